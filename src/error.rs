@@ -1,0 +1,64 @@
+//! What can go wrong, in sentences a user can act on, and the exit code of each.
+
+use std::path::{Path, PathBuf};
+
+/// The result of everything in this crate that can fail.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// Every failure of a job. `Display` gives a full sentence: which file, which record or line, what is wrong, what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The operating system refused something that may succeed later (exit code 1).
+    #[error("cannot {action} {}: {source}", path.display())]
+    Io {
+        /// What was tried, as a verb: "read", "create", "write".
+        action: &'static str,
+        /// The file or directory.
+        path: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// The job does not fit the memory it was given (exit code 1).
+    #[error("not enough memory: {0}")]
+    Memory(String),
+    /// The command line or the configuration is wrong (exit code 2).
+    #[error("{0}")]
+    Config(String),
+    /// An input file cannot be used (exit code 3).
+    #[error("{}: {what}", path.display())]
+    Input {
+        /// The input file.
+        path: PathBuf,
+        /// The record or line, what is wrong with it and what to do.
+        what: String,
+    },
+    /// The inputs are readable, but there is nothing to triangulate in them (exit code 3).
+    #[error("{0}")]
+    NoTerrain(String),
+    /// Something this program guarantees does not hold (exit code 4).
+    #[error("internal check failed: {0}; please report this with the configuration and the input")]
+    Broken(String),
+}
+
+impl Error {
+    /// The process exit code: 1 may be retried, 2 usage or configuration, 3 bad input, 4 internal invariant broken.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Error::Io { .. } | Error::Memory(_) => 1,
+            Error::Config(_) => 2,
+            Error::Input { .. } | Error::NoTerrain(_) => 3,
+            Error::Broken(_) => 4,
+        }
+    }
+
+    /// An I/O failure while doing `action` ("read", "write" ...) to `path`; for `map_err`.
+    pub fn io(action: &'static str, path: impl AsRef<Path>) -> impl FnOnce(std::io::Error) -> Error {
+        let path = path.as_ref().to_path_buf();
+        move |source| Error::Io { action, path, source }
+    }
+
+    /// An input file that cannot be used, and why.
+    pub fn input(path: impl AsRef<Path>, what: impl Into<String>) -> Error {
+        Error::Input { path: path.as_ref().to_path_buf(), what: what.into() }
+    }
+}

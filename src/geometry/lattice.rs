@@ -1,0 +1,166 @@
+//! The job-wide integer grid on which all sites lie: `world = offset + resolution * integer`, in exact decimals.
+
+use rust_decimal::Decimal;
+use rust_decimal::prelude::ToPrimitive;
+use serde::{Deserialize, Serialize};
+
+/// Lattice integers in x and y lie within this of zero, so that the predicates cannot overflow.
+pub const REACH: i32 = 1 << 29;
+
+/// The lattice of a job. Units are those of the source.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Lattice {
+    /// World coordinates (x, y, z) of the lattice point (0, 0, 0).
+    #[serde(with = "decimal_text_array")]
+    pub offset: [Decimal; 3],
+    /// Step in x and y.
+    #[serde(with = "decimal_text")]
+    pub resolution: Decimal,
+    /// Step in z.
+    #[serde(with = "decimal_text")]
+    pub resolution_z: Decimal,
+}
+
+impl Lattice {
+    /// The step along `axis` (0: x, 1: y, 2: z).
+    pub fn step(&self, axis: usize) -> Decimal {
+        if axis == 2 { self.resolution_z } else { self.resolution }
+    }
+
+    /// The world coordinate of lattice integer `i` on `axis`, correctly rounded.
+    pub fn world(&self, axis: usize, i: i32) -> f64 {
+        let exact = self.offset[axis] + self.step(axis) * Decimal::from(i);
+        exact.to_f64().unwrap_or(f64::NAN)
+    }
+}
+
+/// The decimal number that the shortest text of `value` says: 0.1 for the `f64` nearest to one tenth.
+/// `None` where it is not finite or needs more than 28 digits.
+pub fn shortest_decimal(value: f64) -> Option<Decimal> {
+    if !value.is_finite() {
+        return None;
+    }
+    let text = format!("{value}");
+    Decimal::from_str_exact(&text).ok().map(|d| d.normalize())
+}
+
+/// The exact way from one axis of an input, `world = offset + scale * raw`, to the lattice:
+/// `integer = round((raw * mul + add) / div)`, halves away from zero.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AxisMap {
+    mul: i128,
+    add: i128,
+    div: i128,
+}
+
+impl AxisMap {
+    /// The map for an input axis with this `offset` and `scale` to a lattice axis. `None` where the numbers have more
+    /// digits than can be compared exactly, or a step is not positive.
+    pub fn new(offset: Decimal, scale: Decimal, lattice_offset: Decimal, resolution: Decimal) -> Option<AxisMap> {
+        let shift = offset.checked_sub(lattice_offset)?.normalize();
+        let (scale, resolution) = (scale.normalize(), resolution.normalize());
+        if scale <= Decimal::ZERO || resolution <= Decimal::ZERO {
+            return None;
+        }
+        let digits = shift.scale().max(scale.scale()).max(resolution.scale());
+        let integer = |d: Decimal| 10i128.checked_pow(digits - d.scale())?.checked_mul(d.mantissa());
+        let (mul, add, div) = (integer(scale)?, integer(shift)?, integer(resolution)?);
+        let common = gcd(gcd(mul, add.abs()), div);
+        let map = AxisMap { mul: mul / common, add: add / common, div: div / common };
+        // Room for any 32-bit or 10^18 mantissa without overflow.
+        (map.mul < 1 << 60 && map.add.abs() < 1 << 120 && map.div < 1 << 120).then_some(map)
+    }
+
+    /// Whether every raw value meets a lattice point, so that nothing is rounded.
+    pub fn is_exact(&self) -> bool {
+        self.div == 1
+    }
+
+    /// The lattice integer of `raw`, and whether it was rounded; `None` outside the range of `i32`.
+    #[inline]
+    pub fn apply(&self, raw: i64) -> Option<(i32, bool)> {
+        let numerator = raw as i128 * self.mul + self.add;
+        if self.div == 1 {
+            return Some((i32::try_from(numerator).ok()?, false));
+        }
+        let (quotient, rest) = (numerator.div_euclid(self.div), numerator.rem_euclid(self.div));
+        let up = 2 * rest > self.div || (2 * rest == self.div && numerator >= 0);
+        Some((i32::try_from(quotient + up as i128).ok()?, rest != 0))
+    }
+}
+
+fn gcd(a: i128, b: i128) -> i128 {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
+mod decimal_text {
+    use rust_decimal::Decimal;
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    pub(super) fn serialize<S: Serializer>(value: &Decimal, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(value)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Decimal, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        Decimal::from_str_exact(&text).map_err(serde::de::Error::custom)
+    }
+}
+
+mod decimal_text_array {
+    use rust_decimal::Decimal;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub(super) fn serialize<S: Serializer>(value: &[Decimal; 3], serializer: S) -> Result<S::Ok, S::Error> {
+        value.map(|d| d.to_string()).serialize(serializer)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[Decimal; 3], D::Error> {
+        let texts = <[String; 3]>::deserialize(deserializer)?;
+        let mut values = [Decimal::ZERO; 3];
+        for (value, text) in values.iter_mut().zip(&texts) {
+            *value = Decimal::from_str_exact(text).map_err(serde::de::Error::custom)?;
+        }
+        Ok(values)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn decimal(text: &str) -> Decimal {
+        Decimal::from_str_exact(text).unwrap()
+    }
+
+    #[test]
+    fn the_same_scale_and_a_whole_shift_is_exact() {
+        let map = AxisMap::new(decimal("1000.5"), decimal("0.01"), decimal("600000"), decimal("0.01")).unwrap();
+        assert!(map.is_exact());
+        assert_eq!(map.apply(5), Some((-59899945, false)));
+    }
+
+    #[test]
+    fn a_finer_input_is_rounded_to_the_nearest_step() {
+        let map = AxisMap::new(decimal("0"), decimal("0.001"), decimal("0"), decimal("0.01")).unwrap();
+        assert!(!map.is_exact());
+        let rounded: Vec<_> = [14, 15, 16, -14, -15, -16, 20].iter().map(|&raw| map.apply(raw).unwrap()).collect();
+        let expected = [(1, true), (2, true), (2, true), (-1, true), (-2, true), (-2, true), (2, false)];
+        assert_eq!(rounded, expected);
+    }
+
+    #[test]
+    fn what_leaves_the_range_is_refused() {
+        let map = AxisMap::new(decimal("1"), decimal("1"), decimal("0"), decimal("0.001"));
+        assert_eq!(map.unwrap().apply(i32::MAX as i64), None);
+        assert!(AxisMap::new(decimal("0"), decimal("0"), decimal("0"), decimal("1")).is_none());
+    }
+
+    #[test]
+    fn shortest_decimals_are_what_people_wrote() {
+        assert_eq!(shortest_decimal(0.00025).unwrap().to_string(), "0.00025");
+        assert_eq!(shortest_decimal(-123456.789).unwrap().to_string(), "-123456.789");
+        assert_eq!(shortest_decimal(f64::NAN), None);
+        assert_eq!(shortest_decimal(1e300), None);
+    }
+}

@@ -1,0 +1,75 @@
+//! The two decisions everything rests on, `orient2d` and `in_circle`, exact on lattice coordinates.
+//!
+//! Coordinates lie within `lattice::REACH` (2^29) of zero, so differences stay within 2^30: the orientation determinant
+//! fits an `i64`, the in-circle determinant an `i128`.
+
+use super::Site;
+
+/// Relative error of the floating-point in-circle determinant on exactly represented differences,
+/// (10 + 96 eps) eps in Shewchuk 1997, "Adaptive Precision Floating-Point Arithmetic", rounded up.
+const IN_CIRCLE_ERROR: f64 = 1.2e-15;
+
+/// Twice the signed area of triangle abc in square lattice steps: positive if a, b, c turn left. Exact.
+#[inline(always)]
+pub fn orient2d(a: Site, b: Site, c: Site) -> i64 {
+    let (abx, aby) = (b[0] as i64 - a[0] as i64, b[1] as i64 - a[1] as i64);
+    let (acx, acy) = (c[0] as i64 - a[0] as i64, c[1] as i64 - a[1] as i64);
+    abx * acy - aby * acx
+}
+
+/// Whether `d` is inside the circle through the counterclockwise triangle `abc`, ties decided by [`tie`].
+///
+/// This is the canonical decision of the whole project: an edge ac shared by the triangles abc and acd is Delaunay
+/// if and only if `!in_circle(a, b, c, d)`, and exactly one diagonal of every strictly convex quadrilateral is.
+#[inline(always)]
+pub fn in_circle(a: Site, b: Site, c: Site, d: Site) -> bool {
+    let diff = |p: Site| (p[0] as f64 - d[0] as f64, p[1] as f64 - d[1] as f64);
+    let ((ax, ay), (bx, by), (cx, cy)) = (diff(a), diff(b), diff(c));
+    let (al, bl, cl) = (ax * ax + ay * ay, bx * bx + by * by, cx * cx + cy * cy);
+    let (bc, cb) = (bx * cy, cx * by);
+    let (ca, ac) = (cx * ay, ax * cy);
+    let (ab, ba) = (ax * by, bx * ay);
+    let det = al * (bc - cb) + bl * (ca - ac) + cl * (ab - ba);
+    let permanent = al * (bc.abs() + cb.abs()) + bl * (ca.abs() + ac.abs()) + cl * (ab.abs() + ba.abs());
+    if det.abs() > IN_CIRCLE_ERROR * permanent {
+        return det > 0.0;
+    }
+    in_circle_exact(a, b, c, d)
+}
+
+/// The decision of [`in_circle`] where floating point is in doubt.
+#[cold]
+#[inline(never)]
+fn in_circle_exact(a: Site, b: Site, c: Site, d: Site) -> bool {
+    match in_circle_determinant(a, b, c, d).signum() {
+        0 => tie(a, b, c, d),
+        sign => sign > 0,
+    }
+}
+
+/// The in-circle determinant of the counterclockwise triangle `abc` and `d`: positive inside, zero on the circle. Exact.
+pub fn in_circle_determinant(a: Site, b: Site, c: Site, d: Site) -> i128 {
+    let diff = |p: Site| (p[0] as i64 - d[0] as i64, p[1] as i64 - d[1] as i64);
+    let ((ax, ay), (bx, by), (cx, cy)) = (diff(a), diff(b), diff(c));
+    let term = |px: i64, py: i64, qx: i64, qy: i64, rx: i64, ry: i64| {
+        (px * px + py * py) as i128 * (qx * ry - qy * rx) as i128
+    };
+    term(ax, ay, bx, by, cx, cy) + term(bx, by, cx, cy, ax, ay) + term(cx, cy, ax, ay, bx, by)
+}
+
+/// Four distinct sites on one circle: the one that is last in lexicographic (x, y) order counts as outside the circle of the
+/// other three. This is the symbolic perturbation of Devillers and Teillaud 2011, "Perturbations for Delaunay and
+/// weighted Delaunay 3D triangulations", where the last site in the order is raised most; since no three sites of a
+/// circle are collinear, its first step always decides.
+fn tie(a: Site, b: Site, c: Site, d: Site) -> bool {
+    let last = a.max(b).max(c).max(d);
+    if last == d {
+        false
+    } else if last == c {
+        orient2d(a, b, d) > 0
+    } else if last == b {
+        orient2d(a, d, c) > 0
+    } else {
+        orient2d(d, b, c) > 0
+    }
+}

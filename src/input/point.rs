@@ -1,0 +1,32 @@
+//! One input point on the lattice, as it is spilled to disk.
+
+use bytemuck::{Pod, Zeroable};
+
+/// A point that passed the filters, in lattice steps. 24 bytes without padding, so that slices of it are slices of bytes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+pub struct Point {
+    /// Lattice integers in x and y, within `lattice::REACH` of zero.
+    pub position: [i32; 2],
+    /// Lattice integer in z.
+    pub z: i32,
+    /// Red, green and blue as the file has them (0 where it has none).
+    pub rgb: [u16; 3],
+    /// ASPRS classification code (0 where the file has none).
+    pub class: u8,
+    order_high: u8,
+    order_low: u32,
+}
+
+impl Point {
+    /// A point; `order` is its number in the whole job, counting the records of all files in the order of the
+    /// configuration, and must be below 2^40.
+    pub fn new(position: [i32; 2], z: i32, rgb: [u16; 3], class: u8, order: u64) -> Point {
+        Point { position, z, rgb, class, order_high: (order >> 32) as u8, order_low: order as u32 }
+    }
+
+    /// The number of this point's record in the whole job.
+    pub fn order(&self) -> u64 {
+        (self.order_high as u64) << 32 | self.order_low as u64
+    }
+}

@@ -1,0 +1,10 @@
+//! Streams point clouds of any size into one exact Delaunay triangulation and writes it as glTF terrain.
+//!
+//! Start reading at `job::run`, which lists the steps of a job in order; ARCHITECTURE.md follows the data.
+
+pub mod error;
+pub mod geometry;
+pub mod input;
+pub mod triangulation;
+
+pub use error::{Error, Result};

@@ -1,0 +1,3 @@
+//! The command line: parse, run, print the error, exit with its code.
+
+fn main() {}

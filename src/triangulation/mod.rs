@@ -1,0 +1,3 @@
+//! The Delaunay triangulation of the sites of one tile.
+
+pub mod mesh;
