@@ -205,7 +205,11 @@ impl TryFrom<f64> for Share {
     type Error = String;
 
     fn try_from(share: f64) -> std::result::Result<Share, String> {
-        if (0.0..=1.0).contains(&share) { Ok(Share(share)) } else { Err(format!("a share lies between 0 and 1, not {share}")) }
+        if (0.0..=1.0).contains(&share) {
+            Ok(Share(share))
+        } else {
+            Err(format!("a share lies between 0 and 1, not {share}"))
+        }
     }
 }
 
@@ -299,7 +303,8 @@ impl TryFrom<String> for Memory {
     type Error = String;
 
     fn try_from(text: String) -> std::result::Result<Memory, String> {
-        let bytes = parse_memory(&text).ok_or_else(|| format!("memory is a text such as \"4 GiB\" or \"800 MB\", not {text:?}"))?;
+        let bytes = parse_memory(&text)
+            .ok_or_else(|| format!("memory is a text such as \"4 GiB\" or \"800 MB\", not {text:?}"))?;
         if bytes < Memory::LEAST {
             return Err(format!("memory must be at least {}", Memory(Memory::LEAST)));
         }
@@ -375,7 +380,9 @@ impl Config {
             return Err("[input] files is empty: name at least one point cloud".into());
         }
         if config.input.classes.as_ref().is_some_and(Vec::is_empty) {
-            return Err("[input] classes is empty, which would leave no point; leave the key out to keep all but noise".into());
+            return Err(
+                "[input] classes is empty, which would leave no point; leave the key out to keep all but noise".into(),
+            );
         }
         if config.output.directory.as_os_str().is_empty() {
             return Err("[output] directory is empty".into());

@@ -45,7 +45,11 @@ pub fn covered(mesh: &Mesh, boundary: &[[u32; 2]]) -> Result<Vec<bool>> {
         half_edges.clone().map(|h| wanted.binary_search(&[mesh.origin(h), mesh.destination(h)]).is_ok()).collect();
     let found = is_boundary.iter().filter(|&&b| b).count();
     if found != boundary.len() {
-        return Err(Error::Broken(format!("{} of {} closed edges are not in the merge", boundary.len() - found, boundary.len())));
+        return Err(Error::Broken(format!(
+            "{} of {} closed edges are not in the merge",
+            boundary.len() - found,
+            boundary.len()
+        )));
     }
     let mut covered = vec![false; mesh.triangles.len()];
     let mut pending: Vec<u32> = half_edges.filter(|&h| is_boundary[h as usize]).map(|h| h / 3).collect();

@@ -1,9 +1,9 @@
 //! The files between steps: a few columns of plain values each, in the machine's byte order, written whole.
 
 use super::directory::write_whole;
+use crate::positioned::read_exact_at;
 use crate::{Error, Result};
 use bytemuck::Pod;
-use crate::positioned::read_exact_at;
 use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};

@@ -29,7 +29,9 @@ impl Directory {
         for stale in [self.terrain(), self.georeference(), self.report(), self.preview()] {
             remove_file(&stale)?;
         }
-        for directory in ["leaves", "nodes", "rims", "preview"].map(|name| self.job.join(name)).into_iter().chain([self.tiles()]) {
+        for directory in
+            ["leaves", "nodes", "rims", "preview"].map(|name| self.job.join(name)).into_iter().chain([self.tiles()])
+        {
             fs::create_dir_all(&directory).map_err(Error::io("create the directory", &directory))?;
         }
         Ok(())

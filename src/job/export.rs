@@ -62,7 +62,8 @@ pub fn run(directory: &Directory, tree: &Tree, tile: usize, look: &Look, canvas:
     let own = seam_of(directory, tree, tile)?.into_iter().filter(|triangle| owner(triangle) == tile as u32);
     let seam_triangles = sites.add_seam(directory, tile as u32, own, look)?;
     let content = sites.into_tile(look);
-    let mut figures = TileFigures { triangles: content.triangles.len() as u64, seam_triangles, ..TileFigures::default() };
+    let mut figures =
+        TileFigures { triangles: content.triangles.len() as u64, seam_triangles, ..TileFigures::default() };
     ColumnWriter::default().push(&canvas.draw(&content)).write(&directory.preview_fragment(tile))?;
     if !content.triangles.is_empty() {
         let mut bytes = Vec::new();

@@ -60,7 +60,8 @@ impl Grid {
     /// The bucket numbers of `span`, row by row.
     pub fn in_span(&self, span: Span) -> impl Iterator<Item = usize> {
         let columns = self.columns;
-        (span.min[1]..span.max[1]).flat_map(move |row| (span.min[0]..span.max[0]).map(move |column| (row * columns + column) as usize))
+        (span.min[1]..span.max[1])
+            .flat_map(move |row| (span.min[0]..span.max[0]).map(move |column| (row * columns + column) as usize))
     }
 
     /// The lattice coordinate at which bucket line `line` along `axis` begins.
@@ -131,7 +132,8 @@ impl Sums {
             low
         };
         let total = self.points(span);
-        let line = (span.min[axis] + 1..span.max[axis]).min_by_key(|&line| (2 * self.points(below(line))).abs_diff(total))?;
+        let line =
+            (span.min[axis] + 1..span.max[axis]).min_by_key(|&line| (2 * self.points(below(line))).abs_diff(total))?;
         let mut high = span;
         high.min[axis] = line;
         let [low_cell, high_cell] = cell.cut(axis, self.grid.line(axis, line));

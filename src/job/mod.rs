@@ -151,7 +151,8 @@ fn enough_triangles(triangles: u64) -> Result<()> {
         return Ok(());
     }
     Err(Error::NoTerrain(
-        "the points make no triangle: it takes at least three different places in x and y that are not on one line".into(),
+        "the points make no triangle: it takes at least three different places in x and y that are not on one line"
+            .into(),
     ))
 }
 

@@ -127,14 +127,10 @@ fn decode_all(task: &Task, records: u64, grid: &Grid, buckets: &Buckets, stage: 
         }
         Ok(Summary { tally, bounds: scatter.bounds })
     };
-    pieces
-        .par_iter()
-        .with_max_len(1)
-        .map(decode)
-        .try_reduce(Summary::default, |mut a, b| {
-            a += b;
-            Ok(a)
-        })
+    pieces.par_iter().with_max_len(1).map(decode).try_reduce(Summary::default, |mut a, b| {
+        a += b;
+        Ok(a)
+    })
 }
 
 fn too_many_malformed(source: &Source, tally: &Tally, malformed: u64, records: u64) -> Error {

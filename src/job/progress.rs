@@ -35,14 +35,26 @@ impl Progress {
     pub fn stage(self, name: &'static str, total: u64, unit: &'static str) -> Stage {
         let bar = match self {
             Progress::Bars => {
-                let template = format!("{{prefix:>12}} {{bar:30}} {{percent:>3}} %  {{human_pos}} of {{human_len}} {unit}, {{per_sec}}, {{eta}} left");
+                let template = format!(
+                    "{{prefix:>12}} {{bar:30}} {{percent:>3}} %  {{human_pos}} of {{human_len}} {unit}, {{per_sec}}, {{eta}} left"
+                );
                 let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
                 ProgressBar::new(total).with_style(style).with_prefix(name)
             }
             _ => ProgressBar::hidden(),
         };
         let now = Instant::now();
-        Stage { progress: self, name, unit, total, bar, done: AtomicU64::new(0), start: now, cpu_start: cpu_seconds(), logged: Mutex::new(now) }
+        Stage {
+            progress: self,
+            name,
+            unit,
+            total,
+            bar,
+            done: AtomicU64::new(0),
+            start: now,
+            cpu_start: cpu_seconds(),
+            logged: Mutex::new(now),
+        }
     }
 }
 

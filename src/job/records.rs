@@ -62,7 +62,12 @@ impl Leaf {
     /// [`crate::Error::Io`], or [`crate::Error::Broken`] if the file is not whole.
     pub fn load(directory: &Directory, tile: usize) -> Result<Leaf> {
         let mut columns = ColumnReader::open(&directory.leaf(tile))?;
-        Ok(Leaf { positions: columns.next()?, rgb: columns.next()?, class: columns.next()?, triangles: columns.next()? })
+        Ok(Leaf {
+            positions: columns.next()?,
+            rgb: columns.next()?,
+            class: columns.next()?,
+            triangles: columns.next()?,
+        })
     }
 }
 

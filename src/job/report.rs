@@ -78,9 +78,9 @@ pub struct Parts {
 
 impl Report {
     /// Puts the report together.
-    pub fn new(plan: &Plan, mut parts: Parts) -> Report {
+    pub fn new(plan: &Plan, parts: Parts) -> Report {
         let mut warnings = plan.warnings.clone();
-        warnings.append(&mut parts.points.examples.clone());
+        warnings.extend_from_slice(&parts.points.examples);
         Report {
             generator: concat!("gdt-batch ", env!("CARGO_PKG_VERSION")).into(),
             sites: parts.leaves.sites,

@@ -82,7 +82,7 @@ fn expand(patterns: &[String]) -> Result<Vec<PathBuf>> {
         let found = glob::glob(pattern).map_err(|e| Error::Config(format!("[input] files: {pattern}: {e}")))?;
         let before = paths.len();
         for path in found {
-            let path = path.map_err(|e| Error::Io { action: "read", path: e.path().into(), source: e.into_error() })?;
+            let path = path.map_err(|e| Error::io("read", e.path().to_path_buf())(e.into()))?;
             if path.is_file() && !paths.contains(&path) {
                 paths.push(path);
             }
@@ -129,7 +129,9 @@ fn unit_of(choice: UnitChoice, crs: &Crs, warnings: &mut Vec<String>) -> Result<
         (UnitChoice::UsFoot, _) | (UnitChoice::Auto, Unit::UsFoot) => Ok(("us-foot", US_FOOT)),
         (UnitChoice::Auto, Unit::Other(metres)) => Ok(("other", metres)),
         (UnitChoice::Auto, Unit::Unknown) => {
-            warnings.push("no input says the unit of its coordinates; taken as metres (set [input] unit to say otherwise)".into());
+            warnings.push(
+                "no input says the unit of its coordinates; taken as metres (set [input] unit to say otherwise)".into(),
+            );
             Ok(("metre", 1.0))
         }
         (UnitChoice::Auto, Unit::Degree) => Err(Error::Config(format!(
@@ -177,7 +179,12 @@ impl Area {
 
 /// The finest step of the inputs (or the one the user wants), coarsened by tens until the area fits; the offset near the middle
 /// of the area in x and y and at its foot in z, such that the inputs' own grids meet the lattice.
-fn choose_lattice(sources: &[Source], area: &Area, wanted: Option<Decimal>, warnings: &mut Vec<String>) -> Result<Lattice> {
+fn choose_lattice(
+    sources: &[Source],
+    area: &Area,
+    wanted: Option<Decimal>,
+    warnings: &mut Vec<String>,
+) -> Result<Lattice> {
     let finest = |axes: &[usize]| {
         let scales = sources.iter().flat_map(|s| axes.iter().map(|&axis| s.axes[axis].scale));
         scales.min().unwrap_or(Decimal::ONE).normalize()
@@ -191,7 +198,9 @@ fn choose_lattice(sources: &[Source], area: &Area, wanted: Option<Decimal>, warn
         )));
     }
     if resolution != first {
-        warnings.push(format!("the inputs' step of {first} does not fit an area of {size} units: x and y are rounded to {resolution}"));
+        warnings.push(format!(
+            "the inputs' step of {first} does not fit an area of {size} units: x and y are rounded to {resolution}"
+        ));
     }
     let resolution_z = coarsen(finest(&[2]), area.size(2), i32::MAX as f64)?;
     let middle = |axis: usize| (area.min[axis] + area.max[axis]) / 2.0;
@@ -212,8 +221,9 @@ fn phase(sources: &[Source], axis: usize, step: Decimal) -> Result<Decimal> {
     };
     let mut least: Option<Decimal> = None;
     for source in sources {
-        let rest = remainder(source)
-            .ok_or_else(|| Error::input(&source.path, format!("its offset has too many digits for the lattice step {step}")))?;
+        let rest = remainder(source).ok_or_else(|| {
+            Error::input(&source.path, format!("its offset has too many digits for the lattice step {step}"))
+        })?;
         least = Some(least.map_or(rest, |l| l.min(rest)));
     }
     Ok(least.unwrap_or_default())
@@ -222,16 +232,20 @@ fn phase(sources: &[Source], axis: usize, step: Decimal) -> Result<Decimal> {
 /// `step`, ten times as much, and so on, until `size` is less than `steps` of it.
 fn coarsen(mut step: Decimal, size: f64, steps: f64) -> Result<Decimal> {
     while size / step.to_f64().unwrap_or(f64::NAN) >= steps * 0.99 {
-        step = step
-            .checked_mul(Decimal::TEN)
-            .ok_or_else(|| Error::Config(format!("an extent of {size} units is no terrain: check the inputs, or set [input] bounds")))?;
+        step = step.checked_mul(Decimal::TEN).ok_or_else(|| {
+            Error::Config(format!("an extent of {size} units is no terrain: check the inputs, or set [input] bounds"))
+        })?;
     }
     Ok(step.normalize())
 }
 
 /// The whole number next to `near`, or where the lattice through `phase` does not meet it, the lattice point next to that.
 fn lattice_point_near(near: f64, phase: Decimal, step: Decimal) -> Result<Decimal> {
-    let out_of_range = || Error::Config(format!("coordinates around {near:e} have too many digits for the lattice step {step}: check the inputs"));
+    let out_of_range = || {
+        Error::Config(format!(
+            "coordinates around {near:e} have too many digits for the lattice step {step}: check the inputs"
+        ))
+    };
     let near = shortest_decimal(near.round()).ok_or_else(out_of_range)?;
     let steps = near.checked_sub(phase).and_then(|d| d.checked_div(step)).ok_or_else(out_of_range)?.round();
     let point = steps.checked_mul(step).and_then(|d| d.checked_add(phase)).ok_or_else(out_of_range)?;
@@ -241,7 +255,8 @@ fn lattice_point_near(near: f64, phase: Decimal, step: Decimal) -> Result<Decima
 /// Lattice integers xmin, ymin, xmax, ymax of the points within `bounds`, borders included.
 fn lattice_bounds(lattice: &Lattice, bounds: [f64; 4]) -> [i32; 4] {
     std::array::from_fn(|i| {
-        let steps = shortest_decimal(bounds[i]).and_then(|b| b.checked_sub(lattice.offset[i % 2])?.checked_div(lattice.resolution));
+        let steps = shortest_decimal(bounds[i])
+            .and_then(|b| b.checked_sub(lattice.offset[i % 2])?.checked_div(lattice.resolution));
         let steps = steps.map(|s| if i < 2 { s.ceil() } else { s.floor() }).and_then(|s| s.to_i64());
         // Beyond every number: as far out as sites can lie.
         let far = if bounds[i] < 0.0 { -(REACH as i64) } else { REACH as i64 };

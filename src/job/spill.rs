@@ -32,7 +32,11 @@ impl Spill {
     /// [`Error::Io`] if it cannot be made.
     pub fn create(path: &Path) -> Result<Spill> {
         let file = File::options().read(true).write(true).create(true).truncate(true).open(path);
-        Ok(Spill { path: path.to_path_buf(), file: file.map_err(Error::io("create", path))?, points: AtomicU64::new(0) })
+        Ok(Spill {
+            path: path.to_path_buf(),
+            file: file.map_err(Error::io("create", path))?,
+            points: AtomicU64::new(0),
+        })
     }
 
     /// The finished spill file at `path`, to read.

@@ -4,9 +4,9 @@
 use super::directory::Directory;
 use super::records::{Frontier, Rim, RimDraft, RimVertex, RimVertices, Seam, SeamTriangle};
 use super::tree::Tree;
-use crate::{Error, Result};
 use crate::output::frame::Frame;
 use crate::output::normals;
+use crate::{Error, Result};
 
 /// Leaves the finished frontier of `tile` in the job directory.
 ///
