@@ -5,6 +5,7 @@
 pub mod error;
 pub mod geometry;
 pub mod input;
+pub mod output;
 pub mod triangulation;
 
 pub use error::{Error, Result};

@@ -1,0 +1,13 @@
+//! Terrain out: glTF tiles, one scene of all tiles, the georeference and a picture.
+//!
+//! [`frame::Frame`] says where a lattice point lies in a glTF scene; everything that writes or reads positions asks it.
+
+pub mod color;
+pub mod frame;
+pub mod georeference;
+pub mod glb;
+pub mod normals;
+mod parts;
+mod tile;
+
+pub use tile::Tile;
