@@ -8,6 +8,10 @@ pub mod georeference;
 pub mod glb;
 pub mod normals;
 mod parts;
+pub mod picture;
+pub mod preview;
+pub mod read;
+pub mod terrain;
 mod tile;
 
 pub use tile::Tile;
