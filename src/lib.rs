@@ -7,5 +7,6 @@ pub mod geometry;
 pub mod input;
 pub mod output;
 pub mod triangulation;
+pub mod verify;
 
 pub use error::{Error, Result};

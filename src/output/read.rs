@@ -61,6 +61,16 @@ pub fn read_tile(path: &Path) -> Result<TileFile> {
     decoder.tile().map_err(|what| Error::input(path, format!("not a tile of this program: {what}")))
 }
 
+/// The georeference alone of the GLB file at `path`.
+pub fn read_extras(path: &Path) -> Result<Extras> {
+    let container = Container::open(path)?;
+    let mut document: Document = container.document(path)?;
+    if document.scene < document.scenes.len() {
+        return Ok(document.scenes.swap_remove(document.scene).extras);
+    }
+    Err(Error::input(path, "not a tile of this program: there is no scene"))
+}
+
 /// The two chunks of a GLB file.
 pub(super) struct Container {
     file: File,
