@@ -2,7 +2,8 @@
 //!
 //! A vertex is `translation + position`, a node's translation and an f32 of its mesh. Both are whole multiples of the
 //! job's steps, so their sum in f64 is exact and depends on the lattice integers alone: a vertex that several tiles
-//! share has the same bits in all of them. A step is at most half the lattice step, so rounding finds the integer again.
+//! share has the same bits in all of them. A step is at most half the lattice step, so rounding finds the integer again;
+//! it is finer, and positions truer, where the job is small enough for f32.
 
 use rust_decimal::Decimal;
 use rust_decimal::prelude::ToPrimitive;
@@ -24,7 +25,7 @@ pub(super) const PART_REACH: i64 = F32_STEPS - TRANSLATION_STEPS / 2;
 /// Steps are refined below half the resolution by at most this factor, and not below [`FINE_STEP`].
 const REFINEMENT: f64 = 64.0;
 
-/// Metres; a mesh then still reaches 4 km from its translation.
+/// Metres.
 const FINE_STEP: f64 = 1.0 / 4096.0;
 
 /// Lattice steps in metres beyond these bounds are no terrain and would leave the range of f32.
@@ -73,9 +74,16 @@ impl Scale {
                 "a lattice step of {resolution:e} metres in {name} is out of range: set [input] unit and resolution"
             )));
         }
-        let coarse = (resolution / 2.0).log2().floor().exp2();
-        let step = coarse.min(FINE_STEP.max(coarse / REFINEMENT));
+        let step = (resolution / 2.0).log2().floor().exp2();
         Ok(Scale { step, ratio: resolution / step })
+    }
+
+    /// As fine as a mesh that spans so many lattice steps allows, within reason.
+    fn refined(self, lattice_steps: i64) -> Scale {
+        let resolution = self.ratio * self.step;
+        let spanning = (lattice_steps as f64 * resolution / (2 * PART_REACH) as f64).log2().ceil().exp2();
+        let step = self.step.min(spanning.max(FINE_STEP).max(self.step / REFINEMENT));
+        Scale { step, ratio: resolution / step }
     }
 
     /// The glTF steps of lattice integer `i`: a whole number below 2^39.
@@ -93,7 +101,7 @@ fn nearest(value: f64) -> f64 {
 }
 
 impl Frame {
-    /// The frame of a job. `metres_per_unit` is for x and y, `metres_per_unit_z` for z, `crs` is WKT.
+    /// The frame of a job, with steps of about half the lattice's. `metres_per_unit` is for x and y, `metres_per_unit_z` for z, `crs` is WKT.
     ///
     /// Fails where a unit is not positive, or the lattice has more digits than a JSON number keeps.
     pub fn new(lattice: &Lattice, metres_per_unit: f64, metres_per_unit_z: f64, crs: Option<String>) -> Result<Frame> {
@@ -109,6 +117,13 @@ impl Frame {
         let horizontal = Scale::new(extras.resolution * metres_per_unit, "x and y")?;
         let vertical = Scale::new(extras.resolution_z * metres_per_unit_z, "z")?;
         Ok(Frame { extras, horizontal, vertical })
+    }
+
+    /// The frame with finer steps, so that positions are truer, as far as a triangle across a job within these least and
+    /// greatest lattice integers x, y, z can still be written. All tiles of a job need the same frame.
+    pub fn refined(self, bounds: [[i32; 3]; 2]) -> Frame {
+        let [dx, dy, dz] = [0, 1, 2].map(|k| bounds[1][k] as i64 - bounds[0][k] as i64);
+        Frame { horizontal: self.horizontal.refined(dx.max(dy)), vertical: self.vertical.refined(dz), ..self }
     }
 
     /// What is written for readers.

@@ -5,7 +5,9 @@ use std::collections::BTreeMap;
 
 use super::Tile;
 use super::frame::{FINE_GRID, Frame, PART_REACH, origin_between};
+use crate::geometry::lattice::shortest_decimal;
 use crate::{Error, Result};
+use rust_decimal::Decimal;
 
 /// Triangles up to half the reach are grouped by origins this far apart, in steps: half a cell and half a triangle fit.
 const COARSE_GRID: i64 = 1 << 24;
@@ -86,11 +88,18 @@ fn too_long(frame: &Frame, corners: [[i32; 3]; 3]) -> Error {
     } else {
         (extras.resolution, "in x and y", length[0].max(length[2]))
     };
-    // Steps are powers of two: one that holds the triangle may have to be twice what the ratio says.
-    let workable = resolution * 10f64.powf((2.0 * factor).log10().ceil());
+    let workable = coarser(resolution, factor);
     Error::Config(format!(
         "a triangle that is {extent:.1} m long cannot be written exactly with a resolution of {resolution} {key} \
          (glTF has 24 binary digits for a coordinate): set [input] resolution = {workable} or coarser, or leave out \
          the far-off points with bounds"
     ))
+}
+
+/// `resolution` times the least power of ten that makes room for a triangle `factor` times too long.
+fn coarser(resolution: f64, factor: f64) -> String {
+    // Ten times the resolution gives at least eight times the step, a power of two.
+    let tens = factor.log(8.0).ceil().clamp(1.0, 20.0) as i32;
+    let exact = shortest_decimal(resolution).and_then(|r| (0..tens).try_fold(r, |r, _| r.checked_mul(Decimal::TEN)));
+    exact.map_or_else(|| format!("{:e}", resolution * 10f64.powi(tens)), |r| r.normalize().to_string())
 }
