@@ -6,5 +6,6 @@ pub mod error;
 pub mod geometry;
 pub mod input;
 pub mod triangulation;
+pub mod voronoi;
 
 pub use error::{Error, Result};
