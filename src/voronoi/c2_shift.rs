@@ -51,7 +51,6 @@ impl Shift {
                 }
             }
             if self.inverted.is_empty() {
-                counts.removed += self.removed.len() as u64;
                 return Ok(());
             }
         }
@@ -83,7 +82,7 @@ impl Shift {
     fn flip(&mut self, sphere: &mut Sphere, h: u32) {
         let g = sphere.twin(h);
         sphere.flip(h);
-        self.suspects.extend([h, next(h), previous(h), next(g), previous(g)]);
+        self.suspects.extend([h, next(h), previous(h), g, previous(g)]);
     }
 
     /// Takes the triangle of hull edge `h` off the mesh if its apex lies beside the edge: the hull then goes by it.
@@ -106,7 +105,7 @@ impl Shift {
     }
 
     /// Takes the vertex at which `h` starts out if the hole can be filled with counterclockwise triangles.
-    fn take_out(&mut self, sphere: &mut Sphere, sites: &[Site], h: u32) -> bool {
+    pub(super) fn take_out(&mut self, sphere: &mut Sphere, sites: &[Site], h: u32) -> bool {
         let vertex = sphere.origin(h);
         let Some(star) = sphere.star(h) else { return false };
         let Some(fill) = star.fill(sites, sphere.infinity(), false) else { return false };

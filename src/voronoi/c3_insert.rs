@@ -28,7 +28,7 @@ pub(super) fn insert(
         let h = sides[(side & 3) as usize];
         let g = sphere.twin(h);
         sphere.flip(h);
-        flips.suspects.extend([next(h), previous(h), next(g), previous(g)]);
+        flips.suspects.extend([h, previous(h), g, previous(g)]);
     }
     flips.run(sphere, sites)
 }

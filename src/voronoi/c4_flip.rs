@@ -1,7 +1,7 @@
 //! Step C4: flip edges until all are Delaunay (Lawson), by the canonical in-circle test.
 
 use super::Rejected;
-use super::sphere::{Sphere, next, previous};
+use super::sphere::{Sphere, previous};
 use crate::geometry::Site;
 
 /// Flips and steps allowed per site; more are a sign of a mesh that is no triangulation, or of a leaf that this is no
@@ -43,7 +43,7 @@ impl Flips {
             let g = sphere.twin(h);
             sphere.flip(h);
             self.done += 1;
-            self.suspects.extend([next(h), previous(h), next(g), previous(g)]);
+            self.suspects.extend([h, previous(h), g, previous(g)]);
         }
         Ok(())
     }

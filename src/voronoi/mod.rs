@@ -115,9 +115,10 @@ pub fn triangulate(sites: &[Site], scratch: &mut Scratch) -> Result<(Mesh, Count
     shift.test(sphere, at, &mut counts);
     shift.repair(sphere, at, &mut counts)?;
     // C1: complete the hull.
-    std::mem::swap(&mut flips.suspects, &mut shift.suspects);
-    c1_hull::complete_hull(sphere, at, &mut flips.suspects)?;
+    c1_hull::complete_hull(sphere, at, shift)?;
+    counts.removed = shift.removed.len() as u64;
     // C4: flip to Delaunay; C3: insert what is missing into that, flipping as it goes.
+    std::mem::swap(&mut flips.suspects, &mut shift.suspects);
     flips.run(sphere, at)?;
     for &[vertex, near] in &shift.removed {
         c3_insert::insert(sphere, at, vertex, near, flips)?;

@@ -150,30 +150,19 @@ impl Sphere {
         self.corners(h).is_some_and(|c| c.contains(&self.infinity))
     }
 
-    /// Replaces edge `h` by the other diagonal of its two triangles. The outer half-edges are then
-    /// `next(h)`, `previous(h)`, `next(twin)`, `previous(twin)`, and the diagonal is `h` with its twin.
+    /// Replaces edge `h` by the other diagonal of its two triangles. With `g` the twin of `h`, the diagonal is then `next(h)`
+    /// and `next(g)`, and the rim `h`, `previous(h)`, `g`, `previous(g)`.
     #[inline(always)]
     pub(super) fn flip(&mut self, h: u32) {
         let g = self.twin(h);
-        let (hn, hp, gn, gp) = (next(h), previous(h), next(g), previous(g));
-        let (w, z) = (self.origin(hp), self.origin(gp));
-        let (outer_hn, outer_gn) = (self.twin(hn), self.twin(gn));
-        // h: u -> v with apex w becomes z -> w with apex u's side kept in place: (z, w, u) and (w, z, v).
-        self.records[h as usize] = z;
-        self.records[g as usize] = w;
-        // h now runs z -> w, followed by w -> u (the old hp); before it u -> z (the old gn).
-        // g now runs w -> z, followed by z -> v (the old gp); before it v -> w (the old hn).
-        let u = self.origin(gn);
-        let v = self.origin(hn);
-        self.records[hn as usize] = w;
-        self.records[hp as usize] = u;
-        self.records[gn as usize] = z;
-        self.records[gp as usize] = v;
-        let (outer_hp, outer_gp) = (self.twin(hp), self.twin(gp));
-        self.link(hn, outer_hp);
-        self.link(hp, outer_gn);
-        self.link(gn, outer_gp);
-        self.link(gp, outer_hn);
+        let (h_next, g_next) = (next(h), next(g));
+        let (h_apex, g_apex) = (self.apex(h), self.apex(g));
+        let (outer_h, outer_g) = (self.twin(h_next), self.twin(g_next));
+        self.records[h_next as usize] = g_apex;
+        self.records[g_next as usize] = h_apex;
+        self.link(h, outer_g);
+        self.link(g, outer_h);
+        self.link(h_next, g_next);
     }
 
     /// Splits the triangle of `h` at the new vertex `v`; returns the half-edges of the old triangle's sides.
