@@ -1,105 +1,21 @@
 //! Point clouds of every kind in: real ones against what is known of them and against another reader, made-up ones of
 //! every point format, and broken ones.
 
+#[path = "common/cloud.rs"]
+mod cloud;
 mod common;
 #[path = "common/las_file.rs"]
 mod las_file;
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use gdt_batch::geometry::lattice::{AxisMap, Lattice, REACH};
-use gdt_batch::input::{Format, Point, Rules, Source, Tally, TextOptions, Unit, open};
-use gdt_batch::{Error, Result};
+use cloud::{Cloud, decode, file, lattice, read, read_bytes, rules, survives};
+use gdt_batch::Error;
+use gdt_batch::geometry::lattice::REACH;
+use gdt_batch::input::{Point, TextOptions, Unit, open};
 use las_file::{LasFile, points_at};
 use proptest::prelude::*;
-use rust_decimal::Decimal;
-use rust_decimal::prelude::ToPrimitive;
-
-/// A file, all its points, and the lattice they are on.
-struct Cloud {
-    source: Source,
-    lattice: Lattice,
-    points: Vec<Point>,
-    tally: Tally,
-}
-
-/// A lattice for `source` with its middle in the middle, of the finer of the steps in x and y if that fits.
-fn lattice(source: &Source) -> Lattice {
-    let middle = |axis: usize| {
-        let value = (source.min[axis] + source.max[axis]) / 2.0;
-        Decimal::try_from(value).unwrap_or_default().round()
-    };
-    let extent = (source.max[0] - source.min[0]).max(source.max[1] - source.min[1]);
-    let [x, y] = [source.axes[0].scale, source.axes[1].scale];
-    let fits = extent / x.min(y).to_f64().unwrap() < 2.0 * REACH as f64;
-    let resolution = if fits { x.min(y) } else { x.max(y) };
-    Lattice { offset: [middle(0), middle(1), Decimal::ZERO], resolution, resolution_z: source.axes[2].scale }
-}
-
-fn rules(source: &Source, lattice: &Lattice) -> Rules {
-    let map = |axis: usize| {
-        let own = source.axes[axis];
-        AxisMap::new(own.offset, own.scale, lattice.offset[axis], lattice.step(axis)).unwrap()
-    };
-    Rules { maps: [map(0), map(1), map(2)], classes: [true; 256], bounds: None, first_order: 0, rgb: true }
-}
-
-fn decode(source: &Source, rules: &Rules) -> Result<(Vec<Point>, Tally)> {
-    let (mut points, mut tally) = (Vec::new(), Tally::default());
-    for piece in 0..source.pieces() {
-        tally += source.decode(piece, rules, &mut |slice| {
-            assert!(!slice.is_empty() && slice.len() <= 65_536);
-            points.extend_from_slice(slice);
-            Ok(())
-        })?;
-    }
-    let dropped = tally.withheld + tally.other_class + tally.out_of_bounds + tally.malformed;
-    assert_eq!(tally.read, dropped + tally.kept);
-    assert_eq!(tally.kept, points.len() as u64);
-    assert_eq!(tally.read, source.records);
-    Ok((points, tally))
-}
-
-fn read_with(path: &Path, options: &TextOptions) -> Result<Cloud> {
-    let source = open(path, options)?;
-    let lattice = lattice(&source);
-    let (points, tally) = decode(&source, &rules(&source, &lattice))?;
-    Ok(Cloud { source, lattice, points, tally })
-}
-
-fn read(path: &Path) -> Result<Cloud> {
-    read_with(path, &TextOptions::default())
-}
-
-/// A file of `bytes` under a name with `extension`, gone when dropped.
-fn file(extension: &str, bytes: &[u8]) -> tempfile::TempPath {
-    let file = tempfile::Builder::new().suffix(extension).tempfile().unwrap();
-    std::fs::write(file.path(), bytes).unwrap();
-    file.into_temp_path()
-}
-
-fn read_bytes(extension: &str, bytes: &[u8]) -> Result<Cloud> {
-    read(&file(extension, bytes))
-}
-
-impl Cloud {
-    fn bounds(&self) -> [[f64; 2]; 3] {
-        [0, 1, 2].map(|axis| {
-            let lattice = |point: &Point| if axis == 2 { point.z } else { point.position[axis] };
-            let values = self.points.iter().map(lattice);
-            [values.clone().min(), values.max()].map(|value| self.lattice.world(axis, value.unwrap()))
-        })
-    }
-
-    fn classes(&self) -> BTreeMap<u8, usize> {
-        let mut classes = BTreeMap::new();
-        for point in &self.points {
-            *classes.entry(point.class).or_default() += 1;
-        }
-        classes
-    }
-}
 
 /// What is known of a real file: name, bounds of x, y, z, points by class, greatest colour.
 type Known = (&'static str, [[f64; 2]; 3], &'static [(u8, usize)], u16);
@@ -160,15 +76,33 @@ const KNOWN: [Known; 20] = [
     ("data.xyz", [[440750.0, 441890.0], [3750150.0, 3751290.0], [74.0, 255.0]], &[(0, 400)], 0),
 ];
 
+/// Least and greatest x, y, z of the points.
+fn bounds(cloud: &Cloud) -> [[f64; 2]; 3] {
+    [0, 1, 2].map(|axis| {
+        let lattice = |point: &Point| if axis == 2 { point.z } else { point.position[axis] };
+        let values = cloud.points.iter().map(lattice);
+        [values.clone().min(), values.max()].map(|value| cloud.lattice.world(axis, value.unwrap()))
+    })
+}
+
+/// The number of points of each class.
+fn classes(cloud: &Cloud) -> BTreeMap<u8, usize> {
+    let mut classes = BTreeMap::new();
+    for point in &cloud.points {
+        *classes.entry(point.class).or_default() += 1;
+    }
+    classes
+}
+
 #[test]
 fn real_files_hold_what_is_known_of_them() {
     let Some(shared) = common::shared() else { return };
-    for (name, bounds, classes, max_rgb) in KNOWN {
+    for (name, known_bounds, known_classes, max_rgb) in KNOWN {
         let cloud = read(&shared.join("data").join(name)).unwrap();
         assert_eq!(cloud.tally.malformed, 0, "{name}: {:?}", cloud.tally.examples);
-        assert_eq!(cloud.classes(), classes.iter().copied().collect(), "{name}");
+        assert_eq!(classes(&cloud), known_classes.iter().copied().collect(), "{name}");
         assert_eq!(cloud.tally.max_rgb, max_rgb, "{name}");
-        for (axis, (own, known)) in cloud.bounds().iter().zip(&bounds).enumerate() {
+        for (axis, (own, known)) in bounds(&cloud).iter().zip(&known_bounds).enumerate() {
             for (own, known) in own.iter().zip(known) {
                 assert!((own - known).abs() < 1e-9 * known.abs().max(1.0), "{name}: axis {axis}: {own}, known {known}");
             }
@@ -187,18 +121,6 @@ fn the_big_file_is_whole() {
     let tally = source.decode(source.pieces() - 1, &rules, &mut |_| Ok(())).unwrap();
     assert_eq!((tally.kept, tally.malformed), (tally.read, 0));
     assert_eq!((source.crs.horizontal, source.has_rgb), (Unit::Foot, true));
-}
-
-#[test]
-fn small_texts_are_read_whatever_their_layout() {
-    let Some(shared) = common::shared() else { return };
-    let expected = [("autzen-point-format-3.txt", 106, true), ("crlf_test.txt", 10, false), ("quoted2.txt", 9, false)];
-    for (name, points, rgb) in expected {
-        let cloud = read(&shared.join("data").join(name)).unwrap();
-        assert_eq!((cloud.tally.kept, cloud.tally.malformed), (points, 0), "{name}");
-        assert_eq!((cloud.source.format, cloud.source.has_rgb), (Format::Text, rgb), "{name}");
-        assert!(cloud.source.warnings.is_empty(), "{name}");
-    }
 }
 
 #[test]
@@ -226,19 +148,6 @@ fn records_are_those_the_las_crate_reads() {
             assert_eq!((point.position, point.z, point.class, point.rgb), expected, "{name}: record {}", point.order());
         }
     }
-}
-
-#[test]
-fn text_gives_the_same_points_as_the_laz_it_was_made_from() {
-    let Some(shared) = common::shared() else { return };
-    let laz = open(&shared.join("data/Topography.laz"), &TextOptions::default()).unwrap();
-    let csv = open(&shared.join("data/topography.csv"), &TextOptions::default()).unwrap();
-    let lattice = lattice(&csv);
-    let (from_laz, laz_tally) = decode(&laz, &rules(&laz, &lattice)).unwrap();
-    let (from_csv, csv_tally) = decode(&csv, &rules(&csv, &lattice)).unwrap();
-    assert_eq!((laz_tally.rounded_xy, csv_tally.rounded_xy), (0, 0));
-    assert_eq!(from_laz.len(), 73_403);
-    assert!(from_laz.iter().zip(&from_csv).all(|(a, b)| (a.position, a.z, a.order()) == (b.position, b.z, b.order())));
 }
 
 #[test]
@@ -515,116 +424,6 @@ fn what_the_sink_refuses_stops_the_decoding() {
     assert_eq!(source.decode(0, &rules, refuse).unwrap_err().exit_code(), 1);
 }
 
-fn text(content: &str) -> Result<Cloud> {
-    read_bytes(".csv", content.as_bytes())
-}
-
-fn coordinates(cloud: &Cloud) -> Vec<[f64; 3]> {
-    let world = |p: &Point| [0, 1, 2].map(|axis| cloud.lattice.world(axis, [p.position[0], p.position[1], p.z][axis]));
-    cloud.points.iter().map(world).collect()
-}
-
-#[test]
-fn texts_of_many_layouts_say_the_same() {
-    let layouts = [
-        "1.5,2,3.25\n4,5,6\n",
-        "x,y,z\n1.5,2,3.25\n4,5,6",
-        "1.5;2;3.25\r\n4;5;6\r\n",
-        "1.5\t2\t3.25\n4\t5\t6\n",
-        "  1.5   2 \t 3.25  \n\n4 5 6\n",
-        "1.5 , 2 ,  3.25\n4, 5, 6\n",
-        "\u{feff}X;Y;Z\n1.5;2;3.25\n4;5;6\n",
-        "\"Z\",\"name\",\"Easting\",\"Northing\"\n3.25,\"a, b\",1.5,2\n6,c,4,5\n",
-        "# a comment\n// another\nlat lon height\n2 1.5 3.25\n# end\n5 4 6\n",
-        "2\n1.5 2 3.25\n4 5 6\n",
-        "\"1.5\",'2',\"3.25\"\n\"4\",5,6\n",
-        "+15e-1,2.000000000000000000,325E-2\n4.,5,0.6e+1\n",
-    ];
-    for layout in layouts {
-        let cloud = text(layout).unwrap_or_else(|error| panic!("{layout:?}: {error}"));
-        assert_eq!(coordinates(&cloud), [[1.5, 2.0, 3.25], [4.0, 5.0, 6.0]], "{layout:?}: {:?}", cloud.tally.examples);
-        assert_eq!(cloud.tally.malformed, 0, "{layout:?}");
-    }
-}
-
-#[test]
-fn colors_and_classes_of_texts_are_read() {
-    let cloud = text("r,g,b,class,z,y,x\n1,2,3,9,30,20,10\n255.0,0,65535,2,31,21,11\n").unwrap();
-    assert!(cloud.source.has_rgb && cloud.source.has_class);
-    let found: Vec<_> = cloud.points.iter().map(|p| (p.rgb, p.class)).collect();
-    assert_eq!(found, [([1, 2, 3], 9), ([255, 0, 65535], 2)]);
-}
-
-#[test]
-fn options_overrule_what_would_be_detected() {
-    let path = file(".csv", b"a|b|c|d\n%skip\n9|1|2|3\n8|4|5|6\n");
-    let columns = Some(["_", "y", "x", "z"].map(String::from).to_vec());
-    let options = TextOptions { delimiter: Some('|'), header: Some(true), columns, comment: Some("%".to_string()) };
-    assert_eq!(coordinates(&read_with(&path, &options).unwrap()), [[2.0, 1.0, 3.0], [5.0, 4.0, 6.0]]);
-    for (columns, words) in [(["x", "x", "y", "z"], "2 columns x"), (["x", "y", "a", "b"], "no column z")] {
-        let options = TextOptions { columns: Some(columns.map(String::from).to_vec()), ..options.clone() };
-        let error = read_with(&path, &options).err().unwrap();
-        assert!(error.exit_code() == 2 && error.to_string().contains(words), "{error}");
-    }
-    let options = TextOptions { delimiter: Some('7'), ..TextOptions::default() };
-    assert_eq!(read_with(&path, &options).err().unwrap().exit_code(), 2);
-}
-
-#[test]
-fn malformed_lines_are_counted_and_named() {
-    let long = "1".repeat(100_000);
-    let content = format!("x,y,z\n1,2,3\n4,five,6\n7,8\n# fine\nnan,1,2\n{long}\n1,inf,2\n9,9,9\n1e300,0,0\n");
-    let cloud = text(&content).unwrap();
-    assert_eq!((cloud.tally.kept, cloud.tally.malformed), (2, 6));
-    for (example, words) in cloud.tally.examples.iter().zip([
-        "line 3: column 2 (y) is \"five\", not a number",
-        "line 4: column 3 (z) is missing",
-        "line 6: column 1 (x) is \"nan\"",
-        "line 7 has more than 65536 bytes",
-        "line 8: column 2 (y) is \"inf\"",
-    ]) {
-        assert!(example.contains(words), "{example}");
-    }
-    let orders: Vec<u64> = cloud.points.iter().map(Point::order).collect();
-    assert_eq!(orders, [0, 6]);
-}
-
-#[test]
-fn what_is_no_table_is_refused() {
-    for (content, words) in [
-        ("", "is empty"),
-        ("\n\n# nothing\n", "no line with numbers"),
-        ("hello world\nnothing here\n", "names no column x"),
-        ("a\0b", "neither LAS nor LAZ nor UTF-8"),
-        ("x,y\n1,2\n", "names no column z"),
-    ] {
-        let error = text(content).err().unwrap_or_else(|| panic!("{content:?} was read"));
-        assert!(error.exit_code() == 3 && error.to_string().contains(words), "{content:?}: {error}");
-    }
-    let error = read_bytes(".laz", b"LAZF and so on").err().unwrap();
-    assert!(error.to_string().contains("LASF"), "{error}");
-    assert_eq!(read(Path::new("/nowhere/at/all.las")).err().unwrap().exit_code(), 1);
-}
-
-#[test]
-fn noise_beyond_fifteen_decimals_is_rounded_and_counted() {
-    let cloud = text("0.30000000000000004,1,2\n0.5,1,2.5\n").unwrap();
-    assert_eq!(cloud.source.axes[0].scale, Decimal::new(1, 1));
-    assert_eq!((cloud.tally.rounded_xy, cloud.tally.rounded_z), (1, 0));
-}
-
-#[test]
-fn a_text_of_many_blocks_keeps_its_order() {
-    let mut content = String::from("x y z\n");
-    for i in 0..300_000 {
-        content.push_str(&format!("{} {} {}.{:02}\n", i, i % 1000, i / 100, i % 100));
-    }
-    let cloud = text(&content).unwrap();
-    assert!(cloud.source.pieces() > 1);
-    assert_eq!((cloud.tally.kept, cloud.tally.malformed), (300_000, 0));
-    assert!(cloud.points.iter().enumerate().all(|(i, p)| p.order() == i as u64 && p.z == i as i32));
-}
-
 #[test]
 fn descriptions_say_what_a_file_holds() {
     let path = file(".laz", &LasFile::new(4, 7, 0, 100).laz(&[40], false));
@@ -637,33 +436,8 @@ fn descriptions_say_what_a_file_holds() {
     assert!(description.to_string().contains("LAZ 1.4, point format 7"), "{description}");
 }
 
-/// Opens and decodes; whatever comes, it must come back.
-fn survives(extension: &str, bytes: &[u8]) {
-    let path = file(extension, bytes);
-    let Ok(source) = open(&path, &TextOptions::default()) else { return };
-    let axis = |axis: usize| {
-        AxisMap::new(Decimal::ZERO, Decimal::ONE, Decimal::ZERO, source.axes[axis].scale.max(Decimal::ONE))
-    };
-    let map = AxisMap::new(Decimal::ZERO, Decimal::ONE, Decimal::ZERO, Decimal::ONE).unwrap();
-    let maps = [0, 1, 2].map(|i| axis(i).unwrap_or(map));
-    let rules = Rules { maps, classes: [true; 256], bounds: None, first_order: 0, rgb: true };
-    for piece in 0..source.pieces().min(64) {
-        let _ = source.decode(piece, &rules, &mut |_| Ok(()));
-    }
-}
-
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
-
-    #[test]
-    fn random_texts_never_panic(content in proptest::collection::vec(any::<u8>(), 0..300)) {
-        survives(".csv", &content);
-    }
-
-    #[test]
-    fn texts_of_likely_characters_never_panic(content in "[xyzrgb0-9,;. \"'#\\-\\n\\r\\te]{0,200}") {
-        survives(".csv", content.as_bytes());
-    }
 
     #[test]
     fn wrong_bytes_in_a_laz_never_panic(
