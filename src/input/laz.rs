@@ -213,7 +213,7 @@ impl ChunkRun<'_> {
         };
         let mut window = self.file.window(chunk.bytes.clone())?;
         while self.next < chunk.first + held {
-            let stop = (self.next + chunk.restart).min(chunk.first + held);
+            let stop = self.next.saturating_add(chunk.restart).min(chunk.first + held);
             window = match self.decode_run(window, stop, sieve)? {
                 Ok(window) => window,
                 Err(what) => return Ok(Err(what)),
