@@ -275,6 +275,17 @@ fn every_point_format_is_read_plain_and_compressed() {
 }
 
 #[test]
+fn files_without_points_have_no_pieces() {
+    for format in [1, 7] {
+        let file = LasFile::new(4, format, 0, 0);
+        for bytes in [file.las(), file.laz(&[50], false), file.laz(&[50], true)] {
+            let cloud = read_bytes(".laz", &bytes).unwrap();
+            assert_eq!((cloud.source.records, cloud.source.pieces(), cloud.tally.read), (0, 0, 0));
+        }
+    }
+}
+
+#[test]
 fn chunks_are_found_without_their_table() {
     let unfinished = |mut bytes: Vec<u8>| {
         let at = points_at(&bytes);
