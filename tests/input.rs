@@ -209,6 +209,8 @@ fn bad_files_are_read_as_far_as_they_go_or_refused() {
         let cloud = bad(name).unwrap();
         assert_eq!((cloud.tally.kept, cloud.tally.malformed), (kept, malformed), "{name}");
         assert!(words.is_empty() == cloud.tally.examples.is_empty(), "{name}");
+        let known_missing = if words.contains("missing") { malformed } else { 0 };
+        assert_eq!(cloud.source.missing, known_missing, "{name}");
         assert!(words.is_empty() || cloud.tally.examples[0].contains(words), "{name}: {:?}", cloud.tally.examples);
     }
     for (name, words) in [("git-lfs-pointer.laz", "git lfs pull"), ("badheader.txt", "names 2 columns x")] {
