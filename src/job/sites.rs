@@ -73,7 +73,8 @@ fn packed_keys(points: &[Point]) -> Option<(Vec<u64>, u32)> {
     let along = |p: [i32; 2], axis: usize| (p[axis] as i64 - min[axis] as i64) as u64;
     let (x_bits, index_bits) = (bits(along(max, 0)), bits(points.len() as u64));
     let fits = bits(along(max, 1)) + x_bits + index_bits <= u64::BITS;
-    let key = |(i, p): (usize, &Point)| (along(p.position, 1) << x_bits | along(p.position, 0)) << index_bits | i as u64;
+    let key =
+        |(i, p): (usize, &Point)| (along(p.position, 1) << x_bits | along(p.position, 0)) << index_bits | i as u64;
     fits.then(|| (points.iter().enumerate().map(key).collect(), index_bits))
 }
 
@@ -90,7 +91,8 @@ mod tests {
 
     #[test]
     fn a_tile_too_wide_for_packed_keys_is_sorted_all_the_same() {
-        let points = [(1 << 29, 1 << 29, 1), (-(1 << 29), 1 << 29, 2), (0, -(1 << 29), 3), (0, 0, 4), (1 << 29, 1 << 29, 0)];
+        let points =
+            [(1 << 29, 1 << 29, 1), (-(1 << 29), 1 << 29, 2), (0, -(1 << 29), 3), (0, 0, 4), (1 << 29, 1 << 29, 0)];
         let kept = keep(&points, Duplicates::Lowest);
         assert_eq!(kept, [(0, -(1 << 29), 3), (0, 0, 4), (-(1 << 29), 1 << 29, 2), (1 << 29, 1 << 29, 0)]);
     }
