@@ -11,11 +11,13 @@ use crate::geometry::predicates::orient2d;
 const NEAR: usize = 6;
 /// How often the hull is mended before it is given up.
 const ROUNDS: usize = 12;
+/// Rounds in which vertices are taken out only where that leaves a clean hole.
+const PATIENCE: usize = 4;
 
 /// Makes the hull convex. What it changes is noted in `shift`, as are the vertices it takes out: where thin regions reach
 /// the frame, vertices may hang on the hull that belong inside.
 pub(super) fn complete_hull(sphere: &mut Sphere, sites: &[Site], shift: &mut Shift) -> Result<(), Rejected> {
-    for _ in 0..ROUNDS {
+    for round in 0..ROUNDS {
         let spokes = all_spokes(sphere)?;
         let blocked = fill_pockets(sphere, sites, spokes, shift);
         let ring = Ring::new(sphere, &all_spokes(sphere)?);
@@ -24,9 +26,10 @@ pub(super) fn complete_hull(sphere: &mut Sphere, sites: &[Site], shift: &mut Shi
         }
         let before = shift.removed.len();
         for vertex in ring.sharp_corners(sites).chain(blocked) {
-            take_out(sphere, sites, vertex, shift);
+            take_out(sphere, sites, vertex, shift, round >= PATIENCE);
         }
-        if shift.removed.len() == before {
+        shift.repair(sphere, sites)?;
+        if shift.removed.len() == before && round > PATIENCE {
             break;
         }
     }
@@ -54,10 +57,10 @@ fn fill_pockets(sphere: &mut Sphere, sites: &[Site], mut spokes: Vec<u32>, shift
 }
 
 /// Takes `vertex` out if it still is on the hull.
-fn take_out(sphere: &mut Sphere, sites: &[Site], vertex: u32, shift: &mut Shift) {
+fn take_out(sphere: &mut Sphere, sites: &[Site], vertex: u32, shift: &mut Shift, anyhow: bool) {
     let spokes = all_spokes(sphere).unwrap_or_default();
     if let Some(&h) = spokes.iter().find(|&&h| sphere.destination(h) == vertex) {
-        shift.take_out(sphere, sites, next(h));
+        shift.take_out(sphere, sites, next(h), anyhow);
     }
 }
 
@@ -101,6 +104,9 @@ fn all_spokes(sphere: &Sphere) -> Result<Vec<u32>, Rejected> {
         let spoke = sphere.twin(previous(*spokes.last().unwrap_or(&first)));
         if spoke == first {
             return Ok(spokes);
+        }
+        if spokes.len() > sphere.len() {
+            return Err(Rejected::NotAccepted("the hull has no end"));
         }
         spokes.push(spoke);
     }

@@ -93,8 +93,8 @@ impl Texture {
         self.row_ends.resize(self.height + 1, 0);
         self.pixels.clear();
         self.pixels.extend(sites.iter().map(|site| {
-            let [x, y] = [0, 1].map(|i| ((site[i] - low[i]) as f64 * scale) as i32 as u32);
-            y << 16 | x
+            let pixel = |i: usize| ((site[i] - low[i]) as f64 * scale) as i32 as u32;
+            pixel(1) << 16 | pixel(0)
         }));
         for &pixel in &self.pixels {
             self.row_ends[(pixel >> 16) as usize + 1] += 1;

@@ -9,6 +9,7 @@ mod c1_hull;
 mod c2_shift;
 mod c3_insert;
 mod c4_flip;
+mod edges;
 mod g1_write_sites;
 mod g2_voronoi;
 mod g3_islands;
@@ -144,8 +145,8 @@ pub fn triangulate(sites: &[Site], scratch: &mut Scratch) -> Result<(Mesh, Count
     c3_insert::insert_all(sphere, texture, scan, &shift.removed, flips)?;
     counts.flips = flips.done;
     clock.done(&mut counts, 6);
-    let front = sphere.front();
-    acceptance.accept(sphere.compact(), front, at, &texture.order, mesh)?;
+    sphere.compact();
+    acceptance.accept(sphere, at, &texture.order, mesh)?;
     clock.done(&mut counts, 7);
     Ok((std::mem::take(mesh), counts))
 }
