@@ -25,7 +25,7 @@ pub(super) fn complete_hull(sphere: &mut Sphere, sites: &[Site], shift: &mut Shi
             return Ok(());
         }
         let before = shift.removed.len();
-        for vertex in ring.sharp_corners(sites).chain(blocked) {
+        for vertex in ring.sharp_corners(sites, round >= 2).chain(blocked) {
             take_out(sphere, sites, vertex, shift, round >= PATIENCE);
         }
         shift.repair(sphere, sites)?;
@@ -84,13 +84,15 @@ impl Ring {
         self.corners().map(|c| c.map(|v| sites[v as usize])).filter(starts_upward).count() == 1
     }
 
-    /// The vertices at which the hull turns by more than a right angle.
-    fn sharp_corners(&self, sites: &[Site]) -> impl Iterator<Item = u32> {
+    /// The vertices at which the hull turns by more than a right angle, and maybe those beside them.
+    fn sharp_corners(&self, sites: &[Site], and_beside: bool) -> impl Iterator<Item = u32> {
         let along = |a: Site, b: Site, i: usize| b[i] as i64 - a[i] as i64;
-        self.corners().filter_map(move |corner| {
-            let [p, q, r] = corner.map(|v| sites[v as usize]);
-            (along(p, q, 0) * along(q, r, 0) + along(p, q, 1) * along(q, r, 1) < 0).then_some(corner[1])
-        })
+        let is_sharp = move |&[p, q, r]: &[u32; 3]| {
+            let (p, q, r) = (sites[p as usize], sites[q as usize], sites[r as usize]);
+            along(p, q, 0) * along(q, r, 0) + along(p, q, 1) * along(q, r, 1) < 0
+        };
+        let range = if and_beside { 0..3 } else { 1..2 };
+        self.corners().filter(is_sharp).flat_map(move |corner| range.clone().map(move |i| corner[i]))
     }
 }
 

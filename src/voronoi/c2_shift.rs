@@ -14,7 +14,7 @@ const ROUNDS: usize = 6;
 #[derive(Default)]
 pub(super) struct Shift {
     /// Triangles that are not counterclockwise.
-    inverted: Vec<u32>,
+    pub(super) inverted: Vec<u32>,
     /// Edges that may not be Delaunay. All others are.
     pub(super) suspects: Vec<u32>,
     /// Vertices taken out, each with a half-edge nearby.
@@ -112,12 +112,24 @@ impl Shift {
     /// Takes the vertex at which `h` starts out if the hole can be filled with counterclockwise triangles, or `anyhow`; what is
     /// inverted then will be seen to.
     pub(super) fn take_out(&mut self, sphere: &mut Sphere, sites: &[Site], h: u32, anyhow: bool) -> bool {
-        let vertex = sphere.origin(h);
+        let (vertex, first) = (sphere.origin(h), self.suspects.len());
+        let done = self.remove_fan(sphere, sites, h, anyhow);
+        if done {
+            self.removed.push([vertex, self.suspects[first]]);
+        }
+        done
+    }
+
+    /// Removes the triangles around the start of `h`, which stays a corner elsewhere.
+    pub(super) fn dissolve(&mut self, sphere: &mut Sphere, sites: &[Site], h: u32) -> bool {
+        self.remove_fan(sphere, sites, h, true)
+    }
+
+    fn remove_fan(&mut self, sphere: &mut Sphere, sites: &[Site], h: u32, anyhow: bool) -> bool {
         let Some(star) = sphere.star(h) else { return false };
         let Some(fill) = star.fill(sites, sphere.infinity(), anyhow) else { return false };
         let first = self.suspects.len();
         sphere.replace_star(&star, &fill, |h| self.suspects.push(h));
-        self.removed.push([vertex, self.suspects[first]]);
         if anyhow {
             let inverted = |t: &u32| orientation(sphere, sites, *t).is_some_and(|area| area <= 0);
             self.inverted.extend(self.suspects[first..].iter().map(|h| h & !7).filter(inverted));
@@ -128,7 +140,7 @@ impl Shift {
 
 /// Twice the area of the triangle with first half-edge `t`, or `None` for ghosts and free records.
 #[inline(always)]
-fn orientation(sphere: &Sphere, sites: &[Site], t: u32) -> Option<i64> {
+pub(super) fn orientation(sphere: &Sphere, sites: &[Site], t: u32) -> Option<i64> {
     let corners = sphere.corners(t)?;
     if corners.contains(&sphere.infinity()) {
         return None;
