@@ -67,7 +67,7 @@ impl Edges {
             let at = |v: u32| sites[v as usize];
             self.quads.set(lane, at(record[0]), at(record[1]), at(record[2]), at(opposite));
         }
-        let doubtful = self.quads.inside_or_in_doubt();
+        let doubtful = self.quads.inside_or_in_doubt(links.count);
         // Without a branch: about one edge in seven fails, and nobody can foresee which.
         let before = failing.len();
         failing.resize(before + links.count + 1, 0);
