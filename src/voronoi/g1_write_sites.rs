@@ -136,6 +136,10 @@ impl Texture {
                 self.losers.push([x, i]);
             }
         }
+        if self.losers.len() > self.width / 8 {
+            // Where many sites will be missing, they are inserted one beside the other.
+            self.losers.sort_unstable_by_key(|&[_, i]| sites[i as usize]);
+        }
         for at in 0..self.losers.len() {
             let [x, i] = self.losers[at];
             counts.moved += self.place_loser(sites, y, x as usize, i) as u64;

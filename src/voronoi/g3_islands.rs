@@ -79,11 +79,8 @@ impl Islands {
     fn find_fans(&mut self, sphere: &Sphere, sites: &[Site], inverted: &[u32]) {
         self.fans.clear();
         for h in inverted.iter().flat_map(|&t| t..t + 3) {
-            if let Some(fan) = fan(sphere, sites, h) {
-                if fan.degree < self.degrees[fan.site as usize] as usize {
-                    self.fans.push(fan);
-                }
-            }
+            let fan = fan(sphere, sites, h).filter(|fan| fan.degree < self.degrees[fan.site as usize] as usize);
+            self.fans.extend(fan);
         }
         self.fans.sort_unstable();
         self.fans.dedup();
