@@ -1,0 +1,106 @@
+//! The reference: `spade` with canonical flips. The oracle of the tests, the way out for leaves that the pipeline does
+//! not accept, and what triangulates the inner nodes of the tree.
+
+use super::flip::legalize;
+use super::mesh::{HULL, Mesh};
+use crate::geometry::Site;
+use crate::{Error, Result};
+use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation as _};
+
+struct Vertex {
+    site: Site,
+    index: u32,
+}
+
+impl HasPosition for Vertex {
+    type Scalar = f64;
+
+    fn position(&self) -> Point2<f64> {
+        Point2::new(self.site[0] as f64, self.site[1] as f64)
+    }
+}
+
+/// The canonical Delaunay triangulation of distinct `sites`: no triangle if there are fewer than three or all lie on a line.
+///
+/// # Errors
+/// [`Error::Broken`] if `spade` refuses the sites or two of them coincide.
+pub fn triangulate(sites: &[Site]) -> Result<Mesh> {
+    let vertices = sites.iter().enumerate().map(|(i, &site)| Vertex { site, index: i as u32 }).collect();
+    let delaunay = DelaunayTriangulation::<Vertex>::bulk_load(vertices)
+        .map_err(|e| Error::Broken(format!("the reference triangulation refuses a site: {e}")))?;
+    if delaunay.num_vertices() != sites.len() {
+        return Err(Error::Broken("two sites of one tile coincide".into()));
+    }
+    let mut mesh = to_mesh(&delaunay);
+    legalize(&mut mesh, sites);
+    Ok(mesh)
+}
+
+fn to_mesh(delaunay: &DelaunayTriangulation<Vertex>) -> Mesh {
+    let faces = delaunay.num_inner_faces();
+    let mut half_edge_of = vec![HULL; delaunay.num_directed_edges()];
+    let mut mesh = Mesh { triangles: Vec::with_capacity(faces), twins: vec![HULL; 3 * faces] };
+    for face in delaunay.inner_faces() {
+        let first = 3 * mesh.triangles.len() as u32;
+        let edges = face.adjacent_edges();
+        mesh.triangles.push(edges.map(|e| e.from().data().index));
+        for (h, edge) in (first..).zip(&edges) {
+            half_edge_of[edge.fix().index()] = h;
+        }
+    }
+    for face in delaunay.inner_faces() {
+        for edge in face.adjacent_edges() {
+            let h = half_edge_of[edge.fix().index()];
+            mesh.twins[h as usize] = half_edge_of[edge.rev().fix().index()];
+        }
+    }
+    mesh
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::triangulation::flip::fails;
+
+    #[test]
+    fn a_lattice_gets_the_one_canonical_triangulation() {
+        let forward: Vec<Site> = (0..30).flat_map(|x| (0..20).map(move |y| [x, y])).collect();
+        let backward: Vec<Site> = forward.iter().rev().copied().collect();
+        assert_eq!(canonical(&forward), canonical(&backward));
+        assert_eq!(canonical(&forward).len(), 2 * 29 * 19);
+    }
+
+    #[test]
+    fn no_edge_fails_among_cocircular_sites() {
+        let circle: Vec<Site> = (-65..=65)
+            .flat_map(|x: i32| (-65..=65).map(move |y: i32| [x, y]))
+            .filter(|[x, y]| x * x + y * y == 65 * 65)
+            .collect();
+        let mesh = triangulate(&circle).unwrap();
+        assert_eq!(mesh.triangles.len(), circle.len() - 2);
+        assert!((0..mesh.twins.len() as u32).all(|h| !fails(&mesh, &circle, h)));
+    }
+
+    #[test]
+    fn sites_on_a_line_make_no_triangle() {
+        assert!(triangulate(&[[0, 0], [1, 1], [5, 5]]).unwrap().triangles.is_empty());
+        assert!(triangulate(&[]).unwrap().triangles.is_empty());
+    }
+
+    /// The triangles as coordinates, each from its smallest corner, sorted.
+    fn canonical(sites: &[Site]) -> Vec<[Site; 3]> {
+        let mesh = triangulate(sites).unwrap();
+        let mut triangles: Vec<[Site; 3]> = mesh
+            .triangles
+            .iter()
+            .map(|t| {
+                let mut corners = t.map(|v| sites[v as usize]);
+                let first = (0..3).min_by_key(|&i| corners[i]).unwrap();
+                corners.rotate_left(first);
+                corners
+            })
+            .collect();
+        triangles.sort_unstable();
+        triangles
+    }
+}
