@@ -13,5 +13,6 @@ pub mod positioned;
 pub mod sample;
 pub mod triangulation;
 pub mod verify;
+pub mod voronoi;
 
 pub use error::{Error, Result};

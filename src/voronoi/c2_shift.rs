@@ -1,0 +1,172 @@
+//! Step C2: shift all sites from their pixels to their true places, all at once. The topology stays; triangles that are
+//! then not counterclockwise are flipped away, or a corner is taken out, to be inserted again in step C3.
+
+use super::sphere::{Fill, Sphere, Star, next, previous};
+use super::{Counts, Rejected};
+use crate::geometry::Site;
+use crate::geometry::predicates::orient2d;
+
+/// Rounds of repair; what is still bad after them goes another way.
+const ROUNDS: usize = 6;
+
+/// What the shift leaves behind.
+#[derive(Default)]
+pub(super) struct Shift {
+    /// Triangles that are not counterclockwise.
+    inverted: Vec<u32>,
+    /// Edges that may not be Delaunay. All others are.
+    pub(super) suspects: Vec<u32>,
+    /// Vertices taken out, each with a half-edge nearby.
+    pub(super) removed: Vec<[u32; 2]>,
+}
+
+impl Shift {
+    pub(super) fn clear(&mut self) {
+        self.inverted.clear();
+        self.suspects.clear();
+        self.removed.clear();
+    }
+
+    /// Tests all triangles and edges at the true places of `sites`.
+    pub(super) fn test(&mut self, sphere: &Sphere, sites: &[Site], counts: &mut Counts) {
+        for t in sphere.triangles() {
+            match orientation(sphere, sites, t) {
+                Some(area) if area <= 0 => self.inverted.push(t),
+                Some(_) => {
+                    let failing = (t..t + 3).filter(|&h| h < sphere.twin(h) && sphere.fails(sites, h));
+                    self.suspects.extend(failing);
+                }
+                None => {}
+            }
+        }
+        counts.inverted += self.inverted.len() as u64;
+    }
+
+    /// Makes every triangle counterclockwise.
+    pub(super) fn repair(&mut self, sphere: &mut Sphere, sites: &[Site], counts: &mut Counts) -> Result<(), Rejected> {
+        for _ in 0..ROUNDS {
+            for t in std::mem::take(&mut self.inverted) {
+                if orientation(sphere, sites, t).is_some_and(|area| area <= 0) && !self.mend(sphere, sites, t) {
+                    self.inverted.push(t);
+                }
+            }
+            if self.inverted.is_empty() {
+                return Ok(());
+            }
+        }
+        Err(Rejected::NotAccepted("an inverted triangle stayed"))
+    }
+
+    fn mend(&mut self, sphere: &mut Sphere, sites: &[Site], t: u32) -> bool {
+        (t..t + 3).any(|h| self.flip_if_good(sphere, sites, h))
+            || (t..t + 3).any(|h| self.peel_if_between(sphere, sites, h))
+            || (t..t + 3).any(|h| self.take_out(sphere, sites, h))
+            || (t..t + 3).any(|h| self.peel(sphere, h))
+    }
+
+    /// Flips edge `h` if both triangles are counterclockwise then.
+    fn flip_if_good(&mut self, sphere: &mut Sphere, sites: &[Site], h: u32) -> bool {
+        let g = sphere.twin(h);
+        let quad = [sphere.origin(h), sphere.origin(g), sphere.apex(h), sphere.apex(g)];
+        if quad.contains(&sphere.infinity()) {
+            return false;
+        }
+        let [u, v, w, z] = quad.map(|i| sites[i as usize]);
+        let good = orient2d(z, w, u) > 0 && orient2d(w, z, v) > 0;
+        if good {
+            self.flip(sphere, h);
+        }
+        good
+    }
+
+    fn flip(&mut self, sphere: &mut Sphere, h: u32) {
+        let g = sphere.twin(h);
+        sphere.flip(h);
+        self.suspects.extend([h, next(h), previous(h), g, previous(g)]);
+    }
+
+    /// Takes the triangle of hull edge `h` off the mesh if its apex lies beside the edge: the hull then goes by it.
+    fn peel_if_between(&mut self, sphere: &mut Sphere, sites: &[Site], h: u32) -> bool {
+        let [u, v, w] = [sphere.origin(h), sphere.destination(h), sphere.apex(h)].map(|i| sites[i as usize]);
+        let towards = |p: Site, q: Site, r: Site| {
+            (q[0] as i64 - p[0] as i64) * (r[0] as i64 - p[0] as i64)
+                + (q[1] as i64 - p[1] as i64) * (r[1] as i64 - p[1] as i64)
+                > 0
+        };
+        towards(u, v, w) && towards(v, u, w) && self.peel(sphere, h)
+    }
+
+    fn peel(&mut self, sphere: &mut Sphere, h: u32) -> bool {
+        let outside = sphere.apex(sphere.twin(h)) == sphere.infinity();
+        if outside {
+            self.flip(sphere, h);
+        }
+        outside
+    }
+
+    /// Takes the vertex at which `h` starts out if the hole can be filled with counterclockwise triangles.
+    pub(super) fn take_out(&mut self, sphere: &mut Sphere, sites: &[Site], h: u32) -> bool {
+        let vertex = sphere.origin(h);
+        let Some(star) = sphere.star(h) else { return false };
+        let Some(fill) = star.fill(sites, sphere.infinity(), false) else { return false };
+        let mut near = 0;
+        sphere.replace_star(&star, &fill, |h| {
+            near = h;
+            self.suspects.push(h);
+        });
+        self.removed.push([vertex, near]);
+        true
+    }
+}
+
+/// Twice the area of the triangle with first half-edge `t`, or `None` for ghosts and free records.
+#[inline(always)]
+fn orientation(sphere: &Sphere, sites: &[Site], t: u32) -> Option<i64> {
+    let corners = sphere.corners(t)?;
+    if corners.contains(&sphere.infinity()) {
+        return None;
+    }
+    let [a, b, c] = corners.map(|i| sites[i as usize]);
+    Some(orient2d(a, b, c))
+}
+
+impl Star {
+    /// Cuts the hole into counterclockwise triangles; where one of its corners is at infinity, into as many as there is room for,
+    /// and ghosts. `None` if that is impossible, unless it is to be filled `anyhow`.
+    pub(super) fn fill(&self, sites: &[Site], infinity: u32, anyhow: bool) -> Option<Fill> {
+        let mut sides: Vec<usize> = (0..self.vertices.len()).collect();
+        let mut ears = Vec::with_capacity(sides.len());
+        let ghosts = self.vertices.iter().filter(|&&v| v == infinity).count();
+        if ghosts > 1 && !anyhow {
+            return None;
+        }
+        while sides.len() > 2 {
+            let n = sides.len();
+            let triple = |i: usize| [sides[i], sides[(i + 1) % n], sides[(i + 2) % n]];
+            let ear = (0..n).find(|&i| self.is_ear(sites, infinity, &sides, triple(i)));
+            let last_resort = || match ghosts {
+                0 => anyhow.then_some(0),
+                _ => (0..n).find(|&i| self.vertices[triple(i)[2]] == infinity),
+            };
+            let i = ear.or_else(last_resort)?;
+            ears.push(triple(i));
+            sides.remove((i + 1) % n);
+        }
+        Some(Fill { ears, seam: [sides[0], sides[1]] })
+    }
+
+    fn is_ear(&self, sites: &[Site], infinity: u32, sides: &[usize], triple: [usize; 3]) -> bool {
+        let corners = triple.map(|i| self.vertices[i]);
+        if corners.contains(&infinity) {
+            return false;
+        }
+        let at = |v: u32| sites[v as usize];
+        let [a, b, c] = corners.map(at);
+        let covers = |v: u32| {
+            let p = at(v);
+            orient2d(a, b, p) >= 0 && orient2d(b, c, p) >= 0 && orient2d(c, a, p) >= 0
+        };
+        let others = sides.iter().map(|&i| self.vertices[i]).filter(|v| !corners.contains(v) && *v != infinity);
+        orient2d(a, b, c) > 0 && !others.into_iter().any(covers)
+    }
+}

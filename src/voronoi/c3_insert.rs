@@ -1,0 +1,67 @@
+//! Step C3: insert the sites that are missing and those that were taken out. Each is found by walking through the mesh,
+//! which is Delaunay by then, and made Delaunay at once.
+
+use super::Rejected;
+use super::c4_flip::Flips;
+use super::sphere::{Sphere, next, previous};
+use crate::geometry::Site;
+use crate::geometry::predicates::orient2d;
+
+/// Where a new vertex goes: into a triangle, maybe onto one of its edges.
+struct Place {
+    triangle: u32,
+    on: Option<u32>,
+}
+
+/// Inserts `vertex`, looking for its place from half-edge `near` on.
+pub(super) fn insert(
+    sphere: &mut Sphere,
+    sites: &[Site],
+    vertex: u32,
+    near: u32,
+    flips: &mut Flips,
+) -> Result<(), Rejected> {
+    let place = locate(sphere, sites, sites[vertex as usize], near, flips)?;
+    let sides = sphere.split(place.triangle, vertex);
+    flips.suspects.extend(sides);
+    if let Some(side) = place.on {
+        let h = sides[(side & 3) as usize];
+        let g = sphere.twin(h);
+        sphere.flip(h);
+        flips.suspects.extend([h, previous(h), g, previous(g)]);
+    }
+    flips.run(sphere, sites)
+}
+
+fn locate(sphere: &Sphere, sites: &[Site], p: Site, near: u32, flips: &mut Flips) -> Result<Place, Rejected> {
+    let mut h = start(sphere, near)?;
+    loop {
+        flips.step()?;
+        let [a, b, c] = [h, next(h), previous(h)];
+        let side = |e: u32| orient2d(sites[sphere.origin(e) as usize], sites[sphere.destination(e) as usize], p);
+        let sides = [a, b, c].map(side);
+        match sides.iter().position(|&s| s < 0) {
+            Some(i) => {
+                h = sphere.twin([a, b, c][i]);
+                if sphere.is_ghost(h) {
+                    return Ok(Place { triangle: h, on: None });
+                }
+            }
+            None => {
+                let mut on = [a, b, c].into_iter().zip(sides).filter(|&(_, s)| s == 0).map(|(e, _)| e);
+                let place = Place { triangle: h, on: on.next() };
+                return on.next().map_or(Ok(place), |_| Err(Rejected::NotAccepted("two sites in one place")));
+            }
+        }
+    }
+}
+
+/// A half-edge of a finite triangle at or after `near`.
+fn start(sphere: &Sphere, near: u32) -> Result<u32, Rejected> {
+    let finite = |h: u32| sphere.corners(h).is_some_and(|c| !c.contains(&sphere.infinity()));
+    if near < sphere.end() && finite(near) {
+        return Ok(near & !7);
+    }
+    let after = sphere.triangles().filter(|&h| h >= near);
+    after.chain(sphere.triangles()).find(|&h| finite(h)).ok_or(Rejected::NotAccepted("no triangle"))
+}

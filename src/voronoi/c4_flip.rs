@@ -1,0 +1,50 @@
+//! Step C4: flip edges until all are Delaunay (Lawson), by the canonical in-circle test.
+
+use super::Rejected;
+use super::sphere::{Sphere, previous};
+use crate::geometry::Site;
+
+/// Flips and steps allowed per site; more are a sign of a mesh that is no triangulation, or of a leaf that this is no
+/// way to do.
+const STEPS_PER_SITE: u64 = 64;
+
+/// The edges still to be tested, and the effort so far.
+#[derive(Default)]
+pub(super) struct Flips {
+    /// Edges that may not be Delaunay. All others are.
+    pub(super) suspects: Vec<u32>,
+    /// Flips done.
+    pub(super) done: u64,
+    left: u64,
+}
+
+impl Flips {
+    /// Starts anew for a leaf of `sites` sites.
+    pub(super) fn reset(&mut self, sites: usize) {
+        self.suspects.clear();
+        self.done = 0;
+        self.left = STEPS_PER_SITE * sites as u64 + 1024;
+    }
+
+    /// Counts one step of bounded work.
+    #[inline(always)]
+    pub(super) fn step(&mut self) -> Result<(), Rejected> {
+        self.left = self.left.checked_sub(1).ok_or(Rejected::NotAccepted("no end in sight"))?;
+        Ok(())
+    }
+
+    /// Flips until every edge is Delaunay.
+    pub(super) fn run(&mut self, sphere: &mut Sphere, sites: &[Site]) -> Result<(), Rejected> {
+        while let Some(h) = self.suspects.pop() {
+            if sphere.is_free(h) || !sphere.fails(sites, h) {
+                continue;
+            }
+            self.step()?;
+            let g = sphere.twin(h);
+            sphere.flip(h);
+            self.done += 1;
+            self.suspects.extend([h, previous(h), g, previous(g)]);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,187 @@
+//! Step G1: write the sites into a texture. One site wins a pixel; a loser moves to the free pixel beside it, or is missing.
+//!
+//! The texture is a bitmap with a running count, so that the site of a pixel is found by counting bits: the sites are
+//! numbered row by row, which is also the order in which all later steps meet them.
+
+use super::{Counts, Rejected};
+use crate::geometry::Site;
+use crate::geometry::lattice::REACH;
+
+/// Pixels per site: fewer make more work for the repair, more make more work for the transform.
+const PIXELS_PER_SITE: f64 = 5.0;
+/// Largest width and height of the texture.
+const MOST_PIXELS: f64 = 65535.0;
+/// Largest share of missing sites with which going on pays.
+const MOST_MISSING: f64 = 0.4;
+
+const EMPTY: u32 = u32::MAX;
+
+/// A texture with the sites in it. Pixel (x, y) is column x from the west, row y from the south.
+#[derive(Default)]
+pub(super) struct Texture {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    /// 64-pixel words in a row.
+    pub(super) words: usize,
+    /// Bit x % 64 of word `y * words + x / 64`: there is a site in pixel (x, y).
+    pub(super) occupied: Vec<u64>,
+    /// The number of sites in the words before.
+    rank: Vec<u32>,
+    /// Position in the input of every site, by number: first those in the texture, then the missing ones.
+    pub(super) order: Vec<u32>,
+    /// Coordinates by number, and one more for the vertex at infinity.
+    pub(super) sites: Vec<Site>,
+    /// How many sites are in the texture.
+    pub(super) placed: usize,
+    /// The pixel (y << 16 | x) that each missing site belongs to.
+    pub(super) missing: Vec<u32>,
+    pixels: Vec<u32>,
+    row_ends: Vec<u32>,
+    rows: Vec<[u32; 2]>,
+    row: Vec<u32>,
+    losers: Vec<[u32; 2]>,
+}
+
+impl Texture {
+    /// Scales and writes `sites`.
+    pub(super) fn write(&mut self, sites: &[Site], counts: &mut Counts) -> Result<(), Rejected> {
+        let scale = self.fit(sites)?;
+        self.sort_by_row(sites, scale);
+        self.clear(sites.len());
+        for y in 0..self.height {
+            self.write_row(sites, y, counts);
+        }
+        self.append_missing(sites);
+        counts.missing += self.missing.len() as u64;
+        match self.missing.len() as f64 > MOST_MISSING * sites.len() as f64 {
+            true => Err(Rejected::Crowded),
+            false => Ok(()),
+        }
+    }
+
+    /// The number of the site in the pixel `label` (y << 16 | x).
+    #[inline(always)]
+    pub(super) fn number(&self, label: u32) -> u32 {
+        let (x, y) = ((label & 0xffff) as usize, (label >> 16) as usize);
+        let word = y * self.words + x / 64;
+        let before = self.occupied[word] & ((1u64 << (x % 64)) - 1);
+        self.rank[word] + before.count_ones()
+    }
+
+    /// Chooses width and height with the shape of the sites' bounding box; returns the origin and pixels per lattice step.
+    fn fit(&mut self, sites: &[Site]) -> Result<(Site, f64), Rejected> {
+        let (mut low, mut high) = ([i32::MAX; 2], [i32::MIN; 2]);
+        for site in sites {
+            low = [low[0].min(site[0]), low[1].min(site[1])];
+            high = [high[0].max(site[0]), high[1].max(site[1])];
+        }
+        if low.iter().chain(&high).any(|c| c.abs() > REACH) {
+            return Err(Rejected::OutOfReach);
+        }
+        let extent = [0, 1].map(|i| (high[i] - low[i]) as f64 + 1.0);
+        let area = PIXELS_PER_SITE * sites.len() as f64;
+        let scale = (area / (extent[0] * extent[1])).sqrt().min(1.0).min(MOST_PIXELS / extent[0].max(extent[1]));
+        self.width = ((extent[0] - 1.0) * scale) as usize + 1;
+        self.height = ((extent[1] - 1.0) * scale) as usize + 1;
+        self.words = self.width.div_ceil(64);
+        Ok((low, scale))
+    }
+
+    /// Fills `rows` with (pixel column, position in the input), row by row, and `row_ends`.
+    fn sort_by_row(&mut self, sites: &[Site], (low, scale): (Site, f64)) {
+        self.row_ends.clear();
+        self.row_ends.resize(self.height + 1, 0);
+        self.pixels.clear();
+        self.pixels.extend(sites.iter().map(|site| {
+            let [x, y] = [0, 1].map(|i| ((site[i] - low[i]) as f64 * scale) as i32 as u32);
+            y << 16 | x
+        }));
+        for &pixel in &self.pixels {
+            self.row_ends[(pixel >> 16) as usize + 1] += 1;
+        }
+        for y in 0..self.height {
+            self.row_ends[y + 1] += self.row_ends[y];
+        }
+        self.rows.resize(sites.len(), [0; 2]);
+        for (i, &pixel) in self.pixels.iter().enumerate() {
+            let end = &mut self.row_ends[(pixel >> 16) as usize];
+            self.rows[*end as usize] = [pixel & 0xffff, i as u32];
+            *end += 1;
+        }
+    }
+
+    fn clear(&mut self, sites: usize) {
+        self.occupied.clear();
+        self.occupied.resize(self.words * self.height, 0);
+        self.rank.clear();
+        self.order.clear();
+        self.order.reserve(sites);
+        self.sites.clear();
+        self.sites.reserve(sites + 1);
+        self.missing.clear();
+        self.row.clear();
+        self.row.resize(self.width, EMPTY);
+    }
+
+    /// Writes row `y` and numbers its sites from west to east.
+    fn write_row(&mut self, sites: &[Site], y: usize, counts: &mut Counts) {
+        let first = if y == 0 { 0 } else { self.row_ends[y - 1] as usize };
+        self.losers.clear();
+        for &[x, i] in &self.rows[first..self.row_ends[y] as usize] {
+            let winner = &mut self.row[x as usize];
+            if *winner == EMPTY {
+                *winner = i;
+                self.occupied[y * self.words + x as usize / 64] |= 1 << (x % 64);
+            } else {
+                self.losers.push([x, i]);
+            }
+        }
+        for at in 0..self.losers.len() {
+            let [x, i] = self.losers[at];
+            counts.moved += self.place_loser(sites, y, x as usize, i) as u64;
+        }
+        for word in y * self.words..(y + 1) * self.words {
+            self.rank.push(self.sites.len() as u32);
+            let mut bits = self.occupied[word];
+            while bits != 0 {
+                let x = (word - y * self.words) * 64 + bits.trailing_zeros() as usize;
+                let i = std::mem::replace(&mut self.row[x], EMPTY);
+                self.order.push(i);
+                self.sites.push(sites[i as usize]);
+                bits &= bits - 1;
+            }
+        }
+    }
+
+    /// Site `i` has lost pixel `x`: it or the winner moves one pixel west or east, so that their order in x holds.
+    fn place_loser(&mut self, sites: &[Site], y: usize, x: usize, i: u32) -> bool {
+        let winner = self.row[x];
+        let key = |i: u32| (sites[i as usize], i);
+        let (west, east) = if key(i) < key(winner) { (i, winner) } else { (winner, i) };
+        if x + 1 < self.width && self.row[x + 1] == EMPTY {
+            self.row[x] = west;
+            self.row[x + 1] = east;
+            self.occupied[y * self.words + (x + 1) / 64] |= 1 << ((x + 1) % 64);
+            true
+        } else if x > 0 && self.row[x - 1] == EMPTY {
+            self.row[x - 1] = west;
+            self.row[x] = east;
+            self.occupied[y * self.words + (x - 1) / 64] |= 1 << ((x - 1) % 64);
+            true
+        } else {
+            self.missing.push((y << 16 | x) as u32);
+            // Kept at the end of the row buffer's list until all placed sites have their numbers.
+            self.pixels.push(i);
+            false
+        }
+    }
+
+    /// Gives the missing sites the numbers after those in the texture, and infinity the last one.
+    fn append_missing(&mut self, sites: &[Site]) {
+        self.placed = self.sites.len();
+        let missing = &self.pixels[sites.len()..];
+        self.order.extend_from_slice(missing);
+        self.sites.extend(missing.iter().map(|&i| sites[i as usize]));
+        self.sites.push([0; 2]);
+    }
+}

@@ -1,0 +1,220 @@
+//! Step G2: the exact discrete Voronoi diagram. The label of a pixel is the pixel (y << 16 | x) of its nearest site, nearest
+//! being least (d^2, x, y) of the site's pixel. That rule for ties keeps the mesh clean.
+//!
+//! Columns, then rows: first the distance to the nearest site north of every pixel in its column, for the whole texture; then,
+//! row by row from the south, the distance to the nearest site south, the nearer of both as one 16-bit key a column, and for
+//! every pixel the least key over the columns around it. The key is `d^2 << 8 | (dx + 8) << 4 | (dy + 8)`, so that one `min`
+//! gives distance, tie rule and label. It reaches seven pixels far; pixels with no site so near take the lower envelope of
+//! the columns' parabolas (Felzenszwalb and Huttenlocher 2012), which is exact at any distance.
+
+use super::g1_write_sites::Texture;
+
+/// The label of what lies outside the texture.
+pub(super) const FRAME: u32 = u32::MAX;
+
+/// Key of "no site within seven pixels"; so are all larger ones.
+const FAR: i16 = 64 << 8;
+const REACH: usize = 7;
+/// Keys are computed for this many pixels at a time.
+const BLOCK: usize = 32;
+/// A distance in a column that stands for itself and all larger ones.
+const LONG: u8 = u8::MAX;
+
+/// Rows of labels, from the south.
+#[derive(Default)]
+pub(super) struct Voronoi {
+    stride: usize,
+    /// Distance to the nearest site at or north of every pixel.
+    north: Vec<u8>,
+    /// For the row at hand, distance to the nearest site at or south of it.
+    south: Vec<u8>,
+    /// For the row at hand, the row of that site + 1, or 0.
+    south_row: Vec<u32>,
+    /// One key a column, with `REACH` + 1 on either side.
+    columns: Vec<i16>,
+    keys: Vec<i16>,
+    envelope: Vec<Parabola>,
+}
+
+/// A site seen from a row: it is nearest from pixel `from` on, until the next one is.
+#[derive(Clone, Copy)]
+struct Parabola {
+    from: i64,
+    column: i64,
+    height: i64,
+    label: u32,
+}
+
+impl Voronoi {
+    /// Prepares for the rows of `texture`.
+    pub(super) fn start(&mut self, texture: &Texture) {
+        self.stride = texture.words * 64;
+        self.south.clear();
+        self.south.resize(self.stride, LONG);
+        self.south_row.clear();
+        self.south_row.resize(self.stride, 0);
+        self.columns.clear();
+        self.columns.resize(self.stride + 2 * (REACH + 1), FAR);
+        self.keys.resize(self.stride, FAR);
+        self.measure_north(texture);
+    }
+
+    fn measure_north(&mut self, texture: &Texture) {
+        self.north.resize(self.stride * texture.height, LONG);
+        let mut running = vec![LONG; self.stride];
+        for y in (0..texture.height).rev() {
+            grow(&mut running, &texture.occupied[y * texture.words..][..texture.words]);
+            self.north[y * self.stride..][..self.stride].copy_from_slice(&running);
+        }
+    }
+
+    /// Writes the labels of row `y` to `labels[1..=width]`. Rows must be asked for in order.
+    pub(super) fn row(&mut self, texture: &Texture, y: usize, labels: &mut [u32]) {
+        let occupied = &texture.occupied[y * texture.words..][..texture.words];
+        grow(&mut self.south, occupied);
+        for (word, &bits) in occupied.iter().enumerate() {
+            let mut bits = bits;
+            while bits != 0 {
+                self.south_row[word * 64 + bits.trailing_zeros() as usize] = y as u32 + 1;
+                bits &= bits - 1;
+            }
+        }
+        let north = &self.north[y * self.stride..][..self.stride];
+        column_keys(&self.south, north, &mut self.columns[REACH + 1..][..self.stride]);
+        let far = nearest_keys(&self.columns, &mut self.keys, texture.width);
+        let base = ((y as u32) << 16).wrapping_sub(8 << 16 | 8);
+        for (x, (label, &key)) in labels[1..=texture.width].iter_mut().zip(&self.keys).enumerate() {
+            let key = key as u32;
+            *label = base.wrapping_add(x as u32).wrapping_add((key & 15) << 16).wrapping_add(key >> 4 & 15);
+        }
+        if far {
+            self.far_runs(texture, y, &mut labels[1..=texture.width]);
+        }
+    }
+
+    /// Labels the runs of pixels whose nearest site is more than seven pixels away.
+    #[cold]
+    fn far_runs(&mut self, texture: &Texture, y: usize, labels: &mut [u32]) {
+        let mut x = 0;
+        while x < labels.len() {
+            if self.keys[x] < FAR {
+                x += 1;
+                continue;
+            }
+            let end = (x..labels.len()).find(|&i| self.keys[i] < FAR).unwrap_or(labels.len());
+            // Along a row, the columns of the labels only grow: those of the run lie between its neighbours'.
+            let first = if x == 0 { 0 } else { labels[x - 1] & 0xffff };
+            let last = if end == labels.len() { labels.len() as u32 - 1 } else { labels[end] & 0xffff };
+            self.build_envelope(texture, y, first as usize..last as usize + 1, x as i64);
+            let mut at = 0;
+            for (i, label) in labels[x..end].iter_mut().enumerate() {
+                while at + 1 < self.envelope.len() && self.envelope[at + 1].from <= (x + i) as i64 {
+                    at += 1;
+                }
+                *label = self.envelope[at].label;
+            }
+            x = end;
+        }
+    }
+
+    /// The lower envelope, from pixel `start` on, of the sites nearest to row `y` in `columns`.
+    fn build_envelope(&mut self, texture: &Texture, y: usize, columns: std::ops::Range<usize>, start: i64) {
+        self.envelope.clear();
+        for x in columns {
+            let Some(row) = self.nearest_in_column(texture.height, x, y) else { continue };
+            let height = (row as i64 - y as i64).pow(2);
+            let label = (row << 16 | x) as u32;
+            let mut new = Parabola { from: start, column: x as i64, height, label };
+            while let Some(top) = self.envelope.last() {
+                new.from = new.overtakes(top).max(start);
+                if new.from > top.from {
+                    break;
+                }
+                self.envelope.pop();
+                new.from = start;
+            }
+            self.envelope.push(new);
+        }
+    }
+
+    /// The row of the site of column `x` that is nearest to row `y`; of two, the southern one.
+    fn nearest_in_column(&self, height: usize, x: usize, y: usize) -> Option<usize> {
+        let south = (self.south_row[x] as usize).checked_sub(1);
+        let mut north = y;
+        while north < height && self.north[north * self.stride + x] == LONG {
+            north += LONG as usize;
+        }
+        let north = (north < height).then(|| north + self.north[north * self.stride + x] as usize);
+        match (south, north) {
+            (Some(s), Some(n)) => Some(if y - s <= n - y { s } else { n }),
+            (s, n) => s.or(n),
+        }
+    }
+}
+
+impl Parabola {
+    /// The first pixel at which `self`, from a column further east, is strictly nearer than `other`.
+    fn overtakes(&self, other: &Parabola) -> i64 {
+        let squares = self.column.pow(2) - other.column.pow(2) + self.height - other.height;
+        squares.div_euclid(2 * (self.column - other.column)) + 1
+    }
+}
+
+/// Distances to the nearest occupied pixel on one side, one row further on.
+fn grow(distances: &mut [u8], occupied: &[u64]) {
+    const LANES: [u8; 8] = [1, 2, 4, 8, 16, 32, 64, 128];
+    for (row, &bits) in distances.chunks_exact_mut(64).zip(occupied) {
+        for (eight, bits) in row.chunks_exact_mut(8).zip(bits.to_le_bytes()) {
+            for (distance, lane) in eight.iter_mut().zip(LANES) {
+                *distance = if bits & lane != 0 { 0 } else { distance.saturating_add(1) };
+            }
+        }
+    }
+}
+
+/// The key of the nearer of both sites of each column; of two, the southern one.
+fn column_keys(south: &[u8], north: &[u8], keys: &mut [i16]) {
+    for ((key, &south), &north) in keys.iter_mut().zip(south).zip(north) {
+        let distance = south.min(north).min(8) as i16;
+        let dy = if south <= north { -distance } else { distance };
+        *key = ((distance * distance) << 8) + dy + 8;
+    }
+}
+
+/// The least key of every pixel over the columns within reach; whether any of the first `width` pixels has none.
+fn nearest_keys(columns: &[i16], keys: &mut [i16], width: usize) -> bool {
+    let (whole, rest) = (width / BLOCK, width % BLOCK);
+    let mut far = false;
+    for (i, keys) in keys.chunks_exact_mut(BLOCK).take(whole).enumerate() {
+        far |= nearest_keys_of_block(&columns[i * BLOCK..], keys, BLOCK);
+    }
+    if rest > 0 {
+        far |= nearest_keys_of_block(&columns[whole * BLOCK..], &mut keys[whole * BLOCK..], rest);
+    }
+    far
+}
+
+#[inline(always)]
+fn nearest_keys_of_block(columns: &[i16], keys: &mut [i16], width: usize) -> bool {
+    let columns = &columns[..BLOCK + 2 * (REACH + 1)];
+    let mut best = [0i16; BLOCK];
+    for (best, &column) in best.iter_mut().zip(&columns[REACH + 1..]) {
+        *best = column + (8 << 4);
+    }
+    let mut worst = i16::MAX;
+    for r in 1..=REACH {
+        let square = ((r * r) << 8) as i16;
+        let (west, east) = (square + ((8 - r as i16) << 4), square + ((8 + r as i16) << 4));
+        let (from_west, from_east) = (&columns[REACH + 1 - r..][..BLOCK], &columns[REACH + 1 + r..][..BLOCK]);
+        for ((best, &w), &e) in best.iter_mut().zip(from_west).zip(from_east) {
+            *best = (*best).min(w + west).min(e + east);
+        }
+        worst = best[..width].iter().fold(0, |worst, &key| key.max(worst));
+        // No site further off can come nearer, or as near.
+        if worst < (((r + 1) * (r + 1)) << 8) as i16 {
+            break;
+        }
+    }
+    keys[..BLOCK].copy_from_slice(&best);
+    worst >= FAR
+}

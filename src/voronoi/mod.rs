@@ -1,0 +1,142 @@
+//! The canonical Delaunay triangulation of a leaf by way of its discrete Voronoi diagram: the ten steps of Rong, Tan, Cao and
+//! Stephanus 2008, "Computing Two-dimensional Delaunay Triangulation Using Graphics Hardware", here on one CPU thread.
+//!
+//! [`triangulate`] lists the steps in order. Any of them may go wrong on unlucky input; `accept` proves the result, so
+//! that a fault costs time and never correctness.
+
+mod accept;
+mod c1_hull;
+mod c2_shift;
+mod c3_insert;
+mod c4_flip;
+mod g1_write_sites;
+mod g2_voronoi;
+mod g3_islands;
+mod g6_triangles;
+mod sphere;
+#[cfg(test)]
+mod tests;
+
+use crate::geometry::Site;
+use crate::triangulation::mesh::Mesh;
+
+/// Why a leaf was not triangulated here. Cut it, or triangulate it another way.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Rejected {
+    /// Fewer than three sites have no triangle.
+    #[error("too few sites for a triangle")]
+    TooFew,
+    /// More than 2^26 sites.
+    #[error("too many sites for one leaf")]
+    TooMany,
+    /// A coordinate exceeds `geometry::lattice::REACH`.
+    #[error("a coordinate is out of reach")]
+    OutOfReach,
+    /// So many sites share pixels that the discrete diagram says too little.
+    #[error("too many sites share a pixel")]
+    Crowded,
+    /// The result was wrong, or about to be; the text says how it showed.
+    #[error("the mesh was not accepted: {0}")]
+    NotAccepted(&'static str),
+}
+
+/// What the steps met. All are numbers of sites, triangles or edges, as named.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct Counts {
+    /// Sites given.
+    pub sites: u64,
+    /// Sites that found no pixel and were inserted one by one.
+    pub missing: u64,
+    /// Sites that were given a pixel beside their own.
+    pub moved: u64,
+    /// Pieces of Voronoi regions that do not hang together with their site.
+    pub islands: u64,
+    /// Triangles that were not counterclockwise once the sites were at their true places.
+    pub inverted: u64,
+    /// Sites taken out for that reason and inserted again.
+    pub removed: u64,
+    /// Edges flipped to make the mesh Delaunay.
+    pub flips: u64,
+}
+
+impl std::ops::AddAssign for Counts {
+    fn add_assign(&mut self, other: Counts) {
+        self.sites += other.sites;
+        self.missing += other.missing;
+        self.moved += other.moved;
+        self.islands += other.islands;
+        self.inverted += other.inverted;
+        self.removed += other.removed;
+        self.flips += other.flips;
+    }
+}
+
+/// Buffers that [`triangulate`] uses again and again. One for each thread.
+#[derive(Default)]
+pub struct Scratch {
+    texture: g1_write_sites::Texture,
+    voronoi: g2_voronoi::Voronoi,
+    scan: g6_triangles::Scan,
+    sphere: sphere::Sphere,
+    shift: c2_shift::Shift,
+    flips: c4_flip::Flips,
+    acceptance: accept::Acceptance,
+    mesh: Mesh,
+}
+
+impl Scratch {
+    /// Hands back a mesh that is no longer needed: its memory serves the next leaf.
+    pub fn recycle(&mut self, mesh: Mesh) {
+        self.mesh = mesh;
+    }
+}
+
+/// The canonical Delaunay triangulation of `sites`, which must be distinct; the order is free, though south to north is fastest.
+/// The mesh's corners are positions in `sites`.
+///
+/// # Errors
+/// [`Rejected`] where this is not the way to do it; never a wrong mesh.
+pub fn triangulate(sites: &[Site], scratch: &mut Scratch) -> Result<(Mesh, Counts), Rejected> {
+    check_size(sites)?;
+    let Scratch { texture, voronoi, scan, sphere, shift, flips, acceptance, mesh } = scratch;
+    let mut counts = Counts { sites: sites.len() as u64, ..Counts::default() };
+    shift.clear();
+    flips.reset(sites.len());
+
+    // G1: write the sites into the texture.
+    texture.write(sites, &mut counts)?;
+    // G2 to G6: row by row, the Voronoi diagram and the triangles at its corners.
+    voronoi.start(texture);
+    scan.run(texture, voronoi, sphere);
+    let at = &texture.sites;
+    // G3: what islands left.
+    g3_islands::remove_islands(sphere, at, texture.placed, &mut shift.suspects, &mut counts)?;
+    // C2: shift the sites to their true places. It comes before C1, so that the hull is completed but once.
+    shift.test(sphere, at, &mut counts);
+    shift.repair(sphere, at, &mut counts)?;
+    // C1: complete the hull.
+    c1_hull::complete_hull(sphere, at, shift)?;
+    counts.removed = shift.removed.len() as u64;
+    // C4: flip to Delaunay; C3: insert what is missing into that, flipping as it goes.
+    std::mem::swap(&mut flips.suspects, &mut shift.suspects);
+    flips.run(sphere, at)?;
+    for &[vertex, near] in &shift.removed {
+        c3_insert::insert(sphere, at, vertex, near, flips)?;
+    }
+    for (vertex, &pixel) in (texture.placed as u32..).zip(&texture.missing) {
+        c3_insert::insert(sphere, at, vertex, scan.start_near(pixel), flips)?;
+    }
+    counts.flips = flips.done;
+
+    let front = sphere.front();
+    acceptance.accept(sphere.compact(), front, at, &texture.order, mesh)?;
+    Ok((std::mem::take(mesh), counts))
+}
+
+fn check_size(sites: &[Site]) -> Result<(), Rejected> {
+    match sites.len() {
+        0..3 => Err(Rejected::TooFew),
+        n if n > 1 << 26 => Err(Rejected::TooMany),
+        _ => Ok(()),
+    }
+}

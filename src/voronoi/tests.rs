@@ -1,0 +1,144 @@
+//! Random cases of every kind that is known to be hard, against `spade` with canonical flips.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::{Rejected, Scratch, triangulate};
+use crate::geometry::Site;
+use crate::triangulation::mesh::Mesh;
+use crate::triangulation::reference;
+
+/// A small generator (xorshift64*), so that cases are the same everywhere.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        self.0.wrapping_mul(0x2545_f491_4f6c_dd1d)
+    }
+
+    fn below(&mut self, end: i32) -> i32 {
+        ((self.next() >> 33) % end as u64) as i32
+    }
+
+    fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+const KINDS: [&str; 10] = [
+    "uniform",
+    "coarse",
+    "disc",
+    "circle",
+    "rotated lattice",
+    "lattice",
+    "collinear",
+    "parallelogram",
+    "clusters",
+    "void",
+];
+
+fn case(kind: &str, n: usize, random: &mut Random) -> Vec<Site> {
+    let range = [30, 1000, 1 << 20, 1 << 28][random.below(4) as usize];
+    let side = 1 + random.below(range).max((n as f64).sqrt() as i32);
+    let turn = random.unit() * std::f64::consts::TAU;
+    let root = (n as f64).sqrt().ceil() as i32;
+    let (p, q) = (1 + random.below(20), random.below(20));
+    let [ax, ay, bx, by] = [0; 4].map(|_| random.below(2000) - 1000);
+    let (cx, cy, spots) = (random.below(1000), random.below(1000), 1 + random.below(20));
+    let centres: Vec<_> = (0..spots).map(|_| [random.below(100_000), random.below(100_000)]).collect();
+    let site = |i: i32, random: &mut Random| -> Site {
+        match kind {
+            "uniform" => [random.below(side), random.below(side)],
+            "coarse" => [random.below(root + 2), random.below(root + 2)],
+            "disc" => {
+                let (r, a) = (random.unit().sqrt() * side as f64, random.unit() * std::f64::consts::TAU);
+                [(r * a.cos()) as i32, (r * a.sin()) as i32]
+            }
+            "circle" => {
+                let a = random.unit() * std::f64::consts::TAU;
+                [(side as f64 * a.cos()).round() as i32, (side as f64 * a.sin()).round() as i32]
+            }
+            "rotated lattice" => [i % root * p - i / root * q, i % root * q + i / root * p],
+            "lattice" => [i % root * p, i / root * (q + 1)],
+            "collinear" => [ax * i, ay * i + (turn < 1.0 && i == 3) as i32],
+            "parallelogram" => [i % root * ax + i / root * bx, i % root * ay + i / root * by],
+            "clusters" => {
+                let centre = centres[random.below(spots) as usize];
+                let spread = (1.0 - random.unit()).ln().abs().sqrt() * 1500.0;
+                let a = random.unit() * std::f64::consts::TAU;
+                [centre[0] + (spread * a.cos()) as i32, centre[1] + (spread * a.sin()) as i32]
+            }
+            _ => loop {
+                let at = [random.below(1000), random.below(1000)];
+                if (at[0] - cx).pow(2) + (at[1] - cy).pow(2) > 400 * 400 {
+                    break at;
+                }
+            },
+        }
+    };
+    let mut sites: Vec<_> = (0..n as i32).map(|i| site(i, random)).collect();
+    let mut seen = BTreeSet::new();
+    sites.retain(|&s| seen.insert(s));
+    sites
+}
+
+/// The triangles, each from its least corner, as a set.
+fn triangles(mesh: &Mesh) -> BTreeSet<[u32; 3]> {
+    mesh.triangles.iter().map(|&[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().unwrap()).collect()
+}
+
+#[test]
+fn random_cases_are_canonical_or_rejected() {
+    let cases = std::env::var("GDT_CASES").ok().and_then(|s| s.parse().ok()).unwrap_or(2000);
+    let mut random = Random(0x9e37_79b9_7f4a_7c15);
+    let mut scratch = Scratch::default();
+    let mut rejected: BTreeMap<(&str, String), usize> = BTreeMap::new();
+    let mut refused = 0;
+    for i in 0..cases {
+        let kind = KINDS[i % KINDS.len()];
+        let n = 5 + (2000.0f64.powf(random.unit()) - 1.0) as usize;
+        let sites = case(kind, n, &mut random);
+        match triangulate(&sites, &mut scratch) {
+            Ok((mesh, _)) => assert_eq!(
+                triangles(&mesh),
+                triangles(&reference::triangulate(&sites).unwrap()),
+                "case {i}, {kind}: {sites:?}"
+            ),
+            Err(why) => {
+                refused += (kind == "uniform" && sites.len() >= 1000) as usize;
+                *rejected.entry((kind, why.to_string())).or_default() += 1;
+            }
+        }
+    }
+    eprintln!("of {} cases of each kind, rejected: {rejected:#?}", cases / KINDS.len());
+    assert_eq!(refused, 0, "large uniform cases were rejected");
+}
+
+#[test]
+fn uniform_sites_are_never_rejected() {
+    let mut random = Random(42);
+    let mut scratch = Scratch::default();
+    for n in [1000, 3000, 10_000, 30_000] {
+        for side in [1 << 10, 1 << 20, 1 << 28] {
+            let mut sites: Vec<Site> = (0..n).map(|_| [random.below(side), random.below(side / 3)]).collect();
+            sites.sort_unstable();
+            sites.dedup();
+            let (_, counts) = triangulate(&sites, &mut scratch).unwrap();
+            eprintln!("{counts:?}");
+        }
+    }
+}
+
+#[test]
+fn what_has_no_triangle_is_rejected() {
+    let mut scratch = Scratch::default();
+    assert_eq!(triangulate(&[[0, 0], [1, 1]], &mut scratch).unwrap_err(), Rejected::TooFew);
+    let line: Vec<Site> = (0..1000).map(|i| [3 * i, 7 * i]).collect();
+    assert!(triangulate(&line, &mut scratch).is_err());
+    let twice = [[0, 0], [10, 0], [0, 10], [0, 0]];
+    assert!(triangulate(&twice, &mut scratch).is_err());
+    assert_eq!(triangulate(&[[0, 0], [i32::MAX, 0], [0, 10]], &mut scratch).unwrap_err(), Rejected::OutOfReach);
+}
