@@ -40,7 +40,7 @@ fn show(result: &(impl Display + Serialize), talk: Talk) -> Result<()> {
         let text = serde_json::to_string_pretty(result).map_err(|e| Error::Broken(e.to_string()))?;
         println!("{text}");
     } else if !talk.quiet {
-        print!("{result}");
+        println!("{}", result.to_string().trim_end());
     }
     Ok(())
 }

@@ -166,7 +166,15 @@ fn axis(bytes: &[u8], index: usize) -> Checked<Axis> {
             "has {value:e} as the {what} of {name} in its header, which is not a usable number; the file is damaged"
         )
     };
-    let step = shortest_decimal(scale).filter(|step| *step > Decimal::ZERO).ok_or_else(|| unusable("scale", scale))?;
-    let origin = shortest_decimal(offset).ok_or_else(|| unusable("offset", offset))?;
+    let step = written_decimal(scale).filter(|step| *step > Decimal::ZERO).ok_or_else(|| unusable("scale", scale))?;
+    let origin = written_decimal(offset).ok_or_else(|| unusable("offset", offset))?;
     Ok(Axis { offset: origin, scale: step })
+}
+
+/// The number that the writer meant by `value`: where a decimal of 15 digits is within two units in the last place,
+/// as after the writer's own arithmetic, that one (0.000001 for 0.0000010000000000000002), else the shortest.
+fn written_decimal(value: f64) -> Option<Decimal> {
+    let round: f64 = format!("{value:.14e}").parse().ok()?;
+    let near = (round - value).abs() <= 2.0 * f64::EPSILON * value.abs();
+    shortest_decimal(if near { round } else { value })
 }

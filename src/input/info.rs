@@ -105,8 +105,9 @@ impl fmt::Display for Description {
             writeln!(f, "  returns  {:?}", self.points_by_return)?;
         }
         for (axis, name) in ["x", "y", "z"].iter().enumerate() {
-            let (min, max) = (self.min[axis], self.max[axis]);
-            writeln!(f, "  {name}        {min} to {max}, step {}, offset {}", self.scale[axis], self.offset[axis])?;
+            let (min, max, step, offset) = (self.min[axis], self.max[axis], &self.scale[axis], &self.offset[axis]);
+            let decimals = step.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+            writeln!(f, "  {name}        {min:.decimals$} to {max:.decimals$}, step {step}, offset {offset}")?;
         }
         writeln!(f, "  crs      {}", self.crs.label())?;
         writeln!(f, "  unit     {} in x and y, {} in z", self.crs.horizontal.name(), self.vertical())?;

@@ -37,7 +37,7 @@ pub(super) struct Chunks {
     chunks: Vec<Chunk>,
     pieces: Vec<Range<usize>>,
     /// Records that the header promises and no chunk holds.
-    missing: u64,
+    pub(super) missing: u64,
 }
 
 /// How the records of a file are compressed.
@@ -213,7 +213,7 @@ impl ChunkRun<'_> {
         };
         let mut window = self.file.window(chunk.bytes.clone())?;
         while self.next < chunk.first + held {
-            let stop = (self.next + chunk.restart).min(chunk.first + held);
+            let stop = self.next.saturating_add(chunk.restart).min(chunk.first + held);
             window = match self.decode_run(window, stop, sieve)? {
                 Ok(window) => window,
                 Err(what) => return Ok(Err(what)),

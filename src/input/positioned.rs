@@ -105,13 +105,28 @@ pub(super) struct Window {
 }
 
 impl Window {
+    /// Reads on into `out`, as much as is left of the part. That there is less in the file is an error.
+    fn read_direct(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        let size = self.end.saturating_sub(self.next).min(out.len() as u64) as usize;
+        if size == 0 {
+            return Ok(0);
+        }
+        match read_at(&self.file, &mut out[..size], self.next)? {
+            0 => Err(io::Error::other("the file became shorter while it was read")),
+            count => {
+                self.next += count as u64;
+                Ok(count)
+            }
+        }
+    }
+
     fn refill(&mut self) -> io::Result<()> {
-        let size = (self.end.saturating_sub(self.next)).min(WINDOW as u64) as usize;
-        self.buffer.resize(size, 0);
+        let mut buffer = std::mem::take(&mut self.buffer);
         self.at = 0;
-        let count = if size == 0 { 0 } else { read_at(&self.file, &mut self.buffer, self.next)? };
-        self.buffer.truncate(count);
-        self.next += count as u64;
+        buffer.resize(WINDOW, 0);
+        let count = self.read_direct(&mut buffer)?;
+        buffer.truncate(count);
+        self.buffer = buffer;
         Ok(())
     }
 }
@@ -120,10 +135,9 @@ impl Read for Window {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         if self.at == self.buffer.len() {
             if out.len() >= WINDOW {
-                let size = (self.end.saturating_sub(self.next)).min(out.len() as u64) as usize;
-                let count = read_at(&self.file, &mut out[..size], self.next)?;
-                self.next += count as u64;
-                return Ok(count);
+                self.buffer.clear();
+                self.at = 0;
+                return self.read_direct(out);
             }
             self.refill()?;
         }
@@ -171,5 +185,41 @@ impl Seek for Window {
             self.buffer.clear();
         }
         Ok(target)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_window_reads_and_seeks_like_the_bytes_it_shows() {
+        let bytes: Vec<u8> = (0..300_000u32).map(|i| (i * 7 % 251) as u8).collect();
+        let path = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(path.path(), &bytes).unwrap();
+        let file = Positioned::open(path.path()).unwrap();
+        let mut window = file.window(1000..299_000).unwrap();
+        let mut at = 1000;
+        for (size, step) in [(1, 0), (70_000, 5), (3, -2000), (65_536, 100_000), (10, -60_000), (100_000, 0)] {
+            let mut out = vec![0; size];
+            window.read_exact(&mut out).unwrap();
+            assert!(out == bytes[at..at + size], "{size} bytes at {at}");
+            at = (at as i64 + size as i64 + step) as usize;
+            assert_eq!(window.seek(SeekFrom::Current(step)).unwrap(), at as u64);
+        }
+        window.seek(SeekFrom::Start(298_990)).unwrap();
+        assert_eq!(window.read_exact(&mut [0; 11]).unwrap_err().kind(), io::ErrorKind::UnexpectedEof);
+    }
+
+    #[test]
+    fn a_file_that_shrinks_is_an_error_and_not_its_end() {
+        let path = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(path.path(), [1; 1000]).unwrap();
+        let file = Positioned::open(path.path()).unwrap();
+        let mut window = file.window(0..1000).unwrap();
+        std::fs::write(path.path(), [1; 10]).unwrap();
+        assert_eq!(window.read_exact(&mut [0; 20]).unwrap_err().kind(), io::ErrorKind::Other);
+        assert_eq!(file.read_exact_at(&mut [0; 20], 0).unwrap_err().exit_code(), 3);
+        assert_eq!(Positioned::reopen(path.path(), 1000).err().unwrap().exit_code(), 3);
     }
 }

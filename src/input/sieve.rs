@@ -25,6 +25,9 @@ pub(super) struct Record {
     pub(super) rounded: [bool; 2],
 }
 
+/// Lattice integers in x, y and z, and whether they were rounded; `None` where they do not fit.
+type Mapped = [Option<(i32, bool)>; 3];
+
 /// The rules at work on one piece of a source.
 pub(super) struct Sieve<'a> {
     path: &'a Path,
@@ -32,7 +35,7 @@ pub(super) struct Sieve<'a> {
     rules: &'a Rules,
     sink: Sink<'a>,
     points: Vec<Point>,
-    pub(super) tally: Tally,
+    tally: Tally,
 }
 
 impl<'a> Sieve<'a> {
@@ -40,10 +43,9 @@ impl<'a> Sieve<'a> {
         Sieve { path, axes, rules, sink, points: Vec::with_capacity(SLICE), tally: Tally::default() }
     }
 
-    /// Judges record `number` of the source (from 0); `place` names it in an example ("record 12", "line 13").
+    /// Judges record `number` of the source (from 0); `place` names it in an example ("point 12", "line 13").
     #[inline]
     pub(super) fn push(&mut self, number: u64, record: &Record, place: impl Fn() -> String) -> Result<()> {
-        self.tally.read += 1;
         if record.withheld {
             self.tally.withheld += 1;
             return Ok(());
@@ -53,42 +55,55 @@ impl<'a> Sieve<'a> {
             return Ok(());
         }
         let mapped = [0, 1, 2].map(|axis| self.rules.maps[axis].apply(record.raw[axis]));
-        if let Some([x_min, y_min, x_max, y_max]) = self.rules.bounds {
-            let inside = |value: Option<(i32, bool)>, low, high| value.is_some_and(|(v, _)| v >= low && v <= high);
-            if !inside(mapped[0], x_min, x_max) || !inside(mapped[1], y_min, y_max) {
-                self.tally.out_of_bounds += 1;
-                return Ok(());
-            }
+        if !self.in_bounds(&mapped) {
+            self.tally.out_of_bounds += 1;
+            return Ok(());
         }
         match mapped {
             [Some((x, round_x)), Some((y, round_y)), Some((z, round_z))] if reached(x) && reached(y) => {
-                self.tally.kept += 1;
                 self.tally.rounded_xy += (round_x | round_y | record.rounded[0]) as u64;
                 self.tally.rounded_z += (round_z | record.rounded[1]) as u64;
-                let brightest = record.rgb[0].max(record.rgb[1]).max(record.rgb[2]);
-                self.tally.max_rgb = self.tally.max_rgb.max(brightest);
-                self.points.push(Point::new([x, y], z, record.rgb, record.class, self.rules.first_order + number));
-                if self.points.len() == SLICE { self.flush() } else { Ok(()) }
+                self.keep(Point::new([x, y], z, record.rgb, record.class, self.rules.first_order + number))
             }
             _ => {
-                let example = || self.outside(record, &mapped, &place());
-                let text = if self.tally.examples.len() < super::rules::EXAMPLES { example() } else { String::new() };
-                self.tally.add_malformed(1, || text);
+                let (value, name) = self.outside(record, &mapped);
+                self.malformed(1, || {
+                    format!(
+                        "{}: {name} = {value} lies outside the range the job's lattice reaches; leave such points out with \
+                         bounds, or choose a coarser resolution",
+                        place()
+                    )
+                });
                 Ok(())
             }
         }
     }
 
-    /// Counts `count` records that could not be read.
+    #[inline]
+    fn in_bounds(&self, mapped: &Mapped) -> bool {
+        let inside = |axis: usize, low, high| mapped[axis].is_some_and(|(value, _)| value >= low && value <= high);
+        self.rules.bounds.is_none_or(|[x_min, y_min, x_max, y_max]| inside(0, x_min, x_max) && inside(1, y_min, y_max))
+    }
+
+    #[inline]
+    fn keep(&mut self, point: Point) -> Result<()> {
+        self.tally.kept += 1;
+        self.tally.max_rgb = self.tally.max_rgb.max(point.rgb[0].max(point.rgb[1]).max(point.rgb[2]));
+        self.points.push(point);
+        if self.points.len() == SLICE { self.flush() } else { Ok(()) }
+    }
+
+    /// Counts `count` records that cannot be used.
     pub(super) fn malformed(&mut self, count: u64, what: impl FnOnce() -> String) {
         let path = self.path;
-        self.tally.read += count;
         self.tally.add_malformed(count, || format!("{}: {}", path.display(), what()));
     }
 
     /// Hands on what is left and gives the tally.
     pub(super) fn finish(mut self) -> Result<Tally> {
         self.flush()?;
+        let Tally { withheld, other_class, out_of_bounds, malformed, kept, .. } = self.tally;
+        self.tally.read = withheld + other_class + out_of_bounds + malformed + kept;
         Ok(self.tally)
     }
 
@@ -100,17 +115,12 @@ impl<'a> Sieve<'a> {
         Ok(())
     }
 
+    /// The value that has left the lattice, and its axis.
     #[cold]
-    fn outside(&self, record: &Record, mapped: &[Option<(i32, bool)>; 3], place: &str) -> String {
+    fn outside(&self, record: &Record, mapped: &Mapped) -> (f64, &'static str) {
         let out = |axis: usize| mapped[axis].is_none_or(|(v, _)| axis < 2 && !reached(v));
         let axis = (0..3).find(|&axis| out(axis)).unwrap_or(2);
-        let value = self.axes[axis].value(record.raw[axis]);
-        let name = ["x", "y", "z"][axis];
-        format!(
-            "{}: {place}: {name} = {value} lies outside the range the job's lattice reaches; leave such points out with \
-             bounds, or choose a coarser resolution",
-            self.path.display()
-        )
+        (self.axes[axis].value(record.raw[axis]), ["x", "y", "z"][axis])
     }
 }
 

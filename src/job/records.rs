@@ -48,12 +48,14 @@ impl Leaf {
     /// # Errors
     /// [`crate::Error::Io`].
     pub fn save(&self, directory: &Directory, tile: usize) -> Result<()> {
-        ColumnWriter::default()
-            .push(&self.positions)
-            .push(&self.rgb)
-            .push(&self.class)
-            .push(&self.triangles)
-            .write(&directory.leaf(tile))
+        let columns = ColumnWriter::default().push(&self.positions).push(&self.rgb).push(&self.class);
+        // These files are most of what a job writes on its way: corners take two bytes where that is enough.
+        let columns = if self.has_short_corners() {
+            columns.push::<[u16; 3]>(&self.triangles.iter().map(|t| t.map(|v| v as u16)).collect::<Vec<_>>())
+        } else {
+            columns.push(&self.triangles)
+        };
+        columns.write(&directory.leaf(tile))
     }
 
     /// Reads the file of `tile`.
@@ -62,12 +64,18 @@ impl Leaf {
     /// [`crate::Error::Io`], or [`crate::Error::Broken`] if the file is not whole.
     pub fn load(directory: &Directory, tile: usize) -> Result<Leaf> {
         let mut columns = ColumnReader::open(&directory.leaf(tile))?;
-        Ok(Leaf {
-            positions: columns.next()?,
-            rgb: columns.next()?,
-            class: columns.next()?,
-            triangles: columns.next()?,
-        })
+        let mut leaf =
+            Leaf { positions: columns.next()?, rgb: columns.next()?, class: columns.next()?, triangles: Vec::new() };
+        leaf.triangles = if leaf.has_short_corners() {
+            columns.next::<[u16; 3]>()?.into_iter().map(|t| t.map(u32::from)).collect()
+        } else {
+            columns.next()?
+        };
+        Ok(leaf)
+    }
+
+    fn has_short_corners(&self) -> bool {
+        self.positions.len() <= 1 << 16
     }
 }
 

@@ -40,10 +40,11 @@ impl Cell {
         // term to cancellation, which for slivers is more than the numerator itself.
         let magnitude = (bb * c[0].abs().max(c[1].abs()) + cc * b[0].abs().max(b[1].abs())) * scale;
         let doubt = 16.0 * f64::EPSILON * magnitude;
-        let reach = center[0].hypot(center[1]) + 4.0 * doubt;
+        // Not `hypot`: the range of f64 is far from sight, and this runs for every triangle.
+        let reach = (center[0] * center[0] + center[1] * center[1]).sqrt() * (1.0 + 4.0 * f64::EPSILON) + 4.0 * doubt;
         (0..2).all(|axis| {
-            let low = (self.min[axis] as i128 - a[axis] as i128) as f64;
-            let high = (self.max[axis] as i128 - a[axis] as i128) as f64;
+            let low = self.min[axis] as f64 - a[axis] as f64;
+            let high = self.max[axis] as f64 - a[axis] as f64;
             center[axis] - reach >= low && center[axis] + reach < high
         })
     }

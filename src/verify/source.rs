@@ -88,7 +88,7 @@ impl Axis {
         let whole = |d: Decimal| d.mantissa().checked_mul(10i128.checked_pow(digits - d.scale())?);
         let (base, step) = (whole(offset)?, whole(step)?);
         let fits = step > 0 && base.abs() < 1 << 120 && step < 1 << 90;
-        fits.then(|| Axis { base, step, digits, power: 10f64.powi(digits as i32) })
+        fits.then(|| Axis { base, step, digits, power: format!("1e{digits}").parse().unwrap_or(f64::NAN) })
     }
 
     #[inline(always)]

@@ -43,7 +43,7 @@ impl Shift {
     }
 
     /// Makes every triangle counterclockwise.
-    pub(super) fn repair(&mut self, sphere: &mut Sphere, sites: &[Site], counts: &mut Counts) -> Result<(), Rejected> {
+    pub(super) fn repair(&mut self, sphere: &mut Sphere, sites: &[Site]) -> Result<(), Rejected> {
         for _ in 0..ROUNDS {
             for t in std::mem::take(&mut self.inverted) {
                 if orientation(sphere, sites, t).is_some_and(|area| area <= 0) && !self.mend(sphere, sites, t) {

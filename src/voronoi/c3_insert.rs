@@ -3,6 +3,8 @@
 
 use super::Rejected;
 use super::c4_flip::Flips;
+use super::g1_write_sites::Texture;
+use super::g6_triangles::Scan;
 use super::sphere::{Sphere, next, previous};
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
@@ -13,14 +15,25 @@ struct Place {
     on: Option<u32>,
 }
 
-/// Inserts `vertex`, looking for its place from half-edge `near` on.
-pub(super) fn insert(
+/// Inserts the sites `removed` from the mesh and those missing in `texture`.
+pub(super) fn insert_all(
     sphere: &mut Sphere,
-    sites: &[Site],
-    vertex: u32,
-    near: u32,
+    texture: &Texture,
+    scan: &Scan,
+    removed: &[[u32; 2]],
     flips: &mut Flips,
 ) -> Result<(), Rejected> {
+    for &[vertex, near] in removed {
+        insert(sphere, &texture.sites, vertex, near, flips)?;
+    }
+    for (vertex, &pixel) in (texture.placed as u32..).zip(&texture.missing) {
+        insert(sphere, &texture.sites, vertex, scan.start_near(pixel), flips)?;
+    }
+    Ok(())
+}
+
+/// Inserts `vertex`, looking for its place from half-edge `near` on.
+fn insert(sphere: &mut Sphere, sites: &[Site], vertex: u32, near: u32, flips: &mut Flips) -> Result<(), Rejected> {
     let place = locate(sphere, sites, sites[vertex as usize], near, flips)?;
     let sides = sphere.split(place.triangle, vertex);
     flips.suspects.extend(sides);

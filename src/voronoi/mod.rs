@@ -19,6 +19,7 @@ mod tests;
 
 use crate::geometry::Site;
 use crate::triangulation::mesh::Mesh;
+use std::time::Instant;
 
 /// Why a leaf was not triangulated here. Cut it, or triangulate it another way.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -40,6 +41,18 @@ pub enum Rejected {
     NotAccepted(&'static str),
 }
 
+/// The steps that [`Counts::nanoseconds`] tells apart.
+pub const STEPS: [&str; 8] = [
+    "G1 write sites",
+    "G2-G6 Voronoi, triangles",
+    "G3 islands",
+    "C2 shift",
+    "C1 hull",
+    "C4 flip",
+    "C3 insert",
+    "accept",
+];
+
 /// What the steps met. All are numbers of sites, triangles or edges, as named.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Counts {
@@ -57,6 +70,8 @@ pub struct Counts {
     pub removed: u64,
     /// Edges flipped to make the mesh Delaunay.
     pub flips: u64,
+    /// Time by step, see [`STEPS`].
+    pub nanoseconds: [u64; STEPS.len()],
 }
 
 impl std::ops::AddAssign for Counts {
@@ -68,6 +83,9 @@ impl std::ops::AddAssign for Counts {
         self.inverted += other.inverted;
         self.removed += other.removed;
         self.flips += other.flips;
+        for (mine, theirs) in self.nanoseconds.iter_mut().zip(other.nanoseconds) {
+            *mine += theirs;
+        }
     }
 }
 
@@ -100,37 +118,51 @@ pub fn triangulate(sites: &[Site], scratch: &mut Scratch) -> Result<(Mesh, Count
     check_size(sites)?;
     let Scratch { texture, voronoi, scan, sphere, shift, flips, acceptance, mesh } = scratch;
     let mut counts = Counts { sites: sites.len() as u64, ..Counts::default() };
+    let mut clock = Clock::start();
     shift.clear();
     flips.reset(sites.len());
 
-    // G1: write the sites into the texture.
     texture.write(sites, &mut counts)?;
-    // G2 to G6: row by row, the Voronoi diagram and the triangles at its corners.
+    clock.done(&mut counts, 0);
     voronoi.start(texture);
     scan.run(texture, voronoi, sphere);
+    clock.done(&mut counts, 1);
     let at = &texture.sites;
-    // G3: what islands left.
     g3_islands::remove_islands(sphere, at, texture.placed, &mut shift.suspects, &mut counts)?;
-    // C2: shift the sites to their true places. It comes before C1, so that the hull is completed but once.
+    clock.done(&mut counts, 2);
+    // Before C1, so that the hull is completed but once, where it really is.
     shift.test(sphere, at, &mut counts);
-    shift.repair(sphere, at, &mut counts)?;
-    // C1: complete the hull.
+    shift.repair(sphere, at)?;
+    clock.done(&mut counts, 3);
     c1_hull::complete_hull(sphere, at, shift)?;
     counts.removed = shift.removed.len() as u64;
-    // C4: flip to Delaunay; C3: insert what is missing into that, flipping as it goes.
+    clock.done(&mut counts, 4);
+    // Before C3, so that sites are inserted into a Delaunay mesh, where walks are short and sure to end.
     std::mem::swap(&mut flips.suspects, &mut shift.suspects);
     flips.run(sphere, at)?;
-    for &[vertex, near] in &shift.removed {
-        c3_insert::insert(sphere, at, vertex, near, flips)?;
-    }
-    for (vertex, &pixel) in (texture.placed as u32..).zip(&texture.missing) {
-        c3_insert::insert(sphere, at, vertex, scan.start_near(pixel), flips)?;
-    }
+    clock.done(&mut counts, 5);
+    c3_insert::insert_all(sphere, texture, scan, &shift.removed, flips)?;
     counts.flips = flips.done;
-
+    clock.done(&mut counts, 6);
     let front = sphere.front();
     acceptance.accept(sphere.compact(), front, at, &texture.order, mesh)?;
+    clock.done(&mut counts, 7);
     Ok((std::mem::take(mesh), counts))
+}
+
+struct Clock(Instant);
+
+impl Clock {
+    fn start() -> Clock {
+        Clock(Instant::now())
+    }
+
+    /// Adds the time since the last call to `step`.
+    fn done(&mut self, counts: &mut Counts, step: usize) {
+        let now = Instant::now();
+        counts.nanoseconds[step] += (now - self.0).as_nanos() as u64;
+        self.0 = now;
+    }
 }
 
 fn check_size(sites: &[Site]) -> Result<(), Rejected> {

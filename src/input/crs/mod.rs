@@ -90,7 +90,8 @@ impl Crs {
     }
 
     /// Whether nothing says that the two differ: what one does not know agrees with anything. Compared are the units, the
-    /// EPSG codes, and where one has no code the parameters of the projections, or else the names.
+    /// EPSG codes; where one has no code, texts by the parameters of their projections or their names, and names alone where
+    /// neither has a text.
     pub fn same_as(&self, other: &Crs) -> bool {
         if !same_unit(self.horizontal, other.horizontal) || differ(self.vertical, other.vertical, close) {
             return false;
@@ -98,12 +99,14 @@ impl Crs {
         if let (Some(own), Some(others)) = (self.epsg, other.epsg) {
             return own == others;
         }
-        if let (Some(own), Some(others)) = (&self.wkt, &other.wkt) {
-            let (own, others) = (wkt::parameters(own), wkt::parameters(others));
-            if !own.is_empty() && !others.is_empty() {
-                return same_parameters(&own, &others);
-            }
+        match (&self.wkt, &other.wkt) {
+            (Some(own), Some(others)) => same_text(own, others) || self.same_name(other),
+            (None, None) => self.same_name(other),
+            _ => true,
         }
+    }
+
+    fn same_name(&self, other: &Crs) -> bool {
         !differ(self.name.as_deref(), other.name.as_deref(), |own, others| plain(own) == plain(others))
     }
 
@@ -134,9 +137,12 @@ fn close(own: f64, others: f64) -> bool {
     (own - others).abs() <= 1e-8 * own.abs().max(others.abs()).max(1e-3)
 }
 
-/// Writers leave out parameters and spell them differently, so only those of one name are compared.
-fn same_parameters(own: &[(String, f64)], others: &[(String, f64)]) -> bool {
-    own.iter().all(|(name, value)| others.iter().all(|(other, theirs)| name != other || close(*value, *theirs)))
+/// Whether both project, and with the same parameters. Writers leave out some and spell others differently, so only those
+/// of one name are compared.
+fn same_text(own: &str, others: &str) -> bool {
+    let (own, others) = (wkt::parameters(own), wkt::parameters(others));
+    let both = !own.is_empty() && !others.is_empty();
+    both && own.iter().all(|(name, value)| others.iter().all(|(other, theirs)| name != other || close(*value, *theirs)))
 }
 
 /// Letters and digits of a name in lower case: writers disagree on the rest.
@@ -183,7 +189,7 @@ fn read_text(file: &Positioned, vlrs: &[Vlr], warnings: &mut Vec<String>) -> Res
             let text = String::from_utf8_lossy(&bytes);
             match wkt::parse(&text) {
                 Some(crs) => return Ok(Some(crs)),
-                None if text.trim_matches(['\0', ' ']).is_empty() => {}
+                None if text.trim_matches(['\0', ' ', '"', '\'']).is_empty() => {}
                 None => warnings.push("its coordinate system is not well-known text that can be read".to_string()),
             }
         }

@@ -279,6 +279,8 @@ impl<'a> RowReader<'a> {
 /// The number in the column at the start of `line`, and the rest of the line after the delimiter.
 #[inline]
 fn take_number(delimiter: Delimiter, line: &[u8]) -> Option<(Number, Option<&[u8]>)> {
+    let spaces = line.iter().take_while(|byte| **byte == b' ').count();
+    let line = &line[spaces..];
     if let Some((number, length)) = Number::read(line) {
         match (line.get(length), delimiter) {
             (None, _) => return Some((number, None)),
