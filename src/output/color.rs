@@ -134,7 +134,7 @@ mod tests {
         for v in 0..=255 {
             assert_eq!(eight.color(0, [v, 0, 255], 0), sixteen.color(0, [v * 257, 0, 65535], 0));
         }
-        assert_eq!(eight.color(0, [0, 255, 188], 0), [0, 65535, 32876]);
+        assert_eq!(eight.color(0, [0, 255, 188], 0), [0, 65535, 32957]);
     }
 
     #[test]
