@@ -2,7 +2,7 @@
 
 use super::report::grouped;
 use super::scan::{self, Plan};
-use super::{BYTES_PER_LEAF_SITE, workers};
+use super::{BYTES_PER_LEAF_SITE, partition, workers};
 use crate::Result;
 use crate::config::Config;
 use crate::input::Point;
@@ -63,6 +63,7 @@ fn preflight(plan: &Plan, config: &Config, threads: usize) -> Preflight {
     let points = plan.records;
     let steps = |axis: usize| plan.extent[1][axis] as f64 - plan.extent[0][axis] as f64;
     let resolution = plan.frame.extras().resolution;
+    let leaves = per_tile.min(points) * BYTES_PER_LEAF_SITE * threads as u64;
     Preflight {
         files: plan.sources.iter().map(|(s, _)| (s.path.clone(), format!("{:?}", s.format), s.records)).collect(),
         records: points,

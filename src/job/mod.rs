@@ -20,7 +20,7 @@ pub mod spill;
 pub mod stitch;
 pub mod tree;
 
-use crate::config::{ColorChoice, Config};
+use crate::config::{Backend, ColorChoice, Config};
 use crate::output::color::Coloring;
 use crate::output::georeference::Georeference;
 use crate::output::picture::Picture;
@@ -52,6 +52,11 @@ const MOST_TRIANGLES_IN_ONE_FILE: u64 = 20_000_000;
 /// Whatever stops a step; see [`Error`].
 pub fn run(config: &Config, progress: Progress) -> Result<Report> {
     let start = Instant::now();
+    if config.triangulation.backend == Backend::Gpu {
+        return Err(Error::Config(
+            "[triangulation] backend = \"gpu\": this version has no GPU executor; use \"auto\" or \"cpu\"".into(),
+        ));
+    }
     let threads = workers(config)?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|e| Error::Memory(format!("cannot start {threads} threads: {e}")))?;
@@ -204,7 +209,7 @@ fn look(config: &Config, plan: &Plan, summary: &Summary, bounds: [[i32; 3]; 2]) 
         ColorChoice::Auto | ColorChoice::Rgb if summary.tally.max_rgb == 0 => Some(elevation),
         ColorChoice::Auto | ColorChoice::Rgb => Some(Coloring::Rgb { eight_bit: summary.tally.max_rgb <= 255 }),
     };
-    Look { frame: plan.frame.clone(), coloring, normals: config.output.normals }
+    Look { frame: plan.frame.clone().refined(bounds), coloring, normals: config.output.normals }
 }
 
 fn export_all(
