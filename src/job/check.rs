@@ -74,8 +74,7 @@ fn preflight(plan: &Plan, config: &Config, threads: usize) -> Preflight {
         unit: plan.unit.into(),
         crs: plan.crs.name.clone(),
         threads,
-        memory: (per_tile.min(points) * BYTES_PER_LEAF_SITE * threads as u64 + (64 << 20))
-            .max(config.limits.memory.0 / 6),
+        memory: (64 << 20) + leaves.max(partition::buffer_bytes(points, per_tile, config.limits.memory.0 / 6)),
         memory_limit: config.limits.memory.0,
         temporary: points * (size_of::<Point>() as u64 + TEMPORARY_PER_SITE),
         results: points * RESULT_PER_SITE,
