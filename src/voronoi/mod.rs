@@ -43,12 +43,11 @@ pub enum Rejected {
 }
 
 /// The steps that [`Counts::nanoseconds`] tells apart.
-pub const STEPS: [&str; 9] = [
+pub const STEPS: [&str; 8] = [
     "G1 write sites",
     "G2-G6 Voronoi, triangles",
-    "C2 shift",
     "G3 islands",
-    "C2' repair",
+    "C2 shift",
     "C1 hull",
     "C4 flip",
     "C3 insert",
@@ -128,29 +127,28 @@ pub fn triangulate(sites: &[Site], scratch: &mut Scratch) -> Result<(Mesh, Count
     texture.write(sites, &mut counts)?;
     clock.done(&mut counts, 0);
     voronoi.start(texture);
-    scan.run(texture, voronoi, sphere);
+    scan.run(texture, voronoi, sphere, shift);
+    counts.inverted = shift.inverted.len() as u64;
     clock.done(&mut counts, 1);
     let at = &texture.sites;
-    // Before C1, so that the hull is completed but once, where it really is.
-    shift.test(sphere, at, &mut counts);
-    clock.done(&mut counts, 2);
     islands.remove(sphere, at, texture.placed, shift, &mut counts)?;
-    clock.done(&mut counts, 3);
+    clock.done(&mut counts, 2);
+    // Before C1, so that the hull is completed but once, where it really is.
     shift.repair(sphere, at)?;
-    clock.done(&mut counts, 4);
+    clock.done(&mut counts, 3);
     c1_hull::complete_hull(sphere, at, shift)?;
     counts.removed = shift.removed.len() as u64;
-    clock.done(&mut counts, 5);
+    clock.done(&mut counts, 4);
     // Before C3, so that sites are inserted into a Delaunay mesh, where walks are short and sure to end.
     std::mem::swap(&mut flips.suspects, &mut shift.suspects);
     flips.run(sphere, at)?;
-    clock.done(&mut counts, 6);
+    clock.done(&mut counts, 5);
     c3_insert::insert_all(sphere, texture, scan, &shift.removed, flips)?;
     counts.flips = flips.done;
-    clock.done(&mut counts, 7);
+    clock.done(&mut counts, 6);
     sphere.compact();
     acceptance.accept(sphere, at, &texture.order, mesh)?;
-    clock.done(&mut counts, 8);
+    clock.done(&mut counts, 7);
     Ok((std::mem::take(mesh), counts))
 }
 
