@@ -1,9 +1,9 @@
 //! Step C2: shift all sites from their pixels to their true places, all at once. The topology stays; triangles that are
 //! then not counterclockwise are flipped away, or a corner is taken out, to be inserted again in step C3.
 
+use super::Rejected;
 use super::edges::Edges;
 use super::sphere::{Fill, Sphere, Star, next, previous};
-use super::Rejected;
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
 
@@ -31,7 +31,14 @@ impl Shift {
 
     /// Tests the triangles from record `start` to the last, unless `all` in whole blocks only, and their edges to
     /// triangles before them, at the true places of `sites`. Returns the first record that was not tested.
-    pub(super) fn test(&mut self, sphere: &Sphere, sites: &[Site], start: usize, all: bool) -> usize {
+    pub(super) fn test(
+        &mut self,
+        sphere: &Sphere,
+        sites: &[Site],
+        start: usize,
+        all: bool,
+        suspects: &mut Vec<u32>,
+    ) -> usize {
         let records = sphere.records();
         let mut start = start;
         while start + Edges::BLOCK <= records.len() || (all && start < records.len()) {
@@ -41,7 +48,7 @@ impl Shift {
                     self.inverted.push(t);
                 }
             }
-            self.edges.test::<false>(sphere, sites, start, end, &mut self.suspects);
+            self.edges.test::<false>(sphere, sites, start, end, suspects);
             start = end;
         }
         start

@@ -11,9 +11,12 @@
 //! The frame around the texture counts as the colour "infinity": its triangles are the ghosts that close the sphere.
 //! Step G5's prefix sums are needed only where rows are done in parallel.
 //!
-//! Step C2's tests of what a row has made follow at once, while it is in the cache.
+//! Step C2's tests of what a row has made and most flips of step C4 follow at once, while it is in the cache. Flips do not
+//! mind open edges, as slots are half-edges too.
 
+use super::Rejected;
 use super::c2_shift::Shift;
+use super::c4_flip::Flips;
 use super::g1_write_sites::Texture;
 use super::g2_voronoi::{FRAME, Voronoi};
 use super::sphere::Sphere;
@@ -44,7 +47,14 @@ fn column(x: usize) -> u32 {
 
 impl Scan {
     /// Fills `sphere` with the triangles of the discrete Voronoi diagram of `texture`.
-    pub(super) fn run(&mut self, texture: &Texture, voronoi: &mut Voronoi, sphere: &mut Sphere, shift: &mut Shift) {
+    pub(super) fn run(
+        &mut self,
+        texture: &Texture,
+        voronoi: &mut Voronoi,
+        sphere: &mut Sphere,
+        shift: &mut Shift,
+        flips: &mut Flips,
+    ) -> Result<(), Rejected> {
         sphere.reset(texture.width + 3, texture.placed, (texture.sites.len() - 1) as u32);
         let words = texture.width / 64 + 1;
         for row in [&mut self.south, &mut self.north] {
@@ -63,11 +73,14 @@ impl Scan {
             } else {
                 self.north.fill(FRAME);
             }
-            self.scan_row(texture, sphere, &mut shift.suspects);
-            tested = shift.test(sphere, &texture.sites, tested, y == texture.height);
+            self.scan_row(texture, sphere, &mut flips.suspects);
+            tested = shift.test(sphere, &texture.sites, tested, y == texture.height, &mut flips.suspects);
+            flips.run_early(sphere, &texture.sites)?;
             std::mem::swap(&mut self.south, &mut self.north);
             std::mem::swap(&mut self.south_walls, &mut self.north_walls);
         }
+        std::mem::swap(&mut flips.later, &mut shift.suspects);
+        Ok(())
     }
 
     /// A triangle near the site of a pixel (y << 16 | x).

@@ -127,7 +127,7 @@ pub fn triangulate(sites: &[Site], scratch: &mut Scratch) -> Result<(Mesh, Count
     texture.write(sites, &mut counts)?;
     clock.done(&mut counts, 0);
     voronoi.start(texture);
-    scan.run(texture, voronoi, sphere, shift);
+    scan.run(texture, voronoi, sphere, shift, flips)?;
     counts.inverted = shift.inverted.len() as u64;
     clock.done(&mut counts, 1);
     let at = &texture.sites;
