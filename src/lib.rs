@@ -1,11 +1,18 @@
 //! Streams point clouds of any size into one exact Delaunay triangulation and writes it as glTF terrain.
 //!
-//! Start reading at `job::run`, which lists the steps of a job in order; ARCHITECTURE.md follows the data.
+//! Start reading at [`job::run`], which lists the steps of a job in order; ARCHITECTURE.md follows the data.
 
+pub mod cli;
+pub mod config;
 pub mod error;
 pub mod geometry;
 pub mod input;
+pub mod job;
+pub mod output;
+pub mod positioned;
+pub mod sample;
 pub mod triangulation;
+pub mod verify;
 pub mod voronoi;
 
 pub use error::{Error, Result};

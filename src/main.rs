@@ -1,3 +1,64 @@
-//! The command line: parse, run, print the error, exit with its code.
+//! The command line: parse, run, print the result or the error, exit with its code.
 
-fn main() {}
+use clap::Parser;
+use gdt_batch::cli::{Cli, Command, Talk};
+use gdt_batch::config::Config;
+use gdt_batch::job::{self, check, progress::Progress};
+use gdt_batch::{Error, Result, input, sample, verify};
+use serde::Serialize;
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    // clap itself exits with code 2 on a wrong command line.
+    match run(Cli::parse()) {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+fn run(cli: Cli) -> Result<ExitCode> {
+    let talk = cli.talk;
+    match (cli.command, cli.config) {
+        (Some(Command::Check { config }), _) => show(&check::run(&Config::load(&config)?)?, talk)?,
+        (Some(Command::Verify { directory, memory }), _) => return prove(&directory, memory, talk),
+        (Some(Command::Info { files }), _) => info(&files, talk)?,
+        (Some(Command::Sample { file, points, seed }), _) => sample::write(&file, points, seed)?,
+        (None, Some(config)) => show(&job::run(&Config::load(&config)?, Progress::detect(talk.quiet))?, talk)?,
+        (None, None) => return Err(Error::Config("name a configuration file; --help shows how".into())),
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Prints a result for people or for machines.
+fn show(result: &(impl Display + Serialize), talk: Talk) -> Result<()> {
+    if talk.json {
+        let text = serde_json::to_string_pretty(result).map_err(|e| Error::Broken(e.to_string()))?;
+        println!("{text}");
+    } else if !talk.quiet {
+        println!("{}", result.to_string().trim_end());
+    }
+    Ok(())
+}
+
+fn prove(directory: &Path, memory: u64, talk: Talk) -> Result<ExitCode> {
+    let verdict = verify::verify(directory, memory)?;
+    show(&verdict, talk)?;
+    if verdict.holds() {
+        return Ok(ExitCode::SUCCESS);
+    }
+    eprintln!("error: {} does not hold the exact Delaunay triangulation", directory.display());
+    Ok(ExitCode::from(4))
+}
+
+fn info(files: &[PathBuf], talk: Talk) -> Result<()> {
+    for file in files {
+        let source = input::open(file, &input::TextOptions::default())?;
+        show(&input::info::describe(&source), talk)?;
+    }
+    Ok(())
+}

@@ -1,5 +1,26 @@
 //! Point clouds in: what a file holds, and its points on the lattice, piece by piece.
+//!
+//! [`open`] looks at one file and gives a [`Source`]; its pieces are decoded independently on any thread. On the way every
+//! record passes the [`Rules`], and the [`Tally`] says what became of each.
 
+mod chunk_table;
+pub mod crs;
+mod guard;
+mod header;
+pub mod info;
+mod las;
+mod layout;
+mod laz;
 mod point;
+mod positioned;
+mod rules;
+mod sieve;
+mod source;
+pub mod text;
+mod vlr;
 
+pub use crs::{Crs, Unit};
 pub use point::Point;
+pub use rules::{Rules, Tally};
+pub use source::{Axis, Format, Source, open};
+pub use text::TextOptions;

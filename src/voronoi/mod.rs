@@ -55,7 +55,7 @@ pub const STEPS: [&str; 8] = [
 ];
 
 /// What the steps met. All are numbers of sites, triangles or edges, as named.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Counts {
     /// Sites given.
     pub sites: u64,

@@ -1,0 +1,119 @@
+//! What a cloud holds, as its header or a first pass says it: for people, and as JSON.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::{Crs, Format, Source};
+
+/// The answer of `info`. `Display` gives it for people, `Serialize` for programs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Description {
+    /// The file.
+    pub file: String,
+    /// Bytes of the file.
+    pub size: u64,
+    /// How it holds its points.
+    pub format: Format,
+    /// LAS version, as in "1.4".
+    pub version: Option<String>,
+    /// LAS point format.
+    pub point_format: Option<u8>,
+    /// Number of points it says it has.
+    pub points: u64,
+    /// Number of points by return, from the first return on, as the header claims.
+    pub points_by_return: Vec<u64>,
+    /// Least x, y, z; what the header claims for LAS.
+    pub min: [f64; 3],
+    /// Greatest x, y, z, likewise.
+    pub max: [f64; 3],
+    /// Steps of x, y, z, exact.
+    pub scale: [String; 3],
+    /// Offsets of x, y, z, exact.
+    pub offset: [String; 3],
+    /// Whether points have a colour.
+    pub color: bool,
+    /// Whether points have a classification.
+    pub classification: bool,
+    /// Independent parts it is decoded in.
+    pub pieces: usize,
+    /// The coordinate reference system.
+    pub crs: Crs,
+    /// Metres of one unit of x and y.
+    pub metres_per_unit: Option<f64>,
+    /// What is odd about the file.
+    pub warnings: Vec<String>,
+}
+
+/// What `source` holds.
+pub fn describe(source: &Source) -> Description {
+    let last = source.by_return.iter().rposition(|&count| count > 0).map_or(0, |last| last + 1);
+    Description {
+        file: source.path.display().to_string(),
+        size: source.size,
+        format: source.format,
+        version: source.version.map(|[major, minor]| format!("{major}.{minor}")),
+        point_format: source.point_format,
+        points: source.records,
+        points_by_return: source.by_return[..last].to_vec(),
+        min: source.min,
+        max: source.max,
+        scale: source.axes.map(|axis| axis.scale.to_string()),
+        offset: source.axes.map(|axis| axis.offset.to_string()),
+        color: source.has_rgb,
+        classification: source.has_class,
+        pieces: source.pieces(),
+        crs: source.crs.clone(),
+        metres_per_unit: source.crs.metres_per_unit(),
+        warnings: source.warnings.clone(),
+    }
+}
+
+impl Description {
+    fn kind(&self) -> String {
+        let name = match self.format {
+            Format::Las => "LAS",
+            Format::Laz => "LAZ",
+            Format::Text => "text",
+        };
+        match (&self.version, self.point_format) {
+            (Some(version), Some(format)) => format!("{name} {version}, point format {format}"),
+            _ => name.to_string(),
+        }
+    }
+
+    fn content(&self) -> &'static str {
+        match (self.color, self.classification) {
+            (true, true) => "colour, classification",
+            (true, false) => "colour",
+            (false, true) => "classification",
+            (false, false) => "coordinates only",
+        }
+    }
+
+    fn vertical(&self) -> String {
+        self.crs.vertical.map_or("unknown".to_string(), |metres| format!("{metres} m"))
+    }
+}
+
+impl fmt::Display for Description {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        writeln!(f, "{}", self.file)?;
+        writeln!(f, "  format   {}, {} bytes", self.kind(), self.size)?;
+        writeln!(f, "  points   {} ({})", self.points, self.content())?;
+        if !self.points_by_return.is_empty() {
+            writeln!(f, "  returns  {:?}", self.points_by_return)?;
+        }
+        for (axis, name) in ["x", "y", "z"].iter().enumerate() {
+            let (min, max, step, offset) = (self.min[axis], self.max[axis], &self.scale[axis], &self.offset[axis]);
+            let decimals = step.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+            writeln!(f, "  {name}        {min:.decimals$} to {max:.decimals$}, step {step}, offset {offset}")?;
+        }
+        writeln!(f, "  crs      {}", self.crs.label())?;
+        writeln!(f, "  unit     {} in x and y, {} in z", self.crs.horizontal.name(), self.vertical())?;
+        for warning in &self.warnings {
+            writeln!(f, "  warning  {warning}")?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,217 @@
+//! A point cloud that has been looked at and can be decoded piece by piece.
+
+use std::path::{Path, PathBuf};
+
+use rust_decimal::Decimal;
+use rust_decimal::prelude::ToPrimitive;
+use serde::{Deserialize, Serialize};
+
+use super::header::Header;
+use super::las::Records;
+use super::layout::Layout;
+use super::laz::Chunks;
+use super::positioned::Positioned;
+use super::rules::{Rules, Tally};
+use super::sieve::Sieve;
+use super::text::{Table, TextOptions};
+use super::{Crs, Point, crs, vlr};
+use crate::{Error, Result};
+
+/// The exact meaning of the raw integers on one axis: `value = offset + scale * raw`, in the source's unit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Axis {
+    /// The value of raw integer 0.
+    pub offset: Decimal,
+    /// The step from one raw integer to the next, above 0.
+    pub scale: Decimal,
+}
+
+impl Axis {
+    /// The value of `raw`, correctly rounded where it fits 28 digits.
+    pub fn value(&self, raw: i64) -> f64 {
+        let exact = self.scale.checked_mul(Decimal::from(raw)).and_then(|product| product.checked_add(self.offset));
+        let float = |d: Decimal| d.to_f64().unwrap_or(f64::NAN);
+        exact.map_or_else(|| float(self.offset) + float(self.scale) * raw as f64, float)
+    }
+}
+
+/// How a file holds its points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Format {
+    /// Uncompressed LAS.
+    Las,
+    /// Compressed LAS, COPC included.
+    Laz,
+    /// A table of numbers as text.
+    Text,
+}
+
+/// A point cloud file whose header, or text, has been looked at. Nothing it says of its points is to be trusted but
+/// what [`Source::decode`] gives.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// The file.
+    pub path: PathBuf,
+    /// Its size in bytes when it was looked at; a change later is an error.
+    pub size: u64,
+    /// How it holds its points.
+    pub format: Format,
+    /// LAS version, major and minor; `None` for text.
+    pub version: Option<[u8; 2]>,
+    /// LAS point format, 0 to 10; `None` for text.
+    pub point_format: Option<u8>,
+    /// The number of records, those included that the file promises and does not have.
+    pub records: u64,
+    /// How many of them the file is known not to have; decoding counts these as malformed.
+    pub missing: u64,
+    /// Least x, y, z: of all points for text, what the header claims for LAS (often wrong).
+    pub min: [f64; 3],
+    /// Greatest x, y, z, likewise.
+    pub max: [f64; 3],
+    /// What raw integers mean in x, y, z.
+    pub axes: [Axis; 3],
+    /// Whether points have a colour.
+    pub has_rgb: bool,
+    /// Whether points have a classification.
+    pub has_class: bool,
+    /// The coordinate reference system.
+    pub crs: Crs,
+    /// The number of points by return, from the first on, as a LAS header claims it; empty for text.
+    pub by_return: Vec<u64>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+    body: Body,
+}
+
+#[derive(Clone, Debug)]
+enum Body {
+    Las(Records),
+    Laz(Chunks),
+    Text(Table),
+}
+
+/// Looks at the file at `path`: reads the header of LAS or LAZ, or all of a text once, on the threads of the current
+/// rayon pool.
+///
+/// # Errors
+/// `Input` where the file is not a point cloud or is damaged beyond reading, `Io` where it cannot be read, `Config` where
+/// `text` contradicts itself.
+pub fn open(path: &Path, text: &TextOptions) -> Result<Source> {
+    let file = Positioned::open(path)?;
+    let mut start = [0; 64];
+    let held = file.size().min(start.len() as u64) as usize;
+    file.read_exact_at(&mut start[..held], 0)?;
+    let start = &start[..held];
+    if start.starts_with(b"LASF") {
+        return open_las(&file);
+    }
+    refuse(path, start)?;
+    open_text(&file, text)
+}
+
+/// Says what a file is that is certainly no point cloud.
+fn refuse(path: &Path, start: &[u8]) -> Result<()> {
+    if start.is_empty() {
+        return Err(Error::input(path, "is empty"));
+    }
+    if start.starts_with(b"version https://git-lfs.github.com/spec") {
+        let what = "is a Git LFS pointer, not the point cloud itself; fetch that with `git lfs pull`";
+        return Err(Error::input(path, what));
+    }
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    if extension == "las" || extension == "laz" {
+        let what = "does not begin with the letters LASF, so it is not LAS or LAZ; copy or download it again";
+        return Err(Error::input(path, what));
+    }
+    if start.contains(&0) {
+        let what = "is neither LAS nor LAZ nor UTF-8 text; convert it to one of those first";
+        return Err(Error::input(path, what));
+    }
+    Ok(())
+}
+
+fn open_las(file: &Positioned) -> Result<Source> {
+    let (header, mut warnings) = Header::read(file)?;
+    let vlrs = vlr::list(file, &header, &mut warnings)?;
+    let crs = crs::read(file, &vlrs, &mut warnings)?;
+    let (missing, body) = if header.compressed {
+        let chunks = Chunks::read(file, &header, &vlrs, &mut warnings)?;
+        (chunks.missing, Body::Laz(chunks))
+    } else {
+        let records = Records::new(&header, file.size());
+        (records.missing, Body::Las(records))
+    };
+    if missing > 0 {
+        let held = header.records - missing;
+        warnings.push(format!("the header promises {} points, but the file has only {held}", header.records));
+    }
+    Ok(Source {
+        path: file.path().to_path_buf(),
+        size: file.size(),
+        format: if header.compressed { Format::Laz } else { Format::Las },
+        version: Some([1, header.minor]),
+        point_format: Some(header.format),
+        records: header.records,
+        missing,
+        min: header.min,
+        max: header.max,
+        axes: header.axes,
+        has_rgb: Layout::new(header.format, header.record_length).has_rgb(),
+        has_class: true,
+        crs,
+        by_return: header.by_return,
+        warnings,
+        body,
+    })
+}
+
+fn open_text(file: &Positioned, options: &TextOptions) -> Result<Source> {
+    let (table, warnings) = Table::scan(file, options)?;
+    Ok(Source {
+        path: file.path().to_path_buf(),
+        size: file.size(),
+        format: Format::Text,
+        version: None,
+        point_format: None,
+        records: table.records,
+        missing: 0,
+        min: table.min,
+        max: table.max,
+        axes: table.axes(),
+        has_rgb: table.has_rgb(),
+        has_class: table.has_class(),
+        crs: Crs::default(),
+        by_return: Vec::new(),
+        warnings,
+        body: Body::Text(table),
+    })
+}
+
+impl Source {
+    /// The number of independent parts, of about 50,000 records each where the format allows; 0 for a file without records.
+    pub fn pieces(&self) -> usize {
+        match &self.body {
+            Body::Las(records) => records.pieces(),
+            Body::Laz(chunks) => chunks.pieces(),
+            Body::Text(table) => table.pieces(),
+        }
+    }
+
+    /// Decodes part `piece` (below [`Source::pieces`]) and hands the points that pass `rules` to `sink` in record order, at
+    /// most 65,536 at a time. The point of record `i` of the source gets the order `rules.first_order + i`. Records that
+    /// cannot be read are counted as malformed; whether that is too many is for the caller to say.
+    ///
+    /// # Errors
+    /// `Io` or `Input` where the file cannot be read or has changed since, and what `sink` returns.
+    pub fn decode(&self, piece: usize, rules: &Rules, sink: &mut dyn FnMut(&[Point]) -> Result<()>) -> Result<Tally> {
+        let file = Positioned::reopen(&self.path, self.size)?;
+        let mut sieve = Sieve::new(&self.path, &self.axes, rules, sink);
+        match &self.body {
+            Body::Las(records) => records.decode(&file, piece, rules, &mut sieve)?,
+            Body::Laz(chunks) => chunks.decode(&file, piece, rules, &mut sieve)?,
+            Body::Text(table) => table.decode(&file, piece, &mut sieve)?,
+        }
+        sieve.finish()
+    }
+}

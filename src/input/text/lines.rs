@@ -1,0 +1,98 @@
+//! Blocks of text, cut into lines: a line belongs to the block in which it begins.
+
+use std::ops::Range;
+
+use memchr::memchr;
+
+use crate::Result;
+use crate::input::positioned::Positioned;
+
+/// Bytes of a block.
+pub(super) const BLOCK: u64 = 2 << 20;
+
+/// The longest line that is read, in bytes.
+pub(super) const LONGEST: usize = 1 << 16;
+
+/// A line without its end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Line<'a> {
+    /// The line's bytes.
+    Whole(&'a [u8]),
+    /// A line of more than [`LONGEST`] bytes.
+    TooLong,
+}
+
+/// Calls `each` for every line that begins in `range`. Lines begin at `first`, or after a line feed.
+/// Gives the number of lines.
+pub(super) fn for_each_line(
+    file: &Positioned,
+    first: u64,
+    range: Range<u64>,
+    mut each: impl FnMut(u64, Line) -> Result<()>,
+) -> Result<u64> {
+    let begins_line = range.start == first;
+    let from = range.start - !begins_line as u64;
+    let to = (range.end + LONGEST as u64).min(file.size());
+    let text = file.bytes(from..to)?;
+    let end = (range.end - from) as usize;
+    let mut at = if begins_line { 0 } else { memchr(b'\n', &text).map_or(end, |feed| feed + 1) };
+    let mut count = 0;
+    while at < end {
+        let feed = memchr(b'\n', &text[at..]);
+        let length = feed.unwrap_or(text.len() - at);
+        let cut = feed.is_none() && to < file.size();
+        let line =
+            if cut || length > LONGEST { Line::TooLong } else { Line::Whole(without_return(&text[at..at + length])) };
+        each(count, line)?;
+        count += 1;
+        at += length + 1;
+    }
+    Ok(count)
+}
+
+fn without_return(line: &[u8]) -> &[u8] {
+    line.strip_suffix(b"\r").unwrap_or(line)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lines(text: &[u8], block: u64) -> Vec<Option<Vec<u8>>> {
+        let path = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(path.path(), text).unwrap();
+        let file = Positioned::open(path.path()).unwrap();
+        let mut all = Vec::new();
+        let mut start = 0;
+        while start < file.size() {
+            let range = start..(start + block).min(file.size());
+            let collect = |_, line: Line| {
+                all.push(if let Line::Whole(line) = line { Some(line.to_vec()) } else { None });
+                Ok(())
+            };
+            for_each_line(&file, 0, range.clone(), collect).unwrap();
+            start = range.end;
+        }
+        all
+    }
+
+    #[test]
+    fn every_line_is_seen_once_whatever_the_blocks() {
+        let text = b"one\r\n\ntwo\nthree is longer\n\n\nlast";
+        let expected: Vec<_> =
+            ["one", "", "two", "three is longer", "", "", "last"].map(|l| Some(l.as_bytes().to_vec())).into();
+        for block in 1..40 {
+            assert_eq!(lines(text, block), expected, "blocks of {block}");
+        }
+    }
+
+    #[test]
+    fn a_line_too_long_is_one_line_in_bounded_memory() {
+        let mut text = b"1 2 3\n".to_vec();
+        text.extend(std::iter::repeat_n(b'7', 3 * LONGEST));
+        text.extend(b"\n4 5 6\n");
+        let expected = vec![Some(b"1 2 3".to_vec()), None, Some(b"4 5 6".to_vec())];
+        assert_eq!(lines(&text, 1000), expected);
+        assert_eq!(lines(&text, 1 << 20), expected);
+    }
+}

@@ -1,0 +1,304 @@
+//! A text that has been gone through once, and its rows as records.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+use rust_decimal::Decimal;
+
+use super::TextOptions;
+use super::columns::{Columns, Delimiter, Role, shown};
+use super::lines::{BLOCK, LONGEST, Line, for_each_line};
+use super::number::{MOST_DECIMALS, Number, POWERS};
+use crate::input::positioned::Positioned;
+use crate::input::sieve::{Record, Sieve};
+use crate::input::source::Axis;
+use crate::{Error, Result};
+
+/// Bytes at the start of a text that show how it is laid out.
+const SAMPLE: u64 = 1 << 17;
+
+/// The text, after a first pass over all of it.
+#[derive(Clone, Debug)]
+pub(in crate::input) struct Table {
+    columns: Columns,
+    /// Where the rows begin, and where the file ends.
+    rows: Range<u64>,
+    blocks: Vec<Block>,
+    /// Rows, malformed ones included.
+    pub(in crate::input) records: u64,
+    /// Least x, y, z.
+    pub(in crate::input) min: [f64; 3],
+    /// Greatest x, y, z.
+    pub(in crate::input) max: [f64; 3],
+    decimals: [u8; 3],
+}
+
+/// Numbers of the first row and the first line of a block: rows from 0, lines as editors count them.
+#[derive(Clone, Copy, Debug)]
+struct Block {
+    row: u64,
+    line: u64,
+}
+
+/// What the first pass finds in a block, or in all.
+#[derive(Clone, Debug)]
+struct Survey {
+    lines: u64,
+    rows: u64,
+    min: [f64; 3],
+    max: [f64; 3],
+    decimals: [u8; 3],
+}
+
+impl Table {
+    /// Goes through all of `file` on the threads of the current rayon pool; the texts are what the user should know.
+    pub(in crate::input) fn scan(file: &Positioned, options: &TextOptions) -> Result<(Table, Vec<String>)> {
+        let (columns, start, first_line, mut warnings) = detect(file, options)?;
+        let rows = start..file.size();
+        let count = (rows.end - rows.start).div_ceil(BLOCK);
+        let survey = |index| Survey::of_block(file, &columns, &rows, block_range(&rows, index));
+        let surveys: Vec<Survey> = (0..count).into_par_iter().map(survey).collect::<Result<_>>()?;
+        let (mut blocks, mut all) = (Vec::with_capacity(surveys.len()), Survey::empty());
+        for survey in &surveys {
+            blocks.push(Block { row: all.rows, line: first_line + all.lines });
+            all.add(survey);
+        }
+        if all.rows > 0 && all.min[0] > all.max[0] {
+            warnings.push("no line has numbers where x, y and z should be".to_string());
+        }
+        let [min, max] = if all.min[0] <= all.max[0] { [all.min, all.max] } else { [[0.0; 3]; 2] };
+        let decimals = std::array::from_fn(|axis| fitting(all.decimals[axis], min[axis].abs().max(max[axis].abs())));
+        Ok((Table { columns, rows, blocks, records: all.rows, min, max, decimals }, warnings))
+    }
+
+    /// Steps of the most decimals found, from 0.
+    pub(in crate::input) fn axes(&self) -> [Axis; 3] {
+        self.decimals.map(|decimals| Axis { offset: Decimal::ZERO, scale: Decimal::new(1, decimals as u32) })
+    }
+
+    /// Whether rows have red, green and blue.
+    pub(in crate::input) fn has_rgb(&self) -> bool {
+        self.columns.have(Role::Color(0))
+    }
+
+    /// Whether rows have a classification.
+    pub(in crate::input) fn has_class(&self) -> bool {
+        self.columns.have(Role::Class)
+    }
+
+    /// The number of pieces.
+    pub(in crate::input) fn pieces(&self) -> usize {
+        self.blocks.len()
+    }
+
+    /// Sends the rows of `piece` through `sieve`.
+    pub(in crate::input) fn decode(&self, file: &Positioned, piece: usize, sieve: &mut Sieve) -> Result<()> {
+        let Block { mut row, line: first_line } = self.blocks[piece];
+        let mut reader = RowReader::new(&self.columns);
+        let range = block_range(&self.rows, piece as u64);
+        for_each_line(file, self.rows.start, range, |index, line| {
+            let number = || first_line + index;
+            match line {
+                Line::Whole(line) if self.columns.skips(line) => return Ok(()),
+                Line::Whole(line) => match reader.read(line).and_then(|()| reader.record(&self.decimals)) {
+                    Ok(record) => sieve.push(row, &record, || format!("line {}", number()))?,
+                    Err(fault) => {
+                        sieve.malformed(1, || format!("line {}: {}", number(), fault.describe(&self.columns, line)))
+                    }
+                },
+                Line::TooLong => sieve.malformed(1, || format!("line {} has more than {LONGEST} bytes", number())),
+            }
+            row += 1;
+            Ok(())
+        })?;
+        Ok(())
+    }
+}
+
+fn block_range(rows: &Range<u64>, index: u64) -> Range<u64> {
+    let start = rows.start + index * BLOCK;
+    start..(start + BLOCK).min(rows.end)
+}
+
+/// The layout of the text, where its rows begin, the number of the line there, and warnings.
+fn detect(file: &Positioned, options: &TextOptions) -> Result<(Columns, u64, u64, Vec<String>)> {
+    let sample = file.bytes(0..file.size().min(SAMPLE))?;
+    if sample.starts_with(&[0xff, 0xfe]) || sample.starts_with(&[0xfe, 0xff]) {
+        return Err(Error::input(file.path(), "is text in UTF-16; save it as UTF-8"));
+    }
+    let mark = if sample.starts_with(&[0xef, 0xbb, 0xbf]) { 3 } else { 0 };
+    let mut lines: Vec<&[u8]> = sample[mark..].split(|&byte| byte == b'\n').collect();
+    if lines.len() > 1 && file.size() > SAMPLE {
+        lines.pop();
+    }
+    let plain: Vec<&[u8]> = lines.iter().map(|line| line.strip_suffix(b"\r").unwrap_or(line)).collect();
+    let found = Columns::detect(file.path(), &plain, options)?;
+    if !found.header {
+        return Ok((found.columns, mark as u64, 1, found.warnings));
+    }
+    let header = plain.iter().position(|line| !found.columns.skips(line)).unwrap_or(0);
+    let before: usize = lines[..=header].iter().map(|line| line.len() + 1).sum();
+    let start = ((mark + before) as u64).min(file.size());
+    Ok((found.columns, start, header as u64 + 2, found.warnings))
+}
+
+/// As many of `decimals` as leave numbers of this size room in 18 digits.
+fn fitting(decimals: u8, largest: f64) -> u8 {
+    (0..=decimals.min(MOST_DECIMALS)).rev().find(|&d| largest * POWERS[d as usize] as f64 <= 1e18).unwrap_or(0)
+}
+
+impl Survey {
+    fn empty() -> Survey {
+        Survey { lines: 0, rows: 0, min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3], decimals: [0; 3] }
+    }
+
+    fn of_block(file: &Positioned, columns: &Columns, rows: &Range<u64>, range: Range<u64>) -> Result<Survey> {
+        let mut survey = Survey::empty();
+        let mut reader = RowReader::new(columns);
+        survey.lines = for_each_line(file, rows.start, range, |_, line| {
+            match line {
+                Line::Whole(line) if columns.skips(line) => return Ok(()),
+                Line::Whole(line) if reader.read(line).is_ok() => survey.see(&reader.numbers),
+                _ => {}
+            }
+            survey.rows += 1;
+            Ok(())
+        })?;
+        Ok(survey)
+    }
+
+    #[inline]
+    fn see(&mut self, numbers: &[Number; 3]) {
+        for (axis, number) in numbers.iter().enumerate() {
+            let value = number.value();
+            self.min[axis] = self.min[axis].min(value);
+            self.max[axis] = self.max[axis].max(value);
+            if number.decimals > self.decimals[axis] {
+                self.decimals[axis] = self.decimals[axis].max(number.shortest().decimals);
+            }
+        }
+    }
+
+    fn add(&mut self, other: &Survey) {
+        self.lines += other.lines;
+        self.rows += other.rows;
+        for axis in 0..3 {
+            self.min[axis] = self.min[axis].min(other.min[axis]);
+            self.max[axis] = self.max[axis].max(other.max[axis]);
+            self.decimals[axis] = self.decimals[axis].max(other.decimals[axis]);
+        }
+    }
+}
+
+/// Why a row cannot be used: the column, from 0, and what it should hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Fault {
+    column: usize,
+    expected: &'static str,
+}
+
+impl Fault {
+    fn describe(&self, columns: &Columns, line: &[u8]) -> String {
+        let name = match columns.roles[self.column] {
+            Role::Coordinate(axis) => ["x", "y", "z"][axis],
+            Role::Color(channel) => ["red", "green", "blue"][channel],
+            Role::Class | Role::Skipped => "class",
+        };
+        let place = format!("column {} ({name})", self.column + 1);
+        match columns.delimiter.fields(line).get(self.column) {
+            Some(field) => format!("{place} is {}, not {}", shown(field), self.expected),
+            None => format!("{place} is missing in {}", shown(line)),
+        }
+    }
+}
+
+/// Takes rows apart.
+struct RowReader<'a> {
+    columns: &'a Columns,
+    numbers: [Number; 3],
+    rgb: [u16; 3],
+    class: u8,
+}
+
+impl<'a> RowReader<'a> {
+    fn new(columns: &'a Columns) -> RowReader<'a> {
+        RowReader { columns, numbers: [Number::default(); 3], rgb: [0; 3], class: 0 }
+    }
+
+    /// Reads the columns of `line` that are used.
+    #[inline]
+    fn read(&mut self, line: &[u8]) -> std::result::Result<(), Fault> {
+        let delimiter = self.columns.delimiter;
+        let mut rest = Some(line);
+        for (column, &role) in self.columns.roles.iter().enumerate() {
+            let missing = Fault { column, expected: "there" };
+            let line = rest.ok_or(missing)?;
+            if role == Role::Skipped {
+                rest = delimiter.split(line).1;
+                continue;
+            }
+            let (number, after) = take_number(delimiter, line).ok_or(Fault { column, expected: "a number" })?;
+            rest = after;
+            match role {
+                Role::Coordinate(axis) => self.numbers[axis] = number,
+                Role::Color(channel) => {
+                    let expected = "a whole number from 0 to 65535";
+                    self.rgb[channel] = whole(number).ok_or(Fault { column, expected })?;
+                }
+                Role::Class => {
+                    let expected = "a whole number from 0 to 255";
+                    self.class = whole(number).ok_or(Fault { column, expected })?;
+                }
+                Role::Skipped => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// The row last read, in steps of `10^-decimals`.
+    #[inline]
+    fn record(&self, decimals: &[u8; 3]) -> std::result::Result<Record, Fault> {
+        let mut raw = [0; 3];
+        let mut rounded = [false; 2];
+        for axis in 0..3 {
+            let steps = self.numbers[axis].steps(decimals[axis]);
+            let (value, inexact) = steps.ok_or_else(|| self.too_large(axis))?;
+            raw[axis] = value;
+            rounded[axis / 2] |= inexact;
+        }
+        Ok(Record { raw, rgb: self.rgb, class: self.class, withheld: false, rounded })
+    }
+
+    #[cold]
+    fn too_large(&self, axis: usize) -> Fault {
+        let column = self.columns.roles.iter().position(|role| *role == Role::Coordinate(axis)).unwrap_or(0);
+        Fault { column, expected: "a number of a usable size" }
+    }
+}
+
+/// The number in the column at the start of `line`, and the rest of the line after the delimiter.
+#[inline]
+fn take_number(delimiter: Delimiter, line: &[u8]) -> Option<(Number, Option<&[u8]>)> {
+    let spaces = line.iter().take_while(|byte| **byte == b' ').count();
+    let line = &line[spaces..];
+    if let Some((number, length)) = Number::read(line) {
+        match (line.get(length), delimiter) {
+            (None, _) => return Some((number, None)),
+            (Some(byte), Delimiter::Byte(wanted)) if *byte == wanted => {
+                return Some((number, Some(&line[length + 1..])));
+            }
+            (Some(b' ' | b'\t'), Delimiter::Blank) => {
+                let rest = line[length..].trim_ascii_start();
+                return Some((number, (!rest.is_empty()).then_some(rest)));
+            }
+            _ => {}
+        }
+    }
+    let (field, rest) = delimiter.split(line);
+    Some((Number::parse(field)?, rest))
+}
+
+fn whole<T: TryFrom<i64>>(number: Number) -> Option<T> {
+    let number = number.shortest();
+    if number.decimals == 0 && !number.rounded { T::try_from(number.mantissa).ok() } else { None }
+}

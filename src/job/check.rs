@@ -1,0 +1,107 @@
+//! Preflight: what a job would read and need, without writing anything.
+
+use super::report::grouped;
+use super::scan::{self, Plan};
+use super::{BYTES_PER_LEAF_SITE, workers};
+use crate::Result;
+use crate::config::Config;
+use crate::input::Point;
+use serde::Serialize;
+use std::fmt;
+use std::path::PathBuf;
+
+/// Bytes of job directory a site, beside the spill: its place, colour, class and two triangles.
+const TEMPORARY_PER_SITE: u64 = 12 + 6 + 1 + 2 * 12;
+/// Bytes of results a site, at the most: position, normal, colour and two triangles with 16-bit corners.
+const RESULT_PER_SITE: u64 = 12 + 12 + 8 + 2 * 6;
+
+/// What a job would do.
+#[derive(Clone, Debug, Serialize)]
+pub struct Preflight {
+    /// Every input: path, format, records.
+    pub files: Vec<(PathBuf, String, u64)>,
+    /// Records in all inputs.
+    pub records: u64,
+    /// Tiles, about.
+    pub tiles: u64,
+    /// Steps of the lattice in x and y, and z.
+    pub resolution: [String; 2],
+    /// Width and height in source units.
+    pub size: [f64; 2],
+    /// Unit of x and y.
+    pub unit: String,
+    /// Name of the CRS.
+    pub crs: Option<String>,
+    /// Worker threads.
+    pub threads: usize,
+    /// Bytes of memory that the job will need at the most, about.
+    pub memory: u64,
+    /// The memory it was given.
+    pub memory_limit: u64,
+    /// Bytes of temporary files, at the most.
+    pub temporary: u64,
+    /// Bytes of results, at the most.
+    pub results: u64,
+    /// Who will triangulate.
+    pub backend: String,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// Looks at the inputs of `config`.
+///
+/// # Errors
+/// Whatever would stop the job before its first point; see [`scan::run`].
+pub fn run(config: &Config) -> Result<Preflight> {
+    let threads = workers(config)?;
+    let plan = scan::run(config)?;
+    Ok(preflight(&plan, config, threads))
+}
+
+fn preflight(plan: &Plan, config: &Config, threads: usize) -> Preflight {
+    let per_tile = config.triangulation.sites_per_tile.0;
+    let points = plan.records;
+    let steps = |axis: usize| plan.extent[1][axis] as f64 - plan.extent[0][axis] as f64;
+    let resolution = plan.frame.extras().resolution;
+    Preflight {
+        files: plan.sources.iter().map(|(s, _)| (s.path.clone(), format!("{:?}", s.format), s.records)).collect(),
+        records: points,
+        // Tiles come out between half full and full.
+        tiles: (points * 4).div_ceil(per_tile * 3),
+        resolution: [plan.lattice.resolution.to_string(), plan.lattice.resolution_z.to_string()],
+        size: [steps(0) * resolution, steps(1) * resolution],
+        unit: plan.unit.into(),
+        crs: plan.crs.name.clone(),
+        threads,
+        memory: (per_tile.min(points) * BYTES_PER_LEAF_SITE * threads as u64 + (64 << 20))
+            .max(config.limits.memory.0 / 6),
+        memory_limit: config.limits.memory.0,
+        temporary: points * (size_of::<Point>() as u64 + TEMPORARY_PER_SITE),
+        results: points * RESULT_PER_SITE,
+        backend: format!("{:?}", config.triangulation.backend).to_lowercase(),
+        warnings: plan.warnings.clone(),
+    }
+}
+
+impl fmt::Display for Preflight {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (path, format, records) in &self.files {
+            writeln!(f, "{:<8} {:>14} points  {}", format, grouped(*records), path.display())?;
+        }
+        let mebibytes = |bytes: u64| format!("{} MiB", grouped(bytes >> 20));
+        let mut row = |name: &str, value: String| writeln!(f, "{name:<18} {value}");
+        row("points", grouped(self.records))?;
+        row("tiles", format!("about {}", grouped(self.tiles)))?;
+        row("area", format!("{:.1} x {:.1} {}", self.size[0], self.size[1], self.unit))?;
+        row("lattice step", format!("{} (z {})", self.resolution[0], self.resolution[1]))?;
+        row("crs", self.crs.clone().unwrap_or_else(|| "none".into()))?;
+        row("backend", format!("{} on {} threads", self.backend, self.threads))?;
+        row("memory", format!("about {} of {}", mebibytes(self.memory), mebibytes(self.memory_limit)))?;
+        row("temporary files", format!("at most {}", mebibytes(self.temporary)))?;
+        row("results", format!("at most {}", mebibytes(self.results)))?;
+        for warning in &self.warnings {
+            writeln!(f, "warning: {warning}")?;
+        }
+        Ok(())
+    }
+}

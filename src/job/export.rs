@@ -1,0 +1,193 @@
+//! Step 6 of a job, by tile: the tile's own triangles and those of the seams that it owns, with finished normals and
+//! colours, as one GLB; and its pixels of the preview.
+
+use super::columns::ColumnWriter;
+use super::directory::{Directory, remove_file, write_whole};
+use super::records::{Leaf, Rim, RimVertices, SeamTriangle};
+use super::stitch::seam_of;
+use super::tree::Tree;
+use crate::output::Tile;
+use crate::output::color::Coloring;
+use crate::output::frame::Frame;
+use crate::output::glb::encode_tile;
+use crate::output::normals::Sums;
+use crate::output::preview::Canvas;
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+use std::io::Write;
+use std::ops::AddAssign;
+
+/// How tiles are to look.
+#[derive(Clone, Debug)]
+pub struct Look {
+    /// Where lattice integers lie in a glTF scene.
+    pub frame: Frame,
+    /// Where colours come from; `None` for no colours.
+    pub coloring: Option<Coloring>,
+    /// Whether vertices carry normals.
+    pub normals: bool,
+}
+
+/// What one tile, or all of them, came to.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub struct TileFigures {
+    /// GLB files written; a tile whose triangles all belong to others has none.
+    pub files: u64,
+    /// Triangles in them.
+    pub triangles: u64,
+    /// Those of them that cross a border between tiles.
+    pub seam_triangles: u64,
+    /// Bytes of the GLB files.
+    pub bytes: u64,
+}
+
+impl AddAssign for TileFigures {
+    fn add_assign(&mut self, other: TileFigures) {
+        self.files += other.files;
+        self.triangles += other.triangles;
+        self.seam_triangles += other.seam_triangles;
+        self.bytes += other.bytes;
+    }
+}
+
+/// Writes the GLB of `tile` and its part of the preview, and removes the leaf's file, which nothing needs after that.
+///
+/// # Errors
+/// [`Error::Io`] on the output or the job directory, [`Error::Config`] if a triangle is too long for f32.
+pub fn run(directory: &Directory, tree: &Tree, tile: usize, look: &Look, canvas: &Canvas) -> Result<TileFigures> {
+    let leaf = Leaf::load(directory, tile)?;
+    let rims = RimVertices::load(directory, tile)?;
+    let mut sites = Sites::of_leaf(leaf, &rims, look);
+    let own = seam_of(directory, tree, tile)?.into_iter().filter(|triangle| owner(triangle) == tile as u32);
+    let seam_triangles = sites.add_seam(directory, tile as u32, own, look)?;
+    let content = sites.into_tile(look);
+    let mut figures =
+        TileFigures { triangles: content.triangles.len() as u64, seam_triangles, ..TileFigures::default() };
+    ColumnWriter::default().push(&canvas.draw(&content)).write(&directory.preview_fragment(tile))?;
+    if !content.triangles.is_empty() {
+        let mut bytes = Vec::new();
+        encode_tile(&look.frame, &content, &mut bytes)?;
+        write_whole(&directory.tile(tile), |file| file.write_all(&bytes))?;
+        (figures.files, figures.bytes) = (1, bytes.len() as u64);
+    }
+    remove_file(&directory.leaf(tile))?;
+    Ok(figures)
+}
+
+/// A triangle belongs to the tile of its lowest-numbered corner.
+fn owner(triangle: &SeamTriangle) -> u32 {
+    triangle[0].tile.min(triangle[1].tile).min(triangle[2].tile)
+}
+
+/// The vertices of a tile while it is put together: its own sites first, then those of its neighbours.
+struct Sites {
+    positions: Vec<[i32; 3]>,
+    normals: Vec<[f32; 3]>,
+    colors: Vec<[u16; 3]>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Sites {
+    fn of_leaf(leaf: Leaf, rims: &RimVertices, look: &Look) -> Sites {
+        let mut normals = Sums::new(&leaf.positions, &leaf.triangles).finish(&look.frame);
+        for vertex in &rims.0 {
+            normals[vertex.site as usize] = vertex.normal;
+        }
+        let colors = match &look.coloring {
+            Some(coloring) => (0..leaf.positions.len())
+                .map(|v| coloring.color(leaf.positions[v][2], leaf.rgb[v], leaf.class[v]))
+                .collect(),
+            None => Vec::new(),
+        };
+        Sites { positions: leaf.positions, normals, colors, triangles: leaf.triangles }
+    }
+
+    /// Adds the triangles of the seams that `tile` owns, with the vertices that neighbours share with it; returns how many.
+    fn add_seam(
+        &mut self,
+        directory: &Directory,
+        tile: u32,
+        seam: impl Iterator<Item = SeamTriangle>,
+        look: &Look,
+    ) -> Result<u64> {
+        let mut neighbours = Neighbours { directory, rims: HashMap::new() };
+        let mut vertex_of: HashMap<(u32, u32), u32> = HashMap::new();
+        let before = self.triangles.len();
+        for triangle in seam {
+            let mut corners = [0; 3];
+            for (corner, rim) in corners.iter_mut().zip(&triangle) {
+                *corner = match vertex_of.get(&(rim.tile, rim.site)) {
+                    _ if rim.tile == tile => rim.site,
+                    Some(&vertex) => vertex,
+                    None => {
+                        let vertex = self.add_vertex(rim, &mut neighbours, look)?;
+                        vertex_of.insert((rim.tile, rim.site), vertex);
+                        vertex
+                    }
+                };
+            }
+            self.triangles.push(corners);
+        }
+        Ok((self.triangles.len() - before) as u64)
+    }
+
+    fn add_vertex(&mut self, rim: &Rim, neighbours: &mut Neighbours, look: &Look) -> Result<u32> {
+        let vertex = neighbours.of(rim.tile)?.find(rim.site).ok_or_else(|| {
+            Error::Broken(format!("tile {} does not know site {} that a seam uses", rim.tile, rim.site))
+        })?;
+        self.positions.push(rim.position);
+        self.normals.push(vertex.normal);
+        if let Some(coloring) = &look.coloring {
+            self.colors.push(coloring.color(rim.position[2], vertex.rgb, vertex.class as u8));
+        }
+        Ok(self.positions.len() as u32 - 1)
+    }
+
+    /// The finished tile. Sites whose triangles all belong to other tiles are left out.
+    fn into_tile(mut self, look: &Look) -> Tile {
+        let mut used = vec![false; self.positions.len()];
+        self.triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
+        if used.contains(&false) {
+            self.drop_unused(&used);
+        }
+        Tile {
+            positions: self.positions,
+            normals: look.normals.then_some(self.normals),
+            colors: look.coloring.map(|_| self.colors),
+            triangles: self.triangles,
+        }
+    }
+
+    fn drop_unused(&mut self, used: &[bool]) {
+        let number = |next: &mut u32, &used: &bool| Some(std::mem::replace(next, *next + used as u32));
+        let numbers: Vec<u32> = used.iter().scan(0, number).collect();
+        self.triangles.iter_mut().flatten().for_each(|v| *v = numbers[*v as usize]);
+        keep(&mut self.positions, used);
+        keep(&mut self.normals, used);
+        keep(&mut self.colors, used);
+    }
+}
+
+/// Keeps the values whose place in `wanted` says so; a column that the tile does not have stays empty.
+fn keep<T>(values: &mut Vec<T>, wanted: &[bool]) {
+    let mut wanted = wanted.iter();
+    values.retain(|_| *wanted.next().unwrap_or(&false));
+}
+
+/// The finished frontiers of other tiles, read when first asked for.
+struct Neighbours<'a> {
+    directory: &'a Directory,
+    rims: HashMap<u32, RimVertices>,
+}
+
+impl Neighbours<'_> {
+    fn of(&mut self, tile: u32) -> Result<&RimVertices> {
+        Ok(match self.rims.entry(tile) {
+            std::collections::hash_map::Entry::Occupied(entry) => entry.into_mut(),
+            std::collections::hash_map::Entry::Vacant(entry) => {
+                entry.insert(RimVertices::load(self.directory, tile as usize)?)
+            }
+        })
+    }
+}

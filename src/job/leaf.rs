@@ -1,0 +1,103 @@
+//! Step 3 of a job, by tile: triangulate the sites of one leaf and close what can be closed.
+
+use super::closing::{State, close};
+use super::directory::Directory;
+use super::partition::Partition;
+use super::records::{Frontier, Leaf, Rim, RimDraft};
+use super::sites;
+use super::spill::Spill;
+use crate::Result;
+use crate::config::{Backend, Duplicates};
+use crate::geometry::Site;
+use crate::input::Point;
+use crate::output::normals::Sums;
+use crate::triangulation::{self, Outcome};
+use serde::{Deserialize, Serialize};
+use std::ops::AddAssign;
+
+/// What one leaf, or all of them, came to.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub struct LeafFigures {
+    /// Distinct sites.
+    pub sites: u64,
+    /// Points dropped because another has the same x and y.
+    pub duplicates: u64,
+    /// Triangles closed in leaves.
+    pub triangles: u64,
+    /// Bytes of temporary files.
+    pub bytes: u64,
+    /// How the leaves were triangulated.
+    pub outcome: Outcome,
+}
+
+impl AddAssign for LeafFigures {
+    fn add_assign(&mut self, other: LeafFigures) {
+        self.sites += other.sites;
+        self.duplicates += other.duplicates;
+        self.triangles += other.triangles;
+        self.bytes += other.bytes;
+        self.outcome += other.outcome;
+    }
+}
+
+/// What the step needs to know of the configuration.
+#[derive(Clone, Copy, Debug)]
+pub struct Task {
+    /// Which of several points with the same x and y stays.
+    pub duplicates: Duplicates,
+    /// Who triangulates.
+    pub backend: Backend,
+}
+
+/// Triangulates leaf `tile` and leaves its sites, closed triangles and frontier in the job directory.
+///
+/// # Errors
+/// [`crate::Error::Io`] on the job directory, [`crate::Error::Broken`] if the triangulation fails.
+pub fn run(
+    directory: &Directory,
+    partition: &Partition,
+    spill: &Spill,
+    tile: usize,
+    task: Task,
+) -> Result<LeafFigures> {
+    let (points, dropped) = sites::load(spill, &partition.blocks[tile], task.duplicates)?;
+    let sites: Vec<Site> = points.iter().map(|p| p.position).collect();
+    let (mesh, outcome) = triangulation::triangulate(&sites, task.backend)?;
+    let node = partition.tree.leaves[tile];
+    let is_root = partition.tree.nodes[node].parent.is_none();
+    let cell = (!is_root).then_some(&partition.tree.nodes[node].cell);
+    let closing = close(&mesh, &sites, cell, |_| false);
+    let closed = mesh.triangles.iter().zip(&closing.states).filter(|(_, state)| **state == State::Closed);
+    let leaf = leaf_of(&points, closed.map(|(triangle, _)| *triangle).collect());
+    let rim = |&site: &u32| Rim { tile: tile as u32, site, position: leaf.positions[site as usize] };
+    let frontier = Frontier { sites: closing.frontier.iter().map(rim).collect(), boundary: closing.boundary };
+    let bytes = rim_draft(&leaf, &closing.frontier).save(directory, tile)?
+        + leaf.save(directory, tile)?
+        + frontier.save(directory, node)?;
+    let (sites, triangles) = (sites.len() as u64, leaf.triangles.len() as u64);
+    Ok(LeafFigures { sites, duplicates: dropped, triangles, bytes, outcome })
+}
+
+fn leaf_of(points: &[Point], triangles: Vec<[u32; 3]>) -> Leaf {
+    Leaf {
+        positions: points.iter().map(|p| [p.position[0], p.position[1], p.z]).collect(),
+        rgb: points.iter().map(|p| p.rgb).collect(),
+        class: points.iter().map(|p| p.class).collect(),
+        triangles,
+    }
+}
+
+/// The frontier as far as the leaf knows it: the seams add their triangles to the normals when all are known.
+fn rim_draft(leaf: &Leaf, frontier: &[u32]) -> RimDraft {
+    let mut on_frontier = vec![false; leaf.positions.len()];
+    frontier.iter().for_each(|&site| on_frontier[site as usize] = true);
+    let touches = |triangle: &&[u32; 3]| triangle.iter().any(|&v| on_frontier[v as usize]);
+    let touching: Vec<[u32; 3]> = leaf.triangles.iter().filter(touches).copied().collect();
+    let sums = Sums::new(&leaf.positions, &touching);
+    let sites = || frontier.iter().map(|&site| site as usize);
+    RimDraft {
+        sums: sites().map(|site| sums.get(site)).collect(),
+        rgb: sites().map(|site| leaf.rgb[site]).collect(),
+        class: sites().map(|site| leaf.class[site]).collect(),
+    }
+}

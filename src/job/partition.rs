@@ -1,0 +1,291 @@
+//! Step 2 of a job: decode every input once, spill the points to buckets of a grid, and build the tree whose leaves are
+//! the tiles. A bucket with more points than a tile may hold is spilled again to a finer grid of its own.
+
+use super::directory::{Directory, read_json, write_json};
+use super::grid::{Grid, Span, Sums};
+use super::progress::Stage;
+use super::spill::{Block, Bucket, Buckets, Spill};
+use super::tree::{Cell, Kind, Node, Tree};
+use crate::geometry::Site;
+use crate::input::{Point, Rules, Source, Tally};
+use crate::{Error, Result};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::ops::AddAssign;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// What a leaf's cell is cut into before the leaves are chosen: enough that leaves come out even.
+const BUCKETS_PER_TILE: u64 = 8;
+/// More buckets than this and their buffers become too small to write well; crowded ones are spilled again anyway.
+const MOST_BUCKETS: u64 = 16_384;
+
+/// The result of this step: the tree, where each leaf's points are, and what was met on the way.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Partition {
+    /// The tree over all points.
+    pub tree: Tree,
+    /// Where the spill holds the points of each tile.
+    pub blocks: Vec<Vec<Block>>,
+    /// What was read and what was left out.
+    pub summary: Summary,
+    /// The size of the spill in bytes.
+    pub spilled: u64,
+}
+
+impl Partition {
+    /// The result as the step left it in the job directory.
+    ///
+    /// # Errors
+    /// [`Error::Io`] or [`Error::Broken`] if it cannot be read.
+    pub fn load(directory: &Directory) -> Result<Partition> {
+        read_json(&directory.tree())
+    }
+}
+
+/// What all inputs together held.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Summary {
+    /// Counts of records by what became of them.
+    pub tally: Tally,
+    /// The least and greatest lattice integers x, y, z of the kept points; `None` without points.
+    pub bounds: Option<[[i32; 3]; 2]>,
+}
+
+impl AddAssign for Summary {
+    fn add_assign(&mut self, other: Summary) {
+        self.tally += other.tally;
+        self.bounds = match (self.bounds, other.bounds) {
+            (Some(a), Some(b)) => Some(around(a, b)),
+            (a, b) => a.or(b),
+        };
+    }
+}
+
+/// The least box [min, max] around two of them.
+fn around<const N: usize>(a: [[i32; N]; 2], b: [[i32; N]; 2]) -> [[i32; N]; 2] {
+    [std::array::from_fn(|axis| a[0][axis].min(b[0][axis])), std::array::from_fn(|axis| a[1][axis].max(b[1][axis]))]
+}
+
+/// What the step needs to know.
+pub struct Task<'a> {
+    /// The inputs, each with the rules for its points.
+    pub sources: &'a [(Source, Rules)],
+    /// The least and greatest lattice point expected, to lay the first grid; points outside are no error.
+    pub extent: [Site; 2],
+    /// The most points in a tile.
+    pub points_per_tile: u64,
+    /// Bytes for buffers.
+    pub memory: u64,
+    /// The share of malformed records that is put up with.
+    pub malformed_share: f64,
+}
+
+/// Runs the step and leaves its result in the job directory.
+///
+/// # Errors
+/// [`Error::Input`] if an input cannot be read or too much of it is malformed, [`Error::Io`] if the spill cannot be
+/// written.
+pub fn run(task: &Task, directory: &Directory, stage: &Stage) -> Result<Partition> {
+    let spill = Spill::create(&directory.spill())?;
+    let records: u64 = task.sources.iter().map(|(source, _)| source.records).sum();
+    let grid = Grid::over(task.extent[0], task.extent[1], wanted_buckets(records, task.points_per_tile));
+    let buckets = Buckets::new(&spill, grid.buckets(), task.memory);
+    let summary = decode_all(task, records, &grid, &buckets, stage)?;
+    let mut divider = Divider { task, spill: &spill, tree: Tree::default(), blocks: Vec::new() };
+    let buckets = buckets.finish()?;
+    if summary.tally.kept > 0 {
+        divider.grow(Cell::PLANE, None, &grid, buckets)?;
+    }
+    let Divider { tree, blocks, .. } = divider;
+    let partition = Partition { tree, blocks, summary, spilled: spill.bytes() };
+    write_json(&directory.tree(), &partition)?;
+    Ok(partition)
+}
+
+fn wanted_buckets(points: u64, points_per_tile: u64) -> u64 {
+    (points.saturating_mul(BUCKETS_PER_TILE) / points_per_tile).clamp(4, MOST_BUCKETS)
+}
+
+/// Decodes all pieces of all sources in parallel and hands the points to the buckets of the grid.
+fn decode_all(task: &Task, records: u64, grid: &Grid, buckets: &Buckets, stage: &Stage) -> Result<Summary> {
+    let pieces: Vec<(usize, usize)> = task
+        .sources
+        .iter()
+        .enumerate()
+        .flat_map(|(s, (source, _))| (0..source.pieces()).map(move |piece| (s, piece)))
+        .collect();
+    let allowed = (task.malformed_share * records as f64) as u64;
+    let malformed = AtomicU64::new(0);
+    let decode = |&(s, piece): &(usize, usize)| -> Result<Summary> {
+        let (source, rules) = &task.sources[s];
+        let mut scatter = Scatter::new(grid, buckets);
+        let tally = source.decode(piece, rules, &mut |points| scatter.spill(points))?;
+        stage.advance(tally.read);
+        let so_far = malformed.fetch_add(tally.malformed, Ordering::Relaxed) + tally.malformed;
+        if so_far > allowed {
+            return Err(too_many_malformed(source, &tally, so_far, records));
+        }
+        Ok(Summary { tally, bounds: scatter.bounds })
+    };
+    pieces.par_iter().with_max_len(1).map(decode).try_reduce(Summary::default, |mut a, b| {
+        a += b;
+        Ok(a)
+    })
+}
+
+fn too_many_malformed(source: &Source, tally: &Tally, malformed: u64, records: u64) -> Error {
+    Error::input(
+        &source.path,
+        format!(
+            "{malformed} of {records} records are malformed, more than [input] malformed_share allows: {}. \
+             Repair the file, leave it out, or raise malformed_share to read the rest",
+            tally.examples.join("; ")
+        ),
+    )
+}
+
+/// Sorts slices of points by bucket before they go to the shared buffers, so that a lock is taken once a bucket.
+struct Scatter<'a> {
+    grid: &'a Grid,
+    buckets: &'a Buckets<'a>,
+    bucket_of: Vec<u32>,
+    ends: Vec<u32>,
+    sorted: Vec<Point>,
+    bounds: Option<[[i32; 3]; 2]>,
+}
+
+impl<'a> Scatter<'a> {
+    fn new(grid: &'a Grid, buckets: &'a Buckets<'a>) -> Scatter<'a> {
+        Scatter { grid, buckets, bucket_of: Vec::new(), ends: Vec::new(), sorted: Vec::new(), bounds: None }
+    }
+
+    fn spill(&mut self, points: &[Point]) -> Result<()> {
+        self.count(points);
+        self.sorted.resize(points.len(), bytemuck::Zeroable::zeroed());
+        for (point, &bucket) in points.iter().zip(&self.bucket_of).rev() {
+            let end = &mut self.ends[bucket as usize];
+            *end -= 1;
+            self.sorted[*end as usize] = *point;
+        }
+        // Each "end" has now come down to where its bucket starts.
+        self.ends.push(points.len() as u32);
+        for bucket in 0..self.grid.buckets() {
+            let run = self.ends[bucket] as usize..self.ends[bucket + 1] as usize;
+            if !run.is_empty() {
+                self.buckets.extend(bucket, &self.sorted[run])?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The bucket of every point, where each bucket's run ends in sorted order, and the box around all.
+    fn count(&mut self, points: &[Point]) {
+        self.ends.clear();
+        self.ends.resize(self.grid.buckets(), 0);
+        self.bucket_of.clear();
+        for point in points {
+            let bucket = self.grid.bucket(point.position);
+            self.bucket_of.push(bucket);
+            self.ends[bucket as usize] += 1;
+        }
+        let here = points.iter().map(|p| [[p.position[0], p.position[1], p.z]; 2]).reduce(around);
+        self.bounds = self.bounds.into_iter().chain(here).reduce(around);
+        let mut end = 0;
+        for count in &mut self.ends {
+            end += *count;
+            *count = end;
+        }
+    }
+}
+
+/// Grows the tree over the buckets.
+struct Divider<'a> {
+    task: &'a Task<'a>,
+    spill: &'a Spill,
+    tree: Tree,
+    blocks: Vec<Vec<Block>>,
+}
+
+impl Divider<'_> {
+    /// Grows the part of the tree over all of `grid`; returns its root's number.
+    fn grow(&mut self, cell: Cell, parent: Option<usize>, grid: &Grid, mut buckets: Vec<Bucket>) -> Result<usize> {
+        let sums = Sums::new(*grid, buckets.iter().map(|bucket| bucket.points));
+        self.divide(cell, parent, grid, &sums, &mut buckets, grid.span())
+    }
+
+    fn divide(
+        &mut self,
+        cell: Cell,
+        parent: Option<usize>,
+        grid: &Grid,
+        sums: &Sums,
+        buckets: &mut [Bucket],
+        span: Span,
+    ) -> Result<usize> {
+        if sums.points(span) <= self.task.points_per_tile {
+            return Ok(self.leaf(cell, parent, take(grid, buckets, span)));
+        }
+        let Some(halves) = sums.cut(span, cell) else {
+            return self.refine(cell, parent, take(grid, buckets, span));
+        };
+        let number = self.inner(cell, parent);
+        let mut children = [0; 2];
+        for (child, (half, half_cell)) in children.iter_mut().zip(halves) {
+            *child = self.divide(half_cell, Some(number), grid, sums, buckets, half)?;
+        }
+        self.tree.nodes[number].kind = Kind::Inner(children);
+        Ok(number)
+    }
+
+    /// One bucket with more points than a tile may hold: spill it again to a finer grid over where its points really are.
+    fn refine(&mut self, cell: Cell, parent: Option<usize>, bucket: Bucket) -> Result<usize> {
+        let [min, max] = self.extent(&bucket.blocks)?;
+        if min == max {
+            return Ok(self.leaf(cell, parent, bucket));
+        }
+        let grid = Grid::over(min, max, wanted_buckets(bucket.points, self.task.points_per_tile));
+        let finer = Buckets::new(self.spill, grid.buckets(), self.task.memory);
+        bucket.blocks.par_iter().try_for_each(|&block| {
+            let mut points = Vec::new();
+            self.spill.read(block, &mut points)?;
+            Scatter::new(&grid, &finer).spill(&points)
+        })?;
+        self.grow(cell, parent, &grid, finer.finish()?)
+    }
+
+    /// The least and greatest x and y of the points in `blocks`.
+    fn extent(&self, blocks: &[Block]) -> Result<[Site; 2]> {
+        let empty = || [[i32::MAX; 2], [i32::MIN; 2]];
+        blocks
+            .par_iter()
+            .map(|&block| {
+                let mut points = Vec::new();
+                self.spill.read(block, &mut points)?;
+                Ok(points.iter().fold(empty(), |extent, p| around(extent, [p.position; 2])))
+            })
+            .try_reduce(empty, |a, b| Ok(around(a, b)))
+    }
+
+    fn leaf(&mut self, cell: Cell, parent: Option<usize>, bucket: Bucket) -> usize {
+        let number = self.tree.nodes.len();
+        self.tree.nodes.push(Node { cell, parent, kind: Kind::Leaf(self.blocks.len()) });
+        self.tree.leaves.push(number);
+        self.blocks.push(bucket.blocks);
+        number
+    }
+
+    fn inner(&mut self, cell: Cell, parent: Option<usize>) -> usize {
+        self.tree.nodes.push(Node { cell, parent, kind: Kind::Inner([0; 2]) });
+        self.tree.nodes.len() - 1
+    }
+}
+
+/// Joins the buckets of `span` into one and leaves them empty.
+fn take(grid: &Grid, buckets: &mut [Bucket], span: Span) -> Bucket {
+    let mut joined = Bucket::default();
+    for bucket in grid.in_span(span) {
+        joined.points += buckets[bucket].points;
+        joined.blocks.append(&mut buckets[bucket].blocks);
+    }
+    joined
+}

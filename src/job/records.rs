@@ -1,0 +1,234 @@
+//! What the steps leave for each other in the job directory, one type a file.
+
+use super::columns::{ColumnReader, ColumnWriter};
+use super::directory::Directory;
+use crate::Result;
+use crate::geometry::Site;
+use crate::output::normals::NormalSum;
+use bytemuck::{Pod, Zeroable};
+
+/// A site as other tiles know it. Sites are numbered by tile, then in the order of the tile.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Pod, Zeroable)]
+pub struct Rim {
+    /// The tile that owns the site.
+    pub tile: u32,
+    /// Its number in that tile.
+    pub site: u32,
+    /// Lattice integers x, y, z.
+    pub position: [i32; 3],
+}
+
+impl Rim {
+    /// Where it lies in the plane.
+    pub fn plane(&self) -> Site {
+        [self.position[0], self.position[1]]
+    }
+}
+
+/// A triangle of the seam, counterclockwise.
+pub type SeamTriangle = [Rim; 3];
+
+/// The sites of a tile, in order, and the triangles closed in its leaf.
+#[derive(Debug, Default)]
+pub struct Leaf {
+    /// Lattice integers x, y, z of the sites.
+    pub positions: Vec<[i32; 3]>,
+    /// Their colours as read.
+    pub rgb: Vec<[u16; 3]>,
+    /// Their classes.
+    pub class: Vec<u8>,
+    /// The closed triangles as numbers of sites, counterclockwise.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl Leaf {
+    /// Writes the file of `tile`; returns its size in bytes.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    pub fn save(&self, directory: &Directory, tile: usize) -> Result<u64> {
+        let columns = ColumnWriter::default().push(&self.positions).push(&self.rgb).push(&self.class);
+        // These files are most of what a job writes on its way: corners take two bytes where that is enough.
+        let columns = if self.has_short_corners() {
+            columns.push::<[u16; 3]>(&self.triangles.iter().map(|t| t.map(|v| v as u16)).collect::<Vec<_>>())
+        } else {
+            columns.push(&self.triangles)
+        };
+        columns.write(&directory.leaf(tile))
+    }
+
+    /// Reads the file of `tile`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if the file is not whole.
+    pub fn load(directory: &Directory, tile: usize) -> Result<Leaf> {
+        let mut columns = ColumnReader::open(&directory.leaf(tile))?;
+        let mut leaf = Leaf {
+            positions: columns.column()?,
+            rgb: columns.column()?,
+            class: columns.column()?,
+            triangles: Vec::new(),
+        };
+        leaf.triangles = if leaf.has_short_corners() {
+            columns.column::<[u16; 3]>()?.into_iter().map(|t| t.map(u32::from)).collect()
+        } else {
+            columns.column()?
+        };
+        Ok(leaf)
+    }
+
+    fn has_short_corners(&self) -> bool {
+        self.positions.len() <= 1 << 16
+    }
+}
+
+/// What a node hands to its parent.
+#[derive(Debug, Default)]
+pub struct Frontier {
+    /// The sites the parent still needs, ascending.
+    pub sites: Vec<Rim>,
+    /// The directed edges round the closed ground, as positions in `sites`.
+    pub boundary: Vec<[u32; 2]>,
+}
+
+impl Frontier {
+    /// Writes the file of `node`; returns its size in bytes.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    pub fn save(&self, directory: &Directory, node: usize) -> Result<u64> {
+        ColumnWriter::default().push(&self.sites).push(&self.boundary).write(&directory.frontier(node))
+    }
+
+    /// Reads the file of `node`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if the file is not whole.
+    pub fn load(directory: &Directory, node: usize) -> Result<Frontier> {
+        let mut columns = ColumnReader::open(&directory.frontier(node))?;
+        Ok(Frontier { sites: columns.column()?, boundary: columns.column()? })
+    }
+}
+
+/// The triangles that an inner node contributes, by tile: a triangle stands once for each tile that owns a corner of it.
+#[derive(Debug, Default)]
+pub struct Seam {
+    /// Tile, first triangle and number of triangles, by ascending tile.
+    index: Vec<[u32; 3]>,
+    triangles: Vec<SeamTriangle>,
+}
+
+impl Seam {
+    /// Sorts `triangles` by the tiles they touch.
+    pub fn new(triangles: &[SeamTriangle]) -> Seam {
+        let mut touching: Vec<(u32, SeamTriangle)> = Vec::with_capacity(triangles.len() * 2);
+        for triangle in triangles {
+            let mut tiles = triangle.map(|corner| corner.tile);
+            tiles.sort_unstable();
+            touching.extend((0..3).filter(|&i| i == 0 || tiles[i] != tiles[i - 1]).map(|i| (tiles[i], *triangle)));
+        }
+        touching.sort_unstable();
+        let mut seam = Seam::default();
+        for (tile, triangle) in touching {
+            match seam.index.last_mut() {
+                Some([last, _, count]) if *last == tile => *count += 1,
+                _ => seam.index.push([tile, seam.triangles.len() as u32, 1]),
+            }
+            seam.triangles.push(triangle);
+        }
+        seam
+    }
+
+    /// Writes the file of `node`; returns its size in bytes.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    pub fn save(&self, directory: &Directory, node: usize) -> Result<u64> {
+        ColumnWriter::default().push(&self.index).push(&self.triangles).write(&directory.seam(node))
+    }
+
+    /// The triangles of `node` that touch `tile`, from its file.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if the file is not whole.
+    pub fn touching(directory: &Directory, node: usize, tile: usize) -> Result<Vec<SeamTriangle>> {
+        let mut columns = ColumnReader::open(&directory.seam(node))?;
+        let index: Vec<[u32; 3]> = columns.column()?;
+        match index.binary_search_by_key(&(tile as u32), |entry| entry[0]) {
+            Ok(at) => columns.column_part(index[at][1] as usize, index[at][2] as usize),
+            Err(_) => Ok(Vec::new()),
+        }
+    }
+}
+
+/// The frontier of one leaf as far as the leaf knows it, each column in the order of [`Frontier::sites`].
+#[derive(Debug, Default)]
+pub struct RimDraft {
+    /// The sums of normals over the leaf's closed triangles around the site.
+    pub sums: Vec<NormalSum>,
+    /// Colours as read.
+    pub rgb: Vec<[u16; 3]>,
+    /// Classes.
+    pub class: Vec<u8>,
+}
+
+impl RimDraft {
+    /// Writes the file of `tile`; returns its size in bytes.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    pub fn save(&self, directory: &Directory, tile: usize) -> Result<u64> {
+        ColumnWriter::default().push(&self.sums).push(&self.rgb).push(&self.class).write(&directory.rim_draft(tile))
+    }
+
+    /// Reads the file of `tile`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if the file is not whole.
+    pub fn load(directory: &Directory, tile: usize) -> Result<RimDraft> {
+        let mut columns = ColumnReader::open(&directory.rim_draft(tile))?;
+        Ok(RimDraft { sums: columns.column()?, rgb: columns.column()?, class: columns.column()? })
+    }
+}
+
+/// A finished vertex of a tile's frontier, as neighbouring tiles need it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct RimVertex {
+    /// Its number in its tile.
+    pub site: u32,
+    /// Unit normal, source axes, metres.
+    pub normal: [f32; 3],
+    /// Colour as read.
+    pub rgb: [u16; 3],
+    /// Class.
+    pub class: u16,
+}
+
+/// The finished frontier of one leaf, by ascending site.
+#[derive(Debug)]
+pub struct RimVertices(pub Vec<RimVertex>);
+
+impl RimVertices {
+    /// Writes the file of `tile`; returns its size in bytes.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    pub fn save(&self, directory: &Directory, tile: usize) -> Result<u64> {
+        ColumnWriter::default().push(&self.0).write(&directory.rim(tile))
+    }
+
+    /// Reads the file of `tile`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if the file is not whole.
+    pub fn load(directory: &Directory, tile: usize) -> Result<RimVertices> {
+        Ok(RimVertices(ColumnReader::open(&directory.rim(tile))?.column()?))
+    }
+
+    /// The vertex of `site`.
+    pub fn find(&self, site: u32) -> Option<&RimVertex> {
+        self.0.binary_search_by_key(&site, |vertex| vertex.site).ok().map(|at| &self.0[at])
+    }
+}

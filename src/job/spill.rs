@@ -1,0 +1,151 @@
+//! Points on disk by bucket: one file of blocks, each block holding points of one bucket. Memory is one buffer a bucket.
+
+use crate::input::Point;
+use crate::positioned::{read_exact_at, write_all_at};
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// A run of points of one bucket in the spill file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Block {
+    /// The number in the file of the first of the points.
+    pub first: u64,
+    /// How many points.
+    pub points: u32,
+}
+
+/// The spill file. It only grows; blocks of several threads lie in it in any order.
+pub struct Spill {
+    path: PathBuf,
+    file: File,
+    points: AtomicU64,
+}
+
+impl Spill {
+    /// An empty spill file at `path`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be made.
+    pub fn create(path: &Path) -> Result<Spill> {
+        let file = File::options().read(true).write(true).create(true).truncate(true).open(path);
+        Ok(Spill {
+            path: path.to_path_buf(),
+            file: file.map_err(Error::io("create", path))?,
+            points: AtomicU64::new(0),
+        })
+    }
+
+    /// The finished spill file at `path`, to read.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be opened.
+    pub fn open(path: &Path) -> Result<Spill> {
+        let file = File::open(path).map_err(Error::io("open", path))?;
+        Ok(Spill { path: path.to_path_buf(), file, points: AtomicU64::new(0) })
+    }
+
+    /// The bytes written so far.
+    pub fn bytes(&self) -> u64 {
+        self.points.load(Ordering::Relaxed) * size_of::<Point>() as u64
+    }
+
+    /// Adds a block.
+    fn append(&self, points: &[Point]) -> Result<Block> {
+        let first = self.points.fetch_add(points.len() as u64, Ordering::Relaxed);
+        let at = first * size_of::<Point>() as u64;
+        write_all_at(&self.file, bytemuck::cast_slice(points), at).map_err(Error::io("write", &self.path))?;
+        Ok(Block { first, points: points.len() as u32 })
+    }
+
+    /// Adds the points of `block` to `into`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if they cannot be read.
+    pub fn read(&self, block: Block, into: &mut Vec<Point>) -> Result<()> {
+        let start = into.len();
+        into.resize(start + block.points as usize, bytemuck::Zeroable::zeroed());
+        let at = block.first * size_of::<Point>() as u64;
+        let bytes = bytemuck::cast_slice_mut(&mut into[start..]);
+        read_exact_at(&self.file, bytes, at).map_err(Error::io("read", &self.path))
+    }
+}
+
+/// What one bucket holds: its blocks on disk, and how many points in all.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Bucket {
+    /// The blocks, in no particular order.
+    pub blocks: Vec<Block>,
+    /// The number of points in them.
+    pub points: u64,
+}
+
+/// Collects points by bucket from many threads, a buffer a bucket.
+pub struct Buckets<'a> {
+    spill: &'a Spill,
+    capacity: usize,
+    open: Vec<Mutex<OpenBucket>>,
+}
+
+#[derive(Default)]
+struct OpenBucket {
+    buffer: Vec<Point>,
+    bucket: Bucket,
+}
+
+impl<'a> Buckets<'a> {
+    /// `count` empty buckets that together buffer at most `memory` bytes.
+    pub fn new(spill: &'a Spill, count: usize, memory: u64) -> Buckets<'a> {
+        // Larger blocks than these no longer read faster, smaller ones cost a system call for nothing.
+        let capacity = (memory / count as u64 / size_of::<Point>() as u64).clamp(64, 4096) as usize;
+        Buckets { spill, capacity, open: (0..count).map(|_| Mutex::default()).collect() }
+    }
+
+    /// Adds `points`, all of bucket `index`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a full buffer cannot be written.
+    pub fn extend(&self, index: usize, mut points: &[Point]) -> Result<()> {
+        let mut open = self.open[index].lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        while !points.is_empty() {
+            if open.buffer.capacity() == 0 {
+                open.buffer.reserve_exact(self.capacity);
+            }
+            let (now, later) = points.split_at(points.len().min(self.capacity - open.buffer.len()));
+            open.buffer.extend_from_slice(now);
+            points = later;
+            if open.buffer.len() == self.capacity {
+                self.flush(&mut open)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn flush(&self, open: &mut OpenBucket) -> Result<()> {
+        let block = self.spill.append(&open.buffer)?;
+        open.bucket.blocks.push(block);
+        open.bucket.points += block.points as u64;
+        open.buffer.clear();
+        Ok(())
+    }
+
+    /// Writes what is still in the buffers; the buckets with their blocks.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a buffer cannot be written.
+    pub fn finish(self) -> Result<Vec<Bucket>> {
+        let mut buckets = Vec::with_capacity(self.open.len());
+        for open in &self.open {
+            let mut open = open.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+            if !open.buffer.is_empty() {
+                self.flush(&mut open)?;
+            }
+            open.buffer = Vec::new();
+            buckets.push(std::mem::take(&mut open.bucket));
+        }
+        Ok(buckets)
+    }
+}

@@ -1,0 +1,167 @@
+//! Vertex colours: glTF wants them linear, sources have them encoded as sRGB, or not at all.
+
+use std::sync::LazyLock;
+
+/// Linear red, green and blue, 65535 for full intensity.
+pub type Linear = [u16; 3];
+
+/// How the sites of a job are coloured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Coloring {
+    /// By the colour of the source; `eight_bit` where no value of the whole job is above 255.
+    Rgb {
+        /// Values are 0 to 255 in 16-bit fields.
+        eight_bit: bool,
+    },
+    /// By height, from the lowest to the highest lattice integer of the job.
+    Elevation {
+        /// Lowest lattice integer.
+        low: i32,
+        /// Highest lattice integer.
+        high: i32,
+    },
+    /// By ASPRS classification.
+    Class,
+}
+
+impl Coloring {
+    /// The colour of a site with lattice integer `z`, source colour `rgb` and classification `class`.
+    #[inline]
+    pub fn color(&self, z: i32, rgb: [u16; 3], class: u8) -> Linear {
+        match *self {
+            Coloring::Rgb { eight_bit: true } => rgb.map(|v| TO_LINEAR[v.min(255) as usize * 257]),
+            Coloring::Rgb { eight_bit: false } => rgb.map(|v| TO_LINEAR[v as usize]),
+            Coloring::Elevation { low, high } => elevation(z, low, high),
+            Coloring::Class => CLASS_COLORS.get(class as usize).unwrap_or(&OTHER_CLASS).map(decode_byte),
+        }
+    }
+}
+
+/// The colour of height `z` on the ramp from `low` to `high`.
+pub fn elevation(z: i32, low: i32, high: i32) -> Linear {
+    let (above, span) = (z as i64 - low as i64, (high as i64 - low as i64).max(1));
+    let last = RAMP.len() as i64 - 1;
+    RAMP[(above * last / span).clamp(0, last) as usize]
+}
+
+/// Linear intensity as an sRGB byte.
+#[inline]
+pub fn to_srgb(linear: u16) -> u8 {
+    FROM_LINEAR[linear as usize >> 4]
+}
+
+fn decode_byte(v: u8) -> u16 {
+    TO_LINEAR[v as usize * 257]
+}
+
+/// sRGB (IEC 61966-2-1) to linear.
+fn decode(v: f64) -> f64 {
+    if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+}
+
+/// Linear to sRGB.
+fn encode(v: f64) -> f64 {
+    if v <= 0.0031308 { v * 12.92 } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
+}
+
+static TO_LINEAR: LazyLock<Vec<u16>> =
+    LazyLock::new(|| (0..=65535).map(|v| (decode(v as f64 / 65535.0) * 65535.0).round() as u16).collect());
+
+/// By the upper 12 bits, at the middle of each step.
+static FROM_LINEAR: LazyLock<Vec<u8>> =
+    LazyLock::new(|| (0..4096).map(|v| (encode((v as f64 + 0.5) / 4096.0) * 255.0).round() as u8).collect());
+
+/// The hypsometric ramp in sRGB: river meadows, woods, dry slopes, rock, snow.
+const RAMP_STOPS: [[u8; 3]; 7] = [
+    [70, 120, 96],
+    [112, 158, 104],
+    [178, 190, 122],
+    [222, 206, 148],
+    [196, 156, 110],
+    [160, 124, 104],
+    [244, 242, 238],
+];
+
+static RAMP: LazyLock<Vec<Linear>> = LazyLock::new(|| (0..2048).map(|i| ramp_at(i as f64 / 2047.0)).collect());
+
+fn ramp_at(t: f64) -> Linear {
+    let position = t * (RAMP_STOPS.len() - 1) as f64;
+    let (i, rest) = (position.floor().min((RAMP_STOPS.len() - 2) as f64), position.fract());
+    let rest = if i < position.floor() { 1.0 } else { rest };
+    let (a, b) = (RAMP_STOPS[i as usize], RAMP_STOPS[i as usize + 1]);
+    [0, 1, 2].map(|k| {
+        let encoded = a[k] as f64 * (1.0 - rest) + b[k] as f64 * rest;
+        (decode(encoded / 255.0) * 65535.0).round() as u16
+    })
+}
+
+/// sRGB colours of the standard classes 0 to 22 of LAS 1.4.
+const CLASS_COLORS: [[u8; 3]; 23] = [
+    [170, 170, 170], // never classified
+    [190, 190, 190], // unclassified
+    [166, 124, 82],  // ground
+    [160, 200, 110], // low vegetation
+    [96, 168, 80],   // medium vegetation
+    [44, 122, 60],   // high vegetation
+    [214, 96, 72],   // building
+    [240, 60, 200],  // low noise
+    [222, 196, 120], // model key point
+    [72, 132, 204],  // water
+    [120, 110, 130], // rail
+    [110, 110, 116], // road surface
+    [200, 180, 160], // overlap
+    [236, 206, 70],  // wire guard
+    [246, 174, 54],  // wire conductor
+    [150, 80, 150],  // transmission tower
+    [250, 130, 40],  // wire connector
+    [150, 140, 150], // bridge deck
+    [255, 40, 160],  // high noise
+    [130, 150, 170], // overhead structure
+    [120, 90, 60],   // ignored ground
+    [226, 236, 246], // snow
+    [200, 150, 200], // temporal exclusion
+];
+
+const OTHER_CLASS: [u8; 3] = [150, 160, 180];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eight_bit_values_mean_what_their_sixteen_bit_twins_mean() {
+        let (eight, sixteen) = (Coloring::Rgb { eight_bit: true }, Coloring::Rgb { eight_bit: false });
+        for v in 0..=255 {
+            assert_eq!(eight.color(0, [v, 0, 255], 0), sixteen.color(0, [v * 257, 0, 65535], 0));
+        }
+        assert_eq!(eight.color(0, [0, 255, 188], 0), [0, 65535, 32957]);
+    }
+
+    #[test]
+    fn linear_and_back_is_the_same_byte() {
+        for v in 0..=255 {
+            // Twelve bits of linear light cannot tell the darkest bytes apart.
+            let tolerance = if v < 24 { 2 } else { 0 };
+            assert!(to_srgb(decode_byte(v)).abs_diff(v) <= tolerance, "{v}");
+        }
+    }
+
+    #[test]
+    fn the_ramp_goes_from_the_lowest_to_the_highest() {
+        let ramp = Coloring::Elevation { low: -100, high: 2_000_000_000 };
+        let color = |z| ramp.color(z, [0; 3], 0);
+        assert_eq!(color(-100), RAMP_STOPS[0].map(decode_byte));
+        assert_eq!(color(2_000_000_000), RAMP_STOPS[6].map(decode_byte));
+        assert_eq!(color(i32::MIN), color(-100));
+        assert_ne!(color(0), color(1_000_000_000));
+        let flat = Coloring::Elevation { low: 5, high: 5 };
+        assert_eq!(flat.color(5, [0; 3], 0), RAMP_STOPS[0].map(decode_byte));
+    }
+
+    #[test]
+    fn every_class_has_a_colour() {
+        let color = |class| Coloring::Class.color(0, [0; 3], class);
+        assert_ne!(color(2), color(9));
+        assert_eq!(color(65), color(255));
+    }
+}

@@ -1,0 +1,183 @@
+//! Where lattice integers lie in a glTF scene: metres, Y up, every coordinate on one power-of-two step.
+//!
+//! A vertex is `translation + position`, a node's translation and an f32 of its mesh. Both are whole multiples of the
+//! job's steps, so their sum in f64 is exact and depends on the lattice integers alone: a vertex that several tiles
+//! share has the same bits in all of them. A step is at most half the lattice step, so rounding finds the integer again;
+//! it is finer, and positions truer, where the job is small enough for f32.
+
+use rust_decimal::Decimal;
+use serde::{Deserialize, Serialize};
+
+use crate::geometry::lattice::Lattice;
+use crate::{Error, Result};
+
+/// An f32 holds every whole number of steps up to this.
+const F32_STEPS: i64 = 1 << 24;
+
+/// Translations are multiples of this many steps. Steps from the origin stay below 2^39 (2^31 lattice integers, 256 steps
+/// each), so that a translation has at most 24 binary digits and is exact in readers that hold it as f32.
+const TRANSLATION_STEPS: i64 = 1 << 16;
+
+/// Half the extent, in steps, of the widest mesh that one translation can serve, wherever it lies.
+pub(super) const PART_REACH: i64 = F32_STEPS - TRANSLATION_STEPS / 2;
+
+/// Steps are refined below half the resolution by at most this factor, and not below [`FINE_STEP`].
+const REFINEMENT: f64 = 64.0;
+
+/// Metres.
+const FINE_STEP: f64 = 1.0 / 4096.0;
+
+/// Lattice steps in metres beyond these bounds are no terrain and would leave the range of f32.
+const RESOLUTION_BOUNDS: std::ops::Range<f64> = 1e-12..1e12;
+
+/// What a reader needs to get from a glTF scene back to the source, as written to `scenes[0].extras`:
+/// x = `offset[0]` + gx / `metres_per_unit`, y = `offset[1]` - gz / `metres_per_unit`,
+/// z = `offset[2]` + gy / `metres_per_unit_z`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Extras {
+    /// Source coordinates x, y, z of the scene's origin.
+    pub offset: [f64; 3],
+    /// Lattice step in x and y, source units.
+    pub resolution: f64,
+    /// Lattice step in z, source units.
+    pub resolution_z: f64,
+    /// Metres in a source unit of x and y.
+    pub metres_per_unit: f64,
+    /// Metres in a source unit of z.
+    pub metres_per_unit_z: f64,
+    /// Coordinate reference system as WKT.
+    pub crs: Option<String>,
+}
+
+/// The way from lattice integers to glTF metres: a pure function of the job, the same in every tile.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    extras: Extras,
+    horizontal: Scale,
+    vertical: Scale,
+}
+
+/// One kind of axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Scale {
+    /// Metres in a glTF step, a power of two.
+    step: f64,
+    /// glTF steps in a lattice step, at least 2.
+    ratio: f64,
+}
+
+impl Scale {
+    fn new(resolution: f64, name: &str) -> Result<Scale> {
+        if !RESOLUTION_BOUNDS.contains(&resolution) {
+            return Err(Error::Config(format!(
+                "a lattice step of {resolution:e} metres in {name} is out of range: set [input] unit and resolution"
+            )));
+        }
+        let step = (resolution / 2.0).log2().floor().exp2();
+        Ok(Scale { step, ratio: resolution / step })
+    }
+
+    /// As fine as a mesh that spans so many lattice steps allows, within reason.
+    fn refined(self, lattice_steps: i64) -> Scale {
+        let resolution = self.ratio * self.step;
+        let spanning = (lattice_steps as f64 * resolution / (2 * PART_REACH) as f64).log2().ceil().exp2();
+        let step = self.step.min(spanning.max(FINE_STEP).max(self.step / REFINEMENT));
+        Scale { step, ratio: resolution / step }
+    }
+
+    /// The glTF steps of lattice integer `i`: a whole number below 2^39.
+    #[inline(always)]
+    fn steps(&self, i: i32) -> f64 {
+        nearest(i as f64 * self.ratio)
+    }
+}
+
+/// `value` rounded to the nearest whole number, for magnitudes below 2^51; vectorizes on every machine.
+#[inline(always)]
+fn nearest(value: f64) -> f64 {
+    const SHIFT: f64 = 1.5 * (1u64 << 52) as f64;
+    (value + SHIFT) - SHIFT
+}
+
+impl Frame {
+    /// The frame of a job, with steps of about half the lattice's. `metres_per_unit` is for x and y, `metres_per_unit_z` for z, `crs` is WKT.
+    ///
+    /// Fails where a lattice step in metres is not a positive number of a sensible size.
+    pub fn new(lattice: &Lattice, metres_per_unit: f64, metres_per_unit_z: f64, crs: Option<String>) -> Result<Frame> {
+        let [x, y, z] = lattice.offset;
+        let extras = Extras {
+            offset: [number(x), number(y), number(z)],
+            resolution: number(lattice.resolution),
+            resolution_z: number(lattice.resolution_z),
+            metres_per_unit,
+            metres_per_unit_z,
+            crs,
+        };
+        let horizontal = Scale::new(extras.resolution * metres_per_unit, "x and y")?;
+        let vertical = Scale::new(extras.resolution_z * metres_per_unit_z, "z")?;
+        Ok(Frame { extras, horizontal, vertical })
+    }
+
+    /// The frame with finer steps, so that positions are truer, as far as a triangle across a job within these least and
+    /// greatest lattice integers x, y, z can still be written. All tiles of a job need the same frame.
+    pub fn refined(self, bounds: [[i32; 3]; 2]) -> Frame {
+        let [dx, dy, dz] = [0, 1, 2].map(|k| bounds[1][k] as i64 - bounds[0][k] as i64);
+        Frame { horizontal: self.horizontal.refined(dx.max(dy)), vertical: self.vertical.refined(dz), ..self }
+    }
+
+    /// What is written for readers.
+    pub fn extras(&self) -> &Extras {
+        &self.extras
+    }
+
+    /// Metres in a lattice step: in x and y, and in z.
+    pub fn resolution_metres(&self) -> [f64; 2] {
+        let Extras { resolution, resolution_z, metres_per_unit, metres_per_unit_z, .. } = self.extras;
+        [resolution * metres_per_unit, resolution_z * metres_per_unit_z]
+    }
+
+    /// The extent in metres, in x or y and in z, up to which a triangle can always be written exactly. Where the whole
+    /// job is smaller than this, no tile can fail.
+    pub fn longest_triangle(&self) -> [f64; 2] {
+        [self.horizontal.step, self.vertical.step].map(|step| 2.0 * PART_REACH as f64 * step)
+    }
+
+    /// The glTF coordinates (x, y up, z) of a lattice point in steps: whole numbers.
+    #[inline(always)]
+    pub(super) fn steps(&self, point: [i32; 3]) -> [f64; 3] {
+        let [x, y, z] = point;
+        // 0.0 - y has no negative zero.
+        [self.horizontal.steps(x), self.vertical.steps(z), 0.0 - self.horizontal.steps(y)]
+    }
+
+    /// The glTF coordinates of a lattice point relative to an origin in steps; exact within [`PART_REACH`] of it.
+    #[inline(always)]
+    pub(super) fn local(&self, point: [i32; 3], origin: [f64; 3]) -> [f32; 3] {
+        let [x, y, z] = self.steps(point);
+        let (xy, up) = (self.horizontal.step, self.vertical.step);
+        [((x - origin[0]) * xy) as f32, ((y - origin[1]) * up) as f32, ((z - origin[2]) * xy) as f32]
+    }
+
+    /// The glTF world position in metres of a lattice point, exactly as every tile has it.
+    pub fn world(&self, point: [i32; 3]) -> [f64; 3] {
+        self.metres(self.steps(point))
+    }
+
+    /// Steps as metres.
+    pub(super) fn metres(&self, steps: [f64; 3]) -> [f64; 3] {
+        [steps[0] * self.horizontal.step, steps[1] * self.vertical.step, steps[2] * self.horizontal.step]
+    }
+}
+
+/// A place where translations may lie, in steps, nearest to the middle between `low` and `high`.
+pub(super) fn origin_between(low: [f64; 3], high: [f64; 3], grid: i64) -> [f64; 3] {
+    [0, 1, 2].map(|k| (nearest((low[k] + high[k]) * 0.5 / grid as f64)) * grid as f64 + 0.0)
+}
+
+/// The finest grid for [`origin_between`].
+pub(super) const FINE_GRID: i64 = TRANSLATION_STEPS;
+
+/// The nearest f64. A lattice offset may have more digits: what an f64 loses of it is far below any lattice step.
+fn number(exact: Decimal) -> f64 {
+    exact.to_string().parse().expect("the text of a decimal is that of a number")
+}

@@ -1,0 +1,17 @@
+//! Terrain out: glTF tiles, one scene of all tiles, the georeference and a picture.
+//!
+//! [`frame::Frame`] says where a lattice point lies in a glTF scene; everything that writes or reads positions asks it.
+
+pub mod color;
+pub mod frame;
+pub mod georeference;
+pub mod glb;
+pub mod normals;
+mod parts;
+pub mod picture;
+pub mod preview;
+pub mod read;
+pub mod terrain;
+mod tile;
+
+pub use tile::Tile;

@@ -1,0 +1,111 @@
+//! A terrain made up from a seed, to try things on and to test with: hills with a lake, scanned in rows as from an
+//! aircraft, with classes and colours.
+
+use crate::{Error, Result};
+use las::point::{Classification, Format};
+use las::{Builder, Color, Point, Transform, Vector, Vlr, Writer};
+use std::f64::consts::TAU;
+use std::path::Path;
+
+/// Points a square metre.
+const DENSITY: f64 = 4.0;
+/// UTM coordinates of the south-west corner.
+const CORNER: [f64; 2] = [565_000.0, 5_933_000.0];
+/// Metres a step.
+const SCALE: f64 = 0.01;
+/// The level of the lake.
+const WATER: f64 = 41.0;
+
+/// ETRS89 / UTM zone 32N in the well-known text of OGC 01-009.
+const CRS: &str = "PROJCS[\"ETRS89 / UTM zone 32N\",GEOGCS[\"ETRS89\",DATUM[\"European_Terrestrial_Reference_System_1989\",\
+SPHEROID[\"GRS 1980\",6378137,298.257222101]],PRIMEM[\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433]],\
+PROJECTION[\"Transverse_Mercator\"],PARAMETER[\"latitude_of_origin\",0],PARAMETER[\"central_meridian\",9],\
+PARAMETER[\"scale_factor\",0.9996],PARAMETER[\"false_easting\",500000],PARAMETER[\"false_northing\",0],\
+UNIT[\"metre\",1],AUTHORITY[\"EPSG\",\"25832\"]]";
+
+/// Writes `points` points of the terrain of `seed` to `path`, LAZ if it ends so, else LAS.
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be written.
+pub fn write(path: &Path, points: u64, seed: u64) -> Result<()> {
+    if let Some(parent) = path.parent().filter(|p| !p.as_os_str().is_empty()) {
+        std::fs::create_dir_all(parent).map_err(Error::io("create the directory", parent))?;
+    }
+    let failed = |e: las::Error| Error::Io { action: "write", path: path.into(), source: std::io::Error::other(e) };
+    let mut writer = Writer::from_path(path, header().map_err(failed)?).map_err(failed)?;
+    let side = (points as f64).sqrt().ceil().max(1.0) as u64;
+    for number in 0..points {
+        writer.write_point(point(number % side, number / side, seed)).map_err(failed)?;
+    }
+    writer.close().map_err(failed)
+}
+
+fn header() -> las::Result<las::Header> {
+    let axis = |offset: f64| Transform { scale: SCALE, offset };
+    let mut builder = Builder::from((1, 4));
+    builder.point_format = Format::new(7)?;
+    builder.transforms = Vector { x: axis(CORNER[0]), y: axis(CORNER[1]), z: axis(0.0) };
+    builder.has_wkt_crs = true;
+    builder.vlrs.push(Vlr {
+        user_id: "LASF_Projection".into(),
+        record_id: 2112,
+        description: "WKT".into(),
+        data: [CRS.as_bytes(), b"\0"].concat(),
+    });
+    builder.generating_software = concat!("gdt-batch ", env!("CARGO_PKG_VERSION")).into();
+    builder.into_header()
+}
+
+fn point(column: u64, row: u64, seed: u64) -> Point {
+    let step = DENSITY.sqrt().recip();
+    let random = |salt: u64| hash(column ^ row << 32, seed.wrapping_add(salt)) as f64 / u64::MAX as f64;
+    let place = [column as f64 + random(1), row as f64 + random(2)].map(|v| v * step);
+    let ground = height(place, seed);
+    let wooded = noise([place[0] / 60.0, place[1] / 60.0], seed ^ 77) > 0.3 && ground > WATER + 2.0;
+    let (z, class, color) = match () {
+        _ if ground < WATER => (WATER, 9, [60, 95, 120]),
+        _ if wooded && random(3) < 0.6 => (ground + 4.0 + 9.0 * random(4), 5, [52, 84, 40]),
+        _ => (ground, 2, [128, 122, 84]),
+    };
+    let shade = 0.85 + 0.3 * random(5);
+    let [red, green, blue] = color.map(|v| (v as f64 * shade) as u16 * 256);
+    Point {
+        x: CORNER[0] + place[0],
+        y: CORNER[1] + place[1],
+        z,
+        classification: Classification::new(class).unwrap_or_default(),
+        color: Some(Color::new(red, green, blue)),
+        gps_time: Some(0.0),
+        return_number: 1,
+        number_of_returns: 1,
+        ..Point::default()
+    }
+}
+
+/// Metres above the datum: a few octaves of noise.
+fn height([x, y]: [f64; 2], seed: u64) -> f64 {
+    let octave = |i: u32| {
+        let wave = 400.0 / f64::from(1 << i);
+        noise([x / wave, y / wave], seed ^ u64::from(i)) * 0.11 * wave
+    };
+    50.0 + (0..7).map(octave).sum::<f64>()
+}
+
+/// Gradient noise between -1 and 1 (Perlin 1985, "An Image Synthesizer").
+fn noise([x, y]: [f64; 2], seed: u64) -> f64 {
+    let (column, row) = (x.floor(), y.floor());
+    let (u, v) = (x - column, y - row);
+    let corner = |i: f64, j: f64| {
+        let angle = hash((column + i) as u64 ^ ((row + j) as u64) << 32, seed) as f64 / u64::MAX as f64 * TAU;
+        angle.cos() * (u - i) + angle.sin() * (v - j)
+    };
+    let fade = |t: f64| t * t * t * (t * (t * 6.0 - 15.0) + 10.0);
+    let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
+    let south = mix(corner(0.0, 0.0), corner(1.0, 0.0), fade(u));
+    let north = mix(corner(0.0, 1.0), corner(1.0, 1.0), fade(u));
+    1.4 * mix(south, north, fade(v))
+}
+
+fn hash(value: u64, seed: u64) -> u64 {
+    xxhash_rust::xxh3::xxh3_64_with_seed(&value.to_le_bytes(), seed)
+}

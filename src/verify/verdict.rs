@@ -1,0 +1,189 @@
+//! What verification found, for people and programs.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use serde::Serialize;
+
+use super::part::Findings;
+use super::rim::{Matched, Vertices};
+use super::{Report, hull};
+use crate::geometry::Site;
+
+/// The figures of a verified mesh, and what does not hold.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Verdict {
+    /// Tile files.
+    pub tiles: u64,
+    /// Distinct vertices.
+    pub sites: u64,
+    /// Triangles of all tiles.
+    pub triangles: u64,
+    /// Edges with a triangle on one side only.
+    pub hull_edges: u64,
+    /// Edges whose two triangles are in different tiles.
+    pub edges_across_tiles: u64,
+    /// Edges whose two triangles have all four corners on one circle.
+    pub ties: u64,
+    /// Says which triangles the mesh has, however it is tiled: 32 hexadecimal digits.
+    pub digest: String,
+    /// What does not hold, in sentences; empty where the mesh is the exact Delaunay triangulation.
+    pub failures: Vec<String>,
+}
+
+impl Verdict {
+    pub(super) fn new(
+        tiles: usize,
+        mut findings: Findings,
+        matched: Matched,
+        vertices: Vertices,
+        report: Report,
+        names: &[String],
+    ) -> Verdict {
+        let mut verdict = Verdict {
+            tiles: tiles as u64,
+            sites: findings.inner_sites + vertices.distinct,
+            triangles: findings.triangles,
+            hull_edges: matched.hull.len() as u64,
+            edges_across_tiles: matched.across_tiles,
+            ties: findings.ties + matched.ties,
+            digest: findings.digest.to_string(),
+            failures: Vec::new(),
+        };
+        findings.faults.merge(matched.faults);
+        findings.faults.merge(vertices.faults);
+        verdict.failures = findings.faults.sentences(names);
+        verdict.check_outline(matched.hull, findings.area);
+        verdict.check_numbers(report);
+        verdict
+    }
+
+    /// Whether the tiles are the exact Delaunay triangulation.
+    pub fn holds(&self) -> bool {
+        self.failures.is_empty()
+    }
+
+    fn check_outline(&mut self, edges: Vec<[Site; 2]>, area: i128) {
+        let cross = |[a, b]: &[Site; 2]| a[0] as i128 * b[1] as i128 - a[1] as i128 * b[0] as i128;
+        let enclosed: i128 = edges.iter().map(cross).sum();
+        if let Err(failure) = hull::check(edges) {
+            self.failures.push(failure);
+        }
+        if enclosed != area {
+            self.failures.push(format!(
+                "the triangles have an area of {area} half square lattice steps, the boundary encloses {enclosed}"
+            ));
+        }
+    }
+
+    fn check_numbers(&mut self, report: Report) {
+        let euler = 2 * self.sites as i128 - self.hull_edges as i128 - 2;
+        if self.triangles as i128 != euler {
+            self.failures.push(format!(
+                "{} triangles, where {} sites and {} hull edges make {euler} (Euler)",
+                self.triangles, self.sites, self.hull_edges
+            ));
+        }
+        for (name, here, said) in [("sites", self.sites, report.sites), ("triangles", self.triangles, report.triangles)]
+        {
+            if let Some(said) = said.filter(|&said| said != here) {
+                self.failures.push(format!("{here} {name}, where report.json says {said}"));
+            }
+        }
+    }
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let figures = [
+            ("tiles", self.tiles),
+            ("sites", self.sites),
+            ("triangles", self.triangles),
+            ("hull edges", self.hull_edges),
+            ("edges across tiles", self.edges_across_tiles),
+            ("ties", self.ties),
+        ];
+        for (name, figure) in figures {
+            writeln!(f, "{name:<20}{figure:>34}")?;
+        }
+        writeln!(f, "{:<20}{:>34}", "digest", self.digest)?;
+        for failure in &self.failures {
+            writeln!(f, "FAILS: {failure}")?;
+        }
+        let verdict = if self.holds() { "the exact Delaunay triangulation" } else { "not the Delaunay triangulation" };
+        writeln!(f, "{:<20}{verdict:>34}", "verdict")
+    }
+}
+
+/// What can be wrong in many places.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Fault {
+    Unreadable,
+    OffLattice,
+    NotCounterclockwise,
+    Overused,
+    NotDelaunay,
+    Unused,
+    PlaceDiffers,
+    ShadingDiffers,
+}
+
+impl Fault {
+    fn sentence(self) -> &'static str {
+        match self {
+            Fault::Unreadable => "tiles that cannot be used",
+            Fault::OffLattice => "vertices not on the lattice",
+            Fault::NotCounterclockwise => "triangles not counterclockwise",
+            Fault::Overused => "edges used more than once in one direction",
+            Fault::NotDelaunay => "edges not Delaunay",
+            Fault::Unused => "vertices without a triangle",
+            Fault::PlaceDiffers => "sites at different places in different tiles",
+            Fault::ShadingDiffers => "sites with different normals or colours in different tiles",
+        }
+    }
+}
+
+/// How often every fault was found, with one example: the first of the first tile, so that it is always the same.
+#[derive(Debug, Default)]
+pub(super) struct Faults(BTreeMap<Fault, Sightings>);
+
+#[derive(Debug)]
+struct Sightings {
+    count: u64,
+    tile: u32,
+    example: String,
+}
+
+impl Faults {
+    pub(super) fn note(&mut self, fault: Fault, tile: u32, example: impl FnOnce() -> String) {
+        self.add(fault, 1, tile, example);
+    }
+
+    pub(super) fn merge(&mut self, other: Faults) {
+        for (fault, Sightings { count, tile, example }) in other.0 {
+            self.add(fault, count, tile, || example);
+        }
+    }
+
+    fn add(&mut self, fault: Fault, count: u64, tile: u32, example: impl FnOnce() -> String) {
+        match self.0.get_mut(&fault) {
+            None => {
+                self.0.insert(fault, Sightings { count, tile, example: example() });
+            }
+            Some(known) => {
+                known.count += count;
+                if tile < known.tile {
+                    (known.tile, known.example) = (tile, example());
+                }
+            }
+        }
+    }
+
+    fn sentences(&self, names: &[String]) -> Vec<String> {
+        let sentence = |(fault, seen): (&Fault, &Sightings)| {
+            let name = names.get(seen.tile as usize).map_or("?", String::as_str);
+            format!("{} {}, the first in {name}: {}", seen.count, fault.sentence(), seen.example)
+        };
+        self.0.iter().map(sentence).collect()
+    }
+}

@@ -1,0 +1,91 @@
+//! A file read whole, for tests of the input.
+
+use std::path::Path;
+
+use gdt_batch::Result;
+use gdt_batch::geometry::lattice::{AxisMap, Lattice, REACH};
+use gdt_batch::input::{Point, Rules, Source, Tally, TextOptions, open};
+use rust_decimal::Decimal;
+use rust_decimal::prelude::ToPrimitive;
+
+/// A file, all its points, and the lattice they are on.
+pub(crate) struct Cloud {
+    pub(crate) source: Source,
+    pub(crate) lattice: Lattice,
+    pub(crate) points: Vec<Point>,
+    pub(crate) tally: Tally,
+}
+
+/// A lattice for `source` with its middle in the middle, of the finer of the steps in x and y if that fits.
+pub(crate) fn lattice(source: &Source) -> Lattice {
+    let middle = |axis: usize| {
+        let value = (source.min[axis] + source.max[axis]) / 2.0;
+        Decimal::try_from(value).unwrap_or_default().round()
+    };
+    let extent = (source.max[0] - source.min[0]).max(source.max[1] - source.min[1]);
+    let [x, y] = [source.axes[0].scale, source.axes[1].scale];
+    let fits = extent / x.min(y).to_f64().unwrap() < 2.0 * REACH as f64;
+    let resolution = if fits { x.min(y) } else { x.max(y) };
+    Lattice { offset: [middle(0), middle(1), Decimal::ZERO], resolution, resolution_z: source.axes[2].scale }
+}
+
+pub(crate) fn rules(source: &Source, lattice: &Lattice) -> Rules {
+    let map = |axis: usize| {
+        let own = source.axes[axis];
+        AxisMap::new(own.offset, own.scale, lattice.offset[axis], lattice.step(axis)).unwrap()
+    };
+    Rules { maps: [map(0), map(1), map(2)], classes: [true; 256], bounds: None, first_order: 0, rgb: true }
+}
+
+pub(crate) fn decode(source: &Source, rules: &Rules) -> Result<(Vec<Point>, Tally)> {
+    let (mut points, mut tally) = (Vec::new(), Tally::default());
+    for piece in 0..source.pieces() {
+        tally += source.decode(piece, rules, &mut |slice| {
+            assert!(!slice.is_empty() && slice.len() <= 65_536);
+            points.extend_from_slice(slice);
+            Ok(())
+        })?;
+    }
+    let dropped = tally.withheld + tally.other_class + tally.out_of_bounds + tally.malformed;
+    assert_eq!(tally.read, dropped + tally.kept);
+    assert_eq!(tally.kept, points.len() as u64);
+    assert_eq!(tally.read, source.records);
+    Ok((points, tally))
+}
+
+pub(crate) fn read_with(path: &Path, options: &TextOptions) -> Result<Cloud> {
+    let source = open(path, options)?;
+    let lattice = lattice(&source);
+    let (points, tally) = decode(&source, &rules(&source, &lattice))?;
+    Ok(Cloud { source, lattice, points, tally })
+}
+
+pub(crate) fn read(path: &Path) -> Result<Cloud> {
+    read_with(path, &TextOptions::default())
+}
+
+/// A file of `bytes` under a name with `extension`, gone when dropped.
+pub(crate) fn file(extension: &str, bytes: &[u8]) -> tempfile::TempPath {
+    let file = tempfile::Builder::new().suffix(extension).tempfile().unwrap();
+    std::fs::write(file.path(), bytes).unwrap();
+    file.into_temp_path()
+}
+
+pub(crate) fn read_bytes(extension: &str, bytes: &[u8]) -> Result<Cloud> {
+    read(&file(extension, bytes))
+}
+
+/// Opens and decodes; whatever comes, it must come back.
+pub(crate) fn survives(extension: &str, bytes: &[u8]) {
+    let path = file(extension, bytes);
+    let Ok(source) = open(&path, &TextOptions::default()) else { return };
+    let axis = |axis: usize| {
+        AxisMap::new(Decimal::ZERO, Decimal::ONE, Decimal::ZERO, source.axes[axis].scale.max(Decimal::ONE))
+    };
+    let map = AxisMap::new(Decimal::ZERO, Decimal::ONE, Decimal::ZERO, Decimal::ONE).unwrap();
+    let maps = [0, 1, 2].map(|i| axis(i).unwrap_or(map));
+    let rules = Rules { maps, classes: [true; 256], bounds: None, first_order: 0, rgb: true };
+    for piece in 0..source.pieces().min(64) {
+        let _ = source.decode(piece, &rules, &mut |_| Ok(()));
+    }
+}

@@ -1,0 +1,10 @@
+//! What is written is what was meant: tiles, their borders, the picture, and that verification sees what is wrong.
+
+mod model;
+
+mod joined;
+mod khronos;
+mod picture;
+mod round_trip;
+mod sabotage;
+mod tilings;

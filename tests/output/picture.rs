@@ -1,0 +1,84 @@
+//! The picture covers the terrain, every pixel once.
+
+use gdt_batch::geometry::predicates::orient2d;
+use gdt_batch::output::picture::Picture;
+use gdt_batch::output::preview::{Canvas, Texel};
+use proptest::prelude::*;
+
+use crate::model::{Random, cloud, cut, grid, terrain, utm};
+
+#[test]
+fn a_rectangle_is_covered_wholly_and_once() {
+    let frame = utm();
+    for (columns, rows, step) in [(20, 20, 6_000), (5, 9, 1), (2, 2, 1), (300, 2, 77)] {
+        let mesh = terrain(&frame, &grid(columns, rows, step));
+        let canvas = Canvas::new(&frame, mesh.bounds().unwrap());
+        let [width, height] = canvas.size();
+        let mut pixels: Vec<u32> = canvas.draw(&mesh).iter().map(|texel| texel.pixel).collect();
+        pixels.sort_unstable();
+        // The last column or row may have its centre outside.
+        assert!((1599..=1600).contains(&width.max(height)));
+        let covered: Vec<u32> =
+            (0..width * height).filter(|i| i % width + 1 < width && i / width + 1 < height).collect();
+        let inner: Vec<u32> = pixels.iter().copied().filter(|p| covered.binary_search(p).is_ok()).collect();
+        assert!(inner == covered, "{} of {} pixels", inner.len(), covered.len());
+        assert!(pixels.windows(2).all(|pair| pair[0] < pair[1]), "a pixel twice");
+    }
+}
+
+#[test]
+fn the_picture_is_a_png_of_its_size() {
+    let frame = utm();
+    let mesh = terrain(&frame, &cloud(31, 300, 50_000));
+    let canvas = Canvas::new(&frame, mesh.bounds().unwrap());
+    let mut picture = Picture::new(&canvas);
+    picture.add(0, &canvas.draw(&mesh));
+    let png = picture.png();
+    let mut reader = png::Decoder::new(std::io::Cursor::new(&png)).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    reader.next_frame(&mut pixels).unwrap();
+    assert_eq!([reader.info().width, reader.info().height], canvas.size());
+    let seen = pixels.chunks_exact(4).filter(|pixel| pixel[3] == 255).count();
+    assert_eq!(seen, canvas.draw(&mesh).len());
+}
+
+#[test]
+fn a_slope_to_the_light_is_brighter() {
+    let frame = utm();
+    let roof = |x: i32| 300 - (x - 300).abs();
+    let points: Vec<[i32; 3]> = (0..=60).flat_map(|x| [0, 300, 600].map(|y| [10 * x, y, roof(10 * x)])).collect();
+    let mesh = gdt_batch::output::Tile { colors: Some(vec![[30_000; 3]; points.len()]), ..terrain(&frame, &points) };
+    let canvas = Canvas::new(&frame, mesh.bounds().unwrap());
+    let mut picture = Picture::new(&canvas);
+    picture.add(0, &canvas.draw(&mesh));
+    let png = picture.png();
+    let mut reader = png::Decoder::new(std::io::Cursor::new(&png)).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    reader.next_frame(&mut pixels).unwrap();
+    let at = |x: usize, y: usize| pixels[4 * (y * canvas.size()[0] as usize + x)];
+    assert!(at(400, 800) > at(1200, 800) + 40, "{} {}", at(400, 800), at(1200, 800));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(4))]
+
+    #[test]
+    fn tiles_draw_what_the_whole_draws(seed: u64, extent in 3u64..(1 << 29), tiles in 1usize..6) {
+        let frame = utm();
+        let points = cloud(seed, 40, extent);
+        let collinear = points.windows(3).all(|w| orient2d([w[0][0], w[0][1]], [w[1][0], w[1][1]], [w[2][0], w[2][1]]) == 0);
+        prop_assume!(!collinear);
+        let mesh = terrain(&frame, &points);
+        let canvas = Canvas::new(&frame, mesh.bounds().unwrap());
+        let by_pixel = |mut texels: Vec<Texel>| {
+            texels.sort_unstable_by_key(|texel| texel.pixel);
+            texels
+        };
+        let whole = by_pixel(canvas.draw(&mesh));
+        prop_assert!(whole.windows(2).all(|pair| pair[0].pixel < pair[1].pixel));
+        let mut random = Random(seed);
+        let cut = cut(&mesh, tiles, |_| random.below(tiles as u64) as usize);
+        let pieces = by_pixel(cut.iter().rev().flat_map(|tile| canvas.draw(tile)).collect());
+        prop_assert!(pieces == whole);
+    }
+}
