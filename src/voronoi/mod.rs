@@ -1,8 +1,22 @@
 //! The canonical Delaunay triangulation of a leaf by way of its discrete Voronoi diagram: the ten steps of Rong, Tan, Cao and
 //! Stephanus 2008, "Computing Two-dimensional Delaunay Triangulation Using Graphics Hardware", here on one CPU thread.
 //!
-//! [`triangulate`] lists the steps in order. Any of them may go wrong on unlucky input; `accept` proves the result, so
-//! that a fault costs time and never correctness.
+//! [`triangulate`] calls the steps in order; each is a file named after it:
+//!
+//! | step | file | what it does here |
+//! |---|---|---|
+//! | G1 | `g1_write_sites` | writes the sites into a texture; losers of a pixel move beside it or are missing |
+//! | G2 | `g2_voronoi` | labels each pixel with its nearest site, a row at a time |
+//! | G4-G6 | `g6_triangles` | makes triangles, linked, where colours meet; while the row is in the cache, C2's tests and C4's flips |
+//! | G3 | `g3_islands` | takes out what pieces of torn regions have made |
+//! | C2 | `c2_shift` | mends what is inverted at the sites' true places |
+//! | C1 | `c1_hull` | makes the hull convex |
+//! | C4 | `c4_flip` | flips what could not be flipped earlier |
+//! | C3 | `c3_insert` | inserts what is missing or was taken out, flipping as it goes |
+//! | | `accept` | proves the result |
+//!
+//! Any of them may go wrong on unlucky input; as `accept` proves the result, a fault costs time and never correctness. `sphere`
+//! is the mesh they all work on, and `edges` tests many edges at once.
 
 mod accept;
 mod c1_hull;
@@ -45,7 +59,7 @@ pub enum Rejected {
 /// The steps that [`Counts::nanoseconds`] tells apart.
 pub const STEPS: [&str; 8] = [
     "G1 write sites",
-    "G2-G6 Voronoi, triangles",
+    "G2-G6 Voronoi, triangles, most flips",
     "G3 islands",
     "C2 shift",
     "C1 hull",
@@ -111,7 +125,8 @@ impl Scratch {
     }
 }
 
-/// The canonical Delaunay triangulation of `sites`, which must be distinct; the order is free, though south to north is fastest.
+/// The canonical Delaunay triangulation of `sites`, which must be distinct; the order is free: rows from the
+/// south, or any other in which neighbours are close, spare some cache misses.
 /// The mesh's corners are positions in `sites`.
 ///
 /// # Errors
