@@ -11,7 +11,6 @@ use gdt_batch::triangulation::reference;
 use gdt_batch::voronoi::{Counts, STEPS, Scratch, triangulate};
 use spade::{DelaunayTriangulation, Point2, Triangulation};
 use std::path::PathBuf;
-use std::time::Instant;
 
 /// Leaves as a job cuts them by default.
 const LEAF: usize = 50_000;
@@ -89,25 +88,25 @@ fn measure(case: &Case, scratch: &mut Scratch) -> (usize, Counts) {
     let (mut counts, mut by_reference) = (Counts::default(), 0);
     for round in 0..=rounds {
         (counts, by_reference) = (Counts::default(), 0);
-        let start = Instant::now();
+        let start = cpu_time();
         for leaf in &case.leaves {
             by_reference += kernel(leaf, scratch, &mut counts);
         }
-        let kernel_time = start.elapsed();
-        let start = Instant::now();
+        let kernel_time = cpu_time() - start;
+        let start = cpu_time();
         for leaf in &spade_leaves {
             let mesh = DelaunayTriangulation::<Point2<f64>>::bulk_load(leaf.clone()).expect("finite");
             std::hint::black_box(mesh.num_inner_faces());
         }
-        let spade_time = start.elapsed();
-        let start = Instant::now();
+        let spade_time = cpu_time() - start;
+        let start = cpu_time();
         for leaf in &delaunator_leaves {
             std::hint::black_box(delaunator::triangulate(leaf));
         }
         // The first round warms up.
         if round > 0 {
-            for (times, time) in times.iter_mut().zip([kernel_time, spade_time, start.elapsed()]) {
-                times.push(time.as_nanos() as f64 / sites as f64);
+            for (times, time) in times.iter_mut().zip([kernel_time, spade_time, cpu_time() - start]) {
+                times.push(time / sites as f64);
             }
         }
     }
@@ -159,6 +158,12 @@ fn print_steps(totals: &[(String, (usize, Counts))]) {
         }
         println!("  (islands {}, inverted {}, moved {})", counts.islands, counts.inverted, counts.moved);
     }
+}
+
+/// Nanoseconds this thread has run, so that other work on the machine counts as little as possible.
+fn cpu_time() -> f64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    time.tv_sec as f64 * 1e9 + time.tv_nsec as f64
 }
 
 fn median(mut times: Vec<f64>) -> f64 {

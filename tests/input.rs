@@ -13,9 +13,10 @@ use std::path::PathBuf;
 use cloud::{Cloud, decode, file, lattice, read, read_bytes, rules, survives};
 use gdt_batch::Error;
 use gdt_batch::geometry::lattice::REACH;
-use gdt_batch::input::{Point, TextOptions, Unit, open};
+use gdt_batch::input::{Point, Tally, TextOptions, Unit, open};
 use las_file::{LasFile, points_at};
 use proptest::prelude::*;
+use rayon::prelude::*;
 
 /// What is known of a real file: name, bounds of x, y, z, points by class, greatest colour.
 type Known = (&'static str, [[f64; 2]; 3], &'static [(u8, usize)], u16);
@@ -113,14 +114,27 @@ fn real_files_hold_what_is_known_of_them() {
 }
 
 #[test]
-fn the_big_file_is_whole() {
+fn the_big_file_is_whole_when_many_threads_decode_it() {
     let Some(shared) = common::shared() else { return };
     let source = open(&shared.join("data/autzen.laz"), &TextOptions::default()).unwrap();
     let rules = rules(&source, &lattice(&source));
-    assert_eq!((source.records, source.pieces() > 100), (10_653_336, true));
-    let tally = source.decode(source.pieces() - 1, &rules, &mut |_| Ok(())).unwrap();
-    assert_eq!((tally.kept, tally.malformed), (tally.read, 0));
-    assert_eq!((source.crs.horizontal, source.has_rgb), (Unit::Foot, true));
+    let decode = |piece: usize| {
+        let mut order = None;
+        let check = &mut |points: &[Point]| {
+            assert!(points.windows(2).all(|pair| pair[0].order() + 1 == pair[1].order()));
+            assert!(order.is_none_or(|last| last + 1 == points[0].order()));
+            order = points.last().map(Point::order);
+            Ok(())
+        };
+        source.decode(piece, &rules, check).unwrap()
+    };
+    let sum = |mut a: Tally, b: Tally| {
+        a += b;
+        a
+    };
+    let tally = (0..source.pieces()).into_par_iter().map(decode).reduce(Tally::default, sum);
+    assert_eq!((tally.kept, tally.malformed, tally.max_rgb), (10_653_336, 0, 255));
+    assert_eq!((source.records, source.crs.horizontal), (10_653_336, Unit::Foot));
 }
 
 #[test]
@@ -195,6 +209,8 @@ fn bad_files_are_read_as_far_as_they_go_or_refused() {
         let cloud = bad(name).unwrap();
         assert_eq!((cloud.tally.kept, cloud.tally.malformed), (kept, malformed), "{name}");
         assert!(words.is_empty() == cloud.tally.examples.is_empty(), "{name}");
+        let known_missing = if words.contains("missing") { malformed } else { 0 };
+        assert_eq!(cloud.source.missing, known_missing, "{name}");
         assert!(words.is_empty() || cloud.tally.examples[0].contains(words), "{name}: {:?}", cloud.tally.examples);
     }
     for (name, words) in [("git-lfs-pointer.laz", "git lfs pull"), ("badheader.txt", "names 2 columns x")] {
@@ -261,6 +277,17 @@ fn every_point_format_is_read_plain_and_compressed() {
 }
 
 #[test]
+fn files_without_points_have_no_pieces() {
+    for format in [1, 7] {
+        let file = LasFile::new(4, format, 0, 0);
+        for bytes in [file.las(), file.laz(&[50], false), file.laz(&[50], true)] {
+            let cloud = read_bytes(".laz", &bytes).unwrap();
+            assert_eq!((cloud.source.records, cloud.source.pieces(), cloud.tally.read), (0, 0, 0));
+        }
+    }
+}
+
+#[test]
 fn chunks_are_found_without_their_table() {
     let unfinished = |mut bytes: Vec<u8>| {
         let at = points_at(&bytes);
@@ -277,6 +304,38 @@ fn chunks_are_found_without_their_table() {
     let pointwise = LasFile::new(2, 3, 0, 1000);
     let error = read_bytes(".laz", &unfinished(pointwise.laz(&[10, 400, 590], true))).err().unwrap();
     assert!(error.exit_code() == 3 && error.to_string().contains("lost the table"), "{error}");
+}
+
+#[test]
+fn a_wrong_table_is_not_trusted() {
+    for (format, minor) in [(3, 2), (7, 4)] {
+        let file = LasFile::new(minor, format, 0, 1000);
+        let sound = file.laz(&[300], false);
+        let at = points_at(&sound);
+        let table = u64::from_le_bytes(sound[at..at + 8].try_into().unwrap()) as usize;
+        let mut too_many = sound.clone();
+        too_many[table + 4..table + 8].copy_from_slice(&u32::MAX.to_le_bytes());
+        let mut too_far = sound.clone();
+        too_far[table + 8..].fill(0x5a);
+        for (bytes, words) in [(too_many, "claims 4294967295 chunks"), (too_far, "beyond the points")] {
+            let cloud = assert_reads(&file, words, &bytes);
+            assert!(cloud.source.warnings[0].contains(words), "{:?}", cloud.source.warnings);
+        }
+    }
+}
+
+#[test]
+fn a_damaged_chunk_costs_its_own_points_alone() {
+    let file = LasFile::new(4, 7, 0, 1000);
+    let mut bytes = file.laz(&[300], false);
+    let whole = read_bytes(".laz", &bytes).unwrap().points;
+    // The first layer of the first chunk, after its first point and its number of points, becomes far too long.
+    let at = points_at(&bytes) + 8 + file.length() as usize + 4;
+    bytes[at..at + 4].copy_from_slice(&u32::MAX.to_le_bytes());
+    let cloud = read_bytes(".laz", &bytes).unwrap();
+    assert!(cloud.tally.malformed == 300 && cloud.tally.examples[0].contains("chunk 0 is damaged"));
+    let rest: Vec<Point> = whole.into_iter().filter(|point| point.order() >= 300).collect();
+    assert_eq!(cloud.points, rest);
 }
 
 #[test]

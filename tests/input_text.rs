@@ -88,8 +88,14 @@ fn options_overrule_what_would_be_detected() {
         let error = read_with(&path, &options).err().unwrap();
         assert!(error.exit_code() == 2 && error.to_string().contains(words), "{error}");
     }
-    let options = TextOptions { delimiter: Some('7'), ..TextOptions::default() };
-    assert_eq!(read_with(&path, &options).err().unwrap().exit_code(), 2);
+    let delimiter = TextOptions { delimiter: Some('7'), ..TextOptions::default() };
+    let comment = TextOptions { comment: Some("7".to_string()), ..TextOptions::default() };
+    for options in [delimiter, comment] {
+        assert_eq!(read_with(&path, &options).err().unwrap().exit_code(), 2);
+    }
+    let path = file(".csv", b"-- x y z\n-1 2 3\n");
+    let options = TextOptions { comment: Some("--".to_string()), ..TextOptions::default() };
+    assert_eq!(coordinates(&read_with(&path, &options).unwrap()), [[-1.0, 2.0, 3.0]]);
 }
 
 #[test]
@@ -119,6 +125,7 @@ fn what_is_no_table_is_refused() {
         ("hello world\nnothing here\n", "names no column x"),
         ("a\0b", "neither LAS nor LAZ nor UTF-8"),
         ("x,y\n1,2\n", "names no column z"),
+        ("1,5;2,5;3,5\n1,5;2,5;3,5\n", "a point before their decimals"),
     ] {
         let error = text(content).err().unwrap_or_else(|| panic!("{content:?} was read"));
         assert!(error.exit_code() == 3 && error.to_string().contains(words), "{content:?}: {error}");

@@ -21,7 +21,7 @@ pub(super) struct Records {
     layout: Layout,
     points_at: u64,
     /// Whole records that the file holds.
-    pub(super) whole: u64,
+    whole: u64,
     /// Records that the header promises and the file does not hold.
     pub(super) missing: u64,
 }

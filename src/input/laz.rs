@@ -37,7 +37,7 @@ pub(super) struct Chunks {
     chunks: Vec<Chunk>,
     pieces: Vec<Range<usize>>,
     /// Records that the header promises and no chunk holds.
-    missing: u64,
+    pub(super) missing: u64,
 }
 
 /// How the records of a file are compressed.

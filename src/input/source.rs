@@ -63,6 +63,8 @@ pub struct Source {
     pub point_format: Option<u8>,
     /// The number of records, those included that the file promises and does not have.
     pub records: u64,
+    /// How many of them the file is known not to have; decoding counts these as malformed.
+    pub missing: u64,
     /// Least x, y, z: of all points for text, what the header claims for LAS (often wrong).
     pub min: [f64; 3],
     /// Greatest x, y, z, likewise.
@@ -133,11 +135,17 @@ fn open_las(file: &Positioned) -> Result<Source> {
     let (header, mut warnings) = Header::read(file)?;
     let vlrs = vlr::list(file, &header, &mut warnings)?;
     let crs = crs::read(file, &vlrs, &mut warnings)?;
-    let body = if header.compressed {
-        Body::Laz(Chunks::read(file, &header, &vlrs, &mut warnings)?)
+    let (missing, body) = if header.compressed {
+        let chunks = Chunks::read(file, &header, &vlrs, &mut warnings)?;
+        (chunks.missing, Body::Laz(chunks))
     } else {
-        Body::Las(Records::new(&header, file.size()))
+        let records = Records::new(&header, file.size());
+        (records.missing, Body::Las(records))
     };
+    if missing > 0 {
+        let held = header.records - missing;
+        warnings.push(format!("the header promises {} points, but the file has only {held}", header.records));
+    }
     Ok(Source {
         path: file.path().to_path_buf(),
         size: file.size(),
@@ -145,6 +153,7 @@ fn open_las(file: &Positioned) -> Result<Source> {
         version: Some([1, header.minor]),
         point_format: Some(header.format),
         records: header.records,
+        missing,
         min: header.min,
         max: header.max,
         axes: header.axes,
@@ -166,6 +175,7 @@ fn open_text(file: &Positioned, options: &TextOptions) -> Result<Source> {
         version: None,
         point_format: None,
         records: table.records,
+        missing: 0,
         min: table.min,
         max: table.max,
         axes: table.axes(),

@@ -80,23 +80,26 @@ pub fn close(mesh: &Mesh, sites: &[Site], cell: Option<&Cell>, covered: impl Fn(
     let states: Vec<State> = mesh.triangles.iter().enumerate().map(state).collect();
     let mut closing = Closing { states, frontier: Vec::new(), boundary: Vec::new() };
     if cell.is_some() {
-        let position = closing.find_frontier(mesh, sites.len());
-        closing.find_boundary(mesh, &position);
+        let hull: Vec<u32> = (0..).zip(&mesh.twins).filter(|(_, twin)| **twin == HULL).map(|(h, _)| h).collect();
+        let position = closing.find_frontier(mesh, &hull, sites.len());
+        closing.find_boundary(mesh, &hull, &position);
     }
     closing
 }
 
 impl Closing {
+    fn open_triangles(&self) -> impl Iterator<Item = u32> {
+        (0..).zip(&self.states).filter(|(_, state)| **state == State::Open).map(|(triangle, _)| triangle)
+    }
+
     /// Fills `frontier`; returns the position of every site in it.
-    fn find_frontier(&mut self, mesh: &Mesh, sites: usize) -> Vec<u32> {
+    fn find_frontier(&mut self, mesh: &Mesh, hull: &[u32], sites: usize) -> Vec<u32> {
         // Without a triangle every site lies on the hull.
         let mut position = vec![if mesh.triangles.is_empty() { 0 } else { u32::MAX }; sites];
-        for (corners, state) in mesh.triangles.iter().zip(&self.states) {
-            if *state == State::Open {
-                corners.iter().for_each(|&v| position[v as usize] = 0);
-            }
+        for triangle in self.open_triangles() {
+            mesh.triangles[triangle as usize].iter().for_each(|&v| position[v as usize] = 0);
         }
-        for h in (0..mesh.twins.len() as u32).filter(|&h| mesh.twins[h as usize] == HULL) {
+        for &h in hull {
             position[mesh.origin(h) as usize] = 0;
             position[mesh.destination(h) as usize] = 0;
         }
@@ -107,13 +110,13 @@ impl Closing {
         position
     }
 
-    fn find_boundary(&mut self, mesh: &Mesh, position: &[u32]) {
-        for (h, &twin) in mesh.twins.iter().enumerate() {
-            let open_beyond = twin == HULL || self.states[twin as usize / 3] == State::Open;
-            if self.states[h / 3] != State::Open && open_beyond {
-                let ends = [mesh.origin(h as u32), mesh.destination(h as u32)];
-                self.boundary.push(ends.map(|v| position[v as usize]));
-            }
-        }
+    /// Fills `boundary`: the edges of closed ground that open triangles see from outside, and those on the hull.
+    fn find_boundary(&mut self, mesh: &Mesh, hull: &[u32], position: &[u32]) {
+        let is_open = |h: u32| self.states[h as usize / 3] == State::Open;
+        let seen = self.open_triangles().flat_map(|t| 3 * t..3 * t + 3).map(|h| mesh.twins[h as usize]);
+        let inner = seen.filter(|&h| h != HULL && !is_open(h));
+        let outer = hull.iter().copied().filter(|&h| !is_open(h));
+        let ends = |h: u32| [mesh.origin(h), mesh.destination(h)].map(|v| position[v as usize]);
+        self.boundary = inner.chain(outer).map(ends).collect();
     }
 }

@@ -22,12 +22,13 @@ impl ColumnWriter {
         self
     }
 
-    /// Writes the file, whole or not at all.
+    /// Writes the file, whole or not at all; returns its size in bytes.
     ///
     /// # Errors
     /// [`Error::Io`] if that fails.
-    pub fn write(self, path: &Path) -> Result<()> {
-        write_whole(path, |file| file.write_all(&self.bytes))
+    pub fn write(self, path: &Path) -> Result<u64> {
+        write_whole(path, |file| file.write_all(&self.bytes))?;
+        Ok(self.bytes.len() as u64)
     }
 }
 
@@ -54,7 +55,7 @@ impl ColumnReader {
     ///
     /// # Errors
     /// [`Error::Io`] if reading fails, [`Error::Broken`] if the file holds less than the column says.
-    pub fn next<T: Pod>(&mut self) -> Result<Vec<T>> {
+    pub fn column<T: Pod>(&mut self) -> Result<Vec<T>> {
         let length = self.length::<T>()?;
         self.take(length)
     }
@@ -63,8 +64,8 @@ impl ColumnReader {
     /// column that is asked for.
     ///
     /// # Errors
-    /// As [`ColumnReader::next`].
-    pub fn next_part<T: Pod>(mut self, first: usize, count: usize) -> Result<Vec<T>> {
+    /// As [`ColumnReader::column`].
+    pub fn column_part<T: Pod>(mut self, first: usize, count: usize) -> Result<Vec<T>> {
         let length = self.length::<T>()?;
         if first.checked_add(count).is_none_or(|end| end > length) {
             return Err(self.broken());

@@ -164,7 +164,11 @@ fn remove_directory(path: &Path) -> Result<()> {
     }
 }
 
-fn remove_file(path: &Path) -> Result<()> {
+/// Removes the file at `path` if there is one.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be removed.
+pub fn remove_file(path: &Path) -> Result<()> {
     match fs::remove_file(path) {
         Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io("remove", path)(e)),
         _ => Ok(()),

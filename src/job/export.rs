@@ -2,7 +2,7 @@
 //! colours, as one GLB; and its pixels of the preview.
 
 use super::columns::ColumnWriter;
-use super::directory::{Directory, write_whole};
+use super::directory::{Directory, remove_file, write_whole};
 use super::records::{Leaf, Rim, RimVertices, SeamTriangle};
 use super::stitch::seam_of;
 use super::tree::Tree;
@@ -51,7 +51,7 @@ impl AddAssign for TileFigures {
     }
 }
 
-/// Writes the GLB of `tile` and its part of the preview.
+/// Writes the GLB of `tile` and its part of the preview, and removes the leaf's file, which nothing needs after that.
 ///
 /// # Errors
 /// [`Error::Io`] on the output or the job directory, [`Error::Config`] if a triangle is too long for f32.
@@ -71,6 +71,7 @@ pub fn run(directory: &Directory, tree: &Tree, tile: usize, look: &Look, canvas:
         write_whole(&directory.tile(tile), |file| file.write_all(&bytes))?;
         (figures.files, figures.bytes) = (1, bytes.len() as u64);
     }
+    remove_file(&directory.leaf(tile))?;
     Ok(figures)
 }
 

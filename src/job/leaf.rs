@@ -24,6 +24,8 @@ pub struct LeafFigures {
     pub duplicates: u64,
     /// Triangles closed in leaves.
     pub triangles: u64,
+    /// Bytes of temporary files.
+    pub bytes: u64,
     /// How the leaves were triangulated.
     pub outcome: Outcome,
 }
@@ -33,6 +35,7 @@ impl AddAssign for LeafFigures {
         self.sites += other.sites;
         self.duplicates += other.duplicates;
         self.triangles += other.triangles;
+        self.bytes += other.bytes;
         self.outcome += other.outcome;
     }
 }
@@ -68,10 +71,11 @@ pub fn run(
     let leaf = leaf_of(&points, closed.map(|(triangle, _)| *triangle).collect());
     let rim = |&site: &u32| Rim { tile: tile as u32, site, position: leaf.positions[site as usize] };
     let frontier = Frontier { sites: closing.frontier.iter().map(rim).collect(), boundary: closing.boundary };
-    rim_draft(&leaf, &closing.frontier).save(directory, tile)?;
-    leaf.save(directory, tile)?;
-    frontier.save(directory, node)?;
-    Ok(LeafFigures { sites: sites.len() as u64, duplicates: dropped, triangles: leaf.triangles.len() as u64, outcome })
+    let bytes = rim_draft(&leaf, &closing.frontier).save(directory, tile)?
+        + leaf.save(directory, tile)?
+        + frontier.save(directory, node)?;
+    let (sites, triangles) = (sites.len() as u64, leaf.triangles.len() as u64);
+    Ok(LeafFigures { sites, duplicates: dropped, triangles, bytes, outcome })
 }
 
 fn leaf_of(points: &[Point], triangles: Vec<[u32; 3]>) -> Leaf {

@@ -92,8 +92,10 @@ fn run_steps(config: &Config, progress: Progress, threads: usize, start: Instant
 
     let stage = progress.stage("triangulate", partition.summary.tally.kept, "points");
     let leaves = triangulate(config, &directory, &partition, &stage)?;
+    // From here on the leaves' own files are enough.
+    directory::remove_file(&directory.spill())?;
     stages.push(stage.finish());
-    let temporary = partition.spilled;
+    let temporary = partition.spilled + leaves.bytes;
 
     let look = look(config, &plan, &partition.summary, bounds);
     let tiles = partition.tree.leaves.len();
@@ -252,7 +254,7 @@ fn finish(
 fn draw_picture(directory: &Directory, canvas: &Canvas, tiles: usize) -> Result<Vec<u8>> {
     let mut picture = Picture::new(canvas);
     for tile in 0..tiles {
-        picture.add(tile as u32, &ColumnReader::open(&directory.preview_fragment(tile))?.next::<Texel>()?);
+        picture.add(tile as u32, &ColumnReader::open(&directory.preview_fragment(tile))?.column::<Texel>()?);
     }
     Ok(picture.png())
 }

@@ -43,17 +43,19 @@ pub struct Leaf {
 }
 
 impl Leaf {
-    /// Writes the file of `tile`.
+    /// Writes the file of `tile`; returns its size in bytes.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, directory: &Directory, tile: usize) -> Result<()> {
-        ColumnWriter::default()
-            .push(&self.positions)
-            .push(&self.rgb)
-            .push(&self.class)
-            .push(&self.triangles)
-            .write(&directory.leaf(tile))
+    pub fn save(&self, directory: &Directory, tile: usize) -> Result<u64> {
+        let columns = ColumnWriter::default().push(&self.positions).push(&self.rgb).push(&self.class);
+        // These files are most of what a job writes on its way: corners take two bytes where that is enough.
+        let columns = if self.has_short_corners() {
+            columns.push::<[u16; 3]>(&self.triangles.iter().map(|t| t.map(|v| v as u16)).collect::<Vec<_>>())
+        } else {
+            columns.push(&self.triangles)
+        };
+        columns.write(&directory.leaf(tile))
     }
 
     /// Reads the file of `tile`.
@@ -62,12 +64,22 @@ impl Leaf {
     /// [`crate::Error::Io`], or [`crate::Error::Broken`] if the file is not whole.
     pub fn load(directory: &Directory, tile: usize) -> Result<Leaf> {
         let mut columns = ColumnReader::open(&directory.leaf(tile))?;
-        Ok(Leaf {
-            positions: columns.next()?,
-            rgb: columns.next()?,
-            class: columns.next()?,
-            triangles: columns.next()?,
-        })
+        let mut leaf = Leaf {
+            positions: columns.column()?,
+            rgb: columns.column()?,
+            class: columns.column()?,
+            triangles: Vec::new(),
+        };
+        leaf.triangles = if leaf.has_short_corners() {
+            columns.column::<[u16; 3]>()?.into_iter().map(|t| t.map(u32::from)).collect()
+        } else {
+            columns.column()?
+        };
+        Ok(leaf)
+    }
+
+    fn has_short_corners(&self) -> bool {
+        self.positions.len() <= 1 << 16
     }
 }
 
@@ -81,11 +93,11 @@ pub struct Frontier {
 }
 
 impl Frontier {
-    /// Writes the file of `node`.
+    /// Writes the file of `node`; returns its size in bytes.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, directory: &Directory, node: usize) -> Result<()> {
+    pub fn save(&self, directory: &Directory, node: usize) -> Result<u64> {
         ColumnWriter::default().push(&self.sites).push(&self.boundary).write(&directory.frontier(node))
     }
 
@@ -95,7 +107,7 @@ impl Frontier {
     /// [`crate::Error::Io`], or [`crate::Error::Broken`] if the file is not whole.
     pub fn load(directory: &Directory, node: usize) -> Result<Frontier> {
         let mut columns = ColumnReader::open(&directory.frontier(node))?;
-        Ok(Frontier { sites: columns.next()?, boundary: columns.next()? })
+        Ok(Frontier { sites: columns.column()?, boundary: columns.column()? })
     }
 }
 
@@ -128,11 +140,11 @@ impl Seam {
         seam
     }
 
-    /// Writes the file of `node`.
+    /// Writes the file of `node`; returns its size in bytes.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, directory: &Directory, node: usize) -> Result<()> {
+    pub fn save(&self, directory: &Directory, node: usize) -> Result<u64> {
         ColumnWriter::default().push(&self.index).push(&self.triangles).write(&directory.seam(node))
     }
 
@@ -142,9 +154,9 @@ impl Seam {
     /// [`crate::Error::Io`], or [`crate::Error::Broken`] if the file is not whole.
     pub fn touching(directory: &Directory, node: usize, tile: usize) -> Result<Vec<SeamTriangle>> {
         let mut columns = ColumnReader::open(&directory.seam(node))?;
-        let index: Vec<[u32; 3]> = columns.next()?;
+        let index: Vec<[u32; 3]> = columns.column()?;
         match index.binary_search_by_key(&(tile as u32), |entry| entry[0]) {
-            Ok(at) => columns.next_part(index[at][1] as usize, index[at][2] as usize),
+            Ok(at) => columns.column_part(index[at][1] as usize, index[at][2] as usize),
             Err(_) => Ok(Vec::new()),
         }
     }
@@ -162,11 +174,11 @@ pub struct RimDraft {
 }
 
 impl RimDraft {
-    /// Writes the file of `tile`.
+    /// Writes the file of `tile`; returns its size in bytes.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, directory: &Directory, tile: usize) -> Result<()> {
+    pub fn save(&self, directory: &Directory, tile: usize) -> Result<u64> {
         ColumnWriter::default().push(&self.sums).push(&self.rgb).push(&self.class).write(&directory.rim_draft(tile))
     }
 
@@ -176,7 +188,7 @@ impl RimDraft {
     /// [`crate::Error::Io`], or [`crate::Error::Broken`] if the file is not whole.
     pub fn load(directory: &Directory, tile: usize) -> Result<RimDraft> {
         let mut columns = ColumnReader::open(&directory.rim_draft(tile))?;
-        Ok(RimDraft { sums: columns.next()?, rgb: columns.next()?, class: columns.next()? })
+        Ok(RimDraft { sums: columns.column()?, rgb: columns.column()?, class: columns.column()? })
     }
 }
 
@@ -199,11 +211,11 @@ pub struct RimVertex {
 pub struct RimVertices(pub Vec<RimVertex>);
 
 impl RimVertices {
-    /// Writes the file of `tile`.
+    /// Writes the file of `tile`; returns its size in bytes.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, directory: &Directory, tile: usize) -> Result<()> {
+    pub fn save(&self, directory: &Directory, tile: usize) -> Result<u64> {
         ColumnWriter::default().push(&self.0).write(&directory.rim(tile))
     }
 
@@ -212,7 +224,7 @@ impl RimVertices {
     /// # Errors
     /// [`crate::Error::Io`], or [`crate::Error::Broken`] if the file is not whole.
     pub fn load(directory: &Directory, tile: usize) -> Result<RimVertices> {
-        Ok(RimVertices(ColumnReader::open(&directory.rim(tile))?.next()?))
+        Ok(RimVertices(ColumnReader::open(&directory.rim(tile))?.column()?))
     }
 
     /// The vertex of `site`.

@@ -53,6 +53,7 @@ pub fn run(config: &Config) -> Result<Plan> {
     if records >= MOST_RECORDS {
         return Err(Error::Config(format!("{records} records are more than one job can hold (2^40)")));
     }
+    enough_is_there(&sources, records, config.input.malformed_share.0)?;
     let crs = common_crs(&sources)?;
     let (unit, metres) = unit_of(config.input.unit, &crs, &mut warnings)?;
     let area = Area::of(&sources, config);
@@ -73,6 +74,22 @@ pub fn run(config: &Config) -> Result<Plan> {
 fn open_all(config: &Config) -> Result<Vec<Source>> {
     let paths = expand(&config.input.files)?;
     paths.par_iter().map(|path| input::open(path, &config.input.csv)).collect()
+}
+
+/// Stops before the first point if files lack more records than are put up with.
+fn enough_is_there(sources: &[Source], records: u64, malformed_share: f64) -> Result<()> {
+    let missing: u64 = sources.iter().map(|s| s.missing).sum();
+    match sources.iter().find(|s| s.missing > 0) {
+        Some(first) if missing as f64 > malformed_share * records as f64 => Err(Error::input(
+            &first.path,
+            format!(
+                "says that it holds {} records, but {} of them are not there: the file is cut off or its header is wrong. Copy it \
+                 again, or raise [input] malformed_share to use what is there",
+                first.records, first.missing
+            ),
+        )),
+        _ => Ok(()),
+    }
 }
 
 /// The files that the patterns name, in their order, each once.

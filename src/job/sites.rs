@@ -49,15 +49,33 @@ fn preferred(a: &Point, b: &Point, rule: Duplicates) -> bool {
     }
 }
 
-/// Strips of a tile in the order of its sites, so that neighbours in the plane are neighbours in memory.
-const STRIPS: i64 = 4;
+/// Sorts by y, then x: neighbours in the plane are neighbours in memory, and the pipeline likes rows.
+fn sort(points: &mut Vec<Point>) {
+    match packed_keys(points) {
+        Some((mut keys, index_bits)) => {
+            keys.sort_unstable();
+            let index = |key: u64| (key & ((1 << index_bits) - 1)) as usize;
+            *points = keys.into_iter().map(|key| points[index(key)]).collect();
+        }
+        None => points.sort_unstable_by_key(|p| (p.position[1], p.position[0])),
+    }
+}
 
-/// Sorts by strip of x, then y, then x.
-fn sort(points: &mut [Point]) {
-    let xs = || points.iter().map(|p| p.position[0] as i64);
-    let (Some(min), Some(max)) = (xs().min(), xs().max()) else { return };
-    let width = (max - min) / STRIPS + 1;
-    points.sort_unstable_by_key(|p| ((p.position[0] as i64 - min) / width, p.position[1], p.position[0]));
+/// For every point its y, its x and its index in one number, and the bits that the index takes: numbers sort several times
+/// faster than points. `None` where the tile is so wide or so full that 64 bits do not hold them.
+fn packed_keys(points: &[Point]) -> Option<(Vec<u64>, u32)> {
+    let first = points.first()?.position;
+    let (min, max) = points.iter().fold((first, first), |(min, max), p| {
+        let p = p.position;
+        ([min[0].min(p[0]), min[1].min(p[1])], [max[0].max(p[0]), max[1].max(p[1])])
+    });
+    let bits = |value: u64| u64::BITS - value.leading_zeros();
+    let along = |p: [i32; 2], axis: usize| (p[axis] as i64 - min[axis] as i64) as u64;
+    let (x_bits, index_bits) = (bits(along(max, 0)), bits(points.len() as u64));
+    let fits = bits(along(max, 1)) + x_bits + index_bits <= u64::BITS;
+    let key =
+        |(i, p): (usize, &Point)| (along(p.position, 1) << x_bits | along(p.position, 0)) << index_bits | i as u64;
+    fits.then(|| (points.iter().enumerate().map(key).collect(), index_bits))
 }
 
 #[cfg(test)]
@@ -69,6 +87,14 @@ mod tests {
             points.iter().enumerate().map(|(i, p)| Point::new([p.0, p.1], p.2, [0; 3], 2, i as u64)).collect();
         keep_one(&mut points, rule);
         points.iter().map(|p| (p.position[0], p.position[1], p.z)).collect()
+    }
+
+    #[test]
+    fn a_tile_too_wide_for_packed_keys_is_sorted_all_the_same() {
+        let points =
+            [(1 << 29, 1 << 29, 1), (-(1 << 29), 1 << 29, 2), (0, -(1 << 29), 3), (0, 0, 4), (1 << 29, 1 << 29, 0)];
+        let kept = keep(&points, Duplicates::Lowest);
+        assert_eq!(kept, [(0, -(1 << 29), 3), (0, 0, 4), (-(1 << 29), 1 << 29, 2), (1 << 29, 1 << 29, 0)]);
     }
 
     #[test]

@@ -29,7 +29,8 @@ pub fn run(directory: &Directory, tree: &Tree, tile: usize, frame: &Frame) -> Re
         rgb: rgb[at],
         class: class[at] as u16,
     };
-    RimVertices(frontier.sites.iter().enumerate().map(finish).collect()).save(directory, tile)
+    RimVertices(frontier.sites.iter().enumerate().map(finish).collect()).save(directory, tile)?;
+    Ok(())
 }
 
 /// All triangles of the seams that touch `tile`.

@@ -123,3 +123,45 @@ const CLASS_COLORS: [[u8; 3]; 23] = [
 ];
 
 const OTHER_CLASS: [u8; 3] = [150, 160, 180];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eight_bit_values_mean_what_their_sixteen_bit_twins_mean() {
+        let (eight, sixteen) = (Coloring::Rgb { eight_bit: true }, Coloring::Rgb { eight_bit: false });
+        for v in 0..=255 {
+            assert_eq!(eight.color(0, [v, 0, 255], 0), sixteen.color(0, [v * 257, 0, 65535], 0));
+        }
+        assert_eq!(eight.color(0, [0, 255, 188], 0), [0, 65535, 32957]);
+    }
+
+    #[test]
+    fn linear_and_back_is_the_same_byte() {
+        for v in 0..=255 {
+            // Twelve bits of linear light cannot tell the darkest bytes apart.
+            let tolerance = if v < 24 { 2 } else { 0 };
+            assert!(to_srgb(decode_byte(v)).abs_diff(v) <= tolerance, "{v}");
+        }
+    }
+
+    #[test]
+    fn the_ramp_goes_from_the_lowest_to_the_highest() {
+        let ramp = Coloring::Elevation { low: -100, high: 2_000_000_000 };
+        let color = |z| ramp.color(z, [0; 3], 0);
+        assert_eq!(color(-100), RAMP_STOPS[0].map(decode_byte));
+        assert_eq!(color(2_000_000_000), RAMP_STOPS[6].map(decode_byte));
+        assert_eq!(color(i32::MIN), color(-100));
+        assert_ne!(color(0), color(1_000_000_000));
+        let flat = Coloring::Elevation { low: 5, high: 5 };
+        assert_eq!(flat.color(5, [0; 3], 0), RAMP_STOPS[0].map(decode_byte));
+    }
+
+    #[test]
+    fn every_class_has_a_colour() {
+        let color = |class| Coloring::Class.color(0, [0; 3], class);
+        assert_ne!(color(2), color(9));
+        assert_eq!(color(65), color(255));
+    }
+}

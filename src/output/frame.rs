@@ -6,10 +6,9 @@
 //! it is finer, and positions truer, where the job is small enough for f32.
 
 use rust_decimal::Decimal;
-use rust_decimal::prelude::ToPrimitive;
 use serde::{Deserialize, Serialize};
 
-use crate::geometry::lattice::{Lattice, shortest_decimal};
+use crate::geometry::lattice::Lattice;
 use crate::{Error, Result};
 
 /// An f32 holds every whole number of steps up to this.
@@ -103,13 +102,13 @@ fn nearest(value: f64) -> f64 {
 impl Frame {
     /// The frame of a job, with steps of about half the lattice's. `metres_per_unit` is for x and y, `metres_per_unit_z` for z, `crs` is WKT.
     ///
-    /// Fails where a unit is not positive, or the lattice has more digits than a JSON number keeps.
+    /// Fails where a lattice step in metres is not a positive number of a sensible size.
     pub fn new(lattice: &Lattice, metres_per_unit: f64, metres_per_unit_z: f64, crs: Option<String>) -> Result<Frame> {
         let [x, y, z] = lattice.offset;
         let extras = Extras {
-            offset: [number(x, "offset of x")?, number(y, "offset of y")?, number(z, "offset of z")?],
-            resolution: number(lattice.resolution, "resolution")?,
-            resolution_z: number(lattice.resolution_z, "resolution of z")?,
+            offset: [number(x), number(y), number(z)],
+            resolution: number(lattice.resolution),
+            resolution_z: number(lattice.resolution_z),
             metres_per_unit,
             metres_per_unit_z,
             crs,
@@ -178,12 +177,7 @@ pub(super) fn origin_between(low: [f64; 3], high: [f64; 3], grid: i64) -> [f64; 
 /// The finest grid for [`origin_between`].
 pub(super) const FINE_GRID: i64 = TRANSLATION_STEPS;
 
-fn number(exact: Decimal, name: &str) -> Result<f64> {
-    let value = exact.to_string().parse::<f64>().ok().or(exact.to_f64()).unwrap_or(f64::NAN);
-    if shortest_decimal(value) == Some(exact.normalize()) {
-        return Ok(value);
-    }
-    Err(Error::Config(format!(
-        "the {name} of the lattice, {exact}, has more digits than a 64-bit float keeps: set [input] resolution"
-    )))
+/// The nearest f64. A lattice offset may have more digits: what an f64 loses of it is far below any lattice step.
+fn number(exact: Decimal) -> f64 {
+    exact.to_string().parse().expect("the text of a decimal is that of a number")
 }

@@ -117,3 +117,57 @@ fn unit(sum: [f64; 3], weights: [f64; 2]) -> [f32; 3] {
     let length = (x * x + y * y + z * z).sqrt();
     if length > 0.0 { [x, y, z].map(|v| (v / length) as f32) } else { [0.0, 0.0, 1.0] }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::lattice::{Lattice, shortest_decimal};
+
+    /// x and y in steps of 2 cm, z in steps of 1 cm.
+    fn frame() -> Frame {
+        let decimal = |v: f64| shortest_decimal(v).unwrap();
+        let lattice = Lattice { offset: [decimal(0.0); 3], resolution: decimal(0.02), resolution_z: decimal(0.01) };
+        Frame::new(&lattice, 1.0, 1.0, None).unwrap()
+    }
+
+    #[test]
+    fn a_slope_of_45_degrees_in_metres() {
+        let positions = [[0, 0, 0], [10, 0, 20], [0, 10, 0], [10, 10, 20]];
+        for normal in Sums::new(&positions, &[[0, 1, 2], [1, 3, 2]]).finish(&frame()) {
+            assert_eq!(normal, [-std::f32::consts::FRAC_1_SQRT_2, 0.0, std::f32::consts::FRAC_1_SQRT_2]);
+        }
+    }
+
+    #[test]
+    fn sums_of_pieces_add_up_in_any_order() {
+        let positions = [[0, 0, 5], [90, 10, 7], [70, 90, -3], [-60, 80, 2], [-40, -50, 11]];
+        let fan = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]];
+        let whole = Sums::new(&positions, &fan).get(0);
+        for split in 0..fan.len() {
+            let (a, b) = fan.split_at(split);
+            let sum = add(Sums::new(&positions, b).get(0), Sums::new(&positions, a).get(0));
+            assert_eq!(sum, whole);
+        }
+        assert_eq!(finish(whole, &frame()), Sums::new(&positions, &fan).finish(&frame())[0]);
+    }
+
+    #[test]
+    fn huge_triangles_do_not_overflow() {
+        let far = 1 << 29;
+        let positions = [[-far, -far, i32::MIN], [far, -far, i32::MAX], [-far, far, i32::MIN], [far, far, i32::MAX]];
+        let sums = Sums::new(&positions, &[[0, 1, 2], [1, 3, 2]]);
+        assert!(matches!(sums, Sums::Wide(_)));
+        assert_eq!(
+            sums.get(1),
+            add(cross(positions[0], positions[1], positions[2]), cross(positions[1], positions[3], positions[2]))
+        );
+        for [x, y, z] in sums.finish(&frame()) {
+            assert!((x * x + y * y + z * z - 1.0).abs() < 1e-6 && x < 0.0 && z > 0.0);
+        }
+    }
+
+    #[test]
+    fn without_triangles_a_normal_is_straight_up() {
+        assert_eq!(finish([0; 3], &frame()), [0.0, 0.0, 1.0]);
+    }
+}

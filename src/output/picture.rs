@@ -63,6 +63,8 @@ impl Picture {
         let mut encoder = png::Encoder::new(&mut bytes, self.width as u32, height as u32);
         encoder.set_color(png::ColorType::Rgba);
         encoder.set_depth(png::BitDepth::Eight);
+        // A tenth of the time for a fifth more bytes.
+        encoder.set_compression(png::Compression::Fast);
         encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
         let written = encoder.write_header().and_then(|mut png| png.write_image_data(pixels.as_flattened()));
         written.expect("a picture of the size it says, into memory");

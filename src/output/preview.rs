@@ -174,7 +174,7 @@ impl<'a> Drawing<'a> {
             (None, face) => face.unwrap_or([0.0, 0.0, 1.0]).map(f64::from),
         };
         let length = normal.iter().map(|v| v * v).sum::<f64>().sqrt();
-        [0, 1].map(|k| (normal[k] / length * 32767.0).round() as i16)
+        [0, 1].map(|k| (normal[k] / length * 32767.0) as i16)
     }
 
     fn color(&self, weights: [i64; 3]) -> [u8; 3] {
@@ -183,7 +183,7 @@ impl<'a> Drawing<'a> {
             Some(colors) => colors[v].map(f64::from),
             None => elevation(self.tile.positions[v][2], low, high).map(f64::from),
         });
-        linear.map(|v| to_srgb(v.round() as u16))
+        linear.map(|v| to_srgb((v + 0.5) as u16))
     }
 
     /// The mean of what the corners have, by the areas opposite them.

@@ -7,7 +7,9 @@ use crate::geometry::{Site, predicates::in_circle};
 ///
 /// Ends always: every flip lowers the surface of the sites lifted to the (symbolically perturbed) paraboloid.
 pub fn legalize(mesh: &mut Mesh, sites: &[Site]) -> u64 {
-    let mut pending: Vec<u32> = (0..mesh.twins.len() as u32).filter(|&h| fails(mesh, sites, h)).collect();
+    let is_first_half = |&h: &u32| mesh.twins[h as usize] > h;
+    let half_edges = (0..mesh.twins.len() as u32).filter(is_first_half);
+    let mut pending: Vec<u32> = half_edges.filter(|&h| fails(mesh, sites, h)).collect();
     let mut flips = 0;
     while let Some(h) = pending.pop() {
         if !fails(mesh, sites, h) {

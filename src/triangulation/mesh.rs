@@ -43,5 +43,5 @@ pub fn next(h: u32) -> u32 {
 /// The half-edge before `h` in its triangle.
 #[inline(always)]
 pub fn previous(h: u32) -> u32 {
-    if h % 3 == 0 { h + 2 } else { h - 1 }
+    if h.is_multiple_of(3) { h + 2 } else { h - 1 }
 }

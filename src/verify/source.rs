@@ -6,7 +6,7 @@ use crate::geometry::lattice::{REACH, shortest_decimal};
 use crate::output::frame::Extras;
 
 /// Whole numbers below this are exact as f64.
-const EXACT: u64 = 1 << 53;
+const EXACT: u128 = 1 << 53;
 
 /// Powers of ten up to this are exact as f64.
 const EXACT_POWER: u32 = 22;
@@ -75,8 +75,8 @@ fn nearest(value: f64) -> f64 {
 /// `world = (base + step * integer) / 10^digits`.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
-    base: i64,
-    step: i64,
+    base: i128,
+    step: i128,
     digits: u32,
     power: f64,
 }
@@ -87,22 +87,22 @@ impl Axis {
         let digits = offset.scale().max(step.scale());
         let whole = |d: Decimal| d.mantissa().checked_mul(10i128.checked_pow(digits - d.scale())?);
         let (base, step) = (whole(offset)?, whole(step)?);
-        let fits = step > 0 && base.abs() < 1 << 62 && step < 1 << 30;
-        fits.then(|| Axis { base: base as i64, step: step as i64, digits, power: 10f64.powi(digits as i32) })
+        let fits = step > 0 && base.abs() < 1 << 120 && step < 1 << 90;
+        fits.then(|| Axis { base, step, digits, power: format!("1e{digits}").parse().unwrap_or(f64::NAN) })
     }
 
     #[inline(always)]
     fn world(&self, integer: i32) -> f64 {
-        let mantissa = self.base + self.step * integer as i64;
+        let mantissa = self.base + self.step * integer as i128;
         if mantissa.unsigned_abs() < EXACT && self.digits <= EXACT_POWER {
             // Both numbers are exact, so the division rounds once.
-            return mantissa as f64 / self.power;
+            return mantissa as i64 as f64 / self.power;
         }
         self.world_from_text(mantissa)
     }
 
     #[cold]
-    fn world_from_text(&self, mantissa: i64) -> f64 {
+    fn world_from_text(&self, mantissa: i128) -> f64 {
         format!("{mantissa}e-{}", self.digits).parse().unwrap_or(f64::NAN)
     }
 }
@@ -119,6 +119,8 @@ mod tests {
         assert_eq!(axis.world(-4 * 5274357), 5269082.787);
         let long = Axis::new(123456789012.3456, 0.0000001).unwrap();
         assert_eq!(long.world(30), "123456789012.345603".parse::<f64>().unwrap());
+        let odd = Axis::new(114.00000000000003, 0.000001).unwrap();
+        assert_eq!(odd.world(-113_000_000), 1.00000000000003);
         assert!(Axis::new(0.0, 0.01).unwrap().world(0).is_sign_positive());
     }
 

@@ -111,7 +111,7 @@ impl fmt::Display for Verdict {
             writeln!(f, "FAILS: {failure}")?;
         }
         let verdict = if self.holds() { "the exact Delaunay triangulation" } else { "not the Delaunay triangulation" };
-        write!(f, "{:<20}{verdict:>34}", "verdict")
+        writeln!(f, "{:<20}{verdict:>34}", "verdict")
     }
 }
 

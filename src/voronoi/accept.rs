@@ -21,9 +21,10 @@
 //! as the tie rule says) makes it the canonical Delaunay triangulation.
 
 use super::Rejected;
-use super::sphere::{OUTSIDE, next, previous};
+use super::edges::Edges;
+use super::sphere::{OUTSIDE, Sphere};
 use crate::geometry::Site;
-use crate::geometry::predicates::{in_circle, orient2d};
+use crate::geometry::predicates::orient2d;
 use crate::triangulation::mesh::{HULL, Mesh};
 
 /// Buffers of the check.
@@ -32,81 +33,99 @@ pub(super) struct Acceptance {
     used: Vec<bool>,
     successor: Vec<u32>,
     hull: Vec<[u32; 2]>,
+    edges: Edges,
+    doubtful: Vec<u32>,
 }
 
 impl Acceptance {
-    /// Checks the compacted triangles in `records` (see `sphere`; `front` is the number of the first) over `sites` and
-    /// writes them to `mesh`, its corners being positions in the input by `order`.
+    /// Checks the compacted triangles of `sphere` over `sites` and writes them to `mesh`, its corners being positions in the
+    /// input by `order`.
     pub(super) fn accept(
         &mut self,
-        records: &[u32],
-        front: u32,
+        sphere: &Sphere,
         sites: &[Site],
         order: &[u32],
         mesh: &mut Mesh,
     ) -> Result<(), Rejected> {
-        let n = order.len();
+        let sites = &sites[..order.len()];
+        let (n, front, records) = (sites.len(), sphere.front() as usize, sphere.records());
+        let triangles = (records.len() - front) / 8;
         self.used.clear();
         self.used.resize(n, false);
         self.hull.clear();
         mesh.triangles.clear();
-        mesh.twins.clear();
-        mesh.triangles.reserve(records.len() / 8);
-        mesh.twins.reserve(records.len() / 8 * 3);
-        for at in (0..records.len()).step_by(8) {
-            let triangle = self.check_triangle(records, at, front, &sites[..n], mesh)?;
-            mesh.triangles.push(triangle.map(|v| order[v as usize]));
+        mesh.triangles.reserve(triangles);
+        mesh.twins.resize(3 * triangles, HULL);
+        let mut links = 0;
+        for start in (front..records.len()).step_by(Edges::BLOCK) {
+            let end = records.len().min(start + Edges::BLOCK);
+            self.write_triangles(&records[start..end], sites, order, mesh)?;
+            let first = (start - front) / 8 * 3;
+            self.write_twins(&records[start..end], front as u32, &mut mesh.twins[first..]);
+            links += self.check_edges(sphere, sites, start, end)?;
         }
-        let (triangles, edges) = (mesh.triangles.len(), self.hull.len());
-        if triangles + edges + 2 != 2 * n || !self.used.iter().all(|&used| used) {
+        if 2 * links + self.hull.len() != 3 * triangles {
+            return Err(Rejected::NotAccepted("twins do not fit"));
+        }
+        if triangles + self.hull.len() + 2 != 2 * n || !self.used.iter().all(|&used| used) {
             return Err(Rejected::NotAccepted("not every site is used once"));
         }
-        self.check_hull(&sites[..n])
+        self.check_hull(sites)
     }
 
-    /// Points 1, 2 and 5 for the triangle at `at`; notes its corners and hull edges.
-    #[inline(always)]
-    fn check_triangle(
+    /// Point 1, and notes the corners for point 4.
+    fn write_triangles(
         &mut self,
-        records: &[u32],
-        at: usize,
-        front: u32,
+        block: &[u32],
         sites: &[Site],
+        order: &[u32],
         mesh: &mut Mesh,
-    ) -> Result<[u32; 3], Rejected> {
-        let corners = [records[at], records[at + 1], records[at + 2]];
-        let site = |v: u32| sites.get(v as usize).copied().ok_or(Rejected::NotAccepted("a corner is no site"));
-        let [a, b, c] = [site(corners[0])?, site(corners[1])?, site(corners[2])?];
-        if orient2d(a, b, c) <= 0 {
-            return Err(Rejected::NotAccepted("a triangle is not counterclockwise"));
-        }
-        for i in 0..3 {
-            self.used[corners[i] as usize] = true;
-            let (h, twin) = (at as u32 + i as u32, records[at + 4 + i]);
-            let ends = [corners[i], corners[(i + 1) % 3]];
-            if twin == OUTSIDE {
-                self.hull.push(ends);
-                mesh.twins.push(HULL);
-                continue;
+    ) -> Result<(), Rejected> {
+        let n = sites.len();
+        let (order, used) = (&order[..n], &mut self.used[..n]);
+        let mut inverted = false;
+        for record in block.chunks_exact(8) {
+            let corners = [record[0], record[1], record[2]];
+            if corners[0].max(corners[1]).max(corners[2]) >= n as u32 {
+                return Err(Rejected::NotAccepted("a corner is no site"));
             }
-            let twin = twin.wrapping_sub(front);
-            let (other, g) = ((twin & !7) as usize, (twin & 7) as usize);
-            let fault = Rejected::NotAccepted("twins do not fit");
-            let Some(record) = records.get(other..other + 8).filter(|r| g < 3 && r[g + 4] == h + front) else {
-                return Err(fault);
-            };
-            if twin > h {
-                let (end, apex) = (next(g as u32) as usize, previous(g as u32) as usize);
-                if [record[end], record[g]] != ends {
-                    return Err(fault);
-                }
-                if in_circle(a, b, c, site(record[apex])?) {
-                    return Err(Rejected::NotAccepted("an edge is not Delaunay"));
+            let [a, b, c] = [corners[0] as usize, corners[1] as usize, corners[2] as usize];
+            inverted |= orient2d(sites[a], sites[b], sites[c]) <= 0;
+            (used[a], used[b], used[c]) = (true, true, true);
+            mesh.triangles.push([order[a], order[b], order[c]]);
+        }
+        match inverted {
+            true => Err(Rejected::NotAccepted("a triangle is not counterclockwise")),
+            false => Ok(()),
+        }
+    }
+
+    /// Numbers the twins as in a mesh, and notes the hull for point 3.
+    fn write_twins(&mut self, block: &[u32], front: u32, twins: &mut [u32]) {
+        for (record, twins) in block.chunks_exact(8).zip(twins.chunks_exact_mut(3)) {
+            for i in 0..3 {
+                let g = record[4 + i];
+                twins[i] = (g.wrapping_sub(front) >> 3).wrapping_mul(3).wrapping_add(g & 7);
+                if g == OUTSIDE {
+                    twins[i] = HULL;
+                    self.hull.push([record[i], record[(i + 1) % 3]]);
                 }
             }
-            mesh.twins.push((twin >> 3) * 3 + (twin & 7));
         }
-        Ok(corners)
+    }
+
+    /// Points 2 and 5 for the edges of a block; returns how many pairs of twins there are. As every pair is found once, from
+    /// its lesser half-edge, all half-edges are paired if the pairs are half as many as they.
+    fn check_edges(&mut self, sphere: &Sphere, sites: &[Site], start: usize, end: usize) -> Result<usize, Rejected> {
+        self.doubtful.clear();
+        let links = self.edges.test::<true>(sphere.records(), sites, start, end, &mut self.doubtful);
+        if links.broken {
+            return Err(Rejected::NotAccepted("twins do not fit"));
+        }
+        match self.doubtful.iter().any(|&h| sphere.fails(sites, h)) {
+            true => Err(Rejected::NotAccepted("an edge is not Delaunay")),
+            false => Ok(links.count),
+        }
     }
 
     /// Point 3.

@@ -11,11 +11,13 @@ use crate::geometry::predicates::orient2d;
 const NEAR: usize = 6;
 /// How often the hull is mended before it is given up.
 const ROUNDS: usize = 12;
+/// Rounds in which vertices are taken out only where that leaves a clean hole.
+const PATIENCE: usize = 4;
 
 /// Makes the hull convex. What it changes is noted in `shift`, as are the vertices it takes out: where thin regions reach
 /// the frame, vertices may hang on the hull that belong inside.
 pub(super) fn complete_hull(sphere: &mut Sphere, sites: &[Site], shift: &mut Shift) -> Result<(), Rejected> {
-    for _ in 0..ROUNDS {
+    for round in 0..ROUNDS {
         let spokes = all_spokes(sphere)?;
         let blocked = fill_pockets(sphere, sites, spokes, shift);
         let ring = Ring::new(sphere, &all_spokes(sphere)?);
@@ -23,10 +25,11 @@ pub(super) fn complete_hull(sphere: &mut Sphere, sites: &[Site], shift: &mut Shi
             return Ok(());
         }
         let before = shift.removed.len();
-        for vertex in ring.sharp_corners(sites).chain(blocked) {
-            take_out(sphere, sites, vertex, shift);
+        for vertex in ring.sharp_corners(sites, round >= 2).chain(blocked) {
+            take_out(sphere, sites, vertex, shift, round >= PATIENCE);
         }
-        if shift.removed.len() == before {
+        shift.repair(sphere, sites)?;
+        if shift.removed.len() == before && round > PATIENCE {
             break;
         }
     }
@@ -54,10 +57,10 @@ fn fill_pockets(sphere: &mut Sphere, sites: &[Site], mut spokes: Vec<u32>, shift
 }
 
 /// Takes `vertex` out if it still is on the hull.
-fn take_out(sphere: &mut Sphere, sites: &[Site], vertex: u32, shift: &mut Shift) {
+fn take_out(sphere: &mut Sphere, sites: &[Site], vertex: u32, shift: &mut Shift, anyhow: bool) {
     let spokes = all_spokes(sphere).unwrap_or_default();
     if let Some(&h) = spokes.iter().find(|&&h| sphere.destination(h) == vertex) {
-        shift.take_out(sphere, sites, next(h));
+        shift.take_out(sphere, sites, next(h), anyhow);
     }
 }
 
@@ -81,13 +84,15 @@ impl Ring {
         self.corners().map(|c| c.map(|v| sites[v as usize])).filter(starts_upward).count() == 1
     }
 
-    /// The vertices at which the hull turns by more than a right angle.
-    fn sharp_corners(&self, sites: &[Site]) -> impl Iterator<Item = u32> {
+    /// The vertices at which the hull turns by more than a right angle, and maybe those beside them.
+    fn sharp_corners(&self, sites: &[Site], and_beside: bool) -> impl Iterator<Item = u32> {
         let along = |a: Site, b: Site, i: usize| b[i] as i64 - a[i] as i64;
-        self.corners().filter_map(move |corner| {
-            let [p, q, r] = corner.map(|v| sites[v as usize]);
-            (along(p, q, 0) * along(q, r, 0) + along(p, q, 1) * along(q, r, 1) < 0).then_some(corner[1])
-        })
+        let is_sharp = move |&[p, q, r]: &[u32; 3]| {
+            let (p, q, r) = (sites[p as usize], sites[q as usize], sites[r as usize]);
+            along(p, q, 0) * along(q, r, 0) + along(p, q, 1) * along(q, r, 1) < 0
+        };
+        let range = if and_beside { 0..3 } else { 1..2 };
+        self.corners().filter(is_sharp).flat_map(move |corner| range.clone().map(move |i| corner[i]))
     }
 }
 
@@ -101,6 +106,9 @@ fn all_spokes(sphere: &Sphere) -> Result<Vec<u32>, Rejected> {
         let spoke = sphere.twin(previous(*spokes.last().unwrap_or(&first)));
         if spoke == first {
             return Ok(spokes);
+        }
+        if spokes.len() > sphere.len() {
+            return Err(Rejected::NotAccepted("the hull has no end"));
         }
         spokes.push(spoke);
     }

@@ -1,6 +1,7 @@
 //! Step C2: shift all sites from their pixels to their true places, all at once. The topology stays; triangles that are
 //! then not counterclockwise are flipped away, or a corner is taken out, to be inserted again in step C3.
 
+use super::edges::Edges;
 use super::sphere::{Fill, Sphere, Star, next, previous};
 use super::{Counts, Rejected};
 use crate::geometry::Site;
@@ -13,11 +14,12 @@ const ROUNDS: usize = 6;
 #[derive(Default)]
 pub(super) struct Shift {
     /// Triangles that are not counterclockwise.
-    inverted: Vec<u32>,
+    pub(super) inverted: Vec<u32>,
     /// Edges that may not be Delaunay. All others are.
     pub(super) suspects: Vec<u32>,
     /// Vertices taken out, each with a half-edge nearby.
     pub(super) removed: Vec<[u32; 2]>,
+    edges: Edges,
 }
 
 impl Shift {
@@ -29,24 +31,26 @@ impl Shift {
 
     /// Tests all triangles and edges at the true places of `sites`.
     pub(super) fn test(&mut self, sphere: &Sphere, sites: &[Site], counts: &mut Counts) {
-        for t in sphere.triangles() {
-            match orientation(sphere, sites, t) {
-                Some(area) if area <= 0 => self.inverted.push(t),
-                Some(_) => {
-                    let failing = (t..t + 3).filter(|&h| h < sphere.twin(h) && sphere.fails(sites, h));
-                    self.suspects.extend(failing);
+        let records = sphere.records();
+        for start in (sphere.front() as usize..records.len()).step_by(Edges::BLOCK) {
+            let end = records.len().min(start + Edges::BLOCK);
+            for t in (start as u32..end as u32).step_by(8) {
+                if orientation(sphere, sites, t).is_some_and(|area| area <= 0) {
+                    self.inverted.push(t);
                 }
-                None => {}
             }
+            self.edges.test::<false>(records, sites, start, end, &mut self.suspects);
         }
         counts.inverted += self.inverted.len() as u64;
     }
 
     /// Makes every triangle counterclockwise.
     pub(super) fn repair(&mut self, sphere: &mut Sphere, sites: &[Site]) -> Result<(), Rejected> {
-        for _ in 0..ROUNDS {
+        for round in 0..ROUNDS {
             for t in std::mem::take(&mut self.inverted) {
-                if orientation(sphere, sites, t).is_some_and(|area| area <= 0) && !self.mend(sphere, sites, t) {
+                if orientation(sphere, sites, t).is_some_and(|area| area <= 0)
+                    && !self.mend(sphere, sites, t, round > 0)
+                {
                     self.inverted.push(t);
                 }
             }
@@ -57,11 +61,12 @@ impl Shift {
         Err(Rejected::NotAccepted("an inverted triangle stayed"))
     }
 
-    fn mend(&mut self, sphere: &mut Sphere, sites: &[Site], t: u32) -> bool {
+    fn mend(&mut self, sphere: &mut Sphere, sites: &[Site], t: u32, anyhow: bool) -> bool {
         (t..t + 3).any(|h| self.flip_if_good(sphere, sites, h))
             || (t..t + 3).any(|h| self.peel_if_between(sphere, sites, h))
-            || (t..t + 3).any(|h| self.take_out(sphere, sites, h))
+            || (t..t + 3).any(|h| self.take_out(sphere, sites, h, false))
             || (t..t + 3).any(|h| self.peel(sphere, h))
+            || anyhow && (t..t + 3).any(|h| self.take_out(sphere, sites, h, true))
     }
 
     /// Flips edge `h` if both triangles are counterclockwise then.
@@ -104,30 +109,44 @@ impl Shift {
         outside
     }
 
-    /// Takes the vertex at which `h` starts out if the hole can be filled with counterclockwise triangles.
-    pub(super) fn take_out(&mut self, sphere: &mut Sphere, sites: &[Site], h: u32) -> bool {
-        let vertex = sphere.origin(h);
+    /// Takes the vertex at which `h` starts out if the hole can be filled with counterclockwise triangles, or `anyhow`; what is
+    /// inverted then will be seen to.
+    pub(super) fn take_out(&mut self, sphere: &mut Sphere, sites: &[Site], h: u32, anyhow: bool) -> bool {
+        let (vertex, first) = (sphere.origin(h), self.suspects.len());
+        let done = self.remove_fan(sphere, sites, h, anyhow);
+        if done {
+            self.removed.push([vertex, self.suspects[first]]);
+        }
+        done
+    }
+
+    /// Removes the triangles around the start of `h`, which stays a corner elsewhere.
+    pub(super) fn dissolve(&mut self, sphere: &mut Sphere, sites: &[Site], h: u32) -> bool {
+        self.remove_fan(sphere, sites, h, true)
+    }
+
+    fn remove_fan(&mut self, sphere: &mut Sphere, sites: &[Site], h: u32, anyhow: bool) -> bool {
         let Some(star) = sphere.star(h) else { return false };
-        let Some(fill) = star.fill(sites, sphere.infinity(), false) else { return false };
-        let mut near = 0;
-        sphere.replace_star(&star, &fill, |h| {
-            near = h;
-            self.suspects.push(h);
-        });
-        self.removed.push([vertex, near]);
+        let Some(fill) = star.fill(sites, sphere.infinity(), anyhow) else { return false };
+        let first = self.suspects.len();
+        sphere.replace_star(&star, &fill, |h| self.suspects.push(h));
+        if anyhow {
+            let inverted = |t: &u32| orientation(sphere, sites, *t).is_some_and(|area| area <= 0);
+            self.inverted.extend(self.suspects[first..].iter().map(|h| h & !7).filter(inverted));
+        }
         true
     }
 }
 
 /// Twice the area of the triangle with first half-edge `t`, or `None` for ghosts and free records.
 #[inline(always)]
-fn orientation(sphere: &Sphere, sites: &[Site], t: u32) -> Option<i64> {
+pub(super) fn orientation(sphere: &Sphere, sites: &[Site], t: u32) -> Option<i64> {
     let corners = sphere.corners(t)?;
     if corners.contains(&sphere.infinity()) {
         return None;
     }
-    let [a, b, c] = corners.map(|i| sites[i as usize]);
-    Some(orient2d(a, b, c))
+    let at = |v: u32| sites[v as usize];
+    Some(orient2d(at(corners[0]), at(corners[1]), at(corners[2])))
 }
 
 impl Star {
@@ -137,7 +156,7 @@ impl Star {
         let mut sides: Vec<usize> = (0..self.vertices.len()).collect();
         let mut ears = Vec::with_capacity(sides.len());
         let ghosts = self.vertices.iter().filter(|&&v| v == infinity).count();
-        if ghosts > 1 && !anyhow {
+        if ghosts > 1 {
             return None;
         }
         while sides.len() > 2 {

@@ -26,14 +26,18 @@ pub(super) fn insert_all(
     for &[vertex, near] in removed {
         insert(sphere, &texture.sites, vertex, near, flips)?;
     }
+    let (mut last_pixel, mut last) = (u32::MAX, 0);
     for (vertex, &pixel) in (texture.placed as u32..).zip(&texture.missing) {
-        insert(sphere, &texture.sites, vertex, scan.start_near(pixel), flips)?;
+        // The one before, if it was in this pixel or the next, is nearer than what the scan left here.
+        let near = if pixel.wrapping_sub(last_pixel) < 2 { last } else { scan.start_near(pixel) };
+        last = insert(sphere, &texture.sites, vertex, near, flips)?;
+        last_pixel = pixel;
     }
     Ok(())
 }
 
-/// Inserts `vertex`, looking for its place from half-edge `near` on.
-fn insert(sphere: &mut Sphere, sites: &[Site], vertex: u32, near: u32, flips: &mut Flips) -> Result<(), Rejected> {
+/// Inserts `vertex`, looking for its place from half-edge `near` on; returns a half-edge near it.
+fn insert(sphere: &mut Sphere, sites: &[Site], vertex: u32, near: u32, flips: &mut Flips) -> Result<u32, Rejected> {
     let place = locate(sphere, sites, sites[vertex as usize], near, flips)?;
     let sides = sphere.split(place.triangle, vertex);
     flips.suspects.extend(sides);
@@ -43,7 +47,8 @@ fn insert(sphere: &mut Sphere, sites: &[Site], vertex: u32, near: u32, flips: &m
         sphere.flip(h);
         flips.suspects.extend([h, previous(h), g, previous(g)]);
     }
-    flips.run(sphere, sites)
+    flips.run(sphere, sites)?;
+    Ok(sides[0])
 }
 
 fn locate(sphere: &Sphere, sites: &[Site], p: Site, near: u32, flips: &mut Flips) -> Result<Place, Rejected> {
@@ -51,8 +56,9 @@ fn locate(sphere: &Sphere, sites: &[Site], p: Site, near: u32, flips: &mut Flips
     loop {
         flips.step()?;
         let [a, b, c] = [h, next(h), previous(h)];
-        let side = |e: u32| orient2d(sites[sphere.origin(e) as usize], sites[sphere.destination(e) as usize], p);
-        let sides = [a, b, c].map(side);
+        let at = |e: u32| sites[sphere.origin(e) as usize];
+        let (pa, pb, pc) = (at(a), at(b), at(c));
+        let sides = [orient2d(pa, pb, p), orient2d(pb, pc, p), orient2d(pc, pa, p)];
         match sides.iter().position(|&s| s < 0) {
             Some(i) => {
                 h = sphere.twin([a, b, c][i]);

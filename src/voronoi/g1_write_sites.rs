@@ -1,7 +1,6 @@
 //! Step G1: write the sites into a texture. One site wins a pixel; a loser moves to the free pixel beside it, or is missing.
 //!
-//! The texture is a bitmap with a running count, so that the site of a pixel is found by counting bits: the sites are
-//! numbered row by row, which is also the order in which all later steps meet them.
+//! The sites are numbered by row and column of their pixels, which is the order in which all later steps meet them.
 
 use super::{Counts, Rejected};
 use crate::geometry::Site;
@@ -25,8 +24,8 @@ pub(super) struct Texture {
     pub(super) words: usize,
     /// Bit x % 64 of word `y * words + x / 64`: there is a site in pixel (x, y).
     pub(super) occupied: Vec<u64>,
-    /// The number of sites in the words before.
-    rank: Vec<u32>,
+    /// The number of the site in a pixel, where there is one, at `64 * words * y + x`. Whatever else there is, is left from before.
+    numbers: Vec<u32>,
     /// Position in the input of every site, by number: first those in the texture, then the missing ones.
     pub(super) order: Vec<u32>,
     /// Coordinates by number, and one more for the vertex at infinity.
@@ -63,9 +62,7 @@ impl Texture {
     #[inline(always)]
     pub(super) fn number(&self, label: u32) -> u32 {
         let (x, y) = ((label & 0xffff) as usize, (label >> 16) as usize);
-        let word = y * self.words + x / 64;
-        let before = self.occupied[word] & ((1u64 << (x % 64)) - 1);
-        self.rank[word] + before.count_ones()
+        self.numbers[64 * self.words * y + x]
     }
 
     /// Chooses width and height with the shape of the sites' bounding box; returns the origin and pixels per lattice step.
@@ -93,8 +90,8 @@ impl Texture {
         self.row_ends.resize(self.height + 1, 0);
         self.pixels.clear();
         self.pixels.extend(sites.iter().map(|site| {
-            let [x, y] = [0, 1].map(|i| ((site[i] - low[i]) as f64 * scale) as i32 as u32);
-            y << 16 | x
+            let pixel = |i: usize| ((site[i] - low[i]) as f64 * scale) as i32 as u32;
+            pixel(1) << 16 | pixel(0)
         }));
         for &pixel in &self.pixels {
             self.row_ends[(pixel >> 16) as usize + 1] += 1;
@@ -113,7 +110,10 @@ impl Texture {
     fn clear(&mut self, sites: usize) {
         self.occupied.clear();
         self.occupied.resize(self.words * self.height, 0);
-        self.rank.clear();
+        let pixels = 64 * self.words * self.height;
+        if self.numbers.len() < pixels {
+            self.numbers.resize(pixels, 0);
+        }
         self.order.clear();
         self.order.reserve(sites);
         self.sites.clear();
@@ -136,16 +136,20 @@ impl Texture {
                 self.losers.push([x, i]);
             }
         }
+        if self.losers.len() > self.width / 8 {
+            // Where many sites will be missing, they are inserted one beside the other.
+            self.losers.sort_unstable_by_key(|&[_, i]| sites[i as usize]);
+        }
         for at in 0..self.losers.len() {
             let [x, i] = self.losers[at];
             counts.moved += self.place_loser(sites, y, x as usize, i) as u64;
         }
         for word in y * self.words..(y + 1) * self.words {
-            self.rank.push(self.sites.len() as u32);
             let mut bits = self.occupied[word];
             while bits != 0 {
                 let x = (word - y * self.words) * 64 + bits.trailing_zeros() as usize;
                 let i = std::mem::replace(&mut self.row[x], EMPTY);
+                self.numbers[64 * self.words * y + x] = self.sites.len() as u32;
                 self.order.push(i);
                 self.sites.push(sites[i as usize]);
                 bits &= bits - 1;

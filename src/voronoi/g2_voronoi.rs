@@ -72,13 +72,7 @@ impl Voronoi {
     pub(super) fn row(&mut self, texture: &Texture, y: usize, labels: &mut [u32]) {
         let occupied = &texture.occupied[y * texture.words..][..texture.words];
         grow(&mut self.south, occupied);
-        for (word, &bits) in occupied.iter().enumerate() {
-            let mut bits = bits;
-            while bits != 0 {
-                self.south_row[word * 64 + bits.trailing_zeros() as usize] = y as u32 + 1;
-                bits &= bits - 1;
-            }
-        }
+        for_each_bit(occupied, |x| self.south_row[x] = y as u32 + 1);
         let north = &self.north[y * self.stride..][..self.stride];
         column_keys(&self.south, north, &mut self.columns[REACH + 1..][..self.stride]);
         let far = nearest_keys(&self.columns, &mut self.keys, texture.width);
@@ -162,12 +156,19 @@ impl Parabola {
 
 /// Distances to the nearest occupied pixel on one side, one row further on.
 fn grow(distances: &mut [u8], occupied: &[u64]) {
-    const LANES: [u8; 8] = [1, 2, 4, 8, 16, 32, 64, 128];
-    for (row, &bits) in distances.chunks_exact_mut(64).zip(occupied) {
-        for (eight, bits) in row.chunks_exact_mut(8).zip(bits.to_le_bytes()) {
-            for (distance, lane) in eight.iter_mut().zip(LANES) {
-                *distance = if bits & lane != 0 { 0 } else { distance.saturating_add(1) };
-            }
+    for distance in distances.iter_mut() {
+        *distance = distance.saturating_add(1);
+    }
+    for_each_bit(occupied, |x| distances[x] = 0);
+}
+
+#[inline(always)]
+fn for_each_bit(words: &[u64], mut f: impl FnMut(usize)) {
+    for (word, &bits) in words.iter().enumerate() {
+        let mut bits = bits;
+        while bits != 0 {
+            f(word * 64 + bits.trailing_zeros() as usize);
+            bits &= bits - 1;
         }
     }
 }

@@ -2,74 +2,102 @@
 //! region of its own: the scan makes a second fan of triangles around the same site, somewhere else.
 //!
 //! The paper recolours such pixels before it looks for corners. Here, where they are rare, the surplus fan is taken out of
-//! the mesh, which is the same as if its pixels had taken the colours around them.
+//! the mesh, which is the same as if its pixels had taken the colours around them. As the site lies outside its island, some
+//! triangle around it is not counterclockwise, so that only those need to be looked at.
 
-use super::Counts;
-use super::Rejected;
+use super::c2_shift::{Shift, orientation};
 use super::sphere::{Sphere, previous};
+use super::{Counts, Rejected};
 use crate::geometry::Site;
-use crate::geometry::predicates::orient2d;
 
-/// A sphere of `v` vertices has `2 v - 4` triangles; every island adds two.
-pub(super) fn remove_islands(
-    sphere: &mut Sphere,
-    sites: &[Site],
-    placed: usize,
-    suspects: &mut Vec<u32>,
-    counts: &mut Counts,
-) -> Result<(), Rejected> {
-    let expected = 2 * (placed + 1) - 4;
-    if sphere.len() == expected {
-        return Ok(());
-    }
-    for spoke in surplus_fans(sphere, sites) {
-        let star = sphere.star(spoke).ok_or(Rejected::NotAccepted("an island with too many neighbours"))?;
-        let fill = star.fill(sites, sphere.infinity(), true).ok_or(Rejected::NotAccepted("an island without shape"))?;
-        sphere.replace_star(&star, &fill, |h| suspects.push(h));
-        counts.islands += 1;
-    }
-    match sphere.len() == expected {
-        true => Ok(()),
-        false => Err(Rejected::NotAccepted("the discrete Voronoi diagram is not a sphere")),
-    }
+/// Fans with more triangles than this are not followed.
+const MOST: usize = 64;
+
+/// Buffers of the search.
+#[derive(Default)]
+pub(super) struct Islands {
+    /// By site, how many triangles have it as a corner.
+    degrees: Vec<u16>,
+    fans: Vec<Fan>,
 }
 
-/// One half-edge of every fan but the best of each site.
-fn surplus_fans(sphere: &Sphere, sites: &[Site]) -> Vec<u32> {
-    let mut best = vec![None; sites.len()];
-    let mut seen = vec![false; sphere.end() as usize];
-    let mut surplus = Vec::new();
-    for t in sphere.triangles() {
-        for h in t..t + 3 {
-            let vertex = sphere.origin(h);
-            if seen[h as usize] || vertex == sphere.infinity() {
-                continue;
-            }
-            let fan = (std::cmp::Reverse(badness(sphere, sites, h, &mut seen)), h);
-            match best[vertex as usize] {
-                Some(other) if other > fan => surplus.push(fan.1),
-                Some((_, other)) => {
-                    surplus.push(other);
-                    best[vertex as usize] = Some(fan);
+/// A closed fan of triangles around a site that has more than one.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Fan {
+    site: u32,
+    /// Triangles that are not counterclockwise.
+    inverted: usize,
+    degree: usize,
+    /// The least half-edge that starts at the site.
+    spoke: u32,
+}
+
+impl Islands {
+    /// Takes out what surplus fans there are. A sphere of `v` vertices has `2 v - 4` triangles, and every island adds two.
+    pub(super) fn remove(
+        &mut self,
+        sphere: &mut Sphere,
+        sites: &[Site],
+        placed: usize,
+        shift: &mut Shift,
+        counts: &mut Counts,
+    ) -> Result<(), Rejected> {
+        let expected = 2 * placed - 2;
+        if sphere.len() == expected {
+            return Ok(());
+        }
+        self.count_degrees(sphere, sites.len());
+        self.find_fans(sphere, sites, &shift.inverted);
+        for fans in self.fans.chunk_by(|a, b| a.site == b.site) {
+            // If every fan of the site is listed, the best is the first.
+            let all = fans.iter().map(|fan| fan.degree).sum::<usize>() == self.degrees[fans[0].site as usize] as usize;
+            for fan in &fans[all as usize..] {
+                if !shift.dissolve(sphere, sites, fan.spoke) {
+                    return Err(Rejected::NotAccepted("an island could not be removed"));
                 }
-                None => best[vertex as usize] = Some(fan),
+                counts.islands += 1;
+            }
+        }
+        match sphere.len() == expected {
+            true => Ok(()),
+            false => Err(Rejected::NotAccepted("the discrete Voronoi diagram is not a sphere")),
+        }
+    }
+
+    fn count_degrees(&mut self, sphere: &Sphere, sites: usize) {
+        self.degrees.clear();
+        self.degrees.resize(sites, 0);
+        for corners in sphere.triangles().filter_map(|t| sphere.corners(t)) {
+            for vertex in corners {
+                let degree = &mut self.degrees[vertex as usize];
+                *degree = degree.saturating_add(1);
             }
         }
     }
-    surplus
+
+    /// Lists the fans that have an inverted triangle and are not all there is around their site.
+    fn find_fans(&mut self, sphere: &Sphere, sites: &[Site], inverted: &[u32]) {
+        self.fans.clear();
+        for h in inverted.iter().flat_map(|&t| t..t + 3) {
+            let fan = fan(sphere, sites, h).filter(|fan| fan.degree < self.degrees[fan.site as usize] as usize);
+            self.fans.extend(fan);
+        }
+        self.fans.sort_unstable();
+        self.fans.dedup();
+    }
 }
 
-/// How many triangles of the fan of `h` are not counterclockwise: around an island there is always one.
-fn badness(sphere: &Sphere, sites: &[Site], h: u32, seen: &mut [bool]) -> usize {
-    let mut bad = 0;
+fn fan(sphere: &Sphere, sites: &[Site], h: u32) -> Option<Fan> {
+    let mut fan = Fan { site: sphere.origin(h), inverted: 0, degree: 0, spoke: h };
     let mut spoke = h;
-    while !std::mem::replace(&mut seen[spoke as usize], true) {
-        let corners = sphere.corners(spoke).unwrap_or_default();
-        if !corners.contains(&sphere.infinity()) {
-            let [a, b, c] = corners.map(|i| sites[i as usize]);
-            bad += (orient2d(a, b, c) <= 0) as usize;
-        }
+    while fan.degree < MOST {
+        fan.inverted += orientation(sphere, sites, spoke & !7).is_some_and(|area| area <= 0) as usize;
+        fan.degree += 1;
+        fan.spoke = fan.spoke.min(spoke);
         spoke = sphere.twin(previous(spoke));
+        if spoke == h {
+            return Some(fan);
+        }
     }
-    bad
+    None
 }

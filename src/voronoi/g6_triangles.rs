@@ -28,13 +28,21 @@ pub(super) struct Scan {
     starts: Vec<u32>,
 }
 
-/// The half-edge that stands for the open arm going east.
-const EAST: usize = 0;
+/// The slot of the open arm going east.
+const EAST: u32 = Sphere::slot(0);
+/// A slot for links that are not needed.
+const WASTE: u32 = Sphere::slot(1);
+
+/// The slot of the open arm going north from corner `x`.
+#[inline(always)]
+fn column(x: usize) -> u32 {
+    Sphere::slot(x + 2)
+}
 
 impl Scan {
     /// Fills `sphere` with the triangles of the discrete Voronoi diagram of `texture`.
     pub(super) fn run(&mut self, texture: &Texture, voronoi: &mut Voronoi, sphere: &mut Sphere) {
-        sphere.reset(texture.width + 2, texture.placed, (texture.sites.len() - 1) as u32);
+        sphere.reset(texture.width + 3, texture.placed, (texture.sites.len() - 1) as u32);
         let words = texture.width / 64 + 1;
         for row in [&mut self.south, &mut self.north] {
             row.clear();
@@ -86,102 +94,74 @@ impl Scan {
         }
     }
 
+    /// Does what the arms (west, south, east, north: bits 0 to 3) of corner `x` ask for.
     #[inline(always)]
     fn corner(&self, texture: &Texture, sphere: &mut Sphere, x: usize, arms: u32) {
-        const W: u32 = 1;
-        const S: u32 = 2;
-        const E: u32 = 4;
-        const N: u32 = 8;
-        let (east, north) = (Sphere::slot(EAST), Sphere::slot(x + 1));
-        let number = |label: u32| if label == FRAME { sphere.infinity() } else { texture.number(label) };
+        // Three arms, or a bend: told apart by one branch, and each of their shapes treated alike, because no
+        // processor can foresee which comes next.
+        match arms.count_ones() {
+            2 => bend(sphere, x, arms),
+            3 => self.three_colours(texture, sphere, x, arms),
+            _ => self.four_arms(texture, sphere, x),
+        }
+    }
+
+    #[inline(always)]
+    fn three_colours(&self, texture: &Texture, sphere: &mut Sphere, x: usize, arms: u32) {
+        let (west, south, east, north) = (arms & 1 != 0, arms & 2 != 0, arms & 4 != 0, arms & 8 != 0);
         let (sw, se, ne, nw) = (self.south[x], self.south[x + 1], self.north[x + 1], self.north[x]);
-        const WS: u32 = W | S;
-        const SE: u32 = S | E;
-        const EN: u32 = E | N;
-        const NW: u32 = N | W;
-        const WSE: u32 = W | S | E;
-        const SEN: u32 = S | E | N;
-        const ENW: u32 = E | N | W;
-        const NWS: u32 = N | W | S;
-        match arms {
-            WS => join(sphere, east, north),
-            SE => carry(sphere, north, east),
-            NW => carry(sphere, east, north),
-            EN => sphere.link(east, north),
-            WSE => {
-                let t = [number(sw), number(se), number(ne)];
-                let t = sphere.push(t[0], t[1], t[2]);
-                receive(sphere, north, t);
-                receive(sphere, east, t + 2);
-                sphere.link(t + 1, east);
-            }
-            SEN => {
-                let t = [number(sw), number(se), number(ne)];
-                let t = sphere.push(t[0], t[1], t[2]);
-                receive(sphere, north, t);
-                sphere.link(t + 1, east);
-                sphere.link(t + 2, north);
-            }
-            ENW => {
-                let t = [number(sw), number(ne), number(nw)];
-                let t = sphere.push(t[0], t[1], t[2]);
-                receive(sphere, east, t + 2);
-                sphere.link(t, east);
-                sphere.link(t + 1, north);
-            }
-            NWS => {
-                let t = [number(sw), number(se), number(nw)];
-                let t = sphere.push(t[0], t[1], t[2]);
-                receive(sphere, north, t);
-                receive(sphere, east, t + 2);
-                sphere.link(t + 1, north);
-            }
-            // Four arms. Pixels of one colour across the corner hang together there, so that no three colours meet.
-            _ if sw == ne => {
-                let (from_west, from_south) = (sphere.twin(east), sphere.twin(north));
-                sphere.link(north, from_west);
-                sphere.link(east, from_south);
-            }
-            _ if se == nw => {
-                join(sphere, east, north);
-                sphere.link(east, north);
-            }
-            _ => {
-                let quad = [number(sw), number(se), number(ne), number(nw)];
-                let [s, e, n, w] = two_triangles(texture, sphere, quad);
-                receive(sphere, north, s);
-                receive(sphere, east, w);
-                sphere.link(e, east);
-                sphere.link(n, north);
-            }
+        let (b, c) = (if south { se } else { ne }, if north & west { nw } else { ne });
+        let (sw, b, c) = (number(texture, sphere, sw), number(texture, sphere, b), number(texture, sphere, c));
+        let t = sphere.push(sw, b, c);
+        let (from_west, from_south) = (sphere.twin(EAST), sphere.twin(column(x)));
+        // The half-edges across the arms, from the south one round; where an arm is missing, waste paper is linked.
+        let or_waste = |there: bool, h: u32| if there { h } else { WASTE };
+        sphere.link(or_waste(south, t), or_waste(south, from_south));
+        sphere.link(or_waste(west, t + 2), or_waste(west, from_west));
+        sphere.link(or_waste(east, t + south as u32), or_waste(east, EAST));
+        sphere.link(or_waste(north, t + 2 - west as u32), or_waste(north, column(x)));
+    }
+
+    /// Four colours, or fewer: pixels of one colour across the corner hang together there, so that no three colours meet.
+    fn four_arms(&self, texture: &Texture, sphere: &mut Sphere, x: usize) {
+        let labels = [self.south[x], self.south[x + 1], self.north[x + 1], self.north[x]];
+        let (from_west, from_south) = (sphere.twin(EAST), sphere.twin(column(x)));
+        if labels[0] == labels[2] {
+            sphere.link(column(x), from_west);
+            sphere.link(EAST, from_south);
+        } else if labels[1] == labels[3] {
+            sphere.link(from_west, from_south);
+            sphere.link(EAST, column(x));
+        } else {
+            let [sw, se, ne, nw] = labels;
+            let (sw, se) = (number(texture, sphere, sw), number(texture, sphere, se));
+            let (ne, nw) = (number(texture, sphere, ne), number(texture, sphere, nw));
+            let [s, e, n, w] = two_triangles(texture, sphere, [sw, se, ne, nw]);
+            sphere.link(from_south, s);
+            sphere.link(from_west, w);
+            sphere.link(e, EAST);
+            sphere.link(n, column(x));
         }
     }
 }
 
-/// The Voronoi edges that come in at two slots are one.
+/// The Voronoi edge that has one end in the west or east and one in the south or north.
 #[inline(always)]
-fn join(sphere: &mut Sphere, a: u32, b: u32) {
-    let (from_a, from_b) = (sphere.twin(a), sphere.twin(b));
-    sphere.link(from_a, from_b);
+fn bend(sphere: &mut Sphere, x: usize, arms: u32) {
+    let across = if arms & 1 != 0 { sphere.twin(EAST) } else { EAST };
+    let along = if arms & 2 != 0 { sphere.twin(column(x)) } else { column(x) };
+    sphere.link(across, along);
 }
 
-/// The Voronoi edge that came in at slot `a` goes on at slot `b`.
 #[inline(always)]
-fn carry(sphere: &mut Sphere, a: u32, b: u32) {
-    let from = sphere.twin(a);
-    sphere.link(b, from);
-}
-
-/// The Voronoi edge that came in at a slot ends at half-edge `h`.
-#[inline(always)]
-fn receive(sphere: &mut Sphere, slot: u32, h: u32) {
-    let from = sphere.twin(slot);
-    sphere.link(h, from);
+fn number(texture: &Texture, sphere: &Sphere, label: u32) -> u32 {
+    if label == FRAME { sphere.infinity() } else { texture.number(label) }
 }
 
 /// Two triangles for four colours around a corner; the half-edges on its south, east, north and west arm.
 fn two_triangles(texture: &Texture, sphere: &mut Sphere, [sw, se, ne, nw]: [u32; 4]) -> [u32; 4] {
-    let [a, b, c, d] = [sw, se, ne, nw].map(|i| texture.sites[i as usize]);
+    let at = |v: u32| texture.sites[v as usize];
+    let (a, b, c, d) = (at(sw), at(se), at(ne), at(nw));
     if orient2d(a, b, c) > 0 && orient2d(a, c, d) > 0 && !in_circle(a, b, c, d) {
         let t = sphere.push(sw, se, ne);
         let u = sphere.push(sw, ne, nw);

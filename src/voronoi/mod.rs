@@ -9,6 +9,7 @@ mod c1_hull;
 mod c2_shift;
 mod c3_insert;
 mod c4_flip;
+mod edges;
 mod g1_write_sites;
 mod g2_voronoi;
 mod g3_islands;
@@ -42,11 +43,12 @@ pub enum Rejected {
 }
 
 /// The steps that [`Counts::nanoseconds`] tells apart.
-pub const STEPS: [&str; 8] = [
+pub const STEPS: [&str; 9] = [
     "G1 write sites",
     "G2-G6 Voronoi, triangles",
-    "G3 islands",
     "C2 shift",
+    "G3 islands",
+    "C2' repair",
     "C1 hull",
     "C4 flip",
     "C3 insert",
@@ -96,6 +98,7 @@ pub struct Scratch {
     voronoi: g2_voronoi::Voronoi,
     scan: g6_triangles::Scan,
     sphere: sphere::Sphere,
+    islands: g3_islands::Islands,
     shift: c2_shift::Shift,
     flips: c4_flip::Flips,
     acceptance: accept::Acceptance,
@@ -116,7 +119,7 @@ impl Scratch {
 /// [`Rejected`] where this is not the way to do it; never a wrong mesh.
 pub fn triangulate(sites: &[Site], scratch: &mut Scratch) -> Result<(Mesh, Counts), Rejected> {
     check_size(sites)?;
-    let Scratch { texture, voronoi, scan, sphere, shift, flips, acceptance, mesh } = scratch;
+    let Scratch { texture, voronoi, scan, sphere, islands, shift, flips, acceptance, mesh } = scratch;
     let mut counts = Counts { sites: sites.len() as u64, ..Counts::default() };
     let mut clock = Clock::start();
     shift.clear();
@@ -128,25 +131,26 @@ pub fn triangulate(sites: &[Site], scratch: &mut Scratch) -> Result<(Mesh, Count
     scan.run(texture, voronoi, sphere);
     clock.done(&mut counts, 1);
     let at = &texture.sites;
-    g3_islands::remove_islands(sphere, at, texture.placed, &mut shift.suspects, &mut counts)?;
-    clock.done(&mut counts, 2);
     // Before C1, so that the hull is completed but once, where it really is.
     shift.test(sphere, at, &mut counts);
-    shift.repair(sphere, at)?;
+    clock.done(&mut counts, 2);
+    islands.remove(sphere, at, texture.placed, shift, &mut counts)?;
     clock.done(&mut counts, 3);
+    shift.repair(sphere, at)?;
+    clock.done(&mut counts, 4);
     c1_hull::complete_hull(sphere, at, shift)?;
     counts.removed = shift.removed.len() as u64;
-    clock.done(&mut counts, 4);
+    clock.done(&mut counts, 5);
     // Before C3, so that sites are inserted into a Delaunay mesh, where walks are short and sure to end.
     std::mem::swap(&mut flips.suspects, &mut shift.suspects);
     flips.run(sphere, at)?;
-    clock.done(&mut counts, 5);
+    clock.done(&mut counts, 6);
     c3_insert::insert_all(sphere, texture, scan, &shift.removed, flips)?;
     counts.flips = flips.done;
-    clock.done(&mut counts, 6);
-    let front = sphere.front();
-    acceptance.accept(sphere.compact(), front, at, &texture.order, mesh)?;
     clock.done(&mut counts, 7);
+    sphere.compact();
+    acceptance.accept(sphere, at, &texture.order, mesh)?;
+    clock.done(&mut counts, 8);
     Ok((std::mem::take(mesh), counts))
 }
 

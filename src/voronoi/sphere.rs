@@ -16,36 +16,43 @@ pub(super) const OUTSIDE: u32 = u32::MAX;
 /// A closed triangulated surface over sites; see the module.
 #[derive(Default)]
 pub(super) struct Sphere {
+    /// Only as far as `end`; the rest is room, kept from leaf to leaf.
     records: Vec<u32>,
+    end: usize,
     slots: usize,
     free: Vec<u32>,
     infinity: u32,
 }
 
+/// The half-edge after `h` in its triangle: by a table of two-bit numbers, since a branch would be wrong one time in three.
 #[inline(always)]
 pub(super) fn next(h: u32) -> u32 {
-    if h & 3 == 2 { h - 2 } else { h + 1 }
+    (h & !3) | (0b00_10_01 >> (2 * (h & 3)) & 3)
 }
 
+/// The half-edge before `h` in its triangle.
 #[inline(always)]
 pub(super) fn previous(h: u32) -> u32 {
-    if h & 3 == 0 { h + 2 } else { h - 1 }
+    (h & !3) | (0b01_00_10 >> (2 * (h & 3)) & 3)
 }
 
 impl Sphere {
     /// Forgets everything; makes room for `slots` slots and the triangles of `sites` sites. Vertex `infinity` is the ghost.
     pub(super) fn reset(&mut self, slots: usize, sites: usize, infinity: u32) {
         self.slots = slots.div_ceil(4);
-        self.records.clear();
-        self.records.reserve(8 * (self.slots + 2 * sites + sites / 8 + 64));
-        self.records.resize(8 * self.slots, FREE);
+        self.end = 8 * self.slots;
+        let room = self.end + 8 * (2 * sites + sites / 8 + 64);
+        if self.records.len() < room {
+            self.records.resize(room, FREE);
+        }
+        self.records[..self.end].fill(FREE);
         self.free.clear();
         self.infinity = infinity;
     }
 
     /// The half-edge that stands for slot `i`. Only its twin has a meaning.
     #[inline(always)]
-    pub(super) fn slot(i: usize) -> u32 {
+    pub(super) const fn slot(i: usize) -> u32 {
         ((i >> 2) << 3 | (i & 3)) as u32
     }
 
@@ -57,18 +64,23 @@ impl Sphere {
 
     /// The first half-edge of every record that may hold a triangle.
     pub(super) fn triangles(&self) -> impl Iterator<Item = u32> + use<> {
-        ((8 * self.slots) as u32..self.records.len() as u32).step_by(8)
+        (self.front()..self.end()).step_by(8)
+    }
+
+    /// All records, eight numbers each; half-edge h starts at `records[h]` and its twin is `records[h + 4]`.
+    pub(super) fn records(&self) -> &[u32] {
+        &self.records[..self.end]
     }
 
     /// The number of triangles, ghosts included.
     pub(super) fn len(&self) -> usize {
-        self.records.len() / 8 - self.slots - self.free.len()
+        self.end / 8 - self.slots - self.free.len()
     }
 
     /// The first half-edge of the next triangle that is added while none is free.
     #[inline(always)]
     pub(super) fn end(&self) -> u32 {
-        self.records.len() as u32
+        self.end as u32
     }
 
     #[inline(always)]
@@ -124,9 +136,14 @@ impl Sphere {
     /// A new triangle without twins; its first half-edge.
     #[inline(always)]
     pub(super) fn push(&mut self, a: u32, b: u32, c: u32) -> u32 {
-        let h = self.records.len() as u32;
-        self.records.extend_from_slice(&[a, b, c, FREE, FREE, FREE, FREE, FREE]);
-        h
+        let h = self.end;
+        if h + 8 > self.records.len() {
+            self.records.resize(2 * h + 8, FREE);
+        }
+        let record = &mut self.records[h..h + 8];
+        (record[0], record[1], record[2]) = (a, b, c);
+        self.end = h + 8;
+        h as u32
     }
 
     fn add(&mut self, corners: [u32; 3]) -> u32 {
@@ -248,8 +265,8 @@ impl Sphere {
         }
     }
 
-    /// Moves the finite triangles to the front and marks the hull; returns their records.
-    pub(super) fn compact(&mut self) -> &[u32] {
+    /// Moves the finite triangles to the front and marks the hull.
+    pub(super) fn compact(&mut self) {
         let infinity = self.infinity;
         let mut holes = std::mem::take(&mut self.free);
         for h in self.triangles() {
@@ -265,7 +282,6 @@ impl Sphere {
         self.fill_holes(&mut holes);
         self.free = holes;
         self.free.clear();
-        &self.records[8 * self.slots..]
     }
 
     /// Moves triangles from the end into `holes`, so that no hole is left.
@@ -275,25 +291,24 @@ impl Sphere {
         }
         holes.sort_unstable();
         for &hole in holes.iter() {
-            while self.records.len() > 8 * self.slots && self.records[self.records.len() - 8] == FREE {
-                self.records.truncate(self.records.len() - 8);
+            while self.end > 8 * self.slots && self.records[self.end - 8] == FREE {
+                self.end -= 8;
             }
-            if hole as usize >= self.records.len() {
+            if hole as usize >= self.end {
                 break;
             }
-            let last = self.records.len() - 8;
-            self.records.copy_within(last.., hole as usize);
-            self.records.truncate(last);
+            self.end -= 8;
+            self.records.copy_within(self.end..self.end + 8, hole as usize);
             for e in 0..3 {
                 let twin = self.twin(hole + e);
-                if twin != OUTSIDE && (twin as usize) < self.records.len() {
+                if twin != OUTSIDE && (twin as usize) < self.end {
                     self.set_twin(twin, hole + e);
                 }
             }
         }
     }
 
-    /// The number the first triangle has in [`Sphere::compact`]'s records, as a half-edge.
+    /// The first half-edge of the first triangle.
     pub(super) fn front(&self) -> u32 {
         (8 * self.slots) as u32
     }

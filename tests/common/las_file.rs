@@ -90,6 +90,10 @@ impl LasFile {
         bytes.extend([0; 32]);
         bytes.extend(data);
         bytes.extend(std::iter::repeat_n(0xdd, self.stray));
+        if self.records.is_empty() {
+            // The compressor would write its table over the header.
+            return bytes;
+        }
         let mut out = Cursor::new(Vec::new());
         out.write_all(&bytes).unwrap();
         let mut compressor = LasZipCompressor::new(&mut out, vlr).unwrap();

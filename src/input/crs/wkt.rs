@@ -20,10 +20,19 @@ enum Value {
 }
 
 impl Node {
-    fn parse(text: &str) -> Option<Node> {
-        let mut rest = text.trim();
-        let node = Node::read(&mut rest, 0)?;
-        rest.trim_matches(['\0', ' ', '\n', '\r', '\t']).is_empty().then_some(node)
+    /// The systems that `text` holds: one, or as some writers have it a horizontal and a vertical one parted by a comma.
+    fn parse_all(text: &str) -> Option<Vec<Node>> {
+        const FILLING: [char; 5] = ['\0', ' ', '\n', '\r', '\t'];
+        let mut rest = text.trim_matches(FILLING);
+        let mut nodes = Vec::new();
+        loop {
+            nodes.push(Node::read(&mut rest, 0)?);
+            rest = rest.trim_matches(FILLING);
+            match rest.strip_prefix(',') {
+                Some(more) => rest = more,
+                None => return rest.is_empty().then_some(nodes),
+            }
+        }
     }
 
     fn read(rest: &mut &str, depth: usize) -> Option<Node> {
@@ -107,15 +116,14 @@ fn read_quoted<'a>(quoted: &'a str, rest: &mut &'a str) -> Option<Value> {
 const PROJECTED: [&str; 3] = ["PROJCS", "PROJCRS", "PROJECTEDCRS"];
 const GEOGRAPHIC: [&str; 6] = ["GEOGCS", "GEOGCRS", "GEOGRAPHICCRS", "GEODCRS", "GEODETICCRS", "GEOCCS"];
 const LOCAL: [&str; 3] = ["LOCAL_CS", "ENGCRS", "ENGINEERINGCRS"];
-const VERTICAL: [&str; 3] = ["VERT_CS", "VERTCRS", "VERTICALCRS"];
+const VERTICAL: [&str; 4] = ["VERT_CS", "VERTCS", "VERTCRS", "VERTICALCRS"];
 const COMPOUND: [&str; 2] = ["COMPD_CS", "COMPOUNDCRS"];
 const UNITS: [&str; 3] = ["UNIT", "LENGTHUNIT", "ANGLEUNIT"];
 
 /// What `text` says; `None` where it is not well-known text of a coordinate reference system.
 pub(super) fn parse(text: &str) -> Option<Crs> {
-    let root = Node::parse(text.trim_end_matches('\0'))?;
-    let parts = if COMPOUND.contains(&root.keyword.as_str()) { root.children().collect() } else { vec![&root] };
-    let parts: Vec<&Node> = parts.into_iter().map(unbound).collect();
+    let roots = Node::parse_all(text)?;
+    let parts: Vec<&Node> = roots.iter().flat_map(parts).map(unbound).collect();
     let find = |keywords: &[&str]| parts.iter().find(|part| keywords.contains(&part.keyword.as_str())).copied();
     let horizontal = find(&PROJECTED).or_else(|| find(&GEOGRAPHIC)).or_else(|| find(&LOCAL))?;
     let geographic = GEOGRAPHIC[..5].contains(&horizontal.keyword.as_str());
@@ -133,7 +141,7 @@ pub(super) fn parse(text: &str) -> Option<Crs> {
 /// The parameters of the projection in `text`, names in one spelling, sorted; empty where there are none.
 pub(super) fn parameters(text: &str) -> Vec<(String, f64)> {
     let mut found = Vec::new();
-    if let Some(root) = Node::parse(text.trim_end_matches('\0')) {
+    for root in Node::parse_all(text).unwrap_or_default() {
         collect_parameters(&root, &mut found);
     }
     found.sort_by(|a, b| a.0.cmp(&b.0));
@@ -150,6 +158,11 @@ fn collect_parameters(node: &Node, found: &mut Vec<(String, f64)>) {
     for child in node.children().filter(|child| child.keyword != "ABRIDGEDTRANSFORMATION") {
         collect_parameters(child, found);
     }
+}
+
+/// The parts of a compound system, or the system itself.
+fn parts(node: &Node) -> Vec<&Node> {
+    if COMPOUND.contains(&node.keyword.as_str()) { node.children().collect() } else { vec![node] }
 }
 
 /// The system that a bound one is about.
@@ -222,6 +235,13 @@ mod tests {
         assert_eq!(parse(r#"GEOGCS["WGS 84",UNIT["degree",0.0174532925199433]]"#).unwrap().horizontal, Unit::Degree);
         let bound = r#"BOUNDCRS[SOURCECRS[PROJCRS["P",LENGTHUNIT["metre",1]]],TARGETCRS[GEOGCRS["W"]]]"#;
         assert_eq!(parse(bound).unwrap().horizontal, Unit::Metre);
+    }
+
+    #[test]
+    fn two_systems_side_by_side_are_a_compound_one() {
+        let text = r#"PROJCS["P",GEOGCS["G",UNIT["Degree",0.0174]],UNIT["Foot_US",0.3048006096012192]],VERTCS["V",UNIT["Meter",1.0]]"#;
+        let crs = parse(text).unwrap();
+        assert_eq!((crs.horizontal, crs.vertical, crs.name.as_deref()), (Unit::UsFoot, Some(1.0), Some("P")));
     }
 
     #[test]

@@ -135,7 +135,7 @@ pub(super) struct Detection {
 impl Columns {
     /// Finds out how the text in `path` is laid out, the first lines of which are `lines`.
     pub(super) fn detect(path: &Path, lines: &[&[u8]], options: &TextOptions) -> Result<Detection> {
-        let comments = comments(options);
+        let comments = comments(options)?;
         let rows: Vec<&[u8]> = lines.iter().copied().filter(|line| !skipped(line, &comments)).collect();
         let Some((&first, after)) = rows.split_first() else {
             return Err(Error::input(path, "has no line with numbers in it"));
@@ -154,7 +154,7 @@ impl Columns {
             Some(names) => roles(names.iter().map(|name| name.as_bytes()))
                 .map_err(|what| Error::Config(format!("[input.csv] columns {what}")))?,
             None if named => header_roles(&candidates_for_header(&candidates), first)
-                .map_err(|what| Error::input(path, format!("the first line, {}, {what}; {ADVICE}", shown(first))))?,
+                .map_err(|what| Error::input(path, format!("the first line, {}, {what}", shown(first))))?,
             None => vec![Role::Coordinate(0), Role::Coordinate(1), Role::Coordinate(2)],
         };
         let delimiter = row_delimiter(&candidates, &roles, if header { after } else { &rows });
@@ -173,20 +173,26 @@ impl Columns {
     }
 }
 
+const NOT_A_ROW: &str = "has neither three numbers nor names of columns; numbers have a point before their decimals, and a \
+                         comma, a semicolon, a tab or spaces between them";
+
 const ADVICE: &str = "name the columns with `columns` under [input.csv]";
 
-fn comments(options: &TextOptions) -> Vec<Vec<u8>> {
+fn comments(options: &TextOptions) -> Result<Vec<Vec<u8>>> {
     match &options.comment {
-        Some(comment) if comment.is_empty() => Vec::new(),
-        Some(comment) => vec![comment.as_bytes().to_vec()],
-        None => vec![b"#".to_vec(), b"//".to_vec()],
+        Some(comment) if comment.is_empty() => Ok(Vec::new()),
+        Some(comment) if comment.starts_with(|c: char| c.is_ascii_digit()) => Err(Error::Config(format!(
+            "[input.csv] comment = {comment:?} would skip rows; it cannot begin with a digit"
+        ))),
+        Some(comment) => Ok(vec![comment.as_bytes().to_vec()]),
+        None => Ok(vec![b"#".to_vec(), b"//".to_vec()]),
     }
 }
 
 #[inline]
 fn skipped(line: &[u8], comments: &[Vec<u8>]) -> bool {
-    // Rows begin with a digit or a sign, so most lines are decided here.
-    if line.first().is_some_and(|byte| byte.is_ascii_digit() || *byte == b'-') {
+    // Most rows begin with a digit, and no comment does.
+    if line.first().is_some_and(u8::is_ascii_digit) {
         return false;
     }
     let line = line.trim_ascii_start();
@@ -216,12 +222,15 @@ fn candidates_for_header(candidates: &[Delimiter]) -> Vec<Delimiter> {
 
 /// The roles under the first delimiter that gives x, y and z, or what is wrong under the one that gives most columns.
 fn header_roles(candidates: &[Delimiter], line: &[u8]) -> std::result::Result<Vec<Role>, String> {
+    if !line.iter().any(|byte| byte.is_ascii_alphabetic()) {
+        return Err(NOT_A_ROW.to_string());
+    }
     let split = |delimiter: &Delimiter| roles(delimiter.fields(line).into_iter());
     if let Some(found) = candidates.iter().find_map(|delimiter| split(delimiter).ok()) {
         return Ok(found);
     }
     let most = candidates.iter().max_by_key(|delimiter| delimiter.fields(line).len());
-    most.map_or(Err("cannot be read".to_string()), split)
+    most.map_or(Err("cannot be read".to_string()), split).map_err(|what| format!("{what}; {ADVICE}"))
 }
 
 fn roles<'a>(names: impl Iterator<Item = &'a [u8]>) -> std::result::Result<Vec<Role>, String> {

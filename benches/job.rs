@@ -1,0 +1,71 @@
+//! The whole job against decoding alone: `cargo bench --bench job [FILE.laz] [RUNS]`.
+//!
+//! Alternates, in one process, between one thread that only decodes the file with the `las` crate and the whole job on it,
+//! and prints medians, their ratio and the stages of the median job. Without FILE it takes autzen.laz from the test data
+//! if that is there, else a sample terrain of 4 million points.
+
+use gdt_batch::config::Config;
+use gdt_batch::job::progress::Progress;
+use gdt_batch::job::report::Report;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
+
+fn main() -> Outcome<()> {
+    let mut arguments = std::env::args().skip(1).filter(|a| !a.starts_with("--"));
+    let scratch = tempfile::tempdir()?;
+    let file = match arguments.next() {
+        Some(path) => PathBuf::from(path),
+        None => default_file(scratch.path())?,
+    };
+    let runs: usize = arguments.next().map_or(Ok(5), |n| n.parse())?;
+    let (mut decoding, mut jobs) = (Vec::new(), Vec::new());
+    for run in 0..runs {
+        decoding.push(decode(&file)?);
+        jobs.push(job(&file, &scratch.path().join(run.to_string()))?);
+    }
+    decoding.sort_by(f64::total_cmp);
+    jobs.sort_by(|a, b| a.wall_s.total_cmp(&b.wall_s));
+    let (decode, job) = (decoding[runs / 2], &jobs[runs / 2]);
+    println!("{}, {} runs, medians", file.display(), runs);
+    println!("{job}");
+    println!("decode only, one thread, las crate  {decode:.2} s");
+    println!("whole job, {} threads               {:.2} s", job.threads, job.wall_s);
+    println!("ratio                               {:.2}", job.wall_s / decode);
+    Ok(())
+}
+
+fn default_file(scratch: &Path) -> Outcome<PathBuf> {
+    let shared = std::env::var_os("GDT_SHARED")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
+    let autzen = shared.join("data/autzen.laz");
+    if autzen.is_file() {
+        return Ok(autzen);
+    }
+    let sample = scratch.join("sample.laz");
+    gdt_batch::sample::write(&sample, 4_000_000, 1)?;
+    Ok(sample)
+}
+
+/// Seconds that one thread takes to decode every record, as fast as the `las` crate can: into one buffer, in batches.
+fn decode(file: &Path) -> Outcome<f64> {
+    let start = Instant::now();
+    let mut reader = las::Reader::from_path(file)?;
+    let mut batch = las::PointDataBuilder::new().for_header(reader.header()).build();
+    while reader.fill_points(100_000, &mut batch)? > 0 {}
+    Ok(start.elapsed().as_secs_f64())
+}
+
+fn job(file: &Path, output: &Path) -> Outcome<Report> {
+    let config = output.with_extension("toml");
+    std::fs::write(
+        &config,
+        format!(
+            "[input]\nfiles = [{:?}]\nunit = \"metre\"\n[output]\ndirectory = {:?}\n",
+            file.canonicalize()?,
+            output
+        ),
+    )?;
+    Ok(gdt_batch::job::run(&Config::load(&config)?, Progress::Quiet)?)
+}
