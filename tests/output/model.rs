@@ -20,7 +20,7 @@ impl Random {
         let mut v = self.0;
         v = (v ^ (v >> 30)).wrapping_mul(0xbf58476d1ce4e5b9);
         v = (v ^ (v >> 27)).wrapping_mul(0x94d049bb133111eb);
-        (((v ^ (v >> 31)) as u128 * limit as u128) >> 64) as u64
+        ((((v ^ (v >> 31)) as u128) * limit as u128) >> 64) as u64
     }
 }
 
