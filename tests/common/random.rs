@@ -14,18 +14,6 @@ impl Random {
 
     /// A whole number from 0 to `limit`, exclusive.
     pub(crate) fn below(&mut self, limit: u64) -> u64 {
-        (self.bits() as u128 * limit as u128 >> 64) as u64
-    }
-
-    /// A number from 0 to 1, exclusive.
-    pub(crate) fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// Two independent normal variables (Box and Muller 1958).
-    pub(crate) fn normal(&mut self) -> [f64; 2] {
-        let radius = (-2.0 * (1.0 - self.unit()).ln()).sqrt();
-        let (sin, cos) = (self.unit() * std::f64::consts::TAU).sin_cos();
-        [radius * cos, radius * sin]
+        ((self.bits() as u128 * limit as u128) >> 64) as u64
     }
 }

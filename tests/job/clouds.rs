@@ -7,6 +7,20 @@ use std::path::{Path, PathBuf};
 
 use crate::random::Random;
 
+impl Random {
+    /// A number from 0 to 1, exclusive.
+    pub(crate) fn unit(&mut self) -> f64 {
+        self.below(1 << 53) as f64 / (1u64 << 53) as f64
+    }
+
+    /// Two independent normal variables (Box and Muller 1958).
+    pub(crate) fn normal(&mut self) -> [f64; 2] {
+        let radius = (-2.0 * (1.0 - self.unit()).ln()).sqrt();
+        let (sin, cos) = (self.unit() * std::f64::consts::TAU).sin_cos();
+        [radius * cos, radius * sin]
+    }
+}
+
 /// Points x, y, z.
 pub(crate) type Cloud = Vec<[i64; 3]>;
 

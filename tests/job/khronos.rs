@@ -1,34 +1,15 @@
 //! The Khronos validator has nothing to say about what whole jobs write.
 
-use std::path::{Path, PathBuf};
-use std::process::Command;
-
 use crate::clouds;
 use crate::common::shared;
 use crate::program::Job;
-
-/// The folder of the validator; where it is not installed the tests say so and pass, but under tests/run they fail.
-fn npm() -> Option<PathBuf> {
-    let npm = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/npm");
-    if npm.join("node_modules/gltf-validator").is_dir() {
-        return Some(npm);
-    }
-    assert!(std::env::var_os("GDT_TEST_ALL").is_none(), "no gltf-validator in {}", npm.display());
-    eprintln!("not tested: no gltf-validator; run `npm ci` in tests/npm, or tests/run");
-    None
-}
+use crate::validator::validate;
 
 /// Runs the job and validates every GLB; there must be at least `least` of them.
 #[track_caller]
 fn validated(job: &Job, least: usize) {
-    let Some(npm) = npm() else { return };
     job.report();
-    let output = Command::new("node").arg(npm.join("validate.mjs")).arg(job.out()).output().expect("node runs");
-    let said = String::from_utf8_lossy(&output.stdout);
-    assert!(output.status.success(), "{said}{}", String::from_utf8_lossy(&output.stderr));
-    let summary = said.lines().last().unwrap();
-    let files: usize = summary.split(' ').next().unwrap().parse().unwrap();
-    assert!(files >= least && summary.contains(" 0 errors, 0 warnings"), "{summary}");
+    validate(&job.out(), least);
 }
 
 #[test]

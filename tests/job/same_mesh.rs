@@ -13,13 +13,8 @@ const ALL_IN_ONE: u64 = 1_000_000;
 #[track_caller]
 fn one_digest(job: impl Fn() -> Job) -> String {
     let expected = job().tiles_of(ALL_IN_ONE).with("triangulation", "backend = \"reference\"").threads(1).digest();
-    let ways = [
-        (2_000, "cpu", 2),
-        (2_000, "cpu", 1),
-        (2_000, "reference", 2),
-        (50_000, "cpu", 2),
-        (ALL_IN_ONE, "cpu", 2),
-    ];
+    let ways =
+        [(2_000, "cpu", 2), (2_000, "cpu", 1), (2_000, "reference", 2), (50_000, "cpu", 2), (ALL_IN_ONE, "cpu", 2)];
     for (sites, backend, threads) in ways {
         let job = job().tiles_of(sites).threads(threads);
         let digest = job.with("triangulation", &format!("backend = \"{backend}\"")).digest();
