@@ -53,8 +53,8 @@ pub struct Preflight {
 /// # Errors
 /// Whatever would stop the job before its first point; see [`scan::run`].
 pub fn run(config: &Config) -> Result<Preflight> {
-    let threads = workers(config)?;
     let plan = scan::run(config)?;
+    let threads = workers(config, plan.records)?;
     Ok(preflight(&plan, config, threads))
 }
 
