@@ -32,6 +32,14 @@ pub enum Error {
     /// The command line or the configuration is wrong (exit code 2).
     #[error("{0}")]
     Config(String),
+    /// The mesh has a triangle too long for single precision at the resolution of the job (exit code 2).
+    #[error("{what}: set a coarser [input] resolution, narrower bounds, or leave out the classes that are no terrain")]
+    TooFine {
+        /// Whether the resolution of z is meant, not that of x and y.
+        vertical: bool,
+        /// How long it is, and what would fit.
+        what: String,
+    },
     /// An input file cannot be used (exit code 3).
     #[error("{}: {what}", path.display())]
     Input {
@@ -53,7 +61,7 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Io { .. } | Error::InUse { .. } | Error::Memory(_) => 1,
-            Error::Config(_) => 2,
+            Error::Config(_) | Error::TooFine { .. } => 2,
             Error::Input { .. } | Error::NoTerrain(_) => 3,
             Error::Broken(_) => 4,
         }

@@ -1,7 +1,7 @@
 //! Preflight: what a job would read and need, without writing anything.
 
 use super::report::grouped;
-use super::scan::{self, Plan};
+use super::scan::{self, Coarser, Plan};
 use super::{BYTES_PER_LEAF_SITE, partition, workers};
 use crate::Result;
 use crate::config::Config;
@@ -55,7 +55,7 @@ pub struct Preflight {
 /// # Errors
 /// Whatever would stop the job before its first point; see [`scan::run`].
 pub fn run(config: &Config) -> Result<Preflight> {
-    let plan = scan::run(config)?;
+    let plan = scan::run(config, Coarser::default())?;
     let threads = workers(config, plan.records)?;
     Ok(preflight(&plan, config, threads))
 }

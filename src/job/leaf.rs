@@ -5,12 +5,14 @@ use super::directory::Directory;
 use super::partition::Partition;
 use super::records::{Frontier, Leaf, Rim, RimDraft};
 use super::sites;
+use super::span::Longest;
 use super::spill::Spill;
 use crate::Result;
 use crate::config::{Backend, Duplicates};
 use crate::geometry::Site;
 use crate::input::Point;
 use crate::output::normals::Sums;
+use crate::triangulation::mesh::Mesh;
 use crate::triangulation::{self, Outcome};
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
@@ -47,12 +49,15 @@ pub struct Task {
     pub duplicates: Duplicates,
     /// Who triangulates.
     pub backend: Backend,
+    /// How long a triangle may be.
+    pub longest: Longest,
 }
 
 /// Triangulates leaf `tile` and leaves its sites, closed triangles and frontier in the job directory.
 ///
 /// # Errors
-/// [`crate::Error::Io`] on the job directory, [`crate::Error::Broken`] if the triangulation fails.
+/// [`crate::Error::Io`] on the job directory, [`crate::Error::TooFine`] if a triangle is too long to be written,
+/// [`crate::Error::Broken`] if the triangulation fails.
 pub fn run(
     directory: &Directory,
     partition: &Partition,
@@ -67,6 +72,7 @@ pub fn run(
     let is_root = partition.tree.nodes[node].parent.is_none();
     let cell = (!is_root).then_some(&partition.tree.nodes[node].cell);
     let closing = close(&mesh, &sites, cell, |_| false);
+    check_spans(&mesh, &sites, &closing.states, task.longest)?;
     let closed = mesh.triangles.iter().zip(&closing.states).filter(|(_, state)| **state == State::Closed);
     let leaf = leaf_of(&points, closed.map(|(triangle, _)| *triangle).collect());
     triangulation::recycle(mesh);
@@ -77,6 +83,11 @@ pub fn run(
         + frontier.save(directory, node)?;
     let (sites, triangles) = (sites.len() as u64, leaf.triangles.len() as u64);
     Ok(LeafFigures { sites, duplicates: dropped, triangles, bytes, outcome })
+}
+
+fn check_spans(mesh: &Mesh, sites: &[Site], states: &[State], longest: Longest) -> Result<()> {
+    let mut closed = mesh.triangles.iter().zip(states).filter(|(_, state)| **state == State::Closed);
+    closed.try_for_each(|(corners, _)| longest.check(corners.map(|v| sites[v as usize])))
 }
 
 fn leaf_of(points: &[Point], triangles: Vec<[u32; 3]>) -> Leaf {

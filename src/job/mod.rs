@@ -16,6 +16,7 @@ pub mod records;
 pub mod report;
 pub mod scan;
 pub mod sites;
+pub mod span;
 pub mod spill;
 pub mod stitch;
 pub mod tree;
@@ -35,7 +36,8 @@ use partition::{Partition, Summary, Task};
 use progress::{Progress, Stage, StageFigures};
 use rayon::prelude::*;
 use report::{Parts, Report};
-use scan::Plan;
+use scan::{Coarser, Plan};
+use span::Longest;
 use spill::Spill;
 use std::io::Write;
 use std::time::Instant;
@@ -43,6 +45,8 @@ use tree::{Kind, Tree};
 
 /// Bytes that one site of a leaf takes while the leaf is triangulated: points, sort keys, sites, mesh and marks.
 const BYTES_PER_LEAF_SITE: u64 = 500;
+/// Ten times coarser as often as this is no terrain any more.
+const MOST_TENS: u32 = 6;
 /// A mesh of more triangles than this is not written as one file: viewers would not open it.
 const MOST_TRIANGLES_IN_ONE_FILE: u64 = 20_000_000;
 
@@ -56,8 +60,28 @@ pub fn run(config: &Config, progress: Progress) -> Result<Report> {
         let what = "[triangulation] backend = \"gpu\": this version has no GPU executor; use \"auto\" or \"cpu\"";
         return Err(Error::Config(what.into()));
     }
+    let mut coarser = Coarser::default();
+    loop {
+        match attempt(config, coarser, progress, start) {
+            // Only the finished mesh knows its longest triangle, so that a second try is the price of not rounding in vain.
+            Err(Error::TooFine { vertical: true, what }) if coarser.vertical < MOST_TENS => {
+                progress.note(&format!("{what}; starting again with a coarser step in z"));
+                coarser.vertical += 1;
+            }
+            Err(Error::TooFine { vertical: false, what })
+                if config.input.resolution.0.is_none() && coarser.horizontal < MOST_TENS =>
+            {
+                progress.note(&format!("{what}; starting again with a coarser step in x and y"));
+                coarser.horizontal += 1;
+            }
+            outcome => return outcome,
+        }
+    }
+}
+
+fn attempt(config: &Config, coarser: Coarser, progress: Progress, start: Instant) -> Result<Report> {
     let stage = progress.stage("scan", 1, "job");
-    let plan = on_threads(config.threads(), || scan::run(config))?;
+    let plan = on_threads(config.threads(), || scan::run(config, coarser))?;
     stage.advance(1);
     let scanned = stage.finish();
     let threads = workers(config, plan.records)?;
@@ -114,10 +138,12 @@ impl Job<'_> {
         let stage = progress.stage("read", plan.records, "points");
         let partition = partition::run(&task(plan, config), directory, &stage)?;
         let bounds = enough_points(&partition.summary)?;
+        let longest = Longest::of(&plan.frame);
+        longest.check_heights(bounds[0][2], bounds[1][2])?;
         let read = stage.finish();
 
         let stage = progress.stage("triangulate", partition.summary.tally.kept, "points");
-        let leaves = triangulate(config, directory, &partition, &stage)?;
+        let leaves = triangulate(config, directory, &partition, longest, &stage)?;
         // From here on the leaves' own files are enough.
         directory::remove_file(&directory.spill())?;
         let triangulated = stage.finish();
@@ -191,9 +217,15 @@ fn enough_triangles(triangles: u64) -> Result<()> {
 }
 
 /// Triangulates all leaves and merges every inner node as soon as its children are done.
-fn triangulate(config: &Config, directory: &Directory, partition: &Partition, stage: &Stage) -> Result<LeafFigures> {
+fn triangulate(
+    config: &Config,
+    directory: &Directory,
+    partition: &Partition,
+    longest: Longest,
+    stage: &Stage,
+) -> Result<LeafFigures> {
     let spill = Spill::open(&directory.spill())?;
-    let grower = Grower { config, directory, partition, spill: &spill, stage };
+    let grower = Grower { config, directory, partition, spill: &spill, longest, stage };
     grower.grow(0)
 }
 
@@ -202,6 +234,7 @@ struct Grower<'a> {
     directory: &'a Directory,
     partition: &'a Partition,
     spill: &'a Spill,
+    longest: Longest,
     stage: &'a Stage,
 }
 
@@ -210,7 +243,8 @@ impl Grower<'_> {
         match self.partition.tree.nodes[node].kind {
             Kind::Leaf(tile) => {
                 let Config { input, triangulation, .. } = self.config;
-                let task = leaf::Task { duplicates: input.duplicates, backend: triangulation.backend };
+                let task =
+                    leaf::Task { duplicates: input.duplicates, backend: triangulation.backend, longest: self.longest };
                 let figures = leaf::run(self.directory, self.partition, self.spill, tile, task)?;
                 self.stage.advance(figures.sites + figures.duplicates);
                 Ok(figures)
@@ -219,7 +253,8 @@ impl Grower<'_> {
                 let (low, high) = rayon::join(|| self.grow(low), || self.grow(high));
                 let (mut figures, high) = (low?, high?);
                 figures += high;
-                merge::run(self.directory, &self.partition.tree, node, self.config.limits.memory.0 / 2)?;
+                let memory = self.config.limits.memory.0 / 2;
+                merge::run(self.directory, &self.partition.tree, node, memory, self.longest)?;
                 Ok(figures)
             }
         }
