@@ -18,6 +18,14 @@ pub enum Error {
         /// What the operating system said.
         source: std::io::Error,
     },
+    /// Another process works in the job directory (exit code 1).
+    #[error("process {holder} is working in {}: wait for it, or choose another [output] directory", directory.display())]
+    InUse {
+        /// The job directory.
+        directory: PathBuf,
+        /// The process id of the holder.
+        holder: String,
+    },
     /// The job does not fit the memory it was given (exit code 1).
     #[error("not enough memory: {0}")]
     Memory(String),
@@ -44,7 +52,7 @@ impl Error {
     /// The process exit code: 1 may be retried, 2 usage or configuration, 3 bad input, 4 internal invariant broken.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Error::Io { .. } | Error::Memory(_) => 1,
+            Error::Io { .. } | Error::InUse { .. } | Error::Memory(_) => 1,
             Error::Config(_) => 2,
             Error::Input { .. } | Error::NoTerrain(_) => 3,
             Error::Broken(_) => 4,

@@ -2,13 +2,13 @@
 
 use super::report::grouped;
 use super::scan::{self, Plan};
-use super::{BYTES_PER_LEAF_SITE, workers};
+use super::{BYTES_PER_LEAF_SITE, partition, workers};
 use crate::Result;
 use crate::config::Config;
 use crate::input::Point;
 use serde::Serialize;
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Bytes of job directory a site, beside the spill: its place, colour, class and two triangles.
 const TEMPORARY_PER_SITE: u64 = 12 + 6 + 1 + 2 * 12;
@@ -42,6 +42,8 @@ pub struct Preflight {
     pub temporary: u64,
     /// Bytes of results, at the most.
     pub results: u64,
+    /// Bytes free on the disk of the output directory; `None` where the system does not tell.
+    pub disk_free: Option<u64>,
     /// Who will triangulate.
     pub backend: String,
     /// What the user should know.
@@ -53,8 +55,8 @@ pub struct Preflight {
 /// # Errors
 /// Whatever would stop the job before its first point; see [`scan::run`].
 pub fn run(config: &Config) -> Result<Preflight> {
-    let threads = workers(config)?;
     let plan = scan::run(config)?;
+    let threads = workers(config, plan.records)?;
     Ok(preflight(&plan, config, threads))
 }
 
@@ -63,6 +65,7 @@ fn preflight(plan: &Plan, config: &Config, threads: usize) -> Preflight {
     let points = plan.records;
     let steps = |axis: usize| plan.extent[1][axis] as f64 - plan.extent[0][axis] as f64;
     let resolution = plan.frame.extras().resolution;
+    let leaves = per_tile.min(points) * BYTES_PER_LEAF_SITE * threads as u64;
     Preflight {
         files: plan.sources.iter().map(|(s, _)| (s.path.clone(), format!("{:?}", s.format), s.records)).collect(),
         records: points,
@@ -73,14 +76,20 @@ fn preflight(plan: &Plan, config: &Config, threads: usize) -> Preflight {
         unit: plan.unit.into(),
         crs: plan.crs.name.clone(),
         threads,
-        memory: (per_tile.min(points) * BYTES_PER_LEAF_SITE * threads as u64 + (64 << 20))
-            .max(config.limits.memory.0 / 6),
+        memory: (64 << 20) + leaves.max(partition::buffer_bytes(points, per_tile, config.limits.memory.0 / 6)),
         memory_limit: config.limits.memory.0,
         temporary: points * (size_of::<Point>() as u64 + TEMPORARY_PER_SITE),
         results: points * RESULT_PER_SITE,
+        disk_free: disk_free(&config.output.directory),
         backend: format!("{:?}", config.triangulation.backend).to_lowercase(),
         warnings: plan.warnings.clone(),
     }
+}
+
+/// The free bytes where `directory` is, or will be.
+fn disk_free(directory: &Path) -> Option<u64> {
+    let existing = directory.ancestors().find(|d| d.is_dir()).unwrap_or(Path::new("."));
+    fs4::available_space(existing).ok()
 }
 
 impl fmt::Display for Preflight {
@@ -99,6 +108,14 @@ impl fmt::Display for Preflight {
         row("memory", format!("about {} of {}", mebibytes(self.memory), mebibytes(self.memory_limit)))?;
         row("temporary files", format!("at most {}", mebibytes(self.temporary)))?;
         row("results", format!("at most {}", mebibytes(self.results)))?;
+        let free = self.disk_free.map_or("unknown".into(), mebibytes);
+        row("free disk", free)?;
+        if self.disk_free.is_some_and(|free| free < self.temporary + self.results) {
+            writeln!(
+                f,
+                "warning: the disk may not hold the temporary files and the results: make room or choose another disk"
+            )?;
+        }
         for warning in &self.warnings {
             writeln!(f, "warning: {warning}")?;
         }

@@ -69,6 +69,7 @@ pub fn run(
     let closing = close(&mesh, &sites, cell, |_| false);
     let closed = mesh.triangles.iter().zip(&closing.states).filter(|(_, state)| **state == State::Closed);
     let leaf = leaf_of(&points, closed.map(|(triangle, _)| *triangle).collect());
+    triangulation::recycle(mesh);
     let rim = |&site: &u32| Rim { tile: tile as u32, site, position: leaf.positions[site as usize] };
     let frontier = Frontier { sites: closing.frontier.iter().map(rim).collect(), boundary: closing.boundary };
     let bytes = rim_draft(&leaf, &closing.frontier).save(directory, tile)?

@@ -20,7 +20,7 @@ pub mod spill;
 pub mod stitch;
 pub mod tree;
 
-use crate::config::{ColorChoice, Config};
+use crate::config::{Backend, ColorChoice, Config};
 use crate::output::color::Coloring;
 use crate::output::georeference::Georeference;
 use crate::output::picture::Picture;
@@ -32,14 +32,14 @@ use directory::Directory;
 use export::{Look, TileFigures};
 use leaf::LeafFigures;
 use partition::{Partition, Summary, Task};
-use progress::{Progress, Stage};
+use progress::{Progress, Stage, StageFigures};
 use rayon::prelude::*;
 use report::{Parts, Report};
 use scan::Plan;
 use spill::Spill;
 use std::io::Write;
 use std::time::Instant;
-use tree::Kind;
+use tree::{Kind, Tree};
 
 /// Bytes that one site of a leaf takes while the leaf is triangulated: points, sort keys, sites, mesh and marks.
 const BYTES_PER_LEAF_SITE: u64 = 500;
@@ -49,25 +49,46 @@ const MOST_TRIANGLES_IN_ONE_FILE: u64 = 20_000_000;
 /// Runs the whole job of `config`.
 ///
 /// # Errors
-/// Whatever stops a step; see [`Error`].
+/// Whatever stops a step; see [`Error`]. A job that fails leaves no temporary files.
 pub fn run(config: &Config, progress: Progress) -> Result<Report> {
     let start = Instant::now();
-    let threads = workers(config)?;
+    if config.triangulation.backend == Backend::Gpu {
+        let what = "[triangulation] backend = \"gpu\": this version has no GPU executor; use \"auto\" or \"cpu\"";
+        return Err(Error::Config(what.into()));
+    }
+    let stage = progress.stage("scan", 1, "job");
+    let plan = on_threads(config.threads(), || scan::run(config))?;
+    stage.advance(1);
+    let scanned = stage.finish();
+    let threads = workers(config, plan.records)?;
+    let directory = Directory::new(&config.output.directory);
+    let _lock = directory.create()?;
+    let job = Job { config, plan: &plan, directory: &directory, progress, threads, start };
+    let outcome = on_threads(threads, || job.run(scanned));
+    if outcome.is_err() {
+        // The first error is the one to report.
+        let _ = directory.clean_up();
+    }
+    outcome
+}
+
+/// What `work` returns, its rayon tasks on `threads` threads.
+fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> Result<T> + Send) -> Result<T> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|e| Error::Memory(format!("cannot start {threads} threads: {e}")))?;
-    pool.install(|| run_steps(config, progress, threads, start))
+    pool.install(work)
 }
 
 /// As many threads as are wanted, and as have room for a leaf each.
-fn workers(config: &Config) -> Result<usize> {
-    let per_leaf = config.triangulation.sites_per_tile.0.saturating_mul(BYTES_PER_LEAF_SITE);
+fn workers(config: &Config, points: u64) -> Result<usize> {
+    let per_tile = config.triangulation.sites_per_tile.0.min(points).max(1);
+    let per_leaf = per_tile.saturating_mul(BYTES_PER_LEAF_SITE);
     // The rest is for code, stacks, decoders and what the allocator keeps.
     let room = config.limits.memory.0 / 4 * 3;
     match room / per_leaf {
         0 => Err(Error::Config(format!(
-            "[triangulation] sites_per_tile = {} takes about {} MiB a thread, more than [limits] memory = \"{}\" has room for: \
-             lower the one or raise the other",
-            config.triangulation.sites_per_tile.0,
+            "tiles of {per_tile} points take about {} MiB a thread, more than [limits] memory = \"{}\" has room for: lower \
+             [triangulation] sites_per_tile or raise memory",
             per_leaf >> 20,
             config.limits.memory
         ))),
@@ -75,56 +96,67 @@ fn workers(config: &Config) -> Result<usize> {
     }
 }
 
-fn run_steps(config: &Config, progress: Progress, threads: usize, start: Instant) -> Result<Report> {
-    let memory = config.limits.memory.0;
-    let directory = Directory::new(&config.output.directory);
+/// A job whose inputs have been looked at and whose directory is its own.
+struct Job<'a> {
+    config: &'a Config,
+    plan: &'a Plan,
+    directory: &'a Directory,
+    progress: Progress,
+    threads: usize,
+    start: Instant,
+}
 
-    let stage = progress.stage("scan", config.input.files.len() as u64, "patterns");
-    let plan = scan::run(config)?;
-    stage.advance(config.input.files.len() as u64);
-    let mut stages = vec![stage.finish()];
-    directory.create()?;
+impl Job<'_> {
+    /// Step 2 and all after it.
+    fn run(&self, scanned: StageFigures) -> Result<Report> {
+        let Job { config, plan, directory, progress, .. } = *self;
 
-    let stage = progress.stage("read", plan.records, "points");
-    let partition = partition::run(&task(&plan, config), &directory, &stage)?;
-    stages.push(stage.finish());
-    let bounds = enough_points(&partition.summary)?;
+        let stage = progress.stage("read", plan.records, "points");
+        let partition = partition::run(&task(plan, config), directory, &stage)?;
+        let bounds = enough_points(&partition.summary)?;
+        let read = stage.finish();
 
-    let stage = progress.stage("triangulate", partition.summary.tally.kept, "points");
-    let leaves = triangulate(config, &directory, &partition, &stage)?;
-    // From here on the leaves' own files are enough.
-    directory::remove_file(&directory.spill())?;
-    stages.push(stage.finish());
-    let temporary = partition.spilled + leaves.bytes;
+        let stage = progress.stage("triangulate", partition.summary.tally.kept, "points");
+        let leaves = triangulate(config, directory, &partition, &stage)?;
+        // From here on the leaves' own files are enough.
+        directory::remove_file(&directory.spill())?;
+        let triangulated = stage.finish();
 
-    let look = look(config, &plan, &partition.summary, bounds);
-    let tiles = partition.tree.leaves.len();
-    let stage = progress.stage("stitch", tiles as u64, "tiles");
-    (0..tiles).into_par_iter().try_for_each(|tile| {
-        stitch::run(&directory, &partition.tree, tile, &look.frame)?;
+        let look = look(config, plan, &partition.summary, bounds);
+        let tiles = partition.tree.leaves.len();
+        let stage = progress.stage("stitch", tiles as u64, "tiles");
+        stitch_all(directory, &partition.tree, &look, &stage)?;
+        let stitched = stage.finish();
+
+        let stage = progress.stage("write", leaves.sites, "sites");
+        let canvas = Canvas::new(&look.frame, bounds);
+        let written = export_all(directory, &partition, &look, &canvas, &stage)?;
+        enough_triangles(written.triangles)?;
+        let exported = stage.finish();
+
+        let stage = progress.stage("finish", 1, "job");
+        let other_bytes = finish(directory, plan, &written, &canvas, tiles, bounds)?;
+        directory.clean_up()?;
         stage.advance(1);
-        Ok::<(), Error>(())
-    })?;
-    stages.push(stage.finish());
+        let stages = vec![scanned, read, triangulated, stitched, exported, stage.finish()];
 
-    let stage = progress.stage("write", leaves.sites, "sites");
-    let canvas = Canvas::new(&look.frame, bounds);
-    let written = export_all(&directory, &partition, &look, &canvas, &stage)?;
-    enough_triangles(written.triangles)?;
-    stages.push(stage.finish());
-
-    let stage = progress.stage("finish", 1, "scene");
-    let other_bytes = finish(&directory, &plan, &written, &canvas, tiles, bounds)?;
-    directory.clean_up()?;
-    stage.advance(1);
-    stages.push(stage.finish());
-
-    let points = partition.summary.tally;
-    let wall_s = start.elapsed().as_secs_f64();
-    let parts = Parts { points, leaves, tiles: written, other_bytes, temporary, stages, threads, memory, wall_s };
-    let report = Report::new(&plan, parts);
-    directory::write_json(&directory.report(), &report)?;
-    Ok(report)
+        let report = Report::new(
+            plan,
+            Parts {
+                points: partition.summary.tally,
+                leaves,
+                tiles: written,
+                other_bytes,
+                temporary: partition.spilled + leaves.bytes,
+                stages,
+                threads: self.threads,
+                memory: config.limits.memory.0,
+                wall_s: self.start.elapsed().as_secs_f64(),
+            },
+        );
+        directory::write_json(&directory.report(), &report)?;
+        Ok(report)
+    }
 }
 
 fn task<'a>(plan: &'a Plan, config: &Config) -> Task<'a> {
@@ -204,7 +236,15 @@ fn look(config: &Config, plan: &Plan, summary: &Summary, bounds: [[i32; 3]; 2]) 
         ColorChoice::Auto | ColorChoice::Rgb if summary.tally.max_rgb == 0 => Some(elevation),
         ColorChoice::Auto | ColorChoice::Rgb => Some(Coloring::Rgb { eight_bit: summary.tally.max_rgb <= 255 }),
     };
-    Look { frame: plan.frame.clone(), coloring, normals: config.output.normals }
+    Look { frame: plan.frame.clone().refined(bounds), coloring, normals: config.output.normals }
+}
+
+fn stitch_all(directory: &Directory, tree: &Tree, look: &Look, stage: &Stage) -> Result<()> {
+    (0..tree.leaves.len()).into_par_iter().try_for_each(|tile| {
+        stitch::run(directory, tree, tile, &look.frame)?;
+        stage.advance(1);
+        Ok(())
+    })
 }
 
 fn export_all(

@@ -65,6 +65,13 @@ pub fn run(config: &Config) -> Result<Plan> {
         ));
     }
     let frame = Frame::new(&lattice, metres, metres_z, crs.wkt.clone())?;
+    let longest = frame.longest_triangle()[0] / metres;
+    if area.size(0).max(area.size(1)) > longest {
+        warnings.push(format!(
+            "the area is wider than the longest triangle that single precision can hold at this resolution ({longest:.0} units): if the \
+             hull has a longer one the job will say so; a coarser [input] resolution avoids it"
+        ));
+    }
     let bounds = config.input.bounds.map(|b| lattice_bounds(&lattice, b.0));
     let extent = extent_of(&lattice, &area, bounds);
     let sources = with_rules(sources, config, &lattice, bounds, &mut warnings)?;

@@ -61,3 +61,8 @@ pub fn triangulate(sites: &[Site], backend: Backend) -> Result<(Mesh, Outcome)> 
     }
     Ok((reference::triangulate(sites)?, outcome))
 }
+
+/// Takes back the memory of a mesh that is no longer needed, for the next leaf of this thread.
+pub fn recycle(mesh: Mesh) {
+    SCRATCH.with_borrow_mut(|scratch| scratch.recycle(mesh));
+}
