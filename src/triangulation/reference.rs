@@ -4,6 +4,7 @@
 use super::flip::legalize;
 use super::mesh::{HULL, Mesh};
 use crate::geometry::Site;
+use crate::geometry::predicates::orient2d;
 use crate::{Error, Result};
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation as _};
 
@@ -25,6 +26,9 @@ impl HasPosition for Vertex {
 /// # Errors
 /// [`Error::Broken`] if `spade` refuses the sites or two of them coincide.
 pub fn triangulate(sites: &[Site]) -> Result<Mesh> {
+    if collinear(sites) {
+        return Ok(Mesh::default());
+    }
     let vertices = sites.iter().enumerate().map(|(i, &site)| Vertex { site, index: i as u32 }).collect();
     let delaunay = DelaunayTriangulation::<Vertex>::bulk_load(vertices)
         .map_err(|e| Error::Broken(format!("the reference triangulation refuses a site: {e}")))?;
@@ -34,6 +38,14 @@ pub fn triangulate(sites: &[Site]) -> Result<Mesh> {
     let mut mesh = to_mesh(&delaunay);
     legalize(&mut mesh, sites);
     Ok(mesh)
+}
+
+/// Whether distinct `sites` lie on one line. `spade` would find that out as well, but in quadratic time.
+fn collinear(sites: &[Site]) -> bool {
+    match sites {
+        [a, b, rest @ ..] => rest.iter().all(|&c| orient2d(*a, *b, c) == 0),
+        _ => true,
+    }
 }
 
 fn to_mesh(delaunay: &DelaunayTriangulation<Vertex>) -> Mesh {

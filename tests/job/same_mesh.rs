@@ -111,7 +111,7 @@ fn what_makes_no_triangle_is_refused() {
         ("one", vec![[5, 5, 1]]),
         ("two", vec![[5, 5, 1], [9, 7, 1]]),
         ("equal", vec![[5, 5, 1]; 3_000]),
-        ("line", clouds::line(20_000, 0)),
+        ("line", clouds::line(200_000, 0)),
         ("column", (0..5_000).map(|y| [3, y, y]).collect()),
         ("none", vec![]),
     ] {
