@@ -7,6 +7,7 @@ use gdt_batch::job::directory::Directory;
 use gdt_batch::job::partition::{self, Partition};
 use gdt_batch::job::progress::Progress;
 use gdt_batch::job::records::{Leaf, Seam};
+use gdt_batch::job::span::Longest;
 use gdt_batch::job::spill::Spill;
 use gdt_batch::job::tree::Kind;
 use gdt_batch::job::{leaf, merge, scan};
@@ -29,7 +30,7 @@ fn canonical(mut corners: Triangle) -> Triangle {
 fn run_steps(job: &Job, config: &Config) -> (Directory, Partition) {
     let directory = Directory::new(&job.out());
     directory.create().unwrap();
-    let plan = scan::run(config).unwrap();
+    let plan = scan::run(config, scan::Coarser::default()).unwrap();
     let task = partition::Task {
         sources: &plan.sources,
         extent: plan.extent,
@@ -39,13 +40,14 @@ fn run_steps(job: &Job, config: &Config) -> (Directory, Partition) {
     };
     let partition = partition::run(&task, &directory, &Progress::Quiet.stage("read", 0, "points")).unwrap();
     let spill = Spill::open(&directory.spill()).unwrap();
-    let task = leaf::Task { duplicates: Duplicates::Lowest, backend: Backend::Cpu };
+    let longest = Longest::of(&plan.frame);
+    let task = leaf::Task { duplicates: Duplicates::Lowest, backend: Backend::Cpu, longest };
     for tile in (0..partition.tree.leaves.len()).rev() {
         leaf::run(&directory, &partition, &spill, tile, task).unwrap();
     }
     for node in (0..partition.tree.nodes.len()).rev() {
         if matches!(partition.tree.nodes[node].kind, Kind::Inner(_)) {
-            merge::run(&directory, &partition.tree, node, 1 << 28).unwrap();
+            merge::run(&directory, &partition.tree, node, 1 << 28, longest).unwrap();
         }
     }
     (directory, partition)
