@@ -2,10 +2,11 @@
 
 use super::report::grouped;
 use super::scan::{self, Coarser, Plan};
-use super::{BYTES_PER_LEAF_SITE, partition, workers};
+use super::{BYTES_PER_LEAF_SITE, MOST_TRIANGLES_IN_ONE_FILE, partition, workers};
 use crate::Result;
 use crate::config::Config;
 use crate::input::Point;
+use crate::output::preview::Texel;
 use serde::Serialize;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -14,6 +15,13 @@ use std::path::{Path, PathBuf};
 const TEMPORARY_PER_SITE: u64 = 12 + 6 + 1 + 2 * 12;
 /// Bytes of results a site, at the most: position, normal, colour and two triangles with 16-bit corners.
 const RESULT_PER_SITE: u64 = 12 + 12 + 8 + 2 * 6;
+
+/// Bytes of job directory a site of a tile's frontier, in all the files that it is in.
+const TEMPORARY_PER_RIM: u64 = 500;
+/// Bytes of a GLB beside its arrays.
+const RESULT_PER_TILE: u64 = 6000;
+/// Pixels of the preview at the most.
+const PIXELS: u64 = 1600 * 1600;
 
 /// What a job would do.
 #[derive(Clone, Debug, Serialize)]
@@ -65,12 +73,13 @@ fn preflight(plan: &Plan, config: &Config, threads: usize) -> Preflight {
     let points = plan.records;
     let steps = |axis: usize| plan.extent[1][axis] as f64 - plan.extent[0][axis] as f64;
     let resolution = plan.frame.extras().resolution;
+    // Tiles come out between half full and full.
+    let tiles = (points * 4).div_ceil(per_tile * 3);
     let leaves = per_tile.min(points) * BYTES_PER_LEAF_SITE * threads as u64;
     Preflight {
         files: plan.sources.iter().map(|(s, _)| (s.path.clone(), format!("{:?}", s.format), s.records)).collect(),
         records: points,
-        // Tiles come out between half full and full.
-        tiles: (points * 4).div_ceil(per_tile * 3),
+        tiles,
         resolution: [plan.lattice.resolution.to_string(), plan.lattice.resolution_z.to_string()],
         size: [steps(0) * resolution, steps(1) * resolution],
         unit: plan.unit.into(),
@@ -78,12 +87,26 @@ fn preflight(plan: &Plan, config: &Config, threads: usize) -> Preflight {
         threads,
         memory: (64 << 20) + leaves.max(partition::buffer_bytes(points, per_tile, config.limits.memory.0 / 6)),
         memory_limit: config.limits.memory.0,
-        temporary: points * (size_of::<Point>() as u64 + TEMPORARY_PER_SITE),
-        results: points * RESULT_PER_SITE,
+        temporary: temporary_bytes(points, per_tile, tiles),
+        results: result_bytes(points, tiles),
         disk_free: disk_free(&config.output.directory),
         backend: format!("{:?}", config.triangulation.backend).to_lowercase(),
         warnings: plan.warnings.clone(),
     }
+}
+
+fn temporary_bytes(points: u64, per_tile: u64, tiles: u64) -> u64 {
+    // A tile of n sites has about 2.2 sqrt(n) on its frontier.
+    let rims = (2.2 * (per_tile.min(points) as f64).sqrt()) as u64 * tiles;
+    points * (size_of::<Point>() as u64 + TEMPORARY_PER_SITE)
+        + rims * TEMPORARY_PER_RIM
+        + PIXELS * size_of::<Texel>() as u64
+}
+
+fn result_bytes(points: u64, tiles: u64) -> u64 {
+    let in_tiles = points * RESULT_PER_SITE + tiles * RESULT_PER_TILE;
+    let copies = if 2 * points <= MOST_TRIANGLES_IN_ONE_FILE { 2 } else { 1 };
+    copies * in_tiles + 4 * PIXELS
 }
 
 /// The free bytes where `directory` is, or will be.

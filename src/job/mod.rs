@@ -200,8 +200,9 @@ fn enough_points(summary: &Summary) -> Result<[[i32; 3]; 2]> {
     summary.bounds.ok_or_else(|| {
         let tally = &summary.tally;
         Error::NoTerrain(format!(
-            "no point is left to triangulate: of {} read, {} are withheld, {} of other classes, {} out of bounds; check [input] classes and bounds",
-            tally.read, tally.withheld, tally.other_class, tally.out_of_bounds
+            "no point is left to triangulate: of {} read, {} are malformed, {} withheld, {} of other classes, {} out of bounds; check \
+             [input] classes and bounds",
+            tally.read, tally.malformed, tally.withheld, tally.other_class, tally.out_of_bounds
         ))
     })
 }

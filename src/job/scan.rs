@@ -112,7 +112,11 @@ fn expand(patterns: &[String]) -> Result<Vec<PathBuf>> {
         if paths.len() == before && literal.is_file() && !paths.contains(&literal) {
             paths.push(literal);
         } else if paths.len() == before && !paths.iter().any(|p| glob_matches(pattern, p)) {
-            return Err(Error::Config(format!("[input] files: there is no file {pattern}")));
+            let what =
+                if literal.is_dir() { "is a directory; name the files in it, for example" } else { "is no file" };
+            let hint =
+                if literal.is_dir() { format!(" {}/*.laz", pattern.trim_end_matches('/')) } else { String::new() };
+            return Err(Error::Config(format!("[input] files: {pattern} {what}{hint}")));
         }
     }
     Ok(paths)
