@@ -1,40 +1,51 @@
 //! Reading and writing at a position of a file that several threads share, without a common cursor.
 
 use std::fs::File;
-use std::io::Result;
+use std::io::{ErrorKind, Result};
 
-/// Fills `buffer` from byte `at` of `file` on.
-///
-/// # Errors
-/// What the operating system says; `UnexpectedEof` if the file ends before the buffer is full.
-#[cfg(unix)]
-pub fn read_exact_at(file: &File, buffer: &mut [u8], at: u64) -> Result<()> {
-    std::os::unix::fs::FileExt::read_exact_at(file, buffer, at)
-}
-
-/// Writes all of `buffer` from byte `at` of `file` on.
+/// Reads some bytes from byte `at` of `file` on; 0 at its end.
 ///
 /// # Errors
 /// What the operating system says.
 #[cfg(unix)]
-pub fn write_all_at(file: &File, buffer: &[u8], at: u64) -> Result<()> {
-    std::os::unix::fs::FileExt::write_all_at(file, buffer, at)
+pub fn read_at(file: &File, buffer: &mut [u8], at: u64) -> Result<usize> {
+    std::os::unix::fs::FileExt::read_at(file, buffer, at)
+}
+
+/// Reads some bytes from byte `at` of `file` on; 0 at its end.
+///
+/// # Errors
+/// What the operating system says.
+#[cfg(windows)]
+pub fn read_at(file: &File, buffer: &mut [u8], at: u64) -> Result<usize> {
+    std::os::windows::fs::FileExt::seek_read(file, buffer, at)
+}
+
+#[cfg(unix)]
+fn write_at(file: &File, buffer: &[u8], at: u64) -> Result<usize> {
+    std::os::unix::fs::FileExt::write_at(file, buffer, at)
+}
+
+#[cfg(windows)]
+fn write_at(file: &File, buffer: &[u8], at: u64) -> Result<usize> {
+    std::os::windows::fs::FileExt::seek_write(file, buffer, at)
 }
 
 /// Fills `buffer` from byte `at` of `file` on.
 ///
 /// # Errors
 /// What the operating system says; `UnexpectedEof` if the file ends before the buffer is full.
-#[cfg(windows)]
 pub fn read_exact_at(file: &File, mut buffer: &mut [u8], mut at: u64) -> Result<()> {
-    use std::os::windows::fs::FileExt;
     while !buffer.is_empty() {
-        let read = file.seek_read(buffer, at)?;
-        if read == 0 {
-            return Err(std::io::ErrorKind::UnexpectedEof.into());
+        match read_at(file, buffer, at) {
+            Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
+            Ok(read) => {
+                buffer = &mut buffer[read..];
+                at += read as u64;
+            }
+            Err(e) if e.kind() == ErrorKind::Interrupted => {}
+            Err(e) => return Err(e),
         }
-        buffer = &mut buffer[read..];
-        at += read as u64;
     }
     Ok(())
 }
@@ -43,13 +54,17 @@ pub fn read_exact_at(file: &File, mut buffer: &mut [u8], mut at: u64) -> Result<
 ///
 /// # Errors
 /// What the operating system says.
-#[cfg(windows)]
 pub fn write_all_at(file: &File, mut buffer: &[u8], mut at: u64) -> Result<()> {
-    use std::os::windows::fs::FileExt;
     while !buffer.is_empty() {
-        let written = file.seek_write(buffer, at)?;
-        buffer = &buffer[written..];
-        at += written as u64;
+        match write_at(file, buffer, at) {
+            Ok(0) => return Err(ErrorKind::WriteZero.into()),
+            Ok(written) => {
+                buffer = &buffer[written..];
+                at += written as u64;
+            }
+            Err(e) if e.kind() == ErrorKind::Interrupted => {}
+            Err(e) => return Err(e),
+        }
     }
     Ok(())
 }

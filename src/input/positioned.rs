@@ -5,6 +5,7 @@ use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
+use crate::positioned::read_at;
 use crate::{Error, Result};
 
 /// A file open for reading, whose size is known.
@@ -50,21 +51,12 @@ impl Positioned {
 
     /// Fills `buffer` from `offset` on.
     pub(super) fn read_exact_at(&self, buffer: &mut [u8], offset: u64) -> Result<()> {
-        let mut done = 0;
-        while done < buffer.len() {
-            match read_at(&self.file, &mut buffer[done..], offset + done as u64) {
-                Ok(0) => {
-                    return Err(Error::input(
-                        &self.path,
-                        "became shorter while it was read; run again when it is complete",
-                    ));
-                }
-                Ok(count) => done += count,
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                Err(error) => return Err(Error::io("read", &self.path)(error)),
+        crate::positioned::read_exact_at(&self.file, buffer, offset).map_err(|error| match error.kind() {
+            io::ErrorKind::UnexpectedEof => {
+                Error::input(&self.path, "became shorter while it was read; run again when it is complete")
             }
-        }
-        Ok(())
+            _ => Error::io("read", &self.path)(error),
+        })
     }
 
     /// The bytes of `range`, which the caller has checked against [`Positioned::size`].
@@ -79,16 +71,6 @@ impl Positioned {
         let file = self.file.try_clone().map_err(Error::io("read", &self.path))?;
         Ok(Window { file, next: range.start, end: range.end, buffer: Vec::new(), at: 0 })
     }
-}
-
-#[cfg(unix)]
-fn read_at(file: &File, buffer: &mut [u8], offset: u64) -> io::Result<usize> {
-    std::os::unix::fs::FileExt::read_at(file, buffer, offset)
-}
-
-#[cfg(windows)]
-fn read_at(file: &File, buffer: &mut [u8], offset: u64) -> io::Result<usize> {
-    std::os::windows::fs::FileExt::seek_read(file, buffer, offset)
 }
 
 /// Bytes a [`Window`] reads at once.

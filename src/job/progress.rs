@@ -1,6 +1,6 @@
 //! How far a job is: a bar per stage on a terminal, a line now and then in a log, nothing with `--quiet`.
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{HumanCount, ProgressBar, ProgressState, ProgressStyle};
 use serde::{Deserialize, Serialize};
 use std::io::IsTerminal;
 use std::sync::Mutex;
@@ -41,13 +41,7 @@ impl Progress {
     /// Starts a stage of `total` `unit`s.
     pub fn stage(self, name: &'static str, total: u64, unit: &'static str) -> Stage {
         let bar = match self {
-            Progress::Bars => {
-                let template = format!(
-                    "{{prefix:>12}} {{bar:30}} {{percent:>3}} %  {{human_pos}} of {{human_len}} {unit}, {{per_sec}}, {{eta}} left"
-                );
-                let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
-                ProgressBar::new(total).with_style(style).with_prefix(name)
-            }
+            Progress::Bars if total > 1 => ProgressBar::new(total).with_style(style(unit)).with_prefix(name),
             _ => ProgressBar::hidden(),
         };
         let now = Instant::now();
@@ -63,6 +57,17 @@ impl Progress {
             logged: Mutex::new(now),
         }
     }
+}
+
+fn style(unit: &str) -> ProgressStyle {
+    let template = format!(
+        "{{prefix:>12}} {{bar:30}} {{percent:>3}} %  {{human_pos}} of {{human_len}} {unit}, {{rate}}/s, {{eta}} left"
+    );
+    let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    style.with_key("rate", |state: &ProgressState, out: &mut dyn std::fmt::Write| {
+        // A bar that cannot be drawn is no reason to stop.
+        let _ = out.write_str(&HumanCount(state.per_sec() as u64).to_string());
+    })
 }
 
 /// A running stage; its methods may be called from any thread.
