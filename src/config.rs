@@ -85,7 +85,7 @@ pub struct Limits {
     /// Peak resident memory.
     pub memory: Memory,
     /// Worker threads; 0: one per core.
-    pub threads: usize,
+    pub threads: Threads,
 }
 
 fn yes() -> bool {
@@ -271,8 +271,8 @@ impl TryFrom<toml::Value> for SitesPerTile {
     fn try_from(value: toml::Value) -> std::result::Result<SitesPerTile, String> {
         match value {
             toml::Value::String(s) if s == "auto" => Ok(SitesPerTile::AUTO),
-            toml::Value::Integer(sites @ 3..=1_000_000_000) => Ok(SitesPerTile(sites as u64)),
-            _ => Err("sites_per_tile is \"auto\" or a whole number from 3 to 1000000000".into()),
+            toml::Value::Integer(sites @ 3..=50_000_000) => Ok(SitesPerTile(sites as u64)),
+            _ => Err("sites_per_tile is \"auto\" or a whole number from 3 to 50000000".into()),
         }
     }
 }
@@ -280,6 +280,22 @@ impl TryFrom<toml::Value> for SitesPerTile {
 impl From<SitesPerTile> for String {
     fn from(sites: SitesPerTile) -> String {
         sites.0.to_string()
+    }
+}
+
+/// How many worker threads; 0: one per core.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "i64")]
+pub struct Threads(pub usize);
+
+impl TryFrom<i64> for Threads {
+    type Error = String;
+
+    fn try_from(threads: i64) -> std::result::Result<Threads, String> {
+        match threads {
+            0..=1024 => Ok(Threads(threads as usize)),
+            _ => Err(format!("threads is a number from 0 (one per core) to 1024, not {threads}")),
+        }
     }
 }
 
@@ -404,7 +420,7 @@ impl Config {
 
     /// The number of worker threads.
     pub fn threads(&self) -> usize {
-        match self.limits.threads {
+        match self.limits.threads.0 {
             0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
             n => n,
         }

@@ -9,7 +9,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The operating system refused something that may succeed later (exit code 1).
-    #[error("cannot {action} {}: {source}", path.display())]
+    #[error("cannot {action} {}: {source}{}", path.display(), remedy(source))]
     Io {
         /// What was tried, as a verb: "read", "create", "write".
         action: &'static str,
@@ -54,6 +54,17 @@ pub enum Error {
     /// Something this program guarantees does not hold (exit code 4).
     #[error("internal check failed: {0}; please report this with the configuration and the input")]
     Broken(String),
+}
+
+/// What to do about a failure of the operating system, where something can be said.
+fn remedy(error: &std::io::Error) -> &'static str {
+    match error.kind() {
+        std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded => {
+            "; make room or choose another [output] directory, and run again"
+        }
+        std::io::ErrorKind::PermissionDenied => "; check who may read and write there",
+        _ => "",
+    }
 }
 
 impl Error {

@@ -51,6 +51,8 @@ pub struct AxisMap {
     mul: i128,
     add: i128,
     div: i128,
+    /// The same numbers, where any raw `i32` can be mapped without leaving an `i64`: wide division takes ten times as long.
+    narrow: Option<[i64; 3]>,
 }
 
 impl AxisMap {
@@ -66,7 +68,10 @@ impl AxisMap {
         let integer = |d: Decimal| 10i128.checked_pow(digits - d.scale())?.checked_mul(d.mantissa());
         let (mul, add, div) = (integer(scale)?, integer(shift)?, integer(resolution)?);
         let common = gcd(gcd(mul, add.abs()), div);
-        let map = AxisMap { mul: mul / common, add: add / common, div: div / common };
+        let (mul, add, div) = (mul / common, add / common, div / common);
+        let narrow =
+            (mul < 1 << 29 && add.abs() < 1 << 61 && div < 1 << 61).then_some([mul as i64, add as i64, div as i64]);
+        let map = AxisMap { mul, add, div, narrow };
         // Room for any 32-bit or 10^18 mantissa without overflow.
         (map.mul < 1 << 60 && map.add.abs() < 1 << 120 && map.div < 1 << 120).then_some(map)
     }
@@ -79,10 +84,22 @@ impl AxisMap {
     /// The lattice integer of `raw`, and whether it was rounded; `None` outside the range of `i32`.
     #[inline]
     pub fn apply(&self, raw: i64) -> Option<(i32, bool)> {
-        let numerator = raw as i128 * self.mul + self.add;
-        if self.div == 1 {
-            return Some((i32::try_from(numerator).ok()?, false));
+        match self.narrow {
+            Some([mul, add, div]) if i32::try_from(raw).is_ok() => {
+                let numerator = raw * mul + add;
+                if div == 1 {
+                    return Some((i32::try_from(numerator).ok()?, false));
+                }
+                let (quotient, rest) = (numerator.div_euclid(div), numerator.rem_euclid(div));
+                let up = rest > div - rest || (rest == div - rest && numerator >= 0);
+                Some((i32::try_from(quotient + up as i64).ok()?, rest != 0))
+            }
+            _ => self.apply_wide(raw),
         }
+    }
+
+    fn apply_wide(&self, raw: i64) -> Option<(i32, bool)> {
+        let numerator = raw as i128 * self.mul + self.add;
         let (quotient, rest) = (numerator.div_euclid(self.div), numerator.rem_euclid(self.div));
         let up = 2 * rest > self.div || (2 * rest == self.div && numerator >= 0);
         Some((i32::try_from(quotient + up as i128).ok()?, rest != 0))
@@ -147,6 +164,16 @@ mod tests {
         let rounded: Vec<_> = [14, 15, 16, -14, -15, -16, 20].iter().map(|&raw| map.apply(raw).unwrap()).collect();
         let expected = [(1, true), (2, true), (2, true), (-1, true), (-2, true), (-2, true), (2, false)];
         assert_eq!(rounded, expected);
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn both_widths_agree(raw: i32, offset in -1_000_000_000i64..1_000_000_000, scale in 1i64..1000, step in 1i64..1000) {
+            let [offset, scale, step] = [offset, scale, step].map(|mantissa| Decimal::new(mantissa, 5));
+            let map = AxisMap::new(offset, scale, Decimal::new(123, 2), step).unwrap();
+            proptest::prop_assert!(map.narrow.is_some());
+            proptest::prop_assert_eq!(map.apply(raw.into()), map.apply_wide(raw.into()));
+        }
     }
 
     #[test]

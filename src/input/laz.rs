@@ -27,7 +27,7 @@ const PIECE: u64 = 50_000;
 const BLOCK: usize = 1 << 17;
 
 /// The most bytes of a layered chunk that are held to decode it: its layers must be in memory together.
-const LARGEST_CHUNK: u64 = 1 << 29;
+const LARGEST_CHUNK: u64 = 1 << 26;
 
 /// The point data of a LAZ file.
 #[derive(Clone, Debug)]

@@ -1,7 +1,8 @@
 //! Preflight: what a job would read and need, without writing anything.
 
+use super::choose::Coarser;
 use super::report::grouped;
-use super::scan::{self, Coarser, Plan};
+use super::scan::{self, Plan};
 use super::{BYTES_PER_LEAF_SITE, MOST_TRIANGLES_IN_ONE_FILE, partition, workers};
 use crate::Result;
 use crate::config::Config;

@@ -1,7 +1,7 @@
 //! The job directory: everything a job knows, on disk, and where the results go. Any step can be run again from it.
 
 use crate::{Error, Result};
-use serde::{Serialize, de::DeserializeOwned};
+use serde::Serialize;
 use std::fs::{self, File, TryLockError};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -25,6 +25,9 @@ impl Directory {
     /// # Errors
     /// [`Error::Io`] if they cannot be made or emptied, [`Error::Config`] if they are somebody else's or in use.
     pub fn create(&self) -> Result<Lock> {
+        if self.output.exists() && !self.output.is_dir() {
+            return Err(Error::Config(format!("[output] directory: {} is a file", self.output.display())));
+        }
         let is_new = !self.job.exists();
         fs::create_dir_all(&self.job).map_err(Error::io("create the directory", &self.job))?;
         let lock = Lock::take(&self.job, is_new)?;
@@ -34,7 +37,7 @@ impl Directory {
         }
         fs::create_dir_all(self.tiles()).map_err(Error::io("create the directory", self.tiles()))?;
         self.remove_old_tiles()?;
-        for stale in [self.spill(), self.tree(), self.terrain(), self.georeference(), self.report(), self.preview()] {
+        for stale in [self.spill(), self.terrain(), self.georeference(), self.report(), self.preview()] {
             remove_file(&stale)?;
         }
         Ok(lock)
@@ -61,24 +64,9 @@ impl Directory {
         remove_directory(&self.job)
     }
 
-    /// The directory of all results.
-    pub fn output(&self) -> &Path {
-        &self.output
-    }
-
-    /// What scan decided: lattice, units, sources.
-    pub fn plan(&self) -> PathBuf {
-        self.job.join("plan.json")
-    }
-
     /// The points on their way from the inputs to the leaves.
     pub fn spill(&self) -> PathBuf {
         self.job.join("points.spill")
-    }
-
-    /// The k-d tree and where the spill holds each leaf's points.
-    pub fn tree(&self) -> PathBuf {
-        self.job.join("tree.json")
     }
 
     /// The sites and closed triangles of leaf `tile`.
@@ -200,15 +188,6 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     let mut text = serde_json::to_vec_pretty(value).map_err(|e| Error::Broken(format!("{}: {e}", path.display())))?;
     text.push(b'\n');
     write_whole(path, |file| file.write_all(&text))
-}
-
-/// Reads what [`write_json`] wrote.
-///
-/// # Errors
-/// [`Error::Io`] if it cannot be read, [`Error::Broken`] if it is not what a step writes.
-pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
-    let text = fs::read(path).map_err(Error::io("read", path))?;
-    serde_json::from_slice(&text).map_err(|e| Error::Broken(format!("{}: {e}", path.display())))
 }
 
 fn remove_directory(path: &Path) -> Result<()> {

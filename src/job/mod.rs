@@ -2,7 +2,9 @@
 //! export, report. Every step leaves its result in the job directory and finds there what it needs, so that each can be
 //! called on its own, the ones by tile or by node in any order that puts children before parents.
 
+mod area;
 pub mod check;
+pub mod choose;
 pub mod closing;
 pub mod columns;
 pub mod directory;
@@ -28,6 +30,7 @@ use crate::output::picture::Picture;
 use crate::output::preview::{Canvas, Texel};
 use crate::output::terrain::write_terrain;
 use crate::{Error, Result};
+use choose::Coarser;
 use columns::ColumnReader;
 use directory::Directory;
 use export::{Look, TileFigures};
@@ -36,7 +39,7 @@ use partition::{Partition, Summary, Task};
 use progress::{Progress, Stage, StageFigures};
 use rayon::prelude::*;
 use report::{Parts, Report};
-use scan::{Coarser, Plan};
+use scan::Plan;
 use span::Longest;
 use spill::Spill;
 use std::io::Write;
@@ -45,10 +48,14 @@ use tree::{Kind, Tree};
 
 /// Bytes that one site of a leaf takes while the leaf is triangulated: points, sort keys, sites, mesh and marks.
 const BYTES_PER_LEAF_SITE: u64 = 500;
+/// Bytes that a thread takes at least: a decoder with its chunk, a slice of points and their order.
+const BYTES_PER_THREAD: u64 = 8 << 20;
 /// Ten times coarser as often as this is no terrain any more.
 const MOST_TENS: u32 = 6;
 /// A mesh of more triangles than this is not written as one file: viewers would not open it.
 const MOST_TRIANGLES_IN_ONE_FILE: u64 = 20_000_000;
+/// Nor one of more tiles: each is a node with a mesh of its own, and their description would fill the memory.
+const MOST_TILES_IN_ONE_FILE: u64 = 4096;
 
 /// Runs the whole job of `config`.
 ///
@@ -81,7 +88,7 @@ pub fn run(config: &Config, progress: Progress) -> Result<Report> {
 
 fn attempt(config: &Config, coarser: Coarser, progress: Progress, start: Instant) -> Result<Report> {
     let stage = progress.stage("scan", 1, "job");
-    let plan = on_threads(config.threads(), || scan::run(config, coarser))?;
+    let plan = on_threads(workers(config, 0)?, || scan::run(config, coarser))?;
     stage.advance(1);
     let scanned = stage.finish();
     let threads = workers(config, plan.records)?;
@@ -106,7 +113,7 @@ fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> Result<T> + Send) 
 /// As many threads as are wanted, and as have room for a leaf each.
 fn workers(config: &Config, points: u64) -> Result<usize> {
     let per_tile = config.triangulation.sites_per_tile.0.min(points).max(1);
-    let per_leaf = per_tile.saturating_mul(BYTES_PER_LEAF_SITE);
+    let per_leaf = per_tile.saturating_mul(BYTES_PER_LEAF_SITE).max(BYTES_PER_THREAD);
     // The rest is for code, stacks, decoders and what the allocator keeps.
     let room = config.limits.memory.0 / 4 * 3;
     match room / per_leaf {
@@ -254,7 +261,9 @@ impl Grower<'_> {
                 let (low, high) = rayon::join(|| self.grow(low), || self.grow(high));
                 let (mut figures, high) = (low?, high?);
                 figures += high;
-                let memory = self.config.limits.memory.0 / 2;
+                // Nodes below the root may be merged at once on all threads.
+                let share = if node == 0 { 1 } else { rayon::current_num_threads() as u64 };
+                let memory = self.config.limits.memory.0 / 4 * 3 / share;
                 merge::run(self.directory, &self.partition.tree, node, memory, self.longest)?;
                 Ok(figures)
             }
@@ -319,7 +328,7 @@ fn finish(
     let picture = draw_picture(directory, canvas, tiles)?;
     directory::write_whole(&directory.preview(), |file| file.write_all(&picture))?;
     let mut bytes = (text.len() + picture.len()) as u64;
-    if written.triangles <= MOST_TRIANGLES_IN_ONE_FILE {
+    if written.triangles <= MOST_TRIANGLES_IN_ONE_FILE && written.files <= MOST_TILES_IN_ONE_FILE {
         let paths: Vec<_> = (0..tiles).map(|tile| directory.tile(tile)).filter(|path| path.exists()).collect();
         write_terrain(&directory.terrain(), &paths)?;
         bytes += std::fs::metadata(directory.terrain()).map_err(Error::io("read", directory.terrain()))?.len();

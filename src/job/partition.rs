@@ -1,7 +1,7 @@
 //! Step 2 of a job: decode every input once, spill the points to buckets of a grid, and build the tree whose leaves are
 //! the tiles. A bucket with more points than a tile may hold is spilled again to a finer grid of its own.
 
-use super::directory::{Directory, read_json, write_json};
+use super::directory::Directory;
 use super::grid::{Grid, Span, Sums};
 use super::progress::Stage;
 use super::spill::{Block, Bucket, Buckets, Spill};
@@ -32,16 +32,6 @@ pub struct Partition {
     pub spilled: u64,
 }
 
-impl Partition {
-    /// The result as the step left it in the job directory.
-    ///
-    /// # Errors
-    /// [`Error::Io`] or [`Error::Broken`] if it cannot be read.
-    pub fn load(directory: &Directory) -> Result<Partition> {
-        read_json(&directory.tree())
-    }
-}
-
 /// What all inputs together held.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Summary {
@@ -62,7 +52,7 @@ impl AddAssign for Summary {
 }
 
 /// The least box [min, max] around two of them.
-fn around<const N: usize>(a: [[i32; N]; 2], b: [[i32; N]; 2]) -> [[i32; N]; 2] {
+pub(super) fn around<const N: usize>(a: [[i32; N]; 2], b: [[i32; N]; 2]) -> [[i32; N]; 2] {
     [std::array::from_fn(|axis| a[0][axis].min(b[0][axis])), std::array::from_fn(|axis| a[1][axis].max(b[1][axis]))]
 }
 
@@ -80,7 +70,7 @@ pub struct Task<'a> {
     pub malformed_share: f64,
 }
 
-/// Runs the step and leaves its result in the job directory.
+/// Runs the step: leaves the spill in the job directory and returns what the steps after it need to know of it.
 ///
 /// # Errors
 /// [`Error::Input`] if an input cannot be read or too much of it is malformed, [`Error::Io`] if the spill cannot be
@@ -98,7 +88,6 @@ pub fn run(task: &Task, directory: &Directory, stage: &Stage) -> Result<Partitio
     }
     let Divider { tree, blocks, .. } = divider;
     let partition = Partition { tree, blocks, summary, spilled: spill.bytes() };
-    write_json(&directory.tree(), &partition)?;
     Ok(partition)
 }
 

@@ -1,5 +1,7 @@
 //! Step 1 of a job: look at every input, and choose the one lattice, unit and CRS that all of them meet on.
 
+use super::area::Area;
+use super::choose::{self, Coarser};
 use crate::config::{Config, UnitChoice};
 use crate::geometry::Site;
 use crate::geometry::lattice::{AxisMap, Lattice, REACH, shortest_decimal};
@@ -7,9 +9,9 @@ use crate::input::{self, Axis, Crs, Rules, Source, Unit};
 use crate::output::frame::Frame;
 use crate::{Error, Result};
 use rayon::prelude::*;
-use rust_decimal::Decimal;
 use rust_decimal::prelude::ToPrimitive;
-use std::path::PathBuf;
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
 
 /// International foot in metres.
 const FOOT: f64 = 0.3048;
@@ -45,10 +47,10 @@ pub struct Plan {
 /// [`Error::Config`] if there are none, or they do not go together; [`Error::Input`] or [`Error::Io`] if one cannot be used.
 pub fn run(config: &Config, coarser: Coarser) -> Result<Plan> {
     let sources = open_all(config)?;
-    let mut warnings: Vec<String> = sources
-        .iter()
-        .flat_map(|source| source.warnings.iter().map(|w| format!("{}: {w}", source.path.display())))
-        .collect();
+    let mut warnings = unreadable_names(&config.input.files);
+    let of_sources = sources.iter().flat_map(|s| s.warnings.iter().map(|w| format!("{}: {w}", s.path.display())));
+    warnings.extend(of_sources);
+    shorten(&mut warnings);
     let records = sources.iter().map(|s| s.records).sum();
     if records >= MOST_RECORDS {
         return Err(Error::Config(format!("{records} records are more than one job can hold (2^40)")));
@@ -56,12 +58,10 @@ pub fn run(config: &Config, coarser: Coarser) -> Result<Plan> {
     enough_is_there(&sources, records, config.input.malformed_share.0)?;
     let crs = common_crs(&sources)?;
     let (unit, metres) = unit_of(config.input.unit, &crs, &mut warnings)?;
-    let area = Area::of(&sources, config);
+    let area = Area::of(&sources, config, metres)?;
     let metres_z = crs.vertical.unwrap_or(metres);
     let wanted = config.input.resolution.0;
-    let step = horizontal_step(&sources, &area, metres, wanted, coarser.horizontal, &mut warnings)?;
-    let step_z = vertical_step(&sources, &area, metres_z, coarser.vertical, &mut warnings)?;
-    let lattice = choose_lattice(&sources, &area, step, step_z)?;
+    let lattice = choose::lattice(&sources, &area, [metres, metres_z], wanted, coarser, &mut warnings)?;
     if metres_z != metres {
         warnings.push(format!(
             "heights are in another unit than x and y ({metres_z} m and {metres} m): glTF has both in metres, see metres_per_unit_z"
@@ -77,6 +77,27 @@ pub fn run(config: &Config, coarser: Coarser) -> Result<Plan> {
 fn open_all(config: &Config) -> Result<Vec<Source>> {
     let paths = expand(&config.input.files)?;
     paths.par_iter().map(|path| input::open(path, &config.input.csv)).collect()
+}
+
+/// Patterns find only names in UTF-8: says what else lies beside what they find.
+fn unreadable_names(patterns: &[String]) -> Vec<String> {
+    let folders: HashSet<&Path> = patterns.iter().filter_map(|p| Path::new(p).parent()).collect();
+    let entries = folders.into_iter().filter_map(|folder| std::fs::read_dir(folder).ok()).flatten().flatten();
+    let mut names: Vec<PathBuf> = entries.map(|e| e.path()).filter(|p| p.to_str().is_none() && p.is_file()).collect();
+    names.sort_unstable();
+    let warning = |name: PathBuf| format!("{}: left out, because its name is not UTF-8; rename it", name.display());
+    names.into_iter().map(warning).collect()
+}
+
+/// More warnings than this, one for each of thousands of files, would hide the others.
+const MOST_WARNINGS: usize = 50;
+
+fn shorten(warnings: &mut Vec<String>) {
+    if warnings.len() > MOST_WARNINGS {
+        let more = warnings.len() - MOST_WARNINGS;
+        warnings.truncate(MOST_WARNINGS);
+        warnings.push(format!("... and {more} more of the inputs"));
+    }
 }
 
 /// Stops before the first point if files lack more records than are put up with.
@@ -97,33 +118,38 @@ fn enough_is_there(sources: &[Source], records: u64, malformed_share: f64) -> Re
 
 /// The files that the patterns name, in their order, each once.
 fn expand(patterns: &[String]) -> Result<Vec<PathBuf>> {
-    let mut paths: Vec<PathBuf> = Vec::new();
+    let (mut paths, mut known) = (Vec::new(), HashSet::new());
     for pattern in patterns {
-        let found = glob::glob(pattern).map_err(|e| Error::Config(format!("[input] files: {pattern}: {e}")))?;
-        let before = paths.len();
-        for path in found {
-            let path = path.map_err(|e| Error::io("read", e.path().to_path_buf())(e.into()))?;
-            if path.is_file() && !paths.contains(&path) {
-                paths.push(path);
-            }
+        let found = files_of(pattern)?;
+        if found.is_empty() {
+            return Err(Error::Config(format!("[input] files: {}", nothing_at(pattern))));
         }
-        // A name with brackets may be meant literally.
-        let literal = PathBuf::from(pattern);
-        if paths.len() == before && literal.is_file() && !paths.contains(&literal) {
-            paths.push(literal);
-        } else if paths.len() == before && !paths.iter().any(|p| glob_matches(pattern, p)) {
-            let what =
-                if literal.is_dir() { "is a directory; name the files in it, for example" } else { "is no file" };
-            let hint =
-                if literal.is_dir() { format!(" {}/*.laz", pattern.trim_end_matches('/')) } else { String::new() };
-            return Err(Error::Config(format!("[input] files: {pattern} {what}{hint}")));
-        }
+        paths.extend(found.into_iter().filter(|path| known.insert(path.clone())));
     }
     Ok(paths)
 }
 
-fn glob_matches(pattern: &str, path: &std::path::Path) -> bool {
-    glob::Pattern::new(pattern).is_ok_and(|p| p.matches_path(path))
+/// The files that a pattern names; one that names none may be a file's name that only looks like a pattern.
+fn files_of(pattern: &str) -> Result<Vec<PathBuf>> {
+    let found = glob::glob(pattern).map_err(|e| Error::Config(format!("[input] files: {pattern}: {e}")))?;
+    let mut files = Vec::new();
+    for path in found {
+        files.push(path.map_err(|e| Error::io("read", e.path().to_path_buf())(e.into()))?);
+    }
+    files.retain(|path| path.is_file());
+    if files.is_empty() && Path::new(pattern).is_file() {
+        files.push(pattern.into());
+    }
+    Ok(files)
+}
+
+fn nothing_at(pattern: &str) -> String {
+    if Path::new(pattern).is_dir() {
+        let folder = pattern.trim_end_matches('/');
+        format!("{pattern} is a directory; name the files in it, for example {folder}/*.laz")
+    } else {
+        format!("there is no file {pattern}")
+    }
 }
 
 /// The CRS of all sources; those without one agree with any.
@@ -165,174 +191,6 @@ fn unit_of(choice: UnitChoice, crs: &Crs, warnings: &mut Vec<String>) -> Result<
             crs.name.as_deref().unwrap_or("geographic CRS"),
         ))),
     }
-}
-
-/// The box around all inputs in source units, as far as their headers can be believed.
-struct Area {
-    min: [f64; 3],
-    max: [f64; 3],
-}
-
-impl Area {
-    fn of(sources: &[Source], config: &Config) -> Area {
-        let mut area = Area { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
-        for source in sources.iter().filter(|s| s.records > 0) {
-            for axis in 0..3 {
-                area.min[axis] = area.min[axis].min(source.min[axis]);
-                area.max[axis] = area.max[axis].max(source.max[axis]);
-            }
-        }
-        if let Some(bounds) = config.input.bounds {
-            for axis in 0..2 {
-                area.min[axis] = area.min[axis].max(bounds.0[axis]);
-                area.max[axis] = area.max[axis].min(bounds.0[axis + 2]);
-            }
-        }
-        for axis in 0..3 {
-            if area.min[axis] > area.max[axis] || !area.min[axis].is_finite() || !area.max[axis].is_finite() {
-                (area.min[axis], area.max[axis]) = (0.0, 0.0);
-            }
-        }
-        area
-    }
-
-    fn size(&self, axis: usize) -> f64 {
-        self.max[axis] - self.min[axis]
-    }
-}
-
-/// How many tens coarser than it would be the lattice is to be, because it proved too fine for the mesh.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Coarser {
-    /// In x and y.
-    pub horizontal: u32,
-    /// In z.
-    pub vertical: u32,
-}
-
-/// The steps as [`horizontal_step`] and [`vertical_step`] choose them; the offset near the middle of the area in x and y and at its
-/// foot in z, such that the inputs' own grids meet the lattice.
-fn choose_lattice(sources: &[Source], area: &Area, resolution: Decimal, resolution_z: Decimal) -> Result<Lattice> {
-    let middle = |axis: usize| (area.min[axis] + area.max[axis]) / 2.0;
-    let offset = [
-        lattice_point_near(middle(0), phase(sources, 0, resolution)?, resolution)?,
-        lattice_point_near(middle(1), phase(sources, 1, resolution)?, resolution)?,
-        lattice_point_near(area.min[2].floor(), phase(sources, 2, resolution_z)?, resolution_z)?,
-    ];
-    Ok(Lattice { offset, resolution, resolution_z })
-}
-
-/// Metres: no scanner measures x and y more finely, so a wide area may be rounded to this without asking.
-const FINE_ENOUGH: f64 = 0.0099;
-
-/// The step in x and y: what the user wants, else the finest of the inputs on which a triangle across the whole area could be
-/// written, but no coarser than a centimetre for that reason; beyond it [`Error::TooFine`] decides by the mesh itself.
-fn horizontal_step(
-    sources: &[Source],
-    area: &Area,
-    metres: f64,
-    wanted: Option<Decimal>,
-    coarser: u32,
-    warnings: &mut Vec<String>,
-) -> Result<Decimal> {
-    let size = area.size(0).max(area.size(1));
-    let fits = |step: Decimal| size < 2.0 * REACH as f64 * 0.99 * float(step);
-    let is_writable = |step: Decimal| size * metres < Frame::longest_at(float(step) * metres);
-    if let Some(step) = wanted {
-        return if fits(step) { Ok(step) } else { Err(too_fine(step, size)) };
-    }
-    let finest = sources.iter().flat_map(|s| [s.axes[0].scale, s.axes[1].scale]).min().unwrap_or(Decimal::ONE);
-    let first = if is_writable(finest) { finest } else { common_grid(sources).unwrap_or(finest) };
-    let mut step = first;
-    while !fits(step) || (!is_writable(step) && float(step) * metres < FINE_ENOUGH) {
-        step = tens(step, 1)?;
-    }
-    step = tens(step, coarser)?;
-    if step != first {
-        warnings.push(format!(
-            "x and y are rounded to {step}: glTF's single precision cannot hold every triangle that an area of {size:.0} units may \
-             have in steps of {first}"
-        ));
-    }
-    Ok(step)
-}
-
-fn too_fine(step: Decimal, size: f64) -> Error {
-    Error::Config(format!(
-        "[input] resolution = {step} is too fine for an area of {size:.0} units: it may have at most 2^30 steps"
-    ))
-}
-
-/// The step in z: the finest of the inputs on which all heights between the lowest and the highest can be written.
-fn vertical_step(
-    sources: &[Source],
-    area: &Area,
-    metres: f64,
-    coarser: u32,
-    warnings: &mut Vec<String>,
-) -> Result<Decimal> {
-    let finest = sources.iter().map(|s| s.axes[2].scale).min().unwrap_or(Decimal::ONE);
-    let mut step = finest;
-    while area.size(2) * metres >= Frame::longest_at(float(step) * metres) {
-        step = tens(step, 1)?;
-    }
-    step = tens(step, coarser)?;
-    if step != finest {
-        let size = area.size(2);
-        warnings.push(format!(
-            "heights are rounded to {step}: glTF's single precision cannot hold {size:.0} units in steps of {finest}"
-        ));
-    }
-    Ok(step)
-}
-
-/// A step on which the points of all inputs lie, if the coarsest grids of each have one in common.
-fn common_grid(sources: &[Source]) -> Option<Decimal> {
-    let grids = || sources.iter().flat_map(|s| s.grid);
-    let step = grids().min()?;
-    grids().all(|grid| grid.checked_rem(step).is_some_and(|rest| rest.is_zero())).then_some(step.normalize())
-}
-
-fn tens(step: Decimal, count: u32) -> Result<Decimal> {
-    let product = (0..count).try_fold(step, |step, _| step.checked_mul(Decimal::TEN));
-    let step = product.ok_or_else(|| {
-        Error::Config("the inputs span too much for any terrain: check their coordinates, or set [input] bounds".into())
-    })?;
-    Ok(step.normalize())
-}
-
-fn float(step: Decimal) -> f64 {
-    step.to_f64().unwrap_or(f64::NAN)
-}
-
-/// Where between two steps the lattice lies: the least remainder of the inputs' offsets, so that the order of the files does
-/// not matter. Inputs that agree in it lose nothing.
-fn phase(sources: &[Source], axis: usize, step: Decimal) -> Result<Decimal> {
-    let remainder = |source: &Source| {
-        let rest = source.axes[axis].offset.checked_rem(step)?;
-        if rest < Decimal::ZERO { rest.checked_add(step) } else { Some(rest) }
-    };
-    let mut least: Option<Decimal> = None;
-    for source in sources {
-        let rest = remainder(source).ok_or_else(|| {
-            Error::input(&source.path, format!("its offset has too many digits for the lattice step {step}"))
-        })?;
-        least = Some(least.map_or(rest, |l| l.min(rest)));
-    }
-    Ok(least.unwrap_or_default())
-}
-
-/// The whole number next to `near`, or where the lattice through `phase` does not meet it, the lattice point next to that.
-fn lattice_point_near(near: f64, phase: Decimal, step: Decimal) -> Result<Decimal> {
-    let out_of_range = || {
-        Error::Config(format!(
-            "coordinates around {near:e} have too many digits for the lattice step {step}: check the inputs"
-        ))
-    };
-    let near = shortest_decimal(near.round()).ok_or_else(out_of_range)?;
-    let steps = near.checked_sub(phase).and_then(|d| d.checked_div(step)).ok_or_else(out_of_range)?.round();
-    let point = steps.checked_mul(step).and_then(|d| d.checked_add(phase)).ok_or_else(out_of_range)?;
-    Ok(point.normalize())
 }
 
 /// Lattice integers xmin, ymin, xmax, ymax of the points within `bounds`, borders included.

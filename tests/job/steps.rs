@@ -3,6 +3,7 @@
 
 use gdt_batch::config::{Backend, Config, Duplicates};
 use gdt_batch::geometry::Site;
+use gdt_batch::job::choose::Coarser;
 use gdt_batch::job::directory::Directory;
 use gdt_batch::job::partition::{self, Partition};
 use gdt_batch::job::progress::Progress;
@@ -30,7 +31,7 @@ fn canonical(mut corners: Triangle) -> Triangle {
 fn run_steps(job: &Job, config: &Config) -> (Directory, Partition) {
     let directory = Directory::new(&job.out());
     directory.create().unwrap();
-    let plan = scan::run(config, scan::Coarser::default()).unwrap();
+    let plan = scan::run(config, Coarser::default()).unwrap();
     let task = partition::Task {
         sources: &plan.sources,
         extent: plan.extent,

@@ -158,6 +158,12 @@ impl Columns {
             None => vec![Role::Coordinate(0), Role::Coordinate(1), Role::Coordinate(2)],
         };
         let delimiter = row_delimiter(&candidates, &roles, if header { after } else { &rows });
+        let unnamed = !named && options.columns.is_none();
+        if unnamed && rows.last().is_some_and(|row| delimiter.fields(row).len() > 3) {
+            let what =
+                "no line names the columns: the first three are taken for x, y and z; say otherwise with `columns`";
+            warnings.push(format!("{what} under [input.csv]"));
+        }
         Ok(Detection { columns: Columns { delimiter, roles, comments }, header, warnings })
     }
 
