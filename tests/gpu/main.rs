@@ -1,0 +1,5 @@
+//! The shaders against their plain Rust twins, number by number, on whatever adapter there is: software Vulkan will do.
+
+mod random;
+mod rig;
+mod twins;
