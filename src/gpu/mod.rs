@@ -6,6 +6,7 @@
 
 pub mod buffers;
 pub mod device;
+pub mod executor;
 pub mod machine;
 pub mod steps;
 pub mod twins;

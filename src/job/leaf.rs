@@ -7,11 +7,11 @@ use super::records::{Frontier, Leaf, Rim, RimDraft};
 use super::sites;
 use super::spill::Spill;
 use crate::Result;
-use crate::config::{Backend, Duplicates};
+use crate::config::Duplicates;
 use crate::geometry::Site;
 use crate::input::Point;
 use crate::output::normals::Sums;
-use crate::triangulation::{self, Outcome};
+use crate::triangulation::{Outcome, Triangulator};
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 
@@ -41,12 +41,12 @@ impl AddAssign for LeafFigures {
 }
 
 /// What the step needs to know of the configuration.
-#[derive(Clone, Copy, Debug)]
-pub struct Task {
+#[derive(Clone, Copy)]
+pub struct Task<'a> {
     /// Which of several points with the same x and y stays.
     pub duplicates: Duplicates,
     /// Who triangulates.
-    pub backend: Backend,
+    pub triangulator: &'a Triangulator,
 }
 
 /// Triangulates leaf `tile` and leaves its sites, closed triangles and frontier in the job directory.
@@ -58,11 +58,11 @@ pub fn run(
     partition: &Partition,
     spill: &Spill,
     tile: usize,
-    task: Task,
+    task: Task<'_>,
 ) -> Result<LeafFigures> {
     let (points, dropped) = sites::load(spill, &partition.blocks[tile], task.duplicates)?;
     let sites: Vec<Site> = points.iter().map(|p| p.position).collect();
-    let (mesh, outcome) = triangulation::triangulate(&sites, task.backend)?;
+    let (mesh, outcome) = task.triangulator.triangulate(&sites)?;
     let node = partition.tree.leaves[tile];
     let is_root = partition.tree.nodes[node].parent.is_none();
     let cell = (!is_root).then_some(&partition.tree.nodes[node].cell);

@@ -26,6 +26,7 @@ use crate::output::georeference::Georeference;
 use crate::output::picture::Picture;
 use crate::output::preview::{Canvas, Texel};
 use crate::output::terrain::write_terrain;
+use crate::triangulation::Triangulator;
 use crate::{Error, Result};
 use columns::ColumnReader;
 use directory::Directory;
@@ -78,6 +79,8 @@ fn workers(config: &Config) -> Result<usize> {
 fn run_steps(config: &Config, progress: Progress, threads: usize, start: Instant) -> Result<Report> {
     let memory = config.limits.memory.0;
     let directory = Directory::new(&config.output.directory);
+    // First of all, so that a job that must have a GPU fails at once where there is none.
+    let triangulator = Triangulator::new(&config.triangulation, memory, threads)?;
 
     let stage = progress.stage("scan", config.input.files.len() as u64, "patterns");
     let plan = scan::run(config)?;
@@ -91,7 +94,7 @@ fn run_steps(config: &Config, progress: Progress, threads: usize, start: Instant
     let bounds = enough_points(&partition.summary)?;
 
     let stage = progress.stage("triangulate", partition.summary.tally.kept, "points");
-    let leaves = triangulate(config, &directory, &partition, &stage)?;
+    let leaves = triangulate(config, &triangulator, &directory, &partition, &stage)?;
     // From here on the leaves' own files are enough.
     directory::remove_file(&directory.spill())?;
     stages.push(stage.finish());
@@ -121,7 +124,8 @@ fn run_steps(config: &Config, progress: Progress, threads: usize, start: Instant
 
     let points = partition.summary.tally;
     let wall_s = start.elapsed().as_secs_f64();
-    let parts = Parts { points, leaves, tiles: written, other_bytes, temporary, stages, threads, memory, wall_s };
+    let gpu = triangulator.gpu().map(str::to_owned);
+    let parts = Parts { points, leaves, gpu, tiles: written, other_bytes, temporary, stages, threads, memory, wall_s };
     let report = Report::new(&plan, parts);
     directory::write_json(&directory.report(), &report)?;
     Ok(report)
@@ -159,14 +163,21 @@ fn enough_triangles(triangles: u64) -> Result<()> {
 }
 
 /// Triangulates all leaves and merges every inner node as soon as its children are done.
-fn triangulate(config: &Config, directory: &Directory, partition: &Partition, stage: &Stage) -> Result<LeafFigures> {
+fn triangulate(
+    config: &Config,
+    triangulator: &Triangulator,
+    directory: &Directory,
+    partition: &Partition,
+    stage: &Stage,
+) -> Result<LeafFigures> {
     let spill = Spill::open(&directory.spill())?;
-    let grower = Grower { config, directory, partition, spill: &spill, stage };
+    let grower = Grower { config, triangulator, directory, partition, spill: &spill, stage };
     grower.grow(0)
 }
 
 struct Grower<'a> {
     config: &'a Config,
+    triangulator: &'a Triangulator,
     directory: &'a Directory,
     partition: &'a Partition,
     spill: &'a Spill,
@@ -177,8 +188,7 @@ impl Grower<'_> {
     fn grow(&self, node: usize) -> Result<LeafFigures> {
         match self.partition.tree.nodes[node].kind {
             Kind::Leaf(tile) => {
-                let Config { input, triangulation, .. } = self.config;
-                let task = leaf::Task { duplicates: input.duplicates, backend: triangulation.backend };
+                let task = leaf::Task { duplicates: self.config.input.duplicates, triangulator: self.triangulator };
                 let figures = leaf::run(self.directory, self.partition, self.spill, tile, task)?;
                 self.stage.advance(figures.sites + figures.duplicates);
                 Ok(figures)
