@@ -101,6 +101,26 @@ impl Machine {
         Ok(numbers)
     }
 
+    /// The first `count` numbers of buffer `name`, after all that was started.
+    ///
+    /// # Errors
+    /// As [`Machine::start`] and [`Machine::finish`].
+    pub fn numbers(&self, set: &mut Set, name: Name, count: u64) -> Result<Vec<u32>, Fault> {
+        self.numbers_from(set, name, 0, count)
+    }
+
+    /// `count` numbers of buffer `name` from number `first` on.
+    ///
+    /// # Errors
+    /// As [`Machine::numbers`].
+    pub fn numbers_from(&self, set: &mut Set, name: Name, first: u64, count: u64) -> Result<Vec<u32>, Fault> {
+        if count == 0 {
+            return Ok(Vec::new());
+        }
+        let ticket = self.fetch(set, name, 4 * first, 4 * count)?;
+        self.finish(set, ticket)
+    }
+
     /// Makes buffers and pipelines.
     fn prepare(&mut self, set: &mut Set, recording: &Recording) -> Result<(), Fault> {
         let mut runs = 0;
@@ -114,7 +134,7 @@ impl Machine {
                         self.pipelines.insert(*program, pipeline);
                     }
                 }
-                Command::Upload(..) | Command::Clear(..) => {}
+                Command::Upload(..) | Command::Clear(..) | Command::Copy(..) => {}
             }
         }
         set.need(&self.device, Name::Params, (runs * Set::STRIDE).max(Set::STRIDE))
@@ -139,6 +159,9 @@ impl Machine {
                     }
                 }
                 Command::Clear(name, bytes) => encoder.clear_buffer(set.get(*name)?, 0, Some(*bytes)),
+                Command::Copy(from, to, bytes) => {
+                    encoder.copy_buffer_to_buffer(set.get(*from)?, 0, set.get(*to)?, 0, *bytes);
+                }
                 Command::Run(program, _, size) => {
                     self.encode(&mut encoder, set, program, *size, runs * Set::STRIDE)?;
                     runs += 1;

@@ -8,6 +8,7 @@ pub mod buffers;
 pub mod device;
 pub mod executor;
 pub mod machine;
+pub mod selftest;
 pub mod steps;
 pub mod twins;
 

@@ -65,6 +65,8 @@ pub enum Command {
     Upload(Name, Vec<u32>),
     /// Set this many bytes of a buffer to zero.
     Clear(Name, u64),
+    /// Copy this many bytes from one buffer to another.
+    Copy(Name, Name, u64),
     /// Run a program.
     Run(Program, [u32; 5], Groups),
 }
@@ -193,9 +195,9 @@ impl Recording {
             }
         };
         // To and fro, so that the last pass ends in the labels.
-        pass(self, if steps.len() % 2 == 0 { SEED_LABELS } else { SEED_FLOOD }, 0);
+        pass(self, if steps.len().is_multiple_of(2) { SEED_LABELS } else { SEED_FLOOD }, 0);
         for (i, &step) in steps.iter().enumerate() {
-            pass(self, if (steps.len() - i) % 2 == 0 { TO_FLOOD } else { TO_LABELS }, step);
+            pass(self, if (steps.len() - i).is_multiple_of(2) { TO_FLOOD } else { TO_LABELS }, step);
         }
     }
 

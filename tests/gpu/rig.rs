@@ -3,10 +3,11 @@
 use gdt_batch::gpu::buffers::{Name, Set};
 use gdt_batch::gpu::device::{self, Device, Wish};
 use gdt_batch::gpu::machine::Machine;
-use gdt_batch::gpu::steps::Recording;
+use gdt_batch::gpu::selftest::{Comparison, compare};
+use gdt_batch::gpu::steps::{Recording, Size};
 
 pub(crate) struct Rig {
-    pub(crate) machine: Machine,
+    machine: Machine,
     set: Set,
 }
 
@@ -27,16 +28,17 @@ impl Rig {
         }
     }
 
+    /// Every step against its twin.
+    pub(crate) fn compare(&mut self, size: Size, pixels: &[u32]) -> Vec<Comparison> {
+        compare(&mut self.machine, &mut self.set, size, pixels).expect("the steps run")
+    }
+
     pub(crate) fn run(&mut self, recording: &Recording) {
         self.machine.start(&mut self.set, recording).expect("the steps run");
     }
 
-    /// `count` numbers of buffer `name`.
-    pub(crate) fn fetch(&mut self, name: Name, count: u64) -> Vec<u32> {
-        if count == 0 {
-            return Vec::new();
-        }
-        let ticket = self.machine.fetch(&mut self.set, name, 0, 4 * count).expect("the copy starts");
-        self.machine.finish(&self.set, ticket).expect("the copy ends")
+    /// The first `count` numbers of buffer `name`.
+    pub(crate) fn numbers(&mut self, name: Name, count: u64) -> Vec<u32> {
+        self.machine.numbers(&mut self.set, name, count).expect("they come back")
     }
 }
