@@ -174,7 +174,7 @@ impl Engine {
 fn open(wish: &Wish) -> Result<Machine, Fault> {
     let adapters = device::adapters();
     let infos: Vec<_> = adapters.iter().map(wgpu::Adapter::get_info).collect();
-    let chosen = device::choose(&infos, wish).map_err(Fault::Refused)?;
+    let chosen = device::choose(&infos, wish).map_err(Fault::Absent)?;
     Ok(Machine::new(Device::open(&adapters[chosen])?))
 }
 

@@ -18,6 +18,9 @@ use steps::{Recording, Size};
 /// Why a GPU did not do what it was asked to.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Fault {
+    /// There is no adapter that will do; the text is a sentence.
+    #[error("{0}")]
+    Absent(String),
     /// It has not enough memory for a texture of this size.
     #[error("the GPU has not enough memory")]
     OutOfMemory,
@@ -29,15 +32,13 @@ pub enum Fault {
     Refused(String),
 }
 
-/// The steps that make the labels of a texture of its sites, each given by its pixel (y << 16 | x): G1, G2, and G3 where the
-/// diagram is not exact.
+/// The steps that make the labels of a texture of its sites, each given by its pixel (y << 16 | x): G1, G2 and G3. Exact
+/// diagrams have islands too, where thin regions fall apart into pixels.
 pub fn labels(size: Size, pixels: Vec<u32>, voronoi: Voronoi) -> Recording {
     let mut recording = Recording::default();
     recording.write_sites(size, pixels);
     recording.voronoi(size, voronoi);
-    if voronoi == Voronoi::Jfa {
-        recording.remove_islands(size);
-    }
+    recording.remove_islands(size);
     recording
 }
 

@@ -1,5 +1,6 @@
 //! A machine on the first adapter that will do, and how to get numbers back from it.
 
+use gdt_batch::gpu::Fault;
 use gdt_batch::gpu::buffers::{Name, Set};
 use gdt_batch::gpu::device::{self, Device, Wish};
 use gdt_batch::gpu::machine::Machine;
@@ -31,6 +32,16 @@ impl Rig {
     /// Every step against its twin.
     pub(crate) fn compare(&mut self, size: Size, pixels: &[u32]) -> Vec<Comparison> {
         compare(&mut self.machine, &mut self.set, size, pixels).expect("the steps run")
+    }
+
+    /// Loses the device, as a driver's reset would.
+    pub(crate) fn lose(&self) {
+        self.machine.device().device.destroy();
+    }
+
+    pub(crate) fn try_run(&mut self, recording: &Recording) -> Result<(), Fault> {
+        let submission = self.machine.start(&mut self.set, recording)?;
+        self.machine.device().wait(submission)
     }
 
     pub(crate) fn run(&mut self, recording: &Recording) {
