@@ -15,7 +15,7 @@ use std::path::PathBuf;
 /// Leaves as a job cuts them by default.
 const LEAF: usize = 50_000;
 /// Leaves smaller than this are not cut further.
-const SMALL: usize = 2_000;
+const SMALL: usize = 3_000;
 
 struct Case {
     name: String,

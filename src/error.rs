@@ -18,12 +18,28 @@ pub enum Error {
         /// What the operating system said.
         source: std::io::Error,
     },
+    /// Another process works in the job directory (exit code 1).
+    #[error("process {holder} is working in {}: wait for it, or choose another [output] directory", directory.display())]
+    InUse {
+        /// The job directory.
+        directory: PathBuf,
+        /// The process id of the holder.
+        holder: String,
+    },
     /// The job does not fit the memory it was given (exit code 1).
     #[error("not enough memory: {0}")]
     Memory(String),
     /// The command line or the configuration is wrong (exit code 2).
     #[error("{0}")]
     Config(String),
+    /// The mesh has a triangle too long for single precision at the resolution of the job (exit code 2).
+    #[error("{what}: set a coarser [input] resolution, narrower bounds, or leave out the classes that are no terrain")]
+    TooFine {
+        /// Whether the resolution of z is meant, not that of x and y.
+        vertical: bool,
+        /// How long it is, and what would fit.
+        what: String,
+    },
     /// An input file cannot be used (exit code 3).
     #[error("{}: {what}", path.display())]
     Input {
@@ -44,8 +60,8 @@ impl Error {
     /// The process exit code: 1 may be retried, 2 usage or configuration, 3 bad input, 4 internal invariant broken.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Error::Io { .. } | Error::Memory(_) => 1,
-            Error::Config(_) => 2,
+            Error::Io { .. } | Error::InUse { .. } | Error::Memory(_) => 1,
+            Error::Config(_) | Error::TooFine { .. } => 2,
             Error::Input { .. } | Error::NoTerrain(_) => 3,
             Error::Broken(_) => 4,
         }

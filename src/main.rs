@@ -8,6 +8,7 @@ use gdt_batch::job::{self, check, progress::Progress};
 use gdt_batch::{Error, Result, input, sample, verify};
 use serde::Serialize;
 use std::fmt::Display;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -38,13 +39,18 @@ fn run(cli: Cli) -> Result<ExitCode> {
 
 /// Prints a result for people or for machines.
 fn show(result: &(impl Display + Serialize), talk: Talk) -> Result<()> {
-    if talk.json {
-        let text = serde_json::to_string_pretty(result).map_err(|e| Error::Broken(e.to_string()))?;
-        println!("{text}");
-    } else if !talk.quiet {
-        println!("{}", result.to_string().trim_end());
+    let text = if talk.json {
+        serde_json::to_string_pretty(result).map_err(|e| Error::Broken(e.to_string()))?
+    } else if talk.quiet {
+        return Ok(());
+    } else {
+        result.to_string()
+    };
+    match writeln!(std::io::stdout(), "{}", text.trim_end()) {
+        // Who closes the pipe has read enough.
+        Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        outcome => outcome.map_err(Error::io("write to", "standard output")),
     }
-    Ok(())
 }
 
 fn prove(directory: &Path, memory: u64, talk: Talk) -> Result<ExitCode> {

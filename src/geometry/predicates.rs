@@ -17,7 +17,7 @@ pub fn orient2d(a: Site, b: Site, c: Site) -> i64 {
     abx * acy - aby * acx
 }
 
-/// Whether `d` is inside the circle through the counterclockwise triangle `abc`, ties decided by [`tie`].
+/// Whether `d` is inside the circle through the counterclockwise triangle `abc`, ties decided by `tie`.
 ///
 /// This is the canonical decision of the whole project: an edge ac shared by the triangles abc and acd is Delaunay
 /// if and only if `!in_circle(a, b, c, d)`, and exactly one diagonal of every strictly convex quadrilateral is.

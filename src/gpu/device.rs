@@ -3,6 +3,7 @@
 
 use super::Fault;
 use std::future::Future;
+use std::path::Path;
 use std::pin::pin;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -33,6 +34,21 @@ impl Wish {
         let from_environment = || std::env::var(ADAPTER_VARIABLE).ok().filter(|name| !name.is_empty());
         Wish { name: name.map(str::to_owned).or_else(from_environment), software }
     }
+}
+
+/// Whether this machine may have a hardware GPU. Asked before any driver is loaded, because Linux machines without one often have
+/// software drivers, which take tens of megabytes and some write to standard error.
+pub fn hardware_is_likely() -> bool {
+    if !cfg!(target_os = "linux") {
+        return true;
+    }
+    // The device nodes of NVIDIA's driver, of WSL and of Qualcomm's and ARM's own; all others have a render node.
+    let nodes = ["/dev/nvidiactl", "/dev/dxg", "/dev/kgsl-3d0", "/dev/mali0"];
+    let is_render_node = |entry: std::io::Result<std::fs::DirEntry>| {
+        entry.is_ok_and(|entry| entry.file_name().to_string_lossy().starts_with("renderD"))
+    };
+    nodes.iter().any(|node| Path::new(node).exists())
+        || std::fs::read_dir("/dev/dri").is_ok_and(|mut entries| entries.any(is_render_node))
 }
 
 /// All adapters of this machine, of all backends that wgpu can use here.

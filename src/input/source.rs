@@ -71,6 +71,9 @@ pub struct Source {
     pub max: [f64; 3],
     /// What raw integers mean in x, y, z.
     pub axes: [Axis; 3],
+    /// A step in x and in y of which every coordinate is a whole multiple, counted from the axis' offset: the coarsest
+    /// there is for text, the scale for LAS.
+    pub grid: [Decimal; 2],
     /// Whether points have a colour.
     pub has_rgb: bool,
     /// Whether points have a classification.
@@ -157,6 +160,7 @@ fn open_las(file: &Positioned) -> Result<Source> {
         min: header.min,
         max: header.max,
         axes: header.axes,
+        grid: [header.axes[0].scale, header.axes[1].scale],
         has_rgb: Layout::new(header.format, header.record_length).has_rgb(),
         has_class: true,
         crs,
@@ -179,6 +183,7 @@ fn open_text(file: &Positioned, options: &TextOptions) -> Result<Source> {
         min: table.min,
         max: table.max,
         axes: table.axes(),
+        grid: table.grid(),
         has_rgb: table.has_rgb(),
         has_class: table.has_class(),
         crs: Crs::default(),

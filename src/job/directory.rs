@@ -2,8 +2,8 @@
 
 use crate::{Error, Result};
 use serde::{Serialize, de::DeserializeOwned};
-use std::fs::{self, File};
-use std::io::Write;
+use std::fs::{self, File, TryLockError};
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 /// The paths of a job. Files of a step that is called by index carry that index.
@@ -19,20 +19,36 @@ impl Directory {
         Directory { output: output.to_path_buf(), job: output.join("job") }
     }
 
-    /// Makes the directories, empty of what an earlier job may have left.
+    /// Makes the directories, empty of what an earlier job has left, and keeps other processes out until the lock is dropped.
+    /// Removes nothing that a job has not written.
     ///
     /// # Errors
-    /// [`Error::Io`] if they cannot be made or emptied.
-    pub fn create(&self) -> Result<()> {
-        remove_directory(&self.job)?;
-        remove_directory(&self.tiles())?;
-        for stale in [self.terrain(), self.georeference(), self.report(), self.preview()] {
+    /// [`Error::Io`] if they cannot be made or emptied, [`Error::Config`] if they are somebody else's or in use.
+    pub fn create(&self) -> Result<Lock> {
+        let is_new = !self.job.exists();
+        fs::create_dir_all(&self.job).map_err(Error::io("create the directory", &self.job))?;
+        let lock = Lock::take(&self.job, is_new)?;
+        for directory in STEPS.map(|name| self.job.join(name)) {
+            remove_directory(&directory)?;
+            fs::create_dir_all(&directory).map_err(Error::io("create the directory", &directory))?;
+        }
+        fs::create_dir_all(self.tiles()).map_err(Error::io("create the directory", self.tiles()))?;
+        self.remove_old_tiles()?;
+        for stale in [self.spill(), self.tree(), self.terrain(), self.georeference(), self.report(), self.preview()] {
             remove_file(&stale)?;
         }
-        for directory in
-            ["leaves", "nodes", "rims", "preview"].map(|name| self.job.join(name)).into_iter().chain([self.tiles()])
-        {
-            fs::create_dir_all(&directory).map_err(Error::io("create the directory", &directory))?;
+        Ok(lock)
+    }
+
+    /// Tiles of an earlier job, whole or not: files named by a number.
+    fn remove_old_tiles(&self) -> Result<()> {
+        let tiles = self.tiles();
+        for entry in fs::read_dir(&tiles).map_err(Error::io("read", &tiles))? {
+            let path = entry.map_err(Error::io("read", &tiles))?.path();
+            let is_numbered = path.file_stem().is_some_and(|s| s.to_string_lossy().bytes().all(|b| b.is_ascii_digit()));
+            if is_numbered && path.extension().is_some_and(|e| e == "glb" || e == "partial") {
+                remove_file(&path)?;
+            }
         }
         Ok(())
     }
@@ -126,6 +142,44 @@ impl Directory {
     }
 }
 
+/// The folders in the job directory.
+const STEPS: [&str; 4] = ["leaves", "nodes", "rims", "preview"];
+
+/// Keeps other processes out of a job directory, also after a kill: the system lets go of it with the process.
+#[derive(Debug)]
+pub struct Lock {
+    _file: File,
+}
+
+impl Lock {
+    /// Takes the lock file of `job`, which also marks the directory as a job's own.
+    fn take(job: &Path, is_new: bool) -> Result<Lock> {
+        let path = job.join("lock");
+        if !is_new && !path.exists() {
+            return Err(Error::Config(format!(
+                "{} is there already and is no job directory of this program: choose another [output] directory",
+                job.display()
+            )));
+        }
+        let file = File::options().read(true).write(true).create(true).truncate(false).open(&path);
+        let mut file = file.map_err(Error::io("open", &path))?;
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => {
+                let mut holder = String::new();
+                file.read_to_string(&mut holder).map_err(Error::io("read", &path))?;
+                return Err(Error::InUse { directory: job.into(), holder });
+            }
+            // Some network file systems know no locks; there a second job is not noticed.
+            Err(TryLockError::Error(e)) if e.kind() != std::io::ErrorKind::Unsupported => {
+                return Err(Error::io("lock", &path)(e));
+            }
+            _ => {}
+        }
+        file.set_len(0).and_then(|()| write!(file, "{}", std::process::id())).map_err(Error::io("write", &path))?;
+        Ok(Lock { _file: file })
+    }
+}
+
 /// Writes `path` so that it appears under its name only when whole.
 ///
 /// # Errors
@@ -172,5 +226,37 @@ pub fn remove_file(path: &Path) -> Result<()> {
     match fs::remove_file(path) {
         Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io("remove", path)(e)),
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_a_jobs_own_stays() {
+        let output = tempfile::tempdir().unwrap();
+        let directory = Directory::new(output.path());
+        fs::create_dir_all(directory.tiles()).unwrap();
+        let [theirs, old] = ["roof.glb", "000007.glb"].map(|name| directory.tiles().join(name));
+        fs::write(&theirs, "x").unwrap();
+        fs::write(&old, "x").unwrap();
+        drop(directory.create().unwrap());
+        assert!(theirs.exists() && !old.exists());
+        fs::remove_file(output.path().join("job/lock")).unwrap();
+        let error = directory.create().unwrap_err();
+        assert_eq!(error.exit_code(), 2, "{error}");
+    }
+
+    #[test]
+    fn two_jobs_in_one_directory_keep_out_of_each_others_way() {
+        let output = tempfile::tempdir().unwrap();
+        let directory = Directory::new(output.path());
+        let lock = directory.create().unwrap();
+        let error = directory.create().unwrap_err();
+        assert_eq!(error.exit_code(), 1);
+        assert!(error.to_string().contains(&std::process::id().to_string()), "{error}");
+        drop(lock);
+        directory.create().unwrap();
     }
 }

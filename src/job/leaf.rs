@@ -5,13 +5,15 @@ use super::directory::Directory;
 use super::partition::Partition;
 use super::records::{Frontier, Leaf, Rim, RimDraft};
 use super::sites;
+use super::span::Longest;
 use super::spill::Spill;
 use crate::Result;
 use crate::config::Duplicates;
 use crate::geometry::Site;
 use crate::input::Point;
 use crate::output::normals::Sums;
-use crate::triangulation::{Outcome, Triangulator};
+use crate::triangulation::mesh::Mesh;
+use crate::triangulation::{self, Outcome, Triangulator};
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 
@@ -47,12 +49,15 @@ pub struct Task<'a> {
     pub duplicates: Duplicates,
     /// Who triangulates.
     pub triangulator: &'a Triangulator,
+    /// How long a triangle may be.
+    pub longest: Longest,
 }
 
 /// Triangulates leaf `tile` and leaves its sites, closed triangles and frontier in the job directory.
 ///
 /// # Errors
-/// [`crate::Error::Io`] on the job directory, [`crate::Error::Broken`] if the triangulation fails.
+/// [`crate::Error::Io`] on the job directory, [`crate::Error::TooFine`] if a triangle is too long to be written,
+/// [`crate::Error::Broken`] if the triangulation fails.
 pub fn run(
     directory: &Directory,
     partition: &Partition,
@@ -67,8 +72,10 @@ pub fn run(
     let is_root = partition.tree.nodes[node].parent.is_none();
     let cell = (!is_root).then_some(&partition.tree.nodes[node].cell);
     let closing = close(&mesh, &sites, cell, |_| false);
+    check_spans(&mesh, &sites, &closing.states, task.longest)?;
     let closed = mesh.triangles.iter().zip(&closing.states).filter(|(_, state)| **state == State::Closed);
     let leaf = leaf_of(&points, closed.map(|(triangle, _)| *triangle).collect());
+    triangulation::recycle(mesh);
     let rim = |&site: &u32| Rim { tile: tile as u32, site, position: leaf.positions[site as usize] };
     let frontier = Frontier { sites: closing.frontier.iter().map(rim).collect(), boundary: closing.boundary };
     let bytes = rim_draft(&leaf, &closing.frontier).save(directory, tile)?
@@ -76,6 +83,11 @@ pub fn run(
         + frontier.save(directory, node)?;
     let (sites, triangles) = (sites.len() as u64, leaf.triangles.len() as u64);
     Ok(LeafFigures { sites, duplicates: dropped, triangles, bytes, outcome })
+}
+
+fn check_spans(mesh: &Mesh, sites: &[Site], states: &[State], longest: Longest) -> Result<()> {
+    let mut closed = mesh.triangles.iter().zip(states).filter(|(_, state)| **state == State::Closed);
+    closed.try_for_each(|(corners, _)| longest.check(corners.map(|v| sites[v as usize])))
 }
 
 fn leaf_of(points: &[Point], triangles: Vec<[u32; 3]>) -> Leaf {

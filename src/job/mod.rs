@@ -16,6 +16,7 @@ pub mod records;
 pub mod report;
 pub mod scan;
 pub mod sites;
+pub mod span;
 pub mod spill;
 pub mod stitch;
 pub mod tree;
@@ -33,42 +34,90 @@ use directory::Directory;
 use export::{Look, TileFigures};
 use leaf::LeafFigures;
 use partition::{Partition, Summary, Task};
-use progress::{Progress, Stage};
+use progress::{Progress, Stage, StageFigures};
 use rayon::prelude::*;
 use report::{Parts, Report};
-use scan::Plan;
+use scan::{Coarser, Plan};
+use span::Longest;
 use spill::Spill;
 use std::io::Write;
 use std::time::Instant;
-use tree::Kind;
+use tree::{Kind, Tree};
 
 /// Bytes that one site of a leaf takes while the leaf is triangulated: points, sort keys, sites, mesh and marks.
 const BYTES_PER_LEAF_SITE: u64 = 500;
+/// Ten times coarser as often as this is no terrain any more.
+const MOST_TENS: u32 = 6;
 /// A mesh of more triangles than this is not written as one file: viewers would not open it.
 const MOST_TRIANGLES_IN_ONE_FILE: u64 = 20_000_000;
 
 /// Runs the whole job of `config`.
 ///
 /// # Errors
-/// Whatever stops a step; see [`Error`].
+/// Whatever stops a step; see [`Error`]. A job that fails leaves no temporary files.
 pub fn run(config: &Config, progress: Progress) -> Result<Report> {
     let start = Instant::now();
-    let threads = workers(config)?;
+    // First of all, so that a job that must have a GPU fails at once where there is none.
+    let triangulator = Triangulator::new(&config.triangulation, config.limits.memory.0, config.threads())?;
+    let mut coarser = Coarser::default();
+    loop {
+        match attempt(config, &triangulator, coarser, progress, start) {
+            // Only the finished mesh knows its longest triangle, so that a second try is the price of not rounding in vain.
+            Err(Error::TooFine { vertical: true, what }) if coarser.vertical < MOST_TENS => {
+                progress.note(&format!("{what}; starting again with a coarser step in z"));
+                coarser.vertical += 1;
+            }
+            Err(Error::TooFine { vertical: false, what })
+                if config.input.resolution.0.is_none() && coarser.horizontal < MOST_TENS =>
+            {
+                progress.note(&format!("{what}; starting again with a coarser step in x and y"));
+                coarser.horizontal += 1;
+            }
+            outcome => return outcome,
+        }
+    }
+}
+
+fn attempt(
+    config: &Config,
+    triangulator: &Triangulator,
+    coarser: Coarser,
+    progress: Progress,
+    start: Instant,
+) -> Result<Report> {
+    let stage = progress.stage("scan", 1, "job");
+    let plan = on_threads(config.threads(), || scan::run(config, coarser))?;
+    stage.advance(1);
+    let scanned = stage.finish();
+    let threads = workers(config, plan.records)?;
+    let directory = Directory::new(&config.output.directory);
+    let _lock = directory.create()?;
+    let job = Job { config, triangulator, plan: &plan, directory: &directory, progress, threads, start };
+    let outcome = on_threads(threads, || job.run(scanned));
+    if outcome.is_err() {
+        // The first error is the one to report.
+        let _ = directory.clean_up();
+    }
+    outcome
+}
+
+/// What `work` returns, its rayon tasks on `threads` threads.
+fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> Result<T> + Send) -> Result<T> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|e| Error::Memory(format!("cannot start {threads} threads: {e}")))?;
-    pool.install(|| run_steps(config, progress, threads, start))
+    pool.install(work)
 }
 
 /// As many threads as are wanted, and as have room for a leaf each.
-fn workers(config: &Config) -> Result<usize> {
-    let per_leaf = config.triangulation.sites_per_tile.0.saturating_mul(BYTES_PER_LEAF_SITE);
+fn workers(config: &Config, points: u64) -> Result<usize> {
+    let per_tile = config.triangulation.sites_per_tile.0.min(points).max(1);
+    let per_leaf = per_tile.saturating_mul(BYTES_PER_LEAF_SITE);
     // The rest is for code, stacks, decoders and what the allocator keeps.
     let room = config.limits.memory.0 / 4 * 3;
     match room / per_leaf {
         0 => Err(Error::Config(format!(
-            "[triangulation] sites_per_tile = {} takes about {} MiB a thread, more than [limits] memory = \"{}\" has room for: \
-             lower the one or raise the other",
-            config.triangulation.sites_per_tile.0,
+            "tiles of {per_tile} points take about {} MiB a thread, more than [limits] memory = \"{}\" has room for: lower \
+             [triangulation] sites_per_tile or raise memory",
             per_leaf >> 20,
             config.limits.memory
         ))),
@@ -76,59 +125,71 @@ fn workers(config: &Config) -> Result<usize> {
     }
 }
 
-fn run_steps(config: &Config, progress: Progress, threads: usize, start: Instant) -> Result<Report> {
-    let memory = config.limits.memory.0;
-    let directory = Directory::new(&config.output.directory);
-    // First of all, so that a job that must have a GPU fails at once where there is none.
-    let triangulator = Triangulator::new(&config.triangulation, memory, threads)?;
+/// A job whose inputs have been looked at and whose directory is its own.
+struct Job<'a> {
+    config: &'a Config,
+    triangulator: &'a Triangulator,
+    plan: &'a Plan,
+    directory: &'a Directory,
+    progress: Progress,
+    threads: usize,
+    start: Instant,
+}
 
-    let stage = progress.stage("scan", config.input.files.len() as u64, "patterns");
-    let plan = scan::run(config)?;
-    stage.advance(config.input.files.len() as u64);
-    let mut stages = vec![stage.finish()];
-    directory.create()?;
+impl Job<'_> {
+    /// Step 2 and all after it.
+    fn run(&self, scanned: StageFigures) -> Result<Report> {
+        let Job { config, triangulator, plan, directory, progress, .. } = *self;
 
-    let stage = progress.stage("read", plan.records, "points");
-    let partition = partition::run(&task(&plan, config), &directory, &stage)?;
-    stages.push(stage.finish());
-    let bounds = enough_points(&partition.summary)?;
+        let stage = progress.stage("read", plan.records, "points");
+        let partition = partition::run(&task(plan, config), directory, &stage)?;
+        let bounds = enough_points(&partition.summary)?;
+        let longest = Longest::of(&plan.frame);
+        longest.check_heights(bounds[0][2], bounds[1][2])?;
+        let read = stage.finish();
 
-    let stage = progress.stage("triangulate", partition.summary.tally.kept, "points");
-    let leaves = triangulate(config, &triangulator, &directory, &partition, &stage)?;
-    // From here on the leaves' own files are enough.
-    directory::remove_file(&directory.spill())?;
-    stages.push(stage.finish());
-    let temporary = partition.spilled + leaves.bytes;
+        let stage = progress.stage("triangulate", partition.summary.tally.kept, "points");
+        let leaves = triangulate(config, triangulator, directory, &partition, longest, &stage)?;
+        // From here on the leaves' own files are enough.
+        directory::remove_file(&directory.spill())?;
+        let triangulated = stage.finish();
 
-    let look = look(config, &plan, &partition.summary, bounds);
-    let tiles = partition.tree.leaves.len();
-    let stage = progress.stage("stitch", tiles as u64, "tiles");
-    (0..tiles).into_par_iter().try_for_each(|tile| {
-        stitch::run(&directory, &partition.tree, tile, &look.frame)?;
+        let look = look(config, plan, &partition.summary, bounds);
+        let tiles = partition.tree.leaves.len();
+        let stage = progress.stage("stitch", tiles as u64, "tiles");
+        stitch_all(directory, &partition.tree, &look, &stage)?;
+        let stitched = stage.finish();
+
+        let stage = progress.stage("write", leaves.sites, "sites");
+        let canvas = Canvas::new(&look.frame, bounds);
+        let written = export_all(directory, &partition, &look, &canvas, &stage)?;
+        enough_triangles(written.triangles)?;
+        let exported = stage.finish();
+
+        let stage = progress.stage("finish", 1, "job");
+        let other_bytes = finish(directory, plan, &written, &canvas, tiles, bounds)?;
+        directory.clean_up()?;
         stage.advance(1);
-        Ok::<(), Error>(())
-    })?;
-    stages.push(stage.finish());
+        let stages = vec![scanned, read, triangulated, stitched, exported, stage.finish()];
 
-    let stage = progress.stage("write", leaves.sites, "sites");
-    let canvas = Canvas::new(&look.frame, bounds);
-    let written = export_all(&directory, &partition, &look, &canvas, &stage)?;
-    enough_triangles(written.triangles)?;
-    stages.push(stage.finish());
-
-    let stage = progress.stage("finish", 1, "scene");
-    let other_bytes = finish(&directory, &plan, &written, &canvas, tiles, bounds)?;
-    directory.clean_up()?;
-    stage.advance(1);
-    stages.push(stage.finish());
-
-    let points = partition.summary.tally;
-    let wall_s = start.elapsed().as_secs_f64();
-    let gpu = triangulator.gpu().map(str::to_owned);
-    let parts = Parts { points, leaves, gpu, tiles: written, other_bytes, temporary, stages, threads, memory, wall_s };
-    let report = Report::new(&plan, parts);
-    directory::write_json(&directory.report(), &report)?;
-    Ok(report)
+        let report = Report::new(
+            plan,
+            Parts {
+                points: partition.summary.tally,
+                leaves,
+                gpu: triangulator.gpu().map(str::to_owned),
+                tiles: written,
+                other_bytes,
+                temporary: partition.spilled + leaves.bytes,
+                stages,
+                threads: self.threads,
+                memory: config.limits.memory.0,
+                wall_s: self.start.elapsed().as_secs_f64(),
+            },
+        );
+        directory::write_json(&directory.report(), &report)?;
+        Ok(report)
+    }
 }
 
 fn task<'a>(plan: &'a Plan, config: &Config) -> Task<'a> {
@@ -146,8 +207,9 @@ fn enough_points(summary: &Summary) -> Result<[[i32; 3]; 2]> {
     summary.bounds.ok_or_else(|| {
         let tally = &summary.tally;
         Error::NoTerrain(format!(
-            "no point is left to triangulate: of {} read, {} are withheld, {} of other classes, {} out of bounds; check [input] classes and bounds",
-            tally.read, tally.withheld, tally.other_class, tally.out_of_bounds
+            "no point is left to triangulate: of {} read, {} are malformed, {} withheld, {} of other classes, {} out of bounds; check \
+             [input] classes and bounds",
+            tally.read, tally.malformed, tally.withheld, tally.other_class, tally.out_of_bounds
         ))
     })
 }
@@ -168,10 +230,11 @@ fn triangulate(
     triangulator: &Triangulator,
     directory: &Directory,
     partition: &Partition,
+    longest: Longest,
     stage: &Stage,
 ) -> Result<LeafFigures> {
     let spill = Spill::open(&directory.spill())?;
-    let grower = Grower { config, triangulator, directory, partition, spill: &spill, stage };
+    let grower = Grower { config, triangulator, directory, partition, spill: &spill, longest, stage };
     grower.grow(0)
 }
 
@@ -181,6 +244,7 @@ struct Grower<'a> {
     directory: &'a Directory,
     partition: &'a Partition,
     spill: &'a Spill,
+    longest: Longest,
     stage: &'a Stage,
 }
 
@@ -188,7 +252,11 @@ impl Grower<'_> {
     fn grow(&self, node: usize) -> Result<LeafFigures> {
         match self.partition.tree.nodes[node].kind {
             Kind::Leaf(tile) => {
-                let task = leaf::Task { duplicates: self.config.input.duplicates, triangulator: self.triangulator };
+                let task = leaf::Task {
+                    duplicates: self.config.input.duplicates,
+                    triangulator: self.triangulator,
+                    longest: self.longest,
+                };
                 let figures = leaf::run(self.directory, self.partition, self.spill, tile, task)?;
                 self.stage.advance(figures.sites + figures.duplicates);
                 Ok(figures)
@@ -197,7 +265,8 @@ impl Grower<'_> {
                 let (low, high) = rayon::join(|| self.grow(low), || self.grow(high));
                 let (mut figures, high) = (low?, high?);
                 figures += high;
-                merge::run(self.directory, &self.partition.tree, node, self.config.limits.memory.0 / 2)?;
+                let memory = self.config.limits.memory.0 / 2;
+                merge::run(self.directory, &self.partition.tree, node, memory, self.longest)?;
                 Ok(figures)
             }
         }
@@ -214,7 +283,15 @@ fn look(config: &Config, plan: &Plan, summary: &Summary, bounds: [[i32; 3]; 2]) 
         ColorChoice::Auto | ColorChoice::Rgb if summary.tally.max_rgb == 0 => Some(elevation),
         ColorChoice::Auto | ColorChoice::Rgb => Some(Coloring::Rgb { eight_bit: summary.tally.max_rgb <= 255 }),
     };
-    Look { frame: plan.frame.clone(), coloring, normals: config.output.normals }
+    Look { frame: plan.frame.clone().refined(bounds), coloring, normals: config.output.normals }
+}
+
+fn stitch_all(directory: &Directory, tree: &Tree, look: &Look, stage: &Stage) -> Result<()> {
+    (0..tree.leaves.len()).into_par_iter().try_for_each(|tile| {
+        stitch::run(directory, tree, tile, &look.frame)?;
+        stage.advance(1);
+        Ok(())
+    })
 }
 
 fn export_all(

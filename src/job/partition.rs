@@ -102,6 +102,12 @@ pub fn run(task: &Task, directory: &Directory, stage: &Stage) -> Result<Partitio
     Ok(partition)
 }
 
+/// The bytes of buffers for a job of `points` points, within `memory`.
+pub fn buffer_bytes(points: u64, points_per_tile: u64, memory: u64) -> u64 {
+    let buckets = wanted_buckets(points, points_per_tile);
+    memory.min(buckets * Buckets::largest_buffer())
+}
+
 fn wanted_buckets(points: u64, points_per_tile: u64) -> u64 {
     (points.saturating_mul(BUCKETS_PER_TILE) / points_per_tile).clamp(4, MOST_BUCKETS)
 }

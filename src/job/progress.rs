@@ -31,6 +31,13 @@ impl Progress {
         }
     }
 
+    /// Says something between two stages.
+    pub fn note(self, text: &str) {
+        if self != Progress::Quiet {
+            eprintln!("{text}");
+        }
+    }
+
     /// Starts a stage of `total` `unit`s.
     pub fn stage(self, name: &'static str, total: u64, unit: &'static str) -> Stage {
         let bar = match self {

@@ -84,6 +84,15 @@ impl Report {
     /// Puts the report together.
     pub fn new(plan: &Plan, parts: Parts) -> Report {
         let mut warnings = plan.warnings.clone();
+        let rounded = |count: u64, what: &str, step| {
+            format!("{} points were rounded in {what} to steps of {step}", grouped(count))
+        };
+        if parts.points.rounded_xy > 0 {
+            warnings.push(rounded(parts.points.rounded_xy, "x or y", plan.lattice.resolution));
+        }
+        if parts.points.rounded_z > 0 {
+            warnings.push(rounded(parts.points.rounded_z, "z", plan.lattice.resolution_z));
+        }
         warnings.extend_from_slice(&parts.points.examples);
         Report {
             generator: concat!("gdt-batch ", env!("CARGO_PKG_VERSION")).into(),

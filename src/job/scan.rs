@@ -39,11 +39,11 @@ pub struct Plan {
     pub warnings: Vec<String>,
 }
 
-/// Looks at all inputs of `config`.
+/// Looks at all inputs of `config`; `coarser` is nothing unless an earlier try failed with [`Error::TooFine`].
 ///
 /// # Errors
 /// [`Error::Config`] if there are none, or they do not go together; [`Error::Input`] or [`Error::Io`] if one cannot be used.
-pub fn run(config: &Config) -> Result<Plan> {
+pub fn run(config: &Config, coarser: Coarser) -> Result<Plan> {
     let sources = open_all(config)?;
     let mut warnings: Vec<String> = sources
         .iter()
@@ -57,8 +57,11 @@ pub fn run(config: &Config) -> Result<Plan> {
     let crs = common_crs(&sources)?;
     let (unit, metres) = unit_of(config.input.unit, &crs, &mut warnings)?;
     let area = Area::of(&sources, config);
-    let lattice = choose_lattice(&sources, &area, config.input.resolution.0, &mut warnings)?;
     let metres_z = crs.vertical.unwrap_or(metres);
+    let wanted = config.input.resolution.0;
+    let step = horizontal_step(&sources, &area, metres, wanted, coarser.horizontal, &mut warnings)?;
+    let step_z = vertical_step(&sources, &area, metres_z, coarser.vertical, &mut warnings)?;
+    let lattice = choose_lattice(&sources, &area, step, step_z)?;
     if metres_z != metres {
         warnings.push(format!(
             "heights are in another unit than x and y ({metres_z} m and {metres} m): glTF has both in metres, see metres_per_unit_z"
@@ -67,7 +70,7 @@ pub fn run(config: &Config) -> Result<Plan> {
     let frame = Frame::new(&lattice, metres, metres_z, crs.wkt.clone())?;
     let bounds = config.input.bounds.map(|b| lattice_bounds(&lattice, b.0));
     let extent = extent_of(&lattice, &area, bounds);
-    let sources = with_rules(sources, config, &lattice, bounds, &mut warnings)?;
+    let sources = with_rules(sources, config, &lattice, bounds)?;
     Ok(Plan { sources, records, lattice, extent, crs, unit, frame, warnings })
 }
 
@@ -109,7 +112,11 @@ fn expand(patterns: &[String]) -> Result<Vec<PathBuf>> {
         if paths.len() == before && literal.is_file() && !paths.contains(&literal) {
             paths.push(literal);
         } else if paths.len() == before && !paths.iter().any(|p| glob_matches(pattern, p)) {
-            return Err(Error::Config(format!("[input] files: there is no file {pattern}")));
+            let what =
+                if literal.is_dir() { "is a directory; name the files in it, for example" } else { "is no file" };
+            let hint =
+                if literal.is_dir() { format!(" {}/*.laz", pattern.trim_end_matches('/')) } else { String::new() };
+            return Err(Error::Config(format!("[input] files: {pattern} {what}{hint}")));
         }
     }
     Ok(paths)
@@ -194,32 +201,18 @@ impl Area {
     }
 }
 
-/// The finest step of the inputs (or the one the user wants), coarsened by tens until the area fits; the offset near the middle
-/// of the area in x and y and at its foot in z, such that the inputs' own grids meet the lattice.
-fn choose_lattice(
-    sources: &[Source],
-    area: &Area,
-    wanted: Option<Decimal>,
-    warnings: &mut Vec<String>,
-) -> Result<Lattice> {
-    let finest = |axes: &[usize]| {
-        let scales = sources.iter().flat_map(|s| axes.iter().map(|&axis| s.axes[axis].scale));
-        scales.min().unwrap_or(Decimal::ONE).normalize()
-    };
-    let size = area.size(0).max(area.size(1));
-    let first = wanted.unwrap_or_else(|| finest(&[0, 1]));
-    let resolution = coarsen(first, size, 2.0 * REACH as f64)?;
-    if resolution != first && wanted.is_some() {
-        return Err(Error::Config(format!(
-            "[input] resolution = {first} does not fit an area of {size} units; the finest that does is {resolution}"
-        )));
-    }
-    if resolution != first {
-        warnings.push(format!(
-            "the inputs' step of {first} does not fit an area of {size} units: x and y are rounded to {resolution}"
-        ));
-    }
-    let resolution_z = coarsen(finest(&[2]), area.size(2), i32::MAX as f64)?;
+/// How many tens coarser than it would be the lattice is to be, because it proved too fine for the mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Coarser {
+    /// In x and y.
+    pub horizontal: u32,
+    /// In z.
+    pub vertical: u32,
+}
+
+/// The steps as [`horizontal_step`] and [`vertical_step`] choose them; the offset near the middle of the area in x and y and at its
+/// foot in z, such that the inputs' own grids meet the lattice.
+fn choose_lattice(sources: &[Source], area: &Area, resolution: Decimal, resolution_z: Decimal) -> Result<Lattice> {
     let middle = |axis: usize| (area.min[axis] + area.max[axis]) / 2.0;
     let offset = [
         lattice_point_near(middle(0), phase(sources, 0, resolution)?, resolution)?,
@@ -227,6 +220,89 @@ fn choose_lattice(
         lattice_point_near(area.min[2].floor(), phase(sources, 2, resolution_z)?, resolution_z)?,
     ];
     Ok(Lattice { offset, resolution, resolution_z })
+}
+
+/// Metres: no scanner measures x and y more finely, so a wide area may be rounded to this without asking.
+const FINE_ENOUGH: f64 = 0.0099;
+
+/// The step in x and y: what the user wants, else the finest of the inputs on which a triangle across the whole area could be
+/// written, but no coarser than a centimetre for that reason; beyond it [`Error::TooFine`] decides by the mesh itself.
+fn horizontal_step(
+    sources: &[Source],
+    area: &Area,
+    metres: f64,
+    wanted: Option<Decimal>,
+    coarser: u32,
+    warnings: &mut Vec<String>,
+) -> Result<Decimal> {
+    let size = area.size(0).max(area.size(1));
+    let fits = |step: Decimal| size < 2.0 * REACH as f64 * 0.99 * float(step);
+    let is_writable = |step: Decimal| size * metres < Frame::longest_at(float(step) * metres);
+    if let Some(step) = wanted {
+        return if fits(step) { Ok(step) } else { Err(too_fine(step, size)) };
+    }
+    let finest = sources.iter().flat_map(|s| [s.axes[0].scale, s.axes[1].scale]).min().unwrap_or(Decimal::ONE);
+    let first = if is_writable(finest) { finest } else { common_grid(sources).unwrap_or(finest) };
+    let mut step = first;
+    while !fits(step) || (!is_writable(step) && float(step) * metres < FINE_ENOUGH) {
+        step = tens(step, 1)?;
+    }
+    step = tens(step, coarser)?;
+    if step != first {
+        warnings.push(format!(
+            "x and y are rounded to {step}: glTF's single precision cannot hold every triangle that an area of {size:.0} units may \
+             have in steps of {first}"
+        ));
+    }
+    Ok(step)
+}
+
+fn too_fine(step: Decimal, size: f64) -> Error {
+    Error::Config(format!(
+        "[input] resolution = {step} is too fine for an area of {size:.0} units: it may have at most 2^30 steps"
+    ))
+}
+
+/// The step in z: the finest of the inputs on which all heights between the lowest and the highest can be written.
+fn vertical_step(
+    sources: &[Source],
+    area: &Area,
+    metres: f64,
+    coarser: u32,
+    warnings: &mut Vec<String>,
+) -> Result<Decimal> {
+    let finest = sources.iter().map(|s| s.axes[2].scale).min().unwrap_or(Decimal::ONE);
+    let mut step = finest;
+    while area.size(2) * metres >= Frame::longest_at(float(step) * metres) {
+        step = tens(step, 1)?;
+    }
+    step = tens(step, coarser)?;
+    if step != finest {
+        let size = area.size(2);
+        warnings.push(format!(
+            "heights are rounded to {step}: glTF's single precision cannot hold {size:.0} units in steps of {finest}"
+        ));
+    }
+    Ok(step)
+}
+
+/// A step on which the points of all inputs lie, if the coarsest grids of each have one in common.
+fn common_grid(sources: &[Source]) -> Option<Decimal> {
+    let grids = || sources.iter().flat_map(|s| s.grid);
+    let step = grids().min()?;
+    grids().all(|grid| grid.checked_rem(step).is_some_and(|rest| rest.is_zero())).then_some(step.normalize())
+}
+
+fn tens(step: Decimal, count: u32) -> Result<Decimal> {
+    let product = (0..count).try_fold(step, |step, _| step.checked_mul(Decimal::TEN));
+    let step = product.ok_or_else(|| {
+        Error::Config("the inputs span too much for any terrain: check their coordinates, or set [input] bounds".into())
+    })?;
+    Ok(step.normalize())
+}
+
+fn float(step: Decimal) -> f64 {
+    step.to_f64().unwrap_or(f64::NAN)
 }
 
 /// Where between two steps the lattice lies: the least remainder of the inputs' offsets, so that the order of the files does
@@ -244,16 +320,6 @@ fn phase(sources: &[Source], axis: usize, step: Decimal) -> Result<Decimal> {
         least = Some(least.map_or(rest, |l| l.min(rest)));
     }
     Ok(least.unwrap_or_default())
-}
-
-/// `step`, ten times as much, and so on, until `size` is less than `steps` of it.
-fn coarsen(mut step: Decimal, size: f64, steps: f64) -> Result<Decimal> {
-    while size / step.to_f64().unwrap_or(f64::NAN) >= steps * 0.99 {
-        step = step.checked_mul(Decimal::TEN).ok_or_else(|| {
-            Error::Config(format!("an extent of {size} units is no terrain: check the inputs, or set [input] bounds"))
-        })?;
-    }
-    Ok(step.normalize())
 }
 
 /// The whole number next to `near`, or where the lattice through `phase` does not meet it, the lattice point next to that.
@@ -301,21 +367,12 @@ fn with_rules(
     config: &Config,
     lattice: &Lattice,
     bounds: Option<[i32; 4]>,
-    warnings: &mut Vec<String>,
 ) -> Result<Vec<(Source, Rules)>> {
     let rgb = matches!(config.output.color, crate::config::ColorChoice::Auto | crate::config::ColorChoice::Rgb);
     let mut first_order = 0;
     let mut ruled = Vec::with_capacity(sources.len());
     for source in sources {
         let maps = [axis_map(&source, 0, lattice)?, axis_map(&source, 1, lattice)?, axis_map(&source, 2, lattice)?];
-        if maps.iter().any(|map| !map.is_exact()) {
-            warnings.push(format!(
-                "{}: points are rounded to steps of {} in x and y and {} in z",
-                source.path.display(),
-                lattice.resolution,
-                lattice.resolution_z
-            ));
-        }
         let rules = Rules { maps, classes: config.kept_classes(), bounds, first_order, rgb };
         first_order += source.records;
         ruled.push((source, rules));

@@ -83,6 +83,11 @@ pub struct Bucket {
     pub points: u64,
 }
 
+/// Smaller blocks cost more system calls than their memory is worth.
+const LEAST_BLOCK: u64 = 64;
+/// Larger blocks than this no longer read faster.
+const LARGEST_BLOCK: u64 = 4096;
+
 /// Collects points by bucket from many threads, a buffer a bucket.
 pub struct Buckets<'a> {
     spill: &'a Spill,
@@ -99,9 +104,13 @@ struct OpenBucket {
 impl<'a> Buckets<'a> {
     /// `count` empty buckets that together buffer at most `memory` bytes.
     pub fn new(spill: &'a Spill, count: usize, memory: u64) -> Buckets<'a> {
-        // Larger blocks than these no longer read faster, smaller ones cost a system call for nothing.
-        let capacity = (memory / count as u64 / size_of::<Point>() as u64).clamp(64, 4096) as usize;
+        let capacity = (memory / count as u64 / size_of::<Point>() as u64).clamp(LEAST_BLOCK, LARGEST_BLOCK) as usize;
         Buckets { spill, capacity, open: (0..count).map(|_| Mutex::default()).collect() }
+    }
+
+    /// The bytes of one buffer where memory is no matter.
+    pub fn largest_buffer() -> u64 {
+        LARGEST_BLOCK * size_of::<Point>() as u64
     }
 
     /// Adds `points`, all of bucket `index`.

@@ -73,8 +73,18 @@ impl Scale {
                 "a lattice step of {resolution:e} metres in {name} is out of range: set [input] unit and resolution"
             )));
         }
+        Ok(Scale::coarsest(resolution))
+    }
+
+    /// The largest step of at most half of `resolution` metres.
+    fn coarsest(resolution: f64) -> Scale {
         let step = (resolution / 2.0).log2().floor().exp2();
-        Ok(Scale { step, ratio: resolution / step })
+        Scale { step, ratio: resolution / step }
+    }
+
+    /// Metres between the ends of the longest line that one mesh can hold.
+    fn longest(self) -> f64 {
+        2.0 * PART_REACH as f64 * self.step
     }
 
     /// As fine as a mesh that spans so many lattice steps allows, within reason.
@@ -139,7 +149,12 @@ impl Frame {
     /// The extent in metres, in x or y and in z, up to which a triangle can always be written exactly. Where the whole
     /// job is smaller than this, no tile can fail.
     pub fn longest_triangle(&self) -> [f64; 2] {
-        [self.horizontal.step, self.vertical.step].map(|step| 2.0 * PART_REACH as f64 * step)
+        [self.horizontal.longest(), self.vertical.longest()]
+    }
+
+    /// What [`Frame::longest_triangle`] is for a resolution of so many metres.
+    pub fn longest_at(resolution_metres: f64) -> f64 {
+        Scale::coarsest(resolution_metres).longest()
     }
 
     /// The glTF coordinates (x, y up, z) of a lattice point in steps: whole numbers.

@@ -6,7 +6,7 @@ pub mod reference;
 
 use crate::config::{Backend, Triangulation};
 use crate::geometry::Site;
-use crate::gpu::device::Wish;
+use crate::gpu::device::{Wish, hardware_is_likely};
 use crate::gpu::executor::{Executor, Order};
 use crate::voronoi::{self, Counts, Diagrams, Rejected, Scratch};
 use crate::{Error, Result};
@@ -53,6 +53,8 @@ pub struct Triangulator {
 
 /// Bytes on the CPU's side that a pixel of a GPU's texture takes: its label, where its site is listed, and its turn in a buffer.
 const BYTES_PER_PIXEL: u64 = 12;
+/// With less memory than this for the whole job, drivers take too large a share of it for "auto".
+const LEAST_MEMORY: u64 = 1 << 30;
 
 impl Triangulator {
     /// The triangulator that the configuration asks for, for leaves on `threads` threads at once within `memory` bytes.
@@ -61,10 +63,11 @@ impl Triangulator {
     /// [`Error::Config`] if a GPU is asked for and there is none that will do. A GPU that may be used, but cannot, is none.
     pub fn new(config: &Triangulation, memory: u64, threads: usize) -> Result<Triangulator> {
         let pipeline = config.backend != Backend::Reference;
-        if !matches!(config.backend, Backend::Auto | Backend::Gpu) {
+        let required = config.backend == Backend::Gpu;
+        let allowed = || config.backend == Backend::Auto && memory >= LEAST_MEMORY && hardware_is_likely();
+        if !required && !allowed() {
             return Ok(Triangulator { pipeline, gpu: None });
         }
-        let required = config.backend == Backend::Gpu;
         let order = Order {
             wish: Wish::new(config.adapter.as_deref(), required),
             voronoi: config.voronoi,
@@ -105,4 +108,9 @@ impl Triangulator {
         }
         Ok((reference::triangulate(sites)?, outcome))
     }
+}
+
+/// Takes back the memory of a mesh that is no longer needed, for the next leaf of this thread.
+pub fn recycle(mesh: Mesh) {
+    SCRATCH.with_borrow_mut(|scratch| scratch.recycle(mesh));
 }

@@ -3,9 +3,10 @@
 
 use super::flip::legalize;
 use super::mesh::{HULL, Mesh};
+use crate::Error;
 use crate::geometry::Site;
-use crate::{Error, Result};
-use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation as _};
+use crate::geometry::predicates::orient2d;
+use spade::{DelaunayTriangulation, HasPosition, InsertionError, Point2, Triangulation as _};
 
 struct Vertex {
     site: Site,
@@ -24,16 +25,73 @@ impl HasPosition for Vertex {
 ///
 /// # Errors
 /// [`Error::Broken`] if `spade` refuses the sites or two of them coincide.
-pub fn triangulate(sites: &[Site]) -> Result<Mesh> {
-    let vertices = sites.iter().enumerate().map(|(i, &site)| Vertex { site, index: i as u32 }).collect();
-    let delaunay = DelaunayTriangulation::<Vertex>::bulk_load(vertices)
-        .map_err(|e| Error::Broken(format!("the reference triangulation refuses a site: {e}")))?;
+pub fn triangulate(sites: &[Site]) -> crate::Result<Mesh> {
+    if collinear(sites) {
+        return Ok(Mesh::default());
+    }
+    let delaunay = match along(sites) {
+        Some(axis) => insert_along(sites, axis),
+        None => DelaunayTriangulation::bulk_load(vertices(sites).collect()),
+    };
+    let delaunay = delaunay.map_err(|e| Error::Broken(format!("the reference triangulation refuses a site: {e}")))?;
     if delaunay.num_vertices() != sites.len() {
         return Err(Error::Broken("two sites of one tile coincide".into()));
     }
     let mut mesh = to_mesh(&delaunay);
     legalize(&mut mesh, sites);
     Ok(mesh)
+}
+
+fn vertices(sites: &[Site]) -> impl Iterator<Item = Vertex> {
+    sites.iter().enumerate().map(|(i, &site)| Vertex { site, index: i as u32 })
+}
+
+/// Sites in a strip so many times longer than wide are inserted from one end to the other: loading them in bulk, from the
+/// middle outwards, takes up to quadratic time on the thinnest, and this takes longer on wider ones.
+const STRIP: f64 = 50.0;
+
+/// The axis along which `sites` are a long thin strip, if they are one.
+fn along(sites: &[Site]) -> Option<usize> {
+    let count = sites.len() as f64;
+    let mean = [0, 1].map(|axis| sites.iter().map(|p| p[axis] as f64).sum::<f64>() / count);
+    let offset = |p: &Site| [p[0] as f64 - mean[0], p[1] as f64 - mean[1]];
+    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+    for [x, y] in sites.iter().map(offset) {
+        (xx, xy, yy) = (xx + x * x, xy + x * y, yy + y * y);
+    }
+    // The direction in which they vary most.
+    let angle = 0.5 * (2.0 * xy).atan2(xx - yy);
+    let (sin, cos) = angle.sin_cos();
+    let extent = |part: &dyn Fn([f64; 2]) -> f64| {
+        let parts = || sites.iter().map(offset).map(part);
+        parts().fold(f64::NEG_INFINITY, f64::max) - parts().fold(f64::INFINITY, f64::min)
+    };
+    let length = extent(&|[x, y]| x * cos + y * sin);
+    let width = extent(&|[x, y]| y * cos - x * sin);
+    (length > STRIP * width).then_some(if cos.abs() >= sin.abs() { 0 } else { 1 })
+}
+
+/// Inserts the sites in the order of their coordinate on `axis`, each next to the one before.
+fn insert_along(sites: &[Site], axis: usize) -> Result<DelaunayTriangulation<Vertex>, InsertionError> {
+    let mut ordered: Vec<Vertex> = vertices(sites).collect();
+    ordered.sort_unstable_by_key(|vertex| (vertex.site[axis], vertex.site[1 - axis]));
+    let mut delaunay = DelaunayTriangulation::new();
+    let mut last = None;
+    for vertex in ordered {
+        last = Some(match last {
+            Some(hint) => delaunay.insert_with_hint(vertex, hint)?,
+            None => delaunay.insert(vertex)?,
+        });
+    }
+    Ok(delaunay)
+}
+
+/// Whether distinct `sites` lie on one line. `spade` would find that out as well, but in quadratic time.
+fn collinear(sites: &[Site]) -> bool {
+    match sites {
+        [a, b, rest @ ..] => rest.iter().all(|&c| orient2d(*a, *b, c) == 0),
+        _ => true,
+    }
 }
 
 fn to_mesh(delaunay: &DelaunayTriangulation<Vertex>) -> Mesh {
@@ -85,6 +143,20 @@ mod tests {
     fn sites_on_a_line_make_no_triangle() {
         assert!(triangulate(&[[0, 0], [1, 1], [5, 5]]).unwrap().triangles.is_empty());
         assert!(triangulate(&[]).unwrap().triangles.is_empty());
+    }
+
+    #[test]
+    fn strips_in_any_direction_are_triangulated_like_any_sites() {
+        for direction in [[10, 5], [1, 10], [-10, 10], [10, 0], [0, 10]] {
+            let strip: Vec<Site> =
+                (0..3000).map(|i| [direction[0] * i + i % 3, direction[1] * i + i * i % 5]).collect();
+            assert!(along(&strip).is_some());
+            let mesh = triangulate(&strip).unwrap();
+            assert!((0..mesh.twins.len() as u32).all(|h| !fails(&mesh, &strip, h)));
+            let hull = mesh.twins.iter().filter(|twin| **twin == HULL).count();
+            assert_eq!(mesh.triangles.len(), 2 * strip.len() - hull - 2);
+        }
+        assert_eq!(along(&[[0, 0], [7, 1], [3, 9], [-4, 2]]), None);
     }
 
     /// The triangles as coordinates, each from its smallest corner, sorted.

@@ -115,10 +115,10 @@ impl Acceptance {
     }
 
     /// Points 2 and 5 for the edges of a block; returns how many pairs of twins there are. As every pair is found once, from
-    /// its lesser half-edge, all half-edges are paired if the pairs are half as many as they.
+    /// its greater half-edge, all half-edges are paired if the pairs are half as many as they.
     fn check_edges(&mut self, sphere: &Sphere, sites: &[Site], start: usize, end: usize) -> Result<usize, Rejected> {
         self.doubtful.clear();
-        let links = self.edges.test::<true>(sphere.records(), sites, start, end, &mut self.doubtful);
+        let links = self.edges.test::<true>(sphere, sites, start, end, &mut self.doubtful);
         if links.broken {
             return Err(Rejected::NotAccepted("twins do not fit"));
         }

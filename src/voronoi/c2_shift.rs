@@ -1,9 +1,9 @@
 //! Step C2: shift all sites from their pixels to their true places, all at once. The topology stays; triangles that are
 //! then not counterclockwise are flipped away, or a corner is taken out, to be inserted again in step C3.
 
+use super::Rejected;
 use super::edges::Edges;
 use super::sphere::{Fill, Sphere, Star, next, previous};
-use super::{Counts, Rejected};
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
 
@@ -29,19 +29,29 @@ impl Shift {
         self.removed.clear();
     }
 
-    /// Tests all triangles and edges at the true places of `sites`.
-    pub(super) fn test(&mut self, sphere: &Sphere, sites: &[Site], counts: &mut Counts) {
+    /// Tests the triangles from record `start` to the last, unless `all` in whole blocks only, and their edges to
+    /// triangles before them, at the true places of `sites`. Returns the first record that was not tested.
+    pub(super) fn test(
+        &mut self,
+        sphere: &Sphere,
+        sites: &[Site],
+        start: usize,
+        all: bool,
+        suspects: &mut Vec<u32>,
+    ) -> usize {
         let records = sphere.records();
-        for start in (sphere.front() as usize..records.len()).step_by(Edges::BLOCK) {
+        let mut start = start;
+        while start + Edges::BLOCK <= records.len() || (all && start < records.len()) {
             let end = records.len().min(start + Edges::BLOCK);
             for t in (start as u32..end as u32).step_by(8) {
                 if orientation(sphere, sites, t).is_some_and(|area| area <= 0) {
                     self.inverted.push(t);
                 }
             }
-            self.edges.test::<false>(records, sites, start, end, &mut self.suspects);
+            self.edges.test::<false>(sphere, sites, start, end, suspects);
+            start = end;
         }
-        counts.inverted += self.inverted.len() as u64;
+        start
     }
 
     /// Makes every triangle counterclockwise.

@@ -13,6 +13,8 @@ const STEPS_PER_SITE: u64 = 64;
 pub(super) struct Flips {
     /// Edges that may not be Delaunay. All others are.
     pub(super) suspects: Vec<u32>,
+    /// Edges that could not be flipped while the scan went on.
+    pub(super) later: Vec<u32>,
     /// Flips done.
     pub(super) done: u64,
     left: u64,
@@ -22,6 +24,7 @@ impl Flips {
     /// Starts anew for a leaf of `sites` sites.
     pub(super) fn reset(&mut self, sites: usize) {
         self.suspects.clear();
+        self.later.clear();
         self.done = 0;
         self.left = STEPS_PER_SITE * sites as u64 + 1024;
     }
@@ -33,18 +36,41 @@ impl Flips {
         Ok(())
     }
 
+    /// Flips what can be flipped while the scan goes on and sites are not yet where they belong: only where both triangles
+    /// are counterclockwise afterwards. The others wait in `later`.
+    pub(super) fn run_early(&mut self, sphere: &mut Sphere, sites: &[Site]) -> Result<(), Rejected> {
+        while let Some(h) = self.suspects.pop() {
+            let g = sphere.twin(h);
+            // An open edge is tested when its other triangle comes; those to infinity are for step C1.
+            if g < sphere.front() || !sphere.fails_inside(sites, h) {
+                continue;
+            }
+            if !sphere.is_convex(sites, h) {
+                self.later.push(h);
+                continue;
+            }
+            self.flip(sphere, h)?;
+        }
+        Ok(())
+    }
+
     /// Flips until every edge is Delaunay.
     pub(super) fn run(&mut self, sphere: &mut Sphere, sites: &[Site]) -> Result<(), Rejected> {
         while let Some(h) = self.suspects.pop() {
-            if sphere.is_free(h) || !sphere.fails(sites, h) {
-                continue;
+            if !sphere.is_free(h) && sphere.fails(sites, h) {
+                self.flip(sphere, h)?;
             }
-            self.step()?;
-            let g = sphere.twin(h);
-            sphere.flip(h);
-            self.done += 1;
-            self.suspects.extend([h, previous(h), g, previous(g)]);
         }
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn flip(&mut self, sphere: &mut Sphere, h: u32) -> Result<(), Rejected> {
+        self.step()?;
+        self.done += 1;
+        let g = sphere.twin(h);
+        sphere.flip(h);
+        self.suspects.extend([h, previous(h), g, previous(g)]);
         Ok(())
     }
 }

@@ -2,7 +2,7 @@
 //! branches that cannot be foreseen, then many determinants are computed side by side in single precision, with a bound
 //! on their error. What the bound leaves in doubt is for the caller to decide exactly.
 
-use super::sphere::{FREE, OUTSIDE, next, previous};
+use super::sphere::{Sphere, next, previous};
 use crate::geometry::Site;
 use crate::geometry::predicates::Quads;
 
@@ -25,32 +25,33 @@ impl Edges {
     /// Numbers in the records of as many triangles as are tested at a time; each has at most three edges.
     pub(super) const BLOCK: usize = Quads::LANES / 3 * 8;
 
-    /// Appends to `failing` the edges of the triangles in `records[start..end]`, at most [`Edges::BLOCK`], that fail the
-    /// in-circle test or may do so, each as the lesser of its half-edges. Of edges to infinity it says anything.
+    /// Appends to `failing` the edges of the triangles in records `start..end`, at most [`Edges::BLOCK`], that fail the
+    /// in-circle test or may do so. An edge belongs to the later of its triangles. Of edges to infinity it says anything.
     /// With `CHECK`, it looks at the links too.
     #[inline(always)]
     pub(super) fn test<const CHECK: bool>(
         &mut self,
-        records: &[u32],
+        sphere: &Sphere,
         sites: &[Site],
         start: usize,
         end: usize,
         failing: &mut Vec<u32>,
     ) -> Links {
+        let (records, front) = (sphere.records(), sphere.front());
         let mut edges = [0; Quads::LANES + 3];
         let mut links = Links::default();
         for (t, record) in (start as u32..).step_by(8).zip(records[start..end].chunks_exact(8)) {
             for i in 0..3 {
                 let (h, twin) = (t + i, record[4 + i as usize]);
                 edges[links.count] = h;
-                links.count += ((h < twin) & (twin != OUTSIDE) & (record[0] != FREE)) as usize;
+                links.count += ((twin < h) & (twin >= front)) as usize;
             }
         }
         for (lane, &h) in edges[..links.count].iter().enumerate() {
             let t = (h & !7) as usize;
             let record = &records[t..t + 8];
             let g = record[4 + (h & 3) as usize];
-            if CHECK && (g as usize >= records.len() || g & 7 > 2) {
+            if CHECK && g & 7 > 2 {
                 links.broken = true;
                 continue;
             }

@@ -10,7 +10,13 @@
 //!
 //! The frame around the texture counts as the colour "infinity": its triangles are the ghosts that close the sphere.
 //! Step G5's prefix sums are needed only where rows are done in parallel.
+//!
+//! Step C2's tests of what a row has made and most flips of step C4 follow at once, while it is in the cache. Flips do not
+//! mind open edges, as slots are half-edges too.
 
+use super::Rejected;
+use super::c2_shift::Shift;
+use super::c4_flip::Flips;
 use super::g1_write_sites::Texture;
 use super::g2_voronoi::{FRAME, Voronoi};
 use super::sphere::Sphere;
@@ -41,7 +47,14 @@ fn column(x: usize) -> u32 {
 
 impl Scan {
     /// Fills `sphere` with the triangles of the discrete Voronoi diagram of `texture`.
-    pub(super) fn run(&mut self, texture: &Texture, voronoi: &mut Voronoi, sphere: &mut Sphere) {
+    pub(super) fn run(
+        &mut self,
+        texture: &Texture,
+        voronoi: &mut Voronoi,
+        sphere: &mut Sphere,
+        shift: &mut Shift,
+        flips: &mut Flips,
+    ) -> Result<(), Rejected> {
         sphere.reset(texture.width + 3, texture.placed, (texture.sites.len() - 1) as u32);
         let words = texture.width / 64 + 1;
         for row in [&mut self.south, &mut self.north] {
@@ -53,16 +66,21 @@ impl Scan {
             walls.resize(words + 1, 0);
         }
         self.starts.clear();
+        let mut tested = sphere.front() as usize;
         for y in 0..=texture.height {
             if y < texture.height {
                 voronoi.row(texture, y, &mut self.north);
             } else {
                 self.north.fill(FRAME);
             }
-            self.scan_row(texture, sphere);
+            self.scan_row(texture, sphere, &mut flips.suspects);
+            tested = shift.test(sphere, &texture.sites, tested, y == texture.height, &mut flips.suspects);
+            flips.run_early(sphere, &texture.sites)?;
             std::mem::swap(&mut self.south, &mut self.north);
             std::mem::swap(&mut self.south_walls, &mut self.north_walls);
         }
+        std::mem::swap(&mut flips.later, &mut shift.suspects);
+        Ok(())
     }
 
     /// A triangle near the site of a pixel (y << 16 | x).
@@ -72,7 +90,7 @@ impl Scan {
     }
 
     /// Visits the corners between two rows. Corner x has pixel x - 1, at index x of a row, in its west.
-    fn scan_row(&mut self, texture: &Texture, sphere: &mut Sphere) {
+    fn scan_row(&mut self, texture: &Texture, sphere: &mut Sphere, suspects: &mut Vec<u32>) {
         let words = self.floors.len() - 1;
         for word in 0..words {
             let (north, south) = (&self.north[word * 64..][..65], &self.south[word * 64..][..65]);
@@ -88,7 +106,7 @@ impl Scan {
             while corners != 0 {
                 let bit = corners.trailing_zeros();
                 let arms = (w >> bit & 1) | (s >> bit & 1) << 1 | (e >> bit & 1) << 2 | (n >> bit & 1) << 3;
-                self.corner(texture, sphere, word * 64 + bit as usize, arms as u32);
+                self.corner(texture, sphere, word * 64 + bit as usize, arms as u32, suspects);
                 corners &= corners - 1;
             }
         }
@@ -96,13 +114,13 @@ impl Scan {
 
     /// Does what the arms (west, south, east, north: bits 0 to 3) of corner `x` ask for.
     #[inline(always)]
-    fn corner(&self, texture: &Texture, sphere: &mut Sphere, x: usize, arms: u32) {
+    fn corner(&self, texture: &Texture, sphere: &mut Sphere, x: usize, arms: u32, suspects: &mut Vec<u32>) {
         // Three arms, or a bend: told apart by one branch, and each of their shapes treated alike, because no
         // processor can foresee which comes next.
         match arms.count_ones() {
-            2 => bend(sphere, x, arms),
+            2 => bend(sphere, x, arms, suspects),
             3 => self.three_colours(texture, sphere, x, arms),
-            _ => self.four_arms(texture, sphere, x),
+            _ => self.four_arms(texture, sphere, x, suspects),
         }
     }
 
@@ -123,14 +141,14 @@ impl Scan {
     }
 
     /// Four colours, or fewer: pixels of one colour across the corner hang together there, so that no three colours meet.
-    fn four_arms(&self, texture: &Texture, sphere: &mut Sphere, x: usize) {
+    fn four_arms(&self, texture: &Texture, sphere: &mut Sphere, x: usize, suspects: &mut Vec<u32>) {
         let labels = [self.south[x], self.south[x + 1], self.north[x + 1], self.north[x]];
         let (from_west, from_south) = (sphere.twin(EAST), sphere.twin(column(x)));
         if labels[0] == labels[2] {
             sphere.link(column(x), from_west);
             sphere.link(EAST, from_south);
         } else if labels[1] == labels[3] {
-            sphere.link(from_west, from_south);
+            join(sphere, from_west, from_south, suspects);
             sphere.link(EAST, column(x));
         } else {
             let [sw, se, ne, nw] = labels;
@@ -147,10 +165,19 @@ impl Scan {
 
 /// The Voronoi edge that has one end in the west or east and one in the south or north.
 #[inline(always)]
-fn bend(sphere: &mut Sphere, x: usize, arms: u32) {
+fn bend(sphere: &mut Sphere, x: usize, arms: u32, suspects: &mut Vec<u32>) {
     let across = if arms & 1 != 0 { sphere.twin(EAST) } else { EAST };
     let along = if arms & 2 != 0 { sphere.twin(column(x)) } else { column(x) };
-    sphere.link(across, along);
+    join(sphere, across, along, suspects);
+}
+
+/// Links the ends of a Voronoi edge. If both are triangles, both have been tested before they had this edge.
+#[inline(always)]
+fn join(sphere: &mut Sphere, a: u32, b: u32, suspects: &mut Vec<u32>) {
+    sphere.link(a, b);
+    if a.min(b) >= sphere.front() {
+        suspects.push(a);
+    }
 }
 
 #[inline(always)]

@@ -252,6 +252,24 @@ impl Sphere {
         in_circle(at(u), at(v), at(w), at(z))
     }
 
+    /// Whether edge `h` between two finite triangles should be flipped.
+    #[inline(always)]
+    pub(super) fn fails_inside(&self, sites: &[Site], h: u32) -> bool {
+        let g = self.twin(h);
+        let (u, v, w, z) = (self.origin(h), self.origin(g), self.apex(h), self.apex(g));
+        let at = |i: u32| sites[i as usize];
+        u.max(v).max(w).max(z) != self.infinity && in_circle(at(u), at(v), at(w), at(z))
+    }
+
+    /// Whether flipping edge `h`, its triangles finite, leaves two counterclockwise triangles.
+    #[inline(always)]
+    pub(super) fn is_convex(&self, sites: &[Site], h: u32) -> bool {
+        let g = self.twin(h);
+        let at = |i: u32| sites[i as usize];
+        let (u, v, w, z) = (at(self.origin(h)), at(self.origin(g)), at(self.apex(h)), at(self.apex(g)));
+        orient2d(z, w, u) > 0 && orient2d(w, z, v) > 0
+    }
+
     #[cold]
     fn pocket(&self, sites: &[Site], u: u32, v: u32, w: u32, z: u32) -> bool {
         let at = |i: u32| sites[i as usize];

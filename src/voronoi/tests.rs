@@ -2,7 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{Rejected, Scratch, triangulate};
+use super::g1_write_sites::Texture;
+use super::g2_voronoi::Voronoi;
+use super::{Counts, Rejected, Scratch, Shape, triangulate};
 use crate::geometry::Site;
 use crate::triangulation::mesh::Mesh;
 use crate::triangulation::reference;
@@ -99,7 +101,7 @@ fn random_cases_are_canonical_or_rejected() {
     let mut refused = 0;
     for i in 0..cases {
         let kind = KINDS[i % KINDS.len()];
-        let n = 5 + (2000.0f64.powf(random.unit()) - 1.0) as usize;
+        let n = 3 + (2000.0f64.powf(random.unit()) - 1.0) as usize;
         let sites = case(kind, n, &mut random);
         match triangulate(&sites, &mut scratch) {
             Ok((mesh, _)) => assert_eq!(
@@ -141,4 +143,38 @@ fn what_has_no_triangle_is_rejected() {
     let twice = [[0, 0], [10, 0], [0, 10], [0, 0]];
     assert!(triangulate(&twice, &mut scratch).is_err());
     assert_eq!(triangulate(&[[0, 0], [i32::MAX, 0], [0, 10]], &mut scratch).unwrap_err(), Rejected::OutOfReach);
+}
+
+#[test]
+fn labels_are_the_nearest_site_pixels() {
+    let mut random = Random(5);
+    for n in [1, 2, 3, 10, 100, 1000] {
+        for [wide, high] in [[300, 300], [1, 900], [900, 1], [70, 2000]] {
+            // Some textures with half of them empty, so that labels are far away too.
+            let part = 1 + random.below(2);
+            let sites: Vec<Site> = (0..n).map(|_| [random.below(wide) / part, random.below(high)]).collect();
+            let ends = [[0, 0], [wide - 1, high - 1]];
+            check_labels(&[&sites[..], &ends].concat());
+        }
+    }
+}
+
+/// Compares the rows of labels with all distances to all sites.
+fn check_labels(sites: &[Site]) {
+    let (mut texture, mut voronoi) = (Texture::default(), Voronoi::default());
+    // Whether too many are missing is of no importance here.
+    let _ = texture.write(sites, &Shape::default(), &mut Counts::default());
+    let occupied = |x: usize, y: usize| texture.occupied[y * texture.words + x / 64] >> (x % 64) & 1 != 0;
+    let pixels = (0..texture.width).flat_map(|x| (0..texture.height).map(move |y| (x, y)));
+    let placed: Vec<(usize, usize)> = pixels.filter(|&(x, y)| occupied(x, y)).collect();
+    voronoi.start(&texture);
+    let mut labels = vec![0; texture.width + 2];
+    for y in 0..texture.height {
+        voronoi.row(&texture, y, &mut labels);
+        for x in 0..texture.width {
+            let key = |&(sx, sy): &(usize, usize)| (sx.abs_diff(x).pow(2) + sy.abs_diff(y).pow(2), sx, sy);
+            let (_, sx, sy) = placed.iter().map(key).min().unwrap();
+            assert_eq!(labels[x + 1], (sy << 16 | sx) as u32, "pixel ({x}, {y}) of {sites:?}");
+        }
+    }
 }

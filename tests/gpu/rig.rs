@@ -23,7 +23,8 @@ impl Rig {
                 Some(Rig { machine: Machine::new(device), set: Set::default() })
             }
             Err(why) => {
-                eprintln!("SKIPPED: {why}; install mesa-vulkan-drivers to test the shaders");
+                assert!(std::env::var_os("GDT_TEST_ALL").is_none(), "{why}");
+                eprintln!("skipped: {why}; Debian's mesa-vulkan-drivers brings a software GPU that will do");
                 None
             }
         }

@@ -1,5 +1,10 @@
 //! What is written is what was meant: tiles, their borders, the picture, and that verification sees what is wrong.
 
+#[path = "../common/random.rs"]
+mod random;
+#[path = "../common/validator.rs"]
+mod validator;
+
 mod model;
 
 mod joined;

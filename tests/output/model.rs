@@ -11,18 +11,7 @@ use gdt_batch::output::glb::encode_tile;
 use gdt_batch::output::normals::Sums;
 use spade::{DelaunayTriangulation, Point2, Triangulation};
 
-/// A reproducible stream of random numbers (splitmix64).
-pub(crate) struct Random(pub(crate) u64);
-
-impl Random {
-    pub(crate) fn below(&mut self, limit: u64) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e3779b97f4a7c15);
-        let mut v = self.0;
-        v = (v ^ (v >> 30)).wrapping_mul(0xbf58476d1ce4e5b9);
-        v = (v ^ (v >> 27)).wrapping_mul(0x94d049bb133111eb);
-        ((((v ^ (v >> 31)) as u128) * limit as u128) >> 64) as u64
-    }
-}
+use crate::random::Random;
 
 /// A lattice from the texts of its numbers.
 pub(crate) fn lattice(offset: [f64; 3], resolution: f64, resolution_z: f64) -> Lattice {

@@ -5,7 +5,8 @@ use gdt_batch::output::picture::Picture;
 use gdt_batch::output::preview::{Canvas, Texel};
 use proptest::prelude::*;
 
-use crate::model::{Random, cloud, cut, grid, terrain, utm};
+use crate::model::{cloud, cut, grid, terrain, utm};
+use crate::random::Random;
 
 #[test]
 fn a_rectangle_is_covered_wholly_and_once() {

@@ -10,7 +10,8 @@ use gdt_batch::output::read::{TileFile, read_tile};
 use gdt_batch::verify::Source;
 use proptest::prelude::*;
 
-use crate::model::{Random, cloud, cut, grid, lattice, terrain, utm};
+use crate::model::{cloud, cut, grid, lattice, terrain, utm};
+use crate::random::Random;
 
 fn written(frame: &Frame, tile: &Tile) -> Vec<u8> {
     let mut bytes = Vec::new();

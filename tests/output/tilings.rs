@@ -3,7 +3,8 @@
 use gdt_batch::output::frame::Frame;
 use gdt_batch::verify::{Verdict, verify};
 
-use crate::model::{Random, cloud, cut, cut_by_place, grid, lattice, terrain, utm, write_tiles};
+use crate::model::{cloud, cut, cut_by_place, grid, lattice, terrain, utm, write_tiles};
+use crate::random::Random;
 
 const MEMORY: u64 = 1 << 28;
 

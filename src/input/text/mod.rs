@@ -1,6 +1,7 @@
 //! Points as text, one a line: found out once over the whole file, then decoded block by block.
 
 mod columns;
+mod granularity;
 mod lines;
 mod number;
 mod table;

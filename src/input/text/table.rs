@@ -7,6 +7,7 @@ use rust_decimal::Decimal;
 
 use super::TextOptions;
 use super::columns::{Columns, Delimiter, Role, shown};
+use super::granularity::Granularity;
 use super::lines::{BLOCK, LONGEST, Line, for_each_line};
 use super::number::{MOST_DECIMALS, Number, POWERS};
 use crate::input::positioned::Positioned;
@@ -31,6 +32,7 @@ pub(in crate::input) struct Table {
     /// Greatest x, y, z.
     pub(in crate::input) max: [f64; 3],
     decimals: [u8; 3],
+    grid: [Granularity; 2],
 }
 
 /// Numbers of the first row and the first line of a block: rows from 0, lines as editors count them.
@@ -48,6 +50,7 @@ struct Survey {
     min: [f64; 3],
     max: [f64; 3],
     decimals: [u8; 3],
+    grid: [Granularity; 2],
 }
 
 impl Table {
@@ -68,12 +71,17 @@ impl Table {
         }
         let [min, max] = if all.min[0] <= all.max[0] { [all.min, all.max] } else { [[0.0; 3]; 2] };
         let decimals = std::array::from_fn(|axis| fitting(all.decimals[axis], min[axis].abs().max(max[axis].abs())));
-        Ok((Table { columns, rows, blocks, records: all.rows, min, max, decimals }, warnings))
+        Ok((Table { columns, rows, blocks, records: all.rows, min, max, decimals, grid: all.grid }, warnings))
     }
 
     /// Steps of the most decimals found, from 0.
     pub(in crate::input) fn axes(&self) -> [Axis; 3] {
         self.decimals.map(|decimals| Axis { offset: Decimal::ZERO, scale: Decimal::new(1, decimals as u32) })
+    }
+
+    /// The largest step of which every x, and every y, is a whole multiple.
+    pub(in crate::input) fn grid(&self) -> [Decimal; 2] {
+        [0, 1].map(|axis| self.grid[axis].value().unwrap_or(Decimal::ONE))
     }
 
     /// Whether rows have red, green and blue.
@@ -149,7 +157,14 @@ fn fitting(decimals: u8, largest: f64) -> u8 {
 
 impl Survey {
     fn empty() -> Survey {
-        Survey { lines: 0, rows: 0, min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3], decimals: [0; 3] }
+        Survey {
+            lines: 0,
+            rows: 0,
+            min: [f64::INFINITY; 3],
+            max: [f64::NEG_INFINITY; 3],
+            decimals: [0; 3],
+            grid: Default::default(),
+        }
     }
 
     fn of_block(file: &Positioned, columns: &Columns, rows: &Range<u64>, range: Range<u64>) -> Result<Survey> {
@@ -177,6 +192,9 @@ impl Survey {
                 self.decimals[axis] = self.decimals[axis].max(number.shortest().decimals);
             }
         }
+        for (grid, number) in self.grid.iter_mut().zip(numbers) {
+            grid.see(number);
+        }
     }
 
     fn add(&mut self, other: &Survey) {
@@ -186,6 +204,9 @@ impl Survey {
             self.min[axis] = self.min[axis].min(other.min[axis]);
             self.max[axis] = self.max[axis].max(other.max[axis]);
             self.decimals[axis] = self.decimals[axis].max(other.decimals[axis]);
+        }
+        for (grid, other) in self.grid.iter_mut().zip(&other.grid) {
+            grid.add(other);
         }
     }
 }

@@ -1,0 +1,65 @@
+//! The coarsest grid that a column of numbers lies on.
+
+use super::number::Number;
+use super::number::POWERS;
+use rust_decimal::Decimal;
+
+/// The largest step, `step / 10^decimals`, of which all numbers seen are whole multiples; 0 while only zeros were seen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Granularity {
+    step: u64,
+    decimals: u8,
+}
+
+impl Granularity {
+    /// Takes one more number into account.
+    #[inline]
+    pub(super) fn see(&mut self, number: &Number) {
+        let mantissa = number.mantissa.unsigned_abs();
+        let same = number.decimals == self.decimals && self.step > 0 && mantissa.is_multiple_of(self.step);
+        let finest = self.step == 1 && number.decimals <= self.decimals;
+        if !same && !finest {
+            self.add(&Granularity { step: mantissa, decimals: number.decimals });
+        }
+    }
+
+    /// Takes all numbers that `other` has seen into account.
+    pub(super) fn add(&mut self, other: &Granularity) {
+        let decimals = self.decimals.max(other.decimals);
+        let scaled = |g: &Granularity| g.step.checked_mul(POWERS[(decimals - g.decimals) as usize] as u64);
+        // A number too long to compare is taken to need its last digit.
+        let step = scaled(self).zip(scaled(other)).map_or(1, |(a, b)| gcd(a, b));
+        *self = Granularity { step, decimals };
+    }
+
+    /// The step; `None` while only zeros were seen.
+    pub(super) fn value(&self) -> Option<Decimal> {
+        let step = Decimal::from_i128_with_scale(self.step.into(), self.decimals.into()).normalize();
+        (self.step > 0).then_some(step)
+    }
+}
+
+fn gcd(a: u64, b: u64) -> u64 {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn step(texts: &[&str]) -> Option<String> {
+        let mut all = Granularity::default();
+        texts.iter().for_each(|text| all.see(&Number::parse(text.as_bytes()).unwrap()));
+        all.value().map(|step| step.to_string())
+    }
+
+    #[test]
+    fn the_grid_behind_the_digits() {
+        assert_eq!(step(&["273357.14525", "-273357.14500", "0"]).unwrap(), "0.00025");
+        assert_eq!(step(&["440750", "441890"]).unwrap(), "10");
+        assert_eq!(step(&["0.5", "0.75", "3"]).unwrap(), "0.25");
+        assert_eq!(step(&["1.1", "2.3"]).unwrap(), "0.1");
+        assert_eq!(step(&["999999999999999999", "0.000000000000001"]).unwrap(), "0.000000000000001");
+        assert_eq!(step(&["0", "0.0"]), None);
+    }
+}

@@ -1,0 +1,63 @@
+//! Whether the triangles of the mesh can be written: glTF has 24 binary digits for a coordinate.
+
+use crate::geometry::Site;
+use crate::output::frame::Frame;
+use crate::{Error, Result};
+
+/// The longest extent in x, y and in z that a triangle may have, in lattice steps.
+#[derive(Clone, Copy, Debug)]
+pub struct Longest {
+    horizontal: i64,
+    vertical: i64,
+    /// Metres in a step of x and y, and of z.
+    metres: [f64; 2],
+}
+
+impl Longest {
+    /// For the frame of a job.
+    pub fn of(frame: &Frame) -> Longest {
+        let (longest, metres) = (frame.longest_triangle(), frame.resolution_metres());
+        Longest { horizontal: (longest[0] / metres[0]) as i64, vertical: (longest[1] / metres[1]) as i64, metres }
+    }
+
+    /// Checks the triangle abc.
+    ///
+    /// # Errors
+    /// [`Error::TooFine`] if it is too long in x or y.
+    #[inline]
+    pub fn check(&self, [a, b, c]: [Site; 3]) -> Result<()> {
+        let extent = |axis: usize| {
+            let (a, b, c) = (a[axis] as i64, b[axis] as i64, c[axis] as i64);
+            a.max(b).max(c) - a.min(b).min(c)
+        };
+        let longest = extent(0).max(extent(1));
+        if longest <= self.horizontal { Ok(()) } else { Err(self.too_long(longest)) }
+    }
+
+    #[cold]
+    fn too_long(&self, steps: i64) -> Error {
+        let [length, limit] = [steps, self.horizontal].map(|steps| steps as f64 * self.metres[0]);
+        Error::TooFine {
+            vertical: false,
+            what: format!(
+                "the mesh has a triangle {length:.0} m long, and at this resolution glTF holds {limit:.0} m exactly"
+            ),
+        }
+    }
+
+    /// Checks heights from `low` to `high`.
+    ///
+    /// # Errors
+    /// [`Error::TooFine`] if one mesh cannot hold them all.
+    pub fn check_heights(&self, low: i32, high: i32) -> Result<()> {
+        let steps = high as i64 - low as i64;
+        if steps <= self.vertical {
+            return Ok(());
+        }
+        let [span, limit] = [steps, self.vertical].map(|steps| steps as f64 * self.metres[1]);
+        Err(Error::TooFine {
+            vertical: true,
+            what: format!("heights span {span:.0} m, and with their step glTF holds {limit:.0} m exactly"),
+        })
+    }
+}

@@ -1,0 +1,140 @@
+//! Configurations: the shipped ones run, wrong ones are refused with the line, and what cannot be written is said.
+
+use std::fs;
+use std::path::Path;
+
+use gdt_batch::config::Config;
+
+use crate::clouds;
+use crate::program::{Job, gdt_batch};
+
+const LEAST: &str = "[input]\nfiles = [\"cloud.csv\"]\n[output]\ndirectory = \"out\"\n";
+
+fn folder_with_cloud() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    clouds::write(folder.path(), "cloud.csv", &clouds::uniform(100, 1_000, 9));
+    folder
+}
+
+/// A folder with a copy of `configs` and the sample terrain that they name.
+fn shipped() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let configs = folder.path().join("configs");
+    fs::create_dir(&configs).unwrap();
+    for name in ["quickstart.toml", "full.toml"] {
+        let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs").join(name);
+        fs::copy(from, configs.join(name)).unwrap();
+    }
+    gdt_batch(folder.path(), &["sample", "sample/terrain.laz", "--points", "60000"]).succeeded();
+    folder
+}
+
+#[test]
+fn the_shipped_configurations_run() {
+    let folder = shipped();
+    for (config, out) in [("configs/quickstart.toml", "sample/out"), ("configs/full.toml", "sample/out-full")] {
+        gdt_batch(folder.path(), &["check", config]).succeeded();
+        gdt_batch(folder.path(), &[config]).succeeded();
+        gdt_batch(folder.path(), &["verify", out]).succeeded();
+        for name in ["terrain.glb", "georeference.json", "report.json", "preview.png"] {
+            assert!(folder.path().join(out).join(name).is_file(), "{config}: no {name}");
+        }
+        assert!(!folder.path().join(out).join("job").exists(), "{config}: temporary files are left");
+    }
+}
+
+#[test]
+fn the_full_configuration_shows_every_option_at_its_default() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/full.toml");
+    let mut full = Config::load(&path).unwrap();
+    (full.input.classes, full.input.bounds) = (None, None);
+    let folder = folder_with_cloud();
+    let least = folder.path().join("job.toml");
+    fs::write(&least, LEAST).unwrap();
+    let mut least = Config::load(&least).unwrap();
+    (least.input.files, least.output.directory) = (full.input.files.clone(), full.output.directory.clone());
+    assert_eq!(toml::to_string(&full).unwrap(), toml::to_string(&least).unwrap());
+    let text = fs::read_to_string(path).unwrap();
+    for (section, options) in toml::Value::try_from(&least).unwrap().as_table().unwrap() {
+        assert!(text.contains(&format!("[{section}]")), "{section}");
+        let options = options.as_table().unwrap().keys().filter(|name| *name != "csv");
+        options.for_each(|name| assert!(text.contains(&format!("\n{name} = ")), "{section}.{name}"));
+    }
+    for name in ["delimiter", "header", "columns", "comment"] {
+        assert!(text.contains(&format!("\n# {name} = ")), "input.csv.{name}");
+    }
+}
+
+#[test]
+fn wrong_configurations_are_refused_with_the_line() {
+    let folder = folder_with_cloud();
+    for (from, to, words) in [
+        ("files", "fils", &["line 2", "fils"][..]),
+        ("[\"cloud.csv\"]", "3", &["line 2", "sequence"]),
+        ("[output]", "bounds = [9, 0, 1, 1]\n[output]", &["line 3", "xmin"]),
+        ("[output]", "classes = [300]\n[output]", &["line 3", "300"]),
+        ("[output]", "duplicates = \"last\"\n[output]", &["line 3", "last", "lowest"]),
+        ("[output]", "resolution = -1\n[output]", &["line 3", "resolution"]),
+        ("[output]", "malformed_share = 2.0\n[output]", &["line 3", "share"]),
+        ("[output]", "[input.csv]\ndelimeter = \",\"\n[output]", &["line 4", "delimeter"]),
+        ("[output]", "[triangulation]\nsites_per_tile = 1\n[output]", &["line 4", "sites_per_tile"]),
+        ("[output]", "[triangulation]\nbackend = \"cuda\"\n[output]", &["line 4", "cuda"]),
+        ("[output]", "[triangulation]\ntexture = 3\n[output]", &["line 4", "texture"]),
+        ("[output]", "[limits]\nmemory = \"1 MiB\"\n[output]", &["line 4", "128 MiB"]),
+        ("[output]", "[limits]\nmemory = 4\n[output]", &["line 4", "string"]),
+        ("[output]", "[limits]\nthreads = -1\n[output]", &["line 4", "threads"]),
+        ("[output]", "[ouput]", &["line 3", "ouput"]),
+        ("directory", "normals = 1\ndirectory", &["line 4", "boolean"]),
+        ("\"out\"", "\"out", &["line 4", "string"]),
+        ("[\"cloud.csv\"]", "[]", &["files is empty"]),
+        ("[\"cloud.csv\"]", "[\"no such *.laz\"]", &["no such *.laz"]),
+        ("[\"cloud.csv\"]", "[\".\"]", &["[input] files"]),
+        ("[\"cloud.csv\"]", "[\"a[\"]", &["a["]),
+    ] {
+        fs::write(folder.path().join("job.toml"), LEAST.replacen(from, to, 1)).unwrap();
+        gdt_batch(folder.path(), &["job.toml"]).refused(2, words);
+        gdt_batch(folder.path(), &["check", "job.toml"]).refused(2, words);
+    }
+    assert!(!folder.path().join("out").exists(), "a refused job writes nothing");
+}
+
+#[test]
+fn a_configuration_that_is_none_is_refused() {
+    let folder = folder_with_cloud();
+    gdt_batch(folder.path(), &["no.toml"]).refused(2, &["no configuration file no.toml"]);
+    gdt_batch(folder.path(), &["."]).refused(2, &["cannot read the configuration"]);
+    fs::write(folder.path().join("binary.toml"), [0xff, 0xfe, 0x00]).unwrap();
+    gdt_batch(folder.path(), &["binary.toml"]).refused(2, &["binary.toml"]);
+    gdt_batch(folder.path(), &["--no-such-option"]).refused(2, &["--no-such-option"]);
+    assert_eq!(gdt_batch::<&str>(folder.path(), &[]).code, 2, "no argument at all shows the help");
+}
+
+#[test]
+fn an_output_directory_that_cannot_be_made_may_be_tried_again() {
+    let folder = folder_with_cloud();
+    // A file stands where the directory's parent should be: not even root can write there.
+    fs::write(folder.path().join("file"), "").unwrap();
+    fs::write(folder.path().join("job.toml"), LEAST.replace("\"out\"", "\"file/out\"")).unwrap();
+    gdt_batch(folder.path(), &["job.toml"]).refused(1, &["file/out", "directory"]);
+}
+
+#[test]
+fn help_teaches() {
+    let help = gdt_batch(Path::new("."), &["--help"]).succeeded().out;
+    for words in ["check", "verify", "info", "sample", "Examples", "Exit codes", "configs/full.toml"] {
+        assert!(help.contains(words), "{words}");
+    }
+}
+
+#[test]
+fn paths_are_relative_to_the_configuration() {
+    let folder = tempfile::tempdir().unwrap();
+    let odd = folder.path().join("odd [name] *");
+    fs::create_dir(&odd).unwrap();
+    clouds::write(&odd, "cloud.csv", &clouds::uniform(100, 1_000, 9));
+    fs::write(odd.join("job.toml"), LEAST.replace("cloud.csv", "*.csv")).unwrap();
+    gdt_batch(folder.path(), &["odd [name] */job.toml"]).succeeded();
+    assert!(odd.join("out/report.json").is_file());
+    let job = Job::on(&[odd.join("cloud.csv")]);
+    job.run().succeeded();
+}

@@ -1,0 +1,21 @@
+//! Whole jobs, run as a user runs them: the program on a configuration file, and the proof from what it has written.
+
+#[path = "../common/mod.rs"]
+mod common;
+#[path = "../common/random.rs"]
+mod random;
+#[path = "../common/validator.rs"]
+mod validator;
+
+mod clouds;
+mod program;
+
+mod choices;
+mod configuration;
+mod khronos;
+mod limits;
+mod messages;
+mod real;
+mod same_mesh;
+mod steps;
+mod written;

@@ -1,0 +1,144 @@
+//! What the program says: of broken files, before a job, and to machines.
+
+use std::fs;
+
+use crate::clouds;
+use crate::common::shared;
+use crate::program::{Job, gdt_batch, gdt_batch_within, number};
+
+/// Address space that is plenty for small files and far below what hostile headers claim.
+const PLENTY_MIB: u64 = 1_536;
+
+#[test]
+fn broken_files_are_refused_or_read_as_far_as_they_go() {
+    let Some(shared) = shared() else { return };
+    for (name, code, words) in [
+        ("1.2-no-points.las", 3, &["1.2-no-points.las", "1065", "malformed_share"][..]),
+        ("1.2-with-color-clipped.las", 3, &["1.2-with-color-clipped.las", "1065", "malformed_share"]),
+        ("badheader.txt", 3, &["badheader.txt", "2 columns x", "columns"]),
+        ("git-lfs-pointer.laz", 3, &["git-lfs-pointer.laz", "git lfs pull"]),
+        ("truncated-mid-chunk.laz", 3, &["truncated-mid-chunk.laz", "malformed_share"]),
+        ("garbage_nVariableLength.las", 3, &["garbage_nVariableLength.las"]),
+        ("bad_vlr_count.las", 0, &["3 variable length records", "2"]),
+        ("simple-laszip-compressor-version-1.2r0.laz", 0, &[]),
+    ] {
+        let job = Job::on(&[shared.join("data/bad").join(name)]).threads(2);
+        let said = gdt_batch_within(PLENTY_MIB, job.folder(), &[job.config().to_str().unwrap()]);
+        if code == 0 {
+            assert_eq!(said.code, 0, "{name}: {}", said.err);
+            assert!(words.iter().all(|word| said.out.contains(word)), "{name}: {}", said.out);
+            job.verified();
+        } else {
+            said.refused(code, words);
+            let error = &said.err[said.err.find("error: ").unwrap()..];
+            assert_eq!(error.trim_end().lines().count(), 1, "{name}: one paragraph: {error}");
+        }
+    }
+}
+
+#[test]
+fn what_is_left_of_a_broken_file_is_read_on_request() {
+    let Some(shared) = shared() else { return };
+    for (name, kept, lost) in [("1.2-with-color-clipped.las", 1_064, 1), ("truncated-mid-chunk.laz", 44_372, 29_031)] {
+        let job = Job::on(&[shared.join("data/bad").join(name)]).with("input", "malformed_share = 0.5");
+        let report = job.report();
+        job.verified();
+        let points = &report["points"];
+        assert_eq!((number(&points["kept"]), number(&points["malformed"])), (kept, lost), "{name}");
+        assert!(report["warnings"].to_string().contains(name), "{report}");
+    }
+}
+
+#[test]
+fn malformed_lines_are_shown_and_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = clouds::write(folder.path(), "cloud.csv", &clouds::uniform(200, 10_000, 4));
+    let text = fs::read_to_string(&path).unwrap() + "1,2\nfour,5,6\n";
+    fs::write(&path, text).unwrap();
+    Job::on(&[&path]).run().refused(3, &["cloud.csv", "line 202", "malformed_share"]);
+    let job = Job::on(&[&path]).with("input", "malformed_share = 0.05");
+    let said = job.run().succeeded();
+    assert!(said.out.contains("line 202") && said.out.contains("line 203"), "{}", said.out);
+    assert_eq!(number(&job.report()["points"]["malformed"]), 2);
+}
+
+#[test]
+fn unreadable_files_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let empty = folder.path().join("empty.las");
+    fs::write(&empty, "").unwrap();
+    Job::on(&[&empty]).run().refused(3, &["empty.las"]);
+    gdt_batch(folder.path(), &["info", "."]).refused(3, &["regular file"]);
+    gdt_batch(folder.path(), &["info", "missing.las"]).refused(1, &["missing.las"]);
+    gdt_batch(folder.path(), &["verify", "missing"]).refused(1, &["missing"]);
+}
+
+fn small_job() -> (tempfile::TempDir, Job) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = clouds::write(folder.path(), "cloud.csv", &clouds::uniform(5_000, 10_000, 4));
+    let job = Job::on(&[&path]).tiles_of(1_000);
+    (folder, job)
+}
+
+#[test]
+fn check_tells_and_writes_nothing() {
+    let (_folder, job) = small_job();
+    let files = || {
+        let mut names: Vec<_> = fs::read_dir(job.folder()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        names.sort();
+        names
+    };
+    job.config();
+    let before = files();
+    let text = job.run_with(&["check"]).succeeded().out;
+    let json = job.run_with(&["check", "--json"]).succeeded().json();
+    assert_eq!(files(), before);
+    assert!(text.contains("cloud.csv") && text.contains("5 000"), "{text}");
+    assert_eq!(number(&json["records"]), 5_000);
+    let (tiles, real) = (number(&json["tiles"]), number(&job.report()["tiles"]));
+    assert!(real <= 2 * tiles && tiles <= 2 * real, "about {tiles} tiles, {real} in fact");
+}
+
+#[test]
+fn quiet_is_quiet_and_json_is_json() {
+    let (_folder, job) = small_job();
+    let quiet = job.run_with(&["--quiet"]).succeeded();
+    assert_eq!((quiet.out.as_str(), quiet.err.as_str()), ("", ""));
+    let loud = job.run().succeeded();
+    for words in ["points read", "triangles", "tiles", "peak memory", "triangulate"] {
+        assert!(loud.out.contains(words), "{words}: {}", loud.out);
+    }
+    assert!(loud.err.contains("triangulate: done"), "a log gets a line a stage: {}", loud.err);
+    let json = job.run_with(&["--json", "-q"]).succeeded();
+    assert_eq!(json.err, "");
+    let stages = json.json()["stages"].as_array().unwrap().len();
+    assert!(stages >= 5, "{stages} stages");
+    let quiet = gdt_batch(job.folder(), &["verify", "out", "-q"]).succeeded();
+    assert_eq!((quiet.out.as_str(), quiet.err.as_str()), ("", ""));
+}
+
+#[test]
+fn verify_tells_sabotage_from_exactness() {
+    let (_folder, job) = small_job();
+    let digest = job.digest();
+    let tiles = job.out().join("tiles");
+    let mut names: Vec<_> = fs::read_dir(&tiles).unwrap().map(|entry| entry.unwrap().path()).collect();
+    names.sort();
+    let (victim, good) = (&names[names.len() / 2], fs::read(&names[names.len() / 2]).unwrap());
+    let verify = || gdt_batch(job.folder(), &["verify", "out"]);
+    fs::remove_file(victim).unwrap();
+    verify().refused(4, &["does not hold"]);
+    assert!(verify().out.contains("FAILS: "));
+    // Two corners of the last triangle change places: it turns the wrong way.
+    let mut turned = good.clone();
+    let end = good.len() - (good.len() - 2) % 2;
+    let last = (0..end).rev().find(|&at| at % 2 == 0 && good[at..at + 2] != good[at - 2..at]).unwrap();
+    (turned[last - 2], turned[last - 1], turned[last], turned[last + 1]) =
+        (good[last], good[last + 1], good[last - 2], good[last - 1]);
+    fs::write(victim, &turned).unwrap();
+    verify().refused(4, &["does not hold"]);
+    fs::write(victim, &good[..good.len() / 2]).unwrap();
+    verify().refused(4, &["does not hold"]);
+    fs::write(victim, &good).unwrap();
+    assert_eq!(job.verified()["digest"], digest.as_str());
+}

@@ -1,0 +1,166 @@
+//! Runs the program and reads what it says.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// Longer than any job of the tests takes on a slow machine: what runs on hangs.
+const HANGS: Duration = Duration::from_secs(300);
+
+/// What a run of the program came to.
+#[derive(Debug)]
+pub(crate) struct Said {
+    pub(crate) code: i32,
+    pub(crate) out: String,
+    pub(crate) err: String,
+}
+
+impl Said {
+    /// Standard output as JSON.
+    #[track_caller]
+    pub(crate) fn json(&self) -> Value {
+        serde_json::from_str(&self.out).unwrap_or_else(|e| panic!("{e}: {self:?}"))
+    }
+
+    #[track_caller]
+    pub(crate) fn succeeded(self) -> Said {
+        assert_eq!(self.code, 0, "{}", self.err);
+        self
+    }
+
+    /// Asserts the exit code, and that the last paragraph of standard error holds all `words`.
+    #[track_caller]
+    pub(crate) fn refused(&self, code: i32, words: &[&str]) {
+        let message = &self.err[self.err.find("error: ").unwrap_or_else(|| panic!("no error: {self:?}"))..];
+        assert_eq!(self.code, code, "{message}");
+        assert!(words.iter().all(|word| message.contains(word)), "no {words:?} in: {message}");
+    }
+}
+
+/// Runs the program in `folder`.
+#[track_caller]
+pub(crate) fn gdt_batch<S: AsRef<std::ffi::OsStr>>(folder: &Path, arguments: &[S]) -> Said {
+    finish(Command::new(env!("CARGO_BIN_EXE_gdt-batch")).args(arguments).current_dir(folder))
+}
+
+/// Runs the program with no more than `mebibytes` of address space, so that it cannot even ask for more.
+#[track_caller]
+pub(crate) fn gdt_batch_within(mebibytes: u64, folder: &Path, arguments: &[&str]) -> Said {
+    let mut command = Command::new("sh");
+    command.arg("-c").arg(format!("ulimit -v {} && exec \"$0\" \"$@\"", mebibytes * 1024));
+    finish(command.arg(env!("CARGO_BIN_EXE_gdt-batch")).args(arguments).current_dir(folder))
+}
+
+/// Waits for `command`, but not for ever, and makes sure that it has not panicked.
+#[track_caller]
+fn finish(command: &mut Command) -> Said {
+    let logs = tempfile::tempdir().unwrap();
+    let log = |name: &str| File::create(logs.path().join(name)).unwrap();
+    let mut child =
+        command.stdin(Stdio::null()).stdout(log("out")).stderr(log("err")).spawn().expect("the program starts");
+    let start = Instant::now();
+    let status = loop {
+        match child.try_wait().unwrap() {
+            Some(status) => break status,
+            None if start.elapsed() > HANGS => {
+                child.kill().unwrap();
+                panic!("{command:?} hangs");
+            }
+            None => std::thread::sleep(Duration::from_millis(5)),
+        }
+    };
+    let text = |name: &str| String::from_utf8_lossy(&fs::read(logs.path().join(name)).unwrap()).into_owned();
+    let said = Said { code: status.code().unwrap_or(-1), out: text("out"), err: text("err") };
+    assert!(!said.err.contains("panicked") && said.code >= 0, "{status}: {}", said.err);
+    said
+}
+
+/// A configuration in a folder of its own, to which it also writes.
+pub(crate) struct Job {
+    folder: TempDir,
+    sections: BTreeMap<&'static str, String>,
+}
+
+impl Job {
+    /// The least configuration for these files.
+    pub(crate) fn on<P: AsRef<Path>>(files: &[P]) -> Job {
+        let names: Vec<&str> = files.iter().map(|file| file.as_ref().to_str().unwrap()).collect();
+        let job = Job { folder: tempfile::tempdir().unwrap(), sections: BTreeMap::new() };
+        job.with("input", &format!("files = {names:?}")).with("output", "directory = \"out\"")
+    }
+
+    /// With one more line in a section.
+    pub(crate) fn with(mut self, section: &'static str, line: &str) -> Job {
+        *self.sections.entry(section).or_default() += &format!("{line}\n");
+        self
+    }
+
+    pub(crate) fn tiles_of(self, sites: u64) -> Job {
+        self.with("triangulation", &format!("sites_per_tile = {sites}"))
+    }
+
+    pub(crate) fn threads(self, threads: usize) -> Job {
+        self.with("limits", &format!("threads = {threads}"))
+    }
+
+    pub(crate) fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Where it writes.
+    pub(crate) fn out(&self) -> PathBuf {
+        self.folder.path().join("out")
+    }
+
+    /// Writes the configuration and gives its path.
+    pub(crate) fn config(&self) -> PathBuf {
+        let text: String = self.sections.iter().map(|(name, lines)| format!("[{name}]\n{lines}")).collect();
+        let path = self.folder.path().join("job.toml");
+        fs::write(&path, text).unwrap();
+        path
+    }
+
+    /// Runs it with these arguments before the configuration.
+    #[track_caller]
+    pub(crate) fn run_with(&self, arguments: &[&str]) -> Said {
+        let config = self.config();
+        gdt_batch(self.folder(), &[arguments, &[config.to_str().unwrap()]].concat())
+    }
+
+    #[track_caller]
+    pub(crate) fn run(&self) -> Said {
+        self.run_with(&[])
+    }
+
+    /// Runs it, which must succeed, and gives the report.
+    #[track_caller]
+    pub(crate) fn report(&self) -> Value {
+        self.run_with(&["--json", "--quiet"]).succeeded().json()
+    }
+
+    /// What `verify` says of what is written, which must hold.
+    #[track_caller]
+    pub(crate) fn verified(&self) -> Value {
+        let verdict = gdt_batch(self.folder(), &["verify", "out", "--json"]).succeeded().json();
+        assert_eq!(verdict["failures"], serde_json::json!([]));
+        verdict
+    }
+
+    /// Runs it and gives the digest of the mesh, which must be exact.
+    #[track_caller]
+    pub(crate) fn digest(&self) -> String {
+        self.report();
+        self.verified()["digest"].as_str().unwrap().to_owned()
+    }
+}
+
+/// A number of a report.
+#[track_caller]
+pub(crate) fn number(value: &Value) -> u64 {
+    value.as_u64().unwrap_or_else(|| panic!("{value} is no number"))
+}

@@ -1,0 +1,142 @@
+//! The steps of a job by hand, on many small clouds cut into tiny tiles: the closed triangles of all nodes together are
+//! the triangulation of all sites at once.
+
+use gdt_batch::config::{Backend, Config, Duplicates, Triangulation};
+use gdt_batch::geometry::Site;
+use gdt_batch::job::directory::Directory;
+use gdt_batch::job::partition::{self, Partition};
+use gdt_batch::job::progress::Progress;
+use gdt_batch::job::records::{Leaf, Seam};
+use gdt_batch::job::span::Longest;
+use gdt_batch::job::spill::Spill;
+use gdt_batch::job::tree::Kind;
+use gdt_batch::job::{leaf, merge, scan};
+use gdt_batch::triangulation::{Triangulator, reference};
+
+use crate::clouds::{self, Cloud};
+use crate::program::Job;
+use crate::random::Random;
+
+type Triangle = [Site; 3];
+
+/// Turned so that the least corner comes first.
+fn canonical(mut corners: Triangle) -> Triangle {
+    let first = (0..3).min_by_key(|&i| corners[i]).unwrap();
+    corners.rotate_left(first);
+    corners
+}
+
+/// Scans, partitions, triangulates every leaf and merges every inner node.
+fn run_steps(job: &Job, config: &Config) -> (Directory, Partition) {
+    let directory = Directory::new(&job.out());
+    directory.create().unwrap();
+    let plan = scan::run(config, scan::Coarser::default()).unwrap();
+    let task = partition::Task {
+        sources: &plan.sources,
+        extent: plan.extent,
+        points_per_tile: config.triangulation.sites_per_tile.0,
+        memory: 1 << 20,
+        malformed_share: 0.0,
+    };
+    let partition = partition::run(&task, &directory, &Progress::Quiet.stage("read", 0, "points")).unwrap();
+    let spill = Spill::open(&directory.spill()).unwrap();
+    let longest = Longest::of(&plan.frame);
+    let cpu = Triangulation { backend: Backend::Cpu, ..Triangulation::default() };
+    let triangulator = Triangulator::new(&cpu, 1 << 28, 1).unwrap();
+    let task = leaf::Task { duplicates: Duplicates::Lowest, triangulator: &triangulator, longest };
+    for tile in (0..partition.tree.leaves.len()).rev() {
+        leaf::run(&directory, &partition, &spill, tile, task).unwrap();
+    }
+    for node in (0..partition.tree.nodes.len()).rev() {
+        if matches!(partition.tree.nodes[node].kind, Kind::Inner(_)) {
+            merge::run(&directory, &partition.tree, node, 1 << 28, longest).unwrap();
+        }
+    }
+    (directory, partition)
+}
+
+/// All sites, and all triangles that leaves and inner nodes closed, sorted.
+fn collect(directory: &Directory, partition: &Partition) -> (Vec<Site>, Vec<Triangle>) {
+    let (mut sites, mut triangles) = (Vec::new(), Vec::new());
+    for tile in 0..partition.tree.leaves.len() {
+        let leaf = Leaf::load(directory, tile).unwrap();
+        let plane = |v: u32| [leaf.positions[v as usize][0], leaf.positions[v as usize][1]];
+        sites.extend((0..leaf.positions.len() as u32).map(plane));
+        triangles.extend(leaf.triangles.iter().map(|t| canonical(t.map(plane))));
+        for node in partition.tree.ancestors(partition.tree.leaves[tile]) {
+            let seam = Seam::touching(directory, node, tile).unwrap();
+            // A seam triangle stands with every tile it touches: count it with the first.
+            let mine = seam.iter().filter(|t| t.iter().all(|corner| corner.tile as usize >= tile));
+            triangles.extend(mine.map(|t| canonical(t.map(|corner| corner.plane()))));
+        }
+    }
+    triangles.sort_unstable();
+    (sites, triangles)
+}
+
+#[track_caller]
+fn assert_exact(cloud: &Cloud, sites_per_tile: u64, what: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    let job = Job::on(&[clouds::write(folder.path(), "cloud.csv", cloud)]).tiles_of(sites_per_tile);
+    let (directory, partition) = run_steps(&job, &Config::load(&job.config()).unwrap());
+    let (sites, triangles) = collect(&directory, &partition);
+    let mesh = reference::triangulate(&sites).unwrap();
+    let mut expected: Vec<Triangle> = mesh.triangles.iter().map(|t| canonical(t.map(|v| sites[v as usize]))).collect();
+    expected.sort_unstable();
+    let count = |t: &[Triangle]| t.len();
+    assert!(
+        triangles == expected,
+        "{what}, {sites_per_tile} sites a tile: {} triangles, not {}: {cloud:?}",
+        count(&triangles),
+        count(&expected)
+    );
+}
+
+/// The points of `cloud` turned by an angle with whole sine and cosine, and shuffled.
+fn turned_and_shuffled(cloud: Cloud, random: &mut Random) -> Cloud {
+    let mut turned: Cloud = cloud.into_iter().map(|[x, y, z]| [3 * x - 4 * y, 4 * x + 3 * y, z]).collect();
+    for i in (1..turned.len()).rev() {
+        turned.swap(i, random.below(i as u64 + 1) as usize);
+    }
+    turned
+}
+
+/// A cloud of kind `kind`: lattices, turned lattices, cocircular points, lines, random points, and mixtures.
+fn small_cloud(kind: u64, random: &mut Random) -> (Cloud, &'static str) {
+    let seed = random.below(1 << 40);
+    let count = 20 + random.below(180) as usize;
+    let lattice = |side: i64| (0..side * side).map(|i| [i % side, i / side, i]).collect::<Cloud>();
+    match kind {
+        0 => (clouds::uniform(count, 12, seed), "small whole numbers"),
+        1 => (clouds::uniform(count, 1_000_000, seed), "random"),
+        2 => (turned_and_shuffled(lattice(4 + random.below(9) as i64), random), "turned lattice"),
+        3 => (clouds::exact_circle([25, 65, 325, 1105][random.below(4) as usize]), "circle"),
+        4 => {
+            let mut cloud = turned_and_shuffled(clouds::exact_circle(65), random);
+            cloud.extend(lattice(9).iter().map(|[x, y, z]| [40 * x - 160, 40 * y - 160, *z]));
+            cloud.extend(clouds::uniform(30, 300, seed));
+            (cloud, "mixture")
+        }
+        5 => (clouds::line(count, 1), "nearly a line"),
+        _ => (clouds::uniform(count, 4, seed).iter().map(|[x, y, z]| [1_000 * x, *y, *z]).collect(), "columns"),
+    }
+}
+
+#[test]
+fn small_clouds_in_tiny_tiles() {
+    let mut random = Random(20_261_120);
+    for round in 0..40 {
+        for kind in 0..7 {
+            let (cloud, what) = small_cloud(kind, &mut random);
+            assert_exact(&cloud, [5, 13, 40][round % 3], what);
+        }
+    }
+}
+
+#[test]
+fn lines_end_without_a_triangle() {
+    for sites_per_tile in [5, 13, 40] {
+        assert_exact(&clouds::line(100, 0), sites_per_tile, "line");
+        assert_exact(&vec![[3, 3, 3]; 100], sites_per_tile, "one spot");
+    }
+}
