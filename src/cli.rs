@@ -68,6 +68,15 @@ pub enum Command {
         #[arg(required = true)]
         files: Vec<PathBuf>,
     },
+    /// List the GPUs of this machine, compare every step on one of them with plain code, and time it.
+    Gpu {
+        /// A part of the name of the GPU to test; without it the one that backend = "gpu" takes.
+        #[arg(long)]
+        adapter: Option<String>,
+        /// The side of the largest texture to time, in pixels.
+        #[arg(long)]
+        side: Option<u32>,
+    },
     /// Write a sample terrain, made up from a seed, as LAS or LAZ.
     Sample {
         /// The file to write: .las or .laz.

@@ -58,6 +58,10 @@ pub struct Input {
 pub struct Triangulation {
     /// Who triangulates the tiles.
     pub backend: Backend,
+    /// How a GPU computes the discrete Voronoi diagram.
+    pub voronoi: Voronoi,
+    /// A part of the name of the GPU to take; `None`: what the environment names, or the fastest kind.
+    pub adapter: Option<String>,
     /// The side of the pipeline's texture on a GPU.
     pub texture: Texture,
     /// How many sites a tile holds at the most.
@@ -133,6 +137,19 @@ pub enum Backend {
     Gpu,
     /// `spade` alone: slower, for tests and doubters.
     Reference,
+}
+
+/// How a GPU computes the discrete Voronoi diagram. The mesh is the same either way.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Voronoi {
+    /// The exact transform, which is the faster one.
+    #[default]
+    Auto,
+    /// The exact transform: columns, then rows.
+    Exact,
+    /// Jump flooding, 1+JFA, as in the paper.
+    Jfa,
 }
 
 /// Where vertex colours come from.

@@ -6,6 +6,7 @@ pub mod cli;
 pub mod config;
 pub mod error;
 pub mod geometry;
+pub mod gpu;
 pub mod input;
 pub mod job;
 pub mod output;

@@ -3,6 +3,7 @@
 use clap::Parser;
 use gdt_batch::cli::{Cli, Command, Talk};
 use gdt_batch::config::Config;
+use gdt_batch::gpu::selftest;
 use gdt_batch::job::{self, check, progress::Progress};
 use gdt_batch::{Error, Result, input, sample, verify};
 use serde::Serialize;
@@ -28,6 +29,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
         (Some(Command::Check { config }), _) => show(&check::run(&Config::load(&config)?)?, talk)?,
         (Some(Command::Verify { directory, memory }), _) => return prove(&directory, memory, talk),
         (Some(Command::Info { files }), _) => info(&files, talk)?,
+        (Some(Command::Gpu { adapter, side }), _) => return test_gpu(adapter.as_deref(), side, talk),
         (Some(Command::Sample { file, points, seed }), _) => sample::write(&file, points, seed)?,
         (None, Some(config)) => show(&job::run(&Config::load(&config)?, Progress::detect(talk.quiet))?, talk)?,
         (None, None) => return Err(Error::Config("name a configuration file; --help shows how".into())),
@@ -58,6 +60,16 @@ fn prove(directory: &Path, memory: u64, talk: Talk) -> Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     eprintln!("error: {} does not hold the exact Delaunay triangulation", directory.display());
+    Ok(ExitCode::from(4))
+}
+
+fn test_gpu(adapter: Option<&str>, side: Option<u32>, talk: Talk) -> Result<ExitCode> {
+    let test = selftest::run(adapter, side)?;
+    show(&test, talk)?;
+    if test.holds() {
+        return Ok(ExitCode::SUCCESS);
+    }
+    eprintln!("error: a shader and its twin disagree on this GPU; jobs are exact all the same, but slow");
     Ok(ExitCode::from(4))
 }
 

@@ -8,12 +8,12 @@ use super::sites;
 use super::span::Longest;
 use super::spill::Spill;
 use crate::Result;
-use crate::config::{Backend, Duplicates};
+use crate::config::Duplicates;
 use crate::geometry::Site;
 use crate::input::Point;
 use crate::output::normals::Sums;
 use crate::triangulation::mesh::Mesh;
-use crate::triangulation::{self, Outcome};
+use crate::triangulation::{self, Outcome, Triangulator};
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 
@@ -43,12 +43,12 @@ impl AddAssign for LeafFigures {
 }
 
 /// What the step needs to know of the configuration.
-#[derive(Clone, Copy, Debug)]
-pub struct Task {
+#[derive(Clone, Copy)]
+pub struct Task<'a> {
     /// Which of several points with the same x and y stays.
     pub duplicates: Duplicates,
     /// Who triangulates.
-    pub backend: Backend,
+    pub triangulator: &'a Triangulator,
     /// How long a triangle may be.
     pub longest: Longest,
 }
@@ -63,11 +63,11 @@ pub fn run(
     partition: &Partition,
     spill: &Spill,
     tile: usize,
-    task: Task,
+    task: Task<'_>,
 ) -> Result<LeafFigures> {
     let (points, dropped) = sites::load(spill, &partition.blocks[tile], task.duplicates)?;
     let sites: Vec<Site> = points.iter().map(|p| p.position).collect();
-    let (mesh, outcome) = triangulation::triangulate(&sites, task.backend)?;
+    let (mesh, outcome) = task.triangulator.triangulate(&sites)?;
     let node = partition.tree.leaves[tile];
     let is_root = partition.tree.nodes[node].parent.is_none();
     let cell = (!is_root).then_some(&partition.tree.nodes[node].cell);

@@ -23,12 +23,13 @@ pub mod spill;
 pub mod stitch;
 pub mod tree;
 
-use crate::config::{Backend, ColorChoice, Config};
+use crate::config::{ColorChoice, Config};
 use crate::output::color::Coloring;
 use crate::output::georeference::Georeference;
 use crate::output::picture::Picture;
 use crate::output::preview::{Canvas, Texel};
 use crate::output::terrain::write_terrain;
+use crate::triangulation::Triangulator;
 use crate::{Error, Result};
 use choose::Coarser;
 use columns::ColumnReader;
@@ -63,13 +64,11 @@ const MOST_TILES_IN_ONE_FILE: u64 = 4096;
 /// Whatever stops a step; see [`Error`]. A job that fails leaves no temporary files.
 pub fn run(config: &Config, progress: Progress) -> Result<Report> {
     let start = Instant::now();
-    if config.triangulation.backend == Backend::Gpu {
-        let what = "[triangulation] backend = \"gpu\": this version has no GPU executor; use \"auto\" or \"cpu\"";
-        return Err(Error::Config(what.into()));
-    }
+    // First of all, so that a job that must have a GPU fails at once where there is none.
+    let triangulator = Triangulator::new(&config.triangulation, config.limits.memory.0, config.threads())?;
     let mut coarser = Coarser::default();
     loop {
-        match attempt(config, coarser, progress, start) {
+        match attempt(config, &triangulator, coarser, progress, start) {
             // Only the finished mesh knows its longest triangle, so that a second try is the price of not rounding in vain.
             Err(Error::TooFine { vertical: true, what }) if coarser.vertical < MOST_TENS => {
                 progress.note(&format!("{what}; starting again with a coarser step in z"));
@@ -86,7 +85,13 @@ pub fn run(config: &Config, progress: Progress) -> Result<Report> {
     }
 }
 
-fn attempt(config: &Config, coarser: Coarser, progress: Progress, start: Instant) -> Result<Report> {
+fn attempt(
+    config: &Config,
+    triangulator: &Triangulator,
+    coarser: Coarser,
+    progress: Progress,
+    start: Instant,
+) -> Result<Report> {
     let stage = progress.stage("scan", 1, "job");
     let plan = on_threads(workers(config, 0)?, || scan::run(config, coarser))?;
     stage.advance(1);
@@ -94,7 +99,7 @@ fn attempt(config: &Config, coarser: Coarser, progress: Progress, start: Instant
     let threads = workers(config, plan.records)?;
     let directory = Directory::new(&config.output.directory);
     let _lock = directory.create()?;
-    let job = Job { config, plan: &plan, directory: &directory, progress, threads, start };
+    let job = Job { config, triangulator, plan: &plan, directory: &directory, progress, threads, start };
     let outcome = on_threads(threads, || job.run(scanned));
     if outcome.is_err() {
         // The first error is the one to report.
@@ -130,6 +135,7 @@ fn workers(config: &Config, points: u64) -> Result<usize> {
 /// A job whose inputs have been looked at and whose directory is its own.
 struct Job<'a> {
     config: &'a Config,
+    triangulator: &'a Triangulator,
     plan: &'a Plan,
     directory: &'a Directory,
     progress: Progress,
@@ -140,7 +146,7 @@ struct Job<'a> {
 impl Job<'_> {
     /// Step 2 and all after it.
     fn run(&self, scanned: StageFigures) -> Result<Report> {
-        let Job { config, plan, directory, progress, .. } = *self;
+        let Job { config, triangulator, plan, directory, progress, .. } = *self;
 
         let stage = progress.stage("read", plan.records, "points");
         let partition = partition::run(&task(plan, config), directory, &stage)?;
@@ -150,7 +156,7 @@ impl Job<'_> {
         let read = stage.finish();
 
         let stage = progress.stage("triangulate", partition.summary.tally.kept, "points");
-        let leaves = triangulate(config, directory, &partition, longest, &stage)?;
+        let leaves = triangulate(config, triangulator, directory, &partition, longest, &stage)?;
         // From here on the leaves' own files are enough.
         directory::remove_file(&directory.spill())?;
         let triangulated = stage.finish();
@@ -178,6 +184,7 @@ impl Job<'_> {
             Parts {
                 points: partition.summary.tally,
                 leaves,
+                gpu: triangulator.gpu().map(str::to_owned),
                 tiles: written,
                 other_bytes,
                 temporary: partition.spilled + leaves.bytes,
@@ -227,18 +234,20 @@ fn enough_triangles(triangles: u64) -> Result<()> {
 /// Triangulates all leaves and merges every inner node as soon as its children are done.
 fn triangulate(
     config: &Config,
+    triangulator: &Triangulator,
     directory: &Directory,
     partition: &Partition,
     longest: Longest,
     stage: &Stage,
 ) -> Result<LeafFigures> {
     let spill = Spill::open(&directory.spill())?;
-    let grower = Grower { config, directory, partition, spill: &spill, longest, stage };
+    let grower = Grower { config, triangulator, directory, partition, spill: &spill, longest, stage };
     grower.grow(0)
 }
 
 struct Grower<'a> {
     config: &'a Config,
+    triangulator: &'a Triangulator,
     directory: &'a Directory,
     partition: &'a Partition,
     spill: &'a Spill,
@@ -250,9 +259,11 @@ impl Grower<'_> {
     fn grow(&self, node: usize) -> Result<LeafFigures> {
         match self.partition.tree.nodes[node].kind {
             Kind::Leaf(tile) => {
-                let Config { input, triangulation, .. } = self.config;
-                let task =
-                    leaf::Task { duplicates: input.duplicates, backend: triangulation.backend, longest: self.longest };
+                let task = leaf::Task {
+                    duplicates: self.config.input.duplicates,
+                    triangulator: self.triangulator,
+                    longest: self.longest,
+                };
                 let figures = leaf::run(self.directory, self.partition, self.spill, tile, task)?;
                 self.stage.advance(figures.sites + figures.duplicates);
                 Ok(figures)

@@ -30,6 +30,8 @@ pub struct Report {
     pub points: Tally,
     /// How the leaves came to be.
     pub leaves: LeafFigures,
+    /// The GPU that helped.
+    pub gpu: Option<String>,
     /// The lattice.
     pub lattice: Lattice,
     /// Unit of x and y.
@@ -60,6 +62,8 @@ pub struct Parts {
     pub points: Tally,
     /// What the leaves came to.
     pub leaves: LeafFigures,
+    /// The GPU that helped.
+    pub gpu: Option<String>,
     /// What the tiles came to.
     pub tiles: TileFigures,
     /// Bytes of results beside the tiles.
@@ -100,6 +104,7 @@ impl Report {
             files: plan.sources.len(),
             points: parts.points,
             leaves: parts.leaves,
+            gpu: parts.gpu,
             lattice: plan.lattice.clone(),
             unit: plan.unit.into(),
             crs: plan.crs.name.clone(),
@@ -151,6 +156,9 @@ impl fmt::Display for Report {
         row("triangles", grouped(self.triangles))?;
         row("  crossing tile borders", format!("{:.3} %", self.seam_share * 100.0))?;
         row("tiles", grouped(self.tiles))?;
+        if let Some(gpu) = &self.gpu {
+            row("  with the help of a GPU", format!("{} ({gpu})", grouped(self.leaves.outcome.counts.on_gpu)))?;
+        }
         row("lattice step", format!("{} (z {}) {}", self.lattice.resolution, self.lattice.resolution_z, self.unit))?;
         row("written", megabytes(self.bytes_written))?;
         row("temporary files", megabytes(self.bytes_temporary))?;

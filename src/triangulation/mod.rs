@@ -4,10 +4,12 @@ pub mod flip;
 pub mod mesh;
 pub mod reference;
 
-use crate::Result;
-use crate::config::Backend;
+use crate::config::{Backend, Triangulation};
 use crate::geometry::Site;
-use crate::voronoi::{self, Counts, Rejected, Scratch};
+use crate::gpu::device::{Wish, hardware_is_likely};
+use crate::gpu::executor::{Executor, Order};
+use crate::voronoi::{self, Counts, Diagrams, Rejected, Scratch};
+use crate::{Error, Result};
 use mesh::Mesh;
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
@@ -43,23 +45,69 @@ thread_local! {
     static SCRATCH: RefCell<Scratch> = RefCell::default();
 }
 
-/// The canonical Delaunay triangulation of distinct `sites`, the same whichever `backend` computes it.
-///
-/// # Errors
-/// [`crate::Error::Broken`] if even the reference triangulation fails.
-pub fn triangulate(sites: &[Site], backend: Backend) -> Result<(Mesh, Outcome)> {
-    let mut outcome = Outcome::default();
-    if backend != Backend::Reference {
-        match SCRATCH.with_borrow_mut(|scratch| voronoi::triangulate(sites, scratch)) {
-            Ok((mesh, counts)) => return Ok((mesh, Outcome { pipeline: 1, counts, ..outcome })),
-            Err(Rejected::Crowded) => outcome.crowded = 1,
-            Err(Rejected::NotAccepted(_)) => outcome.not_accepted = 1,
-            Err(Rejected::TooFew | Rejected::TooMany | Rejected::OutOfReach) => outcome.reference = 1,
+/// Who triangulates leaves: the pipeline on the worker's own thread, with a GPU's help where there is one, or the reference.
+pub struct Triangulator {
+    pipeline: bool,
+    gpu: Option<Executor>,
+}
+
+/// Bytes on the CPU's side that a pixel of a GPU's texture takes: its label, where its site is listed, and its turn in a buffer.
+const BYTES_PER_PIXEL: u64 = 12;
+/// With less memory than this for the whole job, drivers take too large a share of it for "auto".
+const LEAST_MEMORY: u64 = 1 << 30;
+
+impl Triangulator {
+    /// The triangulator that the configuration asks for, for leaves on `threads` threads at once within `memory` bytes.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if a GPU is asked for and there is none that will do. A GPU that may be used, but cannot, is none.
+    pub fn new(config: &Triangulation, memory: u64, threads: usize) -> Result<Triangulator> {
+        let pipeline = config.backend != Backend::Reference;
+        let required = config.backend == Backend::Gpu;
+        let allowed = || config.backend == Backend::Auto && memory >= LEAST_MEMORY && hardware_is_likely();
+        if !required && !allowed() {
+            return Ok(Triangulator { pipeline, gpu: None });
         }
-    } else {
-        outcome.reference = 1;
+        let order = Order {
+            wish: Wish::new(config.adapter.as_deref(), required),
+            voronoi: config.voronoi,
+            texture: config.texture,
+            most_pixels: memory / 4 / threads as u64 / BYTES_PER_PIXEL,
+            shared: !required,
+        };
+        match Executor::start(&order) {
+            Ok(gpu) => Ok(Triangulator { pipeline, gpu: Some(gpu) }),
+            Err(_) if !required => Ok(Triangulator { pipeline, gpu: None }),
+            Err(why) => Err(Error::Config(format!(
+                "[triangulation] backend = \"gpu\": {why}; `gdt-batch gpu` lists what there is, and \"auto\" does without a GPU"
+            ))),
+        }
     }
-    Ok((reference::triangulate(sites)?, outcome))
+
+    /// The name of the GPU that helps.
+    pub fn gpu(&self) -> Option<&str> {
+        self.gpu.as_ref().map(|gpu| gpu.adapter.as_str())
+    }
+
+    /// The canonical Delaunay triangulation of distinct `sites`, the same whoever computes it.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] if even the reference triangulation fails.
+    pub fn triangulate(&self, sites: &[Site]) -> Result<(Mesh, Outcome)> {
+        let mut outcome = Outcome::default();
+        if self.pipeline {
+            let gpu = self.gpu.as_ref().map(|gpu| gpu as &dyn Diagrams);
+            match SCRATCH.with_borrow_mut(|scratch| voronoi::triangulate_with(sites, gpu, scratch)) {
+                Ok((mesh, counts)) => return Ok((mesh, Outcome { pipeline: 1, counts, ..outcome })),
+                Err(Rejected::Crowded) => outcome.crowded = 1,
+                Err(Rejected::NotAccepted(_)) => outcome.not_accepted = 1,
+                Err(Rejected::TooFew | Rejected::TooMany | Rejected::OutOfReach) => outcome.reference = 1,
+            }
+        } else {
+            outcome.reference = 1;
+        }
+        Ok((reference::triangulate(sites)?, outcome))
+    }
 }
 
 /// Takes back the memory of a mesh that is no longer needed, for the next leaf of this thread.

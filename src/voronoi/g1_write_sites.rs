@@ -2,14 +2,10 @@
 //!
 //! The sites are numbered by row and column of their pixels, which is the order in which all later steps meet them.
 
-use super::{Counts, Rejected};
+use super::{Counts, Rejected, Resolution, Shape};
 use crate::geometry::Site;
 use crate::geometry::lattice::REACH;
 
-/// Pixels per site: fewer make more work for the repair, more make more work for the transform.
-const PIXELS_PER_SITE: f64 = 5.0;
-/// Largest width and height of the texture.
-const MOST_PIXELS: f64 = 65535.0;
 /// Largest share of missing sites with which going on pays.
 const MOST_MISSING: f64 = 0.4;
 
@@ -43,8 +39,8 @@ pub(super) struct Texture {
 
 impl Texture {
     /// Scales and writes `sites`.
-    pub(super) fn write(&mut self, sites: &[Site], counts: &mut Counts) -> Result<(), Rejected> {
-        let scale = self.fit(sites)?;
+    pub(super) fn write(&mut self, sites: &[Site], shape: &Shape, counts: &mut Counts) -> Result<(), Rejected> {
+        let scale = self.fit(sites, shape)?;
         self.sort_by_row(sites, scale);
         self.clear(sites.len());
         for y in 0..self.height {
@@ -66,7 +62,7 @@ impl Texture {
     }
 
     /// Chooses width and height with the shape of the sites' bounding box; returns the origin and pixels per lattice step.
-    fn fit(&mut self, sites: &[Site]) -> Result<(Site, f64), Rejected> {
+    fn fit(&mut self, sites: &[Site], shape: &Shape) -> Result<(Site, f64), Rejected> {
         let (mut low, mut high) = ([i32::MAX; 2], [i32::MIN; 2]);
         for site in sites {
             low = [low[0].min(site[0]), low[1].min(site[1])];
@@ -76,12 +72,31 @@ impl Texture {
             return Err(Rejected::OutOfReach);
         }
         let extent = [0, 1].map(|i| (high[i] - low[i]) as f64 + 1.0);
-        let area = PIXELS_PER_SITE * sites.len() as f64;
-        let scale = (area / (extent[0] * extent[1])).sqrt().min(1.0).min(MOST_PIXELS / extent[0].max(extent[1]));
-        self.width = ((extent[0] - 1.0) * scale) as usize + 1;
-        self.height = ((extent[1] - 1.0) * scale) as usize + 1;
+        let scale = shape.scale(extent, sites.len());
+        [self.width, self.height] = extent.map(|side| pixels_along(side, scale));
         self.words = self.width.div_ceil(64);
         Ok((low, scale))
+    }
+
+    /// The pixel (y << 16 | x) of every site in the texture, by number.
+    pub(super) fn placed_pixels(&self) -> Vec<u32> {
+        let mut pixels = Vec::with_capacity(self.placed);
+        for (at, &word) in self.occupied.iter().enumerate() {
+            let (y, x) = (at / self.words, 64 * (at % self.words));
+            let mut bits = word;
+            while bits != 0 {
+                pixels.push((y << 16 | (x + bits.trailing_zeros() as usize)) as u32);
+                bits &= bits - 1;
+            }
+        }
+        pixels
+    }
+
+    /// Whether `label` (y << 16 | x) is a pixel of the texture with a site in it.
+    #[inline(always)]
+    pub(super) fn has_site(&self, label: u32) -> bool {
+        let (x, y) = ((label & 0xffff) as usize, (label >> 16) as usize);
+        x < self.width && y < self.height && self.occupied[y * self.words + x / 64] >> (x % 64) & 1 != 0
     }
 
     /// Fills `rows` with (pixel column, position in the input), row by row, and `row_ends`.
@@ -187,5 +202,27 @@ impl Texture {
         self.order.extend_from_slice(missing);
         self.sites.extend(missing.iter().map(|&i| sites[i as usize]));
         self.sites.push([0; 2]);
+    }
+}
+
+/// Pixels along a side of `steps` lattice steps.
+fn pixels_along(steps: f64, scale: f64) -> usize {
+    ((steps - 1.0) * scale) as usize + 1
+}
+
+impl Shape {
+    /// Pixels per lattice step for `sites` sites in a box of that many steps.
+    fn scale(&self, extent: [f64; 2], sites: usize) -> f64 {
+        let longer = extent[0].max(extent[1]);
+        let wanted = match self.resolution {
+            Resolution::PixelsPerSite(pixels) => (pixels * sites as f64 / (extent[0] * extent[1])).sqrt(),
+            Resolution::Side(pixels) => f64::from(pixels) / longer,
+        };
+        let mut scale = wanted.min(1.0).min(f64::from(self.most_side) / longer);
+        // A side is a pixel at the least, so that the area alone does not say what fits.
+        while extent.map(|side| pixels_along(side, scale) as u64).iter().product::<u64>() > self.most_pixels {
+            scale *= 0.98;
+        }
+        scale
     }
 }

@@ -34,6 +34,8 @@ pub(super) struct Voronoi {
     columns: Vec<i16>,
     keys: Vec<i16>,
     envelope: Vec<Parabola>,
+    /// The labels of all pixels, if somebody else has made them.
+    given: Option<Vec<u32>>,
 }
 
 /// A site seen from a row: it is nearest from pixel `from` on, until the next one is.
@@ -48,6 +50,7 @@ struct Parabola {
 impl Voronoi {
     /// Prepares for the rows of `texture`.
     pub(super) fn start(&mut self, texture: &Texture) {
+        self.given = None;
         self.stride = texture.words * 64;
         self.south.clear();
         self.south.resize(self.stride, LONG);
@@ -57,6 +60,15 @@ impl Voronoi {
         self.columns.resize(self.stride + 2 * (REACH + 1), FAR);
         self.keys.resize(self.stride, FAR);
         self.measure_north(texture);
+    }
+
+    /// Takes the labels of all pixels of `texture`, row by row, from somebody who need not be trusted: whether they can be used.
+    pub(super) fn take(&mut self, texture: &Texture, labels: Vec<u32>) -> bool {
+        // Neighbours mostly have the same label, which need not be looked up again.
+        let mut runs = labels.chunk_by(|a, b| a == b);
+        let whole = labels.len() == texture.width * texture.height && runs.all(|run| texture.has_site(run[0]));
+        self.given = whole.then_some(labels);
+        whole
     }
 
     fn measure_north(&mut self, texture: &Texture) {
@@ -70,6 +82,10 @@ impl Voronoi {
 
     /// Writes the labels of row `y` to `labels[1..=width]`. Rows must be asked for in order.
     pub(super) fn row(&mut self, texture: &Texture, y: usize, labels: &mut [u32]) {
+        if let Some(given) = &self.given {
+            labels[1..=texture.width].copy_from_slice(&given[y * texture.width..][..texture.width]);
+            return;
+        }
         let occupied = &texture.occupied[y * texture.words..][..texture.words];
         grow(&mut self.south, occupied);
         for_each_bit(occupied, |x| self.south_row[x] = y as u32 + 1);

@@ -56,6 +56,53 @@ pub enum Rejected {
     NotAccepted(&'static str),
 }
 
+/// How many pixels a texture has.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shape {
+    /// How fine it is to be, if it may.
+    pub resolution: Resolution,
+    /// Largest width and height.
+    pub most_side: u32,
+    /// Most pixels in all.
+    pub most_pixels: u64,
+}
+
+/// How fine a texture is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Resolution {
+    /// Pixels per site: fewer make more work for the repair, more make more work for the transform.
+    PixelsPerSite(f64),
+    /// Pixels along the longer side.
+    Side(u32),
+}
+
+impl Default for Shape {
+    /// What suits the CPU.
+    fn default() -> Shape {
+        Shape { resolution: Resolution::PixelsPerSite(5.0), most_side: 65_535, most_pixels: u64::MAX }
+    }
+}
+
+/// Somebody who makes discrete Voronoi diagrams (step G2) faster than this thread does.
+pub trait Diagrams {
+    /// The textures that suit.
+    fn shape(&self) -> Shape;
+
+    /// The diagram of a texture of `width` x `height` pixels whose sites are in `pixels` (each y << 16 | x).
+    fn diagram(&self, width: u32, height: u32, pixels: Vec<u32>) -> Diagram;
+}
+
+/// What has become of a diagram.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Diagram {
+    /// The label of every pixel, row by row: the pixel (y << 16 | x) of its nearest site.
+    Labels(Vec<u32>),
+    /// The texture was too large; [`Diagrams::shape`] is smaller now.
+    TooLarge,
+    /// Do it yourself.
+    No,
+}
+
 /// The steps that [`Counts::nanoseconds`] tells apart.
 pub const STEPS: [&str; 8] = [
     "G1 write sites",
@@ -71,6 +118,8 @@ pub const STEPS: [&str; 8] = [
 /// What the steps met. All are numbers of sites, triangles or edges, as named.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Counts {
+    /// Leaves whose Voronoi diagram a GPU made.
+    pub on_gpu: u64,
     /// Sites given.
     pub sites: u64,
     /// Sites that found no pixel and were inserted one by one.
@@ -91,6 +140,7 @@ pub struct Counts {
 
 impl std::ops::AddAssign for Counts {
     fn add_assign(&mut self, other: Counts) {
+        self.on_gpu += other.on_gpu;
         self.sites += other.sites;
         self.missing += other.missing;
         self.moved += other.moved;
@@ -132,6 +182,18 @@ impl Scratch {
 /// # Errors
 /// [`Rejected`] where this is not the way to do it; never a wrong mesh.
 pub fn triangulate(sites: &[Site], scratch: &mut Scratch) -> Result<(Mesh, Counts), Rejected> {
+    triangulate_with(sites, None, scratch)
+}
+
+/// As [`triangulate`], with the Voronoi diagram made by `diagrams` if they will. They need not be trusted.
+///
+/// # Errors
+/// As [`triangulate`].
+pub fn triangulate_with(
+    sites: &[Site],
+    diagrams: Option<&dyn Diagrams>,
+    scratch: &mut Scratch,
+) -> Result<(Mesh, Counts), Rejected> {
     check_size(sites)?;
     let Scratch { texture, voronoi, scan, sphere, islands, shift, flips, acceptance, mesh } = scratch;
     let mut counts = Counts { sites: sites.len() as u64, ..Counts::default() };
@@ -139,9 +201,8 @@ pub fn triangulate(sites: &[Site], scratch: &mut Scratch) -> Result<(Mesh, Count
     shift.clear();
     flips.reset(sites.len());
 
-    texture.write(sites, &mut counts)?;
+    discretise(sites, diagrams, texture, voronoi, &mut counts)?;
     clock.done(&mut counts, 0);
-    voronoi.start(texture);
     scan.run(texture, voronoi, sphere, shift, flips)?;
     counts.inverted = shift.inverted.len() as u64;
     clock.done(&mut counts, 1);
@@ -165,6 +226,37 @@ pub fn triangulate(sites: &[Site], scratch: &mut Scratch) -> Result<(Mesh, Count
     acceptance.accept(sphere, at, &texture.order, mesh)?;
     clock.done(&mut counts, 7);
     Ok((std::mem::take(mesh), counts))
+}
+
+/// Steps G1 and G2. On this thread G2 is only prepared: its rows are made when the scan needs them.
+fn discretise(
+    sites: &[Site],
+    diagrams: Option<&dyn Diagrams>,
+    texture: &mut g1_write_sites::Texture,
+    voronoi: &mut g2_voronoi::Voronoi,
+    counts: &mut Counts,
+) -> Result<(), Rejected> {
+    if let Some(diagrams) = diagrams {
+        let before = *counts;
+        loop {
+            texture.write(sites, &diagrams.shape(), counts)?;
+            match diagrams.diagram(texture.width as u32, texture.height as u32, texture.placed_pixels()) {
+                Diagram::Labels(labels) => {
+                    if voronoi.take(texture, labels) {
+                        counts.on_gpu = 1;
+                        return Ok(());
+                    }
+                    break;
+                }
+                Diagram::TooLarge => *counts = before,
+                Diagram::No => break,
+            }
+        }
+        *counts = before;
+    }
+    texture.write(sites, &Shape::default(), counts)?;
+    voronoi.start(texture);
+    Ok(())
 }
 
 struct Clock(Instant);

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::g1_write_sites::Texture;
 use super::g2_voronoi::Voronoi;
-use super::{Counts, Rejected, Scratch, triangulate};
+use super::{Counts, Rejected, Scratch, Shape, triangulate};
 use crate::geometry::Site;
 use crate::triangulation::mesh::Mesh;
 use crate::triangulation::reference;
@@ -163,7 +163,7 @@ fn labels_are_the_nearest_site_pixels() {
 fn check_labels(sites: &[Site]) {
     let (mut texture, mut voronoi) = (Texture::default(), Voronoi::default());
     // Whether too many are missing is of no importance here.
-    let _ = texture.write(sites, &mut Counts::default());
+    let _ = texture.write(sites, &Shape::default(), &mut Counts::default());
     let occupied = |x: usize, y: usize| texture.occupied[y * texture.words + x / 64] >> (x % 64) & 1 != 0;
     let pixels = (0..texture.width).flat_map(|x| (0..texture.height).map(move |y| (x, y)));
     let placed: Vec<(usize, usize)> = pixels.filter(|&(x, y)| occupied(x, y)).collect();

@@ -1,7 +1,7 @@
 //! The steps of a job by hand, on many small clouds cut into tiny tiles: the closed triangles of all nodes together are
 //! the triangulation of all sites at once.
 
-use gdt_batch::config::{Backend, Config, Duplicates};
+use gdt_batch::config::{Backend, Config, Duplicates, Triangulation};
 use gdt_batch::geometry::Site;
 use gdt_batch::job::choose::Coarser;
 use gdt_batch::job::directory::Directory;
@@ -12,7 +12,7 @@ use gdt_batch::job::span::Longest;
 use gdt_batch::job::spill::Spill;
 use gdt_batch::job::tree::Kind;
 use gdt_batch::job::{leaf, merge, scan};
-use gdt_batch::triangulation::reference;
+use gdt_batch::triangulation::{Triangulator, reference};
 
 use crate::clouds::{self, Cloud};
 use crate::program::Job;
@@ -42,7 +42,9 @@ fn run_steps(job: &Job, config: &Config) -> (Directory, Partition) {
     let partition = partition::run(&task, &directory, &Progress::Quiet.stage("read", 0, "points")).unwrap();
     let spill = Spill::open(&directory.spill()).unwrap();
     let longest = Longest::of(&plan.frame);
-    let task = leaf::Task { duplicates: Duplicates::Lowest, backend: Backend::Cpu, longest };
+    let cpu = Triangulation { backend: Backend::Cpu, ..Triangulation::default() };
+    let triangulator = Triangulator::new(&cpu, 1 << 28, 1).unwrap();
+    let task = leaf::Task { duplicates: Duplicates::Lowest, triangulator: &triangulator, longest };
     for tile in (0..partition.tree.leaves.len()).rev() {
         leaf::run(&directory, &partition, &spill, tile, task).unwrap();
     }

@@ -1,0 +1,240 @@
+//! Carries out recordings on a device.
+
+use super::Fault;
+use super::buffers::{Name, Set};
+use super::device::Device;
+use super::steps::{Command, Groups, Program, Recording};
+use std::collections::HashMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use wgpu::{BindGroupEntry, BindingResource, BufferBinding, CommandEncoder, ComputePipeline, MapMode};
+
+/// Uploads are cut in pieces of this many bytes, which drivers take faster than one large one.
+const UPLOAD: usize = 32 << 20;
+/// Workgroups after which what is recorded so far is handed over to the GPU.
+const GROUPS_AT_ONCE: u64 = 1 << 18;
+
+/// A device with its pipelines.
+pub struct Machine {
+    device: Device,
+    pipelines: HashMap<Program, ComputePipeline>,
+}
+
+/// A recording under way, whose result is coming back.
+pub struct Ticket {
+    submission: wgpu::SubmissionIndex,
+    bytes: u64,
+    mapped: Arc<AtomicBool>,
+}
+
+impl Machine {
+    /// A machine on an opened device.
+    pub fn new(device: Device) -> Machine {
+        Machine { device, pipelines: HashMap::new() }
+    }
+
+    /// The device.
+    pub fn device(&self) -> &Device {
+        &self.device
+    }
+
+    /// Starts `recording` on the buffers of `set`.
+    ///
+    /// # Errors
+    /// [`Fault`] if the device refuses; nothing is under way then that matters.
+    pub fn start(&mut self, set: &mut Set, recording: &Recording) -> Result<wgpu::SubmissionIndex, Fault> {
+        self.prepare(set, recording)?;
+        let device = &self.device;
+        device.guard(|| self.submit_all(set, recording))?
+    }
+
+    /// Starts `recording`, then the way back of the first `bytes` bytes of buffer `name`.
+    ///
+    /// # Errors
+    /// As [`Machine::start`].
+    pub fn start_and_fetch(
+        &mut self,
+        set: &mut Set,
+        recording: &Recording,
+        name: Name,
+        bytes: u64,
+    ) -> Result<Ticket, Fault> {
+        set.need(&self.device, Name::Staging, bytes)?;
+        self.start(set, recording)?;
+        self.fetch(set, name, 0, bytes)
+    }
+
+    /// Starts the way back of `bytes` bytes of buffer `name`, from byte `first` on.
+    ///
+    /// # Errors
+    /// As [`Machine::start`].
+    pub fn fetch(&self, set: &mut Set, name: Name, first: u64, bytes: u64) -> Result<Ticket, Fault> {
+        set.need(&self.device, Name::Staging, bytes)?;
+        let (from, staging) = (set.get(name)?, set.get(Name::Staging)?);
+        let mapped = Arc::<AtomicBool>::default();
+        let on_mapped = mapped.clone();
+        let submission = self.device.guard(|| {
+            let mut encoder = self.encoder();
+            encoder.copy_buffer_to_buffer(from, first, staging, 0, bytes);
+            let submission = self.device.queue.submit([encoder.finish()]);
+            let done = move |result: Result<(), _>| on_mapped.store(result.is_ok(), Ordering::Release);
+            staging.slice(..bytes).map_async(MapMode::Read, done);
+            submission
+        })?;
+        Ok(Ticket { submission, bytes, mapped })
+    }
+
+    /// Waits for what `ticket` stands for.
+    ///
+    /// # Errors
+    /// [`Fault::Lost`] if it never comes.
+    pub fn finish(&self, set: &Set, ticket: Ticket) -> Result<Vec<u32>, Fault> {
+        self.device.wait(ticket.submission)?;
+        if !ticket.mapped.load(Ordering::Acquire) {
+            return Err(Fault::Lost("a buffer could not be read back".into()));
+        }
+        let staging = set.get(Name::Staging)?;
+        let view = staging.slice(..ticket.bytes).get_mapped_range().map_err(|e| Fault::Lost(e.to_string()))?;
+        let numbers = bytemuck::pod_collect_to_vec(&view);
+        drop(view);
+        self.device.guard(|| staging.unmap())?;
+        Ok(numbers)
+    }
+
+    /// The first `count` numbers of buffer `name`, after all that was started.
+    ///
+    /// # Errors
+    /// As [`Machine::start`] and [`Machine::finish`].
+    pub fn numbers(&self, set: &mut Set, name: Name, count: u64) -> Result<Vec<u32>, Fault> {
+        self.numbers_from(set, name, 0, count)
+    }
+
+    /// `count` numbers of buffer `name` from number `first` on.
+    ///
+    /// # Errors
+    /// As [`Machine::numbers`].
+    pub fn numbers_from(&self, set: &mut Set, name: Name, first: u64, count: u64) -> Result<Vec<u32>, Fault> {
+        if count == 0 {
+            return Ok(Vec::new());
+        }
+        let ticket = self.fetch(set, name, 4 * first, 4 * count)?;
+        self.finish(set, ticket)
+    }
+
+    /// Makes buffers and pipelines.
+    fn prepare(&mut self, set: &mut Set, recording: &Recording) -> Result<(), Fault> {
+        let mut runs = 0;
+        for command in &recording.commands {
+            match command {
+                Command::Need(name, bytes) => set.need(&self.device, *name, *bytes)?,
+                Command::Run(program, ..) => {
+                    runs += 1;
+                    if !self.pipelines.contains_key(program) {
+                        let pipeline = self.device.guard(|| compile(&self.device, program))?;
+                        self.pipelines.insert(*program, pipeline);
+                    }
+                }
+                Command::Upload(..) | Command::Clear(..) | Command::Copy(..) => {}
+            }
+        }
+        set.need(&self.device, Name::Params, (runs * Set::STRIDE).max(Set::STRIDE))
+    }
+
+    fn encoder(&self) -> CommandEncoder {
+        self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
+    }
+
+    fn submit_all(&self, set: &Set, recording: &Recording) -> Result<wgpu::SubmissionIndex, Fault> {
+        let queue = &self.device.queue;
+        queue.write_buffer(set.get(Name::Params)?, 0, &params(recording));
+        let mut encoder = self.encoder();
+        let (mut runs, mut groups) = (0, 0);
+        for command in &recording.commands {
+            match command {
+                Command::Need(..) => {}
+                Command::Upload(name, numbers) => {
+                    let buffer = set.get(*name)?;
+                    for (i, piece) in bytemuck::cast_slice::<u32, u8>(numbers).chunks(UPLOAD).enumerate() {
+                        queue.write_buffer(buffer, (i * UPLOAD) as u64, piece);
+                    }
+                }
+                Command::Clear(name, bytes) => encoder.clear_buffer(set.get(*name)?, 0, Some(*bytes)),
+                Command::Copy(from, to, bytes) => {
+                    encoder.copy_buffer_to_buffer(set.get(*from)?, 0, set.get(*to)?, 0, *bytes);
+                }
+                Command::Run(program, _, size) => {
+                    self.encode(&mut encoder, set, program, *size, runs * Set::STRIDE)?;
+                    runs += 1;
+                    groups += match size {
+                        Groups::Fixed([x, y]) => u64::from(*x) * u64::from(*y),
+                        Groups::Indirect(_) => 0,
+                    };
+                    if groups > GROUPS_AT_ONCE {
+                        groups = 0;
+                        queue.submit([std::mem::replace(&mut encoder, self.encoder()).finish()]);
+                    }
+                }
+            }
+        }
+        Ok(queue.submit([encoder.finish()]))
+    }
+
+    fn encode(
+        &self,
+        encoder: &mut CommandEncoder,
+        set: &Set,
+        program: &Program,
+        groups: Groups,
+        params: u64,
+    ) -> Result<(), Fault> {
+        let pipeline = self.pipelines.get(program).ok_or_else(|| Fault::Refused("a shader is missing".into()))?;
+        let size = wgpu::BufferSize::new(PARAMS);
+        let uniform = BufferBinding { buffer: set.get(Name::Params)?, offset: params, size };
+        let mut entries = vec![BindGroupEntry { binding: 0, resource: BindingResource::Buffer(uniform) }];
+        for &(binding, name) in program.bindings {
+            entries.push(BindGroupEntry { binding, resource: set.get(name)?.as_entire_binding() });
+        }
+        let device = &self.device.device;
+        let layout = pipeline.get_bind_group_layout(0);
+        let bind_group =
+            device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &layout, entries: &entries });
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, &bind_group, &[]);
+        match groups {
+            Groups::Fixed([x, y]) => pass.dispatch_workgroups(x, y, 1),
+            Groups::Indirect(first) => pass.dispatch_workgroups_indirect(set.get(Name::Workgroups)?, 4 * first),
+        }
+        Ok(())
+    }
+}
+
+/// Bytes of the parameters of a dispatch.
+const PARAMS: u64 = 32;
+
+/// The parameters of all dispatches.
+fn params(recording: &Recording) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for command in &recording.commands {
+        if let Command::Run(_, params, _) = command {
+            bytes.extend_from_slice(bytemuck::cast_slice(params));
+            bytes.resize(bytes.len().next_multiple_of(Set::STRIDE as usize), 0);
+        }
+    }
+    bytes
+}
+
+fn compile(device: &Device, program: &Program) -> ComputePipeline {
+    let module = device.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some(program.file),
+        source: wgpu::ShaderSource::Wgsl(program.source.into()),
+    });
+    device.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some(program.entry),
+        layout: None,
+        module: &module,
+        entry_point: Some(program.entry),
+        compilation_options: wgpu::PipelineCompilationOptions::default(),
+        cache: None,
+    })
+}

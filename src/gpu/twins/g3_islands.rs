@@ -1,0 +1,50 @@
+//! Step G3, beside `shaders/g3_islands.wgsl`.
+
+use super::{NONE, key};
+use crate::gpu::steps::{ROUNDS, Size};
+
+/// Gives islands the colours around them, round by round.
+pub fn remove_islands(size: Size, labels: &mut [u32]) {
+    for _ in 0..ROUNDS {
+        let islands = find(size, labels);
+        if islands.is_empty() || islands.len() > size.islands() as usize {
+            return;
+        }
+        for (pixel, colour) in islands {
+            labels[pixel] = colour;
+        }
+    }
+}
+
+/// The pixels that have lost touch with their site, each with its new label.
+fn find(size: Size, labels: &[u32]) -> Vec<(usize, u32)> {
+    let mut islands = Vec::new();
+    for y in 0..size.height {
+        for x in 0..size.width {
+            let pixel = (y * size.width + x) as usize;
+            let label = labels[pixel];
+            if label != NONE && is_island(size, labels, x, y, label) {
+                let colour = other_colour(size, labels, x, y, label);
+                islands.extend(colour.map(|colour| (pixel, colour)));
+            }
+        }
+    }
+    islands
+}
+
+fn is_island(size: Size, labels: &[u32], x: u32, y: u32, label: u32) -> bool {
+    let towards = |from: u32, to: u32| (i64::from(to) - i64::from(from)).signum();
+    let (dx, dy) = (towards(x, label & 0xffff), towards(y, label >> 16));
+    // Where the site lies straight along an axis, only one of the three is another pixel than (x, y).
+    let neighbours = [(dx, 0), (dx, dy), (0, dy)].into_iter().filter(|&offset| offset != (0, 0));
+    let at = |(i, j): (i64, i64)| labels[((i64::from(y) + j) * i64::from(size.width) + i64::from(x) + i) as usize];
+    (dx, dy) != (0, 0) && neighbours.map(at).all(|other| other != label)
+}
+
+/// The nearest site among the neighbours', but not `label`.
+fn other_colour(size: Size, labels: &[u32], x: u32, y: u32, label: u32) -> Option<u32> {
+    let rows = y.saturating_sub(1)..(y + 2).min(size.height);
+    let columns = x.saturating_sub(1)..(x + 2).min(size.width);
+    let around = rows.flat_map(|q| columns.clone().map(move |p| (q * size.width + p) as usize));
+    around.map(|at| labels[at]).filter(|&l| l != label && l != NONE).min_by_key(|&l| key(x, y, l))
+}

@@ -1,0 +1,161 @@
+//! Whole leaves and whole jobs with a GPU's help: the same mesh as without.
+
+use super::random::Random;
+use super::rig::Rig;
+use gdt_batch::config::{Backend, Config, Texture, Triangulation, Voronoi};
+use gdt_batch::geometry::Site;
+use gdt_batch::job::{self, progress::Progress};
+use gdt_batch::triangulation::{Outcome, Triangulator};
+use gdt_batch::verify::verify;
+use gdt_batch::voronoi::{self, Diagram, Diagrams, Rejected, Resolution, Scratch, Shape};
+use std::collections::BTreeSet;
+
+const MEMORY: u64 = 1 << 30;
+
+fn settings(backend: Backend) -> Triangulation {
+    Triangulation { backend, ..Triangulation::default() }
+}
+
+fn solve(config: &Triangulation, sites: &[Site]) -> (BTreeSet<[u32; 3]>, Outcome) {
+    let (mesh, outcome) = Triangulator::new(config, MEMORY, 2).unwrap().triangulate(sites).unwrap();
+    let turned = mesh.triangles.iter().map(|&[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().unwrap());
+    (turned.collect(), outcome)
+}
+
+fn distinct(sites: impl IntoIterator<Item = Site>) -> Vec<Site> {
+    let mut seen = BTreeSet::new();
+    sites.into_iter().filter(|&site| seen.insert(site)).collect()
+}
+
+/// Inputs that the pipeline is known to accept.
+fn inputs() -> Vec<(&'static str, Vec<Site>)> {
+    let mut random = Random(11);
+    let mut uniform = |n, w, h| distinct((0..n).map(|_| [random.below(w) as i32, random.below(h) as i32])).to_vec();
+    vec![
+        ("uniform", uniform(20_000, 1 << 28, 1 << 28)),
+        ("coarse", uniform(8_000, 150, 150)),
+        ("wide", uniform(5_000, 1 << 24, 1 << 14)),
+        ("lattice", (0..5_000).map(|i| [i % 100 * 7, i / 100 * 3]).collect()),
+        (
+            "void",
+            uniform(9_000, 3000, 3000)
+                .into_iter()
+                .filter(|s| (s[0] - 1500).pow(2) + (s[1] - 1500).pow(2) > 1_000_000)
+                .collect(),
+        ),
+    ]
+}
+
+#[test]
+fn a_leaf_has_the_same_triangles_whoever_makes_its_diagram() {
+    if Rig::new().is_none() {
+        return;
+    }
+    for (name, sites) in inputs() {
+        let (expected, _) = solve(&settings(Backend::Reference), &sites);
+        let (on_cpu, outcome) = solve(&settings(Backend::Cpu), &sites);
+        assert!(on_cpu == expected, "{name} on the CPU");
+        assert_eq!((outcome.pipeline, outcome.counts.on_gpu), (1, 0));
+        for voronoi in [Voronoi::Exact, Voronoi::Jfa] {
+            for texture in [Texture::Auto, Texture::Side(300), Texture::Side(1500)] {
+                let (on_gpu, outcome) = solve(&Triangulation { voronoi, texture, ..settings(Backend::Gpu) }, &sites);
+                assert!(on_gpu == expected, "{name}, {voronoi:?}, {texture:?}");
+                // A texture that is too coarse for the input is a reason to go another way; any other is not.
+                if texture == Texture::Auto {
+                    assert_eq!((outcome.pipeline, outcome.counts.on_gpu), (1, 1), "{name}, {voronoi:?}");
+                }
+            }
+        }
+    }
+}
+
+/// Somebody whose diagrams are wrong.
+struct Liar(fn(u32, u32, &[u32]) -> Vec<u32>);
+
+impl Diagrams for Liar {
+    fn shape(&self) -> Shape {
+        Shape { resolution: Resolution::PixelsPerSite(5.0), most_side: 16_384, most_pixels: 1 << 28 }
+    }
+
+    fn diagram(&self, width: u32, height: u32, pixels: Vec<u32>) -> Diagram {
+        Diagram::Labels((self.0)(width, height, &pixels))
+    }
+}
+
+#[test]
+fn a_wrong_diagram_makes_no_wrong_mesh() {
+    let (_, sites) = inputs().swap_remove(0);
+    let (expected, _) = solve(&settings(Backend::Reference), &sites);
+    // Whether every label is a pixel with a site, so that only the mesh shows the lie.
+    let liars: [(&str, bool, Liar); 6] = [
+        ("too few labels", false, Liar(|_, _, pixels| pixels.to_vec())),
+        ("none at all", false, Liar(|_, _, _| Vec::new())),
+        ("no site there", false, Liar(|w, h, _| vec![u32::MAX; (w * h) as usize])),
+        ("one label", true, Liar(|w, h, pixels| vec![pixels[pixels.len() / 2]; (w * h) as usize])),
+        ("in order", true, Liar(|w, h, pixels| pixels.iter().copied().cycle().take((w * h) as usize).collect())),
+        (
+            "noise",
+            true,
+            Liar(|w, h, pixels| {
+                let mut random = Random(5);
+                (0..w * h).map(|_| pixels[random.below(pixels.len() as u32) as usize]).collect()
+            }),
+        ),
+    ];
+    for (name, plausible, liar) in liars {
+        match voronoi::triangulate_with(&sites, Some(&liar), &mut Scratch::default()) {
+            Ok((mesh, counts)) => {
+                let turn = |&[a, b, c]: &[u32; 3]| [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().unwrap();
+                assert!(mesh.triangles.iter().map(turn).collect::<BTreeSet<_>>() == expected, "{name}");
+                assert_eq!(counts.on_gpu, plausible as u64, "{name}");
+            }
+            Err(why) => assert!(plausible && matches!(why, Rejected::NotAccepted(_)), "{name}: {why}"),
+        }
+    }
+}
+
+#[test]
+fn without_the_gpu_that_is_named_there_is_an_error_or_none() {
+    let nameless = |backend| Triangulation { adapter: Some("no GPU has this name".into()), ..settings(backend) };
+    let error = Triangulator::new(&nameless(Backend::Gpu), MEMORY, 1).err().expect("there is no such GPU");
+    assert_eq!(error.exit_code(), 2);
+    assert!(error.to_string().contains("no GPU has this name"), "{error}");
+    assert!(Triangulator::new(&nameless(Backend::Auto), MEMORY, 1).unwrap().gpu().is_none());
+}
+
+#[test]
+fn a_job_has_the_same_digest_on_every_backend() {
+    if Rig::new().is_none() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = folder.path().join("cloud.las");
+    gdt_batch::sample::write(&cloud, 60_000, 3).unwrap();
+    let mut digests = BTreeSet::new();
+    for (i, lines) in [
+        "backend = \"reference\"",
+        "backend = \"cpu\"",
+        "backend = \"gpu\"",
+        "backend = \"gpu\"\nvoronoi = \"jfa\"\nsites_per_tile = 7000",
+        "backend = \"gpu\"\ntexture = 700\nsites_per_tile = 20000",
+    ]
+    .iter()
+    .enumerate()
+    {
+        let path = folder.path().join("job.toml");
+        let text = format!(
+            "[input]\nfiles = [\"cloud.las\"]\n[triangulation]\n{lines}\n[output]\ndirectory = \"out{i}\"\n[limits]\nthreads = 2\n"
+        );
+        std::fs::write(&path, text).unwrap();
+        let config = Config::load(&path).unwrap();
+        let report = job::run(&config, Progress::detect(true)).unwrap();
+        let outcome = report.leaves.outcome;
+        if config.triangulation.backend == Backend::Gpu {
+            assert!(outcome.counts.on_gpu > 0 && outcome.counts.on_gpu == outcome.pipeline, "{lines}: {outcome:?}");
+        }
+        let verdict = verify(&config.output.directory, MEMORY).unwrap();
+        assert_eq!(verdict.failures, Vec::<String>::new(), "{lines}");
+        digests.insert(verdict.digest.to_string());
+    }
+    assert_eq!(digests.len(), 1, "{digests:?}");
+}

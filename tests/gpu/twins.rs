@@ -1,0 +1,69 @@
+//! Every step against its twin: random, dense, sparse, tiny, one row, one column, full, empty.
+
+use super::random::{Random, cases};
+use super::rig::Rig;
+use gdt_batch::gpu::buffers::Name;
+use gdt_batch::gpu::steps::{Command, Recording, Size};
+use gdt_batch::gpu::twins;
+
+#[test]
+fn every_step_is_the_same_bit_for_bit() {
+    let Some(mut rig) = Rig::new() else { return };
+    for (name, size, pixels) in cases() {
+        let comparisons = rig.compare(size, &pixels);
+        let differing: Vec<_> = comparisons.iter().filter(|c| c.differing > 0).collect();
+        assert!(differing.is_empty(), "{name}: {differing:?}");
+        let steps: Vec<_> = comparisons.iter().map(|c| c.step).collect();
+        assert_eq!(steps, ["G1", "G2 jfa", "G3", "G2 exact", "G4", "G5", "G6"]);
+        assert_eq!(comparisons[0].numbers, size.pixels());
+    }
+}
+
+/// The twin of the exact transform against the definition itself, and jump flooding not far from it.
+#[test]
+fn the_twins_do_what_they_are_for() {
+    let mut random = Random(3);
+    for (width, height, count) in [(1, 1, 1), (40, 30, 7), (40, 30, 300), (3, 200, 9), (120, 2, 30), (64, 64, 1)] {
+        let size = Size { width, height };
+        let pixels = random.pixels(size, count);
+        let texture = twins::write_sites(size, &pixels);
+        let nearest = |x: u32, y: u32| {
+            let key = |p: u32| ((p & 0xffff).abs_diff(x).pow(2) + (p >> 16).abs_diff(y).pow(2), p & 0xffff, p >> 16);
+            pixels.iter().copied().min_by_key(|&p| key(p)).unwrap()
+        };
+        let expected: Vec<u32> =
+            (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| nearest(x, y)).collect();
+        assert_eq!(twins::voronoi_exact(size, &texture), expected);
+        let wrong = twins::voronoi_jfa(size, &texture).iter().zip(&expected).filter(|(a, b)| a != b).count();
+        assert!(50 * wrong <= expected.len(), "1+JFA misses {wrong} of {} pixels", expected.len());
+    }
+}
+
+/// Islands as they would be if the diagram were worse: whole patches of labels put where they do not belong.
+#[test]
+fn islands_go_the_same_way_wherever_they_are() {
+    let Some(mut rig) = Rig::new() else { return };
+    let size = Size { width: 200, height: 150 };
+    let mut random = Random(7);
+    let pixels = random.pixels(size, 900);
+    let texture = twins::write_sites(size, &pixels);
+    let clean = twins::voronoi_exact(size, &texture);
+    for patches in [1, 40, 400, 20_000] {
+        let mut labels = clean.clone();
+        for _ in 0..patches {
+            let at = random.below(labels.len() as u32) as usize;
+            let from = random.below(labels.len() as u32) as usize;
+            let length = (1 + random.below(4) as usize).min(labels.len() - at);
+            labels[at..at + length].fill(clean[from]);
+        }
+        let mut recording = Recording::default();
+        recording.commands.push(Command::Need(Name::Labels, 4 * size.pixels()));
+        recording.commands.push(Command::Upload(Name::Labels, labels.clone()));
+        recording.remove_islands(size);
+        rig.run(&recording);
+        let before = labels.clone();
+        twins::remove_islands(size, &mut labels);
+        assert_eq!(labels == before, patches == 20_000, "a texture full of islands is left alone, others are not");
+        assert!(rig.numbers(Name::Labels, size.pixels()) == labels, "{patches} patches");
+    }
+}
