@@ -48,3 +48,40 @@ fn other_colour(size: Size, labels: &[u32], x: u32, y: u32, label: u32) -> Optio
     let around = rows.flat_map(|q| columns.clone().map(move |p| (q * size.width + p) as usize));
     around.map(|at| labels[at]).filter(|&l| l != label && l != NONE).min_by_key(|&l| key(x, y, l))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::twins::{voronoi_exact, voronoi_jfa, write_sites};
+
+    /// The number of islands before every round.
+    fn rounds(size: Size, labels: &mut [u32]) -> Vec<usize> {
+        let mut counts = Vec::new();
+        for _ in 0..ROUNDS {
+            let islands = find(size, labels);
+            counts.push(islands.len());
+            for (pixel, colour) in islands {
+                labels[pixel] = colour;
+            }
+        }
+        counts
+    }
+
+    #[test]
+    fn a_few_rounds_leave_no_island() {
+        let size = Size { width: 1024, height: 1024 };
+        let mut bits = 1u64;
+        let mut random = || {
+            bits = bits.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1);
+            (bits >> 40) as u32 % 256
+        };
+        // Sites in one corner: far away their regions are thin wedges, some of which fall apart into pixels.
+        let pixels: Vec<u32> = (0..1000).map(|_| random() << 16 | random()).collect();
+        let texture = write_sites(size, &pixels);
+        for mut labels in [voronoi_exact(size, &texture), voronoi_jfa(size, &texture)] {
+            let counts = rounds(size, &mut labels);
+            assert!(counts[0] > 0, "this input has no islands and shows nothing");
+            assert_eq!(counts[ROUNDS - 1], 0, "{counts:?}");
+        }
+    }
+}
