@@ -28,7 +28,8 @@ impl Directory {
         if self.output.exists() && !self.output.is_dir() {
             return Err(Error::Config(format!("[output] directory: {} is a file", self.output.display())));
         }
-        let is_new = !self.job.exists();
+        // A kill can leave an empty one.
+        let is_new = fs::read_dir(&self.job).map_or(true, |mut entries| entries.next().is_none());
         fs::create_dir_all(&self.job).map_err(Error::io("create the directory", &self.job))?;
         let lock = Lock::take(&self.job, is_new)?;
         for directory in STEPS.map(|name| self.job.join(name)) {
@@ -61,6 +62,11 @@ impl Directory {
     /// # Errors
     /// [`Error::Io`] if that fails.
     pub fn clean_up(&self) -> Result<()> {
+        for directory in STEPS {
+            remove_directory(&self.job.join(directory))?;
+        }
+        remove_file(&self.spill())?;
+        // With the lock, which marks the directory as a job's own, last: a kill in between leaves what the next job may take.
         remove_directory(&self.job)
     }
 
@@ -222,6 +228,10 @@ mod tests {
         fs::write(&old, "x").unwrap();
         drop(directory.create().unwrap());
         assert!(theirs.exists() && !old.exists());
+        // As a kill may leave it: without the lock nothing else, and then it may be taken again.
+        directory.clean_up().unwrap();
+        fs::create_dir(output.path().join("job")).unwrap();
+        drop(directory.create().unwrap());
         fs::remove_file(output.path().join("job/lock")).unwrap();
         let error = directory.create().unwrap_err();
         assert_eq!(error.exit_code(), 2, "{error}");
