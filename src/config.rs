@@ -2,6 +2,7 @@
 //! that show the line.
 
 use crate::input::TextOptions;
+use crate::output::Compression;
 use crate::{Error, Result};
 use rust_decimal::Decimal;
 use serde::{Deserialize, Serialize};
@@ -80,6 +81,9 @@ pub struct Output {
     /// Whether vertices carry normals.
     #[serde(default = "yes")]
     pub normals: bool,
+    /// How tiles are packed.
+    #[serde(default)]
+    pub compression: Compression,
 }
 
 /// `[limits]`: what the job may use of the machine.

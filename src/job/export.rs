@@ -6,12 +6,12 @@ use super::directory::{Directory, remove_file, write_whole};
 use super::records::{Leaf, Rim, RimVertices, SeamTriangle};
 use super::stitch::seam_of;
 use super::tree::Tree;
-use crate::output::Tile;
 use crate::output::color::Coloring;
 use crate::output::frame::Frame;
 use crate::output::glb::encode_tile;
 use crate::output::normals::Sums;
 use crate::output::preview::Canvas;
+use crate::output::{Compression, Tile};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -27,6 +27,8 @@ pub struct Look {
     pub coloring: Option<Coloring>,
     /// Whether vertices carry normals.
     pub normals: bool,
+    /// How tiles are packed.
+    pub compression: Compression,
 }
 
 /// What one tile, or all of them, came to.
@@ -67,7 +69,7 @@ pub fn run(directory: &Directory, tree: &Tree, tile: usize, look: &Look, canvas:
     ColumnWriter::default().push(&canvas.draw(&content)).write(&directory.preview_fragment(tile))?;
     if !content.triangles.is_empty() {
         let mut bytes = Vec::new();
-        encode_tile(&look.frame, &content, &mut bytes)?;
+        encode_tile(&look.frame, &content, look.compression, &mut bytes)?;
         write_whole(&directory.tile(tile), |file| file.write_all(&bytes))?;
         (figures.files, figures.bytes) = (1, bytes.len() as u64);
     }

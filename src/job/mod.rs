@@ -24,6 +24,7 @@ pub mod stitch;
 pub mod tree;
 
 use crate::config::{ColorChoice, Config};
+use crate::output::Compression;
 use crate::output::color::Coloring;
 use crate::output::georeference::Georeference;
 use crate::output::picture::Picture;
@@ -292,7 +293,12 @@ fn look(config: &Config, plan: &Plan, summary: &Summary, bounds: [[i32; 3]; 2]) 
         ColorChoice::Auto | ColorChoice::Rgb if summary.tally.max_rgb == 0 => Some(elevation),
         ColorChoice::Auto | ColorChoice::Rgb => Some(Coloring::Rgb { eight_bit: summary.tally.max_rgb <= 255 }),
     };
-    Look { frame: plan.frame.clone().refined(bounds), coloring, normals: config.output.normals }
+    let compression = config.output.compression;
+    let frame = match compression {
+        Compression::None => plan.frame.clone().refined(bounds),
+        _ => plan.frame.clone().packed(),
+    };
+    Look { frame, coloring, normals: config.output.normals, compression }
 }
 
 fn stitch_all(directory: &Directory, tree: &Tree, look: &Look, stage: &Stage) -> Result<()> {

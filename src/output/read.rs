@@ -8,8 +8,9 @@ use std::path::Path;
 use bytemuck::{AnyBitPattern, NoUninit, allocation::pod_collect_to_vec};
 use serde::Deserialize;
 
+use super::document::{FLOAT, UNSIGNED_INT, UNSIGNED_SHORT};
 use super::frame::Extras;
-use super::glb::{BIN_CHUNK, FLOAT, JSON_CHUNK, MAGIC, UNSIGNED_INT, UNSIGNED_SHORT, VERSION};
+use super::glb::{BIN_CHUNK, JSON_CHUNK, MAGIC, VERSION};
 use crate::{Error, Result};
 
 /// A GLB file of this program, as it is on disk.

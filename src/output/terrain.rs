@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::glb::{GENERATOR, write_container};
+use super::document::GENERATOR;
+use super::glb::write_container;
 use super::read::Container;
 use crate::{Error, Result};
 

@@ -5,10 +5,10 @@ use std::path::Path;
 
 use gdt_batch::geometry::lattice::{Lattice, shortest_decimal};
 use gdt_batch::geometry::predicates::{in_circle, orient2d};
-use gdt_batch::output::Tile;
 use gdt_batch::output::frame::Frame;
 use gdt_batch::output::glb::encode_tile;
 use gdt_batch::output::normals::Sums;
+use gdt_batch::output::{Compression, Tile};
 use spade::{DelaunayTriangulation, Point2, Triangulation};
 
 use crate::random::Random;
@@ -133,7 +133,7 @@ pub(crate) fn write_tiles(directory: &Path, frame: &Frame, tiles: &[Tile]) {
     std::fs::create_dir_all(&folder).unwrap();
     let mut bytes = Vec::new();
     for (number, tile) in tiles.iter().enumerate() {
-        encode_tile(frame, tile, &mut bytes).unwrap();
+        encode_tile(frame, tile, Compression::None, &mut bytes).unwrap();
         std::fs::write(folder.join(format!("{number:05}.glb")), &bytes).unwrap();
     }
 }

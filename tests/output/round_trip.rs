@@ -3,10 +3,10 @@
 use std::collections::HashMap;
 
 use gdt_batch::Error;
-use gdt_batch::output::Tile;
 use gdt_batch::output::frame::Frame;
 use gdt_batch::output::glb::encode_tile;
 use gdt_batch::output::read::{TileFile, read_tile};
+use gdt_batch::output::{Compression, Tile};
 use gdt_batch::verify::Source;
 use proptest::prelude::*;
 
@@ -15,7 +15,7 @@ use crate::random::Random;
 
 fn written(frame: &Frame, tile: &Tile) -> Vec<u8> {
     let mut bytes = Vec::new();
-    encode_tile(frame, tile, &mut bytes).unwrap();
+    encode_tile(frame, tile, Compression::None, &mut bytes).unwrap();
     bytes
 }
 
@@ -108,7 +108,8 @@ fn a_triangle_too_long_for_gltf_is_refused_with_the_remedy() {
     };
     let longest = (frame.longest_triangle()[0] * 1e6) as i32;
     assert_eq!(integers(&there_and_back(&frame, &triangle(longest - 1))), triangle(longest - 1).positions);
-    let error = encode_tile(&frame, &triangle(longest + longest / 100), &mut Vec::new()).unwrap_err();
+    let error =
+        encode_tile(&frame, &triangle(longest + longest / 100), Compression::None, &mut Vec::new()).unwrap_err();
     assert!(matches!(error, Error::Config(_)));
     assert!(error.to_string().contains("resolution = 0.00001"), "{error}");
 }
