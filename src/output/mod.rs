@@ -3,6 +3,7 @@
 //! [`frame::Frame`] says where a lattice point lies in a glTF scene; everything that writes or reads positions asks it.
 
 pub mod color;
+mod container;
 mod document;
 pub mod encoding;
 pub mod frame;
@@ -10,6 +11,7 @@ pub mod georeference;
 pub mod glb;
 pub mod normals;
 mod order;
+mod packed;
 mod parts;
 pub mod picture;
 pub mod preview;

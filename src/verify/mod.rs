@@ -57,14 +57,14 @@ pub use source::Source;
 pub use verdict::Verdict;
 
 use crate::output::frame::Extras;
-use crate::output::read::{TileFile, read_extras, read_tile};
+use crate::output::read::{TileFile, held_bytes, read_extras, read_tile};
 use crate::{Error, Result};
 use part::Findings;
 use rim::Rim;
 use verdict::Fault;
 
-/// Bytes of memory that checking a tile takes for every byte of its file, at most.
-const MEMORY_FACTOR: u64 = 7;
+/// Bytes of memory that checking a tile takes for every byte that its parts have in memory, at most.
+const MEMORY_FACTOR: u64 = 5;
 
 /// Checks the tiles under `directory/tiles` within about `memory` bytes. The verdict lists what does not hold.
 ///
@@ -107,18 +107,18 @@ struct Tiles {
     paths: Vec<PathBuf>,
     /// Those of the first that can be read; all others have to agree.
     extras: Extras,
+    /// Bytes that the parts of the largest have in memory.
     largest: u64,
 }
 
 impl Tiles {
     fn find(directory: &Path) -> Result<Tiles> {
         let folder = directory.join("tiles");
-        let (mut paths, mut largest) = (Vec::new(), 0);
+        let mut paths = Vec::new();
         for entry in std::fs::read_dir(&folder).map_err(Error::io("read", &folder))? {
-            let entry = entry.map_err(Error::io("read", &folder))?;
-            if entry.path().extension().is_some_and(|e| e == "glb") {
-                largest = largest.max(entry.metadata().map_err(Error::io("read", entry.path()))?.len());
-                paths.push(entry.path());
+            let path = entry.map_err(Error::io("read", &folder))?.path();
+            if path.extension().is_some_and(|e| e == "glb") {
+                paths.push(path);
             }
         }
         paths.sort();
@@ -127,6 +127,8 @@ impl Tiles {
         };
         let readable = paths.iter().find_map(|path| read_extras(path).ok());
         let extras = readable.map_or_else(|| read_extras(first), Ok)?;
+        // One that cannot be read is found again when it is its turn.
+        let largest = paths.par_iter().map(|path| held_bytes(path).unwrap_or(0)).max().unwrap_or(0);
         Ok(Tiles { paths, extras, largest })
     }
 

@@ -89,10 +89,13 @@ pub(super) fn check(part: &Part, tile: u32, source: &Source, findings: &mut Find
 /// The lattice integers of the vertices; `None` where some are not on the lattice.
 fn lattice_points(part: &Part, tile: u32, source: &Source, findings: &mut Findings) -> Option<Vec<[i32; 3]>> {
     let mut points = Vec::with_capacity(part.positions.len());
+    let plain = part.scale == [1.0; 3];
     for v in 0..part.positions.len() {
-        match source.integers(part.world(v)) {
+        let world = part.world(v);
+        let point = if plain { source.integers(world) } else { source.integers_on(world, part.scale) };
+        match point {
             Some(point) => points.push(point),
-            None => findings.faults.note(Fault::OffLattice, tile, || format!("{:?} m", part.world(v))),
+            None => findings.faults.note(Fault::OffLattice, tile, || format!("{world:?} m")),
         }
     }
     (points.len() == part.positions.len()).then_some(points)
