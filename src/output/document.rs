@@ -6,7 +6,7 @@ use bytemuck::{Pod, cast_slice};
 use serde_json::{Value, json};
 
 use super::color::Linear;
-use super::encoding::{Compression, color_bytes, normal_bytes};
+use super::encoding::{Compression, color_bytes, normal_bytes, normal_octahedral};
 use super::frame::Frame;
 use super::order::rings;
 use super::parts::Part;
@@ -117,8 +117,17 @@ impl<'a> Document<'a> {
             return self.add_attribute(&picked(normals, order, up), FLOAT, "VEC3", json!({}));
         }
         let anisotropy = self.frame.anisotropy();
-        let values = picked(normals, order, |normal| normal_bytes(up(normal), anisotropy));
-        self.add_attribute(&values, SIGNED_BYTE, "VEC3", json!({"normalized": true}))
+        let normalized = json!({"normalized": true});
+        if self.compression == Compression::Quantized {
+            let values = picked(normals, order, |normal| normal_bytes(up(normal), anisotropy));
+            return self.add_attribute(&values, SIGNED_BYTE, "VEC3", normalized);
+        }
+        let values = picked(normals, order, |normal| normal_octahedral(up(normal), anisotropy));
+        let accessor = self.add_attribute(&values, SIGNED_BYTE, "VEC3", normalized)?;
+        if let Some(view) = self.views.last_mut() {
+            view["extensions"][MESHOPT]["filter"] = "OCTAHEDRAL".into();
+        }
+        Ok(accessor)
     }
 
     fn add_colors(&mut self, colors: &[Linear], order: &[u32]) -> Result<usize> {
@@ -220,16 +229,19 @@ impl<'a> Document<'a> {
         json["materials"] = json!([material(self.colored)]);
         json["accessors"] = self.accessors.clone().into();
         json["bufferViews"] = self.views.clone().into();
-        json["buffers"] = json!([{"byteLength": self.binary.len()}]);
+        let mut buffers = vec![json!({"byteLength": self.binary.len()})];
         let extensions: &[&str] = match self.compression {
-            Compression::None => return json,
+            Compression::None => &[],
             Compression::Quantized => &[QUANTIZATION],
             Compression::Meshopt => &[QUANTIZATION, MESHOPT],
         };
-        json["extensionsUsed"] = extensions.into();
-        json["extensionsRequired"] = extensions.into();
         if self.compression == Compression::Meshopt {
-            json["buffers"][1] = json!({"byteLength": self.unpacked, "extensions": {MESHOPT: {"fallback": true}}});
+            buffers.push(json!({"byteLength": self.unpacked, "extensions": {MESHOPT: {"fallback": true}}}));
+        }
+        json["buffers"] = buffers.into();
+        if !extensions.is_empty() {
+            json["extensionsUsed"] = extensions.into();
+            json["extensionsRequired"] = extensions.into();
         }
         json
     }

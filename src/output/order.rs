@@ -5,28 +5,31 @@
 //! before, and its third corner is a new vertex or the next one of the ring before. The index codec has a code without
 //! further bytes for both. It is made of whole numbers only, so the bytes do not depend on the machine.
 
+/// Round a vertex with more triangles than this they are sorted rather than searched.
+const SEARCHED: usize = 48;
+
 /// Not numbered yet.
 const NEW: u32 = u32::MAX;
 
 /// The triangles in their new order, corners by new numbers, and for every new number the old one. Vertices without a
 /// triangle come last.
 pub(super) fn rings(vertices: usize, triangles: &[[u32; 3]]) -> (Vec<[u32; 3]>, Vec<u32>) {
+    let star = Star::new(vertices, triangles);
     let mut walk = Walk {
-        triangles,
-        corners: Corners::new(vertices, triangles),
-        done: vec![false; triangles.len()],
         numbers: vec![NEW; vertices],
         order: Vec::with_capacity(vertices),
         ordered: Vec::with_capacity(triangles.len()),
     };
+    let mut left = Vec::new();
     let mut turn = 0;
-    for seed in 0..triangles.len() {
-        if !walk.done[seed] {
-            walk.emit(seed, 0);
-            while turn < walk.order.len() {
-                walk.around(walk.order[turn]);
-                turn += 1;
-            }
+    for seed in (0..vertices as u32).filter(|&v| !star.of(v).is_empty()) {
+        walk.number(seed);
+        while let Some(&v) = walk.order.get(turn) {
+            // Triangles with a vertex whose turn has been are there.
+            let is_left = |spoke: &&Spoke| spoke.iter().all(|&w| walk.numbers[w as usize] > turn as u32);
+            left.extend(star.of(v).iter().filter(is_left));
+            walk.fans(v, &mut left);
+            turn += 1;
         }
     }
     let unused = (0..vertices as u32).filter(|&v| walk.numbers[v as usize] == NEW);
@@ -34,15 +37,18 @@ pub(super) fn rings(vertices: usize, triangles: &[[u32; 3]]) -> (Vec<[u32; 3]>, 
     (walk.ordered, walk.order)
 }
 
-/// The corners of triangles, three times the triangle and the place in it, by their vertex.
-struct Corners {
-    /// Those of vertex v are `all[start[v]..start[v + 1]]`.
+/// The other two corners of a triangle at a vertex, counterclockwise.
+type Spoke = [u32; 2];
+
+/// Triangles by their vertices.
+struct Star {
+    /// Those of vertex v are `spokes[start[v]..start[v + 1]]`.
     start: Vec<u32>,
-    all: Vec<u32>,
+    spokes: Vec<Spoke>,
 }
 
-impl Corners {
-    fn new(vertices: usize, triangles: &[[u32; 3]]) -> Corners {
+impl Star {
+    fn new(vertices: usize, triangles: &[[u32; 3]]) -> Star {
         // One place further than needed: filling moves every start to the next one's place.
         let mut start = vec![0u32; vertices + 2];
         for &v in triangles.as_flattened() {
@@ -51,25 +57,23 @@ impl Corners {
         for v in 2..start.len() {
             start[v] += start[v - 1];
         }
-        let mut all = vec![0; 3 * triangles.len()];
-        for (corner, &v) in triangles.as_flattened().iter().enumerate() {
-            let place = &mut start[v as usize + 1];
-            all[*place as usize] = corner as u32;
-            *place += 1;
+        let mut spokes = vec![[0; 2]; 3 * triangles.len()];
+        for &[a, b, c] in triangles {
+            for (v, spoke) in [(a, [b, c]), (b, [c, a]), (c, [a, b])] {
+                let place = &mut start[v as usize + 1];
+                spokes[*place as usize] = spoke;
+                *place += 1;
+            }
         }
-        Corners { start, all }
+        Star { start, spokes }
     }
 
-    fn of(&self, v: u32) -> &[u32] {
-        &self.all[self.start[v as usize] as usize..self.start[v as usize + 1] as usize]
+    fn of(&self, v: u32) -> &[Spoke] {
+        &self.spokes[self.start[v as usize] as usize..self.start[v as usize + 1] as usize]
     }
 }
 
-struct Walk<'a> {
-    triangles: &'a [[u32; 3]],
-    corners: Corners,
-    /// Triangles that are in `ordered`.
-    done: Vec<bool>,
+struct Walk {
     /// New numbers by old.
     numbers: Vec<u32>,
     /// Old numbers by new.
@@ -77,42 +81,43 @@ struct Walk<'a> {
     ordered: Vec<[u32; 3]>,
 }
 
-impl Walk<'_> {
-    /// Emits what is left around vertex `v`, one fan after the other.
-    fn around(&mut self, v: u32) {
-        while let Some((mut triangle, mut corner)) = self.fan_start(v) {
-            loop {
-                let last = self.emit(triangle, corner);
-                match self.left_at(v).find(|&(t, c)| self.triangles[t][(c + 1) % 3] == last) {
-                    Some(next) => (triangle, corner) = next,
-                    None => break,
-                }
+impl Walk {
+    /// Emits the triangles that are `left` around vertex `v`, one fan after the other, each from one that follows on no
+    /// other; empties `left`.
+    fn fans(&mut self, v: u32, left: &mut Vec<Spoke>) {
+        if left.len() > SEARCHED {
+            return self.many_fans(v, left);
+        }
+        while !left.is_empty() {
+            let is_start = |spoke: &Spoke| left.iter().all(|other| other[1] != spoke[0]);
+            let mut at = left.iter().position(is_start).or(Some(0));
+            while let Some(i) = at {
+                let [from, to] = left.swap_remove(i);
+                let triangle = [v, from, to].map(|w| self.number(w));
+                self.ordered.push(triangle);
+                at = left.iter().position(|spoke| spoke[0] == to);
             }
         }
     }
 
-    /// The triangles at `v` that are not emitted, and which corner `v` is.
-    fn left_at(&self, v: u32) -> impl Iterator<Item = (usize, usize)> {
-        let split = |&corner: &u32| (corner as usize / 3, corner as usize % 3);
-        self.corners.of(v).iter().map(split).filter(|&(t, _)| !self.done[t])
-    }
-
-    /// One that follows on no other around `v`, if there is one.
-    fn fan_start(&self, v: u32) -> Option<(usize, usize)> {
-        let first = |&(t, c): &(usize, usize)| {
-            let from = self.triangles[t][(c + 1) % 3];
-            self.left_at(v).all(|(s, d)| self.triangles[s][(d + 2) % 3] != from)
-        };
-        self.left_at(v).find(first).or_else(|| self.left_at(v).next())
-    }
-
-    /// Emits triangle `t` from its corner number `corner` on; its third corner's old number.
-    fn emit(&mut self, t: usize, corner: usize) -> u32 {
-        self.done[t] = true;
-        let corners = [0, 1, 2].map(|k| self.triangles[t][(corner + k) % 3]);
-        let renumbered = corners.map(|v| self.number(v));
-        self.ordered.push(renumbered);
-        corners[2]
+    /// The same in little time round a hub of thousands.
+    fn many_fans(&mut self, v: u32, left: &mut Vec<Spoke>) {
+        left.sort_unstable();
+        let mut ends: Vec<u32> = left.iter().map(|spoke| spoke[1]).collect();
+        ends.sort_unstable();
+        let mut done = vec![false; left.len()];
+        // The fans that have a start, then what goes all the way round.
+        let starts = (0..left.len()).filter(|&i| ends.binary_search(&left[i][0]).is_err());
+        for start in starts.chain(0..left.len()) {
+            let mut at = Some(start);
+            while let Some(i) = at.filter(|&i| !done[i]) {
+                done[i] = true;
+                let triangle = [v, left[i][0], left[i][1]].map(|w| self.number(w));
+                self.ordered.push(triangle);
+                at = left.binary_search_by_key(&left[i][1], |spoke| spoke[0]).ok();
+            }
+        }
+        left.clear();
     }
 
     fn number(&mut self, v: u32) -> u32 {
@@ -159,6 +164,22 @@ mod tests {
         assert_eq!(order.last(), Some(&400));
         let back = ordered.iter().map(|t| t.map(|v| order[v as usize])).collect();
         assert_eq!(canonical(back), canonical(triangles));
+    }
+
+    #[test]
+    fn hubs_and_doubles_lose_nothing() {
+        // Round vertex 0: a closed fan, an open one, one with a gap, and in the last the same triangle twice.
+        for (count, gap) in [(300u32, 0), (300, 1), (30, 1), (300, 9)] {
+            let mut triangles: Vec<[u32; 3]> = (1..=count).map(|v| [0, v, v % count + 1]).collect();
+            triangles.truncate((count - gap) as usize);
+            if gap == 9 {
+                triangles.swap_remove(100);
+                triangles.push(triangles[7]);
+            }
+            let (ordered, order) = rings(count as usize + 1, &triangles);
+            let back = ordered.iter().map(|t| t.map(|v| order[v as usize])).collect();
+            assert_eq!(canonical(back), canonical(triangles));
+        }
     }
 
     #[test]

@@ -33,10 +33,7 @@ impl Source {
         let steps = [extras.resolution, extras.resolution, extras.resolution_z];
         let axis = |k: usize| Axis::new(extras.offset[k], steps[k]);
         let axes = [axis(0), axis(1), axis(2)];
-        let resolution = [
-            extras.resolution * extras.metres_per_unit,
-            extras.resolution_z * extras.metres_per_unit_z,
-        ];
+        let resolution = [extras.resolution * extras.metres_per_unit, extras.resolution_z * extras.metres_per_unit_z];
         let per_metre = resolution.map(|metres| 1.0 / metres);
         let [Some(x), Some(y), Some(z)] = axes else {
             return Err("its offset and resolution are no decimals that a lattice can have".into());
