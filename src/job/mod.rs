@@ -189,6 +189,7 @@ impl Job<'_> {
                 points: partition.summary.tally,
                 leaves,
                 gpu: triangulator.gpu().map(str::to_owned),
+                gpu_steps: triangulator.gpu_steps(),
                 tiles: written,
                 other_bytes,
                 temporary: partition.spilled + store.bytes(),
