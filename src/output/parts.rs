@@ -48,7 +48,7 @@ fn split_triangles(frame: &Frame, tile: &Tile, triangles: &[[u32; 3]]) -> Result
     let part = |(origin, triangles): ([i64; 3], _)| Part {
         origin: origin.map(|v| v as f64),
         short: false,
-        tile: Cow::Owned(subset(tile, triangles)),
+        tile: Cow::Owned(tile.subset(triangles)),
     };
     Ok(groups.into_iter().map(part).collect())
 }
@@ -82,7 +82,7 @@ fn halve(frame: &Frame, tile: &Tile, triangles: Vec<[u32; 3]>, parts: &mut Vec<P
     }
     let [low, high] = extent_of(frame, tile, triangles.as_flattened());
     if let Some(origin) = short_origin(low, high) {
-        return parts.push(Part { origin, short: true, tile: Cow::Owned(subset(tile, triangles)) });
+        return parts.push(Part { origin, short: true, tile: Cow::Owned(tile.subset(triangles)) });
     }
     let size = |&k: &usize| high[k] - low[k];
     let axis = (0..3).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0);
@@ -120,26 +120,6 @@ fn wider([low, high]: [[f64; 3]; 2], point: [f64; 3]) -> [[f64; 3]; 2] {
 fn extent(frame: &Frame, points: &[[i32; 3]]) -> [[f64; 3]; 2] {
     let none = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
     points.iter().map(|&p| frame.steps(p)).fold(none, wider)
-}
-
-/// The tile of only these triangles of `tile`, its vertices in their old order.
-fn subset(tile: &Tile, mut triangles: Vec<[u32; 3]>) -> Tile {
-    let mut vertices: Vec<u32> = triangles.iter().flatten().copied().collect();
-    vertices.sort_unstable();
-    vertices.dedup();
-    for corner in triangles.iter_mut().flatten() {
-        *corner = vertices.partition_point(|v| v < corner) as u32;
-    }
-    Tile {
-        positions: pick(&tile.positions, &vertices),
-        normals: tile.normals.as_ref().map(|all| pick(all, &vertices)),
-        colors: tile.colors.as_ref().map(|all| pick(all, &vertices)),
-        triangles,
-    }
-}
-
-fn pick<T: Copy>(all: &[T], which: &[u32]) -> Vec<T> {
-    which.iter().map(|&v| all[v as usize]).collect()
 }
 
 fn too_long(frame: &Frame, corners: [[i32; 3]; 3]) -> Error {
