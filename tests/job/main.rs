@@ -12,6 +12,7 @@ mod program;
 
 mod choices;
 mod configuration;
+mod cutting;
 mod khronos;
 mod limits;
 mod messages;
