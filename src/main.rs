@@ -4,7 +4,7 @@ use clap::Parser;
 use gdt_batch::cli::{Cli, Command, Talk};
 use gdt_batch::config::Config;
 use gdt_batch::gpu::selftest;
-use gdt_batch::job::{self, check, progress::Progress};
+use gdt_batch::job::{self, check, progress::Progress, report::skipped_summary};
 use gdt_batch::{Error, Result, input, sample, verify};
 use serde::Serialize;
 use std::fmt::Display;
@@ -31,10 +31,20 @@ fn run(cli: Cli) -> Result<ExitCode> {
         (Some(Command::Info { files }), _) => info(&files, talk)?,
         (Some(Command::Gpu { adapter, side }), _) => return test_gpu(adapter.as_deref(), side, talk),
         (Some(Command::Sample { file, points, seed }), _) => sample::write(&file, points, seed)?,
-        (None, Some(config)) => show(&job::run(&Config::load(&config)?, Progress::detect(talk.quiet))?, talk)?,
+        (None, Some(config)) => run_job(&Config::load(&config)?, talk)?,
         (None, None) => return Err(Error::Config("name a configuration file; --help shows how".into())),
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Runs a job and says what it came to: on standard error too, and even when quiet, if files were left out.
+fn run_job(config: &Config, talk: Talk) -> Result<()> {
+    let report = job::run(config, Progress::detect(talk.quiet))?;
+    show(&report, talk)?;
+    if let Some(summary) = skipped_summary(report.files, &report.skipped) {
+        eprintln!("{summary}: see {}", config.output.directory.join("report.json").display());
+    }
+    Ok(())
 }
 
 /// Prints a result for people or for machines.

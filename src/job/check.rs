@@ -1,7 +1,8 @@
 //! Preflight: what a job would read and need, without writing anything.
 
 use super::choose::Coarser;
-use super::report::grouped;
+use super::partition::Skipped;
+use super::report::{grouped, write_skipped};
 use super::scan::{self, Plan};
 use super::{BYTES_PER_LEAF_SITE, MOST_TRIANGLES_IN_ONE_FILE, partition, workers};
 use crate::Result;
@@ -57,6 +58,8 @@ pub struct Preflight {
     pub backend: String,
     /// What the user should know.
     pub warnings: Vec<String>,
+    /// The inputs that would be left out because they are bad; more may prove bad when they are read.
+    pub skipped: Vec<Skipped>,
 }
 
 /// Looks at the inputs of `config`.
@@ -93,6 +96,7 @@ fn preflight(plan: &Plan, config: &Config, threads: usize) -> Preflight {
         disk_free: disk_free(&config.output.directory),
         backend: format!("{:?}", config.triangulation.backend).to_lowercase(),
         warnings: plan.warnings.clone(),
+        skipped: plan.skipped.clone(),
     }
 }
 
@@ -143,6 +147,6 @@ impl fmt::Display for Preflight {
         for warning in &self.warnings {
             writeln!(f, "warning: {warning}")?;
         }
-        Ok(())
+        write_skipped(f, self.files.len(), &self.skipped)
     }
 }

@@ -96,11 +96,12 @@ fn attempt(
     let plan = on_threads(workers(config, 0)?, || scan::run(config, coarser))?;
     stage.advance(1);
     let scanned = stage.finish();
+    report::note_skipped(&plan.skipped, progress);
     let threads = workers(config, plan.records)?;
     let directory = Directory::new(&config.output.directory);
     let _lock = directory.create()?;
-    let job = Job { config, triangulator, plan: &plan, directory: &directory, progress, threads, start };
-    let outcome = on_threads(threads, || job.run(scanned));
+    let job = Job { config, triangulator, coarser, directory: &directory, progress, threads, start };
+    let outcome = on_threads(threads, || job.run(plan, scanned));
     if outcome.is_err() {
         // The first error is the one to report.
         let _ = directory.clean_up();
@@ -136,7 +137,7 @@ fn workers(config: &Config, points: u64) -> Result<usize> {
 struct Job<'a> {
     config: &'a Config,
     triangulator: &'a Triangulator,
-    plan: &'a Plan,
+    coarser: Coarser,
     directory: &'a Directory,
     progress: Progress,
     threads: usize,
@@ -145,15 +146,14 @@ struct Job<'a> {
 
 impl Job<'_> {
     /// Step 2 and all after it.
-    fn run(&self, scanned: StageFigures) -> Result<Report> {
-        let Job { config, triangulator, plan, directory, progress, .. } = *self;
+    fn run(&self, plan: Plan, scanned: StageFigures) -> Result<Report> {
+        let Job { config, triangulator, directory, progress, .. } = *self;
 
-        let stage = progress.stage("read", plan.records, "points");
-        let partition = partition::run(&task(plan, config), directory, &stage)?;
+        let (plan, partition, read) = self.read(plan)?;
+        let plan = &plan;
         let bounds = enough_points(&partition.summary)?;
         let longest = Longest::of(&plan.frame);
         longest.check_heights(bounds[0][2], bounds[1][2])?;
-        let read = stage.finish();
 
         let stage = progress.stage("triangulate", partition.summary.tally.kept, "points");
         let leaves = triangulate(config, triangulator, directory, &partition, longest, &stage)?;
@@ -197,6 +197,26 @@ impl Job<'_> {
         directory::write_json(&directory.report(), &report)?;
         Ok(report)
     }
+
+    /// Step 2. An input that proves bad only now is left out as if it had never been named: if without it the job would have
+    /// another lattice, all is read again.
+    fn read(&self, mut plan: Plan) -> Result<(Plan, Partition, StageFigures)> {
+        let Job { config, directory, progress, coarser, .. } = *self;
+        loop {
+            let stage = progress.stage("read", plan.records, "points");
+            let mut partition = partition::run(&task(&plan, config), directory, &stage)?;
+            let figures = stage.finish();
+            let lattice = plan.lattice.clone();
+            if !partition.skipped.is_empty() {
+                report::note_skipped(&partition.skipped, progress);
+                plan = scan::without(plan, &partition.skipped, config, coarser)?;
+            }
+            if plan.lattice == lattice {
+                partition.skipped.clone_from(&plan.skipped);
+                return Ok((plan, partition, figures));
+            }
+        }
+    }
 }
 
 fn task<'a>(plan: &'a Plan, config: &Config) -> Task<'a> {
@@ -206,6 +226,7 @@ fn task<'a>(plan: &'a Plan, config: &Config) -> Task<'a> {
         points_per_tile: config.triangulation.sites_per_tile.0,
         memory: config.limits.memory.0 / 6,
         malformed_share: config.input.malformed_share.0,
+        on_bad_file: config.input.on_bad_file,
     }
 }
 

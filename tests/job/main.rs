@@ -2,6 +2,8 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../common/las_file.rs"]
+mod las_file;
 #[path = "../common/random.rs"]
 mod random;
 #[path = "../common/validator.rs"]
@@ -10,6 +12,7 @@ mod validator;
 mod clouds;
 mod program;
 
+mod bad_files;
 mod choices;
 mod configuration;
 mod khronos;
