@@ -9,8 +9,10 @@ pub mod closing;
 pub mod columns;
 pub mod directory;
 pub mod export;
+mod forecast;
 pub mod grid;
 pub mod leaf;
+mod machine;
 pub mod merge;
 pub mod partition;
 pub mod progress;
@@ -37,7 +39,7 @@ use directory::Directory;
 use export::{Look, TileFigures};
 use leaf::LeafFigures;
 use partition::{Partition, Summary, Task};
-use progress::{Progress, Stage, StageFigures};
+use progress::{Progress, Schedule, Stage, StageFigures};
 use rayon::prelude::*;
 use report::{Parts, Report};
 use scan::Plan;
@@ -58,26 +60,41 @@ const MOST_TRIANGLES_IN_ONE_FILE: u64 = 20_000_000;
 /// Nor one of more tiles: each is a node with a mesh of its own, and their description would fill the memory.
 const MOST_TILES_IN_ONE_FILE: u64 = 4096;
 
+/// How a job is run, beside its configuration.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// Where progress goes.
+    pub progress: Progress,
+    /// Whether to go on where the disk or the memory does not seem to suffice.
+    pub force: bool,
+}
+
+impl From<Progress> for Options {
+    fn from(progress: Progress) -> Options {
+        Options { progress, force: false }
+    }
+}
+
 /// Runs the whole job of `config`.
 ///
 /// # Errors
 /// Whatever stops a step; see [`Error`]. A job that fails leaves no temporary files.
-pub fn run(config: &Config, progress: Progress) -> Result<Report> {
-    let start = Instant::now();
+pub fn run(config: &Config, options: impl Into<Options>) -> Result<Report> {
+    let (options, start) = (options.into(), Instant::now());
     // First of all, so that a job that must have a GPU fails at once where there is none.
     let triangulator = Triangulator::new(&config.triangulation, config.limits.memory.0, config.threads())?;
     let mut coarser = Coarser::default();
     loop {
-        match attempt(config, &triangulator, coarser, progress, start) {
+        match attempt(config, &triangulator, coarser, options, start) {
             // Only the finished mesh knows its longest triangle, so that a second try is the price of not rounding in vain.
             Err(Error::TooFine { vertical: true, what }) if coarser.vertical < MOST_TENS => {
-                progress.note(&format!("{what}; starting again with a coarser step in z"));
+                options.progress.note(&format!("{what}; starting again with a coarser step in z"));
                 coarser.vertical += 1;
             }
             Err(Error::TooFine { vertical: false, what })
                 if config.input.resolution.0.is_none() && coarser.horizontal < MOST_TENS =>
             {
-                progress.note(&format!("{what}; starting again with a coarser step in x and y"));
+                options.progress.note(&format!("{what}; starting again with a coarser step in x and y"));
                 coarser.horizontal += 1;
             }
             outcome => return outcome,
@@ -89,15 +106,20 @@ fn attempt(
     config: &Config,
     triangulator: &Triangulator,
     coarser: Coarser,
-    progress: Progress,
+    options: Options,
     start: Instant,
 ) -> Result<Report> {
+    let progress = options.progress;
     let stage = progress.stage("scan", 1, "job");
     let plan = on_threads(workers(config, 0)?, || scan::run(config, coarser))?;
     stage.advance(1);
     let scanned = stage.finish();
+    let progress = &Schedule::new(progress, forecast::costs(&plan));
     report::note_skipped(&plan.skipped, progress);
     let threads = workers(config, plan.records)?;
+    if !options.force {
+        check::preflight(&plan, config, threads).passes()?;
+    }
     let directory = Directory::new(&config.output.directory);
     let _lock = directory.create()?;
     let job = Job { config, triangulator, coarser, directory: &directory, progress, threads, start };
@@ -139,7 +161,7 @@ struct Job<'a> {
     triangulator: &'a Triangulator,
     coarser: Coarser,
     directory: &'a Directory,
-    progress: Progress,
+    progress: &'a Schedule,
     threads: usize,
     start: Instant,
 }
@@ -170,7 +192,7 @@ impl Job<'_> {
         let stage = progress.stage("write", leaves.sites, "sites");
         let canvas = Canvas::new(&look.frame, bounds);
         let written = export_all(directory, &partition, &look, &canvas, &stage)?;
-        enough_triangles(written.triangles)?;
+        enough_triangles(written.triangles, plan)?;
         let exported = stage.finish();
 
         let stage = progress.stage("finish", 1, "job");
@@ -242,14 +264,14 @@ fn enough_points(summary: &Summary) -> Result<[[i32; 3]; 2]> {
     })
 }
 
-fn enough_triangles(triangles: u64) -> Result<()> {
+fn enough_triangles(triangles: u64, plan: &Plan) -> Result<()> {
     if triangles > 0 {
         return Ok(());
     }
-    Err(Error::NoTerrain(
-        "the points make no triangle: it takes at least three different places in x and y that are not on one line"
-            .into(),
-    ))
+    Err(Error::NoTerrain(format!(
+        "the points make no triangle in steps of {}: it takes at least three different places in x and y that are not on one line",
+        plan.lattice.resolution
+    )))
 }
 
 /// Triangulates all leaves and merges every inner node as soon as its children are done.

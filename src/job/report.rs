@@ -2,8 +2,9 @@
 
 use super::export::TileFigures;
 use super::leaf::LeafFigures;
+use super::machine;
 use super::partition::Skipped;
-use super::progress::{Progress, StageFigures};
+use super::progress::{Schedule, StageFigures};
 use super::scan::Plan;
 use crate::geometry::lattice::Lattice;
 use crate::input::Tally;
@@ -114,7 +115,7 @@ impl Report {
             crs: plan.crs.name.clone(),
             bytes_written: parts.tiles.bytes + parts.other_bytes,
             bytes_temporary: parts.temporary,
-            peak_memory: peak_memory(),
+            peak_memory: machine::peak_memory(),
             memory_limit: parts.memory,
             threads: parts.threads,
             wall_s: parts.wall_s,
@@ -122,14 +123,6 @@ impl Report {
             warnings,
         }
     }
-}
-
-/// The largest resident set of this process so far, in bytes, where the system tells.
-pub fn peak_memory() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
-    let kilobytes: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some(kilobytes * 1024)
 }
 
 impl fmt::Display for Report {
@@ -190,7 +183,7 @@ pub fn skipped_summary(used: usize, skipped: &[Skipped]) -> Option<String> {
 }
 
 /// Says so when an input is left out.
-pub(super) fn note_skipped(skipped: &[Skipped], progress: Progress) {
+pub(super) fn note_skipped(skipped: &[Skipped], progress: &Schedule) {
     for bad in skipped {
         progress.note(&format!("left out: {}: {}", bad.file.display(), bad.why));
     }

@@ -202,7 +202,7 @@ mod tests {
         let orders: Vec<u64> = left.iter().map(Point::order).collect();
         assert_eq!(orders, (1..100).chain(300..999).collect::<Vec<u64>>());
         assert_eq!(bucket.points, 798);
-        spill.sift(&mut bucket, &[0..1000]).unwrap();
+        spill.sift(&mut bucket, &[0..500, 500..1000]).unwrap();
         assert_eq!(bucket, Bucket::default());
     }
 }

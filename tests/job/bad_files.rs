@@ -70,7 +70,7 @@ fn files_bad_at_first_sight_are_left_out_and_shouted_about() {
         write(folder.path(), "page.laz", b"<html>not found</html>"),
         write(folder.path(), "cut.laz", &whole[..whole.len() / 2]),
     ];
-    let files = [&bad[..1], &[good.clone()], &bad[1..]].concat();
+    let files = [&bad[..1], std::slice::from_ref(&good), &bad[1..]].concat();
     Job::on(&files).run().refused(3, &["empty.las", "is empty"]);
     let (said, report) = skips(&files, &good);
     for words in
@@ -126,7 +126,7 @@ fn a_job_of_bad_files_alone_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let empty = write(folder.path(), "empty.las", b"");
     let bad = write(folder.path(), "damaged.laz", &damaged(0.01));
-    skipping(&[empty.clone()]).run().refused(3, &["no input is left", "all 1 are bad", "empty.las"]);
+    skipping(std::slice::from_ref(&empty)).run().refused(3, &["no input is left", "all 1 are bad", "empty.las"]);
     skipping(&[empty, bad]).run().refused(3, &["no input is left", "all 2 are bad"]);
 }
 

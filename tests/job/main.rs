@@ -13,11 +13,13 @@ mod clouds;
 mod program;
 
 mod bad_files;
+mod broken;
 mod choices;
 mod configuration;
 mod khronos;
 mod limits;
 mod messages;
+mod preflight;
 mod real;
 mod same_mesh;
 mod steps;
