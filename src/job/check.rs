@@ -106,8 +106,8 @@ pub(super) fn preflight(plan: &Plan, config: &Config, threads: usize) -> Preflig
         memory_free: machine::free_memory(),
         temporary: spill + leaves_on_disk,
         results,
-        // The spill goes before the results come, and a leaf's file when its tile is written.
-        disk: (spill + leaves_on_disk).max(leaves_on_disk.max(results)),
+        // The spill goes before the results come.
+        disk: leaves_on_disk + spill.max(results),
         disk_free: machine::free_disk(output).map(|free| free + taken(output)),
         output: output.clone(),
         backend: format!("{:?}", config.triangulation.backend).to_lowercase(),

@@ -23,6 +23,7 @@ pub mod sites;
 pub mod span;
 pub mod spill;
 pub mod stitch;
+pub mod store;
 pub mod tree;
 
 use crate::config::{ColorChoice, Config};
@@ -47,6 +48,7 @@ use span::Longest;
 use spill::Spill;
 use std::io::Write;
 use std::time::Instant;
+use store::{Key, Store};
 use tree::{Kind, Tree};
 
 /// Bytes that one site of a leaf takes while the leaf is triangulated: points, sort keys, sites, mesh and marks.
@@ -178,25 +180,26 @@ impl Job<'_> {
         longest.check_heights(bounds[0][2], bounds[1][2])?;
 
         let stage = progress.stage("triangulate", partition.summary.tally.kept, "points");
-        let leaves = triangulate(config, triangulator, directory, &partition, longest, &stage)?;
-        // From here on the leaves' own files are enough.
+        let store = Store::create(&directory.store())?;
+        let leaves = triangulate(config, triangulator, &store, directory, &partition, longest, &stage)?;
+        // From here on what is in the store is enough.
         directory::remove_file(&directory.spill())?;
         let triangulated = stage.finish();
 
         let look = look(config, plan, &partition.summary, bounds);
         let tiles = partition.tree.leaves.len();
         let stage = progress.stage("stitch", tiles as u64, "tiles");
-        stitch_all(directory, &partition.tree, &look, &stage)?;
+        stitch_all(&store, &partition.tree, &look, &stage)?;
         let stitched = stage.finish();
 
         let stage = progress.stage("write", leaves.sites, "sites");
         let canvas = Canvas::new(&look.frame, bounds);
-        let written = export_all(directory, &partition, &look, &canvas, &stage)?;
+        let written = export_all(directory, &store, &partition, &look, &canvas, &stage)?;
         enough_triangles(written.triangles, plan)?;
         let exported = stage.finish();
 
         let stage = progress.stage("finish", 1, "job");
-        let other_bytes = finish(directory, plan, &written, &canvas, tiles, bounds)?;
+        let other_bytes = finish(directory, &store, plan, &written, &canvas, tiles, bounds)?;
         directory.clean_up()?;
         stage.advance(1);
         let stages = vec![scanned, read, triangulated, stitched, exported, stage.finish()];
@@ -207,9 +210,10 @@ impl Job<'_> {
                 points: partition.summary.tally,
                 leaves,
                 gpu: triangulator.gpu().map(str::to_owned),
+                gpu_steps: triangulator.gpu_steps(),
                 tiles: written,
                 other_bytes,
-                temporary: partition.spilled + leaves.bytes,
+                temporary: partition.spilled + store.bytes(),
                 stages,
                 threads: self.threads,
                 memory: config.limits.memory.0,
@@ -274,24 +278,25 @@ fn enough_triangles(triangles: u64, plan: &Plan) -> Result<()> {
     )))
 }
 
-/// Triangulates all leaves and merges every inner node as soon as its children are done.
+/// Triangulates all leaves and merges every merge node as soon as all below it is done.
 fn triangulate(
     config: &Config,
     triangulator: &Triangulator,
+    store: &Store,
     directory: &Directory,
     partition: &Partition,
     longest: Longest,
     stage: &Stage,
 ) -> Result<LeafFigures> {
     let spill = Spill::open(&directory.spill())?;
-    let grower = Grower { config, triangulator, directory, partition, spill: &spill, longest, stage };
+    let grower = Grower { config, triangulator, store, partition, spill: &spill, longest, stage };
     grower.grow(0)
 }
 
 struct Grower<'a> {
     config: &'a Config,
     triangulator: &'a Triangulator,
-    directory: &'a Directory,
+    store: &'a Store,
     partition: &'a Partition,
     spill: &'a Spill,
     longest: Longest,
@@ -307,7 +312,7 @@ impl Grower<'_> {
                     triangulator: self.triangulator,
                     longest: self.longest,
                 };
-                let figures = leaf::run(self.directory, self.partition, self.spill, tile, task)?;
+                let figures = leaf::run(self.store, self.partition, self.spill, tile, task)?;
                 self.stage.advance(figures.sites + figures.duplicates);
                 Ok(figures)
             }
@@ -315,10 +320,12 @@ impl Grower<'_> {
                 let (low, high) = rayon::join(|| self.grow(low), || self.grow(high));
                 let (mut figures, high) = (low?, high?);
                 figures += high;
-                // Nodes below the root may be merged at once on all threads.
-                let share = if node == 0 { 1 } else { rayon::current_num_threads() as u64 };
-                let memory = self.config.limits.memory.0 / 4 * 3 / share;
-                merge::run(self.directory, &self.partition.tree, node, memory, self.longest)?;
+                if self.partition.tree.is_merge(node) {
+                    // Nodes below the root may be merged at once on all threads.
+                    let share = if node == 0 { 1 } else { rayon::current_num_threads() as u64 };
+                    let memory = self.config.limits.memory.0 / 4 * 3 / share;
+                    merge::run(self.store, &self.partition.tree, node, memory, self.longest)?;
+                }
                 Ok(figures)
             }
         }
@@ -338,9 +345,9 @@ fn look(config: &Config, plan: &Plan, summary: &Summary, bounds: [[i32; 3]; 2]) 
     Look { frame: plan.frame.clone().refined(bounds), coloring, normals: config.output.normals }
 }
 
-fn stitch_all(directory: &Directory, tree: &Tree, look: &Look, stage: &Stage) -> Result<()> {
+fn stitch_all(store: &Store, tree: &Tree, look: &Look, stage: &Stage) -> Result<()> {
     (0..tree.leaves.len()).into_par_iter().try_for_each(|tile| {
-        stitch::run(directory, tree, tile, &look.frame)?;
+        stitch::run(store, tree, tile, &look.frame)?;
         stage.advance(1);
         Ok(())
     })
@@ -348,6 +355,7 @@ fn stitch_all(directory: &Directory, tree: &Tree, look: &Look, stage: &Stage) ->
 
 fn export_all(
     directory: &Directory,
+    store: &Store,
     partition: &Partition,
     look: &Look,
     canvas: &Canvas,
@@ -357,7 +365,7 @@ fn export_all(
         .into_par_iter()
         .with_max_len(1)
         .map(|tile| {
-            let figures = export::run(directory, &partition.tree, tile, look, canvas)?;
+            let figures = export::run(directory, store, &partition.tree, tile, look, canvas)?;
             stage.advance(partition.blocks[tile].iter().map(|block| block.points as u64).sum());
             Ok(figures)
         })
@@ -370,6 +378,7 @@ fn export_all(
 /// Writes what stands beside the tiles; returns its bytes.
 fn finish(
     directory: &Directory,
+    store: &Store,
     plan: &Plan,
     written: &TileFigures,
     canvas: &Canvas,
@@ -379,7 +388,7 @@ fn finish(
     let georeference = Georeference::new(&plan.frame, &plan.lattice, bounds, plan.unit, plan.crs.epsg);
     let text = georeference.to_json();
     directory::write_whole(&directory.georeference(), |file| file.write_all(text.as_bytes()))?;
-    let picture = draw_picture(directory, canvas, tiles)?;
+    let picture = draw_picture(store, canvas, tiles)?;
     directory::write_whole(&directory.preview(), |file| file.write_all(&picture))?;
     let mut bytes = (text.len() + picture.len()) as u64;
     if written.triangles <= MOST_TRIANGLES_IN_ONE_FILE && written.files <= MOST_TILES_IN_ONE_FILE {
@@ -390,10 +399,10 @@ fn finish(
     Ok(bytes)
 }
 
-fn draw_picture(directory: &Directory, canvas: &Canvas, tiles: usize) -> Result<Vec<u8>> {
+fn draw_picture(store: &Store, canvas: &Canvas, tiles: usize) -> Result<Vec<u8>> {
     let mut picture = Picture::new(canvas);
     for tile in 0..tiles {
-        picture.add(tile as u32, &ColumnReader::open(&directory.preview_fragment(tile))?.column::<Texel>()?);
+        picture.add(tile as u32, &ColumnReader::open(store, Key::Pixels(tile))?.column::<Texel>()?);
     }
     Ok(picture.png())
 }
