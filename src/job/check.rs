@@ -131,8 +131,7 @@ fn result_bytes(points: u64, tiles: u64) -> u64 {
 
 /// Bytes of what an earlier job has left in `output` and the next one replaces.
 fn taken(output: &Path) -> u64 {
-    let folders =
-        ["", "tiles", "job", "job/leaves", "job/nodes", "job/rims", "job/preview"].map(|name| output.join(name));
+    let folders = ["", "tiles", "job"].map(|name| output.join(name));
     let entries = folders.iter().filter_map(|folder| std::fs::read_dir(folder).ok());
     let files = entries.flatten().flatten().filter_map(|entry| entry.metadata().ok()).filter(|meta| meta.is_file());
     files.map(|meta| meta.len()).sum()
