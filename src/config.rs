@@ -48,6 +48,9 @@ pub struct Input {
     /// The share of malformed records or lines that is put up with, 0 to 1.
     #[serde(default)]
     pub malformed_share: Share,
+    /// What becomes of a job with a file that cannot be used.
+    #[serde(default)]
+    pub on_bad_file: OnBadFile,
     /// How text files are laid out, where detection is not to be trusted.
     #[serde(default)]
     pub csv: TextOptions,
@@ -114,6 +117,17 @@ pub enum Duplicates {
     Highest,
     /// The one that is read first, in the order of the files.
     First,
+}
+
+/// What becomes of a job with a file that is no point cloud, is damaged, or has too many malformed records.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum OnBadFile {
+    /// It stops with an error.
+    #[default]
+    Stop,
+    /// It leaves the file out, all of it, and says so.
+    Skip,
 }
 
 /// The unit of x and y.

@@ -10,8 +10,10 @@ pub mod columns;
 pub mod cut;
 pub mod directory;
 pub mod export;
+mod forecast;
 pub mod grid;
 pub mod leaf;
+mod machine;
 pub mod merge;
 pub mod partition;
 pub mod progress;
@@ -41,7 +43,7 @@ use directory::Directory;
 use export::{Look, TileFigures};
 use leaf::LeafFigures;
 use partition::{Partition, Summary, Task};
-use progress::{Progress, Stage, StageFigures};
+use progress::{Progress, Schedule, Stage, StageFigures};
 use rayon::prelude::*;
 use report::{Parts, Report};
 use scan::Plan;
@@ -63,26 +65,41 @@ const MOST_TRIANGLES_IN_ONE_FILE: u64 = 20_000_000;
 /// Nor one of more tiles: each is a node with a mesh of its own, and their description would fill the memory.
 const MOST_TILES_IN_ONE_FILE: u64 = 4096;
 
+/// How a job is run, beside its configuration.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// Where progress goes.
+    pub progress: Progress,
+    /// Whether to go on where the disk or the memory does not seem to suffice.
+    pub force: bool,
+}
+
+impl From<Progress> for Options {
+    fn from(progress: Progress) -> Options {
+        Options { progress, force: false }
+    }
+}
+
 /// Runs the whole job of `config`.
 ///
 /// # Errors
 /// Whatever stops a step; see [`Error`]. A job that fails leaves no temporary files.
-pub fn run(config: &Config, progress: Progress) -> Result<Report> {
-    let start = Instant::now();
+pub fn run(config: &Config, options: impl Into<Options>) -> Result<Report> {
+    let (options, start) = (options.into(), Instant::now());
     // First of all, so that a job that must have a GPU fails at once where there is none.
     let triangulator = Triangulator::new(&config.triangulation, config.limits.memory.0, config.threads())?;
     let mut coarser = Coarser::default();
     loop {
-        match attempt(config, &triangulator, coarser, progress, start) {
+        match attempt(config, &triangulator, coarser, options, start) {
             // Only the finished mesh knows its longest triangle, so that a second try is the price of not rounding in vain.
             Err(Error::TooFine { vertical: true, what }) if coarser.vertical < MOST_TENS => {
-                progress.note(&format!("{what}; starting again with a coarser step in z"));
+                options.progress.note(&format!("{what}; starting again with a coarser step in z"));
                 coarser.vertical += 1;
             }
             Err(Error::TooFine { vertical: false, what })
                 if config.input.resolution.0.is_none() && coarser.horizontal < MOST_TENS =>
             {
-                progress.note(&format!("{what}; starting again with a coarser step in x and y"));
+                options.progress.note(&format!("{what}; starting again with a coarser step in x and y"));
                 coarser.horizontal += 1;
             }
             outcome => return outcome,
@@ -94,18 +111,24 @@ fn attempt(
     config: &Config,
     triangulator: &Triangulator,
     coarser: Coarser,
-    progress: Progress,
+    options: Options,
     start: Instant,
 ) -> Result<Report> {
+    let progress = options.progress;
     let stage = progress.stage("scan", 1, "job");
     let plan = on_threads(workers(config, 0)?, || scan::run(config, coarser))?;
     stage.advance(1);
     let scanned = stage.finish();
+    let progress = &Schedule::new(progress, forecast::costs(&plan));
+    report::note_skipped(&plan.skipped, progress);
     let threads = workers(config, plan.records)?;
+    if !options.force {
+        check::preflight(&plan, config, threads).passes()?;
+    }
     let directory = Directory::new(&config.output.directory);
     let _lock = directory.create()?;
-    let job = Job { config, triangulator, plan: &plan, directory: &directory, progress, threads, start };
-    let outcome = on_threads(threads, || job.run(scanned));
+    let job = Job { config, triangulator, coarser, directory: &directory, progress, threads, start };
+    let outcome = on_threads(threads, || job.run(plan, scanned));
     if outcome.is_err() {
         // The first error is the one to report.
         let _ = directory.clean_up();
@@ -141,24 +164,23 @@ fn workers(config: &Config, points: u64) -> Result<usize> {
 struct Job<'a> {
     config: &'a Config,
     triangulator: &'a Triangulator,
-    plan: &'a Plan,
+    coarser: Coarser,
     directory: &'a Directory,
-    progress: Progress,
+    progress: &'a Schedule,
     threads: usize,
     start: Instant,
 }
 
 impl Job<'_> {
     /// Step 2 and all after it.
-    fn run(&self, scanned: StageFigures) -> Result<Report> {
-        let Job { config, triangulator, plan, directory, progress, .. } = *self;
+    fn run(&self, plan: Plan, scanned: StageFigures) -> Result<Report> {
+        let Job { config, triangulator, directory, progress, .. } = *self;
 
-        let stage = progress.stage("read", plan.records, "points");
-        let partition = partition::run(&task(plan, config), directory, &stage)?;
+        let (plan, partition, read) = self.read(plan)?;
+        let plan = &plan;
         let bounds = enough_points(&partition.summary)?;
         let longest = Longest::of(&plan.frame);
         longest.check_heights(bounds[0][2], bounds[1][2])?;
-        let read = stage.finish();
 
         let stage = progress.stage("triangulate", partition.summary.tally.kept, "points");
         let store = Store::create(&directory.store())?;
@@ -177,7 +199,7 @@ impl Job<'_> {
         let stage = progress.stage("write", leaves.sites, "sites");
         let canvas = Canvas::new(&look.frame, bounds);
         let written = export_all(directory, &store, &partition, &look, &canvas, &stage)?;
-        enough_triangles(&written)?;
+        enough_triangles(&written, plan)?;
         let exported = stage.finish();
 
         let stage = progress.stage("finish", 1, "job");
@@ -205,6 +227,26 @@ impl Job<'_> {
         directory::write_json(&directory.report(), &report)?;
         Ok(report)
     }
+
+    /// Step 2. An input that proves bad only now is left out as if it had never been named: if without it the job would have
+    /// another lattice, all is read again.
+    fn read(&self, mut plan: Plan) -> Result<(Plan, Partition, StageFigures)> {
+        let Job { config, directory, progress, coarser, .. } = *self;
+        loop {
+            let stage = progress.stage("read", plan.records, "points");
+            let mut partition = partition::run(&task(&plan, config), directory, &stage)?;
+            let figures = stage.finish();
+            let lattice = plan.lattice.clone();
+            if !partition.skipped.is_empty() {
+                report::note_skipped(&partition.skipped, progress);
+                plan = scan::without(plan, &partition.skipped, config, coarser)?;
+            }
+            if plan.lattice == lattice {
+                partition.skipped.clone_from(&plan.skipped);
+                return Ok((plan, partition, figures));
+            }
+        }
+    }
 }
 
 fn task<'a>(plan: &'a Plan, config: &Config) -> Task<'a> {
@@ -214,6 +256,7 @@ fn task<'a>(plan: &'a Plan, config: &Config) -> Task<'a> {
         points_per_tile: config.triangulation.sites_per_tile.0,
         memory: config.limits.memory.0 / 6,
         malformed_share: config.input.malformed_share.0,
+        on_bad_file: config.input.on_bad_file,
     }
 }
 
@@ -229,7 +272,7 @@ fn enough_points(summary: &Summary) -> Result<[[i32; 3]; 2]> {
     })
 }
 
-fn enough_triangles(written: &TileFigures) -> Result<()> {
+fn enough_triangles(written: &TileFigures, plan: &Plan) -> Result<()> {
     if written.triangles > 0 {
         return Ok(());
     }
@@ -239,10 +282,10 @@ fn enough_triangles(written: &TileFigures) -> Result<()> {
             written.cut_triangles
         )));
     }
-    Err(Error::NoTerrain(
-        "the points make no triangle: it takes at least three different places in x and y that are not on one line"
-            .into(),
-    ))
+    Err(Error::NoTerrain(format!(
+        "the points make no triangle in steps of {}: it takes at least three different places in x and y that are not on one line",
+        plan.lattice.resolution
+    )))
 }
 
 /// Triangulates all leaves and merges every merge node as soon as all below it is done.
