@@ -4,8 +4,8 @@ use clap::Parser;
 use gdt_batch::cli::{Cli, Command, Talk};
 use gdt_batch::config::Config;
 use gdt_batch::gpu::selftest;
-use gdt_batch::job::{self, check, progress::Progress};
-use gdt_batch::{Error, Result, input, sample, verify};
+use gdt_batch::job::{self, Options, check, progress::Progress};
+use gdt_batch::{Error, Result, input, interrupt, sample, verify};
 use serde::Serialize;
 use std::fmt::Display;
 use std::io::Write;
@@ -31,7 +31,11 @@ fn run(cli: Cli) -> Result<ExitCode> {
         (Some(Command::Info { files }), _) => info(&files, talk)?,
         (Some(Command::Gpu { adapter, side }), _) => return test_gpu(adapter.as_deref(), side, talk),
         (Some(Command::Sample { file, points, seed }), _) => sample::write(&file, points, seed)?,
-        (None, Some(config)) => show(&job::run(&Config::load(&config)?, Progress::detect(talk.quiet))?, talk)?,
+        (None, Some(config)) => {
+            interrupt::listen()?;
+            let options = Options { progress: Progress::detect(talk.quiet), fresh: cli.fresh };
+            show(&job::run(&Config::load(&config)?, options)?, talk)?;
+        }
         (None, None) => return Err(Error::Config("name a configuration file; --help shows how".into())),
     }
     Ok(ExitCode::SUCCESS)

@@ -1,11 +1,10 @@
 //! The files between steps: a few columns of plain values each, in the machine's byte order, written whole.
 
-use super::directory::write_whole;
+use super::directory::{Written, write_whole};
 use crate::positioned::read_exact_at;
 use crate::{Error, Result};
 use bytemuck::Pod;
 use std::fs::File;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Collects columns and writes them as one file.
@@ -22,13 +21,12 @@ impl ColumnWriter {
         self
     }
 
-    /// Writes the file, whole or not at all; returns its size in bytes.
+    /// Writes the file, whole or not at all.
     ///
     /// # Errors
     /// [`Error::Io`] if that fails.
-    pub fn write(self, path: &Path) -> Result<u64> {
-        write_whole(path, |file| file.write_all(&self.bytes))?;
-        Ok(self.bytes.len() as u64)
+    pub fn write(self, path: &Path) -> Result<Written> {
+        write_whole(path, &self.bytes)
     }
 }
 

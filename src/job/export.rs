@@ -2,7 +2,8 @@
 //! colours, as one GLB; and its pixels of the preview.
 
 use super::columns::ColumnWriter;
-use super::directory::{Directory, remove_file, write_whole};
+use super::directory::{Directory, write_result};
+use super::journal::Done;
 use super::records::{Leaf, Rim, RimVertices, SeamTriangle};
 use super::stitch::seam_of;
 use super::tree::Tree;
@@ -15,7 +16,6 @@ use crate::output::preview::Canvas;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
-use std::io::Write;
 use std::ops::AddAssign;
 
 /// How tiles are to look.
@@ -51,11 +51,11 @@ impl AddAssign for TileFigures {
     }
 }
 
-/// Writes the GLB of `tile` and its part of the preview, and removes the leaf's file, which nothing needs after that.
+/// Writes the GLB of `tile` and its part of the preview. Nothing needs the leaf's file after that.
 ///
 /// # Errors
 /// [`Error::Io`] on the output or the job directory, [`Error::Config`] if a triangle is too long for f32.
-pub fn run(directory: &Directory, tree: &Tree, tile: usize, look: &Look, canvas: &Canvas) -> Result<TileFigures> {
+pub fn run(directory: &Directory, tree: &Tree, tile: usize, look: &Look, canvas: &Canvas) -> Result<Done<TileFigures>> {
     let leaf = Leaf::load(directory, tile)?;
     let rims = RimVertices::load(directory, tile)?;
     let mut sites = Sites::of_leaf(leaf, &rims, look);
@@ -64,15 +64,14 @@ pub fn run(directory: &Directory, tree: &Tree, tile: usize, look: &Look, canvas:
     let content = sites.into_tile(look);
     let mut figures =
         TileFigures { triangles: content.triangles.len() as u64, seam_triangles, ..TileFigures::default() };
-    ColumnWriter::default().push(&canvas.draw(&content)).write(&directory.preview_fragment(tile))?;
+    let mut files = vec![ColumnWriter::default().push(&canvas.draw(&content)).write(&directory.preview_fragment(tile))?];
     if !content.triangles.is_empty() {
         let mut bytes = Vec::new();
         encode_tile(&look.frame, &content, &mut bytes)?;
-        write_whole(&directory.tile(tile), |file| file.write_all(&bytes))?;
+        files.push(write_result(&directory.tile(tile), &bytes)?);
         (figures.files, figures.bytes) = (1, bytes.len() as u64);
     }
-    remove_file(&directory.leaf(tile))?;
-    Ok(figures)
+    Ok(Done { obsolete: vec![directory.leaf(tile)], ..Done::new(figures, files) })
 }
 
 /// A triangle belongs to the tile of its lowest-numbered corner.

@@ -2,6 +2,7 @@
 
 use super::closing::{State, close};
 use super::directory::Directory;
+use super::journal::Done;
 use super::partition::Partition;
 use super::records::{Frontier, Leaf, Rim, RimDraft};
 use super::sites;
@@ -64,7 +65,7 @@ pub fn run(
     spill: &Spill,
     tile: usize,
     task: Task<'_>,
-) -> Result<LeafFigures> {
+) -> Result<Done<LeafFigures>> {
     let (points, dropped) = sites::load(spill, &partition.blocks[tile], task.duplicates)?;
     let sites: Vec<Site> = points.iter().map(|p| p.position).collect();
     let (mesh, outcome) = task.triangulator.triangulate(&sites)?;
@@ -78,11 +79,11 @@ pub fn run(
     triangulation::recycle(mesh);
     let rim = |&site: &u32| Rim { tile: tile as u32, site, position: leaf.positions[site as usize] };
     let frontier = Frontier { sites: closing.frontier.iter().map(rim).collect(), boundary: closing.boundary };
-    let bytes = rim_draft(&leaf, &closing.frontier).save(directory, tile)?
-        + leaf.save(directory, tile)?
-        + frontier.save(directory, node)?;
+    let draft = rim_draft(&leaf, &closing.frontier);
+    let files = vec![draft.save(directory, tile)?, leaf.save(directory, tile)?, frontier.save(directory, node)?];
+    let bytes = files.iter().map(|file| file.bytes).sum();
     let (sites, triangles) = (sites.len() as u64, leaf.triangles.len() as u64);
-    Ok(LeafFigures { sites, duplicates: dropped, triangles, bytes, outcome })
+    Ok(Done::new(LeafFigures { sites, duplicates: dropped, triangles, bytes, outcome }, files))
 }
 
 fn check_spans(mesh: &Mesh, sites: &[Site], states: &[State], longest: Longest) -> Result<()> {

@@ -3,6 +3,7 @@
 
 use super::closing::{State, close, covered};
 use super::directory::Directory;
+use super::journal::Done;
 use super::records::{Frontier, Rim, Seam, SeamTriangle};
 use super::span::Longest;
 use super::tree::{Kind, Tree};
@@ -19,7 +20,7 @@ const BYTES_PER_SITE: u64 = 600;
 /// # Errors
 /// [`Error::Memory`] if the frontiers do not fit `memory` bytes, [`Error::TooFine`] if a triangle is too long to be written, [`Error::Io`] on the job directory, [`Error::Broken`] if the
 /// children contradict each other.
-pub fn run(directory: &Directory, tree: &Tree, node: usize, memory: u64, longest: Longest) -> Result<u64> {
+pub fn run(directory: &Directory, tree: &Tree, node: usize, memory: u64, longest: Longest) -> Result<Done<u64>> {
     let Kind::Inner(children) = tree.nodes[node].kind else {
         return Err(Error::Broken(format!("node {node} of the tree is a leaf and has nothing to merge")));
     };
@@ -38,10 +39,10 @@ pub fn run(directory: &Directory, tree: &Tree, node: usize, memory: u64, longest
         .map(|(corners, _)| corners.map(|v| union.sites[v as usize]))
         .collect();
     seam.iter().try_for_each(|corners| longest.check(corners.map(|corner| corner.plane())))?;
-    Seam::new(&seam).save(directory, node)?;
     let frontier = closing.frontier.iter().map(|&site| union.sites[site as usize]).collect();
-    Frontier { sites: frontier, boundary: closing.boundary }.save(directory, node)?;
-    Ok(seam.len() as u64)
+    let frontier = Frontier { sites: frontier, boundary: closing.boundary };
+    let files = vec![Seam::new(&seam).save(directory, node)?, frontier.save(directory, node)?];
+    Ok(Done::new(seam.len() as u64, files))
 }
 
 fn join(mut low: Frontier, high: Frontier) -> Frontier {

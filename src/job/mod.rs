@@ -1,21 +1,26 @@
 //! A job, from the configuration to the report: scan, partition, triangulate the leaves and merge the inner nodes, stitch,
 //! export, report. Every step leaves its result in the job directory and finds there what it needs, so that each can be
-//! called on its own, the ones by tile or by node in any order that puts children before parents.
+//! called on its own, the ones by tile or by node in any order that puts children before parents; and a job that was
+//! interrupted goes on from the steps that its journal has.
 
 mod area;
 pub mod check;
 pub mod choose;
 pub mod closing;
 pub mod columns;
+mod committer;
 pub mod directory;
 pub mod export;
+pub mod fingerprint;
 pub mod grid;
+pub mod journal;
 pub mod leaf;
 pub mod merge;
 pub mod partition;
 pub mod progress;
 pub mod records;
 pub mod report;
+pub mod resume;
 pub mod scan;
 pub mod sites;
 pub mod span;
@@ -35,6 +40,8 @@ use choose::Coarser;
 use columns::ColumnReader;
 use directory::Directory;
 use export::{Look, TileFigures};
+use fingerprint::{Fingerprint, Head};
+use journal::{Done, Journal, Step};
 use leaf::LeafFigures;
 use partition::{Partition, Summary, Task};
 use progress::{Progress, Stage, StageFigures};
@@ -43,7 +50,6 @@ use report::{Parts, Report};
 use scan::Plan;
 use span::Longest;
 use spill::Spill;
-use std::io::Write;
 use std::time::Instant;
 use tree::{Kind, Tree};
 
@@ -58,27 +64,45 @@ const MOST_TRIANGLES_IN_ONE_FILE: u64 = 20_000_000;
 /// Nor one of more tiles: each is a node with a mesh of its own, and their description would fill the memory.
 const MOST_TILES_IN_ONE_FILE: u64 = 4096;
 
-/// Runs the whole job of `config`.
+/// How a job is run, beside its configuration.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// Where progress goes.
+    pub progress: Progress,
+    /// Whether to start over where an interrupted run could be gone on with.
+    pub fresh: bool,
+}
+
+impl From<Progress> for Options {
+    fn from(progress: Progress) -> Options {
+        Options { progress, fresh: false }
+    }
+}
+
+/// Runs the whole job of `config`, or what an interrupted run has left of it.
 ///
 /// # Errors
-/// Whatever stops a step; see [`Error`]. A job that fails leaves no temporary files.
-pub fn run(config: &Config, progress: Progress) -> Result<Report> {
-    let start = Instant::now();
+/// Whatever stops a step; see [`Error`]. [`Error::Resumable`] if the finished steps are kept, else no temporary files are left.
+pub fn run(config: &Config, options: impl Into<Options>) -> Result<Report> {
+    let (options, start) = (options.into(), Instant::now());
     // First of all, so that a job that must have a GPU fails at once where there is none.
     let triangulator = Triangulator::new(&config.triangulation, config.limits.memory.0, config.threads())?;
-    let mut coarser = Coarser::default();
+    let directory = Directory::new(&config.output.directory);
+    let fingerprint = on_threads(workers(config, 0)?, || Fingerprint::of(config))?;
+    let coarser = if options.fresh { Coarser::default() } else { resume::coarser(&directory, &fingerprint)? };
+    let mut head = Head { fingerprint, coarser };
     loop {
-        match attempt(config, &triangulator, coarser, progress, start) {
+        match attempt(config, &triangulator, &head, options, start) {
             // Only the finished mesh knows its longest triangle, so that a second try is the price of not rounding in vain.
-            Err(Error::TooFine { vertical: true, what }) if coarser.vertical < MOST_TENS => {
-                progress.note(&format!("{what}; starting again with a coarser step in z"));
-                coarser.vertical += 1;
+            Err(Error::TooFine { vertical: true, what }) if head.coarser.vertical < MOST_TENS => {
+                options.progress.note(&format!("{what}; starting again with a coarser step in z"));
+                head.coarser.vertical += 1;
             }
             Err(Error::TooFine { vertical: false, what })
-                if config.input.resolution.0.is_none() && coarser.horizontal < MOST_TENS =>
+                if config.input.resolution.0.is_none() && head.coarser.horizontal < MOST_TENS =>
             {
-                progress.note(&format!("{what}; starting again with a coarser step in x and y"));
-                coarser.horizontal += 1;
+                options.progress.note(&format!("{what}; starting again with a coarser step in x and y"));
+                head.coarser.horizontal += 1;
             }
             outcome => return outcome,
         }
@@ -88,24 +112,42 @@ pub fn run(config: &Config, progress: Progress) -> Result<Report> {
 fn attempt(
     config: &Config,
     triangulator: &Triangulator,
-    coarser: Coarser,
-    progress: Progress,
+    head: &Head,
+    options: Options,
     start: Instant,
 ) -> Result<Report> {
+    let progress = options.progress;
     let stage = progress.stage("scan", 1, "job");
-    let plan = on_threads(workers(config, 0)?, || scan::run(config, coarser))?;
+    let plan = on_threads(workers(config, 0)?, || scan::run(config, head.coarser))?;
     stage.advance(1);
     let scanned = stage.finish();
     let threads = workers(config, plan.records)?;
     let directory = Directory::new(&config.output.directory);
-    let _lock = directory.create()?;
-    let job = Job { config, triangulator, plan: &plan, directory: &directory, progress, threads, start };
-    let outcome = on_threads(threads, || job.run(scanned));
-    if outcome.is_err() {
-        // The first error is the one to report.
-        let _ = directory.clean_up();
+    let _lock = directory.lock()?;
+    if let Some(report) = resume::complete(&directory, head)?.filter(|_| !options.fresh) {
+        progress.note("the interrupted run had written all its results");
+        directory.clean_up()?;
+        return Ok(report);
     }
-    outcome
+    on_threads(threads, || {
+        let resume::Start { journal, partition } = resume::start(&directory, head, options.fresh, progress)?;
+        let job =
+            Job { config, triangulator, plan: &plan, directory: &directory, journal: &journal, progress, threads, start };
+        let outcome = job.run(scanned, partition);
+        let steps = journal.finished();
+        // What is finished is on the disk before the message says so.
+        drop(journal);
+        match outcome {
+            Err(why) if why.exit_code() == 1 && steps > 0 => {
+                Err(Error::Resumable { why: Box::new(why), steps, job: directory.job().into() })
+            }
+            outcome => {
+                // The first error is the one to report.
+                let cleaned = directory.clean_up();
+                outcome.and_then(|report| cleaned.map(|()| report))
+            }
+        }
+    })
 }
 
 /// What `work` returns, its rayon tasks on `threads` threads.
@@ -138,44 +180,43 @@ struct Job<'a> {
     triangulator: &'a Triangulator,
     plan: &'a Plan,
     directory: &'a Directory,
+    journal: &'a Journal<'a>,
     progress: Progress,
     threads: usize,
     start: Instant,
 }
 
 impl Job<'_> {
-    /// Step 2 and all after it.
-    fn run(&self, scanned: StageFigures) -> Result<Report> {
-        let Job { config, triangulator, plan, directory, progress, .. } = *self;
+    /// Step 2 and all after it, but for what an earlier run has done of them.
+    fn run(&self, scanned: StageFigures, partition: Option<Partition>) -> Result<Report> {
+        let Job { config, triangulator, plan, directory, journal, progress, .. } = *self;
 
         let stage = progress.stage("read", plan.records, "points");
-        let partition = partition::run(&task(plan, config), directory, &stage)?;
+        let partition = self.partition(partition, &stage)?;
         let bounds = enough_points(&partition.summary)?;
         let longest = Longest::of(&plan.frame);
         longest.check_heights(bounds[0][2], bounds[1][2])?;
         let read = stage.finish();
 
         let stage = progress.stage("triangulate", partition.summary.tally.kept, "points");
-        let leaves = triangulate(config, triangulator, directory, &partition, longest, &stage)?;
-        // From here on the leaves' own files are enough.
-        directory::remove_file(&directory.spill())?;
+        let leaves = self.triangulate(&partition, longest, &stage)?;
         let triangulated = stage.finish();
 
         let look = look(config, plan, &partition.summary, bounds);
         let tiles = partition.tree.leaves.len();
         let stage = progress.stage("stitch", tiles as u64, "tiles");
-        stitch_all(directory, &partition.tree, &look, &stage)?;
+        self.stitch_all(&partition.tree, &look, &stage)?;
         let stitched = stage.finish();
 
         let stage = progress.stage("write", leaves.sites, "sites");
         let canvas = Canvas::new(&look.frame, bounds);
-        let written = export_all(directory, &partition, &look, &canvas, &stage)?;
+        let written = self.export_all(&partition, &look, &canvas, &stage)?;
         enough_triangles(written.triangles)?;
         let exported = stage.finish();
 
         let stage = progress.stage("finish", 1, "job");
-        let other_bytes = finish(directory, plan, &written, &canvas, tiles, bounds)?;
-        directory.clean_up()?;
+        let other_bytes = journal.step(Step::Finish, || finish(directory, plan, &written, &canvas, tiles, bounds))?;
+        journal.commit()?;
         stage.advance(1);
         let stages = vec![scanned, read, triangulated, stitched, exported, stage.finish()];
 
@@ -191,11 +232,70 @@ impl Job<'_> {
                 stages,
                 threads: self.threads,
                 memory: config.limits.memory.0,
+                resumed: journal.taken_over(),
                 wall_s: self.start.elapsed().as_secs_f64(),
             },
         );
-        directory::write_json(&directory.report(), &report)?;
+        journal.record(Step::Report, Done::new((), vec![directory::write_json(&directory.report(), &report)?]))?;
+        journal.commit()?;
         Ok(report)
+    }
+
+    /// Step 2, unless `earlier` is what it came to.
+    fn partition(&self, earlier: Option<Partition>, stage: &Stage) -> Result<Partition> {
+        if let Some(partition) = earlier {
+            stage.take_over(partition.summary.tally.read);
+            return Ok(partition);
+        }
+        let partition = partition::run(&task(self.plan, self.config), self.directory, stage)?;
+        self.journal.record(Step::Partition, Done::new((), vec![partition.save(self.directory)?]))?;
+        Ok(partition)
+    }
+
+    /// Triangulates all leaves and merges every inner node as soon as its children are done.
+    fn triangulate(&self, partition: &Partition, longest: Longest, stage: &Stage) -> Result<LeafFigures> {
+        let tiles = 0..partition.tree.leaves.len();
+        let all_there = tiles.clone().all(|tile| self.journal.has(Step::Leaf(tile)));
+        let spill = if all_there { None } else { Some(Spill::open(&self.directory.spill())?) };
+        let figures = Grower { job: self, partition, spill, longest, stage }.grow(0)?;
+        self.journal.commit()?;
+        if self.journal.is_worth_syncing() {
+            self.directory.sync()?;
+        }
+        // From here on the leaves' own files are enough.
+        directory::remove_file(&self.directory.spill())?;
+        Ok(figures)
+    }
+
+    fn stitch_all(&self, tree: &Tree, look: &Look, stage: &Stage) -> Result<()> {
+        (0..tree.leaves.len()).into_par_iter().try_for_each(|tile| {
+            let step = Step::Stitch(tile);
+            self.journal.step(step, || stitch::run(self.directory, tree, tile, &look.frame))?;
+            self.count(stage, step, 1);
+            Ok(())
+        })
+    }
+
+    fn export_all(&self, partition: &Partition, look: &Look, canvas: &Canvas, stage: &Stage) -> Result<TileFigures> {
+        let export = |tile| {
+            let step = Step::Export(tile);
+            let tree = &partition.tree;
+            let figures = self.journal.step(step, || export::run(self.directory, tree, tile, look, canvas))?;
+            self.count(stage, step, partition.blocks[tile].iter().map(|block| block.points as u64).sum());
+            Ok(figures)
+        };
+        let tiles = (0..partition.tree.leaves.len()).into_par_iter().with_max_len(1);
+        let figures = tiles.map(export).try_reduce(TileFigures::default, |mut a, b| {
+            a += b;
+            Ok(a)
+        })?;
+        self.journal.commit()?;
+        Ok(figures)
+    }
+
+    /// Shows that `step` is done, by this run or an earlier one.
+    fn count(&self, stage: &Stage, step: Step, amount: u64) {
+        if self.journal.has(step) { stage.take_over(amount) } else { stage.advance(amount) }
     }
 }
 
@@ -231,41 +331,22 @@ fn enough_triangles(triangles: u64) -> Result<()> {
     ))
 }
 
-/// Triangulates all leaves and merges every inner node as soon as its children are done.
-fn triangulate(
-    config: &Config,
-    triangulator: &Triangulator,
-    directory: &Directory,
-    partition: &Partition,
-    longest: Longest,
-    stage: &Stage,
-) -> Result<LeafFigures> {
-    let spill = Spill::open(&directory.spill())?;
-    let grower = Grower { config, triangulator, directory, partition, spill: &spill, longest, stage };
-    grower.grow(0)
-}
-
 struct Grower<'a> {
-    config: &'a Config,
-    triangulator: &'a Triangulator,
-    directory: &'a Directory,
+    job: &'a Job<'a>,
     partition: &'a Partition,
-    spill: &'a Spill,
+    /// Where the points are, as long as there is a leaf to be done.
+    spill: Option<Spill>,
     longest: Longest,
     stage: &'a Stage,
 }
 
 impl Grower<'_> {
     fn grow(&self, node: usize) -> Result<LeafFigures> {
+        let Job { config, directory, journal, .. } = *self.job;
         match self.partition.tree.nodes[node].kind {
             Kind::Leaf(tile) => {
-                let task = leaf::Task {
-                    duplicates: self.config.input.duplicates,
-                    triangulator: self.triangulator,
-                    longest: self.longest,
-                };
-                let figures = leaf::run(self.directory, self.partition, self.spill, tile, task)?;
-                self.stage.advance(figures.sites + figures.duplicates);
+                let figures = journal.step(Step::Leaf(tile), || self.leaf(tile))?;
+                self.job.count(self.stage, Step::Leaf(tile), figures.sites + figures.duplicates);
                 Ok(figures)
             }
             Kind::Inner([low, high]) => {
@@ -274,11 +355,20 @@ impl Grower<'_> {
                 figures += high;
                 // Nodes below the root may be merged at once on all threads.
                 let share = if node == 0 { 1 } else { rayon::current_num_threads() as u64 };
-                let memory = self.config.limits.memory.0 / 4 * 3 / share;
-                merge::run(self.directory, &self.partition.tree, node, memory, self.longest)?;
+                let memory = config.limits.memory.0 / 4 * 3 / share;
+                let merge = || merge::run(directory, &self.partition.tree, node, memory, self.longest);
+                journal.step(Step::Node(node), merge)?;
                 Ok(figures)
             }
         }
+    }
+
+    fn leaf(&self, tile: usize) -> Result<Done<LeafFigures>> {
+        let Job { config, directory, triangulator, .. } = *self.job;
+        let task = leaf::Task { duplicates: config.input.duplicates, triangulator, longest: self.longest };
+        let spill = self.spill.as_ref();
+        let spill = spill.ok_or_else(|| Error::Broken(format!("the points of tile {tile} are gone")))?;
+        leaf::run(directory, self.partition, spill, tile, task)
     }
 }
 
@@ -295,36 +385,7 @@ fn look(config: &Config, plan: &Plan, summary: &Summary, bounds: [[i32; 3]; 2]) 
     Look { frame: plan.frame.clone().refined(bounds), coloring, normals: config.output.normals }
 }
 
-fn stitch_all(directory: &Directory, tree: &Tree, look: &Look, stage: &Stage) -> Result<()> {
-    (0..tree.leaves.len()).into_par_iter().try_for_each(|tile| {
-        stitch::run(directory, tree, tile, &look.frame)?;
-        stage.advance(1);
-        Ok(())
-    })
-}
-
-fn export_all(
-    directory: &Directory,
-    partition: &Partition,
-    look: &Look,
-    canvas: &Canvas,
-    stage: &Stage,
-) -> Result<TileFigures> {
-    (0..partition.tree.leaves.len())
-        .into_par_iter()
-        .with_max_len(1)
-        .map(|tile| {
-            let figures = export::run(directory, &partition.tree, tile, look, canvas)?;
-            stage.advance(partition.blocks[tile].iter().map(|block| block.points as u64).sum());
-            Ok(figures)
-        })
-        .try_reduce(TileFigures::default, |mut a, b| {
-            a += b;
-            Ok(a)
-        })
-}
-
-/// Writes what stands beside the tiles; returns its bytes.
+/// Writes what stands beside the tiles; its figure is its bytes.
 fn finish(
     directory: &Directory,
     plan: &Plan,
@@ -332,19 +393,19 @@ fn finish(
     canvas: &Canvas,
     tiles: usize,
     bounds: [[i32; 3]; 2],
-) -> Result<u64> {
+) -> Result<Done<u64>> {
     let georeference = Georeference::new(&plan.frame, &plan.lattice, bounds, plan.unit, plan.crs.epsg);
-    let text = georeference.to_json();
-    directory::write_whole(&directory.georeference(), |file| file.write_all(text.as_bytes()))?;
-    let picture = draw_picture(directory, canvas, tiles)?;
-    directory::write_whole(&directory.preview(), |file| file.write_all(&picture))?;
-    let mut bytes = (text.len() + picture.len()) as u64;
+    let mut files = vec![
+        directory::write_result(&directory.georeference(), georeference.to_json().as_bytes())?,
+        directory::write_result(&directory.preview(), &draw_picture(directory, canvas, tiles)?)?,
+    ];
     if written.triangles <= MOST_TRIANGLES_IN_ONE_FILE && written.files <= MOST_TILES_IN_ONE_FILE {
         let paths: Vec<_> = (0..tiles).map(|tile| directory.tile(tile)).filter(|path| path.exists()).collect();
-        write_terrain(&directory.terrain(), &paths)?;
-        bytes += std::fs::metadata(directory.terrain()).map_err(Error::io("read", directory.terrain()))?.len();
+        write_terrain(&directory::partial(&directory.terrain()), &paths)?;
+        files.push(directory::written_result(&directory.terrain())?);
     }
-    Ok(bytes)
+    let bytes = files.iter().map(|file| file.bytes).sum();
+    Ok(Done::new(bytes, files))
 }
 
 fn draw_picture(directory: &Directory, canvas: &Canvas, tiles: usize) -> Result<Vec<u8>> {

@@ -1,14 +1,15 @@
 //! Step 2 of a job: decode every input once, spill the points to buckets of a grid, and build the tree whose leaves are
 //! the tiles. A bucket with more points than a tile may hold is spilled again to a finer grid of its own.
 
-use super::directory::Directory;
+use super::columns::{ColumnReader, ColumnWriter};
+use super::directory::{Directory, Written};
 use super::grid::{Grid, Span, Sums};
 use super::progress::Stage;
 use super::spill::{Block, Bucket, Buckets, Spill};
 use super::tree::{Cell, Kind, Node, Tree};
 use crate::geometry::Site;
 use crate::input::{Point, Rules, Source, Tally};
-use crate::{Error, Result};
+use crate::{Error, Result, interrupt};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
@@ -20,7 +21,7 @@ const BUCKETS_PER_TILE: u64 = 8;
 const MOST_BUCKETS: u64 = 16_384;
 
 /// The result of this step: the tree, where each leaf's points are, and what was met on the way.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default)]
 pub struct Partition {
     /// The tree over all points.
     pub tree: Tree,
@@ -30,6 +31,33 @@ pub struct Partition {
     pub summary: Summary,
     /// The size of the spill in bytes.
     pub spilled: u64,
+}
+
+impl Partition {
+    /// Writes it down for a run that goes on.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn save(&self, directory: &Directory) -> Result<Written> {
+        let rest = serde_json::to_vec(&(&self.tree, &self.summary, self.spilled));
+        let rest = rest.map_err(|e| Error::Broken(format!("the tree cannot be written down: {e}")))?;
+        let counts: Vec<u64> = self.blocks.iter().map(|blocks| blocks.len() as u64).collect();
+        ColumnWriter::default().push(&rest).push(&counts).push(&self.blocks.concat()).write(&directory.partition())
+    }
+
+    /// Reads what an earlier run has written down.
+    ///
+    /// # Errors
+    /// [`Error::Io`], or [`Error::Broken`] if the file is not whole.
+    pub fn load(directory: &Directory) -> Result<Partition> {
+        let mut columns = ColumnReader::open(&directory.partition())?;
+        let (rest, counts): (Vec<u8>, Vec<u64>) = (columns.column()?, columns.column()?);
+        let broken = |e: serde_json::Error| Error::Broken(format!("{}: {e}", directory.partition().display()));
+        let (tree, summary, spilled) = serde_json::from_slice(&rest).map_err(broken)?;
+        let mut blocks = columns.column::<Block>()?.into_iter();
+        let blocks = counts.iter().map(|&count| blocks.by_ref().take(count as usize).collect()).collect();
+        Ok(Partition { tree, blocks, summary, spilled })
+    }
 }
 
 /// What all inputs together held.
@@ -112,6 +140,7 @@ fn decode_all(task: &Task, records: u64, grid: &Grid, buckets: &Buckets, stage: 
     let allowed = (task.malformed_share * records as f64) as u64;
     let malformed = AtomicU64::new(0);
     let decode = |&(s, piece): &(usize, usize)| -> Result<Summary> {
+        interrupt::check()?;
         let (source, rules) = &task.sources[s];
         let mut scatter = Scatter::new(grid, buckets);
         let tally = source.decode(piece, rules, &mut |points| scatter.spill(points))?;
@@ -241,6 +270,7 @@ impl Divider<'_> {
         let grid = Grid::over(min, max, wanted_buckets(bucket.points, self.task.points_per_tile));
         let finer = Buckets::new(self.spill, grid.buckets(), self.task.memory);
         bucket.blocks.par_iter().try_for_each(|&block| {
+            interrupt::check()?;
             let mut points = Vec::new();
             self.spill.read(block, &mut points)?;
             Scatter::new(&grid, &finer).spill(&points)

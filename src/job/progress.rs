@@ -52,6 +52,7 @@ impl Progress {
             total,
             bar,
             done: AtomicU64::new(0),
+            taken_over: AtomicU64::new(0),
             start: now,
             cpu_start: cpu_seconds(),
             logged: Mutex::new(now),
@@ -78,6 +79,8 @@ pub struct Stage {
     total: u64,
     bar: ProgressBar,
     done: AtomicU64,
+    /// How much of it an earlier run had done.
+    taken_over: AtomicU64,
     start: Instant,
     cpu_start: f64,
     logged: Mutex<Instant>,
@@ -109,6 +112,16 @@ impl Stage {
         }
     }
 
+    /// Counts `amount` units as done by an earlier run: they say nothing of how fast this one is.
+    pub fn take_over(&self, amount: u64) {
+        let done = self.done.fetch_add(amount, Ordering::Relaxed) + amount;
+        self.taken_over.fetch_add(amount, Ordering::Relaxed);
+        if self.progress == Progress::Bars {
+            self.bar.set_position(done.min(self.total));
+            self.bar.reset_eta();
+        }
+    }
+
     fn log(&self, done: u64) {
         let Ok(mut logged) = self.logged.try_lock() else { return };
         if logged.elapsed() < LOG_EVERY || done >= self.total {
@@ -117,7 +130,8 @@ impl Stage {
         *logged = Instant::now();
         let elapsed = self.start.elapsed().as_secs_f64();
         let share = done as f64 / self.total.max(1) as f64;
-        let left = elapsed / share.max(1e-9) * (1.0 - share);
+        let here = done.saturating_sub(self.taken_over.load(Ordering::Relaxed));
+        let left = elapsed / here.max(1) as f64 * (self.total - done) as f64;
         eprintln!("{}: {:.0} % of {} {}, {:.0} s left", self.name, share * 100.0, self.total, self.unit, left);
     }
 

@@ -1,7 +1,7 @@
 //! What the steps leave for each other in the job directory, one type a file.
 
 use super::columns::{ColumnReader, ColumnWriter};
-use super::directory::Directory;
+use super::directory::{Directory, Written};
 use crate::Result;
 use crate::geometry::Site;
 use crate::output::normals::NormalSum;
@@ -43,11 +43,11 @@ pub struct Leaf {
 }
 
 impl Leaf {
-    /// Writes the file of `tile`; returns its size in bytes.
+    /// Writes the file of `tile`.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, directory: &Directory, tile: usize) -> Result<u64> {
+    pub fn save(&self, directory: &Directory, tile: usize) -> Result<Written> {
         let columns = ColumnWriter::default().push(&self.positions).push(&self.rgb).push(&self.class);
         // These files are most of what a job writes on its way: corners take two bytes where that is enough.
         let columns = if self.has_short_corners() {
@@ -93,11 +93,11 @@ pub struct Frontier {
 }
 
 impl Frontier {
-    /// Writes the file of `node`; returns its size in bytes.
+    /// Writes the file of `node`.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, directory: &Directory, node: usize) -> Result<u64> {
+    pub fn save(&self, directory: &Directory, node: usize) -> Result<Written> {
         ColumnWriter::default().push(&self.sites).push(&self.boundary).write(&directory.frontier(node))
     }
 
@@ -140,11 +140,11 @@ impl Seam {
         seam
     }
 
-    /// Writes the file of `node`; returns its size in bytes.
+    /// Writes the file of `node`.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, directory: &Directory, node: usize) -> Result<u64> {
+    pub fn save(&self, directory: &Directory, node: usize) -> Result<Written> {
         ColumnWriter::default().push(&self.index).push(&self.triangles).write(&directory.seam(node))
     }
 
@@ -174,11 +174,11 @@ pub struct RimDraft {
 }
 
 impl RimDraft {
-    /// Writes the file of `tile`; returns its size in bytes.
+    /// Writes the file of `tile`.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, directory: &Directory, tile: usize) -> Result<u64> {
+    pub fn save(&self, directory: &Directory, tile: usize) -> Result<Written> {
         ColumnWriter::default().push(&self.sums).push(&self.rgb).push(&self.class).write(&directory.rim_draft(tile))
     }
 
@@ -211,11 +211,11 @@ pub struct RimVertex {
 pub struct RimVertices(pub Vec<RimVertex>);
 
 impl RimVertices {
-    /// Writes the file of `tile`; returns its size in bytes.
+    /// Writes the file of `tile`.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, directory: &Directory, tile: usize) -> Result<u64> {
+    pub fn save(&self, directory: &Directory, tile: usize) -> Result<Written> {
         ColumnWriter::default().push(&self.0).write(&directory.rim(tile))
     }
 

@@ -74,8 +74,16 @@ pub fn run(config: &Config, coarser: Coarser) -> Result<Plan> {
     Ok(Plan { sources, records, lattice, extent, crs, unit, frame, warnings })
 }
 
+/// The files that `config` names, in their order, each once.
+///
+/// # Errors
+/// [`Error::Config`] if a pattern names none.
+pub fn inputs(config: &Config) -> Result<Vec<PathBuf>> {
+    expand(&config.input.files)
+}
+
 fn open_all(config: &Config) -> Result<Vec<Source>> {
-    let paths = expand(&config.input.files)?;
+    let paths = inputs(config)?;
     paths.par_iter().map(|path| input::open(path, &config.input.csv)).collect()
 }
 

@@ -2,6 +2,7 @@
 //! every tile that shares a vertex writes the same normal.
 
 use super::directory::Directory;
+use super::journal::Done;
 use super::records::{Frontier, Rim, RimDraft, RimVertex, RimVertices, Seam, SeamTriangle};
 use super::tree::Tree;
 use crate::output::frame::Frame;
@@ -12,7 +13,7 @@ use crate::{Error, Result};
 ///
 /// # Errors
 /// [`crate::Error::Io`] or [`crate::Error::Broken`] on the job directory.
-pub fn run(directory: &Directory, tree: &Tree, tile: usize, frame: &Frame) -> Result<()> {
+pub fn run(directory: &Directory, tree: &Tree, tile: usize, frame: &Frame) -> Result<Done<()>> {
     let frontier = Frontier::load(directory, tree.leaves[tile])?;
     let RimDraft { mut sums, rgb, class } = RimDraft::load(directory, tile)?;
     for [a, b, c] in seam_of(directory, tree, tile)? {
@@ -29,8 +30,8 @@ pub fn run(directory: &Directory, tree: &Tree, tile: usize, frame: &Frame) -> Re
         rgb: rgb[at],
         class: class[at] as u16,
     };
-    RimVertices(frontier.sites.iter().enumerate().map(finish).collect()).save(directory, tile)?;
-    Ok(())
+    let rim = RimVertices(frontier.sites.iter().enumerate().map(finish).collect());
+    Ok(Done::new((), vec![rim.save(directory, tile)?]))
 }
 
 /// All triangles of the seams that touch `tile`.

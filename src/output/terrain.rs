@@ -8,10 +8,10 @@ use serde_json::{Value, json};
 
 use super::glb::{GENERATOR, write_container};
 use super::read::Container;
-use crate::{Error, Result};
+use crate::{Error, Result, interrupt};
 
 /// Writes to `out` one GLB file with all tiles (GLB files of one job, at least one) as nodes of one scene, in this order.
-/// Only the JSON chunks are held in memory. The file appears under its name when it is whole.
+/// Only the JSON chunks are held in memory.
 ///
 /// Fails where the file would pass the 4 GiB that a GLB file can have, or a tile is damaged.
 pub fn write_terrain(out: &Path, tiles: &[PathBuf]) -> Result<()> {
@@ -21,20 +21,18 @@ pub fn write_terrain(out: &Path, tiles: &[PathBuf]) -> Result<()> {
     }
     let mut head = Vec::new();
     write_container(scene.json(), scene.length, &mut head)?;
-    let partial = out.with_extension("glb.partial");
-    let file = File::create(&partial).map_err(Error::io("create", &partial))?;
+    let file = File::create(out).map_err(Error::io("create", out))?;
     let mut file = BufWriter::with_capacity(1 << 20, file);
-    file.write_all(&head).map_err(Error::io("write", &partial))?;
+    file.write_all(&head).map_err(Error::io("write", out))?;
     for path in tiles {
+        interrupt::check()?;
         let mut container = Container::open(path)?;
         let copied = copy(&mut container.binary(), &mut file).map_err(Error::io("copy", path))?;
         if copied != container.binary_length {
             return Err(Error::input(path, "changed while it was read"));
         }
     }
-    let file = file.into_inner().map_err(|e| Error::io("write", &partial)(e.into_error()))?;
-    file.sync_all().map_err(Error::io("write", &partial))?;
-    std::fs::rename(&partial, out).map_err(Error::io("rename", &partial))
+    file.flush().map_err(Error::io("write", out))
 }
 
 /// The arrays of the joined document as JSON texts, which take far less room than parsed values.

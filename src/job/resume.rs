@@ -1,0 +1,190 @@
+//! Going on with a job that was interrupted: which of its steps stay, and what must be done again.
+//!
+//! A step stays if what it left is there and whole, or if nothing needs that any more. Steps depend on nothing but the job,
+//! so a step that is done again leaves the same as before, and the steps after it stay.
+
+use super::choose::Coarser;
+use super::directory::Directory;
+use super::fingerprint::{Change, Fingerprint, Head};
+use super::journal::{self, Entry, Journal, Step};
+use super::partition::Partition;
+use super::progress::Progress;
+use super::report::Report;
+use super::spill::Spill;
+use super::tree::Kind;
+use crate::{Error, Result};
+use rayon::prelude::*;
+use std::collections::{HashMap, HashSet};
+use std::path::PathBuf;
+
+/// Where a run begins.
+pub struct Start<'a> {
+    /// Knows which steps are finished.
+    pub journal: Journal<'a>,
+    /// What step 2 came to, if that is one of them.
+    pub partition: Option<Partition>,
+}
+
+/// How much coarser than at first the lattice of the interrupted job became, if it is the same job.
+///
+/// # Errors
+/// [`Error::Io`] if its journal cannot be read.
+pub fn coarser(directory: &Directory, fingerprint: &Fingerprint) -> Result<Coarser> {
+    let same = |head: &Head| !matches!(fingerprint.since(&head.fingerprint), Change::Mesh(_));
+    let head = journal::read(directory)?.map(|(head, _)| head);
+    Ok(head.filter(same).map(|head| head.coarser).unwrap_or_default())
+}
+
+/// The report of the job `head`, if the run that the directory holds was interrupted only while it cleaned up.
+///
+/// # Errors
+/// [`Error::Io`] if its journal cannot be read.
+pub fn complete(directory: &Directory, head: &Head) -> Result<Option<Report>> {
+    let Some((old, entries)) = journal::read(directory)? else { return Ok(None) };
+    let is_written = entries
+        .iter()
+        .any(|entry| entry.step == Step::Report && entry.files.iter().all(|file| file.is_whole(directory)));
+    if !is_written || old.coarser != head.coarser || head.fingerprint.since(&old.fingerprint) != Change::Nothing {
+        return Ok(None);
+    }
+    let text = std::fs::read(directory.report()).map_err(Error::io("read", directory.report()))?;
+    Ok(serde_json::from_slice(&text).ok())
+}
+
+/// Begins the run of the job `head` in its locked directory: goes on with the one that the directory holds, as far as it is the
+/// same and whole, and removes all else. With `fresh` nothing stays.
+///
+/// # Errors
+/// [`Error::Io`] on the job directory.
+pub fn start<'a>(directory: &'a Directory, head: &Head, fresh: bool, progress: Progress) -> Result<Start<'a>> {
+    let kept = if fresh { None } else { kept(directory, head, progress)? };
+    let kept = kept.unwrap_or_default();
+    if !kept.entries.is_empty() {
+        progress.note(&format!("going on with an interrupted run: {} steps are done", kept.entries.len()));
+    }
+    let journal = Journal::begin(directory, head, kept.entries)?;
+    directory.sweep(&kept.files)?;
+    Ok(Start { journal, partition: kept.partition })
+}
+
+/// What stays.
+#[derive(Default)]
+struct Kept {
+    entries: Vec<Entry>,
+    /// The files, by name, that the steps to come need.
+    files: HashSet<PathBuf>,
+    partition: Option<Partition>,
+}
+
+fn kept(directory: &Directory, head: &Head, progress: Progress) -> Result<Option<Kept>> {
+    let Some((old, mut entries)) = journal::read(directory)? else { return Ok(None) };
+    if entries.is_empty() || old.coarser != head.coarser {
+        return Ok(None);
+    }
+    match head.fingerprint.since(&old.fingerprint) {
+        Change::Nothing => {}
+        Change::Look(what) => {
+            progress.note(&format!("changed since the interrupted run: {what}; the tiles are written again"));
+            entries.retain(|entry| matches!(entry.step, Step::Partition | Step::Leaf(_) | Step::Node(_)));
+        }
+        Change::Mesh(what) => {
+            progress.note(&format!("changed since the interrupted run: {what}; starting over"));
+            return Ok(None);
+        }
+    }
+    let kept = Review::of(directory, entries)?.map(Review::kept);
+    if kept.is_none() {
+        progress.note("what the interrupted run has left is not whole; starting over");
+    }
+    Ok(kept)
+}
+
+/// The interrupted run, looked at.
+struct Review {
+    directory: Directory,
+    partition: Partition,
+    entries: HashMap<Step, Entry>,
+    /// Steps whose files are all there and whole.
+    whole: HashSet<Step>,
+    exported: bool,
+}
+
+impl Review {
+    /// `None` if its points are not there any more, though they are needed.
+    fn of(directory: &Directory, entries: Vec<Entry>) -> Result<Option<Review>> {
+        let is_whole = |entry: &&Entry| entry.files.par_iter().all(|file| file.is_whole(directory));
+        let whole: HashSet<Step> = entries.par_iter().filter(is_whole).map(|entry| entry.step).collect();
+        if !whole.contains(&Step::Partition) {
+            return Ok(None);
+        }
+        let partition = Partition::load(directory)?;
+        let entries = entries.into_iter().map(|entry| (entry.step, entry)).collect();
+        let mut review = Review { directory: directory.clone(), partition, entries, whole, exported: false };
+        review.exported = review.tiles().all(|tile| review.whole.contains(&Step::Export(tile)));
+        Ok(review.has_its_points().then_some(review))
+    }
+
+    fn tiles(&self) -> std::ops::Range<usize> {
+        0..self.partition.tree.leaves.len()
+    }
+
+    /// Whether `step` is finished, and what it left is whole where that is `needed`.
+    fn stays(&self, step: Step, needed: bool) -> bool {
+        if needed { self.whole.contains(&step) } else { self.entries.contains_key(&step) }
+    }
+
+    fn node_stays(&self, node: usize) -> bool {
+        match self.partition.tree.nodes[node].kind {
+            Kind::Leaf(tile) => self.leaf_stays(tile),
+            Kind::Inner(_) => self.stays(Step::Node(node), !self.exported),
+        }
+    }
+
+    fn stitch_stays(&self, tile: usize) -> bool {
+        self.stays(Step::Stitch(tile), !self.exported)
+    }
+
+    fn leaf_stays(&self, tile: usize) -> bool {
+        let parent = self.partition.tree.nodes[self.partition.tree.leaves[tile]].parent;
+        let is_used_up = self.whole.contains(&Step::Export(tile))
+            && self.stitch_stays(tile)
+            && parent.is_none_or(|parent| self.node_stays(parent));
+        self.stays(Step::Leaf(tile), !is_used_up)
+    }
+
+    /// Whether the spill still holds the points of all leaves that are to be done.
+    fn has_its_points(&self) -> bool {
+        let mut missing = self.tiles().filter(|&tile| !self.leaf_stays(tile)).peekable();
+        if missing.peek().is_none() {
+            return true;
+        }
+        let Ok(spill) = Spill::open(&self.directory.spill()) else { return false };
+        missing.par_bridge().all(|tile| self.partition.blocks[tile].par_iter().all(|&block| spill.is_whole(block)))
+    }
+
+    fn step_stays(&self, step: Step) -> bool {
+        match step {
+            Step::Leaf(tile) => self.leaf_stays(tile),
+            Step::Node(node) => self.node_stays(node),
+            Step::Stitch(tile) => self.stitch_stays(tile),
+            Step::Partition | Step::Export(_) => self.whole.contains(&step),
+            Step::Finish | Step::Report => self.exported && self.whole.contains(&step),
+        }
+    }
+
+    fn kept(self) -> Kept {
+        let stays: HashSet<Step> = self.entries.keys().copied().filter(|&step| self.step_stays(step)).collect();
+        let mut files = HashSet::new();
+        if !self.tiles().all(|tile| stays.contains(&Step::Leaf(tile))) {
+            files.insert(self.directory.name(&self.directory.spill()));
+        }
+        let is_used_up = |step: Step| matches!(step, Step::Leaf(tile) if stays.contains(&Step::Export(tile)));
+        let mut kept: Vec<Entry> = self.entries.into_values().filter(|entry| stays.contains(&entry.step)).collect();
+        for entry in kept.iter().filter(|entry| !is_used_up(entry.step)) {
+            files.extend(entry.files.iter().map(|file| file.name.clone()));
+        }
+        // The journal does not depend on the order of a hash map.
+        kept.sort_by_key(|entry| entry.step);
+        Kept { entries: kept, files, partition: Some(self.partition) }
+    }
+}
