@@ -61,7 +61,8 @@ impl Directory {
         }
         create_directory(&self.tiles())?;
         old.extend(files_in(&self.tiles())?.into_iter().filter(|path| is_numbered(path)));
-        let single = [self.spill(), self.partition(), self.terrain(), self.georeference(), self.report(), self.preview()];
+        let single =
+            [self.spill(), self.partition(), self.terrain(), self.georeference(), self.report(), self.preview()];
         old.extend(single.iter().map(|path| partial(path)));
         old.extend(single);
         old.iter().filter(|path| !keep.contains(&self.name(path))).try_for_each(|path| remove_file(path))

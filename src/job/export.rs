@@ -64,7 +64,8 @@ pub fn run(directory: &Directory, tree: &Tree, tile: usize, look: &Look, canvas:
     let content = sites.into_tile(look);
     let mut figures =
         TileFigures { triangles: content.triangles.len() as u64, seam_triangles, ..TileFigures::default() };
-    let mut files = vec![ColumnWriter::default().push(&canvas.draw(&content)).write(&directory.preview_fragment(tile))?];
+    let mut files =
+        vec![ColumnWriter::default().push(&canvas.draw(&content)).write(&directory.preview_fragment(tile))?];
     if !content.triangles.is_empty() {
         let mut bytes = Vec::new();
         encode_tile(&look.frame, &content, &mut bytes)?;

@@ -91,7 +91,8 @@ impl Entry {
     /// # Errors
     /// [`Error::Broken`] if they are those of another step.
     pub fn figures<T: DeserializeOwned>(&self) -> Result<T> {
-        serde_json::from_str(self.figures.get()).map_err(|e| Error::Broken(format!("the journal: {:?}: {e}", self.step)))
+        serde_json::from_str(self.figures.get())
+            .map_err(|e| Error::Broken(format!("the journal: {:?}: {e}", self.step)))
     }
 }
 

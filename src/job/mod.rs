@@ -131,8 +131,16 @@ fn attempt(
     }
     on_threads(threads, || {
         let resume::Start { journal, partition } = resume::start(&directory, head, options.fresh, progress)?;
-        let job =
-            Job { config, triangulator, plan: &plan, directory: &directory, journal: &journal, progress, threads, start };
+        let job = Job {
+            config,
+            triangulator,
+            plan: &plan,
+            directory: &directory,
+            journal: &journal,
+            progress,
+            threads,
+            start,
+        };
         let outcome = job.run(scanned, partition);
         let steps = journal.finished();
         // What is finished is on the disk before the message says so.
