@@ -33,7 +33,7 @@ pub enum Error {
     #[error("interrupted")]
     Interrupted,
     /// A job stopped, and what it has finished is kept (exit code as of the reason).
-    #[error("{why}\n{steps} finished steps are kept in {}: run the same command again to go on", job.display())]
+    #[error("{why}\nfinished steps are kept in {} ({steps}): run the same command again to go on", job.display())]
     Resumable {
         /// Why it stopped.
         why: Box<Error>,

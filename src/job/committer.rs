@@ -1,7 +1,7 @@
 //! The thread that brings records and results to the disk while others work: records of a second or so together, since what
 //! costs is to wait for the disk.
 
-use super::directory::{publish, remove_file};
+use super::directory::publish;
 use crate::{Error, Result, fault};
 use std::fs::File;
 use std::io::Write;
@@ -22,15 +22,12 @@ pub(super) struct Batch {
     pub(super) lines: String,
     /// Results to publish.
     pub(super) results: Vec<PathBuf>,
-    /// Files to remove once the lines are on the disk.
-    pub(super) obsolete: Vec<PathBuf>,
 }
 
 impl Batch {
     fn append(&mut self, mut other: Batch) {
         self.lines += &other.lines;
         self.results.append(&mut other.results);
-        self.obsolete.append(&mut other.obsolete);
     }
 }
 
@@ -159,7 +156,5 @@ fn commit(batch: Batch, mut file: &File, path: &Path) -> Result<()> {
     }
     file.write_all(lines).and_then(|()| file.sync_data()).map_err(Error::io("write", path))?;
     fault::point("committed");
-    batch.obsolete.iter().try_for_each(|path| remove_file(path))?;
-    fault::point("removed");
     Ok(())
 }

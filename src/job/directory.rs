@@ -1,7 +1,6 @@
 //! The job directory: everything a job knows, on disk, and where the results go. Any step can be run again from it.
 
 use crate::{Error, Result, fault};
-use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::{BTreeSet, HashSet};
 use std::fs::{self, File, TryLockError};
@@ -9,7 +8,7 @@ use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 
-/// The paths of a job. Files of a step that is called by index carry that index.
+/// The paths of a job.
 #[derive(Clone, Debug)]
 pub struct Directory {
     output: PathBuf,
@@ -48,21 +47,15 @@ impl Directory {
         Ok(lock)
     }
 
-    /// Makes the folders of the steps and of the tiles, and removes from them what an earlier run has left, but for the files
-    /// of `keep`, named as in the journal. Removes nothing that a job has not written.
+    /// Makes the folder of the tiles, and removes what an earlier run has left, but for the files of `keep`, named as in the
+    /// journal. Removes nothing that a job has not written.
     ///
     /// # Errors
-    /// [`Error::Io`] if a folder cannot be made or a file cannot be removed.
+    /// [`Error::Io`] if the folder cannot be made or a file cannot be removed.
     pub fn sweep(&self, keep: &HashSet<PathBuf>) -> Result<()> {
-        let mut old = Vec::new();
-        for folder in STEPS.map(|name| self.job.join(name)) {
-            create_directory(&folder)?;
-            old.extend(files_in(&folder)?);
-        }
         create_directory(&self.tiles())?;
-        old.extend(files_in(&self.tiles())?.into_iter().filter(|path| is_numbered(path)));
-        let single =
-            [self.spill(), self.partition(), self.terrain(), self.georeference(), self.report(), self.preview()];
+        let mut old = numbered_files(&self.tiles())?;
+        let single = [self.spill(), self.store(), self.terrain(), self.georeference(), self.report(), self.preview()];
         old.extend(single.iter().map(|path| partial(path)));
         old.extend(single);
         old.iter().filter(|path| !keep.contains(&self.name(path))).try_for_each(|path| remove_file(path))
@@ -83,28 +76,12 @@ impl Directory {
         self.output.join(name)
     }
 
-    /// Waits until all that the steps have left here is on the disk.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if it does not get there.
-    pub fn sync(&self) -> Result<()> {
-        for folder in STEPS.map(|name| self.job.join(name)) {
-            files_in(&folder)?.par_iter().try_for_each(|path| sync_file(path))?;
-            sync_directory(&folder)?;
-        }
-        Ok(())
-    }
-
     /// Removes all that only the steps need.
     ///
     /// # Errors
     /// [`Error::Io`] if that fails.
     pub fn clean_up(&self) -> Result<()> {
-        for directory in STEPS {
-            remove_directory(&self.job.join(directory))?;
-            fault::point("cleaning");
-        }
-        for file in [self.spill(), self.partition(), self.journal()] {
+        for file in [self.spill(), self.store(), self.journal()] {
             remove_file(&file)?;
             fault::point("cleaning");
         }
@@ -117,44 +94,14 @@ impl Directory {
         self.job.join("journal")
     }
 
-    /// What the steps after the partition know of it.
-    pub fn partition(&self) -> PathBuf {
-        self.job.join("partition")
-    }
-
     /// The points on their way from the inputs to the leaves.
     pub fn spill(&self) -> PathBuf {
         self.job.join("points.spill")
     }
 
-    /// The sites and closed triangles of leaf `tile`.
-    pub fn leaf(&self, tile: usize) -> PathBuf {
-        self.job.join(format!("leaves/{tile:06}.leaf"))
-    }
-
-    /// What tree node `node` hands to its parent.
-    pub fn frontier(&self, node: usize) -> PathBuf {
-        self.job.join(format!("nodes/{node:06}.frontier"))
-    }
-
-    /// The triangles that inner node `node` contributes.
-    pub fn seam(&self, node: usize) -> PathBuf {
-        self.job.join(format!("nodes/{node:06}.seam"))
-    }
-
-    /// The frontier of leaf `tile` as far as the leaf knows it.
-    pub fn rim_draft(&self, tile: usize) -> PathBuf {
-        self.job.join(format!("rims/{tile:06}.draft"))
-    }
-
-    /// The finished rim vertices of leaf `tile`.
-    pub fn rim(&self, tile: usize) -> PathBuf {
-        self.job.join(format!("rims/{tile:06}.rim"))
-    }
-
-    /// The pixels of the preview that `tile` covers.
-    pub fn preview_fragment(&self, tile: usize) -> PathBuf {
-        self.job.join(format!("preview/{tile:06}.pixels"))
+    /// The results of the steps.
+    pub fn store(&self) -> PathBuf {
+        self.job.join("steps.store")
     }
 
     /// The directory of the tiles.
@@ -187,9 +134,6 @@ impl Directory {
         self.output.join("preview.png")
     }
 }
-
-/// The folders in the job directory.
-const STEPS: [&str; 4] = ["leaves", "nodes", "rims", "preview"];
 
 /// Keeps other processes out of a job directory, also after a kill: the system lets go of it with the process.
 #[derive(Debug)]
@@ -226,28 +170,16 @@ impl Lock {
     }
 }
 
-/// A file that a step has written.
+/// A result of the job that a step has written. It waits under its [`partial`] name until [`publish`] has brought it to the
+/// disk.
 #[derive(Clone, Debug)]
 pub struct Written {
-    /// Where it is, or where a result will be once it is published.
+    /// Where it will be.
     pub path: PathBuf,
     /// Its size in bytes.
     pub bytes: u64,
     /// The XXH3 of its content.
     pub hash: u64,
-    /// Whether it is a result, which waits under its [`partial`] name until [`publish`] has brought it to the disk.
-    pub is_result: bool,
-}
-
-/// Writes a file of the job directory, whole or not at all. It need not reach the disk: who goes on after a power failure
-/// looks whether it did.
-///
-/// # Errors
-/// [`Error::Io`] if writing or renaming fails.
-pub fn write_whole(path: &Path, content: &[u8]) -> Result<Written> {
-    let written = write_result(path, content)?;
-    fs::rename(partial(path), path).map_err(Error::io("rename the finished file to", path))?;
-    Ok(Written { is_result: false, ..written })
 }
 
 /// Writes a result of the job under its [`partial`] name.
@@ -257,7 +189,7 @@ pub fn write_whole(path: &Path, content: &[u8]) -> Result<Written> {
 pub fn write_result(path: &Path, content: &[u8]) -> Result<Written> {
     let partial = partial(path);
     fs::write(&partial, content).map_err(Error::io("write", &partial))?;
-    Ok(Written { path: path.into(), bytes: content.len() as u64, hash: xxh3_64(content), is_result: true })
+    Ok(Written { path: path.into(), bytes: content.len() as u64, hash: xxh3_64(content) })
 }
 
 /// Writes `value` as JSON under the [`partial`] name of the result at `path`.
@@ -276,7 +208,7 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<Written> {
 /// [`Error::Io`] if it cannot be read.
 pub fn written_result(path: &Path) -> Result<Written> {
     let (bytes, hash) = digest(&partial(path))?;
-    Ok(Written { path: path.into(), bytes, hash, is_result: true })
+    Ok(Written { path: path.into(), bytes, hash })
 }
 
 /// The size and the XXH3 of the file at `path`.
@@ -336,15 +268,15 @@ fn create_directory(path: &Path) -> Result<()> {
     fs::create_dir_all(path).map_err(Error::io("create the directory", path))
 }
 
-fn files_in(folder: &Path) -> Result<Vec<PathBuf>> {
+/// The files in `folder` that are named as tiles are, whole or not.
+fn numbered_files(folder: &Path) -> Result<Vec<PathBuf>> {
     let entries = fs::read_dir(folder).map_err(Error::io("read", folder))?;
-    entries.map(|entry| Ok(entry.map_err(Error::io("read", folder))?.path())).collect()
-}
-
-/// Whether `path` is named as a tile is, whole or not.
-fn is_numbered(path: &Path) -> bool {
-    let number = path.file_stem().is_some_and(|s| s.to_string_lossy().bytes().all(|b| b.is_ascii_digit()));
-    number && path.extension().is_some_and(|e| e == "glb" || e == "partial")
+    let paths = entries.map(|entry| Ok(entry.map_err(Error::io("read", folder))?.path()));
+    let is_numbered = |path: &PathBuf| {
+        let number = path.file_stem().is_some_and(|s| s.to_string_lossy().bytes().all(|b| b.is_ascii_digit()));
+        number && path.extension().is_some_and(|e| e == "glb" || e == "partial")
+    };
+    paths.filter(|path| path.as_ref().map_or(true, is_numbered)).collect()
 }
 
 fn remove_directory(path: &Path) -> Result<()> {
@@ -383,7 +315,7 @@ mod tests {
         directory.clean_up().unwrap();
         fs::create_dir(output.path().join("job")).unwrap();
         drop(directory.create().unwrap());
-        fs::remove_file(output.path().join("job/lock")).unwrap();
+        fs::rename(output.path().join("job/lock"), output.path().join("job/theirs")).unwrap();
         let error = directory.create().unwrap_err();
         assert_eq!(error.exit_code(), 2, "{error}");
     }

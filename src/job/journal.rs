@@ -1,5 +1,5 @@
-//! The journal of a job: a line for every finished step, with the names, sizes and hashes of the files it left and the figures
-//! of the report. A run that was interrupted is gone on with from here.
+//! The journal of a job: a line for every finished step, with the places, sizes and hashes of what it left and the figures of
+//! the report. A run that was interrupted is gone on with from here.
 //!
 //! A line is the XXH3 of the text after it, a blank, and that text, which is JSON. The first line says what the job is. What
 //! follows the first line that is not whole was never written.
@@ -7,6 +7,7 @@
 use super::committer::{Batch, Committer};
 use super::directory::{self, Directory, Written};
 use super::fingerprint::Head;
+use super::store::Stored;
 use crate::{Error, Result, interrupt};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -40,16 +41,16 @@ pub enum Step {
 pub struct Done<T> {
     /// For the report.
     pub figures: T,
-    /// The files it has written.
-    pub files: Vec<Written>,
-    /// Files that nothing needs any more.
-    pub obsolete: Vec<PathBuf>,
+    /// What it has left for later steps.
+    pub stored: Vec<Stored>,
+    /// The results of the job that it has written.
+    pub results: Vec<Written>,
 }
 
 impl<T> Done<T> {
-    /// A step that makes no file obsolete.
-    pub fn new(figures: T, files: Vec<Written>) -> Done<T> {
-        Done { figures, files, obsolete: Vec::new() }
+    /// A step that writes no result of the job.
+    pub fn new(figures: T, stored: Vec<Stored>) -> Done<T> {
+        Done { figures, stored, results: Vec::new() }
     }
 }
 
@@ -58,12 +59,14 @@ impl<T> Done<T> {
 pub struct Entry {
     /// Which step.
     pub step: Step,
-    /// Its files.
-    pub files: Vec<Recorded>,
+    /// Its records in the store.
+    pub stored: Vec<Stored>,
+    /// Its results.
+    pub results: Vec<Recorded>,
     figures: Box<RawValue>,
 }
 
-/// A file as the journal knows it.
+/// A result of the job as the journal knows it.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct Recorded {
     /// Relative to the output directory.
@@ -83,7 +86,8 @@ impl Entry {
     fn new<T: Serialize>(directory: &Directory, step: Step, done: &Done<T>) -> Result<Entry> {
         let record = |file: &Written| Recorded { name: directory.name(&file.path), bytes: file.bytes, hash: file.hash };
         let figures = serde_json::value::to_raw_value(&done.figures).map_err(unwritable)?;
-        Ok(Entry { step, files: done.files.iter().map(record).collect(), figures })
+        let (stored, results) = (done.stored.clone(), done.results.iter().map(record).collect());
+        Ok(Entry { step, stored, results, figures })
     }
 
     /// The figures of its step.
@@ -184,15 +188,15 @@ impl<'a> Journal<'a> {
         self.record(step, work()?)
     }
 
-    /// Records that `step` is finished; returns its figures. Its results get their names, and what it makes obsolete goes, when
-    /// the record is committed: after a while, or by [`Journal::commit`].
+    /// Records that `step` is finished; returns its figures. Its results get their names when the record is committed: after a
+    /// while, or by [`Journal::commit`].
     ///
     /// # Errors
     /// [`Error::Io`] if an earlier record could not be committed.
     pub fn record<T: Serialize>(&self, step: Step, done: Done<T>) -> Result<T> {
         let entry = Entry::new(self.directory, step, &done)?;
-        let results = done.files.into_iter().filter(|file| file.is_result).map(|file| file.path).collect();
-        self.committer.add(Batch { lines: line(&entry)?, results, obsolete: done.obsolete })?;
+        let results = done.results.into_iter().map(|file| file.path).collect();
+        self.committer.add(Batch { lines: line(&entry)?, results })?;
         self.recorded.fetch_add(1, Ordering::Relaxed);
         Ok(done.figures)
     }

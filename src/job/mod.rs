@@ -26,6 +26,7 @@ pub mod sites;
 pub mod span;
 pub mod spill;
 pub mod stitch;
+pub mod store;
 pub mod tree;
 
 use crate::config::{ColorChoice, Config};
@@ -51,6 +52,7 @@ use scan::Plan;
 use span::Longest;
 use spill::Spill;
 use std::time::Instant;
+use store::{Key, Store};
 use tree::{Kind, Tree};
 
 /// Bytes that one site of a leaf takes while the leaf is triangulated: points, sort keys, sites, mesh and marks.
@@ -130,12 +132,13 @@ fn attempt(
         return Ok(report);
     }
     on_threads(threads, || {
-        let resume::Start { journal, partition } = resume::start(&directory, head, options.fresh, progress)?;
+        let resume::Start { store, journal, partition } = resume::start(&directory, head, options.fresh, progress)?;
         let job = Job {
             config,
             triangulator,
             plan: &plan,
             directory: &directory,
+            store: &store,
             journal: &journal,
             progress,
             threads,
@@ -188,6 +191,7 @@ struct Job<'a> {
     triangulator: &'a Triangulator,
     plan: &'a Plan,
     directory: &'a Directory,
+    store: &'a Store,
     journal: &'a Journal<'a>,
     progress: Progress,
     threads: usize,
@@ -197,7 +201,7 @@ struct Job<'a> {
 impl Job<'_> {
     /// Step 2 and all after it, but for what an earlier run has done of them.
     fn run(&self, scanned: StageFigures, partition: Option<Partition>) -> Result<Report> {
-        let Job { config, triangulator, plan, directory, journal, progress, .. } = *self;
+        let Job { config, triangulator, plan, directory, store, journal, progress, .. } = *self;
 
         let stage = progress.stage("read", plan.records, "points");
         let partition = self.partition(partition, &stage)?;
@@ -223,7 +227,8 @@ impl Job<'_> {
         let exported = stage.finish();
 
         let stage = progress.stage("finish", 1, "job");
-        let other_bytes = journal.step(Step::Finish, || finish(directory, plan, &written, &canvas, tiles, bounds))?;
+        let other_bytes =
+            journal.step(Step::Finish, || finish(directory, store, plan, &written, &canvas, tiles, bounds))?;
         journal.commit()?;
         stage.advance(1);
         let stages = vec![scanned, read, triangulated, stitched, exported, stage.finish()];
@@ -234,9 +239,10 @@ impl Job<'_> {
                 points: partition.summary.tally,
                 leaves,
                 gpu: triangulator.gpu().map(str::to_owned),
+                gpu_steps: triangulator.gpu_steps(),
                 tiles: written,
                 other_bytes,
-                temporary: partition.spilled + leaves.bytes,
+                temporary: partition.spilled + store.bytes(),
                 stages,
                 threads: self.threads,
                 memory: config.limits.memory.0,
@@ -244,7 +250,8 @@ impl Job<'_> {
                 wall_s: self.start.elapsed().as_secs_f64(),
             },
         );
-        journal.record(Step::Report, Done::new((), vec![directory::write_json(&directory.report(), &report)?]))?;
+        let results = vec![directory::write_json(&directory.report(), &report)?];
+        journal.record(Step::Report, Done { results, ..Done::new((), Vec::new()) })?;
         journal.commit()?;
         Ok(report)
     }
@@ -256,21 +263,20 @@ impl Job<'_> {
             return Ok(partition);
         }
         let partition = partition::run(&task(self.plan, self.config), self.directory, stage)?;
-        self.journal.record(Step::Partition, Done::new((), vec![partition.save(self.directory)?]))?;
+        self.journal.record(Step::Partition, Done::new((), vec![partition.save(self.store)?]))?;
         Ok(partition)
     }
 
-    /// Triangulates all leaves and merges every inner node as soon as its children are done.
+    /// Triangulates all leaves and merges every merge node as soon as all below it is done.
     fn triangulate(&self, partition: &Partition, longest: Longest, stage: &Stage) -> Result<LeafFigures> {
-        let tiles = 0..partition.tree.leaves.len();
-        let all_there = tiles.clone().all(|tile| self.journal.has(Step::Leaf(tile)));
+        let all_there = (0..partition.tree.leaves.len()).all(|tile| self.journal.has(Step::Leaf(tile)));
         let spill = if all_there { None } else { Some(Spill::open(&self.directory.spill())?) };
         let figures = Grower { job: self, partition, spill, longest, stage }.grow(0)?;
         self.journal.commit()?;
         if self.journal.is_worth_syncing() {
-            self.directory.sync()?;
+            self.store.sync()?;
         }
-        // From here on the leaves' own files are enough.
+        // From here on what is in the store is enough.
         directory::remove_file(&self.directory.spill())?;
         Ok(figures)
     }
@@ -278,7 +284,7 @@ impl Job<'_> {
     fn stitch_all(&self, tree: &Tree, look: &Look, stage: &Stage) -> Result<()> {
         (0..tree.leaves.len()).into_par_iter().try_for_each(|tile| {
             let step = Step::Stitch(tile);
-            self.journal.step(step, || stitch::run(self.directory, tree, tile, &look.frame))?;
+            self.journal.step(step, || stitch::run(self.store, tree, tile, &look.frame))?;
             self.count(stage, step, 1);
             Ok(())
         })
@@ -287,8 +293,8 @@ impl Job<'_> {
     fn export_all(&self, partition: &Partition, look: &Look, canvas: &Canvas, stage: &Stage) -> Result<TileFigures> {
         let export = |tile| {
             let step = Step::Export(tile);
-            let tree = &partition.tree;
-            let figures = self.journal.step(step, || export::run(self.directory, tree, tile, look, canvas))?;
+            let (directory, store, tree) = (self.directory, self.store, &partition.tree);
+            let figures = self.journal.step(step, || export::run(directory, store, tree, tile, look, canvas))?;
             self.count(stage, step, partition.blocks[tile].iter().map(|block| block.points as u64).sum());
             Ok(figures)
         };
@@ -350,7 +356,7 @@ struct Grower<'a> {
 
 impl Grower<'_> {
     fn grow(&self, node: usize) -> Result<LeafFigures> {
-        let Job { config, directory, journal, .. } = *self.job;
+        let Job { config, store, journal, .. } = *self.job;
         match self.partition.tree.nodes[node].kind {
             Kind::Leaf(tile) => {
                 let figures = journal.step(Step::Leaf(tile), || self.leaf(tile))?;
@@ -361,22 +367,24 @@ impl Grower<'_> {
                 let (low, high) = rayon::join(|| self.grow(low), || self.grow(high));
                 let (mut figures, high) = (low?, high?);
                 figures += high;
-                // Nodes below the root may be merged at once on all threads.
-                let share = if node == 0 { 1 } else { rayon::current_num_threads() as u64 };
-                let memory = config.limits.memory.0 / 4 * 3 / share;
-                let merge = || merge::run(directory, &self.partition.tree, node, memory, self.longest);
-                journal.step(Step::Node(node), merge)?;
+                if self.partition.tree.is_merge(node) {
+                    // Nodes below the root may be merged at once on all threads.
+                    let share = if node == 0 { 1 } else { rayon::current_num_threads() as u64 };
+                    let memory = config.limits.memory.0 / 4 * 3 / share;
+                    let merge = || merge::run(store, &self.partition.tree, node, memory, self.longest);
+                    journal.step(Step::Node(node), merge)?;
+                }
                 Ok(figures)
             }
         }
     }
 
     fn leaf(&self, tile: usize) -> Result<Done<LeafFigures>> {
-        let Job { config, directory, triangulator, .. } = *self.job;
+        let Job { config, store, triangulator, .. } = *self.job;
         let task = leaf::Task { duplicates: config.input.duplicates, triangulator, longest: self.longest };
         let spill = self.spill.as_ref();
         let spill = spill.ok_or_else(|| Error::Broken(format!("the points of tile {tile} are gone")))?;
-        leaf::run(directory, self.partition, spill, tile, task)
+        leaf::run(store, self.partition, spill, tile, task)
     }
 }
 
@@ -396,6 +404,7 @@ fn look(config: &Config, plan: &Plan, summary: &Summary, bounds: [[i32; 3]; 2]) 
 /// Writes what stands beside the tiles; its figure is its bytes.
 fn finish(
     directory: &Directory,
+    store: &Store,
     plan: &Plan,
     written: &TileFigures,
     canvas: &Canvas,
@@ -403,23 +412,23 @@ fn finish(
     bounds: [[i32; 3]; 2],
 ) -> Result<Done<u64>> {
     let georeference = Georeference::new(&plan.frame, &plan.lattice, bounds, plan.unit, plan.crs.epsg);
-    let mut files = vec![
+    let mut results = vec![
         directory::write_result(&directory.georeference(), georeference.to_json().as_bytes())?,
-        directory::write_result(&directory.preview(), &draw_picture(directory, canvas, tiles)?)?,
+        directory::write_result(&directory.preview(), &draw_picture(store, canvas, tiles)?)?,
     ];
     if written.triangles <= MOST_TRIANGLES_IN_ONE_FILE && written.files <= MOST_TILES_IN_ONE_FILE {
         let paths: Vec<_> = (0..tiles).map(|tile| directory.tile(tile)).filter(|path| path.exists()).collect();
         write_terrain(&directory::partial(&directory.terrain()), &paths)?;
-        files.push(directory::written_result(&directory.terrain())?);
+        results.push(directory::written_result(&directory.terrain())?);
     }
-    let bytes = files.iter().map(|file| file.bytes).sum();
-    Ok(Done::new(bytes, files))
+    let bytes = results.iter().map(|file| file.bytes).sum();
+    Ok(Done { results, ..Done::new(bytes, Vec::new()) })
 }
 
-fn draw_picture(directory: &Directory, canvas: &Canvas, tiles: usize) -> Result<Vec<u8>> {
+fn draw_picture(store: &Store, canvas: &Canvas, tiles: usize) -> Result<Vec<u8>> {
     let mut picture = Picture::new(canvas);
     for tile in 0..tiles {
-        picture.add(tile as u32, &ColumnReader::open(&directory.preview_fragment(tile))?.column::<Texel>()?);
+        picture.add(tile as u32, &ColumnReader::open(store, Key::Pixels(tile))?.column::<Texel>()?);
     }
     Ok(picture.png())
 }

@@ -2,10 +2,11 @@
 //! the tiles. A bucket with more points than a tile may hold is spilled again to a finer grid of its own.
 
 use super::columns::{ColumnReader, ColumnWriter};
-use super::directory::{Directory, Written};
+use super::directory::Directory;
 use super::grid::{Grid, Span, Sums};
 use super::progress::Stage;
 use super::spill::{Block, Bucket, Buckets, Spill};
+use super::store::{Key, Store, Stored};
 use super::tree::{Cell, Kind, Node, Tree};
 use crate::geometry::Site;
 use crate::input::{Point, Rules, Source, Tally};
@@ -38,21 +39,21 @@ impl Partition {
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn save(&self, directory: &Directory) -> Result<Written> {
+    pub fn save(&self, store: &Store) -> Result<Stored> {
         let rest = serde_json::to_vec(&(&self.tree, &self.summary, self.spilled));
         let rest = rest.map_err(|e| Error::Broken(format!("the tree cannot be written down: {e}")))?;
         let counts: Vec<u64> = self.blocks.iter().map(|blocks| blocks.len() as u64).collect();
-        ColumnWriter::default().push(&rest).push(&counts).push(&self.blocks.concat()).write(&directory.partition())
+        ColumnWriter::default().push(&rest).push(&counts).push(&self.blocks.concat()).write(store, Key::Partition)
     }
 
     /// Reads what an earlier run has written down.
     ///
     /// # Errors
-    /// [`Error::Io`], or [`Error::Broken`] if the file is not whole.
-    pub fn load(directory: &Directory) -> Result<Partition> {
-        let mut columns = ColumnReader::open(&directory.partition())?;
+    /// [`Error::Io`], or [`Error::Broken`] if there is none.
+    pub fn load(store: &Store) -> Result<Partition> {
+        let mut columns = ColumnReader::open(store, Key::Partition)?;
         let (rest, counts): (Vec<u8>, Vec<u64>) = (columns.column()?, columns.column()?);
-        let broken = |e: serde_json::Error| Error::Broken(format!("{}: {e}", directory.partition().display()));
+        let broken = |e: serde_json::Error| Error::Broken(format!("{}: {e}", store.path().display()));
         let (tree, summary, spilled) = serde_json::from_slice(&rest).map_err(broken)?;
         let mut blocks = columns.column::<Block>()?.into_iter();
         let blocks = counts.iter().map(|&count| blocks.by_ref().take(count as usize).collect()).collect();

@@ -1,7 +1,7 @@
-//! What the steps leave for each other in the job directory, one type a file.
+//! What the steps leave for each other in the job's store, one type a record.
 
 use super::columns::{ColumnReader, ColumnWriter};
-use super::directory::{Directory, Written};
+use super::store::{Key, Store, Stored};
 use crate::Result;
 use crate::geometry::Site;
 use crate::output::normals::NormalSum;
@@ -43,27 +43,27 @@ pub struct Leaf {
 }
 
 impl Leaf {
-    /// Writes the file of `tile`.
+    /// Writes the record of `tile`.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, directory: &Directory, tile: usize) -> Result<Written> {
+    pub fn save(&self, store: &Store, tile: usize) -> Result<Stored> {
         let columns = ColumnWriter::default().push(&self.positions).push(&self.rgb).push(&self.class);
-        // These files are most of what a job writes on its way: corners take two bytes where that is enough.
+        // These records are most of what a job writes on its way: corners take two bytes where that is enough.
         let columns = if self.has_short_corners() {
             columns.push::<[u16; 3]>(&self.triangles.iter().map(|t| t.map(|v| v as u16)).collect::<Vec<_>>())
         } else {
             columns.push(&self.triangles)
         };
-        columns.write(&directory.leaf(tile))
+        columns.write(store, Key::Leaf(tile))
     }
 
-    /// Reads the file of `tile`.
+    /// Reads the record of `tile`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if the file is not whole.
-    pub fn load(directory: &Directory, tile: usize) -> Result<Leaf> {
-        let mut columns = ColumnReader::open(&directory.leaf(tile))?;
+    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if there is none.
+    pub fn load(store: &Store, tile: usize) -> Result<Leaf> {
+        let mut columns = ColumnReader::open(store, Key::Leaf(tile))?;
         let mut leaf = Leaf {
             positions: columns.column()?,
             rgb: columns.column()?,
@@ -93,20 +93,20 @@ pub struct Frontier {
 }
 
 impl Frontier {
-    /// Writes the file of `node`.
+    /// Writes the record of `node`.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, directory: &Directory, node: usize) -> Result<Written> {
-        ColumnWriter::default().push(&self.sites).push(&self.boundary).write(&directory.frontier(node))
+    pub fn save(&self, store: &Store, node: usize) -> Result<Stored> {
+        ColumnWriter::default().push(&self.sites).push(&self.boundary).write(store, Key::Frontier(node))
     }
 
-    /// Reads the file of `node`.
+    /// Reads the record of `node`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if the file is not whole.
-    pub fn load(directory: &Directory, node: usize) -> Result<Frontier> {
-        let mut columns = ColumnReader::open(&directory.frontier(node))?;
+    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if there is none.
+    pub fn load(store: &Store, node: usize) -> Result<Frontier> {
+        let mut columns = ColumnReader::open(store, Key::Frontier(node))?;
         Ok(Frontier { sites: columns.column()?, boundary: columns.column()? })
     }
 }
@@ -140,20 +140,20 @@ impl Seam {
         seam
     }
 
-    /// Writes the file of `node`.
+    /// Writes the record of `node`.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, directory: &Directory, node: usize) -> Result<Written> {
-        ColumnWriter::default().push(&self.index).push(&self.triangles).write(&directory.seam(node))
+    pub fn save(&self, store: &Store, node: usize) -> Result<Stored> {
+        ColumnWriter::default().push(&self.index).push(&self.triangles).write(store, Key::Seam(node))
     }
 
-    /// The triangles of `node` that touch `tile`, from its file.
+    /// The triangles of `node` that touch `tile`, from its record.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if the file is not whole.
-    pub fn touching(directory: &Directory, node: usize, tile: usize) -> Result<Vec<SeamTriangle>> {
-        let mut columns = ColumnReader::open(&directory.seam(node))?;
+    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if there is none.
+    pub fn touching(store: &Store, node: usize, tile: usize) -> Result<Vec<SeamTriangle>> {
+        let mut columns = ColumnReader::open(store, Key::Seam(node))?;
         let index: Vec<[u32; 3]> = columns.column()?;
         match index.binary_search_by_key(&(tile as u32), |entry| entry[0]) {
             Ok(at) => columns.column_part(index[at][1] as usize, index[at][2] as usize),
@@ -174,20 +174,20 @@ pub struct RimDraft {
 }
 
 impl RimDraft {
-    /// Writes the file of `tile`.
+    /// Writes the record of `tile`.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, directory: &Directory, tile: usize) -> Result<Written> {
-        ColumnWriter::default().push(&self.sums).push(&self.rgb).push(&self.class).write(&directory.rim_draft(tile))
+    pub fn save(&self, store: &Store, tile: usize) -> Result<Stored> {
+        ColumnWriter::default().push(&self.sums).push(&self.rgb).push(&self.class).write(store, Key::RimDraft(tile))
     }
 
-    /// Reads the file of `tile`.
+    /// Reads the record of `tile`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if the file is not whole.
-    pub fn load(directory: &Directory, tile: usize) -> Result<RimDraft> {
-        let mut columns = ColumnReader::open(&directory.rim_draft(tile))?;
+    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if there is none.
+    pub fn load(store: &Store, tile: usize) -> Result<RimDraft> {
+        let mut columns = ColumnReader::open(store, Key::RimDraft(tile))?;
         Ok(RimDraft { sums: columns.column()?, rgb: columns.column()?, class: columns.column()? })
     }
 }
@@ -211,20 +211,20 @@ pub struct RimVertex {
 pub struct RimVertices(pub Vec<RimVertex>);
 
 impl RimVertices {
-    /// Writes the file of `tile`.
+    /// Writes the record of `tile`.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, directory: &Directory, tile: usize) -> Result<Written> {
-        ColumnWriter::default().push(&self.0).write(&directory.rim(tile))
+    pub fn save(&self, store: &Store, tile: usize) -> Result<Stored> {
+        ColumnWriter::default().push(&self.0).write(store, Key::Rim(tile))
     }
 
-    /// Reads the file of `tile`.
+    /// Reads the record of `tile`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if the file is not whole.
-    pub fn load(directory: &Directory, tile: usize) -> Result<RimVertices> {
-        Ok(RimVertices(ColumnReader::open(&directory.rim(tile))?.column()?))
+    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if there is none.
+    pub fn load(store: &Store, tile: usize) -> Result<RimVertices> {
+        Ok(RimVertices(ColumnReader::open(store, Key::Rim(tile))?.column()?))
     }
 
     /// The vertex of `site`.

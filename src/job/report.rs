@@ -6,6 +6,8 @@ use super::progress::StageFigures;
 use super::scan::Plan;
 use crate::geometry::lattice::Lattice;
 use crate::input::Tally;
+use crate::triangulation::Outcome;
+use crate::voronoi::STEPS;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -32,6 +34,8 @@ pub struct Report {
     pub leaves: LeafFigures,
     /// The GPU that helped.
     pub gpu: Option<String>,
+    /// What the pipeline's steps took of all leaves together: on the workers, and on the GPU itself where it tells.
+    pub steps: Steps,
     /// The lattice.
     pub lattice: Lattice,
     /// Unit of x and y.
@@ -58,6 +62,33 @@ pub struct Report {
     pub warnings: Vec<String>,
 }
 
+/// Seconds by step of the pipeline.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Steps {
+    /// On the workers, all of them together.
+    pub cpu: Vec<StepSeconds>,
+    /// On the GPU.
+    pub gpu: Vec<StepSeconds>,
+}
+
+/// One step.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct StepSeconds {
+    /// Its name in the paper.
+    pub step: String,
+    /// Seconds.
+    pub seconds: f64,
+}
+
+impl Steps {
+    fn new(leaves: &LeafFigures, gpu: &[(&'static str, f64)]) -> Steps {
+        let named = |(step, seconds): (&str, f64)| StepSeconds { step: step.into(), seconds };
+        let nanoseconds = leaves.outcome.counts.nanoseconds;
+        let cpu = STEPS.into_iter().zip(nanoseconds.map(|ns| ns as f64 / 1e9)).filter(|(_, seconds)| *seconds > 0.0);
+        Steps { cpu: cpu.map(named).collect(), gpu: gpu.iter().copied().map(named).collect() }
+    }
+}
+
 /// The figures of the stages, before they become a report.
 pub struct Parts {
     /// What was read.
@@ -66,6 +97,8 @@ pub struct Parts {
     pub leaves: LeafFigures,
     /// The GPU that helped.
     pub gpu: Option<String>,
+    /// Seconds by step on that GPU.
+    pub gpu_steps: Vec<(&'static str, f64)>,
     /// What the tiles came to.
     pub tiles: TileFigures,
     /// Bytes of results beside the tiles.
@@ -109,6 +142,7 @@ impl Report {
             points: parts.points,
             leaves: parts.leaves,
             gpu: parts.gpu,
+            steps: Steps::new(&parts.leaves, &parts.gpu_steps),
             lattice: plan.lattice.clone(),
             unit: plan.unit.into(),
             crs: plan.crs.name.clone(),
@@ -150,6 +184,12 @@ impl fmt::Display for Report {
             )?;
         }
         writeln!(f, "{:<12} {:>9.2}\n", "all", self.wall_s)?;
+        for (unit, steps) in [("cpu s", &self.steps.cpu), ("gpu s", &self.steps.gpu)] {
+            for (i, StepSeconds { step, seconds }) in steps.iter().enumerate() {
+                let head = if i == 0 { format!("triangulate by step, {unit}") } else { String::new() };
+                writeln!(f, "{head:<28} {step:<40} {seconds:>9.2}")?;
+            }
+        }
         let mut row = |name: &str, value: String| writeln!(f, "{name:<28} {value}");
         row("points read", grouped(self.points.read))?;
         row("  withheld", grouped(self.points.withheld))?;
@@ -161,6 +201,23 @@ impl fmt::Display for Report {
         row("triangles", grouped(self.triangles))?;
         row("  crossing tile borders", format!("{:.3} %", self.seam_share * 100.0))?;
         row("tiles", grouped(self.tiles))?;
+        let Outcome { pipeline, reference, crowded, not_accepted, counts } = &self.leaves.outcome;
+        let leaves = pipeline + reference + crowded + not_accepted;
+        row(
+            "leaves",
+            format!(
+                "{}, of them by spade {} ({crowded} crowded, {not_accepted} not accepted, {reference} other)",
+                grouped(leaves),
+                grouped(leaves - pipeline)
+            ),
+        )?;
+        row("  sites moved to other pixels", grouped(counts.moved))?;
+        row("  sites missing, inserted", grouped(counts.missing))?;
+        row(
+            "  inverted triangles",
+            format!("{}, sites taken out {}", grouped(counts.inverted), grouped(counts.removed)),
+        )?;
+        row("  edges flipped", grouped(counts.flips))?;
         if let Some(gpu) = &self.gpu {
             row("  with the help of a GPU", format!("{} ({gpu})", grouped(self.leaves.outcome.counts.on_gpu)))?;
         }

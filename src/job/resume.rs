@@ -8,17 +8,19 @@ use super::directory::Directory;
 use super::fingerprint::{Change, Fingerprint, Head};
 use super::journal::{self, Entry, Journal, Step};
 use super::partition::Partition;
-use super::progress::Progress;
+use super::progress::{Progress, Stage};
 use super::report::Report;
 use super::spill::Spill;
-use super::tree::Kind;
-use crate::{Error, Result};
+use super::store::{Store, Stored};
+use crate::{Error, Result, interrupt};
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 
 /// Where a run begins.
 pub struct Start<'a> {
+    /// Holds what the finished steps have left.
+    pub store: Store,
     /// Knows which steps are finished.
     pub journal: Journal<'a>,
     /// What step 2 came to, if that is one of them.
@@ -43,7 +45,7 @@ pub fn complete(directory: &Directory, head: &Head) -> Result<Option<Report>> {
     let Some((old, entries)) = journal::read(directory)? else { return Ok(None) };
     let is_written = entries
         .iter()
-        .any(|entry| entry.step == Step::Report && entry.files.iter().all(|file| file.is_whole(directory)));
+        .any(|entry| entry.step == Step::Report && entry.results.iter().all(|file| file.is_whole(directory)));
     if !is_written || old.coarser != head.coarser || head.fingerprint.since(&old.fingerprint) != Change::Nothing {
         return Ok(None);
     }
@@ -62,9 +64,12 @@ pub fn start<'a>(directory: &'a Directory, head: &Head, fresh: bool, progress: P
     if !kept.entries.is_empty() {
         progress.note(&format!("going on with an interrupted run: {} steps are done", kept.entries.len()));
     }
+    let stored: Vec<Stored> = kept.entries.iter().flat_map(|entry| &entry.stored).copied().collect();
     let journal = Journal::begin(directory, head, kept.entries)?;
     directory.sweep(&kept.files)?;
-    Ok(Start { journal, partition: kept.partition })
+    let path = directory.store();
+    let store = if stored.is_empty() { Store::create(&path)? } else { Store::open(&path, stored.iter())? };
+    Ok(Start { store, journal, partition: kept.partition })
 }
 
 /// What stays.
@@ -92,7 +97,9 @@ fn kept(directory: &Directory, head: &Head, progress: Progress) -> Result<Option
             return Ok(None);
         }
     }
-    let kept = Review::of(directory, entries)?.map(Review::kept);
+    let stage = progress.stage("check", entries.len() as u64, "steps");
+    let kept = Review::of(directory, entries, &stage)?.map(Review::kept);
+    stage.finish();
     if kept.is_none() {
         progress.note("what the interrupted run has left is not whole; starting over");
     }
@@ -104,20 +111,32 @@ struct Review {
     directory: Directory,
     partition: Partition,
     entries: HashMap<Step, Entry>,
-    /// Steps whose files are all there and whole.
+    /// Steps of which all that they have left is there and whole.
     whole: HashSet<Step>,
+    /// Whether the step of every tile's export is one of them.
     exported: bool,
 }
 
 impl Review {
     /// `None` if its points are not there any more, though they are needed.
-    fn of(directory: &Directory, entries: Vec<Entry>) -> Result<Option<Review>> {
-        let is_whole = |entry: &&Entry| entry.files.par_iter().all(|file| file.is_whole(directory));
-        let whole: HashSet<Step> = entries.par_iter().filter(is_whole).map(|entry| entry.step).collect();
+    fn of(directory: &Directory, entries: Vec<Entry>, stage: &Stage) -> Result<Option<Review>> {
+        let stored = entries.iter().flat_map(|entry| &entry.stored);
+        let Ok(store) = Store::open(&directory.store(), stored) else { return Ok(None) };
+        let is_whole = |entry: &Entry| {
+            entry.stored.iter().all(|stored| store.is_whole(stored))
+                && entry.results.iter().all(|file| file.is_whole(directory))
+        };
+        let check = |entry: &Entry| {
+            interrupt::check()?;
+            stage.advance(1);
+            Ok(is_whole(entry).then_some(entry.step))
+        };
+        let whole =
+            entries.par_iter().filter_map(|entry| check(entry).transpose()).collect::<Result<HashSet<Step>>>()?;
         if !whole.contains(&Step::Partition) {
             return Ok(None);
         }
-        let partition = Partition::load(directory)?;
+        let partition = Partition::load(&store)?;
         let entries = entries.into_iter().map(|entry| (entry.step, entry)).collect();
         let mut review = Review { directory: directory.clone(), partition, entries, whole, exported: false };
         review.exported = review.tiles().all(|tile| review.whole.contains(&Step::Export(tile)));
@@ -134,10 +153,7 @@ impl Review {
     }
 
     fn node_stays(&self, node: usize) -> bool {
-        match self.partition.tree.nodes[node].kind {
-            Kind::Leaf(tile) => self.leaf_stays(tile),
-            Kind::Inner(_) => self.stays(Step::Node(node), !self.exported),
-        }
+        self.stays(Step::Node(node), !self.exported)
     }
 
     fn stitch_stays(&self, tile: usize) -> bool {
@@ -145,10 +161,11 @@ impl Review {
     }
 
     fn leaf_stays(&self, tile: usize) -> bool {
-        let parent = self.partition.tree.nodes[self.partition.tree.leaves[tile]].parent;
+        let tree = &self.partition.tree;
+        let mut above = tree.merges_above(tree.leaves[tile]);
         let is_used_up = self.whole.contains(&Step::Export(tile))
             && self.stitch_stays(tile)
-            && parent.is_none_or(|parent| self.node_stays(parent));
+            && above.next().is_none_or(|node| self.node_stays(node));
         self.stays(Step::Leaf(tile), !is_used_up)
     }
 
@@ -178,11 +195,9 @@ impl Review {
         if !self.tiles().all(|tile| stays.contains(&Step::Leaf(tile))) {
             files.insert(self.directory.name(&self.directory.spill()));
         }
-        let is_used_up = |step: Step| matches!(step, Step::Leaf(tile) if stays.contains(&Step::Export(tile)));
         let mut kept: Vec<Entry> = self.entries.into_values().filter(|entry| stays.contains(&entry.step)).collect();
-        for entry in kept.iter().filter(|entry| !is_used_up(entry.step)) {
-            files.extend(entry.files.iter().map(|file| file.name.clone()));
-        }
+        files.extend(kept.iter().flat_map(|entry| &entry.results).map(|file| file.name.clone()));
+        files.insert(self.directory.name(&self.directory.store()));
         // The journal does not depend on the order of a hash map.
         kept.sort_by_key(|entry| entry.step);
         Kept { entries: kept, files, partition: Some(self.partition) }

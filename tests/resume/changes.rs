@@ -1,6 +1,7 @@
 //! What has changed since a run was interrupted is named, and decides from where it goes on.
 
 use std::fs;
+use std::path::Path;
 
 use crate::clouds;
 use crate::rig::{Rig, Run, Setup};
@@ -44,13 +45,12 @@ fn another_look_keeps_the_mesh() {
         ("[output] color", Setup { output: base().output.replace(elevation, "color = \"none\""), ..base() }),
         ("[output] normals", base().output("normals = false")),
     ];
-    // Once among the leaves, once among the tiles: the leaves of the tiles that are written are gone by then.
-    for (key, setup) in &looks {
-        let (said, resumed) = change_to(&mut rig, 12, setup);
-        assert!(said.contains(key) && said.contains("written again") && resumed >= 12, "{resumed}: {said}");
+    // Once among the leaves, once among the tiles.
+    for ((key, setup), count) in looks.iter().zip([12, 45]) {
+        let (said, resumed) = change_to(&mut rig, count, setup);
+        assert!(said.contains(key) && said.contains("written again"), "{said}");
+        assert!(resumed >= 12 && resumed < count.max(13), "{resumed} steps");
     }
-    let (said, _) = change_to(&mut rig, 55, &looks[0].1);
-    assert!(said.contains("[output] color"), "{said}");
 }
 
 #[test]
@@ -121,37 +121,50 @@ fn a_finished_job_runs_from_the_start() {
     assert_eq!(rig.completes("twice")["resumed"], 0);
 }
 
+/// Changes a byte at each of `places`, parts of its length.
+fn damage(path: &Path, places: &[f64]) {
+    let mut bytes = fs::read(path).unwrap();
+    let length = bytes.len() as f64;
+    places.iter().for_each(|place| bytes[(place * length) as usize] ^= 0x10);
+    fs::write(path, bytes).unwrap();
+}
+
 #[test]
-fn files_that_are_damaged_or_gone_are_made_again() {
+fn what_is_damaged_is_made_again() {
     let rig = rig();
-    // Some time among the leaves, the rims and the tiles: 11 to 20 leaves.
-    for count in [10, 25, 45, 60] {
-        for damage in 0..3 {
+    // Among the leaves, the rims and the tiles.
+    for count in [10, 20, 30, 45] {
+        for places in [&[0.1][..], &[0.5, 0.9], &[0.999]] {
             rig.forget();
-            if !rig.run_to("committed", count).was_killed() {
-                break;
-            }
-            let job = rig.out().join("job");
-            let folders = ["leaves", "nodes", "rims", "preview"].map(|name| job.join(name));
-            let tiles = rig.out().join("tiles");
-            for folder in folders.iter().chain([&tiles]) {
-                let mut paths: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
-                paths.sort();
-                let Some(path) = paths.get(damage * paths.len() / 3) else { continue };
-                match damage {
-                    0 => fs::remove_file(path).unwrap(),
-                    1 => fs::write(path, b"").unwrap(),
-                    _ => {
-                        let mut bytes = fs::read(path).unwrap();
-                        let middle = bytes.len() / 2;
-                        bytes[middle] ^= 1;
-                        fs::write(path, bytes).unwrap();
-                    }
-                }
-            }
-            rig.completes(&format!("damage {damage} after {count}"));
+            assert!(rig.run_to("committed", count).was_killed());
+            let store = rig.out().join("job/steps.store");
+            damage(&store, places);
+            rig.completes(&format!("damage at {places:?} after {count} commits"));
+        }
+        rig.forget();
+        assert!(rig.run_to("committed", count).was_killed());
+        let store = rig.out().join("job/steps.store");
+        let half = fs::metadata(&store).unwrap().len() / 2;
+        fs::File::options().write(true).open(&store).unwrap().set_len(half).unwrap();
+        rig.completes(&format!("half a store after {count} commits"));
+    }
+}
+
+#[test]
+fn tiles_that_are_damaged_or_gone_are_written_again() {
+    let rig = rig();
+    assert!(rig.run_to("committed", 45).was_killed());
+    let tiles = || fs::read_dir(rig.out().join("tiles")).unwrap().map(|entry| entry.unwrap().path());
+    assert!(tiles().count() >= 3);
+    for (i, path) in tiles().enumerate() {
+        match i % 3 {
+            0 => fs::remove_file(path).unwrap(),
+            1 => fs::write(path, b"").unwrap(),
+            _ => damage(&path, &[0.5]),
         }
     }
+    let resumed = rig.completes("damaged tiles")["resumed"].as_u64().unwrap();
+    assert!((20..45).contains(&resumed), "{resumed} steps: all but the tiles");
 }
 
 #[test]

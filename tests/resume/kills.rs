@@ -7,8 +7,8 @@ use crate::random::Random;
 use crate::rig::{Rig, Run, Setup};
 
 /// Where a commit can be cut off: before it; with the results under their names and no record; in the middle of the record;
-/// with the record, before what it makes obsolete is removed; after that.
-const PLACES: [&str; 5] = ["commit", "published", "torn", "committed", "removed"];
+/// after it.
+const PLACES: [&str; 4] = ["commit", "published", "torn", "committed"];
 
 fn small_job(setup: &Setup) -> Rig {
     Rig::new(&clouds::clusters(20_000), setup).committing_every(0)
@@ -39,14 +39,14 @@ fn kill_at_each(rig: &Rig, place: &str, stride: usize) -> u64 {
 fn killed_at_every_commit() {
     let rig = small_job(&Setup::tiles_of(3_500));
     let kills: u64 = PLACES.iter().map(|place| kill_at_each(&rig, place, 1)).sum();
-    assert!(kills >= 150, "only {kills} kills");
+    assert!(kills >= 110, "only {kills} kills");
 }
 
 #[test]
 fn killed_at_commits_with_two_threads() {
     let rig = small_job(&Setup::tiles_of(3_500).threads(2));
     let kills: u64 = PLACES.iter().map(|place| kill_at_each(&rig, place, 4)).sum();
-    assert!(kills >= 35, "only {kills} kills");
+    assert!(kills >= 25, "only {kills} kills");
 }
 
 #[test]
@@ -61,7 +61,7 @@ fn killed_again_and_again_while_it_goes_on() {
             kills += 1;
             assert!(kills < 100, "{place}: it does not get on");
         }
-        assert!(kills >= 10, "{place}: only {kills} kills");
+        assert!(kills >= 5, "{place}: only {kills} kills");
         rig.is_complete(place);
     }
 }
@@ -71,14 +71,14 @@ fn killed_while_it_cleans_up() {
     let rig = small_job(&Setup::tiles_of(5_000));
     for count in 1.. {
         if !rig.run_to("cleaning", count).was_killed() {
-            assert!(count > 5, "cleaning up takes several steps");
+            assert!(count > 3, "cleaning up takes several steps");
             break;
         }
         let before = std::fs::read(rig.out().join("report.json")).unwrap();
         rig.completes(&format!("cleaning, {count}"));
         // As long as the journal is there, the job is known to be complete, and nothing is done again.
         let after = std::fs::read(rig.out().join("report.json")).unwrap();
-        assert!(before == after || count == 7, "cleaning, {count}: done again");
+        assert!(before == after || count == 3, "cleaning, {count}: done again");
         rig.forget();
     }
 }
@@ -119,13 +119,13 @@ fn kill_at_random(rig: &Rig, seed: u64, kills: u64) {
 #[test]
 fn killed_at_random_with_one_thread() {
     let rig = Rig::new(&clouds::gaussian(40_000), &Setup::tiles_of(2_000)).committing_every(10);
-    kill_at_random(&rig, 1, kills_wanted(40));
+    kill_at_random(&rig, 1, kills_wanted(45));
 }
 
 #[test]
 fn killed_at_random_with_two_threads() {
     let rig = Rig::new(&clouds::gaussian(40_000), &Setup::tiles_of(2_000).threads(2)).committing_every(10);
-    kill_at_random(&rig, 2, kills_wanted(40));
+    kill_at_random(&rig, 2, kills_wanted(45));
 }
 
 #[test]

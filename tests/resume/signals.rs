@@ -1,5 +1,7 @@
 //! Ctrl-C and its kin.
 
+use std::time::Duration;
+
 use crate::clouds;
 use crate::rig::{Rig, Run, Setup};
 
@@ -12,11 +14,10 @@ fn long_job(threads: usize) -> Rig {
 fn sigterm_and_ctrl_c_stop_it_and_it_goes_on() {
     for (signal, threads) in [("TERM", 1), ("INT", 2)] {
         let rig = long_job(threads);
-        for folder in ["job/nodes", "job/rims", "tiles"] {
-            let files = || std::fs::read_dir(rig.out().join(folder)).map_or(0, |entries| entries.count());
-            let before = files();
+        // Among the leaves, among the rims, among the tiles.
+        for steps in [50, 250, 400] {
             let mut run = Run::start(&mut rig.command());
-            run.wait_until(|| files() > before + 3);
+            run.wait_until(|| rig.steps() > steps);
             run.signal(signal);
             run.end().stopped(&[
                 "error: interrupted",
@@ -48,10 +49,10 @@ fn a_second_ctrl_c_ends_it_at_once() {
     // One leaf that takes long, and in which nobody looks for signals.
     let rig = Rig::new(&clouds::gaussian(400_000), &Setup::tiles_of(500_000).backend("reference")).committing_every(0);
     let mut run = Run::start(&mut rig.command());
-    let partition = rig.out().join("job/partition");
-    run.wait_until(|| partition.exists());
+    run.wait_until(|| rig.steps() == 1);
+    std::thread::sleep(Duration::from_millis(100));
     run.signal("INT");
-    std::thread::sleep(std::time::Duration::from_millis(20));
+    std::thread::sleep(Duration::from_millis(20));
     run.signal("INT");
     let end = run.end();
     assert_eq!(end.status.code(), Some(1), "{end:?}");

@@ -1,0 +1,231 @@
+//! What the steps leave for each other: one file that only grows, a record a result. A file a result would cost more than
+//! the results: making and removing thousands of small files takes a good part of a job's time on common file systems.
+//!
+//! The journal knows where each record is and the hash of its bytes, so that a store whose writer was killed can be opened
+//! again, whatever the kill left after them.
+
+use crate::positioned::{read_exact_at, write_all_at};
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{PoisonError, RwLock};
+use xxhash_rust::xxh3::{Xxh3, xxh3_64_with_seed};
+
+/// What a record holds; it is a tile's or a node's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum Key {
+    /// The sites and closed triangles of a tile.
+    Leaf(usize),
+    /// What a tree node hands to its parent.
+    Frontier(usize),
+    /// The frontier of a tile as far as its leaf knows it.
+    RimDraft(usize),
+    /// The triangles that an inner node contributes.
+    Seam(usize),
+    /// The finished rim vertices of a tile.
+    Rim(usize),
+    /// The pixels of the preview that a tile covers.
+    Pixels(usize),
+    /// What the steps after the partition know of it.
+    Partition,
+}
+
+impl Key {
+    fn code(self) -> [u32; 2] {
+        match self {
+            Key::Leaf(i) => [1, i as u32],
+            Key::Frontier(i) => [2, i as u32],
+            Key::RimDraft(i) => [3, i as u32],
+            Key::Seam(i) => [4, i as u32],
+            Key::Rim(i) => [5, i as u32],
+            Key::Pixels(i) => [6, i as u32],
+            Key::Partition => [7, 0],
+        }
+    }
+}
+
+fn seed(code: [u32; 2]) -> u64 {
+    (code[0] as u64) << 32 | code[1] as u64
+}
+
+/// Where a record's bytes are.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub(super) at: u64,
+    pub(super) length: u64,
+}
+
+/// A record as the journal knows it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Stored {
+    /// What it holds.
+    key: Key,
+    /// Where its bytes begin in the file, and how many they are.
+    at: u64,
+    length: u64,
+    hash: u64,
+}
+
+/// The results of all steps of a job, on disk; threads may write and read at once.
+#[derive(Debug)]
+pub struct Store {
+    path: PathBuf,
+    pub(super) file: File,
+    end: AtomicU64,
+    places: RwLock<HashMap<Key, Place>>,
+}
+
+impl Store {
+    /// An empty store at `path`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be made.
+    pub fn create(path: &Path) -> Result<Store> {
+        let file = File::options().read(true).write(true).create(true).truncate(true).open(path);
+        let file = file.map_err(Error::io("create", path))?;
+        Ok(Store { path: path.to_path_buf(), file, end: AtomicU64::new(0), places: RwLock::default() })
+    }
+
+    /// The store at `path` with the records of `stored`; all else in it is written over.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be opened.
+    pub fn open<'a>(path: &Path, stored: impl Iterator<Item = &'a Stored>) -> Result<Store> {
+        let file = File::options().read(true).write(true).open(path).map_err(Error::io("open", path))?;
+        let (mut end, mut places) = (0, HashMap::new());
+        for &Stored { key, at, length, .. } in stored {
+            places.insert(key, Place { at, length });
+            end = end.max(at + length);
+        }
+        Ok(Store { path: path.to_path_buf(), file, end: AtomicU64::new(end), places: RwLock::new(places) })
+    }
+
+    /// Whether the record of `stored` is there and holds what was written to it.
+    pub fn is_whole(&self, stored: &Stored) -> bool {
+        let place = Place { at: stored.at, length: stored.length };
+        self.hash(place, seed(stored.key.code())).is_ok_and(|hash| hash == stored.hash)
+    }
+
+    /// Waits until all records are on the disk.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if they do not get there.
+    pub fn sync(&self) -> Result<()> {
+        self.file.sync_data().map_err(Error::io("write", &self.path))
+    }
+
+    fn hash(&self, place: Place, seed: u64) -> Result<u64> {
+        let mut hasher = Xxh3::with_seed(seed);
+        let mut buffer = vec![0; place.length.min(1 << 20) as usize];
+        let mut done = 0;
+        while done < place.length {
+            let part = &mut buffer[..(place.length - done).min(1 << 20) as usize];
+            self.read(place.at + done, part)?;
+            hasher.update(part);
+            done += part.len() as u64;
+        }
+        Ok(hasher.digest())
+    }
+
+    /// Writes a record. It takes the place of an earlier one of the same key.
+    pub(super) fn put(&self, key: Key, content: &[u8]) -> Result<Stored> {
+        let (length, hash) = (content.len() as u64, xxh3_64_with_seed(content, seed(key.code())));
+        let at = self.end.fetch_add(length, Ordering::Relaxed);
+        write_all_at(&self.file, content, at).map_err(Error::io("write", &self.path))?;
+        let mut places = self.places.write().unwrap_or_else(PoisonError::into_inner);
+        places.insert(key, Place { at, length });
+        Ok(Stored { key, at, length, hash })
+    }
+
+    /// Whether there is a record of `key`.
+    pub fn has(&self, key: Key) -> bool {
+        self.places.read().unwrap_or_else(PoisonError::into_inner).contains_key(&key)
+    }
+
+    /// Where the record of `key` is.
+    pub(super) fn place(&self, key: Key) -> Result<Place> {
+        let places = self.places.read().unwrap_or_else(PoisonError::into_inner);
+        places.get(&key).copied().ok_or_else(|| Error::Broken(format!("{} has no {key:?}", self.path.display())))
+    }
+
+    /// Fills `buffer` from byte `at` of the file on.
+    pub(super) fn read(&self, at: u64, buffer: &mut [u8]) -> Result<()> {
+        read_exact_at(&self.file, buffer, at).map_err(Error::io("read", &self.path))
+    }
+
+    /// The bytes of all records.
+    pub fn bytes(&self) -> u64 {
+        self.end.load(Ordering::Relaxed)
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::columns::{ColumnReader, ColumnWriter};
+    use super::*;
+
+    fn put(store: &Store, key: Key, values: &[u32]) -> Stored {
+        ColumnWriter::default().push(values).write(store, key).unwrap()
+    }
+
+    fn get(store: &Store, key: Key) -> Result<Vec<u32>> {
+        ColumnReader::open(store, key)?.column()
+    }
+
+    #[test]
+    fn a_record_that_is_cut_or_changed_is_not_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("steps");
+        let store = Store::create(&path).unwrap();
+        let stored: Vec<Stored> = (0..4).map(|tile| put(&store, Key::Leaf(tile), &vec![7; 5 * tile])).collect();
+        let whole = std::fs::read(&path).unwrap();
+        for (at, _) in whole.iter().enumerate() {
+            let mut changed = whole.clone();
+            changed[at] ^= 0x40;
+            for (content, cut) in [(&whole[..at], true), (&changed, false)] {
+                std::fs::write(&path, content).unwrap();
+                let store = Store::open(&path, stored.iter()).unwrap();
+                for record in &stored {
+                    let end = record.at + record.length;
+                    let is_hit = if cut { end > at as u64 } else { (record.at..end).contains(&(at as u64)) };
+                    assert_eq!(store.is_whole(record), !is_hit, "{record:?}, byte {at}, cut: {cut}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_opened_store_has_what_it_is_told_and_goes_on_after_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("steps");
+        let store = Store::create(&path).unwrap();
+        let kept = put(&store, Key::Rim(0), &[1, 2, 3]);
+        put(&store, Key::Rim(1), &[4, 5, 6]);
+        let store = Store::open(&path, [kept].iter()).unwrap();
+        assert!(store.has(Key::Rim(0)) && !store.has(Key::Rim(1)));
+        let added = put(&store, Key::Seam(7), &[8]);
+        let store = Store::open(&path, [kept, added].iter()).unwrap();
+        assert_eq!((get(&store, Key::Rim(0)).unwrap(), get(&store, Key::Seam(7)).unwrap()), (vec![1, 2, 3], vec![8]));
+        let other = Stored { key: Key::Rim(1), ..kept };
+        assert!(store.is_whole(&kept) && !store.is_whole(&other), "the hash is that of the key as well");
+    }
+
+    #[test]
+    fn a_later_record_takes_the_place_of_an_earlier_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("steps");
+        let store = Store::create(&path).unwrap();
+        let stored = [put(&store, Key::Frontier(3), &[1]), put(&store, Key::Frontier(3), &[2, 3])];
+        assert_eq!(get(&store, Key::Frontier(3)).unwrap(), [2, 3]);
+        assert_eq!(get(&Store::open(&path, stored.iter()).unwrap(), Key::Frontier(3)).unwrap(), [2, 3]);
+        assert!(get(&store, Key::Frontier(4)).unwrap_err().to_string().contains("Frontier(4)"));
+    }
+}
