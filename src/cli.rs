@@ -35,6 +35,9 @@ pub struct Cli {
     /// Start over where an interrupted run of the job could be gone on with.
     #[arg(long, requires = "config")]
     pub fresh: bool,
+    /// Run the job even where the disk or the memory does not seem to suffice.
+    #[arg(long, requires = "config")]
+    pub force: bool,
     /// How to talk.
     #[command(flatten)]
     pub talk: Talk,
@@ -54,7 +57,7 @@ pub struct Talk {
 /// The commands beside running a job.
 #[derive(Subcommand, Debug)]
 pub enum Command {
-    /// Look at the inputs of a job and say what it would do; writes nothing.
+    /// Look at the inputs of a job and say what it would do and whether it fits; writes nothing.
     Check {
         /// The configuration of the job.
         config: PathBuf,

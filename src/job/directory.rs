@@ -55,10 +55,16 @@ impl Directory {
     pub fn sweep(&self, keep: &HashSet<PathBuf>) -> Result<()> {
         create_directory(&self.tiles())?;
         let mut old = numbered_files(&self.tiles())?;
+        if self.cut().is_dir() {
+            old.extend(numbered_files(&self.cut())?);
+        }
         let single = [self.spill(), self.store(), self.terrain(), self.georeference(), self.report(), self.preview()];
         old.extend(single.iter().map(|path| partial(path)));
         old.extend(single);
-        old.iter().filter(|path| !keep.contains(&self.name(path))).try_for_each(|path| remove_file(path))
+        old.iter().filter(|path| !keep.contains(&self.name(path))).try_for_each(|path| remove_file(path))?;
+        // What is somebody else's in it stays, and so do triangles that are kept.
+        let _ = fs::remove_dir(self.cut());
+        Ok(())
     }
 
     /// The job directory itself.
@@ -112,6 +118,24 @@ impl Directory {
     /// The GLB of `tile`.
     pub fn tile(&self, tile: usize) -> PathBuf {
         self.tiles().join(format!("{tile:06}.glb"))
+    }
+
+    /// The directory of the triangles that are left out.
+    pub fn cut(&self) -> PathBuf {
+        self.output.join("cut")
+    }
+
+    /// Makes the directory of the triangles that are left out.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be made.
+    pub fn create_cut(&self) -> Result<()> {
+        fs::create_dir_all(self.cut()).map_err(Error::io("create the directory", self.cut()))
+    }
+
+    /// The GLB of what is left out of `tile`.
+    pub fn cut_tile(&self, tile: usize) -> PathBuf {
+        self.cut().join(format!("{tile:06}.glb"))
     }
 
     /// All tiles in one scene.

@@ -38,6 +38,7 @@ pub struct Fingerprint {
 /// By what a file is known again.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct Identity {
+    /// As the report names it.
     path: PathBuf,
     bytes: u64,
     /// When it was written, in nanoseconds since 1970.
@@ -145,7 +146,7 @@ impl Identity {
         let data = file.metadata().map_err(Error::io("read", path))?;
         let modified = data.modified().ok().and_then(|time| time.duration_since(SystemTime::UNIX_EPOCH).ok());
         Ok(Identity {
-            path: path.canonicalize().map_err(Error::io("read", path))?,
+            path: path.to_path_buf(),
             bytes: data.len(),
             modified: modified.map_or(0, |age| age.as_nanos() as u64),
             samples: samples(&file, data.len()).map_err(Error::io("read", path))?,

@@ -9,12 +9,15 @@ pub mod choose;
 pub mod closing;
 pub mod columns;
 mod committer;
+pub mod cut;
 pub mod directory;
 pub mod export;
 pub mod fingerprint;
+mod forecast;
 pub mod grid;
 pub mod journal;
 pub mod leaf;
+mod machine;
 pub mod merge;
 pub mod partition;
 pub mod progress;
@@ -30,6 +33,7 @@ pub mod store;
 pub mod tree;
 
 use crate::config::{ColorChoice, Config};
+use crate::output::Compression;
 use crate::output::color::Coloring;
 use crate::output::georeference::Georeference;
 use crate::output::picture::Picture;
@@ -39,13 +43,14 @@ use crate::triangulation::Triangulator;
 use crate::{Error, Result};
 use choose::Coarser;
 use columns::ColumnReader;
+use cut::Cut;
 use directory::Directory;
 use export::{Look, TileFigures};
 use fingerprint::{Fingerprint, Head};
 use journal::{Done, Journal, Step};
 use leaf::LeafFigures;
 use partition::{Partition, Summary, Task};
-use progress::{Progress, Stage, StageFigures};
+use progress::{Progress, Schedule, Stage, StageFigures};
 use rayon::prelude::*;
 use report::{Parts, Report};
 use scan::Plan;
@@ -71,13 +76,15 @@ const MOST_TILES_IN_ONE_FILE: u64 = 4096;
 pub struct Options {
     /// Where progress goes.
     pub progress: Progress,
+    /// Whether to go on where the disk or the memory does not seem to suffice.
+    pub force: bool,
     /// Whether to start over where an interrupted run could be gone on with.
     pub fresh: bool,
 }
 
 impl From<Progress> for Options {
     fn from(progress: Progress) -> Options {
-        Options { progress, fresh: false }
+        Options { progress, force: false, fresh: false }
     }
 }
 
@@ -123,7 +130,12 @@ fn attempt(
     let plan = on_threads(workers(config, 0)?, || scan::run(config, head.coarser))?;
     stage.advance(1);
     let scanned = stage.finish();
+    let progress = &Schedule::new(progress, forecast::costs(&plan));
+    report::note_skipped(&plan.skipped, progress);
     let threads = workers(config, plan.records)?;
+    if !options.force {
+        check::preflight(&plan, config, threads).passes()?;
+    }
     let directory = Directory::new(&config.output.directory);
     let _lock = directory.lock()?;
     if let Some(report) = resume::complete(&directory, head)?.filter(|_| !options.fresh) {
@@ -132,11 +144,11 @@ fn attempt(
         return Ok(report);
     }
     on_threads(threads, || {
-        let resume::Start { store, journal, partition } = resume::start(&directory, head, options.fresh, progress)?;
+        let resume::Start { store, journal, partition } = resume::start(&directory, head, options)?;
         let job = Job {
             config,
             triangulator,
-            plan: &plan,
+            coarser: head.coarser,
             directory: &directory,
             store: &store,
             journal: &journal,
@@ -144,7 +156,7 @@ fn attempt(
             threads,
             start,
         };
-        let outcome = job.run(scanned, partition);
+        let outcome = job.run(plan, scanned, partition);
         let steps = journal.finished();
         // What is finished is on the disk before the message says so.
         drop(journal);
@@ -189,33 +201,36 @@ fn workers(config: &Config, points: u64) -> Result<usize> {
 struct Job<'a> {
     config: &'a Config,
     triangulator: &'a Triangulator,
-    plan: &'a Plan,
+    coarser: Coarser,
     directory: &'a Directory,
     store: &'a Store,
     journal: &'a Journal<'a>,
-    progress: Progress,
+    progress: &'a Schedule,
     threads: usize,
     start: Instant,
 }
 
 impl Job<'_> {
     /// Step 2 and all after it, but for what an earlier run has done of them.
-    fn run(&self, scanned: StageFigures, partition: Option<Partition>) -> Result<Report> {
-        let Job { config, triangulator, plan, directory, store, journal, progress, .. } = *self;
+    fn run(&self, plan: Plan, scanned: StageFigures, partition: Option<Partition>) -> Result<Report> {
+        let Job { config, triangulator, directory, store, journal, progress, .. } = *self;
 
-        let stage = progress.stage("read", plan.records, "points");
-        let partition = self.partition(partition, &stage)?;
+        let (plan, partition, read) = match partition {
+            Some(partition) => self.take_over(plan, partition)?,
+            None => self.read(plan)?,
+        };
+        let plan = &plan;
         let bounds = enough_points(&partition.summary)?;
         let longest = Longest::of(&plan.frame);
         longest.check_heights(bounds[0][2], bounds[1][2])?;
-        let read = stage.finish();
 
         let stage = progress.stage("triangulate", partition.summary.tally.kept, "points");
         let leaves = self.triangulate(&partition, longest, &stage)?;
         let triangulated = stage.finish();
 
-        let look = look(config, plan, &partition.summary, bounds);
         let tiles = partition.tree.leaves.len();
+        let cut = Cut::new(config.output.max_edge, &plan.frame, store, [tiles as u64, leaves.sites], bounds)?;
+        let look = look(config, plan, &partition.summary, bounds, cut);
         let stage = progress.stage("stitch", tiles as u64, "tiles");
         self.stitch_all(&partition.tree, &look, &stage)?;
         let stitched = stage.finish();
@@ -223,7 +238,7 @@ impl Job<'_> {
         let stage = progress.stage("write", leaves.sites, "sites");
         let canvas = Canvas::new(&look.frame, bounds);
         let written = self.export_all(&partition, &look, &canvas, &stage)?;
-        enough_triangles(written.triangles)?;
+        enough_triangles(&written, plan)?;
         let exported = stage.finish();
 
         let stage = progress.stage("finish", 1, "job");
@@ -256,15 +271,35 @@ impl Job<'_> {
         Ok(report)
     }
 
-    /// Step 2, unless `earlier` is what it came to.
-    fn partition(&self, earlier: Option<Partition>, stage: &Stage) -> Result<Partition> {
-        if let Some(partition) = earlier {
-            stage.take_over(partition.summary.tally.read);
-            return Ok(partition);
+    /// Step 2. An input that proves bad only now is left out as if it had never been named: if without it the job would have
+    /// another lattice, all is read again.
+    fn read(&self, mut plan: Plan) -> Result<(Plan, Partition, StageFigures)> {
+        let Job { config, directory, progress, coarser, .. } = *self;
+        loop {
+            let stage = progress.stage("read", plan.records, "points");
+            let mut partition = partition::run(&task(&plan, config), directory, &stage)?;
+            let figures = stage.finish();
+            let lattice = plan.lattice.clone();
+            if !partition.skipped.is_empty() {
+                report::note_skipped(&partition.skipped, progress);
+                plan = scan::without(plan, &partition.skipped, config, coarser)?;
+            }
+            if plan.lattice == lattice {
+                partition.skipped.clone_from(&plan.skipped);
+                self.journal.record(Step::Partition, Done::new((), vec![partition.save(self.store)?]))?;
+                return Ok((plan, partition, figures));
+            }
         }
-        let partition = partition::run(&task(self.plan, self.config), self.directory, stage)?;
-        self.journal.record(Step::Partition, Done::new((), vec![partition.save(self.store)?]))?;
-        Ok(partition)
+    }
+
+    /// What [`Job::read`] came to in an earlier run.
+    fn take_over(&self, mut plan: Plan, partition: Partition) -> Result<(Plan, Partition, StageFigures)> {
+        let stage = self.progress.stage("read", plan.records, "points");
+        if partition.skipped != plan.skipped {
+            plan = scan::without(plan, &partition.skipped, self.config, self.coarser)?;
+        }
+        stage.take_over(partition.summary.tally.read);
+        Ok((plan, partition, stage.finish()))
     }
 
     /// Triangulates all leaves and merges every merge node as soon as all below it is done.
@@ -284,7 +319,7 @@ impl Job<'_> {
     fn stitch_all(&self, tree: &Tree, look: &Look, stage: &Stage) -> Result<()> {
         (0..tree.leaves.len()).into_par_iter().try_for_each(|tile| {
             let step = Step::Stitch(tile);
-            self.journal.step(step, || stitch::run(self.store, tree, tile, &look.frame))?;
+            self.journal.step(step, || stitch::run(self.store, tree, tile, look))?;
             self.count(stage, step, 1);
             Ok(())
         })
@@ -320,6 +355,7 @@ fn task<'a>(plan: &'a Plan, config: &Config) -> Task<'a> {
         points_per_tile: config.triangulation.sites_per_tile.0,
         memory: config.limits.memory.0 / 6,
         malformed_share: config.input.malformed_share.0,
+        on_bad_file: config.input.on_bad_file,
     }
 }
 
@@ -335,14 +371,20 @@ fn enough_points(summary: &Summary) -> Result<[[i32; 3]; 2]> {
     })
 }
 
-fn enough_triangles(triangles: u64) -> Result<()> {
-    if triangles > 0 {
+fn enough_triangles(written: &TileFigures, plan: &Plan) -> Result<()> {
+    if written.triangles > 0 {
         return Ok(());
     }
-    Err(Error::NoTerrain(
-        "the points make no triangle: it takes at least three different places in x and y that are not on one line"
-            .into(),
-    ))
+    if written.cut_triangles > 0 {
+        return Err(Error::Config(format!(
+            "[output] max_edge leaves out all {} triangles: give a greater one",
+            written.cut_triangles
+        )));
+    }
+    Err(Error::NoTerrain(format!(
+        "the points make no triangle in steps of {}: it takes at least three different places in x and y that are not on one line",
+        plan.lattice.resolution
+    )))
 }
 
 struct Grower<'a> {
@@ -389,7 +431,7 @@ impl Grower<'_> {
 }
 
 /// How the tiles are to look.
-fn look(config: &Config, plan: &Plan, summary: &Summary, bounds: [[i32; 3]; 2]) -> Look {
+fn look(config: &Config, plan: &Plan, summary: &Summary, bounds: [[i32; 3]; 2], cut: Cut) -> Look {
     let elevation = Coloring::Elevation { low: bounds[0][2], high: bounds[1][2] };
     let coloring = match config.output.color {
         ColorChoice::None => None,
@@ -398,7 +440,12 @@ fn look(config: &Config, plan: &Plan, summary: &Summary, bounds: [[i32; 3]; 2]) 
         ColorChoice::Auto | ColorChoice::Rgb if summary.tally.max_rgb == 0 => Some(elevation),
         ColorChoice::Auto | ColorChoice::Rgb => Some(Coloring::Rgb { eight_bit: summary.tally.max_rgb <= 255 }),
     };
-    Look { frame: plan.frame.clone().refined(bounds), coloring, normals: config.output.normals }
+    let compression = config.output.compression;
+    let frame = match compression {
+        Compression::None => plan.frame.clone().refined(bounds),
+        _ => plan.frame.clone().packed(),
+    };
+    Look { frame, coloring, normals: config.output.normals, compression, cut }
 }
 
 /// Writes what stands beside the tiles; its figure is its bytes.

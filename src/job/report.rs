@@ -2,7 +2,9 @@
 
 use super::export::TileFigures;
 use super::leaf::LeafFigures;
-use super::progress::StageFigures;
+use super::machine;
+use super::partition::Skipped;
+use super::progress::{Schedule, StageFigures};
 use super::scan::Plan;
 use crate::geometry::lattice::Lattice;
 use crate::input::Tally;
@@ -20,14 +22,19 @@ pub struct Report {
     pub sites: u64,
     /// Triangles in all tiles.
     pub triangles: u64,
+    /// Triangles that `max_edge` leaves out; they are in `cut`.
+    #[serde(default)]
+    pub cut_triangles: u64,
     /// GLB files in `tiles`.
     pub tiles: u64,
     /// The share of the triangles that cross a border between tiles.
     pub seam_share: f64,
     /// Points dropped because another has the same x and y.
     pub duplicates: u64,
-    /// The inputs.
+    /// The inputs that were read.
     pub files: usize,
+    /// The inputs that were left out because they are bad; no other figure counts them.
+    pub skipped: Vec<Skipped>,
     /// Records by what became of them.
     pub points: Tally,
     /// How the leaves came to be.
@@ -135,10 +142,12 @@ impl Report {
             generator: concat!("gdt-batch ", env!("CARGO_PKG_VERSION")).into(),
             sites: parts.leaves.sites,
             triangles: parts.tiles.triangles,
+            cut_triangles: parts.tiles.cut_triangles,
             tiles: parts.tiles.files,
             seam_share: parts.tiles.seam_triangles as f64 / parts.tiles.triangles.max(1) as f64,
             duplicates: parts.leaves.duplicates,
             files: plan.sources.len(),
+            skipped: plan.skipped.clone(),
             points: parts.points,
             leaves: parts.leaves,
             gpu: parts.gpu,
@@ -148,7 +157,7 @@ impl Report {
             crs: plan.crs.name.clone(),
             bytes_written: parts.tiles.bytes + parts.other_bytes,
             bytes_temporary: parts.temporary,
-            peak_memory: peak_memory(),
+            peak_memory: machine::peak_memory(),
             memory_limit: parts.memory,
             threads: parts.threads,
             resumed: parts.resumed,
@@ -157,14 +166,6 @@ impl Report {
             warnings,
         }
     }
-}
-
-/// The largest resident set of this process so far, in bytes, where the system tells.
-pub fn peak_memory() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
-    let kilobytes: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some(kilobytes * 1024)
 }
 
 impl fmt::Display for Report {
@@ -200,6 +201,9 @@ impl fmt::Display for Report {
         row("sites", grouped(self.sites))?;
         row("triangles", grouped(self.triangles))?;
         row("  crossing tile borders", format!("{:.3} %", self.seam_share * 100.0))?;
+        if self.cut_triangles > 0 {
+            row("  left out (max_edge)", grouped(self.cut_triangles))?;
+        }
         row("tiles", grouped(self.tiles))?;
         let Outcome { pipeline, reference, crowded, not_accepted, counts } = &self.leaves.outcome;
         let leaves = pipeline + reference + crowded + not_accepted;
@@ -232,7 +236,28 @@ impl fmt::Display for Report {
         for warning in &self.warnings {
             writeln!(f, "warning: {warning}")?;
         }
-        Ok(())
+        write_skipped(f, self.files, &self.skipped)
+    }
+}
+
+/// Says how many of all inputs are left out, and each of them with its reason; nothing where none is.
+pub(super) fn write_skipped(f: &mut fmt::Formatter<'_>, used: usize, skipped: &[Skipped]) -> fmt::Result {
+    if let Some(summary) = skipped_summary(used, skipped) {
+        writeln!(f, "\n{summary}:")?;
+    }
+    skipped.iter().try_for_each(|bad| writeln!(f, "  {}: {}", bad.file.display(), bad.why))
+}
+
+/// A sentence on the inputs that are left out; `None` where none is.
+pub fn skipped_summary(used: usize, skipped: &[Skipped]) -> Option<String> {
+    let (bad, all) = (skipped.len(), used + skipped.len());
+    (bad > 0).then(|| format!("LEFT OUT: {bad} of {all} input files, because they are bad and on_bad_file = \"skip\""))
+}
+
+/// Says so when an input is left out.
+pub(super) fn note_skipped(skipped: &[Skipped], progress: &Schedule) {
+    for bad in skipped {
+        progress.note(&format!("left out: {}: {}", bad.file.display(), bad.why));
     }
 }
 

@@ -3,6 +3,7 @@
 //! A step stays if what it left is there and whole, or if nothing needs that any more. Steps depend on nothing but the job,
 //! so a step that is done again leaves the same as before, and the steps after it stay.
 
+use super::Options;
 use super::choose::Coarser;
 use super::directory::Directory;
 use super::fingerprint::{Change, Fingerprint, Head};
@@ -54,12 +55,13 @@ pub fn complete(directory: &Directory, head: &Head) -> Result<Option<Report>> {
 }
 
 /// Begins the run of the job `head` in its locked directory: goes on with the one that the directory holds, as far as it is the
-/// same and whole, and removes all else. With `fresh` nothing stays.
+/// same and whole, and removes all else.
 ///
 /// # Errors
 /// [`Error::Io`] on the job directory.
-pub fn start<'a>(directory: &'a Directory, head: &Head, fresh: bool, progress: Progress) -> Result<Start<'a>> {
-    let kept = if fresh { None } else { kept(directory, head, progress)? };
+pub fn start<'a>(directory: &'a Directory, head: &Head, options: Options) -> Result<Start<'a>> {
+    let progress = options.progress;
+    let kept = if options.fresh { None } else { kept(directory, head, progress)? };
     let kept = kept.unwrap_or_default();
     if !kept.entries.is_empty() {
         progress.note(&format!("going on with an interrupted run: {} steps are done", kept.entries.len()));

@@ -32,7 +32,8 @@ fn the_largest_texture_is_the_same_bit_for_bit() {
     let across = (rig.most_pixels() / u64::from(side)).min(u64::from(side)) as u32;
     for (width, height) in [(side, across), (across, side)] {
         let size = Size { width, height };
-        for count in [40, size.pixels() as usize / 5] {
+        // Triangles of more sites would not fit a buffer of software.
+        for count in [40, size.pixels() as usize / 16] {
             let pixels = Random(11).pixels(size, count);
             let differing: Vec<_> = rig.compare(size, &pixels).into_iter().filter(|c| c.differing > 0).collect();
             assert!(differing.is_empty(), "{width} x {height}, {count} sites: {differing:?}");

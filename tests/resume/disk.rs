@@ -9,7 +9,7 @@ use crate::rig::{Rig, Run, Setup};
 /// A run in which no file may become larger than so many bytes.
 fn limited(rig: &Rig, kibibytes: u64) -> Run {
     let mut command = Command::new("bash");
-    command.arg("-c").arg(format!("ulimit -f {kibibytes} && exec \"$0\" job.toml"));
+    command.arg("-c").arg(format!("ulimit -f {kibibytes} && exec \"$0\" --force job.toml"));
     Run::start(command.arg(env!("CARGO_BIN_EXE_gdt-batch")).env("GDT_COMMIT_MS", "0").current_dir(rig.folder.path()))
 }
 
@@ -43,7 +43,7 @@ fn a_file_that_may_not_grow_stops_any_stage() {
 const FILL: &str = r#"
 set -u
 mount -t tmpfs -o size=$1k tmpfs out || exit 77
-GDT_COMMIT_MS=0 "$0" job.toml 2>&1
+GDT_COMMIT_MS=0 "$0" --force job.toml 2>&1
 code=$?
 mount -o remount,size=256m out
 "$0" --quiet job.toml || exit 78
