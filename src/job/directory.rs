@@ -33,18 +33,22 @@ impl Directory {
         fs::create_dir_all(&self.job).map_err(Error::io("create the directory", &self.job))?;
         let lock = Lock::take(&self.job, is_new)?;
         fs::create_dir_all(self.tiles()).map_err(Error::io("create the directory", self.tiles()))?;
-        self.remove_old_tiles()?;
+        self.remove_old_tiles(&self.tiles())?;
+        if self.cut().is_dir() {
+            self.remove_old_tiles(&self.cut())?;
+            // What is somebody else's in it stays.
+            let _ = fs::remove_dir(self.cut());
+        }
         for stale in [self.spill(), self.store(), self.terrain(), self.georeference(), self.report(), self.preview()] {
             remove_file(&stale)?;
         }
         Ok(lock)
     }
 
-    /// Tiles of an earlier job, whole or not: files named by a number.
-    fn remove_old_tiles(&self) -> Result<()> {
-        let tiles = self.tiles();
-        for entry in fs::read_dir(&tiles).map_err(Error::io("read", &tiles))? {
-            let path = entry.map_err(Error::io("read", &tiles))?.path();
+    /// Tiles of an earlier job in `tiles`, whole or not: files named by a number.
+    fn remove_old_tiles(&self, tiles: &Path) -> Result<()> {
+        for entry in fs::read_dir(tiles).map_err(Error::io("read", tiles))? {
+            let path = entry.map_err(Error::io("read", tiles))?.path();
             let is_numbered = path.file_stem().is_some_and(|s| s.to_string_lossy().bytes().all(|b| b.is_ascii_digit()));
             if is_numbered && path.extension().is_some_and(|e| e == "glb" || e == "partial") {
                 remove_file(&path)?;
@@ -82,6 +86,24 @@ impl Directory {
     /// The GLB of `tile`.
     pub fn tile(&self, tile: usize) -> PathBuf {
         self.tiles().join(format!("{tile:06}.glb"))
+    }
+
+    /// The directory of the triangles that are left out.
+    pub fn cut(&self) -> PathBuf {
+        self.output.join("cut")
+    }
+
+    /// Makes the directory of the triangles that are left out.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be made.
+    pub fn create_cut(&self) -> Result<()> {
+        fs::create_dir_all(self.cut()).map_err(Error::io("create the directory", self.cut()))
+    }
+
+    /// The GLB of what is left out of `tile`.
+    pub fn cut_tile(&self, tile: usize) -> PathBuf {
+        self.cut().join(format!("{tile:06}.glb"))
     }
 
     /// All tiles in one scene.

@@ -7,6 +7,7 @@ pub mod check;
 pub mod choose;
 pub mod closing;
 pub mod columns;
+pub mod cut;
 pub mod directory;
 pub mod export;
 mod forecast;
@@ -27,6 +28,7 @@ pub mod store;
 pub mod tree;
 
 use crate::config::{ColorChoice, Config};
+use crate::output::Compression;
 use crate::output::color::Coloring;
 use crate::output::georeference::Georeference;
 use crate::output::picture::Picture;
@@ -36,6 +38,7 @@ use crate::triangulation::Triangulator;
 use crate::{Error, Result};
 use choose::Coarser;
 use columns::ColumnReader;
+use cut::Cut;
 use directory::Directory;
 use export::{Look, TileFigures};
 use leaf::LeafFigures;
@@ -186,8 +189,9 @@ impl Job<'_> {
         directory::remove_file(&directory.spill())?;
         let triangulated = stage.finish();
 
-        let look = look(config, plan, &partition.summary, bounds);
         let tiles = partition.tree.leaves.len();
+        let cut = Cut::new(config.output.max_edge, &plan.frame, &store, [tiles as u64, leaves.sites], bounds)?;
+        let look = look(config, plan, &partition.summary, bounds, cut);
         let stage = progress.stage("stitch", tiles as u64, "tiles");
         stitch_all(&store, &partition.tree, &look, &stage)?;
         let stitched = stage.finish();
@@ -195,7 +199,7 @@ impl Job<'_> {
         let stage = progress.stage("write", leaves.sites, "sites");
         let canvas = Canvas::new(&look.frame, bounds);
         let written = export_all(directory, &store, &partition, &look, &canvas, &stage)?;
-        enough_triangles(written.triangles, plan)?;
+        enough_triangles(&written, plan)?;
         let exported = stage.finish();
 
         let stage = progress.stage("finish", 1, "job");
@@ -268,9 +272,15 @@ fn enough_points(summary: &Summary) -> Result<[[i32; 3]; 2]> {
     })
 }
 
-fn enough_triangles(triangles: u64, plan: &Plan) -> Result<()> {
-    if triangles > 0 {
+fn enough_triangles(written: &TileFigures, plan: &Plan) -> Result<()> {
+    if written.triangles > 0 {
         return Ok(());
+    }
+    if written.cut_triangles > 0 {
+        return Err(Error::Config(format!(
+            "[output] max_edge leaves out all {} triangles: give a greater one",
+            written.cut_triangles
+        )));
     }
     Err(Error::NoTerrain(format!(
         "the points make no triangle in steps of {}: it takes at least three different places in x and y that are not on one line",
@@ -333,7 +343,7 @@ impl Grower<'_> {
 }
 
 /// How the tiles are to look.
-fn look(config: &Config, plan: &Plan, summary: &Summary, bounds: [[i32; 3]; 2]) -> Look {
+fn look(config: &Config, plan: &Plan, summary: &Summary, bounds: [[i32; 3]; 2], cut: Cut) -> Look {
     let elevation = Coloring::Elevation { low: bounds[0][2], high: bounds[1][2] };
     let coloring = match config.output.color {
         ColorChoice::None => None,
@@ -342,12 +352,17 @@ fn look(config: &Config, plan: &Plan, summary: &Summary, bounds: [[i32; 3]; 2]) 
         ColorChoice::Auto | ColorChoice::Rgb if summary.tally.max_rgb == 0 => Some(elevation),
         ColorChoice::Auto | ColorChoice::Rgb => Some(Coloring::Rgb { eight_bit: summary.tally.max_rgb <= 255 }),
     };
-    Look { frame: plan.frame.clone().refined(bounds), coloring, normals: config.output.normals }
+    let compression = config.output.compression;
+    let frame = match compression {
+        Compression::None => plan.frame.clone().refined(bounds),
+        _ => plan.frame.clone().packed(),
+    };
+    Look { frame, coloring, normals: config.output.normals, compression, cut }
 }
 
 fn stitch_all(store: &Store, tree: &Tree, look: &Look, stage: &Stage) -> Result<()> {
     (0..tree.leaves.len()).into_par_iter().try_for_each(|tile| {
-        stitch::run(store, tree, tile, &look.frame)?;
+        stitch::run(store, tree, tile, look)?;
         stage.advance(1);
         Ok(())
     })

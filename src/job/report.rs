@@ -22,6 +22,9 @@ pub struct Report {
     pub sites: u64,
     /// Triangles in all tiles.
     pub triangles: u64,
+    /// Triangles that `max_edge` leaves out; they are in `cut`.
+    #[serde(default)]
+    pub cut_triangles: u64,
     /// GLB files in `tiles`.
     pub tiles: u64,
     /// The share of the triangles that cross a border between tiles.
@@ -135,6 +138,7 @@ impl Report {
             generator: concat!("gdt-batch ", env!("CARGO_PKG_VERSION")).into(),
             sites: parts.leaves.sites,
             triangles: parts.tiles.triangles,
+            cut_triangles: parts.tiles.cut_triangles,
             tiles: parts.tiles.files,
             seam_share: parts.tiles.seam_triangles as f64 / parts.tiles.triangles.max(1) as f64,
             duplicates: parts.leaves.duplicates,
@@ -192,6 +196,9 @@ impl fmt::Display for Report {
         row("sites", grouped(self.sites))?;
         row("triangles", grouped(self.triangles))?;
         row("  crossing tile borders", format!("{:.3} %", self.seam_share * 100.0))?;
+        if self.cut_triangles > 0 {
+            row("  left out (max_edge)", grouped(self.cut_triangles))?;
+        }
         row("tiles", grouped(self.tiles))?;
         let Outcome { pipeline, reference, crowded, not_accepted, counts } = &self.leaves.outcome;
         let leaves = pipeline + reference + crowded + not_accepted;

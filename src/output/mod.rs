@@ -3,10 +3,15 @@
 //! [`frame::Frame`] says where a lattice point lies in a glTF scene; everything that writes or reads positions asks it.
 
 pub mod color;
+mod container;
+mod document;
+pub mod encoding;
 pub mod frame;
 pub mod georeference;
 pub mod glb;
 pub mod normals;
+mod order;
+mod packed;
 mod parts;
 pub mod picture;
 pub mod preview;
@@ -14,4 +19,5 @@ pub mod read;
 pub mod terrain;
 mod tile;
 
+pub use encoding::Compression;
 pub use tile::Tile;

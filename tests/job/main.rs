@@ -16,6 +16,7 @@ mod bad_files;
 mod broken;
 mod choices;
 mod configuration;
+mod cutting;
 mod khronos;
 mod limits;
 mod messages;
