@@ -36,25 +36,16 @@ impl Directory {
             remove_directory(&directory)?;
             fs::create_dir_all(&directory).map_err(Error::io("create the directory", &directory))?;
         }
-        fs::create_dir_all(self.tiles()).map_err(Error::io("create the directory", self.tiles()))?;
-        self.remove_old_tiles()?;
-        for stale in [self.spill(), self.terrain(), self.georeference(), self.report(), self.preview()] {
+        for tiles in [self.tiles(), self.levels()] {
+            fs::create_dir_all(&tiles).map_err(Error::io("create the directory", &tiles))?;
+            remove_old_tiles(&tiles)?;
+        }
+        for stale in
+            [self.spill(), self.terrain(), self.tileset(), self.georeference(), self.report(), self.preview()]
+        {
             remove_file(&stale)?;
         }
         Ok(lock)
-    }
-
-    /// Tiles of an earlier job, whole or not: files named by a number.
-    fn remove_old_tiles(&self) -> Result<()> {
-        let tiles = self.tiles();
-        for entry in fs::read_dir(&tiles).map_err(Error::io("read", &tiles))? {
-            let path = entry.map_err(Error::io("read", &tiles))?.path();
-            let is_numbered = path.file_stem().is_some_and(|s| s.to_string_lossy().bytes().all(|b| b.is_ascii_digit()));
-            if is_numbered && path.extension().is_some_and(|e| e == "glb" || e == "partial") {
-                remove_file(&path)?;
-            }
-        }
-        Ok(())
     }
 
     /// Removes all that only the steps need.
@@ -66,6 +57,8 @@ impl Directory {
             remove_directory(&self.job.join(directory))?;
         }
         remove_file(&self.spill())?;
+        // Only jobs with levels have use for it.
+        let _ = fs::remove_dir(self.levels());
         // With the lock, which marks the directory as a job's own, last: a kill in between leaves what the next job may take.
         remove_directory(&self.job)
     }
@@ -115,6 +108,26 @@ impl Directory {
         self.tiles().join(format!("{tile:06}.glb"))
     }
 
+    /// What `tileset.json` will say of the coarser tile at tree node `node`.
+    pub fn level_record(&self, node: usize) -> PathBuf {
+        self.job.join(format!("levels/{node:06}.level"))
+    }
+
+    /// The directory of the coarser tiles.
+    pub fn levels(&self) -> PathBuf {
+        self.output.join("levels")
+    }
+
+    /// The GLB of the coarser tile at tree node `node`.
+    pub fn level(&self, node: usize) -> PathBuf {
+        self.levels().join(format!("{node:06}.glb"))
+    }
+
+    /// All tiles as 3D Tiles.
+    pub fn tileset(&self) -> PathBuf {
+        self.output.join("tileset.json")
+    }
+
     /// All tiles in one scene.
     pub fn terrain(&self) -> PathBuf {
         self.output.join("terrain.glb")
@@ -137,7 +150,7 @@ impl Directory {
 }
 
 /// The folders in the job directory.
-const STEPS: [&str; 4] = ["leaves", "nodes", "rims", "preview"];
+const STEPS: [&str; 5] = ["leaves", "nodes", "rims", "preview", "levels"];
 
 /// Keeps other processes out of a job directory, also after a kill: the system lets go of it with the process.
 #[derive(Debug)]
@@ -194,6 +207,18 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     let mut text = serde_json::to_vec_pretty(value).map_err(|e| Error::Broken(format!("{}: {e}", path.display())))?;
     text.push(b'\n');
     write_whole(path, |file| file.write_all(&text))
+}
+
+/// Removes the tiles of an earlier job, whole or not: files named by a number.
+fn remove_old_tiles(tiles: &Path) -> Result<()> {
+    for entry in fs::read_dir(tiles).map_err(Error::io("read", tiles))? {
+        let path = entry.map_err(Error::io("read", tiles))?.path();
+        let is_numbered = path.file_stem().is_some_and(|s| s.to_string_lossy().bytes().all(|b| b.is_ascii_digit()));
+        if is_numbered && path.extension().is_some_and(|e| e == "glb" || e == "partial") {
+            remove_file(&path)?;
+        }
+    }
+    Ok(())
 }
 
 fn remove_directory(path: &Path) -> Result<()> {

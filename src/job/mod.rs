@@ -11,9 +11,11 @@ pub mod directory;
 pub mod export;
 pub mod grid;
 pub mod leaf;
+pub mod levels;
 pub mod merge;
 pub mod partition;
 pub mod progress;
+pub mod pyramid;
 pub mod records;
 pub mod report;
 pub mod scan;
@@ -21,9 +23,10 @@ pub mod sites;
 pub mod span;
 pub mod spill;
 pub mod stitch;
+pub mod tileset;
 pub mod tree;
 
-use crate::config::{ColorChoice, Config};
+use crate::config::{ColorChoice, Config, Format};
 use crate::output::color::Coloring;
 use crate::output::georeference::Georeference;
 use crate::output::picture::Picture;
@@ -36,8 +39,10 @@ use columns::ColumnReader;
 use directory::Directory;
 use export::{Look, TileFigures};
 use leaf::LeafFigures;
+use levels::LevelFigures;
 use partition::{Partition, Summary, Task};
 use progress::{Progress, Stage, StageFigures};
+use pyramid::{Pyramid, Sizes};
 use rayon::prelude::*;
 use report::{Parts, Report};
 use scan::Plan;
@@ -173,11 +178,30 @@ impl Job<'_> {
         enough_triangles(written.triangles)?;
         let exported = stage.finish();
 
+        let one_file = fits_one_file(&written);
+        let mut warnings = Vec::new();
+        let (mut coarser, mut levelled) = (LevelFigures::default(), None);
+        let mut other_bytes = 0;
+        if config.output.format != Format::Glb || !one_file {
+            let (sizes, pyramid) = pyramid(config, &partition);
+            let stage = progress.stage("levels", pyramid.inner.len() as u64, "tiles");
+            coarser = self.make_levels(&pyramid, sizes, &look, &stage)?;
+            other_bytes += tileset::write(directory, &pyramid, &look, None)?;
+            levelled = Some(stage.finish());
+            warnings.extend(levels_left_out(config, &pyramid));
+        }
+
         let stage = progress.stage("finish", 1, "job");
-        let other_bytes = finish(directory, plan, &written, &canvas, tiles, bounds)?;
+        other_bytes += finish(directory, plan, &canvas, tiles, bounds)?;
+        if one_file && config.output.format != Format::Tiles {
+            other_bytes += write_one_file(directory, tiles)?;
+        } else if config.output.format == Format::Glb {
+            warnings.push(too_large_for_one_file(&written));
+        }
         directory.clean_up()?;
         stage.advance(1);
-        let stages = vec![scanned, read, triangulated, stitched, exported, stage.finish()];
+        let stages = [Some(scanned), Some(read), Some(triangulated), Some(stitched), Some(exported), levelled];
+        let stages = stages.into_iter().flatten().chain([stage.finish()]).collect();
 
         let report = Report::new(
             plan,
@@ -186,6 +210,8 @@ impl Job<'_> {
                 leaves,
                 gpu: triangulator.gpu().map(str::to_owned),
                 tiles: written,
+                levels: coarser,
+                warnings,
                 other_bytes,
                 temporary: partition.spilled + leaves.bytes,
                 stages,
@@ -197,6 +223,64 @@ impl Job<'_> {
         directory::write_json(&directory.report(), &report)?;
         Ok(report)
     }
+
+    /// Makes the coarser tiles, those of one height side by side, as many at once as have room.
+    fn make_levels(&self, pyramid: &Pyramid, sizes: Sizes, look: &Look, stage: &Stage) -> Result<LevelFigures> {
+        let content = self.config.output.levels;
+        let lanes = match pyramid.largest() {
+            largest if content && largest > 0 => (sizes.memory / largest).clamp(1, self.threads as u64) as usize,
+            _ => self.threads,
+        };
+        let make = |at: usize| {
+            let figures = levels::run(self.directory, pyramid, at, look, sizes, content)?;
+            stage.advance(1);
+            Ok(figures)
+        };
+        on_threads(lanes, || {
+            let mut all = LevelFigures::default();
+            for height in pyramid.by_height() {
+                let sum = |mut a: LevelFigures, b| {
+                    a += b;
+                    Ok(a)
+                };
+                all += height.into_par_iter().with_max_len(1).map(make).try_reduce(LevelFigures::default, sum)?;
+            }
+            Ok(all)
+        })
+    }
+}
+
+/// Which tiles viewers see.
+fn pyramid(config: &Config, partition: &Partition) -> (Sizes, Pyramid) {
+    let points = |blocks: &Vec<spill::Block>| blocks.iter().map(|block| block.points as u64).sum();
+    let points: Vec<u64> = partition.blocks.iter().map(points).collect();
+    let sizes = Sizes { sites: config.output.level_sites.0, memory: config.limits.memory.0 / 4 * 3 };
+    (sizes, Pyramid::new(&partition.tree, &points, sizes))
+}
+
+fn levels_left_out(config: &Config, pyramid: &Pyramid) -> Option<String> {
+    let without = pyramid.inner.iter().filter(|inner| !inner.content).count();
+    (config.output.levels && without > 0).then(|| {
+        format!(
+            "{without} of {} coarser tiles are left out, because the tiles below them are too large for [limits] memory = \"{}\": \
+             viewers load the finer ones at once; lower [triangulation] sites_per_tile or raise memory",
+            pyramid.inner.len(),
+            config.limits.memory
+        )
+    })
+}
+
+fn fits_one_file(written: &TileFigures) -> bool {
+    written.triangles <= MOST_TRIANGLES_IN_ONE_FILE && written.files <= MOST_TILES_IN_ONE_FILE
+}
+
+fn too_large_for_one_file(written: &TileFigures) -> String {
+    format!(
+        "{} triangles in {} tiles are more than viewers open as one file: terrain.glb is left out and tileset.json written in its \
+         place; set [input] bounds or classes for a smaller terrain",
+        report::grouped(written.triangles),
+        report::grouped(written.files)
+    )
 }
 
 fn task<'a>(plan: &'a Plan, config: &Config) -> Task<'a> {
@@ -325,26 +409,20 @@ fn export_all(
 }
 
 /// Writes what stands beside the tiles; returns its bytes.
-fn finish(
-    directory: &Directory,
-    plan: &Plan,
-    written: &TileFigures,
-    canvas: &Canvas,
-    tiles: usize,
-    bounds: [[i32; 3]; 2],
-) -> Result<u64> {
+fn finish(directory: &Directory, plan: &Plan, canvas: &Canvas, tiles: usize, bounds: [[i32; 3]; 2]) -> Result<u64> {
     let georeference = Georeference::new(&plan.frame, &plan.lattice, bounds, plan.unit, plan.crs.epsg);
     let text = georeference.to_json();
     directory::write_whole(&directory.georeference(), |file| file.write_all(text.as_bytes()))?;
     let picture = draw_picture(directory, canvas, tiles)?;
     directory::write_whole(&directory.preview(), |file| file.write_all(&picture))?;
-    let mut bytes = (text.len() + picture.len()) as u64;
-    if written.triangles <= MOST_TRIANGLES_IN_ONE_FILE && written.files <= MOST_TILES_IN_ONE_FILE {
-        let paths: Vec<_> = (0..tiles).map(|tile| directory.tile(tile)).filter(|path| path.exists()).collect();
-        write_terrain(&directory.terrain(), &paths)?;
-        bytes += std::fs::metadata(directory.terrain()).map_err(Error::io("read", directory.terrain()))?.len();
-    }
-    Ok(bytes)
+    Ok((text.len() + picture.len()) as u64)
+}
+
+/// Writes `terrain.glb`; returns its bytes.
+fn write_one_file(directory: &Directory, tiles: usize) -> Result<u64> {
+    let paths: Vec<_> = (0..tiles).map(|tile| directory.tile(tile)).filter(|path| path.exists()).collect();
+    write_terrain(&directory.terrain(), &paths)?;
+    Ok(std::fs::metadata(directory.terrain()).map_err(Error::io("read", directory.terrain()))?.len())
 }
 
 fn draw_picture(directory: &Directory, canvas: &Canvas, tiles: usize) -> Result<Vec<u8>> {

@@ -2,6 +2,7 @@
 
 use super::export::TileFigures;
 use super::leaf::LeafFigures;
+use super::levels::LevelFigures;
 use super::progress::StageFigures;
 use super::scan::Plan;
 use crate::geometry::lattice::Lattice;
@@ -20,6 +21,8 @@ pub struct Report {
     pub triangles: u64,
     /// GLB files in `tiles`.
     pub tiles: u64,
+    /// The coarser tiles in `levels`.
+    pub levels: LevelFigures,
     /// The share of the triangles that cross a border between tiles.
     pub seam_share: f64,
     /// Points dropped because another has the same x and y.
@@ -66,6 +69,10 @@ pub struct Parts {
     pub gpu: Option<String>,
     /// What the tiles came to.
     pub tiles: TileFigures,
+    /// What the coarser tiles came to.
+    pub levels: LevelFigures,
+    /// What the user should know of the results.
+    pub warnings: Vec<String>,
     /// Bytes of results beside the tiles.
     pub other_bytes: u64,
     /// Bytes of temporary files.
@@ -94,11 +101,13 @@ impl Report {
             warnings.push(rounded(parts.points.rounded_z, "z", plan.lattice.resolution_z));
         }
         warnings.extend_from_slice(&parts.points.examples);
+        warnings.extend(parts.warnings);
         Report {
             generator: concat!("gdt-batch ", env!("CARGO_PKG_VERSION")).into(),
             sites: parts.leaves.sites,
             triangles: parts.tiles.triangles,
             tiles: parts.tiles.files,
+            levels: parts.levels,
             seam_share: parts.tiles.seam_triangles as f64 / parts.tiles.triangles.max(1) as f64,
             duplicates: parts.leaves.duplicates,
             files: plan.sources.len(),
@@ -108,7 +117,7 @@ impl Report {
             lattice: plan.lattice.clone(),
             unit: plan.unit.into(),
             crs: plan.crs.name.clone(),
-            bytes_written: parts.tiles.bytes + parts.other_bytes,
+            bytes_written: parts.tiles.bytes + parts.levels.bytes + parts.other_bytes,
             bytes_temporary: parts.temporary,
             peak_memory: peak_memory(),
             memory_limit: parts.memory,
@@ -156,6 +165,10 @@ impl fmt::Display for Report {
         row("triangles", grouped(self.triangles))?;
         row("  crossing tile borders", format!("{:.3} %", self.seam_share * 100.0))?;
         row("tiles", grouped(self.tiles))?;
+        if self.levels.files > 0 {
+            let levels = &self.levels;
+            row("coarser tiles", format!("{}, at most {:.2} m off", grouped(levels.files), levels.error_m))?;
+        }
         if let Some(gpu) = &self.gpu {
             row("  with the help of a GPU", format!("{} ({gpu})", grouped(self.leaves.outcome.counts.on_gpu)))?;
         }

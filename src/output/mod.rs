@@ -3,15 +3,19 @@
 //! [`frame::Frame`] says where a lattice point lies in a glTF scene; everything that writes or reads positions asks it.
 
 pub mod color;
+pub mod deviation;
 pub mod frame;
 pub mod georeference;
 pub mod glb;
+pub mod join;
 pub mod normals;
 mod parts;
 pub mod picture;
 pub mod preview;
 pub mod read;
+pub mod simplify;
 pub mod terrain;
 mod tile;
+pub mod tileset;
 
 pub use tile::Tile;
