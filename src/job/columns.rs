@@ -1,17 +1,18 @@
-//! The files between steps: a few columns of plain values each, in the machine's byte order, written whole.
+//! A record of the store: a few columns of plain values each, in the machine's byte order.
 
-use super::directory::write_whole;
-use crate::positioned::read_exact_at;
+use super::store::{HEAD, Key, Store};
 use crate::{Error, Result};
 use bytemuck::Pod;
-use std::fs::File;
-use std::io::Write;
-use std::path::{Path, PathBuf};
 
-/// Collects columns and writes them as one file.
-#[derive(Default)]
+/// Collects columns and writes them as one record.
 pub struct ColumnWriter {
     bytes: Vec<u8>,
+}
+
+impl Default for ColumnWriter {
+    fn default() -> ColumnWriter {
+        ColumnWriter { bytes: vec![0; HEAD] }
+    }
 }
 
 impl ColumnWriter {
@@ -22,39 +23,37 @@ impl ColumnWriter {
         self
     }
 
-    /// Writes the file, whole or not at all; returns its size in bytes.
+    /// Writes the record of `key`.
     ///
     /// # Errors
     /// [`Error::Io`] if that fails.
-    pub fn write(self, path: &Path) -> Result<u64> {
-        write_whole(path, |file| file.write_all(&self.bytes))?;
-        Ok(self.bytes.len() as u64)
+    pub fn write(mut self, store: &Store, key: Key) -> Result<()> {
+        store.put(key, &mut self.bytes)
     }
 }
 
-/// Reads the columns of a file in the order in which they were written.
-pub struct ColumnReader {
-    path: PathBuf,
-    file: File,
-    size: u64,
+/// Reads the columns of a record in the order in which they were written.
+pub struct ColumnReader<'a> {
+    store: &'a Store,
+    key: Key,
     at: u64,
+    end: u64,
 }
 
-impl ColumnReader {
-    /// Reads the file at `path`.
+impl ColumnReader<'_> {
+    /// Reads the record of `key`.
     ///
     /// # Errors
-    /// [`Error::Io`] if that fails.
-    pub fn open(path: &Path) -> Result<ColumnReader> {
-        let file = File::open(path).map_err(Error::io("open", path))?;
-        let size = file.metadata().map_err(Error::io("read", path))?.len();
-        Ok(ColumnReader { path: path.to_path_buf(), file, size, at: 0 })
+    /// [`Error::Broken`] if there is none.
+    pub fn open(store: &Store, key: Key) -> Result<ColumnReader<'_>> {
+        let place = store.place(key)?;
+        Ok(ColumnReader { store, key, at: place.at, end: place.at + place.length })
     }
 
     /// The next column.
     ///
     /// # Errors
-    /// [`Error::Io`] if reading fails, [`Error::Broken`] if the file holds less than the column says.
+    /// [`Error::Io`] if reading fails, [`Error::Broken`] if the record holds less than the column says.
     pub fn column<T: Pod>(&mut self) -> Result<Vec<T>> {
         let length = self.length::<T>()?;
         self.take(length)
@@ -74,26 +73,25 @@ impl ColumnReader {
         self.take(count)
     }
 
-    /// The number of values in the next column, all of which are in the file.
+    /// The number of values in the next column, all of which are in the record.
     fn length<T: Pod>(&mut self) -> Result<usize> {
         let length = self.take::<u64>(1)?[0];
-        let fits = length.checked_mul(size_of::<T>() as u64).is_some_and(|bytes| bytes <= self.size - self.at);
+        let fits = length.checked_mul(size_of::<T>() as u64).is_some_and(|bytes| bytes <= self.end - self.at);
         if fits { Ok(length as usize) } else { Err(self.broken()) }
     }
 
     fn take<T: Pod>(&mut self, count: usize) -> Result<Vec<T>> {
         let bytes = (count * size_of::<T>()) as u64;
-        if bytes > self.size - self.at {
+        if bytes > self.end - self.at {
             return Err(self.broken());
         }
         let mut values = vec![T::zeroed(); count];
-        let buffer = bytemuck::cast_slice_mut(&mut values);
-        read_exact_at(&self.file, buffer, self.at).map_err(Error::io("read", &self.path))?;
+        self.store.read(self.at, bytemuck::cast_slice_mut(&mut values))?;
         self.at += bytes;
         Ok(values)
     }
 
     fn broken(&self) -> Error {
-        Error::Broken(format!("{} ends too early", self.path.display()))
+        Error::Broken(format!("{:?} in {} ends too early", self.key, self.store.path().display()))
     }
 }

@@ -6,7 +6,7 @@ use std::fs::{self, File, TryLockError};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
-/// The paths of a job. Files of a step that is called by index carry that index.
+/// The paths of a job.
 #[derive(Clone, Debug)]
 pub struct Directory {
     output: PathBuf,
@@ -32,17 +32,12 @@ impl Directory {
         let is_new = fs::read_dir(&self.job).map_or(true, |mut entries| entries.next().is_none());
         fs::create_dir_all(&self.job).map_err(Error::io("create the directory", &self.job))?;
         let lock = Lock::take(&self.job, is_new)?;
-        for directory in STEPS.map(|name| self.job.join(name)) {
-            remove_directory(&directory)?;
-            fs::create_dir_all(&directory).map_err(Error::io("create the directory", &directory))?;
-        }
         for tiles in [self.tiles(), self.levels()] {
             fs::create_dir_all(&tiles).map_err(Error::io("create the directory", &tiles))?;
             remove_old_tiles(&tiles)?;
         }
-        for stale in
-            [self.spill(), self.terrain(), self.tileset(), self.georeference(), self.report(), self.preview()]
-        {
+        let results = [self.terrain(), self.tileset(), self.georeference(), self.report(), self.preview()];
+        for stale in [self.spill(), self.store()].into_iter().chain(results) {
             remove_file(&stale)?;
         }
         Ok(lock)
@@ -53,10 +48,8 @@ impl Directory {
     /// # Errors
     /// [`Error::Io`] if that fails.
     pub fn clean_up(&self) -> Result<()> {
-        for directory in STEPS {
-            remove_directory(&self.job.join(directory))?;
-        }
         remove_file(&self.spill())?;
+        remove_file(&self.store())?;
         // Only jobs with levels have use for it.
         let _ = fs::remove_dir(self.levels());
         // With the lock, which marks the directory as a job's own, last: a kill in between leaves what the next job may take.
@@ -68,34 +61,9 @@ impl Directory {
         self.job.join("points.spill")
     }
 
-    /// The sites and closed triangles of leaf `tile`.
-    pub fn leaf(&self, tile: usize) -> PathBuf {
-        self.job.join(format!("leaves/{tile:06}.leaf"))
-    }
-
-    /// What tree node `node` hands to its parent.
-    pub fn frontier(&self, node: usize) -> PathBuf {
-        self.job.join(format!("nodes/{node:06}.frontier"))
-    }
-
-    /// The triangles that inner node `node` contributes.
-    pub fn seam(&self, node: usize) -> PathBuf {
-        self.job.join(format!("nodes/{node:06}.seam"))
-    }
-
-    /// The frontier of leaf `tile` as far as the leaf knows it.
-    pub fn rim_draft(&self, tile: usize) -> PathBuf {
-        self.job.join(format!("rims/{tile:06}.draft"))
-    }
-
-    /// The finished rim vertices of leaf `tile`.
-    pub fn rim(&self, tile: usize) -> PathBuf {
-        self.job.join(format!("rims/{tile:06}.rim"))
-    }
-
-    /// The pixels of the preview that `tile` covers.
-    pub fn preview_fragment(&self, tile: usize) -> PathBuf {
-        self.job.join(format!("preview/{tile:06}.pixels"))
+    /// The results of the steps.
+    pub fn store(&self) -> PathBuf {
+        self.job.join("steps.store")
     }
 
     /// The directory of the tiles.
@@ -106,11 +74,6 @@ impl Directory {
     /// The GLB of `tile`.
     pub fn tile(&self, tile: usize) -> PathBuf {
         self.tiles().join(format!("{tile:06}.glb"))
-    }
-
-    /// What `tileset.json` will say of the coarser tile at tree node `node`.
-    pub fn level_record(&self, node: usize) -> PathBuf {
-        self.job.join(format!("levels/{node:06}.level"))
     }
 
     /// The directory of the coarser tiles.
@@ -148,9 +111,6 @@ impl Directory {
         self.output.join("preview.png")
     }
 }
-
-/// The folders in the job directory.
-const STEPS: [&str; 5] = ["leaves", "nodes", "rims", "preview", "levels"];
 
 /// Keeps other processes out of a job directory, also after a kill: the system lets go of it with the process.
 #[derive(Debug)]
@@ -257,7 +217,7 @@ mod tests {
         directory.clean_up().unwrap();
         fs::create_dir(output.path().join("job")).unwrap();
         drop(directory.create().unwrap());
-        fs::remove_file(output.path().join("job/lock")).unwrap();
+        fs::rename(output.path().join("job/lock"), output.path().join("job/theirs")).unwrap();
         let error = directory.create().unwrap_err();
         assert_eq!(error.exit_code(), 2, "{error}");
     }

@@ -2,9 +2,10 @@
 //! colours, as one GLB; and its pixels of the preview.
 
 use super::columns::ColumnWriter;
-use super::directory::{Directory, remove_file, write_whole};
+use super::directory::{Directory, write_whole};
 use super::records::{Leaf, Rim, RimVertices, SeamTriangle};
 use super::stitch::seam_of;
+use super::store::{Key, Store};
 use super::tree::Tree;
 use crate::output::Tile;
 use crate::output::color::Coloring;
@@ -51,27 +52,33 @@ impl AddAssign for TileFigures {
     }
 }
 
-/// Writes the GLB of `tile` and its part of the preview, and removes the leaf's file, which nothing needs after that.
+/// Writes the GLB of `tile` and leaves its part of the preview in the store.
 ///
 /// # Errors
-/// [`Error::Io`] on the output or the job directory, [`Error::Config`] if a triangle is too long for f32.
-pub fn run(directory: &Directory, tree: &Tree, tile: usize, look: &Look, canvas: &Canvas) -> Result<TileFigures> {
-    let leaf = Leaf::load(directory, tile)?;
-    let rims = RimVertices::load(directory, tile)?;
+/// [`Error::Io`] on the output or the store, [`Error::Config`] if a triangle is too long for f32.
+pub fn run(
+    directory: &Directory,
+    store: &Store,
+    tree: &Tree,
+    tile: usize,
+    look: &Look,
+    canvas: &Canvas,
+) -> Result<TileFigures> {
+    let leaf = Leaf::load(store, tile)?;
+    let rims = RimVertices::load(store, tile)?;
     let mut sites = Sites::of_leaf(leaf, &rims, look);
-    let own = seam_of(directory, tree, tile)?.into_iter().filter(|triangle| owner(triangle) == tile as u32);
-    let seam_triangles = sites.add_seam(directory, tile as u32, own, look)?;
+    let own = seam_of(store, tree, tile)?.into_iter().filter(|triangle| owner(triangle) == tile as u32);
+    let seam_triangles = sites.add_seam(store, tile as u32, own, look)?;
     let content = sites.into_tile(look);
     let mut figures =
         TileFigures { triangles: content.triangles.len() as u64, seam_triangles, ..TileFigures::default() };
-    ColumnWriter::default().push(&canvas.draw(&content)).write(&directory.preview_fragment(tile))?;
+    ColumnWriter::default().push(&canvas.draw(&content)).write(store, Key::Pixels(tile))?;
     if !content.triangles.is_empty() {
         let mut bytes = Vec::new();
         encode_tile(&look.frame, &content, &mut bytes)?;
         write_whole(&directory.tile(tile), |file| file.write_all(&bytes))?;
         (figures.files, figures.bytes) = (1, bytes.len() as u64);
     }
-    remove_file(&directory.leaf(tile))?;
     Ok(figures)
 }
 
@@ -106,12 +113,12 @@ impl Sites {
     /// Adds the triangles of the seams that `tile` owns, with the vertices that neighbours share with it; returns how many.
     fn add_seam(
         &mut self,
-        directory: &Directory,
+        store: &Store,
         tile: u32,
         seam: impl Iterator<Item = SeamTriangle>,
         look: &Look,
     ) -> Result<u64> {
-        let mut neighbours = Neighbours { directory, rims: HashMap::new() };
+        let mut neighbours = Neighbours { store, rims: HashMap::new() };
         let mut vertex_of: HashMap<(u32, u32), u32> = HashMap::new();
         let before = self.triangles.len();
         for triangle in seam {
@@ -177,7 +184,7 @@ fn keep<T>(values: &mut Vec<T>, wanted: &[bool]) {
 
 /// The finished frontiers of other tiles, read when first asked for.
 struct Neighbours<'a> {
-    directory: &'a Directory,
+    store: &'a Store,
     rims: HashMap<u32, RimVertices>,
 }
 
@@ -186,7 +193,7 @@ impl Neighbours<'_> {
         Ok(match self.rims.entry(tile) {
             std::collections::hash_map::Entry::Occupied(entry) => entry.into_mut(),
             std::collections::hash_map::Entry::Vacant(entry) => {
-                entry.insert(RimVertices::load(self.directory, tile as usize)?)
+                entry.insert(RimVertices::load(self.store, tile as usize)?)
             }
         })
     }

@@ -1,12 +1,12 @@
 //! Step 3 of a job, by tile: triangulate the sites of one leaf and close what can be closed.
 
 use super::closing::{State, close};
-use super::directory::Directory;
 use super::partition::Partition;
 use super::records::{Frontier, Leaf, Rim, RimDraft};
 use super::sites;
 use super::span::Longest;
 use super::spill::Spill;
+use super::store::Store;
 use crate::Result;
 use crate::config::Duplicates;
 use crate::geometry::Site;
@@ -26,8 +26,6 @@ pub struct LeafFigures {
     pub duplicates: u64,
     /// Triangles closed in leaves.
     pub triangles: u64,
-    /// Bytes of temporary files.
-    pub bytes: u64,
     /// How the leaves were triangulated.
     pub outcome: Outcome,
 }
@@ -37,7 +35,6 @@ impl AddAssign for LeafFigures {
         self.sites += other.sites;
         self.duplicates += other.duplicates;
         self.triangles += other.triangles;
-        self.bytes += other.bytes;
         self.outcome += other.outcome;
     }
 }
@@ -53,18 +50,12 @@ pub struct Task<'a> {
     pub longest: Longest,
 }
 
-/// Triangulates leaf `tile` and leaves its sites, closed triangles and frontier in the job directory.
+/// Triangulates leaf `tile` and leaves its sites, closed triangles and frontier in the store.
 ///
 /// # Errors
-/// [`crate::Error::Io`] on the job directory, [`crate::Error::TooFine`] if a triangle is too long to be written,
+/// [`crate::Error::Io`] on the spill or the store, [`crate::Error::TooFine`] if a triangle is too long to be written,
 /// [`crate::Error::Broken`] if the triangulation fails.
-pub fn run(
-    directory: &Directory,
-    partition: &Partition,
-    spill: &Spill,
-    tile: usize,
-    task: Task<'_>,
-) -> Result<LeafFigures> {
+pub fn run(store: &Store, partition: &Partition, spill: &Spill, tile: usize, task: Task<'_>) -> Result<LeafFigures> {
     let (points, dropped) = sites::load(spill, &partition.blocks[tile], task.duplicates)?;
     let sites: Vec<Site> = points.iter().map(|p| p.position).collect();
     let (mesh, outcome) = task.triangulator.triangulate(&sites)?;
@@ -78,11 +69,11 @@ pub fn run(
     triangulation::recycle(mesh);
     let rim = |&site: &u32| Rim { tile: tile as u32, site, position: leaf.positions[site as usize] };
     let frontier = Frontier { sites: closing.frontier.iter().map(rim).collect(), boundary: closing.boundary };
-    let bytes = rim_draft(&leaf, &closing.frontier).save(directory, tile)?
-        + leaf.save(directory, tile)?
-        + frontier.save(directory, node)?;
+    rim_draft(&leaf, &closing.frontier).save(store, tile)?;
+    leaf.save(store, tile)?;
+    frontier.save(store, node)?;
     let (sites, triangles) = (sites.len() as u64, leaf.triangles.len() as u64);
-    Ok(LeafFigures { sites, duplicates: dropped, triangles, bytes, outcome })
+    Ok(LeafFigures { sites, duplicates: dropped, triangles, outcome })
 }
 
 fn check_spans(mesh: &Mesh, sites: &[Site], states: &[State], longest: Longest) -> Result<()> {

@@ -4,6 +4,7 @@ use super::directory::{Directory, write_whole};
 use super::export::Look;
 use super::pyramid::{Child, Pyramid, Sizes};
 use super::records::{Level, LevelTile};
+use super::store::Store;
 use crate::output::glb::encode_tile;
 use crate::output::join::join;
 use crate::output::read::{TileFile, read_tile};
@@ -43,6 +44,7 @@ impl AddAssign for LevelFigures {
 /// [`Error::Io`] on the output or the job directory, [`Error::Broken`] if a file there is not what an earlier step has written.
 pub fn run(
     directory: &Directory,
+    store: &Store,
     pyramid: &Pyramid,
     at: usize,
     look: &Look,
@@ -52,7 +54,7 @@ pub fn run(
     let inner = &pyramid.inner[at];
     let mut below = Below::default();
     for &child in &inner.children {
-        below.add(directory, pyramid, child, look, content && inner.content)?;
+        below.add(directory, store, pyramid, child, look, content && inner.content)?;
     }
     let Below { files, leaves, bounds, error } = below;
     let mut figures = LevelFigures::default();
@@ -73,7 +75,7 @@ pub fn run(
             error_m: own.error,
         };
     }
-    Level { own, leaves }.save(directory, inner.node)?;
+    Level { own, leaves }.save(store, inner.node)?;
     Ok(figures)
 }
 
@@ -92,7 +94,15 @@ struct Below {
 }
 
 impl Below {
-    fn add(&mut self, directory: &Directory, pyramid: &Pyramid, child: Child, look: &Look, keep: bool) -> Result<()> {
+    fn add(
+        &mut self,
+        directory: &Directory,
+        store: &Store,
+        pyramid: &Pyramid,
+        child: Child,
+        look: &Look,
+        keep: bool,
+    ) -> Result<()> {
         match child {
             Child::Leaf(tile) => {
                 let path = directory.tile(tile);
@@ -104,7 +114,7 @@ impl Below {
             }
             Child::Inner(at) => {
                 let node = pyramid.inner[at].node;
-                let own = Level::load(directory, node)?.own;
+                let own = Level::load(store, node)?.own;
                 self.widen(own.bounds());
                 self.error = self.error.max(own.error);
                 if keep && own.content > 0 {
@@ -132,9 +142,8 @@ fn read(path: PathBuf) -> Result<TileFile> {
 pub(super) fn bounds_of(file: &TileFile, look: &Look) -> Option<[[i32; 3]; 2]> {
     let none = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
     let worlds = file.parts.iter().flat_map(|part| (0..part.positions.len()).map(|v| part.world(v)));
-    let [low, high] = worlds.fold(none, |[low, high], p| {
-        [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]
-    });
+    let [low, high] =
+        worlds.fold(none, |[low, high], p| [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]);
     // glTF's z goes south.
     let corners = [[low[0], low[1], high[2]], [high[0], high[1], low[2]]];
     let [low, high] = corners.map(|corner| look.frame.integers(corner));

@@ -1,11 +1,11 @@
-//! Step 4 of a job, by inner node of the tree: triangulate what the two children still need, discard what covers ground
+//! Step 4 of a job, by merge node of the tree: triangulate what the nodes below still need, discard what covers ground
 //! that is closed below, and close what can be closed now. What closes here are the seams.
 
 use super::closing::{State, close, covered};
-use super::directory::Directory;
 use super::records::{Frontier, Rim, Seam, SeamTriangle};
 use super::span::Longest;
-use super::tree::{Kind, Tree};
+use super::store::Store;
+use super::tree::Tree;
 use crate::geometry::Site;
 use crate::triangulation::reference;
 use crate::{Error, Result};
@@ -13,17 +13,13 @@ use crate::{Error, Result};
 /// Bytes that merging one frontier site takes at the peak: `spade`, the mesh and the marks.
 const BYTES_PER_SITE: u64 = 600;
 
-/// Merges the children of inner node `node`, whose own results must be in the job directory; returns the number of seam
-/// triangles.
+/// Merges the frontiers below merge node `node`, which must be in the store; returns the number of seam triangles.
 ///
 /// # Errors
-/// [`Error::Memory`] if the frontiers do not fit `memory` bytes, [`Error::TooFine`] if a triangle is too long to be written, [`Error::Io`] on the job directory, [`Error::Broken`] if the
-/// children contradict each other.
-pub fn run(directory: &Directory, tree: &Tree, node: usize, memory: u64, longest: Longest) -> Result<u64> {
-    let Kind::Inner(children) = tree.nodes[node].kind else {
-        return Err(Error::Broken(format!("node {node} of the tree is a leaf and has nothing to merge")));
-    };
-    let union = join(Frontier::load(directory, children[0])?, Frontier::load(directory, children[1])?);
+/// [`Error::Memory`] if the frontiers do not fit `memory` bytes, [`Error::TooFine`] if a triangle is too long to be
+/// written, [`Error::Io`] on the store, [`Error::Broken`] if the frontiers contradict each other.
+pub fn run(store: &Store, tree: &Tree, node: usize, memory: u64, longest: Longest) -> Result<u64> {
+    let union = join(store, &tree.merged_by(node))?;
     check_memory(union.sites.len(), memory)?;
     let sites: Vec<Site> = union.sites.iter().map(Rim::plane).collect();
     let mesh = reference::triangulate(&sites)?;
@@ -38,17 +34,22 @@ pub fn run(directory: &Directory, tree: &Tree, node: usize, memory: u64, longest
         .map(|(corners, _)| corners.map(|v| union.sites[v as usize]))
         .collect();
     seam.iter().try_for_each(|corners| longest.check(corners.map(|corner| corner.plane())))?;
-    Seam::new(&seam).save(directory, node)?;
+    Seam::new(&seam).save(store, node)?;
     let frontier = closing.frontier.iter().map(|&site| union.sites[site as usize]).collect();
-    Frontier { sites: frontier, boundary: closing.boundary }.save(directory, node)?;
+    Frontier { sites: frontier, boundary: closing.boundary }.save(store, node)?;
     Ok(seam.len() as u64)
 }
 
-fn join(mut low: Frontier, high: Frontier) -> Frontier {
-    let offset = low.sites.len() as u32;
-    low.sites.extend(high.sites);
-    low.boundary.extend(high.boundary.iter().map(|edge| edge.map(|v| v + offset)));
-    low
+/// The frontiers of `nodes` as one.
+fn join(store: &Store, nodes: &[usize]) -> Result<Frontier> {
+    let mut union = Frontier::default();
+    for &node in nodes {
+        let Frontier { sites, boundary } = Frontier::load(store, node)?;
+        let offset = union.sites.len() as u32;
+        union.sites.extend(sites);
+        union.boundary.extend(boundary.iter().map(|edge| edge.map(|v| v + offset)));
+    }
+    Ok(union)
 }
 
 fn check_memory(sites: usize, memory: u64) -> Result<()> {

@@ -23,6 +23,7 @@ pub mod sites;
 pub mod span;
 pub mod spill;
 pub mod stitch;
+pub mod store;
 pub mod tileset;
 pub mod tree;
 
@@ -50,6 +51,7 @@ use span::Longest;
 use spill::Spill;
 use std::io::Write;
 use std::time::Instant;
+use store::{Key, Store};
 use tree::{Kind, Tree};
 
 /// Bytes that one site of a leaf takes while the leaf is triangulated: points, sort keys, sites, mesh and marks.
@@ -161,20 +163,21 @@ impl Job<'_> {
         let read = stage.finish();
 
         let stage = progress.stage("triangulate", partition.summary.tally.kept, "points");
-        let leaves = triangulate(config, triangulator, directory, &partition, longest, &stage)?;
-        // From here on the leaves' own files are enough.
+        let store = Store::create(&directory.store())?;
+        let leaves = triangulate(config, triangulator, &store, directory, &partition, longest, &stage)?;
+        // From here on what is in the store is enough.
         directory::remove_file(&directory.spill())?;
         let triangulated = stage.finish();
 
         let look = look(config, plan, &partition.summary, bounds);
         let tiles = partition.tree.leaves.len();
         let stage = progress.stage("stitch", tiles as u64, "tiles");
-        stitch_all(directory, &partition.tree, &look, &stage)?;
+        stitch_all(&store, &partition.tree, &look, &stage)?;
         let stitched = stage.finish();
 
         let stage = progress.stage("write", leaves.sites, "sites");
         let canvas = Canvas::new(&look.frame, bounds);
-        let written = export_all(directory, &partition, &look, &canvas, &stage)?;
+        let written = export_all(directory, &store, &partition, &look, &canvas, &stage)?;
         enough_triangles(written.triangles)?;
         let exported = stage.finish();
 
@@ -185,14 +188,14 @@ impl Job<'_> {
         if config.output.format != Format::Glb || !one_file {
             let (sizes, pyramid) = pyramid(config, &partition);
             let stage = progress.stage("levels", pyramid.inner.len() as u64, "tiles");
-            coarser = self.make_levels(&pyramid, sizes, &look, &stage)?;
-            other_bytes += tileset::write(directory, &pyramid, &look, None)?;
+            coarser = self.make_levels(&store, &pyramid, sizes, &look, &stage)?;
+            other_bytes += tileset::write(directory, &store, &pyramid, &look, None)?;
             levelled = Some(stage.finish());
             warnings.extend(levels_left_out(config, &pyramid));
         }
 
         let stage = progress.stage("finish", 1, "job");
-        other_bytes += finish(directory, plan, &canvas, tiles, bounds)?;
+        other_bytes += finish(directory, &store, plan, &canvas, tiles, bounds)?;
         if one_file && config.output.format != Format::Tiles {
             other_bytes += write_one_file(directory, tiles)?;
         } else if config.output.format == Format::Glb {
@@ -213,7 +216,7 @@ impl Job<'_> {
                 levels: coarser,
                 warnings,
                 other_bytes,
-                temporary: partition.spilled + leaves.bytes,
+                temporary: partition.spilled + store.bytes(),
                 stages,
                 threads: self.threads,
                 memory: config.limits.memory.0,
@@ -225,14 +228,21 @@ impl Job<'_> {
     }
 
     /// Makes the coarser tiles, those of one height side by side, as many at once as have room.
-    fn make_levels(&self, pyramid: &Pyramid, sizes: Sizes, look: &Look, stage: &Stage) -> Result<LevelFigures> {
+    fn make_levels(
+        &self,
+        store: &Store,
+        pyramid: &Pyramid,
+        sizes: Sizes,
+        look: &Look,
+        stage: &Stage,
+    ) -> Result<LevelFigures> {
         let content = self.config.output.levels;
         let lanes = match pyramid.largest() {
             largest if content && largest > 0 => (sizes.memory / largest).clamp(1, self.threads as u64) as usize,
             _ => self.threads,
         };
         let make = |at: usize| {
-            let figures = levels::run(self.directory, pyramid, at, look, sizes, content)?;
+            let figures = levels::run(self.directory, store, pyramid, at, look, sizes, content)?;
             stage.advance(1);
             Ok(figures)
         };
@@ -315,24 +325,25 @@ fn enough_triangles(triangles: u64) -> Result<()> {
     ))
 }
 
-/// Triangulates all leaves and merges every inner node as soon as its children are done.
+/// Triangulates all leaves and merges every merge node as soon as all below it is done.
 fn triangulate(
     config: &Config,
     triangulator: &Triangulator,
+    store: &Store,
     directory: &Directory,
     partition: &Partition,
     longest: Longest,
     stage: &Stage,
 ) -> Result<LeafFigures> {
     let spill = Spill::open(&directory.spill())?;
-    let grower = Grower { config, triangulator, directory, partition, spill: &spill, longest, stage };
+    let grower = Grower { config, triangulator, store, partition, spill: &spill, longest, stage };
     grower.grow(0)
 }
 
 struct Grower<'a> {
     config: &'a Config,
     triangulator: &'a Triangulator,
-    directory: &'a Directory,
+    store: &'a Store,
     partition: &'a Partition,
     spill: &'a Spill,
     longest: Longest,
@@ -348,7 +359,7 @@ impl Grower<'_> {
                     triangulator: self.triangulator,
                     longest: self.longest,
                 };
-                let figures = leaf::run(self.directory, self.partition, self.spill, tile, task)?;
+                let figures = leaf::run(self.store, self.partition, self.spill, tile, task)?;
                 self.stage.advance(figures.sites + figures.duplicates);
                 Ok(figures)
             }
@@ -356,10 +367,12 @@ impl Grower<'_> {
                 let (low, high) = rayon::join(|| self.grow(low), || self.grow(high));
                 let (mut figures, high) = (low?, high?);
                 figures += high;
-                // Nodes below the root may be merged at once on all threads.
-                let share = if node == 0 { 1 } else { rayon::current_num_threads() as u64 };
-                let memory = self.config.limits.memory.0 / 4 * 3 / share;
-                merge::run(self.directory, &self.partition.tree, node, memory, self.longest)?;
+                if self.partition.tree.is_merge(node) {
+                    // Nodes below the root may be merged at once on all threads.
+                    let share = if node == 0 { 1 } else { rayon::current_num_threads() as u64 };
+                    let memory = self.config.limits.memory.0 / 4 * 3 / share;
+                    merge::run(self.store, &self.partition.tree, node, memory, self.longest)?;
+                }
                 Ok(figures)
             }
         }
@@ -379,9 +392,9 @@ fn look(config: &Config, plan: &Plan, summary: &Summary, bounds: [[i32; 3]; 2]) 
     Look { frame: plan.frame.clone().refined(bounds), coloring, normals: config.output.normals }
 }
 
-fn stitch_all(directory: &Directory, tree: &Tree, look: &Look, stage: &Stage) -> Result<()> {
+fn stitch_all(store: &Store, tree: &Tree, look: &Look, stage: &Stage) -> Result<()> {
     (0..tree.leaves.len()).into_par_iter().try_for_each(|tile| {
-        stitch::run(directory, tree, tile, &look.frame)?;
+        stitch::run(store, tree, tile, &look.frame)?;
         stage.advance(1);
         Ok(())
     })
@@ -389,6 +402,7 @@ fn stitch_all(directory: &Directory, tree: &Tree, look: &Look, stage: &Stage) ->
 
 fn export_all(
     directory: &Directory,
+    store: &Store,
     partition: &Partition,
     look: &Look,
     canvas: &Canvas,
@@ -398,7 +412,7 @@ fn export_all(
         .into_par_iter()
         .with_max_len(1)
         .map(|tile| {
-            let figures = export::run(directory, &partition.tree, tile, look, canvas)?;
+            let figures = export::run(directory, store, &partition.tree, tile, look, canvas)?;
             stage.advance(partition.blocks[tile].iter().map(|block| block.points as u64).sum());
             Ok(figures)
         })
@@ -409,11 +423,18 @@ fn export_all(
 }
 
 /// Writes what stands beside the tiles; returns its bytes.
-fn finish(directory: &Directory, plan: &Plan, canvas: &Canvas, tiles: usize, bounds: [[i32; 3]; 2]) -> Result<u64> {
+fn finish(
+    directory: &Directory,
+    store: &Store,
+    plan: &Plan,
+    canvas: &Canvas,
+    tiles: usize,
+    bounds: [[i32; 3]; 2],
+) -> Result<u64> {
     let georeference = Georeference::new(&plan.frame, &plan.lattice, bounds, plan.unit, plan.crs.epsg);
     let text = georeference.to_json();
     directory::write_whole(&directory.georeference(), |file| file.write_all(text.as_bytes()))?;
-    let picture = draw_picture(directory, canvas, tiles)?;
+    let picture = draw_picture(store, canvas, tiles)?;
     directory::write_whole(&directory.preview(), |file| file.write_all(&picture))?;
     Ok((text.len() + picture.len()) as u64)
 }
@@ -425,10 +446,10 @@ fn write_one_file(directory: &Directory, tiles: usize) -> Result<u64> {
     Ok(std::fs::metadata(directory.terrain()).map_err(Error::io("read", directory.terrain()))?.len())
 }
 
-fn draw_picture(directory: &Directory, canvas: &Canvas, tiles: usize) -> Result<Vec<u8>> {
+fn draw_picture(store: &Store, canvas: &Canvas, tiles: usize) -> Result<Vec<u8>> {
     let mut picture = Picture::new(canvas);
     for tile in 0..tiles {
-        picture.add(tile as u32, &ColumnReader::open(&directory.preview_fragment(tile))?.column::<Texel>()?);
+        picture.add(tile as u32, &ColumnReader::open(store, Key::Pixels(tile))?.column::<Texel>()?);
     }
     Ok(picture.png())
 }

@@ -1,7 +1,7 @@
-//! What the steps leave for each other in the job directory, one type a file.
+//! What the steps leave for each other in the job's store, one type a record.
 
 use super::columns::{ColumnReader, ColumnWriter};
-use super::directory::Directory;
+use super::store::{Key, Store};
 use crate::geometry::Site;
 use crate::output::normals::NormalSum;
 use crate::{Error, Result};
@@ -43,27 +43,27 @@ pub struct Leaf {
 }
 
 impl Leaf {
-    /// Writes the file of `tile`; returns its size in bytes.
+    /// Writes the record of `tile`.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, directory: &Directory, tile: usize) -> Result<u64> {
+    pub fn save(&self, store: &Store, tile: usize) -> Result<()> {
         let columns = ColumnWriter::default().push(&self.positions).push(&self.rgb).push(&self.class);
-        // These files are most of what a job writes on its way: corners take two bytes where that is enough.
+        // These records are most of what a job writes on its way: corners take two bytes where that is enough.
         let columns = if self.has_short_corners() {
             columns.push::<[u16; 3]>(&self.triangles.iter().map(|t| t.map(|v| v as u16)).collect::<Vec<_>>())
         } else {
             columns.push(&self.triangles)
         };
-        columns.write(&directory.leaf(tile))
+        columns.write(store, Key::Leaf(tile))
     }
 
-    /// Reads the file of `tile`.
+    /// Reads the record of `tile`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if the file is not whole.
-    pub fn load(directory: &Directory, tile: usize) -> Result<Leaf> {
-        let mut columns = ColumnReader::open(&directory.leaf(tile))?;
+    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if there is none.
+    pub fn load(store: &Store, tile: usize) -> Result<Leaf> {
+        let mut columns = ColumnReader::open(store, Key::Leaf(tile))?;
         let mut leaf = Leaf {
             positions: columns.column()?,
             rgb: columns.column()?,
@@ -93,20 +93,20 @@ pub struct Frontier {
 }
 
 impl Frontier {
-    /// Writes the file of `node`; returns its size in bytes.
+    /// Writes the record of `node`.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, directory: &Directory, node: usize) -> Result<u64> {
-        ColumnWriter::default().push(&self.sites).push(&self.boundary).write(&directory.frontier(node))
+    pub fn save(&self, store: &Store, node: usize) -> Result<()> {
+        ColumnWriter::default().push(&self.sites).push(&self.boundary).write(store, Key::Frontier(node))
     }
 
-    /// Reads the file of `node`.
+    /// Reads the record of `node`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if the file is not whole.
-    pub fn load(directory: &Directory, node: usize) -> Result<Frontier> {
-        let mut columns = ColumnReader::open(&directory.frontier(node))?;
+    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if there is none.
+    pub fn load(store: &Store, node: usize) -> Result<Frontier> {
+        let mut columns = ColumnReader::open(store, Key::Frontier(node))?;
         Ok(Frontier { sites: columns.column()?, boundary: columns.column()? })
     }
 }
@@ -140,20 +140,20 @@ impl Seam {
         seam
     }
 
-    /// Writes the file of `node`; returns its size in bytes.
+    /// Writes the record of `node`.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, directory: &Directory, node: usize) -> Result<u64> {
-        ColumnWriter::default().push(&self.index).push(&self.triangles).write(&directory.seam(node))
+    pub fn save(&self, store: &Store, node: usize) -> Result<()> {
+        ColumnWriter::default().push(&self.index).push(&self.triangles).write(store, Key::Seam(node))
     }
 
-    /// The triangles of `node` that touch `tile`, from its file.
+    /// The triangles of `node` that touch `tile`, from its record.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if the file is not whole.
-    pub fn touching(directory: &Directory, node: usize, tile: usize) -> Result<Vec<SeamTriangle>> {
-        let mut columns = ColumnReader::open(&directory.seam(node))?;
+    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if there is none.
+    pub fn touching(store: &Store, node: usize, tile: usize) -> Result<Vec<SeamTriangle>> {
+        let mut columns = ColumnReader::open(store, Key::Seam(node))?;
         let index: Vec<[u32; 3]> = columns.column()?;
         match index.binary_search_by_key(&(tile as u32), |entry| entry[0]) {
             Ok(at) => columns.column_part(index[at][1] as usize, index[at][2] as usize),
@@ -174,20 +174,20 @@ pub struct RimDraft {
 }
 
 impl RimDraft {
-    /// Writes the file of `tile`; returns its size in bytes.
+    /// Writes the record of `tile`.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, directory: &Directory, tile: usize) -> Result<u64> {
-        ColumnWriter::default().push(&self.sums).push(&self.rgb).push(&self.class).write(&directory.rim_draft(tile))
+    pub fn save(&self, store: &Store, tile: usize) -> Result<()> {
+        ColumnWriter::default().push(&self.sums).push(&self.rgb).push(&self.class).write(store, Key::RimDraft(tile))
     }
 
-    /// Reads the file of `tile`.
+    /// Reads the record of `tile`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if the file is not whole.
-    pub fn load(directory: &Directory, tile: usize) -> Result<RimDraft> {
-        let mut columns = ColumnReader::open(&directory.rim_draft(tile))?;
+    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if there is none.
+    pub fn load(store: &Store, tile: usize) -> Result<RimDraft> {
+        let mut columns = ColumnReader::open(store, Key::RimDraft(tile))?;
         Ok(RimDraft { sums: columns.column()?, rgb: columns.column()?, class: columns.column()? })
     }
 }
@@ -211,20 +211,20 @@ pub struct RimVertex {
 pub struct RimVertices(pub Vec<RimVertex>);
 
 impl RimVertices {
-    /// Writes the file of `tile`; returns its size in bytes.
+    /// Writes the record of `tile`.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, directory: &Directory, tile: usize) -> Result<u64> {
-        ColumnWriter::default().push(&self.0).write(&directory.rim(tile))
+    pub fn save(&self, store: &Store, tile: usize) -> Result<()> {
+        ColumnWriter::default().push(&self.0).write(store, Key::Rim(tile))
     }
 
-    /// Reads the file of `tile`.
+    /// Reads the record of `tile`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if the file is not whole.
-    pub fn load(directory: &Directory, tile: usize) -> Result<RimVertices> {
-        Ok(RimVertices(ColumnReader::open(&directory.rim(tile))?.column()?))
+    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if there is none.
+    pub fn load(store: &Store, tile: usize) -> Result<RimVertices> {
+        Ok(RimVertices(ColumnReader::open(store, Key::Rim(tile))?.column()?))
     }
 
     /// The vertex of `site`.
@@ -268,23 +268,22 @@ pub struct Level {
 }
 
 impl Level {
-    /// Writes the file of `node`; returns its size in bytes.
+    /// Stores it as that of `node`.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, directory: &Directory, node: usize) -> Result<u64> {
-        ColumnWriter::default().push(&[self.own]).push(&self.leaves).write(&directory.level_record(node))
+    pub fn save(&self, store: &Store, node: usize) -> Result<()> {
+        ColumnWriter::default().push(&[self.own]).push(&self.leaves).write(store, Key::Level(node))
     }
 
-    /// Reads the file of `node`.
+    /// That of `node`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if the file is not whole.
-    pub fn load(directory: &Directory, node: usize) -> Result<Level> {
-        let path = directory.level_record(node);
-        let mut columns = ColumnReader::open(&path)?;
+    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if it is not there or not whole.
+    pub fn load(store: &Store, node: usize) -> Result<Level> {
+        let mut columns = ColumnReader::open(store, Key::Level(node))?;
         let own = columns.column()?;
-        let [own] = own[..] else { return Err(Error::Broken(format!("{} is damaged", path.display()))) };
+        let [own] = own[..] else { return Err(Error::Broken(format!("the record of coarser tile {node} is damaged"))) };
         Ok(Level { own, leaves: columns.column()? })
     }
 }

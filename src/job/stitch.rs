@@ -1,21 +1,21 @@
 //! Step 5 of a job, by tile: finish the normals of the tile's frontier with the triangles of the seams above it, so that
 //! every tile that shares a vertex writes the same normal.
 
-use super::directory::Directory;
 use super::records::{Frontier, Rim, RimDraft, RimVertex, RimVertices, Seam, SeamTriangle};
+use super::store::Store;
 use super::tree::Tree;
 use crate::output::frame::Frame;
 use crate::output::normals;
 use crate::{Error, Result};
 
-/// Leaves the finished frontier of `tile` in the job directory.
+/// Leaves the finished frontier of `tile` in the store.
 ///
 /// # Errors
-/// [`crate::Error::Io`] or [`crate::Error::Broken`] on the job directory.
-pub fn run(directory: &Directory, tree: &Tree, tile: usize, frame: &Frame) -> Result<()> {
-    let frontier = Frontier::load(directory, tree.leaves[tile])?;
-    let RimDraft { mut sums, rgb, class } = RimDraft::load(directory, tile)?;
-    for [a, b, c] in seam_of(directory, tree, tile)? {
+/// [`crate::Error::Io`] or [`crate::Error::Broken`] on the store.
+pub fn run(store: &Store, tree: &Tree, tile: usize, frame: &Frame) -> Result<()> {
+    let frontier = Frontier::load(store, tree.leaves[tile])?;
+    let RimDraft { mut sums, rgb, class } = RimDraft::load(store, tile)?;
+    for [a, b, c] in seam_of(store, tree, tile)? {
         let normal = normals::cross(a.position, b.position, c.position);
         for corner in [a, b, c].iter().filter(|corner| corner.tile as usize == tile) {
             let at = frontier.sites.binary_search(corner);
@@ -29,18 +29,17 @@ pub fn run(directory: &Directory, tree: &Tree, tile: usize, frame: &Frame) -> Re
         rgb: rgb[at],
         class: class[at] as u16,
     };
-    RimVertices(frontier.sites.iter().enumerate().map(finish).collect()).save(directory, tile)?;
-    Ok(())
+    RimVertices(frontier.sites.iter().enumerate().map(finish).collect()).save(store, tile)
 }
 
 /// All triangles of the seams that touch `tile`.
 ///
 /// # Errors
-/// [`crate::Error::Io`] or [`crate::Error::Broken`] on the job directory.
-pub fn seam_of(directory: &Directory, tree: &Tree, tile: usize) -> Result<Vec<SeamTriangle>> {
+/// [`crate::Error::Io`] or [`crate::Error::Broken`] on the store.
+pub fn seam_of(store: &Store, tree: &Tree, tile: usize) -> Result<Vec<SeamTriangle>> {
     let mut seam = Vec::new();
-    for node in tree.ancestors(tree.leaves[tile]) {
-        seam.extend(Seam::touching(directory, node, tile)?);
+    for node in tree.merges_above(tree.leaves[tile]) {
+        seam.extend(Seam::touching(store, node, tile)?);
     }
     Ok(seam)
 }

@@ -5,6 +5,7 @@ use super::export::Look;
 use super::levels::bounds_of;
 use super::pyramid::{Child, Pyramid};
 use super::records::{Level, LevelTile};
+use super::store::Store;
 use crate::output::read::read_tile;
 use crate::output::tileset::{Node, tileset_json};
 use crate::{Error, Result};
@@ -13,9 +14,15 @@ use crate::{Error, Result};
 ///
 /// # Errors
 /// [`Error::Io`] on the output or the job directory, [`Error::Broken`] if there is no tile.
-pub fn write(directory: &Directory, pyramid: &Pyramid, look: &Look, transform: Option<[f64; 16]>) -> Result<u64> {
+pub fn write(
+    directory: &Directory,
+    store: &Store,
+    pyramid: &Pyramid,
+    look: &Look,
+    transform: Option<[f64; 16]>,
+) -> Result<u64> {
     let root = match pyramid.inner.len().checked_sub(1) {
-        Some(last) => inner_node(directory, pyramid, last)?,
+        Some(last) => inner_node(directory, store, pyramid, last)?,
         None => single_node(directory, look)?,
     };
     let root = root.ok_or_else(|| Error::Broken("there is no tile to list in tileset.json".into()))?;
@@ -25,14 +32,14 @@ pub fn write(directory: &Directory, pyramid: &Pyramid, look: &Look, transform: O
     Ok(text.len() as u64)
 }
 
-fn inner_node(directory: &Directory, pyramid: &Pyramid, at: usize) -> Result<Option<Node>> {
+fn inner_node(directory: &Directory, store: &Store, pyramid: &Pyramid, at: usize) -> Result<Option<Node>> {
     let inner = &pyramid.inner[at];
-    let Level { own, leaves } = Level::load(directory, inner.node)?;
+    let Level { own, leaves } = Level::load(store, inner.node)?;
     let mut leaves = leaves.iter();
     let mut children = Vec::new();
     for &child in &inner.children {
         children.extend(match child {
-            Child::Inner(below) => inner_node(directory, pyramid, below)?,
+            Child::Inner(below) => inner_node(directory, store, pyramid, below)?,
             Child::Leaf(tile) => leaves.next().and_then(|leaf| node(leaf, format!("tiles/{tile:06}.glb"))),
         });
     }

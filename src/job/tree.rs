@@ -93,10 +93,38 @@ pub struct Tree {
     pub leaves: Vec<usize>,
 }
 
+/// Frontiers are merged at the root and at every third inner node on the way down, eight at a time where the tree is full:
+/// joining two at every node would triangulate most frontier sites once a node, more than twice as often in all.
+const MERGE_STRIDE: usize = 3;
+
 impl Tree {
     /// The nodes above node `node`, nearest first.
-    pub fn ancestors(&self, node: usize) -> impl Iterator<Item = usize> {
+    fn ancestors(&self, node: usize) -> impl Iterator<Item = usize> {
         std::iter::successors(self.nodes[node].parent, |&n| self.nodes[n].parent)
+    }
+
+    /// Whether `node` merges the frontiers of what is below it.
+    pub fn is_merge(&self, node: usize) -> bool {
+        let is_inner = matches!(self.nodes[node].kind, Kind::Inner(_));
+        is_inner && self.ancestors(node).count().is_multiple_of(MERGE_STRIDE)
+    }
+
+    /// The merge nodes above node `node`, nearest first.
+    pub fn merges_above(&self, node: usize) -> impl Iterator<Item = usize> {
+        self.ancestors(node).filter(|&n| self.is_merge(n))
+    }
+
+    /// Whose frontiers merge node `node` merges, from the lowest tile to the highest.
+    pub fn merged_by(&self, node: usize) -> Vec<usize> {
+        let mut merged = Vec::new();
+        let mut pending = vec![node];
+        while let Some(at) = pending.pop() {
+            match self.nodes[at].kind {
+                Kind::Inner([low, high]) if at == node || !self.is_merge(at) => pending.extend([high, low]),
+                _ => merged.push(at),
+            }
+        }
+        merged
     }
 }
 

@@ -164,7 +164,9 @@ impl Line {
 
     /// Whether `point`, on the line, lies ahead of `here`.
     fn leads(&self, here: [i32; 3], point: [i32; 3]) -> bool {
-        (0..2).any(|k| (self.to[k] as i64 - self.from[k] as i64).signum() * (point[k] as i64 - here[k] as i64).signum() > 0)
+        (0..2).any(|k| {
+            (self.to[k] as i64 - self.from[k] as i64).signum() * (point[k] as i64 - here[k] as i64).signum() > 0
+        })
     }
 
     /// The line's height above or below a vertex on it.

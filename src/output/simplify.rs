@@ -45,8 +45,7 @@ fn collapse(frame: &Frame, tile: &Tile, triangles: usize) -> Option<Vec<[u32; 3]
     for _ in 0..ATTEMPTS {
         let corners = tile.triangles.as_flattened();
         let options = SimplifyOptions::LockBorder;
-        let coarse =
-            simplify_with_locks_decoder(corners, &positions, &locked, 3 * triangles, f32::MAX, options, None);
+        let coarse = simplify_with_locks_decoder(corners, &positions, &locked, 3 * triangles, f32::MAX, options, None);
         let coarse: Vec<[u32; 3]> = coarse.as_chunks().0.to_vec();
         let turned: Vec<[u32; 3]> = coarse.iter().filter(|t| !is_counterclockwise(tile, t)).copied().collect();
         if turned.is_empty() {
@@ -61,9 +60,9 @@ fn collapse(frame: &Frame, tile: &Tile, triangles: usize) -> Option<Vec<[u32; 3]
 fn flattened(frame: &Frame, positions: &[[i32; 3]]) -> Vec<[f32; 3]> {
     let [xy, up] = frame.resolution_metres();
     let first = positions.first().copied().unwrap_or_default();
-    let [low, high] = positions.iter().fold([first; 2], |[low, high], p| {
-        [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]
-    });
+    let [low, high] = positions
+        .iter()
+        .fold([first; 2], |[low, high], p| [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]);
     let middle = [0, 1, 2].map(|k| (low[k] as f64 + high[k] as f64) / 2.0);
     let scale = [1.0, 1.0, up / xy * FLATNESS];
     positions.iter().map(|p| [0, 1, 2].map(|k| ((p[k] as f64 - middle[k]) * scale[k]) as f32)).collect()

@@ -10,7 +10,7 @@ use gdt_batch::job::progress::Progress;
 use gdt_batch::job::records::{Leaf, Seam};
 use gdt_batch::job::span::Longest;
 use gdt_batch::job::spill::Spill;
-use gdt_batch::job::tree::Kind;
+use gdt_batch::job::store::Store;
 use gdt_batch::job::{leaf, merge, scan};
 use gdt_batch::triangulation::{Triangulator, reference};
 
@@ -28,7 +28,7 @@ fn canonical(mut corners: Triangle) -> Triangle {
 }
 
 /// Scans, partitions, triangulates every leaf and merges every inner node.
-fn run_steps(job: &Job, config: &Config) -> (Directory, Partition) {
+fn run_steps(job: &Job, config: &Config) -> (Store, Partition) {
     let directory = Directory::new(&job.out());
     directory.create().unwrap();
     let plan = scan::run(config, Coarser::default()).unwrap();
@@ -40,32 +40,33 @@ fn run_steps(job: &Job, config: &Config) -> (Directory, Partition) {
         malformed_share: 0.0,
     };
     let partition = partition::run(&task, &directory, &Progress::Quiet.stage("read", 0, "points")).unwrap();
+    let store = Store::create(&directory.store()).unwrap();
     let spill = Spill::open(&directory.spill()).unwrap();
     let longest = Longest::of(&plan.frame);
     let cpu = Triangulation { backend: Backend::Cpu, ..Triangulation::default() };
     let triangulator = Triangulator::new(&cpu, 1 << 28, 1).unwrap();
     let task = leaf::Task { duplicates: Duplicates::Lowest, triangulator: &triangulator, longest };
     for tile in (0..partition.tree.leaves.len()).rev() {
-        leaf::run(&directory, &partition, &spill, tile, task).unwrap();
+        leaf::run(&store, &partition, &spill, tile, task).unwrap();
     }
     for node in (0..partition.tree.nodes.len()).rev() {
-        if matches!(partition.tree.nodes[node].kind, Kind::Inner(_)) {
-            merge::run(&directory, &partition.tree, node, 1 << 28, longest).unwrap();
+        if partition.tree.is_merge(node) {
+            merge::run(&store, &partition.tree, node, 1 << 28, longest).unwrap();
         }
     }
-    (directory, partition)
+    (store, partition)
 }
 
 /// All sites, and all triangles that leaves and inner nodes closed, sorted.
-fn collect(directory: &Directory, partition: &Partition) -> (Vec<Site>, Vec<Triangle>) {
+fn collect(store: &Store, partition: &Partition) -> (Vec<Site>, Vec<Triangle>) {
     let (mut sites, mut triangles) = (Vec::new(), Vec::new());
     for tile in 0..partition.tree.leaves.len() {
-        let leaf = Leaf::load(directory, tile).unwrap();
+        let leaf = Leaf::load(store, tile).unwrap();
         let plane = |v: u32| [leaf.positions[v as usize][0], leaf.positions[v as usize][1]];
         sites.extend((0..leaf.positions.len() as u32).map(plane));
         triangles.extend(leaf.triangles.iter().map(|t| canonical(t.map(plane))));
-        for node in partition.tree.ancestors(partition.tree.leaves[tile]) {
-            let seam = Seam::touching(directory, node, tile).unwrap();
+        for node in partition.tree.merges_above(partition.tree.leaves[tile]) {
+            let seam = Seam::touching(store, node, tile).unwrap();
             // A seam triangle stands with every tile it touches: count it with the first.
             let mine = seam.iter().filter(|t| t.iter().all(|corner| corner.tile as usize >= tile));
             triangles.extend(mine.map(|t| canonical(t.map(|corner| corner.plane()))));
@@ -79,8 +80,8 @@ fn collect(directory: &Directory, partition: &Partition) -> (Vec<Site>, Vec<Tria
 fn assert_exact(cloud: &Cloud, sites_per_tile: u64, what: &str) {
     let folder = tempfile::tempdir().unwrap();
     let job = Job::on(&[clouds::write(folder.path(), "cloud.csv", cloud)]).tiles_of(sites_per_tile);
-    let (directory, partition) = run_steps(&job, &Config::load(&job.config()).unwrap());
-    let (sites, triangles) = collect(&directory, &partition);
+    let (store, partition) = run_steps(&job, &Config::load(&job.config()).unwrap());
+    let (sites, triangles) = collect(&store, &partition);
     let mesh = reference::triangulate(&sites).unwrap();
     let mut expected: Vec<Triangle> = mesh.triangles.iter().map(|t| canonical(t.map(|v| sites[v as usize]))).collect();
     expected.sort_unstable();
