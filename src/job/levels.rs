@@ -5,6 +5,7 @@ use super::export::Look;
 use super::pyramid::{Child, Pyramid, Sizes};
 use super::records::{Level, LevelTile};
 use super::store::Store;
+use crate::output::frame::Frame;
 use crate::output::glb::encode_tile;
 use crate::output::join::join;
 use crate::output::read::{TileFile, read_tile};
@@ -63,7 +64,8 @@ pub fn run(
         let joined = join(&look.frame, &files).map_err(|what| broken(inner.node, &what))?;
         drop(files);
         let simple = simplify(&look.frame, &joined, sizes.target(joined.triangles.len()));
-        own.error = error + simple.error;
+        // Both lie between the lowest and the highest vertex.
+        own.error = (error + simple.error).min(height_range(&look.frame, bounds));
         own.content = 1;
         let mut bytes = Vec::new();
         encode_tile(&look.frame, &simple.tile, &mut bytes)?;
@@ -77,6 +79,11 @@ pub fn run(
     }
     Level { own, leaves }.save(store, inner.node)?;
     Ok(figures)
+}
+
+/// Metres.
+fn height_range(frame: &Frame, bounds: Option<[[i32; 3]; 2]>) -> f64 {
+    bounds.map_or(0.0, |[low, high]| (high[2] as f64 - low[2] as f64) * frame.resolution_metres()[1])
 }
 
 fn broken(node: usize, what: &str) -> Error {

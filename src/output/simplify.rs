@@ -1,21 +1,22 @@
-//! A terrain with fewer triangles, for looking at from afar: meshoptimizer collapses edges, and what comes back is checked.
+//! A terrain with fewer triangles, for looking at from afar.
 //!
-//! Vertices of the outline stay, and so do its edges: two terrains that meet along a part of their outlines still meet there when
-//! both, or either of them, are simplified. No other vertex moves, some go.
+//! A vertex goes by being moved to one of its neighbours: the triangles round it are replaced by those that this neighbour makes
+//! with the edges round them. It may go where all these are counterclockwise, which is decided exactly. So the triangles cover the
+//! same ground once, as before, and no other vertex moves. Vertices of the outline stay, and so do its edges: two terrains that meet
+//! along a part of their outlines still meet there when both, or either of them, are simplified.
+//!
+//! The vertex whose going is noticed least goes first: the vertical distance that it is off the new triangles, with what the ground
+//! there has been off already, since it is the greatest distance that is to be small; among vertices that are equal in that, those
+//! with short edges.
 
-use meshopt::{SimplifyOptions, simplify_with_locks_decoder};
+mod ring;
+mod topology;
 
 use super::Tile;
 use super::deviation::deviation;
 use super::frame::Frame;
-use crate::geometry::predicates::orient2d;
-
-/// Heights are handed over this much smaller. All triangles are nearly level then, so that the simplifier's error is the vertical
-/// distance, and its test against triangles that turn over sees what turns over in the plane, be the walls ever so steep.
-const FLATNESS: f64 = 1.0 / 4096.0;
-
-/// Simplifications of one tile before it is left as it is.
-const ATTEMPTS: usize = 4;
+use ring::Ring;
+use topology::{NONE, Topology, next};
 
 /// A simplified terrain.
 #[derive(Debug)]
@@ -26,76 +27,136 @@ pub struct Simplified {
     pub error: f64,
 }
 
-/// `tile`, a terrain over ground that it covers once, with about `triangles` triangles; with more where its outline has too many.
+/// `tile`, a terrain over ground that it covers once, with `triangles` triangles; with more where its outline has too many.
 pub fn simplify(frame: &Frame, tile: &Tile, triangles: usize) -> Simplified {
-    match collapse(frame, tile, triangles) {
-        Some(coarse) => {
-            let error = deviation(&tile.positions, &tile.triangles, &coarse) * frame.resolution_metres()[1];
-            Simplified { tile: subset(tile, coarse), error }
-        }
-        None => Simplified { tile: tile.clone(), error: 0.0 },
-    }
-}
-
-/// Triangles over the same ground, all counterclockwise. Where some turn over although the simplifier has looked (its coordinates
-/// are rounded), their corners and those around them are locked, and it tries again.
-fn collapse(frame: &Frame, tile: &Tile, triangles: usize) -> Option<Vec<[u32; 3]>> {
-    let positions = flattened(frame, &tile.positions);
-    let mut locked = vec![false; positions.len()];
-    for _ in 0..ATTEMPTS {
-        let corners = tile.triangles.as_flattened();
-        let options = SimplifyOptions::LockBorder;
-        let coarse = simplify_with_locks_decoder(corners, &positions, &locked, 3 * triangles, f32::MAX, options, None);
-        let coarse: Vec<[u32; 3]> = coarse.as_chunks().0.to_vec();
-        let turned: Vec<[u32; 3]> = coarse.iter().filter(|t| !is_counterclockwise(tile, t)).copied().collect();
-        if turned.is_empty() {
-            return (outline(&coarse) == outline(&tile.triangles)).then_some(coarse);
-        }
-        lock_around(tile, &turned, &mut locked);
-    }
-    None
-}
-
-/// x and y in lattice steps from the middle, z in the same unit but flattened.
-fn flattened(frame: &Frame, positions: &[[i32; 3]]) -> Vec<[f32; 3]> {
     let [xy, up] = frame.resolution_metres();
-    let first = positions.first().copied().unwrap_or_default();
-    let [low, high] = positions
-        .iter()
-        .fold([first; 2], |[low, high], p| [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]);
-    let middle = [0, 1, 2].map(|k| (low[k] as f64 + high[k] as f64) / 2.0);
-    let scale = [1.0, 1.0, up / xy * FLATNESS];
-    positions.iter().map(|p| [0, 1, 2].map(|k| ((p[k] as f64 - middle[k]) * scale[k]) as f32)).collect()
+    let mut collapser = Collapser::new(&tile.positions, &tile.triangles, up / xy);
+    collapser.run(triangles);
+    let coarse = collapser.topology.triangles();
+    let error = deviation(&tile.positions, &tile.triangles, &coarse) * up;
+    Simplified { tile: subset(tile, coarse), error }
 }
 
-fn is_counterclockwise(tile: &Tile, triangle: &[u32; 3]) -> bool {
-    let [a, b, c] = triangle.map(|v| tile.positions[v as usize]).map(|p| [p[0], p[1]]);
-    orient2d(a, b, c) > 0
+/// Of so many vertices one is rated to choose the first limit.
+const SAMPLE: usize = 61;
+/// The limit rises by this factor from sweep to sweep.
+const RISE: f32 = 1.25;
+
+/// A terrain while its vertices go.
+struct Collapser<'a> {
+    positions: &'a [[i32; 3]],
+    topology: Topology,
+    /// Steps of x and y in a step of z.
+    steepness: f64,
+    /// What it costs to take a vertex out, steps of x and y; infinite for those that cannot go.
+    costs: Vec<f32>,
+    vertices: Vec<Vertex>,
+    ring: Ring,
+    /// The sweep that is under way, from 1.
+    sweep: u32,
 }
 
-/// Locks the corners of the `turned` triangles and of all original triangles that touch them.
-fn lock_around(tile: &Tile, turned: &[[u32; 3]], locked: &mut [bool]) {
-    let mut touched = vec![false; locked.len()];
-    turned.iter().flatten().for_each(|&v| touched[v as usize] = true);
-    for triangle in tile.triangles.iter().filter(|t| t.iter().any(|&v| touched[v as usize])) {
-        triangle.iter().for_each(|&v| locked[v as usize] = true);
+/// What else is known of a vertex.
+#[derive(Clone, Copy)]
+struct Vertex {
+    /// The half-edge along which it would go; [`NONE`] where it cannot.
+    along: u32,
+    /// How far the ground around may be off already, steps of x and y.
+    off: f32,
+    /// The sweep in which its neighbours have changed since it was rated; 0 where they have not.
+    changed: u32,
+}
+
+impl<'a> Collapser<'a> {
+    fn new(positions: &'a [[i32; 3]], triangles: &[[u32; 3]], steepness: f64) -> Collapser<'a> {
+        let topology = Topology::new(positions.len(), triangles);
+        // What is inside may go for nothing as far as is known.
+        let unknown = |v| if topology.is_inside(v) { 0.0 } else { f32::INFINITY };
+        Collapser {
+            positions,
+            costs: (0..positions.len() as u32).map(unknown).collect(),
+            topology,
+            steepness,
+            vertices: vec![Vertex { along: NONE, off: 0.0, changed: u32::MAX }; positions.len()],
+            ring: Ring::default(),
+            sweep: 0,
+        }
     }
-}
 
-/// A number that is the same for meshes with the same outline: the sum over all directed edges of one for the edge less one for
-/// its reverse, which cancel inside. Counterclockwise triangles with the outline of a mesh that covers its ground once cover
-/// that ground once: the winding number of the outline says how many lie over a point.
-fn outline(triangles: &[[u32; 3]]) -> u64 {
-    let edges = triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
-    edges.fold(0, |sum, (a, b)| sum.wrapping_add(mixed(a, b)).wrapping_sub(mixed(b, a)))
-}
+    /// Takes vertices out until `triangles` are left, or none can go: in sweeps over all of them, which is kind to the cache, each
+    /// for those that cost less than a limit that rises from sweep to sweep.
+    fn run(&mut self, triangles: usize) {
+        let mut limit = self.middle_cost();
+        while self.topology.count() > triangles {
+            let least = self.costs.iter().copied().fold(f32::INFINITY, f32::min);
+            if least == f32::INFINITY {
+                return;
+            }
+            self.sweep += 1;
+            limit = (limit * RISE).max(least * RISE).max(f32::MIN_POSITIVE);
+            self.sweep_below(limit, triangles);
+        }
+    }
 
-/// The finalizer of splitmix64 over an edge.
-fn mixed(a: u32, b: u32) -> u64 {
-    let mut v = (u64::from(a) << 32 | u64::from(b)).wrapping_add(0x9e37_79b9_7f4a_7c15);
-    v = (v ^ (v >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    v = (v ^ (v >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    v ^ (v >> 31)
+    /// The cost that about half of the vertices have.
+    fn middle_cost(&mut self) -> f32 {
+        let mut costs = Vec::new();
+        for v in (0..self.costs.len()).step_by(SAMPLE) {
+            if self.costs[v] < f32::INFINITY {
+                self.rate(v as u32);
+                costs.push(self.costs[v]);
+            }
+        }
+        costs.sort_unstable_by(f32::total_cmp);
+        costs.get(costs.len() / 2).copied().filter(|cost| cost.is_finite()).unwrap_or(0.0)
+    }
+
+    /// Takes out what costs less than `limit`. What loses a neighbour has to wait for the next sweep: so vertices go everywhere
+    /// rather than one after the other, and few are rated in vain.
+    fn sweep_below(&mut self, limit: f32, triangles: usize) {
+        for v in 0..self.costs.len() {
+            if self.costs[v] >= limit || self.vertices[v].changed == self.sweep {
+                continue;
+            }
+            if self.vertices[v].changed > 0 {
+                self.rate(v as u32);
+            }
+            if self.costs[v] < limit {
+                self.collapse(v as u32);
+                if self.topology.count() <= triangles {
+                    return;
+                }
+            }
+        }
+    }
+
+    /// Finds where `v` would go best, and what that costs.
+    fn rate(&mut self, v: u32) {
+        let best =
+            self.ring.gather(v, &self.topology, self.positions).then(|| self.ring.best(self.steepness)).flatten();
+        let vertex = &mut self.vertices[v as usize];
+        vertex.changed = 0;
+        (vertex.along, self.costs[v as usize]) = match best {
+            Some((edge, cost)) => (edge, vertex.off + cost as f32),
+            None => (NONE, f32::INFINITY),
+        };
+    }
+
+    fn collapse(&mut self, v: u32) {
+        let cost = std::mem::replace(&mut self.costs[v as usize], f32::INFINITY);
+        let along = self.vertices[v as usize].along;
+        for edge in self.topology.around(v) {
+            let neighbour = self.topology.origin(next(edge)) as usize;
+            let vertex = &mut self.vertices[neighbour];
+            vertex.off = vertex.off.max(cost);
+            vertex.changed = self.sweep;
+            if vertex.along == NONE && self.topology.is_inside(neighbour as u32) {
+                // It could not go; whether it can now is found when its turn comes.
+                self.costs[neighbour] = cost;
+            }
+        }
+        self.topology.collapse(along);
+    }
 }
 
 /// The tile of these triangles, without the vertices that they do not use.
