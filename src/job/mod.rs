@@ -14,6 +14,7 @@ pub mod leaf;
 pub mod levels;
 pub mod merge;
 pub mod partition;
+pub mod placement;
 pub mod progress;
 pub mod pyramid;
 pub mod records;
@@ -42,6 +43,7 @@ use export::{Look, TileFigures};
 use leaf::LeafFigures;
 use levels::LevelFigures;
 use partition::{Partition, Summary, Task};
+use placement::Placement;
 use progress::{Progress, Stage, StageFigures};
 use pyramid::{Pyramid, Sizes};
 use rayon::prelude::*;
@@ -184,18 +186,22 @@ impl Job<'_> {
         let one_file = fits_one_file(&written);
         let mut warnings = Vec::new();
         let (mut coarser, mut levelled) = (LevelFigures::default(), None);
-        let mut other_bytes = 0;
+        let (mut other_bytes, mut placement) = (0, None);
         if config.output.format != Format::Glb || !one_file {
             let (sizes, pyramid) = pyramid(config, &partition);
             let stage = progress.stage("levels", pyramid.inner.len() as u64, "tiles");
             coarser = self.make_levels(&store, &pyramid, sizes, &look, &stage)?;
-            other_bytes += tileset::write(directory, &store, &pyramid, &look, None)?;
+            let placed = placement::place(plan, &look.frame, bounds, config.output.height_offset);
+            warnings.extend(placement::remark(&placed));
+            placement = placed.ok();
+            let transform = placement.as_ref().map(|placement| placement.transform);
+            other_bytes += tileset::write(directory, &store, &pyramid, &look, transform)?;
             levelled = Some(stage.finish());
             warnings.extend(levels_left_out(config, &pyramid));
         }
 
         let stage = progress.stage("finish", 1, "job");
-        other_bytes += finish(directory, &store, plan, &canvas, tiles, bounds)?;
+        other_bytes += finish(directory, &store, plan, placement, &canvas, tiles, bounds)?;
         if one_file && config.output.format != Format::Tiles {
             other_bytes += write_one_file(directory, tiles)?;
         } else if config.output.format == Format::Glb {
@@ -427,12 +433,13 @@ fn finish(
     directory: &Directory,
     store: &Store,
     plan: &Plan,
+    placement: Option<Placement>,
     canvas: &Canvas,
     tiles: usize,
     bounds: [[i32; 3]; 2],
 ) -> Result<u64> {
     let georeference = Georeference::new(&plan.frame, &plan.lattice, bounds, plan.unit, plan.crs.epsg);
-    let text = georeference.to_json();
+    let text = georeference.to_json(placement.as_ref());
     directory::write_whole(&directory.georeference(), |file| file.write_all(text.as_bytes()))?;
     let picture = draw_picture(store, canvas, tiles)?;
     directory::write_whole(&directory.preview(), |file| file.write_all(&picture))?;

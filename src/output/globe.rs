@@ -32,11 +32,7 @@ impl Globe {
         let (sin, cos) = latitude.sin_cos();
         let normal = SEMI_MAJOR / (1.0 - ECCENTRICITY_2 * sin * sin).sqrt();
         let around = (normal + height) * cos;
-        Ok([
-            around * longitude.cos(),
-            around * longitude.sin(),
-            (normal * (1.0 - ECCENTRICITY_2) + height) * sin,
-        ])
+        Ok([around * longitude.cos(), around * longitude.sin(), (normal * (1.0 - ECCENTRICITY_2) + height) * sin])
     }
 
     /// Longitude and latitude in radians.

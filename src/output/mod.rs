@@ -7,6 +7,7 @@ pub mod deviation;
 pub mod frame;
 pub mod georeference;
 pub mod glb;
+pub mod globe;
 pub mod join;
 pub mod normals;
 mod parts;
