@@ -30,6 +30,9 @@ pub struct Cli {
     pub command: Option<Command>,
     /// The configuration of the job to run (TOML).
     pub config: Option<PathBuf>,
+    /// Run the job even where the disk or the memory does not seem to suffice.
+    #[arg(long, requires = "config")]
+    pub force: bool,
     /// How to talk.
     #[command(flatten)]
     pub talk: Talk,
@@ -49,7 +52,7 @@ pub struct Talk {
 /// The commands beside running a job.
 #[derive(Subcommand, Debug)]
 pub enum Command {
-    /// Look at the inputs of a job and say what it would do; writes nothing.
+    /// Look at the inputs of a job and say what it would do and whether it fits; writes nothing.
     Check {
         /// The configuration of the job.
         config: PathBuf,

@@ -2,6 +2,7 @@
 //! that show the line.
 
 use crate::input::TextOptions;
+use crate::output::Compression;
 use crate::{Error, Result};
 use rust_decimal::Decimal;
 use serde::{Deserialize, Serialize};
@@ -47,6 +48,9 @@ pub struct Input {
     /// The share of malformed records or lines that is put up with, 0 to 1.
     #[serde(default)]
     pub malformed_share: Share,
+    /// What becomes of a job with a file that cannot be used.
+    #[serde(default)]
+    pub on_bad_file: OnBadFile,
     /// How text files are laid out, where detection is not to be trusted.
     #[serde(default)]
     pub csv: TextOptions,
@@ -92,6 +96,12 @@ pub struct Output {
     /// Metres that heights are raised by to be heights above the ellipsoid, where 3D Tiles are placed on the globe.
     #[serde(default)]
     pub height_offset: f64,
+    /// How tiles are packed.
+    #[serde(default)]
+    pub compression: Compression,
+    /// Triangles with an edge longer than this are left out.
+    #[serde(default)]
+    pub max_edge: MaxEdge,
 }
 
 /// In which form viewers get the terrain; the exact tiles are written in any case.
@@ -132,6 +142,17 @@ pub enum Duplicates {
     Highest,
     /// The one that is read first, in the order of the files.
     First,
+}
+
+/// What becomes of a job with a file that is no point cloud, is damaged, or has too many malformed records.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum OnBadFile {
+    /// It stops with an error.
+    #[default]
+    Stop,
+    /// It leaves the file out, all of it, and says so.
+    Skip,
 }
 
 /// The unit of x and y.
@@ -192,6 +213,47 @@ pub enum ColorChoice {
     Class,
     /// No colours.
     None,
+}
+
+/// How long an edge of a triangle may be in the plane.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "toml::Value", into = "String")]
+pub enum MaxEdge {
+    /// As long as it is: the terrain is the whole triangulation.
+    #[default]
+    None,
+    /// Ten times the local spacing of the sites.
+    Auto,
+    /// So many source units.
+    Length(f64),
+}
+
+impl TryFrom<toml::Value> for MaxEdge {
+    type Error = String;
+
+    fn try_from(value: toml::Value) -> std::result::Result<MaxEdge, String> {
+        let length = match value {
+            toml::Value::String(s) if s == "none" => return Ok(MaxEdge::None),
+            toml::Value::String(s) if s == "auto" => return Ok(MaxEdge::Auto),
+            toml::Value::Integer(i) => i as f64,
+            toml::Value::Float(f) => f,
+            _ => 0.0,
+        };
+        match length > 0.0 && length.is_finite() {
+            true => Ok(MaxEdge::Length(length)),
+            false => Err("max_edge is \"none\", \"auto\" or a positive number of source units, such as 30.0".into()),
+        }
+    }
+}
+
+impl From<MaxEdge> for String {
+    fn from(max_edge: MaxEdge) -> String {
+        match max_edge {
+            MaxEdge::None => "none".into(),
+            MaxEdge::Auto => "auto".into(),
+            MaxEdge::Length(length) => length.to_string(),
+        }
+    }
 }
 
 /// A rectangle [xmin, ymin, xmax, ymax] in source units.
@@ -539,6 +601,8 @@ mod tests {
         assert!(memory.contains("line 6") && memory.contains("4 GiB"), "{memory}");
         let bounds = error(&LEAST.replace("[output]", "bounds = [1, 1, 0, 2]\n[output]"));
         assert!(bounds.contains("line 3") && bounds.contains("xmin"), "{bounds}");
+        let edge = error(&format!("{LEAST}max_edge = -1\n"));
+        assert!(edge.contains("line 5") && edge.contains("auto"), "{edge}");
         let sites = error(&format!("{LEAST}[triangulation]\nsites_per_tile = 2\n"));
         assert!(sites.contains("line 6") && sites.contains("auto"), "{sites}");
     }

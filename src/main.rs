@@ -4,7 +4,7 @@ use clap::Parser;
 use gdt_batch::cli::{Cli, Command, Talk};
 use gdt_batch::config::Config;
 use gdt_batch::gpu::selftest;
-use gdt_batch::job::{self, check, progress::Progress};
+use gdt_batch::job::{self, Options, check, progress::Progress, report::skipped_summary};
 use gdt_batch::{Error, Result, input, sample, verify};
 use serde::Serialize;
 use std::fmt::Display;
@@ -26,15 +26,29 @@ fn main() -> ExitCode {
 fn run(cli: Cli) -> Result<ExitCode> {
     let talk = cli.talk;
     match (cli.command, cli.config) {
-        (Some(Command::Check { config }), _) => show(&check::run(&Config::load(&config)?)?, talk)?,
+        (Some(Command::Check { config }), _) => {
+            let preflight = check::run(&Config::load(&config)?)?;
+            show(&preflight, talk)?;
+            preflight.passes()?;
+        }
         (Some(Command::Verify { directory, memory }), _) => return prove(&directory, memory, talk),
         (Some(Command::Info { files }), _) => info(&files, talk)?,
         (Some(Command::Gpu { adapter, side }), _) => return test_gpu(adapter.as_deref(), side, talk),
         (Some(Command::Sample { file, points, seed }), _) => sample::write(&file, points, seed)?,
-        (None, Some(config)) => show(&job::run(&Config::load(&config)?, Progress::detect(talk.quiet))?, talk)?,
+        (None, Some(config)) => run_job(&Config::load(&config)?, cli.force, talk)?,
         (None, None) => return Err(Error::Config("name a configuration file; --help shows how".into())),
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Runs a job and says what it came to: on standard error too, and even when quiet, if files were left out.
+fn run_job(config: &Config, force: bool, talk: Talk) -> Result<()> {
+    let report = job::run(config, Options { progress: Progress::detect(talk.quiet), force })?;
+    show(&report, talk)?;
+    if let Some(summary) = skipped_summary(report.files, &report.skipped) {
+        eprintln!("{summary}: see {}", config.output.directory.join("report.json").display());
+    }
+    Ok(())
 }
 
 /// Prints a result for people or for machines.

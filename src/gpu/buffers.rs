@@ -2,6 +2,7 @@
 //! and only ever grow.
 
 use super::Fault;
+use super::clock::Clock;
 use super::device::Device;
 use wgpu::BufferUsages;
 
@@ -55,6 +56,7 @@ impl Name {
 #[derive(Default)]
 pub struct Set {
     buffers: [Option<wgpu::Buffer>; Name::COUNT],
+    pub(super) clock: Option<Clock>,
 }
 
 impl Set {

@@ -7,9 +7,10 @@
 
 use super::Fault;
 use super::buffers::{Name, Set};
+use super::clock::StepTimes;
 use super::device::{self, Device, MOST_SIDE, Wish};
 use super::machine::{Machine, Ticket};
-use super::steps::Size;
+use super::steps::{Size, Step};
 use crate::config::{Texture, Voronoi};
 use crate::voronoi::{Diagram, Diagrams, Resolution, Shape};
 use std::collections::VecDeque;
@@ -54,6 +55,8 @@ struct State {
     most_pixels: AtomicU64,
     waiting: AtomicUsize,
     gone: AtomicBool,
+    /// Nanoseconds by step on the GPU.
+    times: [AtomicU64; Step::ALL.len()],
 }
 
 struct Request {
@@ -97,6 +100,7 @@ impl Executor {
             most_pixels: AtomicU64::new(most_pixels),
             waiting: AtomicUsize::new(0),
             gone: AtomicBool::new(false),
+            times: Default::default(),
         });
         let (sender, receiver) = channel();
         let of_thread = state.clone();
@@ -104,6 +108,12 @@ impl Executor {
         let thread = std::thread::Builder::new().name("gpu".into()).spawn(run);
         let thread = Some(thread.map_err(|e| format!("the GPU's thread does not start: {e}"))?);
         Ok(Executor { requests: Mutex::new(Some(sender)), state, resolution, shared, thread, adapter })
+    }
+
+    /// Seconds that every step has taken on the GPU itself so far; none where the adapter does not tell.
+    pub fn step_seconds(&self) -> Vec<(&'static str, f64)> {
+        let seconds = |step: Step| self.state.times[step as usize].load(Ordering::Relaxed) as f64 / 1e9;
+        Step::ALL.map(|step| (step.name(), seconds(step))).into_iter().filter(|(_, seconds)| *seconds > 0.0).collect()
     }
 
     /// Sends `work` and waits for its diagram; `None` if the thread is gone.
@@ -150,7 +160,7 @@ trait Engines: Send {
     /// Starts `work` on the buffers of `slot`.
     fn start(&mut self, slot: usize, work: &Work) -> Result<Self::Ticket, Fault>;
     /// Waits for it.
-    fn finish(&mut self, slot: usize, ticket: Self::Ticket) -> Result<Vec<u32>, Fault>;
+    fn finish(&mut self, slot: usize, ticket: Self::Ticket) -> Result<(Vec<u32>, StepTimes), Fault>;
     /// Frees the buffers of `slot`.
     fn free(&mut self, slot: usize);
     /// Opens a lost device anew.
@@ -186,7 +196,7 @@ impl Engines for Engine {
         self.machine.start_and_fetch(&mut self.sets[slot], &recording, Name::Labels, 4 * work.size.pixels())
     }
 
-    fn finish(&mut self, slot: usize, ticket: Ticket) -> Result<Vec<u32>, Fault> {
+    fn finish(&mut self, slot: usize, ticket: Ticket) -> Result<(Vec<u32>, StepTimes), Fault> {
         self.machine.finish(&self.sets[slot], ticket)
     }
 
@@ -261,7 +271,12 @@ impl<E: Engines> Service<E> {
         let done = self.engine.finish(slot, ticket);
         self.free.push(slot);
         match done {
-            Ok(labels) => answer(&request, Diagram::Labels(labels)),
+            Ok((labels, times)) => {
+                for (sum, time) in self.state.times.iter().zip(times) {
+                    sum.fetch_add(time, Ordering::Relaxed);
+                }
+                answer(&request, Diagram::Labels(labels));
+            }
             Err(fault) => self.recover(request, &fault),
         }
     }
@@ -313,8 +328,8 @@ mod tests {
             self.starts.pop_front().unwrap_or(Ok(())).map(|()| work.pixels[0])
         }
 
-        fn finish(&mut self, _: usize, ticket: u32) -> Result<Vec<u32>, Fault> {
-            self.finishes.pop_front().unwrap_or(Ok(())).map(|()| vec![ticket])
+        fn finish(&mut self, _: usize, ticket: u32) -> Result<(Vec<u32>, StepTimes), Fault> {
+            self.finishes.pop_front().unwrap_or(Ok(())).map(|()| (vec![ticket], StepTimes::default()))
         }
 
         fn free(&mut self, _: usize) {}

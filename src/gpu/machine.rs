@@ -2,8 +2,9 @@
 
 use super::Fault;
 use super::buffers::{Name, Set};
+use super::clock::{Clock, Marks, STAMP_BYTES, StepTimes, marks};
 use super::device::Device;
-use super::steps::{Command, Groups, Program, Recording};
+use super::steps::{Command, Groups, Program, Recording, Step};
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -24,6 +25,8 @@ pub struct Machine {
 pub struct Ticket {
     submission: wgpu::SubmissionIndex,
     bytes: u64,
+    /// Those whose timestamps come back too.
+    timed: Vec<Step>,
     mapped: Arc<AtomicBool>,
 }
 
@@ -44,11 +47,10 @@ impl Machine {
     /// [`Fault`] if the device refuses; nothing is under way then that matters.
     pub fn start(&mut self, set: &mut Set, recording: &Recording) -> Result<wgpu::SubmissionIndex, Fault> {
         self.prepare(set, recording)?;
-        let device = &self.device;
-        device.guard(|| self.submit_all(set, recording))?
+        self.device.guard(|| self.submit_all(set, recording, None))?
     }
 
-    /// Starts `recording`, then the way back of the first `bytes` bytes of buffer `name`.
+    /// Starts `recording`, then the way back of the first `bytes` bytes of buffer `name`, and of the steps' times.
     ///
     /// # Errors
     /// As [`Machine::start`].
@@ -59,9 +61,15 @@ impl Machine {
         name: Name,
         bytes: u64,
     ) -> Result<Ticket, Fault> {
-        set.need(&self.device, Name::Staging, bytes)?;
-        self.start(set, recording)?;
-        self.fetch(set, name, 0, bytes)
+        set.need(&self.device, Name::Staging, bytes.next_multiple_of(8) + STAMP_BYTES)?;
+        self.prepare(set, recording)?;
+        if set.clock.is_none() {
+            set.clock = Clock::new(&self.device)?;
+        }
+        let (marks, steps) = marks(recording);
+        self.device.guard(|| self.submit_all(set, recording, Some(&marks)))??;
+        let timed = if set.clock.is_some() { steps } else { Vec::new() };
+        self.fetch_timed(set, name, 0, bytes, timed)
     }
 
     /// Starts the way back of `bytes` bytes of buffer `name`, from byte `first` on.
@@ -70,35 +78,49 @@ impl Machine {
     /// As [`Machine::start`].
     pub fn fetch(&self, set: &mut Set, name: Name, first: u64, bytes: u64) -> Result<Ticket, Fault> {
         set.need(&self.device, Name::Staging, bytes)?;
+        self.fetch_timed(set, name, first, bytes, Vec::new())
+    }
+
+    fn fetch_timed(&self, set: &Set, name: Name, first: u64, bytes: u64, timed: Vec<Step>) -> Result<Ticket, Fault> {
         let (from, staging) = (set.get(name)?, set.get(Name::Staging)?);
+        let stamps = bytes.next_multiple_of(8);
+        let all = if timed.is_empty() { bytes } else { stamps + STAMP_BYTES };
         let mapped = Arc::<AtomicBool>::default();
         let on_mapped = mapped.clone();
         let submission = self.device.guard(|| {
             let mut encoder = self.encoder();
             encoder.copy_buffer_to_buffer(from, first, staging, 0, bytes);
+            if let Some(clock) = &set.clock {
+                clock.resolve(&mut encoder, &timed, staging, stamps);
+            }
             let submission = self.device.queue.submit([encoder.finish()]);
             let done = move |result: Result<(), _>| on_mapped.store(result.is_ok(), Ordering::Release);
-            staging.slice(..bytes).map_async(MapMode::Read, done);
+            staging.slice(..all).map_async(MapMode::Read, done);
             submission
         })?;
-        Ok(Ticket { submission, bytes, mapped })
+        Ok(Ticket { submission, bytes, timed, mapped })
     }
 
-    /// Waits for what `ticket` stands for.
+    /// Waits for what `ticket` stands for; the numbers, and the times of the steps where they were taken.
     ///
     /// # Errors
     /// [`Fault::Lost`] if it never comes.
-    pub fn finish(&self, set: &Set, ticket: Ticket) -> Result<Vec<u32>, Fault> {
+    pub fn finish(&self, set: &Set, ticket: Ticket) -> Result<(Vec<u32>, StepTimes), Fault> {
         self.device.wait(ticket.submission)?;
         if !ticket.mapped.load(Ordering::Acquire) {
             return Err(Fault::Lost("a buffer could not be read back".into()));
         }
         let staging = set.get(Name::Staging)?;
-        let view = staging.slice(..ticket.bytes).get_mapped_range().map_err(|e| Fault::Lost(e.to_string()))?;
-        let numbers = bytemuck::pod_collect_to_vec(&view);
-        drop(view);
+        let mapped = |range| staging.slice(range).get_mapped_range().map_err(|e| Fault::Lost(e.to_string()));
+        let numbers = bytemuck::pod_collect_to_vec(&mapped(0..ticket.bytes)?);
+        let mut times = StepTimes::default();
+        if let Some(clock) = set.clock.as_ref().filter(|_| !ticket.timed.is_empty()) {
+            let first = ticket.bytes.next_multiple_of(8);
+            let stamps: Vec<u64> = bytemuck::pod_collect_to_vec(&mapped(first..first + STAMP_BYTES)?);
+            times = clock.times(&stamps, &ticket.timed);
+        }
         self.device.guard(|| staging.unmap())?;
-        Ok(numbers)
+        Ok((numbers, times))
     }
 
     /// The first `count` numbers of buffer `name`, after all that was started.
@@ -118,7 +140,7 @@ impl Machine {
             return Ok(Vec::new());
         }
         let ticket = self.fetch(set, name, 4 * first, 4 * count)?;
-        self.finish(set, ticket)
+        Ok(self.finish(set, ticket)?.0)
     }
 
     /// Makes buffers and pipelines.
@@ -134,7 +156,7 @@ impl Machine {
                         self.pipelines.insert(*program, pipeline);
                     }
                 }
-                Command::Upload(..) | Command::Clear(..) | Command::Copy(..) => {}
+                Command::Step(..) | Command::Upload(..) | Command::Clear(..) | Command::Copy(..) => {}
             }
         }
         set.need(&self.device, Name::Params, (runs * Set::STRIDE).max(Set::STRIDE))
@@ -144,14 +166,19 @@ impl Machine {
         self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
     }
 
-    fn submit_all(&self, set: &Set, recording: &Recording) -> Result<wgpu::SubmissionIndex, Fault> {
+    fn submit_all(
+        &self,
+        set: &Set,
+        recording: &Recording,
+        marks: Option<&[Marks]>,
+    ) -> Result<wgpu::SubmissionIndex, Fault> {
         let queue = &self.device.queue;
         queue.write_buffer(set.get(Name::Params)?, 0, &params(recording));
         let mut encoder = self.encoder();
         let (mut runs, mut groups) = (0, 0);
         for command in &recording.commands {
             match command {
-                Command::Need(..) => {}
+                Command::Need(..) | Command::Step(..) => {}
                 Command::Upload(name, numbers) => {
                     let buffer = set.get(*name)?;
                     for (i, piece) in bytemuck::cast_slice::<u32, u8>(numbers).chunks(UPLOAD).enumerate() {
@@ -163,7 +190,8 @@ impl Machine {
                     encoder.copy_buffer_to_buffer(set.get(*from)?, 0, set.get(*to)?, 0, *bytes);
                 }
                 Command::Run(program, _, size) => {
-                    self.encode(&mut encoder, set, program, *size, runs * Set::STRIDE)?;
+                    let marks = marks.and_then(|marks| marks.get(runs as usize)).copied().unwrap_or_default();
+                    self.encode(&mut encoder, set, program, *size, runs * Set::STRIDE, marks)?;
                     runs += 1;
                     groups += match size {
                         Groups::Fixed([x, y]) => u64::from(*x) * u64::from(*y),
@@ -186,6 +214,7 @@ impl Machine {
         program: &Program,
         groups: Groups,
         params: u64,
+        marks: Marks,
     ) -> Result<(), Fault> {
         let pipeline = self.pipelines.get(program).ok_or_else(|| Fault::Refused("a shader is missing".into()))?;
         let size = wgpu::BufferSize::new(PARAMS);
@@ -198,7 +227,8 @@ impl Machine {
         let layout = pipeline.get_bind_group_layout(0);
         let bind_group =
             device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &layout, entries: &entries });
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        let timestamp_writes = set.clock.as_ref().and_then(|clock| clock.writes(marks));
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes });
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, &bind_group, &[]);
         match groups {

@@ -5,6 +5,7 @@
 //! of its own. What comes back of a leaf is its discrete Voronoi diagram; `voronoi` makes the mesh of it and proves it.
 
 pub mod buffers;
+pub mod clock;
 pub mod device;
 pub mod executor;
 pub mod machine;

@@ -56,9 +56,46 @@ pub enum Groups {
     Indirect(u64),
 }
 
+/// The steps of the paper that a GPU does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// G1.
+    WriteSites,
+    /// G2.
+    Voronoi,
+    /// G3.
+    Islands,
+    /// G4.
+    Vertices,
+    /// G5.
+    Count,
+    /// G6.
+    Triangles,
+}
+
+impl Step {
+    /// In order.
+    pub const ALL: [Step; 6] =
+        [Step::WriteSites, Step::Voronoi, Step::Islands, Step::Vertices, Step::Count, Step::Triangles];
+
+    /// As reports name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Step::WriteSites => "G1 write sites",
+            Step::Voronoi => "G2 Voronoi",
+            Step::Islands => "G3 islands",
+            Step::Vertices => "G4 vertices",
+            Step::Count => "G5 count",
+            Step::Triangles => "G6 triangles",
+        }
+    }
+}
+
 /// One thing for the GPU to do.
 #[derive(Clone, Debug)]
 pub enum Command {
+    /// What follows belongs to this step.
+    Step(Step),
     /// Make sure that a buffer has this many bytes.
     Need(Name, u64),
     /// Write numbers to the start of a buffer.
@@ -152,6 +189,7 @@ impl Recording {
     /// Step G1: the sites, each by its pixel (y << 16 | x), into the texture.
     pub fn write_sites(&mut self, size: Size, pixels: Vec<u32>) {
         let (sites, (groups, invocations)) = (pixels.len() as u32, line(pixels.len() as u32));
+        self.commands.push(Command::Step(Step::WriteSites));
         self.need(Pixels, u64::from(sites));
         self.need(Texture, size.pixels());
         self.commands.push(Command::Upload(Pixels, pixels));
@@ -163,6 +201,7 @@ impl Recording {
 
     /// Step G2: the discrete Voronoi diagram.
     pub fn voronoi(&mut self, size: Size, voronoi: Voronoi) {
+        self.commands.push(Command::Step(Step::Voronoi));
         match voronoi {
             Voronoi::Auto | Voronoi::Exact => self.voronoi_exact(size),
             Voronoi::Jfa => self.voronoi_jfa(size),
@@ -206,6 +245,7 @@ impl Recording {
         let Size { width, height } = size;
         let all = [width.div_ceil(32), height.div_ceil(8)];
         let room = size.islands();
+        self.commands.push(Command::Step(Step::Islands));
         self.need(Islands, 1 + 2 * u64::from(room));
         self.need(Workgroups, 6);
         for round in 0..ROUNDS {
@@ -221,6 +261,7 @@ impl Recording {
     /// Step G4: which corners are Voronoi vertices, and how many triangles there are in each segment.
     pub fn find_vertices(&mut self, size: Size) {
         let segments = size.all_segments();
+        self.commands.push(Command::Step(Step::Vertices));
         self.need(Vertices, 2 * u64::from(segments));
         self.need(Counts, u64::from(levels(segments).last().map_or(0, |level| level.first + level.length)));
         if segments > 0 {
@@ -232,6 +273,7 @@ impl Recording {
     /// Step G5: prefix sums of those numbers. The total is then at [`total`].
     pub fn count(&mut self, size: Size) {
         let levels = levels(size.all_segments());
+        self.commands.push(Command::Step(Step::Count));
         if size.all_segments() == 0 {
             self.commands.push(Command::Clear(Counts, 4 * u64::from(levels[levels.len() - 1].first + 1)));
             return;
@@ -252,6 +294,7 @@ impl Recording {
 
     /// Step G6: the triangles, `room` of them at the most.
     pub fn make_triangles(&mut self, size: Size, room: u32) {
+        self.commands.push(Command::Step(Step::Triangles));
         self.need(Triangles, 3 * u64::from(room));
         if size.all_segments() > 0 {
             let (groups, invocations) = line(size.all_segments());

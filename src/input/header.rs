@@ -17,6 +17,9 @@ const MOST: usize = 375;
 /// The most points of a file: their numbers must fit 40 bits.
 const MOST_RECORDS: u64 = 1 << 40;
 
+/// The most steps of its scale that an axis' offset may have: 2^53, as many as an f64 tells apart.
+const MOST_STEPS: Decimal = Decimal::from_parts(0, 1 << 21, 0, false, 0);
+
 /// A value, or what is wrong with the file.
 type Checked<T> = std::result::Result<T, String>;
 
@@ -167,7 +170,9 @@ fn axis(bytes: &[u8], index: usize) -> Checked<Axis> {
         )
     };
     let step = written_decimal(scale).filter(|step| *step > Decimal::ZERO).ok_or_else(|| unusable("scale", scale))?;
-    let origin = written_decimal(offset).ok_or_else(|| unusable("offset", offset))?;
+    // Farther out, floating point no longer tells one step from the next.
+    let in_steps = |origin: &Decimal| origin.checked_div(step).is_some_and(|steps| steps.abs() < MOST_STEPS);
+    let origin = written_decimal(offset).filter(in_steps).ok_or_else(|| unusable("offset", offset))?;
     Ok(Axis { offset: origin, scale: step })
 }
 

@@ -8,6 +8,9 @@ use std::path::{Path, PathBuf};
 use crate::positioned::read_at;
 use crate::{Error, Result};
 
+/// What to say of a file that ends before its size.
+const SHRUNK: &str = "it became shorter while it was read; run again when it is complete";
+
 /// A file open for reading, whose size is known.
 pub(super) struct Positioned {
     file: File,
@@ -31,10 +34,10 @@ impl Positioned {
         let file = Positioned::open(path)?;
         if file.size != size {
             let what = format!(
-                "has changed while it was in use: it had {size} bytes and has {} now; run again when it is complete",
+                "it has changed while it was in use, from {size} bytes to {}; run again when it is complete",
                 file.size
             );
-            return Err(Error::input(path, what));
+            return Err(Error::io("read", path)(io::Error::other(what)));
         }
         Ok(file)
     }
@@ -52,9 +55,7 @@ impl Positioned {
     /// Fills `buffer` from `offset` on.
     pub(super) fn read_exact_at(&self, buffer: &mut [u8], offset: u64) -> Result<()> {
         crate::positioned::read_exact_at(&self.file, buffer, offset).map_err(|error| match error.kind() {
-            io::ErrorKind::UnexpectedEof => {
-                Error::input(&self.path, "became shorter while it was read; run again when it is complete")
-            }
+            io::ErrorKind::UnexpectedEof => Error::io("read", &self.path)(io::Error::other(SHRUNK)),
             _ => Error::io("read", &self.path)(error),
         })
     }
@@ -94,7 +95,7 @@ impl Window {
             return Ok(0);
         }
         match read_at(&self.file, &mut out[..size], self.next)? {
-            0 => Err(io::Error::other("the file became shorter while it was read")),
+            0 => Err(io::Error::other(SHRUNK)),
             count => {
                 self.next += count as u64;
                 Ok(count)
@@ -201,7 +202,7 @@ mod tests {
         let mut window = file.window(0..1000).unwrap();
         std::fs::write(path.path(), [1; 10]).unwrap();
         assert_eq!(window.read_exact(&mut [0; 20]).unwrap_err().kind(), io::ErrorKind::Other);
-        assert_eq!(file.read_exact_at(&mut [0; 20], 0).unwrap_err().exit_code(), 3);
-        assert_eq!(Positioned::reopen(path.path(), 1000).err().unwrap().exit_code(), 3);
+        assert_eq!(file.read_exact_at(&mut [0; 20], 0).unwrap_err().exit_code(), 1);
+        assert_eq!(Positioned::reopen(path.path(), 1000).err().unwrap().exit_code(), 1);
     }
 }

@@ -127,6 +127,9 @@ fn refuse(path: &Path, start: &[u8]) -> Result<()> {
         let what = "does not begin with the letters LASF, so it is not LAS or LAZ; copy or download it again";
         return Err(Error::input(path, what));
     }
+    if start.starts_with(&[0xff, 0xfe]) || start.starts_with(&[0xfe, 0xff]) {
+        return Err(Error::input(path, "is text in UTF-16; save it as UTF-8"));
+    }
     if start.contains(&0) {
         let what = "is neither LAS nor LAZ nor UTF-8 text; convert it to one of those first";
         return Err(Error::input(path, what));

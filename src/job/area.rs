@@ -66,6 +66,11 @@ impl Area {
         area
     }
 
+    /// The greatest distance from zero along `axis`.
+    pub(super) fn farthest(&self, axis: usize) -> f64 {
+        self.min[axis].abs().max(self.max[axis].abs())
+    }
+
     /// Its extent along `axis`.
     pub(super) fn size(&self, axis: usize) -> f64 {
         self.max[axis] - self.min[axis]

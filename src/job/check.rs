@@ -1,16 +1,17 @@
 //! Preflight: what a job would read and need, without writing anything.
 
 use super::choose::Coarser;
-use super::report::grouped;
+use super::partition::Skipped;
+use super::report::{grouped, write_skipped};
 use super::scan::{self, Plan};
-use super::{BYTES_PER_LEAF_SITE, MOST_TRIANGLES_IN_ONE_FILE, partition, workers};
-use crate::Result;
+use super::{BYTES_PER_LEAF_SITE, MOST_TRIANGLES_IN_ONE_FILE, machine, partition, workers};
 use crate::config::Config;
 use crate::input::Point;
 use crate::output::preview::Texel;
+use crate::{Error, Result};
 use serde::Serialize;
-use std::fmt;
 use std::path::{Path, PathBuf};
+use std::{fmt, io};
 
 /// Bytes of job directory a site, beside the spill: its place, colour, class and two triangles.
 const TEMPORARY_PER_SITE: u64 = 12 + 6 + 1 + 2 * 12;
@@ -47,16 +48,25 @@ pub struct Preflight {
     pub memory: u64,
     /// The memory it was given.
     pub memory_limit: u64,
-    /// Bytes of temporary files, at the most.
+    /// Bytes of memory free on this machine; `None` where the system does not tell.
+    pub memory_free: Option<u64>,
+    /// Bytes of temporary files, about.
     pub temporary: u64,
-    /// Bytes of results, at the most.
+    /// Bytes of results, about.
     pub results: u64,
-    /// Bytes free on the disk of the output directory; `None` where the system does not tell.
+    /// Bytes of both that there will be at once, at the most: some temporary files are gone before results come.
+    pub disk: u64,
+    /// Bytes free on the disk of the output directory, with those that an earlier job takes there; `None` where the system does
+    /// not tell.
     pub disk_free: Option<u64>,
+    /// The output directory.
+    pub output: PathBuf,
     /// Who will triangulate.
     pub backend: String,
     /// What the user should know.
     pub warnings: Vec<String>,
+    /// The inputs that would be left out because they are bad; more may prove bad when they are read.
+    pub skipped: Vec<Skipped>,
 }
 
 /// Looks at the inputs of `config`.
@@ -69,17 +79,22 @@ pub fn run(config: &Config) -> Result<Preflight> {
     Ok(preflight(&plan, config, threads))
 }
 
-fn preflight(plan: &Plan, config: &Config, threads: usize) -> Preflight {
+/// What the job of `plan` would do.
+pub(super) fn preflight(plan: &Plan, config: &Config, threads: usize) -> Preflight {
     let per_tile = config.triangulation.sites_per_tile.0;
-    let points = plan.records;
+    // Records that are known to be missing take no room.
+    let points = plan.records - plan.sources.iter().map(|(source, _)| source.missing).sum::<u64>();
     let steps = |axis: usize| plan.extent[1][axis] as f64 - plan.extent[0][axis] as f64;
     let resolution = plan.frame.extras().resolution;
     // Tiles come out between half full and full.
     let tiles = (points * 4).div_ceil(per_tile * 3);
     let leaves = per_tile.min(points) * BYTES_PER_LEAF_SITE * threads as u64;
+    let output = &config.output.directory;
+    let spill = points * size_of::<Point>() as u64;
+    let [leaves_on_disk, results] = [leaf_bytes(points, per_tile, tiles), result_bytes(points, tiles)];
     Preflight {
         files: plan.sources.iter().map(|(s, _)| (s.path.clone(), format!("{:?}", s.format), s.records)).collect(),
-        records: points,
+        records: plan.records,
         tiles,
         resolution: [plan.lattice.resolution.to_string(), plan.lattice.resolution_z.to_string()],
         size: [steps(0) * resolution, steps(1) * resolution],
@@ -88,20 +103,24 @@ fn preflight(plan: &Plan, config: &Config, threads: usize) -> Preflight {
         threads,
         memory: (64 << 20) + leaves.max(partition::buffer_bytes(points, per_tile, config.limits.memory.0 / 6)),
         memory_limit: config.limits.memory.0,
-        temporary: temporary_bytes(points, per_tile, tiles),
-        results: result_bytes(points, tiles),
-        disk_free: disk_free(&config.output.directory),
+        memory_free: machine::free_memory(),
+        temporary: spill + leaves_on_disk,
+        results,
+        // The spill goes before the results come.
+        disk: leaves_on_disk + spill.max(results),
+        disk_free: machine::free_disk(output).map(|free| free + taken(output)),
+        output: output.clone(),
         backend: format!("{:?}", config.triangulation.backend).to_lowercase(),
         warnings: plan.warnings.clone(),
+        skipped: plan.skipped.clone(),
     }
 }
 
-fn temporary_bytes(points: u64, per_tile: u64, tiles: u64) -> u64 {
+/// Bytes that steps leave for later steps.
+fn leaf_bytes(points: u64, per_tile: u64, tiles: u64) -> u64 {
     // A tile of n sites has about 2.2 sqrt(n) on its frontier.
     let rims = (2.2 * (per_tile.min(points) as f64).sqrt()) as u64 * tiles;
-    points * (size_of::<Point>() as u64 + TEMPORARY_PER_SITE)
-        + rims * TEMPORARY_PER_RIM
-        + PIXELS * size_of::<Texel>() as u64
+    points * TEMPORARY_PER_SITE + rims * TEMPORARY_PER_RIM + PIXELS * size_of::<Texel>() as u64
 }
 
 fn result_bytes(points: u64, tiles: u64) -> u64 {
@@ -110,10 +129,44 @@ fn result_bytes(points: u64, tiles: u64) -> u64 {
     copies * in_tiles + 4 * PIXELS
 }
 
-/// The free bytes where `directory` is, or will be.
-fn disk_free(directory: &Path) -> Option<u64> {
-    let existing = directory.ancestors().find(|d| d.is_dir()).unwrap_or(Path::new("."));
-    fs4::available_space(existing).ok()
+/// Bytes of what an earlier job has left in `output` and the next one replaces.
+fn taken(output: &Path) -> u64 {
+    let folders = ["", "tiles", "job"].map(|name| output.join(name));
+    let entries = folders.iter().filter_map(|folder| std::fs::read_dir(folder).ok());
+    let files = entries.flatten().flatten().filter_map(|entry| entry.metadata().ok()).filter(|meta| meta.is_file());
+    files.map(|meta| meta.len()).sum()
+}
+
+impl Preflight {
+    /// Whether the machine has what the job needs.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if nothing can be written to the output directory or its disk is too small, [`Error::Memory`] if too little
+    /// memory is free.
+    pub fn passes(&self) -> Result<()> {
+        machine::check_writable(&self.output)?;
+        if let Some(free) = self.disk_free.filter(|free| *free < self.disk) {
+            let what = format!(
+                "the job takes about {} there, and {} are free (--force goes on all the same)",
+                mebibytes(self.disk),
+                mebibytes(free)
+            );
+            return Err(Error::io("write to", &self.output)(io::Error::new(io::ErrorKind::StorageFull, what)));
+        }
+        match self.memory_free.filter(|free| *free < self.memory) {
+            Some(free) => Err(Error::Memory(format!(
+                "the job takes about {}, and this machine has {} free; end other programs, or lower [limits] threads or \
+                 [triangulation] sites_per_tile (--force goes on all the same)",
+                mebibytes(self.memory),
+                mebibytes(free)
+            ))),
+            None => Ok(()),
+        }
+    }
+}
+
+fn mebibytes(bytes: u64) -> String {
+    format!("{} MiB", grouped(bytes >> 20))
 }
 
 impl fmt::Display for Preflight {
@@ -121,7 +174,6 @@ impl fmt::Display for Preflight {
         for (path, format, records) in &self.files {
             writeln!(f, "{:<8} {:>14} points  {}", format, grouped(*records), path.display())?;
         }
-        let mebibytes = |bytes: u64| format!("{} MiB", grouped(bytes >> 20));
         let mut row = |name: &str, value: String| writeln!(f, "{name:<18} {value}");
         row("points", grouped(self.records))?;
         row("tiles", format!("about {}", grouped(self.tiles)))?;
@@ -129,20 +181,15 @@ impl fmt::Display for Preflight {
         row("lattice step", format!("{} (z {})", self.resolution[0], self.resolution[1]))?;
         row("crs", self.crs.clone().unwrap_or_else(|| "none".into()))?;
         row("backend", format!("{} on {} threads", self.backend, self.threads))?;
-        row("memory", format!("about {} of {}", mebibytes(self.memory), mebibytes(self.memory_limit)))?;
-        row("temporary files", format!("at most {}", mebibytes(self.temporary)))?;
-        row("results", format!("at most {}", mebibytes(self.results)))?;
-        let free = self.disk_free.map_or("unknown".into(), mebibytes);
-        row("free disk", free)?;
-        if self.disk_free.is_some_and(|free| free < self.temporary + self.results) {
-            writeln!(
-                f,
-                "warning: the disk may not hold the temporary files and the results: make room or choose another disk"
-            )?;
-        }
+        let free = |bytes: Option<u64>| bytes.map_or("unknown".into(), mebibytes);
+        let (memory, limit) = (mebibytes(self.memory), mebibytes(self.memory_limit));
+        row("memory", format!("about {memory} of {limit}, {} free", free(self.memory_free)))?;
+        row("temporary files", format!("about {}", mebibytes(self.temporary)))?;
+        row("results", format!("about {}", mebibytes(self.results)))?;
+        row("disk", format!("about {} at once, {} free", mebibytes(self.disk), free(self.disk_free)))?;
         for warning in &self.warnings {
             writeln!(f, "warning: {warning}")?;
         }
-        Ok(())
+        write_skipped(f, self.files.len(), &self.skipped)
     }
 }

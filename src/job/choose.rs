@@ -47,6 +47,11 @@ fn place(sources: &[Source], area: &Area, resolution: Decimal, resolution_z: Dec
     Ok(Lattice { offset, resolution, resolution_z })
 }
 
+/// Whether 64-bit floating-point numbers tell coordinates up to `farthest` from those a step farther.
+fn is_told_apart(farthest: f64, step: f64) -> bool {
+    farthest / step < 1.0 / f64::EPSILON
+}
+
 /// The share of the area's size that its longest triangle is taken to have in advance: longer ones take a hull edge from one
 /// end of the area to the other.
 const LIKELY_SPAN: f64 = 0.8;
@@ -65,10 +70,11 @@ fn horizontal_step(
     warnings: &mut Vec<String>,
 ) -> Result<Decimal> {
     let size = area.size(0).max(area.size(1));
-    let fits = |step: Decimal| size < 2.0 * REACH as f64 * 0.99 * float(step);
+    let farthest = area.farthest(0).max(area.farthest(1));
+    let fits = |step: Decimal| size < 2.0 * REACH as f64 * 0.99 * float(step) && is_told_apart(farthest, float(step));
     let is_writable = |step: Decimal| LIKELY_SPAN * size * metres < Frame::longest_at(float(step) * metres);
     if let Some(step) = wanted {
-        return if fits(step) { Ok(step) } else { Err(too_fine(step, size)) };
+        return if fits(step) { Ok(step) } else { Err(too_fine(step, size, farthest)) };
     }
     let finest = sources.iter().flat_map(|s| [s.axes[0].scale, s.axes[1].scale]).min().unwrap_or(Decimal::ONE);
     let scales = common_step(sources, |source, axis| source.axes[axis].scale);
@@ -89,9 +95,10 @@ fn horizontal_step(
     Ok(step)
 }
 
-fn too_fine(step: Decimal, size: f64) -> Error {
+fn too_fine(step: Decimal, size: f64, farthest: f64) -> Error {
     Error::Config(format!(
-        "[input] resolution = {step} is too fine for an area of {size:.0} units: it may have at most 2^30 steps"
+        "[input] resolution = {step} is too fine for an area of {size:.0} units with coordinates up to {farthest:.0}: it may have at \
+         most 2^30 steps, and lie within 2^52 steps of zero"
     ))
 }
 
@@ -105,7 +112,10 @@ fn vertical_step(
 ) -> Result<Decimal> {
     let finest = sources.iter().map(|s| s.axes[2].scale).min().unwrap_or(Decimal::ONE);
     let mut step = finest;
-    while area.size(2) * metres >= Frame::longest_at(float(step) * metres) {
+    let fits = |step: Decimal| {
+        area.size(2) * metres < Frame::longest_at(float(step) * metres) && is_told_apart(area.farthest(2), float(step))
+    };
+    while !fits(step) {
         step = tens(step, 1)?;
     }
     step = tens(step, coarser)?;

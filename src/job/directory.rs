@@ -36,6 +36,11 @@ impl Directory {
             fs::create_dir_all(&tiles).map_err(Error::io("create the directory", &tiles))?;
             remove_old_tiles(&tiles)?;
         }
+        if self.cut().is_dir() {
+            remove_old_tiles(&self.cut())?;
+            // What is somebody else's in it stays.
+            let _ = fs::remove_dir(self.cut());
+        }
         let results = [self.terrain(), self.tileset(), self.georeference(), self.report(), self.preview()];
         for stale in [self.spill(), self.store()].into_iter().chain(results) {
             remove_file(&stale)?;
@@ -89,6 +94,24 @@ impl Directory {
     /// All tiles as 3D Tiles.
     pub fn tileset(&self) -> PathBuf {
         self.output.join("tileset.json")
+    }
+
+    /// The directory of the triangles that are left out.
+    pub fn cut(&self) -> PathBuf {
+        self.output.join("cut")
+    }
+
+    /// Makes the directory of the triangles that are left out.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be made.
+    pub fn create_cut(&self) -> Result<()> {
+        fs::create_dir_all(self.cut()).map_err(Error::io("create the directory", self.cut()))
+    }
+
+    /// The GLB of what is left out of `tile`.
+    pub fn cut_tile(&self, tile: usize) -> PathBuf {
+        self.cut().join(format!("{tile:06}.glb"))
     }
 
     /// All tiles in one scene.

@@ -2,25 +2,27 @@
 //! colours, as one GLB; and its pixels of the preview.
 
 use super::columns::ColumnWriter;
+use super::cut::Cut;
 use super::directory::{Directory, write_whole};
 use super::records::{Leaf, Rim, RimVertices, SeamTriangle};
 use super::stitch::seam_of;
 use super::store::{Key, Store};
 use super::tree::Tree;
-use crate::output::Tile;
 use crate::output::color::Coloring;
 use crate::output::frame::Frame;
 use crate::output::glb::encode_tile;
 use crate::output::normals::Sums;
 use crate::output::preview::Canvas;
+use crate::output::{Compression, Tile};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::io::Write;
 use std::ops::AddAssign;
+use std::path::Path;
 
 /// How tiles are to look.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Look {
     /// Where lattice integers lie in a glTF scene.
     pub frame: Frame,
@@ -28,6 +30,10 @@ pub struct Look {
     pub coloring: Option<Coloring>,
     /// Whether vertices carry normals.
     pub normals: bool,
+    /// How tiles are packed.
+    pub compression: Compression,
+    /// Which triangles are left out.
+    pub cut: Cut,
 }
 
 /// What one tile, or all of them, came to.
@@ -39,7 +45,9 @@ pub struct TileFigures {
     pub triangles: u64,
     /// Those of them that cross a border between tiles.
     pub seam_triangles: u64,
-    /// Bytes of the GLB files.
+    /// Triangles that are left out.
+    pub cut_triangles: u64,
+    /// Bytes of the GLB files, those with what is left out among them.
     pub bytes: u64,
 }
 
@@ -48,11 +56,12 @@ impl AddAssign for TileFigures {
         self.files += other.files;
         self.triangles += other.triangles;
         self.seam_triangles += other.seam_triangles;
+        self.cut_triangles += other.cut_triangles;
         self.bytes += other.bytes;
     }
 }
 
-/// Writes the GLB of `tile` and leaves its part of the preview in the store.
+/// Writes the GLB of `tile`, and one of its triangles that are left out, and leaves its part of the preview in the store.
 ///
 /// # Errors
 /// [`Error::Io`] on the output or the store, [`Error::Config`] if a triangle is too long for f32.
@@ -69,17 +78,31 @@ pub fn run(
     let mut sites = Sites::of_leaf(leaf, &rims, look);
     let own = seam_of(store, tree, tile)?.into_iter().filter(|triangle| owner(triangle) == tile as u32);
     let seam_triangles = sites.add_seam(store, tile as u32, own, look)?;
+    let left_out = sites.left_out();
     let content = sites.into_tile(look);
-    let mut figures =
-        TileFigures { triangles: content.triangles.len() as u64, seam_triangles, ..TileFigures::default() };
+    let mut figures = TileFigures {
+        triangles: content.triangles.len() as u64,
+        seam_triangles,
+        cut_triangles: left_out.triangles.len() as u64,
+        ..TileFigures::default()
+    };
     ColumnWriter::default().push(&canvas.draw(&content)).write(store, Key::Pixels(tile))?;
     if !content.triangles.is_empty() {
-        let mut bytes = Vec::new();
-        encode_tile(&look.frame, &content, &mut bytes)?;
-        write_whole(&directory.tile(tile), |file| file.write_all(&bytes))?;
-        (figures.files, figures.bytes) = (1, bytes.len() as u64);
+        (figures.files, figures.bytes) = (1, write_tile(&directory.tile(tile), &content, look)?);
+    }
+    if !left_out.triangles.is_empty() {
+        directory.create_cut()?;
+        figures.bytes += write_tile(&directory.cut_tile(tile), &left_out, look)?;
     }
     Ok(figures)
+}
+
+/// Writes a GLB; its bytes.
+fn write_tile(path: &Path, content: &Tile, look: &Look) -> Result<u64> {
+    let mut bytes = Vec::new();
+    encode_tile(&look.frame, content, look.compression, &mut bytes)?;
+    write_whole(path, |file| file.write_all(&bytes))?;
+    Ok(bytes.len() as u64)
 }
 
 /// A triangle belongs to the tile of its lowest-numbered corner.
@@ -93,10 +116,13 @@ struct Sites {
     normals: Vec<[f32; 3]>,
     colors: Vec<[u16; 3]>,
     triangles: Vec<[u32; 3]>,
+    /// Triangles that are left out.
+    cut: Vec<[u32; 3]>,
 }
 
 impl Sites {
-    fn of_leaf(leaf: Leaf, rims: &RimVertices, look: &Look) -> Sites {
+    fn of_leaf(mut leaf: Leaf, rims: &RimVertices, look: &Look) -> Sites {
+        let cut = look.cut.take(&leaf.positions, &mut leaf.triangles);
         let mut normals = Sums::new(&leaf.positions, &leaf.triangles).finish(&look.frame);
         for vertex in &rims.0 {
             normals[vertex.site as usize] = vertex.normal;
@@ -107,10 +133,10 @@ impl Sites {
                 .collect(),
             None => Vec::new(),
         };
-        Sites { positions: leaf.positions, normals, colors, triangles: leaf.triangles }
+        Sites { positions: leaf.positions, normals, colors, triangles: leaf.triangles, cut }
     }
 
-    /// Adds the triangles of the seams that `tile` owns, with the vertices that neighbours share with it; returns how many.
+    /// Adds the triangles of the seams that `tile` owns, with the vertices that neighbours share with it; returns how many are written.
     fn add_seam(
         &mut self,
         store: &Store,
@@ -134,7 +160,8 @@ impl Sites {
                     }
                 };
             }
-            self.triangles.push(corners);
+            let is_cut = look.cut.leaves_out(triangle.map(|corner| corner.position));
+            if is_cut { &mut self.cut } else { &mut self.triangles }.push(corners);
         }
         Ok((self.triangles.len() - before) as u64)
     }
@@ -151,7 +178,12 @@ impl Sites {
         Ok(self.positions.len() as u32 - 1)
     }
 
-    /// The finished tile. Sites whose triangles all belong to other tiles are left out.
+    /// What is left out, without normals and colours.
+    fn left_out(&self) -> Tile {
+        Tile::of(&self.positions, self.cut.clone())
+    }
+
+    /// The finished tile. Sites whose triangles all belong to other tiles, or are left out, are not in it.
     fn into_tile(mut self, look: &Look) -> Tile {
         let mut used = vec![false; self.positions.len()];
         self.triangles.iter().flatten().for_each(|&v| used[v as usize] = true);

@@ -68,7 +68,7 @@ pub fn run(
         own.error = (error + simple.error).min(height_range(&look.frame, bounds));
         own.content = 1;
         let mut bytes = Vec::new();
-        encode_tile(&look.frame, &simple.tile, &mut bytes)?;
+        encode_tile(&look.frame, &simple.tile, look.compression, &mut bytes)?;
         write_whole(&directory.level(inner.node), |file| file.write_all(&bytes))?;
         figures = LevelFigures {
             files: 1,

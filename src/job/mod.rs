@@ -7,11 +7,14 @@ pub mod check;
 pub mod choose;
 pub mod closing;
 pub mod columns;
+pub mod cut;
 pub mod directory;
 pub mod export;
+mod forecast;
 pub mod grid;
 pub mod leaf;
 pub mod levels;
+mod machine;
 pub mod merge;
 pub mod partition;
 pub mod placement;
@@ -29,6 +32,7 @@ pub mod tileset;
 pub mod tree;
 
 use crate::config::{ColorChoice, Config, Format};
+use crate::output::Compression;
 use crate::output::color::Coloring;
 use crate::output::georeference::Georeference;
 use crate::output::picture::Picture;
@@ -38,13 +42,14 @@ use crate::triangulation::Triangulator;
 use crate::{Error, Result};
 use choose::Coarser;
 use columns::ColumnReader;
+use cut::Cut;
 use directory::Directory;
 use export::{Look, TileFigures};
 use leaf::LeafFigures;
 use levels::LevelFigures;
 use partition::{Partition, Summary, Task};
 use placement::Placement;
-use progress::{Progress, Stage, StageFigures};
+use progress::{Progress, Schedule, Stage, StageFigures};
 use pyramid::{Pyramid, Sizes};
 use rayon::prelude::*;
 use report::{Parts, Report};
@@ -67,26 +72,41 @@ const MOST_TRIANGLES_IN_ONE_FILE: u64 = 20_000_000;
 /// Nor one of more tiles: each is a node with a mesh of its own, and their description would fill the memory.
 const MOST_TILES_IN_ONE_FILE: u64 = 4096;
 
+/// How a job is run, beside its configuration.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// Where progress goes.
+    pub progress: Progress,
+    /// Whether to go on where the disk or the memory does not seem to suffice.
+    pub force: bool,
+}
+
+impl From<Progress> for Options {
+    fn from(progress: Progress) -> Options {
+        Options { progress, force: false }
+    }
+}
+
 /// Runs the whole job of `config`.
 ///
 /// # Errors
 /// Whatever stops a step; see [`Error`]. A job that fails leaves no temporary files.
-pub fn run(config: &Config, progress: Progress) -> Result<Report> {
-    let start = Instant::now();
+pub fn run(config: &Config, options: impl Into<Options>) -> Result<Report> {
+    let (options, start) = (options.into(), Instant::now());
     // First of all, so that a job that must have a GPU fails at once where there is none.
     let triangulator = Triangulator::new(&config.triangulation, config.limits.memory.0, config.threads())?;
     let mut coarser = Coarser::default();
     loop {
-        match attempt(config, &triangulator, coarser, progress, start) {
+        match attempt(config, &triangulator, coarser, options, start) {
             // Only the finished mesh knows its longest triangle, so that a second try is the price of not rounding in vain.
             Err(Error::TooFine { vertical: true, what }) if coarser.vertical < MOST_TENS => {
-                progress.note(&format!("{what}; starting again with a coarser step in z"));
+                options.progress.note(&format!("{what}; starting again with a coarser step in z"));
                 coarser.vertical += 1;
             }
             Err(Error::TooFine { vertical: false, what })
                 if config.input.resolution.0.is_none() && coarser.horizontal < MOST_TENS =>
             {
-                progress.note(&format!("{what}; starting again with a coarser step in x and y"));
+                options.progress.note(&format!("{what}; starting again with a coarser step in x and y"));
                 coarser.horizontal += 1;
             }
             outcome => return outcome,
@@ -98,18 +118,24 @@ fn attempt(
     config: &Config,
     triangulator: &Triangulator,
     coarser: Coarser,
-    progress: Progress,
+    options: Options,
     start: Instant,
 ) -> Result<Report> {
+    let progress = options.progress;
     let stage = progress.stage("scan", 1, "job");
     let plan = on_threads(workers(config, 0)?, || scan::run(config, coarser))?;
     stage.advance(1);
     let scanned = stage.finish();
+    let progress = &Schedule::new(progress, forecast::costs(&plan));
+    report::note_skipped(&plan.skipped, progress);
     let threads = workers(config, plan.records)?;
+    if !options.force {
+        check::preflight(&plan, config, threads).passes()?;
+    }
     let directory = Directory::new(&config.output.directory);
     let _lock = directory.create()?;
-    let job = Job { config, triangulator, plan: &plan, directory: &directory, progress, threads, start };
-    let outcome = on_threads(threads, || job.run(scanned));
+    let job = Job { config, triangulator, coarser, directory: &directory, progress, threads, start };
+    let outcome = on_threads(threads, || job.run(plan, scanned));
     if outcome.is_err() {
         // The first error is the one to report.
         let _ = directory.clean_up();
@@ -145,24 +171,23 @@ fn workers(config: &Config, points: u64) -> Result<usize> {
 struct Job<'a> {
     config: &'a Config,
     triangulator: &'a Triangulator,
-    plan: &'a Plan,
+    coarser: Coarser,
     directory: &'a Directory,
-    progress: Progress,
+    progress: &'a Schedule,
     threads: usize,
     start: Instant,
 }
 
 impl Job<'_> {
     /// Step 2 and all after it.
-    fn run(&self, scanned: StageFigures) -> Result<Report> {
-        let Job { config, triangulator, plan, directory, progress, .. } = *self;
+    fn run(&self, plan: Plan, scanned: StageFigures) -> Result<Report> {
+        let Job { config, triangulator, directory, progress, .. } = *self;
 
-        let stage = progress.stage("read", plan.records, "points");
-        let partition = partition::run(&task(plan, config), directory, &stage)?;
+        let (plan, partition, read) = self.read(plan)?;
+        let plan = &plan;
         let bounds = enough_points(&partition.summary)?;
         let longest = Longest::of(&plan.frame);
         longest.check_heights(bounds[0][2], bounds[1][2])?;
-        let read = stage.finish();
 
         let stage = progress.stage("triangulate", partition.summary.tally.kept, "points");
         let store = Store::create(&directory.store())?;
@@ -171,8 +196,9 @@ impl Job<'_> {
         directory::remove_file(&directory.spill())?;
         let triangulated = stage.finish();
 
-        let look = look(config, plan, &partition.summary, bounds);
         let tiles = partition.tree.leaves.len();
+        let cut = Cut::new(config.output.max_edge, &plan.frame, &store, [tiles as u64, leaves.sites], bounds)?;
+        let look = look(config, plan, &partition.summary, bounds, cut);
         let stage = progress.stage("stitch", tiles as u64, "tiles");
         stitch_all(&store, &partition.tree, &look, &stage)?;
         let stitched = stage.finish();
@@ -180,7 +206,7 @@ impl Job<'_> {
         let stage = progress.stage("write", leaves.sites, "sites");
         let canvas = Canvas::new(&look.frame, bounds);
         let written = export_all(directory, &store, &partition, &look, &canvas, &stage)?;
-        enough_triangles(written.triangles)?;
+        enough_triangles(&written, plan)?;
         let exported = stage.finish();
 
         let one_file = fits_one_file(&written);
@@ -218,6 +244,7 @@ impl Job<'_> {
                 points: partition.summary.tally,
                 leaves,
                 gpu: triangulator.gpu().map(str::to_owned),
+                gpu_steps: triangulator.gpu_steps(),
                 tiles: written,
                 levels: coarser,
                 warnings,
@@ -264,6 +291,26 @@ impl Job<'_> {
             Ok(all)
         })
     }
+
+    /// Step 2. An input that proves bad only now is left out as if it had never been named: if without it the job would have
+    /// another lattice, all is read again.
+    fn read(&self, mut plan: Plan) -> Result<(Plan, Partition, StageFigures)> {
+        let Job { config, directory, progress, coarser, .. } = *self;
+        loop {
+            let stage = progress.stage("read", plan.records, "points");
+            let mut partition = partition::run(&task(&plan, config), directory, &stage)?;
+            let figures = stage.finish();
+            let lattice = plan.lattice.clone();
+            if !partition.skipped.is_empty() {
+                report::note_skipped(&partition.skipped, progress);
+                plan = scan::without(plan, &partition.skipped, config, coarser)?;
+            }
+            if plan.lattice == lattice {
+                partition.skipped.clone_from(&plan.skipped);
+                return Ok((plan, partition, figures));
+            }
+        }
+    }
 }
 
 /// Which tiles viewers see.
@@ -306,6 +353,7 @@ fn task<'a>(plan: &'a Plan, config: &Config) -> Task<'a> {
         points_per_tile: config.triangulation.sites_per_tile.0,
         memory: config.limits.memory.0 / 6,
         malformed_share: config.input.malformed_share.0,
+        on_bad_file: config.input.on_bad_file,
     }
 }
 
@@ -321,14 +369,20 @@ fn enough_points(summary: &Summary) -> Result<[[i32; 3]; 2]> {
     })
 }
 
-fn enough_triangles(triangles: u64) -> Result<()> {
-    if triangles > 0 {
+fn enough_triangles(written: &TileFigures, plan: &Plan) -> Result<()> {
+    if written.triangles > 0 {
         return Ok(());
     }
-    Err(Error::NoTerrain(
-        "the points make no triangle: it takes at least three different places in x and y that are not on one line"
-            .into(),
-    ))
+    if written.cut_triangles > 0 {
+        return Err(Error::Config(format!(
+            "[output] max_edge leaves out all {} triangles: give a greater one",
+            written.cut_triangles
+        )));
+    }
+    Err(Error::NoTerrain(format!(
+        "the points make no triangle in steps of {}: it takes at least three different places in x and y that are not on one line",
+        plan.lattice.resolution
+    )))
 }
 
 /// Triangulates all leaves and merges every merge node as soon as all below it is done.
@@ -386,7 +440,7 @@ impl Grower<'_> {
 }
 
 /// How the tiles are to look.
-fn look(config: &Config, plan: &Plan, summary: &Summary, bounds: [[i32; 3]; 2]) -> Look {
+fn look(config: &Config, plan: &Plan, summary: &Summary, bounds: [[i32; 3]; 2], cut: Cut) -> Look {
     let elevation = Coloring::Elevation { low: bounds[0][2], high: bounds[1][2] };
     let coloring = match config.output.color {
         ColorChoice::None => None,
@@ -395,12 +449,17 @@ fn look(config: &Config, plan: &Plan, summary: &Summary, bounds: [[i32; 3]; 2]) 
         ColorChoice::Auto | ColorChoice::Rgb if summary.tally.max_rgb == 0 => Some(elevation),
         ColorChoice::Auto | ColorChoice::Rgb => Some(Coloring::Rgb { eight_bit: summary.tally.max_rgb <= 255 }),
     };
-    Look { frame: plan.frame.clone().refined(bounds), coloring, normals: config.output.normals }
+    let compression = config.output.compression;
+    let frame = match compression {
+        Compression::None => plan.frame.clone().refined(bounds),
+        _ => plan.frame.clone().packed(),
+    };
+    Look { frame, coloring, normals: config.output.normals, compression, cut }
 }
 
 fn stitch_all(store: &Store, tree: &Tree, look: &Look, stage: &Stage) -> Result<()> {
     (0..tree.leaves.len()).into_par_iter().try_for_each(|tile| {
-        stitch::run(store, tree, tile, &look.frame)?;
+        stitch::run(store, tree, tile, look)?;
         stage.advance(1);
         Ok(())
     })

@@ -6,12 +6,14 @@ use super::grid::{Grid, Span, Sums};
 use super::progress::Stage;
 use super::spill::{Block, Bucket, Buckets, Spill};
 use super::tree::{Cell, Kind, Node, Tree};
+use crate::config::OnBadFile;
 use crate::geometry::Site;
 use crate::input::{Point, Rules, Source, Tally};
 use crate::{Error, Result};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::ops::AddAssign;
+use std::ops::{AddAssign, Range};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// What a leaf's cell is cut into before the leaves are chosen: enough that leaves come out even.
@@ -30,6 +32,17 @@ pub struct Partition {
     pub summary: Summary,
     /// The size of the spill in bytes.
     pub spilled: u64,
+    /// The inputs that proved bad on the way and were left out, all of them; nothing else here counts them.
+    pub skipped: Vec<Skipped>,
+}
+
+/// An input that was left out because it is bad.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Skipped {
+    /// The file.
+    pub file: PathBuf,
+    /// What is wrong with it.
+    pub why: String,
 }
 
 /// What all inputs together held.
@@ -66,29 +79,63 @@ pub struct Task<'a> {
     pub points_per_tile: u64,
     /// Bytes for buffers.
     pub memory: u64,
-    /// The share of malformed records that is put up with.
+    /// The share of malformed records that is put up with: of all inputs together, or where bad ones are left out, of each.
     pub malformed_share: f64,
+    /// What becomes of an input with more of them.
+    pub on_bad_file: OnBadFile,
 }
 
 /// Runs the step: leaves the spill in the job directory and returns what the steps after it need to know of it.
 ///
 /// # Errors
-/// [`Error::Input`] if an input cannot be read or too much of it is malformed, [`Error::Io`] if the spill cannot be
-/// written.
+/// [`Error::Input`] if too much of the inputs is malformed and bad ones are not to be left out, [`Error::Io`] if an input
+/// cannot be read or the spill cannot be written.
 pub fn run(task: &Task, directory: &Directory, stage: &Stage) -> Result<Partition> {
     let spill = Spill::create(&directory.spill())?;
     let records: u64 = task.sources.iter().map(|(source, _)| source.records).sum();
     let grid = Grid::over(task.extent[0], task.extent[1], wanted_buckets(records, task.points_per_tile));
     let buckets = Buckets::new(&spill, grid.buckets(), task.memory);
-    let summary = decode_all(task, records, &grid, &buckets, stage)?;
+    let by_source = decode_all(task, records, &grid, &buckets, stage)?;
+    let mut buckets = buckets.finish()?;
+    let Judgement { summary, skipped, orders } = judge(task, by_source);
+    if !orders.is_empty() {
+        buckets.par_iter_mut().try_for_each(|bucket| spill.sift(bucket, &orders))?;
+    }
     let mut divider = Divider { task, spill: &spill, tree: Tree::default(), blocks: Vec::new() };
-    let buckets = buckets.finish()?;
     if summary.tally.kept > 0 {
         divider.grow(Cell::PLANE, None, &grid, buckets)?;
     }
     let Divider { tree, blocks, .. } = divider;
-    let partition = Partition { tree, blocks, summary, spilled: spill.bytes() };
-    Ok(partition)
+    Ok(Partition { tree, blocks, summary, spilled: spill.bytes(), skipped })
+}
+
+/// What the inputs held, those apart that are to be left out.
+struct Judgement {
+    summary: Summary,
+    skipped: Vec<Skipped>,
+    /// The numbers of the records of those left out.
+    orders: Vec<Range<u64>>,
+}
+
+/// Sums up the inputs. Each is judged by itself, so that it does not depend on the others whether it is left out.
+fn judge(task: &Task, by_source: BySource) -> Judgement {
+    let mut judgement = Judgement { summary: Summary::default(), skipped: Vec::new(), orders: Vec::new() };
+    for (index, summary) in by_source.0 {
+        let (source, rules) = &task.sources[index];
+        let is_bad = summary.tally.malformed > allowed(task.malformed_share, source.records);
+        if is_bad && task.on_bad_file == OnBadFile::Skip {
+            let why = malformed_share_exceeded(&summary.tally, summary.tally.malformed, source.records);
+            judgement.skipped.push(Skipped { file: source.path.clone(), why });
+            judgement.orders.push(rules.first_order..rules.first_order + source.records);
+        } else {
+            judgement.summary += summary;
+        }
+    }
+    judgement
+}
+
+fn allowed(malformed_share: f64, records: u64) -> u64 {
+    (malformed_share * records as f64) as u64
 }
 
 /// The bytes of buffers for a job of `points` points, within `memory`.
@@ -101,42 +148,62 @@ fn wanted_buckets(points: u64, points_per_tile: u64) -> u64 {
     (points.saturating_mul(BUCKETS_PER_TILE) / points_per_tile).clamp(4, MOST_BUCKETS)
 }
 
+/// What each input held, in their order; those without pieces have none.
+#[derive(Default)]
+struct BySource(Vec<(usize, Summary)>);
+
+impl BySource {
+    /// Adds what the pieces after these held.
+    fn append(mut self, later: BySource) -> BySource {
+        let mut later = later.0.into_iter();
+        match (self.0.last_mut(), later.next()) {
+            (Some((last, summary)), Some((first, more))) if *last == first => *summary += more,
+            (_, next) => self.0.extend(next),
+        }
+        self.0.extend(later);
+        self
+    }
+}
+
 /// Decodes all pieces of all sources in parallel and hands the points to the buckets of the grid.
-fn decode_all(task: &Task, records: u64, grid: &Grid, buckets: &Buckets, stage: &Stage) -> Result<Summary> {
+fn decode_all(task: &Task, records: u64, grid: &Grid, buckets: &Buckets, stage: &Stage) -> Result<BySource> {
     let pieces: Vec<(usize, usize)> = task
         .sources
         .iter()
         .enumerate()
         .flat_map(|(s, (source, _))| (0..source.pieces()).map(move |piece| (s, piece)))
         .collect();
-    let allowed = (task.malformed_share * records as f64) as u64;
+    let allowed = allowed(task.malformed_share, records);
     let malformed = AtomicU64::new(0);
-    let decode = |&(s, piece): &(usize, usize)| -> Result<Summary> {
+    let decode = |&(s, piece): &(usize, usize)| -> Result<BySource> {
         let (source, rules) = &task.sources[s];
         let mut scatter = Scatter::new(grid, buckets);
         let tally = source.decode(piece, rules, &mut |points| scatter.spill(points))?;
         stage.advance(tally.read);
         let so_far = malformed.fetch_add(tally.malformed, Ordering::Relaxed) + tally.malformed;
-        if so_far > allowed {
+        // The piece that goes beyond says so: another may be sound.
+        if task.on_bad_file == OnBadFile::Stop && tally.malformed > 0 && so_far > allowed {
             return Err(too_many_malformed(source, &tally, so_far, records));
         }
-        Ok(Summary { tally, bounds: scatter.bounds })
+        Ok(BySource(vec![(s, Summary { tally, bounds: scatter.bounds })]))
     };
-    pieces.par_iter().with_max_len(1).map(decode).try_reduce(Summary::default, |mut a, b| {
-        a += b;
-        Ok(a)
-    })
+    // The reduction keeps the order of the pieces.
+    pieces.par_iter().with_max_len(1).map(decode).try_reduce(BySource::default, |a, b| Ok(a.append(b)))
 }
 
 fn too_many_malformed(source: &Source, tally: &Tally, malformed: u64, records: u64) -> Error {
+    let what = malformed_share_exceeded(tally, malformed, records);
     Error::input(
         &source.path,
         format!(
-            "{malformed} of {records} records are malformed, more than [input] malformed_share allows: {}. \
-             Repair the file, leave it out, or raise malformed_share to read the rest",
-            tally.examples.join("; ")
+            "{what}. Repair the file, leave it out (on_bad_file = \"skip\"), or raise malformed_share to read the rest"
         ),
     )
+}
+
+fn malformed_share_exceeded(tally: &Tally, malformed: u64, records: u64) -> String {
+    let examples = tally.examples.join("; ");
+    format!("{malformed} of {records} records are malformed, more than [input] malformed_share allows: {examples}")
 }
 
 /// Sorts slices of points by bucket before they go to the shared buffers, so that a lock is taken once a bucket.

@@ -1,10 +1,11 @@
 //! How far a job is: a bar per stage on a terminal, a line now and then in a log, nothing with `--quiet`.
 
+use super::forecast::{Forecast, rough};
 use indicatif::{HumanCount, ProgressBar, ProgressState, ProgressStyle};
 use serde::{Deserialize, Serialize};
 use std::io::IsTerminal;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 /// Between two lines in a log.
@@ -38,47 +39,103 @@ impl Progress {
         }
     }
 
-    /// Starts a stage of `total` `unit`s.
+    /// Starts a stage of `total` `unit`s that is no part of a job.
     pub fn stage(self, name: &'static str, total: u64, unit: &'static str) -> Stage {
-        let bar = match self {
-            Progress::Bars if total > 1 => ProgressBar::new(total).with_style(style(unit)).with_prefix(name),
-            _ => ProgressBar::hidden(),
-        };
-        let now = Instant::now();
-        Stage {
-            progress: self,
-            name,
-            unit,
-            total,
-            bar,
-            done: AtomicU64::new(0),
-            start: now,
-            cpu_start: cpu_seconds(),
-            logged: Mutex::new(now),
-        }
+        Schedule::new(self, Vec::new()).stage(name, total, unit)
     }
 }
 
-fn style(unit: &str) -> ProgressStyle {
+/// The stages of a job, one after the other, and when the last of them will be done.
+pub struct Schedule {
+    progress: Progress,
+    forecast: Arc<Mutex<Forecast>>,
+}
+
+impl Schedule {
+    /// For stages that are expected to cost so much, in the order in which they will come.
+    pub fn new(progress: Progress, costs: Vec<(&'static str, f64)>) -> Schedule {
+        Schedule { progress, forecast: Arc::new(Mutex::new(Forecast::new(costs))) }
+    }
+
+    /// Says something between two stages.
+    pub fn note(&self, text: &str) {
+        self.progress.note(text);
+    }
+
+    /// Starts a stage of `total` `unit`s.
+    pub fn stage(&self, name: &'static str, total: u64, unit: &'static str) -> Stage {
+        let pace = Arc::new(Pace {
+            forecast: self.forecast.clone(),
+            name,
+            total,
+            done: AtomicU64::new(0),
+            taken_over: AtomicU64::new(0),
+            start: Instant::now(),
+        });
+        let bar = match self.progress {
+            Progress::Bars if total > 1 => {
+                ProgressBar::new(total).with_style(style(unit, pace.clone())).with_prefix(name)
+            }
+            _ => ProgressBar::hidden(),
+        };
+        let logged = Mutex::new(pace.start);
+        Stage { progress: self.progress, unit, bar, pace, cpu_start: cpu_seconds(), logged }
+    }
+}
+
+/// How far a stage is, and how fast.
+struct Pace {
+    forecast: Arc<Mutex<Forecast>>,
+    name: &'static str,
+    total: u64,
+    done: AtomicU64,
+    /// How much of it an earlier run had done.
+    taken_over: AtomicU64,
+    start: Instant,
+}
+
+impl Pace {
+    fn share(&self, amount: &AtomicU64) -> f64 {
+        (amount.load(Ordering::Relaxed) as f64 / self.total.max(1) as f64).min(1.0)
+    }
+
+    /// Seconds left of the whole job.
+    fn left(&self) -> f64 {
+        let shares = [&self.taken_over, &self.done].map(|amount| self.share(amount));
+        self.forecast().left(self.name, shares[0], shares[1], self.start.elapsed().as_secs_f64())
+    }
+
+    fn finish(&self) {
+        let share = 1.0 - self.share(&self.taken_over);
+        self.forecast().finish(self.name, share, self.start.elapsed().as_secs_f64());
+    }
+
+    fn forecast(&self) -> MutexGuard<'_, Forecast> {
+        self.forecast.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
+}
+
+fn style(unit: &str, pace: Arc<Pace>) -> ProgressStyle {
     let template = format!(
-        "{{prefix:>12}} {{bar:30}} {{percent:>3}} %  {{human_pos}} of {{human_len}} {unit}, {{rate}}/s, {{eta}} left"
+        "{{prefix:>12}} {{bar:30}} {{percent:>3}} %  {{human_pos}} of {{human_len}} {unit}, {{rate}}/s, {{left}} left of the job"
     );
     let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
-    style.with_key("rate", |state: &ProgressState, out: &mut dyn std::fmt::Write| {
-        // A bar that cannot be drawn is no reason to stop.
+    // A bar that cannot be drawn is no reason to stop.
+    let rate = |state: &ProgressState, out: &mut dyn std::fmt::Write| {
         let _ = out.write_str(&HumanCount(state.per_sec() as u64).to_string());
-    })
+    };
+    let left = move |_: &ProgressState, out: &mut dyn std::fmt::Write| {
+        let _ = out.write_str(&rough(pace.left()));
+    };
+    style.with_key("rate", rate).with_key("left", left)
 }
 
 /// A running stage; its methods may be called from any thread.
 pub struct Stage {
     progress: Progress,
-    name: &'static str,
     unit: &'static str,
-    total: u64,
     bar: ProgressBar,
-    done: AtomicU64,
-    start: Instant,
+    pace: Arc<Pace>,
     cpu_start: f64,
     logged: Mutex<Instant>,
 }
@@ -101,38 +158,48 @@ pub struct StageFigures {
 impl Stage {
     /// Counts `amount` more units as done.
     pub fn advance(&self, amount: u64) {
-        let done = self.done.fetch_add(amount, Ordering::Relaxed) + amount;
+        let done = self.pace.done.fetch_add(amount, Ordering::Relaxed) + amount;
         match self.progress {
             Progress::Quiet => {}
-            Progress::Bars => self.bar.set_position(done.min(self.total)),
+            Progress::Bars => self.bar.set_position(done.min(self.pace.total)),
             Progress::Lines => self.log(done),
+        }
+    }
+
+    /// Counts `amount` units as done by an earlier run: they say nothing of how fast this one is.
+    pub fn take_over(&self, amount: u64) {
+        let done = self.pace.done.fetch_add(amount, Ordering::Relaxed) + amount;
+        self.pace.taken_over.fetch_add(amount, Ordering::Relaxed);
+        if self.progress == Progress::Bars {
+            self.bar.set_position(done.min(self.pace.total));
+            self.bar.reset_eta();
         }
     }
 
     fn log(&self, done: u64) {
         let Ok(mut logged) = self.logged.try_lock() else { return };
-        if logged.elapsed() < LOG_EVERY || done >= self.total {
+        let Pace { name, total, .. } = *self.pace;
+        if logged.elapsed() < LOG_EVERY || done >= total {
             return;
         }
         *logged = Instant::now();
-        let elapsed = self.start.elapsed().as_secs_f64();
-        let share = done as f64 / self.total.max(1) as f64;
-        let left = elapsed / share.max(1e-9) * (1.0 - share);
-        eprintln!("{}: {:.0} % of {} {}, {:.0} s left", self.name, share * 100.0, self.total, self.unit, left);
+        let percent = self.pace.share(&self.pace.done) * 100.0;
+        eprintln!("{name}: {percent:.0} % of {total} {}, {} left of the job", self.unit, rough(self.pace.left()));
     }
 
     /// Ends the stage.
     pub fn finish(self) -> StageFigures {
         self.bar.finish_and_clear();
+        self.pace.finish();
         let figures = StageFigures {
-            stage: self.name.into(),
-            wall_s: self.start.elapsed().as_secs_f64(),
+            stage: self.pace.name.into(),
+            wall_s: self.pace.start.elapsed().as_secs_f64(),
             cpu_s: cpu_seconds() - self.cpu_start,
-            done: self.done.load(Ordering::Relaxed),
+            done: self.pace.done.load(Ordering::Relaxed),
             unit: self.unit.into(),
         };
         if self.progress == Progress::Lines {
-            eprintln!("{}: done, {} {} in {:.1} s", self.name, figures.done, self.unit, figures.wall_s);
+            eprintln!("{}: done, {} {} in {:.1} s", figures.stage, figures.done, self.unit, figures.wall_s);
         }
         figures
     }

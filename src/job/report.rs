@@ -3,10 +3,14 @@
 use super::export::TileFigures;
 use super::leaf::LeafFigures;
 use super::levels::LevelFigures;
-use super::progress::StageFigures;
+use super::machine;
+use super::partition::Skipped;
+use super::progress::{Schedule, StageFigures};
 use super::scan::Plan;
 use crate::geometry::lattice::Lattice;
 use crate::input::Tally;
+use crate::triangulation::Outcome;
+use crate::voronoi::STEPS;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -19,6 +23,9 @@ pub struct Report {
     pub sites: u64,
     /// Triangles in all tiles.
     pub triangles: u64,
+    /// Triangles that `max_edge` leaves out; they are in `cut`.
+    #[serde(default)]
+    pub cut_triangles: u64,
     /// GLB files in `tiles`.
     pub tiles: u64,
     /// The coarser tiles in `levels`.
@@ -27,14 +34,18 @@ pub struct Report {
     pub seam_share: f64,
     /// Points dropped because another has the same x and y.
     pub duplicates: u64,
-    /// The inputs.
+    /// The inputs that were read.
     pub files: usize,
+    /// The inputs that were left out because they are bad; no other figure counts them.
+    pub skipped: Vec<Skipped>,
     /// Records by what became of them.
     pub points: Tally,
     /// How the leaves came to be.
     pub leaves: LeafFigures,
     /// The GPU that helped.
     pub gpu: Option<String>,
+    /// What the pipeline's steps took of all leaves together: on the workers, and on the GPU itself where it tells.
+    pub steps: Steps,
     /// The lattice.
     pub lattice: Lattice,
     /// Unit of x and y.
@@ -59,6 +70,33 @@ pub struct Report {
     pub warnings: Vec<String>,
 }
 
+/// Seconds by step of the pipeline.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Steps {
+    /// On the workers, all of them together.
+    pub cpu: Vec<StepSeconds>,
+    /// On the GPU.
+    pub gpu: Vec<StepSeconds>,
+}
+
+/// One step.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct StepSeconds {
+    /// Its name in the paper.
+    pub step: String,
+    /// Seconds.
+    pub seconds: f64,
+}
+
+impl Steps {
+    fn new(leaves: &LeafFigures, gpu: &[(&'static str, f64)]) -> Steps {
+        let named = |(step, seconds): (&str, f64)| StepSeconds { step: step.into(), seconds };
+        let nanoseconds = leaves.outcome.counts.nanoseconds;
+        let cpu = STEPS.into_iter().zip(nanoseconds.map(|ns| ns as f64 / 1e9)).filter(|(_, seconds)| *seconds > 0.0);
+        Steps { cpu: cpu.map(named).collect(), gpu: gpu.iter().copied().map(named).collect() }
+    }
+}
+
 /// The figures of the stages, before they become a report.
 pub struct Parts {
     /// What was read.
@@ -67,6 +105,8 @@ pub struct Parts {
     pub leaves: LeafFigures,
     /// The GPU that helped.
     pub gpu: Option<String>,
+    /// Seconds by step on that GPU.
+    pub gpu_steps: Vec<(&'static str, f64)>,
     /// What the tiles came to.
     pub tiles: TileFigures,
     /// What the coarser tiles came to.
@@ -106,20 +146,23 @@ impl Report {
             generator: concat!("gdt-batch ", env!("CARGO_PKG_VERSION")).into(),
             sites: parts.leaves.sites,
             triangles: parts.tiles.triangles,
+            cut_triangles: parts.tiles.cut_triangles,
             tiles: parts.tiles.files,
             levels: parts.levels,
             seam_share: parts.tiles.seam_triangles as f64 / parts.tiles.triangles.max(1) as f64,
             duplicates: parts.leaves.duplicates,
             files: plan.sources.len(),
+            skipped: plan.skipped.clone(),
             points: parts.points,
             leaves: parts.leaves,
             gpu: parts.gpu,
+            steps: Steps::new(&parts.leaves, &parts.gpu_steps),
             lattice: plan.lattice.clone(),
             unit: plan.unit.into(),
             crs: plan.crs.name.clone(),
             bytes_written: parts.tiles.bytes + parts.levels.bytes + parts.other_bytes,
             bytes_temporary: parts.temporary,
-            peak_memory: peak_memory(),
+            peak_memory: machine::peak_memory(),
             memory_limit: parts.memory,
             threads: parts.threads,
             wall_s: parts.wall_s,
@@ -127,14 +170,6 @@ impl Report {
             warnings,
         }
     }
-}
-
-/// The largest resident set of this process so far, in bytes, where the system tells.
-pub fn peak_memory() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
-    let kilobytes: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some(kilobytes * 1024)
 }
 
 impl fmt::Display for Report {
@@ -154,6 +189,12 @@ impl fmt::Display for Report {
             )?;
         }
         writeln!(f, "{:<12} {:>9.2}\n", "all", self.wall_s)?;
+        for (unit, steps) in [("cpu s", &self.steps.cpu), ("gpu s", &self.steps.gpu)] {
+            for (i, StepSeconds { step, seconds }) in steps.iter().enumerate() {
+                let head = if i == 0 { format!("triangulate by step, {unit}") } else { String::new() };
+                writeln!(f, "{head:<28} {step:<40} {seconds:>9.2}")?;
+            }
+        }
         let mut row = |name: &str, value: String| writeln!(f, "{name:<28} {value}");
         row("points read", grouped(self.points.read))?;
         row("  withheld", grouped(self.points.withheld))?;
@@ -164,11 +205,31 @@ impl fmt::Display for Report {
         row("sites", grouped(self.sites))?;
         row("triangles", grouped(self.triangles))?;
         row("  crossing tile borders", format!("{:.3} %", self.seam_share * 100.0))?;
+        if self.cut_triangles > 0 {
+            row("  left out (max_edge)", grouped(self.cut_triangles))?;
+        }
         row("tiles", grouped(self.tiles))?;
         if self.levels.files > 0 {
             let levels = &self.levels;
             row("coarser tiles", format!("{}, at most {:.2} m off", grouped(levels.files), levels.error_m))?;
         }
+        let Outcome { pipeline, reference, crowded, not_accepted, counts } = &self.leaves.outcome;
+        let leaves = pipeline + reference + crowded + not_accepted;
+        row(
+            "leaves",
+            format!(
+                "{}, of them by spade {} ({crowded} crowded, {not_accepted} not accepted, {reference} other)",
+                grouped(leaves),
+                grouped(leaves - pipeline)
+            ),
+        )?;
+        row("  sites moved to other pixels", grouped(counts.moved))?;
+        row("  sites missing, inserted", grouped(counts.missing))?;
+        row(
+            "  inverted triangles",
+            format!("{}, sites taken out {}", grouped(counts.inverted), grouped(counts.removed)),
+        )?;
+        row("  edges flipped", grouped(counts.flips))?;
         if let Some(gpu) = &self.gpu {
             row("  with the help of a GPU", format!("{} ({gpu})", grouped(self.leaves.outcome.counts.on_gpu)))?;
         }
@@ -180,7 +241,28 @@ impl fmt::Display for Report {
         for warning in &self.warnings {
             writeln!(f, "warning: {warning}")?;
         }
-        Ok(())
+        write_skipped(f, self.files, &self.skipped)
+    }
+}
+
+/// Says how many of all inputs are left out, and each of them with its reason; nothing where none is.
+pub(super) fn write_skipped(f: &mut fmt::Formatter<'_>, used: usize, skipped: &[Skipped]) -> fmt::Result {
+    if let Some(summary) = skipped_summary(used, skipped) {
+        writeln!(f, "\n{summary}:")?;
+    }
+    skipped.iter().try_for_each(|bad| writeln!(f, "  {}: {}", bad.file.display(), bad.why))
+}
+
+/// A sentence on the inputs that are left out; `None` where none is.
+pub fn skipped_summary(used: usize, skipped: &[Skipped]) -> Option<String> {
+    let (bad, all) = (skipped.len(), used + skipped.len());
+    (bad > 0).then(|| format!("LEFT OUT: {bad} of {all} input files, because they are bad and on_bad_file = \"skip\""))
+}
+
+/// Says so when an input is left out.
+pub(super) fn note_skipped(skipped: &[Skipped], progress: &Schedule) {
+    for bad in skipped {
+        progress.note(&format!("left out: {}: {}", bad.file.display(), bad.why));
     }
 }
 

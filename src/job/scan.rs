@@ -2,7 +2,8 @@
 
 use super::area::Area;
 use super::choose::{self, Coarser};
-use crate::config::{Config, UnitChoice};
+use super::partition::Skipped;
+use crate::config::{Config, OnBadFile, UnitChoice};
 use crate::geometry::Site;
 use crate::geometry::lattice::{AxisMap, Lattice, REACH, shortest_decimal};
 use crate::input::{self, Axis, Crs, Rules, Source, Unit};
@@ -39,14 +40,60 @@ pub struct Plan {
     pub frame: Frame,
     /// What the user should know.
     pub warnings: Vec<String>,
+    /// The inputs that are left out because they are bad.
+    pub skipped: Vec<Skipped>,
 }
 
 /// Looks at all inputs of `config`; `coarser` is nothing unless an earlier try failed with [`Error::TooFine`].
 ///
 /// # Errors
-/// [`Error::Config`] if there are none, or they do not go together; [`Error::Input`] or [`Error::Io`] if one cannot be used.
+/// [`Error::Config`] if there are none, or they do not go together; [`Error::Input`] if one cannot be used and bad ones are
+/// not to be left out, or none is left; [`Error::Io`] if one cannot be read.
 pub fn run(config: &Config, coarser: Coarser) -> Result<Plan> {
-    let sources = open_all(config)?;
+    let (sources, skipped) = open_all(config)?;
+    settle(sources, skipped, config, coarser)
+}
+
+/// The plan that [`run`] would have made without the inputs that step 2 has `skipped`.
+///
+/// # Errors
+/// As [`run`].
+pub fn without(plan: Plan, skipped: &[Skipped], config: &Config, coarser: Coarser) -> Result<Plan> {
+    let is_bad = |source: &Source| skipped.iter().any(|bad| bad.file == source.path);
+    let sources = plan.sources.into_iter().map(|(source, _)| source).filter(|source| !is_bad(source));
+    let is_new = |bad: &&Skipped| !plan.skipped.contains(bad);
+    let all = plan.skipped.iter().chain(skipped.iter().filter(is_new)).cloned();
+    settle(sources.collect(), all.collect(), config, coarser)
+}
+
+/// Makes the plan, without those of `sources` that stand in its way if bad files are to be left out.
+fn settle(mut sources: Vec<Source>, mut skipped: Vec<Skipped>, config: &Config, coarser: Coarser) -> Result<Plan> {
+    loop {
+        if let (true, Some(first)) = (sources.is_empty(), skipped.first()) {
+            return Err(Error::NoTerrain(format!(
+                "no input is left: all {} are bad and left out, the first of them {}: {}",
+                skipped.len(),
+                first.file.display(),
+                first.why
+            )));
+        }
+        match make_plan(&sources, config, coarser) {
+            Err(Error::Input { path, what })
+                if config.input.on_bad_file == OnBadFile::Skip && sources.iter().any(|s| s.path == path) =>
+            {
+                sources.retain(|source| source.path != path);
+                skipped.push(Skipped { file: path, why: what });
+            }
+            planned => {
+                let (plan, rules) = planned?;
+                return Ok(Plan { sources: sources.into_iter().zip(rules).collect(), skipped, ..plan });
+            }
+        }
+    }
+}
+
+/// A plan that does not hold the sources yet, and the rules for their points.
+fn make_plan(sources: &[Source], config: &Config, coarser: Coarser) -> Result<(Plan, Vec<Rules>)> {
     let mut warnings = unreadable_names(&config.input.files);
     let of_sources = sources.iter().flat_map(|s| s.warnings.iter().map(|w| format!("{}: {w}", s.path.display())));
     warnings.extend(of_sources);
@@ -55,13 +102,13 @@ pub fn run(config: &Config, coarser: Coarser) -> Result<Plan> {
     if records >= MOST_RECORDS {
         return Err(Error::Config(format!("{records} records are more than one job can hold (2^40)")));
     }
-    enough_is_there(&sources, records, config.input.malformed_share.0)?;
-    let crs = common_crs(&sources)?;
+    enough_is_there(sources, records, config)?;
+    let crs = common_crs(sources)?;
     let (unit, metres) = unit_of(config.input.unit, &crs, &mut warnings)?;
-    let area = Area::of(&sources, config, metres)?;
+    let area = Area::of(sources, config, metres)?;
     let metres_z = crs.vertical.unwrap_or(metres);
     let wanted = config.input.resolution.0;
-    let lattice = choose::lattice(&sources, &area, [metres, metres_z], wanted, coarser, &mut warnings)?;
+    let lattice = choose::lattice(sources, &area, [metres, metres_z], wanted, coarser, &mut warnings)?;
     if metres_z != metres {
         warnings.push(format!(
             "heights are in another unit than x and y ({metres_z} m and {metres} m): glTF has both in metres, see metres_per_unit_z"
@@ -70,13 +117,26 @@ pub fn run(config: &Config, coarser: Coarser) -> Result<Plan> {
     let frame = Frame::new(&lattice, metres, metres_z, crs.wkt.clone())?;
     let bounds = config.input.bounds.map(|b| lattice_bounds(&lattice, b.0));
     let extent = extent_of(&lattice, &area, bounds);
-    let sources = with_rules(sources, config, &lattice, bounds)?;
-    Ok(Plan { sources, records, lattice, extent, crs, unit, frame, warnings })
+    let rules = rules(sources, config, &lattice, bounds)?;
+    let (sources, skipped) = (Vec::new(), Vec::new());
+    Ok((Plan { sources, records, lattice, extent, crs, unit, frame, warnings, skipped }, rules))
 }
 
-fn open_all(config: &Config) -> Result<Vec<Source>> {
+/// Opens all inputs; those that are bad apart if they are to be left out.
+fn open_all(config: &Config) -> Result<(Vec<Source>, Vec<Skipped>)> {
     let paths = expand(&config.input.files)?;
-    paths.par_iter().map(|path| input::open(path, &config.input.csv)).collect()
+    let opened: Vec<Result<Source>> = paths.par_iter().map(|path| input::open(path, &config.input.csv)).collect();
+    let (mut sources, mut skipped) = (Vec::with_capacity(opened.len()), Vec::new());
+    for source in opened {
+        match source {
+            Err(Error::Input { path, what }) if config.input.on_bad_file == OnBadFile::Skip => {
+                skipped.push(Skipped { file: path, why: what });
+            }
+            // What the system cannot read may be sound: leaving it out is not for this program to decide.
+            source => sources.push(source?),
+        }
+    }
+    Ok((sources, skipped))
 }
 
 /// Patterns find only names in UTF-8: says what else lies beside what they find.
@@ -100,11 +160,19 @@ fn shorten(warnings: &mut Vec<String>) {
     }
 }
 
-/// Stops before the first point if files lack more records than are put up with.
-fn enough_is_there(sources: &[Source], records: u64, malformed_share: f64) -> Result<()> {
-    let missing: u64 = sources.iter().map(|s| s.missing).sum();
-    match sources.iter().find(|s| s.missing > 0) {
-        Some(first) if missing as f64 > malformed_share * records as f64 => Err(Error::input(
+/// Stops before the first point if files lack more records than are put up with: all together, or where bad ones are left
+/// out, each by itself.
+fn enough_is_there(sources: &[Source], records: u64, config: &Config) -> Result<()> {
+    let is_too_much = |missing: u64, records: u64| missing as f64 > config.input.malformed_share.0 * records as f64;
+    let lacking = match config.input.on_bad_file {
+        OnBadFile::Skip => sources.iter().find(|s| is_too_much(s.missing, s.records)),
+        OnBadFile::Stop if is_too_much(sources.iter().map(|s| s.missing).sum(), records) => {
+            sources.iter().find(|s| s.missing > 0)
+        }
+        OnBadFile::Stop => None,
+    };
+    match lacking {
+        Some(first) => Err(Error::input(
             &first.path,
             format!(
                 "says that it holds {} records, but {} of them are not there: the file is cut off or its header is wrong. Copy it \
@@ -112,7 +180,7 @@ fn enough_is_there(sources: &[Source], records: u64, malformed_share: f64) -> Re
                 first.records, first.missing
             ),
         )),
-        _ => Ok(()),
+        None => Ok(()),
     }
 }
 
@@ -220,22 +288,16 @@ fn extent_of(lattice: &Lattice, area: &Area, bounds: Option<[i32; 4]>) -> [Site;
     extent
 }
 
-fn with_rules(
-    sources: Vec<Source>,
-    config: &Config,
-    lattice: &Lattice,
-    bounds: Option<[i32; 4]>,
-) -> Result<Vec<(Source, Rules)>> {
+fn rules(sources: &[Source], config: &Config, lattice: &Lattice, bounds: Option<[i32; 4]>) -> Result<Vec<Rules>> {
     let rgb = matches!(config.output.color, crate::config::ColorChoice::Auto | crate::config::ColorChoice::Rgb);
     let mut first_order = 0;
-    let mut ruled = Vec::with_capacity(sources.len());
+    let mut rules = Vec::with_capacity(sources.len());
     for source in sources {
-        let maps = [axis_map(&source, 0, lattice)?, axis_map(&source, 1, lattice)?, axis_map(&source, 2, lattice)?];
-        let rules = Rules { maps, classes: config.kept_classes(), bounds, first_order, rgb };
+        let maps = [axis_map(source, 0, lattice)?, axis_map(source, 1, lattice)?, axis_map(source, 2, lattice)?];
+        rules.push(Rules { maps, classes: config.kept_classes(), bounds, first_order, rgb });
         first_order += source.records;
-        ruled.push((source, rules));
     }
-    Ok(ruled)
+    Ok(rules)
 }
 
 fn axis_map(source: &Source, axis: usize, lattice: &Lattice) -> Result<AxisMap> {

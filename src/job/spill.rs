@@ -5,6 +5,7 @@ use crate::positioned::{read_exact_at, write_all_at};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -71,6 +72,30 @@ impl Spill {
         let at = block.first * size_of::<Point>() as u64;
         let bytes = bytemuck::cast_slice_mut(&mut into[start..]);
         read_exact_at(&self.file, bytes, at).map_err(Error::io("read", &self.path))
+    }
+
+    /// Takes the points whose numbers in the job lie in one of `orders`, which ascend, out of `bucket`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if its blocks cannot be read, or those with fewer points cannot be written.
+    pub fn sift(&self, bucket: &mut Bucket, orders: &[Range<u64>]) -> Result<()> {
+        let is_wanted = |point: &Point| {
+            let order = point.order();
+            let after = orders.partition_point(|range| range.start <= order);
+            after == 0 || orders[after - 1].end <= order
+        };
+        let mut points = Vec::new();
+        for block in &mut bucket.blocks {
+            points.clear();
+            self.read(*block, &mut points)?;
+            points.retain(is_wanted);
+            if points.len() < block.points as usize {
+                *block = self.append(&points)?;
+            }
+        }
+        bucket.blocks.retain(|block| block.points > 0);
+        bucket.points = bucket.blocks.iter().map(|block| block.points as u64).sum();
+        Ok(())
     }
 }
 
@@ -156,5 +181,28 @@ impl<'a> Buckets<'a> {
             buckets.push(std::mem::take(&mut open.bucket));
         }
         Ok(buckets)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sifting_takes_out_the_points_of_a_range_of_records_and_no_others() {
+        let folder = tempfile::tempdir().unwrap();
+        let spill = Spill::create(&folder.path().join("points.spill")).unwrap();
+        let buckets = Buckets::new(&spill, 1, 0);
+        let points: Vec<Point> = (0..1000).map(|i| Point::new([i as i32, 0], 0, [0; 3], 0, i)).collect();
+        buckets.extend(0, &points).unwrap();
+        let mut bucket = buckets.finish().unwrap().remove(0);
+        spill.sift(&mut bucket, &[0..1, 64..64, 100..300, 999..2000]).unwrap();
+        let mut left = Vec::new();
+        bucket.blocks.iter().for_each(|&block| spill.read(block, &mut left).unwrap());
+        let orders: Vec<u64> = left.iter().map(Point::order).collect();
+        assert_eq!(orders, (1..100).chain(300..999).collect::<Vec<u64>>());
+        assert_eq!(bucket.points, 798);
+        spill.sift(&mut bucket, &[0..500, 500..1000]).unwrap();
+        assert_eq!(bucket, Bucket::default());
     }
 }

@@ -1,21 +1,25 @@
 //! Step 5 of a job, by tile: finish the normals of the tile's frontier with the triangles of the seams above it, so that
-//! every tile that shares a vertex writes the same normal.
+//! every tile that shares a vertex writes the same normal. Triangles that are left out of the terrain count for nothing.
 
-use super::records::{Frontier, Rim, RimDraft, RimVertex, RimVertices, Seam, SeamTriangle};
+use super::export::Look;
+use super::records::{Frontier, Leaf, Rim, RimDraft, RimVertex, RimVertices, Seam, SeamTriangle};
 use super::store::Store;
 use super::tree::Tree;
-use crate::output::frame::Frame;
-use crate::output::normals;
+use crate::output::normals::{self, NormalSum, Sums};
 use crate::{Error, Result};
 
 /// Leaves the finished frontier of `tile` in the store.
 ///
 /// # Errors
 /// [`crate::Error::Io`] or [`crate::Error::Broken`] on the store.
-pub fn run(store: &Store, tree: &Tree, tile: usize, frame: &Frame) -> Result<()> {
+pub fn run(store: &Store, tree: &Tree, tile: usize, look: &Look) -> Result<()> {
     let frontier = Frontier::load(store, tree.leaves[tile])?;
     let RimDraft { mut sums, rgb, class } = RimDraft::load(store, tile)?;
-    for [a, b, c] in seam_of(store, tree, tile)? {
+    if !look.cut.is_nothing() {
+        sums = sums_of_written(store, tile, &frontier, look)?;
+    }
+    let written = |t: &SeamTriangle| !look.cut.leaves_out(t.map(|corner| corner.position));
+    for [a, b, c] in seam_of(store, tree, tile)?.into_iter().filter(written) {
         let normal = normals::cross(a.position, b.position, c.position);
         for corner in [a, b, c].iter().filter(|corner| corner.tile as usize == tile) {
             let at = frontier.sites.binary_search(corner);
@@ -25,11 +29,19 @@ pub fn run(store: &Store, tree: &Tree, tile: usize, frame: &Frame) -> Result<()>
     }
     let finish = |(at, rim): (usize, &Rim)| RimVertex {
         site: rim.site,
-        normal: normals::finish(sums[at], frame),
+        normal: normals::finish(sums[at], &look.frame),
         rgb: rgb[at],
         class: class[at] as u16,
     };
     RimVertices(frontier.sites.iter().enumerate().map(finish).collect()).save(store, tile)
+}
+
+/// The sums over only those of the leaf's triangles that are written.
+fn sums_of_written(store: &Store, tile: usize, frontier: &Frontier, look: &Look) -> Result<Vec<NormalSum>> {
+    let Leaf { positions, mut triangles, .. } = Leaf::load(store, tile)?;
+    look.cut.take(&positions, &mut triangles);
+    let sums = Sums::new(&positions, &triangles);
+    Ok(frontier.sites.iter().map(|rim| sums.get(rim.site as usize)).collect())
 }
 
 /// All triangles of the seams that touch `tile`.

@@ -27,6 +27,17 @@ const REFINEMENT: f64 = 64.0;
 /// Metres.
 const FINE_STEP: f64 = 1.0 / 4096.0;
 
+/// Steps for 16-bit positions are at most this part of the lattice step: rounding to them moves a site by up to 0.49 of
+/// a lattice step, and rounding back finds it.
+const PACKED_RATIO: f64 = 0.98;
+
+/// Steps that a 16-bit position reaches from its origin.
+const SHORT_REACH: f64 = 65535.0;
+
+/// Origins of meshes with 16-bit positions are multiples of this many steps. With at most 4 steps to a lattice step, steps
+/// from the scene's origin stay below 2^33, so that the translation is exact as f32.
+const SHORT_GRID: f64 = 512.0;
+
 /// Lattice steps in metres beyond these bounds are no terrain and would leave the range of f32.
 const RESOLUTION_BOUNDS: std::ops::Range<f64> = 1e-12..1e12;
 
@@ -79,6 +90,14 @@ impl Scale {
     /// The largest step of at most half of `resolution` metres.
     fn coarsest(resolution: f64) -> Scale {
         let step = (resolution / 2.0).log2().floor().exp2();
+        Scale { step, ratio: resolution / step }
+    }
+
+    /// The largest step from which rounding still leads back, for `resolution` metres.
+    fn packed(resolution: f64) -> Scale {
+        let step = (resolution * PACKED_RATIO).log2().floor().exp2();
+        // A resolution that is a power of two is met exactly.
+        let step = if resolution.log2().fract() == 0.0 { resolution } else { step };
         Scale { step, ratio: resolution / step }
     }
 
@@ -135,6 +154,13 @@ impl Frame {
         Frame { horizontal: self.horizontal.refined(dx.max(dy)), vertical: self.vertical.refined(dz), ..self }
     }
 
+    /// The frame with the coarsest steps from which the lattice can be told, so that positions take 16 bits. All tiles of a
+    /// job need the same frame.
+    pub fn packed(self) -> Frame {
+        let [xy, up] = self.resolution_metres();
+        Frame { horizontal: Scale::packed(xy), vertical: Scale::packed(up), ..self }
+    }
+
     /// What is written for readers.
     pub fn extras(&self) -> &Extras {
         &self.extras
@@ -173,6 +199,23 @@ impl Frame {
         [((x - origin[0]) * xy) as f32, ((y - origin[1]) * up) as f32, ((z - origin[2]) * xy) as f32]
     }
 
+    /// The glTF coordinates of a lattice point relative to an origin in whole steps; exact within [`PART_REACH`] of it.
+    #[inline(always)]
+    pub(super) fn local_steps(&self, point: [i32; 3], origin: [f64; 3]) -> [f64; 3] {
+        let steps = self.steps(point);
+        [0, 1, 2].map(|k| steps[k] - origin[k])
+    }
+
+    /// Metres in a step along the glTF axes.
+    pub(super) fn step(&self) -> [f64; 3] {
+        self.metres([1.0; 3])
+    }
+
+    /// Metres in a vertical step over metres in a horizontal one.
+    pub(super) fn anisotropy(&self) -> f32 {
+        (self.vertical.step / self.horizontal.step) as f32
+    }
+
     /// The glTF world position in metres of a lattice point, exactly as every tile has it.
     pub fn world(&self, point: [i32; 3]) -> [f64; 3] {
         self.metres(self.steps(point))
@@ -197,6 +240,15 @@ impl Frame {
 pub(super) fn origin_between(low: [f64; 3], high: [f64; 3], grid: i64) -> [f64; 3] {
     [0, 1, 2].map(|k| (nearest((low[k] + high[k]) * 0.5 / grid as f64)) * grid as f64 + 0.0)
 }
+
+/// The origin from which 16-bit positions reach all of what lies between `low` and `high`, in steps, if there is one.
+pub(super) fn short_origin(low: [f64; 3], high: [f64; 3]) -> Option<[f64; 3]> {
+    let origin = low.map(|v| (v / SHORT_GRID).floor() * SHORT_GRID + 0.0);
+    (0..3).all(|k| high[k] - origin[k] <= SHORT_REACH).then_some(origin)
+}
+
+/// The extent in steps that always has a [`short_origin`].
+pub(super) const SHORT_EXTENT: f64 = SHORT_REACH - SHORT_GRID + 1.0;
 
 /// The finest grid for [`origin_between`].
 pub(super) const FINE_GRID: i64 = TRANSLATION_STEPS;

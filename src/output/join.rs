@@ -39,8 +39,7 @@ fn number(frame: &Frame, part: &Part, v: usize, vertex_of: &mut VertexOf, joined
     if number == next {
         joined.positions.push(point);
         if let (Some(normals), Some(theirs)) = (&mut joined.normals, &part.normals) {
-            let [x, up, z] = theirs[v];
-            normals.push([x, 0.0 - z, up]);
+            normals.push(normal(theirs[v], part.scale));
         }
         if let (Some(colors), Some(theirs)) = (&mut joined.colors, &part.colors) {
             let [red, green, blue, _] = theirs[v];
@@ -48,6 +47,13 @@ fn number(frame: &Frame, part: &Part, v: usize, vertex_of: &mut VertexOf, joined
         }
     }
     Ok(number)
+}
+
+/// The unit normal x east, y north, z up of one in a mesh that its node stretches by `scale`.
+fn normal(theirs: [f32; 3], scale: [f64; 3]) -> [f32; 3] {
+    let [x, up, z] = [0, 1, 2].map(|k| theirs[k] as f64 / scale[k]);
+    let length = (x * x + up * up + z * z).sqrt();
+    if length > 0.0 { [x / length, -z / length, up / length].map(|v| v as f32) } else { [0.0, 0.0, 1.0] }
 }
 
 /// Multiplies: the sites of a mesh need to be spread, not protected.

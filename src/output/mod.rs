@@ -3,13 +3,18 @@
 //! [`frame::Frame`] says where a lattice point lies in a glTF scene; everything that writes or reads positions asks it.
 
 pub mod color;
+mod container;
 pub mod deviation;
+mod document;
+pub mod encoding;
 pub mod frame;
 pub mod georeference;
 pub mod glb;
 pub mod globe;
 pub mod join;
 pub mod normals;
+mod order;
+mod packed;
 mod parts;
 pub mod picture;
 pub mod preview;
@@ -19,4 +24,5 @@ pub mod terrain;
 mod tile;
 pub mod tileset;
 
+pub use encoding::Compression;
 pub use tile::Tile;

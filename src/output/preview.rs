@@ -79,13 +79,18 @@ impl Canvas {
 
     /// The pixels whose centres the triangles of `tile` cover.
     pub fn draw(&self, tile: &Tile) -> Fragment {
-        let cells: Vec<[u16; 2]> = tile.positions.iter().map(|&p| self.cell(p)).collect();
+        let pixels = 1.0 / self.pitch as f64;
+        let cells: Vec<u32> = tile.positions.iter().map(|&p| self.cell(p, pixels)).collect();
         let mut fragment = Fragment::new();
         for &triangle in &tile.triangles {
-            let [a, b, c] = triangle.map(|v| cells[v as usize]);
-            let between = |k: usize| [a[k].min(b[k]).min(c[k]) as i64, a[k].max(b[k]).max(c[k]) as i64];
-            let (columns, rows) = (between(0), between(1));
-            if columns[0] < columns[1] && rows[0] < rows[1] {
+            let corners = triangle.map(|v| cells[v as usize]);
+            // Most triangles lie between two rows or columns of centres.
+            let differs = (corners[0] ^ corners[1]) | (corners[0] ^ corners[2]);
+            if differs & 0xffff != 0 && differs >> 16 != 0 {
+                let [columns, rows] = [0, 16].map(|shift| {
+                    let at = corners.map(|cell| (cell >> shift & 0xffff) as i64);
+                    [at[0].min(at[1]).min(at[2]), at[0].max(at[1]).max(at[2])]
+                });
                 Drawing::new(self, tile, triangle).draw(columns, rows, &mut fragment);
             }
         }
@@ -97,11 +102,17 @@ impl Canvas {
         [(point[0] as i64 - self.corner[0]) << self.shift, (self.corner[1] - point[1] as i64) << self.shift]
     }
 
-    /// How many pixel centres lie left of a point, and above it.
-    fn cell(&self, point: [i32; 3]) -> [u16; 2] {
-        // Below 2^32, and a 32-bit division is the faster one.
-        let centers = |v: i64| ((v + self.pitch - 1 - self.center) as u32 / self.pitch as u32) as u16;
-        self.place(point).map(centers)
+    /// How many pixel centres lie left of a point (low half), and above it (high half). `pixels` is 1 by the pitch.
+    fn cell(&self, point: [i32; 3], pixels: f64) -> u32 {
+        let centers = |v: i64| {
+            let beyond = v + self.pitch - 1 - self.center;
+            // A division, by a product that is off by one at the most.
+            let near = (beyond as f64 * pixels) as i64;
+            let rest = beyond - near * self.pitch;
+            (near - (rest < 0) as i64 + (rest >= self.pitch) as i64) as u32
+        };
+        let [column, row] = self.place(point).map(centers);
+        row << 16 | column
     }
 
     /// The middle of a column or row in subdivisions; odd.
@@ -114,8 +125,7 @@ impl Canvas {
 struct Drawing<'a> {
     canvas: &'a Canvas,
     tile: &'a Tile,
-    /// Vertices, clockwise seen from above (counterclockwise where y goes down), the least in (x, y) first, so that what
-    /// is interpolated does not depend on how a file turns the triangle.
+    /// Vertices, clockwise seen from above: counterclockwise where y goes down.
     corners: [u32; 3],
     places: [[i64; 2]; 3],
 }
@@ -123,28 +133,28 @@ struct Drawing<'a> {
 impl<'a> Drawing<'a> {
     fn new(canvas: &'a Canvas, tile: &'a Tile, triangle: [u32; 3]) -> Drawing<'a> {
         let [a, b, c] = triangle;
-        let site = |v: u32| tile.positions[v as usize];
-        let corners = [[a, c, b], [c, b, a], [b, a, c]].into_iter().min_by_key(|t| site(t[0])).unwrap_or([a, c, b]);
-        Drawing { canvas, tile, corners, places: corners.map(|v| canvas.place(site(v))) }
+        let corners = [a, c, b];
+        Drawing { canvas, tile, corners, places: corners.map(|v| canvas.place(tile.positions[v as usize])) }
     }
 
     fn draw(&self, columns: [i64; 2], rows: [i64; 2], fragment: &mut Fragment) {
-        let face = self.tile.normals.is_none().then(|| {
-            let [a, c, b] = self.corners.map(|v| self.tile.positions[v as usize]);
-            finish(cross(a, b, c), &self.canvas.frame)
-        });
         for row in rows[0]..rows[1] {
             let (edges, [first, last]) = self.covered(columns, row);
             for column in first..last {
                 let weights = edges.map(|(value, step)| value.wrapping_add((column - columns[0]).wrapping_mul(step)));
-                fragment.push(Texel {
-                    pixel: row as u32 * self.canvas.width + column as u32,
-                    slope: self.slope(face, weights),
-                    color: self.color(weights),
-                    unused: 0,
-                });
+                fragment.push(self.texel(row as u32 * self.canvas.width + column as u32, weights));
             }
         }
+    }
+
+    fn texel(&self, pixel: u32, mut weights: [i64; 3]) -> Texel {
+        // From the corner least in (x, y) on, so that what is interpolated does not depend on how a file turns the triangle.
+        let mut corners = self.corners;
+        let turn = (0..3).min_by_key(|&k| self.tile.positions[corners[k] as usize]).unwrap_or(0);
+        corners.rotate_left(turn);
+        weights.rotate_left(turn);
+        let shading = Shading { canvas: self.canvas, tile: self.tile, corners, weights };
+        Texel { pixel, slope: shading.slope(), color: shading.color(), unused: 0 }
     }
 
     /// For the edge opposite every corner its function at the first column and what a column adds; and the columns of
@@ -167,28 +177,41 @@ impl<'a> Drawing<'a> {
         });
         (edges, range)
     }
+}
 
-    fn slope(&self, face: Option<[f32; 3]>, weights: [i64; 3]) -> [i16; 2] {
-        let normal = match (&self.tile.normals, face) {
-            (Some(normals), _) => self.interpolate(weights, |v| normals[v].map(f64::from)),
-            (None, face) => face.unwrap_or([0.0, 0.0, 1.0]).map(f64::from),
+/// A point of a triangle, by the areas opposite its corners.
+struct Shading<'a> {
+    canvas: &'a Canvas,
+    tile: &'a Tile,
+    corners: [u32; 3],
+    weights: [i64; 3],
+}
+
+impl Shading<'_> {
+    fn slope(&self) -> [i16; 2] {
+        let normal = match &self.tile.normals {
+            Some(normals) => self.interpolate(|v| normals[v].map(f64::from)),
+            None => {
+                let [a, c, b] = self.corners.map(|v| self.tile.positions[v as usize]);
+                finish(cross(a, b, c), &self.canvas.frame).map(f64::from)
+            }
         };
         let length = normal.iter().map(|v| v * v).sum::<f64>().sqrt();
         [0, 1].map(|k| (normal[k] / length * 32767.0) as i16)
     }
 
-    fn color(&self, weights: [i64; 3]) -> [u8; 3] {
+    fn color(&self) -> [u8; 3] {
         let [low, high] = self.canvas.heights;
-        let linear = self.interpolate(weights, |v| match &self.tile.colors {
+        let linear = self.interpolate(|v| match &self.tile.colors {
             Some(colors) => colors[v].map(f64::from),
             None => elevation(self.tile.positions[v][2], low, high).map(f64::from),
         });
         linear.map(|v| to_srgb((v + 0.5) as u16))
     }
 
-    /// The mean of what the corners have, by the areas opposite them.
-    fn interpolate(&self, weights: [i64; 3], value: impl Fn(usize) -> [f64; 3]) -> [f64; 3] {
-        let weights = weights.map(|w| w as f64);
+    /// The mean of what the corners have.
+    fn interpolate(&self, value: impl Fn(usize) -> [f64; 3]) -> [f64; 3] {
+        let weights = self.weights.map(|w| w as f64);
         let total: f64 = weights.iter().sum();
         let [a, b, c] = self.corners.map(|v| value(v as usize));
         [0, 1, 2].map(|k| (a[k] * weights[0] + b[k] * weights[1] + c[k] * weights[2]) / total)
@@ -197,7 +220,10 @@ impl<'a> Drawing<'a> {
 
 /// Leaves those columns of `range` where `value + step * (column - first)` is at least `least`.
 fn narrow(range: &mut [i64; 2], first: i64, value: i64, step: i64, least: i64) {
-    if step > 0 && value < least {
+    if range[1] - first == 1 {
+        // Most triangles that are drawn span one column: no division.
+        range[1] -= (value < least) as i64;
+    } else if step > 0 && value < least {
         range[0] = range[0].max(first + (least - value + step - 1) / step);
     } else if step <= 0 && value < least {
         range[1] = range[0];

@@ -1,15 +1,16 @@
 //! Reads tiles back as any reader of glTF would, trusting nothing: a damaged or hostile file gives an error that says
 //! what is wrong with it, and never takes more memory than a few times its size.
 
-use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
+use std::borrow::Cow;
 use std::path::Path;
 
 use bytemuck::{AnyBitPattern, NoUninit, allocation::pod_collect_to_vec};
 use serde::Deserialize;
 
+use super::container::Container;
+use super::document::{FLOAT, SIGNED_BYTE, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT};
 use super::frame::Extras;
-use super::glb::{BIN_CHUNK, FLOAT, JSON_CHUNK, MAGIC, UNSIGNED_INT, UNSIGNED_SHORT, VERSION};
+use super::packed::{MOST_EXPANSION, Packed};
 use crate::{Error, Result};
 
 /// A GLB file of this program, as it is on disk.
@@ -26,11 +27,13 @@ pub struct TileFile {
 pub struct Part {
     /// Metres.
     pub translation: [f64; 3],
-    /// Metres (x, y up, z) from the translation; finite.
+    /// Metres in a unit of the positions.
+    pub scale: [f64; 3],
+    /// From the translation (x, y up, z) in units of the scale; finite.
     pub positions: Vec<[f32; 3]>,
-    /// As many as positions.
+    /// As many as positions; a viewer divides them by the scale and makes them unit vectors.
     pub normals: Option<Vec<[f32; 3]>>,
-    /// As many as positions; linear red, green, blue and alpha.
+    /// As many as positions; linear red, green, blue and alpha, 65535 for 1.
     pub colors: Option<Vec<[u16; 4]>>,
     /// Indices of positions, within range.
     pub triangles: Vec<[u32; 3]>,
@@ -41,7 +44,7 @@ impl Part {
     #[inline(always)]
     pub fn world(&self, v: usize) -> [f64; 3] {
         let (position, translation) = (self.positions[v], self.translation);
-        [0, 1, 2].map(|k| translation[k] + position[k] as f64)
+        [0, 1, 2].map(|k| translation[k] + self.scale[k] * position[k] as f64)
     }
 }
 
@@ -49,16 +52,18 @@ impl Part {
 pub fn read_tile(path: &Path) -> Result<TileFile> {
     let mut container = Container::open(path)?;
     let document: Document = container.document(path)?;
-    let mut binary = Vec::new();
-    binary
-        .try_reserve_exact(container.binary_length as usize)
-        .map_err(|_| Error::Memory(format!("{} needs {} bytes to read", path.display(), container.binary_length)))?;
-    container.binary().read_to_end(&mut binary).map_err(Error::io("read", path))?;
-    if binary.len() as u64 != container.binary_length {
-        return Err(Error::input(path, "ends inside its binary chunk"));
-    }
+    let binary = container.binary(path)?;
     let mut decoder = Decoder { document: &document, binary: &binary, used: 0 };
     decoder.tile().map_err(|what| Error::input(path, format!("not a tile of this program: {what}")))
+}
+
+/// Bytes that the parts of the GLB file at `path` take in memory at most, as far as its description says.
+pub fn held_bytes(path: &Path) -> Result<u64> {
+    let container = Container::open(path)?;
+    let document: Document = container.document(path)?;
+    let size = |accessor: &Accessor| accessor.count.saturating_mul(if accessor.kind == "SCALAR" { 4 } else { 12 });
+    let said = document.accessors.iter().map(size).fold(0, u64::saturating_add);
+    Ok(said.min(container.binary_length.saturating_mul(MOST_EXPANSION)))
 }
 
 /// The georeference alone of the GLB file at `path`.
@@ -69,68 +74,6 @@ pub fn read_extras(path: &Path) -> Result<Extras> {
         return Ok(document.scenes.swap_remove(document.scene).extras);
     }
     Err(Error::input(path, "not a tile of this program: there is no scene"))
-}
-
-/// The two chunks of a GLB file.
-pub(super) struct Container {
-    file: File,
-    json: Vec<u8>,
-    binary_start: u64,
-    /// Bytes in the binary chunk.
-    pub(super) binary_length: u64,
-}
-
-impl Container {
-    /// Reads all but the binary chunk and checks the lengths against the file's size.
-    pub(super) fn open(path: &Path) -> Result<Container> {
-        let mut file = File::open(path).map_err(Error::io("open", path))?;
-        let size = file.metadata().map_err(Error::io("read", path))?.len();
-        let damaged = |what: &str| Error::input(path, format!("not a whole GLB file: {what}"));
-        if size < 20 {
-            return Err(damaged("shorter than its header"));
-        }
-        let [magic, version, total, json_length, json_kind] = read_words(&mut file).map_err(Error::io("read", path))?;
-        if magic != MAGIC || version != VERSION || json_kind != JSON_CHUNK {
-            return Err(damaged("it does not start as glTF 2.0"));
-        }
-        if total as u64 != size {
-            return Err(damaged(&format!("its header says {total} bytes, it has {size}")));
-        }
-        let json_end = 20 + json_length as u64;
-        if json_end > size {
-            return Err(damaged("its JSON chunk goes past the end"));
-        }
-        let mut json = vec![0; json_length as usize];
-        file.read_exact(&mut json).map_err(Error::io("read", path))?;
-        let mut container = Container { file, json, binary_start: json_end + 8, binary_length: 0 };
-        if json_end + 8 <= size {
-            let [length, kind] = read_words(&mut container.file).map_err(Error::io("read", path))?;
-            if kind != BIN_CHUNK || container.binary_start + length as u64 != size {
-                return Err(damaged("its second chunk is not binary data up to the end"));
-            }
-            container.binary_length = length as u64;
-        }
-        Ok(container)
-    }
-
-    /// The JSON chunk as a `T`.
-    pub(super) fn document<'a, T: Deserialize<'a>>(&'a self, path: &Path) -> Result<T> {
-        serde_json::from_slice(&self.json)
-            .map_err(|e| Error::input(path, format!("its JSON chunk is not one of this program: {e}")))
-    }
-
-    /// The binary chunk from its start.
-    pub(super) fn binary(&mut self) -> impl Read {
-        // A seek that fails shows as an empty chunk, whose length is then found wrong.
-        let length = self.file.seek(SeekFrom::Start(self.binary_start)).map_or(0, |_| self.binary_length);
-        (&mut self.file).take(length)
-    }
-}
-
-fn read_words<const N: usize>(file: &mut File) -> std::io::Result<[u32; N]> {
-    let mut words = [[0u8; 4]; N];
-    file.read_exact(words.as_flattened_mut())?;
-    Ok(words.map(u32::from_le_bytes))
 }
 
 #[derive(Deserialize)]
@@ -166,6 +109,12 @@ struct Node {
     mesh: usize,
     #[serde(default)]
     translation: [f64; 3],
+    #[serde(default = "unscaled")]
+    scale: [f64; 3],
+}
+
+fn unscaled() -> [f64; 3] {
+    [1.0; 3]
 }
 
 #[derive(Deserialize)]
@@ -212,13 +161,22 @@ struct Accessor {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "camelCase")]
 struct View {
-    #[serde(rename = "buffer")]
-    _buffer: usize,
+    buffer: usize,
     #[serde(default)]
     byte_offset: u64,
     byte_length: u64,
+    byte_stride: Option<u64>,
     #[serde(rename = "target")]
     _target: Option<u64>,
+    #[serde(default)]
+    extensions: Extensions,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Extensions {
+    #[serde(rename = "EXT_meshopt_compression")]
+    packed: Option<Packed>,
 }
 
 type Decoded<T> = std::result::Result<T, String>;
@@ -243,7 +201,7 @@ impl Decoder<'_> {
         let [Primitive { attributes, indices, .. }] = &mesh.primitives[..] else {
             return Err(format!("mesh {} does not have one primitive", node.mesh));
         };
-        let positions: Vec<[f32; 3]> = self.elements(attributes.position, FLOAT, "VEC3")?;
+        let positions = self.positions(attributes.position)?;
         if !positions.as_flattened().iter().chain(&[0.0]).all(|v| v.is_finite()) {
             return Err("a position is not a finite number".into());
         }
@@ -251,12 +209,40 @@ impl Decoder<'_> {
             true => Ok(()),
             false => Err(format!("{} positions, but {count} {name}", positions.len())),
         };
-        let normals: Option<Vec<_>> = attributes.normal.map(|n| self.elements(n, FLOAT, "VEC3")).transpose()?;
-        let colors: Option<Vec<_>> = attributes.color.map(|c| self.elements(c, UNSIGNED_SHORT, "VEC4")).transpose()?;
+        let normals = attributes.normal.map(|n| self.normals(n)).transpose()?;
+        let colors = attributes.color.map(|c| self.colors(c)).transpose()?;
         normals.as_ref().map_or(Ok(()), |n| same_count(n.len(), "normals"))?;
         colors.as_ref().map_or(Ok(()), |c| same_count(c.len(), "colours"))?;
         let triangles = self.triangles(*indices, positions.len())?;
-        Ok(Part { translation: node.translation, positions, normals, colors, triangles })
+        Ok(Part { translation: node.translation, scale: node.scale, positions, normals, colors, triangles })
+    }
+
+    fn positions(&mut self, accessor: usize) -> Decoded<Vec<[f32; 3]>> {
+        if self.component(accessor)? == FLOAT {
+            return self.elements(accessor, FLOAT, "VEC3");
+        }
+        let short: Vec<[u16; 4]> = self.elements(accessor, UNSIGNED_SHORT, "VEC3")?;
+        Ok(short.into_iter().map(|[x, y, z, _]| [x, y, z].map(f32::from)).collect())
+    }
+
+    fn normals(&mut self, accessor: usize) -> Decoded<Vec<[f32; 3]>> {
+        if self.component(accessor)? == FLOAT {
+            return self.elements(accessor, FLOAT, "VEC3");
+        }
+        let bytes: Vec<[i8; 4]> = self.elements(accessor, SIGNED_BYTE, "VEC3")?;
+        Ok(bytes.into_iter().map(|[x, y, z, _]| [x, y, z].map(|v| f32::from(v) / 127.0)).collect())
+    }
+
+    fn colors(&mut self, accessor: usize) -> Decoded<Vec<[u16; 4]>> {
+        if self.component(accessor)? == UNSIGNED_SHORT {
+            return self.elements(accessor, UNSIGNED_SHORT, "VEC4");
+        }
+        let bytes: Vec<[u8; 4]> = self.elements(accessor, UNSIGNED_BYTE, "VEC4")?;
+        Ok(bytes.into_iter().map(|c| c.map(|v| u16::from(v) * 257)).collect())
+    }
+
+    fn component(&self, accessor: usize) -> Decoded<u64> {
+        Ok(item(&self.document.accessors, accessor, "accessor")?.component_type)
     }
 
     fn triangles(&mut self, indices: usize, vertices: usize) -> Decoded<Vec<[u32; 3]>> {
@@ -293,15 +279,33 @@ impl Decoder<'_> {
             ));
         }
         let view = item(&self.document.buffer_views, accessor.buffer_view, "buffer view")?;
-        let length = accessor.count.checked_mul(size_of::<T>() as u64).filter(|&length| length <= view.byte_length);
-        let end = length.and_then(|length| view.byte_offset.checked_add(length));
-        let range = end.and_then(|end| self.binary.get(view.byte_offset as usize..usize::try_from(end).ok()?));
-        let bytes = range.ok_or_else(|| format!("accessor {number} goes past the end of the data"))?;
+        let size = size_of::<T>() as u64;
+        if view.byte_stride.is_some_and(|stride| stride != size) {
+            return Err(format!("accessor {number} is not {size} bytes an element"));
+        }
+        let bytes = self.bytes(view)?;
+        let length = accessor.count.checked_mul(size).and_then(|length| usize::try_from(length).ok());
+        let bytes = length.and_then(|length| bytes.get(..length));
+        Ok(pod_collect_to_vec(bytes.ok_or_else(|| format!("accessor {number} goes past the end of the data"))?))
+    }
+
+    /// What a view shows.
+    fn bytes(&mut self, view: &View) -> Decoded<Cow<'_, [u8]>> {
+        let (buffer, start, length) = match &view.extensions.packed {
+            Some(packed) => (packed.buffer, packed.byte_offset, packed.byte_length),
+            None => (view.buffer, view.byte_offset, view.byte_length),
+        };
+        let end = start.checked_add(length).and_then(|end| usize::try_from(end).ok());
+        let range = end.and_then(|end| self.binary.get(start as usize..end)).filter(|_| buffer == 0);
+        let bytes = range.ok_or("a buffer view goes past the end of the data")?;
         self.used += bytes.len();
         if self.used > self.binary.len() {
             return Err("the same data are used more than once".into());
         }
-        Ok(pod_collect_to_vec(bytes))
+        match &view.extensions.packed {
+            Some(packed) => packed.unpack(bytes).map(Cow::Owned),
+            None => Ok(Cow::Borrowed(bytes)),
+        }
     }
 }
 

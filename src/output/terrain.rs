@@ -1,17 +1,22 @@
-//! Joins tile files into one scene, for viewers that open a single file.
+//! Joins tile files into one scene, for viewers that open a single file. What `EXT_meshopt_compression` packs is unpacked,
+//! for not all of them know it.
 
+use std::borrow::Cow;
 use std::fs::File;
-use std::io::{BufWriter, Write, copy};
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
+use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::glb::{GENERATOR, write_container};
-use super::read::Container;
+use super::container::Container;
+use super::document::{GENERATOR, MESHOPT, QUANTIZATION};
+use super::glb::write_container;
+use super::packed::Packed;
 use crate::{Error, Result};
 
 /// Writes to `out` one GLB file with all tiles (GLB files of one job, at least one) as nodes of one scene, in this order.
-/// Only the JSON chunks are held in memory. The file appears under its name when it is whole.
+/// One tile is held in memory at a time, and a description of every other. The file appears under its name when it is whole.
 ///
 /// Fails where the file would pass the 4 GiB that a GLB file can have, or a tile is damaged.
 pub fn write_terrain(out: &Path, tiles: &[PathBuf]) -> Result<()> {
@@ -25,16 +30,67 @@ pub fn write_terrain(out: &Path, tiles: &[PathBuf]) -> Result<()> {
     let file = File::create(&partial).map_err(Error::io("create", &partial))?;
     let mut file = BufWriter::with_capacity(1 << 20, file);
     file.write_all(&head).map_err(Error::io("write", &partial))?;
+    let mut written = 0;
     for path in tiles {
-        let mut container = Container::open(path)?;
-        let copied = copy(&mut container.binary(), &mut file).map_err(Error::io("copy", path))?;
-        if copied != container.binary_length {
-            return Err(Error::input(path, "changed while it was read"));
-        }
+        written += copy_views(path, &mut file)?;
+    }
+    if written != scene.length {
+        return Err(Error::input(out, "the tiles changed while they were joined"));
     }
     let file = file.into_inner().map_err(|e| Error::io("write", &partial)(e.into_error()))?;
     file.sync_all().map_err(Error::io("write", &partial))?;
     std::fs::rename(&partial, out).map_err(Error::io("rename", &partial))
+}
+
+/// Writes the unpacked data of the tile at `path`; how many bytes.
+fn copy_views(path: &Path, file: &mut impl Write) -> Result<u64> {
+    let mut container = Container::open(path)?;
+    let tile: Value = container.document(path)?;
+    let binary = container.binary(path)?;
+    let damaged = |what: String| Error::input(path, format!("not a tile of this program: {what}"));
+    let mut written = 0;
+    for view in tile["bufferViews"].as_array().into_iter().flatten() {
+        let view = View::of(view).map_err(damaged)?;
+        let bytes = view.bytes(&binary).map_err(damaged)?;
+        let padding = bytes.len().next_multiple_of(4) - bytes.len();
+        file.write_all(&bytes).and_then(|()| file.write_all(&[0; 4][..padding])).map_err(Error::io("copy", path))?;
+        written += (bytes.len() + padding) as u64;
+    }
+    Ok(written)
+}
+
+/// Where the data of a buffer view are.
+struct View {
+    start: u64,
+    /// Bytes in the file.
+    length: u64,
+    packed: Option<Packed>,
+}
+
+impl View {
+    fn of(view: &Value) -> std::result::Result<View, String> {
+        if let Some(packed) = view["extensions"].get(MESHOPT) {
+            let packed = Packed::deserialize(packed).map_err(|e| e.to_string())?;
+            return Ok(View { start: packed.byte_offset, length: packed.byte_length, packed: Some(packed) });
+        }
+        let number = |key: &str| view[key].as_u64();
+        let length = number("byteLength").ok_or("a buffer view has no length")?;
+        Ok(View { start: number("byteOffset").unwrap_or(0), length, packed: None })
+    }
+
+    /// Bytes of the unpacked data.
+    fn unpacked_length(&self) -> u64 {
+        self.packed.map_or(Some(self.length), |packed| packed.unpacked_length()).unwrap_or(u64::MAX)
+    }
+
+    fn bytes<'a>(&self, binary: &'a [u8]) -> std::result::Result<Cow<'a, [u8]>, String> {
+        let end = self.start.saturating_add(self.length).try_into().unwrap_or(usize::MAX);
+        let bytes = binary.get(self.start as usize..end).ok_or("a buffer view goes past the end of the data")?;
+        match &self.packed {
+            Some(packed) => packed.unpack(bytes).map(Cow::Owned),
+            None => Ok(Cow::Borrowed(bytes)),
+        }
+    }
 }
 
 /// The arrays of the joined document as JSON texts, which take far less room than parsed values.
@@ -46,6 +102,7 @@ struct Scene {
     nodes: List,
     extras: Value,
     materials: Value,
+    quantized: bool,
     /// Bytes of the binary chunk.
     length: u64,
 }
@@ -72,8 +129,13 @@ impl Scene {
         let mut tile: Value = container.document(path)?;
         let (views, accessors, meshes) = (self.views.count, self.accessors.count, self.meshes.count);
         for view in elements(&mut tile, "bufferViews") {
-            shift(view, "byteOffset", self.length);
+            let length = View::of(view).map_err(|what| Error::input(path, what))?.unpacked_length();
+            view["buffer"] = 0.into();
+            view["byteOffset"] = self.length.into();
+            view["byteLength"] = length.into();
+            view.as_object_mut().into_iter().for_each(|view| drop(view.remove("extensions")));
             self.views.push(view);
+            self.length = self.length.saturating_add(length).saturating_add(3) & !3;
         }
         for accessor in elements(&mut tile, "accessors") {
             shift(accessor, "bufferView", views);
@@ -97,7 +159,8 @@ impl Scene {
             self.extras = tile["scenes"][0]["extras"].take();
             self.materials = tile["materials"].take();
         }
-        self.length += container.binary_length;
+        let extensions = tile["extensionsRequired"].as_array();
+        self.quantized |= extensions.is_some_and(|names| names.iter().any(|name| name == QUANTIZATION));
         Ok(())
     }
 
@@ -106,10 +169,14 @@ impl Scene {
         let scene = json!({"nodes": nodes, "extras": self.extras});
         let asset = json!({"version": "2.0", "generator": GENERATOR});
         let (materials, length) = (&self.materials, self.length);
+        let extensions = match self.quantized {
+            true => format!(r#""extensionsUsed":["{QUANTIZATION}"],"extensionsRequired":["{QUANTIZATION}"],"#),
+            false => String::new(),
+        };
         let [views, accessors, meshes, nodes] =
             [&self.views, &self.accessors, &self.meshes, &self.nodes].map(|list| &list.text);
         format!(
-            r#"{{"asset":{asset},"scene":0,"scenes":[{scene}],"nodes":[{nodes}],"meshes":[{meshes}],"materials":{materials},"accessors":[{accessors}],"bufferViews":[{views}],"buffers":[{{"byteLength":{length}}}]}}"#
+            r#"{{"asset":{asset},{extensions}"scene":0,"scenes":[{scene}],"nodes":[{nodes}],"meshes":[{meshes}],"materials":{materials},"accessors":[{accessors}],"bufferViews":[{views}],"buffers":[{{"byteLength":{length}}}]}}"#
         )
         .into_bytes()
     }

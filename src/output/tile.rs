@@ -15,6 +15,23 @@ pub struct Tile {
 }
 
 impl Tile {
+    /// The tile of these triangles between some of `positions`, which keep their order, without normals and colours.
+    pub fn of(positions: &[[i32; 3]], mut triangles: Vec<[u32; 3]>) -> Tile {
+        let vertices = renumber(&mut triangles);
+        Tile { positions: pick(positions, &vertices), triangles, ..Tile::default() }
+    }
+
+    /// The tile of only these triangles of this one.
+    pub(super) fn subset(&self, mut triangles: Vec<[u32; 3]>) -> Tile {
+        let vertices = renumber(&mut triangles);
+        Tile {
+            positions: pick(&self.positions, &vertices),
+            normals: self.normals.as_ref().map(|all| pick(all, &vertices)),
+            colors: self.colors.as_ref().map(|all| pick(all, &vertices)),
+            triangles,
+        }
+    }
+
     /// The least and greatest lattice integers of the vertices on every axis; `None` without vertices.
     pub fn bounds(&self) -> Option<[[i32; 3]; 2]> {
         let first = *self.positions.first()?;
@@ -22,4 +39,19 @@ impl Tile {
             [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]
         }))
     }
+}
+
+/// Numbers the corners of `triangles` anew; the old numbers in order.
+fn renumber(triangles: &mut [[u32; 3]]) -> Vec<u32> {
+    let mut vertices: Vec<u32> = triangles.iter().flatten().copied().collect();
+    vertices.sort_unstable();
+    vertices.dedup();
+    for corner in triangles.iter_mut().flatten() {
+        *corner = vertices.partition_point(|v| v < corner) as u32;
+    }
+    vertices
+}
+
+fn pick<T: Copy>(all: &[T], which: &[u32]) -> Vec<T> {
+    which.iter().map(|&v| all[v as usize]).collect()
 }

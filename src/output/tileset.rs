@@ -4,8 +4,8 @@
 
 use serde_json::{Value, json};
 
+use super::document::GENERATOR;
 use super::frame::Frame;
-use super::glb::GENERATOR;
 
 /// Half the least extent of a bounding volume, metres: viewers divide by it.
 const LEAST_HALF: f64 = 0.005;

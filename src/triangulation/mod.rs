@@ -89,6 +89,11 @@ impl Triangulator {
         self.gpu.as_ref().map(|gpu| gpu.adapter.as_str())
     }
 
+    /// Seconds that every step has taken on the GPU itself, where it tells.
+    pub fn gpu_steps(&self) -> Vec<(&'static str, f64)> {
+        self.gpu.as_ref().map(Executor::step_seconds).unwrap_or_default()
+    }
+
     /// The canonical Delaunay triangulation of distinct `sites`, the same whoever computes it.
     ///
     /// # Errors

@@ -36,6 +36,13 @@
 //! (few) need a common table: the number of sites is that of the other vertices plus that of the distinct ends.
 //!
 //! Together with the number of sites of the report, no site that the job has read is missing.
+//!
+//! # Triangles that are left out
+//!
+//! Where `[output] max_edge` leaves triangles out of the terrain, they are in `cut/`, and all of the above is checked of what
+//! is written and what is left out together. Normals and colours are not compared with `cut/`, which has none. If the report
+//! says that triangles were left out and `cut/` is gone, only checks 1, 4 and the first sentence of 2 are made, and 3 between
+//! triangles that are there; the verdict says so.
 
 mod digest;
 mod hull;
@@ -57,14 +64,14 @@ pub use source::Source;
 pub use verdict::Verdict;
 
 use crate::output::frame::Extras;
-use crate::output::read::{TileFile, read_extras, read_tile};
+use crate::output::read::{TileFile, held_bytes, read_extras, read_tile};
 use crate::{Error, Result};
 use part::Findings;
 use rim::Rim;
 use verdict::Fault;
 
-/// Bytes of memory that checking a tile takes for every byte of its file, at most.
-const MEMORY_FACTOR: u64 = 7;
+/// Bytes of memory that checking a tile takes for every byte that its parts have in memory, at most.
+const MEMORY_FACTOR: u64 = 5;
 
 /// Checks the tiles under `directory/tiles` within about `memory` bytes. The verdict lists what does not hold.
 ///
@@ -83,14 +90,17 @@ pub fn verify(directory: &Path, memory: u64) -> Result<Verdict> {
     let names = tiles.names();
     let (matched, vertices) = rim.finish(&source, &names)?;
     let report = read_report(directory)?;
-    Ok(Verdict::new(tiles.paths.len(), findings, matched, vertices, report, &names))
+    Ok(Verdict::new(tiles.written, findings, matched, vertices, report, &names))
 }
 
 /// What `report.json` says.
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
 struct Report {
     sites: Option<u64>,
+    /// Those that are written.
     triangles: Option<u64>,
+    /// Those that are left out.
+    cut_triangles: Option<u64>,
 }
 
 fn read_report(directory: &Path) -> Result<Report> {
@@ -105,34 +115,37 @@ fn read_report(directory: &Path) -> Result<Report> {
 /// The tiles to check, in the order of their names.
 struct Tiles {
     paths: Vec<PathBuf>,
+    /// So many of them, the first, are the terrain's; the others hold what was left out.
+    written: usize,
     /// Those of the first that can be read; all others have to agree.
     extras: Extras,
+    /// Bytes that the parts of the largest have in memory.
     largest: u64,
 }
 
 impl Tiles {
     fn find(directory: &Path) -> Result<Tiles> {
         let folder = directory.join("tiles");
-        let (mut paths, mut largest) = (Vec::new(), 0);
-        for entry in std::fs::read_dir(&folder).map_err(Error::io("read", &folder))? {
-            let entry = entry.map_err(Error::io("read", &folder))?;
-            if entry.path().extension().is_some_and(|e| e == "glb") {
-                largest = largest.max(entry.metadata().map_err(Error::io("read", entry.path()))?.len());
-                paths.push(entry.path());
-            }
-        }
-        paths.sort();
+        let mut paths = glb_files(&folder)?;
+        let written = paths.len();
         let Some(first) = paths.first() else {
             return Err(Error::input(&folder, "has no .glb file: is this the output directory of a finished job?"));
         };
         let readable = paths.iter().find_map(|path| read_extras(path).ok());
         let extras = readable.map_or_else(|| read_extras(first), Ok)?;
-        Ok(Tiles { paths, extras, largest })
+        let cut = directory.join("cut");
+        if cut.is_dir() {
+            paths.extend(glb_files(&cut)?);
+        }
+        // One that cannot be read is found again when it is its turn.
+        let largest = paths.par_iter().map(|path| held_bytes(path).unwrap_or(0)).max().unwrap_or(0);
+        Ok(Tiles { paths, written, extras, largest })
     }
 
     fn names(&self) -> Vec<String> {
         let name = |p: &PathBuf| p.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        self.paths.iter().map(name).collect()
+        let (tiles, cut) = self.paths.split_at(self.written);
+        tiles.iter().map(name).chain(cut.iter().map(|p| format!("cut/{}", name(p)))).collect()
     }
 
     /// How many tiles may be in memory at once.
@@ -178,10 +191,27 @@ impl Tiles {
             return Ok(());
         }
         for part in &tile.parts {
-            let records = part::check(part, number as u32, source, findings);
+            let mut records = part::check(part, number as u32, source, findings);
+            if number >= self.written {
+                findings.cut += part.triangles.len() as u64;
+                records.vertices.iter_mut().for_each(|vertex| vertex.unshaded = 1);
+            }
             let mut rim = rim.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
             rim.add(&records)?;
         }
         Ok(())
     }
+}
+
+/// The GLB files in `folder` by name.
+fn glb_files(folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut paths = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(Error::io("read", folder))? {
+        let path = entry.map_err(Error::io("read", folder))?.path();
+        if path.extension().is_some_and(|e| e == "glb") {
+            paths.push(path);
+        }
+    }
+    paths.sort();
+    Ok(paths)
 }

@@ -16,6 +16,8 @@ use crate::output::read::Part;
 pub(super) struct Findings {
     pub(super) faults: Faults,
     pub(super) triangles: u64,
+    /// Those of them that are left out of the terrain.
+    pub(super) cut: u64,
     /// Vertices that are on no one-sided edge.
     pub(super) inner_sites: u64,
     /// Edges with both triangles in one part.
@@ -33,6 +35,7 @@ impl Findings {
         Findings {
             faults: self.faults,
             triangles: self.triangles + other.triangles,
+            cut: self.cut + other.cut,
             inner_sites: self.inner_sites + other.inner_sites,
             inner_edges: self.inner_edges + other.inner_edges,
             ties: self.ties + other.ties,
@@ -89,10 +92,13 @@ pub(super) fn check(part: &Part, tile: u32, source: &Source, findings: &mut Find
 /// The lattice integers of the vertices; `None` where some are not on the lattice.
 fn lattice_points(part: &Part, tile: u32, source: &Source, findings: &mut Findings) -> Option<Vec<[i32; 3]>> {
     let mut points = Vec::with_capacity(part.positions.len());
+    let plain = part.scale == [1.0; 3];
     for v in 0..part.positions.len() {
-        match source.integers(part.world(v)) {
+        let world = part.world(v);
+        let point = if plain { source.integers(world) } else { source.integers_on(world, part.scale) };
+        match point {
             Some(point) => points.push(point),
-            None => findings.faults.note(Fault::OffLattice, tile, || format!("{:?} m", part.world(v))),
+            None => findings.faults.note(Fault::OffLattice, tile, || format!("{world:?} m")),
         }
     }
     (points.len() == part.positions.len()).then_some(points)
@@ -233,5 +239,5 @@ fn fingerprint(part: &Part, v: usize, site: Site, tile: u32) -> RimVertex {
     let mut shading = [0; 20];
     shading[..12].copy_from_slice(cast_slice(&normal));
     shading[12..].copy_from_slice(cast_slice(&color));
-    RimVertex { site, position, shading: xxh3_64(&shading), tile, unused: 0 }
+    RimVertex { site, position, shading: xxh3_64(&shading), tile, unshaded: 0 }
 }

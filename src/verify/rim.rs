@@ -48,7 +48,8 @@ impl Record for RimEdge {
 pub(super) struct RimVertex {
     pub(super) site: Site,
     pub(super) tile: u32,
-    pub(super) unused: u32,
+    /// 1 where there is neither normal nor colour, nor should there be.
+    pub(super) unshaded: u32,
     /// Hash of the place in the scene.
     pub(super) position: u64,
     /// Hash of normal and colour.
@@ -163,7 +164,9 @@ impl Vertices {
         if let Some(other) = group.iter().find(|v| v.position != first.position) {
             self.faults.note(Fault::PlaceDiffers, first.tile, || both(other));
         }
-        if let Some(other) = group.iter().find(|v| v.shading != first.shading) {
+        let mut shaded = group.iter().filter(|v| v.unshaded == 0);
+        let shading = shaded.next().map_or(first.shading, |v| v.shading);
+        if let Some(other) = shaded.find(|v| v.shading != shading) {
             self.faults.note(Fault::ShadingDiffers, first.tile, || both(other));
         }
     }

@@ -11,14 +11,19 @@ const EXACT: u128 = 1 << 53;
 /// Powers of ten up to this are exact as f64.
 const EXACT_POWER: u32 = 22;
 
-/// Written positions are at most this far from the lattice, in lattice steps: half a glTF step, and some rounding.
+/// Positions in metres are at most this far from the lattice, in lattice steps: half a glTF step, and some rounding.
 const OFF_LATTICE: f64 = 0.26;
+
+/// Quantized positions are on coarser steps, from which the lattice can still be told.
+const OFF_LATTICE_QUANTIZED: f64 = 0.495;
 
 /// What the tiles of a job say about their lattice.
 #[derive(Clone, Debug)]
 pub struct Source {
     /// Lattice steps in a metre: x and y, z.
     per_metre: [f64; 2],
+    /// Metres in a lattice step: x and y, z.
+    resolution: [f64; 2],
     axes: [Axis; 3],
 }
 
@@ -28,26 +33,41 @@ impl Source {
         let steps = [extras.resolution, extras.resolution, extras.resolution_z];
         let axis = |k: usize| Axis::new(extras.offset[k], steps[k]);
         let axes = [axis(0), axis(1), axis(2)];
-        let per_metre = [
-            1.0 / (extras.resolution * extras.metres_per_unit),
-            1.0 / (extras.resolution_z * extras.metres_per_unit_z),
-        ];
+        let resolution = [extras.resolution * extras.metres_per_unit, extras.resolution_z * extras.metres_per_unit_z];
+        let per_metre = resolution.map(|metres| 1.0 / metres);
         let [Some(x), Some(y), Some(z)] = axes else {
             return Err("its offset and resolution are no decimals that a lattice can have".into());
         };
         if !per_metre.iter().all(|v| v.is_finite() && *v > 0.0) {
             return Err("its resolution and metres_per_unit are not positive numbers".into());
         }
-        Ok(Source { per_metre, axes: [x, y, z] })
+        Ok(Source { per_metre, resolution, axes: [x, y, z] })
     }
 
     /// The lattice integers x, y, z of a scene position in metres; `None` if it is not on the lattice.
     #[inline]
     pub fn integers(&self, world: [f64; 3]) -> Option<[i32; 3]> {
+        self.integers_within(world, OFF_LATTICE)
+    }
+
+    /// The lattice integers of a scene position that is a whole number of steps of so many metres, as x, y up, z of the scene
+    /// have them; `None` if it is not the step next to a point of the lattice.
+    #[inline]
+    pub fn integers_on(&self, world: [f64; 3], steps: [f64; 3]) -> Option<[i32; 3]> {
+        let point = self.integers_within(world, OFF_LATTICE_QUANTIZED)?;
+        let [x, y, z] = [point[0], point[2], point[1]].map(f64::from);
+        let [xy, up] = self.resolution;
+        let exact = [x * (xy / steps[0]), y * (up / steps[1]), 0.0 - z * (xy / steps[2])];
+        let met = (0..3).all(|k| nearest(exact[k]) * steps[k] == world[k]);
+        met.then_some(point)
+    }
+
+    #[inline(always)]
+    fn integers_within(&self, world: [f64; 3], tolerance: f64) -> Option<[i32; 3]> {
         let [xy, up] = self.per_metre;
         let exact = [world[0] * xy, -world[2] * xy, world[1] * up];
         let rounded = exact.map(nearest);
-        let near = (0..3).all(|k| (exact[k] - rounded[k]).abs() <= OFF_LATTICE);
+        let near = (0..3).all(|k| (exact[k] - rounded[k]).abs() <= tolerance);
         let within = rounded[0].abs().max(rounded[1].abs()) <= REACH as f64
             && (i32::MIN as f64..=i32::MAX as f64).contains(&rounded[2]);
         (near && within).then(|| rounded.map(|v| v as i32))
@@ -139,6 +159,26 @@ mod tests {
         assert_eq!(source.integers([0.014, 0.0, 0.0]), None);
         assert_eq!(source.integers([1e30, 0.0, 0.0]), None);
         assert_eq!(source.integers([f64::NAN, 0.0, 0.0]), None);
+    }
+
+    #[test]
+    fn quantized_positions_are_next_to_the_lattice() {
+        let extras = Extras {
+            offset: [0.0; 3],
+            resolution: 0.01,
+            resolution_z: 0.01,
+            metres_per_unit: 1.0,
+            metres_per_unit_z: 1.0,
+            crs: None,
+        };
+        let source = Source::new(&extras).unwrap();
+        let step = 1.0 / 128.0;
+        let on = |x: f64| source.integers_on([x * step, 0.0, 0.0], [step; 3]);
+        // 0.05 m are 6.4 steps.
+        assert_eq!(on(6.0), Some([5, 0, 0]));
+        // Seven steps are nearer to 0.05 m than to 0.06 m, and yet not the nearest to it.
+        assert_eq!(on(7.0), None);
+        assert_eq!(on(6.5), None);
     }
 
     #[test]

@@ -104,7 +104,7 @@ pub enum Diagram {
 }
 
 /// The steps that [`Counts::nanoseconds`] tells apart.
-pub const STEPS: [&str; 8] = [
+pub const STEPS: [&str; 9] = [
     "G1 write sites",
     "G2-G6 Voronoi, triangles, most flips",
     "G3 islands",
@@ -113,7 +113,11 @@ pub const STEPS: [&str; 8] = [
     "C4 flip",
     "C3 insert",
     "accept",
+    "wait for the GPU",
 ];
+
+/// The last of [`STEPS`].
+const WAIT: usize = STEPS.len() - 1;
 
 /// What the steps met. All are numbers of sites, triangles or edges, as named.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -203,6 +207,7 @@ pub fn triangulate_with(
 
     discretise(sites, diagrams, texture, voronoi, &mut counts)?;
     clock.done(&mut counts, 0);
+    counts.nanoseconds[0] = counts.nanoseconds[0].saturating_sub(counts.nanoseconds[WAIT]);
     scan.run(texture, voronoi, sphere, shift, flips)?;
     counts.inverted = shift.inverted.len() as u64;
     clock.done(&mut counts, 1);
@@ -240,7 +245,10 @@ fn discretise(
         let before = *counts;
         loop {
             texture.write(sites, &diagrams.shape(), counts)?;
-            match diagrams.diagram(texture.width as u32, texture.height as u32, texture.placed_pixels()) {
+            let asked = Instant::now();
+            let answer = diagrams.diagram(texture.width as u32, texture.height as u32, texture.placed_pixels());
+            counts.nanoseconds[WAIT] += asked.elapsed().as_nanos() as u64;
+            match answer {
                 Diagram::Labels(labels) => {
                     if voronoi.take(texture, labels) {
                         counts.on_gpu = 1;

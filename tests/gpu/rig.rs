@@ -30,6 +30,11 @@ impl Rig {
         }
     }
 
+    /// The pixels of the largest texture.
+    pub(crate) fn most_pixels(&self) -> u64 {
+        device::most_pixels(&self.machine.device().limits)
+    }
+
     /// Every step against its twin.
     pub(crate) fn compare(&mut self, size: Size, pixels: &[u32]) -> Vec<Comparison> {
         compare(&mut self.machine, &mut self.set, size, pixels).expect("the steps run")

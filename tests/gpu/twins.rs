@@ -3,6 +3,7 @@
 use super::random::{Random, cases};
 use super::rig::Rig;
 use gdt_batch::gpu::buffers::Name;
+use gdt_batch::gpu::device;
 use gdt_batch::gpu::steps::{Command, Recording, Size};
 use gdt_batch::gpu::twins;
 
@@ -16,6 +17,28 @@ fn every_step_is_the_same_bit_for_bit() {
         let steps: Vec<_> = comparisons.iter().map(|c| c.step).collect();
         assert_eq!(steps, ["G1", "G2 jfa", "G3", "G2 exact", "G4", "G5", "G6"]);
         assert_eq!(comparisons[0].numbers, size.pixels());
+    }
+}
+
+/// The longest rows and columns there are; the whole square where the adapter binds so much, as no software does.
+/// Minutes on software, so GDT_TEST_LARGE=1 asks for it.
+#[test]
+fn the_largest_texture_is_the_same_bit_for_bit() {
+    if std::env::var_os("GDT_TEST_LARGE").is_none() {
+        return eprintln!("not tested: textures of 16384 pixels a side; set GDT_TEST_LARGE=1");
+    }
+    let Some(mut rig) = Rig::new() else { return };
+    let side = device::MOST_SIDE;
+    let across = (rig.most_pixels() / u64::from(side)).min(u64::from(side)) as u32;
+    for (width, height) in [(side, across), (across, side)] {
+        let size = Size { width, height };
+        // Triangles of more sites would not fit a buffer of software.
+        for count in [40, size.pixels() as usize / 16] {
+            let pixels = Random(11).pixels(size, count);
+            let differing: Vec<_> = rig.compare(size, &pixels).into_iter().filter(|c| c.differing > 0).collect();
+            assert!(differing.is_empty(), "{width} x {height}, {count} sites: {differing:?}");
+            eprintln!("{width} x {height}, {count} sites: every step the same");
+        }
     }
 }
 

@@ -2,6 +2,8 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../common/las_file.rs"]
+mod las_file;
 #[path = "../common/random.rs"]
 mod random;
 #[path = "../common/validator.rs"]
@@ -10,11 +12,16 @@ mod validator;
 mod clouds;
 mod program;
 
+mod bad_files;
+mod broken;
 mod choices;
 mod configuration;
+mod cutting;
 mod khronos;
+mod levels;
 mod limits;
 mod messages;
+mod preflight;
 mod real;
 mod same_mesh;
 mod steps;

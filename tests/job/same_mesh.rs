@@ -46,6 +46,19 @@ fn autzen_trim() {
 }
 
 #[test]
+fn however_it_is_packed() {
+    let Some(shared) = shared() else { return };
+    let packed = |file: &str, compression: &str| {
+        let job = Job::on(&[shared.join("data").join(file)]).tiles_of(10_000);
+        job.with("output", &format!("compression = \"{compression}\"")).digest()
+    };
+    for file in ["crop_2.laz", "32-1-472-150-76.laz", "Topography.laz"] {
+        let [none, quantized, meshopt] = ["none", "quantized", "meshopt"].map(|compression| packed(file, compression));
+        assert!(none == quantized && none == meshopt, "{file}");
+    }
+}
+
+#[test]
 fn a_real_lattice() {
     let Some(shared) = shared() else { return };
     one_digest(|| Job::on(&[shared.join("data/simple1_4.las")]).with("input", "unit = \"metre\""));

@@ -1,7 +1,7 @@
 //! The steps of a job by hand, on many small clouds cut into tiny tiles: the closed triangles of all nodes together are
 //! the triangulation of all sites at once.
 
-use gdt_batch::config::{Backend, Config, Duplicates, Triangulation};
+use gdt_batch::config::{Backend, Config, Duplicates, OnBadFile, Triangulation};
 use gdt_batch::geometry::Site;
 use gdt_batch::job::choose::Coarser;
 use gdt_batch::job::directory::Directory;
@@ -38,6 +38,7 @@ fn run_steps(job: &Job, config: &Config) -> (Store, Partition) {
         points_per_tile: config.triangulation.sites_per_tile.0,
         memory: 1 << 20,
         malformed_share: 0.0,
+        on_bad_file: OnBadFile::Stop,
     };
     let partition = partition::run(&task, &directory, &Progress::Quiet.stage("read", 0, "points")).unwrap();
     let store = Store::create(&directory.store()).unwrap();

@@ -1,9 +1,10 @@
 //! One scene of all tiles.
 
+use gdt_batch::output::Compression;
 use gdt_batch::output::read::read_tile;
 use gdt_batch::output::terrain::write_terrain;
 
-use crate::model::{cloud, cut_by_place, terrain, utm, write_tiles};
+use crate::model::{cloud, cut_by_place, terrain, utm, write_tiles, write_tiles_as};
 
 #[test]
 fn the_scene_has_the_parts_of_all_tiles() {
@@ -24,6 +25,25 @@ fn the_scene_has_the_parts_of_all_tiles() {
     }
     let names: Vec<_> = std::fs::read_dir(directory.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
     assert_eq!(names.len(), 2, "nothing but tiles and terrain.glb: {names:?}");
+}
+
+#[test]
+fn what_is_packed_is_unpacked_in_the_scene() {
+    let (frame, directory) = (utm(), tempfile::tempdir().unwrap());
+    let tiles = cut_by_place(&terrain(&frame, &cloud(22, 2_000, 20_000)), 2);
+    write_tiles_as(Compression::Meshopt, directory.path(), &frame, &tiles);
+    let paths: Vec<_> = (0..tiles.len()).map(|i| directory.path().join(format!("tiles/{i:05}.glb"))).collect();
+    let out = directory.path().join("terrain.glb");
+    write_terrain(&out, &paths).unwrap();
+    let bytes = std::fs::read(&out).unwrap();
+    let json = String::from_utf8_lossy(&bytes[..20_000]);
+    assert!(json.contains("KHR_mesh_quantization") && !json.contains("EXT_meshopt_compression"));
+    let joined = read_tile(&out).unwrap();
+    for (part, path) in joined.parts.iter().zip(&paths) {
+        let tile = &read_tile(path).unwrap().parts[0];
+        assert_eq!((part.translation, part.scale, &part.positions), (tile.translation, tile.scale, &tile.positions));
+        assert_eq!((&part.normals, &part.colors, &part.triangles), (&tile.normals, &tile.colors, &tile.triangles));
+    }
 }
 
 #[test]

@@ -1,10 +1,10 @@
 //! The Khronos validator has nothing to say about what is written.
 
-use gdt_batch::output::Tile;
 use gdt_batch::output::frame::Frame;
 use gdt_batch::output::terrain::write_terrain;
+use gdt_batch::output::{Compression, Tile};
 
-use crate::model::{cloud, cut_by_place, grid, lattice, terrain, utm, write_tiles};
+use crate::model::{cloud, cut_by_place, grid, lattice, terrain, utm, write_tiles, write_tiles_as};
 use crate::validator::validate;
 
 #[test]
@@ -24,4 +24,23 @@ fn the_khronos_validator_finds_nothing() {
     write_tiles(&directory.path().join("parts"), &fine, &[terrain(&fine, &grid(40, 25, 1_000_000))]);
     write_tiles(&directory.path().join("long"), &frame, &[long]);
     validate(directory.path(), tiles.len() + 4);
+}
+
+#[test]
+fn nor_about_what_is_packed() {
+    let directory = tempfile::tempdir().unwrap();
+    // Heights on finer steps than the plane, and a tile of several parts.
+    let frame = Frame::new(&lattice([4e5, 6e6, 0.0], 0.01, 0.001), 1.0, 1.0, None).unwrap();
+    let mesh = terrain(&frame, &cloud(42, 3_000, 20_000));
+    let tiles = cut_by_place(&mesh, 3);
+    for compression in [Compression::Quantized, Compression::Meshopt] {
+        let folder = directory.path().join(format!("{compression:?}"));
+        write_tiles_as(compression, &folder, &frame, &tiles);
+        let paths: Vec<_> = (0..tiles.len()).map(|i| folder.join(format!("tiles/{i:05}.glb"))).collect();
+        write_terrain(&folder.join("terrain.glb"), &paths).unwrap();
+        let bare = Tile { normals: None, colors: None, ..mesh.clone() };
+        write_tiles_as(compression, &folder.join("bare"), &frame, &[bare]);
+        write_tiles_as(compression, &folder.join("parts"), &frame, &[terrain(&frame, &grid(90, 90, 2_000))]);
+    }
+    validate(directory.path(), 2 * (tiles.len() + 3));
 }

@@ -5,10 +5,10 @@ use std::path::Path;
 
 use gdt_batch::geometry::lattice::{Lattice, shortest_decimal};
 use gdt_batch::geometry::predicates::{in_circle, orient2d};
-use gdt_batch::output::Tile;
 use gdt_batch::output::frame::Frame;
 use gdt_batch::output::glb::encode_tile;
 use gdt_batch::output::normals::Sums;
+use gdt_batch::output::{Compression, Tile};
 use spade::{DelaunayTriangulation, Point2, Triangulation};
 
 use crate::random::Random;
@@ -127,13 +127,26 @@ pub(crate) fn cut_by_place(mesh: &Tile, side: usize) -> Vec<Tile> {
     cut(mesh, side * side, |i| cell(mesh.triangles[i][0], 0) * side + cell(mesh.triangles[i][0], 1))
 }
 
-/// Writes the tiles as a job does.
+/// Every way to write a tile.
+pub(crate) const COMPRESSIONS: [Compression; 3] = [Compression::None, Compression::Quantized, Compression::Meshopt];
+
+/// The frame that goes with a compression.
+pub(crate) fn framed(frame: &Frame, compression: Compression) -> Frame {
+    if compression == Compression::None { frame.clone() } else { frame.clone().packed() }
+}
+
+/// Writes the tiles as a job does, without compression.
 pub(crate) fn write_tiles(directory: &Path, frame: &Frame, tiles: &[Tile]) {
+    write_tiles_as(Compression::None, directory, frame, tiles);
+}
+
+/// Writes the tiles as a job does.
+pub(crate) fn write_tiles_as(compression: Compression, directory: &Path, frame: &Frame, tiles: &[Tile]) {
     let folder = directory.join("tiles");
     std::fs::create_dir_all(&folder).unwrap();
     let mut bytes = Vec::new();
     for (number, tile) in tiles.iter().enumerate() {
-        encode_tile(frame, tile, &mut bytes).unwrap();
+        encode_tile(&framed(frame, compression), tile, compression, &mut bytes).unwrap();
         std::fs::write(folder.join(format!("{number:05}.glb")), &bytes).unwrap();
     }
 }

@@ -3,19 +3,19 @@
 use std::collections::HashMap;
 
 use gdt_batch::Error;
-use gdt_batch::output::Tile;
 use gdt_batch::output::frame::Frame;
 use gdt_batch::output::glb::encode_tile;
-use gdt_batch::output::read::{TileFile, read_tile};
+use gdt_batch::output::read::{Part, TileFile, read_tile};
+use gdt_batch::output::{Compression, Tile};
 use gdt_batch::verify::Source;
 use proptest::prelude::*;
 
-use crate::model::{cloud, cut, grid, lattice, terrain, utm};
+use crate::model::{COMPRESSIONS, cloud, cut, framed, grid, lattice, terrain, utm};
 use crate::random::Random;
 
 fn written(frame: &Frame, tile: &Tile) -> Vec<u8> {
     let mut bytes = Vec::new();
-    encode_tile(frame, tile, &mut bytes).unwrap();
+    encode_tile(frame, tile, Compression::None, &mut bytes).unwrap();
     bytes
 }
 
@@ -29,11 +29,96 @@ fn there_and_back(frame: &Frame, tile: &Tile) -> TileFile {
     read_bytes(&written(frame, tile)).unwrap()
 }
 
+fn there_and_back_as(compression: Compression, frame: &Frame, tile: &Tile) -> TileFile {
+    let mut bytes = Vec::new();
+    encode_tile(&framed(frame, compression), tile, compression, &mut bytes).unwrap();
+    read_bytes(&bytes).unwrap()
+}
+
 /// The lattice integers of all parts, joined.
 fn integers(file: &TileFile) -> Vec<[i32; 3]> {
+    file.parts.iter().flat_map(|part| integers_of(file, part)).collect()
+}
+
+fn integers_of(file: &TileFile, part: &Part) -> Vec<[i32; 3]> {
     let source = Source::new(&file.extras).unwrap();
-    let worlds = file.parts.iter().flat_map(|part| (0..part.positions.len()).map(|v| part.world(v)));
-    worlds.map(|world| source.integers(world).unwrap()).collect()
+    let of = |world| match part.scale == [1.0; 3] {
+        true => source.integers(world),
+        false => source.integers_on(world, part.scale),
+    };
+    (0..part.positions.len()).map(|v| of(part.world(v)).unwrap()).collect()
+}
+
+/// The triangles of all parts by the lattice integers of their corners, least corner first, sorted.
+fn triangles(file: &TileFile) -> Vec<[[i32; 3]; 3]> {
+    let of_part = |part: &Part| {
+        let points = integers_of(file, part);
+        part.triangles.iter().map(|t| t.map(|v| points[v as usize])).collect::<Vec<_>>()
+    };
+    canonical(file.parts.iter().flat_map(of_part).collect())
+}
+
+fn canonical(mut triangles: Vec<[[i32; 3]; 3]>) -> Vec<[[i32; 3]; 3]> {
+    for triangle in &mut triangles {
+        let least = (0..3).min_by_key(|&k| triangle[k]).unwrap();
+        triangle.rotate_left(least);
+    }
+    triangles.sort_unstable();
+    triangles
+}
+
+fn meant(tile: &Tile) -> Vec<[[i32; 3]; 3]> {
+    canonical(tile.triangles.iter().map(|t| t.map(|v| tile.positions[v as usize])).collect())
+}
+
+#[test]
+fn packed_tiles_hold_the_same_vertices_and_triangles() {
+    let tile = terrain(&utm(), &cloud(1, 5_000, 20_000));
+    for compression in [Compression::Quantized, Compression::Meshopt] {
+        let file = there_and_back_as(compression, &utm(), &tile);
+        let [part] = &file.parts[..] else { panic!("{} parts", file.parts.len()) };
+        assert_eq!(triangles(&file), meant(&tile));
+        let (normals, colors) = (part.normals.as_ref().unwrap(), part.colors.as_ref().unwrap());
+        for (v, point) in integers(&file).iter().enumerate() {
+            let old = tile.positions.binary_search(point).unwrap();
+            let [x, y, z] = tile.normals.as_ref().unwrap()[old];
+            let cosine: f32 = [x, z, -y].iter().zip(normals[v]).map(|(a, b)| a * b).sum();
+            assert!(cosine > 0.99, "{point:?}: {cosine}");
+            let color = tile.colors.as_ref().unwrap()[old];
+            assert!((0..3).all(|k| color[k].abs_diff(colors[v][k]) <= 129) && colors[v][3] == 65535);
+        }
+    }
+}
+
+#[test]
+fn packing_is_worth_it() {
+    let tile = terrain(&utm(), &grid(150, 150, 40));
+    let size = |compression| {
+        let mut bytes = Vec::new();
+        encode_tile(&framed(&utm(), compression), &tile, compression, &mut bytes).unwrap();
+        bytes.len() / tile.positions.len()
+    };
+    let [none, quantized, meshopt] = COMPRESSIONS.map(size);
+    assert!(none >= 43 && quantized <= 28 && meshopt <= 9, "{none}, {quantized}, {meshopt} bytes a vertex");
+}
+
+#[test]
+fn tiles_wider_than_16_bits_are_cut_into_parts() {
+    let frame = Frame::new(&lattice([0.0; 3], 0.001, 0.001), 1.0, 1.0, None).unwrap();
+    let count = |points: &[[i32; 3]]| {
+        let tile = terrain(&frame, points);
+        let files = COMPRESSIONS.map(|compression| there_and_back_as(compression, &frame, &tile));
+        assert!(files.iter().all(|file| triangles(file) == meant(&tile)));
+        files[2].parts.iter().map(|part| part.positions.iter().flatten().all(|v| *v <= 65535.0)).collect::<Vec<_>>()
+    };
+    // 64 m are the reach: 60 m, 120 m, and 60 m with one point 200 m away.
+    assert_eq!(count(&grid(61, 61, 1_000)), [true]);
+    assert_eq!(count(&grid(61, 61, 2_000)), [true; 4]);
+    let mut far = grid(61, 61, 1_000);
+    far.push([200_000, 30_000, 0]);
+    assert_eq!(count(&far), [true, false]);
+    // Very many parts are not worth it.
+    assert!(count(&grid(61, 61, 20_000)).iter().all(|short| !short));
 }
 
 #[test]
@@ -108,7 +193,8 @@ fn a_triangle_too_long_for_gltf_is_refused_with_the_remedy() {
     };
     let longest = (frame.longest_triangle()[0] * 1e6) as i32;
     assert_eq!(integers(&there_and_back(&frame, &triangle(longest - 1))), triangle(longest - 1).positions);
-    let error = encode_tile(&frame, &triangle(longest + longest / 100), &mut Vec::new()).unwrap_err();
+    let error =
+        encode_tile(&frame, &triangle(longest + longest / 100), Compression::None, &mut Vec::new()).unwrap_err();
     assert!(matches!(error, Error::Config(_)));
     assert!(error.to_string().contains("resolution = 0.00001"), "{error}");
 }
@@ -152,16 +238,17 @@ proptest! {
 
     #[test]
     fn shared_vertices_have_the_same_bits_in_every_tile(
-        seed: u64, tiles in 2usize..9, extent in 50u64..2_000_000,
+        seed: u64, tiles in 2usize..9, extent in 50u64..2_000_000, compression in prop::sample::select(&COMPRESSIONS[..]),
         resolution in prop::sample::select(vec![0.01, 0.001, 0.00025, 1.0, 0.3]), unit in prop::sample::select(vec![1.0, 0.3048]),
     ) {
         let frame = Frame::new(&lattice([4e5, 6.1e6, 0.0], resolution, 0.01), unit, unit, None).unwrap();
         let mesh = terrain(&frame, &cloud(seed, 60, extent));
-        let frame = if seed % 2 == 0 { frame.refined(mesh.bounds().unwrap()) } else { frame };
+        let plain = compression == Compression::None;
+        let frame = if plain && seed % 2 == 0 { frame.refined(mesh.bounds().unwrap()) } else { framed(&frame, compression) };
         let mut random = Random(seed);
         let mut worlds = HashMap::new();
         for tile in cut(&mesh, tiles, |_| random.below(tiles as u64) as usize) {
-            let file = there_and_back(&frame, &tile);
+            let file = there_and_back_as(compression, &frame, &tile);
             let vertices = file.parts.iter().flat_map(|part| (0..part.positions.len()).map(|v| part.world(v)));
             for (point, world) in integers(&file).into_iter().zip(vertices) {
                 let bits = world.map(f64::to_bits);
@@ -173,9 +260,12 @@ proptest! {
     }
 
     #[test]
-    fn damaged_files_give_errors(seed: u64, cut_at in 0usize..3000) {
-        let frame = utm();
-        let bytes = written(&frame, &terrain(&frame, &cloud(5, 30, 3_000)));
+    fn damaged_files_give_errors(
+        seed: u64, cut_at in 0usize..3000, compression in prop::sample::select(&COMPRESSIONS[..]),
+    ) {
+        let frame = framed(&utm(), compression);
+        let mut bytes = Vec::new();
+        encode_tile(&frame, &terrain(&frame, &cloud(5, 30, 3_000)), compression, &mut bytes).unwrap();
         prop_assert!(read_bytes(&bytes[..cut_at % bytes.len()]).is_err());
         let mut random = Random(seed);
         let mut damaged = bytes.clone();
@@ -190,6 +280,27 @@ proptest! {
             }
         }
     }
+}
+
+#[test]
+fn hostile_packed_files_take_no_memory() {
+    let (frame, tile) = (utm().packed(), terrain(&utm(), &cloud(5, 30, 3_000)));
+    let mut bytes = Vec::new();
+    encode_tile(&frame, &tile, Compression::Meshopt, &mut bytes).unwrap();
+    let said = |from: &str, to: &str| {
+        let place = bytes.windows(from.len()).position(|window| window == from.as_bytes()).unwrap();
+        let mut file = bytes.clone();
+        file.splice(place..place + from.len(), to.bytes());
+        assert_eq!(from.len(), to.len());
+        read_bytes(&file).unwrap_err().to_string()
+    };
+    // 30 vertices in the extension's words, and the corners of the triangles.
+    assert!(said("\"byteStride\":8,\"count\":30", "\"byteStride\":8,\"count\":99").contains("damaged"));
+    assert!(said("\"byteStride\":8", "\"byteStride\":9").contains("of 9 bytes"));
+    let corners = format!("\"count\":{}", 3 * tile.triangles.len());
+    assert!(said(&corners, &corners.replace("\"count\":1", "\"count\":9")).contains("cannot hold"));
+    assert!(said("ATTRIBUTES", "TRIANGLESS").contains("TRIANGLESS"));
+    assert!(said("OCTAHEDRAL", "QUATERNION").contains("QUATERNION"));
 }
 
 #[test]
@@ -215,5 +326,5 @@ fn hostile_files_take_no_memory() {
     assert!(message(json.replace("\"count\":30", "\"count\":31")).contains("past the end"));
     assert!(message(json.replace("\"nodes\":[0]", "\"nodes\":[0,0,0,0,0,0,0,0]")).contains("more than once"));
     assert!(message(json.replace("\"nodes\":[0]", "\"nodes\":[9]")).contains("no node 9"));
-    assert!(message(json.replace("\"translation\"", "\"scale\"")).contains("scale"));
+    assert!(message(json.replace("\"translation\"", "\"rotation\"")).contains("rotation"));
 }

@@ -1,5 +1,6 @@
 //! What the columns of a text mean and what parts them, as the options say or as the first lines show.
 
+use std::cmp::Reverse;
 use std::path::Path;
 
 use memchr::{memchr, memchr2};
@@ -265,7 +266,7 @@ fn drop_partial_color(roles: &mut [Role]) {
     }
 }
 
-/// The first delimiter under which some row has numbers as x, y and z.
+/// The delimiter under which most rows have numbers as x, y and z; the first of those that are as good.
 fn row_delimiter(candidates: &[Delimiter], roles: &[Role], rows: &[&[u8]]) -> Delimiter {
     let fits = |delimiter: Delimiter, row: &&[u8]| {
         let fields = delimiter.fields(row);
@@ -275,8 +276,8 @@ fn row_delimiter(candidates: &[Delimiter], roles: &[Role], rows: &[&[u8]]) -> De
         };
         roles.iter().enumerate().all(number)
     };
-    let mut tried = candidates.iter().copied();
-    tried.find(|&delimiter| rows.iter().any(|row| fits(delimiter, row))).unwrap_or(candidates[0])
+    let fitting = |delimiter: &&Delimiter| rows.iter().filter(|row| fits(**delimiter, row)).count();
+    candidates.iter().min_by_key(|delimiter| Reverse(fitting(delimiter))).copied().unwrap_or(Delimiter::Blank)
 }
 
 /// The start of `text` in quotes, for a message.

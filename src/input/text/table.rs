@@ -10,10 +10,10 @@ use super::columns::{Columns, Delimiter, Role, shown};
 use super::granularity::Granularity;
 use super::lines::{BLOCK, LONGEST, Line, for_each_line};
 use super::number::{MOST_DECIMALS, Number, POWERS};
+use crate::Result;
 use crate::input::positioned::Positioned;
 use crate::input::sieve::{Record, Sieve};
 use crate::input::source::Axis;
-use crate::{Error, Result};
 
 /// Bytes at the start of a text that show how it is laid out.
 const SAMPLE: u64 = 1 << 17;
@@ -131,9 +131,6 @@ fn block_range(rows: &Range<u64>, index: u64) -> Range<u64> {
 /// The layout of the text, where its rows begin, the number of the line there, and warnings.
 fn detect(file: &Positioned, options: &TextOptions) -> Result<(Columns, u64, u64, Vec<String>)> {
     let sample = file.bytes(0..file.size().min(SAMPLE))?;
-    if sample.starts_with(&[0xff, 0xfe]) || sample.starts_with(&[0xfe, 0xff]) {
-        return Err(Error::input(file.path(), "is text in UTF-16; save it as UTF-8"));
-    }
     let mark = if sample.starts_with(&[0xef, 0xbb, 0xbf]) { 3 } else { 0 };
     let mut lines: Vec<&[u8]> = sample[mark..].split(|&byte| byte == b'\n').collect();
     if lines.len() > 1 && file.size() > SAMPLE {

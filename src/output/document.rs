@@ -1,0 +1,266 @@
+//! The glTF document of a tile, and the bytes it describes.
+
+use std::borrow::Cow;
+
+use bytemuck::{Pod, cast_slice};
+use serde_json::{Value, json};
+
+use super::color::Linear;
+use super::encoding::{Compression, color_bytes, normal_bytes, normal_octahedral};
+use super::frame::Frame;
+use super::order::rings;
+use super::parts::Part;
+use crate::{Error, Result};
+
+/// Says in every file who wrote it.
+pub(super) const GENERATOR: &str = concat!("gdt-batch ", env!("CARGO_PKG_VERSION"));
+
+// Names of the glTF specification and its extensions.
+pub(super) const SIGNED_BYTE: u64 = 5120;
+pub(super) const UNSIGNED_BYTE: u64 = 5121;
+pub(super) const UNSIGNED_SHORT: u64 = 5123;
+pub(super) const UNSIGNED_INT: u64 = 5125;
+pub(super) const FLOAT: u64 = 5126;
+const ARRAY_BUFFER: u64 = 34962;
+const ELEMENT_ARRAY_BUFFER: u64 = 34963;
+pub(super) const MESHOPT: &str = "EXT_meshopt_compression";
+pub(super) const QUANTIZATION: &str = "KHR_mesh_quantization";
+
+/// Linear colour of a terrain without vertex colours.
+const PLAIN: [f64; 4] = [0.52, 0.5, 0.45, 1.0];
+
+/// The arrays of the glTF document and the binary chunk while they are put together.
+pub(super) struct Document<'a> {
+    frame: &'a Frame,
+    compression: Compression,
+    views: Vec<Value>,
+    accessors: Vec<Value>,
+    meshes: Vec<Value>,
+    nodes: Vec<Value>,
+    colored: bool,
+    /// The binary chunk; its length is a multiple of 4.
+    pub(super) binary: Vec<u8>,
+    /// Bytes of the buffer that stands for what readers unpack; a multiple of 4.
+    unpacked: u64,
+}
+
+impl<'a> Document<'a> {
+    pub(super) fn new(frame: &'a Frame, compression: Compression) -> Document<'a> {
+        Document {
+            frame,
+            compression,
+            views: Vec::new(),
+            accessors: Vec::new(),
+            meshes: Vec::new(),
+            nodes: Vec::new(),
+            colored: false,
+            binary: Vec::new(),
+            unpacked: 0,
+        }
+    }
+
+    /// Appends a node, its mesh and their data.
+    pub(super) fn add_part(&mut self, part: &Part) -> Result<()> {
+        let tile = &*part.tile;
+        let (triangles, order) = match self.compression {
+            Compression::None => (Cow::Borrowed(&tile.triangles), (0..tile.positions.len() as u32).collect()),
+            _ => {
+                let (triangles, order) = rings(tile.positions.len(), &tile.triangles);
+                (Cow::Owned(triangles), order)
+            }
+        };
+        let mut attributes = json!({"POSITION": self.add_positions(part, &order)?});
+        if let Some(normals) = &tile.normals {
+            attributes["NORMAL"] = self.add_normals(normals, &order)?.into();
+        }
+        if let Some(colors) = &tile.colors {
+            attributes["COLOR_0"] = self.add_colors(colors, &order)?.into();
+            self.colored = true;
+        }
+        let indices = self.add_triangles(&triangles, order.len())?;
+        let primitive = json!({"attributes": attributes, "indices": indices, "material": 0});
+        let mut node = json!({"mesh": self.meshes.len(), "translation": self.frame.metres(part.origin)});
+        if self.compression != Compression::None {
+            node["scale"] = json!(self.frame.step());
+        }
+        self.nodes.push(node);
+        self.meshes.push(json!({"primitives": [primitive]}));
+        Ok(())
+    }
+
+    fn add_positions(&mut self, part: &Part, order: &[u32]) -> Result<usize> {
+        let positions = &part.tile.positions;
+        // The way from the lattice is monotonic, and y turns round.
+        let [low, high] = part.tile.bounds().unwrap_or_default();
+        let [low, high] = [[low[0], high[1], low[2]], [high[0], low[1], high[2]]];
+        if self.compression == Compression::None {
+            let local = |p| self.frame.local(p, part.origin);
+            let values = picked(positions, order, local);
+            return self.add_attribute(&values, FLOAT, "VEC3", json!({"min": local(low), "max": local(high)}));
+        }
+        let steps = |p| self.frame.local_steps(p, part.origin);
+        let bounds = json!({"min": steps(low).map(|v| v as f32), "max": steps(high).map(|v| v as f32)});
+        if !part.short {
+            let values = picked(positions, order, |p| steps(p).map(|v| v as f32));
+            return self.add_attribute(&values, FLOAT, "VEC3", bounds);
+        }
+        let values = picked(positions, order, |p| {
+            let [x, y, z] = steps(p).map(|v| v as u16);
+            [x, y, z, 0]
+        });
+        self.add_attribute(&values, UNSIGNED_SHORT, "VEC3", bounds)
+    }
+
+    fn add_normals(&mut self, normals: &[[f32; 3]], order: &[u32]) -> Result<usize> {
+        let up = |[x, y, z]: [f32; 3]| [x, z, 0.0 - y];
+        if self.compression == Compression::None {
+            return self.add_attribute(&picked(normals, order, up), FLOAT, "VEC3", json!({}));
+        }
+        let anisotropy = self.frame.anisotropy();
+        let normalized = json!({"normalized": true});
+        if self.compression == Compression::Quantized {
+            let values = picked(normals, order, |normal| normal_bytes(up(normal), anisotropy));
+            return self.add_attribute(&values, SIGNED_BYTE, "VEC3", normalized);
+        }
+        let values = picked(normals, order, |normal| normal_octahedral(up(normal), anisotropy));
+        let accessor = self.add_attribute(&values, SIGNED_BYTE, "VEC3", normalized)?;
+        if let Some(view) = self.views.last_mut() {
+            view["extensions"][MESHOPT]["filter"] = "OCTAHEDRAL".into();
+        }
+        Ok(accessor)
+    }
+
+    fn add_colors(&mut self, colors: &[Linear], order: &[u32]) -> Result<usize> {
+        let normalized = json!({"normalized": true});
+        if self.compression == Compression::None {
+            let values = picked(colors, order, |[r, g, b]| [r, g, b, u16::MAX]);
+            return self.add_attribute(&values, UNSIGNED_SHORT, "VEC4", normalized);
+        }
+        self.add_attribute(&picked(colors, order, color_bytes), UNSIGNED_BYTE, "VEC4", normalized)
+    }
+
+    /// Appends an accessor and a view of vertices; its index.
+    fn add_attribute<T: Pod>(&mut self, values: &[T], component: u64, shape: &str, more: Value) -> Result<usize> {
+        let mut view = json!({"target": ARRAY_BUFFER});
+        if self.compression != Compression::None {
+            view["byteStride"] = size_of::<T>().into();
+        }
+        match self.compression {
+            Compression::Meshopt => {
+                // Version 0 is the one of the extension.
+                let packed = meshopt::encode_vertex_buffer_level(values, 0, Some(0)).map_err(not_packed)?;
+                self.add_packed(view, &packed, "ATTRIBUTES", size_of::<T>(), values.len());
+            }
+            _ => self.add_view(view, cast_slice(values)),
+        }
+        Ok(self.add_accessor(component, values.len(), shape, more))
+    }
+
+    fn add_triangles(&mut self, triangles: &[[u32; 3]], vertices: usize) -> Result<usize> {
+        let view = json!({"target": ELEMENT_ARRAY_BUFFER});
+        let corners = triangles.as_flattened();
+        // Index 65535 would restart a primitive.
+        let short = vertices <= u16::MAX as usize;
+        let (component, size) = if short { (UNSIGNED_SHORT, 2) } else { (UNSIGNED_INT, 4) };
+        if self.compression == Compression::Meshopt {
+            let packed = meshopt::encode_index_buffer(corners, vertices).map_err(not_packed)?;
+            self.add_packed(view, &packed, "TRIANGLES", size, corners.len());
+        } else if short {
+            self.add_view(view, cast_slice(&corners.iter().map(|&v| v as u16).collect::<Vec<_>>()));
+        } else {
+            self.add_view(view, cast_slice(corners));
+        }
+        Ok(self.add_accessor(component, corners.len(), "SCALAR", json!({})))
+    }
+
+    fn add_accessor(&mut self, component: u64, count: usize, shape: &str, mut more: Value) -> usize {
+        more["bufferView"] = (self.views.len() - 1).into();
+        more["componentType"] = component.into();
+        more["count"] = count.into();
+        more["type"] = shape.into();
+        self.accessors.push(more);
+        self.accessors.len() - 1
+    }
+
+    fn add_view(&mut self, mut view: Value, bytes: &[u8]) {
+        view["buffer"] = 0.into();
+        view["byteOffset"] = self.append(bytes).into();
+        view["byteLength"] = bytes.len().into();
+        self.views.push(view);
+    }
+
+    /// Appends a view of `count` elements of `size` bytes that readers have to unpack.
+    fn add_packed(&mut self, mut view: Value, packed: &[u8], mode: &str, size: usize, count: usize) {
+        view["extensions"][MESHOPT] = json!({
+            "buffer": 0,
+            "byteOffset": self.append(packed),
+            "byteLength": packed.len(),
+            "byteStride": size,
+            "count": count,
+            "mode": mode,
+        });
+        view["buffer"] = 1.into();
+        view["byteOffset"] = self.unpacked.into();
+        view["byteLength"] = (size * count).into();
+        self.unpacked += (size * count).next_multiple_of(4) as u64;
+        self.views.push(view);
+    }
+
+    /// Appends to the binary chunk; where.
+    fn append(&mut self, bytes: &[u8]) -> usize {
+        let start = self.binary.len();
+        self.binary.extend_from_slice(bytes);
+        self.binary.resize(self.binary.len().next_multiple_of(4), 0);
+        start
+    }
+
+    pub(super) fn json(&self) -> Value {
+        let mut json = json!({
+            "asset": {"version": "2.0", "generator": GENERATOR},
+            "scene": 0,
+            "scenes": [{"extras": self.frame.extras()}],
+        });
+        if self.nodes.is_empty() {
+            return json;
+        }
+        json["scenes"][0]["nodes"] = (0..self.nodes.len()).collect();
+        json["nodes"] = self.nodes.clone().into();
+        json["meshes"] = self.meshes.clone().into();
+        json["materials"] = json!([material(self.colored)]);
+        json["accessors"] = self.accessors.clone().into();
+        json["bufferViews"] = self.views.clone().into();
+        let mut buffers = vec![json!({"byteLength": self.binary.len()})];
+        let extensions: &[&str] = match self.compression {
+            Compression::None => &[],
+            Compression::Quantized => &[QUANTIZATION],
+            Compression::Meshopt => &[QUANTIZATION, MESHOPT],
+        };
+        if self.compression == Compression::Meshopt {
+            buffers.push(json!({"byteLength": self.unpacked, "extensions": {MESHOPT: {"fallback": true}}}));
+        }
+        json["buffers"] = buffers.into();
+        if !extensions.is_empty() {
+            json["extensionsUsed"] = extensions.into();
+            json["extensionsRequired"] = extensions.into();
+        }
+        json
+    }
+}
+
+/// What `convert` makes of the values with these numbers.
+fn picked<T: Copy, B>(values: &[T], order: &[u32], convert: impl Fn(T) -> B) -> Vec<B> {
+    order.iter().map(|&v| convert(values[v as usize])).collect()
+}
+
+fn not_packed(error: meshopt::Error) -> Error {
+    Error::Broken(format!("a tile could not be packed: {error}"))
+}
+
+/// Dull and seen from both sides; white under vertex colours, which it multiplies.
+fn material(colored: bool) -> Value {
+    let mut surface = json!({"metallicFactor": 0.0, "roughnessFactor": 1.0});
+    if !colored {
+        surface["baseColorFactor"] = json!(PLAIN);
+    }
+    json!({"name": "terrain", "doubleSided": true, "pbrMetallicRoughness": surface})
+}

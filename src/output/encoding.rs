@@ -1,0 +1,103 @@
+//! How vertices and triangles become bytes: the choices, and the rounding of normals and colours.
+
+use serde::{Deserialize, Serialize};
+
+/// How a tile is packed. Positions are exact in all of them: rounding finds the lattice integers again.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Compression {
+    /// Quantized, then packed by the codecs of `EXT_meshopt_compression`.
+    #[default]
+    Meshopt,
+    /// Positions in 16 bits, normals and colours in 8 (`KHR_mesh_quantization`).
+    Quantized,
+    /// Plain glTF: positions and normals in single precision, colours in 16 bits.
+    None,
+}
+
+/// The normal x, y up, z of a mesh in signed bytes, 127 for 1, whose node stretches it by 1, `anisotropy`, 1: readers divide
+/// normals by that. The fourth byte is padding.
+#[inline(always)]
+pub(super) fn normal_bytes([x, y, z]: [f32; 3], anisotropy: f32) -> [i8; 4] {
+    let y = y * anisotropy;
+    let scale = 127.0 / (x * x + y * y + z * z).sqrt();
+    let byte = |v: f32| (v * scale).round() as i8;
+    [byte(x), byte(y), byte(z), 0]
+}
+
+/// The same normal as two signed bytes on the octahedron, 127 for 1, as the octahedral filter of `EXT_meshopt_compression`
+/// has it: smaller when packed.
+#[inline(always)]
+pub(super) fn normal_octahedral([x, y, z]: [f32; 3], anisotropy: f32) -> [i8; 4] {
+    let y = y * anisotropy;
+    let scale = 1.0 / (x.abs() + y.abs() + z.abs());
+    let (u, v) = (x * scale, y * scale);
+    let (u, v) =
+        if z >= 0.0 { (u, v) } else { (1.0f32.copysign(u) * (1.0 - v.abs()), 1.0f32.copysign(v) * (1.0 - u.abs())) };
+    let byte = |v: f32| (v * 127.0).round() as i8;
+    [byte(u), byte(v), 127, 0]
+}
+
+/// The normal in signed bytes of [`normal_octahedral`]: what the filter gives. In single precision and this order of
+/// operations everywhere, so that what is unpacked does not depend on the machine.
+#[inline(always)]
+pub(super) fn from_octahedral([u, v, one, padding]: [i8; 4]) -> [i8; 4] {
+    let one = f32::from(one.max(1));
+    let (u, v) = (f32::from(u) / one, f32::from(v) / one);
+    let z = 1.0 - u.abs() - v.abs();
+    let fold = (-z).max(0.0);
+    let (x, y) = (u - fold.copysign(u), v - fold.copysign(v));
+    let scale = 127.0 / (x * x + y * y + z * z).sqrt();
+    let byte = |v: f32| (v * scale).round() as i8;
+    [byte(x), byte(y), byte(z), padding]
+}
+
+/// A linear colour in bytes, opaque.
+pub(super) fn color_bytes([r, g, b]: [u16; 3]) -> [u8; 4] {
+    let byte = |v: u16| ((v as u32 * 255 + 32767) / 65535) as u8;
+    [byte(r), byte(g), byte(b), u8::MAX]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Unit normals that point up, on a spiral.
+    fn normals() -> impl Iterator<Item = [f32; 3]> {
+        (0..5_000).map(|i| {
+            let (up, turn) = ((i as f32 + 0.5) / 5_000.0, i as f32 * 2.4);
+            let across = (1.0 - up * up).sqrt();
+            [across * turn.cos(), up, across * turn.sin()]
+        })
+    }
+
+    /// Degrees between a normal and what a viewer makes of its bytes.
+    fn error([x, y, z]: [f32; 3], bytes: [i8; 4], anisotropy: f32) -> f32 {
+        let [a, b, c] = [f32::from(bytes[0]), f32::from(bytes[1]) / anisotropy, f32::from(bytes[2])];
+        let cosine = (x * a + y * b + z * c) / (a * a + b * b + c * c).sqrt();
+        cosine.min(1.0).acos().to_degrees()
+    }
+
+    #[test]
+    fn normals_in_bytes_are_true_to_a_degree() {
+        let worst = |of: &dyn Fn([f32; 3]) -> f32| normals().map(of).fold(0.0, f32::max);
+        assert!(worst(&|n| error(n, normal_bytes(n, 1.0), 1.0)) < 0.5);
+        assert!(worst(&|n| error(n, from_octahedral(normal_octahedral(n, 1.0)), 1.0)) < 1.0);
+        for anisotropy in [0.25, 4.0] {
+            assert!(worst(&|n| error(n, normal_bytes(n, anisotropy), anisotropy)) < 2.0);
+            assert!(worst(&|n| error(n, from_octahedral(normal_octahedral(n, anisotropy)), anisotropy)) < 4.0);
+        }
+    }
+
+    #[test]
+    fn the_filter_is_that_of_meshoptimizer() {
+        for normal in normals() {
+            let packed = normal_octahedral(normal, 1.0);
+            let mut theirs = [packed];
+            meshopt::decode_filter_oct(&mut theirs);
+            let ours = from_octahedral(packed);
+            assert!((0..4).all(|k| ours[k].abs_diff(theirs[0][k]) <= 1), "{packed:?}: {ours:?}, theirs {theirs:?}");
+        }
+        assert_eq!(from_octahedral([0, 0, 0, 0]), [0, 0, 127, 0]);
+    }
+}

@@ -1,0 +1,94 @@
+//! A point cloud of any bytes: opened, planned for, decoded.
+
+use std::path::Path;
+use std::sync::LazyLock;
+
+use gdt_batch::config::Config;
+use gdt_batch::geometry::lattice::{AxisMap, REACH};
+use gdt_batch::input::{Point, Rules, Source, Tally, TextOptions, open};
+use gdt_batch::job::choose::Coarser;
+use gdt_batch::job::scan;
+use gdt_batch::{Error, Result};
+
+use super::with_file;
+
+/// More points than this are not waited for: a few bytes may promise very many.
+const ENOUGH: u64 = 200_000;
+
+/// The bytes of a LAS or LAZ file.
+pub(crate) fn las(bytes: &[u8]) {
+    with_file(".las", bytes, |path| read(path, &TextOptions::default()));
+}
+
+/// The first byte says which options are set, the others are the text.
+pub(crate) fn text(bytes: &[u8]) {
+    let Some((&choice, text)) = bytes.split_first() else { return };
+    let bit = |bit: u8| choice >> bit & 1 == 1;
+    let columns = || ["z", "-", "x", "y", "class"].map(String::from).to_vec();
+    let options = TextOptions {
+        delimiter: bit(0).then_some(if bit(1) { ';' } else { ' ' }),
+        header: bit(2).then_some(bit(3)),
+        columns: bit(4).then(columns),
+        comment: bit(5).then(|| "%".to_owned()),
+    };
+    with_file(".csv", text, |path| read(path, &options));
+}
+
+fn read(path: &Path, options: &TextOptions) {
+    let Ok(source) = open(path, options) else { return };
+    plan(path, options);
+    let Some(rules) = rules(&source) else { return };
+    let mut seen = 0;
+    for piece in 0..source.pieces() {
+        match decode(&source, piece, &rules, &mut seen) {
+            Ok(tally) => check(&tally),
+            Err(Error::Memory(_)) => return,
+            Err(error) => panic!("{error}"),
+        }
+    }
+}
+
+/// The first step of a job on the file: whatever its header says, a plan or a sentence.
+fn plan(path: &Path, options: &TextOptions) {
+    static CONFIG: LazyLock<Config> = LazyLock::new(|| {
+        let text = b"[input]\nfiles = [\"a\"]\n[output]\ndirectory = \"out\"\n[limits]\nthreads = 1\n";
+        with_file(".toml", text, |path| Config::load(path).expect("the least configuration"))
+    });
+    let mut config = CONFIG.clone();
+    config.input.files = vec![path.to_str().expect("a plain path").to_owned()];
+    config.input.csv = options.clone();
+    if let Err(error) = scan::run(&config, Coarser::default()) {
+        assert!(matches!(error.exit_code(), 2 | 3) && error.to_string().len() < 4000, "{error}");
+    }
+}
+
+/// A lattice that is the file's own steps.
+fn rules(source: &Source) -> Option<Rules> {
+    let map = |axis: usize| {
+        let own = source.axes[axis];
+        AxisMap::new(own.offset, own.scale, own.offset, own.scale)
+    };
+    Some(Rules { maps: [map(0)?, map(1)?, map(2)?], classes: [true; 256], bounds: None, first_order: 5, rgb: true })
+}
+
+fn decode(source: &Source, piece: usize, rules: &Rules, seen: &mut u64) -> Result<Tally> {
+    let (mut kept, mut next) = (0, 0);
+    let mut sink = |points: &[Point]| {
+        for point in points {
+            assert!(point.position.iter().all(|v| (-REACH..=REACH).contains(v)));
+            assert!(point.order() >= next && point.order() - rules.first_order < source.records);
+            next = point.order() + 1;
+        }
+        kept += points.len() as u64;
+        *seen += points.len() as u64;
+        if *seen > ENOUGH { Err(Error::Memory("enough".into())) } else { Ok(()) }
+    };
+    let tally = source.decode(piece, rules, &mut sink)?;
+    assert_eq!(tally.kept, kept);
+    Ok(tally)
+}
+
+fn check(tally: &Tally) {
+    assert_eq!(tally.read, tally.withheld + tally.other_class + tally.out_of_bounds + tally.malformed + tally.kept);
+    assert_eq!(tally.malformed > 0, !tally.examples.is_empty());
+}

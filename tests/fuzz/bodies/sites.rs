@@ -1,0 +1,47 @@
+//! The triangulator on sites that provoke ties: few bits a coordinate, so that many are cocircular or collinear.
+
+use std::collections::BTreeSet;
+
+use gdt_batch::config::{Backend, Triangulation};
+use gdt_batch::geometry::Site;
+use gdt_batch::triangulation::mesh::Mesh;
+use gdt_batch::triangulation::{Triangulator, reference};
+
+use super::judge;
+
+/// More are slow to judge.
+const MOST: usize = 1500;
+
+/// The first byte says how the others become sites: how many bits a coordinate has, how far apart they are, and whether they
+/// are sheared, which makes parallelograms of squares.
+pub(crate) fn sites(bytes: &[u8]) {
+    let sites = sites_of(bytes);
+    let wanted = Triangulation { backend: Backend::Cpu, ..Triangulation::default() };
+    let triangulator = Triangulator::new(&wanted, 1 << 28, 1).expect("the CPU is always there");
+    let (mesh, _) = triangulator.triangulate(&sites).expect("a mesh of distinct sites");
+    judge::judge(&sites, &mesh);
+    let expected = reference::triangulate(&sites).expect("a mesh of distinct sites");
+    assert!(triangles(&mesh) == triangles(&expected), "the pipeline and the reference differ");
+}
+
+fn sites_of(bytes: &[u8]) -> Vec<Site> {
+    let Some((&choice, bytes)) = bytes.split_first() else { return Vec::new() };
+    let (bits, far, shear) = (choice & 7, choice >> 3 & 3, choice >> 5);
+    let step = [1, 3, 1 << 12, 1 << 20][far as usize];
+    let coordinate = |byte: u8| (byte >> (7 - bits)) as i32 - (1 << bits >> 1);
+    let site = |pair: &[u8]| {
+        let [x, y] = [coordinate(pair[0]), coordinate(pair[1])];
+        [step * (x + shear as i32 * y / 2), step * (y - shear as i32 * x / 3)]
+    };
+    // Distinct and in rows, as a leaf has them.
+    let distinct: BTreeSet<[i32; 2]> = bytes.chunks_exact(2).take(MOST).map(site).map(|[x, y]| [y, x]).collect();
+    distinct.into_iter().map(|[y, x]| [x, y]).collect()
+}
+
+fn triangles(mesh: &Mesh) -> BTreeSet<[u32; 3]> {
+    let turned = |corners: &[u32; 3]| {
+        let least = (0..3).min_by_key(|&i| corners[i]).unwrap_or(0);
+        [0, 1, 2].map(|i| corners[(least + i) % 3])
+    };
+    mesh.triangles.iter().map(turned).collect()
+}

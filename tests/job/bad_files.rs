@@ -1,0 +1,172 @@
+//! Bad files among good ones: the job stops, or goes on as if they had never been named, and says so loudly. Files that
+//! change under a job's hands.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use gdt_batch::Error;
+use gdt_batch::config::{Config, OnBadFile};
+use gdt_batch::job::choose::Coarser;
+use gdt_batch::job::directory::Directory;
+use gdt_batch::job::progress::Progress;
+use gdt_batch::job::scan::Plan;
+use gdt_batch::job::{partition, scan};
+use serde_json::Value;
+
+use crate::las_file::{LasFile, points_at};
+use crate::program::{Job, Said, number};
+
+/// Writes `bytes` under `name`.
+fn write(folder: &Path, name: &str, bytes: &[u8]) -> PathBuf {
+    let path = folder.join(name);
+    fs::write(&path, bytes).unwrap();
+    path
+}
+
+fn good(folder: &Path) -> PathBuf {
+    write(folder, "good.laz", &LasFile::new(4, 7, 0, 3000).laz(&[500], false))
+}
+
+/// A layered LAZ of 900 points, the middle third of which is damaged, in steps of `scale`.
+fn damaged(scale: f64) -> Vec<u8> {
+    let file = LasFile::new(4, 7, 0, 900);
+    let mut bytes = file.laz(&[300], false);
+    let mut at = points_at(&bytes) + 8;
+    let numbers = |bytes: &[u8], at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+    // Over the first chunk: a record, its number of points, the size of each of ten layers, and the layers.
+    let layers: usize = (1..=10).map(|layer| numbers(&bytes, at + file.length() as usize + 4 * layer)).sum();
+    at += file.length() as usize + 4 + 4 * 10 + layers;
+    let size_of_a_layer = at + file.length() as usize + 4;
+    bytes[size_of_a_layer..size_of_a_layer + 4].copy_from_slice(&u32::MAX.to_le_bytes());
+    for axis in 0..2 {
+        bytes[131 + 8 * axis..139 + 8 * axis].copy_from_slice(&scale.to_le_bytes());
+    }
+    bytes
+}
+
+fn skipping(files: &[PathBuf]) -> Job {
+    Job::on(files).with("input", "on_bad_file = \"skip\"").tiles_of(200).threads(2)
+}
+
+/// What the job of `files` says and reports; its mesh must be that of `good` alone.
+#[track_caller]
+fn skips(files: &[PathBuf], good: &Path) -> (Said, Value) {
+    let job = skipping(files);
+    let said = job.run().succeeded();
+    let report: Value = serde_json::from_slice(&fs::read(job.out().join("report.json")).unwrap()).unwrap();
+    assert_eq!(job.verified()["digest"], Job::on(&[good]).tiles_of(200).digest());
+    assert_eq!(number(&report["points"]["read"]), 3000);
+    assert_eq!(number(&report["files"]), 1);
+    (said, report)
+}
+
+#[test]
+fn files_bad_at_first_sight_are_left_out_and_shouted_about() {
+    let folder = tempfile::tempdir().unwrap();
+    let good = good(folder.path());
+    let whole = fs::read(&good).unwrap();
+    let bad = [
+        write(folder.path(), "empty.las", b""),
+        write(folder.path(), "page.laz", b"<html>not found</html>"),
+        write(folder.path(), "cut.laz", &whole[..whole.len() / 2]),
+    ];
+    let files = [&bad[..1], std::slice::from_ref(&good), &bad[1..]].concat();
+    Job::on(&files).run().refused(3, &["empty.las", "is empty"]);
+    let (said, report) = skips(&files, &good);
+    for words in
+        ["LEFT OUT: 3 of 4 input files", "empty.las: is empty", "page.laz: ", "cut.laz: says that it holds 3000"]
+    {
+        assert!(said.out.contains(words), "{words}: {}", said.out);
+    }
+    assert!(said.err.trim_end().lines().last().unwrap().starts_with("LEFT OUT: 3 of 4 input files"), "{}", said.err);
+    assert!(said.err.contains("left out: ") && said.err.contains("page.laz"), "{}", said.err);
+    let files_of = |report: &Value| report["skipped"].as_array().unwrap().len();
+    assert_eq!(files_of(&report), 3);
+    let job = skipping(&files);
+    let check = job.run_with(&["check"]).succeeded().out;
+    assert!(check.contains("LEFT OUT: 3 of 4 input files") && check.contains("page.laz"), "{check}");
+    let quiet = job.run_with(&["--quiet", "--json"]).succeeded();
+    assert_eq!((quiet.err.lines().count(), files_of(&quiet.json())), (1, 3), "even when quiet: {}", quiet.err);
+}
+
+#[test]
+fn a_file_damaged_in_its_middle_is_left_out_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let good = good(folder.path());
+    // With the good file's step; and with a finer one, so that the whole job would lie on a finer lattice.
+    for scale in [0.01, 0.0005] {
+        let bad = write(folder.path(), "damaged.laz", &damaged(scale));
+        for files in [[bad.clone(), good.clone()], [good.clone(), bad.clone()]] {
+            Job::on(&files).run().refused(3, &["damaged.laz", "chunk 1 is damaged", "on_bad_file"]);
+            let (said, report) = skips(&files, &good);
+            assert!(said.out.contains("damaged.laz: 300 of 900 records are malformed"), "{}", said.out);
+            assert_eq!(report["lattice"]["resolution"], "0.01");
+            let times_read = said.err.matches("read: done").count();
+            assert_eq!(times_read, if scale == 0.01 { 1 } else { 2 }, "{}", said.err);
+        }
+    }
+}
+
+#[test]
+fn each_file_is_judged_by_itself() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows = |count: usize| (0..count).map(|i| format!("{},{},{}\n", i * 7 % 101, i * i % 89, i)).collect::<String>();
+    let good = write(folder.path(), "large.csv", rows(1000).as_bytes());
+    let sound = write(folder.path(), "sound.csv", (rows(96) + &"1,2\n".repeat(4)).as_bytes());
+    let bad = write(folder.path(), "bad.csv", (rows(94) + &"1,2\n".repeat(6)).as_bytes());
+    let job = Job::on(&[good, sound, bad]).with("input", "malformed_share = 0.05");
+    assert_eq!(number(&job.report()["points"]["malformed"]), 10, "ten of 1200 is little, and one share for all");
+    let report = job.with("input", "on_bad_file = \"skip\"").report();
+    assert_eq!((number(&report["points"]["read"]), number(&report["points"]["malformed"])), (1100, 4));
+    assert!(report["skipped"][0]["file"].as_str().unwrap().ends_with("bad.csv"), "{}", report["skipped"]);
+}
+
+#[test]
+fn a_job_of_bad_files_alone_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let empty = write(folder.path(), "empty.las", b"");
+    let bad = write(folder.path(), "damaged.laz", &damaged(0.01));
+    skipping(std::slice::from_ref(&empty)).run().refused(3, &["no input is left", "all 1 are bad", "empty.las"]);
+    skipping(&[empty, bad]).run().refused(3, &["no input is left", "all 2 are bad"]);
+}
+
+/// A job that has looked at its inputs, and what it has found.
+fn planned(folder: &Path) -> (Directory, Plan) {
+    let good = good(folder);
+    let job = skipping(&[good]);
+    let plan = scan::run(&Config::load(&job.config()).unwrap(), Coarser::default()).unwrap();
+    (Directory::new(&folder.join("out")), plan)
+}
+
+/// What step 2 says after `change` to the input.
+fn error_after(change: impl Fn(&Path)) -> Error {
+    let folder = tempfile::tempdir().unwrap();
+    let (directory, plan) = planned(folder.path());
+    let _lock = directory.create().unwrap();
+    change(&plan.sources[0].0.path);
+    let task = partition::Task {
+        sources: &plan.sources,
+        extent: plan.extent,
+        points_per_tile: 1000,
+        memory: 1 << 20,
+        malformed_share: 0.0,
+        on_bad_file: OnBadFile::Skip,
+    };
+    partition::run(&task, &directory, &Progress::Quiet.stage("read", 0, "points")).unwrap_err()
+}
+
+#[test]
+fn what_changes_while_it_is_read_may_be_tried_again_even_where_bad_files_are_skipped() {
+    let cut = |path: &Path| {
+        let bytes = fs::read(path).unwrap();
+        fs::write(path, &bytes[..bytes.len() / 2]).unwrap();
+    };
+    for (error, words) in [
+        (error_after(|path| fs::remove_file(path).unwrap()), "good.laz"),
+        (error_after(cut), "has changed while it was in use"),
+        (error_after(|path| fs::write(path, vec![7; 1 << 20]).unwrap()), "to 1048576; run again"),
+    ] {
+        assert_eq!(error.exit_code(), 1, "{error}");
+        assert!(error.to_string().contains(words), "{error}");
+    }
+}

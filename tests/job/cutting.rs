@@ -1,0 +1,106 @@
+//! Long triangles are left out of the terrain, and nothing of the exact mesh is lost.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::clouds;
+use crate::common::shared;
+use crate::program::{Job, gdt_batch, number};
+
+/// Two square fields of points 10 apart, and a void 2,000 wide between them.
+fn two_fields() -> clouds::Cloud {
+    let field = |west: i64| (0..60 * 60).map(move |i| [west + i % 60 * 10, i / 60 * 10 + i % 3, i % 7]);
+    field(0).chain(field(2_600)).collect()
+}
+
+/// The digest of only what is written, after a look at the whole; takes `cut/` away.
+#[track_caller]
+fn digest_of_written(job: &Job) -> String {
+    fs::remove_dir_all(job.out().join("cut")).unwrap();
+    let verdict = job.verified();
+    assert!(verdict["unproved"].as_str().unwrap().contains("triangles were left out"));
+    verdict["digest"].as_str().unwrap().to_owned()
+}
+
+#[test]
+fn what_is_left_out_does_not_depend_on_the_tiles_and_the_whole_is_exact() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = clouds::write(folder.path(), "cloud.csv", &two_fields());
+    let whole = Job::on(&[&file]).digest();
+    for max_edge in ["100", "\"auto\""] {
+        let mut written: Option<(u64, String)> = None;
+        for (sites, compression) in [(300, "meshopt"), (1_000, "none"), (50_000, "quantized")] {
+            let line = format!("max_edge = {max_edge}\ncompression = \"{compression}\"");
+            let job = Job::on(&[&file]).tiles_of(sites).with("output", &line);
+            let report = job.report();
+            let verdict = job.verified();
+            assert_eq!((verdict["digest"].as_str(), verdict["unproved"].is_null()), (Some(&whole[..]), true));
+            let cut = number(&report["cut_triangles"]);
+            assert!(cut > 10 && number(&verdict["cut"]) == cut, "{cut} triangles");
+            assert_eq!(number(&verdict["triangles"]), cut + number(&report["triangles"]));
+            let found = (cut, digest_of_written(&job));
+            assert_eq!(*written.get_or_insert(found.clone()), found, "{sites} sites a tile, {max_edge}");
+        }
+        assert_ne!(written.unwrap().1, whole);
+    }
+}
+
+#[test]
+fn the_void_is_empty_in_the_preview() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = clouds::write(folder.path(), "cloud.csv", &two_fields());
+    let middle = |job: Job| {
+        job.report();
+        let png = fs::read(job.out().join("preview.png")).unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(&png)).read_info().unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut pixels).unwrap();
+        let (width, height) = (reader.info().width as usize, reader.info().height as usize);
+        pixels[4 * (height / 2 * width + width / 2) + 3]
+    };
+    assert_eq!(middle(Job::on(&[&file])), 255);
+    assert_eq!(middle(Job::on(&[&file]).with("output", "max_edge = 100.0")), 0);
+}
+
+#[test]
+fn a_lost_file_of_what_was_left_out_is_noticed() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = clouds::write(folder.path(), "cloud.csv", &two_fields());
+    let job = Job::on(&[&file]).tiles_of(1_000).with("output", "max_edge = \"auto\"");
+    job.report();
+    let cut = fs::read_dir(job.out().join("cut")).unwrap().next().unwrap().unwrap().path();
+    fs::remove_file(cut).unwrap();
+    let said = gdt_batch(job.folder(), &["verify", "out"]);
+    assert_eq!(said.code, 4);
+    assert!(said.out.contains("left out, where report.json says"), "{}", said.out);
+}
+
+#[test]
+fn all_or_nothing_may_be_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = clouds::write(folder.path(), "cloud.csv", &two_fields());
+    Job::on(&[&file]).with("output", "max_edge = 1").run().refused(2, &["max_edge", "all", "greater"]);
+    let job = Job::on(&[&file]).with("output", "max_edge = 100");
+    job.report();
+    assert!(job.out().join("cut").is_dir());
+    let job = job.with("output", "").with("input", "bounds = [0, 0, 590, 700]");
+    let report: Value = job.report();
+    assert_eq!(number(&report["cut_triangles"]), 0);
+    assert!(!job.out().join("cut").exists(), "nothing of an earlier job stays");
+    job.verified();
+}
+
+#[test]
+fn a_real_river() {
+    let Some(data) = shared().map(|shared| shared.join("data")) else { return };
+    let ground = |sites| {
+        let job = Job::on(&[data.join("Topography.laz")]).with("input", "classes = [2]").tiles_of(sites);
+        job.with("output", "max_edge = \"auto\"")
+    };
+    let (few, many) = (ground(50_000), ground(700));
+    let counts = [&few, &many].map(|job| number(&job.report()["cut_triangles"]));
+    assert_eq!(few.verified()["digest"], many.verified()["digest"]);
+    assert!(counts[0] == counts[1] && counts[0] > 0, "{counts:?}");
+    assert_eq!(digest_of_written(&few), digest_of_written(&many));
+}

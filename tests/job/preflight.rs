@@ -1,0 +1,77 @@
+//! Before a job: what it will need is estimated, compared with what there is, and refused unless one insists.
+
+use std::fs;
+use std::path::Path;
+
+use gdt_batch::config::Config;
+use gdt_batch::job::check::{self, Preflight};
+
+use crate::clouds;
+use crate::las_file::{LasFile, points_at};
+use crate::program::{Job, number};
+
+fn small_job(folder: &Path) -> Job {
+    let file = clouds::write(folder, "cloud.csv", &clouds::uniform(100_000, 1_000_000, 4));
+    Job::on(&[file])
+}
+
+#[test]
+fn what_is_not_there_is_refused_and_may_be_tried_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let preflight = check::run(&Config::load(&small_job(folder.path()).config()).unwrap()).unwrap();
+    preflight.passes().unwrap();
+    let need = preflight.disk;
+    for (lacking, words) in [
+        (Preflight { disk_free: Some(need - 1), ..preflight.clone() }, "make room or choose another"),
+        (Preflight { memory_free: Some(1 << 20), ..preflight.clone() }, "lower [limits] threads"),
+        (Preflight { output: folder.path().join("cloud.csv/out"), ..preflight.clone() }, "cloud.csv/out"),
+    ] {
+        // Nothing is made at a path that leads through a file, but above it there is a directory.
+        let Err(error) = lacking.passes() else {
+            assert!(words.ends_with("/out"));
+            continue;
+        };
+        assert_eq!(error.exit_code(), 1, "{error}");
+        assert!(error.to_string().contains(words) && error.to_string().contains("--force"), "{error}");
+    }
+    Preflight { disk_free: Some(need), memory_free: None, ..preflight }.passes().unwrap();
+}
+
+#[test]
+fn the_estimate_of_the_disk_is_no_guess() {
+    let folder = tempfile::tempdir().unwrap();
+    let job = small_job(folder.path());
+    let estimate = job.run_with(&["check", "--json"]).succeeded().json();
+    let report = job.report();
+    for (estimated, real) in [("temporary", "bytes_temporary"), ("results", "bytes_written")] {
+        let ratio = number(&estimate[estimated]) as f64 / number(&report[real]) as f64;
+        assert!((0.9..2.0).contains(&ratio), "{estimated}: {ratio} times what it came to");
+    }
+}
+
+/// A file of few bytes that promises four thousand million points in one chunk.
+fn bomb() -> Vec<u8> {
+    let mut bytes = LasFile::new(4, 7, 0, 1000).laz(&[1000], false);
+    let chunk_size = 375 + 54 + 12;
+    bytes[chunk_size..chunk_size + 4].copy_from_slice(&(u32::MAX - 1).to_le_bytes());
+    bytes[247..255].copy_from_slice(&4_000_000_000u64.to_le_bytes());
+    assert!(points_at(&bytes) > chunk_size);
+    bytes
+}
+
+#[test]
+fn a_job_larger_than_the_disk_is_refused_unless_forced() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("bomb.laz");
+    fs::write(&file, bomb()).unwrap();
+    let job = Job::on(&[file]);
+    let check = job.run_with(&["check", "--json"]);
+    let [need, free] = ["disk", "disk_free"].map(|name| number(&check.json()[name]));
+    assert!(need > 100 << 30, "{need}");
+    if need > free {
+        check.refused(1, &["make room", "--force"]);
+        job.run().refused(1, &["make room", "--force"]);
+    }
+    assert!(!job.out().exists(), "a refused job writes nothing");
+    job.run_with(&["--force"]).refused(3, &["bomb.laz", "only 1000 points"]);
+}
