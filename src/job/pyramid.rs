@@ -4,7 +4,7 @@
 use super::tree::{Kind, Tree};
 
 /// Bytes that a site takes while the meshes below a tile are joined and simplified.
-pub const BYTES_PER_LEVEL_SITE: u64 = 450;
+pub const BYTES_PER_LEVEL_SITE: u64 = 550;
 
 /// What a tile of the tileset is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,6 +47,11 @@ pub struct Sizes {
 }
 
 impl Sizes {
+    /// Tiles of at most so many `sites`, fewer where four of them do not fit `memory`.
+    pub fn new(sites: u64, memory: u64) -> Sizes {
+        Sizes { sites: sites.min(memory / (4 * BYTES_PER_LEVEL_SITE)).max(1), memory }
+    }
+
     /// About how many triangles a tile is to have whose children together have `triangles`.
     pub fn target(self, triangles: usize) -> usize {
         (triangles / 4).min((2 * self.sites as usize).max(triangles / 16)).max(1)

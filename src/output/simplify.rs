@@ -10,6 +10,8 @@
 //! with short edges.
 
 mod ring;
+#[cfg(test)]
+mod tests;
 mod topology;
 
 use super::Tile;
