@@ -18,7 +18,9 @@ The least configuration:
   directory = \"out\"
 All options, explained: configs/full.toml
 
-Exit codes: 0 done; 1 may be retried (disk, memory); 2 command line or configuration;
+A job that was interrupted goes on where it was when the same command is run again.
+
+Exit codes: 0 done; 1 may be retried (disk, memory, Ctrl-C); 2 command line or configuration;
 3 bad input; 4 a guarantee does not hold (verify failed, or an internal check).";
 
 /// One exact Delaunay terrain out of point clouds of any size, as glTF tiles.
@@ -30,6 +32,9 @@ pub struct Cli {
     pub command: Option<Command>,
     /// The configuration of the job to run (TOML).
     pub config: Option<PathBuf>,
+    /// Start over where an interrupted run of the job could be gone on with.
+    #[arg(long, requires = "config")]
+    pub fresh: bool,
     /// Run the job even where the disk or the memory does not seem to suffice.
     #[arg(long, requires = "config")]
     pub force: bool,

@@ -29,6 +29,19 @@ pub enum Error {
     /// The job does not fit the memory it was given (exit code 1).
     #[error("not enough memory: {0}")]
     Memory(String),
+    /// The process was asked to stop (exit code 1).
+    #[error("interrupted")]
+    Interrupted,
+    /// A job stopped, and what it has finished is kept (exit code as of the reason).
+    #[error("{why}\nfinished steps are kept in {} ({steps}): run the same command again to go on", job.display())]
+    Resumable {
+        /// Why it stopped.
+        why: Box<Error>,
+        /// How many steps are finished.
+        steps: u64,
+        /// The job directory.
+        job: PathBuf,
+    },
     /// The command line or the configuration is wrong (exit code 2).
     #[error("{0}")]
     Config(String),
@@ -62,6 +75,7 @@ fn remedy(error: &std::io::Error) -> &'static str {
         std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded => {
             "; make room or choose another [output] directory, and run again"
         }
+        std::io::ErrorKind::FileTooLarge => "; raise the limit on the size of files (ulimit -f), and run again",
         std::io::ErrorKind::PermissionDenied => "; check who may read and write there",
         _ => "",
     }
@@ -71,7 +85,8 @@ impl Error {
     /// The process exit code: 1 may be retried, 2 usage or configuration, 3 bad input, 4 internal invariant broken.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Error::Io { .. } | Error::InUse { .. } | Error::Memory(_) => 1,
+            Error::Io { .. } | Error::InUse { .. } | Error::Memory(_) | Error::Interrupted => 1,
+            Error::Resumable { why, .. } => why.exit_code(),
             Error::Config(_) | Error::TooFine { .. } => 2,
             Error::Input { .. } | Error::NoTerrain(_) => 3,
             Error::Broken(_) => 4,

@@ -5,9 +5,11 @@
 pub mod cli;
 pub mod config;
 pub mod error;
+mod fault;
 pub mod geometry;
 pub mod gpu;
 pub mod input;
+pub mod interrupt;
 pub mod job;
 pub mod output;
 pub mod positioned;

@@ -5,7 +5,7 @@ use gdt_batch::cli::{Cli, Command, Talk};
 use gdt_batch::config::Config;
 use gdt_batch::gpu::selftest;
 use gdt_batch::job::{self, Options, check, progress::Progress, report::skipped_summary};
-use gdt_batch::{Error, Result, input, sample, verify};
+use gdt_batch::{Error, Result, input, interrupt, sample, verify};
 use serde::Serialize;
 use std::fmt::Display;
 use std::io::Write;
@@ -35,15 +35,20 @@ fn run(cli: Cli) -> Result<ExitCode> {
         (Some(Command::Info { files }), _) => info(&files, talk)?,
         (Some(Command::Gpu { adapter, side }), _) => return test_gpu(adapter.as_deref(), side, talk),
         (Some(Command::Sample { file, points, seed }), _) => sample::write(&file, points, seed)?,
-        (None, Some(config)) => run_job(&Config::load(&config)?, cli.force, talk)?,
+        (None, Some(config)) => {
+            let progress = Progress::detect(talk.quiet);
+            let options = Options { progress, force: cli.force, fresh: cli.fresh };
+            run_job(&Config::load(&config)?, options, talk)?;
+        }
         (None, None) => return Err(Error::Config("name a configuration file; --help shows how".into())),
     }
     Ok(ExitCode::SUCCESS)
 }
 
 /// Runs a job and says what it came to: on standard error too, and even when quiet, if files were left out.
-fn run_job(config: &Config, force: bool, talk: Talk) -> Result<()> {
-    let report = job::run(config, Options { progress: Progress::detect(talk.quiet), force })?;
+fn run_job(config: &Config, options: Options, talk: Talk) -> Result<()> {
+    interrupt::listen()?;
+    let report = job::run(config, options)?;
     show(&report, talk)?;
     if let Some(summary) = skipped_summary(report.files, &report.skipped) {
         eprintln!("{summary}: see {}", config.output.directory.join("report.json").display());

@@ -1,11 +1,11 @@
 //! Where the points of a job lie, as far as headers can be believed.
 
 use super::partition::around;
-use crate::Result;
 use crate::config::Config;
 use crate::geometry::lattice::AxisMap;
 use crate::input::{Axis, Format, Rules, Source};
 use crate::output::frame::Frame;
+use crate::{Result, interrupt};
 use rayon::prelude::*;
 use rust_decimal::Decimal;
 use rust_decimal::prelude::ToPrimitive;
@@ -104,6 +104,7 @@ fn measure(source: &Source, classes: &[bool; 256], pieces: Range<usize>) -> Resu
     };
     let rules = Rules { maps: [x, y, z], classes: *classes, bounds: None, first_order: 0, rgb: false };
     let measure_piece = |piece| {
+        interrupt::check()?;
         let mut found = None;
         source.decode(piece, &rules, &mut |points| {
             let boxes = points.iter().map(|p| [[p.position[0], p.position[1], p.z]; 2]);

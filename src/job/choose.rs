@@ -7,6 +7,7 @@ use crate::output::frame::Frame;
 use crate::{Error, Result};
 use rust_decimal::Decimal;
 use rust_decimal::prelude::ToPrimitive;
+use serde::{Deserialize, Serialize};
 
 /// The lattice for `sources` in `area`, `metres` and `metres_z` the units of x and y and of z; `wanted` is the user's step. What had
 /// to be rounded goes to `warnings`.
@@ -27,7 +28,7 @@ pub(super) fn lattice(
 }
 
 /// How many tens coarser than it would be the lattice is to be, because it proved too fine for the mesh.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Coarser {
     /// In x and y.
     pub horizontal: u32,

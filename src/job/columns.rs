@@ -1,18 +1,13 @@
 //! A record of the store: a few columns of plain values each, in the machine's byte order.
 
-use super::store::{HEAD, Key, Store};
+use super::store::{Key, Store, Stored};
 use crate::{Error, Result};
 use bytemuck::Pod;
 
 /// Collects columns and writes them as one record.
+#[derive(Default)]
 pub struct ColumnWriter {
     bytes: Vec<u8>,
-}
-
-impl Default for ColumnWriter {
-    fn default() -> ColumnWriter {
-        ColumnWriter { bytes: vec![0; HEAD] }
-    }
 }
 
 impl ColumnWriter {
@@ -27,8 +22,8 @@ impl ColumnWriter {
     ///
     /// # Errors
     /// [`Error::Io`] if that fails.
-    pub fn write(mut self, store: &Store, key: Key) -> Result<()> {
-        store.put(key, &mut self.bytes)
+    pub fn write(self, store: &Store, key: Key) -> Result<Stored> {
+        store.put(key, &self.bytes)
     }
 }
 

@@ -168,6 +168,6 @@ mod tests {
         assert!(!cut.leaves_out(long(200, 90)) && cut.leaves_out(long(200, 120)));
         assert!(!cut.leaves_out(long(3_000, 360)) && cut.leaves_out(long(3_000, 480)));
         // From the dense part into the sparse one the sparse one counts.
-        assert!(!cut.leaves_out(long(900, 360)));
+        assert!(!cut.leaves_out(long(940, 390)));
     }
 }

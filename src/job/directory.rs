@@ -1,10 +1,12 @@
 //! The job directory: everything a job knows, on disk, and where the results go. Any step can be run again from it.
 
-use crate::{Error, Result};
+use crate::{Error, Result, fault};
 use serde::Serialize;
+use std::collections::{BTreeSet, HashSet};
 use std::fs::{self, File, TryLockError};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
+use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 
 /// The paths of a job.
 #[derive(Clone, Debug)]
@@ -19,33 +21,70 @@ impl Directory {
         Directory { output: output.to_path_buf(), job: output.join("job") }
     }
 
-    /// Makes the directories, empty of what an earlier job has left, and keeps other processes out until the lock is dropped.
-    /// Removes nothing that a job has not written.
+    /// Makes the job directory, if it is not there, and keeps other processes out of it until the lock is dropped.
     ///
     /// # Errors
-    /// [`Error::Io`] if they cannot be made or emptied, [`Error::Config`] if they are somebody else's or in use.
-    pub fn create(&self) -> Result<Lock> {
+    /// [`Error::Io`] if it cannot be made, [`Error::InUse`] if another process has it, [`Error::Config`] if it is somebody
+    /// else's.
+    pub fn lock(&self) -> Result<Lock> {
         if self.output.exists() && !self.output.is_dir() {
             return Err(Error::Config(format!("[output] directory: {} is a file", self.output.display())));
         }
         // A kill can leave an empty one.
         let is_new = fs::read_dir(&self.job).map_or(true, |mut entries| entries.next().is_none());
-        fs::create_dir_all(&self.job).map_err(Error::io("create the directory", &self.job))?;
-        let lock = Lock::take(&self.job, is_new)?;
-        for tiles in [self.tiles(), self.levels()] {
-            fs::create_dir_all(&tiles).map_err(Error::io("create the directory", &tiles))?;
-            remove_old_tiles(&tiles)?;
+        create_directory(&self.job)?;
+        Lock::take(&self.job, is_new)
+    }
+
+    /// Takes the lock, and leaves nothing of an earlier job.
+    ///
+    /// # Errors
+    /// As [`Directory::lock`] and [`Directory::sweep`].
+    pub fn create(&self) -> Result<Lock> {
+        let lock = self.lock()?;
+        remove_file(&self.journal())?;
+        self.sweep(&HashSet::new())?;
+        Ok(lock)
+    }
+
+    /// Makes the folder of the tiles, and removes what an earlier run has left, but for the files of `keep`, named as in the
+    /// journal. Removes nothing that a job has not written.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the folder cannot be made or a file cannot be removed.
+    pub fn sweep(&self, keep: &HashSet<PathBuf>) -> Result<()> {
+        create_directory(&self.tiles())?;
+        let mut old = numbered_files(&self.tiles())?;
+        if self.levels().is_dir() {
+            old.extend(numbered_files(&self.levels())?);
         }
         if self.cut().is_dir() {
-            remove_old_tiles(&self.cut())?;
-            // What is somebody else's in it stays.
-            let _ = fs::remove_dir(self.cut());
+            old.extend(numbered_files(&self.cut())?);
         }
-        let results = [self.terrain(), self.tileset(), self.georeference(), self.report(), self.preview()];
-        for stale in [self.spill(), self.store()].into_iter().chain(results) {
-            remove_file(&stale)?;
-        }
-        Ok(lock)
+        let single = [self.spill(), self.store(), self.terrain(), self.georeference(), self.report(), self.preview()];
+        let single = single.into_iter().chain([self.tileset()]).collect::<Vec<_>>();
+        old.extend(single.iter().map(|path| partial(path)));
+        old.extend(single);
+        old.iter().filter(|path| !keep.contains(&self.name(path))).try_for_each(|path| remove_file(path))?;
+        // What is somebody else's in it stays, and so do triangles that are kept.
+        let _ = fs::remove_dir(self.cut());
+        let _ = fs::remove_dir(self.levels());
+        Ok(())
+    }
+
+    /// The job directory itself.
+    pub fn job(&self) -> &Path {
+        &self.job
+    }
+
+    /// The name of a file as the journal has it: relative to the output directory.
+    pub fn name(&self, path: &Path) -> PathBuf {
+        path.strip_prefix(&self.output).unwrap_or(path).to_path_buf()
+    }
+
+    /// The file of this name.
+    pub fn file(&self, name: &Path) -> PathBuf {
+        self.output.join(name)
     }
 
     /// Removes all that only the steps need.
@@ -53,12 +92,17 @@ impl Directory {
     /// # Errors
     /// [`Error::Io`] if that fails.
     pub fn clean_up(&self) -> Result<()> {
-        remove_file(&self.spill())?;
-        remove_file(&self.store())?;
-        // Only jobs with levels have use for it.
-        let _ = fs::remove_dir(self.levels());
+        for file in [self.spill(), self.store(), self.journal()] {
+            remove_file(&file)?;
+            fault::point("cleaning");
+        }
         // With the lock, which marks the directory as a job's own, last: a kill in between leaves what the next job may take.
         remove_directory(&self.job)
+    }
+
+    /// Which steps are finished, with what result.
+    pub fn journal(&self) -> PathBuf {
+        self.job.join("journal")
     }
 
     /// The points on their way from the inputs to the leaves.
@@ -84,6 +128,14 @@ impl Directory {
     /// The directory of the coarser tiles.
     pub fn levels(&self) -> PathBuf {
         self.output.join("levels")
+    }
+
+    /// Makes the directory of the coarser tiles.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be made.
+    pub fn create_levels(&self) -> Result<()> {
+        create_directory(&self.levels())
     }
 
     /// The GLB of the coarser tile at tree node `node`.
@@ -170,38 +222,113 @@ impl Lock {
     }
 }
 
-/// Writes `path` so that it appears under its name only when whole.
-///
-/// # Errors
-/// [`Error::Io`] if writing or renaming fails, or what `fill` returns.
-pub fn write_whole(path: &Path, fill: impl FnOnce(&mut File) -> std::io::Result<()>) -> Result<()> {
-    let partial = path.with_extension("partial");
-    let mut file = File::create(&partial).map_err(Error::io("create", &partial))?;
-    fill(&mut file).map_err(Error::io("write", &partial))?;
-    drop(file);
-    fs::rename(&partial, path).map_err(Error::io("rename the finished file to", path))
+/// A result of the job that a step has written. It waits under its [`partial`] name until [`publish`] has brought it to the
+/// disk.
+#[derive(Clone, Debug)]
+pub struct Written {
+    /// Where it will be.
+    pub path: PathBuf,
+    /// Its size in bytes.
+    pub bytes: u64,
+    /// The XXH3 of its content.
+    pub hash: u64,
 }
 
-/// Writes `value` as JSON to `path`, whole or not at all.
+/// Writes a result of the job under its [`partial`] name.
 ///
 /// # Errors
 /// [`Error::Io`] if writing fails.
-pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
-    let mut text = serde_json::to_vec_pretty(value).map_err(|e| Error::Broken(format!("{}: {e}", path.display())))?;
-    text.push(b'\n');
-    write_whole(path, |file| file.write_all(&text))
+pub fn write_result(path: &Path, content: &[u8]) -> Result<Written> {
+    let partial = partial(path);
+    fs::write(&partial, content).map_err(Error::io("write", &partial))?;
+    Ok(Written { path: path.into(), bytes: content.len() as u64, hash: xxh3_64(content) })
 }
 
-/// Removes the tiles of an earlier job, whole or not: files named by a number.
-fn remove_old_tiles(tiles: &Path) -> Result<()> {
-    for entry in fs::read_dir(tiles).map_err(Error::io("read", tiles))? {
-        let path = entry.map_err(Error::io("read", tiles))?.path();
-        let is_numbered = path.file_stem().is_some_and(|s| s.to_string_lossy().bytes().all(|b| b.is_ascii_digit()));
-        if is_numbered && path.extension().is_some_and(|e| e == "glb" || e == "partial") {
-            remove_file(&path)?;
+/// Writes `value` as JSON under the [`partial`] name of the result at `path`.
+///
+/// # Errors
+/// [`Error::Io`] if writing fails.
+pub fn write_json(path: &Path, value: &impl Serialize) -> Result<Written> {
+    let mut text = serde_json::to_vec_pretty(value).map_err(|e| Error::Broken(format!("{}: {e}", path.display())))?;
+    text.push(b'\n');
+    write_result(path, &text)
+}
+
+/// The result at `path` that has been written under its [`partial`] name by other means.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be read.
+pub fn written_result(path: &Path) -> Result<Written> {
+    let (bytes, hash) = digest(&partial(path))?;
+    Ok(Written { path: path.into(), bytes, hash })
+}
+
+/// The size and the XXH3 of the file at `path`.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be read.
+pub fn digest(path: &Path) -> Result<(u64, u64)> {
+    let mut file = File::open(path).map_err(Error::io("open", path))?;
+    let (mut hasher, mut bytes, mut buffer) = (Xxh3::new(), 0, vec![0; 1 << 18]);
+    loop {
+        let count = file.read(&mut buffer).map_err(Error::io("read", path))?;
+        if count == 0 {
+            return Ok((bytes, hasher.digest()));
         }
+        hasher.update(&buffer[..count]);
+        bytes += count as u64;
     }
-    Ok(())
+}
+
+/// The name under which the file at `path` waits until it is whole.
+pub fn partial(path: &Path) -> PathBuf {
+    path.with_extension("partial")
+}
+
+/// Gives results their names: only once all of each is on the disk, and such that the names are there too.
+///
+/// # Errors
+/// [`Error::Io`] if that fails.
+pub fn publish(results: &[PathBuf]) -> Result<()> {
+    for path in results {
+        let partial = partial(path);
+        sync_file(&partial)?;
+        fs::rename(&partial, path).map_err(Error::io("rename the finished file to", path))?;
+    }
+    let folders: BTreeSet<&Path> = results.iter().filter_map(|path| path.parent()).collect();
+    folders.into_iter().try_for_each(sync_directory)
+}
+
+fn sync_file(path: &Path) -> Result<()> {
+    let file = File::options().write(true).open(path).map_err(Error::io("open", path))?;
+    file.sync_all().map_err(Error::io("write", path))
+}
+
+/// Brings the names in `directory` to the disk, where the system knows how.
+///
+/// # Errors
+/// [`Error::Io`] if that fails.
+pub fn sync_directory(directory: &Path) -> Result<()> {
+    if cfg!(not(unix)) {
+        return Ok(());
+    }
+    let file = File::open(directory).map_err(Error::io("open", directory))?;
+    file.sync_all().map_err(Error::io("write", directory))
+}
+
+fn create_directory(path: &Path) -> Result<()> {
+    fs::create_dir_all(path).map_err(Error::io("create the directory", path))
+}
+
+/// The files in `folder` that are named as tiles are, whole or not.
+fn numbered_files(folder: &Path) -> Result<Vec<PathBuf>> {
+    let entries = fs::read_dir(folder).map_err(Error::io("read", folder))?;
+    let paths = entries.map(|entry| Ok(entry.map_err(Error::io("read", folder))?.path()));
+    let is_numbered = |path: &PathBuf| {
+        let number = path.file_stem().is_some_and(|s| s.to_string_lossy().bytes().all(|b| b.is_ascii_digit()));
+        number && path.extension().is_some_and(|e| e == "glb" || e == "partial")
+    };
+    paths.filter(|path| path.as_ref().map_or(true, is_numbered)).collect()
 }
 
 fn remove_directory(path: &Path) -> Result<()> {

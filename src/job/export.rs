@@ -3,7 +3,8 @@
 
 use super::columns::ColumnWriter;
 use super::cut::Cut;
-use super::directory::{Directory, write_whole};
+use super::directory::{Directory, Written, write_result};
+use super::journal::Done;
 use super::records::{Leaf, Rim, RimVertices, SeamTriangle};
 use super::stitch::seam_of;
 use super::store::{Key, Store};
@@ -17,7 +18,6 @@ use crate::output::{Compression, Tile};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
-use std::io::Write;
 use std::ops::AddAssign;
 use std::path::Path;
 
@@ -72,7 +72,7 @@ pub fn run(
     tile: usize,
     look: &Look,
     canvas: &Canvas,
-) -> Result<TileFigures> {
+) -> Result<Done<TileFigures>> {
     let leaf = Leaf::load(store, tile)?;
     let rims = RimVertices::load(store, tile)?;
     let mut sites = Sites::of_leaf(leaf, &rims, look);
@@ -86,23 +86,25 @@ pub fn run(
         cut_triangles: left_out.triangles.len() as u64,
         ..TileFigures::default()
     };
-    ColumnWriter::default().push(&canvas.draw(&content)).write(store, Key::Pixels(tile))?;
+    let pixels = ColumnWriter::default().push(&canvas.draw(&content)).write(store, Key::Pixels(tile))?;
+    let mut results = Vec::new();
     if !content.triangles.is_empty() {
-        (figures.files, figures.bytes) = (1, write_tile(&directory.tile(tile), &content, look)?);
+        results.push(write_tile(&directory.tile(tile), &content, look)?);
+        figures.files = 1;
     }
     if !left_out.triangles.is_empty() {
         directory.create_cut()?;
-        figures.bytes += write_tile(&directory.cut_tile(tile), &left_out, look)?;
+        results.push(write_tile(&directory.cut_tile(tile), &left_out, look)?);
     }
-    Ok(figures)
+    figures.bytes = results.iter().map(|file| file.bytes).sum();
+    Ok(Done { results, ..Done::new(figures, vec![pixels]) })
 }
 
-/// Writes a GLB; its bytes.
-fn write_tile(path: &Path, content: &Tile, look: &Look) -> Result<u64> {
+/// Writes a GLB.
+fn write_tile(path: &Path, content: &Tile, look: &Look) -> Result<Written> {
     let mut bytes = Vec::new();
     encode_tile(&look.frame, content, look.compression, &mut bytes)?;
-    write_whole(path, |file| file.write_all(&bytes))?;
-    Ok(bytes.len() as u64)
+    write_result(path, &bytes)
 }
 
 /// A triangle belongs to the tile of its lowest-numbered corner.

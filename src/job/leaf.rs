@@ -1,6 +1,7 @@
 //! Step 3 of a job, by tile: triangulate the sites of one leaf and close what can be closed.
 
 use super::closing::{State, close};
+use super::journal::Done;
 use super::partition::Partition;
 use super::records::{Frontier, Leaf, Rim, RimDraft};
 use super::sites;
@@ -55,7 +56,13 @@ pub struct Task<'a> {
 /// # Errors
 /// [`crate::Error::Io`] on the spill or the store, [`crate::Error::TooFine`] if a triangle is too long to be written,
 /// [`crate::Error::Broken`] if the triangulation fails.
-pub fn run(store: &Store, partition: &Partition, spill: &Spill, tile: usize, task: Task<'_>) -> Result<LeafFigures> {
+pub fn run(
+    store: &Store,
+    partition: &Partition,
+    spill: &Spill,
+    tile: usize,
+    task: Task<'_>,
+) -> Result<Done<LeafFigures>> {
     let (points, dropped) = sites::load(spill, &partition.blocks[tile], task.duplicates)?;
     let sites: Vec<Site> = points.iter().map(|p| p.position).collect();
     let (mesh, outcome) = task.triangulator.triangulate(&sites)?;
@@ -69,11 +76,10 @@ pub fn run(store: &Store, partition: &Partition, spill: &Spill, tile: usize, tas
     triangulation::recycle(mesh);
     let rim = |&site: &u32| Rim { tile: tile as u32, site, position: leaf.positions[site as usize] };
     let frontier = Frontier { sites: closing.frontier.iter().map(rim).collect(), boundary: closing.boundary };
-    rim_draft(&leaf, &closing.frontier).save(store, tile)?;
-    leaf.save(store, tile)?;
-    frontier.save(store, node)?;
+    let draft = rim_draft(&leaf, &closing.frontier);
+    let stored = vec![draft.save(store, tile)?, leaf.save(store, tile)?, frontier.save(store, node)?];
     let (sites, triangles) = (sites.len() as u64, leaf.triangles.len() as u64);
-    Ok(LeafFigures { sites, duplicates: dropped, triangles, outcome })
+    Ok(Done::new(LeafFigures { sites, duplicates: dropped, triangles, outcome }, stored))
 }
 
 fn check_spans(mesh: &Mesh, sites: &[Site], states: &[State], longest: Longest) -> Result<()> {

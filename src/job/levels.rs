@@ -1,7 +1,8 @@
 //! Step 7 of a job, by inner tile of the pyramid: the meshes of its children, read back from their files, joined and simplified.
 
-use super::directory::{Directory, write_whole};
+use super::directory::{Directory, write_result};
 use super::export::Look;
+use super::journal::Done;
 use super::pyramid::{Child, Pyramid, Sizes};
 use super::records::{Level, LevelTile};
 use super::store::Store;
@@ -12,7 +13,6 @@ use crate::output::read::{TileFile, read_tile};
 use crate::output::simplify::simplify;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
-use std::io::Write;
 use std::ops::AddAssign;
 use std::path::PathBuf;
 
@@ -51,14 +51,14 @@ pub fn run(
     look: &Look,
     sizes: Sizes,
     content: bool,
-) -> Result<LevelFigures> {
+) -> Result<Done<LevelFigures>> {
     let inner = &pyramid.inner[at];
     let mut below = Below::default();
     for &child in &inner.children {
         below.add(directory, store, pyramid, child, look, content && inner.content)?;
     }
     let Below { files, leaves, bounds, error } = below;
-    let mut figures = LevelFigures::default();
+    let (mut figures, mut results) = (LevelFigures::default(), Vec::new());
     let mut own = LevelTile::new(bounds, false);
     if content && inner.content && !files.is_empty() {
         let joined = join(&look.frame, &files).map_err(|what| broken(inner.node, &what))?;
@@ -69,7 +69,8 @@ pub fn run(
         own.content = 1;
         let mut bytes = Vec::new();
         encode_tile(&look.frame, &simple.tile, look.compression, &mut bytes)?;
-        write_whole(&directory.level(inner.node), |file| file.write_all(&bytes))?;
+        directory.create_levels()?;
+        results.push(write_result(&directory.level(inner.node), &bytes)?);
         figures = LevelFigures {
             files: 1,
             triangles: simple.tile.triangles.len() as u64,
@@ -77,8 +78,8 @@ pub fn run(
             error_m: own.error,
         };
     }
-    Level { own, leaves }.save(store, inner.node)?;
-    Ok(figures)
+    let stored = Level { own, leaves }.save(store, inner.node)?;
+    Ok(Done { results, ..Done::new(figures, vec![stored]) })
 }
 
 /// Metres.

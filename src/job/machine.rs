@@ -11,14 +11,17 @@ pub(super) fn free_disk(directory: &Path) -> Option<u64> {
 /// Whether a file can be made where `directory` is, or will be. Leaves nothing behind.
 ///
 /// # Errors
-/// [`Error::Io`] if not.
+/// [`Error::Io`] if not, [`Error::Config`] if a file is there.
 pub(super) fn check_writable(directory: &Path) -> Result<()> {
+    if directory.is_file() {
+        return Err(Error::Config(format!("[output] directory: {} is a file", directory.display())));
+    }
     tempfile::tempfile_in(existing(directory)).map(drop).map_err(Error::io("write to", directory))
 }
 
-/// The nearest directory above, or itself.
+/// The nearest of it and what is above it that is there already.
 fn existing(directory: &Path) -> &Path {
-    directory.ancestors().find(|d| d.is_dir()).unwrap_or(Path::new("."))
+    directory.ancestors().find(|d| d.exists()).unwrap_or(Path::new("."))
 }
 
 /// Bytes of memory that a process can have without others being swapped out; `None` where the system does not tell.

@@ -2,6 +2,7 @@
 //! that is closed below, and close what can be closed now. What closes here are the seams.
 
 use super::closing::{State, close, covered};
+use super::journal::Done;
 use super::records::{Frontier, Rim, Seam, SeamTriangle};
 use super::span::Longest;
 use super::store::Store;
@@ -18,7 +19,7 @@ const BYTES_PER_SITE: u64 = 600;
 /// # Errors
 /// [`Error::Memory`] if the frontiers do not fit `memory` bytes, [`Error::TooFine`] if a triangle is too long to be
 /// written, [`Error::Io`] on the store, [`Error::Broken`] if the frontiers contradict each other.
-pub fn run(store: &Store, tree: &Tree, node: usize, memory: u64, longest: Longest) -> Result<u64> {
+pub fn run(store: &Store, tree: &Tree, node: usize, memory: u64, longest: Longest) -> Result<Done<u64>> {
     let union = join(store, &tree.merged_by(node))?;
     check_memory(union.sites.len(), memory)?;
     let sites: Vec<Site> = union.sites.iter().map(Rim::plane).collect();
@@ -34,10 +35,10 @@ pub fn run(store: &Store, tree: &Tree, node: usize, memory: u64, longest: Longes
         .map(|(corners, _)| corners.map(|v| union.sites[v as usize]))
         .collect();
     seam.iter().try_for_each(|corners| longest.check(corners.map(|corner| corner.plane())))?;
-    Seam::new(&seam).save(store, node)?;
     let frontier = closing.frontier.iter().map(|&site| union.sites[site as usize]).collect();
-    Frontier { sites: frontier, boundary: closing.boundary }.save(store, node)?;
-    Ok(seam.len() as u64)
+    let frontier = Frontier { sites: frontier, boundary: closing.boundary };
+    let stored = vec![Seam::new(&seam).save(store, node)?, frontier.save(store, node)?];
+    Ok(Done::new(seam.len() as u64, stored))
 }
 
 /// The frontiers of `nodes` as one.

@@ -1,17 +1,21 @@
 //! A job, from the configuration to the report: scan, partition, triangulate the leaves and merge the inner nodes, stitch,
 //! export, report. Every step leaves its result in the job directory and finds there what it needs, so that each can be
-//! called on its own, the ones by tile or by node in any order that puts children before parents.
+//! called on its own, the ones by tile or by node in any order that puts children before parents; and a job that was
+//! interrupted goes on from the steps that its journal has.
 
 mod area;
 pub mod check;
 pub mod choose;
 pub mod closing;
 pub mod columns;
+mod committer;
 pub mod cut;
 pub mod directory;
 pub mod export;
+pub mod fingerprint;
 mod forecast;
 pub mod grid;
+pub mod journal;
 pub mod leaf;
 pub mod levels;
 mod machine;
@@ -22,6 +26,7 @@ pub mod progress;
 pub mod pyramid;
 pub mod records;
 pub mod report;
+pub mod resume;
 pub mod scan;
 pub mod sites;
 pub mod span;
@@ -45,6 +50,8 @@ use columns::ColumnReader;
 use cut::Cut;
 use directory::Directory;
 use export::{Look, TileFigures};
+use fingerprint::{Fingerprint, Head};
+use journal::{Done, Journal, Step};
 use leaf::LeafFigures;
 use levels::LevelFigures;
 use partition::{Partition, Summary, Task};
@@ -56,7 +63,6 @@ use report::{Parts, Report};
 use scan::Plan;
 use span::Longest;
 use spill::Spill;
-use std::io::Write;
 use std::time::Instant;
 use store::{Key, Store};
 use tree::{Kind, Tree};
@@ -79,35 +85,40 @@ pub struct Options {
     pub progress: Progress,
     /// Whether to go on where the disk or the memory does not seem to suffice.
     pub force: bool,
+    /// Whether to start over where an interrupted run could be gone on with.
+    pub fresh: bool,
 }
 
 impl From<Progress> for Options {
     fn from(progress: Progress) -> Options {
-        Options { progress, force: false }
+        Options { progress, force: false, fresh: false }
     }
 }
 
-/// Runs the whole job of `config`.
+/// Runs the whole job of `config`, or what an interrupted run has left of it.
 ///
 /// # Errors
-/// Whatever stops a step; see [`Error`]. A job that fails leaves no temporary files.
+/// Whatever stops a step; see [`Error`]. [`Error::Resumable`] if the finished steps are kept, else no temporary files are left.
 pub fn run(config: &Config, options: impl Into<Options>) -> Result<Report> {
     let (options, start) = (options.into(), Instant::now());
     // First of all, so that a job that must have a GPU fails at once where there is none.
     let triangulator = Triangulator::new(&config.triangulation, config.limits.memory.0, config.threads())?;
-    let mut coarser = Coarser::default();
+    let directory = Directory::new(&config.output.directory);
+    let fingerprint = on_threads(workers(config, 0)?, || Fingerprint::of(config))?;
+    let coarser = if options.fresh { Coarser::default() } else { resume::coarser(&directory, &fingerprint)? };
+    let mut head = Head { fingerprint, coarser };
     loop {
-        match attempt(config, &triangulator, coarser, options, start) {
+        match attempt(config, &triangulator, &head, options, start) {
             // Only the finished mesh knows its longest triangle, so that a second try is the price of not rounding in vain.
-            Err(Error::TooFine { vertical: true, what }) if coarser.vertical < MOST_TENS => {
+            Err(Error::TooFine { vertical: true, what }) if head.coarser.vertical < MOST_TENS => {
                 options.progress.note(&format!("{what}; starting again with a coarser step in z"));
-                coarser.vertical += 1;
+                head.coarser.vertical += 1;
             }
             Err(Error::TooFine { vertical: false, what })
-                if config.input.resolution.0.is_none() && coarser.horizontal < MOST_TENS =>
+                if config.input.resolution.0.is_none() && head.coarser.horizontal < MOST_TENS =>
             {
                 options.progress.note(&format!("{what}; starting again with a coarser step in x and y"));
-                coarser.horizontal += 1;
+                head.coarser.horizontal += 1;
             }
             outcome => return outcome,
         }
@@ -117,13 +128,13 @@ pub fn run(config: &Config, options: impl Into<Options>) -> Result<Report> {
 fn attempt(
     config: &Config,
     triangulator: &Triangulator,
-    coarser: Coarser,
+    head: &Head,
     options: Options,
     start: Instant,
 ) -> Result<Report> {
     let progress = options.progress;
     let stage = progress.stage("scan", 1, "job");
-    let plan = on_threads(workers(config, 0)?, || scan::run(config, coarser))?;
+    let plan = on_threads(workers(config, 0)?, || scan::run(config, head.coarser))?;
     stage.advance(1);
     let scanned = stage.finish();
     let progress = &Schedule::new(progress, forecast::costs(&plan));
@@ -133,14 +144,40 @@ fn attempt(
         check::preflight(&plan, config, threads).passes()?;
     }
     let directory = Directory::new(&config.output.directory);
-    let _lock = directory.create()?;
-    let job = Job { config, triangulator, coarser, directory: &directory, progress, threads, start };
-    let outcome = on_threads(threads, || job.run(plan, scanned));
-    if outcome.is_err() {
-        // The first error is the one to report.
-        let _ = directory.clean_up();
+    let _lock = directory.lock()?;
+    if let Some(report) = resume::complete(&directory, head)?.filter(|_| !options.fresh) {
+        progress.note("the interrupted run had written all its results");
+        directory.clean_up()?;
+        return Ok(report);
     }
-    outcome
+    on_threads(threads, || {
+        let resume::Start { store, journal, partition } = resume::start(&directory, head, options)?;
+        let job = Job {
+            config,
+            triangulator,
+            coarser: head.coarser,
+            directory: &directory,
+            store: &store,
+            journal: &journal,
+            progress,
+            threads,
+            start,
+        };
+        let outcome = job.run(plan, scanned, partition);
+        let steps = journal.finished();
+        // What is finished is on the disk before the message says so.
+        drop(journal);
+        match outcome {
+            Err(why) if why.exit_code() == 1 && steps > 0 => {
+                Err(Error::Resumable { why: Box::new(why), steps, job: directory.job().into() })
+            }
+            outcome => {
+                // The first error is the one to report.
+                let cleaned = directory.clean_up();
+                outcome.and_then(|report| cleaned.map(|()| report))
+            }
+        }
+    })
 }
 
 /// What `work` returns, its rayon tasks on `threads` threads.
@@ -173,67 +210,71 @@ struct Job<'a> {
     triangulator: &'a Triangulator,
     coarser: Coarser,
     directory: &'a Directory,
+    store: &'a Store,
+    journal: &'a Journal<'a>,
     progress: &'a Schedule,
     threads: usize,
     start: Instant,
 }
 
 impl Job<'_> {
-    /// Step 2 and all after it.
-    fn run(&self, plan: Plan, scanned: StageFigures) -> Result<Report> {
-        let Job { config, triangulator, directory, progress, .. } = *self;
+    /// Step 2 and all after it, but for what an earlier run has done of them.
+    fn run(&self, plan: Plan, scanned: StageFigures, partition: Option<Partition>) -> Result<Report> {
+        let Job { config, triangulator, directory, store, journal, progress, .. } = *self;
 
-        let (plan, partition, read) = self.read(plan)?;
+        let (plan, partition, read) = match partition {
+            Some(partition) => self.take_over(plan, partition)?,
+            None => self.read(plan)?,
+        };
         let plan = &plan;
         let bounds = enough_points(&partition.summary)?;
         let longest = Longest::of(&plan.frame);
         longest.check_heights(bounds[0][2], bounds[1][2])?;
 
         let stage = progress.stage("triangulate", partition.summary.tally.kept, "points");
-        let store = Store::create(&directory.store())?;
-        let leaves = triangulate(config, triangulator, &store, directory, &partition, longest, &stage)?;
-        // From here on what is in the store is enough.
-        directory::remove_file(&directory.spill())?;
+        let leaves = self.triangulate(&partition, longest, &stage)?;
         let triangulated = stage.finish();
 
         let tiles = partition.tree.leaves.len();
-        let cut = Cut::new(config.output.max_edge, &plan.frame, &store, [tiles as u64, leaves.sites], bounds)?;
+        let cut = Cut::new(config.output.max_edge, &plan.frame, store, [tiles as u64, leaves.sites], bounds)?;
         let look = look(config, plan, &partition.summary, bounds, cut);
         let stage = progress.stage("stitch", tiles as u64, "tiles");
-        stitch_all(&store, &partition.tree, &look, &stage)?;
+        self.stitch_all(&partition.tree, &look, &stage)?;
         let stitched = stage.finish();
 
         let stage = progress.stage("write", leaves.sites, "sites");
         let canvas = Canvas::new(&look.frame, bounds);
-        let written = export_all(directory, &store, &partition, &look, &canvas, &stage)?;
+        let written = self.export_all(&partition, &look, &canvas, &stage)?;
         enough_triangles(&written, plan)?;
         let exported = stage.finish();
 
         let one_file = fits_one_file(&written);
         let mut warnings = Vec::new();
         let (mut coarser, mut levelled) = (LevelFigures::default(), None);
-        let (mut other_bytes, mut placement) = (0, None);
+        let (mut tileset, mut placement) = (None, None);
         if config.output.format != Format::Glb || !one_file {
             let (sizes, pyramid) = pyramid(config, &partition);
             let stage = progress.stage("levels", pyramid.inner.len() as u64, "tiles");
-            coarser = self.make_levels(&store, &pyramid, sizes, &look, &stage)?;
+            coarser = self.make_levels(&pyramid, sizes, &look, &stage)?;
             let placed = placement::place(plan, &look.frame, bounds, config.output.height_offset);
             warnings.extend(placement::remark(&placed));
             placement = placed.ok();
             let transform = placement.as_ref().map(|placement| placement.transform);
-            other_bytes += tileset::write(directory, &store, &pyramid, &look, transform)?;
+            tileset = Some(tileset::text(directory, store, &pyramid, &look, transform)?);
             levelled = Some(stage.finish());
             warnings.extend(levels_left_out(config, &pyramid));
         }
 
         let stage = progress.stage("finish", 1, "job");
-        other_bytes += finish(directory, &store, plan, placement, &canvas, tiles, bounds)?;
-        if one_file && config.output.format != Format::Tiles {
-            other_bytes += write_one_file(directory, tiles)?;
-        } else if config.output.format == Format::Glb {
+        let finish = || {
+            let viewers = Viewers { tileset, one_file: one_file && config.output.format != Format::Tiles };
+            finish(directory, store, plan, placement.as_ref(), viewers, &canvas, tiles, bounds)
+        };
+        let other_bytes = journal.step(Step::Finish, finish)?;
+        if !one_file && config.output.format == Format::Glb {
             warnings.push(too_large_for_one_file(&written));
         }
-        directory.clean_up()?;
+        journal.commit()?;
         stage.advance(1);
         let stages = [Some(scanned), Some(read), Some(triangulated), Some(stitched), Some(exported), levelled];
         let stages = stages.into_iter().flatten().chain([stage.finish()]).collect();
@@ -253,29 +294,26 @@ impl Job<'_> {
                 stages,
                 threads: self.threads,
                 memory: config.limits.memory.0,
+                resumed: journal.taken_over(),
                 wall_s: self.start.elapsed().as_secs_f64(),
             },
         );
-        directory::write_json(&directory.report(), &report)?;
+        let results = vec![directory::write_json(&directory.report(), &report)?];
+        journal.record(Step::Report, Done { results, ..Done::new((), Vec::new()) })?;
+        journal.commit()?;
         Ok(report)
     }
 
     /// Makes the coarser tiles, those of one height side by side, as many at once as have room.
-    fn make_levels(
-        &self,
-        store: &Store,
-        pyramid: &Pyramid,
-        sizes: Sizes,
-        look: &Look,
-        stage: &Stage,
-    ) -> Result<LevelFigures> {
+    fn make_levels(&self, pyramid: &Pyramid, sizes: Sizes, look: &Look, stage: &Stage) -> Result<LevelFigures> {
         let content = self.config.output.levels;
         let lanes = match pyramid.largest() {
             largest if content && largest > 0 => (sizes.memory / largest).clamp(1, self.threads as u64) as usize,
             _ => self.threads,
         };
         let make = |at: usize| {
-            let figures = levels::run(self.directory, store, pyramid, at, look, sizes, content)?;
+            let run = || levels::run(self.directory, self.store, pyramid, at, look, sizes, content);
+            let figures = self.journal.step(Step::Level(pyramid.inner[at].node), run)?;
             stage.advance(1);
             Ok(figures)
         };
@@ -287,6 +325,8 @@ impl Job<'_> {
                     Ok(a)
                 };
                 all += height.into_par_iter().with_max_len(1).map(make).try_reduce(LevelFigures::default, sum)?;
+                // The next ones read them under their names.
+                self.journal.commit()?;
             }
             Ok(all)
         })
@@ -307,9 +347,65 @@ impl Job<'_> {
             }
             if plan.lattice == lattice {
                 partition.skipped.clone_from(&plan.skipped);
+                self.journal.record(Step::Partition, Done::new((), vec![partition.save(self.store)?]))?;
                 return Ok((plan, partition, figures));
             }
         }
+    }
+
+    /// What [`Job::read`] came to in an earlier run.
+    fn take_over(&self, mut plan: Plan, partition: Partition) -> Result<(Plan, Partition, StageFigures)> {
+        let stage = self.progress.stage("read", plan.records, "points");
+        if partition.skipped != plan.skipped {
+            plan = scan::without(plan, &partition.skipped, self.config, self.coarser)?;
+        }
+        stage.take_over(partition.summary.tally.read);
+        Ok((plan, partition, stage.finish()))
+    }
+
+    /// Triangulates all leaves and merges every merge node as soon as all below it is done.
+    fn triangulate(&self, partition: &Partition, longest: Longest, stage: &Stage) -> Result<LeafFigures> {
+        let all_there = (0..partition.tree.leaves.len()).all(|tile| self.journal.has(Step::Leaf(tile)));
+        let spill = if all_there { None } else { Some(Spill::open(&self.directory.spill())?) };
+        let figures = Grower { job: self, partition, spill, longest, stage }.grow(0)?;
+        self.journal.commit()?;
+        if self.journal.is_worth_syncing() {
+            self.store.sync()?;
+        }
+        // From here on what is in the store is enough.
+        directory::remove_file(&self.directory.spill())?;
+        Ok(figures)
+    }
+
+    fn stitch_all(&self, tree: &Tree, look: &Look, stage: &Stage) -> Result<()> {
+        (0..tree.leaves.len()).into_par_iter().try_for_each(|tile| {
+            let step = Step::Stitch(tile);
+            self.journal.step(step, || stitch::run(self.store, tree, tile, look))?;
+            self.count(stage, step, 1);
+            Ok(())
+        })
+    }
+
+    fn export_all(&self, partition: &Partition, look: &Look, canvas: &Canvas, stage: &Stage) -> Result<TileFigures> {
+        let export = |tile| {
+            let step = Step::Export(tile);
+            let (directory, store, tree) = (self.directory, self.store, &partition.tree);
+            let figures = self.journal.step(step, || export::run(directory, store, tree, tile, look, canvas))?;
+            self.count(stage, step, partition.blocks[tile].iter().map(|block| block.points as u64).sum());
+            Ok(figures)
+        };
+        let tiles = (0..partition.tree.leaves.len()).into_par_iter().with_max_len(1);
+        let figures = tiles.map(export).try_reduce(TileFigures::default, |mut a, b| {
+            a += b;
+            Ok(a)
+        })?;
+        self.journal.commit()?;
+        Ok(figures)
+    }
+
+    /// Shows that `step` is done, by this run or an earlier one.
+    fn count(&self, stage: &Stage, step: Step, amount: u64) {
+        if self.journal.has(step) { stage.take_over(amount) } else { stage.advance(amount) }
     }
 }
 
@@ -385,42 +481,22 @@ fn enough_triangles(written: &TileFigures, plan: &Plan) -> Result<()> {
     )))
 }
 
-/// Triangulates all leaves and merges every merge node as soon as all below it is done.
-fn triangulate(
-    config: &Config,
-    triangulator: &Triangulator,
-    store: &Store,
-    directory: &Directory,
-    partition: &Partition,
-    longest: Longest,
-    stage: &Stage,
-) -> Result<LeafFigures> {
-    let spill = Spill::open(&directory.spill())?;
-    let grower = Grower { config, triangulator, store, partition, spill: &spill, longest, stage };
-    grower.grow(0)
-}
-
 struct Grower<'a> {
-    config: &'a Config,
-    triangulator: &'a Triangulator,
-    store: &'a Store,
+    job: &'a Job<'a>,
     partition: &'a Partition,
-    spill: &'a Spill,
+    /// Where the points are, as long as there is a leaf to be done.
+    spill: Option<Spill>,
     longest: Longest,
     stage: &'a Stage,
 }
 
 impl Grower<'_> {
     fn grow(&self, node: usize) -> Result<LeafFigures> {
+        let Job { config, store, journal, .. } = *self.job;
         match self.partition.tree.nodes[node].kind {
             Kind::Leaf(tile) => {
-                let task = leaf::Task {
-                    duplicates: self.config.input.duplicates,
-                    triangulator: self.triangulator,
-                    longest: self.longest,
-                };
-                let figures = leaf::run(self.store, self.partition, self.spill, tile, task)?;
-                self.stage.advance(figures.sites + figures.duplicates);
+                let figures = journal.step(Step::Leaf(tile), || self.leaf(tile))?;
+                self.job.count(self.stage, Step::Leaf(tile), figures.sites + figures.duplicates);
                 Ok(figures)
             }
             Kind::Inner([low, high]) => {
@@ -430,12 +506,21 @@ impl Grower<'_> {
                 if self.partition.tree.is_merge(node) {
                     // Nodes below the root may be merged at once on all threads.
                     let share = if node == 0 { 1 } else { rayon::current_num_threads() as u64 };
-                    let memory = self.config.limits.memory.0 / 4 * 3 / share;
-                    merge::run(self.store, &self.partition.tree, node, memory, self.longest)?;
+                    let memory = config.limits.memory.0 / 4 * 3 / share;
+                    let merge = || merge::run(store, &self.partition.tree, node, memory, self.longest);
+                    journal.step(Step::Node(node), merge)?;
                 }
                 Ok(figures)
             }
         }
+    }
+
+    fn leaf(&self, tile: usize) -> Result<Done<LeafFigures>> {
+        let Job { config, store, triangulator, .. } = *self.job;
+        let task = leaf::Task { duplicates: config.input.duplicates, triangulator, longest: self.longest };
+        let spill = self.spill.as_ref();
+        let spill = spill.ok_or_else(|| Error::Broken(format!("the points of tile {tile} are gone")))?;
+        leaf::run(store, self.partition, spill, tile, task)
     }
 }
 
@@ -457,59 +542,40 @@ fn look(config: &Config, plan: &Plan, summary: &Summary, bounds: [[i32; 3]; 2], 
     Look { frame, coloring, normals: config.output.normals, compression, cut }
 }
 
-fn stitch_all(store: &Store, tree: &Tree, look: &Look, stage: &Stage) -> Result<()> {
-    (0..tree.leaves.len()).into_par_iter().try_for_each(|tile| {
-        stitch::run(store, tree, tile, look)?;
-        stage.advance(1);
-        Ok(())
-    })
+/// What viewers open.
+struct Viewers {
+    /// The text of `tileset.json`.
+    tileset: Option<String>,
+    /// Whether there is to be a `terrain.glb`.
+    one_file: bool,
 }
 
-fn export_all(
-    directory: &Directory,
-    store: &Store,
-    partition: &Partition,
-    look: &Look,
-    canvas: &Canvas,
-    stage: &Stage,
-) -> Result<TileFigures> {
-    (0..partition.tree.leaves.len())
-        .into_par_iter()
-        .with_max_len(1)
-        .map(|tile| {
-            let figures = export::run(directory, store, &partition.tree, tile, look, canvas)?;
-            stage.advance(partition.blocks[tile].iter().map(|block| block.points as u64).sum());
-            Ok(figures)
-        })
-        .try_reduce(TileFigures::default, |mut a, b| {
-            a += b;
-            Ok(a)
-        })
-}
-
-/// Writes what stands beside the tiles; returns its bytes.
+/// Writes what stands beside the tiles; its figure is its bytes.
 fn finish(
     directory: &Directory,
     store: &Store,
     plan: &Plan,
-    placement: Option<Placement>,
+    placement: Option<&Placement>,
+    viewers: Viewers,
     canvas: &Canvas,
     tiles: usize,
     bounds: [[i32; 3]; 2],
-) -> Result<u64> {
+) -> Result<Done<u64>> {
     let georeference = Georeference::new(&plan.frame, &plan.lattice, bounds, plan.unit, plan.crs.epsg);
-    let text = georeference.to_json(placement.as_ref());
-    directory::write_whole(&directory.georeference(), |file| file.write_all(text.as_bytes()))?;
-    let picture = draw_picture(store, canvas, tiles)?;
-    directory::write_whole(&directory.preview(), |file| file.write_all(&picture))?;
-    Ok((text.len() + picture.len()) as u64)
-}
-
-/// Writes `terrain.glb`; returns its bytes.
-fn write_one_file(directory: &Directory, tiles: usize) -> Result<u64> {
-    let paths: Vec<_> = (0..tiles).map(|tile| directory.tile(tile)).filter(|path| path.exists()).collect();
-    write_terrain(&directory.terrain(), &paths)?;
-    Ok(std::fs::metadata(directory.terrain()).map_err(Error::io("read", directory.terrain()))?.len())
+    let mut results = vec![
+        directory::write_result(&directory.georeference(), georeference.to_json(placement).as_bytes())?,
+        directory::write_result(&directory.preview(), &draw_picture(store, canvas, tiles)?)?,
+    ];
+    if let Some(tileset) = viewers.tileset {
+        results.push(directory::write_result(&directory.tileset(), tileset.as_bytes())?);
+    }
+    if viewers.one_file {
+        let paths: Vec<_> = (0..tiles).map(|tile| directory.tile(tile)).filter(|path| path.exists()).collect();
+        write_terrain(&directory::partial(&directory.terrain()), &paths)?;
+        results.push(directory::written_result(&directory.terrain())?);
+    }
+    let bytes = results.iter().map(|file| file.bytes).sum();
+    Ok(Done { results, ..Done::new(bytes, Vec::new()) })
 }
 
 fn draw_picture(store: &Store, canvas: &Canvas, tiles: usize) -> Result<Vec<u8>> {

@@ -1,15 +1,17 @@
 //! Step 2 of a job: decode every input once, spill the points to buckets of a grid, and build the tree whose leaves are
 //! the tiles. A bucket with more points than a tile may hold is spilled again to a finer grid of its own.
 
+use super::columns::{ColumnReader, ColumnWriter};
 use super::directory::Directory;
 use super::grid::{Grid, Span, Sums};
 use super::progress::Stage;
 use super::spill::{Block, Bucket, Buckets, Spill};
+use super::store::{Key, Store, Stored};
 use super::tree::{Cell, Kind, Node, Tree};
 use crate::config::OnBadFile;
 use crate::geometry::Site;
 use crate::input::{Point, Rules, Source, Tally};
-use crate::{Error, Result};
+use crate::{Error, Result, interrupt};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::{AddAssign, Range};
@@ -22,7 +24,7 @@ const BUCKETS_PER_TILE: u64 = 8;
 const MOST_BUCKETS: u64 = 16_384;
 
 /// The result of this step: the tree, where each leaf's points are, and what was met on the way.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default)]
 pub struct Partition {
     /// The tree over all points.
     pub tree: Tree,
@@ -43,6 +45,33 @@ pub struct Skipped {
     pub file: PathBuf,
     /// What is wrong with it.
     pub why: String,
+}
+
+impl Partition {
+    /// Writes it down for a run that goes on.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn save(&self, store: &Store) -> Result<Stored> {
+        let rest = serde_json::to_vec(&(&self.tree, &self.summary, self.spilled, &self.skipped));
+        let rest = rest.map_err(|e| Error::Broken(format!("the tree cannot be written down: {e}")))?;
+        let counts: Vec<u64> = self.blocks.iter().map(|blocks| blocks.len() as u64).collect();
+        ColumnWriter::default().push(&rest).push(&counts).push(&self.blocks.concat()).write(store, Key::Partition)
+    }
+
+    /// Reads what an earlier run has written down.
+    ///
+    /// # Errors
+    /// [`Error::Io`], or [`Error::Broken`] if there is none.
+    pub fn load(store: &Store) -> Result<Partition> {
+        let mut columns = ColumnReader::open(store, Key::Partition)?;
+        let (rest, counts): (Vec<u8>, Vec<u64>) = (columns.column()?, columns.column()?);
+        let broken = |e: serde_json::Error| Error::Broken(format!("{}: {e}", store.path().display()));
+        let (tree, summary, spilled, skipped) = serde_json::from_slice(&rest).map_err(broken)?;
+        let mut blocks = columns.column::<Block>()?.into_iter();
+        let blocks = counts.iter().map(|&count| blocks.by_ref().take(count as usize).collect()).collect();
+        Ok(Partition { tree, blocks, summary, spilled, skipped })
+    }
 }
 
 /// What all inputs together held.
@@ -176,6 +205,7 @@ fn decode_all(task: &Task, records: u64, grid: &Grid, buckets: &Buckets, stage: 
     let allowed = allowed(task.malformed_share, records);
     let malformed = AtomicU64::new(0);
     let decode = |&(s, piece): &(usize, usize)| -> Result<BySource> {
+        interrupt::check()?;
         let (source, rules) = &task.sources[s];
         let mut scatter = Scatter::new(grid, buckets);
         let tally = source.decode(piece, rules, &mut |points| scatter.spill(points))?;
@@ -308,6 +338,7 @@ impl Divider<'_> {
         let grid = Grid::over(min, max, wanted_buckets(bucket.points, self.task.points_per_tile));
         let finer = Buckets::new(self.spill, grid.buckets(), self.task.memory);
         bucket.blocks.par_iter().try_for_each(|&block| {
+            interrupt::check()?;
             let mut points = Vec::new();
             self.spill.read(block, &mut points)?;
             Scatter::new(&grid, &finer).spill(&points)

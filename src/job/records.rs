@@ -1,7 +1,7 @@
 //! What the steps leave for each other in the job's store, one type a record.
 
 use super::columns::{ColumnReader, ColumnWriter};
-use super::store::{Key, Store};
+use super::store::{Key, Store, Stored};
 use crate::geometry::Site;
 use crate::output::normals::NormalSum;
 use crate::{Error, Result};
@@ -47,7 +47,7 @@ impl Leaf {
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, store: &Store, tile: usize) -> Result<()> {
+    pub fn save(&self, store: &Store, tile: usize) -> Result<Stored> {
         let columns = ColumnWriter::default().push(&self.positions).push(&self.rgb).push(&self.class);
         // These records are most of what a job writes on its way: corners take two bytes where that is enough.
         let columns = if self.has_short_corners() {
@@ -97,7 +97,7 @@ impl Frontier {
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, store: &Store, node: usize) -> Result<()> {
+    pub fn save(&self, store: &Store, node: usize) -> Result<Stored> {
         ColumnWriter::default().push(&self.sites).push(&self.boundary).write(store, Key::Frontier(node))
     }
 
@@ -144,7 +144,7 @@ impl Seam {
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, store: &Store, node: usize) -> Result<()> {
+    pub fn save(&self, store: &Store, node: usize) -> Result<Stored> {
         ColumnWriter::default().push(&self.index).push(&self.triangles).write(store, Key::Seam(node))
     }
 
@@ -178,7 +178,7 @@ impl RimDraft {
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, store: &Store, tile: usize) -> Result<()> {
+    pub fn save(&self, store: &Store, tile: usize) -> Result<Stored> {
         ColumnWriter::default().push(&self.sums).push(&self.rgb).push(&self.class).write(store, Key::RimDraft(tile))
     }
 
@@ -215,7 +215,7 @@ impl RimVertices {
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, store: &Store, tile: usize) -> Result<()> {
+    pub fn save(&self, store: &Store, tile: usize) -> Result<Stored> {
         ColumnWriter::default().push(&self.0).write(store, Key::Rim(tile))
     }
 
@@ -272,7 +272,7 @@ impl Level {
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, store: &Store, node: usize) -> Result<()> {
+    pub fn save(&self, store: &Store, node: usize) -> Result<Stored> {
         ColumnWriter::default().push(&[self.own]).push(&self.leaves).write(store, Key::Level(node))
     }
 

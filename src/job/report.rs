@@ -62,6 +62,8 @@ pub struct Report {
     pub memory_limit: u64,
     /// Worker threads.
     pub threads: usize,
+    /// How many steps were taken over from a run that was interrupted; their times are not in the stages.
+    pub resumed: u64,
     /// Seconds from start to end.
     pub wall_s: f64,
     /// The stages in order.
@@ -123,6 +125,8 @@ pub struct Parts {
     pub threads: usize,
     /// The memory limit in bytes.
     pub memory: u64,
+    /// Steps taken over from a run that was interrupted.
+    pub resumed: u64,
     /// Seconds since the start.
     pub wall_s: f64,
 }
@@ -165,6 +169,7 @@ impl Report {
             peak_memory: machine::peak_memory(),
             memory_limit: parts.memory,
             threads: parts.threads,
+            resumed: parts.resumed,
             wall_s: parts.wall_s,
             stages: parts.stages,
             warnings,
@@ -236,6 +241,9 @@ impl fmt::Display for Report {
         row("lattice step", format!("{} (z {}) {}", self.lattice.resolution, self.lattice.resolution_z, self.unit))?;
         row("written", megabytes(self.bytes_written))?;
         row("temporary files", megabytes(self.bytes_temporary))?;
+        if self.resumed > 0 {
+            row("steps taken over", format!("{} of the run that was interrupted", grouped(self.resumed)))?;
+        }
         let peak = self.peak_memory.map_or("unknown".into(), megabytes);
         row("peak memory", format!("{peak} of {}", megabytes(self.memory_limit)))?;
         for warning in &self.warnings {

@@ -122,9 +122,17 @@ fn make_plan(sources: &[Source], config: &Config, coarser: Coarser) -> Result<(P
     Ok((Plan { sources, records, lattice, extent, crs, unit, frame, warnings, skipped }, rules))
 }
 
+/// The files that `config` names, in their order, each once.
+///
+/// # Errors
+/// [`Error::Config`] if a pattern names none.
+pub fn inputs(config: &Config) -> Result<Vec<PathBuf>> {
+    expand(&config.input.files)
+}
+
 /// Opens all inputs; those that are bad apart if they are to be left out.
 fn open_all(config: &Config) -> Result<(Vec<Source>, Vec<Skipped>)> {
-    let paths = expand(&config.input.files)?;
+    let paths = inputs(config)?;
     let opened: Vec<Result<Source>> = paths.par_iter().map(|path| input::open(path, &config.input.csv)).collect();
     let (mut sources, mut skipped) = (Vec::with_capacity(opened.len()), Vec::new());
     for source in opened {

@@ -3,20 +3,24 @@
 use crate::input::Point;
 use crate::positioned::{read_exact_at, write_all_at};
 use crate::{Error, Result};
-use serde::{Deserialize, Serialize};
+use bytemuck::{Pod, Zeroable};
 use std::fs::File;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
+use xxhash_rust::xxh3::xxh3_64;
 
 /// A run of points of one bucket in the spill file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 pub struct Block {
     /// The number in the file of the first of the points.
     pub first: u64,
     /// How many points.
     pub points: u32,
+    /// The lower half of the XXH3 of their bytes.
+    pub hash: u32,
 }
 
 /// The spill file. It only grows; blocks of several threads lie in it in any order.
@@ -59,7 +63,13 @@ impl Spill {
         let first = self.points.fetch_add(points.len() as u64, Ordering::Relaxed);
         let at = first * size_of::<Point>() as u64;
         write_all_at(&self.file, bytemuck::cast_slice(points), at).map_err(Error::io("write", &self.path))?;
-        Ok(Block { first, points: points.len() as u32 })
+        Ok(Block { first, points: points.len() as u32, hash: hash(points) })
+    }
+
+    /// Whether `block` holds what was written to it.
+    pub fn is_whole(&self, block: Block) -> bool {
+        let mut points = Vec::new();
+        self.read(block, &mut points).is_ok() && hash(&points) == block.hash
     }
 
     /// Adds the points of `block` to `into`.
@@ -97,6 +107,10 @@ impl Spill {
         bucket.points = bucket.blocks.iter().map(|block| block.points as u64).sum();
         Ok(())
     }
+}
+
+fn hash(points: &[Point]) -> u32 {
+    xxh3_64(bytemuck::cast_slice(points)) as u32
 }
 
 /// What one bucket holds: its blocks on disk, and how many points in all.

@@ -2,6 +2,7 @@
 //! every tile that shares a vertex writes the same normal. Triangles that are left out of the terrain count for nothing.
 
 use super::export::Look;
+use super::journal::Done;
 use super::records::{Frontier, Leaf, Rim, RimDraft, RimVertex, RimVertices, Seam, SeamTriangle};
 use super::store::Store;
 use super::tree::Tree;
@@ -12,7 +13,7 @@ use crate::{Error, Result};
 ///
 /// # Errors
 /// [`crate::Error::Io`] or [`crate::Error::Broken`] on the store.
-pub fn run(store: &Store, tree: &Tree, tile: usize, look: &Look) -> Result<()> {
+pub fn run(store: &Store, tree: &Tree, tile: usize, look: &Look) -> Result<Done<()>> {
     let frontier = Frontier::load(store, tree.leaves[tile])?;
     let RimDraft { mut sums, rgb, class } = RimDraft::load(store, tile)?;
     if !look.cut.is_nothing() {
@@ -33,7 +34,8 @@ pub fn run(store: &Store, tree: &Tree, tile: usize, look: &Look) -> Result<()> {
         rgb: rgb[at],
         class: class[at] as u16,
     };
-    RimVertices(frontier.sites.iter().enumerate().map(finish).collect()).save(store, tile)
+    let rim = RimVertices(frontier.sites.iter().enumerate().map(finish).collect());
+    Ok(Done::new((), vec![rim.save(store, tile)?]))
 }
 
 /// The sums over only those of the leaf's triangles that are written.

@@ -1,12 +1,12 @@
 //! What the steps leave for each other: one file that only grows, a record a result. A file a result would cost more than
 //! the results: making and removing thousands of small files takes a good part of a job's time on common file systems.
 //!
-//! A record says what it is, how long it is, and the hash of its bytes, so that a store whose writer was killed can be
-//! opened again: it ends with the last record that is whole.
+//! The journal knows where each record is and the hash of its bytes, so that a store whose writer was killed can be opened
+//! again, whatever the kill left after them.
 
 use crate::positioned::{read_exact_at, write_all_at};
 use crate::{Error, Result};
-use bytemuck::{Pod, Zeroable};
+use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ use std::sync::{PoisonError, RwLock};
 use xxhash_rust::xxh3::{Xxh3, xxh3_64_with_seed};
 
 /// What a record holds; it is a tile's or a node's.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Key {
     /// The sites and closed triangles of a tile.
     Leaf(usize),
@@ -29,6 +29,8 @@ pub enum Key {
     Rim(usize),
     /// The pixels of the preview that a tile covers.
     Pixels(usize),
+    /// What the steps after the partition know of it.
+    Partition,
     /// What `tileset.json` will say of the coarser tile at a tree node.
     Level(usize),
 }
@@ -42,29 +44,11 @@ impl Key {
             Key::Seam(i) => [4, i as u32],
             Key::Rim(i) => [5, i as u32],
             Key::Pixels(i) => [6, i as u32],
-            Key::Level(i) => [7, i as u32],
+            Key::Partition => [7, 0],
+            Key::Level(i) => [8, i as u32],
         }
     }
-
-    fn of_code([kind, index]: [u32; 2]) -> Option<Key> {
-        let kinds = [Key::Leaf, Key::Frontier, Key::RimDraft, Key::Seam, Key::Rim, Key::Pixels, Key::Level];
-        kinds.get((kind as usize).checked_sub(1)?).map(|key| key(index as usize))
-    }
 }
-
-/// The head of a record in the file.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-struct Head {
-    code: [u32; 2],
-    /// Bytes after the head.
-    length: u64,
-    /// Of these bytes, seeded with the code.
-    hash: u64,
-}
-
-/// Room for the head at the front of a record.
-pub(super) const HEAD: usize = size_of::<Head>();
 
 fn seed(code: [u32; 2]) -> u64 {
     (code[0] as u64) << 32 | code[1] as u64
@@ -75,6 +59,17 @@ fn seed(code: [u32; 2]) -> u64 {
 pub(super) struct Place {
     pub(super) at: u64,
     pub(super) length: u64,
+}
+
+/// A record as the journal knows it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Stored {
+    /// What it holds.
+    key: Key,
+    /// Where its bytes begin in the file, and how many they are.
+    at: u64,
+    length: u64,
+    hash: u64,
 }
 
 /// The results of all steps of a job, on disk; threads may write and read at once.
@@ -97,38 +92,32 @@ impl Store {
         Ok(Store { path: path.to_path_buf(), file, end: AtomicU64::new(0), places: RwLock::default() })
     }
 
-    /// The store at `path` as far as it is whole; what comes after is written over.
+    /// The store at `path` with the records of `stored`; all else in it is written over.
     ///
     /// # Errors
-    /// [`Error::Io`] if it cannot be read.
-    pub fn open(path: &Path) -> Result<Store> {
+    /// [`Error::Io`] if it cannot be opened.
+    pub fn open<'a>(path: &Path, stored: impl Iterator<Item = &'a Stored>) -> Result<Store> {
         let file = File::options().read(true).write(true).open(path).map_err(Error::io("open", path))?;
-        let size = file.metadata().map_err(Error::io("read", path))?.len();
-        let mut store = Store { path: path.to_path_buf(), file, end: AtomicU64::new(0), places: RwLock::default() };
         let (mut end, mut places) = (0, HashMap::new());
-        while let Some((key, place)) = store.whole_record(end, size)? {
-            places.insert(key, place);
-            end = place.at + place.length;
+        for &Stored { key, at, length, .. } in stored {
+            places.insert(key, Place { at, length });
+            end = end.max(at + length);
         }
-        (store.end, store.places) = (AtomicU64::new(end), RwLock::new(places));
-        Ok(store)
+        Ok(Store { path: path.to_path_buf(), file, end: AtomicU64::new(end), places: RwLock::new(places) })
     }
 
-    /// The record whose head is at `at`, if it is whole and in a file of `size` bytes.
-    fn whole_record(&self, at: u64, size: u64) -> Result<Option<(Key, Place)>> {
-        let place = Place { at: at + HEAD as u64, length: 0 };
-        if place.at > size {
-            return Ok(None);
-        }
-        let mut head = Head::zeroed();
-        self.read(at, bytemuck::bytes_of_mut(&mut head))?;
-        match Key::of_code(head.code) {
-            Some(key) if head.length <= size - place.at => {
-                let place = Place { length: head.length, ..place };
-                Ok((self.hash(place, seed(head.code))? == head.hash).then_some((key, place)))
-            }
-            _ => Ok(None),
-        }
+    /// Whether the record of `stored` is there and holds what was written to it.
+    pub fn is_whole(&self, stored: &Stored) -> bool {
+        let place = Place { at: stored.at, length: stored.length };
+        self.hash(place, seed(stored.key.code())).is_ok_and(|hash| hash == stored.hash)
+    }
+
+    /// Waits until all records are on the disk.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if they do not get there.
+    pub fn sync(&self) -> Result<()> {
+        self.file.sync_data().map_err(Error::io("write", &self.path))
     }
 
     fn hash(&self, place: Place, seed: u64) -> Result<u64> {
@@ -144,18 +133,14 @@ impl Store {
         Ok(hasher.digest())
     }
 
-    /// Writes a record: `bytes` begin with [`HEAD`] bytes of room for its head. It takes the place of an earlier one of
-    /// the same key.
-    pub(super) fn put(&self, key: Key, bytes: &mut [u8]) -> Result<()> {
-        let (head, content) = bytes.split_at_mut(HEAD);
-        let (code, length) = (key.code(), content.len() as u64);
-        let hash = xxh3_64_with_seed(content, seed(code));
-        head.copy_from_slice(bytemuck::bytes_of(&Head { code, length, hash }));
-        let at = self.end.fetch_add(bytes.len() as u64, Ordering::Relaxed);
-        write_all_at(&self.file, bytes, at).map_err(Error::io("write", &self.path))?;
+    /// Writes a record. It takes the place of an earlier one of the same key.
+    pub(super) fn put(&self, key: Key, content: &[u8]) -> Result<Stored> {
+        let (length, hash) = (content.len() as u64, xxh3_64_with_seed(content, seed(key.code())));
+        let at = self.end.fetch_add(length, Ordering::Relaxed);
+        write_all_at(&self.file, content, at).map_err(Error::io("write", &self.path))?;
         let mut places = self.places.write().unwrap_or_else(PoisonError::into_inner);
-        places.insert(key, Place { at: at + HEAD as u64, length });
-        Ok(())
+        places.insert(key, Place { at, length });
+        Ok(Stored { key, at, length, hash })
     }
 
     /// Whether there is a record of `key`.
@@ -190,8 +175,8 @@ mod tests {
     use super::super::columns::{ColumnReader, ColumnWriter};
     use super::*;
 
-    fn put(store: &Store, key: Key, values: &[u32]) {
-        ColumnWriter::default().push(values).write(store, key).unwrap();
+    fn put(store: &Store, key: Key, values: &[u32]) -> Stored {
+        ColumnWriter::default().push(values).write(store, key).unwrap()
     }
 
     fn get(store: &Store, key: Key) -> Result<Vec<u32>> {
@@ -199,46 +184,41 @@ mod tests {
     }
 
     #[test]
-    fn a_store_cut_anywhere_opens_with_the_records_before_the_cut() {
+    fn a_record_that_is_cut_or_changed_is_not_whole() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("steps");
         let store = Store::create(&path).unwrap();
-        let ends: Vec<u64> = (0..4)
-            .map(|tile| {
-                put(&store, Key::Leaf(tile), &vec![tile as u32; 5 * tile]);
-                store.bytes()
-            })
-            .collect();
+        let stored: Vec<Stored> = (0..4).map(|tile| put(&store, Key::Leaf(tile), &vec![7; 5 * tile])).collect();
         let whole = std::fs::read(&path).unwrap();
-        for cut in 0..=whole.len() {
-            std::fs::write(&path, &whole[..cut]).unwrap();
-            let store = Store::open(&path).unwrap();
-            let left = ends.iter().filter(|&&end| end <= cut as u64).count();
-            assert_eq!((0..4).filter(|&tile| store.has(Key::Leaf(tile))).count(), left, "cut at {cut}");
-            put(&store, Key::Seam(7), &[7]);
-            let store = Store::open(&path).unwrap();
-            assert_eq!(get(&store, Key::Seam(7)).unwrap(), [7]);
-            assert_eq!(store.has(Key::Leaf(0)), left > 0);
+        for (at, _) in whole.iter().enumerate() {
+            let mut changed = whole.clone();
+            changed[at] ^= 0x40;
+            for (content, cut) in [(&whole[..at], true), (&changed, false)] {
+                std::fs::write(&path, content).unwrap();
+                let store = Store::open(&path, stored.iter()).unwrap();
+                for record in &stored {
+                    let end = record.at + record.length;
+                    let is_hit = if cut { end > at as u64 } else { (record.at..end).contains(&(at as u64)) };
+                    assert_eq!(store.is_whole(record), !is_hit, "{record:?}, byte {at}, cut: {cut}");
+                }
+            }
         }
     }
 
     #[test]
-    fn a_changed_byte_ends_the_store_before_it() {
+    fn an_opened_store_has_what_it_is_told_and_goes_on_after_it() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("steps");
         let store = Store::create(&path).unwrap();
-        put(&store, Key::Rim(0), &[1, 2, 3]);
-        let first = store.bytes();
+        let kept = put(&store, Key::Rim(0), &[1, 2, 3]);
         put(&store, Key::Rim(1), &[4, 5, 6]);
-        let whole = std::fs::read(&path).unwrap();
-        for at in first as usize..whole.len() {
-            let mut changed = whole.clone();
-            changed[at] ^= 0x40;
-            std::fs::write(&path, changed).unwrap();
-            let store = Store::open(&path).unwrap();
-            assert_eq!(get(&store, Key::Rim(0)).unwrap(), [1, 2, 3]);
-            assert!(!store.has(Key::Rim(1)), "byte {at}");
-        }
+        let store = Store::open(&path, [kept].iter()).unwrap();
+        assert!(store.has(Key::Rim(0)) && !store.has(Key::Rim(1)));
+        let added = put(&store, Key::Seam(7), &[8]);
+        let store = Store::open(&path, [kept, added].iter()).unwrap();
+        assert_eq!((get(&store, Key::Rim(0)).unwrap(), get(&store, Key::Seam(7)).unwrap()), (vec![1, 2, 3], vec![8]));
+        let other = Stored { key: Key::Rim(1), ..kept };
+        assert!(store.is_whole(&kept) && !store.is_whole(&other), "the hash is that of the key as well");
     }
 
     #[test]
@@ -246,10 +226,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("steps");
         let store = Store::create(&path).unwrap();
-        put(&store, Key::Frontier(3), &[1]);
-        put(&store, Key::Frontier(3), &[2, 3]);
+        let stored = [put(&store, Key::Frontier(3), &[1]), put(&store, Key::Frontier(3), &[2, 3])];
         assert_eq!(get(&store, Key::Frontier(3)).unwrap(), [2, 3]);
-        assert_eq!(get(&Store::open(&path).unwrap(), Key::Frontier(3)).unwrap(), [2, 3]);
+        assert_eq!(get(&Store::open(&path, stored.iter()).unwrap(), Key::Frontier(3)).unwrap(), [2, 3]);
         assert!(get(&store, Key::Frontier(4)).unwrap_err().to_string().contains("Frontier(4)"));
     }
 }

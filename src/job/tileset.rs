@@ -1,6 +1,6 @@
 //! `tileset.json` from what the steps before have left.
 
-use super::directory::{self, Directory};
+use super::directory::Directory;
 use super::export::Look;
 use super::levels::bounds_of;
 use super::pyramid::{Child, Pyramid};
@@ -10,17 +10,17 @@ use crate::output::read::read_tile;
 use crate::output::tileset::{Node, tileset_json};
 use crate::{Error, Result};
 
-/// Writes `tileset.json`; returns its size in bytes.
+/// The text of `tileset.json`.
 ///
 /// # Errors
 /// [`Error::Io`] on the output or the job directory, [`Error::Broken`] if there is no tile.
-pub fn write(
+pub fn text(
     directory: &Directory,
     store: &Store,
     pyramid: &Pyramid,
     look: &Look,
     transform: Option<[f64; 16]>,
-) -> Result<u64> {
+) -> Result<String> {
     let root = match pyramid.inner.len().checked_sub(1) {
         Some(last) => inner_node(directory, store, pyramid, last)?,
         None => single_node(directory, look)?,
@@ -28,8 +28,7 @@ pub fn write(
     let root = root.ok_or_else(|| Error::Broken("there is no tile to list in tileset.json".into()))?;
     let mut text = tileset_json(&look.frame, &root, transform).to_string();
     text.push('\n');
-    directory::write_whole(&directory.tileset(), |file| std::io::Write::write_all(file, text.as_bytes()))?;
-    Ok(text.len() as u64)
+    Ok(text)
 }
 
 fn inner_node(directory: &Directory, store: &Store, pyramid: &Pyramid, at: usize) -> Result<Option<Node>> {

@@ -82,10 +82,10 @@ mod tests {
     fn normals_in_bytes_are_true_to_a_degree() {
         let worst = |of: &dyn Fn([f32; 3]) -> f32| normals().map(of).fold(0.0, f32::max);
         assert!(worst(&|n| error(n, normal_bytes(n, 1.0), 1.0)) < 0.5);
-        assert!(worst(&|n| error(n, from_octahedral(normal_octahedral(n, 1.0)), 1.0)) < 1.0);
+        assert!(worst(&|n| error(n, from_octahedral(normal_octahedral(n, 1.0)), 1.0)) < 1.25);
         for anisotropy in [0.25, 4.0] {
             assert!(worst(&|n| error(n, normal_bytes(n, anisotropy), anisotropy)) < 2.0);
-            assert!(worst(&|n| error(n, from_octahedral(normal_octahedral(n, anisotropy)), anisotropy)) < 4.0);
+            assert!(worst(&|n| error(n, from_octahedral(normal_octahedral(n, anisotropy)), anisotropy)) < 5.0);
         }
     }
 

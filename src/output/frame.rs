@@ -3,7 +3,8 @@
 //! A vertex is `translation + position`, a node's translation and an f32 of its mesh. Both are whole multiples of the
 //! job's steps, so their sum in f64 is exact and depends on the lattice integers alone: a vertex that several tiles
 //! share has the same bits in all of them. A step is at most half the lattice step, so rounding finds the integer again;
-//! it is finer, and positions truer, where the job is small enough for f32.
+//! it is finer, and positions truer, where the job is small enough for f32. Packed, with 16-bit positions, it is coarser, and
+//! just as fine as rounding needs: see [`Frame::packed`].
 
 use rust_decimal::Decimal;
 use serde::{Deserialize, Serialize};
@@ -95,9 +96,9 @@ impl Scale {
 
     /// The largest step from which rounding still leads back, for `resolution` metres.
     fn packed(resolution: f64) -> Scale {
-        let step = (resolution * PACKED_RATIO).log2().floor().exp2();
         // A resolution that is a power of two is met exactly.
-        let step = if resolution.log2().fract() == 0.0 { resolution } else { step };
+        let is_power = resolution.to_bits() << (u64::BITS - f64::MANTISSA_DIGITS + 1) == 0;
+        let step = if is_power { resolution } else { (resolution * PACKED_RATIO).log2().floor().exp2() };
         Scale { step, ratio: resolution / step }
     }
 
@@ -256,4 +257,20 @@ pub(super) const FINE_GRID: i64 = TRANSLATION_STEPS;
 /// The nearest f64. A lattice offset may have more digits: what an f64 loses of it is far below any lattice step.
 fn number(exact: Decimal) -> f64 {
     exact.to_string().parse().expect("the text of a decimal is that of a number")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn packed_steps_are_powers_of_two_from_which_rounding_leads_back() {
+        let near = [0.5f64, 1.0, 0.0078125].into_iter().flat_map(|v| [v.next_down(), v, v.next_up(), v * 0.981]);
+        for resolution in near.chain([0.01, 0.001, 0.003048, 0.3048 / 4096.0, 7.0]) {
+            let Scale { step, ratio } = Scale::packed(resolution);
+            assert_eq!(step.log2().fract(), 0.0, "{resolution}");
+            assert_eq!(step.to_bits() << 12, 0, "{resolution}");
+            assert!(ratio == 1.0 || (1.02..2.05).contains(&ratio), "{resolution}: {ratio}");
+        }
+    }
 }

@@ -52,7 +52,7 @@ impl Packed {
         let length = self.unpacked_length().unwrap_or(u64::MAX);
         let plausible = match self.mode {
             Mode::Attributes => length / MOST_VERTEX_RATIO <= packed.len() as u64,
-            Mode::Triangles => self.count / 3 <= packed.len() as u64 && self.count % 3 == 0,
+            Mode::Triangles => self.count / 3 <= packed.len() as u64 && self.count.is_multiple_of(3),
         };
         if !plausible {
             return Err(format!("{} packed bytes cannot hold {} elements", packed.len(), self.count));

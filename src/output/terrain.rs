@@ -13,10 +13,10 @@ use super::container::Container;
 use super::document::{GENERATOR, MESHOPT, QUANTIZATION};
 use super::glb::write_container;
 use super::packed::Packed;
-use crate::{Error, Result};
+use crate::{Error, Result, interrupt};
 
 /// Writes to `out` one GLB file with all tiles (GLB files of one job, at least one) as nodes of one scene, in this order.
-/// One tile is held in memory at a time, and a description of every other. The file appears under its name when it is whole.
+/// One tile is held in memory at a time, and a description of every other.
 ///
 /// Fails where the file would pass the 4 GiB that a GLB file can have, or a tile is damaged.
 pub fn write_terrain(out: &Path, tiles: &[PathBuf]) -> Result<()> {
@@ -26,20 +26,18 @@ pub fn write_terrain(out: &Path, tiles: &[PathBuf]) -> Result<()> {
     }
     let mut head = Vec::new();
     write_container(scene.json(), scene.length, &mut head)?;
-    let partial = out.with_extension("glb.partial");
-    let file = File::create(&partial).map_err(Error::io("create", &partial))?;
+    let file = File::create(out).map_err(Error::io("create", out))?;
     let mut file = BufWriter::with_capacity(1 << 20, file);
-    file.write_all(&head).map_err(Error::io("write", &partial))?;
+    file.write_all(&head).map_err(Error::io("write", out))?;
     let mut written = 0;
     for path in tiles {
+        interrupt::check()?;
         written += copy_views(path, &mut file)?;
     }
     if written != scene.length {
         return Err(Error::input(out, "the tiles changed while they were joined"));
     }
-    let file = file.into_inner().map_err(|e| Error::io("write", &partial)(e.into_error()))?;
-    file.sync_all().map_err(Error::io("write", &partial))?;
-    std::fs::rename(&partial, out).map_err(Error::io("rename", &partial))
+    file.flush().map_err(Error::io("write", out))
 }
 
 /// Writes the unpacked data of the tile at `path`; how many bytes.

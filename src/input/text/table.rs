@@ -10,10 +10,10 @@ use super::columns::{Columns, Delimiter, Role, shown};
 use super::granularity::Granularity;
 use super::lines::{BLOCK, LONGEST, Line, for_each_line};
 use super::number::{MOST_DECIMALS, Number, POWERS};
-use crate::Result;
 use crate::input::positioned::Positioned;
 use crate::input::sieve::{Record, Sieve};
 use crate::input::source::Axis;
+use crate::{Result, interrupt};
 
 /// Bytes at the start of a text that show how it is laid out.
 const SAMPLE: u64 = 1 << 17;
@@ -59,7 +59,10 @@ impl Table {
         let (columns, start, first_line, mut warnings) = detect(file, options)?;
         let rows = start..file.size();
         let count = (rows.end - rows.start).div_ceil(BLOCK);
-        let survey = |index| Survey::of_block(file, &columns, &rows, block_range(&rows, index));
+        let survey = |index| {
+            interrupt::check()?;
+            Survey::of_block(file, &columns, &rows, block_range(&rows, index))
+        };
         let surveys: Vec<Survey> = (0..count).into_par_iter().map(survey).collect::<Result<_>>()?;
         let (mut blocks, mut all) = (Vec::with_capacity(surveys.len()), Survey::empty());
         for survey in &surveys {

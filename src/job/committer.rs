@@ -1,0 +1,160 @@
+//! The thread that brings records and results to the disk while others work: records of a second or so together, since what
+//! costs is to wait for the disk.
+
+use super::directory::publish;
+use crate::{Error, Result, fault};
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Between two commits: what a kill costs at the most, beside the steps that are under way.
+const INTERVAL: Duration = Duration::from_secs(1);
+/// From then on a job waits for the disk before it gives up what it could be repeated from.
+const WORTH_SYNCING: Duration = Duration::from_secs(60);
+
+/// What is to be committed together.
+#[derive(Default)]
+pub(super) struct Batch {
+    /// Lines of the journal, to be written once the results are published.
+    pub(super) lines: String,
+    /// Results to publish.
+    pub(super) results: Vec<PathBuf>,
+}
+
+impl Batch {
+    fn append(&mut self, mut other: Batch) {
+        self.lines += &other.lines;
+        self.results.append(&mut other.results);
+    }
+}
+
+/// A journal file and the thread that writes to it. Dropping it commits what has been added, unless a commit has failed.
+pub(super) struct Committer {
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+    interval: Duration,
+    start: Instant,
+}
+
+#[derive(Default)]
+struct Shared {
+    state: Mutex<State>,
+    /// Somebody waits for a commit, or this is the end.
+    wanted: Condvar,
+    committed: Condvar,
+}
+
+#[derive(Default)]
+struct State {
+    batch: Batch,
+    /// Records added, and those of them that are on the disk.
+    added: u64,
+    committed: u64,
+    wanted: bool,
+    closing: bool,
+    /// After a failure nothing is written any more: the end of the journal is unknown.
+    failed: bool,
+    /// What failed, until somebody has been told.
+    failure: Option<Error>,
+}
+
+impl Shared {
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Committer {
+    /// Starts the thread for the journal at `path`.
+    pub(super) fn start(path: &Path) -> Result<Committer> {
+        let file = File::options().append(true).open(path).map_err(Error::io("open", path))?;
+        let interval = fault::commit_interval().unwrap_or(INTERVAL);
+        let shared = Arc::new(Shared::default());
+        let (of_thread, path) = (shared.clone(), path.to_path_buf());
+        let run = move || run(&of_thread, &file, &path, interval);
+        let thread = std::thread::Builder::new().name("journal".into()).spawn(run);
+        let thread = Some(thread.map_err(|e| Error::Memory(format!("cannot start a thread: {e}")))?);
+        Ok(Committer { shared, thread, interval, start: Instant::now() })
+    }
+
+    /// Adds a record to the next commit.
+    pub(super) fn add(&self, record: Batch) -> Result<()> {
+        let mut state = self.shared.state();
+        state.batch.append(record);
+        state.added += 1;
+        if let Some(error) = state.failure.take() {
+            return Err(error);
+        }
+        drop(state);
+        if self.interval.is_zero() { self.commit() } else { Ok(()) }
+    }
+
+    /// Waits until all that was added is committed.
+    pub(super) fn commit(&self) -> Result<()> {
+        let mut state = self.shared.state();
+        let due = state.added;
+        state.wanted = true;
+        self.shared.wanted.notify_one();
+        while state.committed < due && !state.failed {
+            state = self.shared.committed.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+        state.failure.take().map_or(Ok(()), Err)
+    }
+
+    pub(super) fn is_worth_syncing(&self) -> bool {
+        self.interval.is_zero() || self.start.elapsed() > WORTH_SYNCING
+    }
+}
+
+impl Drop for Committer {
+    fn drop(&mut self) {
+        self.shared.state().closing = true;
+        self.shared.wanted.notify_one();
+        if let Some(thread) = self.thread.take() {
+            // A panic there has been printed; there is nobody left to tell.
+            let _ = thread.join();
+        }
+    }
+}
+
+fn run(shared: &Shared, file: &File, path: &Path, interval: Duration) {
+    loop {
+        let state = shared.state();
+        let waits = |state: &mut State| !state.wanted && !state.closing;
+        let waited = shared.wanted.wait_timeout_while(state, interval.max(Duration::from_millis(1)), waits);
+        let (mut state, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        let (batch, added, closing) = (std::mem::take(&mut state.batch), state.added, state.closing);
+        let due = added > state.committed && !state.failed;
+        state.wanted = false;
+        drop(state);
+        let outcome = if due { commit(batch, file, path) } else { Ok(()) };
+        let mut state = shared.state();
+        match outcome {
+            Ok(()) => state.committed = added,
+            Err(error) => (state.failed, state.failure) = (true, Some(error)),
+        }
+        shared.committed.notify_all();
+        if closing {
+            return;
+        }
+    }
+}
+
+/// In this order, so that whatever the journal says is so, whenever the machine stops.
+fn commit(batch: Batch, mut file: &File, path: &Path) -> Result<()> {
+    fault::point("commit");
+    publish(&batch.results)?;
+    fault::point("published");
+    let lines = batch.lines.as_bytes();
+    if fault::is_due("torn") {
+        // What a power failure may leave of it.
+        let _ = file.write_all(&lines[..lines.len() / 2]);
+        fault::die();
+    }
+    file.write_all(lines).and_then(|()| file.sync_data()).map_err(Error::io("write", path))?;
+    fault::point("committed");
+    Ok(())
+}

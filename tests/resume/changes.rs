@@ -1,0 +1,192 @@
+//! What has changed since a run was interrupted is named, and decides from where it goes on.
+
+use std::fs;
+use std::path::Path;
+
+use crate::clouds;
+use crate::rig::{Rig, Run, Setup};
+
+fn base() -> Setup {
+    Setup::tiles_of(2_000).output("color = \"elevation\"")
+}
+
+/// Kills the job `base` at its `count`-th commit, runs it as `setup`, and gives what was said and the steps taken over.
+#[track_caller]
+fn change_to(rig: &mut Rig, count: u64, setup: &Setup) -> (String, u64) {
+    rig.forget();
+    rig.configure(&base());
+    assert!(rig.run_to("committed", count).was_killed());
+    rig.expect(setup);
+    let said = rig.run().succeeded().err;
+    let report = rig.is_complete(&said);
+    (said, report["resumed"].as_u64().unwrap())
+}
+
+fn rig() -> Rig {
+    Rig::new(&clouds::gaussian(20_000), &base()).committing_every(0)
+}
+
+#[test]
+fn means_may_change() {
+    let mut rig = rig();
+    for setup in
+        [base().threads(2), Setup { limits: "memory = \"1 GiB\"\nthreads = 1".into(), ..base() }, base().backend("cpu")]
+    {
+        let (said, resumed) = change_to(&mut rig, 12, &setup);
+        assert!(resumed >= 12 && !said.contains("changed"), "{resumed}: {said}");
+    }
+}
+
+#[test]
+fn another_look_keeps_the_mesh() {
+    let mut rig = rig();
+    let elevation = "color = \"elevation\"";
+    let looks = [
+        ("[output] color", Setup { output: base().output.replace(elevation, "color = \"none\""), ..base() }),
+        ("[output] normals", base().output("normals = false")),
+    ];
+    // Once among the leaves, once among the tiles.
+    for ((key, setup), count) in looks.iter().zip([12, 45]) {
+        let (said, resumed) = change_to(&mut rig, count, setup);
+        assert!(said.contains(key) && said.contains("written again"), "{said}");
+        assert!(resumed >= 12 && resumed < count.max(13), "{resumed} steps");
+    }
+}
+
+#[test]
+fn another_mesh_starts_over_and_says_why() {
+    let mut rig = rig();
+    for (key, setup) in [
+        ("[triangulation] sites_per_tile", Setup { triangulation: "sites_per_tile = 1500".into(), ..base() }),
+        ("[input] bounds", Setup { input: base().input + "\nbounds = [-20000, -20000, 20000, 20000]", ..base() }),
+        ("[input] duplicates", Setup { input: base().input + "\nduplicates = \"highest\"", ..base() }),
+        ("[output] color", Setup { output: base().output.replace("elevation", "auto"), ..base() }),
+    ] {
+        let (said, resumed) = change_to(&mut rig, 12, &setup);
+        assert!(said.contains(key) && said.contains("starting over") && resumed == 0, "{key}, {resumed}: {said}");
+    }
+}
+
+#[test]
+fn another_input_starts_over_and_says_which() {
+    let mut rig = rig();
+    let path = rig.folder.path().join("cloud.csv");
+    let text = fs::read_to_string(&path).unwrap();
+    let kill = |rig: &Rig| {
+        rig.forget();
+        fs::write(&path, &text).unwrap();
+        assert!(rig.run_to("committed", 12).was_killed());
+    };
+    kill(&rig);
+    fs::write(&path, text.clone() + "17,17,17\n").unwrap();
+    rig.expect(&base());
+    let said = rig.run().succeeded().err;
+    assert!(said.contains("cloud.csv") && said.contains("starting over"), "{said}");
+    assert_eq!(rig.is_complete("an input that grew")["resumed"], 0);
+    // The same size and the same time, but another digit in the middle.
+    kill(&rig);
+    let written = fs::metadata(&path).unwrap().modified().unwrap();
+    let at = text.len() - 3;
+    let digit = if &text[at..=at] == "1" { "2" } else { "1" };
+    fs::write(&path, format!("{}{digit}{}", &text[..at], &text[at + 1..])).unwrap();
+    fs::File::options().write(true).open(&path).unwrap().set_modified(written).unwrap();
+    rig.expect(&base());
+    let said = rig.run().succeeded().err;
+    assert!(said.contains("cloud.csv") && said.contains("starting over"), "{said}");
+    rig.is_complete("an input with another digit");
+    // Another file beside it.
+    kill(&rig);
+    let more = clouds::uniform(500, 50_000, 5);
+    clouds::write(rig.folder.path(), "more.csv", &more);
+    rig.expect(&Setup { input: "files = [\"*.csv\"]".into(), ..base() });
+    let said = rig.run().succeeded().err;
+    assert!(said.contains("more.csv (new)") && said.contains("starting over"), "{said}");
+    rig.is_complete("a new input");
+}
+
+#[test]
+fn fresh_starts_over() {
+    let rig = rig();
+    assert!(rig.run_to("committed", 30).was_killed());
+    let said = Run::start(rig.command().arg("--fresh")).end().succeeded().err;
+    assert!(!said.contains("going on"), "{said}");
+    assert_eq!(rig.is_complete("--fresh")["resumed"], 0);
+}
+
+#[test]
+fn a_finished_job_runs_from_the_start() {
+    let rig = rig();
+    rig.completes("once");
+    fs::remove_file(rig.out().join("tiles/000000.glb")).unwrap();
+    assert_eq!(rig.completes("twice")["resumed"], 0);
+}
+
+/// Changes a byte at each of `places`, parts of its length.
+fn damage(path: &Path, places: &[f64]) {
+    let mut bytes = fs::read(path).unwrap();
+    let length = bytes.len() as f64;
+    places.iter().for_each(|place| bytes[(place * length) as usize] ^= 0x10);
+    fs::write(path, bytes).unwrap();
+}
+
+#[test]
+fn what_is_damaged_is_made_again() {
+    let rig = rig();
+    // Among the leaves, the rims and the tiles.
+    for count in [10, 20, 30, 45] {
+        for places in [&[0.1][..], &[0.5, 0.9], &[0.999]] {
+            rig.forget();
+            assert!(rig.run_to("committed", count).was_killed());
+            let store = rig.out().join("job/steps.store");
+            damage(&store, places);
+            rig.completes(&format!("damage at {places:?} after {count} commits"));
+        }
+        rig.forget();
+        assert!(rig.run_to("committed", count).was_killed());
+        let store = rig.out().join("job/steps.store");
+        let half = fs::metadata(&store).unwrap().len() / 2;
+        fs::File::options().write(true).open(&store).unwrap().set_len(half).unwrap();
+        rig.completes(&format!("half a store after {count} commits"));
+    }
+}
+
+#[test]
+fn tiles_that_are_damaged_or_gone_are_written_again() {
+    let rig = rig();
+    assert!(rig.run_to("committed", 45).was_killed());
+    let tiles = || fs::read_dir(rig.out().join("tiles")).unwrap().map(|entry| entry.unwrap().path());
+    assert!(tiles().count() >= 3);
+    for (i, path) in tiles().enumerate() {
+        match i % 3 {
+            0 => fs::remove_file(path).unwrap(),
+            1 => fs::write(path, b"").unwrap(),
+            _ => damage(&path, &[0.5]),
+        }
+    }
+    let resumed = rig.completes("damaged tiles")["resumed"].as_u64().unwrap();
+    assert!((20..45).contains(&resumed), "{resumed} steps: all but the tiles");
+}
+
+#[test]
+fn points_that_are_damaged_are_read_again() {
+    let rig = rig();
+    assert!(rig.run_to("committed", 3).was_killed());
+    let spill = rig.out().join("job/points.spill");
+    let mut bytes = fs::read(&spill).unwrap();
+    bytes.iter_mut().for_each(|byte| *byte = !*byte);
+    fs::write(&spill, bytes).unwrap();
+    let said = rig.run().succeeded().err;
+    assert!(said.contains("not whole; starting over"), "{said}");
+    rig.is_complete("damaged points");
+}
+
+#[test]
+fn a_journal_that_is_no_journal_is_no_obstacle() {
+    let rig = rig();
+    for garbage in [&b""[..], b"\n\n", b"\xff\xfe\x00", b"0000000000000000 {}\n"] {
+        rig.forget();
+        assert!(rig.run_to("committed", 20).was_killed());
+        fs::write(rig.out().join("job/journal"), garbage).unwrap();
+        assert_eq!(rig.completes("a journal of garbage")["resumed"], 0);
+    }
+}

@@ -1,0 +1,92 @@
+//! Disks that fill up, at every stage.
+
+use std::collections::BTreeSet;
+use std::process::Command;
+
+use crate::clouds;
+use crate::rig::{Rig, Run, Setup};
+
+/// A run in which no file may become larger than so many bytes.
+fn limited(rig: &Rig, kibibytes: u64) -> Run {
+    let mut command = Command::new("bash");
+    command.arg("-c").arg(format!("ulimit -f {kibibytes} && exec \"$0\" --force job.toml"));
+    Run::start(command.arg(env!("CARGO_BIN_EXE_gdt-batch")).env("GDT_COMMIT_MS", "0").current_dir(rig.folder.path()))
+}
+
+/// Where a run stopped: the file that could not be written, without its number, and how many steps were finished.
+fn place(said: &str) -> (String, String) {
+    let after = |text: &'static str| said.split(text).nth(1).unwrap_or_default();
+    let file = after("error: cannot write ").split(": ").next().unwrap_or_default();
+    let steps = after("are kept in out/job (").split(')').next().unwrap_or_default();
+    (file.replace(|c: char| c.is_ascii_digit(), ""), steps.to_owned())
+}
+
+#[test]
+fn a_file_that_may_not_grow_stops_any_stage() {
+    let rig = Rig::new(&clouds::gaussian(20_000), &Setup::tiles_of(2_000)).committing_every(0);
+    let mut places = BTreeSet::new();
+    for count in [0, 1, 8, 14, 30, 40] {
+        for kibibytes in [24, 300, 600, 1_000] {
+            rig.forget();
+            assert!(count == 0 || rig.run_to("committed", count).was_killed());
+            let end = limited(&rig, kibibytes).end().stopped(&["error: cannot write", "ulimit -f"]);
+            assert!(count == 0 || end.err.contains("run the same command again"), "{}", end.err);
+            rig.has_nothing_half_written(&end.err);
+            places.insert(place(&end.err));
+            rig.completes(&end.err);
+        }
+    }
+    assert!(places.len() >= 5, "{places:?}");
+}
+
+/// Fills a file system of $1 KiB, then makes room and goes on. Prints what the first run said.
+const FILL: &str = r#"
+set -u
+mount -t tmpfs -o size=$1k tmpfs out || exit 77
+GDT_COMMIT_MS=0 "$0" --force job.toml 2>&1
+code=$?
+mount -o remount,size=256m out
+"$0" --quiet job.toml || exit 78
+cp -r out copy
+exit $code
+"#;
+
+/// A command that may mount, if there is one: for root in a mount namespace, for others in a user namespace as well.
+fn mounting(rig: &Rig, kibibytes: u64) -> Command {
+    let mut command = Command::new("unshare");
+    command.args(["--user", "--map-root-user", "--mount", "bash", "-c", FILL, env!("CARGO_BIN_EXE_gdt-batch")]);
+    command.arg(kibibytes.to_string()).current_dir(rig.folder.path());
+    command
+}
+
+#[test]
+fn a_disk_that_fills_up_stops_any_stage() {
+    let rig = Rig::new(&clouds::gaussian(20_000), &Setup::tiles_of(2_000));
+    let can_mount = Command::new("unshare")
+        .args(["--user", "--map-root-user", "--mount", "mount", "-t", "tmpfs", "tmpfs", "/mnt"])
+        .output()
+        .is_ok_and(|output| output.status.success());
+    if !can_mount {
+        eprintln!("skipped: no file system can be mounted here");
+        return;
+    }
+    let mut places = BTreeSet::new();
+    let copy = rig.folder.path().join("copy");
+    // The points, the leaves, and then mostly the pixels of the preview.
+    let kibibytes = [256, 768, 1024, 1280, 1536, 1792].into_iter().chain((2..40).map(|mebibytes| mebibytes << 10));
+    for kibibytes in kibibytes {
+        std::fs::create_dir(rig.out()).unwrap();
+        let end = Run::start(&mut mounting(&rig, kibibytes)).end();
+        std::fs::remove_dir(rig.out()).unwrap();
+        std::fs::rename(&copy, rig.out()).unwrap();
+        rig.is_complete(&format!("{kibibytes} KiB: {}", end.out));
+        rig.forget();
+        if end.status.success() {
+            break;
+        }
+        assert_eq!(end.status.code(), Some(1), "{kibibytes} KiB: {end:?}");
+        assert!(end.out.contains("No space left") && end.out.contains("make room"), "{}", end.out);
+        places.insert(place(&end.out));
+    }
+    assert!(places.len() >= 8, "{places:?}");
+}

@@ -1,0 +1,27 @@
+//! Two processes, one directory.
+
+use crate::clouds;
+use crate::rig::{Rig, Run, Setup};
+
+#[test]
+fn a_second_process_is_told_who_is_there() {
+    let rig = Rig::new(&clouds::gaussian(40_000), &Setup::tiles_of(1_000)).committing_every(0);
+    let mut first = Run::start(&mut rig.command());
+    let journal = rig.out().join("job/journal");
+    first.wait_until(|| journal.exists());
+    first.signal("STOP");
+    let second = rig.run().stopped(&["is working in", "another [output] directory"]);
+    assert!(second.err.contains(&first.child.id().to_string()), "{}", second.err);
+    assert!(!second.err.contains("run the same command again"), "it has nothing to go on with: {}", second.err);
+    first.signal("CONT");
+    first.end().succeeded();
+    rig.is_complete("after a second process");
+}
+
+#[test]
+fn the_lock_of_a_process_that_was_killed_is_no_obstacle() {
+    let rig = Rig::new(&clouds::gaussian(20_000), &Setup::tiles_of(2_000)).committing_every(0);
+    assert!(rig.run_to("committed", 5).was_killed());
+    assert!(rig.out().join("job/lock").exists());
+    assert!(rig.completes("after a kill")["resumed"].as_u64() >= Some(5));
+}

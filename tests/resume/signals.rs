@@ -1,0 +1,61 @@
+//! Ctrl-C and its kin.
+
+use std::time::Duration;
+
+use crate::clouds;
+use crate::rig::{Rig, Run, Setup};
+
+/// A job of many steps that each wait for the disk: long enough to be met on its way.
+fn long_job(threads: usize) -> Rig {
+    Rig::new(&clouds::gaussian(60_000), &Setup::tiles_of(500).threads(threads)).committing_every(0)
+}
+
+#[test]
+fn sigterm_and_ctrl_c_stop_it_and_it_goes_on() {
+    for (signal, threads) in [("TERM", 1), ("INT", 2)] {
+        let rig = long_job(threads);
+        // Among the leaves, among the rims, among the tiles.
+        for steps in [50, 250, 400] {
+            let mut run = Run::start(&mut rig.command());
+            run.wait_until(|| rig.steps() > steps);
+            run.signal(signal);
+            run.end().stopped(&[
+                "error: interrupted",
+                "finished steps are kept in out/job",
+                "run the same command again",
+            ]);
+            rig.has_nothing_half_written(signal);
+        }
+        assert!(rig.completes(signal)["resumed"].as_u64() > Some(100));
+    }
+}
+
+#[test]
+fn what_is_interrupted_before_the_first_step_leaves_nothing() {
+    let rig = Rig::new(&clouds::gaussian(400_000), &Setup::tiles_of(20_000));
+    let mut run = Run::start(&mut rig.command());
+    let spill = rig.out().join("job/points.spill");
+    run.wait_until(|| spill.exists());
+    run.signal("INT");
+    let end = run.end().stopped(&["error: interrupted"]);
+    if !end.err.contains("run the same command again") {
+        assert!(!rig.out().join("job").exists());
+    }
+    rig.completes("after an interruption");
+}
+
+#[test]
+fn a_second_ctrl_c_ends_it_at_once() {
+    // One leaf that takes long, and in which nobody looks for signals.
+    let rig = Rig::new(&clouds::gaussian(400_000), &Setup::tiles_of(500_000).backend("reference")).committing_every(0);
+    let mut run = Run::start(&mut rig.command());
+    run.wait_until(|| rig.steps() == 1);
+    std::thread::sleep(Duration::from_millis(100));
+    run.signal("INT");
+    std::thread::sleep(Duration::from_millis(20));
+    run.signal("INT");
+    let end = run.end();
+    assert_eq!(end.status.code(), Some(1), "{end:?}");
+    assert!(!end.err.contains("interrupted"), "it did not come to say so: {}", end.err);
+    rig.completes("after a second Ctrl-C");
+}
