@@ -84,12 +84,37 @@ pub struct Output {
     /// Whether vertices carry normals.
     #[serde(default = "yes")]
     pub normals: bool,
+    /// In which form viewers get the terrain.
+    #[serde(default)]
+    pub format: Format,
+    /// Whether 3D Tiles have coarser levels above the exact tiles.
+    #[serde(default = "yes")]
+    pub levels: bool,
+    /// How many sites a coarser tile holds at the most.
+    #[serde(default)]
+    pub level_sites: LevelSites,
+    /// Metres that heights are raised by to be heights above the ellipsoid, where 3D Tiles are placed on the globe.
+    #[serde(default)]
+    pub height_offset: f64,
     /// How tiles are packed.
     #[serde(default)]
     pub compression: Compression,
     /// Triangles with an edge longer than this are left out.
     #[serde(default)]
     pub max_edge: MaxEdge,
+}
+
+/// In which form viewers get the terrain; the exact tiles are written in any case.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Format {
+    /// Both where the terrain fits one file that viewers open, else 3D Tiles.
+    #[default]
+    Auto,
+    /// One file, `terrain.glb`.
+    Glb,
+    /// 3D Tiles, `tileset.json`.
+    Tiles,
 }
 
 /// `[limits]`: what the job may use of the machine.
@@ -362,6 +387,36 @@ impl From<SitesPerTile> for String {
     }
 }
 
+/// How many sites a coarser tile holds at the most.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "toml::Value", into = "String")]
+pub struct LevelSites(pub u64);
+
+impl Default for LevelSites {
+    /// As many as the exact tiles have by default.
+    fn default() -> LevelSites {
+        LevelSites(SitesPerTile::AUTO.0)
+    }
+}
+
+impl TryFrom<toml::Value> for LevelSites {
+    type Error = String;
+
+    fn try_from(value: toml::Value) -> std::result::Result<LevelSites, String> {
+        match value {
+            toml::Value::String(s) if s == "auto" => Ok(LevelSites::default()),
+            toml::Value::Integer(sites @ 100..=10_000_000) => Ok(LevelSites(sites as u64)),
+            _ => Err("level_sites is \"auto\" or a whole number from 100 to 10000000".into()),
+        }
+    }
+}
+
+impl From<LevelSites> for String {
+    fn from(sites: LevelSites) -> String {
+        sites.0.to_string()
+    }
+}
+
 /// How many worker threads; 0: one per core.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "i64")]
@@ -481,6 +536,9 @@ impl Config {
         }
         if config.output.directory.as_os_str().is_empty() {
             return Err("[output] directory is empty".into());
+        }
+        if !config.output.height_offset.is_finite() {
+            return Err("[output] height_offset is not a number of metres".into());
         }
         Ok(config)
     }

@@ -2,6 +2,7 @@
 
 use super::choose::Coarser;
 use super::partition::Skipped;
+use super::pyramid::{BYTES_PER_LEVEL_SITE, Sizes};
 use super::report::{grouped, write_skipped};
 use super::scan::{self, Plan};
 use super::{BYTES_PER_LEAF_SITE, MOST_TRIANGLES_IN_ONE_FILE, machine, partition, workers};
@@ -110,7 +111,12 @@ pub(super) fn preflight(plan: &Plan, config: &Config, threads: usize) -> Preflig
         unit: plan.unit.into(),
         crs: plan.crs.name.clone(),
         threads,
-        memory: (64 << 20) + leaves.max(partition::buffer_bytes(points, per_tile, config.limits.memory.0 / 6)),
+        memory: (64 << 20)
+            + leaves.max(level_bytes(config, points, threads)).max(partition::buffer_bytes(
+                points,
+                per_tile,
+                config.limits.memory.0 / 6,
+            )),
         memory_limit: config.limits.memory.0,
         memory_free: machine::free_memory(),
         temporary: spill + leaves_on_disk,
@@ -132,15 +138,23 @@ fn leaf_bytes(points: u64, per_tile: u64, tiles: u64) -> u64 {
     points * TEMPORARY_PER_SITE + rims * TEMPORARY_PER_RIM + PIXELS * size_of::<Texel>() as u64
 }
 
+/// Bytes of memory that making coarser tiles takes.
+fn level_bytes(config: &Config, points: u64, threads: usize) -> u64 {
+    let memory = config.limits.memory.0 / 4 * 3;
+    let one = (4 * Sizes::new(config.output.level_sites.0, memory).sites).min(points) * BYTES_PER_LEVEL_SITE;
+    if config.output.levels { (one * threads as u64).min(memory) } else { 0 }
+}
+
 fn result_bytes(points: u64, tiles: u64, compression: Compression) -> u64 {
     let in_tiles = points * result_per_site(compression) + tiles * RESULT_PER_TILE;
     let copies = if 2 * points <= MOST_TRIANGLES_IN_ONE_FILE { 2 } else { 1 };
-    copies * in_tiles + 4 * PIXELS
+    // Levels add about a third.
+    copies * in_tiles + in_tiles / 2 + 4 * PIXELS
 }
 
 /// Bytes of what an earlier job has left in `output` and the next one replaces.
 fn taken(output: &Path) -> u64 {
-    let folders = ["", "tiles", "job"].map(|name| output.join(name));
+    let folders = ["", "tiles", "levels", "cut", "job"].map(|name| output.join(name));
     let entries = folders.iter().filter_map(|folder| std::fs::read_dir(folder).ok());
     let files = entries.flatten().flatten().filter_map(|entry| entry.metadata().ok()).filter(|meta| meta.is_file());
     files.map(|meta| meta.len()).sum()

@@ -55,15 +55,20 @@ impl Directory {
     pub fn sweep(&self, keep: &HashSet<PathBuf>) -> Result<()> {
         create_directory(&self.tiles())?;
         let mut old = numbered_files(&self.tiles())?;
+        if self.levels().is_dir() {
+            old.extend(numbered_files(&self.levels())?);
+        }
         if self.cut().is_dir() {
             old.extend(numbered_files(&self.cut())?);
         }
         let single = [self.spill(), self.store(), self.terrain(), self.georeference(), self.report(), self.preview()];
+        let single = single.into_iter().chain([self.tileset()]).collect::<Vec<_>>();
         old.extend(single.iter().map(|path| partial(path)));
         old.extend(single);
         old.iter().filter(|path| !keep.contains(&self.name(path))).try_for_each(|path| remove_file(path))?;
         // What is somebody else's in it stays, and so do triangles that are kept.
         let _ = fs::remove_dir(self.cut());
+        let _ = fs::remove_dir(self.levels());
         Ok(())
     }
 
@@ -118,6 +123,29 @@ impl Directory {
     /// The GLB of `tile`.
     pub fn tile(&self, tile: usize) -> PathBuf {
         self.tiles().join(format!("{tile:06}.glb"))
+    }
+
+    /// The directory of the coarser tiles.
+    pub fn levels(&self) -> PathBuf {
+        self.output.join("levels")
+    }
+
+    /// Makes the directory of the coarser tiles.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be made.
+    pub fn create_levels(&self) -> Result<()> {
+        create_directory(&self.levels())
+    }
+
+    /// The GLB of the coarser tile at tree node `node`.
+    pub fn level(&self, node: usize) -> PathBuf {
+        self.levels().join(format!("{node:06}.glb"))
+    }
+
+    /// All tiles as 3D Tiles.
+    pub fn tileset(&self) -> PathBuf {
+        self.output.join("tileset.json")
     }
 
     /// The directory of the triangles that are left out.

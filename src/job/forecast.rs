@@ -10,6 +10,7 @@ use std::time::Duration;
 const TRIANGULATE: f64 = 430.0;
 const STITCH: f64 = 10.0;
 const WRITE: f64 = 300.0;
+const LEVELS: f64 = 900.0;
 const FINISH: f64 = 8.0;
 
 fn cost_of_reading(format: Format) -> f64 {
@@ -29,6 +30,7 @@ pub(super) fn costs(plan: &Plan) -> Vec<(&'static str, f64)> {
         ("triangulate", points * TRIANGULATE),
         ("stitch", points * STITCH),
         ("write", points * WRITE),
+        ("levels", points * LEVELS),
         ("finish", points * FINISH),
     ]
 }

@@ -30,7 +30,9 @@ pub enum Step {
     Stitch(usize),
     /// Step 6 of a tile.
     Export(usize),
-    /// Step 7, but for the report.
+    /// Step 7 of an inner node that viewers see.
+    Level(usize),
+    /// Step 8, but for the report.
     Finish,
     /// The report: the job is complete.
     Report,

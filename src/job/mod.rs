@@ -17,10 +17,13 @@ mod forecast;
 pub mod grid;
 pub mod journal;
 pub mod leaf;
+pub mod levels;
 mod machine;
 pub mod merge;
 pub mod partition;
+pub mod placement;
 pub mod progress;
+pub mod pyramid;
 pub mod records;
 pub mod report;
 pub mod resume;
@@ -30,9 +33,10 @@ pub mod span;
 pub mod spill;
 pub mod stitch;
 pub mod store;
+pub mod tileset;
 pub mod tree;
 
-use crate::config::{ColorChoice, Config};
+use crate::config::{ColorChoice, Config, Format};
 use crate::output::Compression;
 use crate::output::color::Coloring;
 use crate::output::georeference::Georeference;
@@ -49,8 +53,11 @@ use export::{Look, TileFigures};
 use fingerprint::{Fingerprint, Head};
 use journal::{Done, Journal, Step};
 use leaf::LeafFigures;
+use levels::LevelFigures;
 use partition::{Partition, Summary, Task};
+use placement::Placement;
 use progress::{Progress, Schedule, Stage, StageFigures};
+use pyramid::{Pyramid, Sizes};
 use rayon::prelude::*;
 use report::{Parts, Report};
 use scan::Plan;
@@ -241,12 +248,36 @@ impl Job<'_> {
         enough_triangles(&written, plan)?;
         let exported = stage.finish();
 
+        let one_file = fits_one_file(&written);
+        let mut warnings = Vec::new();
+        let (mut coarser, mut levelled) = (LevelFigures::default(), None);
+        let (mut tileset, mut placement) = (None, None);
+        if config.output.format != Format::Glb || !one_file {
+            let (sizes, pyramid) = pyramid(config, &partition);
+            let stage = progress.stage("levels", pyramid.inner.len() as u64, "tiles");
+            coarser = self.make_levels(&pyramid, sizes, &look, &stage)?;
+            let placed = placement::place(plan, &look.frame, bounds, config.output.height_offset);
+            warnings.extend(placement::remark(&placed));
+            placement = placed.ok();
+            let transform = placement.as_ref().map(|placement| placement.transform);
+            tileset = Some(tileset::text(directory, store, &pyramid, &look, transform)?);
+            levelled = Some(stage.finish());
+            warnings.extend(levels_left_out(config, &pyramid));
+        }
+
         let stage = progress.stage("finish", 1, "job");
-        let other_bytes =
-            journal.step(Step::Finish, || finish(directory, store, plan, &written, &canvas, tiles, bounds))?;
+        let finish = || {
+            let viewers = Viewers { tileset, one_file: one_file && config.output.format != Format::Tiles };
+            finish(directory, store, plan, placement.as_ref(), viewers, &canvas, tiles, bounds)
+        };
+        let other_bytes = journal.step(Step::Finish, finish)?;
+        if !one_file && config.output.format == Format::Glb {
+            warnings.push(too_large_for_one_file(&written));
+        }
         journal.commit()?;
         stage.advance(1);
-        let stages = vec![scanned, read, triangulated, stitched, exported, stage.finish()];
+        let stages = [Some(scanned), Some(read), Some(triangulated), Some(stitched), Some(exported), levelled];
+        let stages = stages.into_iter().flatten().chain([stage.finish()]).collect();
 
         let report = Report::new(
             plan,
@@ -256,6 +287,8 @@ impl Job<'_> {
                 gpu: triangulator.gpu().map(str::to_owned),
                 gpu_steps: triangulator.gpu_steps(),
                 tiles: written,
+                levels: coarser,
+                warnings,
                 other_bytes,
                 temporary: partition.spilled + store.bytes(),
                 stages,
@@ -269,6 +302,34 @@ impl Job<'_> {
         journal.record(Step::Report, Done { results, ..Done::new((), Vec::new()) })?;
         journal.commit()?;
         Ok(report)
+    }
+
+    /// Makes the coarser tiles, those of one height side by side, as many at once as have room.
+    fn make_levels(&self, pyramid: &Pyramid, sizes: Sizes, look: &Look, stage: &Stage) -> Result<LevelFigures> {
+        let content = self.config.output.levels;
+        let lanes = match pyramid.largest() {
+            largest if content && largest > 0 => (sizes.memory / largest).clamp(1, self.threads as u64) as usize,
+            _ => self.threads,
+        };
+        let make = |at: usize| {
+            let run = || levels::run(self.directory, self.store, pyramid, at, look, sizes, content);
+            let figures = self.journal.step(Step::Level(pyramid.inner[at].node), run)?;
+            stage.advance(1);
+            Ok(figures)
+        };
+        on_threads(lanes, || {
+            let mut all = LevelFigures::default();
+            for height in pyramid.by_height() {
+                let sum = |mut a: LevelFigures, b| {
+                    a += b;
+                    Ok(a)
+                };
+                all += height.into_par_iter().with_max_len(1).map(make).try_reduce(LevelFigures::default, sum)?;
+                // The next ones read them under their names.
+                self.journal.commit()?;
+            }
+            Ok(all)
+        })
     }
 
     /// Step 2. An input that proves bad only now is left out as if it had never been named: if without it the job would have
@@ -346,6 +407,39 @@ impl Job<'_> {
     fn count(&self, stage: &Stage, step: Step, amount: u64) {
         if self.journal.has(step) { stage.take_over(amount) } else { stage.advance(amount) }
     }
+}
+
+/// Which tiles viewers see.
+fn pyramid(config: &Config, partition: &Partition) -> (Sizes, Pyramid) {
+    let points = |blocks: &Vec<spill::Block>| blocks.iter().map(|block| block.points as u64).sum();
+    let points: Vec<u64> = partition.blocks.iter().map(points).collect();
+    let sizes = Sizes::new(config.output.level_sites.0, config.limits.memory.0 / 4 * 3);
+    (sizes, Pyramid::new(&partition.tree, &points, sizes))
+}
+
+fn levels_left_out(config: &Config, pyramid: &Pyramid) -> Option<String> {
+    let without = pyramid.inner.iter().filter(|inner| !inner.content).count();
+    (config.output.levels && without > 0).then(|| {
+        format!(
+            "{without} of {} coarser tiles are left out, because the tiles below them are too large for [limits] memory = \"{}\": \
+             viewers load the finer ones at once; lower [triangulation] sites_per_tile or raise memory",
+            pyramid.inner.len(),
+            config.limits.memory
+        )
+    })
+}
+
+fn fits_one_file(written: &TileFigures) -> bool {
+    written.triangles <= MOST_TRIANGLES_IN_ONE_FILE && written.files <= MOST_TILES_IN_ONE_FILE
+}
+
+fn too_large_for_one_file(written: &TileFigures) -> String {
+    format!(
+        "{} triangles in {} tiles are more than viewers open as one file: terrain.glb is left out and tileset.json written in its \
+         place; set [input] bounds or classes for a smaller terrain",
+        report::grouped(written.triangles),
+        report::grouped(written.files)
+    )
 }
 
 fn task<'a>(plan: &'a Plan, config: &Config) -> Task<'a> {
@@ -448,22 +542,34 @@ fn look(config: &Config, plan: &Plan, summary: &Summary, bounds: [[i32; 3]; 2], 
     Look { frame, coloring, normals: config.output.normals, compression, cut }
 }
 
+/// What viewers open.
+struct Viewers {
+    /// The text of `tileset.json`.
+    tileset: Option<String>,
+    /// Whether there is to be a `terrain.glb`.
+    one_file: bool,
+}
+
 /// Writes what stands beside the tiles; its figure is its bytes.
 fn finish(
     directory: &Directory,
     store: &Store,
     plan: &Plan,
-    written: &TileFigures,
+    placement: Option<&Placement>,
+    viewers: Viewers,
     canvas: &Canvas,
     tiles: usize,
     bounds: [[i32; 3]; 2],
 ) -> Result<Done<u64>> {
     let georeference = Georeference::new(&plan.frame, &plan.lattice, bounds, plan.unit, plan.crs.epsg);
     let mut results = vec![
-        directory::write_result(&directory.georeference(), georeference.to_json().as_bytes())?,
+        directory::write_result(&directory.georeference(), georeference.to_json(placement).as_bytes())?,
         directory::write_result(&directory.preview(), &draw_picture(store, canvas, tiles)?)?,
     ];
-    if written.triangles <= MOST_TRIANGLES_IN_ONE_FILE && written.files <= MOST_TILES_IN_ONE_FILE {
+    if let Some(tileset) = viewers.tileset {
+        results.push(directory::write_result(&directory.tileset(), tileset.as_bytes())?);
+    }
+    if viewers.one_file {
         let paths: Vec<_> = (0..tiles).map(|tile| directory.tile(tile)).filter(|path| path.exists()).collect();
         write_terrain(&directory::partial(&directory.terrain()), &paths)?;
         results.push(directory::written_result(&directory.terrain())?);

@@ -2,9 +2,9 @@
 
 use super::columns::{ColumnReader, ColumnWriter};
 use super::store::{Key, Store, Stored};
-use crate::Result;
 use crate::geometry::Site;
 use crate::output::normals::NormalSum;
+use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
 
 /// A site as other tiles know it. Sites are numbered by tile, then in the order of the tile.
@@ -230,5 +230,60 @@ impl RimVertices {
     /// The vertex of `site`.
     pub fn find(&self, site: u32) -> Option<&RimVertex> {
         self.0.binary_search_by_key(&site, |vertex| vertex.site).ok().map(|at| &self.0[at])
+    }
+}
+
+/// What `tileset.json` says of a tile.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct LevelTile {
+    /// The greatest vertical distance to the exact mesh, metres.
+    pub error: f64,
+    /// The least and greatest lattice x, y, z of the exact mesh below; the least are greater where there is none.
+    corners: [[i32; 3]; 2],
+    /// Whether there is a GLB: 1 or 0.
+    pub content: u32,
+    unused: u32,
+}
+
+impl LevelTile {
+    /// A tile of the exact mesh within `bounds`, with or without content.
+    pub fn new(bounds: Option<[[i32; 3]; 2]>, content: bool) -> LevelTile {
+        LevelTile { error: 0.0, corners: bounds.unwrap_or([[1; 3], [0; 3]]), content: content.into(), unused: 0 }
+    }
+
+    /// The least and greatest lattice x, y, z; `None` where there is no triangle below.
+    pub fn bounds(&self) -> Option<[[i32; 3]; 2]> {
+        (self.corners[0][0] <= self.corners[1][0]).then_some(self.corners)
+    }
+}
+
+/// What a coarser tile leaves for the tile above it and for `tileset.json`.
+#[derive(Debug)]
+pub struct Level {
+    /// The tile itself.
+    pub own: LevelTile,
+    /// The exact tiles among its children, in their order.
+    pub leaves: Vec<LevelTile>,
+}
+
+impl Level {
+    /// Stores it as that of `node`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    pub fn save(&self, store: &Store, node: usize) -> Result<Stored> {
+        ColumnWriter::default().push(&[self.own]).push(&self.leaves).write(store, Key::Level(node))
+    }
+
+    /// That of `node`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if it is not there or not whole.
+    pub fn load(store: &Store, node: usize) -> Result<Level> {
+        let mut columns = ColumnReader::open(store, Key::Level(node))?;
+        let own = columns.column()?;
+        let [own] = own[..] else { return Err(Error::Broken(format!("the record of coarser tile {node} is damaged"))) };
+        Ok(Level { own, leaves: columns.column()? })
     }
 }

@@ -2,6 +2,7 @@
 
 use super::export::TileFigures;
 use super::leaf::LeafFigures;
+use super::levels::LevelFigures;
 use super::machine;
 use super::partition::Skipped;
 use super::progress::{Schedule, StageFigures};
@@ -27,6 +28,8 @@ pub struct Report {
     pub cut_triangles: u64,
     /// GLB files in `tiles`.
     pub tiles: u64,
+    /// The coarser tiles in `levels`.
+    pub levels: LevelFigures,
     /// The share of the triangles that cross a border between tiles.
     pub seam_share: f64,
     /// Points dropped because another has the same x and y.
@@ -108,6 +111,10 @@ pub struct Parts {
     pub gpu_steps: Vec<(&'static str, f64)>,
     /// What the tiles came to.
     pub tiles: TileFigures,
+    /// What the coarser tiles came to.
+    pub levels: LevelFigures,
+    /// What the user should know of the results.
+    pub warnings: Vec<String>,
     /// Bytes of results beside the tiles.
     pub other_bytes: u64,
     /// Bytes of temporary files.
@@ -138,12 +145,14 @@ impl Report {
             warnings.push(rounded(parts.points.rounded_z, "z", plan.lattice.resolution_z));
         }
         warnings.extend_from_slice(&parts.points.examples);
+        warnings.extend(parts.warnings);
         Report {
             generator: concat!("gdt-batch ", env!("CARGO_PKG_VERSION")).into(),
             sites: parts.leaves.sites,
             triangles: parts.tiles.triangles,
             cut_triangles: parts.tiles.cut_triangles,
             tiles: parts.tiles.files,
+            levels: parts.levels,
             seam_share: parts.tiles.seam_triangles as f64 / parts.tiles.triangles.max(1) as f64,
             duplicates: parts.leaves.duplicates,
             files: plan.sources.len(),
@@ -155,7 +164,7 @@ impl Report {
             lattice: plan.lattice.clone(),
             unit: plan.unit.into(),
             crs: plan.crs.name.clone(),
-            bytes_written: parts.tiles.bytes + parts.other_bytes,
+            bytes_written: parts.tiles.bytes + parts.levels.bytes + parts.other_bytes,
             bytes_temporary: parts.temporary,
             peak_memory: machine::peak_memory(),
             memory_limit: parts.memory,
@@ -205,6 +214,10 @@ impl fmt::Display for Report {
             row("  left out (max_edge)", grouped(self.cut_triangles))?;
         }
         row("tiles", grouped(self.tiles))?;
+        if self.levels.files > 0 {
+            let levels = &self.levels;
+            row("coarser tiles", format!("{}, at most {:.2} m off", grouped(levels.files), levels.error_m))?;
+        }
         let Outcome { pipeline, reference, crowded, not_accepted, counts } = &self.leaves.outcome;
         let leaves = pipeline + reference + crowded + not_accepted;
         row(

@@ -187,6 +187,8 @@ impl Review {
             Step::Node(node) => self.node_stays(node),
             Step::Stitch(tile) => self.stitch_stays(tile),
             Step::Partition | Step::Export(_) => self.whole.contains(&step),
+            // How they are cut depends on the memory, which may be another now.
+            Step::Level(_) => false,
             Step::Finish | Step::Report => self.exported && self.whole.contains(&step),
         }
     }

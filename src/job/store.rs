@@ -31,6 +31,8 @@ pub enum Key {
     Pixels(usize),
     /// What the steps after the partition know of it.
     Partition,
+    /// What `tileset.json` will say of the coarser tile at a tree node.
+    Level(usize),
 }
 
 impl Key {
@@ -43,6 +45,7 @@ impl Key {
             Key::Rim(i) => [5, i as u32],
             Key::Pixels(i) => [6, i as u32],
             Key::Partition => [7, 0],
+            Key::Level(i) => [8, i as u32],
         }
     }
 }

@@ -222,6 +222,15 @@ impl Frame {
         self.metres(self.steps(point))
     }
 
+    /// The lattice point at a glTF world position in metres as [`Frame::world`] gives it; `None` where there is none.
+    pub fn integers(&self, world: [f64; 3]) -> Option<[i32; 3]> {
+        let [xy, up] = self.resolution_metres();
+        let point = [world[0] / xy, -world[2] / xy, world[1] / up].map(f64::round);
+        let is_there = point.iter().all(|v| v.abs() <= i32::MAX as f64);
+        let point = point.map(|v| v as i32);
+        (is_there && self.world(point) == world).then_some(point)
+    }
+
     /// Steps as metres.
     pub(super) fn metres(&self, steps: [f64; 3]) -> [f64; 3] {
         [steps[0] * self.horizontal.step, steps[1] * self.vertical.step, steps[2] * self.horizontal.step]

@@ -40,9 +40,13 @@ impl Georeference {
         }
     }
 
-    /// The text of the file.
-    pub fn to_json(&self) -> String {
-        let mut text = serde_json::to_string_pretty(self).expect("numbers and strings always serialize");
+    /// The text of the file; `globe` is where the terrain lies on the globe, if that is known.
+    pub fn to_json(&self, globe: Option<impl Serialize>) -> String {
+        let whole = serde_json::to_value(self).and_then(|mut whole| {
+            whole["globe"] = serde_json::to_value(globe)?;
+            serde_json::to_string_pretty(&whole)
+        });
+        let mut text = whole.expect("numbers and strings always serialize");
         text.push('\n');
         text
     }

@@ -4,11 +4,14 @@
 
 pub mod color;
 mod container;
+pub mod deviation;
 mod document;
 pub mod encoding;
 pub mod frame;
 pub mod georeference;
 pub mod glb;
+pub mod globe;
+pub mod join;
 pub mod normals;
 mod order;
 mod packed;
@@ -16,8 +19,10 @@ mod parts;
 pub mod picture;
 pub mod preview;
 pub mod read;
+pub mod simplify;
 pub mod terrain;
 mod tile;
+pub mod tileset;
 
 pub use encoding::Compression;
 pub use tile::Tile;

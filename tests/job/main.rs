@@ -18,6 +18,7 @@ mod choices;
 mod configuration;
 mod cutting;
 mod khronos;
+mod levels;
 mod limits;
 mod messages;
 mod preflight;

@@ -29,13 +29,15 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 fn threads_and_repetition_change_no_byte() {
     let folder = tempfile::tempdir().unwrap();
     let cloud = clouds::write(folder.path(), "cloud.csv", &clouds::gaussian(40_000));
-    let job = |threads: usize| Job::on(&[&cloud]).tiles_of(3_000).threads(threads);
+    let job = |threads: usize| Job::on(&[&cloud]).tiles_of(3_000).with("output", "level_sites = 3000").threads(threads);
     let (one, two) = (job(1), job(2));
     one.report();
     two.report();
     let expected = files(&one.out());
-    let names: Vec<&String> = expected.keys().filter(|name| !name.starts_with("tiles/")).collect();
-    assert_eq!(names, ["georeference.json", "preview.png", "terrain.glb"]);
+    let is_tile = |name: &&String| name.starts_with("tiles/") || name.starts_with("levels/");
+    let names: Vec<&String> = expected.keys().filter(|name| !is_tile(name)).collect();
+    assert_eq!(names, ["georeference.json", "preview.png", "terrain.glb", "tileset.json"]);
+    assert!(expected.keys().filter(|name| name.starts_with("levels/")).count() > 4);
     let differ = |found: BTreeMap<String, Vec<u8>>| {
         assert!(found.keys().eq(expected.keys()));
         expected.iter().filter(|(name, bytes)| found[*name] != **bytes).map(|(name, _)| name).collect::<Vec<_>>()

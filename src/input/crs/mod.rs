@@ -1,5 +1,6 @@
 //! Coordinate reference systems, as far as a terrain needs them: the units, a text for readers, and whether two agree.
 
+mod definition;
 mod geotiff;
 mod wkt;
 
@@ -104,6 +105,16 @@ impl Crs {
             (None, None) => self.same_name(other),
             _ => true,
         }
+    }
+
+    /// Its definition in the way of PROJ.4, which leads to longitude and latitude; `None` where that is not known.
+    pub fn definition(&self) -> Option<String> {
+        definition::definition(self)
+    }
+
+    /// The name of the system of its heights, where the text gives one.
+    pub fn vertical_name(&self) -> Option<String> {
+        wkt::vertical_name(self.wkt.as_deref()?)
     }
 
     fn same_name(&self, other: &Crs) -> bool {

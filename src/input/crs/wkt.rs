@@ -7,13 +7,13 @@ const DEEPEST: usize = 40;
 
 /// `KEYWORD[value, value, ...]`.
 #[derive(Clone, Debug, PartialEq)]
-struct Node {
-    keyword: String,
+pub(super) struct Node {
+    pub(super) keyword: String,
     values: Vec<Value>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-enum Value {
+pub(super) enum Value {
     Text(String),
     Number(f64),
     Node(Node),
@@ -56,19 +56,24 @@ impl Node {
         }
     }
 
-    fn children(&self) -> impl Iterator<Item = &Node> {
+    pub(super) fn children(&self) -> impl Iterator<Item = &Node> {
         self.values.iter().filter_map(|value| if let Value::Node(node) = value { Some(node) } else { None })
     }
 
-    fn child(&self, keywords: &[&str]) -> Option<&Node> {
+    pub(super) fn child(&self, keywords: &[&str]) -> Option<&Node> {
         self.children().find(|child| keywords.contains(&child.keyword.as_str()))
     }
 
-    fn text(&self, index: usize) -> Option<&str> {
+    pub(super) fn text(&self, index: usize) -> Option<&str> {
         if let Some(Value::Text(text)) = self.values.get(index) { Some(text) } else { None }
     }
 
-    fn number(&self, index: usize) -> Option<f64> {
+    /// Metres of its unit of length.
+    pub(super) fn unit_metres(&self) -> Option<f64> {
+        units(self).0.and_then(length)
+    }
+
+    pub(super) fn number(&self, index: usize) -> Option<f64> {
         match self.values.get(index)? {
             Value::Number(number) => Some(*number),
             Value::Text(text) => text.parse().ok(),
@@ -113,12 +118,24 @@ fn read_quoted<'a>(quoted: &'a str, rest: &mut &'a str) -> Option<Value> {
     Some(Value::Text(text))
 }
 
-const PROJECTED: [&str; 3] = ["PROJCS", "PROJCRS", "PROJECTEDCRS"];
+pub(super) const PROJECTED: [&str; 3] = ["PROJCS", "PROJCRS", "PROJECTEDCRS"];
 const GEOGRAPHIC: [&str; 6] = ["GEOGCS", "GEOGCRS", "GEOGRAPHICCRS", "GEODCRS", "GEODETICCRS", "GEOCCS"];
 const LOCAL: [&str; 3] = ["LOCAL_CS", "ENGCRS", "ENGINEERINGCRS"];
 const VERTICAL: [&str; 4] = ["VERT_CS", "VERTCS", "VERTCRS", "VERTICALCRS"];
 const COMPOUND: [&str; 2] = ["COMPD_CS", "COMPOUNDCRS"];
 const UNITS: [&str; 3] = ["UNIT", "LENGTHUNIT", "ANGLEUNIT"];
+
+/// The part of the system in `text` whose keyword is one of these.
+pub(super) fn find(text: &str, keywords: &[&str]) -> Option<Node> {
+    let roots = Node::parse_all(text)?;
+    let mut parts = roots.iter().flat_map(parts).map(unbound);
+    parts.find(|part| keywords.contains(&part.keyword.as_str())).cloned()
+}
+
+/// The name of the vertical system in `text`.
+pub(super) fn vertical_name(text: &str) -> Option<String> {
+    find(text, &VERTICAL)?.text(0).map(str::to_string).filter(|name| !name.is_empty())
+}
 
 /// What `text` says; `None` where it is not well-known text of a coordinate reference system.
 pub(super) fn parse(text: &str) -> Option<Crs> {

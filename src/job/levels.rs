@@ -1,0 +1,159 @@
+//! Step 7 of a job, by inner tile of the pyramid: the meshes of its children, read back from their files, joined and simplified.
+
+use super::directory::{Directory, write_result};
+use super::export::Look;
+use super::journal::Done;
+use super::pyramid::{Child, Pyramid, Sizes};
+use super::records::{Level, LevelTile};
+use super::store::Store;
+use crate::output::frame::Frame;
+use crate::output::glb::encode_tile;
+use crate::output::join::join;
+use crate::output::read::{TileFile, read_tile};
+use crate::output::simplify::simplify;
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::ops::AddAssign;
+use std::path::PathBuf;
+
+/// What one coarser tile, or all of them, came to.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub struct LevelFigures {
+    /// GLB files in `levels`.
+    pub files: u64,
+    /// Triangles in them.
+    pub triangles: u64,
+    /// Bytes of them.
+    pub bytes: u64,
+    /// The greatest vertical distance between one of them and the exact mesh, metres.
+    pub error_m: f64,
+}
+
+impl AddAssign for LevelFigures {
+    fn add_assign(&mut self, other: LevelFigures) {
+        self.files += other.files;
+        self.triangles += other.triangles;
+        self.bytes += other.bytes;
+        self.error_m = self.error_m.max(other.error_m);
+    }
+}
+
+/// Makes inner tile `at` of the pyramid, whose children must be there. Leaves in the job directory what `tileset.json` will say of
+/// it and of the exact tiles below it; with `content` its mesh in `levels` too.
+///
+/// # Errors
+/// [`Error::Io`] on the output or the job directory, [`Error::Broken`] if a file there is not what an earlier step has written.
+pub fn run(
+    directory: &Directory,
+    store: &Store,
+    pyramid: &Pyramid,
+    at: usize,
+    look: &Look,
+    sizes: Sizes,
+    content: bool,
+) -> Result<Done<LevelFigures>> {
+    let inner = &pyramid.inner[at];
+    let mut below = Below::default();
+    for &child in &inner.children {
+        below.add(directory, store, pyramid, child, look, content && inner.content)?;
+    }
+    let Below { files, leaves, bounds, error } = below;
+    let (mut figures, mut results) = (LevelFigures::default(), Vec::new());
+    let mut own = LevelTile::new(bounds, false);
+    if content && inner.content && !files.is_empty() {
+        let joined = join(&look.frame, &files).map_err(|what| broken(inner.node, &what))?;
+        drop(files);
+        let simple = simplify(&look.frame, &joined, sizes.target(joined.triangles.len()));
+        // Both lie between the lowest and the highest vertex.
+        own.error = (error + simple.error).min(height_range(&look.frame, bounds));
+        own.content = 1;
+        let mut bytes = Vec::new();
+        encode_tile(&look.frame, &simple.tile, look.compression, &mut bytes)?;
+        directory.create_levels()?;
+        results.push(write_result(&directory.level(inner.node), &bytes)?);
+        figures = LevelFigures {
+            files: 1,
+            triangles: simple.tile.triangles.len() as u64,
+            bytes: bytes.len() as u64,
+            error_m: own.error,
+        };
+    }
+    let stored = Level { own, leaves }.save(store, inner.node)?;
+    Ok(Done { results, ..Done::new(figures, vec![stored]) })
+}
+
+/// Metres.
+fn height_range(frame: &Frame, bounds: Option<[[i32; 3]; 2]>) -> f64 {
+    bounds.map_or(0.0, |[low, high]| (high[2] as f64 - low[2] as f64) * frame.resolution_metres()[1])
+}
+
+fn broken(node: usize, what: &str) -> Error {
+    Error::Broken(format!("the tiles below node {node} do not go together: {what}"))
+}
+
+/// What the children of a tile come to.
+#[derive(Default)]
+struct Below {
+    files: Vec<TileFile>,
+    leaves: Vec<LevelTile>,
+    bounds: Option<[[i32; 3]; 2]>,
+    /// The greatest of a child, metres.
+    error: f64,
+}
+
+impl Below {
+    fn add(
+        &mut self,
+        directory: &Directory,
+        store: &Store,
+        pyramid: &Pyramid,
+        child: Child,
+        look: &Look,
+        keep: bool,
+    ) -> Result<()> {
+        match child {
+            Child::Leaf(tile) => {
+                let path = directory.tile(tile);
+                let file = if path.exists() { Some(read(path)?) } else { None };
+                let bounds = file.as_ref().and_then(|file| bounds_of(file, look));
+                self.leaves.push(LevelTile::new(bounds, file.is_some()));
+                self.widen(bounds);
+                self.files.extend(file.filter(|_| keep));
+            }
+            Child::Inner(at) => {
+                let node = pyramid.inner[at].node;
+                let own = Level::load(store, node)?.own;
+                self.widen(own.bounds());
+                self.error = self.error.max(own.error);
+                if keep && own.content > 0 {
+                    self.files.push(read(directory.level(node))?);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn widen(&mut self, bounds: Option<[[i32; 3]; 2]>) {
+        self.bounds = self.bounds.into_iter().chain(bounds).reduce(super::partition::around);
+    }
+}
+
+/// What this program has written a moment ago.
+fn read(path: PathBuf) -> Result<TileFile> {
+    read_tile(&path).map_err(|error| match error {
+        Error::Input { .. } => Error::Broken(error.to_string()),
+        other => other,
+    })
+}
+
+/// The least and greatest lattice x, y, z in `file`.
+pub(super) fn bounds_of(file: &TileFile, look: &Look) -> Option<[[i32; 3]; 2]> {
+    let none = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+    let worlds = file.parts.iter().flat_map(|part| (0..part.positions.len()).map(|v| part.world(v)));
+    let [low, high] =
+        worlds.fold(none, |[low, high], p| [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]);
+    // glTF's z goes south.
+    let corners = [[low[0], low[1], high[2]], [high[0], high[1], low[2]]];
+    let [low, high] = corners.map(|corner| look.frame.integers(corner));
+    Some([low?, high?])
+}

@@ -1,0 +1,58 @@
+//! `tileset.json` from what the steps before have left.
+
+use super::directory::Directory;
+use super::export::Look;
+use super::levels::bounds_of;
+use super::pyramid::{Child, Pyramid};
+use super::records::{Level, LevelTile};
+use super::store::Store;
+use crate::output::read::read_tile;
+use crate::output::tileset::{Node, tileset_json};
+use crate::{Error, Result};
+
+/// The text of `tileset.json`.
+///
+/// # Errors
+/// [`Error::Io`] on the output or the job directory, [`Error::Broken`] if there is no tile.
+pub fn text(
+    directory: &Directory,
+    store: &Store,
+    pyramid: &Pyramid,
+    look: &Look,
+    transform: Option<[f64; 16]>,
+) -> Result<String> {
+    let root = match pyramid.inner.len().checked_sub(1) {
+        Some(last) => inner_node(directory, store, pyramid, last)?,
+        None => single_node(directory, look)?,
+    };
+    let root = root.ok_or_else(|| Error::Broken("there is no tile to list in tileset.json".into()))?;
+    let mut text = tileset_json(&look.frame, &root, transform).to_string();
+    text.push('\n');
+    Ok(text)
+}
+
+fn inner_node(directory: &Directory, store: &Store, pyramid: &Pyramid, at: usize) -> Result<Option<Node>> {
+    let inner = &pyramid.inner[at];
+    let Level { own, leaves } = Level::load(store, inner.node)?;
+    let mut leaves = leaves.iter();
+    let mut children = Vec::new();
+    for &child in &inner.children {
+        children.extend(match child {
+            Child::Inner(below) => inner_node(directory, store, pyramid, below)?,
+            Child::Leaf(tile) => leaves.next().and_then(|leaf| node(leaf, format!("tiles/{tile:06}.glb"))),
+        });
+    }
+    let node = node(&own, format!("levels/{:06}.glb", inner.node));
+    Ok(node.map(|node| Node { children, ..node }))
+}
+
+fn node(tile: &LevelTile, uri: String) -> Option<Node> {
+    let uri = (tile.content > 0).then_some(uri);
+    Some(Node { uri, bounds: tile.bounds()?, error: tile.error, children: Vec::new() })
+}
+
+/// The only tile of a small job.
+fn single_node(directory: &Directory, look: &Look) -> Result<Option<Node>> {
+    let bounds = bounds_of(&read_tile(&directory.tile(0))?, look);
+    Ok(node(&LevelTile::new(bounds, true), "tiles/000000.glb".into()))
+}
