@@ -96,12 +96,38 @@ pub struct Output {
     /// Metres that heights are raised by to be heights above the ellipsoid, where 3D Tiles are placed on the globe.
     #[serde(default)]
     pub height_offset: f64,
-    /// How tiles are packed.
+    /// How tiles are to be packed.
     #[serde(default)]
-    pub compression: Compression,
+    pub compression: CompressionChoice,
     /// Triangles with an edge longer than this are left out.
     #[serde(default)]
     pub max_edge: MaxEdge,
+}
+
+/// How tiles are to be packed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum CompressionChoice {
+    /// With meshopt for 3D Tiles alone, whose viewers know it; else quantized.
+    #[default]
+    Auto,
+    /// See [`Compression::Meshopt`].
+    Meshopt,
+    /// See [`Compression::Quantized`].
+    Quantized,
+    /// See [`Compression::None`].
+    None,
+}
+
+impl Output {
+    /// How tiles are packed.
+    pub fn packing(&self) -> Compression {
+        match (self.compression, self.format) {
+            (CompressionChoice::Auto, Format::Tiles) | (CompressionChoice::Meshopt, _) => Compression::Meshopt,
+            (CompressionChoice::Auto, _) | (CompressionChoice::Quantized, _) => Compression::Quantized,
+            (CompressionChoice::None, _) => Compression::None,
+        }
+    }
 }
 
 /// In which form viewers get the terrain; the exact tiles are written in any case.

@@ -101,7 +101,7 @@ pub(super) fn preflight(plan: &Plan, config: &Config, threads: usize) -> Preflig
     let output = &config.output.directory;
     let spill = points * size_of::<Point>() as u64;
     let [leaves_on_disk, results] =
-        [leaf_bytes(points, per_tile, tiles), result_bytes(points, tiles, config.output.compression)];
+        [leaf_bytes(points, per_tile, tiles), result_bytes(points, tiles, config.output.packing())];
     Preflight {
         files: plan.sources.iter().map(|(s, _)| (s.path.clone(), format!("{:?}", s.format), s.records)).collect(),
         records: plan.records,
@@ -147,9 +147,11 @@ fn level_bytes(config: &Config, points: u64, threads: usize) -> u64 {
 
 fn result_bytes(points: u64, tiles: u64, compression: Compression) -> u64 {
     let in_tiles = points * result_per_site(compression) + tiles * RESULT_PER_TILE;
-    let copies = if 2 * points <= MOST_TRIANGLES_IN_ONE_FILE { 2 } else { 1 };
+    // One file is never packed with meshopt.
+    let unpacked = if compression == Compression::None { Compression::None } else { Compression::Quantized };
+    let in_one = if 2 * points <= MOST_TRIANGLES_IN_ONE_FILE { points * result_per_site(unpacked) } else { 0 };
     // Levels add about a third.
-    copies * in_tiles + in_tiles / 2 + 4 * PIXELS
+    in_tiles + in_one + in_tiles / 2 + 4 * PIXELS
 }
 
 /// Bytes of what an earlier job has left in `output` and the next one replaces.

@@ -534,7 +534,7 @@ fn look(config: &Config, plan: &Plan, summary: &Summary, bounds: [[i32; 3]; 2], 
         ColorChoice::Auto | ColorChoice::Rgb if summary.tally.max_rgb == 0 => Some(elevation),
         ColorChoice::Auto | ColorChoice::Rgb => Some(Coloring::Rgb { eight_bit: summary.tally.max_rgb <= 255 }),
     };
-    let compression = config.output.compression;
+    let compression = config.output.packing();
     let frame = match compression {
         Compression::None => plan.frame.clone().refined(bounds),
         _ => plan.frame.clone().packed(),

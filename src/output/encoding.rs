@@ -1,13 +1,9 @@
 //! How vertices and triangles become bytes: the choices, and the rounding of normals and colours.
 
-use serde::{Deserialize, Serialize};
-
 /// How a tile is packed. Positions are exact in all of them: rounding finds the lattice integers again.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Compression {
     /// Quantized, then packed by the codecs of `EXT_meshopt_compression`.
-    #[default]
     Meshopt,
     /// Positions in 16 bits, normals and colours in 8 (`KHR_mesh_quantization`).
     Quantized,

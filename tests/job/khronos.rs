@@ -20,7 +20,7 @@ fn many_small_tiles() {
     validated(&Job::on(&[&cloud]).with("output", "color = \"none\""), 2);
     validated(&Job::on(&[&cloud]).with("output", "normals = false"), 2);
     validated(&Job::on(&[&cloud]).with("output", "color = \"none\"\nnormals = false").tiles_of(500), 60);
-    validated(&Job::on(&[&cloud]).with("output", "compression = \"quantized\"").tiles_of(1_000), 30);
+    validated(&Job::on(&[&cloud]).with("output", "compression = \"meshopt\"").tiles_of(1_000), 30);
     validated(&Job::on(&[&cloud]).with("output", "compression = \"none\"\nmax_edge = \"auto\"").tiles_of(1_000), 40);
 }
 
