@@ -63,7 +63,7 @@ pub fn run(
     if content && inner.content && !files.is_empty() {
         let joined = join(&look.frame, &files).map_err(|what| broken(inner.node, &what))?;
         drop(files);
-        let simple = simplify(&look.frame, &joined, sizes.target(joined.triangles.len()));
+        let simple = simplify(&look.frame, &joined, sizes.target(joined.triangles.len()))?;
         // Both lie between the lowest and the highest vertex.
         own.error = (error + simple.error).min(height_range(&look.frame, bounds));
         own.content = 1;

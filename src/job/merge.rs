@@ -1,7 +1,7 @@
 //! Step 4 of a job, by merge node of the tree: triangulate what the nodes below still need, discard what covers ground
 //! that is closed below, and close what can be closed now. What closes here are the seams.
 
-use super::closing::{State, close, covered};
+use super::closing::{State, close};
 use super::journal::Done;
 use super::records::{Frontier, Rim, Seam, SeamTriangle};
 use super::span::Longest;
@@ -9,6 +9,7 @@ use super::store::Store;
 use super::tree::Tree;
 use crate::geometry::Site;
 use crate::triangulation::reference;
+use crate::triangulation::region::covered;
 use crate::{Error, Result};
 
 /// Bytes that merging one frontier site takes at the peak: `spade`, the mesh and the marks.

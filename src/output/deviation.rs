@@ -190,7 +190,7 @@ impl Line {
 }
 
 /// The vertices of the fine mesh, sorted into the cells of a grid, row by row.
-struct Sieve<'a> {
+pub(super) struct Sieve<'a> {
     positions: &'a [[i32; 3]],
     low: [f64; 2],
     /// Cells in a lattice step.
@@ -200,10 +200,12 @@ struct Sieve<'a> {
     /// Where each cell's vertices start in `sorted`, and their end.
     starts: Vec<u32>,
     sorted: Vec<[i32; 3]>,
+    /// Their numbers.
+    numbers: Vec<u32>,
 }
 
 impl<'a> Sieve<'a> {
-    fn new(positions: &'a [[i32; 3]]) -> Sieve<'a> {
+    pub(super) fn new(positions: &'a [[i32; 3]]) -> Sieve<'a> {
         let none = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
         let [low, high] = positions.iter().fold(none, |[low, high], p| {
             let p = [p[0] as f64, p[1] as f64];
@@ -215,8 +217,8 @@ impl<'a> Sieve<'a> {
         let rows = (cells / columns).ceil();
         let scale = [columns / (size[0] + 1.0), rows / (size[1] + 1.0)];
         let (columns, rows) = (columns as usize, rows as usize);
-        let mut sieve =
-            Sieve { positions, low, scale, columns, rows, starts: vec![0; columns * rows + 1], sorted: Vec::new() };
+        let (starts, sorted, numbers) = (vec![0; columns * rows + 1], Vec::new(), Vec::new());
+        let mut sieve = Sieve { positions, low, scale, columns, rows, starts, sorted, numbers };
         sieve.sort();
         sieve
     }
@@ -230,10 +232,11 @@ impl<'a> Sieve<'a> {
             *start = end;
         }
         self.sorted = vec![[0; 3]; self.positions.len()];
-        for (p, &cell) in self.positions.iter().zip(&cells).rev() {
+        self.numbers = vec![0; self.positions.len()];
+        for (v, &cell) in cells.iter().enumerate().rev() {
             let at = &mut self.starts[cell as usize];
             *at -= 1;
-            self.sorted[*at as usize] = *p;
+            (self.sorted[*at as usize], self.numbers[*at as usize]) = (self.positions[v], v as u32);
         }
     }
 
@@ -251,19 +254,29 @@ impl<'a> Sieve<'a> {
 
     /// The greatest distance between a vertex and the triangle of `coarse` over it.
     fn inside(&self, coarse: &[[u32; 3]]) -> f64 {
-        coarse.iter().map(|t| self.inside_one(t.map(|v| self.positions[v as usize]))).fold(0.0, f64::max)
+        coarse.iter().map(|t| self.inside_one(t.map(|v| self.positions[v as usize])).0).fold(0.0, f64::max)
     }
 
-    fn inside_one(&self, corners: [[i32; 3]; 3]) -> f64 {
+    /// For every triangle of `coarse` that is off a vertex the distance (its bits) and number of the one it is furthest off.
+    pub(super) fn furthest(&self, coarse: &[[u32; 3]]) -> impl Iterator<Item = (u64, u32)> {
+        let found = coarse.iter().map(|t| self.inside_one(t.map(|v| self.positions[v as usize])));
+        found.filter(|(distance, _)| *distance > 0.0).map(|(distance, v)| (distance.to_bits(), v))
+    }
+
+    /// The greatest distance of a triangle, and the number of the vertex where it is.
+    fn inside_one(&self, corners: [[i32; 3]; 3]) -> (f64, u32) {
         let ys = corners.map(|p| p[1]);
         let (first, last) = (ys[0].min(ys[1]).min(ys[2]), ys[0].max(ys[1]).max(ys[2]));
-        let mut greatest = 0.0f64;
+        let mut greatest = (0.0f64, 0);
         for row in self.row(first as f64)..=self.row(last as f64) {
             let [west, east] = self.span(&corners, row);
             let start = self.starts[row * self.columns + self.column(west)];
             let end = self.starts[row * self.columns + self.column(east) + 1];
-            for p in &self.sorted[start as usize..end as usize] {
-                greatest = greatest.max(apart(&corners, *p));
+            for at in start as usize..end as usize {
+                let distance = apart(&corners, self.sorted[at]);
+                if distance > greatest.0 {
+                    greatest = (distance, self.numbers[at]);
+                }
             }
         }
         greatest

@@ -1,24 +1,25 @@
-//! A terrain with fewer triangles, for looking at from afar.
+//! A terrain with fewer triangles, for looking at from afar: the Delaunay triangulation of some of its vertices, within its outline.
 //!
-//! A vertex goes by being moved to one of its neighbours: the triangles round it are replaced by those that this neighbour makes
-//! with the edges round them. It may go where all these are counterclockwise, which is decided exactly. So the triangles cover the
-//! same ground once, as before, and no other vertex moves. Vertices of the outline stay, and so do its edges: two terrains that meet
-//! along a part of their outlines still meet there when both, or either of them, are simplified.
+//! All vertices of the outline stay, and so do its edges: they are edges of the triangulation of all sites of the job, and an edge of
+//! a Delaunay triangulation is one of that of any subset that has both its ends, because its empty circle stays empty. So two terrains
+//! that meet along a part of their outlines still meet there when both, or either of them, are simplified; the triangles cover the
+//! same ground once, as before; and it is the program's own pipeline that makes them.
 //!
-//! The vertex whose going is noticed least goes first: the vertical distance that it is off the new triangles, with what the ground
-//! there has been off already, since it is the greatest distance that is to be small; among vertices that are equal in that, those
-//! with short edges.
+//! Which vertices stay inside: first one of every cell of a grid, that of the most ordinary height; then, where the triangulation of
+//! these is furthest off the terrain, the vertex that it is furthest off (Garland and Heckbert 1995, "Fast polygonal approximation
+//! of terrains and height fields", here with all of them inserted at once).
 
-mod ring;
 #[cfg(test)]
 mod tests;
-mod topology;
 
 use super::Tile;
-use super::deviation::deviation;
+use super::deviation::{Sieve, deviation};
 use super::frame::Frame;
-use ring::Ring;
-use topology::{NONE, Topology, next};
+use crate::geometry::Site;
+use crate::triangulation::region::covered;
+use crate::triangulation::{self, canonical};
+use crate::{Error, Result};
+use std::collections::HashSet;
 
 /// A simplified terrain.
 #[derive(Debug)]
@@ -29,136 +30,127 @@ pub struct Simplified {
     pub error: f64,
 }
 
-/// `tile`, a terrain over ground that it covers once, with `triangles` triangles; with more where its outline has too many.
-pub fn simplify(frame: &Frame, tile: &Tile, triangles: usize) -> Simplified {
-    let [xy, up] = frame.resolution_metres();
-    let mut collapser = Collapser::new(&tile.positions, &tile.triangles, up / xy);
-    collapser.run(triangles);
-    let coarse = collapser.topology.triangles();
-    let error = deviation(&tile.positions, &tile.triangles, &coarse) * up;
-    Simplified { tile: subset(tile, coarse), error }
+/// However many vertices the outline has, there are at least this many for each triangle that is wanted inside.
+const LEAST_INSIDE: f64 = 1.0 / 16.0;
+/// The share of the vertices inside that a grid chooses.
+const BY_GRID: f64 = 0.6;
+
+/// `tile`, a part of a Delaunay triangulation, with about so many `triangles`; with more where its outline has too many.
+///
+/// # Errors
+/// [`Error::Broken`] if its outline is not that of a part of a Delaunay triangulation.
+pub fn simplify(frame: &Frame, tile: &Tile, triangles: usize) -> Result<Simplified> {
+    let outline = Outline::of(tile);
+    let inside = tile.positions.len() - outline.vertices;
+    let least = (triangles as f64 * LEAST_INSIDE) as usize;
+    let wanted = (triangles / 2).saturating_sub(outline.vertices / 2).max(least).min(inside);
+    let (mut kept, mut coarse) = (outline.on.clone(), tile.triangles.clone());
+    if wanted < inside {
+        let by_grid = (wanted as f64 * BY_GRID) as usize;
+        keep_by_grid(tile, by_grid, &mut kept);
+        coarse = outline.fill(tile, &kept)?;
+        let rest = (outline.vertices + wanted).saturating_sub(kept.iter().filter(|&&kept| kept).count());
+        if keep_furthest(tile, &coarse, rest, &mut kept) > 0 {
+            coarse = outline.fill(tile, &kept)?;
+        }
+    }
+    let error = deviation(&tile.positions, &tile.triangles, &coarse) * frame.resolution_metres()[1];
+    Ok(Simplified { tile: subset(tile, coarse), error })
 }
 
-/// Of so many vertices one is rated to choose the first limit.
-const SAMPLE: usize = 61;
-/// The limit rises by this factor from sweep to sweep.
-const RISE: f32 = 1.25;
-
-/// A terrain while its vertices go.
-struct Collapser<'a> {
-    positions: &'a [[i32; 3]],
-    topology: Topology,
-    /// Steps of x and y in a step of z.
-    steepness: f64,
-    /// What it costs to take a vertex out, steps of x and y; infinite for those that cannot go.
-    costs: Vec<f32>,
-    vertices: Vec<Vertex>,
-    ring: Ring,
-    /// The sweep that is under way, from 1.
-    sweep: u32,
+/// The edges round a terrain.
+struct Outline {
+    /// The directed edges that have the terrain on their left and nothing on their right.
+    edges: Vec<[u32; 2]>,
+    /// Whether a vertex is on one of them.
+    on: Vec<bool>,
+    /// How many are.
+    vertices: usize,
 }
 
-/// What else is known of a vertex.
-#[derive(Clone, Copy)]
-struct Vertex {
-    /// The half-edge along which it would go; [`NONE`] where it cannot.
-    along: u32,
-    /// How far the ground around may be off already, steps of x and y.
-    off: f32,
-    /// The sweep in which its neighbours have changed since it was rated; 0 where they have not.
-    changed: u32,
-}
-
-impl<'a> Collapser<'a> {
-    fn new(positions: &'a [[i32; 3]], triangles: &[[u32; 3]], steepness: f64) -> Collapser<'a> {
-        let topology = Topology::new(positions.len(), triangles);
-        // What is inside may go for nothing as far as is known.
-        let unknown = |v| if topology.is_inside(v) { 0.0 } else { f32::INFINITY };
-        Collapser {
-            positions,
-            costs: (0..positions.len() as u32).map(unknown).collect(),
-            topology,
-            steepness,
-            vertices: vec![Vertex { along: NONE, off: 0.0, changed: u32::MAX }; positions.len()],
-            ring: Ring::default(),
-            sweep: 0,
-        }
-    }
-
-    /// Takes vertices out until `triangles` are left, or none can go: in sweeps over all of them, which is kind to the cache, each
-    /// for those that cost less than a limit that rises from sweep to sweep.
-    fn run(&mut self, triangles: usize) {
-        let mut limit = self.middle_cost();
-        while self.topology.count() > triangles {
-            let least = self.costs.iter().copied().fold(f32::INFINITY, f32::min);
-            if least == f32::INFINITY {
-                return;
-            }
-            self.sweep += 1;
-            limit = (limit * RISE).max(least * RISE).max(f32::MIN_POSITIVE);
-            self.sweep_below(limit, triangles);
-        }
-    }
-
-    /// The cost that about half of the vertices have.
-    fn middle_cost(&mut self) -> f32 {
-        let mut costs = Vec::new();
-        for v in (0..self.costs.len()).step_by(SAMPLE) {
-            if self.costs[v] < f32::INFINITY {
-                self.rate(v as u32);
-                costs.push(self.costs[v]);
-            }
-        }
-        costs.sort_unstable_by(f32::total_cmp);
-        costs.get(costs.len() / 2).copied().filter(|cost| cost.is_finite()).unwrap_or(0.0)
-    }
-
-    /// Takes out what costs less than `limit`. What loses a neighbour has to wait for the next sweep: so vertices go everywhere
-    /// rather than one after the other, and few are rated in vain.
-    fn sweep_below(&mut self, limit: f32, triangles: usize) {
-        for v in 0..self.costs.len() {
-            if self.costs[v] >= limit || self.vertices[v].changed == self.sweep {
-                continue;
-            }
-            if self.vertices[v].changed > 0 {
-                self.rate(v as u32);
-            }
-            if self.costs[v] < limit {
-                self.collapse(v as u32);
-                if self.topology.count() <= triangles {
-                    return;
-                }
-            }
-        }
-    }
-
-    /// Finds where `v` would go best, and what that costs.
-    fn rate(&mut self, v: u32) {
-        let best =
-            self.ring.gather(v, &self.topology, self.positions).then(|| self.ring.best(self.steepness)).flatten();
-        let vertex = &mut self.vertices[v as usize];
-        vertex.changed = 0;
-        (vertex.along, self.costs[v as usize]) = match best {
-            Some((edge, cost)) => (edge, vertex.off + cost as f32),
-            None => (NONE, f32::INFINITY),
+impl Outline {
+    fn of(tile: &Tile) -> Outline {
+        // The edges that leave a vertex inside lead to the same vertices as those that come to it come from. Equal sums of
+        // scrambled numbers instead of equal sets: only what differs is looked at closely, and that is little.
+        let scrambled = |v: u32| {
+            let x = (v as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            (x ^ (x >> 31)).wrapping_mul(0xbf58_476d_1ce4_e5b9)
         };
-    }
-
-    fn collapse(&mut self, v: u32) {
-        let cost = std::mem::replace(&mut self.costs[v as usize], f32::INFINITY);
-        let along = self.vertices[v as usize].along;
-        for edge in self.topology.around(v) {
-            let neighbour = self.topology.origin(next(edge)) as usize;
-            let vertex = &mut self.vertices[neighbour];
-            vertex.off = vertex.off.max(cost);
-            vertex.changed = self.sweep;
-            if vertex.along == NONE && self.topology.is_inside(neighbour as u32) {
-                // It could not go; whether it can now is found when its turn comes.
-                self.costs[neighbour] = cost;
+        let mut balance = vec![0u64; tile.positions.len()];
+        for &[a, b, c] in &tile.triangles {
+            let (of_a, of_b, of_c) = (scrambled(a), scrambled(b), scrambled(c));
+            for (v, to, from) in [(a, of_b, of_c), (b, of_c, of_a), (c, of_a, of_b)] {
+                balance[v as usize] = balance[v as usize].wrapping_add(to).wrapping_sub(from);
             }
         }
-        self.topology.collapse(along);
+        let on: Vec<bool> = balance.iter().map(|&sum| sum != 0).collect();
+        let between = |&[a, b]: &[u32; 2]| on[a as usize] && on[b as usize];
+        let sides = tile.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).filter(between);
+        let sides: Vec<[u32; 2]> = sides.collect();
+        let known: HashSet<[u32; 2]> = sides.iter().copied().collect();
+        let edges = sides.into_iter().filter(|&[a, b]| !known.contains(&[b, a])).collect();
+        let vertices = on.iter().filter(|&&on| on).count();
+        Outline { edges, on, vertices }
     }
+
+    /// The triangulation of the vertices `kept`, within the outline.
+    fn fill(&self, tile: &Tile, kept: &[bool]) -> Result<Vec<[u32; 3]>> {
+        let vertices: Vec<u32> = (0..).zip(kept).filter(|(_, kept)| **kept).map(|(v, _)| v).collect();
+        let mut number = vec![u32::MAX; kept.len()];
+        vertices.iter().zip(0..).for_each(|(&v, n)| number[v as usize] = n);
+        let sites: Vec<Site> = vertices.iter().map(|&v| plane(tile.positions[v as usize])).collect();
+        let mesh = canonical(&sites)?;
+        let edges: Vec<[u32; 2]> = self.edges.iter().map(|edge| edge.map(|v| number[v as usize])).collect();
+        let covered = covered(&mesh, &edges)?;
+        let inside = mesh.triangles.iter().zip(covered).filter(|(_, covered)| *covered);
+        let triangles: Vec<_> = inside.map(|(t, _)| t.map(|v| vertices[v as usize])).collect();
+        triangulation::recycle(mesh);
+        if triangles.is_empty() {
+            return Err(Error::Broken("a terrain without triangles cannot be simplified".into()));
+        }
+        Ok(triangles)
+    }
+}
+
+fn plane(point: [i32; 3]) -> Site {
+    [point[0], point[1]]
+}
+
+/// Keeps of each cell of a grid with about `cells` cells the vertex whose height is nearest to the mean of the cell's.
+fn keep_by_grid(tile: &Tile, cells: usize, kept: &mut [bool]) {
+    let Some([low, high]) = tile.bounds().filter(|_| cells > 0) else { return };
+    let size = [0, 1].map(|k| high[k] as f64 - low[k] as f64 + 1.0);
+    let side = (size[0] * size[1] / cells as f64).sqrt();
+    let [columns, rows] = size.map(|size| (size / side).ceil().clamp(1.0, cells as f64) as usize);
+    let cell = |p: &[i32; 3]| {
+        let [column, row] = [0, 1].map(|k| ((p[k] as f64 - low[k] as f64) / side) as usize);
+        row.min(rows - 1) * columns + column.min(columns - 1)
+    };
+    let mut sums = vec![(0i64, 0i64); columns * rows];
+    for p in &tile.positions {
+        let sum = &mut sums[cell(p)];
+        *sum = (sum.0 + p[2] as i64, sum.1 + 1);
+    }
+    let mut nearest = vec![(i64::MAX, u32::MAX); columns * rows];
+    for (v, p) in (0..).zip(&tile.positions) {
+        let at = cell(p);
+        let (sum, count) = sums[at];
+        nearest[at] = nearest[at].min(((p[2] as i64 - sum / count).abs(), v));
+    }
+    nearest.iter().filter(|(_, v)| *v != u32::MAX).for_each(|&(_, v)| kept[v as usize] = true);
+}
+
+/// Keeps of the triangles of `coarse` that are furthest off the terrain the vertex that each is furthest off, `count` at the most; how
+/// many.
+fn keep_furthest(tile: &Tile, coarse: &[[u32; 3]], count: usize, kept: &mut [bool]) -> usize {
+    let mut furthest: Vec<(u64, u32)> = Sieve::new(&tile.positions).furthest(coarse).collect();
+    if furthest.len() > count {
+        // Distances are not negative, so their bits are in their order.
+        furthest.sort_unstable_by(|a, b| b.cmp(a));
+        furthest.truncate(count);
+    }
+    furthest.iter().for_each(|&(_, v)| kept[v as usize] = true);
+    furthest.len()
 }
 
 /// The tile of these triangles, without the vertices that they do not use.

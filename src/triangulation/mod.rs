@@ -3,6 +3,7 @@
 pub mod flip;
 pub mod mesh;
 pub mod reference;
+pub mod region;
 
 use crate::config::{Backend, Triangulation};
 use crate::geometry::Site;
@@ -112,6 +113,17 @@ impl Triangulator {
             outcome.reference = 1;
         }
         Ok((reference::triangulate(sites)?, outcome))
+    }
+}
+
+/// The canonical Delaunay triangulation of distinct `sites`, by this thread alone.
+///
+/// # Errors
+/// As [`Triangulator::triangulate`].
+pub fn canonical(sites: &[Site]) -> Result<Mesh> {
+    match SCRATCH.with_borrow_mut(|scratch| voronoi::triangulate(sites, scratch)) {
+        Ok((mesh, _)) => Ok(mesh),
+        Err(_) => reference::triangulate(sites),
     }
 }
 
