@@ -413,7 +413,7 @@ impl Job<'_> {
 fn pyramid(config: &Config, partition: &Partition) -> (Sizes, Pyramid) {
     let points = |blocks: &Vec<spill::Block>| blocks.iter().map(|block| block.points as u64).sum();
     let points: Vec<u64> = partition.blocks.iter().map(points).collect();
-    let sizes = Sizes::new(config.output.level_sites.0, config.limits.memory.0 / 4 * 3);
+    let sizes = Sizes::new(config.output.level_sites.0, config.limits.memory.0);
     (sizes, Pyramid::new(&partition.tree, &points, sizes))
 }
 

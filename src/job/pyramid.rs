@@ -47,8 +47,10 @@ pub struct Sizes {
 }
 
 impl Sizes {
-    /// Tiles of at most so many `sites`, fewer where four of them do not fit `memory`.
+    /// Tiles of at most so many `sites`, fewer where four of them do not fit the part of the job's `memory` that the allocator does
+    /// not keep from the steps before.
     pub fn new(sites: u64, memory: u64) -> Sizes {
+        let memory = memory / 5 * 2;
         Sizes { sites: sites.min(memory / (4 * BYTES_PER_LEVEL_SITE)).max(1), memory }
     }
 
