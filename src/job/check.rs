@@ -8,6 +8,7 @@ use super::scan::{self, Plan};
 use super::{BYTES_PER_LEAF_SITE, MOST_TRIANGLES_IN_ONE_FILE, machine, partition, workers};
 use crate::config::Config;
 use crate::input::Point;
+use crate::output::Compression;
 use crate::output::preview::Texel;
 use crate::{Error, Result};
 use serde::Serialize;
@@ -16,8 +17,15 @@ use std::{fmt, io};
 
 /// Bytes of job directory a site, beside the spill: its place, colour, class and two triangles.
 const TEMPORARY_PER_SITE: u64 = 12 + 6 + 1 + 2 * 12;
-/// Bytes of results a site, at the most: position, normal, colour and two triangles with 16-bit corners.
-const RESULT_PER_SITE: u64 = 12 + 12 + 8 + 2 * 6;
+/// Bytes of results a site: position, normal, colour and two triangles with 16-bit corners.
+fn result_per_site(compression: Compression) -> u64 {
+    match compression {
+        Compression::None => 12 + 12 + 8 + 2 * 6,
+        Compression::Quantized => 8 + 4 + 4 + 2 * 6,
+        // As it packs dense clouds, and half as much again for others.
+        Compression::Meshopt => 15,
+    }
+}
 
 /// Bytes of job directory a site of a tile's frontier, in all the files that it is in.
 const TEMPORARY_PER_RIM: u64 = 500;
@@ -92,7 +100,8 @@ pub(super) fn preflight(plan: &Plan, config: &Config, threads: usize) -> Preflig
     let leaves = per_tile.min(points) * BYTES_PER_LEAF_SITE * threads as u64;
     let output = &config.output.directory;
     let spill = points * size_of::<Point>() as u64;
-    let [leaves_on_disk, results] = [leaf_bytes(points, per_tile, tiles), result_bytes(points, tiles)];
+    let [leaves_on_disk, results] =
+        [leaf_bytes(points, per_tile, tiles), result_bytes(points, tiles, config.output.compression)];
     Preflight {
         files: plan.sources.iter().map(|(s, _)| (s.path.clone(), format!("{:?}", s.format), s.records)).collect(),
         records: plan.records,
@@ -136,8 +145,8 @@ fn level_bytes(config: &Config, points: u64, threads: usize) -> u64 {
     if config.output.levels { (one * threads as u64).min(sizes.memory) } else { 0 }
 }
 
-fn result_bytes(points: u64, tiles: u64) -> u64 {
-    let in_tiles = points * RESULT_PER_SITE + tiles * RESULT_PER_TILE;
+fn result_bytes(points: u64, tiles: u64, compression: Compression) -> u64 {
+    let in_tiles = points * result_per_site(compression) + tiles * RESULT_PER_TILE;
     let copies = if 2 * points <= MOST_TRIANGLES_IN_ONE_FILE { 2 } else { 1 };
     // Levels add about a third.
     copies * in_tiles + in_tiles / 2 + 4 * PIXELS

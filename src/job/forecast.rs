@@ -9,7 +9,7 @@ use std::time::Duration;
 /// ratios matter.
 const TRIANGULATE: f64 = 430.0;
 const STITCH: f64 = 10.0;
-const WRITE: f64 = 150.0;
+const WRITE: f64 = 300.0;
 const LEVELS: f64 = 900.0;
 const FINISH: f64 = 8.0;
 
@@ -95,7 +95,7 @@ mod tests {
     use proptest::prelude::*;
 
     const STAGES: [(&str, f64); 5] =
-        [("read", 370.0), ("triangulate", 430.0), ("stitch", 10.0), ("write", 150.0), ("finish", 8.0)];
+        [("read", 370.0), ("triangulate", 430.0), ("stitch", 10.0), ("write", 300.0), ("finish", 8.0)];
 
     /// Goes through a job whose stages take `seconds`, and compares at every hundredth of each what is left with the estimate;
     /// the worst ratio after the first tenth of the job, where more than a fiftieth of it is left.

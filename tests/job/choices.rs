@@ -32,7 +32,8 @@ impl Square {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("square.csv");
         std::fs::write(&path, POINTS).unwrap();
-        Square { job: Job::on(&[&path]), _folder: folder }
+        // Plain, so that values come back as they are meant.
+        Square { job: Job::on(&[&path]).with("output", "compression = \"none\""), _folder: folder }
     }
 
     fn with(self, section: &'static str, line: &str) -> Square {

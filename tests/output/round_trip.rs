@@ -296,8 +296,8 @@ fn hostile_packed_files_take_no_memory() {
     };
     // 30 vertices in the extension's words, and the corners of the triangles.
     assert!(said("\"byteStride\":8,\"count\":30", "\"byteStride\":8,\"count\":99").contains("damaged"));
-    assert!(said("\"byteStride\":8", "\"byteStride\":9").contains("of 9 bytes"));
-    let corners = format!("\"count\":{}", 3 * tile.triangles.len());
+    assert!(said("\"byteStride\":8,\"count\":30", "\"byteStride\":9,\"count\":30").contains("of 9 bytes"));
+    let corners = format!("\"byteStride\":2,\"count\":{}", 3 * tile.triangles.len());
     assert!(said(&corners, &corners.replace("\"count\":1", "\"count\":9")).contains("cannot hold"));
     assert!(said("ATTRIBUTES", "TRIANGLESS").contains("TRIANGLESS"));
     assert!(said("OCTAHEDRAL", "QUATERNION").contains("QUATERNION"));
