@@ -16,9 +16,11 @@ type VertexOf = HashMap<[i32; 2], u32, BuildHasherDefault<SiteHasher>>;
 /// Fails with a sentence where a vertex is not on the lattice or some files have normals or colours and others do not.
 pub fn join(frame: &Frame, files: &[TileFile]) -> Result<Tile, String> {
     let parts = || files.iter().flat_map(|file| &file.parts);
-    let mut joined = Tile::default();
-    joined.normals = parts().all(|part| part.normals.is_some()).then(Vec::new);
-    joined.colors = parts().all(|part| part.colors.is_some()).then(Vec::new);
+    let mut joined = Tile {
+        normals: parts().all(|part| part.normals.is_some()).then(Vec::new),
+        colors: parts().all(|part| part.colors.is_some()).then(Vec::new),
+        ..Tile::default()
+    };
     let vertices = parts().map(|part| part.positions.len()).sum();
     let mut vertex_of = VertexOf::with_capacity_and_hasher(vertices, BuildHasherDefault::default());
     for part in parts() {
