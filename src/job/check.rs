@@ -140,9 +140,9 @@ fn leaf_bytes(points: u64, per_tile: u64, tiles: u64) -> u64 {
 
 /// Bytes of memory that making coarser tiles takes.
 fn level_bytes(config: &Config, points: u64, threads: usize) -> u64 {
-    let memory = config.limits.memory.0 / 4 * 3;
-    let one = (4 * Sizes::new(config.output.level_sites.0, memory).sites).min(points) * BYTES_PER_LEVEL_SITE;
-    if config.output.levels { (one * threads as u64).min(memory) } else { 0 }
+    let sizes = Sizes::new(config.output.level_sites.0, config.limits.memory.0);
+    let one = (4 * sizes.sites).min(points) * BYTES_PER_LEVEL_SITE;
+    if config.output.levels { (one * threads as u64).min(sizes.memory) } else { 0 }
 }
 
 fn result_bytes(points: u64, tiles: u64, compression: Compression) -> u64 {

@@ -55,7 +55,6 @@ use journal::{Done, Journal, Step};
 use leaf::LeafFigures;
 use levels::LevelFigures;
 use partition::{Partition, Summary, Task};
-use placement::Placement;
 use progress::{Progress, Schedule, Stage, StageFigures};
 use pyramid::{Pyramid, Sizes};
 use rayon::prelude::*;
@@ -266,10 +265,10 @@ impl Job<'_> {
         }
 
         let stage = progress.stage("finish", 1, "job");
-        let finish = || {
-            let viewers = Viewers { tileset, one_file: one_file && config.output.format != Format::Tiles };
-            finish(directory, store, plan, placement.as_ref(), viewers, &canvas, tiles, bounds)
-        };
+        let georeference = Georeference::new(&plan.frame, &plan.lattice, bounds, plan.unit, plan.crs.epsg);
+        let georeference = georeference.to_json(placement.as_ref());
+        let viewers = Viewers { tileset, one_file: one_file && config.output.format != Format::Tiles };
+        let finish = || finish(directory, store, &georeference, &viewers, &canvas, tiles);
         let other_bytes = journal.step(Step::Finish, finish)?;
         if !one_file && config.output.format == Format::Glb {
             warnings.push(too_large_for_one_file(&written));
@@ -413,7 +412,7 @@ impl Job<'_> {
 fn pyramid(config: &Config, partition: &Partition) -> (Sizes, Pyramid) {
     let points = |blocks: &Vec<spill::Block>| blocks.iter().map(|block| block.points as u64).sum();
     let points: Vec<u64> = partition.blocks.iter().map(points).collect();
-    let sizes = Sizes::new(config.output.level_sites.0, config.limits.memory.0 / 4 * 3);
+    let sizes = Sizes::new(config.output.level_sites.0, config.limits.memory.0);
     (sizes, Pyramid::new(&partition.tree, &points, sizes))
 }
 
@@ -554,19 +553,16 @@ struct Viewers {
 fn finish(
     directory: &Directory,
     store: &Store,
-    plan: &Plan,
-    placement: Option<&Placement>,
-    viewers: Viewers,
+    georeference: &str,
+    viewers: &Viewers,
     canvas: &Canvas,
     tiles: usize,
-    bounds: [[i32; 3]; 2],
 ) -> Result<Done<u64>> {
-    let georeference = Georeference::new(&plan.frame, &plan.lattice, bounds, plan.unit, plan.crs.epsg);
     let mut results = vec![
-        directory::write_result(&directory.georeference(), georeference.to_json(placement).as_bytes())?,
+        directory::write_result(&directory.georeference(), georeference.as_bytes())?,
         directory::write_result(&directory.preview(), &draw_picture(store, canvas, tiles)?)?,
     ];
-    if let Some(tileset) = viewers.tileset {
+    if let Some(tileset) = &viewers.tileset {
         results.push(directory::write_result(&directory.tileset(), tileset.as_bytes())?);
     }
     if viewers.one_file {

@@ -6,6 +6,9 @@ use super::tree::{Kind, Tree};
 /// Bytes that a site takes while the meshes below a tile are joined and simplified.
 pub const BYTES_PER_LEVEL_SITE: u64 = 550;
 
+/// Bytes that the process and what its allocator keeps of the steps before take.
+const KEPT: u64 = 104 << 20;
+
 /// What a tile of the tileset is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Child {
@@ -47,8 +50,10 @@ pub struct Sizes {
 }
 
 impl Sizes {
-    /// Tiles of at most so many `sites`, fewer where four of them do not fit `memory`.
+    /// Tiles of at most so many `sites`, fewer where four of them do not fit the part of the job's `memory` that the allocator does
+    /// not keep from the steps before.
     pub fn new(sites: u64, memory: u64) -> Sizes {
+        let memory = memory.saturating_sub(KEPT).max(memory / 5).min(memory / 4 * 3);
         Sizes { sites: sites.min(memory / (4 * BYTES_PER_LEVEL_SITE)).max(1), memory }
     }
 

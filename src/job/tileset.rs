@@ -22,7 +22,7 @@ pub fn text(
     transform: Option<[f64; 16]>,
 ) -> Result<String> {
     let root = match pyramid.inner.len().checked_sub(1) {
-        Some(last) => inner_node(directory, store, pyramid, last)?,
+        Some(last) => inner_node(store, pyramid, last)?,
         None => single_node(directory, look)?,
     };
     let root = root.ok_or_else(|| Error::Broken("there is no tile to list in tileset.json".into()))?;
@@ -31,14 +31,14 @@ pub fn text(
     Ok(text)
 }
 
-fn inner_node(directory: &Directory, store: &Store, pyramid: &Pyramid, at: usize) -> Result<Option<Node>> {
+fn inner_node(store: &Store, pyramid: &Pyramid, at: usize) -> Result<Option<Node>> {
     let inner = &pyramid.inner[at];
     let Level { own, leaves } = Level::load(store, inner.node)?;
     let mut leaves = leaves.iter();
     let mut children = Vec::new();
     for &child in &inner.children {
         children.extend(match child {
-            Child::Inner(below) => inner_node(directory, store, pyramid, below)?,
+            Child::Inner(below) => inner_node(store, pyramid, below)?,
             Child::Leaf(tile) => leaves.next().and_then(|leaf| node(leaf, format!("tiles/{tile:06}.glb"))),
         });
     }

@@ -16,7 +16,7 @@ const STEPS_PER_EDGE: u64 = 64;
 /// in steps of z; no smaller than the true one. Both must cover the same ground once, with counterclockwise triangles.
 pub fn deviation(positions: &[[i32; 3]], fine: &[[u32; 3]], coarse: &[[u32; 3]]) -> f64 {
     let at_crossings = Fans::new(positions, fine).crossings(coarse);
-    let inside = at_crossings.map(|crossings| crossings.max(Sieve::new(positions).inside(coarse)));
+    let inside = at_crossings.map(|crossings| crossings.max(Sieve::new(positions, 1).inside(coarse)));
     // Rounding loses some 2^-50 of a height.
     let lost = 1e-9;
     inside.map_or_else(|| height_range(positions), |found| if found > 0.0 { found + lost } else { 0.0 })
@@ -205,35 +205,37 @@ pub(super) struct Sieve<'a> {
 }
 
 impl<'a> Sieve<'a> {
-    pub(super) fn new(positions: &'a [[i32; 3]]) -> Sieve<'a> {
+    /// Of one vertex of `every`.
+    pub(super) fn new(positions: &'a [[i32; 3]], every: usize) -> Sieve<'a> {
         let none = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
         let [low, high] = positions.iter().fold(none, |[low, high], p| {
             let p = [p[0] as f64, p[1] as f64];
             [[0, 1].map(|k| low[k].min(p[k])), [0, 1].map(|k| high[k].max(p[k]))]
         });
         let size = [0, 1].map(|k| (high[k] - low[k]).max(1.0));
-        let cells = (positions.len() / 2 + 1) as f64;
+        let cells = (positions.len() / every / 2 + 1) as f64;
         let columns = (cells * size[0] / size[1]).sqrt().ceil().clamp(1.0, cells);
         let rows = (cells / columns).ceil();
         let scale = [columns / (size[0] + 1.0), rows / (size[1] + 1.0)];
         let (columns, rows) = (columns as usize, rows as usize);
         let (starts, sorted, numbers) = (vec![0; columns * rows + 1], Vec::new(), Vec::new());
         let mut sieve = Sieve { positions, low, scale, columns, rows, starts, sorted, numbers };
-        sieve.sort();
+        sieve.sort(every);
         sieve
     }
 
-    fn sort(&mut self) {
-        let cells: Vec<u32> = self.positions.iter().map(|p| self.cell(p)).collect();
+    fn sort(&mut self, every: usize) {
+        let cells: Vec<u32> = self.positions.iter().step_by(every).map(|p| self.cell(p)).collect();
         cells.iter().for_each(|&cell| self.starts[cell as usize] += 1);
         let mut end = 0;
         for start in &mut self.starts {
             end += *start;
             *start = end;
         }
-        self.sorted = vec![[0; 3]; self.positions.len()];
-        self.numbers = vec![0; self.positions.len()];
-        for (v, &cell) in cells.iter().enumerate().rev() {
+        self.sorted = vec![[0; 3]; cells.len()];
+        self.numbers = vec![0; cells.len()];
+        for (i, &cell) in cells.iter().enumerate().rev() {
+            let v = i * every;
             let at = &mut self.starts[cell as usize];
             *at -= 1;
             (self.sorted[*at as usize], self.numbers[*at as usize]) = (self.positions[v], v as u32);

@@ -5,6 +5,7 @@ use std::hash::{BuildHasherDefault, Hasher};
 
 use super::Tile;
 use super::frame::Frame;
+use super::outline::on_outline;
 use super::read::{Part, TileFile};
 
 /// Number of the vertex at a site.
@@ -16,26 +17,35 @@ type VertexOf = HashMap<[i32; 2], u32, BuildHasherDefault<SiteHasher>>;
 /// Fails with a sentence where a vertex is not on the lattice or some files have normals or colours and others do not.
 pub fn join(frame: &Frame, files: &[TileFile]) -> Result<Tile, String> {
     let parts = || files.iter().flat_map(|file| &file.parts);
-    let mut joined = Tile::default();
-    joined.normals = parts().all(|part| part.normals.is_some()).then(Vec::new);
-    joined.colors = parts().all(|part| part.colors.is_some()).then(Vec::new);
-    let vertices = parts().map(|part| part.positions.len()).sum();
-    let mut vertex_of = VertexOf::with_capacity_and_hasher(vertices, BuildHasherDefault::default());
+    let mut joined = Tile {
+        normals: parts().all(|part| part.normals.is_some()).then(Vec::new),
+        colors: parts().all(|part| part.colors.is_some()).then(Vec::new),
+        ..Tile::default()
+    };
+    let mut vertex_of = VertexOf::default();
     for part in parts() {
+        // Only what is on an outline can be in another part too.
+        let shared = on_outline(part.positions.len(), &part.triangles);
         let numbers: Vec<u32> = (0..part.positions.len())
-            .map(|v| number(frame, part, v, &mut vertex_of, &mut joined))
+            .map(|v| number(frame, part, v, shared[v].then_some(&mut vertex_of), &mut joined))
             .collect::<Result<_, _>>()?;
         joined.triangles.extend(part.triangles.iter().map(|t| t.map(|v| numbers[v as usize])));
     }
     Ok(joined)
 }
 
-/// The number in `joined` of vertex `v` of `part`, which is appended if it is new.
-fn number(frame: &Frame, part: &Part, v: usize, vertex_of: &mut VertexOf, joined: &mut Tile) -> Result<u32, String> {
+/// The number in `joined` of vertex `v` of `part`, which is appended if it is new: always, unless `shared` knows its site.
+fn number(
+    frame: &Frame,
+    part: &Part,
+    v: usize,
+    shared: Option<&mut VertexOf>,
+    joined: &mut Tile,
+) -> Result<u32, String> {
     let world = part.world(v);
     let point = frame.integers(world).ok_or_else(|| format!("the vertex at {world:?} is not on the job's lattice"))?;
     let next = joined.positions.len() as u32;
-    let number = *vertex_of.entry([point[0], point[1]]).or_insert(next);
+    let number = shared.map_or(next, |vertex_of| *vertex_of.entry([point[0], point[1]]).or_insert(next));
     if number == next {
         joined.positions.push(point);
         if let (Some(normals), Some(theirs)) = (&mut joined.normals, &part.normals) {

@@ -14,6 +14,7 @@ pub mod globe;
 pub mod join;
 pub mod normals;
 mod order;
+mod outline;
 mod packed;
 mod parts;
 pub mod picture;

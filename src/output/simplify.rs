@@ -15,6 +15,7 @@ mod tests;
 use super::Tile;
 use super::deviation::{Sieve, deviation};
 use super::frame::Frame;
+use super::outline::on_outline;
 use crate::geometry::Site;
 use crate::triangulation::region::covered;
 use crate::triangulation::{self, canonical};
@@ -32,6 +33,8 @@ pub struct Simplified {
 
 /// However many vertices the outline has, there are at least this many for each triangle that is wanted inside.
 const LEAST_INSIDE: f64 = 1.0 / 16.0;
+/// One vertex of so many is looked at for the one that a triangle is furthest off.
+const LOOKED_AT: usize = 3;
 /// The share of the vertices inside that a grid chooses.
 const BY_GRID: f64 = 0.6;
 
@@ -70,20 +73,7 @@ struct Outline {
 
 impl Outline {
     fn of(tile: &Tile) -> Outline {
-        // The edges that leave a vertex inside lead to the same vertices as those that come to it come from. Equal sums of
-        // scrambled numbers instead of equal sets: only what differs is looked at closely, and that is little.
-        let scrambled = |v: u32| {
-            let x = (v as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-            (x ^ (x >> 31)).wrapping_mul(0xbf58_476d_1ce4_e5b9)
-        };
-        let mut balance = vec![0u64; tile.positions.len()];
-        for &[a, b, c] in &tile.triangles {
-            let (of_a, of_b, of_c) = (scrambled(a), scrambled(b), scrambled(c));
-            for (v, to, from) in [(a, of_b, of_c), (b, of_c, of_a), (c, of_a, of_b)] {
-                balance[v as usize] = balance[v as usize].wrapping_add(to).wrapping_sub(from);
-            }
-        }
-        let on: Vec<bool> = balance.iter().map(|&sum| sum != 0).collect();
+        let on = on_outline(tile.positions.len(), &tile.triangles);
         let between = |&[a, b]: &[u32; 2]| on[a as usize] && on[b as usize];
         let sides = tile.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).filter(between);
         let sides: Vec<[u32; 2]> = sides.collect();
@@ -143,7 +133,7 @@ fn keep_by_grid(tile: &Tile, cells: usize, kept: &mut [bool]) {
 /// Keeps of the triangles of `coarse` that are furthest off the terrain the vertex that each is furthest off, `count` at the most; how
 /// many.
 fn keep_furthest(tile: &Tile, coarse: &[[u32; 3]], count: usize, kept: &mut [bool]) -> usize {
-    let mut furthest: Vec<(u64, u32)> = Sieve::new(&tile.positions).furthest(coarse).collect();
+    let mut furthest: Vec<(u64, u32)> = Sieve::new(&tile.positions, LOOKED_AT).furthest(coarse).collect();
     if furthest.len() > count {
         // Distances are not negative, so their bits are in their order.
         furthest.sort_unstable_by(|a, b| b.cmp(a));
