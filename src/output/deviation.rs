@@ -307,8 +307,17 @@ impl<'a> Sieve<'a> {
 /// The distance between `p` and the counterclockwise triangle over it; 0 outside.
 fn apart(corners: &[[i32; 3]; 3], p: [i32; 3]) -> f64 {
     let [a, b, c] = *corners;
-    let weights = [(b, c), (c, a), (a, b)].map(|(from, to)| orient2d(plane(from), plane(to), plane(p)));
-    if weights.iter().any(|&w| w < 0) {
+    let weight = |from, to| orient2d(plane(from), plane(to), plane(p));
+    let of_a = weight(b, c);
+    if of_a < 0 {
+        return 0.0;
+    }
+    let of_b = weight(c, a);
+    if of_b < 0 {
+        return 0.0;
+    }
+    let weights = [of_a, of_b, weight(a, b)];
+    if weights[2] < 0 {
         return 0.0;
     }
     let total: f64 = weights.iter().map(|&w| w as f64).sum();

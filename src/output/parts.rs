@@ -61,13 +61,14 @@ pub(super) fn split_short<'a>(frame: &Frame, tile: &'a Tile) -> Result<Vec<Part<
     if let Some(origin) = short_origin(low, high) {
         return Ok(vec![Part { origin, short: true, tile: Cow::Borrowed(tile) }]);
     }
+    let steps: Vec<[f64; 3]> = tile.positions.iter().map(|&p| frame.steps(p)).collect();
     let fits = |triangle: &[u32; 3]| {
-        let [low, high] = extent_of(frame, tile, triangle);
+        let [low, high] = extent_of(&steps, triangle);
         (0..3).all(|k| high[k] - low[k] <= SHORT_EXTENT)
     };
     let (near, far): (Vec<_>, Vec<_>) = tile.triangles.iter().partition(|triangle| fits(triangle));
     let mut parts = Vec::new();
-    halve(frame, tile, near, &mut parts);
+    halve(&steps, tile, near, &mut parts);
     if parts.len() > FEW_PARTS && tile.triangles.len() < LEAST_TRIANGLES * parts.len() {
         return split(frame, tile);
     }
@@ -76,11 +77,12 @@ pub(super) fn split_short<'a>(frame: &Frame, tile: &'a Tile) -> Result<Vec<Part<
 }
 
 /// Cuts `triangles`, none of them longer than 16 bits reach, in two until every piece is within reach.
-fn halve(frame: &Frame, tile: &Tile, triangles: Vec<[u32; 3]>, parts: &mut Vec<Part>) {
+/// `steps` are the glTF coordinates of all vertices.
+fn halve(steps: &[[f64; 3]], tile: &Tile, triangles: Vec<[u32; 3]>, parts: &mut Vec<Part>) {
     if triangles.is_empty() {
         return;
     }
-    let [low, high] = extent_of(frame, tile, triangles.as_flattened());
+    let [low, high] = extent_of(steps, triangles.as_flattened());
     if let Some(origin) = short_origin(low, high) {
         return parts.push(Part { origin, short: true, tile: Cow::Owned(tile.subset(triangles)) });
     }
@@ -88,14 +90,14 @@ fn halve(frame: &Frame, tile: &Tile, triangles: Vec<[u32; 3]>, parts: &mut Vec<P
     let axis = (0..3).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0);
     // Twice the middle; no two pieces are empty, for the middles differ where no single triangle is as long as all.
     let middle = |triangle: &[u32; 3]| {
-        let [low, high] = extent_of(frame, tile, triangle);
-        low[axis] + high[axis]
+        let [a, b, c] = triangle.map(|v| steps[v as usize][axis]);
+        a.min(b).min(c) + a.max(b).max(c)
     };
     let ends = triangles.iter().map(middle).fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], m| [a.min(m), b.max(m)]);
     let cut = (ends[0] + ends[1]) / 2.0;
     let (first, second) = triangles.into_iter().partition(|triangle| middle(triangle) <= cut);
-    halve(frame, tile, first, parts);
-    halve(frame, tile, second, parts);
+    halve(steps, tile, first, parts);
+    halve(steps, tile, second, parts);
 }
 
 /// The origin on `grid` next to the middle of `points`, if all of them are within reach of it.
@@ -106,10 +108,10 @@ fn common_origin(frame: &Frame, points: &[[i32; 3]], grid: i64) -> Option<[f64; 
     (0..3).all(|k| high[k] - origin[k] <= reach && origin[k] - low[k] <= reach).then_some(origin)
 }
 
-/// The least and greatest glTF coordinates of these vertices of `tile` in steps.
-fn extent_of(frame: &Frame, tile: &Tile, vertices: &[u32]) -> [[f64; 3]; 2] {
+/// The least and greatest glTF coordinates of these vertices, of those in `steps`.
+fn extent_of(steps: &[[f64; 3]], vertices: &[u32]) -> [[f64; 3]; 2] {
     let none = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    vertices.iter().map(|&v| frame.steps(tile.positions[v as usize])).fold(none, wider)
+    vertices.iter().map(|&v| steps[v as usize]).fold(none, wider)
 }
 
 fn wider([low, high]: [[f64; 3]; 2], point: [f64; 3]) -> [[f64; 3]; 2] {
