@@ -213,7 +213,7 @@ impl<'a> Sieve<'a> {
             [[0, 1].map(|k| low[k].min(p[k])), [0, 1].map(|k| high[k].max(p[k]))]
         });
         let size = [0, 1].map(|k| (high[k] - low[k]).max(1.0));
-        let cells = (positions.len() / every / 2 + 1) as f64;
+        let cells = (positions.len() / every + 1) as f64;
         let columns = (cells * size[0] / size[1]).sqrt().ceil().clamp(1.0, cells);
         let rows = (cells / columns).ceil();
         let scale = [columns / (size[0] + 1.0), rows / (size[1] + 1.0)];
