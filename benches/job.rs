@@ -1,7 +1,8 @@
 //! The whole job against decoding alone: `cargo bench --bench job [FILE.laz] [RUNS]`.
 //!
-//! Alternates, in one process, between one thread that only decodes the file with the `las` crate and the whole job on it,
-//! and prints medians, their ratio and the stages of the median job. Without FILE it takes autzen.laz from the test data
+//! Alternates, in one process, between one thread that only decodes the file with the `las` crate, the whole job on it with plain
+//! tiles alone, and the job with all there is for viewers: tiles packed with meshopt, and levels of detail. Prints medians, their
+//! ratios and the stages of the median jobs. Without FILE it takes autzen.laz from the test data
 //! if that is there, else a sample terrain of 4 million points.
 
 use gdt_batch::config::Config;
@@ -20,19 +21,26 @@ fn main() -> Outcome<()> {
         None => default_file(scratch.path())?,
     };
     let runs: usize = arguments.next().map_or(Ok(5), |n| n.parse())?;
-    let (mut decoding, mut jobs) = (Vec::new(), Vec::new());
+    let (mut decoding, mut plain, mut full) = (Vec::new(), Vec::new(), Vec::new());
     for run in 0..runs {
         decoding.push(decode(&file)?);
-        jobs.push(job(&file, &scratch.path().join(run.to_string()))?);
+        plain.push(job(&file, &scratch.path().join(format!("plain{run}")), "compression = \"none\"\nlevels = false")?);
+        full.push(job(&file, &scratch.path().join(format!("full{run}")), "format = \"tiles\"")?);
     }
     decoding.sort_by(f64::total_cmp);
-    jobs.sort_by(|a, b| a.wall_s.total_cmp(&b.wall_s));
-    let (decode, job) = (decoding[runs / 2], &jobs[runs / 2]);
+    let [plain, full] = [plain, full].map(|mut jobs: Vec<Report>| {
+        jobs.sort_by(|a, b| a.wall_s.total_cmp(&b.wall_s));
+        jobs.swap_remove(runs / 2)
+    });
+    let decode = decoding[runs / 2];
     println!("{}, {} runs, medians", file.display(), runs);
-    println!("{job}");
+    println!("{plain}");
+    println!("{full}");
     println!("decode only, one thread, las crate  {decode:.2} s");
-    println!("whole job, {} threads               {:.2} s", job.threads, job.wall_s);
-    println!("ratio                               {:.2}", job.wall_s / decode);
+    for (name, job) in [("plain tiles", &plain), ("packed, levels", &full)] {
+        println!("whole job, {} threads, {name:<14} {:.2} s, {:.2} x", job.threads, job.wall_s, job.wall_s / decode);
+    }
+    println!("packing and levels add {:.2} of the job without them", full.wall_s / plain.wall_s - 1.0);
     Ok(())
 }
 
@@ -57,12 +65,12 @@ fn decode(file: &Path) -> Outcome<f64> {
     Ok(start.elapsed().as_secs_f64())
 }
 
-fn job(file: &Path, output: &Path) -> Outcome<Report> {
+fn job(file: &Path, output: &Path, look: &str) -> Outcome<Report> {
     let config = output.with_extension("toml");
     std::fs::write(
         &config,
         format!(
-            "[input]\nfiles = [{:?}]\nunit = \"metre\"\n[output]\ndirectory = {:?}\n",
+            "[input]\nfiles = [{:?}]\nunit = \"metre\"\n[output]\ndirectory = {:?}\n{look}\n",
             file.canonicalize()?,
             output
         ),
