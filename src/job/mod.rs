@@ -55,6 +55,7 @@ use journal::{Done, Journal, Step};
 use leaf::LeafFigures;
 use levels::LevelFigures;
 use partition::{Partition, Summary, Task};
+use placement::Placement;
 use progress::{Progress, Schedule, Stage, StageFigures};
 use pyramid::{Pyramid, Sizes};
 use rayon::prelude::*;
@@ -248,21 +249,10 @@ impl Job<'_> {
         let exported = stage.finish();
 
         let one_file = fits_one_file(&written);
-        let mut warnings = Vec::new();
-        let (mut coarser, mut levelled) = (LevelFigures::default(), None);
-        let (mut tileset, mut placement) = (None, None);
-        if config.output.format != Format::Glb || !one_file {
-            let (sizes, pyramid) = pyramid(config, &partition);
-            let stage = progress.stage("levels", pyramid.inner.len() as u64, "tiles");
-            coarser = self.make_levels(&pyramid, sizes, &look, &stage)?;
-            let placed = placement::place(plan, &look.frame, bounds, config.output.height_offset);
-            warnings.extend(placement::remark(&placed));
-            placement = placed.ok();
-            let transform = placement.as_ref().map(|placement| placement.transform);
-            tileset = Some(tileset::text(directory, store, &pyramid, &look, transform)?);
-            levelled = Some(stage.finish());
-            warnings.extend(levels_left_out(config, &pyramid));
-        }
+        let with_tileset = config.output.format != Format::Glb || !one_file;
+        let for_viewers = with_tileset.then(|| self.tileset(plan, &partition, &look, bounds)).transpose()?;
+        let Levelled { figures: coarser, tileset, placement, mut warnings, stage: levelled } =
+            for_viewers.unwrap_or_default();
 
         let stage = progress.stage("finish", 1, "job");
         let georeference = Georeference::new(&plan.frame, &plan.lattice, bounds, plan.unit, plan.crs.epsg);
@@ -301,6 +291,20 @@ impl Job<'_> {
         journal.record(Step::Report, Done { results, ..Done::new((), Vec::new()) })?;
         journal.commit()?;
         Ok(report)
+    }
+
+    /// What `tileset.json` needs and says.
+    fn tileset(&self, plan: &Plan, partition: &Partition, look: &Look, bounds: [[i32; 3]; 2]) -> Result<Levelled> {
+        let (sizes, pyramid) = pyramid(self.config, partition);
+        let stage = self.progress.stage("levels", pyramid.inner.len() as u64, "tiles");
+        let figures = self.make_levels(&pyramid, sizes, look, &stage)?;
+        let placed = placement::place(plan, &look.frame, bounds, self.config.output.height_offset);
+        let mut warnings = Vec::from_iter(placement::remark(&placed));
+        warnings.extend(levels_left_out(self.config, &pyramid));
+        let placement = placed.ok();
+        let transform = placement.as_ref().map(|placement| placement.transform);
+        let tileset = Some(tileset::text(self.directory, self.store, &pyramid, look, transform)?);
+        Ok(Levelled { figures, tileset, placement, warnings, stage: Some(stage.finish()) })
     }
 
     /// Makes the coarser tiles, those of one height side by side, as many at once as have room.
@@ -406,6 +410,17 @@ impl Job<'_> {
     fn count(&self, stage: &Stage, step: Step, amount: u64) {
         if self.journal.has(step) { stage.take_over(amount) } else { stage.advance(amount) }
     }
+}
+
+/// What comes of a tileset, if there is one.
+#[derive(Default)]
+struct Levelled {
+    figures: LevelFigures,
+    /// The text of `tileset.json`.
+    tileset: Option<String>,
+    placement: Option<Placement>,
+    warnings: Vec<String>,
+    stage: Option<StageFigures>,
 }
 
 /// Which tiles viewers see.
