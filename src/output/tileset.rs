@@ -27,7 +27,7 @@ pub struct Node {
 /// to earth-centred ones, column by column.
 pub fn tileset_json(frame: &Frame, root: &Node, transform: Option<[f64; 16]>) -> Value {
     let whole = diagonal(frame, root);
-    let mut tile = tile_json(frame, root);
+    let (mut tile, _) = tile_json(frame, root);
     tile["refine"] = "REPLACE".into();
     if let Some(transform) = transform {
         tile["transform"] = transform.to_vec().into();
@@ -40,17 +40,30 @@ pub fn tileset_json(frame: &Frame, root: &Node, transform: Option<[f64; 16]>) ->
     })
 }
 
-fn tile_json(frame: &Frame, node: &Node) -> Value {
+/// The tile, and the corners of its bounding volume, which holds those of its children.
+fn tile_json(frame: &Frame, node: &Node) -> (Value, [[f64; 3]; 2]) {
     // Without content it is to be refined from everywhere.
     let error = if node.uri.is_some() { node.error } else { diagonal(frame, node).max(node.error) };
-    let mut tile = json!({"boundingVolume": {"box": box_of(frame, node.bounds)}, "geometricError": error});
+    let (children, volumes): (Vec<Value>, Vec<_>) = node.children.iter().map(|child| tile_json(frame, child)).unzip();
+    let volume = volumes.into_iter().fold(thick(corners(frame, node.bounds)), around);
+    let mut tile = json!({"boundingVolume": {"box": box_of(volume)}, "geometricError": error});
     if let Some(uri) = &node.uri {
         tile["content"] = json!({"uri": uri});
     }
-    if !node.children.is_empty() {
-        tile["children"] = node.children.iter().map(|child| tile_json(frame, child)).collect();
+    if !children.is_empty() {
+        tile["children"] = children.into();
     }
-    tile
+    (tile, volume)
+}
+
+/// The corners, at least twice [`LEAST_HALF`] apart along every axis.
+fn thick([low, high]: [[f64; 3]; 2]) -> [[f64; 3]; 2] {
+    let lacking = [0, 1, 2].map(|k| (LEAST_HALF - (high[k] - low[k]) / 2.0).max(0.0));
+    [[0, 1, 2].map(|k| low[k] - lacking[k]), [0, 1, 2].map(|k| high[k] + lacking[k])]
+}
+
+fn around(a: [[f64; 3]; 2], b: [[f64; 3]; 2]) -> [[f64; 3]; 2] {
+    [[0, 1, 2].map(|k| a[0][k].min(b[0][k])), [0, 1, 2].map(|k| a[1][k].max(b[1][k]))]
 }
 
 /// Metres x, y, z of the tileset at the two corners of `bounds`.
@@ -62,12 +75,11 @@ pub fn corners(frame: &Frame, bounds: [[i32; 3]; 2]) -> [[f64; 3]; 2] {
 }
 
 /// Centre and half axes.
-fn box_of(frame: &Frame, bounds: [[i32; 3]; 2]) -> [f64; 12] {
-    let [low, high] = corners(frame, bounds);
+fn box_of([low, high]: [[f64; 3]; 2]) -> [f64; 12] {
     let mut numbers = [0.0; 12];
     for k in 0..3 {
         numbers[k] = (low[k] + high[k]) / 2.0;
-        numbers[3 + 4 * k] = ((high[k] - low[k]) / 2.0).max(LEAST_HALF);
+        numbers[3 + 4 * k] = (high[k] - low[k]) / 2.0;
     }
     numbers
 }
@@ -75,4 +87,30 @@ fn box_of(frame: &Frame, bounds: [[i32; 3]; 2]) -> [f64; 12] {
 fn diagonal(frame: &Frame, node: &Node) -> f64 {
     let [low, high] = corners(frame, node.bounds);
     (0..3).map(|k| (high[k] - low[k]).powi(2)).sum::<f64>().sqrt().max(2.0 * LEAST_HALF)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::lattice::{Lattice, shortest_decimal};
+
+    #[test]
+    fn a_flat_tile_at_the_rim_stays_within_its_parent() {
+        let decimal = |v: f64| shortest_decimal(v).unwrap();
+        let lattice = Lattice { offset: [decimal(0.0); 3], resolution: decimal(0.001), resolution_z: decimal(0.001) };
+        let frame = Frame::new(&lattice, 1.0, 1.0, None).unwrap();
+        let node = |bounds, children| Node { uri: None, bounds, error: 0.0, children };
+        let child = node([[0, 0, 5], [3, 4_000, 5]], Vec::new());
+        let root = node([[0, 0, 5], [9_000, 9_000, 5]], vec![child]);
+        let json = tileset_json(&frame, &root, None);
+        let numbers = |tile: &Value| -> Vec<f64> {
+            tile["boundingVolume"]["box"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
+        };
+        let (outer, inner) = (numbers(&json["root"]), numbers(&json["root"]["children"][0]));
+        for k in 0..3 {
+            assert!(inner[3 + 4 * k] >= LEAST_HALF);
+            assert!(inner[k] - inner[3 + 4 * k] >= outer[k] - outer[3 + 4 * k] - 1e-12, "axis {k}");
+            assert!(inner[k] + inner[3 + 4 * k] <= outer[k] + outer[3 + 4 * k] + 1e-12, "axis {k}");
+        }
+    }
 }
