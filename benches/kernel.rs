@@ -5,10 +5,13 @@
 //! when small, as in a job. Runs alternate; the medians are printed. Real data is read from `../shared/data`, or from
 //! `$GDT_SHARED/data`, where there is any.
 
+mod points;
+
 use delaunator::Point;
 use gdt_batch::geometry::Site;
 use gdt_batch::triangulation::reference;
 use gdt_batch::voronoi::{Counts, STEPS, Scratch, triangulate};
+use points::{Random, distinct, gaussian, median, uniform};
 use spade::{DelaunayTriangulation, Point2, Triangulation};
 use std::path::PathBuf;
 
@@ -166,11 +169,6 @@ fn cpu_time() -> f64 {
     time.tv_sec as f64 * 1e9 + time.tv_nsec as f64
 }
 
-fn median(mut times: Vec<f64>) -> f64 {
-    times.sort_by(f64::total_cmp);
-    times[times.len() / 2]
-}
-
 /// Cuts at the median of the longer side until no part has more than `leaf` sites.
 fn cut(mut sites: Vec<Site>, leaf: usize) -> Vec<Vec<Site>> {
     if sites.len() <= leaf {
@@ -189,13 +187,6 @@ fn cut(mut sites: Vec<Site>, leaf: usize) -> Vec<Vec<Site>> {
     leaves
 }
 
-/// Distinct sites in the order of their first use.
-fn distinct(mut sites: Vec<Site>) -> Vec<Site> {
-    let mut seen = std::collections::HashSet::with_capacity(sites.len());
-    sites.retain(|&s| seen.insert(s));
-    sites
-}
-
 /// The distinct sites of a file of the shared test data.
 fn shared(name: &str) -> Option<Vec<Site>> {
     let folder = std::env::var_os("GDT_SHARED").map(PathBuf::from);
@@ -208,33 +199,6 @@ fn shared(name: &str) -> Option<Vec<Site>> {
     let low = [points.x_raw().min()?, points.y_raw().min()?];
     let sites = points.x_raw().zip(points.y_raw()).map(|(x, y)| [x - low[0], y - low[1]]).collect();
     Some(distinct(sites))
-}
-
-/// xorshift64*.
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> [f64; 2] {
-        let (r, a) = ((-2.0 * (1.0 - self.unit()).ln()).sqrt(), std::f64::consts::TAU * self.unit());
-        [r * a.cos(), r * a.sin()]
-    }
-}
-
-fn uniform(n: usize) -> Vec<Site> {
-    let mut random = Random(1);
-    distinct((0..n).map(|_| [0; 2].map(|_| (random.unit() * 1e8) as i32)).collect())
-}
-
-fn gaussian(n: usize) -> Vec<Site> {
-    let mut random = Random(2);
-    distinct((0..n).map(|_| random.normal().map(|c| (c * 1e7) as i32)).collect())
 }
 
 fn clusters(n: usize, spots: usize) -> Vec<Site> {

@@ -161,6 +161,7 @@ impl std::ops::AddAssign for Counts {
 /// Buffers that [`triangulate`] uses again and again. One for each thread.
 #[derive(Default)]
 pub struct Scratch {
+    shape: Shape,
     texture: g1_write_sites::Texture,
     voronoi: g2_voronoi::Voronoi,
     scan: g6_triangles::Scan,
@@ -173,6 +174,11 @@ pub struct Scratch {
 }
 
 impl Scratch {
+    /// Buffers for textures of this `shape` where the diagrams are made on this thread. The mesh is the same with any.
+    pub fn with_shape(shape: Shape) -> Scratch {
+        Scratch { shape, ..Scratch::default() }
+    }
+
     /// Hands back a mesh that is no longer needed: its memory serves the next leaf.
     pub fn recycle(&mut self, mesh: Mesh) {
         self.mesh = mesh;
@@ -199,13 +205,13 @@ pub fn triangulate_with(
     scratch: &mut Scratch,
 ) -> Result<(Mesh, Counts), Rejected> {
     check_size(sites)?;
-    let Scratch { texture, voronoi, scan, sphere, islands, shift, flips, acceptance, mesh } = scratch;
+    let Scratch { shape, texture, voronoi, scan, sphere, islands, shift, flips, acceptance, mesh } = scratch;
     let mut counts = Counts { sites: sites.len() as u64, ..Counts::default() };
     let mut clock = Clock::start();
     shift.clear();
     flips.reset(sites.len());
 
-    discretise(sites, diagrams, texture, voronoi, &mut counts)?;
+    discretise(sites, diagrams, shape, texture, voronoi, &mut counts)?;
     clock.done(&mut counts, 0);
     counts.nanoseconds[0] = counts.nanoseconds[0].saturating_sub(counts.nanoseconds[WAIT]);
     scan.run(texture, voronoi, sphere, shift, flips)?;
@@ -237,6 +243,7 @@ pub fn triangulate_with(
 fn discretise(
     sites: &[Site],
     diagrams: Option<&dyn Diagrams>,
+    shape: &Shape,
     texture: &mut g1_write_sites::Texture,
     voronoi: &mut g2_voronoi::Voronoi,
     counts: &mut Counts,
@@ -262,7 +269,7 @@ fn discretise(
         }
         *counts = before;
     }
-    texture.write(sites, &Shape::default(), counts)?;
+    texture.write(sites, shape, counts)?;
     voronoi.start(texture);
     Ok(())
 }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::g1_write_sites::Texture;
 use super::g2_voronoi::Voronoi;
-use super::{Counts, Rejected, Scratch, Shape, triangulate};
+use super::{Counts, Rejected, Resolution, Scratch, Shape, triangulate};
 use crate::geometry::Site;
 use crate::triangulation::mesh::Mesh;
 use crate::triangulation::reference;
@@ -117,6 +117,21 @@ fn random_cases_are_canonical_or_rejected() {
     }
     eprintln!("of {} cases of each kind, rejected: {rejected:#?}", cases / KINDS.len());
     assert_eq!(refused, 0, "large uniform cases were rejected");
+}
+
+#[test]
+fn the_mesh_is_the_same_with_any_texture() {
+    let mut random = Random(7);
+    let sites: Vec<Site> = (0..5000).map(|i| [200 * i, random.below(1 << 20)]).collect();
+    let expected = triangles(&triangulate(&sites, &mut Scratch::default()).unwrap().0);
+    let mut missing = Vec::new();
+    for side in [80, 300, 1000] {
+        let shape = Shape { resolution: Resolution::Side(side), ..Shape::default() };
+        let (mesh, counts) = triangulate(&sites, &mut Scratch::with_shape(shape)).unwrap();
+        assert!(triangles(&mesh) == expected, "{side}");
+        missing.push(counts.missing);
+    }
+    assert!(missing.is_sorted_by(|finer, coarser| finer > coarser), "{missing:?}");
 }
 
 #[test]

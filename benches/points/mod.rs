@@ -1,0 +1,45 @@
+//! What the benchmarks share: made-up sites, and the median.
+
+use gdt_batch::geometry::Site;
+
+/// xorshift64*.
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    pub(crate) fn unit(&mut self) -> f64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    pub(crate) fn normal(&mut self) -> [f64; 2] {
+        let (r, a) = ((-2.0 * (1.0 - self.unit()).ln()).sqrt(), std::f64::consts::TAU * self.unit());
+        [r * a.cos(), r * a.sin()]
+    }
+}
+
+/// `n` sites in a square.
+pub(crate) fn uniform(n: usize) -> Vec<Site> {
+    let mut random = Random(1);
+    distinct((0..n).map(|_| [0; 2].map(|_| (random.unit() * 1e8) as i32)).collect())
+}
+
+/// `n` sites round a centre, normally distributed.
+pub(crate) fn gaussian(n: usize) -> Vec<Site> {
+    let mut random = Random(2);
+    distinct((0..n).map(|_| random.normal().map(|c| (c * 1e7) as i32)).collect())
+}
+
+/// Distinct sites in the order of their first use.
+pub(crate) fn distinct(mut sites: Vec<Site>) -> Vec<Site> {
+    let mut seen = std::collections::HashSet::with_capacity(sites.len());
+    sites.retain(|&s| seen.insert(s));
+    sites
+}
+
+/// The middle one of `times`.
+pub(crate) fn median(mut times: Vec<f64>) -> f64 {
+    times.sort_by(f64::total_cmp);
+    times[times.len() / 2]
+}
