@@ -318,7 +318,7 @@ impl Job<'_> {
         warnings.extend(levels_left_out(self.config, &pyramid));
         let placement = placed.ok();
         let transform = placement.as_ref().map(|placement| placement.transform);
-        let tileset = Some(tileset::text(self.directory, self.store, &pyramid, look, transform)?);
+        let tileset = Some(tileset::text(self.store, &pyramid, look, transform)?);
         Ok(Levelled { figures, tileset, placement, warnings, stage: Some(stage.finish()) })
     }
 

@@ -1,12 +1,9 @@
 //! `tileset.json` from what the steps before have left.
 
-use super::directory::Directory;
 use super::export::Look;
-use super::levels::bounds_of;
 use super::pyramid::{Child, Pyramid};
 use super::records::{Level, LevelTile};
 use super::store::Store;
-use crate::output::read::read_tile;
 use crate::output::tileset::{Node, tileset_json};
 use crate::{Error, Result};
 
@@ -14,16 +11,11 @@ use crate::{Error, Result};
 ///
 /// # Errors
 /// [`Error::Io`] on the output or the job directory, [`Error::Broken`] if there is no tile.
-pub fn text(
-    directory: &Directory,
-    store: &Store,
-    pyramid: &Pyramid,
-    look: &Look,
-    transform: Option<[f64; 16]>,
-) -> Result<String> {
+pub fn text(store: &Store, pyramid: &Pyramid, look: &Look, transform: Option<[f64; 16]>) -> Result<String> {
     let root = match pyramid.inner.len().checked_sub(1) {
         Some(last) => inner_node(store, pyramid, last)?,
-        None => single_node(directory, look)?,
+        // The only tile of a small job.
+        None => node(&LevelTile::load(store, 0)?, tile_uri(0)),
     };
     let root = root.ok_or_else(|| Error::Broken("there is no tile to list in tileset.json".into()))?;
     let mut text = tileset_json(&look.frame, &root, transform).to_string();
@@ -39,7 +31,7 @@ fn inner_node(store: &Store, pyramid: &Pyramid, at: usize) -> Result<Option<Node
     for &child in &inner.children {
         children.extend(match child {
             Child::Inner(below) => inner_node(store, pyramid, below)?,
-            Child::Leaf(tile) => leaves.next().and_then(|leaf| node(leaf, format!("tiles/{tile:06}.glb"))),
+            Child::Leaf(tile) => leaves.next().and_then(|leaf| node(leaf, tile_uri(tile))),
         });
     }
     let node = node(&own, format!("levels/{:06}.glb", inner.node));
@@ -51,8 +43,6 @@ fn node(tile: &LevelTile, uri: String) -> Option<Node> {
     Some(Node { uri, bounds: tile.bounds()?, error: tile.error, children: Vec::new() })
 }
 
-/// The only tile of a small job.
-fn single_node(directory: &Directory, look: &Look) -> Result<Option<Node>> {
-    let bounds = bounds_of(&read_tile(&directory.tile(0))?, look);
-    Ok(node(&LevelTile::new(bounds, true), "tiles/000000.glb".into()))
+fn tile_uri(tile: usize) -> String {
+    format!("tiles/{tile:06}.glb")
 }
