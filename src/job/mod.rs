@@ -298,13 +298,12 @@ impl Job<'_> {
         let (sizes, pyramid) = pyramid(self.config, partition);
         let stage = self.progress.stage("levels", pyramid.inner.len() as u64, "tiles");
         let figures = self.make_levels(&pyramid, sizes, look, &stage)?;
-        let placed = placement::place(plan, &look.frame, bounds, self.config.output.height_offset);
+        let mut root = tileset::root(self.directory, self.store, &pyramid, look)?;
+        let placed = placement::place(plan, &look.frame, bounds, self.config.output.height_offset, &mut root);
         let mut warnings = Vec::from_iter(placement::remark(&placed));
         warnings.extend(levels_left_out(self.config, &pyramid));
-        let placement = placed.ok();
-        let transform = placement.as_ref().map(|placement| placement.transform);
-        let tileset = Some(tileset::text(self.directory, self.store, &pyramid, look, transform)?);
-        Ok(Levelled { figures, tileset, placement, warnings, stage: Some(stage.finish()) })
+        let tileset = Some(tileset::text(look, &root));
+        Ok(Levelled { figures, tileset, placement: placed.ok(), warnings, stage: Some(stage.finish()) })
     }
 
     /// Makes the coarser tiles, those of one height side by side, as many at once as have room.

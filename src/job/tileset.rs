@@ -10,25 +10,23 @@ use crate::output::read::read_tile;
 use crate::output::tileset::{Node, tileset_json};
 use crate::{Error, Result};
 
-/// The text of `tileset.json`.
+/// The root of the tiles, none of them placed on the globe yet.
 ///
 /// # Errors
 /// [`Error::Io`] on the output or the job directory, [`Error::Broken`] if there is no tile.
-pub fn text(
-    directory: &Directory,
-    store: &Store,
-    pyramid: &Pyramid,
-    look: &Look,
-    transform: Option<[f64; 16]>,
-) -> Result<String> {
+pub fn root(directory: &Directory, store: &Store, pyramid: &Pyramid, look: &Look) -> Result<Node> {
     let root = match pyramid.inner.len().checked_sub(1) {
         Some(last) => inner_node(store, pyramid, last)?,
         None => single_node(directory, look)?,
     };
-    let root = root.ok_or_else(|| Error::Broken("there is no tile to list in tileset.json".into()))?;
-    let mut text = tileset_json(&look.frame, &root, transform).to_string();
+    root.ok_or_else(|| Error::Broken("there is no tile to list in tileset.json".into()))
+}
+
+/// The text of `tileset.json`.
+pub fn text(look: &Look, root: &Node) -> String {
+    let mut text = tileset_json(&look.frame, root).to_string();
     text.push('\n');
-    Ok(text)
+    text
 }
 
 fn inner_node(store: &Store, pyramid: &Pyramid, at: usize) -> Result<Option<Node>> {
@@ -48,7 +46,7 @@ fn inner_node(store: &Store, pyramid: &Pyramid, at: usize) -> Result<Option<Node
 
 fn node(tile: &LevelTile, uri: String) -> Option<Node> {
     let uri = (tile.content > 0).then_some(uri);
-    Some(Node { uri, bounds: tile.bounds()?, error: tile.error, children: Vec::new() })
+    Some(Node { uri, bounds: tile.bounds()?, error: tile.error, transform: None, children: Vec::new() })
 }
 
 /// The only tile of a small job.

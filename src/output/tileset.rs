@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use super::document::GENERATOR;
 use super::frame::Frame;
+use super::globe::{applied, relative};
 
 /// Half the least extent of a bounding volume, metres: viewers divide by it.
 const LEAST_HALF: f64 = 0.005;
@@ -19,19 +20,21 @@ pub struct Node {
     pub bounds: [[i32; 3]; 2],
     /// The greatest vertical distance to the exact mesh, metres.
     pub error: f64,
+    /// Where it lies on the globe, if it lies there: metres x, y, z of the scene to earth-centred ones, column by column. A tile
+    /// without is placed as its parent is.
+    pub transform: Option<[f64; 16]>,
     /// Finer tiles, which replace it.
     pub children: Vec<Node>,
 }
 
-/// The content of `tileset.json`, without a line's end. `transform` places the terrain on the globe: metres x, y, z of the tileset
-/// to earth-centred ones, column by column.
-pub fn tileset_json(frame: &Frame, root: &Node, transform: Option<[f64; 16]>) -> Value {
+/// Least and greatest x, y, z, metres.
+type Extent = [[f64; 3]; 2];
+
+/// The content of `tileset.json`, without a line's end.
+pub fn tileset_json(frame: &Frame, root: &Node) -> Value {
     let whole = diagonal(frame, root);
-    let mut tile = tile_json(frame, root);
+    let (mut tile, _) = tile_json(frame, root, None);
     tile["refine"] = "REPLACE".into();
-    if let Some(transform) = transform {
-        tile["transform"] = transform.to_vec().into();
-    }
     json!({
         "asset": {"version": "1.1", "generator": GENERATOR, "extras": frame.extras()},
         // What is wrong where nothing is shown.
@@ -40,17 +43,35 @@ pub fn tileset_json(frame: &Frame, root: &Node, transform: Option<[f64; 16]>) ->
     })
 }
 
-fn tile_json(frame: &Frame, node: &Node) -> Value {
+/// The tile below one that `above` places on the globe, and what its bounding volume takes in the frame of that one.
+fn tile_json(frame: &Frame, node: &Node, above: Option<&[f64; 16]>) -> (Value, Extent) {
     // Without content it is to be refined from everywhere.
     let error = if node.uri.is_some() { node.error } else { diagonal(frame, node).max(node.error) };
-    let mut tile = json!({"boundingVolume": {"box": box_of(frame, node.bounds)}, "geometricError": error});
+    let own = node.transform.as_ref();
+    let children: Vec<(Value, Extent)> =
+        node.children.iter().map(|child| tile_json(frame, child, own.or(above))).collect();
+    let within = children.iter().map(|&(_, extent)| extent).fold(corners(frame, node.bounds), union);
+    let mut tile = json!({"boundingVolume": {"box": box_of(within)}, "geometricError": error});
     if let Some(uri) = &node.uri {
         tile["content"] = json!({"uri": uri});
     }
-    if !node.children.is_empty() {
-        tile["children"] = node.children.iter().map(|child| tile_json(frame, child)).collect();
+    if !children.is_empty() {
+        tile["children"] = children.into_iter().map(|(child, _)| child).collect();
     }
-    tile
+    let Some(own) = own else { return (tile, within) };
+    let transform = above.map_or(*own, |above| relative(above, own));
+    tile["transform"] = transform.to_vec().into();
+    (tile, image(&transform, within))
+}
+
+fn union(a: Extent, b: Extent) -> Extent {
+    [[0, 1, 2].map(|k| a[0][k].min(b[0][k])), [0, 1, 2].map(|k| a[1][k].max(b[1][k]))]
+}
+
+/// What a box takes once it is transformed: that of its corners, since the map is affine.
+fn image(transform: &[f64; 16], extent: Extent) -> Extent {
+    let corner = |i: usize| applied(transform, [0, 1, 2].map(|k| extent[i >> k & 1][k]));
+    (0..8).map(|i| [corner(i); 2]).reduce(union).unwrap_or(extent)
 }
 
 /// Metres x, y, z of the tileset at the two corners of `bounds`.
@@ -62,8 +83,7 @@ pub fn corners(frame: &Frame, bounds: [[i32; 3]; 2]) -> [[f64; 3]; 2] {
 }
 
 /// Centre and half axes.
-fn box_of(frame: &Frame, bounds: [[i32; 3]; 2]) -> [f64; 12] {
-    let [low, high] = corners(frame, bounds);
+fn box_of([low, high]: Extent) -> [f64; 12] {
     let mut numbers = [0.0; 12];
     for k in 0..3 {
         numbers[k] = (low[k] + high[k]) / 2.0;
