@@ -17,6 +17,7 @@ mod broken;
 mod choices;
 mod configuration;
 mod cutting;
+mod globe;
 mod khronos;
 mod levels;
 mod limits;
