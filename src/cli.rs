@@ -25,7 +25,7 @@ Exit codes: 0 done; 1 may be retried (disk, memory, Ctrl-C); 2 command line or c
 
 /// One exact Delaunay terrain out of point clouds of any size, as glTF tiles.
 #[derive(Parser, Debug)]
-#[command(name = "gdt-batch", version, after_help = AFTER_HELP, args_conflicts_with_subcommands = true, arg_required_else_help = true)]
+#[command(name = "gdt-batch", version, after_help = AFTER_HELP, arg_required_else_help = true)]
 pub struct Cli {
     /// What to do; a configuration file alone runs its job.
     #[command(subcommand)]

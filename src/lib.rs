@@ -19,3 +19,9 @@ pub mod verify;
 pub mod voronoi;
 
 pub use error::{Error, Result};
+
+/// Writes a line to standard error. Who has closed it, or put it on a full disk, does not want the job to end for that.
+pub fn say(text: &str) {
+    use std::io::Write;
+    let _ = writeln!(std::io::stderr(), "{text}");
+}

@@ -5,6 +5,7 @@ use gdt_batch::cli::{Cli, Command, Talk};
 use gdt_batch::config::Config;
 use gdt_batch::gpu::selftest;
 use gdt_batch::job::{self, Options, check, progress::Progress, report::skipped_summary};
+use gdt_batch::say;
 use gdt_batch::{Error, Result, input, interrupt, sample, verify};
 use serde::Serialize;
 use std::fmt::Display;
@@ -17,7 +18,7 @@ fn main() -> ExitCode {
     match run(Cli::parse()) {
         Ok(code) => code,
         Err(error) => {
-            eprintln!("error: {error}");
+            say(&format!("error: {error}"));
             ExitCode::from(error.exit_code())
         }
     }
@@ -26,6 +27,12 @@ fn main() -> ExitCode {
 fn run(cli: Cli) -> Result<ExitCode> {
     let talk = cli.talk;
     match (cli.command, cli.config) {
+        (Some(_), Some(config)) => {
+            let config = config.display();
+            return Err(Error::Config(format!(
+                "{config} and a command: name the configuration after the command, or alone"
+            )));
+        }
         (Some(Command::Check { config }), _) => {
             let preflight = check::run(&Config::load(&config)?)?;
             show(&preflight, talk)?;
@@ -51,7 +58,7 @@ fn run_job(config: &Config, options: Options, talk: Talk) -> Result<()> {
     let report = job::run(config, options)?;
     show(&report, talk)?;
     if let Some(summary) = skipped_summary(report.files, &report.skipped) {
-        eprintln!("{summary}: see {}", config.output.directory.join("report.json").display());
+        say(&format!("{summary}: see {}", config.output.directory.join("report.json").display()));
     }
     Ok(())
 }
@@ -78,7 +85,7 @@ fn prove(directory: &Path, memory: u64, talk: Talk) -> Result<ExitCode> {
     if verdict.holds() {
         return Ok(ExitCode::SUCCESS);
     }
-    eprintln!("error: {} does not hold the exact Delaunay triangulation", directory.display());
+    say(&format!("error: {} does not hold the exact Delaunay triangulation", directory.display()));
     Ok(ExitCode::from(4))
 }
 
@@ -88,7 +95,7 @@ fn test_gpu(adapter: Option<&str>, side: Option<u32>, talk: Talk) -> Result<Exit
     if test.holds() {
         return Ok(ExitCode::SUCCESS);
     }
-    eprintln!("error: a shader and its twin disagree on this GPU; jobs are exact all the same, but slow");
+    say("error: a shader and its twin disagree on this GPU; jobs are exact all the same, but slow");
     Ok(ExitCode::from(4))
 }
 

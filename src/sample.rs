@@ -26,8 +26,15 @@ UNIT[\"metre\",1],AUTHORITY[\"EPSG\",\"25832\"]]";
 /// Writes `points` points of the terrain of `seed` to `path`, LAZ if it ends so, else LAS.
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be written.
+/// [`Error::Io`] if the file cannot be written, [`Error::Config`] if its name ends otherwise or there is to be no point.
 pub fn write(path: &Path, points: u64, seed: u64) -> Result<()> {
+    let ending = path.extension().map(|e| e.to_ascii_lowercase());
+    if !ending.is_some_and(|ending| ending == "las" || ending == "laz") {
+        return Err(Error::Config(format!("{}: the name of a sample ends in .las or .laz", path.display())));
+    }
+    if points == 0 {
+        return Err(Error::Config("a sample has at least one point".into()));
+    }
     if let Some(parent) = path.parent().filter(|p| !p.as_os_str().is_empty()) {
         std::fs::create_dir_all(parent).map_err(Error::io("create the directory", parent))?;
     }

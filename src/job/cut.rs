@@ -86,14 +86,15 @@ fn longest([a, b, c]: [[i32; 3]; 3]) -> u64 {
 }
 
 /// How far sites are apart, by place: the bounding box of all sites is laid out with square cells, and in a cell with n
-/// sites the spacing is the square root of the cell's area over n.
+/// sites the spacing is the square root of the cell's area over n. A cell at the rim of a void has few sites because most of it is
+/// void, so each counts as many as the fullest of its neighbours.
 #[derive(Debug)]
 pub struct Spacing {
     corner: [i64; 2],
     /// Lattice steps.
     side: i64,
     columns: usize,
-    /// Sites by cell, row by row.
+    /// Sites by cell, row by row; once all are counted, the most in a cell and the eight around it.
     counts: Vec<u32>,
 }
 
@@ -108,7 +109,29 @@ impl Spacing {
             Ok(())
         })?;
         spacing.counts = counts.into_iter().map(AtomicU32::into_inner).collect();
+        spacing.spread();
         Ok(spacing)
+    }
+
+    /// Gives every cell the count of the fullest of its neighbours and itself: first along rows, then along columns.
+    fn spread(&mut self) {
+        let columns = self.columns;
+        for row in self.counts.chunks_exact_mut(columns) {
+            let mut before = 0;
+            for at in 0..columns {
+                let (here, after) = (row[at], row.get(at + 1).copied().unwrap_or(0));
+                row[at] = here.max(before).max(after);
+                before = here;
+            }
+        }
+        for column in 0..columns {
+            let mut before = 0;
+            for at in (column..self.counts.len()).step_by(columns) {
+                let (here, after) = (self.counts[at], self.counts.get(at + columns).copied().unwrap_or(0));
+                self.counts[at] = here.max(before).max(after);
+                before = here;
+            }
+        }
     }
 
     /// Cells for so many sites within these bounds.
@@ -163,11 +186,16 @@ mod tests {
             let cell = spacing.cell(site);
             spacing.counts[cell] += 1;
         }
+        // The field's own rim: a cell that it hardly reaches counts like the full one beside it.
+        let (full, rim) = (spacing.cell([200, 2_000, 0]), spacing.cell([200, 3_989, 0]));
+        assert!(spacing.counts[rim] < spacing.counts[full] * 9 / 10);
+        spacing.spread();
+        assert!(spacing.counts[rim] >= spacing.counts[full] * 9 / 10);
         let cut = Cut::Wider(spacing);
         let long = |x: i32, length: i32| [[x, 2_000, 0], [x + length, 2_000, 0], [x, 2_010, 0]];
         assert!(!cut.leaves_out(long(200, 90)) && cut.leaves_out(long(200, 120)));
         assert!(!cut.leaves_out(long(3_000, 360)) && cut.leaves_out(long(3_000, 480)));
-        // From the dense part into the sparse one the sparse one counts.
-        assert!(!cut.leaves_out(long(940, 390)));
+        // From the dense part into the sparse one what is usual there stays.
+        assert!(!cut.leaves_out(long(940, 90)));
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::{Error, Result, fault};
 use serde::Serialize;
+use serde_json::Value;
 use std::collections::{BTreeSet, HashSet};
 use std::fs::{self, File, TryLockError};
 use std::io::{Read, Write};
@@ -39,37 +40,80 @@ impl Directory {
     /// Takes the lock, and leaves nothing of an earlier job.
     ///
     /// # Errors
-    /// As [`Directory::lock`] and [`Directory::sweep`].
+    /// As [`Directory::lock`] and [`Directory::sweep_results`].
     pub fn create(&self) -> Result<Lock> {
         let lock = self.lock()?;
         remove_file(&self.journal())?;
-        self.sweep(&HashSet::new())?;
+        self.sweep_job(&HashSet::new())?;
+        self.sweep_results(&HashSet::new())?;
         Ok(lock)
     }
 
-    /// Makes the folder of the tiles, and removes what an earlier run has left, but for the files of `keep`, named as in the
-    /// journal. Removes nothing that a job has not written.
+    /// Removes what an earlier run has left for its steps, but for the files of `keep`, named as in the journal.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a file cannot be removed.
+    pub fn sweep_job(&self, keep: &HashSet<PathBuf>) -> Result<()> {
+        self.remove_all(&[self.spill(), self.store()], keep)
+    }
+
+    /// Makes the folder of the tiles, and removes the results of an earlier run, whole or not, but for the files of `keep`.
     ///
     /// # Errors
     /// [`Error::Io`] if the folder cannot be made or a file cannot be removed.
-    pub fn sweep(&self, keep: &HashSet<PathBuf>) -> Result<()> {
+    pub fn sweep_results(&self, keep: &HashSet<PathBuf>) -> Result<()> {
         create_directory(&self.tiles())?;
-        let mut old = numbered_files(&self.tiles())?;
-        if self.levels().is_dir() {
-            old.extend(numbered_files(&self.levels())?);
-        }
-        if self.cut().is_dir() {
-            old.extend(numbered_files(&self.cut())?);
-        }
-        let single = [self.spill(), self.store(), self.terrain(), self.georeference(), self.report(), self.preview()];
-        let single = single.into_iter().chain([self.tileset()]).collect::<Vec<_>>();
-        old.extend(single.iter().map(|path| partial(path)));
-        old.extend(single);
-        old.iter().filter(|path| !keep.contains(&self.name(path))).try_for_each(|path| remove_file(path))?;
-        // What is somebody else's in it stays, and so do triangles that are kept.
+        let results = self.results()?;
+        let partials: Vec<PathBuf> = results.iter().map(|path| partial(path)).collect();
+        self.remove_all(&results, keep)?;
+        self.remove_all(&partials, keep)?;
+        // What is somebody else's in them stays, and so do triangles that are kept.
         let _ = fs::remove_dir(self.cut());
         let _ = fs::remove_dir(self.levels());
         Ok(())
+    }
+
+    /// Removes the results of a run that has failed for good.
+    ///
+    /// # Errors
+    /// As [`Directory::sweep_results`].
+    pub fn withdraw(&self) -> Result<()> {
+        self.sweep_results(&HashSet::new())?;
+        let _ = fs::remove_dir(self.tiles());
+        Ok(())
+    }
+
+    fn remove_all(&self, paths: &[PathBuf], keep: &HashSet<PathBuf>) -> Result<()> {
+        paths.iter().filter(|path| !keep.contains(&self.name(path))).try_for_each(|path| remove_file(path))
+    }
+
+    /// What has the name of a result, whole or not.
+    fn results(&self) -> Result<Vec<PathBuf>> {
+        let folders = [self.tiles(), self.levels(), self.cut()];
+        let numbered = folders.iter().filter(|folder| folder.is_dir()).map(|folder| numbered_files(folder));
+        let mut results = numbered.collect::<Result<Vec<_>>>()?.concat();
+        results.extend([self.terrain(), self.tileset(), self.georeference(), self.report(), self.preview()]);
+        Ok(results)
+    }
+
+    /// Makes sure that what a job would remove or write over is an earlier job's.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if there are such files and nothing says that a job has written them.
+    pub fn is_not_somebody_elses(&self) -> Result<()> {
+        let report = fs::read(self.report()).ok().and_then(|text| serde_json::from_slice::<Value>(&text).ok());
+        let wrote_it = |report: &Value| report["generator"].as_str().is_some_and(|by| by.starts_with("gdt-batch"));
+        if self.journal().exists() || report.as_ref().is_some_and(wrote_it) {
+            return Ok(());
+        }
+        match self.results()?.into_iter().find(|path| path.exists()) {
+            None => Ok(()),
+            Some(found) => Err(Error::Config(format!(
+                "{} is there, which a job would write over or remove, and nothing says that it is an earlier job's: choose another \
+                 [output] directory, or move it away",
+                found.display()
+            ))),
+        }
     }
 
     /// The job directory itself.

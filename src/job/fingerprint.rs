@@ -33,6 +33,8 @@ pub struct Fingerprint {
     look: Map<String, Value>,
     /// The inputs.
     files: Vec<Identity>,
+    /// Bytes of memory, which decide how many levels there are, and nothing else.
+    pub memory: u64,
 }
 
 /// By what a file is known again.
@@ -78,6 +80,7 @@ impl Fingerprint {
             program: format!("gdt-batch {}, {order}", env!("CARGO_PKG_VERSION")),
             mesh,
             look: options(&config.output, "output", &["directory"])?,
+            memory: config.limits.memory.0,
             files: paths.par_iter().map(|path| Identity::of(path)).collect::<Result<_>>()?,
         })
     }

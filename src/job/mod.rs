@@ -63,6 +63,9 @@ use report::{Parts, Report};
 use scan::Plan;
 use span::Longest;
 use spill::Spill;
+use std::collections::HashSet;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use store::{Key, Store};
 use tree::{Kind, Tree};
@@ -144,6 +147,7 @@ fn attempt(
         check::preflight(&plan, config, threads).passes()?;
     }
     let directory = Directory::new(&config.output.directory);
+    directory.is_not_somebody_elses()?;
     let _lock = directory.lock()?;
     if let Some(report) = resume::complete(&directory, head)?.filter(|_| !options.fresh) {
         progress.note("the interrupted run had written all its results");
@@ -151,7 +155,7 @@ fn attempt(
         return Ok(report);
     }
     on_threads(threads, || {
-        let resume::Start { store, journal, partition } = resume::start(&directory, head, options)?;
+        let resume::Start { store, journal, partition, files } = resume::start(&directory, head, options)?;
         let job = Job {
             config,
             triangulator,
@@ -162,9 +166,11 @@ fn attempt(
             progress,
             threads,
             start,
+            kept: files,
+            publishing: AtomicBool::new(false),
         };
         let outcome = job.run(plan, scanned, partition);
-        let steps = journal.finished();
+        let (steps, publishing) = (journal.finished(), job.publishing.load(Ordering::Relaxed));
         // What is finished is on the disk before the message says so.
         drop(journal);
         match outcome {
@@ -173,7 +179,9 @@ fn attempt(
             }
             outcome => {
                 // The first error is the one to report.
-                let cleaned = directory.clean_up();
+                let failed_late = outcome.is_err() && publishing;
+                let withdrawn = if failed_late { directory.withdraw() } else { Ok(()) };
+                let cleaned = directory.clean_up().and(withdrawn);
                 outcome.and_then(|report| cleaned.map(|()| report))
             }
         }
@@ -215,6 +223,10 @@ struct Job<'a> {
     progress: &'a Schedule,
     threads: usize,
     start: Instant,
+    /// Results of an earlier run that stay.
+    kept: HashSet<PathBuf>,
+    /// Whether results of earlier jobs have made room for this one's.
+    publishing: AtomicBool,
 }
 
 impl Job<'_> {
@@ -242,6 +254,9 @@ impl Job<'_> {
         self.stitch_all(&partition.tree, &look, &stage)?;
         let stitched = stage.finish();
 
+        // Not earlier: what an earlier job has made stays as long as this one may fail for its input.
+        self.publishing.store(true, Ordering::Relaxed);
+        directory.sweep_results(&self.kept)?;
         let stage = progress.stage("write", leaves.sites, "sites");
         let canvas = Canvas::new(&look.frame, bounds);
         let written = self.export_all(&partition, &look, &canvas, &stage)?;

@@ -3,7 +3,7 @@
 use super::scan::Plan;
 use crate::output::frame::Frame;
 use crate::output::globe::{Globe, applied};
-use crate::output::tileset::{Node, corners};
+use crate::output::tileset::{Extent, Node, corners};
 use serde::Serialize;
 
 /// Places along each side at which the distortion is measured, both ends among them, where it is greatest.
@@ -29,9 +29,6 @@ pub struct Placement {
     /// Metres added to heights.
     pub height_offset: f64,
 }
-
-/// A box in the scene: least and greatest metres east, north and up.
-type Extent = [[f64; 3]; 2];
 
 /// The way from the scene to the globe.
 struct Ground<'a> {

@@ -1,6 +1,7 @@
 //! How far a job is: a bar per stage on a terminal, a line now and then in a log, nothing with `--quiet`.
 
 use super::forecast::{Forecast, rough};
+use crate::say;
 use indicatif::{HumanCount, ProgressBar, ProgressState, ProgressStyle};
 use serde::{Deserialize, Serialize};
 use std::io::IsTerminal;
@@ -35,7 +36,7 @@ impl Progress {
     /// Says something between two stages.
     pub fn note(self, text: &str) {
         if self != Progress::Quiet {
-            eprintln!("{text}");
+            say(text);
         }
     }
 
@@ -184,7 +185,7 @@ impl Stage {
         }
         *logged = Instant::now();
         let percent = self.pace.share(&self.pace.done) * 100.0;
-        eprintln!("{name}: {percent:.0} % of {total} {}, {} left of the job", self.unit, rough(self.pace.left()));
+        say(&format!("{name}: {percent:.0} % of {total} {}, {} left of the job", self.unit, rough(self.pace.left())));
     }
 
     /// Ends the stage.
@@ -199,7 +200,7 @@ impl Stage {
             unit: self.unit.into(),
         };
         if self.progress == Progress::Lines {
-            eprintln!("{}: done, {} {} in {:.1} s", figures.stage, figures.done, self.unit, figures.wall_s);
+            say(&format!("{}: done, {} {} in {:.1} s", figures.stage, figures.done, self.unit, figures.wall_s));
         }
         figures
     }

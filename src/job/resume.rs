@@ -26,6 +26,8 @@ pub struct Start<'a> {
     pub journal: Journal<'a>,
     /// What step 2 came to, if that is one of them.
     pub partition: Option<Partition>,
+    /// The files, by name, that finished steps have left and that stay.
+    pub files: HashSet<PathBuf>,
 }
 
 /// How much coarser than at first the lattice of the interrupted job became, if it is the same job.
@@ -68,10 +70,10 @@ pub fn start<'a>(directory: &'a Directory, head: &Head, options: Options) -> Res
     }
     let stored: Vec<Stored> = kept.entries.iter().flat_map(|entry| &entry.stored).copied().collect();
     let journal = Journal::begin(directory, head, kept.entries)?;
-    directory.sweep(&kept.files)?;
+    directory.sweep_job(&kept.files)?;
     let path = directory.store();
     let store = if stored.is_empty() { Store::create(&path)? } else { Store::open(&path, stored.iter())? };
-    Ok(Start { store, journal, partition: kept.partition })
+    Ok(Start { store, journal, partition: kept.partition, files: kept.files })
 }
 
 /// What stays.
@@ -98,6 +100,10 @@ fn kept(directory: &Directory, head: &Head, progress: Progress) -> Result<Option
             progress.note(&format!("changed since the interrupted run: {what}; starting over"));
             return Ok(None);
         }
+    }
+    if head.fingerprint.memory != old.fingerprint.memory {
+        // Coarser tiles for which the memory does not suffice are left out.
+        entries.retain(|entry| !matches!(entry.step, Step::Level(_) | Step::Finish | Step::Report));
     }
     let stage = progress.stage("check", entries.len() as u64, "steps");
     let kept = Review::of(directory, entries, &stage)?.map(Review::kept);
@@ -186,9 +192,7 @@ impl Review {
             Step::Leaf(tile) => self.leaf_stays(tile),
             Step::Node(node) => self.node_stays(node),
             Step::Stitch(tile) => self.stitch_stays(tile),
-            Step::Partition | Step::Export(_) => self.whole.contains(&step),
-            // How they are cut depends on the memory, which may be another now.
-            Step::Level(_) => false,
+            Step::Partition | Step::Export(_) | Step::Level(_) => self.whole.contains(&step),
             Step::Finish | Step::Report => self.exported && self.whole.contains(&step),
         }
     }

@@ -3,8 +3,8 @@
 //!
 //! Both are linear over every triangle, so their difference is linear over every piece that the two sets of edges together cut the
 //! ground into, and greatest at a corner of such a piece: at a vertex of the fine mesh (those of the coarse one are among them), or
-//! where a fine and a coarse edge cross. [`Fans`] finds the crossings by walking along every coarse edge through the fine mesh,
-//! [`Sieve`] finds the fine vertices in every coarse triangle.
+//! where a fine and a coarse edge cross. `Fans` finds the crossings by walking along every coarse edge through the fine mesh,
+//! `Sieve` finds the fine vertices in every coarse triangle.
 
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;

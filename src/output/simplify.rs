@@ -34,7 +34,7 @@ pub struct Simplified {
 /// However many vertices the outline has, there are at least this many for each triangle that is wanted inside.
 const LEAST_INSIDE: f64 = 1.0 / 16.0;
 /// One vertex of so many is looked at for the one that a triangle is furthest off.
-const LOOKED_AT: usize = 5;
+const LOOKED_AT: usize = 8;
 /// The share of the vertices inside that a grid chooses.
 const BY_GRID: f64 = 0.6;
 

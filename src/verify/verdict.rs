@@ -72,6 +72,10 @@ impl Verdict {
             verdict.check_number("triangles left out", verdict.cut, report.cut_triangles);
         }
         verdict.check_number("triangles", verdict.triangles - verdict.cut, report.triangles);
+        if report.sites.is_none() && verdict.unproved.is_none() {
+            verdict.unproved =
+                Some("that no site is missing: there is no report.json that says how many there are".into());
+        }
         verdict
     }
 
