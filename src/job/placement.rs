@@ -3,7 +3,7 @@
 use super::scan::Plan;
 use crate::output::frame::Frame;
 use crate::output::globe::{Globe, applied};
-use crate::output::tileset::{Extent, Node, corners};
+use crate::output::tileset::{Node, corners};
 use serde::Serialize;
 
 /// Places along each side at which the distortion is measured, both ends among them, where it is greatest.
@@ -38,15 +38,8 @@ struct Ground<'a> {
     base: f64,
 }
 
-/// Places `root` and, where need be, each tile below, of a job whose sites have these least and greatest lattice x, y, z; a
-/// sentence where there is no way, and then nothing is placed.
-pub fn place(
-    plan: &Plan,
-    frame: &Frame,
-    bounds: [[i32; 3]; 2],
-    height_offset: f64,
-    root: &mut Node,
-) -> Result<Placement, String> {
+/// Places `root` and, where need be, each tile below; a sentence where there is no way, and then nothing is placed.
+pub fn place(plan: &Plan, frame: &Frame, height_offset: f64, root: &mut Node) -> Result<Placement, String> {
     let definition = plan.crs.definition().ok_or_else(|| match &plan.crs.name {
         Some(name) => format!("{name} has no definition that leads to longitude and latitude"),
         None => "no input names its coordinate system".to_string(),
@@ -54,15 +47,14 @@ pub fn place(
     let extras = frame.extras();
     let globe = Globe::new(&definition, extras.metres_per_unit)?;
     let ground = Ground { frame, globe, base: extras.offset[2] * extras.metres_per_unit_z + height_offset };
-    let whole = corners(frame, bounds);
-    let transform = ground.tangent(whole)?;
-    let mut distortion_m = ground.distortion(&transform, whole)?;
+    let transform = ground.tangent(root.middle)?;
+    let mut distortion_m = ground.distortion(&transform, root.bounds)?;
     let per_tile = distortion_m > ONE_TRANSFORM && !root.children.is_empty();
     if per_tile {
         // Of a copy, since none is placed if one cannot be.
-        let mut children = root.children.clone();
-        distortion_m = ground.lay_all(&mut children)?;
-        root.children = children;
+        let mut placed = root.clone();
+        distortion_m = ground.lay(&mut placed)?;
+        *root = placed;
     }
     root.transform = Some(transform);
     Ok(Placement {
@@ -77,18 +69,23 @@ pub fn place(
 
 impl Ground<'_> {
     /// Gives every tile from `node` down a transform of its own; returns the distortion of the exact ones.
+    ///
+    /// The same place is then elsewhere in a tile than in the exact one below it, by at most the distortion of both, and a viewer
+    /// that shows the coarser tile shows that too: so it counts in the error, as what was lost in height does.
     fn lay(&self, node: &mut Node) -> Result<f64, String> {
-        let extent = corners(self.frame, node.bounds);
-        let transform = self.tangent(extent)?;
+        let transform = self.tangent(node.middle)?;
+        let own = self.distortion(&transform, node.bounds)?;
         node.transform = Some(transform);
         if node.children.is_empty() {
-            return self.distortion(&transform, extent);
+            return Ok(own);
         }
-        self.lay_all(&mut node.children)
-    }
-
-    fn lay_all(&self, nodes: &mut [Node]) -> Result<f64, String> {
-        nodes.iter_mut().try_fold(0.0f64, |most, node| Ok(most.max(self.lay(node)?)))
+        let (mut exact, mut below) = (0.0f64, 0.0f64);
+        for child in &mut node.children {
+            exact = exact.max(self.lay(child)?);
+            below = below.max(child.error);
+        }
+        node.error = below.max(node.error + own + exact);
+        Ok(exact)
     }
 
     /// The source's x and y at a place of the scene.
@@ -97,19 +94,20 @@ impl Ground<'_> {
         [0, 1].map(|k| extras.offset[k] + place[k] / extras.metres_per_unit)
     }
 
-    /// The map from the scene to the globe that is exact to first order in the middle of `extent`, at the height of the scene's origin.
-    fn tangent(&self, [low, high]: Extent) -> Result<[f64; 16], String> {
-        let middle = [0, 1].map(|k| (low[k] + high[k]) / 2.0);
-        let [x, y] = self.source(middle);
-        let mut transform = self.globe.tangent(x, y, self.base)?;
+    /// The map from the scene to the globe that is exact to first order at a lattice place, at the height of the scene's origin.
+    fn tangent(&self, [x, y]: [i32; 2]) -> Result<[f64; 16], String> {
+        let [[east, north, _], _] = corners(self.frame, [[x, y, 0]; 2]);
+        let [source_x, source_y] = self.source([east, north]);
+        let mut transform = self.globe.tangent(source_x, source_y, self.base)?;
         // From the tangent's origin to the scene's.
-        let origin = applied(&transform, [-middle[0], -middle[1], 0.0]);
+        let origin = applied(&transform, [-east, -north, 0.0]);
         transform[12..15].copy_from_slice(&origin);
         Ok(transform)
     }
 
-    /// The greatest distance in metres between where `transform` puts a place of `extent` and where it belongs.
-    fn distortion(&self, transform: &[f64; 16], [low, high]: Extent) -> Result<f64, String> {
+    /// The greatest distance in metres between where `transform` puts a place within `bounds` and where it belongs.
+    fn distortion(&self, transform: &[f64; 16], bounds: [[i32; 3]; 2]) -> Result<f64, String> {
+        let [low, high] = corners(self.frame, bounds);
         let mut greatest = 0.0f64;
         for i in 0..PLACES * PLACES * 2 {
             let share = [i % PLACES, i / PLACES % PLACES].map(|n| n as f64 / (PLACES - 1) as f64);
@@ -136,7 +134,8 @@ pub fn remark(placement: &Result<Placement, String>) -> Option<String> {
     (off > ONE_TRANSFORM).then(|| {
         format!(
             "in tileset.json {flat} lies flat on the tangent plane at its middle, which is up to {off:.1} m off the curved earth; \
-             smaller tiles follow it more closely: lower [triangulation] sites_per_tile"
+             smaller tiles follow it more closely: lower [triangulation] sites_per_tile, and leave long triangles along the hull out \
+             with [output] max_edge"
         )
     })
 }

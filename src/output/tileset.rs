@@ -18,7 +18,9 @@ pub struct Node {
     pub uri: Option<String>,
     /// The least and greatest lattice x, y, z of the exact mesh below.
     pub bounds: [[i32; 3]; 2],
-    /// The greatest vertical distance to the exact mesh, metres.
+    /// The lattice x, y of the place where its transform is to be exact.
+    pub middle: [i32; 2],
+    /// The greatest distance to the exact mesh, metres: along the vertical, and what transforms put elsewhere.
     pub error: f64,
     /// Where it lies on the globe, if it lies there: metres x, y, z of the scene to earth-centred ones, column by column. A tile
     /// without is placed as its parent is.
@@ -28,7 +30,7 @@ pub struct Node {
 }
 
 /// Least and greatest x, y, z, metres.
-pub type Extent = [[f64; 3]; 2];
+type Extent = [[f64; 3]; 2];
 
 /// The content of `tileset.json`, without a line's end.
 pub fn tileset_json(frame: &Frame, root: &Node) -> Value {
@@ -43,8 +45,8 @@ pub fn tileset_json(frame: &Frame, root: &Node) -> Value {
     })
 }
 
-/// The tile below one that `above` places on the globe, and what its bounding volume, which holds those of its children, takes in the
-/// frame of that one.
+/// The tile below one that `above` places on the globe, and what its bounding volume takes in the frame of that one. The volume
+/// holds those of its children.
 fn tile_json(frame: &Frame, node: &Node, above: Option<&[f64; 16]>) -> (Value, Extent) {
     // Without content it is to be refined from everywhere.
     let error = if node.uri.is_some() { node.error } else { diagonal(frame, node).max(node.error) };
@@ -82,7 +84,7 @@ fn around(a: Extent, b: Extent) -> Extent {
 }
 
 /// Metres x, y, z of the tileset at the two corners of `bounds`.
-pub fn corners(frame: &Frame, bounds: [[i32; 3]; 2]) -> Extent {
+pub fn corners(frame: &Frame, bounds: [[i32; 3]; 2]) -> [[f64; 3]; 2] {
     bounds.map(|corner| {
         let [x, up, z] = frame.world(corner);
         [x, 0.0 - z, up]
@@ -114,7 +116,7 @@ mod tests {
         let decimal = |v: f64| shortest_decimal(v).unwrap();
         let lattice = Lattice { offset: [decimal(0.0); 3], resolution: decimal(0.001), resolution_z: decimal(0.001) };
         let frame = Frame::new(&lattice, 1.0, 1.0, None).unwrap();
-        let node = |bounds, children| Node { uri: None, bounds, error: 0.0, transform: None, children };
+        let node = |bounds, children| Node { uri: None, bounds, middle: [0; 2], error: 0.0, transform: None, children };
         let child = node([[0, 0, 5], [3, 4_000, 5]], Vec::new());
         let root = node([[0, 0, 5], [9_000, 9_000, 5]], vec![child]);
         let json = tileset_json(&frame, &root);

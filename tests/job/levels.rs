@@ -1,81 +1,19 @@
 //! Coarser levels and `tileset.json`: the rules of 3D Tiles, borders that fit, errors that are true, and viewers that open it all.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use gdt_batch::output::read::read_tile;
+use gdt_batch::output::globe::relative;
 use serde_json::{Value, json};
 
 use crate::clouds;
 use crate::common::shared;
+use crate::globe::wide;
 use crate::program::{Job, number};
 use crate::random::Random;
+use crate::tileset::{Tile, applied, error, extent, height, keeps_the_rules, tiles, triangles};
 use crate::validator::validate;
-
-/// A tile of the tileset.
-struct Tile {
-    json: Value,
-    /// Places of its parents, nearest first.
-    above: Vec<usize>,
-    /// Places of the leaves at or below it.
-    leaves: Vec<usize>,
-}
-
-/// All tiles, children after their parents.
-fn tiles(job: &Job) -> Vec<Tile> {
-    fn add(found: &mut Vec<Tile>, json: &Value, above: &[usize]) {
-        let own = found.len();
-        found.push(Tile { json: json.clone(), above: above.to_vec(), leaves: Vec::new() });
-        let children = json["children"].as_array();
-        if children.is_none() {
-            found[own].leaves.push(own);
-            above.iter().for_each(|&parent| found[parent].leaves.push(own));
-        }
-        let above: Vec<usize> = [&[own], above].concat();
-        children.into_iter().flatten().for_each(|child| add(found, child, &above));
-    }
-    let json: Value = serde_json::from_slice(&std::fs::read(job.out().join("tileset.json")).unwrap()).unwrap();
-    assert_eq!(json["asset"]["version"], "1.1");
-    assert!(error(&json) >= error(&json["root"]));
-    assert_eq!(json["root"]["refine"], "REPLACE");
-    let mut found = Vec::new();
-    add(&mut found, &json["root"], &[]);
-    found
-}
-
-fn error(tile: &Value) -> f64 {
-    tile["geometricError"].as_f64().unwrap()
-}
-
-/// Least and greatest x, y, z.
-fn extent(tile: &Value) -> [[f64; 3]; 2] {
-    let numbers: Vec<f64> =
-        tile["boundingVolume"]["box"].as_array().unwrap().iter().map(|n| n.as_f64().unwrap()).collect();
-    assert_eq!(numbers.len(), 12);
-    let half = [numbers[3], numbers[7], numbers[11]];
-    assert!(half.iter().all(|&h| h > 0.0) && numbers[3..].iter().filter(|&&n| n != 0.0).count() == 3);
-    [-1.0, 1.0].map(|side| [0, 1, 2].map(|k| numbers[k] + side * half[k]))
-}
-
-/// Whether box `inner` lies in `outer`; sums of a centre and half a side are rounded.
-fn is_within(inner: [[f64; 3]; 2], outer: [[f64; 3]; 2]) -> bool {
-    (0..3).all(|k| inner[0][k] >= outer[0][k] - 1e-6 && inner[1][k] <= outer[1][k] + 1e-6)
-}
-
-/// The triangles of a tile's content, x east, y north, z up in metres from the scene's origin.
-fn triangles(job: &Job, tile: &Tile) -> Vec<[[f64; 3]; 3]> {
-    let path = job.out().join(tile.json["content"]["uri"].as_str().unwrap());
-    let mut found = Vec::new();
-    for part in read_tile(&path).unwrap().parts {
-        let corner = |v: u32| {
-            let [x, up, z] = part.world(v as usize);
-            [x, -z, up]
-        };
-        found.extend(part.triangles.iter().map(|t| t.map(corner)));
-    }
-    found
-}
 
 fn bits(point: [f64; 3]) -> [u64; 3] {
     point.map(|v| (v + 0.0).to_bits())
@@ -93,36 +31,6 @@ fn outline(triangles: &[[[f64; 3]; 3]]) -> BTreeSet<[[u64; 3]; 2]> {
         }
     }
     edges
-}
-
-/// The height over x, y in a triangle, or else nothing.
-fn height(t: &[[f64; 3]; 3], [x, y]: [f64; 2]) -> Option<f64> {
-    let area = |a: [f64; 3], b: [f64; 3]| (a[0] - x) * (b[1] - y) - (b[0] - x) * (a[1] - y);
-    let weights = [area(t[1], t[2]), area(t[2], t[0]), area(t[0], t[1])];
-    let total: f64 = weights.iter().sum();
-    weights.iter().all(|&w| w >= 0.0).then(|| (0..3).map(|i| weights[i] * t[i][2]).sum::<f64>() / total)
-}
-
-/// The rules of 3D Tiles 1.1, and that every GLB is shown by one tile.
-#[track_caller]
-fn keeps_the_rules(job: &Job, tiles: &[Tile]) {
-    let mut shown = BTreeMap::<String, usize>::new();
-    for tile in tiles {
-        let own = extent(&tile.json);
-        if let Some(&parent) = tile.above.first() {
-            assert!(is_within(own, extent(&tiles[parent].json)) && error(&tile.json) <= error(&tiles[parent].json));
-            assert!(tile.json["refine"].is_null());
-        }
-        let Some(uri) = tile.json["content"]["uri"].as_str() else { continue };
-        *shown.entry(uri.to_owned()).or_default() += 1;
-        let points: Vec<[f64; 3]> = triangles(job, tile).into_iter().flatten().collect();
-        assert!(!points.is_empty() && points.iter().all(|&p| is_within([p, p], own)), "{uri}");
-        assert_eq!(uri.starts_with("tiles/"), tile.json["children"].is_null(), "{uri}");
-        assert!(uri.starts_with("levels/") || error(&tile.json) == 0.0, "{uri}");
-    }
-    let files = |folder: &str| std::fs::read_dir(job.out().join(folder)).map_or(0, |entries| entries.count());
-    assert!(shown.values().all(|&count| count == 1));
-    assert_eq!(shown.len(), files("tiles") + files("levels"));
 }
 
 fn hills(count: usize, seed: u64) -> clouds::Cloud {
@@ -163,7 +71,7 @@ fn levels_keep_the_rules_their_borders_and_their_word() {
 }
 
 /// So tiles of any levels that lie side by side meet without a crack.
-fn borders_are_the_exact_ones(job: &Job, tiles: &[Tile]) {
+pub(crate) fn borders_are_the_exact_ones(job: &Job, tiles: &[Tile]) {
     for tile in tiles.iter().filter(|tile| !tile.json["children"].is_null()) {
         let below: Vec<_> = tile.leaves.iter().flat_map(|&leaf| triangles(job, &tiles[leaf])).collect();
         let own = triangles(job, tile);
@@ -172,7 +80,7 @@ fn borders_are_the_exact_ones(job: &Job, tiles: &[Tile]) {
     }
 }
 
-fn errors_are_true(job: &Job, tiles: &[Tile], name: &str) {
+pub(crate) fn errors_are_true(job: &Job, tiles: &[Tile], name: &str) {
     let meshes: Vec<_> = tiles.iter().map(|tile| triangles(job, tile)).collect();
     let mut random = Random(9);
     let (mut looked, mut greatest) = (0, 0.0f64);
@@ -283,14 +191,15 @@ fn seen(job: &Job, chromium: &Path, page: &str, places: &[[f64; 3]]) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// The middles of a dozen triangles of the finest mesh.
+/// The middles of a dozen triangles of the finest mesh, in the frame of the root.
 fn middles(job: &Job, tiles: &[Tile]) -> Vec<[f64; 3]> {
     let mut random = Random(4);
     let middle = |_| {
         let leaf = tiles[0].leaves[random.below(tiles[0].leaves.len() as u64) as usize];
         let mesh = triangles(job, &tiles[leaf]);
         let t = mesh[random.below(mesh.len() as u64) as usize];
-        [0, 1, 2].map(|k| (t[0][k] + t[1][k] + t[2][k]) / 3.0)
+        let middle = [0, 1, 2].map(|k| (t[0][k] + t[1][k] + t[2][k]) / 3.0);
+        applied(&relative(&tiles[0].placed, &tiles[leaf].placed), middle)
     };
     (0..12).map(middle).collect()
 }
@@ -354,14 +263,27 @@ fn stadium() -> Option<Job> {
 fn a_browser_shows_the_tileset_on_the_globe() {
     let (Some(chromium), Some(job)) = (chromium(), stadium()) else { return };
     let report = job.report();
-    let tiles = tiles(&job);
-    let places = middles(&job, &tiles);
-    let seen = seen(&job, &chromium, "cesium", &places);
-    is_exact(&seen["fine"], &report, &places);
-    is_coarsest(&seen["coarse"], &job, &tiles);
+    let seen = seen_on_the_globe(&job, &report, &tiles(&job), &chromium);
     let centre: [f64; 3] = serde_json::from_value(seen["centre"].clone()).unwrap();
     let expected = [-123.0712, 44.0507, 141.2];
     assert!((0..3).all(|k| (centre[k] - expected[k]).abs() < [2e-4, 2e-4, 1.0][k]), "{centre:?}");
+}
+
+#[test]
+fn a_browser_shows_a_wide_area_on_the_globe() {
+    let Some(chromium) = chromium() else { return };
+    let (job, tiles) = wide();
+    let report: Value = serde_json::from_slice(&std::fs::read(job.out().join("report.json")).unwrap()).unwrap();
+    seen_on_the_globe(&job, &report, &tiles, &chromium);
+}
+
+#[track_caller]
+fn seen_on_the_globe(job: &Job, report: &Value, tiles: &[Tile], chromium: &Path) -> Value {
+    let places = middles(job, tiles);
+    let seen = seen(job, chromium, "cesium", &places);
+    is_exact(&seen["fine"], report, &places);
+    is_coarsest(&seen["coarse"], job, tiles);
+    seen
 }
 
 /// Minutes on a software GPU; GDT_TEST_LARGE=1 asks for it.

@@ -11,6 +11,7 @@ mod validator;
 
 mod clouds;
 mod program;
+mod tileset;
 
 mod bad_files;
 mod broken;

@@ -1,5 +1,5 @@
 // The page of cesium.html: shows the tileset coarse and fine where it lies on the globe, and tells the server what is to be seen.
-const { Cartesian3, Cartographic, Cesium3DTileset, CesiumWidget, Color, DirectionalLight, HeadingPitchRange, Math: Angles, Matrix4 } = window.Cesium;
+const { Cartesian3, Cartographic, Cesium3DTileset, CesiumWidget, Color, DirectionalLight, HeadingPitchRange, Math: Angles, Matrix4, Ray } = window.Cesium;
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
 function emptyScene() {
@@ -21,18 +21,15 @@ function lookAt(scene, tileset) {
   scene.light = new DirectionalLight({ direction: Cartesian3.normalize(direction, direction), intensity: 3 });
 }
 
-// The height over x, y, along the plumb line through the place found, in the tileset's own frame.
+// The height over x, y, in the tileset's own frame, straight down. Not by getHeight, which looks towards the centre of the earth: that is
+// 0.2 degrees off the plumb line at these latitudes, and where laser points stand one above the other, on walls and tree trunks, triangles
+// rise 300 m a metre, so that the two sight lines meet the terrain metres apart.
 function heightOver(scene, tileset, [x, y]) {
   const toWorld = tileset.root.computedTransform;
-  const inverse = Matrix4.inverse(toWorld, new Matrix4());
-  let z = 0;
-  for (let nearer = 0; nearer < 3; nearer++) {
-    const place = Cartographic.fromCartesian(Matrix4.multiplyByPoint(toWorld, new Cartesian3(x, y, z), new Cartesian3()));
-    place.height = tileset.getHeight(place, scene);
-    if (place.height === undefined) return null;
-    z = Matrix4.multiplyByPoint(inverse, Cartographic.toCartesian(place), new Cartesian3()).z;
-  }
-  return z;
+  const origin = Matrix4.multiplyByPoint(toWorld, new Cartesian3(x, y, 1e5), new Cartesian3());
+  const down = Matrix4.multiplyByPointAsVector(toWorld, new Cartesian3(0, 0, -1), new Cartesian3());
+  const found = tileset.pick(new Ray(origin, Cartesian3.normalize(down, down)), scene.frameState, new Cartesian3());
+  return found ? Matrix4.multiplyByPoint(Matrix4.inverse(toWorld, new Matrix4()), found, new Cartesian3()).z : null;
 }
 
 // The screen space error in pixels at which CesiumJS shows the root alone: above that of the tileset it would show nothing at all.
