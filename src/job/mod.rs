@@ -314,7 +314,7 @@ impl Job<'_> {
         let (sizes, pyramid) = pyramid(self.config, partition);
         let stage = self.progress.stage("levels", pyramid.inner.len() as u64, "tiles");
         let figures = self.make_levels(&pyramid, sizes, look, &stage)?;
-        let mut root = tileset::root(self.directory, self.store, &partition.tree, &pyramid, look)?;
+        let mut root = tileset::root(self.store, &partition.tree, &pyramid)?;
         let placed = placement::place(plan, &look.frame, self.config.output.height_offset, &mut root);
         let mut warnings = Vec::from_iter(placement::remark(&placed));
         warnings.extend(levels_left_out(self.config, &pyramid));

@@ -1,24 +1,22 @@
 //! `tileset.json` from what the steps before have left.
 
-use super::directory::Directory;
 use super::export::Look;
-use super::levels::bounds_of;
 use super::pyramid::{Child, Pyramid};
 use super::records::{Level, LevelTile};
 use super::store::Store;
 use super::tree::{Cell, Tree};
-use crate::output::read::read_tile;
 use crate::output::tileset::{Node, tileset_json};
 use crate::{Error, Result};
 
 /// The root of the tiles, none of them placed on the globe yet.
 ///
 /// # Errors
-/// [`Error::Io`] on the output or the job directory, [`Error::Broken`] if there is no tile.
-pub fn root(directory: &Directory, store: &Store, tree: &Tree, pyramid: &Pyramid, look: &Look) -> Result<Node> {
+/// [`Error::Io`] on the store, [`Error::Broken`] if there is no tile.
+pub fn root(store: &Store, tree: &Tree, pyramid: &Pyramid) -> Result<Node> {
     let root = match pyramid.inner.len().checked_sub(1) {
         Some(last) => inner_node(store, tree, pyramid, last)?,
-        None => single_node(directory, look)?,
+        // The only tile of a small job.
+        None => node(&LevelTile::load(store, 0)?, &Cell::PLANE, tile_uri(0)),
     };
     root.ok_or_else(|| Error::Broken("there is no tile to list in tileset.json".into()))
 }
@@ -40,7 +38,7 @@ fn inner_node(store: &Store, tree: &Tree, pyramid: &Pyramid, at: usize) -> Resul
             Child::Inner(below) => inner_node(store, tree, pyramid, below)?,
             Child::Leaf(tile) => {
                 let cell = &tree.nodes[tree.leaves[tile]].cell;
-                leaves.next().and_then(|leaf| node(leaf, cell, format!("tiles/{tile:06}.glb")))
+                leaves.next().and_then(|leaf| node(leaf, cell, tile_uri(tile)))
             }
         });
     }
@@ -65,8 +63,6 @@ fn middle(cell: &Cell, bounds: [[i32; 3]; 2]) -> [i32; 2] {
     })
 }
 
-/// The only tile of a small job.
-fn single_node(directory: &Directory, look: &Look) -> Result<Option<Node>> {
-    let bounds = bounds_of(&read_tile(&directory.tile(0))?, look);
-    Ok(node(&LevelTile::new(bounds, true), &Cell::PLANE, "tiles/000000.glb".into()))
+fn tile_uri(tile: usize) -> String {
+    format!("tiles/{tile:06}.glb")
 }

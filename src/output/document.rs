@@ -6,7 +6,7 @@ use bytemuck::{Pod, cast_slice};
 use serde_json::{Value, json};
 
 use super::color::Linear;
-use super::encoding::{Compression, color_bytes, normal_bytes, normal_octahedral};
+use super::encoding::{Compression, EXPONENTIAL_REACH, color_bytes, exponential, normal_bytes, normal_octahedral};
 use super::frame::Frame;
 use super::order::rings;
 use super::parts::Part;
@@ -101,6 +101,13 @@ impl<'a> Document<'a> {
         let steps = |p| self.frame.local_steps(p, part.origin);
         let bounds = json!({"min": steps(low).map(|v| v as f32), "max": steps(high).map(|v| v as f32)});
         if !part.short {
+            let is_near = [low, high].map(steps).as_flattened().iter().all(|v| v.abs() < EXPONENTIAL_REACH);
+            if self.compression == Compression::Meshopt && is_near {
+                let values = picked(positions, order, |p| steps(p).map(exponential));
+                let accessor = self.add_attribute(&values, FLOAT, "VEC3", bounds)?;
+                self.set_filter("EXPONENTIAL");
+                return Ok(accessor);
+            }
             let values = picked(positions, order, |p| steps(p).map(|v| v as f32));
             return self.add_attribute(&values, FLOAT, "VEC3", bounds);
         }
@@ -124,10 +131,15 @@ impl<'a> Document<'a> {
         }
         let values = picked(normals, order, |normal| normal_octahedral(up(normal), anisotropy));
         let accessor = self.add_attribute(&values, SIGNED_BYTE, "VEC3", normalized)?;
-        if let Some(view) = self.views.last_mut() {
-            view["extensions"][MESHOPT]["filter"] = "OCTAHEDRAL".into();
-        }
+        self.set_filter("OCTAHEDRAL");
         Ok(accessor)
+    }
+
+    /// Says how readers go on once they have unpacked the view that was added last.
+    fn set_filter(&mut self, name: &str) {
+        if let Some(view) = self.views.last_mut() {
+            view["extensions"][MESHOPT]["filter"] = name.into();
+        }
     }
 
     fn add_colors(&mut self, colors: &[Linear], order: &[u32]) -> Result<usize> {

@@ -5,7 +5,7 @@
 pub enum Compression {
     /// Quantized, then packed by the codecs of `EXT_meshopt_compression`.
     Meshopt,
-    /// Positions in 16 bits, normals and colours in 8 (`KHR_mesh_quantization`).
+    /// Positions in 16 bits where a tile allows it, else in single precision, normals and colours in 8 (`KHR_mesh_quantization`).
     Quantized,
     /// Plain glTF: positions and normals in single precision, colours in 16 bits.
     None,
@@ -48,6 +48,22 @@ pub(super) fn from_octahedral([u, v, one, padding]: [i8; 4]) -> [i8; 4] {
     [byte(x), byte(y), byte(z), padding]
 }
 
+/// Whole numbers of less magnitude than this have an encoding by [`exponential`].
+pub(super) const EXPONENTIAL_REACH: f64 = (1 << 23) as f64;
+
+/// Mantissa (24 bits, signed) and exponent (8 bits, here 0) of a whole number, as the exponential filter of
+/// `EXT_meshopt_compression` has them: neighbours differ in low bits only, unlike those of f32.
+pub(super) fn exponential(steps: f64) -> u32 {
+    steps as i32 as u32 & 0x00ff_ffff
+}
+
+/// The number that [`exponential`] stands for, whatever its exponent.
+pub(super) fn from_exponential(bits: u32) -> f32 {
+    let mantissa = (bits as i32) << 8 >> 8;
+    let exponent = bits as i32 >> 24;
+    (f64::from(mantissa) * f64::from(exponent).exp2()) as f32
+}
+
 /// A linear colour in bytes, opaque.
 pub(super) fn color_bytes([r, g, b]: [u16; 3]) -> [u8; 4] {
     let byte = |v: u16| ((v as u32 * 255 + 32767) / 65535) as u8;
@@ -83,6 +99,20 @@ mod tests {
             assert!(worst(&|n| error(n, normal_bytes(n, anisotropy), anisotropy)) < 2.0);
             assert!(worst(&|n| error(n, from_octahedral(normal_octahedral(n, anisotropy)), anisotropy)) < 5.0);
         }
+    }
+
+    #[test]
+    fn whole_numbers_pass_the_exponential_filter() {
+        let numbers = [0.0, 1.0, -1.0, 65536.0, -77_777.0, EXPONENTIAL_REACH - 1.0, 1.0 - EXPONENTIAL_REACH];
+        for number in numbers {
+            let packed = exponential(number);
+            let mut theirs = [[packed]];
+            meshopt::decode_filter_exp(&mut theirs);
+            assert_eq!(f64::from(f32::from_bits(theirs[0][0])), number);
+            assert_eq!(f64::from(from_exponential(packed)), number);
+        }
+        assert_eq!(from_exponential(0xff00_0003), 1.5);
+        assert_eq!(from_exponential(0x0200_0003), 12.0);
     }
 
     #[test]

@@ -248,9 +248,6 @@ pub(super) fn short_origin(low: [f64; 3], high: [f64; 3]) -> Option<[f64; 3]> {
     (0..3).all(|k| high[k] - origin[k] <= SHORT_REACH).then_some(origin)
 }
 
-/// The extent in steps that always has a [`short_origin`].
-pub(super) const SHORT_EXTENT: f64 = SHORT_REACH - SHORT_GRID + 1.0;
-
 /// The finest grid for [`origin_between`].
 pub(super) const FINE_GRID: i64 = TRANSLATION_STEPS;
 

@@ -4,7 +4,7 @@ use bytemuck::allocation::pod_collect_to_vec;
 use bytemuck::cast_slice_mut;
 use serde::Deserialize;
 
-use super::encoding::from_octahedral;
+use super::encoding::{from_exponential, from_octahedral};
 
 /// Bytes of a tile in memory for every byte of its file, at most: the codec of vertices makes up to 64 of one, and 2-byte
 /// positions become 4-byte ones.
@@ -39,6 +39,7 @@ enum Mode {
 #[serde(rename_all = "UPPERCASE")]
 enum Filter {
     Octahedral,
+    Exponential,
 }
 
 impl Packed {
@@ -77,6 +78,11 @@ impl Packed {
                 let normals = cast_slice_mut::<u8, [i8; 4]>(&mut unpacked);
                 normals.iter_mut().for_each(|normal| *normal = from_octahedral(*normal));
             }
+            (Some(Filter::Exponential), stride) if stride % 4 == 0 => {
+                let numbers = cast_slice_mut::<u8, [u8; 4]>(&mut unpacked);
+                numbers.iter_mut().for_each(|v| *v = from_exponential(u32::from_le_bytes(*v)).to_le_bytes());
+            }
+            (Some(Filter::Exponential), stride) => return Err(format!("packed numbers of {stride} bytes")),
             (Some(Filter::Octahedral), stride) => return Err(format!("packed normals of {stride} bytes")),
         }
         Ok(unpacked)

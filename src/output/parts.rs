@@ -1,20 +1,16 @@
-//! Tiles wider than 16 bits, or f32, can hold on the job's step are cut into parts, each with its own translation.
+//! Tiles wider than f32 can hold on the job's step are cut into parts, each with its own translation.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use super::Tile;
-use super::frame::{FINE_GRID, Frame, PART_REACH, SHORT_EXTENT, origin_between, short_origin};
+use super::frame::{FINE_GRID, Frame, PART_REACH, origin_between, short_origin};
 use crate::geometry::lattice::shortest_decimal;
 use crate::{Error, Result};
 use rust_decimal::Decimal;
 
 /// Triangles up to half the reach are grouped by origins this far apart, in steps: half a cell and half a triangle fit.
 const COARSE_GRID: i64 = 1 << 24;
-
-/// 16-bit parts of a tile that are more than [`FEW_PARTS`] have at least so many triangles on average.
-const LEAST_TRIANGLES: usize = 2_000;
-const FEW_PARTS: usize = 4;
 
 /// What one node and mesh of a tile hold.
 pub(super) struct Part<'a> {
@@ -53,51 +49,14 @@ fn split_triangles(frame: &Frame, tile: &Tile, triangles: &[[u32; 3]]) -> Result
     Ok(groups.into_iter().map(part).collect())
 }
 
-/// The parts of `tile`, most of them within reach of 16 bits: triangles that are longer are left to f32, and so is the
-/// whole tile where it would take very many parts. Fails where a single triangle is too long for that too.
+/// [`split`], but one part with 16-bit positions where they reach all of `tile`.
 pub(super) fn split_short<'a>(frame: &Frame, tile: &'a Tile) -> Result<Vec<Part<'a>>> {
     let Some(bounds) = tile.bounds() else { return Ok(Vec::new()) };
     let [low, high] = extent(frame, &bounds);
-    if let Some(origin) = short_origin(low, high) {
-        return Ok(vec![Part { origin, short: true, tile: Cow::Borrowed(tile) }]);
+    match short_origin(low, high) {
+        Some(origin) => Ok(vec![Part { origin, short: true, tile: Cow::Borrowed(tile) }]),
+        None => split(frame, tile),
     }
-    let steps: Vec<[f64; 3]> = tile.positions.iter().map(|&p| frame.steps(p)).collect();
-    let fits = |triangle: &[u32; 3]| {
-        let [low, high] = extent_of(&steps, triangle);
-        (0..3).all(|k| high[k] - low[k] <= SHORT_EXTENT)
-    };
-    let (near, far): (Vec<_>, Vec<_>) = tile.triangles.iter().partition(|triangle| fits(triangle));
-    let mut parts = Vec::new();
-    halve(&steps, tile, near, &mut parts);
-    if parts.len() > FEW_PARTS && tile.triangles.len() < LEAST_TRIANGLES * parts.len() {
-        return split(frame, tile);
-    }
-    parts.extend(split_triangles(frame, tile, &far)?);
-    Ok(parts)
-}
-
-/// Cuts `triangles`, none of them longer than 16 bits reach, in two until every piece is within reach.
-/// `steps` are the glTF coordinates of all vertices.
-fn halve(steps: &[[f64; 3]], tile: &Tile, triangles: Vec<[u32; 3]>, parts: &mut Vec<Part>) {
-    if triangles.is_empty() {
-        return;
-    }
-    let [low, high] = extent_of(steps, triangles.as_flattened());
-    if let Some(origin) = short_origin(low, high) {
-        return parts.push(Part { origin, short: true, tile: Cow::Owned(tile.subset(triangles)) });
-    }
-    let size = |&k: &usize| high[k] - low[k];
-    let axis = (0..3).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0);
-    // Twice the middle; no two pieces are empty, for the middles differ where no single triangle is as long as all.
-    let middle = |triangle: &[u32; 3]| {
-        let [a, b, c] = triangle.map(|v| steps[v as usize][axis]);
-        a.min(b).min(c) + a.max(b).max(c)
-    };
-    let ends = triangles.iter().map(middle).fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], m| [a.min(m), b.max(m)]);
-    let cut = (ends[0] + ends[1]) / 2.0;
-    let (first, second) = triangles.into_iter().partition(|triangle| middle(triangle) <= cut);
-    halve(steps, tile, first, parts);
-    halve(steps, tile, second, parts);
 }
 
 /// The origin on `grid` next to the middle of `points`, if all of them are within reach of it.
@@ -108,20 +67,12 @@ fn common_origin(frame: &Frame, points: &[[i32; 3]], grid: i64) -> Option<[f64; 
     (0..3).all(|k| high[k] - origin[k] <= reach && origin[k] - low[k] <= reach).then_some(origin)
 }
 
-/// The least and greatest glTF coordinates of these vertices, of those in `steps`.
-fn extent_of(steps: &[[f64; 3]], vertices: &[u32]) -> [[f64; 3]; 2] {
-    let none = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    vertices.iter().map(|&v| steps[v as usize]).fold(none, wider)
-}
-
-fn wider([low, high]: [[f64; 3]; 2], point: [f64; 3]) -> [[f64; 3]; 2] {
-    [[0, 1, 2].map(|k| low[k].min(point[k])), [0, 1, 2].map(|k| high[k].max(point[k]))]
-}
-
 /// The least and greatest glTF coordinates of `points` in steps.
 fn extent(frame: &Frame, points: &[[i32; 3]]) -> [[f64; 3]; 2] {
     let none = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    points.iter().map(|&p| frame.steps(p)).fold(none, wider)
+    points.iter().map(|&p| frame.steps(p)).fold(none, |[low, high], point| {
+        [[0, 1, 2].map(|k| low[k].min(point[k])), [0, 1, 2].map(|k| high[k].max(point[k]))]
+    })
 }
 
 fn too_long(frame: &Frame, corners: [[i32; 3]; 3]) -> Error {

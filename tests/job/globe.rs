@@ -83,12 +83,12 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
 }
 
-/// A job on these points, and its tiles, which keep the rules.
+/// A job on these points, and its tiles, which are packed with meshopt and keep the rules.
 fn job(points: &[[i32; 3]]) -> (Job, Vec<Tile>) {
     let folder = tempfile::tempdir().unwrap();
     let cloud = folder.path().join("cloud.las");
     std::fs::write(&cloud, utm(points)).unwrap();
-    let job = Job::on(&[&cloud]).tiles_of(500).with("output", "level_sites = 500");
+    let job = Job::on(&[&cloud]).tiles_of(500).with("output", "level_sites = 500\nformat = \"tiles\"");
     job.report();
     job.verified();
     let tiles = tiles(&job);

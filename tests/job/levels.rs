@@ -247,7 +247,8 @@ fn a_browser_shows_the_tileset_and_the_file() {
     let Some(chromium) = chromium() else { return };
     let folder = tempfile::tempdir().unwrap();
     let cloud = clouds::write(folder.path(), "cloud.csv", &hills(20_000, 3));
-    shows(&Job::on(&[cloud]).tiles_of(2_000).with("output", "level_sites = 2000"), &chromium);
+    let packed = "level_sites = 2000\ncompression = \"meshopt\"";
+    shows(&Job::on(&[cloud]).tiles_of(2_000).with("output", packed), &chromium);
     if let Some(job) = stadium() {
         shows(&job, &chromium);
     }

@@ -103,22 +103,35 @@ fn packing_is_worth_it() {
 }
 
 #[test]
-fn tiles_wider_than_16_bits_are_cut_into_parts() {
+fn tiles_wider_than_16_bits_are_in_single_precision() {
     let frame = Frame::new(&lattice([0.0; 3], 0.001, 0.001), 1.0, 1.0, None).unwrap();
-    let count = |points: &[[i32; 3]]| {
+    let is_short = |points: &[[i32; 3]]| {
         let tile = terrain(&frame, points);
         let files = COMPRESSIONS.map(|compression| there_and_back_as(compression, &frame, &tile));
         assert!(files.iter().all(|file| triangles(file) == meant(&tile)));
-        files[2].parts.iter().map(|part| part.positions.iter().flatten().all(|v| *v <= 65535.0)).collect::<Vec<_>>()
+        assert!(files.iter().all(|file| file.parts.len() == 1));
+        files[2].parts[0].positions.as_flattened().iter().all(|v| (0.0..=65535.0).contains(v))
     };
-    // 64 m are the reach: 60 m, 120 m, and 60 m with one point 200 m away.
-    assert_eq!(count(&grid(61, 61, 1_000)), [true]);
-    assert_eq!(count(&grid(61, 61, 2_000)), [true; 4]);
+    // 64 m are the reach: 60 m, 120 m, 1200 m, and 60 m with one point 200 m away.
+    assert!(is_short(&grid(61, 61, 1_000)));
+    assert!(!is_short(&grid(61, 61, 2_000)));
+    assert!(!is_short(&grid(61, 61, 20_000)));
     let mut far = grid(61, 61, 1_000);
     far.push([200_000, 30_000, 0]);
-    assert_eq!(count(&far), [true, false]);
-    // Very many parts are not worth it.
-    assert!(count(&grid(61, 61, 20_000)).iter().all(|short| !short));
+    assert!(!is_short(&far));
+}
+
+#[test]
+fn packing_is_worth_it_for_wide_tiles_too() {
+    let frame = framed(&Frame::new(&lattice([0.0; 3], 0.001, 0.001), 1.0, 1.0, None).unwrap(), Compression::Meshopt);
+    let size = |points: &[[i32; 3]]| {
+        let tile = terrain(&frame, points);
+        let mut bytes = Vec::new();
+        encode_tile(&frame, &tile, Compression::Meshopt, &mut bytes).unwrap();
+        bytes.len() as f64 / tile.positions.len() as f64
+    };
+    let (narrow, wide) = (size(&cloud(5, 4_000, 60_000)), size(&cloud(5, 4_000, 480_000)));
+    assert!(wide < narrow + 3.0, "{narrow} and {wide} bytes a vertex");
 }
 
 #[test]
