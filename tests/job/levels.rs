@@ -1,19 +1,15 @@
-//! Coarser levels and `tileset.json`: the rules of 3D Tiles, borders that fit, errors that are true, and viewers that open it all.
+//! Coarser levels and `tileset.json`: the rules of 3D Tiles, borders that fit, errors that are true.
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::Path;
 
-use gdt_batch::output::globe::relative;
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use crate::clouds;
 use crate::common::shared;
-use crate::globe::wide;
 use crate::program::{Job, number};
 use crate::random::Random;
-use crate::tileset::{Tile, applied, error, extent, height, keeps_the_rules, tiles, triangles};
-use crate::validator::validate;
+use crate::tileset::{Tile, error, height, keeps_the_rules, tiles, triangles};
 
 fn bits(point: [f64; 3]) -> [u64; 3] {
     point.map(|v| (v + 0.0).to_bits())
@@ -33,7 +29,7 @@ fn outline(triangles: &[[[f64; 3]; 3]]) -> BTreeSet<[[u64; 3]; 2]> {
     edges
 }
 
-fn hills(count: usize, seed: u64) -> clouds::Cloud {
+pub(crate) fn hills(count: usize, seed: u64) -> clouds::Cloud {
     let mut random = Random(seed);
     let mut height = |x: f64, y: f64| {
         let hills = (x / 900.0).sin() * 300.0 + (y / 700.0).cos() * 250.0 + (x * y / 4e6).sin() * 80.0;
@@ -159,141 +155,4 @@ fn a_coordinate_system_places_the_tileset_on_the_globe() {
             serde_json::from_slice(&std::fs::read(job.out().join("georeference.json")).unwrap()).unwrap();
         assert!(georeference["globe"]["distortion_m"].as_f64().unwrap() < 0.2, "{name}");
     }
-}
-
-/// Chromium, if it is there; under tests/run it has to be.
-fn chromium() -> Option<PathBuf> {
-    let npm = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/npm/node_modules");
-    let is_there = ["three", "3d-tiles-renderer", "cesium"].iter().all(|package| npm.join(package).is_dir());
-    let found = ["/usr/bin/chromium", "/usr/bin/chromium-browser"].map(PathBuf::from).into_iter().find(|p| p.exists());
-    if found.is_none() || !is_there {
-        assert!(std::env::var_os("GDT_TEST_ALL").is_none(), "no Chromium, or no three.js or CesiumJS in tests/npm");
-        eprintln!("not tested: no Chromium, or no three.js or CesiumJS; run `npm ci` in tests/npm, or tests/run");
-        return None;
-    }
-    found
-}
-
-/// What a page of tests/npm shows of the job in the browser, heights at `places` included.
-#[track_caller]
-fn seen(job: &Job, chromium: &Path, page: &str, places: &[[f64; 3]]) -> Value {
-    let places: Vec<[f64; 2]> = places.iter().map(|p| [p[0], p[1]]).collect();
-    let request = job.folder().join("request.json");
-    std::fs::write(&request, json!({"places": places}).to_string()).unwrap();
-    let screenshot = job.folder().join("screenshot.png");
-    let view = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/npm/view.mjs");
-    let output =
-        Command::new("node").arg(view).arg(job.out()).arg(chromium).arg(&screenshot).arg(page).arg(request).output();
-    let output = output.expect("node runs");
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    assert!(output.status.success(), "{}{}", text(&output.stdout), text(&output.stderr));
-    assert!(std::fs::metadata(&screenshot).unwrap().len() > 10_000, "an empty picture");
-    serde_json::from_slice(&output.stdout).unwrap()
-}
-
-/// The middles of a dozen triangles of the finest mesh, in the frame of the root.
-fn middles(job: &Job, tiles: &[Tile]) -> Vec<[f64; 3]> {
-    let mut random = Random(4);
-    let middle = |_| {
-        let leaf = tiles[0].leaves[random.below(tiles[0].leaves.len() as u64) as usize];
-        let mesh = triangles(job, &tiles[leaf]);
-        let t = mesh[random.below(mesh.len() as u64) as usize];
-        let middle = [0, 1, 2].map(|k| (t[0][k] + t[1][k] + t[2][k]) / 3.0);
-        applied(&relative(&tiles[0].placed, &tiles[leaf].placed), middle)
-    };
-    (0..12).map(middle).collect()
-}
-
-/// The finest mesh, whole and at its heights.
-#[track_caller]
-fn is_exact(view: &Value, report: &Value, expected: &[[f64; 3]]) {
-    assert_eq!(view["triangles"], report["triangles"]);
-    let heights = view["heights"].as_array().unwrap();
-    assert_eq!(heights.len(), expected.len());
-    for (height, place) in heights.iter().zip(expected) {
-        let height = height.as_f64().unwrap_or_else(|| panic!("nothing at {place:?}"));
-        assert!((height - place[2]).abs() < 0.02, "{height} at {place:?}");
-    }
-}
-
-/// The root's content alone.
-#[track_caller]
-fn is_coarsest(view: &Value, job: &Job, tiles: &[Tile]) {
-    assert_eq!(number(&view["triangles"]), triangles(job, &tiles[0]).len() as u64);
-    assert_eq!(number(&view["meshes"]), 1);
-}
-
-#[track_caller]
-fn shows(job: &Job, chromium: &Path) {
-    let report = job.report();
-    let tiles = tiles(job);
-    keeps_the_rules(job, &tiles);
-    validate(&job.out(), tiles.len());
-    let places = middles(job, &tiles);
-    let seen = seen(job, chromium, "view", &places);
-    is_exact(&seen["fine"], &report, &places);
-    is_coarsest(&seen["coarse"], job, &tiles);
-    assert_eq!(seen["file"].is_null(), !job.out().join("terrain.glb").exists());
-    if !seen["file"].is_null() {
-        is_exact(&seen["file"], &report, &places);
-    }
-    let all = extent(&tiles[0].json);
-    let found: Vec<Vec<f64>> = serde_json::from_value(seen["fine"]["box"].clone()).unwrap();
-    assert!((0..3).all(|k| (0..2).all(|side| (found[side][k] - all[side][k]).abs() < 0.02)), "{found:?} {all:?}");
-}
-
-#[test]
-fn a_browser_shows_the_tileset_and_the_file() {
-    let Some(chromium) = chromium() else { return };
-    let folder = tempfile::tempdir().unwrap();
-    let cloud = clouds::write(folder.path(), "cloud.csv", &hills(20_000, 3));
-    let packed = "level_sites = 2000\ncompression = \"meshopt\"";
-    shows(&Job::on(&[cloud]).tiles_of(2_000).with("output", packed), &chromium);
-    if let Some(job) = stadium() {
-        shows(&job, &chromium);
-    }
-}
-
-/// A real cloud with a coordinate system, in a handful of tiles.
-fn stadium() -> Option<Job> {
-    let cloud = shared()?.join("data/autzen_trim.las");
-    Some(Job::on(&[cloud]).tiles_of(6_000).with("output", "level_sites = 6000"))
-}
-
-#[test]
-fn a_browser_shows_the_tileset_on_the_globe() {
-    let (Some(chromium), Some(job)) = (chromium(), stadium()) else { return };
-    let report = job.report();
-    let seen = seen_on_the_globe(&job, &report, &tiles(&job), &chromium);
-    let centre: [f64; 3] = serde_json::from_value(seen["centre"].clone()).unwrap();
-    let expected = [-123.0712, 44.0507, 141.2];
-    assert!((0..3).all(|k| (centre[k] - expected[k]).abs() < [2e-4, 2e-4, 1.0][k]), "{centre:?}");
-}
-
-#[test]
-fn a_browser_shows_a_wide_area_on_the_globe() {
-    let Some(chromium) = chromium() else { return };
-    let (job, tiles) = wide();
-    let report: Value = serde_json::from_slice(&std::fs::read(job.out().join("report.json")).unwrap()).unwrap();
-    seen_on_the_globe(&job, &report, &tiles, &chromium);
-}
-
-#[track_caller]
-fn seen_on_the_globe(job: &Job, report: &Value, tiles: &[Tile], chromium: &Path) -> Value {
-    let places = middles(job, tiles);
-    let seen = seen(job, chromium, "cesium", &places);
-    is_exact(&seen["fine"], report, &places);
-    is_coarsest(&seen["coarse"], job, tiles);
-    seen
-}
-
-/// Minutes on a software GPU; GDT_TEST_LARGE=1 asks for it.
-#[test]
-fn a_browser_shows_the_large_file() {
-    let (Some(chromium), Some(data)) = (chromium(), shared()) else { return };
-    if std::env::var_os("GDT_TEST_LARGE").is_none() {
-        eprintln!("not tested: autzen.laz in a browser; set GDT_TEST_LARGE=1");
-        return;
-    }
-    shows(&Job::on(&[data.join("data/autzen.laz")]).with("output", "format = \"tiles\""), &chromium);
 }

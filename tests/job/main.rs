@@ -27,4 +27,5 @@ mod preflight;
 mod real;
 mod same_mesh;
 mod steps;
+mod viewers;
 mod written;
