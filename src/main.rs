@@ -9,7 +9,7 @@ use gdt_batch::say;
 use gdt_batch::{Error, Result, input, interrupt, sample, verify};
 use serde::Serialize;
 use std::fmt::Display;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -100,6 +100,11 @@ fn test_gpu(adapter: Option<&str>, side: Option<u32>, talk: Talk) -> Result<Exit
 }
 
 fn info(files: &[PathBuf], talk: Talk) -> Result<()> {
+    if let Some(missing) =
+        files.iter().find(|file| file.symlink_metadata().is_err_and(|e| e.kind() == ErrorKind::NotFound))
+    {
+        return Err(Error::Config(format!("there is no file {}: name the point clouds to look at", missing.display())));
+    }
     for file in files {
         let source = input::open(file, &input::TextOptions::default())?;
         show(&input::info::describe(&source), talk)?;

@@ -21,12 +21,13 @@ pub(super) struct Positioned {
 impl Positioned {
     /// Opens `path`, which must be a regular file.
     pub(super) fn open(path: &Path) -> Result<Positioned> {
-        let file = File::open(path).map_err(Error::io("read", path))?;
-        let meta = file.metadata().map_err(Error::io("read", path))?;
-        if !meta.is_file() {
+        // Before it is opened: a pipe would wait for somebody who writes.
+        if !path.metadata().map_err(Error::io("read", path))?.is_file() {
             return Err(Error::input(path, "is not a regular file; give the point-cloud files themselves"));
         }
-        Ok(Positioned { file, path: path.to_path_buf(), size: meta.len() })
+        let file = File::open(path).map_err(Error::io("read", path))?;
+        let size = file.metadata().map_err(Error::io("read", path))?.len();
+        Ok(Positioned { file, path: path.to_path_buf(), size })
     }
 
     /// Opens `path` again; an error where its size is no longer `size`.

@@ -1,6 +1,7 @@
 //! Preflight: what a job would read and need, without writing anything.
 
 use super::choose::Coarser;
+use super::directory::Directory;
 use super::partition::Skipped;
 use super::pyramid::{BYTES_PER_LEVEL_SITE, Sizes};
 use super::report::{grouped, write_skipped};
@@ -83,6 +84,7 @@ pub struct Preflight {
 /// # Errors
 /// Whatever would stop the job before its first point; see [`scan::run`].
 pub fn run(config: &Config) -> Result<Preflight> {
+    Directory::new(&config.output.directory).nothing_is_in_the_way()?;
     let plan = scan::run(config, Coarser::default())?;
     let threads = workers(config, plan.records)?;
     Ok(preflight(&plan, config, threads))

@@ -1,5 +1,5 @@
-//! The thread that brings records and results to the disk while others work: records of a second or so together, since what
-//! costs is to wait for the disk.
+//! The thread that brings records and results to the disk while others work: all of some time together, since what costs is to
+//! wait for the disk.
 
 use super::directory::publish;
 use crate::{Error, Result, fault};
@@ -10,8 +10,9 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Between two commits: what a kill costs at the most, beside the steps that are under way.
-const INTERVAL: Duration = Duration::from_secs(1);
+/// Between two commits: what a kill costs at the most, beside the steps that are under way. Short, so that at the end of a stage
+/// little is left to wait for.
+const INTERVAL: Duration = Duration::from_millis(100);
 /// From then on a job waits for the disk before it gives up what it could be repeated from.
 const WORTH_SYNCING: Duration = Duration::from_secs(60);
 

@@ -28,9 +28,6 @@ impl Directory {
     /// [`Error::Io`] if it cannot be made, [`Error::InUse`] if another process has it, [`Error::Config`] if it is somebody
     /// else's.
     pub fn lock(&self) -> Result<Lock> {
-        if self.output.exists() && !self.output.is_dir() {
-            return Err(Error::Config(format!("[output] directory: {} is a file", self.output.display())));
-        }
         // A kill can leave an empty one.
         let is_new = fs::read_dir(&self.job).map_or(true, |mut entries| entries.next().is_none());
         create_directory(&self.job)?;
@@ -96,6 +93,29 @@ impl Directory {
         Ok(results)
     }
 
+    /// Makes sure that there is no file, nor a link that leads nowhere, where a job needs a folder, and no folder where it writes a
+    /// file.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if something is in the way.
+    pub fn nothing_is_in_the_way(&self) -> Result<()> {
+        let folders = [self.job.clone(), self.tiles(), self.levels(), self.cut()];
+        let mut folders = self.output.ancestors().chain(folders.iter().map(PathBuf::as_path));
+        let is_in_the_way = |path: &&Path| path.symlink_metadata().is_ok() && !path.is_dir();
+        let (found, what, wanted) = if let Some(found) = folders.find(is_in_the_way) {
+            let what = if found.exists() { "is not a directory" } else { "is a link that leads nowhere" };
+            (found.to_path_buf(), what, "a directory")
+        } else if let Some(found) = self.results()?.into_iter().find(|path| path.is_dir()) {
+            (found, "is a directory", "a file")
+        } else {
+            return Ok(());
+        };
+        Err(Error::Config(format!(
+            "{} {what}, and the job needs {wanted} there: move it away, or choose another [output] directory",
+            found.display()
+        )))
+    }
+
     /// Makes sure that what a job would remove or write over is an earlier job's.
     ///
     /// # Errors
@@ -106,7 +126,7 @@ impl Directory {
         if self.journal().exists() || report.as_ref().is_some_and(wrote_it) {
             return Ok(());
         }
-        match self.results()?.into_iter().find(|path| path.exists()) {
+        match self.results()?.into_iter().find(|path| path.symlink_metadata().is_ok()) {
             None => Ok(()),
             Some(found) => Err(Error::Config(format!(
                 "{} is there, which a job would write over or remove, and nothing says that it is an earlier job's: choose another \

@@ -5,7 +5,7 @@ use super::columns::ColumnWriter;
 use super::cut::Cut;
 use super::directory::{Directory, Written, write_result};
 use super::journal::Done;
-use super::records::{Leaf, Rim, RimVertices, SeamTriangle};
+use super::records::{Leaf, LevelTile, Rim, RimVertices, SeamTriangle};
 use super::stitch::seam_of;
 use super::store::{Key, Store};
 use super::tree::Tree;
@@ -61,7 +61,8 @@ impl AddAssign for TileFigures {
     }
 }
 
-/// Writes the GLB of `tile`, and one of its triangles that are left out, and leaves its part of the preview in the store.
+/// Writes the GLB of `tile`, and one of its triangles that are left out, and leaves its part of the preview
+/// and its line of `tileset.json` in the store.
 ///
 /// # Errors
 /// [`Error::Io`] on the output or the store, [`Error::Config`] if a triangle is too long for f32.
@@ -87,6 +88,7 @@ pub fn run(
         ..TileFigures::default()
     };
     let pixels = ColumnWriter::default().push(&canvas.draw(&content)).write(store, Key::Pixels(tile))?;
+    let known = LevelTile::new(content.bounds(), !content.triangles.is_empty()).save(store, tile)?;
     let mut results = Vec::new();
     if !content.triangles.is_empty() {
         results.push(write_tile(&directory.tile(tile), &content, look)?);
@@ -97,7 +99,7 @@ pub fn run(
         results.push(write_tile(&directory.cut_tile(tile), &left_out, look)?);
     }
     figures.bytes = results.iter().map(|file| file.bytes).sum();
-    Ok(Done { results, ..Done::new(figures, vec![pixels]) })
+    Ok(Done { results, ..Done::new(figures, vec![pixels, known]) })
 }
 
 /// Writes a GLB.

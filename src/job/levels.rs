@@ -55,7 +55,7 @@ pub fn run(
     let inner = &pyramid.inner[at];
     let mut below = Below::default();
     for &child in &inner.children {
-        below.add(directory, store, pyramid, child, look, content && inner.content)?;
+        below.add(directory, store, pyramid, child, content && inner.content)?;
     }
     let Below { files, leaves, bounds, error } = below;
     let (mut figures, mut results) = (LevelFigures::default(), Vec::new());
@@ -102,23 +102,15 @@ struct Below {
 }
 
 impl Below {
-    fn add(
-        &mut self,
-        directory: &Directory,
-        store: &Store,
-        pyramid: &Pyramid,
-        child: Child,
-        look: &Look,
-        keep: bool,
-    ) -> Result<()> {
+    fn add(&mut self, directory: &Directory, store: &Store, pyramid: &Pyramid, child: Child, keep: bool) -> Result<()> {
         match child {
             Child::Leaf(tile) => {
-                let path = directory.tile(tile);
-                let file = if path.exists() { Some(read(path)?) } else { None };
-                let bounds = file.as_ref().and_then(|file| bounds_of(file, look));
-                self.leaves.push(LevelTile::new(bounds, file.is_some()));
-                self.widen(bounds);
-                self.files.extend(file.filter(|_| keep));
+                let own = LevelTile::load(store, tile)?;
+                self.widen(own.bounds());
+                if keep && own.content > 0 {
+                    self.files.push(read(directory.tile(tile))?);
+                }
+                self.leaves.push(own);
             }
             Child::Inner(at) => {
                 let node = pyramid.inner[at].node;
@@ -144,16 +136,4 @@ fn read(path: PathBuf) -> Result<TileFile> {
         Error::Input { .. } => Error::Broken(error.to_string()),
         other => other,
     })
-}
-
-/// The least and greatest lattice x, y, z in `file`.
-pub(super) fn bounds_of(file: &TileFile, look: &Look) -> Option<[[i32; 3]; 2]> {
-    let none = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    let worlds = file.parts.iter().flat_map(|part| (0..part.positions.len()).map(|v| part.world(v)));
-    let [low, high] =
-        worlds.fold(none, |[low, high], p| [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]);
-    // glTF's z goes south.
-    let corners = [[low[0], low[1], high[2]], [high[0], high[1], low[2]]];
-    let [low, high] = corners.map(|corner| look.frame.integers(corner));
-    Some([low?, high?])
 }

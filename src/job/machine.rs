@@ -11,11 +11,8 @@ pub(super) fn free_disk(directory: &Path) -> Option<u64> {
 /// Whether a file can be made where `directory` is, or will be. Leaves nothing behind.
 ///
 /// # Errors
-/// [`Error::Io`] if not, [`Error::Config`] if a file is there.
+/// [`Error::Io`] if not.
 pub(super) fn check_writable(directory: &Path) -> Result<()> {
-    if directory.is_file() {
-        return Err(Error::Config(format!("[output] directory: {} is a file", directory.display())));
-    }
     tempfile::tempfile_in(existing(directory)).map(drop).map_err(Error::io("write to", directory))
 }
 

@@ -107,6 +107,7 @@ pub fn run(config: &Config, options: impl Into<Options>) -> Result<Report> {
     // First of all, so that a job that must have a GPU fails at once where there is none.
     let triangulator = Triangulator::new(&config.triangulation, config.limits.memory.0, config.threads())?;
     let directory = Directory::new(&config.output.directory);
+    directory.nothing_is_in_the_way()?;
     let fingerprint = on_threads(workers(config, 0)?, || Fingerprint::of(config))?;
     let coarser = if options.fresh { Coarser::default() } else { resume::coarser(&directory, &fingerprint)? };
     let mut head = Head { fingerprint, coarser };
@@ -265,7 +266,7 @@ impl Job<'_> {
 
         let one_file = fits_one_file(&written);
         let with_tileset = config.output.format != Format::Glb || !one_file;
-        let for_viewers = with_tileset.then(|| self.tileset(plan, &partition, &look, bounds)).transpose()?;
+        let for_viewers = with_tileset.then(|| self.tileset(plan, &partition, &look)).transpose()?;
         let Levelled { figures: coarser, tileset, placement, mut warnings, stage: levelled } =
             for_viewers.unwrap_or_default();
 
@@ -309,17 +310,16 @@ impl Job<'_> {
     }
 
     /// What `tileset.json` needs and says.
-    fn tileset(&self, plan: &Plan, partition: &Partition, look: &Look, bounds: [[i32; 3]; 2]) -> Result<Levelled> {
+    fn tileset(&self, plan: &Plan, partition: &Partition, look: &Look) -> Result<Levelled> {
         let (sizes, pyramid) = pyramid(self.config, partition);
         let stage = self.progress.stage("levels", pyramid.inner.len() as u64, "tiles");
         let figures = self.make_levels(&pyramid, sizes, look, &stage)?;
-        let placed = placement::place(plan, &look.frame, bounds, self.config.output.height_offset);
+        let mut root = tileset::root(self.store, &partition.tree, &pyramid)?;
+        let placed = placement::place(plan, &look.frame, self.config.output.height_offset, &mut root);
         let mut warnings = Vec::from_iter(placement::remark(&placed));
         warnings.extend(levels_left_out(self.config, &pyramid));
-        let placement = placed.ok();
-        let transform = placement.as_ref().map(|placement| placement.transform);
-        let tileset = Some(tileset::text(self.directory, self.store, &pyramid, look, transform)?);
-        Ok(Levelled { figures, tileset, placement, warnings, stage: Some(stage.finish()) })
+        let tileset = Some(tileset::text(look, &root));
+        Ok(Levelled { figures, tileset, placement: placed.ok(), warnings, stage: Some(stage.finish()) })
     }
 
     /// Makes the coarser tiles, those of one height side by side, as many at once as have room.

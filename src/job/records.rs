@@ -252,6 +252,24 @@ impl LevelTile {
         LevelTile { error: 0.0, corners: bounds.unwrap_or([[1; 3], [0; 3]]), content: content.into(), unused: 0 }
     }
 
+    /// Stores it as that of exact tile `tile`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    pub fn save(&self, store: &Store, tile: usize) -> Result<Stored> {
+        ColumnWriter::default().push(&[*self]).write(store, Key::Tile(tile))
+    }
+
+    /// That of exact tile `tile`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if it is not there or not whole.
+    pub fn load(store: &Store, tile: usize) -> Result<LevelTile> {
+        let own = ColumnReader::open(store, Key::Tile(tile))?.column()?;
+        let [own] = own[..] else { return Err(Error::Broken(format!("the record of tile {tile} is damaged"))) };
+        Ok(own)
+    }
+
     /// The least and greatest lattice x, y, z; `None` where there is no triangle below.
     pub fn bounds(&self) -> Option<[[i32; 3]; 2]> {
         (self.corners[0][0] <= self.corners[1][0]).then_some(self.corners)

@@ -29,6 +29,8 @@ pub enum Key {
     Rim(usize),
     /// The pixels of the preview that a tile covers.
     Pixels(usize),
+    /// What `tileset.json` will say of an exact tile.
+    Tile(usize),
     /// What the steps after the partition know of it.
     Partition,
     /// What `tileset.json` will say of the coarser tile at a tree node.
@@ -46,6 +48,7 @@ impl Key {
             Key::Pixels(i) => [6, i as u32],
             Key::Partition => [7, 0],
             Key::Level(i) => [8, i as u32],
+            Key::Tile(i) => [9, i as u32],
         }
     }
 }

@@ -3,23 +3,44 @@
 //!
 //! Both are linear over every triangle, so their difference is linear over every piece that the two sets of edges together cut the
 //! ground into, and greatest at a corner of such a piece: at a vertex of the fine mesh (those of the coarse one are among them), or
-//! where a fine and a coarse edge cross. `Fans` finds the crossings by walking along every coarse edge through the fine mesh,
-//! `Sieve` finds the fine vertices in every coarse triangle.
+//! where a fine and a coarse edge cross. `Fans` finds the crossings by walking along a coarse edge through the fine mesh, `Sieve`
+//! finds the fine vertices in a coarse triangle; `Relief` tells beforehand how far off a coarse triangle can be at the most, so that
+//! few of them have to be looked at.
 
+use super::cells::Cells;
+use super::relief::Relief;
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
 
 /// Steps of a walk that an edge may take on average; a mesh that needs more has nothing but slivers.
 const STEPS_PER_EDGE: u64 = 64;
+/// So many triangles are looked at in the order of how far off they can be.
+const FIRST: usize = 256;
 
 /// The greatest vertical distance between the terrains `fine` and `coarse`, triangles of the same `positions` (lattice x, y, z),
 /// in steps of z; no smaller than the true one. Both must cover the same ground once, with counterclockwise triangles.
 pub fn deviation(positions: &[[i32; 3]], fine: &[[u32; 3]], coarse: &[[u32; 3]]) -> f64 {
-    let at_crossings = Fans::new(positions, fine).crossings(coarse);
-    let inside = at_crossings.map(|crossings| crossings.max(Sieve::new(positions, 1).inside(coarse)));
+    let relief = Relief::new(positions, fine);
+    let mut bounds: Vec<(u64, u32)> = coarse.iter().map(|triangle| relief.bound(triangle)).zip(0..).collect();
+    // What can be furthest off comes first, so that most of the others need not be looked at.
+    let first = FIRST.min(bounds.len());
+    if first < bounds.len() {
+        bounds.select_nth_unstable_by(first, |a, b| b.cmp(a));
+    }
+    bounds[..first].sort_unstable_by(|a, b| b.cmp(a));
+    let (fans, sieve) = (Fans::new(positions, fine), Sieve::new(positions, 1));
+    let mut steps = STEPS_PER_EDGE * (3 * coarse.len() as u64 + 1000);
+    let mut greatest = 0.0f64;
+    for (bound, triangle) in bounds {
+        if bound as f64 > greatest {
+            let triangle = &coarse[triangle as usize];
+            let Some(at_crossings) = fans.crossings(triangle, &mut steps) else { return height_range(positions) };
+            greatest = greatest.max(at_crossings).max(sieve.inside_one(triangle).0);
+        }
+    }
     // Rounding loses some 2^-50 of a height.
     let lost = 1e-9;
-    inside.map_or_else(|| height_range(positions), |found| if found > 0.0 { found + lost } else { 0.0 })
+    if greatest > 0.0 { greatest + lost } else { 0.0 }
 }
 
 /// No two terrains over the same vertices are further apart.
@@ -78,15 +99,12 @@ impl<'a> Fans<'a> {
         self.around(a).iter().find(|edge| edge[0] == b).map(|edge| edge[1])
     }
 
-    /// The greatest distance where an edge of `coarse` crosses one of this mesh; `None` where that cannot be told.
-    fn crossings(&self, coarse: &[[u32; 3]]) -> Option<f64> {
-        let mut steps = STEPS_PER_EDGE * (3 * coarse.len() as u64 + 1000);
+    /// The greatest distance where an edge of a coarse triangle crosses one of this mesh; `None` where that cannot be told.
+    fn crossings(&self, &[a, b, c]: &[u32; 3], steps: &mut u64) -> Option<f64> {
         let mut greatest = 0.0f64;
-        for &[a, b, c] in coarse {
-            // The other triangle of an edge has it the other way round; the outline is the same in both meshes.
-            for (from, to) in [(a, b), (b, c), (c, a)].into_iter().filter(|(from, to)| from < to) {
-                greatest = greatest.max(self.along(from, to, &mut steps)?);
-            }
+        // The other triangle of an edge has it the other way round; the outline is the same in both meshes.
+        for (from, to) in [(a, b), (b, c), (c, a)].into_iter().filter(|(from, to)| from < to) {
+            greatest = greatest.max(self.along(from, to, steps)?);
         }
         Some(greatest)
     }
@@ -189,14 +207,10 @@ impl Line {
     }
 }
 
-/// The vertices of the fine mesh, sorted into the cells of a grid, row by row.
+/// The vertices of the fine mesh, sorted into cells.
 pub(super) struct Sieve<'a> {
     positions: &'a [[i32; 3]],
-    low: [f64; 2],
-    /// Cells in a lattice step.
-    scale: [f64; 2],
-    columns: usize,
-    rows: usize,
+    cells: Cells,
     /// Where each cell's vertices start in `sorted`, and their end.
     starts: Vec<u32>,
     sorted: Vec<[i32; 3]>,
@@ -207,25 +221,15 @@ pub(super) struct Sieve<'a> {
 impl<'a> Sieve<'a> {
     /// Of one vertex of `every`.
     pub(super) fn new(positions: &'a [[i32; 3]], every: usize) -> Sieve<'a> {
-        let none = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
-        let [low, high] = positions.iter().fold(none, |[low, high], p| {
-            let p = [p[0] as f64, p[1] as f64];
-            [[0, 1].map(|k| low[k].min(p[k])), [0, 1].map(|k| high[k].max(p[k]))]
-        });
-        let size = [0, 1].map(|k| (high[k] - low[k]).max(1.0));
-        let cells = (positions.len() / every + 1) as f64;
-        let columns = (cells * size[0] / size[1]).sqrt().ceil().clamp(1.0, cells);
-        let rows = (cells / columns).ceil();
-        let scale = [columns / (size[0] + 1.0), rows / (size[1] + 1.0)];
-        let (columns, rows) = (columns as usize, rows as usize);
-        let (starts, sorted, numbers) = (vec![0; columns * rows + 1], Vec::new(), Vec::new());
-        let mut sieve = Sieve { positions, low, scale, columns, rows, starts, sorted, numbers };
+        let cells = Cells::new(positions, positions.len() / every + 1);
+        let (starts, sorted, numbers) = (vec![0; cells.count() + 1], Vec::new(), Vec::new());
+        let mut sieve = Sieve { positions, cells, starts, sorted, numbers };
         sieve.sort(every);
         sieve
     }
 
     fn sort(&mut self, every: usize) {
-        let cells: Vec<u32> = self.positions.iter().step_by(every).map(|p| self.cell(p)).collect();
+        let cells: Vec<u32> = self.positions.iter().step_by(every).map(|p| self.cells.of(p)).collect();
         cells.iter().for_each(|&cell| self.starts[cell as usize] += 1);
         let mut end = 0;
         for start in &mut self.starts {
@@ -242,38 +246,21 @@ impl<'a> Sieve<'a> {
         }
     }
 
-    fn cell(&self, p: &[i32; 3]) -> u32 {
-        (self.row(p[1] as f64) * self.columns + self.column(p[0] as f64)) as u32
-    }
-
-    fn column(&self, x: f64) -> usize {
-        (((x - self.low[0]) * self.scale[0]) as usize).min(self.columns - 1)
-    }
-
-    fn row(&self, y: f64) -> usize {
-        (((y - self.low[1]) * self.scale[1]) as usize).min(self.rows - 1)
-    }
-
-    /// The greatest distance between a vertex and the triangle of `coarse` over it.
-    fn inside(&self, coarse: &[[u32; 3]]) -> f64 {
-        coarse.iter().map(|t| self.inside_one(t.map(|v| self.positions[v as usize])).0).fold(0.0, f64::max)
-    }
-
     /// For every triangle of `coarse` that is off a vertex the distance (its bits) and number of the one it is furthest off.
     pub(super) fn furthest(&self, coarse: &[[u32; 3]]) -> impl Iterator<Item = (u64, u32)> {
-        let found = coarse.iter().map(|t| self.inside_one(t.map(|v| self.positions[v as usize])));
+        let found = coarse.iter().map(|triangle| self.inside_one(triangle));
         found.filter(|(distance, _)| *distance > 0.0).map(|(distance, v)| (distance.to_bits(), v))
     }
 
     /// The greatest distance of a triangle, and the number of the vertex where it is.
-    fn inside_one(&self, corners: [[i32; 3]; 3]) -> (f64, u32) {
+    fn inside_one(&self, triangle: &[u32; 3]) -> (f64, u32) {
+        let corners = triangle.map(|v| self.positions[v as usize]);
         let ys = corners.map(|p| p[1]);
         let (first, last) = (ys[0].min(ys[1]).min(ys[2]), ys[0].max(ys[1]).max(ys[2]));
         let mut greatest = (0.0f64, 0);
-        for row in self.row(first as f64)..=self.row(last as f64) {
-            let [west, east] = self.span(&corners, row);
-            let start = self.starts[row * self.columns + self.column(west)];
-            let end = self.starts[row * self.columns + self.column(east) + 1];
+        for row in self.cells.row(first as f64)..=self.cells.row(last as f64) {
+            let [west, east] = self.cells.span(&corners, row);
+            let [start, end] = [self.cells.at(row, west), self.cells.at(row, east) + 1].map(|cell| self.starts[cell]);
             for at in start as usize..end as usize {
                 let distance = apart(&corners, self.sorted[at]);
                 if distance > greatest.0 {
@@ -282,25 +269,6 @@ impl<'a> Sieve<'a> {
             }
         }
         greatest
-    }
-
-    /// Between which x the triangle lies in `row`, with a cell to spare for rounding.
-    fn span(&self, corners: &[[i32; 3]; 3], row: usize) -> [f64; 2] {
-        let y_of = |row: f64| self.low[1] + row / self.scale[1];
-        let (south, north) = (y_of(row as f64 - 0.01), y_of(row as f64 + 1.01));
-        let mut span = [f64::INFINITY, f64::NEG_INFINITY];
-        for k in 0..3 {
-            let [a, b] = [corners[k], corners[(k + 1) % 3]].map(|p| [p[0] as f64, p[1] as f64]);
-            let [a, b] = if a[1] <= b[1] { [a, b] } else { [b, a] };
-            if a[1] > north || b[1] < south {
-                continue;
-            }
-            let x_at = |y: f64| if a[1] == b[1] { a[0] } else { a[0] + (b[0] - a[0]) * ((y - a[1]) / (b[1] - a[1])) };
-            let ends = [x_at(south.max(a[1])), if b[1] <= north { b[0] } else { x_at(north) }];
-            span = [span[0].min(ends[0]).min(ends[1]), span[1].max(ends[0]).max(ends[1])];
-        }
-        let spare = 0.01 / self.scale[0];
-        [span[0] - spare, span[1] + spare]
     }
 }
 
@@ -323,4 +291,51 @@ fn apart(corners: &[[i32; 3]; 3], p: [i32; 3]) -> f64 {
     let total: f64 = weights.iter().map(|&w| w as f64).sum();
     let height = |k: usize| weights[k] as f64 * (corners[k][2] as f64 - p[2] as f64);
     ((height(0) + height(1) + height(2)) / total).abs()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::triangulation::canonical;
+    use crate::triangulation::mesh::{HULL, Mesh};
+    use proptest::prelude::*;
+
+    fn triangulation(positions: &[[i32; 3]], kept: &[u32]) -> Mesh {
+        let sites: Vec<Site> = kept.iter().map(|&v| plane(positions[v as usize])).collect();
+        canonical(&sites).unwrap()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        /// Mostly flat, with a few high places, so that most triangles need not be looked at.
+        #[test]
+        fn what_is_not_looked_at_is_no_further_off(
+            mut positions in prop::collection::vec((0..3_000, 0..3_000, 0..20i32), 400..3_000),
+            peaks in prop::collection::vec((0..400usize, 20..5_000), 0..6),
+            every in 3..9usize,
+        ) {
+            peaks.iter().for_each(|&(at, height)| positions[at].2 = height);
+            let mut positions: Vec<[i32; 3]> = positions.into_iter().map(|(x, y, z)| [x, y, z]).collect();
+            positions.sort_unstable();
+            positions.dedup_by_key(|p| plane(*p));
+            let all: Vec<u32> = (0..positions.len() as u32).collect();
+            let fine = triangulation(&positions, &all);
+            let mut kept = vec![false; positions.len()];
+            kept.iter_mut().step_by(every).for_each(|kept| *kept = true);
+            for h in (0..fine.twins.len() as u32).filter(|&h| fine.twins[h as usize] == HULL) {
+                kept[fine.origin(h) as usize] = true;
+            }
+            let kept: Vec<u32> = all.into_iter().filter(|&v| kept[v as usize]).collect();
+            let coarse = triangulation(&positions, &kept).triangles;
+            let coarse: Vec<[u32; 3]> = coarse.iter().map(|t| t.map(|v| kept[v as usize])).collect();
+
+            let (fans, sieve) = (Fans::new(&positions, &fine.triangles), Sieve::new(&positions, 1));
+            let mut steps = u64::MAX;
+            let furthest = coarse.iter().map(|t| fans.crossings(t, &mut steps).unwrap().max(sieve.inside_one(t).0));
+            let furthest = furthest.fold(0.0, f64::max);
+            let found = deviation(&positions, &fine.triangles, &coarse);
+            prop_assert!(found == 0.0 && furthest == 0.0 || found == furthest + 1e-9, "{} and {}", found, furthest);
+        }
+    }
 }

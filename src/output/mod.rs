@@ -2,6 +2,7 @@
 //!
 //! [`frame::Frame`] says where a lattice point lies in a glTF scene; everything that writes or reads positions asks it.
 
+mod cells;
 pub mod color;
 mod container;
 pub mod deviation;
@@ -20,6 +21,7 @@ mod parts;
 pub mod picture;
 pub mod preview;
 pub mod read;
+mod relief;
 pub mod simplify;
 pub mod terrain;
 mod tile;

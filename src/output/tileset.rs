@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use super::document::GENERATOR;
 use super::frame::Frame;
+use super::globe::{applied, relative};
 
 /// Half the least extent of a bounding volume, metres: viewers divide by it.
 const LEAST_HALF: f64 = 0.005;
@@ -17,21 +18,25 @@ pub struct Node {
     pub uri: Option<String>,
     /// The least and greatest lattice x, y, z of the exact mesh below.
     pub bounds: [[i32; 3]; 2],
-    /// The greatest vertical distance to the exact mesh, metres.
+    /// The lattice x, y of the place where its transform is to be exact.
+    pub middle: [i32; 2],
+    /// The greatest distance to the exact mesh, metres: along the vertical, and what transforms put elsewhere.
     pub error: f64,
+    /// Where it lies on the globe, if it lies there: metres x, y, z of the scene to earth-centred ones, column by column. A tile
+    /// without is placed as its parent is.
+    pub transform: Option<[f64; 16]>,
     /// Finer tiles, which replace it.
     pub children: Vec<Node>,
 }
 
-/// The content of `tileset.json`, without a line's end. `transform` places the terrain on the globe: metres x, y, z of the tileset
-/// to earth-centred ones, column by column.
-pub fn tileset_json(frame: &Frame, root: &Node, transform: Option<[f64; 16]>) -> Value {
+/// Least and greatest x, y, z, metres.
+type Extent = [[f64; 3]; 2];
+
+/// The content of `tileset.json`, without a line's end.
+pub fn tileset_json(frame: &Frame, root: &Node) -> Value {
     let whole = diagonal(frame, root);
-    let (mut tile, _) = tile_json(frame, root);
+    let (mut tile, _) = tile_json(frame, root, None);
     tile["refine"] = "REPLACE".into();
-    if let Some(transform) = transform {
-        tile["transform"] = transform.to_vec().into();
-    }
     json!({
         "asset": {"version": "1.1", "generator": GENERATOR, "extras": frame.extras()},
         // What is wrong where nothing is shown.
@@ -40,11 +45,14 @@ pub fn tileset_json(frame: &Frame, root: &Node, transform: Option<[f64; 16]>) ->
     })
 }
 
-/// The tile, and the corners of its bounding volume, which holds those of its children.
-fn tile_json(frame: &Frame, node: &Node) -> (Value, [[f64; 3]; 2]) {
+/// The tile below one that `above` places on the globe, and what its bounding volume takes in the frame of that one. The volume
+/// holds those of its children.
+fn tile_json(frame: &Frame, node: &Node, above: Option<&[f64; 16]>) -> (Value, Extent) {
     // Without content it is to be refined from everywhere.
     let error = if node.uri.is_some() { node.error } else { diagonal(frame, node).max(node.error) };
-    let (children, volumes): (Vec<Value>, Vec<_>) = node.children.iter().map(|child| tile_json(frame, child)).unzip();
+    let own = node.transform.as_ref();
+    let below = node.children.iter().map(|child| tile_json(frame, child, own.or(above)));
+    let (children, volumes): (Vec<Value>, Vec<Extent>) = below.unzip();
     let volume = volumes.into_iter().fold(thick(corners(frame, node.bounds)), around);
     let mut tile = json!({"boundingVolume": {"box": box_of(volume)}, "geometricError": error});
     if let Some(uri) = &node.uri {
@@ -53,16 +61,25 @@ fn tile_json(frame: &Frame, node: &Node) -> (Value, [[f64; 3]; 2]) {
     if !children.is_empty() {
         tile["children"] = children.into();
     }
-    (tile, volume)
+    let Some(own) = own else { return (tile, volume) };
+    let transform = above.map_or(*own, |above| relative(above, own));
+    tile["transform"] = transform.to_vec().into();
+    (tile, image(&transform, volume))
+}
+
+/// What a box takes once it is transformed: that of its corners, since the map is affine.
+fn image(transform: &[f64; 16], extent: Extent) -> Extent {
+    let corner = |i: usize| applied(transform, [0, 1, 2].map(|k| extent[i >> k & 1][k]));
+    (0..8).map(|i| [corner(i); 2]).reduce(around).unwrap_or(extent)
 }
 
 /// The corners, at least twice [`LEAST_HALF`] apart along every axis.
-fn thick([low, high]: [[f64; 3]; 2]) -> [[f64; 3]; 2] {
+fn thick([low, high]: Extent) -> Extent {
     let lacking = [0, 1, 2].map(|k| (LEAST_HALF - (high[k] - low[k]) / 2.0).max(0.0));
     [[0, 1, 2].map(|k| low[k] - lacking[k]), [0, 1, 2].map(|k| high[k] + lacking[k])]
 }
 
-fn around(a: [[f64; 3]; 2], b: [[f64; 3]; 2]) -> [[f64; 3]; 2] {
+fn around(a: Extent, b: Extent) -> Extent {
     [[0, 1, 2].map(|k| a[0][k].min(b[0][k])), [0, 1, 2].map(|k| a[1][k].max(b[1][k]))]
 }
 
@@ -75,7 +92,7 @@ pub fn corners(frame: &Frame, bounds: [[i32; 3]; 2]) -> [[f64; 3]; 2] {
 }
 
 /// Centre and half axes.
-fn box_of([low, high]: [[f64; 3]; 2]) -> [f64; 12] {
+fn box_of([low, high]: Extent) -> [f64; 12] {
     let mut numbers = [0.0; 12];
     for k in 0..3 {
         numbers[k] = (low[k] + high[k]) / 2.0;
@@ -99,10 +116,10 @@ mod tests {
         let decimal = |v: f64| shortest_decimal(v).unwrap();
         let lattice = Lattice { offset: [decimal(0.0); 3], resolution: decimal(0.001), resolution_z: decimal(0.001) };
         let frame = Frame::new(&lattice, 1.0, 1.0, None).unwrap();
-        let node = |bounds, children| Node { uri: None, bounds, error: 0.0, children };
+        let node = |bounds, children| Node { uri: None, bounds, middle: [0; 2], error: 0.0, transform: None, children };
         let child = node([[0, 0, 5], [3, 4_000, 5]], Vec::new());
         let root = node([[0, 0, 5], [9_000, 9_000, 5]], vec![child]);
-        let json = tileset_json(&frame, &root, None);
+        let json = tileset_json(&frame, &root);
         let numbers = |tile: &Value| -> Vec<f64> {
             tile["boundingVolume"]["box"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
         };

@@ -52,6 +52,7 @@ mod source;
 mod spill;
 mod verdict;
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -75,7 +76,7 @@ const MEMORY_FACTOR: u64 = 5;
 
 /// Checks the tiles under `directory/tiles` within about `memory` bytes. The verdict lists what does not hold.
 ///
-/// Fails where there are no tiles, one cannot be read for reasons of the machine, or one alone needs more memory.
+/// Fails with [`Error::Config`] where there are no tiles, and where one cannot be read for reasons of the machine, or one alone needs more memory.
 pub fn verify(directory: &Path, memory: u64) -> Result<Verdict> {
     let tiles = Tiles::find(directory)?;
     let source = Source::new(&tiles.extras).map_err(|what| Error::input(&tiles.paths[0], what))?;
@@ -125,11 +126,11 @@ struct Tiles {
 
 impl Tiles {
     fn find(directory: &Path) -> Result<Tiles> {
-        let folder = directory.join("tiles");
+        let folder = folder_of_tiles(directory)?;
         let mut paths = glb_files(&folder)?;
         let written = paths.len();
         let Some(first) = paths.first() else {
-            return Err(Error::input(&folder, "has no .glb file: is this the output directory of a finished job?"));
+            return Err(no_output(&folder, "has no .glb file"));
         };
         let readable = paths.iter().find_map(|path| read_extras(path).ok());
         let extras = readable.map_or_else(|| read_extras(first), Ok)?;
@@ -201,6 +202,22 @@ impl Tiles {
         }
         Ok(())
     }
+}
+
+/// Where the tiles are in the output `directory` of a job.
+fn folder_of_tiles(directory: &Path) -> Result<PathBuf> {
+    let folder = directory.join("tiles");
+    match directory.metadata() {
+        Err(e) if e.kind() == ErrorKind::NotFound => Err(no_output(directory, "is not there")),
+        Err(e) => Err(Error::io("read", directory)(e)),
+        Ok(meta) if !meta.is_dir() => Err(no_output(directory, "is not a directory")),
+        Ok(_) if !folder.is_dir() => Err(no_output(directory, "has no folder named tiles")),
+        Ok(_) => Ok(folder),
+    }
+}
+
+fn no_output(path: &Path, what: &str) -> Error {
+    Error::Config(format!("{} {what}: name the output directory of a finished job", path.display()))
 }
 
 /// The GLB files in `folder` by name.

@@ -110,12 +110,45 @@ fn a_configuration_that_is_none_is_refused() {
 }
 
 #[test]
+#[cfg(target_os = "linux")]
 fn an_output_directory_that_cannot_be_made_may_be_tried_again() {
     let folder = folder_with_cloud();
-    // A file stands where the directory's parent should be: not even root can write there.
-    fs::write(folder.path().join("file"), "").unwrap();
-    fs::write(folder.path().join("job.toml"), LEAST.replace("\"out\"", "\"file/out\"")).unwrap();
-    gdt_batch(folder.path(), &["job.toml"]).refused(1, &["file/out", "directory"]);
+    // Not even root can write there.
+    fs::write(folder.path().join("job.toml"), LEAST.replace("\"out\"", "\"/proc/none/out\"")).unwrap();
+    gdt_batch(folder.path(), &["job.toml"]).refused(1, &["/proc/none/out", "cannot write"]);
+}
+
+/// Whatever else stands where the job needs to write is named before the first point is read, and stays.
+#[test]
+#[cfg(unix)]
+fn what_is_in_the_way_of_the_output_is_named() {
+    let folder = folder_with_cloud();
+    fs::write(folder.path().join("job.toml"), LEAST).unwrap();
+    let there = |name: &str| folder.path().join(name);
+    let refused = |name: &str, words: &str| {
+        for arguments in [&["job.toml"][..], &["job.toml", "--force"], &["check", "job.toml"]] {
+            gdt_batch(folder.path(), arguments).refused(2, &[&format!("{name} {words}"), "move it away"]);
+        }
+    };
+    // As files, and as links that lead nowhere; what is removed here was still there.
+    let by_files = |name: &str| {
+        fs::write(there(name), "theirs").unwrap();
+        refused(name, "is not a directory");
+        fs::remove_file(there(name)).unwrap();
+        std::os::unix::fs::symlink("nowhere", there(name)).unwrap();
+        refused(name, "is a link that leads nowhere");
+        fs::remove_file(there(name)).unwrap();
+    };
+    by_files("out");
+    fs::create_dir(there("out")).unwrap();
+    ["out/tiles", "out/levels", "out/cut", "out/job"].into_iter().for_each(by_files);
+    fs::create_dir(there("out/tiles")).unwrap();
+    for name in ["out/tileset.json", "out/report.json", "out/tiles/000000.glb"] {
+        fs::create_dir(there(name)).unwrap();
+        refused(name, "is a directory");
+        fs::remove_dir(there(name)).unwrap();
+    }
+    gdt_batch(folder.path(), &["job.toml"]).succeeded();
 }
 
 #[test]

@@ -6,7 +6,9 @@ use serde_json::Value;
 
 use crate::clouds;
 use crate::common::shared;
+use crate::levels::{borders_are_the_exact_ones, errors_are_true};
 use crate::program::{Job, gdt_batch, number};
+use crate::tileset::{extent, keeps_the_rules, tiles, triangles};
 
 /// Two square fields of points 10 apart, and a void 2,000 wide between them.
 fn two_fields() -> clouds::Cloud {
@@ -44,6 +46,30 @@ fn what_is_left_out_does_not_depend_on_the_tiles_and_the_whole_is_exact() {
         }
         assert_ne!(written.unwrap().1, whole);
     }
+}
+
+#[test]
+fn coarser_levels_leave_the_void_empty_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = clouds::write(folder.path(), "cloud.csv", &two_fields());
+    let job = Job::on(&[&file]).tiles_of(150).with("output", "level_sites = 150\nmax_edge = 100");
+    assert!(number(&job.report()["cut_triangles"]) > 10);
+    job.verified();
+    let tiles = tiles(&job);
+    keeps_the_rules(&job, &tiles);
+    borders_are_the_exact_ones(&job, &tiles);
+    errors_are_true(&job, &tiles, "two fields");
+    let [low, high] = extent(&tiles[0].json);
+    let middle = (low[0] + high[0]) / 2.0;
+    let mut both_sides = 0;
+    for tile in &tiles {
+        let mesh = triangles(&job, tile);
+        let is_west = |t: &[[f64; 3]; 3]| t.iter().filter(|corner| corner[0] < middle).count();
+        assert!(mesh.iter().all(|t| is_west(t) % 3 == 0), "{} bridges the void", tile.json["content"]["uri"]);
+        let west = mesh.iter().filter(|t| is_west(t) == 3).count();
+        both_sides += usize::from(west > 0 && west < mesh.len());
+    }
+    assert!(both_sides > 0, "a level has ground on both sides");
 }
 
 #[test]

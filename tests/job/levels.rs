@@ -1,81 +1,15 @@
-//! Coarser levels and `tileset.json`: the rules of 3D Tiles, borders that fit, errors that are true, and viewers that open it all.
+//! Coarser levels and `tileset.json`: the rules of 3D Tiles, borders that fit, errors that are true.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::collections::BTreeSet;
+use std::path::Path;
 
-use gdt_batch::output::read::read_tile;
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use crate::clouds;
 use crate::common::shared;
 use crate::program::{Job, number};
 use crate::random::Random;
-use crate::validator::validate;
-
-/// A tile of the tileset.
-struct Tile {
-    json: Value,
-    /// Places of its parents, nearest first.
-    above: Vec<usize>,
-    /// Places of the leaves at or below it.
-    leaves: Vec<usize>,
-}
-
-/// All tiles, children after their parents.
-fn tiles(job: &Job) -> Vec<Tile> {
-    fn add(found: &mut Vec<Tile>, json: &Value, above: &[usize]) {
-        let own = found.len();
-        found.push(Tile { json: json.clone(), above: above.to_vec(), leaves: Vec::new() });
-        let children = json["children"].as_array();
-        if children.is_none() {
-            found[own].leaves.push(own);
-            above.iter().for_each(|&parent| found[parent].leaves.push(own));
-        }
-        let above: Vec<usize> = [&[own], above].concat();
-        children.into_iter().flatten().for_each(|child| add(found, child, &above));
-    }
-    let json: Value = serde_json::from_slice(&std::fs::read(job.out().join("tileset.json")).unwrap()).unwrap();
-    assert_eq!(json["asset"]["version"], "1.1");
-    assert!(error(&json) >= error(&json["root"]));
-    assert_eq!(json["root"]["refine"], "REPLACE");
-    let mut found = Vec::new();
-    add(&mut found, &json["root"], &[]);
-    found
-}
-
-fn error(tile: &Value) -> f64 {
-    tile["geometricError"].as_f64().unwrap()
-}
-
-/// Least and greatest x, y, z.
-fn extent(tile: &Value) -> [[f64; 3]; 2] {
-    let numbers: Vec<f64> =
-        tile["boundingVolume"]["box"].as_array().unwrap().iter().map(|n| n.as_f64().unwrap()).collect();
-    assert_eq!(numbers.len(), 12);
-    let half = [numbers[3], numbers[7], numbers[11]];
-    assert!(half.iter().all(|&h| h > 0.0) && numbers[3..].iter().filter(|&&n| n != 0.0).count() == 3);
-    [-1.0, 1.0].map(|side| [0, 1, 2].map(|k| numbers[k] + side * half[k]))
-}
-
-/// Whether box `inner` lies in `outer`; sums of a centre and half a side are rounded.
-fn is_within(inner: [[f64; 3]; 2], outer: [[f64; 3]; 2]) -> bool {
-    (0..3).all(|k| inner[0][k] >= outer[0][k] - 1e-6 && inner[1][k] <= outer[1][k] + 1e-6)
-}
-
-/// The triangles of a tile's content, x east, y north, z up in metres from the scene's origin.
-fn triangles(job: &Job, tile: &Tile) -> Vec<[[f64; 3]; 3]> {
-    let path = job.out().join(tile.json["content"]["uri"].as_str().unwrap());
-    let mut found = Vec::new();
-    for part in read_tile(&path).unwrap().parts {
-        let corner = |v: u32| {
-            let [x, up, z] = part.world(v as usize);
-            [x, -z, up]
-        };
-        found.extend(part.triangles.iter().map(|t| t.map(corner)));
-    }
-    found
-}
+use crate::tileset::{Tile, error, height, keeps_the_rules, tiles, triangles};
 
 fn bits(point: [f64; 3]) -> [u64; 3] {
     point.map(|v| (v + 0.0).to_bits())
@@ -95,37 +29,7 @@ fn outline(triangles: &[[[f64; 3]; 3]]) -> BTreeSet<[[u64; 3]; 2]> {
     edges
 }
 
-/// The height over x, y in a triangle, or else nothing.
-fn height(t: &[[f64; 3]; 3], [x, y]: [f64; 2]) -> Option<f64> {
-    let area = |a: [f64; 3], b: [f64; 3]| (a[0] - x) * (b[1] - y) - (b[0] - x) * (a[1] - y);
-    let weights = [area(t[1], t[2]), area(t[2], t[0]), area(t[0], t[1])];
-    let total: f64 = weights.iter().sum();
-    weights.iter().all(|&w| w >= 0.0).then(|| (0..3).map(|i| weights[i] * t[i][2]).sum::<f64>() / total)
-}
-
-/// The rules of 3D Tiles 1.1, and that every GLB is shown by one tile.
-#[track_caller]
-fn keeps_the_rules(job: &Job, tiles: &[Tile]) {
-    let mut shown = BTreeMap::<String, usize>::new();
-    for tile in tiles {
-        let own = extent(&tile.json);
-        if let Some(&parent) = tile.above.first() {
-            assert!(is_within(own, extent(&tiles[parent].json)) && error(&tile.json) <= error(&tiles[parent].json));
-            assert!(tile.json["refine"].is_null());
-        }
-        let Some(uri) = tile.json["content"]["uri"].as_str() else { continue };
-        *shown.entry(uri.to_owned()).or_default() += 1;
-        let points: Vec<[f64; 3]> = triangles(job, tile).into_iter().flatten().collect();
-        assert!(!points.is_empty() && points.iter().all(|&p| is_within([p, p], own)), "{uri}");
-        assert_eq!(uri.starts_with("tiles/"), tile.json["children"].is_null(), "{uri}");
-        assert!(uri.starts_with("levels/") || error(&tile.json) == 0.0, "{uri}");
-    }
-    let files = |folder: &str| std::fs::read_dir(job.out().join(folder)).map_or(0, |entries| entries.count());
-    assert!(shown.values().all(|&count| count == 1));
-    assert_eq!(shown.len(), files("tiles") + files("levels"));
-}
-
-fn hills(count: usize, seed: u64) -> clouds::Cloud {
+pub(crate) fn hills(count: usize, seed: u64) -> clouds::Cloud {
     let mut random = Random(seed);
     let mut height = |x: f64, y: f64| {
         let hills = (x / 900.0).sin() * 300.0 + (y / 700.0).cos() * 250.0 + (x * y / 4e6).sin() * 80.0;
@@ -163,7 +67,7 @@ fn levels_keep_the_rules_their_borders_and_their_word() {
 }
 
 /// So tiles of any levels that lie side by side meet without a crack.
-fn borders_are_the_exact_ones(job: &Job, tiles: &[Tile]) {
+pub(crate) fn borders_are_the_exact_ones(job: &Job, tiles: &[Tile]) {
     for tile in tiles.iter().filter(|tile| !tile.json["children"].is_null()) {
         let below: Vec<_> = tile.leaves.iter().flat_map(|&leaf| triangles(job, &tiles[leaf])).collect();
         let own = triangles(job, tile);
@@ -172,7 +76,7 @@ fn borders_are_the_exact_ones(job: &Job, tiles: &[Tile]) {
     }
 }
 
-fn errors_are_true(job: &Job, tiles: &[Tile], name: &str) {
+pub(crate) fn errors_are_true(job: &Job, tiles: &[Tile], name: &str) {
     let meshes: Vec<_> = tiles.iter().map(|tile| triangles(job, tile)).collect();
     let mut random = Random(9);
     let (mut looked, mut greatest) = (0, 0.0f64);
@@ -251,72 +155,4 @@ fn a_coordinate_system_places_the_tileset_on_the_globe() {
             serde_json::from_slice(&std::fs::read(job.out().join("georeference.json")).unwrap()).unwrap();
         assert!(georeference["globe"]["distortion_m"].as_f64().unwrap() < 0.2, "{name}");
     }
-}
-
-/// Chromium, if it is there; under tests/run it has to be.
-fn chromium() -> Option<PathBuf> {
-    let npm = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/npm/node_modules/three");
-    let found = ["/usr/bin/chromium", "/usr/bin/chromium-browser"].map(PathBuf::from).into_iter().find(|p| p.exists());
-    if found.is_none() || !npm.is_dir() {
-        assert!(std::env::var_os("GDT_TEST_ALL").is_none(), "no Chromium, or no three.js in tests/npm");
-        eprintln!("not tested: no Chromium, or no three.js; run `npm ci` in tests/npm, or tests/run");
-        return None;
-    }
-    found
-}
-
-/// What a browser shows of the job, heights at `places` included.
-#[track_caller]
-fn seen(job: &Job, chromium: &Path, places: &[[f64; 2]]) -> Value {
-    let request = job.folder().join("request.json");
-    std::fs::write(&request, json!({"places": places}).to_string()).unwrap();
-    let screenshot = job.folder().join("screenshot.png");
-    let view = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/npm/view.mjs");
-    let output = Command::new("node").arg(view).arg(job.out()).arg(chromium).arg(request).arg(&screenshot).output();
-    let output = output.expect("node runs");
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    assert!(output.status.success(), "{}{}", text(&output.stdout), text(&output.stderr));
-    assert!(std::fs::metadata(&screenshot).unwrap().len() > 10_000, "an empty picture");
-    serde_json::from_slice(&output.stdout).unwrap()
-}
-
-#[track_caller]
-fn shows(job: &Job, chromium: &Path) {
-    let report = job.report();
-    let tiles = tiles(job);
-    keeps_the_rules(job, &tiles);
-    validate(&job.out(), tiles.len());
-    let mut random = Random(4);
-    let leaves: Vec<usize> = tiles[0].leaves.clone();
-    let mut expected = Vec::new();
-    while expected.len() < 12 {
-        let mesh = triangles(job, &tiles[leaves[random.below(leaves.len() as u64) as usize]]);
-        let t = mesh[random.below(mesh.len() as u64) as usize];
-        expected.push([0, 1, 2].map(|k| (t[0][k] + t[1][k] + t[2][k]) / 3.0));
-    }
-    let places: Vec<[f64; 2]> = expected.iter().map(|p| [p[0], p[1]]).collect();
-    let seen = seen(job, chromium, &places);
-    let all = extent(&tiles[0].json);
-    for view in ["file", "fine"] {
-        assert_eq!(number(&seen[view]["triangles"]), number(&report["triangles"]), "{view}");
-        for (height, place) in seen[view]["heights"].as_array().unwrap().iter().zip(&expected) {
-            let height = height.as_f64().unwrap_or_else(|| panic!("{view}: nothing at {place:?}"));
-            assert!((height - place[2]).abs() < 0.02, "{view}: {height} at {place:?}");
-        }
-    }
-    let found: Vec<Vec<f64>> = serde_json::from_value(seen["fine"]["box"].clone()).unwrap();
-    assert!((0..3).all(|k| (0..2).all(|side| (found[side][k] - all[side][k]).abs() < 0.02)), "{found:?} {all:?}");
-    assert_eq!(number(&seen["coarse"]["triangles"]), triangles(job, &tiles[0]).len() as u64);
-    assert_eq!(number(&seen["coarse"]["meshes"]), 1);
-}
-
-#[test]
-fn a_browser_shows_the_tileset_and_the_file() {
-    let Some(chromium) = chromium() else { return };
-    let folder = tempfile::tempdir().unwrap();
-    let cloud = clouds::write(folder.path(), "cloud.csv", &hills(20_000, 3));
-    shows(&Job::on(&[cloud]).tiles_of(2_000).with("output", "level_sites = 2000"), &chromium);
-    let Some(data) = shared().map(|shared| shared.join("data")) else { return };
-    let job = Job::on(&[data.join("autzen_trim.las")]).tiles_of(6_000).with("output", "level_sites = 6000");
-    shows(&job, &chromium);
 }

@@ -11,12 +11,14 @@ mod validator;
 
 mod clouds;
 mod program;
+mod tileset;
 
 mod bad_files;
 mod broken;
 mod choices;
 mod configuration;
 mod cutting;
+mod globe;
 mod khronos;
 mod levels;
 mod limits;
@@ -25,4 +27,5 @@ mod preflight;
 mod real;
 mod same_mesh;
 mod steps;
+mod viewers;
 mod written;

@@ -69,8 +69,22 @@ fn unreadable_files_are_named() {
     fs::write(&empty, "").unwrap();
     Job::on(&[&empty]).run().refused(3, &["empty.las"]);
     gdt_batch(folder.path(), &["info", "."]).refused(3, &["regular file"]);
-    gdt_batch(folder.path(), &["info", "missing.las"]).refused(1, &["missing.las"]);
-    gdt_batch(folder.path(), &["verify", "missing"]).refused(1, &["missing"]);
+    gdt_batch(folder.path(), &["info", "missing.las"]).refused(2, &["no file missing.las"]);
+    for path in ["missing", ".", "empty.las"] {
+        gdt_batch(folder.path(), &["verify", path]).refused(2, &[path, "output directory of a finished job"]);
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn what_is_no_file_is_not_waited_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let made = std::process::Command::new("mkfifo").arg(folder.path().join("pipe.csv")).status().unwrap();
+    assert!(made.success());
+    for path in ["pipe.csv", "/dev/zero"] {
+        gdt_batch(folder.path(), &["info", path]).refused(3, &[path, "regular file"]);
+    }
+    Job::on(&[folder.path().join("pipe.csv")]).run().refused(2, &["pipe.csv", "files"]);
 }
 
 fn small_job() -> (tempfile::TempDir, Job) {

@@ -1,6 +1,7 @@
-// node view.mjs OUTPUT CHROMIUM REQUEST.json SCREENSHOT.png: opens OUTPUT/tileset.json (3d-tiles-renderer) and OUTPUT/terrain.glb
-// (GLTFLoader), both with three.js, in a headless Chromium, and prints as JSON what they show: triangles, bounds, and the heights at
-// the places [x, y] that the request lists as "places", metres from the scene's origin.
+// node view.mjs OUTPUT CHROMIUM SCREENSHOT.png [PAGE [REQUEST.json]]: opens what a job has written to the folder OUTPUT in a headless
+// Chromium, and prints as JSON what it shows: triangles, bounds, and the heights at the places [x, y] that the request lists as
+// "places", metres from the scene's origin. PAGE "view", which is meant where none is given, shows tileset.json with 3d-tiles-renderer
+// and terrain.glb with GLTFLoader, both of three.js; "cesium" shows tileset.json on the globe, with CesiumJS.
 import { createServer } from 'node:http';
 import { mkdtemp, readFile, rm, writeFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
@@ -8,10 +9,10 @@ import { dirname, extname, join, normalize } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { spawn } from 'node:child_process';
 
-const [output, chromium, requestPath, screenshot] = process.argv.slice(2);
+const [output, chromium, screenshot, page = 'view', requestPath] = process.argv.slice(2);
 const here = dirname(fileURLToPath(import.meta.url));
-const TYPES = { '.html': 'text/html', '.js': 'text/javascript', '.mjs': 'text/javascript', '.json': 'application/json' };
-const PATIENCE_MS = 120_000;
+const TYPES = { '.html': 'text/html', '.js': 'text/javascript', '.mjs': 'text/javascript', '.json': 'application/json', '.wasm': 'application/wasm' };
+const PATIENCE_MS = 280_000;
 
 let settle;
 const shown = new Promise((resolve, reject) => { settle = { resolve, reject }; });
@@ -24,6 +25,7 @@ async function answer(request, response) {
     settle.resolve(JSON.parse(Buffer.concat(parts).toString()));
     return response.end();
   }
+  if (path === '/request.json' && !requestPath) return response.end('{"places": []}');
   const file = path === '/request.json' ? requestPath : path.startsWith('/out/') ? join(output, path.slice(4)) : join(here, path);
   try {
     const bytes = await readFile(file);
@@ -41,7 +43,7 @@ const profile = await mkdtemp(join(tmpdir(), 'gdt-view-'));
 const browser = spawn(chromium, [
   '--headless', '--no-sandbox', '--disable-gpu', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-quic',
   '--no-first-run', '--disable-background-networking', '--disable-component-update', '--disable-sync', '--disable-dev-shm-usage',
-  `--user-data-dir=${profile}`, '--window-size=800,600', `http://127.0.0.1:${server.address().port}/view.html`,
+  `--user-data-dir=${profile}`, '--window-size=800,600', `http://127.0.0.1:${server.address().port}/${page}.html`,
 ], { stdio: ['ignore', 'ignore', 'pipe'] });
 let said = '';
 browser.stderr.on('data', (text) => { said = (said + text).slice(-4000); });

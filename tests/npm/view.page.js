@@ -1,4 +1,5 @@
-// The page of view.html: shows the tileset coarse and fine, and the single file, and tells the server what is to be seen.
+// The page of view.html: shows the single file, and the tileset coarse and fine, as far as they are there, and tells the server what
+// is to be seen.
 import * as THREE from 'three';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 import { MeshoptDecoder } from 'three/addons/libs/meshopt_decoder.module.js';
@@ -61,7 +62,11 @@ function facts(root, places, toWorld, up) {
   return { triangles, box: [box.min.toArray(), box.max.toArray()], heights, meshes: meshes.length };
 }
 
+const isThere = async (path) => (await fetch(path, { method: 'HEAD' })).ok;
+const picture = () => renderer.domElement.toDataURL('image/png');
+
 async function showTiles(places) {
+  if (!await isThere('/out/tileset.json')) return null;
   const root = (await (await fetch('/out/tileset.json')).json()).root;
   const toWorld = new THREE.Matrix4().fromArray(root.transform ?? new THREE.Matrix4().toArray());
   const tiles = new TilesRenderer('/out/tileset.json');
@@ -101,11 +106,11 @@ async function showTiles(places) {
     // In the tileset's own coordinates: the frame has already turned the globe back.
     seen[name] = facts(tiles.group, places, new THREE.Matrix4(), 'z');
   }
-  return { ...seen, picture: renderer.domElement.toDataURL('image/png') };
+  return { ...seen, picture: picture() };
 }
 
 async function showFile(places) {
-  if (!(await fetch('/out/terrain.glb', { method: 'HEAD' })).ok) return null;
+  if (!await isThere('/out/terrain.glb')) return null;
   const { scene: terrain } = await gltf.loadAsync('/out/terrain.glb');
   const up = new THREE.Vector3(0, 1, 0);
   const scene = sceneWith(terrain, up);
@@ -118,7 +123,7 @@ try {
   const { places } = await (await fetch('/request.json')).json();
   await MeshoptDecoder.ready;
   const file = await showFile(places);
-  result = { file, ...await showTiles(places) };
+  result = { file, picture: picture(), ...await showTiles(places) };
 } catch (error) {
   result = { error: String(error.stack ?? error) };
 }

@@ -219,7 +219,15 @@ fn a_damaged_tile_and_one_of_another_job() {
 #[test]
 fn a_directory_without_tiles() {
     let directory = tempfile::tempdir().unwrap();
-    assert_eq!(verify(directory.path(), 1 << 28).unwrap_err().exit_code(), 1);
+    let refused = |path: &std::path::Path, words: &str| {
+        let error = verify(path, 1 << 28).unwrap_err();
+        assert!(error.exit_code() == 2 && error.to_string().contains(words), "{error}");
+        assert!(error.to_string().contains("output directory of a finished job"), "{error}");
+    };
+    refused(&directory.path().join("none"), "none is not there");
+    refused(directory.path(), "has no folder named tiles");
+    std::fs::write(directory.path().join("file"), "").unwrap();
+    refused(&directory.path().join("file"), "file is not a directory");
     std::fs::create_dir(directory.path().join("tiles")).unwrap();
-    assert!(verify(directory.path(), 1 << 28).unwrap_err().to_string().contains("no .glb"));
+    refused(directory.path(), "tiles has no .glb file");
 }

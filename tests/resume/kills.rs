@@ -50,6 +50,17 @@ fn killed_at_commits_with_two_threads() {
 }
 
 #[test]
+fn killed_while_triangles_are_left_out_below_levels() {
+    let setup = Setup::tiles_of(2_000).output("max_edge = \"auto\"").output("level_sites = 1000");
+    let rig = small_job(&setup);
+    for folder in ["cut/", "levels/"] {
+        assert!(rig.expected.keys().filter(|name| name.starts_with(folder)).count() > 2, "{folder}");
+    }
+    let kills: u64 = PLACES.iter().map(|place| kill_at_each(&rig, place, 8)).sum();
+    assert!(kills >= 16, "only {kills} kills");
+}
+
+#[test]
 fn killed_again_and_again_while_it_goes_on() {
     let rig = small_job(&Setup::tiles_of(3_500).threads(2));
     for place in PLACES {

@@ -1,0 +1,188 @@
+//! Wide areas follow the curve of the earth, tile by tile.
+
+use std::collections::HashMap;
+
+use proj4rs::{Proj, transform::transform};
+use serde_json::Value;
+
+use crate::program::Job;
+use crate::random::Random;
+use crate::tileset::{Tile, applied, error, height, keeps_the_rules, numbers, tiles, triangles};
+
+/// Source coordinates of the middle.
+const MIDDLE: [f64; 3] = [500_000.0, 4_000_000.0, 0.0];
+
+/// A LAS file of points in UTM zone 33 north, steps of 1 cm from [`MIDDLE`].
+fn utm(points: &[[i32; 3]]) -> Vec<u8> {
+    let keys: [u16; 12] = [1, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, 32633];
+    let mut bytes = vec![0; 227];
+    let mut put = |at: usize, value: &[u8]| bytes[at..at + value.len()].copy_from_slice(value);
+    put(0, b"LASF");
+    put(24, &[1, 2]);
+    put(94, &227u16.to_le_bytes());
+    put(96, &(227 + 54 + 24u32).to_le_bytes());
+    put(100, &1u32.to_le_bytes());
+    put(105, &20u16.to_le_bytes());
+    put(107, &(points.len() as u32).to_le_bytes());
+    for (axis, offset) in MIDDLE.into_iter().enumerate() {
+        put(131 + 8 * axis, &0.01f64.to_le_bytes());
+        put(155 + 8 * axis, &offset.to_le_bytes());
+    }
+    let mut record = [0; 54];
+    record[2..17].copy_from_slice(b"LASF_Projection");
+    record[18..20].copy_from_slice(&34735u16.to_le_bytes());
+    record[20..22].copy_from_slice(&24u16.to_le_bytes());
+    bytes.extend(record);
+    bytes.extend(keys.iter().flat_map(|key| key.to_le_bytes()));
+    for point in points {
+        bytes.extend(point.iter().flat_map(|v| v.to_le_bytes()));
+        bytes.extend([0, 0, 9, 2, 0, 0, 0, 0]);
+    }
+    bytes
+}
+
+/// `side` times `side` points, spread over a square that reaches `half` metres from `centre` and up to its sides, 200 m high at most.
+fn square(side: i32, half: f64, centre: [f64; 2]) -> Vec<[i32; 3]> {
+    let mut random = Random(7);
+    let mut along = |i: i32, centre: f64| {
+        let share = ((i as f64 + random.unit() * 1.5 - 0.75) / (side - 1) as f64).clamp(0.0, 1.0);
+        ((centre + (2.0 * share - 1.0) * half) * 100.0).round() as i32
+    };
+    let places: Vec<[i32; 2]> =
+        (0..side * side).map(|i| [along(i % side, centre[0]), along(i / side, centre[1])]).collect();
+    places.into_iter().map(|[x, y]| [x, y, random.below(20_000) as i32]).collect()
+}
+
+fn georeference(job: &Job, name: &str) -> Value {
+    let text = std::fs::read(job.out().join("georeference.json")).unwrap();
+    serde_json::from_slice::<Value>(&text).unwrap()[name].take()
+}
+
+/// Earth-centred places of places in the source, by another way than the program's: PROJ's own geocentric coordinates.
+struct Truth {
+    utm: Proj,
+    geocentric: Proj,
+}
+
+impl Truth {
+    fn new() -> Truth {
+        let proj = |text: &str| Proj::from_proj_string(text).unwrap();
+        Truth { utm: proj("+proj=utm +zone=33 +datum=WGS84"), geocentric: proj("+proj=geocent +datum=WGS84") }
+    }
+
+    /// For a place of the scene, whose origin is at `offset` in the source.
+    fn place(&self, offset: [f64; 3], place: [f64; 3]) -> [f64; 3] {
+        let [x, y, z] = [0, 1, 2].map(|k| offset[k] + place[k]);
+        let mut point = (x, y, z);
+        transform(&self.utm, &self.geocentric, &mut point).unwrap();
+        [point.0, point.1, point.2]
+    }
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
+}
+
+/// A job on these points, and its tiles, which are packed with meshopt and keep the rules.
+fn job(points: &[[i32; 3]]) -> (Job, Vec<Tile>) {
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = folder.path().join("cloud.las");
+    std::fs::write(&cloud, utm(points)).unwrap();
+    let job = Job::on(&[&cloud]).tiles_of(500).with("output", "level_sites = 500\nformat = \"tiles\"");
+    job.report();
+    job.verified();
+    let tiles = tiles(&job);
+    keeps_the_rules(&job, &tiles);
+    (job, tiles)
+}
+
+/// A job on an area 100 km wide.
+pub(crate) fn wide() -> (Job, Vec<Tile>) {
+    job(&square(200, 50_000.0, [0.0; 2]))
+}
+
+fn is_exact(tile: &Tile) -> bool {
+    tile.json["children"].is_null()
+}
+
+#[test]
+fn a_wide_area_follows_the_curve_of_the_earth() {
+    let (job, tiles) = wide();
+    assert!(tiles.iter().all(|tile| numbers::<16>(&tile.json["transform"]).is_some()));
+    let globe = georeference(&job, "globe");
+    assert_eq!(globe["per_tile"], true);
+    let promise = globe["distortion_m"].as_f64().unwrap();
+    let offset: [f64; 3] = numbers(&georeference(&job, "offset")).unwrap();
+    let truth = Truth::new();
+    let (mut off, mut gap, mut flat) = (0.0f64, 0.0f64, 0.0f64);
+    let mut places = HashMap::new();
+    for tile in tiles.iter().filter(|tile| is_exact(tile)) {
+        for place in triangles(&job, tile).into_iter().flatten() {
+            let belongs = truth.place(offset, place);
+            let found = applied(&tile.placed, place);
+            off = off.max(distance(found, belongs));
+            flat = flat.max(distance(applied(&tiles[0].placed, place), belongs));
+            let first = *places.entry(place.map(f64::to_bits)).or_insert(found);
+            gap = gap.max(distance(first, found));
+        }
+    }
+    eprintln!("promised {promise} m, off {off} m, gap {gap} m, with one transform {flat} m");
+    // A resolution's half at most from rounding to steps, and what two ways of reckoning differ by.
+    let rounding = 0.01;
+    assert!(off <= promise + rounding && gap <= 2.0 * promise, "{off}, {gap}, {promise}");
+    assert!(promise < 1.5 * off, "{promise} m are promised, and no more than {off} used");
+    assert!(gap > 0.0 && flat > 300.0 && off < flat / 20.0, "{off} of {flat}, {gap}");
+}
+
+/// Where coarser tiles lie flat across the earth's curve, that is part of their error.
+#[test]
+fn errors_of_wide_tiles_are_true_on_the_globe() {
+    let (job, tiles) = wide();
+    let meshes: Vec<_> = tiles.iter().map(|tile| triangles(&job, tile)).collect();
+    let mut random = Random(3);
+    let (mut looked, mut vertical) = (0, 0);
+    for (leaf, tile) in tiles.iter().enumerate().filter(|(_, tile)| is_exact(tile)) {
+        for _ in 0..20 {
+            let exact = meshes[leaf][random.below(meshes[leaf].len() as u64) as usize][0];
+            for &above in &tile.above {
+                let Some(coarse) = meshes[above].iter().find_map(|t| height(t, [exact[0], exact[1]])) else { continue };
+                let shown = applied(&tiles[above].placed, [exact[0], exact[1], coarse]);
+                let off = distance(shown, applied(&tile.placed, exact));
+                assert!(off <= error(&tiles[above].json) + 1e-6, "{off} of {}", tiles[above].json["geometricError"]);
+                looked += 1;
+                // No height is off by more than all heights differ.
+                vertical += usize::from(off <= 200.0);
+            }
+        }
+    }
+    assert!(looked > 3_000 && vertical < looked, "{looked} places, {vertical} off by no more than heights are");
+}
+
+/// Triangles that bridge a void 60 km wide do not pull the tiles they are in away from the ground.
+#[test]
+fn long_triangles_leave_the_ground_where_it_belongs() {
+    let fields = [square(60, 2_000.0, [-30_000.0, 0.0]), square(60, 2_000.0, [30_000.0, 0.0])].concat();
+    let (job, tiles) = job(&fields);
+    let offset: [f64; 3] = numbers(&georeference(&job, "offset")).unwrap();
+    let truth = Truth::new();
+    // Every vertex in the tile that puts it best.
+    let mut best = HashMap::new();
+    for tile in tiles.iter().filter(|tile| is_exact(tile)) {
+        for place in triangles(&job, tile).into_iter().flatten() {
+            let off = distance(applied(&tile.placed, place), truth.place(offset, place));
+            best.entry(place.map(f64::to_bits)).and_modify(|best: &mut f64| *best = best.min(off)).or_insert(off);
+        }
+    }
+    let worst = best.values().copied().fold(0.0, f64::max);
+    let promise = georeference(&job, "globe")["distortion_m"].as_f64().unwrap();
+    assert!(best.len() > 7_000 && worst < 0.2 && promise > 50.0, "{} places, {worst} m, {promise}", best.len());
+}
+
+#[test]
+fn a_small_area_has_one_transform() {
+    let (job, tiles) = job(&square(70, 1_000.0, [0.0; 2]));
+    let globe = georeference(&job, "globe");
+    assert_eq!(Some(tiles[0].placed), numbers(&globe["transform"]));
+    assert!(tiles.len() > 5 && tiles[1..].iter().all(|tile| tile.json["transform"].is_null()));
+    assert_eq!(globe["per_tile"], false);
+}

@@ -1,0 +1,194 @@
+//! Programs that show terrain open what a job has written, and show all of it where it belongs: three.js and CesiumJS in a headless
+//! browser, and Blender on request.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use gdt_batch::output::globe::relative;
+use serde_json::{Value, json};
+
+use crate::clouds;
+use crate::common::shared;
+use crate::globe::wide;
+use crate::levels::hills;
+use crate::program::{Job, number};
+use crate::random::Random;
+use crate::tileset::{Tile, applied, extent, keeps_the_rules, tiles, triangles};
+use crate::validator::validate;
+
+/// Chromium, if it is there; under tests/run it has to be.
+fn chromium() -> Option<PathBuf> {
+    let npm = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/npm/node_modules");
+    let is_there = ["three", "3d-tiles-renderer", "cesium"].iter().all(|package| npm.join(package).is_dir());
+    let found = ["/usr/bin/chromium", "/usr/bin/chromium-browser"].map(PathBuf::from).into_iter().find(|p| p.exists());
+    if found.is_none() || !is_there {
+        assert!(std::env::var_os("GDT_TEST_ALL").is_none(), "no Chromium, or no three.js or CesiumJS in tests/npm");
+        eprintln!("not tested: no Chromium, or no three.js or CesiumJS; run `npm ci` in tests/npm, or tests/run");
+        return None;
+    }
+    found
+}
+
+/// A file that asks for the heights at `places`.
+fn request(job: &Job, places: &[[f64; 3]]) -> PathBuf {
+    let places: Vec<[f64; 2]> = places.iter().map(|p| [p[0], p[1]]).collect();
+    let request = job.folder().join("request.json");
+    std::fs::write(&request, json!({"places": places}).to_string()).unwrap();
+    request
+}
+
+/// What a page of tests/npm shows of the job in the browser, heights at `places` included.
+#[track_caller]
+fn seen(job: &Job, chromium: &Path, page: &str, places: &[[f64; 3]]) -> Value {
+    let request = request(job, places);
+    let screenshot = job.folder().join("screenshot.png");
+    let view = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/npm/view.mjs");
+    let output =
+        Command::new("node").arg(view).arg(job.out()).arg(chromium).arg(&screenshot).arg(page).arg(request).output();
+    let output = output.expect("node runs");
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    assert!(output.status.success(), "{}{}", text(&output.stdout), text(&output.stderr));
+    assert!(std::fs::metadata(&screenshot).unwrap().len() > 10_000, "an empty picture");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// The middles of a dozen triangles of the finest mesh, in the frame of the root.
+fn middles(job: &Job, tiles: &[Tile]) -> Vec<[f64; 3]> {
+    let mut random = Random(4);
+    let middle = |_| {
+        let leaf = tiles[0].leaves[random.below(tiles[0].leaves.len() as u64) as usize];
+        let mesh = triangles(job, &tiles[leaf]);
+        let t = mesh[random.below(mesh.len() as u64) as usize];
+        let middle = [0, 1, 2].map(|k| (t[0][k] + t[1][k] + t[2][k]) / 3.0);
+        applied(&relative(&tiles[0].placed, &tiles[leaf].placed), middle)
+    };
+    (0..12).map(middle).collect()
+}
+
+/// The finest mesh, whole and at its heights.
+#[track_caller]
+fn is_exact(view: &Value, report: &Value, expected: &[[f64; 3]]) {
+    assert_eq!(view["triangles"], report["triangles"]);
+    let heights = view["heights"].as_array().unwrap();
+    assert_eq!(heights.len(), expected.len());
+    for (height, place) in heights.iter().zip(expected) {
+        let height = height.as_f64().unwrap_or_else(|| panic!("nothing at {place:?}"));
+        assert!((height - place[2]).abs() < 0.02, "{height} at {place:?}");
+    }
+}
+
+/// The box of what is shown is that of the root, side by side.
+#[track_caller]
+fn is_as_large(view: &Value, root: &Tile) {
+    let all = extent(&root.json);
+    let found: Vec<Vec<f64>> = serde_json::from_value(view["box"].clone()).unwrap();
+    assert!((0..3).all(|k| (0..2).all(|side| (found[side][k] - all[side][k]).abs() < 0.02)), "{found:?} {all:?}");
+}
+
+/// The root's content alone.
+#[track_caller]
+fn is_coarsest(view: &Value, job: &Job, tiles: &[Tile]) {
+    assert_eq!(number(&view["triangles"]), triangles(job, &tiles[0]).len() as u64);
+    assert_eq!(number(&view["meshes"]), 1);
+}
+
+#[track_caller]
+fn shows(job: &Job, chromium: &Path) {
+    let report = job.report();
+    let tiles = tiles(job);
+    keeps_the_rules(job, &tiles);
+    validate(&job.out(), tiles.len());
+    let places = middles(job, &tiles);
+    let seen = seen(job, chromium, "view", &places);
+    is_exact(&seen["fine"], &report, &places);
+    is_coarsest(&seen["coarse"], job, &tiles);
+    assert_eq!(seen["file"].is_null(), !job.out().join("terrain.glb").exists());
+    if !seen["file"].is_null() {
+        is_exact(&seen["file"], &report, &places);
+    }
+    is_as_large(&seen["fine"], &tiles[0]);
+}
+
+#[test]
+fn a_browser_shows_the_tileset_and_the_file() {
+    let Some(chromium) = chromium() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = clouds::write(folder.path(), "cloud.csv", &hills(20_000, 3));
+    let packed = "level_sites = 2000\ncompression = \"meshopt\"";
+    shows(&Job::on(&[cloud]).tiles_of(2_000).with("output", packed), &chromium);
+    if let Some(job) = stadium() {
+        shows(&job, &chromium);
+    }
+}
+
+/// A real cloud with a coordinate system, in a handful of tiles.
+fn stadium() -> Option<Job> {
+    let cloud = shared()?.join("data/autzen_trim.las");
+    Some(Job::on(&[cloud]).tiles_of(6_000).with("output", "level_sites = 6000"))
+}
+
+#[test]
+fn a_browser_shows_the_tileset_on_the_globe() {
+    let (Some(chromium), Some(job)) = (chromium(), stadium()) else { return };
+    let report = job.report();
+    let seen = seen_on_the_globe(&job, &report, &tiles(&job), &chromium);
+    let centre: [f64; 3] = serde_json::from_value(seen["centre"].clone()).unwrap();
+    let expected = [-123.0712, 44.0507, 141.2];
+    assert!((0..3).all(|k| (centre[k] - expected[k]).abs() < [2e-4, 2e-4, 1.0][k]), "{centre:?}");
+}
+
+#[test]
+fn a_browser_shows_a_wide_area_on_the_globe() {
+    let Some(chromium) = chromium() else { return };
+    let (job, tiles) = wide();
+    let report: Value = serde_json::from_slice(&std::fs::read(job.out().join("report.json")).unwrap()).unwrap();
+    seen_on_the_globe(&job, &report, &tiles, &chromium);
+}
+
+#[track_caller]
+fn seen_on_the_globe(job: &Job, report: &Value, tiles: &[Tile], chromium: &Path) -> Value {
+    let places = middles(job, tiles);
+    let seen = seen(job, chromium, "cesium", &places);
+    is_exact(&seen["fine"], report, &places);
+    is_coarsest(&seen["coarse"], job, tiles);
+    seen
+}
+
+/// Minutes on a software GPU; GDT_TEST_LARGE=1 asks for it.
+#[test]
+fn a_browser_shows_the_large_file() {
+    let (Some(chromium), Some(data)) = (chromium(), shared()) else { return };
+    if std::env::var_os("GDT_TEST_LARGE").is_none() {
+        eprintln!("not tested: autzen.laz in a browser; set GDT_TEST_LARGE=1");
+        return;
+    }
+    shows(&Job::on(&[data.join("data/autzen.laz")]).with("output", "format = \"tiles\""), &chromium);
+}
+
+/// GDT_BPY names a Python that has Blender's module `bpy`.
+#[test]
+fn blender_opens_the_file() {
+    let Some(python) = std::env::var_os("GDT_BPY") else {
+        eprintln!("not tested: Blender; set GDT_BPY to a Python that has the module bpy");
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = clouds::write(folder.path(), "cloud.csv", &hills(20_000, 3));
+    for compression in ["none", "quantized", "meshopt"] {
+        let look = format!("compression = \"{compression}\"");
+        let job = Job::on(&[&cloud]).tiles_of(2_000).with("output", &look);
+        let report = job.report();
+        let tiles = tiles(&job);
+        let places = middles(&job, &tiles);
+        let request = request(&job, &places);
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/blender.py");
+        let output = Command::new(&python).arg(script).arg(job.out().join("terrain.glb")).arg(request).output();
+        let output = output.expect("GDT_BPY runs");
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        assert!(output.status.success(), "{}{}", text(&output.stdout), text(&output.stderr));
+        // Blender talks, too.
+        let seen: Value = serde_json::from_str(text(&output.stdout).lines().last().unwrap()).unwrap();
+        is_exact(&seen, &report, &places);
+        is_as_large(&seen, &tiles[0]);
+    }
+}

@@ -1,0 +1,84 @@
+// The page of cesium.html: shows the tileset coarse and fine where it lies on the globe, and tells the server what is to be seen.
+const { Cartesian3, Cartographic, Cesium3DTileset, CesiumWidget, Color, DirectionalLight, HeadingPitchRange, Math: Angles, Matrix4, Ray } = window.Cesium;
+const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+
+function emptyScene() {
+  const widget = new CesiumWidget('scene', {
+    baseLayer: false, globe: false, skyBox: false, skyAtmosphere: false, useDefaultRenderLoop: false,
+    creditContainer: document.createElement('div'), contextOptions: { webgl: { preserveDrawingBuffer: true } },
+  });
+  widget.resize();
+  const { scene } = widget;
+  scene.backgroundColor = Color.fromCssColorString('#8fb3d9');
+  return scene;
+}
+
+// From the south, from above, and the light from the south-east.
+function lookAt(scene, tileset) {
+  const { center, radius } = tileset.boundingSphere;
+  scene.camera.lookAt(center, new HeadingPitchRange(0, Angles.toRadians(-45), radius * 2));
+  const direction = Matrix4.multiplyByPointAsVector(tileset.root.computedTransform, new Cartesian3(-0.5, 0.5, -1), new Cartesian3());
+  scene.light = new DirectionalLight({ direction: Cartesian3.normalize(direction, direction), intensity: 3 });
+}
+
+// The height over x, y, in the tileset's own frame, straight down. Not by getHeight, which looks towards the centre of the earth: that is
+// 0.2 degrees off the plumb line at these latitudes, and where laser points stand one above the other, on walls and tree trunks, triangles
+// rise 300 m a metre, so that the two sight lines meet the terrain metres apart.
+function heightOver(scene, tileset, [x, y]) {
+  const toWorld = tileset.root.computedTransform;
+  const origin = Matrix4.multiplyByPoint(toWorld, new Cartesian3(x, y, 1e5), new Cartesian3());
+  const down = Matrix4.multiplyByPointAsVector(toWorld, new Cartesian3(0, 0, -1), new Cartesian3());
+  const found = tileset.pick(new Ray(origin, Cartesian3.normalize(down, down)), scene.frameState, new Cartesian3());
+  return found ? Matrix4.multiplyByPoint(Matrix4.inverse(toWorld, new Matrix4()), found, new Cartesian3()).z : null;
+}
+
+// The screen space error in pixels at which CesiumJS shows the root alone: above that of the tileset it would show nothing at all.
+async function coarseError(scene, tileset) {
+  const { geometricError, root } = await (await fetch('/out/tileset.json')).json();
+  const { center, radius } = tileset.boundingSphere;
+  const distance = Cartesian3.distance(scene.camera.positionWC, center) - radius / 2;
+  return Math.sqrt(geometricError * root.geometricError) * scene.drawingBufferHeight / (distance * scene.camera.frustum.sseDenominator);
+}
+
+function facts(scene, tileset, shown, places) {
+  const triangles = [...shown].reduce((sum, tile) => sum + tile.content.trianglesLength, 0);
+  return { triangles, meshes: shown.size, heights: places.map((place) => heightOver(scene, tileset, place)) };
+}
+
+async function show(places) {
+  const scene = emptyScene();
+  const tileset = await Cesium3DTileset.fromUrl('/out/tileset.json', {
+    foveatedScreenSpaceError: false, cullRequestsWhileMoving: false, cacheBytes: 2 ** 32, enablePick: true,
+  });
+  const failures = [];
+  tileset.tileFailed.addEventListener(({ url, message }) => failures.push(`${url}: ${message}`));
+  scene.renderError.addEventListener((_, error) => failures.push(String(error)));
+  scene.primitives.add(tileset);
+  lookAt(scene, tileset);
+  const shown = new Set();
+  tileset.tileVisible.addEventListener((tile) => shown.add(tile));
+  const seen = {};
+  for (const [name, error] of [['coarse', await coarseError(scene, tileset)], ['fine', 1e-6]]) {
+    tileset.maximumScreenSpaceError = error;
+    for (let calm = 0; calm < 10;) {
+      shown.clear();
+      scene.render();
+      await pause(20);
+      calm = tileset.tilesLoaded && shown.size > 0 ? calm + 1 : 0;
+      if (failures.length > 0) throw new Error(failures.join('; '));
+    }
+    seen[name] = facts(scene, tileset, shown, places);
+  }
+  const { longitude, latitude, height } = Cartographic.fromCartesian(tileset.boundingSphere.center);
+  const centre = [Angles.toDegrees(longitude), Angles.toDegrees(latitude), height];
+  return { ...seen, centre, picture: scene.canvas.toDataURL('image/png') };
+}
+
+let result;
+try {
+  const { places } = await (await fetch('/request.json')).json();
+  result = await show(places);
+} catch (error) {
+  result = { error: String(error.stack ?? error) };
+}
+await fetch('/result', { method: 'POST', body: JSON.stringify(result) });
