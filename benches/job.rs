@@ -1,9 +1,9 @@
 //! The whole job against decoding alone: `cargo bench --bench job [FILE.laz] [RUNS]`.
 //!
 //! Alternates, in one process, between one thread that only decodes the file with the `las` crate, the whole job on it with plain
-//! tiles alone, and the job with all there is for viewers: tiles packed with meshopt, and levels of detail. Prints medians, their
-//! ratios and the stages of the median jobs. Without FILE it takes autzen.laz from the test data
-//! if that is there, else a sample terrain of 4 million points.
+//! tiles alone, the same on the same points as LAS, and the job with all there is for viewers: tiles packed with meshopt, and levels
+//! of detail. Prints medians, their ratios and the stages of the median jobs. Without FILE it takes autzen.laz from the test data if
+//! that is there, else a sample terrain of 4 million points.
 
 use gdt_batch::config::Config;
 use gdt_batch::job::progress::Progress;
@@ -13,6 +13,9 @@ use std::time::Instant;
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
+const PLAIN: &str = "compression = \"none\"\nlevels = false";
+const FULL: &str = "format = \"tiles\"";
+
 fn main() -> Outcome<()> {
     let mut arguments = std::env::args().skip(1).filter(|a| !a.starts_with("--"));
     let scratch = tempfile::tempdir()?;
@@ -21,25 +24,29 @@ fn main() -> Outcome<()> {
         None => default_file(scratch.path())?,
     };
     let runs: usize = arguments.next().map_or(Ok(5), |n| n.parse())?;
-    let (mut decoding, mut plain, mut full) = (Vec::new(), Vec::new(), Vec::new());
+    let unpacked = as_las(&file, scratch.path())?;
+    let cases =
+        [("plain tiles", &file, PLAIN), ("plain tiles, LAS", &unpacked, PLAIN), ("packed, levels", &file, FULL)];
+    let (mut decoding, mut jobs) = (Vec::new(), [const { Vec::new() }; 3]);
     for run in 0..runs {
         decoding.push(decode(&file)?);
-        plain.push(job(&file, &scratch.path().join(format!("plain{run}")), "compression = \"none\"\nlevels = false")?);
-        full.push(job(&file, &scratch.path().join(format!("full{run}")), "format = \"tiles\"")?);
+        for (case, (_, input, look)) in cases.iter().enumerate() {
+            jobs[case].push(job(input, &scratch.path().join(format!("{case}-{run}")), look)?);
+        }
     }
     decoding.sort_by(f64::total_cmp);
-    let [plain, full] = [plain, full].map(|mut jobs: Vec<Report>| {
+    let medians = jobs.map(|mut jobs: Vec<Report>| {
         jobs.sort_by(|a, b| a.wall_s.total_cmp(&b.wall_s));
         jobs.swap_remove(runs / 2)
     });
     let decode = decoding[runs / 2];
     println!("{}, {} runs, medians", file.display(), runs);
-    println!("{plain}");
-    println!("{full}");
+    medians.iter().zip(cases).for_each(|(job, (name, ..))| println!("{name}\n{job}"));
     println!("decode only, one thread, las crate  {decode:.2} s");
-    for (name, job) in [("plain tiles", &plain), ("packed, levels", &full)] {
-        println!("whole job, {} threads, {name:<14} {:.2} s, {:.2} x", job.threads, job.wall_s, job.wall_s / decode);
+    for (job, (name, ..)) in medians.iter().zip(cases) {
+        println!("whole job, {} threads, {name:<16} {:.2} s, {:.2} x", job.threads, job.wall_s, job.wall_s / decode);
     }
+    let [plain, _, full] = medians;
     println!("packing and levels add {:.2} of the job without them", full.wall_s / plain.wall_s - 1.0);
     Ok(())
 }
@@ -63,6 +70,19 @@ fn decode(file: &Path) -> Outcome<f64> {
     let mut batch = las::PointDataBuilder::new().for_header(reader.header()).build();
     while reader.fill_points(100_000, &mut batch)? > 0 {}
     Ok(start.elapsed().as_secs_f64())
+}
+
+/// The same points without compression.
+fn as_las(file: &Path, scratch: &Path) -> Outcome<PathBuf> {
+    let path = scratch.join("unpacked.las");
+    let mut reader = las::Reader::from_path(file)?;
+    let mut writer = las::Writer::from_path(&path, reader.header().clone())?;
+    let mut batch = las::PointDataBuilder::new().for_header(reader.header()).build();
+    while reader.fill_points(100_000, &mut batch)? > 0 {
+        writer.write_points(&batch)?;
+    }
+    writer.close()?;
+    Ok(path)
 }
 
 fn job(file: &Path, output: &Path, look: &str) -> Outcome<Report> {
