@@ -8,6 +8,9 @@ use rust_decimal::Decimal;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
+/// Metres. No datum is as far from the ellipsoid; beyond it f64 would lose what puts tiles together.
+const MOST_HEIGHT_OFFSET: f64 = 100_000.0;
+
 /// Everything a user can say about a job.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -563,8 +566,8 @@ impl Config {
         if config.output.directory.as_os_str().is_empty() {
             return Err("[output] directory is empty".into());
         }
-        if !config.output.height_offset.is_finite() {
-            return Err("[output] height_offset is not a number of metres".into());
+        if config.output.height_offset.is_nan() || config.output.height_offset.abs() > MOST_HEIGHT_OFFSET {
+            return Err(format!("[output] height_offset is not a number of metres up to {MOST_HEIGHT_OFFSET}"));
         }
         Ok(config)
     }

@@ -19,11 +19,11 @@ pub enum Error {
         source: std::io::Error,
     },
     /// Another process works in the job directory (exit code 1).
-    #[error("process {holder} is working in {}: wait for it, or choose another [output] directory", directory.display())]
+    #[error("{} is working in {}: wait for it, or choose another [output] directory", process(holder), directory.display())]
     InUse {
         /// The job directory.
         directory: PathBuf,
-        /// The process id of the holder.
+        /// The process id of the holder; empty if it has not said so yet.
         holder: String,
     },
     /// The job does not fit the memory it was given (exit code 1).
@@ -67,6 +67,10 @@ pub enum Error {
     /// Something this program guarantees does not hold (exit code 4).
     #[error("internal check failed: {0}; please report this with the configuration and the input")]
     Broken(String),
+}
+
+fn process(holder: &str) -> String {
+    if holder.is_empty() { "another process".into() } else { format!("process {holder}") }
 }
 
 /// What to do about a failure of the operating system, where something can be said.

@@ -84,7 +84,9 @@ pub struct Preflight {
 /// # Errors
 /// Whatever would stop the job before its first point; see [`scan::run`].
 pub fn run(config: &Config) -> Result<Preflight> {
-    Directory::new(&config.output.directory).nothing_is_in_the_way()?;
+    let directory = Directory::new(&config.output.directory);
+    directory.nothing_is_in_the_way()?;
+    directory.is_not_somebody_elses()?;
     let plan = scan::run(config, Coarser::default())?;
     let threads = workers(config, plan.records)?;
     Ok(preflight(&plan, config, threads))
@@ -174,7 +176,7 @@ impl Preflight {
         machine::check_writable(&self.output)?;
         if let Some(free) = self.disk_free.filter(|free| *free < self.disk) {
             let what = format!(
-                "the job takes about {} there, and {} are free (--force goes on all the same)",
+                "the job takes about {} there, and {} are free or its own already (--force goes on all the same)",
                 mebibytes(self.disk),
                 mebibytes(free)
             );

@@ -14,7 +14,6 @@ use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 use std::collections::HashMap;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicU64, Ordering};
 use xxhash_rust::xxh3::xxh3_64;
 
 /// A step of a job, by tile or node where it is called by one.
@@ -139,7 +138,6 @@ pub fn read(directory: &Directory) -> Result<Option<(Head, Vec<Entry>)>> {
 pub struct Journal<'a> {
     directory: &'a Directory,
     taken_over: HashMap<Step, Entry>,
-    recorded: AtomicU64,
     committer: Committer,
 }
 
@@ -157,7 +155,7 @@ impl<'a> Journal<'a> {
         directory::write_result(&path, text.as_bytes())?;
         directory::publish(std::slice::from_ref(&path))?;
         let taken_over = entries.into_iter().map(|entry| (entry.step, entry)).collect();
-        Ok(Journal { directory, taken_over, recorded: AtomicU64::new(0), committer: Committer::start(&path)? })
+        Ok(Journal { directory, taken_over, committer: Committer::start(&path)? })
     }
 
     /// Whether an earlier run has finished `step`.
@@ -168,11 +166,6 @@ impl<'a> Journal<'a> {
     /// How many steps earlier runs have finished.
     pub fn taken_over(&self) -> u64 {
         self.taken_over.len() as u64
-    }
-
-    /// How many steps are finished.
-    pub fn finished(&self) -> u64 {
-        self.taken_over() + self.recorded.load(Ordering::Relaxed)
     }
 
     /// The figures of `step`: those of an earlier run if it has finished the step, else `work` does it and is recorded.
@@ -199,7 +192,6 @@ impl<'a> Journal<'a> {
         let entry = Entry::new(self.directory, step, &done)?;
         let results = done.results.into_iter().map(|file| file.path).collect();
         self.committer.add(Batch { lines: line(&entry)?, results })?;
-        self.recorded.fetch_add(1, Ordering::Relaxed);
         Ok(done.figures)
     }
 

@@ -171,9 +171,10 @@ fn attempt(
             publishing: AtomicBool::new(false),
         };
         let outcome = job.run(plan, scanned, partition);
-        let (steps, publishing) = (journal.finished(), job.publishing.load(Ordering::Relaxed));
-        // What is finished is on the disk before the message says so.
+        let publishing = job.publishing.load(Ordering::Relaxed);
+        // What is finished is on the disk before the message says so, if it gets there.
         drop(journal);
+        let steps = if outcome.is_err() { steps_kept(&directory) } else { 0 };
         match outcome {
             Err(why) if why.exit_code() == 1 && steps > 0 => {
                 Err(Error::Resumable { why: Box::new(why), steps, job: directory.job().into() })
@@ -187,6 +188,11 @@ fn attempt(
             }
         }
     })
+}
+
+/// How many finished steps the journal of a run that has failed holds.
+fn steps_kept(directory: &Directory) -> u64 {
+    journal::read(directory).ok().flatten().map_or(0, |(_, entries)| entries.len() as u64)
 }
 
 /// What `work` returns, its rayon tasks on `threads` threads.
@@ -465,9 +471,13 @@ fn fits_one_file(written: &TileFigures) -> bool {
 fn too_large_for_one_file(written: &TileFigures) -> String {
     format!(
         "{} triangles in {} tiles are more than viewers open as one file: terrain.glb is left out and tileset.json written in its \
-         place; set [input] bounds or classes for a smaller terrain",
+         place; set {}",
         report::grouped(written.triangles),
-        report::grouped(written.files)
+        report::grouped(written.files),
+        match written.triangles > MOST_TRIANGLES_IN_ONE_FILE {
+            true => "[input] bounds or classes for a smaller terrain",
+            false => "a greater [triangulation] sites_per_tile for fewer tiles",
+        }
     )
 }
 

@@ -21,6 +21,10 @@ pub(super) struct Container {
 impl Container {
     /// Reads all but the binary chunk and checks the lengths against the file's size.
     pub(super) fn open(path: &Path) -> Result<Container> {
+        // Before it is opened: a pipe would wait for somebody who writes.
+        if !path.metadata().map_err(Error::io("open", path))?.is_file() {
+            return Err(Error::input(path, "is not a regular file"));
+        }
         let mut file = File::open(path).map_err(Error::io("open", path))?;
         let size = file.metadata().map_err(Error::io("read", path))?.len();
         let damaged = |what: &str| Error::input(path, format!("not a whole GLB file: {what}"));

@@ -6,7 +6,10 @@ use bytemuck::{Pod, cast_slice};
 use serde_json::{Value, json};
 
 use super::color::Linear;
-use super::encoding::{Compression, EXPONENTIAL_REACH, color_bytes, exponential, normal_bytes, normal_octahedral};
+use super::encoding::{
+    Compression, EXPONENTIAL_REACH, color_bytes, exponential, needs_long_normals, normal_bytes, normal_octahedral,
+    normal_shorts,
+};
 use super::frame::Frame;
 use super::order::rings;
 use super::parts::Part;
@@ -17,6 +20,7 @@ pub(super) const GENERATOR: &str = concat!("gdt-batch ", env!("CARGO_PKG_VERSION
 
 // Names of the glTF specification and its extensions.
 pub(super) const SIGNED_BYTE: u64 = 5120;
+pub(super) const SIGNED_SHORT: u64 = 5122;
 pub(super) const UNSIGNED_BYTE: u64 = 5121;
 pub(super) const UNSIGNED_SHORT: u64 = 5123;
 pub(super) const UNSIGNED_INT: u64 = 5125;
@@ -125,6 +129,10 @@ impl<'a> Document<'a> {
         }
         let anisotropy = self.frame.anisotropy();
         let normalized = json!({"normalized": true});
+        if needs_long_normals(anisotropy) {
+            let values = picked(normals, order, |normal| normal_shorts(up(normal), anisotropy));
+            return self.add_attribute(&values, SIGNED_SHORT, "VEC3", normalized);
+        }
         if self.compression == Compression::Quantized {
             let values = picked(normals, order, |normal| normal_bytes(up(normal), anisotropy));
             return self.add_attribute(&values, SIGNED_BYTE, "VEC3", normalized);

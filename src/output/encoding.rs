@@ -14,11 +14,31 @@ pub enum Compression {
 /// The normal x, y up, z of a mesh in signed bytes, 127 for 1, whose node stretches it by 1, `anisotropy`, 1: readers divide
 /// normals by that. The fourth byte is padding.
 #[inline(always)]
-pub(super) fn normal_bytes([x, y, z]: [f32; 3], anisotropy: f32) -> [i8; 4] {
+pub(super) fn normal_bytes(normal: [f32; 3], anisotropy: f32) -> [i8; 4] {
+    let [x, y, z] = stretched(normal, anisotropy, 127.0).map(|v| v as i8);
+    [x, y, z, 0]
+}
+
+/// Steps of a mesh that differ by more than this make 8 bits too few for a normal.
+const MOST_ANISOTROPY: f32 = 4.0;
+
+/// Whether the normals of a mesh that is stretched so are better in 16 bits.
+pub(super) fn needs_long_normals(anisotropy: f32) -> bool {
+    !(1.0 / MOST_ANISOTROPY..=MOST_ANISOTROPY).contains(&anisotropy)
+}
+
+/// As [`normal_bytes`], in signed 16 bits, 32767 for 1.
+pub(super) fn normal_shorts(normal: [f32; 3], anisotropy: f32) -> [i16; 4] {
+    let [x, y, z] = stretched(normal, anisotropy, 32767.0).map(|v| v as i16);
+    [x, y, z, 0]
+}
+
+/// The normal with its y stretched, so long and in whole numbers.
+#[inline(always)]
+fn stretched([x, y, z]: [f32; 3], anisotropy: f32, length: f32) -> [f32; 3] {
     let y = y * anisotropy;
-    let scale = 127.0 / (x * x + y * y + z * z).sqrt();
-    let byte = |v: f32| (v * scale).round() as i8;
-    [byte(x), byte(y), byte(z), 0]
+    let scale = length / (x * x + y * y + z * z).sqrt();
+    [x, y, z].map(|v| (v * scale).round())
 }
 
 /// The same normal as two signed bytes on the octahedron, 127 for 1, as the octahedral filter of `EXT_meshopt_compression`
@@ -84,8 +104,9 @@ mod tests {
     }
 
     /// Degrees between a normal and what a viewer makes of its bytes.
-    fn error([x, y, z]: [f32; 3], bytes: [i8; 4], anisotropy: f32) -> f32 {
-        let [a, b, c] = [f32::from(bytes[0]), f32::from(bytes[1]) / anisotropy, f32::from(bytes[2])];
+    fn error([x, y, z]: [f32; 3], packed: [impl Into<f32>; 4], anisotropy: f32) -> f32 {
+        let [a, b, c, _] = packed.map(Into::into);
+        let b = b / anisotropy;
         let cosine = (x * a + y * b + z * c) / (a * a + b * b + c * c).sqrt();
         cosine.min(1.0).acos().to_degrees()
     }
@@ -98,6 +119,11 @@ mod tests {
         for anisotropy in [0.25, 4.0] {
             assert!(worst(&|n| error(n, normal_bytes(n, anisotropy), anisotropy)) < 2.0);
             assert!(worst(&|n| error(n, from_octahedral(normal_octahedral(n, anisotropy)), anisotropy)) < 5.0);
+            assert!(!needs_long_normals(anisotropy));
+        }
+        for (anisotropy, most) in [(1.0 / 256.0, 0.5), (0.125, 0.1), (8.0, 0.1), (256.0, 0.5)] {
+            assert!(needs_long_normals(anisotropy));
+            assert!(worst(&|n| error(n, normal_shorts(n, anisotropy), anisotropy)) < most);
         }
     }
 

@@ -8,7 +8,7 @@ use bytemuck::{AnyBitPattern, NoUninit, allocation::pod_collect_to_vec};
 use serde::Deserialize;
 
 use super::container::Container;
-use super::document::{FLOAT, SIGNED_BYTE, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT};
+use super::document::{FLOAT, SIGNED_BYTE, SIGNED_SHORT, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT};
 use super::frame::Extras;
 use super::packed::{MOST_EXPANSION, Packed};
 use crate::{Error, Result};
@@ -228,6 +228,10 @@ impl Decoder<'_> {
     fn normals(&mut self, accessor: usize) -> Decoded<Vec<[f32; 3]>> {
         if self.component(accessor)? == FLOAT {
             return self.elements(accessor, FLOAT, "VEC3");
+        }
+        if self.component(accessor)? == SIGNED_SHORT {
+            let shorts: Vec<[i16; 4]> = self.elements(accessor, SIGNED_SHORT, "VEC3")?;
+            return Ok(shorts.into_iter().map(|[x, y, z, _]| [x, y, z].map(|v| f32::from(v) / 32767.0)).collect());
         }
         let bytes: Vec<[i8; 4]> = self.elements(accessor, SIGNED_BYTE, "VEC3")?;
         Ok(bytes.into_iter().map(|[x, y, z, _]| [x, y, z].map(|v| f32::from(v) / 127.0)).collect())

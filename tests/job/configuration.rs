@@ -84,6 +84,8 @@ fn wrong_configurations_are_refused_with_the_line() {
         ("[output]", "[limits]\nmemory = 4\n[output]", &["line 4", "string"]),
         ("[output]", "[limits]\nthreads = -1\n[output]", &["line 4", "threads"]),
         ("[output]", "[ouput]", &["line 3", "ouput"]),
+        ("directory", "height_offset = -1e6\ndirectory", &["height_offset", "100000"]),
+        ("directory", "height_offset = nan\ndirectory", &["height_offset", "100000"]),
         ("directory", "normals = 1\ndirectory", &["line 4", "boolean"]),
         ("\"out\"", "\"out", &["line 4", "string"]),
         ("[\"cloud.csv\"]", "[]", &["files is empty"]),
@@ -148,6 +150,12 @@ fn what_is_in_the_way_of_the_output_is_named() {
         refused(name, "is a directory");
         fs::remove_dir(there(name)).unwrap();
     }
+    // A file that no job wrote, where one would.
+    fs::write(there("out/report.json"), "theirs").unwrap();
+    for arguments in [&["job.toml"][..], &["check", "job.toml"]] {
+        gdt_batch(folder.path(), arguments).refused(2, &["out/report.json", "would write over", "move it away"]);
+    }
+    fs::remove_file(there("out/report.json")).unwrap();
     gdt_batch(folder.path(), &["job.toml"]).succeeded();
 }
 

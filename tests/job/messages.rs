@@ -79,8 +79,12 @@ fn unreadable_files_are_named() {
 #[cfg(unix)]
 fn what_is_no_file_is_not_waited_for() {
     let folder = tempfile::tempdir().unwrap();
-    let made = std::process::Command::new("mkfifo").arg(folder.path().join("pipe.csv")).status().unwrap();
-    assert!(made.success());
+    std::fs::create_dir_all(folder.path().join("out/tiles")).unwrap();
+    for name in ["pipe.csv", "out/tiles/000000.glb"] {
+        let made = std::process::Command::new("mkfifo").arg(folder.path().join(name)).status().unwrap();
+        assert!(made.success());
+    }
+    gdt_batch(folder.path(), &["verify", "out"]).refused(3, &["000000.glb", "regular file"]);
     for path in ["pipe.csv", "/dev/zero"] {
         gdt_batch(folder.path(), &["info", path]).refused(3, &[path, "regular file"]);
     }

@@ -90,6 +90,29 @@ fn packed_tiles_hold_the_same_vertices_and_triangles() {
     }
 }
 
+/// What a viewer makes of packed normals, whatever the steps of x and y beside those of z: it divides them by the node's scale.
+#[test]
+fn packed_normals_are_true_on_any_lattice() {
+    for (resolution_z, most) in [(0.0001, 1.0f64), (0.01, 1.25), (0.003, 5.0), (1.0, 1.0)] {
+        let frame = Frame::new(&lattice([0.0; 3], 0.01, resolution_z), 1.0, 1.0, None).unwrap();
+        let mut points = cloud(7, 2_000, 20_000);
+        points.iter_mut().for_each(|p| p[2] = (p[2] as f64 * 0.01 / resolution_z) as i32);
+        let tile = terrain(&frame, &points);
+        for compression in [Compression::Quantized, Compression::Meshopt] {
+            let file = there_and_back_as(compression, &frame, &tile);
+            let part = &file.parts[0];
+            for (v, point) in integers(&file).iter().enumerate() {
+                let [x, y, z] = tile.normals.as_ref().unwrap()[tile.positions.binary_search(point).unwrap()];
+                let seen = [0, 1, 2].map(|k| f64::from(part.normals.as_ref().unwrap()[v][k]) / part.scale[k]);
+                let length = seen.iter().map(|v| v * v).sum::<f64>().sqrt();
+                let cosine: f64 = [x, z, -y].iter().zip(seen).map(|(a, b)| f64::from(*a) * b).sum::<f64>() / length;
+                let degrees = cosine.min(1.0).acos().to_degrees();
+                assert!(degrees < most, "{compression:?}, z in {resolution_z}: {degrees} degrees");
+            }
+        }
+    }
+}
+
 #[test]
 fn packing_is_worth_it() {
     let tile = terrain(&utm(), &grid(150, 150, 40));
