@@ -13,8 +13,10 @@ pub mod cut;
 pub mod directory;
 pub mod export;
 pub mod fingerprint;
+pub mod finish;
 mod forecast;
 pub mod grid;
+mod grow;
 pub mod journal;
 pub mod leaf;
 pub mod levels;
@@ -40,13 +42,10 @@ use crate::config::{ColorChoice, Config, Format};
 use crate::output::Compression;
 use crate::output::color::Coloring;
 use crate::output::georeference::Georeference;
-use crate::output::picture::Picture;
-use crate::output::preview::{Canvas, Texel};
-use crate::output::terrain::write_terrain;
+use crate::output::preview::Canvas;
 use crate::triangulation::Triangulator;
 use crate::{Error, Result};
 use choose::Coarser;
-use columns::ColumnReader;
 use cut::Cut;
 use directory::Directory;
 use export::{Look, TileFigures};
@@ -67,8 +66,8 @@ use std::collections::HashSet;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
-use store::{Key, Store};
-use tree::{Kind, Tree};
+use store::Store;
+use tree::Tree;
 
 /// Bytes that one site of a leaf takes while the leaf is triangulated: points, sort keys, sites, mesh and marks.
 const BYTES_PER_LEAF_SITE: u64 = 500;
@@ -279,8 +278,8 @@ impl Job<'_> {
         let stage = progress.stage("finish", 1, "job");
         let georeference = Georeference::new(&plan.frame, &plan.lattice, bounds, plan.unit, plan.crs.epsg);
         let georeference = georeference.to_json(placement.as_ref());
-        let viewers = Viewers { tileset, one_file: one_file && config.output.format != Format::Tiles };
-        let finish = || finish(directory, store, &georeference, &viewers, &canvas, tiles);
+        let viewers = finish::Viewers { tileset, one_file: one_file && config.output.format != Format::Tiles };
+        let finish = || finish::run(directory, store, &georeference, &viewers, &canvas, tiles);
         let other_bytes = journal.step(Step::Finish, finish)?;
         if !one_file && config.output.format == Format::Glb {
             warnings.push(too_large_for_one_file(&written));
@@ -391,7 +390,7 @@ impl Job<'_> {
     fn triangulate(&self, partition: &Partition, longest: Longest, stage: &Stage) -> Result<LeafFigures> {
         let all_there = (0..partition.tree.leaves.len()).all(|tile| self.journal.has(Step::Leaf(tile)));
         let spill = if all_there { None } else { Some(Spill::open(&self.directory.spill())?) };
-        let figures = Grower { job: self, partition, spill, longest, stage }.grow(0)?;
+        let figures = grow::Grower { job: self, partition, spill, longest, stage }.grow(0)?;
         self.journal.commit()?;
         if self.journal.is_worth_syncing() {
             self.store.sync()?;
@@ -520,49 +519,6 @@ fn enough_triangles(written: &TileFigures, plan: &Plan) -> Result<()> {
     )))
 }
 
-struct Grower<'a> {
-    job: &'a Job<'a>,
-    partition: &'a Partition,
-    /// Where the points are, as long as there is a leaf to be done.
-    spill: Option<Spill>,
-    longest: Longest,
-    stage: &'a Stage,
-}
-
-impl Grower<'_> {
-    fn grow(&self, node: usize) -> Result<LeafFigures> {
-        let Job { config, store, journal, .. } = *self.job;
-        match self.partition.tree.nodes[node].kind {
-            Kind::Leaf(tile) => {
-                let figures = journal.step(Step::Leaf(tile), || self.leaf(tile))?;
-                self.job.count(self.stage, Step::Leaf(tile), figures.sites + figures.duplicates);
-                Ok(figures)
-            }
-            Kind::Inner([low, high]) => {
-                let (low, high) = rayon::join(|| self.grow(low), || self.grow(high));
-                let (mut figures, high) = (low?, high?);
-                figures += high;
-                if self.partition.tree.is_merge(node) {
-                    // Nodes below the root may be merged at once on all threads.
-                    let share = if node == 0 { 1 } else { rayon::current_num_threads() as u64 };
-                    let memory = config.limits.memory.0 / 4 * 3 / share;
-                    let merge = || merge::run(store, &self.partition.tree, node, memory, self.longest);
-                    journal.step(Step::Node(node), merge)?;
-                }
-                Ok(figures)
-            }
-        }
-    }
-
-    fn leaf(&self, tile: usize) -> Result<Done<LeafFigures>> {
-        let Job { config, store, triangulator, .. } = *self.job;
-        let task = leaf::Task { duplicates: config.input.duplicates, triangulator, longest: self.longest };
-        let spill = self.spill.as_ref();
-        let spill = spill.ok_or_else(|| Error::Broken(format!("the points of tile {tile} are gone")))?;
-        leaf::run(store, self.partition, spill, tile, task)
-    }
-}
-
 /// How the tiles are to look.
 fn look(config: &Config, plan: &Plan, summary: &Summary, bounds: [[i32; 3]; 2], cut: Cut) -> Look {
     let elevation = Coloring::Elevation { low: bounds[0][2], high: bounds[1][2] };
@@ -579,45 +535,4 @@ fn look(config: &Config, plan: &Plan, summary: &Summary, bounds: [[i32; 3]; 2], 
         _ => plan.frame.clone().packed(),
     };
     Look { frame, coloring, normals: config.output.normals, compression, cut }
-}
-
-/// What viewers open.
-struct Viewers {
-    /// The text of `tileset.json`.
-    tileset: Option<String>,
-    /// Whether there is to be a `terrain.glb`.
-    one_file: bool,
-}
-
-/// Writes what stands beside the tiles; its figure is its bytes.
-fn finish(
-    directory: &Directory,
-    store: &Store,
-    georeference: &str,
-    viewers: &Viewers,
-    canvas: &Canvas,
-    tiles: usize,
-) -> Result<Done<u64>> {
-    let mut results = vec![
-        directory::write_result(&directory.georeference(), georeference.as_bytes())?,
-        directory::write_result(&directory.preview(), &draw_picture(store, canvas, tiles)?)?,
-    ];
-    if let Some(tileset) = &viewers.tileset {
-        results.push(directory::write_result(&directory.tileset(), tileset.as_bytes())?);
-    }
-    if viewers.one_file {
-        let paths: Vec<_> = (0..tiles).map(|tile| directory.tile(tile)).filter(|path| path.exists()).collect();
-        write_terrain(&directory::partial(&directory.terrain()), &paths)?;
-        results.push(directory::written_result(&directory.terrain())?);
-    }
-    let bytes = results.iter().map(|file| file.bytes).sum();
-    Ok(Done { results, ..Done::new(bytes, Vec::new()) })
-}
-
-fn draw_picture(store: &Store, canvas: &Canvas, tiles: usize) -> Result<Vec<u8>> {
-    let mut picture = Picture::new(canvas);
-    for tile in 0..tiles {
-        picture.add(tile as u32, &ColumnReader::open(store, Key::Pixels(tile))?.column::<Texel>()?);
-    }
-    Ok(picture.png())
 }

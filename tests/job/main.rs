@@ -6,6 +6,8 @@ mod common;
 mod las_file;
 #[path = "../common/random.rs"]
 mod random;
+#[path = "../common/scattered.rs"]
+mod scattered;
 #[path = "../common/validator.rs"]
 mod validator;
 

@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use crate::clouds;
 use crate::rig::{Rig, Run, Setup};
+use crate::scattered;
 
 fn base() -> Setup {
     Setup::tiles_of(2_000).output("color = \"elevation\"")
@@ -23,7 +23,7 @@ fn change_to(rig: &mut Rig, count: u64, setup: &Setup) -> (String, u64) {
 }
 
 fn rig() -> Rig {
-    Rig::new(&clouds::gaussian(20_000), &base()).committing_every(0)
+    Rig::new(&scattered::gaussian(20_000), &base()).committing_every(0)
 }
 
 #[test]
@@ -96,8 +96,8 @@ fn another_input_starts_over_and_says_which() {
     rig.is_complete("an input with another digit");
     // Another file beside it.
     kill(&rig);
-    let more = clouds::uniform(500, 50_000, 5);
-    clouds::write(rig.folder.path(), "more.csv", &more);
+    let more = scattered::uniform(500, 50_000, 5);
+    scattered::write(rig.folder.path(), "more.csv", &more);
     rig.expect(&Setup { input: "files = [\"*.csv\"]".into(), ..base() });
     let said = rig.run().succeeded().err;
     assert!(said.contains("more.csv (new)") && said.contains("starting over"), "{said}");

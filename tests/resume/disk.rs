@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 use std::process::Command;
 
-use crate::clouds;
 use crate::rig::{Rig, Run, Setup};
+use crate::scattered;
 
 /// A run in which no file may become larger than so many bytes.
 fn limited(rig: &Rig, kibibytes: u64) -> Run {
@@ -23,7 +23,7 @@ fn place(said: &str) -> (String, String) {
 
 #[test]
 fn a_file_that_may_not_grow_stops_any_stage() {
-    let rig = Rig::new(&clouds::gaussian(20_000), &Setup::tiles_of(2_000)).committing_every(0);
+    let rig = Rig::new(&scattered::gaussian(20_000), &Setup::tiles_of(2_000)).committing_every(0);
     let mut places = BTreeSet::new();
     for count in [0, 1, 8, 14, 30, 40] {
         for kibibytes in [24, 300, 600, 1_000] {
@@ -61,7 +61,7 @@ fn mounting(rig: &Rig, kibibytes: u64) -> Command {
 
 #[test]
 fn a_disk_that_fills_up_stops_any_stage() {
-    let rig = Rig::new(&clouds::gaussian(20_000), &Setup::tiles_of(2_000));
+    let rig = Rig::new(&scattered::gaussian(20_000), &Setup::tiles_of(2_000));
     let can_mount = Command::new("unshare")
         .args(["--user", "--map-root-user", "--mount", "mount", "-t", "tmpfs", "tmpfs", "/mnt"])
         .output()

@@ -2,16 +2,16 @@
 
 use std::time::{Duration, Instant};
 
-use crate::clouds;
 use crate::random::Random;
 use crate::rig::{Rig, Run, Setup};
+use crate::scattered;
 
 /// Where a commit can be cut off: before it; with the results under their names and no record; in the middle of the record;
 /// after it.
 const PLACES: [&str; 4] = ["commit", "published", "torn", "committed"];
 
 fn small_job(setup: &Setup) -> Rig {
-    Rig::new(&clouds::clusters(20_000), setup).committing_every(0)
+    Rig::new(&scattered::clusters(20_000), setup).committing_every(0)
 }
 
 /// Kills the run at every `stride`-th time that it comes to `place`, each time from the start, and goes on; returns the kills.
@@ -129,13 +129,13 @@ fn kill_at_random(rig: &Rig, seed: u64, kills: u64) {
 
 #[test]
 fn killed_at_random_with_one_thread() {
-    let rig = Rig::new(&clouds::gaussian(40_000), &Setup::tiles_of(2_000)).committing_every(10);
+    let rig = Rig::new(&scattered::gaussian(40_000), &Setup::tiles_of(2_000)).committing_every(10);
     kill_at_random(&rig, 1, kills_wanted(45));
 }
 
 #[test]
 fn killed_at_random_with_two_threads() {
-    let rig = Rig::new(&clouds::gaussian(40_000), &Setup::tiles_of(2_000).threads(2)).committing_every(10);
+    let rig = Rig::new(&scattered::gaussian(40_000), &Setup::tiles_of(2_000).threads(2)).committing_every(10);
     kill_at_random(&rig, 2, kills_wanted(45));
 }
 

@@ -1,11 +1,11 @@
 //! Two processes, one directory.
 
-use crate::clouds;
 use crate::rig::{Rig, Run, Setup};
+use crate::scattered;
 
 #[test]
 fn a_second_process_is_told_who_is_there() {
-    let rig = Rig::new(&clouds::gaussian(40_000), &Setup::tiles_of(1_000)).committing_every(0);
+    let rig = Rig::new(&scattered::gaussian(40_000), &Setup::tiles_of(1_000)).committing_every(0);
     let mut first = Run::start(&mut rig.command());
     let journal = rig.out().join("job/journal");
     first.wait_until(|| journal.exists());
@@ -20,7 +20,7 @@ fn a_second_process_is_told_who_is_there() {
 
 #[test]
 fn the_lock_of_a_process_that_was_killed_is_no_obstacle() {
-    let rig = Rig::new(&clouds::gaussian(20_000), &Setup::tiles_of(2_000)).committing_every(0);
+    let rig = Rig::new(&scattered::gaussian(20_000), &Setup::tiles_of(2_000)).committing_every(0);
     assert!(rig.run_to("committed", 5).was_killed());
     assert!(rig.out().join("job/lock").exists());
     assert!(rig.completes("after a kill")["resumed"].as_u64() >= Some(5));

@@ -4,12 +4,11 @@
 //! `GDT_KILLS=n` makes the tests at random moments kill so many times each. CONTRIBUTING.md tells of the faults on purpose.
 #![cfg(unix)]
 
-#[path = "../job/clouds.rs"]
-#[allow(dead_code, reason = "other tests need the rest")]
-mod clouds;
 #[path = "../common/random.rs"]
 mod random;
 mod rig;
+#[path = "../common/scattered.rs"]
+mod scattered;
 
 mod changes;
 mod disk;

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::clouds;
+use crate::scattered;
 
 /// Longer than any job here takes on a slow machine: what runs on hangs.
 const HANGS: Duration = Duration::from_secs(300);
@@ -147,7 +147,7 @@ impl Rig {
     #[track_caller]
     pub(crate) fn new(cloud: &[[i64; 3]], setup: &Setup) -> Rig {
         let folder = tempfile::tempdir().unwrap();
-        clouds::write(folder.path(), "cloud.csv", cloud);
+        scattered::write(folder.path(), "cloud.csv", cloud);
         let mut rig = Rig { folder, expected: BTreeMap::new(), report: Value::Null, environment: Vec::new() };
         rig.expect(setup);
         rig

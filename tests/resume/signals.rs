@@ -2,12 +2,12 @@
 
 use std::time::Duration;
 
-use crate::clouds;
 use crate::rig::{Rig, Run, Setup};
+use crate::scattered;
 
 /// A job of many steps that each wait for the disk: long enough to be met on its way.
 fn long_job(threads: usize) -> Rig {
-    Rig::new(&clouds::gaussian(60_000), &Setup::tiles_of(500).threads(threads)).committing_every(0)
+    Rig::new(&scattered::gaussian(60_000), &Setup::tiles_of(500).threads(threads)).committing_every(0)
 }
 
 #[test]
@@ -32,7 +32,7 @@ fn sigterm_and_ctrl_c_stop_it_and_it_goes_on() {
 
 #[test]
 fn what_is_interrupted_before_the_first_step_leaves_nothing() {
-    let rig = Rig::new(&clouds::gaussian(400_000), &Setup::tiles_of(20_000));
+    let rig = Rig::new(&scattered::gaussian(400_000), &Setup::tiles_of(20_000));
     let mut run = Run::start(&mut rig.command());
     let spill = rig.out().join("job/points.spill");
     run.wait_until(|| spill.exists());
@@ -47,7 +47,8 @@ fn what_is_interrupted_before_the_first_step_leaves_nothing() {
 #[test]
 fn a_second_ctrl_c_ends_it_at_once() {
     // One leaf that takes long, and in which nobody looks for signals.
-    let rig = Rig::new(&clouds::gaussian(400_000), &Setup::tiles_of(500_000).backend("reference")).committing_every(0);
+    let rig =
+        Rig::new(&scattered::gaussian(400_000), &Setup::tiles_of(500_000).backend("reference")).committing_every(0);
     let mut run = Run::start(&mut rig.command());
     run.wait_until(|| rig.steps() == 1);
     std::thread::sleep(Duration::from_millis(100));
