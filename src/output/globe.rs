@@ -1,5 +1,6 @@
 //! Where a terrain in a projected coordinate system lies on the WGS 84 ellipsoid.
 
+use glam::{DAffine3, DMat4};
 use proj4rs::Proj;
 use proj4rs::transform::transform;
 
@@ -67,40 +68,18 @@ impl Globe {
 
 /// Where `transform` puts a place of the tileset, metres.
 pub fn applied(transform: &[f64; 16], place: [f64; 3]) -> [f64; 3] {
-    let turned = turned(transform, place);
-    [0, 1, 2].map(|k| turned[k] + transform[12 + k])
-}
-
-/// What `transform` makes of a difference of two places.
-fn turned(transform: &[f64; 16], [x, y, z]: [f64; 3]) -> [f64; 3] {
-    [0, 1, 2].map(|k| transform[k] * x + transform[4 + k] * y + transform[8 + k] * z)
+    affine(transform).transform_point3(place.into()).into()
 }
 
 /// The transform that leads to where `inner` does when `outer` comes after it. `outer` must not be flat.
 pub fn relative(outer: &[f64; 16], inner: &[f64; 16]) -> [f64; 16] {
-    let back = inverse(outer);
-    let mut columns = [0.0; 16];
-    for at in 0..4 {
-        let column = [0, 1, 2].map(|k| inner[4 * at + k]);
-        // Earth-centred places differ by far less than they are long: the difference first.
-        let column = if at < 3 { column } else { [0, 1, 2].map(|k| column[k] - outer[12 + k]) };
-        columns[4 * at..4 * at + 3].copy_from_slice(&turned(&back, column));
-    }
-    columns[15] = 1.0;
-    columns
+    let (outer, inner) = (affine(outer), affine(inner));
+    let back = outer.matrix3.inverse();
+    // Earth-centred places differ by far less than they are long: the difference first.
+    let translation = back * (inner.translation - outer.translation);
+    DMat4::from(DAffine3 { matrix3: back * inner.matrix3, translation }).to_cols_array()
 }
 
-/// The inverse of the linear part, by cross products of its columns.
-fn inverse(transform: &[f64; 16]) -> [f64; 16] {
-    let column = |at: usize| [0, 1, 2].map(|k| transform[4 * at + k]);
-    let cross =
-        |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|k| a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3]);
-    let rows = [0, 1, 2].map(|k| cross(column((k + 1) % 3), column((k + 2) % 3)));
-    let determinant: f64 = (0..3).map(|k| rows[0][k] * column(0)[k]).sum();
-    let mut columns = [0.0; 16];
-    for at in 0..9 {
-        columns[4 * (at / 3) + at % 3] = rows[at % 3][at / 3] / determinant;
-    }
-    columns[15] = 1.0;
-    columns
+fn affine(transform: &[f64; 16]) -> DAffine3 {
+    DAffine3::from_mat4(DMat4::from_cols_array(transform))
 }

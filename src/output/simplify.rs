@@ -58,7 +58,7 @@ pub fn simplify(frame: &Frame, tile: &Tile, triangles: usize) -> Result<Simplifi
         }
     }
     let error = deviation(&tile.positions, &tile.triangles, &coarse) * frame.resolution_metres()[1];
-    Ok(Simplified { tile: subset(tile, coarse), error })
+    Ok(Simplified { tile: tile.subset(coarse), error })
 }
 
 /// The edges round a terrain.
@@ -141,23 +141,4 @@ fn keep_furthest(tile: &Tile, coarse: &[[u32; 3]], count: usize, kept: &mut [boo
     }
     furthest.iter().for_each(|&(_, v)| kept[v as usize] = true);
     furthest.len()
-}
-
-/// The tile of these triangles, without the vertices that they do not use.
-fn subset(tile: &Tile, mut triangles: Vec<[u32; 3]>) -> Tile {
-    let mut used = vec![false; tile.positions.len()];
-    triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
-    let number = |next: &mut u32, &used: &bool| Some(std::mem::replace(next, *next + used as u32));
-    let numbers: Vec<u32> = used.iter().scan(0, number).collect();
-    triangles.iter_mut().flatten().for_each(|v| *v = numbers[*v as usize]);
-    Tile {
-        positions: kept(&tile.positions, &used),
-        normals: tile.normals.as_ref().map(|normals| kept(normals, &used)),
-        colors: tile.colors.as_ref().map(|colors| kept(colors, &used)),
-        triangles,
-    }
-}
-
-fn kept<T: Copy>(values: &[T], used: &[bool]) -> Vec<T> {
-    values.iter().zip(used).filter(|(_, used)| **used).map(|(value, _)| *value).collect()
 }
