@@ -25,6 +25,11 @@ impl Point {
         Point { position, z, rgb, class, order_high: (order >> 32) as u8, order_low: order as u32 }
     }
 
+    /// Lattice integers x, y, z.
+    pub fn corner(&self) -> [i32; 3] {
+        [self.position[0], self.position[1], self.z]
+    }
+
     /// The number of this point's record in the whole job.
     pub fn order(&self) -> u64 {
         (self.order_high as u64) << 32 | self.order_low as u64

@@ -1,6 +1,6 @@
 //! Step 3 of a job, by tile: triangulate the sites of one leaf and close what can be closed.
 
-use super::closing::{State, close};
+use super::closing::{Closing, State, close};
 use super::journal::Done;
 use super::partition::Partition;
 use super::records::{Frontier, Leaf, Rim, RimDraft};
@@ -12,8 +12,8 @@ use crate::Result;
 use crate::config::Duplicates;
 use crate::geometry::Site;
 use crate::input::Point;
-use crate::output::normals::Sums;
-use crate::triangulation::mesh::Mesh;
+use crate::output::normals::{self, NormalSum};
+use crate::triangulation::mesh::{HULL, Mesh};
 use crate::triangulation::{self, Outcome, Triangulator};
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
@@ -71,25 +71,41 @@ pub fn run(
     let cell = (!is_root).then_some(&partition.tree.nodes[node].cell);
     let closing = close(&mesh, &sites, cell, |_| false);
     check_spans(&mesh, &sites, &closing.states, task.longest)?;
+    let sums = frontier_sums(&mesh, &closing, &points);
     let closed = mesh.triangles.iter().zip(&closing.states).filter(|(_, state)| **state == State::Closed);
     let leaf = leaf_of(&points, closed.map(|(triangle, _)| *triangle).collect());
     triangulation::recycle(mesh);
     let rim = |&site: &u32| Rim { tile: tile as u32, site, position: leaf.positions[site as usize] };
     let frontier = Frontier { sites: closing.frontier.iter().map(rim).collect(), boundary: closing.boundary };
-    let draft = rim_draft(&leaf, &closing.frontier);
+    let draft = rim_draft(&leaf, &closing.frontier, sums);
     let stored = vec![draft.save(store, tile)?, leaf.save(store, tile)?, frontier.save(store, node)?];
     let (sites, triangles) = (sites.len() as u64, leaf.triangles.len() as u64);
     Ok(Done::new(LeafFigures { sites, duplicates: dropped, triangles, outcome }, stored))
 }
 
 fn check_spans(mesh: &Mesh, sites: &[Site], states: &[State], longest: Longest) -> Result<()> {
+    if longest.holds_all(sites) {
+        return Ok(());
+    }
     let mut closed = mesh.triangles.iter().zip(states).filter(|(_, state)| **state == State::Closed);
     closed.try_for_each(|(corners, _)| longest.check(corners.map(|v| sites[v as usize])))
 }
 
+/// The sums of normals over the closed triangles around every site of the frontier.
+fn frontier_sums(mesh: &Mesh, closing: &Closing, points: &[Point]) -> Vec<NormalSum> {
+    let corner = |v: u32| points[v as usize].corner();
+    let sum = |&spoke: &u32| {
+        let around = (spoke != HULL).then(|| mesh.around(spoke)).into_iter().flatten().map(|t| t as usize);
+        let closed = around.filter(|&t| closing.states[t] == State::Closed);
+        let normals = closed.map(|t| mesh.triangles[t].map(corner)).map(|[a, b, c]| normals::cross(a, b, c));
+        normals.fold([0; 3], normals::add)
+    };
+    closing.spokes.iter().map(sum).collect()
+}
+
 fn leaf_of(points: &[Point], triangles: Vec<[u32; 3]>) -> Leaf {
     Leaf {
-        positions: points.iter().map(|p| [p.position[0], p.position[1], p.z]).collect(),
+        positions: points.iter().map(Point::corner).collect(),
         rgb: points.iter().map(|p| p.rgb).collect(),
         class: points.iter().map(|p| p.class).collect(),
         triangles,
@@ -97,15 +113,10 @@ fn leaf_of(points: &[Point], triangles: Vec<[u32; 3]>) -> Leaf {
 }
 
 /// The frontier as far as the leaf knows it: the seams add their triangles to the normals when all are known.
-fn rim_draft(leaf: &Leaf, frontier: &[u32]) -> RimDraft {
-    let mut on_frontier = vec![false; leaf.positions.len()];
-    frontier.iter().for_each(|&site| on_frontier[site as usize] = true);
-    let touches = |triangle: &&[u32; 3]| triangle.iter().any(|&v| on_frontier[v as usize]);
-    let touching: Vec<[u32; 3]> = leaf.triangles.iter().filter(touches).copied().collect();
-    let sums = Sums::new(&leaf.positions, &touching);
+fn rim_draft(leaf: &Leaf, frontier: &[u32], sums: Vec<NormalSum>) -> RimDraft {
     let sites = || frontier.iter().map(|&site| site as usize);
     RimDraft {
-        sums: sites().map(|site| sums.get(site)).collect(),
+        sums,
         rgb: sites().map(|site| leaf.rgb[site]).collect(),
         class: sites().map(|site| leaf.class[site]).collect(),
     }

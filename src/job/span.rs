@@ -20,6 +20,14 @@ impl Longest {
         Longest { horizontal: (longest[0] / metres[0]) as i64, vertical: (longest[1] / metres[1]) as i64, metres }
     }
 
+    /// Whether no triangle of these `sites` can be too long.
+    pub fn holds_all(&self, sites: &[Site]) -> bool {
+        (0..2).all(|axis| {
+            let along = || sites.iter().map(|site| site[axis] as i64);
+            along().max().zip(along().min()).is_none_or(|(high, low)| high - low <= self.horizontal)
+        })
+    }
+
     /// Checks the triangle abc.
     ///
     /// # Errors

@@ -32,6 +32,12 @@ impl Mesh {
     pub fn apex(&self, h: u32) -> u32 {
         self.origin(previous(h))
     }
+
+    /// The triangles around the site at which half-edge `h` starts, counterclockwise. If the site lies on the hull, so must `h`.
+    pub fn around(&self, h: u32) -> impl Iterator<Item = u32> {
+        let next = move |&spoke: &u32| Some(self.twins[previous(spoke) as usize]).filter(|&s| s != HULL && s != h);
+        std::iter::successors(Some(h), next).map(|spoke| spoke / 3)
+    }
 }
 
 /// The half-edge after `h` in its triangle.
