@@ -10,7 +10,7 @@ use super::{BYTES_PER_LEAF_SITE, MOST_TRIANGLES_IN_ONE_FILE, machine, partition,
 use crate::config::Config;
 use crate::input::Point;
 use crate::output::Compression;
-use crate::output::preview::Texel;
+use crate::output::preview::{self, Texel};
 use crate::{Error, Result};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -33,7 +33,7 @@ const TEMPORARY_PER_RIM: u64 = 500;
 /// Bytes of a GLB beside its arrays.
 const RESULT_PER_TILE: u64 = 6000;
 /// Pixels of the preview at the most.
-const PIXELS: u64 = 1600 * 1600;
+const PIXELS: u64 = preview::LONGER_SIDE * preview::LONGER_SIDE;
 
 /// What a job would do.
 #[derive(Clone, Debug, Serialize)]

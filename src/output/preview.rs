@@ -11,7 +11,7 @@ use super::frame::Frame;
 use super::normals::{cross, finish};
 
 /// Pixels along the longer side.
-const LONGER_SIDE: u64 = 1600;
+pub const LONGER_SIDE: u64 = 1024;
 
 /// Lattice steps are divided until the longer side has at least this many subdivisions.
 const LEAST_SPAN: i64 = 1 << 20;
