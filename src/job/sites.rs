@@ -53,7 +53,8 @@ fn preferred(a: &Point, b: &Point, rule: Duplicates) -> bool {
 fn sort(points: &mut Vec<Point>) {
     match packed_keys(points) {
         Some((mut keys, index_bits)) => {
-            keys.sort_unstable();
+            // Indices ascend, and the order of equal keys stays.
+            radsort::sort_by_key(&mut keys, |key| key >> index_bits);
             let index = |key: u64| (key & ((1 << index_bits) - 1)) as usize;
             *points = keys.into_iter().map(|key| points[index(key)]).collect();
         }
