@@ -7,7 +7,7 @@ use std::collections::{BTreeSet, HashSet};
 use std::fs::{self, File, TryLockError};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
-use xxhash_rust::xxh3::{Xxh3, xxh3_64};
+use xxhash_rust::xxh3::Xxh3;
 
 /// The paths of a job.
 #[derive(Clone, Debug)]
@@ -303,9 +303,21 @@ pub struct Written {
 /// # Errors
 /// [`Error::Io`] if writing fails.
 pub fn write_result(path: &Path, content: &[u8]) -> Result<Written> {
+    write_pieces(path, &[content])
+}
+
+/// [`write_result`] for content in pieces.
+///
+/// # Errors
+/// [`Error::Io`] if writing fails.
+pub fn write_pieces(path: &Path, pieces: &[&[u8]]) -> Result<Written> {
     let partial = partial(path);
-    fs::write(&partial, content).map_err(Error::io("write", &partial))?;
-    Ok(Written { path: path.into(), bytes: content.len() as u64, hash: xxh3_64(content) })
+    let write = |mut file: File| pieces.iter().try_for_each(|piece| file.write_all(piece));
+    File::create(&partial).and_then(write).map_err(Error::io("write", &partial))?;
+    let mut hasher = Xxh3::new();
+    pieces.iter().for_each(|piece| hasher.update(piece));
+    let bytes = pieces.iter().map(|piece| piece.len() as u64).sum();
+    Ok(Written { path: path.into(), bytes, hash: hasher.digest() })
 }
 
 /// Writes `value` as JSON under the [`partial`] name of the result at `path`.

@@ -3,7 +3,7 @@
 
 use super::columns::ColumnWriter;
 use super::cut::Cut;
-use super::directory::{Directory, Written, write_result};
+use super::directory::{Directory, Written, write_pieces};
 use super::journal::Done;
 use super::records::{Leaf, LevelTile, Rim, RimVertices, SeamTriangle};
 use super::stitch::seam_of;
@@ -11,12 +11,13 @@ use super::store::{Key, Store};
 use super::tree::Tree;
 use crate::output::color::Coloring;
 use crate::output::frame::Frame;
-use crate::output::glb::encode_tile;
+use crate::output::glb::Glb;
 use crate::output::normals::Sums;
 use crate::output::preview::Canvas;
 use crate::output::{Compression, Tile};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
+use std::cell::RefCell;
 use std::collections::HashMap;
 use std::ops::AddAssign;
 use std::path::Path;
@@ -102,11 +103,17 @@ pub fn run(
     Ok(Done { results, ..Done::new(figures, vec![pixels, known]) })
 }
 
+thread_local! {
+    /// The bytes of the file at hand, kept from tile to tile so that their pages are faulted in once a thread.
+    static GLB: RefCell<Glb> = RefCell::default();
+}
+
 /// Writes a GLB.
-fn write_tile(path: &Path, content: &Tile, look: &Look) -> Result<Written> {
-    let mut bytes = Vec::new();
-    encode_tile(&look.frame, content, look.compression, &mut bytes)?;
-    write_result(path, &bytes)
+pub(super) fn write_tile(path: &Path, content: &Tile, look: &Look) -> Result<Written> {
+    GLB.with_borrow_mut(|glb| {
+        glb.encode(&look.frame, content, look.compression)?;
+        write_pieces(path, &glb.pieces())
+    })
 }
 
 /// A triangle belongs to the tile of its lowest-numbered corner.

@@ -1,13 +1,12 @@
 //! Step 7 of a job, by inner tile of the pyramid: the meshes of its children, read back from their files, joined and simplified.
 
-use super::directory::{Directory, write_result};
-use super::export::Look;
+use super::directory::Directory;
+use super::export::{Look, write_tile};
 use super::journal::Done;
 use super::pyramid::{Child, Pyramid, Sizes};
 use super::records::{Level, LevelTile};
 use super::store::Store;
 use crate::output::frame::Frame;
-use crate::output::glb::encode_tile;
 use crate::output::join::join;
 use crate::output::read::{TileFile, read_tile};
 use crate::output::simplify::simplify;
@@ -67,16 +66,11 @@ pub fn run(
         // Both lie between the lowest and the highest vertex.
         own.error = (error + simple.error).min(height_range(&look.frame, bounds));
         own.content = 1;
-        let mut bytes = Vec::new();
-        encode_tile(&look.frame, &simple.tile, look.compression, &mut bytes)?;
         directory.create_levels()?;
-        results.push(write_result(&directory.level(inner.node), &bytes)?);
-        figures = LevelFigures {
-            files: 1,
-            triangles: simple.tile.triangles.len() as u64,
-            bytes: bytes.len() as u64,
-            error_m: own.error,
-        };
+        let written = write_tile(&directory.level(inner.node), &simple.tile, look)?;
+        let triangles = simple.tile.triangles.len() as u64;
+        figures = LevelFigures { files: 1, triangles, bytes: written.bytes, error_m: own.error };
+        results.push(written);
     }
     let stored = Level { own, leaves }.save(store, inner.node)?;
     Ok(Done { results, ..Done::new(figures, vec![stored]) })

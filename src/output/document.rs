@@ -49,7 +49,9 @@ pub(super) struct Document<'a> {
 }
 
 impl<'a> Document<'a> {
-    pub(super) fn new(frame: &'a Frame, compression: Compression) -> Document<'a> {
+    /// An empty document; what `binary` holds is forgotten, and its memory used.
+    pub(super) fn new(frame: &'a Frame, compression: Compression, mut binary: Vec<u8>) -> Document<'a> {
+        binary.clear();
         Document {
             frame,
             compression,
@@ -58,7 +60,7 @@ impl<'a> Document<'a> {
             meshes: Vec::new(),
             nodes: Vec::new(),
             colored: false,
-            binary: Vec::new(),
+            binary,
             unpacked: 0,
         }
     }
@@ -67,21 +69,22 @@ impl<'a> Document<'a> {
     pub(super) fn add_part(&mut self, part: &Part) -> Result<()> {
         let tile = &*part.tile;
         let (triangles, order) = match self.compression {
-            Compression::None => (Cow::Borrowed(&tile.triangles), (0..tile.positions.len() as u32).collect()),
+            Compression::None => (Cow::Borrowed(&tile.triangles), None),
             _ => {
                 let (triangles, order) = rings(tile.positions.len(), &tile.triangles);
-                (Cow::Owned(triangles), order)
+                (Cow::Owned(triangles), Some(order))
             }
         };
-        let mut attributes = json!({"POSITION": self.add_positions(part, &order)?});
+        let order = order.as_deref();
+        let mut attributes = json!({"POSITION": self.add_positions(part, order)?});
         if let Some(normals) = &tile.normals {
-            attributes["NORMAL"] = self.add_normals(normals, &order)?.into();
+            attributes["NORMAL"] = self.add_normals(normals, order)?.into();
         }
         if let Some(colors) = &tile.colors {
-            attributes["COLOR_0"] = self.add_colors(colors, &order)?.into();
+            attributes["COLOR_0"] = self.add_colors(colors, order)?.into();
             self.colored = true;
         }
-        let indices = self.add_triangles(&triangles, order.len())?;
+        let indices = self.add_triangles(&triangles, tile.positions.len())?;
         let primitive = json!({"attributes": attributes, "indices": indices, "material": 0});
         let mut node = json!({"mesh": self.meshes.len(), "translation": self.frame.metres(part.origin)});
         if self.compression != Compression::None {
@@ -92,7 +95,7 @@ impl<'a> Document<'a> {
         Ok(())
     }
 
-    fn add_positions(&mut self, part: &Part, order: &[u32]) -> Result<usize> {
+    fn add_positions(&mut self, part: &Part, order: Option<&[u32]>) -> Result<usize> {
         let positions = &part.tile.positions;
         // The way from the lattice is monotonic, and y turns round.
         let [low, high] = part.tile.bounds().unwrap_or_default();
@@ -122,7 +125,7 @@ impl<'a> Document<'a> {
         self.add_attribute(&values, UNSIGNED_SHORT, "VEC3", bounds)
     }
 
-    fn add_normals(&mut self, normals: &[[f32; 3]], order: &[u32]) -> Result<usize> {
+    fn add_normals(&mut self, normals: &[[f32; 3]], order: Option<&[u32]>) -> Result<usize> {
         let up = |[x, y, z]: [f32; 3]| [x, z, 0.0 - y];
         if self.compression == Compression::None {
             return self.add_attribute(&picked(normals, order, up), FLOAT, "VEC3", json!({}));
@@ -150,7 +153,7 @@ impl<'a> Document<'a> {
         }
     }
 
-    fn add_colors(&mut self, colors: &[Linear], order: &[u32]) -> Result<usize> {
+    fn add_colors(&mut self, colors: &[Linear], order: Option<&[u32]>) -> Result<usize> {
         let normalized = json!({"normalized": true});
         if self.compression == Compression::None {
             let values = picked(colors, order, |[r, g, b]| [r, g, b, u16::MAX]);
@@ -267,9 +270,12 @@ impl<'a> Document<'a> {
     }
 }
 
-/// What `convert` makes of the values with these numbers.
-fn picked<T: Copy, B>(values: &[T], order: &[u32], convert: impl Fn(T) -> B) -> Vec<B> {
-    order.iter().map(|&v| convert(values[v as usize])).collect()
+/// What `convert` makes of the values with these numbers, or of all of them as they are.
+fn picked<T: Copy, B>(values: &[T], order: Option<&[u32]>, convert: impl Fn(T) -> B) -> Vec<B> {
+    match order {
+        Some(order) => order.iter().map(|&v| convert(values[v as usize])).collect(),
+        None => values.iter().map(|&value| convert(value)).collect(),
+    }
 }
 
 fn not_packed(error: meshopt::Error) -> Error {

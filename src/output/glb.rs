@@ -12,23 +12,37 @@ pub(super) const VERSION: u32 = 2;
 pub(super) const JSON_CHUNK: u32 = u32::from_le_bytes(*b"JSON");
 pub(super) const BIN_CHUNK: u32 = u32::from_le_bytes(*b"BIN\0");
 
-/// The bytes of the GLB file of `tile`, into `out`, which is cleared first and can be used again for the next tile.
-/// The same tile gives the same bytes. Unless `compression` is none, `frame` should be [`Frame::packed`].
-///
-/// Fails where a triangle is too long to be exact in f32 ([`Frame::longest_triangle`]) or the file would pass 4 GiB.
-pub fn encode_tile(frame: &Frame, tile: &Tile, compression: Compression, out: &mut Vec<u8>) -> Result<()> {
-    let parts = match compression {
-        Compression::None => split(frame, tile)?,
-        _ => split_short(frame, tile)?,
-    };
-    let mut document = Document::new(frame, compression);
-    for part in &parts {
-        document.add_part(part)?;
+/// The bytes of a GLB file. Its memory can be used again for the next tile.
+#[derive(Debug, Default)]
+pub struct Glb {
+    head: Vec<u8>,
+    binary: Vec<u8>,
+}
+
+impl Glb {
+    /// Makes it that of `tile`. The same tile gives the same bytes. Unless `compression` is none, `frame` should be [`Frame::packed`].
+    ///
+    /// # Errors
+    /// [`Error::Config`] where a triangle is too long to be exact in f32 ([`Frame::longest_triangle`]) or the file would pass 4 GiB.
+    pub fn encode(&mut self, frame: &Frame, tile: &Tile, compression: Compression) -> Result<()> {
+        let parts = match compression {
+            Compression::None => split(frame, tile)?,
+            _ => split_short(frame, tile)?,
+        };
+        let mut document = Document::new(frame, compression, std::mem::take(&mut self.binary));
+        for part in &parts {
+            document.add_part(part)?;
+        }
+        self.head.clear();
+        write_container(document.json().to_string().into_bytes(), document.binary.len() as u64, &mut self.head)?;
+        self.binary = document.binary;
+        Ok(())
     }
-    out.clear();
-    write_container(document.json().to_string().into_bytes(), document.binary.len() as u64, out)?;
-    out.extend_from_slice(&document.binary);
-    Ok(())
+
+    /// The file's bytes, one piece after the other: joining them would be one copy more.
+    pub fn pieces(&self) -> [&[u8]; 2] {
+        [&self.head, &self.binary]
+    }
 }
 
 /// Header, JSON chunk and the head of the binary chunk, whose `length` bytes are to follow.
@@ -41,7 +55,6 @@ pub(super) fn write_container(mut json: Vec<u8>, length: u64, out: &mut Vec<u8>)
             "a GLB file of {total} bytes would pass the limit of 4 GiB: set a smaller sites_per_tile"
         ))
     })?;
-    out.reserve(total as usize);
     for word in [MAGIC, VERSION, total, json.len() as u32, JSON_CHUNK] {
         out.extend_from_slice(&word.to_le_bytes());
     }

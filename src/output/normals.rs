@@ -96,11 +96,11 @@ fn accumulate<T: Copy + std::ops::AddAssign>(
 
 /// Whether as many triangles as these, all at one vertex, keep the sum within an `i64`.
 fn narrow_suffices(positions: &[[i32; 3]], triangles: usize) -> bool {
-    let mut widest = [0u128; 3];
-    for k in 0..3 {
-        let (low, high) = positions.iter().fold((i32::MAX, i32::MIN), |(l, h), p| (l.min(p[k]), h.max(p[k])));
-        widest[k] = (high as i64 - low as i64).max(0) as u128;
-    }
+    let Some(&first) = positions.first() else { return true };
+    let (low, high) = positions.iter().fold((first, first), |(low, high), p| {
+        ([0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k])))
+    });
+    let widest = [0, 1, 2].map(|k| (high[k] as i64 - low[k] as i64) as u128);
     let [x, y, z] = widest;
     let largest = (x * y).max(y * z).max(x * z) * 2;
     largest.saturating_mul(triangles as u128) < 1 << 63
@@ -115,7 +115,9 @@ fn weights(frame: &Frame) -> [f64; 2] {
 fn unit(sum: [f64; 3], weights: [f64; 2]) -> [f32; 3] {
     let [x, y, z] = [sum[0] * weights[0], sum[1] * weights[0], sum[2] * weights[1]];
     let length = (x * x + y * y + z * z).sqrt();
-    if length > 0.0 { [x, y, z].map(|v| (v / length) as f32) } else { [0.0, 0.0, 1.0] }
+    // One division rather than three; what is lost is far below an f32's last place.
+    let shrink = 1.0 / length;
+    if length > 0.0 { [x, y, z].map(|v| (v * shrink) as f32) } else { [0.0, 0.0, 1.0] }
 }
 
 #[cfg(test)]

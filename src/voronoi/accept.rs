@@ -53,15 +53,14 @@ impl Acceptance {
         self.used.clear();
         self.used.resize(n, false);
         self.hull.clear();
-        mesh.triangles.clear();
-        mesh.triangles.reserve(triangles);
+        mesh.triangles.resize(triangles, [0; 3]);
         mesh.twins.resize(3 * triangles, HULL);
         let mut links = 0;
         for start in (front..records.len()).step_by(Edges::BLOCK) {
             let end = records.len().min(start + Edges::BLOCK);
-            self.write_triangles(&records[start..end], sites, order, mesh)?;
-            let first = (start - front) / 8 * 3;
-            self.write_twins(&records[start..end], front as u32, &mut mesh.twins[first..]);
+            let first = (start - front) / 8;
+            self.write_triangles(&records[start..end], sites, order, &mut mesh.triangles[first..])?;
+            self.write_twins(&records[start..end], front as u32, &mut mesh.twins[3 * first..]);
             links += self.check_edges(sphere, sites, start, end)?;
         }
         if 2 * links + self.hull.len() != 3 * triangles {
@@ -79,12 +78,12 @@ impl Acceptance {
         block: &[u32],
         sites: &[Site],
         order: &[u32],
-        mesh: &mut Mesh,
+        triangles: &mut [[u32; 3]],
     ) -> Result<(), Rejected> {
         let n = sites.len();
         let (order, used) = (&order[..n], &mut self.used[..n]);
         let mut inverted = false;
-        for record in block.chunks_exact(8) {
+        for (record, triangle) in block.chunks_exact(8).zip(triangles) {
             let corners = [record[0], record[1], record[2]];
             if corners[0].max(corners[1]).max(corners[2]) >= n as u32 {
                 return Err(Rejected::NotAccepted("a corner is no site"));
@@ -92,7 +91,7 @@ impl Acceptance {
             let [a, b, c] = [corners[0] as usize, corners[1] as usize, corners[2] as usize];
             inverted |= orient2d(sites[a], sites[b], sites[c]) <= 0;
             (used[a], used[b], used[c]) = (true, true, true);
-            mesh.triangles.push([order[a], order[b], order[c]]);
+            *triangle = [order[a], order[b], order[c]];
         }
         match inverted {
             true => Err(Rejected::NotAccepted("a triangle is not counterclockwise")),

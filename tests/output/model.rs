@@ -6,7 +6,7 @@ use std::path::Path;
 use gdt_batch::geometry::lattice::{Lattice, shortest_decimal};
 use gdt_batch::geometry::predicates::{in_circle, orient2d};
 use gdt_batch::output::frame::Frame;
-use gdt_batch::output::glb::encode_tile;
+use gdt_batch::output::glb::Glb;
 use gdt_batch::output::normals::Sums;
 use gdt_batch::output::{Compression, Tile};
 use spade::{DelaunayTriangulation, Point2, Triangulation};
@@ -144,9 +144,15 @@ pub(crate) fn write_tiles(directory: &Path, frame: &Frame, tiles: &[Tile]) {
 pub(crate) fn write_tiles_as(compression: Compression, directory: &Path, frame: &Frame, tiles: &[Tile]) {
     let folder = directory.join("tiles");
     std::fs::create_dir_all(&folder).unwrap();
-    let mut bytes = Vec::new();
     for (number, tile) in tiles.iter().enumerate() {
-        encode_tile(&framed(frame, compression), tile, compression, &mut bytes).unwrap();
+        let bytes = encode_tile(&framed(frame, compression), tile, compression).unwrap();
         std::fs::write(folder.join(format!("{number:05}.glb")), &bytes).unwrap();
     }
+}
+
+/// The bytes of the GLB file of `tile`.
+pub(crate) fn encode_tile(frame: &Frame, tile: &Tile, compression: Compression) -> gdt_batch::Result<Vec<u8>> {
+    let mut glb = Glb::default();
+    glb.encode(frame, tile, compression)?;
+    Ok(glb.pieces().concat())
 }

@@ -4,19 +4,16 @@ use std::collections::HashMap;
 
 use gdt_batch::Error;
 use gdt_batch::output::frame::Frame;
-use gdt_batch::output::glb::encode_tile;
 use gdt_batch::output::read::{Part, TileFile, read_tile};
 use gdt_batch::output::{Compression, Tile};
 use gdt_batch::verify::Source;
 use proptest::prelude::*;
 
-use crate::model::{COMPRESSIONS, cloud, cut, framed, grid, lattice, terrain, utm};
+use crate::model::{COMPRESSIONS, cloud, cut, encode_tile, framed, grid, lattice, terrain, utm};
 use crate::random::Random;
 
 fn written(frame: &Frame, tile: &Tile) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    encode_tile(frame, tile, Compression::None, &mut bytes).unwrap();
-    bytes
+    encode_tile(frame, tile, Compression::None).unwrap()
 }
 
 fn read_bytes(bytes: &[u8]) -> gdt_batch::Result<TileFile> {
@@ -30,8 +27,7 @@ fn there_and_back(frame: &Frame, tile: &Tile) -> TileFile {
 }
 
 fn there_and_back_as(compression: Compression, frame: &Frame, tile: &Tile) -> TileFile {
-    let mut bytes = Vec::new();
-    encode_tile(&framed(frame, compression), tile, compression, &mut bytes).unwrap();
+    let bytes = encode_tile(&framed(frame, compression), tile, compression).unwrap();
     read_bytes(&bytes).unwrap()
 }
 
@@ -117,8 +113,7 @@ fn packed_normals_are_true_on_any_lattice() {
 fn packing_is_worth_it() {
     let tile = terrain(&utm(), &grid(150, 150, 40));
     let size = |compression| {
-        let mut bytes = Vec::new();
-        encode_tile(&framed(&utm(), compression), &tile, compression, &mut bytes).unwrap();
+        let bytes = encode_tile(&framed(&utm(), compression), &tile, compression).unwrap();
         bytes.len() / tile.positions.len()
     };
     let [none, quantized, meshopt] = COMPRESSIONS.map(size);
@@ -149,8 +144,7 @@ fn packing_is_worth_it_for_wide_tiles_too() {
     let frame = framed(&Frame::new(&lattice([0.0; 3], 0.001, 0.001), 1.0, 1.0, None).unwrap(), Compression::Meshopt);
     let size = |points: &[[i32; 3]]| {
         let tile = terrain(&frame, points);
-        let mut bytes = Vec::new();
-        encode_tile(&frame, &tile, Compression::Meshopt, &mut bytes).unwrap();
+        let bytes = encode_tile(&frame, &tile, Compression::Meshopt).unwrap();
         bytes.len() as f64 / tile.positions.len() as f64
     };
     let (narrow, wide) = (size(&cloud(5, 4_000, 60_000)), size(&cloud(5, 4_000, 480_000)));
@@ -229,8 +223,7 @@ fn a_triangle_too_long_for_gltf_is_refused_with_the_remedy() {
     };
     let longest = (frame.longest_triangle()[0] * 1e6) as i32;
     assert_eq!(integers(&there_and_back(&frame, &triangle(longest - 1))), triangle(longest - 1).positions);
-    let error =
-        encode_tile(&frame, &triangle(longest + longest / 100), Compression::None, &mut Vec::new()).unwrap_err();
+    let error = encode_tile(&frame, &triangle(longest + longest / 100), Compression::None).unwrap_err();
     assert!(matches!(error, Error::Config(_)));
     assert!(error.to_string().contains("resolution = 0.00001"), "{error}");
 }
@@ -300,8 +293,7 @@ proptest! {
         seed: u64, cut_at in 0usize..3000, compression in prop::sample::select(&COMPRESSIONS[..]),
     ) {
         let frame = framed(&utm(), compression);
-        let mut bytes = Vec::new();
-        encode_tile(&frame, &terrain(&frame, &cloud(5, 30, 3_000)), compression, &mut bytes).unwrap();
+        let bytes = encode_tile(&frame, &terrain(&frame, &cloud(5, 30, 3_000)), compression).unwrap();
         prop_assert!(read_bytes(&bytes[..cut_at % bytes.len()]).is_err());
         let mut random = Random(seed);
         let mut damaged = bytes.clone();
@@ -321,8 +313,7 @@ proptest! {
 #[test]
 fn hostile_packed_files_take_no_memory() {
     let (frame, tile) = (utm().packed(), terrain(&utm(), &cloud(5, 30, 3_000)));
-    let mut bytes = Vec::new();
-    encode_tile(&frame, &tile, Compression::Meshopt, &mut bytes).unwrap();
+    let bytes = encode_tile(&frame, &tile, Compression::Meshopt).unwrap();
     let said = |from: &str, to: &str| {
         let place = bytes.windows(from.len()).position(|window| window == from.as_bytes()).unwrap();
         let mut file = bytes.clone();
