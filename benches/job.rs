@@ -95,5 +95,8 @@ fn job(file: &Path, output: &Path, look: &str) -> Outcome<Report> {
             output
         ),
     )?;
-    Ok(gdt_batch::job::run(&Config::load(&config)?, Progress::Quiet)?)
+    let report = gdt_batch::job::run(&Config::load(&config)?, Progress::Quiet)?;
+    // The next job finds the same disk, and file cache of the system that has been in use before.
+    std::fs::remove_dir_all(output)?;
+    Ok(report)
 }
