@@ -95,7 +95,10 @@ fn job(file: &Path, output: &Path, look: &str) -> Outcome<Report> {
             output
         ),
     )?;
-    let report = gdt_batch::job::run(&Config::load(&config)?, Progress::Quiet)?;
+    let start = Instant::now();
+    let mut report = gdt_batch::job::run(&Config::load(&config)?, Progress::Quiet)?;
+    // With the report itself, and cleaning up.
+    report.wall_s = start.elapsed().as_secs_f64();
     // The next job finds the same disk, and file cache of the system that has been in use before.
     std::fs::remove_dir_all(output)?;
     Ok(report)

@@ -7,6 +7,7 @@ use std::collections::{BTreeSet, HashSet};
 use std::fs::{self, File, TryLockError};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
+use std::thread::ScopedJoinHandle;
 use xxhash_rust::xxh3::Xxh3;
 
 /// The paths of a job.
@@ -361,18 +362,39 @@ pub fn partial(path: &Path) -> PathBuf {
     path.with_extension("partial")
 }
 
+/// Files that are brought to the disk side by side.
+const SYNCS_AT_ONCE: usize = 8;
+
 /// Gives results their names: only once all of each is on the disk, and such that the names are there too.
 ///
 /// # Errors
 /// [`Error::Io`] if that fails.
 pub fn publish(results: &[PathBuf]) -> Result<()> {
+    sync_files(results)?;
     for path in results {
-        let partial = partial(path);
-        sync_file(&partial)?;
-        fs::rename(&partial, path).map_err(Error::io("rename the finished file to", path))?;
+        fs::rename(partial(path), path).map_err(Error::io("rename the finished file to", path))?;
     }
     let folders: BTreeSet<&Path> = results.iter().filter_map(|path| path.parent()).collect();
     folders.into_iter().try_for_each(sync_directory)
+}
+
+/// Brings what waits to be `results` to the disk, several at a time: waits for the disk that overlap are hardly longer than one.
+fn sync_files(results: &[PathBuf]) -> Result<()> {
+    let share = results.len().div_ceil(SYNCS_AT_ONCE).max(1);
+    let sync = |results: &[PathBuf]| results.iter().try_for_each(|path| sync_file(&partial(path)));
+    std::thread::scope(|scope| {
+        let mut shares = results.chunks(share);
+        let own = shares.next().unwrap_or_default();
+        let start = |share| std::thread::Builder::new().spawn_scoped(scope, move || sync(share)).map_err(|_| share);
+        let others: Vec<_> = shares.map(start).collect();
+        let own = sync(own);
+        // What no thread could be had for is done here.
+        let join = |other| match other {
+            Ok(thread) => ScopedJoinHandle::join(thread).unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
+            Err(share) => sync(share),
+        };
+        others.into_iter().map(join).fold(own, Result::and)
+    })
 }
 
 fn sync_file(path: &Path) -> Result<()> {

@@ -257,7 +257,7 @@ impl Job<'_> {
         let cut = Cut::new(config.output.max_edge, &plan.frame, store, [tiles as u64, leaves.sites], bounds)?;
         let look = look(config, plan, &partition.summary, bounds, cut);
         let stage = progress.stage("stitch", tiles as u64, "tiles");
-        self.stitch_all(&partition.tree, &look, &stage)?;
+        self.beside(|| self.give_up_points(), || self.stitch_all(&partition.tree, &look, &stage))?;
         let stitched = stage.finish();
 
         // Not earlier: what an earlier job has made stays as long as this one may fail for its input.
@@ -279,6 +279,10 @@ impl Job<'_> {
         let georeference = Georeference::new(&plan.frame, &plan.lattice, bounds, plan.unit, plan.crs.epsg);
         let georeference = georeference.to_json(placement.as_ref());
         let viewers = finish::Viewers { tileset, one_file: one_file && config.output.format != Format::Tiles };
+        if viewers.one_file {
+            // It is made of the tiles under their names.
+            journal.commit()?;
+        }
         let finish = || finish::run(directory, store, &georeference, &viewers, &canvas, tiles);
         let other_bytes = journal.step(Step::Finish, finish)?;
         if !one_file && config.output.format == Format::Glb {
@@ -343,13 +347,15 @@ impl Job<'_> {
         on_threads(lanes, || {
             let mut all = LevelFigures::default();
             for height in pyramid.by_height() {
+                if content {
+                    // The tiles below are read under their names.
+                    self.journal.commit()?;
+                }
                 let sum = |mut a: LevelFigures, b| {
                     a += b;
                     Ok(a)
                 };
                 all += height.into_par_iter().with_max_len(1).map(make).try_reduce(LevelFigures::default, sum)?;
-                // The next ones read them under their names.
-                self.journal.commit()?;
             }
             Ok(all)
         })
@@ -390,14 +396,27 @@ impl Job<'_> {
     fn triangulate(&self, partition: &Partition, longest: Longest, stage: &Stage) -> Result<LeafFigures> {
         let all_there = (0..partition.tree.leaves.len()).all(|tile| self.journal.has(Step::Leaf(tile)));
         let spill = if all_there { None } else { Some(Spill::open(&self.directory.spill())?) };
-        let figures = grow::Grower { job: self, partition, spill, longest, stage }.grow(0)?;
+        grow::Grower { job: self, partition, spill, longest, stage }.grow(0)
+    }
+
+    /// Removes the points: once all leaves are in the journal, what is in the store is enough.
+    fn give_up_points(&self) -> Result<()> {
         self.journal.commit()?;
         if self.journal.is_worth_syncing() {
             self.store.sync()?;
         }
-        // From here on what is in the store is enough.
-        directory::remove_file(&self.directory.spill())?;
-        Ok(figures)
+        directory::remove_file(&self.directory.spill())
+    }
+
+    /// Does `work`, and beside it, on a thread of its own, what waits for the disk.
+    fn beside<T>(&self, waiting: impl FnOnce() -> Result<()> + Send, work: impl FnOnce() -> Result<T>) -> Result<T> {
+        std::thread::scope(|scope| {
+            let thread = std::thread::Builder::new().spawn_scoped(scope, waiting);
+            let thread = thread.map_err(|e| Error::Memory(format!("cannot start a thread: {e}")))?;
+            let outcome = work();
+            let waited = thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+            outcome.and_then(|outcome| waited.map(|()| outcome))
+        })
     }
 
     fn stitch_all(&self, tree: &Tree, look: &Look, stage: &Stage) -> Result<()> {
@@ -418,12 +437,10 @@ impl Job<'_> {
             Ok(figures)
         };
         let tiles = (0..partition.tree.leaves.len()).into_par_iter().with_max_len(1);
-        let figures = tiles.map(export).try_reduce(TileFigures::default, |mut a, b| {
+        tiles.map(export).try_reduce(TileFigures::default, |mut a, b| {
             a += b;
             Ok(a)
-        })?;
-        self.journal.commit()?;
-        Ok(figures)
+        })
     }
 
     /// Shows that `step` is done, by this run or an earlier one.
