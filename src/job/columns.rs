@@ -6,15 +6,15 @@ use bytemuck::Pod;
 
 /// Collects columns and writes them as one record.
 #[derive(Default)]
-pub struct ColumnWriter {
-    bytes: Vec<u8>,
+pub struct ColumnWriter<'a> {
+    /// The number of values and the bytes of each.
+    columns: Vec<([u8; 8], &'a [u8])>,
 }
 
-impl ColumnWriter {
+impl<'a> ColumnWriter<'a> {
     /// Adds a column.
-    pub fn push<T: Pod>(mut self, column: &[T]) -> ColumnWriter {
-        self.bytes.extend_from_slice(&(column.len() as u64).to_ne_bytes());
-        self.bytes.extend_from_slice(bytemuck::cast_slice(column));
+    pub fn push<T: Pod>(mut self, column: &'a [T]) -> ColumnWriter<'a> {
+        self.columns.push(((column.len() as u64).to_ne_bytes(), bytemuck::cast_slice(column)));
         self
     }
 
@@ -23,7 +23,8 @@ impl ColumnWriter {
     /// # Errors
     /// [`Error::Io`] if that fails.
     pub fn write(self, store: &Store, key: Key) -> Result<Stored> {
-        store.put(key, &self.bytes)
+        let pieces: Vec<&[u8]> = self.columns.iter().flat_map(|(length, bytes)| [&length[..], bytes]).collect();
+        store.put(key, &pieces)
     }
 }
 

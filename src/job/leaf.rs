@@ -71,16 +71,14 @@ pub fn run(
     let cell = (!is_root).then_some(&partition.tree.nodes[node].cell);
     let closing = close(&mesh, &sites, cell, |_| false);
     check_spans(&mesh, &sites, &closing.states, task.longest)?;
-    let sums = frontier_sums(&mesh, &closing, &points);
+    let draft = rim_draft(&mesh, &closing, &points);
     let closed = mesh.triangles.iter().zip(&closing.states).filter(|(_, state)| **state == State::Closed);
-    let leaf = leaf_of(&points, closed.map(|(triangle, _)| *triangle).collect());
-    triangulation::recycle(mesh);
-    let rim = |&site: &u32| Rim { tile: tile as u32, site, position: leaf.positions[site as usize] };
+    let (leaf, triangles) = Leaf::save(store, tile, &points, closed.map(|(triangle, _)| *triangle))?;
+    let rim = |&site: &u32| Rim { tile: tile as u32, site, position: points[site as usize].corner() };
     let frontier = Frontier { sites: closing.frontier.iter().map(rim).collect(), boundary: closing.boundary };
-    let draft = rim_draft(&leaf, &closing.frontier, sums);
-    let stored = vec![draft.save(store, tile)?, leaf.save(store, tile)?, frontier.save(store, node)?];
-    let (sites, triangles) = (sites.len() as u64, leaf.triangles.len() as u64);
-    Ok(Done::new(LeafFigures { sites, duplicates: dropped, triangles, outcome }, stored))
+    let stored = vec![draft.save(store, tile)?, leaf, frontier.save(store, node)?];
+    triangulation::recycle(mesh);
+    Ok(Done::new(LeafFigures { sites: sites.len() as u64, duplicates: dropped, triangles, outcome }, stored))
 }
 
 fn check_spans(mesh: &Mesh, sites: &[Site], states: &[State], longest: Longest) -> Result<()> {
@@ -91,33 +89,20 @@ fn check_spans(mesh: &Mesh, sites: &[Site], states: &[State], longest: Longest) 
     closed.try_for_each(|(corners, _)| longest.check(corners.map(|v| sites[v as usize])))
 }
 
-/// The sums of normals over the closed triangles around every site of the frontier.
-fn frontier_sums(mesh: &Mesh, closing: &Closing, points: &[Point]) -> Vec<NormalSum> {
-    let corner = |v: u32| points[v as usize].corner();
-    let sum = |&spoke: &u32| {
-        let around = (spoke != HULL).then(|| mesh.around(spoke)).into_iter().flatten().map(|t| t as usize);
-        let closed = around.filter(|&t| closing.states[t] == State::Closed);
-        let normals = closed.map(|t| mesh.triangles[t].map(corner)).map(|[a, b, c]| normals::cross(a, b, c));
-        normals.fold([0; 3], normals::add)
-    };
-    closing.spokes.iter().map(sum).collect()
-}
-
-fn leaf_of(points: &[Point], triangles: Vec<[u32; 3]>) -> Leaf {
-    Leaf {
-        positions: points.iter().map(Point::corner).collect(),
-        rgb: points.iter().map(|p| p.rgb).collect(),
-        class: points.iter().map(|p| p.class).collect(),
-        triangles,
-    }
-}
-
 /// The frontier as far as the leaf knows it: the seams add their triangles to the normals when all are known.
-fn rim_draft(leaf: &Leaf, frontier: &[u32], sums: Vec<NormalSum>) -> RimDraft {
-    let sites = || frontier.iter().map(|&site| site as usize);
+fn rim_draft(mesh: &Mesh, closing: &Closing, points: &[Point]) -> RimDraft {
+    let sites = || closing.frontier.iter().map(|&site| &points[site as usize]);
     RimDraft {
-        sums,
-        rgb: sites().map(|site| leaf.rgb[site]).collect(),
-        class: sites().map(|site| leaf.class[site]).collect(),
+        sums: closing.spokes.iter().map(|&spoke| closed_around(mesh, closing, points, spoke)).collect(),
+        rgb: sites().map(|point| point.rgb).collect(),
+        class: sites().map(|point| point.class).collect(),
     }
+}
+
+/// The sum of normals over the closed triangles around the start of `spoke`.
+fn closed_around(mesh: &Mesh, closing: &Closing, points: &[Point], spoke: u32) -> NormalSum {
+    let around = (spoke != HULL).then(|| mesh.around(spoke)).into_iter().flatten();
+    let closed = around.map(|t| t as usize).filter(|&t| closing.states[t] == State::Closed);
+    let corners = closed.map(|t| mesh.triangles[t].map(|v| points[v as usize].corner()));
+    corners.map(|[a, b, c]| normals::cross(a, b, c)).fold([0; 3], normals::add)
 }

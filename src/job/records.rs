@@ -3,6 +3,7 @@
 use super::columns::{ColumnReader, ColumnWriter};
 use super::store::{Key, Store, Stored};
 use crate::geometry::Site;
+use crate::input::Point;
 use crate::output::normals::NormalSum;
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
@@ -43,19 +44,28 @@ pub struct Leaf {
 }
 
 impl Leaf {
-    /// Writes the record of `tile`.
+    /// Writes the record of `tile`, whose sites are those of `points`; with it, how many triangles there are.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn save(&self, store: &Store, tile: usize) -> Result<Stored> {
-        let columns = ColumnWriter::default().push(&self.positions).push(&self.rgb).push(&self.class);
+    pub fn save(
+        store: &Store,
+        tile: usize,
+        points: &[Point],
+        triangles: impl Iterator<Item = [u32; 3]>,
+    ) -> Result<(Stored, u64)> {
+        let positions: Vec<[i32; 3]> = points.iter().map(Point::corner).collect();
+        let rgb: Vec<[u16; 3]> = points.iter().map(|p| p.rgb).collect();
+        let class: Vec<u8> = points.iter().map(|p| p.class).collect();
+        let columns = ColumnWriter::default().push(&positions).push(&rgb).push(&class);
         // These records are most of what a job writes on its way: corners take two bytes where that is enough.
-        let columns = if self.has_short_corners() {
-            columns.push::<[u16; 3]>(&self.triangles.iter().map(|t| t.map(|v| v as u16)).collect::<Vec<_>>())
+        if has_short_corners(&positions) {
+            let triangles: Vec<[u16; 3]> = triangles.map(|t| t.map(|v| v as u16)).collect();
+            Ok((columns.push(&triangles).write(store, Key::Leaf(tile))?, triangles.len() as u64))
         } else {
-            columns.push(&self.triangles)
-        };
-        columns.write(store, Key::Leaf(tile))
+            let triangles: Vec<[u32; 3]> = triangles.collect();
+            Ok((columns.push(&triangles).write(store, Key::Leaf(tile))?, triangles.len() as u64))
+        }
     }
 
     /// Reads the record of `tile`.
@@ -70,17 +80,17 @@ impl Leaf {
             class: columns.column()?,
             triangles: Vec::new(),
         };
-        leaf.triangles = if leaf.has_short_corners() {
+        leaf.triangles = if has_short_corners(&leaf.positions) {
             columns.column::<[u16; 3]>()?.into_iter().map(|t| t.map(u32::from)).collect()
         } else {
             columns.column()?
         };
         Ok(leaf)
     }
+}
 
-    fn has_short_corners(&self) -> bool {
-        self.positions.len() <= 1 << 16
-    }
+fn has_short_corners(positions: &[[i32; 3]]) -> bool {
+    positions.len() <= 1 << 16
 }
 
 /// What a node hands to its parent.

@@ -9,10 +9,11 @@ use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::fs::File;
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{PoisonError, RwLock};
-use xxhash_rust::xxh3::{Xxh3, xxh3_64_with_seed};
+use xxhash_rust::xxh3::Xxh3;
 
 /// What a record holds; it is a tile's or a node's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -73,6 +74,24 @@ pub struct Stored {
     at: u64,
     length: u64,
     hash: u64,
+}
+
+/// Writes to a file from a place on, whatever others do with the file.
+struct From<'a> {
+    file: &'a File,
+    at: u64,
+}
+
+impl Write for From<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        write_all_at(self.file, bytes, self.at)?;
+        self.at += bytes.len() as u64;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
 }
 
 /// The results of all steps of a job, on disk; threads may write and read at once.
@@ -136,14 +155,22 @@ impl Store {
         Ok(hasher.digest())
     }
 
-    /// Writes a record. It takes the place of an earlier one of the same key.
-    pub(super) fn put(&self, key: Key, content: &[u8]) -> Result<Stored> {
-        let (length, hash) = (content.len() as u64, xxh3_64_with_seed(content, seed(key.code())));
+    /// Writes a record, given in pieces. It takes the place of an earlier one of the same key.
+    pub(super) fn put(&self, key: Key, pieces: &[&[u8]]) -> Result<Stored> {
+        let length = pieces.iter().map(|piece| piece.len() as u64).sum();
         let at = self.end.fetch_add(length, Ordering::Relaxed);
-        write_all_at(&self.file, content, at).map_err(Error::io("write", &self.path))?;
+        let mut hasher = Xxh3::with_seed(seed(key.code()));
+        // Small pieces are joined, large ones written as they are.
+        let mut writer = BufWriter::new(From { file: &self.file, at });
+        let mut write = |piece: &&[u8]| {
+            hasher.update(piece);
+            writer.write_all(piece)
+        };
+        let written = pieces.iter().try_for_each(&mut write).and_then(|()| writer.flush());
+        written.map_err(Error::io("write", &self.path))?;
         let mut places = self.places.write().unwrap_or_else(PoisonError::into_inner);
         places.insert(key, Place { at, length });
-        Ok(Stored { key, at, length, hash })
+        Ok(Stored { key, at, length, hash: hasher.digest() })
     }
 
     /// Whether there is a record of `key`.
