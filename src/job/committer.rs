@@ -12,7 +12,10 @@ use std::time::{Duration, Instant};
 
 /// Between two commits: what a kill costs at the most, beside the steps that are under way. Short, so that at the end of a stage
 /// little is left to wait for.
-const INTERVAL: Duration = Duration::from_millis(100);
+const INTERVAL: Duration = Duration::from_millis(40);
+/// Where commits take long they are so many times as far apart, at most [`LONGEST_REST`]: a slow disk is there for the job first.
+const REST: u32 = 3;
+const LONGEST_REST: Duration = Duration::from_secs(1);
 /// From then on a job waits for the disk before it gives up what it could be repeated from.
 const WORTH_SYNCING: Duration = Duration::from_secs(60);
 
@@ -122,16 +125,20 @@ impl Drop for Committer {
 }
 
 fn run(shared: &Shared, file: &File, path: &Path, interval: Duration) {
+    let interval = interval.max(Duration::from_millis(1));
+    let mut rest = interval;
     loop {
         let state = shared.state();
         let waits = |state: &mut State| !state.wanted && !state.closing;
-        let waited = shared.wanted.wait_timeout_while(state, interval.max(Duration::from_millis(1)), waits);
+        let waited = shared.wanted.wait_timeout_while(state, rest, waits);
         let (mut state, _) = waited.unwrap_or_else(PoisonError::into_inner);
         let (batch, added, closing) = (std::mem::take(&mut state.batch), state.added, state.closing);
         let due = added > state.committed && !state.failed;
         state.wanted = false;
         drop(state);
+        let begun = Instant::now();
         let outcome = if due { commit(batch, file, path) } else { Ok(()) };
+        rest = interval.max(LONGEST_REST.min(REST * begun.elapsed()));
         let mut state = shared.state();
         match outcome {
             Ok(()) => state.committed = added,

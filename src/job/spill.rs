@@ -4,6 +4,7 @@ use crate::input::Point;
 use crate::positioned::{read_exact_at, write_all_at};
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
+use rayon::prelude::*;
 use std::fs::File;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -185,16 +186,15 @@ impl<'a> Buckets<'a> {
     /// # Errors
     /// [`Error::Io`] if a buffer cannot be written.
     pub fn finish(self) -> Result<Vec<Bucket>> {
-        let mut buckets = Vec::with_capacity(self.open.len());
-        for open in &self.open {
+        let finish = |open: &Mutex<OpenBucket>| {
             let mut open = open.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
             if !open.buffer.is_empty() {
                 self.flush(&mut open)?;
             }
             open.buffer = Vec::new();
-            buckets.push(std::mem::take(&mut open.bucket));
-        }
-        Ok(buckets)
+            Ok(std::mem::take(&mut open.bucket))
+        };
+        self.open.par_iter().map(finish).collect()
     }
 }
 
