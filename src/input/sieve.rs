@@ -54,7 +54,9 @@ impl<'a> Sieve<'a> {
             self.tally.other_class += 1;
             return Ok(());
         }
-        let mapped = [0, 1, 2].map(|axis| self.rules.maps[axis].apply(record.raw[axis]));
+        // One by one: `map` would become a call here, for every record.
+        let [x, y, z] = &self.rules.maps;
+        let mapped = [x.apply(record.raw[0]), y.apply(record.raw[1]), z.apply(record.raw[2])];
         if !self.in_bounds(&mapped) {
             self.tally.out_of_bounds += 1;
             return Ok(());

@@ -139,9 +139,7 @@ impl Sites {
             normals[vertex.site as usize] = vertex.normal;
         }
         let colors = match &look.coloring {
-            Some(coloring) => (0..leaf.positions.len())
-                .map(|v| coloring.color(leaf.positions[v][2], leaf.rgb[v], leaf.class[v]))
-                .collect(),
+            Some(coloring) => coloring.colors(&leaf.positions, &leaf.rgb, &leaf.class),
             None => Vec::new(),
         };
         Sites { positions: leaf.positions, normals, colors, triangles: leaf.triangles, cut }
@@ -197,7 +195,7 @@ impl Sites {
     /// The finished tile. Sites whose triangles all belong to other tiles, or are left out, are not in it.
     fn into_tile(mut self, look: &Look) -> Tile {
         let mut used = vec![false; self.positions.len()];
-        self.triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
+        self.triangles.as_flattened().iter().for_each(|&v| used[v as usize] = true);
         if used.contains(&false) {
             self.drop_unused(&used);
         }
@@ -212,7 +210,7 @@ impl Sites {
     fn drop_unused(&mut self, used: &[bool]) {
         let number = |next: &mut u32, &used: &bool| Some(std::mem::replace(next, *next + used as u32));
         let numbers: Vec<u32> = used.iter().scan(0, number).collect();
-        self.triangles.iter_mut().flatten().for_each(|v| *v = numbers[*v as usize]);
+        self.triangles.as_flattened_mut().iter_mut().for_each(|v| *v = numbers[*v as usize]);
         keep(&mut self.positions, used);
         keep(&mut self.normals, used);
         keep(&mut self.colors, used);
@@ -220,9 +218,14 @@ impl Sites {
 }
 
 /// Keeps the values whose place in `wanted` says so; a column that the tile does not have stays empty.
-fn keep<T>(values: &mut Vec<T>, wanted: &[bool]) {
-    let mut wanted = wanted.iter();
-    values.retain(|_| *wanted.next().unwrap_or(&false));
+fn keep<T: Copy>(values: &mut Vec<T>, wanted: &[bool]) {
+    let mut kept = 0;
+    // Without a branch that cannot be foreseen.
+    for at in 0..values.len() {
+        values[kept] = values[at];
+        kept += wanted[at] as usize;
+    }
+    values.truncate(kept);
 }
 
 /// The finished frontiers of other tiles, read when first asked for.

@@ -25,6 +25,22 @@ pub enum Coloring {
 }
 
 impl Coloring {
+    /// The colours of sites with these lattice integers x, y, z, source colours and classifications.
+    pub fn colors(&self, positions: &[[i32; 3]], rgb: &[[u16; 3]], class: &[u8]) -> Vec<Linear> {
+        match *self {
+            // Most jobs; the tables looked up but once.
+            Coloring::Rgb { eight_bit: true } => {
+                let table: [u16; 256] = std::array::from_fn(|v| decode_byte(v as u8));
+                rgb.iter().map(|rgb| rgb.map(|v| table[v.min(255) as usize])).collect()
+            }
+            Coloring::Rgb { eight_bit: false } => {
+                let table = &**TO_LINEAR;
+                rgb.iter().map(|rgb| rgb.map(|v| table[v as usize])).collect()
+            }
+            _ => positions.iter().zip(rgb).zip(class).map(|((p, &rgb), &class)| self.color(p[2], rgb, class)).collect(),
+        }
+    }
+
     /// The colour of a site with lattice integer `z`, source colour `rgb` and classification `class`.
     #[inline]
     pub fn color(&self, z: i32, rgb: [u16; 3], class: u8) -> Linear {
@@ -133,6 +149,11 @@ mod tests {
         let (eight, sixteen) = (Coloring::Rgb { eight_bit: true }, Coloring::Rgb { eight_bit: false });
         for v in 0..=255 {
             assert_eq!(eight.color(0, [v, 0, 255], 0), sixteen.color(0, [v * 257, 0, 65535], 0));
+        }
+        for coloring in [eight, sixteen, Coloring::Elevation { low: 0, high: 9 }, Coloring::Class] {
+            let (positions, rgb, class) = ([[0, 0, 3], [5, 5, 9]], [[1, 2, 300], [255, 65535, 256]], [2, 9]);
+            let one_by_one = [0, 1].map(|i| coloring.color(positions[i][2], rgb[i], class[i]));
+            assert_eq!(coloring.colors(&positions, &rgb, &class), one_by_one);
         }
         assert_eq!(eight.color(0, [0, 255, 188], 0), [0, 65535, 32957]);
     }

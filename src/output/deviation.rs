@@ -73,7 +73,7 @@ enum At {
 impl<'a> Fans<'a> {
     fn new(positions: &'a [[i32; 3]], triangles: &[[u32; 3]]) -> Fans<'a> {
         let mut starts = vec![0u32; positions.len() + 1];
-        triangles.iter().flatten().for_each(|&v| starts[v as usize] += 1);
+        triangles.as_flattened().iter().for_each(|&v| starts[v as usize] += 1);
         let mut end = 0;
         for start in &mut starts {
             end += *start;

@@ -213,8 +213,11 @@ impl Shading<'_> {
     fn interpolate(&self, value: impl Fn(usize) -> [f64; 3]) -> [f64; 3] {
         let weights = self.weights.map(|w| w as f64);
         let total: f64 = weights.iter().sum();
-        let [a, b, c] = self.corners.map(|v| value(v as usize));
-        [0, 1, 2].map(|k| (a[k] * weights[0] + b[k] * weights[1] + c[k] * weights[2]) / total)
+        // One by one: `map` would become a call here, for every pixel.
+        let [a, b, c] = self.corners;
+        let [a, b, c] = [value(a as usize), value(b as usize), value(c as usize)];
+        let mean = |k: usize| (a[k] * weights[0] + b[k] * weights[1] + c[k] * weights[2]) / total;
+        [mean(0), mean(1), mean(2)]
     }
 }
 
