@@ -284,11 +284,11 @@ impl Job<'_> {
             journal.commit()?;
         }
         let finish = || finish::run(directory, store, &georeference, &viewers, &canvas, tiles);
-        let other_bytes = journal.step(Step::Finish, finish)?;
+        // The tiles are on the disk before the report says how long that took.
+        let other_bytes = self.beside(|| journal.commit(), || journal.step(Step::Finish, finish))?;
         if !one_file && config.output.format == Format::Glb {
             warnings.push(too_large_for_one_file(&written));
         }
-        journal.commit()?;
         stage.advance(1);
         let stages = [Some(scanned), Some(read), Some(triangulated), Some(stitched), Some(exported), levelled];
         let stages = stages.into_iter().flatten().chain([stage.finish()]).collect();

@@ -93,8 +93,9 @@ pub struct Tree {
     pub leaves: Vec<usize>,
 }
 
-/// Frontiers are merged at the root and at every third inner node on the way down, eight at a time where the tree is full:
-/// joining two at every node would triangulate most frontier sites once a node, more than twice as often in all.
+/// Frontiers are merged at the root, at its grandchildren and at every third inner node below those, eight at a time where the
+/// tree is full: joining two at every node would triangulate most frontier sites once a node, more than twice as often in
+/// all. At the root only four, as there is no other work beside it.
 const MERGE_STRIDE: usize = 3;
 
 impl Tree {
@@ -106,7 +107,8 @@ impl Tree {
     /// Whether `node` merges the frontiers of what is below it.
     pub fn is_merge(&self, node: usize) -> bool {
         let is_inner = matches!(self.nodes[node].kind, Kind::Inner(_));
-        is_inner && self.ancestors(node).count().is_multiple_of(MERGE_STRIDE)
+        let depth = self.ancestors(node).count();
+        is_inner && (depth == 0 || (depth + 1).is_multiple_of(MERGE_STRIDE))
     }
 
     /// The merge nodes above node `node`, nearest first.
