@@ -8,6 +8,8 @@ use crate::geometry::Site;
 pub struct Grid {
     origin: Site,
     side: u32,
+    /// 2^64 by `side`, rounded up: a product by it, cut off there, is the whole quotient of any 32-bit number.
+    inverse: u128,
     columns: u32,
     rows: u32,
 }
@@ -32,6 +34,7 @@ impl Grid {
         Grid {
             origin: min,
             side: side as u32,
+            inverse: (1u128 << 64).div_ceil(side as u128),
             columns: size[0].div_ceil(side) as u32,
             rows: size[1].div_ceil(side) as u32,
         }
@@ -47,7 +50,7 @@ impl Grid {
     pub fn bucket(&self, p: Site) -> u32 {
         let place = |axis: usize, count: u32| {
             let along = (p[axis] as i64 - self.origin[axis] as i64).clamp(0, u32::MAX as i64) as u32;
-            (along / self.side).min(count - 1)
+            ((along as u128 * self.inverse >> 64) as u32).min(count - 1)
         };
         place(1, self.rows) * self.columns + place(0, self.columns)
     }
@@ -153,6 +156,26 @@ mod tests {
         assert_eq!(grid.bucket([i32::MAX, i32::MAX]) as usize, grid.buckets() - 1);
         assert_eq!(Grid::over([3, 3], [3, 3], 100).buckets(), 1);
         assert!(Grid::over([0, 0], [1 << 30, 0], 1000).buckets() <= 1000);
+    }
+
+    #[test]
+    fn a_product_divides_as_a_division_does() {
+        for side in [1, 2, 3, 7, 255, 256, 1000, 65_537, (1 << 30) - 1, 1 << 30] {
+            let grid = Grid {
+                origin: [0, 0],
+                side,
+                inverse: (1u128 << 64).div_ceil(side as u128),
+                columns: u32::MAX,
+                rows: 1,
+            };
+            for multiple in [0, 1, 2, (i32::MAX as u32 / side).saturating_sub(1), i32::MAX as u32 / side] {
+                for along in [(multiple * side).saturating_sub(1), multiple * side, (multiple * side).saturating_add(1)]
+                {
+                    let along = along.min(i32::MAX as u32);
+                    assert_eq!(grid.bucket([along as i32, 0]), along / side, "{along} by {side}");
+                }
+            }
+        }
     }
 
     #[test]

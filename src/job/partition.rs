@@ -275,13 +275,18 @@ impl<'a> Scatter<'a> {
         self.ends.clear();
         self.ends.resize(self.grid.buckets(), 0);
         self.bucket_of.clear();
+        let Some(first) = points.first().map(Point::corner) else { return };
+        let [mut low, mut high] = self.bounds.unwrap_or([first; 2]);
         for point in points {
             let bucket = self.grid.bucket(point.position);
             self.bucket_of.push(bucket);
             self.ends[bucket as usize] += 1;
+            for (axis, value) in point.corner().into_iter().enumerate() {
+                low[axis] = low[axis].min(value);
+                high[axis] = high[axis].max(value);
+            }
         }
-        let here = points.iter().map(|p| [[p.position[0], p.position[1], p.z]; 2]).reduce(around);
-        self.bounds = self.bounds.into_iter().chain(here).reduce(around);
+        self.bounds = Some([low, high]);
         let mut end = 0;
         for count in &mut self.ends {
             end += *count;

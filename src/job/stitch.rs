@@ -23,7 +23,7 @@ pub fn run(store: &Store, tree: &Tree, tile: usize, look: &Look) -> Result<Done<
     for [a, b, c] in seam_of(store, tree, tile)?.into_iter().filter(written) {
         let normal = normals::cross(a.position, b.position, c.position);
         for corner in [a, b, c].iter().filter(|corner| corner.tile as usize == tile) {
-            let at = frontier.sites.binary_search(corner);
+            let at = frontier.sites.binary_search_by_key(&corner.site, |rim| rim.site);
             let at = at.map_err(|_| Error::Broken(format!("a seam uses a site that tile {tile} does not hand up")))?;
             sums[at] = normals::add(sums[at], normal);
         }

@@ -1,6 +1,7 @@
 //! Puts the fragments of all tiles together, shades them and writes the PNG.
 
 use super::preview::{Canvas, Texel};
+use rayon::prelude::*;
 
 /// Slope (rise over run) that the steeper part of the terrain should get for its relief to be seen.
 const TARGET_SLOPE: f32 = 0.6;
@@ -84,7 +85,7 @@ impl Picture {
             let [r, g, b] = self.texels[i].color.map(|v| (v as f32 * light).min(255.0) as u8);
             [r, g, b, 255]
         };
-        (0..self.texels.len()).map(shade).collect()
+        (0..self.texels.len()).into_par_iter().with_min_len(self.width).map(shade).collect()
     }
 
     /// Whether the next pixel to the right or below is another tile's.
