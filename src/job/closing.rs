@@ -98,3 +98,60 @@ impl Closing {
         self.boundary = inner.chain(outer).map(ends).collect();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::predicates::{in_circle_determinant, orient2d};
+    use crate::triangulation::canonical;
+    use proptest::prelude::*;
+
+    /// Whether a lattice point outside `cell` lies in or on the circle through abc. Where a line of lattice points cuts the disc,
+    /// one of those next to the middle of the chord is inside, if any is.
+    fn reaches_out(cell: &Cell, [a, b, c]: [Site; 3]) -> bool {
+        let double_area = orient2d(a, b, c) as f64;
+        let from_a = |p: Site| [0, 1].map(|k| (p[k] - a[k]) as f64);
+        let ([bx, by], [cx, cy]) = (from_a(b), from_a(c));
+        let (bb, cc) = (bx * bx + by * by, cx * cx + cy * cy);
+        let center = [(bb * cy - cc * by) / (2.0 * double_area), (cc * bx - bb * cx) / (2.0 * double_area)];
+        (0..2).any(|axis| {
+            let middle = (center[1 - axis] + a[1 - axis] as f64).clamp(-1e8, 1e8) as i32;
+            [cell.min[axis] - 1, cell.max[axis]].into_iter().any(|beyond| {
+                (middle - 2..=middle + 2).any(|along| {
+                    let mut point = [along; 2];
+                    point[axis] = beyond as i32;
+                    in_circle_determinant(a, b, c, point) >= 0
+                })
+            })
+        })
+    }
+
+    proptest! {
+        /// On grids (small sides, many cocircular sites) as well as scattered and nearly on a line.
+        #[test]
+        fn what_is_not_open_reaches_no_site_outside(
+            sites in prop::collection::btree_set(prop::array::uniform2(0i32..200), 3..150),
+            squeeze in prop::array::uniform2(prop::sample::select(vec![1, 7, 60])),
+            room in prop::array::uniform4(0i64..20),
+        ) {
+            let sites: Vec<Site> = sites.into_iter().map(|p| [p[0] / squeeze[0], p[1] / squeeze[1]]).collect();
+            let sites: Vec<Site> = sites.into_iter().collect::<std::collections::BTreeSet<_>>().into_iter().collect();
+            let along = |axis: usize| sites.iter().map(move |p| p[axis] as i64);
+            let low = [0, 1].map(|axis| along(axis).min().unwrap() - room[axis]);
+            let high = [0, 1].map(|axis| along(axis).max().unwrap() + 1 + room[2 + axis]);
+            let cell = Cell { min: low, max: high };
+            let mesh = canonical(&sites).unwrap();
+            let closing = close(&mesh, &sites, Some(&cell), |_| false);
+            for (corners, state) in mesh.triangles.iter().zip(&closing.states) {
+                let [a, b, c] = corners.map(|v| sites[v as usize]);
+                prop_assert!(*state == State::Open || !reaches_out(&cell, [a, b, c]), "{a:?} {b:?} {c:?} in {cell:?}");
+                prop_assert!(*state == State::Closed || !cell.holds_disc(a, b, c));
+            }
+            for (&site, &spoke) in closing.frontier.iter().zip(&closing.spokes) {
+                let around = (spoke != HULL).then(|| mesh.around(spoke)).into_iter().flatten();
+                let corners = mesh.triangles.iter().flatten().filter(|&&v| v == site).count();
+                prop_assert_eq!(around.count(), corners);
+            }
+        }
+    }
+}
