@@ -50,7 +50,7 @@ impl Grid {
     pub fn bucket(&self, p: Site) -> u32 {
         let place = |axis: usize, count: u32| {
             let along = (p[axis] as i64 - self.origin[axis] as i64).clamp(0, u32::MAX as i64) as u32;
-            ((along as u128 * self.inverse >> 64) as u32).min(count - 1)
+            (((along as u128 * self.inverse) >> 64) as u32).min(count - 1)
         };
         place(1, self.rows) * self.columns + place(0, self.columns)
     }
