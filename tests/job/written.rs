@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use gdt_batch::output::preview::LONGER_SIDE;
 use gdt_batch::verify::verify;
 use serde_json::Value;
 
@@ -98,5 +99,5 @@ fn the_georeference_agrees_with_the_cloud() {
     assert_eq!((georeference["resolution"].as_f64(), georeference["unit"].as_str()), (Some(1.0), Some("metre")));
     let png = fs::read(job.out().join("preview.png")).unwrap();
     let picture = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
-    assert_eq!(picture.info().width, 1_600);
+    assert_eq!(picture.info().width, LONGER_SIDE as u32);
 }
