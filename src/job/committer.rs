@@ -4,7 +4,7 @@
 use super::directory::publish;
 use crate::{Error, Result, fault};
 use std::fs::File;
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -37,6 +37,7 @@ impl Batch {
 
 /// A journal file and the thread that writes to it. Dropping it commits what has been added, unless a commit has failed.
 pub(super) struct Committer {
+    path: PathBuf,
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
     interval: Duration,
@@ -78,10 +79,11 @@ impl Committer {
         let interval = fault::commit_interval().unwrap_or(INTERVAL);
         let shared = Arc::new(Shared::default());
         let (of_thread, path) = (shared.clone(), path.to_path_buf());
-        let run = move || run(&of_thread, &file, &path, interval);
+        let to = path.clone();
+        let run = move || run(&of_thread, &file, &to, interval);
         let thread = std::thread::Builder::new().name("journal".into()).spawn(run);
         let thread = Some(thread.map_err(|e| Error::Memory(format!("cannot start a thread: {e}")))?);
-        Ok(Committer { shared, thread, interval, start: Instant::now() })
+        Ok(Committer { path, shared, thread, interval, start: Instant::now() })
     }
 
     /// Adds a record to the next commit.
@@ -105,7 +107,12 @@ impl Committer {
         while state.committed < due && !state.failed {
             state = self.shared.committed.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
-        state.failure.take().map_or(Ok(()), Err)
+        match state.failure.take() {
+            Some(error) => Err(error),
+            // Somebody else has been told why.
+            None if state.committed < due => Err(Error::io("write", &self.path)(io::Error::other("it failed before"))),
+            None => Ok(()),
+        }
     }
 
     pub(super) fn is_worth_syncing(&self) -> bool {
@@ -165,4 +172,24 @@ fn commit(batch: Batch, mut file: &File, path: &Path) -> Result<()> {
     file.write_all(lines).and_then(|()| file.sync_data()).map_err(Error::io("write", path))?;
     fault::point("committed");
     Ok(())
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_committed_after_a_failure_whoever_has_been_told() {
+        let committer = Committer::start(Path::new("/dev/full")).unwrap();
+        let record = || Batch { lines: "a step\n".into(), results: Vec::new() };
+        let told = std::iter::repeat_with(|| {
+            std::thread::sleep(Duration::from_millis(1));
+            committer.add(record())
+        });
+        let told = told.take(10_000).find_map(Result::err).unwrap();
+        assert_eq!(told.exit_code(), 1, "{told}");
+        for _ in 0..2 {
+            assert!(committer.commit().is_err());
+        }
+    }
 }

@@ -22,6 +22,10 @@ pub struct Head {
     pub coarser: Coarser,
 }
 
+/// Of what steps leave for later steps, and of which nodes merge: raised with every change, so that no run goes on from what means
+/// something else to it.
+pub(super) const LAYOUT: u32 = 2;
+
 /// What the results of a job depend on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fingerprint {
@@ -77,7 +81,7 @@ impl Fingerprint {
         let own = matches!(config.output.color, ColorChoice::Auto | ColorChoice::Rgb);
         mesh.insert("[output] color".into(), own.into());
         Ok(Fingerprint {
-            program: format!("gdt-batch {}, {order}", env!("CARGO_PKG_VERSION")),
+            program: format!("gdt-batch {}, layout {LAYOUT}, {order}", env!("CARGO_PKG_VERSION")),
             mesh,
             look: options(&config.output, "output", &["directory"])?,
             memory: config.limits.memory.0,

@@ -408,14 +408,15 @@ impl Job<'_> {
         directory::remove_file(&self.directory.spill())
     }
 
-    /// Does `work`, and beside it, on a thread of its own, what waits for the disk.
-    fn beside<T>(&self, waiting: impl FnOnce() -> Result<()> + Send, work: impl FnOnce() -> Result<T>) -> Result<T> {
-        std::thread::scope(|scope| {
-            let thread = std::thread::Builder::new().spawn_scoped(scope, waiting);
-            let thread = thread.map_err(|e| Error::Memory(format!("cannot start a thread: {e}")))?;
-            let outcome = work();
-            let waited = thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-            outcome.and_then(|outcome| waited.map(|()| outcome))
+    /// Does `work`, and beside it, on a thread of its own if there is one, what waits for the disk.
+    fn beside<T>(&self, waiting: impl Fn() -> Result<()> + Sync, work: impl FnOnce() -> Result<T>) -> Result<T> {
+        std::thread::scope(|scope| match std::thread::Builder::new().spawn_scoped(scope, &waiting) {
+            Ok(thread) => {
+                let outcome = work();
+                let waited = thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+                outcome.and_then(|outcome| waited.map(|()| outcome))
+            }
+            Err(_) => waiting().and_then(|()| work()),
         })
     }
 

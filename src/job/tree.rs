@@ -134,6 +134,7 @@ impl Tree {
 mod tests {
     use super::*;
     use crate::geometry::predicates::{in_circle_determinant, orient2d};
+    use crate::job::fingerprint::LAYOUT;
     use proptest::prelude::*;
 
     #[test]
@@ -143,6 +144,18 @@ mod tests {
         assert!(!cell.holds_disc([11, 0], [0, 11], [-11, 0]));
         assert!(!cell.holds_disc([0, 0], [10, 1], [5, 1]), "a sliver's disc is far larger than the sliver");
         assert!(Cell::PLANE.holds_disc([0, 0], [10, 1], [5, 1]));
+    }
+
+    #[test]
+    fn other_merges_are_another_layout() {
+        let inner = |number: usize| Node {
+            cell: Cell::PLANE,
+            parent: number.checked_sub(1),
+            kind: Kind::Inner([number + 1, number + 1]),
+        };
+        let tree = Tree { nodes: (0..12).map(inner).collect(), leaves: Vec::new() };
+        let merges: Vec<usize> = (0..12).filter(|&node| tree.is_merge(node)).collect();
+        assert_eq!((LAYOUT, merges), (2, vec![0, 2, 5, 8, 11]));
     }
 
     proptest! {
