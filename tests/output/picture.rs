@@ -56,8 +56,10 @@ fn a_slope_to_the_light_is_brighter() {
     let mut reader = png::Decoder::new(std::io::Cursor::new(&png)).read_info().unwrap();
     let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
     reader.next_frame(&mut pixels).unwrap();
-    let at = |x: usize, y: usize| pixels[4 * (y * canvas.size()[0] as usize + x)];
-    assert!(at(400, 800) > at(1200, 800) + 40, "{} {}", at(400, 800), at(1200, 800));
+    let side = canvas.size()[0] as usize;
+    let at = |x: usize, y: usize| pixels[4 * (y * side + x)];
+    let (to_the_light, away) = (at(side / 4, side / 2), at(side * 3 / 4, side / 2));
+    assert!(to_the_light > away + 40, "{to_the_light} {away}");
 }
 
 proptest! {
