@@ -105,6 +105,7 @@ mod tests {
     use crate::geometry::predicates::{in_circle_determinant, orient2d};
     use crate::triangulation::canonical;
     use proptest::prelude::*;
+    use std::collections::BTreeSet;
 
     /// Whether a lattice point outside `cell` lies in or on the circle through abc. Where a line of lattice points cuts the disc,
     /// one of those next to the middle of the chord is inside, if any is.
@@ -134,8 +135,8 @@ mod tests {
             squeeze in prop::array::uniform2(prop::sample::select(vec![1, 7, 60])),
             room in prop::array::uniform4(0i64..20),
         ) {
-            let sites: Vec<Site> = sites.into_iter().map(|p| [p[0] / squeeze[0], p[1] / squeeze[1]]).collect();
-            let sites: Vec<Site> = sites.into_iter().collect::<std::collections::BTreeSet<_>>().into_iter().collect();
+            let sites: BTreeSet<Site> = sites.into_iter().map(|p| [p[0] / squeeze[0], p[1] / squeeze[1]]).collect();
+            let sites = Vec::from_iter(sites);
             let along = |axis: usize| sites.iter().map(move |p| p[axis] as i64);
             let low = [0, 1].map(|axis| along(axis).min().unwrap() - room[axis]);
             let high = [0, 1].map(|axis| along(axis).max().unwrap() + 1 + room[2 + axis]);

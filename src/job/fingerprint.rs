@@ -29,7 +29,7 @@ pub(super) const LAYOUT: u32 = 2;
 /// What the results of a job depend on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fingerprint {
-    /// Program, version and byte order: the files in the job directory are no exchange format.
+    /// Program, version, [`LAYOUT`] and byte order: the files in the job directory are no exchange format.
     program: String,
     /// The options that the mesh depends on, as the user knows them.
     mesh: Map<String, Value>,

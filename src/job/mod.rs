@@ -257,7 +257,7 @@ impl Job<'_> {
         let cut = Cut::new(config.output.max_edge, &plan.frame, store, [tiles as u64, leaves.sites], bounds)?;
         let look = look(config, plan, &partition.summary, bounds, cut);
         let stage = progress.stage("stitch", tiles as u64, "tiles");
-        self.beside(|| self.give_up_points(), || self.stitch_all(&partition.tree, &look, &stage))?;
+        beside(|| self.give_up_points(), || self.stitch_all(&partition.tree, &look, &stage))?;
         let stitched = stage.finish();
 
         // Not earlier: what an earlier job has made stays as long as this one may fail for its input.
@@ -285,7 +285,7 @@ impl Job<'_> {
         }
         let finish = || finish::run(directory, store, &georeference, &viewers, &canvas, tiles);
         // The tiles are on the disk before the report says how long that took.
-        let other_bytes = self.beside(|| journal.commit(), || journal.step(Step::Finish, finish))?;
+        let other_bytes = beside(|| journal.commit(), || journal.step(Step::Finish, finish))?;
         if !one_file && config.output.format == Format::Glb {
             warnings.push(too_large_for_one_file(&written));
         }
@@ -408,18 +408,6 @@ impl Job<'_> {
         directory::remove_file(&self.directory.spill())
     }
 
-    /// Does `work`, and beside it, on a thread of its own if there is one, what waits for the disk.
-    fn beside<T>(&self, waiting: impl Fn() -> Result<()> + Sync, work: impl FnOnce() -> Result<T>) -> Result<T> {
-        std::thread::scope(|scope| match std::thread::Builder::new().spawn_scoped(scope, &waiting) {
-            Ok(thread) => {
-                let outcome = work();
-                let waited = thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-                outcome.and_then(|outcome| waited.map(|()| outcome))
-            }
-            Err(_) => waiting().and_then(|()| work()),
-        })
-    }
-
     fn stitch_all(&self, tree: &Tree, look: &Look, stage: &Stage) -> Result<()> {
         (0..tree.leaves.len()).into_par_iter().try_for_each(|tile| {
             let step = Step::Stitch(tile);
@@ -448,6 +436,18 @@ impl Job<'_> {
     fn count(&self, stage: &Stage, step: Step, amount: u64) {
         if self.journal.has(step) { stage.take_over(amount) } else { stage.advance(amount) }
     }
+}
+
+/// Does `work`, and beside it, on a thread of its own if there is one, what waits for the disk.
+fn beside<T>(waiting: impl Fn() -> Result<()> + Sync, work: impl FnOnce() -> Result<T>) -> Result<T> {
+    std::thread::scope(|scope| match std::thread::Builder::new().spawn_scoped(scope, &waiting) {
+        Ok(thread) => {
+            let outcome = work();
+            let waited = thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+            outcome.and_then(|outcome| waited.map(|()| outcome))
+        }
+        Err(_) => waiting().and_then(|()| work()),
+    })
 }
 
 /// What comes of a tileset, if there is one.

@@ -77,12 +77,12 @@ pub struct Stored {
 }
 
 /// Writes to a file from a place on, whatever others do with the file.
-struct From<'a> {
+struct WriteFrom<'a> {
     file: &'a File,
     at: u64,
 }
 
-impl Write for From<'_> {
+impl Write for WriteFrom<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         write_all_at(self.file, bytes, self.at)?;
         self.at += bytes.len() as u64;
@@ -161,7 +161,7 @@ impl Store {
         let at = self.end.fetch_add(length, Ordering::Relaxed);
         let mut hasher = Xxh3::with_seed(seed(key.code()));
         // Small pieces are joined, large ones written as they are.
-        let mut writer = BufWriter::new(From { file: &self.file, at });
+        let mut writer = BufWriter::new(WriteFrom { file: &self.file, at });
         let mut write = |piece: &&[u8]| {
             hasher.update(piece);
             writer.write_all(piece)

@@ -2,6 +2,7 @@
 //! triangles nor the cut into tiles changes a bit of them.
 
 use super::frame::Frame;
+use super::tile::bounds;
 
 /// The sum over the triangles around a vertex of their normals, each twice as long as the triangle's area, in lattice steps
 /// (x, y, z). Sums of one vertex from several tiles are added.
@@ -96,10 +97,7 @@ fn accumulate<T: Copy + std::ops::AddAssign>(
 
 /// Whether as many triangles as these, all at one vertex, keep the sum within an `i64`.
 fn narrow_suffices(positions: &[[i32; 3]], triangles: usize) -> bool {
-    let Some(&first) = positions.first() else { return true };
-    let (low, high) = positions.iter().fold((first, first), |(low, high), p| {
-        ([0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k])))
-    });
+    let Some([low, high]) = bounds(positions) else { return true };
     let widest = [0, 1, 2].map(|k| (high[k] as i64 - low[k] as i64) as u128);
     let [x, y, z] = widest;
     let largest = (x * y).max(y * z).max(x * z) * 2;

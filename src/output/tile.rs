@@ -34,11 +34,16 @@ impl Tile {
 
     /// The least and greatest lattice integers of the vertices on every axis; `None` without vertices.
     pub fn bounds(&self) -> Option<[[i32; 3]; 2]> {
-        let first = *self.positions.first()?;
-        Some(self.positions.iter().fold([first, first], |[low, high], p| {
-            [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]
-        }))
+        bounds(&self.positions)
     }
+}
+
+/// The least and greatest of `positions` on every axis; `None` if there are none.
+pub(super) fn bounds(positions: &[[i32; 3]]) -> Option<[[i32; 3]; 2]> {
+    let first = *positions.first()?;
+    Some(positions.iter().fold([first, first], |[low, high], p| {
+        [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]
+    }))
 }
 
 /// A table of so many numbers for each corner is quicker than sorting the corners.
