@@ -95,21 +95,16 @@ pub fn run(config: &Config) -> Result<Preflight> {
 /// What the job of `plan` would do.
 pub(super) fn preflight(plan: &Plan, config: &Config, threads: usize) -> Preflight {
     let per_tile = config.triangulation.sites_per_tile.0;
-    // Records that are known to be missing take no room.
-    let points = plan.records - plan.sources.iter().map(|(source, _)| source.missing).sum::<u64>();
+    let points = points(plan);
     let steps = |axis: usize| plan.extent[1][axis] as f64 - plan.extent[0][axis] as f64;
     let resolution = plan.frame.extras().resolution;
-    // Tiles come out between half full and full.
-    let tiles = (points * 4).div_ceil(per_tile * 3);
     let leaves = per_tile.min(points) * BYTES_PER_LEAF_SITE * threads as u64;
     let output = &config.output.directory;
-    let spill = points * size_of::<Point>() as u64;
-    let [leaves_on_disk, results] =
-        [leaf_bytes(points, per_tile, tiles), result_bytes(points, tiles, config.output.packing())];
+    let OnDisk { spill, steps: left_by_steps, results } = OnDisk::of(plan, config);
     Preflight {
         files: plan.sources.iter().map(|(s, _)| (s.path.clone(), format!("{:?}", s.format), s.records)).collect(),
         records: plan.records,
-        tiles,
+        tiles: tiles(points, config),
         resolution: [plan.lattice.resolution.to_string(), plan.lattice.resolution_z.to_string()],
         size: [steps(0) * resolution, steps(1) * resolution],
         unit: plan.unit.into(),
@@ -123,10 +118,10 @@ pub(super) fn preflight(plan: &Plan, config: &Config, threads: usize) -> Preflig
             )),
         memory_limit: config.limits.memory.0,
         memory_free: machine::free_memory(),
-        temporary: spill + leaves_on_disk,
+        temporary: spill + left_by_steps,
         results,
-        // The spill goes before the results come.
-        disk: leaves_on_disk + spill.max(results),
+        // Where there is no room for both, the spill goes before the results come.
+        disk: left_by_steps + spill.max(results),
         disk_free: machine::free_disk(output).map(|free| free + taken(output)),
         output: output.clone(),
         backend: format!("{:?}", config.triangulation.backend).to_lowercase(),
@@ -135,8 +130,44 @@ pub(super) fn preflight(plan: &Plan, config: &Config, threads: usize) -> Preflig
     }
 }
 
+/// Records but for those that are known to be missing.
+fn points(plan: &Plan) -> u64 {
+    plan.records - plan.sources.iter().map(|(source, _)| source.missing).sum::<u64>()
+}
+
+/// Tiles come out between half full and full.
+fn tiles(points: u64, config: &Config) -> u64 {
+    (points * 4).div_ceil(config.triangulation.sites_per_tile.0 * 3)
+}
+
+/// Bytes of a job's files, about.
+struct OnDisk {
+    spill: u64,
+    /// What steps leave for later steps.
+    steps: u64,
+    results: u64,
+}
+
+impl OnDisk {
+    fn of(plan: &Plan, config: &Config) -> OnDisk {
+        let points = points(plan);
+        let tiles = tiles(points, config);
+        OnDisk {
+            spill: points * size_of::<Point>() as u64,
+            steps: step_bytes(points, config.triangulation.sites_per_tile.0, tiles),
+            results: result_bytes(points, tiles, config.output.packing()),
+        }
+    }
+}
+
+/// Whether the disk has room for all other files beside the points, which are there already.
+pub(super) fn has_room_beside_points(plan: &Plan, config: &Config) -> bool {
+    let OnDisk { steps, results, .. } = OnDisk::of(plan, config);
+    machine::free_disk(&config.output.directory).is_some_and(|free| steps + results <= free)
+}
+
 /// Bytes that steps leave for later steps.
-fn leaf_bytes(points: u64, per_tile: u64, tiles: u64) -> u64 {
+fn step_bytes(points: u64, per_tile: u64, tiles: u64) -> u64 {
     // A tile of n sites has about 2.2 sqrt(n) on its frontier.
     let rims = (2.2 * (per_tile.min(points) as f64).sqrt()) as u64 * tiles;
     points * TEMPORARY_PER_SITE + rims * TEMPORARY_PER_RIM + PIXELS * size_of::<Texel>() as u64

@@ -5,8 +5,9 @@ use super::columns::ColumnWriter;
 use super::cut::Cut;
 use super::directory::{Directory, Written, write_pieces};
 use super::journal::Done;
+use super::ready::Settled;
 use super::records::{Leaf, LevelTile, Rim, RimVertices, SeamTriangle};
-use super::stitch::seam_of;
+use super::stitch::{owner, seam_of};
 use super::store::{Key, Store};
 use super::tree::Tree;
 use crate::output::color::Coloring;
@@ -62,7 +63,7 @@ impl AddAssign for TileFigures {
     }
 }
 
-/// Writes the GLB of `tile`, and one of its triangles that are left out, and leaves its part of the preview
+/// Writes the GLB of a tile, and one of its triangles that are left out, and leaves its part of the preview
 /// and its line of `tileset.json` in the store.
 ///
 /// # Errors
@@ -71,14 +72,15 @@ pub fn run(
     directory: &Directory,
     store: &Store,
     tree: &Tree,
-    tile: usize,
+    settled: Settled,
     look: &Look,
     canvas: &Canvas,
 ) -> Result<Done<TileFigures>> {
+    let tile = settled.tile;
     let leaf = Leaf::load(store, tile)?;
     let rims = RimVertices::load(store, tile)?;
     let mut sites = Sites::of_leaf(leaf, &rims, look);
-    let own = seam_of(store, tree, tile)?.into_iter().filter(|triangle| owner(triangle) == tile as u32);
+    let own = seam_of(store, tree, settled)?.into_iter().filter(|triangle| owner(triangle) == tile as u32);
     let seam_triangles = sites.add_seam(store, tile as u32, own, look)?;
     let left_out = sites.left_out();
     let content = sites.into_tile(look);
@@ -114,11 +116,6 @@ pub(super) fn write_tile(path: &Path, content: &Tile, look: &Look) -> Result<Wri
         glb.encode(&look.frame, content, look.compression)?;
         write_pieces(path, &glb.pieces())
     })
-}
-
-/// A triangle belongs to the tile of its lowest-numbered corner.
-fn owner(triangle: &SeamTriangle) -> u32 {
-    triangle[0].tile.min(triangle[1].tile).min(triangle[2].tile)
 }
 
 /// The vertices of a tile while it is put together: its own sites first, then those of its neighbours.

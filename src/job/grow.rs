@@ -1,15 +1,19 @@
 //! Steps 3 and 4 of a job, in the order of the tree: children before parents, side by side where there are threads.
 
-use super::Job;
+use super::forecast;
 use super::journal::{Done, Step};
 use super::leaf::{self, LeafFigures};
 use super::merge;
 use super::partition::Partition;
-use super::progress::Stage;
+use super::progress::{Stage, Strand};
+use super::ready::Settled;
 use super::span::Longest;
 use super::spill::Spill;
 use super::tree::Kind;
+use super::write::TileWriter;
+use super::{BYTES_PER_LEAF_SITE, Job};
 use crate::{Error, Result};
+use rayon::Scope;
 
 /// Walks the tree.
 pub(super) struct Grower<'a> {
@@ -19,32 +23,40 @@ pub(super) struct Grower<'a> {
     pub(super) spill: Option<Spill>,
     pub(super) longest: Longest,
     pub(super) stage: &'a Stage,
+    pub(super) strand: &'a Strand,
+    /// Takes the tiles that need no node above.
+    pub(super) writer: &'a TileWriter<'a>,
 }
 
-impl Grower<'_> {
+impl<'a> Grower<'a> {
     /// Triangulates the leaves below `node`, and merges every merge node as soon as all below it is done.
-    pub(super) fn grow(&self, node: usize) -> Result<LeafFigures> {
-        let Job { config, store, journal, .. } = *self.job;
+    pub(super) fn grow(&self, scope: &Scope<'a>, node: usize) -> Result<LeafFigures> {
+        self.writer.check()?;
         match self.partition.tree.nodes[node].kind {
-            Kind::Leaf(tile) => {
-                let figures = journal.step(Step::Leaf(tile), || self.leaf(tile))?;
-                self.job.count(self.stage, Step::Leaf(tile), figures.sites + figures.duplicates);
-                Ok(figures)
-            }
+            Kind::Leaf(tile) => self.grow_leaf(scope, node, tile),
             Kind::Inner([low, high]) => {
-                let (low, high) = rayon::join(|| self.grow(low), || self.grow(high));
+                let (low, high) = rayon::join(|| self.grow(scope, low), || self.grow(scope, high));
                 let (mut figures, high) = (low?, high?);
                 figures += high;
                 if self.partition.tree.is_merge(node) {
-                    // Nodes below the root may be merged at once on all threads.
-                    let share = if node == 0 { 1 } else { rayon::current_num_threads() as u64 };
-                    let memory = config.limits.memory.0 / 4 * 3 / share;
-                    let merge = || merge::run(store, &self.partition.tree, node, memory, self.longest);
-                    journal.step(Step::Node(node), merge)?;
+                    self.merge(scope, node)?;
                 }
                 Ok(figures)
             }
         }
+    }
+
+    fn grow_leaf(&self, scope: &Scope<'a>, node: usize, tile: usize) -> Result<LeafFigures> {
+        let journal = self.job.journal;
+        let figures: LeafFigures = journal.step(Step::Leaf(tile), || self.strand.time(|| self.leaf(tile)))?;
+        let points = figures.sites + figures.duplicates;
+        self.strand.advance(points);
+        self.job.count(self.stage, Step::Leaf(tile), forecast::triangulated(points));
+        // Any other leaf hands its hull up.
+        if node == 0 || figures.sites == 0 {
+            self.writer.take(scope, Settled { tile, by: node });
+        }
+        Ok(figures)
     }
 
     fn leaf(&self, tile: usize) -> Result<Done<LeafFigures>> {
@@ -53,5 +65,27 @@ impl Grower<'_> {
         let spill = self.spill.as_ref();
         let spill = spill.ok_or_else(|| Error::Broken(format!("the points of tile {tile} are gone")))?;
         leaf::run(store, self.partition, spill, tile, task)
+    }
+
+    fn merge(&self, scope: &Scope<'a>, node: usize) -> Result<()> {
+        let Job { store, journal, .. } = *self.job;
+        let (tree, memory) = (&self.partition.tree, self.memory_of_merge(node));
+        let merge = || self.strand.time(|| merge::run(store, tree, node, memory, self.longest));
+        for tile in journal.step(Step::Node(node), merge)? {
+            self.writer.take(scope, Settled { tile: tile as usize, by: node });
+        }
+        Ok(())
+    }
+
+    /// Nodes below the root may be merged at once on all threads. Beside the root the others write tiles, which takes half of what
+    /// leaves do.
+    fn memory_of_merge(&self, node: usize) -> u64 {
+        let Job { config, threads, .. } = *self.job;
+        let memory = config.limits.memory.0 / 4 * 3;
+        if node > 0 {
+            return memory / threads as u64;
+        }
+        let tile = config.triangulation.sites_per_tile.0.saturating_mul(BYTES_PER_LEAF_SITE / 2);
+        memory.saturating_sub(tile.saturating_mul(threads as u64 - 1))
     }
 }

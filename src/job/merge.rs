@@ -15,12 +15,13 @@ use crate::{Error, Result};
 /// Bytes that merging one frontier site takes at the peak: `spade`, the mesh and the marks.
 const BYTES_PER_SITE: u64 = 600;
 
-/// Merges the frontiers below merge node `node`, which must be in the store; returns the number of seam triangles.
+/// Merges the frontiers below merge node `node`, which must be in the store; returns the tiles that it settles: those it hands
+/// no site of up, though it was handed some.
 ///
 /// # Errors
 /// [`Error::Memory`] if the frontiers do not fit `memory` bytes, [`Error::TooFine`] if a triangle is too long to be
 /// written, [`Error::Io`] on the store, [`Error::Broken`] if the frontiers contradict each other.
-pub fn run(store: &Store, tree: &Tree, node: usize, memory: u64, longest: Longest) -> Result<Done<u64>> {
+pub fn run(store: &Store, tree: &Tree, node: usize, memory: u64, longest: Longest) -> Result<Done<Vec<u32>>> {
     let union = join(store, &tree.merged_by(node))?;
     check_memory(union.sites.len(), memory)?;
     let sites: Vec<Site> = union.sites.iter().map(Rim::plane).collect();
@@ -39,7 +40,9 @@ pub fn run(store: &Store, tree: &Tree, node: usize, memory: u64, longest: Longes
     let frontier = closing.frontier.iter().map(|&site| union.sites[site as usize]).collect();
     let frontier = Frontier { sites: frontier, boundary: closing.boundary };
     let stored = vec![Seam::new(&seam).save(store, node)?, frontier.save(store, node)?];
-    Ok(Done::new(seam.len() as u64, stored))
+    let above = frontier.tiles();
+    let settled = union.tiles().into_iter().filter(|tile| above.binary_search(tile).is_err());
+    Ok(Done::new(settled.collect(), stored))
 }
 
 /// The frontiers of `nodes` as one.

@@ -26,6 +26,7 @@ pub mod partition;
 pub mod placement;
 pub mod progress;
 pub mod pyramid;
+pub mod ready;
 pub mod records;
 pub mod report;
 pub mod resume;
@@ -37,12 +38,13 @@ pub mod stitch;
 pub mod store;
 pub mod tileset;
 pub mod tree;
+mod weave;
+mod write;
 
 use crate::config::{ColorChoice, Config, Format};
 use crate::output::Compression;
 use crate::output::color::Coloring;
 use crate::output::georeference::Georeference;
-use crate::output::preview::Canvas;
 use crate::triangulation::Triangulator;
 use crate::{Error, Result};
 use choose::Coarser;
@@ -51,23 +53,21 @@ use directory::Directory;
 use export::{Look, TileFigures};
 use fingerprint::{Fingerprint, Head};
 use journal::{Done, Journal, Step};
-use leaf::LeafFigures;
 use levels::LevelFigures;
 use partition::{Partition, Summary, Task};
 use placement::Placement;
-use progress::{Progress, Schedule, Stage, StageFigures};
+use progress::{Clock, Progress, Schedule, Stage, StageFigures};
 use pyramid::{Pyramid, Sizes};
 use rayon::prelude::*;
 use report::{Parts, Report};
 use scan::Plan;
 use span::Longest;
-use spill::Spill;
 use std::collections::HashSet;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
 use store::Store;
-use tree::Tree;
+use weave::Mesh;
+use write::WrittenTiles;
 
 /// Bytes that one site of a leaf takes while the leaf is triangulated: points, sort keys, sites, mesh and marks.
 const BYTES_PER_LEAF_SITE: u64 = 500;
@@ -102,7 +102,7 @@ impl From<Progress> for Options {
 /// # Errors
 /// Whatever stops a step; see [`Error`]. [`Error::Resumable`] if the finished steps are kept, else no temporary files are left.
 pub fn run(config: &Config, options: impl Into<Options>) -> Result<Report> {
-    let (options, start) = (options.into(), Instant::now());
+    let (options, clock) = (options.into(), Clock::start());
     // First of all, so that a job that must have a GPU fails at once where there is none.
     let triangulator = Triangulator::new(&config.triangulation, config.limits.memory.0, config.threads())?;
     let directory = Directory::new(&config.output.directory);
@@ -111,7 +111,7 @@ pub fn run(config: &Config, options: impl Into<Options>) -> Result<Report> {
     let coarser = if options.fresh { Coarser::default() } else { resume::coarser(&directory, &fingerprint)? };
     let mut head = Head { fingerprint, coarser };
     loop {
-        match attempt(config, &triangulator, &head, options, start) {
+        match attempt(config, &triangulator, &head, options, clock) {
             // Only the finished mesh knows its longest triangle, so that a second try is the price of not rounding in vain.
             Err(Error::TooFine { vertical: true, what }) if head.coarser.vertical < MOST_TENS => {
                 options.progress.note(&format!("{what}; starting again with a coarser step in z"));
@@ -133,14 +133,14 @@ fn attempt(
     triangulator: &Triangulator,
     head: &Head,
     options: Options,
-    start: Instant,
+    clock: Clock,
 ) -> Result<Report> {
     let progress = options.progress;
-    let stage = progress.stage("scan", 1, "job");
+    let stage = Schedule::new(progress, clock, Vec::new()).stage("scan", 1, "job");
     let plan = on_threads(workers(config, 0)?, || scan::run(config, head.coarser))?;
     stage.advance(1);
     let scanned = stage.finish();
-    let progress = &Schedule::new(progress, forecast::costs(&plan));
+    let progress = &Schedule::new(progress, clock, forecast::costs(&plan));
     report::note_skipped(&plan.skipped, progress);
     let threads = workers(config, plan.records)?;
     if !options.force {
@@ -165,7 +165,7 @@ fn attempt(
             journal: &journal,
             progress,
             threads,
-            start,
+            clock,
             kept: files,
             publishing: AtomicBool::new(false),
         };
@@ -228,7 +228,7 @@ struct Job<'a> {
     journal: &'a Journal<'a>,
     progress: &'a Schedule,
     threads: usize,
-    start: Instant,
+    clock: Clock,
     /// Results of an earlier run that stay.
     kept: HashSet<PathBuf>,
     /// Whether results of earlier jobs have made room for this one's.
@@ -238,8 +238,6 @@ struct Job<'a> {
 impl Job<'_> {
     /// Step 2 and all after it, but for what an earlier run has done of them.
     fn run(&self, plan: Plan, scanned: StageFigures, partition: Option<Partition>) -> Result<Report> {
-        let Job { config, triangulator, directory, store, journal, progress, .. } = *self;
-
         let (plan, partition, read) = match partition {
             Some(partition) => self.take_over(plan, partition)?,
             None => self.read(plan)?,
@@ -249,29 +247,29 @@ impl Job<'_> {
         let longest = Longest::of(&plan.frame);
         longest.check_heights(bounds[0][2], bounds[1][2])?;
 
-        let stage = progress.stage("triangulate", partition.summary.tally.kept, "points");
-        let leaves = self.triangulate(&partition, longest, &stage)?;
-        let triangulated = stage.finish();
+        let mesh = self.weave(plan, &partition, bounds, longest)?;
+        enough_triangles(&mesh.tiles.figures, plan)?;
+        // What is in the store is enough now.
+        beside(|| self.give_up_points(), || self.publish(plan, &partition, bounds, mesh, [scanned, read]))
+    }
 
+    /// Steps 7 and 8.
+    fn publish(
+        &self,
+        plan: &Plan,
+        partition: &Partition,
+        bounds: [[i32; 3]; 2],
+        mesh: Mesh,
+        before: [StageFigures; 2],
+    ) -> Result<Report> {
+        let Job { config, triangulator, directory, store, journal, progress, .. } = *self;
+        let Mesh { leaves, tiles: WrittenTiles { style: (look, canvas), figures: written, stages }, triangulated } =
+            mesh;
         let tiles = partition.tree.leaves.len();
-        let cut = Cut::new(config.output.max_edge, &plan.frame, store, [tiles as u64, leaves.sites], bounds)?;
-        let look = look(config, plan, &partition.summary, bounds, cut);
-        let stage = progress.stage("stitch", tiles as u64, "tiles");
-        beside(|| self.give_up_points(), || self.stitch_all(&partition.tree, &look, &stage))?;
-        let stitched = stage.finish();
-
-        // Not earlier: what an earlier job has made stays as long as this one may fail for its input.
-        self.publishing.store(true, Ordering::Relaxed);
-        directory.sweep_results(&self.kept)?;
-        let stage = progress.stage("write", leaves.sites, "sites");
-        let canvas = Canvas::new(&look.frame, bounds);
-        let written = self.export_all(&partition, &look, &canvas, &stage)?;
-        enough_triangles(&written, plan)?;
-        let exported = stage.finish();
 
         let one_file = fits_one_file(&written);
         let with_tileset = config.output.format != Format::Glb || !one_file;
-        let for_viewers = with_tileset.then(|| self.tileset(plan, &partition, &look)).transpose()?;
+        let for_viewers = with_tileset.then(|| self.tileset(plan, partition, &look)).transpose()?;
         let Levelled { figures: coarser, tileset, placement, mut warnings, stage: levelled } =
             for_viewers.unwrap_or_default();
 
@@ -290,13 +288,13 @@ impl Job<'_> {
             warnings.push(too_large_for_one_file(&written));
         }
         stage.advance(1);
-        let stages = [Some(scanned), Some(read), Some(triangulated), Some(stitched), Some(exported), levelled];
-        let stages = stages.into_iter().flatten().chain([stage.finish()]).collect();
+        let mesh = std::iter::once(triangulated).chain(stages);
+        let stages = before.into_iter().chain(mesh).chain(levelled).chain([stage.finish()]).collect();
 
         let report = Report::new(
             plan,
             Parts {
-                points: partition.summary.tally,
+                points: partition.summary.tally.clone(),
                 leaves,
                 gpu: triangulator.gpu().map(str::to_owned),
                 gpu_steps: triangulator.gpu_steps(),
@@ -309,7 +307,7 @@ impl Job<'_> {
                 threads: self.threads,
                 memory: config.limits.memory.0,
                 resumed: journal.taken_over(),
-                wall_s: self.start.elapsed().as_secs_f64(),
+                clock: self.clock,
             },
         );
         let results = vec![directory::write_json(&directory.report(), &report)?];
@@ -392,13 +390,6 @@ impl Job<'_> {
         Ok((plan, partition, stage.finish()))
     }
 
-    /// Triangulates all leaves and merges every merge node as soon as all below it is done.
-    fn triangulate(&self, partition: &Partition, longest: Longest, stage: &Stage) -> Result<LeafFigures> {
-        let all_there = (0..partition.tree.leaves.len()).all(|tile| self.journal.has(Step::Leaf(tile)));
-        let spill = if all_there { None } else { Some(Spill::open(&self.directory.spill())?) };
-        grow::Grower { job: self, partition, spill, longest, stage }.grow(0)
-    }
-
     /// Removes the points: once all leaves are in the journal, what is in the store is enough.
     fn give_up_points(&self) -> Result<()> {
         self.journal.commit()?;
@@ -406,30 +397,6 @@ impl Job<'_> {
             self.store.sync()?;
         }
         directory::remove_file(&self.directory.spill())
-    }
-
-    fn stitch_all(&self, tree: &Tree, look: &Look, stage: &Stage) -> Result<()> {
-        (0..tree.leaves.len()).into_par_iter().try_for_each(|tile| {
-            let step = Step::Stitch(tile);
-            self.journal.step(step, || stitch::run(self.store, tree, tile, look))?;
-            self.count(stage, step, 1);
-            Ok(())
-        })
-    }
-
-    fn export_all(&self, partition: &Partition, look: &Look, canvas: &Canvas, stage: &Stage) -> Result<TileFigures> {
-        let export = |tile| {
-            let step = Step::Export(tile);
-            let (directory, store, tree) = (self.directory, self.store, &partition.tree);
-            let figures = self.journal.step(step, || export::run(directory, store, tree, tile, look, canvas))?;
-            self.count(stage, step, partition.blocks[tile].iter().map(|block| block.points as u64).sum());
-            Ok(figures)
-        };
-        let tiles = (0..partition.tree.leaves.len()).into_par_iter().with_max_len(1);
-        tiles.map(export).try_reduce(TileFigures::default, |mut a, b| {
-            a += b;
-            Ok(a)
-        })
     }
 
     /// Shows that `step` is done, by this run or an earlier one.
@@ -463,8 +430,7 @@ struct Levelled {
 
 /// Which tiles viewers see.
 fn pyramid(config: &Config, partition: &Partition) -> (Sizes, Pyramid) {
-    let points = |blocks: &Vec<spill::Block>| blocks.iter().map(|block| block.points as u64).sum();
-    let points: Vec<u64> = partition.blocks.iter().map(points).collect();
+    let points: Vec<u64> = (0..partition.blocks.len()).map(|tile| partition.points(tile)).collect();
     let sizes = Sizes::new(config.output.level_sites.0, config.limits.memory.0);
     (sizes, Pyramid::new(&partition.tree, &points, sizes))
 }

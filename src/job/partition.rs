@@ -48,6 +48,11 @@ pub struct Skipped {
 }
 
 impl Partition {
+    /// Points in `tile`.
+    pub fn points(&self, tile: usize) -> u64 {
+        self.blocks[tile].iter().map(|block| block.points as u64).sum()
+    }
+
     /// Writes it down for a run that goes on.
     ///
     /// # Errors

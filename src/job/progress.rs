@@ -6,7 +6,7 @@ use indicatif::{HumanCount, ProgressBar, ProgressState, ProgressStyle};
 use serde::{Deserialize, Serialize};
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Between two lines in a log.
@@ -42,20 +42,50 @@ impl Progress {
 
     /// Starts a stage of `total` `unit`s that is no part of a job.
     pub fn stage(self, name: &'static str, total: u64, unit: &'static str) -> Stage {
-        Schedule::new(self, Vec::new()).stage(name, total, unit)
+        Schedule::new(self, Clock::start(), Vec::new()).stage(name, total, unit)
+    }
+}
+
+/// When a job began, by the wall and by the processors.
+#[derive(Clone, Copy, Debug)]
+pub struct Clock {
+    wall: Instant,
+    cpu: f64,
+}
+
+impl Clock {
+    /// One that begins now.
+    pub fn start() -> Clock {
+        Clock { wall: Instant::now(), cpu: cpu_seconds() }
+    }
+
+    /// Seconds since then.
+    pub fn wall_s(&self) -> f64 {
+        self.wall.elapsed().as_secs_f64()
+    }
+
+    /// Seconds of processor time of this process since then.
+    pub fn cpu_s(&self) -> f64 {
+        cpu_seconds() - self.cpu
+    }
+
+    /// Seconds from then to `at`.
+    fn until(&self, at: Instant) -> f64 {
+        (at - self.wall).as_secs_f64()
     }
 }
 
 /// The stages of a job, one after the other, and when the last of them will be done.
 pub struct Schedule {
     progress: Progress,
+    clock: Clock,
     forecast: Arc<Mutex<Forecast>>,
 }
 
 impl Schedule {
     /// For stages that are expected to cost so much, in the order in which they will come.
-    pub fn new(progress: Progress, costs: Vec<(&'static str, f64)>) -> Schedule {
-        Schedule { progress, forecast: Arc::new(Mutex::new(Forecast::new(costs))) }
+    pub fn new(progress: Progress, clock: Clock, costs: Vec<(&'static str, f64)>) -> Schedule {
+        Schedule { progress, clock, forecast: Arc::new(Mutex::new(Forecast::new(costs))) }
     }
 
     /// Says something between two stages.
@@ -80,7 +110,12 @@ impl Schedule {
             _ => ProgressBar::hidden(),
         };
         let logged = Mutex::new(pace.start);
-        Stage { progress: self.progress, unit, bar, pace, cpu_start: cpu_seconds(), logged }
+        Stage { progress: self.progress, job: self.clock, own: Clock::start(), unit, bar, pace, logged }
+    }
+
+    /// One of several kinds of work that go on side by side within a stage.
+    pub fn strand(&self, name: &'static str, unit: &'static str) -> Strand {
+        Strand { name, unit, job: self.clock, work: Mutex::default() }
     }
 }
 
@@ -134,10 +169,11 @@ fn style(unit: &str, pace: Arc<Pace>) -> ProgressStyle {
 /// A running stage; its methods may be called from any thread.
 pub struct Stage {
     progress: Progress,
+    job: Clock,
+    own: Clock,
     unit: &'static str,
     bar: ProgressBar,
     pace: Arc<Pace>,
-    cpu_start: f64,
     logged: Mutex<Instant>,
 }
 
@@ -146,6 +182,9 @@ pub struct Stage {
 pub struct StageFigures {
     /// Its name.
     pub stage: String,
+    /// Seconds from the start of the job to its start.
+    #[serde(default)]
+    pub start_s: f64,
     /// Seconds from its start to its end.
     pub wall_s: f64,
     /// Seconds of processor time of all threads.
@@ -194,8 +233,9 @@ impl Stage {
         self.pace.finish();
         let figures = StageFigures {
             stage: self.pace.name.into(),
-            wall_s: self.pace.start.elapsed().as_secs_f64(),
-            cpu_s: cpu_seconds() - self.cpu_start,
+            start_s: self.job.until(self.own.wall),
+            wall_s: self.own.wall_s(),
+            cpu_s: self.own.cpu_s(),
             done: self.pace.done.load(Ordering::Relaxed),
             unit: self.unit.into(),
         };
@@ -204,6 +244,57 @@ impl Stage {
         }
         figures
     }
+}
+
+/// A kind of work that goes on beside others; its methods may be called from any thread.
+pub struct Strand {
+    name: &'static str,
+    unit: &'static str,
+    job: Clock,
+    work: Mutex<Work>,
+}
+
+/// What has been done of a [`Strand`].
+#[derive(Default)]
+struct Work {
+    /// When the first piece of it began and the last one ended.
+    span: Option<[Instant; 2]>,
+    cpu_s: f64,
+    done: u64,
+}
+
+impl Strand {
+    /// Does a piece of the work, all of it on this thread.
+    pub fn time<T>(&self, piece: impl FnOnce() -> T) -> T {
+        let (begun, cpu_start) = (Instant::now(), thread_cpu_seconds());
+        let outcome = piece();
+        let (ended, cpu_s) = (Instant::now(), thread_cpu_seconds() - cpu_start);
+        let mut work = self.work();
+        work.span = Some(work.span.map_or([begun, ended], |[first, last]| [first.min(begun), last.max(ended)]));
+        work.cpu_s += cpu_s;
+        outcome
+    }
+
+    /// Counts `amount` more units as done.
+    pub fn advance(&self, amount: u64) {
+        self.work().done += amount;
+    }
+
+    /// What it took; nothing where all of it was done by an earlier run.
+    pub fn finish(self) -> StageFigures {
+        let Work { span, cpu_s, done } = *self.work();
+        let [start_s, end_s] = span.map_or([0.0; 2], |span| span.map(|at| self.job.until(at)));
+        StageFigures { stage: self.name.into(), start_s, wall_s: end_s - start_s, cpu_s, done, unit: self.unit.into() }
+    }
+
+    fn work(&self) -> MutexGuard<'_, Work> {
+        self.work.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Processor time of this thread so far, in seconds.
+fn thread_cpu_seconds() -> f64 {
+    cpu_time::ThreadTime::try_now().map_or(f64::NAN, |t| t.as_duration().as_secs_f64())
 }
 
 /// Processor time of this process so far, in seconds.

@@ -119,6 +119,13 @@ impl Frontier {
         let mut columns = ColumnReader::open(store, Key::Frontier(node))?;
         Ok(Frontier { sites: columns.column()?, boundary: columns.column()? })
     }
+
+    /// The tiles that have sites in it, ascending.
+    pub fn tiles(&self) -> Vec<u32> {
+        let mut tiles: Vec<u32> = self.sites.iter().map(|rim| rim.tile).collect();
+        tiles.dedup();
+        tiles
+    }
 }
 
 /// The triangles that an inner node contributes, by tile: a triangle stands once for each tile that owns a corner of it.

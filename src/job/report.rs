@@ -5,7 +5,7 @@ use super::leaf::LeafFigures;
 use super::levels::LevelFigures;
 use super::machine;
 use super::partition::Skipped;
-use super::progress::{Schedule, StageFigures};
+use super::progress::{Clock, Schedule, StageFigures};
 use super::scan::Plan;
 use crate::geometry::lattice::Lattice;
 use crate::input::Tally;
@@ -66,7 +66,10 @@ pub struct Report {
     pub resumed: u64,
     /// Seconds from start to end.
     pub wall_s: f64,
-    /// The stages in order.
+    /// Seconds of processor time of all threads, those among them that belong to no stage.
+    #[serde(default)]
+    pub cpu_s: f64,
+    /// The stages in the order in which they begin; some go on side by side.
     pub stages: Vec<StageFigures>,
     /// What the user should know.
     pub warnings: Vec<String>,
@@ -127,8 +130,8 @@ pub struct Parts {
     pub memory: u64,
     /// Steps taken over from a run that was interrupted.
     pub resumed: u64,
-    /// Seconds since the start.
-    pub wall_s: f64,
+    /// Since the start.
+    pub clock: Clock,
 }
 
 impl Report {
@@ -170,7 +173,8 @@ impl Report {
             memory_limit: parts.memory,
             threads: parts.threads,
             resumed: parts.resumed,
-            wall_s: parts.wall_s,
+            wall_s: parts.clock.wall_s(),
+            cpu_s: parts.clock.cpu_s(),
             stages: parts.stages,
             warnings,
         }
@@ -179,13 +183,14 @@ impl Report {
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{:<12} {:>9} {:>9} {:>14}  rate", "stage", "wall s", "cpu s", "done")?;
+        writeln!(f, "{:<12} {:>9} {:>9} {:>9} {:>14}  rate", "stage", "from s", "wall s", "cpu s", "done")?;
         for stage in &self.stages {
             let rate = stage.done as f64 / stage.wall_s.max(1e-9);
             writeln!(
                 f,
-                "{:<12} {:>9.2} {:>9.2} {:>14}  {} {}/s",
+                "{:<12} {:>9.2} {:>9.2} {:>9.2} {:>14}  {} {}/s",
                 stage.stage,
+                stage.start_s,
                 stage.wall_s,
                 stage.cpu_s,
                 grouped(stage.done),
@@ -193,7 +198,7 @@ impl fmt::Display for Report {
                 stage.unit
             )?;
         }
-        writeln!(f, "{:<12} {:>9.2}\n", "all", self.wall_s)?;
+        writeln!(f, "{:<12} {:>9} {:>9.2} {:>9.2}\n", "all", "", self.wall_s, self.cpu_s)?;
         for (unit, steps) in [("cpu s", &self.steps.cpu), ("gpu s", &self.steps.gpu)] {
             for (i, StepSeconds { step, seconds }) in steps.iter().enumerate() {
                 let head = if i == 0 { format!("triangulate by step, {unit}") } else { String::new() };

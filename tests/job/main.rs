@@ -30,4 +30,5 @@ mod real;
 mod same_mesh;
 mod steps;
 mod viewers;
+mod woven;
 mod written;

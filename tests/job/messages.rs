@@ -126,7 +126,7 @@ fn quiet_is_quiet_and_json_is_json() {
     for words in ["points read", "triangles", "tiles", "peak memory", "triangulate"] {
         assert!(loud.out.contains(words), "{words}: {}", loud.out);
     }
-    assert!(loud.err.contains("triangulate: done"), "a log gets a line a stage: {}", loud.err);
+    assert!(loud.err.contains("mesh: done"), "a log gets a line a stage: {}", loud.err);
     let json = job.run_with(&["--json", "-q"]).succeeded();
     assert_eq!(json.err, "");
     let stages = json.json()["stages"].as_array().unwrap().len();

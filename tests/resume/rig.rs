@@ -262,7 +262,7 @@ fn lasting(text: &[u8]) -> Value {
     let mut report: Value = serde_json::from_slice(text).unwrap();
     // A step that was cut off has left bytes in the store that nobody needs.
     let changing =
-        ["wall_s", "stages", "steps", "peak_memory", "resumed", "threads", "memory_limit", "bytes_temporary"];
+        ["wall_s", "cpu_s", "stages", "steps", "peak_memory", "resumed", "threads", "memory_limit", "bytes_temporary"];
     for name in changing {
         report.as_object_mut().unwrap().remove(name).unwrap();
     }

@@ -1,0 +1,101 @@
+//! Steps 3 to 6 of a job, woven into each other: tiles that need no node above are stitched and written while others are still
+//! triangulated and merged.
+
+use super::Job;
+use super::cut::Cut;
+use super::grow::Grower;
+use super::journal::Step;
+use super::leaf::LeafFigures;
+use super::partition::Partition;
+use super::progress::StageFigures;
+use super::scan::Plan;
+use super::span::Longest;
+use super::spill::Spill;
+use super::write::{TileWriter, WrittenTiles};
+use super::{beside, check, look};
+use crate::Result;
+use crate::config::MaxEdge;
+use crate::output::preview::Canvas;
+use std::sync::atomic::Ordering;
+
+/// The whole mesh, in tiles.
+pub(super) struct Mesh {
+    pub(super) leaves: LeafFigures,
+    pub(super) tiles: WrittenTiles,
+    pub(super) triangulated: StageFigures,
+}
+
+impl Job<'_> {
+    /// Triangulates all leaves, merges their frontiers and writes the tiles.
+    pub(super) fn weave(
+        &self,
+        plan: &Plan,
+        partition: &Partition,
+        bounds: [[i32; 3]; 2],
+        longest: Longest,
+    ) -> Result<Mesh> {
+        let stage = self.progress.stage("mesh", partition.summary.tally.kept, "points");
+        let strand = self.progress.strand("triangulate", "points");
+        let writer = TileWriter::new(self, partition, &stage);
+        let grower = Grower {
+            job: self,
+            partition,
+            spill: self.spill(partition)?,
+            longest,
+            stage: &stage,
+            strand: &strand,
+            writer: &writer,
+        };
+        let style = |sites| {
+            let count = [partition.tree.leaves.len() as u64, sites];
+            let cut = Cut::new(self.config.output.max_edge, &plan.frame, self.store, count, bounds)?;
+            let look = look(self.config, plan, &partition.summary, bounds, cut);
+            let canvas = Canvas::new(&look.frame, bounds);
+            Ok((look, canvas))
+        };
+        let at_once = self.may_write_at_once(plan, bounds, longest);
+        let work = || {
+            rayon::scope(|scope| {
+                if at_once {
+                    self.make_way()?;
+                    // How many sites there are counts only for what has to wait.
+                    writer.begin(scope, style(0)?);
+                }
+                let leaves = grower.grow(scope, 0)?;
+                if !at_once {
+                    // Not beside the writing: where the disk is small, the results need the room.
+                    let style = beside(|| self.give_up_points(), || style(leaves.sites))?;
+                    self.make_way()?;
+                    writer.begin(scope, style);
+                }
+                Ok(leaves)
+            })
+        };
+        let leaves = work().map_err(|error| writer.fail(error)).unwrap_or_default();
+        let tiles = writer.finish()?;
+        let triangulated = strand.finish();
+        stage.finish();
+        Ok(Mesh { leaves, tiles, triangulated })
+    }
+
+    /// The points, as long as there is a leaf to be done.
+    fn spill(&self, partition: &Partition) -> Result<Option<Spill>> {
+        let all_there = (0..partition.tree.leaves.len()).all(|tile| self.journal.has(Step::Leaf(tile)));
+        if all_there { Ok(None) } else { Spill::open(&self.directory.spill()).map(Some) }
+    }
+
+    /// Whether tiles may be written before all are triangulated: not as long as the job may fail for its input, nor where how tiles
+    /// look depends on all of them, nor where the disk has no room for them beside the points.
+    fn may_write_at_once(&self, plan: &Plan, [low, high]: [[i32; 3]; 2], longest: Longest) -> bool {
+        let corners = [low, high].map(|corner| [corner[0], corner[1]]);
+        longest.holds_all(&corners)
+            && self.config.output.max_edge != MaxEdge::Auto
+            && check::has_room_beside_points(plan, self.config)
+    }
+
+    /// What an earlier job has made stays until this one can no longer fail for its input.
+    fn make_way(&self) -> Result<()> {
+        self.publishing.store(true, Ordering::Relaxed);
+        self.directory.sweep_results(&self.kept)
+    }
+}

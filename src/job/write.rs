@@ -1,0 +1,153 @@
+//! Steps 5 and 6 of a job, each tile as soon as it can be done: beside those that are still triangulated, once writing has begun.
+
+use super::Job;
+use super::export::{self, Look, TileFigures};
+use super::journal::Step;
+use super::partition::Partition;
+use super::progress::{Stage, StageFigures, Strand};
+use super::ready::{Ready, Settled};
+use super::{forecast, stitch};
+use crate::output::preview::Canvas;
+use crate::{Error, Result};
+use rayon::Scope;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
+
+/// Stitches and exports tiles; its methods may be called from any thread.
+pub(super) struct TileWriter<'a> {
+    job: &'a Job<'a>,
+    partition: &'a Partition,
+    stage: &'a Stage,
+    stitch: Strand,
+    write: Strand,
+    /// How tiles are to look and what they are drawn on, from when they may be written.
+    style: OnceLock<(Look, Canvas)>,
+    state: Mutex<State>,
+    failed: AtomicBool,
+}
+
+struct State {
+    /// Tiles that came before they could be written.
+    held: Vec<Settled>,
+    ready: Ready,
+    written: TileFigures,
+    /// What went wrong first.
+    failure: Option<Error>,
+}
+
+/// What has come of all tiles.
+pub(super) struct WrittenTiles {
+    pub(super) style: (Look, Canvas),
+    pub(super) figures: TileFigures,
+    pub(super) stages: [StageFigures; 2],
+}
+
+impl<'a> TileWriter<'a> {
+    pub(super) fn new(job: &'a Job<'a>, partition: &'a Partition, stage: &'a Stage) -> TileWriter<'a> {
+        let ready = Ready::new(partition.tree.leaves.len());
+        let state = State { held: Vec::new(), ready, written: TileFigures::default(), failure: None };
+        TileWriter {
+            job,
+            partition,
+            stage,
+            stitch: job.progress.strand("stitch", "tiles"),
+            write: job.progress.strand("write", "points"),
+            style: OnceLock::new(),
+            state: Mutex::new(state),
+            failed: AtomicBool::new(false),
+        }
+    }
+
+    /// From here on tiles are written, those first that have come already.
+    pub(super) fn begin<'s>(&'s self, scope: &Scope<'s>, style: (Look, Canvas)) {
+        let mut state = self.state();
+        // Under the lock, so that no tile is held any more after those that are taken here.
+        self.style.get_or_init(|| style);
+        let held = std::mem::take(&mut state.held);
+        drop(state);
+        held.into_iter().for_each(|settled| self.start(scope, settled));
+    }
+
+    /// Takes a tile whose triangles are all known.
+    pub(super) fn take<'s>(&'s self, scope: &Scope<'s>, settled: Settled) {
+        let mut state = self.state();
+        if self.style.get().is_none() {
+            state.held.push(settled);
+            return;
+        }
+        drop(state);
+        self.start(scope, settled);
+    }
+
+    /// # Errors
+    /// [`Error::Interrupted`] if something has failed, which [`TileWriter::finish`] tells.
+    pub(super) fn check(&self) -> Result<()> {
+        if self.failed.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(()) }
+    }
+
+    /// Keeps the first error, and stops.
+    pub(super) fn fail(&self, error: Error) {
+        self.state().failure.get_or_insert(error);
+        self.failed.store(true, Ordering::Relaxed);
+    }
+
+    /// What has come of all tiles.
+    ///
+    /// # Errors
+    /// What went wrong first; [`Error::Broken`] if a tile is missing.
+    pub(super) fn finish(self) -> Result<WrittenTiles> {
+        let state = self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
+        if let Some(failure) = state.failure {
+            return Err(failure);
+        }
+        let style = self.style.into_inner().ok_or_else(|| Error::Broken("no tile was to be written".into()))?;
+        Ok(WrittenTiles { style, figures: state.written, stages: [self.stitch.finish(), self.write.finish()] })
+    }
+
+    fn start<'s>(&'s self, scope: &Scope<'s>, settled: Settled) {
+        scope.spawn(move |scope| {
+            for ready in self.attempt(|| self.stitch(settled)).unwrap_or_default() {
+                scope.spawn(move |_| {
+                    self.attempt(|| self.export(ready));
+                });
+            }
+        });
+    }
+
+    /// Does `work` unless something has failed.
+    fn attempt<T>(&self, work: impl FnOnce() -> Result<T>) -> Option<T> {
+        let outcome = self.check().and_then(|()| work());
+        outcome.map_err(|error| self.fail(error)).ok()
+    }
+
+    /// Returns the tiles that can be exported now.
+    fn stitch(&self, settled: Settled) -> Result<Vec<Settled>> {
+        let Job { journal, store, .. } = *self.job;
+        let (look, _) = self.style()?;
+        let run = || self.stitch.time(|| stitch::run(store, &self.partition.tree, settled, look));
+        let neighbours = journal.step(Step::Stitch(settled.tile), run)?;
+        self.stitch.advance(1);
+        Ok(self.state().ready.stitched(settled, &neighbours))
+    }
+
+    fn export(&self, settled: Settled) -> Result<()> {
+        let Job { journal, directory, store, .. } = *self.job;
+        let (look, canvas) = self.style()?;
+        let export = || export::run(directory, store, &self.partition.tree, settled, look, canvas);
+        let step = Step::Export(settled.tile);
+        let figures = journal.step(step, || self.write.time(export))?;
+        self.state().written += figures;
+        let points = self.partition.points(settled.tile);
+        self.write.advance(points);
+        self.job.count(self.stage, step, points - forecast::triangulated(points));
+        Ok(())
+    }
+
+    fn style(&self) -> Result<&(Look, Canvas)> {
+        self.style.get().ok_or_else(|| Error::Broken("a tile is written too early".into()))
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
