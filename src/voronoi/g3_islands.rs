@@ -6,9 +6,10 @@
 //! triangle around it is not counterclockwise, so that only those need to be looked at.
 
 use super::c2_shift::{Shift, orientation};
-use super::sphere::{Sphere, previous};
+use super::sphere::{Sphere, next, previous};
 use super::{Counts, Rejected};
 use crate::geometry::Site;
+use std::cmp::Reverse;
 
 /// Fans with more triangles than this are not followed.
 const MOST: usize = 64;
@@ -21,13 +22,13 @@ pub(super) struct Islands {
     fans: Vec<Fan>,
 }
 
-/// A closed fan of triangles around a site that has more than one.
+/// A closed fan of triangles around a site that has more than one; the least of them is most likely the one that holds the site.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Fan {
     site: u32,
     /// Triangles that are not counterclockwise.
     inverted: usize,
-    degree: usize,
+    degree: Reverse<usize>,
     /// The least half-edge that starts at the site.
     spoke: u32,
 }
@@ -42,26 +43,50 @@ impl Islands {
         shift: &mut Shift,
         counts: &mut Counts,
     ) -> Result<(), Rejected> {
-        let expected = 2 * placed - 2;
-        if sphere.len() == expected {
-            return Ok(());
-        }
-        self.count_degrees(sphere, sites.len());
-        self.find_fans(sphere, sites, &shift.inverted);
-        for fans in self.fans.chunk_by(|a, b| a.site == b.site) {
-            // If every fan of the site is listed, the best is the first.
-            let all = fans.iter().map(|fan| fan.degree).sum::<usize>() == self.degrees[fans[0].site as usize] as usize;
-            for fan in &fans[all as usize..] {
-                if !shift.dissolve(sphere, sites, fan.spoke) {
-                    return Err(Rejected::NotAccepted("an island could not be removed"));
-                }
-                counts.islands += 1;
+        // Nothing has been taken out yet.
+        let mut expected = 2 * placed - 2;
+        while sphere.len() > expected {
+            let before = sphere.len();
+            self.remove_apart(sphere, sites, shift, counts);
+            expected = 2 * (placed - shift.removed.len()) - 2;
+            if sphere.len() == before {
+                return Err(Rejected::NotAccepted("an island could not be removed"));
             }
         }
         match sphere.len() == expected {
             true => Ok(()),
             false => Err(Rejected::NotAccepted("the discrete Voronoi diagram is not a sphere")),
         }
+    }
+
+    /// Takes out those surplus fans that have no other fan within. An island may lie within an island, and so may a whole region.
+    fn remove_apart(&mut self, sphere: &mut Sphere, sites: &[Site], shift: &mut Shift, counts: &mut Counts) {
+        self.count_degrees(sphere, sites.len());
+        self.find_fans(sphere, sites, &shift.inverted);
+        for fans in self.fans.chunk_by(|a, b| a.site == b.site) {
+            // If every fan of the site is listed, the best is the first.
+            let listed: usize = fans.iter().map(|fan| fan.degree.0).sum();
+            let all = listed == self.degrees[fans[0].site as usize] as usize;
+            for found in &fans[all as usize..] {
+                // One beside it may have gone.
+                if fan(sphere, sites, found.spoke).as_ref() != Some(found) {
+                    continue;
+                }
+                if shift.dissolve(sphere, sites, found.spoke) {
+                    counts.islands += 1;
+                } else if let Some(h) = self.enclosed(sphere, found) {
+                    shift.take_out(sphere, sites, h, true);
+                }
+            }
+        }
+    }
+
+    /// A half-edge that starts at a site whose only triangles are two of `fan`.
+    fn enclosed(&self, sphere: &Sphere, fan: &Fan) -> Option<u32> {
+        let around = |spoke: &u32| Some(sphere.twin(previous(*spoke)));
+        let sides = std::iter::successors(Some(fan.spoke), around).take(fan.degree.0).map(next);
+        let mut behind = sides.map(|side| sphere.twin(side));
+        behind.find(|&h| sphere.origin(h) != sphere.infinity() && self.degrees[sphere.origin(h) as usize] == 2)
     }
 
     fn count_degrees(&mut self, sphere: &Sphere, sites: usize) {
@@ -79,7 +104,7 @@ impl Islands {
     fn find_fans(&mut self, sphere: &Sphere, sites: &[Site], inverted: &[u32]) {
         self.fans.clear();
         for h in inverted.iter().flat_map(|&t| t..t + 3) {
-            let fan = fan(sphere, sites, h).filter(|fan| fan.degree < self.degrees[fan.site as usize] as usize);
+            let fan = fan(sphere, sites, h).filter(|fan| fan.degree.0 < self.degrees[fan.site as usize] as usize);
             self.fans.extend(fan);
         }
         self.fans.sort_unstable();
@@ -87,12 +112,16 @@ impl Islands {
     }
 }
 
+/// The fan around the start of `h`, if its triangle is still there.
 fn fan(sphere: &Sphere, sites: &[Site], h: u32) -> Option<Fan> {
-    let mut fan = Fan { site: sphere.origin(h), inverted: 0, degree: 0, spoke: h };
+    if sphere.is_free(h) {
+        return None;
+    }
+    let mut fan = Fan { site: sphere.origin(h), inverted: 0, degree: Reverse(0), spoke: h };
     let mut spoke = h;
-    while fan.degree < MOST {
+    while fan.degree.0 < MOST {
         fan.inverted += orientation(sphere, sites, spoke & !7).is_some_and(|area| area <= 0) as usize;
-        fan.degree += 1;
+        fan.degree.0 += 1;
         fan.spoke = fan.spoke.min(spoke);
         spoke = sphere.twin(previous(spoke));
         if spoke == h {

@@ -149,6 +149,22 @@ fn uniform_sites_are_never_rejected() {
     }
 }
 
+/// Between two sites far out on a circle a region is thin, and falls apart; its pieces lie within pieces of the next.
+#[test]
+fn islands_within_islands_are_taken_out() {
+    let mut random = Random(11);
+    let mut scratch = Scratch::default();
+    let mut islands = 0;
+    for round in 0..400 {
+        let sites = case("circle", 100 + 3 * round, &mut random);
+        match triangulate(&sites, &mut scratch) {
+            Ok((_, counts)) => islands += counts.islands,
+            Err(why) => assert_eq!(why, Rejected::Crowded, "{sites:?}"),
+        }
+    }
+    assert!(islands > 100, "{islands}");
+}
+
 #[test]
 fn what_has_no_triangle_is_rejected() {
     let mut scratch = Scratch::default();
