@@ -64,7 +64,8 @@ pub struct Preflight {
     pub temporary: u64,
     /// Bytes of results, about.
     pub results: u64,
-    /// Bytes of both that there will be at once, at the most: some temporary files are gone before results come.
+    /// Bytes that there must be room for. Where there is room for both, results come while all temporary files are there; else some
+    /// of these are gone before.
     pub disk: u64,
     /// Bytes free on the disk of the output directory, with those that an earlier job takes there; `None` where the system does
     /// not tell.
@@ -120,7 +121,7 @@ pub(super) fn preflight(plan: &Plan, config: &Config, threads: usize) -> Preflig
         memory_free: machine::free_memory(),
         temporary: spill + left_by_steps,
         results,
-        // Where there is no room for both, the spill goes before the results come.
+        // The spill may go before the results come.
         disk: left_by_steps + spill.max(results),
         disk_free: machine::free_disk(output).map(|free| free + taken(output)),
         output: output.clone(),
@@ -160,10 +161,10 @@ impl OnDisk {
     }
 }
 
-/// Whether the disk has room for all other files beside the points, which are there already.
+/// Whether the disk has ample room for all other files beside the points, which are there already.
 pub(super) fn has_room_beside_points(plan: &Plan, config: &Config) -> bool {
     let OnDisk { steps, results, .. } = OnDisk::of(plan, config);
-    machine::free_disk(&config.output.directory).is_some_and(|free| steps + results <= free)
+    machine::free_disk(&config.output.directory).is_some_and(|free| (steps + results) / 4 * 5 <= free)
 }
 
 /// Bytes that steps leave for later steps.
@@ -246,7 +247,7 @@ impl fmt::Display for Preflight {
         row("memory", format!("about {memory} of {limit}, {} free", free(self.memory_free)))?;
         row("temporary files", format!("about {}", mebibytes(self.temporary)))?;
         row("results", format!("about {}", mebibytes(self.results)))?;
-        row("disk", format!("about {} at once, {} free", mebibytes(self.disk), free(self.disk_free)))?;
+        row("disk", format!("about {} at least, {} free", mebibytes(self.disk), free(self.disk_free)))?;
         for warning in &self.warnings {
             writeln!(f, "warning: {warning}")?;
         }

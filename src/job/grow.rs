@@ -29,19 +29,19 @@ pub(super) struct Grower<'a> {
 }
 
 impl<'a> Grower<'a> {
-    /// Triangulates the leaves below `node`, and merges every merge node as soon as all below it is done.
-    pub(super) fn grow(&self, scope: &Scope<'a>, node: usize) -> Result<LeafFigures> {
-        self.writer.check()?;
+    /// Triangulates the leaves below `node`, and merges every merge node as soon as all below it is done. `None` if something
+    /// has failed, which the writer tells.
+    pub(super) fn grow(&self, scope: &Scope<'a>, node: usize) -> Option<LeafFigures> {
         match self.partition.tree.nodes[node].kind {
-            Kind::Leaf(tile) => self.grow_leaf(scope, node, tile),
+            Kind::Leaf(tile) => self.writer.attempt(|| self.grow_leaf(scope, node, tile)),
             Kind::Inner([low, high]) => {
                 let (low, high) = rayon::join(|| self.grow(scope, low), || self.grow(scope, high));
                 let (mut figures, high) = (low?, high?);
                 figures += high;
                 if self.partition.tree.is_merge(node) {
-                    self.merge(scope, node)?;
+                    self.writer.attempt(|| self.merge(scope, node))?;
                 }
-                Ok(figures)
+                Some(figures)
             }
         }
     }
@@ -50,8 +50,10 @@ impl<'a> Grower<'a> {
         let journal = self.job.journal;
         let figures: LeafFigures = journal.step(Step::Leaf(tile), || self.strand.time(|| self.leaf(tile)))?;
         let points = figures.sites + figures.duplicates;
-        self.strand.advance(points);
         self.job.count(self.stage, Step::Leaf(tile), forecast::triangulated(points));
+        if !journal.has(Step::Leaf(tile)) {
+            self.strand.advance(points);
+        }
         // Any other leaf hands its hull up.
         if node == 0 || figures.sites == 0 {
             self.writer.take(scope, Settled { tile, by: node });
@@ -77,8 +79,8 @@ impl<'a> Grower<'a> {
         Ok(())
     }
 
-    /// Nodes below the root may be merged at once on all threads. Beside the root the others write tiles, which takes half of what
-    /// leaves do.
+    /// Nodes below the root may be merged at once on all threads. Beside the root the others may write tiles, which takes half of
+    /// what leaves do.
     fn memory_of_merge(&self, node: usize) -> u64 {
         let Job { config, threads, .. } = *self.job;
         let memory = config.limits.memory.0 / 4 * 3;

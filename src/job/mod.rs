@@ -1,5 +1,5 @@
-//! A job, from the configuration to the report: scan, partition, triangulate the leaves and merge the inner nodes, stitch,
-//! export, report. Every step leaves its result in the job directory and finds there what it needs, so that each can be
+//! A job, from the configuration to the report: scan, partition, triangulate the leaves and merge the inner nodes, beside that
+//! stitch and export, then levels and report. Every step leaves its result in the job directory and finds there what it needs, so that each can be
 //! called on its own, the ones by tile or by node in any order that puts children before parents; and a job that was
 //! interrupted goes on from the steps that its journal has.
 
@@ -64,7 +64,6 @@ use scan::Plan;
 use span::Longest;
 use std::collections::HashSet;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
 use store::Store;
 use weave::Mesh;
 use write::WrittenTiles;
@@ -155,7 +154,7 @@ fn attempt(
         return Ok(report);
     }
     on_threads(threads, || {
-        let resume::Start { store, journal, partition, files } = resume::start(&directory, head, options)?;
+        let resume::Start { store, journal, partition, files } = resume::start(&directory, head, config, options)?;
         let job = Job {
             config,
             triangulator,
@@ -167,10 +166,8 @@ fn attempt(
             threads,
             clock,
             kept: files,
-            publishing: AtomicBool::new(false),
         };
         let outcome = job.run(plan, scanned, partition);
-        let publishing = job.publishing.load(Ordering::Relaxed);
         // What is finished is on the disk before the message says so, if it gets there.
         drop(journal);
         let steps = if outcome.is_err() { steps_kept(&directory) } else { 0 };
@@ -179,9 +176,10 @@ fn attempt(
                 Err(Error::Resumable { why: Box::new(why), steps, job: directory.job().into() })
             }
             outcome => {
+                // Without a report they are those of this run, or of one that was interrupted.
+                let are_parts = outcome.is_err() && !directory.report().exists();
+                let withdrawn = if are_parts { directory.withdraw() } else { Ok(()) };
                 // The first error is the one to report.
-                let failed_late = outcome.is_err() && publishing;
-                let withdrawn = if failed_late { directory.withdraw() } else { Ok(()) };
                 let cleaned = directory.clean_up().and(withdrawn);
                 outcome.and_then(|report| cleaned.map(|()| report))
             }
@@ -231,8 +229,6 @@ struct Job<'a> {
     clock: Clock,
     /// Results of an earlier run that stay.
     kept: HashSet<PathBuf>,
-    /// Whether results of earlier jobs have made room for this one's.
-    publishing: AtomicBool,
 }
 
 impl Job<'_> {

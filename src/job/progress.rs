@@ -115,7 +115,7 @@ impl Schedule {
 
     /// One of several kinds of work that go on side by side within a stage.
     pub fn strand(&self, name: &'static str, unit: &'static str) -> Strand {
-        Strand { name, unit, job: self.clock, work: Mutex::default() }
+        Strand { name, unit, job: self.clock, begun: Instant::now(), work: Mutex::default() }
     }
 }
 
@@ -189,7 +189,7 @@ pub struct StageFigures {
     pub wall_s: f64,
     /// Seconds of processor time of all threads.
     pub cpu_s: f64,
-    /// How many of its units it went through.
+    /// How many of its units this run went through.
     pub done: u64,
     /// What its units are.
     pub unit: String,
@@ -231,12 +231,13 @@ impl Stage {
     pub fn finish(self) -> StageFigures {
         self.bar.finish_and_clear();
         self.pace.finish();
+        let [done, taken_over] = [&self.pace.done, &self.pace.taken_over].map(|amount| amount.load(Ordering::Relaxed));
         let figures = StageFigures {
             stage: self.pace.name.into(),
             start_s: self.job.until(self.own.wall),
             wall_s: self.own.wall_s(),
             cpu_s: self.own.cpu_s(),
-            done: self.pace.done.load(Ordering::Relaxed),
+            done: done - taken_over,
             unit: self.unit.into(),
         };
         if self.progress == Progress::Lines {
@@ -251,6 +252,7 @@ pub struct Strand {
     name: &'static str,
     unit: &'static str,
     job: Clock,
+    begun: Instant,
     work: Mutex<Work>,
 }
 
@@ -280,10 +282,10 @@ impl Strand {
         self.work().done += amount;
     }
 
-    /// What it took; nothing where all of it was done by an earlier run.
+    /// What it took.
     pub fn finish(self) -> StageFigures {
         let Work { span, cpu_s, done } = *self.work();
-        let [start_s, end_s] = span.map_or([0.0; 2], |span| span.map(|at| self.job.until(at)));
+        let [start_s, end_s] = span.unwrap_or([self.begun; 2]).map(|at| self.job.until(at));
         StageFigures { stage: self.name.into(), start_s, wall_s: end_s - start_s, cpu_s, done, unit: self.unit.into() }
     }
 

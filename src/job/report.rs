@@ -185,7 +185,7 @@ impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{:<12} {:>9} {:>9} {:>9} {:>14}  rate", "stage", "from s", "wall s", "cpu s", "done")?;
         for stage in &self.stages {
-            let rate = stage.done as f64 / stage.wall_s.max(1e-9);
+            let rate = if stage.done > 0 { stage.done as f64 / stage.wall_s.max(1e-9) } else { 0.0 };
             writeln!(
                 f,
                 "{:<12} {:>9.2} {:>9.2} {:>9.2} {:>14}  {} {}/s",

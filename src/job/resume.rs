@@ -13,6 +13,7 @@ use super::progress::{Progress, Stage};
 use super::report::Report;
 use super::spill::Spill;
 use super::store::{Store, Stored};
+use crate::config::{Config, MaxEdge};
 use crate::{Error, Result, interrupt};
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
@@ -56,14 +57,14 @@ pub fn complete(directory: &Directory, head: &Head) -> Result<Option<Report>> {
     Ok(serde_json::from_slice(&text).ok())
 }
 
-/// Begins the run of the job `head` in its locked directory: goes on with the one that the directory holds, as far as it is the
+/// Begins the run of the job `head`, that of `config`, in its locked directory: goes on with the one that the directory holds, as far as it is the
 /// same and whole, and removes all else.
 ///
 /// # Errors
 /// [`Error::Io`] on the job directory.
-pub fn start<'a>(directory: &'a Directory, head: &Head, options: Options) -> Result<Start<'a>> {
+pub fn start<'a>(directory: &'a Directory, head: &Head, config: &Config, options: Options) -> Result<Start<'a>> {
     let progress = options.progress;
-    let kept = if options.fresh { None } else { kept(directory, head, progress)? };
+    let kept = if options.fresh { None } else { kept(directory, head, config, progress)? };
     let kept = kept.unwrap_or_default();
     if !kept.entries.is_empty() {
         progress.note(&format!("going on with an interrupted run: {} steps are done", kept.entries.len()));
@@ -85,7 +86,7 @@ struct Kept {
     partition: Option<Partition>,
 }
 
-fn kept(directory: &Directory, head: &Head, progress: Progress) -> Result<Option<Kept>> {
+fn kept(directory: &Directory, head: &Head, config: &Config, progress: Progress) -> Result<Option<Kept>> {
     let Some((old, mut entries)) = journal::read(directory)? else { return Ok(None) };
     if entries.is_empty() || old.coarser != head.coarser {
         return Ok(None);
@@ -106,7 +107,8 @@ fn kept(directory: &Directory, head: &Head, progress: Progress) -> Result<Option
         entries.retain(|entry| !matches!(entry.step, Step::Level(_) | Step::Finish | Step::Report));
     }
     let stage = progress.stage("check", entries.len() as u64, "steps");
-    let kept = Review::of(directory, entries, &stage)?.map(Review::kept);
+    let counted_again = config.output.max_edge == MaxEdge::Auto;
+    let kept = Review::of(directory, entries, counted_again, &stage)?.map(Review::kept);
     stage.finish();
     if kept.is_none() {
         progress.note("what the interrupted run has left is not whole; starting over");
@@ -123,11 +125,13 @@ struct Review {
     whole: HashSet<Step>,
     /// Whether the step of every tile's export is one of them.
     exported: bool,
+    /// Whether the sites of all leaves are counted before the next tile is written.
+    counted_again: bool,
 }
 
 impl Review {
     /// `None` if its points are not there any more, though they are needed.
-    fn of(directory: &Directory, entries: Vec<Entry>, stage: &Stage) -> Result<Option<Review>> {
+    fn of(directory: &Directory, entries: Vec<Entry>, counted_again: bool, stage: &Stage) -> Result<Option<Review>> {
         let stored = entries.iter().flat_map(|entry| &entry.stored);
         let Ok(store) = Store::open(&directory.store(), stored) else { return Ok(None) };
         let is_whole = |entry: &Entry| {
@@ -146,7 +150,8 @@ impl Review {
         }
         let partition = Partition::load(&store)?;
         let entries = entries.into_iter().map(|entry| (entry.step, entry)).collect();
-        let mut review = Review { directory: directory.clone(), partition, entries, whole, exported: false };
+        let directory = directory.clone();
+        let mut review = Review { directory, partition, entries, whole, exported: false, counted_again };
         review.exported = review.tiles().all(|tile| review.whole.contains(&Step::Export(tile)));
         Ok(review.has_its_points().then_some(review))
     }
@@ -172,6 +177,7 @@ impl Review {
         let tree = &self.partition.tree;
         let mut above = tree.merges_above(tree.leaves[tile]);
         let is_used_up = self.whole.contains(&Step::Export(tile))
+            && (self.exported || !self.counted_again)
             && self.stitch_stays(tile)
             && above.next().is_none_or(|node| self.node_stays(node));
         self.stays(Step::Leaf(tile), !is_used_up)

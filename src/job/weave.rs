@@ -16,7 +16,6 @@ use super::{beside, check, look};
 use crate::Result;
 use crate::config::MaxEdge;
 use crate::output::preview::Canvas;
-use std::sync::atomic::Ordering;
 
 /// The whole mesh, in tiles.
 pub(super) struct Mesh {
@@ -47,32 +46,27 @@ impl Job<'_> {
             writer: &writer,
         };
         let style = |sites| {
-            let count = [partition.tree.leaves.len() as u64, sites];
-            let cut = Cut::new(self.config.output.max_edge, &plan.frame, self.store, count, bounds)?;
+            let cut = self.cut(plan, partition, bounds, sites)?;
             let look = look(self.config, plan, &partition.summary, bounds, cut);
             let canvas = Canvas::new(&look.frame, bounds);
             Ok((look, canvas))
         };
-        let at_once = self.may_write_at_once(plan, bounds, longest);
-        let work = || {
-            rayon::scope(|scope| {
-                if at_once {
-                    self.make_way()?;
-                    // How many sites there are counts only for what has to wait.
-                    writer.begin(scope, style(0)?);
-                }
-                let leaves = grower.grow(scope, 0)?;
-                if !at_once {
-                    // Not beside the writing: where the disk is small, the results need the room.
-                    let style = beside(|| self.give_up_points(), || style(leaves.sites))?;
-                    self.make_way()?;
-                    writer.begin(scope, style);
-                }
-                Ok(leaves)
-            })
-        };
-        let leaves = work().map_err(|error| writer.fail(error)).unwrap_or_default();
+        let at_once = self.may_write_at_once(plan);
+        let leaves = rayon::scope(|scope| {
+            if at_once {
+                // How many sites there are matters only to what has to wait.
+                writer.attempt(|| writer.begin(scope, style(0)?))?;
+            }
+            let leaves = grower.grow(scope, 0)?;
+            if !at_once {
+                // Not beside the writing: where the disk is small, the results need the room.
+                let style = || beside(|| self.give_up_points(), || style(leaves.sites));
+                writer.attempt(|| writer.begin(scope, style()?))?;
+            }
+            Some(leaves)
+        });
         let tiles = writer.finish()?;
+        let leaves = leaves.unwrap_or_default();
         let triangulated = strand.finish();
         stage.finish();
         Ok(Mesh { leaves, tiles, triangulated })
@@ -84,18 +78,22 @@ impl Job<'_> {
         if all_there { Ok(None) } else { Spill::open(&self.directory.spill()).map(Some) }
     }
 
-    /// Whether tiles may be written before all are triangulated: not as long as the job may fail for its input, nor where how tiles
-    /// look depends on all of them, nor where the disk has no room for them beside the points.
-    fn may_write_at_once(&self, plan: &Plan, [low, high]: [[i32; 3]; 2], longest: Longest) -> bool {
-        let corners = [low, high].map(|corner| [corner[0], corner[1]]);
-        longest.holds_all(&corners)
+    /// Whether tiles may be written before all are triangulated: not where that takes the place of what an earlier job has made, as
+    /// this one may still fail; nor where how tiles look depends on all of them; nor where the disk has no room for them beside
+    /// the points.
+    fn may_write_at_once(&self, plan: &Plan) -> bool {
+        !self.directory.report().exists()
             && self.config.output.max_edge != MaxEdge::Auto
             && check::has_room_beside_points(plan, self.config)
     }
 
-    /// What an earlier job has made stays until this one can no longer fail for its input.
-    fn make_way(&self) -> Result<()> {
-        self.publishing.store(true, Ordering::Relaxed);
-        self.directory.sweep_results(&self.kept)
+    /// Which triangles are left out.
+    fn cut(&self, plan: &Plan, partition: &Partition, bounds: [[i32; 3]; 2], sites: u64) -> Result<Cut> {
+        let tiles = partition.tree.leaves.len();
+        if (0..tiles).all(|tile| self.journal.has(Step::Export(tile))) {
+            // Nobody asks, and what there is to count may be gone.
+            return Ok(Cut::Nothing);
+        }
+        Cut::new(self.config.output.max_edge, &plan.frame, self.store, [tiles as u64, sites], bounds)
     }
 }

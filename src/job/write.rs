@@ -30,6 +30,7 @@ struct State {
     /// Tiles that came before they could be written.
     held: Vec<Settled>,
     ready: Ready,
+    exported: usize,
     written: TileFigures,
     /// What went wrong first.
     failure: Option<Error>,
@@ -45,7 +46,7 @@ pub(super) struct WrittenTiles {
 impl<'a> TileWriter<'a> {
     pub(super) fn new(job: &'a Job<'a>, partition: &'a Partition, stage: &'a Stage) -> TileWriter<'a> {
         let ready = Ready::new(partition.tree.leaves.len());
-        let state = State { held: Vec::new(), ready, written: TileFigures::default(), failure: None };
+        let state = State { held: Vec::new(), ready, exported: 0, written: TileFigures::default(), failure: None };
         TileWriter {
             job,
             partition,
@@ -58,14 +59,19 @@ impl<'a> TileWriter<'a> {
         }
     }
 
-    /// From here on tiles are written, those first that have come already.
-    pub(super) fn begin<'s>(&'s self, scope: &Scope<'s>, style: (Look, Canvas)) {
+    /// From here on tiles are written, those first that have come already. What an earlier job has made is removed.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be.
+    pub(super) fn begin<'s>(&'s self, scope: &Scope<'s>, style: (Look, Canvas)) -> Result<()> {
+        self.job.directory.sweep_results(&self.job.kept)?;
         let mut state = self.state();
         // Under the lock, so that no tile is held any more after those that are taken here.
         self.style.get_or_init(|| style);
         let held = std::mem::take(&mut state.held);
         drop(state);
         held.into_iter().for_each(|settled| self.start(scope, settled));
+        Ok(())
     }
 
     /// Takes a tile whose triangles are all known.
@@ -79,28 +85,29 @@ impl<'a> TileWriter<'a> {
         self.start(scope, settled);
     }
 
-    /// # Errors
-    /// [`Error::Interrupted`] if something has failed, which [`TileWriter::finish`] tells.
-    pub(super) fn check(&self) -> Result<()> {
-        if self.failed.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(()) }
-    }
-
-    /// Keeps the first error, and stops.
-    pub(super) fn fail(&self, error: Error) {
-        self.state().failure.get_or_insert(error);
-        self.failed.store(true, Ordering::Relaxed);
+    /// Does `work` unless something has failed before. The first error of all is kept for [`TileWriter::finish`].
+    pub(super) fn attempt<T>(&self, work: impl FnOnce() -> Result<T>) -> Option<T> {
+        if self.failed.load(Ordering::Relaxed) {
+            return None;
+        }
+        let keep = |error| {
+            self.state().failure.get_or_insert(error);
+            self.failed.store(true, Ordering::Relaxed);
+        };
+        work().map_err(keep).ok()
     }
 
     /// What has come of all tiles.
     ///
     /// # Errors
-    /// What went wrong first; [`Error::Broken`] if a tile is missing.
+    /// What went wrong first; [`Error::Broken`] if a tile was not written.
     pub(super) fn finish(self) -> Result<WrittenTiles> {
         let state = self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
         if let Some(failure) = state.failure {
             return Err(failure);
         }
-        let style = self.style.into_inner().ok_or_else(|| Error::Broken("no tile was to be written".into()))?;
+        let style = self.style.into_inner().filter(|_| state.exported == self.partition.tree.leaves.len());
+        let style = style.ok_or_else(|| Error::Broken(format!("only {} tiles were written", state.exported)))?;
         Ok(WrittenTiles { style, figures: state.written, stages: [self.stitch.finish(), self.write.finish()] })
     }
 
@@ -114,19 +121,14 @@ impl<'a> TileWriter<'a> {
         });
     }
 
-    /// Does `work` unless something has failed.
-    fn attempt<T>(&self, work: impl FnOnce() -> Result<T>) -> Option<T> {
-        let outcome = self.check().and_then(|()| work());
-        outcome.map_err(|error| self.fail(error)).ok()
-    }
-
     /// Returns the tiles that can be exported now.
     fn stitch(&self, settled: Settled) -> Result<Vec<Settled>> {
         let Job { journal, store, .. } = *self.job;
         let (look, _) = self.style()?;
         let run = || self.stitch.time(|| stitch::run(store, &self.partition.tree, settled, look));
-        let neighbours = journal.step(Step::Stitch(settled.tile), run)?;
-        self.stitch.advance(1);
+        let step = Step::Stitch(settled.tile);
+        let neighbours = journal.step(step, run)?;
+        self.stitch.advance(!journal.has(step) as u64);
         Ok(self.state().ready.stitched(settled, &neighbours))
     }
 
@@ -136,9 +138,14 @@ impl<'a> TileWriter<'a> {
         let export = || export::run(directory, store, &self.partition.tree, settled, look, canvas);
         let step = Step::Export(settled.tile);
         let figures = journal.step(step, || self.write.time(export))?;
-        self.state().written += figures;
+        let mut state = self.state();
+        state.written += figures;
+        state.exported += 1;
+        drop(state);
         let points = self.partition.points(settled.tile);
-        self.write.advance(points);
+        if !journal.has(step) {
+            self.write.advance(points);
+        }
         self.job.count(self.stage, step, points - forecast::triangulated(points));
         Ok(())
     }

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::rig::{Rig, Run, Setup};
+use crate::rig::{Rig, Run, Setup, files};
 use crate::scattered;
 
 fn base() -> Setup {
@@ -189,4 +189,51 @@ fn a_journal_that_is_no_journal_is_no_obstacle() {
         fs::write(rig.out().join("job/journal"), garbage).unwrap();
         assert_eq!(rig.completes("a journal of garbage")["resumed"], 0);
     }
+}
+
+#[test]
+fn what_an_earlier_job_has_made_stays_until_the_new_mesh_is_there() {
+    let mut rig = rig();
+    rig.completes("once");
+    let earlier = files(&rig.out());
+    let path = rig.folder.path().join("cloud.csv");
+    fs::write(&path, fs::read_to_string(&path).unwrap() + "17,17,17\n").unwrap();
+    // Among the leaves and their merges.
+    assert!(rig.run_to("committed", 20).was_killed());
+    let mut found = files(&rig.out());
+    found.retain(|name, _| !name.starts_with("job/"));
+    assert!(found == earlier, "{:?}", found.keys());
+    rig.expect(&base());
+    rig.completes("with another point");
+}
+
+/// Tiles come early, so an interrupted run may have left some when the next one turns out to be impossible.
+#[test]
+fn a_run_that_fails_for_good_leaves_no_parts_of_an_interrupted_one() {
+    let rig = rig();
+    let path = rig.folder.path().join("cloud.csv");
+    let text = fs::read_to_string(&path).unwrap();
+    assert!(rig.run_to("committed", 45).was_killed());
+    assert!(files(&rig.out().join("tiles")).len() >= 3);
+    fs::write(&path, text.clone() + "no,point,this\n").unwrap();
+    let end = rig.run();
+    assert_eq!(end.status.code(), Some(3), "{end:?}");
+    assert!(files(&rig.out()).is_empty(), "{:?}", files(&rig.out()).keys());
+    fs::write(&path, text).unwrap();
+    rig.completes("good again");
+}
+
+/// With "auto" all leaves are counted once more, those too whose tiles are there.
+#[test]
+fn leaves_that_are_counted_again_must_be_whole() {
+    let cut = || base().output("max_edge = \"auto\"");
+    let rig = Rig::new(&scattered::gaussian(20_000), &cut()).committing_every(0);
+    assert!(rig.run_to("committed", 60).was_killed());
+    assert!(files(&rig.out().join("tiles")).len() >= 3);
+    let store = rig.out().join("job/steps.store");
+    let mut bytes = fs::read(&store).unwrap();
+    let length = bytes.len();
+    bytes[length / 10..length / 2].fill(0);
+    fs::write(&store, bytes).unwrap();
+    rig.completes("leaves of zeroes");
 }
