@@ -219,7 +219,8 @@ impl Sphere {
         changed(open[i]);
     }
 
-    /// The triangles around the vertex at the start of `h`, or `None` if there are more than [`Star::MOST`].
+    /// The triangles around the vertex at the start of `h`, or `None` if there are more than [`Star::MOST`], or they leave no hole
+    /// that could be filled.
     pub(super) fn star(&self, h: u32) -> Option<Star> {
         let mut star = Star::default();
         let mut spoke = h;
@@ -230,7 +231,7 @@ impl Sphere {
             star.outside.push(self.twin(side));
             spoke = self.twin(previous(spoke));
             if spoke == h {
-                return star.outside_is_apart().then_some(star);
+                return star.leaves_a_hole().then_some(star);
             }
             if star.sides.len() == Star::MOST {
                 return None;
@@ -346,9 +347,13 @@ pub(super) struct Star {
 impl Star {
     const MOST: usize = 48;
 
-    /// No two triangles of the star share a side opposite to the vertex.
-    fn outside_is_apart(&self) -> bool {
-        self.outside.iter().all(|o| !self.sides.contains(o))
+    /// No triangle is there twice, and no two of them share a side opposite to the vertex: where the diagram was wrong, a triangle
+    /// may have its vertex twice, or be glued to itself.
+    fn leaves_a_hole(&self) -> bool {
+        let is_new = |(at, side): (usize, &u32)| self.sides[..at].iter().all(|before| before & !7 != side & !7);
+        self.sides.len() > 1
+            && self.sides.iter().enumerate().all(is_new)
+            && self.outside.iter().all(|outside| !self.sides.contains(outside))
     }
 }
 
