@@ -89,8 +89,9 @@ impl Directory {
     fn results(&self) -> Result<Vec<PathBuf>> {
         let folders = [self.tiles(), self.levels(), self.cut()];
         let numbered = folders.iter().filter(|folder| folder.is_dir()).map(|folder| numbered_files(folder));
-        let mut results = numbered.collect::<Result<Vec<_>>>()?.concat();
-        results.extend([self.terrain(), self.tileset(), self.georeference(), self.report(), self.preview()]);
+        // The report comes first: what stands beside one is complete, whenever a removal is cut off.
+        let mut results = vec![self.report(), self.terrain(), self.tileset(), self.georeference(), self.preview()];
+        results.extend(numbered.collect::<Result<Vec<_>>>()?.concat());
         Ok(results)
     }
 
@@ -127,7 +128,8 @@ impl Directory {
         if self.journal().exists() || report.as_ref().is_some_and(wrote_it) {
             return Ok(());
         }
-        match self.results()?.into_iter().find(|path| path.symlink_metadata().is_ok()) {
+        let mut results = self.results()?.into_iter().flat_map(|path| [partial(&path), path]);
+        match results.find(|path| path.symlink_metadata().is_ok()) {
             None => Ok(()),
             Some(found) => Err(Error::Config(format!(
                 "{} is there, which a job would write over or remove, and nothing says that it is an earlier job's: choose another \

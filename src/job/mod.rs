@@ -64,6 +64,7 @@ use scan::Plan;
 use span::Longest;
 use std::collections::HashSet;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 use store::Store;
 use weave::Mesh;
 use write::WrittenTiles;
@@ -154,7 +155,8 @@ fn attempt(
         return Ok(report);
     }
     on_threads(threads, || {
-        let resume::Start { store, journal, partition, files } = resume::start(&directory, head, config, options)?;
+        let resume::Start { store, journal, partition, files, parts } =
+            resume::start(&directory, head, config, options)?;
         let job = Job {
             config,
             triangulator,
@@ -166,8 +168,10 @@ fn attempt(
             threads,
             clock,
             kept: files,
+            parts: AtomicBool::new(parts),
         };
         let outcome = job.run(plan, scanned, partition);
+        let parts = job.parts.load(Ordering::Relaxed);
         // What is finished is on the disk before the message says so, if it gets there.
         drop(journal);
         let steps = if outcome.is_err() { steps_kept(&directory) } else { 0 };
@@ -176,11 +180,9 @@ fn attempt(
                 Err(Error::Resumable { why: Box::new(why), steps, job: directory.job().into() })
             }
             outcome => {
-                // Without a report they are those of this run, or of one that was interrupted.
-                let are_parts = outcome.is_err() && !directory.report().exists();
-                let withdrawn = if are_parts { directory.withdraw() } else { Ok(()) };
+                let withdrawn = if outcome.is_err() && parts { directory.withdraw() } else { Ok(()) };
                 // The first error is the one to report.
-                let cleaned = directory.clean_up().and(withdrawn);
+                let cleaned = withdrawn.and_then(|()| directory.clean_up());
                 outcome.and_then(|report| cleaned.map(|()| report))
             }
         }
@@ -229,6 +231,8 @@ struct Job<'a> {
     clock: Clock,
     /// Results of an earlier run that stay.
     kept: HashSet<PathBuf>,
+    /// Whether results may be there that are only a part of this job's.
+    parts: AtomicBool,
 }
 
 impl Job<'_> {

@@ -29,6 +29,8 @@ pub struct Start<'a> {
     pub partition: Option<Partition>,
     /// The files, by name, that finished steps have left and that stay.
     pub files: HashSet<PathBuf>,
+    /// Whether finished steps have left a part of the results.
+    pub parts: bool,
 }
 
 /// How much coarser than at first the lattice of the interrupted job became, if it is the same job.
@@ -66,6 +68,11 @@ pub fn start<'a>(directory: &'a Directory, head: &Head, config: &Config, options
     let progress = options.progress;
     let kept = if options.fresh { None } else { kept(directory, head, config, progress)? };
     let kept = kept.unwrap_or_default();
+    let parts = has_parts(directory)?;
+    if parts && kept.entries.is_empty() {
+        // Once the old journal is gone nobody knows whose they are.
+        directory.sweep_results(&HashSet::new())?;
+    }
     if !kept.entries.is_empty() {
         progress.note(&format!("going on with an interrupted run: {} steps are done", kept.entries.len()));
     }
@@ -74,7 +81,14 @@ pub fn start<'a>(directory: &'a Directory, head: &Head, config: &Config, options
     directory.sweep_job(&kept.files)?;
     let path = directory.store();
     let store = if stored.is_empty() { Store::create(&path)? } else { Store::open(&path, stored.iter())? };
-    Ok(Start { store, journal, partition: kept.partition, files: kept.files })
+    Ok(Start { store, journal, partition: kept.partition, files: kept.files, parts })
+}
+
+/// Whether an interrupted run has left a part of its results. Before that, those of an earlier job have made way, report and all.
+fn has_parts(directory: &Directory) -> Result<bool> {
+    let is_export = |entry: &Entry| matches!(entry.step, Step::Export(_));
+    let exported = journal::read(directory)?.is_some_and(|(_, entries)| entries.iter().any(is_export));
+    Ok(exported && !directory.report().exists())
 }
 
 /// What stays.

@@ -64,6 +64,7 @@ impl<'a> TileWriter<'a> {
     /// # Errors
     /// [`Error::Io`] if it cannot be.
     pub(super) fn begin<'s>(&'s self, scope: &Scope<'s>, style: (Look, Canvas)) -> Result<()> {
+        self.job.parts.store(true, Ordering::Relaxed);
         self.job.directory.sweep_results(&self.job.kept)?;
         let mut state = self.state();
         // Under the lock, so that no tile is held any more after those that are taken here.
