@@ -48,12 +48,9 @@ impl<'a> Grower<'a> {
 
     fn grow_leaf(&self, scope: &Scope<'a>, node: usize, tile: usize) -> Result<LeafFigures> {
         let journal = self.job.journal;
-        let figures: LeafFigures = journal.step(Step::Leaf(tile), || self.strand.time(|| self.leaf(tile)))?;
-        let points = figures.sites + figures.duplicates;
-        self.job.count(self.stage, Step::Leaf(tile), forecast::triangulated(points));
-        if !journal.has(Step::Leaf(tile)) {
-            self.strand.advance(points);
-        }
+        let (step, points) = (Step::Leaf(tile), self.partition.points(tile));
+        let figures: LeafFigures = journal.step(step, || self.strand.time(points, || self.leaf(tile)))?;
+        self.job.count(self.stage, step, forecast::triangulated(points));
         // Any other leaf hands its hull up.
         if node == 0 || figures.sites == 0 {
             self.writer.take(scope, Settled { tile, by: node });
@@ -72,7 +69,7 @@ impl<'a> Grower<'a> {
     fn merge(&self, scope: &Scope<'a>, node: usize) -> Result<()> {
         let Job { store, journal, .. } = *self.job;
         let (tree, memory) = (&self.partition.tree, self.memory_of_merge(node));
-        let merge = || self.strand.time(|| merge::run(store, tree, node, memory, self.longest));
+        let merge = || self.strand.time(0, || merge::run(store, tree, node, memory, self.longest));
         for tile in journal.step(Step::Node(node), merge)? {
             self.writer.take(scope, Settled { tile: tile as usize, by: node });
         }

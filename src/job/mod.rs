@@ -1,7 +1,7 @@
 //! A job, from the configuration to the report: scan, partition, triangulate the leaves and merge the inner nodes, beside that
-//! stitch and export, then levels and report. Every step leaves its result in the job directory and finds there what it needs, so that each can be
-//! called on its own, the ones by tile or by node in any order that puts children before parents; and a job that was
-//! interrupted goes on from the steps that its journal has.
+//! stitch and export, then levels and report. Every step leaves its result in the job directory and finds there what it needs, so
+//! that each can be called on its own, the ones by tile or by node in any order that puts children before parents; and a job that
+//! was interrupted goes on from the steps that its journal has.
 
 mod area;
 pub mod check;

@@ -266,20 +266,16 @@ struct Work {
 }
 
 impl Strand {
-    /// Does a piece of the work, all of it on this thread.
-    pub fn time<T>(&self, piece: impl FnOnce() -> T) -> T {
+    /// Does a piece of the work, of so many units, all of it on this thread.
+    pub fn time<T>(&self, units: u64, piece: impl FnOnce() -> T) -> T {
         let (begun, cpu_start) = (Instant::now(), thread_cpu_seconds());
         let outcome = piece();
         let (ended, cpu_s) = (Instant::now(), thread_cpu_seconds() - cpu_start);
         let mut work = self.work();
         work.span = Some(work.span.map_or([begun, ended], |[first, last]| [first.min(begun), last.max(ended)]));
         work.cpu_s += cpu_s;
+        work.done += units;
         outcome
-    }
-
-    /// Counts `amount` more units as done.
-    pub fn advance(&self, amount: u64) {
-        self.work().done += amount;
     }
 
     /// What it took.

@@ -59,8 +59,8 @@ pub fn complete(directory: &Directory, head: &Head) -> Result<Option<Report>> {
     Ok(serde_json::from_slice(&text).ok())
 }
 
-/// Begins the run of the job `head`, that of `config`, in its locked directory: goes on with the one that the directory holds, as far as it is the
-/// same and whole, and removes all else.
+/// Begins the run of the job `head`, that of `config`, in its locked directory: goes on with the one that the directory holds, as
+/// far as it is the same and whole, and removes all else.
 ///
 /// # Errors
 /// [`Error::Io`] on the job directory.

@@ -126,10 +126,8 @@ impl<'a> TileWriter<'a> {
     fn stitch(&self, settled: Settled) -> Result<Vec<Settled>> {
         let Job { journal, store, .. } = *self.job;
         let (look, _) = self.style()?;
-        let run = || self.stitch.time(|| stitch::run(store, &self.partition.tree, settled, look));
-        let step = Step::Stitch(settled.tile);
-        let neighbours = journal.step(step, run)?;
-        self.stitch.advance(!journal.has(step) as u64);
+        let run = || self.stitch.time(1, || stitch::run(store, &self.partition.tree, settled, look));
+        let neighbours = journal.step(Step::Stitch(settled.tile), run)?;
         Ok(self.state().ready.stitched(settled, &neighbours))
     }
 
@@ -137,16 +135,12 @@ impl<'a> TileWriter<'a> {
         let Job { journal, directory, store, .. } = *self.job;
         let (look, canvas) = self.style()?;
         let export = || export::run(directory, store, &self.partition.tree, settled, look, canvas);
-        let step = Step::Export(settled.tile);
-        let figures = journal.step(step, || self.write.time(export))?;
+        let (step, points) = (Step::Export(settled.tile), self.partition.points(settled.tile));
+        let figures = journal.step(step, || self.write.time(points, export))?;
         let mut state = self.state();
         state.written += figures;
         state.exported += 1;
         drop(state);
-        let points = self.partition.points(settled.tile);
-        if !journal.has(step) {
-            self.write.advance(points);
-        }
         self.job.count(self.stage, step, points - forecast::triangulated(points));
         Ok(())
     }
