@@ -82,14 +82,19 @@ impl AxisMap {
     }
 
     /// The lattice integer of `raw`, and whether it was rounded; `None` outside the range of `i32`.
-    #[inline]
+    #[inline(always)]
     pub fn apply(&self, raw: i64) -> Option<(i32, bool)> {
         match self.narrow {
+            // Most maps are exact: the one case that is worth having wherever records are read.
+            Some([mul, add, 1]) if i32::try_from(raw).is_ok() => Some((i32::try_from(raw * mul + add).ok()?, false)),
+            narrow => self.round(narrow, raw),
+        }
+    }
+
+    fn round(&self, narrow: Option<[i64; 3]>, raw: i64) -> Option<(i32, bool)> {
+        match narrow {
             Some([mul, add, div]) if i32::try_from(raw).is_ok() => {
                 let numerator = raw * mul + add;
-                if div == 1 {
-                    return Some((i32::try_from(numerator).ok()?, false));
-                }
                 let (quotient, rest) = (numerator.div_euclid(div), numerator.rem_euclid(div));
                 let up = rest > div - rest || (rest == div - rest && numerator >= 0);
                 Some((i32::try_from(quotient + up as i64).ok()?, rest != 0))

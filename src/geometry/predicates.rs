@@ -4,6 +4,7 @@
 //! fits an `i64`, the in-circle determinant an `i128`.
 
 use super::Site;
+use multiversion::multiversion;
 
 /// Relative error of the floating-point in-circle determinant on exactly represented differences,
 /// (10 + 96 eps) eps in Shewchuk 1997, "Adaptive Precision Floating-Point Arithmetic", rounded up.
@@ -70,26 +71,32 @@ impl Quads {
     }
 
     /// For each of the first `count` tests whether [`in_circle`] may be true: never false where it is.
-    // On its own it becomes vector instructions; inlined where it is used, it may not.
-    #[inline(never)]
+    #[inline(always)]
     pub fn inside_or_in_doubt(&self, count: usize) -> [bool; Quads::LANES] {
-        const GROUP: usize = 16;
-        let mut doubtful = [false; Quads::LANES];
-        for first in (0..count.min(Quads::LANES)).step_by(GROUP) {
-            let [ax, ay, bx, by, cx, cy] = self.differences.each_ref().map(|d| &d[first..first + GROUP]);
-            for (i, doubtful) in doubtful[first..first + GROUP].iter_mut().enumerate() {
-                let (ax, ay, bx, by) = (ax[i] as f32, ay[i] as f32, bx[i] as f32, by[i] as f32);
-                let (cx, cy) = (cx[i] as f32, cy[i] as f32);
-                let (al, bl, cl) = (ax * ax + ay * ay, bx * bx + by * by, cx * cx + cy * cy);
-                let (bc, cb, ca, ac) = (bx * cy, cx * by, cx * ay, ax * cy);
-                let (ab, ba) = (ax * by, bx * ay);
-                let det = al * (bc - cb) + bl * (ca - ac) + cl * (ab - ba);
-                let permanent = al * (bc.abs() + cb.abs()) + bl * (ca.abs() + ac.abs()) + cl * (ab.abs() + ba.abs());
-                *doubtful = det >= -IN_CIRCLE_ERROR_SINGLE * permanent;
-            }
-        }
-        doubtful
+        inside_or_in_doubt(&self.differences, count)
     }
+}
+
+// On its own it becomes vector instructions; inlined where it is used, it may not.
+#[multiversion(targets("x86_64+avx2"), attrs(inline(never)))]
+fn inside_or_in_doubt(differences: &[[i32; Quads::LANES]; 6], count: usize) -> [bool; Quads::LANES] {
+    // As arrays of one length, so that nothing is left to check.
+    const GROUP: usize = 16;
+    let [ax, ay, bx, by, cx, cy] = differences;
+    let mut doubtful = [false; Quads::LANES];
+    for first in (0..count.min(Quads::LANES)).step_by(GROUP) {
+        for i in first..first + GROUP {
+            let (ax, ay, bx, by) = (ax[i] as f32, ay[i] as f32, bx[i] as f32, by[i] as f32);
+            let (cx, cy) = (cx[i] as f32, cy[i] as f32);
+            let (al, bl, cl) = (ax * ax + ay * ay, bx * bx + by * by, cx * cx + cy * cy);
+            let (bc, cb, ca, ac) = (bx * cy, cx * by, cx * ay, ax * cy);
+            let (ab, ba) = (ax * by, bx * ay);
+            let det = al * (bc - cb) + bl * (ca - ac) + cl * (ab - ba);
+            let permanent = al * (bc.abs() + cb.abs()) + bl * (ca.abs() + ac.abs()) + cl * (ab.abs() + ba.abs());
+            doubtful[i] = det >= -IN_CIRCLE_ERROR_SINGLE * permanent;
+        }
+    }
+    doubtful
 }
 
 /// The decision of [`in_circle`] where floating point is in doubt.

@@ -3,7 +3,9 @@
 use super::spill::{Block, Spill};
 use crate::Result;
 use crate::config::Duplicates;
+use crate::geometry::Site;
 use crate::input::Point;
+use multiversion::multiversion;
 use std::cmp::Reverse;
 
 /// Reads the points in `blocks` and keeps one of those with equal x and y; the sites in order, and how many points were
@@ -65,11 +67,7 @@ fn sort(points: &mut Vec<Point>) {
 /// For every point its y, its x and its index in one number, and the bits that the index takes: numbers sort several times
 /// faster than points. `None` where the tile is so wide or so full that 64 bits do not hold them.
 fn packed_keys(points: &[Point]) -> Option<(Vec<u64>, u32)> {
-    let first = points.first()?.position;
-    let (min, max) = points.iter().fold((first, first), |(min, max), p| {
-        let p = p.position;
-        ([min[0].min(p[0]), min[1].min(p[1])], [max[0].max(p[0]), max[1].max(p[1])])
-    });
+    let (min, max) = extent(points)?;
     let bits = |value: u64| u64::BITS - value.leading_zeros();
     let along = |p: [i32; 2], axis: usize| (p[axis] as i64 - min[axis] as i64) as u64;
     let (x_bits, index_bits) = (bits(along(max, 0)), bits(points.len() as u64));
@@ -77,6 +75,16 @@ fn packed_keys(points: &[Point]) -> Option<(Vec<u64>, u32)> {
     let key =
         |(i, p): (usize, &Point)| (along(p.position, 1) << x_bits | along(p.position, 0)) << index_bits | i as u64;
     fits.then(|| (points.iter().enumerate().map(key).collect(), index_bits))
+}
+
+/// The least and greatest x and y, if there is a point.
+#[multiversion(targets("x86_64+avx2"))]
+fn extent(points: &[Point]) -> Option<(Site, Site)> {
+    let first = points.first()?.position;
+    Some(points.iter().fold((first, first), |(min, max), p| {
+        let p = p.position;
+        ([min[0].min(p[0]), min[1].min(p[1])], [max[0].max(p[0]), max[1].max(p[1])])
+    }))
 }
 
 #[cfg(test)]

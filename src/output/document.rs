@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use bytemuck::{Pod, cast_slice};
+use multiversion::multiversion;
 use serde_json::{Value, json};
 
 use super::color::Linear;
@@ -101,47 +102,48 @@ impl<'a> Document<'a> {
         let [low, high] = part.tile.bounds().unwrap_or_default();
         let [low, high] = [[low[0], high[1], low[2]], [high[0], low[1], high[2]]];
         if self.compression == Compression::None {
-            let local = |p| self.frame.local(p, part.origin);
-            let values = picked(positions, order, local);
-            return self.add_attribute(&values, FLOAT, "VEC3", json!({"min": local(low), "max": local(high)}));
+            let (frame, origin) = (self.frame, part.origin);
+            let local = |p| frame.local(p, origin);
+            let bounds = json!({"min": local(low), "max": local(high)});
+            return self.add_attribute(positions, order, local, Kind::new(FLOAT, "VEC3", bounds));
         }
-        let steps = |p| self.frame.local_steps(p, part.origin);
+        let (frame, origin) = (self.frame, part.origin);
+        let steps = |p| frame.local_steps(p, origin);
         let bounds = json!({"min": steps(low).map(|v| v as f32), "max": steps(high).map(|v| v as f32)});
         if !part.short {
             let is_near = [low, high].map(steps).as_flattened().iter().all(|v| v.abs() < EXPONENTIAL_REACH);
             if self.compression == Compression::Meshopt && is_near {
-                let values = picked(positions, order, |p| steps(p).map(exponential));
-                let accessor = self.add_attribute(&values, FLOAT, "VEC3", bounds)?;
+                let convert = |p| steps(p).map(exponential);
+                let accessor = self.add_attribute(positions, order, convert, Kind::new(FLOAT, "VEC3", bounds))?;
                 self.set_filter("EXPONENTIAL");
                 return Ok(accessor);
             }
-            let values = picked(positions, order, |p| steps(p).map(|v| v as f32));
-            return self.add_attribute(&values, FLOAT, "VEC3", bounds);
+            let convert = |p| steps(p).map(|v| v as f32);
+            return self.add_attribute(positions, order, convert, Kind::new(FLOAT, "VEC3", bounds));
         }
-        let values = picked(positions, order, |p| {
+        let convert = |p| {
             let [x, y, z] = steps(p).map(|v| v as u16);
             [x, y, z, 0]
-        });
-        self.add_attribute(&values, UNSIGNED_SHORT, "VEC3", bounds)
+        };
+        self.add_attribute(positions, order, convert, Kind::new(UNSIGNED_SHORT, "VEC3", bounds))
     }
 
     fn add_normals(&mut self, normals: &[[f32; 3]], order: Option<&[u32]>) -> Result<usize> {
         let up = |[x, y, z]: [f32; 3]| [x, z, 0.0 - y];
         if self.compression == Compression::None {
-            return self.add_attribute(&picked(normals, order, up), FLOAT, "VEC3", json!({}));
+            return self.add_attribute(normals, order, up, Kind::new(FLOAT, "VEC3", json!({})));
         }
         let anisotropy = self.frame.anisotropy();
-        let normalized = json!({"normalized": true});
         if needs_long_normals(anisotropy) {
-            let values = picked(normals, order, |normal| normal_shorts(up(normal), anisotropy));
-            return self.add_attribute(&values, SIGNED_SHORT, "VEC3", normalized);
+            let convert = |normal| normal_shorts(up(normal), anisotropy);
+            return self.add_attribute(normals, order, convert, Kind::normalized(SIGNED_SHORT, "VEC3"));
         }
         if self.compression == Compression::Quantized {
-            let values = picked(normals, order, |normal| normal_bytes(up(normal), anisotropy));
-            return self.add_attribute(&values, SIGNED_BYTE, "VEC3", normalized);
+            let convert = |normal| normal_bytes(up(normal), anisotropy);
+            return self.add_attribute(normals, order, convert, Kind::normalized(SIGNED_BYTE, "VEC3"));
         }
-        let values = picked(normals, order, |normal| normal_octahedral(up(normal), anisotropy));
-        let accessor = self.add_attribute(&values, SIGNED_BYTE, "VEC3", normalized)?;
+        let convert = |normal| normal_octahedral(up(normal), anisotropy);
+        let accessor = self.add_attribute(normals, order, convert, Kind::normalized(SIGNED_BYTE, "VEC3"))?;
         self.set_filter("OCTAHEDRAL");
         Ok(accessor)
     }
@@ -154,29 +156,38 @@ impl<'a> Document<'a> {
     }
 
     fn add_colors(&mut self, colors: &[Linear], order: Option<&[u32]>) -> Result<usize> {
-        let normalized = json!({"normalized": true});
         if self.compression == Compression::None {
-            let values = picked(colors, order, |[r, g, b]| [r, g, b, u16::MAX]);
-            return self.add_attribute(&values, UNSIGNED_SHORT, "VEC4", normalized);
+            let convert = |[r, g, b]: Linear| [r, g, b, u16::MAX];
+            return self.add_attribute(colors, order, convert, Kind::normalized(UNSIGNED_SHORT, "VEC4"));
         }
-        self.add_attribute(&picked(colors, order, color_bytes), UNSIGNED_BYTE, "VEC4", normalized)
+        self.add_attribute(colors, order, color_bytes, Kind::normalized(UNSIGNED_BYTE, "VEC4"))
     }
 
-    /// Appends an accessor and a view of vertices; its index.
-    fn add_attribute<T: Pod>(&mut self, values: &[T], component: u64, shape: &str, more: Value) -> Result<usize> {
+    /// Appends an accessor and a view of what `convert` makes of the vertices' `values`, those with the numbers in `order` or all
+    /// of them as they are; its index.
+    fn add_attribute<T: Copy, B: Pod>(
+        &mut self,
+        values: &[T],
+        order: Option<&[u32]>,
+        convert: impl Fn(T) -> B,
+        kind: Kind,
+    ) -> Result<usize> {
         let mut view = json!({"target": ARRAY_BUFFER});
         if self.compression != Compression::None {
-            view["byteStride"] = size_of::<T>().into();
+            view["byteStride"] = size_of::<B>().into();
         }
-        match self.compression {
-            Compression::Meshopt => {
+        let of_vertex = |v: u32| convert(values[v as usize]);
+        match (self.compression, order) {
+            (Compression::Meshopt, Some(order)) => {
+                let values: Vec<B> = order.iter().map(|&v| of_vertex(v)).collect();
                 // Version 0 is the one of the extension.
-                let packed = meshopt::encode_vertex_buffer_level(values, 0, Some(0)).map_err(not_packed)?;
-                self.add_packed(view, &packed, "ATTRIBUTES", size_of::<T>(), values.len());
+                let packed = meshopt::encode_vertex_buffer_level(&values, 0, Some(0)).map_err(not_packed)?;
+                self.add_packed(view, &packed, "ATTRIBUTES", size_of::<B>(), values.len());
             }
-            _ => self.add_view(view, cast_slice(values)),
+            (_, Some(order)) => self.add_view(view, order, of_vertex),
+            (_, None) => self.add_view(view, values, convert),
         }
-        Ok(self.add_accessor(component, values.len(), shape, more))
+        Ok(self.add_accessor(values.len(), kind))
     }
 
     fn add_triangles(&mut self, triangles: &[[u32; 3]], vertices: usize) -> Result<usize> {
@@ -189,26 +200,30 @@ impl<'a> Document<'a> {
             let packed = meshopt::encode_index_buffer(corners, vertices).map_err(not_packed)?;
             self.add_packed(view, &packed, "TRIANGLES", size, corners.len());
         } else if short {
-            self.add_view(view, cast_slice(&corners.iter().map(|&v| v as u16).collect::<Vec<_>>()));
+            self.add_view(view, corners, |v| v as u16);
         } else {
-            self.add_view(view, cast_slice(corners));
+            self.add_view(view, corners, |v| v);
         }
-        Ok(self.add_accessor(component, corners.len(), "SCALAR", json!({})))
+        Ok(self.add_accessor(corners.len(), Kind::new(component, "SCALAR", json!({}))))
     }
 
-    fn add_accessor(&mut self, component: u64, count: usize, shape: &str, mut more: Value) -> usize {
-        more["bufferView"] = (self.views.len() - 1).into();
-        more["componentType"] = component.into();
-        more["count"] = count.into();
-        more["type"] = shape.into();
-        self.accessors.push(more);
+    fn add_accessor(&mut self, count: usize, kind: Kind) -> usize {
+        let mut accessor = kind.more;
+        accessor["bufferView"] = (self.views.len() - 1).into();
+        accessor["componentType"] = kind.component.into();
+        accessor["count"] = count.into();
+        accessor["type"] = kind.shape.into();
+        self.accessors.push(accessor);
         self.accessors.len() - 1
     }
 
-    fn add_view(&mut self, mut view: Value, bytes: &[u8]) {
+    /// Appends a view of what `convert` makes of `values`.
+    fn add_view<T: Copy, B: Pod>(&mut self, mut view: Value, values: &[T], convert: impl Fn(T) -> B) {
         view["buffer"] = 0.into();
-        view["byteOffset"] = self.append(bytes).into();
-        view["byteLength"] = bytes.len().into();
+        view["byteOffset"] = self.binary.len().into();
+        view["byteLength"] = (values.len() * size_of::<B>()).into();
+        append_converted(&mut self.binary, values, convert);
+        self.pad();
         self.views.push(view);
     }
 
@@ -233,8 +248,12 @@ impl<'a> Document<'a> {
     fn append(&mut self, bytes: &[u8]) -> usize {
         let start = self.binary.len();
         self.binary.extend_from_slice(bytes);
-        self.binary.resize(self.binary.len().next_multiple_of(4), 0);
+        self.pad();
         start
+    }
+
+    fn pad(&mut self) {
+        self.binary.resize(self.binary.len().next_multiple_of(4), 0);
     }
 
     pub(super) fn json(&self) -> Value {
@@ -270,11 +289,34 @@ impl<'a> Document<'a> {
     }
 }
 
-/// What `convert` makes of the values with these numbers, or of all of them as they are.
-fn picked<T: Copy, B>(values: &[T], order: Option<&[u32]>, convert: impl Fn(T) -> B) -> Vec<B> {
-    match order {
-        Some(order) => order.iter().map(|&v| convert(values[v as usize])).collect(),
-        None => values.iter().map(|&value| convert(value)).collect(),
+/// What the elements of an accessor are.
+struct Kind {
+    component: u64,
+    shape: &'static str,
+    /// What else the accessor says.
+    more: Value,
+}
+
+impl Kind {
+    fn new(component: u64, shape: &'static str, more: Value) -> Kind {
+        Kind { component, shape, more }
+    }
+
+    fn normalized(component: u64, shape: &'static str) -> Kind {
+        Kind::new(component, shape, json!({"normalized": true}))
+    }
+}
+
+/// Appends what `convert` makes of `values`, by pieces that never leave the cache.
+#[multiversion(targets("x86_64+avx2"))]
+fn append_converted<T: Copy, B: Pod>(bytes: &mut Vec<u8>, values: &[T], convert: impl Fn(T) -> B) {
+    let mut piece = [B::zeroed(); 256];
+    bytes.reserve(size_of::<B>() * values.len());
+    for values in values.chunks(piece.len()) {
+        for (converted, &value) in piece.iter_mut().zip(values) {
+            *converted = convert(value);
+        }
+        bytes.extend_from_slice(cast_slice(&piece[..values.len()]));
     }
 }
 

@@ -3,6 +3,7 @@
 
 use super::frame::Frame;
 use super::tile::bounds;
+use multiversion::multiversion;
 
 /// The sum over the triangles around a vertex of their normals, each twice as long as the triangle's area, in lattice steps
 /// (x, y, z). Sums of one vertex from several tiles are added.
@@ -45,7 +46,7 @@ impl Sums {
     pub fn finish(&self, frame: &Frame) -> Vec<[f32; 3]> {
         let weights = weights(frame);
         match self {
-            Sums::Narrow(sums) => sums.iter().map(|s| unit(s.map(|v| v as f64), weights)).collect(),
+            Sums::Narrow(sums) => units(sums, weights),
             Sums::Wide(sums) => sums.iter().map(|s| unit(s.map(|v| v as f64), weights)).collect(),
         }
     }
@@ -110,6 +111,12 @@ fn weights(frame: &Frame) -> [f64; 2] {
     [vertical, horizontal]
 }
 
+#[multiversion(targets("x86_64+avx2"))]
+fn units(sums: &[[i64; 3]], weights: [f64; 2]) -> Vec<[f32; 3]> {
+    sums.iter().map(|s| unit(s.map(|v| v as f64), weights)).collect()
+}
+
+#[inline(always)]
 fn unit(sum: [f64; 3], weights: [f64; 2]) -> [f32; 3] {
     let [x, y, z] = [sum[0] * weights[0], sum[1] * weights[0], sum[2] * weights[1]];
     let length = (x * x + y * y + z * z).sqrt();

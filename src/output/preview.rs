@@ -31,6 +31,9 @@ pub struct Canvas {
     shift: u32,
     /// Side of a pixel in subdivisions, even.
     pitch: i64,
+    /// 2^64 by `pitch`, rounded up: a product by it, cut off there, is the whole quotient of any number of subdivisions, as they
+    /// and the pitch have 56 bits at the most together.
+    inverse: u64,
     /// Subdivisions from a pixel's edge to its centre, odd.
     center: i64,
 }
@@ -68,6 +71,7 @@ impl Canvas {
             height,
             shift,
             pitch,
+            inverse: (1u128 << 64).div_ceil(pitch as u128) as u64,
             center: (pitch / 2) | 1,
         }
     }
@@ -79,8 +83,7 @@ impl Canvas {
 
     /// The pixels whose centres the triangles of `tile` cover.
     pub fn draw(&self, tile: &Tile) -> Fragment {
-        let pixels = 1.0 / self.pitch as f64;
-        let cells: Vec<u32> = tile.positions.iter().map(|&p| self.cell(p, pixels)).collect();
+        let cells: Vec<u32> = tile.positions.iter().map(|&p| self.cell(p)).collect();
         let mut fragment = Fragment::new();
         for &triangle in &tile.triangles {
             let corners = triangle.map(|v| cells[v as usize]);
@@ -102,14 +105,11 @@ impl Canvas {
         [(point[0] as i64 - self.corner[0]) << self.shift, (self.corner[1] - point[1] as i64) << self.shift]
     }
 
-    /// How many pixel centres lie left of a point (low half), and above it (high half). `pixels` is 1 by the pitch.
-    fn cell(&self, point: [i32; 3], pixels: f64) -> u32 {
+    /// How many pixel centres lie left of a point (low half), and above it (high half).
+    fn cell(&self, point: [i32; 3]) -> u32 {
         let centers = |v: i64| {
-            let beyond = v + self.pitch - 1 - self.center;
-            // A division, by a product that is off by one at the most.
-            let near = (beyond as f64 * pixels) as i64;
-            let rest = beyond - near * self.pitch;
-            (near - (rest < 0) as i64 + (rest >= self.pitch) as i64) as u32
+            let beyond = (v + self.pitch - 1 - self.center) as u64;
+            ((beyond as u128 * self.inverse as u128) >> 64) as u32
         };
         let [column, row] = self.place(point).map(centers);
         row << 16 | column

@@ -1,5 +1,7 @@
 //! The content of one tile, in lattice steps and source axes.
 
+use multiversion::multiversion;
+
 /// A piece of the terrain: vertices on the job's lattice and the triangles between them. Every vertex is the corner of
 /// at least one triangle.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -39,6 +41,7 @@ impl Tile {
 }
 
 /// The least and greatest of `positions` on every axis; `None` if there are none.
+#[multiversion(targets("x86_64+avx2"))]
 pub(super) fn bounds(positions: &[[i32; 3]]) -> Option<[[i32; 3]; 2]> {
     let first = *positions.first()?;
     Some(positions.iter().fold([first, first], |[low, high], p| {
