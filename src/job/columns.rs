@@ -82,12 +82,12 @@ impl ColumnReader<'_> {
             return Err(self.broken());
         }
         let mut values = vec![T::zeroed(); count];
-        self.store.read(self.at, bytemuck::cast_slice_mut(&mut values))?;
+        self.store.read(self.key, self.at, bytemuck::cast_slice_mut(&mut values))?;
         self.at += bytes;
         Ok(values)
     }
 
     fn broken(&self) -> Error {
-        Error::Broken(format!("{:?} in {} ends too early", self.key, self.store.path().display()))
+        Error::Broken(format!("{:?} in {} ends too early", self.key, self.store.path(self.key).display()))
     }
 }

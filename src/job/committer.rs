@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 /// little is left to wait for.
 const INTERVAL: Duration = Duration::from_millis(40);
 /// Where commits take long they are so many times as far apart, at most [`LONGEST_REST`]: a slow disk is there for the job first.
-const REST: u32 = 3;
+const REST: u32 = 1;
 const LONGEST_REST: Duration = Duration::from_secs(1);
 /// From then on a job waits for the disk before it gives up what it could be repeated from.
 const WORTH_SYNCING: Duration = Duration::from_secs(60);
@@ -91,19 +91,26 @@ impl Committer {
         let mut state = self.shared.state();
         state.batch.append(record);
         state.added += 1;
+        let due = state.added;
         if let Some(error) = state.failure.take() {
             return Err(error);
         }
         drop(state);
-        if self.interval.is_zero() { self.commit() } else { Ok(()) }
+        if self.interval.is_zero() { self.commit(due) } else { Ok(()) }
     }
 
-    /// Waits until all that was added is committed.
-    pub(super) fn commit(&self) -> Result<()> {
+    /// How many records have been added.
+    pub(super) fn added(&self) -> u64 {
+        self.shared.state().added
+    }
+
+    /// Waits until the first `due` records are committed.
+    pub(super) fn commit(&self, due: u64) -> Result<()> {
         let mut state = self.shared.state();
-        let due = state.added;
-        state.wanted = true;
-        self.shared.wanted.notify_one();
+        if state.committed < due {
+            state.wanted = true;
+            self.shared.wanted.notify_one();
+        }
         while state.committed < due && !state.failed {
             state = self.shared.committed.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
@@ -192,7 +199,7 @@ mod tests {
         assert_eq!(told.exit_code(), 1, "{told}");
         // The thread goes on waking up meanwhile.
         for _ in 0..100 {
-            assert!(committer.commit().is_err());
+            assert!(committer.commit(committer.added()).is_err());
             std::thread::sleep(Duration::from_millis(1));
         }
     }

@@ -1,6 +1,8 @@
 //! The job directory: everything a job knows, on disk, and where the results go. Any step can be run again from it.
 
+use super::store::Store;
 use crate::{Error, Result, fault};
+use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::{BTreeSet, HashSet};
@@ -52,7 +54,8 @@ impl Directory {
     /// # Errors
     /// [`Error::Io`] if a file cannot be removed.
     pub fn sweep_job(&self, keep: &HashSet<PathBuf>) -> Result<()> {
-        self.remove_all(&[self.spill(), self.store()], keep)
+        self.remove_all(&self.store(), keep)?;
+        self.remove_all(&[self.spill()], keep)
     }
 
     /// Makes the folder of the tiles, and removes the results of an earlier run, whole or not, but for the files of `keep`.
@@ -159,10 +162,9 @@ impl Directory {
     /// # Errors
     /// [`Error::Io`] if that fails.
     pub fn clean_up(&self) -> Result<()> {
-        for file in [self.spill(), self.store(), self.journal()] {
-            remove_file(&file)?;
-            fault::point("cleaning");
-        }
+        // Side by side: what large files have in memory takes a while to be freed.
+        self.store().into_par_iter().chain([self.spill()]).try_for_each(|file| clean(&file))?;
+        clean(&self.journal())?;
         // With the lock, which marks the directory as a job's own, last: a kill in between leaves what the next job may take.
         remove_directory(&self.job)
     }
@@ -177,9 +179,9 @@ impl Directory {
         self.job.join("points.spill")
     }
 
-    /// The results of the steps.
-    pub fn store(&self) -> PathBuf {
-        self.job.join("steps.store")
+    /// The files with the results of the steps.
+    pub fn store(&self) -> [PathBuf; Store::PARTS] {
+        std::array::from_fn(|part| self.job.join(format!("steps.{part}.store")))
     }
 
     /// The directory of the tiles.
@@ -436,6 +438,12 @@ fn remove_directory(path: &Path) -> Result<()> {
         Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io("remove", path)(e)),
         _ => Ok(()),
     }
+}
+
+fn clean(file: &Path) -> Result<()> {
+    remove_file(file)?;
+    fault::point("cleaning");
+    Ok(())
 }
 
 /// Removes the file at `path` if there is one.

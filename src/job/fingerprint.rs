@@ -24,7 +24,7 @@ pub struct Head {
 
 /// Of what steps leave for later steps, and of which nodes merge: raised with every change, so that no run goes on from what means
 /// something else to it.
-pub(super) const LAYOUT: u32 = 3;
+pub(super) const LAYOUT: u32 = 4;
 
 /// What the results of a job depend on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -134,6 +134,10 @@ pub fn read(directory: &Directory) -> Result<Option<(Head, Vec<Entry>)>> {
     Ok(head.map(|head| (head, lines.map_while(parse).collect())))
 }
 
+/// A place in the journal of a run: after so many records. The default is its start.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Mark(u64);
+
 /// The journal of a run. Its methods may be called from any thread.
 pub struct Journal<'a> {
     directory: &'a Directory,
@@ -200,7 +204,20 @@ impl<'a> Journal<'a> {
     /// # Errors
     /// [`Error::Io`] if that fails.
     pub fn commit(&self) -> Result<()> {
-        self.committer.commit()
+        self.committer.commit(self.committer.added())
+    }
+
+    /// Where the journal is now.
+    pub fn mark(&self) -> Mark {
+        Mark(self.committer.added())
+    }
+
+    /// Waits until all before `mark` is on the disk.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if that fails.
+    pub fn commit_to(&self, mark: Mark) -> Result<()> {
+        self.committer.commit(mark.0)
     }
 
     /// Whether the job has run for so long that it should not depend on what the system has not brought to the disk yet.

@@ -52,7 +52,7 @@ use cut::Cut;
 use directory::Directory;
 use export::{Look, TileFigures};
 use fingerprint::{Fingerprint, Head};
-use journal::{Done, Journal, Step};
+use journal::{Done, Journal, Mark, Step};
 use levels::LevelFigures;
 use partition::{Partition, Summary, Task};
 use placement::Placement;
@@ -151,7 +151,7 @@ fn attempt(
     let _lock = directory.lock()?;
     if let Some(report) = resume::complete(&directory, head)?.filter(|_| !options.fresh) {
         progress.note("the interrupted run had written all its results");
-        directory.clean_up()?;
+        on_threads(threads, || directory.clean_up())?;
         return Ok(report);
     }
     on_threads(threads, || {
@@ -174,6 +174,8 @@ fn attempt(
         let parts = job.parts.load(Ordering::Relaxed);
         // What is finished is on the disk before the message says so, if it gets there.
         drop(journal);
+        // An open file cannot be freed by whoever removes it.
+        drop(store);
         let steps = if outcome.is_err() { steps_kept(&directory) } else { 0 };
         match outcome {
             Err(why) if why.exit_code() == 1 && steps > 0 => {
@@ -250,7 +252,8 @@ impl Job<'_> {
         let mesh = self.weave(plan, &partition, bounds, longest)?;
         enough_triangles(&mesh.tiles.figures, plan)?;
         // What is in the store is enough now.
-        beside(|| self.give_up_points(), || self.publish(plan, &partition, bounds, mesh, [scanned, read]))
+        let grown = mesh.grown;
+        beside(|| self.give_up_points(grown), || self.publish(plan, &partition, bounds, mesh, [scanned, read]))
     }
 
     /// Steps 7 and 8.
@@ -263,8 +266,9 @@ impl Job<'_> {
         before: [StageFigures; 2],
     ) -> Result<Report> {
         let Job { config, triangulator, directory, store, journal, progress, .. } = *self;
-        let Mesh { leaves, tiles: WrittenTiles { style: (look, canvas), figures: written, stages }, triangulated } =
-            mesh;
+        let Mesh {
+            leaves, tiles: WrittenTiles { style: (look, canvas), figures: written, stages }, triangulated, ..
+        } = mesh;
         let tiles = partition.tree.leaves.len();
 
         let one_file = fits_one_file(&written);
@@ -390,9 +394,9 @@ impl Job<'_> {
         Ok((plan, partition, stage.finish()))
     }
 
-    /// Removes the points: once all leaves are in the journal, what is in the store is enough.
-    fn give_up_points(&self) -> Result<()> {
-        self.journal.commit()?;
+    /// Removes the points: once all leaves are in the journal, which they are at `grown`, what is in the store is enough.
+    fn give_up_points(&self, grown: Mark) -> Result<()> {
+        self.journal.commit_to(grown)?;
         if self.journal.is_worth_syncing() {
             self.store.sync()?;
         }

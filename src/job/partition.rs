@@ -71,7 +71,7 @@ impl Partition {
     pub fn load(store: &Store) -> Result<Partition> {
         let mut columns = ColumnReader::open(store, Key::Partition)?;
         let (rest, counts): (Vec<u8>, Vec<u64>) = (columns.column()?, columns.column()?);
-        let broken = |e: serde_json::Error| Error::Broken(format!("{}: {e}", store.path().display()));
+        let broken = |e: serde_json::Error| Error::Broken(format!("{}: {e}", store.path(Key::Partition).display()));
         let (tree, summary, spilled, skipped) = serde_json::from_slice(&rest).map_err(broken)?;
         let mut blocks = columns.column::<Block>()?.into_iter();
         let blocks = counts.iter().map(|&count| blocks.by_ref().take(count as usize).collect()).collect();

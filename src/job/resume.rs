@@ -79,8 +79,8 @@ pub fn start<'a>(directory: &'a Directory, head: &Head, config: &Config, options
     let stored: Vec<Stored> = kept.entries.iter().flat_map(|entry| &entry.stored).copied().collect();
     let journal = Journal::begin(directory, head, kept.entries)?;
     directory.sweep_job(&kept.files)?;
-    let path = directory.store();
-    let store = if stored.is_empty() { Store::create(&path)? } else { Store::open(&path, stored.iter())? };
+    let paths = directory.store();
+    let store = if stored.is_empty() { Store::create(paths)? } else { Store::open(paths, stored.iter())? };
     Ok(Start { store, journal, partition: kept.partition, files: kept.files, parts })
 }
 
@@ -147,7 +147,7 @@ impl Review {
     /// `None` if its points are not there any more, though they are needed.
     fn of(directory: &Directory, entries: Vec<Entry>, counted_again: bool, stage: &Stage) -> Result<Option<Review>> {
         let stored = entries.iter().flat_map(|entry| &entry.stored);
-        let Ok(store) = Store::open(&directory.store(), stored) else { return Ok(None) };
+        let Ok(store) = Store::open(directory.store(), stored) else { return Ok(None) };
         let is_whole = |entry: &Entry| {
             entry.stored.iter().all(|stored| store.is_whole(stored))
                 && entry.results.iter().all(|file| file.is_whole(directory))
@@ -225,7 +225,7 @@ impl Review {
         }
         let mut kept: Vec<Entry> = self.entries.into_values().filter(|entry| stays.contains(&entry.step)).collect();
         files.extend(kept.iter().flat_map(|entry| &entry.results).map(|file| file.name.clone()));
-        files.insert(self.directory.name(&self.directory.store()));
+        files.extend(self.directory.store().iter().map(|path| self.directory.name(path)));
         // The journal does not depend on the order of a hash map.
         kept.sort_by_key(|entry| entry.step);
         Kept { entries: kept, files, partition: Some(self.partition) }

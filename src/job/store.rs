@@ -1,7 +1,8 @@
-//! What the steps leave for each other: one file that only grows, a record a result. A file a result would cost more than
-//! the results: making and removing thousands of small files takes a good part of a job's time on common file systems.
+//! What the steps leave for each other: a few files that only grow, a record a result. A file a result would cost more than
+//! the results: making and removing thousands of small files takes a good part of a job's time on common file systems. With one
+//! file for all, threads would wait for each other where they write, and one would remove it at the end while the others idle.
 //!
-//! The journal knows where each record is and the hash of its bytes, so that a store whose writer was killed can be opened
+//! The journal knows where in its file each record is and the hash of its bytes, so that a store whose writer was killed can be opened
 //! again, whatever the kill left after them.
 
 use crate::positioned::{read_exact_at, write_all_at};
@@ -52,13 +53,18 @@ impl Key {
             Key::Tile(i) => [9, i as u32],
         }
     }
+
+    /// The number of the file that has its record.
+    fn part(self) -> usize {
+        self.code()[1] as usize % Store::PARTS
+    }
 }
 
 fn seed(code: [u32; 2]) -> u64 {
     (code[0] as u64) << 32 | code[1] as u64
 }
 
-/// Where a record's bytes are.
+/// Where in the key's file a record's bytes are.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     pub(super) at: u64,
@@ -70,7 +76,7 @@ pub(super) struct Place {
 pub struct Stored {
     /// What it holds.
     key: Key,
-    /// Where its bytes begin in the file, and how many they are.
+    /// Where its bytes begin in the key's file, and how many they are.
     at: u64,
     length: u64,
     hash: u64,
@@ -97,41 +103,58 @@ impl Write for WriteFrom<'_> {
 /// The results of all steps of a job, on disk; threads may write and read at once.
 #[derive(Debug)]
 pub struct Store {
-    path: PathBuf,
-    pub(super) file: File,
-    end: AtomicU64,
+    parts: Vec<Part>,
     places: RwLock<HashMap<Key, Place>>,
 }
 
+/// One of the files.
+#[derive(Debug)]
+struct Part {
+    path: PathBuf,
+    file: File,
+    end: AtomicU64,
+}
+
 impl Store {
-    /// An empty store at `path`.
+    /// Into how many files records are dealt out.
+    pub const PARTS: usize = 8;
+
+    /// An empty store in files at `paths`.
     ///
     /// # Errors
-    /// [`Error::Io`] if it cannot be made.
-    pub fn create(path: &Path) -> Result<Store> {
-        let file = File::options().read(true).write(true).create(true).truncate(true).open(path);
-        let file = file.map_err(Error::io("create", path))?;
-        Ok(Store { path: path.to_path_buf(), file, end: AtomicU64::new(0), places: RwLock::default() })
+    /// [`Error::Io`] if they cannot be made.
+    pub fn create(paths: [PathBuf; Store::PARTS]) -> Result<Store> {
+        let part = |path: PathBuf| {
+            let file = File::options().read(true).write(true).create(true).truncate(true).open(&path);
+            Ok(Part { file: file.map_err(Error::io("create", &path))?, path, end: AtomicU64::new(0) })
+        };
+        let parts = paths.into_iter().map(part).collect::<Result<_>>()?;
+        Ok(Store { parts, places: RwLock::default() })
     }
 
-    /// The store at `path` with the records of `stored`; all else in it is written over.
+    /// The store in the files at `paths` with the records of `stored`; all else in it is written over.
     ///
     /// # Errors
-    /// [`Error::Io`] if it cannot be opened.
-    pub fn open<'a>(path: &Path, stored: impl Iterator<Item = &'a Stored>) -> Result<Store> {
-        let file = File::options().read(true).write(true).open(path).map_err(Error::io("open", path))?;
-        let (mut end, mut places) = (0, HashMap::new());
+    /// [`Error::Io`] if one cannot be opened.
+    pub fn open<'a>(paths: [PathBuf; Store::PARTS], stored: impl Iterator<Item = &'a Stored>) -> Result<Store> {
+        let (mut ends, mut places) = ([0; Store::PARTS], HashMap::new());
         for &Stored { key, at, length, .. } in stored {
             places.insert(key, Place { at, length });
-            end = end.max(at + length);
+            let end = &mut ends[key.part()];
+            *end = (at + length).max(*end);
         }
-        Ok(Store { path: path.to_path_buf(), file, end: AtomicU64::new(end), places: RwLock::new(places) })
+        let part = |(path, end): (PathBuf, u64)| {
+            let file = File::options().read(true).write(true).open(&path).map_err(Error::io("open", &path))?;
+            Ok(Part { path, file, end: AtomicU64::new(end) })
+        };
+        let parts = paths.into_iter().zip(ends).map(part).collect::<Result<_>>()?;
+        Ok(Store { parts, places: RwLock::new(places) })
     }
 
     /// Whether the record of `stored` is there and holds what was written to it.
     pub fn is_whole(&self, stored: &Stored) -> bool {
         let place = Place { at: stored.at, length: stored.length };
-        self.hash(place, seed(stored.key.code())).is_ok_and(|hash| hash == stored.hash)
+        self.hash(stored.key, place).is_ok_and(|hash| hash == stored.hash)
     }
 
     /// Waits until all records are on the disk.
@@ -139,16 +162,20 @@ impl Store {
     /// # Errors
     /// [`Error::Io`] if they do not get there.
     pub fn sync(&self) -> Result<()> {
-        self.file.sync_data().map_err(Error::io("write", &self.path))
+        self.parts.iter().try_for_each(|part| part.file.sync_data().map_err(Error::io("write", &part.path)))
     }
 
-    fn hash(&self, place: Place, seed: u64) -> Result<u64> {
-        let mut hasher = Xxh3::with_seed(seed);
+    fn part(&self, key: Key) -> &Part {
+        &self.parts[key.part()]
+    }
+
+    fn hash(&self, key: Key, place: Place) -> Result<u64> {
+        let mut hasher = Xxh3::with_seed(seed(key.code()));
         let mut buffer = vec![0; place.length.min(1 << 20) as usize];
         let mut done = 0;
         while done < place.length {
             let part = &mut buffer[..(place.length - done).min(1 << 20) as usize];
-            self.read(place.at + done, part)?;
+            self.read(key, place.at + done, part)?;
             hasher.update(part);
             done += part.len() as u64;
         }
@@ -158,16 +185,17 @@ impl Store {
     /// Writes a record, given in pieces. It takes the place of an earlier one of the same key.
     pub(super) fn put(&self, key: Key, pieces: &[&[u8]]) -> Result<Stored> {
         let length = pieces.iter().map(|piece| piece.len() as u64).sum();
-        let at = self.end.fetch_add(length, Ordering::Relaxed);
+        let part = self.part(key);
+        let at = part.end.fetch_add(length, Ordering::Relaxed);
         let mut hasher = Xxh3::with_seed(seed(key.code()));
         // Small pieces are joined, large ones written as they are.
-        let mut writer = BufWriter::new(WriteFrom { file: &self.file, at });
+        let mut writer = BufWriter::new(WriteFrom { file: &part.file, at });
         let mut write = |piece: &&[u8]| {
             hasher.update(piece);
             writer.write_all(piece)
         };
         let written = pieces.iter().try_for_each(&mut write).and_then(|()| writer.flush());
-        written.map_err(Error::io("write", &self.path))?;
+        written.map_err(Error::io("write", &part.path))?;
         let mut places = self.places.write().unwrap_or_else(PoisonError::into_inner);
         places.insert(key, Place { at, length });
         Ok(Stored { key, at, length, hash: hasher.digest() })
@@ -181,22 +209,23 @@ impl Store {
     /// Where the record of `key` is.
     pub(super) fn place(&self, key: Key) -> Result<Place> {
         let places = self.places.read().unwrap_or_else(PoisonError::into_inner);
-        places.get(&key).copied().ok_or_else(|| Error::Broken(format!("{} has no {key:?}", self.path.display())))
+        places.get(&key).copied().ok_or_else(|| Error::Broken(format!("{} has no {key:?}", self.path(key).display())))
     }
 
-    /// Fills `buffer` from byte `at` of the file on.
-    pub(super) fn read(&self, at: u64, buffer: &mut [u8]) -> Result<()> {
-        read_exact_at(&self.file, buffer, at).map_err(Error::io("read", &self.path))
+    /// Fills `buffer` from byte `at` of the file of `key` on.
+    pub(super) fn read(&self, key: Key, at: u64, buffer: &mut [u8]) -> Result<()> {
+        let part = self.part(key);
+        read_exact_at(&part.file, buffer, at).map_err(Error::io("read", &part.path))
     }
 
     /// The bytes of all records.
     pub fn bytes(&self) -> u64 {
-        self.end.load(Ordering::Relaxed)
+        self.parts.iter().map(|part| part.end.load(Ordering::Relaxed)).sum()
     }
 
-    /// The file.
-    pub fn path(&self) -> &Path {
-        &self.path
+    /// The file where the record of `key` is, or would be.
+    pub fn path(&self, key: Key) -> &Path {
+        &self.part(key).path
     }
 }
 
@@ -213,19 +242,36 @@ mod tests {
         ColumnReader::open(store, key)?.column()
     }
 
+    fn paths(folder: &Path) -> [PathBuf; Store::PARTS] {
+        std::array::from_fn(|part| folder.join(part.to_string()))
+    }
+
+    #[test]
+    fn records_are_dealt_out_to_all_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::create(paths(folder.path())).unwrap();
+        (0..Store::PARTS).for_each(|tile| _ = put(&store, Key::Leaf(tile), &[1]));
+        let lengths = paths(folder.path()).map(|path| path.metadata().unwrap().len());
+        assert_eq!(lengths, [12; Store::PARTS]);
+        assert_eq!(store.bytes(), 12 * Store::PARTS as u64);
+    }
+
     #[test]
     fn a_record_that_is_cut_or_changed_is_not_whole() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("steps");
-        let store = Store::create(&path).unwrap();
-        let stored: Vec<Stored> = (0..4).map(|tile| put(&store, Key::Leaf(tile), &vec![7; 5 * tile])).collect();
-        let whole = std::fs::read(&path).unwrap();
+        let paths = paths(folder.path());
+        let store = Store::create(paths.clone()).unwrap();
+        // One after the other in one file.
+        let key = |i: usize| Key::Leaf(3 + i * Store::PARTS);
+        let stored: Vec<Stored> = (0..4).map(|i| put(&store, key(i), &vec![7; 5 * i])).collect();
+        let path = &paths[3];
+        let whole = std::fs::read(path).unwrap();
         for (at, _) in whole.iter().enumerate() {
             let mut changed = whole.clone();
             changed[at] ^= 0x40;
             for (content, cut) in [(&whole[..at], true), (&changed, false)] {
-                std::fs::write(&path, content).unwrap();
-                let store = Store::open(&path, stored.iter()).unwrap();
+                std::fs::write(path, content).unwrap();
+                let store = Store::open(paths.clone(), stored.iter()).unwrap();
                 for record in &stored {
                     let end = record.at + record.length;
                     let is_hit = if cut { end > at as u64 } else { (record.at..end).contains(&(at as u64)) };
@@ -238,14 +284,14 @@ mod tests {
     #[test]
     fn an_opened_store_has_what_it_is_told_and_goes_on_after_it() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("steps");
-        let store = Store::create(&path).unwrap();
+        let paths = paths(folder.path());
+        let store = Store::create(paths.clone()).unwrap();
         let kept = put(&store, Key::Rim(0), &[1, 2, 3]);
         put(&store, Key::Rim(1), &[4, 5, 6]);
-        let store = Store::open(&path, [kept].iter()).unwrap();
+        let store = Store::open(paths.clone(), [kept].iter()).unwrap();
         assert!(store.has(Key::Rim(0)) && !store.has(Key::Rim(1)));
         let added = put(&store, Key::Seam(7), &[8]);
-        let store = Store::open(&path, [kept, added].iter()).unwrap();
+        let store = Store::open(paths.clone(), [kept, added].iter()).unwrap();
         assert_eq!((get(&store, Key::Rim(0)).unwrap(), get(&store, Key::Seam(7)).unwrap()), (vec![1, 2, 3], vec![8]));
         let other = Stored { key: Key::Rim(1), ..kept };
         assert!(store.is_whole(&kept) && !store.is_whole(&other), "the hash is that of the key as well");
@@ -254,11 +300,11 @@ mod tests {
     #[test]
     fn a_later_record_takes_the_place_of_an_earlier_one() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("steps");
-        let store = Store::create(&path).unwrap();
+        let paths = paths(folder.path());
+        let store = Store::create(paths.clone()).unwrap();
         let stored = [put(&store, Key::Frontier(3), &[1]), put(&store, Key::Frontier(3), &[2, 3])];
         assert_eq!(get(&store, Key::Frontier(3)).unwrap(), [2, 3]);
-        assert_eq!(get(&Store::open(&path, stored.iter()).unwrap(), Key::Frontier(3)).unwrap(), [2, 3]);
+        assert_eq!(get(&Store::open(paths.clone(), stored.iter()).unwrap(), Key::Frontier(3)).unwrap(), [2, 3]);
         assert!(get(&store, Key::Frontier(4)).unwrap_err().to_string().contains("Frontier(4)"));
     }
 }

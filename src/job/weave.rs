@@ -4,7 +4,7 @@
 use super::Job;
 use super::cut::Cut;
 use super::grow::Grower;
-use super::journal::Step;
+use super::journal::{Mark, Step};
 use super::leaf::LeafFigures;
 use super::partition::Partition;
 use super::progress::StageFigures;
@@ -22,6 +22,8 @@ pub(super) struct Mesh {
     pub(super) leaves: LeafFigures,
     pub(super) tiles: WrittenTiles,
     pub(super) triangulated: StageFigures,
+    /// Where the journal has all leaves and merges.
+    pub(super) grown: Mark,
 }
 
 impl Job<'_> {
@@ -58,18 +60,21 @@ impl Job<'_> {
                 writer.attempt(|| writer.begin(scope, style(0)?))?;
             }
             let leaves = grower.grow(scope, 0)?;
+            let grown = self.journal.mark();
+            // With it the points are closed: an open file is not freed when it is removed.
+            drop(grower);
             if !at_once {
                 // Not beside the writing: where the disk is small, the results need the room.
-                let style = || beside(|| self.give_up_points(), || style(leaves.sites));
+                let style = || beside(|| self.give_up_points(grown), || style(leaves.sites));
                 writer.attempt(|| writer.begin(scope, style()?))?;
             }
-            Some(leaves)
+            Some((leaves, grown))
         });
         let tiles = writer.finish()?;
-        let leaves = leaves.unwrap_or_default();
+        let (leaves, grown) = leaves.unwrap_or_default();
         let triangulated = strand.finish();
         stage.finish();
-        Ok(Mesh { leaves, tiles, triangulated })
+        Ok(Mesh { leaves, tiles, triangulated, grown })
     }
 
     /// The points, as long as there is a leaf to be done.

@@ -41,7 +41,7 @@ fn run_steps(job: &Job, config: &Config) -> (Store, Partition) {
         on_bad_file: OnBadFile::Stop,
     };
     let partition = partition::run(&task, &directory, &Progress::Quiet.stage("read", 0, "points")).unwrap();
-    let store = Store::create(&directory.store()).unwrap();
+    let store = Store::create(directory.store()).unwrap();
     let spill = Spill::open(&directory.spill()).unwrap();
     let longest = Longest::of(&plan.frame);
     let cpu = Triangulation { backend: Backend::Cpu, ..Triangulation::default() };

@@ -139,15 +139,15 @@ fn what_is_damaged_is_made_again() {
         for places in [&[0.1][..], &[0.5, 0.9], &[0.999]] {
             rig.forget();
             assert!(rig.run_to("committed", count).was_killed());
-            let store = rig.out().join("job/steps.store");
-            damage(&store, places);
+            rig.stores().iter().for_each(|store| damage(store, places));
             rig.completes(&format!("damage at {places:?} after {count} commits"));
         }
         rig.forget();
         assert!(rig.run_to("committed", count).was_killed());
-        let store = rig.out().join("job/steps.store");
-        let half = fs::metadata(&store).unwrap().len() / 2;
-        fs::File::options().write(true).open(&store).unwrap().set_len(half).unwrap();
+        for store in rig.stores() {
+            let half = fs::metadata(&store).unwrap().len() / 2;
+            fs::File::options().write(true).open(&store).unwrap().set_len(half).unwrap();
+        }
         rig.completes(&format!("half a store after {count} commits"));
     }
 }
@@ -234,18 +234,18 @@ fn leaves_that_are_counted_again_must_be_whole() {
     let entries = journal.lines().skip(1).map(|line| line.split_once(' ').unwrap().1);
     let entries: Vec<Value> = entries.map(|text| serde_json::from_str(text).unwrap()).collect();
     let exported = |tile: &Value| entries.iter().any(|entry| entry["step"]["Export"] == *tile);
-    let store = rig.out().join("job/steps.store");
-    let mut bytes = fs::read(&store).unwrap();
+    let stores = rig.stores();
+    let mut bytes = stores.each_ref().map(|store| fs::read(store).unwrap());
     let mut lost = 0;
     for stored in entries.iter().flat_map(|entry| entry["stored"].as_array().unwrap()) {
         let leaf = &stored["key"]["Leaf"];
         if leaf.is_u64() && exported(leaf) {
             let [at, length] = ["at", "length"].map(|name| stored[name].as_u64().unwrap() as usize);
-            bytes[at..at + length].fill(0);
+            bytes[leaf.as_u64().unwrap() as usize % stores.len()][at..at + length].fill(0);
             lost += 1;
         }
     }
     assert!(lost >= 3 && !rig.out().join("tileset.json").exists());
-    fs::write(&store, bytes).unwrap();
+    stores.iter().zip(bytes).for_each(|(store, bytes)| fs::write(store, bytes).unwrap());
     rig.completes("leaves of zeroes");
 }

@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
+use gdt_batch::job::directory::Directory;
+use gdt_batch::job::store::Store;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -232,6 +234,11 @@ impl Rig {
     pub(crate) fn steps(&self) -> usize {
         let journal = fs::read(self.out().join("job/journal")).unwrap_or_default();
         journal.iter().filter(|&&byte| byte == b'\n').count().saturating_sub(1)
+    }
+
+    /// The files with the results of the steps.
+    pub(crate) fn stores(&self) -> [PathBuf; Store::PARTS] {
+        Directory::new(&self.out()).store()
     }
 
     pub(crate) fn forget(&self) {
