@@ -87,12 +87,12 @@ impl AxisMap {
         match self.narrow {
             // Most maps are exact: the one case that is worth having wherever records are read.
             Some([mul, add, 1]) if i32::try_from(raw).is_ok() => Some((i32::try_from(raw * mul + add).ok()?, false)),
-            narrow => self.round(narrow, raw),
+            _ => self.round(raw),
         }
     }
 
-    fn round(&self, narrow: Option<[i64; 3]>, raw: i64) -> Option<(i32, bool)> {
-        match narrow {
+    fn round(&self, raw: i64) -> Option<(i32, bool)> {
+        match self.narrow {
             Some([mul, add, div]) if i32::try_from(raw).is_ok() => {
                 let numerator = raw * mul + add;
                 let (quotient, rest) = (numerator.div_euclid(div), numerator.rem_euclid(div));

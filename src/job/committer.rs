@@ -13,8 +13,7 @@ use std::time::{Duration, Instant};
 /// Between two commits: what a kill costs at the most, beside the steps that are under way. Short, so that at the end of a stage
 /// little is left to wait for.
 const INTERVAL: Duration = Duration::from_millis(40);
-/// Where commits take long they are so many times as far apart, at most [`LONGEST_REST`]: a slow disk is there for the job first.
-const REST: u32 = 1;
+/// Where commits take longer, the disk is the job's alone for as long after each, but for no longer than this.
 const LONGEST_REST: Duration = Duration::from_secs(1);
 /// From then on a job waits for the disk before it gives up what it could be repeated from.
 const WORTH_SYNCING: Duration = Duration::from_secs(60);
@@ -37,7 +36,6 @@ impl Batch {
 
 /// A journal file and the thread that writes to it. Dropping it commits what has been added, unless a commit has failed.
 pub(super) struct Committer {
-    path: PathBuf,
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
     interval: Duration,
@@ -60,9 +58,7 @@ struct State {
     committed: u64,
     wanted: bool,
     closing: bool,
-    /// After a failure nothing is written any more: the end of the journal is unknown.
-    failed: bool,
-    /// What failed, until somebody has been told.
+    /// What failed. After that nothing is written any more: the end of the journal is unknown.
     failure: Option<Error>,
 }
 
@@ -79,11 +75,10 @@ impl Committer {
         let interval = fault::commit_interval().unwrap_or(INTERVAL);
         let shared = Arc::new(Shared::default());
         let (of_thread, path) = (shared.clone(), path.to_path_buf());
-        let to = path.clone();
-        let run = move || run(&of_thread, &file, &to, interval);
+        let run = move || run(&of_thread, &file, &path, interval);
         let thread = std::thread::Builder::new().name("journal".into()).spawn(run);
         let thread = Some(thread.map_err(|e| Error::Memory(format!("cannot start a thread: {e}")))?);
-        Ok(Committer { path, shared, thread, interval, start: Instant::now() })
+        Ok(Committer { shared, thread, interval, start: Instant::now() })
     }
 
     /// Adds a record to the next commit.
@@ -92,8 +87,8 @@ impl Committer {
         state.batch.append(record);
         state.added += 1;
         let due = state.added;
-        if let Some(error) = state.failure.take() {
-            return Err(error);
+        if let Some(error) = &state.failure {
+            return Err(again(error));
         }
         drop(state);
         if self.interval.is_zero() { self.commit(due) } else { Ok(()) }
@@ -111,14 +106,12 @@ impl Committer {
             state.wanted = true;
             self.shared.wanted.notify_one();
         }
-        while state.committed < due && !state.failed {
+        while state.committed < due && state.failure.is_none() {
             state = self.shared.committed.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
-        match state.failure.take() {
-            Some(error) => Err(error),
-            // Somebody else has been told why.
-            None if state.committed < due => Err(Error::io("write", &self.path)(io::Error::other("it failed before"))),
-            None => Ok(()),
+        match &state.failure {
+            Some(error) if state.committed < due => Err(again(error)),
+            _ => Ok(()),
         }
     }
 
@@ -147,16 +140,16 @@ fn run(shared: &Shared, file: &File, path: &Path, interval: Duration) {
         let waited = shared.wanted.wait_timeout_while(state, rest, waits);
         let (mut state, _) = waited.unwrap_or_else(PoisonError::into_inner);
         let (batch, added, closing) = (std::mem::take(&mut state.batch), state.added, state.closing);
-        let due = added > state.committed && !state.failed;
+        let due = added > state.committed && state.failure.is_none();
         state.wanted = false;
         drop(state);
         let begun = Instant::now();
         let outcome = due.then(|| commit(batch, file, path));
-        rest = interval.max(LONGEST_REST.min(REST * begun.elapsed()));
+        rest = interval.max(LONGEST_REST.min(begun.elapsed()));
         let mut state = shared.state();
         match outcome {
             Some(Ok(())) => state.committed = added,
-            Some(Err(error)) => (state.failed, state.failure) = (true, Some(error)),
+            Some(Err(error)) => state.failure = Some(error),
             // Nothing to do, or nothing that may be done any more.
             None => {}
         }
@@ -164,6 +157,17 @@ fn run(shared: &Shared, file: &File, path: &Path, interval: Duration) {
         if closing {
             return;
         }
+    }
+}
+
+/// The same error for everybody who waits: nobody knows whose will be shown.
+fn again(error: &Error) -> Error {
+    match error {
+        Error::Io { action, path, source } => Error::io(action, path)(match source.raw_os_error() {
+            Some(code) => io::Error::from_raw_os_error(code),
+            None => io::Error::new(source.kind(), source.to_string()),
+        }),
+        other => Error::Broken(other.to_string()),
     }
 }
 
@@ -199,7 +203,8 @@ mod tests {
         assert_eq!(told.exit_code(), 1, "{told}");
         // The thread goes on waking up meanwhile.
         for _ in 0..100 {
-            assert!(committer.commit(committer.added()).is_err());
+            let again = committer.commit(committer.added()).unwrap_err();
+            assert_eq!(again.to_string(), told.to_string(), "whoever asks is told why");
             std::thread::sleep(Duration::from_millis(1));
         }
     }

@@ -54,8 +54,12 @@ impl Directory {
     /// # Errors
     /// [`Error::Io`] if a file cannot be removed.
     pub fn sweep_job(&self, keep: &HashSet<PathBuf>) -> Result<()> {
-        self.remove_all(&self.store(), keep)?;
-        self.remove_all(&[self.spill()], keep)
+        let entries = fs::read_dir(&self.job).map_err(Error::io("read", &self.job))?;
+        let paths = entries.map(|entry| Ok(entry.map_err(Error::io("read", &self.job))?.path()));
+        let mut paths = paths.collect::<Result<Vec<PathBuf>>>()?;
+        // Whatever they are called: other versions have other files.
+        paths.retain(|path| *path != self.journal() && *path != lock_file(&self.job) && !path.is_dir());
+        self.remove_all(&paths, keep)
     }
 
     /// Makes the folder of the tiles, and removes the results of an earlier run, whole or not, but for the files of `keep`.
@@ -265,7 +269,7 @@ pub struct Lock {
 impl Lock {
     /// Takes the lock file of `job`, which also marks the directory as a job's own.
     fn take(job: &Path, is_new: bool) -> Result<Lock> {
-        let path = job.join("lock");
+        let path = lock_file(job);
         if !is_new && !path.exists() {
             return Err(Error::Config(format!(
                 "{} is there already and is no job directory of this program: choose another [output] directory",
@@ -438,6 +442,10 @@ fn remove_directory(path: &Path) -> Result<()> {
         Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io("remove", path)(e)),
         _ => Ok(()),
     }
+}
+
+fn lock_file(job: &Path) -> PathBuf {
+    job.join("lock")
 }
 
 fn clean(file: &Path) -> Result<()> {

@@ -2,8 +2,8 @@
 //! the results: making and removing thousands of small files takes a good part of a job's time on common file systems. With one
 //! file for all, threads would wait for each other where they write, and one would remove it at the end while the others idle.
 //!
-//! The journal knows where in its file each record is and the hash of its bytes, so that a store whose writer was killed can be opened
-//! again, whatever the kill left after them.
+//! The journal knows where in its file each record is and the hash of its bytes, so that a store whose writer was killed can be
+//! opened again, whatever the kill left after them.
 
 use crate::positioned::{read_exact_at, write_all_at};
 use crate::{Error, Result};
@@ -144,7 +144,9 @@ impl Store {
             *end = (at + length).max(*end);
         }
         let part = |(path, end): (PathBuf, u64)| {
-            let file = File::options().read(true).write(true).open(&path).map_err(Error::io("open", &path))?;
+            // One that is gone has lost its records, and no others.
+            let file = File::options().read(true).write(true).create(true).truncate(false).open(&path);
+            let file = file.map_err(Error::io("open", &path))?;
             Ok(Part { path, file, end: AtomicU64::new(end) })
         };
         let parts = paths.into_iter().zip(ends).map(part).collect::<Result<_>>()?;

@@ -176,18 +176,23 @@ impl<'a> Document<'a> {
         if self.compression != Compression::None {
             view["byteStride"] = size_of::<B>().into();
         }
+        let count = order.map_or(values.len(), <[u32]>::len);
         let of_vertex = |v: u32| convert(values[v as usize]);
-        match (self.compression, order) {
-            (Compression::Meshopt, Some(order)) => {
-                let values: Vec<B> = order.iter().map(|&v| of_vertex(v)).collect();
-                // Version 0 is the one of the extension.
-                let packed = meshopt::encode_vertex_buffer_level(&values, 0, Some(0)).map_err(not_packed)?;
-                self.add_packed(view, &packed, "ATTRIBUTES", size_of::<B>(), values.len());
+        if self.compression == Compression::Meshopt {
+            let converted: Vec<B> = match order {
+                Some(order) => order.iter().map(|&v| of_vertex(v)).collect(),
+                None => values.iter().map(|&value| convert(value)).collect(),
+            };
+            // Version 0 is the one of the extension.
+            let packed = meshopt::encode_vertex_buffer_level(&converted, 0, Some(0)).map_err(not_packed)?;
+            self.add_packed(view, &packed, "ATTRIBUTES", size_of::<B>(), count);
+        } else {
+            match order {
+                Some(order) => self.add_view(view, order, of_vertex),
+                None => self.add_view(view, values, convert),
             }
-            (_, Some(order)) => self.add_view(view, order, of_vertex),
-            (_, None) => self.add_view(view, values, convert),
         }
-        Ok(self.add_accessor(values.len(), kind))
+        Ok(self.add_accessor(count, kind))
     }
 
     fn add_triangles(&mut self, triangles: &[[u32; 3]], vertices: usize) -> Result<usize> {

@@ -150,6 +150,22 @@ fn what_is_damaged_is_made_again() {
         }
         rig.completes(&format!("half a store after {count} commits"));
     }
+    rig.forget();
+    assert!(rig.run_to("committed", 30).was_killed());
+    fs::remove_file(&rig.stores()[3]).unwrap();
+    let report = rig.completes("one file of the store is gone");
+    assert!(report["resumed"].as_u64().unwrap() > 5, "the steps of the others stay");
+}
+
+#[test]
+fn files_of_another_version_make_room_at_once() {
+    let rig = rig();
+    assert!(rig.run_to("committed", 10).was_killed());
+    let old = rig.out().join("job/steps.store");
+    fs::write(&old, "as another version called it").unwrap();
+    assert!(rig.run_to("committed", 3).was_killed());
+    assert!(!old.exists());
+    rig.completes("after that");
 }
 
 #[test]
