@@ -43,15 +43,17 @@ impl Texture {
         let scale = self.fit(sites, shape)?;
         self.sort_by_row(sites, scale);
         self.clear(sites.len());
+        let most_missing = (MOST_MISSING * sites.len() as f64) as usize;
         for y in 0..self.height {
             self.write_row(sites, y, counts);
+            // At once: whoever cuts what is crowded may have to ask many times.
+            if self.missing.len() > most_missing {
+                return Err(Rejected::Crowded);
+            }
         }
         self.append_missing(sites);
         counts.missing += self.missing.len() as u64;
-        match self.missing.len() as f64 > MOST_MISSING * sites.len() as f64 {
-            true => Err(Rejected::Crowded),
-            false => Ok(()),
-        }
+        Ok(())
     }
 
     /// The number of the site in the pixel `label` (y << 16 | x).
