@@ -101,13 +101,12 @@ impl<'a> Document<'a> {
         // The way from the lattice is monotonic, and y turns round.
         let [low, high] = part.tile.bounds().unwrap_or_default();
         let [low, high] = [[low[0], high[1], low[2]], [high[0], low[1], high[2]]];
+        let (frame, origin) = (self.frame, part.origin);
         if self.compression == Compression::None {
-            let (frame, origin) = (self.frame, part.origin);
             let local = |p| frame.local(p, origin);
             let bounds = json!({"min": local(low), "max": local(high)});
             return self.add_attribute(positions, order, local, Kind::new(FLOAT, "VEC3", bounds));
         }
-        let (frame, origin) = (self.frame, part.origin);
         let steps = |p| frame.local_steps(p, origin);
         let bounds = json!({"min": steps(low).map(|v| v as f32), "max": steps(high).map(|v| v as f32)});
         if !part.short {
@@ -177,18 +176,15 @@ impl<'a> Document<'a> {
             view["byteStride"] = size_of::<B>().into();
         }
         let count = order.map_or(values.len(), <[u32]>::len);
-        let of_vertex = |v: u32| convert(values[v as usize]);
         if self.compression == Compression::Meshopt {
-            let converted: Vec<B> = match order {
-                Some(order) => order.iter().map(|&v| of_vertex(v)).collect(),
-                None => values.iter().map(|&value| convert(value)).collect(),
-            };
+            let vertex = |i: usize| order.map_or(i, |order| order[i] as usize);
+            let converted: Vec<B> = (0..count).map(|i| convert(values[vertex(i)])).collect();
             // Version 0 is the one of the extension.
             let packed = meshopt::encode_vertex_buffer_level(&converted, 0, Some(0)).map_err(not_packed)?;
             self.add_packed(view, &packed, "ATTRIBUTES", size_of::<B>(), count);
         } else {
             match order {
-                Some(order) => self.add_view(view, order, of_vertex),
+                Some(order) => self.add_view(view, order, |v| convert(values[v as usize])),
                 None => self.add_view(view, values, convert),
             }
         }

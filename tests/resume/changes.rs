@@ -127,6 +127,8 @@ fn a_finished_job_runs_from_the_start() {
 fn damage(path: &Path, places: &[f64]) {
     let mut bytes = fs::read(path).unwrap();
     let length = bytes.len() as f64;
+    // Which of the files have records by now depends on the threads; the first always has the partition.
+    let places = if bytes.is_empty() { &[] } else { places };
     places.iter().for_each(|place| bytes[(place * length) as usize] ^= 0x10);
     fs::write(path, bytes).unwrap();
 }
