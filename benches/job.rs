@@ -6,7 +6,7 @@
 //! that is there, else a sample terrain of 4 million points.
 
 use gdt_batch::config::Config;
-use gdt_batch::job::progress::Progress;
+use gdt_batch::job::progress::stage::Progress;
 use gdt_batch::job::report::Report;
 use std::path::{Path, PathBuf};
 use std::time::Instant;

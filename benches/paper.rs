@@ -21,7 +21,7 @@ use gdt_batch::gpu::executor::{Executor, Order};
 use gdt_batch::gpu::machine::Machine;
 use gdt_batch::gpu::steps::{Size, Step};
 use gdt_batch::gpu::{self, twins};
-use gdt_batch::triangulation::mesh::Mesh;
+use gdt_batch::mesh::half_edge::Mesh;
 use gdt_batch::voronoi::{
     Counts, Diagram, Diagrams, Rejected, Resolution, STEPS, Scratch, Shape, triangulate, triangulate_with,
 };

@@ -3,7 +3,7 @@
 //! Coordinates lie within `lattice::REACH` (2^29) of zero, so differences stay within 2^30: the orientation determinant
 //! fits an `i64`, the in-circle determinant an `i128`.
 
-use super::Site;
+use crate::geometry::Site;
 use multiversion::multiversion;
 
 /// Relative error of the floating-point in-circle determinant on exactly represented differences,

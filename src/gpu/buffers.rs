@@ -1,9 +1,9 @@
 //! The buffers that the steps share, by name, and what they hold. Every leaf in flight has a set of its own; sets are used again
 //! and only ever grow.
 
-use super::Fault;
-use super::clock::Clock;
-use super::device::Device;
+use crate::gpu::Fault;
+use crate::gpu::clock::Clock;
+use crate::gpu::device::Device;
 use wgpu::BufferUsages;
 
 /// A buffer of the pipeline. One number (`u32`) a pixel unless it says otherwise.

@@ -1,8 +1,8 @@
 //! How long steps take on the GPU itself: timestamps at their first and last dispatch, where the adapter has them.
 
-use super::Fault;
-use super::device::Device;
-use super::steps::{Command, Recording, Step};
+use crate::gpu::Fault;
+use crate::gpu::device::Device;
+use crate::gpu::steps::{Command, Recording, Step};
 use wgpu::{BufferUsages, CommandEncoder, ComputePassTimestampWrites, Features, QuerySet, QueryType};
 
 /// Nanoseconds that each [`Step`] took, in their order; 0 for those that did not run.

@@ -1,7 +1,7 @@
 //! Adapters and devices: which GPU is taken, with which limits, and how its failures are caught. Nothing here panics, whatever
 //! the driver does: every error ends as a [`Fault`].
 
-use super::Fault;
+use crate::gpu::Fault;
 use std::future::Future;
 use std::path::Path;
 use std::pin::pin;

@@ -5,13 +5,13 @@
 //! Whatever goes wrong costs time only: too large a texture is asked for again at half the size, a lost device is opened anew
 //! once, and after that every worker does its leaves itself.
 
-use super::Fault;
-use super::buffers::{Name, Set};
-use super::clock::StepTimes;
-use super::device::{self, Device, MOST_SIDE, Wish};
-use super::machine::{Machine, Ticket};
-use super::steps::{Size, Step};
 use crate::config::{Texture, Voronoi};
+use crate::gpu::Fault;
+use crate::gpu::buffers::{Name, Set};
+use crate::gpu::clock::StepTimes;
+use crate::gpu::device::{self, Device, MOST_SIDE, Wish};
+use crate::gpu::machine::{Machine, Ticket};
+use crate::gpu::steps::{Size, Step};
 use crate::voronoi::{Diagram, Diagrams, Resolution, Shape};
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};

@@ -1,10 +1,10 @@
 //! Carries out recordings on a device.
 
-use super::Fault;
-use super::buffers::{Name, Set};
-use super::clock::{Clock, Marks, STAMP_BYTES, StepTimes, marks};
-use super::device::Device;
-use super::steps::{Command, Groups, Program, Recording, Step};
+use crate::gpu::Fault;
+use crate::gpu::buffers::{Name, Set};
+use crate::gpu::clock::{Clock, Marks, STAMP_BYTES, StepTimes, marks};
+use crate::gpu::device::Device;
+use crate::gpu::steps::{Command, Groups, Program, Recording, Step};
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

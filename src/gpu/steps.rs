@@ -1,8 +1,8 @@
 //! The steps of the paper as lists of dispatches: which shader, which buffers, which parameters, how many workgroups. Nothing
 //! here touches the GPU; `machine` carries out what is recorded.
 
-use super::buffers::Name;
 use crate::config::Voronoi;
+use crate::gpu::buffers::Name;
 
 /// A shader's entry point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

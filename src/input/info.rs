@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::{Crs, Format, Source};
+use crate::input::{Crs, Format, Source};
 
 /// The answer of `info`. `Display` gives it for people, `Serialize` for programs.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -3,21 +3,16 @@
 //! [`open`] looks at one file and gives a [`Source`]; its pieces are decoded independently on any thread. On the way every
 //! record passes the [`Rules`], and the [`Tally`] says what became of each.
 
-mod chunk_table;
+mod catch_panic;
 pub mod crs;
-mod guard;
-mod header;
+mod file;
+mod filter;
 pub mod info;
 mod las;
-mod layout;
-mod laz;
 mod point;
-mod positioned;
 mod rules;
-mod sieve;
 mod source;
 pub mod text;
-mod vlr;
 
 pub use crs::{Crs, Unit};
 pub use point::Point;

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::geometry::lattice::AxisMap;
 
 /// How many malformed records a [`Tally`] describes.
-pub(super) const EXAMPLES: usize = 5;
+pub(crate) const EXAMPLES: usize = 5;
 
 /// What decoding a source needs to know of the job.
 #[derive(Clone, Debug)]
@@ -52,7 +52,7 @@ pub struct Tally {
 
 impl Tally {
     /// Counts `count` malformed records that `example` describes.
-    pub(super) fn add_malformed(&mut self, count: u64, example: impl FnOnce() -> String) {
+    pub(crate) fn add_malformed(&mut self, count: u64, example: impl FnOnce() -> String) {
         self.malformed += count;
         if self.examples.len() < EXAMPLES {
             self.examples.push(example());

@@ -6,15 +6,16 @@ use rust_decimal::Decimal;
 use rust_decimal::prelude::ToPrimitive;
 use serde::{Deserialize, Serialize};
 
-use super::header::Header;
-use super::las::Records;
-use super::layout::Layout;
-use super::laz::Chunks;
-use super::positioned::Positioned;
-use super::rules::{Rules, Tally};
-use super::sieve::Sieve;
-use super::text::{Table, TextOptions};
-use super::{Crs, Point, crs, vlr};
+use crate::input::file::Positioned;
+use crate::input::filter::Sieve;
+use crate::input::las::header::Header;
+use crate::input::las::layout::Layout;
+use crate::input::las::laz::Chunks;
+use crate::input::las::uncompressed::Records;
+use crate::input::las::vlr;
+use crate::input::rules::{Rules, Tally};
+use crate::input::text::{Table, TextOptions};
+use crate::input::{Crs, Point, crs};
 use crate::{Error, Result};
 
 /// The exact meaning of the raw integers on one axis: `value = offset + scale * raw`, in the source's unit.

@@ -3,71 +3,52 @@
 //! that each can be called on its own, the ones by tile or by node in any order that puts children before parents; and a job that
 //! was interrupted goes on from the steps that its journal has.
 
-mod area;
-pub mod check;
-pub mod choose;
-pub mod closing;
-pub mod columns;
-mod committer;
-pub mod cut;
-pub mod directory;
-pub mod export;
-pub mod fingerprint;
-pub mod finish;
-mod forecast;
-pub mod grid;
-mod grow;
-pub mod journal;
-pub mod leaf;
+pub mod durable;
 pub mod levels;
-mod machine;
-pub mod merge;
+pub mod mesh;
 pub mod partition;
-pub mod placement;
+pub mod plan;
+pub mod preflight;
 pub mod progress;
-pub mod pyramid;
-pub mod ready;
+pub mod publish;
 pub mod records;
 pub mod report;
-pub mod resume;
-pub mod scan;
-pub mod sites;
-pub mod span;
-pub mod spill;
-pub mod stitch;
-pub mod store;
-pub mod tileset;
-pub mod tree;
-mod weave;
-mod write;
+pub mod run;
+pub mod tiles;
 
 use crate::config::{ColorChoice, Config, Format};
+use crate::job::durable::directory::{self, Directory};
+use crate::job::durable::journal;
+use crate::job::durable::journal::{Done, Journal, Mark, Step};
+use crate::job::durable::store::Store;
+use crate::job::levels::hierarchy::{Pyramid, Sizes};
+use crate::job::levels::level::LevelFigures;
+use crate::job::mesh::precision_limit::Longest;
+use crate::job::partition::read::{Partition, Summary, Task};
+use crate::job::plan::fingerprint::{Fingerprint, Head};
+use crate::job::plan::lattice_choice::Coarser;
+use crate::job::plan::scan;
+use crate::job::plan::scan::Plan;
+use crate::job::preflight::check;
+use crate::job::progress::stage::{Clock, Progress, Schedule, Stage, StageFigures};
+use crate::job::progress::time_left;
+use crate::job::publish::placement::Placement;
+use crate::job::publish::{finish, placement, tileset};
+use crate::job::report::{Parts, Report};
+use crate::job::run::local_run::Mesh;
+use crate::job::run::resume;
+use crate::job::run::tile_queue::WrittenTiles;
+use crate::job::tiles::max_edge::Cut;
+use crate::job::tiles::write::{Look, TileFigures};
 use crate::output::Compression;
 use crate::output::color::Coloring;
-use crate::output::georeference::Georeference;
+use crate::output::tiles3d::georeference::Georeference;
 use crate::triangulation::Triangulator;
 use crate::{Error, Result};
-use choose::Coarser;
-use cut::Cut;
-use directory::Directory;
-use export::{Look, TileFigures};
-use fingerprint::{Fingerprint, Head};
-use journal::{Done, Journal, Mark, Step};
-use levels::LevelFigures;
-use partition::{Partition, Summary, Task};
-use placement::Placement;
-use progress::{Clock, Progress, Schedule, Stage, StageFigures};
-use pyramid::{Pyramid, Sizes};
 use rayon::prelude::*;
-use report::{Parts, Report};
-use scan::Plan;
-use span::Longest;
 use std::collections::HashSet;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use store::Store;
-use weave::Mesh;
-use write::WrittenTiles;
 
 /// Bytes that one site of a leaf takes while the leaf is triangulated: points, sort keys, sites, mesh and marks.
 const BYTES_PER_LEAF_SITE: u64 = 500;
@@ -140,7 +121,7 @@ fn attempt(
     let plan = on_threads(workers(config, 0)?, || scan::run(config, head.coarser))?;
     stage.advance(1);
     let scanned = stage.finish();
-    let progress = &Schedule::new(progress, clock, forecast::costs(&plan));
+    let progress = &Schedule::new(progress, clock, time_left::costs(&plan));
     report::note_skipped(&plan.skipped, progress);
     let threads = workers(config, plan.records)?;
     if !options.force {
@@ -221,7 +202,7 @@ fn workers(config: &Config, points: u64) -> Result<usize> {
 }
 
 /// A job whose inputs have been looked at and whose directory is its own.
-struct Job<'a> {
+pub(crate) struct Job<'a> {
     config: &'a Config,
     triangulator: &'a Triangulator,
     coarser: Coarser,
@@ -341,7 +322,7 @@ impl Job<'_> {
             _ => self.threads,
         };
         let make = |at: usize| {
-            let run = || levels::run(self.directory, self.store, pyramid, at, look, sizes, content);
+            let run = || levels::level::run(self.directory, self.store, pyramid, at, look, sizes, content);
             let figures = self.journal.step(Step::Level(pyramid.inner[at].node), run)?;
             stage.advance(1);
             Ok(figures)
@@ -369,7 +350,7 @@ impl Job<'_> {
         let Job { config, directory, progress, coarser, .. } = *self;
         loop {
             let stage = progress.stage("read", plan.records, "points");
-            let mut partition = partition::run(&task(&plan, config), directory, &stage)?;
+            let mut partition = partition::read::run(&task(&plan, config), directory, &stage)?;
             let figures = stage.finish();
             let lattice = plan.lattice.clone();
             if !partition.skipped.is_empty() {

@@ -1,9 +1,9 @@
 //! What the steps leave for each other in the job's store, one type a record.
 
-use super::columns::{ColumnReader, ColumnWriter};
-use super::store::{Key, Store, Stored};
 use crate::geometry::Site;
 use crate::input::Point;
+use crate::job::durable::columns::{ColumnReader, ColumnWriter};
+use crate::job::durable::store::{Key, Store, Stored};
 use crate::output::normals::NormalSum;
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};

@@ -20,7 +20,7 @@ const F32_STEPS: i64 = 1 << 24;
 const TRANSLATION_STEPS: i64 = 1 << 16;
 
 /// Half the extent, in steps, of the widest mesh that one translation can serve, wherever it lies.
-pub(super) const PART_REACH: i64 = F32_STEPS - TRANSLATION_STEPS / 2;
+pub(crate) const PART_REACH: i64 = F32_STEPS - TRANSLATION_STEPS / 2;
 
 /// Steps are refined below half the resolution by at most this factor, and not below [`FINE_STEP`].
 const REFINEMENT: f64 = 64.0;
@@ -186,7 +186,7 @@ impl Frame {
 
     /// The glTF coordinates (x, y up, z) of a lattice point in steps: whole numbers.
     #[inline(always)]
-    pub(super) fn steps(&self, point: [i32; 3]) -> [f64; 3] {
+    pub(crate) fn steps(&self, point: [i32; 3]) -> [f64; 3] {
         let [x, y, z] = point;
         // 0.0 - y has no negative zero.
         [self.horizontal.steps(x), self.vertical.steps(z), 0.0 - self.horizontal.steps(y)]
@@ -194,7 +194,7 @@ impl Frame {
 
     /// The glTF coordinates of a lattice point relative to an origin in steps; exact within [`PART_REACH`] of it.
     #[inline(always)]
-    pub(super) fn local(&self, point: [i32; 3], origin: [f64; 3]) -> [f32; 3] {
+    pub(crate) fn local(&self, point: [i32; 3], origin: [f64; 3]) -> [f32; 3] {
         let [x, y, z] = self.steps(point);
         let (xy, up) = (self.horizontal.step, self.vertical.step);
         [((x - origin[0]) * xy) as f32, ((y - origin[1]) * up) as f32, ((z - origin[2]) * xy) as f32]
@@ -202,18 +202,18 @@ impl Frame {
 
     /// The glTF coordinates of a lattice point relative to an origin in whole steps; exact within [`PART_REACH`] of it.
     #[inline(always)]
-    pub(super) fn local_steps(&self, point: [i32; 3], origin: [f64; 3]) -> [f64; 3] {
+    pub(crate) fn local_steps(&self, point: [i32; 3], origin: [f64; 3]) -> [f64; 3] {
         let steps = self.steps(point);
         [0, 1, 2].map(|k| steps[k] - origin[k])
     }
 
     /// Metres in a step along the glTF axes.
-    pub(super) fn step(&self) -> [f64; 3] {
+    pub(crate) fn step(&self) -> [f64; 3] {
         self.metres([1.0; 3])
     }
 
     /// Metres in a vertical step over metres in a horizontal one.
-    pub(super) fn anisotropy(&self) -> f32 {
+    pub(crate) fn anisotropy(&self) -> f32 {
         (self.vertical.step / self.horizontal.step) as f32
     }
 
@@ -232,24 +232,24 @@ impl Frame {
     }
 
     /// Steps as metres.
-    pub(super) fn metres(&self, steps: [f64; 3]) -> [f64; 3] {
+    pub(crate) fn metres(&self, steps: [f64; 3]) -> [f64; 3] {
         [steps[0] * self.horizontal.step, steps[1] * self.vertical.step, steps[2] * self.horizontal.step]
     }
 }
 
 /// A place where translations may lie, in steps, nearest to the middle between `low` and `high`.
-pub(super) fn origin_between(low: [f64; 3], high: [f64; 3], grid: i64) -> [f64; 3] {
+pub(crate) fn origin_between(low: [f64; 3], high: [f64; 3], grid: i64) -> [f64; 3] {
     [0, 1, 2].map(|k| (nearest((low[k] + high[k]) * 0.5 / grid as f64)) * grid as f64 + 0.0)
 }
 
 /// The origin from which 16-bit positions reach all of what lies between `low` and `high`, in steps, if there is one.
-pub(super) fn short_origin(low: [f64; 3], high: [f64; 3]) -> Option<[f64; 3]> {
+pub(crate) fn short_origin(low: [f64; 3], high: [f64; 3]) -> Option<[f64; 3]> {
     let origin = low.map(|v| (v / SHORT_GRID).floor() * SHORT_GRID + 0.0);
     (0..3).all(|k| high[k] - origin[k] <= SHORT_REACH).then_some(origin)
 }
 
 /// The finest grid for [`origin_between`].
-pub(super) const FINE_GRID: i64 = TRANSLATION_STEPS;
+pub(crate) const FINE_GRID: i64 = TRANSLATION_STEPS;
 
 /// The nearest f64. A lattice offset may have more digits: what an f64 loses of it is far below any lattice step.
 fn number(exact: Decimal) -> f64 {

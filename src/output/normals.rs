@@ -1,8 +1,8 @@
 //! Vertex normals weighted by the area of the triangles around, from exact integer sums: neither the order of the
 //! triangles nor the cut into tiles changes a bit of them.
 
-use super::frame::Frame;
-use super::tile::bounds;
+use crate::output::frame::Frame;
+use crate::output::tile::bounds;
 use multiversion::multiversion;
 
 /// The sum over the triangles around a vertex of their normals, each twice as long as the triangle's area, in lattice steps

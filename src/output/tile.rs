@@ -24,7 +24,7 @@ impl Tile {
     }
 
     /// The tile of only these triangles of this one.
-    pub(super) fn subset(&self, mut triangles: Vec<[u32; 3]>) -> Tile {
+    pub(crate) fn subset(&self, mut triangles: Vec<[u32; 3]>) -> Tile {
         let vertices = renumber(&mut triangles);
         Tile {
             positions: pick(&self.positions, &vertices),
@@ -42,7 +42,7 @@ impl Tile {
 
 /// The least and greatest of `positions` on every axis; `None` if there are none.
 #[multiversion(targets("x86_64+avx2"))]
-pub(super) fn bounds(positions: &[[i32; 3]]) -> Option<[[i32; 3]; 2]> {
+pub(crate) fn bounds(positions: &[[i32; 3]]) -> Option<[[i32; 3]; 2]> {
     let first = *positions.first()?;
     Some(positions.iter().fold([first, first], |[low, high], p| {
         [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]

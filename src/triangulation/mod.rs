@@ -1,17 +1,14 @@
 //! The Delaunay triangulation of the sites of one tile, whoever computes it.
 
-pub mod flip;
-pub mod mesh;
 pub mod reference;
-pub mod region;
 
 use crate::config::{Backend, Triangulation};
 use crate::geometry::Site;
 use crate::gpu::device::{Wish, hardware_is_likely};
 use crate::gpu::executor::{Executor, Order};
+use crate::mesh::half_edge::Mesh;
 use crate::voronoi::{self, Counts, Diagrams, Rejected, Scratch};
 use crate::{Error, Result};
-use mesh::Mesh;
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
 use std::ops::AddAssign;

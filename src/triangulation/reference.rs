@@ -1,11 +1,11 @@
 //! The reference: `spade` with canonical flips. The oracle of the tests, the way out for leaves that the pipeline does
 //! not accept, and what triangulates the inner nodes of the tree.
 
-use super::flip::legalize;
-use super::mesh::{HULL, Mesh};
 use crate::Error;
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
+use crate::mesh::flip::legalize;
+use crate::mesh::half_edge::{HULL, Mesh};
 use spade::{DelaunayTriangulation, HasPosition, InsertionError, Point2, Triangulation as _};
 
 struct Vertex {
@@ -118,7 +118,7 @@ fn to_mesh(delaunay: &DelaunayTriangulation<Vertex>) -> Mesh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::triangulation::flip::fails;
+    use crate::mesh::flip::fails;
 
     #[test]
     fn a_lattice_gets_the_one_canonical_triangulation() {

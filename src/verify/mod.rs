@@ -65,7 +65,7 @@ pub use source::Source;
 pub use verdict::Verdict;
 
 use crate::output::frame::Extras;
-use crate::output::read::{TileFile, held_bytes, read_extras, read_tile};
+use crate::output::gltf::read::{TileFile, held_bytes, read_extras, read_tile};
 use crate::{Error, Result};
 use part::Findings;
 use rim::Rim;

@@ -3,13 +3,13 @@
 use bytemuck::cast_slice;
 use xxhash_rust::xxh3::xxh3_64;
 
-use super::digest::Digest;
-use super::rim::{RimEdge, RimVertex};
-use super::source::Source;
-use super::verdict::{Fault, Faults};
 use crate::geometry::Site;
 use crate::geometry::predicates::{in_circle, in_circle_determinant, orient2d};
-use crate::output::read::Part;
+use crate::output::gltf::read::Part;
+use crate::verify::digest::Digest;
+use crate::verify::rim::{RimEdge, RimVertex};
+use crate::verify::source::Source;
+use crate::verify::verdict::{Fault, Faults};
 
 /// The sum of what was found in many parts.
 #[derive(Debug, Default)]

@@ -6,12 +6,12 @@ use bytemuck::{Pod, Zeroable, bytes_of};
 use rayon::slice::ParallelSliceMut;
 use xxhash_rust::xxh3::xxh3_64;
 
-use super::part::{Records, Stand, edge_text, stand};
-use super::source::Source;
-use super::spill::{Record, Spill};
-use super::verdict::{Fault, Faults};
 use crate::Result;
 use crate::geometry::Site;
+use crate::verify::part::{Records, Stand, edge_text, stand};
+use crate::verify::source::Source;
+use crate::verify::spill::{Record, Spill};
+use crate::verify::verdict::{Fault, Faults};
 
 /// An edge with its triangle on one side.
 #[repr(C)]

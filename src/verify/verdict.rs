@@ -5,10 +5,10 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::part::Findings;
-use super::rim::{Matched, Vertices};
-use super::{Report, hull};
 use crate::geometry::Site;
+use crate::verify::part::Findings;
+use crate::verify::rim::{Matched, Vertices};
+use crate::verify::{Report, hull};
 
 /// The figures of a verified mesh, and what does not hold.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]

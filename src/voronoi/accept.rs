@@ -20,12 +20,12 @@
 //! all sites as corners. By (5) it is locally Delaunay, which by Delaunay's lemma (on the lifted surface, symbolically perturbed
 //! as the tie rule says) makes it the canonical Delaunay triangulation.
 
-use super::Rejected;
-use super::edges::Edges;
-use super::sphere::{OUTSIDE, Sphere};
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
-use crate::triangulation::mesh::{HULL, Mesh};
+use crate::mesh::half_edge::{HULL, Mesh};
+use crate::voronoi::Rejected;
+use crate::voronoi::edges::Edges;
+use crate::voronoi::sphere::{OUTSIDE, Sphere};
 
 /// Buffers of the check.
 #[derive(Default)]

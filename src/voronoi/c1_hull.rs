@@ -1,11 +1,11 @@
 //! Step C1: complete the convex hull. Where two hull edges leave a pocket between them, it is filled with a triangle, which
 //! is the flip of an edge to infinity, until none is left: the paper's stack walk round the boundary.
 
-use super::Rejected;
-use super::c2_shift::Shift;
-use super::sphere::{Sphere, next, previous};
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
+use crate::voronoi::Rejected;
+use crate::voronoi::c2_shift::Shift;
+use crate::voronoi::sphere::{Sphere, next, previous};
 
 /// How many hull vertices on either side of a pocket are tried for lying in it.
 const NEAR: usize = 6;

@@ -1,11 +1,11 @@
 //! Step C2: shift all sites from their pixels to their true places, all at once. The topology stays; triangles that are
 //! then not counterclockwise are flipped away, or a corner is taken out, to be inserted again in step C3.
 
-use super::Rejected;
-use super::edges::Edges;
-use super::sphere::{Fill, Sphere, Star, next, previous};
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
+use crate::voronoi::Rejected;
+use crate::voronoi::edges::Edges;
+use crate::voronoi::sphere::{Fill, Sphere, Star, next, previous};
 
 /// Rounds of repair; what is still bad after them goes another way.
 const ROUNDS: usize = 6;

@@ -1,13 +1,13 @@
 //! Step C3: insert the sites that are missing and those that were taken out. Each is found by walking through the mesh,
 //! which is Delaunay by then, and made Delaunay at once.
 
-use super::Rejected;
-use super::c4_flip::Flips;
-use super::g1_write_sites::Texture;
-use super::g6_triangles::Scan;
-use super::sphere::{Sphere, next, previous};
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
+use crate::voronoi::Rejected;
+use crate::voronoi::c4_flip::Flips;
+use crate::voronoi::g1_write_sites::Texture;
+use crate::voronoi::g6_triangles::Scan;
+use crate::voronoi::sphere::{Sphere, next, previous};
 
 /// Where a new vertex goes: into a triangle, maybe onto one of its edges.
 struct Place {

@@ -2,9 +2,9 @@
 //! branches that cannot be foreseen, then many determinants are computed side by side in single precision, with a bound
 //! on their error. What the bound leaves in doubt is for the caller to decide exactly.
 
-use super::sphere::{Sphere, next, previous};
 use crate::geometry::Site;
 use crate::geometry::predicates::Quads;
+use crate::voronoi::sphere::{Sphere, next, previous};
 
 /// The batch at hand.
 #[derive(Default)]

@@ -2,9 +2,9 @@
 //!
 //! The sites are numbered by row and column of their pixels, which is the order in which all later steps meet them.
 
-use super::{Counts, Rejected, Resolution, Shape};
 use crate::geometry::Site;
 use crate::geometry::lattice::REACH;
+use crate::voronoi::{Counts, Rejected, Resolution, Shape};
 
 /// Largest share of missing sites with which going on pays.
 const MOST_MISSING: f64 = 0.4;

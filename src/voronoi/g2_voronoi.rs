@@ -7,7 +7,7 @@
 //! gives distance, tie rule and label. It reaches seven pixels far; pixels with no site so near take the lower envelope of
 //! the columns' parabolas (Felzenszwalb and Huttenlocher 2012), which is exact at any distance.
 
-use super::g1_write_sites::Texture;
+use crate::voronoi::g1_write_sites::Texture;
 
 /// The label of what lies outside the texture.
 pub(super) const FRAME: u32 = u32::MAX;

@@ -5,10 +5,10 @@
 //! the mesh, which is the same as if its pixels had taken the colours around them. As the site lies outside its island, some
 //! triangle around it is not counterclockwise, so that only those need to be looked at.
 
-use super::c2_shift::{Shift, orientation};
-use super::sphere::{Sphere, next, previous};
-use super::{Counts, Rejected};
 use crate::geometry::Site;
+use crate::voronoi::c2_shift::{Shift, orientation};
+use crate::voronoi::sphere::{Sphere, next, previous};
+use crate::voronoi::{Counts, Rejected};
 use std::cmp::Reverse;
 
 /// Fans with more triangles than this are not followed.

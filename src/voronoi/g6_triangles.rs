@@ -14,13 +14,13 @@
 //! Step C2's tests of what a row has made and most flips of step C4 follow at once, while it is in the cache. Flips do not
 //! mind open edges, as slots are half-edges too.
 
-use super::Rejected;
-use super::c2_shift::Shift;
-use super::c4_flip::Flips;
-use super::g1_write_sites::Texture;
-use super::g2_voronoi::{FRAME, Voronoi};
-use super::sphere::Sphere;
 use crate::geometry::predicates::{in_circle, orient2d};
+use crate::voronoi::Rejected;
+use crate::voronoi::c2_shift::Shift;
+use crate::voronoi::c4_flip::Flips;
+use crate::voronoi::g1_write_sites::Texture;
+use crate::voronoi::g2_voronoi::{FRAME, Voronoi};
+use crate::voronoi::sphere::Sphere;
 
 /// Buffers of the scan.
 #[derive(Default)]

@@ -33,7 +33,7 @@ mod sphere;
 mod tests;
 
 use crate::geometry::Site;
-use crate::triangulation::mesh::Mesh;
+use crate::mesh::half_edge::Mesh;
 use std::time::Instant;
 
 /// Why a leaf was not triangulated here. Cut it, or triangulate it another way.

@@ -2,12 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::g1_write_sites::Texture;
-use super::g2_voronoi::Voronoi;
-use super::{Counts, Rejected, Resolution, Scratch, Shape, triangulate};
 use crate::geometry::Site;
-use crate::triangulation::mesh::Mesh;
+use crate::mesh::half_edge::Mesh;
 use crate::triangulation::reference;
+use crate::voronoi::g1_write_sites::Texture;
+use crate::voronoi::g2_voronoi::Voronoi;
+use crate::voronoi::{Counts, Rejected, Resolution, Scratch, Shape, triangulate};
 
 /// A small generator (xorshift64*), so that cases are the same everywhere.
 struct Random(u64);

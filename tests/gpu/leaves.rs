@@ -4,7 +4,7 @@ use super::random::Random;
 use super::rig::Rig;
 use gdt_batch::config::{Backend, Config, Texture, Triangulation, Voronoi};
 use gdt_batch::geometry::Site;
-use gdt_batch::job::{self, progress::Progress};
+use gdt_batch::job::{self, progress::stage::Progress};
 use gdt_batch::triangulation::{Outcome, Triangulator};
 use gdt_batch::verify::verify;
 use gdt_batch::voronoi::{self, Diagram, Diagrams, Rejected, Resolution, Scratch, Shape};

@@ -6,11 +6,12 @@ use std::path::{Path, PathBuf};
 
 use gdt_batch::Error;
 use gdt_batch::config::{Config, OnBadFile};
-use gdt_batch::job::choose::Coarser;
-use gdt_batch::job::directory::Directory;
-use gdt_batch::job::progress::Progress;
-use gdt_batch::job::scan::Plan;
-use gdt_batch::job::{partition, scan};
+use gdt_batch::job::durable::directory::Directory;
+use gdt_batch::job::partition::read as partition;
+use gdt_batch::job::plan::lattice_choice::Coarser;
+use gdt_batch::job::plan::scan;
+use gdt_batch::job::plan::scan::Plan;
+use gdt_batch::job::progress::stage::Progress;
 use serde_json::Value;
 
 use crate::las_file::{LasFile, points_at};

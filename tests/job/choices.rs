@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use gdt_batch::output::read::{TileFile, read_tile};
+use gdt_batch::output::gltf::read::{TileFile, read_tile};
 use gdt_batch::verify::Source;
 use serde_json::Value;
 use tempfile::TempDir;

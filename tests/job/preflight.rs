@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use gdt_batch::config::Config;
-use gdt_batch::job::check::{self, Preflight};
+use gdt_batch::job::preflight::check::{self, Preflight};
 
 use crate::clouds;
 use crate::las_file::{LasFile, points_at};

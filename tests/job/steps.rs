@@ -3,15 +3,17 @@
 
 use gdt_batch::config::{Backend, Config, Duplicates, OnBadFile, Triangulation};
 use gdt_batch::geometry::Site;
-use gdt_batch::job::choose::Coarser;
-use gdt_batch::job::directory::Directory;
-use gdt_batch::job::partition::{self, Partition};
-use gdt_batch::job::progress::Progress;
+use gdt_batch::job::durable::directory::Directory;
+use gdt_batch::job::durable::store::Store;
+use gdt_batch::job::mesh::precision_limit::Longest;
+use gdt_batch::job::mesh::{leaf, merge};
+use gdt_batch::job::partition::point_file::Spill;
+use gdt_batch::job::partition::read as partition;
+use gdt_batch::job::partition::read::Partition;
+use gdt_batch::job::plan::lattice_choice::Coarser;
+use gdt_batch::job::plan::scan;
+use gdt_batch::job::progress::stage::Progress;
 use gdt_batch::job::records::{Leaf, Seam};
-use gdt_batch::job::span::Longest;
-use gdt_batch::job::spill::Spill;
-use gdt_batch::job::store::Store;
-use gdt_batch::job::{leaf, merge, scan};
 use gdt_batch::triangulation::{Triangulator, reference};
 
 use crate::clouds::{self, Cloud};

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use gdt_batch::output::read::read_tile;
+use gdt_batch::output::gltf::read::read_tile;
 use serde_json::Value;
 
 use crate::program::Job;

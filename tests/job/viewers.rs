@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use gdt_batch::output::globe::relative;
+use gdt_batch::output::tiles3d::globe::relative;
 use serde_json::{Value, json};
 
 use crate::clouds;

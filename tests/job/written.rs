@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use gdt_batch::output::preview::LONGER_SIDE;
+use gdt_batch::output::preview::canvas::LONGER_SIDE;
 use gdt_batch::verify::verify;
 use serde_json::Value;
 

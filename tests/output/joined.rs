@@ -1,8 +1,8 @@
 //! One scene of all tiles.
 
 use gdt_batch::output::Compression;
-use gdt_batch::output::read::read_tile;
-use gdt_batch::output::terrain::write_terrain;
+use gdt_batch::output::gltf::one_file::write_terrain;
+use gdt_batch::output::gltf::read::read_tile;
 
 use crate::model::{cloud, cut_by_place, terrain, utm, write_tiles, write_tiles_as};
 

@@ -1,7 +1,7 @@
 //! The Khronos validator has nothing to say about what is written.
 
 use gdt_batch::output::frame::Frame;
-use gdt_batch::output::terrain::write_terrain;
+use gdt_batch::output::gltf::one_file::write_terrain;
 use gdt_batch::output::{Compression, Tile};
 
 use crate::model::{cloud, cut_by_place, grid, lattice, terrain, utm, write_tiles, write_tiles_as};

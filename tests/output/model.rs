@@ -6,7 +6,7 @@ use std::path::Path;
 use gdt_batch::geometry::lattice::{Lattice, shortest_decimal};
 use gdt_batch::geometry::predicates::{in_circle, orient2d};
 use gdt_batch::output::frame::Frame;
-use gdt_batch::output::glb::Glb;
+use gdt_batch::output::gltf::glb::Glb;
 use gdt_batch::output::normals::Sums;
 use gdt_batch::output::{Compression, Tile};
 use spade::{DelaunayTriangulation, Point2, Triangulation};

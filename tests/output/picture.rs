@@ -1,8 +1,8 @@
 //! The picture covers the terrain, every pixel once.
 
 use gdt_batch::geometry::predicates::orient2d;
-use gdt_batch::output::picture::Picture;
-use gdt_batch::output::preview::{Canvas, LONGER_SIDE, Texel};
+use gdt_batch::output::preview::canvas::{Canvas, LONGER_SIDE, Texel};
+use gdt_batch::output::preview::picture::Picture;
 use proptest::prelude::*;
 
 use crate::model::{cloud, cut, grid, terrain, utm};

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use gdt_batch::Error;
 use gdt_batch::output::frame::Frame;
-use gdt_batch::output::read::{Part, TileFile, read_tile};
+use gdt_batch::output::gltf::read::{Part, TileFile, read_tile};
 use gdt_batch::output::{Compression, Tile};
 use gdt_batch::verify::Source;
 use proptest::prelude::*;

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-use gdt_batch::job::directory::Directory;
-use gdt_batch::job::store::Store;
+use gdt_batch::job::durable::directory::Directory;
+use gdt_batch::job::durable::store::Store;
 use serde_json::Value;
 use tempfile::TempDir;
 

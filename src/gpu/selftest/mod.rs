@@ -7,11 +7,11 @@ mod timing;
 pub use compare::{Comparison, compare};
 pub use timing::{StepTime, Timing};
 
-use super::Fault;
-use super::buffers::Set;
-use super::device::{self, ADAPTER_VARIABLE, Device, Wish};
-use super::machine::Machine;
-use super::steps::Size;
+use crate::gpu::Fault;
+use crate::gpu::buffers::Set;
+use crate::gpu::device::{self, ADAPTER_VARIABLE, Device, Wish};
+use crate::gpu::machine::Machine;
+use crate::gpu::steps::Size;
 use crate::{Error, Result};
 use serde::Serialize;
 use std::fmt;

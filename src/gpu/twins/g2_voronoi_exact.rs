@@ -1,7 +1,7 @@
 //! Step G2, exact, beside `shaders/g2_voronoi_exact.wgsl`.
 
-use super::{NONE, key, own};
 use crate::gpu::steps::Size;
+use crate::gpu::twins::{NONE, key, own};
 
 /// The label of every pixel of `texture`: the pixel of its nearest site, least (d^2, x, y), or [`NONE`] without any site.
 pub fn voronoi_exact(size: Size, texture: &[u32]) -> Vec<u32> {

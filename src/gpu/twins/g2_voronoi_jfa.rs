@@ -1,7 +1,7 @@
 //! Step G2, 1+JFA, beside `shaders/g2_voronoi_jfa.wgsl`.
 
-use super::{NONE, key, own};
 use crate::gpu::steps::{Size, jfa_steps};
+use crate::gpu::twins::{NONE, key, own};
 
 /// The label of every pixel of `texture` as jump flooding finds it.
 pub fn voronoi_jfa(size: Size, texture: &[u32]) -> Vec<u32> {

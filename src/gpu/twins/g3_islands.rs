@@ -1,7 +1,7 @@
 //! Step G3, beside `shaders/g3_islands.wgsl`.
 
-use super::{NONE, key};
 use crate::gpu::steps::{ROUNDS, Size};
+use crate::gpu::twins::{NONE, key};
 
 /// Gives islands the colours around them, round by round.
 pub fn remove_islands(size: Size, labels: &mut [u32]) {

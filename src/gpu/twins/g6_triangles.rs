@@ -1,7 +1,7 @@
 //! Step G6, beside `shaders/g6_triangles.wgsl`.
 
-use super::g4_vertices::{around, find_vertices};
 use crate::gpu::steps::Size;
+use crate::gpu::twins::g4_vertices::{around, find_vertices};
 
 /// The triangles of all corners, row by row, as triples of site numbers.
 pub fn make_triangles(size: Size, labels: &[u32], texture: &[u32]) -> Vec<[u32; 3]> {

@@ -1,7 +1,7 @@
 //! The definition of a projected system in the way of PROJ.4, from its EPSG code or from its well-known text.
 
-use super::wkt::{Node, PROJECTED, find};
-use super::{Crs, plain};
+use crate::input::crs::wkt::{Node, PROJECTED, find};
+use crate::input::crs::{Crs, plain};
 
 /// Parameters of projections: names in WKT, letters and digits in lower case, and that of PROJ.4.
 const PARAMETERS: [(&str, &str); 20] = [
@@ -42,7 +42,7 @@ const METHODS: [(&str, &str); 10] = [
 ];
 
 /// The definition of `crs`; `None` where neither its code nor its text gives one.
-pub(super) fn definition(crs: &Crs) -> Option<String> {
+pub(crate) fn definition(crs: &Crs) -> Option<String> {
     let of_code = |code| Some(crs_definitions::from_code(u16::try_from(code).ok()?)?.proj4.to_string());
     crs.epsg.and_then(of_code).or_else(|| of_text(crs.wkt.as_deref()?))
 }

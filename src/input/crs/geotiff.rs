@@ -1,7 +1,7 @@
 //! Coordinate reference systems as GeoTIFF keys (OGC 19-008r4, as LAS holds them in three records).
 
-use super::{Crs, Unit, from_epsg};
-use crate::input::layout::{float64, uint16};
+use crate::input::crs::{Crs, Unit, from_epsg};
+use crate::input::las::layout::{float64, uint16};
 
 const MODEL_TYPE: u16 = 1024;
 const GEOGRAPHIC_TYPE: u16 = 2048;
@@ -20,13 +20,13 @@ const DOUBLES: u16 = 34736;
 const TEXTS: u16 = 34737;
 
 /// The three records, as they are in the file.
-pub(super) struct Records {
+pub(crate) struct Records {
     /// The key directory: numbers of 16 bits.
-    pub(super) directory: Vec<u8>,
+    pub(crate) directory: Vec<u8>,
     /// Values of 64 bits.
-    pub(super) doubles: Vec<u8>,
+    pub(crate) doubles: Vec<u8>,
     /// Texts.
-    pub(super) texts: Vec<u8>,
+    pub(crate) texts: Vec<u8>,
 }
 
 impl Records {
@@ -76,7 +76,7 @@ fn metres(code: u16) -> Option<f64> {
 }
 
 /// What the keys say; `None` where they say nothing.
-pub(super) fn parse(records: &Records) -> Option<Crs> {
+pub(crate) fn parse(records: &Records) -> Option<Crs> {
     let model = records.code(MODEL_TYPE);
     let projected = records.code(PROJECTED_TYPE).filter(|_| model != Some(2));
     let code = projected.or_else(|| records.code(GEOGRAPHIC_TYPE).filter(|_| model != Some(1)));

@@ -6,9 +6,9 @@ mod wkt;
 
 use serde::{Deserialize, Serialize};
 
-use super::positioned::Positioned;
-use super::vlr::Vlr;
 use crate::Result;
+use crate::input::file::Positioned;
+use crate::input::las::vlr::Vlr;
 
 /// A unit of x and y.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -172,7 +172,7 @@ fn from_epsg(code: u32) -> Option<Crs> {
 const TEXT_RECORDS: [(&str, u16); 2] = [("LASF_Projection", 2112), ("liblas", 2112)];
 
 /// The system that the records of `file` describe. Text wins over GeoTIFF keys; an empty one counts as none.
-pub(super) fn read(file: &Positioned, vlrs: &[Vlr], warnings: &mut Vec<String>) -> Result<Crs> {
+pub(crate) fn read(file: &Positioned, vlrs: &[Vlr], warnings: &mut Vec<String>) -> Result<Crs> {
     let text = read_text(file, vlrs, warnings)?;
     let keys = geotiff::parse(&geotiff::Records {
         directory: record(file, vlrs, 34735)?,

@@ -1,19 +1,19 @@
 //! Well-known text of coordinate reference systems, versions 1 (OGC 01-009) and 2 (ISO 19162): units, names, codes.
 
-use super::{Crs, Unit};
+use crate::input::crs::{Crs, Unit};
 
 /// Nesting deeper than this is damage.
 const DEEPEST: usize = 40;
 
 /// `KEYWORD[value, value, ...]`.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Node {
-    pub(super) keyword: String,
+pub(crate) struct Node {
+    pub(crate) keyword: String,
     values: Vec<Value>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Value {
+pub(crate) enum Value {
     Text(String),
     Number(f64),
     Node(Node),
@@ -56,24 +56,24 @@ impl Node {
         }
     }
 
-    pub(super) fn children(&self) -> impl Iterator<Item = &Node> {
+    pub(crate) fn children(&self) -> impl Iterator<Item = &Node> {
         self.values.iter().filter_map(|value| if let Value::Node(node) = value { Some(node) } else { None })
     }
 
-    pub(super) fn child(&self, keywords: &[&str]) -> Option<&Node> {
+    pub(crate) fn child(&self, keywords: &[&str]) -> Option<&Node> {
         self.children().find(|child| keywords.contains(&child.keyword.as_str()))
     }
 
-    pub(super) fn text(&self, index: usize) -> Option<&str> {
+    pub(crate) fn text(&self, index: usize) -> Option<&str> {
         if let Some(Value::Text(text)) = self.values.get(index) { Some(text) } else { None }
     }
 
     /// Metres of its unit of length.
-    pub(super) fn unit_metres(&self) -> Option<f64> {
+    pub(crate) fn unit_metres(&self) -> Option<f64> {
         units(self).0.and_then(length)
     }
 
-    pub(super) fn number(&self, index: usize) -> Option<f64> {
+    pub(crate) fn number(&self, index: usize) -> Option<f64> {
         match self.values.get(index)? {
             Value::Number(number) => Some(*number),
             Value::Text(text) => text.parse().ok(),
@@ -118,7 +118,7 @@ fn read_quoted<'a>(quoted: &'a str, rest: &mut &'a str) -> Option<Value> {
     Some(Value::Text(text))
 }
 
-pub(super) const PROJECTED: [&str; 3] = ["PROJCS", "PROJCRS", "PROJECTEDCRS"];
+pub(crate) const PROJECTED: [&str; 3] = ["PROJCS", "PROJCRS", "PROJECTEDCRS"];
 const GEOGRAPHIC: [&str; 6] = ["GEOGCS", "GEOGCRS", "GEOGRAPHICCRS", "GEODCRS", "GEODETICCRS", "GEOCCS"];
 const LOCAL: [&str; 3] = ["LOCAL_CS", "ENGCRS", "ENGINEERINGCRS"];
 const VERTICAL: [&str; 4] = ["VERT_CS", "VERTCS", "VERTCRS", "VERTICALCRS"];
@@ -126,19 +126,19 @@ const COMPOUND: [&str; 2] = ["COMPD_CS", "COMPOUNDCRS"];
 const UNITS: [&str; 3] = ["UNIT", "LENGTHUNIT", "ANGLEUNIT"];
 
 /// The part of the system in `text` whose keyword is one of these.
-pub(super) fn find(text: &str, keywords: &[&str]) -> Option<Node> {
+pub(crate) fn find(text: &str, keywords: &[&str]) -> Option<Node> {
     let roots = Node::parse_all(text)?;
     let mut parts = roots.iter().flat_map(parts).map(unbound);
     parts.find(|part| keywords.contains(&part.keyword.as_str())).cloned()
 }
 
 /// The name of the vertical system in `text`.
-pub(super) fn vertical_name(text: &str) -> Option<String> {
+pub(crate) fn vertical_name(text: &str) -> Option<String> {
     find(text, &VERTICAL)?.text(0).map(str::to_string).filter(|name| !name.is_empty())
 }
 
 /// What `text` says; `None` where it is not well-known text of a coordinate reference system.
-pub(super) fn parse(text: &str) -> Option<Crs> {
+pub(crate) fn parse(text: &str) -> Option<Crs> {
     let roots = Node::parse_all(text)?;
     let parts: Vec<&Node> = roots.iter().flat_map(parts).map(unbound).collect();
     let find = |keywords: &[&str]| parts.iter().find(|part| keywords.contains(&part.keyword.as_str())).copied();
@@ -156,7 +156,7 @@ pub(super) fn parse(text: &str) -> Option<Crs> {
 }
 
 /// The parameters of the projection in `text`, names in one spelling, sorted; empty where there are none.
-pub(super) fn parameters(text: &str) -> Vec<(String, f64)> {
+pub(crate) fn parameters(text: &str) -> Vec<(String, f64)> {
     let mut found = Vec::new();
     for root in Node::parse_all(text).unwrap_or_default() {
         collect_parameters(&root, &mut found);

@@ -5,13 +5,13 @@ use std::path::Path;
 
 use memchr::{memchr, memchr2};
 
-use super::TextOptions;
-use super::number::Number;
+use crate::input::text::TextOptions;
+use crate::input::text::number::Number;
 use crate::{Error, Result};
 
 /// What stands between two columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Delimiter {
+pub(crate) enum Delimiter {
     /// One character, with or without spaces around it.
     Byte(u8),
     /// Any run of spaces and tabs.
@@ -38,7 +38,7 @@ impl Delimiter {
 
     /// The bytes of the column at the start of `line`, spaces and quotes taken off, and the rest of the line after the
     /// delimiter, if there is any.
-    pub(super) fn split<'a>(&self, line: &'a [u8]) -> (&'a [u8], Option<&'a [u8]>) {
+    pub(crate) fn split<'a>(&self, line: &'a [u8]) -> (&'a [u8], Option<&'a [u8]>) {
         let line = if *self == Delimiter::Blank { line.trim_ascii_start() } else { line };
         let quoted = quoted_length(line.trim_ascii_start())
             .map_or(0, |length| length + line.len() - line.trim_ascii_start().len());
@@ -60,7 +60,7 @@ impl Delimiter {
     }
 
     /// All columns of `line`.
-    pub(super) fn fields<'a>(&self, line: &'a [u8]) -> Vec<&'a [u8]> {
+    pub(crate) fn fields<'a>(&self, line: &'a [u8]) -> Vec<&'a [u8]> {
         let mut fields = Vec::new();
         let mut rest = Some(line);
         while let Some(line) = rest {
@@ -87,7 +87,7 @@ fn unquoted(field: &[u8]) -> &[u8] {
 
 /// What a column holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Role {
+pub(crate) enum Role {
     /// x, y or z.
     Coordinate(usize),
     /// Red, green or blue.
@@ -116,26 +116,26 @@ fn role(name: &[u8]) -> Role {
 
 /// How the lines of a text are to be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Columns {
+pub(crate) struct Columns {
     /// What parts the columns of a row.
-    pub(super) delimiter: Delimiter,
+    pub(crate) delimiter: Delimiter,
     /// What each column holds, up to the last that is used.
-    pub(super) roles: Vec<Role>,
+    pub(crate) roles: Vec<Role>,
     /// What lines to be skipped begin with.
     comments: Vec<Vec<u8>>,
 }
 
 /// The lines at the start of a text, and what to do with them.
-pub(super) struct Detection {
-    pub(super) columns: Columns,
+pub(crate) struct Detection {
+    pub(crate) columns: Columns,
     /// Whether the first line that is neither blank nor a comment is no row.
-    pub(super) header: bool,
-    pub(super) warnings: Vec<String>,
+    pub(crate) header: bool,
+    pub(crate) warnings: Vec<String>,
 }
 
 impl Columns {
     /// Finds out how the text in `path` is laid out, the first lines of which are `lines`.
-    pub(super) fn detect(path: &Path, lines: &[&[u8]], options: &TextOptions) -> Result<Detection> {
+    pub(crate) fn detect(path: &Path, lines: &[&[u8]], options: &TextOptions) -> Result<Detection> {
         let comments = comments(options)?;
         let rows: Vec<&[u8]> = lines.iter().copied().filter(|line| !skipped(line, &comments)).collect();
         let Some((&first, after)) = rows.split_first() else {
@@ -170,12 +170,12 @@ impl Columns {
 
     /// Whether `line` is blank or a comment.
     #[inline]
-    pub(super) fn skips(&self, line: &[u8]) -> bool {
+    pub(crate) fn skips(&self, line: &[u8]) -> bool {
         skipped(line, &self.comments)
     }
 
     /// Whether a column holds what `wanted` says.
-    pub(super) fn have(&self, wanted: Role) -> bool {
+    pub(crate) fn have(&self, wanted: Role) -> bool {
         self.roles.contains(&wanted)
     }
 }
@@ -281,7 +281,7 @@ fn row_delimiter(candidates: &[Delimiter], roles: &[Role], rows: &[&[u8]]) -> De
 }
 
 /// The start of `text` in quotes, for a message.
-pub(super) fn shown(text: &[u8]) -> String {
+pub(crate) fn shown(text: &[u8]) -> String {
     const MOST: usize = 60;
     let text = String::from_utf8_lossy(&text[..text.len().min(4 * MOST)]).into_owned();
     let short: String = text.chars().take(MOST).collect();

@@ -1,12 +1,12 @@
 //! The coarsest grid that a column of numbers lies on.
 
-use super::number::Number;
-use super::number::POWERS;
+use crate::input::text::number::Number;
+use crate::input::text::number::POWERS;
 use rust_decimal::Decimal;
 
 /// The largest step, `step / 10^decimals`, of which all numbers seen are whole multiples; 0 while only zeros were seen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Granularity {
+pub(crate) struct Granularity {
     step: u64,
     decimals: u8,
 }
@@ -14,7 +14,7 @@ pub(super) struct Granularity {
 impl Granularity {
     /// Takes one more number into account.
     #[inline]
-    pub(super) fn see(&mut self, number: &Number) {
+    pub(crate) fn see(&mut self, number: &Number) {
         let mantissa = number.mantissa.unsigned_abs();
         let same = number.decimals == self.decimals && self.step > 0 && mantissa.is_multiple_of(self.step);
         let finest = self.step == 1 && number.decimals <= self.decimals;
@@ -24,7 +24,7 @@ impl Granularity {
     }
 
     /// Takes all numbers that `other` has seen into account.
-    pub(super) fn add(&mut self, other: &Granularity) {
+    pub(crate) fn add(&mut self, other: &Granularity) {
         let decimals = self.decimals.max(other.decimals);
         let scaled = |g: &Granularity| g.step.checked_mul(POWERS[(decimals - g.decimals) as usize] as u64);
         // A number too long to compare is taken to need its last digit.
@@ -33,7 +33,7 @@ impl Granularity {
     }
 
     /// The step; `None` while only zeros were seen.
-    pub(super) fn value(&self) -> Option<Decimal> {
+    pub(crate) fn value(&self) -> Option<Decimal> {
         let step = Decimal::from_i128_with_scale(self.step.into(), self.decimals.into()).normalize();
         (self.step > 0).then_some(step)
     }

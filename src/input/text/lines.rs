@@ -5,17 +5,17 @@ use std::ops::Range;
 use memchr::memchr;
 
 use crate::Result;
-use crate::input::positioned::Positioned;
+use crate::input::file::Positioned;
 
 /// Bytes of a block.
-pub(super) const BLOCK: u64 = 2 << 20;
+pub(crate) const BLOCK: u64 = 2 << 20;
 
 /// The longest line that is read, in bytes.
-pub(super) const LONGEST: usize = 1 << 16;
+pub(crate) const LONGEST: usize = 1 << 16;
 
 /// A line without its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Line<'a> {
+pub(crate) enum Line<'a> {
     /// The line's bytes.
     Whole(&'a [u8]),
     /// A line of more than [`LONGEST`] bytes.
@@ -24,7 +24,7 @@ pub(super) enum Line<'a> {
 
 /// Calls `each` for every line that begins in `range`. Lines begin at `first`, or after a line feed.
 /// Gives the number of lines.
-pub(super) fn for_each_line(
+pub(crate) fn for_each_line(
     file: &Positioned,
     first: u64,
     range: Range<u64>,

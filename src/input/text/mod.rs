@@ -6,7 +6,7 @@ mod lines;
 mod number;
 mod table;
 
-pub(super) use table::Table;
+pub(crate) use table::Table;
 
 use serde::{Deserialize, Serialize};
 

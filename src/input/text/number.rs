@@ -1,13 +1,13 @@
 //! Decimal numbers as exact integers: mantissa and number of decimals, without floating point on the way.
 
 /// The most decimals that are kept; further ones are noise of floating point and are rounded away.
-pub(super) const MOST_DECIMALS: u8 = 15;
+pub(crate) const MOST_DECIMALS: u8 = 15;
 
 /// The most digits that surely fit an `i64`.
 const MOST_DIGITS: usize = 18;
 
 /// Powers of ten that fit an `i64`.
-pub(super) const POWERS: [i64; 19] = {
+pub(crate) const POWERS: [i64; 19] = {
     let mut powers = [1; 19];
     let mut i = 1;
     while i < 19 {
@@ -19,19 +19,19 @@ pub(super) const POWERS: [i64; 19] = {
 
 /// `mantissa / 10^decimals`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Number {
-    pub(super) mantissa: i64,
+pub(crate) struct Number {
+    pub(crate) mantissa: i64,
     /// At most [`MOST_DECIMALS`].
-    pub(super) decimals: u8,
+    pub(crate) decimals: u8,
     /// Whether digits had to be rounded away.
-    pub(super) rounded: bool,
+    pub(crate) rounded: bool,
 }
 
 impl Number {
     /// The plain number at the start of `bytes`, as far as its digits go, and its length; `None` where there is none or
     /// it is not a plain one. What follows it is the caller's to check.
     #[inline]
-    pub(super) fn read(bytes: &[u8]) -> Option<(Number, usize)> {
+    pub(crate) fn read(bytes: &[u8]) -> Option<(Number, usize)> {
         let negative = bytes.first() == Some(&b'-');
         let start = negative as usize;
         let (mut mantissa, mut at) = (0i64, start);
@@ -60,7 +60,7 @@ impl Number {
 
     /// The number that all of `text` says, an exponent and any number of digits included; `None` where it says none,
     /// or one of more than 18 digits before the point.
-    pub(super) fn parse(text: &[u8]) -> Option<Number> {
+    pub(crate) fn parse(text: &[u8]) -> Option<Number> {
         if let Some((number, length)) = Number::read(text)
             && length == text.len()
         {
@@ -79,7 +79,7 @@ impl Number {
     }
 
     /// The same number with as few decimals as it needs.
-    pub(super) fn shortest(mut self) -> Number {
+    pub(crate) fn shortest(mut self) -> Number {
         while self.decimals > 0 && self.mantissa % 10 == 0 {
             self.mantissa /= 10;
             self.decimals -= 1;
@@ -89,7 +89,7 @@ impl Number {
 
     /// The integer in steps of `10^-decimals`, and whether anything was rounded; `None` where it does not fit.
     #[inline]
-    pub(super) fn steps(&self, decimals: u8) -> Option<(i64, bool)> {
+    pub(crate) fn steps(&self, decimals: u8) -> Option<(i64, bool)> {
         if self.decimals <= decimals {
             let factor = POWERS[(decimals - self.decimals) as usize];
             return Some((self.mantissa.checked_mul(factor)?, self.rounded));
@@ -100,7 +100,7 @@ impl Number {
 
     /// The nearest floating-point number, but for at most one unit in the last place where there are more than 15 digits.
     #[inline]
-    pub(super) fn value(&self) -> f64 {
+    pub(crate) fn value(&self) -> f64 {
         self.mantissa as f64 / POWERS[self.decimals as usize] as f64
     }
 }

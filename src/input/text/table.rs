@@ -5,14 +5,14 @@ use std::ops::Range;
 use rayon::prelude::*;
 use rust_decimal::Decimal;
 
-use super::TextOptions;
-use super::columns::{Columns, Delimiter, Role, shown};
-use super::granularity::Granularity;
-use super::lines::{BLOCK, LONGEST, Line, for_each_line};
-use super::number::{MOST_DECIMALS, Number, POWERS};
-use crate::input::positioned::Positioned;
-use crate::input::sieve::{Record, Sieve};
+use crate::input::file::Positioned;
+use crate::input::filter::{Record, Sieve};
 use crate::input::source::Axis;
+use crate::input::text::TextOptions;
+use crate::input::text::columns::{Columns, Delimiter, Role, shown};
+use crate::input::text::granularity::Granularity;
+use crate::input::text::lines::{BLOCK, LONGEST, Line, for_each_line};
+use crate::input::text::number::{MOST_DECIMALS, Number, POWERS};
 use crate::{Result, interrupt};
 
 /// Bytes at the start of a text that show how it is laid out.
@@ -20,17 +20,17 @@ const SAMPLE: u64 = 1 << 17;
 
 /// The text, after a first pass over all of it.
 #[derive(Clone, Debug)]
-pub(in crate::input) struct Table {
+pub(crate) struct Table {
     columns: Columns,
     /// Where the rows begin, and where the file ends.
     rows: Range<u64>,
     blocks: Vec<Block>,
     /// Rows, malformed ones included.
-    pub(in crate::input) records: u64,
+    pub(crate) records: u64,
     /// Least x, y, z.
-    pub(in crate::input) min: [f64; 3],
+    pub(crate) min: [f64; 3],
     /// Greatest x, y, z.
-    pub(in crate::input) max: [f64; 3],
+    pub(crate) max: [f64; 3],
     decimals: [u8; 3],
     grid: [Granularity; 2],
 }
@@ -55,7 +55,7 @@ struct Survey {
 
 impl Table {
     /// Goes through all of `file` on the threads of the current rayon pool; the texts are what the user should know.
-    pub(in crate::input) fn scan(file: &Positioned, options: &TextOptions) -> Result<(Table, Vec<String>)> {
+    pub(crate) fn scan(file: &Positioned, options: &TextOptions) -> Result<(Table, Vec<String>)> {
         let (columns, start, first_line, mut warnings) = detect(file, options)?;
         let rows = start..file.size();
         let count = (rows.end - rows.start).div_ceil(BLOCK);
@@ -78,32 +78,32 @@ impl Table {
     }
 
     /// Steps of the most decimals found, from 0.
-    pub(in crate::input) fn axes(&self) -> [Axis; 3] {
+    pub(crate) fn axes(&self) -> [Axis; 3] {
         self.decimals.map(|decimals| Axis { offset: Decimal::ZERO, scale: Decimal::new(1, decimals as u32) })
     }
 
     /// The largest step of which every x, and every y, is a whole multiple.
-    pub(in crate::input) fn grid(&self) -> [Decimal; 2] {
+    pub(crate) fn grid(&self) -> [Decimal; 2] {
         [0, 1].map(|axis| self.grid[axis].value().unwrap_or(Decimal::ONE))
     }
 
     /// Whether rows have red, green and blue.
-    pub(in crate::input) fn has_rgb(&self) -> bool {
+    pub(crate) fn has_rgb(&self) -> bool {
         self.columns.have(Role::Color(0))
     }
 
     /// Whether rows have a classification.
-    pub(in crate::input) fn has_class(&self) -> bool {
+    pub(crate) fn has_class(&self) -> bool {
         self.columns.have(Role::Class)
     }
 
     /// The number of pieces.
-    pub(in crate::input) fn pieces(&self) -> usize {
+    pub(crate) fn pieces(&self) -> usize {
         self.blocks.len()
     }
 
     /// Sends the rows of `piece` through `sieve`.
-    pub(in crate::input) fn decode(&self, file: &Positioned, piece: usize, sieve: &mut Sieve) -> Result<()> {
+    pub(crate) fn decode(&self, file: &Positioned, piece: usize, sieve: &mut Sieve) -> Result<()> {
         let Block { mut row, line: first_line } = self.blocks[piece];
         let mut reader = RowReader::new(&self.columns);
         let range = block_range(&self.rows, piece as u64);

@@ -6,8 +6,8 @@ use std::sync::LazyLock;
 use gdt_batch::config::Config;
 use gdt_batch::geometry::lattice::{AxisMap, REACH};
 use gdt_batch::input::{Point, Rules, Source, Tally, TextOptions, open};
-use gdt_batch::job::choose::Coarser;
-use gdt_batch::job::scan;
+use gdt_batch::job::plan::lattice_choice::Coarser;
+use gdt_batch::job::plan::scan;
 use gdt_batch::{Error, Result};
 
 use super::with_file;

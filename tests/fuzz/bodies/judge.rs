@@ -4,7 +4,7 @@
 use std::collections::{HashMap, HashSet};
 
 use gdt_batch::geometry::Site;
-use gdt_batch::triangulation::mesh::{HULL, Mesh};
+use gdt_batch::mesh::half_edge::{HULL, Mesh};
 
 /// Panics unless every triangle turns left, edges meet in pairs, the hull is convex and holds every site on it, Euler's formula
 /// holds, and every edge is Delaunay with ties decided by the rule: the lexicographically last of four counts as outside.

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use gdt_batch::config::{Backend, Triangulation};
 use gdt_batch::geometry::Site;
-use gdt_batch::triangulation::mesh::Mesh;
+use gdt_batch::mesh::half_edge::Mesh;
 use gdt_batch::triangulation::{Triangulator, reference};
 
 use super::judge;

@@ -1,0 +1,209 @@
+//! Files read at given positions: no shared seek position, no memory map, so that any thread may read and a file that
+//! shrinks is an error, never a crash.
+
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+use crate::positional_io::read_at;
+use crate::{Error, Result};
+
+/// What to say of a file that ends before its size.
+const SHRUNK: &str = "it became shorter while it was read; run again when it is complete";
+
+/// A file open for reading, whose size is known.
+pub(crate) struct Positioned {
+    file: File,
+    path: PathBuf,
+    size: u64,
+}
+
+impl Positioned {
+    /// Opens `path`, which must be a regular file.
+    pub(crate) fn open(path: &Path) -> Result<Positioned> {
+        // Before it is opened: a pipe would wait for somebody who writes.
+        if !path.metadata().map_err(Error::io("read", path))?.is_file() {
+            return Err(Error::input(path, "is not a regular file; give the point-cloud files themselves"));
+        }
+        let file = File::open(path).map_err(Error::io("read", path))?;
+        let size = file.metadata().map_err(Error::io("read", path))?.len();
+        Ok(Positioned { file, path: path.to_path_buf(), size })
+    }
+
+    /// Opens `path` again; an error where its size is no longer `size`.
+    pub(crate) fn reopen(path: &Path, size: u64) -> Result<Positioned> {
+        let file = Positioned::open(path)?;
+        if file.size != size {
+            let what = format!(
+                "it has changed while it was in use, from {size} bytes to {}; run again when it is complete",
+                file.size
+            );
+            return Err(Error::io("read", path)(io::Error::other(what)));
+        }
+        Ok(file)
+    }
+
+    /// The size in bytes when the file was opened.
+    pub(crate) fn size(&self) -> u64 {
+        self.size
+    }
+
+    /// The file's path.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Fills `buffer` from `offset` on.
+    pub(crate) fn read_exact_at(&self, buffer: &mut [u8], offset: u64) -> Result<()> {
+        crate::positional_io::read_exact_at(&self.file, buffer, offset).map_err(|error| match error.kind() {
+            io::ErrorKind::UnexpectedEof => Error::io("read", &self.path)(io::Error::other(SHRUNK)),
+            _ => Error::io("read", &self.path)(error),
+        })
+    }
+
+    /// The bytes of `range`, which the caller has checked against [`Positioned::size`].
+    pub(crate) fn bytes(&self, range: std::ops::Range<u64>) -> Result<Vec<u8>> {
+        let mut bytes = vec![0; (range.end - range.start) as usize];
+        self.read_exact_at(&mut bytes, range.start)?;
+        Ok(bytes)
+    }
+
+    /// A buffered reader of the bytes of `range`.
+    pub(crate) fn window(&self, range: std::ops::Range<u64>) -> Result<Window> {
+        let file = self.file.try_clone().map_err(Error::io("read", &self.path))?;
+        Ok(Window { file, next: range.start, end: range.end, buffer: Vec::new(), at: 0 })
+    }
+}
+
+/// Bytes a [`Window`] reads at once.
+const WINDOW: usize = 1 << 16;
+
+/// A part of a file as a stream that ends where the part ends. Skipped bytes are not read.
+pub(crate) struct Window {
+    file: File,
+    /// Position in the file of the first byte after the buffer.
+    next: u64,
+    end: u64,
+    buffer: Vec<u8>,
+    at: usize,
+}
+
+impl Window {
+    /// Reads on into `out`, as much as is left of the part. That there is less in the file is an error.
+    fn read_direct(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        let size = self.end.saturating_sub(self.next).min(out.len() as u64) as usize;
+        if size == 0 {
+            return Ok(0);
+        }
+        match read_at(&self.file, &mut out[..size], self.next)? {
+            0 => Err(io::Error::other(SHRUNK)),
+            count => {
+                self.next += count as u64;
+                Ok(count)
+            }
+        }
+    }
+
+    fn refill(&mut self) -> io::Result<()> {
+        let mut buffer = std::mem::take(&mut self.buffer);
+        self.at = 0;
+        buffer.resize(WINDOW, 0);
+        let count = self.read_direct(&mut buffer)?;
+        buffer.truncate(count);
+        self.buffer = buffer;
+        Ok(())
+    }
+}
+
+impl Read for Window {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        if self.at == self.buffer.len() {
+            if out.len() >= WINDOW {
+                self.buffer.clear();
+                self.at = 0;
+                return self.read_direct(out);
+            }
+            self.refill()?;
+        }
+        let count = out.len().min(self.buffer.len() - self.at);
+        out[..count].copy_from_slice(&self.buffer[self.at..self.at + count]);
+        self.at += count;
+        Ok(count)
+    }
+
+    #[inline]
+    fn read_exact(&mut self, mut out: &mut [u8]) -> io::Result<()> {
+        // The arithmetic decoder asks for single bytes.
+        if let Some(bytes) = self.buffer.get(self.at..self.at + out.len()) {
+            out.copy_from_slice(bytes);
+            self.at += out.len();
+            return Ok(());
+        }
+        while !out.is_empty() {
+            match self.read(out) {
+                Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
+                Ok(count) => out = &mut out[count..],
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Seek for Window {
+    /// Positions are those of the file.
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        let here = self.next - (self.buffer.len() - self.at) as u64;
+        let target = match to {
+            SeekFrom::Start(position) => Some(position),
+            SeekFrom::Current(step) => here.checked_add_signed(step),
+            SeekFrom::End(step) => self.end.checked_add_signed(step),
+        };
+        let target = target.ok_or(io::ErrorKind::InvalidInput)?;
+        let first = self.next - self.buffer.len() as u64;
+        if (first..=self.next).contains(&target) {
+            self.at = (target - first) as usize;
+        } else {
+            (self.next, self.at) = (target, 0);
+            self.buffer.clear();
+        }
+        Ok(target)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_window_reads_and_seeks_like_the_bytes_it_shows() {
+        let bytes: Vec<u8> = (0..300_000u32).map(|i| (i * 7 % 251) as u8).collect();
+        let path = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(path.path(), &bytes).unwrap();
+        let file = Positioned::open(path.path()).unwrap();
+        let mut window = file.window(1000..299_000).unwrap();
+        let mut at = 1000;
+        for (size, step) in [(1, 0), (70_000, 5), (3, -2000), (65_536, 100_000), (10, -60_000), (100_000, 0)] {
+            let mut out = vec![0; size];
+            window.read_exact(&mut out).unwrap();
+            assert!(out == bytes[at..at + size], "{size} bytes at {at}");
+            at = (at as i64 + size as i64 + step) as usize;
+            assert_eq!(window.seek(SeekFrom::Current(step)).unwrap(), at as u64);
+        }
+        window.seek(SeekFrom::Start(298_990)).unwrap();
+        assert_eq!(window.read_exact(&mut [0; 11]).unwrap_err().kind(), io::ErrorKind::UnexpectedEof);
+    }
+
+    #[test]
+    fn a_file_that_shrinks_is_an_error_and_not_its_end() {
+        let path = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(path.path(), [1; 1000]).unwrap();
+        let file = Positioned::open(path.path()).unwrap();
+        let mut window = file.window(0..1000).unwrap();
+        std::fs::write(path.path(), [1; 10]).unwrap();
+        assert_eq!(window.read_exact(&mut [0; 20]).unwrap_err().kind(), io::ErrorKind::Other);
+        assert_eq!(file.read_exact_at(&mut [0; 20], 0).unwrap_err().exit_code(), 1);
+        assert_eq!(Positioned::reopen(path.path(), 1000).err().unwrap().exit_code(), 1);
+    }
+}

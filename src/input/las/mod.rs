@@ -1,0 +1,8 @@
+//! LAS and LAZ files: headers, variable-length records, and their points, compressed or not.
+
+pub(crate) mod chunk_table;
+pub(crate) mod header;
+pub(crate) mod layout;
+pub(crate) mod laz;
+pub(crate) mod uncompressed;
+pub(crate) mod vlr;

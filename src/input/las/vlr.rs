@@ -1,0 +1,98 @@
+//! The variable length records of a LAS file, ordinary and extended: where they are, checked against the file's size.
+
+use std::ops::Range;
+
+use crate::Result;
+use crate::input::file::Positioned;
+use crate::input::las::header::Header;
+use crate::input::las::layout::{uint16, uint64};
+
+/// Bytes before the data of a variable length record.
+const HEAD: u64 = 54;
+
+/// Bytes before the data of an extended one.
+const EXTENDED_HEAD: u64 = 60;
+
+/// The most variable length records that are looked at; real files have a few.
+const MOST: u32 = 10_000;
+
+/// The longest record that is read into memory. A coordinate system's text has some thousand bytes.
+const LONGEST: u64 = 1 << 20;
+
+/// One variable length record.
+#[derive(Clone, Debug)]
+pub(crate) struct Vlr {
+    user: String,
+    id: u16,
+    data: Range<u64>,
+}
+
+impl Vlr {
+    /// Whether this is the record `id` of `user`.
+    pub(crate) fn is(&self, user: &str, id: u16) -> bool {
+        self.id == id && self.user == user
+    }
+
+    /// The record's data; empty where it is longer than any record this program reads.
+    pub(crate) fn read(&self, file: &Positioned) -> Result<Vec<u8>> {
+        if self.data.end - self.data.start > LONGEST { Ok(Vec::new()) } else { file.bytes(self.data.clone()) }
+    }
+}
+
+/// All records that lie in the file, and a warning where the header promises more.
+pub(crate) fn list(file: &Positioned, header: &Header, warnings: &mut Vec<String>) -> Result<Vec<Vlr>> {
+    let ordinary = Stretch { range: header.size..header.points_at, count: header.vlrs, head: HEAD };
+    let mut vlrs = ordinary.walk(file)?;
+    if (vlrs.len() as u32) < header.vlrs.min(MOST) {
+        warnings.push(format!(
+            "the header says {} variable length records, but only {} fit before the points",
+            header.vlrs,
+            vlrs.len()
+        ));
+    }
+    let (at, count) = header.evlrs;
+    if count > 0 {
+        let extended = Stretch { range: at..file.size(), count, head: EXTENDED_HEAD };
+        let found = if at >= header.points_at { extended.walk(file)? } else { Vec::new() };
+        if (found.len() as u32) < count.min(MOST) {
+            warnings.push(format!(
+                "the header says {count} extended variable length records at byte {at}, but only {} are there",
+                found.len()
+            ));
+        }
+        vlrs.extend(found);
+    }
+    Ok(vlrs)
+}
+
+/// A stretch of the file that holds records one after the other.
+struct Stretch {
+    range: Range<u64>,
+    count: u32,
+    head: u64,
+}
+
+impl Stretch {
+    fn walk(&self, file: &Positioned) -> Result<Vec<Vlr>> {
+        let mut vlrs = Vec::new();
+        let mut at = self.range.start;
+        while (vlrs.len() as u32) < self.count.min(MOST) && fits(at, self.head, self.range.end) {
+            let mut head = [0; EXTENDED_HEAD as usize];
+            file.read_exact_at(&mut head[..self.head as usize], at)?;
+            let length = if self.head == HEAD { uint16(&head, 20) as u64 } else { uint64(&head, 20) };
+            if !fits(at + self.head, length, self.range.end) {
+                break;
+            }
+            let user = head[2..18].split(|&b| b == 0).next().unwrap_or_default();
+            let user = String::from_utf8_lossy(user).into_owned();
+            let data = at + self.head..at + self.head + length;
+            at = data.end;
+            vlrs.push(Vlr { user, id: uint16(&head, 18), data });
+        }
+        Ok(vlrs)
+    }
+}
+
+fn fits(at: u64, length: u64, end: u64) -> bool {
+    at.checked_add(length).is_some_and(|last| last <= end)
+}

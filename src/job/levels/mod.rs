@@ -1,0 +1,4 @@
+//! Step 7: coarser tiles.
+
+pub mod hierarchy;
+pub mod level;

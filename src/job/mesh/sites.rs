@@ -1,0 +1,117 @@
+//! The sites of a tile: its points from the spill, one for every x and y, in an order that depends on them alone.
+
+use crate::Result;
+use crate::config::Duplicates;
+use crate::geometry::Site;
+use crate::input::Point;
+use crate::job::partition::point_file::{Block, Spill};
+use multiversion::multiversion;
+use std::cmp::Reverse;
+
+/// Reads the points in `blocks` and keeps one of those with equal x and y; the sites in order, and how many points were
+/// duplicates. Memory stays within twice the sites, however often they repeat.
+///
+/// # Errors
+/// [`crate::Error::Io`] if the spill cannot be read.
+pub fn load(spill: &Spill, blocks: &[Block], rule: Duplicates) -> Result<(Vec<Point>, u64)> {
+    let mut points = Vec::with_capacity(blocks.iter().map(|b| b.points as usize).sum::<usize>().min(1 << 20));
+    let (mut kept, mut duplicates) = (0, 0);
+    for &block in blocks {
+        spill.read(block, &mut points)?;
+        if points.len() > (2 * kept).max(1 << 20) {
+            duplicates += keep_one(&mut points, rule);
+            kept = points.len();
+        }
+    }
+    duplicates += keep_one(&mut points, rule);
+    Ok((points, duplicates))
+}
+
+/// Sorts `points` and drops all but one of every x and y; returns how many were dropped.
+fn keep_one(points: &mut Vec<Point>, rule: Duplicates) -> u64 {
+    let before = points.len();
+    sort(points);
+    points.dedup_by(|next, kept| {
+        let same = next.position == kept.position;
+        if same && preferred(next, kept, rule) {
+            *kept = *next;
+        }
+        same
+    });
+    (before - points.len()) as u64
+}
+
+/// Whether `a` rather than `b`, at the same place, is to stay. Where the rule leaves it open their other values decide,
+/// so that the order of the files does not matter.
+fn preferred(a: &Point, b: &Point, rule: Duplicates) -> bool {
+    match rule {
+        Duplicates::Lowest => (a.z, a.class, a.rgb) < (b.z, b.class, b.rgb),
+        Duplicates::Highest => (Reverse(a.z), a.class, a.rgb) < (Reverse(b.z), b.class, b.rgb),
+        Duplicates::First => a.order() < b.order(),
+    }
+}
+
+/// Sorts by y, then x: neighbours in the plane are neighbours in memory, and the pipeline likes rows.
+fn sort(points: &mut Vec<Point>) {
+    match packed_keys(points) {
+        Some((mut keys, index_bits)) => {
+            // Indices ascend, and the order of equal keys stays.
+            radsort::sort_by_key(&mut keys, |key| key >> index_bits);
+            let index = |key: u64| (key & ((1 << index_bits) - 1)) as usize;
+            *points = keys.into_iter().map(|key| points[index(key)]).collect();
+        }
+        None => points.sort_unstable_by_key(|p| (p.position[1], p.position[0])),
+    }
+}
+
+/// For every point its y, its x and its index in one number, and the bits that the index takes: numbers sort several times
+/// faster than points. `None` where the tile is so wide or so full that 64 bits do not hold them.
+fn packed_keys(points: &[Point]) -> Option<(Vec<u64>, u32)> {
+    let (min, max) = extent(points)?;
+    let bits = |value: u64| u64::BITS - value.leading_zeros();
+    let along = |p: [i32; 2], axis: usize| (p[axis] as i64 - min[axis] as i64) as u64;
+    let (x_bits, index_bits) = (bits(along(max, 0)), bits(points.len() as u64));
+    let fits = bits(along(max, 1)) + x_bits + index_bits <= u64::BITS;
+    let key =
+        |(i, p): (usize, &Point)| (along(p.position, 1) << x_bits | along(p.position, 0)) << index_bits | i as u64;
+    fits.then(|| (points.iter().enumerate().map(key).collect(), index_bits))
+}
+
+/// The least and greatest x and y, if there is a point.
+#[multiversion(targets("x86_64+avx2"))]
+fn extent(points: &[Point]) -> Option<(Site, Site)> {
+    let first = points.first()?.position;
+    Some(points.iter().fold((first, first), |(min, max), p| {
+        let p = p.position;
+        ([min[0].min(p[0]), min[1].min(p[1])], [max[0].max(p[0]), max[1].max(p[1])])
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn keep(points: &[(i32, i32, i32)], rule: Duplicates) -> Vec<(i32, i32, i32)> {
+        let mut points: Vec<Point> =
+            points.iter().enumerate().map(|(i, p)| Point::new([p.0, p.1], p.2, [0; 3], 2, i as u64)).collect();
+        keep_one(&mut points, rule);
+        points.iter().map(|p| (p.position[0], p.position[1], p.z)).collect()
+    }
+
+    #[test]
+    fn a_tile_too_wide_for_packed_keys_is_sorted_all_the_same() {
+        let points =
+            [(1 << 29, 1 << 29, 1), (-(1 << 29), 1 << 29, 2), (0, -(1 << 29), 3), (0, 0, 4), (1 << 29, 1 << 29, 0)];
+        let kept = keep(&points, Duplicates::Lowest);
+        assert_eq!(kept, [(0, -(1 << 29), 3), (0, 0, 4), (-(1 << 29), 1 << 29, 2), (1 << 29, 1 << 29, 0)]);
+    }
+
+    #[test]
+    fn one_of_every_place_stays() {
+        let points = [(5, 5, 30), (1, 1, 9), (5, 5, 10), (5, 5, 20)];
+        assert_eq!(keep(&points, Duplicates::Lowest), [(1, 1, 9), (5, 5, 10)]);
+        assert_eq!(keep(&points, Duplicates::Highest), [(1, 1, 9), (5, 5, 30)]);
+        assert_eq!(keep(&points, Duplicates::First), [(1, 1, 9), (5, 5, 30)]);
+        assert_eq!(keep(&[(5, 5, 1), (5, 5, 0)], Duplicates::First), [(5, 5, 1)]);
+    }
+}

@@ -1,0 +1,197 @@
+//! A regular grid of buckets over a rectangle of lattice points, and the sums that cut it into tiles.
+
+use crate::geometry::Site;
+use crate::job::partition::tree::Cell;
+
+/// A grid of square buckets; what lies outside belongs to the nearest bucket.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Grid {
+    origin: Site,
+    side: u32,
+    /// 2^64 by `side`, rounded up: a product by it, cut off there, is the whole quotient of any 32-bit number.
+    inverse: u128,
+    columns: u32,
+    rows: u32,
+}
+
+/// A rectangle of buckets: columns `min[0]..max[0]`, rows `min[1]..max[1]`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Span {
+    min: [u32; 2],
+    max: [u32; 2],
+}
+
+impl Grid {
+    /// A grid of at most `buckets` (and about as many) over the lattice points from `min` to `max`, both included.
+    pub fn over(min: Site, max: Site, buckets: u64) -> Grid {
+        let size = [0, 1].map(|axis| (max[axis] as i64 - min[axis] as i64 + 1) as u64);
+        let count = |side: u64| size[0].div_ceil(side) * size[1].div_ceil(side);
+        // Twice the ideal side is always few enough for a compact rectangle; a thin one needs the search to go on.
+        let mut side = ((size[0] as f64 * size[1] as f64 / buckets as f64).sqrt() as u64).max(1);
+        while count(side) > buckets {
+            side += side / 16 + 1;
+        }
+        Grid {
+            origin: min,
+            side: side as u32,
+            inverse: (1u128 << 64).div_ceil(side as u128),
+            columns: size[0].div_ceil(side) as u32,
+            rows: size[1].div_ceil(side) as u32,
+        }
+    }
+
+    /// The number of buckets.
+    pub fn buckets(&self) -> usize {
+        self.columns as usize * self.rows as usize
+    }
+
+    /// The bucket of a lattice point.
+    #[inline]
+    pub fn bucket(&self, p: Site) -> u32 {
+        let place = |axis: usize, count: u32| {
+            let along = (p[axis] as i64 - self.origin[axis] as i64).clamp(0, u32::MAX as i64) as u32;
+            (((along as u128 * self.inverse) >> 64) as u32).min(count - 1)
+        };
+        place(1, self.rows) * self.columns + place(0, self.columns)
+    }
+
+    /// All buckets.
+    pub fn span(&self) -> Span {
+        Span { min: [0, 0], max: [self.columns, self.rows] }
+    }
+
+    /// The bucket numbers of `span`, row by row.
+    pub fn in_span(&self, span: Span) -> impl Iterator<Item = usize> {
+        let columns = self.columns;
+        (span.min[1]..span.max[1])
+            .flat_map(move |row| (span.min[0]..span.max[0]).map(move |column| (row * columns + column) as usize))
+    }
+
+    /// The lattice coordinate at which bucket line `line` along `axis` begins.
+    fn line(&self, axis: usize, line: u32) -> i64 {
+        self.origin[axis] as i64 + line as i64 * self.side as i64
+    }
+}
+
+/// Points in every rectangle of buckets, by a summed-area table.
+pub struct Sums {
+    grid: Grid,
+    table: Vec<u64>,
+}
+
+impl Sums {
+    /// From the number of points in each bucket.
+    pub fn new(grid: Grid, points: impl Iterator<Item = u64>) -> Sums {
+        let width = grid.columns as usize + 1;
+        let mut table = vec![0; width * (grid.rows as usize + 1)];
+        for (bucket, count) in points.enumerate() {
+            let (row, column) = (bucket / grid.columns as usize + 1, bucket % grid.columns as usize + 1);
+            let at = row * width + column;
+            table[at] = count + table[at - 1] + table[at - width] - table[at - width - 1];
+        }
+        Sums { grid, table }
+    }
+
+    /// The number of points in `span`.
+    pub fn points(&self, span: Span) -> u64 {
+        let at = |column: u32, row: u32| self.table[row as usize * (self.grid.columns as usize + 1) + column as usize];
+        at(span.max[0], span.max[1]) + at(span.min[0], span.min[1])
+            - at(span.min[0], span.max[1])
+            - at(span.max[0], span.min[1])
+    }
+
+    /// `span` without empty lines of buckets on its sides.
+    fn trim(&self, mut span: Span) -> Span {
+        for axis in 0..2 {
+            let with = |min: u32, max: u32| {
+                let mut line = span;
+                (line.min[axis], line.max[axis]) = (min, max);
+                self.points(line)
+            };
+            let (mut min, mut max) = (span.min[axis], span.max[axis]);
+            while max - min > 1 && with(min, min + 1) == 0 {
+                min += 1;
+            }
+            while max - min > 1 && with(max - 1, max) == 0 {
+                max -= 1;
+            }
+            (span.min[axis], span.max[axis]) = (min, max);
+        }
+        span
+    }
+
+    /// Cuts `span` across its longer side where the halves are most alike; each half holds points, and the two cells
+    /// part `cell`. `None` if all points lie in one bucket.
+    pub fn cut(&self, span: Span, cell: Cell) -> Option<[(Span, Cell); 2]> {
+        let span = self.trim(span);
+        let lines = [0, 1].map(|axis| span.max[axis] - span.min[axis]);
+        let axis = if lines[0] >= lines[1] { 0 } else { 1 };
+        if lines[axis] < 2 {
+            return None;
+        }
+        let below = |line: u32| {
+            let mut low = span;
+            low.max[axis] = line;
+            low
+        };
+        let total = self.points(span);
+        let line =
+            (span.min[axis] + 1..span.max[axis]).min_by_key(|&line| (2 * self.points(below(line))).abs_diff(total))?;
+        let mut high = span;
+        high.min[axis] = line;
+        let [low_cell, high_cell] = cell.cut(axis, self.grid.line(axis, line));
+        Some([(below(line), low_cell), (high, high_cell)])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_grid_keeps_within_its_number_of_buckets_and_outsiders_go_to_its_border() {
+        let grid = Grid::over([0, 0], [999, 99], 50);
+        assert!(grid.buckets() <= 50 && grid.buckets() >= 20, "{grid:?}");
+        assert_eq!(grid.bucket([-5, -5]), 0);
+        assert_eq!(grid.bucket([i32::MAX, i32::MAX]) as usize, grid.buckets() - 1);
+        assert_eq!(Grid::over([3, 3], [3, 3], 100).buckets(), 1);
+        assert!(Grid::over([0, 0], [1 << 30, 0], 1000).buckets() <= 1000);
+    }
+
+    #[test]
+    fn a_product_divides_as_a_division_does() {
+        for side in [1, 2, 3, 7, 255, 256, 1000, 65_537, (1 << 30) - 1, 1 << 30] {
+            let grid = Grid {
+                origin: [0, 0],
+                side,
+                inverse: (1u128 << 64).div_ceil(side as u128),
+                columns: u32::MAX,
+                rows: 1,
+            };
+            for multiple in [0, 1, 2, (i32::MAX as u32 / side).saturating_sub(1), i32::MAX as u32 / side] {
+                for along in [(multiple * side).saturating_sub(1), multiple * side, (multiple * side).saturating_add(1)]
+                {
+                    let along = along.min(i32::MAX as u32);
+                    assert_eq!(grid.bucket([along as i32, 0]), along / side, "{along} by {side}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn cuts_part_the_points_until_one_bucket_is_left() {
+        let grid = Grid::over([0, 0], [9, 9], 100);
+        let mut counts = vec![0; 100];
+        for p in [[2, 3], [2, 3], [7, 3], [7, 8]] {
+            counts[grid.bucket(p) as usize] += 1;
+        }
+        let sums = Sums::new(grid, counts.into_iter());
+        assert_eq!(sums.points(grid.span()), 4);
+        let [(low, low_cell), (high, high_cell)] = sums.cut(grid.span(), Cell::PLANE).unwrap();
+        assert_eq!((sums.points(low), sums.points(high)), (2, 2));
+        assert_eq!(low_cell.max[0], high_cell.min[0]);
+        assert!((3..=7).contains(&low_cell.max[0]));
+        assert!(sums.cut(low, low_cell).is_none());
+        assert!(sums.cut(high, high_cell).is_some());
+    }
+}

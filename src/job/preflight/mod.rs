@@ -1,0 +1,3 @@
+//! Whether a job fits.
+
+pub mod check;

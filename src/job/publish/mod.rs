@@ -1,0 +1,5 @@
+//! Step 8: what stands beside the tiles.
+
+pub mod finish;
+pub mod placement;
+pub mod tileset;

@@ -1,0 +1,66 @@
+//! The part of a triangulation within given edges.
+
+use crate::mesh::half_edge::{HULL, Mesh};
+use crate::{Error, Result};
+
+/// Marks the triangles of `mesh` that cover the ground on the left of the directed edges `boundary` (by their sites): what a flood
+/// from there reaches without crossing one of them.
+///
+/// # Errors
+/// [`Error::Broken`] if a boundary edge is missing from the mesh, which cannot be: it is an edge of the triangulation of
+/// all sites, hence of any triangulation of some of them.
+pub fn covered(mesh: &Mesh, boundary: &[[u32; 2]]) -> Result<Vec<bool>> {
+    let wanted = Starting::new(boundary);
+    let half_edges = 0..mesh.twins.len() as u32;
+    let is_boundary: Vec<bool> = half_edges.clone().map(|h| wanted.has(mesh.origin(h), mesh.destination(h))).collect();
+    let found = is_boundary.iter().filter(|&&b| b).count();
+    if found != boundary.len() {
+        return Err(Error::Broken(format!(
+            "{} of {} closed edges are not in the merge",
+            boundary.len() - found,
+            boundary.len()
+        )));
+    }
+    let mut covered = vec![false; mesh.triangles.len()];
+    let mut pending: Vec<u32> = half_edges.filter(|&h| is_boundary[h as usize]).map(|h| h / 3).collect();
+    while let Some(triangle) = pending.pop() {
+        if std::mem::replace(&mut covered[triangle as usize], true) {
+            continue;
+        }
+        for h in 3 * triangle..3 * triangle + 3 {
+            let twin = mesh.twins[h as usize];
+            if !is_boundary[h as usize] && twin != HULL {
+                pending.push(twin / 3);
+            }
+        }
+    }
+    Ok(covered)
+}
+
+/// Directed edges by the site at which they start.
+struct Starting {
+    /// Where the edges of each site begin in `ends`, and where the last site's end.
+    first: Vec<u32>,
+    ends: Vec<u32>,
+}
+
+impl Starting {
+    fn new(edges: &[[u32; 2]]) -> Starting {
+        let mut edges = edges.to_vec();
+        edges.sort_unstable();
+        let sites = edges.last().map_or(0, |edge| edge[0] + 1);
+        let mut first = Vec::with_capacity(sites as usize + 1);
+        for (at, edge) in (0..).zip(&edges) {
+            first.resize(edge[0] as usize + 1, at);
+        }
+        first.push(edges.len() as u32);
+        Starting { first, ends: edges.iter().map(|edge| edge[1]).collect() }
+    }
+
+    fn has(&self, origin: u32, destination: u32) -> bool {
+        let origin = origin as usize;
+        let range =
+            (origin + 1 < self.first.len()).then(|| self.first[origin] as usize..self.first[origin + 1] as usize);
+        range.is_some_and(|range| self.ends[range].contains(&destination))
+    }
+}

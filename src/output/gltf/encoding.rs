@@ -1,0 +1,155 @@
+//! How vertices and triangles become bytes: the choices, and the rounding of normals and colours.
+
+/// How a tile is packed. Positions are exact in all of them: rounding finds the lattice integers again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Compression {
+    /// Quantized, then packed by the codecs of `EXT_meshopt_compression`.
+    Meshopt,
+    /// Positions in 16 bits where a tile allows it, else in single precision, normals and colours in 8 (`KHR_mesh_quantization`).
+    Quantized,
+    /// Plain glTF: positions and normals in single precision, colours in 16 bits.
+    None,
+}
+
+/// The normal x, y up, z of a mesh in signed bytes, 127 for 1, whose node stretches it by 1, `anisotropy`, 1: readers divide
+/// normals by that. The fourth byte is padding.
+#[inline(always)]
+pub(crate) fn normal_bytes(normal: [f32; 3], anisotropy: f32) -> [i8; 4] {
+    let [x, y, z] = stretched(normal, anisotropy, 127.0).map(|v| v as i8);
+    [x, y, z, 0]
+}
+
+/// Steps of a mesh that differ by more than this make 8 bits too few for a normal.
+const MOST_ANISOTROPY: f32 = 4.0;
+
+/// Whether the normals of a mesh that is stretched so are better in 16 bits.
+pub(crate) fn needs_long_normals(anisotropy: f32) -> bool {
+    !(1.0 / MOST_ANISOTROPY..=MOST_ANISOTROPY).contains(&anisotropy)
+}
+
+/// As [`normal_bytes`], in signed 16 bits, 32767 for 1.
+pub(crate) fn normal_shorts(normal: [f32; 3], anisotropy: f32) -> [i16; 4] {
+    let [x, y, z] = stretched(normal, anisotropy, 32767.0).map(|v| v as i16);
+    [x, y, z, 0]
+}
+
+/// The normal with its y stretched, so long and in whole numbers.
+#[inline(always)]
+fn stretched([x, y, z]: [f32; 3], anisotropy: f32, length: f32) -> [f32; 3] {
+    let y = y * anisotropy;
+    let scale = length / (x * x + y * y + z * z).sqrt();
+    [x, y, z].map(|v| (v * scale).round())
+}
+
+/// The same normal as two signed bytes on the octahedron, 127 for 1, as the octahedral filter of `EXT_meshopt_compression`
+/// has it: smaller when packed.
+#[inline(always)]
+pub(crate) fn normal_octahedral([x, y, z]: [f32; 3], anisotropy: f32) -> [i8; 4] {
+    let y = y * anisotropy;
+    let scale = 1.0 / (x.abs() + y.abs() + z.abs());
+    let (u, v) = (x * scale, y * scale);
+    let (u, v) =
+        if z >= 0.0 { (u, v) } else { (1.0f32.copysign(u) * (1.0 - v.abs()), 1.0f32.copysign(v) * (1.0 - u.abs())) };
+    let byte = |v: f32| (v * 127.0).round() as i8;
+    [byte(u), byte(v), 127, 0]
+}
+
+/// The normal in signed bytes of [`normal_octahedral`]: what the filter gives. In single precision and this order of
+/// operations everywhere, so that what is unpacked does not depend on the machine.
+#[inline(always)]
+pub(crate) fn from_octahedral([u, v, one, padding]: [i8; 4]) -> [i8; 4] {
+    let one = f32::from(one.max(1));
+    let (u, v) = (f32::from(u) / one, f32::from(v) / one);
+    let z = 1.0 - u.abs() - v.abs();
+    let fold = (-z).max(0.0);
+    let (x, y) = (u - fold.copysign(u), v - fold.copysign(v));
+    let scale = 127.0 / (x * x + y * y + z * z).sqrt();
+    let byte = |v: f32| (v * scale).round() as i8;
+    [byte(x), byte(y), byte(z), padding]
+}
+
+/// Whole numbers of less magnitude than this have an encoding by [`exponential`].
+pub(crate) const EXPONENTIAL_REACH: f64 = (1 << 23) as f64;
+
+/// Mantissa (24 bits, signed) and exponent (8 bits, here 0) of a whole number, as the exponential filter of
+/// `EXT_meshopt_compression` has them: neighbours differ in low bits only, unlike those of f32.
+pub(crate) fn exponential(steps: f64) -> u32 {
+    steps as i32 as u32 & 0x00ff_ffff
+}
+
+/// The number that [`exponential`] stands for, whatever its exponent.
+pub(crate) fn from_exponential(bits: u32) -> f32 {
+    let mantissa = (bits as i32) << 8 >> 8;
+    let exponent = bits as i32 >> 24;
+    (f64::from(mantissa) * f64::from(exponent).exp2()) as f32
+}
+
+/// A linear colour in bytes, opaque.
+pub(crate) fn color_bytes([r, g, b]: [u16; 3]) -> [u8; 4] {
+    let byte = |v: u16| ((v as u32 * 255 + 32767) / 65535) as u8;
+    [byte(r), byte(g), byte(b), u8::MAX]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Unit normals that point up, on a spiral.
+    fn normals() -> impl Iterator<Item = [f32; 3]> {
+        (0..5_000).map(|i| {
+            let (up, turn) = ((i as f32 + 0.5) / 5_000.0, i as f32 * 2.4);
+            let across = (1.0 - up * up).sqrt();
+            [across * turn.cos(), up, across * turn.sin()]
+        })
+    }
+
+    /// Degrees between a normal and what a viewer makes of its bytes.
+    fn error([x, y, z]: [f32; 3], packed: [impl Into<f32>; 4], anisotropy: f32) -> f32 {
+        let [a, b, c, _] = packed.map(Into::into);
+        let b = b / anisotropy;
+        let cosine = (x * a + y * b + z * c) / (a * a + b * b + c * c).sqrt();
+        cosine.min(1.0).acos().to_degrees()
+    }
+
+    #[test]
+    fn normals_in_bytes_are_true_to_a_degree() {
+        let worst = |of: &dyn Fn([f32; 3]) -> f32| normals().map(of).fold(0.0, f32::max);
+        assert!(worst(&|n| error(n, normal_bytes(n, 1.0), 1.0)) < 0.5);
+        assert!(worst(&|n| error(n, from_octahedral(normal_octahedral(n, 1.0)), 1.0)) < 1.25);
+        for anisotropy in [0.25, 4.0] {
+            assert!(worst(&|n| error(n, normal_bytes(n, anisotropy), anisotropy)) < 2.0);
+            assert!(worst(&|n| error(n, from_octahedral(normal_octahedral(n, anisotropy)), anisotropy)) < 5.0);
+            assert!(!needs_long_normals(anisotropy));
+        }
+        for (anisotropy, most) in [(1.0 / 256.0, 0.5), (0.125, 0.1), (8.0, 0.1), (256.0, 0.5)] {
+            assert!(needs_long_normals(anisotropy));
+            assert!(worst(&|n| error(n, normal_shorts(n, anisotropy), anisotropy)) < most);
+        }
+    }
+
+    #[test]
+    fn whole_numbers_pass_the_exponential_filter() {
+        let numbers = [0.0, 1.0, -1.0, 65536.0, -77_777.0, EXPONENTIAL_REACH - 1.0, 1.0 - EXPONENTIAL_REACH];
+        for number in numbers {
+            let packed = exponential(number);
+            let mut theirs = [[packed]];
+            meshopt::decode_filter_exp(&mut theirs);
+            assert_eq!(f64::from(f32::from_bits(theirs[0][0])), number);
+            assert_eq!(f64::from(from_exponential(packed)), number);
+        }
+        assert_eq!(from_exponential(0xff00_0003), 1.5);
+        assert_eq!(from_exponential(0x0200_0003), 12.0);
+    }
+
+    #[test]
+    fn the_filter_is_that_of_meshoptimizer() {
+        for normal in normals() {
+            let packed = normal_octahedral(normal, 1.0);
+            let mut theirs = [packed];
+            meshopt::decode_filter_oct(&mut theirs);
+            let ours = from_octahedral(packed);
+            assert!((0..4).all(|k| ours[k].abs_diff(theirs[0][k]) <= 1), "{packed:?}: {ours:?}, theirs {theirs:?}");
+        }
+        assert_eq!(from_octahedral([0, 0, 0, 0]), [0, 0, 127, 0]);
+    }
+}

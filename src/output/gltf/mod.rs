@@ -1,0 +1,11 @@
+//! glTF: writing tiles as GLB files, packed or plain, and reading them back.
+
+pub(crate) mod container;
+pub(crate) mod document;
+pub mod encoding;
+pub mod glb;
+pub(crate) mod meshopt;
+pub mod one_file;
+pub(crate) mod parts;
+pub mod read;
+pub(crate) mod vertex_order;

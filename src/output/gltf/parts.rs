@@ -1,0 +1,102 @@
+//! Tiles wider than f32 can hold on the job's step are cut into parts, each with its own translation.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+use crate::geometry::lattice::shortest_decimal;
+use crate::output::Tile;
+use crate::output::frame::{FINE_GRID, Frame, PART_REACH, origin_between, short_origin};
+use crate::{Error, Result};
+use rust_decimal::Decimal;
+
+/// Triangles up to half the reach are grouped by origins this far apart, in steps: half a cell and half a triangle fit.
+const COARSE_GRID: i64 = 1 << 24;
+
+/// What one node and mesh of a tile hold.
+pub(crate) struct Part<'a> {
+    /// The node's translation in glTF steps.
+    pub(crate) origin: [f64; 3],
+    /// Whether 16 bits reach every vertex from there.
+    pub(crate) short: bool,
+    /// Vertices and triangles within reach of it.
+    pub(crate) tile: Cow<'a, Tile>,
+}
+
+/// The parts of `tile`, each within reach of f32: one where it is small enough. Fails where a single triangle is too long.
+pub(crate) fn split<'a>(frame: &Frame, tile: &'a Tile) -> Result<Vec<Part<'a>>> {
+    let Some(bounds) = tile.bounds() else { return Ok(Vec::new()) };
+    if let Some(origin) = common_origin(frame, &bounds, FINE_GRID) {
+        return Ok(vec![Part { origin, short: false, tile: Cow::Borrowed(tile) }]);
+    }
+    split_triangles(frame, tile, &tile.triangles)
+}
+
+/// [`split`] for only these triangles of `tile`.
+fn split_triangles(frame: &Frame, tile: &Tile, triangles: &[[u32; 3]]) -> Result<Vec<Part<'static>>> {
+    let mut groups = BTreeMap::<[i64; 3], Vec<[u32; 3]>>::new();
+    for &triangle in triangles {
+        let corners = triangle.map(|v| tile.positions[v as usize]);
+        let origin = common_origin(frame, &corners, COARSE_GRID)
+            .or_else(|| common_origin(frame, &corners, FINE_GRID))
+            .ok_or_else(|| too_long(frame, corners))?;
+        groups.entry(origin.map(|v| v as i64)).or_default().push(triangle);
+    }
+    let part = |(origin, triangles): ([i64; 3], _)| Part {
+        origin: origin.map(|v| v as f64),
+        short: false,
+        tile: Cow::Owned(tile.subset(triangles)),
+    };
+    Ok(groups.into_iter().map(part).collect())
+}
+
+/// [`split`], but one part with 16-bit positions where they reach all of `tile`.
+pub(crate) fn split_short<'a>(frame: &Frame, tile: &'a Tile) -> Result<Vec<Part<'a>>> {
+    let Some(bounds) = tile.bounds() else { return Ok(Vec::new()) };
+    let [low, high] = extent(frame, &bounds);
+    match short_origin(low, high) {
+        Some(origin) => Ok(vec![Part { origin, short: true, tile: Cow::Borrowed(tile) }]),
+        None => split(frame, tile),
+    }
+}
+
+/// The origin on `grid` next to the middle of `points`, if all of them are within reach of it.
+fn common_origin(frame: &Frame, points: &[[i32; 3]], grid: i64) -> Option<[f64; 3]> {
+    let [low, high] = extent(frame, points);
+    let origin = origin_between(low, high, grid);
+    let reach = (PART_REACH + FINE_GRID / 2) as f64;
+    (0..3).all(|k| high[k] - origin[k] <= reach && origin[k] - low[k] <= reach).then_some(origin)
+}
+
+/// The least and greatest glTF coordinates of `points` in steps.
+fn extent(frame: &Frame, points: &[[i32; 3]]) -> [[f64; 3]; 2] {
+    let none = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+    points.iter().map(|&p| frame.steps(p)).fold(none, |[low, high], point| {
+        [[0, 1, 2].map(|k| low[k].min(point[k])), [0, 1, 2].map(|k| high[k].max(point[k]))]
+    })
+}
+
+fn too_long(frame: &Frame, corners: [[i32; 3]; 3]) -> Error {
+    let [low, high] = extent(frame, &corners);
+    let (length, limit) = (frame.metres([0, 1, 2].map(|k| high[k] - low[k])), frame.longest_triangle());
+    let factor = [length[0] / limit[0], length[2] / limit[0], length[1] / limit[1]].into_iter().fold(1.0, f64::max);
+    let extras = frame.extras();
+    let (resolution, key, extent) = if length[1] / limit[1] == factor {
+        (extras.resolution_z, "in z", length[1])
+    } else {
+        (extras.resolution, "in x and y", length[0].max(length[2]))
+    };
+    let workable = coarser(resolution, factor);
+    Error::Config(format!(
+        "a triangle that is {extent:.1} m long cannot be written exactly with a resolution of {resolution} {key} \
+         (glTF has 24 binary digits for a coordinate): set [input] resolution = {workable} or coarser, or leave out \
+         the far-off points with bounds"
+    ))
+}
+
+/// `resolution` times the least power of ten that makes room for a triangle `factor` times too long.
+fn coarser(resolution: f64, factor: f64) -> String {
+    // Ten times the resolution gives at least eight times the step, a power of two.
+    let tens = factor.log(8.0).ceil().clamp(1.0, 20.0) as i32;
+    let exact = shortest_decimal(resolution).and_then(|r| (0..tens).try_fold(r, |r, _| r.checked_mul(Decimal::TEN)));
+    exact.map_or_else(|| format!("{:e}", resolution * 10f64.powi(tens)), |r| r.normalize().to_string())
+}

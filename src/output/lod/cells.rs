@@ -1,0 +1,80 @@
+//! The plane around some points cut into cells of one size, row by row.
+
+/// Where the cells lie.
+pub(crate) struct Cells {
+    low: [f64; 2],
+    /// Cells in a lattice step.
+    scale: [f64; 2],
+    columns: usize,
+    rows: usize,
+}
+
+impl Cells {
+    /// About so many cells around `positions` (lattice x, y, z).
+    pub(crate) fn new(positions: &[[i32; 3]], about: usize) -> Cells {
+        let none = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
+        let [low, high] = positions.iter().fold(none, |[low, high], p| {
+            let p = [p[0] as f64, p[1] as f64];
+            [[0, 1].map(|k| low[k].min(p[k])), [0, 1].map(|k| high[k].max(p[k]))]
+        });
+        let size = [0, 1].map(|k| (high[k] - low[k]).max(1.0));
+        let about = about.max(1) as f64;
+        let columns = (about * size[0] / size[1]).sqrt().ceil().clamp(1.0, about);
+        let rows = (about / columns).ceil();
+        let scale = [columns / (size[0] + 1.0), rows / (size[1] + 1.0)];
+        Cells { low, scale, columns: columns as usize, rows: rows as usize }
+    }
+
+    /// How many there are.
+    pub(crate) fn count(&self) -> usize {
+        self.columns * self.rows
+    }
+
+    /// The number of the cell in this row and column.
+    pub(crate) fn at(&self, row: usize, column: usize) -> usize {
+        row * self.columns + column
+    }
+
+    /// The number of the cell around a point.
+    pub(crate) fn of(&self, p: &[i32; 3]) -> u32 {
+        self.at(self.row(p[1] as f64), self.column(p[0] as f64)) as u32
+    }
+
+    /// The column at `x`, or the outermost one on that side.
+    pub(crate) fn column(&self, x: f64) -> usize {
+        (((x - self.low[0]) * self.scale[0]) as usize).min(self.columns - 1)
+    }
+
+    /// The row at `y`, or the outermost one on that side.
+    pub(crate) fn row(&self, y: f64) -> usize {
+        (((y - self.low[1]) * self.scale[1]) as usize).min(self.rows - 1)
+    }
+
+    /// The first and last column and the first and last row of the cells around a triangle.
+    pub(crate) fn around(&self, corners: &[[i32; 3]; 3]) -> [[usize; 2]; 2] {
+        let ends = |k: usize| {
+            let [a, b, c] = corners.map(|p| p[k]);
+            [a.min(b).min(c), a.max(b).max(c)].map(f64::from)
+        };
+        [ends(0).map(|x| self.column(x)), ends(1).map(|y| self.row(y))]
+    }
+
+    /// The first and the last column in which the triangle lies in `row`, maybe with one to spare for rounding.
+    pub(crate) fn span(&self, corners: &[[i32; 3]; 3], row: usize) -> [usize; 2] {
+        let y_of = |row: f64| self.low[1] + row / self.scale[1];
+        let (south, north) = (y_of(row as f64 - 0.01), y_of(row as f64 + 1.01));
+        let mut span = [f64::INFINITY, f64::NEG_INFINITY];
+        for k in 0..3 {
+            let [a, b] = [corners[k], corners[(k + 1) % 3]].map(|p| [p[0] as f64, p[1] as f64]);
+            let [a, b] = if a[1] <= b[1] { [a, b] } else { [b, a] };
+            if a[1] > north || b[1] < south {
+                continue;
+            }
+            let x_at = |y: f64| if a[1] == b[1] { a[0] } else { a[0] + (b[0] - a[0]) * ((y - a[1]) / (b[1] - a[1])) };
+            let ends = [x_at(south.max(a[1])), if b[1] <= north { b[0] } else { x_at(north) }];
+            span = [span[0].min(ends[0]).min(ends[1]), span[1].max(ends[0]).max(ends[1])];
+        }
+        let spare = 0.01 / self.scale[0];
+        [span[0] - spare, span[1] + spare].map(|x| self.column(x))
+    }
+}

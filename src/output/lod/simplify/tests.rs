@@ -1,0 +1,88 @@
+//! Simplified terrains cover what the original covers, and are as far off as they say.
+
+use proptest::prelude::*;
+
+use crate::geometry::lattice::{Lattice, shortest_decimal};
+use crate::geometry::predicates::orient2d;
+use crate::output::lod::simplify::*;
+use crate::triangulation::reference::triangulate;
+
+/// All steps a metre.
+fn frame() -> Frame {
+    let decimal = |v: f64| shortest_decimal(v).unwrap();
+    let lattice = Lattice { offset: [decimal(0.0); 3], resolution: decimal(1.0), resolution_z: decimal(1.0) };
+    Frame::new(&lattice, 1.0, 1.0, None).unwrap()
+}
+
+fn terrain(mut points: Vec<[i32; 3]>) -> Tile {
+    points.sort_unstable();
+    points.dedup_by_key(|p| [p[0], p[1]]);
+    let sites: Vec<[i32; 2]> = points.iter().map(|p| [p[0], p[1]]).collect();
+    Tile { triangles: triangulate(&sites).unwrap().triangles, positions: points, ..Tile::default() }
+}
+
+/// Twice the area; asserts that all triangles are counterclockwise.
+fn area(tile: &Tile) -> i64 {
+    let areas = tile.triangles.iter().map(|t| {
+        let [a, b, c] = t.map(|v| tile.positions[v as usize]).map(|p| [p[0], p[1]]);
+        orient2d(a, b, c)
+    });
+    areas.inspect(|&area| assert!(area > 0)).sum()
+}
+
+/// The height of `tile` over a place, or nothing outside.
+fn height(tile: &Tile, place: [f64; 2]) -> Option<f64> {
+    tile.triangles.iter().find_map(|t| {
+        let corners = t.map(|v| tile.positions[v as usize].map(f64::from));
+        let beside =
+            |a: [f64; 3], b: [f64; 3]| (a[0] - place[0]) * (b[1] - place[1]) - (b[0] - place[0]) * (a[1] - place[1]);
+        let weights = [beside(corners[1], corners[2]), beside(corners[2], corners[0]), beside(corners[0], corners[1])];
+        let total: f64 = weights.iter().sum();
+        weights.iter().all(|&w| w >= 0.0).then(|| (0..3).map(|i| weights[i] * corners[i][2]).sum::<f64>() / total)
+    })
+}
+
+#[test]
+fn a_plane_keeps_its_outline_and_is_nowhere_off() {
+    let plane = terrain((0..400).map(|i| [i % 20 * 10, i / 20 * 10, i % 20 * 3 + i / 20 * 7]).collect());
+    let simple = simplify(&frame(), &plane, 1).unwrap();
+    assert!(simple.error < 1e-8, "{}", simple.error);
+    assert_eq!(area(&simple.tile), area(&plane));
+    // The 76 vertices of the outline, and triangles between them.
+    assert_eq!((simple.tile.positions.len(), simple.tile.triangles.len()), (76, 74));
+}
+
+#[test]
+fn nothing_inside_means_nothing_to_do() {
+    let fan = terrain(vec![[0, 0, 5], [9, 0, 5], [0, 9, 1]]);
+    let simple = simplify(&frame(), &fan, 1).unwrap();
+    assert_eq!((simple.tile, simple.error), (fan, 0.0));
+}
+
+proptest! {
+    #[test]
+    fn the_ground_is_the_same_and_the_error_is_true(
+        points in prop::collection::vec([-40i32..40, -40i32..40, 0i32..60], 8..200),
+        share in 2usize..8,
+        places in prop::collection::vec([-40.0f64..40.0, -40.0f64..40.0], 40),
+    ) {
+        let tile = terrain(points);
+        prop_assume!(!tile.triangles.is_empty());
+        let simple = simplify(&frame(), &tile, tile.triangles.len() / share).unwrap();
+        prop_assert_eq!(area(&simple.tile), area(&tile));
+        prop_assert!(simple.tile.triangles.len() <= tile.triangles.len());
+        let mut greatest = 0.0f64;
+        for place in places {
+            if let (Some(fine), Some(coarse)) = (height(&tile, place), height(&simple.tile, place)) {
+                greatest = greatest.max((fine - coarse).abs());
+            }
+        }
+        prop_assert!(greatest <= simple.error + 1e-9, "{} of {}", greatest, simple.error);
+        // No bound by the height of everything where the distance can be measured.
+        let vertices = tile.positions.iter().filter_map(|p| {
+            Some((height(&simple.tile, [p[0] as f64, p[1] as f64])? - p[2] as f64).abs())
+        });
+        let at_vertices = vertices.fold(0.0, f64::max);
+        prop_assert!(simple.error == 0.0 || simple.error < 60.0 || at_vertices > 0.0);
+    }
+}
