@@ -13,12 +13,12 @@
 mod points;
 
 use delaunator::Point;
-use gdt_batch::config::{Texture, Voronoi};
 use gdt_batch::geometry::Site;
 use gdt_batch::gpu::buffers::{Name, Set};
 use gdt_batch::gpu::device::{self, Device, Wish};
 use gdt_batch::gpu::executor::{Executor, Order};
 use gdt_batch::gpu::machine::Machine;
+use gdt_batch::gpu::options::{TextureSide, VoronoiMethod};
 use gdt_batch::gpu::steps::{Size, Step};
 use gdt_batch::gpu::{self, twins};
 use gdt_batch::mesh::half_edge::Mesh;
@@ -72,7 +72,7 @@ fn figure_10(sites: &[Site], gpu: Option<&RefCell<Gpu>>, rounds: usize) {
     let mut ways = on_cpu_with_any(sites);
     for (gpu, side) in gpu.into_iter().flat_map(|gpu| SIDES.map(|side| (gpu, side))) {
         ways.extend(on_gpu_alone_and_helped(gpu, sites, side));
-        ways.push(by_shaders(gpu, sites, side, Voronoi::Jfa));
+        ways.push(by_shaders(gpu, sites, side, VoronoiMethod::Jfa));
     }
     let mut groups = by_side(&measure(ways, rounds));
     groups.push(("plain loops, one thread".into(), SIDES.map(|side| plain_loops(sites, side)).into()));
@@ -254,7 +254,12 @@ impl Gpu {
     }
 
     /// Steps G1 to G6, by the GPU's own timestamps.
-    fn run(&mut self, size: Size, pixels: &[u32], voronoi: Voronoi) -> Result<[f64; Step::ALL.len()], gpu::Fault> {
+    fn run(
+        &mut self,
+        size: Size,
+        pixels: &[u32],
+        voronoi: VoronoiMethod,
+    ) -> Result<[f64; Step::ALL.len()], gpu::Fault> {
         // At most two triangles a site, and some for what the texture gets wrong.
         let room = 2 * pixels.len() + pixels.len() / 4 + 64;
         let mut recording = gpu::labels(size, pixels.to_vec(), voronoi);
@@ -267,13 +272,13 @@ impl Gpu {
 
 /// The exact shaders, and the pipeline with their help.
 fn on_gpu_alone_and_helped<'a>(gpu: &'a RefCell<Gpu>, sites: &'a [Site], side: u32) -> Vec<Way<'a>> {
-    let shaders = by_shaders(gpu, sites, side, Voronoi::Exact);
+    let shaders = by_shaders(gpu, sites, side, VoronoiMethod::Exact);
     std::iter::once(shaders).chain(on_gpu_and_cpu(gpu.borrow().kind, sites, side)).collect()
 }
 
-fn by_shaders<'a>(gpu: &'a RefCell<Gpu>, sites: &[Site], side: u32, voronoi: Voronoi) -> Way<'a> {
+fn by_shaders<'a>(gpu: &'a RefCell<Gpu>, sites: &[Site], side: u32, voronoi: VoronoiMethod) -> Way<'a> {
     let placed = placed(sites, side);
-    let transform = if voronoi == Voronoi::Jfa { "1+JFA" } else { "exact" };
+    let transform = if voronoi == VoronoiMethod::Jfa { "1+JFA" } else { "exact" };
     let name = format!("{}, shaders, {transform}", gpu.borrow().kind);
     let run = move || {
         let (size, pixels) = placed.as_ref().map_err(String::clone)?;
@@ -288,8 +293,8 @@ fn by_shaders<'a>(gpu: &'a RefCell<Gpu>, sites: &[Site], side: u32, voronoi: Vor
 
 /// The pipeline with the GPU's help, if it gives any.
 fn on_gpu_and_cpu<'a>(kind: &str, sites: &'a [Site], side: u32) -> Option<Way<'a>> {
-    let (wish, texture) = (Wish::new(None, true), Texture::Side(side));
-    let order = Order { wish, voronoi: Voronoi::Auto, texture, most_pixels: u64::MAX, shared: false };
+    let (wish, texture) = (Wish::new(None, true), TextureSide::Side(side));
+    let order = Order { wish, voronoi: VoronoiMethod::Auto, texture, most_pixels: u64::MAX, shared: false };
     let executor = Executor::start(&order).ok()?;
     let mut scratch = Scratch::default();
     let run = move || {

@@ -99,5 +99,5 @@ pub enum Command {
 }
 
 fn memory(text: &str) -> Result<u64, String> {
-    crate::config::Memory::try_from(text.to_owned()).map(|memory| memory.0)
+    crate::job::options::MemoryLimit::try_from(text.to_owned()).map(|memory| memory.0)
 }

@@ -18,8 +18,10 @@ pub mod sample;
 pub mod triangulation;
 pub mod verify;
 pub mod voronoi;
+mod warnings;
 
 pub use error::{Error, Result};
+pub use warnings::Warnings;
 
 /// Writes a line to standard error. Who has closed it, or put it on a full disk, does not want the job to end for that.
 pub fn say(text: &str) {

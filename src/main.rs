@@ -2,8 +2,8 @@
 
 use clap::Parser;
 use gdt_batch::cli::{Cli, Command, Talk};
-use gdt_batch::config::Config;
 use gdt_batch::gpu::selftest;
+use gdt_batch::job::options::JobOptions;
 use gdt_batch::job::preflight::check;
 use gdt_batch::job::progress::stage::Progress;
 use gdt_batch::job::report::skipped_summary;
@@ -37,7 +37,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
             )));
         }
         (Some(Command::Check { config }), _) => {
-            let preflight = check::run(&Config::load(&config)?)?;
+            let preflight = check::run(&gdt_batch::config::load(&config)?)?;
             show(&preflight, talk)?;
             preflight.passes()?;
         }
@@ -48,7 +48,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
         (None, Some(config)) => {
             let progress = Progress::detect(talk.quiet);
             let options = Options { progress, force: cli.force, fresh: cli.fresh };
-            run_job(&Config::load(&config)?, options, talk)?;
+            run_job(&gdt_batch::config::load(&config)?, options, talk)?;
         }
         (None, None) => return Err(Error::Config("name a configuration file; --help shows how".into())),
     }
@@ -56,7 +56,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
 }
 
 /// Runs a job and says what it came to: on standard error too, and even when quiet, if files were left out.
-fn run_job(config: &Config, options: Options, talk: Talk) -> Result<()> {
+fn run_job(config: &JobOptions, options: Options, talk: Talk) -> Result<()> {
     interrupt::listen()?;
     let report = job::run(config, options)?;
     show(&report, talk)?;

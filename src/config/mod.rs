@@ -1,209 +1,158 @@
-//! The configuration of a job: TOML in, checked values out. Unknown keys, wrong types and impossible values are errors
-//! that show the line.
+//! Configuration files: TOML in, checked options out. An unknown key, a wrong type or an impossible value is an error that shows
+//! the line.
 
-mod values;
+use crate::gpu::options::{GpuOptions, TextureSide, VoronoiMethod};
+use crate::input::options::InputOptions;
+use crate::job::options::{JobOptions, Limits};
+use crate::output::options::OutputOptions;
+use crate::triangulation::options::{Backend, MaxPointsPerTile, TriangulationOptions};
+use crate::{Error, Result, Warnings};
+use serde::Deserialize;
+use std::path::Path;
 
-use crate::input::TextOptions;
-use crate::output::Compression;
-use crate::{Error, Result};
-use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
-pub use values::{
-    Backend, Bounds, ColorChoice, CompressionChoice, Duplicates, Format, LevelSites, MaxEdge, Memory, OnBadFile,
-    Resolution, Share, SitesPerTile, Texture, Threads, UnitChoice, Voronoi,
-};
+/// The greatest `height_offset` in metres. No datum is as far from the ellipsoid, and with a greater one f64 would lose the digits
+/// that let tiles meet.
+const MAX_HEIGHT_OFFSET: f64 = 100_000.0;
 
-/// Metres. No datum is as far from the ellipsoid; beyond it f64 would lose what puts tiles together.
-const MOST_HEIGHT_OFFSET: f64 = 100_000.0;
-
-/// Everything a user can say about a job.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+/// A configuration file as it is written.
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Config {
-    /// What to read.
-    pub input: Input,
-    /// How to triangulate.
+struct ConfigFile {
+    input: InputOptions,
     #[serde(default)]
-    pub triangulation: Triangulation,
-    /// What to write.
-    pub output: Output,
-    /// What the job may use.
+    triangulation: TriangulationTable,
     #[serde(default)]
-    pub limits: Limits,
+    gpu: GpuTable,
+    output: OutputOptions,
+    #[serde(default)]
+    limits: Limits,
 }
 
-/// `[input]`: which points.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Input {
-    /// Paths or globs, relative to the configuration file.
-    pub files: Vec<String>,
-    /// Keep only these classes; default: all but noise (7, 18).
-    #[serde(default)]
-    pub classes: Option<Vec<u8>>,
-    /// Keep only what lies in [xmin, ymin, xmax, ymax], in source units, borders included.
-    #[serde(default)]
-    pub bounds: Option<Bounds>,
-    /// Which of several points with the same x and y stays.
-    #[serde(default)]
-    pub duplicates: Duplicates,
-    /// The unit of x and y.
-    #[serde(default)]
-    pub unit: UnitChoice,
-    /// The step of the lattice in x and y, in source units.
-    #[serde(default)]
-    pub resolution: Resolution,
-    /// The share of malformed records or lines that is put up with, 0 to 1.
-    #[serde(default)]
-    pub malformed_share: Share,
-    /// What becomes of a job with a file that cannot be used.
-    #[serde(default)]
-    pub on_bad_file: OnBadFile,
-    /// How text files are laid out, where detection is not to be trusted.
-    #[serde(default)]
-    pub csv: TextOptions,
-}
-
-/// `[triangulation]`: how, never what: the mesh is the same whatever stands here.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+/// `[triangulation]`, with the keys that were there before `[gpu]` existed.
+#[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Triangulation {
-    /// Who triangulates the tiles.
-    pub backend: Backend,
-    /// How a GPU computes the discrete Voronoi diagram.
-    pub voronoi: Voronoi,
-    /// A part of the name of the GPU to take; `None`: what the environment names, or the fastest kind.
-    pub adapter: Option<String>,
-    /// The side of the pipeline's texture on a GPU.
-    pub texture: Texture,
-    /// How many sites a tile holds at the most.
-    pub sites_per_tile: SitesPerTile,
+struct TriangulationTable {
+    backend: Backend,
+    #[serde(alias = "sites_per_tile")]
+    max_points_per_tile: MaxPointsPerTile,
+    voronoi: Option<VoronoiMethod>,
+    adapter: Option<String>,
+    texture: Option<TextureSide>,
 }
 
-/// `[output]`: where and what.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Output {
-    /// The directory to write to, relative to the configuration file.
-    pub directory: PathBuf,
-    /// Where vertex colours come from.
-    #[serde(default)]
-    pub color: ColorChoice,
-    /// Whether vertices carry normals.
-    #[serde(default = "yes")]
-    pub normals: bool,
-    /// In which form viewers get the terrain.
-    #[serde(default)]
-    pub format: Format,
-    /// Whether 3D Tiles have coarser levels above the exact tiles.
-    #[serde(default = "yes")]
-    pub levels: bool,
-    /// How many sites a coarser tile holds at the most.
-    #[serde(default)]
-    pub level_sites: LevelSites,
-    /// Metres that heights are raised by to be heights above the ellipsoid, where 3D Tiles are placed on the globe.
-    #[serde(default)]
-    pub height_offset: f64,
-    /// How tiles are to be packed.
-    #[serde(default)]
-    pub compression: CompressionChoice,
-    /// Triangles with an edge longer than this are left out.
-    #[serde(default)]
-    pub max_edge: MaxEdge,
-}
-
-impl Output {
-    /// How tiles are packed.
-    pub fn packing(&self) -> Compression {
-        match (self.compression, self.format) {
-            (CompressionChoice::Auto, Format::Tiles) | (CompressionChoice::Meshopt, _) => Compression::Meshopt,
-            (CompressionChoice::Auto, _) | (CompressionChoice::Quantized, _) => Compression::Quantized,
-            (CompressionChoice::None, _) => Compression::None,
-        }
-    }
-}
-
-/// `[limits]`: what the job may use of the machine.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+/// `[gpu]`; a key that is left out may still be in `[triangulation]`.
+#[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Limits {
-    /// Peak resident memory.
-    pub memory: Memory,
-    /// Worker threads; 0: one per core.
-    pub threads: Threads,
+struct GpuTable {
+    voronoi: Option<VoronoiMethod>,
+    adapter: Option<String>,
+    texture: Option<TextureSide>,
 }
 
-fn yes() -> bool {
-    true
+/// A key or value that has another name now.
+struct Renamed {
+    table: &'static str,
+    key: &'static str,
+    /// The value that was renamed; `None` if the key was.
+    value: Option<&'static str>,
+    now: &'static str,
 }
 
-impl Config {
-    /// Reads and checks the file at `path`; relative paths in it become relative to its directory.
-    ///
-    /// # Errors
-    /// [`Error::Config`] with the offending line if the text is not a valid configuration, [`Error::Io`] if it cannot be read.
-    pub fn load(path: &Path) -> Result<Config> {
-        let text = match std::fs::read_to_string(path) {
-            Ok(text) => text,
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
-                return Err(Error::Config(format!("there is no configuration file {}", path.display())));
-            }
-            Err(e) => return Err(Error::Config(format!("cannot read the configuration {}: {e}", path.display()))),
-        };
-        let mut config = Config::parse(&text).map_err(|e| Error::Config(format!("{}: {e}", path.display())))?;
-        let base = path.parent().unwrap_or(Path::new(""));
-        config.output.directory = base.join(&config.output.directory);
-        for file in &mut config.input.files {
-            // A glob's special characters in the directory of the configuration itself are meant literally.
-            if !Path::new(file).is_absolute() {
-                *file = format!("{}{file}", glob_prefix(base));
-            }
-        }
-        Ok(config)
-    }
+/// Old names still work; a warning says the new one.
+const RENAMED: [Renamed; 7] = [
+    Renamed { table: "input", key: "malformed_share", value: None, now: "[input] max_malformed_fraction" },
+    Renamed { table: "triangulation", key: "sites_per_tile", value: None, now: "[triangulation] max_points_per_tile" },
+    Renamed { table: "triangulation", key: "voronoi", value: None, now: "[gpu] voronoi" },
+    Renamed { table: "triangulation", key: "adapter", value: None, now: "[gpu] adapter" },
+    Renamed { table: "triangulation", key: "texture", value: None, now: "[gpu] texture" },
+    Renamed { table: "output", key: "level_sites", value: None, now: "[output] max_points_per_level_tile" },
+    Renamed { table: "output", key: "format", value: Some("tiles"), now: "format = \"3dtiles\"" },
+];
 
-    /// Checks a configuration's text; the message of an error shows the line.
-    fn parse(text: &str) -> std::result::Result<Config, String> {
-        let config: Config = toml::from_str(text).map_err(|e| e.to_string())?;
-        if config.input.files.is_empty() {
-            return Err("[input] files is empty: name at least one point cloud".into());
+/// Reads and checks the file at `path`; relative paths in it become relative to its directory.
+///
+/// # Errors
+/// [`Error::Config`] with the offending line if the text is not a valid configuration or the file cannot be read.
+pub fn load(path: &Path) -> Result<JobOptions> {
+    let text = match std::fs::read_to_string(path) {
+        Ok(text) => text,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
+            return Err(Error::Config(format!("there is no configuration file {}", path.display())));
         }
-        if config.input.classes.as_ref().is_some_and(Vec::is_empty) {
-            return Err(
-                "[input] classes is empty, which would leave no point; leave the key out to keep all but noise".into(),
-            );
-        }
-        if config.output.directory.as_os_str().is_empty() {
-            return Err("[output] directory is empty".into());
-        }
-        if config.output.height_offset.is_nan() || config.output.height_offset.abs() > MOST_HEIGHT_OFFSET {
-            return Err(format!("[output] height_offset is not a number of metres up to {MOST_HEIGHT_OFFSET}"));
-        }
-        Ok(config)
-    }
-
-    /// Which of the 256 classification codes are kept.
-    pub fn kept_classes(&self) -> [bool; 256] {
-        match &self.input.classes {
-            Some(classes) => {
-                let mut kept = [false; 256];
-                classes.iter().for_each(|&class| kept[class as usize] = true);
-                kept
-            }
-            None => std::array::from_fn(|class| class != 7 && class != 18),
+        Err(e) => return Err(Error::Config(format!("cannot read the configuration {}: {e}", path.display()))),
+    };
+    let mut options = parse(&text).map_err(|e| Error::Config(format!("{}: {e}", path.display())))?;
+    let base = path.parent().unwrap_or(Path::new(""));
+    options.output.directory = base.join(&options.output.directory);
+    for file in &mut options.input.files {
+        if !Path::new(file).is_absolute() {
+            *file = format!("{}{file}", glob_prefix(base));
         }
     }
+    Ok(options)
+}
 
-    /// The number of worker threads.
-    pub fn threads(&self) -> usize {
-        match self.limits.threads.0 {
-            0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
-            n => n,
+/// Checks a configuration's text; the message of an error shows the line.
+fn parse(text: &str) -> std::result::Result<JobOptions, String> {
+    let file: ConfigFile = toml::from_str(text).map_err(|e| e.to_string())?;
+    if file.input.files.is_empty() {
+        return Err("[input] files is empty: name at least one point cloud".into());
+    }
+    if file.input.classes.as_ref().is_some_and(Vec::is_empty) {
+        return Err(
+            "[input] classes is empty, which would leave no point; leave the key out to keep all but noise".into()
+        );
+    }
+    if file.output.directory.as_os_str().is_empty() {
+        return Err("[output] directory is empty".into());
+    }
+    if file.output.height_offset.is_nan() || file.output.height_offset.abs() > MAX_HEIGHT_OFFSET {
+        return Err(format!("[output] height_offset is not a number of metres up to {MAX_HEIGHT_OFFSET}"));
+    }
+    let TriangulationTable { backend, max_points_per_tile, voronoi, adapter, texture } = file.triangulation;
+    let gpu = GpuOptions {
+        voronoi: one_of("voronoi", file.gpu.voronoi, voronoi)?.unwrap_or_default(),
+        adapter: one_of("adapter", file.gpu.adapter, adapter)?,
+        texture: one_of("texture", file.gpu.texture, texture)?.unwrap_or_default(),
+    };
+    Ok(JobOptions {
+        input: file.input,
+        triangulation: TriangulationOptions { backend, max_points_per_tile },
+        gpu,
+        output: file.output,
+        limits: file.limits,
+        warnings: old_names(text),
+    })
+}
+
+/// The value of a key that may be in `[gpu]` or, as it was before, in `[triangulation]`.
+fn one_of<T>(key: &str, in_gpu: Option<T>, in_triangulation: Option<T>) -> std::result::Result<Option<T>, String> {
+    match (in_gpu, in_triangulation) {
+        (Some(_), Some(_)) => {
+            Err(format!("[gpu] {key} and its old name [triangulation] {key} are both set: keep [gpu]"))
         }
+        (value, old) => Ok(value.or(old)),
     }
 }
 
-/// `directory` as the beginning of a glob pattern.
+/// A warning for every old name in the text.
+fn old_names(text: &str) -> Warnings {
+    let mut warnings = Warnings::default();
+    let Ok(file) = text.parse::<toml::Table>() else { return warnings };
+    for Renamed { table, key, value, now } in RENAMED {
+        let Some(found) = file.get(table).and_then(|table| table.get(key)) else { continue };
+        match value {
+            None => warnings.push(format!("[{table}] {key} has a new name: {now}; the old one still works")),
+            Some(value) if found.as_str() == Some(value) => {
+                warnings.push(format!("[{table}] {key} = \"{value}\" has a new name: {now}; the old one still works"));
+            }
+            Some(_) => {}
+        }
+    }
+    warnings
+}
+
+/// `directory` as the beginning of a glob pattern: its own special characters are meant literally.
 fn glob_prefix(directory: &Path) -> String {
     if directory.as_os_str().is_empty() {
         return String::new();
@@ -214,20 +163,24 @@ fn glob_prefix(directory: &Path) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::input::options::Duplicates;
+    use crate::output::options::OutputFormat;
 
     const LEAST: &str = "[input]\nfiles = [\"a.laz\"]\n[output]\ndirectory = \"out\"\n";
 
     fn error(text: &str) -> String {
-        Config::parse(text).unwrap_err()
+        parse(text).unwrap_err()
     }
 
     #[test]
     fn the_least_configuration_has_the_documented_defaults() {
-        let config = Config::parse(LEAST).unwrap();
-        assert_eq!(config.limits.memory.0, 4 << 30);
-        assert_eq!(config.input.duplicates, Duplicates::Lowest);
-        assert!(config.output.normals);
-        assert!(config.kept_classes()[2] && !config.kept_classes()[7] && !config.kept_classes()[18]);
+        let options = parse(LEAST).unwrap();
+        assert_eq!(options.limits.memory.0, 4 << 30);
+        assert_eq!(options.input.duplicates, Duplicates::Lowest);
+        assert!(options.output.normals);
+        let kept = options.input.kept_classes();
+        assert!(kept[2] && !kept[7] && !kept[18]);
+        assert!(options.warnings.is_empty());
     }
 
     #[test]
@@ -242,7 +195,36 @@ mod tests {
         assert!(bounds.contains("line 3") && bounds.contains("xmin"), "{bounds}");
         let edge = error(&format!("{LEAST}max_edge = -1\n"));
         assert!(edge.contains("line 5") && edge.contains("auto"), "{edge}");
-        let sites = error(&format!("{LEAST}[triangulation]\nsites_per_tile = 2\n"));
-        assert!(sites.contains("line 6") && sites.contains("auto"), "{sites}");
+        let points = error(&format!("{LEAST}[triangulation]\nmax_points_per_tile = 2\n"));
+        assert!(points.contains("line 6") && points.contains("auto"), "{points}");
+    }
+
+    #[test]
+    fn old_names_work_and_say_the_new_one() {
+        let old = "[input]\nfiles = [\"a.laz\"]\nmalformed_share = 0.25\n[triangulation]\nsites_per_tile = 1000\n\
+                   voronoi = \"jfa\"\nadapter = \"lava\"\ntexture = 512\n\
+                   [output]\ndirectory = \"out\"\nlevel_sites = 2000\nformat = \"tiles\"\n";
+        let new = "[input]\nfiles = [\"a.laz\"]\nmax_malformed_fraction = 0.25\n\
+                   [triangulation]\nmax_points_per_tile = 1000\n\
+                   [gpu]\nvoronoi = \"jfa\"\nadapter = \"lava\"\ntexture = 512\n\
+                   [output]\ndirectory = \"out\"\nmax_points_per_level_tile = 2000\nformat = \"3dtiles\"\n";
+        let (old, mut new) = (parse(old).unwrap(), parse(new).unwrap());
+        assert!(new.warnings.is_empty());
+        assert_eq!(new.output.format, OutputFormat::Tiles3d);
+        let warnings: Vec<&str> = old.warnings.iter().collect();
+        assert_eq!(warnings.len(), RENAMED.len(), "{warnings:?}");
+        for (warning, renamed) in warnings.iter().zip(RENAMED) {
+            assert!(warning.contains(renamed.now) && warning.contains(renamed.key), "{warning}");
+        }
+        new.warnings = old.warnings.clone();
+        assert_eq!(serde_json::to_string(&old).unwrap(), serde_json::to_string(&new).unwrap());
+    }
+
+    #[test]
+    fn a_key_under_both_its_names_is_an_error() {
+        let both = error(&format!("{LEAST}[triangulation]\nvoronoi = \"jfa\"\n[gpu]\nvoronoi = \"exact\"\n"));
+        assert!(both.contains("[gpu] voronoi"), "{both}");
+        let twice = error(&format!("{LEAST}[triangulation]\nsites_per_tile = 50\nmax_points_per_tile = 60\n"));
+        assert!(twice.contains("max_points_per_tile"), "{twice}");
     }
 }

@@ -112,11 +112,11 @@ pub(super) fn marks(recording: &Recording) -> (Vec<Marks>, Vec<Step>) {
 mod tests {
     use super::super::steps::Size;
     use super::*;
-    use crate::config::Voronoi;
+    use crate::gpu::options::VoronoiMethod;
 
     #[test]
     fn every_step_begins_and_ends_once() {
-        let recording = crate::gpu::labels(Size { width: 700, height: 500 }, vec![0, 5, 9], Voronoi::Jfa);
+        let recording = crate::gpu::labels(Size { width: 700, height: 500 }, vec![0, 5, 9], VoronoiMethod::Jfa);
         let (marks, steps) = marks(&recording);
         assert_eq!(steps, [Step::WriteSites, Step::Voronoi, Step::Islands]);
         let begins: Vec<u32> = marks.iter().filter_map(|m| m.begin).collect();

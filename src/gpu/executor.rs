@@ -5,12 +5,12 @@
 //! Whatever goes wrong costs time only: too large a texture is asked for again at half the size, a lost device is opened anew
 //! once, and after that every worker does its leaves itself.
 
-use crate::config::{Texture, Voronoi};
 use crate::gpu::Fault;
 use crate::gpu::buffers::{Name, Set};
 use crate::gpu::clock::StepTimes;
 use crate::gpu::device::{self, Device, MOST_SIDE, Wish};
 use crate::gpu::machine::{Machine, Ticket};
+use crate::gpu::options::{TextureSide, VoronoiMethod};
 use crate::gpu::steps::{Size, Step};
 use crate::voronoi::{Diagram, Diagrams, Resolution, Shape};
 use std::collections::VecDeque;
@@ -30,9 +30,9 @@ pub struct Order {
     /// Which adapter.
     pub wish: Wish,
     /// Which transform.
-    pub voronoi: Voronoi,
+    pub voronoi: VoronoiMethod,
     /// How large the textures are.
-    pub texture: Texture,
+    pub texture: TextureSide,
     /// Most pixels that there is room for on the CPU's side.
     pub most_pixels: u64,
     /// Whether workers do a leaf themselves while the GPU has enough to do.
@@ -82,9 +82,9 @@ impl Executor {
         let adapter = device.info.name.clone();
         let most_pixels = device::most_pixels(&device.limits).min(order.most_pixels).max(1);
         let resolution = match order.texture {
-            Texture::Auto => Shape::default().resolution,
-            Texture::Max => Resolution::Side(MOST_SIDE),
-            Texture::Side(side) => Resolution::Side(side),
+            TextureSide::Auto => Shape::default().resolution,
+            TextureSide::Max => Resolution::Side(MOST_SIDE),
+            TextureSide::Side(side) => Resolution::Side(side),
         };
         Executor::on(engine, adapter, resolution, most_pixels, order.shared)
     }
@@ -170,13 +170,13 @@ trait Engines: Send {
 /// A device and the buffers of the leaves in flight.
 struct Engine {
     wish: Wish,
-    voronoi: Voronoi,
+    voronoi: VoronoiMethod,
     machine: Machine,
     sets: [Set; IN_FLIGHT],
 }
 
 impl Engine {
-    fn open(wish: Wish, voronoi: Voronoi) -> Result<Engine, Fault> {
+    fn open(wish: Wish, voronoi: VoronoiMethod) -> Result<Engine, Fault> {
         Ok(Engine { machine: open(&wish)?, wish, voronoi, sets: Default::default() })
     }
 }

@@ -2,18 +2,19 @@
 //!
 //! One WGSL file per step in `shaders/`, and for each a plain loop in `twins` that gives the same numbers bit for bit. [`steps`]
 //! records which dispatches a step is made of, [`machine`] carries recordings out, [`executor`] does leaf after leaf on a thread
-//! of its own. What comes back of a leaf is its discrete Voronoi diagram; `voronoi` makes the mesh of it and proves it.
+//! of its own. What comes back of a leaf is its discrete VoronoiMethod diagram; `voronoi` makes the mesh of it and proves it.
 
 pub mod buffers;
 pub mod clock;
 pub mod device;
 pub mod executor;
 pub mod machine;
+pub mod options;
 pub mod selftest;
 pub mod steps;
 pub mod twins;
 
-use crate::config::Voronoi;
+use crate::gpu::options::VoronoiMethod;
 use steps::{Recording, Size};
 
 /// Why a GPU did not do what it was asked to.
@@ -35,7 +36,7 @@ pub enum Fault {
 
 /// The steps that make the labels of a texture of its sites, each given by its pixel (y << 16 | x): G1, G2 and G3. Exact
 /// diagrams have islands too, where thin regions fall apart into pixels.
-pub fn labels(size: Size, pixels: Vec<u32>, voronoi: Voronoi) -> Recording {
+pub fn labels(size: Size, pixels: Vec<u32>, voronoi: VoronoiMethod) -> Recording {
     let mut recording = Recording::default();
     recording.write_sites(size, pixels);
     recording.voronoi(size, voronoi);

@@ -1,8 +1,8 @@
 //! The steps of the paper as lists of dispatches: which shader, which buffers, which parameters, how many workgroups. Nothing
 //! here touches the GPU; `machine` carries out what is recorded.
 
-use crate::config::Voronoi;
 use crate::gpu::buffers::Name;
+use crate::gpu::options::VoronoiMethod;
 
 /// A shader's entry point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -199,12 +199,12 @@ impl Recording {
         }
     }
 
-    /// Step G2: the discrete Voronoi diagram.
-    pub fn voronoi(&mut self, size: Size, voronoi: Voronoi) {
+    /// Step G2: the discrete VoronoiMethod diagram.
+    pub fn voronoi(&mut self, size: Size, voronoi: VoronoiMethod) {
         self.commands.push(Command::Step(Step::Voronoi));
         match voronoi {
-            Voronoi::Auto | Voronoi::Exact => self.voronoi_exact(size),
-            Voronoi::Jfa => self.voronoi_jfa(size),
+            VoronoiMethod::Auto | VoronoiMethod::Exact => self.voronoi_exact(size),
+            VoronoiMethod::Jfa => self.voronoi_jfa(size),
         }
     }
 
@@ -258,7 +258,7 @@ impl Recording {
         }
     }
 
-    /// Step G4: which corners are Voronoi vertices, and how many triangles there are in each segment.
+    /// Step G4: which corners are VoronoiMethod vertices, and how many triangles there are in each segment.
     pub fn find_vertices(&mut self, size: Size) {
         let segments = size.all_segments();
         self.commands.push(Command::Step(Step::Vertices));
@@ -357,8 +357,8 @@ mod tests {
         let size = Size { width: 16_384, height: 16_384 };
         let mut recording = Recording::default();
         recording.write_sites(size, vec![0; 1 << 26]);
-        recording.voronoi(size, Voronoi::Exact);
-        recording.voronoi(size, Voronoi::Jfa);
+        recording.voronoi(size, VoronoiMethod::Exact);
+        recording.voronoi(size, VoronoiMethod::Jfa);
         recording.remove_islands(size);
         recording.find_vertices(size);
         recording.count(size);

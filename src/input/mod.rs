@@ -9,6 +9,7 @@ mod file;
 mod filter;
 pub mod info;
 mod las;
+pub mod options;
 mod point;
 mod rules;
 mod source;

@@ -6,6 +6,7 @@
 pub mod durable;
 pub mod levels;
 pub mod mesh;
+pub mod options;
 pub mod partition;
 pub mod plan;
 pub mod preflight;
@@ -16,7 +17,6 @@ pub mod report;
 pub mod run;
 pub mod tiles;
 
-use crate::config::{ColorChoice, Config, Format};
 use crate::job::durable::directory::{self, Directory};
 use crate::job::durable::journal;
 use crate::job::durable::journal::{Done, Journal, Mark, Step};
@@ -24,6 +24,7 @@ use crate::job::durable::store::Store;
 use crate::job::levels::hierarchy::{Pyramid, Sizes};
 use crate::job::levels::level::LevelFigures;
 use crate::job::mesh::precision_limit::Longest;
+use crate::job::options::JobOptions;
 use crate::job::partition::read::{Partition, Summary, Task};
 use crate::job::plan::fingerprint::{Fingerprint, Head};
 use crate::job::plan::lattice_choice::Coarser;
@@ -42,6 +43,7 @@ use crate::job::tiles::max_edge::Cut;
 use crate::job::tiles::write::{Look, TileFigures};
 use crate::output::Compression;
 use crate::output::color::Coloring;
+use crate::output::options::{ColorChoice, OutputFormat};
 use crate::output::tiles3d::georeference::Georeference;
 use crate::triangulation::Triangulator;
 use crate::{Error, Result};
@@ -82,10 +84,10 @@ impl From<Progress> for Options {
 ///
 /// # Errors
 /// Whatever stops a step; see [`Error`]. [`Error::Resumable`] if the finished steps are kept, else no temporary files are left.
-pub fn run(config: &Config, options: impl Into<Options>) -> Result<Report> {
+pub fn run(config: &JobOptions, options: impl Into<Options>) -> Result<Report> {
     let (options, clock) = (options.into(), Clock::start());
     // First of all, so that a job that must have a GPU fails at once where there is none.
-    let triangulator = Triangulator::new(&config.triangulation, config.limits.memory.0, config.threads())?;
+    let triangulator = Triangulator::new(&config.triangulation, &config.gpu, config.limits.memory.0, config.threads())?;
     let directory = Directory::new(&config.output.directory);
     directory.nothing_is_in_the_way()?;
     let fingerprint = on_threads(workers(config, 0)?, || Fingerprint::of(config))?;
@@ -110,7 +112,7 @@ pub fn run(config: &Config, options: impl Into<Options>) -> Result<Report> {
 }
 
 fn attempt(
-    config: &Config,
+    config: &JobOptions,
     triangulator: &Triangulator,
     head: &Head,
     options: Options,
@@ -185,15 +187,15 @@ fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> Result<T> + Send) 
 }
 
 /// As many threads as are wanted, and as have room for a leaf each.
-fn workers(config: &Config, points: u64) -> Result<usize> {
-    let per_tile = config.triangulation.sites_per_tile.0.min(points).max(1);
+fn workers(config: &JobOptions, points: u64) -> Result<usize> {
+    let per_tile = config.triangulation.max_points_per_tile.0.min(points).max(1);
     let per_leaf = per_tile.saturating_mul(BYTES_PER_LEAF_SITE).max(BYTES_PER_THREAD);
     // The rest is for code, stacks, decoders and what the allocator keeps.
     let room = config.limits.memory.0 / 4 * 3;
     match room / per_leaf {
         0 => Err(Error::Config(format!(
             "tiles of {per_tile} points take about {} MiB a thread, more than [limits] memory = \"{}\" has room for: lower \
-             [triangulation] sites_per_tile or raise memory",
+             [triangulation] max_points_per_tile or raise memory",
             per_leaf >> 20,
             config.limits.memory
         ))),
@@ -203,7 +205,7 @@ fn workers(config: &Config, points: u64) -> Result<usize> {
 
 /// A job whose inputs have been looked at and whose directory is its own.
 pub(crate) struct Job<'a> {
-    config: &'a Config,
+    config: &'a JobOptions,
     triangulator: &'a Triangulator,
     coarser: Coarser,
     directory: &'a Directory,
@@ -253,7 +255,7 @@ impl Job<'_> {
         let tiles = partition.tree.leaves.len();
 
         let one_file = fits_one_file(&written);
-        let with_tileset = config.output.format != Format::Glb || !one_file;
+        let with_tileset = config.output.format != OutputFormat::Glb || !one_file;
         let for_viewers = with_tileset.then(|| self.tileset(plan, partition, &look)).transpose()?;
         let Levelled { figures: coarser, tileset, placement, mut warnings, stage: levelled } =
             for_viewers.unwrap_or_default();
@@ -261,7 +263,7 @@ impl Job<'_> {
         let stage = progress.stage("finish", 1, "job");
         let georeference = Georeference::new(&plan.frame, &plan.lattice, bounds, plan.unit, plan.crs.epsg);
         let georeference = georeference.to_json(placement.as_ref());
-        let viewers = finish::Viewers { tileset, one_file: one_file && config.output.format != Format::Tiles };
+        let viewers = finish::Viewers { tileset, one_file: one_file && config.output.format != OutputFormat::Tiles3d };
         if viewers.one_file {
             // It is made of the tiles under their names.
             journal.commit()?;
@@ -269,7 +271,7 @@ impl Job<'_> {
         let finish = || finish::run(directory, store, &georeference, &viewers, &canvas, tiles);
         // The tiles are on the disk before the report says how long that took.
         let other_bytes = beside(|| journal.commit(), || journal.step(Step::Finish, finish))?;
-        if !one_file && config.output.format == Format::Glb {
+        if !one_file && config.output.format == OutputFormat::Glb {
             warnings.push(too_large_for_one_file(&written));
         }
         stage.advance(1);
@@ -414,18 +416,18 @@ struct Levelled {
 }
 
 /// Which tiles viewers see.
-fn pyramid(config: &Config, partition: &Partition) -> (Sizes, Pyramid) {
+fn pyramid(config: &JobOptions, partition: &Partition) -> (Sizes, Pyramid) {
     let points: Vec<u64> = (0..partition.blocks.len()).map(|tile| partition.points(tile)).collect();
-    let sizes = Sizes::new(config.output.level_sites.0, config.limits.memory.0);
+    let sizes = Sizes::new(config.output.max_points_per_level_tile.0, config.limits.memory.0);
     (sizes, Pyramid::new(&partition.tree, &points, sizes))
 }
 
-fn levels_left_out(config: &Config, pyramid: &Pyramid) -> Option<String> {
+fn levels_left_out(config: &JobOptions, pyramid: &Pyramid) -> Option<String> {
     let without = pyramid.inner.iter().filter(|inner| !inner.content).count();
     (config.output.levels && without > 0).then(|| {
         format!(
             "{without} of {} coarser tiles are left out, because the tiles below them are too large for [limits] memory = \"{}\": \
-             viewers load the finer ones at once; lower [triangulation] sites_per_tile or raise memory",
+             viewers load the finer ones at once; lower [triangulation] max_points_per_tile or raise memory",
             pyramid.inner.len(),
             config.limits.memory
         )
@@ -444,18 +446,18 @@ fn too_large_for_one_file(written: &TileFigures) -> String {
         report::grouped(written.files),
         match written.triangles > MOST_TRIANGLES_IN_ONE_FILE {
             true => "[input] bounds or classes for a smaller terrain",
-            false => "a greater [triangulation] sites_per_tile for fewer tiles",
+            false => "a greater [triangulation] max_points_per_tile for fewer tiles",
         }
     )
 }
 
-fn task<'a>(plan: &'a Plan, config: &Config) -> Task<'a> {
+fn task<'a>(plan: &'a Plan, config: &JobOptions) -> Task<'a> {
     Task {
         sources: &plan.sources,
         extent: plan.extent,
-        points_per_tile: config.triangulation.sites_per_tile.0,
+        points_per_tile: config.triangulation.max_points_per_tile.0,
         memory: config.limits.memory.0 / 6,
-        malformed_share: config.input.malformed_share.0,
+        max_malformed_fraction: config.input.max_malformed_fraction.0,
         on_bad_file: config.input.on_bad_file,
     }
 }
@@ -489,7 +491,7 @@ fn enough_triangles(written: &TileFigures, plan: &Plan) -> Result<()> {
 }
 
 /// How the tiles are to look.
-fn look(config: &Config, plan: &Plan, summary: &Summary, bounds: [[i32; 3]; 2], cut: Cut) -> Look {
+fn look(config: &JobOptions, plan: &Plan, summary: &Summary, bounds: [[i32; 3]; 2], cut: Cut) -> Look {
     let elevation = Coloring::Elevation { low: bounds[0][2], high: bounds[1][2] };
     let coloring = match config.output.color {
         ColorChoice::None => None,

@@ -7,6 +7,7 @@ pub mod frame;
 pub mod gltf;
 pub mod lod;
 pub mod normals;
+pub mod options;
 pub mod preview;
 mod tile;
 pub mod tiles3d;

@@ -1,12 +1,14 @@
 //! The Delaunay triangulation of the sites of one tile, whoever computes it.
 
+pub mod options;
 pub mod reference;
 
-use crate::config::{Backend, Triangulation};
 use crate::geometry::Site;
 use crate::gpu::device::{Wish, hardware_is_likely};
 use crate::gpu::executor::{Executor, Order};
+use crate::gpu::options::GpuOptions;
 use crate::mesh::half_edge::Mesh;
+use crate::triangulation::options::{Backend, TriangulationOptions};
 use crate::voronoi::{self, Counts, Diagrams, Rejected, Scratch};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -59,7 +61,7 @@ impl Triangulator {
     ///
     /// # Errors
     /// [`Error::Config`] if a GPU is asked for and there is none that will do. A GPU that may be used, but cannot, is none.
-    pub fn new(config: &Triangulation, memory: u64, threads: usize) -> Result<Triangulator> {
+    pub fn new(config: &TriangulationOptions, gpu: &GpuOptions, memory: u64, threads: usize) -> Result<Triangulator> {
         let pipeline = config.backend != Backend::Reference;
         let required = config.backend == Backend::Gpu;
         let allowed = || config.backend == Backend::Auto && memory >= LEAST_MEMORY && hardware_is_likely();
@@ -67,9 +69,9 @@ impl Triangulator {
             return Ok(Triangulator { pipeline, gpu: None });
         }
         let order = Order {
-            wish: Wish::new(config.adapter.as_deref(), required),
-            voronoi: config.voronoi,
-            texture: config.texture,
+            wish: Wish::new(gpu.adapter.as_deref(), required),
+            voronoi: gpu.voronoi,
+            texture: gpu.texture,
             most_pixels: memory / 4 / threads as u64 / BYTES_PER_PIXEL,
             shared: !required,
         };

@@ -1,14 +1,14 @@
 //! What goes wrong on a device is an answer, never a panic.
 
 use super::rig::Rig;
-use gdt_batch::config::Voronoi;
+use gdt_batch::gpu::options::VoronoiMethod;
 use gdt_batch::gpu::steps::{Command, Recording, Size};
 use gdt_batch::gpu::{Fault, buffers::Name, labels};
 
 #[test]
 fn a_lost_device_says_so() {
     let Some(mut rig) = Rig::new() else { return };
-    let recording = labels(Size { width: 100, height: 100 }, vec![5, 7 << 16 | 9], Voronoi::Exact);
+    let recording = labels(Size { width: 100, height: 100 }, vec![5, 7 << 16 | 9], VoronoiMethod::Exact);
     assert_eq!(rig.try_run(&recording), Ok(()));
     rig.lose();
     for _ in 0..2 {
@@ -22,7 +22,7 @@ fn a_texture_beyond_the_limits_does_not_fit_and_the_device_lives_on() {
     let Some(mut rig) = Rig::new() else { return };
     let too_large = Recording { commands: vec![Command::Need(Name::Labels, 1 << 40)] };
     assert_eq!(rig.try_run(&too_large), Err(Fault::OutOfMemory));
-    let small = labels(Size { width: 100, height: 100 }, vec![5], Voronoi::Jfa);
+    let small = labels(Size { width: 100, height: 100 }, vec![5], VoronoiMethod::Jfa);
     assert_eq!(rig.try_run(&small), Ok(()));
 }
 

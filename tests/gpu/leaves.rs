@@ -2,9 +2,10 @@
 
 use super::random::Random;
 use super::rig::Rig;
-use gdt_batch::config::{Backend, Config, Texture, Triangulation, Voronoi};
 use gdt_batch::geometry::Site;
+use gdt_batch::gpu::options::{GpuOptions, TextureSide, VoronoiMethod};
 use gdt_batch::job::{self, progress::stage::Progress};
+use gdt_batch::triangulation::options::{Backend, TriangulationOptions};
 use gdt_batch::triangulation::{Outcome, Triangulator};
 use gdt_batch::verify::verify;
 use gdt_batch::voronoi::{self, Diagram, Diagrams, Rejected, Resolution, Scratch, Shape};
@@ -12,12 +13,12 @@ use std::collections::BTreeSet;
 
 const MEMORY: u64 = 1 << 30;
 
-fn settings(backend: Backend) -> Triangulation {
-    Triangulation { backend, ..Triangulation::default() }
+fn settings(backend: Backend) -> TriangulationOptions {
+    TriangulationOptions { backend, ..TriangulationOptions::default() }
 }
 
-fn solve(config: &Triangulation, sites: &[Site]) -> (BTreeSet<[u32; 3]>, Outcome) {
-    let (mesh, outcome) = Triangulator::new(config, MEMORY, 2).unwrap().triangulate(sites).unwrap();
+fn solve(config: &TriangulationOptions, gpu: &GpuOptions, sites: &[Site]) -> (BTreeSet<[u32; 3]>, Outcome) {
+    let (mesh, outcome) = Triangulator::new(config, gpu, MEMORY, 2).unwrap().triangulate(sites).unwrap();
     let turned = mesh.triangles.iter().map(|&[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().unwrap());
     (turned.collect(), outcome)
 }
@@ -52,16 +53,17 @@ fn a_leaf_has_the_same_triangles_whoever_makes_its_diagram() {
         return;
     }
     for (name, sites) in inputs() {
-        let (expected, _) = solve(&settings(Backend::Reference), &sites);
-        let (on_cpu, outcome) = solve(&settings(Backend::Cpu), &sites);
+        let (expected, _) = solve(&settings(Backend::Reference), &GpuOptions::default(), &sites);
+        let (on_cpu, outcome) = solve(&settings(Backend::Cpu), &GpuOptions::default(), &sites);
         assert!(on_cpu == expected, "{name} on the CPU");
         assert_eq!((outcome.pipeline, outcome.counts.on_gpu), (1, 0));
-        for voronoi in [Voronoi::Exact, Voronoi::Jfa] {
-            for texture in [Texture::Auto, Texture::Side(300), Texture::Side(1500)] {
-                let (on_gpu, outcome) = solve(&Triangulation { voronoi, texture, ..settings(Backend::Gpu) }, &sites);
+        for voronoi in [VoronoiMethod::Exact, VoronoiMethod::Jfa] {
+            for texture in [TextureSide::Auto, TextureSide::Side(300), TextureSide::Side(1500)] {
+                let (on_gpu, outcome) =
+                    solve(&settings(Backend::Gpu), &GpuOptions { voronoi, texture, adapter: None }, &sites);
                 assert!(on_gpu == expected, "{name}, {voronoi:?}, {texture:?}");
                 // A texture that is too coarse for the input is a reason to go another way; any other is not.
-                if texture == Texture::Auto {
+                if texture == TextureSide::Auto {
                     assert_eq!((outcome.pipeline, outcome.counts.on_gpu), (1, 1), "{name}, {voronoi:?}");
                 }
             }
@@ -85,7 +87,7 @@ impl Diagrams for Liar {
 #[test]
 fn a_wrong_diagram_makes_no_wrong_mesh() {
     let (_, sites) = inputs().swap_remove(0);
-    let (expected, _) = solve(&settings(Backend::Reference), &sites);
+    let (expected, _) = solve(&settings(Backend::Reference), &GpuOptions::default(), &sites);
     // Whether every label is a pixel with a site, so that only the mesh shows the lie.
     let liars: [(&str, bool, Liar); 6] = [
         ("too few labels", false, Liar(|_, _, pixels| pixels.to_vec())),
@@ -116,11 +118,11 @@ fn a_wrong_diagram_makes_no_wrong_mesh() {
 
 #[test]
 fn without_the_gpu_that_is_named_there_is_an_error_or_none() {
-    let nameless = |backend| Triangulation { adapter: Some("no GPU has this name".into()), ..settings(backend) };
-    let error = Triangulator::new(&nameless(Backend::Gpu), MEMORY, 1).err().expect("there is no such GPU");
+    let nameless = GpuOptions { adapter: Some("no GPU has this name".into()), ..GpuOptions::default() };
+    let error = Triangulator::new(&settings(Backend::Gpu), &nameless, MEMORY, 1).err().expect("there is no such GPU");
     assert_eq!(error.exit_code(), 2);
     assert!(error.to_string().contains("no GPU has this name"), "{error}");
-    assert!(Triangulator::new(&nameless(Backend::Auto), MEMORY, 1).unwrap().gpu().is_none());
+    assert!(Triangulator::new(&settings(Backend::Auto), &nameless, MEMORY, 1).unwrap().gpu().is_none());
 }
 
 #[test]
@@ -136,8 +138,8 @@ fn a_job_has_the_same_digest_on_every_backend() {
         "backend = \"reference\"",
         "backend = \"cpu\"",
         "backend = \"gpu\"",
-        "backend = \"gpu\"\nvoronoi = \"jfa\"\nsites_per_tile = 7000",
-        "backend = \"gpu\"\ntexture = 700\nsites_per_tile = 20000",
+        "backend = \"gpu\"\nmax_points_per_tile = 7000\n[gpu]\nvoronoi = \"jfa\"",
+        "backend = \"gpu\"\nmax_points_per_tile = 20000\n[gpu]\ntexture = 700",
     ]
     .iter()
     .enumerate()
@@ -147,7 +149,7 @@ fn a_job_has_the_same_digest_on_every_backend() {
             "[input]\nfiles = [\"cloud.las\"]\n[triangulation]\n{lines}\n[output]\ndirectory = \"out{i}\"\n[limits]\nthreads = 2\n"
         );
         std::fs::write(&path, text).unwrap();
-        let config = Config::load(&path).unwrap();
+        let config = gdt_batch::config::load(&path).unwrap();
         let report = job::run(&config, Progress::detect(true)).unwrap();
         let outcome = report.leaves.outcome;
         if config.triangulation.backend == Backend::Gpu {

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use gdt_batch::Error;
-use gdt_batch::config::{Config, OnBadFile};
+use gdt_batch::input::options::OnBadFile;
 use gdt_batch::job::durable::directory::Directory;
 use gdt_batch::job::partition::read as partition;
 use gdt_batch::job::plan::lattice_choice::Coarser;
@@ -115,7 +115,7 @@ fn each_file_is_judged_by_itself() {
     let good = write(folder.path(), "large.csv", rows(1000).as_bytes());
     let sound = write(folder.path(), "sound.csv", (rows(96) + &"1,2\n".repeat(4)).as_bytes());
     let bad = write(folder.path(), "bad.csv", (rows(94) + &"1,2\n".repeat(6)).as_bytes());
-    let job = Job::on(&[good, sound, bad]).with("input", "malformed_share = 0.05");
+    let job = Job::on(&[good, sound, bad]).with("input", "max_malformed_fraction = 0.05");
     assert_eq!(number(&job.report()["points"]["malformed"]), 10, "ten of 1200 is little, and one share for all");
     let report = job.with("input", "on_bad_file = \"skip\"").report();
     assert_eq!((number(&report["points"]["read"]), number(&report["points"]["malformed"])), (1100, 4));
@@ -135,7 +135,7 @@ fn a_job_of_bad_files_alone_is_an_error() {
 fn planned(folder: &Path) -> (Directory, Plan) {
     let good = good(folder);
     let job = skipping(&[good]);
-    let plan = scan::run(&Config::load(&job.config()).unwrap(), Coarser::default()).unwrap();
+    let plan = scan::run(&gdt_batch::config::load(&job.config()).unwrap(), Coarser::default()).unwrap();
     (Directory::new(&folder.join("out")), plan)
 }
 
@@ -150,7 +150,7 @@ fn error_after(change: impl Fn(&Path)) -> Error {
         extent: plan.extent,
         points_per_tile: 1000,
         memory: 1 << 20,
-        malformed_share: 0.0,
+        max_malformed_fraction: 0.0,
         on_bad_file: OnBadFile::Skip,
     };
     partition::run(&task, &directory, &Progress::Quiet.stage("read", 0, "points")).unwrap_err()

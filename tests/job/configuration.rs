@@ -3,8 +3,6 @@
 use std::fs;
 use std::path::Path;
 
-use gdt_batch::config::Config;
-
 use crate::clouds;
 use crate::program::{Job, gdt_batch};
 
@@ -46,12 +44,12 @@ fn the_shipped_configurations_run() {
 #[test]
 fn the_full_configuration_shows_every_option_at_its_default() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/full.toml");
-    let mut full = Config::load(&path).unwrap();
+    let mut full = gdt_batch::config::load(&path).unwrap();
     (full.input.classes, full.input.bounds) = (None, None);
     let folder = folder_with_cloud();
     let least = folder.path().join("job.toml");
     fs::write(&least, LEAST).unwrap();
-    let mut least = Config::load(&least).unwrap();
+    let mut least = gdt_batch::config::load(&least).unwrap();
     (least.input.files, least.output.directory) = (full.input.files.clone(), full.output.directory.clone());
     assert_eq!(toml::to_string(&full).unwrap(), toml::to_string(&least).unwrap());
     let text = fs::read_to_string(path).unwrap();
@@ -75,11 +73,11 @@ fn wrong_configurations_are_refused_with_the_line() {
         ("[output]", "classes = [300]\n[output]", &["line 3", "300"]),
         ("[output]", "duplicates = \"last\"\n[output]", &["line 3", "last", "lowest"]),
         ("[output]", "resolution = -1\n[output]", &["line 3", "resolution"]),
-        ("[output]", "malformed_share = 2.0\n[output]", &["line 3", "share"]),
+        ("[output]", "max_malformed_fraction = 2.0\n[output]", &["line 3", "share"]),
         ("[output]", "[input.csv]\ndelimeter = \",\"\n[output]", &["line 4", "delimeter"]),
-        ("[output]", "[triangulation]\nsites_per_tile = 1\n[output]", &["line 4", "sites_per_tile"]),
+        ("[output]", "[triangulation]\nmax_points_per_tile = 1\n[output]", &["line 4", "max_points_per_tile"]),
         ("[output]", "[triangulation]\nbackend = \"cuda\"\n[output]", &["line 4", "cuda"]),
-        ("[output]", "[triangulation]\ntexture = 3\n[output]", &["line 4", "texture"]),
+        ("[output]", "[gpu]\ntexture = 3\n[output]", &["line 4", "texture"]),
         ("[output]", "[limits]\nmemory = \"1 MiB\"\n[output]", &["line 4", "128 MiB"]),
         ("[output]", "[limits]\nmemory = 4\n[output]", &["line 4", "string"]),
         ("[output]", "[limits]\nthreads = -1\n[output]", &["line 4", "threads"]),

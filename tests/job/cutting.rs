@@ -52,7 +52,7 @@ fn what_is_left_out_does_not_depend_on_the_tiles_and_the_whole_is_exact() {
 fn coarser_levels_leave_the_void_empty_too() {
     let folder = tempfile::tempdir().unwrap();
     let file = clouds::write(folder.path(), "cloud.csv", &two_fields());
-    let job = Job::on(&[&file]).tiles_of(150).with("output", "level_sites = 150\nmax_edge = 100");
+    let job = Job::on(&[&file]).tiles_of(150).with("output", "max_points_per_level_tile = 150\nmax_edge = 100");
     assert!(number(&job.report()["cut_triangles"]) > 10);
     job.verified();
     let tiles = tiles(&job);

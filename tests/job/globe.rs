@@ -88,7 +88,7 @@ fn job(points: &[[i32; 3]]) -> (Job, Vec<Tile>) {
     let folder = tempfile::tempdir().unwrap();
     let cloud = folder.path().join("cloud.las");
     std::fs::write(&cloud, utm(points)).unwrap();
-    let job = Job::on(&[&cloud]).tiles_of(500).with("output", "level_sites = 500\nformat = \"tiles\"");
+    let job = Job::on(&[&cloud]).tiles_of(500).with("output", "max_points_per_level_tile = 500\nformat = \"3dtiles\"");
     job.report();
     job.verified();
     let tiles = tiles(&job);

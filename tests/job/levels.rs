@@ -45,7 +45,7 @@ pub(crate) fn hills(count: usize, seed: u64) -> clouds::Cloud {
 }
 
 fn small(cloud: &Path) -> Job {
-    Job::on(&[cloud]).tiles_of(500).with("output", "level_sites = 500")
+    Job::on(&[cloud]).tiles_of(500).with("output", "max_points_per_level_tile = 500")
 }
 
 #[test]
@@ -115,8 +115,8 @@ fn the_form_is_the_users_choice() {
     };
     assert_eq!(there(""), [true, true, true]);
     assert_eq!(there("format = \"glb\""), [true, false, false]);
-    assert_eq!(there("format = \"tiles\""), [false, true, true]);
-    assert_eq!(there("format = \"tiles\"\nlevels = false"), [false, true, false]);
+    assert_eq!(there("format = \"3dtiles\""), [false, true, true]);
+    assert_eq!(there("format = \"3dtiles\"\nlevels = false"), [false, true, false]);
 }
 
 #[test]

@@ -58,6 +58,6 @@ fn tiles_too_large_for_the_memory_are_refused() {
         let file = clouds::write(folder.path(), &format!("{count}.csv"), &clouds::uniform(count, 100_000, 3));
         Job::on(&[file]).tiles_of(5_000_000).with("limits", "memory = \"128 MiB\"")
     });
-    many.run().refused(2, &["sites_per_tile", "memory"]);
+    many.run().refused(2, &["max_points_per_tile", "memory"]);
     few.digest();
 }

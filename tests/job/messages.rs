@@ -13,11 +13,11 @@ const PLENTY_MIB: u64 = 1_536;
 fn broken_files_are_refused_or_read_as_far_as_they_go() {
     let Some(shared) = shared() else { return };
     for (name, code, words) in [
-        ("1.2-no-points.las", 3, &["1.2-no-points.las", "1065", "malformed_share"][..]),
-        ("1.2-with-color-clipped.las", 3, &["1.2-with-color-clipped.las", "1065", "malformed_share"]),
+        ("1.2-no-points.las", 3, &["1.2-no-points.las", "1065", "max_malformed_fraction"][..]),
+        ("1.2-with-color-clipped.las", 3, &["1.2-with-color-clipped.las", "1065", "max_malformed_fraction"]),
         ("badheader.txt", 3, &["badheader.txt", "2 columns x", "columns"]),
         ("git-lfs-pointer.laz", 3, &["git-lfs-pointer.laz", "git lfs pull"]),
-        ("truncated-mid-chunk.laz", 3, &["truncated-mid-chunk.laz", "malformed_share"]),
+        ("truncated-mid-chunk.laz", 3, &["truncated-mid-chunk.laz", "max_malformed_fraction"]),
         ("garbage_nVariableLength.las", 3, &["garbage_nVariableLength.las"]),
         ("bad_vlr_count.las", 0, &["3 variable length records", "2"]),
         ("simple-laszip-compressor-version-1.2r0.laz", 0, &[]),
@@ -40,7 +40,7 @@ fn broken_files_are_refused_or_read_as_far_as_they_go() {
 fn what_is_left_of_a_broken_file_is_read_on_request() {
     let Some(shared) = shared() else { return };
     for (name, kept, lost) in [("1.2-with-color-clipped.las", 1_064, 1), ("truncated-mid-chunk.laz", 44_372, 29_031)] {
-        let job = Job::on(&[shared.join("data/bad").join(name)]).with("input", "malformed_share = 0.5");
+        let job = Job::on(&[shared.join("data/bad").join(name)]).with("input", "max_malformed_fraction = 0.5");
         let report = job.report();
         job.verified();
         let points = &report["points"];
@@ -55,8 +55,8 @@ fn malformed_lines_are_shown_and_counted() {
     let path = clouds::write(folder.path(), "cloud.csv", &clouds::uniform(200, 10_000, 4));
     let text = fs::read_to_string(&path).unwrap() + "1,2\nfour,5,6\n";
     fs::write(&path, text).unwrap();
-    Job::on(&[&path]).run().refused(3, &["cloud.csv", "line 202", "malformed_share"]);
-    let job = Job::on(&[&path]).with("input", "malformed_share = 0.05");
+    Job::on(&[&path]).run().refused(3, &["cloud.csv", "line 202", "max_malformed_fraction"]);
+    let job = Job::on(&[&path]).with("input", "max_malformed_fraction = 0.05");
     let said = job.run().succeeded();
     assert!(said.out.contains("line 202") && said.out.contains("line 203"), "{}", said.out);
     assert_eq!(number(&job.report()["points"]["malformed"]), 2);

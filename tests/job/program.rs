@@ -101,7 +101,7 @@ impl Job {
     }
 
     pub(crate) fn tiles_of(self, sites: u64) -> Job {
-        self.with("triangulation", &format!("sites_per_tile = {sites}"))
+        self.with("triangulation", &format!("max_points_per_tile = {sites}"))
     }
 
     pub(crate) fn threads(self, threads: usize) -> Job {

@@ -1,12 +1,13 @@
 //! The steps of a job by hand, on many small clouds cut into tiny tiles: the closed triangles of all nodes together are
 //! the triangulation of all sites at once.
 
-use gdt_batch::config::{Backend, Config, Duplicates, OnBadFile, Triangulation};
 use gdt_batch::geometry::Site;
+use gdt_batch::input::options::{Duplicates, OnBadFile};
 use gdt_batch::job::durable::directory::Directory;
 use gdt_batch::job::durable::store::Store;
 use gdt_batch::job::mesh::precision_limit::Longest;
 use gdt_batch::job::mesh::{leaf, merge};
+use gdt_batch::job::options::JobOptions;
 use gdt_batch::job::partition::point_file::Spill;
 use gdt_batch::job::partition::read as partition;
 use gdt_batch::job::partition::read::Partition;
@@ -14,6 +15,7 @@ use gdt_batch::job::plan::lattice_choice::Coarser;
 use gdt_batch::job::plan::scan;
 use gdt_batch::job::progress::stage::Progress;
 use gdt_batch::job::records::{Leaf, Seam};
+use gdt_batch::triangulation::options::{Backend, TriangulationOptions};
 use gdt_batch::triangulation::{Triangulator, reference};
 
 use crate::clouds::{self, Cloud};
@@ -30,24 +32,24 @@ fn canonical(mut corners: Triangle) -> Triangle {
 }
 
 /// Scans, partitions, triangulates every leaf and merges every inner node.
-fn run_steps(job: &Job, config: &Config) -> (Store, Partition) {
+fn run_steps(job: &Job, config: &JobOptions) -> (Store, Partition) {
     let directory = Directory::new(&job.out());
     directory.create().unwrap();
     let plan = scan::run(config, Coarser::default()).unwrap();
     let task = partition::Task {
         sources: &plan.sources,
         extent: plan.extent,
-        points_per_tile: config.triangulation.sites_per_tile.0,
+        points_per_tile: config.triangulation.max_points_per_tile.0,
         memory: 1 << 20,
-        malformed_share: 0.0,
+        max_malformed_fraction: 0.0,
         on_bad_file: OnBadFile::Stop,
     };
     let partition = partition::run(&task, &directory, &Progress::Quiet.stage("read", 0, "points")).unwrap();
     let store = Store::create(directory.store()).unwrap();
     let spill = Spill::open(&directory.spill()).unwrap();
     let longest = Longest::of(&plan.frame);
-    let cpu = Triangulation { backend: Backend::Cpu, ..Triangulation::default() };
-    let triangulator = Triangulator::new(&cpu, 1 << 28, 1).unwrap();
+    let cpu = TriangulationOptions { backend: Backend::Cpu, ..TriangulationOptions::default() };
+    let triangulator = Triangulator::new(&cpu, &gdt_batch::gpu::options::GpuOptions::default(), 1 << 28, 1).unwrap();
     let task = leaf::Task { duplicates: Duplicates::Lowest, triangulator: &triangulator, longest };
     for tile in (0..partition.tree.leaves.len()).rev() {
         leaf::run(&store, &partition, &spill, tile, task).unwrap();
@@ -80,10 +82,10 @@ fn collect(store: &Store, partition: &Partition) -> (Vec<Site>, Vec<Triangle>) {
 }
 
 #[track_caller]
-fn assert_exact(cloud: &Cloud, sites_per_tile: u64, what: &str) {
+fn assert_exact(cloud: &Cloud, max_points_per_tile: u64, what: &str) {
     let folder = tempfile::tempdir().unwrap();
-    let job = Job::on(&[clouds::write(folder.path(), "cloud.csv", cloud)]).tiles_of(sites_per_tile);
-    let (store, partition) = run_steps(&job, &Config::load(&job.config()).unwrap());
+    let job = Job::on(&[clouds::write(folder.path(), "cloud.csv", cloud)]).tiles_of(max_points_per_tile);
+    let (store, partition) = run_steps(&job, &gdt_batch::config::load(&job.config()).unwrap());
     let (sites, triangles) = collect(&store, &partition);
     let mesh = reference::triangulate(&sites).unwrap();
     let mut expected: Vec<Triangle> = mesh.triangles.iter().map(|t| canonical(t.map(|v| sites[v as usize]))).collect();
@@ -91,7 +93,7 @@ fn assert_exact(cloud: &Cloud, sites_per_tile: u64, what: &str) {
     let count = |t: &[Triangle]| t.len();
     assert!(
         triangles == expected,
-        "{what}, {sites_per_tile} sites a tile: {} triangles, not {}: {cloud:?}",
+        "{what}, {max_points_per_tile} sites a tile: {} triangles, not {}: {cloud:?}",
         count(&triangles),
         count(&expected)
     );
@@ -140,8 +142,8 @@ fn small_clouds_in_tiny_tiles() {
 
 #[test]
 fn lines_end_without_a_triangle() {
-    for sites_per_tile in [5, 13, 40] {
-        assert_exact(&clouds::line(100, 0), sites_per_tile, "line");
-        assert_exact(&vec![[3, 3, 3]; 100], sites_per_tile, "one spot");
+    for max_points_per_tile in [5, 13, 40] {
+        assert_exact(&clouds::line(100, 0), max_points_per_tile, "line");
+        assert_exact(&vec![[3, 3, 3]; 100], max_points_per_tile, "one spot");
     }
 }

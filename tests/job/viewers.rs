@@ -114,7 +114,7 @@ fn a_browser_shows_the_tileset_and_the_file() {
     let Some(chromium) = chromium() else { return };
     let folder = tempfile::tempdir().unwrap();
     let cloud = clouds::write(folder.path(), "cloud.csv", &hills(20_000, 3));
-    let packed = "level_sites = 2000\ncompression = \"meshopt\"";
+    let packed = "max_points_per_level_tile = 2000\ncompression = \"meshopt\"";
     shows(&Job::on(&[cloud]).tiles_of(2_000).with("output", packed), &chromium);
     if let Some(job) = stadium() {
         shows(&job, &chromium);
@@ -124,7 +124,7 @@ fn a_browser_shows_the_tileset_and_the_file() {
 /// A real cloud with a coordinate system, in a handful of tiles.
 fn stadium() -> Option<Job> {
     let cloud = shared()?.join("data/autzen_trim.las");
-    Some(Job::on(&[cloud]).tiles_of(6_000).with("output", "level_sites = 6000"))
+    Some(Job::on(&[cloud]).tiles_of(6_000).with("output", "max_points_per_level_tile = 6000"))
 }
 
 #[test]
@@ -162,7 +162,7 @@ fn a_browser_shows_the_large_file() {
         eprintln!("not tested: autzen.laz in a browser; set GDT_TEST_LARGE=1");
         return;
     }
-    shows(&Job::on(&[data.join("data/autzen.laz")]).with("output", "format = \"tiles\""), &chromium);
+    shows(&Job::on(&[data.join("data/autzen.laz")]).with("output", "format = \"3dtiles\""), &chromium);
 }
 
 /// GDT_BPY names a Python that has Blender's module `bpy`.

@@ -29,7 +29,7 @@ fn results(job: &Job) -> BTreeMap<PathBuf, Vec<u8>> {
 fn tiles_that_need_not_wait_do_not() {
     let folder = tempfile::tempdir().unwrap();
     let cloud = clouds::write(folder.path(), "grid.csv", &clouds::grid(200, 200));
-    let job = |threads| Job::on(&[&cloud]).tiles_of(150).threads(threads).with("output", "format = \"tiles\"");
+    let job = |threads| Job::on(&[&cloud]).tiles_of(150).threads(threads).with("output", "format = \"3dtiles\"");
     let mut expected = None;
     for threads in [1, 4] {
         let woven = job(threads);

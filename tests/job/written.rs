@@ -30,7 +30,9 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 fn threads_and_repetition_change_no_byte() {
     let folder = tempfile::tempdir().unwrap();
     let cloud = clouds::write(folder.path(), "cloud.csv", &clouds::gaussian(40_000));
-    let job = |threads: usize| Job::on(&[&cloud]).tiles_of(3_000).with("output", "level_sites = 3000").threads(threads);
+    let job = |threads: usize| {
+        Job::on(&[&cloud]).tiles_of(3_000).with("output", "max_points_per_level_tile = 3000").threads(threads)
+    };
     let (one, two) = (job(1), job(2));
     one.report();
     two.report();

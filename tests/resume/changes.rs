@@ -59,7 +59,7 @@ fn another_look_keeps_the_mesh() {
 fn another_mesh_starts_over_and_says_why() {
     let mut rig = rig();
     for (key, setup) in [
-        ("[triangulation] sites_per_tile", Setup { triangulation: "sites_per_tile = 1500".into(), ..base() }),
+        ("[triangulation] max_points_per_tile", Setup { triangulation: "max_points_per_tile = 1500".into(), ..base() }),
         ("[input] bounds", Setup { input: base().input + "\nbounds = [-20000, -20000, 20000, 20000]", ..base() }),
         ("[input] duplicates", Setup { input: base().input + "\nduplicates = \"highest\"", ..base() }),
         ("[output] color", Setup { output: base().output.replace("elevation", "auto"), ..base() }),

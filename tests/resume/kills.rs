@@ -51,7 +51,7 @@ fn killed_at_commits_with_two_threads() {
 
 #[test]
 fn killed_while_triangles_are_left_out_below_levels() {
-    let setup = Setup::tiles_of(2_000).output("max_edge = \"auto\"").output("level_sites = 1000");
+    let setup = Setup::tiles_of(2_000).output("max_edge = \"auto\"").output("max_points_per_level_tile = 1000");
     let rig = small_job(&setup);
     for folder in ["cut/", "levels/"] {
         assert!(rig.expected.keys().filter(|name| name.starts_with(folder)).count() > 2, "{folder}");

@@ -31,7 +31,7 @@ impl Setup {
     pub(crate) fn tiles_of(sites: u64) -> Setup {
         Setup {
             input: "files = [\"cloud.csv\"]".into(),
-            triangulation: format!("sites_per_tile = {sites}"),
+            triangulation: format!("max_points_per_tile = {sites}"),
             output: "directory = \"out\"".into(),
             limits: "threads = 1".into(),
         }

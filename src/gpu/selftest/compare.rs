@@ -1,8 +1,8 @@
 //! Every step against its twin on the same input.
 
-use crate::config::Voronoi;
 use crate::gpu::buffers::{Name, Set};
 use crate::gpu::machine::Machine;
+use crate::gpu::options::VoronoiMethod;
 use crate::gpu::steps::{Recording, Size, total};
 use crate::gpu::{Fault, twins};
 use serde::Serialize;
@@ -43,7 +43,7 @@ pub fn compare(machine: &mut Machine, set: &mut Set, size: Size, pixels: &[u32])
         recording.voronoi(size, voronoi);
         recording
     };
-    machine.start(set, &labels(Voronoi::Jfa))?;
+    machine.start(set, &labels(VoronoiMethod::Jfa))?;
     comparisons.push(Comparison::new("G1", &machine.numbers(set, Name::Texture, size.pixels())?, &texture));
     comparisons.push(Comparison::new("G2 jfa", &machine.numbers(set, Name::Labels, size.pixels())?, &jfa));
 
@@ -54,7 +54,7 @@ pub fn compare(machine: &mut Machine, set: &mut Set, size: Size, pixels: &[u32])
     comparisons.push(Comparison::new("G3", &machine.numbers(set, Name::Labels, size.pixels())?, &jfa));
 
     let exact = twins::voronoi_exact(size, &texture);
-    machine.start(set, &labels(Voronoi::Exact))?;
+    machine.start(set, &labels(VoronoiMethod::Exact))?;
     comparisons.push(Comparison::new("G2 exact", &machine.numbers(set, Name::Labels, size.pixels())?, &exact));
     comparisons.extend(compare_triangles(machine, set, size, &exact, &texture)?);
     Ok(comparisons)

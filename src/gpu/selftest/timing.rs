@@ -1,9 +1,9 @@
 //! The time of every step, beside the least that moving its bytes takes.
 
-use crate::config::Voronoi;
 use crate::gpu::Fault;
 use crate::gpu::buffers::{Name, Set};
 use crate::gpu::machine::Machine;
+use crate::gpu::options::VoronoiMethod;
 use crate::gpu::steps::{Command, Recording, Size, jfa_steps, total};
 use serde::Serialize;
 use std::time::Instant;
@@ -76,9 +76,9 @@ pub(super) fn time_steps(
     let steps = [
         ("upload", upload, 4 * sites, false),
         ("G1 write sites", write, 4 * all + 12 * sites, true),
-        ("G2 jfa", record(|r| r.voronoi(size, Voronoi::Jfa)), 8 * all * (jumps + 1), true),
+        ("G2 jfa", record(|r| r.voronoi(size, VoronoiMethod::Jfa)), 8 * all * (jumps + 1), true),
         ("G3 islands", record(|r| r.remove_islands(size)), 4 * all, true),
-        ("G2 exact", record(|r| r.voronoi(size, Voronoi::Exact)), 8 * all + all / 2, true),
+        ("G2 exact", record(|r| r.voronoi(size, VoronoiMethod::Exact)), 8 * all + all / 2, true),
         ("G4 vertices", record(|r| r.find_vertices(size)), 4 * all + 12 * segments, true),
         ("G5 count", record(|r| r.count(size)), 12 * segments, true),
     ];

@@ -1,9 +1,9 @@
 //! Step 3 of a job, by tile: triangulate the sites of one leaf and close what can be closed.
 
 use crate::Result;
-use crate::config::Duplicates;
 use crate::geometry::Site;
 use crate::input::Point;
+use crate::input::options::Duplicates;
 use crate::job::durable::journal::Done;
 use crate::job::durable::store::Store;
 use crate::job::mesh::final_triangles::{Closing, State, close};

@@ -1,9 +1,9 @@
 //! The sites of a tile: its points from the spill, one for every x and y, in an order that depends on them alone.
 
 use crate::Result;
-use crate::config::Duplicates;
 use crate::geometry::Site;
 use crate::input::Point;
+use crate::input::options::Duplicates;
 use crate::job::partition::point_file::{Block, Spill};
 use multiversion::multiversion;
 use std::cmp::Reverse;

@@ -1,8 +1,8 @@
 //! Step 2 of a job: decode every input once, spill the points to buckets of a grid, and build the tree whose leaves are
 //! the tiles. A bucket with more points than a tile may hold is spilled again to a finer grid of its own.
 
-use crate::config::OnBadFile;
 use crate::geometry::Site;
+use crate::input::options::OnBadFile;
 use crate::input::{Point, Rules, Source, Tally};
 use crate::job::durable::columns::{ColumnReader, ColumnWriter};
 use crate::job::durable::directory::Directory;
@@ -114,7 +114,7 @@ pub struct Task<'a> {
     /// Bytes for buffers.
     pub memory: u64,
     /// The share of malformed records that is put up with: of all inputs together, or where bad ones are left out, of each.
-    pub malformed_share: f64,
+    pub max_malformed_fraction: f64,
     /// What becomes of an input with more of them.
     pub on_bad_file: OnBadFile,
 }
@@ -156,9 +156,9 @@ fn judge(task: &Task, by_source: BySource) -> Judgement {
     let mut judgement = Judgement { summary: Summary::default(), skipped: Vec::new(), orders: Vec::new() };
     for (index, summary) in by_source.0 {
         let (source, rules) = &task.sources[index];
-        let is_bad = summary.tally.malformed > allowed(task.malformed_share, source.records);
+        let is_bad = summary.tally.malformed > allowed(task.max_malformed_fraction, source.records);
         if is_bad && task.on_bad_file == OnBadFile::Skip {
-            let why = malformed_share_exceeded(&summary.tally, summary.tally.malformed, source.records);
+            let why = max_malformed_fraction_exceeded(&summary.tally, summary.tally.malformed, source.records);
             judgement.skipped.push(Skipped { file: source.path.clone(), why });
             judgement.orders.push(rules.first_order..rules.first_order + source.records);
         } else {
@@ -168,8 +168,8 @@ fn judge(task: &Task, by_source: BySource) -> Judgement {
     judgement
 }
 
-fn allowed(malformed_share: f64, records: u64) -> u64 {
-    (malformed_share * records as f64) as u64
+fn allowed(max_malformed_fraction: f64, records: u64) -> u64 {
+    (max_malformed_fraction * records as f64) as u64
 }
 
 /// The bytes of buffers for a job of `points` points, within `memory`.
@@ -207,7 +207,7 @@ fn decode_all(task: &Task, records: u64, grid: &Grid, buckets: &Buckets, stage: 
         .enumerate()
         .flat_map(|(s, (source, _))| (0..source.pieces()).map(move |piece| (s, piece)))
         .collect();
-    let allowed = allowed(task.malformed_share, records);
+    let allowed = allowed(task.max_malformed_fraction, records);
     let malformed = AtomicU64::new(0);
     let decode = |&(s, piece): &(usize, usize)| -> Result<BySource> {
         interrupt::check()?;
@@ -227,18 +227,20 @@ fn decode_all(task: &Task, records: u64, grid: &Grid, buckets: &Buckets, stage: 
 }
 
 fn too_many_malformed(source: &Source, tally: &Tally, malformed: u64, records: u64) -> Error {
-    let what = malformed_share_exceeded(tally, malformed, records);
+    let what = max_malformed_fraction_exceeded(tally, malformed, records);
     Error::input(
         &source.path,
         format!(
-            "{what}. Repair the file, leave it out (on_bad_file = \"skip\"), or raise malformed_share to read the rest"
+            "{what}. Repair the file, leave it out (on_bad_file = \"skip\"), or raise max_malformed_fraction to read the rest"
         ),
     )
 }
 
-fn malformed_share_exceeded(tally: &Tally, malformed: u64, records: u64) -> String {
+fn max_malformed_fraction_exceeded(tally: &Tally, malformed: u64, records: u64) -> String {
     let examples = tally.examples.join("; ");
-    format!("{malformed} of {records} records are malformed, more than [input] malformed_share allows: {examples}")
+    format!(
+        "{malformed} of {records} records are malformed, more than [input] max_malformed_fraction allows: {examples}"
+    )
 }
 
 /// Sorts slices of points by bucket before they go to the shared buffers, so that a lock is taken once a bucket.

@@ -1,8 +1,8 @@
 //! Where the points of a job lie, as far as headers can be believed.
 
-use crate::config::Config;
 use crate::geometry::lattice::AxisMap;
 use crate::input::{Axis, Format, Rules, Source};
+use crate::job::options::JobOptions;
 use crate::job::partition::read::around;
 use crate::output::frame::Frame;
 use crate::{Result, interrupt};
@@ -24,8 +24,8 @@ const SUSPICIOUS: f64 = 100.0;
 
 impl Area {
     /// The box around `sources`: what their headers say, unless their points say otherwise.
-    pub(crate) fn of(sources: &[Source], config: &Config, metres: f64) -> Result<Area> {
-        let classes = config.kept_classes();
+    pub(crate) fn of(sources: &[Source], config: &JobOptions, metres: f64) -> Result<Area> {
+        let classes = config.input.kept_classes();
         let boxes = sources.par_iter().map(|s| header_box(s, &classes)).collect::<Result<Vec<_>>>()?;
         let area = Area::around(&boxes, config);
         if !area.is_suspicious(sources, metres) {
@@ -44,7 +44,7 @@ impl Area {
         (0..3).any(is_too_wide)
     }
 
-    fn around(boxes: &[Option<[[f64; 3]; 2]>], config: &Config) -> Area {
+    fn around(boxes: &[Option<[[f64; 3]; 2]>], config: &JobOptions) -> Area {
         let mut area = Area { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
         for [min, max] in boxes.iter().flatten() {
             for axis in 0..3 {

@@ -1,8 +1,9 @@
 //! What a job is: whether an interrupted one may be gone on with, and from where.
 
-use crate::config::{ColorChoice, Config};
+use crate::job::options::JobOptions;
 use crate::job::plan::lattice_choice::Coarser;
 use crate::job::plan::scan;
+use crate::output::options::ColorChoice;
 use crate::{Error, Result};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -72,7 +73,7 @@ impl Fingerprint {
     ///
     /// # Errors
     /// [`Error::Config`] if there are no inputs, [`Error::Io`] if one cannot be read.
-    pub fn of(config: &Config) -> Result<Fingerprint> {
+    pub fn of(config: &JobOptions) -> Result<Fingerprint> {
         let paths = scan::inputs(config)?;
         let order = if cfg!(target_endian = "little") { "little-endian" } else { "big-endian" };
         let mut mesh = options(&config.input, "input", &["files"])?;

@@ -1,9 +1,10 @@
 //! Step 1 of a job: look at every input, and choose the one lattice, unit and CRS that all of them meet on.
 
-use crate::config::{Config, OnBadFile, UnitChoice};
 use crate::geometry::Site;
 use crate::geometry::lattice::{AxisMap, Lattice, REACH, shortest_decimal};
+use crate::input::options::{OnBadFile, UnitChoice};
 use crate::input::{self, Axis, Crs, Rules, Source, Unit};
+use crate::job::options::JobOptions;
 use crate::job::partition::read::Skipped;
 use crate::job::plan::extent::Area;
 use crate::job::plan::lattice_choice::{self, Coarser};
@@ -49,7 +50,7 @@ pub struct Plan {
 /// # Errors
 /// [`Error::Config`] if there are none, or they do not go together; [`Error::Input`] if one cannot be used and bad ones are
 /// not to be left out, or none is left; [`Error::Io`] if one cannot be read.
-pub fn run(config: &Config, coarser: Coarser) -> Result<Plan> {
+pub fn run(config: &JobOptions, coarser: Coarser) -> Result<Plan> {
     let (sources, skipped) = open_all(config)?;
     settle(sources, skipped, config, coarser)
 }
@@ -58,7 +59,7 @@ pub fn run(config: &Config, coarser: Coarser) -> Result<Plan> {
 ///
 /// # Errors
 /// As [`run`].
-pub fn without(plan: Plan, skipped: &[Skipped], config: &Config, coarser: Coarser) -> Result<Plan> {
+pub fn without(plan: Plan, skipped: &[Skipped], config: &JobOptions, coarser: Coarser) -> Result<Plan> {
     let is_bad = |source: &Source| skipped.iter().any(|bad| bad.file == source.path);
     let sources = plan.sources.into_iter().map(|(source, _)| source).filter(|source| !is_bad(source));
     let is_new = |bad: &&Skipped| !plan.skipped.contains(bad);
@@ -67,7 +68,7 @@ pub fn without(plan: Plan, skipped: &[Skipped], config: &Config, coarser: Coarse
 }
 
 /// Makes the plan, without those of `sources` that stand in its way if bad files are to be left out.
-fn settle(mut sources: Vec<Source>, mut skipped: Vec<Skipped>, config: &Config, coarser: Coarser) -> Result<Plan> {
+fn settle(mut sources: Vec<Source>, mut skipped: Vec<Skipped>, config: &JobOptions, coarser: Coarser) -> Result<Plan> {
     loop {
         if let (true, Some(first)) = (sources.is_empty(), skipped.first()) {
             return Err(Error::NoTerrain(format!(
@@ -93,7 +94,7 @@ fn settle(mut sources: Vec<Source>, mut skipped: Vec<Skipped>, config: &Config, 
 }
 
 /// A plan that does not hold the sources yet, and the rules for their points.
-fn make_plan(sources: &[Source], config: &Config, coarser: Coarser) -> Result<(Plan, Vec<Rules>)> {
+fn make_plan(sources: &[Source], config: &JobOptions, coarser: Coarser) -> Result<(Plan, Vec<Rules>)> {
     let mut warnings = unreadable_names(&config.input.files);
     let of_sources = sources.iter().flat_map(|s| s.warnings.iter().map(|w| format!("{}: {w}", s.path.display())));
     warnings.extend(of_sources);
@@ -126,12 +127,12 @@ fn make_plan(sources: &[Source], config: &Config, coarser: Coarser) -> Result<(P
 ///
 /// # Errors
 /// [`Error::Config`] if a pattern names none.
-pub fn inputs(config: &Config) -> Result<Vec<PathBuf>> {
+pub fn inputs(config: &JobOptions) -> Result<Vec<PathBuf>> {
     expand(&config.input.files)
 }
 
 /// Opens all inputs; those that are bad apart if they are to be left out.
-fn open_all(config: &Config) -> Result<(Vec<Source>, Vec<Skipped>)> {
+fn open_all(config: &JobOptions) -> Result<(Vec<Source>, Vec<Skipped>)> {
     let paths = inputs(config)?;
     let opened: Vec<Result<Source>> = paths.par_iter().map(|path| input::open(path, &config.input.csv)).collect();
     let (mut sources, mut skipped) = (Vec::with_capacity(opened.len()), Vec::new());
@@ -170,8 +171,9 @@ fn shorten(warnings: &mut Vec<String>) {
 
 /// Stops before the first point if files lack more records than are put up with: all together, or where bad ones are left
 /// out, each by itself.
-fn enough_is_there(sources: &[Source], records: u64, config: &Config) -> Result<()> {
-    let is_too_much = |missing: u64, records: u64| missing as f64 > config.input.malformed_share.0 * records as f64;
+fn enough_is_there(sources: &[Source], records: u64, config: &JobOptions) -> Result<()> {
+    let is_too_much =
+        |missing: u64, records: u64| missing as f64 > config.input.max_malformed_fraction.0 * records as f64;
     let lacking = match config.input.on_bad_file {
         OnBadFile::Skip => sources.iter().find(|s| is_too_much(s.missing, s.records)),
         OnBadFile::Stop if is_too_much(sources.iter().map(|s| s.missing).sum(), records) => {
@@ -184,7 +186,7 @@ fn enough_is_there(sources: &[Source], records: u64, config: &Config) -> Result<
             &first.path,
             format!(
                 "says that it holds {} records, but {} of them are not there: the file is cut off or its header is wrong. Copy it \
-                 again, or raise [input] malformed_share to use what is there",
+                 again, or raise [input] max_malformed_fraction to use what is there",
                 first.records, first.missing
             ),
         )),
@@ -296,13 +298,16 @@ fn extent_of(lattice: &Lattice, area: &Area, bounds: Option<[i32; 4]>) -> [Site;
     extent
 }
 
-fn rules(sources: &[Source], config: &Config, lattice: &Lattice, bounds: Option<[i32; 4]>) -> Result<Vec<Rules>> {
-    let rgb = matches!(config.output.color, crate::config::ColorChoice::Auto | crate::config::ColorChoice::Rgb);
+fn rules(sources: &[Source], config: &JobOptions, lattice: &Lattice, bounds: Option<[i32; 4]>) -> Result<Vec<Rules>> {
+    let rgb = matches!(
+        config.output.color,
+        crate::output::options::ColorChoice::Auto | crate::output::options::ColorChoice::Rgb
+    );
     let mut first_order = 0;
     let mut rules = Vec::with_capacity(sources.len());
     for source in sources {
         let maps = [axis_map(source, 0, lattice)?, axis_map(source, 1, lattice)?, axis_map(source, 2, lattice)?];
-        rules.push(Rules { maps, classes: config.kept_classes(), bounds, first_order, rgb });
+        rules.push(Rules { maps, classes: config.input.kept_classes(), bounds, first_order, rgb });
         first_order += source.records;
     }
     Ok(rules)

@@ -1,9 +1,9 @@
 //! Preflight: what a job would read and need, without writing anything.
 
-use crate::config::Config;
 use crate::input::Point;
 use crate::job::durable::directory::Directory;
 use crate::job::levels::hierarchy::{BYTES_PER_LEVEL_SITE, Sizes};
+use crate::job::options::JobOptions;
 use crate::job::partition::read as partition;
 use crate::job::partition::read::Skipped;
 use crate::job::plan::lattice_choice::Coarser;
@@ -86,7 +86,7 @@ pub struct Preflight {
 ///
 /// # Errors
 /// Whatever would stop the job before its first point; see [`scan::run`].
-pub fn run(config: &Config) -> Result<Preflight> {
+pub fn run(config: &JobOptions) -> Result<Preflight> {
     let directory = Directory::new(&config.output.directory);
     directory.nothing_is_in_the_way()?;
     directory.is_not_somebody_elses()?;
@@ -96,8 +96,8 @@ pub fn run(config: &Config) -> Result<Preflight> {
 }
 
 /// What the job of `plan` would do.
-pub(crate) fn preflight(plan: &Plan, config: &Config, threads: usize) -> Preflight {
-    let per_tile = config.triangulation.sites_per_tile.0;
+pub(crate) fn preflight(plan: &Plan, config: &JobOptions, threads: usize) -> Preflight {
+    let per_tile = config.triangulation.max_points_per_tile.0;
     let points = points(plan);
     let steps = |axis: usize| plan.extent[1][axis] as f64 - plan.extent[0][axis] as f64;
     let resolution = plan.frame.extras().resolution;
@@ -139,8 +139,8 @@ fn points(plan: &Plan) -> u64 {
 }
 
 /// Tiles come out between half full and full.
-fn tiles(points: u64, config: &Config) -> u64 {
-    (points * 4).div_ceil(config.triangulation.sites_per_tile.0 * 3)
+fn tiles(points: u64, config: &JobOptions) -> u64 {
+    (points * 4).div_ceil(config.triangulation.max_points_per_tile.0 * 3)
 }
 
 /// Bytes of a job's files, about.
@@ -152,19 +152,19 @@ struct OnDisk {
 }
 
 impl OnDisk {
-    fn of(plan: &Plan, config: &Config) -> OnDisk {
+    fn of(plan: &Plan, config: &JobOptions) -> OnDisk {
         let points = points(plan);
         let tiles = tiles(points, config);
         OnDisk {
             spill: points * size_of::<Point>() as u64,
-            steps: step_bytes(points, config.triangulation.sites_per_tile.0, tiles),
+            steps: step_bytes(points, config.triangulation.max_points_per_tile.0, tiles),
             results: result_bytes(points, tiles, config.output.packing()),
         }
     }
 }
 
 /// Whether the disk has ample room for all other files beside the points, which are there already.
-pub(crate) fn has_room_beside_points(plan: &Plan, config: &Config) -> bool {
+pub(crate) fn has_room_beside_points(plan: &Plan, config: &JobOptions) -> bool {
     let OnDisk { steps, results, .. } = OnDisk::of(plan, config);
     machine::free_disk(&config.output.directory).is_some_and(|free| (steps + results) / 4 * 5 <= free)
 }
@@ -177,8 +177,8 @@ fn step_bytes(points: u64, per_tile: u64, tiles: u64) -> u64 {
 }
 
 /// Bytes of memory that making coarser tiles takes.
-fn level_bytes(config: &Config, points: u64, threads: usize) -> u64 {
-    let sizes = Sizes::new(config.output.level_sites.0, config.limits.memory.0);
+fn level_bytes(config: &JobOptions, points: u64, threads: usize) -> u64 {
+    let sizes = Sizes::new(config.output.max_points_per_level_tile.0, config.limits.memory.0);
     let one = (4 * sizes.sites).min(points) * BYTES_PER_LEVEL_SITE;
     if config.output.levels { (one * threads as u64).min(sizes.memory) } else { 0 }
 }
@@ -219,7 +219,7 @@ impl Preflight {
         match self.memory_free.filter(|free| *free < self.memory) {
             Some(free) => Err(Error::Memory(format!(
                 "the job takes about {}, and this machine has {} free; end other programs, or lower [limits] threads or \
-                 [triangulation] sites_per_tile (--force goes on all the same)",
+                 [triangulation] max_points_per_tile (--force goes on all the same)",
                 mebibytes(self.memory),
                 mebibytes(free)
             ))),

@@ -134,7 +134,7 @@ pub fn remark(placement: &Result<Placement, String>) -> Option<String> {
     (off > ONE_TRANSFORM).then(|| {
         format!(
             "in tileset.json {flat} lies flat on the tangent plane at its middle, which is up to {off:.1} m off the curved earth; \
-             smaller tiles follow it more closely: lower [triangulation] sites_per_tile, and leave long triangles along the hull out \
+             smaller tiles follow it more closely: lower [triangulation] max_points_per_tile, and leave long triangles along the hull out \
              with [output] max_edge"
         )
     })

@@ -2,7 +2,6 @@
 //! triangulated and merged.
 
 use crate::Result;
-use crate::config::MaxEdge;
 use crate::job::Job;
 use crate::job::durable::journal::{Mark, Step};
 use crate::job::mesh::leaf::LeafFigures;
@@ -16,6 +15,7 @@ use crate::job::run::tile_queue::{TileWriter, WrittenTiles};
 use crate::job::run::tree_walk::Grower;
 use crate::job::tiles::max_edge::Cut;
 use crate::job::{beside, look};
+use crate::output::options::MaxEdge;
 use crate::output::preview::canvas::Canvas;
 
 /// The whole mesh, in tiles.

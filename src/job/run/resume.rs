@@ -3,17 +3,18 @@
 //! A step stays if what it left is there and whole, or if nothing needs that any more. Steps depend on nothing but the job,
 //! so a step that is done again leaves the same as before, and the steps after it stay.
 
-use crate::config::{Config, MaxEdge};
 use crate::job::Options;
 use crate::job::durable::directory::Directory;
 use crate::job::durable::journal::{self, Entry, Journal, Step};
 use crate::job::durable::store::{Store, Stored};
+use crate::job::options::JobOptions;
 use crate::job::partition::point_file::Spill;
 use crate::job::partition::read::Partition;
 use crate::job::plan::fingerprint::{Change, Fingerprint, Head};
 use crate::job::plan::lattice_choice::Coarser;
 use crate::job::progress::stage::{Progress, Stage};
 use crate::job::report::Report;
+use crate::output::options::MaxEdge;
 use crate::{Error, Result, interrupt};
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
@@ -64,7 +65,7 @@ pub fn complete(directory: &Directory, head: &Head) -> Result<Option<Report>> {
 ///
 /// # Errors
 /// [`Error::Io`] on the job directory.
-pub fn start<'a>(directory: &'a Directory, head: &Head, config: &Config, options: Options) -> Result<Start<'a>> {
+pub fn start<'a>(directory: &'a Directory, head: &Head, config: &JobOptions, options: Options) -> Result<Start<'a>> {
     let progress = options.progress;
     let kept = if options.fresh { None } else { kept(directory, head, config, progress)? };
     let kept = kept.unwrap_or_default();
@@ -100,7 +101,7 @@ struct Kept {
     partition: Option<Partition>,
 }
 
-fn kept(directory: &Directory, head: &Head, config: &Config, progress: Progress) -> Result<Option<Kept>> {
+fn kept(directory: &Directory, head: &Head, config: &JobOptions, progress: Progress) -> Result<Option<Kept>> {
     let Some((old, mut entries)) = journal::read(directory)? else { return Ok(None) };
     if entries.is_empty() || old.coarser != head.coarser {
         return Ok(None);

@@ -84,7 +84,7 @@ impl<'a> Grower<'a> {
         if node > 0 {
             return memory / threads as u64;
         }
-        let tile = config.triangulation.sites_per_tile.0.saturating_mul(BYTES_PER_LEAF_SITE / 2);
+        let tile = config.triangulation.max_points_per_tile.0.saturating_mul(BYTES_PER_LEAF_SITE / 2);
         memory.saturating_sub(tile.saturating_mul(threads as u64 - 1))
     }
 }

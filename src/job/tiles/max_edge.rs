@@ -4,10 +4,10 @@
 //! of anything changes it. The triangles that are left out go to `cut/`, so that nothing of the exact mesh is lost.
 
 use crate::Result;
-use crate::config::MaxEdge;
 use crate::job::durable::store::Store;
 use crate::job::records::Leaf;
 use crate::output::frame::Frame;
+use crate::output::options::MaxEdge;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
 

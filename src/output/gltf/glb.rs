@@ -52,7 +52,7 @@ pub(crate) fn write_container(mut json: Vec<u8>, length: u64, out: &mut Vec<u8>)
     let total = 20 + json.len() as u64 + binary;
     let total = u32::try_from(total).map_err(|_| {
         Error::Config(format!(
-            "a GLB file of {total} bytes would pass the limit of 4 GiB: set a smaller sites_per_tile"
+            "a GLB file of {total} bytes would pass the limit of 4 GiB: set a smaller max_points_per_tile"
         ))
     })?;
     for word in [MAGIC, VERSION, total, json.len() as u32, JSON_CHUNK] {

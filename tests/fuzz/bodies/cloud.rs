@@ -3,9 +3,9 @@
 use std::path::Path;
 use std::sync::LazyLock;
 
-use gdt_batch::config::Config;
 use gdt_batch::geometry::lattice::{AxisMap, REACH};
 use gdt_batch::input::{Point, Rules, Source, Tally, TextOptions, open};
+use gdt_batch::job::options::JobOptions;
 use gdt_batch::job::plan::lattice_choice::Coarser;
 use gdt_batch::job::plan::scan;
 use gdt_batch::{Error, Result};
@@ -50,9 +50,9 @@ fn read(path: &Path, options: &TextOptions) {
 
 /// The first step of a job on the file: whatever its header says, a plan or a sentence.
 fn plan(path: &Path, options: &TextOptions) {
-    static CONFIG: LazyLock<Config> = LazyLock::new(|| {
+    static CONFIG: LazyLock<JobOptions> = LazyLock::new(|| {
         let text = b"[input]\nfiles = [\"a\"]\n[output]\ndirectory = \"out\"\n[limits]\nthreads = 1\n";
-        with_file(".toml", text, |path| Config::load(path).expect("the least configuration"))
+        with_file(".toml", text, |path| gdt_batch::config::load(path).expect("the least configuration"))
     });
     let mut config = CONFIG.clone();
     config.input.files = vec![path.to_str().expect("a plain path").to_owned()];

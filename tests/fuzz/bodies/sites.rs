@@ -2,9 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use gdt_batch::config::{Backend, Triangulation};
 use gdt_batch::geometry::Site;
 use gdt_batch::mesh::half_edge::Mesh;
+use gdt_batch::triangulation::options::{Backend, TriangulationOptions};
 use gdt_batch::triangulation::{Triangulator, reference};
 
 use super::judge;
@@ -16,8 +16,9 @@ const MOST: usize = 1500;
 /// are sheared, which makes parallelograms of squares.
 pub(crate) fn sites(bytes: &[u8]) {
     let sites = sites_of(bytes);
-    let wanted = Triangulation { backend: Backend::Cpu, ..Triangulation::default() };
-    let triangulator = Triangulator::new(&wanted, 1 << 28, 1).expect("the CPU is always there");
+    let wanted = TriangulationOptions { backend: Backend::Cpu, ..TriangulationOptions::default() };
+    let triangulator = Triangulator::new(&wanted, &gdt_batch::gpu::options::GpuOptions::default(), 1 << 28, 1)
+        .expect("the CPU is always there");
     let (mesh, _) = triangulator.triangulate(&sites).expect("a mesh of distinct sites");
     judge::judge(&sites, &mesh);
     let expected = reference::triangulate(&sites).expect("a mesh of distinct sites");

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::{Case, Read, Refused, case};
 
 pub(super) fn cases(folder: &Path) -> Vec<Case> {
-    let all = "malformed_share = 1.0";
+    let all = "max_malformed_fraction = 1.0";
     [
         ("1.2-no-points.las", "", Refused(3, "holds 1065 records, but 1065 of them are not there")),
         ("1.2-no-points.las", all, Refused(3, "of 1065 read, 1065 are malformed")),
@@ -14,7 +14,7 @@ pub(super) fn cases(folder: &Path) -> Vec<Case> {
         ("badheader.txt", "", Refused(3, "names 2 columns x")),
         ("badheader.txt", all, Refused(3, "name the columns with `columns`")),
         ("git-lfs-pointer.laz", "", Refused(3, "git lfs pull")),
-        ("truncated-mid-chunk.laz", "", Refused(3, "malformed_share")),
+        ("truncated-mid-chunk.laz", "", Refused(3, "max_malformed_fraction")),
         ("truncated-mid-chunk.laz", all, Read(73_403, 29_031, "29031 points are lost")),
         ("garbage_nVariableLength.las", "", Refused(3, "garbage_nVariableLength.las")),
         ("garbage_nVariableLength.las", all, Read(719, 1, "variable length records")),

@@ -171,7 +171,8 @@ pub(super) fn records_and_cuts() -> Vec<Case> {
         let name = format!("cut after {eighth} of 8");
         cases.push(case(&name, ".las", plain[..cut].to_vec(), Refused(3, "are not there")));
         cases.push(
-            case(&name, ".las", plain[..cut].to_vec(), Read(COUNT, missing, "missing")).with("malformed_share = 1.0"),
+            case(&name, ".las", plain[..cut].to_vec(), Read(COUNT, missing, "missing"))
+                .with("max_malformed_fraction = 1.0"),
         );
     }
     for (name, at, value) in [("x", 0, i32::MIN), ("y", 4, i32::MAX), ("z", 8, i32::MIN)] {

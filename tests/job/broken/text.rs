@@ -72,7 +72,7 @@ pub(super) fn cases() -> Vec<Case> {
     ] {
         cases.push(case(name, ".csv", bytes, gives));
     }
-    let bad_share = "malformed_share = 0.5";
+    let bad_share = "max_malformed_fraction = 0.5";
     cases.push(
         case("bad lines allowed", ".csv", rows_and("a,b,c\n1,2\nnan,nan,nan\n"), Read(8, 3, "line 6")).with(bad_share),
     );

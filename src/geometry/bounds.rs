@@ -1,0 +1,94 @@
+//! Axis-aligned boxes of lattice points.
+
+use serde::de::{Deserialize, Deserializer, Error};
+use serde::ser::{Serialize, Serializer};
+
+/// The box of all lattice points p with `min <= p <= max` on each of `N` axes. A box always holds at least one point; where there
+/// may be none, use `Option<Bounds<N>>`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Bounds<const N: usize> {
+    /// The least lattice integer on each axis.
+    pub min: [i32; N],
+    /// The greatest lattice integer on each axis.
+    pub max: [i32; N],
+}
+
+impl<const N: usize> Bounds<N> {
+    /// The box of one point.
+    pub fn of_point(point: [i32; N]) -> Bounds<N> {
+        Bounds { min: point, max: point }
+    }
+
+    /// The least box of all `points`, or `None` if there are none.
+    #[inline]
+    pub fn of_points(points: impl IntoIterator<Item = [i32; N]>) -> Option<Bounds<N>> {
+        let mut points = points.into_iter();
+        let mut bounds = Bounds::of_point(points.next()?);
+        points.for_each(|point| bounds.include(point));
+        Some(bounds)
+    }
+
+    /// Grows the box until it holds `point`.
+    #[inline]
+    pub fn include(&mut self, point: [i32; N]) {
+        for (axis, value) in point.into_iter().enumerate() {
+            self.min[axis] = self.min[axis].min(value);
+            self.max[axis] = self.max[axis].max(value);
+        }
+    }
+
+    /// The least box that holds both boxes.
+    pub fn union(mut self, other: Bounds<N>) -> Bounds<N> {
+        self.include(other.min);
+        self.include(other.max);
+        self
+    }
+
+    /// The length along `axis` in lattice steps: 0 for a box of one point.
+    pub fn extent(&self, axis: usize) -> i64 {
+        self.max[axis] as i64 - self.min[axis] as i64
+    }
+}
+
+/// Written as `[min, max]`.
+impl<const N: usize> Serialize for Bounds<N> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        [&self.min[..], &self.max[..]].serialize(serializer)
+    }
+}
+
+impl<'de, const N: usize> Deserialize<'de> for Bounds<N> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Bounds<N>, D::Error> {
+        let [min, max] = <[Vec<i32>; 2]>::deserialize(deserializer)?;
+        let corner = |values: Vec<i32>| {
+            let count = values.len();
+            values.try_into().map_err(|_| D::Error::custom(format!("a corner has {count} coordinates, not {N}")))
+        };
+        Ok(Bounds { min: corner(min)?, max: corner(max)? })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bounds_hold_what_they_are_made_of() {
+        assert_eq!(Bounds::<2>::of_points([]), None);
+        let bounds = Bounds::of_points([[3, -1], [0, 5], [2, 2]]).unwrap();
+        assert_eq!(bounds, Bounds { min: [0, -1], max: [3, 5] });
+        assert_eq!((bounds.extent(0), bounds.extent(1)), (3, 6));
+        assert_eq!(bounds.union(Bounds::of_point([-7, 0])).min, [-7, -1]);
+        let widest = Bounds { min: [i32::MIN], max: [i32::MAX] };
+        assert_eq!(widest.extent(0), u32::MAX as i64);
+    }
+
+    #[test]
+    fn bounds_are_read_back_as_they_were_written() {
+        let bounds = Bounds { min: [0, -1, 4], max: [3, 5, 4] };
+        let text = serde_json::to_string(&bounds).unwrap();
+        assert_eq!(text, "[[0,-1,4],[3,5,4]]");
+        assert_eq!(serde_json::from_str::<Bounds<3>>(&text).unwrap(), bounds);
+        assert!(serde_json::from_str::<Bounds<2>>(&text).is_err());
+    }
+}

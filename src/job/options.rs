@@ -1,0 +1,141 @@
+//! The options of a job: those of each room, and `[limits]`.
+
+use crate::Warnings;
+use crate::gpu::options::GpuOptions;
+use crate::input::options::InputOptions;
+use crate::output::options::OutputOptions;
+use crate::triangulation::options::TriangulationOptions;
+use serde::{Deserialize, Serialize};
+
+/// Everything that a user says about a job.
+#[derive(Clone, Debug, Serialize)]
+pub struct JobOptions {
+    /// What to read.
+    pub input: InputOptions,
+    /// How to triangulate.
+    pub triangulation: TriangulationOptions,
+    /// How to use a GPU.
+    pub gpu: GpuOptions,
+    /// What to write.
+    pub output: OutputOptions,
+    /// What the job may use of the machine.
+    pub limits: Limits,
+    /// What the user should know about the options themselves.
+    pub warnings: Warnings,
+}
+
+impl JobOptions {
+    /// The number of worker threads.
+    pub fn threads(&self) -> usize {
+        match self.limits.threads.0 {
+            0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
+            n => n,
+        }
+    }
+}
+
+/// `[limits]`: what the job may use of the machine.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Limits {
+    /// Peak resident memory.
+    pub memory: MemoryLimit,
+    /// Worker threads; 0: one per core.
+    pub threads: Threads,
+}
+
+/// How many worker threads; 0: one per core.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "i64")]
+pub struct Threads(pub usize);
+
+impl TryFrom<i64> for Threads {
+    type Error = String;
+
+    fn try_from(threads: i64) -> std::result::Result<Threads, String> {
+        match threads {
+            0..=1024 => Ok(Threads(threads as usize)),
+            _ => Err(format!("threads is a number from 0 (one per core) to 1024, not {threads}")),
+        }
+    }
+}
+
+/// An amount of memory in bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct MemoryLimit(pub u64);
+
+impl MemoryLimit {
+    /// Below this not even the buffers of one tile are sure to fit.
+    const LEAST: u64 = 128 << 20;
+}
+
+impl Default for MemoryLimit {
+    fn default() -> MemoryLimit {
+        MemoryLimit(4 << 30)
+    }
+}
+
+impl TryFrom<String> for MemoryLimit {
+    type Error = String;
+
+    fn try_from(text: String) -> std::result::Result<MemoryLimit, String> {
+        let bytes = parse_memory(&text)
+            .ok_or_else(|| format!("memory is a text such as \"4 GiB\" or \"800 MB\", not {text:?}"))?;
+        if bytes < MemoryLimit::LEAST {
+            return Err(format!("memory must be at least {}", MemoryLimit(MemoryLimit::LEAST)));
+        }
+        Ok(MemoryLimit(bytes))
+    }
+}
+
+impl From<MemoryLimit> for String {
+    fn from(memory: MemoryLimit) -> String {
+        memory.to_string()
+    }
+}
+
+impl std::fmt::Display for MemoryLimit {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (value, unit) = match self.0 {
+            b if b >= 1 << 30 => (b as f64 / (1u64 << 30) as f64, "GiB"),
+            b if b >= 1 << 20 => (b as f64 / (1u64 << 20) as f64, "MiB"),
+            b => (b as f64 / 1024.0, "KiB"),
+        };
+        let decimals = if value.fract() == 0.0 { 0 } else { 1 };
+        write!(f, "{value:.decimals$} {unit}")
+    }
+}
+
+fn parse_memory(text: &str) -> Option<u64> {
+    let text = text.trim();
+    let split = text.find(|c: char| !c.is_ascii_digit() && c != '.')?;
+    let value: f64 = text[..split].parse().ok()?;
+    let unit: f64 = match text[split..].trim().to_ascii_lowercase().as_str() {
+        "kib" => 1024.0,
+        "mib" => 1024.0 * 1024.0,
+        "gib" => 1024.0 * 1024.0 * 1024.0,
+        "tib" => 1024.0 * 1024.0 * 1024.0 * 1024.0,
+        "kb" => 1e3,
+        "mb" => 1e6,
+        "gb" => 1e9,
+        "tb" => 1e12,
+        _ => return None,
+    };
+    Some((value * unit) as u64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn amounts_of_memory() {
+        assert_eq!(parse_memory("4 GiB"), Some(4 << 30));
+        assert_eq!(parse_memory("1.5GB"), Some(1_500_000_000));
+        assert_eq!(parse_memory("12"), None);
+        assert_eq!(parse_memory("GiB"), None);
+        assert_eq!(MemoryLimit(1 << 30).to_string(), "1 GiB");
+        assert_eq!(MemoryLimit(1_500_000_000).to_string(), "1.4 GiB");
+    }
+}

@@ -1,0 +1,169 @@
+//! The options of `[output]`.
+
+use crate::output::Compression;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// `[output]`: where and what.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OutputOptions {
+    /// The directory to write to, relative to the configuration file.
+    pub directory: PathBuf,
+    /// Where vertex colours come from.
+    #[serde(default)]
+    pub color: ColorChoice,
+    /// Whether vertices carry normals.
+    #[serde(default = "yes")]
+    pub normals: bool,
+    /// In which form viewers get the terrain.
+    #[serde(default)]
+    pub format: OutputFormat,
+    /// Whether 3D Tiles have coarser levels above the exact tiles.
+    #[serde(default = "yes")]
+    pub levels: bool,
+    /// How many sites a coarser tile holds at the most.
+    #[serde(default, alias = "level_sites")]
+    pub max_points_per_level_tile: MaxPointsPerLevelTile,
+    /// Metres that heights are raised by to be heights above the ellipsoid, where 3D Tiles are placed on the globe.
+    #[serde(default)]
+    pub height_offset: f64,
+    /// How tiles are to be packed.
+    #[serde(default)]
+    pub compression: CompressionChoice,
+    /// Triangles with an edge longer than this are left out.
+    #[serde(default)]
+    pub max_edge: MaxEdge,
+}
+
+impl OutputOptions {
+    /// How tiles are packed.
+    pub fn packing(&self) -> Compression {
+        match (self.compression, self.format) {
+            (CompressionChoice::Auto, OutputFormat::Tiles3d) | (CompressionChoice::Meshopt, _) => Compression::Meshopt,
+            (CompressionChoice::Auto, _) | (CompressionChoice::Quantized, _) => Compression::Quantized,
+            (CompressionChoice::None, _) => Compression::None,
+        }
+    }
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// In which form viewers get the terrain; the exact tiles are written in any case.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum OutputFormat {
+    /// Both where the terrain fits one file that viewers open, else 3D Tiles.
+    #[default]
+    Auto,
+    /// One file, `terrain.glb`.
+    Glb,
+    /// 3D Tiles, `tileset.json`.
+    #[serde(rename = "3dtiles", alias = "tiles")]
+    Tiles3d,
+}
+
+/// How tiles are to be packed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum CompressionChoice {
+    /// With meshopt for 3D Tiles alone, whose viewers know it; else quantized.
+    #[default]
+    Auto,
+    /// See [`crate::output::Compression::Meshopt`].
+    Meshopt,
+    /// See [`crate::output::Compression::Quantized`].
+    Quantized,
+    /// See [`crate::output::Compression::None`].
+    None,
+}
+
+/// Where vertex colours come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ColorChoice {
+    /// The points' own colours, elevation where they have none.
+    #[default]
+    Auto,
+    /// The points' own colours.
+    Rgb,
+    /// A ramp over the heights.
+    Elevation,
+    /// A colour per class.
+    Class,
+    /// No colours.
+    None,
+}
+
+/// How long an edge of a triangle may be in the plane.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "toml::Value", into = "String")]
+pub enum MaxEdge {
+    /// As long as it is: the terrain is the whole triangulation.
+    #[default]
+    None,
+    /// Ten times the local spacing of the sites.
+    Auto,
+    /// So many source units.
+    Length(f64),
+}
+
+impl TryFrom<toml::Value> for MaxEdge {
+    type Error = String;
+
+    fn try_from(value: toml::Value) -> std::result::Result<MaxEdge, String> {
+        let length = match value {
+            toml::Value::String(s) if s == "none" => return Ok(MaxEdge::None),
+            toml::Value::String(s) if s == "auto" => return Ok(MaxEdge::Auto),
+            toml::Value::Integer(i) => i as f64,
+            toml::Value::Float(f) => f,
+            _ => 0.0,
+        };
+        match length > 0.0 && length.is_finite() {
+            true => Ok(MaxEdge::Length(length)),
+            false => Err("max_edge is \"none\", \"auto\" or a positive number of source units, such as 30.0".into()),
+        }
+    }
+}
+
+impl From<MaxEdge> for String {
+    fn from(max_edge: MaxEdge) -> String {
+        match max_edge {
+            MaxEdge::None => "none".into(),
+            MaxEdge::Auto => "auto".into(),
+            MaxEdge::Length(length) => length.to_string(),
+        }
+    }
+}
+
+/// How many sites a coarser tile holds at the most.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "toml::Value", into = "String")]
+pub struct MaxPointsPerLevelTile(pub u64);
+
+impl Default for MaxPointsPerLevelTile {
+    /// As many as the exact tiles have by default.
+    fn default() -> MaxPointsPerLevelTile {
+        MaxPointsPerLevelTile(50_000)
+    }
+}
+
+impl TryFrom<toml::Value> for MaxPointsPerLevelTile {
+    type Error = String;
+
+    fn try_from(value: toml::Value) -> std::result::Result<MaxPointsPerLevelTile, String> {
+        match value {
+            toml::Value::String(s) if s == "auto" => Ok(MaxPointsPerLevelTile::default()),
+            toml::Value::Integer(sites @ 100..=10_000_000) => Ok(MaxPointsPerLevelTile(sites as u64)),
+            _ => Err("max_points_per_level_tile is \"auto\" or a whole number from 100 to 10000000".into()),
+        }
+    }
+}
+
+impl From<MaxPointsPerLevelTile> for String {
+    fn from(sites: MaxPointsPerLevelTile) -> String {
+        sites.0.to_string()
+    }
+}
