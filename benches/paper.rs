@@ -21,9 +21,10 @@ use gdt_batch::gpu::machine::Machine;
 use gdt_batch::gpu::options::{TextureSide, VoronoiMethod};
 use gdt_batch::gpu::steps::{Size, Step};
 use gdt_batch::gpu::{self, twins};
-use gdt_batch::mesh::half_edge::Mesh;
+use gdt_batch::mesh::half_edge::HalfEdgeMesh;
 use gdt_batch::voronoi::{
-    Counts, Diagram, Diagrams, Rejected, Resolution, STEPS, Scratch, Shape, triangulate, triangulate_with,
+    DiagramBackend, DiagramReply, PipelineBuffers, PipelineCounts, Rejection, STEP_NAMES, TextureRequest,
+    TextureResolution, triangulate, triangulate_with,
 };
 use points::{gaussian, median, uniform};
 use spade::{DelaunayTriangulation, Point2, Triangulation};
@@ -87,7 +88,7 @@ fn figure_10(sites: &[Site], gpu: Option<&RefCell<Gpu>>, rounds: usize) {
 struct Run {
     total: Option<f64>,
     steps: Vec<(&'static str, f64)>,
-    counts: Counts,
+    counts: PipelineCounts,
     /// How often `spade` fits in.
     times_spade: f64,
 }
@@ -157,19 +158,26 @@ fn on_cpu_with_any(sites: &[Site]) -> Vec<Way<'_>> {
 
 /// The pipeline on this thread, with a texture of `side` or else of the size that suits.
 fn on_cpu<'a>(sites: &'a [Site], side: Option<u32>) -> Way<'a> {
-    let shape = side.map_or(Shape::default(), |side| Shape { resolution: Resolution::Side(side), ..Shape::default() });
-    let mut scratch = Scratch::with_shape(shape);
-    let run = move || pipeline(&mut scratch, |scratch| triangulate(sites, scratch));
+    let shape = side.map_or(TextureRequest::default(), |side| TextureRequest {
+        resolution: TextureResolution::Side(side),
+        ..TextureRequest::default()
+    });
+    let mut buffers = PipelineBuffers::with_shape(shape);
+    let run = move || pipeline(&mut buffers, |buffers| triangulate(sites, buffers));
     Way { name: CPU.into(), side, run: Box::new(run) }
 }
 
-fn pipeline(scratch: &mut Scratch, f: impl FnOnce(&mut Scratch) -> Result<(Mesh, Counts), Rejected>) -> Outcome {
-    let (done, total) = timed(|| f(scratch));
+fn pipeline(
+    buffers: &mut PipelineBuffers,
+    f: impl FnOnce(&mut PipelineBuffers) -> Result<(HalfEdgeMesh, PipelineCounts), Rejection>,
+) -> Outcome {
+    let (done, total) = timed(|| f(buffers));
     let (mesh, counts) = done.map_err(|why| why.to_string())?;
-    scratch.recycle(black_box(mesh));
+    buffers.recycle(black_box(mesh));
     let milliseconds = counts.nanoseconds.map(|time| time as f64 / 1e6);
     // The last step is to wait for the GPU.
-    let steps = STEPS.into_iter().zip(milliseconds).take(STEPS.len() - (counts.on_gpu == 0) as usize).collect();
+    let steps =
+        STEP_NAMES.into_iter().zip(milliseconds).take(STEP_NAMES.len() - (counts.on_gpu == 0) as usize).collect();
     Ok(Run { total: Some(total), steps, counts, ..Run::default() })
 }
 
@@ -211,23 +219,23 @@ fn plain_loops(sites: &[Site], side: u32) -> Outcome {
 /// Somebody who makes no diagrams, but keeps what is asked of him.
 struct Listener(u32, Mutex<Option<(Size, Vec<u32>)>>);
 
-impl Diagrams for Listener {
-    fn shape(&self) -> Shape {
-        Shape { resolution: Resolution::Side(self.0), ..Shape::default() }
+impl DiagramBackend for Listener {
+    fn shape(&self) -> TextureRequest {
+        TextureRequest { resolution: TextureResolution::Side(self.0), ..TextureRequest::default() }
     }
 
-    fn diagram(&self, width: u32, height: u32, pixels: Vec<u32>) -> Diagram {
+    fn diagram(&self, width: u32, height: u32, pixels: Vec<u32>) -> DiagramReply {
         if let Ok(mut heard) = self.1.lock() {
             *heard = Some((Size { width, height }, pixels));
         }
-        Diagram::No
+        DiagramReply::No
     }
 }
 
 /// The texture of `sites`, and the pixel of each that has one.
 fn placed(sites: &[Site], side: u32) -> Result<(Size, Vec<u32>), String> {
     let listener = Listener(side, Mutex::new(None));
-    let done = triangulate_with(sites, Some(&listener), &mut Scratch::default());
+    let done = triangulate_with(sites, Some(&listener), &mut PipelineBuffers::default());
     let heard = listener.1.into_inner().ok().flatten();
     heard.ok_or_else(|| done.err().map_or("no texture was made".into(), |why| why.to_string()))
 }
@@ -296,9 +304,9 @@ fn on_gpu_and_cpu<'a>(kind: &str, sites: &'a [Site], side: u32) -> Option<Way<'a
     let (wish, texture) = (Wish::new(None, true), TextureSide::Side(side));
     let order = Order { wish, voronoi: VoronoiMethod::Auto, texture, most_pixels: u64::MAX, shared: false };
     let executor = Executor::start(&order).ok()?;
-    let mut scratch = Scratch::default();
+    let mut buffers = PipelineBuffers::default();
     let run = move || {
-        let mut run = pipeline(&mut scratch, |scratch| triangulate_with(sites, Some(&executor), scratch))?;
+        let mut run = pipeline(&mut buffers, |buffers| triangulate_with(sites, Some(&executor), buffers))?;
         if run.counts.on_gpu == 0 {
             return Err("the GPU did not take it".into());
         }
@@ -395,7 +403,7 @@ fn print_whys<'a>(outcomes: impl Iterator<Item = &'a Outcome>) {
 /// What the steps met, as percentages of the sites.
 fn print_counts(outcomes: &[Outcome]) {
     print_head("Of a hundred sites (CPU)", &SIDES.map(|side| side.to_string()));
-    let count = |label: &str, of: fn(&Counts) -> u64| {
+    let count = |label: &str, of: fn(&PipelineCounts) -> u64| {
         let percent = |run: &Run| format!("{:.2}", 100.0 * of(&run.counts) as f64 / run.counts.sites as f64);
         let cells: Vec<_> = outcomes.iter().map(|o| o.as_ref().map_or("-".into(), percent)).collect();
         println!("| {label} | {} |", cells.join(" | "));

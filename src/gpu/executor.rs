@@ -12,7 +12,7 @@ use crate::gpu::device::{self, Device, MOST_SIDE, Wish};
 use crate::gpu::machine::{Machine, Ticket};
 use crate::gpu::options::{TextureSide, VoronoiMethod};
 use crate::gpu::steps::{Size, Step};
-use crate::voronoi::{Diagram, Diagrams, Resolution, Shape};
+use crate::voronoi::{DiagramBackend, DiagramReply, TextureRequest, TextureResolution};
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
@@ -43,7 +43,7 @@ pub struct Order {
 pub struct Executor {
     requests: Mutex<Option<Sender<Request>>>,
     state: Arc<State>,
-    resolution: Resolution,
+    resolution: TextureResolution,
     shared: bool,
     thread: Option<JoinHandle<()>>,
     /// The adapter's name.
@@ -61,7 +61,7 @@ struct State {
 
 struct Request {
     work: Work,
-    reply: SyncSender<Diagram>,
+    reply: SyncSender<DiagramReply>,
 }
 
 /// A texture to make the diagram of.
@@ -82,9 +82,9 @@ impl Executor {
         let adapter = device.info.name.clone();
         let most_pixels = device::most_pixels(&device.limits).min(order.most_pixels).max(1);
         let resolution = match order.texture {
-            TextureSide::Auto => Shape::default().resolution,
-            TextureSide::Max => Resolution::Side(MOST_SIDE),
-            TextureSide::Side(side) => Resolution::Side(side),
+            TextureSide::Auto => TextureRequest::default().resolution,
+            TextureSide::Max => TextureResolution::Side(MOST_SIDE),
+            TextureSide::Side(side) => TextureResolution::Side(side),
         };
         Executor::on(engine, adapter, resolution, most_pixels, order.shared)
     }
@@ -92,7 +92,7 @@ impl Executor {
     fn on<E: Engines + 'static>(
         engine: E,
         adapter: String,
-        resolution: Resolution,
+        resolution: TextureResolution,
         most_pixels: u64,
         shared: bool,
     ) -> Result<Executor, String> {
@@ -117,7 +117,7 @@ impl Executor {
     }
 
     /// Sends `work` and waits for its diagram; `None` if the thread is gone.
-    fn ask(&self, work: Work) -> Option<Diagram> {
+    fn ask(&self, work: Work) -> Option<DiagramReply> {
         let (reply, answer) = sync_channel(1);
         let requests = self.requests.lock().unwrap_or_else(PoisonError::into_inner).clone()?;
         requests.send(Request { work, reply }).ok()?;
@@ -125,13 +125,13 @@ impl Executor {
     }
 }
 
-impl Diagrams for Executor {
-    fn shape(&self) -> Shape {
+impl DiagramBackend for Executor {
+    fn shape(&self) -> TextureRequest {
         let most_pixels = self.state.most_pixels.load(Ordering::Acquire);
-        Shape { resolution: self.resolution, most_side: MOST_SIDE, most_pixels }
+        TextureRequest { resolution: self.resolution, most_side: MOST_SIDE, most_pixels }
     }
 
-    fn diagram(&self, width: u32, height: u32, pixels: Vec<u32>) -> Diagram {
+    fn diagram(&self, width: u32, height: u32, pixels: Vec<u32>) -> DiagramReply {
         let waiting = self.state.waiting.fetch_add(1, Ordering::AcqRel);
         let busy = self.shared && waiting >= IN_FLIGHT;
         let answer = match busy || self.state.gone.load(Ordering::Acquire) {
@@ -139,7 +139,7 @@ impl Diagrams for Executor {
             false => self.ask(Work { size: Size { width, height }, pixels }),
         };
         self.state.waiting.fetch_sub(1, Ordering::AcqRel);
-        answer.unwrap_or(Diagram::No)
+        answer.unwrap_or(DiagramReply::No)
     }
 }
 
@@ -250,7 +250,7 @@ impl<E: Engines> Service<E> {
 
     fn launch(&mut self, request: Request) {
         let Some(slot) = self.free.pop().filter(|_| !self.state.gone.load(Ordering::Acquire)) else {
-            return answer(&request, Diagram::No);
+            return answer(&request, DiagramReply::No);
         };
         match self.engine.start(slot, &request.work) {
             Ok(ticket) => self.flights.push_back(Flight { request, slot, ticket }),
@@ -275,19 +275,19 @@ impl<E: Engines> Service<E> {
                 for (sum, time) in self.state.times.iter().zip(times) {
                     sum.fetch_add(time, Ordering::Relaxed);
                 }
-                answer(&request, Diagram::Labels(labels));
+                answer(&request, DiagramReply::Labels(labels));
             }
             Err(fault) => self.recover(request, &fault),
         }
     }
 
     /// A texture of that many pixels does not fit.
-    fn shrink(&self, pixels: u64) -> Diagram {
+    fn shrink(&self, pixels: u64) -> DiagramReply {
         if pixels <= LEAST_PIXELS {
-            return Diagram::No;
+            return DiagramReply::No;
         }
         self.state.most_pixels.fetch_min(pixels / 2, Ordering::AcqRel);
-        Diagram::TooLarge
+        DiagramReply::TooLarge
     }
 
     /// After `fault` hit `request`: does all that was under way again on the device opened anew, or gives the GPU up.
@@ -305,7 +305,7 @@ impl<E: Engines> Service<E> {
     }
 }
 
-fn answer(request: &Request, diagram: Diagram) {
+fn answer(request: &Request, diagram: DiagramReply) {
     // A worker that does not wait any more needs no answer.
     let _ = request.reply.send(diagram);
 }
@@ -347,7 +347,7 @@ mod tests {
         let reopens = Arc::<AtomicUsize>::default();
         let (starts, finishes) = (starts.into_iter().collect(), finishes.into_iter().collect());
         let engine = Scripted { starts, finishes, reopens: reopens.clone() };
-        let executor = Executor::on(engine, "test".into(), Resolution::Side(1), 1 << 28, false).unwrap();
+        let executor = Executor::on(engine, "test".into(), TextureResolution::Side(1), 1 << 28, false).unwrap();
         (executor, reopens)
     }
 
@@ -364,7 +364,7 @@ mod tests {
                 scope.spawn(move || {
                     for leaf in 0..100 {
                         let pixel = worker << 16 | leaf;
-                        assert_eq!(executor.diagram(9, 9, vec![pixel]), Diagram::Labels(vec![pixel]));
+                        assert_eq!(executor.diagram(9, 9, vec![pixel]), DiagramReply::Labels(vec![pixel]));
                     }
                 });
             }
@@ -374,28 +374,28 @@ mod tests {
     #[test]
     fn too_large_a_texture_halves_what_is_asked_for_next() {
         let (executor, _) = executor([Err(Fault::OutOfMemory), Err(Fault::OutOfMemory)], []);
-        assert_eq!(executor.diagram(8192, 8192, vec![5]), Diagram::TooLarge);
+        assert_eq!(executor.diagram(8192, 8192, vec![5]), DiagramReply::TooLarge);
         assert_eq!(executor.shape().most_pixels, 1 << 25);
         // If even a small one does not fit, the worker does it.
-        assert_eq!(executor.diagram(16, 16, vec![5]), Diagram::No);
-        assert_eq!(executor.diagram(16, 16, vec![5]), Diagram::Labels(vec![5]));
+        assert_eq!(executor.diagram(16, 16, vec![5]), DiagramReply::No);
+        assert_eq!(executor.diagram(16, 16, vec![5]), DiagramReply::Labels(vec![5]));
     }
 
     #[test]
     fn a_lost_device_is_opened_anew_once() {
         let (executor, reopens) = executor([], [lost(), Ok(()), lost()]);
-        assert_eq!(executor.diagram(9, 9, vec![5]), Diagram::Labels(vec![5]));
+        assert_eq!(executor.diagram(9, 9, vec![5]), DiagramReply::Labels(vec![5]));
         assert_eq!(reopens.load(Ordering::Acquire), 1);
-        assert_eq!(executor.diagram(9, 9, vec![6]), Diagram::No);
-        assert_eq!(executor.diagram(9, 9, vec![7]), Diagram::No);
+        assert_eq!(executor.diagram(9, 9, vec![6]), DiagramReply::No);
+        assert_eq!(executor.diagram(9, 9, vec![7]), DiagramReply::No);
         assert_eq!(reopens.load(Ordering::Acquire), 1);
     }
 
     #[test]
     fn a_refusal_is_not_tried_again() {
         let (executor, reopens) = executor([Err(Fault::Refused("test".into()))], []);
-        assert_eq!(executor.diagram(9, 9, vec![5]), Diagram::No);
-        assert_eq!(executor.diagram(9, 9, vec![5]), Diagram::No);
+        assert_eq!(executor.diagram(9, 9, vec![5]), DiagramReply::No);
+        assert_eq!(executor.diagram(9, 9, vec![5]), DiagramReply::No);
         assert_eq!(reopens.load(Ordering::Acquire), 0);
     }
 }

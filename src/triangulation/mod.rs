@@ -7,9 +7,9 @@ use crate::geometry::Site;
 use crate::gpu::device::{Wish, hardware_is_likely};
 use crate::gpu::executor::{Executor, Order};
 use crate::gpu::options::GpuOptions;
-use crate::mesh::half_edge::Mesh;
+use crate::mesh::half_edge::HalfEdgeMesh;
 use crate::triangulation::options::{Backend, TriangulationOptions};
-use crate::voronoi::{self, Counts, Diagrams, Rejected, Scratch};
+use crate::voronoi::{self, DiagramBackend, PipelineBuffers, PipelineCounts, Rejection};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
@@ -17,7 +17,7 @@ use std::ops::AddAssign;
 
 /// How leaves were triangulated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Outcome {
+pub struct TriangulationCounts {
     /// Leaves that the discrete-Voronoi pipeline triangulated, and its result was accepted.
     pub pipeline: u64,
     /// Leaves that `spade` triangulated: all with `backend = "reference"`, else those too small for the pipeline.
@@ -27,11 +27,11 @@ pub struct Outcome {
     /// Leaves that the pipeline got wrong, which showed, and `spade` triangulated.
     pub not_accepted: u64,
     /// What the pipeline met.
-    pub counts: Counts,
+    pub counts: PipelineCounts,
 }
 
-impl AddAssign for Outcome {
-    fn add_assign(&mut self, other: Outcome) {
+impl AddAssign for TriangulationCounts {
+    fn add_assign(&mut self, other: TriangulationCounts) {
         self.pipeline += other.pipeline;
         self.reference += other.reference;
         self.crowded += other.crowded;
@@ -42,7 +42,7 @@ impl AddAssign for Outcome {
 
 thread_local! {
     /// The pipeline's buffers, kept from leaf to leaf so that their pages are faulted in once a thread.
-    static SCRATCH: RefCell<Scratch> = RefCell::default();
+    static BUFFERS: RefCell<PipelineBuffers> = RefCell::default();
 }
 
 /// Who triangulates leaves: the pipeline on the worker's own thread, with a GPU's help where there is one, or the reference.
@@ -98,15 +98,15 @@ impl Triangulator {
     ///
     /// # Errors
     /// [`Error::Broken`] if even the reference triangulation fails.
-    pub fn triangulate(&self, sites: &[Site]) -> Result<(Mesh, Outcome)> {
-        let mut outcome = Outcome::default();
+    pub fn triangulate(&self, sites: &[Site]) -> Result<(HalfEdgeMesh, TriangulationCounts)> {
+        let mut outcome = TriangulationCounts::default();
         if self.pipeline {
-            let gpu = self.gpu.as_ref().map(|gpu| gpu as &dyn Diagrams);
-            match SCRATCH.with_borrow_mut(|scratch| voronoi::triangulate_with(sites, gpu, scratch)) {
-                Ok((mesh, counts)) => return Ok((mesh, Outcome { pipeline: 1, counts, ..outcome })),
-                Err(Rejected::Crowded) => outcome.crowded = 1,
-                Err(Rejected::NotAccepted(_)) => outcome.not_accepted = 1,
-                Err(Rejected::TooFew | Rejected::TooMany | Rejected::OutOfReach) => outcome.reference = 1,
+            let gpu = self.gpu.as_ref().map(|gpu| gpu as &dyn DiagramBackend);
+            match BUFFERS.with_borrow_mut(|buffers| voronoi::triangulate_with(sites, gpu, buffers)) {
+                Ok((mesh, counts)) => return Ok((mesh, TriangulationCounts { pipeline: 1, counts, ..outcome })),
+                Err(Rejection::Crowded) => outcome.crowded = 1,
+                Err(Rejection::NotAccepted(_)) => outcome.not_accepted = 1,
+                Err(Rejection::TooFew | Rejection::TooMany | Rejection::OutOfReach) => outcome.reference = 1,
             }
         } else {
             outcome.reference = 1;
@@ -119,14 +119,14 @@ impl Triangulator {
 ///
 /// # Errors
 /// As [`Triangulator::triangulate`].
-pub fn canonical(sites: &[Site]) -> Result<Mesh> {
-    match SCRATCH.with_borrow_mut(|scratch| voronoi::triangulate(sites, scratch)) {
+pub fn canonical(sites: &[Site]) -> Result<HalfEdgeMesh> {
+    match BUFFERS.with_borrow_mut(|buffers| voronoi::triangulate(sites, buffers)) {
         Ok((mesh, _)) => Ok(mesh),
         Err(_) => reference::triangulate(sites),
     }
 }
 
 /// Takes back the memory of a mesh that is no longer needed, for the next leaf of this thread.
-pub fn recycle(mesh: Mesh) {
-    SCRATCH.with_borrow_mut(|scratch| scratch.recycle(mesh));
+pub fn recycle(mesh: HalfEdgeMesh) {
+    BUFFERS.with_borrow_mut(|buffers| buffers.recycle(mesh));
 }

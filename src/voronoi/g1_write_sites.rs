@@ -4,7 +4,7 @@
 
 use crate::geometry::Site;
 use crate::geometry::lattice::REACH;
-use crate::voronoi::{Counts, Rejected, Resolution, Shape};
+use crate::voronoi::{PipelineCounts, Rejection, TextureRequest, TextureResolution};
 
 /// Largest share of missing sites with which going on pays.
 const MOST_MISSING: f64 = 0.4;
@@ -13,7 +13,7 @@ const EMPTY: u32 = u32::MAX;
 
 /// A texture with the sites in it. Pixel (x, y) is column x from the west, row y from the south.
 #[derive(Default)]
-pub(super) struct Texture {
+pub(super) struct SiteTexture {
     pub(super) width: usize,
     pub(super) height: usize,
     /// 64-pixel words in a row.
@@ -37,9 +37,14 @@ pub(super) struct Texture {
     losers: Vec<[u32; 2]>,
 }
 
-impl Texture {
+impl SiteTexture {
     /// Scales and writes `sites`.
-    pub(super) fn write(&mut self, sites: &[Site], shape: &Shape, counts: &mut Counts) -> Result<(), Rejected> {
+    pub(super) fn write(
+        &mut self,
+        sites: &[Site],
+        shape: &TextureRequest,
+        counts: &mut PipelineCounts,
+    ) -> Result<(), Rejection> {
         let scale = self.fit(sites, shape)?;
         self.sort_by_row(sites, scale);
         self.clear(sites.len());
@@ -48,7 +53,7 @@ impl Texture {
             self.write_row(sites, y, counts);
             // At once: whoever cuts what is crowded may have to ask many times.
             if self.missing.len() > most_missing {
-                return Err(Rejected::Crowded);
+                return Err(Rejection::Crowded);
             }
         }
         self.append_missing(sites);
@@ -64,14 +69,14 @@ impl Texture {
     }
 
     /// Chooses width and height with the shape of the sites' bounding box; returns the origin and pixels per lattice step.
-    fn fit(&mut self, sites: &[Site], shape: &Shape) -> Result<(Site, f64), Rejected> {
+    fn fit(&mut self, sites: &[Site], shape: &TextureRequest) -> Result<(Site, f64), Rejection> {
         let (mut low, mut high) = ([i32::MAX; 2], [i32::MIN; 2]);
         for site in sites {
             low = [low[0].min(site[0]), low[1].min(site[1])];
             high = [high[0].max(site[0]), high[1].max(site[1])];
         }
         if low.iter().chain(&high).any(|c| c.abs() > REACH) {
-            return Err(Rejected::OutOfReach);
+            return Err(Rejection::OutOfReach);
         }
         let extent = [0, 1].map(|i| (high[i] - low[i]) as f64 + 1.0);
         let scale = shape.scale(extent, sites.len());
@@ -141,7 +146,7 @@ impl Texture {
     }
 
     /// Writes row `y` and numbers its sites from west to east.
-    fn write_row(&mut self, sites: &[Site], y: usize, counts: &mut Counts) {
+    fn write_row(&mut self, sites: &[Site], y: usize, counts: &mut PipelineCounts) {
         let first = if y == 0 { 0 } else { self.row_ends[y - 1] as usize };
         self.losers.clear();
         for &[x, i] in &self.rows[first..self.row_ends[y] as usize] {
@@ -212,13 +217,13 @@ fn pixels_along(steps: f64, scale: f64) -> usize {
     ((steps - 1.0) * scale) as usize + 1
 }
 
-impl Shape {
+impl TextureRequest {
     /// Pixels per lattice step for `sites` sites in a box of that many steps.
     fn scale(&self, extent: [f64; 2], sites: usize) -> f64 {
         let longer = extent[0].max(extent[1]);
         let wanted = match self.resolution {
-            Resolution::PixelsPerSite(pixels) => (pixels * sites as f64 / (extent[0] * extent[1])).sqrt(),
-            Resolution::Side(pixels) => f64::from(pixels) / longer,
+            TextureResolution::PixelsPerSite(pixels) => (pixels * sites as f64 / (extent[0] * extent[1])).sqrt(),
+            TextureResolution::Side(pixels) => f64::from(pixels) / longer,
         };
         let mut scale = wanted.min(1.0).min(f64::from(self.most_side) / longer);
         // A side is a pixel at the least, so that the area alone does not say what fits.

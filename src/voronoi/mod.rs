@@ -15,7 +15,7 @@
 //! | C3 | `c3_insert` | inserts what is missing or was taken out, flipping as it goes |
 //! | | `accept` | proves the result |
 //!
-//! Any of them may go wrong on unlucky input; as `accept` proves the result, a fault costs time and never correctness. `sphere`
+//! Any of them may go wrong on unlucky input; as `accept` proves the result, a fault costs time and never correctness. `closed`
 //! is the mesh they all work on, and `edges` tests many edges at once.
 
 mod accept;
@@ -23,22 +23,22 @@ mod c1_hull;
 mod c2_shift;
 mod c3_insert;
 mod c4_flip;
-mod edges;
+mod closed_mesh;
+mod edge_tester;
 mod g1_write_sites;
 mod g2_voronoi;
 mod g3_islands;
 mod g6_triangles;
-mod sphere;
 #[cfg(test)]
 mod tests;
 
 use crate::geometry::Site;
-use crate::mesh::half_edge::Mesh;
+use crate::mesh::half_edge::HalfEdgeMesh;
 use std::time::Instant;
 
 /// Why a leaf was not triangulated here. Cut it, or triangulate it another way.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Rejected {
+pub enum Rejection {
     /// Fewer than three sites have no triangle.
     #[error("too few sites for a triangle")]
     TooFew,
@@ -58,9 +58,9 @@ pub enum Rejected {
 
 /// How many pixels a texture has.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shape {
+pub struct TextureRequest {
     /// How fine it is to be, if it may.
-    pub resolution: Resolution,
+    pub resolution: TextureResolution,
     /// Largest width and height.
     pub most_side: u32,
     /// Most pixels in all.
@@ -69,42 +69,42 @@ pub struct Shape {
 
 /// How fine a texture is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Resolution {
+pub enum TextureResolution {
     /// Pixels per site: fewer make more work for the repair, more make more work for the transform.
     PixelsPerSite(f64),
     /// Pixels along the longer side.
     Side(u32),
 }
 
-impl Default for Shape {
+impl Default for TextureRequest {
     /// What suits the CPU.
-    fn default() -> Shape {
-        Shape { resolution: Resolution::PixelsPerSite(5.0), most_side: 65_535, most_pixels: u64::MAX }
+    fn default() -> TextureRequest {
+        TextureRequest { resolution: TextureResolution::PixelsPerSite(5.0), most_side: 65_535, most_pixels: u64::MAX }
     }
 }
 
 /// Somebody who makes discrete Voronoi diagrams (step G2) faster than this thread does.
-pub trait Diagrams {
+pub trait DiagramBackend {
     /// The textures that suit.
-    fn shape(&self) -> Shape;
+    fn shape(&self) -> TextureRequest;
 
     /// The diagram of a texture of `width` x `height` pixels whose sites are in `pixels` (each y << 16 | x).
-    fn diagram(&self, width: u32, height: u32, pixels: Vec<u32>) -> Diagram;
+    fn diagram(&self, width: u32, height: u32, pixels: Vec<u32>) -> DiagramReply;
 }
 
 /// What has become of a diagram.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Diagram {
+pub enum DiagramReply {
     /// The label of every pixel, row by row: the pixel (y << 16 | x) of its nearest site.
     Labels(Vec<u32>),
-    /// The texture was too large; [`Diagrams::shape`] is smaller now.
+    /// The texture was too large; [`DiagramBackend::shape`] is smaller now.
     TooLarge,
     /// Do it yourself.
     No,
 }
 
-/// The steps that [`Counts::nanoseconds`] tells apart.
-pub const STEPS: [&str; 9] = [
+/// The steps that [`PipelineCounts::nanoseconds`] tells apart.
+pub const STEP_NAMES: [&str; 9] = [
     "G1 write sites",
     "G2-G6 Voronoi, triangles, most flips",
     "G3 islands",
@@ -116,12 +116,12 @@ pub const STEPS: [&str; 9] = [
     "wait for the GPU",
 ];
 
-/// The last of [`STEPS`].
-const WAIT: usize = STEPS.len() - 1;
+/// The last of [`STEP_NAMES`].
+const WAIT: usize = STEP_NAMES.len() - 1;
 
 /// What the steps met. All are numbers of sites, triangles or edges, as named.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub struct Counts {
+pub struct PipelineCounts {
     /// Leaves whose Voronoi diagram a GPU made.
     pub on_gpu: u64,
     /// Sites given.
@@ -138,12 +138,12 @@ pub struct Counts {
     pub removed: u64,
     /// Edges flipped to make the mesh Delaunay.
     pub flips: u64,
-    /// Time by step, see [`STEPS`].
-    pub nanoseconds: [u64; STEPS.len()],
+    /// Time by step, see [`STEP_NAMES`].
+    pub nanoseconds: [u64; STEP_NAMES.len()],
 }
 
-impl std::ops::AddAssign for Counts {
-    fn add_assign(&mut self, other: Counts) {
+impl std::ops::AddAssign for PipelineCounts {
+    fn add_assign(&mut self, other: PipelineCounts) {
         self.on_gpu += other.on_gpu;
         self.sites += other.sites;
         self.missing += other.missing;
@@ -160,27 +160,27 @@ impl std::ops::AddAssign for Counts {
 
 /// Buffers that [`triangulate`] uses again and again. One for each thread.
 #[derive(Default)]
-pub struct Scratch {
-    shape: Shape,
-    texture: g1_write_sites::Texture,
-    voronoi: g2_voronoi::Voronoi,
-    scan: g6_triangles::Scan,
-    sphere: sphere::Sphere,
-    islands: g3_islands::Islands,
-    shift: c2_shift::Shift,
-    flips: c4_flip::Flips,
-    acceptance: accept::Acceptance,
-    mesh: Mesh,
+pub struct PipelineBuffers {
+    shape: TextureRequest,
+    texture: g1_write_sites::SiteTexture,
+    voronoi: g2_voronoi::LabelRows,
+    scan: g6_triangles::TextureScan,
+    closed: closed_mesh::ClosedMesh,
+    islands: g3_islands::IslandSearch,
+    shift: c2_shift::ShiftRepair,
+    flips: c4_flip::FlipQueue,
+    acceptance: accept::AcceptanceCheck,
+    mesh: HalfEdgeMesh,
 }
 
-impl Scratch {
+impl PipelineBuffers {
     /// Buffers for textures of this `shape` where the diagrams are made on this thread. The mesh is the same with any.
-    pub fn with_shape(shape: Shape) -> Scratch {
-        Scratch { shape, ..Scratch::default() }
+    pub fn with_shape(shape: TextureRequest) -> PipelineBuffers {
+        PipelineBuffers { shape, ..PipelineBuffers::default() }
     }
 
     /// Hands back a mesh that is no longer needed: its memory serves the next leaf.
-    pub fn recycle(&mut self, mesh: Mesh) {
+    pub fn recycle(&mut self, mesh: HalfEdgeMesh) {
         self.mesh = mesh;
     }
 }
@@ -190,9 +190,9 @@ impl Scratch {
 /// The mesh's corners are positions in `sites`.
 ///
 /// # Errors
-/// [`Rejected`] where this is not the way to do it; never a wrong mesh.
-pub fn triangulate(sites: &[Site], scratch: &mut Scratch) -> Result<(Mesh, Counts), Rejected> {
-    triangulate_with(sites, None, scratch)
+/// [`Rejection`] where this is not the way to do it; never a wrong mesh.
+pub fn triangulate(sites: &[Site], buffers: &mut PipelineBuffers) -> Result<(HalfEdgeMesh, PipelineCounts), Rejection> {
+    triangulate_with(sites, None, buffers)
 }
 
 /// As [`triangulate`], with the Voronoi diagram made by `diagrams` if they will. They need not be trusted.
@@ -201,40 +201,40 @@ pub fn triangulate(sites: &[Site], scratch: &mut Scratch) -> Result<(Mesh, Count
 /// As [`triangulate`].
 pub fn triangulate_with(
     sites: &[Site],
-    diagrams: Option<&dyn Diagrams>,
-    scratch: &mut Scratch,
-) -> Result<(Mesh, Counts), Rejected> {
+    backend: Option<&dyn DiagramBackend>,
+    buffers: &mut PipelineBuffers,
+) -> Result<(HalfEdgeMesh, PipelineCounts), Rejection> {
     check_size(sites)?;
-    let Scratch { shape, texture, voronoi, scan, sphere, islands, shift, flips, acceptance, mesh } = scratch;
-    let mut counts = Counts { sites: sites.len() as u64, ..Counts::default() };
-    let mut clock = Clock::start();
+    let PipelineBuffers { shape, texture, voronoi, scan, closed, islands, shift, flips, acceptance, mesh } = buffers;
+    let mut counts = PipelineCounts { sites: sites.len() as u64, ..PipelineCounts::default() };
+    let mut clock = StepTimer::start();
     shift.clear();
     flips.reset(sites.len());
 
-    discretise(sites, diagrams, shape, texture, voronoi, &mut counts)?;
+    discretise(sites, backend, shape, texture, voronoi, &mut counts)?;
     clock.done(&mut counts, 0);
     counts.nanoseconds[0] = counts.nanoseconds[0].saturating_sub(counts.nanoseconds[WAIT]);
-    scan.run(texture, voronoi, sphere, shift, flips)?;
+    scan.run(texture, voronoi, closed, shift, flips)?;
     counts.inverted = shift.inverted.len() as u64;
     clock.done(&mut counts, 1);
     let at = &texture.sites;
-    islands.remove(sphere, at, texture.placed, shift, &mut counts)?;
+    islands.remove(closed, at, texture.placed, shift, &mut counts)?;
     clock.done(&mut counts, 2);
     // Before C1, so that the hull is completed but once, where it really is.
-    shift.repair(sphere, at)?;
+    shift.repair(closed, at)?;
     clock.done(&mut counts, 3);
-    c1_hull::complete_hull(sphere, at, shift)?;
+    c1_hull::complete_hull(closed, at, shift)?;
     counts.removed = shift.removed.len() as u64;
     clock.done(&mut counts, 4);
     // Before C3, so that sites are inserted into a Delaunay mesh, where walks are short and sure to end.
     std::mem::swap(&mut flips.suspects, &mut shift.suspects);
-    flips.run(sphere, at)?;
+    flips.run(closed, at)?;
     clock.done(&mut counts, 5);
-    c3_insert::insert_all(sphere, texture, scan, &shift.removed, flips)?;
+    c3_insert::insert_all(closed, texture, scan, &shift.removed, flips)?;
     counts.flips = flips.done;
     clock.done(&mut counts, 6);
-    sphere.compact();
-    acceptance.accept(sphere, at, &texture.order, mesh)?;
+    closed.compact();
+    acceptance.accept(closed, at, &texture.order, mesh)?;
     clock.done(&mut counts, 7);
     Ok((std::mem::take(mesh), counts))
 }
@@ -242,29 +242,29 @@ pub fn triangulate_with(
 /// Steps G1 and G2. On this thread G2 is only prepared: its rows are made when the scan needs them.
 fn discretise(
     sites: &[Site],
-    diagrams: Option<&dyn Diagrams>,
-    shape: &Shape,
-    texture: &mut g1_write_sites::Texture,
-    voronoi: &mut g2_voronoi::Voronoi,
-    counts: &mut Counts,
-) -> Result<(), Rejected> {
-    if let Some(diagrams) = diagrams {
+    backend: Option<&dyn DiagramBackend>,
+    shape: &TextureRequest,
+    texture: &mut g1_write_sites::SiteTexture,
+    voronoi: &mut g2_voronoi::LabelRows,
+    counts: &mut PipelineCounts,
+) -> Result<(), Rejection> {
+    if let Some(backend) = backend {
         let before = *counts;
         loop {
-            texture.write(sites, &diagrams.shape(), counts)?;
+            texture.write(sites, &backend.shape(), counts)?;
             let asked = Instant::now();
-            let answer = diagrams.diagram(texture.width as u32, texture.height as u32, texture.placed_pixels());
+            let answer = backend.diagram(texture.width as u32, texture.height as u32, texture.placed_pixels());
             counts.nanoseconds[WAIT] += asked.elapsed().as_nanos() as u64;
             match answer {
-                Diagram::Labels(labels) => {
+                DiagramReply::Labels(labels) => {
                     if voronoi.take(texture, labels) {
                         counts.on_gpu = 1;
                         return Ok(());
                     }
                     break;
                 }
-                Diagram::TooLarge => *counts = before,
-                Diagram::No => break,
+                DiagramReply::TooLarge => *counts = before,
+                DiagramReply::No => break,
             }
         }
         *counts = before;
@@ -274,25 +274,25 @@ fn discretise(
     Ok(())
 }
 
-struct Clock(Instant);
+struct StepTimer(Instant);
 
-impl Clock {
-    fn start() -> Clock {
-        Clock(Instant::now())
+impl StepTimer {
+    fn start() -> StepTimer {
+        StepTimer(Instant::now())
     }
 
     /// Adds the time since the last call to `step`.
-    fn done(&mut self, counts: &mut Counts, step: usize) {
+    fn done(&mut self, counts: &mut PipelineCounts, step: usize) {
         let now = Instant::now();
         counts.nanoseconds[step] += (now - self.0).as_nanos() as u64;
         self.0 = now;
     }
 }
 
-fn check_size(sites: &[Site]) -> Result<(), Rejected> {
+fn check_size(sites: &[Site]) -> Result<(), Rejection> {
     match sites.len() {
-        0..3 => Err(Rejected::TooFew),
-        n if n > 1 << 26 => Err(Rejected::TooMany),
+        0..3 => Err(Rejection::TooFew),
+        n if n > 1 << 26 => Err(Rejection::TooMany),
         _ => Ok(()),
     }
 }

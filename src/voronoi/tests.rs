@@ -3,11 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::geometry::Site;
-use crate::mesh::half_edge::Mesh;
+use crate::mesh::half_edge::HalfEdgeMesh;
 use crate::triangulation::reference;
-use crate::voronoi::g1_write_sites::Texture;
-use crate::voronoi::g2_voronoi::Voronoi;
-use crate::voronoi::{Counts, Rejected, Resolution, Scratch, Shape, triangulate};
+use crate::voronoi::g1_write_sites::SiteTexture;
+use crate::voronoi::g2_voronoi::LabelRows;
+use crate::voronoi::{PipelineBuffers, PipelineCounts, Rejection, TextureRequest, TextureResolution, triangulate};
 
 /// A small generator (xorshift64*), so that cases are the same everywhere.
 struct Random(u64);
@@ -88,7 +88,7 @@ fn case(kind: &str, n: usize, random: &mut Random) -> Vec<Site> {
 }
 
 /// The triangles, each from its least corner, as a set.
-fn triangles(mesh: &Mesh) -> BTreeSet<[u32; 3]> {
+fn triangles(mesh: &HalfEdgeMesh) -> BTreeSet<[u32; 3]> {
     mesh.triangles.iter().map(|&[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().unwrap()).collect()
 }
 
@@ -96,14 +96,14 @@ fn triangles(mesh: &Mesh) -> BTreeSet<[u32; 3]> {
 fn random_cases_are_canonical_or_rejected() {
     let cases = std::env::var("GDT_CASES").ok().and_then(|s| s.parse().ok()).unwrap_or(2000);
     let mut random = Random(0x9e37_79b9_7f4a_7c15);
-    let mut scratch = Scratch::default();
+    let mut buffers = PipelineBuffers::default();
     let mut rejected: BTreeMap<(&str, String), usize> = BTreeMap::new();
     let mut refused = 0;
     for i in 0..cases {
         let kind = KINDS[i % KINDS.len()];
         let n = 3 + (2000.0f64.powf(random.unit()) - 1.0) as usize;
         let sites = case(kind, n, &mut random);
-        match triangulate(&sites, &mut scratch) {
+        match triangulate(&sites, &mut buffers) {
             Ok((mesh, _)) => assert_eq!(
                 triangles(&mesh),
                 triangles(&reference::triangulate(&sites).unwrap()),
@@ -123,11 +123,11 @@ fn random_cases_are_canonical_or_rejected() {
 fn the_mesh_is_the_same_with_any_texture() {
     let mut random = Random(7);
     let sites: Vec<Site> = (0..5000).map(|i| [200 * i, random.below(1 << 20)]).collect();
-    let expected = triangles(&triangulate(&sites, &mut Scratch::default()).unwrap().0);
+    let expected = triangles(&triangulate(&sites, &mut PipelineBuffers::default()).unwrap().0);
     let mut missing = Vec::new();
     for side in [80, 300, 1000] {
-        let shape = Shape { resolution: Resolution::Side(side), ..Shape::default() };
-        let (mesh, counts) = triangulate(&sites, &mut Scratch::with_shape(shape)).unwrap();
+        let shape = TextureRequest { resolution: TextureResolution::Side(side), ..TextureRequest::default() };
+        let (mesh, counts) = triangulate(&sites, &mut PipelineBuffers::with_shape(shape)).unwrap();
         assert!(triangles(&mesh) == expected, "{side}");
         missing.push(counts.missing);
     }
@@ -137,13 +137,13 @@ fn the_mesh_is_the_same_with_any_texture() {
 #[test]
 fn uniform_sites_are_never_rejected() {
     let mut random = Random(42);
-    let mut scratch = Scratch::default();
+    let mut buffers = PipelineBuffers::default();
     for n in [1000, 3000, 10_000, 30_000] {
         for side in [1 << 10, 1 << 20, 1 << 28] {
             let mut sites: Vec<Site> = (0..n).map(|_| [random.below(side), random.below(side / 3)]).collect();
             sites.sort_unstable();
             sites.dedup();
-            let (_, counts) = triangulate(&sites, &mut scratch).unwrap();
+            let (_, counts) = triangulate(&sites, &mut buffers).unwrap();
             eprintln!("{counts:?}");
         }
     }
@@ -153,13 +153,13 @@ fn uniform_sites_are_never_rejected() {
 #[test]
 fn islands_within_islands_are_taken_out() {
     let mut random = Random(11);
-    let mut scratch = Scratch::default();
+    let mut buffers = PipelineBuffers::default();
     let mut islands = 0;
     for round in 0..400 {
         let sites = case("circle", 100 + 3 * round, &mut random);
-        match triangulate(&sites, &mut scratch) {
+        match triangulate(&sites, &mut buffers) {
             Ok((_, counts)) => islands += counts.islands,
-            Err(why) => assert_eq!(why, Rejected::Crowded, "{sites:?}"),
+            Err(why) => assert_eq!(why, Rejection::Crowded, "{sites:?}"),
         }
     }
     assert!(islands > 100, "{islands}");
@@ -167,13 +167,13 @@ fn islands_within_islands_are_taken_out() {
 
 #[test]
 fn what_has_no_triangle_is_rejected() {
-    let mut scratch = Scratch::default();
-    assert_eq!(triangulate(&[[0, 0], [1, 1]], &mut scratch).unwrap_err(), Rejected::TooFew);
+    let mut buffers = PipelineBuffers::default();
+    assert_eq!(triangulate(&[[0, 0], [1, 1]], &mut buffers).unwrap_err(), Rejection::TooFew);
     let line: Vec<Site> = (0..1000).map(|i| [3 * i, 7 * i]).collect();
-    assert!(triangulate(&line, &mut scratch).is_err());
+    assert!(triangulate(&line, &mut buffers).is_err());
     let twice = [[0, 0], [10, 0], [0, 10], [0, 0]];
-    assert!(triangulate(&twice, &mut scratch).is_err());
-    assert_eq!(triangulate(&[[0, 0], [i32::MAX, 0], [0, 10]], &mut scratch).unwrap_err(), Rejected::OutOfReach);
+    assert!(triangulate(&twice, &mut buffers).is_err());
+    assert_eq!(triangulate(&[[0, 0], [i32::MAX, 0], [0, 10]], &mut buffers).unwrap_err(), Rejection::OutOfReach);
 }
 
 #[test]
@@ -192,9 +192,9 @@ fn labels_are_the_nearest_site_pixels() {
 
 /// Compares the rows of labels with all distances to all sites.
 fn check_labels(sites: &[Site]) {
-    let (mut texture, mut voronoi) = (Texture::default(), Voronoi::default());
+    let (mut texture, mut voronoi) = (SiteTexture::default(), LabelRows::default());
     // Whether too many are missing is of no importance here.
-    let _ = texture.write(sites, &Shape::default(), &mut Counts::default());
+    let _ = texture.write(sites, &TextureRequest::default(), &mut PipelineCounts::default());
     let occupied = |x: usize, y: usize| texture.occupied[y * texture.words + x / 64] >> (x % 64) & 1 != 0;
     let pixels = (0..texture.width).flat_map(|x| (0..texture.height).map(move |y| (x, y)));
     let placed: Vec<(usize, usize)> = pixels.filter(|&(x, y)| occupied(x, y)).collect();

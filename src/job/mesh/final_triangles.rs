@@ -6,7 +6,7 @@
 
 use crate::geometry::Site;
 use crate::job::partition::tree::Cell;
-use crate::mesh::half_edge::{HULL, Mesh};
+use crate::mesh::half_edge::{HULL, HalfEdgeMesh};
 
 /// What has become of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,7 +38,7 @@ pub struct Closing {
 /// hull, so do the discs of all triangles on the straight way from it to that point: beyond the edge where the way leaves a
 /// Delaunay triangle, the disc of the next one covers that of the last. So a flood from the hull that
 /// stops at held discs meets all that are not held.
-pub fn close(mesh: &Mesh, sites: &[Site], cell: Option<&Cell>, covered: impl Fn(usize) -> bool) -> Closing {
+pub fn close(mesh: &HalfEdgeMesh, sites: &[Site], cell: Option<&Cell>, covered: impl Fn(usize) -> bool) -> Closing {
     let state = |triangle| if covered(triangle) { State::Covered } else { State::Closed };
     let states = (0..mesh.triangles.len()).map(state).collect();
     let mut closing = Closing { states, frontier: Vec::new(), spokes: Vec::new(), boundary: Vec::new() };
@@ -53,7 +53,7 @@ pub fn close(mesh: &Mesh, sites: &[Site], cell: Option<&Cell>, covered: impl Fn(
 
 impl Closing {
     /// Marks the triangles that a node above decides; returns them, ascending.
-    fn open(&mut self, mesh: &Mesh, sites: &[Site], cell: &Cell, hull: &[u32]) -> Vec<u32> {
+    fn open(&mut self, mesh: &HalfEdgeMesh, sites: &[Site], cell: &Cell, hull: &[u32]) -> Vec<u32> {
         let mut reached = vec![false; mesh.triangles.len()];
         let mut pending: Vec<u32> = hull.iter().map(|h| h / 3).collect();
         let mut open = Vec::new();
@@ -74,7 +74,7 @@ impl Closing {
     }
 
     /// Fills `frontier` and `spokes`; returns the position of every site in it.
-    fn find_frontier(&mut self, mesh: &Mesh, open: &[u32], hull: &[u32], sites: usize) -> Vec<u32> {
+    fn find_frontier(&mut self, mesh: &HalfEdgeMesh, open: &[u32], hull: &[u32], sites: usize) -> Vec<u32> {
         const INSIDE: u32 = u32::MAX - 1;
         // A half-edge from every site of the frontier. Without a triangle every site lies on the hull.
         let mut position = vec![if mesh.triangles.is_empty() { HULL } else { INSIDE }; sites];
@@ -89,7 +89,7 @@ impl Closing {
     }
 
     /// Fills `boundary`: the edges of closed ground that open triangles see from outside, and those on the hull.
-    fn find_boundary(&mut self, mesh: &Mesh, open: &[u32], hull: &[u32], position: &[u32]) {
+    fn find_boundary(&mut self, mesh: &HalfEdgeMesh, open: &[u32], hull: &[u32], position: &[u32]) {
         let is_open = |h: u32| self.states[h as usize / 3] == State::Open;
         let seen = open.iter().flat_map(|t| 3 * t..3 * t + 3).map(|h| mesh.twins[h as usize]);
         let inner = seen.filter(|&h| h != HULL && !is_open(h));

@@ -12,9 +12,9 @@ use crate::job::mesh::sites;
 use crate::job::partition::point_file::Spill;
 use crate::job::partition::read::Partition;
 use crate::job::records::{Frontier, Leaf, Rim, RimDraft};
-use crate::mesh::half_edge::{HULL, Mesh};
+use crate::mesh::half_edge::{HULL, HalfEdgeMesh};
 use crate::output::normals::{self, NormalSum};
-use crate::triangulation::{self, Outcome, Triangulator};
+use crate::triangulation::{self, TriangulationCounts, Triangulator};
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 
@@ -28,7 +28,7 @@ pub struct LeafFigures {
     /// Triangles closed in leaves.
     pub triangles: u64,
     /// How the leaves were triangulated.
-    pub outcome: Outcome,
+    pub outcome: TriangulationCounts,
 }
 
 impl AddAssign for LeafFigures {
@@ -81,7 +81,7 @@ pub fn run(
     Ok(Done::new(LeafFigures { sites: sites.len() as u64, duplicates: dropped, triangles, outcome }, stored))
 }
 
-fn check_spans(mesh: &Mesh, sites: &[Site], states: &[State], longest: Longest) -> Result<()> {
+fn check_spans(mesh: &HalfEdgeMesh, sites: &[Site], states: &[State], longest: Longest) -> Result<()> {
     if longest.holds_all(sites) {
         return Ok(());
     }
@@ -90,7 +90,7 @@ fn check_spans(mesh: &Mesh, sites: &[Site], states: &[State], longest: Longest) 
 }
 
 /// The frontier as far as the leaf knows it: the seams add their triangles to the normals when all are known.
-fn rim_draft(mesh: &Mesh, closing: &Closing, points: &[Point]) -> RimDraft {
+fn rim_draft(mesh: &HalfEdgeMesh, closing: &Closing, points: &[Point]) -> RimDraft {
     let sites = || closing.frontier.iter().map(|&site| &points[site as usize]);
     RimDraft {
         sums: closing.spokes.iter().map(|&spoke| closed_around(mesh, closing, points, spoke)).collect(),
@@ -100,7 +100,7 @@ fn rim_draft(mesh: &Mesh, closing: &Closing, points: &[Point]) -> RimDraft {
 }
 
 /// The sum of normals over the closed triangles around the start of `spoke`.
-fn closed_around(mesh: &Mesh, closing: &Closing, points: &[Point], spoke: u32) -> NormalSum {
+fn closed_around(mesh: &HalfEdgeMesh, closing: &Closing, points: &[Point], spoke: u32) -> NormalSum {
     let around = (spoke != HULL).then(|| mesh.around(spoke)).into_iter().flatten();
     let closed = around.map(|t| t as usize).filter(|&t| closing.states[t] == State::Closed);
     let corners = closed.map(|t| mesh.triangles[t].map(|v| points[v as usize].corner()));

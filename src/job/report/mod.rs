@@ -9,8 +9,8 @@ use crate::job::plan::scan::Plan;
 use crate::job::progress::machine;
 use crate::job::progress::stage::{Clock, Schedule, StageFigures};
 use crate::job::tiles::write::TileFigures;
-use crate::triangulation::Outcome;
-use crate::voronoi::STEPS;
+use crate::triangulation::TriangulationCounts;
+use crate::voronoi::STEP_NAMES;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -97,7 +97,8 @@ impl Steps {
     fn new(leaves: &LeafFigures, gpu: &[(&'static str, f64)]) -> Steps {
         let named = |(step, seconds): (&str, f64)| StepSeconds { step: step.into(), seconds };
         let nanoseconds = leaves.outcome.counts.nanoseconds;
-        let cpu = STEPS.into_iter().zip(nanoseconds.map(|ns| ns as f64 / 1e9)).filter(|(_, seconds)| *seconds > 0.0);
+        let cpu =
+            STEP_NAMES.into_iter().zip(nanoseconds.map(|ns| ns as f64 / 1e9)).filter(|(_, seconds)| *seconds > 0.0);
         Steps { cpu: cpu.map(named).collect(), gpu: gpu.iter().copied().map(named).collect() }
     }
 }
@@ -223,7 +224,7 @@ impl fmt::Display for Report {
             let levels = &self.levels;
             row("coarser tiles", format!("{}, at most {:.2} m off", grouped(levels.files), levels.error_m))?;
         }
-        let Outcome { pipeline, reference, crowded, not_accepted, counts } = &self.leaves.outcome;
+        let TriangulationCounts { pipeline, reference, crowded, not_accepted, counts } = &self.leaves.outcome;
         let leaves = pipeline + reference + crowded + not_accepted;
         row(
             "leaves",
