@@ -23,9 +23,9 @@
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
 use crate::mesh::half_edge::{HULL, HalfEdgeMesh};
-use crate::voronoi::Rejection;
 use crate::voronoi::closed_mesh::{ClosedMesh, OUTSIDE};
 use crate::voronoi::edge_tester::EdgeTester;
+use crate::voronoi::rejection::Rejection;
 
 /// Buffers of the check.
 #[derive(Default)]

@@ -3,9 +3,9 @@
 
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
-use crate::voronoi::Rejection;
 use crate::voronoi::c2_shift::ShiftRepair;
 use crate::voronoi::closed_mesh::{ClosedMesh, next, previous};
+use crate::voronoi::rejection::Rejection;
 
 /// How many hull vertices on either side of a pocket are tried for lying in it.
 const NEAR: usize = 6;

@@ -3,9 +3,9 @@
 
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
-use crate::voronoi::Rejection;
 use crate::voronoi::closed_mesh::{ClosedMesh, HoleFilling, OneRing, next, previous};
 use crate::voronoi::edge_tester::EdgeTester;
+use crate::voronoi::rejection::Rejection;
 
 /// Rounds of repair; what is still bad after them goes another way.
 const ROUNDS: usize = 6;

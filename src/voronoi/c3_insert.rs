@@ -3,11 +3,11 @@
 
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
-use crate::voronoi::Rejection;
 use crate::voronoi::c4_flip::FlipQueue;
 use crate::voronoi::closed_mesh::{ClosedMesh, next, previous};
 use crate::voronoi::g1_write_sites::SiteTexture;
 use crate::voronoi::g6_triangles::TextureScan;
+use crate::voronoi::rejection::Rejection;
 
 /// Where a new vertex goes: into a triangle, maybe onto one of its edges.
 struct InsertionPoint {

@@ -1,8 +1,8 @@
 //! Step C4: flip edges until all are Delaunay (Lawson), by the canonical in-circle test.
 
 use crate::geometry::Site;
-use crate::voronoi::Rejection;
 use crate::voronoi::closed_mesh::{ClosedMesh, previous};
+use crate::voronoi::rejection::Rejection;
 
 /// Flips and steps allowed per site; more are a sign of a mesh that is no triangulation, or of a leaf that this is no
 /// way to do.

@@ -8,7 +8,8 @@
 use crate::geometry::Site;
 use crate::voronoi::c2_shift::{ShiftRepair, orientation};
 use crate::voronoi::closed_mesh::{ClosedMesh, next, previous};
-use crate::voronoi::{PipelineCounts, Rejection};
+use crate::voronoi::counts::PipelineCounts;
+use crate::voronoi::rejection::Rejection;
 use std::cmp::Reverse;
 
 /// Fans with more triangles than this are not followed.

@@ -15,12 +15,12 @@
 //! mind open edges, as slots are half-edges too.
 
 use crate::geometry::predicates::{in_circle, orient2d};
-use crate::voronoi::Rejection;
 use crate::voronoi::c2_shift::ShiftRepair;
 use crate::voronoi::c4_flip::FlipQueue;
 use crate::voronoi::closed_mesh::ClosedMesh;
 use crate::voronoi::g1_write_sites::SiteTexture;
 use crate::voronoi::g2_voronoi::{FRAME, LabelRows};
+use crate::voronoi::rejection::Rejection;
 
 /// Buffers of the scan.
 #[derive(Default)]

@@ -8,9 +8,10 @@ use gdt_batch::job::{self, progress::stage::Progress};
 use gdt_batch::triangulation::options::{Backend, TriangulationOptions};
 use gdt_batch::triangulation::{TriangulationCounts, Triangulator};
 use gdt_batch::verify::verify;
-use gdt_batch::voronoi::{
-    self, DiagramBackend, DiagramReply, PipelineBuffers, Rejection, TextureRequest, TextureResolution,
-};
+use gdt_batch::voronoi::diagram_backend::{DiagramBackend, DiagramReply};
+use gdt_batch::voronoi::rejection::Rejection;
+use gdt_batch::voronoi::texture_request::{TextureRequest, TextureResolution};
+use gdt_batch::voronoi::{self, PipelineBuffers};
 use std::collections::BTreeSet;
 
 const MEMORY: u64 = 1 << 30;
@@ -77,8 +78,8 @@ fn a_leaf_has_the_same_triangles_whoever_makes_its_diagram() {
 struct Liar(fn(u32, u32, &[u32]) -> Vec<u32>);
 
 impl DiagramBackend for Liar {
-    fn shape(&self) -> TextureRequest {
-        TextureRequest { resolution: TextureResolution::PixelsPerSite(5.0), most_side: 16_384, most_pixels: 1 << 28 }
+    fn texture_request(&self) -> TextureRequest {
+        TextureRequest { resolution: TextureResolution::PixelsPerSite(5.0), max_side: 16_384, max_pixels: 1 << 28 }
     }
 
     fn diagram(&self, width: u32, height: u32, pixels: Vec<u32>) -> DiagramReply {

@@ -10,7 +10,7 @@ use crate::job::progress::machine;
 use crate::job::progress::stage::{Clock, Schedule, StageFigures};
 use crate::job::tiles::write::TileFigures;
 use crate::triangulation::TriangulationCounts;
-use crate::voronoi::STEP_NAMES;
+use crate::voronoi::counts::STEP_NAMES;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
