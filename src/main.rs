@@ -5,7 +5,7 @@ use gdt_batch::cli::{Cli, Command, Talk};
 use gdt_batch::gpu::selftest;
 use gdt_batch::job::options::JobOptions;
 use gdt_batch::job::preflight::check;
-use gdt_batch::job::progress::stage::Progress;
+use gdt_batch::job::progress::stage::ProgressOutput;
 use gdt_batch::job::report::skipped_summary;
 use gdt_batch::job::{self, Options};
 use gdt_batch::say;
@@ -46,7 +46,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
         (Some(Command::Gpu { adapter, side }), _) => return test_gpu(adapter.as_deref(), side, talk),
         (Some(Command::Sample { file, points, seed }), _) => sample::write(&file, points, seed)?,
         (None, Some(config)) => {
-            let progress = Progress::detect(talk.quiet);
+            let progress = ProgressOutput::detect(talk.quiet);
             let options = Options { progress, force: cli.force, fresh: cli.fresh };
             run_job(&gdt_batch::config::load(&config)?, options, talk)?;
         }

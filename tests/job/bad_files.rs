@@ -8,10 +8,10 @@ use gdt_batch::Error;
 use gdt_batch::input::options::OnBadFile;
 use gdt_batch::job::durable::directory::Directory;
 use gdt_batch::job::partition::read as partition;
-use gdt_batch::job::plan::lattice_choice::Coarser;
+use gdt_batch::job::plan::lattice_choice::LatticeCoarsening;
 use gdt_batch::job::plan::scan;
 use gdt_batch::job::plan::scan::Plan;
-use gdt_batch::job::progress::stage::Progress;
+use gdt_batch::job::progress::stage::ProgressOutput;
 use serde_json::Value;
 
 use crate::las_file::{LasFile, points_at};
@@ -135,7 +135,7 @@ fn a_job_of_bad_files_alone_is_an_error() {
 fn planned(folder: &Path) -> (Directory, Plan) {
     let good = good(folder);
     let job = skipping(&[good]);
-    let plan = scan::run(&gdt_batch::config::load(&job.config()).unwrap(), Coarser::default()).unwrap();
+    let plan = scan::run(&gdt_batch::config::load(&job.config()).unwrap(), LatticeCoarsening::default()).unwrap();
     (Directory::new(&folder.join("out")), plan)
 }
 
@@ -153,7 +153,7 @@ fn error_after(change: impl Fn(&Path)) -> Error {
         max_malformed_fraction: 0.0,
         on_bad_file: OnBadFile::Skip,
     };
-    partition::run(&task, &directory, &Progress::Quiet.stage("read", 0, "points")).unwrap_err()
+    partition::run(&task, &directory, &ProgressOutput::Quiet.stage("read", 0, "points")).unwrap_err()
 }
 
 #[test]

@@ -5,15 +5,15 @@ use gdt_batch::geometry::Site;
 use gdt_batch::input::options::{Duplicates, OnBadFile};
 use gdt_batch::job::durable::directory::Directory;
 use gdt_batch::job::durable::store::Store;
-use gdt_batch::job::mesh::precision_limit::Longest;
+use gdt_batch::job::mesh::precision_limit::PrecisionLimit;
 use gdt_batch::job::mesh::{leaf, merge};
 use gdt_batch::job::options::JobOptions;
-use gdt_batch::job::partition::point_file::Spill;
+use gdt_batch::job::partition::point_file::PointFile;
 use gdt_batch::job::partition::read as partition;
 use gdt_batch::job::partition::read::Partition;
-use gdt_batch::job::plan::lattice_choice::Coarser;
+use gdt_batch::job::plan::lattice_choice::LatticeCoarsening;
 use gdt_batch::job::plan::scan;
-use gdt_batch::job::progress::stage::Progress;
+use gdt_batch::job::progress::stage::ProgressOutput;
 use gdt_batch::job::records::{Leaf, Seam};
 use gdt_batch::triangulation::options::{Backend, TriangulationOptions};
 use gdt_batch::triangulation::{Triangulator, reference};
@@ -35,7 +35,7 @@ fn canonical(mut corners: Triangle) -> Triangle {
 fn run_steps(job: &Job, config: &JobOptions) -> (Store, Partition) {
     let directory = Directory::new(&job.out());
     directory.create().unwrap();
-    let plan = scan::run(config, Coarser::default()).unwrap();
+    let plan = scan::run(config, LatticeCoarsening::default()).unwrap();
     let task = partition::Task {
         sources: &plan.sources,
         extent: plan.extent,
@@ -44,10 +44,10 @@ fn run_steps(job: &Job, config: &JobOptions) -> (Store, Partition) {
         max_malformed_fraction: 0.0,
         on_bad_file: OnBadFile::Stop,
     };
-    let partition = partition::run(&task, &directory, &Progress::Quiet.stage("read", 0, "points")).unwrap();
+    let partition = partition::run(&task, &directory, &ProgressOutput::Quiet.stage("read", 0, "points")).unwrap();
     let store = Store::create(directory.store()).unwrap();
-    let spill = Spill::open(&directory.spill()).unwrap();
-    let longest = Longest::of(&plan.frame);
+    let spill = PointFile::open(&directory.spill()).unwrap();
+    let longest = PrecisionLimit::of(&plan.frame);
     let cpu = TriangulationOptions { backend: Backend::Cpu, ..TriangulationOptions::default() };
     let triangulator = Triangulator::new(&cpu, &gdt_batch::gpu::options::GpuOptions::default(), 1 << 28, 1).unwrap();
     let task = leaf::Task { duplicates: Duplicates::Lowest, triangulator: &triangulator, longest };

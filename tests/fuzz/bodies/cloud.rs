@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 use gdt_batch::geometry::lattice::{AxisMap, REACH};
 use gdt_batch::input::{Point, Rules, Source, Tally, TextOptions, open};
 use gdt_batch::job::options::JobOptions;
-use gdt_batch::job::plan::lattice_choice::Coarser;
+use gdt_batch::job::plan::lattice_choice::LatticeCoarsening;
 use gdt_batch::job::plan::scan;
 use gdt_batch::{Error, Result};
 
@@ -57,7 +57,7 @@ fn plan(path: &Path, options: &TextOptions) {
     let mut config = CONFIG.clone();
     config.input.files = vec![path.to_str().expect("a plain path").to_owned()];
     config.input.csv = options.clone();
-    if let Err(error) = scan::run(&config, Coarser::default()) {
+    if let Err(error) = scan::run(&config, LatticeCoarsening::default()) {
         assert!(matches!(error.exit_code(), 2 | 3) && error.to_string().len() < 4000, "{error}");
     }
 }
