@@ -15,7 +15,7 @@ pub(super) const OUTSIDE: u32 = u32::MAX;
 
 /// A closed triangulated surface over sites; see the module.
 #[derive(Default)]
-pub(super) struct Sphere {
+pub(super) struct ClosedMesh {
     /// Only as far as `end`; the rest is room, kept from leaf to leaf.
     records: Vec<u32>,
     end: usize,
@@ -36,7 +36,7 @@ pub(super) fn previous(h: u32) -> u32 {
     (h & !3) | (0b01_00_10 >> (2 * (h & 3)) & 3)
 }
 
-impl Sphere {
+impl ClosedMesh {
     /// Forgets everything; makes room for `slots` slots and the triangles of `sites` sites. Vertex `infinity` is the ghost.
     pub(super) fn reset(&mut self, slots: usize, sites: usize, infinity: u32) {
         self.slots = slots.div_ceil(4);
@@ -200,7 +200,7 @@ impl Sphere {
 
     /// Takes the vertex at the start of `h` out and fills the hole, `fill` listing the new triangles by the numbers of
     /// `star`'s sides. Calls `changed` with every half-edge of the new triangles.
-    pub(super) fn replace_star(&mut self, star: &Star, fill: &Fill, mut changed: impl FnMut(u32)) {
+    pub(super) fn replace_star(&mut self, star: &OneRing, fill: &HoleFilling, mut changed: impl FnMut(u32)) {
         for &side in &star.sides {
             self.release(side);
         }
@@ -219,10 +219,10 @@ impl Sphere {
         changed(open[i]);
     }
 
-    /// The triangles around the vertex at the start of `h`, or `None` if there are more than [`Star::MOST`], or they leave no hole
+    /// The triangles around the vertex at the start of `h`, or `None` if there are more than [`OneRing::MOST`], or they leave no hole
     /// that could be filled.
-    pub(super) fn star(&self, h: u32) -> Option<Star> {
-        let mut star = Star::default();
+    pub(super) fn star(&self, h: u32) -> Option<OneRing> {
+        let mut star = OneRing::default();
         let mut spoke = h;
         loop {
             let side = next(spoke);
@@ -233,7 +233,7 @@ impl Sphere {
             if spoke == h {
                 return star.leaves_a_hole().then_some(star);
             }
-            if star.sides.len() == Star::MOST {
+            if star.sides.len() == OneRing::MOST {
                 return None;
             }
         }
@@ -335,7 +335,7 @@ impl Sphere {
 
 /// The triangles around one vertex, counterclockwise, and the hole they would leave.
 #[derive(Default)]
-pub(super) struct Star {
+pub(super) struct OneRing {
     /// The side of each triangle that faces the vertex.
     sides: Vec<u32>,
     /// The vertex at which the side starts.
@@ -344,7 +344,7 @@ pub(super) struct Star {
     outside: Vec<u32>,
 }
 
-impl Star {
+impl OneRing {
     const MOST: usize = 48;
 
     /// No triangle is there twice, and no two of them share a side opposite to the vertex: where the diagram was wrong, a triangle
@@ -357,9 +357,9 @@ impl Star {
     }
 }
 
-/// How to fill the hole of a [`Star`]: triangles in the order they are cut off, by side numbers. Cutting off (i, j, k) joins
+/// How to fill the hole of a [`OneRing`]: triangles in the order they are cut off, by side numbers. Cutting off (i, j, k) joins
 /// sides i and j to one that keeps the number i. At the end two sides are left.
-pub(super) struct Fill {
+pub(super) struct HoleFilling {
     pub(super) ears: Vec<[usize; 3]>,
     pub(super) seam: [usize; 2],
 }

@@ -1,29 +1,29 @@
-//! How long steps take on the GPU itself: timestamps at their first and last dispatch, where the adapter has them.
+//! The time that each step takes on the GPU itself: timestamps at its first and last dispatch, on adapters that have them.
 
-use crate::gpu::Fault;
 use crate::gpu::device::Device;
-use crate::gpu::steps::{Command, Recording, Step};
+use crate::gpu::error::GpuError;
+use crate::gpu::steps::{GpuCommand, GpuStep, Recording};
 use wgpu::{BufferUsages, CommandEncoder, ComputePassTimestampWrites, Features, QuerySet, QueryType};
 
-/// Nanoseconds that each [`Step`] took, in their order; 0 for those that did not run.
-pub type StepTimes = [u64; Step::ALL.len()];
+/// The nanoseconds that each [`GpuStep`] took, in the order of the steps; 0 for steps that did not run.
+pub type StepNanoseconds = [u64; GpuStep::ALL.len()];
 
-/// Two timestamps a step.
-const STAMPS: u32 = 2 * Step::ALL.len() as u32;
+/// Two timestamps per step.
+const STAMPS: u32 = 2 * GpuStep::ALL.len() as u32;
 /// Bytes of all timestamps.
 pub(super) const STAMP_BYTES: u64 = 8 * STAMPS as u64;
 
 /// The timestamps of one leaf in flight.
-pub(super) struct Clock {
+pub(super) struct GpuTimestamps {
     stamps: QuerySet,
     resolved: wgpu::Buffer,
-    /// Nanoseconds in a tick.
+    /// Nanoseconds per tick.
     period: f64,
 }
 
-impl Clock {
-    /// A clock, if `device` has timestamps.
-    pub(super) fn new(device: &Device) -> Result<Option<Clock>, Fault> {
+impl GpuTimestamps {
+    /// Creates the timestamps, or returns `None` if `device` does not support them.
+    pub(super) fn new(device: &Device) -> Result<Option<GpuTimestamps>, GpuError> {
         if !device.device.features().contains(Features::TIMESTAMP_QUERY) {
             return Ok(None);
         }
@@ -37,13 +37,13 @@ impl Clock {
         let period = f64::from(device.queue.get_timestamp_period());
         device.guard(|| {
             let (stamps, resolved) = (device.device.create_query_set(&stamps), device.device.create_buffer(&resolved));
-            Some(Clock { stamps, resolved, period })
+            Some(GpuTimestamps { stamps, resolved, period })
         })
     }
 
-    /// The timestamps that a dispatch with these `marks` writes.
-    pub(super) fn writes(&self, marks: Marks) -> Option<ComputePassTimestampWrites<'_>> {
-        let Marks { begin, end } = marks;
+    /// Returns the timestamps that a dispatch with these `marks` writes.
+    pub(super) fn writes(&self, marks: DispatchMarks) -> Option<ComputePassTimestampWrites<'_>> {
+        let DispatchMarks { begin, end } = marks;
         let write = || ComputePassTimestampWrites {
             query_set: &self.stamps,
             beginning_of_pass_write_index: begin,
@@ -52,19 +52,19 @@ impl Clock {
         (begin.is_some() || end.is_some()).then(write)
     }
 
-    /// Records the way of the timestamps of `steps` into `staging`, from byte `at` on.
-    pub(super) fn resolve(&self, encoder: &mut CommandEncoder, steps: &[Step], staging: &wgpu::Buffer, at: u64) {
+    /// Records the copy of the timestamps of `steps` into `staging`, from byte `at` on.
+    pub(super) fn resolve(&self, encoder: &mut CommandEncoder, steps: &[GpuStep], staging: &wgpu::Buffer, at: u64) {
         for &step in steps {
             let first = 2 * step as u32;
-            // Offsets of what is resolved have to be multiples of 256: one after the other.
+            // The offset of a resolved query must be a multiple of 256, so the steps are resolved one by one.
             encoder.resolve_query_set(&self.stamps, first..first + 2, &self.resolved, 0);
             encoder.copy_buffer_to_buffer(&self.resolved, 0, staging, at + 8 * u64::from(first), 16);
         }
     }
 
-    /// The times of `steps` from their timestamps.
-    pub(super) fn times(&self, stamps: &[u64], steps: &[Step]) -> StepTimes {
-        let mut times = [0; Step::ALL.len()];
+    /// Computes the times of `steps` from their timestamps.
+    pub(super) fn nanoseconds(&self, stamps: &[u64], steps: &[GpuStep]) -> StepNanoseconds {
+        let mut times = [0; GpuStep::ALL.len()];
         for &step in steps {
             let first = 2 * step as usize;
             times[step as usize] = (stamps[first + 1].saturating_sub(stamps[first]) as f64 * self.period) as u64;
@@ -73,33 +73,33 @@ impl Clock {
     }
 }
 
-/// Which timestamps a dispatch writes.
+/// The indices of the timestamps that a dispatch writes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Marks {
+pub(super) struct DispatchMarks {
     begin: Option<u32>,
     end: Option<u32>,
 }
 
-/// The marks of every dispatch of `recording`, and the steps that have dispatches.
-pub(super) fn marks(recording: &Recording) -> (Vec<Marks>, Vec<Step>) {
-    let (mut marks, mut steps): (Vec<Marks>, Vec<Step>) = (Vec::new(), Vec::new());
+/// Returns the marks of every dispatch of `recording`, and the steps that have dispatches.
+pub(super) fn marks(recording: &Recording) -> (Vec<DispatchMarks>, Vec<GpuStep>) {
+    let (mut marks, mut steps): (Vec<DispatchMarks>, Vec<GpuStep>) = (Vec::new(), Vec::new());
     let mut current = None;
-    let end = |marks: &mut Vec<Marks>, step: Step| {
+    let end = |marks: &mut Vec<DispatchMarks>, step: GpuStep| {
         if let Some(last) = marks.last_mut() {
             last.end = Some(2 * step as u32 + 1);
         }
     };
     for command in &recording.commands {
         match command {
-            Command::Step(step) => current = Some(*step),
-            Command::Run(..) => {
+            GpuCommand::Step(step) => current = Some(*step),
+            GpuCommand::Run(..) => {
                 let before = steps.last().copied();
                 let begins = current.filter(|&step| before != Some(step));
                 if let Some(step) = begins {
                     before.into_iter().for_each(|before| end(&mut marks, before));
                     steps.push(step);
                 }
-                marks.push(Marks { begin: begins.map(|step| 2 * step as u32), end: None });
+                marks.push(DispatchMarks { begin: begins.map(|step| 2 * step as u32), end: None });
             }
             _ => {}
         }
@@ -110,19 +110,20 @@ pub(super) fn marks(recording: &Recording) -> (Vec<Marks>, Vec<Step>) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::steps::Size;
     use super::*;
     use crate::gpu::options::VoronoiMethod;
+    use crate::gpu::texture_size::TextureSize;
 
     #[test]
     fn every_step_begins_and_ends_once() {
-        let recording = crate::gpu::labels(Size { width: 700, height: 500 }, vec![0, 5, 9], VoronoiMethod::Jfa);
+        let size = TextureSize { width: 700, height: 500 };
+        let recording = Recording::labels(size, vec![0, 5, 9], VoronoiMethod::Jfa);
         let (marks, steps) = marks(&recording);
-        assert_eq!(steps, [Step::WriteSites, Step::Voronoi, Step::Islands]);
+        assert_eq!(steps, [GpuStep::WriteSites, GpuStep::Voronoi, GpuStep::Islands]);
         let begins: Vec<u32> = marks.iter().filter_map(|m| m.begin).collect();
         let ends: Vec<u32> = marks.iter().filter_map(|m| m.end).collect();
         assert_eq!((begins, ends), (vec![0, 2, 4], vec![1, 3, 5]));
-        assert_eq!(marks[0], Marks { begin: Some(0), end: Some(1) });
+        assert_eq!(marks[0], DispatchMarks { begin: Some(0), end: Some(1) });
         assert_eq!(marks.last().unwrap().end, Some(5));
     }
 }

@@ -3,43 +3,43 @@
 //! on their error. What the bound leaves in doubt is for the caller to decide exactly.
 
 use crate::geometry::Site;
-use crate::geometry::predicates::Quads;
-use crate::voronoi::sphere::{Sphere, next, previous};
+use crate::geometry::predicates::InCircleBatch;
+use crate::voronoi::closed_mesh::{ClosedMesh, next, previous};
 
 /// The batch at hand.
 #[derive(Default)]
-pub(super) struct Edges {
-    quads: Quads,
+pub(super) struct EdgeTester {
+    batch: InCircleBatch,
 }
 
-/// What [`Edges::test`] found of the links between half-edges.
+/// What [`EdgeTester::test`] found of the links between half-edges.
 #[derive(Default)]
-pub(super) struct Links {
+pub(super) struct LinkCheck {
     /// Edges tested.
     pub(super) count: usize,
     /// Whether any two half-edges are not each other's twins, or have other ends.
     pub(super) broken: bool,
 }
 
-impl Edges {
+impl EdgeTester {
     /// Numbers in the records of as many triangles as are tested at a time; each has at most three edges.
-    pub(super) const BLOCK: usize = Quads::LANES / 3 * 8;
+    pub(super) const BLOCK: usize = InCircleBatch::LANES / 3 * 8;
 
-    /// Appends to `failing` the edges of the triangles in records `start..end`, at most [`Edges::BLOCK`], that fail the
+    /// Appends to `failing` the edges of the triangles in records `start..end`, at most [`EdgeTester::BLOCK`], that fail the
     /// in-circle test or may do so. An edge belongs to the later of its triangles. Of edges to infinity it says anything.
     /// With `CHECK`, it looks at the links too.
     #[inline(always)]
     pub(super) fn test<const CHECK: bool>(
         &mut self,
-        sphere: &Sphere,
+        sphere: &ClosedMesh,
         sites: &[Site],
         start: usize,
         end: usize,
         failing: &mut Vec<u32>,
-    ) -> Links {
+    ) -> LinkCheck {
         let (records, front) = (sphere.records(), sphere.front());
-        let mut edges = [0; Quads::LANES + 3];
-        let mut links = Links::default();
+        let mut edges = [0; InCircleBatch::LANES + 3];
+        let mut links = LinkCheck::default();
         for (t, record) in (start as u32..).step_by(8).zip(records[start..end].chunks_exact(8)) {
             for i in 0..3 {
                 let (h, twin) = (t + i, record[4 + i as usize]);
@@ -66,9 +66,9 @@ impl Edges {
                 }
             }
             let at = |v: u32| sites[v as usize];
-            self.quads.set(lane, at(record[0]), at(record[1]), at(record[2]), at(opposite));
+            self.batch.set(lane, at(record[0]), at(record[1]), at(record[2]), at(opposite));
         }
-        let doubtful = self.quads.inside_or_in_doubt(links.count);
+        let doubtful = self.batch.inside_or_in_doubt(links.count);
         // Without a branch: about one edge in seven fails, and nobody can foresee which.
         let before = failing.len();
         failing.resize(before + links.count + 1, 0);
