@@ -4,7 +4,8 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::input::{Crs, Format, Source};
+use crate::input::crs::system::Crs;
+use crate::input::source::{Format, Source};
 
 /// The answer of `info`. `Display` gives it for people, `Serialize` for programs.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -3,38 +3,23 @@
 use std::path::{Path, PathBuf};
 
 use rust_decimal::Decimal;
-use rust_decimal::prelude::ToPrimitive;
 use serde::{Deserialize, Serialize};
 
-use crate::input::file::Positioned;
-use crate::input::filter::Sieve;
+use crate::input::crs::system::Crs;
+use crate::input::file::random_access::Positioned;
+use crate::input::las::crs_records;
 use crate::input::las::header::Header;
 use crate::input::las::layout::Layout;
 use crate::input::las::laz::Chunks;
 use crate::input::las::uncompressed::Records;
 use crate::input::las::vlr;
-use crate::input::rules::{Rules, Tally};
-use crate::input::text::{Table, TextOptions};
-use crate::input::{Crs, Point, crs};
+use crate::input::points::axis::Axis;
+use crate::input::points::filter::Sieve;
+use crate::input::points::point::Point;
+use crate::input::points::rules::{Rules, Tally};
+use crate::input::text::options::TextOptions;
+use crate::input::text::table::Table;
 use crate::{Error, Result};
-
-/// The exact meaning of the raw integers on one axis: `value = offset + scale * raw`, in the source's unit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Axis {
-    /// The value of raw integer 0.
-    pub offset: Decimal,
-    /// The step from one raw integer to the next, above 0.
-    pub scale: Decimal,
-}
-
-impl Axis {
-    /// The value of `raw`, correctly rounded where it fits 28 digits.
-    pub fn value(&self, raw: i64) -> f64 {
-        let exact = self.scale.checked_mul(Decimal::from(raw)).and_then(|product| product.checked_add(self.offset));
-        let float = |d: Decimal| d.to_f64().unwrap_or(f64::NAN);
-        exact.map_or_else(|| float(self.offset) + float(self.scale) * raw as f64, float)
-    }
-}
 
 /// How a file holds its points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -141,7 +126,7 @@ fn refuse(path: &Path, start: &[u8]) -> Result<()> {
 fn open_las(file: &Positioned) -> Result<Source> {
     let (header, mut warnings) = Header::read(file)?;
     let vlrs = vlr::list(file, &header, &mut warnings)?;
-    let crs = crs::read(file, &vlrs, &mut warnings)?;
+    let crs = crs_records::read(file, &vlrs, &mut warnings)?;
     let (missing, body) = if header.compressed {
         let chunks = Chunks::read(file, &header, &vlrs, &mut warnings)?;
         (chunks.missing, Body::Laz(chunks))

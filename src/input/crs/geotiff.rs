@@ -1,7 +1,9 @@
 //! Coordinate reference systems as GeoTIFF keys (OGC 19-008r4, as LAS holds them in three records).
 
-use crate::input::crs::{Crs, Unit, from_epsg};
-use crate::input::las::layout::{float64, uint16};
+use crate::input::crs::from_wkt::from_epsg;
+use crate::input::crs::system::Crs;
+use crate::input::crs::unit::Unit;
+use crate::input::file::bytes::{float64, uint16};
 
 const MODEL_TYPE: u16 = 1024;
 const GEOGRAPHIC_TYPE: u16 = 2048;

@@ -1,7 +1,6 @@
 //! The definition of a projected system in the way of PROJ.4, from its EPSG code or from its well-known text.
 
-use crate::input::crs::wkt::{Node, PROJECTED, find};
-use crate::input::crs::{Crs, plain};
+use crate::input::crs::wkt::{Node, PROJECTED, find, plain};
 
 /// Parameters of projections: names in WKT, letters and digits in lower case, and that of PROJ.4.
 const PARAMETERS: [(&str, &str); 20] = [
@@ -41,10 +40,10 @@ const METHODS: [(&str, &str); 10] = [
     ("lambertazimuthalequalarea", "laea"),
 ];
 
-/// The definition of `crs`; `None` where neither its code nor its text gives one.
-pub(crate) fn definition(crs: &Crs) -> Option<String> {
+/// The definition of the system of this code or this text; `None` where neither gives one.
+pub(crate) fn definition(epsg: Option<u32>, wkt: Option<&str>) -> Option<String> {
     let of_code = |code| Some(crs_definitions::from_code(u16::try_from(code).ok()?)?.proj4.to_string());
-    crs.epsg.and_then(of_code).or_else(|| of_text(crs.wkt.as_deref()?))
+    epsg.and_then(of_code).or_else(|| of_text(wkt?))
 }
 
 fn of_text(text: &str) -> Option<String> {
@@ -113,12 +112,11 @@ fn is_close_to_wgs84(base: &Node) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{from_epsg, wkt};
     use super::*;
 
     #[test]
     fn a_code_gives_its_own_definition() {
-        let definition = definition(&from_epsg(26915).unwrap()).unwrap();
+        let definition = definition(Some(26915), None).unwrap();
         assert!(definition.contains("+proj=utm +zone=15"), "{definition}");
     }
 
@@ -130,12 +128,12 @@ mod tests {
             PARAMETER["central_meridian",-120.5],PARAMETER["false_easting",1000],PARAMETER["false_northing",0],
             UNIT["foot",0.3048]]"#;
         assert_eq!(
-            definition(&wkt::parse(text).unwrap()).unwrap(),
+            definition(None, Some(text)).unwrap(),
             "+proj=lcc +lat_1=43 +lat_2=45.5 +lat_0=41.75 +lon_0=-120.5 +x_0=304.8 +y_0=0 +a=6378137 +rf=298.25 +towgs84=0,0,0 \
              +to_meter=0.3048 +no_defs"
         );
         // A datum that may be hundreds of metres off is not guessed.
         let other = text.replace("GCS_North_American_1983_HARN", "European 1950");
-        assert_eq!(definition(&wkt::parse(&other).unwrap()), None);
+        assert_eq!(definition(None, Some(&other)), None);
     }
 }

@@ -1,73 +1,10 @@
 //! Coordinate reference systems, as far as a terrain needs them: the units, a text for readers, and whether two agree.
 
-mod definition;
-mod geotiff;
-mod wkt;
-
 use serde::{Deserialize, Serialize};
 
-use crate::Result;
-use crate::input::file::Positioned;
-use crate::input::las::vlr::Vlr;
-
-/// A unit of x and y.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Unit {
-    /// The metre.
-    Metre,
-    /// The international foot, 0.3048 m.
-    Foot,
-    /// The foot of the US survey, 1200/3937 m.
-    UsFoot,
-    /// Degrees of longitude and latitude, or another angle.
-    Degree,
-    /// Another unit of so many metres.
-    Other(f64),
-    /// The file does not say.
-    #[default]
-    Unknown,
-}
-
-impl Unit {
-    /// Metres of the foot of the US survey.
-    pub const US_FOOT: f64 = 1200.0 / 3937.0;
-
-    /// The unit of so many metres. The two feet differ by 6e-7 m; texts give them with 9 digits or more.
-    fn of(metres: Option<f64>) -> Unit {
-        let near = |value: f64, other: f64| (value - other).abs() < 1e-8;
-        match metres {
-            None => Unit::Unknown,
-            Some(value) if near(value, 1.0) => Unit::Metre,
-            Some(value) if near(value, 0.3048) => Unit::Foot,
-            Some(value) if near(value, Unit::US_FOOT) => Unit::UsFoot,
-            Some(value) => Unit::Other(value),
-        }
-    }
-
-    /// Metres of one unit; `None` for angles and where it is not known.
-    pub fn metres_per_unit(&self) -> Option<f64> {
-        match self {
-            Unit::Metre => Some(1.0),
-            Unit::Foot => Some(0.3048),
-            Unit::UsFoot => Some(Unit::US_FOOT),
-            Unit::Other(metres) => Some(*metres),
-            Unit::Degree | Unit::Unknown => None,
-        }
-    }
-
-    /// The unit's name for a reader.
-    pub fn name(&self) -> String {
-        match self {
-            Unit::Metre => "metre".into(),
-            Unit::Foot => "foot".into(),
-            Unit::UsFoot => "US survey foot".into(),
-            Unit::Degree => "degree".into(),
-            Unit::Other(metres) => format!("{metres} m"),
-            Unit::Unknown => "unknown".into(),
-        }
-    }
-}
+use crate::input::crs::proj4;
+use crate::input::crs::unit::Unit;
+use crate::input::crs::wkt::{self, plain};
 
 /// What a file says of its coordinate reference system.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -109,7 +46,7 @@ impl Crs {
 
     /// Its definition in the way of PROJ.4, which leads to longitude and latitude; `None` where that is not known.
     pub fn definition(&self) -> Option<String> {
-        definition::definition(self)
+        proj4::definition(self.epsg, self.wkt.as_deref())
     }
 
     /// The name of the system of its heights, where the text gives one.
@@ -156,65 +93,10 @@ fn same_text(own: &str, others: &str) -> bool {
     both && own.iter().all(|(name, value)| others.iter().all(|(other, theirs)| name != other || close(*value, *theirs)))
 }
 
-/// Letters and digits of a name in lower case: writers disagree on the rest.
-fn plain(name: &str) -> String {
-    name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
-}
-
-/// The system of an EPSG code.
-fn from_epsg(code: u32) -> Option<Crs> {
-    let definition = crs_definitions::from_code(u16::try_from(code).ok()?)?;
-    let crs = wkt::parse(definition.wkt)?;
-    Some(Crs { epsg: Some(code), ..crs })
-}
-
-/// The users under which well-known text is stored: LAS 1.4's, and that of libLAS before it.
-const TEXT_RECORDS: [(&str, u16); 2] = [("LASF_Projection", 2112), ("liblas", 2112)];
-
-/// The system that the records of `file` describe. Text wins over GeoTIFF keys; an empty one counts as none.
-pub(crate) fn read(file: &Positioned, vlrs: &[Vlr], warnings: &mut Vec<String>) -> Result<Crs> {
-    let text = read_text(file, vlrs, warnings)?;
-    let keys = geotiff::parse(&geotiff::Records {
-        directory: record(file, vlrs, 34735)?,
-        doubles: record(file, vlrs, 34736)?,
-        texts: record(file, vlrs, 34737)?,
-    });
-    if let (Some(text), Some(keys)) = (&text, &keys)
-        && !text.same_as(keys)
-    {
-        warnings.push(format!(
-            "its two coordinate systems differ: {} in {} as text (used), {} in {} as GeoTIFF keys",
-            text.label(),
-            text.horizontal.name(),
-            keys.label(),
-            keys.horizontal.name()
-        ));
-    }
-    Ok(text.or(keys).unwrap_or_default())
-}
-
-fn read_text(file: &Positioned, vlrs: &[Vlr], warnings: &mut Vec<String>) -> Result<Option<Crs>> {
-    for (user, id) in TEXT_RECORDS {
-        for vlr in vlrs.iter().filter(|vlr| vlr.is(user, id)) {
-            let bytes = vlr.read(file)?;
-            let text = String::from_utf8_lossy(&bytes);
-            match wkt::parse(&text) {
-                Some(crs) => return Ok(Some(crs)),
-                None if text.trim_matches(['\0', ' ', '"', '\'']).is_empty() => {}
-                None => warnings.push("its coordinate system is not well-known text that can be read".to_string()),
-            }
-        }
-    }
-    Ok(None)
-}
-
-fn record(file: &Positioned, vlrs: &[Vlr], id: u16) -> Result<Vec<u8>> {
-    vlrs.iter().find(|vlr| vlr.is("LASF_Projection", id)).map_or(Ok(Vec::new()), |vlr| vlr.read(file))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::input::crs::from_wkt::from_epsg;
 
     #[test]
     fn what_is_not_known_agrees_and_what_differs_does_not() {
@@ -226,12 +108,5 @@ mod tests {
         assert!(!named.same_as(&Crs { epsg: None, ..from_epsg(26916).unwrap() }));
         assert!(!utm.same_as(&Crs { horizontal: Unit::Foot, ..utm.clone() }));
         assert!(!Crs { vertical: Some(1.0), ..utm.clone() }.same_as(&Crs { vertical: Some(0.3048), ..utm.clone() }));
-    }
-
-    #[test]
-    fn the_two_feet_are_told_apart() {
-        assert_eq!(Unit::of(Some(0.3048)), Unit::Foot);
-        assert_eq!(Unit::of(Some(0.304800609601219)), Unit::UsFoot);
-        assert_eq!(Unit::of(Some(0.3048006096)), Unit::UsFoot);
     }
 }

@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use laz::laszip::ChunkTable;
 
-use crate::input::catch_panic::guarded;
-use crate::input::file::Positioned;
+use crate::input::file::bytes::{uint32, uint64};
+use crate::input::file::random_access::Positioned;
+use crate::input::las::catch_panic::guarded;
+use crate::input::las::compression::Coding;
 use crate::input::las::header::Header;
-use crate::input::las::layout::{uint32, uint64};
-use crate::input::las::laz::Coding;
 use crate::{Error, Result};
 
 /// Bytes before the first chunk, which hold the position of the table.
@@ -25,29 +25,6 @@ pub(crate) struct Chunk {
     pub(crate) bytes: Range<u64>,
     /// After how many records the compression begins anew within it; more than `count` but where the table is lost.
     pub(crate) restart: u64,
-}
-
-/// The head of a layered chunk: its first record as it is, the number of records, the size of every layer.
-#[derive(Clone, Debug)]
-pub(crate) struct Layers {
-    /// Bytes of a record.
-    pub(crate) record: u64,
-    /// Number of layers.
-    pub(crate) count: u64,
-}
-
-impl Layers {
-    /// The number of records and of bytes of the chunk at the start of `range`; `None` where it does not fit in there.
-    pub(crate) fn read(&self, file: &Positioned, range: Range<u64>) -> Result<Option<(u64, u64)>> {
-        let head = self.record + 4 + 4 * self.count;
-        if range.end.saturating_sub(range.start) < head {
-            return Ok(None);
-        }
-        let numbers = file.bytes(range.start + self.record..range.start + head)?;
-        let layers: u64 = (1..=self.count as usize).map(|layer| uint32(&numbers, 4 * layer) as u64).sum();
-        let fits = head + layers <= range.end - range.start;
-        Ok(fits.then_some((uint32(&numbers, 0) as u64, head + layers)))
-    }
 }
 
 /// The chunks of `file`, in order, together with at most `header.records` records.

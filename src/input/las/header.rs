@@ -3,9 +3,10 @@
 use rust_decimal::Decimal;
 
 use crate::geometry::lattice::shortest_decimal;
-use crate::input::file::Positioned;
-use crate::input::las::layout::{LENGTHS, float64, uint16, uint32, uint64};
-use crate::input::source::Axis;
+use crate::input::file::bytes::{float64, uint16, uint32, uint64};
+use crate::input::file::random_access::Positioned;
+use crate::input::las::layout::LENGTHS;
+use crate::input::points::axis::Axis;
 use crate::{Error, Result};
 
 /// The header's size in versions 1.0 to 1.2, the least there is.

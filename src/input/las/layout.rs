@@ -1,6 +1,7 @@
 //! Where the fields of a LAS point record lie, by point format.
 
-use crate::input::filter::Record;
+use crate::input::file::bytes::{int32, uint16};
+use crate::input::points::record::Record;
 
 /// The least record length of each point format, in bytes (LAS 1.4 R15, section 2.6).
 pub(crate) const LENGTHS: [u16; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
@@ -44,33 +45,4 @@ impl Layout {
         };
         Record { raw, rgb, class, withheld, rounded: [false; 2] }
     }
-}
-
-/// The little-endian number at `at`; the caller has checked the length.
-pub(crate) fn uint16(bytes: &[u8], at: usize) -> u16 {
-    u16::from_le_bytes(array(bytes, at))
-}
-
-/// The little-endian number at `at`; the caller has checked the length.
-pub(crate) fn uint32(bytes: &[u8], at: usize) -> u32 {
-    u32::from_le_bytes(array(bytes, at))
-}
-
-/// The little-endian number at `at`; the caller has checked the length.
-pub(crate) fn uint64(bytes: &[u8], at: usize) -> u64 {
-    u64::from_le_bytes(array(bytes, at))
-}
-
-/// The little-endian number at `at`; the caller has checked the length.
-pub(crate) fn float64(bytes: &[u8], at: usize) -> f64 {
-    f64::from_le_bytes(array(bytes, at))
-}
-
-fn int32(bytes: &[u8], at: usize) -> i32 {
-    i32::from_le_bytes(array(bytes, at))
-}
-
-#[inline]
-fn array<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
-    bytes[at..at + N].try_into().expect("a slice of N bytes")
 }

@@ -3,11 +3,11 @@
 use std::ops::Range;
 
 use crate::Result;
-use crate::input::file::Positioned;
-use crate::input::filter::Sieve;
+use crate::input::file::random_access::Positioned;
 use crate::input::las::header::Header;
 use crate::input::las::layout::Layout;
-use crate::input::rules::Rules;
+use crate::input::points::filter::Sieve;
+use crate::input::points::rules::Rules;
 
 /// Records of a piece.
 const PIECE: u64 = 50_000;

@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use crate::Result;
-use crate::input::file::Positioned;
+use crate::input::file::bytes::{uint16, uint64};
+use crate::input::file::random_access::Positioned;
 use crate::input::las::header::Header;
-use crate::input::las::layout::{uint16, uint64};
 
 /// Bytes before the data of a variable length record.
 const HEAD: u64 = 54;

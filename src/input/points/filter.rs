@@ -4,26 +4,16 @@ use std::path::Path;
 
 use crate::Result;
 use crate::geometry::lattice::REACH;
-use crate::input::Point;
-use crate::input::rules::{Rules, Tally};
-use crate::input::source::Axis;
+use crate::input::points::axis::Axis;
+use crate::input::points::point::Point;
+use crate::input::points::record::Record;
+use crate::input::points::rules::{Rules, Tally};
 
 /// Points handed to the sink at once, at most: 384 KiB of them, which stays in the second-level cache.
 const SLICE: usize = 1 << 14;
 
 /// Where the points of a source go, in record order.
 pub(crate) type Sink<'a> = &'a mut dyn FnMut(&[Point]) -> Result<()>;
-
-/// What a record says before it is judged. `raw` is in steps of the source's axes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Record {
-    pub(crate) raw: [i64; 3],
-    pub(crate) rgb: [u16; 3],
-    pub(crate) class: u8,
-    pub(crate) withheld: bool,
-    /// Whether x or y, and whether z, was rounded on the way to `raw`.
-    pub(crate) rounded: [bool; 2],
-}
 
 /// Lattice integers in x, y and z, and whether they were rounded; `None` where they do not fit.
 type Mapped = [Option<(i32, bool)>; 3];

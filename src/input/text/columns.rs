@@ -5,8 +5,8 @@ use std::path::Path;
 
 use memchr::{memchr, memchr2};
 
-use crate::input::text::TextOptions;
 use crate::input::text::number::Number;
+use crate::input::text::options::TextOptions;
 use crate::{Error, Result};
 
 /// What stands between two columns.

@@ -5,7 +5,7 @@ use std::ops::Range;
 use memchr::memchr;
 
 use crate::Result;
-use crate::input::file::Positioned;
+use crate::input::file::random_access::Positioned;
 
 /// Bytes of a block.
 pub(crate) const BLOCK: u64 = 2 << 20;

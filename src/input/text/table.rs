@@ -5,14 +5,15 @@ use std::ops::Range;
 use rayon::prelude::*;
 use rust_decimal::Decimal;
 
-use crate::input::file::Positioned;
-use crate::input::filter::{Record, Sieve};
-use crate::input::source::Axis;
-use crate::input::text::TextOptions;
+use crate::input::file::random_access::Positioned;
+use crate::input::points::axis::Axis;
+use crate::input::points::filter::Sieve;
+use crate::input::points::record::Record;
 use crate::input::text::columns::{Columns, Delimiter, Role, shown};
 use crate::input::text::granularity::Granularity;
 use crate::input::text::lines::{BLOCK, LONGEST, Line, for_each_line};
 use crate::input::text::number::{MOST_DECIMALS, Number, POWERS};
+use crate::input::text::options::TextOptions;
 use crate::{Result, interrupt};
 
 /// Bytes at the start of a text that show how it is laid out.

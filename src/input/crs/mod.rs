@@ -1,0 +1,9 @@
+//! Coordinate reference systems, as far as a terrain needs them: the units, a text for readers, and whether two agree.
+
+pub(crate) mod from_records;
+pub(crate) mod from_wkt;
+pub(crate) mod geotiff;
+pub(crate) mod proj4;
+pub(crate) mod system;
+pub(crate) mod unit;
+pub(crate) mod wkt;
