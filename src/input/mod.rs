@@ -1,7 +1,7 @@
-//! Point clouds in: what a file holds, and its points on the lattice, piece by piece.
+//! Point clouds in: what a file holds, and its points on the lattice, chunk by chunk.
 //!
-//! [`open`] looks at one file and gives a [`Source`]; its pieces are decoded independently on any thread. On the way every
-//! record passes the [`Rules`], and the [`Tally`] says what became of each.
+//! [`open`] looks at one file and gives a [`Source`]; its chunks are decoded independently on any thread. On the way every
+//! record passes the [`PointRules`], and the [`PointCounts`] says what became of each.
 
 mod crs;
 mod file;
@@ -16,6 +16,6 @@ pub use crs::system::Crs;
 pub use crs::unit::Unit;
 pub use points::axis::Axis;
 pub use points::point::Point;
-pub use points::rules::{Rules, Tally};
-pub use source::{Format, Source, open};
+pub use points::rules::{PointCounts, PointRules};
+pub use source::{FileFormat, Source, open};
 pub use text::options::TextOptions;

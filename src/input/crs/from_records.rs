@@ -2,14 +2,14 @@
 
 use crate::Result;
 use crate::input::crs::from_wkt;
-use crate::input::crs::geotiff::{self, Records};
+use crate::input::crs::geotiff::{self, GeoKeys};
 use crate::input::crs::system::Crs;
 
 /// The system that the texts, in their order, and the keys of a file describe. Text wins over GeoTIFF keys; an empty one counts as
 /// none.
 pub(crate) fn from_records(
     texts: impl Iterator<Item = Result<Vec<u8>>>,
-    keys: &Records,
+    keys: &GeoKeys,
     warnings: &mut Vec<String>,
 ) -> Result<Crs> {
     let text = from_texts(texts, warnings)?;

@@ -2,7 +2,7 @@
 
 use crate::input::crs::system::Crs;
 use crate::input::crs::unit::Unit;
-use crate::input::crs::wkt::{GEOGRAPHIC, LOCAL, Node, PROJECTED, VERTICAL, length, parts, unbound, units};
+use crate::input::crs::wkt::{GEOGRAPHIC, LOCAL, PROJECTED, VERTICAL, WktNode, length, parts, unbound, units};
 
 /// The system of an EPSG code.
 pub(crate) fn from_epsg(code: u32) -> Option<Crs> {
@@ -13,8 +13,8 @@ pub(crate) fn from_epsg(code: u32) -> Option<Crs> {
 
 /// What `text` says; `None` where it is not well-known text of a coordinate reference system.
 pub(crate) fn parse(text: &str) -> Option<Crs> {
-    let roots = Node::parse_all(text)?;
-    let parts: Vec<&Node> = roots.iter().flat_map(parts).map(unbound).collect();
+    let roots = WktNode::parse_all(text)?;
+    let parts: Vec<&WktNode> = roots.iter().flat_map(parts).map(unbound).collect();
     let find = |keywords: &[&str]| parts.iter().find(|part| keywords.contains(&part.keyword.as_str())).copied();
     let horizontal = find(&PROJECTED).or_else(|| find(&GEOGRAPHIC)).or_else(|| find(&LOCAL))?;
     let geographic = GEOGRAPHIC[..5].contains(&horizontal.keyword.as_str());
@@ -29,11 +29,11 @@ pub(crate) fn parse(text: &str) -> Option<Crs> {
     })
 }
 
-fn angle(unit: &Node) -> Unit {
+fn angle(unit: &WktNode) -> Unit {
     if unit.keyword == "LENGTHUNIT" { Unit::of(length(unit)) } else { Unit::Degree }
 }
 
-fn epsg(node: &Node) -> Option<u32> {
+fn epsg(node: &WktNode) -> Option<u32> {
     let authority = node.child(&["AUTHORITY", "ID"])?;
     let code = authority.number(1)?;
     let valid = authority.text(0)?.eq_ignore_ascii_case("EPSG") && code > 0.0 && code < 1e6 && code.fract() == 0.0;

@@ -1,6 +1,6 @@
 //! The definition of a projected system in the way of PROJ.4, from its EPSG code or from its well-known text.
 
-use crate::input::crs::wkt::{Node, PROJECTED, find, plain};
+use crate::input::crs::wkt::{PROJECTED, WktNode, comparable_name, find};
 
 /// Parameters of projections: names in WKT, letters and digits in lower case, and that of PROJ.4.
 const PARAMETERS: [(&str, &str); 20] = [
@@ -49,12 +49,12 @@ pub(crate) fn definition(epsg: Option<u32>, wkt: Option<&str>) -> Option<String>
 fn of_text(text: &str) -> Option<String> {
     let system = find(text, &PROJECTED)?;
     let conversion = system.child(&["CONVERSION"]).unwrap_or(&system);
-    let method = plain(conversion.child(&["PROJECTION", "METHOD"])?.text(0)?);
+    let method = comparable_name(conversion.child(&["PROJECTION", "METHOD"])?.text(0)?);
     let (_, projection) = METHODS.iter().find(|(name, _)| *name == method)?;
     let mut words = vec![format!("+proj={projection}")];
     let metres = system.unit_metres()?;
     for parameter in conversion.children().filter(|child| child.keyword == "PARAMETER") {
-        let (name, value) = (plain(parameter.text(0)?), parameter.number(1)?);
+        let (name, value) = (comparable_name(parameter.text(0)?), parameter.number(1)?);
         let (_, short) = PARAMETERS.iter().find(|(long, _)| *long == name)?;
         // PROJ.4 takes false eastings and northings in metres.
         let factor = if short.ends_with("_0") && (*short == "x_0" || *short == "y_0") {
@@ -75,7 +75,7 @@ fn of_text(text: &str) -> Option<String> {
 }
 
 /// The ellipsoid, and the shift to WGS 84 where the text gives it; else none, which is off by a metre or two for NAD83 and ETRS89.
-fn datum(system: &Node) -> Option<String> {
+fn datum(system: &WktNode) -> Option<String> {
     let base = system.child(&["GEOGCS", "BASEGEOGCRS", "BASEGEODCRS"])?;
     let datum = base.child(&["DATUM", "TRF", "GEODETICDATUM", "ENSEMBLE"])?;
     let spheroid = datum.child(&["SPHEROID", "ELLIPSOID"])?;
@@ -91,8 +91,8 @@ fn datum(system: &Node) -> Option<String> {
 }
 
 /// Whether the datum is one of those that agree with WGS 84 to a metre or two.
-fn is_close_to_wgs84(base: &Node) -> bool {
-    let name = plain(base.text(0).unwrap_or_default());
+fn is_close_to_wgs84(base: &WktNode) -> bool {
+    let name = comparable_name(base.text(0).unwrap_or_default());
     [
         "wgs84",
         "wgs1984",

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::input::crs::proj4;
 use crate::input::crs::unit::Unit;
-use crate::input::crs::wkt::{self, plain};
+use crate::input::crs::wkt::{self, comparable_name};
 
 /// What a file says of its coordinate reference system.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -55,7 +55,9 @@ impl Crs {
     }
 
     fn same_name(&self, other: &Crs) -> bool {
-        !differ(self.name.as_deref(), other.name.as_deref(), |own, others| plain(own) == plain(others))
+        !differ(self.name.as_deref(), other.name.as_deref(), |own, others| {
+            comparable_name(own) == comparable_name(others)
+        })
     }
 
     /// A short name for messages.

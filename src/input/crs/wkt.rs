@@ -5,26 +5,26 @@ const DEEPEST: usize = 40;
 
 /// `KEYWORD[value, value, ...]`.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Node {
+pub(crate) struct WktNode {
     pub(crate) keyword: String,
-    values: Vec<Value>,
+    values: Vec<WktValue>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Value {
+pub(crate) enum WktValue {
     Text(String),
     Number(f64),
-    Node(Node),
+    WktNode(WktNode),
 }
 
-impl Node {
+impl WktNode {
     /// The systems that `text` holds: one, or as some writers have it a horizontal and a vertical one parted by a comma.
-    pub(crate) fn parse_all(text: &str) -> Option<Vec<Node>> {
+    pub(crate) fn parse_all(text: &str) -> Option<Vec<WktNode>> {
         const FILLING: [char; 5] = ['\0', ' ', '\n', '\r', '\t'];
         let mut rest = text.trim_matches(FILLING);
         let mut nodes = Vec::new();
         loop {
-            nodes.push(Node::read(&mut rest, 0)?);
+            nodes.push(WktNode::read(&mut rest, 0)?);
             rest = rest.trim_matches(FILLING);
             match rest.strip_prefix(',') {
                 Some(more) => rest = more,
@@ -33,16 +33,16 @@ impl Node {
         }
     }
 
-    fn read(rest: &mut &str, depth: usize) -> Option<Node> {
+    fn read(rest: &mut &str, depth: usize) -> Option<WktNode> {
         let (keyword, inside) = rest.split_once(['[', '('])?;
         let keyword = keyword.trim();
         if depth > DEEPEST || keyword.is_empty() || !keyword.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_') {
             return None;
         }
         *rest = inside;
-        let mut node = Node { keyword: keyword.to_ascii_uppercase(), values: Vec::new() };
+        let mut node = WktNode { keyword: keyword.to_ascii_uppercase(), values: Vec::new() };
         loop {
-            node.values.push(Value::read(rest, depth)?);
+            node.values.push(WktValue::read(rest, depth)?);
             *rest = rest.trim_start();
             let next = rest.chars().next()?;
             *rest = &rest[next.len_utf8()..];
@@ -54,16 +54,16 @@ impl Node {
         }
     }
 
-    pub(crate) fn children(&self) -> impl Iterator<Item = &Node> {
-        self.values.iter().filter_map(|value| if let Value::Node(node) = value { Some(node) } else { None })
+    pub(crate) fn children(&self) -> impl Iterator<Item = &WktNode> {
+        self.values.iter().filter_map(|value| if let WktValue::WktNode(node) = value { Some(node) } else { None })
     }
 
-    pub(crate) fn child(&self, keywords: &[&str]) -> Option<&Node> {
+    pub(crate) fn child(&self, keywords: &[&str]) -> Option<&WktNode> {
         self.children().find(|child| keywords.contains(&child.keyword.as_str()))
     }
 
     pub(crate) fn text(&self, index: usize) -> Option<&str> {
-        if let Some(Value::Text(text)) = self.values.get(index) { Some(text) } else { None }
+        if let Some(WktValue::Text(text)) = self.values.get(index) { Some(text) } else { None }
     }
 
     /// Metres of its unit of length.
@@ -73,31 +73,31 @@ impl Node {
 
     pub(crate) fn number(&self, index: usize) -> Option<f64> {
         match self.values.get(index)? {
-            Value::Number(number) => Some(*number),
-            Value::Text(text) => text.parse().ok(),
-            Value::Node(_) => None,
+            WktValue::Number(number) => Some(*number),
+            WktValue::Text(text) => text.parse().ok(),
+            WktValue::WktNode(_) => None,
         }
     }
 }
 
-impl Value {
-    fn read(rest: &mut &str, depth: usize) -> Option<Value> {
+impl WktValue {
+    fn read(rest: &mut &str, depth: usize) -> Option<WktValue> {
         *rest = rest.trim_start();
         if let Some(quoted) = rest.strip_prefix('"') {
             return read_quoted(quoted, rest);
         }
         let end = rest.find([',', ']', ')', '[', '('])?;
         if rest[end..].starts_with(['[', '(']) {
-            return Node::read(rest, depth + 1).map(Value::Node);
+            return WktNode::read(rest, depth + 1).map(WktValue::WktNode);
         }
         let word = rest[..end].trim();
         *rest = &rest[end..];
-        Some(word.parse().map_or_else(|_| Value::Text(word.to_string()), Value::Number))
+        Some(word.parse().map_or_else(|_| WktValue::Text(word.to_string()), WktValue::Number))
     }
 }
 
 /// The text up to the closing quote, where a doubled quote stands for one.
-fn read_quoted<'a>(quoted: &'a str, rest: &mut &'a str) -> Option<Value> {
+fn read_quoted<'a>(quoted: &'a str, rest: &mut &'a str) -> Option<WktValue> {
     let mut text = String::new();
     let mut left = quoted;
     loop {
@@ -113,7 +113,7 @@ fn read_quoted<'a>(quoted: &'a str, rest: &mut &'a str) -> Option<Value> {
         }
     }
     *rest = left;
-    Some(Value::Text(text))
+    Some(WktValue::Text(text))
 }
 
 pub(crate) const PROJECTED: [&str; 3] = ["PROJCS", "PROJCRS", "PROJECTEDCRS"];
@@ -124,8 +124,8 @@ const COMPOUND: [&str; 2] = ["COMPD_CS", "COMPOUNDCRS"];
 const UNITS: [&str; 3] = ["UNIT", "LENGTHUNIT", "ANGLEUNIT"];
 
 /// The part of the system in `text` whose keyword is one of these.
-pub(crate) fn find(text: &str, keywords: &[&str]) -> Option<Node> {
-    let roots = Node::parse_all(text)?;
+pub(crate) fn find(text: &str, keywords: &[&str]) -> Option<WktNode> {
+    let roots = WktNode::parse_all(text)?;
     let mut parts = roots.iter().flat_map(parts).map(unbound);
     parts.find(|part| keywords.contains(&part.keyword.as_str())).cloned()
 }
@@ -138,18 +138,18 @@ pub(crate) fn vertical_name(text: &str) -> Option<String> {
 /// The parameters of the projection in `text`, names in one spelling, sorted; empty where there are none.
 pub(crate) fn parameters(text: &str) -> Vec<(String, f64)> {
     let mut found = Vec::new();
-    for root in Node::parse_all(text).unwrap_or_default() {
+    for root in WktNode::parse_all(text).unwrap_or_default() {
         collect_parameters(&root, &mut found);
     }
     found.sort_by(|a, b| a.0.cmp(&b.0));
     found
 }
 
-fn collect_parameters(node: &Node, found: &mut Vec<(String, f64)>) {
+fn collect_parameters(node: &WktNode, found: &mut Vec<(String, f64)>) {
     if node.keyword == "PARAMETER"
         && let (Some(name), Some(value)) = (node.text(0), node.number(1))
     {
-        found.push((plain(name), value));
+        found.push((comparable_name(name), value));
     }
     // The base of a bound system also carries parameters, those of the datum shift, which say nothing of the plane.
     for child in node.children().filter(|child| child.keyword != "ABRIDGEDTRANSFORMATION") {
@@ -158,12 +158,12 @@ fn collect_parameters(node: &Node, found: &mut Vec<(String, f64)>) {
 }
 
 /// The parts of a compound system, or the system itself.
-pub(crate) fn parts(node: &Node) -> Vec<&Node> {
+pub(crate) fn parts(node: &WktNode) -> Vec<&WktNode> {
     if COMPOUND.contains(&node.keyword.as_str()) { node.children().collect() } else { vec![node] }
 }
 
 /// The system that a bound one is about.
-pub(crate) fn unbound(node: &Node) -> &Node {
+pub(crate) fn unbound(node: &WktNode) -> &WktNode {
     if node.keyword != "BOUNDCRS" {
         return node;
     }
@@ -171,26 +171,26 @@ pub(crate) fn unbound(node: &Node) -> &Node {
 }
 
 /// The unit of the first axis, or of all, and that of a third axis if there is one.
-pub(crate) fn units(node: &Node) -> (Option<&Node>, Option<&Node>) {
+pub(crate) fn units(node: &WktNode) -> (Option<&WktNode>, Option<&WktNode>) {
     let common = node.child(&UNITS);
-    let axes: Vec<&Node> = node.children().filter(|child| child.keyword == "AXIS").collect();
+    let axes: Vec<&WktNode> = node.children().filter(|child| child.keyword == "AXIS").collect();
     let of_axis = |index: usize| axes.get(index).and_then(|axis| axis.child(&UNITS));
     let third = if axes.len() == 3 { of_axis(2).or(common) } else { None };
     (of_axis(0).or(common), third)
 }
 
 /// Metres of a unit of length.
-pub(crate) fn length(unit: &Node) -> Option<f64> {
+pub(crate) fn length(unit: &WktNode) -> Option<f64> {
     let factor = unit.number(1).filter(|factor| factor.is_finite() && *factor > 0.0)?;
     (unit.keyword != "ANGLEUNIT" && !is_angle_name(unit)).then_some(factor)
 }
 
-fn is_angle_name(unit: &Node) -> bool {
+fn is_angle_name(unit: &WktNode) -> bool {
     let name = unit.text(0).unwrap_or_default().to_ascii_lowercase();
     name.starts_with("degree") || name.starts_with("radian") || name.starts_with("grad")
 }
 
 /// Letters and digits of a name in lower case: writers disagree on the rest.
-pub(crate) fn plain(name: &str) -> String {
+pub(crate) fn comparable_name(name: &str) -> String {
     name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
 }

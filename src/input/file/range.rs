@@ -9,11 +9,11 @@ use crate::positional_io::read_at;
 /// What to say of a file that ends before its size.
 pub(crate) const SHRUNK: &str = "it became shorter while it was read; run again when it is complete";
 
-/// Bytes a [`Window`] reads at once.
-const WINDOW: usize = 1 << 16;
+/// Bytes a [`FileRange`] reads at once.
+const BUFFER: usize = 1 << 16;
 
 /// A part of a file as a stream that ends where the part ends. Skipped bytes are not read.
-pub(crate) struct Window {
+pub(crate) struct FileRange {
     file: File,
     /// Position in the file of the first byte after the buffer.
     next: u64,
@@ -22,10 +22,10 @@ pub(crate) struct Window {
     at: usize,
 }
 
-impl Window {
+impl FileRange {
     /// A reader of the bytes of `range` of `file`.
-    pub(crate) fn new(file: File, range: Range<u64>) -> Window {
-        Window { file, next: range.start, end: range.end, buffer: Vec::new(), at: 0 }
+    pub(crate) fn new(file: File, range: Range<u64>) -> FileRange {
+        FileRange { file, next: range.start, end: range.end, buffer: Vec::new(), at: 0 }
     }
 
     /// Reads on into `out`, as much as is left of the part. That there is less in the file is an error.
@@ -46,7 +46,7 @@ impl Window {
     fn refill(&mut self) -> io::Result<()> {
         let mut buffer = std::mem::take(&mut self.buffer);
         self.at = 0;
-        buffer.resize(WINDOW, 0);
+        buffer.resize(BUFFER, 0);
         let count = self.read_direct(&mut buffer)?;
         buffer.truncate(count);
         self.buffer = buffer;
@@ -54,10 +54,10 @@ impl Window {
     }
 }
 
-impl Read for Window {
+impl Read for FileRange {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         if self.at == self.buffer.len() {
-            if out.len() >= WINDOW {
+            if out.len() >= BUFFER {
                 self.buffer.clear();
                 self.at = 0;
                 return self.read_direct(out);
@@ -90,7 +90,7 @@ impl Read for Window {
     }
 }
 
-impl Seek for Window {
+impl Seek for FileRange {
     /// Positions are those of the file.
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         let here = self.next - (self.buffer.len() - self.at) as u64;

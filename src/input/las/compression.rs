@@ -7,13 +7,13 @@ use laz::{DecompressionSelection, LazItem, LazItemType, LazVlr};
 
 use crate::Result;
 use crate::input::file::bytes::{uint16, uint32};
-use crate::input::file::random_access::Positioned;
-use crate::input::file::range::Window;
-use crate::input::las::header::Header;
+use crate::input::file::random_access::RandomAccessFile;
+use crate::input::file::range::FileRange;
+use crate::input::las::header::LasHeader;
 
 /// How the records of a file are compressed.
 #[derive(Clone, Debug)]
-pub(crate) struct Coding {
+pub(crate) struct LazCompression {
     items: Vec<LazItem>,
     /// The layers of a chunk; `None` for pointwise compression.
     pub(crate) layers: Option<Layers>,
@@ -23,9 +23,9 @@ pub(crate) struct Coding {
     pub(crate) chunk_size: Option<u64>,
 }
 
-impl Coding {
+impl LazCompression {
     /// Reads and checks the data of the LASzip record.
-    pub(crate) fn parse(bytes: &[u8], header: &Header) -> std::result::Result<Coding, String> {
+    pub(crate) fn parse(bytes: &[u8], header: &LasHeader) -> std::result::Result<LazCompression, String> {
         let broken = |what: String| format!("has a LASzip record that {what}; the file is damaged or of a newer kind");
         if bytes.len() < 34 {
             return Err(broken(format!("has {} bytes of at least 34", bytes.len())));
@@ -50,7 +50,7 @@ impl Coding {
                 header.format
             )));
         }
-        Ok(Coding {
+        Ok(LazCompression {
             layers: (compressor == 3).then(|| Layers { record: size, count: items.iter().map(layers_of).sum() }),
             chunked: compressor != 1,
             chunk_size: (chunk_size != u32::MAX && chunk_size != 0).then_some(chunk_size as u64),
@@ -60,10 +60,10 @@ impl Coding {
 
     pub(crate) fn decoder(
         &self,
-        window: Window,
+        window: FileRange,
         selection: DecompressionSelection,
-    ) -> laz::Result<Box<dyn RecordDecompressor<Window>>> {
-        let mut decoder: Box<dyn RecordDecompressor<Window>> = match self.layers {
+    ) -> laz::Result<Box<dyn RecordDecompressor<FileRange>>> {
+        let mut decoder: Box<dyn RecordDecompressor<FileRange>> = match self.layers {
             Some(_) => Box::new(LayeredPointRecordDecompressor::new(window)),
             None => Box::new(SequentialPointRecordDecompressor::new(window)),
         };
@@ -108,7 +108,7 @@ pub(crate) struct Layers {
 
 impl Layers {
     /// The number of records and of bytes of the chunk at the start of `range`; `None` where it does not fit in there.
-    pub(crate) fn read(&self, file: &Positioned, range: Range<u64>) -> Result<Option<(u64, u64)>> {
+    pub(crate) fn read(&self, file: &RandomAccessFile, range: Range<u64>) -> Result<Option<(u64, u64)>> {
         let head = self.record + 4 + 4 * self.count;
         if range.end.saturating_sub(range.start) < head {
             return Ok(None);

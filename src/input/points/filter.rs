@@ -6,8 +6,8 @@ use crate::Result;
 use crate::geometry::lattice::REACH;
 use crate::input::points::axis::Axis;
 use crate::input::points::point::Point;
-use crate::input::points::record::Record;
-use crate::input::points::rules::{Rules, Tally};
+use crate::input::points::record::PointRecord;
+use crate::input::points::rules::{PointCounts, PointRules};
 
 /// Points handed to the sink at once, at most: 384 KiB of them, which stays in the second-level cache.
 const SLICE: usize = 1 << 14;
@@ -18,24 +18,24 @@ pub(crate) type Sink<'a> = &'a mut dyn FnMut(&[Point]) -> Result<()>;
 /// Lattice integers in x, y and z, and whether they were rounded; `None` where they do not fit.
 type Mapped = [Option<(i32, bool)>; 3];
 
-/// The rules at work on one piece of a source.
-pub(crate) struct Sieve<'a> {
+/// The rules at work on one chunk of a source.
+pub(crate) struct PointFilter<'a> {
     path: &'a Path,
     axes: &'a [Axis; 3],
-    rules: &'a Rules,
+    rules: &'a PointRules,
     sink: Sink<'a>,
     points: Vec<Point>,
-    tally: Tally,
+    tally: PointCounts,
 }
 
-impl<'a> Sieve<'a> {
-    pub(crate) fn new(path: &'a Path, axes: &'a [Axis; 3], rules: &'a Rules, sink: Sink<'a>) -> Sieve<'a> {
-        Sieve { path, axes, rules, sink, points: Vec::with_capacity(SLICE), tally: Tally::default() }
+impl<'a> PointFilter<'a> {
+    pub(crate) fn new(path: &'a Path, axes: &'a [Axis; 3], rules: &'a PointRules, sink: Sink<'a>) -> PointFilter<'a> {
+        PointFilter { path, axes, rules, sink, points: Vec::with_capacity(SLICE), tally: PointCounts::default() }
     }
 
     /// Judges record `number` of the source (from 0); `place` names it in an example ("point 12", "line 13").
     #[inline]
-    pub(crate) fn push(&mut self, number: u64, record: &Record, place: impl Fn() -> String) -> Result<()> {
+    pub(crate) fn push(&mut self, number: u64, record: &PointRecord, place: impl Fn() -> String) -> Result<()> {
         if record.withheld {
             self.tally.withheld += 1;
             return Ok(());
@@ -92,9 +92,9 @@ impl<'a> Sieve<'a> {
     }
 
     /// Hands on what is left and gives the tally.
-    pub(crate) fn finish(mut self) -> Result<Tally> {
+    pub(crate) fn finish(mut self) -> Result<PointCounts> {
         self.flush()?;
-        let Tally { withheld, other_class, out_of_bounds, malformed, kept, .. } = self.tally;
+        let PointCounts { withheld, other_class, out_of_bounds, malformed, kept, .. } = self.tally;
         self.tally.read = withheld + other_class + out_of_bounds + malformed + kept;
         Ok(self.tally)
     }
@@ -109,7 +109,7 @@ impl<'a> Sieve<'a> {
 
     /// The value that has left the lattice, and its axis.
     #[cold]
-    fn outside(&self, record: &Record, mapped: &Mapped) -> (f64, &'static str) {
+    fn outside(&self, record: &PointRecord, mapped: &Mapped) -> (f64, &'static str) {
         let out = |axis: usize| mapped[axis].is_none_or(|(v, _)| axis < 2 && !reached(v));
         let axis = (0..3).find(|&axis| out(axis)).unwrap_or(2);
         (self.axes[axis].value(record.raw[axis]), ["x", "y", "z"][axis])

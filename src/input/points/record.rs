@@ -2,7 +2,7 @@
 
 /// What a record says before it is judged. `raw` is in steps of the source's axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Record {
+pub(crate) struct PointRecord {
     pub(crate) raw: [i64; 3],
     pub(crate) rgb: [u16; 3],
     pub(crate) class: u8,

@@ -3,7 +3,7 @@
 
 use crate::geometry::Site;
 use crate::input::options::OnBadFile;
-use crate::input::{Point, Rules, Source, Tally};
+use crate::input::{Point, PointCounts, PointRules, Source};
 use crate::job::durable::columns::{ColumnReader, ColumnWriter};
 use crate::job::durable::directory::Directory;
 use crate::job::durable::store::{Key, Store, Stored};
@@ -83,7 +83,7 @@ impl Partition {
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Summary {
     /// Counts of records by what became of them.
-    pub tally: Tally,
+    pub tally: PointCounts,
     /// The least and greatest lattice integers x, y, z of the kept points; `None` without points.
     pub bounds: Option<[[i32; 3]; 2]>,
 }
@@ -106,7 +106,7 @@ pub(crate) fn around<const N: usize>(a: [[i32; N]; 2], b: [[i32; N]; 2]) -> [[i3
 /// What the step needs to know.
 pub struct Task<'a> {
     /// The inputs, each with the rules for its points.
-    pub sources: &'a [(Source, Rules)],
+    pub sources: &'a [(Source, PointRules)],
     /// The least and greatest lattice point expected, to lay the first grid; points outside are no error.
     pub extent: [Site; 2],
     /// The most points in a tile.
@@ -205,7 +205,7 @@ fn decode_all(task: &Task, records: u64, grid: &Grid, buckets: &Buckets, stage: 
         .sources
         .iter()
         .enumerate()
-        .flat_map(|(s, (source, _))| (0..source.pieces()).map(move |piece| (s, piece)))
+        .flat_map(|(s, (source, _))| (0..source.chunks()).map(move |piece| (s, piece)))
         .collect();
     let allowed = allowed(task.max_malformed_fraction, records);
     let malformed = AtomicU64::new(0);
@@ -226,7 +226,7 @@ fn decode_all(task: &Task, records: u64, grid: &Grid, buckets: &Buckets, stage: 
     pieces.par_iter().with_max_len(1).map(decode).try_reduce(BySource::default, |a, b| Ok(a.append(b)))
 }
 
-fn too_many_malformed(source: &Source, tally: &Tally, malformed: u64, records: u64) -> Error {
+fn too_many_malformed(source: &Source, tally: &PointCounts, malformed: u64, records: u64) -> Error {
     let what = max_malformed_fraction_exceeded(tally, malformed, records);
     Error::input(
         &source.path,
@@ -236,7 +236,7 @@ fn too_many_malformed(source: &Source, tally: &Tally, malformed: u64, records: u
     )
 }
 
-fn max_malformed_fraction_exceeded(tally: &Tally, malformed: u64, records: u64) -> String {
+fn max_malformed_fraction_exceeded(tally: &PointCounts, malformed: u64, records: u64) -> String {
     let examples = tally.examples.join("; ");
     format!(
         "{malformed} of {records} records are malformed, more than [input] max_malformed_fraction allows: {examples}"

@@ -1,7 +1,7 @@
 //! Where the points of a job lie, as far as headers can be believed.
 
 use crate::geometry::lattice::AxisMap;
-use crate::input::{Axis, Format, Rules, Source};
+use crate::input::{Axis, FileFormat, PointRules, Source};
 use crate::job::options::JobOptions;
 use crate::job::partition::read::around;
 use crate::output::frame::Frame;
@@ -31,7 +31,7 @@ impl Area {
         if !area.is_suspicious(sources, metres) {
             return Ok(area);
         }
-        let boxes = sources.par_iter().map(|s| measure(s, &classes, 0..s.pieces())).collect::<Result<Vec<_>>>()?;
+        let boxes = sources.par_iter().map(|s| measure(s, &classes, 0..s.chunks())).collect::<Result<Vec<_>>>()?;
         Ok(Area::around(&boxes, config))
     }
 
@@ -80,14 +80,14 @@ impl Area {
 /// The box [min, max] of a source by its header, or by its points if its first piece shows that the header is wrong.
 fn header_box(source: &Source, classes: &[bool; 256]) -> Result<Option<[[f64; 3]; 2]>> {
     let header = [source.min, source.max];
-    if source.format == Format::Text || source.pieces() == 0 {
+    if source.format == FileFormat::Text || source.chunks() == 0 {
         return Ok((source.records > 0).then_some(header));
     }
     // Two steps of the measurement for its own coarseness.
     let slack = |axis: usize| 2.0 * MEASURE as f64 * to_float(source.axes[axis].scale);
     match measure(source, classes, 0..1)? {
         Some([min, max]) if (0..3).any(|k| min[k] < header[0][k] - slack(k) || max[k] > header[1][k] + slack(k)) => {
-            measure(source, classes, 0..source.pieces())
+            measure(source, classes, 0..source.chunks())
         }
         _ => Ok(Some(header)),
     }
@@ -102,7 +102,7 @@ fn measure(source: &Source, classes: &[bool; 256], pieces: Range<usize>) -> Resu
     let [Some(x), Some(y), Some(z)] = source.axes.each_ref().map(map) else {
         return Ok(Some([source.min, source.max]));
     };
-    let rules = Rules { maps: [x, y, z], classes: *classes, bounds: None, first_order: 0, rgb: false };
+    let rules = PointRules { maps: [x, y, z], classes: *classes, bounds: None, first_order: 0, rgb: false };
     let measure_piece = |piece| {
         interrupt::check()?;
         let mut found = None;

@@ -3,7 +3,7 @@
 use crate::geometry::Site;
 use crate::geometry::lattice::{AxisMap, Lattice, REACH, shortest_decimal};
 use crate::input::options::{OnBadFile, UnitChoice};
-use crate::input::{self, Axis, Crs, Rules, Source, Unit};
+use crate::input::{self, Axis, Crs, PointRules, Source, Unit};
 use crate::job::options::JobOptions;
 use crate::job::partition::read::Skipped;
 use crate::job::plan::extent::Area;
@@ -26,7 +26,7 @@ const MOST_RECORDS: u64 = 1 << 40;
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// The inputs, each with the rules for its points.
-    pub sources: Vec<(Source, Rules)>,
+    pub sources: Vec<(Source, PointRules)>,
     /// Records in all of them.
     pub records: u64,
     /// The lattice all sites lie on.
@@ -94,7 +94,7 @@ fn settle(mut sources: Vec<Source>, mut skipped: Vec<Skipped>, config: &JobOptio
 }
 
 /// A plan that does not hold the sources yet, and the rules for their points.
-fn make_plan(sources: &[Source], config: &JobOptions, coarser: Coarser) -> Result<(Plan, Vec<Rules>)> {
+fn make_plan(sources: &[Source], config: &JobOptions, coarser: Coarser) -> Result<(Plan, Vec<PointRules>)> {
     let mut warnings = unreadable_names(&config.input.files);
     let of_sources = sources.iter().flat_map(|s| s.warnings.iter().map(|w| format!("{}: {w}", s.path.display())));
     warnings.extend(of_sources);
@@ -298,7 +298,12 @@ fn extent_of(lattice: &Lattice, area: &Area, bounds: Option<[i32; 4]>) -> [Site;
     extent
 }
 
-fn rules(sources: &[Source], config: &JobOptions, lattice: &Lattice, bounds: Option<[i32; 4]>) -> Result<Vec<Rules>> {
+fn rules(
+    sources: &[Source],
+    config: &JobOptions,
+    lattice: &Lattice,
+    bounds: Option<[i32; 4]>,
+) -> Result<Vec<PointRules>> {
     let rgb = matches!(
         config.output.color,
         crate::output::options::ColorChoice::Auto | crate::output::options::ColorChoice::Rgb
@@ -307,7 +312,7 @@ fn rules(sources: &[Source], config: &JobOptions, lattice: &Lattice, bounds: Opt
     let mut rules = Vec::with_capacity(sources.len());
     for source in sources {
         let maps = [axis_map(source, 0, lattice)?, axis_map(source, 1, lattice)?, axis_map(source, 2, lattice)?];
-        rules.push(Rules { maps, classes: config.input.kept_classes(), bounds, first_order, rgb });
+        rules.push(PointRules { maps, classes: config.input.kept_classes(), bounds, first_order, rgb });
         first_order += source.records;
     }
     Ok(rules)

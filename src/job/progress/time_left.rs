@@ -1,7 +1,7 @@
 //! How long a job will take: from the pace of the stage that runs, and for the stages to come from what they usually cost beside
 //! those that are done.
 
-use crate::input::Format;
+use crate::input::FileFormat;
 use crate::job::plan::scan::Plan;
 use std::time::Duration;
 
@@ -11,11 +11,11 @@ const MESH: f64 = 740.0;
 const LEVELS: f64 = 900.0;
 const FINISH: f64 = 8.0;
 
-fn cost_of_reading(format: Format) -> f64 {
+fn cost_of_reading(format: FileFormat) -> f64 {
     match format {
-        Format::Las => 130.0,
-        Format::Laz => 370.0,
-        Format::Text => 250.0,
+        FileFormat::Las => 130.0,
+        FileFormat::Laz => 370.0,
+        FileFormat::Text => 250.0,
     }
 }
 

@@ -1,7 +1,7 @@
 //! What a job came to: a table for people, the same as `report.json` for machines.
 
 use crate::geometry::lattice::Lattice;
-use crate::input::Tally;
+use crate::input::PointCounts;
 use crate::job::levels::level::LevelFigures;
 use crate::job::mesh::leaf::LeafFigures;
 use crate::job::partition::read::Skipped;
@@ -39,7 +39,7 @@ pub struct Report {
     /// The inputs that were left out because they are bad; no other figure counts them.
     pub skipped: Vec<Skipped>,
     /// Records by what became of them.
-    pub points: Tally,
+    pub points: PointCounts,
     /// How the leaves came to be.
     pub leaves: LeafFigures,
     /// The GPU that helped.
@@ -105,7 +105,7 @@ impl Steps {
 /// The figures of the stages, before they become a report.
 pub struct Parts {
     /// What was read.
-    pub points: Tally,
+    pub points: PointCounts,
     /// What the leaves came to.
     pub leaves: LeafFigures,
     /// The GPU that helped.
