@@ -1,7 +1,8 @@
 //! Whether the outline is one convex polygon, turning once.
 
 use crate::geometry::Site;
-use crate::geometry::predicates::orient2d;
+use crate::verify::exact::side;
+use std::cmp::Ordering;
 
 /// Checks directed edges with the inside on their left, in any order; collinear corners are allowed. A sentence where they
 /// are not the outline of a convex polygon.
@@ -40,9 +41,9 @@ fn following(edges: &[[Site; 2]], site: Site) -> Result<[Site; 2], String> {
 
 /// Left or straight on, not back.
 fn turns_left(edge: [Site; 2], next: [Site; 2]) -> bool {
-    match orient2d(edge[0], edge[1], next[1]) {
-        0 => lower_half(edge) == lower_half(next),
-        turn => turn > 0,
+    match side(edge[0], edge[1], next[1]) {
+        Ordering::Equal => lower_half(edge) == lower_half(next),
+        turn => turn.is_gt(),
     }
 }
 

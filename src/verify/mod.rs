@@ -7,7 +7,7 @@
 //! 2. Over all tiles no directed edge is used twice. The edges that are not used in both directions form one closed loop
 //!    that turns left, or not at all, at every corner, never back, and once round in total.
 //! 3. For every edge used in both directions, the corner opposite on one side is not inside the circle of the triangle on
-//!    the other side, ties decided by the canonical rule of [`crate::geometry::predicates::in_circle`].
+//!    the other side. Ties are decided by the rule of [`crate::geometry::predicates::in_circle`].
 //! 4. A site that several tiles have lies at the same place, bit for bit, and has the same normal and colour.
 //! 5. Every vertex has a triangle; `triangles = 2 sites - hull edges - 2` (Euler); the triangles' area is the hull's; and the
 //!    numbers of sites and triangles are those of `report.json`.
@@ -45,6 +45,7 @@
 //! triangles that are there; the verdict says so.
 
 mod digest;
+mod exact;
 mod hull;
 mod part;
 mod rim;

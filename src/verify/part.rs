@@ -4,9 +4,9 @@ use bytemuck::cast_slice;
 use xxhash_rust::xxh3::xxh3_64;
 
 use crate::geometry::Site;
-use crate::geometry::predicates::{in_circle, in_circle_determinant, orient2d};
 use crate::output::gltf::read::Part;
 use crate::verify::digest::Digest;
+use crate::verify::exact::{EdgeState, double_area, edge_state, side};
 use crate::verify::rim::{RimEdge, RimVertex};
 use crate::verify::source::Source;
 use crate::verify::verdict::{Fault, Faults};
@@ -50,25 +50,6 @@ impl Findings {
 pub(super) struct Records {
     pub(super) edges: Vec<RimEdge>,
     pub(super) vertices: Vec<RimVertex>,
-}
-
-/// How two triangles over a common edge stand.
-pub(super) enum Stand {
-    Delaunay,
-    /// Four corners on one circle, and the diagonal that the tie rule wants.
-    Tie,
-    Wrong,
-}
-
-/// The edge ac between the counterclockwise triangles abc and acd.
-#[inline(always)]
-pub(super) fn stand(a: Site, b: Site, c: Site, d: Site) -> Stand {
-    // With 64-bit products this costs no more than a floating-point filter.
-    match in_circle_determinant(a, b, c, d) {
-        ..0 => Stand::Delaunay,
-        0 if !in_circle(a, b, c, d) => Stand::Tie,
-        _ => Stand::Wrong,
-    }
 }
 
 /// Checks `part` of tile number `tile`.
@@ -115,12 +96,11 @@ fn check_triangles(
     let coordinates: Vec<[f64; 3]> = points.iter().map(|&p| source.coordinates(p)).collect();
     for &triangle in &part.triangles {
         let [a, b, c] = triangle.map(|v| sites[v as usize]);
-        let area = orient2d(a, b, c);
-        if area <= 0 {
+        if side(a, b, c).is_le() {
             let corners = [a, b, c].map(|site| source.site_text(site)).join(" ");
             findings.faults.note(Fault::NotCounterclockwise, tile, || corners);
         }
-        findings.area += area as i128;
+        findings.area += double_area(a, b, c);
         findings.digest.add(triangle.map(|v| coordinates[v as usize]));
     }
     findings.triangles += part.triangles.len() as u64;
@@ -201,10 +181,10 @@ fn check_edges(star: &mut Star, sites: &[Site], tile: u32, source: &Source, find
             findings.inner_edges += 1;
             // The triangles (to, apex, from) and (to, from, opposite).
             let [a, b, c, d] = [to, apex, from as u32, opposite].map(|v| sites[v as usize]);
-            match stand(a, b, c, d) {
-                Stand::Delaunay => {}
-                Stand::Tie => findings.ties += 1,
-                Stand::Wrong => findings.faults.note(Fault::NotDelaunay, tile, || edge_text(source, a, c)),
+            match edge_state(a, b, c, d) {
+                EdgeState::Delaunay => {}
+                EdgeState::Tie => findings.ties += 1,
+                EdgeState::NotDelaunay => findings.faults.note(Fault::NotDelaunay, tile, || edge_text(source, a, c)),
             }
         }
     }

@@ -8,7 +8,8 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use crate::Result;
 use crate::geometry::Site;
-use crate::verify::part::{Records, Stand, edge_text, stand};
+use crate::verify::exact::{EdgeState, edge_state};
+use crate::verify::part::{Records, edge_text};
 use crate::verify::source::Source;
 use crate::verify::spill::{Record, Spill};
 use crate::verify::verdict::{Fault, Faults};
@@ -138,10 +139,10 @@ impl Matched {
         self.across_tiles += (left.tile != right.tile) as u64;
         let [a, c] = right.directed();
         // The triangles (c, a, left's apex) and (a, c, right's apex).
-        match stand(a, left.apex, c, right.apex) {
-            Stand::Delaunay => {}
-            Stand::Tie => self.ties += 1,
-            Stand::Wrong => self.faults.note(Fault::NotDelaunay, left.tile, || {
+        match edge_state(a, left.apex, c, right.apex) {
+            EdgeState::Delaunay => {}
+            EdgeState::Tie => self.ties += 1,
+            EdgeState::NotDelaunay => self.faults.note(Fault::NotDelaunay, left.tile, || {
                 format!(
                     "{} between {} and {}",
                     edge_text(source, a, c),

@@ -6,6 +6,7 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::geometry::Site;
+use crate::verify::exact::cross;
 use crate::verify::part::Findings;
 use crate::verify::rim::{Matched, Vertices};
 use crate::verify::{Report, hull};
@@ -85,8 +86,7 @@ impl Verdict {
     }
 
     fn check_outline(&mut self, edges: Vec<[Site; 2]>, area: i128) {
-        let cross = |[a, b]: &[Site; 2]| a[0] as i128 * b[1] as i128 - a[1] as i128 * b[0] as i128;
-        let enclosed: i128 = edges.iter().map(cross).sum();
+        let enclosed: i128 = edges.iter().map(|&[a, b]| cross(a, b)).sum();
         if let Err(failure) = hull::check(edges) {
             self.failures.push(failure);
         }
