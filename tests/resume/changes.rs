@@ -107,12 +107,15 @@ fn another_input_starts_over_and_says_which() {
 }
 
 #[test]
-fn fresh_starts_over() {
+fn restart_starts_over_under_its_old_name_too() {
     let rig = rig();
-    assert!(rig.run_to("committed", 30).was_killed());
-    let said = Run::start(rig.command().arg("--fresh")).end().succeeded().err;
-    assert!(!said.contains("going on"), "{said}");
-    assert_eq!(rig.is_complete("--fresh")["resumed"], 0);
+    for name in ["--restart", "--fresh"] {
+        assert!(rig.run_to("committed", 30).was_killed());
+        let said = Run::start(rig.command().arg(name)).end().succeeded().err;
+        assert!(!said.contains("going on"), "{said}");
+        assert_eq!(said.contains("--fresh has a new name: --restart"), name == "--fresh", "{said}");
+        assert_eq!(rig.is_complete(name)["resumed"], 0);
+    }
 }
 
 #[test]

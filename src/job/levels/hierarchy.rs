@@ -185,7 +185,7 @@ mod tests {
         for points in [26_000, 37_500, 50_000] {
             let hierarchy = hierarchy(4, points, 50_000, u64::MAX);
             assert_eq!(hierarchy.by_height().iter().map(Vec::len).collect::<Vec<_>>(), [4, 1], "{points}");
-            assert!(hierarchy.tiles.iter().all(|tile| tile.children.len() == 4 && inner.content));
+            assert!(hierarchy.tiles.iter().all(|tile| tile.children.len() == 4 && tile.content));
             assert_eq!(hierarchy.tiles[0].children, [0, 1, 2, 3].map(|tile| ChildTile::Exact(TileIndex(tile))));
         }
     }

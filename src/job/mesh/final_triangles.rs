@@ -38,7 +38,12 @@ pub struct FinalTriangles {
 /// Follow the straight line from the triangle to that point: beyond the edge where the line leaves a Delaunay triangle, the disc of
 /// the next triangle covers that of the last. So the discs of all triangles along the line reach out too, and a flood from the
 /// hull that stops at discs inside the cell meets every triangle whose disc is not.
-pub fn find_final(mesh: &HalfEdgeMesh, sites: &[Site], cell: Option<&Cell>, covered: impl Fn(usize) -> bool) -> FinalTriangles {
+pub fn find_final(
+    mesh: &HalfEdgeMesh,
+    sites: &[Site],
+    cell: Option<&Cell>,
+    covered: impl Fn(usize) -> bool,
+) -> FinalTriangles {
     let state = |triangle| if covered(triangle) { TriangleState::Covered } else { TriangleState::Final };
     let states = (0..mesh.triangles.len()).map(state).collect();
     let mut found = FinalTriangles { states, frontier: Vec::new(), half_edges: Vec::new(), boundary: Vec::new() };

@@ -13,7 +13,7 @@ use crate::job::plan::job_plan::Plan;
 use crate::job::records::{BorderVertex, Frontier, Leaf, PartialNormals, StepOutput, Store};
 use crate::mesh::half_edge::{HULL, HalfEdgeMesh};
 use crate::output::normals::{self, NormalSum};
-use crate::triangulation::{self, Outcome, Triangulator};
+use crate::triangulation::{self, TriangulationCounts, Triangulator};
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 
@@ -27,7 +27,7 @@ pub struct LeafStats {
     /// Triangles that leaves made final.
     pub triangles: u64,
     /// How the leaves were triangulated.
-    pub outcome: Outcome,
+    pub outcome: TriangulationCounts,
 }
 
 impl AddAssign for LeafStats {
@@ -72,12 +72,7 @@ pub fn triangulate_leaf(
 }
 
 /// Checks that single precision can hold all final triangles.
-fn check_precision(
-    mesh: &HalfEdgeMesh,
-    sites: &[Site],
-    states: &[TriangleState],
-    limit: PrecisionLimit,
-) -> Result<()> {
+fn check_precision(mesh: &HalfEdgeMesh, sites: &[Site], states: &[TriangleState], limit: PrecisionLimit) -> Result<()> {
     if limit.holds_all(sites) {
         return Ok(());
     }

@@ -17,7 +17,11 @@ impl PrecisionLimit {
     /// Returns the limit for the frame of a job.
     pub fn of(frame: &Frame) -> PrecisionLimit {
         let (longest, metres) = (frame.longest_triangle(), frame.resolution_metres());
-        PrecisionLimit { horizontal: (longest[0] / metres[0]) as i64, vertical: (longest[1] / metres[1]) as i64, metres }
+        PrecisionLimit {
+            horizontal: (longest[0] / metres[0]) as i64,
+            vertical: (longest[1] / metres[1]) as i64,
+            metres,
+        }
     }
 
     /// Tells whether no triangle of these `sites` can be too long.

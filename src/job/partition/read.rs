@@ -96,7 +96,7 @@ fn decode_all(plan: &Plan, grid: &Grid, buckets: &Buckets, stage: &Stage) -> Res
         .inputs
         .iter()
         .enumerate()
-        .flat_map(|(index, input)| (0..input.source.pieces()).map(move |piece| (index, piece)))
+        .flat_map(|(index, input)| (0..input.source.chunks()).map(move |piece| (index, piece)))
         .collect();
     let options = &plan.options.input;
     let allowed = allowed_malformed(options.max_malformed_fraction.0, plan.records);

@@ -1,8 +1,8 @@
 //! The CRS and the units that all inputs of a job have in common.
 
-use crate::input::{Crs, Unit};
-use crate::input::options::UnitChoice;
 use crate::input::Source;
+use crate::input::options::UnitChoice;
+use crate::input::{Crs, Unit};
 use crate::{Error, Result, Warnings};
 
 /// Returns the CRS of all sources. A source without one agrees with any.
@@ -38,23 +38,32 @@ pub fn horizontal_unit(choice: UnitChoice, crs: &Crs, warnings: &mut Warnings) -
         UnitChoice::Foot => Unit::Foot,
         UnitChoice::UsFoot => Unit::UsFoot,
     };
+    if let Some(metres) = unit.metres_per_unit() {
+        return Ok((key_of(unit), metres));
+    }
     match unit {
-        Unit::Metre => Ok(("metre", 1.0)),
-        Unit::Foot => Ok(("foot", FOOT)),
-        Unit::UsFoot => Ok(("us-foot", US_FOOT)),
-        Unit::Other(metres) => Ok(("other", metres)),
         Unit::Unknown => {
             warnings.push(
                 "no input says the unit of its coordinates: they are taken as metres (set [input] unit to say otherwise)",
             );
-            Ok(("metre", 1.0))
+            Ok((key_of(Unit::Metre), 1.0))
         }
-        Unit::Degree => Err(Error::Config(format!(
+        _ => Err(Error::Config(format!(
             "the coordinates are in degrees ({}), and a Delaunay triangulation in degrees is distorted: transform the points to a \
              projected CRS first, for example with `pdal translate --writers.las.scale_x=0.01 --writers.las.scale_y=0.01 in.laz \
              out.laz reprojection --filters.reprojection.out_srs=EPSG:...`; if the CRS record is wrong, set [input] unit = \
              \"metre\"",
             crs.name.as_deref().unwrap_or("geographic CRS"),
         ))),
+    }
+}
+
+/// Returns the name that the configuration and the report use for a unit.
+fn key_of(unit: Unit) -> &'static str {
+    match unit {
+        Unit::Metre => "metre",
+        Unit::Foot => "foot",
+        Unit::UsFoot => "us-foot",
+        Unit::Degree | Unit::Unknown | Unit::Other(_) => "other",
     }
 }

@@ -3,7 +3,7 @@
 use crate::geometry::Bounds;
 use crate::geometry::lattice::AxisMap;
 use crate::input::options::InputOptions;
-use crate::input::{Axis, Format, PointRules, Source};
+use crate::input::{Axis, FileFormat, PointRules, Source};
 use crate::output::frame::Frame;
 use crate::{Result, interrupt};
 use rayon::prelude::*;
@@ -34,7 +34,7 @@ impl Extent {
         if !extent.is_suspicious(sources, metres) {
             return Ok(extent);
         }
-        let boxes = sources.par_iter().map(|s| measure(s, &classes, 0..s.pieces())).collect::<Result<Vec<_>>>()?;
+        let boxes = sources.par_iter().map(|s| measure(s, &classes, 0..s.chunks())).collect::<Result<Vec<_>>>()?;
         Ok(Extent::around(&boxes, options))
     }
 
@@ -84,14 +84,14 @@ impl Extent {
 /// Returns the box of a source by its header, or by its points if the first of them show that the header is wrong.
 fn header_box(source: &Source, classes: &[bool; 256]) -> Result<Option<SourceBox>> {
     let header = [source.min, source.max];
-    if source.format == Format::Text || source.pieces() == 0 {
+    if source.format == FileFormat::Text || source.chunks() == 0 {
         return Ok((source.records > 0).then_some(header));
     }
     // The measurement is coarse: allow for two of its steps.
     let slack = |axis: usize| 2.0 * MEASURE as f64 * to_float(source.axes[axis].scale);
     match measure(source, classes, 0..1)? {
         Some([min, max]) if (0..3).any(|k| min[k] < header[0][k] - slack(k) || max[k] > header[1][k] + slack(k)) => {
-            measure(source, classes, 0..source.pieces())
+            measure(source, classes, 0..source.chunks())
         }
         _ => Ok(Some(header)),
     }

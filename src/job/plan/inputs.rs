@@ -84,8 +84,7 @@ pub fn unreadable_names(options: &InputOptions) -> Vec<String> {
 /// [`Error::Input`] names the first file that holds too few.
 pub fn check_missing_records(sources: &[Source], options: &InputOptions) -> Result<()> {
     let records = sources.iter().map(|source| source.records).sum();
-    let is_too_much =
-        |missing: u64, records: u64| missing as f64 > options.max_malformed_fraction.0 * records as f64;
+    let is_too_much = |missing: u64, records: u64| missing as f64 > options.max_malformed_fraction.0 * records as f64;
     let lacking = match options.on_bad_file {
         OnBadFile::Skip => sources.iter().find(|s| is_too_much(s.missing, s.records)),
         OnBadFile::Stop if is_too_much(sources.iter().map(|s| s.missing).sum(), records) => {

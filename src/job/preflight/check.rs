@@ -98,8 +98,7 @@ impl Preflight {
             results,
             // The points may go before the results come.
             disk: store + points.max(results),
-            disk_free: machine::free_disk(&options.output.directory)
-                .map(|free| free + estimate::replaced_bytes(plan)),
+            disk_free: machine::free_disk(&options.output.directory).map(|free| free + estimate::replaced_bytes(plan)),
             output: options.output.directory.clone(),
             backend: format!("{:?}", options.triangulation.backend).to_lowercase(),
             warnings: plan.all_warnings(),

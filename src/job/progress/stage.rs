@@ -180,7 +180,11 @@ impl Stage {
         }
         *logged = Instant::now();
         let percent = self.pace.share(&self.pace.done) * 100.0;
-        say(&format!("{name}: {percent:.0} % of {total} {}, {} left of the job", self.unit, rough_time(self.pace.left())));
+        say(&format!(
+            "{name}: {percent:.0} % of {total} {}, {} left of the job",
+            self.unit,
+            rough_time(self.pace.left())
+        ));
     }
 
     /// Ends the stage and returns what it took.

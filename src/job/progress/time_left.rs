@@ -29,8 +29,11 @@ impl TimeLeft {
         let (now, later) = self.expected(name);
         let [spent, expected] = self.done;
         let share = (to - from).max(1e-9);
-        let whole =
-            if expected > 0.0 { (seconds + EXPECTATION_WEIGHT * now * spent / expected) / (share + EXPECTATION_WEIGHT) } else { seconds / share };
+        let whole = if expected > 0.0 {
+            (seconds + EXPECTATION_WEIGHT * now * spent / expected) / (share + EXPECTATION_WEIGHT)
+        } else {
+            seconds / share
+        };
         let pace = (spent + seconds) / (expected + now * seconds / whole.max(1e-9)).max(1e-9);
         whole * (1.0 - to) + pace * later
     }

@@ -72,14 +72,7 @@ pub fn place(crs: &Crs, frame: &Frame, height_offset: f64, root: &mut Node) -> R
         *root = placed;
     }
     root.transform = Some(transform);
-    Ok(Placement {
-        definition,
-        transform,
-        per_tile,
-        distortion_m,
-        vertical_datum: crs.vertical_name(),
-        height_offset,
-    })
+    Ok(Placement { definition, transform, per_tile, distortion_m, vertical_datum: crs.vertical_name(), height_offset })
 }
 
 impl Ground<'_> {

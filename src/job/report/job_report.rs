@@ -1,17 +1,17 @@
 //! The report of a finished job, as `report.json` holds it for machines.
 
+use crate::Warnings;
 use crate::geometry::lattice::Lattice;
 use crate::input::PointCounts;
 use crate::job::levels::level::LevelStats;
 use crate::job::mesh::leaf::LeafStats;
 use crate::job::plan::job_plan::{Plan, SkippedInput};
-use crate::job::progress::machine;
 use crate::job::progress::clock::JobClock;
+use crate::job::progress::machine;
 use crate::job::progress::stats::StageStats;
-use crate::job::tiles::write_tile::TileStats;
-use crate::voronoi::STEPS;
-use crate::Warnings;
 use crate::job::progress::text::grouped;
+use crate::job::tiles::write_tile::TileStats;
+use crate::voronoi::counts::STEP_NAMES;
 use serde::{Deserialize, Serialize};
 
 /// The report of a finished job.
@@ -97,7 +97,8 @@ impl PipelineTimes {
     fn new(leaves: &LeafStats, gpu: &[(&'static str, f64)]) -> PipelineTimes {
         let named = |(step, seconds): (&str, f64)| StepSeconds { step: step.into(), seconds };
         let nanoseconds = leaves.outcome.counts.nanoseconds;
-        let cpu = STEPS.into_iter().zip(nanoseconds.map(|ns| ns as f64 / 1e9)).filter(|(_, seconds)| *seconds > 0.0);
+        let cpu =
+            STEP_NAMES.into_iter().zip(nanoseconds.map(|ns| ns as f64 / 1e9)).filter(|(_, seconds)| *seconds > 0.0);
         PipelineTimes { cpu: cpu.map(named).collect(), gpu: gpu.iter().copied().map(named).collect() }
     }
 }

@@ -3,7 +3,7 @@
 use crate::job::progress::text::{grouped, precise_mebibytes};
 use crate::job::report::job_report::{Report, StepSeconds};
 use crate::job::report::skipped::write_skipped;
-use crate::triangulation::Outcome;
+use crate::triangulation::TriangulationCounts;
 use std::fmt;
 
 impl fmt::Display for Report {
@@ -48,7 +48,7 @@ impl fmt::Display for Report {
             let levels = &self.levels;
             row("coarser tiles", format!("{}, at most {:.2} m off", grouped(levels.files), levels.error_m))?;
         }
-        let Outcome { pipeline, reference, crowded, not_accepted, counts } = &self.leaves.outcome;
+        let TriangulationCounts { pipeline, reference, crowded, not_accepted, counts } = &self.leaves.outcome;
         let leaves = pipeline + reference + crowded + not_accepted;
         row(
             "leaves",

@@ -137,12 +137,7 @@ fn attempt(
 }
 
 /// Ends an attempt: keeps the finished steps if the job can go on from them, or else removes them.
-fn end(
-    directory: &JobDirectory,
-    outcome: Result<Report>,
-    steps: u64,
-    has_partial_results: bool,
-) -> Result<Report> {
+fn end(directory: &JobDirectory, outcome: Result<Report>, steps: u64, has_partial_results: bool) -> Result<Report> {
     match outcome {
         Err(why) if why.exit_code() == 1 && steps > 0 => {
             Err(Error::Resumable { why: Box::new(why), steps, job: directory.job().into() })

@@ -2,6 +2,7 @@
 
 use crate::geometry::Bounds;
 use crate::job::durable::atomic_file::write_pending_json;
+use crate::job::levels::level::LevelStats;
 use crate::job::mesh::leaf::LeafStats;
 use crate::job::partition::result::Partition;
 use crate::job::plan::job_plan::Plan;
@@ -9,7 +10,6 @@ use crate::job::publish::limits::{fits_one_file, too_large_for_one_file};
 use crate::job::publish::placement::{place, placement_warning};
 use crate::job::publish::side_files::{SideFiles, write_side_files};
 use crate::job::publish::tileset_tree::{tileset_root, tileset_text};
-use crate::job::levels::level::LevelStats;
 use crate::job::records::{JobStep, StepOutput};
 use crate::job::report::job_report::{Report, ReportParts};
 use crate::job::run::context::RunContext;

@@ -13,7 +13,7 @@ use crate::job::plan::fingerprint::{Fingerprint, JobChange, JobHeader};
 use crate::job::plan::job_plan::Plan;
 use crate::job::plan::lattice_choice::LatticeCoarsening;
 use crate::job::progress::stage::{ProgressOutput, Stage};
-use crate::job::records::{Journal, JobStep, JournalEntry, RecordRef, Store};
+use crate::job::records::{JobStep, Journal, JournalEntry, RecordRef, Store};
 use crate::job::report::job_report::Report;
 use crate::output::options::MaxEdge;
 use crate::{Error, Result, interrupt};
@@ -37,8 +37,7 @@ impl EarlierRun {
     pub fn read(directory: &JobDirectory) -> Result<Option<EarlierRun>> {
         let read = journal::read::<JobHeader, JobStep, _>(directory)?;
         Ok(read.map(|(header, entries)| {
-            let wrote_tiles =
-                entries.iter().any(|entry: &JournalEntry| matches!(entry.step, JobStep::WriteTile(_)));
+            let wrote_tiles = entries.iter().any(|entry: &JournalEntry| matches!(entry.step, JobStep::WriteTile(_)));
             let has_partial_results = wrote_tiles && !directory.output().report().exists();
             EarlierRun { header, entries, has_partial_results }
         }))
@@ -220,8 +219,7 @@ impl ResumeReview {
         let entries = entries.into_iter().map(|entry| (entry.step, entry)).collect();
         let directory = directory.clone();
         let mut review = ResumeReview { directory, partition, entries, whole, all_written: false, counts_leaves };
-        review.all_written =
-            review.partition.tree.tiles().all(|tile| review.whole.contains(&JobStep::WriteTile(tile)));
+        review.all_written = review.partition.tree.tiles().all(|tile| review.whole.contains(&JobStep::WriteTile(tile)));
         Ok(review.has_needed_points().then_some(review))
     }
 
@@ -255,9 +253,8 @@ impl ResumeReview {
             return true;
         }
         let Ok(points) = PointFile::open(&self.directory.points()) else { return false };
-        let is_whole = |tile: TileIndex| {
-            self.partition.blocks[tile.get()].par_iter().all(|&block| points.is_whole(block))
-        };
+        let is_whole =
+            |tile: TileIndex| self.partition.blocks[tile.get()].par_iter().all(|&block| points.is_whole(block));
         missing.par_bridge().all(is_whole)
     }
 

@@ -1,6 +1,6 @@
 //! What the stages of a job usually cost, for the estimate of the time left.
 
-use crate::input::Format;
+use crate::input::FileFormat;
 use crate::job::plan::job_plan::Plan;
 
 /// Nanoseconds of one processor for each point, measured on autzen.laz (see BENCHMARKS.md). Only their ratios matter.
@@ -8,11 +8,11 @@ const MESH: f64 = 740.0;
 const LEVELS: f64 = 900.0;
 const PUBLISH: f64 = 8.0;
 
-fn cost_of_reading(format: Format) -> f64 {
+fn cost_of_reading(format: FileFormat) -> f64 {
     match format {
-        Format::Las => 130.0,
-        Format::Laz => 370.0,
-        Format::Text => 250.0,
+        FileFormat::Las => 130.0,
+        FileFormat::Laz => 370.0,
+        FileFormat::Text => 250.0,
     }
 }
 

@@ -71,8 +71,7 @@ impl<'a> TreeWalk<'a> {
     fn merge(&self, scope: &Scope<'a>, node: NodeIndex) -> Result<()> {
         let RunContext { store, journal, threads, .. } = *self.run;
         let memory = merge_memory(&self.plan.options, node == NodeIndex::ROOT, threads);
-        let merge =
-            || self.activity.time(0, || merge_frontiers(self.plan, &self.partition.tree, store, memory, node));
+        let merge = || self.activity.time(0, || merge_frontiers(self.plan, &self.partition.tree, store, memory, node));
         for tile in journal.step(JobStep::Merge(node), merge)? {
             self.queue.push(scope, FinishedTile { tile, last_merge: node });
         }

@@ -35,7 +35,8 @@ pub fn finish_border_normals(
         let normal = normals::cross(a.position, b.position, c.position);
         for corner in [a, b, c].iter().filter(|corner| corner.tile == tile) {
             let at = frontier.sites.binary_search_by_key(&corner.site, |vertex| vertex.site);
-            let at = at.map_err(|_| Error::Broken(format!("a seam uses a site that is not in tile {tile}'s frontier")))?;
+            let at =
+                at.map_err(|_| Error::Broken(format!("a seam uses a site that is not in tile {tile}'s frontier")))?;
             sums[at] = normals::add(sums[at], normal);
         }
     }

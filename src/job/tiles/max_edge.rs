@@ -153,7 +153,12 @@ impl SiteSpacing {
             side *= 2;
         }
         let [columns, rows] = [width, height].map(|extent| extent.div_ceil(side) as usize);
-        SiteSpacing { corner: [low[0] as i64, low[1] as i64], side: side as i64, columns, counts: vec![0; columns * rows] }
+        SiteSpacing {
+            corner: [low[0] as i64, low[1] as i64],
+            side: side as i64,
+            columns,
+            counts: vec![0; columns * rows],
+        }
     }
 
     fn cell(&self, position: [i32; 3]) -> usize {

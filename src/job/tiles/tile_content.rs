@@ -72,7 +72,10 @@ impl TileContent {
         style: &TileStyle,
     ) -> Result<u32> {
         let vertex = neighbours.of(border.tile)?.find(border.site).ok_or_else(|| {
-            Error::Broken(format!("a seam uses site {} of tile {}, whose border does not have it", border.site, border.tile))
+            Error::Broken(format!(
+                "a seam uses site {} of tile {}, whose border does not have it",
+                border.site, border.tile
+            ))
         })?;
         self.positions.push(border.position);
         self.normals.push(vertex.normal);

@@ -1,6 +1,8 @@
 //! Step 6, once for each tile: writes the tile's own triangles and those of its seam that it owns as one GLB, and draws its pixels of
 //! the preview.
 
+use crate::Result;
+use crate::geometry::Bounds;
 use crate::job::durable::atomic_file::{PendingFile, write_pending_pieces};
 use crate::job::durable::columns::ColumnWriter;
 use crate::job::durable::directory::{JobDirectory, create_folder};
@@ -13,7 +15,6 @@ use crate::job::tiles::tile_content::TileContent;
 use crate::output::Tile;
 use crate::output::gltf::glb::Glb;
 use crate::output::preview::canvas::Canvas;
-use crate::Result;
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
 use std::ops::AddAssign;
@@ -72,7 +73,8 @@ pub fn write_tile(
         ..TileStats::default()
     };
     let pixels = ColumnWriter::default().push(&canvas.draw(&kept)).write(store, StepRecord::Pixels(tile))?;
-    let summary = TileSummary::new(kept.bounds(), !kept.triangles.is_empty()).save(store, tile)?;
+    let summary = TileSummary::new(kept.bounds().map(|[min, max]| Bounds { min, max }), !kept.triangles.is_empty())
+        .save(store, tile)?;
     let mut files = Vec::new();
     if !kept.triangles.is_empty() {
         files.push(write_glb(&directory.output().tile(tile.get()), &kept, style)?);
