@@ -6,7 +6,7 @@
 //! that is there, else a sample terrain of 4 million points.
 
 use gdt_batch::job::progress::stage::ProgressOutput;
-use gdt_batch::job::report::Report;
+use gdt_batch::job::report::job_report::Report;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 

@@ -57,7 +57,7 @@ fn plan(path: &Path, options: &TextOptions) {
     let mut config = CONFIG.clone();
     config.input.files = vec![path.to_str().expect("a plain path").to_owned()];
     config.input.csv = options.clone();
-    if let Err(error) = scan::run(&config, LatticeCoarsening::default()) {
+    if let Err(error) = scan::make_plan(&config, LatticeCoarsening::default()) {
         assert!(matches!(error.exit_code(), 2 | 3) && error.to_string().len() < 4000, "{error}");
     }
 }
