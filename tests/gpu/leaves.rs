@@ -4,7 +4,7 @@ use super::random::Random;
 use super::rig::Rig;
 use gdt_batch::geometry::Site;
 use gdt_batch::gpu::options::{GpuOptions, TextureSide, VoronoiMethod};
-use gdt_batch::job::{self, progress::stage::Progress};
+use gdt_batch::job::{self, progress::stage::ProgressOutput};
 use gdt_batch::triangulation::options::{Backend, TriangulationOptions};
 use gdt_batch::triangulation::{TriangulationCounts, Triangulator};
 use gdt_batch::verify::verify;
@@ -153,7 +153,7 @@ fn a_job_has_the_same_digest_on_every_backend() {
         );
         std::fs::write(&path, text).unwrap();
         let config = gdt_batch::config::load(&path).unwrap();
-        let report = job::run(&config, Progress::detect(true)).unwrap();
+        let report = job::run(&config, ProgressOutput::detect(true)).unwrap();
         let outcome = report.leaves.outcome;
         if config.triangulation.backend == Backend::Gpu {
             assert!(outcome.counts.on_gpu > 0 && outcome.counts.on_gpu == outcome.pipeline, "{lines}: {outcome:?}");

@@ -1,7 +1,6 @@
 //! The definition of a projected system in the way of PROJ.4, from its EPSG code or from its well-known text.
 
-use crate::input::crs::wkt::{Node, PROJECTED, find};
-use crate::input::crs::{Crs, plain};
+use crate::input::crs::wkt::{PROJECTED, WktNode, comparable_name, find};
 
 /// Parameters of projections: names in WKT, letters and digits in lower case, and that of PROJ.4.
 const PARAMETERS: [(&str, &str); 20] = [
@@ -41,21 +40,21 @@ const METHODS: [(&str, &str); 10] = [
     ("lambertazimuthalequalarea", "laea"),
 ];
 
-/// The definition of `crs`; `None` where neither its code nor its text gives one.
-pub(crate) fn definition(crs: &Crs) -> Option<String> {
+/// The definition of the system of this code or this text; `None` where neither gives one.
+pub(crate) fn definition(epsg: Option<u32>, wkt: Option<&str>) -> Option<String> {
     let of_code = |code| Some(crs_definitions::from_code(u16::try_from(code).ok()?)?.proj4.to_string());
-    crs.epsg.and_then(of_code).or_else(|| of_text(crs.wkt.as_deref()?))
+    epsg.and_then(of_code).or_else(|| of_text(wkt?))
 }
 
 fn of_text(text: &str) -> Option<String> {
     let system = find(text, &PROJECTED)?;
     let conversion = system.child(&["CONVERSION"]).unwrap_or(&system);
-    let method = plain(conversion.child(&["PROJECTION", "METHOD"])?.text(0)?);
+    let method = comparable_name(conversion.child(&["PROJECTION", "METHOD"])?.text(0)?);
     let (_, projection) = METHODS.iter().find(|(name, _)| *name == method)?;
     let mut words = vec![format!("+proj={projection}")];
     let metres = system.unit_metres()?;
     for parameter in conversion.children().filter(|child| child.keyword == "PARAMETER") {
-        let (name, value) = (plain(parameter.text(0)?), parameter.number(1)?);
+        let (name, value) = (comparable_name(parameter.text(0)?), parameter.number(1)?);
         let (_, short) = PARAMETERS.iter().find(|(long, _)| *long == name)?;
         // PROJ.4 takes false eastings and northings in metres.
         let factor = if short.ends_with("_0") && (*short == "x_0" || *short == "y_0") {
@@ -76,7 +75,7 @@ fn of_text(text: &str) -> Option<String> {
 }
 
 /// The ellipsoid, and the shift to WGS 84 where the text gives it; else none, which is off by a metre or two for NAD83 and ETRS89.
-fn datum(system: &Node) -> Option<String> {
+fn datum(system: &WktNode) -> Option<String> {
     let base = system.child(&["GEOGCS", "BASEGEOGCRS", "BASEGEODCRS"])?;
     let datum = base.child(&["DATUM", "TRF", "GEODETICDATUM", "ENSEMBLE"])?;
     let spheroid = datum.child(&["SPHEROID", "ELLIPSOID"])?;
@@ -92,8 +91,8 @@ fn datum(system: &Node) -> Option<String> {
 }
 
 /// Whether the datum is one of those that agree with WGS 84 to a metre or two.
-fn is_close_to_wgs84(base: &Node) -> bool {
-    let name = plain(base.text(0).unwrap_or_default());
+fn is_close_to_wgs84(base: &WktNode) -> bool {
+    let name = comparable_name(base.text(0).unwrap_or_default());
     [
         "wgs84",
         "wgs1984",
@@ -113,12 +112,11 @@ fn is_close_to_wgs84(base: &Node) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{from_epsg, wkt};
     use super::*;
 
     #[test]
     fn a_code_gives_its_own_definition() {
-        let definition = definition(&from_epsg(26915).unwrap()).unwrap();
+        let definition = definition(Some(26915), None).unwrap();
         assert!(definition.contains("+proj=utm +zone=15"), "{definition}");
     }
 
@@ -130,12 +128,12 @@ mod tests {
             PARAMETER["central_meridian",-120.5],PARAMETER["false_easting",1000],PARAMETER["false_northing",0],
             UNIT["foot",0.3048]]"#;
         assert_eq!(
-            definition(&wkt::parse(text).unwrap()).unwrap(),
+            definition(None, Some(text)).unwrap(),
             "+proj=lcc +lat_1=43 +lat_2=45.5 +lat_0=41.75 +lon_0=-120.5 +x_0=304.8 +y_0=0 +a=6378137 +rf=298.25 +towgs84=0,0,0 \
              +to_meter=0.3048 +no_defs"
         );
         // A datum that may be hundreds of metres off is not guessed.
         let other = text.replace("GCS_North_American_1983_HARN", "European 1950");
-        assert_eq!(definition(&wkt::parse(&other).unwrap()), None);
+        assert_eq!(definition(None, Some(&other)), None);
     }
 }

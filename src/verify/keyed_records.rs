@@ -1,4 +1,4 @@
-//! Records that are grouped by key at the end: in memory, or in temporary files once they are too many.
+//! Collects records and groups them by key: in memory, or in temporary files once there are too many.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -8,37 +8,44 @@ use bytemuck::{Pod, cast_slice, cast_slice_mut};
 
 use crate::{Error, Result};
 
-/// Records are parted by key into so many buckets; at the end one bucket at a time is in memory.
+/// Records are divided by key into this many buckets. Grouping holds one bucket at a time in memory.
 const BUCKETS: usize = 64;
 
 /// A record with a key.
-pub(super) trait Record: Pod {
-    /// A hash of the key: records of one key have the same.
-    fn hash(&self) -> u64;
+pub(super) trait KeyedRecord: Pod {
+    /// Returns a hash of the key, the same for all records with that key.
+    fn key_hash(&self) -> u64;
 }
 
 /// Many records in little memory.
-pub(super) struct Spill<R> {
+pub(super) struct KeyedRecords<R> {
     buckets: Vec<Vec<R>>,
+    /// The number of records in memory.
     held: usize,
-    /// Records held in memory at most.
+    /// The greatest number of records in memory.
     limit: usize,
     directory: PathBuf,
-    /// One for every bucket, without a name, once there was need.
+    /// A file without a name for every bucket, or none as long as all records fit the memory.
     files: Vec<File>,
 }
 
-impl<R: Record> Spill<R> {
-    /// Holds up to `memory` bytes; what is more goes to temporary files in `directory`.
-    pub(super) fn new(directory: PathBuf, memory: u64) -> Spill<R> {
-        // Vectors that grow have up to twice the room they need.
+impl<R: KeyedRecord> KeyedRecords<R> {
+    /// Returns an empty collection that takes up to `memory` bytes and then writes to temporary files in `directory`.
+    pub(super) fn new(directory: PathBuf, memory: u64) -> KeyedRecords<R> {
+        // A growing vector takes up to twice the room that it needs.
         let limit = (memory as usize / (2 * size_of::<R>())).max(1024);
-        Spill { buckets: (0..BUCKETS).map(|_| Vec::new()).collect(), held: 0, limit, directory, files: Vec::new() }
+        KeyedRecords {
+            buckets: (0..BUCKETS).map(|_| Vec::new()).collect(),
+            held: 0,
+            limit,
+            directory,
+            files: Vec::new(),
+        }
     }
 
     pub(super) fn extend(&mut self, records: &[R]) -> Result<()> {
         for record in records {
-            self.buckets[(record.hash() >> 32) as usize % BUCKETS].push(*record);
+            self.buckets[(record.key_hash() >> 32) as usize % BUCKETS].push(*record);
         }
         self.held += records.len();
         if self.held > self.limit { self.write_out() } else { Ok(()) }
@@ -58,7 +65,7 @@ impl<R: Record> Spill<R> {
         Ok(())
     }
 
-    /// Calls `body` with all records of one bucket after the other.
+    /// Calls `body` once for each bucket with all its records. Records with the same key are in the same bucket.
     pub(super) fn for_each_bucket(mut self, mut body: impl FnMut(&mut Vec<R>)) -> Result<()> {
         for number in 0..BUCKETS {
             let mut bucket = std::mem::take(&mut self.buckets[number]);
@@ -71,7 +78,8 @@ impl<R: Record> Spill<R> {
     }
 }
 
-fn load<R: Record>(file: &mut File, bucket: &mut Vec<R>) -> std::io::Result<()> {
+/// Appends the records of a file to a bucket.
+fn load<R: KeyedRecord>(file: &mut File, bucket: &mut Vec<R>) -> std::io::Result<()> {
     let bytes = file.seek(SeekFrom::End(0))? as usize;
     file.seek(SeekFrom::Start(0))?;
     let held = bucket.len();

@@ -4,9 +4,10 @@ use std::path::Path;
 
 use crate::Result;
 use crate::geometry::lattice::REACH;
-use crate::input::Point;
-use crate::input::rules::{Rules, Tally};
-use crate::input::source::Axis;
+use crate::input::points::axis::Axis;
+use crate::input::points::point::Point;
+use crate::input::points::record::PointRecord;
+use crate::input::points::rules::{PointCounts, PointRules};
 
 /// Points handed to the sink at once, at most: 384 KiB of them, which stays in the second-level cache.
 const SLICE: usize = 1 << 14;
@@ -14,38 +15,27 @@ const SLICE: usize = 1 << 14;
 /// Where the points of a source go, in record order.
 pub(crate) type Sink<'a> = &'a mut dyn FnMut(&[Point]) -> Result<()>;
 
-/// What a record says before it is judged. `raw` is in steps of the source's axes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Record {
-    pub(crate) raw: [i64; 3],
-    pub(crate) rgb: [u16; 3],
-    pub(crate) class: u8,
-    pub(crate) withheld: bool,
-    /// Whether x or y, and whether z, was rounded on the way to `raw`.
-    pub(crate) rounded: [bool; 2],
-}
-
 /// Lattice integers in x, y and z, and whether they were rounded; `None` where they do not fit.
 type Mapped = [Option<(i32, bool)>; 3];
 
-/// The rules at work on one piece of a source.
-pub(crate) struct Sieve<'a> {
+/// The rules at work on one chunk of a source.
+pub(crate) struct PointFilter<'a> {
     path: &'a Path,
     axes: &'a [Axis; 3],
-    rules: &'a Rules,
+    rules: &'a PointRules,
     sink: Sink<'a>,
     points: Vec<Point>,
-    tally: Tally,
+    tally: PointCounts,
 }
 
-impl<'a> Sieve<'a> {
-    pub(crate) fn new(path: &'a Path, axes: &'a [Axis; 3], rules: &'a Rules, sink: Sink<'a>) -> Sieve<'a> {
-        Sieve { path, axes, rules, sink, points: Vec::with_capacity(SLICE), tally: Tally::default() }
+impl<'a> PointFilter<'a> {
+    pub(crate) fn new(path: &'a Path, axes: &'a [Axis; 3], rules: &'a PointRules, sink: Sink<'a>) -> PointFilter<'a> {
+        PointFilter { path, axes, rules, sink, points: Vec::with_capacity(SLICE), tally: PointCounts::default() }
     }
 
     /// Judges record `number` of the source (from 0); `place` names it in an example ("point 12", "line 13").
     #[inline]
-    pub(crate) fn push(&mut self, number: u64, record: &Record, place: impl Fn() -> String) -> Result<()> {
+    pub(crate) fn push(&mut self, number: u64, record: &PointRecord, place: impl Fn() -> String) -> Result<()> {
         if record.withheld {
             self.tally.withheld += 1;
             return Ok(());
@@ -102,9 +92,9 @@ impl<'a> Sieve<'a> {
     }
 
     /// Hands on what is left and gives the tally.
-    pub(crate) fn finish(mut self) -> Result<Tally> {
+    pub(crate) fn finish(mut self) -> Result<PointCounts> {
         self.flush()?;
-        let Tally { withheld, other_class, out_of_bounds, malformed, kept, .. } = self.tally;
+        let PointCounts { withheld, other_class, out_of_bounds, malformed, kept, .. } = self.tally;
         self.tally.read = withheld + other_class + out_of_bounds + malformed + kept;
         Ok(self.tally)
     }
@@ -119,7 +109,7 @@ impl<'a> Sieve<'a> {
 
     /// The value that has left the lattice, and its axis.
     #[cold]
-    fn outside(&self, record: &Record, mapped: &Mapped) -> (f64, &'static str) {
+    fn outside(&self, record: &PointRecord, mapped: &Mapped) -> (f64, &'static str) {
         let out = |axis: usize| mapped[axis].is_none_or(|(v, _)| axis < 2 && !reached(v));
         let axis = (0..3).find(|&axis| out(axis)).unwrap_or(2);
         (self.axes[axis].value(record.raw[axis]), ["x", "y", "z"][axis])

@@ -6,12 +6,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::geometry::lattice::AxisMap;
 
-/// How many malformed records a [`Tally`] describes.
+/// How many malformed records a [`PointCounts`] describes.
 pub(crate) const EXAMPLES: usize = 5;
 
 /// What decoding a source needs to know of the job.
 #[derive(Clone, Debug)]
-pub struct Rules {
+pub struct PointRules {
     /// The way from the source's axes x, y and z to the lattice.
     pub maps: [AxisMap; 3],
     /// Whether points of each classification code are kept.
@@ -27,7 +27,7 @@ pub struct Rules {
 /// What became of the records of a source, or of a part of it:
 /// `read = withheld + other_class + out_of_bounds + malformed + kept`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Tally {
+pub struct PointCounts {
     /// Records seen, those included that the file promises and does not have.
     pub read: u64,
     /// Dropped: flagged as withheld.
@@ -50,7 +50,7 @@ pub struct Tally {
     pub examples: Vec<String>,
 }
 
-impl Tally {
+impl PointCounts {
     /// Counts `count` malformed records that `example` describes.
     pub(crate) fn add_malformed(&mut self, count: u64, example: impl FnOnce() -> String) {
         self.malformed += count;
@@ -60,8 +60,8 @@ impl Tally {
     }
 }
 
-impl AddAssign for Tally {
-    fn add_assign(&mut self, other: Tally) {
+impl AddAssign for PointCounts {
+    fn add_assign(&mut self, other: PointCounts) {
         self.read += other.read;
         self.withheld += other.withheld;
         self.other_class += other.other_class;
