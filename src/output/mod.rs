@@ -5,6 +5,7 @@
 pub mod color;
 pub mod frame;
 pub mod gltf;
+pub mod layout;
 pub mod lod;
 pub mod normals;
 pub mod options;
