@@ -5,7 +5,7 @@
 use serde_json::{Value, json};
 
 use crate::output::frame::Frame;
-use crate::output::gltf::document::GENERATOR;
+use crate::output::gltf::schema::GENERATOR;
 use crate::output::tiles3d::globe::{applied, relative};
 
 /// Half the least extent of a bounding volume, metres: viewers divide by it.
