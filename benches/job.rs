@@ -5,8 +5,8 @@
 //! of detail. Prints medians, their ratios and the stages of the median jobs. Without FILE it takes autzen.laz from the test data if
 //! that is there, else a sample terrain of 4 million points.
 
-use gdt_batch::job::progress::stage::Progress;
-use gdt_batch::job::report::Report;
+use gdt_batch::job::progress::stage::ProgressOutput;
+use gdt_batch::job::report::job_report::Report;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -95,7 +95,7 @@ fn job(file: &Path, output: &Path, look: &str) -> Outcome<Report> {
         ),
     )?;
     let start = Instant::now();
-    let mut report = gdt_batch::job::run(&gdt_batch::config::load(&config)?, Progress::Quiet)?;
+    let mut report = gdt_batch::job::run(&gdt_batch::config::load(&config)?, ProgressOutput::Quiet)?;
     // With the report itself, and cleaning up.
     report.wall_s = start.elapsed().as_secs_f64();
     empty(output)?;

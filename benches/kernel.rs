@@ -10,7 +10,8 @@ mod points;
 use delaunator::Point;
 use gdt_batch::geometry::Site;
 use gdt_batch::triangulation::reference;
-use gdt_batch::voronoi::{Counts, STEPS, Scratch, triangulate};
+use gdt_batch::voronoi::counts::{PipelineCounts, STEP_NAMES};
+use gdt_batch::voronoi::{PipelineBuffers, triangulate};
 use points::{Random, distinct, gaussian, median, uniform};
 use spade::{DelaunayTriangulation, Point2, Triangulation};
 use std::path::PathBuf;
@@ -35,14 +36,14 @@ fn main() {
     println!(
         "ns per site (medians)      kernel   spade  delaun.  x spade  x delaun.  removed%  missing%  flips  reference"
     );
-    let mut scratch = Scratch::default();
+    let mut buffers = PipelineBuffers::default();
     let mut totals = Vec::new();
     for (name, make) in cases(all) {
         if !wanted(&name) {
             continue;
         }
         if let Some(leaves) = make() {
-            totals.push((name.clone(), measure(&Case { name, leaves }, &mut scratch)));
+            totals.push((name.clone(), measure(&Case { name, leaves }, &mut buffers)));
         }
     }
     print_steps(&totals);
@@ -80,7 +81,7 @@ fn cases(all: bool) -> Vec<(String, Make)> {
 }
 
 /// Runs the three in turn until each has had about a second, at least three times, and prints the medians.
-fn measure(case: &Case, scratch: &mut Scratch) -> (usize, Counts) {
+fn measure(case: &Case, buffers: &mut PipelineBuffers) -> (usize, PipelineCounts) {
     let sites: usize = case.leaves.iter().map(Vec::len).sum();
     let points = |s: &Site| Point2::new(s[0] as f64, s[1] as f64);
     let spade_leaves: Vec<Vec<Point2<f64>>> = case.leaves.iter().map(|l| l.iter().map(points).collect()).collect();
@@ -88,12 +89,12 @@ fn measure(case: &Case, scratch: &mut Scratch) -> (usize, Counts) {
     let delaunator_leaves: Vec<Vec<Point>> = case.leaves.iter().map(|l| l.iter().map(points).collect()).collect();
     let rounds = (1_500_000 / sites).clamp(3, 15);
     let mut times = [(); 3].map(|()| Vec::new());
-    let (mut counts, mut by_reference) = (Counts::default(), 0);
+    let (mut counts, mut by_reference) = (PipelineCounts::default(), 0);
     for round in 0..=rounds {
-        (counts, by_reference) = (Counts::default(), 0);
+        (counts, by_reference) = (PipelineCounts::default(), 0);
         let start = cpu_time();
         for leaf in &case.leaves {
-            by_reference += kernel(leaf, scratch, &mut counts);
+            by_reference += kernel(leaf, buffers, &mut counts);
         }
         let kernel_time = cpu_time() - start;
         let start = cpu_time();
@@ -128,11 +129,11 @@ fn measure(case: &Case, scratch: &mut Scratch) -> (usize, Counts) {
 }
 
 /// Triangulates a leaf, or its halves if it is rejected; returns how many sites went to the reference.
-fn kernel(leaf: &[Site], scratch: &mut Scratch, counts: &mut Counts) -> usize {
-    match triangulate(leaf, scratch) {
+fn kernel(leaf: &[Site], buffers: &mut PipelineBuffers, counts: &mut PipelineCounts) -> usize {
+    match triangulate(leaf, buffers) {
         Ok((mesh, more)) => {
             *counts += more;
-            scratch.recycle(std::hint::black_box(mesh));
+            buffers.recycle(std::hint::black_box(mesh));
             0
         }
         Err(why) if leaf.len() <= SMALL => {
@@ -147,16 +148,16 @@ fn kernel(leaf: &[Site], scratch: &mut Scratch, counts: &mut Counts) -> usize {
                 println!("{} sites: {why}", leaf.len());
             }
             let halves = cut(leaf.to_vec(), leaf.len().div_ceil(2));
-            halves.iter().map(|half| kernel(half, scratch, counts)).sum()
+            halves.iter().map(|half| kernel(half, buffers, counts)).sum()
         }
     }
 }
 
-fn print_steps(totals: &[(String, (usize, Counts))]) {
+fn print_steps(totals: &[(String, (usize, PipelineCounts))]) {
     println!("\nns per site by step (last run)");
     for (name, (sites, counts)) in totals {
         print!("{name:<26}");
-        for (step, nanoseconds) in STEPS.iter().zip(counts.nanoseconds) {
+        for (step, nanoseconds) in STEP_NAMES.iter().zip(counts.nanoseconds) {
             print!(" {}: {:.1}", step.split(' ').next().unwrap_or(step), nanoseconds as f64 / *sites as f64);
         }
         println!("  (islands {}, inverted {}, moved {})", counts.islands, counts.inverted, counts.moved);

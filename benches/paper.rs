@@ -14,17 +14,22 @@ mod points;
 
 use delaunator::Point;
 use gdt_batch::geometry::Site;
-use gdt_batch::gpu::buffers::{Name, Set};
-use gdt_batch::gpu::device::{self, Device, Wish};
-use gdt_batch::gpu::executor::{Executor, Order};
-use gdt_batch::gpu::machine::Machine;
-use gdt_batch::gpu::options::{TextureSide, VoronoiMethod};
-use gdt_batch::gpu::steps::{Size, Step};
-use gdt_batch::gpu::{self, twins};
-use gdt_batch::mesh::half_edge::Mesh;
-use gdt_batch::voronoi::{
-    Counts, Diagram, Diagrams, Rejected, Resolution, STEPS, Scratch, Shape, triangulate, triangulate_with,
-};
+use gdt_batch::gpu::buffer_id::BufferId;
+use gdt_batch::gpu::buffers::BufferSet;
+use gdt_batch::gpu::device::{self, AdapterRequest, Device};
+use gdt_batch::gpu::engine::GpuEngine;
+use gdt_batch::gpu::error::GpuError;
+use gdt_batch::gpu::executor::{Executor, GpuUse};
+use gdt_batch::gpu::options::{GpuOptions, TextureSide, VoronoiMethod};
+use gdt_batch::gpu::steps::{GpuStep, Recording};
+use gdt_batch::gpu::texture_size::TextureSize;
+use gdt_batch::gpu::twins;
+use gdt_batch::mesh::half_edge::HalfEdgeMesh;
+use gdt_batch::voronoi::counts::{PipelineCounts, STEP_NAMES};
+use gdt_batch::voronoi::diagram_backend::{DiagramBackend, DiagramReply};
+use gdt_batch::voronoi::rejection::Rejection;
+use gdt_batch::voronoi::texture_request::{TextureRequest, TextureResolution};
+use gdt_batch::voronoi::{PipelineBuffers, triangulate, triangulate_with};
 use points::{gaussian, median, uniform};
 use spade::{DelaunayTriangulation, Point2, Triangulation};
 use std::cell::RefCell;
@@ -87,7 +92,7 @@ fn figure_10(sites: &[Site], gpu: Option<&RefCell<Gpu>>, rounds: usize) {
 struct Run {
     total: Option<f64>,
     steps: Vec<(&'static str, f64)>,
-    counts: Counts,
+    counts: PipelineCounts,
     /// How often `spade` fits in.
     times_spade: f64,
 }
@@ -157,19 +162,26 @@ fn on_cpu_with_any(sites: &[Site]) -> Vec<Way<'_>> {
 
 /// The pipeline on this thread, with a texture of `side` or else of the size that suits.
 fn on_cpu<'a>(sites: &'a [Site], side: Option<u32>) -> Way<'a> {
-    let shape = side.map_or(Shape::default(), |side| Shape { resolution: Resolution::Side(side), ..Shape::default() });
-    let mut scratch = Scratch::with_shape(shape);
-    let run = move || pipeline(&mut scratch, |scratch| triangulate(sites, scratch));
+    let request = side.map_or(TextureRequest::default(), |side| TextureRequest {
+        resolution: TextureResolution::Side(side),
+        ..TextureRequest::default()
+    });
+    let mut buffers = PipelineBuffers::with_texture(request);
+    let run = move || pipeline(&mut buffers, |buffers| triangulate(sites, buffers));
     Way { name: CPU.into(), side, run: Box::new(run) }
 }
 
-fn pipeline(scratch: &mut Scratch, f: impl FnOnce(&mut Scratch) -> Result<(Mesh, Counts), Rejected>) -> Outcome {
-    let (done, total) = timed(|| f(scratch));
+fn pipeline(
+    buffers: &mut PipelineBuffers,
+    f: impl FnOnce(&mut PipelineBuffers) -> Result<(HalfEdgeMesh, PipelineCounts), Rejection>,
+) -> Outcome {
+    let (done, total) = timed(|| f(buffers));
     let (mesh, counts) = done.map_err(|why| why.to_string())?;
-    scratch.recycle(black_box(mesh));
+    buffers.recycle(black_box(mesh));
     let milliseconds = counts.nanoseconds.map(|time| time as f64 / 1e6);
     // The last step is to wait for the GPU.
-    let steps = STEPS.into_iter().zip(milliseconds).take(STEPS.len() - (counts.on_gpu == 0) as usize).collect();
+    let steps =
+        STEP_NAMES.into_iter().zip(milliseconds).take(STEP_NAMES.len() - (counts.on_gpu == 0) as usize).collect();
     Ok(Run { total: Some(total), steps, counts, ..Run::default() })
 }
 
@@ -203,31 +215,31 @@ fn plain_loops(sites: &[Site], side: u32) -> Outcome {
     let (corners, g4) = timed(|| twins::find_vertices(size, &labels));
     let (_, g5) = timed(|| black_box(twins::count(size, &corners)));
     let (_, g6) = timed(|| black_box(twins::make_triangles(size, &labels, &texture)));
-    let mut steps: Vec<_> = Step::ALL.map(Step::name).into_iter().zip([g1, g2, g3, g4, g5, g6]).collect();
+    let mut steps: Vec<_> = GpuStep::ALL.map(GpuStep::name).into_iter().zip([g1, g2, g3, g4, g5, g6]).collect();
     steps.insert(2, ("or G2 by 1+JFA", jfa));
     Ok(Run { steps, ..Run::default() })
 }
 
 /// Somebody who makes no diagrams, but keeps what is asked of him.
-struct Listener(u32, Mutex<Option<(Size, Vec<u32>)>>);
+struct Listener(u32, Mutex<Option<(TextureSize, Vec<u32>)>>);
 
-impl Diagrams for Listener {
-    fn shape(&self) -> Shape {
-        Shape { resolution: Resolution::Side(self.0), ..Shape::default() }
+impl DiagramBackend for Listener {
+    fn texture_request(&self) -> TextureRequest {
+        TextureRequest { resolution: TextureResolution::Side(self.0), ..TextureRequest::default() }
     }
 
-    fn diagram(&self, width: u32, height: u32, pixels: Vec<u32>) -> Diagram {
+    fn diagram(&self, width: u32, height: u32, pixels: Vec<u32>) -> DiagramReply {
         if let Ok(mut heard) = self.1.lock() {
-            *heard = Some((Size { width, height }, pixels));
+            *heard = Some((TextureSize { width, height }, pixels));
         }
-        Diagram::No
+        DiagramReply::Unavailable
     }
 }
 
 /// The texture of `sites`, and the pixel of each that has one.
-fn placed(sites: &[Site], side: u32) -> Result<(Size, Vec<u32>), String> {
+fn placed(sites: &[Site], side: u32) -> Result<(TextureSize, Vec<u32>), String> {
     let listener = Listener(side, Mutex::new(None));
-    let done = triangulate_with(sites, Some(&listener), &mut Scratch::default());
+    let done = triangulate_with(sites, Some(&listener), &mut PipelineBuffers::default());
     let heard = listener.1.into_inner().ok().flatten();
     heard.ok_or_else(|| done.err().map_or("no texture was made".into(), |why| why.to_string()))
 }
@@ -239,33 +251,38 @@ struct Gpu {
     name: String,
     /// Whether it is one, or only a program that behaves so.
     kind: &'static str,
-    machine: Machine,
-    set: Set,
+    engine: GpuEngine,
+    buffers: BufferSet,
 }
 
 impl Gpu {
     fn open() -> Result<Gpu, String> {
         let adapters = device::adapters();
         let infos: Vec<_> = adapters.iter().map(wgpu::Adapter::get_info).collect();
-        let chosen = device::choose(&infos, &Wish::new(None, true))?;
-        let device = Device::open(&adapters[chosen]).map_err(|fault| fault.to_string())?;
+        let chosen = device::choose(&infos, &AdapterRequest::new(None, true))?;
+        let device = Device::open(&adapters[chosen]).map_err(|error| error.to_string())?;
         let kind = if device::is_software(&infos[chosen]) { "software GPU" } else { "GPU" };
-        Ok(Gpu { name: infos[chosen].name.clone(), kind, machine: Machine::new(device), set: Set::default() })
+        Ok(Gpu {
+            name: infos[chosen].name.clone(),
+            kind,
+            engine: GpuEngine::new(device),
+            buffers: BufferSet::default(),
+        })
     }
 
     /// Steps G1 to G6, by the GPU's own timestamps.
     fn run(
         &mut self,
-        size: Size,
+        size: TextureSize,
         pixels: &[u32],
         voronoi: VoronoiMethod,
-    ) -> Result<[f64; Step::ALL.len()], gpu::Fault> {
+    ) -> Result<[f64; GpuStep::ALL.len()], GpuError> {
         // At most two triangles a site, and some for what the texture gets wrong.
         let room = 2 * pixels.len() + pixels.len() / 4 + 64;
-        let mut recording = gpu::labels(size, pixels.to_vec(), voronoi);
-        recording.commands.extend(gpu::triangles(size, room as u32).commands);
-        let ticket = self.machine.start_and_fetch(&mut self.set, &recording, Name::Triangles, 12)?;
-        let (_, times) = self.machine.finish(&self.set, ticket)?;
+        let mut recording = Recording::labels(size, pixels.to_vec(), voronoi);
+        recording.commands.extend(Recording::triangles(size, room as u32).commands);
+        let readback = self.engine.start_and_fetch(&mut self.buffers, &recording, BufferId::Triangles, 12)?;
+        let (_, times) = self.engine.finish(&self.buffers, readback)?;
         Ok(times.map(|time| time as f64 / 1e6))
     }
 }
@@ -282,23 +299,22 @@ fn by_shaders<'a>(gpu: &'a RefCell<Gpu>, sites: &[Site], side: u32, voronoi: Vor
     let name = format!("{}, shaders, {transform}", gpu.borrow().kind);
     let run = move || {
         let (size, pixels) = placed.as_ref().map_err(String::clone)?;
-        let times = gpu.borrow_mut().run(*size, pixels, voronoi).map_err(|fault| fault.to_string())?;
+        let times = gpu.borrow_mut().run(*size, pixels, voronoi).map_err(|error| error.to_string())?;
         if times.iter().all(|&time| time == 0.0) {
             return Err("the adapter has no timestamps".into());
         }
-        Ok(Run { steps: Step::ALL.map(Step::name).into_iter().zip(times).collect(), ..Run::default() })
+        Ok(Run { steps: GpuStep::ALL.map(GpuStep::name).into_iter().zip(times).collect(), ..Run::default() })
     };
     Way { name, side: Some(side), run: Box::new(run) }
 }
 
 /// The pipeline with the GPU's help, if it gives any.
 fn on_gpu_and_cpu<'a>(kind: &str, sites: &'a [Site], side: u32) -> Option<Way<'a>> {
-    let (wish, texture) = (Wish::new(None, true), TextureSide::Side(side));
-    let order = Order { wish, voronoi: VoronoiMethod::Auto, texture, most_pixels: u64::MAX, shared: false };
-    let executor = Executor::start(&order).ok()?;
-    let mut scratch = Scratch::default();
+    let options = GpuOptions { texture: TextureSide::Side(side), ..GpuOptions::default() };
+    let executor = Executor::start(&options, GpuUse::Required, u64::MAX).ok()?;
+    let mut buffers = PipelineBuffers::default();
     let run = move || {
-        let mut run = pipeline(&mut scratch, |scratch| triangulate_with(sites, Some(&executor), scratch))?;
+        let mut run = pipeline(&mut buffers, |buffers| triangulate_with(sites, Some(&executor), buffers))?;
         if run.counts.on_gpu == 0 {
             return Err("the GPU did not take it".into());
         }
@@ -395,7 +411,7 @@ fn print_whys<'a>(outcomes: impl Iterator<Item = &'a Outcome>) {
 /// What the steps met, as percentages of the sites.
 fn print_counts(outcomes: &[Outcome]) {
     print_head("Of a hundred sites (CPU)", &SIDES.map(|side| side.to_string()));
-    let count = |label: &str, of: fn(&Counts) -> u64| {
+    let count = |label: &str, of: fn(&PipelineCounts) -> u64| {
         let percent = |run: &Run| format!("{:.2}", 100.0 * of(&run.counts) as f64 / run.counts.sites as f64);
         let cells: Vec<_> = outcomes.iter().map(|o| o.as_ref().map_or("-".into(), percent)).collect();
         println!("| {label} | {} |", cells.join(" | "));

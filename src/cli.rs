@@ -1,52 +1,59 @@
-//! The command line: what it accepts, and which part of the library each command calls.
+//! The command line: the commands and their options.
 
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
-/// What `--help` teaches beside the options.
+/// What `--help` shows after the options.
 const AFTER_HELP: &str = "\
 Examples:
-  gdt-batch sample terrain.laz          make a sample terrain to try things on
+  gdt-batch sample terrain.laz          write a sample terrain to try things on
   gdt-batch configs/quickstart.toml     run a job
-  gdt-batch check job.toml              what would it read, how large is it, does it fit?
+  gdt-batch check job.toml              what would the job read, how large is it, does it fit?
   gdt-batch verify out                  prove that the tiles in out are the exact Delaunay triangulation
 
-The least configuration:
+The shortest configuration:
   [input]
   files = [\"clouds/*.laz\"]
   [output]
   directory = \"out\"
-All options, explained: configs/full.toml
+configs/full.toml explains all options.
 
-A job that was interrupted goes on where it was when the same command is run again.
+After an interruption, run the same command again: the job continues where it stopped.
 
-Exit codes: 0 done; 1 may be retried (disk, memory, Ctrl-C); 2 command line or configuration;
-3 bad input; 4 a guarantee does not hold (verify failed, or an internal check).";
+Exit codes:
+  0  done
+  1  may be retried (disk, memory, Ctrl-C)
+  2  command line or configuration
+  3  bad input
+  4  a guarantee does not hold (verify failed, or an internal check)";
 
-/// One exact Delaunay terrain out of point clouds of any size, as glTF tiles.
+/// Turns point clouds of any size into one exact Delaunay terrain, written as glTF tiles.
 #[derive(Parser, Debug)]
 #[command(name = "gdt-batch", version, after_help = AFTER_HELP, arg_required_else_help = true)]
 pub struct Cli {
-    /// What to do; a configuration file alone runs its job.
+    /// The command; without one, gdt-batch runs the job of a configuration file.
     #[command(subcommand)]
-    pub command: Option<Command>,
+    pub command: Option<CliCommand>,
     /// The configuration of the job to run (TOML).
     pub config: Option<PathBuf>,
-    /// Start over where an interrupted run of the job could be gone on with.
+    /// Start the job over instead of continuing an interrupted run.
     #[arg(long, requires = "config")]
+    pub restart: bool,
+    /// The old name of `--restart`.
+    #[arg(long, requires = "config", hide = true)]
     pub fresh: bool,
-    /// Run the job even where the disk or the memory does not seem to suffice.
+    /// Run the job even if it does not seem to fit the disk or the memory.
     #[arg(long, requires = "config")]
     pub force: bool,
-    /// How to talk.
+    /// What to print.
     #[command(flatten)]
-    pub talk: Talk,
+    pub print: PrintOptions,
 }
 
-/// How to talk; may stand anywhere on the command line.
+/// What to print. These options may stand anywhere on the command line.
 #[derive(Args, Clone, Copy, Debug)]
-pub struct Talk {
-    /// No progress, and no table at the end.
+pub struct PrintOptions {
+    /// Print only errors, and a line if input files were left out.
     #[arg(long, short, global = true)]
     pub quiet: bool,
     /// Print the result as JSON on standard output.
@@ -54,45 +61,45 @@ pub struct Talk {
     pub json: bool,
 }
 
-/// The commands beside running a job.
+/// The commands other than running a job.
 #[derive(Subcommand, Debug)]
-pub enum Command {
-    /// Look at the inputs of a job and say what it would do and whether it fits; writes nothing.
+pub enum CliCommand {
+    /// Show what a job would do and whether it fits; write nothing.
     Check {
         /// The configuration of the job.
         config: PathBuf,
     },
-    /// Read written tiles back and prove with exact arithmetic that they are the Delaunay triangulation.
+    /// Read the written tiles back and prove with exact arithmetic that they are the Delaunay triangulation.
     Verify {
         /// The output directory of a job.
         directory: PathBuf,
-        /// The most memory to use, such as "4 GiB".
+        /// The memory that verify may use, such as "4 GiB".
         #[arg(long, default_value = "4 GiB", value_parser = memory)]
         memory: u64,
     },
-    /// Say what point clouds hold.
+    /// Show what point clouds contain.
     Info {
         /// Point clouds: LAS, LAZ, COPC or text.
         #[arg(required = true)]
         files: Vec<PathBuf>,
     },
-    /// List the GPUs of this machine, compare every step on one of them with plain code, and time it.
+    /// List the GPUs of this machine, test each step of the pipeline on one of them, and time it.
     Gpu {
-        /// A part of the name of the GPU to test; without it the one that backend = "gpu" takes.
+        /// Part of the name of the GPU to test. Default: the GPU that backend = "gpu" takes.
         #[arg(long)]
         adapter: Option<String>,
         /// The side of the largest texture to time, in pixels.
         #[arg(long)]
         side: Option<u32>,
     },
-    /// Write a sample terrain, made up from a seed, as LAS or LAZ.
+    /// Write a made-up sample terrain as LAS or LAZ.
     Sample {
         /// The file to write: .las or .laz.
         file: PathBuf,
-        /// How many points.
+        /// The number of points.
         #[arg(long, default_value_t = 1_000_000)]
         points: u64,
-        /// Another seed gives another terrain.
+        /// Each seed gives another terrain.
         #[arg(long, default_value_t = 1)]
         seed: u64,
     },
@@ -100,4 +107,22 @@ pub enum Command {
 
 fn memory(text: &str) -> Result<u64, String> {
     crate::job::options::MemoryLimit::try_from(text.to_owned()).map(|memory| memory.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_definition_of_the_command_line_is_sound() {
+        <Cli as clap::CommandFactory>::command().debug_assert();
+    }
+
+    #[test]
+    fn restart_has_an_old_name_that_help_does_not_show() {
+        let cli = Cli::try_parse_from(["gdt-batch", "--fresh", "job.toml"]).unwrap();
+        assert!(cli.fresh && !cli.restart);
+        let help = <Cli as clap::CommandFactory>::command().render_long_help().to_string();
+        assert!(help.contains("--restart") && !help.contains("--fresh"), "{help}");
+    }
 }

@@ -2,6 +2,8 @@
 //!
 //! Start reading at [`job::run`], which lists the steps of a job in order; ARCHITECTURE.md follows the data.
 
+#![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
+
 pub mod cli;
 pub mod config;
 pub mod error;
@@ -23,7 +25,7 @@ mod warnings;
 pub use error::{Error, Result};
 pub use warnings::Warnings;
 
-/// Writes a line to standard error. Who has closed it, or put it on a full disk, does not want the job to end for that.
+/// Writes a line to standard error. A closed or full standard error must not end the job, so failures are ignored.
 pub fn say(text: &str) {
     use std::io::Write;
     let _ = writeln!(std::io::stderr(), "{text}");

@@ -1,4 +1,4 @@
-//! Warnings: what a user should know, though it does not stop the job.
+//! Warnings: what a user should know although the job goes on.
 
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -9,17 +9,17 @@ use std::path::Path;
 pub struct Warnings(Vec<String>);
 
 impl Warnings {
-    /// Adds one.
+    /// Adds a warning.
     pub fn push(&mut self, warning: impl Into<String>) {
         self.0.push(warning.into());
     }
 
-    /// Adds those of the file at `path`, each with the file's name before it.
+    /// Adds the warnings about the file at `path`, each with the path before it.
     pub fn extend_from_file(&mut self, path: &Path, warnings: &Warnings) {
         self.0.extend(warnings.0.iter().map(|warning| format!("{}: {warning}", path.display())));
     }
 
-    /// Keeps at most `most` of them, and says how many more there were: thousands would hide the rest.
+    /// Keeps the first `most` warnings and adds one that says how many more there were: thousands would hide the others.
     pub fn shorten(&mut self, most: usize) {
         if self.0.len() > most {
             let more = self.0.len() - most;
@@ -28,12 +28,12 @@ impl Warnings {
         }
     }
 
-    /// All of them.
+    /// Returns all warnings.
     pub fn iter(&self) -> impl Iterator<Item = &str> {
         self.0.iter().map(String::as_str)
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no warnings.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use cloud::{Cloud, decode, file, lattice, read, read_bytes, rules, survives};
 use gdt_batch::Error;
 use gdt_batch::geometry::lattice::REACH;
-use gdt_batch::input::{Point, Tally, TextOptions, Unit, open};
+use gdt_batch::input::{Point, PointCounts, TextOptions, Unit, open};
 use las_file::{LasFile, points_at};
 use proptest::prelude::*;
 use rayon::prelude::*;
@@ -118,7 +118,7 @@ fn the_big_file_is_whole_when_many_threads_decode_it() {
     let Some(shared) = common::shared() else { return };
     let source = open(&shared.join("data/autzen.laz"), &TextOptions::default()).unwrap();
     let rules = rules(&source, &lattice(&source));
-    let decode = |piece: usize| {
+    let decode = |chunk: usize| {
         let mut order = None;
         let check = &mut |points: &[Point]| {
             assert!(points.windows(2).all(|pair| pair[0].order() + 1 == pair[1].order()));
@@ -126,13 +126,13 @@ fn the_big_file_is_whole_when_many_threads_decode_it() {
             order = points.last().map(Point::order);
             Ok(())
         };
-        source.decode(piece, &rules, check).unwrap()
+        source.decode(chunk, &rules, check).unwrap()
     };
-    let sum = |mut a: Tally, b: Tally| {
+    let sum = |mut a: PointCounts, b: PointCounts| {
         a += b;
         a
     };
-    let tally = (0..source.pieces()).into_par_iter().map(decode).reduce(Tally::default, sum);
+    let tally = (0..source.chunks()).into_par_iter().map(decode).reduce(PointCounts::default, sum);
     assert_eq!((tally.kept, tally.malformed, tally.max_rgb), (10_653_336, 0, 255));
     assert_eq!((source.records, source.crs.horizontal), (10_653_336, Unit::Foot));
 }
@@ -282,7 +282,7 @@ fn files_without_points_have_no_pieces() {
         let file = LasFile::new(4, format, 0, 0);
         for bytes in [file.las(), file.laz(&[50], false), file.laz(&[50], true)] {
             let cloud = read_bytes(".laz", &bytes).unwrap();
-            assert_eq!((cloud.source.records, cloud.source.pieces(), cloud.tally.read), (0, 0, 0));
+            assert_eq!((cloud.source.records, cloud.source.chunks(), cloud.tally.read), (0, 0, 0));
         }
     }
 }

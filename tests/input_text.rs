@@ -8,7 +8,7 @@ use std::path::Path;
 
 use cloud::{Cloud, decode, file, lattice, read, read_bytes, read_with, rules, survives};
 use gdt_batch::Result;
-use gdt_batch::input::{Format, Point, TextOptions, open};
+use gdt_batch::input::{FileFormat, Point, TextOptions, open};
 use proptest::prelude::*;
 use rust_decimal::Decimal;
 
@@ -19,7 +19,7 @@ fn small_texts_are_read_whatever_their_layout() {
     for (name, points, rgb) in expected {
         let cloud = read(&shared.join("data").join(name)).unwrap();
         assert_eq!((cloud.tally.kept, cloud.tally.malformed), (points, 0), "{name}");
-        assert_eq!((cloud.source.format, cloud.source.has_rgb), (Format::Text, rgb), "{name}");
+        assert_eq!((cloud.source.format, cloud.source.has_rgb), (FileFormat::Text, rgb), "{name}");
         assert!(cloud.source.warnings.is_empty(), "{name}");
     }
 }
@@ -149,7 +149,7 @@ fn a_text_of_many_blocks_keeps_its_order() {
         content.push_str(&format!("{} {} {}.{:02}\n", i, i % 1000, i / 100, i % 100));
     }
     let cloud = text(&content).unwrap();
-    assert!(cloud.source.pieces() > 1);
+    assert!(cloud.source.chunks() > 1);
     assert_eq!((cloud.tally.kept, cloud.tally.malformed), (300_000, 0));
     assert!(cloud.points.iter().enumerate().all(|(i, p)| p.order() == i as u64 && p.z == i as i32));
 }

@@ -1,5 +1,5 @@
-//! Configuration files: TOML in, checked options out. An unknown key, a wrong type or an impossible value is an error that shows
-//! the line.
+//! Reads configuration files: TOML in, checked options out. An unknown key, a wrong type or an impossible value is an error that
+//! shows the line.
 
 use crate::gpu::options::{GpuOptions, TextureSide, VoronoiMethod};
 use crate::input::options::InputOptions;
@@ -10,11 +10,11 @@ use crate::{Error, Result, Warnings};
 use serde::Deserialize;
 use std::path::Path;
 
-/// The greatest `height_offset` in metres. No datum is as far from the ellipsoid, and with a greater one f64 would lose the digits
-/// that let tiles meet.
+/// The greatest `height_offset` in metres. No datum is that far from the ellipsoid, and f64 would lose the digits that let tiles
+/// meet.
 const MAX_HEIGHT_OFFSET: f64 = 100_000.0;
 
-/// A configuration file as it is written.
+/// A configuration file as it was written.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ConfigFile {
@@ -28,7 +28,7 @@ struct ConfigFile {
     limits: Limits,
 }
 
-/// `[triangulation]`, with the keys that were there before `[gpu]` existed.
+/// `[triangulation]`, with the keys that are in `[gpu]` now.
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct TriangulationTable {
@@ -40,7 +40,7 @@ struct TriangulationTable {
     texture: Option<TextureSide>,
 }
 
-/// `[gpu]`; a key that is left out may still be in `[triangulation]`.
+/// `[gpu]`. Older configurations have these keys in `[triangulation]`.
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct GpuTable {
@@ -49,7 +49,7 @@ struct GpuTable {
     texture: Option<TextureSide>,
 }
 
-/// A key or value that has another name now.
+/// A key or a value that has a new name.
 struct Renamed {
     table: &'static str,
     key: &'static str,
@@ -58,7 +58,7 @@ struct Renamed {
     now: &'static str,
 }
 
-/// Old names still work; a warning says the new one.
+/// Old names still work, and a warning says the new one.
 const RENAMED: [Renamed; 7] = [
     Renamed { table: "input", key: "malformed_share", value: None, now: "[input] max_malformed_fraction" },
     Renamed { table: "triangulation", key: "sites_per_tile", value: None, now: "[triangulation] max_points_per_tile" },
@@ -69,7 +69,7 @@ const RENAMED: [Renamed; 7] = [
     Renamed { table: "output", key: "format", value: Some("tiles"), now: "format = \"3dtiles\"" },
 ];
 
-/// Reads and checks the file at `path`; relative paths in it become relative to its directory.
+/// Reads and checks the file at `path`. Relative paths in it count from its directory.
 ///
 /// # Errors
 /// [`Error::Config`] with the offending line if the text is not a valid configuration or the file cannot be read.
@@ -92,7 +92,7 @@ pub fn load(path: &Path) -> Result<JobOptions> {
     Ok(options)
 }
 
-/// Checks a configuration's text; the message of an error shows the line.
+/// Reads and checks the text of a configuration. The error shows the line.
 fn parse(text: &str) -> std::result::Result<JobOptions, String> {
     let file: ConfigFile = toml::from_str(text).map_err(|e| e.to_string())?;
     if file.input.files.is_empty() {
@@ -100,14 +100,16 @@ fn parse(text: &str) -> std::result::Result<JobOptions, String> {
     }
     if file.input.classes.as_ref().is_some_and(Vec::is_empty) {
         return Err(
-            "[input] classes is empty, which would leave no point; leave the key out to keep all but noise".into()
+            "[input] classes is empty, so no point would be left; leave the key out to keep all but noise".into()
         );
     }
     if file.output.directory.as_os_str().is_empty() {
         return Err("[output] directory is empty".into());
     }
     if file.output.height_offset.is_nan() || file.output.height_offset.abs() > MAX_HEIGHT_OFFSET {
-        return Err(format!("[output] height_offset is not a number of metres up to {MAX_HEIGHT_OFFSET}"));
+        return Err(format!(
+            "[output] height_offset must be a number of metres from -{MAX_HEIGHT_OFFSET} to {MAX_HEIGHT_OFFSET}"
+        ));
     }
     let TriangulationTable { backend, max_points_per_tile, voronoi, adapter, texture } = file.triangulation;
     let gpu = GpuOptions {
@@ -125,7 +127,7 @@ fn parse(text: &str) -> std::result::Result<JobOptions, String> {
     })
 }
 
-/// The value of a key that may be in `[gpu]` or, as it was before, in `[triangulation]`.
+/// Returns the value of a key that may be in `[gpu]` or, under its old name, in `[triangulation]`.
 fn one_of<T>(key: &str, in_gpu: Option<T>, in_triangulation: Option<T>) -> std::result::Result<Option<T>, String> {
     match (in_gpu, in_triangulation) {
         (Some(_), Some(_)) => {
@@ -135,7 +137,7 @@ fn one_of<T>(key: &str, in_gpu: Option<T>, in_triangulation: Option<T>) -> std::
     }
 }
 
-/// A warning for every old name in the text.
+/// Returns a warning for every old name in the text.
 fn old_names(text: &str) -> Warnings {
     let mut warnings = Warnings::default();
     let Ok(file) = text.parse::<toml::Table>() else { return warnings };
@@ -152,7 +154,7 @@ fn old_names(text: &str) -> Warnings {
     warnings
 }
 
-/// `directory` as the beginning of a glob pattern: its own special characters are meant literally.
+/// Returns `directory` as the beginning of a glob pattern, with its own special characters escaped.
 fn glob_prefix(directory: &Path) -> String {
     if directory.as_os_str().is_empty() {
         return String::new();

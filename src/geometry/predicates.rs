@@ -46,18 +46,18 @@ pub fn in_circle(a: Site, b: Site, c: Site, d: Site) -> bool {
 const IN_CIRCLE_ERROR_SINGLE: f32 = 1e-6;
 
 /// Many in-circle tests at once, undecided in doubt: built so that compilers make vector instructions of it.
-pub struct Quads {
+pub struct InCircleBatch {
     /// ax, ay, bx, by, cx, cy, each relative to d.
-    differences: [[i32; Quads::LANES]; 6],
+    differences: [[i32; InCircleBatch::LANES]; 6],
 }
 
-impl Default for Quads {
+impl Default for InCircleBatch {
     fn default() -> Self {
-        Quads { differences: [[0; Quads::LANES]; 6] }
+        InCircleBatch { differences: [[0; InCircleBatch::LANES]; 6] }
     }
 }
 
-impl Quads {
+impl InCircleBatch {
     /// How many tests fit.
     pub const LANES: usize = 64;
 
@@ -72,19 +72,19 @@ impl Quads {
 
     /// For each of the first `count` tests whether [`in_circle`] may be true: never false where it is.
     #[inline(always)]
-    pub fn inside_or_in_doubt(&self, count: usize) -> [bool; Quads::LANES] {
+    pub fn inside_or_in_doubt(&self, count: usize) -> [bool; InCircleBatch::LANES] {
         inside_or_in_doubt(&self.differences, count)
     }
 }
 
 // On its own it becomes vector instructions; inlined where it is used, it may not.
 #[multiversion(targets("x86_64+avx2"), attrs(inline(never)))]
-fn inside_or_in_doubt(differences: &[[i32; Quads::LANES]; 6], count: usize) -> [bool; Quads::LANES] {
+fn inside_or_in_doubt(differences: &[[i32; InCircleBatch::LANES]; 6], count: usize) -> [bool; InCircleBatch::LANES] {
     // As arrays of one length, so that nothing is left to check.
     const GROUP: usize = 16;
     let [ax, ay, bx, by, cx, cy] = differences;
-    let mut doubtful = [false; Quads::LANES];
-    for first in (0..count.min(Quads::LANES)).step_by(GROUP) {
+    let mut doubtful = [false; InCircleBatch::LANES];
+    for first in (0..count.min(InCircleBatch::LANES)).step_by(GROUP) {
         for i in first..first + GROUP {
             let (ax, ay, bx, by) = (ax[i] as f32, ay[i] as f32, bx[i] as f32, by[i] as f32);
             let (cx, cy) = (cx[i] as f32, cy[i] as f32);
@@ -168,9 +168,9 @@ mod tests {
             if orient2d(a, b, c) == 0 || [c, d].iter().flatten().any(|v| v.abs() > 1 << 29) {
                 continue;
             }
-            let mut quads = Quads::default();
-            quads.set(17, a, b, c, d);
-            let doubtful = quads.inside_or_in_doubt(18)[17];
+            let mut batch = InCircleBatch::default();
+            batch.set(17, a, b, c, d);
+            let doubtful = batch.inside_or_in_doubt(18)[17];
             let exact = in_circle_determinant(a, b, c, d);
             assert_eq!(in_circle(a, b, c, d), exact > 0 || (exact == 0 && tie(a, b, c, d)));
             assert!(doubtful || exact < 0, "{a:?} {b:?} {c:?} {d:?}");

@@ -2,23 +2,23 @@
 
 use serde::{Deserialize, Serialize};
 
-/// `[gpu]`: how a GPU is used, never what for: the mesh is the same whatever stands here.
+/// `[gpu]`: how a GPU is used. The mesh is the same with every choice.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct GpuOptions {
     /// How a GPU computes the discrete Voronoi diagram.
     pub voronoi: VoronoiMethod,
-    /// A part of the name of the GPU to take; `None`: what the environment names, or the fastest kind.
+    /// A part of the name of the GPU to use. `None` takes the one that the environment names, or the fastest kind.
     pub adapter: Option<String>,
     /// The side of the pipeline's texture on a GPU.
     pub texture: TextureSide,
 }
 
-/// How a GPU computes the discrete VoronoiMethod diagram. The mesh is the same either way.
+/// How a GPU computes the discrete Voronoi diagram. The mesh is the same either way.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum VoronoiMethod {
-    /// The exact transform, which is the faster one.
+    /// The exact transform, because it is faster.
     #[default]
     Auto,
     /// The exact transform: columns, then rows.
@@ -31,10 +31,10 @@ pub enum VoronoiMethod {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "toml::Value", into = "String")]
 pub enum TextureSide {
-    /// What suits the adapter.
+    /// Chosen by the number of sites, within what the adapter supports.
     #[default]
     Auto,
-    /// The largest that the adapter has.
+    /// The largest that the adapter supports.
     Max,
     /// This many pixels.
     Side(u32),

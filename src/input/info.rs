@@ -4,17 +4,18 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::input::{Crs, Format, Source};
+use crate::input::crs::system::Crs;
+use crate::input::source::{FileFormat, Source};
 
 /// The answer of `info`. `Display` gives it for people, `Serialize` for programs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Description {
+pub struct SourceDescription {
     /// The file.
     pub file: String,
     /// Bytes of the file.
     pub size: u64,
     /// How it holds its points.
-    pub format: Format,
+    pub format: FileFormat,
     /// LAS version, as in "1.4".
     pub version: Option<String>,
     /// LAS point format.
@@ -36,7 +37,7 @@ pub struct Description {
     /// Whether points have a classification.
     pub classification: bool,
     /// Independent parts it is decoded in.
-    pub pieces: usize,
+    pub chunks: usize,
     /// The coordinate reference system.
     pub crs: Crs,
     /// Metres of one unit of x and y.
@@ -46,9 +47,9 @@ pub struct Description {
 }
 
 /// What `source` holds.
-pub fn describe(source: &Source) -> Description {
+pub fn describe(source: &Source) -> SourceDescription {
     let last = source.by_return.iter().rposition(|&count| count > 0).map_or(0, |last| last + 1);
-    Description {
+    SourceDescription {
         file: source.path.display().to_string(),
         size: source.size,
         format: source.format,
@@ -62,19 +63,19 @@ pub fn describe(source: &Source) -> Description {
         offset: source.axes.map(|axis| axis.offset.to_string()),
         color: source.has_rgb,
         classification: source.has_class,
-        pieces: source.pieces(),
+        chunks: source.chunks(),
         crs: source.crs.clone(),
         metres_per_unit: source.crs.metres_per_unit(),
         warnings: source.warnings.clone(),
     }
 }
 
-impl Description {
+impl SourceDescription {
     fn kind(&self) -> String {
         let name = match self.format {
-            Format::Las => "LAS",
-            Format::Laz => "LAZ",
-            Format::Text => "text",
+            FileFormat::Las => "LAS",
+            FileFormat::Laz => "LAZ",
+            FileFormat::Text => "text",
         };
         match (&self.version, self.point_format) {
             (Some(version), Some(format)) => format!("{name} {version}, point format {format}"),
@@ -96,7 +97,7 @@ impl Description {
     }
 }
 
-impl fmt::Display for Description {
+impl fmt::Display for SourceDescription {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         writeln!(f, "{}", self.file)?;
         writeln!(f, "  format   {}, {} bytes", self.kind(), self.size)?;

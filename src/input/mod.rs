@@ -1,22 +1,21 @@
-//! Point clouds in: what a file holds, and its points on the lattice, piece by piece.
+//! Point clouds in: what a file holds, and its points on the lattice, chunk by chunk.
 //!
-//! [`open`] looks at one file and gives a [`Source`]; its pieces are decoded independently on any thread. On the way every
-//! record passes the [`Rules`], and the [`Tally`] says what became of each.
+//! [`open`] looks at one file and gives a [`Source`]; its chunks are decoded independently on any thread. On the way every
+//! record passes the [`PointRules`], and the [`PointCounts`] says what became of each.
 
-mod catch_panic;
-pub mod crs;
+mod crs;
 mod file;
-mod filter;
 pub mod info;
 mod las;
 pub mod options;
-mod point;
-mod rules;
+mod points;
 mod source;
-pub mod text;
+mod text;
 
-pub use crs::{Crs, Unit};
-pub use point::Point;
-pub use rules::{Rules, Tally};
-pub use source::{Axis, Format, Source, open};
-pub use text::TextOptions;
+pub use crs::system::Crs;
+pub use crs::unit::Unit;
+pub use points::axis::Axis;
+pub use points::point::Point;
+pub use points::rules::{PointCounts, PointRules};
+pub use source::{FileFormat, Source, open};
+pub use text::options::TextOptions;

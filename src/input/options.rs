@@ -1,7 +1,7 @@
 //! The options of `[input]`.
 
 use crate::geometry::lattice::shortest_decimal;
-use crate::input::TextOptions;
+use crate::input::text::options::TextOptions;
 use rust_decimal::Decimal;
 use serde::{Deserialize, Serialize};
 

@@ -1,45 +1,30 @@
-//! A point cloud that has been looked at and can be decoded piece by piece.
+//! A point cloud that has been looked at and can be decoded chunk by chunk.
 
 use std::path::{Path, PathBuf};
 
 use rust_decimal::Decimal;
-use rust_decimal::prelude::ToPrimitive;
 use serde::{Deserialize, Serialize};
 
-use crate::input::file::Positioned;
-use crate::input::filter::Sieve;
-use crate::input::las::header::Header;
-use crate::input::las::layout::Layout;
-use crate::input::las::laz::Chunks;
-use crate::input::las::uncompressed::Records;
+use crate::input::crs::system::Crs;
+use crate::input::file::random_access::RandomAccessFile;
+use crate::input::las::crs_records;
+use crate::input::las::header::LasHeader;
+use crate::input::las::layout::RecordLayout;
+use crate::input::las::laz::CompressedPoints;
+use crate::input::las::uncompressed::UncompressedPoints;
 use crate::input::las::vlr;
-use crate::input::rules::{Rules, Tally};
-use crate::input::text::{Table, TextOptions};
-use crate::input::{Crs, Point, crs};
+use crate::input::points::axis::Axis;
+use crate::input::points::filter::PointFilter;
+use crate::input::points::point::Point;
+use crate::input::points::rules::{PointCounts, PointRules};
+use crate::input::text::options::TextOptions;
+use crate::input::text::table::TextTable;
 use crate::{Error, Result};
-
-/// The exact meaning of the raw integers on one axis: `value = offset + scale * raw`, in the source's unit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Axis {
-    /// The value of raw integer 0.
-    pub offset: Decimal,
-    /// The step from one raw integer to the next, above 0.
-    pub scale: Decimal,
-}
-
-impl Axis {
-    /// The value of `raw`, correctly rounded where it fits 28 digits.
-    pub fn value(&self, raw: i64) -> f64 {
-        let exact = self.scale.checked_mul(Decimal::from(raw)).and_then(|product| product.checked_add(self.offset));
-        let float = |d: Decimal| d.to_f64().unwrap_or(f64::NAN);
-        exact.map_or_else(|| float(self.offset) + float(self.scale) * raw as f64, float)
-    }
-}
 
 /// How a file holds its points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Format {
+pub enum FileFormat {
     /// Uncompressed LAS.
     Las,
     /// Compressed LAS, COPC included.
@@ -57,7 +42,7 @@ pub struct Source {
     /// Its size in bytes when it was looked at; a change later is an error.
     pub size: u64,
     /// How it holds its points.
-    pub format: Format,
+    pub format: FileFormat,
     /// LAS version, major and minor; `None` for text.
     pub version: Option<[u8; 2]>,
     /// LAS point format, 0 to 10; `None` for text.
@@ -85,14 +70,14 @@ pub struct Source {
     pub by_return: Vec<u64>,
     /// What the user should know.
     pub warnings: Vec<String>,
-    body: Body,
+    body: PointData,
 }
 
 #[derive(Clone, Debug)]
-enum Body {
-    Las(Records),
-    Laz(Chunks),
-    Text(Table),
+enum PointData {
+    Las(UncompressedPoints),
+    Laz(CompressedPoints),
+    Text(TextTable),
 }
 
 /// Looks at the file at `path`: reads the header of LAS or LAZ, or all of a text once, on the threads of the current
@@ -102,7 +87,7 @@ enum Body {
 /// `Input` where the file is not a point cloud or is damaged beyond reading, `Io` where it cannot be read, `Config` where
 /// `text` contradicts itself.
 pub fn open(path: &Path, text: &TextOptions) -> Result<Source> {
-    let file = Positioned::open(path)?;
+    let file = RandomAccessFile::open(path)?;
     let mut start = [0; 64];
     let held = file.size().min(start.len() as u64) as usize;
     file.read_exact_at(&mut start[..held], 0)?;
@@ -138,16 +123,16 @@ fn refuse(path: &Path, start: &[u8]) -> Result<()> {
     Ok(())
 }
 
-fn open_las(file: &Positioned) -> Result<Source> {
-    let (header, mut warnings) = Header::read(file)?;
+fn open_las(file: &RandomAccessFile) -> Result<Source> {
+    let (header, mut warnings) = LasHeader::read(file)?;
     let vlrs = vlr::list(file, &header, &mut warnings)?;
-    let crs = crs::read(file, &vlrs, &mut warnings)?;
+    let crs = crs_records::read(file, &vlrs, &mut warnings)?;
     let (missing, body) = if header.compressed {
-        let chunks = Chunks::read(file, &header, &vlrs, &mut warnings)?;
-        (chunks.missing, Body::Laz(chunks))
+        let chunks = CompressedPoints::read(file, &header, &vlrs, &mut warnings)?;
+        (chunks.missing, PointData::Laz(chunks))
     } else {
-        let records = Records::new(&header, file.size());
-        (records.missing, Body::Las(records))
+        let records = UncompressedPoints::new(&header, file.size());
+        (records.missing, PointData::Las(records))
     };
     if missing > 0 {
         let held = header.records - missing;
@@ -156,7 +141,7 @@ fn open_las(file: &Positioned) -> Result<Source> {
     Ok(Source {
         path: file.path().to_path_buf(),
         size: file.size(),
-        format: if header.compressed { Format::Laz } else { Format::Las },
+        format: if header.compressed { FileFormat::Laz } else { FileFormat::Las },
         version: Some([1, header.minor]),
         point_format: Some(header.format),
         records: header.records,
@@ -165,7 +150,7 @@ fn open_las(file: &Positioned) -> Result<Source> {
         max: header.max,
         axes: header.axes,
         grid: [header.axes[0].scale, header.axes[1].scale],
-        has_rgb: Layout::new(header.format, header.record_length).has_rgb(),
+        has_rgb: RecordLayout::new(header.format, header.record_length).has_rgb(),
         has_class: true,
         crs,
         by_return: header.by_return,
@@ -174,12 +159,12 @@ fn open_las(file: &Positioned) -> Result<Source> {
     })
 }
 
-fn open_text(file: &Positioned, options: &TextOptions) -> Result<Source> {
-    let (table, warnings) = Table::scan(file, options)?;
+fn open_text(file: &RandomAccessFile, options: &TextOptions) -> Result<Source> {
+    let (table, warnings) = TextTable::scan(file, options)?;
     Ok(Source {
         path: file.path().to_path_buf(),
         size: file.size(),
-        format: Format::Text,
+        format: FileFormat::Text,
         version: None,
         point_format: None,
         records: table.records,
@@ -193,34 +178,39 @@ fn open_text(file: &Positioned, options: &TextOptions) -> Result<Source> {
         crs: Crs::default(),
         by_return: Vec::new(),
         warnings,
-        body: Body::Text(table),
+        body: PointData::Text(table),
     })
 }
 
 impl Source {
     /// The number of independent parts, of about 50,000 records each where the format allows; 0 for a file without records.
-    pub fn pieces(&self) -> usize {
+    pub fn chunks(&self) -> usize {
         match &self.body {
-            Body::Las(records) => records.pieces(),
-            Body::Laz(chunks) => chunks.pieces(),
-            Body::Text(table) => table.pieces(),
+            PointData::Las(records) => records.chunks(),
+            PointData::Laz(chunks) => chunks.chunks(),
+            PointData::Text(table) => table.chunks(),
         }
     }
 
-    /// Decodes part `piece` (below [`Source::pieces`]) and hands the points that pass `rules` to `sink` in record order, at
-    /// most 65,536 at a time. The point of record `i` of the source gets the order `rules.first_order + i`. Records that
+    /// Decodes part `chunk` (below [`Source::chunks`]) and hands the points that pass `rules` to `sink` in record order, at
+    /// most 65,536 at a time. The point of record `i` of the source gets the order `rules.first_order + i`. UncompressedPoints that
     /// cannot be read are counted as malformed; whether that is too many is for the caller to say.
     ///
     /// # Errors
     /// `Io` or `Input` where the file cannot be read or has changed since, and what `sink` returns.
-    pub fn decode(&self, piece: usize, rules: &Rules, sink: &mut dyn FnMut(&[Point]) -> Result<()>) -> Result<Tally> {
-        let file = Positioned::reopen(&self.path, self.size)?;
-        let mut sieve = Sieve::new(&self.path, &self.axes, rules, sink);
+    pub fn decode(
+        &self,
+        chunk: usize,
+        rules: &PointRules,
+        sink: &mut dyn FnMut(&[Point]) -> Result<()>,
+    ) -> Result<PointCounts> {
+        let file = RandomAccessFile::reopen(&self.path, self.size)?;
+        let mut filter = PointFilter::new(&self.path, &self.axes, rules, sink);
         match &self.body {
-            Body::Las(records) => records.decode(&file, piece, rules, &mut sieve)?,
-            Body::Laz(chunks) => chunks.decode(&file, piece, rules, &mut sieve)?,
-            Body::Text(table) => table.decode(&file, piece, &mut sieve)?,
+            PointData::Las(records) => records.decode(&file, chunk, rules, &mut filter)?,
+            PointData::Laz(chunks) => chunks.decode(&file, chunk, rules, &mut filter)?,
+            PointData::Text(table) => table.decode(&file, chunk, &mut filter)?,
         }
-        sieve.finish()
+        filter.finish()
     }
 }

@@ -3,12 +3,13 @@
 use crate::Warnings;
 use crate::gpu::options::GpuOptions;
 use crate::input::options::InputOptions;
+use crate::job::progress::stage::ProgressOutput;
 use crate::output::options::OutputOptions;
 use crate::triangulation::options::TriangulationOptions;
 use serde::{Deserialize, Serialize};
 
 /// Everything that a user says about a job.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct JobOptions {
     /// What to read.
     pub input: InputOptions,
@@ -31,6 +32,23 @@ impl JobOptions {
             0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
             n => n,
         }
+    }
+}
+
+/// How a job is run. Neither the mesh nor the files depend on it.
+#[derive(Clone, Copy, Debug)]
+pub struct RunOptions {
+    /// Where progress goes.
+    pub progress: ProgressOutput,
+    /// Whether to run though the disk or the memory seems too small.
+    pub force: bool,
+    /// Whether to start over instead of going on with an interrupted run.
+    pub restart: bool,
+}
+
+impl From<ProgressOutput> for RunOptions {
+    fn from(progress: ProgressOutput) -> RunOptions {
+        RunOptions { progress, force: false, restart: false }
     }
 }
 

@@ -1,36 +1,118 @@
-//! What the steps leave for each other in the job's store, one type a record.
+//! The contract between steps: what each writes to the job's store for later ones, one type for each kind of record, and what the
+//! steps are called in the journal.
 
-use crate::geometry::Site;
+use crate::geometry::{Bounds, Site};
 use crate::input::Point;
 use crate::job::durable::columns::{ColumnReader, ColumnWriter};
-use crate::job::durable::store::{Key, Store, Stored};
+use crate::job::durable::journal::{self, StepKey};
+use crate::job::durable::store::{self, RecordKey};
+use crate::job::index::{NodeIndex, TileIndex};
 use crate::output::normals::NormalSum;
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
+use serde::{Deserialize, Serialize};
 
-/// A site as other tiles know it. Sites are numbered by tile, then in the order of the tile.
+/// The store of a job.
+pub type Store = store::Store<StepRecord>;
+/// A record of a job's store as the journal knows it.
+pub type RecordRef = store::RecordRef<StepRecord>;
+/// What a finished step of a job gives back.
+pub type StepOutput<T> = journal::StepOutput<T, StepRecord>;
+/// The journal of a job.
+pub type Journal<'a> = journal::Journal<'a, JobStep, StepRecord>;
+/// A line of a job's journal.
+pub type JournalEntry = journal::JournalEntry<JobStep, StepRecord>;
+
+/// A step of a job, for one tile or one tree node where it runs once for each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub enum JobStep {
+    /// Reads the points and cuts the plane into tiles.
+    Partition,
+    /// Triangulates a tile.
+    Leaf(TileIndex),
+    /// Merges what the nodes below a node left pending.
+    Merge(NodeIndex),
+    /// Finishes the normals on a tile's border.
+    BorderNormals(TileIndex),
+    /// Writes a tile.
+    WriteTile(TileIndex),
+    /// Makes a coarser tile.
+    Level(NodeIndex),
+    /// Writes what is beside the tiles, except the report.
+    Publish,
+    /// Writes the report: the job is complete.
+    Report,
+}
+
+impl StepKey for JobStep {}
+
+/// A kind of record, and the tile or tree node that it belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum StepRecord {
+    /// [`Leaf`]
+    Leaf(TileIndex),
+    /// [`Frontier`]
+    Frontier(NodeIndex),
+    /// [`PartialNormals`]
+    PartialNormals(TileIndex),
+    /// [`Seam`]
+    Seam(NodeIndex),
+    /// [`FinishedBorder`]
+    FinishedBorder(TileIndex),
+    /// The pixels of the preview that a tile covers.
+    Pixels(TileIndex),
+    /// The result of the step that reads the points.
+    Partition,
+    /// [`LevelSummary`]
+    Level(NodeIndex),
+    /// [`TileSummary`] of an exact tile.
+    Tile(TileIndex),
+}
+
+impl RecordKey for StepRecord {
+    fn code(self) -> [u32; 2] {
+        match self {
+            StepRecord::Leaf(tile) => [1, tile.0],
+            StepRecord::Frontier(node) => [2, node.0],
+            StepRecord::PartialNormals(tile) => [3, tile.0],
+            StepRecord::Seam(node) => [4, node.0],
+            StepRecord::FinishedBorder(tile) => [5, tile.0],
+            StepRecord::Pixels(tile) => [6, tile.0],
+            StepRecord::Partition => [7, 0],
+            StepRecord::Level(node) => [8, node.0],
+            StepRecord::Tile(tile) => [9, tile.0],
+        }
+    }
+}
+
+/// A site on the border of a tile, as other tiles know it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Pod, Zeroable)]
-pub struct Rim {
+pub struct BorderVertex {
     /// The tile that owns the site.
-    pub tile: u32,
-    /// Its number in that tile.
+    pub tile: TileIndex,
+    /// The number of the site in that tile.
     pub site: u32,
     /// Lattice integers x, y, z.
     pub position: [i32; 3],
 }
 
-impl Rim {
-    /// Where it lies in the plane.
+impl BorderVertex {
+    /// Returns its x and y.
     pub fn plane(&self) -> Site {
         [self.position[0], self.position[1]]
     }
 }
 
-/// A triangle of the seam, counterclockwise.
-pub type SeamTriangle = [Rim; 3];
+/// A triangle of a seam, counterclockwise.
+pub type SeamTriangle = [BorderVertex; 3];
 
-/// The sites of a tile, in order, and the triangles closed in its leaf.
+/// Returns the tile that a triangle of a seam belongs to: that of its first corner in the order of tiles.
+pub fn owner(triangle: &SeamTriangle) -> TileIndex {
+    triangle[0].tile.min(triangle[1].tile).min(triangle[2].tile)
+}
+
+/// The sites of a tile, in order, and the triangles that its leaf makes final.
 #[derive(Debug, Default)]
 pub struct Leaf {
     /// Lattice integers x, y, z of the sites.
@@ -39,53 +121,63 @@ pub struct Leaf {
     pub rgb: Vec<[u16; 3]>,
     /// Their classes.
     pub class: Vec<u8>,
-    /// The closed triangles as numbers of sites, counterclockwise.
+    /// The final triangles as numbers of sites, counterclockwise.
     pub triangles: Vec<[u32; 3]>,
 }
 
 impl Leaf {
-    /// Writes the record of `tile`, whose sites are those of `points`; with it, how many triangles there are.
+    /// Writes the record of `tile`, whose sites are `points`. Returns the record and the number of triangles.
     ///
     /// # Errors
-    /// [`crate::Error::Io`].
+    /// [`Error::Io`].
     pub fn save(
         store: &Store,
-        tile: usize,
+        tile: TileIndex,
         points: &[Point],
         triangles: impl Iterator<Item = [u32; 3]>,
-    ) -> Result<(Stored, u64)> {
+    ) -> Result<(RecordRef, u64)> {
+        let key = StepRecord::Leaf(tile);
         let positions: Vec<[i32; 3]> = points.iter().map(Point::corner).collect();
         let rgb: Vec<[u16; 3]> = points.iter().map(|p| p.rgb).collect();
         let class: Vec<u8> = points.iter().map(|p| p.class).collect();
         let columns = ColumnWriter::default().push(&positions).push(&rgb).push(&class);
-        // These records are most of what a job writes on its way: corners take two bytes where that is enough.
+        // These records are most of what a job stores: corners take two bytes where that is enough.
         if has_short_corners(&positions) {
             let triangles: Vec<[u16; 3]> = triangles.map(|t| t.map(|v| v as u16)).collect();
-            Ok((columns.push(&triangles).write(store, Key::Leaf(tile))?, triangles.len() as u64))
+            Ok((columns.push(&triangles).write(store, key)?, triangles.len() as u64))
         } else {
             let triangles: Vec<[u32; 3]> = triangles.collect();
-            Ok((columns.push(&triangles).write(store, Key::Leaf(tile))?, triangles.len() as u64))
+            Ok((columns.push(&triangles).write(store, key)?, triangles.len() as u64))
         }
     }
 
     /// Reads the record of `tile`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if there is none.
-    pub fn load(store: &Store, tile: usize) -> Result<Leaf> {
-        let mut columns = ColumnReader::open(store, Key::Leaf(tile))?;
+    /// [`Error::Io`], or [`Error::Broken`] if there is none.
+    pub fn load(store: &Store, tile: TileIndex) -> Result<Leaf> {
+        let mut columns = ColumnReader::open(store, StepRecord::Leaf(tile))?;
         let mut leaf = Leaf {
-            positions: columns.column()?,
-            rgb: columns.column()?,
-            class: columns.column()?,
+            positions: columns.column()?.to_vec(),
+            rgb: columns.column()?.to_vec(),
+            class: columns.column()?.to_vec(),
             triangles: Vec::new(),
         };
         leaf.triangles = if has_short_corners(&leaf.positions) {
-            columns.column::<[u16; 3]>()?.into_iter().map(|t| t.map(u32::from)).collect()
+            columns.column::<[u16; 3]>()?.iter().map(|t| t.map(u32::from)).collect()
         } else {
-            columns.column()?
+            columns.column()?.to_vec()
         };
         Ok(leaf)
+    }
+
+    /// Calls `visit` with the positions of the sites of `tile`, without reading the rest of its record.
+    ///
+    /// # Errors
+    /// As [`Leaf::load`].
+    pub fn visit_positions(store: &Store, tile: TileIndex, visit: impl FnMut(&[i32; 3])) -> Result<()> {
+        ColumnReader::open(store, StepRecord::Leaf(tile))?.column::<[i32; 3]>()?.iter().for_each(visit);
+        Ok(())
     }
 }
 
@@ -93,12 +185,12 @@ fn has_short_corners(positions: &[[i32; 3]]) -> bool {
     positions.len() <= 1 << 16
 }
 
-/// What a node hands to its parent.
+/// What a node passes to the merge node above it.
 #[derive(Debug, Default)]
 pub struct Frontier {
-    /// The sites the parent still needs, ascending.
-    pub sites: Vec<Rim>,
-    /// The directed edges round the closed ground, as positions in `sites`.
+    /// The sites that the merge above still needs, ascending.
+    pub sites: Vec<BorderVertex>,
+    /// The directed edges around the final ground, as positions in `sites`.
     pub boundary: Vec<[u32; 2]>,
 }
 
@@ -106,29 +198,29 @@ impl Frontier {
     /// Writes the record of `node`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`].
-    pub fn save(&self, store: &Store, node: usize) -> Result<Stored> {
-        ColumnWriter::default().push(&self.sites).push(&self.boundary).write(store, Key::Frontier(node))
+    /// [`Error::Io`].
+    pub fn save(&self, store: &Store, node: NodeIndex) -> Result<RecordRef> {
+        ColumnWriter::default().push(&self.sites).push(&self.boundary).write(store, StepRecord::Frontier(node))
     }
 
     /// Reads the record of `node`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if there is none.
-    pub fn load(store: &Store, node: usize) -> Result<Frontier> {
-        let mut columns = ColumnReader::open(store, Key::Frontier(node))?;
-        Ok(Frontier { sites: columns.column()?, boundary: columns.column()? })
+    /// [`Error::Io`], or [`Error::Broken`] if there is none.
+    pub fn load(store: &Store, node: NodeIndex) -> Result<Frontier> {
+        let mut columns = ColumnReader::open(store, StepRecord::Frontier(node))?;
+        Ok(Frontier { sites: columns.column()?.to_vec(), boundary: columns.column()?.to_vec() })
     }
 
-    /// The tiles that have sites in it, ascending.
-    pub fn tiles(&self) -> Vec<u32> {
-        let mut tiles: Vec<u32> = self.sites.iter().map(|rim| rim.tile).collect();
+    /// Returns the tiles that own sites of it, ascending.
+    pub fn tiles(&self) -> Vec<TileIndex> {
+        let mut tiles: Vec<TileIndex> = self.sites.iter().map(|vertex| vertex.tile).collect();
         tiles.dedup();
         tiles
     }
 }
 
-/// The triangles that an inner node contributes, by tile: a triangle stands once for each tile that owns a corner of it.
+/// The triangles that a merge node makes final, sorted by tile. A triangle is listed once for each tile that owns a corner of it.
 #[derive(Debug, Default)]
 pub struct Seam {
     /// Tile, first triangle and number of triangles, by ascending tile.
@@ -137,9 +229,9 @@ pub struct Seam {
 }
 
 impl Seam {
-    /// Sorts `triangles` by the tiles they touch.
+    /// Sorts `triangles` by the tiles that they touch.
     pub fn new(triangles: &[SeamTriangle]) -> Seam {
-        let mut touching: Vec<(u32, SeamTriangle)> = Vec::with_capacity(triangles.len() * 2);
+        let mut touching: Vec<(TileIndex, SeamTriangle)> = Vec::with_capacity(triangles.len() * 2);
         for triangle in triangles {
             let mut tiles = triangle.map(|corner| corner.tile);
             tiles.sort_unstable();
@@ -149,8 +241,8 @@ impl Seam {
         let mut seam = Seam::default();
         for (tile, triangle) in touching {
             match seam.index.last_mut() {
-                Some([last, _, count]) if *last == tile => *count += 1,
-                _ => seam.index.push([tile, seam.triangles.len() as u32, 1]),
+                Some([last, _, count]) if *last == tile.0 => *count += 1,
+                _ => seam.index.push([tile.0, seam.triangles.len() as u32, 1]),
             }
             seam.triangles.push(triangle);
         }
@@ -160,29 +252,29 @@ impl Seam {
     /// Writes the record of `node`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`].
-    pub fn save(&self, store: &Store, node: usize) -> Result<Stored> {
-        ColumnWriter::default().push(&self.index).push(&self.triangles).write(store, Key::Seam(node))
+    /// [`Error::Io`].
+    pub fn save(&self, store: &Store, node: NodeIndex) -> Result<RecordRef> {
+        ColumnWriter::default().push(&self.index).push(&self.triangles).write(store, StepRecord::Seam(node))
     }
 
-    /// The triangles of `node` that touch `tile`, from its record.
+    /// Reads from the record of `node` the triangles that touch `tile`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if there is none.
-    pub fn touching(store: &Store, node: usize, tile: usize) -> Result<Vec<SeamTriangle>> {
-        let mut columns = ColumnReader::open(store, Key::Seam(node))?;
-        let index: Vec<[u32; 3]> = columns.column()?;
-        match index.binary_search_by_key(&(tile as u32), |entry| entry[0]) {
-            Ok(at) => columns.column_part(index[at][1] as usize, index[at][2] as usize),
+    /// [`Error::Io`], or [`Error::Broken`] if there is no record.
+    pub fn touching(store: &Store, node: NodeIndex, tile: TileIndex) -> Result<Vec<SeamTriangle>> {
+        let mut columns = ColumnReader::open(store, StepRecord::Seam(node))?;
+        let index = columns.column::<[u32; 3]>()?;
+        match index.binary_search_by_key(&tile.0, |entry| entry[0]) {
+            Ok(at) => Ok(columns.column_part(index[at][1] as usize, index[at][2] as usize)?.to_vec()),
             Err(_) => Ok(Vec::new()),
         }
     }
 }
 
-/// The frontier of one leaf as far as the leaf knows it, each column in the order of [`Frontier::sites`].
+/// What a leaf knows of its frontier before the seams are known; each column is in the order of [`Frontier::sites`].
 #[derive(Debug, Default)]
-pub struct RimDraft {
-    /// The sums of normals over the leaf's closed triangles around the site.
+pub struct PartialNormals {
+    /// The sum of the normals of the leaf's final triangles around each site.
     pub sums: Vec<NormalSum>,
     /// Colours as read.
     pub rgb: Vec<[u16; 3]>,
@@ -190,32 +282,37 @@ pub struct RimDraft {
     pub class: Vec<u8>,
 }
 
-impl RimDraft {
+impl PartialNormals {
     /// Writes the record of `tile`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`].
-    pub fn save(&self, store: &Store, tile: usize) -> Result<Stored> {
-        ColumnWriter::default().push(&self.sums).push(&self.rgb).push(&self.class).write(store, Key::RimDraft(tile))
+    /// [`Error::Io`].
+    pub fn save(&self, store: &Store, tile: TileIndex) -> Result<RecordRef> {
+        let columns = ColumnWriter::default().push(&self.sums).push(&self.rgb).push(&self.class);
+        columns.write(store, StepRecord::PartialNormals(tile))
     }
 
     /// Reads the record of `tile`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if there is none.
-    pub fn load(store: &Store, tile: usize) -> Result<RimDraft> {
-        let mut columns = ColumnReader::open(store, Key::RimDraft(tile))?;
-        Ok(RimDraft { sums: columns.column()?, rgb: columns.column()?, class: columns.column()? })
+    /// [`Error::Io`], or [`Error::Broken`] if there is none.
+    pub fn load(store: &Store, tile: TileIndex) -> Result<PartialNormals> {
+        let mut columns = ColumnReader::open(store, StepRecord::PartialNormals(tile))?;
+        Ok(PartialNormals {
+            sums: columns.column()?.to_vec(),
+            rgb: columns.column()?.to_vec(),
+            class: columns.column()?.to_vec(),
+        })
     }
 }
 
-/// A finished vertex of a tile's frontier, as neighbouring tiles need it.
+/// A finished vertex on the border of a tile, with what the neighbouring tiles write of it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-pub struct RimVertex {
+pub struct BorderAttributes {
     /// Its number in its tile.
     pub site: u32,
-    /// Unit normal, source axes, metres.
+    /// Unit normal along the source's axes, from lengths in metres.
     pub normal: [f32; 3],
     /// Colour as read.
     pub rgb: [u16; 3],
@@ -225,27 +322,28 @@ pub struct RimVertex {
 
 /// The finished frontier of one leaf, by ascending site.
 #[derive(Debug)]
-pub struct RimVertices(pub Vec<RimVertex>);
+pub struct FinishedBorder(pub Vec<BorderAttributes>);
 
-impl RimVertices {
+impl FinishedBorder {
     /// Writes the record of `tile`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`].
-    pub fn save(&self, store: &Store, tile: usize) -> Result<Stored> {
-        ColumnWriter::default().push(&self.0).write(store, Key::Rim(tile))
+    /// [`Error::Io`].
+    pub fn save(&self, store: &Store, tile: TileIndex) -> Result<RecordRef> {
+        ColumnWriter::default().push(&self.0).write(store, StepRecord::FinishedBorder(tile))
     }
 
     /// Reads the record of `tile`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if there is none.
-    pub fn load(store: &Store, tile: usize) -> Result<RimVertices> {
-        Ok(RimVertices(ColumnReader::open(store, Key::Rim(tile))?.column()?))
+    /// [`Error::Io`], or [`Error::Broken`] if there is none.
+    pub fn load(store: &Store, tile: TileIndex) -> Result<FinishedBorder> {
+        let mut columns = ColumnReader::open(store, StepRecord::FinishedBorder(tile))?;
+        Ok(FinishedBorder(columns.column()?.to_vec()))
     }
 
-    /// The vertex of `site`.
-    pub fn find(&self, site: u32) -> Option<&RimVertex> {
+    /// Returns the vertex of `site`.
+    pub fn find(&self, site: u32) -> Option<&BorderAttributes> {
         self.0.binary_search_by_key(&site, |vertex| vertex.site).ok().map(|at| &self.0[at])
     }
 }
@@ -253,72 +351,74 @@ impl RimVertices {
 /// What `tileset.json` says of a tile.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-pub struct LevelTile {
-    /// The greatest vertical distance to the exact mesh, metres.
+pub struct TileSummary {
+    /// The greatest vertical distance to the exact mesh in metres.
     pub error: f64,
-    /// The least and greatest lattice x, y, z of the exact mesh below; the least are greater where there is none.
+    /// The least and greatest lattice x, y, z of the exact mesh below. Without a triangle, the least are greater.
     corners: [[i32; 3]; 2],
-    /// Whether there is a GLB: 1 or 0.
+    /// 1 if there is a GLB, else 0.
     pub content: u32,
     unused: u32,
 }
 
-impl LevelTile {
-    /// A tile of the exact mesh within `bounds`, with or without content.
-    pub fn new(bounds: Option<[[i32; 3]; 2]>, content: bool) -> LevelTile {
-        LevelTile { error: 0.0, corners: bounds.unwrap_or([[1; 3], [0; 3]]), content: content.into(), unused: 0 }
+impl TileSummary {
+    /// Returns the summary of a tile over the exact mesh within `bounds`, with or without a GLB.
+    pub fn new(bounds: Option<Bounds<3>>, content: bool) -> TileSummary {
+        let corners = bounds.map_or([[1; 3], [0; 3]], |bounds| [bounds.min, bounds.max]);
+        TileSummary { error: 0.0, corners, content: content.into(), unused: 0 }
     }
 
-    /// Stores it as that of exact tile `tile`.
+    /// Writes the record of exact tile `tile`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`].
-    pub fn save(&self, store: &Store, tile: usize) -> Result<Stored> {
-        ColumnWriter::default().push(&[*self]).write(store, Key::Tile(tile))
+    /// [`Error::Io`].
+    pub fn save(&self, store: &Store, tile: TileIndex) -> Result<RecordRef> {
+        ColumnWriter::default().push(&[*self]).write(store, StepRecord::Tile(tile))
     }
 
-    /// That of exact tile `tile`.
+    /// Reads the record of exact tile `tile`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if it is not there or not whole.
-    pub fn load(store: &Store, tile: usize) -> Result<LevelTile> {
-        let own = ColumnReader::open(store, Key::Tile(tile))?.column()?;
+    /// [`Error::Io`], or [`Error::Broken`] if it is missing or damaged.
+    pub fn load(store: &Store, tile: TileIndex) -> Result<TileSummary> {
+        let own = ColumnReader::open(store, StepRecord::Tile(tile))?.column()?;
         let [own] = own[..] else { return Err(Error::Broken(format!("the record of tile {tile} is damaged"))) };
         Ok(own)
     }
 
-    /// The least and greatest lattice x, y, z; `None` where there is no triangle below.
-    pub fn bounds(&self) -> Option<[[i32; 3]; 2]> {
-        (self.corners[0][0] <= self.corners[1][0]).then_some(self.corners)
+    /// Returns the box of the exact mesh below; `None` if it has no triangle.
+    pub fn bounds(&self) -> Option<Bounds<3>> {
+        let [min, max] = self.corners;
+        (min[0] <= max[0]).then_some(Bounds { min, max })
     }
 }
 
 /// What a coarser tile leaves for the tile above it and for `tileset.json`.
 #[derive(Debug)]
-pub struct Level {
+pub struct LevelSummary {
     /// The tile itself.
-    pub own: LevelTile,
+    pub own: TileSummary,
     /// The exact tiles among its children, in their order.
-    pub leaves: Vec<LevelTile>,
+    pub leaves: Vec<TileSummary>,
 }
 
-impl Level {
-    /// Stores it as that of `node`.
+impl LevelSummary {
+    /// Writes the record of the coarser tile at `node`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`].
-    pub fn save(&self, store: &Store, node: usize) -> Result<Stored> {
-        ColumnWriter::default().push(&[self.own]).push(&self.leaves).write(store, Key::Level(node))
+    /// [`Error::Io`].
+    pub fn save(&self, store: &Store, node: NodeIndex) -> Result<RecordRef> {
+        ColumnWriter::default().push(&[self.own]).push(&self.leaves).write(store, StepRecord::Level(node))
     }
 
-    /// That of `node`.
+    /// Reads the record of the coarser tile at `node`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], or [`crate::Error::Broken`] if it is not there or not whole.
-    pub fn load(store: &Store, node: usize) -> Result<Level> {
-        let mut columns = ColumnReader::open(store, Key::Level(node))?;
+    /// [`Error::Io`], or [`Error::Broken`] if it is missing or damaged.
+    pub fn load(store: &Store, node: NodeIndex) -> Result<LevelSummary> {
+        let mut columns = ColumnReader::open(store, StepRecord::Level(node))?;
         let own = columns.column()?;
         let [own] = own[..] else { return Err(Error::Broken(format!("the record of coarser tile {node} is damaged"))) };
-        Ok(Level { own, leaves: columns.column()? })
+        Ok(LevelSummary { own, leaves: columns.column()?.to_vec() })
     }
 }

@@ -1,12 +1,12 @@
 //! Step C4 as a plain loop: Lawson flips until every edge satisfies the canonical in-circle decision.
 
 use crate::geometry::{Site, predicates::in_circle};
-use crate::mesh::half_edge::{HULL, Mesh, next, previous};
+use crate::mesh::half_edge::{HULL, HalfEdgeMesh, next, previous};
 
 /// Turns any triangulation of `sites` into their canonical Delaunay triangulation; returns the number of flips.
 ///
 /// Ends always: every flip lowers the surface of the sites lifted to the (symbolically perturbed) paraboloid.
-pub fn legalize(mesh: &mut Mesh, sites: &[Site]) -> u64 {
+pub fn legalize(mesh: &mut HalfEdgeMesh, sites: &[Site]) -> u64 {
     let is_first_half = |&h: &u32| mesh.twins[h as usize] > h;
     let half_edges = (0..mesh.twins.len() as u32).filter(is_first_half);
     let mut pending: Vec<u32> = half_edges.filter(|&h| fails(mesh, sites, h)).collect();
@@ -26,7 +26,7 @@ pub fn legalize(mesh: &mut Mesh, sites: &[Site]) -> u64 {
 
 /// Whether half-edge `h` is an inner edge whose opposite apex lies in the circle of its triangle.
 #[inline]
-pub fn fails(mesh: &Mesh, sites: &[Site], h: u32) -> bool {
+pub fn fails(mesh: &HalfEdgeMesh, sites: &[Site], h: u32) -> bool {
     let g = mesh.twins[h as usize];
     if g == HULL {
         return false;
@@ -37,7 +37,7 @@ pub fn fails(mesh: &Mesh, sites: &[Site], h: u32) -> bool {
 
 /// Replaces the diagonal `h` of its two triangles by the other diagonal. Afterwards `next(h)` and `next(g)` are the two
 /// half-edges of the new diagonal, and `h`, `previous(h)`, `g`, `previous(g)` lie on the rim of the quadrilateral.
-fn flip(mesh: &mut Mesh, h: u32) {
+fn flip(mesh: &mut HalfEdgeMesh, h: u32) {
     let g = mesh.twins[h as usize];
     let (r, s) = (mesh.apex(h), mesh.apex(g));
     let (h_next, g_next) = (next(h), next(g));
@@ -50,11 +50,11 @@ fn flip(mesh: &mut Mesh, h: u32) {
     link(mesh, h_next, g_next);
 }
 
-fn set_origin(mesh: &mut Mesh, h: u32, site: u32) {
+fn set_origin(mesh: &mut HalfEdgeMesh, h: u32, site: u32) {
     mesh.triangles[h as usize / 3][h as usize % 3] = site;
 }
 
-fn link(mesh: &mut Mesh, h: u32, twin: u32) {
+fn link(mesh: &mut HalfEdgeMesh, h: u32, twin: u32) {
     mesh.twins[h as usize] = twin;
     if twin != HULL {
         mesh.twins[twin as usize] = h;

@@ -1,20 +1,20 @@
 //! The topology of a triangulation: which sites make a triangle and which triangles share an edge.
 //! It knows no coordinates.
 
-/// In [`Mesh::twins`]: no triangle on the other side, the half-edge lies on the hull.
+/// In [`HalfEdgeMesh::twins`]: no triangle on the other side, the half-edge lies on the hull.
 pub const HULL: u32 = u32::MAX;
 
 /// A triangle mesh as half-edges. Half-edge `3 t + i` of triangle `t` starts at its `i`-th corner and ends at the next;
 /// corners are counterclockwise.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Mesh {
+pub struct HalfEdgeMesh {
     /// The three corners of every triangle, as indices of sites.
     pub triangles: Vec<[u32; 3]>,
     /// For every half-edge the half-edge in the opposite direction, or [`HULL`]. Three times as long as `triangles`.
     pub twins: Vec<u32>,
 }
 
-impl Mesh {
+impl HalfEdgeMesh {
     /// The site at which half-edge `h` starts.
     #[inline(always)]
     pub fn origin(&self, h: u32) -> u32 {

@@ -1,6 +1,6 @@
 //! The part of a triangulation within given edges.
 
-use crate::mesh::half_edge::{HULL, Mesh};
+use crate::mesh::half_edge::{HULL, HalfEdgeMesh};
 use crate::{Error, Result};
 
 /// Marks the triangles of `mesh` that cover the ground on the left of the directed edges `boundary` (by their sites): what a flood
@@ -9,8 +9,8 @@ use crate::{Error, Result};
 /// # Errors
 /// [`Error::Broken`] if a boundary edge is missing from the mesh, which cannot be: it is an edge of the triangulation of
 /// all sites, hence of any triangulation of some of them.
-pub fn covered(mesh: &Mesh, boundary: &[[u32; 2]]) -> Result<Vec<bool>> {
-    let wanted = Starting::new(boundary);
+pub fn covered(mesh: &HalfEdgeMesh, boundary: &[[u32; 2]]) -> Result<Vec<bool>> {
+    let wanted = EdgesByOrigin::new(boundary);
     let half_edges = 0..mesh.twins.len() as u32;
     let is_boundary: Vec<bool> = half_edges.clone().map(|h| wanted.has(mesh.origin(h), mesh.destination(h))).collect();
     let found = is_boundary.iter().filter(|&&b| b).count();
@@ -38,14 +38,14 @@ pub fn covered(mesh: &Mesh, boundary: &[[u32; 2]]) -> Result<Vec<bool>> {
 }
 
 /// Directed edges by the site at which they start.
-struct Starting {
+struct EdgesByOrigin {
     /// Where the edges of each site begin in `ends`, and where the last site's end.
     first: Vec<u32>,
     ends: Vec<u32>,
 }
 
-impl Starting {
-    fn new(edges: &[[u32; 2]]) -> Starting {
+impl EdgesByOrigin {
+    fn new(edges: &[[u32; 2]]) -> EdgesByOrigin {
         let mut edges = edges.to_vec();
         edges.sort_unstable();
         let sites = edges.last().map_or(0, |edge| edge[0] + 1);
@@ -54,7 +54,7 @@ impl Starting {
             first.resize(edge[0] as usize + 1, at);
         }
         first.push(edges.len() as u32);
-        Starting { first, ends: edges.iter().map(|edge| edge[1]).collect() }
+        EdgesByOrigin { first, ends: edges.iter().map(|edge| edge[1]).collect() }
     }
 
     fn has(&self, origin: u32, destination: u32) -> bool {

@@ -62,7 +62,7 @@ pub struct Extras {
 }
 
 /// The way from lattice integers to glTF metres: a pure function of the job, the same in every tile.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Frame {
     extras: Extras,
     horizontal: Scale,
@@ -70,7 +70,7 @@ pub struct Frame {
 }
 
 /// One kind of axis.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Scale {
     /// Metres in a glTF step, a power of two.
     step: f64,

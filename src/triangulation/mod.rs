@@ -1,37 +1,42 @@
-//! The Delaunay triangulation of the sites of one tile, whoever computes it.
+//! The Delaunay triangulation of the sites of one tile. It is the same whichever backend computes it.
 
 pub mod options;
 pub mod reference;
+#[cfg(test)]
+mod tests;
 
 use crate::geometry::Site;
-use crate::gpu::device::{Wish, hardware_is_likely};
-use crate::gpu::executor::{Executor, Order};
+use crate::gpu::device::hardware_is_likely;
+use crate::gpu::executor::{Executor, GpuUse};
 use crate::gpu::options::GpuOptions;
-use crate::mesh::half_edge::Mesh;
+use crate::mesh::half_edge::HalfEdgeMesh;
 use crate::triangulation::options::{Backend, TriangulationOptions};
-use crate::voronoi::{self, Counts, Diagrams, Rejected, Scratch};
+use crate::voronoi::counts::PipelineCounts;
+use crate::voronoi::diagram_backend::DiagramBackend;
+use crate::voronoi::rejection::Rejection;
+use crate::voronoi::{self, PipelineBuffers};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
 use std::ops::AddAssign;
 
-/// How leaves were triangulated.
+/// How many leaves were triangulated in which way.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Outcome {
-    /// Leaves that the discrete-Voronoi pipeline triangulated, and its result was accepted.
+pub struct TriangulationCounts {
+    /// Leaves that the discrete-Voronoi pipeline triangulated.
     pub pipeline: u64,
-    /// Leaves that `spade` triangulated: all with `backend = "reference"`, else those too small for the pipeline.
+    /// Leaves that only `spade` tried: all with `backend = "reference"`, else those that are too small for the pipeline.
     pub reference: u64,
-    /// Leaves that the pipeline gave up and `spade` triangulated: too many sites shared a pixel.
+    /// Leaves that the pipeline gave up because too many sites shared a pixel, and that `spade` triangulated.
     pub crowded: u64,
-    /// Leaves that the pipeline got wrong, which showed, and `spade` triangulated.
+    /// Leaves whose mesh failed the pipeline's acceptance check, and that `spade` triangulated.
     pub not_accepted: u64,
-    /// What the pipeline met.
-    pub counts: Counts,
+    /// What the pipeline counted.
+    pub counts: PipelineCounts,
 }
 
-impl AddAssign for Outcome {
-    fn add_assign(&mut self, other: Outcome) {
+impl AddAssign for TriangulationCounts {
+    fn add_assign(&mut self, other: TriangulationCounts) {
         self.pipeline += other.pipeline;
         self.reference += other.reference;
         self.crowded += other.crowded;
@@ -41,72 +46,66 @@ impl AddAssign for Outcome {
 }
 
 thread_local! {
-    /// The pipeline's buffers, kept from leaf to leaf so that their pages are faulted in once a thread.
-    static SCRATCH: RefCell<Scratch> = RefCell::default();
+    /// The pipeline's buffers. They are kept from leaf to leaf, so that each thread faults in their pages only once.
+    static BUFFERS: RefCell<PipelineBuffers> = RefCell::default();
 }
 
-/// Who triangulates leaves: the pipeline on the worker's own thread, with a GPU's help where there is one, or the reference.
+/// Triangulates leaves: with the pipeline on the worker's own thread, which a GPU may help, or with the reference.
 pub struct Triangulator {
     pipeline: bool,
     gpu: Option<Executor>,
 }
 
-/// Bytes on the CPU's side that a pixel of a GPU's texture takes: its label, where its site is listed, and its turn in a buffer.
+/// Bytes that the CPU needs per pixel of a GPU's texture: the label, where the site is listed, and a share of a buffer.
 const BYTES_PER_PIXEL: u64 = 12;
-/// With less memory than this for the whole job, drivers take too large a share of it for "auto".
-const LEAST_MEMORY: u64 = 1 << 30;
+/// "auto" uses no GPU if the whole job has less memory than this, because drivers would take too large a share of it.
+const MIN_MEMORY: u64 = 1 << 30;
 
 impl Triangulator {
-    /// The triangulator that the configuration asks for, for leaves on `threads` threads at once within `memory` bytes.
+    /// Returns the triangulator that the configuration asks for, for leaves on `threads` threads at once within `memory` bytes.
     ///
     /// # Errors
-    /// [`Error::Config`] if a GPU is asked for and there is none that will do. A GPU that may be used, but cannot, is none.
+    /// [`Error::Config`] if the configuration requires a GPU and none is suitable. If it only allows a GPU, the triangulator works
+    /// without one.
     pub fn new(config: &TriangulationOptions, gpu: &GpuOptions, memory: u64, threads: usize) -> Result<Triangulator> {
         let pipeline = config.backend != Backend::Reference;
-        let required = config.backend == Backend::Gpu;
-        let allowed = || config.backend == Backend::Auto && memory >= LEAST_MEMORY && hardware_is_likely();
-        if !required && !allowed() {
-            return Ok(Triangulator { pipeline, gpu: None });
-        }
-        let order = Order {
-            wish: Wish::new(gpu.adapter.as_deref(), required),
-            voronoi: gpu.voronoi,
-            texture: gpu.texture,
-            most_pixels: memory / 4 / threads as u64 / BYTES_PER_PIXEL,
-            shared: !required,
+        let gpu_use = match config.backend {
+            Backend::Gpu => GpuUse::Required,
+            Backend::Auto if memory >= MIN_MEMORY && hardware_is_likely() => GpuUse::Optional,
+            _ => return Ok(Triangulator { pipeline, gpu: None }),
         };
-        match Executor::start(&order) {
+        match Executor::start(gpu, gpu_use, memory / 4 / threads as u64 / BYTES_PER_PIXEL) {
             Ok(gpu) => Ok(Triangulator { pipeline, gpu: Some(gpu) }),
-            Err(_) if !required => Ok(Triangulator { pipeline, gpu: None }),
+            Err(_) if gpu_use == GpuUse::Optional => Ok(Triangulator { pipeline, gpu: None }),
             Err(why) => Err(Error::Config(format!(
-                "[triangulation] backend = \"gpu\": {why}; `gdt-batch gpu` lists what there is, and \"auto\" does without a GPU"
+                "[triangulation] backend = \"gpu\": {why}; `gdt-batch gpu` lists the adapters, and backend = \"auto\" needs no GPU"
             ))),
         }
     }
 
-    /// The name of the GPU that helps.
+    /// Returns the name of the GPU that helps.
     pub fn gpu(&self) -> Option<&str> {
         self.gpu.as_ref().map(|gpu| gpu.adapter.as_str())
     }
 
-    /// Seconds that every step has taken on the GPU itself, where it tells.
+    /// Returns the seconds that every step has taken on the GPU itself; nothing if the GPU has no timestamps.
     pub fn gpu_steps(&self) -> Vec<(&'static str, f64)> {
         self.gpu.as_ref().map(Executor::step_seconds).unwrap_or_default()
     }
 
-    /// The canonical Delaunay triangulation of distinct `sites`, the same whoever computes it.
+    /// Computes the canonical Delaunay triangulation of distinct `sites`.
     ///
     /// # Errors
     /// [`Error::Broken`] if even the reference triangulation fails.
-    pub fn triangulate(&self, sites: &[Site]) -> Result<(Mesh, Outcome)> {
-        let mut outcome = Outcome::default();
+    pub fn triangulate(&self, sites: &[Site]) -> Result<(HalfEdgeMesh, TriangulationCounts)> {
+        let mut outcome = TriangulationCounts::default();
         if self.pipeline {
-            let gpu = self.gpu.as_ref().map(|gpu| gpu as &dyn Diagrams);
-            match SCRATCH.with_borrow_mut(|scratch| voronoi::triangulate_with(sites, gpu, scratch)) {
-                Ok((mesh, counts)) => return Ok((mesh, Outcome { pipeline: 1, counts, ..outcome })),
-                Err(Rejected::Crowded) => outcome.crowded = 1,
-                Err(Rejected::NotAccepted(_)) => outcome.not_accepted = 1,
-                Err(Rejected::TooFew | Rejected::TooMany | Rejected::OutOfReach) => outcome.reference = 1,
+            let gpu = self.gpu.as_ref().map(|gpu| gpu as &dyn DiagramBackend);
+            match BUFFERS.with_borrow_mut(|buffers| voronoi::triangulate_with(sites, gpu, buffers)) {
+                Ok((mesh, counts)) => return Ok((mesh, TriangulationCounts { pipeline: 1, counts, ..outcome })),
+                Err(Rejection::Crowded) => outcome.crowded = 1,
+                Err(Rejection::NotAccepted(_)) => outcome.not_accepted = 1,
+                Err(Rejection::TooFew | Rejection::TooMany | Rejection::OutOfReach) => outcome.reference = 1,
             }
         } else {
             outcome.reference = 1;
@@ -115,18 +114,18 @@ impl Triangulator {
     }
 }
 
-/// The canonical Delaunay triangulation of distinct `sites`, by this thread alone.
+/// Computes the canonical Delaunay triangulation of distinct `sites` on this thread alone.
 ///
 /// # Errors
 /// As [`Triangulator::triangulate`].
-pub fn canonical(sites: &[Site]) -> Result<Mesh> {
-    match SCRATCH.with_borrow_mut(|scratch| voronoi::triangulate(sites, scratch)) {
+pub fn canonical(sites: &[Site]) -> Result<HalfEdgeMesh> {
+    match BUFFERS.with_borrow_mut(|buffers| voronoi::triangulate(sites, buffers)) {
         Ok((mesh, _)) => Ok(mesh),
         Err(_) => reference::triangulate(sites),
     }
 }
 
-/// Takes back the memory of a mesh that is no longer needed, for the next leaf of this thread.
-pub fn recycle(mesh: Mesh) {
-    SCRATCH.with_borrow_mut(|scratch| scratch.recycle(mesh));
+/// Takes back a mesh that is no longer needed, so that this thread's next leaf uses its memory.
+pub fn recycle(mesh: HalfEdgeMesh) {
+    BUFFERS.with_borrow_mut(|buffers| buffers.recycle(mesh));
 }

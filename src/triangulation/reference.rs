@@ -5,7 +5,7 @@ use crate::Error;
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
 use crate::mesh::flip::legalize;
-use crate::mesh::half_edge::{HULL, Mesh};
+use crate::mesh::half_edge::{HULL, HalfEdgeMesh};
 use spade::{DelaunayTriangulation, HasPosition, InsertionError, Point2, Triangulation as _};
 
 struct Vertex {
@@ -25,9 +25,9 @@ impl HasPosition for Vertex {
 ///
 /// # Errors
 /// [`Error::Broken`] if `spade` refuses the sites or two of them coincide.
-pub fn triangulate(sites: &[Site]) -> crate::Result<Mesh> {
+pub fn triangulate(sites: &[Site]) -> crate::Result<HalfEdgeMesh> {
     if collinear(sites) {
-        return Ok(Mesh::default());
+        return Ok(HalfEdgeMesh::default());
     }
     let delaunay = match along(sites) {
         Some(axis) => insert_along(sites, axis),
@@ -94,10 +94,10 @@ fn collinear(sites: &[Site]) -> bool {
     }
 }
 
-fn to_mesh(delaunay: &DelaunayTriangulation<Vertex>) -> Mesh {
+fn to_mesh(delaunay: &DelaunayTriangulation<Vertex>) -> HalfEdgeMesh {
     let faces = delaunay.num_inner_faces();
     let mut half_edge_of = vec![HULL; delaunay.num_directed_edges()];
-    let mut mesh = Mesh { triangles: Vec::with_capacity(faces), twins: vec![HULL; 3 * faces] };
+    let mut mesh = HalfEdgeMesh { triangles: Vec::with_capacity(faces), twins: vec![HULL; 3 * faces] };
     for face in delaunay.inner_faces() {
         let first = 3 * mesh.triangles.len() as u32;
         let edges = face.adjacent_edges();

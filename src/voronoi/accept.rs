@@ -22,31 +22,31 @@
 
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
-use crate::mesh::half_edge::{HULL, Mesh};
-use crate::voronoi::Rejected;
-use crate::voronoi::edges::Edges;
-use crate::voronoi::sphere::{OUTSIDE, Sphere};
+use crate::mesh::half_edge::{HULL, HalfEdgeMesh};
+use crate::voronoi::closed_mesh::{ClosedMesh, OUTSIDE};
+use crate::voronoi::edge_tester::EdgeTester;
+use crate::voronoi::rejection::Rejection;
 
 /// Buffers of the check.
 #[derive(Default)]
-pub(super) struct Acceptance {
+pub(super) struct AcceptanceCheck {
     used: Vec<bool>,
     successor: Vec<u32>,
     hull: Vec<[u32; 2]>,
-    edges: Edges,
+    edges: EdgeTester,
     doubtful: Vec<u32>,
 }
 
-impl Acceptance {
+impl AcceptanceCheck {
     /// Checks the compacted triangles of `sphere` over `sites` and writes them to `mesh`, its corners being positions in the
     /// input by `order`.
     pub(super) fn accept(
         &mut self,
-        sphere: &Sphere,
+        sphere: &ClosedMesh,
         sites: &[Site],
         order: &[u32],
-        mesh: &mut Mesh,
-    ) -> Result<(), Rejected> {
+        mesh: &mut HalfEdgeMesh,
+    ) -> Result<(), Rejection> {
         let sites = &sites[..order.len()];
         let (n, front, records) = (sites.len(), sphere.front() as usize, sphere.records());
         let triangles = (records.len() - front) / 8;
@@ -56,18 +56,18 @@ impl Acceptance {
         mesh.triangles.resize(triangles, [0; 3]);
         mesh.twins.resize(3 * triangles, HULL);
         let mut links = 0;
-        for start in (front..records.len()).step_by(Edges::BLOCK) {
-            let end = records.len().min(start + Edges::BLOCK);
+        for start in (front..records.len()).step_by(EdgeTester::BLOCK) {
+            let end = records.len().min(start + EdgeTester::BLOCK);
             let first = (start - front) / 8;
             self.write_triangles(&records[start..end], sites, order, &mut mesh.triangles[first..])?;
             self.write_twins(&records[start..end], front as u32, &mut mesh.twins[3 * first..]);
             links += self.check_edges(sphere, sites, start, end)?;
         }
         if 2 * links + self.hull.len() != 3 * triangles {
-            return Err(Rejected::NotAccepted("twins do not fit"));
+            return Err(Rejection::NotAccepted("twins do not fit"));
         }
         if triangles + self.hull.len() + 2 != 2 * n || !self.used.iter().all(|&used| used) {
-            return Err(Rejected::NotAccepted("not every site is used once"));
+            return Err(Rejection::NotAccepted("not every site is used once"));
         }
         self.check_hull(sites)
     }
@@ -79,14 +79,14 @@ impl Acceptance {
         sites: &[Site],
         order: &[u32],
         triangles: &mut [[u32; 3]],
-    ) -> Result<(), Rejected> {
+    ) -> Result<(), Rejection> {
         let n = sites.len();
         let (order, used) = (&order[..n], &mut self.used[..n]);
         let mut inverted = false;
         for (record, triangle) in block.chunks_exact(8).zip(triangles) {
             let corners = [record[0], record[1], record[2]];
             if corners[0].max(corners[1]).max(corners[2]) >= n as u32 {
-                return Err(Rejected::NotAccepted("a corner is no site"));
+                return Err(Rejection::NotAccepted("a corner is no site"));
             }
             let [a, b, c] = [corners[0] as usize, corners[1] as usize, corners[2] as usize];
             inverted |= orient2d(sites[a], sites[b], sites[c]) <= 0;
@@ -94,7 +94,7 @@ impl Acceptance {
             *triangle = [order[a], order[b], order[c]];
         }
         match inverted {
-            true => Err(Rejected::NotAccepted("a triangle is not counterclockwise")),
+            true => Err(Rejection::NotAccepted("a triangle is not counterclockwise")),
             false => Ok(()),
         }
     }
@@ -115,22 +115,28 @@ impl Acceptance {
 
     /// Points 2 and 5 for the edges of a block; returns how many pairs of twins there are. As every pair is found once, from
     /// its greater half-edge, all half-edges are paired if the pairs are half as many as they.
-    fn check_edges(&mut self, sphere: &Sphere, sites: &[Site], start: usize, end: usize) -> Result<usize, Rejected> {
+    fn check_edges(
+        &mut self,
+        sphere: &ClosedMesh,
+        sites: &[Site],
+        start: usize,
+        end: usize,
+    ) -> Result<usize, Rejection> {
         self.doubtful.clear();
         let links = self.edges.test::<true>(sphere, sites, start, end, &mut self.doubtful);
         if links.broken {
-            return Err(Rejected::NotAccepted("twins do not fit"));
+            return Err(Rejection::NotAccepted("twins do not fit"));
         }
         match self.doubtful.iter().any(|&h| sphere.fails(sites, h)) {
-            true => Err(Rejected::NotAccepted("an edge is not Delaunay")),
+            true => Err(Rejection::NotAccepted("an edge is not Delaunay")),
             false => Ok(links.count),
         }
     }
 
     /// Point 3.
-    fn check_hull(&mut self, sites: &[Site]) -> Result<(), Rejected> {
+    fn check_hull(&mut self, sites: &[Site]) -> Result<(), Rejection> {
         const NONE: u32 = u32::MAX;
-        let fault = Rejected::NotAccepted("the hull is not convex");
+        let fault = Rejection::NotAccepted("the hull is not convex");
         self.successor.clear();
         self.successor.resize(sites.len(), NONE);
         for &[u, v] in &self.hull {

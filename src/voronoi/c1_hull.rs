@@ -3,9 +3,9 @@
 
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
-use crate::voronoi::Rejected;
-use crate::voronoi::c2_shift::Shift;
-use crate::voronoi::sphere::{Sphere, next, previous};
+use crate::voronoi::c2_shift::ShiftRepair;
+use crate::voronoi::closed_mesh::{ClosedMesh, next, previous};
+use crate::voronoi::rejection::Rejection;
 
 /// How many hull vertices on either side of a pocket are tried for lying in it.
 const NEAR: usize = 6;
@@ -16,11 +16,11 @@ const PATIENCE: usize = 4;
 
 /// Makes the hull convex. What it changes is noted in `shift`, as are the vertices it takes out: where thin regions reach
 /// the frame, vertices may hang on the hull that belong inside.
-pub(super) fn complete_hull(sphere: &mut Sphere, sites: &[Site], shift: &mut Shift) -> Result<(), Rejected> {
+pub(super) fn complete_hull(sphere: &mut ClosedMesh, sites: &[Site], shift: &mut ShiftRepair) -> Result<(), Rejection> {
     for round in 0..ROUNDS {
         let spokes = all_spokes(sphere)?;
         let blocked = fill_pockets(sphere, sites, spokes, shift);
-        let ring = Ring::new(sphere, &all_spokes(sphere)?);
+        let ring = HullLoop::new(sphere, &all_spokes(sphere)?);
         if blocked.is_empty() && ring.turns_once(sites) {
             return Ok(());
         }
@@ -33,11 +33,11 @@ pub(super) fn complete_hull(sphere: &mut Sphere, sites: &[Site], shift: &mut Shi
             break;
         }
     }
-    Err(Rejected::NotAccepted("the hull could not be completed"))
+    Err(Rejection::NotAccepted("the hull could not be completed"))
 }
 
 /// Fills pockets from `spokes` on; returns the vertices whose pockets were left because other hull vertices lie in them.
-fn fill_pockets(sphere: &mut Sphere, sites: &[Site], mut spokes: Vec<u32>, shift: &mut Shift) -> Vec<u32> {
+fn fill_pockets(sphere: &mut ClosedMesh, sites: &[Site], mut spokes: Vec<u32>, shift: &mut ShiftRepair) -> Vec<u32> {
     let mut blocked = Vec::new();
     while let Some(h) = spokes.pop() {
         // Flips let a half-edge change its place, so that one in the list need not be a spoke any more.
@@ -57,7 +57,7 @@ fn fill_pockets(sphere: &mut Sphere, sites: &[Site], mut spokes: Vec<u32>, shift
 }
 
 /// Takes `vertex` out if it still is on the hull.
-fn take_out(sphere: &mut Sphere, sites: &[Site], vertex: u32, shift: &mut Shift, anyhow: bool) {
+fn take_out(sphere: &mut ClosedMesh, sites: &[Site], vertex: u32, shift: &mut ShiftRepair, anyhow: bool) {
     let spokes = all_spokes(sphere).unwrap_or_default();
     if let Some(&h) = spokes.iter().find(|&&h| sphere.destination(h) == vertex) {
         shift.take_out(sphere, sites, next(h), anyhow);
@@ -65,11 +65,11 @@ fn take_out(sphere: &mut Sphere, sites: &[Site], vertex: u32, shift: &mut Shift,
 }
 
 /// The vertices of the hull, counterclockwise.
-struct Ring(Vec<u32>);
+struct HullLoop(Vec<u32>);
 
-impl Ring {
-    fn new(sphere: &Sphere, spokes: &[u32]) -> Ring {
-        Ring(spokes.iter().rev().map(|&h| sphere.destination(h)).collect())
+impl HullLoop {
+    fn new(sphere: &ClosedMesh, spokes: &[u32]) -> HullLoop {
+        HullLoop(spokes.iter().rev().map(|&h| sphere.destination(h)).collect())
     }
 
     /// Every vertex with the one before and the one after it.
@@ -97,9 +97,9 @@ impl Ring {
 }
 
 /// All half-edges that start at infinity.
-fn all_spokes(sphere: &Sphere) -> Result<Vec<u32>, Rejected> {
+fn all_spokes(sphere: &ClosedMesh) -> Result<Vec<u32>, Rejection> {
     let infinity = sphere.infinity();
-    let ghost = sphere.triangles().find(|&t| sphere.is_ghost(t)).ok_or(Rejected::NotAccepted("no hull"))?;
+    let ghost = sphere.triangles().find(|&t| sphere.is_ghost(t)).ok_or(Rejection::NotAccepted("no hull"))?;
     let first = (ghost..ghost + 3).find(|&h| sphere.origin(h) == infinity).unwrap_or(ghost);
     let mut spokes = vec![first];
     loop {
@@ -108,14 +108,14 @@ fn all_spokes(sphere: &Sphere) -> Result<Vec<u32>, Rejected> {
             return Ok(spokes);
         }
         if spokes.len() > sphere.len() {
-            return Err(Rejected::NotAccepted("the hull has no end"));
+            return Err(Rejection::NotAccepted("the hull has no end"));
         }
         spokes.push(spoke);
     }
 }
 
 /// Whether no hull vertex nearby lies in the pocket at spoke `h`.
-fn is_empty(sphere: &Sphere, sites: &[Site], h: u32) -> bool {
+fn is_empty(sphere: &ClosedMesh, sites: &[Site], h: u32) -> bool {
     let at = |v: u32| sites[v as usize];
     let vertices = [sphere.destination(h), sphere.apex(h), sphere.apex(sphere.twin(h))];
     let [a, b, c] = vertices.map(at);

@@ -3,26 +3,26 @@
 
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
-use crate::voronoi::Rejected;
-use crate::voronoi::edges::Edges;
-use crate::voronoi::sphere::{Fill, Sphere, Star, next, previous};
+use crate::voronoi::closed_mesh::{ClosedMesh, HoleFilling, OneRing, next, previous};
+use crate::voronoi::edge_tester::EdgeTester;
+use crate::voronoi::rejection::Rejection;
 
 /// Rounds of repair; what is still bad after them goes another way.
 const ROUNDS: usize = 6;
 
 /// What the shift leaves behind.
 #[derive(Default)]
-pub(super) struct Shift {
+pub(super) struct ShiftRepair {
     /// Triangles that are not counterclockwise.
     pub(super) inverted: Vec<u32>,
     /// Edges that may not be Delaunay. All others are.
     pub(super) suspects: Vec<u32>,
     /// Vertices taken out, each with a half-edge nearby.
     pub(super) removed: Vec<[u32; 2]>,
-    edges: Edges,
+    edges: EdgeTester,
 }
 
-impl Shift {
+impl ShiftRepair {
     pub(super) fn clear(&mut self) {
         self.inverted.clear();
         self.suspects.clear();
@@ -33,7 +33,7 @@ impl Shift {
     /// triangles before them, at the true places of `sites`. Returns the first record that was not tested.
     pub(super) fn test(
         &mut self,
-        sphere: &Sphere,
+        sphere: &ClosedMesh,
         sites: &[Site],
         start: usize,
         all: bool,
@@ -41,8 +41,8 @@ impl Shift {
     ) -> usize {
         let records = sphere.records();
         let mut start = start;
-        while start + Edges::BLOCK <= records.len() || (all && start < records.len()) {
-            let end = records.len().min(start + Edges::BLOCK);
+        while start + EdgeTester::BLOCK <= records.len() || (all && start < records.len()) {
+            let end = records.len().min(start + EdgeTester::BLOCK);
             for t in (start as u32..end as u32).step_by(8) {
                 if orientation(sphere, sites, t).is_some_and(|area| area <= 0) {
                     self.inverted.push(t);
@@ -55,7 +55,7 @@ impl Shift {
     }
 
     /// Makes every triangle counterclockwise.
-    pub(super) fn repair(&mut self, sphere: &mut Sphere, sites: &[Site]) -> Result<(), Rejected> {
+    pub(super) fn repair(&mut self, sphere: &mut ClosedMesh, sites: &[Site]) -> Result<(), Rejection> {
         for round in 0..ROUNDS {
             for t in std::mem::take(&mut self.inverted) {
                 if orientation(sphere, sites, t).is_some_and(|area| area <= 0)
@@ -68,10 +68,10 @@ impl Shift {
                 return Ok(());
             }
         }
-        Err(Rejected::NotAccepted("an inverted triangle stayed"))
+        Err(Rejection::NotAccepted("an inverted triangle stayed"))
     }
 
-    fn mend(&mut self, sphere: &mut Sphere, sites: &[Site], t: u32, anyhow: bool) -> bool {
+    fn mend(&mut self, sphere: &mut ClosedMesh, sites: &[Site], t: u32, anyhow: bool) -> bool {
         (t..t + 3).any(|h| self.flip_if_good(sphere, sites, h))
             || (t..t + 3).any(|h| self.peel_if_between(sphere, sites, h))
             || (t..t + 3).any(|h| self.take_out(sphere, sites, h, false))
@@ -80,7 +80,7 @@ impl Shift {
     }
 
     /// Flips edge `h` if both triangles are counterclockwise then.
-    fn flip_if_good(&mut self, sphere: &mut Sphere, sites: &[Site], h: u32) -> bool {
+    fn flip_if_good(&mut self, sphere: &mut ClosedMesh, sites: &[Site], h: u32) -> bool {
         let g = sphere.twin(h);
         let quad = [sphere.origin(h), sphere.origin(g), sphere.apex(h), sphere.apex(g)];
         if quad.contains(&sphere.infinity()) {
@@ -94,14 +94,14 @@ impl Shift {
         good
     }
 
-    fn flip(&mut self, sphere: &mut Sphere, h: u32) {
+    fn flip(&mut self, sphere: &mut ClosedMesh, h: u32) {
         let g = sphere.twin(h);
         sphere.flip(h);
         self.suspects.extend([h, next(h), previous(h), g, previous(g)]);
     }
 
     /// Takes the triangle of hull edge `h` off the mesh if its apex lies beside the edge: the hull then goes by it.
-    fn peel_if_between(&mut self, sphere: &mut Sphere, sites: &[Site], h: u32) -> bool {
+    fn peel_if_between(&mut self, sphere: &mut ClosedMesh, sites: &[Site], h: u32) -> bool {
         let [u, v, w] = [sphere.origin(h), sphere.destination(h), sphere.apex(h)].map(|i| sites[i as usize]);
         let towards = |p: Site, q: Site, r: Site| {
             (q[0] as i64 - p[0] as i64) * (r[0] as i64 - p[0] as i64)
@@ -111,7 +111,7 @@ impl Shift {
         towards(u, v, w) && towards(v, u, w) && self.peel(sphere, h)
     }
 
-    fn peel(&mut self, sphere: &mut Sphere, h: u32) -> bool {
+    fn peel(&mut self, sphere: &mut ClosedMesh, h: u32) -> bool {
         let outside = sphere.apex(sphere.twin(h)) == sphere.infinity();
         if outside {
             self.flip(sphere, h);
@@ -121,7 +121,7 @@ impl Shift {
 
     /// Takes the vertex at which `h` starts out if the hole can be filled with counterclockwise triangles, or `anyhow`; what is
     /// inverted then will be seen to.
-    pub(super) fn take_out(&mut self, sphere: &mut Sphere, sites: &[Site], h: u32, anyhow: bool) -> bool {
+    pub(super) fn take_out(&mut self, sphere: &mut ClosedMesh, sites: &[Site], h: u32, anyhow: bool) -> bool {
         let (vertex, first) = (sphere.origin(h), self.suspects.len());
         let done = self.remove_fan(sphere, sites, h, anyhow);
         if done {
@@ -131,11 +131,11 @@ impl Shift {
     }
 
     /// Removes the triangles around the start of `h`, which stays a corner elsewhere.
-    pub(super) fn dissolve(&mut self, sphere: &mut Sphere, sites: &[Site], h: u32) -> bool {
+    pub(super) fn dissolve(&mut self, sphere: &mut ClosedMesh, sites: &[Site], h: u32) -> bool {
         self.remove_fan(sphere, sites, h, true)
     }
 
-    fn remove_fan(&mut self, sphere: &mut Sphere, sites: &[Site], h: u32, anyhow: bool) -> bool {
+    fn remove_fan(&mut self, sphere: &mut ClosedMesh, sites: &[Site], h: u32, anyhow: bool) -> bool {
         let Some(star) = sphere.star(h) else { return false };
         let Some(fill) = star.fill(sites, sphere.infinity(), anyhow) else { return false };
         let first = self.suspects.len();
@@ -150,7 +150,7 @@ impl Shift {
 
 /// Twice the area of the triangle with first half-edge `t`, or `None` for ghosts and free records.
 #[inline(always)]
-pub(super) fn orientation(sphere: &Sphere, sites: &[Site], t: u32) -> Option<i64> {
+pub(super) fn orientation(sphere: &ClosedMesh, sites: &[Site], t: u32) -> Option<i64> {
     let corners = sphere.corners(t)?;
     if corners.contains(&sphere.infinity()) {
         return None;
@@ -159,10 +159,10 @@ pub(super) fn orientation(sphere: &Sphere, sites: &[Site], t: u32) -> Option<i64
     Some(orient2d(at(corners[0]), at(corners[1]), at(corners[2])))
 }
 
-impl Star {
+impl OneRing {
     /// Cuts the hole into counterclockwise triangles; where one of its corners is at infinity, into as many as there is room for,
     /// and ghosts. `None` if that is impossible, unless it is to be filled `anyhow`.
-    pub(super) fn fill(&self, sites: &[Site], infinity: u32, anyhow: bool) -> Option<Fill> {
+    pub(super) fn fill(&self, sites: &[Site], infinity: u32, anyhow: bool) -> Option<HoleFilling> {
         let mut sides: Vec<usize> = (0..self.vertices.len()).collect();
         let mut ears = Vec::with_capacity(sides.len());
         let ghosts = self.vertices.iter().filter(|&&v| v == infinity).count();
@@ -181,7 +181,7 @@ impl Star {
             ears.push(triple(i));
             sides.remove((i + 1) % n);
         }
-        Some(Fill { ears, seam: [sides[0], sides[1]] })
+        Some(HoleFilling { ears, seam: [sides[0], sides[1]] })
     }
 
     fn is_ear(&self, sites: &[Site], infinity: u32, sides: &[usize], triple: [usize; 3]) -> bool {

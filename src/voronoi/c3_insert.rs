@@ -3,26 +3,26 @@
 
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
-use crate::voronoi::Rejected;
-use crate::voronoi::c4_flip::Flips;
-use crate::voronoi::g1_write_sites::Texture;
-use crate::voronoi::g6_triangles::Scan;
-use crate::voronoi::sphere::{Sphere, next, previous};
+use crate::voronoi::c4_flip::FlipQueue;
+use crate::voronoi::closed_mesh::{ClosedMesh, next, previous};
+use crate::voronoi::g1_write_sites::SiteTexture;
+use crate::voronoi::g6_triangles::TextureScan;
+use crate::voronoi::rejection::Rejection;
 
 /// Where a new vertex goes: into a triangle, maybe onto one of its edges.
-struct Place {
+struct InsertionPoint {
     triangle: u32,
     on: Option<u32>,
 }
 
 /// Inserts the sites `removed` from the mesh and those missing in `texture`.
 pub(super) fn insert_all(
-    sphere: &mut Sphere,
-    texture: &Texture,
-    scan: &Scan,
+    sphere: &mut ClosedMesh,
+    texture: &SiteTexture,
+    scan: &TextureScan,
     removed: &[[u32; 2]],
-    flips: &mut Flips,
-) -> Result<(), Rejected> {
+    flips: &mut FlipQueue,
+) -> Result<(), Rejection> {
     for &[vertex, near] in removed {
         insert(sphere, &texture.sites, vertex, near, flips)?;
     }
@@ -37,7 +37,13 @@ pub(super) fn insert_all(
 }
 
 /// Inserts `vertex`, looking for its place from half-edge `near` on; returns a half-edge near it.
-fn insert(sphere: &mut Sphere, sites: &[Site], vertex: u32, near: u32, flips: &mut Flips) -> Result<u32, Rejected> {
+fn insert(
+    sphere: &mut ClosedMesh,
+    sites: &[Site],
+    vertex: u32,
+    near: u32,
+    flips: &mut FlipQueue,
+) -> Result<u32, Rejection> {
     let place = locate(sphere, sites, sites[vertex as usize], near, flips)?;
     let sides = sphere.split(place.triangle, vertex);
     flips.suspects.extend(sides);
@@ -51,7 +57,13 @@ fn insert(sphere: &mut Sphere, sites: &[Site], vertex: u32, near: u32, flips: &m
     Ok(sides[0])
 }
 
-fn locate(sphere: &Sphere, sites: &[Site], p: Site, near: u32, flips: &mut Flips) -> Result<Place, Rejected> {
+fn locate(
+    sphere: &ClosedMesh,
+    sites: &[Site],
+    p: Site,
+    near: u32,
+    flips: &mut FlipQueue,
+) -> Result<InsertionPoint, Rejection> {
     let mut h = start(sphere, near)?;
     loop {
         flips.step()?;
@@ -63,24 +75,24 @@ fn locate(sphere: &Sphere, sites: &[Site], p: Site, near: u32, flips: &mut Flips
             Some(i) => {
                 h = sphere.twin([a, b, c][i]);
                 if sphere.is_ghost(h) {
-                    return Ok(Place { triangle: h, on: None });
+                    return Ok(InsertionPoint { triangle: h, on: None });
                 }
             }
             None => {
                 let mut on = [a, b, c].into_iter().zip(sides).filter(|&(_, s)| s == 0).map(|(e, _)| e);
-                let place = Place { triangle: h, on: on.next() };
-                return on.next().map_or(Ok(place), |_| Err(Rejected::NotAccepted("two sites in one place")));
+                let place = InsertionPoint { triangle: h, on: on.next() };
+                return on.next().map_or(Ok(place), |_| Err(Rejection::NotAccepted("two sites in one place")));
             }
         }
     }
 }
 
 /// A half-edge of a finite triangle at or after `near`.
-fn start(sphere: &Sphere, near: u32) -> Result<u32, Rejected> {
+fn start(sphere: &ClosedMesh, near: u32) -> Result<u32, Rejection> {
     let finite = |h: u32| sphere.corners(h).is_some_and(|c| !c.contains(&sphere.infinity()));
     if near < sphere.end() && finite(near) {
         return Ok(near & !7);
     }
     let after = sphere.triangles().filter(|&h| h >= near);
-    after.chain(sphere.triangles()).find(|&h| finite(h)).ok_or(Rejected::NotAccepted("no triangle"))
+    after.chain(sphere.triangles()).find(|&h| finite(h)).ok_or(Rejection::NotAccepted("no triangle"))
 }

@@ -2,9 +2,11 @@
 //!
 //! The sites are numbered by row and column of their pixels, which is the order in which all later steps meet them.
 
-use crate::geometry::Site;
 use crate::geometry::lattice::REACH;
-use crate::voronoi::{Counts, Rejected, Resolution, Shape};
+use crate::geometry::{Bounds, Site};
+use crate::voronoi::counts::PipelineCounts;
+use crate::voronoi::rejection::Rejection;
+use crate::voronoi::texture_request::{TextureRequest, pixels_along};
 
 /// Largest share of missing sites with which going on pays.
 const MOST_MISSING: f64 = 0.4;
@@ -13,7 +15,7 @@ const EMPTY: u32 = u32::MAX;
 
 /// A texture with the sites in it. Pixel (x, y) is column x from the west, row y from the south.
 #[derive(Default)]
-pub(super) struct Texture {
+pub(super) struct SiteTexture {
     pub(super) width: usize,
     pub(super) height: usize,
     /// 64-pixel words in a row.
@@ -37,10 +39,15 @@ pub(super) struct Texture {
     losers: Vec<[u32; 2]>,
 }
 
-impl Texture {
+impl SiteTexture {
     /// Scales and writes `sites`.
-    pub(super) fn write(&mut self, sites: &[Site], shape: &Shape, counts: &mut Counts) -> Result<(), Rejected> {
-        let scale = self.fit(sites, shape)?;
+    pub(super) fn write(
+        &mut self,
+        sites: &[Site],
+        request: &TextureRequest,
+        counts: &mut PipelineCounts,
+    ) -> Result<(), Rejection> {
+        let scale = self.fit(sites, request)?;
         self.sort_by_row(sites, scale);
         self.clear(sites.len());
         let most_missing = (MOST_MISSING * sites.len() as f64) as usize;
@@ -48,7 +55,7 @@ impl Texture {
             self.write_row(sites, y, counts);
             // At once: whoever cuts what is crowded may have to ask many times.
             if self.missing.len() > most_missing {
-                return Err(Rejected::Crowded);
+                return Err(Rejection::Crowded);
             }
         }
         self.append_missing(sites);
@@ -64,20 +71,17 @@ impl Texture {
     }
 
     /// Chooses width and height with the shape of the sites' bounding box; returns the origin and pixels per lattice step.
-    fn fit(&mut self, sites: &[Site], shape: &Shape) -> Result<(Site, f64), Rejected> {
-        let (mut low, mut high) = ([i32::MAX; 2], [i32::MIN; 2]);
-        for site in sites {
-            low = [low[0].min(site[0]), low[1].min(site[1])];
-            high = [high[0].max(site[0]), high[1].max(site[1])];
+    fn fit(&mut self, sites: &[Site], request: &TextureRequest) -> Result<(Site, f64), Rejection> {
+        let bounds = Bounds::of_points(sites.iter().copied()).ok_or(Rejection::TooFew)?;
+        let within_reach = |c: &i32| (-REACH..=REACH).contains(c);
+        if !bounds.min.iter().chain(&bounds.max).all(within_reach) {
+            return Err(Rejection::OutOfReach);
         }
-        if low.iter().chain(&high).any(|c| c.abs() > REACH) {
-            return Err(Rejected::OutOfReach);
-        }
-        let extent = [0, 1].map(|i| (high[i] - low[i]) as f64 + 1.0);
-        let scale = shape.scale(extent, sites.len());
+        let extent = [0, 1].map(|axis| bounds.extent(axis) as f64 + 1.0);
+        let scale = request.scale(extent, sites.len());
         [self.width, self.height] = extent.map(|side| pixels_along(side, scale));
         self.words = self.width.div_ceil(64);
-        Ok((low, scale))
+        Ok((bounds.min, scale))
     }
 
     /// The pixel (y << 16 | x) of every site in the texture, by number.
@@ -141,7 +145,7 @@ impl Texture {
     }
 
     /// Writes row `y` and numbers its sites from west to east.
-    fn write_row(&mut self, sites: &[Site], y: usize, counts: &mut Counts) {
+    fn write_row(&mut self, sites: &[Site], y: usize, counts: &mut PipelineCounts) {
         let first = if y == 0 { 0 } else { self.row_ends[y - 1] as usize };
         self.losers.clear();
         for &[x, i] in &self.rows[first..self.row_ends[y] as usize] {
@@ -204,27 +208,5 @@ impl Texture {
         self.order.extend_from_slice(missing);
         self.sites.extend(missing.iter().map(|&i| sites[i as usize]));
         self.sites.push([0; 2]);
-    }
-}
-
-/// Pixels along a side of `steps` lattice steps.
-fn pixels_along(steps: f64, scale: f64) -> usize {
-    ((steps - 1.0) * scale) as usize + 1
-}
-
-impl Shape {
-    /// Pixels per lattice step for `sites` sites in a box of that many steps.
-    fn scale(&self, extent: [f64; 2], sites: usize) -> f64 {
-        let longer = extent[0].max(extent[1]);
-        let wanted = match self.resolution {
-            Resolution::PixelsPerSite(pixels) => (pixels * sites as f64 / (extent[0] * extent[1])).sqrt(),
-            Resolution::Side(pixels) => f64::from(pixels) / longer,
-        };
-        let mut scale = wanted.min(1.0).min(f64::from(self.most_side) / longer);
-        // A side is a pixel at the least, so that the area alone does not say what fits.
-        while extent.map(|side| pixels_along(side, scale) as u64).iter().product::<u64>() > self.most_pixels {
-            scale *= 0.98;
-        }
-        scale
     }
 }

@@ -7,7 +7,7 @@
 //! gives distance, tie rule and label. It reaches seven pixels far; pixels with no site so near take the lower envelope of
 //! the columns' parabolas (Felzenszwalb and Huttenlocher 2012), which is exact at any distance.
 
-use crate::voronoi::g1_write_sites::Texture;
+use crate::voronoi::g1_write_sites::SiteTexture;
 
 /// The label of what lies outside the texture.
 pub(super) const FRAME: u32 = u32::MAX;
@@ -22,7 +22,7 @@ const LONG: u8 = u8::MAX;
 
 /// Rows of labels, from the south.
 #[derive(Default)]
-pub(super) struct Voronoi {
+pub(super) struct LabelRows {
     stride: usize,
     /// Distance to the nearest site at or north of every pixel.
     north: Vec<u8>,
@@ -47,9 +47,9 @@ struct Parabola {
     label: u32,
 }
 
-impl Voronoi {
+impl LabelRows {
     /// Prepares for the rows of `texture`.
-    pub(super) fn start(&mut self, texture: &Texture) {
+    pub(super) fn start(&mut self, texture: &SiteTexture) {
         self.given = None;
         self.stride = texture.words * 64;
         self.south.clear();
@@ -63,7 +63,7 @@ impl Voronoi {
     }
 
     /// Takes the labels of all pixels of `texture`, row by row, from somebody who need not be trusted: whether they can be used.
-    pub(super) fn take(&mut self, texture: &Texture, labels: Vec<u32>) -> bool {
+    pub(super) fn take(&mut self, texture: &SiteTexture, labels: Vec<u32>) -> bool {
         // Neighbours mostly have the same label, which need not be looked up again.
         let mut runs = labels.chunk_by(|a, b| a == b);
         let whole = labels.len() == texture.width * texture.height && runs.all(|run| texture.has_site(run[0]));
@@ -71,7 +71,7 @@ impl Voronoi {
         whole
     }
 
-    fn measure_north(&mut self, texture: &Texture) {
+    fn measure_north(&mut self, texture: &SiteTexture) {
         self.north.resize(self.stride * texture.height, LONG);
         let mut running = vec![LONG; self.stride];
         for y in (0..texture.height).rev() {
@@ -81,7 +81,7 @@ impl Voronoi {
     }
 
     /// Writes the labels of row `y` to `labels[1..=width]`. Rows must be asked for in order.
-    pub(super) fn row(&mut self, texture: &Texture, y: usize, labels: &mut [u32]) {
+    pub(super) fn row(&mut self, texture: &SiteTexture, y: usize, labels: &mut [u32]) {
         if let Some(given) = &self.given {
             labels[1..=texture.width].copy_from_slice(&given[y * texture.width..][..texture.width]);
             return;
@@ -104,7 +104,7 @@ impl Voronoi {
 
     /// Labels the runs of pixels whose nearest site is more than seven pixels away.
     #[cold]
-    fn far_runs(&mut self, texture: &Texture, y: usize, labels: &mut [u32]) {
+    fn far_runs(&mut self, texture: &SiteTexture, y: usize, labels: &mut [u32]) {
         let mut x = 0;
         while x < labels.len() {
             if self.keys[x] < FAR {
@@ -128,7 +128,7 @@ impl Voronoi {
     }
 
     /// The lower envelope, from pixel `start` on, of the sites nearest to row `y` in `columns`.
-    fn build_envelope(&mut self, texture: &Texture, y: usize, columns: std::ops::Range<usize>, start: i64) {
+    fn build_envelope(&mut self, texture: &SiteTexture, y: usize, columns: std::ops::Range<usize>, start: i64) {
         self.envelope.clear();
         for x in columns {
             let Some(row) = self.nearest_in_column(texture.height, x, y) else { continue };

@@ -6,9 +6,10 @@
 //! triangle around it is not counterclockwise, so that only those need to be looked at.
 
 use crate::geometry::Site;
-use crate::voronoi::c2_shift::{Shift, orientation};
-use crate::voronoi::sphere::{Sphere, next, previous};
-use crate::voronoi::{Counts, Rejected};
+use crate::voronoi::c2_shift::{ShiftRepair, orientation};
+use crate::voronoi::closed_mesh::{ClosedMesh, next, previous};
+use crate::voronoi::counts::PipelineCounts;
+use crate::voronoi::rejection::Rejection;
 use std::cmp::Reverse;
 
 /// Fans with more triangles than this are not followed.
@@ -16,15 +17,15 @@ const MOST: usize = 64;
 
 /// Buffers of the search.
 #[derive(Default)]
-pub(super) struct Islands {
+pub(super) struct IslandSearch {
     /// By site, how many triangles have it as a corner.
     degrees: Vec<u16>,
-    fans: Vec<Fan>,
+    fans: Vec<TriangleFan>,
 }
 
 /// A closed fan of triangles around a site that has more than one; the least of them is most likely the one that holds the site.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Fan {
+struct TriangleFan {
     site: u32,
     /// Triangles that are not counterclockwise.
     inverted: usize,
@@ -33,16 +34,16 @@ struct Fan {
     spoke: u32,
 }
 
-impl Islands {
+impl IslandSearch {
     /// Takes out what surplus fans there are. A sphere of `v` vertices has `2 v - 4` triangles, and every island adds two.
     pub(super) fn remove(
         &mut self,
-        sphere: &mut Sphere,
+        sphere: &mut ClosedMesh,
         sites: &[Site],
         placed: usize,
-        shift: &mut Shift,
-        counts: &mut Counts,
-    ) -> Result<(), Rejected> {
+        shift: &mut ShiftRepair,
+        counts: &mut PipelineCounts,
+    ) -> Result<(), Rejection> {
         // Nothing has been taken out yet.
         let mut expected = 2 * placed - 2;
         while sphere.len() > expected {
@@ -50,17 +51,23 @@ impl Islands {
             self.remove_apart(sphere, sites, shift, counts);
             expected = 2 * (placed - shift.removed.len()) - 2;
             if sphere.len() == before {
-                return Err(Rejected::NotAccepted("an island could not be removed"));
+                return Err(Rejection::NotAccepted("an island could not be removed"));
             }
         }
         match sphere.len() == expected {
             true => Ok(()),
-            false => Err(Rejected::NotAccepted("the discrete Voronoi diagram is not a sphere")),
+            false => Err(Rejection::NotAccepted("the discrete Voronoi diagram is not a sphere")),
         }
     }
 
     /// Takes out those surplus fans that have no other fan within. An island may lie within an island, and so may a whole region.
-    fn remove_apart(&mut self, sphere: &mut Sphere, sites: &[Site], shift: &mut Shift, counts: &mut Counts) {
+    fn remove_apart(
+        &mut self,
+        sphere: &mut ClosedMesh,
+        sites: &[Site],
+        shift: &mut ShiftRepair,
+        counts: &mut PipelineCounts,
+    ) {
         self.count_degrees(sphere, sites.len());
         self.find_fans(sphere, sites, &shift.inverted);
         for fans in self.fans.chunk_by(|a, b| a.site == b.site) {
@@ -82,14 +89,14 @@ impl Islands {
     }
 
     /// A half-edge that starts at a site whose only triangles are two of `fan`.
-    fn enclosed(&self, sphere: &Sphere, fan: &Fan) -> Option<u32> {
+    fn enclosed(&self, sphere: &ClosedMesh, fan: &TriangleFan) -> Option<u32> {
         let around = |spoke: &u32| Some(sphere.twin(previous(*spoke)));
         let sides = std::iter::successors(Some(fan.spoke), around).take(fan.degree.0).map(next);
         let mut behind = sides.map(|side| sphere.twin(side));
         behind.find(|&h| sphere.origin(h) != sphere.infinity() && self.degrees[sphere.origin(h) as usize] == 2)
     }
 
-    fn count_degrees(&mut self, sphere: &Sphere, sites: usize) {
+    fn count_degrees(&mut self, sphere: &ClosedMesh, sites: usize) {
         self.degrees.clear();
         self.degrees.resize(sites, 0);
         for corners in sphere.triangles().filter_map(|t| sphere.corners(t)) {
@@ -101,7 +108,7 @@ impl Islands {
     }
 
     /// Lists the fans that have an inverted triangle and are not all there is around their site.
-    fn find_fans(&mut self, sphere: &Sphere, sites: &[Site], inverted: &[u32]) {
+    fn find_fans(&mut self, sphere: &ClosedMesh, sites: &[Site], inverted: &[u32]) {
         self.fans.clear();
         for h in inverted.iter().flat_map(|&t| t..t + 3) {
             let fan = fan(sphere, sites, h).filter(|fan| fan.degree.0 < self.degrees[fan.site as usize] as usize);
@@ -113,11 +120,11 @@ impl Islands {
 }
 
 /// The fan around the start of `h`, if its triangle is still there.
-fn fan(sphere: &Sphere, sites: &[Site], h: u32) -> Option<Fan> {
+fn fan(sphere: &ClosedMesh, sites: &[Site], h: u32) -> Option<TriangleFan> {
     if sphere.is_free(h) {
         return None;
     }
-    let mut fan = Fan { site: sphere.origin(h), inverted: 0, degree: Reverse(0), spoke: h };
+    let mut fan = TriangleFan { site: sphere.origin(h), inverted: 0, degree: Reverse(0), spoke: h };
     let mut spoke = h;
     while fan.degree.0 < MOST {
         fan.inverted += orientation(sphere, sites, spoke & !7).is_some_and(|area| area <= 0) as usize;

@@ -15,16 +15,16 @@
 //! mind open edges, as slots are half-edges too.
 
 use crate::geometry::predicates::{in_circle, orient2d};
-use crate::voronoi::Rejected;
-use crate::voronoi::c2_shift::Shift;
-use crate::voronoi::c4_flip::Flips;
-use crate::voronoi::g1_write_sites::Texture;
-use crate::voronoi::g2_voronoi::{FRAME, Voronoi};
-use crate::voronoi::sphere::Sphere;
+use crate::voronoi::c2_shift::ShiftRepair;
+use crate::voronoi::c4_flip::FlipQueue;
+use crate::voronoi::closed_mesh::ClosedMesh;
+use crate::voronoi::g1_write_sites::SiteTexture;
+use crate::voronoi::g2_voronoi::{FRAME, LabelRows};
+use crate::voronoi::rejection::Rejection;
 
 /// Buffers of the scan.
 #[derive(Default)]
-pub(super) struct Scan {
+pub(super) struct TextureScan {
     south: Vec<u32>,
     north: Vec<u32>,
     south_walls: Vec<u64>,
@@ -35,26 +35,26 @@ pub(super) struct Scan {
 }
 
 /// The slot of the open arm going east.
-const EAST: u32 = Sphere::slot(0);
+const EAST: u32 = ClosedMesh::slot(0);
 /// A slot for links that are not needed.
-const WASTE: u32 = Sphere::slot(1);
+const WASTE: u32 = ClosedMesh::slot(1);
 
 /// The slot of the open arm going north from corner `x`.
 #[inline(always)]
 fn column(x: usize) -> u32 {
-    Sphere::slot(x + 2)
+    ClosedMesh::slot(x + 2)
 }
 
-impl Scan {
+impl TextureScan {
     /// Fills `sphere` with the triangles of the discrete Voronoi diagram of `texture`.
     pub(super) fn run(
         &mut self,
-        texture: &Texture,
-        voronoi: &mut Voronoi,
-        sphere: &mut Sphere,
-        shift: &mut Shift,
-        flips: &mut Flips,
-    ) -> Result<(), Rejected> {
+        texture: &SiteTexture,
+        voronoi: &mut LabelRows,
+        sphere: &mut ClosedMesh,
+        shift: &mut ShiftRepair,
+        flips: &mut FlipQueue,
+    ) -> Result<(), Rejection> {
         sphere.reset(texture.width + 3, texture.placed, (texture.sites.len() - 1) as u32);
         let words = texture.width / 64 + 1;
         for row in [&mut self.south, &mut self.north] {
@@ -90,7 +90,7 @@ impl Scan {
     }
 
     /// Visits the corners between two rows. Corner x has pixel x - 1, at index x of a row, in its west.
-    fn scan_row(&mut self, texture: &Texture, sphere: &mut Sphere, suspects: &mut Vec<u32>) {
+    fn scan_row(&mut self, texture: &SiteTexture, sphere: &mut ClosedMesh, suspects: &mut Vec<u32>) {
         let words = self.floors.len() - 1;
         for word in 0..words {
             let (north, south) = (&self.north[word * 64..][..65], &self.south[word * 64..][..65]);
@@ -114,7 +114,7 @@ impl Scan {
 
     /// Does what the arms (west, south, east, north: bits 0 to 3) of corner `x` ask for.
     #[inline(always)]
-    fn corner(&self, texture: &Texture, sphere: &mut Sphere, x: usize, arms: u32, suspects: &mut Vec<u32>) {
+    fn corner(&self, texture: &SiteTexture, sphere: &mut ClosedMesh, x: usize, arms: u32, suspects: &mut Vec<u32>) {
         // Three arms, or a bend: told apart by one branch, and each of their shapes treated alike, because no
         // processor can foresee which comes next.
         match arms.count_ones() {
@@ -125,7 +125,7 @@ impl Scan {
     }
 
     #[inline(always)]
-    fn three_colours(&self, texture: &Texture, sphere: &mut Sphere, x: usize, arms: u32) {
+    fn three_colours(&self, texture: &SiteTexture, sphere: &mut ClosedMesh, x: usize, arms: u32) {
         let (west, south, east, north) = (arms & 1 != 0, arms & 2 != 0, arms & 4 != 0, arms & 8 != 0);
         let (sw, se, ne, nw) = (self.south[x], self.south[x + 1], self.north[x + 1], self.north[x]);
         let (b, c) = (if south { se } else { ne }, if north & west { nw } else { ne });
@@ -141,7 +141,7 @@ impl Scan {
     }
 
     /// Four colours, or fewer: pixels of one colour across the corner hang together there, so that no three colours meet.
-    fn four_arms(&self, texture: &Texture, sphere: &mut Sphere, x: usize, suspects: &mut Vec<u32>) {
+    fn four_arms(&self, texture: &SiteTexture, sphere: &mut ClosedMesh, x: usize, suspects: &mut Vec<u32>) {
         let labels = [self.south[x], self.south[x + 1], self.north[x + 1], self.north[x]];
         let (from_west, from_south) = (sphere.twin(EAST), sphere.twin(column(x)));
         if labels[0] == labels[2] {
@@ -165,7 +165,7 @@ impl Scan {
 
 /// The Voronoi edge that has one end in the west or east and one in the south or north.
 #[inline(always)]
-fn bend(sphere: &mut Sphere, x: usize, arms: u32, suspects: &mut Vec<u32>) {
+fn bend(sphere: &mut ClosedMesh, x: usize, arms: u32, suspects: &mut Vec<u32>) {
     let across = if arms & 1 != 0 { sphere.twin(EAST) } else { EAST };
     let along = if arms & 2 != 0 { sphere.twin(column(x)) } else { column(x) };
     join(sphere, across, along, suspects);
@@ -173,7 +173,7 @@ fn bend(sphere: &mut Sphere, x: usize, arms: u32, suspects: &mut Vec<u32>) {
 
 /// Links the ends of a Voronoi edge. If both are triangles, both have been tested before they had this edge.
 #[inline(always)]
-fn join(sphere: &mut Sphere, a: u32, b: u32, suspects: &mut Vec<u32>) {
+fn join(sphere: &mut ClosedMesh, a: u32, b: u32, suspects: &mut Vec<u32>) {
     sphere.link(a, b);
     if a.min(b) >= sphere.front() {
         suspects.push(a);
@@ -181,12 +181,12 @@ fn join(sphere: &mut Sphere, a: u32, b: u32, suspects: &mut Vec<u32>) {
 }
 
 #[inline(always)]
-fn number(texture: &Texture, sphere: &Sphere, label: u32) -> u32 {
+fn number(texture: &SiteTexture, sphere: &ClosedMesh, label: u32) -> u32 {
     if label == FRAME { sphere.infinity() } else { texture.number(label) }
 }
 
 /// Two triangles for four colours around a corner; the half-edges on its south, east, north and west arm.
-fn two_triangles(texture: &Texture, sphere: &mut Sphere, [sw, se, ne, nw]: [u32; 4]) -> [u32; 4] {
+fn two_triangles(texture: &SiteTexture, sphere: &mut ClosedMesh, [sw, se, ne, nw]: [u32; 4]) -> [u32; 4] {
     let at = |v: u32| texture.sites[v as usize];
     let (a, b, c, d) = (at(sw), at(se), at(ne), at(nw));
     if orient2d(a, b, c) > 0 && orient2d(a, c, d) > 0 && !in_circle(a, b, c, d) {

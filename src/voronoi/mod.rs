@@ -1,298 +1,178 @@
 //! The canonical Delaunay triangulation of a leaf by way of its discrete Voronoi diagram: the ten steps of Rong, Tan, Cao and
 //! Stephanus 2008, "Computing Two-dimensional Delaunay Triangulation Using Graphics Hardware", here on one CPU thread.
 //!
-//! [`triangulate`] calls the steps in order; each is a file named after it:
+//! [`triangulate`] calls the steps in order. Each step has a file of its name:
 //!
 //! | step | file | what it does here |
 //! |---|---|---|
-//! | G1 | `g1_write_sites` | writes the sites into a texture; losers of a pixel move beside it or are missing |
-//! | G2 | `g2_voronoi` | labels each pixel with its nearest site, a row at a time |
-//! | G4-G6 | `g6_triangles` | makes triangles, linked, where colours meet; while the row is in the cache, C2's tests and C4's flips |
-//! | G3 | `g3_islands` | takes out what pieces of torn regions have made |
-//! | C2 | `c2_shift` | mends what is inverted at the sites' true places |
+//! | G1 | `g1_write_sites` | writes the sites into a texture; a site that loses its pixel moves to a neighbouring one or is missing |
+//! | G2 | `g2_voronoi` | labels each pixel with its nearest site, one row at a time |
+//! | G4-G6 | `g6_triangles` | makes linked triangles where colours meet; while the row is in the cache, C2's tests and C4's flips |
+//! | G3 | `g3_islands` | removes the triangles that pieces of torn regions have made |
+//! | C2 | `c2_shift` | repairs triangles that are inverted at the sites' true places |
 //! | C1 | `c1_hull` | makes the hull convex |
-//! | C4 | `c4_flip` | flips what could not be flipped earlier |
-//! | C3 | `c3_insert` | inserts what is missing or was taken out, flipping as it goes |
+//! | C4 | `c4_flip` | makes the flips that were not possible earlier |
+//! | C3 | `c3_insert` | inserts the sites that are missing or were removed, flipping edges along the way |
 //! | | `accept` | proves the result |
 //!
-//! Any of them may go wrong on unlucky input; as `accept` proves the result, a fault costs time and never correctness. `sphere`
-//! is the mesh they all work on, and `edges` tests many edges at once.
+//! Any step may go wrong on unlucky input. Because `accept` proves the result, an error costs time and never correctness. All
+//! steps work on one mesh, of `closed_mesh`; `edge_tester` tests many of its edges at once.
 
 mod accept;
 mod c1_hull;
 mod c2_shift;
 mod c3_insert;
 mod c4_flip;
-mod edges;
+mod closed_mesh;
+pub mod counts;
+pub mod diagram_backend;
+mod edge_tester;
 mod g1_write_sites;
 mod g2_voronoi;
 mod g3_islands;
 mod g6_triangles;
-mod sphere;
+pub mod rejection;
+#[cfg(test)]
+pub(crate) mod test_cases;
 #[cfg(test)]
 mod tests;
+pub mod texture_request;
 
 use crate::geometry::Site;
-use crate::mesh::half_edge::Mesh;
+use crate::mesh::half_edge::HalfEdgeMesh;
+use crate::voronoi::accept::AcceptanceCheck;
+use crate::voronoi::c2_shift::ShiftRepair;
+use crate::voronoi::c4_flip::FlipQueue;
+use crate::voronoi::closed_mesh::ClosedMesh;
+use crate::voronoi::counts::{PipelineCounts, StepTimer, WAIT};
+use crate::voronoi::diagram_backend::{DiagramBackend, DiagramReply};
+use crate::voronoi::g1_write_sites::SiteTexture;
+use crate::voronoi::g2_voronoi::LabelRows;
+use crate::voronoi::g3_islands::IslandSearch;
+use crate::voronoi::g6_triangles::TextureScan;
+use crate::voronoi::rejection::Rejection;
+use crate::voronoi::texture_request::TextureRequest;
 use std::time::Instant;
 
-/// Why a leaf was not triangulated here. Cut it, or triangulate it another way.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Rejected {
-    /// Fewer than three sites have no triangle.
-    #[error("too few sites for a triangle")]
-    TooFew,
-    /// More than 2^26 sites.
-    #[error("too many sites for one leaf")]
-    TooMany,
-    /// A coordinate exceeds `geometry::lattice::REACH`.
-    #[error("a coordinate is out of reach")]
-    OutOfReach,
-    /// So many sites share pixels that the discrete diagram says too little.
-    #[error("too many sites share a pixel")]
-    Crowded,
-    /// The result was wrong, or about to be; the text says how it showed.
-    #[error("the mesh was not accepted: {0}")]
-    NotAccepted(&'static str),
-}
-
-/// How many pixels a texture has.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shape {
-    /// How fine it is to be, if it may.
-    pub resolution: Resolution,
-    /// Largest width and height.
-    pub most_side: u32,
-    /// Most pixels in all.
-    pub most_pixels: u64,
-}
-
-/// How fine a texture is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Resolution {
-    /// Pixels per site: fewer make more work for the repair, more make more work for the transform.
-    PixelsPerSite(f64),
-    /// Pixels along the longer side.
-    Side(u32),
-}
-
-impl Default for Shape {
-    /// What suits the CPU.
-    fn default() -> Shape {
-        Shape { resolution: Resolution::PixelsPerSite(5.0), most_side: 65_535, most_pixels: u64::MAX }
-    }
-}
-
-/// Somebody who makes discrete Voronoi diagrams (step G2) faster than this thread does.
-pub trait Diagrams {
-    /// The textures that suit.
-    fn shape(&self) -> Shape;
-
-    /// The diagram of a texture of `width` x `height` pixels whose sites are in `pixels` (each y << 16 | x).
-    fn diagram(&self, width: u32, height: u32, pixels: Vec<u32>) -> Diagram;
-}
-
-/// What has become of a diagram.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Diagram {
-    /// The label of every pixel, row by row: the pixel (y << 16 | x) of its nearest site.
-    Labels(Vec<u32>),
-    /// The texture was too large; [`Diagrams::shape`] is smaller now.
-    TooLarge,
-    /// Do it yourself.
-    No,
-}
-
-/// The steps that [`Counts::nanoseconds`] tells apart.
-pub const STEPS: [&str; 9] = [
-    "G1 write sites",
-    "G2-G6 Voronoi, triangles, most flips",
-    "G3 islands",
-    "C2 shift",
-    "C1 hull",
-    "C4 flip",
-    "C3 insert",
-    "accept",
-    "wait for the GPU",
-];
-
-/// The last of [`STEPS`].
-const WAIT: usize = STEPS.len() - 1;
-
-/// What the steps met. All are numbers of sites, triangles or edges, as named.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub struct Counts {
-    /// Leaves whose Voronoi diagram a GPU made.
-    pub on_gpu: u64,
-    /// Sites given.
-    pub sites: u64,
-    /// Sites that found no pixel and were inserted one by one.
-    pub missing: u64,
-    /// Sites that were given a pixel beside their own.
-    pub moved: u64,
-    /// Pieces of Voronoi regions that do not hang together with their site.
-    pub islands: u64,
-    /// Triangles that were not counterclockwise once the sites were at their true places.
-    pub inverted: u64,
-    /// Sites taken out for that reason and inserted again.
-    pub removed: u64,
-    /// Edges flipped to make the mesh Delaunay.
-    pub flips: u64,
-    /// Time by step, see [`STEPS`].
-    pub nanoseconds: [u64; STEPS.len()],
-}
-
-impl std::ops::AddAssign for Counts {
-    fn add_assign(&mut self, other: Counts) {
-        self.on_gpu += other.on_gpu;
-        self.sites += other.sites;
-        self.missing += other.missing;
-        self.moved += other.moved;
-        self.islands += other.islands;
-        self.inverted += other.inverted;
-        self.removed += other.removed;
-        self.flips += other.flips;
-        for (mine, theirs) in self.nanoseconds.iter_mut().zip(other.nanoseconds) {
-            *mine += theirs;
-        }
-    }
-}
-
-/// Buffers that [`triangulate`] uses again and again. One for each thread.
+/// Buffers that [`triangulate`] reuses from leaf to leaf. Each thread has its own.
 #[derive(Default)]
-pub struct Scratch {
-    shape: Shape,
-    texture: g1_write_sites::Texture,
-    voronoi: g2_voronoi::Voronoi,
-    scan: g6_triangles::Scan,
-    sphere: sphere::Sphere,
-    islands: g3_islands::Islands,
-    shift: c2_shift::Shift,
-    flips: c4_flip::Flips,
-    acceptance: accept::Acceptance,
-    mesh: Mesh,
+pub struct PipelineBuffers {
+    request: TextureRequest,
+    texture: SiteTexture,
+    labels: LabelRows,
+    scan: TextureScan,
+    closed: ClosedMesh,
+    islands: IslandSearch,
+    shift: ShiftRepair,
+    flips: FlipQueue,
+    acceptance: AcceptanceCheck,
+    mesh: HalfEdgeMesh,
 }
 
-impl Scratch {
-    /// Buffers for textures of this `shape` where the diagrams are made on this thread. The mesh is the same with any.
-    pub fn with_shape(shape: Shape) -> Scratch {
-        Scratch { shape, ..Scratch::default() }
+impl PipelineBuffers {
+    /// Returns buffers for textures as `request` says, where this thread computes the diagrams. The mesh is the same with any.
+    pub fn with_texture(request: TextureRequest) -> PipelineBuffers {
+        PipelineBuffers { request, ..PipelineBuffers::default() }
     }
 
-    /// Hands back a mesh that is no longer needed: its memory serves the next leaf.
-    pub fn recycle(&mut self, mesh: Mesh) {
+    /// Takes back a mesh that is no longer needed, so that the next leaf uses its memory.
+    pub fn recycle(&mut self, mesh: HalfEdgeMesh) {
         self.mesh = mesh;
     }
 }
 
-/// The canonical Delaunay triangulation of `sites`, which must be distinct; the order is free: rows from the
-/// south, or any other in which neighbours are close, spare some cache misses.
-/// The mesh's corners are positions in `sites`.
+/// Computes the canonical Delaunay triangulation of distinct `sites`. The corners of the mesh are positions in `sites`. Any order of
+/// the sites will do, but an order in which neighbours are close, such as rows from the south, saves cache misses.
 ///
 /// # Errors
-/// [`Rejected`] where this is not the way to do it; never a wrong mesh.
-pub fn triangulate(sites: &[Site], scratch: &mut Scratch) -> Result<(Mesh, Counts), Rejected> {
-    triangulate_with(sites, None, scratch)
+/// [`Rejection`] if the pipeline does not suit the sites. It never returns a wrong mesh.
+pub fn triangulate(sites: &[Site], buffers: &mut PipelineBuffers) -> Result<(HalfEdgeMesh, PipelineCounts), Rejection> {
+    triangulate_with(sites, None, buffers)
 }
 
-/// As [`triangulate`], with the Voronoi diagram made by `diagrams` if they will. They need not be trusted.
+/// As [`triangulate`], but `backend` computes the Voronoi diagram if it can. The backend need not be trusted.
 ///
 /// # Errors
 /// As [`triangulate`].
 pub fn triangulate_with(
     sites: &[Site],
-    diagrams: Option<&dyn Diagrams>,
-    scratch: &mut Scratch,
-) -> Result<(Mesh, Counts), Rejected> {
+    backend: Option<&dyn DiagramBackend>,
+    buffers: &mut PipelineBuffers,
+) -> Result<(HalfEdgeMesh, PipelineCounts), Rejection> {
     check_size(sites)?;
-    let Scratch { shape, texture, voronoi, scan, sphere, islands, shift, flips, acceptance, mesh } = scratch;
-    let mut counts = Counts { sites: sites.len() as u64, ..Counts::default() };
-    let mut clock = Clock::start();
+    let PipelineBuffers { request, texture, labels, scan, closed, islands, shift, flips, acceptance, mesh } = buffers;
+    let mut counts = PipelineCounts { sites: sites.len() as u64, ..PipelineCounts::default() };
+    let mut timer = StepTimer::start();
     shift.clear();
     flips.reset(sites.len());
 
-    discretise(sites, diagrams, shape, texture, voronoi, &mut counts)?;
-    clock.done(&mut counts, 0);
+    discretise(sites, backend, request, texture, labels, &mut counts)?;
+    timer.finish(&mut counts, 0);
     counts.nanoseconds[0] = counts.nanoseconds[0].saturating_sub(counts.nanoseconds[WAIT]);
-    scan.run(texture, voronoi, sphere, shift, flips)?;
+    scan.run(texture, labels, closed, shift, flips)?;
     counts.inverted = shift.inverted.len() as u64;
-    clock.done(&mut counts, 1);
+    timer.finish(&mut counts, 1);
     let at = &texture.sites;
-    islands.remove(sphere, at, texture.placed, shift, &mut counts)?;
-    clock.done(&mut counts, 2);
-    // Before C1, so that the hull is completed but once, where it really is.
-    shift.repair(sphere, at)?;
-    clock.done(&mut counts, 3);
-    c1_hull::complete_hull(sphere, at, shift)?;
+    islands.remove(closed, at, texture.placed, shift, &mut counts)?;
+    timer.finish(&mut counts, 2);
+    // C2 comes before C1, so that the hull is completed only once, at its true place.
+    shift.repair(closed, at)?;
+    timer.finish(&mut counts, 3);
+    c1_hull::complete_hull(closed, at, shift)?;
     counts.removed = shift.removed.len() as u64;
-    clock.done(&mut counts, 4);
-    // Before C3, so that sites are inserted into a Delaunay mesh, where walks are short and sure to end.
+    timer.finish(&mut counts, 4);
+    // C4 comes before C3, so that sites are inserted into a Delaunay mesh, in which walks are short and sure to end.
     std::mem::swap(&mut flips.suspects, &mut shift.suspects);
-    flips.run(sphere, at)?;
-    clock.done(&mut counts, 5);
-    c3_insert::insert_all(sphere, texture, scan, &shift.removed, flips)?;
+    flips.run(closed, at)?;
+    timer.finish(&mut counts, 5);
+    c3_insert::insert_all(closed, texture, scan, &shift.removed, flips)?;
     counts.flips = flips.done;
-    clock.done(&mut counts, 6);
-    sphere.compact();
-    acceptance.accept(sphere, at, &texture.order, mesh)?;
-    clock.done(&mut counts, 7);
+    timer.finish(&mut counts, 6);
+    closed.compact();
+    acceptance.accept(closed, at, &texture.order, mesh)?;
+    timer.finish(&mut counts, 7);
     Ok((std::mem::take(mesh), counts))
 }
 
-/// Steps G1 and G2. On this thread G2 is only prepared: its rows are made when the scan needs them.
+/// Does steps G1 and G2. Without a backend, G2 is only prepared: the scan computes each row when it needs it.
 fn discretise(
     sites: &[Site],
-    diagrams: Option<&dyn Diagrams>,
-    shape: &Shape,
-    texture: &mut g1_write_sites::Texture,
-    voronoi: &mut g2_voronoi::Voronoi,
-    counts: &mut Counts,
-) -> Result<(), Rejected> {
-    if let Some(diagrams) = diagrams {
+    backend: Option<&dyn DiagramBackend>,
+    request: &TextureRequest,
+    texture: &mut SiteTexture,
+    labels: &mut LabelRows,
+    counts: &mut PipelineCounts,
+) -> Result<(), Rejection> {
+    if let Some(backend) = backend {
         let before = *counts;
         loop {
-            texture.write(sites, &diagrams.shape(), counts)?;
+            texture.write(sites, &backend.texture_request(), counts)?;
             let asked = Instant::now();
-            let answer = diagrams.diagram(texture.width as u32, texture.height as u32, texture.placed_pixels());
+            let reply = backend.diagram(texture.width as u32, texture.height as u32, texture.placed_pixels());
             counts.nanoseconds[WAIT] += asked.elapsed().as_nanos() as u64;
-            match answer {
-                Diagram::Labels(labels) => {
-                    if voronoi.take(texture, labels) {
+            match reply {
+                DiagramReply::Labels(given) => {
+                    if labels.take(texture, given) {
                         counts.on_gpu = 1;
                         return Ok(());
                     }
                     break;
                 }
-                Diagram::TooLarge => *counts = before,
-                Diagram::No => break,
+                DiagramReply::TooLarge => *counts = before,
+                DiagramReply::Unavailable => break,
             }
         }
         *counts = before;
     }
-    texture.write(sites, shape, counts)?;
-    voronoi.start(texture);
+    texture.write(sites, request, counts)?;
+    labels.start(texture);
     Ok(())
 }
 
-struct Clock(Instant);
-
-impl Clock {
-    fn start() -> Clock {
-        Clock(Instant::now())
-    }
-
-    /// Adds the time since the last call to `step`.
-    fn done(&mut self, counts: &mut Counts, step: usize) {
-        let now = Instant::now();
-        counts.nanoseconds[step] += (now - self.0).as_nanos() as u64;
-        self.0 = now;
-    }
-}
-
-fn check_size(sites: &[Site]) -> Result<(), Rejected> {
+fn check_size(sites: &[Site]) -> Result<(), Rejection> {
     match sites.len() {
-        0..3 => Err(Rejected::TooFew),
-        n if n > 1 << 26 => Err(Rejected::TooMany),
+        0..3 => Err(Rejection::TooFew),
+        n if n > 1 << 26 => Err(Rejection::TooMany),
         _ => Ok(()),
     }
 }

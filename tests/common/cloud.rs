@@ -4,7 +4,7 @@ use std::path::Path;
 
 use gdt_batch::Result;
 use gdt_batch::geometry::lattice::{AxisMap, Lattice, REACH};
-use gdt_batch::input::{Point, Rules, Source, Tally, TextOptions, open};
+use gdt_batch::input::{Point, PointCounts, PointRules, Source, TextOptions, open};
 use rust_decimal::Decimal;
 use rust_decimal::prelude::ToPrimitive;
 
@@ -13,7 +13,7 @@ pub(crate) struct Cloud {
     pub(crate) source: Source,
     pub(crate) lattice: Lattice,
     pub(crate) points: Vec<Point>,
-    pub(crate) tally: Tally,
+    pub(crate) tally: PointCounts,
 }
 
 /// A lattice for `source` with its middle in the middle, of the finer of the steps in x and y if that fits.
@@ -29,18 +29,18 @@ pub(crate) fn lattice(source: &Source) -> Lattice {
     Lattice { offset: [middle(0), middle(1), Decimal::ZERO], resolution, resolution_z: source.axes[2].scale }
 }
 
-pub(crate) fn rules(source: &Source, lattice: &Lattice) -> Rules {
+pub(crate) fn rules(source: &Source, lattice: &Lattice) -> PointRules {
     let map = |axis: usize| {
         let own = source.axes[axis];
         AxisMap::new(own.offset, own.scale, lattice.offset[axis], lattice.step(axis)).unwrap()
     };
-    Rules { maps: [map(0), map(1), map(2)], classes: [true; 256], bounds: None, first_order: 0, rgb: true }
+    PointRules { maps: [map(0), map(1), map(2)], classes: [true; 256], bounds: None, first_order: 0, rgb: true }
 }
 
-pub(crate) fn decode(source: &Source, rules: &Rules) -> Result<(Vec<Point>, Tally)> {
-    let (mut points, mut tally) = (Vec::new(), Tally::default());
-    for piece in 0..source.pieces() {
-        tally += source.decode(piece, rules, &mut |slice| {
+pub(crate) fn decode(source: &Source, rules: &PointRules) -> Result<(Vec<Point>, PointCounts)> {
+    let (mut points, mut tally) = (Vec::new(), PointCounts::default());
+    for chunk in 0..source.chunks() {
+        tally += source.decode(chunk, rules, &mut |slice| {
             assert!(!slice.is_empty() && slice.len() <= 65_536);
             points.extend_from_slice(slice);
             Ok(())
@@ -84,8 +84,8 @@ pub(crate) fn survives(extension: &str, bytes: &[u8]) {
     };
     let map = AxisMap::new(Decimal::ZERO, Decimal::ONE, Decimal::ZERO, Decimal::ONE).unwrap();
     let maps = [0, 1, 2].map(|i| axis(i).unwrap_or(map));
-    let rules = Rules { maps, classes: [true; 256], bounds: None, first_order: 0, rgb: true };
-    for piece in 0..source.pieces().min(64) {
-        let _ = source.decode(piece, &rules, &mut |_| Ok(()));
+    let rules = PointRules { maps, classes: [true; 256], bounds: None, first_order: 0, rgb: true };
+    for chunk in 0..source.chunks().min(64) {
+        let _ = source.decode(chunk, &rules, &mut |_| Ok(()));
     }
 }

@@ -4,11 +4,14 @@ use super::random::Random;
 use super::rig::Rig;
 use gdt_batch::geometry::Site;
 use gdt_batch::gpu::options::{GpuOptions, TextureSide, VoronoiMethod};
-use gdt_batch::job::{self, progress::stage::Progress};
+use gdt_batch::job::{self, progress::stage::ProgressOutput};
 use gdt_batch::triangulation::options::{Backend, TriangulationOptions};
-use gdt_batch::triangulation::{Outcome, Triangulator};
+use gdt_batch::triangulation::{TriangulationCounts, Triangulator};
 use gdt_batch::verify::verify;
-use gdt_batch::voronoi::{self, Diagram, Diagrams, Rejected, Resolution, Scratch, Shape};
+use gdt_batch::voronoi::diagram_backend::{DiagramBackend, DiagramReply};
+use gdt_batch::voronoi::rejection::Rejection;
+use gdt_batch::voronoi::texture_request::{TextureRequest, TextureResolution};
+use gdt_batch::voronoi::{self, PipelineBuffers};
 use std::collections::BTreeSet;
 
 const MEMORY: u64 = 1 << 30;
@@ -17,7 +20,7 @@ fn settings(backend: Backend) -> TriangulationOptions {
     TriangulationOptions { backend, ..TriangulationOptions::default() }
 }
 
-fn solve(config: &TriangulationOptions, gpu: &GpuOptions, sites: &[Site]) -> (BTreeSet<[u32; 3]>, Outcome) {
+fn solve(config: &TriangulationOptions, gpu: &GpuOptions, sites: &[Site]) -> (BTreeSet<[u32; 3]>, TriangulationCounts) {
     let (mesh, outcome) = Triangulator::new(config, gpu, MEMORY, 2).unwrap().triangulate(sites).unwrap();
     let turned = mesh.triangles.iter().map(|&[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().unwrap());
     (turned.collect(), outcome)
@@ -74,13 +77,13 @@ fn a_leaf_has_the_same_triangles_whoever_makes_its_diagram() {
 /// Somebody whose diagrams are wrong.
 struct Liar(fn(u32, u32, &[u32]) -> Vec<u32>);
 
-impl Diagrams for Liar {
-    fn shape(&self) -> Shape {
-        Shape { resolution: Resolution::PixelsPerSite(5.0), most_side: 16_384, most_pixels: 1 << 28 }
+impl DiagramBackend for Liar {
+    fn texture_request(&self) -> TextureRequest {
+        TextureRequest { resolution: TextureResolution::PixelsPerSite(5.0), max_side: 16_384, max_pixels: 1 << 28 }
     }
 
-    fn diagram(&self, width: u32, height: u32, pixels: Vec<u32>) -> Diagram {
-        Diagram::Labels((self.0)(width, height, &pixels))
+    fn diagram(&self, width: u32, height: u32, pixels: Vec<u32>) -> DiagramReply {
+        DiagramReply::Labels((self.0)(width, height, &pixels))
     }
 }
 
@@ -105,13 +108,13 @@ fn a_wrong_diagram_makes_no_wrong_mesh() {
         ),
     ];
     for (name, plausible, liar) in liars {
-        match voronoi::triangulate_with(&sites, Some(&liar), &mut Scratch::default()) {
+        match voronoi::triangulate_with(&sites, Some(&liar), &mut PipelineBuffers::default()) {
             Ok((mesh, counts)) => {
                 let turn = |&[a, b, c]: &[u32; 3]| [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().unwrap();
                 assert!(mesh.triangles.iter().map(turn).collect::<BTreeSet<_>>() == expected, "{name}");
                 assert_eq!(counts.on_gpu, plausible as u64, "{name}");
             }
-            Err(why) => assert!(plausible && matches!(why, Rejected::NotAccepted(_)), "{name}: {why}"),
+            Err(why) => assert!(plausible && matches!(why, Rejection::NotAccepted(_)), "{name}: {why}"),
         }
     }
 }
@@ -150,7 +153,7 @@ fn a_job_has_the_same_digest_on_every_backend() {
         );
         std::fs::write(&path, text).unwrap();
         let config = gdt_batch::config::load(&path).unwrap();
-        let report = job::run(&config, Progress::detect(true)).unwrap();
+        let report = job::run(&config, ProgressOutput::detect(true)).unwrap();
         let outcome = report.leaves.outcome;
         if config.triangulation.backend == Backend::Gpu {
             assert!(outcome.counts.on_gpu > 0 && outcome.counts.on_gpu == outcome.pipeline, "{lines}: {outcome:?}");

@@ -1,6 +1,6 @@
 //! Textures of sites to try things on.
 
-use gdt_batch::gpu::steps::Size;
+use gdt_batch::gpu::texture_size::TextureSize;
 
 /// A small generator (xorshift64*), so that cases are the same everywhere.
 pub(crate) struct Random(pub(crate) u64);
@@ -14,12 +14,12 @@ impl Random {
     }
 
     /// `count` pixels (y << 16 | x), some of them maybe the same.
-    pub(crate) fn pixels(&mut self, size: Size, count: usize) -> Vec<u32> {
+    pub(crate) fn pixels(&mut self, size: TextureSize, count: usize) -> Vec<u32> {
         (0..count).map(|_| self.below(size.height) << 16 | self.below(size.width)).collect()
     }
 
     /// Pixels in `spots` heaps, which leave wide voids.
-    pub(crate) fn heaps(&mut self, size: Size, count: usize, spots: usize) -> Vec<u32> {
+    pub(crate) fn heaps(&mut self, size: TextureSize, count: usize, spots: usize) -> Vec<u32> {
         let centres = self.pixels(size, spots);
         let reach = (size.width.min(size.height) / 16).max(1);
         let near = |random: &mut Random, centre: u32, side: u32| (centre + random.below(reach)).min(side - 1);
@@ -33,10 +33,10 @@ impl Random {
 }
 
 /// What the tests go through: a name, the texture's size, the pixels of the sites.
-pub(crate) fn cases() -> Vec<(&'static str, Size, Vec<u32>)> {
+pub(crate) fn cases() -> Vec<(&'static str, TextureSize, Vec<u32>)> {
     let mut random = Random(0x9e37_79b9_7f4a_7c15);
-    let size = |width, height| Size { width, height };
-    let all = |size: Size| (0..size.height).flat_map(|y| (0..size.width).map(move |x| y << 16 | x)).collect();
+    let size = |width, height| TextureSize { width, height };
+    let all = |size: TextureSize| (0..size.height).flat_map(|y| (0..size.width).map(move |x| y << 16 | x)).collect();
     let row = |y: u32, width: u32| (0..width).map(|x| y << 16 | x).collect();
     let column = |x: u32, height: u32| (0..height).map(|y| y << 16 | x).collect();
     let mut cases = vec![

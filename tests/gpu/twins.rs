@@ -2,9 +2,10 @@
 
 use super::random::{Random, cases};
 use super::rig::Rig;
-use gdt_batch::gpu::buffers::Name;
+use gdt_batch::gpu::buffer_id::BufferId;
 use gdt_batch::gpu::device;
-use gdt_batch::gpu::steps::{Command, Recording, Size};
+use gdt_batch::gpu::steps::{GpuCommand, Recording};
+use gdt_batch::gpu::texture_size::TextureSize;
 use gdt_batch::gpu::twins;
 
 #[test]
@@ -28,10 +29,10 @@ fn the_largest_texture_is_the_same_bit_for_bit() {
         return eprintln!("not tested: textures of 16384 pixels a side; set GDT_TEST_LARGE=1");
     }
     let Some(mut rig) = Rig::new() else { return };
-    let side = device::MOST_SIDE;
-    let across = (rig.most_pixels() / u64::from(side)).min(u64::from(side)) as u32;
+    let side = device::MAX_SIDE;
+    let across = (rig.max_pixels() / u64::from(side)).min(u64::from(side)) as u32;
     for (width, height) in [(side, across), (across, side)] {
-        let size = Size { width, height };
+        let size = TextureSize { width, height };
         // Triangles of more sites would not fit a buffer of software.
         for count in [40, size.pixels() as usize / 16] {
             let pixels = Random(11).pixels(size, count);
@@ -47,7 +48,7 @@ fn the_largest_texture_is_the_same_bit_for_bit() {
 fn the_twins_do_what_they_are_for() {
     let mut random = Random(3);
     for (width, height, count) in [(1, 1, 1), (40, 30, 7), (40, 30, 300), (3, 200, 9), (120, 2, 30), (64, 64, 1)] {
-        let size = Size { width, height };
+        let size = TextureSize { width, height };
         let pixels = random.pixels(size, count);
         let texture = twins::write_sites(size, &pixels);
         let nearest = |x: u32, y: u32| {
@@ -66,7 +67,7 @@ fn the_twins_do_what_they_are_for() {
 #[test]
 fn islands_go_the_same_way_wherever_they_are() {
     let Some(mut rig) = Rig::new() else { return };
-    let size = Size { width: 200, height: 150 };
+    let size = TextureSize { width: 200, height: 150 };
     let mut random = Random(7);
     let pixels = random.pixels(size, 900);
     let texture = twins::write_sites(size, &pixels);
@@ -80,13 +81,13 @@ fn islands_go_the_same_way_wherever_they_are() {
             labels[at..at + length].fill(clean[from]);
         }
         let mut recording = Recording::default();
-        recording.commands.push(Command::Need(Name::Labels, 4 * size.pixels()));
-        recording.commands.push(Command::Upload(Name::Labels, labels.clone()));
+        recording.commands.push(GpuCommand::Reserve(BufferId::Labels, 4 * size.pixels()));
+        recording.commands.push(GpuCommand::Upload(BufferId::Labels, labels.clone()));
         recording.remove_islands(size);
         rig.run(&recording);
         let before = labels.clone();
         twins::remove_islands(size, &mut labels);
         assert_eq!(labels == before, patches == 20_000, "a texture full of islands is left alone, others are not");
-        assert!(rig.numbers(Name::Labels, size.pixels()) == labels, "{patches} patches");
+        assert!(rig.numbers(BufferId::Labels, size.pixels()) == labels, "{patches} patches");
     }
 }

@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 
 use gdt_batch::Error;
 use gdt_batch::input::options::OnBadFile;
-use gdt_batch::job::durable::directory::Directory;
-use gdt_batch::job::partition::read as partition;
-use gdt_batch::job::plan::lattice_choice::Coarser;
-use gdt_batch::job::plan::scan;
-use gdt_batch::job::plan::scan::Plan;
-use gdt_batch::job::progress::stage::Progress;
+use gdt_batch::job::durable::directory::JobDirectory;
+use gdt_batch::job::partition::read::read_points;
+use gdt_batch::job::plan::job_plan::Plan;
+use gdt_batch::job::plan::lattice_choice::LatticeCoarsening;
+use gdt_batch::job::plan::scan::make_plan;
+use gdt_batch::job::progress::stage::ProgressOutput;
 use serde_json::Value;
 
 use crate::las_file::{LasFile, points_at};
@@ -132,11 +132,11 @@ fn a_job_of_bad_files_alone_is_an_error() {
 }
 
 /// A job that has looked at its inputs, and what it has found.
-fn planned(folder: &Path) -> (Directory, Plan) {
+fn planned(folder: &Path) -> (JobDirectory, Plan) {
     let good = good(folder);
     let job = skipping(&[good]);
-    let plan = scan::run(&gdt_batch::config::load(&job.config()).unwrap(), Coarser::default()).unwrap();
-    (Directory::new(&folder.join("out")), plan)
+    let plan = make_plan(&gdt_batch::config::load(&job.config()).unwrap(), LatticeCoarsening::default()).unwrap();
+    (JobDirectory::new(&folder.join("out")), plan)
 }
 
 /// What step 2 says after `change` to the input.
@@ -144,16 +144,9 @@ fn error_after(change: impl Fn(&Path)) -> Error {
     let folder = tempfile::tempdir().unwrap();
     let (directory, plan) = planned(folder.path());
     let _lock = directory.create().unwrap();
-    change(&plan.sources[0].0.path);
-    let task = partition::Task {
-        sources: &plan.sources,
-        extent: plan.extent,
-        points_per_tile: 1000,
-        memory: 1 << 20,
-        max_malformed_fraction: 0.0,
-        on_bad_file: OnBadFile::Skip,
-    };
-    partition::run(&task, &directory, &Progress::Quiet.stage("read", 0, "points")).unwrap_err()
+    change(&plan.inputs[0].source.path);
+    assert_eq!(plan.options.input.on_bad_file, OnBadFile::Skip);
+    read_points(&plan, &directory, &ProgressOutput::Quiet.stage("read", 0, "points")).unwrap_err()
 }
 
 #[test]

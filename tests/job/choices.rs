@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use gdt_batch::output::gltf::read::{TileFile, read_tile};
-use gdt_batch::verify::Source;
+use gdt_batch::verify::SourceGrid;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -67,7 +67,7 @@ impl Square {
 
 /// Source coordinates of the vertices of a tile of one part.
 fn places(tile: &TileFile) -> Vec<[f64; 3]> {
-    let source = Source::new(&tile.extras).unwrap();
+    let source = SourceGrid::new(&tile.extras).unwrap();
     let part = &tile.parts[0];
     (0..part.positions.len()).map(|v| source.coordinates(source.integers(part.world(v)).unwrap())).collect()
 }

@@ -17,7 +17,7 @@ fn small_job(folder: &Path) -> Job {
 #[test]
 fn what_is_not_there_is_refused_and_may_be_tried_again() {
     let folder = tempfile::tempdir().unwrap();
-    let preflight = check::run(&gdt_batch::config::load(&small_job(folder.path()).config()).unwrap()).unwrap();
+    let preflight = check::check(&gdt_batch::config::load(&small_job(folder.path()).config()).unwrap()).unwrap();
     preflight.passes().unwrap();
     let need = preflight.disk;
     let file = folder.path().join("cloud.csv");

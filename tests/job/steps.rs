@@ -1,20 +1,19 @@
-//! The steps of a job by hand, on many small clouds cut into tiny tiles: the closed triangles of all nodes together are
+//! The steps of a job by hand, on many small clouds cut into tiny tiles: the final triangles of all nodes together are
 //! the triangulation of all sites at once.
 
 use gdt_batch::geometry::Site;
-use gdt_batch::input::options::{Duplicates, OnBadFile};
-use gdt_batch::job::durable::directory::Directory;
-use gdt_batch::job::durable::store::Store;
-use gdt_batch::job::mesh::precision_limit::Longest;
-use gdt_batch::job::mesh::{leaf, merge};
+use gdt_batch::job::durable::directory::JobDirectory;
+use gdt_batch::job::index::NodeIndex;
+use gdt_batch::job::mesh::leaf::triangulate_leaf;
+use gdt_batch::job::mesh::merge::merge_frontiers;
 use gdt_batch::job::options::JobOptions;
-use gdt_batch::job::partition::point_file::Spill;
-use gdt_batch::job::partition::read as partition;
-use gdt_batch::job::partition::read::Partition;
-use gdt_batch::job::plan::lattice_choice::Coarser;
-use gdt_batch::job::plan::scan;
-use gdt_batch::job::progress::stage::Progress;
-use gdt_batch::job::records::{Leaf, Seam};
+use gdt_batch::job::partition::point_file::PointFile;
+use gdt_batch::job::partition::read::read_points;
+use gdt_batch::job::partition::result::Partition;
+use gdt_batch::job::plan::lattice_choice::LatticeCoarsening;
+use gdt_batch::job::plan::scan::make_plan;
+use gdt_batch::job::progress::stage::ProgressOutput;
+use gdt_batch::job::records::{Leaf, Seam, Store};
 use gdt_batch::triangulation::options::{Backend, TriangulationOptions};
 use gdt_batch::triangulation::{Triangulator, reference};
 
@@ -31,49 +30,41 @@ fn canonical(mut corners: Triangle) -> Triangle {
     corners
 }
 
-/// Scans, partitions, triangulates every leaf and merges every inner node.
-fn run_steps(job: &Job, config: &JobOptions) -> (Store, Partition) {
-    let directory = Directory::new(&job.out());
+/// Plans, reads, triangulates every leaf and merges every merge node.
+fn run_steps(job: &Job, options: &JobOptions) -> (Store, Partition) {
+    let directory = JobDirectory::new(&job.out());
     directory.create().unwrap();
-    let plan = scan::run(config, Coarser::default()).unwrap();
-    let task = partition::Task {
-        sources: &plan.sources,
-        extent: plan.extent,
-        points_per_tile: config.triangulation.max_points_per_tile.0,
-        memory: 1 << 20,
-        max_malformed_fraction: 0.0,
-        on_bad_file: OnBadFile::Stop,
-    };
-    let partition = partition::run(&task, &directory, &Progress::Quiet.stage("read", 0, "points")).unwrap();
+    let mut plan = make_plan(options, LatticeCoarsening::default()).unwrap();
+    // The buffers get a sixth of this.
+    plan.options.limits.memory.0 = 6 << 20;
+    let stage = ProgressOutput::Quiet.stage("read", 0, "points");
+    let partition = read_points(&plan, &directory, &stage).unwrap();
     let store = Store::create(directory.store()).unwrap();
-    let spill = Spill::open(&directory.spill()).unwrap();
-    let longest = Longest::of(&plan.frame);
+    let points = PointFile::open(&directory.points()).unwrap();
     let cpu = TriangulationOptions { backend: Backend::Cpu, ..TriangulationOptions::default() };
     let triangulator = Triangulator::new(&cpu, &gdt_batch::gpu::options::GpuOptions::default(), 1 << 28, 1).unwrap();
-    let task = leaf::Task { duplicates: Duplicates::Lowest, triangulator: &triangulator, longest };
-    for tile in (0..partition.tree.leaves.len()).rev() {
-        leaf::run(&store, &partition, &spill, tile, task).unwrap();
+    let tree = &partition.tree;
+    for tile in tree.tiles().rev() {
+        triangulate_leaf(&plan, &partition, &points, &store, &triangulator, tile).unwrap();
     }
-    for node in (0..partition.tree.nodes.len()).rev() {
-        if partition.tree.is_merge(node) {
-            merge::run(&store, &partition.tree, node, 1 << 28, longest).unwrap();
-        }
+    for node in (0..tree.nodes.len()).rev().map(NodeIndex::new).filter(|&node| tree.is_merge(node)) {
+        merge_frontiers(&plan, tree, &store, 1 << 28, node).unwrap();
     }
     (store, partition)
 }
 
-/// All sites, and all triangles that leaves and inner nodes closed, sorted.
+/// All sites, and all triangles that leaves and merge nodes made final, sorted.
 fn collect(store: &Store, partition: &Partition) -> (Vec<Site>, Vec<Triangle>) {
     let (mut sites, mut triangles) = (Vec::new(), Vec::new());
-    for tile in 0..partition.tree.leaves.len() {
+    for tile in partition.tree.tiles() {
         let leaf = Leaf::load(store, tile).unwrap();
         let plane = |v: u32| [leaf.positions[v as usize][0], leaf.positions[v as usize][1]];
         sites.extend((0..leaf.positions.len() as u32).map(plane));
         triangles.extend(leaf.triangles.iter().map(|t| canonical(t.map(plane))));
-        for node in partition.tree.merges_above(partition.tree.leaves[tile]) {
+        for node in partition.tree.merges_above(partition.tree.leaf(tile)) {
             let seam = Seam::touching(store, node, tile).unwrap();
-            // A seam triangle stands with every tile it touches: count it with the first.
-            let mine = seam.iter().filter(|t| t.iter().all(|corner| corner.tile as usize >= tile));
+            // A seam triangle is listed with every tile that it touches: count it with the first.
+            let mine = seam.iter().filter(|t| t.iter().all(|corner| corner.tile >= tile));
             triangles.extend(mine.map(|t| canonical(t.map(|corner| corner.plane()))));
         }
     }

@@ -40,7 +40,7 @@ fn tiles_that_need_not_wait_do_not() {
         let report = waiting.report();
         assert_eq!(report["cut_triangles"], 0);
         assert!(
-            span(&report, "stitch")[0] >= span(&report, "triangulate")[1],
+            span(&report, "border normals")[0] >= span(&report, "triangulate")[1],
             "{threads} threads: {}",
             report["stages"]
         );

@@ -6,7 +6,7 @@ use gdt_batch::Error;
 use gdt_batch::output::frame::Frame;
 use gdt_batch::output::gltf::read::{Part, TileFile, read_tile};
 use gdt_batch::output::{Compression, Tile};
-use gdt_batch::verify::Source;
+use gdt_batch::verify::SourceGrid;
 use proptest::prelude::*;
 
 use crate::model::{COMPRESSIONS, cloud, cut, encode_tile, framed, grid, lattice, terrain, utm};
@@ -37,7 +37,7 @@ fn integers(file: &TileFile) -> Vec<[i32; 3]> {
 }
 
 fn integers_of(file: &TileFile, part: &Part) -> Vec<[i32; 3]> {
-    let source = Source::new(&file.extras).unwrap();
+    let source = SourceGrid::new(&file.extras).unwrap();
     let of = |world| match part.scale == [1.0; 3] {
         true => source.integers(world),
         false => source.integers_on(world, part.scale),

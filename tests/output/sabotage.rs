@@ -213,7 +213,7 @@ fn a_damaged_tile_and_one_of_another_job() {
     let mut other = good.clone();
     other[place] = b'9';
     std::fs::write(&first, &other).unwrap();
-    says(&verify(directory.path(), 1 << 28).unwrap().failures.join("\n"), &["of another job"]);
+    says(&verify(directory.path(), 1 << 28).unwrap().failures.join("\n"), &["another job"]);
 }
 
 #[test]

@@ -107,12 +107,15 @@ fn another_input_starts_over_and_says_which() {
 }
 
 #[test]
-fn fresh_starts_over() {
+fn restart_starts_over_under_its_old_name_too() {
     let rig = rig();
-    assert!(rig.run_to("committed", 30).was_killed());
-    let said = Run::start(rig.command().arg("--fresh")).end().succeeded().err;
-    assert!(!said.contains("going on"), "{said}");
-    assert_eq!(rig.is_complete("--fresh")["resumed"], 0);
+    for name in ["--restart", "--fresh"] {
+        assert!(rig.run_to("committed", 30).was_killed());
+        let said = Run::start(rig.command().arg(name)).end().succeeded().err;
+        assert!(!said.contains("going on"), "{said}");
+        assert_eq!(said.contains("--fresh has a new name: --restart"), name == "--fresh", "{said}");
+        assert_eq!(rig.is_complete(name)["resumed"], 0);
+    }
 }
 
 #[test]
@@ -191,10 +194,10 @@ fn tiles_that_are_damaged_or_gone_are_written_again() {
 fn points_that_are_damaged_are_read_again() {
     let rig = rig();
     assert!(rig.run_to("committed", 3).was_killed());
-    let spill = rig.out().join("job/points.spill");
-    let mut bytes = fs::read(&spill).unwrap();
+    let points = rig.out().join("job/points");
+    let mut bytes = fs::read(&points).unwrap();
     bytes.iter_mut().for_each(|byte| *byte = !*byte);
-    fs::write(&spill, bytes).unwrap();
+    fs::write(&points, bytes).unwrap();
     let said = rig.run().succeeded().err;
     assert!(said.contains("not whole; starting over"), "{said}");
     rig.is_complete("damaged points");
@@ -251,7 +254,7 @@ fn leaves_that_are_counted_again_must_be_whole() {
     let journal = fs::read_to_string(rig.out().join("job/journal")).unwrap();
     let entries = journal.lines().skip(1).map(|line| line.split_once(' ').unwrap().1);
     let entries: Vec<Value> = entries.map(|text| serde_json::from_str(text).unwrap()).collect();
-    let exported = |tile: &Value| entries.iter().any(|entry| entry["step"]["Export"] == *tile);
+    let exported = |tile: &Value| entries.iter().any(|entry| entry["step"]["WriteTile"] == *tile);
     let stores = rig.stores();
     let mut bytes = stores.each_ref().map(|store| fs::read(store).unwrap());
     let mut lost = 0;

@@ -1,7 +1,8 @@
-//! Jobs that are killed, interrupted, filled up and changed on their way: run again, they end with the same bytes as a job
-//! that nobody has disturbed.
+//! Jobs that are killed, interrupted, changed, or run out of disk space. Run again, they end with the same bytes as an undisturbed
+//! job.
 //!
-//! `GDT_KILLS=n` makes the tests at random moments kill so many times each. CONTRIBUTING.md tells of the faults on purpose.
+//! The program must be built with `--features fault-injection`: CONTRIBUTING.md explains it. `GDT_KILLS=n` sets the number of kills
+//! of each test that kills at random moments.
 #![cfg(unix)]
 
 #[path = "../common/random.rs"]

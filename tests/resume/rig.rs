@@ -7,8 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-use gdt_batch::job::durable::directory::Directory;
-use gdt_batch::job::durable::store::Store;
+use gdt_batch::job::durable::directory::{JobDirectory, STORE_FILES};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -237,8 +236,8 @@ impl Rig {
     }
 
     /// The files with the results of the steps.
-    pub(crate) fn stores(&self) -> [PathBuf; Store::PARTS] {
-        Directory::new(&self.out()).store()
+    pub(crate) fn stores(&self) -> [PathBuf; STORE_FILES] {
+        JobDirectory::new(&self.out()).store()
     }
 
     pub(crate) fn forget(&self) {

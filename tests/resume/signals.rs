@@ -34,8 +34,8 @@ fn sigterm_and_ctrl_c_stop_it_and_it_goes_on() {
 fn what_is_interrupted_before_the_first_step_leaves_nothing() {
     let rig = Rig::new(&scattered::gaussian(400_000), &Setup::tiles_of(20_000));
     let mut run = Run::start(&mut rig.command());
-    let spill = rig.out().join("job/points.spill");
-    run.wait_until(|| spill.exists());
+    let points = rig.out().join("job/points");
+    run.wait_until(|| points.exists());
     run.signal("INT");
     let end = run.end().stopped(&["error: interrupted"]);
     if !end.err.contains("run the same command again") {

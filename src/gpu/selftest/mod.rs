@@ -1,85 +1,86 @@
-//! What `gdt-batch gpu` shows: the adapters of this machine and which would be chosen, whether every step gives the same numbers
-//! as its twin, and how long each takes.
+//! What `gdt-batch gpu` shows: the adapters of this machine and which of them would be chosen, whether every step gives the same
+//! numbers as its twin, and how long each step takes.
 
 mod compare;
 mod timing;
 
-pub use compare::{Comparison, compare};
-pub use timing::{StepTime, Timing};
+pub use compare::{StepComparison, compare};
+pub use timing::{TextureTiming, TimedStep};
 
-use crate::gpu::Fault;
-use crate::gpu::buffers::Set;
-use crate::gpu::device::{self, ADAPTER_VARIABLE, Device, Wish};
-use crate::gpu::machine::Machine;
-use crate::gpu::steps::Size;
+use crate::gpu::buffers::BufferSet;
+use crate::gpu::device::{self, ADAPTER_VARIABLE, AdapterRequest, Device};
+use crate::gpu::engine::GpuEngine;
+use crate::gpu::error::GpuError;
+use crate::gpu::texture_size::TextureSize;
 use crate::{Error, Result};
 use serde::Serialize;
 use std::fmt;
 
-/// Sides of the textures that are timed.
+/// The sides of the textures that are timed.
 const SIDES: [u32; 5] = [1024, 2048, 4096, 8192, 16_384];
-/// The largest that software is asked for: beyond it takes minutes.
+/// The largest side that is timed on a software renderer. Larger textures take minutes.
 const SOFTWARE_SIDE: u32 = 4096;
-/// Pixels per site, as leaves have them.
+/// Pixels per site, as in the textures of leaves.
 const PIXELS_PER_SITE: u64 = 5;
 
-/// An adapter, as far as it matters here.
+/// What the self-test shows of an adapter.
 #[derive(Clone, Debug, Serialize)]
-pub struct Adapter {
-    /// Its name.
+pub struct AdapterSummary {
+    /// The adapter's name.
     pub name: String,
-    /// What kind of GPU it is.
+    /// The kind of GPU.
     pub kind: String,
     /// Vulkan, Metal or DX12.
     pub backend: String,
     /// The driver and its version.
     pub driver: String,
-    /// Whether it is a program on the CPU.
+    /// Whether the adapter is a program on the CPU.
     pub software: bool,
     /// Bytes of the largest buffer.
     pub buffer: u64,
-    /// Bytes of a buffer that a shader can see.
+    /// Bytes of the largest buffer that a shader can bind.
     pub binding: u64,
     /// Pixels of the largest texture.
     pub pixels: u64,
-    /// What it lacks to be used.
+    /// What the adapter lacks to run the shaders.
     pub lacks: Option<&'static str>,
 }
 
-/// The outcome of the self-test.
+/// The result of the self-test.
 #[derive(Clone, Debug, Serialize)]
 pub struct SelfTest {
     /// All adapters.
-    pub adapters: Vec<Adapter>,
-    /// What `backend = "auto"` takes, or why nothing.
+    pub adapters: Vec<AdapterSummary>,
+    /// The adapter that `backend = "auto"` uses, or why there is none.
     pub auto: std::result::Result<String, String>,
-    /// What `backend = "gpu"` takes, or why nothing; it is what was tested.
+    /// The adapter that `backend = "gpu"` uses, or why there is none. This adapter was tested.
     pub gpu: std::result::Result<String, String>,
-    /// Every step against its twin.
-    pub comparisons: Vec<Comparison>,
-    /// Bytes a second that a copy within the adapter's memory reads and writes.
+    /// Every step compared with its twin.
+    pub comparisons: Vec<StepComparison>,
+    /// Bytes per second that a copy within the adapter's memory reads and writes.
     pub copy_bandwidth: f64,
-    /// By texture size.
-    pub timings: Vec<Timing>,
+    /// The times of the steps, by texture size.
+    pub timings: Vec<TextureTiming>,
     /// Why larger textures were not timed.
     pub stopped: Option<String>,
 }
 
 impl SelfTest {
-    /// Whether every number of every step was right.
+    /// Returns whether every number of every step was right.
     pub fn holds(&self) -> bool {
         self.comparisons.iter().all(|comparison| comparison.differing == 0)
     }
 }
 
-/// Lists the adapters; tests the one called `name`, or the one that `backend = "gpu"` would take; times it on textures up to `side`.
+/// Lists the adapters, and tests the one called `name`, or if that is `None`, the one that `backend = "gpu"` would use. Times the
+/// steps on textures of up to `side` pixels a side.
 ///
 /// # Errors
-/// [`Error::Config`] if there is no such adapter or it does not do what it must.
+/// [`Error::Config`] if there is no such adapter or it fails.
 pub fn run(name: Option<&str>, side: Option<u32>) -> Result<SelfTest> {
     let adapters = device::adapters();
     let infos: Vec<_> = adapters.iter().map(wgpu::Adapter::get_info).collect();
-    let choose = |software| device::choose(&infos, &Wish::new(name, software));
+    let choose = |allow_software| device::choose(&infos, &AdapterRequest::new(name, allow_software));
     let name_of = |chosen: &std::result::Result<usize, String>| match chosen {
         Ok(i) => Ok(infos[*i].name.clone()),
         Err(why) => Err(why.clone()),
@@ -95,15 +96,15 @@ pub fn run(name: Option<&str>, side: Option<u32>) -> Result<SelfTest> {
         stopped: None,
     };
     let chosen = gpu.map_err(Error::Config)?;
-    let most_side = side.unwrap_or(if test.adapters[chosen].software { SOFTWARE_SIDE } else { SIDES[SIDES.len() - 1] });
-    let tested = Device::open(&adapters[chosen]).and_then(|device| fill(&mut test, device, most_side));
-    tested.map_err(|fault| Error::Config(format!("{}: {fault}", infos[chosen].name)))?;
+    let max_side = side.unwrap_or(if test.adapters[chosen].software { SOFTWARE_SIDE } else { SIDES[SIDES.len() - 1] });
+    let tested = Device::open(&adapters[chosen]).and_then(|device| fill(&mut test, device, max_side));
+    tested.map_err(|error| Error::Config(format!("{}: {error}", infos[chosen].name)))?;
     Ok(test)
 }
 
-fn describe(adapter: &wgpu::Adapter) -> Adapter {
+fn describe(adapter: &wgpu::Adapter) -> AdapterSummary {
     let (info, limits) = (adapter.get_info(), device::wanted_limits(&adapter.limits()));
-    Adapter {
+    AdapterSummary {
         software: device::is_software(&info),
         kind: format!("{:?}", info.device_type),
         backend: info.backend.to_string(),
@@ -111,40 +112,41 @@ fn describe(adapter: &wgpu::Adapter) -> Adapter {
         name: info.name,
         buffer: limits.max_buffer_size,
         binding: limits.max_storage_buffer_binding_size,
-        pixels: device::most_pixels(&limits),
+        pixels: device::max_pixels(&limits),
         lacks: device::shortage(&limits),
     }
 }
 
-fn fill(test: &mut SelfTest, device: Device, most_side: u32) -> std::result::Result<(), Fault> {
-    let most_pixels = device::most_pixels(&device.limits);
-    let (mut machine, mut set) = (Machine::new(device), Set::default());
+/// Compares and times the steps on `device`.
+fn fill(test: &mut SelfTest, device: Device, max_side: u32) -> std::result::Result<(), GpuError> {
+    let max_pixels = device::max_pixels(&device.limits);
+    let (mut engine, mut buffers) = (GpuEngine::new(device), BufferSet::default());
     for (width, height, sites) in [(1000, 700, 140_000), (600, 500, 30)] {
-        let size = Size { width, height };
-        test.comparisons.extend(compare(&mut machine, &mut set, size, &scatter(size, sites))?);
+        let size = TextureSize { width, height };
+        test.comparisons.extend(compare(&mut engine, &mut buffers, size, &scatter(size, sites))?);
     }
-    test.copy_bandwidth = timing::copy_bandwidth(&mut machine, &mut set)?;
-    for side in SIDES.into_iter().filter(|&side| side <= most_side) {
-        let size = Size { width: side, height: side };
-        if size.pixels() > most_pixels {
-            test.stopped = Some(format!("a texture of {side} x {side} is more than this adapter takes"));
+    test.copy_bandwidth = timing::copy_bandwidth(&mut engine, &mut buffers)?;
+    for side in SIDES.into_iter().filter(|&side| side <= max_side) {
+        let size = TextureSize { width: side, height: side };
+        if size.pixels() > max_pixels {
+            test.stopped = Some(format!("this adapter does not support a texture of {side} x {side}"));
             break;
         }
         let sites = scatter(size, size.pixels() / PIXELS_PER_SITE);
-        match timing::time_steps(&mut machine, &mut set, side, sites, test.copy_bandwidth) {
+        match timing::time_steps(&mut engine, &mut buffers, side, sites, test.copy_bandwidth) {
             Ok(timing) => test.timings.push(timing),
-            Err(Fault::OutOfMemory) => {
+            Err(GpuError::OutOfMemory) => {
                 test.stopped = Some(format!("a texture of {side} x {side} does not fit the adapter's memory"));
                 break;
             }
-            Err(fault) => return Err(fault),
+            Err(error) => return Err(error),
         }
     }
     Ok(())
 }
 
-/// Pixels (y << 16 | x) that look random and are the same everywhere (splitmix64).
-fn scatter(size: Size, sites: u64) -> Vec<u32> {
+/// Returns pixels (y << 16 | x) that look random and are the same on every machine (splitmix64).
+fn scatter(size: TextureSize, sites: u64) -> Vec<u32> {
     let mixed = |i: u64| {
         let mut v = i.wrapping_mul(0x9e37_79b9_7f4a_7c15);
         v = (v ^ (v >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -164,8 +166,8 @@ impl fmt::Display for SelfTest {
             Ok(name) => name.clone(),
             Err(why) => format!("none: {why}"),
         };
-        writeln!(f, "backend = \"auto\" takes {}", or_none(&self.auto))?;
-        writeln!(f, "backend = \"gpu\"  takes {} ({ADAPTER_VARIABLE} names another)\n", or_none(&self.gpu))?;
+        writeln!(f, "backend = \"auto\" uses {}", or_none(&self.auto))?;
+        writeln!(f, "backend = \"gpu\"  uses {} (set {ADAPTER_VARIABLE} to choose another)\n", or_none(&self.gpu))?;
         for c in &self.comparisons {
             let verdict = match c.first {
                 None if c.differing == 0 => "same".into(),
@@ -175,14 +177,14 @@ impl fmt::Display for SelfTest {
         }
         writeln!(
             f,
-            "\ncopies read and write {:.1} GB/s; the floor is what a step's bytes take at that",
+            "\ncopies read and write {:.1} GB/s; the floor is the time that a step's bytes take at this speed",
             self.copy_bandwidth / 1e9
         )?;
         for timing in &self.timings {
             writeln!(f, "\n{0} x {0}, {1} sites, {2} triangles", timing.side, timing.sites, timing.triangles)?;
             writeln!(f, "{:<16} {:>10} {:>10} {:>8} {:>10}", "step", "ms", "floor ms", "times", "MB")?;
             for step in &timing.steps {
-                let StepTime { step, milliseconds, bytes, floor } = step;
+                let TimedStep { step, milliseconds, bytes, floor } = step;
                 let floor_text = floor.map_or("-".into(), |floor| format!("{floor:.3}"));
                 let times = floor.map_or("-".into(), |floor| format!("{:.1}", milliseconds / floor));
                 let megabytes = *bytes as f64 / 1e6;
@@ -193,18 +195,18 @@ impl fmt::Display for SelfTest {
     }
 }
 
-impl fmt::Display for Adapter {
+impl fmt::Display for AdapterSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Adapter { name, kind, backend, driver, .. } = self;
+        let AdapterSummary { name, kind, backend, driver, .. } = self;
         writeln!(f, "{name} ({kind}, {backend}; {driver})")?;
         let side = (self.pixels as f64).sqrt();
         write!(
             f,
-            "  buffers of {} MiB, {} MiB in a shader: textures of {} pixels, such as {side:.0} x {side:.0}",
+            "  buffers of {} MiB, {} MiB in a shader: textures of up to {} pixels, for example {side:.0} x {side:.0}",
             self.buffer >> 20,
             self.binding >> 20,
             self.pixels
         )?;
-        self.lacks.iter().try_for_each(|what| write!(f, "\n  cannot be used: it lacks {what}"))
+        self.lacks.iter().try_for_each(|need| write!(f, "\n  cannot be used: it lacks {need}"))
     }
 }

@@ -1,76 +1,79 @@
-//! The time of every step, beside the least that moving its bytes takes.
+//! The time of every step, next to the least time that moving its bytes takes.
 
-use crate::gpu::Fault;
-use crate::gpu::buffers::{Name, Set};
-use crate::gpu::machine::Machine;
+use crate::gpu::buffer_id::BufferId;
+use crate::gpu::buffers::BufferSet;
+use crate::gpu::engine::GpuEngine;
+use crate::gpu::error::GpuError;
 use crate::gpu::options::VoronoiMethod;
-use crate::gpu::steps::{Command, Recording, Size, jfa_steps, total};
+use crate::gpu::prefix_sums::position_of_total;
+use crate::gpu::steps::{GpuCommand, Recording};
+use crate::gpu::texture_size::TextureSize;
 use serde::Serialize;
 use std::time::Instant;
 
-/// Runs of which the median is taken.
+/// How many runs the median is taken of.
 const RUNS: usize = 3;
-/// A run repeats a step until it lasts about this long, so that handing work over does not count.
+/// A run repeats a step until it lasts about this long, so that the time to submit work does not count.
 const RUN_SECONDS: f64 = 0.02;
-/// Repetitions in a run at the most.
-const MOST_REPEATS: usize = 20;
-/// Bytes that are copied to see how fast memory is.
-const COPY: u64 = 64 << 20;
+/// The most repetitions in a run.
+const MAX_REPEATS: usize = 20;
+/// How many bytes are copied to measure the bandwidth of memory.
+const COPY_BYTES: u64 = 64 << 20;
 
 /// The time of one step.
 #[derive(Clone, Debug, Serialize)]
-pub struct StepTime {
+pub struct TimedStep {
     /// The step.
     pub step: &'static str,
-    /// Milliseconds that it took, the median of some runs.
+    /// The milliseconds that it took: the median of some runs.
     pub milliseconds: f64,
-    /// Bytes that it has to read and write, were every number touched once.
+    /// The bytes that it reads and writes if it touches every number once.
     pub bytes: u64,
-    /// Milliseconds that copying as many bytes takes on this adapter; `None` where they go to or come from the CPU.
+    /// The milliseconds that copying as many bytes takes on this adapter; `None` if they go to or come from the CPU.
     pub floor: Option<f64>,
 }
 
 /// The times of all steps on one texture.
 #[derive(Clone, Debug, Serialize)]
-pub struct Timing {
-    /// Width and height of the texture.
+pub struct TextureTiming {
+    /// The width and height of the texture.
     pub side: u32,
-    /// Sites in it.
+    /// The number of sites in it.
     pub sites: u64,
-    /// Triangles that came out.
+    /// The number of triangles that the steps made.
     pub triangles: u64,
-    /// In order.
-    pub steps: Vec<StepTime>,
+    /// The steps, in order.
+    pub steps: Vec<TimedStep>,
 }
 
-/// Bytes a second that a copy within the GPU's memory reads and writes, together.
+/// Returns the bytes per second, read and written together, of a copy within the GPU's memory.
 ///
 /// # Errors
-/// [`Fault`] of the device.
-pub(super) fn copy_bandwidth(machine: &mut Machine, set: &mut Set) -> Result<f64, Fault> {
+/// [`GpuError`] of the device.
+pub(super) fn copy_bandwidth(engine: &mut GpuEngine, buffers: &mut BufferSet) -> Result<f64, GpuError> {
     let mut recording = Recording::default();
-    recording.commands.extend([Name::Labels, Name::Flood].map(|name| Command::Need(name, COPY)));
-    recording.commands.push(Command::Copy(Name::Labels, Name::Flood, COPY));
-    let milliseconds = time(machine, set, &recording)?;
-    Ok(2.0 * COPY as f64 / (milliseconds / 1000.0))
+    recording.commands.extend([BufferId::Labels, BufferId::Flood].map(|id| GpuCommand::Reserve(id, COPY_BYTES)));
+    recording.commands.push(GpuCommand::Copy(BufferId::Labels, BufferId::Flood, COPY_BYTES));
+    let milliseconds = time(engine, buffers, &recording)?;
+    Ok(2.0 * COPY_BYTES as f64 / (milliseconds / 1000.0))
 }
 
 /// Times all steps on a texture of `side` x `side` with sites at `pixels`; `bandwidth` is that of copies.
 ///
 /// # Errors
-/// [`Fault`] of the device, [`Fault::OutOfMemory`] if the texture is too large for it.
+/// [`GpuError`] of the device; [`GpuError::OutOfMemory`] if the texture is too large for it.
 pub(super) fn time_steps(
-    machine: &mut Machine,
-    set: &mut Set,
+    engine: &mut GpuEngine,
+    buffers: &mut BufferSet,
     side: u32,
     pixels: Vec<u32>,
     bandwidth: f64,
-) -> Result<Timing, Fault> {
-    let size = Size { width: side, height: side };
+) -> Result<TextureTiming, GpuError> {
+    let size = TextureSize { width: side, height: side };
     let (sites, all, segments) = (pixels.len() as u64, size.pixels(), u64::from(size.all_segments()));
-    // At most two triangles a site, and some for what the texture gets wrong.
+    // A site has at most two triangles; leave some room for what the texture gets wrong.
     let room = (2 * sites + sites / 4 + 64) as u32;
-    let jumps = jfa_steps(size).len() as u64;
+    let jumps = size.jump_steps().len() as u64;
     let mut write = record(|r| r.write_sites(size, pixels));
     let upload = take_uploads(&mut write);
     let steps = [
@@ -84,19 +87,20 @@ pub(super) fn time_steps(
     ];
     let mut times = Vec::new();
     for (step, recording, bytes, on_gpu) in steps {
-        let milliseconds = time(machine, set, &recording)?;
-        times.push(StepTime { step, milliseconds, bytes, floor: on_gpu.then_some(floor(bytes, bandwidth)) });
+        let milliseconds = time(engine, buffers, &recording)?;
+        times.push(TimedStep { step, milliseconds, bytes, floor: on_gpu.then_some(floor(bytes, bandwidth)) });
     }
-    // Counting again and again, to be timed, has spoilt the sums.
-    machine.start(set, &record(|r| r.find_vertices(size)))?;
-    machine.start(set, &record(|r| r.count(size)))?;
-    let triangles = u64::from(machine.numbers_from(set, Name::Counts, u64::from(total(size)), 1)?[0]);
+    // The repetitions of the count have spoilt the sums: compute them once more.
+    engine.start(buffers, &record(|r| r.find_vertices(size)))?;
+    engine.start(buffers, &record(|r| r.count(size)))?;
+    let total = u64::from(position_of_total(size));
+    let triangles = u64::from(engine.numbers_from(buffers, BufferId::Counts, total, 1)?[0]);
     let bytes = 12 * segments + (12 + 16 + 12) * triangles;
-    let milliseconds = time(machine, set, &record(|r| r.make_triangles(size, room)))?;
-    times.push(StepTime { step: "G6 triangles", milliseconds, bytes, floor: Some(floor(bytes, bandwidth)) });
-    let milliseconds = time_readback(machine, set, all)?;
-    times.push(StepTime { step: "labels back", milliseconds, bytes: 4 * all, floor: None });
-    Ok(Timing { side, sites, triangles, steps: times })
+    let milliseconds = time(engine, buffers, &record(|r| r.make_triangles(size, room)))?;
+    times.push(TimedStep { step: "G6 triangles", milliseconds, bytes, floor: Some(floor(bytes, bandwidth)) });
+    let milliseconds = time_readback(engine, buffers, all)?;
+    times.push(TimedStep { step: "labels back", milliseconds, bytes: 4 * all, floor: None });
+    Ok(TextureTiming { side, sites, triangles, steps: times })
 }
 
 fn record(f: impl FnOnce(&mut Recording)) -> Recording {
@@ -105,49 +109,50 @@ fn record(f: impl FnOnce(&mut Recording)) -> Recording {
     recording
 }
 
-/// Moves the uploads of `recording` to one of their own.
+/// Moves the uploads of `recording` to a recording of their own.
 fn take_uploads(recording: &mut Recording) -> Recording {
-    let needs = recording.commands.iter().filter(|c| matches!(c, Command::Need(..))).cloned().collect::<Vec<_>>();
-    let (uploads, rest) =
-        std::mem::take(&mut recording.commands).into_iter().partition(|c| matches!(c, Command::Upload(..)));
+    let reserve = recording.commands.iter().filter(|c| matches!(c, GpuCommand::Reserve(..))).cloned();
+    let mut commands: Vec<GpuCommand> = reserve.collect();
+    let (uploads, rest): (Vec<_>, Vec<_>) =
+        std::mem::take(&mut recording.commands).into_iter().partition(|c| matches!(c, GpuCommand::Upload(..)));
     recording.commands = rest;
-    let uploads: Vec<Command> = uploads;
-    Recording { commands: needs.into_iter().chain(uploads).collect() }
+    commands.extend(uploads);
+    Recording { commands }
 }
 
 fn floor(bytes: u64, bandwidth: f64) -> f64 {
     1000.0 * bytes as f64 / bandwidth
 }
 
-/// Milliseconds that `recording` takes.
-fn time(machine: &mut Machine, set: &mut Set, recording: &Recording) -> Result<f64, Fault> {
-    // Once for the buffers and the shaders, once to see how long it takes.
-    seconds(machine, set, recording)?;
-    let once = seconds(machine, set, recording)?;
-    let repeats = ((RUN_SECONDS / once) as usize).clamp(1, MOST_REPEATS);
+/// Returns the milliseconds that `recording` takes.
+fn time(engine: &mut GpuEngine, buffers: &mut BufferSet, recording: &Recording) -> Result<f64, GpuError> {
+    // The first run creates buffers and compiles shaders, the second shows how long a run takes.
+    seconds(engine, buffers, recording)?;
+    let once = seconds(engine, buffers, recording)?;
+    let repeats = ((RUN_SECONDS / once) as usize).clamp(1, MAX_REPEATS);
     let repeated =
         Recording { commands: std::iter::repeat_n(&recording.commands, repeats).flatten().cloned().collect() };
     let mut runs = [once; RUNS];
     for run in &mut runs {
-        *run = seconds(machine, set, &repeated)? / repeats as f64;
+        *run = seconds(engine, buffers, &repeated)? / repeats as f64;
     }
     Ok(1000.0 * median(runs))
 }
 
-fn time_readback(machine: &mut Machine, set: &mut Set, numbers: u64) -> Result<f64, Fault> {
+fn time_readback(engine: &mut GpuEngine, buffers: &mut BufferSet, numbers: u64) -> Result<f64, GpuError> {
     let mut runs = [0.0; RUNS];
     for run in &mut runs {
         let start = Instant::now();
-        machine.numbers(set, Name::Labels, numbers)?;
+        engine.numbers(buffers, BufferId::Labels, numbers)?;
         *run = start.elapsed().as_secs_f64();
     }
     Ok(1000.0 * median(runs))
 }
 
-fn seconds(machine: &mut Machine, set: &mut Set, recording: &Recording) -> Result<f64, Fault> {
+fn seconds(engine: &mut GpuEngine, buffers: &mut BufferSet, recording: &Recording) -> Result<f64, GpuError> {
     let start = Instant::now();
-    let submission = machine.start(set, recording)?;
-    machine.device().wait(submission)?;
+    let submission = engine.start(buffers, recording)?;
+    engine.device().wait(submission)?;
     Ok(start.elapsed().as_secs_f64())
 }
 

@@ -1,9 +1,10 @@
-//! Step G1, beside `shaders/g1_write_sites.wgsl`.
+//! Step G1: the twin of `shaders/g1_write_sites.wgsl`.
 
-use crate::gpu::steps::Size;
+use crate::gpu::texture_size::TextureSize;
 
-/// The texture of the sites in `pixels` (each y << 16 | x): per pixel the complement of the number of the first site there, or 0.
-pub fn write_sites(size: Size, pixels: &[u32]) -> Vec<u32> {
+/// Returns the texture of the sites at `pixels` (each y << 16 | x). A pixel holds the complement of the number of its first site,
+/// or 0.
+pub fn write_sites(size: TextureSize, pixels: &[u32]) -> Vec<u32> {
     let mut texture = vec![0; size.pixels() as usize];
     for (site, pixel) in (0u32..).zip(pixels) {
         let (x, y) = (pixel & 0xffff, pixel >> 16);

@@ -1,14 +1,15 @@
-//! Step G2, exact, beside `shaders/g2_voronoi_exact.wgsl`.
+//! Step G2, exact: the twin of `shaders/g2_voronoi_exact.wgsl`.
 
-use crate::gpu::steps::Size;
-use crate::gpu::twins::{NONE, key, own};
+use crate::gpu::texture_size::TextureSize;
+use crate::gpu::twins::label::{NONE, key, own};
 
-/// The label of every pixel of `texture`: the pixel of its nearest site, least (d^2, x, y), or [`NONE`] without any site.
-pub fn voronoi_exact(size: Size, texture: &[u32]) -> Vec<u32> {
+/// Returns the label of every pixel of `texture`: the pixel of its nearest site, least (d^2, x, y), or [`NONE`] if there is no
+/// site.
+pub fn voronoi_exact(size: TextureSize, texture: &[u32]) -> Vec<u32> {
     let in_column = nearest_in_columns(size, texture);
     let mut labels = Vec::with_capacity(texture.len());
     for y in 0..size.height {
-        // Along a row the columns of the labels never decrease.
+        // Along a row, the columns of the labels never decrease.
         let mut low = 0;
         for x in 0..size.width {
             let row = &in_column[(y * size.width) as usize..][..size.width as usize];
@@ -20,8 +21,8 @@ pub fn voronoi_exact(size: Size, texture: &[u32]) -> Vec<u32> {
     labels
 }
 
-/// For every pixel the nearest site of its own column, as a label; of two, the southern one.
-fn nearest_in_columns(size: Size, texture: &[u32]) -> Vec<u32> {
+/// Returns the nearest site of each pixel's own column, as a label. Of two at the same distance, the southern one wins.
+fn nearest_in_columns(size: TextureSize, texture: &[u32]) -> Vec<u32> {
     let mut nearest = vec![NONE; texture.len()];
     let at = |x: u32, y: u32| (y * size.width + x) as usize;
     for x in 0..size.width {
@@ -46,7 +47,7 @@ fn nearest_in_columns(size: Size, texture: &[u32]) -> Vec<u32> {
     nearest
 }
 
-/// The nearest of the sites of all columns from `low` on.
+/// Returns the nearest of the sites of all columns from `low` on.
 fn nearest(row: &[u32], x: u32, y: u32, low: u32) -> u32 {
     let mut best = NONE;
     for column in low..row.len() as u32 {

@@ -1,19 +1,19 @@
-//! Step G2, 1+JFA, beside `shaders/g2_voronoi_jfa.wgsl`.
+//! Step G2, 1+JFA: the twin of `shaders/g2_voronoi_jfa.wgsl`.
 
-use crate::gpu::steps::{Size, jfa_steps};
-use crate::gpu::twins::{NONE, key, own};
+use crate::gpu::texture_size::TextureSize;
+use crate::gpu::twins::label::{NONE, key, own};
 
-/// The label of every pixel of `texture` as jump flooding finds it.
-pub fn voronoi_jfa(size: Size, texture: &[u32]) -> Vec<u32> {
+/// Returns the label that jump flooding finds for every pixel of `texture`.
+pub fn voronoi_jfa(size: TextureSize, texture: &[u32]) -> Vec<u32> {
     let pixels = (0..size.height).flat_map(|y| (0..size.width).map(move |x| own(x, y)));
     let mut labels: Vec<u32> = pixels.zip(texture).map(|(pixel, &site)| if site == 0 { NONE } else { pixel }).collect();
-    for step in jfa_steps(size) {
+    for step in size.jump_steps() {
         labels = flood(size, &labels, i64::from(step));
     }
     labels
 }
 
-fn flood(size: Size, before: &[u32], step: i64) -> Vec<u32> {
+fn flood(size: TextureSize, before: &[u32], step: i64) -> Vec<u32> {
     let mut after = Vec::with_capacity(before.len());
     for y in 0..size.height {
         for x in 0..size.width {

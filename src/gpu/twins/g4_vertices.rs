@@ -1,9 +1,9 @@
-//! Step G4, beside `shaders/g4_vertices.wgsl`.
+//! Step G4: the twin of `shaders/g4_vertices.wgsl`.
 
-use crate::gpu::steps::Size;
+use crate::gpu::texture_size::TextureSize;
 
-/// How many triangles the corner in the northeast of each pixel makes: none, one or two. Corners on the frame are left out.
-pub fn find_vertices(size: Size, labels: &[u32]) -> Vec<u32> {
+/// Returns how many triangles (0, 1 or 2) the corner to the northeast of each pixel makes. Corners on the frame are left out.
+pub fn find_vertices(size: TextureSize, labels: &[u32]) -> Vec<u32> {
     let mut triangles = Vec::new();
     for y in 0..size.height - 1 {
         for x in 0..size.width - 1 {
@@ -20,7 +20,7 @@ pub fn find_vertices(size: Size, labels: &[u32]) -> Vec<u32> {
     triangles
 }
 
-/// The labels of the four pixels around the corner, counterclockwise from the southwest.
-pub(super) fn around(size: Size, labels: &[u32], x: u32, y: u32) -> [u32; 4] {
+/// Returns the labels of the four pixels around the corner, counterclockwise from the southwest.
+pub(super) fn around(size: TextureSize, labels: &[u32], x: u32, y: u32) -> [u32; 4] {
     [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(i, j)| labels[((y + j) * size.width + x + i) as usize])
 }

@@ -1,10 +1,10 @@
-//! Step G6, beside `shaders/g6_triangles.wgsl`.
+//! Step G6: the twin of `shaders/g6_triangles.wgsl`.
 
-use crate::gpu::steps::Size;
+use crate::gpu::texture_size::TextureSize;
 use crate::gpu::twins::g4_vertices::{around, find_vertices};
 
-/// The triangles of all corners, row by row, as triples of site numbers.
-pub fn make_triangles(size: Size, labels: &[u32], texture: &[u32]) -> Vec<[u32; 3]> {
+/// Returns the triangles of all corners, row by row, as triples of site numbers.
+pub fn make_triangles(size: TextureSize, labels: &[u32], texture: &[u32]) -> Vec<[u32; 3]> {
     let site = |label: u32| !texture[((label >> 16) * size.width + (label & 0xffff)) as usize];
     let mut triangles = Vec::new();
     let counts = find_vertices(size, labels);

@@ -1,7 +1,9 @@
 //! Coordinate reference systems as GeoTIFF keys (OGC 19-008r4, as LAS holds them in three records).
 
-use crate::input::crs::{Crs, Unit, from_epsg};
-use crate::input::las::layout::{float64, uint16};
+use crate::input::crs::from_wkt::from_epsg;
+use crate::input::crs::system::Crs;
+use crate::input::crs::unit::Unit;
+use crate::input::file::bytes::{float64, uint16};
 
 const MODEL_TYPE: u16 = 1024;
 const GEOGRAPHIC_TYPE: u16 = 2048;
@@ -20,7 +22,7 @@ const DOUBLES: u16 = 34736;
 const TEXTS: u16 = 34737;
 
 /// The three records, as they are in the file.
-pub(crate) struct Records {
+pub(crate) struct GeoKeys {
     /// The key directory: numbers of 16 bits.
     pub(crate) directory: Vec<u8>,
     /// Values of 64 bits.
@@ -29,7 +31,7 @@ pub(crate) struct Records {
     pub(crate) texts: Vec<u8>,
 }
 
-impl Records {
+impl GeoKeys {
     /// The place, count and value of `key`.
     fn entry(&self, key: u16) -> Option<(u16, u16, u16)> {
         let numbers = |index: usize| self.directory.chunks_exact(8).nth(index);
@@ -76,7 +78,7 @@ fn metres(code: u16) -> Option<f64> {
 }
 
 /// What the keys say; `None` where they say nothing.
-pub(crate) fn parse(records: &Records) -> Option<Crs> {
+pub(crate) fn parse(records: &GeoKeys) -> Option<Crs> {
     let model = records.code(MODEL_TYPE);
     let projected = records.code(PROJECTED_TYPE).filter(|_| model != Some(2));
     let code = projected.or_else(|| records.code(GEOGRAPHIC_TYPE).filter(|_| model != Some(1)));
@@ -103,10 +105,10 @@ pub(crate) fn parse(records: &Records) -> Option<Crs> {
 mod tests {
     use super::*;
 
-    fn records(keys: &[[u16; 4]], doubles: &[f64]) -> Records {
+    fn records(keys: &[[u16; 4]], doubles: &[f64]) -> GeoKeys {
         let mut all = vec![[1, 1, 0, keys.len() as u16]];
         all.extend(keys);
-        Records {
+        GeoKeys {
             directory: all.iter().flatten().flat_map(|number| number.to_le_bytes()).collect(),
             doubles: doubles.iter().flat_map(|number| number.to_le_bytes()).collect(),
             texts: b"My grid|".to_vec(),
@@ -145,7 +147,7 @@ mod tests {
     fn geographic_systems_are_in_degrees_and_damage_says_nothing() {
         assert_eq!(parse(&records(&[[1024, 0, 1, 2], [2048, 0, 1, 4326]], &[])).unwrap().horizontal, Unit::Degree);
         assert_eq!(parse(&records(&[[3076, DOUBLES, 9, 9], [1026, TEXTS, 9, 9000]], &[])), None);
-        let cut = Records { directory: vec![1, 0, 1], doubles: Vec::new(), texts: Vec::new() };
+        let cut = GeoKeys { directory: vec![1, 0, 1], doubles: Vec::new(), texts: Vec::new() };
         assert_eq!(parse(&cut), None);
     }
 }

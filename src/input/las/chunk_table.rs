@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use laz::laszip::ChunkTable;
 
-use crate::input::catch_panic::guarded;
-use crate::input::file::Positioned;
-use crate::input::las::header::Header;
-use crate::input::las::layout::{uint32, uint64};
-use crate::input::las::laz::Coding;
+use crate::input::file::bytes::{uint32, uint64};
+use crate::input::file::random_access::RandomAccessFile;
+use crate::input::las::catch_panic::catch_panic;
+use crate::input::las::compression::LazCompression;
+use crate::input::las::header::LasHeader;
 use crate::{Error, Result};
 
 /// Bytes before the first chunk, which hold the position of the table.
@@ -16,7 +16,7 @@ const POINTER: u64 = 8;
 
 /// A run of records that can be decoded on its own.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Chunk {
+pub(crate) struct LazChunk {
     /// The number of its first record in the file.
     pub(crate) first: u64,
     /// Its number of records.
@@ -27,48 +27,25 @@ pub(crate) struct Chunk {
     pub(crate) restart: u64,
 }
 
-/// The head of a layered chunk: its first record as it is, the number of records, the size of every layer.
-#[derive(Clone, Debug)]
-pub(crate) struct Layers {
-    /// Bytes of a record.
-    pub(crate) record: u64,
-    /// Number of layers.
-    pub(crate) count: u64,
-}
-
-impl Layers {
-    /// The number of records and of bytes of the chunk at the start of `range`; `None` where it does not fit in there.
-    pub(crate) fn read(&self, file: &Positioned, range: Range<u64>) -> Result<Option<(u64, u64)>> {
-        let head = self.record + 4 + 4 * self.count;
-        if range.end.saturating_sub(range.start) < head {
-            return Ok(None);
-        }
-        let numbers = file.bytes(range.start + self.record..range.start + head)?;
-        let layers: u64 = (1..=self.count as usize).map(|layer| uint32(&numbers, 4 * layer) as u64).sum();
-        let fits = head + layers <= range.end - range.start;
-        Ok(fits.then_some((uint32(&numbers, 0) as u64, head + layers)))
-    }
-}
-
 /// The chunks of `file`, in order, together with at most `header.records` records.
 pub(crate) fn find(
-    file: &Positioned,
-    header: &Header,
-    coding: &Coding,
+    file: &RandomAccessFile,
+    header: &LasHeader,
+    compression: &LazCompression,
     warnings: &mut Vec<String>,
-) -> Result<Vec<Chunk>> {
+) -> Result<Vec<LazChunk>> {
     if header.records == 0 {
         return Ok(Vec::new());
     }
-    if !coding.chunked {
-        return Ok(vec![Chunk {
+    if !compression.chunked {
+        return Ok(vec![LazChunk {
             first: 0,
             count: header.records,
             bytes: header.points_at..file.size(),
             restart: u64::MAX,
         }]);
     }
-    match from_table(file, header, coding)? {
+    match from_table(file, header, compression)? {
         Ok((chunks, surplus)) => {
             if surplus > 0 {
                 warnings
@@ -78,19 +55,19 @@ pub(crate) fn find(
         }
         Err(what) => {
             warnings.push(format!("the table of its compressed chunks {what}; they are found one by one instead"));
-            walk(file, header, coding)
+            walk(file, header, compression)
         }
     }
 }
 
-/// Chunks and the number of records left out, or what is wrong with the table.
-type Found = std::result::Result<(Vec<Chunk>, u64), String>;
+/// CompressedPoints and the number of records left out, or what is wrong with the table.
+type Found = std::result::Result<(Vec<LazChunk>, u64), String>;
 
-fn from_table(file: &Positioned, header: &Header, coding: &Coding) -> Result<Found> {
+fn from_table(file: &RandomAccessFile, header: &LasHeader, compression: &LazCompression) -> Result<Found> {
     let Some(table_at) = table_position(file, header)? else {
         return Ok(Err("is missing, so the file was not finished or is cut short".to_string()));
     };
-    let entries = match read_table(file, header, coding, table_at)? {
+    let entries = match read_table(file, header, compression, table_at)? {
         Ok(entries) => entries,
         Err(what) => return Ok(Err(what)),
     };
@@ -102,9 +79,9 @@ fn from_table(file: &Positioned, header: &Header, coding: &Coding) -> Result<Fou
             return Ok(Err(format!("lets chunk {} reach beyond the points", chunks.len())));
         }
         let kept = count.min(header.records - first);
-        surplus += if coding.chunk_size.is_none() { count - kept } else { 0 };
+        surplus += if compression.chunk_size.is_none() { count - kept } else { 0 };
         if kept > 0 {
-            chunks.push(Chunk { first, count: kept, bytes: at..end, restart: u64::MAX });
+            chunks.push(LazChunk { first, count: kept, bytes: at..end, restart: u64::MAX });
         }
         first += kept;
         at = end;
@@ -113,7 +90,7 @@ fn from_table(file: &Positioned, header: &Header, coding: &Coding) -> Result<Fou
 }
 
 /// The position of the chunk table: before the points, or, by writers that cannot go back, at the end of the file.
-fn table_position(file: &Positioned, header: &Header) -> Result<Option<u64>> {
+fn table_position(file: &RandomAccessFile, header: &LasHeader) -> Result<Option<u64>> {
     let first = header.points_at + POINTER;
     if first + POINTER > file.size() {
         return Ok(None);
@@ -129,9 +106,9 @@ fn table_position(file: &Positioned, header: &Header) -> Result<Option<u64>> {
 
 /// The records and bytes of every chunk.
 fn read_table(
-    file: &Positioned,
-    header: &Header,
-    coding: &Coding,
+    file: &RandomAccessFile,
+    header: &LasHeader,
+    compression: &LazCompression,
     at: u64,
 ) -> Result<std::result::Result<Vec<(u64, u64)>, String>> {
     let chunks = uint32(&file.bytes(at..at + POINTER)?, 4) as u64;
@@ -140,8 +117,8 @@ fn read_table(
     if chunks > room {
         return Ok(Err(format!("claims {chunks} chunks, more than the file has room for")));
     }
-    let mut window = file.window(at..file.size())?;
-    let table = match guarded(|| ChunkTable::read(&mut window, coding.chunk_size.is_none())) {
+    let mut window = file.range(at..file.size())?;
+    let table = match catch_panic(|| ChunkTable::read(&mut window, compression.chunk_size.is_none())) {
         Ok(Ok(table)) => table,
         Ok(Err(error)) if error.kind() != std::io::ErrorKind::UnexpectedEof => {
             return Err(Error::io("read", file.path())(error));
@@ -151,19 +128,19 @@ fn read_table(
     };
     // The table holds 32-bit numbers, which the decoder extends by their sign.
     let entry = |entry: &laz::laszip::ChunkTableEntry| {
-        (coding.chunk_size.unwrap_or(entry.point_count as u32 as u64), entry.byte_count as u32 as u64)
+        (compression.chunk_size.unwrap_or(entry.point_count as u32 as u64), entry.byte_count as u32 as u64)
     };
     Ok(Ok(table.as_ref().iter().map(entry).collect()))
 }
 
 /// The chunks without a table. Layered ones say how long they are; pointwise ones of known size follow one another, so
 /// they can be decoded in one go.
-fn walk(file: &Positioned, header: &Header, coding: &Coding) -> Result<Vec<Chunk>> {
+fn walk(file: &RandomAccessFile, header: &LasHeader, compression: &LazCompression) -> Result<Vec<LazChunk>> {
     let start = header.points_at + POINTER;
-    let Some(layers) = &coding.layers else {
-        return match coding.chunk_size {
+    let Some(layers) = &compression.layers else {
+        return match compression.chunk_size {
             Some(restart) if start < file.size() => {
-                Ok(vec![Chunk { first: 0, count: header.records, bytes: start..file.size(), restart }])
+                Ok(vec![LazChunk { first: 0, count: header.records, bytes: start..file.size(), restart }])
             }
             Some(_) => Ok(Vec::new()),
             None => Err(Error::input(
@@ -177,7 +154,7 @@ fn walk(file: &Positioned, header: &Header, coding: &Coding) -> Result<Vec<Chunk
         match layers.read(file, at..file.size())? {
             Some((count @ 1.., size)) => {
                 let count = count.min(header.records - first);
-                chunks.push(Chunk { first, count, bytes: at..at + size, restart: u64::MAX });
+                chunks.push(LazChunk { first, count, bytes: at..at + size, restart: u64::MAX });
                 first += count;
                 at += size;
             }

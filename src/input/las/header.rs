@@ -3,9 +3,10 @@
 use rust_decimal::Decimal;
 
 use crate::geometry::lattice::shortest_decimal;
-use crate::input::file::Positioned;
-use crate::input::las::layout::{LENGTHS, float64, uint16, uint32, uint64};
-use crate::input::source::Axis;
+use crate::input::file::bytes::{float64, uint16, uint32, uint64};
+use crate::input::file::random_access::RandomAccessFile;
+use crate::input::las::layout::LENGTHS;
+use crate::input::points::axis::Axis;
 use crate::{Error, Result};
 
 /// The header's size in versions 1.0 to 1.2, the least there is.
@@ -25,7 +26,7 @@ type Checked<T> = std::result::Result<T, String>;
 
 /// What the header says.
 #[derive(Clone, Debug)]
-pub(crate) struct Header {
+pub(crate) struct LasHeader {
     /// The minor version, 0 to 4.
     pub(crate) minor: u8,
     /// Point format 0 to 10, without the compression bits.
@@ -54,17 +55,17 @@ pub(crate) struct Header {
     pub(crate) axes: [Axis; 3],
 }
 
-impl Header {
+impl LasHeader {
     /// Reads and checks the header of `file`; the texts are what the user should know.
-    pub(crate) fn read(file: &Positioned) -> Result<(Header, Vec<String>)> {
+    pub(crate) fn read(file: &RandomAccessFile) -> Result<(LasHeader, Vec<String>)> {
         let mut bytes = [0; MOST];
         let held = file.size().min(MOST as u64) as usize;
         file.read_exact_at(&mut bytes[..held], 0)?;
-        Header::parse(&bytes[..held], file.size()).map_err(|what| Error::input(file.path(), what))
+        LasHeader::parse(&bytes[..held], file.size()).map_err(|what| Error::input(file.path(), what))
     }
 
     /// Reads the header from the first bytes of a file of `file_size` bytes, or says what is wrong with it.
-    pub(crate) fn parse(bytes: &[u8], file_size: u64) -> Checked<(Header, Vec<String>)> {
+    pub(crate) fn parse(bytes: &[u8], file_size: u64) -> Checked<(LasHeader, Vec<String>)> {
         if bytes.len() < LEAST {
             return Err(format!("is too short for a LAS header: {file_size} bytes of at least {LEAST}; copy it again"));
         }
@@ -91,7 +92,7 @@ impl Header {
             return Err(format!("says it has {records} points, more than any file holds; the file is damaged"));
         }
         let [min, max] = bounds(bytes)?;
-        let header = Header {
+        let header = LasHeader {
             minor,
             format,
             compressed,

@@ -1,30 +1,31 @@
 //! Where the fields of a LAS point record lie, by point format.
 
-use crate::input::filter::Record;
+use crate::input::file::bytes::{int32, uint16};
+use crate::input::points::record::PointRecord;
 
 /// The least record length of each point format, in bytes (LAS 1.4 R15, section 2.6).
 pub(crate) const LENGTHS: [u16; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
 
 /// The positions of the fields that are read, in bytes from the start of a record.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Layout {
-    /// Record length in bytes, extra bytes included.
+pub(crate) struct RecordLayout {
+    /// PointRecord length in bytes, extra bytes included.
     pub(crate) length: usize,
     /// Whether this is a format of LAS 1.4 (6 to 10).
     pub(crate) extended: bool,
     rgb: Option<usize>,
 }
 
-impl Layout {
+impl RecordLayout {
     /// The layout of point format `format` (0 to 10) with records of `length` bytes.
-    pub(crate) fn new(format: u8, length: u16) -> Layout {
+    pub(crate) fn new(format: u8, length: u16) -> RecordLayout {
         let rgb = match format {
             2 => Some(20),
             3 | 5 => Some(28),
             7 | 8 | 10 => Some(30),
             _ => None,
         };
-        Layout { length: length as usize, extended: format >= 6, rgb }
+        RecordLayout { length: length as usize, extended: format >= 6, rgb }
     }
 
     /// Whether records hold red, green and blue.
@@ -34,7 +35,7 @@ impl Layout {
 
     /// Reads a record of at least `self.length` bytes.
     #[inline]
-    pub(crate) fn record(&self, bytes: &[u8], with_rgb: bool) -> Record {
+    pub(crate) fn record(&self, bytes: &[u8], with_rgb: bool) -> PointRecord {
         let raw = [0, 4, 8].map(|at| int32(bytes, at) as i64);
         let (class, withheld) =
             if self.extended { (bytes[16], bytes[15] & 4 != 0) } else { (bytes[15] & 31, bytes[15] & 128 != 0) };
@@ -42,35 +43,6 @@ impl Layout {
             Some(at) if with_rgb => [at, at + 2, at + 4].map(|at| uint16(bytes, at)),
             _ => [0; 3],
         };
-        Record { raw, rgb, class, withheld, rounded: [false; 2] }
+        PointRecord { raw, rgb, class, withheld, rounded: [false; 2] }
     }
-}
-
-/// The little-endian number at `at`; the caller has checked the length.
-pub(crate) fn uint16(bytes: &[u8], at: usize) -> u16 {
-    u16::from_le_bytes(array(bytes, at))
-}
-
-/// The little-endian number at `at`; the caller has checked the length.
-pub(crate) fn uint32(bytes: &[u8], at: usize) -> u32 {
-    u32::from_le_bytes(array(bytes, at))
-}
-
-/// The little-endian number at `at`; the caller has checked the length.
-pub(crate) fn uint64(bytes: &[u8], at: usize) -> u64 {
-    u64::from_le_bytes(array(bytes, at))
-}
-
-/// The little-endian number at `at`; the caller has checked the length.
-pub(crate) fn float64(bytes: &[u8], at: usize) -> f64 {
-    f64::from_le_bytes(array(bytes, at))
-}
-
-fn int32(bytes: &[u8], at: usize) -> i32 {
-    i32::from_le_bytes(array(bytes, at))
-}
-
-#[inline]
-fn array<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
-    bytes[at..at + N].try_into().expect("a slice of N bytes")
 }

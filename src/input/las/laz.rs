@@ -6,21 +6,23 @@
 use std::io;
 use std::ops::Range;
 
-use laz::record::{LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor};
-use laz::{DecompressionSelection, LazItem, LazItemType, LazVlr};
+use laz::record::RecordDecompressor;
+use laz::{DecompressionSelection, LazVlr};
 
-use crate::input::catch_panic::guarded;
-use crate::input::file::{Positioned, Window};
-use crate::input::filter::Sieve;
-use crate::input::las::chunk_table::{self, Chunk, Layers};
-use crate::input::las::header::Header;
-use crate::input::las::layout::{Layout, uint16, uint32};
+use crate::input::file::random_access::RandomAccessFile;
+use crate::input::file::range::FileRange;
+use crate::input::las::catch_panic::catch_panic;
+use crate::input::las::chunk_table::{self, LazChunk};
+use crate::input::las::compression::LazCompression;
+use crate::input::las::header::LasHeader;
+use crate::input::las::layout::RecordLayout;
 use crate::input::las::uncompressed::push_records;
 use crate::input::las::vlr::Vlr;
-use crate::input::rules::Rules;
+use crate::input::points::filter::PointFilter;
+use crate::input::points::rules::PointRules;
 use crate::{Error, Result};
 
-/// Records a piece has at least, if there are as many; small chunks (COPC has them) go together.
+/// Records a chunk has at least, if there are as many; small chunks (COPC has them) go together.
 const PIECE: u64 = 50_000;
 
 /// Decoded bytes held at once, unless a single record is longer.
@@ -31,66 +33,66 @@ const LARGEST_CHUNK: u64 = 1 << 26;
 
 /// The point data of a LAZ file.
 #[derive(Clone, Debug)]
-pub(crate) struct Chunks {
-    layout: Layout,
-    coding: Coding,
-    chunks: Vec<Chunk>,
-    pieces: Vec<Range<usize>>,
+pub(crate) struct CompressedPoints {
+    layout: RecordLayout,
+    compression: LazCompression,
+    laz_chunks: Vec<LazChunk>,
+    chunks: Vec<Range<usize>>,
     /// Records that the header promises and no chunk holds.
     pub(crate) missing: u64,
 }
 
-/// How the records of a file are compressed.
-#[derive(Clone, Debug)]
-pub(crate) struct Coding {
-    items: Vec<LazItem>,
-    /// The layers of a chunk; `None` for pointwise compression.
-    pub(crate) layers: Option<Layers>,
-    /// Whether the points are cut in chunks at all.
-    pub(crate) chunked: bool,
-    /// Records of a chunk, where all but the last have the same number.
-    pub(crate) chunk_size: Option<u64>,
-}
-
-impl Chunks {
+impl CompressedPoints {
     /// Finds the chunks of `file`.
-    pub(crate) fn read(file: &Positioned, header: &Header, vlrs: &[Vlr], warnings: &mut Vec<String>) -> Result<Chunks> {
+    pub(crate) fn read(
+        file: &RandomAccessFile,
+        header: &LasHeader,
+        vlrs: &[Vlr],
+        warnings: &mut Vec<String>,
+    ) -> Result<CompressedPoints> {
         let Some(vlr) = vlrs.iter().find(|vlr| vlr.is(LazVlr::USER_ID, LazVlr::RECORD_ID)) else {
             let what = "says its points are compressed, but has no LASzip record; the file is damaged";
             return Err(Error::input(file.path(), what));
         };
-        let coding = Coding::parse(&vlr.read(file)?, header).map_err(|what| Error::input(file.path(), what))?;
-        let chunks = chunk_table::find(file, header, &coding, warnings)?;
-        let missing = header.records - chunks.iter().map(|chunk| chunk.count).sum::<u64>();
-        let layout = Layout::new(header.format, header.record_length);
-        Ok(Chunks { layout, coding, pieces: group(&chunks), chunks, missing })
+        let compression =
+            LazCompression::parse(&vlr.read(file)?, header).map_err(|what| Error::input(file.path(), what))?;
+        let laz_chunks = chunk_table::find(file, header, &compression, warnings)?;
+        let missing = header.records - laz_chunks.iter().map(|chunk| chunk.count).sum::<u64>();
+        let layout = RecordLayout::new(header.format, header.record_length);
+        Ok(CompressedPoints { layout, compression, chunks: group(&laz_chunks), laz_chunks, missing })
     }
 
     /// The number of records, those missing included.
     fn records(&self) -> u64 {
-        self.chunks.last().map_or(0, |chunk| chunk.first + chunk.count) + self.missing
+        self.laz_chunks.last().map_or(0, |chunk| chunk.first + chunk.count) + self.missing
     }
 
-    /// The number of pieces; at least one where records are missing, to count them.
-    pub(crate) fn pieces(&self) -> usize {
-        self.pieces.len().max((self.missing > 0) as usize)
+    /// The number of chunks; at least one where records are missing, to count them.
+    pub(crate) fn chunks(&self) -> usize {
+        self.chunks.len().max((self.missing > 0) as usize)
     }
 
-    /// Sends the records of `piece` through `sieve`.
-    pub(crate) fn decode(&self, file: &Positioned, piece: usize, rules: &Rules, sieve: &mut Sieve) -> Result<()> {
-        for index in self.pieces.get(piece).cloned().unwrap_or_default() {
-            let chunk = &self.chunks[index];
-            let mut run = ChunkRun { chunks: self, file, index, rules, next: chunk.first };
-            if let Err(what) = run.decode(sieve)? {
+    /// Sends the records of `chunk` through `filter`.
+    pub(crate) fn decode(
+        &self,
+        file: &RandomAccessFile,
+        chunk: usize,
+        rules: &PointRules,
+        filter: &mut PointFilter,
+    ) -> Result<()> {
+        for index in self.chunks.get(chunk).cloned().unwrap_or_default() {
+            let chunk = &self.laz_chunks[index];
+            let mut run = ChunkDecoder { chunks: self, file, index, rules, next: chunk.first };
+            if let Err(what) = run.decode(filter)? {
                 let (left, at) = (chunk.first + chunk.count - run.next, run.next);
-                sieve.malformed(left, || {
+                filter.malformed(left, || {
                     format!("chunk {index} is damaged at point {at}: {what}; {left} points are lost, so copy it again or allow the loss")
                 });
             }
         }
-        if piece + 1 == self.pieces() && self.missing > 0 {
+        if chunk + 1 == self.chunks() && self.missing > 0 {
             let (all, missing) = (self.records(), self.missing);
-            sieve.malformed(missing, || {
+            filter.malformed(missing, || {
                 format!(
                     "the header promises {all} points, but the compressed data ends {missing} before; copy it again, or \
                      allow the loss"
@@ -101,100 +103,26 @@ impl Chunks {
     }
 }
 
-/// Cuts the chunks in pieces.
-fn group(chunks: &[Chunk]) -> Vec<Range<usize>> {
-    let mut pieces = Vec::new();
+/// Cuts the chunks in chunks.
+fn group(laz_chunks: &[LazChunk]) -> Vec<Range<usize>> {
+    let mut chunks = Vec::new();
     let (mut start, mut records) = (0, 0);
-    for (index, chunk) in chunks.iter().enumerate() {
+    for (index, chunk) in laz_chunks.iter().enumerate() {
         records += chunk.count;
-        if records >= PIECE || index + 1 == chunks.len() {
-            pieces.push(start..index + 1);
+        if records >= PIECE || index + 1 == laz_chunks.len() {
+            chunks.push(start..index + 1);
             (start, records) = (index + 1, 0);
         }
     }
-    pieces
-}
-
-impl Coding {
-    /// Reads and checks the data of the LASzip record.
-    fn parse(bytes: &[u8], header: &Header) -> std::result::Result<Coding, String> {
-        let broken = |what: String| format!("has a LASzip record that {what}; the file is damaged or of a newer kind");
-        if bytes.len() < 34 {
-            return Err(broken(format!("has {} bytes of at least 34", bytes.len())));
-        }
-        let vlr = LazVlr::from_buffer(bytes).map_err(|error| broken(format!("cannot be read ({error})")))?;
-        let (compressor, chunk_size) = (uint16(bytes, 0), uint32(bytes, 12));
-        let items = vlr.items().clone();
-        let size: u64 = items.iter().map(|item| item.size() as u64).sum();
-        if size != header.record_length as u64 {
-            return Err(broken(format!(
-                "describes points of {size} bytes, while the header says {}",
-                header.record_length
-            )));
-        }
-        if let Some(item) = items.iter().find(|item| !known(item, compressor == 3)) {
-            return Err(broken(format!("has {:?} in version {} in it", item.item_type(), item.version())));
-        }
-        let point = if header.format >= 6 { LazItemType::Point14 } else { LazItemType::Point10 };
-        if !(1..=3).contains(&compressor) || items.first().is_none_or(|item| item.item_type() != point) {
-            return Err(broken(format!(
-                "has compressor {compressor}, which does not go with point format {}",
-                header.format
-            )));
-        }
-        Ok(Coding {
-            layers: (compressor == 3).then(|| Layers { record: size, count: items.iter().map(layers_of).sum() }),
-            chunked: compressor != 1,
-            chunk_size: (chunk_size != u32::MAX && chunk_size != 0).then_some(chunk_size as u64),
-            items,
-        })
-    }
-
-    fn decoder(
-        &self,
-        window: Window,
-        selection: DecompressionSelection,
-    ) -> laz::Result<Box<dyn RecordDecompressor<Window>>> {
-        let mut decoder: Box<dyn RecordDecompressor<Window>> = match self.layers {
-            Some(_) => Box::new(LayeredPointRecordDecompressor::new(window)),
-            None => Box::new(SequentialPointRecordDecompressor::new(window)),
-        };
-        decoder.set_fields_from(&self.items)?;
-        decoder.set_selection(selection);
-        Ok(decoder)
-    }
-}
-
-/// Whether the decoders take `item`, whose size must be that of its type.
-fn known(item: &LazItem, layered: bool) -> bool {
-    let size = match item.item_type() {
-        LazItemType::Byte(size) | LazItemType::Byte14(size) => size,
-        LazItemType::Point10 => 20,
-        LazItemType::GpsTime | LazItemType::RGBNIR14 => 8,
-        LazItemType::RGB12 | LazItemType::RGB14 => 6,
-        LazItemType::WavePacket13 | LazItemType::WavePacket14 => 29,
-        LazItemType::Point14 => 30,
-    };
-    let versions = if layered { 3..=4 } else { 1..=2 };
-    item.size() == size && versions.contains(&item.version())
-}
-
-/// The number of layers an item of layered compression has.
-fn layers_of(item: &LazItem) -> u64 {
-    match item.item_type() {
-        LazItemType::Point14 => 9,
-        LazItemType::RGBNIR14 => 2,
-        LazItemType::Byte14(count) => count as u64,
-        _ => 1,
-    }
+    chunks
 }
 
 /// One chunk on its way through the decoder.
-struct ChunkRun<'a> {
-    chunks: &'a Chunks,
-    file: &'a Positioned,
+struct ChunkDecoder<'a> {
+    chunks: &'a CompressedPoints,
+    file: &'a RandomAccessFile,
     index: usize,
-    rules: &'a Rules,
+    rules: &'a PointRules,
     /// The number of the next record.
     next: u64,
 }
@@ -202,19 +130,19 @@ struct ChunkRun<'a> {
 /// Inside: what is wrong with the data. Outside: what stops the job.
 type Judged<T> = Result<std::result::Result<T, String>>;
 
-impl ChunkRun<'_> {
+impl ChunkDecoder<'_> {
     /// Decodes the chunk as far as it goes; `self.next` then says how far.
-    fn decode(&mut self, sieve: &mut Sieve) -> Judged<()> {
-        let chunk = &self.chunks.chunks[self.index];
+    fn decode(&mut self, filter: &mut PointFilter) -> Judged<()> {
+        let chunk = &self.chunks.laz_chunks[self.index];
         let end = chunk.first + chunk.count;
         let held = match self.layered_count(chunk)? {
             Ok(held) => held.min(chunk.count),
             Err(what) => return Ok(Err(what)),
         };
-        let mut window = self.file.window(chunk.bytes.clone())?;
+        let mut window = self.file.range(chunk.bytes.clone())?;
         while self.next < chunk.first + held {
             let stop = self.next.saturating_add(chunk.restart).min(chunk.first + held);
-            window = match self.decode_run(window, stop, sieve)? {
+            window = match self.decode_run(window, stop, filter)? {
                 Ok(window) => window,
                 Err(what) => return Ok(Err(what)),
             };
@@ -223,8 +151,8 @@ impl ChunkRun<'_> {
     }
 
     /// The number of points a layered chunk says it has; that of the chunk table for others.
-    fn layered_count(&self, chunk: &Chunk) -> Judged<u64> {
-        let Some(layers) = &self.chunks.coding.layers else {
+    fn layered_count(&self, chunk: &LazChunk) -> Judged<u64> {
+        let Some(layers) = &self.chunks.compression.layers else {
             return Ok(Ok(chunk.count));
         };
         let size = chunk.bytes.end - chunk.bytes.start;
@@ -240,9 +168,9 @@ impl ChunkRun<'_> {
     }
 
     /// Decodes the records up to number `stop`, with fresh models, and gives the window back.
-    fn decode_run(&mut self, window: Window, stop: u64, sieve: &mut Sieve) -> Judged<Window> {
+    fn decode_run(&mut self, window: FileRange, stop: u64, filter: &mut PointFilter) -> Judged<FileRange> {
         let selection = self.selection();
-        let mut decoder = match guarded(|| self.chunks.coding.decoder(window, selection)) {
+        let mut decoder = match catch_panic(|| self.chunks.compression.decoder(window, selection)) {
             Ok(Ok(decoder)) => decoder,
             Ok(Err(error)) => return Ok(Err(error.to_string())),
             Err(panic) => return Ok(Err(panic)),
@@ -252,8 +180,8 @@ impl ChunkRun<'_> {
         while self.next < stop {
             let wanted = ((block.len() / length) as u64).min(stop - self.next) as usize * length;
             let mut done = 0;
-            let outcome = guarded(|| decode_block(decoder.as_mut(), &mut block[..wanted], length, &mut done));
-            push_records(&self.chunks.layout, &block[..done], self.next, self.rules, sieve)?;
+            let outcome = catch_panic(|| decode_block(decoder.as_mut(), &mut block[..wanted], length, &mut done));
+            push_records(&self.chunks.layout, &block[..done], self.next, self.rules, filter)?;
             self.next += (done / length) as u64;
             match outcome {
                 Ok(Ok(())) => {}
@@ -275,7 +203,7 @@ impl ChunkRun<'_> {
 
 /// Decodes record after record into `block`; `done` counts the bytes, also when it fails.
 fn decode_block(
-    decoder: &mut dyn RecordDecompressor<Window>,
+    decoder: &mut dyn RecordDecompressor<FileRange>,
     block: &mut [u8],
     length: usize,
     done: &mut usize,

@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use crate::Result;
-use crate::input::file::Positioned;
-use crate::input::las::header::Header;
-use crate::input::las::layout::{uint16, uint64};
+use crate::input::file::bytes::{uint16, uint64};
+use crate::input::file::random_access::RandomAccessFile;
+use crate::input::las::header::LasHeader;
 
 /// Bytes before the data of a variable length record.
 const HEAD: u64 = 54;
@@ -34,14 +34,14 @@ impl Vlr {
     }
 
     /// The record's data; empty where it is longer than any record this program reads.
-    pub(crate) fn read(&self, file: &Positioned) -> Result<Vec<u8>> {
+    pub(crate) fn read(&self, file: &RandomAccessFile) -> Result<Vec<u8>> {
         if self.data.end - self.data.start > LONGEST { Ok(Vec::new()) } else { file.bytes(self.data.clone()) }
     }
 }
 
 /// All records that lie in the file, and a warning where the header promises more.
-pub(crate) fn list(file: &Positioned, header: &Header, warnings: &mut Vec<String>) -> Result<Vec<Vlr>> {
-    let ordinary = Stretch { range: header.size..header.points_at, count: header.vlrs, head: HEAD };
+pub(crate) fn list(file: &RandomAccessFile, header: &LasHeader, warnings: &mut Vec<String>) -> Result<Vec<Vlr>> {
+    let ordinary = VlrSequence { range: header.size..header.points_at, count: header.vlrs, head: HEAD };
     let mut vlrs = ordinary.walk(file)?;
     if (vlrs.len() as u32) < header.vlrs.min(MOST) {
         warnings.push(format!(
@@ -52,7 +52,7 @@ pub(crate) fn list(file: &Positioned, header: &Header, warnings: &mut Vec<String
     }
     let (at, count) = header.evlrs;
     if count > 0 {
-        let extended = Stretch { range: at..file.size(), count, head: EXTENDED_HEAD };
+        let extended = VlrSequence { range: at..file.size(), count, head: EXTENDED_HEAD };
         let found = if at >= header.points_at { extended.walk(file)? } else { Vec::new() };
         if (found.len() as u32) < count.min(MOST) {
             warnings.push(format!(
@@ -66,14 +66,14 @@ pub(crate) fn list(file: &Positioned, header: &Header, warnings: &mut Vec<String
 }
 
 /// A stretch of the file that holds records one after the other.
-struct Stretch {
+struct VlrSequence {
     range: Range<u64>,
     count: u32,
     head: u64,
 }
 
-impl Stretch {
-    fn walk(&self, file: &Positioned) -> Result<Vec<Vlr>> {
+impl VlrSequence {
+    fn walk(&self, file: &RandomAccessFile) -> Result<Vec<Vlr>> {
         let mut vlrs = Vec::new();
         let mut at = self.range.start;
         while (vlrs.len() as u32) < self.count.min(MOST) && fits(at, self.head, self.range.end) {

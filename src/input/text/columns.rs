@@ -5,8 +5,8 @@ use std::path::Path;
 
 use memchr::{memchr, memchr2};
 
-use crate::input::text::TextOptions;
 use crate::input::text::number::Number;
+use crate::input::text::options::TextOptions;
 use crate::{Error, Result};
 
 /// What stands between two columns.
@@ -87,7 +87,7 @@ fn unquoted(field: &[u8]) -> &[u8] {
 
 /// What a column holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Role {
+pub(crate) enum ColumnRole {
     /// x, y or z.
     Coordinate(usize),
     /// Red, green or blue.
@@ -99,19 +99,19 @@ pub(crate) enum Role {
 }
 
 /// The names that people give to columns.
-const NAMES: [(&[&str], Role); 7] = [
-    (&["x", "easting", "east", "lon", "long", "longitude"], Role::Coordinate(0)),
-    (&["y", "northing", "north", "lat", "latitude"], Role::Coordinate(1)),
-    (&["z", "elevation", "elev", "height", "altitude", "alt"], Role::Coordinate(2)),
-    (&["r", "red"], Role::Color(0)),
-    (&["g", "green"], Role::Color(1)),
-    (&["b", "blue"], Role::Color(2)),
-    (&["class", "classification"], Role::Class),
+const NAMES: [(&[&str], ColumnRole); 7] = [
+    (&["x", "easting", "east", "lon", "long", "longitude"], ColumnRole::Coordinate(0)),
+    (&["y", "northing", "north", "lat", "latitude"], ColumnRole::Coordinate(1)),
+    (&["z", "elevation", "elev", "height", "altitude", "alt"], ColumnRole::Coordinate(2)),
+    (&["r", "red"], ColumnRole::Color(0)),
+    (&["g", "green"], ColumnRole::Color(1)),
+    (&["b", "blue"], ColumnRole::Color(2)),
+    (&["class", "classification"], ColumnRole::Class),
 ];
 
-fn role(name: &[u8]) -> Role {
+fn role(name: &[u8]) -> ColumnRole {
     let name = String::from_utf8_lossy(name).trim().to_lowercase();
-    NAMES.iter().find(|(names, _)| names.contains(&name.as_str())).map_or(Role::Skipped, |&(_, role)| role)
+    NAMES.iter().find(|(names, _)| names.contains(&name.as_str())).map_or(ColumnRole::Skipped, |&(_, role)| role)
 }
 
 /// How the lines of a text are to be read.
@@ -120,13 +120,13 @@ pub(crate) struct Columns {
     /// What parts the columns of a row.
     pub(crate) delimiter: Delimiter,
     /// What each column holds, up to the last that is used.
-    pub(crate) roles: Vec<Role>,
+    pub(crate) roles: Vec<ColumnRole>,
     /// What lines to be skipped begin with.
     comments: Vec<Vec<u8>>,
 }
 
 /// The lines at the start of a text, and what to do with them.
-pub(crate) struct Detection {
+pub(crate) struct DetectedColumns {
     pub(crate) columns: Columns,
     /// Whether the first line that is neither blank nor a comment is no row.
     pub(crate) header: bool,
@@ -135,7 +135,7 @@ pub(crate) struct Detection {
 
 impl Columns {
     /// Finds out how the text in `path` is laid out, the first lines of which are `lines`.
-    pub(crate) fn detect(path: &Path, lines: &[&[u8]], options: &TextOptions) -> Result<Detection> {
+    pub(crate) fn detect(path: &Path, lines: &[&[u8]], options: &TextOptions) -> Result<DetectedColumns> {
         let comments = comments(options)?;
         let rows: Vec<&[u8]> = lines.iter().copied().filter(|line| !skipped(line, &comments)).collect();
         let Some((&first, after)) = rows.split_first() else {
@@ -156,7 +156,7 @@ impl Columns {
                 .map_err(|what| Error::Config(format!("[input.csv] columns {what}")))?,
             None if named => header_roles(&candidates_for_header(&candidates), first)
                 .map_err(|what| Error::input(path, format!("the first line, {}, {what}", shown(first))))?,
-            None => vec![Role::Coordinate(0), Role::Coordinate(1), Role::Coordinate(2)],
+            None => vec![ColumnRole::Coordinate(0), ColumnRole::Coordinate(1), ColumnRole::Coordinate(2)],
         };
         let delimiter = row_delimiter(&candidates, &roles, if header { after } else { &rows });
         let unnamed = !named && options.columns.is_none();
@@ -165,7 +165,7 @@ impl Columns {
                 "no line names the columns: the first three are taken for x, y and z; say otherwise with `columns`";
             warnings.push(format!("{what} under [input.csv]"));
         }
-        Ok(Detection { columns: Columns { delimiter, roles, comments }, header, warnings })
+        Ok(DetectedColumns { columns: Columns { delimiter, roles, comments }, header, warnings })
     }
 
     /// Whether `line` is blank or a comment.
@@ -175,7 +175,7 @@ impl Columns {
     }
 
     /// Whether a column holds what `wanted` says.
-    pub(crate) fn have(&self, wanted: Role) -> bool {
+    pub(crate) fn have(&self, wanted: ColumnRole) -> bool {
         self.roles.contains(&wanted)
     }
 }
@@ -228,7 +228,7 @@ fn candidates_for_header(candidates: &[Delimiter]) -> Vec<Delimiter> {
 }
 
 /// The roles under the first delimiter that gives x, y and z, or what is wrong under the one that gives most columns.
-fn header_roles(candidates: &[Delimiter], line: &[u8]) -> std::result::Result<Vec<Role>, String> {
+fn header_roles(candidates: &[Delimiter], line: &[u8]) -> std::result::Result<Vec<ColumnRole>, String> {
     if !line.iter().any(|byte| byte.is_ascii_alphabetic()) {
         return Err(NOT_A_ROW.to_string());
     }
@@ -240,38 +240,38 @@ fn header_roles(candidates: &[Delimiter], line: &[u8]) -> std::result::Result<Ve
     most.map_or(Err("cannot be read".to_string()), split).map_err(|what| format!("{what}; {ADVICE}"))
 }
 
-fn roles<'a>(names: impl Iterator<Item = &'a [u8]>) -> std::result::Result<Vec<Role>, String> {
-    let mut roles: Vec<Role> = names.map(role).collect();
+fn roles<'a>(names: impl Iterator<Item = &'a [u8]>) -> std::result::Result<Vec<ColumnRole>, String> {
+    let mut roles: Vec<ColumnRole> = names.map(role).collect();
     for (names, role) in NAMES {
         let count = roles.iter().filter(|other| **other == role).count();
         if count > 1 {
             return Err(format!("names {count} columns {}", names[0]));
         }
-        if count == 0 && matches!(role, Role::Coordinate(_)) {
+        if count == 0 && matches!(role, ColumnRole::Coordinate(_)) {
             return Err(format!("names no column {}", names[0]));
         }
     }
     drop_partial_color(&mut roles);
-    let used = roles.iter().rposition(|role| *role != Role::Skipped).map_or(0, |last| last + 1);
+    let used = roles.iter().rposition(|role| *role != ColumnRole::Skipped).map_or(0, |last| last + 1);
     roles.truncate(used);
     Ok(roles)
 }
 
 /// Colours count only where all three are there.
-fn drop_partial_color(roles: &mut [Role]) {
-    if !(0..3).all(|channel| roles.contains(&Role::Color(channel))) {
-        for role in roles.iter_mut().filter(|role| matches!(role, Role::Color(_))) {
-            *role = Role::Skipped;
+fn drop_partial_color(roles: &mut [ColumnRole]) {
+    if !(0..3).all(|channel| roles.contains(&ColumnRole::Color(channel))) {
+        for role in roles.iter_mut().filter(|role| matches!(role, ColumnRole::Color(_))) {
+            *role = ColumnRole::Skipped;
         }
     }
 }
 
 /// The delimiter under which most rows have numbers as x, y and z; the first of those that are as good.
-fn row_delimiter(candidates: &[Delimiter], roles: &[Role], rows: &[&[u8]]) -> Delimiter {
+fn row_delimiter(candidates: &[Delimiter], roles: &[ColumnRole], rows: &[&[u8]]) -> Delimiter {
     let fits = |delimiter: Delimiter, row: &&[u8]| {
         let fields = delimiter.fields(row);
-        let number = |(column, role): (usize, &Role)| {
-            !matches!(role, Role::Coordinate(_))
+        let number = |(column, role): (usize, &ColumnRole)| {
+            !matches!(role, ColumnRole::Coordinate(_))
                 || fields.get(column).is_some_and(|field| Number::parse(field).is_some())
         };
         roles.iter().enumerate().all(number)

@@ -5,7 +5,7 @@ use std::ops::Range;
 use memchr::memchr;
 
 use crate::Result;
-use crate::input::file::Positioned;
+use crate::input::file::random_access::RandomAccessFile;
 
 /// Bytes of a block.
 pub(crate) const BLOCK: u64 = 2 << 20;
@@ -15,7 +15,7 @@ pub(crate) const LONGEST: usize = 1 << 16;
 
 /// A line without its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Line<'a> {
+pub(crate) enum TextLine<'a> {
     /// The line's bytes.
     Whole(&'a [u8]),
     /// A line of more than [`LONGEST`] bytes.
@@ -25,10 +25,10 @@ pub(crate) enum Line<'a> {
 /// Calls `each` for every line that begins in `range`. Lines begin at `first`, or after a line feed.
 /// Gives the number of lines.
 pub(crate) fn for_each_line(
-    file: &Positioned,
+    file: &RandomAccessFile,
     first: u64,
     range: Range<u64>,
-    mut each: impl FnMut(u64, Line) -> Result<()>,
+    mut each: impl FnMut(u64, TextLine) -> Result<()>,
 ) -> Result<u64> {
     let begins_line = range.start == first;
     let from = range.start - !begins_line as u64;
@@ -41,8 +41,11 @@ pub(crate) fn for_each_line(
         let feed = memchr(b'\n', &text[at..]);
         let length = feed.unwrap_or(text.len() - at);
         let cut = feed.is_none() && to < file.size();
-        let line =
-            if cut || length > LONGEST { Line::TooLong } else { Line::Whole(without_return(&text[at..at + length])) };
+        let line = if cut || length > LONGEST {
+            TextLine::TooLong
+        } else {
+            TextLine::Whole(without_return(&text[at..at + length]))
+        };
         each(count, line)?;
         count += 1;
         at += length + 1;
@@ -61,13 +64,13 @@ mod tests {
     fn lines(text: &[u8], block: u64) -> Vec<Option<Vec<u8>>> {
         let path = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(path.path(), text).unwrap();
-        let file = Positioned::open(path.path()).unwrap();
+        let file = RandomAccessFile::open(path.path()).unwrap();
         let mut all = Vec::new();
         let mut start = 0;
         while start < file.size() {
             let range = start..(start + block).min(file.size());
-            let collect = |_, line: Line| {
-                all.push(if let Line::Whole(line) = line { Some(line.to_vec()) } else { None });
+            let collect = |_, line: TextLine| {
+                all.push(if let TextLine::Whole(line) = line { Some(line.to_vec()) } else { None });
                 Ok(())
             };
             for_each_line(&file, 0, range.clone(), collect).unwrap();

@@ -5,14 +5,15 @@ use std::ops::Range;
 use rayon::prelude::*;
 use rust_decimal::Decimal;
 
-use crate::input::file::Positioned;
-use crate::input::filter::{Record, Sieve};
-use crate::input::source::Axis;
-use crate::input::text::TextOptions;
-use crate::input::text::columns::{Columns, Delimiter, Role, shown};
+use crate::input::file::random_access::RandomAccessFile;
+use crate::input::points::axis::Axis;
+use crate::input::points::filter::PointFilter;
+use crate::input::points::record::PointRecord;
+use crate::input::text::columns::{ColumnRole, Columns, Delimiter, shown};
 use crate::input::text::granularity::Granularity;
-use crate::input::text::lines::{BLOCK, LONGEST, Line, for_each_line};
+use crate::input::text::lines::{BLOCK, LONGEST, TextLine, for_each_line};
 use crate::input::text::number::{MOST_DECIMALS, Number, POWERS};
+use crate::input::text::options::TextOptions;
 use crate::{Result, interrupt};
 
 /// Bytes at the start of a text that show how it is laid out.
@@ -20,11 +21,11 @@ const SAMPLE: u64 = 1 << 17;
 
 /// The text, after a first pass over all of it.
 #[derive(Clone, Debug)]
-pub(crate) struct Table {
+pub(crate) struct TextTable {
     columns: Columns,
     /// Where the rows begin, and where the file ends.
     rows: Range<u64>,
-    blocks: Vec<Block>,
+    blocks: Vec<BlockStart>,
     /// Rows, malformed ones included.
     pub(crate) records: u64,
     /// Least x, y, z.
@@ -37,7 +38,7 @@ pub(crate) struct Table {
 
 /// Numbers of the first row and the first line of a block: rows from 0, lines as editors count them.
 #[derive(Clone, Copy, Debug)]
-struct Block {
+struct BlockStart {
     row: u64,
     line: u64,
 }
@@ -53,9 +54,9 @@ struct Survey {
     grid: [Granularity; 2],
 }
 
-impl Table {
+impl TextTable {
     /// Goes through all of `file` on the threads of the current rayon pool; the texts are what the user should know.
-    pub(crate) fn scan(file: &Positioned, options: &TextOptions) -> Result<(Table, Vec<String>)> {
+    pub(crate) fn scan(file: &RandomAccessFile, options: &TextOptions) -> Result<(TextTable, Vec<String>)> {
         let (columns, start, first_line, mut warnings) = detect(file, options)?;
         let rows = start..file.size();
         let count = (rows.end - rows.start).div_ceil(BLOCK);
@@ -66,7 +67,7 @@ impl Table {
         let surveys: Vec<Survey> = (0..count).into_par_iter().map(survey).collect::<Result<_>>()?;
         let (mut blocks, mut all) = (Vec::with_capacity(surveys.len()), Survey::empty());
         for survey in &surveys {
-            blocks.push(Block { row: all.rows, line: first_line + all.lines });
+            blocks.push(BlockStart { row: all.rows, line: first_line + all.lines });
             all.add(survey);
         }
         if all.rows > 0 && all.min[0] > all.max[0] {
@@ -74,7 +75,7 @@ impl Table {
         }
         let [min, max] = if all.min[0] <= all.max[0] { [all.min, all.max] } else { [[0.0; 3]; 2] };
         let decimals = std::array::from_fn(|axis| fitting(all.decimals[axis], min[axis].abs().max(max[axis].abs())));
-        Ok((Table { columns, rows, blocks, records: all.rows, min, max, decimals, grid: all.grid }, warnings))
+        Ok((TextTable { columns, rows, blocks, records: all.rows, min, max, decimals, grid: all.grid }, warnings))
     }
 
     /// Steps of the most decimals found, from 0.
@@ -89,35 +90,35 @@ impl Table {
 
     /// Whether rows have red, green and blue.
     pub(crate) fn has_rgb(&self) -> bool {
-        self.columns.have(Role::Color(0))
+        self.columns.have(ColumnRole::Color(0))
     }
 
     /// Whether rows have a classification.
     pub(crate) fn has_class(&self) -> bool {
-        self.columns.have(Role::Class)
+        self.columns.have(ColumnRole::Class)
     }
 
-    /// The number of pieces.
-    pub(crate) fn pieces(&self) -> usize {
+    /// The number of chunks.
+    pub(crate) fn chunks(&self) -> usize {
         self.blocks.len()
     }
 
-    /// Sends the rows of `piece` through `sieve`.
-    pub(crate) fn decode(&self, file: &Positioned, piece: usize, sieve: &mut Sieve) -> Result<()> {
-        let Block { mut row, line: first_line } = self.blocks[piece];
+    /// Sends the rows of `chunk` through `filter`.
+    pub(crate) fn decode(&self, file: &RandomAccessFile, chunk: usize, filter: &mut PointFilter) -> Result<()> {
+        let BlockStart { mut row, line: first_line } = self.blocks[chunk];
         let mut reader = RowReader::new(&self.columns);
-        let range = block_range(&self.rows, piece as u64);
+        let range = block_range(&self.rows, chunk as u64);
         for_each_line(file, self.rows.start, range, |index, line| {
             let number = || first_line + index;
             match line {
-                Line::Whole(line) if self.columns.skips(line) => return Ok(()),
-                Line::Whole(line) => match reader.read(line).and_then(|()| reader.record(&self.decimals)) {
-                    Ok(record) => sieve.push(row, &record, || format!("line {}", number()))?,
-                    Err(fault) => {
-                        sieve.malformed(1, || format!("line {}: {}", number(), fault.describe(&self.columns, line)))
+                TextLine::Whole(line) if self.columns.skips(line) => return Ok(()),
+                TextLine::Whole(line) => match reader.read(line).and_then(|()| reader.record(&self.decimals)) {
+                    Ok(record) => filter.push(row, &record, || format!("line {}", number()))?,
+                    Err(error) => {
+                        filter.malformed(1, || format!("line {}: {}", number(), error.describe(&self.columns, line)))
                     }
                 },
-                Line::TooLong => sieve.malformed(1, || format!("line {} has more than {LONGEST} bytes", number())),
+                TextLine::TooLong => filter.malformed(1, || format!("line {} has more than {LONGEST} bytes", number())),
             }
             row += 1;
             Ok(())
@@ -132,7 +133,7 @@ fn block_range(rows: &Range<u64>, index: u64) -> Range<u64> {
 }
 
 /// The layout of the text, where its rows begin, the number of the line there, and warnings.
-fn detect(file: &Positioned, options: &TextOptions) -> Result<(Columns, u64, u64, Vec<String>)> {
+fn detect(file: &RandomAccessFile, options: &TextOptions) -> Result<(Columns, u64, u64, Vec<String>)> {
     let sample = file.bytes(0..file.size().min(SAMPLE))?;
     let mark = if sample.starts_with(&[0xef, 0xbb, 0xbf]) { 3 } else { 0 };
     let mut lines: Vec<&[u8]> = sample[mark..].split(|&byte| byte == b'\n').collect();
@@ -167,13 +168,13 @@ impl Survey {
         }
     }
 
-    fn of_block(file: &Positioned, columns: &Columns, rows: &Range<u64>, range: Range<u64>) -> Result<Survey> {
+    fn of_block(file: &RandomAccessFile, columns: &Columns, rows: &Range<u64>, range: Range<u64>) -> Result<Survey> {
         let mut survey = Survey::empty();
         let mut reader = RowReader::new(columns);
         survey.lines = for_each_line(file, rows.start, range, |_, line| {
             match line {
-                Line::Whole(line) if columns.skips(line) => return Ok(()),
-                Line::Whole(line) if reader.read(line).is_ok() => survey.see(&reader.numbers),
+                TextLine::Whole(line) if columns.skips(line) => return Ok(()),
+                TextLine::Whole(line) if reader.read(line).is_ok() => survey.see(&reader.numbers),
                 _ => {}
             }
             survey.rows += 1;
@@ -213,17 +214,17 @@ impl Survey {
 
 /// Why a row cannot be used: the column, from 0, and what it should hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Fault {
+struct RowError {
     column: usize,
     expected: &'static str,
 }
 
-impl Fault {
+impl RowError {
     fn describe(&self, columns: &Columns, line: &[u8]) -> String {
         let name = match columns.roles[self.column] {
-            Role::Coordinate(axis) => ["x", "y", "z"][axis],
-            Role::Color(channel) => ["red", "green", "blue"][channel],
-            Role::Class | Role::Skipped => "class",
+            ColumnRole::Coordinate(axis) => ["x", "y", "z"][axis],
+            ColumnRole::Color(channel) => ["red", "green", "blue"][channel],
+            ColumnRole::Class | ColumnRole::Skipped => "class",
         };
         let place = format!("column {} ({name})", self.column + 1);
         match columns.delimiter.fields(line).get(self.column) {
@@ -248,29 +249,29 @@ impl<'a> RowReader<'a> {
 
     /// Reads the columns of `line` that are used.
     #[inline]
-    fn read(&mut self, line: &[u8]) -> std::result::Result<(), Fault> {
+    fn read(&mut self, line: &[u8]) -> std::result::Result<(), RowError> {
         let delimiter = self.columns.delimiter;
         let mut rest = Some(line);
         for (column, &role) in self.columns.roles.iter().enumerate() {
-            let missing = Fault { column, expected: "there" };
+            let missing = RowError { column, expected: "there" };
             let line = rest.ok_or(missing)?;
-            if role == Role::Skipped {
+            if role == ColumnRole::Skipped {
                 rest = delimiter.split(line).1;
                 continue;
             }
-            let (number, after) = take_number(delimiter, line).ok_or(Fault { column, expected: "a number" })?;
+            let (number, after) = take_number(delimiter, line).ok_or(RowError { column, expected: "a number" })?;
             rest = after;
             match role {
-                Role::Coordinate(axis) => self.numbers[axis] = number,
-                Role::Color(channel) => {
+                ColumnRole::Coordinate(axis) => self.numbers[axis] = number,
+                ColumnRole::Color(channel) => {
                     let expected = "a whole number from 0 to 65535";
-                    self.rgb[channel] = whole(number).ok_or(Fault { column, expected })?;
+                    self.rgb[channel] = whole(number).ok_or(RowError { column, expected })?;
                 }
-                Role::Class => {
+                ColumnRole::Class => {
                     let expected = "a whole number from 0 to 255";
-                    self.class = whole(number).ok_or(Fault { column, expected })?;
+                    self.class = whole(number).ok_or(RowError { column, expected })?;
                 }
-                Role::Skipped => {}
+                ColumnRole::Skipped => {}
             }
         }
         Ok(())
@@ -278,7 +279,7 @@ impl<'a> RowReader<'a> {
 
     /// The row last read, in steps of `10^-decimals`.
     #[inline]
-    fn record(&self, decimals: &[u8; 3]) -> std::result::Result<Record, Fault> {
+    fn record(&self, decimals: &[u8; 3]) -> std::result::Result<PointRecord, RowError> {
         let mut raw = [0; 3];
         let mut rounded = [false; 2];
         for axis in 0..3 {
@@ -287,13 +288,13 @@ impl<'a> RowReader<'a> {
             raw[axis] = value;
             rounded[axis / 2] |= inexact;
         }
-        Ok(Record { raw, rgb: self.rgb, class: self.class, withheld: false, rounded })
+        Ok(PointRecord { raw, rgb: self.rgb, class: self.class, withheld: false, rounded })
     }
 
     #[cold]
-    fn too_large(&self, axis: usize) -> Fault {
-        let column = self.columns.roles.iter().position(|role| *role == Role::Coordinate(axis)).unwrap_or(0);
-        Fault { column, expected: "a number of a usable size" }
+    fn too_large(&self, axis: usize) -> RowError {
+        let column = self.columns.roles.iter().position(|role| *role == ColumnRole::Coordinate(axis)).unwrap_or(0);
+        RowError { column, expected: "a number of a usable size" }
     }
 }
 

@@ -1,13 +1,20 @@
-//! A record of the store: a few columns of plain values each, in the machine's byte order.
+//! A record of the store: a few columns of plain values, in the machine's byte order.
+//!
+//! A column is the number of its values as a `u64`, then the values, then zeros up to a multiple of eight bytes: so values are
+//! aligned in the file, and slices of it can be used as they are.
 
-use crate::job::durable::store::{Key, Store, Stored};
+use crate::job::durable::mapped::MappedSlice;
+use crate::job::durable::store::{RecordKey, RecordPlace, RecordRef, Store};
 use crate::{Error, Result};
 use bytemuck::Pod;
+
+/// Bytes to which columns are padded.
+const ALIGNMENT: usize = 8;
 
 /// Collects columns and writes them as one record.
 #[derive(Default)]
 pub struct ColumnWriter<'a> {
-    /// The number of values and the bytes of each.
+    /// The number of values of each column, and their bytes.
     columns: Vec<([u8; 8], &'a [u8])>,
 }
 
@@ -21,73 +28,73 @@ impl<'a> ColumnWriter<'a> {
     /// Writes the record of `key`.
     ///
     /// # Errors
-    /// [`Error::Io`] if that fails.
-    pub fn write(self, store: &Store, key: Key) -> Result<Stored> {
-        let pieces: Vec<&[u8]> = self.columns.iter().flat_map(|(length, bytes)| [&length[..], bytes]).collect();
-        store.put(key, &pieces)
+    /// [`Error::Io`] if writing fails.
+    pub fn write<K: RecordKey>(self, store: &Store<K>, key: K) -> Result<RecordRef<K>> {
+        let padding = |bytes: &[u8]| &[0; ALIGNMENT][..bytes.len().next_multiple_of(ALIGNMENT) - bytes.len()];
+        let pieces = self.columns.iter().flat_map(|(length, bytes)| [&length[..], bytes, padding(bytes)]);
+        store.put(key, &pieces.collect::<Vec<&[u8]>>())
     }
 }
 
 /// Reads the columns of a record in the order in which they were written.
-pub struct ColumnReader<'a> {
-    store: &'a Store,
-    key: Key,
-    at: u64,
-    end: u64,
+pub struct ColumnReader<'a, K> {
+    store: &'a Store<K>,
+    key: K,
+    /// What is left of the record.
+    rest: RecordPlace,
 }
 
-impl ColumnReader<'_> {
-    /// Reads the record of `key`.
+impl<'a, K: RecordKey> ColumnReader<'a, K> {
+    /// Finds the record of `key`.
     ///
     /// # Errors
-    /// [`Error::Broken`] if there is none.
-    pub fn open(store: &Store, key: Key) -> Result<ColumnReader<'_>> {
-        let place = store.place(key)?;
-        Ok(ColumnReader { store, key, at: place.at, end: place.at + place.length })
+    /// [`Error::Broken`] if the store has none.
+    pub fn open(store: &'a Store<K>, key: K) -> Result<ColumnReader<'a, K>> {
+        Ok(ColumnReader { store, key, rest: store.place(key)? })
     }
 
-    /// The next column.
+    /// Returns the next column.
     ///
     /// # Errors
-    /// [`Error::Io`] if reading fails, [`Error::Broken`] if the record holds less than the column says.
-    pub fn column<T: Pod>(&mut self) -> Result<Vec<T>> {
-        let length = self.length::<T>()?;
-        self.take(length)
+    /// [`Error::Io`] if reading fails, [`Error::Broken`] if the record is shorter than the column says.
+    pub fn column<T: Pod>(&mut self) -> Result<MappedSlice<T>> {
+        let count = self.count::<T>()?;
+        let column = self.store.read(self.key, self.rest.at, count)?;
+        self.skip((count * size_of::<T>()).next_multiple_of(ALIGNMENT) as u64)?;
+        Ok(column)
     }
 
-    /// `count` values of the next column from the one at `first` on, without reading the others. It must be the last
-    /// column that is asked for.
+    /// Returns `count` values of the last column from the one at `first` on, without reading the others.
     ///
     /// # Errors
     /// As [`ColumnReader::column`].
-    pub fn column_part<T: Pod>(mut self, first: usize, count: usize) -> Result<Vec<T>> {
-        let length = self.length::<T>()?;
+    pub fn column_part<T: Pod>(mut self, first: usize, count: usize) -> Result<MappedSlice<T>> {
+        let length = self.count::<T>()?;
         if first.checked_add(count).is_none_or(|end| end > length) {
-            return Err(self.broken());
+            return Err(self.ends_too_early());
         }
-        self.at += (first * size_of::<T>()) as u64;
-        self.take(count)
+        self.store.read(self.key, self.rest.at + (first * size_of::<T>()) as u64, count)
     }
 
-    /// The number of values in the next column, all of which are in the record.
-    fn length<T: Pod>(&mut self) -> Result<usize> {
-        let length = self.take::<u64>(1)?[0];
-        let fits = length.checked_mul(size_of::<T>() as u64).is_some_and(|bytes| bytes <= self.end - self.at);
-        if fits { Ok(length as usize) } else { Err(self.broken()) }
-    }
-
-    fn take<T: Pod>(&mut self, count: usize) -> Result<Vec<T>> {
-        let bytes = (count * size_of::<T>()) as u64;
-        if bytes > self.end - self.at {
-            return Err(self.broken());
+    /// Reads the number of values in the next column, and checks that the record holds them all.
+    fn count<T: Pod>(&mut self) -> Result<usize> {
+        if self.rest.length < 8 {
+            return Err(self.ends_too_early());
         }
-        let mut values = vec![T::zeroed(); count];
-        self.store.read(self.key, self.at, bytemuck::cast_slice_mut(&mut values))?;
-        self.at += bytes;
-        Ok(values)
+        let count = self.store.read::<u64>(self.key, self.rest.at, 1)?[0];
+        self.skip(8)?;
+        let fits = count.checked_mul(size_of::<T>() as u64).is_some_and(|bytes| bytes <= self.rest.length);
+        if fits { Ok(count as usize) } else { Err(self.ends_too_early()) }
     }
 
-    fn broken(&self) -> Error {
+    fn skip(&mut self, bytes: u64) -> Result<()> {
+        let RecordPlace { at, length } = self.rest;
+        let left = length.checked_sub(bytes).ok_or_else(|| self.ends_too_early())?;
+        self.rest = RecordPlace { at: at + bytes, length: left };
+        Ok(())
+    }
+
+    fn ends_too_early(&self) -> Error {
         Error::Broken(format!("{:?} in {} ends too early", self.key, self.store.path(self.key).display()))
     }
 }

@@ -1,7 +1,7 @@
-//! The thread that brings records and results to the disk while others work: all of some time together, since what costs is to
-//! wait for the disk.
+//! The thread that brings records and results to the disk while others work. It commits many together, because waiting for the
+//! disk is what costs time.
 
-use crate::job::durable::directory::publish;
+use crate::job::durable::atomic_file::publish;
 use crate::{Error, Result, fault};
 use std::fs::File;
 use std::io::{self, Write};
@@ -10,60 +10,62 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Between two commits: what a kill costs at the most, beside the steps that are under way. Short, so that at the end of a stage
-/// little is left to wait for.
+/// The time between two commits: a kill costs the work of this time, and the steps that are under way. It is short, so that little
+/// is left to wait for at the end of a stage.
 const INTERVAL: Duration = Duration::from_millis(40);
-/// Where commits take longer, the disk is the job's alone for as long after each, but for no longer than this.
+/// After a slow commit the thread rests for as long as the commit took, but for no longer than this, so that others get the disk.
 const LONGEST_REST: Duration = Duration::from_secs(1);
-/// From then on a job waits for the disk before it gives up what it could be repeated from.
+/// A job that has run for longer waits for the disk before it removes what its steps could be repeated from.
 const WORTH_SYNCING: Duration = Duration::from_secs(60);
 
-/// What is to be committed together.
+/// What is committed together.
 #[derive(Default)]
-pub(crate) struct Batch {
-    /// Lines of the journal, to be written once the results are published.
+pub(crate) struct CommitBatch {
+    /// Lines of the journal, written once the files are published.
     pub(crate) lines: String,
-    /// Results to publish.
-    pub(crate) results: Vec<PathBuf>,
+    /// Files to publish.
+    pub(crate) files: Vec<PathBuf>,
 }
 
-impl Batch {
-    fn append(&mut self, mut other: Batch) {
+impl CommitBatch {
+    fn append(&mut self, mut other: CommitBatch) {
         self.lines += &other.lines;
-        self.results.append(&mut other.results);
+        self.files.append(&mut other.files);
     }
 }
 
 /// A journal file and the thread that writes to it. Dropping it commits what has been added, unless a commit has failed.
 pub(crate) struct Committer {
-    shared: Arc<Shared>,
+    shared: Arc<CommitterShared>,
     thread: Option<JoinHandle<()>>,
     interval: Duration,
     start: Instant,
 }
 
 #[derive(Default)]
-struct Shared {
-    state: Mutex<State>,
-    /// Somebody waits for a commit, or this is the end.
+struct CommitterShared {
+    state: Mutex<CommitState>,
+    /// Wakes the thread: a commit is wanted, or the end has come.
     wanted: Condvar,
+    /// Wakes those who wait for a commit.
     committed: Condvar,
 }
 
 #[derive(Default)]
-struct State {
-    batch: Batch,
-    /// Records added, and those of them that are on the disk.
+struct CommitState {
+    batch: CommitBatch,
+    /// The number of records that were added.
     added: u64,
+    /// The number of them that are on the disk.
     committed: u64,
     wanted: bool,
     closing: bool,
-    /// What failed. After that nothing is written any more: the end of the journal is unknown.
+    /// The first failure. Nothing is written after it, because the end of the journal is unknown.
     failure: Option<Error>,
 }
 
-impl Shared {
-    fn state(&self) -> MutexGuard<'_, State> {
+impl CommitterShared {
+    fn state(&self) -> MutexGuard<'_, CommitState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -73,7 +75,7 @@ impl Committer {
     pub(crate) fn start(path: &Path) -> Result<Committer> {
         let file = File::options().append(true).open(path).map_err(Error::io("open", path))?;
         let interval = fault::commit_interval().unwrap_or(INTERVAL);
-        let shared = Arc::new(Shared::default());
+        let shared = Arc::new(CommitterShared::default());
         let (of_thread, path) = (shared.clone(), path.to_path_buf());
         let run = move || run(&of_thread, &file, &path, interval);
         let thread = std::thread::Builder::new().name("journal".into()).spawn(run);
@@ -82,19 +84,19 @@ impl Committer {
     }
 
     /// Adds a record to the next commit.
-    pub(crate) fn add(&self, record: Batch) -> Result<()> {
+    pub(crate) fn add(&self, record: CommitBatch) -> Result<()> {
         let mut state = self.shared.state();
         state.batch.append(record);
         state.added += 1;
         let due = state.added;
         if let Some(error) = &state.failure {
-            return Err(again(error));
+            return Err(copy_of(error));
         }
         drop(state);
         if self.interval.is_zero() { self.commit(due) } else { Ok(()) }
     }
 
-    /// How many records have been added.
+    /// Returns how many records have been added.
     pub(crate) fn added(&self) -> u64 {
         self.shared.state().added
     }
@@ -110,7 +112,7 @@ impl Committer {
             state = self.shared.committed.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
         match &state.failure {
-            Some(error) if state.committed < due => Err(again(error)),
+            Some(error) if state.committed < due => Err(copy_of(error)),
             _ => Ok(()),
         }
     }
@@ -118,25 +120,35 @@ impl Committer {
     pub(crate) fn is_worth_syncing(&self) -> bool {
         self.interval.is_zero() || self.start.elapsed() > WORTH_SYNCING
     }
-}
 
-impl Drop for Committer {
-    fn drop(&mut self) {
+    /// Commits what can be committed, ends the thread and returns the number of committed records.
+    pub(crate) fn close(mut self) -> u64 {
+        self.stop();
+        self.shared.state().committed
+    }
+
+    fn stop(&mut self) {
         self.shared.state().closing = true;
         self.shared.wanted.notify_one();
         if let Some(thread) = self.thread.take() {
-            // A panic there has been printed; there is nobody left to tell.
+            // A panic in the thread has been printed, and there is nobody left to tell.
             let _ = thread.join();
         }
     }
 }
 
-fn run(shared: &Shared, file: &File, path: &Path, interval: Duration) {
+impl Drop for Committer {
+    fn drop(&mut self) {
+        self.stop();
+    }
+}
+
+fn run(shared: &CommitterShared, file: &File, path: &Path, interval: Duration) {
     let interval = interval.max(Duration::from_millis(1));
     let mut rest = interval;
     loop {
         let state = shared.state();
-        let waits = |state: &mut State| !state.wanted && !state.closing;
+        let waits = |state: &mut CommitState| !state.wanted && !state.closing;
         let waited = shared.wanted.wait_timeout_while(state, rest, waits);
         let (mut state, _) = waited.unwrap_or_else(PoisonError::into_inner);
         let (batch, added, closing) = (std::mem::take(&mut state.batch), state.added, state.closing);
@@ -150,7 +162,7 @@ fn run(shared: &Shared, file: &File, path: &Path, interval: Duration) {
         match outcome {
             Some(Ok(())) => state.committed = added,
             Some(Err(error)) => state.failure = Some(error),
-            // Nothing to do, or nothing that may be done any more.
+            // There was nothing to commit, or nothing may be committed any more.
             None => {}
         }
         shared.committed.notify_all();
@@ -160,8 +172,8 @@ fn run(shared: &Shared, file: &File, path: &Path, interval: Duration) {
     }
 }
 
-/// The same error for everybody who waits: nobody knows whose will be shown.
-fn again(error: &Error) -> Error {
+/// Returns the same error again. Everybody who waits gets it, because nobody knows whose error will be shown.
+fn copy_of(error: &Error) -> Error {
     match error {
         Error::Io { action, path, source } => Error::io(action, path)(match source.raw_os_error() {
             Some(code) => io::Error::from_raw_os_error(code),
@@ -171,10 +183,10 @@ fn again(error: &Error) -> Error {
     }
 }
 
-/// In this order, so that whatever the journal says is so, whenever the machine stops.
-fn commit(batch: Batch, mut file: &File, path: &Path) -> Result<()> {
+/// Publishes the files, then writes the lines: so whatever the journal says is true, whenever the machine stops.
+fn commit(batch: CommitBatch, mut file: &File, path: &Path) -> Result<()> {
     fault::point("commit");
-    publish(&batch.results)?;
+    publish(&batch.files)?;
     fault::point("published");
     let lines = batch.lines.as_bytes();
     if fault::is_due("torn") {
@@ -192,19 +204,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nothing_is_committed_after_a_failure_whoever_has_been_told() {
+    fn nothing_is_committed_after_a_failure() {
         let committer = Committer::start(Path::new("/dev/full")).unwrap();
-        let record = || Batch { lines: "a step\n".into(), results: Vec::new() };
+        let record = || CommitBatch { lines: "a step\n".into(), files: Vec::new() };
         let told = std::iter::repeat_with(|| {
             std::thread::sleep(Duration::from_millis(1));
             committer.add(record())
         });
         let told = told.take(10_000).find_map(Result::err).unwrap();
         assert_eq!(told.exit_code(), 1, "{told}");
-        // The thread goes on waking up meanwhile.
+        // The thread keeps waking up meanwhile.
         for _ in 0..100 {
             let again = committer.commit(committer.added()).unwrap_err();
-            assert_eq!(again.to_string(), told.to_string(), "whoever asks is told why");
+            assert_eq!(again.to_string(), told.to_string(), "everybody who asks is told why");
             std::thread::sleep(Duration::from_millis(1));
         }
     }

@@ -1,7 +1,12 @@
-//! What makes a job survive a kill: it knows no step.
+//! What lets a job survive a kill: results that appear only when they are whole, a store of records, and a journal of finished
+//! steps. Nothing here knows what a step does; the job says what its records and steps are called ([`store::RecordKey`],
+//! [`journal::Journal`]).
 
+pub mod atomic_file;
 pub mod columns;
-pub mod committer;
+pub(crate) mod committer;
 pub mod directory;
 pub mod journal;
+pub mod lock;
+pub mod mapped;
 pub mod store;

@@ -1,11 +1,12 @@
-//! Step 7 of a job, by inner tile of the pyramid: the meshes of its children, read back from their files, joined and simplified.
+//! Step 7, once for each coarser tile: reads the meshes of its children back from their files, joins and simplifies them.
 
-use crate::job::durable::directory::Directory;
-use crate::job::durable::journal::Done;
-use crate::job::durable::store::Store;
-use crate::job::levels::hierarchy::{Child, Pyramid, Sizes};
-use crate::job::records::{Level, LevelTile};
-use crate::job::tiles::write::{Look, write_tile};
+use crate::geometry::Bounds;
+use crate::job::durable::directory::{JobDirectory, create_folder};
+use crate::job::index::NodeIndex;
+use crate::job::levels::hierarchy::{ChildTile, Hierarchy, LevelSizes};
+use crate::job::records::{LevelSummary, StepOutput, Store, TileSummary};
+use crate::job::tiles::style::TileStyle;
+use crate::job::tiles::write_tile::write_glb;
 use crate::output::frame::Frame;
 use crate::output::gltf::read::{TileFile, read_tile};
 use crate::output::lod::join::join;
@@ -15,21 +16,21 @@ use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 use std::path::PathBuf;
 
-/// What one coarser tile, or all of them, came to.
+/// The figures of one coarser tile, or of all.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-pub struct LevelFigures {
+pub struct LevelStats {
     /// GLB files in `levels`.
     pub files: u64,
     /// Triangles in them.
     pub triangles: u64,
-    /// Bytes of them.
+    /// Their bytes.
     pub bytes: u64,
-    /// The greatest vertical distance between one of them and the exact mesh, metres.
+    /// The greatest vertical distance between one of them and the exact mesh in metres.
     pub error_m: f64,
 }
 
-impl AddAssign for LevelFigures {
-    fn add_assign(&mut self, other: LevelFigures) {
+impl AddAssign for LevelStats {
+    fn add_assign(&mut self, other: LevelStats) {
         self.files += other.files;
         self.triangles += other.triangles;
         self.bytes += other.bytes;
@@ -37,95 +38,104 @@ impl AddAssign for LevelFigures {
     }
 }
 
-/// Makes inner tile `at` of the pyramid, whose children must be there. Leaves in the job directory what `tileset.json` will say of
-/// it and of the exact tiles below it; with `content` its mesh in `levels` too.
+/// Makes coarser tile `index` of the hierarchy, whose children must exist. Stores what `tileset.json` says of it and of the exact
+/// tiles among its children. With `content` it writes the mesh too.
 ///
 /// # Errors
-/// [`Error::Io`] on the output or the job directory, [`Error::Broken`] if a file there is not what an earlier step has written.
-pub fn run(
-    directory: &Directory,
+/// [`Error::Io`] on the output or the store, [`Error::Broken`] if a file is not what an earlier step wrote.
+pub fn make_level(
+    directory: &JobDirectory,
     store: &Store,
-    pyramid: &Pyramid,
-    at: usize,
-    look: &Look,
-    sizes: Sizes,
+    hierarchy: &Hierarchy,
+    index: usize,
+    style: &TileStyle,
+    sizes: LevelSizes,
     content: bool,
-) -> Result<Done<LevelFigures>> {
-    let inner = &pyramid.inner[at];
-    let mut below = Below::default();
-    for &child in &inner.children {
-        below.add(directory, store, pyramid, child, content && inner.content)?;
+) -> Result<StepOutput<LevelStats>> {
+    let coarse = &hierarchy.tiles[index];
+    let mut children = ChildMeshes::default();
+    for &child in &coarse.children {
+        children.add(directory, store, hierarchy, child, content && coarse.content)?;
     }
-    let Below { files, leaves, bounds, error } = below;
-    let (mut figures, mut results) = (LevelFigures::default(), Vec::new());
-    let mut own = LevelTile::new(bounds, false);
-    if content && inner.content && !files.is_empty() {
-        let joined = join(&look.frame, &files).map_err(|what| broken(inner.node, &what))?;
-        drop(files);
-        let simple = simplify(&look.frame, &joined, sizes.target(joined.triangles.len()))?;
-        // Both lie between the lowest and the highest vertex.
-        own.error = (error + simple.error).min(height_range(&look.frame, bounds));
+    let ChildMeshes { files: meshes, leaves, bounds, error } = children;
+    let (mut stats, mut files) = (LevelStats::default(), Vec::new());
+    let mut own = TileSummary::new(bounds, false);
+    if content && coarse.content && !meshes.is_empty() {
+        let joined = join(&style.frame, &meshes).map_err(|what| contradiction(coarse.node, &what))?;
+        drop(meshes);
+        let simple = simplify(&style.frame, &joined, sizes.target(joined.triangles.len()))?;
+        // No error is greater than the range of heights: both meshes lie within it.
+        own.error = (error + simple.error).min(height_range(&style.frame, bounds));
         own.content = 1;
-        directory.create_levels()?;
-        let written = write_tile(&directory.level(inner.node), &simple.tile, look)?;
+        create_folder(&directory.output().levels())?;
+        let written = write_glb(&directory.output().level(coarse.node.get()), &simple.tile, style)?;
         let triangles = simple.tile.triangles.len() as u64;
-        figures = LevelFigures { files: 1, triangles, bytes: written.bytes, error_m: own.error };
-        results.push(written);
+        stats = LevelStats { files: 1, triangles, bytes: written.bytes, error_m: own.error };
+        files.push(written);
     }
-    let stored = Level { own, leaves }.save(store, inner.node)?;
-    Ok(Done { results, ..Done::new(figures, vec![stored]) })
+    let record = LevelSummary { own, leaves }.save(store, coarse.node)?;
+    Ok(StepOutput { files, ..StepOutput::new(stats, vec![record]) })
 }
 
-/// Metres.
-fn height_range(frame: &Frame, bounds: Option<[[i32; 3]; 2]>) -> f64 {
-    bounds.map_or(0.0, |[low, high]| (high[2] as f64 - low[2] as f64) * frame.resolution_metres()[1])
+/// Returns the range of heights in metres.
+fn height_range(frame: &Frame, bounds: Option<Bounds<3>>) -> f64 {
+    bounds.map_or(0.0, |bounds| bounds.extent(2) as f64 * frame.resolution_metres()[1])
 }
 
-fn broken(node: usize, what: &str) -> Error {
-    Error::Broken(format!("the tiles below node {node} do not go together: {what}"))
+fn contradiction(node: NodeIndex, what: &impl std::fmt::Display) -> Error {
+    Error::Broken(format!("the tiles below node {node} do not fit together: {what}"))
 }
 
-/// What the children of a tile come to.
+/// The children of a coarser tile.
 #[derive(Default)]
-struct Below {
+struct ChildMeshes {
     files: Vec<TileFile>,
-    leaves: Vec<LevelTile>,
-    bounds: Option<[[i32; 3]; 2]>,
-    /// The greatest of a child, metres.
+    /// The exact tiles among them.
+    leaves: Vec<TileSummary>,
+    bounds: Option<Bounds<3>>,
+    /// The greatest error of a child in metres.
     error: f64,
 }
 
-impl Below {
-    fn add(&mut self, directory: &Directory, store: &Store, pyramid: &Pyramid, child: Child, keep: bool) -> Result<()> {
+impl ChildMeshes {
+    /// Adds a child, and its mesh if `with_mesh` is set.
+    fn add(
+        &mut self,
+        directory: &JobDirectory,
+        store: &Store,
+        hierarchy: &Hierarchy,
+        child: ChildTile,
+        with_mesh: bool,
+    ) -> Result<()> {
         match child {
-            Child::Leaf(tile) => {
-                let own = LevelTile::load(store, tile)?;
+            ChildTile::Exact(tile) => {
+                let own = TileSummary::load(store, tile)?;
                 self.widen(own.bounds());
-                if keep && own.content > 0 {
-                    self.files.push(read(directory.tile(tile))?);
+                if with_mesh && own.content > 0 {
+                    self.files.push(read_own(directory.output().tile(tile.get()))?);
                 }
                 self.leaves.push(own);
             }
-            Child::Inner(at) => {
-                let node = pyramid.inner[at].node;
-                let own = Level::load(store, node)?.own;
+            ChildTile::Coarse(index) => {
+                let node = hierarchy.tiles[index].node;
+                let own = LevelSummary::load(store, node)?.own;
                 self.widen(own.bounds());
                 self.error = self.error.max(own.error);
-                if keep && own.content > 0 {
-                    self.files.push(read(directory.level(node))?);
+                if with_mesh && own.content > 0 {
+                    self.files.push(read_own(directory.output().level(node.get()))?);
                 }
             }
         }
         Ok(())
     }
 
-    fn widen(&mut self, bounds: Option<[[i32; 3]; 2]>) {
-        self.bounds = self.bounds.into_iter().chain(bounds).reduce(crate::job::partition::read::around);
+    fn widen(&mut self, bounds: Option<Bounds<3>>) {
+        self.bounds = self.bounds.into_iter().chain(bounds).reduce(Bounds::union);
     }
 }
 
-/// What this program has written a moment ago.
-fn read(path: PathBuf) -> Result<TileFile> {
+/// Reads a tile that this program wrote a moment ago: if it is bad, the program is.
+fn read_own(path: PathBuf) -> Result<TileFile> {
     read_tile(&path).map_err(|error| match error {
         Error::Input { .. } => Error::Broken(error.to_string()),
         other => other,

@@ -1,99 +1,104 @@
-//! Which triangles of a node are done, and what its parent still needs: design of the tree merge.
+//! Which triangles of a node are final, and what the merge above still needs. This is the proof of the tree merge.
 //!
-//! A triangle whose circumscribed disc lies strictly inside the node's cell is closed: no site outside the cell can be
-//! inside or on its circle, so it belongs to the triangulation of all sites. Whoever touches a triangle that is not
-//! closed, or the hull, is in the frontier and goes up, with the directed edges round the closed ground.
+//! A triangle whose circumscribed disc lies strictly inside the node's cell is final: no site outside the cell is inside or on its
+//! circle, so it belongs to the triangulation of all sites. The other triangles are pending. The vertices of pending triangles and of
+//! the hull are the frontier, which goes up together with the directed edges around the final ground.
 
 use crate::geometry::Site;
 use crate::job::partition::tree::Cell;
-use crate::mesh::half_edge::{HULL, Mesh};
+use crate::mesh::half_edge::{HULL, HalfEdgeMesh};
 
-/// What has become of a triangle.
+/// What a node decides about a triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum State {
-    /// It covers ground that is closed below this node, and is no triangle of the result.
+pub enum TriangleState {
+    /// It covers ground that is final below this node, so it is not a triangle of the result.
     Covered,
-    /// It is a triangle of the result, contributed by this node.
-    Closed,
+    /// It is a triangle of the result, and this node contributes it.
+    Final,
     /// A node above decides.
-    Open,
+    Pending,
 }
 
-/// The outcome for one node.
+/// What a node decides, and what it passes up.
 #[derive(Debug)]
-pub struct Closing {
-    /// For every triangle of the node's mesh.
-    pub states: Vec<State>,
+pub struct FinalTriangles {
+    /// The state of every triangle of the node's mesh.
+    pub states: Vec<TriangleState>,
     /// The sites that go up, ascending.
     pub frontier: Vec<u32>,
-    /// For each of them a half-edge that starts there, the one on the hull if there is one; [`HULL`] if it has no triangle.
-    pub spokes: Vec<u32>,
-    /// The directed edges that have closed ground on their left and none on their right, as positions in `frontier`.
+    /// For each of them a half-edge that starts there: the one on the hull if there is one; [`HULL`] if the site has no triangle.
+    pub half_edges: Vec<u32>,
+    /// The directed edges with final ground on their left and none on their right, as positions in `frontier`.
     pub boundary: Vec<[u32; 2]>,
 }
 
-/// Closes what can be closed. `cell` is `None` at the root, where everything left is a triangle of the result.
+/// Finds the final triangles of a node. `cell` is `None` at the root, where every triangle that covers new ground is final.
 ///
-/// Only triangles near the hull are looked at. If the disc of a triangle reaches a point outside the cell, which holds the
-/// hull, so do the discs of all triangles on the straight way from it to that point: beyond the edge where the way leaves a
-/// Delaunay triangle, the disc of the next one covers that of the last. So a flood from the hull that
-/// stops at held discs meets all that are not held.
-pub fn close(mesh: &Mesh, sites: &[Site], cell: Option<&Cell>, covered: impl Fn(usize) -> bool) -> Closing {
-    let state = |triangle| if covered(triangle) { State::Covered } else { State::Closed };
+/// Only triangles near the hull need a test. Let the disc of a triangle reach a point outside the cell, which contains the hull.
+/// Follow the straight line from the triangle to that point: beyond the edge where the line leaves a Delaunay triangle, the disc of
+/// the next triangle covers that of the last. So the discs of all triangles along the line reach out too, and a flood from the
+/// hull that stops at discs inside the cell meets every triangle whose disc is not.
+pub fn find_final(
+    mesh: &HalfEdgeMesh,
+    sites: &[Site],
+    cell: Option<&Cell>,
+    covered: impl Fn(usize) -> bool,
+) -> FinalTriangles {
+    let state = |triangle| if covered(triangle) { TriangleState::Covered } else { TriangleState::Final };
     let states = (0..mesh.triangles.len()).map(state).collect();
-    let mut closing = Closing { states, frontier: Vec::new(), spokes: Vec::new(), boundary: Vec::new() };
+    let mut found = FinalTriangles { states, frontier: Vec::new(), half_edges: Vec::new(), boundary: Vec::new() };
     if let Some(cell) = cell {
         let hull: Vec<u32> = (0..).zip(&mesh.twins).filter(|(_, twin)| **twin == HULL).map(|(h, _)| h).collect();
-        let open = closing.open(mesh, sites, cell, &hull);
-        let position = closing.find_frontier(mesh, &open, &hull, sites.len());
-        closing.find_boundary(mesh, &open, &hull, &position);
+        let pending = found.mark_pending(mesh, sites, cell, &hull);
+        let position = found.find_frontier(mesh, &pending, &hull, sites.len());
+        found.find_boundary(mesh, &pending, &hull, &position);
     }
-    closing
+    found
 }
 
-impl Closing {
-    /// Marks the triangles that a node above decides; returns them, ascending.
-    fn open(&mut self, mesh: &Mesh, sites: &[Site], cell: &Cell, hull: &[u32]) -> Vec<u32> {
+impl FinalTriangles {
+    /// Marks the triangles that a node above decides, and returns them, ascending.
+    fn mark_pending(&mut self, mesh: &HalfEdgeMesh, sites: &[Site], cell: &Cell, hull: &[u32]) -> Vec<u32> {
         let mut reached = vec![false; mesh.triangles.len()];
-        let mut pending: Vec<u32> = hull.iter().map(|h| h / 3).collect();
-        let mut open = Vec::new();
-        while let Some(triangle) = pending.pop() {
+        let mut flood: Vec<u32> = hull.iter().map(|h| h / 3).collect();
+        let mut pending = Vec::new();
+        while let Some(triangle) = flood.pop() {
             let t = triangle as usize;
             let [a, b, c] = mesh.triangles[t].map(|v| sites[v as usize]);
             if std::mem::replace(&mut reached[t], true) || cell.holds_disc(a, b, c) {
                 continue;
             }
-            if self.states[t] == State::Closed {
-                self.states[t] = State::Open;
-                open.push(triangle);
+            if self.states[t] == TriangleState::Final {
+                self.states[t] = TriangleState::Pending;
+                pending.push(triangle);
             }
-            pending.extend(mesh.twins[3 * t..3 * t + 3].iter().filter(|&&twin| twin != HULL).map(|twin| twin / 3));
+            flood.extend(mesh.twins[3 * t..3 * t + 3].iter().filter(|&&twin| twin != HULL).map(|twin| twin / 3));
         }
-        open.sort_unstable();
-        open
+        pending.sort_unstable();
+        pending
     }
 
-    /// Fills `frontier` and `spokes`; returns the position of every site in it.
-    fn find_frontier(&mut self, mesh: &Mesh, open: &[u32], hull: &[u32], sites: usize) -> Vec<u32> {
+    /// Fills `frontier` and `half_edges`, and returns the position of every site in the frontier.
+    fn find_frontier(&mut self, mesh: &HalfEdgeMesh, pending: &[u32], hull: &[u32], sites: usize) -> Vec<u32> {
         const INSIDE: u32 = u32::MAX - 1;
-        // A half-edge from every site of the frontier. Without a triangle every site lies on the hull.
+        // A half-edge from every site of the frontier. If there is no triangle, every site lies on the hull.
         let mut position = vec![if mesh.triangles.is_empty() { HULL } else { INSIDE }; sites];
-        for h in open.iter().flat_map(|t| 3 * t..3 * t + 3).chain(hull.iter().copied()) {
+        for h in pending.iter().flat_map(|t| 3 * t..3 * t + 3).chain(hull.iter().copied()) {
             position[mesh.origin(h) as usize] = h;
         }
         for (site, position) in position.iter_mut().enumerate().filter(|(_, h)| **h != INSIDE) {
-            self.spokes.push(std::mem::replace(position, self.frontier.len() as u32));
+            self.half_edges.push(std::mem::replace(position, self.frontier.len() as u32));
             self.frontier.push(site as u32);
         }
         position
     }
 
-    /// Fills `boundary`: the edges of closed ground that open triangles see from outside, and those on the hull.
-    fn find_boundary(&mut self, mesh: &Mesh, open: &[u32], hull: &[u32], position: &[u32]) {
-        let is_open = |h: u32| self.states[h as usize / 3] == State::Open;
-        let seen = open.iter().flat_map(|t| 3 * t..3 * t + 3).map(|h| mesh.twins[h as usize]);
-        let inner = seen.filter(|&h| h != HULL && !is_open(h));
-        let outer = hull.iter().copied().filter(|&h| !is_open(h));
+    /// Fills `boundary` with the edges of final ground that pending triangles see from outside, and those on the hull.
+    fn find_boundary(&mut self, mesh: &HalfEdgeMesh, pending: &[u32], hull: &[u32], position: &[u32]) {
+        let is_pending = |h: u32| self.states[h as usize / 3] == TriangleState::Pending;
+        let seen = pending.iter().flat_map(|t| 3 * t..3 * t + 3).map(|h| mesh.twins[h as usize]);
+        let inner = seen.filter(|&h| h != HULL && !is_pending(h));
+        let outer = hull.iter().copied().filter(|&h| !is_pending(h));
         let ends = |h: u32| [mesh.origin(h), mesh.destination(h)].map(|v| position[v as usize]);
         self.boundary = inner.chain(outer).map(ends).collect();
     }
@@ -107,8 +112,8 @@ mod tests {
     use proptest::prelude::*;
     use std::collections::BTreeSet;
 
-    /// Whether a lattice point outside `cell` lies in or on the circle through abc. Where a line of lattice points cuts the disc,
-    /// one of those next to the middle of the chord is inside, if any is.
+    /// Tells whether a lattice point outside `cell` lies in or on the circle through abc. If any point of a line of lattice points
+    /// lies in the disc, so does one next to the middle of the chord.
     fn reaches_out(cell: &Cell, [a, b, c]: [Site; 3]) -> bool {
         let double_area = orient2d(a, b, c) as f64;
         let from_a = |p: Site| [0, 1].map(|k| (p[k] - a[k]) as f64);
@@ -128,9 +133,9 @@ mod tests {
     }
 
     proptest! {
-        /// On grids (small sides, many cocircular sites) as well as scattered and nearly on a line.
+        /// The sites are grids with many cocircular sites, scattered, or nearly on a line.
         #[test]
-        fn what_is_not_open_reaches_no_site_outside(
+        fn discs_of_final_triangles_reach_no_site_outside(
             sites in prop::collection::btree_set(prop::array::uniform2(0i32..200), 3..150),
             squeeze in prop::array::uniform2(prop::sample::select(vec![1, 7, 60])),
             room in prop::array::uniform4(0i64..20),
@@ -142,13 +147,13 @@ mod tests {
             let high = [0, 1].map(|axis| along(axis).max().unwrap() + 1 + room[2 + axis]);
             let cell = Cell { min: low, max: high };
             let mesh = canonical(&sites).unwrap();
-            let closing = close(&mesh, &sites, Some(&cell), |_| false);
-            for (corners, state) in mesh.triangles.iter().zip(&closing.states) {
+            let found = find_final(&mesh, &sites, Some(&cell), |_| false);
+            for (corners, state) in mesh.triangles.iter().zip(&found.states) {
                 let [a, b, c] = corners.map(|v| sites[v as usize]);
-                prop_assert!(*state == State::Open || !reaches_out(&cell, [a, b, c]), "{a:?} {b:?} {c:?} in {cell:?}");
-                prop_assert!(*state == State::Closed || !cell.holds_disc(a, b, c));
+                prop_assert!(*state == TriangleState::Pending || !reaches_out(&cell, [a, b, c]), "{a:?} {b:?} {c:?} in {cell:?}");
+                prop_assert!(*state == TriangleState::Final || !cell.holds_disc(a, b, c));
             }
-            for (&site, &spoke) in closing.frontier.iter().zip(&closing.spokes) {
+            for (&site, &spoke) in found.frontier.iter().zip(&found.half_edges) {
                 let around = (spoke != HULL).then(|| mesh.around(spoke)).into_iter().flatten();
                 let corners = mesh.triangles.iter().flatten().filter(|&&v| v == site).count();
                 prop_assert_eq!(around.count(), corners);

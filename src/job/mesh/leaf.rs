@@ -1,38 +1,37 @@
-//! Step 3 of a job, by tile: triangulate the sites of one leaf and close what can be closed.
+//! Step 3, once for each tile: triangulates the sites of a leaf, and stores the triangles that are final and the frontier.
 
 use crate::Result;
 use crate::geometry::Site;
 use crate::input::Point;
-use crate::input::options::Duplicates;
-use crate::job::durable::journal::Done;
-use crate::job::durable::store::Store;
-use crate::job::mesh::final_triangles::{Closing, State, close};
-use crate::job::mesh::precision_limit::Longest;
-use crate::job::mesh::sites;
-use crate::job::partition::point_file::Spill;
-use crate::job::partition::read::Partition;
-use crate::job::records::{Frontier, Leaf, Rim, RimDraft};
-use crate::mesh::half_edge::{HULL, Mesh};
+use crate::job::index::TileIndex;
+use crate::job::mesh::final_triangles::{FinalTriangles, TriangleState, find_final};
+use crate::job::mesh::precision_limit::PrecisionLimit;
+use crate::job::mesh::sites::load_sites;
+use crate::job::partition::point_file::PointFile;
+use crate::job::partition::result::Partition;
+use crate::job::plan::job_plan::Plan;
+use crate::job::records::{BorderVertex, Frontier, Leaf, PartialNormals, StepOutput, Store};
+use crate::mesh::half_edge::{HULL, HalfEdgeMesh};
 use crate::output::normals::{self, NormalSum};
-use crate::triangulation::{self, Outcome, Triangulator};
+use crate::triangulation::{self, TriangulationCounts, Triangulator};
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 
-/// What one leaf, or all of them, came to.
+/// The figures of one leaf, or the sum over all.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-pub struct LeafFigures {
+pub struct LeafStats {
     /// Distinct sites.
     pub sites: u64,
-    /// Points dropped because another has the same x and y.
+    /// Points that were dropped because another has the same x and y.
     pub duplicates: u64,
-    /// Triangles closed in leaves.
+    /// Triangles that leaves made final.
     pub triangles: u64,
     /// How the leaves were triangulated.
-    pub outcome: Outcome,
+    pub outcome: TriangulationCounts,
 }
 
-impl AddAssign for LeafFigures {
-    fn add_assign(&mut self, other: LeafFigures) {
+impl AddAssign for LeafStats {
+    fn add_assign(&mut self, other: LeafStats) {
         self.sites += other.sites;
         self.duplicates += other.duplicates;
         self.triangles += other.triangles;
@@ -40,69 +39,61 @@ impl AddAssign for LeafFigures {
     }
 }
 
-/// What the step needs to know of the configuration.
-#[derive(Clone, Copy)]
-pub struct Task<'a> {
-    /// Which of several points with the same x and y stays.
-    pub duplicates: Duplicates,
-    /// Who triangulates.
-    pub triangulator: &'a Triangulator,
-    /// How long a triangle may be.
-    pub longest: Longest,
-}
-
-/// Triangulates leaf `tile` and leaves its sites, closed triangles and frontier in the store.
+/// Triangulates the sites of `tile` and stores them with the final triangles and the frontier.
 ///
 /// # Errors
-/// [`crate::Error::Io`] on the spill or the store, [`crate::Error::TooFine`] if a triangle is too long to be written,
+/// [`crate::Error::Io`] on the point file or the store, [`crate::Error::TooFine`] if a triangle is too long to be written,
 /// [`crate::Error::Broken`] if the triangulation fails.
-pub fn run(
-    store: &Store,
+pub fn triangulate_leaf(
+    plan: &Plan,
     partition: &Partition,
-    spill: &Spill,
-    tile: usize,
-    task: Task<'_>,
-) -> Result<Done<LeafFigures>> {
-    let (points, dropped) = sites::load(spill, &partition.blocks[tile], task.duplicates)?;
+    points: &PointFile,
+    store: &Store,
+    triangulator: &Triangulator,
+    tile: TileIndex,
+) -> Result<StepOutput<LeafStats>> {
+    let (points, duplicates) = load_sites(points, &partition.blocks[tile.get()], plan.options.input.duplicates)?;
     let sites: Vec<Site> = points.iter().map(|p| p.position).collect();
-    let (mesh, outcome) = task.triangulator.triangulate(&sites)?;
-    let node = partition.tree.leaves[tile];
-    let is_root = partition.tree.nodes[node].parent.is_none();
-    let cell = (!is_root).then_some(&partition.tree.nodes[node].cell);
-    let closing = close(&mesh, &sites, cell, |_| false);
-    check_spans(&mesh, &sites, &closing.states, task.longest)?;
-    let draft = rim_draft(&mesh, &closing, &points);
-    let closed = mesh.triangles.iter().zip(&closing.states).filter(|(_, state)| **state == State::Closed);
-    let (leaf, triangles) = Leaf::save(store, tile, &points, closed.map(|(triangle, _)| *triangle))?;
-    let rim = |&site: &u32| Rim { tile: tile as u32, site, position: points[site as usize].corner() };
-    let frontier = Frontier { sites: closing.frontier.iter().map(rim).collect(), boundary: closing.boundary };
-    let stored = vec![draft.save(store, tile)?, leaf, frontier.save(store, node)?];
+    let (mesh, outcome) = triangulator.triangulate(&sites)?;
+    let node = partition.tree.leaf(tile);
+    let is_root = partition.tree.node(node).parent.is_none();
+    let cell = (!is_root).then_some(&partition.tree.node(node).cell);
+    let found = find_final(&mesh, &sites, cell, |_| false);
+    check_precision(&mesh, &sites, &found.states, PrecisionLimit::of(&plan.frame))?;
+    let normals = partial_normals(&mesh, &found, &points);
+    let is_final = |(_, state): &(&[u32; 3], &TriangleState)| **state == TriangleState::Final;
+    let triangles = mesh.triangles.iter().zip(&found.states).filter(is_final).map(|(triangle, _)| *triangle);
+    let (leaf, triangles) = Leaf::save(store, tile, &points, triangles)?;
+    let vertex = |&site: &u32| BorderVertex { tile, site, position: points[site as usize].corner() };
+    let frontier = Frontier { sites: found.frontier.iter().map(vertex).collect(), boundary: found.boundary };
+    let records = vec![normals.save(store, tile)?, leaf, frontier.save(store, node)?];
     triangulation::recycle(mesh);
-    Ok(Done::new(LeafFigures { sites: sites.len() as u64, duplicates: dropped, triangles, outcome }, stored))
+    Ok(StepOutput::new(LeafStats { sites: sites.len() as u64, duplicates, triangles, outcome }, records))
 }
 
-fn check_spans(mesh: &Mesh, sites: &[Site], states: &[State], longest: Longest) -> Result<()> {
-    if longest.holds_all(sites) {
+/// Checks that single precision can hold all final triangles.
+fn check_precision(mesh: &HalfEdgeMesh, sites: &[Site], states: &[TriangleState], limit: PrecisionLimit) -> Result<()> {
+    if limit.holds_all(sites) {
         return Ok(());
     }
-    let mut closed = mesh.triangles.iter().zip(states).filter(|(_, state)| **state == State::Closed);
-    closed.try_for_each(|(corners, _)| longest.check(corners.map(|v| sites[v as usize])))
+    let mut final_ones = mesh.triangles.iter().zip(states).filter(|(_, state)| **state == TriangleState::Final);
+    final_ones.try_for_each(|(corners, _)| limit.check(corners.map(|v| sites[v as usize])))
 }
 
-/// The frontier as far as the leaf knows it: the seams add their triangles to the normals when all are known.
-fn rim_draft(mesh: &Mesh, closing: &Closing, points: &[Point]) -> RimDraft {
-    let sites = || closing.frontier.iter().map(|&site| &points[site as usize]);
-    RimDraft {
-        sums: closing.spokes.iter().map(|&spoke| closed_around(mesh, closing, points, spoke)).collect(),
+/// Returns what the leaf knows of the normals on its frontier. The seams add their triangles when all of them are known.
+fn partial_normals(mesh: &HalfEdgeMesh, found: &FinalTriangles, points: &[Point]) -> PartialNormals {
+    let sites = || found.frontier.iter().map(|&site| &points[site as usize]);
+    PartialNormals {
+        sums: found.half_edges.iter().map(|&start| final_normals_around(mesh, found, points, start)).collect(),
         rgb: sites().map(|point| point.rgb).collect(),
         class: sites().map(|point| point.class).collect(),
     }
 }
 
-/// The sum of normals over the closed triangles around the start of `spoke`.
-fn closed_around(mesh: &Mesh, closing: &Closing, points: &[Point], spoke: u32) -> NormalSum {
-    let around = (spoke != HULL).then(|| mesh.around(spoke)).into_iter().flatten();
-    let closed = around.map(|t| t as usize).filter(|&t| closing.states[t] == State::Closed);
-    let corners = closed.map(|t| mesh.triangles[t].map(|v| points[v as usize].corner()));
+/// Returns the sum of the normals of the final triangles around the origin of half-edge `start`.
+fn final_normals_around(mesh: &HalfEdgeMesh, found: &FinalTriangles, points: &[Point], start: u32) -> NormalSum {
+    let around = (start != HULL).then(|| mesh.around(start)).into_iter().flatten();
+    let final_ones = around.map(|t| t as usize).filter(|&t| found.states[t] == TriangleState::Final);
+    let corners = final_ones.map(|t| mesh.triangles[t].map(|v| points[v as usize].corner()));
     corners.map(|[a, b, c]| normals::cross(a, b, c)).fold([0; 3], normals::add)
 }

@@ -1,52 +1,59 @@
-//! Step 4 of a job, by merge node of the tree: triangulate what the nodes below still need, discard what covers ground
-//! that is closed below, and close what can be closed now. What closes here are the seams.
+//! Step 4, once for each merge node of the tree: triangulates what the nodes below left pending, discards what covers ground that is
+//! final already, and finds the triangles that are final now. These are the seam.
 
 use crate::geometry::Site;
-use crate::job::durable::journal::Done;
-use crate::job::durable::store::Store;
-use crate::job::mesh::final_triangles::{State, close};
-use crate::job::mesh::precision_limit::Longest;
+use crate::job::index::{NodeIndex, TileIndex};
+use crate::job::mesh::final_triangles::{TriangleState, find_final};
+use crate::job::mesh::precision_limit::PrecisionLimit;
 use crate::job::partition::tree::Tree;
-use crate::job::records::{Frontier, Rim, Seam, SeamTriangle};
+use crate::job::plan::job_plan::Plan;
+use crate::job::records::{BorderVertex, Frontier, Seam, SeamTriangle, StepOutput, Store};
 use crate::mesh::region::covered;
 use crate::triangulation::reference;
 use crate::{Error, Result};
 
-/// Bytes that merging one frontier site takes at the peak: `spade`, the mesh and the marks.
+/// The peak number of bytes that merging takes for each frontier site: `spade`, the mesh and the marks.
 const BYTES_PER_SITE: u64 = 600;
 
-/// Merges the frontiers below merge node `node`, which must be in the store; returns the tiles that it settles: those it hands
-/// no site of up, though it was handed some.
+/// Merges the frontiers below merge node `node`, which must be in the store. Returns the tiles that this finishes: those that have
+/// sites in a frontier below, and none in the frontier that goes up.
 ///
 /// # Errors
-/// [`Error::Memory`] if the frontiers do not fit `memory` bytes, [`Error::TooFine`] if a triangle is too long to be
-/// written, [`Error::Io`] on the store, [`Error::Broken`] if the frontiers contradict each other.
-pub fn run(store: &Store, tree: &Tree, node: usize, memory: u64, longest: Longest) -> Result<Done<Vec<u32>>> {
+/// [`Error::Memory`] if the frontiers do not fit `memory` bytes, [`Error::TooFine`] if a triangle is too long to be written,
+/// [`Error::Io`] on the store, [`Error::Broken`] if the frontiers contradict each other.
+pub fn merge_frontiers(
+    plan: &Plan,
+    tree: &Tree,
+    store: &Store,
+    memory: u64,
+    node: NodeIndex,
+) -> Result<StepOutput<Vec<TileIndex>>> {
     let union = join(store, &tree.merged_by(node))?;
     check_memory(union.sites.len(), memory)?;
-    let sites: Vec<Site> = union.sites.iter().map(Rim::plane).collect();
+    let sites: Vec<Site> = union.sites.iter().map(BorderVertex::plane).collect();
     let mesh = reference::triangulate(&sites)?;
     let covered = covered(&mesh, &union.boundary)?;
-    let cell = tree.nodes[node].parent.map(|_| &tree.nodes[node].cell);
-    let closing = close(&mesh, &sites, cell, |triangle| covered[triangle]);
+    let cell = tree.node(node).parent.map(|_| &tree.node(node).cell);
+    let found = find_final(&mesh, &sites, cell, |triangle| covered[triangle]);
     let seam: Vec<SeamTriangle> = mesh
         .triangles
         .iter()
-        .zip(&closing.states)
-        .filter(|(_, state)| **state == State::Closed)
+        .zip(&found.states)
+        .filter(|(_, state)| **state == TriangleState::Final)
         .map(|(corners, _)| corners.map(|v| union.sites[v as usize]))
         .collect();
-    seam.iter().try_for_each(|corners| longest.check(corners.map(|corner| corner.plane())))?;
-    let frontier = closing.frontier.iter().map(|&site| union.sites[site as usize]).collect();
-    let frontier = Frontier { sites: frontier, boundary: closing.boundary };
-    let stored = vec![Seam::new(&seam).save(store, node)?, frontier.save(store, node)?];
+    let limit = PrecisionLimit::of(&plan.frame);
+    seam.iter().try_for_each(|corners| limit.check(corners.map(|corner| corner.plane())))?;
+    let frontier = found.frontier.iter().map(|&site| union.sites[site as usize]).collect();
+    let frontier = Frontier { sites: frontier, boundary: found.boundary };
+    let records = vec![Seam::new(&seam).save(store, node)?, frontier.save(store, node)?];
     let above = frontier.tiles();
-    let settled = union.tiles().into_iter().filter(|tile| above.binary_search(tile).is_err());
-    Ok(Done::new(settled.collect(), stored))
+    let finished = union.tiles().into_iter().filter(|tile| above.binary_search(tile).is_err());
+    Ok(StepOutput::new(finished.collect(), records))
 }
 
-/// The frontiers of `nodes` as one.
-fn join(store: &Store, nodes: &[usize]) -> Result<Frontier> {
+/// Joins the frontiers of `nodes` into one.
+fn join(store: &Store, nodes: &[NodeIndex]) -> Result<Frontier> {
     let mut union = Frontier::default();
     for &node in nodes {
         let Frontier { sites, boundary } = Frontier::load(store, node)?;
@@ -63,8 +70,8 @@ fn check_memory(sites: usize, memory: u64) -> Result<()> {
         return Ok(());
     }
     Err(Error::Memory(format!(
-        "{sites} sites lie on circles or triangles that no tile can decide alone, and joining them takes about {} MiB; \
-         raise [limits] memory",
+        "{sites} sites lie on circles or triangles that no tile can decide alone, and joining them takes about {} MiB; raise \
+         [limits] memory",
         needed >> 20
     )))
 }

@@ -1,4 +1,4 @@
-//! Steps 3 and 4: triangulating leaves and merging what they leave open.
+//! Steps 3 and 4: triangulates the leaves of the tree, and merges what they leave pending.
 
 pub mod final_triangles;
 pub mod leaf;

@@ -1,26 +1,30 @@
-//! Whether the triangles of the mesh can be written: glTF has 24 binary digits for a coordinate.
+//! Whether glTF can hold the triangles of the mesh: its coordinates have 24 binary digits.
 
-use crate::geometry::Site;
+use crate::geometry::{Bounds, Site};
 use crate::output::frame::Frame;
 use crate::{Error, Result};
 
 /// The longest extent in x, y and in z that a triangle may have, in lattice steps.
 #[derive(Clone, Copy, Debug)]
-pub struct Longest {
+pub struct PrecisionLimit {
     horizontal: i64,
     vertical: i64,
     /// Metres in a step of x and y, and of z.
     metres: [f64; 2],
 }
 
-impl Longest {
-    /// For the frame of a job.
-    pub fn of(frame: &Frame) -> Longest {
+impl PrecisionLimit {
+    /// Returns the limit for the frame of a job.
+    pub fn of(frame: &Frame) -> PrecisionLimit {
         let (longest, metres) = (frame.longest_triangle(), frame.resolution_metres());
-        Longest { horizontal: (longest[0] / metres[0]) as i64, vertical: (longest[1] / metres[1]) as i64, metres }
+        PrecisionLimit {
+            horizontal: (longest[0] / metres[0]) as i64,
+            vertical: (longest[1] / metres[1]) as i64,
+            metres,
+        }
     }
 
-    /// Whether no triangle of these `sites` can be too long.
+    /// Tells whether no triangle of these `sites` can be too long.
     pub fn holds_all(&self, sites: &[Site]) -> bool {
         (0..2).all(|axis| {
             let along = || sites.iter().map(|site| site[axis] as i64);
@@ -53,12 +57,12 @@ impl Longest {
         }
     }
 
-    /// Checks heights from `low` to `high`.
+    /// Checks the heights of a mesh with these `bounds`.
     ///
     /// # Errors
-    /// [`Error::TooFine`] if one mesh cannot hold them all.
-    pub fn check_heights(&self, low: i32, high: i32) -> Result<()> {
-        let steps = high as i64 - low as i64;
+    /// [`Error::TooFine`] if a mesh cannot hold all heights.
+    pub fn check_heights(&self, bounds: Bounds<3>) -> Result<()> {
+        let steps = bounds.extent(2);
         if steps <= self.vertical {
             return Ok(());
         }

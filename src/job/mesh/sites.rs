@@ -1,23 +1,23 @@
-//! The sites of a tile: its points from the spill, one for every x and y, in an order that depends on them alone.
+//! The sites of a tile: its points from the point file, one for every x and y, in an order that depends on the points alone.
 
 use crate::Result;
-use crate::geometry::Site;
+use crate::geometry::Bounds;
 use crate::input::Point;
 use crate::input::options::Duplicates;
-use crate::job::partition::point_file::{Block, Spill};
+use crate::job::partition::point_file::{PointBlock, PointFile};
 use multiversion::multiversion;
 use std::cmp::Reverse;
 
-/// Reads the points in `blocks` and keeps one of those with equal x and y; the sites in order, and how many points were
-/// duplicates. Memory stays within twice the sites, however often they repeat.
+/// Reads the points in `blocks` and keeps one of those with equal x and y. Returns the sites in order, and the number of points that
+/// were dropped. Memory stays below twice that of the sites, however often points repeat.
 ///
 /// # Errors
-/// [`crate::Error::Io`] if the spill cannot be read.
-pub fn load(spill: &Spill, blocks: &[Block], rule: Duplicates) -> Result<(Vec<Point>, u64)> {
+/// [`crate::Error::Io`] if the point file cannot be read.
+pub fn load_sites(file: &PointFile, blocks: &[PointBlock], rule: Duplicates) -> Result<(Vec<Point>, u64)> {
     let mut points = Vec::with_capacity(blocks.iter().map(|b| b.points as usize).sum::<usize>().min(1 << 20));
     let (mut kept, mut duplicates) = (0, 0);
     for &block in blocks {
-        spill.read(block, &mut points)?;
+        points.extend_from_slice(&file.read(block)?);
         if points.len() > (2 * kept).max(1 << 20) {
             duplicates += keep_one(&mut points, rule);
             kept = points.len();
@@ -27,7 +27,7 @@ pub fn load(spill: &Spill, blocks: &[Block], rule: Duplicates) -> Result<(Vec<Po
     Ok((points, duplicates))
 }
 
-/// Sorts `points` and drops all but one of every x and y; returns how many were dropped.
+/// Sorts `points`, keeps one of every x and y, and returns how many were dropped.
 fn keep_one(points: &mut Vec<Point>, rule: Duplicates) -> u64 {
     let before = points.len();
     sort(points);
@@ -41,8 +41,8 @@ fn keep_one(points: &mut Vec<Point>, rule: Duplicates) -> u64 {
     (before - points.len()) as u64
 }
 
-/// Whether `a` rather than `b`, at the same place, is to stay. Where the rule leaves it open their other values decide,
-/// so that the order of the files does not matter.
+/// Tells whether `a` stays rather than `b`, which has the same x and y. Where the rule leaves it open, the other values decide, so that
+/// the order of the files does not matter.
 fn preferred(a: &Point, b: &Point, rule: Duplicates) -> bool {
     match rule {
         Duplicates::Lowest => (a.z, a.class, a.rgb) < (b.z, b.class, b.rgb),
@@ -51,11 +51,11 @@ fn preferred(a: &Point, b: &Point, rule: Duplicates) -> bool {
     }
 }
 
-/// Sorts by y, then x: neighbours in the plane are neighbours in memory, and the pipeline likes rows.
+/// Sorts by y, then x: neighbours in the plane become neighbours in memory, and the pipeline works row by row.
 fn sort(points: &mut Vec<Point>) {
     match packed_keys(points) {
         Some((mut keys, index_bits)) => {
-            // Indices ascend, and the order of equal keys stays.
+            // Indices ascend, and the sort keeps the order of equal keys.
             radsort::sort_by_key(&mut keys, |key| key >> index_bits);
             let index = |key: u64| (key & ((1 << index_bits) - 1)) as usize;
             *points = keys.into_iter().map(|key| points[index(key)]).collect();
@@ -64,10 +64,10 @@ fn sort(points: &mut Vec<Point>) {
     }
 }
 
-/// For every point its y, its x and its index in one number, and the bits that the index takes: numbers sort several times
-/// faster than points. `None` where the tile is so wide or so full that 64 bits do not hold them.
+/// Returns for every point its y, its x and its index in one number, and the number of bits of the index: numbers sort several times
+/// faster than points. Returns `None` if 64 bits do not hold them.
 fn packed_keys(points: &[Point]) -> Option<(Vec<u64>, u32)> {
-    let (min, max) = extent(points)?;
+    let Bounds { min, max } = bounds(points)?;
     let bits = |value: u64| u64::BITS - value.leading_zeros();
     let along = |p: [i32; 2], axis: usize| (p[axis] as i64 - min[axis] as i64) as u64;
     let (x_bits, index_bits) = (bits(along(max, 0)), bits(points.len() as u64));
@@ -77,14 +77,10 @@ fn packed_keys(points: &[Point]) -> Option<(Vec<u64>, u32)> {
     fits.then(|| (points.iter().enumerate().map(key).collect(), index_bits))
 }
 
-/// The least and greatest x and y, if there is a point.
+/// Returns the box of the points' x and y.
 #[multiversion(targets("x86_64+avx2"))]
-fn extent(points: &[Point]) -> Option<(Site, Site)> {
-    let first = points.first()?.position;
-    Some(points.iter().fold((first, first), |(min, max), p| {
-        let p = p.position;
-        ([min[0].min(p[0]), min[1].min(p[1])], [max[0].max(p[0]), max[1].max(p[1])])
-    }))
+fn bounds(points: &[Point]) -> Option<Bounds<2>> {
+    Bounds::of_points(points.iter().map(|point| point.position))
 }
 
 #[cfg(test)]
@@ -99,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tile_too_wide_for_packed_keys_is_sorted_all_the_same() {
+    fn a_tile_too_wide_for_packed_keys_is_sorted_too() {
         let points =
             [(1 << 29, 1 << 29, 1), (-(1 << 29), 1 << 29, 2), (0, -(1 << 29), 3), (0, 0, 4), (1 << 29, 1 << 29, 0)];
         let kept = keep(&points, Duplicates::Lowest);
@@ -107,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn one_of_every_place_stays() {
+    fn one_point_of_every_place_stays() {
         let points = [(5, 5, 30), (1, 1, 9), (5, 5, 10), (5, 5, 20)];
         assert_eq!(keep(&points, Duplicates::Lowest), [(1, 1, 9), (5, 5, 10)]);
         assert_eq!(keep(&points, Duplicates::Highest), [(1, 1, 9), (5, 5, 30)]);

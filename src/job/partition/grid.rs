@@ -1,14 +1,17 @@
-//! A regular grid of buckets over a rectangle of lattice points, and the sums that cut it into tiles.
+//! The grid that sorts points into buckets while they are read, and the sums of points by which it is cut into tiles.
+//!
+//! Its cells differ from those of other grids in the program: they are square in whole lattice steps, and the division that finds
+//! the bucket of a point is a multiplication, because it runs for every point that is read.
 
-use crate::geometry::Site;
+use crate::geometry::{Bounds, Site};
 use crate::job::partition::tree::Cell;
 
-/// A grid of square buckets; what lies outside belongs to the nearest bucket.
+/// A grid of square buckets. A point outside belongs to the nearest bucket.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Grid {
     origin: Site,
     side: u32,
-    /// 2^64 by `side`, rounded up: a product by it, cut off there, is the whole quotient of any 32-bit number.
+    /// 2^64 / `side`, rounded up: a 32-bit number times this, shifted right by 64 bits, is its quotient by `side`.
     inverse: u128,
     columns: u32,
     rows: u32,
@@ -16,23 +19,23 @@ pub struct Grid {
 
 /// A rectangle of buckets: columns `min[0]..max[0]`, rows `min[1]..max[1]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Span {
+pub struct GridSpan {
     min: [u32; 2],
     max: [u32; 2],
 }
 
 impl Grid {
-    /// A grid of at most `buckets` (and about as many) over the lattice points from `min` to `max`, both included.
-    pub fn over(min: Site, max: Site, buckets: u64) -> Grid {
-        let size = [0, 1].map(|axis| (max[axis] as i64 - min[axis] as i64 + 1) as u64);
+    /// Returns a grid of about `buckets` buckets, and no more, over the lattice points of `bounds`.
+    pub fn over(bounds: Bounds<2>, buckets: u64) -> Grid {
+        let size = [0, 1].map(|axis| (bounds.extent(axis) + 1) as u64);
         let count = |side: u64| size[0].div_ceil(side) * size[1].div_ceil(side);
-        // Twice the ideal side is always few enough for a compact rectangle; a thin one needs the search to go on.
+        // For a compact rectangle at most twice the ideal side is enough; for a thin one the search goes on.
         let mut side = ((size[0] as f64 * size[1] as f64 / buckets as f64).sqrt() as u64).max(1);
         while count(side) > buckets {
             side += side / 16 + 1;
         }
         Grid {
-            origin: min,
+            origin: bounds.min,
             side: side as u32,
             inverse: (1u128 << 64).div_ceil(side as u128),
             columns: size[0].div_ceil(side) as u32,
@@ -40,12 +43,12 @@ impl Grid {
         }
     }
 
-    /// The number of buckets.
+    /// Returns the number of buckets.
     pub fn buckets(&self) -> usize {
         self.columns as usize * self.rows as usize
     }
 
-    /// The bucket of a lattice point.
+    /// Returns the bucket of a lattice point.
     #[inline]
     pub fn bucket(&self, p: Site) -> u32 {
         let place = |axis: usize, count: u32| {
@@ -55,33 +58,33 @@ impl Grid {
         place(1, self.rows) * self.columns + place(0, self.columns)
     }
 
-    /// All buckets.
-    pub fn span(&self) -> Span {
-        Span { min: [0, 0], max: [self.columns, self.rows] }
+    /// Returns the rectangle of all buckets.
+    pub fn span(&self) -> GridSpan {
+        GridSpan { min: [0, 0], max: [self.columns, self.rows] }
     }
 
-    /// The bucket numbers of `span`, row by row.
-    pub fn in_span(&self, span: Span) -> impl Iterator<Item = usize> {
+    /// Returns the bucket numbers of `span`, row by row.
+    pub fn in_span(&self, span: GridSpan) -> impl Iterator<Item = usize> {
         let columns = self.columns;
         (span.min[1]..span.max[1])
             .flat_map(move |row| (span.min[0]..span.max[0]).map(move |column| (row * columns + column) as usize))
     }
 
-    /// The lattice coordinate at which bucket line `line` along `axis` begins.
+    /// Returns the lattice coordinate where row or column `line` begins along `axis`.
     fn line(&self, axis: usize, line: u32) -> i64 {
         self.origin[axis] as i64 + line as i64 * self.side as i64
     }
 }
 
-/// Points in every rectangle of buckets, by a summed-area table.
-pub struct Sums {
+/// The number of points in every rectangle of buckets, by a summed-area table.
+pub struct GridSums {
     grid: Grid,
     table: Vec<u64>,
 }
 
-impl Sums {
-    /// From the number of points in each bucket.
-    pub fn new(grid: Grid, points: impl Iterator<Item = u64>) -> Sums {
+impl GridSums {
+    /// Builds the table from the number of points in each bucket.
+    pub fn new(grid: Grid, points: impl Iterator<Item = u64>) -> GridSums {
         let width = grid.columns as usize + 1;
         let mut table = vec![0; width * (grid.rows as usize + 1)];
         for (bucket, count) in points.enumerate() {
@@ -89,19 +92,19 @@ impl Sums {
             let at = row * width + column;
             table[at] = count + table[at - 1] + table[at - width] - table[at - width - 1];
         }
-        Sums { grid, table }
+        GridSums { grid, table }
     }
 
-    /// The number of points in `span`.
-    pub fn points(&self, span: Span) -> u64 {
+    /// Returns the number of points in `span`.
+    pub fn points(&self, span: GridSpan) -> u64 {
         let at = |column: u32, row: u32| self.table[row as usize * (self.grid.columns as usize + 1) + column as usize];
         at(span.max[0], span.max[1]) + at(span.min[0], span.min[1])
             - at(span.min[0], span.max[1])
             - at(span.max[0], span.min[1])
     }
 
-    /// `span` without empty lines of buckets on its sides.
-    fn trim(&self, mut span: Span) -> Span {
+    /// Returns `span` without the empty rows and columns on its sides.
+    fn trim(&self, mut span: GridSpan) -> GridSpan {
         for axis in 0..2 {
             let with = |min: u32, max: u32| {
                 let mut line = span;
@@ -120,9 +123,9 @@ impl Sums {
         span
     }
 
-    /// Cuts `span` across its longer side where the halves are most alike; each half holds points, and the two cells
-    /// part `cell`. `None` if all points lie in one bucket.
-    pub fn cut(&self, span: Span, cell: Cell) -> Option<[(Span, Cell); 2]> {
+    /// Cuts `span` across its longer side where the halves are most nearly equal. Each half holds points, and the two cells divide
+    /// `cell`. Returns `None` if all points are in one bucket.
+    pub fn cut(&self, span: GridSpan, cell: Cell) -> Option<[(GridSpan, Cell); 2]> {
         let span = self.trim(span);
         let lines = [0, 1].map(|axis| span.max[axis] - span.min[axis]);
         let axis = if lines[0] >= lines[1] { 0 } else { 1 };
@@ -148,18 +151,22 @@ impl Sums {
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_grid_keeps_within_its_number_of_buckets_and_outsiders_go_to_its_border() {
-        let grid = Grid::over([0, 0], [999, 99], 50);
-        assert!(grid.buckets() <= 50 && grid.buckets() >= 20, "{grid:?}");
-        assert_eq!(grid.bucket([-5, -5]), 0);
-        assert_eq!(grid.bucket([i32::MAX, i32::MAX]) as usize, grid.buckets() - 1);
-        assert_eq!(Grid::over([3, 3], [3, 3], 100).buckets(), 1);
-        assert!(Grid::over([0, 0], [1 << 30, 0], 1000).buckets() <= 1000);
+    fn over(min: Site, max: Site, buckets: u64) -> Grid {
+        Grid::over(Bounds { min, max }, buckets)
     }
 
     #[test]
-    fn a_product_divides_as_a_division_does() {
+    fn a_grid_keeps_within_its_number_of_buckets_and_takes_points_outside_at_its_border() {
+        let grid = over([0, 0], [999, 99], 50);
+        assert!(grid.buckets() <= 50 && grid.buckets() >= 20, "{grid:?}");
+        assert_eq!(grid.bucket([-5, -5]), 0);
+        assert_eq!(grid.bucket([i32::MAX, i32::MAX]) as usize, grid.buckets() - 1);
+        assert_eq!(over([3, 3], [3, 3], 100).buckets(), 1);
+        assert!(over([0, 0], [1 << 30, 0], 1000).buckets() <= 1000);
+    }
+
+    #[test]
+    fn the_multiplication_divides_exactly() {
         for side in [1, 2, 3, 7, 255, 256, 1000, 65_537, (1 << 30) - 1, 1 << 30] {
             let grid = Grid {
                 origin: [0, 0],
@@ -179,13 +186,13 @@ mod tests {
     }
 
     #[test]
-    fn cuts_part_the_points_until_one_bucket_is_left() {
-        let grid = Grid::over([0, 0], [9, 9], 100);
+    fn cuts_divide_the_points_until_one_bucket_is_left() {
+        let grid = over([0, 0], [9, 9], 100);
         let mut counts = vec![0; 100];
         for p in [[2, 3], [2, 3], [7, 3], [7, 8]] {
             counts[grid.bucket(p) as usize] += 1;
         }
-        let sums = Sums::new(grid, counts.into_iter());
+        let sums = GridSums::new(grid, counts.into_iter());
         assert_eq!(sums.points(grid.span()), 4);
         let [(low, low_cell), (high, high_cell)] = sums.cut(grid.span(), Cell::PLANE).unwrap();
         assert_eq!((sums.points(low), sums.points(high)), (2, 2));

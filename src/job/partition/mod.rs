@@ -1,6 +1,10 @@
-//! Step 2: reading the points, and cutting the plane into tiles.
+//! Step 2: reads the points of all inputs once, and cuts the plane into tiles of about equally many.
 
+pub(crate) mod bucket_sorter;
+pub mod buckets;
 pub mod grid;
 pub mod point_file;
 pub mod read;
+pub mod result;
 pub mod tree;
+pub mod tree_builder;

@@ -1,9 +1,11 @@
 //! The k-d tree that cuts the plane into tiles, and the half-open cells of its nodes.
 
-use crate::geometry::{Site, predicates::orient2d};
+use crate::geometry::Site;
+use crate::geometry::predicates::orient2d;
+use crate::job::index::{NodeIndex, TileIndex};
 use serde::{Deserialize, Serialize};
 
-/// A half-open rectangle of lattice points, `min <= (x, y) < max`; cells on the outside reach to [`Cell::FAR`].
+/// A half-open rectangle of lattice points, `min <= (x, y) < max`. The outermost cells reach to [`Cell::FAR`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Cell {
     /// The least x and y inside.
@@ -13,13 +15,13 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// Stands for infinity: no disc and no site reaches it.
+    /// Infinity: no disc and no site reaches it.
     pub const FAR: i64 = i64::MAX;
 
     /// The whole plane.
     pub const PLANE: Cell = Cell { min: [-Cell::FAR; 2], max: [Cell::FAR; 2] };
 
-    /// The two parts below and from `at` on along `axis`.
+    /// Cuts the cell at coordinate `at` of `axis`; a point at `at` is in the second part.
     pub fn cut(&self, axis: usize, at: i64) -> [Cell; 2] {
         let (mut low, mut high) = (*self, *self);
         low.max[axis] = at;
@@ -27,8 +29,8 @@ impl Cell {
         [low, high]
     }
 
-    /// Whether the circumscribed disc of the counterclockwise triangle abc certainly lies strictly inside the cell, so
-    /// that no site outside the cell can be in or on its circle. Conservative: `false` when floating point is in doubt.
+    /// Tells whether the circumscribed disc of the counterclockwise triangle abc certainly lies strictly inside the cell: then no
+    /// site outside the cell is in or on its circle. Returns `false` where floating point leaves a doubt.
     pub fn holds_disc(&self, a: Site, b: Site, c: Site) -> bool {
         let double_area = orient2d(a, b, c) as f64;
         let diff = |p: Site| [(p[0] as i64 - a[0] as i64) as f64, (p[1] as i64 - a[1] as i64) as f64];
@@ -39,11 +41,11 @@ impl Cell {
         }
         let scale = 0.5 / double_area;
         let center = [(bb * c[1] - cc * b[1]) * scale, (cc * b[0] - bb * c[0]) * scale];
-        // The area is exact but for its last place; the numerators lose a few units in the last place of their larger
-        // term to cancellation, which for slivers is more than the numerator itself.
+        // The area is exact except for its last digit. Cancellation costs the numerators a few units in the last place of their
+        // larger term; for slivers that is more than the numerator itself.
         let magnitude = (bb * c[0].abs().max(c[1].abs()) + cc * b[0].abs().max(b[1].abs())) * scale;
         let doubt = 16.0 * f64::EPSILON * magnitude;
-        // Not `hypot`: the range of f64 is far from sight, and this runs for every triangle.
+        // Not `hypot`, which guards against overflow: nothing here overflows, and this runs for every triangle.
         let reach = (center[0] * center[0] + center[1] * center[1]).sqrt() * (1.0 + 4.0 * f64::EPSILON) + 4.0 * doubt;
         (0..2).all(|axis| {
             let low = self.min[axis] as f64 - a[axis] as f64;
@@ -52,8 +54,8 @@ impl Cell {
         })
     }
 
-    /// Settles most triangles without a division: whether the border is farther from `a` than the disc's diameter, which is
-    /// the product of the sides' lengths by twice the area. The squares of the lengths are given.
+    /// Decides most triangles without a division: tells whether the border is farther from `a` than the disc's diameter, which is
+    /// the product of the sides' lengths divided by twice the area. The arguments are the squares of the lengths.
     fn is_far_from_border(&self, a: Site, double_area: f64, ab: f64, ac: f64, bc: f64) -> bool {
         let room = (0..2).fold(f64::INFINITY, |room, axis| {
             let at = a[axis] as f64;
@@ -64,65 +66,80 @@ impl Cell {
     }
 }
 
-/// What a node of the tree is.
+/// Whether a tree node is a tile or has children.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Kind {
-    /// A tile, by its number.
-    Leaf(usize),
-    /// An inner node with the node numbers of its two children.
-    Inner([usize; 2]),
+pub enum NodeKind {
+    /// A tile.
+    Leaf(TileIndex),
+    /// An inner node and its two children.
+    Inner([NodeIndex; 2]),
 }
 
-/// A node: its cell, its parent (`None` at the root) and what it is.
+/// A node of the tree.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Node {
-    /// The part of the plane it is responsible for.
+pub struct TreeNode {
+    /// The part of the plane that it decides.
     pub cell: Cell,
-    /// The node it was cut from.
-    pub parent: Option<usize>,
+    /// The node that it was cut from; `None` at the root.
+    pub parent: Option<NodeIndex>,
     /// Leaf or inner.
-    pub kind: Kind,
+    pub kind: NodeKind,
 }
 
-/// The tree. Node 0 is the root; tiles are numbered in depth-first order.
+/// The k-d tree. Node 0 is the root, and tiles are numbered in depth-first order.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Tree {
-    /// All nodes; children come after their parent.
-    pub nodes: Vec<Node>,
-    /// The node number of every tile.
-    pub leaves: Vec<usize>,
+    /// All nodes. Children come after their parent.
+    pub nodes: Vec<TreeNode>,
+    /// The node of every tile.
+    pub leaves: Vec<NodeIndex>,
 }
 
 /// Frontiers are merged at the root, at its grandchildren and at every third inner node below those, eight at a time where the
-/// tree is full: joining two at every node would triangulate most frontier sites once a node, more than twice as often in
-/// all. At the root only four, as there is no other work beside it.
+/// tree is full. Merging two at every node would triangulate most frontier sites more than twice as often. The root merges only
+/// four, because other threads have little to do meanwhile.
 const MERGE_STRIDE: usize = 3;
 
 impl Tree {
-    /// The nodes above node `node`, nearest first.
-    fn ancestors(&self, node: usize) -> impl Iterator<Item = usize> {
-        std::iter::successors(self.nodes[node].parent, |&n| self.nodes[n].parent)
+    /// Returns the node with this index.
+    pub fn node(&self, node: NodeIndex) -> &TreeNode {
+        &self.nodes[node.get()]
     }
 
-    /// Whether `node` merges the frontiers of what is below it.
-    pub fn is_merge(&self, node: usize) -> bool {
-        let is_inner = matches!(self.nodes[node].kind, Kind::Inner(_));
+    /// Returns the node of a tile.
+    pub fn leaf(&self, tile: TileIndex) -> NodeIndex {
+        self.leaves[tile.get()]
+    }
+
+    /// Returns all tiles, ascending.
+    pub fn tiles(&self) -> impl DoubleEndedIterator<Item = TileIndex> + ExactSizeIterator + Clone {
+        (0..self.leaves.len()).map(TileIndex::new)
+    }
+
+    /// Returns the nodes above `node`, nearest first.
+    fn ancestors(&self, node: NodeIndex) -> impl Iterator<Item = NodeIndex> {
+        std::iter::successors(self.node(node).parent, |&n| self.node(n).parent)
+    }
+
+    /// Tells whether `node` merges the frontiers below it.
+    pub fn is_merge(&self, node: NodeIndex) -> bool {
+        let is_inner = matches!(self.node(node).kind, NodeKind::Inner(_));
         let depth = self.ancestors(node).count();
         is_inner && (depth == 0 || (depth + 1).is_multiple_of(MERGE_STRIDE))
     }
 
-    /// The merge nodes above node `node`, nearest first.
-    pub fn merges_above(&self, node: usize) -> impl Iterator<Item = usize> {
+    /// Returns the merge nodes above `node`, nearest first.
+    pub fn merges_above(&self, node: NodeIndex) -> impl Iterator<Item = NodeIndex> {
         self.ancestors(node).filter(|&n| self.is_merge(n))
     }
 
-    /// Whose frontiers merge node `node` merges, from the lowest tile to the highest.
-    pub fn merged_by(&self, node: usize) -> Vec<usize> {
+    /// Returns the nodes whose frontiers merge node `node` merges, in the order of their tiles.
+    pub fn merged_by(&self, node: NodeIndex) -> Vec<NodeIndex> {
         let mut merged = Vec::new();
         let mut pending = vec![node];
         while let Some(at) = pending.pop() {
-            match self.nodes[at].kind {
-                Kind::Inner([low, high]) if at == node || !self.is_merge(at) => pending.extend([high, low]),
+            match self.node(at).kind {
+                NodeKind::Inner([low, high]) if at == node || !self.is_merge(at) => pending.extend([high, low]),
                 _ => merged.push(at),
             }
         }
@@ -147,15 +164,15 @@ mod tests {
     }
 
     #[test]
-    fn other_merges_are_another_layout() {
-        let inner = |number: usize| Node {
+    fn a_change_of_merge_nodes_changes_the_layout_version() {
+        let inner = |number: usize| TreeNode {
             cell: Cell::PLANE,
-            parent: number.checked_sub(1),
-            kind: Kind::Inner([number + 1, number + 1]),
+            parent: number.checked_sub(1).map(NodeIndex::new),
+            kind: NodeKind::Inner([NodeIndex::new(number + 1); 2]),
         };
         let tree = Tree { nodes: (0..12).map(inner).collect(), leaves: Vec::new() };
-        let merges: Vec<usize> = (0..12).filter(|&node| tree.is_merge(node)).collect();
-        assert_eq!((LAYOUT, merges), (4, vec![0, 2, 5, 8, 11]));
+        let merges: Vec<usize> = (0..12).filter(|&node| tree.is_merge(NodeIndex::new(node))).collect();
+        assert_eq!((LAYOUT, merges), (5, vec![0, 2, 5, 8, 11]));
     }
 
     proptest! {

@@ -1,77 +1,78 @@
-//! The choice of the job's lattice: as fine as the inputs, as long as the mesh can be written.
+//! Choosing the job's lattice: as fine as the inputs, as long as the mesh can be written.
 
 use crate::geometry::lattice::{Lattice, REACH, shortest_decimal};
 use crate::input::Source;
-use crate::job::plan::extent::Area;
+use crate::job::plan::extent::Extent;
 use crate::output::frame::Frame;
-use crate::{Error, Result};
+use crate::{Error, Result, Warnings};
 use rust_decimal::Decimal;
 use rust_decimal::prelude::ToPrimitive;
 use serde::{Deserialize, Serialize};
 
-/// The lattice for `sources` in `area`, `metres` and `metres_z` the units of x and y and of z; `wanted` is the user's step. What had
-/// to be rounded goes to `warnings`.
-///
-/// # Errors
-/// [`Error::Config`] if a wanted step does not fit, or no step does.
-pub(crate) fn lattice(
-    sources: &[Source],
-    area: &Area,
-    [metres, metres_z]: [f64; 2],
-    wanted: Option<Decimal>,
-    coarser: Coarser,
-    warnings: &mut Vec<String>,
-) -> Result<Lattice> {
-    let resolution = horizontal_step(sources, area, metres, wanted, coarser.horizontal, warnings)?;
-    let resolution_z = vertical_step(sources, area, metres_z, coarser.vertical, warnings)?;
-    place(sources, area, resolution, resolution_z)
-}
-
-/// How many tens coarser than it would be the lattice is to be, because it proved too fine for the mesh.
+/// By how many powers of ten the lattice is coarser than it would be, because a finer one proved too fine for the mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Coarser {
+pub struct LatticeCoarsening {
     /// In x and y.
     pub horizontal: u32,
     /// In z.
     pub vertical: u32,
 }
 
-/// The steps as [`horizontal_step`] and [`vertical_step`] choose them; the offset near the middle of the area in x and y and at its
-/// foot in z, such that the inputs' own grids meet the lattice.
-fn place(sources: &[Source], area: &Area, resolution: Decimal, resolution_z: Decimal) -> Result<Lattice> {
-    let middle = |axis: usize| (area.min[axis] + area.max[axis]) / 2.0;
+/// Returns the lattice for `sources` within `extent`. `metres` is the length of the unit of x and y, `metres_z` of that of z;
+/// `wanted` is the step that the user sets. A warning says what had to be rounded.
+///
+/// # Errors
+/// [`Error::Config`] if the wanted step does not fit, or no step does.
+pub(crate) fn choose_lattice(
+    sources: &[Source],
+    extent: &Extent,
+    [metres, metres_z]: [f64; 2],
+    wanted: Option<Decimal>,
+    coarsening: LatticeCoarsening,
+    warnings: &mut Warnings,
+) -> Result<Lattice> {
+    let resolution = horizontal_step(sources, extent, metres, wanted, coarsening.horizontal, warnings)?;
+    let resolution_z = vertical_step(sources, extent, metres_z, coarsening.vertical, warnings)?;
+    place(sources, extent, resolution, resolution_z)
+}
+
+/// Places a lattice with these steps: its offset is near the middle of the extent in x and y and at its foot in z, and the inputs'
+/// own grids meet it.
+fn place(sources: &[Source], extent: &Extent, resolution: Decimal, resolution_z: Decimal) -> Result<Lattice> {
+    let middle = |axis: usize| (extent.min[axis] + extent.max[axis]) / 2.0;
     let offset = [
         lattice_point_near(middle(0), phase(sources, 0, resolution)?, resolution)?,
         lattice_point_near(middle(1), phase(sources, 1, resolution)?, resolution)?,
-        lattice_point_near(area.min[2].floor(), phase(sources, 2, resolution_z)?, resolution_z)?,
+        lattice_point_near(extent.min[2].floor(), phase(sources, 2, resolution_z)?, resolution_z)?,
     ];
     Ok(Lattice { offset, resolution, resolution_z })
 }
 
-/// Whether 64-bit floating-point numbers tell coordinates up to `farthest` from those a step farther.
+/// Tells whether 64-bit floating point separates coordinates up to `farthest` from those a step away.
 fn is_told_apart(farthest: f64, step: f64) -> bool {
     farthest / step < 1.0 / f64::EPSILON
 }
 
-/// The share of the area's size that its longest triangle is taken to have in advance: longer ones take a hull edge from one
-/// end of the area to the other.
+/// The length that the longest triangle is expected to have before the mesh is known, as a fraction of the extent. Only a hull edge
+/// from one end of the extent to the other is longer.
 const LIKELY_SPAN: f64 = 0.8;
 
-/// Metres: no scanner measures x and y more finely, so a wide area may be rounded to this without asking.
+/// A step in metres. No scanner measures x and y more finely, so the lattice of a wide extent may be rounded to this without asking.
 const FINE_ENOUGH: f64 = 0.0099;
 
-/// The step in x and y: what the user wants, else the finest of the inputs on which a triangle across the whole area could be
-/// written, but no coarser than a centimetre for that reason; beyond it [`Error::TooFine`] decides by the mesh itself.
+/// Returns the step in x and y: the one that the user sets, or else the finest of the inputs with which a triangle across the whole
+/// extent can be written. For that reason alone it becomes no coarser than a centimetre; beyond that the mesh itself decides
+/// ([`Error::TooFine`]).
 fn horizontal_step(
     sources: &[Source],
-    area: &Area,
+    extent: &Extent,
     metres: f64,
     wanted: Option<Decimal>,
-    coarser: u32,
-    warnings: &mut Vec<String>,
+    coarsening: u32,
+    warnings: &mut Warnings,
 ) -> Result<Decimal> {
-    let size = area.size(0).max(area.size(1));
-    let farthest = area.farthest(0).max(area.farthest(1));
+    let size = extent.size(0).max(extent.size(1));
+    let farthest = extent.farthest(0).max(extent.farthest(1));
     let fits = |step: Decimal| size < 2.0 * REACH as f64 * 0.99 * float(step) && is_told_apart(farthest, float(step));
     let is_writable = |step: Decimal| LIKELY_SPAN * size * metres < Frame::longest_at(float(step) * metres);
     if let Some(step) = wanted {
@@ -84,9 +85,9 @@ fn horizontal_step(
     let first = lossless.unwrap_or(finest);
     let mut step = first;
     while !fits(step) || (!is_writable(step) && float(step) * metres < FINE_ENOUGH) {
-        step = tens(step, 1)?;
+        step = times_power_of_ten(step, 1)?;
     }
-    step = tens(step, coarser)?;
+    step = times_power_of_ten(step, coarsening)?;
     if step != first {
         warnings.push(format!(
             "x and y are rounded to {step}: glTF's single precision cannot hold every triangle that an area of {size:.0} units may \
@@ -98,30 +99,31 @@ fn horizontal_step(
 
 fn too_fine(step: Decimal, size: f64, farthest: f64) -> Error {
     Error::Config(format!(
-        "[input] resolution = {step} is too fine for an area of {size:.0} units with coordinates up to {farthest:.0}: it may have at \
-         most 2^30 steps, and lie within 2^52 steps of zero"
+        "[input] resolution = {step} is too fine for an area of {size:.0} units with coordinates up to {farthest:.0}: the area may \
+         have at most 2^30 steps, and must lie within 2^52 steps of zero"
     ))
 }
 
-/// The step in z: the finest of the inputs on which all heights between the lowest and the highest can be written.
+/// Returns the step in z: the finest of the inputs with which all heights between the lowest and the highest can be written.
 fn vertical_step(
     sources: &[Source],
-    area: &Area,
+    extent: &Extent,
     metres: f64,
-    coarser: u32,
-    warnings: &mut Vec<String>,
+    coarsening: u32,
+    warnings: &mut Warnings,
 ) -> Result<Decimal> {
     let finest = sources.iter().map(|s| s.axes[2].scale).min().unwrap_or(Decimal::ONE);
     let mut step = finest;
     let fits = |step: Decimal| {
-        area.size(2) * metres < Frame::longest_at(float(step) * metres) && is_told_apart(area.farthest(2), float(step))
+        extent.size(2) * metres < Frame::longest_at(float(step) * metres)
+            && is_told_apart(extent.farthest(2), float(step))
     };
     while !fits(step) {
-        step = tens(step, 1)?;
+        step = times_power_of_ten(step, 1)?;
     }
-    step = tens(step, coarser)?;
+    step = times_power_of_ten(step, coarsening)?;
     if step != finest {
-        let size = area.size(2);
+        let size = extent.size(2);
         warnings.push(format!(
             "heights are rounded to {step}: glTF's single precision cannot hold {size:.0} units in steps of {finest}"
         ));
@@ -129,8 +131,8 @@ fn vertical_step(
     Ok(step)
 }
 
-/// The largest step on which the points of all inputs lie, if those of each lie on steps of `step_of` it and an axis: the
-/// greatest common divisor of these and of the distances between the inputs' offsets. `None` if that takes too many digits.
+/// Returns the largest step on which the points of all inputs lie, where `step_of` gives the step of one input on one axis: the
+/// greatest common divisor of these steps and of the distances between the inputs' offsets. `None` if it takes too many digits.
 fn common_step(sources: &[Source], step_of: impl Fn(&Source, usize) -> Decimal) -> Option<Decimal> {
     let first = sources.first()?;
     let mut common = Decimal::ZERO;
@@ -143,7 +145,7 @@ fn common_step(sources: &[Source], step_of: impl Fn(&Source, usize) -> Decimal) 
     Some(common.normalize())
 }
 
-/// The greatest common divisor of two decimals, by Euclid's algorithm.
+/// Returns the greatest common divisor of two decimals, by Euclid's algorithm.
 fn divisor(mut a: Decimal, mut b: Decimal) -> Option<Decimal> {
     while !b.is_zero() {
         (a, b) = (b, a.checked_rem(b)?);
@@ -151,8 +153,8 @@ fn divisor(mut a: Decimal, mut b: Decimal) -> Option<Decimal> {
     Some(a)
 }
 
-fn tens(step: Decimal, count: u32) -> Result<Decimal> {
-    let product = (0..count).try_fold(step, |step, _| step.checked_mul(Decimal::TEN));
+fn times_power_of_ten(step: Decimal, power: u32) -> Result<Decimal> {
+    let product = (0..power).try_fold(step, |step, _| step.checked_mul(Decimal::TEN));
     let step = product.ok_or_else(|| {
         Error::Config("the inputs span too much for any terrain: check their coordinates, or set [input] bounds".into())
     })?;
@@ -163,8 +165,8 @@ fn float(step: Decimal) -> f64 {
     step.to_f64().unwrap_or(f64::NAN)
 }
 
-/// Where between two steps the lattice lies: the least remainder of the inputs' offsets, so that the order of the files does
-/// not matter. Inputs that agree in it lose nothing.
+/// Returns where between two multiples of the step the lattice lies: the least remainder of the inputs' offsets, so that the order
+/// of the files does not matter. Inputs that agree in it lose nothing.
 fn phase(sources: &[Source], axis: usize, step: Decimal) -> Result<Decimal> {
     let remainder = |source: &Source| {
         let rest = source.axes[axis].offset.checked_rem(step)?;
@@ -180,7 +182,7 @@ fn phase(sources: &[Source], axis: usize, step: Decimal) -> Result<Decimal> {
     Ok(least.unwrap_or_default())
 }
 
-/// The whole number next to `near`, or where the lattice through `phase` does not meet it, the lattice point next to that.
+/// Returns the whole number nearest to `near`; where the lattice through `phase` does not meet it, the lattice point next to it.
 fn lattice_point_near(near: f64, phase: Decimal, step: Decimal) -> Result<Decimal> {
     let out_of_range = || {
         Error::Config(format!(

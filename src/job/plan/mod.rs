@@ -1,6 +1,11 @@
-//! What a job is: its inputs, lattice and frame, and by what it is known again.
+//! Step 1: the plan says what a job is. It is made from the options and the inputs' headers alone, and it can be written down and
+//! read back, so that every later step is a function of the plan, an index and the store.
 
+pub mod budget;
+pub mod coordinates;
 pub mod extent;
 pub mod fingerprint;
+pub mod inputs;
+pub mod job_plan;
 pub mod lattice_choice;
 pub mod scan;

@@ -1,41 +1,21 @@
-//! Preflight: what a job would read and need, without writing anything.
+//! The result of the preflight, for people and for machines.
 
-use crate::input::Point;
-use crate::job::durable::directory::Directory;
-use crate::job::levels::hierarchy::{BYTES_PER_LEVEL_SITE, Sizes};
+use crate::input::Source;
+use crate::job::durable::directory::JobDirectory;
 use crate::job::options::JobOptions;
-use crate::job::partition::read as partition;
-use crate::job::partition::read::Skipped;
-use crate::job::plan::lattice_choice::Coarser;
-use crate::job::plan::scan::{self, Plan};
+use crate::job::plan::budget::workers;
+use crate::job::plan::job_plan::{Plan, SkippedInput};
+use crate::job::plan::lattice_choice::LatticeCoarsening;
+use crate::job::plan::scan::make_plan;
+use crate::job::preflight::estimate::{self, DiskEstimate};
 use crate::job::progress::machine;
-use crate::job::report::{grouped, write_skipped};
-use crate::job::{BYTES_PER_LEAF_SITE, MOST_TRIANGLES_IN_ONE_FILE, workers};
-use crate::output::Compression;
-use crate::output::preview::canvas::{self, Texel};
-use crate::{Error, Result};
+use crate::job::progress::text::{grouped, mebibytes};
+use crate::job::publish::limits::MAX_TRIANGLES_IN_ONE_FILE;
+use crate::job::report::skipped::write_skipped;
+use crate::{Error, Result, Warnings};
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::{fmt, io};
-
-/// Bytes of job directory a site, beside the spill: its place, colour, class and two triangles.
-const TEMPORARY_PER_SITE: u64 = 12 + 6 + 1 + 2 * 12;
-/// Bytes of results a site: position, normal, colour and two triangles with 16-bit corners.
-fn result_per_site(compression: Compression) -> u64 {
-    match compression {
-        Compression::None => 12 + 12 + 8 + 2 * 6,
-        Compression::Quantized => 8 + 4 + 4 + 2 * 6,
-        // As it packs dense clouds, and half as much again for others.
-        Compression::Meshopt => 15,
-    }
-}
-
-/// Bytes of job directory a site of a tile's frontier, in all the files that it is in.
-const TEMPORARY_PER_RIM: u64 = 500;
-/// Bytes of a GLB beside its arrays.
-const RESULT_PER_TILE: u64 = 6000;
-/// Pixels of the preview at the most.
-const PIXELS: u64 = canvas::LONGER_SIDE * canvas::LONGER_SIDE;
 
 /// What a job would do.
 #[derive(Clone, Debug, Serialize)]
@@ -44,9 +24,9 @@ pub struct Preflight {
     pub files: Vec<(PathBuf, String, u64)>,
     /// Records in all inputs.
     pub records: u64,
-    /// Tiles, about.
+    /// About how many tiles.
     pub tiles: u64,
-    /// Steps of the lattice in x and y, and z.
+    /// Steps of the lattice in x and y, and in z.
     pub resolution: [String; 2],
     /// Width and height in source units.
     pub size: [f64; 2],
@@ -56,152 +36,77 @@ pub struct Preflight {
     pub crs: Option<String>,
     /// Worker threads.
     pub threads: usize,
-    /// Bytes of memory that the job will need at the most, about.
+    /// About how many bytes of memory the job needs.
     pub memory: u64,
-    /// The memory it was given.
+    /// The memory limit of the job in bytes.
     pub memory_limit: u64,
-    /// Bytes of memory free on this machine; `None` where the system does not tell.
+    /// Bytes of memory free on this machine; `None` if the system does not tell.
     pub memory_free: Option<u64>,
-    /// Bytes of temporary files, about.
+    /// About how many bytes the temporary files take.
     pub temporary: u64,
-    /// Bytes of results, about.
+    /// About how many bytes the results take.
     pub results: u64,
-    /// Bytes that there must be room for. Where there is room for both, results come while all temporary files are there; else some
-    /// of these are gone before.
+    /// The least number of bytes that the disk must have. With room for all files, results are written while all temporary files
+    /// still exist; with less, some of these are removed before.
     pub disk: u64,
-    /// Bytes free on the disk of the output directory, with those that an earlier job takes there; `None` where the system does
-    /// not tell.
+    /// Bytes free on the disk of the output directory, including what an earlier job takes there; `None` if the system does not
+    /// tell.
     pub disk_free: Option<u64>,
     /// The output directory.
     pub output: PathBuf,
-    /// Who will triangulate.
+    /// The backend that triangulates.
     pub backend: String,
     /// What the user should know.
-    pub warnings: Vec<String>,
-    /// The inputs that would be left out because they are bad; more may prove bad when they are read.
-    pub skipped: Vec<Skipped>,
+    pub warnings: Warnings,
+    /// The inputs that would be left out because they are bad. More may prove bad when they are read.
+    pub skipped: Vec<SkippedInput>,
 }
 
-/// Looks at the inputs of `config`.
+/// Looks at the inputs of a job and says what it would do.
 ///
 /// # Errors
-/// Whatever would stop the job before its first point; see [`scan::run`].
-pub fn run(config: &JobOptions) -> Result<Preflight> {
-    let directory = Directory::new(&config.output.directory);
-    directory.nothing_is_in_the_way()?;
-    directory.is_not_somebody_elses()?;
-    let plan = scan::run(config, Coarser::default())?;
-    let threads = workers(config, plan.records)?;
-    Ok(preflight(&plan, config, threads))
-}
-
-/// What the job of `plan` would do.
-pub(crate) fn preflight(plan: &Plan, config: &JobOptions, threads: usize) -> Preflight {
-    let per_tile = config.triangulation.max_points_per_tile.0;
-    let points = points(plan);
-    let steps = |axis: usize| plan.extent[1][axis] as f64 - plan.extent[0][axis] as f64;
-    let resolution = plan.frame.extras().resolution;
-    let leaves = per_tile.min(points) * BYTES_PER_LEAF_SITE * threads as u64;
-    let output = &config.output.directory;
-    let OnDisk { spill, steps: left_by_steps, results } = OnDisk::of(plan, config);
-    Preflight {
-        files: plan.sources.iter().map(|(s, _)| (s.path.clone(), format!("{:?}", s.format), s.records)).collect(),
-        records: plan.records,
-        tiles: tiles(points, config),
-        resolution: [plan.lattice.resolution.to_string(), plan.lattice.resolution_z.to_string()],
-        size: [steps(0) * resolution, steps(1) * resolution],
-        unit: plan.unit.into(),
-        crs: plan.crs.name.clone(),
-        threads,
-        memory: (64 << 20)
-            + leaves.max(level_bytes(config, points, threads)).max(partition::buffer_bytes(
-                points,
-                per_tile,
-                config.limits.memory.0 / 6,
-            )),
-        memory_limit: config.limits.memory.0,
-        memory_free: machine::free_memory(),
-        temporary: spill + left_by_steps,
-        results,
-        // The spill may go before the results come.
-        disk: left_by_steps + spill.max(results),
-        disk_free: machine::free_disk(output).map(|free| free + taken(output)),
-        output: output.clone(),
-        backend: format!("{:?}", config.triangulation.backend).to_lowercase(),
-        warnings: plan.warnings.clone(),
-        skipped: plan.skipped.clone(),
-    }
-}
-
-/// Records but for those that are known to be missing.
-fn points(plan: &Plan) -> u64 {
-    plan.records - plan.sources.iter().map(|(source, _)| source.missing).sum::<u64>()
-}
-
-/// Tiles come out between half full and full.
-fn tiles(points: u64, config: &JobOptions) -> u64 {
-    (points * 4).div_ceil(config.triangulation.max_points_per_tile.0 * 3)
-}
-
-/// Bytes of a job's files, about.
-struct OnDisk {
-    spill: u64,
-    /// What steps leave for later steps.
-    steps: u64,
-    results: u64,
-}
-
-impl OnDisk {
-    fn of(plan: &Plan, config: &JobOptions) -> OnDisk {
-        let points = points(plan);
-        let tiles = tiles(points, config);
-        OnDisk {
-            spill: points * size_of::<Point>() as u64,
-            steps: step_bytes(points, config.triangulation.max_points_per_tile.0, tiles),
-            results: result_bytes(points, tiles, config.output.packing()),
-        }
-    }
-}
-
-/// Whether the disk has ample room for all other files beside the points, which are there already.
-pub(crate) fn has_room_beside_points(plan: &Plan, config: &JobOptions) -> bool {
-    let OnDisk { steps, results, .. } = OnDisk::of(plan, config);
-    machine::free_disk(&config.output.directory).is_some_and(|free| (steps + results) / 4 * 5 <= free)
-}
-
-/// Bytes that steps leave for later steps.
-fn step_bytes(points: u64, per_tile: u64, tiles: u64) -> u64 {
-    // A tile of n sites has about 2.2 sqrt(n) on its frontier.
-    let rims = (2.2 * (per_tile.min(points) as f64).sqrt()) as u64 * tiles;
-    points * TEMPORARY_PER_SITE + rims * TEMPORARY_PER_RIM + PIXELS * size_of::<Texel>() as u64
-}
-
-/// Bytes of memory that making coarser tiles takes.
-fn level_bytes(config: &JobOptions, points: u64, threads: usize) -> u64 {
-    let sizes = Sizes::new(config.output.max_points_per_level_tile.0, config.limits.memory.0);
-    let one = (4 * sizes.sites).min(points) * BYTES_PER_LEVEL_SITE;
-    if config.output.levels { (one * threads as u64).min(sizes.memory) } else { 0 }
-}
-
-fn result_bytes(points: u64, tiles: u64, compression: Compression) -> u64 {
-    let in_tiles = points * result_per_site(compression) + tiles * RESULT_PER_TILE;
-    // One file is never packed with meshopt.
-    let unpacked = if compression == Compression::None { Compression::None } else { Compression::Quantized };
-    let in_one = if 2 * points <= MOST_TRIANGLES_IN_ONE_FILE { points * result_per_site(unpacked) } else { 0 };
-    // Levels add about a third.
-    in_tiles + in_one + in_tiles / 2 + 4 * PIXELS
-}
-
-/// Bytes of what an earlier job has left in `output` and the next one replaces.
-fn taken(output: &Path) -> u64 {
-    let folders = ["", "tiles", "levels", "cut", "job"].map(|name| output.join(name));
-    let entries = folders.iter().filter_map(|folder| std::fs::read_dir(folder).ok());
-    let files = entries.flatten().flatten().filter_map(|entry| entry.metadata().ok()).filter(|meta| meta.is_file());
-    files.map(|meta| meta.len()).sum()
+/// Every error that would stop the job before its first point; see [`make_plan`].
+pub fn check(options: &JobOptions) -> Result<Preflight> {
+    let directory = JobDirectory::new(&options.output.directory);
+    directory.check_nothing_in_the_way()?;
+    directory.check_results_are_ours()?;
+    let plan = make_plan(options, LatticeCoarsening::default())?;
+    let threads = workers(options, plan.records)?;
+    Ok(Preflight::of(&plan, threads))
 }
 
 impl Preflight {
-    /// Whether the machine has what the job needs.
+    /// Returns what the job of `plan` would do on `threads` threads.
+    pub(crate) fn of(plan: &Plan, threads: usize) -> Preflight {
+        let options = &plan.options;
+        let resolution = plan.frame.extras().resolution;
+        let DiskEstimate { points, store, results } = DiskEstimate::of(plan, MAX_TRIANGLES_IN_ONE_FILE);
+        let describe = |source: &Source| (source.path.clone(), format!("{:?}", source.format), source.records);
+        Preflight {
+            files: plan.inputs.iter().map(|input| describe(&input.source)).collect(),
+            records: plan.records,
+            tiles: estimate::tiles(plan),
+            resolution: [plan.lattice.resolution.to_string(), plan.lattice.resolution_z.to_string()],
+            size: [0, 1].map(|axis| plan.extent.extent(axis) as f64 * resolution),
+            unit: plan.unit.clone(),
+            crs: plan.crs.name.clone(),
+            threads,
+            memory: estimate::memory(plan, threads),
+            memory_limit: options.limits.memory.0,
+            memory_free: machine::free_memory(),
+            temporary: points + store,
+            results,
+            // The points may go before the results come.
+            disk: store + points.max(results),
+            disk_free: machine::free_disk(&options.output.directory).map(|free| free + estimate::replaced_bytes(plan)),
+            output: options.output.directory.clone(),
+            backend: format!("{:?}", options.triangulation.backend).to_lowercase(),
+            warnings: plan.all_warnings(),
+            skipped: plan.skipped.clone(),
+        }
+    }
+
+    /// Checks that the machine has what the job needs.
     ///
     /// # Errors
     /// [`Error::Io`] if nothing can be written to the output directory or its disk is too small, [`Error::Memory`] if too little
@@ -210,7 +115,7 @@ impl Preflight {
         machine::check_writable(&self.output)?;
         if let Some(free) = self.disk_free.filter(|free| *free < self.disk) {
             let what = format!(
-                "the job takes about {} there, and {} are free or its own already (--force goes on all the same)",
+                "the job takes about {} there, and {} are free or its own already (--force runs it anyway)",
                 mebibytes(self.disk),
                 mebibytes(free)
             );
@@ -219,17 +124,13 @@ impl Preflight {
         match self.memory_free.filter(|free| *free < self.memory) {
             Some(free) => Err(Error::Memory(format!(
                 "the job takes about {}, and this machine has {} free; end other programs, or lower [limits] threads or \
-                 [triangulation] max_points_per_tile (--force goes on all the same)",
+                 [triangulation] max_points_per_tile (--force runs it anyway)",
                 mebibytes(self.memory),
                 mebibytes(free)
             ))),
             None => Ok(()),
         }
     }
-}
-
-fn mebibytes(bytes: u64) -> String {
-    format!("{} MiB", grouped(bytes >> 20))
 }
 
 impl fmt::Display for Preflight {
@@ -249,8 +150,8 @@ impl fmt::Display for Preflight {
         row("memory", format!("about {memory} of {limit}, {} free", free(self.memory_free)))?;
         row("temporary files", format!("about {}", mebibytes(self.temporary)))?;
         row("results", format!("about {}", mebibytes(self.results)))?;
-        row("disk", format!("about {} at least, {} free", mebibytes(self.disk), free(self.disk_free)))?;
-        for warning in &self.warnings {
+        row("disk", format!("at least about {}, {} free", mebibytes(self.disk), free(self.disk_free)))?;
+        for warning in self.warnings.iter() {
             writeln!(f, "warning: {warning}")?;
         }
         write_skipped(f, self.files.len(), &self.skipped)

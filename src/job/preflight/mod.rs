@@ -1,3 +1,4 @@
-//! Whether a job fits.
+//! Preflight: what a job would read and need, found out without writing anything.
 
 pub mod check;
+pub mod estimate;

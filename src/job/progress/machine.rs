@@ -1,48 +1,113 @@
 //! What the machine has to offer, as far as it tells.
 
 use crate::{Error, Result};
-use std::path::Path;
+use std::fs;
+use std::path::{Path, PathBuf};
 
-/// Bytes free where `directory` is, or will be; `None` where the system does not tell.
+/// Returns the free bytes on the disk of `directory`, which need not exist yet; `None` if the system does not tell.
 pub(crate) fn free_disk(directory: &Path) -> Option<u64> {
-    fs4::available_space(existing(directory)).ok()
+    fs4::available_space(nearest_existing(directory)).ok()
 }
 
-/// Whether a file can be made where `directory` is, or will be. Leaves nothing behind.
+/// Checks that a file can be made on the disk of `directory`, which need not exist yet. Leaves nothing behind.
 ///
 /// # Errors
-/// [`Error::Io`] if not.
+/// [`Error::Io`] if no file can be made.
 pub(crate) fn check_writable(directory: &Path) -> Result<()> {
-    tempfile::tempfile_in(existing(directory)).map(drop).map_err(Error::io("write to", directory))
+    tempfile::tempfile_in(nearest_existing(directory)).map(drop).map_err(Error::io("write to", directory))
 }
 
-/// The nearest of it and what is above it that is there already.
-fn existing(directory: &Path) -> &Path {
+/// Returns the directory, or the nearest one above it that exists.
+fn nearest_existing(directory: &Path) -> &Path {
     directory.ancestors().find(|d| d.exists()).unwrap_or(Path::new("."))
 }
 
-/// Bytes of memory that a process can have without others being swapped out; `None` where the system does not tell.
+/// Returns the bytes of memory that this process can have before the system swaps or kills; `None` if the system does not tell.
 pub(crate) fn free_memory() -> Option<u64> {
-    let table = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let table = fs::read_to_string("/proc/meminfo").ok()?;
     let machine = kibibytes(&table, "MemAvailable:")? * 1024;
-    Some(group_memory().map_or(machine, |group| group.min(machine)))
+    let groups = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
+    Some(free_in_groups(&groups, Path::new("/sys/fs/cgroup")).map_or(machine, |free| free.min(machine)))
 }
 
-/// What the limit of a container, if there is one, leaves.
-fn group_memory() -> Option<u64> {
-    let number =
-        |name: &str| std::fs::read_to_string(format!("/sys/fs/cgroup/{name}")).ok()?.trim().parse::<u64>().ok();
-    Some(number("memory.max")?.saturating_sub(number("memory.current")?))
+/// Returns the bytes that the control groups of this process leave, as the kernel's table `groups` names them below `root`. The
+/// limit of every group above counts too: Slurm and containers set it on one of them.
+fn free_in_groups(groups: &str, root: &Path) -> Option<u64> {
+    // Version 2 has one hierarchy, number 0, without controllers. Version 1 has one for memory.
+    let free_in = |line: &str| {
+        let mut fields = line.splitn(3, ':');
+        let (number, controllers, path) = (fields.next()?, fields.next()?, fields.next()?);
+        if number == "0" && controllers.is_empty() {
+            least_free(root, path, ["memory.max", "memory.current"])
+        } else if controllers.split(',').any(|controller| controller == "memory") {
+            least_free(&root.join("memory"), path, ["memory.limit_in_bytes", "memory.usage_in_bytes"])
+        } else {
+            None
+        }
+    };
+    groups.lines().filter_map(free_in).min()
 }
 
-/// The largest resident set of this process so far, in bytes; `None` where the system does not tell.
+/// Returns the least that any group from `root` down to `path` leaves. `files` names the limit and the usage.
+fn least_free(root: &Path, path: &str, files: [&str; 2]) -> Option<u64> {
+    let number = |file: PathBuf| fs::read_to_string(file).ok()?.trim().parse::<u64>().ok();
+    let free = |group: &Path| {
+        let [limit, usage] = files.map(|name| number(group.join(name)));
+        Some(limit?.saturating_sub(usage?))
+    };
+    // A container may see its own group as the root, whatever the path says.
+    let own = root.join(path.trim_start_matches('/'));
+    own.ancestors().take_while(|group| group.starts_with(root)).filter_map(free).min()
+}
+
+/// Returns the largest resident set of this process so far in bytes; `None` if the system does not tell.
 pub(crate) fn peak_memory() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let status = fs::read_to_string("/proc/self/status").ok()?;
     kibibytes(&status, "VmHWM:").map(|kibibytes| kibibytes * 1024)
 }
 
-/// The number after `name` in a table of the kernel's.
+/// Returns the number after `name` in one of the kernel's tables.
 fn kibibytes(table: &str, name: &str) -> Option<u64> {
     let line = table.lines().find(|line| line.starts_with(name))?;
     line.split_whitespace().nth(1)?.parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn group(root: &Path, path: &str, names: [&str; 2], values: [&str; 2]) {
+        let folder = root.join(path);
+        fs::create_dir_all(&folder).unwrap();
+        names.iter().zip(values).for_each(|(name, value)| fs::write(folder.join(name), value).unwrap());
+    }
+
+    #[test]
+    fn the_tightest_group_above_the_process_limits_its_memory() {
+        let root = tempfile::tempdir().unwrap();
+        let names = ["memory.max", "memory.current"];
+        group(root.path(), "slurm", names, ["max\n", "900\n"]);
+        group(root.path(), "slurm/job_7", names, ["1000\n", "300\n"]);
+        group(root.path(), "slurm/job_7/task_0", names, ["max\n", "100\n"]);
+        group(root.path(), "other", names, ["10\n", "0\n"]);
+        assert_eq!(free_in_groups("0::/slurm/job_7/task_0\n", root.path()), Some(700));
+        assert_eq!(free_in_groups("0::/slurm\n", root.path()), None, "no group has a limit");
+        assert_eq!(free_in_groups("0::/gone/elsewhere\n", root.path()), None);
+        assert_eq!(free_in_groups("", root.path()), None);
+    }
+
+    #[test]
+    fn groups_of_version_1_count_too() {
+        let root = tempfile::tempdir().unwrap();
+        group(root.path(), "memory/a/b", ["memory.limit_in_bytes", "memory.usage_in_bytes"], ["500\n", "600\n"]);
+        let groups = "12:cpu,cpuacct:/a\n7:hugetlb,memory:/a/b\n0::/\n";
+        assert_eq!(free_in_groups(groups, root.path()), Some(0));
+    }
+
+    #[test]
+    fn a_container_sees_its_own_group_as_the_root() {
+        let root = tempfile::tempdir().unwrap();
+        group(root.path(), "", ["memory.max", "memory.current"], ["5000\n", "2000\n"]);
+        assert_eq!(free_in_groups("0::/../../docker/abc\n", root.path()), Some(3000));
+    }
 }

@@ -1,5 +1,9 @@
-//! How far a job is. It knows no step.
+//! How far a job is, how long it will take, and what the machine has left. Nothing here knows what a step does.
 
+pub(crate) mod activity;
+pub mod clock;
 pub mod machine;
 pub mod stage;
-pub mod time_left;
+pub mod stats;
+pub mod text;
+pub(crate) mod time_left;

@@ -1,5 +1,6 @@
-//! Step 8: what stands beside the tiles.
+//! Step 8: writes what is beside the tiles.
 
-pub mod finish;
+pub mod limits;
 pub mod placement;
-pub mod tileset;
+pub mod side_files;
+pub mod tileset_tree;

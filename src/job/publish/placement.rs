@@ -1,49 +1,64 @@
-//! Where the terrain lies on the globe: the transforms of `tileset.json`, and how far they are off where the plane is not a plane.
+//! Placing the terrain on the globe: the transforms of `tileset.json`, and how far off they are because the earth is curved.
 
-use crate::job::plan::scan::Plan;
+use crate::input::Crs;
 use crate::output::frame::Frame;
 use crate::output::tiles3d::globe::{Globe, applied};
 use crate::output::tiles3d::tileset::{Node, corners};
 use serde::Serialize;
 
-/// Places along each side at which the distortion is measured, both ends among them, where it is greatest.
+/// The number of places along each side at which the distortion is measured. Both ends are among them: there it is greatest.
 const PLACES: usize = 9;
 
-/// Up to so many metres off, one transform places all tiles, which then meet exactly: no farther off than what datums are taken for
-/// that of the globe. Beyond it every tile has its own transform.
+/// The greatest distortion in metres with which one transform places all tiles, so that they meet exactly. Datums that differ from the
+/// globe's by as much are accepted too. Beyond it every tile has a transform of its own.
 const ONE_TRANSFORM: f64 = 1.0;
 
 /// What `georeference.json` says of the globe.
 #[derive(Clone, Debug, Serialize)]
 pub struct Placement {
-    /// The projected system in the way of PROJ.4.
+    /// The projected system as a PROJ.4 string.
     pub definition: String,
     /// The transform of the tileset's root: metres east, north and up in the scene to earth-centred ones, column by column.
     pub transform: [f64; 16],
     /// Whether the tiles below the root have transforms of their own.
     pub per_tile: bool,
-    /// The greatest distance in metres between where the tileset puts a place of an exact tile's box and where it belongs.
+    /// The greatest distance in metres between where the tileset puts a place of an exact tile and where it belongs.
     pub distortion_m: f64,
-    /// What heights are counted from, where the inputs say; they are taken as heights above the ellipsoid all the same.
+    /// What the heights count from, if the inputs say. The tileset takes them as heights above the ellipsoid anyway.
     pub vertical_datum: Option<String>,
     /// Metres added to heights.
     pub height_offset: f64,
+}
+
+/// Why a terrain cannot be placed on the globe.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct NotPlaced(String);
+
+impl From<String> for NotPlaced {
+    fn from(why: String) -> NotPlaced {
+        NotPlaced(why)
+    }
 }
 
 /// The way from the scene to the globe.
 struct Ground<'a> {
     frame: &'a Frame,
     globe: Globe,
-    /// Metres that the scene's origin is above the ellipsoid.
+    /// The height of the scene's origin above the ellipsoid in metres.
     base: f64,
 }
 
-/// Places `root` and, where need be, each tile below; a sentence where there is no way, and then nothing is placed.
-pub fn place(plan: &Plan, frame: &Frame, height_offset: f64, root: &mut Node) -> Result<Placement, String> {
-    let definition = plan.crs.definition().ok_or_else(|| match &plan.crs.name {
+/// Places `root`, and each tile below if need be. `height_offset` is added to heights, in metres.
+///
+/// # Errors
+/// [`NotPlaced`] says why the terrain cannot be placed; then nothing is.
+pub fn place(crs: &Crs, frame: &Frame, height_offset: f64, root: &mut Node) -> Result<Placement, NotPlaced> {
+    let definition = crs.definition().ok_or_else(|| match &crs.name {
         Some(name) => format!("{name} has no definition that leads to longitude and latitude"),
         None => "no input names its coordinate system".to_string(),
-    })?;
+    });
+    let definition = definition.map_err(NotPlaced)?;
     let extras = frame.extras();
     let globe = Globe::new(&definition, extras.metres_per_unit)?;
     let ground = Ground { frame, globe, base: extras.offset[2] * extras.metres_per_unit_z + height_offset };
@@ -51,28 +66,21 @@ pub fn place(plan: &Plan, frame: &Frame, height_offset: f64, root: &mut Node) ->
     let mut distortion_m = ground.distortion(&transform, root.bounds)?;
     let per_tile = distortion_m > ONE_TRANSFORM && !root.children.is_empty();
     if per_tile {
-        // Of a copy, since none is placed if one cannot be.
+        // A copy, because no tile is placed if one cannot be.
         let mut placed = root.clone();
         distortion_m = ground.lay(&mut placed)?;
         *root = placed;
     }
     root.transform = Some(transform);
-    Ok(Placement {
-        definition,
-        transform,
-        per_tile,
-        distortion_m,
-        vertical_datum: plan.crs.vertical_name(),
-        height_offset,
-    })
+    Ok(Placement { definition, transform, per_tile, distortion_m, vertical_datum: crs.vertical_name(), height_offset })
 }
 
 impl Ground<'_> {
-    /// Gives every tile from `node` down a transform of its own; returns the distortion of the exact ones.
+    /// Gives every tile from `node` down a transform of its own, and returns the greatest distortion of the exact ones.
     ///
-    /// The same place is then elsewhere in a tile than in the exact one below it, by at most the distortion of both, and a viewer
-    /// that shows the coarser tile shows that too: so it counts in the error, as what was lost in height does.
-    fn lay(&self, node: &mut Node) -> Result<f64, String> {
+    /// A place is then not quite where it is in the exact tile below, by at most the distortion of both tiles. A viewer that shows
+    /// the coarser tile shows that error too, so it is added to the vertical error.
+    fn lay(&self, node: &mut Node) -> Result<f64, NotPlaced> {
         let transform = self.tangent(node.middle)?;
         let own = self.distortion(&transform, node.bounds)?;
         node.transform = Some(transform);
@@ -88,25 +96,25 @@ impl Ground<'_> {
         Ok(exact)
     }
 
-    /// The source's x and y at a place of the scene.
+    /// Returns the source's x and y at a place of the scene.
     fn source(&self, place: [f64; 2]) -> [f64; 2] {
         let extras = self.frame.extras();
         [0, 1].map(|k| extras.offset[k] + place[k] / extras.metres_per_unit)
     }
 
-    /// The map from the scene to the globe that is exact to first order at a lattice place, at the height of the scene's origin.
-    fn tangent(&self, [x, y]: [i32; 2]) -> Result<[f64; 16], String> {
+    /// Returns the map from the scene to the globe that is exact to first order at a lattice point, at the height of the scene's origin.
+    fn tangent(&self, [x, y]: [i32; 2]) -> Result<[f64; 16], NotPlaced> {
         let [[east, north, _], _] = corners(self.frame, [[x, y, 0]; 2]);
         let [source_x, source_y] = self.source([east, north]);
         let mut transform = self.globe.tangent(source_x, source_y, self.base)?;
-        // From the tangent's origin to the scene's.
+        // Move the origin from the tangent's to the scene's.
         let origin = applied(&transform, [-east, -north, 0.0]);
         transform[12..15].copy_from_slice(&origin);
         Ok(transform)
     }
 
-    /// The greatest distance in metres between where `transform` puts a place within `bounds` and where it belongs.
-    fn distortion(&self, transform: &[f64; 16], bounds: [[i32; 3]; 2]) -> Result<f64, String> {
+    /// Returns the greatest distance in metres between where `transform` puts a place within `bounds` and where it belongs.
+    fn distortion(&self, transform: &[f64; 16], bounds: [[i32; 3]; 2]) -> Result<f64, NotPlaced> {
         let [low, high] = corners(self.frame, bounds);
         let mut greatest = 0.0f64;
         for i in 0..PLACES * PLACES * 2 {
@@ -122,8 +130,8 @@ impl Ground<'_> {
     }
 }
 
-/// What the user should know of the placement.
-pub fn remark(placement: &Result<Placement, String>) -> Option<String> {
+/// Returns what the user should know about the placement.
+pub fn placement_warning(placement: &Result<Placement, NotPlaced>) -> Option<String> {
     let placement = match placement {
         Err(why) => {
             return Some(format!("tileset.json is not placed on the globe: {why}; its coordinates are local"));
@@ -133,9 +141,9 @@ pub fn remark(placement: &Result<Placement, String>) -> Option<String> {
     let (flat, off) = (if placement.per_tile { "each tile" } else { "the only tile" }, placement.distortion_m);
     (off > ONE_TRANSFORM).then(|| {
         format!(
-            "in tileset.json {flat} lies flat on the tangent plane at its middle, which is up to {off:.1} m off the curved earth; \
-             smaller tiles follow it more closely: lower [triangulation] max_points_per_tile, and leave long triangles along the hull out \
-             with [output] max_edge"
+            "in tileset.json {flat} lies flat on the tangent plane at its middle, up to {off:.1} m off the curved earth; smaller tiles \
+             follow it more closely: lower [triangulation] max_points_per_tile, and leave out long triangles along the hull with \
+             [output] max_edge"
         )
     })
 }

@@ -1,105 +1,105 @@
-//! Steps 3 to 6 of a job, woven into each other: tiles that need no node above are stitched and written while others are still
+//! Running steps 3 to 6 at the same time: tiles that no node above can change are finished and written while others are still
 //! triangulated and merged.
 
 use crate::Result;
-use crate::job::Job;
-use crate::job::durable::journal::{Mark, Step};
-use crate::job::mesh::leaf::LeafFigures;
-use crate::job::mesh::precision_limit::Longest;
-use crate::job::partition::point_file::Spill;
-use crate::job::partition::read::Partition;
-use crate::job::plan::scan::Plan;
-use crate::job::preflight::check;
-use crate::job::progress::stage::StageFigures;
-use crate::job::run::tile_queue::{TileWriter, WrittenTiles};
-use crate::job::run::tree_walk::Grower;
-use crate::job::tiles::max_edge::Cut;
-use crate::job::{beside, look};
+use crate::geometry::Bounds;
+use crate::job::durable::journal::JournalPosition;
+use crate::job::index::NodeIndex;
+use crate::job::mesh::leaf::LeafStats;
+use crate::job::partition::point_file::PointFile;
+use crate::job::partition::result::Partition;
+use crate::job::plan::job_plan::Plan;
+use crate::job::preflight::estimate::has_room_besides_points;
+use crate::job::publish::limits::MAX_TRIANGLES_IN_ONE_FILE;
+use crate::job::records::JobStep;
+use crate::job::run::context::RunContext;
+use crate::job::run::threads::run_concurrently;
+use crate::job::run::tile_queue::{TileQueue, WrittenTiles};
+use crate::job::run::tree_walk::TreeWalk;
+use crate::job::tiles::max_edge::MaxEdgeRule;
+use crate::job::tiles::style::TileStyle;
 use crate::output::options::MaxEdge;
 use crate::output::preview::canvas::Canvas;
 
-/// The whole mesh, in tiles.
-pub(crate) struct Mesh {
-    pub(crate) leaves: LeafFigures,
+/// The whole mesh, written as tiles.
+pub(crate) struct MeshInTiles {
+    pub(crate) leaves: LeafStats,
     pub(crate) tiles: WrittenTiles,
-    pub(crate) triangulated: StageFigures,
     /// Where the journal has all leaves and merges.
-    pub(crate) grown: Mark,
+    pub(crate) all_leaves: JournalPosition,
 }
 
-impl Job<'_> {
-    /// Triangulates all leaves, merges their frontiers and writes the tiles.
-    pub(crate) fn weave(
-        &self,
-        plan: &Plan,
-        partition: &Partition,
-        bounds: [[i32; 3]; 2],
-        longest: Longest,
-    ) -> Result<Mesh> {
-        let stage = self.progress.stage("mesh", partition.summary.tally.kept, "points");
-        let strand = self.progress.strand("triangulate", "points");
-        let writer = TileWriter::new(self, partition, &stage);
-        let grower = Grower {
-            job: self,
-            partition,
-            spill: self.spill(partition)?,
-            longest,
-            stage: &stage,
-            strand: &strand,
-            writer: &writer,
-        };
-        let style = |sites| {
-            let cut = self.cut(plan, partition, bounds, sites)?;
-            let look = look(self.config, plan, &partition.summary, bounds, cut);
-            let canvas = Canvas::new(&look.frame, bounds);
-            Ok((look, canvas))
-        };
-        let at_once = self.may_write_at_once(plan);
-        let leaves = rayon::scope(|scope| {
-            if at_once {
-                // How many sites there are matters only to what has to wait.
-                writer.attempt(|| writer.begin(scope, style(0)?))?;
-            }
-            let leaves = grower.grow(scope, 0)?;
-            let grown = self.journal.mark();
-            // With it the points are closed: an open file is not freed when it is removed.
-            drop(grower);
-            if !at_once {
-                // Not beside the writing: where the disk is small, the results need the room.
-                let style = || beside(|| self.give_up_points(grown), || style(leaves.sites));
-                writer.attempt(|| writer.begin(scope, style()?))?;
-            }
-            Some((leaves, grown))
-        });
-        let tiles = writer.finish()?;
-        let (leaves, grown) = leaves.unwrap_or_default();
-        let triangulated = strand.finish();
-        stage.finish();
-        Ok(Mesh { leaves, tiles, triangulated, grown })
-    }
-
-    /// The points, as long as there is a leaf to be done.
-    fn spill(&self, partition: &Partition) -> Result<Option<Spill>> {
-        let all_there = (0..partition.tree.leaves.len()).all(|tile| self.journal.has(Step::Leaf(tile)));
-        if all_there { Ok(None) } else { Spill::open(&self.directory.spill()).map(Some) }
-    }
-
-    /// Whether tiles may be written before all are triangulated: not where that takes the place of what an earlier job has made, as
-    /// this one may still fail; nor where how tiles look depends on all of them; nor where the disk has no room for them beside
-    /// the points.
-    fn may_write_at_once(&self, plan: &Plan) -> bool {
-        !self.directory.report().exists()
-            && self.config.output.max_edge != MaxEdge::Auto
-            && check::has_room_beside_points(plan, self.config)
-    }
-
-    /// Which triangles are left out.
-    fn cut(&self, plan: &Plan, partition: &Partition, bounds: [[i32; 3]; 2], sites: u64) -> Result<Cut> {
-        let tiles = partition.tree.leaves.len();
-        if (0..tiles).all(|tile| self.journal.has(Step::Export(tile))) {
-            // Nobody asks, and what there is to count may be gone.
-            return Ok(Cut::Nothing);
+/// Triangulates all leaves, merges their frontiers and writes the tiles.
+///
+/// # Errors
+/// Those of the four steps.
+pub(crate) fn mesh_and_tiles(
+    run: &RunContext,
+    plan: &Plan,
+    partition: &Partition,
+    bounds: Bounds<3>,
+) -> Result<MeshInTiles> {
+    let stage = run.progress.stage("mesh", partition.summary.counts.kept, "points");
+    let activity = run.progress.activity("triangulate", "points");
+    let queue = TileQueue::new(run, partition, &stage);
+    let points = open_points(run, partition)?;
+    let walk = TreeWalk { run, plan, partition, points, stage: &stage, activity: &activity, queue: &queue };
+    let style = |sites| {
+        let max_edge = max_edge_rule(run, plan, partition, bounds, sites)?;
+        let style = TileStyle::new(plan, &partition.summary, bounds, max_edge);
+        let canvas = Canvas::new(&style.frame, [bounds.min, bounds.max]);
+        Ok((style, canvas))
+    };
+    let writes_at_once = may_write_at_once(run, plan);
+    let walked = rayon::scope(|scope| {
+        if writes_at_once {
+            // The number of sites matters only to a rule for which the tiles have to wait.
+            queue.attempt(|| style(0).and_then(|(style, canvas)| queue.begin(scope, style, canvas)))?;
         }
-        Cut::new(self.config.output.max_edge, &plan.frame, self.store, [tiles as u64, sites], bounds)
+        let leaves = walk.walk(scope, NodeIndex::ROOT)?;
+        let all_leaves = run.journal.position();
+        // This closes the point file: an open file is not freed when it is removed.
+        drop(walk);
+        if !writes_at_once {
+            // Not while tiles are written: on a small disk the results need the room.
+            let style = || run_concurrently(|| run.remove_points(all_leaves), || style(leaves.sites));
+            queue.attempt(|| style().and_then(|(style, canvas)| queue.begin(scope, style, canvas)))?;
+        }
+        Some((leaves, all_leaves))
+    });
+    run.add_stage(activity.finish());
+    let tiles = queue.finish()?;
+    let (leaves, all_leaves) = walked.unwrap_or_default();
+    stage.finish();
+    Ok(MeshInTiles { leaves, tiles, all_leaves })
+}
+
+/// Opens the point file if a leaf is still to be done.
+fn open_points(run: &RunContext, partition: &Partition) -> Result<Option<PointFile>> {
+    let all_done = partition.tree.tiles().all(|tile| run.journal.has(JobStep::Leaf(tile)));
+    if all_done { Ok(None) } else { PointFile::open(&run.directory.points()).map(Some) }
+}
+
+/// Tells whether tiles may be written before all are triangulated. They must wait if they replace the results of an earlier job,
+/// because this one may still fail; if all sites decide how a tile looks; and if the disk has no room for them besides the points.
+fn may_write_at_once(run: &RunContext, plan: &Plan) -> bool {
+    !run.directory.output().report().exists()
+        && plan.options.output.max_edge != MaxEdge::Auto
+        && has_room_besides_points(plan, MAX_TRIANGLES_IN_ONE_FILE)
+}
+
+/// Returns the rule that leaves triangles out.
+fn max_edge_rule(
+    run: &RunContext,
+    plan: &Plan,
+    partition: &Partition,
+    bounds: Bounds<3>,
+    sites: u64,
+) -> Result<MaxEdgeRule> {
+    if partition.tree.tiles().all(|tile| run.journal.has(JobStep::WriteTile(tile))) {
+        // No step needs the rule, and the leaves that it counts may be gone.
+        return Ok(MaxEdgeRule::KeepAll);
     }
+    let (choice, tiles) = (plan.options.output.max_edge, partition.tree.leaves.len());
+    MaxEdgeRule::new(choice, &plan.frame, run.store, tiles, sites, bounds)
 }

@@ -1,6 +1,13 @@
-//! Runs the steps.
+//! Running the steps of a job in this process: the only room that knows all of them.
 
-pub mod local_run;
+pub(crate) mod attempt;
+pub(crate) mod context;
+pub(crate) mod levels_step;
+pub(crate) mod local_run;
+pub(crate) mod publish_step;
+pub(crate) mod read_step;
 pub mod resume;
-pub mod tile_queue;
-pub mod tree_walk;
+pub(crate) mod stage_costs;
+pub mod threads;
+pub(crate) mod tile_queue;
+pub(crate) mod tree_walk;

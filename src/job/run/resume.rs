@@ -1,234 +1,285 @@
-//! Going on with a job that was interrupted: which of its steps stay, and what must be done again.
+//! Going on with an interrupted job: which of its steps stay, and which must run again.
 //!
-//! A step stays if what it left is there and whole, or if nothing needs that any more. Steps depend on nothing but the job,
-//! so a step that is done again leaves the same as before, and the steps after it stay.
+//! A step stays if everything that it wrote is there and whole, or if nothing needs that any more. The output of a step depends on
+//! nothing but the job. So a step that runs again writes the same as before, and the steps after it stay.
 
-use crate::job::Options;
-use crate::job::durable::directory::Directory;
-use crate::job::durable::journal::{self, Entry, Journal, Step};
-use crate::job::durable::store::{Store, Stored};
+use crate::job::durable::directory::{JobDirectory, STORE_FILES};
+use crate::job::durable::journal;
+use crate::job::index::{NodeIndex, TileIndex};
 use crate::job::options::JobOptions;
-use crate::job::partition::point_file::Spill;
-use crate::job::partition::read::Partition;
-use crate::job::plan::fingerprint::{Change, Fingerprint, Head};
-use crate::job::plan::lattice_choice::Coarser;
-use crate::job::progress::stage::{Progress, Stage};
-use crate::job::report::Report;
+use crate::job::partition::point_file::PointFile;
+use crate::job::partition::result::Partition;
+use crate::job::plan::fingerprint::{Fingerprint, JobChange, JobHeader};
+use crate::job::plan::job_plan::Plan;
+use crate::job::plan::lattice_choice::LatticeCoarsening;
+use crate::job::progress::stage::{ProgressOutput, Stage};
+use crate::job::records::{JobStep, Journal, JournalEntry, RecordRef, Store};
+use crate::job::report::job_report::Report;
 use crate::output::options::MaxEdge;
 use crate::{Error, Result, interrupt};
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 
-/// Where a run begins.
-pub struct Start<'a> {
-    /// Holds what the finished steps have left.
-    pub store: Store,
-    /// Knows which steps are finished.
-    pub journal: Journal<'a>,
-    /// What step 2 came to, if that is one of them.
-    pub partition: Option<Partition>,
-    /// The files, by name, that finished steps have left and that stay.
-    pub files: HashSet<PathBuf>,
-    /// Whether finished steps have left a part of the results.
-    pub parts: bool,
+/// An earlier run of a job in the same directory, as its journal tells. The journal is read once.
+pub struct EarlierRun {
+    header: JobHeader,
+    entries: Vec<JournalEntry>,
+    /// Whether the run left a part of its results. Before it wrote them, it removed those of the job before, with their report.
+    has_partial_results: bool,
 }
 
-/// How much coarser than at first the lattice of the interrupted job became, if it is the same job.
-///
-/// # Errors
-/// [`Error::Io`] if its journal cannot be read.
-pub fn coarser(directory: &Directory, fingerprint: &Fingerprint) -> Result<Coarser> {
-    let same = |head: &Head| !matches!(fingerprint.since(&head.fingerprint), Change::Mesh(_));
-    let head = journal::read(directory)?.map(|(head, _)| head);
-    Ok(head.filter(same).map(|head| head.coarser).unwrap_or_default())
-}
-
-/// The report of the job `head`, if the run that the directory holds was interrupted only while it cleaned up.
-///
-/// # Errors
-/// [`Error::Io`] if its journal cannot be read.
-pub fn complete(directory: &Directory, head: &Head) -> Result<Option<Report>> {
-    let Some((old, entries)) = journal::read(directory)? else { return Ok(None) };
-    let is_written = entries
-        .iter()
-        .any(|entry| entry.step == Step::Report && entry.results.iter().all(|file| file.is_whole(directory)));
-    if !is_written || old.coarser != head.coarser || head.fingerprint.since(&old.fingerprint) != Change::Nothing {
-        return Ok(None);
+impl EarlierRun {
+    /// Reads the journal in the job directory, if there is one.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be read.
+    pub fn read(directory: &JobDirectory) -> Result<Option<EarlierRun>> {
+        let read = journal::read::<JobHeader, JobStep, _>(directory)?;
+        Ok(read.map(|(header, entries)| {
+            let wrote_tiles = entries.iter().any(|entry: &JournalEntry| matches!(entry.step, JobStep::WriteTile(_)));
+            let has_partial_results = wrote_tiles && !directory.output().report().exists();
+            EarlierRun { header, entries, has_partial_results }
+        }))
     }
-    let text = std::fs::read(directory.report()).map_err(Error::io("read", directory.report()))?;
-    Ok(serde_json::from_slice(&text).ok())
+
+    /// Forgets all steps, so that the job starts over.
+    pub fn forget_steps(&mut self) {
+        self.entries.clear();
+    }
+
+    /// Tells whether the job with this fingerprint has the same mesh.
+    fn has_mesh_of(&self, fingerprint: &Fingerprint) -> bool {
+        !self.entries.is_empty() && !matches!(fingerprint.since(&self.header.fingerprint), JobChange::Mesh(_))
+    }
+
+    /// Returns how much coarser the lattice became, if the job with this fingerprint has the same mesh.
+    pub fn coarsening(&self, fingerprint: &Fingerprint) -> LatticeCoarsening {
+        if self.has_mesh_of(fingerprint) { self.header.coarsening } else { LatticeCoarsening::default() }
+    }
+
+    /// Returns the plan that the run wrote, with the present `options`, if it is whole and the mesh is that of the job with
+    /// `header`.
+    pub fn plan(&self, directory: &JobDirectory, header: &JobHeader, options: &JobOptions) -> Option<Plan> {
+        let entry = self.entries.iter().find(|entry| entry.step == JobStep::Partition)?;
+        let is_same = self.header.coarsening == header.coarsening && self.has_mesh_of(&header.fingerprint);
+        let plan = is_same && entry.files.iter().all(|file| file.is_whole(directory));
+        let plan = plan.then(|| Plan::read(&directory.plan()).ok())??;
+        Some(Plan { options: options.clone(), ..plan })
+    }
+
+    /// Returns the report of the job with `header` if the run was interrupted only while it cleaned up.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the report cannot be read.
+    pub fn complete_report(&self, directory: &JobDirectory, header: &JobHeader) -> Result<Option<Report>> {
+        let is_written = |entry: &JournalEntry| {
+            entry.step == JobStep::Report && entry.files.iter().all(|file| file.is_whole(directory))
+        };
+        let is_same = self.header.coarsening == header.coarsening
+            && header.fingerprint.since(&self.header.fingerprint) == JobChange::Nothing;
+        if !is_same || !self.entries.iter().any(is_written) {
+            return Ok(None);
+        }
+        let path = directory.output().report();
+        let text = std::fs::read(&path).map_err(Error::io("read", &path))?;
+        Ok(serde_json::from_slice(&text).ok())
+    }
 }
 
-/// Begins the run of the job `head`, that of `config`, in its locked directory: goes on with the one that the directory holds, as
-/// far as it is the same and whole, and removes all else.
+/// Where a run begins.
+pub struct RunStart<'a> {
+    /// What the finished steps stored.
+    pub store: Store,
+    /// Which steps are finished.
+    pub journal: Journal<'a>,
+    /// What reading the points found, if that is finished.
+    pub partition: Option<Partition>,
+    /// The files that stay, as the journal names them.
+    pub kept: HashSet<PathBuf>,
+    /// Whether the output directory holds a part of the results.
+    pub has_partial_results: bool,
+}
+
+/// Begins a run of the job with `header` in its locked directory: takes over what is the same and whole from the earlier run, and
+/// removes everything else.
 ///
 /// # Errors
 /// [`Error::Io`] on the job directory.
-pub fn start<'a>(directory: &'a Directory, head: &Head, config: &JobOptions, options: Options) -> Result<Start<'a>> {
-    let progress = options.progress;
-    let kept = if options.fresh { None } else { kept(directory, head, config, progress)? };
-    let kept = kept.unwrap_or_default();
-    let parts = has_parts(directory)?;
-    if parts && kept.entries.is_empty() {
-        // Once the old journal is gone nobody knows whose they are.
-        directory.sweep_results(&HashSet::new())?;
+pub fn start<'a>(
+    directory: &'a JobDirectory,
+    header: &JobHeader,
+    earlier: Option<EarlierRun>,
+    max_edge: MaxEdge,
+    progress: ProgressOutput,
+) -> Result<RunStart<'a>> {
+    let has_partial_results = earlier.as_ref().is_some_and(|earlier| earlier.has_partial_results);
+    let kept = earlier.map(|earlier| review(directory, header, earlier, max_edge, progress)).transpose()?;
+    let KeptSteps { entries, files, partition } = kept.flatten().unwrap_or_default();
+    if has_partial_results && entries.is_empty() {
+        // Once the old journal is gone, nothing tells whose results they are.
+        directory.remove_results(&HashSet::new())?;
     }
-    if !kept.entries.is_empty() {
-        progress.note(&format!("going on with an interrupted run: {} steps are done", kept.entries.len()));
+    if !entries.is_empty() {
+        progress.note(&format!("going on with an interrupted run: {} steps are done", entries.len()));
     }
-    let stored: Vec<Stored> = kept.entries.iter().flat_map(|entry| &entry.stored).copied().collect();
-    let journal = Journal::begin(directory, head, kept.entries)?;
-    directory.sweep_job(&kept.files)?;
-    let paths = directory.store();
-    let store = if stored.is_empty() { Store::create(paths)? } else { Store::open(paths, stored.iter())? };
-    Ok(Start { store, journal, partition: kept.partition, files: kept.files, parts })
+    let records: Vec<RecordRef> = entries.iter().flat_map(|entry| &entry.records).copied().collect();
+    let journal = Journal::begin(directory, header, entries)?;
+    directory.remove_job_files(&files)?;
+    let paths: [PathBuf; STORE_FILES] = directory.store();
+    let store = if records.is_empty() { Store::create(paths)? } else { Store::open(paths, records.iter())? };
+    Ok(RunStart { store, journal, partition, kept: files, has_partial_results })
 }
 
-/// Whether an interrupted run has left a part of its results. Before that, those of an earlier job have made way, report and all.
-fn has_parts(directory: &Directory) -> Result<bool> {
-    let is_export = |entry: &Entry| matches!(entry.step, Step::Export(_));
-    let exported = journal::read(directory)?.is_some_and(|(_, entries)| entries.iter().any(is_export));
-    Ok(exported && !directory.report().exists())
-}
-
-/// What stays.
+/// The steps that stay, and what they left.
 #[derive(Default)]
-struct Kept {
-    entries: Vec<Entry>,
-    /// The files, by name, that the steps to come need.
+struct KeptSteps {
+    entries: Vec<JournalEntry>,
+    /// The files that later steps need, as the journal names them.
     files: HashSet<PathBuf>,
     partition: Option<Partition>,
 }
 
-fn kept(directory: &Directory, head: &Head, config: &JobOptions, progress: Progress) -> Result<Option<Kept>> {
-    let Some((old, mut entries)) = journal::read(directory)? else { return Ok(None) };
-    if entries.is_empty() || old.coarser != head.coarser {
+/// Returns the steps of an earlier run that stay, or `None` if the job starts over.
+fn review(
+    directory: &JobDirectory,
+    header: &JobHeader,
+    earlier: EarlierRun,
+    max_edge: MaxEdge,
+    progress: ProgressOutput,
+) -> Result<Option<KeptSteps>> {
+    let EarlierRun { header: old, mut entries, .. } = earlier;
+    if entries.is_empty() || old.coarsening != header.coarsening {
         return Ok(None);
     }
-    match head.fingerprint.since(&old.fingerprint) {
-        Change::Nothing => {}
-        Change::Look(what) => {
+    match header.fingerprint.since(&old.fingerprint) {
+        JobChange::Nothing => {}
+        JobChange::Style(what) => {
             progress.note(&format!("changed since the interrupted run: {what}; the tiles are written again"));
-            entries.retain(|entry| matches!(entry.step, Step::Partition | Step::Leaf(_) | Step::Node(_)));
+            let is_mesh = |step| matches!(step, JobStep::Partition | JobStep::Leaf(_) | JobStep::Merge(_));
+            entries.retain(|entry| is_mesh(entry.step));
         }
-        Change::Mesh(what) => {
+        JobChange::Mesh(what) => {
             progress.note(&format!("changed since the interrupted run: {what}; starting over"));
             return Ok(None);
         }
     }
-    if head.fingerprint.memory != old.fingerprint.memory {
-        // Coarser tiles for which the memory does not suffice are left out.
-        entries.retain(|entry| !matches!(entry.step, Step::Level(_) | Step::Finish | Step::Report));
+    if header.fingerprint.memory != old.fingerprint.memory {
+        // Coarser tiles that do not fit the memory are left out.
+        entries.retain(|entry| !matches!(entry.step, JobStep::Level(_) | JobStep::Publish | JobStep::Report));
     }
     let stage = progress.stage("check", entries.len() as u64, "steps");
-    let counted_again = config.output.max_edge == MaxEdge::Auto;
-    let kept = Review::of(directory, entries, counted_again, &stage)?.map(Review::kept);
+    let counts_leaves = max_edge == MaxEdge::Auto;
+    let kept = ResumeReview::of(directory, entries, counts_leaves, &stage)?.map(ResumeReview::into_kept);
     stage.finish();
     if kept.is_none() {
-        progress.note("what the interrupted run has left is not whole; starting over");
+        progress.note("what the interrupted run left is damaged; starting over");
     }
     Ok(kept)
 }
 
-/// The interrupted run, looked at.
-struct Review {
-    directory: Directory,
+/// A look at what an interrupted run left.
+struct ResumeReview {
+    directory: JobDirectory,
     partition: Partition,
-    entries: HashMap<Step, Entry>,
-    /// Steps of which all that they have left is there and whole.
-    whole: HashSet<Step>,
-    /// Whether the step of every tile's export is one of them.
-    exported: bool,
+    entries: HashMap<JobStep, JournalEntry>,
+    /// The steps whose records and files are all there and whole.
+    whole: HashSet<JobStep>,
+    /// Whether all tiles are written and whole.
+    all_written: bool,
     /// Whether the sites of all leaves are counted before the next tile is written.
-    counted_again: bool,
+    counts_leaves: bool,
 }
 
-impl Review {
-    /// `None` if its points are not there any more, though they are needed.
-    fn of(directory: &Directory, entries: Vec<Entry>, counted_again: bool, stage: &Stage) -> Result<Option<Review>> {
-        let stored = entries.iter().flat_map(|entry| &entry.stored);
-        let Ok(store) = Store::open(directory.store(), stored) else { return Ok(None) };
-        let is_whole = |entry: &Entry| {
-            entry.stored.iter().all(|stored| store.is_whole(stored))
-                && entry.results.iter().all(|file| file.is_whole(directory))
+impl ResumeReview {
+    /// Returns `None` if the points are gone, though a leaf needs them, or if the partition is damaged.
+    fn of(
+        directory: &JobDirectory,
+        entries: Vec<JournalEntry>,
+        counts_leaves: bool,
+        stage: &Stage,
+    ) -> Result<Option<ResumeReview>> {
+        let records = entries.iter().flat_map(|entry| &entry.records);
+        let Ok(store) = Store::open(directory.store(), records) else { return Ok(None) };
+        let is_whole = |entry: &JournalEntry| {
+            entry.records.iter().all(|record| store.is_whole(record))
+                && entry.files.iter().all(|file| file.is_whole(directory))
         };
-        let check = |entry: &Entry| {
+        let check = |entry: &JournalEntry| {
             interrupt::check()?;
             stage.advance(1);
             Ok(is_whole(entry).then_some(entry.step))
         };
         let whole =
-            entries.par_iter().filter_map(|entry| check(entry).transpose()).collect::<Result<HashSet<Step>>>()?;
-        if !whole.contains(&Step::Partition) {
+            entries.par_iter().filter_map(|entry| check(entry).transpose()).collect::<Result<HashSet<JobStep>>>()?;
+        if !whole.contains(&JobStep::Partition) {
             return Ok(None);
         }
         let partition = Partition::load(&store)?;
         let entries = entries.into_iter().map(|entry| (entry.step, entry)).collect();
         let directory = directory.clone();
-        let mut review = Review { directory, partition, entries, whole, exported: false, counted_again };
-        review.exported = review.tiles().all(|tile| review.whole.contains(&Step::Export(tile)));
-        Ok(review.has_its_points().then_some(review))
+        let mut review = ResumeReview { directory, partition, entries, whole, all_written: false, counts_leaves };
+        review.all_written = review.partition.tree.tiles().all(|tile| review.whole.contains(&JobStep::WriteTile(tile)));
+        Ok(review.has_needed_points().then_some(review))
     }
 
-    fn tiles(&self) -> std::ops::Range<usize> {
-        0..self.partition.tree.leaves.len()
-    }
-
-    /// Whether `step` is finished, and what it left is whole where that is `needed`.
-    fn stays(&self, step: Step, needed: bool) -> bool {
+    /// Tells whether `step` is finished, and whole if it is `needed`.
+    fn stays(&self, step: JobStep, needed: bool) -> bool {
         if needed { self.whole.contains(&step) } else { self.entries.contains_key(&step) }
     }
 
-    fn node_stays(&self, node: usize) -> bool {
-        self.stays(Step::Node(node), !self.exported)
+    fn merge_stays(&self, node: NodeIndex) -> bool {
+        self.stays(JobStep::Merge(node), !self.all_written)
     }
 
-    fn stitch_stays(&self, tile: usize) -> bool {
-        self.stays(Step::Stitch(tile), !self.exported)
+    fn border_stays(&self, tile: TileIndex) -> bool {
+        self.stays(JobStep::BorderNormals(tile), !self.all_written)
     }
 
-    fn leaf_stays(&self, tile: usize) -> bool {
+    fn leaf_stays(&self, tile: TileIndex) -> bool {
         let tree = &self.partition.tree;
-        let mut above = tree.merges_above(tree.leaves[tile]);
-        let is_used_up = self.whole.contains(&Step::Export(tile))
-            && (self.exported || !self.counted_again)
-            && self.stitch_stays(tile)
-            && above.next().is_none_or(|node| self.node_stays(node));
-        self.stays(Step::Leaf(tile), !is_used_up)
+        let mut above = tree.merges_above(tree.leaf(tile));
+        let is_used_up = self.whole.contains(&JobStep::WriteTile(tile))
+            && (self.all_written || !self.counts_leaves)
+            && self.border_stays(tile)
+            && above.next().is_none_or(|node| self.merge_stays(node));
+        self.stays(JobStep::Leaf(tile), !is_used_up)
     }
 
-    /// Whether the spill still holds the points of all leaves that are to be done.
-    fn has_its_points(&self) -> bool {
-        let mut missing = self.tiles().filter(|&tile| !self.leaf_stays(tile)).peekable();
+    /// Tells whether the point file still holds the points of all leaves that are to be done.
+    fn has_needed_points(&self) -> bool {
+        let mut missing = self.partition.tree.tiles().filter(|&tile| !self.leaf_stays(tile)).peekable();
         if missing.peek().is_none() {
             return true;
         }
-        let Ok(spill) = Spill::open(&self.directory.spill()) else { return false };
-        missing.par_bridge().all(|tile| self.partition.blocks[tile].par_iter().all(|&block| spill.is_whole(block)))
+        let Ok(points) = PointFile::open(&self.directory.points()) else { return false };
+        let is_whole =
+            |tile: TileIndex| self.partition.blocks[tile.get()].par_iter().all(|&block| points.is_whole(block));
+        missing.par_bridge().all(is_whole)
     }
 
-    fn step_stays(&self, step: Step) -> bool {
+    fn step_stays(&self, step: JobStep) -> bool {
         match step {
-            Step::Leaf(tile) => self.leaf_stays(tile),
-            Step::Node(node) => self.node_stays(node),
-            Step::Stitch(tile) => self.stitch_stays(tile),
-            Step::Partition | Step::Export(_) | Step::Level(_) => self.whole.contains(&step),
-            Step::Finish | Step::Report => self.exported && self.whole.contains(&step),
+            JobStep::Leaf(tile) => self.leaf_stays(tile),
+            JobStep::Merge(node) => self.merge_stays(node),
+            JobStep::BorderNormals(tile) => self.border_stays(tile),
+            JobStep::Partition | JobStep::WriteTile(_) | JobStep::Level(_) => self.whole.contains(&step),
+            JobStep::Publish | JobStep::Report => self.all_written && self.whole.contains(&step),
         }
     }
 
-    fn kept(self) -> Kept {
-        let stays: HashSet<Step> = self.entries.keys().copied().filter(|&step| self.step_stays(step)).collect();
+    fn into_kept(self) -> KeptSteps {
+        let stays: HashSet<JobStep> = self.entries.keys().copied().filter(|&step| self.step_stays(step)).collect();
         let mut files = HashSet::new();
-        if !self.tiles().all(|tile| stays.contains(&Step::Leaf(tile))) {
-            files.insert(self.directory.name(&self.directory.spill()));
+        if !self.partition.tree.tiles().all(|tile| stays.contains(&JobStep::Leaf(tile))) {
+            files.insert(self.directory.name(&self.directory.points()));
         }
-        let mut kept: Vec<Entry> = self.entries.into_values().filter(|entry| stays.contains(&entry.step)).collect();
-        files.extend(kept.iter().flat_map(|entry| &entry.results).map(|file| file.name.clone()));
+        let mut entries: Vec<JournalEntry> =
+            self.entries.into_values().filter(|entry| stays.contains(&entry.step)).collect();
+        files.extend(entries.iter().flat_map(|entry| &entry.files).map(|file| file.name.clone()));
         files.extend(self.directory.store().iter().map(|path| self.directory.name(path)));
-        // The journal does not depend on the order of a hash map.
-        kept.sort_by_key(|entry| entry.step);
-        Kept { entries: kept, files, partition: Some(self.partition) }
+        // The journal must not depend on the order of a hash map.
+        entries.sort_by_key(|entry| entry.step);
+        KeptSteps { entries, files, partition: Some(self.partition) }
     }
 }

@@ -1,156 +1,163 @@
-//! Steps 5 and 6 of a job, each tile as soon as it can be done: beside those that are still triangulated, once writing has begun.
+//! Running steps 5 and 6, each tile as soon as it can be done: while other tiles are still triangulated, once writing has begun.
 
-use crate::job::Job;
-use crate::job::durable::journal::Step;
-use crate::job::partition::read::Partition;
-use crate::job::progress::stage::{Stage, StageFigures, Strand};
-use crate::job::progress::time_left;
-use crate::job::tiles::border_normals as stitch;
-use crate::job::tiles::dependencies::{Ready, Settled};
-use crate::job::tiles::write::{self, Look, TileFigures};
+use crate::job::partition::result::Partition;
+use crate::job::progress::activity::Activity;
+use crate::job::progress::stage::Stage;
+use crate::job::records::JobStep;
+use crate::job::run::context::RunContext;
+use crate::job::run::stage_costs::triangulated_share;
+use crate::job::tiles::border_normals::finish_border_normals;
+use crate::job::tiles::dependencies::{FinishedTile, TileDependencies};
+use crate::job::tiles::style::TileStyle;
+use crate::job::tiles::write_tile::{TileStats, write_tile};
 use crate::output::preview::canvas::Canvas;
 use crate::{Error, Result};
 use rayon::Scope;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
-/// Stitches and exports tiles; its methods may be called from any thread.
-pub(crate) struct TileWriter<'a> {
-    job: &'a Job<'a>,
+/// Finishes and writes tiles. Any thread may call its methods.
+pub(crate) struct TileQueue<'a> {
+    run: &'a RunContext<'a>,
     partition: &'a Partition,
     stage: &'a Stage,
-    stitch: Strand,
-    write: Strand,
-    /// How tiles are to look and what they are drawn on, from when they may be written.
-    style: OnceLock<(Look, Canvas)>,
-    state: Mutex<State>,
-    failed: AtomicBool,
+    border_normals: Activity,
+    write: Activity,
+    /// How tiles look and what they are drawn on; set when tiles may be written.
+    style: OnceLock<(TileStyle, Canvas)>,
+    state: Mutex<QueueState>,
+    has_failed: AtomicBool,
 }
 
-struct State {
-    /// Tiles that came before they could be written.
-    held: Vec<Settled>,
-    ready: Ready,
-    exported: usize,
-    written: TileFigures,
-    /// What went wrong first.
+struct QueueState {
+    /// Tiles that were finished before tiles may be written.
+    held: Vec<FinishedTile>,
+    dependencies: TileDependencies,
+    written: usize,
+    stats: TileStats,
+    /// The first error.
     failure: Option<Error>,
 }
 
-/// What has come of all tiles.
+/// Totals over all tiles.
 pub(crate) struct WrittenTiles {
-    pub(crate) style: (Look, Canvas),
-    pub(crate) figures: TileFigures,
-    pub(crate) stages: [StageFigures; 2],
+    pub(crate) style: TileStyle,
+    pub(crate) canvas: Canvas,
+    pub(crate) stats: TileStats,
 }
 
-impl<'a> TileWriter<'a> {
-    pub(crate) fn new(job: &'a Job<'a>, partition: &'a Partition, stage: &'a Stage) -> TileWriter<'a> {
-        let ready = Ready::new(partition.tree.leaves.len());
-        let state = State { held: Vec::new(), ready, exported: 0, written: TileFigures::default(), failure: None };
-        TileWriter {
-            job,
+impl<'a> TileQueue<'a> {
+    pub(crate) fn new(run: &'a RunContext<'a>, partition: &'a Partition, stage: &'a Stage) -> TileQueue<'a> {
+        let dependencies = TileDependencies::new(partition.tree.leaves.len());
+        let state =
+            QueueState { held: Vec::new(), dependencies, written: 0, stats: TileStats::default(), failure: None };
+        TileQueue {
+            run,
             partition,
             stage,
-            stitch: job.progress.strand("stitch", "tiles"),
-            write: job.progress.strand("write", "points"),
+            border_normals: run.progress.activity("border normals", "tiles"),
+            write: run.progress.activity("write", "points"),
             style: OnceLock::new(),
             state: Mutex::new(state),
-            failed: AtomicBool::new(false),
+            has_failed: AtomicBool::new(false),
         }
     }
 
-    /// From here on tiles are written, those first that have come already. What an earlier job has made is removed.
+    /// Lets tiles be written from now on, beginning with those that are finished already. Removes the results of an earlier job.
     ///
     /// # Errors
-    /// [`Error::Io`] if it cannot be.
-    pub(crate) fn begin<'s>(&'s self, scope: &Scope<'s>, style: (Look, Canvas)) -> Result<()> {
-        self.job.parts.store(true, Ordering::Relaxed);
-        self.job.directory.sweep_results(&self.job.kept)?;
+    /// [`Error::Io`] if these cannot be removed.
+    pub(crate) fn begin<'s>(&'s self, scope: &Scope<'s>, style: TileStyle, canvas: Canvas) -> Result<()> {
+        self.run.begin_results()?;
         let mut state = self.state();
-        // Under the lock, so that no tile is held any more after those that are taken here.
-        self.style.get_or_init(|| style);
+        // The lock is held here, so that no thread holds back a tile after these are taken.
+        self.style.get_or_init(|| (style, canvas));
         let held = std::mem::take(&mut state.held);
         drop(state);
-        held.into_iter().for_each(|settled| self.start(scope, settled));
+        held.into_iter().for_each(|tile| self.start(scope, tile));
         Ok(())
     }
 
-    /// Takes a tile whose triangles are all known.
-    pub(crate) fn take<'s>(&'s self, scope: &Scope<'s>, settled: Settled) {
+    /// Takes a finished tile.
+    pub(crate) fn push<'s>(&'s self, scope: &Scope<'s>, tile: FinishedTile) {
         let mut state = self.state();
         if self.style.get().is_none() {
-            state.held.push(settled);
+            state.held.push(tile);
             return;
         }
         drop(state);
-        self.start(scope, settled);
+        self.start(scope, tile);
     }
 
-    /// Does `work` unless something has failed before. The first error of all is kept for [`TileWriter::finish`].
+    /// Runs `work` unless something failed before. Keeps the first error for [`TileQueue::finish`].
     pub(crate) fn attempt<T>(&self, work: impl FnOnce() -> Result<T>) -> Option<T> {
-        if self.failed.load(Ordering::Relaxed) {
+        if self.has_failed.load(Ordering::Relaxed) {
             return None;
         }
         let keep = |error| {
             self.state().failure.get_or_insert(error);
-            self.failed.store(true, Ordering::Relaxed);
+            self.has_failed.store(true, Ordering::Relaxed);
         };
         work().map_err(keep).ok()
     }
 
-    /// What has come of all tiles.
+    /// Ends the queue and returns the totals over all tiles. Adds its stages to the report.
     ///
     /// # Errors
-    /// What went wrong first; [`Error::Broken`] if a tile was not written.
+    /// The first error of all; [`Error::Broken`] if a tile was not written.
     pub(crate) fn finish(self) -> Result<WrittenTiles> {
         let state = self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
         if let Some(failure) = state.failure {
             return Err(failure);
         }
-        let style = self.style.into_inner().filter(|_| state.exported == self.partition.tree.leaves.len());
-        let style = style.ok_or_else(|| Error::Broken(format!("only {} tiles were written", state.exported)))?;
-        Ok(WrittenTiles { style, figures: state.written, stages: [self.stitch.finish(), self.write.finish()] })
+        let style = self.style.into_inner().filter(|_| state.written == self.partition.tree.leaves.len());
+        let Some((style, canvas)) = style else {
+            return Err(Error::Broken(format!("only {} tiles were written", state.written)));
+        };
+        self.run.add_stage(self.border_normals.finish());
+        self.run.add_stage(self.write.finish());
+        Ok(WrittenTiles { style, canvas, stats: state.stats })
     }
 
-    fn start<'s>(&'s self, scope: &Scope<'s>, settled: Settled) {
+    fn start<'s>(&'s self, scope: &Scope<'s>, tile: FinishedTile) {
         scope.spawn(move |scope| {
-            for ready in self.attempt(|| self.stitch(settled)).unwrap_or_default() {
+            for ready in self.attempt(|| self.finish_border(tile)).unwrap_or_default() {
                 scope.spawn(move |_| {
-                    self.attempt(|| self.export(ready));
+                    self.attempt(|| self.write(ready));
                 });
             }
         });
     }
 
-    /// Returns the tiles that can be exported now.
-    fn stitch(&self, settled: Settled) -> Result<Vec<Settled>> {
-        let Job { journal, store, .. } = *self.job;
-        let (look, _) = self.style()?;
-        let run = || self.stitch.time(1, || stitch::run(store, &self.partition.tree, settled, look));
-        let neighbours = journal.step(Step::Stitch(settled.tile), run)?;
-        Ok(self.state().ready.stitched(settled, &neighbours))
+    /// Finishes the border normals of a tile and returns the tiles that can be written now.
+    fn finish_border(&self, finished: FinishedTile) -> Result<Vec<FinishedTile>> {
+        let RunContext { journal, store, .. } = *self.run;
+        let (style, _) = self.style()?;
+        let work = || finish_border_normals(store, &self.partition.tree, style, finished);
+        let step = JobStep::BorderNormals(finished.tile);
+        let neighbours = journal.step(step, || self.border_normals.time(1, work))?;
+        Ok(self.state().dependencies.border_done(finished, &neighbours))
     }
 
-    fn export(&self, settled: Settled) -> Result<()> {
-        let Job { journal, directory, store, .. } = *self.job;
-        let (look, canvas) = self.style()?;
-        let export = || write::run(directory, store, &self.partition.tree, settled, look, canvas);
-        let (step, points) = (Step::Export(settled.tile), self.partition.points(settled.tile));
-        let figures = journal.step(step, || self.write.time(points, export))?;
+    fn write(&self, finished: FinishedTile) -> Result<()> {
+        let RunContext { journal, directory, store, .. } = *self.run;
+        let (style, canvas) = self.style()?;
+        let work = || write_tile(directory, store, &self.partition.tree, style, canvas, finished);
+        let (step, points) = (JobStep::WriteTile(finished.tile), self.partition.points(finished.tile));
+        let stats = journal.step(step, || self.write.time(points, work))?;
         let mut state = self.state();
-        state.written += figures;
-        state.exported += 1;
+        state.stats += stats;
+        state.written += 1;
         drop(state);
-        self.job.count(self.stage, step, points - time_left::triangulated(points));
+        self.run.count(self.stage, step, points - triangulated_share(points));
         Ok(())
     }
 
-    fn style(&self) -> Result<&(Look, Canvas)> {
+    fn style(&self) -> Result<&(TileStyle, Canvas)> {
         self.style.get().ok_or_else(|| Error::Broken("a tile is written too early".into()))
     }
 
-    fn state(&self) -> MutexGuard<'_, State> {
+    fn state(&self) -> MutexGuard<'_, QueueState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

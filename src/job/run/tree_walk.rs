@@ -1,90 +1,80 @@
-//! Steps 3 and 4 of a job, in the order of the tree: children before parents, side by side where there are threads.
+//! Running steps 3 and 4 in the order of the tree: children before their parent, in parallel where there are threads.
 
-use crate::job::durable::journal::{Done, Step};
-use crate::job::mesh::leaf::{self, LeafFigures};
-use crate::job::mesh::merge;
-use crate::job::mesh::precision_limit::Longest;
-use crate::job::partition::point_file::Spill;
-use crate::job::partition::read::Partition;
-use crate::job::partition::tree::Kind;
-use crate::job::progress::stage::{Stage, Strand};
-use crate::job::progress::time_left;
-use crate::job::run::tile_queue::TileWriter;
-use crate::job::tiles::dependencies::Settled;
-use crate::job::{BYTES_PER_LEAF_SITE, Job};
+use crate::job::index::{NodeIndex, TileIndex};
+use crate::job::mesh::leaf::{LeafStats, triangulate_leaf};
+use crate::job::mesh::merge::merge_frontiers;
+use crate::job::partition::point_file::PointFile;
+use crate::job::partition::result::Partition;
+use crate::job::partition::tree::NodeKind;
+use crate::job::plan::budget::merge_memory;
+use crate::job::plan::job_plan::Plan;
+use crate::job::progress::activity::Activity;
+use crate::job::progress::stage::Stage;
+use crate::job::records::{JobStep, StepOutput};
+use crate::job::run::context::RunContext;
+use crate::job::run::stage_costs::triangulated_share;
+use crate::job::run::tile_queue::TileQueue;
+use crate::job::tiles::dependencies::FinishedTile;
 use crate::{Error, Result};
 use rayon::Scope;
 
 /// Walks the tree.
-pub(crate) struct Grower<'a> {
-    pub(crate) job: &'a Job<'a>,
+pub(crate) struct TreeWalk<'a> {
+    pub(crate) run: &'a RunContext<'a>,
+    pub(crate) plan: &'a Plan,
     pub(crate) partition: &'a Partition,
-    /// Where the points are, as long as there is a leaf to be done.
-    pub(crate) spill: Option<Spill>,
-    pub(crate) longest: Longest,
+    /// The points; `None` if all leaves are done.
+    pub(crate) points: Option<PointFile>,
     pub(crate) stage: &'a Stage,
-    pub(crate) strand: &'a Strand,
-    /// Takes the tiles that need no node above.
-    pub(crate) writer: &'a TileWriter<'a>,
+    pub(crate) activity: &'a Activity,
+    /// Takes the tiles that are finished.
+    pub(crate) queue: &'a TileQueue<'a>,
 }
 
-impl<'a> Grower<'a> {
-    /// Triangulates the leaves below `node`, and merges every merge node as soon as all below it is done. `None` if something
-    /// has failed, which the writer tells.
-    pub(crate) fn grow(&self, scope: &Scope<'a>, node: usize) -> Option<LeafFigures> {
-        match self.partition.tree.nodes[node].kind {
-            Kind::Leaf(tile) => self.writer.attempt(|| self.grow_leaf(scope, node, tile)),
-            Kind::Inner([low, high]) => {
-                let (low, high) = rayon::join(|| self.grow(scope, low), || self.grow(scope, high));
-                let (mut figures, high) = (low?, high?);
-                figures += high;
+impl<'a> TreeWalk<'a> {
+    /// Triangulates the leaves below `node`, and merges at every merge node once everything below it is done. Returns `None` if
+    /// something failed; the queue has the error.
+    pub(crate) fn walk(&self, scope: &Scope<'a>, node: NodeIndex) -> Option<LeafStats> {
+        match self.partition.tree.node(node).kind {
+            NodeKind::Leaf(tile) => self.queue.attempt(|| self.leaf(scope, node, tile)),
+            NodeKind::Inner([low, high]) => {
+                let (low, high) = rayon::join(|| self.walk(scope, low), || self.walk(scope, high));
+                let (mut stats, high) = (low?, high?);
+                stats += high;
                 if self.partition.tree.is_merge(node) {
-                    self.writer.attempt(|| self.merge(scope, node))?;
+                    self.queue.attempt(|| self.merge(scope, node))?;
                 }
-                Some(figures)
+                Some(stats)
             }
         }
     }
 
-    fn grow_leaf(&self, scope: &Scope<'a>, node: usize, tile: usize) -> Result<LeafFigures> {
-        let journal = self.job.journal;
-        let (step, points) = (Step::Leaf(tile), self.partition.points(tile));
-        let figures: LeafFigures = journal.step(step, || self.strand.time(points, || self.leaf(tile)))?;
-        self.job.count(self.stage, step, time_left::triangulated(points));
-        // Any other leaf hands its hull up.
-        if node == 0 || figures.sites == 0 {
-            self.writer.take(scope, Settled { tile, by: node });
+    fn leaf(&self, scope: &Scope<'a>, node: NodeIndex, tile: TileIndex) -> Result<LeafStats> {
+        let (step, points) = (JobStep::Leaf(tile), self.partition.points(tile));
+        let triangulate = || self.activity.time(points, || self.triangulate(tile));
+        let stats: LeafStats = self.run.journal.step(step, triangulate)?;
+        self.run.count(self.stage, step, triangulated_share(points));
+        // Any other leaf passes its hull up.
+        if node == NodeIndex::ROOT || stats.sites == 0 {
+            self.queue.push(scope, FinishedTile { tile, last_merge: node });
         }
-        Ok(figures)
+        Ok(stats)
     }
 
-    fn leaf(&self, tile: usize) -> Result<Done<LeafFigures>> {
-        let Job { config, store, triangulator, .. } = *self.job;
-        let task = leaf::Task { duplicates: config.input.duplicates, triangulator, longest: self.longest };
-        let spill = self.spill.as_ref();
-        let spill = spill.ok_or_else(|| Error::Broken(format!("the points of tile {tile} are gone")))?;
-        leaf::run(store, self.partition, spill, tile, task)
+    fn triangulate(&self, tile: TileIndex) -> Result<StepOutput<LeafStats>> {
+        let RunContext { store, triangulator, .. } = *self.run;
+        let points = self.points.as_ref();
+        let points = points.ok_or_else(|| Error::Broken(format!("the points of tile {tile} are gone")))?;
+        triangulate_leaf(self.plan, self.partition, points, store, triangulator, tile)
     }
 
-    fn merge(&self, scope: &Scope<'a>, node: usize) -> Result<()> {
-        let Job { store, journal, .. } = *self.job;
-        let (tree, memory) = (&self.partition.tree, self.memory_of_merge(node));
-        let merge = || self.strand.time(0, || merge::run(store, tree, node, memory, self.longest));
-        for tile in journal.step(Step::Node(node), merge)? {
-            self.writer.take(scope, Settled { tile: tile as usize, by: node });
+    fn merge(&self, scope: &Scope<'a>, node: NodeIndex) -> Result<()> {
+        let RunContext { store, journal, threads, .. } = *self.run;
+        let memory = merge_memory(&self.plan.options, node == NodeIndex::ROOT, threads);
+        let merge = || self.activity.time(0, || merge_frontiers(self.plan, &self.partition.tree, store, memory, node));
+        for tile in journal.step(JobStep::Merge(node), merge)? {
+            self.queue.push(scope, FinishedTile { tile, last_merge: node });
         }
         Ok(())
-    }
-
-    /// Nodes below the root may be merged at once on all threads. Beside the root the others may write tiles, which takes half of
-    /// what leaves do.
-    fn memory_of_merge(&self, node: usize) -> u64 {
-        let Job { config, threads, .. } = *self.job;
-        let memory = config.limits.memory.0 / 4 * 3;
-        if node > 0 {
-            return memory / threads as u64;
-        }
-        let tile = config.triangulation.max_points_per_tile.0.saturating_mul(BYTES_PER_LEAF_SITE / 2);
-        memory.saturating_sub(tile.saturating_mul(threads as u64 - 1))
     }
 }

@@ -1,50 +1,54 @@
 //! Which tiles can be written while others are still triangulated.
 //!
-//! A tile is **settled** by the node that hands none of its sites up: no node above can give it another triangle, so once that node is
-//! done its seams are complete, and its frontier can be stitched. Its own triangles may have corners in other tiles, whose normals
-//! are finished when those tiles are stitched. Then it can be written.
+//! A tile is **finished** once a merge node passes none of its sites up: no node above can give it another triangle. Then its seam is
+//! complete and the normals on its border can be finished. Its own triangles may have corners in other tiles, whose normals are
+//! finished with those tiles. After them it can be written.
+
+use crate::job::index::{NodeIndex, TileIndex};
 
 /// A tile whose triangles are all known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Settled {
+pub struct FinishedTile {
     /// The tile.
-    pub tile: usize,
-    /// The node of the tree above which no seam touches it. Any node above that will do as well, once it is merged.
-    pub by: usize,
+    pub tile: TileIndex,
+    /// A merged node above which no seam touches the tile.
+    pub last_merge: NodeIndex,
 }
 
-/// Keeps account of which tiles wait for which.
-pub struct Ready {
-    /// Those that are stitched.
-    stitched: Vec<Option<Settled>>,
-    /// How many of its neighbours each of them still waits for.
+/// Which tiles wait for which.
+pub struct TileDependencies {
+    /// The tiles whose border normals are done.
+    done: Vec<Option<FinishedTile>>,
+    /// The number of neighbours that each of them still waits for.
     missing: Vec<usize>,
-    /// The stitched tiles that wait for a tile.
-    waiting: Vec<Vec<Settled>>,
+    /// For each tile, the done tiles that wait for it.
+    waiting: Vec<Vec<FinishedTile>>,
 }
 
-impl Ready {
-    /// For so many tiles, none of them stitched.
-    pub fn new(tiles: usize) -> Ready {
-        Ready { stitched: vec![None; tiles], missing: vec![0; tiles], waiting: vec![Vec::new(); tiles] }
+impl TileDependencies {
+    /// Returns the state for this number of tiles, none of them done.
+    pub fn new(tiles: usize) -> TileDependencies {
+        TileDependencies { done: vec![None; tiles], missing: vec![0; tiles], waiting: vec![Vec::new(); tiles] }
     }
 
-    /// Takes note that a tile is stitched, whose own triangles have corners in these other tiles, each named once. Returns the tiles
-    /// that can be written now.
-    pub fn stitched(&mut self, settled: Settled, neighbours: &[u32]) -> Vec<Settled> {
-        self.stitched[settled.tile] = Some(settled);
-        for neighbour in neighbours.iter().map(|&neighbour| neighbour as usize) {
-            if self.stitched[neighbour].is_none() {
-                self.missing[settled.tile] += 1;
-                self.waiting[neighbour].push(settled);
+    /// Notes that the border normals of a tile are done. Its own triangles have corners in the tiles `neighbours`, which names each
+    /// once. Returns the tiles that can be written now.
+    pub fn border_done(&mut self, finished: FinishedTile, neighbours: &[TileIndex]) -> Vec<FinishedTile> {
+        let tile = finished.tile.get();
+        self.done[tile] = Some(finished);
+        for neighbour in neighbours.iter().map(|neighbour| neighbour.get()) {
+            if self.done[neighbour].is_none() {
+                self.missing[tile] += 1;
+                self.waiting[neighbour].push(finished);
             }
         }
         let mut ready = Vec::new();
-        for waiting in std::mem::take(&mut self.waiting[settled.tile]) {
-            self.missing[waiting.tile] -= 1;
-            ready.extend((self.missing[waiting.tile] == 0).then_some(waiting));
+        for waiting in std::mem::take(&mut self.waiting[tile]) {
+            let missing = &mut self.missing[waiting.tile.get()];
+            *missing -= 1;
+            ready.extend((*missing == 0).then_some(waiting));
         }
-        ready.extend((self.missing[settled.tile] == 0).then_some(settled));
+        ready.extend((self.missing[tile] == 0).then_some(finished));
         ready
     }
 }
@@ -55,26 +59,28 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Whatever the order: every tile once, as soon as it and its neighbours are stitched.
+        /// In whatever order the borders are done: every tile comes once, as soon as its border and those of its neighbours are.
         #[test]
-        fn a_tile_is_ready_when_all_its_neighbours_are(
-            edges in prop::collection::btree_set((0u32..12, 0u32..12), 0..40),
+        fn a_tile_is_ready_when_its_border_and_its_neighbours_are_done(
+            edges in prop::collection::btree_set((0usize..12, 0usize..12), 0..40),
             order in Just((0..12).collect::<Vec<usize>>()).prop_shuffle(),
         ) {
             let neighbours = |tile: usize| {
-                edges.iter().filter(|(a, b)| *a as usize == tile && a != b).map(|edge| edge.1).collect::<Vec<u32>>()
+                let edges = edges.iter().filter(|(a, b)| *a == tile && a != b);
+                edges.map(|edge| TileIndex::new(edge.1)).collect::<Vec<TileIndex>>()
             };
-            let mut ready = Ready::new(12);
+            let mut dependencies = TileDependencies::new(12);
             let mut written = Vec::new();
             for (at, &tile) in order.iter().enumerate() {
-                let stitched = &order[..=at];
-                for settled in ready.stitched(Settled { tile, by: tile + 100 }, &neighbours(tile)) {
-                    prop_assert_eq!(settled.by, settled.tile + 100);
-                    written.push(settled.tile);
+                let done = &order[..=at];
+                let finished = FinishedTile { tile: TileIndex::new(tile), last_merge: NodeIndex::new(tile + 100) };
+                for ready in dependencies.border_done(finished, &neighbours(tile)) {
+                    prop_assert_eq!(ready.last_merge.get(), ready.tile.get() + 100);
+                    written.push(ready.tile.get());
                 }
                 written.sort_unstable();
-                let all_there = |tile: usize| neighbours(tile).iter().all(|&n| stitched.contains(&(n as usize)));
-                let mut expected: Vec<usize> = stitched.iter().copied().filter(|&tile| all_there(tile)).collect();
+                let all_there = |tile: usize| neighbours(tile).iter().all(|n| done.contains(&n.get()));
+                let mut expected: Vec<usize> = done.iter().copied().filter(|&tile| all_there(tile)).collect();
                 expected.sort_unstable();
                 prop_assert_eq!(&written, &expected);
             }

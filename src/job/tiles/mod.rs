@@ -1,6 +1,9 @@
-//! Steps 5 and 6: finishing tiles and writing them.
+//! Steps 5 and 6: finishes the normals on the borders of tiles, and writes the tiles.
 
 pub mod border_normals;
 pub mod dependencies;
 pub mod max_edge;
-pub mod write;
+pub mod seam;
+pub mod style;
+pub(crate) mod tile_content;
+pub mod write_tile;

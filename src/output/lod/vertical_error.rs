@@ -296,11 +296,11 @@ fn apart(corners: &[[i32; 3]; 3], p: [i32; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::half_edge::{HULL, Mesh};
+    use crate::mesh::half_edge::{HULL, HalfEdgeMesh};
     use crate::triangulation::canonical;
     use proptest::prelude::*;
 
-    fn triangulation(positions: &[[i32; 3]], kept: &[u32]) -> Mesh {
+    fn triangulation(positions: &[[i32; 3]], kept: &[u32]) -> HalfEdgeMesh {
         let sites: Vec<Site> = kept.iter().map(|&v| plane(positions[v as usize])).collect();
         canonical(&sites).unwrap()
     }

@@ -4,9 +4,9 @@ use std::path::Path;
 use std::sync::LazyLock;
 
 use gdt_batch::geometry::lattice::{AxisMap, REACH};
-use gdt_batch::input::{Point, Rules, Source, Tally, TextOptions, open};
+use gdt_batch::input::{Point, PointCounts, PointRules, Source, TextOptions, open};
 use gdt_batch::job::options::JobOptions;
-use gdt_batch::job::plan::lattice_choice::Coarser;
+use gdt_batch::job::plan::lattice_choice::LatticeCoarsening;
 use gdt_batch::job::plan::scan;
 use gdt_batch::{Error, Result};
 
@@ -39,8 +39,8 @@ fn read(path: &Path, options: &TextOptions) {
     plan(path, options);
     let Some(rules) = rules(&source) else { return };
     let mut seen = 0;
-    for piece in 0..source.pieces() {
-        match decode(&source, piece, &rules, &mut seen) {
+    for chunk in 0..source.chunks() {
+        match decode(&source, chunk, &rules, &mut seen) {
             Ok(tally) => check(&tally),
             Err(Error::Memory(_)) => return,
             Err(error) => panic!("{error}"),
@@ -57,21 +57,27 @@ fn plan(path: &Path, options: &TextOptions) {
     let mut config = CONFIG.clone();
     config.input.files = vec![path.to_str().expect("a plain path").to_owned()];
     config.input.csv = options.clone();
-    if let Err(error) = scan::run(&config, Coarser::default()) {
+    if let Err(error) = scan::make_plan(&config, LatticeCoarsening::default()) {
         assert!(matches!(error.exit_code(), 2 | 3) && error.to_string().len() < 4000, "{error}");
     }
 }
 
 /// A lattice that is the file's own steps.
-fn rules(source: &Source) -> Option<Rules> {
+fn rules(source: &Source) -> Option<PointRules> {
     let map = |axis: usize| {
         let own = source.axes[axis];
         AxisMap::new(own.offset, own.scale, own.offset, own.scale)
     };
-    Some(Rules { maps: [map(0)?, map(1)?, map(2)?], classes: [true; 256], bounds: None, first_order: 5, rgb: true })
+    Some(PointRules {
+        maps: [map(0)?, map(1)?, map(2)?],
+        classes: [true; 256],
+        bounds: None,
+        first_order: 5,
+        rgb: true,
+    })
 }
 
-fn decode(source: &Source, piece: usize, rules: &Rules, seen: &mut u64) -> Result<Tally> {
+fn decode(source: &Source, chunk: usize, rules: &PointRules, seen: &mut u64) -> Result<PointCounts> {
     let (mut kept, mut next) = (0, 0);
     let mut sink = |points: &[Point]| {
         for point in points {
@@ -83,12 +89,12 @@ fn decode(source: &Source, piece: usize, rules: &Rules, seen: &mut u64) -> Resul
         *seen += points.len() as u64;
         if *seen > ENOUGH { Err(Error::Memory("enough".into())) } else { Ok(()) }
     };
-    let tally = source.decode(piece, rules, &mut sink)?;
+    let tally = source.decode(chunk, rules, &mut sink)?;
     assert_eq!(tally.kept, kept);
     Ok(tally)
 }
 
-fn check(tally: &Tally) {
+fn check(tally: &PointCounts) {
     assert_eq!(tally.read, tally.withheld + tally.other_class + tally.out_of_bounds + tally.malformed + tally.kept);
     assert_eq!(tally.malformed > 0, !tally.examples.is_empty());
 }

@@ -4,11 +4,11 @@
 use std::collections::{HashMap, HashSet};
 
 use gdt_batch::geometry::Site;
-use gdt_batch::mesh::half_edge::{HULL, Mesh};
+use gdt_batch::mesh::half_edge::{HULL, HalfEdgeMesh};
 
 /// Panics unless every triangle turns left, edges meet in pairs, the hull is convex and holds every site on it, Euler's formula
 /// holds, and every edge is Delaunay with ties decided by the rule: the lexicographically last of four counts as outside.
-pub(crate) fn judge(sites: &[Site], mesh: &Mesh) {
+pub(crate) fn judge(sites: &[Site], mesh: &HalfEdgeMesh) {
     if sites.len() < 3 || sites.iter().all(|&p| area(sites[0], sites[1], p) == 0) {
         assert!(mesh.triangles.is_empty(), "triangles on a line");
         return;

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use gdt_batch::geometry::Site;
-use gdt_batch::mesh::half_edge::Mesh;
+use gdt_batch::mesh::half_edge::HalfEdgeMesh;
 use gdt_batch::triangulation::options::{Backend, TriangulationOptions};
 use gdt_batch::triangulation::{Triangulator, reference};
 
@@ -39,7 +39,7 @@ fn sites_of(bytes: &[u8]) -> Vec<Site> {
     distinct.into_iter().map(|[y, x]| [x, y]).collect()
 }
 
-fn triangles(mesh: &Mesh) -> BTreeSet<[u32; 3]> {
+fn triangles(mesh: &HalfEdgeMesh) -> BTreeSet<[u32; 3]> {
     let turned = |corners: &[u32; 3]| {
         let least = (0..3).min_by_key(|&i| corners[i]).unwrap_or(0);
         [0, 1, 2].map(|i| corners[(least + i) % 3])

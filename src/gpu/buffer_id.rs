@@ -1,0 +1,51 @@
+//! The names of the buffers that the steps share.
+
+use wgpu::BufferUsages;
+
+/// A buffer of the pipeline. It holds one number (`u32`) per pixel unless its description says otherwise.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum BufferId {
+    /// The parameters of all dispatches, one block of bytes each.
+    Params,
+    /// The pixel (y << 16 | x) of every site.
+    Pixels,
+    /// The complement of the number of the site in a pixel, or 0.
+    Texture,
+    /// Which of the 32 rows of a band have a site: one number per column and band.
+    Words,
+    /// The nearest row with a site south of a band: one number per column and band.
+    South,
+    /// The nearest row with a site north of a band: one number per column and band.
+    North,
+    /// The label of a pixel: the pixel (y << 16 | x) of its nearest site.
+    Labels,
+    /// The other copy of the labels, between which jump flooding alternates.
+    Flood,
+    /// The number of pixels that are islands, then the pixel and the new label of each.
+    Islands,
+    /// Workgroup counts of the next dispatches of step G3.
+    Workgroups,
+    /// Voronoi vertices: two words for 32 corners.
+    Vertices,
+    /// Numbers of triangles: all levels of the prefix sums.
+    Counts,
+    /// Triples of site numbers.
+    Triangles,
+    /// The copy of a result that the CPU reads.
+    Staging,
+}
+
+impl BufferId {
+    /// The number of buffers.
+    pub(super) const COUNT: usize = BufferId::Staging as usize + 1;
+
+    /// Returns what wgpu must allow the buffer to be used for.
+    pub(super) fn usage(self) -> BufferUsages {
+        match self {
+            BufferId::Params => BufferUsages::UNIFORM | BufferUsages::COPY_DST,
+            BufferId::Staging => BufferUsages::MAP_READ | BufferUsages::COPY_DST,
+            BufferId::Workgroups => BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::INDIRECT,
+            _ => BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC,
+        }
+    }
+}

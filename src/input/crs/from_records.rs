@@ -1,0 +1,42 @@
+//! The one coordinate reference system of a file that may describe two.
+
+use crate::Result;
+use crate::input::crs::from_wkt;
+use crate::input::crs::geotiff::{self, GeoKeys};
+use crate::input::crs::system::Crs;
+
+/// The system that the texts, in their order, and the keys of a file describe. Text wins over GeoTIFF keys; an empty one counts as
+/// none.
+pub(crate) fn from_records(
+    texts: impl Iterator<Item = Result<Vec<u8>>>,
+    keys: &GeoKeys,
+    warnings: &mut Vec<String>,
+) -> Result<Crs> {
+    let text = from_texts(texts, warnings)?;
+    let keys = geotiff::parse(keys);
+    if let (Some(text), Some(keys)) = (&text, &keys)
+        && !text.same_as(keys)
+    {
+        warnings.push(format!(
+            "its two coordinate systems differ: {} in {} as text (used), {} in {} as GeoTIFF keys",
+            text.label(),
+            text.horizontal.name(),
+            keys.label(),
+            keys.horizontal.name()
+        ));
+    }
+    Ok(text.or(keys).unwrap_or_default())
+}
+
+fn from_texts(texts: impl Iterator<Item = Result<Vec<u8>>>, warnings: &mut Vec<String>) -> Result<Option<Crs>> {
+    for bytes in texts {
+        let bytes = bytes?;
+        let text = String::from_utf8_lossy(&bytes);
+        match from_wkt::parse(&text) {
+            Some(crs) => return Ok(Some(crs)),
+            None if text.trim_matches(['\0', ' ', '"', '\'']).is_empty() => {}
+            None => warnings.push("its coordinate system is not well-known text that can be read".to_string()),
+        }
+    }
+    Ok(None)
+}

@@ -1,0 +1,93 @@
+//! The coordinate reference system that a well-known text describes.
+
+use crate::input::crs::system::Crs;
+use crate::input::crs::unit::Unit;
+use crate::input::crs::wkt::{GEOGRAPHIC, LOCAL, PROJECTED, VERTICAL, WktNode, length, parts, unbound, units};
+
+/// The system of an EPSG code.
+pub(crate) fn from_epsg(code: u32) -> Option<Crs> {
+    let definition = crs_definitions::from_code(u16::try_from(code).ok()?)?;
+    let crs = parse(definition.wkt)?;
+    Some(Crs { epsg: Some(code), ..crs })
+}
+
+/// What `text` says; `None` where it is not well-known text of a coordinate reference system.
+pub(crate) fn parse(text: &str) -> Option<Crs> {
+    let roots = WktNode::parse_all(text)?;
+    let parts: Vec<&WktNode> = roots.iter().flat_map(parts).map(unbound).collect();
+    let find = |keywords: &[&str]| parts.iter().find(|part| keywords.contains(&part.keyword.as_str())).copied();
+    let horizontal = find(&PROJECTED).or_else(|| find(&GEOGRAPHIC)).or_else(|| find(&LOCAL))?;
+    let geographic = GEOGRAPHIC[..5].contains(&horizontal.keyword.as_str());
+    let (unit, third) = units(horizontal);
+    let vertical = find(&VERTICAL).and_then(|vertical| units(vertical).0).or(third).and_then(length);
+    Some(Crs {
+        wkt: Some(text.trim_end_matches(['\0', ' ', '\n', '\r', '\t']).to_string()),
+        epsg: epsg(horizontal),
+        horizontal: unit.map_or(Unit::Unknown, |unit| if geographic { angle(unit) } else { Unit::of(length(unit)) }),
+        vertical,
+        name: horizontal.text(0).map(str::to_string).filter(|name| !name.is_empty()),
+    })
+}
+
+fn angle(unit: &WktNode) -> Unit {
+    if unit.keyword == "LENGTHUNIT" { Unit::of(length(unit)) } else { Unit::Degree }
+}
+
+fn epsg(node: &WktNode) -> Option<u32> {
+    let authority = node.child(&["AUTHORITY", "ID"])?;
+    let code = authority.number(1)?;
+    let valid = authority.text(0)?.eq_ignore_ascii_case("EPSG") && code > 0.0 && code < 1e6 && code.fract() == 0.0;
+    valid.then_some(code as u32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::crs::wkt::parameters;
+
+    const COMPOUND_2: &str = r#"COMPOUNDCRS["a + b",PROJCRS["a",BASEGEOGCRS["g",DATUM["d",ELLIPSOID["e",6378137,298.25,
+        LENGTHUNIT["metre",1]]],PRIMEM["Greenwich",0,ANGLEUNIT["degree",0.0174532925199433]]],CONVERSION["c",
+        METHOD["Transverse Mercator",ID["EPSG",9807]],PARAMETER["False easting",1,LENGTHUNIT["US survey foot",0.304800609601219]]],
+        CS[Cartesian,2],AXIS["(E)",east,ORDER[1],LENGTHUNIT["US survey foot",0.304800609601219]],
+        AXIS["(N)",north,ORDER[2],LENGTHUNIT["US survey foot",0.304800609601219]],ID["EPSG",2276]],
+        VERTCRS["b",VDATUM["v"],CS[vertical,1],AXIS["h",up,LENGTHUNIT["metre",1]]]]"#;
+
+    #[test]
+    fn a_compound_system_of_version_2_has_both_units() {
+        let crs = parse(COMPOUND_2).unwrap();
+        assert_eq!((crs.horizontal, crs.vertical), (Unit::UsFoot, Some(1.0)));
+        assert_eq!((crs.epsg, crs.name.as_deref()), (Some(2276), Some("a")));
+        assert_eq!(parameters(COMPOUND_2), [("falseeasting".to_string(), 1.0)]);
+    }
+
+    #[test]
+    fn the_unit_of_a_projected_system_is_not_that_of_its_base() {
+        let text = r#"PROJCS["P",GEOGCS["G",UNIT["degree",0.0174]],UNIT["Foot",0.3048],AUTHORITY["EPSG","2994"]]"#;
+        let crs = parse(text).unwrap();
+        assert_eq!((crs.horizontal, crs.vertical, crs.epsg), (Unit::Foot, None, Some(2994)));
+    }
+
+    #[test]
+    fn geographic_systems_are_in_degrees_and_bound_ones_are_looked_into() {
+        assert_eq!(parse(r#"GEOGCS["WGS 84",UNIT["degree",0.0174532925199433]]"#).unwrap().horizontal, Unit::Degree);
+        let bound = r#"BOUNDCRS[SOURCECRS[PROJCRS["P",LENGTHUNIT["metre",1]]],TARGETCRS[GEOGCRS["W"]]]"#;
+        assert_eq!(parse(bound).unwrap().horizontal, Unit::Metre);
+    }
+
+    #[test]
+    fn two_systems_side_by_side_are_a_compound_one() {
+        let text = r#"PROJCS["P",GEOGCS["G",UNIT["Degree",0.0174]],UNIT["Foot_US",0.3048006096012192]],VERTCS["V",UNIT["Meter",1.0]]"#;
+        let crs = parse(text).unwrap();
+        assert_eq!((crs.horizontal, crs.vertical, crs.name.as_deref()), (Unit::UsFoot, Some(1.0), Some("P")));
+    }
+
+    #[test]
+    fn damage_is_no_system() {
+        let deep = "A[".repeat(100_000);
+        for text in
+            ["", "hello", "PROJCS[", r#"PROJCS["x""#, "PROJCS[]]", "VERT_CS[\"v\",UNIT[\"metre\",1]]", deep.as_str()]
+        {
+            assert_eq!(parse(text), None, "{}", &text[..text.len().min(20)]);
+        }
+    }
+}

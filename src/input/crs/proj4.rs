@@ -1,0 +1,139 @@
+//! The definition of a projected system in the way of PROJ.4, from its EPSG code or from its well-known text.
+
+use crate::input::crs::wkt::{PROJECTED, WktNode, comparable_name, find};
+
+/// Parameters of projections: names in WKT, letters and digits in lower case, and that of PROJ.4.
+const PARAMETERS: [(&str, &str); 20] = [
+    ("centralmeridian", "lon_0"),
+    ("longitudeofcenter", "lon_0"),
+    ("longitudeoforigin", "lon_0"),
+    ("longitudeofnaturalorigin", "lon_0"),
+    ("longitudeoffalseorigin", "lon_0"),
+    ("latitudeoforigin", "lat_0"),
+    ("latitudeofcenter", "lat_0"),
+    ("latitudeofnaturalorigin", "lat_0"),
+    ("latitudeoffalseorigin", "lat_0"),
+    ("standardparallel1", "lat_1"),
+    ("latitudeof1ststandardparallel", "lat_1"),
+    ("standardparallel2", "lat_2"),
+    ("latitudeof2ndstandardparallel", "lat_2"),
+    ("scalefactor", "k_0"),
+    ("scalefactoratnaturalorigin", "k_0"),
+    ("falseeasting", "x_0"),
+    ("eastingatfalseorigin", "x_0"),
+    ("falsenorthing", "y_0"),
+    ("northingatfalseorigin", "y_0"),
+    ("azimuth", "alpha"),
+];
+
+/// Projections whose parameters these are.
+const METHODS: [(&str, &str); 10] = [
+    ("transversemercator", "tmerc"),
+    ("gausskruger", "tmerc"),
+    ("lambertconformalconic2sp", "lcc"),
+    ("lambertconicconformal2sp", "lcc"),
+    ("lambertconformalconic1sp", "lcc"),
+    ("lambertconicconformal1sp", "lcc"),
+    ("lambertconformalconic", "lcc"),
+    ("albersconicequalarea", "aea"),
+    ("albersequalarea", "aea"),
+    ("lambertazimuthalequalarea", "laea"),
+];
+
+/// The definition of the system of this code or this text; `None` where neither gives one.
+pub(crate) fn definition(epsg: Option<u32>, wkt: Option<&str>) -> Option<String> {
+    let of_code = |code| Some(crs_definitions::from_code(u16::try_from(code).ok()?)?.proj4.to_string());
+    epsg.and_then(of_code).or_else(|| of_text(wkt?))
+}
+
+fn of_text(text: &str) -> Option<String> {
+    let system = find(text, &PROJECTED)?;
+    let conversion = system.child(&["CONVERSION"]).unwrap_or(&system);
+    let method = comparable_name(conversion.child(&["PROJECTION", "METHOD"])?.text(0)?);
+    let (_, projection) = METHODS.iter().find(|(name, _)| *name == method)?;
+    let mut words = vec![format!("+proj={projection}")];
+    let metres = system.unit_metres()?;
+    for parameter in conversion.children().filter(|child| child.keyword == "PARAMETER") {
+        let (name, value) = (comparable_name(parameter.text(0)?), parameter.number(1)?);
+        let (_, short) = PARAMETERS.iter().find(|(long, _)| *long == name)?;
+        // PROJ.4 takes false eastings and northings in metres.
+        let factor = if short.ends_with("_0") && (*short == "x_0" || *short == "y_0") {
+            parameter.unit_metres().unwrap_or(metres)
+        } else {
+            1.0
+        };
+        words.push(format!("+{short}={}", value * factor));
+    }
+    // A cone with one parallel has it at the origin.
+    let latitude = words.iter().find_map(|word| word.strip_prefix("+lat_0="));
+    if *projection == "lcc" && !words.iter().any(|word| word.starts_with("+lat_1=")) {
+        words.push(format!("+lat_1={}", latitude?));
+    }
+    words.push(datum(&system)?);
+    words.push(format!("+to_meter={metres} +no_defs"));
+    Some(words.join(" "))
+}
+
+/// The ellipsoid, and the shift to WGS 84 where the text gives it; else none, which is off by a metre or two for NAD83 and ETRS89.
+fn datum(system: &WktNode) -> Option<String> {
+    let base = system.child(&["GEOGCS", "BASEGEOGCRS", "BASEGEODCRS"])?;
+    let datum = base.child(&["DATUM", "TRF", "GEODETICDATUM", "ENSEMBLE"])?;
+    let spheroid = datum.child(&["SPHEROID", "ELLIPSOID"])?;
+    let (axis, flattening) = (spheroid.number(1)?, spheroid.number(2)?);
+    let shift = match datum.child(&["TOWGS84"]) {
+        Some(shift) => (0..7).map(|k| shift.number(k).unwrap_or(0.0).to_string()).collect::<Vec<_>>().join(","),
+        None if is_close_to_wgs84(base) => "0,0,0".into(),
+        None => return None,
+    };
+    let greenwich = base.child(&["PRIMEM", "PRIMEMERIDIAN"]).is_none_or(|meridian| meridian.number(1) == Some(0.0));
+    let shape = if flattening > 0.0 { format!("+a={axis} +rf={flattening}") } else { format!("+a={axis} +b={axis}") };
+    greenwich.then(|| format!("{shape} +towgs84={shift}"))
+}
+
+/// Whether the datum is one of those that agree with WGS 84 to a metre or two.
+fn is_close_to_wgs84(base: &WktNode) -> bool {
+    let name = comparable_name(base.text(0).unwrap_or_default());
+    [
+        "wgs84",
+        "wgs1984",
+        "nad83",
+        "northamerican1983",
+        "etrs89",
+        "etrs1989",
+        "rgf93",
+        "rgf1993",
+        "gda94",
+        "gda2020",
+        "jgd20",
+    ]
+    .iter()
+    .any(|known| name.contains(known))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_code_gives_its_own_definition() {
+        let definition = definition(Some(26915), None).unwrap();
+        assert!(definition.contains("+proj=utm +zone=15"), "{definition}");
+    }
+
+    #[test]
+    fn a_text_in_feet_gives_metres() {
+        let text = r#"PROJCS["a",GEOGCS["GCS_North_American_1983_HARN",DATUM["d",SPHEROID["GRS 1980",6378137,298.25]],
+            PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]],PROJECTION["Lambert_Conformal_Conic_2SP"],
+            PARAMETER["standard_parallel_1",43],PARAMETER["standard_parallel_2",45.5],PARAMETER["latitude_of_origin",41.75],
+            PARAMETER["central_meridian",-120.5],PARAMETER["false_easting",1000],PARAMETER["false_northing",0],
+            UNIT["foot",0.3048]]"#;
+        assert_eq!(
+            definition(None, Some(text)).unwrap(),
+            "+proj=lcc +lat_1=43 +lat_2=45.5 +lat_0=41.75 +lon_0=-120.5 +x_0=304.8 +y_0=0 +a=6378137 +rf=298.25 +towgs84=0,0,0 \
+             +to_meter=0.3048 +no_defs"
+        );
+        // A datum that may be hundreds of metres off is not guessed.
+        let other = text.replace("GCS_North_American_1983_HARN", "European 1950");
+        assert_eq!(definition(None, Some(&other)), None);
+    }
+}

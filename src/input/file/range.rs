@@ -1,0 +1,112 @@
+//! A part of a file as a stream.
+
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::ops::Range;
+
+use crate::positional_io::read_at;
+
+/// What to say of a file that ends before its size.
+pub(crate) const SHRUNK: &str = "it became shorter while it was read; run again when it is complete";
+
+/// Bytes a [`FileRange`] reads at once.
+const BUFFER: usize = 1 << 16;
+
+/// A part of a file as a stream that ends where the part ends. Skipped bytes are not read.
+pub(crate) struct FileRange {
+    file: File,
+    /// Position in the file of the first byte after the buffer.
+    next: u64,
+    end: u64,
+    buffer: Vec<u8>,
+    at: usize,
+}
+
+impl FileRange {
+    /// A reader of the bytes of `range` of `file`.
+    pub(crate) fn new(file: File, range: Range<u64>) -> FileRange {
+        FileRange { file, next: range.start, end: range.end, buffer: Vec::new(), at: 0 }
+    }
+
+    /// Reads on into `out`, as much as is left of the part. That there is less in the file is an error.
+    fn read_direct(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        let size = self.end.saturating_sub(self.next).min(out.len() as u64) as usize;
+        if size == 0 {
+            return Ok(0);
+        }
+        match read_at(&self.file, &mut out[..size], self.next)? {
+            0 => Err(io::Error::other(SHRUNK)),
+            count => {
+                self.next += count as u64;
+                Ok(count)
+            }
+        }
+    }
+
+    fn refill(&mut self) -> io::Result<()> {
+        let mut buffer = std::mem::take(&mut self.buffer);
+        self.at = 0;
+        buffer.resize(BUFFER, 0);
+        let count = self.read_direct(&mut buffer)?;
+        buffer.truncate(count);
+        self.buffer = buffer;
+        Ok(())
+    }
+}
+
+impl Read for FileRange {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        if self.at == self.buffer.len() {
+            if out.len() >= BUFFER {
+                self.buffer.clear();
+                self.at = 0;
+                return self.read_direct(out);
+            }
+            self.refill()?;
+        }
+        let count = out.len().min(self.buffer.len() - self.at);
+        out[..count].copy_from_slice(&self.buffer[self.at..self.at + count]);
+        self.at += count;
+        Ok(count)
+    }
+
+    #[inline]
+    fn read_exact(&mut self, mut out: &mut [u8]) -> io::Result<()> {
+        // The arithmetic decoder asks for single bytes.
+        if let Some(bytes) = self.buffer.get(self.at..self.at + out.len()) {
+            out.copy_from_slice(bytes);
+            self.at += out.len();
+            return Ok(());
+        }
+        while !out.is_empty() {
+            match self.read(out) {
+                Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
+                Ok(count) => out = &mut out[count..],
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Seek for FileRange {
+    /// Positions are those of the file.
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        let here = self.next - (self.buffer.len() - self.at) as u64;
+        let target = match to {
+            SeekFrom::Start(position) => Some(position),
+            SeekFrom::Current(step) => here.checked_add_signed(step),
+            SeekFrom::End(step) => self.end.checked_add_signed(step),
+        };
+        let target = target.ok_or(io::ErrorKind::InvalidInput)?;
+        let first = self.next - self.buffer.len() as u64;
+        if (first..=self.next).contains(&target) {
+            self.at = (target - first) as usize;
+        } else {
+            (self.next, self.at) = (target, 0);
+            self.buffer.clear();
+        }
+        Ok(target)
+    }
+}

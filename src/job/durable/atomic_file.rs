@@ -1,0 +1,149 @@
+//! Files that appear under their name only when they are whole and on the disk.
+//!
+//! A step writes a file under its partial name ([`write_pending`]). [`publish`] brings it to the disk and then renames it.
+
+use crate::{Error, Result};
+use serde::Serialize;
+use std::collections::BTreeSet;
+use std::fs::{self, File};
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+use std::thread::ScopedJoinHandle;
+use xxhash_rust::xxh3::Xxh3;
+
+/// A file that a step has written under its [`partial_path`], until [`publish`] gives it its name.
+#[derive(Clone, Debug)]
+pub struct PendingFile {
+    /// Its final path.
+    pub path: PathBuf,
+    /// Its size in bytes.
+    pub bytes: u64,
+    /// The XXH3 of its content.
+    pub hash: u64,
+}
+
+/// Writes `content` under the [`partial_path`] of `path`.
+///
+/// # Errors
+/// [`Error::Io`] if writing fails.
+pub fn write_pending(path: &Path, content: &[u8]) -> Result<PendingFile> {
+    write_pending_pieces(path, &[content])
+}
+
+/// Writes the concatenated `pieces` under the [`partial_path`] of `path`.
+///
+/// # Errors
+/// [`Error::Io`] if writing fails.
+pub fn write_pending_pieces(path: &Path, pieces: &[&[u8]]) -> Result<PendingFile> {
+    let partial = partial_path(path);
+    let write = |mut file: File| pieces.iter().try_for_each(|piece| file.write_all(piece));
+    File::create(&partial).and_then(write).map_err(Error::io("write", &partial))?;
+    let mut hasher = Xxh3::new();
+    pieces.iter().for_each(|piece| hasher.update(piece));
+    let bytes = pieces.iter().map(|piece| piece.len() as u64).sum();
+    Ok(PendingFile { path: path.into(), bytes, hash: hasher.digest() })
+}
+
+/// Writes `value` as JSON under the [`partial_path`] of `path`.
+///
+/// # Errors
+/// [`Error::Io`] if writing fails.
+pub fn write_pending_json(path: &Path, value: &impl Serialize) -> Result<PendingFile> {
+    let mut text = serde_json::to_vec_pretty(value).map_err(|e| Error::Broken(format!("{}: {e}", path.display())))?;
+    text.push(b'\n');
+    write_pending(path, &text)
+}
+
+/// Returns the pending file of `path` when something else has written it under its [`partial_path`].
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be read.
+pub fn find_pending(path: &Path) -> Result<PendingFile> {
+    let (bytes, hash) = digest(&partial_path(path))?;
+    Ok(PendingFile { path: path.into(), bytes, hash })
+}
+
+/// Returns the size and the XXH3 of the file at `path`.
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be read.
+pub fn digest(path: &Path) -> Result<(u64, u64)> {
+    let mut file = File::open(path).map_err(Error::io("open", path))?;
+    let (mut hasher, mut bytes, mut buffer) = (Xxh3::new(), 0, vec![0; 1 << 18]);
+    loop {
+        let count = file.read(&mut buffer).map_err(Error::io("read", path))?;
+        if count == 0 {
+            return Ok((bytes, hasher.digest()));
+        }
+        hasher.update(&buffer[..count]);
+        bytes += count as u64;
+    }
+}
+
+/// Returns the name under which the file at `path` waits until it is whole.
+pub fn partial_path(path: &Path) -> PathBuf {
+    path.with_extension("partial")
+}
+
+/// How many threads wait for the disk at the same time.
+const PARALLEL_SYNCS: usize = 8;
+
+/// Gives pending files their names. A file is on the disk before its name is, and all names are on the disk before this returns.
+///
+/// # Errors
+/// [`Error::Io`] if a file cannot be synced or renamed.
+pub fn publish(paths: &[PathBuf]) -> Result<()> {
+    sync_partial_files(paths)?;
+    for path in paths {
+        fs::rename(partial_path(path), path).map_err(Error::io("rename the finished file to", path))?;
+    }
+    let folders: BTreeSet<&Path> = paths.iter().filter_map(|path| path.parent()).collect();
+    folders.into_iter().try_for_each(sync_directory)
+}
+
+/// Brings pending files to the disk on several threads: overlapping waits take little longer than one.
+fn sync_partial_files(paths: &[PathBuf]) -> Result<()> {
+    let share = paths.len().div_ceil(PARALLEL_SYNCS).max(1);
+    let sync = |paths: &[PathBuf]| paths.iter().try_for_each(|path| sync_file(&partial_path(path)));
+    std::thread::scope(|scope| {
+        let mut shares = paths.chunks(share);
+        let own = shares.next().unwrap_or_default();
+        let start = |share| std::thread::Builder::new().spawn_scoped(scope, move || sync(share)).map_err(|_| share);
+        let others: Vec<_> = shares.map(start).collect();
+        let own = sync(own);
+        // If a thread could not be started, this one does its share.
+        let join = |other| match other {
+            Ok(thread) => ScopedJoinHandle::join(thread).unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
+            Err(share) => sync(share),
+        };
+        others.into_iter().map(join).fold(own, Result::and)
+    })
+}
+
+fn sync_file(path: &Path) -> Result<()> {
+    let file = File::options().write(true).open(path).map_err(Error::io("open", path))?;
+    file.sync_all().map_err(Error::io("write", path))
+}
+
+/// Brings the names in `directory` to the disk, on systems that can.
+///
+/// # Errors
+/// [`Error::Io`] if that fails.
+fn sync_directory(directory: &Path) -> Result<()> {
+    if cfg!(not(unix)) {
+        return Ok(());
+    }
+    let file = File::open(directory).map_err(Error::io("open", directory))?;
+    file.sync_all().map_err(Error::io("write", directory))
+}
+
+/// Removes the file at `path` if it exists.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be removed.
+pub fn remove_file(path: &Path) -> Result<()> {
+    match fs::remove_file(path) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io("remove", path)(e)),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,53 @@
+//! The lock that keeps a second process out of a job directory.
+
+use crate::{Error, Result};
+use std::fs::{self, File, TryLockError};
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+
+/// A held lock. The system releases it with the process, so a kill leaves nothing to clean up.
+#[derive(Debug)]
+pub struct Lock {
+    _file: File,
+}
+
+impl Lock {
+    /// Creates the job directory `job` if need be and takes its lock. The lock file also marks the directory as a job's own.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the directory or the file cannot be made, [`Error::InUse`] if another process holds the lock,
+    /// [`Error::Config`] if the directory is not a job directory.
+    pub fn take(job: &Path) -> Result<Lock> {
+        // A kill can leave an empty directory.
+        let is_new = fs::read_dir(job).map_or(true, |mut entries| entries.next().is_none());
+        fs::create_dir_all(job).map_err(Error::io("create the directory", job))?;
+        let path = lock_file(job);
+        if !is_new && !path.exists() {
+            return Err(Error::Config(format!(
+                "{} exists and is not a job directory of this program: choose another [output] directory",
+                job.display()
+            )));
+        }
+        let file = File::options().read(true).write(true).create(true).truncate(false).open(&path);
+        let mut file = file.map_err(Error::io("open", &path))?;
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => {
+                let mut holder = String::new();
+                file.read_to_string(&mut holder).map_err(Error::io("read", &path))?;
+                return Err(Error::InUse { directory: job.into(), holder });
+            }
+            // Some network file systems have no locks: there a second job goes unnoticed.
+            Err(TryLockError::Error(e)) if e.kind() != std::io::ErrorKind::Unsupported => {
+                return Err(Error::io("lock", &path)(e));
+            }
+            _ => {}
+        }
+        file.set_len(0).and_then(|()| write!(file, "{}", std::process::id())).map_err(Error::io("write", &path))?;
+        Ok(Lock { _file: file })
+    }
+}
+
+/// Returns the path of the lock file of a job directory.
+pub fn lock_file(job: &Path) -> PathBuf {
+    job.join("lock")
+}

@@ -1,0 +1,143 @@
+//! Collecting points by bucket from many threads: each bucket has a buffer that is written to the point file when it is full.
+
+use crate::Result;
+use crate::input::Point;
+use crate::job::partition::point_file::{PointBlock, PointFile};
+use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// What one bucket holds.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Bucket {
+    /// Its blocks in the point file, in no particular order.
+    pub blocks: Vec<PointBlock>,
+    /// The number of points in them.
+    pub points: u64,
+}
+
+impl Bucket {
+    /// Removes the points whose numbers in the job are in one of `orders`, which ascend. Blocks with fewer points are written
+    /// again.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`] if its blocks cannot be read or written.
+    pub fn remove_records(&mut self, file: &PointFile, orders: &[Range<u64>]) -> Result<()> {
+        let is_wanted = |point: &Point| {
+            let order = point.order();
+            let after = orders.partition_point(|range| range.start <= order);
+            after == 0 || orders[after - 1].end <= order
+        };
+        for block in &mut self.blocks {
+            let points: Vec<Point> = file.read(*block)?.iter().copied().filter(is_wanted).collect();
+            if points.len() < block.points as usize {
+                *block = file.append(&points)?;
+            }
+        }
+        self.blocks.retain(|block| block.points > 0);
+        self.points = self.blocks.iter().map(|block| block.points as u64).sum();
+        Ok(())
+    }
+}
+
+/// Smaller blocks cost more system calls than their memory is worth.
+const LEAST_BLOCK: u64 = 64;
+/// Larger blocks read no faster.
+const LARGEST_BLOCK: u64 = 4096;
+
+/// Buckets that several threads fill at the same time.
+pub struct Buckets<'a> {
+    file: &'a PointFile,
+    /// Points that a buffer holds.
+    capacity: usize,
+    open: Vec<Mutex<OpenBucket>>,
+}
+
+#[derive(Default)]
+struct OpenBucket {
+    buffer: Vec<Point>,
+    bucket: Bucket,
+}
+
+impl<'a> Buckets<'a> {
+    /// Returns `count` empty buckets that together buffer at most `memory` bytes.
+    pub fn new(file: &'a PointFile, count: usize, memory: u64) -> Buckets<'a> {
+        let capacity = (memory / count as u64 / size_of::<Point>() as u64).clamp(LEAST_BLOCK, LARGEST_BLOCK) as usize;
+        Buckets { file, capacity, open: (0..count).map(|_| Mutex::default()).collect() }
+    }
+
+    /// Returns the bytes of one buffer where memory is ample.
+    pub fn largest_buffer() -> u64 {
+        LARGEST_BLOCK * size_of::<Point>() as u64
+    }
+
+    /// Adds `points`, which all belong to bucket `index`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`] if a full buffer cannot be written.
+    pub fn extend(&self, index: usize, mut points: &[Point]) -> Result<()> {
+        let mut open = lock(&self.open[index]);
+        while !points.is_empty() {
+            if open.buffer.capacity() == 0 {
+                open.buffer.reserve_exact(self.capacity);
+            }
+            let (now, later) = points.split_at(points.len().min(self.capacity - open.buffer.len()));
+            open.buffer.extend_from_slice(now);
+            points = later;
+            if open.buffer.len() == self.capacity {
+                self.flush(&mut open)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn flush(&self, open: &mut OpenBucket) -> Result<()> {
+        let block = self.file.append(&open.buffer)?;
+        open.bucket.blocks.push(block);
+        open.bucket.points += block.points as u64;
+        open.buffer.clear();
+        Ok(())
+    }
+
+    /// Writes what is still in the buffers and returns the buckets.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`] if a buffer cannot be written.
+    pub fn finish(self) -> Result<Vec<Bucket>> {
+        let finish = |open: &Mutex<OpenBucket>| {
+            let mut open = lock(open);
+            if !open.buffer.is_empty() {
+                self.flush(&mut open)?;
+            }
+            open.buffer = Vec::new();
+            Ok(std::mem::take(&mut open.bucket))
+        };
+        self.open.par_iter().map(finish).collect()
+    }
+}
+
+fn lock(open: &Mutex<OpenBucket>) -> MutexGuard<'_, OpenBucket> {
+    open.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_points_of_the_given_records_are_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = PointFile::create(&folder.path().join("points")).unwrap();
+        let buckets = Buckets::new(&file, 1, 0);
+        let points: Vec<Point> = (0..1000).map(|i| Point::new([i as i32, 0], 0, [0; 3], 0, i)).collect();
+        buckets.extend(0, &points).unwrap();
+        let mut bucket = buckets.finish().unwrap().remove(0);
+        bucket.remove_records(&file, &[0..1, 64..64, 100..300, 999..2000]).unwrap();
+        let mut orders = Vec::new();
+        bucket.blocks.iter().for_each(|&block| orders.extend(file.read(block).unwrap().iter().map(Point::order)));
+        assert_eq!(orders, (1..100).chain(300..999).collect::<Vec<u64>>());
+        assert_eq!(bucket.points, 798);
+        bucket.remove_records(&file, &[0..500, 500..1000]).unwrap();
+        assert_eq!(bucket, Bucket::default());
+    }
+}

@@ -1,0 +1,106 @@
+//! The input files: which ones the options name, and what their headers say.
+
+use crate::input::options::{InputOptions, OnBadFile};
+use crate::input::{Source, open};
+use crate::job::plan::job_plan::SkippedInput;
+use crate::{Error, Result};
+use rayon::prelude::*;
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+
+/// Returns the files that the options name, in their order, each once.
+///
+/// # Errors
+/// [`Error::Config`] if a pattern names none, [`Error::Io`] if a folder cannot be read.
+pub fn input_paths(options: &InputOptions) -> Result<Vec<PathBuf>> {
+    let (mut paths, mut known) = (Vec::new(), HashSet::new());
+    for pattern in &options.files {
+        let found = files_of(pattern)?;
+        if found.is_empty() {
+            return Err(Error::Config(format!("[input] files: {}", nothing_at(pattern))));
+        }
+        paths.extend(found.into_iter().filter(|path| known.insert(path.clone())));
+    }
+    Ok(paths)
+}
+
+/// Returns the files that match a pattern. A pattern without a match may be a file's name that only looks like a pattern.
+fn files_of(pattern: &str) -> Result<Vec<PathBuf>> {
+    let found = glob::glob(pattern).map_err(|e| Error::Config(format!("[input] files: {pattern}: {e}")))?;
+    let mut files = Vec::new();
+    for path in found {
+        files.push(path.map_err(|e| Error::io("read", e.path().to_path_buf())(e.into()))?);
+    }
+    files.retain(|path| path.is_file());
+    if files.is_empty() && Path::new(pattern).is_file() {
+        files.push(pattern.into());
+    }
+    Ok(files)
+}
+
+fn nothing_at(pattern: &str) -> String {
+    if Path::new(pattern).is_dir() {
+        let folder = pattern.trim_end_matches('/');
+        format!("{pattern} is a directory; name the files in it, for example {folder}/*.laz")
+    } else {
+        format!("there is no file {pattern}")
+    }
+}
+
+/// Opens all inputs. Where bad files are to be left out, returns them apart.
+///
+/// # Errors
+/// [`Error::Input`] if a file is bad and must not be left out, [`Error::Io`] if one cannot be read.
+pub fn open_all(options: &InputOptions) -> Result<(Vec<Source>, Vec<SkippedInput>)> {
+    let paths = input_paths(options)?;
+    let opened: Vec<Result<Source>> = paths.par_iter().map(|path| open(path, &options.csv)).collect();
+    let (mut sources, mut skipped) = (Vec::with_capacity(opened.len()), Vec::new());
+    for source in opened {
+        match source {
+            Err(Error::Input { path, what }) if options.on_bad_file == OnBadFile::Skip => {
+                skipped.push(SkippedInput { file: path, why: what });
+            }
+            // A file that the system cannot read may be sound: the program must not decide to leave it out.
+            source => sources.push(source?),
+        }
+    }
+    Ok((sources, skipped))
+}
+
+/// Returns a warning for every file beside the inputs that no pattern can name, because its name is not UTF-8.
+pub fn unreadable_names(options: &InputOptions) -> Vec<String> {
+    let folders: HashSet<&Path> = options.files.iter().filter_map(|p| Path::new(p).parent()).collect();
+    let entries = folders.into_iter().filter_map(|folder| std::fs::read_dir(folder).ok()).flatten().flatten();
+    let mut names: Vec<PathBuf> = entries.map(|e| e.path()).filter(|p| p.to_str().is_none() && p.is_file()).collect();
+    names.sort_unstable();
+    let warning = |name: PathBuf| format!("{}: left out, because its name is not UTF-8; rename it", name.display());
+    names.into_iter().map(warning).collect()
+}
+
+/// Checks that the files hold enough of the records that they promise: all files together, or each by itself where bad files are
+/// to be left out.
+///
+/// # Errors
+/// [`Error::Input`] names the first file that holds too few.
+pub fn check_missing_records(sources: &[Source], options: &InputOptions) -> Result<()> {
+    let records = sources.iter().map(|source| source.records).sum();
+    let is_too_much = |missing: u64, records: u64| missing as f64 > options.max_malformed_fraction.0 * records as f64;
+    let lacking = match options.on_bad_file {
+        OnBadFile::Skip => sources.iter().find(|s| is_too_much(s.missing, s.records)),
+        OnBadFile::Stop if is_too_much(sources.iter().map(|s| s.missing).sum(), records) => {
+            sources.iter().find(|s| s.missing > 0)
+        }
+        OnBadFile::Stop => None,
+    };
+    match lacking {
+        Some(first) => Err(Error::input(
+            &first.path,
+            format!(
+                "the header promises {} records, but {} of them are missing: the file is cut off or its header is wrong. Copy it \
+                 again, or raise [input] max_malformed_fraction to use what is there",
+                first.records, first.missing
+            ),
+        )),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,88 @@
+//! The plan of a job.
+
+use crate::geometry::Bounds;
+use crate::geometry::lattice::Lattice;
+use crate::input::Crs;
+use crate::input::PointRules;
+use crate::input::Source;
+use crate::job::durable::atomic_file::{PendingFile, write_pending_json};
+use crate::job::options::JobOptions;
+use crate::job::plan::lattice_choice::LatticeCoarsening;
+use crate::output::frame::Frame;
+use crate::{Error, Result, Warnings};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// What a job reads and where it puts it. The plan holds everything that the later steps need beside what earlier steps stored:
+/// no step looks at a header again, or computes anything again that depends on a machine's mathematics library.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// What the user wants.
+    pub options: JobOptions,
+    /// The inputs in their order.
+    pub inputs: Vec<PlannedInput>,
+    /// The inputs that are left out because they are bad.
+    pub skipped: Vec<SkippedInput>,
+    /// The number of records in all inputs.
+    pub records: u64,
+    /// How much coarser the lattice is than the inputs ask for.
+    pub coarsening: LatticeCoarsening,
+    /// The lattice that all sites lie on.
+    pub lattice: Lattice,
+    /// The box of the inputs on the lattice as their headers claim it, within `[input] bounds`.
+    pub extent: Bounds<2>,
+    /// The CRS of the job.
+    pub crs: Crs,
+    /// The name of the unit of x and y.
+    pub unit: String,
+    /// The way from the lattice to glTF.
+    pub frame: Frame,
+    /// What the user should know about the inputs. [`Plan::all_warnings`] adds what there is to know about the options.
+    pub warnings: Warnings,
+}
+
+/// An input and the rules for its points.
+#[derive(Clone, Debug)]
+pub struct PlannedInput {
+    /// What its header says.
+    pub source: Source,
+    /// How its points come to the lattice, and which of them are kept.
+    pub rules: PointRules,
+}
+
+/// An input that is left out because it is bad.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SkippedInput {
+    /// The file.
+    pub file: PathBuf,
+    /// What is wrong with it.
+    pub why: String,
+}
+
+impl Plan {
+    /// Returns what the user should know about the options and the inputs.
+    pub fn all_warnings(&self) -> Warnings {
+        let mut warnings = self.options.warnings.clone();
+        warnings.extend(self.warnings.clone());
+        warnings
+    }
+
+    /// Writes the plan as the pending file at `path`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if writing fails.
+    pub fn write(&self, path: &Path) -> Result<PendingFile> {
+        write_pending_json(path, &"STUB")
+    }
+
+    /// Reads the plan in the file at `path`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the file cannot be read, [`Error::Broken`] if it holds no plan.
+    pub fn read(path: &Path) -> Result<Plan> {
+        let text = std::fs::read(path).map_err(Error::io("read", path))?;
+        serde_json::from_slice::<String>(&text)
+            .map(|_| -> Plan { unimplemented!() })
+            .map_err(|e| Error::Broken(format!("{}: {e}", path.display())))
+    }
+}

@@ -1,0 +1,113 @@
+//! Estimates of the disk and the memory that a job needs.
+
+use crate::input::Point;
+use crate::job::levels::hierarchy::{BYTES_PER_LEVEL_SITE, LevelSizes};
+use crate::job::options::JobOptions;
+use crate::job::partition::tree_builder::buffer_bytes;
+use crate::job::plan::budget::{BYTES_PER_LEAF_SITE, read_buffer_memory};
+use crate::job::plan::job_plan::Plan;
+use crate::job::progress::machine;
+use crate::output::Compression;
+use crate::output::layout::OutputLayout;
+use crate::output::preview::canvas::{LONGER_SIDE, Texel};
+
+/// Bytes that the store takes for a site: its position, colour, class and two triangles.
+const STORE_PER_SITE: u64 = 12 + 6 + 1 + 2 * 12;
+/// Bytes that the store takes for a site on a tile's frontier, in all records that it is in.
+const STORE_PER_BORDER_SITE: u64 = 500;
+/// Bytes of a GLB besides its arrays.
+const RESULT_PER_TILE: u64 = 6000;
+/// The most pixels of the preview.
+const PIXELS: u64 = LONGER_SIDE * LONGER_SIDE;
+/// Bytes that a process takes before it has done anything.
+const PROCESS_MEMORY: u64 = 64 << 20;
+
+/// Returns the bytes of results for a site: position, normal, colour and two triangles with 16-bit corners.
+fn result_per_site(compression: Compression) -> u64 {
+    match compression {
+        Compression::None => 12 + 12 + 8 + 2 * 6,
+        Compression::Quantized => 8 + 4 + 4 + 2 * 6,
+        // What it takes for dense clouds, and half as much again for others.
+        Compression::Meshopt => 15,
+    }
+}
+
+/// About how many bytes a job's files take.
+pub(crate) struct DiskEstimate {
+    /// The point file.
+    pub(crate) points: u64,
+    /// The store.
+    pub(crate) store: u64,
+    /// The results.
+    pub(crate) results: u64,
+}
+
+impl DiskEstimate {
+    /// Returns the estimate for the job of `plan`. A `terrain.glb` is written for up to `max_one_file` triangles.
+    pub(crate) fn of(plan: &Plan, max_one_file: u64) -> DiskEstimate {
+        let (points, tiles) = (points(plan), tiles(plan));
+        let per_tile = plan.options.triangulation.max_points_per_tile.0;
+        DiskEstimate {
+            points: points * size_of::<Point>() as u64,
+            store: store_bytes(points, per_tile, tiles),
+            results: result_bytes(points, tiles, plan.options.output.packing(), max_one_file),
+        }
+    }
+}
+
+/// Tells whether the disk has ample room for all other files besides the points, which are there already.
+pub(crate) fn has_room_besides_points(plan: &Plan, max_one_file: u64) -> bool {
+    let DiskEstimate { store, results, .. } = DiskEstimate::of(plan, max_one_file);
+    machine::free_disk(&plan.options.output.directory).is_some_and(|free| (store + results) / 4 * 5 <= free)
+}
+
+/// Returns the number of records, except those known to be missing.
+fn points(plan: &Plan) -> u64 {
+    plan.records - plan.inputs.iter().map(|input| input.source.missing).sum::<u64>()
+}
+
+/// Returns about how many tiles there will be: tiles come out between half full and full.
+pub(crate) fn tiles(plan: &Plan) -> u64 {
+    (points(plan) * 4).div_ceil(plan.options.triangulation.max_points_per_tile.0 * 3)
+}
+
+fn store_bytes(points: u64, per_tile: u64, tiles: u64) -> u64 {
+    // A tile of n sites has about 2.2 sqrt(n) on its frontier.
+    let border_sites = (2.2 * (per_tile.min(points) as f64).sqrt()) as u64 * tiles;
+    points * STORE_PER_SITE + border_sites * STORE_PER_BORDER_SITE + PIXELS * size_of::<Texel>() as u64
+}
+
+fn result_bytes(points: u64, tiles: u64, compression: Compression, max_one_file: u64) -> u64 {
+    let in_tiles = points * result_per_site(compression) + tiles * RESULT_PER_TILE;
+    // terrain.glb is never packed with meshopt.
+    let unpacked = if compression == Compression::None { Compression::None } else { Compression::Quantized };
+    let in_one_file = if 2 * points <= max_one_file { points * result_per_site(unpacked) } else { 0 };
+    // Levels add about a third.
+    in_tiles + in_one_file + in_tiles / 2 + 4 * PIXELS
+}
+
+/// Returns about how many bytes of memory the job of `plan` takes on `threads` threads.
+pub(crate) fn memory(plan: &Plan, threads: usize) -> u64 {
+    let (options, points) = (&plan.options, points(plan));
+    let per_tile = options.triangulation.max_points_per_tile.0;
+    let leaves = per_tile.min(points) * BYTES_PER_LEAF_SITE * threads as u64;
+    let levels = level_memory(options, points, threads);
+    let buffers = buffer_bytes(points, per_tile, read_buffer_memory(options));
+    PROCESS_MEMORY + leaves.max(levels).max(buffers)
+}
+
+fn level_memory(options: &JobOptions, points: u64, threads: usize) -> u64 {
+    let sizes = LevelSizes::new(options.output.max_points_per_level_tile.0, options.limits.memory.0);
+    let one = (4 * sizes.sites).min(points) * BYTES_PER_LEVEL_SITE;
+    if options.output.levels { (one * threads as u64).min(sizes.memory) } else { 0 }
+}
+
+/// Returns the bytes of the files that an earlier job left and that this one replaces.
+pub(crate) fn replaced_bytes(plan: &Plan) -> u64 {
+    let output = OutputLayout::new(&plan.options.output.directory);
+    let mut folders = vec![output.directory().to_path_buf(), output.job()];
+    folders.extend(output.glb_folders());
+    let entries = folders.iter().filter_map(|folder| std::fs::read_dir(folder).ok());
+    let files = entries.flatten().flatten().filter_map(|entry| entry.metadata().ok()).filter(|meta| meta.is_file());
+    files.map(|meta| meta.len()).sum()
+}

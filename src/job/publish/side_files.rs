@@ -1,0 +1,58 @@
+//! Writing the files beside the tiles: the georeference, the preview, `tileset.json` and `terrain.glb`.
+
+use crate::Result;
+use crate::job::durable::atomic_file::{find_pending, partial_path, write_pending};
+use crate::job::durable::columns::ColumnReader;
+use crate::job::durable::directory::JobDirectory;
+use crate::job::index::TileIndex;
+use crate::job::records::{StepOutput, StepRecord, Store};
+use crate::output::gltf::one_file::write_terrain;
+use crate::output::preview::canvas::{Canvas, Texel};
+use crate::output::preview::picture::Picture;
+
+/// What the files beside the tiles hold.
+pub struct SideFiles {
+    /// The text of `georeference.json`.
+    pub georeference: String,
+    /// The text of `tileset.json`, if there is to be one.
+    pub tileset: Option<String>,
+    /// Whether there is to be a `terrain.glb`. It is made from the tiles, which must have their names.
+    pub one_file: bool,
+}
+
+/// Writes the files beside the tiles and returns the number of their bytes.
+///
+/// # Errors
+/// [`crate::Error::Io`] on the output or the store, [`crate::Error::Broken`] if they are not what earlier steps wrote.
+pub fn write_side_files(
+    directory: &JobDirectory,
+    store: &Store,
+    content: &SideFiles,
+    canvas: &Canvas,
+    tiles: usize,
+) -> Result<StepOutput<u64>> {
+    let output = directory.output();
+    let mut files = vec![
+        write_pending(&output.georeference(), content.georeference.as_bytes())?,
+        write_pending(&output.preview(), &draw_preview(store, canvas, tiles)?)?,
+    ];
+    if let Some(tileset) = &content.tileset {
+        files.push(write_pending(&output.tileset(), tileset.as_bytes())?);
+    }
+    if content.one_file {
+        let paths: Vec<_> = (0..tiles).map(|tile| output.tile(tile)).filter(|path| path.exists()).collect();
+        write_terrain(&partial_path(&output.terrain()), &paths)?;
+        files.push(find_pending(&output.terrain())?);
+    }
+    let bytes = files.iter().map(|file| file.bytes).sum();
+    Ok(StepOutput { files, ..StepOutput::new(bytes, Vec::new()) })
+}
+
+/// Returns the preview as PNG.
+fn draw_preview(store: &Store, canvas: &Canvas, tiles: usize) -> Result<Vec<u8>> {
+    let mut picture = Picture::new(canvas);
+    for tile in (0..tiles).map(TileIndex::new) {
+        picture.add(tile.0, &ColumnReader::open(store, StepRecord::Pixels(tile))?.column::<Texel>()?);
+    }
+    Ok(picture.png())
+}

@@ -1,0 +1,183 @@
+//! The report of a finished job, as `report.json` holds it for machines.
+
+use crate::Warnings;
+use crate::geometry::lattice::Lattice;
+use crate::input::PointCounts;
+use crate::job::levels::level::LevelStats;
+use crate::job::mesh::leaf::LeafStats;
+use crate::job::plan::job_plan::{Plan, SkippedInput};
+use crate::job::progress::clock::JobClock;
+use crate::job::progress::machine;
+use crate::job::progress::stats::StageStats;
+use crate::job::progress::text::grouped;
+use crate::job::tiles::write_tile::TileStats;
+use crate::voronoi::counts::STEP_NAMES;
+use serde::{Deserialize, Serialize};
+
+/// The report of a finished job.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Report {
+    /// Program and version.
+    pub generator: String,
+    /// Distinct sites in the mesh.
+    pub sites: u64,
+    /// Triangles in all tiles.
+    pub triangles: u64,
+    /// Triangles that `max_edge` left out. They are in `cut`.
+    #[serde(default)]
+    pub cut_triangles: u64,
+    /// GLB files in `tiles`.
+    pub tiles: u64,
+    /// The coarser tiles in `levels`.
+    pub levels: LevelStats,
+    /// The share of the triangles that cross a border between tiles.
+    pub seam_share: f64,
+    /// Points that were dropped because another has the same x and y.
+    pub duplicates: u64,
+    /// The number of inputs that were read.
+    pub files: usize,
+    /// The inputs that were left out because they are bad. No other figure counts them.
+    pub skipped: Vec<SkippedInput>,
+    /// Numbers of records by what became of them.
+    pub points: PointCounts,
+    /// How the leaves were triangulated.
+    pub leaves: LeafStats,
+    /// The GPU that helped; `None` without one.
+    pub gpu: Option<String>,
+    /// What each step of the pipeline took for all leaves together.
+    pub steps: PipelineTimes,
+    /// The lattice.
+    pub lattice: Lattice,
+    /// Unit of x and y.
+    pub unit: String,
+    /// Name of the CRS.
+    pub crs: Option<String>,
+    /// Bytes of all results.
+    pub bytes_written: u64,
+    /// The most bytes that temporary files took.
+    pub bytes_temporary: u64,
+    /// The largest resident set of the process, in bytes; `None` where the system does not tell.
+    pub peak_memory: Option<u64>,
+    /// The memory the job was given, in bytes.
+    pub memory_limit: u64,
+    /// Worker threads.
+    pub threads: usize,
+    /// The number of steps that an interrupted run had finished. The stages do not include their times.
+    pub resumed: u64,
+    /// Seconds from start to end.
+    pub wall_s: f64,
+    /// Seconds of processor time of all threads, including those of no stage.
+    #[serde(default)]
+    pub cpu_s: f64,
+    /// The stages in the order in which they begin. Some run at the same time.
+    pub stages: Vec<StageStats>,
+    /// What the user should know.
+    pub warnings: Warnings,
+}
+
+/// Seconds by step of the pipeline.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct PipelineTimes {
+    /// Processor time of all worker threads together.
+    pub cpu: Vec<StepSeconds>,
+    /// Time on the GPU, if it tells.
+    pub gpu: Vec<StepSeconds>,
+}
+
+/// The time of one step.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct StepSeconds {
+    /// Its name in the paper.
+    pub step: String,
+    /// Seconds.
+    pub seconds: f64,
+}
+
+impl PipelineTimes {
+    fn new(leaves: &LeafStats, gpu: &[(&'static str, f64)]) -> PipelineTimes {
+        let named = |(step, seconds): (&str, f64)| StepSeconds { step: step.into(), seconds };
+        let nanoseconds = leaves.outcome.counts.nanoseconds;
+        let cpu =
+            STEP_NAMES.into_iter().zip(nanoseconds.map(|ns| ns as f64 / 1e9)).filter(|(_, seconds)| *seconds > 0.0);
+        PipelineTimes { cpu: cpu.map(named).collect(), gpu: gpu.iter().copied().map(named).collect() }
+    }
+}
+
+/// What a report is put together from.
+pub struct ReportParts {
+    /// What was read.
+    pub points: PointCounts,
+    /// The sum over all leaves.
+    pub leaves: LeafStats,
+    /// The GPU that helped.
+    pub gpu: Option<String>,
+    /// Seconds by step on that GPU.
+    pub gpu_steps: Vec<(&'static str, f64)>,
+    /// The sum over all tiles.
+    pub tiles: TileStats,
+    /// The sum over all coarser tiles.
+    pub levels: LevelStats,
+    /// What the user should know about the results.
+    pub warnings: Warnings,
+    /// Bytes of results besides the tiles.
+    pub other_bytes: u64,
+    /// Bytes of temporary files.
+    pub temporary: u64,
+    /// The stages.
+    pub stages: Vec<StageStats>,
+    /// Worker threads.
+    pub threads: usize,
+    /// The memory limit in bytes.
+    pub memory: u64,
+    /// Steps that an interrupted run had finished.
+    pub resumed: u64,
+    /// The start of the job.
+    pub clock: JobClock,
+}
+
+impl Report {
+    /// Puts the report together.
+    pub fn new(plan: &Plan, parts: ReportParts) -> Report {
+        let mut warnings = plan.all_warnings();
+        let rounded = |count: u64, what: &str, step| {
+            format!("{} points were rounded in {what} to steps of {step}", grouped(count))
+        };
+        if parts.points.rounded_xy > 0 {
+            warnings.push(rounded(parts.points.rounded_xy, "x or y", plan.lattice.resolution));
+        }
+        if parts.points.rounded_z > 0 {
+            warnings.push(rounded(parts.points.rounded_z, "z", plan.lattice.resolution_z));
+        }
+        warnings.extend(parts.points.examples.iter().cloned());
+        warnings.extend(parts.warnings);
+        Report {
+            generator: concat!("gdt-batch ", env!("CARGO_PKG_VERSION")).into(),
+            sites: parts.leaves.sites,
+            triangles: parts.tiles.triangles,
+            cut_triangles: parts.tiles.cut_triangles,
+            tiles: parts.tiles.files,
+            levels: parts.levels,
+            seam_share: parts.tiles.seam_triangles as f64 / parts.tiles.triangles.max(1) as f64,
+            duplicates: parts.leaves.duplicates,
+            files: plan.inputs.len(),
+            skipped: plan.skipped.clone(),
+            points: parts.points,
+            leaves: parts.leaves,
+            gpu: parts.gpu,
+            steps: PipelineTimes::new(&parts.leaves, &parts.gpu_steps),
+            lattice: plan.lattice.clone(),
+            unit: plan.unit.clone(),
+            crs: plan.crs.name.clone(),
+            bytes_written: parts.tiles.bytes + parts.levels.bytes + parts.other_bytes,
+            bytes_temporary: parts.temporary,
+            peak_memory: machine::peak_memory(),
+            memory_limit: parts.memory,
+            threads: parts.threads,
+            resumed: parts.resumed,
+            wall_s: parts.clock.wall_s(),
+            cpu_s: parts.clock.cpu_s(),
+            stages: parts.stages,
+            warnings,
+        }
+    }
+}

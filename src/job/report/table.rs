@@ -1,0 +1,84 @@
+//! The report as a table for people.
+
+use crate::job::progress::text::{grouped, precise_mebibytes};
+use crate::job::report::job_report::{Report, StepSeconds};
+use crate::job::report::skipped::write_skipped;
+use crate::triangulation::TriangulationCounts;
+use std::fmt;
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{:<12} {:>9} {:>9} {:>9} {:>14}  rate", "stage", "from s", "wall s", "cpu s", "done")?;
+        for stage in &self.stages {
+            let rate = if stage.done > 0 { stage.done as f64 / stage.wall_s.max(1e-9) } else { 0.0 };
+            writeln!(
+                f,
+                "{:<12} {:>9.2} {:>9.2} {:>9.2} {:>14}  {} {}/s",
+                stage.stage,
+                stage.start_s,
+                stage.wall_s,
+                stage.cpu_s,
+                grouped(stage.done),
+                grouped(rate as u64),
+                stage.unit
+            )?;
+        }
+        writeln!(f, "{:<12} {:>9} {:>9.2} {:>9.2}\n", "all", "", self.wall_s, self.cpu_s)?;
+        for (unit, steps) in [("cpu s", &self.steps.cpu), ("gpu s", &self.steps.gpu)] {
+            for (i, StepSeconds { step, seconds }) in steps.iter().enumerate() {
+                let head = if i == 0 { format!("triangulate by step, {unit}") } else { String::new() };
+                writeln!(f, "{head:<28} {step:<40} {seconds:>9.2}")?;
+            }
+        }
+        let mut row = |name: &str, value: String| writeln!(f, "{name:<28} {value}");
+        row("points read", grouped(self.points.read))?;
+        row("  withheld", grouped(self.points.withheld))?;
+        row("  of other classes", grouped(self.points.other_class))?;
+        row("  out of bounds", grouped(self.points.out_of_bounds))?;
+        row("  malformed", grouped(self.points.malformed))?;
+        row("  duplicates in x, y", grouped(self.duplicates))?;
+        row("sites", grouped(self.sites))?;
+        row("triangles", grouped(self.triangles))?;
+        row("  crossing tile borders", format!("{:.3} %", self.seam_share * 100.0))?;
+        if self.cut_triangles > 0 {
+            row("  left out (max_edge)", grouped(self.cut_triangles))?;
+        }
+        row("tiles", grouped(self.tiles))?;
+        if self.levels.files > 0 {
+            let levels = &self.levels;
+            row("coarser tiles", format!("{}, at most {:.2} m off", grouped(levels.files), levels.error_m))?;
+        }
+        let TriangulationCounts { pipeline, reference, crowded, not_accepted, counts } = &self.leaves.outcome;
+        let leaves = pipeline + reference + crowded + not_accepted;
+        row(
+            "leaves",
+            format!(
+                "{}, of them by spade {} ({crowded} crowded, {not_accepted} not accepted, {reference} other)",
+                grouped(leaves),
+                grouped(leaves - pipeline)
+            ),
+        )?;
+        row("  sites moved to other pixels", grouped(counts.moved))?;
+        row("  sites missing, inserted", grouped(counts.missing))?;
+        row(
+            "  inverted triangles",
+            format!("{}, sites taken out {}", grouped(counts.inverted), grouped(counts.removed)),
+        )?;
+        row("  edges flipped", grouped(counts.flips))?;
+        if let Some(gpu) = &self.gpu {
+            row("  with the help of a GPU", format!("{} ({gpu})", grouped(self.leaves.outcome.counts.on_gpu)))?;
+        }
+        row("lattice step", format!("{} (z {}) {}", self.lattice.resolution, self.lattice.resolution_z, self.unit))?;
+        row("written", precise_mebibytes(self.bytes_written))?;
+        row("temporary files", precise_mebibytes(self.bytes_temporary))?;
+        if self.resumed > 0 {
+            row("steps taken over", format!("{} of an interrupted run", grouped(self.resumed)))?;
+        }
+        let peak = self.peak_memory.map_or("unknown".into(), precise_mebibytes);
+        row("peak memory", format!("{peak} of {}", precise_mebibytes(self.memory_limit)))?;
+        for warning in self.warnings.iter() {
+            writeln!(f, "warning: {warning}")?;
+        }
+        write_skipped(f, self.files, &self.skipped)
+    }
+}

@@ -1,0 +1,155 @@
+//! Attempts at a job: each begins where the last run stopped, and ends with a clean directory or with steps to go on from. If the
+//! finished mesh proves too fine for single precision, another attempt takes a coarser lattice.
+
+use crate::job::durable::directory::JobDirectory;
+use crate::job::durable::lock::Lock;
+use crate::job::options::{JobOptions, RunOptions};
+use crate::job::partition::result::Partition;
+use crate::job::plan::budget::workers;
+use crate::job::plan::fingerprint::{Fingerprint, JobHeader};
+use crate::job::plan::job_plan::Plan;
+use crate::job::plan::lattice_choice::LatticeCoarsening;
+use crate::job::plan::scan::make_plan;
+use crate::job::preflight::check::Preflight;
+use crate::job::progress::clock::JobClock;
+use crate::job::progress::stage::JobProgress;
+use crate::job::report::job_report::Report;
+use crate::job::run::context::RunContext;
+use crate::job::run::read_step::note_skipped;
+use crate::job::run::resume::{self, EarlierRun, RunStart};
+use crate::job::run::stage_costs::stage_costs;
+use crate::job::run::threads::on_threads;
+use crate::triangulation::Triangulator;
+use crate::{Error, Result};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Give up after this many tenfold coarsenings: what is left is no terrain.
+const MAX_COARSENINGS: u32 = 6;
+
+/// The walk of a job through the steps after the plan. The partition is that of an earlier run, if one read the points.
+pub(crate) type Walk = fn(&RunContext, Plan, Option<Partition>) -> Result<Report>;
+
+/// What all attempts at a job have in common.
+struct JobRequest<'a> {
+    options: &'a JobOptions,
+    run: RunOptions,
+    triangulator: Triangulator,
+    directory: JobDirectory,
+    fingerprint: Fingerprint,
+    clock: JobClock,
+    walk: Walk,
+}
+
+/// Runs a job, or what an interrupted run left of it.
+///
+/// # Errors
+/// See [`crate::job::run`].
+pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, walk: Walk) -> Result<Report> {
+    let clock = JobClock::start();
+    // First of all, so that a job that must have a GPU fails at once if there is none.
+    let memory = options.limits.memory.0;
+    let triangulator = Triangulator::new(&options.triangulation, &options.gpu, memory, options.threads())?;
+    let directory = JobDirectory::new(&options.output.directory);
+    directory.check_nothing_in_the_way()?;
+    let fingerprint = on_threads(workers(options, 0)?, || Fingerprint::of(options))?;
+    let (mut lock, mut earlier) = (None, None);
+    if directory.journal().exists() {
+        lock = Some(directory.lock()?);
+        earlier = EarlierRun::read(&directory)?;
+    }
+    if let Some(earlier) = earlier.as_mut().filter(|_| run.restart) {
+        earlier.forget_steps();
+    }
+    let job = JobRequest { options, run, triangulator, directory, fingerprint, clock, walk };
+    let mut coarsening = earlier.as_ref().map_or_else(Default::default, |run| run.coarsening(&job.fingerprint));
+    loop {
+        let outcome = attempt(&job, coarsening, earlier.take(), lock.take());
+        // Only the finished mesh knows its longest triangle. To round in advance would often round for nothing.
+        let Err(Error::TooFine { vertical, what }) = outcome else { return outcome };
+        let (power, axes) = match vertical {
+            true => (&mut coarsening.vertical, "z"),
+            false => (&mut coarsening.horizontal, "x and y"),
+        };
+        let may_coarsen = vertical || options.input.resolution.0.is_none();
+        if !may_coarsen || *power >= MAX_COARSENINGS {
+            return Err(Error::TooFine { vertical, what });
+        }
+        run.progress.note(&format!("{what}; starting again with a coarser step in {axes}"));
+        *power += 1;
+    }
+}
+
+fn attempt(
+    job: &JobRequest,
+    coarsening: LatticeCoarsening,
+    earlier: Option<EarlierRun>,
+    lock: Option<Lock>,
+) -> Result<Report> {
+    let JobRequest { options, run, ref directory, clock, .. } = *job;
+    let header = JobHeader { fingerprint: job.fingerprint.clone(), coarsening };
+    let stage = JobProgress::new(run.progress, clock, Vec::new()).stage("plan", 1, "job");
+    let plan = match earlier.as_ref().and_then(|earlier| earlier.plan(directory, &header, options)) {
+        Some(plan) => plan,
+        None => on_threads(workers(options, 0)?, || make_plan(options, coarsening))?,
+    };
+    stage.advance(1);
+    let planned = stage.finish();
+    let progress = &JobProgress::new(run.progress, clock, stage_costs(&plan));
+    note_skipped(&plan.skipped, progress);
+    let threads = workers(options, plan.records)?;
+    if !run.force {
+        Preflight::of(&plan, threads).passes()?;
+    }
+    directory.check_results_are_ours()?;
+    let _lock = lock.map_or_else(|| directory.lock(), Ok)?;
+    if let Some(earlier) = &earlier {
+        if let Some(report) = earlier.complete_report(directory, &header)? {
+            progress.note("the interrupted run had written all its results");
+            on_threads(threads, || directory.remove_job())?;
+            return Ok(report);
+        }
+    }
+    on_threads(threads, || {
+        let start = resume::start(directory, &header, earlier, options.output.max_edge, run.progress)?;
+        let RunStart { store, journal, partition, kept, has_partial_results } = start;
+        let context = RunContext {
+            triangulator: &job.triangulator,
+            directory,
+            store: &store,
+            journal: &journal,
+            progress,
+            threads,
+            clock,
+            kept,
+            has_partial_results: AtomicBool::new(has_partial_results),
+            stages: Mutex::new(vec![planned]),
+        };
+        let outcome = (job.walk)(&context, plan, partition);
+        let has_partial_results = context.has_partial_results.load(Ordering::Relaxed);
+        drop(context);
+        // Finished steps reach the disk before a message says that they are kept.
+        let steps = journal.close();
+        // An open file is not freed when it is removed.
+        drop(store);
+        end(directory, outcome, steps, has_partial_results)
+    })
+}
+
+/// Ends an attempt: keeps the finished steps if the job can go on from them, or else removes them.
+fn end(directory: &JobDirectory, outcome: Result<Report>, steps: u64, has_partial_results: bool) -> Result<Report> {
+    match outcome {
+        Err(why) if why.exit_code() == 1 && steps > 0 => {
+            Err(Error::Resumable { why: Box::new(why), steps, job: directory.job().into() })
+        }
+        outcome => {
+            let withdrawn = match outcome.is_err() && has_partial_results {
+                true => directory.withdraw_results(),
+                false => Ok(()),
+            };
+            // The first error is the one to report.
+            let cleaned = withdrawn.and_then(|()| directory.remove_job());
+            outcome.and_then(|report| cleaned.map(|()| report))
+        }
+    }
+}

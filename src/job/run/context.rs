@@ -1,0 +1,64 @@
+//! What the steps of a running job share.
+
+use crate::Result;
+use crate::job::durable::atomic_file::remove_file;
+use crate::job::durable::directory::JobDirectory;
+use crate::job::durable::journal::JournalPosition;
+use crate::job::progress::clock::JobClock;
+use crate::job::progress::stage::{JobProgress, Stage};
+use crate::job::progress::stats::StageStats;
+use crate::job::records::{JobStep, Journal, Store};
+use crate::triangulation::Triangulator;
+use std::collections::HashSet;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// A run whose directory is locked, with its store and journal.
+pub(crate) struct RunContext<'a> {
+    pub(crate) triangulator: &'a Triangulator,
+    pub(crate) directory: &'a JobDirectory,
+    pub(crate) store: &'a Store,
+    pub(crate) journal: &'a Journal<'a>,
+    pub(crate) progress: &'a JobProgress,
+    pub(crate) threads: usize,
+    pub(crate) clock: JobClock,
+    /// The results of an earlier run that stay, as the journal names them.
+    pub(crate) kept: HashSet<PathBuf>,
+    /// Whether the output directory may hold a part of this job's results.
+    pub(crate) has_partial_results: AtomicBool,
+    /// The stages that have ended.
+    pub(crate) stages: Mutex<Vec<StageStats>>,
+}
+
+impl RunContext<'_> {
+    /// Counts the units of `step` as done, by this run or by an earlier one.
+    pub(crate) fn count(&self, stage: &Stage, step: JobStep, amount: u64) {
+        if self.journal.has(step) { stage.take_over(amount) } else { stage.advance(amount) }
+    }
+
+    /// Adds a stage to the report.
+    pub(crate) fn add_stage(&self, stage: StageStats) {
+        self.stages().push(stage);
+    }
+
+    /// Returns the stages that have ended.
+    pub(crate) fn stages(&self) -> MutexGuard<'_, Vec<StageStats>> {
+        self.stages.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Notes that from now on the output directory holds a part of this job's results, and removes those of an earlier job.
+    pub(crate) fn begin_results(&self) -> Result<()> {
+        self.has_partial_results.store(true, Ordering::Relaxed);
+        self.directory.remove_results(&self.kept)
+    }
+
+    /// Removes the points. At `all_leaves` the journal has all leaves: from there on the store is enough.
+    pub(crate) fn remove_points(&self, all_leaves: JournalPosition) -> Result<()> {
+        self.journal.commit_to(all_leaves)?;
+        if self.journal.is_worth_syncing() {
+            self.store.sync()?;
+        }
+        remove_file(&self.directory.points())
+    }
+}

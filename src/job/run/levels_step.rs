@@ -1,0 +1,76 @@
+//! Running step 7 for all coarser tiles.
+
+use crate::Result;
+use crate::job::levels::hierarchy::{Hierarchy, LevelSizes};
+use crate::job::levels::level::{LevelStats, make_level};
+use crate::job::partition::result::Partition;
+use crate::job::plan::job_plan::Plan;
+use crate::job::records::JobStep;
+use crate::job::run::context::RunContext;
+use crate::job::run::threads::on_threads;
+use crate::job::tiles::style::TileStyle;
+use rayon::prelude::*;
+
+/// The coarser tiles of a job.
+pub(crate) struct LevelResult {
+    pub(crate) hierarchy: Hierarchy,
+    pub(crate) stats: LevelStats,
+    pub(crate) warning: Option<String>,
+}
+
+/// Makes the coarser tiles. Those of one height are made in parallel, as many at a time as the memory has room for.
+///
+/// # Errors
+/// Those of [`make_level`].
+pub(crate) fn make_levels(
+    run: &RunContext,
+    plan: &Plan,
+    partition: &Partition,
+    style: &TileStyle,
+) -> Result<LevelResult> {
+    let output = &plan.options.output;
+    let points: Vec<u64> = partition.tree.tiles().map(|tile| partition.points(tile)).collect();
+    let sizes = LevelSizes::new(output.max_points_per_level_tile.0, plan.options.limits.memory.0);
+    let hierarchy = Hierarchy::new(&partition.tree, &points, sizes);
+    let stage = run.progress.stage("levels", hierarchy.tiles.len() as u64, "tiles");
+    let parallel = match hierarchy.largest() {
+        largest if output.levels && largest > 0 => (sizes.memory / largest).clamp(1, run.threads as u64) as usize,
+        _ => run.threads,
+    };
+    let make = |index: usize| {
+        let work = || make_level(run.directory, run.store, &hierarchy, index, style, sizes, output.levels);
+        let stats = run.journal.step(JobStep::Level(hierarchy.tiles[index].node), work)?;
+        stage.advance(1);
+        Ok(stats)
+    };
+    let sum = |mut a: LevelStats, b| {
+        a += b;
+        Ok(a)
+    };
+    let stats = on_threads(parallel, || {
+        let mut all = LevelStats::default();
+        for height in hierarchy.by_height() {
+            if output.levels {
+                // A level reads the tiles below, which must have their names.
+                run.journal.commit()?;
+            }
+            all += height.into_par_iter().with_max_len(1).map(make).try_reduce(LevelStats::default, sum)?;
+        }
+        Ok(all)
+    })?;
+    run.add_stage(stage.finish());
+    let warning = left_out_warning(plan, &hierarchy);
+    Ok(LevelResult { hierarchy, stats, warning })
+}
+
+fn left_out_warning(plan: &Plan, hierarchy: &Hierarchy) -> Option<String> {
+    let without = hierarchy.tiles.iter().filter(|tile| !tile.content).count();
+    (plan.options.output.levels && without > 0).then(|| {
+        format!(
+            "{without} of {} coarser tiles are left out, because the tiles below them are too large for [limits] memory = \"{}\": \
+             viewers load the finer ones at once; lower [triangulation] max_points_per_tile or raise memory",
+            hierarchy.tiles.len(),
+            plan.options.limits.memory
+        )
+    })
+}

@@ -1,0 +1,47 @@
+//! How the tiles of a job look. All tiles have one style, so that they fit together.
+
+use crate::geometry::Bounds;
+use crate::job::partition::result::PointSummary;
+use crate::job::plan::job_plan::Plan;
+use crate::job::tiles::max_edge::MaxEdgeRule;
+use crate::output::Compression;
+use crate::output::color::Coloring;
+use crate::output::frame::Frame;
+use crate::output::options::ColorChoice;
+
+/// How tiles look.
+#[derive(Debug)]
+pub struct TileStyle {
+    /// Where lattice integers lie in a glTF scene.
+    pub frame: Frame,
+    /// Where colours come from; `None` for no colours.
+    pub coloring: Option<Coloring>,
+    /// Whether vertices carry normals.
+    pub normals: bool,
+    /// How tiles are packed.
+    pub compression: Compression,
+    /// Which triangles are left out.
+    pub max_edge: MaxEdgeRule,
+}
+
+impl TileStyle {
+    /// Returns the style of the tiles of a job whose points are within `bounds`.
+    pub fn new(plan: &Plan, summary: &PointSummary, bounds: Bounds<3>, max_edge: MaxEdgeRule) -> TileStyle {
+        let output = &plan.options.output;
+        let max_rgb = summary.counts.max_rgb;
+        let elevation = Coloring::Elevation { low: bounds.min[2], high: bounds.max[2] };
+        let coloring = match output.color {
+            ColorChoice::None => None,
+            ColorChoice::Class => Some(Coloring::Class),
+            ColorChoice::Elevation => Some(elevation),
+            ColorChoice::Auto | ColorChoice::Rgb if max_rgb == 0 => Some(elevation),
+            ColorChoice::Auto | ColorChoice::Rgb => Some(Coloring::Rgb { eight_bit: max_rgb <= 255 }),
+        };
+        let compression = output.packing();
+        let frame = match compression {
+            Compression::None => plan.frame.clone().refined([bounds.min, bounds.max]),
+            _ => plan.frame.clone().packed(),
+        };
+        TileStyle { frame, coloring, normals: output.normals, compression, max_edge }
+    }
+}

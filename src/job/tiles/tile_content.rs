@@ -1,0 +1,142 @@
+//! Putting a tile together: the triangles of its leaf, then those of the seam that it owns, with finished normals and colours.
+
+use crate::job::index::TileIndex;
+use crate::job::records::{BorderVertex, FinishedBorder, Leaf, SeamTriangle, Store};
+use crate::job::tiles::style::TileStyle;
+use crate::output::Tile;
+use crate::output::normals::Sums;
+use crate::{Error, Result};
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+
+/// The vertices and triangles of a tile. Its own sites come first, then those of its neighbours.
+pub(crate) struct TileContent {
+    positions: Vec<[i32; 3]>,
+    normals: Vec<[f32; 3]>,
+    colors: Vec<[u16; 3]>,
+    triangles: Vec<[u32; 3]>,
+    /// Triangles that are left out.
+    cut: Vec<[u32; 3]>,
+}
+
+impl TileContent {
+    /// Returns the content that the tile's leaf contributes.
+    pub(crate) fn of_leaf(mut leaf: Leaf, border: &FinishedBorder, style: &TileStyle) -> TileContent {
+        let cut = style.max_edge.take(&leaf.positions, &mut leaf.triangles);
+        let mut normals = Sums::new(&leaf.positions, &leaf.triangles).finish(&style.frame);
+        for vertex in &border.0 {
+            normals[vertex.site as usize] = vertex.normal;
+        }
+        let colors = match &style.coloring {
+            Some(coloring) => coloring.colors(&leaf.positions, &leaf.rgb, &leaf.class),
+            None => Vec::new(),
+        };
+        TileContent { positions: leaf.positions, normals, colors, triangles: leaf.triangles, cut }
+    }
+
+    /// Adds the triangles of the seam that `tile` owns, with the vertices that belong to neighbours. Returns the number of triangles
+    /// that are not left out.
+    pub(crate) fn add_seam(
+        &mut self,
+        store: &Store,
+        tile: TileIndex,
+        seam: impl Iterator<Item = SeamTriangle>,
+        style: &TileStyle,
+    ) -> Result<u64> {
+        let mut neighbours = NeighbourBorders { store, borders: HashMap::new() };
+        let mut vertex_of: HashMap<(TileIndex, u32), u32> = HashMap::new();
+        let before = self.triangles.len();
+        for triangle in seam {
+            let mut corners = [0; 3];
+            for (corner, border) in corners.iter_mut().zip(&triangle) {
+                *corner = match vertex_of.get(&(border.tile, border.site)) {
+                    _ if border.tile == tile => border.site,
+                    Some(&vertex) => vertex,
+                    None => {
+                        let vertex = self.add_vertex(border, &mut neighbours, style)?;
+                        vertex_of.insert((border.tile, border.site), vertex);
+                        vertex
+                    }
+                };
+            }
+            let is_cut = style.max_edge.leaves_out(triangle.map(|corner| corner.position));
+            if is_cut { &mut self.cut } else { &mut self.triangles }.push(corners);
+        }
+        Ok((self.triangles.len() - before) as u64)
+    }
+
+    fn add_vertex(
+        &mut self,
+        border: &BorderVertex,
+        neighbours: &mut NeighbourBorders,
+        style: &TileStyle,
+    ) -> Result<u32> {
+        let vertex = neighbours.of(border.tile)?.find(border.site).ok_or_else(|| {
+            Error::Broken(format!(
+                "a seam uses site {} of tile {}, whose border does not have it",
+                border.site, border.tile
+            ))
+        })?;
+        self.positions.push(border.position);
+        self.normals.push(vertex.normal);
+        if let Some(coloring) = &style.coloring {
+            self.colors.push(coloring.color(border.position[2], vertex.rgb, vertex.class as u8));
+        }
+        Ok(self.positions.len() as u32 - 1)
+    }
+
+    /// Returns the triangles that are left out, without normals and colours.
+    pub(crate) fn left_out(&self) -> Tile {
+        Tile::of(&self.positions, self.cut.clone())
+    }
+
+    /// Returns the finished tile. It lacks the sites whose triangles all belong to other tiles or are left out.
+    pub(crate) fn into_tile(mut self, style: &TileStyle) -> Tile {
+        let mut used = vec![false; self.positions.len()];
+        self.triangles.as_flattened().iter().for_each(|&v| used[v as usize] = true);
+        if used.contains(&false) {
+            self.drop_unused(&used);
+        }
+        Tile {
+            positions: self.positions,
+            normals: style.normals.then_some(self.normals),
+            colors: style.coloring.map(|_| self.colors),
+            triangles: self.triangles,
+        }
+    }
+
+    fn drop_unused(&mut self, used: &[bool]) {
+        let number = |next: &mut u32, &used: &bool| Some(std::mem::replace(next, *next + used as u32));
+        let numbers: Vec<u32> = used.iter().scan(0, number).collect();
+        self.triangles.as_flattened_mut().iter_mut().for_each(|v| *v = numbers[*v as usize]);
+        keep(&mut self.positions, used);
+        keep(&mut self.normals, used);
+        keep(&mut self.colors, used);
+    }
+}
+
+/// Keeps the values whose flag in `wanted` is set. An empty column stays empty.
+fn keep<T: Copy>(values: &mut Vec<T>, wanted: &[bool]) {
+    let mut kept = 0;
+    // Branch-free.
+    for at in 0..values.len() {
+        values[kept] = values[at];
+        kept += wanted[at] as usize;
+    }
+    values.truncate(kept);
+}
+
+/// The finished borders of other tiles, each read when it is first needed.
+struct NeighbourBorders<'a> {
+    store: &'a Store,
+    borders: HashMap<TileIndex, FinishedBorder>,
+}
+
+impl NeighbourBorders<'_> {
+    fn of(&mut self, tile: TileIndex) -> Result<&FinishedBorder> {
+        Ok(match self.borders.entry(tile) {
+            Entry::Occupied(entry) => entry.into_mut(),
+            Entry::Vacant(entry) => entry.insert(FinishedBorder::load(self.store, tile)?),
+        })
+    }
+}

@@ -1,0 +1,105 @@
+//! Step 6, once for each tile: writes the tile's own triangles and those of its seam that it owns as one GLB, and draws its pixels of
+//! the preview.
+
+use crate::Result;
+use crate::geometry::Bounds;
+use crate::job::durable::atomic_file::{PendingFile, write_pending_pieces};
+use crate::job::durable::columns::ColumnWriter;
+use crate::job::durable::directory::{JobDirectory, create_folder};
+use crate::job::partition::tree::Tree;
+use crate::job::records::{FinishedBorder, Leaf, StepOutput, StepRecord, Store, TileSummary, owner};
+use crate::job::tiles::dependencies::FinishedTile;
+use crate::job::tiles::seam::seam_of;
+use crate::job::tiles::style::TileStyle;
+use crate::job::tiles::tile_content::TileContent;
+use crate::output::Tile;
+use crate::output::gltf::glb::Glb;
+use crate::output::preview::canvas::Canvas;
+use serde::{Deserialize, Serialize};
+use std::cell::RefCell;
+use std::ops::AddAssign;
+use std::path::Path;
+
+/// The figures of one tile, or the sum over all.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub struct TileStats {
+    /// GLB files written. A tile whose triangles all belong to others has none.
+    pub files: u64,
+    /// Triangles in them.
+    pub triangles: u64,
+    /// Those of them that cross a border between tiles.
+    pub seam_triangles: u64,
+    /// Triangles that are left out.
+    pub cut_triangles: u64,
+    /// Bytes of the GLB files, including those of triangles that are left out.
+    pub bytes: u64,
+}
+
+impl AddAssign for TileStats {
+    fn add_assign(&mut self, other: TileStats) {
+        self.files += other.files;
+        self.triangles += other.triangles;
+        self.seam_triangles += other.seam_triangles;
+        self.cut_triangles += other.cut_triangles;
+        self.bytes += other.bytes;
+    }
+}
+
+/// Writes the GLB of a tile, and one of its triangles that are left out. Stores its part of the preview and what `tileset.json` says
+/// of it.
+///
+/// # Errors
+/// [`crate::Error::Io`] on the output or the store, [`crate::Error::Config`] if a triangle is too long for f32.
+pub fn write_tile(
+    directory: &JobDirectory,
+    store: &Store,
+    tree: &Tree,
+    style: &TileStyle,
+    canvas: &Canvas,
+    finished: FinishedTile,
+) -> Result<StepOutput<TileStats>> {
+    let tile = finished.tile;
+    let leaf = Leaf::load(store, tile)?;
+    let border = FinishedBorder::load(store, tile)?;
+    let mut content = TileContent::of_leaf(leaf, &border, style);
+    let own = seam_of(store, tree, finished)?.into_iter().filter(|triangle| owner(triangle) == tile);
+    let seam_triangles = content.add_seam(store, tile, own, style)?;
+    let left_out = content.left_out();
+    let kept = content.into_tile(style);
+    let mut stats = TileStats {
+        triangles: kept.triangles.len() as u64,
+        seam_triangles,
+        cut_triangles: left_out.triangles.len() as u64,
+        ..TileStats::default()
+    };
+    let pixels = ColumnWriter::default().push(&canvas.draw(&kept)).write(store, StepRecord::Pixels(tile))?;
+    let summary = TileSummary::new(kept.bounds().map(|[min, max]| Bounds { min, max }), !kept.triangles.is_empty())
+        .save(store, tile)?;
+    let mut files = Vec::new();
+    if !kept.triangles.is_empty() {
+        files.push(write_glb(&directory.output().tile(tile.get()), &kept, style)?);
+        stats.files = 1;
+    }
+    if !left_out.triangles.is_empty() {
+        create_folder(&directory.output().cut())?;
+        files.push(write_glb(&directory.output().cut_tile(tile.get()), &left_out, style)?);
+    }
+    stats.bytes = files.iter().map(|file| file.bytes).sum();
+    Ok(StepOutput { files, ..StepOutput::new(stats, vec![pixels, summary]) })
+}
+
+thread_local! {
+    /// The bytes of the current file. A thread keeps the buffer from tile to tile, so that its pages are faulted in once.
+    static GLB: RefCell<Glb> = RefCell::default();
+}
+
+/// Writes a tile as a pending GLB file.
+///
+/// # Errors
+/// [`crate::Error::Io`] if writing fails, [`crate::Error::Config`] if a triangle is too long for f32.
+pub fn write_glb(path: &Path, content: &Tile, style: &TileStyle) -> Result<PendingFile> {
+    GLB.with_borrow_mut(|glb| {
+        glb.encode(&style.frame, content, style.compression)?;
+        write_pending_pieces(path, &glb.pieces())
+    })
+}

@@ -1,0 +1,39 @@
+//! The pipeline against the reference on random sites of every kind that is known to be hard.
+
+use crate::mesh::half_edge::HalfEdgeMesh;
+use crate::triangulation::reference;
+use crate::voronoi::test_cases::{KINDS, Random, case};
+use crate::voronoi::{PipelineBuffers, triangulate};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Returns the set of triangles, each from its least corner.
+fn triangles(mesh: &HalfEdgeMesh) -> BTreeSet<[u32; 3]> {
+    mesh.triangles.iter().map(|&[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().unwrap()).collect()
+}
+
+#[test]
+fn random_cases_are_canonical_or_rejected() {
+    let cases = std::env::var("GDT_CASES").ok().and_then(|s| s.parse().ok()).unwrap_or(2000);
+    let mut random = Random(0x9e37_79b9_7f4a_7c15);
+    let mut buffers = PipelineBuffers::default();
+    let mut rejected: BTreeMap<(&str, String), usize> = BTreeMap::new();
+    let mut refused = 0;
+    for i in 0..cases {
+        let kind = KINDS[i % KINDS.len()];
+        let n = 3 + (2000.0f64.powf(random.unit()) - 1.0) as usize;
+        let sites = case(kind, n, &mut random);
+        match triangulate(&sites, &mut buffers) {
+            Ok((mesh, _)) => assert_eq!(
+                triangles(&mesh),
+                triangles(&reference::triangulate(&sites).unwrap()),
+                "case {i}, {kind}: {sites:?}"
+            ),
+            Err(why) => {
+                refused += (kind == "uniform" && sites.len() >= 1000) as usize;
+                *rejected.entry((kind, why.to_string())).or_default() += 1;
+            }
+        }
+    }
+    eprintln!("of {} cases of each kind, rejected: {rejected:#?}", cases / KINDS.len());
+    assert_eq!(refused, 0, "large uniform cases were rejected");
+}

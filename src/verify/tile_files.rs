@@ -1,0 +1,100 @@
+//! The tile files of an output directory.
+
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+
+use crate::output::frame::Extras;
+use crate::output::gltf::read::{held_bytes, read_extras};
+use crate::{Error, Result};
+
+/// Checking a tile takes at most this many times the memory of its meshes.
+const MEMORY_FACTOR: u64 = 5;
+
+/// The files to check.
+pub(super) struct TileFiles {
+    /// The terrain's tiles, and after them the files of `cut/`, each in the order of their names.
+    pub(super) paths: Vec<PathBuf>,
+    /// The number of the terrain's tiles.
+    pub(super) terrain: usize,
+    /// The georeference of the first file that can be read. All others have to agree with it.
+    pub(super) extras: Extras,
+    /// The memory that the meshes of the largest file take, in bytes.
+    largest: u64,
+}
+
+impl TileFiles {
+    /// Finds the files in the output `directory` of a job.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if there are no tiles, [`Error::Io`] or [`Error::Input`] if no tile can be read.
+    pub(super) fn find(directory: &Path) -> Result<TileFiles> {
+        let folder = folder_of_tiles(directory)?;
+        let mut paths = glb_files(&folder)?;
+        let terrain = paths.len();
+        let Some(first) = paths.first() else {
+            return Err(no_output(&folder, "has no .glb file"));
+        };
+        let readable = paths.iter().find_map(|path| read_extras(path).ok());
+        let extras = readable.map_or_else(|| read_extras(first), Ok)?;
+        let cut = directory.join("cut");
+        if cut.is_dir() {
+            paths.extend(glb_files(&cut)?);
+        }
+        // A file that cannot be read is reported when it is checked.
+        let largest = paths.par_iter().map(|path| held_bytes(path).unwrap_or(0)).max().unwrap_or(0);
+        Ok(TileFiles { paths, terrain, extras, largest })
+    }
+
+    /// Returns the names of the files for people.
+    pub(super) fn names(&self) -> Vec<String> {
+        let name = |p: &PathBuf| p.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let (terrain, cut) = self.paths.split_at(self.terrain);
+        terrain.iter().map(name).chain(cut.iter().map(|p| format!("cut/{}", name(p)))).collect()
+    }
+
+    /// Returns how many files may be checked at the same time within `memory` bytes.
+    ///
+    /// # Errors
+    /// [`Error::Memory`] if there is not enough for one.
+    pub(super) fn lanes(&self, memory: u64) -> Result<usize> {
+        let each = self.largest.saturating_mul(MEMORY_FACTOR).max(1);
+        match (memory / each) as usize {
+            0 if each > 2 * memory => Err(Error::Memory(format!(
+                "the largest tile takes about {} MiB to verify: set a higher memory limit",
+                each >> 20
+            ))),
+            lanes => Ok(lanes.clamp(1, rayon::current_num_threads())),
+        }
+    }
+}
+
+/// Returns the folder of the tiles in the output `directory` of a job.
+fn folder_of_tiles(directory: &Path) -> Result<PathBuf> {
+    let folder = directory.join("tiles");
+    match directory.metadata() {
+        Err(e) if e.kind() == ErrorKind::NotFound => Err(no_output(directory, "is not there")),
+        Err(e) => Err(Error::io("read", directory)(e)),
+        Ok(meta) if !meta.is_dir() => Err(no_output(directory, "is not a directory")),
+        Ok(_) if !folder.is_dir() => Err(no_output(directory, "has no folder named tiles")),
+        Ok(_) => Ok(folder),
+    }
+}
+
+fn no_output(path: &Path, what: &str) -> Error {
+    Error::Config(format!("{} {what}: name the output directory of a finished job", path.display()))
+}
+
+/// Returns the GLB files in `folder`, sorted by name.
+fn glb_files(folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut paths = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(Error::io("read", folder))? {
+        let path = entry.map_err(Error::io("read", folder))?.path();
+        if path.extension().is_some_and(|e| e == "glb") {
+            paths.push(path);
+        }
+    }
+    paths.sort();
+    Ok(paths)
+}

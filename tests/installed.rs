@@ -1,0 +1,22 @@
+//! What users install has no faults on purpose built in: see CONTRIBUTING.md.
+#![cfg(not(feature = "fault-injection"))]
+
+use std::fs;
+use std::process::Command;
+
+/// Each of these kills a build with the feature at its first commit or at its end.
+const FAULTS: [&str; 5] = ["commit:1", "published:1", "torn:1", "committed:1", "cleaning:1"];
+
+#[test]
+fn no_environment_variable_kills_the_installed_program() {
+    let folder = tempfile::tempdir().unwrap();
+    let job = "[input]\nfiles = [\"cloud.csv\"]\n[output]\ndirectory = \"out\"\n";
+    fs::write(folder.path().join("job.toml"), job).unwrap();
+    fs::write(folder.path().join("cloud.csv"), "0,0,1\n9,0,2\n9,9,3\n0,9,4\n4,5,6\n").unwrap();
+    for fault in FAULTS {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_gdt-batch"));
+        program.arg("job.toml").current_dir(folder.path()).env("GDT_FAULT", fault).env("GDT_COMMIT_MS", "0");
+        let output = program.output().unwrap();
+        assert!(output.status.success(), "{fault}: {output:?}");
+    }
+}

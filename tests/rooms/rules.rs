@@ -1,0 +1,134 @@
+//! The rules: who may import whom. A broken rule is a sentence that names the arrow.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+
+use crate::house::Arrow;
+
+/// No file in `rooms` imports anything from `never`. A room is a folder; a file at its own place counts as one.
+struct Rule {
+    rooms: &'static [&'static str],
+    never: &'static [&'static str],
+    why: &'static str,
+}
+
+/// The steps of a job: each imports only from those before it.
+const STEPS: [&str; 6] = ["job/plan", "job/partition", "job/mesh", "job/tiles", "job/levels", "job/publish"];
+
+const RULES: [Rule; 7] = [
+    Rule {
+        rooms: &["geometry", "mesh", "voronoi", "gpu", "triangulation", "input", "output"],
+        never: &["config", "job", "verify", "cli"],
+        why: "a library room knows no job",
+    },
+    Rule { rooms: &["verify"], never: &["config", "job", "cli"], why: "the proof shares nothing with the job" },
+    Rule { rooms: &["job"], never: &["config", "verify", "cli"], why: "a job takes options from anywhere" },
+    Rule {
+        rooms: &["job/durable", "job/progress"],
+        never: &["job/records", "job/plan", "job/partition", "job/mesh", "job/tiles", "job/levels", "job/publish"],
+        why: "durable and progress know no step",
+    },
+    Rule {
+        rooms: &["job/durable", "job/progress", "job/records", "job/options"],
+        never: &["job/run", "job/preflight", "job/report", "job/mod"],
+        why: "what all steps share knows none of their users",
+    },
+    Rule {
+        rooms: &STEPS,
+        never: &["job/run", "job/preflight", "job/report", "job/mod"],
+        why: "a step does not know who runs it",
+    },
+    Rule {
+        rooms: &["job/preflight", "job/report"],
+        never: &["job/run", "job/mod"],
+        why: "only job/mod.rs imports job/run",
+    },
+];
+
+/// Returns a sentence for every broken rule.
+pub(crate) fn broken(arrows: &[Arrow]) -> Vec<String> {
+    let directions = arrows.iter().filter_map(|arrow| Some(format!("{}: {}", text(arrow), broken_rule(arrow)?)));
+    directions.chain(circles(arrows)).collect()
+}
+
+/// The arrow as a line that leads to it.
+fn text(arrow: &Arrow) -> String {
+    format!("src/{}:{} imports {} from src/{}", arrow.from, arrow.line, arrow.path, arrow.to)
+}
+
+fn broken_rule(arrow: &Arrow) -> Option<&'static str> {
+    let (is_from, is_to) = (|room: &&str| is_in(&arrow.from, room), |room: &&str| is_in(&arrow.to, room));
+    let rule = RULES.iter().find(|rule| rule.rooms.iter().any(is_from) && rule.never.iter().any(is_to));
+    let step = |is: &dyn Fn(&&str) -> bool| STEPS.iter().position(is);
+    match (step(&is_from), step(&is_to)) {
+        _ if rule.is_some() => rule.map(|rule| rule.why),
+        (Some(from), Some(to)) if from < to => Some("a step imports only from the steps before it"),
+        _ if is_from(&"config") && !is_open_to_config(&arrow.to) => {
+            Some("config imports only options, errors, warnings and geometry")
+        }
+        _ => None,
+    }
+}
+
+fn is_open_to_config(file: &str) -> bool {
+    file.ends_with("/options.rs") || ["config", "geometry", "error", "warnings"].iter().any(|room| is_in(file, room))
+}
+
+fn is_in(file: &str, room: &str) -> bool {
+    file.strip_prefix(room).is_some_and(|rest| rest == ".rs" || rest.starts_with('/'))
+}
+
+/// Finds circles in every folder between its files and its sub-folders, each of which counts as one with all that is in it.
+/// So files are never in a circle either, in one room or in several.
+fn circles(arrows: &[Arrow]) -> Vec<String> {
+    let arrows: Vec<&Arrow> = arrows.iter().filter(|arrow| !arrow.passes_on).collect();
+    let folders = |file: &str| -> Vec<String> { file.match_indices('/').map(|(at, _)| file[..=at].into()).collect() };
+    let all: BTreeSet<String> = arrows.iter().flat_map(|arrow| folders(&arrow.from)).chain([String::new()]).collect();
+    all.iter().flat_map(|folder| circles_in(folder, &arrows)).collect()
+}
+
+/// The shortest circles of a folder. One that shares an arrow with a shorter one waits until that is gone.
+fn circles_in(folder: &str, arrows: &[&Arrow]) -> Vec<String> {
+    let mut graph = Graph::new();
+    for arrow in arrows {
+        if let (Some(from), Some(to)) = (entry(folder, &arrow.from), entry(folder, &arrow.to)) {
+            graph.entry(from).or_default().entry(to).or_insert(arrow);
+        }
+    }
+    let edges = graph.iter().flat_map(|(&from, targets)| targets.keys().map(move |&to| (from, to)));
+    let circle = |(from, to)| Some([&[from], way(&graph, to, from)?.as_slice()].concat());
+    let mut circles: Vec<Vec<&str>> = edges.filter(|(from, to)| from != to).filter_map(circle).collect();
+    circles.sort_by_key(Vec::len);
+    let (mut told, mut texts) = (BTreeSet::new(), Vec::new());
+    for circle in circles {
+        let edges: Vec<_> = circle.windows(2).map(|pair| (pair[0], pair[1])).collect();
+        if edges.iter().all(|edge| !told.contains(edge)) {
+            let arrows: String = edges.iter().map(|(from, to)| format!("\n    {}", text(graph[from][to]))).collect();
+            texts.push(format!("a circle in src/{folder}: {}{arrows}", circle.join(" -> ")));
+            told.extend(edges);
+        }
+    }
+    texts
+}
+
+/// The file or sub-folder of `folder` that `file` is in.
+fn entry<'a>(folder: &str, file: &'a str) -> Option<&'a str> {
+    let rest = file.strip_prefix(folder)?;
+    Some(rest.split_once('/').map_or(rest, |(sub, _)| sub))
+}
+
+type Graph<'a> = BTreeMap<&'a str, BTreeMap<&'a str, &'a Arrow>>;
+
+/// The shortest way along arrows, with both ends.
+fn way<'a>(graph: &Graph<'a>, from: &'a str, to: &'a str) -> Option<Vec<&'a str>> {
+    let (mut ways, mut seen) = (VecDeque::from([vec![from]]), BTreeSet::from([from]));
+    while let Some(way) = ways.pop_front() {
+        let end = *way.last()?;
+        if end == to {
+            return Some(way);
+        }
+        for &next in graph.get(end).into_iter().flat_map(BTreeMap::keys).filter(|next| seen.insert(**next)) {
+            ways.push_back([way.as_slice(), &[next]].concat());
+        }
+    }
+    None
+}
