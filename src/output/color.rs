@@ -72,13 +72,15 @@ fn decode_byte(v: u8) -> u16 {
 
 /// sRGB (IEC 61966-2-1) to linear.
 fn decode(v: f64) -> f64 {
-    if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+    if v <= 0.04045 { v / 12.92 } else { libm::pow((v + 0.055) / 1.055, 2.4) }
 }
 
 /// Linear to sRGB.
 fn encode(v: f64) -> f64 {
-    if v <= 0.0031308 { v * 12.92 } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
+    if v <= 0.0031308 { v * 12.92 } else { 1.055 * libm::pow(v, 1.0 / 2.4) - 0.055 }
 }
+
+// The tables are made with `libm`, not with the machine's mathematics library: they decide bytes, which are the same everywhere.
 
 static TO_LINEAR: LazyLock<Vec<u16>> =
     LazyLock::new(|| (0..=65535).map(|v| (decode(v as f64 / 65535.0) * 65535.0).round() as u16).collect());

@@ -90,15 +90,15 @@ impl Scale {
 
     /// The largest step of at most half of `resolution` metres.
     fn coarsest(resolution: f64) -> Scale {
-        let step = (resolution / 2.0).log2().floor().exp2();
+        let step = power_below(resolution / 2.0);
         Scale { step, ratio: resolution / step }
     }
 
     /// The largest step from which rounding still leads back, for `resolution` metres.
     fn packed(resolution: f64) -> Scale {
         // A resolution that is a power of two is met exactly.
-        let is_power = resolution.to_bits() << (u64::BITS - f64::MANTISSA_DIGITS + 1) == 0;
-        let step = if is_power { resolution } else { (resolution * PACKED_RATIO).log2().floor().exp2() };
+        let is_power = power_below(resolution) == resolution;
+        let step = if is_power { resolution } else { power_below(resolution * PACKED_RATIO) };
         Scale { step, ratio: resolution / step }
     }
 
@@ -110,7 +110,7 @@ impl Scale {
     /// As fine as a mesh that spans so many lattice steps allows, within reason.
     fn refined(self, lattice_steps: i64) -> Scale {
         let resolution = self.ratio * self.step;
-        let spanning = (lattice_steps as f64 * resolution / (2 * PART_REACH) as f64).log2().ceil().exp2();
+        let spanning = power_above(lattice_steps as f64 * resolution / (2 * PART_REACH) as f64);
         let step = self.step.min(spanning.max(FINE_STEP).max(self.step / REFINEMENT));
         Scale { step, ratio: resolution / step }
     }
@@ -120,6 +120,17 @@ impl Scale {
     fn steps(&self, i: i32) -> f64 {
         nearest(i as f64 * self.ratio)
     }
+}
+
+/// Returns the greatest power of two that is not above `value`, or zero for zero. Exact, unlike a logarithm.
+fn power_below(value: f64) -> f64 {
+    f64::from_bits(value.to_bits() & f64::INFINITY.to_bits())
+}
+
+/// Returns the least power of two that is not below `value`, or zero for zero.
+fn power_above(value: f64) -> f64 {
+    let below = power_below(value);
+    if below == value { value } else { 2.0 * below }
 }
 
 /// `value` rounded to the nearest whole number, for magnitudes below 2^51; vectorizes on every machine.
@@ -259,6 +270,16 @@ fn number(exact: Decimal) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn powers_of_two_bound_every_number() {
+        assert_eq!(
+            [0.0, 1.0, 0.75, 0.01, 1e-12, 6e11].map(power_below),
+            [0.0, 1.0, 0.5, 1.0 / 128.0, 0.5f64.powi(40), 2f64.powi(39)]
+        );
+        assert_eq!([0.0, 1.0, 0.75, 0.01, 3.0].map(power_above), [0.0, 1.0, 1.0, 1.0 / 64.0, 4.0]);
+        assert_eq!((power_below(1.0f64.next_down()), power_above(1.0f64.next_up())), (0.5, 2.0));
+    }
 
     #[test]
     fn packed_steps_are_powers_of_two_from_which_rounding_leads_back() {

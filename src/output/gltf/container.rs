@@ -1,4 +1,4 @@
-//! The two chunks of a GLB file.
+//! The frame of a GLB file: its header and two chunks, of JSON and of binary data.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -6,11 +6,15 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use crate::output::gltf::glb::{BIN_CHUNK, JSON_CHUNK, MAGIC, VERSION};
 use crate::{Error, Result};
 
-/// The two chunks of a GLB file.
-pub(crate) struct Container {
+const MAGIC: u32 = u32::from_le_bytes(*b"glTF");
+const VERSION: u32 = 2;
+const JSON_CHUNK: u32 = u32::from_le_bytes(*b"JSON");
+const BIN_CHUNK: u32 = u32::from_le_bytes(*b"BIN\0");
+
+/// An open GLB file: its JSON chunk, and where its binary chunk is.
+pub(crate) struct GlbFile {
     file: File,
     json: Vec<u8>,
     binary_start: u64,
@@ -18,9 +22,9 @@ pub(crate) struct Container {
     pub(crate) binary_length: u64,
 }
 
-impl Container {
+impl GlbFile {
     /// Reads all but the binary chunk and checks the lengths against the file's size.
-    pub(crate) fn open(path: &Path) -> Result<Container> {
+    pub(crate) fn open(path: &Path) -> Result<GlbFile> {
         // Before it is opened: a pipe would wait for somebody who writes.
         if !path.metadata().map_err(Error::io("open", path))?.is_file() {
             return Err(Error::input(path, "is not a regular file"));
@@ -44,7 +48,7 @@ impl Container {
         }
         let mut json = vec![0; json_length as usize];
         file.read_exact(&mut json).map_err(Error::io("read", path))?;
-        let mut container = Container { file, json, binary_start: json_end + 8, binary_length: 0 };
+        let mut container = GlbFile { file, json, binary_start: json_end + 8, binary_length: 0 };
         if json_end + 8 <= size {
             let [length, kind] = read_words(&mut container.file).map_err(Error::io("read", path))?;
             if kind != BIN_CHUNK || container.binary_start + length as u64 != size {
@@ -80,4 +84,25 @@ fn read_words<const N: usize>(file: &mut File) -> std::io::Result<[u32; N]> {
     let mut words = [[0u8; 4]; N];
     file.read_exact(words.as_flattened_mut())?;
     Ok(words.map(u32::from_le_bytes))
+}
+
+/// Writes the header, the JSON chunk and the head of the binary chunk, whose `length` bytes are to follow.
+pub(crate) fn write_head(mut json: Vec<u8>, length: u64, out: &mut Vec<u8>) -> Result<()> {
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let binary = if length == 0 { 0 } else { 8 + length };
+    let total = 20 + json.len() as u64 + binary;
+    let total = u32::try_from(total).map_err(|_| {
+        Error::Config(format!(
+            "a GLB file of {total} bytes would pass the limit of 4 GiB: set a smaller max_points_per_tile"
+        ))
+    })?;
+    for word in [MAGIC, VERSION, total, json.len() as u32, JSON_CHUNK] {
+        out.extend_from_slice(&word.to_le_bytes());
+    }
+    out.extend_from_slice(&json);
+    if length > 0 {
+        out.extend_from_slice(&(length as u32).to_le_bytes());
+        out.extend_from_slice(&BIN_CHUNK.to_le_bytes());
+    }
+    Ok(())
 }

@@ -1,10 +1,17 @@
-//! The glTF document of a tile, and the bytes it describes.
+//! Builds the glTF document of a tile, and the bytes that it describes.
 
 use std::borrow::Cow;
 
 use bytemuck::{Pod, cast_slice};
+use gltf::json::accessor::{Accessor, ComponentType, GenericComponentType, Type};
+use gltf::json::buffer::{Buffer, Stride, Target, View};
+use gltf::json::mesh::{Mesh, Primitive, Semantic};
+use gltf::json::scene::{Node, Scene};
+use gltf::json::validation::Checked::Valid;
+use gltf::json::validation::USize64;
+use gltf::json::{Asset, Index, Root};
 use multiversion::multiversion;
-use serde_json::{Value, json};
+use serde_json::json;
 
 use crate::output::color::Linear;
 use crate::output::frame::Frame;
@@ -12,58 +19,34 @@ use crate::output::gltf::encoding::{
     Compression, EXPONENTIAL_REACH, color_bytes, exponential, needs_long_normals, normal_bytes, normal_octahedral,
     normal_shorts,
 };
+use crate::output::gltf::meshopt::{PackedFilter, PackedMode, PackedView, fallback_buffer};
 use crate::output::gltf::parts::Part;
+use crate::output::gltf::schema::{GENERATOR, MESHOPT, QUANTIZATION, to_text};
 use crate::output::gltf::vertex_order::rings;
 use crate::{Error, Result};
 
-/// Says in every file who wrote it.
-pub(crate) const GENERATOR: &str = concat!("gdt-batch ", env!("CARGO_PKG_VERSION"));
+/// The buffer of the binary chunk.
+const STORED: u32 = 0;
+/// The buffer that stands for what readers unpack.
+const UNPACKED: u32 = 1;
 
-// Names of the glTF specification and its extensions.
-pub(crate) const SIGNED_BYTE: u64 = 5120;
-pub(crate) const SIGNED_SHORT: u64 = 5122;
-pub(crate) const UNSIGNED_BYTE: u64 = 5121;
-pub(crate) const UNSIGNED_SHORT: u64 = 5123;
-pub(crate) const UNSIGNED_INT: u64 = 5125;
-pub(crate) const FLOAT: u64 = 5126;
-const ARRAY_BUFFER: u64 = 34962;
-const ELEMENT_ARRAY_BUFFER: u64 = 34963;
-pub(crate) const MESHOPT: &str = "EXT_meshopt_compression";
-pub(crate) const QUANTIZATION: &str = "KHR_mesh_quantization";
-
-/// Linear colour of a terrain without vertex colours.
-const PLAIN: [f64; 4] = [0.52, 0.5, 0.45, 1.0];
-
-/// The arrays of the glTF document and the binary chunk while they are put together.
-pub(crate) struct Document<'a> {
+/// A document and its binary chunk while they are put together.
+pub(crate) struct DocumentBuilder<'a> {
     frame: &'a Frame,
     compression: Compression,
-    views: Vec<Value>,
-    accessors: Vec<Value>,
-    meshes: Vec<Value>,
-    nodes: Vec<Value>,
+    root: Root,
     colored: bool,
     /// The binary chunk; its length is a multiple of 4.
-    pub(crate) binary: Vec<u8>,
+    binary: Vec<u8>,
     /// Bytes of the buffer that stands for what readers unpack; a multiple of 4.
     unpacked: u64,
 }
 
-impl<'a> Document<'a> {
-    /// An empty document; what `binary` holds is forgotten, and its memory used.
-    pub(crate) fn new(frame: &'a Frame, compression: Compression, mut binary: Vec<u8>) -> Document<'a> {
+impl<'a> DocumentBuilder<'a> {
+    /// Returns a builder without parts. It takes over the memory of `binary`, not its content.
+    pub(crate) fn new(frame: &'a Frame, compression: Compression, mut binary: Vec<u8>) -> DocumentBuilder<'a> {
         binary.clear();
-        Document {
-            frame,
-            compression,
-            views: Vec::new(),
-            accessors: Vec::new(),
-            meshes: Vec::new(),
-            nodes: Vec::new(),
-            colored: false,
-            binary,
-            unpacked: 0,
-        }
+        DocumentBuilder { frame, compression, root: Root::default(), colored: false, binary, unpacked: 0 }
     }
 
     /// Appends a node, its mesh and their data.
@@ -77,26 +60,33 @@ impl<'a> Document<'a> {
             }
         };
         let order = order.as_deref();
-        let mut attributes = json!({"POSITION": self.add_positions(part, order)?});
+        let mut attributes = vec![(Valid(Semantic::Positions), self.add_positions(part, order)?)];
         if let Some(normals) = &tile.normals {
-            attributes["NORMAL"] = self.add_normals(normals, order)?.into();
+            attributes.push((Valid(Semantic::Normals), self.add_normals(normals, order)?));
         }
         if let Some(colors) = &tile.colors {
-            attributes["COLOR_0"] = self.add_colors(colors, order)?.into();
+            attributes.push((Valid(Semantic::Colors(0)), self.add_colors(colors, order)?));
             self.colored = true;
         }
-        let indices = self.add_triangles(&triangles, tile.positions.len())?;
-        let primitive = json!({"attributes": attributes, "indices": indices, "material": 0});
-        let mut node = json!({"mesh": self.meshes.len(), "translation": self.frame.metres(part.origin)});
-        if self.compression != Compression::None {
-            node["scale"] = json!(self.frame.step());
-        }
-        self.nodes.push(node);
-        self.meshes.push(json!({"primitives": [primitive]}));
+        let primitive = Primitive {
+            attributes: attributes.into_iter().collect(),
+            indices: Some(self.add_triangles(&triangles, tile.positions.len())?),
+            material: Some(Index::new(0)),
+            extensions: None,
+            extras: None,
+            mode: Default::default(),
+            targets: None,
+        };
+        let primitives = vec![primitive];
+        let mesh = self.root.push(Mesh { primitives, extensions: None, extras: None, name: None, weights: None });
+        // Both are exact: see `TRANSLATION_STEPS` of the frame, and steps are powers of two.
+        let translation = Some(self.frame.metres(part.origin).map(|v| v as f32));
+        let scale = (self.compression != Compression::None).then(|| self.frame.step().map(|v| v as f32));
+        self.root.push(Node { mesh: Some(mesh), translation, scale, ..Node::default() });
         Ok(())
     }
 
-    fn add_positions(&mut self, part: &Part, order: Option<&[u32]>) -> Result<usize> {
+    fn add_positions(&mut self, part: &Part, order: Option<&[u32]>) -> Result<Index<Accessor>> {
         let positions = &part.tile.positions;
         // The way from the lattice is monotonic, and y turns round.
         let [low, high] = part.tile.bounds().unwrap_or_default();
@@ -104,207 +94,233 @@ impl<'a> Document<'a> {
         let (frame, origin) = (self.frame, part.origin);
         if self.compression == Compression::None {
             let local = |p| frame.local(p, origin);
-            let bounds = json!({"min": local(low), "max": local(high)});
-            return self.add_attribute(positions, order, local, Kind::new(FLOAT, "VEC3", bounds));
+            return self.add_attribute(positions, order, local, ElementType::position([local(low), local(high)]));
         }
         let steps = |p| frame.local_steps(p, origin);
-        let bounds = json!({"min": steps(low).map(|v| v as f32), "max": steps(high).map(|v| v as f32)});
+        let element = ElementType::position([low, high].map(|p| steps(p).map(|v| v as f32)));
         if !part.short {
             let is_near = [low, high].map(steps).as_flattened().iter().all(|v| v.abs() < EXPONENTIAL_REACH);
             if self.compression == Compression::Meshopt && is_near {
                 let convert = |p| steps(p).map(exponential);
-                let accessor = self.add_attribute(positions, order, convert, Kind::new(FLOAT, "VEC3", bounds))?;
-                self.set_filter("EXPONENTIAL");
-                return Ok(accessor);
+                return self.add_attribute(positions, order, convert, element.filtered(PackedFilter::Exponential));
             }
             let convert = |p| steps(p).map(|v| v as f32);
-            return self.add_attribute(positions, order, convert, Kind::new(FLOAT, "VEC3", bounds));
+            return self.add_attribute(positions, order, convert, element);
         }
         let convert = |p| {
             let [x, y, z] = steps(p).map(|v| v as u16);
             [x, y, z, 0]
         };
-        self.add_attribute(positions, order, convert, Kind::new(UNSIGNED_SHORT, "VEC3", bounds))
+        self.add_attribute(positions, order, convert, ElementType { component: ComponentType::U16, ..element })
     }
 
-    fn add_normals(&mut self, normals: &[[f32; 3]], order: Option<&[u32]>) -> Result<usize> {
+    fn add_normals(&mut self, normals: &[[f32; 3]], order: Option<&[u32]>) -> Result<Index<Accessor>> {
         let up = |[x, y, z]: [f32; 3]| [x, z, 0.0 - y];
         if self.compression == Compression::None {
-            return self.add_attribute(normals, order, up, Kind::new(FLOAT, "VEC3", json!({})));
+            return self.add_attribute(normals, order, up, ElementType::new(ComponentType::F32, Type::Vec3));
         }
         let anisotropy = self.frame.anisotropy();
         if needs_long_normals(anisotropy) {
             let convert = |normal| normal_shorts(up(normal), anisotropy);
-            return self.add_attribute(normals, order, convert, Kind::normalized(SIGNED_SHORT, "VEC3"));
+            return self.add_attribute(
+                normals,
+                order,
+                convert,
+                ElementType::normalized(ComponentType::I16, Type::Vec3),
+            );
         }
+        let element = ElementType::normalized(ComponentType::I8, Type::Vec3);
         if self.compression == Compression::Quantized {
             let convert = |normal| normal_bytes(up(normal), anisotropy);
-            return self.add_attribute(normals, order, convert, Kind::normalized(SIGNED_BYTE, "VEC3"));
+            return self.add_attribute(normals, order, convert, element);
         }
         let convert = |normal| normal_octahedral(up(normal), anisotropy);
-        let accessor = self.add_attribute(normals, order, convert, Kind::normalized(SIGNED_BYTE, "VEC3"))?;
-        self.set_filter("OCTAHEDRAL");
-        Ok(accessor)
+        self.add_attribute(normals, order, convert, element.filtered(PackedFilter::Octahedral))
     }
 
-    /// Says how readers go on once they have unpacked the view that was added last.
-    fn set_filter(&mut self, name: &str) {
-        if let Some(view) = self.views.last_mut() {
-            view["extensions"][MESHOPT]["filter"] = name.into();
-        }
-    }
-
-    fn add_colors(&mut self, colors: &[Linear], order: Option<&[u32]>) -> Result<usize> {
+    fn add_colors(&mut self, colors: &[Linear], order: Option<&[u32]>) -> Result<Index<Accessor>> {
         if self.compression == Compression::None {
             let convert = |[r, g, b]: Linear| [r, g, b, u16::MAX];
-            return self.add_attribute(colors, order, convert, Kind::normalized(UNSIGNED_SHORT, "VEC4"));
+            return self.add_attribute(colors, order, convert, ElementType::normalized(ComponentType::U16, Type::Vec4));
         }
-        self.add_attribute(colors, order, color_bytes, Kind::normalized(UNSIGNED_BYTE, "VEC4"))
+        self.add_attribute(colors, order, color_bytes, ElementType::normalized(ComponentType::U8, Type::Vec4))
     }
 
-    /// Appends an accessor and a view of what `convert` makes of the vertices' `values`, those with the numbers in `order` or all
-    /// of them as they are; its index.
+    /// Appends an accessor and a buffer view of what `convert` makes of the vertices' `values`: of those with the numbers in `order`,
+    /// or of all as they are.
     fn add_attribute<T: Copy, B: Pod>(
         &mut self,
         values: &[T],
         order: Option<&[u32]>,
         convert: impl Fn(T) -> B,
-        kind: Kind,
-    ) -> Result<usize> {
-        let mut view = json!({"target": ARRAY_BUFFER});
-        if self.compression != Compression::None {
-            view["byteStride"] = size_of::<B>().into();
-        }
+        element: ElementType,
+    ) -> Result<Index<Accessor>> {
         let count = order.map_or(values.len(), <[u32]>::len);
-        if self.compression == Compression::Meshopt {
+        let mut view = if self.compression == Compression::Meshopt {
             let vertex = |i: usize| order.map_or(i, |order| order[i] as usize);
             let converted: Vec<B> = (0..count).map(|i| convert(values[vertex(i)])).collect();
             // Version 0 is the one of the extension.
             let packed = meshopt::encode_vertex_buffer_level(&converted, 0, Some(0)).map_err(not_packed)?;
-            self.add_packed(view, &packed, "ATTRIBUTES", size_of::<B>(), count);
+            self.add_packed(&packed, PackedMode::Attributes, element.filter, size_of::<B>(), count)
         } else {
             match order {
-                Some(order) => self.add_view(view, order, |v| convert(values[v as usize])),
-                None => self.add_view(view, values, convert),
+                Some(order) => self.add_plain(order, |v| convert(values[v as usize])),
+                None => self.add_plain(values, convert),
             }
-        }
-        Ok(self.add_accessor(count, kind))
+        };
+        view.target = Some(Valid(Target::ArrayBuffer));
+        view.byte_stride = (self.compression != Compression::None).then_some(Stride(size_of::<B>()));
+        Ok(self.add_accessor(view, count, element))
     }
 
-    fn add_triangles(&mut self, triangles: &[[u32; 3]], vertices: usize) -> Result<usize> {
-        let view = json!({"target": ELEMENT_ARRAY_BUFFER});
+    fn add_triangles(&mut self, triangles: &[[u32; 3]], vertices: usize) -> Result<Index<Accessor>> {
         let corners = triangles.as_flattened();
         // Index 65535 would restart a primitive.
         let short = vertices <= u16::MAX as usize;
-        let (component, size) = if short { (UNSIGNED_SHORT, 2) } else { (UNSIGNED_INT, 4) };
-        if self.compression == Compression::Meshopt {
+        let component = if short { ComponentType::U16 } else { ComponentType::U32 };
+        let mut view = if self.compression == Compression::Meshopt {
             let packed = meshopt::encode_index_buffer(corners, vertices).map_err(not_packed)?;
-            self.add_packed(view, &packed, "TRIANGLES", size, corners.len());
+            self.add_packed(&packed, PackedMode::Triangles, None, component.size(), corners.len())
         } else if short {
-            self.add_view(view, corners, |v| v as u16);
+            self.add_plain(corners, |v| v as u16)
         } else {
-            self.add_view(view, corners, |v| v);
-        }
-        Ok(self.add_accessor(corners.len(), Kind::new(component, "SCALAR", json!({}))))
+            self.add_plain(corners, |v| v)
+        };
+        view.target = Some(Valid(Target::ElementArrayBuffer));
+        Ok(self.add_accessor(view, corners.len(), ElementType::new(component, Type::Scalar)))
     }
 
-    fn add_accessor(&mut self, count: usize, kind: Kind) -> usize {
-        let mut accessor = kind.more;
-        accessor["bufferView"] = (self.views.len() - 1).into();
-        accessor["componentType"] = kind.component.into();
-        accessor["count"] = count.into();
-        accessor["type"] = kind.shape.into();
-        self.accessors.push(accessor);
-        self.accessors.len() - 1
+    /// Appends an accessor of all `count` elements of `view`, and the view.
+    fn add_accessor(&mut self, view: View, count: usize, element: ElementType) -> Index<Accessor> {
+        let view = self.root.push(view);
+        let [min, max] = [0, 1].map(|end| element.bounds.map(|bounds| json!(bounds[end])));
+        self.root.push(Accessor {
+            buffer_view: Some(view),
+            byte_offset: None,
+            count: USize64::from(count),
+            component_type: Valid(GenericComponentType(element.component)),
+            type_: Valid(element.shape),
+            normalized: element.normalized,
+            min,
+            max,
+            extensions: None,
+            extras: None,
+            name: None,
+            sparse: None,
+        })
     }
 
-    /// Appends a view of what `convert` makes of `values`.
-    fn add_view<T: Copy, B: Pod>(&mut self, mut view: Value, values: &[T], convert: impl Fn(T) -> B) {
-        view["buffer"] = 0.into();
-        view["byteOffset"] = self.binary.len().into();
-        view["byteLength"] = (values.len() * size_of::<B>()).into();
+    /// Appends to the binary chunk what `convert` makes of `values`.
+    fn add_plain<T: Copy, B: Pod>(&mut self, values: &[T], convert: impl Fn(T) -> B) -> View {
+        let start = self.binary.len();
         append_converted(&mut self.binary, values, convert);
         self.pad();
-        self.views.push(view);
+        view(STORED, start as u64, (values.len() * size_of::<B>()) as u64)
     }
 
-    /// Appends a view of `count` elements of `size` bytes that readers have to unpack.
-    fn add_packed(&mut self, mut view: Value, packed: &[u8], mode: &str, size: usize, count: usize) {
-        view["extensions"][MESHOPT] = json!({
-            "buffer": 0,
-            "byteOffset": self.append(packed),
-            "byteLength": packed.len(),
-            "byteStride": size,
-            "count": count,
-            "mode": mode,
-        });
-        view["buffer"] = 1.into();
-        view["byteOffset"] = self.unpacked.into();
-        view["byteLength"] = (size * count).into();
-        self.unpacked += (size * count).next_multiple_of(4) as u64;
-        self.views.push(view);
-    }
-
-    /// Appends to the binary chunk; where.
-    fn append(&mut self, bytes: &[u8]) -> usize {
+    /// Appends to the binary chunk `count` elements of `size` bytes that readers have to unpack.
+    fn add_packed(
+        &mut self,
+        packed: &[u8],
+        mode: PackedMode,
+        filter: Option<PackedFilter>,
+        size: usize,
+        count: usize,
+    ) -> View {
         let start = self.binary.len();
-        self.binary.extend_from_slice(bytes);
+        self.binary.extend_from_slice(packed);
         self.pad();
-        start
+        let (byte_offset, byte_length) = (start as u64, packed.len() as u64);
+        let (buffer, byte_stride, count) = (STORED as usize, size as u64, count as u64);
+        let packed = PackedView { buffer, byte_offset, byte_length, byte_stride, count, mode, filter };
+        let length = count * byte_stride;
+        let unpacked = self.unpacked;
+        self.unpacked += length.next_multiple_of(4);
+        View { extensions: Some(packed.to_extensions()), ..view(UNPACKED, unpacked, length) }
     }
 
     fn pad(&mut self) {
         self.binary.resize(self.binary.len().next_multiple_of(4), 0);
     }
 
-    pub(crate) fn json(&self) -> Value {
-        let mut json = json!({
-            "asset": {"version": "2.0", "generator": GENERATOR},
-            "scene": 0,
-            "scenes": [{"extras": self.frame.extras()}],
-        });
-        if self.nodes.is_empty() {
-            return json;
+    /// Returns the JSON text and the binary chunk.
+    pub(crate) fn finish(mut self) -> Result<(Vec<u8>, Vec<u8>)> {
+        let extras = serde_json::value::to_raw_value(self.frame.extras())
+            .map_err(|e| Error::Broken(format!("the georeference of a tile cannot be written: {e}")))?;
+        let nodes = (0..self.root.nodes.len() as u32).map(Index::new).collect();
+        let scene = self.root.push(Scene { nodes, extras: Some(extras), extensions: None, name: None });
+        self.root.scene = Some(scene);
+        self.root.asset = asset();
+        if !self.root.nodes.is_empty() {
+            self.add_buffers();
         }
-        json["scenes"][0]["nodes"] = (0..self.nodes.len()).collect();
-        json["nodes"] = self.nodes.clone().into();
-        json["meshes"] = self.meshes.clone().into();
-        json["materials"] = json!([material(self.colored)]);
-        json["accessors"] = self.accessors.clone().into();
-        json["bufferViews"] = self.views.clone().into();
-        let mut buffers = vec![json!({"byteLength": self.binary.len()})];
+        Ok((to_text(&self.root, self.colored)?, self.binary))
+    }
+
+    fn add_buffers(&mut self) {
+        self.root.push(buffer(self.binary.len() as u64));
         let extensions: &[&str] = match self.compression {
             Compression::None => &[],
             Compression::Quantized => &[QUANTIZATION],
-            Compression::Meshopt => &[QUANTIZATION, MESHOPT],
+            Compression::Meshopt => {
+                self.root.push(Buffer { extensions: Some(fallback_buffer()), ..buffer(self.unpacked) });
+                &[QUANTIZATION, MESHOPT]
+            }
         };
-        if self.compression == Compression::Meshopt {
-            buffers.push(json!({"byteLength": self.unpacked, "extensions": {MESHOPT: {"fallback": true}}}));
-        }
-        json["buffers"] = buffers.into();
-        if !extensions.is_empty() {
-            json["extensionsUsed"] = extensions.into();
-            json["extensionsRequired"] = extensions.into();
-        }
-        json
+        self.root.extensions_used = extensions.iter().map(|name| name.to_string()).collect();
+        self.root.extensions_required = self.root.extensions_used.clone();
     }
 }
 
 /// What the elements of an accessor are.
-struct Kind {
-    component: u64,
-    shape: &'static str,
-    /// What else the accessor says.
-    more: Value,
+#[derive(Clone, Copy)]
+struct ElementType {
+    component: ComponentType,
+    shape: Type,
+    normalized: bool,
+    /// The least and the greatest element, component by component.
+    bounds: Option<[[f32; 3]; 2]>,
+    filter: Option<PackedFilter>,
 }
 
-impl Kind {
-    fn new(component: u64, shape: &'static str, more: Value) -> Kind {
-        Kind { component, shape, more }
+impl ElementType {
+    fn new(component: ComponentType, shape: Type) -> ElementType {
+        ElementType { component, shape, normalized: false, bounds: None, filter: None }
     }
 
-    fn normalized(component: u64, shape: &'static str) -> Kind {
-        Kind::new(component, shape, json!({"normalized": true}))
+    fn normalized(component: ComponentType, shape: Type) -> ElementType {
+        ElementType { normalized: true, ..ElementType::new(component, shape) }
+    }
+
+    fn position(bounds: [[f32; 3]; 2]) -> ElementType {
+        ElementType { bounds: Some(bounds), ..ElementType::new(ComponentType::F32, Type::Vec3) }
+    }
+
+    fn filtered(self, filter: PackedFilter) -> ElementType {
+        ElementType { filter: Some(filter), ..self }
+    }
+}
+
+/// Returns who wrote the file, and to which version of glTF.
+pub(crate) fn asset() -> Asset {
+    Asset { generator: Some(GENERATOR.into()), ..Asset::default() }
+}
+
+/// Returns a buffer of `length` bytes.
+pub(crate) fn buffer(length: u64) -> Buffer {
+    Buffer { byte_length: USize64(length), name: None, uri: None, extensions: None, extras: None }
+}
+
+fn view(buffer: u32, start: u64, length: u64) -> View {
+    View {
+        buffer: Index::new(buffer),
+        byte_length: USize64(length),
+        byte_offset: Some(USize64(start)),
+        byte_stride: None,
+        name: None,
+        target: None,
+        extensions: None,
+        extras: None,
     }
 }
 
@@ -323,13 +339,4 @@ fn append_converted<T: Copy, B: Pod>(bytes: &mut Vec<u8>, values: &[T], convert:
 
 fn not_packed(error: meshopt::Error) -> Error {
     Error::Broken(format!("a tile could not be packed: {error}"))
-}
-
-/// Dull and seen from both sides; white under vertex colours, which it multiplies.
-fn material(colored: bool) -> Value {
-    let mut surface = json!({"metallicFactor": 0.0, "roughnessFactor": 1.0});
-    if !colored {
-        surface["baseColorFactor"] = json!(PLAIN);
-    }
-    json!({"name": "terrain", "doubleSided": true, "pbrMetallicRoughness": surface})
 }

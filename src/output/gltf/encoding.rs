@@ -81,7 +81,9 @@ pub(crate) fn exponential(steps: f64) -> u32 {
 pub(crate) fn from_exponential(bits: u32) -> f32 {
     let mantissa = (bits as i32) << 8 >> 8;
     let exponent = bits as i32 >> 24;
-    (f64::from(mantissa) * f64::from(exponent).exp2()) as f32
+    // The bits of 2 to the power of `exponent`, which no mathematics library rounds.
+    let power = f64::from_bits(((f64::MAX_EXP - 1 + exponent) as u64) << (f64::MANTISSA_DIGITS - 1));
+    (f64::from(mantissa) * power) as f32
 }
 
 /// A linear colour in bytes, opaque.
@@ -139,6 +141,8 @@ mod tests {
         }
         assert_eq!(from_exponential(0xff00_0003), 1.5);
         assert_eq!(from_exponential(0x0200_0003), 12.0);
+        assert_eq!(from_exponential(0x8000_0001), 0.5f32.powi(128));
+        assert_eq!(from_exponential(0x7f00_0001), 2f32.powi(127));
     }
 
     #[test]

@@ -1,10 +1,14 @@
-//! What `EXT_meshopt_compression` says of a view, and how to unpack it.
+//! What `EXT_meshopt_compression` says of a buffer view, and how to unpack it.
 
 use bytemuck::allocation::pod_collect_to_vec;
 use bytemuck::cast_slice_mut;
-use serde::Deserialize;
+use gltf::json::{Value, buffer, extensions};
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, json};
 
 use crate::output::gltf::encoding::{from_exponential, from_octahedral};
+use crate::output::gltf::schema::MESHOPT;
+use crate::output::gltf::strict::Decoded;
 
 /// Bytes of a tile in memory for every byte of its file, at most: the codec of vertices makes up to 64 of one, and 2-byte
 /// positions become 4-byte ones.
@@ -14,59 +18,75 @@ pub(crate) const MOST_EXPANSION: u64 = 128;
 const MOST_VERTEX_RATIO: u64 = 64;
 
 /// The extension's object of a buffer view.
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "camelCase")]
-pub(crate) struct Packed {
+pub(crate) struct PackedView {
     pub(crate) buffer: usize,
     #[serde(default)]
     pub(crate) byte_offset: u64,
     pub(crate) byte_length: u64,
-    byte_stride: u64,
-    count: u64,
-    mode: Mode,
-    filter: Option<Filter>,
+    pub(crate) byte_stride: u64,
+    pub(crate) count: u64,
+    pub(crate) mode: PackedMode,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) filter: Option<PackedFilter>,
 }
 
-#[derive(Clone, Copy, Debug, Deserialize)]
+/// What is packed.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "UPPERCASE")]
-enum Mode {
+pub(crate) enum PackedMode {
     Attributes,
     Triangles,
 }
 
-/// Those of the extension's filters that this program uses.
-#[derive(Clone, Copy, Debug, Deserialize)]
+/// What is still to be done after unpacking: those of the extension's filters that this program uses.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "UPPERCASE")]
-enum Filter {
+pub(crate) enum PackedFilter {
     Octahedral,
     Exponential,
 }
 
-impl Packed {
+impl PackedView {
+    /// Reads the extension of `view`, which may have no other extension.
+    pub(crate) fn of(view: &buffer::View) -> Decoded<Option<PackedView>> {
+        let Some(extensions) = &view.extensions else { return Ok(None) };
+        match extensions.others.keys().find(|name| *name != MESHOPT) {
+            Some(other) => Err(format!("unknown extension {other}")),
+            None => extensions.others.get(MESHOPT).map(PackedView::deserialize).transpose().map_err(|e| e.to_string()),
+        }
+    }
+
+    /// Returns the extensions of the view.
+    pub(crate) fn to_extensions(self) -> extensions::buffer::View {
+        extensions::buffer::View { others: only_meshopt(json!(self)) }
+    }
+
     /// Bytes of the view when unpacked.
     pub(crate) fn unpacked_length(&self) -> Option<u64> {
         self.count.checked_mul(self.byte_stride)
     }
 
     /// The view's bytes from `packed`; a sentence where that is not what it says.
-    pub(crate) fn unpack(&self, packed: &[u8]) -> Result<Vec<u8>, String> {
+    pub(crate) fn unpack(&self, packed: &[u8]) -> Decoded<Vec<u8>> {
         let length = self.unpacked_length().unwrap_or(u64::MAX);
         let plausible = match self.mode {
-            Mode::Attributes => length / MOST_VERTEX_RATIO <= packed.len() as u64,
-            Mode::Triangles => self.count / 3 <= packed.len() as u64 && self.count.is_multiple_of(3),
+            PackedMode::Attributes => length / MOST_VERTEX_RATIO <= packed.len() as u64,
+            PackedMode::Triangles => self.count / 3 <= packed.len() as u64 && self.count.is_multiple_of(3),
         };
         if !plausible {
             return Err(format!("{} packed bytes cannot hold {} elements", packed.len(), self.count));
         }
         let count = self.count as usize;
         let unpacked = match (self.mode, self.byte_stride) {
-            (Mode::Attributes, 4) => vertices::<4>(packed, count),
-            (Mode::Attributes, 8) => vertices::<8>(packed, count),
-            (Mode::Attributes, 12) => vertices::<12>(packed, count),
-            (Mode::Triangles, 2) => {
+            (PackedMode::Attributes, 4) => vertices::<4>(packed, count),
+            (PackedMode::Attributes, 8) => vertices::<8>(packed, count),
+            (PackedMode::Attributes, 12) => vertices::<12>(packed, count),
+            (PackedMode::Triangles, 2) => {
                 meshopt::decode_index_buffer::<u16>(packed, count).ok().map(|v| pod_collect_to_vec(&v))
             }
-            (Mode::Triangles, 4) => {
+            (PackedMode::Triangles, 4) => {
                 meshopt::decode_index_buffer::<u32>(packed, count).ok().map(|v| pod_collect_to_vec(&v))
             }
             (_, stride) => return Err(format!("packed elements of {stride} bytes")),
@@ -74,19 +94,28 @@ impl Packed {
         let mut unpacked = unpacked.ok_or("packed data are damaged")?;
         match (self.filter, self.byte_stride) {
             (None, _) => {}
-            (Some(Filter::Octahedral), 4) => {
+            (Some(PackedFilter::Octahedral), 4) => {
                 let normals = cast_slice_mut::<u8, [i8; 4]>(&mut unpacked);
                 normals.iter_mut().for_each(|normal| *normal = from_octahedral(*normal));
             }
-            (Some(Filter::Exponential), stride) if stride % 4 == 0 => {
+            (Some(PackedFilter::Exponential), stride) if stride % 4 == 0 => {
                 let numbers = cast_slice_mut::<u8, [u8; 4]>(&mut unpacked);
                 numbers.iter_mut().for_each(|v| *v = from_exponential(u32::from_le_bytes(*v)).to_le_bytes());
             }
-            (Some(Filter::Exponential), stride) => return Err(format!("packed numbers of {stride} bytes")),
-            (Some(Filter::Octahedral), stride) => return Err(format!("packed normals of {stride} bytes")),
+            (Some(PackedFilter::Exponential), stride) => return Err(format!("packed numbers of {stride} bytes")),
+            (Some(PackedFilter::Octahedral), stride) => return Err(format!("packed normals of {stride} bytes")),
         }
         Ok(unpacked)
     }
+}
+
+/// Returns the extensions of a buffer that holds nothing but room for what readers unpack.
+pub(crate) fn fallback_buffer() -> extensions::buffer::Buffer {
+    extensions::buffer::Buffer { others: only_meshopt(json!({"fallback": true})) }
+}
+
+fn only_meshopt(value: Value) -> Map<String, Value> {
+    Map::from_iter([(MESHOPT.to_string(), value)])
 }
 
 fn vertices<const SIZE: usize>(packed: &[u8], count: usize) -> Option<Vec<u8>>

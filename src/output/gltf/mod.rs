@@ -8,4 +8,7 @@ pub(crate) mod meshopt;
 pub mod one_file;
 pub(crate) mod parts;
 pub mod read;
+pub(crate) mod schema;
+pub(crate) mod stored_view;
+pub(crate) mod strict;
 pub(crate) mod vertex_order;

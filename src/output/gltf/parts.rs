@@ -96,7 +96,8 @@ fn too_long(frame: &Frame, corners: [[i32; 3]; 3]) -> Error {
 /// `resolution` times the least power of ten that makes room for a triangle `factor` times too long.
 fn coarser(resolution: f64, factor: f64) -> String {
     // Ten times the resolution gives at least eight times the step, a power of two.
-    let tens = factor.log(8.0).ceil().clamp(1.0, 20.0) as i32;
+    let room = std::iter::successors(Some(8.0), |room| Some(room * 8.0));
+    let tens = 1 + room.take_while(|room| *room < factor).take(19).count() as i32;
     let exact = shortest_decimal(resolution).and_then(|r| (0..tens).try_fold(r, |r, _| r.checked_mul(Decimal::TEN)));
     exact.map_or_else(|| format!("{:e}", resolution * 10f64.powi(tens)), |r| r.normalize().to_string())
 }

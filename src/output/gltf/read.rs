@@ -5,12 +5,18 @@ use std::borrow::Cow;
 use std::path::Path;
 
 use bytemuck::{AnyBitPattern, NoUninit, allocation::pod_collect_to_vec};
-use serde::Deserialize;
+use gltf::json::Index;
+use gltf::json::accessor::{Accessor, ComponentType, Type};
+use gltf::json::buffer::View;
+use gltf::json::mesh::{Primitive, Semantic};
+use gltf::json::scene::{Node, Scene};
+use gltf::json::validation::Checked::Valid;
 
 use crate::output::frame::Extras;
-use crate::output::gltf::container::Container;
-use crate::output::gltf::document::{FLOAT, SIGNED_BYTE, SIGNED_SHORT, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT};
-use crate::output::gltf::meshopt::{MOST_EXPANSION, Packed};
+use crate::output::gltf::container::GlbFile;
+use crate::output::gltf::meshopt::MOST_EXPANSION;
+use crate::output::gltf::stored_view::StoredView;
+use crate::output::gltf::strict::{Decoded, RawDocument};
 use crate::{Error, Result};
 
 /// A GLB file of this program, as it is on disk.
@@ -50,139 +56,143 @@ impl Part {
 
 /// Reads the GLB file at `path`.
 pub fn read_tile(path: &Path) -> Result<TileFile> {
-    let mut container = Container::open(path)?;
-    let document: Document = container.document(path)?;
-    let binary = container.binary(path)?;
+    let mut file = GlbFile::open(path)?;
+    let document = read_document(path, &file)?;
+    let binary = file.binary(path)?;
     let mut decoder = Decoder { document: &document, binary: &binary, used: 0 };
     decoder.tile().map_err(|what| Error::input(path, format!("not a tile of this program: {what}")))
 }
 
-/// Bytes that the parts of the GLB file at `path` take in memory at most, as far as its description says.
+/// Returns the number of bytes that the parts of the GLB file at `path` take in memory at most, as far as its description says.
 pub fn held_bytes(path: &Path) -> Result<u64> {
-    let container = Container::open(path)?;
-    let document: Document = container.document(path)?;
-    let size = |accessor: &Accessor| accessor.count.saturating_mul(if accessor.kind == "SCALAR" { 4 } else { 12 });
-    let said = document.accessors.iter().map(size).fold(0, u64::saturating_add);
-    Ok(said.min(container.binary_length.saturating_mul(MOST_EXPANSION)))
+    let file = GlbFile::open(path)?;
+    let size = |elements: &Elements| elements.count.saturating_mul(if elements.shape == Type::Scalar { 4 } else { 12 });
+    let said = read_document(path, &file)?.elements.iter().map(size).fold(0, u64::saturating_add);
+    Ok(said.min(file.binary_length.saturating_mul(MOST_EXPANSION)))
 }
 
-/// The georeference alone of the GLB file at `path`.
+/// Reads the georeference alone of the GLB file at `path`.
 pub fn read_extras(path: &Path) -> Result<Extras> {
-    let container = Container::open(path)?;
-    let mut document: Document = container.document(path)?;
+    let mut document = read_document(path, &GlbFile::open(path)?)?;
     if document.scene < document.scenes.len() {
         return Ok(document.scenes.swap_remove(document.scene).extras);
     }
     Err(Error::input(path, "not a tile of this program: there is no scene"))
 }
 
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct Document {
-    #[serde(default)]
-    scene: usize,
-    scenes: Vec<Scene>,
-    #[serde(default)]
-    nodes: Vec<Node>,
-    #[serde(default)]
-    meshes: Vec<Mesh>,
-    #[serde(default)]
-    accessors: Vec<Accessor>,
-    #[serde(default)]
-    buffer_views: Vec<View>,
+fn read_document(path: &Path, file: &GlbFile) -> Result<TileDocument> {
+    let document = file.document(path)?;
+    let not_ours = |what| Error::input(path, format!("its JSON chunk is not one of this program: {what}"));
+    TileDocument::new(&document).map_err(not_ours)
 }
 
-#[derive(Deserialize)]
-struct Scene {
+/// What the document of a tile says that is needed to decode it. All indices may be out of range.
+struct TileDocument {
+    scene: usize,
+    scenes: Vec<TileScene>,
+    nodes: Vec<PlacedMesh>,
+    meshes: Vec<Vec<Surface>>,
+    elements: Vec<Elements>,
+    views: Vec<StrideView>,
+}
+
+struct TileScene {
     extras: Extras,
-    #[serde(default)]
     nodes: Vec<usize>,
 }
 
-// Unknown fields of these would change what the data mean.
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Node {
-    #[serde(default, rename = "name")]
-    _name: String,
+/// A mesh, and where a node puts it.
+struct PlacedMesh {
     mesh: usize,
-    #[serde(default)]
     translation: [f64; 3],
-    #[serde(default = "unscaled")]
     scale: [f64; 3],
 }
 
-fn unscaled() -> [f64; 3] {
-    [1.0; 3]
-}
-
-#[derive(Deserialize)]
-struct Mesh {
-    primitives: Vec<Primitive>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Primitive {
-    attributes: Attributes,
+/// The accessors of a primitive.
+#[derive(Clone, Copy)]
+struct Surface {
+    positions: usize,
+    normals: Option<usize>,
+    colors: Option<usize>,
     indices: usize,
-    #[serde(rename = "material")]
-    _material: Option<usize>,
 }
 
-#[derive(Clone, Copy, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Attributes {
-    #[serde(rename = "POSITION")]
-    position: usize,
-    #[serde(rename = "NORMAL")]
-    normal: Option<usize>,
-    #[serde(rename = "COLOR_0")]
-    color: Option<usize>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields, rename_all = "camelCase")]
-struct Accessor {
-    buffer_view: usize,
-    component_type: u64,
+/// What an accessor gives.
+struct Elements {
+    view: usize,
+    component: ComponentType,
+    shape: Type,
     count: u64,
-    #[serde(rename = "type")]
-    kind: String,
-    #[serde(default, rename = "normalized")]
-    _normalized: bool,
-    #[serde(default, rename = "min")]
-    _min: Vec<f64>,
-    #[serde(default, rename = "max")]
-    _max: Vec<f64>,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields, rename_all = "camelCase")]
-struct View {
-    buffer: usize,
-    #[serde(default)]
-    byte_offset: u64,
-    byte_length: u64,
-    byte_stride: Option<u64>,
-    #[serde(rename = "target")]
-    _target: Option<u64>,
-    #[serde(default)]
-    extensions: Extensions,
+/// A buffer view, and the bytes from one of its elements to the next if it says them.
+struct StrideView {
+    stored: StoredView,
+    stride: Option<usize>,
 }
 
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Extensions {
-    #[serde(rename = "EXT_meshopt_compression")]
-    packed: Option<Packed>,
+impl TileDocument {
+    fn new(document: &RawDocument) -> Decoded<TileDocument> {
+        Ok(TileDocument {
+            scene: document.scene,
+            scenes: document.scenes().map(|scene| TileScene::new(&scene?)).collect::<Decoded<_>>()?,
+            nodes: document.nodes().map(|node| PlacedMesh::new(&node?)).collect::<Decoded<_>>()?,
+            meshes: document
+                .meshes()
+                .map(|mesh| mesh?.primitives.iter().map(Surface::new).collect())
+                .collect::<Decoded<_>>()?,
+            elements: document.accessors().map(|accessor| Elements::new(&accessor?)).collect::<Decoded<_>>()?,
+            views: document.buffer_views().map(|view| StrideView::new(&view?)).collect::<Decoded<_>>()?,
+        })
+    }
 }
 
-type Decoded<T> = std::result::Result<T, String>;
+impl TileScene {
+    fn new(scene: &Scene) -> Decoded<TileScene> {
+        let extras = scene.extras.as_ref().ok_or("a scene has no extras")?;
+        let extras = serde_json::from_str(extras.get()).map_err(|e| format!("the extras of a scene: {e}"))?;
+        Ok(TileScene { extras, nodes: scene.nodes.iter().map(|node| node.value()).collect() })
+    }
+}
+
+impl PlacedMesh {
+    fn new(node: &Node) -> Decoded<PlacedMesh> {
+        let mesh = node.mesh.ok_or("a node has no mesh")?.value();
+        let [translation, scale] = [node.translation.unwrap_or_default(), node.scale.unwrap_or([1.0; 3])];
+        Ok(PlacedMesh { mesh, translation: translation.map(f64::from), scale: scale.map(f64::from) })
+    }
+}
+
+impl Surface {
+    fn new(primitive: &Primitive) -> Decoded<Surface> {
+        let attribute = |semantic| primitive.attributes.get(&Valid(semantic)).map(Index::value);
+        Ok(Surface {
+            positions: attribute(Semantic::Positions).ok_or("a primitive has no positions")?,
+            normals: attribute(Semantic::Normals),
+            colors: attribute(Semantic::Colors(0)),
+            indices: primitive.indices.ok_or("a primitive has no indices")?.value(),
+        })
+    }
+}
+
+impl Elements {
+    fn new(accessor: &Accessor) -> Decoded<Elements> {
+        let (Valid(component), Valid(shape)) = (accessor.component_type, accessor.type_) else {
+            return Err("an accessor's type is not one of glTF's".into());
+        };
+        let view = accessor.buffer_view.ok_or("an accessor has no buffer view")?.value();
+        Ok(Elements { view, component: component.0, shape, count: accessor.count.0 })
+    }
+}
+
+impl StrideView {
+    fn new(view: &View) -> Decoded<StrideView> {
+        Ok(StrideView { stored: StoredView::of(view)?, stride: view.byte_stride.map(|stride| stride.0) })
+    }
+}
 
 struct Decoder<'a> {
-    document: &'a Document,
+    document: &'a TileDocument,
     binary: &'a [u8],
     /// Bytes decoded so far: data that are used again and again would otherwise grow without bound.
     used: usize,
@@ -198,10 +208,10 @@ impl Decoder<'_> {
     fn part(&mut self, node: usize) -> Decoded<Part> {
         let node = item(&self.document.nodes, node, "node")?;
         let mesh = item(&self.document.meshes, node.mesh, "mesh")?;
-        let [Primitive { attributes, indices, .. }] = &mesh.primitives[..] else {
+        let [surface] = mesh[..] else {
             return Err(format!("mesh {} does not have one primitive", node.mesh));
         };
-        let positions = self.positions(attributes.position)?;
+        let positions = self.positions(surface.positions)?;
         if !positions.as_flattened().iter().chain(&[0.0]).all(|v| v.is_finite()) {
             return Err("a position is not a finite number".into());
         }
@@ -209,56 +219,56 @@ impl Decoder<'_> {
             true => Ok(()),
             false => Err(format!("{} positions, but {count} {name}", positions.len())),
         };
-        let normals = attributes.normal.map(|n| self.normals(n)).transpose()?;
-        let colors = attributes.color.map(|c| self.colors(c)).transpose()?;
+        let normals = surface.normals.map(|n| self.normals(n)).transpose()?;
+        let colors = surface.colors.map(|c| self.colors(c)).transpose()?;
         normals.as_ref().map_or(Ok(()), |n| same_count(n.len(), "normals"))?;
         colors.as_ref().map_or(Ok(()), |c| same_count(c.len(), "colours"))?;
-        let triangles = self.triangles(*indices, positions.len())?;
+        let triangles = self.triangles(surface.indices, positions.len())?;
         Ok(Part { translation: node.translation, scale: node.scale, positions, normals, colors, triangles })
     }
 
     fn positions(&mut self, accessor: usize) -> Decoded<Vec<[f32; 3]>> {
-        if self.component(accessor)? == FLOAT {
-            return self.elements(accessor, FLOAT, "VEC3");
+        if self.component(accessor)? == ComponentType::F32 {
+            return self.elements(accessor, ComponentType::F32, Type::Vec3);
         }
-        let short: Vec<[u16; 4]> = self.elements(accessor, UNSIGNED_SHORT, "VEC3")?;
+        let short: Vec<[u16; 4]> = self.elements(accessor, ComponentType::U16, Type::Vec3)?;
         Ok(short.into_iter().map(|[x, y, z, _]| [x, y, z].map(f32::from)).collect())
     }
 
     fn normals(&mut self, accessor: usize) -> Decoded<Vec<[f32; 3]>> {
-        if self.component(accessor)? == FLOAT {
-            return self.elements(accessor, FLOAT, "VEC3");
+        if self.component(accessor)? == ComponentType::F32 {
+            return self.elements(accessor, ComponentType::F32, Type::Vec3);
         }
-        if self.component(accessor)? == SIGNED_SHORT {
-            let shorts: Vec<[i16; 4]> = self.elements(accessor, SIGNED_SHORT, "VEC3")?;
+        if self.component(accessor)? == ComponentType::I16 {
+            let shorts: Vec<[i16; 4]> = self.elements(accessor, ComponentType::I16, Type::Vec3)?;
             return Ok(shorts.into_iter().map(|[x, y, z, _]| [x, y, z].map(|v| f32::from(v) / 32767.0)).collect());
         }
-        let bytes: Vec<[i8; 4]> = self.elements(accessor, SIGNED_BYTE, "VEC3")?;
+        let bytes: Vec<[i8; 4]> = self.elements(accessor, ComponentType::I8, Type::Vec3)?;
         Ok(bytes.into_iter().map(|[x, y, z, _]| [x, y, z].map(|v| f32::from(v) / 127.0)).collect())
     }
 
     fn colors(&mut self, accessor: usize) -> Decoded<Vec<[u16; 4]>> {
-        if self.component(accessor)? == UNSIGNED_SHORT {
-            return self.elements(accessor, UNSIGNED_SHORT, "VEC4");
+        if self.component(accessor)? == ComponentType::U16 {
+            return self.elements(accessor, ComponentType::U16, Type::Vec4);
         }
-        let bytes: Vec<[u8; 4]> = self.elements(accessor, UNSIGNED_BYTE, "VEC4")?;
+        let bytes: Vec<[u8; 4]> = self.elements(accessor, ComponentType::U8, Type::Vec4)?;
         Ok(bytes.into_iter().map(|c| c.map(|v| u16::from(v) * 257)).collect())
     }
 
-    fn component(&self, accessor: usize) -> Decoded<u64> {
-        Ok(item(&self.document.accessors, accessor, "accessor")?.component_type)
+    fn component(&self, accessor: usize) -> Decoded<ComponentType> {
+        Ok(item(&self.document.elements, accessor, "accessor")?.component)
     }
 
     fn triangles(&mut self, indices: usize, vertices: usize) -> Decoded<Vec<[u32; 3]>> {
-        let accessor = item(&self.document.accessors, indices, "accessor")?;
+        let accessor = item(&self.document.elements, indices, "accessor")?;
         if accessor.count % 3 != 0 {
             return Err(format!("{} indices are not whole triangles", accessor.count));
         }
-        let triangles: Vec<[u32; 3]> = if accessor.component_type == UNSIGNED_SHORT {
-            let short: Vec<u16> = self.elements(indices, UNSIGNED_SHORT, "SCALAR")?;
+        let triangles: Vec<[u32; 3]> = if accessor.component == ComponentType::U16 {
+            let short: Vec<u16> = self.elements(indices, ComponentType::U16, Type::Scalar)?;
             short.chunks_exact(3).map(|t| [t[0] as u32, t[1] as u32, t[2] as u32]).collect()
         } else {
-            let corners: Vec<u32> = self.elements(indices, UNSIGNED_INT, "SCALAR")?;
+            let corners: Vec<u32> = self.elements(indices, ComponentType::U32, Type::Scalar)?;
             corners.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect()
         };
         match triangles.as_flattened().iter().find(|&&v| v as usize >= vertices) {
@@ -267,49 +277,38 @@ impl Decoder<'_> {
         }
     }
 
-    /// The elements of an accessor of this type, tightly packed.
+    /// Returns the elements of an accessor of this type, tightly packed.
     fn elements<T: AnyBitPattern + NoUninit>(
         &mut self,
         accessor: usize,
-        component: u64,
-        kind: &str,
+        component: ComponentType,
+        shape: Type,
     ) -> Decoded<Vec<T>> {
-        let number = accessor;
-        let accessor = item(&self.document.accessors, accessor, "accessor")?;
-        if accessor.component_type != component || accessor.kind != kind {
+        let elements = item(&self.document.elements, accessor, "accessor")?;
+        if elements.component != component || elements.shape != shape {
             return Err(format!(
-                "accessor {number} holds {} of component type {}, where {kind} of {component} was expected",
-                accessor.kind, accessor.component_type
+                "accessor {accessor} holds {:?} of {:?}, where {shape:?} of {component:?} was expected",
+                elements.shape, elements.component
             ));
         }
-        let view = item(&self.document.buffer_views, accessor.buffer_view, "buffer view")?;
-        let size = size_of::<T>() as u64;
-        if view.byte_stride.is_some_and(|stride| stride != size) {
-            return Err(format!("accessor {number} is not {size} bytes an element"));
+        let view = item(&self.document.views, elements.view, "buffer view")?;
+        if view.stride.is_some_and(|stride| stride != size_of::<T>()) {
+            return Err(format!("accessor {accessor} is not {} bytes an element", size_of::<T>()));
         }
-        let bytes = self.bytes(view)?;
-        let length = accessor.count.checked_mul(size).and_then(|length| usize::try_from(length).ok());
+        let bytes = self.bytes(&view.stored)?;
+        let length = elements.count.checked_mul(size_of::<T>() as u64).and_then(|length| usize::try_from(length).ok());
         let bytes = length.and_then(|length| bytes.get(..length));
-        Ok(pod_collect_to_vec(bytes.ok_or_else(|| format!("accessor {number} goes past the end of the data"))?))
+        Ok(pod_collect_to_vec(bytes.ok_or_else(|| format!("accessor {accessor} goes past the end of the data"))?))
     }
 
-    /// What a view shows.
-    fn bytes(&mut self, view: &View) -> Decoded<Cow<'_, [u8]>> {
-        let (buffer, start, length) = match &view.extensions.packed {
-            Some(packed) => (packed.buffer, packed.byte_offset, packed.byte_length),
-            None => (view.buffer, view.byte_offset, view.byte_length),
-        };
-        let end = start.checked_add(length).and_then(|end| usize::try_from(end).ok());
-        let range = end.and_then(|end| self.binary.get(start as usize..end)).filter(|_| buffer == 0);
-        let bytes = range.ok_or("a buffer view goes past the end of the data")?;
-        self.used += bytes.len();
+    /// Returns what a view shows.
+    fn bytes(&mut self, view: &StoredView) -> Decoded<Cow<'_, [u8]>> {
+        let stored = view.stored(self.binary)?;
+        self.used += stored.len();
         if self.used > self.binary.len() {
             return Err("the same data are used more than once".into());
         }
-        match &view.extensions.packed {
-            Some(packed) => packed.unpack(bytes).map(Cow::Owned),
-            None => Ok(Cow::Borrowed(bytes)),
-        }
+        view.unpack(stored)
     }
 }
 

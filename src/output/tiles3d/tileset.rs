@@ -5,7 +5,7 @@
 use serde_json::{Value, json};
 
 use crate::output::frame::Frame;
-use crate::output::gltf::document::GENERATOR;
+use crate::output::gltf::schema::GENERATOR;
 use crate::output::tiles3d::globe::{applied, relative};
 
 /// Half the least extent of a bounding volume, metres: viewers divide by it.
@@ -103,7 +103,7 @@ fn box_of([low, high]: Extent) -> [f64; 12] {
 
 fn diagonal(frame: &Frame, node: &Node) -> f64 {
     let [low, high] = corners(frame, node.bounds);
-    (0..3).map(|k| (high[k] - low[k]).powi(2)).sum::<f64>().sqrt().max(2.0 * LEAST_HALF)
+    (0..3).map(|k| (high[k] - low[k]) * (high[k] - low[k])).sum::<f64>().sqrt().max(2.0 * LEAST_HALF)
 }
 
 #[cfg(test)]
