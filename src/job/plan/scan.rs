@@ -1,7 +1,7 @@
 //! Step 1 of a job: look at every input, and choose the one lattice, unit and CRS that all of them meet on.
 
-use crate::geometry::Site;
 use crate::geometry::lattice::{AxisMap, Lattice, REACH, shortest_decimal};
+use crate::geometry::{Bounds, Site};
 use crate::input::options::{OnBadFile, UnitChoice};
 use crate::input::{self, Axis, Crs, PointRules, Source, Unit};
 use crate::job::options::JobOptions;
@@ -15,10 +15,6 @@ use rust_decimal::prelude::ToPrimitive;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-/// International foot in metres.
-const FOOT: f64 = 0.3048;
-/// US survey foot in metres.
-const US_FOOT: f64 = 1200.0 / 3937.0;
 /// A point's number in the job is kept in 40 bits.
 const MOST_RECORDS: u64 = 1 << 40;
 
@@ -253,8 +249,8 @@ fn common_crs(sources: &[Source]) -> Result<Crs> {
 fn unit_of(choice: UnitChoice, crs: &Crs, warnings: &mut Vec<String>) -> Result<(&'static str, f64)> {
     match (choice, crs.horizontal) {
         (UnitChoice::Metre, _) | (UnitChoice::Auto, Unit::Metre) => Ok(("metre", 1.0)),
-        (UnitChoice::Foot, _) | (UnitChoice::Auto, Unit::Foot) => Ok(("foot", FOOT)),
-        (UnitChoice::UsFoot, _) | (UnitChoice::Auto, Unit::UsFoot) => Ok(("us-foot", US_FOOT)),
+        (UnitChoice::Foot, _) | (UnitChoice::Auto, Unit::Foot) => Ok(("foot", Unit::FOOT)),
+        (UnitChoice::UsFoot, _) | (UnitChoice::Auto, Unit::UsFoot) => Ok(("us-foot", Unit::US_FOOT)),
         (UnitChoice::Auto, Unit::Other(metres)) => Ok(("other", metres)),
         (UnitChoice::Auto, Unit::Unknown) => {
             warnings.push(
@@ -308,6 +304,7 @@ fn rules(
         config.output.color,
         crate::output::options::ColorChoice::Auto | crate::output::options::ColorChoice::Rgb
     );
+    let bounds = bounds.map(|[west, south, east, north]| Bounds { min: [west, south], max: [east, north] });
     let mut first_order = 0;
     let mut rules = Vec::with_capacity(sources.len());
     for source in sources {

@@ -40,7 +40,7 @@ struct Ground<'a> {
 
 /// Places `root` and, where need be, each tile below; a sentence where there is no way, and then nothing is placed.
 pub fn place(plan: &Plan, frame: &Frame, height_offset: f64, root: &mut Node) -> Result<Placement, String> {
-    let definition = plan.crs.definition().ok_or_else(|| match &plan.crs.name {
+    let definition = plan.crs.proj4_definition().ok_or_else(|| match &plan.crs.name {
         Some(name) => format!("{name} has no definition that leads to longitude and latitude"),
         None => "no input names its coordinate system".to_string(),
     })?;
