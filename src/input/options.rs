@@ -3,6 +3,7 @@
 use crate::geometry::lattice::shortest_decimal;
 use crate::input::text::options::TextOptions;
 use rust_decimal::Decimal;
+use rust_decimal::prelude::ToPrimitive;
 use serde::{Deserialize, Serialize};
 
 /// `[input]`: which points.
@@ -97,7 +98,7 @@ pub struct SourceBounds(pub [f64; 4]);
 
 /// The step of the lattice: `None` means "auto".
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(try_from = "toml::Value", into = "String")]
+#[serde(try_from = "toml::Value", into = "toml::Value")]
 pub struct ResolutionChoice(pub Option<Decimal>);
 
 impl TryFrom<toml::Value> for ResolutionChoice {
@@ -117,9 +118,12 @@ impl TryFrom<toml::Value> for ResolutionChoice {
     }
 }
 
-impl From<ResolutionChoice> for String {
-    fn from(resolution: ResolutionChoice) -> String {
-        resolution.0.map_or("auto".into(), |step| step.to_string())
+impl From<ResolutionChoice> for toml::Value {
+    fn from(resolution: ResolutionChoice) -> toml::Value {
+        match resolution.0.and_then(|step| step.to_f64()) {
+            None => toml::Value::String("auto".into()),
+            Some(step) => toml::Value::Float(step),
+        }
     }
 }
 

@@ -85,9 +85,7 @@ fn try_plan(
 ) -> Result<(Plan, Vec<PointRules>)> {
     let mut warnings = Warnings::default();
     warnings.extend(unreadable_names(&options.input));
-    sources
-        .iter()
-        .for_each(|source| warnings.extend(source.warnings.iter().map(|w| format!("{}: {w}", source.path.display()))));
+    sources.iter().for_each(|source| warnings.extend_from_file(&source.path, &source.warnings));
     warnings.shorten(MAX_WARNINGS);
     let records = sources.iter().map(|s| s.records).sum();
     if records >= MAX_RECORDS {
