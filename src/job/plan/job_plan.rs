@@ -5,7 +5,7 @@ use crate::geometry::lattice::Lattice;
 use crate::input::Crs;
 use crate::input::PointRules;
 use crate::input::Source;
-use crate::job::durable::atomic_file::{PendingFile, write_pending_json};
+use crate::job::durable::atomic_file::{PendingFile, write_pending};
 use crate::job::options::JobOptions;
 use crate::job::plan::lattice_choice::LatticeCoarsening;
 use crate::output::frame::Frame;
@@ -72,7 +72,8 @@ impl Plan {
     /// # Errors
     /// [`Error::Io`] if writing fails.
     pub fn write(&self, path: &Path) -> Result<PendingFile> {
-        write_pending_json(path, self)
+        let text = serde_json::to_vec(self).map_err(|e| Error::Broken(format!("{}: {e}", path.display())))?;
+        write_pending(path, &text)
     }
 
     /// Reads the plan in the file at `path`.
