@@ -101,7 +101,7 @@ pub fn run(config: &JobOptions, options: impl Into<Options>) -> Result<Report> {
                 head.coarser.vertical += 1;
             }
             Err(Error::TooFine { vertical: false, what })
-                if config.input.resolution.0.is_none() && head.coarser.horizontal < MOST_TENS =>
+                if config.input.resolution.step().is_none() && head.coarser.horizontal < MOST_TENS =>
             {
                 options.progress.note(&format!("{what}; starting again with a coarser step in x and y"));
                 head.coarser.horizontal += 1;

@@ -104,7 +104,7 @@ fn make_plan(sources: &[Source], config: &JobOptions, coarser: Coarser) -> Resul
     let (unit, metres) = unit_of(config.input.unit, &crs, &mut warnings)?;
     let area = Area::of(sources, config, metres)?;
     let metres_z = crs.vertical.unwrap_or(metres);
-    let wanted = config.input.resolution.0;
+    let wanted = config.input.resolution.step();
     let lattice = lattice_choice::lattice(sources, &area, [metres, metres_z], wanted, coarser, &mut warnings)?;
     if metres_z != metres {
         warnings.push(format!(
