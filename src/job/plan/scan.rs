@@ -96,7 +96,7 @@ fn try_plan(
     let (unit, metres) = horizontal_unit(options.input.unit, &crs, &mut warnings)?;
     let extent = Extent::of(sources, &options.input, metres)?;
     let metres_z = crs.vertical.unwrap_or(metres);
-    let wanted = options.input.resolution.0;
+    let wanted = options.input.resolution.step();
     let lattice = choose_lattice(sources, &extent, [metres, metres_z], wanted, coarsening, &mut warnings)?;
     if metres_z != metres {
         warnings.push(format!(
