@@ -62,7 +62,7 @@ fn options(path: &Path, text: &TextOptions, choice: usize) -> JobOptions {
     let mut options = OPTIONS[choice % OUTPUTS.len()].clone();
     options.input.files = vec![path.to_str().expect("a plain path").to_owned()];
     options.input.csv = text.clone();
-    options.input.max_malformed_fraction.0 = if choice % 2 == 0 { 0.0 } else { 1.0 };
+    options.input.max_malformed_fraction.0 = [0.0, 1.0][choice % 2];
     options
 }
 

@@ -1,8 +1,8 @@
 //! Whole jobs: whatever the input, a job ends with an error that a user can act on, or with an output that verifies.
 
-use gdt_batch::job::options::JobOptions;
+use gdt_batch::job::options::{JobOptions, RunOptions};
 use gdt_batch::job::preflight::check;
-use gdt_batch::job::progress::stage::Progress;
+use gdt_batch::job::progress::stage::ProgressOutput;
 use gdt_batch::{Error, job, verify};
 
 use super::with_file;
@@ -21,7 +21,7 @@ pub(crate) fn options(text: &str) -> JobOptions {
 
 /// Scans the inputs. Returns whether there is a job to run.
 pub(crate) fn preflight(options: &JobOptions) -> bool {
-    match check::run(options) {
+    match check::check(options) {
         Ok(preflight) => {
             assert!(!preflight.to_string().is_empty());
             true
@@ -38,7 +38,7 @@ pub(crate) fn run_and_verify(mut options: JobOptions) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     options.output.directory = folder.path().join("out");
     // The free memory of this machine must not matter.
-    let run = job::Options { progress: Progress::Quiet, force: true, fresh: false };
+    let run = RunOptions { progress: ProgressOutput::Quiet, force: true, restart: false };
     let report = match job::run(&options, run) {
         Ok(report) => report,
         Err(error) => return assert_is_for_the_user(&error),
