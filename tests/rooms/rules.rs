@@ -28,7 +28,7 @@ const RULES: [Rule; 7] = [
         why: "durable and progress know no step",
     },
     Rule {
-        rooms: &["job/durable", "job/progress", "job/records", "job/options"],
+        rooms: &["job/durable", "job/progress", "job/records", "job/options", "job/index"],
         never: &["job/run", "job/preflight", "job/report", "job/mod"],
         why: "what all steps share knows none of their users",
     },
