@@ -34,7 +34,7 @@ const RULES: [Rule; 7] = [
     Rule {
         rooms: &["job/durable", "job/progress", "job/records", "job/options"],
         never: &["job/run", "job/preflight", "job/report", "job/mod"],
-        why: "what all steps share does not know the rooms that use them",
+        why: "what all steps share does not know the rooms that use it",
     },
     Rule {
         rooms: &STEPS,
