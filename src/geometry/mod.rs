@@ -3,6 +3,7 @@
 mod bounds;
 pub mod lattice;
 pub mod predicates;
+pub mod square_grid;
 
 pub use bounds::Bounds;
 
