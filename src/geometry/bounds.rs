@@ -14,12 +14,12 @@ pub struct Bounds<const N: usize> {
 }
 
 impl<const N: usize> Bounds<N> {
-    /// The box of one point.
+    /// Returns the box of one point.
     pub fn of_point(point: [i32; N]) -> Bounds<N> {
         Bounds { min: point, max: point }
     }
 
-    /// The least box of all `points`, or `None` if there are none.
+    /// Returns the least box that holds all `points`, or `None` if there are none.
     #[inline]
     pub fn of_points(points: impl IntoIterator<Item = [i32; N]>) -> Option<Bounds<N>> {
         let mut points = points.into_iter();
@@ -37,14 +37,14 @@ impl<const N: usize> Bounds<N> {
         }
     }
 
-    /// The least box that holds both boxes.
+    /// Returns the least box that holds both boxes.
     pub fn union(mut self, other: Bounds<N>) -> Bounds<N> {
         self.include(other.min);
         self.include(other.max);
         self
     }
 
-    /// The length along `axis` in lattice steps: 0 for a box of one point.
+    /// Returns the length along `axis` in lattice steps, which is 0 for a box of one point.
     pub fn extent(&self, axis: usize) -> i64 {
         self.max[axis] as i64 - self.min[axis] as i64
     }

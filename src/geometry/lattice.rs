@@ -1,41 +1,52 @@
-//! The job-wide integer grid on which all sites lie: `world = offset + resolution * integer`, in exact decimals.
+//! The integer grid of a job, on which all sites lie: `world = offset + resolution * integer`, in exact decimals.
 
 use rust_decimal::Decimal;
 use rust_decimal::prelude::ToPrimitive;
 use serde::{Deserialize, Serialize};
 
-/// Lattice integers in x and y lie within this of zero, so that the predicates cannot overflow.
+/// Lattice integers in x and y lie within this distance of zero, so that the predicates cannot overflow.
 pub const REACH: i32 = 1 << 29;
 
-/// The lattice of a job. Units are those of the source.
+/// The lattice of a job, in source units.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Lattice {
     /// World coordinates (x, y, z) of the lattice point (0, 0, 0).
     #[serde(with = "decimal_text_array")]
     pub offset: [Decimal; 3],
-    /// Step in x and y.
+    /// The step in x and y.
     #[serde(with = "decimal_text")]
     pub resolution: Decimal,
-    /// Step in z.
+    /// The step in z.
     #[serde(with = "decimal_text")]
     pub resolution_z: Decimal,
 }
 
 impl Lattice {
-    /// The step along `axis` (0: x, 1: y, 2: z).
+    /// Returns the lattice with these steps, or `None` if the world coordinate of some `i32` needs more digits than a decimal has.
+    pub fn new(offset: [Decimal; 3], resolution: Decimal, resolution_z: Decimal) -> Option<Lattice> {
+        let lattice = Lattice { offset, resolution, resolution_z };
+        let ends = [0, 1, 2].into_iter().flat_map(|axis| [i32::MIN, i32::MAX].map(|i| (axis, i)));
+        ends.into_iter().all(|(axis, i)| lattice.exact_world(axis, i).is_some()).then_some(lattice)
+    }
+
+    /// Returns the step along `axis` (0: x, 1: y, 2: z).
     pub fn step(&self, axis: usize) -> Decimal {
         if axis == 2 { self.resolution_z } else { self.resolution }
     }
 
-    /// The world coordinate of lattice integer `i` on `axis`, correctly rounded.
+    /// Returns the world coordinate of lattice integer `i` on `axis`, correctly rounded. It is a number on every lattice that
+    /// [`Lattice::new`] returns, and NaN where another lattice would need too many digits.
     pub fn world(&self, axis: usize, i: i32) -> f64 {
-        let exact = self.offset[axis] + self.step(axis) * Decimal::from(i);
-        exact.to_f64().unwrap_or(f64::NAN)
+        self.exact_world(axis, i).and_then(|exact| exact.to_f64()).unwrap_or(f64::NAN)
+    }
+
+    fn exact_world(&self, axis: usize, i: i32) -> Option<Decimal> {
+        self.step(axis).checked_mul(Decimal::from(i))?.checked_add(self.offset[axis])
     }
 }
 
-/// The decimal number that the shortest text of `value` says: 0.1 for the `f64` nearest to one tenth.
-/// `None` where it is not finite or needs more than 28 digits.
+/// Returns the decimal number of the shortest text for `value`: 0.1 for the `f64` nearest to one tenth. Returns `None` if `value`
+/// is not finite or needs more than 28 digits.
 pub fn shortest_decimal(value: f64) -> Option<Decimal> {
     if !value.is_finite() {
         return None;
@@ -44,20 +55,21 @@ pub fn shortest_decimal(value: f64) -> Option<Decimal> {
     Decimal::from_str_exact(&text).ok().map(|d| d.normalize())
 }
 
-/// The exact way from one axis of an input, `world = offset + scale * raw`, to the lattice:
+/// The exact map from one axis of an input, `world = offset + scale * raw`, to the lattice:
 /// `integer = round((raw * mul + add) / div)`, halves away from zero.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "[String; 3]", try_from = "[String; 3]")]
 pub struct AxisMap {
     mul: i128,
     add: i128,
     div: i128,
-    /// The same numbers, where any raw `i32` can be mapped without leaving an `i64`: wide division takes ten times as long.
+    /// The same numbers, if they map every raw `i32` without leaving an `i64`. Wide division takes ten times as long.
     narrow: Option<[i64; 3]>,
 }
 
 impl AxisMap {
-    /// The map for an input axis with this `offset` and `scale` to a lattice axis. `None` where the numbers have more
-    /// digits than can be compared exactly, or a step is not positive.
+    /// Returns the map from an input axis with this `offset` and `scale` to a lattice axis, or `None` if the numbers have too many
+    /// digits to be compared exactly, or a step is not positive.
     pub fn new(offset: Decimal, scale: Decimal, lattice_offset: Decimal, resolution: Decimal) -> Option<AxisMap> {
         let shift = offset.checked_sub(lattice_offset)?.normalize();
         let (scale, resolution) = (scale.normalize(), resolution.normalize());
@@ -68,24 +80,23 @@ impl AxisMap {
         let integer = |d: Decimal| 10i128.checked_pow(digits - d.scale())?.checked_mul(d.mantissa());
         let (mul, add, div) = (integer(scale)?, integer(shift)?, integer(resolution)?);
         let common = gcd(gcd(mul, add.abs()), div);
-        let (mul, add, div) = (mul / common, add / common, div / common);
-        let narrow =
-            (mul < 1 << 29 && add.abs() < 1 << 61 && div < 1 << 61).then_some([mul as i64, add as i64, div as i64]);
-        let map = AxisMap { mul, add, div, narrow };
+        AxisMap::from_integers(mul / common, add / common, div / common)
+    }
+
+    /// Returns the map of these integers. Returns `None` if `mul` or `div` is not positive, or a number is too large.
+    fn from_integers(mul: i128, add: i128, div: i128) -> Option<AxisMap> {
+        let narrow = (mul < 1 << 29 && add.unsigned_abs() < 1 << 61 && div < 1 << 61)
+            .then_some([mul as i64, add as i64, div as i64]);
         // Room for any 32-bit or 10^18 mantissa without overflow.
-        (map.mul < 1 << 60 && map.add.abs() < 1 << 120 && map.div < 1 << 120).then_some(map)
+        let fits = (1..1 << 60).contains(&mul) && add.unsigned_abs() < 1 << 120 && (1..1 << 120).contains(&div);
+        fits.then_some(AxisMap { mul, add, div, narrow })
     }
 
-    /// Whether every raw value meets a lattice point, so that nothing is rounded.
-    pub fn is_exact(&self) -> bool {
-        self.div == 1
-    }
-
-    /// The lattice integer of `raw`, and whether it was rounded; `None` outside the range of `i32`.
+    /// Returns the lattice integer of `raw` and whether it was rounded, or `None` if it is outside the range of `i32`.
     #[inline(always)]
     pub fn apply(&self, raw: i64) -> Option<(i32, bool)> {
         match self.narrow {
-            // Most maps are exact: the one case that is worth having wherever records are read.
+            // Most maps are exact. Only this case is worth inlining wherever records are read.
             Some([mul, add, 1]) if i32::try_from(raw).is_ok() => Some((i32::try_from(raw * mul + add).ok()?, false)),
             _ => self.round(raw),
         }
@@ -110,6 +121,28 @@ impl AxisMap {
         Some((i32::try_from(quotient + up as i128).ok()?, rest != 0))
     }
 }
+
+/// A map is written as the digits of `mul`, `add` and `div`, since JSON readers do not keep all digits of large numbers.
+impl From<AxisMap> for [String; 3] {
+    fn from(map: AxisMap) -> [String; 3] {
+        [map.mul, map.add, map.div].map(|number| number.to_string())
+    }
+}
+
+impl TryFrom<[String; 3]> for AxisMap {
+    type Error = InvalidAxisMap;
+
+    fn try_from(numbers: [String; 3]) -> Result<AxisMap, InvalidAxisMap> {
+        let [mul, add, div] = numbers.each_ref().map(|number| number.parse().ok());
+        let map = mul.zip(add).zip(div).and_then(|((mul, add), div)| AxisMap::from_integers(mul, add, div));
+        map.ok_or(InvalidAxisMap(numbers))
+    }
+}
+
+/// Three numbers that are not the integers of an [`AxisMap`].
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0:?} are not the integers of a map to the lattice")]
+pub struct InvalidAxisMap([String; 3]);
 
 fn gcd(a: i128, b: i128) -> i128 {
     if b == 0 { a } else { gcd(b, a % b) }
@@ -158,14 +191,12 @@ mod tests {
     #[test]
     fn the_same_scale_and_a_whole_shift_is_exact() {
         let map = AxisMap::new(decimal("1000.5"), decimal("0.01"), decimal("600000"), decimal("0.01")).unwrap();
-        assert!(map.is_exact());
         assert_eq!(map.apply(5), Some((-59899945, false)));
     }
 
     #[test]
     fn a_finer_input_is_rounded_to_the_nearest_step() {
         let map = AxisMap::new(decimal("0"), decimal("0.001"), decimal("0"), decimal("0.01")).unwrap();
-        assert!(!map.is_exact());
         let rounded: Vec<_> = [14, 15, 16, -14, -15, -16, 20].iter().map(|&raw| map.apply(raw).unwrap()).collect();
         let expected = [(1, true), (2, true), (2, true), (-1, true), (-2, true), (-2, true), (2, false)];
         assert_eq!(rounded, expected);
@@ -182,7 +213,24 @@ mod tests {
     }
 
     #[test]
-    fn what_leaves_the_range_is_refused() {
+    fn maps_are_read_back_as_they_were_written() {
+        let wide =
+            AxisMap::new(decimal("1"), decimal("0.001"), decimal("0"), decimal("12345678901234567890.123")).unwrap();
+        let narrow = AxisMap::new(decimal("-0.5"), decimal("0.01"), decimal("0"), decimal("0.03")).unwrap();
+        for map in [wide, narrow] {
+            let text = serde_json::to_string(&map).unwrap();
+            assert_eq!(serde_json::from_str::<AxisMap>(&text).unwrap(), map, "{text}");
+        }
+        let least = i128::MIN.to_string();
+        for [mul, add, div] in [["1", "0", "0"], ["0", "0", "1"], ["-1", "0", "1"], ["1", &least, "1"], ["1", "x", "1"]]
+        {
+            let text = format!("[\"{mul}\",\"{add}\",\"{div}\"]");
+            assert!(serde_json::from_str::<AxisMap>(&text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn values_beyond_the_range_are_refused() {
         let map = AxisMap::new(decimal("1"), decimal("1"), decimal("0"), decimal("0.001"));
         assert_eq!(map.unwrap().apply(i32::MAX as i64), None);
         assert!(AxisMap::new(decimal("0"), decimal("0"), decimal("0"), decimal("1")).is_none());
@@ -194,5 +242,19 @@ mod tests {
         assert_eq!(shortest_decimal(-123456.789).unwrap().to_string(), "-123456.789");
         assert_eq!(shortest_decimal(f64::NAN), None);
         assert_eq!(shortest_decimal(1e300), None);
+    }
+
+    #[test]
+    fn a_lattice_whose_coordinates_need_too_many_digits_is_refused() {
+        let one = Decimal::ONE;
+        let far = decimal("79000000000000000000000000000");
+        assert!(Lattice::new([Decimal::ZERO; 3], one, one).is_some());
+        let coarse = decimal("1000000000000000000000000000");
+        assert_eq!(Lattice::new([Decimal::ZERO; 3], coarse, one), None);
+        assert_eq!(Lattice::new([Decimal::ZERO; 3], one, coarse), None);
+        assert_eq!(Lattice::new([Decimal::ZERO, far, Decimal::ZERO], decimal("1000000000000000000"), one), None);
+        let unchecked = Lattice { offset: [Decimal::ZERO; 3], resolution: coarse, resolution_z: one };
+        assert_eq!(unchecked.world(0, 3), 3e27);
+        assert!(unchecked.world(0, 1000).is_nan());
     }
 }

@@ -3,9 +3,8 @@
 mod bounds;
 pub mod lattice;
 pub mod predicates;
+mod site;
 pub mod square_grid;
 
 pub use bounds::Bounds;
-
-/// A site: x and y in lattice steps, each within [`lattice::REACH`] of zero.
-pub type Site = [i32; 2];
+pub use site::Site;

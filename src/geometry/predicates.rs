@@ -1,16 +1,16 @@
-//! The two decisions everything rests on, `orient2d` and `in_circle`, exact on lattice coordinates.
+//! The two decisions on which everything rests, `orient2d` and `in_circle`. Both are exact on lattice coordinates.
 //!
 //! Coordinates lie within `lattice::REACH` (2^29) of zero, so differences stay within 2^30: the orientation determinant
 //! fits an `i64`, the in-circle determinant an `i128`.
 
-use crate::geometry::Site;
+use crate::geometry::site::Site;
 use multiversion::multiversion;
 
 /// Relative error of the floating-point in-circle determinant on exactly represented differences,
 /// (10 + 96 eps) eps in Shewchuk 1997, "Adaptive Precision Floating-Point Arithmetic", rounded up.
 const IN_CIRCLE_ERROR: f64 = 1.2e-15;
 
-/// Twice the signed area of triangle abc in square lattice steps: positive if a, b, c turn left. Exact.
+/// Returns twice the signed area of triangle abc in square lattice steps, which is positive if a, b, c turn left. Exact.
 #[inline(always)]
 pub fn orient2d(a: Site, b: Site, c: Site) -> i64 {
     let (abx, aby) = (b[0] as i64 - a[0] as i64, b[1] as i64 - a[1] as i64);
@@ -18,7 +18,7 @@ pub fn orient2d(a: Site, b: Site, c: Site) -> i64 {
     abx * acy - aby * acx
 }
 
-/// Whether `d` is inside the circle through the counterclockwise triangle `abc`, ties decided by `tie`.
+/// Returns whether `d` is inside the circle through the counterclockwise triangle `abc`. `tie` decides if `d` is on the circle.
 ///
 /// This is the canonical decision of the whole project: an edge ac shared by the triangles abc and acd is Delaunay
 /// if and only if `!in_circle(a, b, c, d)`, and exactly one diagonal of every strictly convex quadrilateral is.
@@ -39,15 +39,15 @@ pub fn in_circle(a: Site, b: Site, c: Site, d: Site) -> bool {
 }
 
 /// Relative error of the in-circle determinant in single precision, from differences that are rounded once. With
-/// `e = 2^-24`: a difference is wrong by `e`, a product of two by 3 e, a lift (sum of two squares) by 4 e, a
+/// `e = 2^-24`, the relative errors are: a difference is wrong by `e`, a product of two by 3 e, a lift (sum of two squares) by 4 e, a
 /// difference of two products by 4 e of the sum of their sizes, a term by 9 e, their sum by 11 e of the permanent, which itself
 /// is wrong by as much. Terms of second order stay below e together; 13 e < 8e-7. Nothing over- or underflows: differences are
 /// integers up to 2^30, so that terms that are not zero lie between 1 and 2^123.
 const IN_CIRCLE_ERROR_SINGLE: f32 = 1e-6;
 
-/// Many in-circle tests at once, undecided in doubt: built so that compilers make vector instructions of it.
+/// Many in-circle tests at once. They leave doubtful cases undecided, and their layout lets the compiler use vector instructions.
 pub struct InCircleBatch {
-    /// ax, ay, bx, by, cx, cy, each relative to d.
+    /// The coordinates ax, ay, bx, by, cx, cy, each relative to d.
     differences: [[i32; InCircleBatch::LANES]; 6],
 }
 
@@ -70,17 +70,17 @@ impl InCircleBatch {
         (cx[lane], cy[lane]) = (c[0].wrapping_sub(d[0]), c[1].wrapping_sub(d[1]));
     }
 
-    /// For each of the first `count` tests whether [`in_circle`] may be true: never false where it is.
+    /// Returns for each of the first `count` tests whether [`in_circle`] may be true. It is never false where `in_circle` is true.
     #[inline(always)]
     pub fn inside_or_in_doubt(&self, count: usize) -> [bool; InCircleBatch::LANES] {
         inside_or_in_doubt(&self.differences, count)
     }
 }
 
-// On its own it becomes vector instructions; inlined where it is used, it may not.
+// As a function of its own it compiles to vector instructions. Inlined into its callers it might not.
 #[multiversion(targets("x86_64+avx2"), attrs(inline(never)))]
 fn inside_or_in_doubt(differences: &[[i32; InCircleBatch::LANES]; 6], count: usize) -> [bool; InCircleBatch::LANES] {
-    // As arrays of one length, so that nothing is left to check.
+    // Arrays of one constant length need no bounds checks.
     const GROUP: usize = 16;
     let [ax, ay, bx, by, cx, cy] = differences;
     let mut doubtful = [false; InCircleBatch::LANES];
@@ -99,7 +99,7 @@ fn inside_or_in_doubt(differences: &[[i32; InCircleBatch::LANES]; 6], count: usi
     doubtful
 }
 
-/// The decision of [`in_circle`] where floating point is in doubt.
+/// Decides [`in_circle`] where floating point is in doubt.
 #[cold]
 #[inline(never)]
 fn in_circle_exact(a: Site, b: Site, c: Site, d: Site) -> bool {
@@ -109,7 +109,7 @@ fn in_circle_exact(a: Site, b: Site, c: Site, d: Site) -> bool {
     }
 }
 
-/// The in-circle determinant of the counterclockwise triangle `abc` and `d`: positive inside, zero on the circle. Exact.
+/// Returns the in-circle determinant of the counterclockwise triangle `abc` and `d`: positive inside, zero on the circle. Exact.
 pub fn in_circle_determinant(a: Site, b: Site, c: Site, d: Site) -> i128 {
     let diff = |p: Site| (p[0] as i64 - d[0] as i64, p[1] as i64 - d[1] as i64);
     let ((ax, ay), (bx, by), (cx, cy)) = (diff(a), diff(b), diff(c));
@@ -119,10 +119,10 @@ pub fn in_circle_determinant(a: Site, b: Site, c: Site, d: Site) -> i128 {
     term(ax, ay, bx, by, cx, cy) + term(bx, by, cx, cy, ax, ay) + term(cx, cy, ax, ay, bx, by)
 }
 
-/// Four distinct sites on one circle: the one that is last in lexicographic (x, y) order counts as outside the circle of the
-/// other three. This is the symbolic perturbation of Devillers and Teillaud 2011, "Perturbations for Delaunay and
-/// weighted Delaunay 3D triangulations", where the last site in the order is raised most; since no three sites of a
-/// circle are collinear, its first step always decides.
+/// Decides [`in_circle`] for four distinct sites on one circle: the last of them in lexicographic (x, y) order counts as outside
+/// the circle of the other three. This is the symbolic perturbation of Devillers and Teillaud 2011, "Perturbations for Delaunay and
+/// weighted Delaunay 3D triangulations", in which the last site in the order is raised most. Because no three sites of a
+/// circle are collinear, the first step of their rule always decides.
 fn tie(a: Site, b: Site, c: Site, d: Site) -> bool {
     let last = a.max(b).max(c).max(d);
     if last == d {
@@ -139,6 +139,8 @@ fn tie(a: Site, b: Site, c: Site, d: Site) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::lattice::REACH;
+    use proptest::prelude::*;
 
     /// xorshift64*, within 2^bits of zero.
     fn number(state: &mut u64, bits: u32) -> i32 {
@@ -178,5 +180,117 @@ mod tests {
             sure += !doubtful as usize;
         }
         assert!(inside > 10_000 && sure > 10_000);
+    }
+
+    /// Returns the sign of `value`.
+    fn sign(value: f64) -> i64 {
+        (value > 0.0) as i64 - (value < 0.0) as i64
+    }
+
+    fn coord(site: Site) -> robust::Coord<f64> {
+        robust::Coord { x: site[0].into(), y: site[1].into() }
+    }
+
+    fn robust_orientation(a: Site, b: Site, c: Site) -> i64 {
+        sign(robust::orient2d(coord(a), coord(b), coord(c)))
+    }
+
+    fn robust_in_circle(a: Site, b: Site, c: Site, d: Site) -> i64 {
+        sign(robust::incircle(coord(a), coord(b), coord(c), coord(d)))
+    }
+
+    fn clamped([x, y]: [i64; 2]) -> Site {
+        [x, y].map(|c| c.clamp(-i64::from(REACH), i64::from(REACH)) as i32)
+    }
+
+    fn site_within(reach: i32) -> impl Strategy<Value = Site> {
+        [-reach..=reach, -reach..=reach]
+    }
+
+    /// A distance from zero, of any order of magnitude.
+    fn reach() -> impl Strategy<Value = i32> {
+        (0..=29).prop_map(|bits| 1 << bits)
+    }
+
+    fn random() -> impl Strategy<Value = [Site; 4]> {
+        reach().prop_flat_map(|reach| [(); 4].map(|()| site_within(reach)))
+    }
+
+    /// Coordinates at the ends of the range, so that differences reach 2^30.
+    fn extreme() -> impl Strategy<Value = [Site; 4]> {
+        let coordinate = || prop_oneof![Just(-REACH), Just(REACH), Just(0), -REACH..=-REACH + 2, REACH - 2..=REACH];
+        [(); 4].map(|()| [coordinate(), coordinate()])
+    }
+
+    /// Sites on the line through two sites, or up to two steps off.
+    fn near_a_line() -> impl Strategy<Value = [Site; 4]> {
+        let parts = (
+            site_within(REACH),
+            site_within(1 << 14),
+            [(); 3].map(|()| -(1i64 << 15)..1 << 15),
+            [(); 3].map(|()| site_within(2)),
+        );
+        parts.prop_map(|(a, direction, factors, off)| {
+            let on = |i: usize| {
+                [0, 1].map(|k| i64::from(a[k]) + factors[i] * i64::from(direction[k]) + i64::from(off[i][k]))
+            };
+            [a, clamped(on(0)), clamped(on(1)), clamped(on(2))]
+        })
+    }
+
+    /// Four sites of one circle: a site, turned by right angles and mirrored around a centre.
+    fn cocircular() -> impl Strategy<Value = [Site; 4]> {
+        (site_within(REACH / 2), site_within(REACH / 2), [(); 4].map(|()| 0..8usize)).prop_map(
+            |([x, y], [p, q], turns)| {
+                let around = [[p, q], [-q, p], [-p, -q], [q, -p], [q, p], [-p, q], [-q, -p], [p, -q]];
+                turns.map(|turn| [x + around[turn][0], y + around[turn][1]])
+            },
+        )
+    }
+
+    /// The same, up to one step off the circle.
+    fn near_a_circle() -> impl Strategy<Value = [Site; 4]> {
+        (cocircular(), [(); 4].map(|()| site_within(1))).prop_map(|(sites, off)| {
+            [0, 1, 2, 3].map(|i| clamped([0, 1].map(|k| i64::from(sites[i][k]) + i64::from(off[i][k]))))
+        })
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(20_000))]
+
+        #[test]
+        fn signs_are_those_of_robust(
+            [a, b, c, d] in prop_oneof![random(), extreme(), near_a_line(), cocircular(), near_a_circle()]
+        ) {
+            prop_assert_eq!(orient2d(a, b, c).signum(), robust_orientation(a, b, c));
+            let expected = robust_in_circle(a, b, c, d);
+            prop_assert_eq!(in_circle_determinant(a, b, c, d).signum() as i64, expected);
+            if orient2d(a, b, c) > 0 && ![a, b, c].contains(&d) {
+                prop_assert_eq!(in_circle(a, b, c, d), expected > 0 || (expected == 0 && tie(a, b, c, d)));
+                let mut batch = InCircleBatch::default();
+                batch.set(0, a, b, c, d);
+                prop_assert!(batch.inside_or_in_doubt(1)[0] || expected < 0);
+            }
+        }
+
+        #[test]
+        fn turned_and_mirrored_sites_are_cocircular([a, b, c, d] in cocircular()) {
+            prop_assert_eq!(robust_in_circle(a, b, c, d), 0);
+            prop_assert_eq!(in_circle_determinant(a, b, c, d), 0);
+        }
+
+        #[test]
+        fn exactly_one_diagonal_of_a_convex_quadrilateral_is_delaunay(
+            [a, b, c, d] in prop_oneof![random(), extreme(), near_a_line(), cocircular(), near_a_circle()]
+        ) {
+            let orders = [[a, b, c, d], [a, b, d, c], [a, c, b, d], [a, c, d, b], [a, d, b, c], [a, d, c, b]];
+            let is_convex = |&[a, b, c, d]: &[Site; 4]| {
+                [[a, b, c], [b, c, d], [c, d, a], [d, a, b]].iter().all(|&[p, q, r]| orient2d(p, q, r) > 0)
+            };
+            for [a, b, c, d] in orders.into_iter().filter(is_convex) {
+                prop_assert!(in_circle(a, b, c, d) != in_circle(b, c, d, a));
+                prop_assert_eq!(in_circle(a, b, c, d), in_circle(c, d, a, b));
+            }
+        }
     }
 }

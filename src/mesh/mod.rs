@@ -1,4 +1,5 @@
-//! The topology of a triangle mesh: which corners, which neighbours. It knows no coordinates; who needs them passes them in.
+//! The topology of a triangle mesh: the corners and neighbours of its triangles. Functions that need coordinates take them as an
+//! argument.
 
 pub mod adjacency;
 pub mod flip;

@@ -3,20 +3,20 @@
 use crate::mesh::half_edge::{HULL, HalfEdgeMesh};
 use crate::{Error, Result};
 
-/// Marks the triangles of `mesh` that cover the ground on the left of the directed edges `boundary` (by their sites): what a flood
-/// from there reaches without crossing one of them.
+/// Marks the triangles of `mesh` that lie to the left of the directed edges `boundary`, which are given by their sites: those that a
+/// flood from the left of the edges reaches without crossing one of them.
 ///
 /// # Errors
-/// [`Error::Broken`] if a boundary edge is missing from the mesh, which cannot be: it is an edge of the triangulation of
-/// all sites, hence of any triangulation of some of them.
+/// [`Error::Broken`] if a boundary edge is missing from the mesh. This should be impossible: an edge of the triangulation of all
+/// sites is an edge of the triangulation of any subset with its two ends.
 pub fn covered(mesh: &HalfEdgeMesh, boundary: &[[u32; 2]]) -> Result<Vec<bool>> {
-    let wanted = EdgesByOrigin::new(boundary);
+    let edges = EdgesByOrigin::new(boundary);
     let half_edges = 0..mesh.twins.len() as u32;
-    let is_boundary: Vec<bool> = half_edges.clone().map(|h| wanted.has(mesh.origin(h), mesh.destination(h))).collect();
+    let is_boundary: Vec<bool> = half_edges.clone().map(|h| edges.has(mesh.origin(h), mesh.destination(h))).collect();
     let found = is_boundary.iter().filter(|&&b| b).count();
     if found != boundary.len() {
         return Err(Error::Broken(format!(
-            "{} of {} closed edges are not in the merge",
+            "{} of {} boundary edges are not in the triangulation",
             boundary.len() - found,
             boundary.len()
         )));
@@ -37,9 +37,9 @@ pub fn covered(mesh: &HalfEdgeMesh, boundary: &[[u32; 2]]) -> Result<Vec<bool>> 
     Ok(covered)
 }
 
-/// Directed edges by the site at which they start.
+/// Directed edges, grouped by the site at which they start.
 struct EdgesByOrigin {
-    /// Where the edges of each site begin in `ends`, and where the last site's end.
+    /// The position in `ends` of the first edge of each site, and the position after the last edge.
     first: Vec<u32>,
     ends: Vec<u32>,
 }

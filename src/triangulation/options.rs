@@ -2,39 +2,39 @@
 
 use serde::{Deserialize, Serialize};
 
-/// `[triangulation]`: how, never what: the mesh is the same whatever stands here.
+/// `[triangulation]`: how the mesh is computed. The mesh is the same with every choice.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TriangulationOptions {
-    /// Who triangulates the tiles.
+    /// What triangulates the tiles.
     pub backend: Backend,
-    /// How many sites a tile holds at the most.
+    /// The most sites that a tile holds.
     #[serde(alias = "sites_per_tile")]
     pub max_points_per_tile: MaxPointsPerTile,
 }
 
-/// Who triangulates the tiles.
+/// What triangulates the tiles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Backend {
-    /// The fastest this machine has.
+    /// The fastest backend of this machine.
     #[default]
     Auto,
-    /// The discrete-VoronoiMethod pipeline on the CPU.
+    /// The discrete-Voronoi pipeline on the CPU.
     Cpu,
-    /// The discrete-VoronoiMethod pipeline on a GPU.
+    /// The discrete-Voronoi pipeline on a GPU.
     Gpu,
-    /// `spade` alone: slower, for tests and doubters.
+    /// `spade` alone: slower, for tests and comparisons.
     Reference,
 }
 
-/// How many sites a tile holds at the most.
+/// The most sites that a tile holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(try_from = "toml::Value", into = "String")]
+#[serde(try_from = "toml::Value", into = "toml::Value")]
 pub struct MaxPointsPerTile(pub u64);
 
 impl MaxPointsPerTile {
-    /// Keeps a leaf in the cache of one core while it is triangulated, and its vertices within 16-bit indices.
+    /// With this many sites, a leaf stays in the cache of one core while it is triangulated, and 16-bit indices reach its vertices.
     const AUTO: MaxPointsPerTile = MaxPointsPerTile(50_000);
 }
 
@@ -56,8 +56,8 @@ impl TryFrom<toml::Value> for MaxPointsPerTile {
     }
 }
 
-impl From<MaxPointsPerTile> for String {
-    fn from(sites: MaxPointsPerTile) -> String {
-        sites.0.to_string()
+impl From<MaxPointsPerTile> for toml::Value {
+    fn from(points: MaxPointsPerTile) -> toml::Value {
+        toml::Value::Integer(points.0 as i64)
     }
 }

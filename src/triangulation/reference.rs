@@ -1,5 +1,5 @@
-//! The reference: `spade` with canonical flips. The oracle of the tests, the way out for leaves that the pipeline does
-//! not accept, and what triangulates the inner nodes of the tree.
+//! The reference: `spade`, then canonical flips. It triangulates the inner nodes of the tree and the leaves that the pipeline
+//! rejects, and the tests compare the pipeline with it.
 
 use crate::Error;
 use crate::geometry::Site;
@@ -8,12 +8,12 @@ use crate::mesh::flip::legalize;
 use crate::mesh::half_edge::{HULL, HalfEdgeMesh};
 use spade::{DelaunayTriangulation, HasPosition, InsertionError, Point2, Triangulation as _};
 
-struct Vertex {
+struct SpadeVertex {
     site: Site,
     index: u32,
 }
 
-impl HasPosition for Vertex {
+impl HasPosition for SpadeVertex {
     type Scalar = f64;
 
     fn position(&self) -> Point2<f64> {
@@ -21,7 +21,8 @@ impl HasPosition for Vertex {
     }
 }
 
-/// The canonical Delaunay triangulation of distinct `sites`: no triangle if there are fewer than three or all lie on a line.
+/// Computes the canonical Delaunay triangulation of distinct `sites`. It has no triangle if there are fewer than three sites or all
+/// lie on one line.
 ///
 /// # Errors
 /// [`Error::Broken`] if `spade` refuses the sites or two of them coincide.
@@ -29,7 +30,7 @@ pub fn triangulate(sites: &[Site]) -> crate::Result<HalfEdgeMesh> {
     if collinear(sites) {
         return Ok(HalfEdgeMesh::default());
     }
-    let delaunay = match along(sites) {
+    let delaunay = match strip_axis(sites) {
         Some(axis) => insert_along(sites, axis),
         None => DelaunayTriangulation::bulk_load(vertices(sites).collect()),
     };
@@ -42,16 +43,16 @@ pub fn triangulate(sites: &[Site]) -> crate::Result<HalfEdgeMesh> {
     Ok(mesh)
 }
 
-fn vertices(sites: &[Site]) -> impl Iterator<Item = Vertex> {
-    sites.iter().enumerate().map(|(i, &site)| Vertex { site, index: i as u32 })
+fn vertices(sites: &[Site]) -> impl Iterator<Item = SpadeVertex> {
+    sites.iter().enumerate().map(|(i, &site)| SpadeVertex { site, index: i as u32 })
 }
 
-/// Sites in a strip so many times longer than wide are inserted from one end to the other: loading them in bulk, from the
-/// middle outwards, takes up to quadratic time on the thinnest, and this takes longer on wider ones.
-const STRIP: f64 = 50.0;
+/// If the sites lie in a strip that is more than this many times longer than wide, they are inserted from one end to the other.
+/// Bulk loading works from the middle outwards, and takes up to quadratic time on thin strips; on wide ones it is faster.
+const STRIP_RATIO: f64 = 50.0;
 
-/// The axis along which `sites` are a long thin strip, if they are one.
-fn along(sites: &[Site]) -> Option<usize> {
+/// Returns the axis along which `sites` are a long thin strip, if they are one.
+fn strip_axis(sites: &[Site]) -> Option<usize> {
     let count = sites.len() as f64;
     let mean = [0, 1].map(|axis| sites.iter().map(|p| p[axis] as f64).sum::<f64>() / count);
     let offset = |p: &Site| [p[0] as f64 - mean[0], p[1] as f64 - mean[1]];
@@ -59,7 +60,7 @@ fn along(sites: &[Site]) -> Option<usize> {
     for [x, y] in sites.iter().map(offset) {
         (xx, xy, yy) = (xx + x * x, xy + x * y, yy + y * y);
     }
-    // The direction in which they vary most.
+    // The direction in which the sites vary most.
     let angle = 0.5 * (2.0 * xy).atan2(xx - yy);
     let (sin, cos) = angle.sin_cos();
     let extent = |part: &dyn Fn([f64; 2]) -> f64| {
@@ -68,12 +69,12 @@ fn along(sites: &[Site]) -> Option<usize> {
     };
     let length = extent(&|[x, y]| x * cos + y * sin);
     let width = extent(&|[x, y]| y * cos - x * sin);
-    (length > STRIP * width).then_some(if cos.abs() >= sin.abs() { 0 } else { 1 })
+    (length > STRIP_RATIO * width).then_some(if cos.abs() >= sin.abs() { 0 } else { 1 })
 }
 
-/// Inserts the sites in the order of their coordinate on `axis`, each next to the one before.
-fn insert_along(sites: &[Site], axis: usize) -> Result<DelaunayTriangulation<Vertex>, InsertionError> {
-    let mut ordered: Vec<Vertex> = vertices(sites).collect();
+/// Inserts the sites in the order of their coordinate on `axis`, each close to the one before.
+fn insert_along(sites: &[Site], axis: usize) -> Result<DelaunayTriangulation<SpadeVertex>, InsertionError> {
+    let mut ordered: Vec<SpadeVertex> = vertices(sites).collect();
     ordered.sort_unstable_by_key(|vertex| (vertex.site[axis], vertex.site[1 - axis]));
     let mut delaunay = DelaunayTriangulation::new();
     let mut last = None;
@@ -86,7 +87,7 @@ fn insert_along(sites: &[Site], axis: usize) -> Result<DelaunayTriangulation<Ver
     Ok(delaunay)
 }
 
-/// Whether distinct `sites` lie on one line. `spade` would find that out as well, but in quadratic time.
+/// Returns whether distinct `sites` lie on one line. `spade` would find that out too, but in quadratic time.
 fn collinear(sites: &[Site]) -> bool {
     match sites {
         [a, b, rest @ ..] => rest.iter().all(|&c| orient2d(*a, *b, c) == 0),
@@ -94,7 +95,7 @@ fn collinear(sites: &[Site]) -> bool {
     }
 }
 
-fn to_mesh(delaunay: &DelaunayTriangulation<Vertex>) -> HalfEdgeMesh {
+fn to_mesh(delaunay: &DelaunayTriangulation<SpadeVertex>) -> HalfEdgeMesh {
     let faces = delaunay.num_inner_faces();
     let mut half_edge_of = vec![HULL; delaunay.num_directed_edges()];
     let mut mesh = HalfEdgeMesh { triangles: Vec::with_capacity(faces), twins: vec![HULL; 3 * faces] };
@@ -150,16 +151,16 @@ mod tests {
         for direction in [[10, 5], [1, 10], [-10, 10], [10, 0], [0, 10]] {
             let strip: Vec<Site> =
                 (0..3000).map(|i| [direction[0] * i + i % 3, direction[1] * i + i * i % 5]).collect();
-            assert!(along(&strip).is_some());
+            assert!(strip_axis(&strip).is_some());
             let mesh = triangulate(&strip).unwrap();
             assert!((0..mesh.twins.len() as u32).all(|h| !fails(&mesh, &strip, h)));
             let hull = mesh.twins.iter().filter(|twin| **twin == HULL).count();
             assert_eq!(mesh.triangles.len(), 2 * strip.len() - hull - 2);
         }
-        assert_eq!(along(&[[0, 0], [7, 1], [3, 9], [-4, 2]]), None);
+        assert_eq!(strip_axis(&[[0, 0], [7, 1], [3, 9], [-4, 2]]), None);
     }
 
-    /// The triangles as coordinates, each from its smallest corner, sorted.
+    /// Returns the triangles as coordinates, each from its smallest corner, sorted.
     fn canonical(sites: &[Site]) -> Vec<[Site; 3]> {
         let mesh = triangulate(sites).unwrap();
         let mut triangles: Vec<[Site; 3]> = mesh

@@ -202,17 +202,14 @@ fn two_triangles(texture: &SiteTexture, sphere: &mut ClosedMesh, [sw, se, ne, nw
     }
 }
 
-/// Bit i: `a[i] != b[i]`, of 64.
+/// Returns a word of 64 bits, in which bit i says whether `a[i] != b[i]`.
 #[inline(always)]
 fn differences(a: &[u32], b: &[u32]) -> u64 {
     let mut bytes = [0u8; 64];
     for ((byte, a), b) in bytes.iter_mut().zip(a).zip(b) {
         *byte = (a != b) as u8;
     }
-    // A product that gathers the low bits of eight bytes into one.
-    let gather = |eight: &[u8]| {
-        let eight = eight.try_into().expect("chunks of eight");
-        u64::from_le_bytes(eight).wrapping_mul(0x0102_0408_1020_4080) >> 56
-    };
-    bytes.chunks_exact(8).rev().fold(0, |bits, eight| bits << 8 | gather(eight))
+    // The product gathers the low bits of eight bytes in one byte.
+    let gather = |eight: [u8; 8]| u64::from_le_bytes(eight).wrapping_mul(0x0102_0408_1020_4080) >> 56;
+    bytes.as_chunks::<8>().0.iter().rev().fold(0, |bits, &eight| bits << 8 | gather(eight))
 }

@@ -45,7 +45,12 @@ fn place(sources: &[Source], extent: &Extent, resolution: Decimal, resolution_z:
         lattice_point_near(middle(1), phase(sources, 1, resolution)?, resolution)?,
         lattice_point_near(extent.min[2].floor(), phase(sources, 2, resolution_z)?, resolution_z)?,
     ];
-    Ok(Lattice { offset, resolution, resolution_z })
+    Lattice::new(offset, resolution, resolution_z).ok_or_else(|| {
+        Error::Config(format!(
+            "coordinates in steps of {resolution} (z: {resolution_z}) need more digits than this program has: check the scales of \
+             the inputs, or set [input] resolution"
+        ))
+    })
 }
 
 /// Tells whether 64-bit floating point separates coordinates up to `farthest` from those a step away.

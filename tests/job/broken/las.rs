@@ -134,6 +134,11 @@ pub(super) fn records_and_cuts() -> Vec<Case> {
     let deep = "A[".repeat(30_000);
     let unit = |factor: &str| format!("PROJCS[\"a\",UNIT[\"m\",{factor}]]").into_bytes();
     let unreadable = || Read(COUNT, 0, "not well-known text");
+    let steps_of_1e27 = || {
+        let text = unit("1e-20");
+        let bytes = with_record(&sound(4).las(), "LASF_Projection", 2112, text.len() as u16, &text);
+        (0..3).fold(bytes, |bytes, axis| patched(&bytes, 131 + 8 * axis, &double(1e27)))
+    };
     let mut cases = vec![
         case(
             "VLR longer than the file",
@@ -153,6 +158,7 @@ pub(super) fn records_and_cuts() -> Vec<Case> {
         case("WKT with half a quote", ".las", text(b"PROJCS[\"a"), unreadable()),
         case("WKT with an absurd unit", ".las", text(&unit("1e300")), Refused(2, "set [input] unit")),
         case("WKT with a tiny unit", ".las", text(&unit("1e-300")), Refused(2, "set [input] unit")),
+        case("steps of 1e27 in a unit of 1e-20", ".las", steps_of_1e27(), Refused(2, "more digits")),
         case("WKT with a unit that is no number", ".las", text(&unit("nan")), Read(COUNT, 0, "")),
         case("GeoTIFF that counts too far", ".las", keys(&[0xff; 64]), Read(COUNT, 0, "")),
         case("GeoTIFF of three bytes", ".las", keys(&[1, 0, 1]), Read(COUNT, 0, "")),
