@@ -4,6 +4,7 @@ mod bounds;
 pub mod lattice;
 pub mod predicates;
 mod site;
+pub mod square_grid;
 
 pub use bounds::Bounds;
 pub use site::Site;

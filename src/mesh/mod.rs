@@ -1,6 +1,7 @@
 //! The topology of a triangle mesh: the corners and neighbours of its triangles. Functions that need coordinates take them as an
 //! argument.
 
+pub mod adjacency;
 pub mod flip;
 pub mod half_edge;
 pub mod region;

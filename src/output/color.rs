@@ -1,16 +1,16 @@
-//! Vertex colours: glTF wants them linear, sources have them encoded as sRGB, or not at all.
+//! Vertex colours. glTF has linear colours; sources have sRGB colours, or none.
 
 use std::sync::LazyLock;
 
 /// Linear red, green and blue, 65535 for full intensity.
-pub type Linear = [u16; 3];
+pub type LinearRgb = [u16; 3];
 
-/// How the sites of a job are coloured.
+/// How the sites of a job get their colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coloring {
-    /// By the colour of the source; `eight_bit` where no value of the whole job is above 255.
+    /// By the colour of the source.
     Rgb {
-        /// Values are 0 to 255 in 16-bit fields.
+        /// Whether all values of the job are 0 to 255, in 16-bit fields.
         eight_bit: bool,
     },
     /// By height, from the lowest to the highest lattice integer of the job.
@@ -25,10 +25,10 @@ pub enum Coloring {
 }
 
 impl Coloring {
-    /// The colours of sites with these lattice integers x, y, z, source colours and classifications.
-    pub fn colors(&self, positions: &[[i32; 3]], rgb: &[[u16; 3]], class: &[u8]) -> Vec<Linear> {
+    /// Returns the colours of sites with these lattice integers x, y, z, source colours and classifications.
+    pub fn colors(&self, positions: &[[i32; 3]], rgb: &[[u16; 3]], class: &[u8]) -> Vec<LinearRgb> {
         match *self {
-            // Most jobs; the tables looked up but once.
+            // Most jobs: here the table is fetched once, not for every site.
             Coloring::Rgb { eight_bit: true } => {
                 let table: [u16; 256] = std::array::from_fn(|v| decode_byte(v as u8));
                 rgb.iter().map(|rgb| rgb.map(|v| table[v.min(255) as usize])).collect()
@@ -41,26 +41,26 @@ impl Coloring {
         }
     }
 
-    /// The colour of a site with lattice integer `z`, source colour `rgb` and classification `class`.
+    /// Returns the colour of a site with lattice integer `z`, source colour `rgb` and classification `class`.
     #[inline]
-    pub fn color(&self, z: i32, rgb: [u16; 3], class: u8) -> Linear {
+    pub fn color(&self, z: i32, rgb: [u16; 3], class: u8) -> LinearRgb {
         match *self {
             Coloring::Rgb { eight_bit: true } => rgb.map(|v| TO_LINEAR[v.min(255) as usize * 257]),
             Coloring::Rgb { eight_bit: false } => rgb.map(|v| TO_LINEAR[v as usize]),
-            Coloring::Elevation { low, high } => elevation(z, low, high),
+            Coloring::Elevation { low, high } => height_color(z, low, high),
             Coloring::Class => CLASS_COLORS.get(class as usize).unwrap_or(&OTHER_CLASS).map(decode_byte),
         }
     }
 }
 
-/// The colour of height `z` on the ramp from `low` to `high`.
-pub fn elevation(z: i32, low: i32, high: i32) -> Linear {
+/// Returns the colour of height `z` on the ramp from `low` to `high`.
+pub fn height_color(z: i32, low: i32, high: i32) -> LinearRgb {
     let (above, span) = (z as i64 - low as i64, (high as i64 - low as i64).max(1));
     let last = RAMP.len() as i64 - 1;
     RAMP[(above * last / span).clamp(0, last) as usize]
 }
 
-/// Linear intensity as an sRGB byte.
+/// Returns a linear intensity as an sRGB byte.
 #[inline]
 pub fn to_srgb(linear: u16) -> u8 {
     FROM_LINEAR[linear as usize >> 4]
@@ -70,22 +70,22 @@ fn decode_byte(v: u8) -> u16 {
     TO_LINEAR[v as usize * 257]
 }
 
-/// sRGB (IEC 61966-2-1) to linear.
+/// Returns the linear value of an sRGB value (IEC 61966-2-1).
 fn decode(v: f64) -> f64 {
     if v <= 0.04045 { v / 12.92 } else { libm::pow((v + 0.055) / 1.055, 2.4) }
 }
 
-/// Linear to sRGB.
+/// Returns the sRGB value of a linear value.
 fn encode(v: f64) -> f64 {
     if v <= 0.0031308 { v * 12.92 } else { 1.055 * libm::pow(v, 1.0 / 2.4) - 0.055 }
 }
 
-// The tables are made with `libm`, not with the machine's mathematics library: they decide bytes, which are the same everywhere.
+// The tables decide bytes that must be the same everywhere, so `libm` computes them, not the machine's mathematics library.
 
 static TO_LINEAR: LazyLock<Vec<u16>> =
     LazyLock::new(|| (0..=65535).map(|v| (decode(v as f64 / 65535.0) * 65535.0).round() as u16).collect());
 
-/// By the upper 12 bits, at the middle of each step.
+/// sRGB bytes by the upper 12 bits of the linear value, each for the middle of its range.
 static FROM_LINEAR: LazyLock<Vec<u8>> =
     LazyLock::new(|| (0..4096).map(|v| (encode((v as f64 + 0.5) / 4096.0) * 255.0).round() as u8).collect());
 
@@ -100,9 +100,9 @@ const RAMP_STOPS: [[u8; 3]; 7] = [
     [244, 242, 238],
 ];
 
-static RAMP: LazyLock<Vec<Linear>> = LazyLock::new(|| (0..2048).map(|i| ramp_at(i as f64 / 2047.0)).collect());
+static RAMP: LazyLock<Vec<LinearRgb>> = LazyLock::new(|| (0..2048).map(|i| ramp_at(i as f64 / 2047.0)).collect());
 
-fn ramp_at(t: f64) -> Linear {
+fn ramp_at(t: f64) -> LinearRgb {
     let position = t * (RAMP_STOPS.len() - 1) as f64;
     let (i, rest) = (position.floor().min((RAMP_STOPS.len() - 2) as f64), position.fract());
     let rest = if i < position.floor() { 1.0 } else { rest };
@@ -147,7 +147,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn eight_bit_values_mean_what_their_sixteen_bit_twins_mean() {
+    fn eight_bit_colours_are_those_of_the_same_sixteen_bit_values() {
         let (eight, sixteen) = (Coloring::Rgb { eight_bit: true }, Coloring::Rgb { eight_bit: false });
         for v in 0..=255 {
             assert_eq!(eight.color(0, [v, 0, 255], 0), sixteen.color(0, [v * 257, 0, 65535], 0));
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn linear_and_back_is_the_same_byte() {
+    fn bytes_come_back_from_linear_values() {
         for v in 0..=255 {
             // Twelve bits of linear light cannot tell the darkest bytes apart.
             let tolerance = if v < 24 { 2 } else { 0 };
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn the_ramp_goes_from_the_lowest_to_the_highest() {
+    fn the_ramp_spans_the_heights_of_the_job() {
         let ramp = Coloring::Elevation { low: -100, high: 2_000_000_000 };
         let color = |z| ramp.color(z, [0; 3], 0);
         assert_eq!(color(-100), RAMP_STOPS[0].map(decode_byte));

@@ -1,121 +1,122 @@
-//! Where lattice integers lie in a glTF scene: metres, Y up, every coordinate on one power-of-two step.
+//! Where lattice integers lie in a glTF scene: in metres, Y up, with every coordinate a whole multiple of a power of two, the step.
 //!
-//! A vertex is `translation + position`, a node's translation and an f32 of its mesh. Both are whole multiples of the
-//! job's steps, so their sum in f64 is exact and depends on the lattice integers alone: a vertex that several tiles
-//! share has the same bits in all of them. A step is at most half the lattice step, so rounding finds the integer again;
-//! it is finer, and positions truer, where the job is small enough for f32. Packed, with 16-bit positions, it is coarser, and
-//! just as fine as rounding needs: see [`Frame::packed`].
+//! A vertex is at `translation + position`: its node's translation and an f32 of its mesh. Both are whole multiples of the job's
+//! steps, so their sum in f64 is exact and depends on the lattice integers alone. A vertex that several tiles share has the same bits
+//! in all of them. A step is at most half a lattice step, so rounding finds the integer again. In a job that is small enough for f32
+//! the steps are finer, and positions are truer. Packed tiles have coarser steps, just fine enough for rounding, so that positions
+//! take 16 bits: see [`Frame::packed`].
 
 use rust_decimal::Decimal;
 use serde::{Deserialize, Serialize};
 
+use crate::geometry::Bounds;
 use crate::geometry::lattice::Lattice;
 use crate::{Error, Result};
 
 /// An f32 holds every whole number of steps up to this.
 const F32_STEPS: i64 = 1 << 24;
 
-/// Translations are multiples of this many steps. Steps from the origin stay below 2^39 (2^31 lattice integers, 256 steps
-/// each), so that a translation has at most 24 binary digits and is exact in readers that hold it as f32.
+/// Translations are multiples of this many steps. They stay below 2^39 steps (2^31 lattice integers with 256 steps each), so a
+/// translation has at most 24 binary digits: it is exact as f32.
 const TRANSLATION_STEPS: i64 = 1 << 16;
 
-/// Half the extent, in steps, of the widest mesh that one translation can serve, wherever it lies.
+/// Half the extent in steps of the widest mesh that one translation serves, wherever it lies.
 pub(crate) const PART_REACH: i64 = F32_STEPS - TRANSLATION_STEPS / 2;
 
 /// Steps are refined below half the resolution by at most this factor, and not below [`FINE_STEP`].
 const REFINEMENT: f64 = 64.0;
 
-/// Metres.
+/// The finest step in metres.
 const FINE_STEP: f64 = 1.0 / 4096.0;
 
-/// Steps for 16-bit positions are at most this part of the lattice step: rounding to them moves a site by up to 0.49 of
-/// a lattice step, and rounding back finds it.
+/// Steps for 16-bit positions are at most this part of a lattice step. Rounding to them moves a site by up to 0.49 lattice steps, and
+/// rounding back finds it.
 const PACKED_RATIO: f64 = 0.98;
 
 /// Steps that a 16-bit position reaches from its origin.
 const SHORT_REACH: f64 = 65535.0;
 
-/// Origins of meshes with 16-bit positions are multiples of this many steps. With at most 4 steps to a lattice step, steps
-/// from the scene's origin stay below 2^33, so that the translation is exact as f32.
+/// Origins of meshes with 16-bit positions are multiples of this many steps. A lattice step has at most 4 of these steps, so they stay
+/// below 2^33 steps, and the translation is exact as f32.
 const SHORT_GRID: f64 = 512.0;
 
-/// Lattice steps in metres beyond these bounds are no terrain and would leave the range of f32.
+/// The range of a lattice step in metres. Others are not those of a terrain and would leave the range of f32.
 const RESOLUTION_BOUNDS: std::ops::Range<f64> = 1e-12..1e12;
 
-/// What a reader needs to get from a glTF scene back to the source, as written to `scenes[0].extras`:
+/// The numbers that lead from a glTF scene back to the source, as written to `scenes[0].extras`:
 /// x = `offset[0]` + gx / `metres_per_unit`, y = `offset[1]` - gz / `metres_per_unit`,
 /// z = `offset[2]` + gy / `metres_per_unit_z`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Extras {
-    /// Source coordinates x, y, z of the scene's origin.
+    /// The source coordinates x, y, z of the scene's origin.
     pub offset: [f64; 3],
-    /// Lattice step in x and y, source units.
+    /// The lattice step in x and y, in source units.
     pub resolution: f64,
-    /// Lattice step in z, source units.
+    /// The lattice step in z, in source units.
     pub resolution_z: f64,
     /// Metres in a source unit of x and y.
     pub metres_per_unit: f64,
     /// Metres in a source unit of z.
     pub metres_per_unit_z: f64,
-    /// Coordinate reference system as WKT.
+    /// The coordinate reference system as WKT.
     pub crs: Option<String>,
 }
 
-/// The way from lattice integers to glTF metres: a pure function of the job, the same in every tile.
+/// The map from lattice integers to glTF metres. It is the same in every tile of a job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Frame {
     extras: Extras,
-    horizontal: Scale,
-    vertical: Scale,
+    horizontal: AxisScale,
+    vertical: AxisScale,
 }
 
-/// One kind of axis.
+/// The map along one kind of axis.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-struct Scale {
+struct AxisScale {
     /// Metres in a glTF step, a power of two.
     step: f64,
-    /// glTF steps in a lattice step, at least 2.
+    /// glTF steps in a lattice step: at least 2, or at least 1 in packed tiles.
     ratio: f64,
 }
 
-impl Scale {
-    fn new(resolution: f64, name: &str) -> Result<Scale> {
+impl AxisScale {
+    fn new(resolution: f64, name: &str) -> Result<AxisScale> {
         if !RESOLUTION_BOUNDS.contains(&resolution) {
             return Err(Error::Config(format!(
                 "a lattice step of {resolution:e} metres in {name} is out of range: set [input] unit and resolution"
             )));
         }
-        Ok(Scale::coarsest(resolution))
+        Ok(AxisScale::coarsest(resolution))
     }
 
-    /// The largest step of at most half of `resolution` metres.
-    fn coarsest(resolution: f64) -> Scale {
+    /// Returns the map with the largest step of at most half of `resolution` metres.
+    fn coarsest(resolution: f64) -> AxisScale {
         let step = power_below(resolution / 2.0);
-        Scale { step, ratio: resolution / step }
+        AxisScale { step, ratio: resolution / step }
     }
 
-    /// The largest step from which rounding still leads back, for `resolution` metres.
-    fn packed(resolution: f64) -> Scale {
-        // A resolution that is a power of two is met exactly.
+    /// Returns the map with the largest step from which rounding still leads back, for `resolution` metres.
+    fn packed(resolution: f64) -> AxisScale {
+        // A resolution that is a power of two is a step itself.
         let is_power = power_below(resolution) == resolution;
         let step = if is_power { resolution } else { power_below(resolution * PACKED_RATIO) };
-        Scale { step, ratio: resolution / step }
+        AxisScale { step, ratio: resolution / step }
     }
 
-    /// Metres between the ends of the longest line that one mesh can hold.
+    /// Returns the length in metres of the longest line that one mesh can hold.
     fn longest(self) -> f64 {
         2.0 * PART_REACH as f64 * self.step
     }
 
-    /// As fine as a mesh that spans so many lattice steps allows, within reason.
-    fn refined(self, lattice_steps: i64) -> Scale {
+    /// Returns the map with a step as fine as a mesh that spans `lattice_steps` allows, within reason.
+    fn refined(self, lattice_steps: i64) -> AxisScale {
         let resolution = self.ratio * self.step;
         let spanning = power_above(lattice_steps as f64 * resolution / (2 * PART_REACH) as f64);
         let step = self.step.min(spanning.max(FINE_STEP).max(self.step / REFINEMENT));
-        Scale { step, ratio: resolution / step }
+        AxisScale { step, ratio: resolution / step }
     }
 
-    /// The glTF steps of lattice integer `i`: a whole number below 2^39.
+    /// Returns lattice integer `i` in glTF steps, a whole number below 2^39.
     #[inline(always)]
     fn steps(&self, i: i32) -> f64 {
         nearest(i as f64 * self.ratio)
@@ -133,7 +134,7 @@ fn power_above(value: f64) -> f64 {
     if below == value { value } else { 2.0 * below }
 }
 
-/// `value` rounded to the nearest whole number, for magnitudes below 2^51; vectorizes on every machine.
+/// Rounds `value` to the nearest whole number, for magnitudes below 2^51. Unlike `round` it vectorizes on every machine.
 #[inline(always)]
 fn nearest(value: f64) -> f64 {
     const SHIFT: f64 = 1.5 * (1u64 << 52) as f64;
@@ -141,9 +142,11 @@ fn nearest(value: f64) -> f64 {
 }
 
 impl Frame {
-    /// The frame of a job, with steps of about half the lattice's. `metres_per_unit` is for x and y, `metres_per_unit_z` for z, `crs` is WKT.
+    /// Returns the frame of a job, with steps of about half a lattice step. `metres_per_unit` is for x and y, `metres_per_unit_z` for z,
+    /// and `crs` is WKT.
     ///
-    /// Fails where a lattice step in metres is not a positive number of a sensible size.
+    /// # Errors
+    /// [`Error::Config`] if a lattice step in metres is not a positive number of a sensible size.
     pub fn new(lattice: &Lattice, metres_per_unit: f64, metres_per_unit_z: f64, crs: Option<String>) -> Result<Frame> {
         let [x, y, z] = lattice.offset;
         let extras = Extras {
@@ -154,48 +157,48 @@ impl Frame {
             metres_per_unit_z,
             crs,
         };
-        let horizontal = Scale::new(extras.resolution * metres_per_unit, "x and y")?;
-        let vertical = Scale::new(extras.resolution_z * metres_per_unit_z, "z")?;
+        let horizontal = AxisScale::new(extras.resolution * metres_per_unit, "x and y")?;
+        let vertical = AxisScale::new(extras.resolution_z * metres_per_unit_z, "z")?;
         Ok(Frame { extras, horizontal, vertical })
     }
 
-    /// The frame with finer steps, so that positions are truer, as far as a triangle across a job within these least and
-    /// greatest lattice integers x, y, z can still be written. All tiles of a job need the same frame.
-    pub fn refined(self, bounds: [[i32; 3]; 2]) -> Frame {
-        let [dx, dy, dz] = [0, 1, 2].map(|k| bounds[1][k] as i64 - bounds[0][k] as i64);
-        Frame { horizontal: self.horizontal.refined(dx.max(dy)), vertical: self.vertical.refined(dz), ..self }
+    /// Returns the frame with finer steps, so that positions are truer. They are as fine as a triangle across a job within `bounds`
+    /// allows. All tiles of a job need the same frame.
+    pub fn refined(self, bounds: Bounds<3>) -> Frame {
+        let horizontal = self.horizontal.refined(bounds.extent(0).max(bounds.extent(1)));
+        Frame { horizontal, vertical: self.vertical.refined(bounds.extent(2)), ..self }
     }
 
-    /// The frame with the coarsest steps from which the lattice can be told, so that positions take 16 bits. All tiles of a
-    /// job need the same frame.
+    /// Returns the frame with the coarsest steps from which rounding finds the lattice, so that positions take 16 bits. All tiles of
+    /// a job need the same frame.
     pub fn packed(self) -> Frame {
         let [xy, up] = self.resolution_metres();
-        Frame { horizontal: Scale::packed(xy), vertical: Scale::packed(up), ..self }
+        Frame { horizontal: AxisScale::packed(xy), vertical: AxisScale::packed(up), ..self }
     }
 
-    /// What is written for readers.
+    /// Returns what is written for readers.
     pub fn extras(&self) -> &Extras {
         &self.extras
     }
 
-    /// Metres in a lattice step: in x and y, and in z.
+    /// Returns the metres in a lattice step: in x and y, and in z.
     pub fn resolution_metres(&self) -> [f64; 2] {
         let Extras { resolution, resolution_z, metres_per_unit, metres_per_unit_z, .. } = self.extras;
         [resolution * metres_per_unit, resolution_z * metres_per_unit_z]
     }
 
-    /// The extent in metres, in x or y and in z, up to which a triangle can always be written exactly. Where the whole
-    /// job is smaller than this, no tile can fail.
+    /// Returns the extent in metres, in x or y and in z, up to which a triangle can always be written exactly. If the whole job is
+    /// smaller than this, no tile can fail.
     pub fn longest_triangle(&self) -> [f64; 2] {
         [self.horizontal.longest(), self.vertical.longest()]
     }
 
-    /// What [`Frame::longest_triangle`] is for a resolution of so many metres.
+    /// Returns the extent in metres up to which a triangle can be written exactly at this resolution in metres.
     pub fn longest_at(resolution_metres: f64) -> f64 {
-        Scale::coarsest(resolution_metres).longest()
+        AxisScale::coarsest(resolution_metres).longest()
     }
 
-    /// The glTF coordinates (x, y up, z) of a lattice point in steps: whole numbers.
+    /// Returns the glTF coordinates (x, y up, z) of a lattice point in steps, which are whole numbers.
     #[inline(always)]
     pub(crate) fn steps(&self, point: [i32; 3]) -> [f64; 3] {
         let [x, y, z] = point;
@@ -203,7 +206,8 @@ impl Frame {
         [self.horizontal.steps(x), self.vertical.steps(z), 0.0 - self.horizontal.steps(y)]
     }
 
-    /// The glTF coordinates of a lattice point relative to an origin in steps; exact within [`PART_REACH`] of it.
+    /// Returns the glTF coordinates in metres of a lattice point relative to an origin in steps. They are exact within [`PART_REACH`]
+    /// of it.
     #[inline(always)]
     pub(crate) fn local(&self, point: [i32; 3], origin: [f64; 3]) -> [f32; 3] {
         let [x, y, z] = self.steps(point);
@@ -211,29 +215,29 @@ impl Frame {
         [((x - origin[0]) * xy) as f32, ((y - origin[1]) * up) as f32, ((z - origin[2]) * xy) as f32]
     }
 
-    /// The glTF coordinates of a lattice point relative to an origin in whole steps; exact within [`PART_REACH`] of it.
+    /// Returns the glTF coordinates in steps of a lattice point relative to an origin in steps.
     #[inline(always)]
     pub(crate) fn local_steps(&self, point: [i32; 3], origin: [f64; 3]) -> [f64; 3] {
         let steps = self.steps(point);
         [0, 1, 2].map(|k| steps[k] - origin[k])
     }
 
-    /// Metres in a step along the glTF axes.
+    /// Returns the metres in a step along the glTF axes.
     pub(crate) fn step(&self) -> [f64; 3] {
         self.metres([1.0; 3])
     }
 
-    /// Metres in a vertical step over metres in a horizontal one.
+    /// Returns a vertical step divided by a horizontal one.
     pub(crate) fn anisotropy(&self) -> f32 {
         (self.vertical.step / self.horizontal.step) as f32
     }
 
-    /// The glTF world position in metres of a lattice point, exactly as every tile has it.
+    /// Returns the glTF world position in metres of a lattice point, exactly as every tile has it.
     pub fn world(&self, point: [i32; 3]) -> [f64; 3] {
         self.metres(self.steps(point))
     }
 
-    /// The lattice point at a glTF world position in metres as [`Frame::world`] gives it; `None` where there is none.
+    /// Returns the lattice point at a glTF world position in metres, or `None` if [`Frame::world`] gives no point that position.
     pub fn integers(&self, world: [f64; 3]) -> Option<[i32; 3]> {
         let [xy, up] = self.resolution_metres();
         let point = [world[0] / xy, -world[2] / xy, world[1] / up].map(f64::round);
@@ -242,18 +246,18 @@ impl Frame {
         (is_there && self.world(point) == world).then_some(point)
     }
 
-    /// Steps as metres.
+    /// Returns steps as metres.
     pub(crate) fn metres(&self, steps: [f64; 3]) -> [f64; 3] {
         [steps[0] * self.horizontal.step, steps[1] * self.vertical.step, steps[2] * self.horizontal.step]
     }
 }
 
-/// A place where translations may lie, in steps, nearest to the middle between `low` and `high`.
+/// Returns the origin on `grid` next to the middle between `low` and `high`, all in steps.
 pub(crate) fn origin_between(low: [f64; 3], high: [f64; 3], grid: i64) -> [f64; 3] {
     [0, 1, 2].map(|k| (nearest((low[k] + high[k]) * 0.5 / grid as f64)) * grid as f64 + 0.0)
 }
 
-/// The origin from which 16-bit positions reach all of what lies between `low` and `high`, in steps, if there is one.
+/// Returns the origin from which 16-bit positions reach everything between `low` and `high`, in steps, if there is one.
 pub(crate) fn short_origin(low: [f64; 3], high: [f64; 3]) -> Option<[f64; 3]> {
     let origin = low.map(|v| (v / SHORT_GRID).floor() * SHORT_GRID + 0.0);
     (0..3).all(|k| high[k] - origin[k] <= SHORT_REACH).then_some(origin)
@@ -262,9 +266,10 @@ pub(crate) fn short_origin(low: [f64; 3], high: [f64; 3]) -> Option<[f64; 3]> {
 /// The finest grid for [`origin_between`].
 pub(crate) const FINE_GRID: i64 = TRANSLATION_STEPS;
 
-/// The nearest f64. A lattice offset may have more digits: what an f64 loses of it is far below any lattice step.
+/// Returns the nearest f64. A lattice offset may have more digits, but the loss is far below any lattice step.
 fn number(exact: Decimal) -> f64 {
-    exact.to_string().parse().expect("the text of a decimal is that of a number")
+    // The text of a decimal is always a number.
+    exact.to_string().parse().unwrap_or(f64::NAN)
 }
 
 #[cfg(test)]
@@ -282,10 +287,10 @@ mod tests {
     }
 
     #[test]
-    fn packed_steps_are_powers_of_two_from_which_rounding_leads_back() {
+    fn packed_steps_are_powers_of_two_just_below_the_resolution() {
         let near = [0.5f64, 1.0, 0.0078125].into_iter().flat_map(|v| [v.next_down(), v, v.next_up(), v * 0.981]);
         for resolution in near.chain([0.01, 0.001, 0.003048, 0.3048 / 4096.0, 7.0]) {
-            let Scale { step, ratio } = Scale::packed(resolution);
+            let AxisScale { step, ratio } = AxisScale::packed(resolution);
             assert_eq!(step.log2().fract(), 0.0, "{resolution}");
             assert_eq!(step.to_bits() << 12, 0, "{resolution}");
             assert!(ratio == 1.0 || (1.02..2.05).contains(&ratio), "{resolution}: {ratio}");

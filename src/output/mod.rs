@@ -1,8 +1,9 @@
-//! Terrain out: glTF tiles, one scene of all tiles, the georeference and a picture.
+//! Writes the terrain: glTF tiles, one scene of all tiles, 3D Tiles, the georeference and a picture.
 //!
-//! [`frame::Frame`] says where a lattice point lies in a glTF scene; everything that writes or reads positions asks it.
+//! [`frame::Frame`] says where a lattice point lies in a glTF scene. All code that writes or reads positions asks it.
 
 pub mod color;
+pub mod compression;
 pub mod frame;
 pub mod gltf;
 pub mod layout;
@@ -10,8 +11,8 @@ pub mod lod;
 pub mod normals;
 pub mod options;
 pub mod preview;
-mod tile;
+pub mod tile;
 pub mod tiles3d;
 
-pub use gltf::encoding::Compression;
+pub use compression::Compression;
 pub use tile::Tile;

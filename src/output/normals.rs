@@ -1,75 +1,75 @@
-//! Vertex normals weighted by the area of the triangles around, from exact integer sums: neither the order of the
-//! triangles nor the cut into tiles changes a bit of them.
+//! Vertex normals, weighted by the area of the triangles around the vertex. They come from exact integer sums, so neither the order
+//! of the triangles nor the cut into tiles changes a bit of them.
 
 use crate::output::frame::Frame;
 use crate::output::tile::bounds;
 use multiversion::multiversion;
 
-/// The sum over the triangles around a vertex of their normals, each twice as long as the triangle's area, in lattice steps
-/// (x, y, z). Sums of one vertex from several tiles are added.
+/// The sum of the normals of the triangles around a vertex, each with a length of twice the triangle's area, in lattice steps
+/// (x, y, z). The sums of one vertex in several tiles are added.
 pub type NormalSum = [i128; 3];
 
-/// The sums of all vertices of a tile, narrow where the tile's extent proves that they cannot overflow.
+/// The sums of all vertices of a tile: narrow if the tile's extent proves that they cannot overflow.
 #[derive(Clone, Debug)]
-pub enum Sums {
+pub enum NormalSums {
     /// No sum can leave an `i64`.
     Narrow(Vec<[i64; 3]>),
-    /// For huge triangles.
+    /// A sum may leave an `i64`, because triangles are huge.
     Wide(Vec<NormalSum>),
 }
 
-impl Sums {
-    /// The sums over `triangles` (indices of `positions`, counterclockwise) at every vertex of `positions` (lattice steps).
-    pub fn new(positions: &[[i32; 3]], triangles: &[[u32; 3]]) -> Sums {
+impl NormalSums {
+    /// Returns the sums over `triangles` (indices of `positions`, counterclockwise) at every vertex of `positions` (lattice steps).
+    pub fn new(positions: &[[i32; 3]], triangles: &[[u32; 3]]) -> NormalSums {
         let mut sums = if narrow_suffices(positions, triangles.len()) {
-            Sums::Narrow(vec![[0; 3]; positions.len()])
+            NormalSums::Narrow(vec![[0; 3]; positions.len()])
         } else {
-            Sums::Wide(vec![[0; 3]; positions.len()])
+            NormalSums::Wide(vec![[0; 3]; positions.len()])
         };
         match &mut sums {
-            Sums::Narrow(sums) => accumulate(positions, triangles, sums, cross_narrow),
-            Sums::Wide(sums) => accumulate(positions, triangles, sums, cross),
+            NormalSums::Narrow(sums) => accumulate(positions, triangles, sums, cross_narrow),
+            NormalSums::Wide(sums) => accumulate(positions, triangles, sums, cross),
         }
         sums
     }
 
-    /// The sum of vertex `v`.
+    /// Returns the sum of vertex `v`.
     #[inline]
     pub fn get(&self, v: usize) -> NormalSum {
         match self {
-            Sums::Narrow(sums) => sums[v].map(i128::from),
-            Sums::Wide(sums) => sums[v],
+            NormalSums::Narrow(sums) => sums[v].map(i128::from),
+            NormalSums::Wide(sums) => sums[v],
         }
     }
 
-    /// The unit normals of all vertices, as [`finish`] gives them.
-    pub fn finish(&self, frame: &Frame) -> Vec<[f32; 3]> {
+    /// Returns the unit normals of all vertices, each as [`unit_normal`] does.
+    pub fn unit_normals(&self, frame: &Frame) -> Vec<[f32; 3]> {
         let weights = weights(frame);
         match self {
-            Sums::Narrow(sums) => units(sums, weights),
-            Sums::Wide(sums) => sums.iter().map(|s| unit(s.map(|v| v as f64), weights)).collect(),
+            NormalSums::Narrow(sums) => units(sums, weights),
+            NormalSums::Wide(sums) => sums.iter().map(|s| unit(s.map(|v| v as f64), weights)).collect(),
         }
     }
 }
 
-/// The unit normal (x east, y north, z up) in metres of a vertex whose sum is complete; straight up for a zero sum.
-pub fn finish(sum: NormalSum, frame: &Frame) -> [f32; 3] {
+/// Returns the unit normal (x east, y north, z up) in metres of a vertex with a complete sum, or straight up for a zero sum.
+pub fn unit_normal(sum: NormalSum, frame: &Frame) -> [f32; 3] {
     unit(sum.map(|v| v as f64), weights(frame))
 }
 
-/// `a + b`.
+/// Returns `a + b`.
 pub fn add(a: NormalSum, b: NormalSum) -> NormalSum {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
-/// The normal of the counterclockwise triangle `abc`, twice as long as its area, in lattice steps.
+/// Returns the normal of the counterclockwise triangle `abc`, with a length of twice its area, in lattice steps.
 pub fn cross(a: [i32; 3], b: [i32; 3], c: [i32; 3]) -> NormalSum {
     let difference = |p: [i32; 3]| [0, 1, 2].map(|k| p[k] as i128 - a[k] as i128);
     let ([ux, uy, uz], [vx, vy, vz]) = (difference(b), difference(c));
     [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx]
 }
 
-/// [`cross`] where [`narrow_suffices`].
+/// Does what [`cross`] does, for tiles where [`narrow_suffices`].
 #[inline(always)]
 fn cross_narrow(a: [i32; 3], b: [i32; 3], c: [i32; 3]) -> [i64; 3] {
     let difference = |p: [i32; 3]| [0, 1, 2].map(|k| p[k] as i64 - a[k] as i64);
@@ -96,16 +96,15 @@ fn accumulate<T: Copy + std::ops::AddAssign>(
     }
 }
 
-/// Whether as many triangles as these, all at one vertex, keep the sum within an `i64`.
+/// Tells whether the sum of `triangles` normals, all at one vertex, stays within an `i64`.
 fn narrow_suffices(positions: &[[i32; 3]], triangles: usize) -> bool {
-    let Some([low, high]) = bounds(positions) else { return true };
-    let widest = [0, 1, 2].map(|k| (high[k] as i64 - low[k] as i64) as u128);
-    let [x, y, z] = widest;
+    let Some(bounds) = bounds(positions) else { return true };
+    let [x, y, z] = [0, 1, 2].map(|axis| bounds.extent(axis) as u128);
     let largest = (x * y).max(y * z).max(x * z) * 2;
     largest.saturating_mul(triangles as u128) < 1 << 63
 }
 
-/// A normal in lattice steps times these is a normal in metres, up to a common factor.
+/// Returns the factors for x and y, and for z, that turn a normal in lattice steps into one in metres, up to a common factor.
 fn weights(frame: &Frame) -> [f64; 2] {
     let [horizontal, vertical] = frame.resolution_metres();
     [vertical, horizontal]
@@ -120,7 +119,7 @@ fn units(sums: &[[i64; 3]], weights: [f64; 2]) -> Vec<[f32; 3]> {
 fn unit(sum: [f64; 3], weights: [f64; 2]) -> [f32; 3] {
     let [x, y, z] = [sum[0] * weights[0], sum[1] * weights[0], sum[2] * weights[1]];
     let length = (x * x + y * y + z * z).sqrt();
-    // One division rather than three; what is lost is far below an f32's last place.
+    // One division instead of three. The loss is far below an f32's last place.
     let shrink = 1.0 / length;
     if length > 0.0 { [x, y, z].map(|v| (v * shrink) as f32) } else { [0.0, 0.0, 1.0] }
 }
@@ -130,7 +129,7 @@ mod tests {
     use super::*;
     use crate::geometry::lattice::{Lattice, shortest_decimal};
 
-    /// x and y in steps of 2 cm, z in steps of 1 cm.
+    /// Returns a frame with steps of 2 cm in x and y, and 1 cm in z.
     fn frame() -> Frame {
         let decimal = |v: f64| shortest_decimal(v).unwrap();
         let lattice = Lattice { offset: [decimal(0.0); 3], resolution: decimal(0.02), resolution_z: decimal(0.01) };
@@ -138,43 +137,43 @@ mod tests {
     }
 
     #[test]
-    fn a_slope_of_45_degrees_in_metres() {
+    fn normals_are_in_metres() {
         let positions = [[0, 0, 0], [10, 0, 20], [0, 10, 0], [10, 10, 20]];
-        for normal in Sums::new(&positions, &[[0, 1, 2], [1, 3, 2]]).finish(&frame()) {
+        for normal in NormalSums::new(&positions, &[[0, 1, 2], [1, 3, 2]]).unit_normals(&frame()) {
             assert_eq!(normal, [-std::f32::consts::FRAC_1_SQRT_2, 0.0, std::f32::consts::FRAC_1_SQRT_2]);
         }
     }
 
     #[test]
-    fn sums_of_pieces_add_up_in_any_order() {
+    fn the_order_of_additions_does_not_matter() {
         let positions = [[0, 0, 5], [90, 10, 7], [70, 90, -3], [-60, 80, 2], [-40, -50, 11]];
         let fan = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]];
-        let whole = Sums::new(&positions, &fan).get(0);
+        let whole = NormalSums::new(&positions, &fan).get(0);
         for split in 0..fan.len() {
             let (a, b) = fan.split_at(split);
-            let sum = add(Sums::new(&positions, b).get(0), Sums::new(&positions, a).get(0));
+            let sum = add(NormalSums::new(&positions, b).get(0), NormalSums::new(&positions, a).get(0));
             assert_eq!(sum, whole);
         }
-        assert_eq!(finish(whole, &frame()), Sums::new(&positions, &fan).finish(&frame())[0]);
+        assert_eq!(unit_normal(whole, &frame()), NormalSums::new(&positions, &fan).unit_normals(&frame())[0]);
     }
 
     #[test]
     fn huge_triangles_do_not_overflow() {
         let far = 1 << 29;
         let positions = [[-far, -far, i32::MIN], [far, -far, i32::MAX], [-far, far, i32::MIN], [far, far, i32::MAX]];
-        let sums = Sums::new(&positions, &[[0, 1, 2], [1, 3, 2]]);
-        assert!(matches!(sums, Sums::Wide(_)));
+        let sums = NormalSums::new(&positions, &[[0, 1, 2], [1, 3, 2]]);
+        assert!(matches!(sums, NormalSums::Wide(_)));
         assert_eq!(
             sums.get(1),
             add(cross(positions[0], positions[1], positions[2]), cross(positions[1], positions[3], positions[2]))
         );
-        for [x, y, z] in sums.finish(&frame()) {
+        for [x, y, z] in sums.unit_normals(&frame()) {
             assert!((x * x + y * y + z * z - 1.0).abs() < 1e-6 && x < 0.0 && z > 0.0);
         }
     }
 
     #[test]
-    fn without_triangles_a_normal_is_straight_up() {
-        assert_eq!(finish([0; 3], &frame()), [0.0, 0.0, 1.0]);
+    fn a_vertex_without_triangles_has_a_normal_straight_up() {
+        assert_eq!(unit_normal([0; 3], &frame()), [0.0, 0.0, 1.0]);
     }
 }

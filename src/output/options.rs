@@ -1,10 +1,10 @@
 //! The options of `[output]`.
 
-use crate::output::Compression;
+use crate::output::compression::{Compression, CompressionChoice};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// `[output]`: where and what.
+/// `[output]`: where the results go, and what they are.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OutputOptions {
@@ -16,28 +16,28 @@ pub struct OutputOptions {
     /// Whether vertices carry normals.
     #[serde(default = "yes")]
     pub normals: bool,
-    /// In which form viewers get the terrain.
+    /// The files for viewers.
     #[serde(default)]
     pub format: OutputFormat,
     /// Whether 3D Tiles have coarser levels above the exact tiles.
     #[serde(default = "yes")]
     pub levels: bool,
-    /// How many sites a coarser tile holds at the most.
+    /// The most sites in a coarser tile.
     #[serde(default, alias = "level_sites")]
     pub max_points_per_level_tile: MaxPointsPerLevelTile,
-    /// Metres that heights are raised by to be heights above the ellipsoid, where 3D Tiles are placed on the globe.
+    /// Metres to add to heights so that they count from the ellipsoid, where 3D Tiles are placed on the globe.
     #[serde(default)]
     pub height_offset: f64,
-    /// How tiles are to be packed.
+    /// How tiles are packed.
     #[serde(default)]
     pub compression: CompressionChoice,
-    /// Triangles with an edge longer than this are left out.
+    /// The longest edge of a triangle that is not left out.
     #[serde(default)]
     pub max_edge: MaxEdge,
 }
 
 impl OutputOptions {
-    /// How tiles are packed.
+    /// Returns how tiles are packed.
     pub fn packing(&self) -> Compression {
         match (self.compression, self.format) {
             (CompressionChoice::Auto, OutputFormat::Tiles3d) | (CompressionChoice::Meshopt, _) => Compression::Meshopt,
@@ -51,11 +51,11 @@ fn yes() -> bool {
     true
 }
 
-/// In which form viewers get the terrain; the exact tiles are written in any case.
+/// The files that are written for viewers besides the exact tiles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum OutputFormat {
-    /// Both where the terrain fits one file that viewers open, else 3D Tiles.
+    /// Both if the terrain fits one file that viewers open, else 3D Tiles.
     #[default]
     Auto,
     /// One file, `terrain.glb`.
@@ -65,26 +65,11 @@ pub enum OutputFormat {
     Tiles3d,
 }
 
-/// How tiles are to be packed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum CompressionChoice {
-    /// With meshopt for 3D Tiles alone, whose viewers know it; else quantized.
-    #[default]
-    Auto,
-    /// See [`crate::output::Compression::Meshopt`].
-    Meshopt,
-    /// See [`crate::output::Compression::Quantized`].
-    Quantized,
-    /// See [`crate::output::Compression::None`].
-    None,
-}
-
 /// Where vertex colours come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ColorChoice {
-    /// The points' own colours, elevation where they have none.
+    /// The points' own colours, or elevation if they have none.
     #[default]
     Auto,
     /// The points' own colours.
@@ -97,16 +82,16 @@ pub enum ColorChoice {
     None,
 }
 
-/// How long an edge of a triangle may be in the plane.
+/// How long an edge of a triangle may be in the plane. Triangles with a longer edge are left out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "toml::Value", into = "toml::Value")]
 pub enum MaxEdge {
-    /// As long as it is: the terrain is the whole triangulation.
+    /// Any length: no triangle is left out.
     #[default]
     None,
     /// Ten times the local spacing of the sites.
     Auto,
-    /// So many source units.
+    /// This many source units.
     Length(f64),
 }
 
@@ -138,13 +123,13 @@ impl From<MaxEdge> for toml::Value {
     }
 }
 
-/// How many sites a coarser tile holds at the most.
+/// The most sites in a coarser tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "toml::Value", into = "toml::Value")]
 pub struct MaxPointsPerLevelTile(pub u64);
 
 impl Default for MaxPointsPerLevelTile {
-    /// As many as the exact tiles have by default.
+    /// Returns the default of the exact tiles.
     fn default() -> MaxPointsPerLevelTile {
         MaxPointsPerLevelTile(50_000)
     }

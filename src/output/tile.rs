@@ -1,29 +1,30 @@
 //! The content of one tile, in lattice steps and source axes.
 
+use crate::geometry::Bounds;
 use multiversion::multiversion;
 
-/// A piece of the terrain: vertices on the job's lattice and the triangles between them. Every vertex is the corner of
-/// at least one triangle.
+/// A piece of the terrain: vertices on the job's lattice and the triangles between them. Every vertex is the corner of at
+/// least one triangle.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tile {
-    /// Lattice integers x, y, z of every vertex.
+    /// The lattice integers x, y, z of every vertex.
     pub positions: Vec<[i32; 3]>,
-    /// Unit normals of the vertices (x east, y north, z up) in a space where all axes are in metres.
+    /// The unit normals of the vertices (x east, y north, z up) in a space where all axes are in metres.
     pub normals: Option<Vec<[f32; 3]>>,
-    /// Linear red, green and blue of the vertices, 65535 for full intensity.
+    /// The linear red, green and blue of the vertices, 65535 for full intensity.
     pub colors: Option<Vec<[u16; 3]>>,
-    /// Corners as indices of vertices, counterclockwise seen from above.
+    /// The corners as indices of vertices, counterclockwise seen from above.
     pub triangles: Vec<[u32; 3]>,
 }
 
 impl Tile {
-    /// The tile of these triangles between some of `positions`, which keep their order, without normals and colours.
+    /// Returns the tile of these triangles between some of `positions`, without normals and colours. Vertices keep their order.
     pub fn of(positions: &[[i32; 3]], mut triangles: Vec<[u32; 3]>) -> Tile {
         let vertices = renumber(&mut triangles);
         Tile { positions: pick(positions, &vertices), triangles, ..Tile::default() }
     }
 
-    /// The tile of only these triangles of this one.
+    /// Returns the tile of these triangles between vertices of this tile.
     pub(crate) fn subset(&self, mut triangles: Vec<[u32; 3]>) -> Tile {
         let vertices = renumber(&mut triangles);
         Tile {
@@ -34,25 +35,22 @@ impl Tile {
         }
     }
 
-    /// The least and greatest lattice integers of the vertices on every axis; `None` without vertices.
-    pub fn bounds(&self) -> Option<[[i32; 3]; 2]> {
+    /// Returns the box of the vertices, or `None` without vertices.
+    pub fn bounds(&self) -> Option<Bounds<3>> {
         bounds(&self.positions)
     }
 }
 
-/// The least and greatest of `positions` on every axis; `None` if there are none.
+/// Returns the box of `positions`, or `None` if there are none.
 #[multiversion(targets("x86_64+avx2"))]
-pub(crate) fn bounds(positions: &[[i32; 3]]) -> Option<[[i32; 3]; 2]> {
-    let first = *positions.first()?;
-    Some(positions.iter().fold([first, first], |[low, high], p| {
-        [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]
-    }))
+pub(crate) fn bounds(positions: &[[i32; 3]]) -> Option<Bounds<3>> {
+    Bounds::of_points(positions.iter().copied())
 }
 
-/// A table of so many numbers for each corner is quicker than sorting the corners.
+/// Up to this many times the number of corners, a table by vertex is quicker than sorting the corners.
 const TABLE_PER_CORNER: usize = 8;
 
-/// Numbers the corners of `triangles` anew; the old numbers in order.
+/// Gives the vertices of `triangles` new numbers from 0 on, in the order of the old ones, and returns the old ones.
 fn renumber(triangles: &mut [[u32; 3]]) -> Vec<u32> {
     let corners = triangles.as_flattened_mut();
     let Some((first, last)) = corners.iter().min().copied().zip(corners.iter().max().copied()) else {
@@ -60,22 +58,22 @@ fn renumber(triangles: &mut [[u32; 3]]) -> Vec<u32> {
     };
     let span = (last - first) as usize + 1;
     if span > TABLE_PER_CORNER * corners.len() {
-        return renumber_few(triangles);
+        return renumber_by_sorting(triangles);
     }
     let mut number = vec![0u32; span];
     corners.iter().for_each(|&v| number[(v - first) as usize] = 1);
-    let vertices: Vec<u32> = (first..).zip(&number).filter(|(_, used)| **used > 0).map(|(v, _)| v).collect();
+    let vertices: Vec<u32> = (first..=last).zip(&number).filter(|(_, used)| **used > 0).map(|(v, _)| v).collect();
     vertices.iter().zip(0..).for_each(|(&v, new)| number[(v - first) as usize] = new);
     corners.iter_mut().for_each(|v| *v = number[(*v - first) as usize]);
     vertices
 }
 
-/// The same where the old numbers are far apart.
-fn renumber_few(triangles: &mut [[u32; 3]]) -> Vec<u32> {
-    let mut vertices: Vec<u32> = triangles.iter().flatten().copied().collect();
+/// Does what [`renumber`] does, for old numbers that are far apart.
+fn renumber_by_sorting(triangles: &mut [[u32; 3]]) -> Vec<u32> {
+    let mut vertices: Vec<u32> = triangles.as_flattened().to_vec();
     vertices.sort_unstable();
     vertices.dedup();
-    for corner in triangles.iter_mut().flatten() {
+    for corner in triangles.as_flattened_mut() {
         *corner = vertices.partition_point(|v| v < corner) as u32;
     }
     vertices
@@ -92,10 +90,12 @@ mod tests {
 
     proptest! {
         #[test]
-        fn both_ways_to_number_anew_agree(mut triangles in prop::collection::vec(prop::array::uniform3(0u32..4_000), 0..200)) {
-            let mut few = triangles.clone();
-            prop_assert_eq!(renumber(&mut triangles), renumber_few(&mut few));
-            prop_assert_eq!(triangles, few);
+        fn a_table_and_sorting_give_the_same_numbers(
+            mut triangles in prop::collection::vec(prop::array::uniform3(0u32..4_000), 0..200),
+        ) {
+            let mut sorted = triangles.clone();
+            prop_assert_eq!(renumber(&mut triangles), renumber_by_sorting(&mut sorted));
+            prop_assert_eq!(triangles, sorted);
         }
     }
 }

@@ -4,7 +4,7 @@ use bytemuck::cast_slice;
 use xxhash_rust::xxh3::xxh3_64;
 
 use crate::geometry::Site;
-use crate::output::gltf::read::Part;
+use crate::output::gltf::read::TilePart;
 use crate::verify::border::{BorderEdge, BorderSite, MeshBorder};
 use crate::verify::exact::{EdgeState, double_area, edge_state, side};
 use crate::verify::failures::Failure;
@@ -13,7 +13,7 @@ use crate::verify::half_edges::HalfEdgesByOrigin;
 use crate::verify::source_grid::SourceGrid;
 
 /// Checks `mesh` of tile number `tile`, adds what it finds to `findings`, and returns the border of the mesh.
-pub(super) fn check_mesh(mesh: &Part, tile: u32, grid: &SourceGrid, findings: &mut Findings) -> MeshBorder {
+pub(super) fn check_mesh(mesh: &TilePart, tile: u32, grid: &SourceGrid, findings: &mut Findings) -> MeshBorder {
     findings.triangles += mesh.triangles.len() as u64;
     let Some(points) = lattice_points(mesh, tile, grid, findings) else { return MeshBorder::default() };
     let sites: Vec<Site> = points.iter().map(|p| [p[0], p[1]]).collect();
@@ -28,7 +28,7 @@ pub(super) fn check_mesh(mesh: &Part, tile: u32, grid: &SourceGrid, findings: &m
 }
 
 /// Returns the lattice integers of the vertices, or `None` if some are not on the lattice.
-fn lattice_points(mesh: &Part, tile: u32, grid: &SourceGrid, findings: &mut Findings) -> Option<Vec<[i32; 3]>> {
+fn lattice_points(mesh: &TilePart, tile: u32, grid: &SourceGrid, findings: &mut Findings) -> Option<Vec<[i32; 3]>> {
     let as_plain = |world| grid.integers(world);
     let as_quantized = |world| grid.integers_on(world, mesh.scale);
     // A plain mesh has the scale 1. So has a quantized mesh with steps of one metre.
@@ -46,7 +46,7 @@ fn lattice_points(mesh: &Part, tile: u32, grid: &SourceGrid, findings: &mut Find
     points
 }
 
-fn points_of(mesh: &Part, integers: impl Fn([f64; 3]) -> Option<[i32; 3]>) -> Option<Vec<[i32; 3]>> {
+fn points_of(mesh: &TilePart, integers: impl Fn([f64; 3]) -> Option<[i32; 3]>) -> Option<Vec<[i32; 3]>> {
     let mut points = Vec::with_capacity(mesh.positions.len());
     for v in 0..mesh.positions.len() {
         points.push(integers(mesh.world(v))?);
@@ -55,7 +55,7 @@ fn points_of(mesh: &Part, integers: impl Fn([f64; 3]) -> Option<[i32; 3]>) -> Op
 }
 
 struct MeshCheck<'a> {
-    mesh: &'a Part,
+    mesh: &'a TilePart,
     /// The sites of the vertices.
     sites: Vec<Site>,
     tile: u32,
@@ -98,11 +98,11 @@ impl MeshCheck<'_> {
         let mut edges = Vec::new();
         let mut is_end = vec![false; self.sites.len()];
         for from in 0..self.sites.len() {
-            for half_edge in half_edges.of(from).iter().filter(|half_edge| !half_edge.is_matched()) {
-                let [to, apex] = [half_edge.to, half_edge.apex()].map(|v| self.sites[v as usize]);
+            for half_edge in half_edges.of(from).filter(|half_edge| !half_edge.is_matched()) {
+                let [to, apex] = [half_edge.to(), half_edge.apex()].map(|v| self.sites[v as usize]);
                 edges.push(BorderEdge::new(self.sites[from], to, apex, self.tile));
                 is_end[from] = true;
-                is_end[half_edge.to as usize] = true;
+                is_end[half_edge.to() as usize] = true;
             }
         }
         let ends = (0..self.sites.len()).filter(|&v| is_end[v]);

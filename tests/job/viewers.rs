@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use gdt_batch::output::tiles3d::globe::relative;
+use gdt_batch::output::tiles3d::globe::relative_transform;
 use serde_json::{Value, json};
 
 use crate::clouds;
@@ -60,7 +60,7 @@ fn middles(job: &Job, tiles: &[Tile]) -> Vec<[f64; 3]> {
         let mesh = triangles(job, &tiles[leaf]);
         let t = mesh[random.below(mesh.len() as u64) as usize];
         let middle = [0, 1, 2].map(|k| (t[0][k] + t[1][k] + t[2][k]) / 3.0);
-        applied(&relative(&tiles[0].placed, &tiles[leaf].placed), middle)
+        applied(&relative_transform(&tiles[0].placed, &tiles[leaf].placed), middle)
     };
     (0..12).map(middle).collect()
 }

@@ -3,11 +3,12 @@
 use std::collections::HashMap;
 use std::path::Path;
 
+use gdt_batch::geometry::Bounds;
 use gdt_batch::geometry::lattice::{Lattice, shortest_decimal};
 use gdt_batch::geometry::predicates::{in_circle, orient2d};
 use gdt_batch::output::frame::Frame;
-use gdt_batch::output::gltf::glb::Glb;
-use gdt_batch::output::normals::Sums;
+use gdt_batch::output::gltf::glb::GlbEncoder;
+use gdt_batch::output::normals::NormalSums;
 use gdt_batch::output::{Compression, Tile};
 use spade::{DelaunayTriangulation, Point2, Triangulation};
 
@@ -89,7 +90,7 @@ pub(crate) fn terrain(frame: &Frame, points: &[[i32; 3]]) -> Tile {
     let color = |p: &[i32; 3]| [p[0] as u16, p[1] as u16, p[2] as u16];
     Tile {
         positions: points.to_vec(),
-        normals: Some(Sums::new(points, &triangles).finish(frame)),
+        normals: Some(NormalSums::new(points, &triangles).unit_normals(frame)),
         colors: Some(points.iter().map(color).collect()),
         triangles,
     }
@@ -119,7 +120,7 @@ pub(crate) fn cut(mesh: &Tile, tiles: usize, mut which: impl FnMut(usize) -> usi
 
 /// Cuts a mesh into tiles by place, `side` by `side` of them.
 pub(crate) fn cut_by_place(mesh: &Tile, side: usize) -> Vec<Tile> {
-    let [low, high] = mesh.bounds().unwrap();
+    let Bounds { min: low, max: high } = mesh.bounds().unwrap();
     let cell = |v: u32, k: usize| {
         let (above, span) = (mesh.positions[v as usize][k] - low[k], high[k] - low[k] + 1);
         above as usize * side / span as usize
@@ -152,7 +153,7 @@ pub(crate) fn write_tiles_as(compression: Compression, directory: &Path, frame: 
 
 /// The bytes of the GLB file of `tile`.
 pub(crate) fn encode_tile(frame: &Frame, tile: &Tile, compression: Compression) -> gdt_batch::Result<Vec<u8>> {
-    let mut glb = Glb::default();
+    let mut glb = GlbEncoder::default();
     glb.encode(frame, tile, compression)?;
     Ok(glb.pieces().concat())
 }

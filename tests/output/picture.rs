@@ -1,7 +1,7 @@
 //! The picture covers the terrain, every pixel once.
 
 use gdt_batch::geometry::predicates::orient2d;
-use gdt_batch::output::preview::canvas::{Canvas, LONGER_SIDE, Texel};
+use gdt_batch::output::preview::canvas::{Canvas, LONGER_SIDE, PreviewPixel};
 use gdt_batch::output::preview::picture::Picture;
 use proptest::prelude::*;
 
@@ -15,7 +15,7 @@ fn a_rectangle_is_covered_wholly_and_once() {
         let mesh = terrain(&frame, &grid(columns, rows, step));
         let canvas = Canvas::new(&frame, mesh.bounds().unwrap());
         let [width, height] = canvas.size();
-        let mut pixels: Vec<u32> = canvas.draw(&mesh).iter().map(|texel| texel.pixel).collect();
+        let mut pixels: Vec<u32> = canvas.draw(&mesh).iter().map(|pixel| pixel.pixel).collect();
         pixels.sort_unstable();
         // The last column or row may have its centre outside.
         assert!((LONGER_SIDE as u32 - 1..=LONGER_SIDE as u32).contains(&width.max(height)));
@@ -34,7 +34,7 @@ fn the_picture_is_a_png_of_its_size() {
     let canvas = Canvas::new(&frame, mesh.bounds().unwrap());
     let mut picture = Picture::new(&canvas);
     picture.add(0, &canvas.draw(&mesh));
-    let png = picture.png();
+    let png = picture.png().unwrap();
     let mut reader = png::Decoder::new(std::io::Cursor::new(&png)).read_info().unwrap();
     let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
     reader.next_frame(&mut pixels).unwrap();
@@ -52,7 +52,7 @@ fn a_slope_to_the_light_is_brighter() {
     let canvas = Canvas::new(&frame, mesh.bounds().unwrap());
     let mut picture = Picture::new(&canvas);
     picture.add(0, &canvas.draw(&mesh));
-    let png = picture.png();
+    let png = picture.png().unwrap();
     let mut reader = png::Decoder::new(std::io::Cursor::new(&png)).read_info().unwrap();
     let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
     reader.next_frame(&mut pixels).unwrap();
@@ -73,9 +73,9 @@ proptest! {
         prop_assume!(!collinear);
         let mesh = terrain(&frame, &points);
         let canvas = Canvas::new(&frame, mesh.bounds().unwrap());
-        let by_pixel = |mut texels: Vec<Texel>| {
-            texels.sort_unstable_by_key(|texel| texel.pixel);
-            texels
+        let by_pixel = |mut pixels: Vec<PreviewPixel>| {
+            pixels.sort_unstable_by_key(|pixel| pixel.pixel);
+            pixels
         };
         let whole = by_pixel(canvas.draw(&mesh));
         prop_assert!(whole.windows(2).all(|pair| pair[0].pixel < pair[1].pixel));

@@ -3,8 +3,9 @@
 use std::collections::HashMap;
 
 use gdt_batch::Error;
+use gdt_batch::geometry::Bounds;
 use gdt_batch::output::frame::Frame;
-use gdt_batch::output::gltf::read::{Part, TileFile, read_tile};
+use gdt_batch::output::gltf::read::{TileFile, TilePart, read_tile};
 use gdt_batch::output::{Compression, Tile};
 use gdt_batch::verify::SourceGrid;
 use proptest::prelude::*;
@@ -36,7 +37,7 @@ fn integers(file: &TileFile) -> Vec<[i32; 3]> {
     file.parts.iter().flat_map(|part| integers_of(file, part)).collect()
 }
 
-fn integers_of(file: &TileFile, part: &Part) -> Vec<[i32; 3]> {
+fn integers_of(file: &TileFile, part: &TilePart) -> Vec<[i32; 3]> {
     let source = SourceGrid::new(&file.extras).unwrap();
     let of = |world| match part.scale == [1.0; 3] {
         true => source.integers(world),
@@ -47,7 +48,7 @@ fn integers_of(file: &TileFile, part: &Part) -> Vec<[i32; 3]> {
 
 /// The triangles of all parts by the lattice integers of their corners, least corner first, sorted.
 fn triangles(file: &TileFile) -> Vec<[[i32; 3]; 3]> {
-    let of_part = |part: &Part| {
+    let of_part = |part: &TilePart| {
         let points = integers_of(file, part);
         part.triangles.iter().map(|t| t.map(|v| points[v as usize])).collect::<Vec<_>>()
     };
@@ -234,7 +235,7 @@ fn a_small_job_gets_finer_steps_and_a_wide_one_does_not() {
     let off =
         |frame: &Frame| (0..1000).map(|i| (frame.world([i, 0, 0])[0] - i as f64 * 0.01).abs()).fold(0.0, f64::max);
     assert!((0.0018..0.002).contains(&off(&frame)));
-    assert!(off(&frame.clone().refined([[0; 3], [100_000; 3]])) < 0.000_125);
+    assert!(off(&frame.clone().refined(Bounds { min: [0; 3], max: [100_000; 3] })) < 0.000_125);
     let wide = vec![[-6_000_000, 0, 0], [6_000_000, 0, 0], [0, 40_000, 9_000]];
     let tile = Tile { positions: wide, triangles: vec![[0, 1, 2]], ..Tile::default() };
     let refined = frame.clone().refined(tile.bounds().unwrap());

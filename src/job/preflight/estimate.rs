@@ -9,7 +9,7 @@ use crate::job::plan::job_plan::Plan;
 use crate::job::progress::machine;
 use crate::output::Compression;
 use crate::output::layout::OutputLayout;
-use crate::output::preview::canvas::{LONGER_SIDE, Texel};
+use crate::output::preview::canvas::{LONGER_SIDE, PreviewPixel};
 
 /// Bytes that the store takes for a site: its position, colour, class and two triangles.
 const STORE_PER_SITE: u64 = 12 + 6 + 1 + 2 * 12;
@@ -74,7 +74,7 @@ pub(crate) fn tiles(plan: &Plan) -> u64 {
 fn store_bytes(points: u64, per_tile: u64, tiles: u64) -> u64 {
     // A tile of n sites has about 2.2 sqrt(n) on its frontier.
     let border_sites = (2.2 * (per_tile.min(points) as f64).sqrt()) as u64 * tiles;
-    points * STORE_PER_SITE + border_sites * STORE_PER_BORDER_SITE + PIXELS * size_of::<Texel>() as u64
+    points * STORE_PER_SITE + border_sites * STORE_PER_BORDER_SITE + PIXELS * size_of::<PreviewPixel>() as u64
 }
 
 fn result_bytes(points: u64, tiles: u64, compression: Compression, max_one_file: u64) -> u64 {

@@ -1,9 +1,10 @@
 //! Placing the terrain on the globe: the transforms of `tileset.json`, and how far off they are because the earth is curved.
 
+use crate::geometry::Bounds;
 use crate::input::Crs;
 use crate::output::frame::Frame;
-use crate::output::tiles3d::globe::{Globe, applied};
-use crate::output::tiles3d::tileset::{Node, corners};
+use crate::output::tiles3d::globe::{Globe, transform_point};
+use crate::output::tiles3d::tileset::{TilesetNode, bounds_in_metres};
 use serde::Serialize;
 
 /// The number of places along each side at which the distortion is measured. Both ends are among them: there it is greatest.
@@ -53,7 +54,7 @@ struct Ground<'a> {
 ///
 /// # Errors
 /// [`NotPlaced`] says why the terrain cannot be placed; then nothing is.
-pub fn place(crs: &Crs, frame: &Frame, height_offset: f64, root: &mut Node) -> Result<Placement, NotPlaced> {
+pub fn place(crs: &Crs, frame: &Frame, height_offset: f64, root: &mut TilesetNode) -> Result<Placement, NotPlaced> {
     let definition = crs.proj4_definition().ok_or_else(|| match &crs.name {
         Some(name) => format!("{name} has no definition that leads to longitude and latitude"),
         None => "no input names its coordinate system".to_string(),
@@ -80,7 +81,7 @@ impl Ground<'_> {
     ///
     /// A place is then not quite where it is in the exact tile below, by at most the distortion of both tiles. A viewer that shows
     /// the coarser tile shows that error too, so it is added to the vertical error.
-    fn lay(&self, node: &mut Node) -> Result<f64, NotPlaced> {
+    fn lay(&self, node: &mut TilesetNode) -> Result<f64, NotPlaced> {
         let transform = self.tangent(node.middle)?;
         let own = self.distortion(&transform, node.bounds)?;
         node.transform = Some(transform);
@@ -104,18 +105,18 @@ impl Ground<'_> {
 
     /// Returns the map from the scene to the globe that is exact to first order at a lattice point, at the height of the scene's origin.
     fn tangent(&self, [x, y]: [i32; 2]) -> Result<[f64; 16], NotPlaced> {
-        let [[east, north, _], _] = corners(self.frame, [[x, y, 0]; 2]);
+        let [[east, north, _], _] = bounds_in_metres(self.frame, Bounds::of_point([x, y, 0]));
         let [source_x, source_y] = self.source([east, north]);
         let mut transform = self.globe.tangent(source_x, source_y, self.base)?;
         // Move the origin from the tangent's to the scene's.
-        let origin = applied(&transform, [-east, -north, 0.0]);
+        let origin = transform_point(&transform, [-east, -north, 0.0]);
         transform[12..15].copy_from_slice(&origin);
         Ok(transform)
     }
 
     /// Returns the greatest distance in metres between where `transform` puts a place within `bounds` and where it belongs.
-    fn distortion(&self, transform: &[f64; 16], bounds: [[i32; 3]; 2]) -> Result<f64, NotPlaced> {
-        let [low, high] = corners(self.frame, bounds);
+    fn distortion(&self, transform: &[f64; 16], bounds: Bounds<3>) -> Result<f64, NotPlaced> {
+        let [low, high] = bounds_in_metres(self.frame, bounds);
         let mut greatest = 0.0f64;
         for i in 0..PLACES * PLACES * 2 {
             let share = [i % PLACES, i / PLACES % PLACES].map(|n| n as f64 / (PLACES - 1) as f64);
@@ -123,7 +124,7 @@ impl Ground<'_> {
             let z = if i < PLACES * PLACES { low[2] } else { high[2] };
             let [source_x, source_y] = self.source([x, y]);
             let belongs = self.globe.place(source_x, source_y, self.base + z)?;
-            let found = applied(transform, [x, y, z]);
+            let found = transform_point(transform, [x, y, z]);
             greatest = greatest.max((0..3).map(|k| (found[k] - belongs[k]).powi(2)).sum::<f64>().sqrt());
         }
         Ok(greatest)

@@ -7,7 +7,7 @@ use crate::job::durable::directory::JobDirectory;
 use crate::job::index::TileIndex;
 use crate::job::records::{StepOutput, StepRecord, Store};
 use crate::output::gltf::one_file::write_terrain;
-use crate::output::preview::canvas::{Canvas, Texel};
+use crate::output::preview::canvas::{Canvas, PreviewPixel};
 use crate::output::preview::picture::Picture;
 
 /// What the files beside the tiles hold.
@@ -52,7 +52,7 @@ pub fn write_side_files(
 fn draw_preview(store: &Store, canvas: &Canvas, tiles: usize) -> Result<Vec<u8>> {
     let mut picture = Picture::new(canvas);
     for tile in (0..tiles).map(TileIndex::new) {
-        picture.add(tile.0, &ColumnReader::open(store, StepRecord::Pixels(tile))?.column::<Texel>()?);
+        picture.add(tile.0, &ColumnReader::open(store, StepRecord::Pixels(tile))?.column::<PreviewPixel>()?);
     }
-    Ok(picture.png())
+    picture.png()
 }

@@ -7,14 +7,14 @@ use crate::job::partition::tree::{Cell, Tree};
 use crate::job::records::{LevelSummary, Store, TileSummary};
 use crate::output::frame::Frame;
 use crate::output::layout::{level_uri, tile_uri};
-use crate::output::tiles3d::tileset::{Node, tileset_json};
+use crate::output::tiles3d::tileset::{TilesetNode, tileset_json};
 use crate::{Error, Result};
 
 /// Returns the root of the tiles, none of them placed on the globe yet.
 ///
 /// # Errors
 /// [`Error::Io`] on the store, [`Error::Broken`] if there is no tile.
-pub fn tileset_root(store: &Store, tree: &Tree, hierarchy: &Hierarchy) -> Result<Node> {
+pub fn tileset_root(store: &Store, tree: &Tree, hierarchy: &Hierarchy) -> Result<TilesetNode> {
     let root = match hierarchy.tiles.len().checked_sub(1) {
         Some(last) => coarse_node(store, tree, hierarchy, last)?,
         // A small job has one tile.
@@ -24,13 +24,13 @@ pub fn tileset_root(store: &Store, tree: &Tree, hierarchy: &Hierarchy) -> Result
 }
 
 /// Returns the text of `tileset.json`.
-pub fn tileset_text(frame: &Frame, root: &Node) -> String {
+pub fn tileset_text(frame: &Frame, root: &TilesetNode) -> String {
     let mut text = tileset_json(frame, root).to_string();
     text.push('\n');
     text
 }
 
-fn coarse_node(store: &Store, tree: &Tree, hierarchy: &Hierarchy, index: usize) -> Result<Option<Node>> {
+fn coarse_node(store: &Store, tree: &Tree, hierarchy: &Hierarchy, index: usize) -> Result<Option<TilesetNode>> {
     let coarse = &hierarchy.tiles[index];
     let LevelSummary { own, leaves } = LevelSummary::load(store, coarse.node)?;
     let mut leaves = leaves.iter();
@@ -45,14 +45,14 @@ fn coarse_node(store: &Store, tree: &Tree, hierarchy: &Hierarchy, index: usize) 
         });
     }
     let node = node(&own, &tree.node(coarse.node).cell, level_uri(coarse.node.get()));
-    Ok(node.map(|node| Node { children, ..node }))
+    Ok(node.map(|node| TilesetNode { children, ..node }))
 }
 
 /// Returns the node of one tile without its children, or `None` if the tile has no triangle.
-fn node(tile: &TileSummary, cell: &Cell, uri: String) -> Option<Node> {
+fn node(tile: &TileSummary, cell: &Cell, uri: String) -> Option<TilesetNode> {
     let (uri, bounds) = ((tile.content > 0).then_some(uri), tile.bounds()?);
     let (error, middle) = (tile.error, middle(cell, bounds));
-    Some(Node { uri, bounds: [bounds.min, bounds.max], middle, error, transform: None, children: Vec::new() })
+    Some(TilesetNode { uri, bounds, middle, error, transform: None, children: Vec::new() })
 }
 
 /// Returns the middle of the part of `bounds` in the tile's cell, or of all of it if no part is. A triangle along the hull can be as

@@ -47,7 +47,7 @@ pub(crate) fn mesh_and_tiles(
     let style = |sites| {
         let max_edge = max_edge_rule(run, plan, partition, bounds, sites)?;
         let style = TileStyle::new(plan, &partition.summary, bounds, max_edge);
-        let canvas = Canvas::new(&style.frame, [bounds.min, bounds.max]);
+        let canvas = Canvas::new(&style.frame, bounds);
         Ok((style, canvas))
     };
     let writes_at_once = may_write_at_once(run, plan);

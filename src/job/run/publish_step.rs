@@ -58,11 +58,10 @@ pub(crate) fn publish(
         tileset = Some(tileset_text(&tiles.style.frame, &root));
         (placement, stats) = (placed.ok(), levels.stats);
     }
-    let bounds = [bounds.min, bounds.max];
     let georeference = Georeference::new(&plan.frame, &plan.lattice, bounds, &plan.unit, plan.crs.epsg);
     let fits = fits_one_file(&tiles.stats);
     let content = SideFiles {
-        georeference: georeference.to_json(placement.as_ref()),
+        georeference: georeference.to_json(placement.as_ref())?,
         tileset,
         one_file: fits && output.format != OutputFormat::Tiles3d,
     };

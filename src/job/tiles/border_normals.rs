@@ -10,7 +10,7 @@ use crate::job::records::{
 use crate::job::tiles::dependencies::FinishedTile;
 use crate::job::tiles::seam::seam_of;
 use crate::job::tiles::style::TileStyle;
-use crate::output::normals::{self, NormalSum, Sums};
+use crate::output::normals::{self, NormalSum, NormalSums};
 use crate::{Error, Result};
 
 /// Stores the finished frontier of a tile. Returns the other tiles that have corners of the tile's own triangles.
@@ -42,7 +42,7 @@ pub fn finish_border_normals(
     }
     let finish = |(at, vertex): (usize, &BorderVertex)| BorderAttributes {
         site: vertex.site,
-        normal: normals::finish(sums[at], &style.frame),
+        normal: normals::unit_normal(sums[at], &style.frame),
         rgb: rgb[at],
         class: class[at] as u16,
     };
@@ -64,6 +64,6 @@ fn neighbours(seam: &[SeamTriangle], tile: TileIndex) -> Vec<TileIndex> {
 fn sums_of_kept(store: &Store, tile: TileIndex, frontier: &Frontier, style: &TileStyle) -> Result<Vec<NormalSum>> {
     let Leaf { positions, mut triangles, .. } = Leaf::load(store, tile)?;
     style.max_edge.take(&positions, &mut triangles);
-    let sums = Sums::new(&positions, &triangles);
+    let sums = NormalSums::new(&positions, &triangles);
     Ok(frontier.sites.iter().map(|vertex| sums.get(vertex.site as usize)).collect())
 }

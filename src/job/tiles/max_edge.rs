@@ -5,6 +5,7 @@
 
 use crate::Result;
 use crate::geometry::Bounds;
+use crate::geometry::square_grid::SquareGrid;
 use crate::job::index::TileIndex;
 use crate::job::records::{Leaf, Store};
 use crate::output::frame::Frame;
@@ -99,10 +100,9 @@ fn longest_square([a, b, c]: [[i32; 3]; 3]) -> u64 {
 /// the count of the fullest of itself and its neighbours.
 #[derive(Debug)]
 pub struct SiteSpacing {
-    corner: [i64; 2],
+    grid: SquareGrid,
     /// The side of a cell in lattice steps.
     side: i64,
-    columns: usize,
     /// The number of sites in each cell, row by row; after [`SiteSpacing::spread`], the most in the cell and the eight around it.
     counts: Vec<u32>,
 }
@@ -124,7 +124,7 @@ impl SiteSpacing {
 
     /// Gives every cell the count of the fullest of itself and its neighbours: first along rows, then along columns.
     fn spread(&mut self) {
-        let columns = self.columns;
+        let columns = self.grid.columns();
         for row in self.counts.chunks_exact_mut(columns) {
             let mut before = 0;
             for at in 0..columns {
@@ -145,25 +145,19 @@ impl SiteSpacing {
 
     /// Returns cells for `sites` sites within `bounds`, all empty.
     fn empty(bounds: Bounds<3>, sites: u64) -> SiteSpacing {
-        let Bounds { min: low, .. } = bounds;
         let [width, height] = [0, 1].map(|axis| (bounds.extent(axis) + 1) as u64);
         let area = width as u128 * height as u128 * SITES_PER_CELL / sites.max(1) as u128;
         let mut side = (area.isqrt() as u64).max(1);
         while width.div_ceil(side).saturating_mul(height.div_ceil(side)) > MAX_CELLS {
             side *= 2;
         }
-        let [columns, rows] = [width, height].map(|extent| extent.div_ceil(side) as usize);
-        SiteSpacing {
-            corner: [low[0] as i64, low[1] as i64],
-            side: side as i64,
-            columns,
-            counts: vec![0; columns * rows],
-        }
+        let [min, max] = [bounds.min, bounds.max].map(|[x, y, _]| [x, y]);
+        let grid = SquareGrid::new(Bounds { min, max }, side as f64, f64::INFINITY);
+        SiteSpacing { grid, side: side as i64, counts: vec![0; grid.cells()] }
     }
 
     fn cell(&self, position: [i32; 3]) -> usize {
-        let [column, row] = [0, 1].map(|k| ((position[k] as i64 - self.corner[k]) / self.side) as usize);
-        row * self.columns + column
+        self.grid.cell(position[0], position[1])
     }
 
     /// Tells whether an edge with this square is longer than [`SPACINGS`] times the widest spacing at the corners.

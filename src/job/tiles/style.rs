@@ -39,7 +39,7 @@ impl TileStyle {
         };
         let compression = output.packing();
         let frame = match compression {
-            Compression::None => plan.frame.clone().refined([bounds.min, bounds.max]),
+            Compression::None => plan.frame.clone().refined(bounds),
             _ => plan.frame.clone().packed(),
         };
         TileStyle { frame, coloring, normals: output.normals, compression, max_edge }

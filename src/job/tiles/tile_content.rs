@@ -4,7 +4,7 @@ use crate::job::index::TileIndex;
 use crate::job::records::{BorderVertex, FinishedBorder, Leaf, SeamTriangle, Store};
 use crate::job::tiles::style::TileStyle;
 use crate::output::Tile;
-use crate::output::normals::Sums;
+use crate::output::normals::NormalSums;
 use crate::{Error, Result};
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -23,7 +23,7 @@ impl TileContent {
     /// Returns the content that the tile's leaf contributes.
     pub(crate) fn of_leaf(mut leaf: Leaf, border: &FinishedBorder, style: &TileStyle) -> TileContent {
         let cut = style.max_edge.take(&leaf.positions, &mut leaf.triangles);
-        let mut normals = Sums::new(&leaf.positions, &leaf.triangles).finish(&style.frame);
+        let mut normals = NormalSums::new(&leaf.positions, &leaf.triangles).unit_normals(&style.frame);
         for vertex in &border.0 {
             normals[vertex.site as usize] = vertex.normal;
         }

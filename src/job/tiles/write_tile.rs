@@ -2,7 +2,6 @@
 //! the preview.
 
 use crate::Result;
-use crate::geometry::Bounds;
 use crate::job::durable::atomic_file::{PendingFile, write_pending_pieces};
 use crate::job::durable::columns::ColumnWriter;
 use crate::job::durable::directory::{JobDirectory, create_folder};
@@ -13,7 +12,7 @@ use crate::job::tiles::seam::seam_of;
 use crate::job::tiles::style::TileStyle;
 use crate::job::tiles::tile_content::TileContent;
 use crate::output::Tile;
-use crate::output::gltf::glb::Glb;
+use crate::output::gltf::glb::GlbEncoder;
 use crate::output::preview::canvas::Canvas;
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
@@ -73,8 +72,7 @@ pub fn write_tile(
         ..TileStats::default()
     };
     let pixels = ColumnWriter::default().push(&canvas.draw(&kept)).write(store, StepRecord::Pixels(tile))?;
-    let summary = TileSummary::new(kept.bounds().map(|[min, max]| Bounds { min, max }), !kept.triangles.is_empty())
-        .save(store, tile)?;
+    let summary = TileSummary::new(kept.bounds(), !kept.triangles.is_empty()).save(store, tile)?;
     let mut files = Vec::new();
     if !kept.triangles.is_empty() {
         files.push(write_glb(&directory.output().tile(tile.get()), &kept, style)?);
@@ -90,7 +88,7 @@ pub fn write_tile(
 
 thread_local! {
     /// The bytes of the current file. A thread keeps the buffer from tile to tile, so that its pages are faulted in once.
-    static GLB: RefCell<Glb> = RefCell::default();
+    static GLB: RefCell<GlbEncoder> = RefCell::default();
 }
 
 /// Writes a tile as a pending GLB file.

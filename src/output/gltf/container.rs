@@ -1,4 +1,4 @@
-//! The frame of a GLB file: its header and two chunks, of JSON and of binary data.
+//! The outer form of a GLB file: a header and two chunks, one of JSON and one of binary data.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -23,9 +23,9 @@ pub(crate) struct GlbFile {
 }
 
 impl GlbFile {
-    /// Reads all but the binary chunk and checks the lengths against the file's size.
+    /// Reads everything except the binary chunk, and checks the lengths against the file's size.
     pub(crate) fn open(path: &Path) -> Result<GlbFile> {
-        // Before it is opened: a pipe would wait for somebody who writes.
+        // This comes before opening, which would wait for a writer if the file is a pipe.
         if !path.metadata().map_err(Error::io("open", path))?.is_file() {
             return Err(Error::input(path, "is not a regular file"));
         }
@@ -40,7 +40,7 @@ impl GlbFile {
             return Err(damaged("it does not start as glTF 2.0"));
         }
         if total as u64 != size {
-            return Err(damaged(&format!("its header says {total} bytes, it has {size}")));
+            return Err(damaged(&format!("its header says {total} bytes, but it has {size}")));
         }
         let json_end = 20 + json_length as u64;
         if json_end > size {
@@ -59,13 +59,13 @@ impl GlbFile {
         Ok(container)
     }
 
-    /// The JSON chunk as a `T`.
+    /// Parses the JSON chunk.
     pub(crate) fn document<'a, T: Deserialize<'a>>(&'a self, path: &Path) -> Result<T> {
         serde_json::from_slice(&self.json)
             .map_err(|e| Error::input(path, format!("its JSON chunk is not one of this program: {e}")))
     }
 
-    /// The binary chunk.
+    /// Reads the binary chunk.
     pub(crate) fn binary(&mut self, path: &Path) -> Result<Vec<u8>> {
         let mut bytes = Vec::new();
         bytes
@@ -86,7 +86,7 @@ fn read_words<const N: usize>(file: &mut File) -> std::io::Result<[u32; N]> {
     Ok(words.map(u32::from_le_bytes))
 }
 
-/// Writes the header, the JSON chunk and the head of the binary chunk, whose `length` bytes are to follow.
+/// Writes the header, the JSON chunk and the head of the binary chunk. The `length` bytes of that chunk must follow.
 pub(crate) fn write_head(mut json: Vec<u8>, length: u64, out: &mut Vec<u8>) -> Result<()> {
     json.resize(json.len().next_multiple_of(4), b' ');
     let binary = if length == 0 { 0 } else { 8 + length };

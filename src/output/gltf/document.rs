@@ -13,16 +13,17 @@ use gltf::json::{Asset, Index, Root};
 use multiversion::multiversion;
 use serde_json::json;
 
-use crate::output::color::Linear;
+use crate::geometry::Bounds;
+use crate::output::color::LinearRgb;
+use crate::output::compression::Compression;
 use crate::output::frame::Frame;
 use crate::output::gltf::encoding::{
-    Compression, EXPONENTIAL_REACH, color_bytes, exponential, needs_long_normals, normal_bytes, normal_octahedral,
-    normal_shorts,
+    EXPONENTIAL_REACH, color_bytes, exponential, needs_long_normals, normal_bytes, normal_octahedral, normal_shorts,
 };
 use crate::output::gltf::meshopt::{PackedFilter, PackedMode, PackedView, fallback_buffer};
-use crate::output::gltf::parts::Part;
+use crate::output::gltf::parts::SplitPart;
 use crate::output::gltf::schema::{GENERATOR, MESHOPT, QUANTIZATION, to_text};
-use crate::output::gltf::vertex_order::rings;
+use crate::output::gltf::vertex_order::order_vertices;
 use crate::{Error, Result};
 
 /// The buffer of the binary chunk.
@@ -50,12 +51,12 @@ impl<'a> DocumentBuilder<'a> {
     }
 
     /// Appends a node, its mesh and their data.
-    pub(crate) fn add_part(&mut self, part: &Part) -> Result<()> {
+    pub(crate) fn add_part(&mut self, part: &SplitPart) -> Result<()> {
         let tile = &*part.tile;
         let (triangles, order) = match self.compression {
             Compression::None => (Cow::Borrowed(&tile.triangles), None),
             _ => {
-                let (triangles, order) = rings(tile.positions.len(), &tile.triangles);
+                let (triangles, order) = order_vertices(tile.positions.len(), &tile.triangles);
                 (Cow::Owned(triangles), Some(order))
             }
         };
@@ -79,18 +80,18 @@ impl<'a> DocumentBuilder<'a> {
         };
         let primitives = vec![primitive];
         let mesh = self.root.push(Mesh { primitives, extensions: None, extras: None, name: None, weights: None });
-        // Both are exact: see `TRANSLATION_STEPS` of the frame, and steps are powers of two.
+        // Both are exact in single precision: translations by the frame's choice, steps because they are powers of two.
         let translation = Some(self.frame.metres(part.origin).map(|v| v as f32));
         let scale = (self.compression != Compression::None).then(|| self.frame.step().map(|v| v as f32));
         self.root.push(Node { mesh: Some(mesh), translation, scale, ..Node::default() });
         Ok(())
     }
 
-    fn add_positions(&mut self, part: &Part, order: Option<&[u32]>) -> Result<Index<Accessor>> {
+    fn add_positions(&mut self, part: &SplitPart, order: Option<&[u32]>) -> Result<Index<Accessor>> {
         let positions = &part.tile.positions;
-        // The way from the lattice is monotonic, and y turns round.
-        let [low, high] = part.tile.bounds().unwrap_or_default();
-        let [low, high] = [[low[0], high[1], low[2]], [high[0], low[1], high[2]]];
+        let Bounds { min, max } = part.tile.bounds().unwrap_or(Bounds::of_point([0; 3]));
+        // The map from the lattice is monotonic, and it turns y round.
+        let [low, high] = [[min[0], max[1], min[2]], [max[0], min[1], max[2]]];
         let (frame, origin) = (self.frame, part.origin);
         if self.compression == Compression::None {
             let local = |p| frame.local(p, origin);
@@ -138,9 +139,9 @@ impl<'a> DocumentBuilder<'a> {
         self.add_attribute(normals, order, convert, element.filtered(PackedFilter::Octahedral))
     }
 
-    fn add_colors(&mut self, colors: &[Linear], order: Option<&[u32]>) -> Result<Index<Accessor>> {
+    fn add_colors(&mut self, colors: &[LinearRgb], order: Option<&[u32]>) -> Result<Index<Accessor>> {
         if self.compression == Compression::None {
-            let convert = |[r, g, b]: Linear| [r, g, b, u16::MAX];
+            let convert = |[r, g, b]: LinearRgb| [r, g, b, u16::MAX];
             return self.add_attribute(colors, order, convert, ElementType::normalized(ComponentType::U16, Type::Vec4));
         }
         self.add_attribute(colors, order, color_bytes, ElementType::normalized(ComponentType::U8, Type::Vec4))
@@ -324,7 +325,7 @@ fn view(buffer: u32, start: u64, length: u64) -> View {
     }
 }
 
-/// Appends what `convert` makes of `values`, by pieces that never leave the cache.
+/// Appends what `convert` makes of `values`, in pieces that stay in the cache.
 #[multiversion(targets("x86_64+avx2"))]
 fn append_converted<T: Copy, B: Pod>(bytes: &mut Vec<u8>, values: &[T], convert: impl Fn(T) -> B) {
     let mut piece = [B::zeroed(); 256];

@@ -1,39 +1,28 @@
-//! How vertices and triangles become bytes: the choices, and the rounding of normals and colours.
+//! Rounds normals, colours and whole numbers to the bytes of packed tiles, and reads them back.
 
-/// How a tile is packed. Positions are exact in all of them: rounding finds the lattice integers again.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Compression {
-    /// Quantized, then packed by the codecs of `EXT_meshopt_compression`.
-    Meshopt,
-    /// Positions in 16 bits where a tile allows it, else in single precision, normals and colours in 8 (`KHR_mesh_quantization`).
-    Quantized,
-    /// Plain glTF: positions and normals in single precision, colours in 16 bits.
-    None,
-}
-
-/// The normal x, y up, z of a mesh in signed bytes, 127 for 1, whose node stretches it by 1, `anisotropy`, 1: readers divide
-/// normals by that. The fourth byte is padding.
+/// Returns a normal (x, y up, z) in signed bytes, 127 for 1, for a mesh that its node stretches by 1, `anisotropy`, 1: readers
+/// divide normals by that. The fourth byte is padding.
 #[inline(always)]
 pub(crate) fn normal_bytes(normal: [f32; 3], anisotropy: f32) -> [i8; 4] {
     let [x, y, z] = stretched(normal, anisotropy, 127.0).map(|v| v as i8);
     [x, y, z, 0]
 }
 
-/// Steps of a mesh that differ by more than this make 8 bits too few for a normal.
+/// If the vertical and the horizontal step differ by more than this factor, 8 bits are too few for a normal.
 const MOST_ANISOTROPY: f32 = 4.0;
 
-/// Whether the normals of a mesh that is stretched so are better in 16 bits.
+/// Tells whether the normals of a mesh that its node stretches by `anisotropy` need 16 bits.
 pub(crate) fn needs_long_normals(anisotropy: f32) -> bool {
     !(1.0 / MOST_ANISOTROPY..=MOST_ANISOTROPY).contains(&anisotropy)
 }
 
-/// As [`normal_bytes`], in signed 16 bits, 32767 for 1.
+/// Does what [`normal_bytes`] does, in signed 16 bits, 32767 for 1.
 pub(crate) fn normal_shorts(normal: [f32; 3], anisotropy: f32) -> [i16; 4] {
     let [x, y, z] = stretched(normal, anisotropy, 32767.0).map(|v| v as i16);
     [x, y, z, 0]
 }
 
-/// The normal with its y stretched, so long and in whole numbers.
+/// Returns the normal with its y stretched, as whole numbers of about this `length`.
 #[inline(always)]
 fn stretched([x, y, z]: [f32; 3], anisotropy: f32, length: f32) -> [f32; 3] {
     let y = y * anisotropy;
@@ -41,8 +30,8 @@ fn stretched([x, y, z]: [f32; 3], anisotropy: f32, length: f32) -> [f32; 3] {
     [x, y, z].map(|v| (v * scale).round())
 }
 
-/// The same normal as two signed bytes on the octahedron, 127 for 1, as the octahedral filter of `EXT_meshopt_compression`
-/// has it: smaller when packed.
+/// Returns the normal as two signed bytes on the octahedron, 127 for 1, in the form of the octahedral filter of
+/// `EXT_meshopt_compression`, which packs better than three bytes.
 #[inline(always)]
 pub(crate) fn normal_octahedral([x, y, z]: [f32; 3], anisotropy: f32) -> [i8; 4] {
     let y = y * anisotropy;
@@ -54,8 +43,8 @@ pub(crate) fn normal_octahedral([x, y, z]: [f32; 3], anisotropy: f32) -> [i8; 4]
     [byte(u), byte(v), 127, 0]
 }
 
-/// The normal in signed bytes of [`normal_octahedral`]: what the filter gives. In single precision and this order of
-/// operations everywhere, so that what is unpacked does not depend on the machine.
+/// Returns the normal in signed bytes from the form of [`normal_octahedral`], as the filter does. Single precision and this order of
+/// operations make the result the same on every machine.
 #[inline(always)]
 pub(crate) fn from_octahedral([u, v, one, padding]: [i8; 4]) -> [i8; 4] {
     let one = f32::from(one.max(1));
@@ -68,16 +57,16 @@ pub(crate) fn from_octahedral([u, v, one, padding]: [i8; 4]) -> [i8; 4] {
     [byte(x), byte(y), byte(z), padding]
 }
 
-/// Whole numbers of less magnitude than this have an encoding by [`exponential`].
+/// Whole numbers below this, and above its negative, have a form by [`exponential`].
 pub(crate) const EXPONENTIAL_REACH: f64 = (1 << 23) as f64;
 
-/// Mantissa (24 bits, signed) and exponent (8 bits, here 0) of a whole number, as the exponential filter of
-/// `EXT_meshopt_compression` has them: neighbours differ in low bits only, unlike those of f32.
+/// Returns a whole number in the form of the exponential filter of `EXT_meshopt_compression`: a mantissa of 24 bits, signed, and an
+/// exponent of 8 bits, here 0. Neighbouring numbers differ in low bits only, unlike those of f32, so they pack better.
 pub(crate) fn exponential(steps: f64) -> u32 {
     steps as i32 as u32 & 0x00ff_ffff
 }
 
-/// The number that [`exponential`] stands for, whatever its exponent.
+/// Returns the number in the form of [`exponential`], with any exponent.
 pub(crate) fn from_exponential(bits: u32) -> f32 {
     let mantissa = (bits as i32) << 8 >> 8;
     let exponent = bits as i32 >> 24;
@@ -86,7 +75,7 @@ pub(crate) fn from_exponential(bits: u32) -> f32 {
     (f64::from(mantissa) * power) as f32
 }
 
-/// A linear colour in bytes, opaque.
+/// Returns a linear colour in bytes, opaque.
 pub(crate) fn color_bytes([r, g, b]: [u16; 3]) -> [u8; 4] {
     let byte = |v: u16| ((v as u32 * 255 + 32767) / 65535) as u8;
     [byte(r), byte(g), byte(b), u8::MAX]
@@ -96,7 +85,7 @@ pub(crate) fn color_bytes([r, g, b]: [u16; 3]) -> [u8; 4] {
 mod tests {
     use super::*;
 
-    /// Unit normals that point up, on a spiral.
+    /// Returns unit normals that point up, on a spiral.
     fn normals() -> impl Iterator<Item = [f32; 3]> {
         (0..5_000).map(|i| {
             let (up, turn) = ((i as f32 + 0.5) / 5_000.0, i as f32 * 2.4);
@@ -105,7 +94,7 @@ mod tests {
         })
     }
 
-    /// Degrees between a normal and what a viewer makes of its bytes.
+    /// Returns the degrees between a normal and the normal that a viewer reads from its bytes.
     fn error([x, y, z]: [f32; 3], packed: [impl Into<f32>; 4], anisotropy: f32) -> f32 {
         let [a, b, c, _] = packed.map(Into::into);
         let b = b / anisotropy;
@@ -114,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn normals_in_bytes_are_true_to_a_degree() {
+    fn packed_normals_are_within_a_few_degrees() {
         let worst = |of: &dyn Fn([f32; 3]) -> f32| normals().map(of).fold(0.0, f32::max);
         assert!(worst(&|n| error(n, normal_bytes(n, 1.0), 1.0)) < 0.5);
         assert!(worst(&|n| error(n, from_octahedral(normal_octahedral(n, 1.0)), 1.0)) < 1.25);
@@ -130,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn whole_numbers_pass_the_exponential_filter() {
+    fn the_exponential_filter_returns_whole_numbers() {
         let numbers = [0.0, 1.0, -1.0, 65536.0, -77_777.0, EXPONENTIAL_REACH - 1.0, 1.0 - EXPONENTIAL_REACH];
         for number in numbers {
             let packed = exponential(number);
@@ -146,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn the_filter_is_that_of_meshoptimizer() {
+    fn the_octahedral_filter_agrees_with_meshoptimizer() {
         for normal in normals() {
             let packed = normal_octahedral(normal, 1.0);
             let mut theirs = [packed];

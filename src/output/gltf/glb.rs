@@ -1,25 +1,26 @@
-//! One tile as a binary glTF 2.0 file.
+//! Encodes one tile as a binary glTF 2.0 file.
 
 use crate::Result;
-use crate::output::Tile;
+use crate::output::compression::Compression;
 use crate::output::frame::Frame;
 use crate::output::gltf::container::write_head;
 use crate::output::gltf::document::DocumentBuilder;
-use crate::output::gltf::encoding::Compression;
 use crate::output::gltf::parts::{split, split_short};
+use crate::output::tile::Tile;
 
-/// The bytes of a GLB file. Its memory can be used again for the next tile.
+/// Makes the bytes of GLB files, one after the other in the same memory.
 #[derive(Debug, Default)]
-pub struct Glb {
+pub struct GlbEncoder {
     head: Vec<u8>,
     binary: Vec<u8>,
 }
 
-impl Glb {
-    /// Makes it that of `tile`. The same tile gives the same bytes. Unless `compression` is none, `frame` should be [`Frame::packed`].
+impl GlbEncoder {
+    /// Makes the bytes of the file of `tile`. The same tile gives the same bytes. Unless `compression` is none, `frame` should be
+    /// [`Frame::packed`].
     ///
     /// # Errors
-    /// [`crate::Error::Config`] where a triangle is too long to be exact in f32 ([`Frame::longest_triangle`]) or the file would pass 4 GiB.
+    /// [`crate::Error::Config`] if a triangle is too long to be exact in f32 ([`Frame::longest_triangle`]) or the file would pass 4 GiB.
     pub fn encode(&mut self, frame: &Frame, tile: &Tile, compression: Compression) -> Result<()> {
         let parts = match compression {
             Compression::None => split(frame, tile)?,
@@ -36,7 +37,7 @@ impl Glb {
         Ok(())
     }
 
-    /// The file's bytes, one piece after the other: joining them would be one copy more.
+    /// Returns the file's bytes in two pieces, one after the other: joining them would be one more copy.
     pub fn pieces(&self) -> [&[u8]; 2] {
         [&self.head, &self.binary]
     }

@@ -1,4 +1,4 @@
-//! What `EXT_meshopt_compression` says of a buffer view, and how to unpack it.
+//! Buffer views that `EXT_meshopt_compression` packs: their description, and how to unpack them.
 
 use bytemuck::allocation::pod_collect_to_vec;
 use bytemuck::cast_slice_mut;
@@ -10,14 +10,14 @@ use crate::output::gltf::encoding::{from_exponential, from_octahedral};
 use crate::output::gltf::schema::MESHOPT;
 use crate::output::gltf::strict::Decoded;
 
-/// Bytes of a tile in memory for every byte of its file, at most: the codec of vertices makes up to 64 of one, and 2-byte
-/// positions become 4-byte ones.
+/// Bytes of a tile in memory for every byte of its file, at most: the vertex codec unpacks one byte to up to 64, and 2-byte positions
+/// become 4-byte ones.
 pub(crate) const MOST_EXPANSION: u64 = 128;
 
-/// A vertex codec spends at least two bits on sixteen bytes.
+/// Bytes that one packed byte stands for, at most: the vertex codec spends at least two bits on sixteen bytes.
 const MOST_VERTEX_RATIO: u64 = 64;
 
-/// The extension's object of a buffer view.
+/// The extension's object in a buffer view.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "camelCase")]
 pub(crate) struct PackedView {
@@ -40,7 +40,7 @@ pub(crate) enum PackedMode {
     Triangles,
 }
 
-/// What is still to be done after unpacking: those of the extension's filters that this program uses.
+/// What follows unpacking: the filters of the extension that this program uses.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "UPPERCASE")]
 pub(crate) enum PackedFilter {
@@ -63,12 +63,12 @@ impl PackedView {
         extensions::buffer::View { others: only_meshopt(json!(self)) }
     }
 
-    /// Bytes of the view when unpacked.
+    /// Returns the number of bytes of the view when unpacked, or `None` if that number is too large.
     pub(crate) fn unpacked_length(&self) -> Option<u64> {
         self.count.checked_mul(self.byte_stride)
     }
 
-    /// The view's bytes from `packed`; a sentence where that is not what it says.
+    /// Unpacks the view's bytes. The result is a sentence if `packed` is not what the view says.
     pub(crate) fn unpack(&self, packed: &[u8]) -> Decoded<Vec<u8>> {
         let length = self.unpacked_length().unwrap_or(u64::MAX);
         let plausible = match self.mode {
@@ -122,7 +122,7 @@ fn vertices<const SIZE: usize>(packed: &[u8], count: usize) -> Option<Vec<u8>>
 where
     [u8; SIZE]: Default,
 {
-    // The extension knows version 0 only, and the others have no bound on the ratio.
+    // The extension has version 0 only, and other versions have no bound on the ratio.
     if meshopt::decode_vertex_version(packed) != Some(0) {
         return None;
     }

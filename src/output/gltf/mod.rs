@@ -1,4 +1,4 @@
-//! glTF: writing tiles as GLB files, packed or plain, and reading them back.
+//! glTF: writes tiles as GLB files, packed or plain, and reads them back.
 
 pub(crate) mod container;
 pub(crate) mod document;

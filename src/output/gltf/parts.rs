@@ -1,38 +1,42 @@
-//! Tiles wider than f32 can hold on the job's step are cut into parts, each with its own translation.
+//! Cuts tiles that are wider than f32 can hold in the job's steps into parts, each with its own translation.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use crate::geometry::lattice::shortest_decimal;
-use crate::output::Tile;
 use crate::output::frame::{FINE_GRID, Frame, PART_REACH, origin_between, short_origin};
+use crate::output::tile::Tile;
 use crate::{Error, Result};
 use rust_decimal::Decimal;
 
-/// Triangles up to half the reach are grouped by origins this far apart, in steps: half a cell and half a triangle fit.
+/// The distance in steps between the origins of parts. Half of it and half a triangle stay within reach, unless the triangle is very
+/// long.
 const COARSE_GRID: i64 = 1 << 24;
 
-/// What one node and mesh of a tile hold.
-pub(crate) struct Part<'a> {
+/// The part of a tile that becomes one node and its mesh.
+pub(crate) struct SplitPart<'a> {
     /// The node's translation in glTF steps.
     pub(crate) origin: [f64; 3],
-    /// Whether 16 bits reach every vertex from there.
+    /// Whether 16 bits reach every vertex from the origin.
     pub(crate) short: bool,
-    /// Vertices and triangles within reach of it.
+    /// The vertices and triangles, all within reach of the origin.
     pub(crate) tile: Cow<'a, Tile>,
 }
 
-/// The parts of `tile`, each within reach of f32: one where it is small enough. Fails where a single triangle is too long.
-pub(crate) fn split<'a>(frame: &Frame, tile: &'a Tile) -> Result<Vec<Part<'a>>> {
+/// Returns the parts of `tile`, each within reach of f32. A tile that is small enough is one part.
+///
+/// # Errors
+/// [`Error::Config`] if a single triangle is too long.
+pub(crate) fn split<'a>(frame: &Frame, tile: &'a Tile) -> Result<Vec<SplitPart<'a>>> {
     let Some(bounds) = tile.bounds() else { return Ok(Vec::new()) };
-    if let Some(origin) = common_origin(frame, &bounds, FINE_GRID) {
-        return Ok(vec![Part { origin, short: false, tile: Cow::Borrowed(tile) }]);
+    if let Some(origin) = common_origin(frame, &[bounds.min, bounds.max], FINE_GRID) {
+        return Ok(vec![SplitPart { origin, short: false, tile: Cow::Borrowed(tile) }]);
     }
     split_triangles(frame, tile, &tile.triangles)
 }
 
-/// [`split`] for only these triangles of `tile`.
-fn split_triangles(frame: &Frame, tile: &Tile, triangles: &[[u32; 3]]) -> Result<Vec<Part<'static>>> {
+/// Returns the parts of these triangles of `tile`.
+fn split_triangles(frame: &Frame, tile: &Tile, triangles: &[[u32; 3]]) -> Result<Vec<SplitPart<'static>>> {
     let mut groups = BTreeMap::<[i64; 3], Vec<[u32; 3]>>::new();
     for &triangle in triangles {
         let corners = triangle.map(|v| tile.positions[v as usize]);
@@ -41,7 +45,7 @@ fn split_triangles(frame: &Frame, tile: &Tile, triangles: &[[u32; 3]]) -> Result
             .ok_or_else(|| too_long(frame, corners))?;
         groups.entry(origin.map(|v| v as i64)).or_default().push(triangle);
     }
-    let part = |(origin, triangles): ([i64; 3], _)| Part {
+    let part = |(origin, triangles): ([i64; 3], _)| SplitPart {
         origin: origin.map(|v| v as f64),
         short: false,
         tile: Cow::Owned(tile.subset(triangles)),
@@ -49,17 +53,20 @@ fn split_triangles(frame: &Frame, tile: &Tile, triangles: &[[u32; 3]]) -> Result
     Ok(groups.into_iter().map(part).collect())
 }
 
-/// [`split`], but one part with 16-bit positions where they reach all of `tile`.
-pub(crate) fn split_short<'a>(frame: &Frame, tile: &'a Tile) -> Result<Vec<Part<'a>>> {
+/// Returns one part with 16-bit positions if they reach all of `tile`, else what [`split`] does.
+///
+/// # Errors
+/// As [`split`].
+pub(crate) fn split_short<'a>(frame: &Frame, tile: &'a Tile) -> Result<Vec<SplitPart<'a>>> {
     let Some(bounds) = tile.bounds() else { return Ok(Vec::new()) };
-    let [low, high] = extent(frame, &bounds);
+    let [low, high] = extent(frame, &[bounds.min, bounds.max]);
     match short_origin(low, high) {
-        Some(origin) => Ok(vec![Part { origin, short: true, tile: Cow::Borrowed(tile) }]),
+        Some(origin) => Ok(vec![SplitPart { origin, short: true, tile: Cow::Borrowed(tile) }]),
         None => split(frame, tile),
     }
 }
 
-/// The origin on `grid` next to the middle of `points`, if all of them are within reach of it.
+/// Returns the origin on `grid` next to the middle of `points`, if all of them are within reach of it.
 fn common_origin(frame: &Frame, points: &[[i32; 3]], grid: i64) -> Option<[f64; 3]> {
     let [low, high] = extent(frame, points);
     let origin = origin_between(low, high, grid);
@@ -67,7 +74,7 @@ fn common_origin(frame: &Frame, points: &[[i32; 3]], grid: i64) -> Option<[f64; 
     (0..3).all(|k| high[k] - origin[k] <= reach && origin[k] - low[k] <= reach).then_some(origin)
 }
 
-/// The least and greatest glTF coordinates of `points` in steps.
+/// Returns the least and greatest glTF coordinates of `points` in steps.
 fn extent(frame: &Frame, points: &[[i32; 3]]) -> [[f64; 3]; 2] {
     let none = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
     points.iter().map(|&p| frame.steps(p)).fold(none, |[low, high], point| {
@@ -93,7 +100,7 @@ fn too_long(frame: &Frame, corners: [[i32; 3]; 3]) -> Error {
     ))
 }
 
-/// `resolution` times the least power of ten that makes room for a triangle `factor` times too long.
+/// Returns `resolution` times the least power of ten that makes room for a triangle `factor` times too long.
 fn coarser(resolution: f64, factor: f64) -> String {
     // Ten times the resolution gives at least eight times the step, a power of two.
     let room = std::iter::successors(Some(8.0), |room| Some(room * 8.0));

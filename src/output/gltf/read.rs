@@ -1,5 +1,5 @@
-//! Reads tiles back as any reader of glTF would, trusting nothing: a damaged or hostile file gives an error that says
-//! what is wrong with it, and never takes more memory than a few times its size.
+//! Reads tiles back as any reader of glTF would, and trusts nothing: a damaged or hostile file gives an error that says what is
+//! wrong with it, and takes no more memory than a few times its size.
 
 use std::borrow::Cow;
 use std::path::Path;
@@ -19,34 +19,34 @@ use crate::output::gltf::stored_view::StoredView;
 use crate::output::gltf::strict::{Decoded, RawDocument};
 use crate::{Error, Result};
 
-/// A GLB file of this program, as it is on disk.
+/// A GLB file of this program, as it is on the disk.
 #[derive(Clone, Debug)]
 pub struct TileFile {
     /// The scene's georeference.
     pub extras: Extras,
-    /// The meshes of the scene, one for every node.
-    pub parts: Vec<Part>,
+    /// The meshes of the scene, one for each node.
+    pub parts: Vec<TilePart>,
 }
 
 /// One node and its mesh.
 #[derive(Clone, Debug)]
-pub struct Part {
-    /// Metres.
+pub struct TilePart {
+    /// The translation in metres.
     pub translation: [f64; 3],
-    /// Metres in a unit of the positions.
+    /// The metres in a unit of the positions.
     pub scale: [f64; 3],
-    /// From the translation (x, y up, z) in units of the scale; finite.
+    /// The positions (x, y up, z) from the translation, in units of the scale. They are finite.
     pub positions: Vec<[f32; 3]>,
-    /// As many as positions; a viewer divides them by the scale and makes them unit vectors.
+    /// The normals, as many as positions. A viewer divides them by the scale and makes them unit vectors.
     pub normals: Option<Vec<[f32; 3]>>,
-    /// As many as positions; linear red, green, blue and alpha, 65535 for 1.
+    /// The colours, as many as positions: linear red, green, blue and alpha, 65535 for 1.
     pub colors: Option<Vec<[u16; 4]>>,
-    /// Indices of positions, within range.
+    /// The triangles as indices of positions, within range.
     pub triangles: Vec<[u32; 3]>,
 }
 
-impl Part {
-    /// The position of vertex `v` in the scene, metres; exact.
+impl TilePart {
+    /// Returns the position of vertex `v` in the scene in metres. It is exact.
     #[inline(always)]
     pub fn world(&self, v: usize) -> [f64; 3] {
         let (position, translation) = (self.positions[v], self.translation);
@@ -63,7 +63,7 @@ pub fn read_tile(path: &Path) -> Result<TileFile> {
     decoder.tile().map_err(|what| Error::input(path, format!("not a tile of this program: {what}")))
 }
 
-/// Returns the number of bytes that the parts of the GLB file at `path` take in memory at most, as far as its description says.
+/// Returns the number of bytes that the parts of the GLB file at `path` take in memory, at most, according to its description.
 pub fn held_bytes(path: &Path) -> Result<u64> {
     let file = GlbFile::open(path)?;
     let size = |elements: &Elements| elements.count.saturating_mul(if elements.shape == Type::Scalar { 4 } else { 12 });
@@ -194,7 +194,7 @@ impl StrideView {
 struct Decoder<'a> {
     document: &'a TileDocument,
     binary: &'a [u8],
-    /// Bytes decoded so far: data that are used again and again would otherwise grow without bound.
+    /// Bytes decoded so far. A limit keeps data that are used again and again from growing without bound.
     used: usize,
 }
 
@@ -205,7 +205,7 @@ impl Decoder<'_> {
         Ok(TileFile { extras: scene.extras.clone(), parts })
     }
 
-    fn part(&mut self, node: usize) -> Decoded<Part> {
+    fn part(&mut self, node: usize) -> Decoded<TilePart> {
         let node = item(&self.document.nodes, node, "node")?;
         let mesh = item(&self.document.meshes, node.mesh, "mesh")?;
         let [surface] = mesh[..] else {
@@ -224,7 +224,7 @@ impl Decoder<'_> {
         normals.as_ref().map_or(Ok(()), |n| same_count(n.len(), "normals"))?;
         colors.as_ref().map_or(Ok(()), |c| same_count(c.len(), "colours"))?;
         let triangles = self.triangles(surface.indices, positions.len())?;
-        Ok(Part { translation: node.translation, scale: node.scale, positions, normals, colors, triangles })
+        Ok(TilePart { translation: node.translation, scale: node.scale, positions, normals, colors, triangles })
     }
 
     fn positions(&mut self, accessor: usize) -> Decoded<Vec<[f32; 3]>> {

@@ -1,50 +1,51 @@
-//! How low and how high the ground is, roughly and surely, by cells: a bound on how far a simplified triangle can be from it.
+//! The least and greatest height of a terrain in each cell of a grid. They bound how far a simplified triangle can be from the terrain.
 
-use crate::output::lod::cells::Cells;
+use crate::output::lod::cell_grid::CellGrid;
 
-/// Vertices of the terrain to a cell.
+/// Vertices of the terrain in a cell, on average.
 const VERTICES_PER_CELL: usize = 8;
-/// A triangle in more cells than this counts for the whole plane, so that a fan of slivers takes no longer than other terrains.
+
+/// A triangle in more cells than this counts everywhere, so that a fan of slivers takes no longer than other terrains.
 const MOST_CELLS: usize = 64;
 
-/// A terrain, roughly.
-pub(crate) struct Relief<'a> {
+/// The heights of a terrain, cell by cell.
+pub(crate) struct HeightBounds<'a> {
     positions: &'a [[i32; 3]],
-    cells: Cells,
+    cells: CellGrid,
     /// The least and the greatest height in each cell.
     ranges: Vec<[i32; 2]>,
-    /// And that of triangles in very many cells.
+    /// The least and the greatest height of triangles that are in more than [`MOST_CELLS`].
     everywhere: [i32; 2],
 }
 
-/// The range of no height at all.
+/// The range that holds no height.
 const NONE: [i32; 2] = [i32::MAX, i32::MIN];
 
-fn wider(a: [i32; 2], b: [i32; 2]) -> [i32; 2] {
+fn union(a: [i32; 2], b: [i32; 2]) -> [i32; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
 }
 
-impl<'a> Relief<'a> {
-    /// Of a terrain whose triangles are `fine`, corners of `positions` (lattice x, y, z).
-    pub(crate) fn new(positions: &'a [[i32; 3]], fine: &[[u32; 3]]) -> Relief<'a> {
-        let cells = Cells::new(positions, positions.len() / VERTICES_PER_CELL + 1);
+impl<'a> HeightBounds<'a> {
+    /// Returns the heights of the terrain with the triangles `fine`, whose corners are `positions` (lattice x, y, z).
+    pub(crate) fn new(positions: &'a [[i32; 3]], fine: &[[u32; 3]]) -> HeightBounds<'a> {
+        let cells = CellGrid::new(positions, positions.len() / VERTICES_PER_CELL + 1);
         let ranges = vec![NONE; cells.count()];
-        let mut relief = Relief { positions, cells, ranges, everywhere: NONE };
-        fine.iter().for_each(|triangle| relief.add(triangle));
-        relief
+        let mut bounds = HeightBounds { positions, cells, ranges, everywhere: NONE };
+        fine.iter().for_each(|triangle| bounds.add(triangle));
+        bounds
     }
 
-    /// Every point of a triangle lies in a cell that knows its heights.
+    /// Adds the heights of a triangle to every cell that holds a point of it.
     fn add(&mut self, triangle: &[u32; 3]) {
         let (corners, range) = self.corners(triangle);
         let [columns, rows] = self.cells.around(&corners);
         if (columns[1] - columns[0] + 1) * (rows[1] - rows[0] + 1) > MOST_CELLS {
-            self.everywhere = wider(self.everywhere, range);
+            self.everywhere = union(self.everywhere, range);
             return;
         }
         for row in rows[0]..=rows[1] {
             for known in &mut self.ranges[self.cells.at(row, columns[0])..=self.cells.at(row, columns[1])] {
-                *known = wider(*known, range);
+                *known = union(*known, range);
             }
         }
     }
@@ -55,17 +56,17 @@ impl<'a> Relief<'a> {
         (corners, [a.min(b).min(c), a.max(b).max(c)])
     }
 
-    /// Steps of z that no point of the triangle is further off the ground.
-    pub(crate) fn bound(&self, triangle: &[u32; 3]) -> u64 {
+    /// Returns a number of z steps: no point of the triangle is further above or below the terrain.
+    pub(crate) fn error_bound(&self, triangle: &[u32; 3]) -> u64 {
         let (corners, [low, high]) = self.corners(triangle);
         let [columns, rows] = self.cells.around(&corners);
-        let mut ground = self.everywhere;
+        let mut terrain = self.everywhere;
         for row in rows[0]..=rows[1] {
             let ranges = &self.ranges[self.cells.at(row, columns[0])..=self.cells.at(row, columns[1])];
-            ground = ranges.iter().copied().fold(ground, wider);
+            terrain = ranges.iter().copied().fold(terrain, union);
         }
-        let above = high as i64 - ground[0] as i64;
-        let below = ground[1] as i64 - low as i64;
+        let above = high as i64 - terrain[0] as i64;
+        let below = terrain[1] as i64 - low as i64;
         above.max(below).max(0) as u64
     }
 }

@@ -1,8 +1,9 @@
-//! Levels of detail: joining tiles, simplifying what they make, and measuring how far off the result is.
+//! Levels of detail: joins tiles, simplifies them, and measures how far the result is from the exact mesh.
 
 mod boundary;
-mod cells;
+mod cell_grid;
 mod height_bounds;
 pub mod join;
 pub mod simplify;
+mod vertex_cells;
 pub mod vertical_error;

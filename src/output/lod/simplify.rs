@@ -1,23 +1,26 @@
-//! A terrain with fewer triangles, for looking at from afar: the Delaunay triangulation of some of its vertices, within its outline.
+//! A terrain with fewer triangles, to be seen from afar: the Delaunay triangulation of some of its vertices, within its boundary.
 //!
-//! All vertices of the outline stay, and so do its edges: they are edges of the triangulation of all sites of the job, and an edge of
-//! a Delaunay triangulation is one of that of any subset that has both its ends, because its empty circle stays empty. So two terrains
-//! that meet along a part of their outlines still meet there when both, or either of them, are simplified; the triangles cover the
-//! same ground once, as before; and it is the program's own pipeline that makes them.
+//! All vertices and edges of the boundary stay. The edges are edges of the triangulation of all sites of the job, and such an edge is
+//! also an edge of the Delaunay triangulation of any subset that has both its ends, because its empty circle stays empty. So two
+//! terrains that meet along a part of their boundaries still meet there when either or both of them are simplified, the triangles
+//! cover the same ground once, as before, and the program's own pipeline makes them.
 //!
-//! Which vertices stay inside: first one of every cell of a grid, that of the most ordinary height; then, where the triangulation of
-//! these is furthest off the terrain, the vertex that it is furthest off (Garland and Heckbert 1995, "Fast polygonal approximation
-//! of terrains and height fields", here with all of them inserted at once).
+//! Inside, the vertices that stay are chosen in two passes. First, one vertex of every cell of a grid stays: the one whose height is
+//! nearest to the mean of the cell. Then the triangulation of these is compared with the terrain: where a triangle is furthest from
+//! it, the vertex with the greatest distance stays too (Garland and Heckbert 1995, "Fast polygonal approximation of terrains and
+//! height fields", here with all vertices of a pass inserted at once).
 
 #[cfg(test)]
 mod tests;
 
-use crate::geometry::Site;
+use crate::geometry::square_grid::SquareGrid;
+use crate::geometry::{Bounds, Site};
 use crate::mesh::region::covered;
-use crate::output::Tile;
 use crate::output::frame::Frame;
-use crate::output::lod::boundary::on_outline;
-use crate::output::lod::vertical_error::{Sieve, deviation};
+use crate::output::lod::boundary::on_boundary;
+use crate::output::lod::vertex_cells::{VertexCells, plane};
+use crate::output::lod::vertical_error::vertical_error;
+use crate::output::tile::Tile;
 use crate::triangulation::{self, canonical};
 use crate::{Error, Result};
 use std::collections::HashSet;
@@ -27,63 +30,66 @@ use std::collections::HashSet;
 pub struct Simplified {
     /// Its vertices are some of the original's, in their order.
     pub tile: Tile,
-    /// The greatest vertical distance to the original, metres.
+    /// The greatest vertical distance to the original in metres.
     pub error: f64,
 }
 
-/// However many vertices the outline has, there are at least this many for each triangle that is wanted inside.
+/// Vertices that stay inside for each triangle that is wanted, at least, however many vertices the boundary has.
 const LEAST_INSIDE: f64 = 1.0 / 16.0;
-/// One vertex of so many is looked at for the one that a triangle is furthest off.
+
+/// The second pass looks at one of this many vertices.
 const LOOKED_AT: usize = 8;
-/// The share of the vertices inside that a grid chooses.
+
+/// The share of the inner vertices that the first pass chooses.
 const BY_GRID: f64 = 0.6;
 
-/// `tile`, a part of a Delaunay triangulation, with about so many `triangles`; with more where its outline has too many.
+/// Simplifies `tile`, a part of a Delaunay triangulation, to about `triangles` triangles. The result has more if the boundary has too
+/// many edges.
 ///
 /// # Errors
-/// [`Error::Broken`] if its outline is not that of a part of a Delaunay triangulation.
+/// [`Error::Broken`] if the boundary is not that of a part of a Delaunay triangulation.
 pub fn simplify(frame: &Frame, tile: &Tile, triangles: usize) -> Result<Simplified> {
-    let outline = Outline::of(tile);
-    let inside = tile.positions.len() - outline.vertices;
+    let boundary = Boundary::of(tile);
+    let inside = tile.positions.len() - boundary.vertices;
     let least = (triangles as f64 * LEAST_INSIDE) as usize;
-    let wanted = (triangles / 2).saturating_sub(outline.vertices / 2).max(least).min(inside);
-    let (mut kept, mut coarse) = (outline.on.clone(), tile.triangles.clone());
+    let wanted = (triangles / 2).saturating_sub(boundary.vertices / 2).max(least).min(inside);
+    let (mut kept, mut coarse) = (boundary.on.clone(), tile.triangles.clone());
     if wanted < inside {
         let by_grid = (wanted as f64 * BY_GRID) as usize;
         keep_by_grid(tile, by_grid, &mut kept);
-        coarse = outline.fill(tile, &kept)?;
-        let rest = (outline.vertices + wanted).saturating_sub(kept.iter().filter(|&&kept| kept).count());
+        coarse = boundary.fill(tile, &kept)?;
+        let rest = (boundary.vertices + wanted).saturating_sub(kept.iter().filter(|&&kept| kept).count());
         if keep_furthest(tile, &coarse, rest, &mut kept) > 0 {
-            coarse = outline.fill(tile, &kept)?;
+            coarse = boundary.fill(tile, &kept)?;
         }
     }
-    let error = deviation(&tile.positions, &tile.triangles, &coarse) * frame.resolution_metres()[1];
+    let error = vertical_error(&tile.positions, &tile.triangles, &coarse) * frame.resolution_metres()[1];
     Ok(Simplified { tile: tile.subset(coarse), error })
 }
 
-/// The edges round a terrain.
-struct Outline {
-    /// The directed edges that have the terrain on their left and nothing on their right.
+/// The edges around a terrain.
+struct Boundary {
+    /// The directed edges with the terrain on their left and nothing on their right.
     edges: Vec<[u32; 2]>,
-    /// Whether a vertex is on one of them.
+    /// Tells whether a vertex is on one of them.
     on: Vec<bool>,
-    /// How many are.
+    /// The number of vertices on them.
     vertices: usize,
 }
 
-impl Outline {
-    fn of(tile: &Tile) -> Outline {
-        let on = on_outline(tile.positions.len(), &tile.triangles);
+impl Boundary {
+    fn of(tile: &Tile) -> Boundary {
+        let on = on_boundary(tile.positions.len(), &tile.triangles);
         let between = |&[a, b]: &[u32; 2]| on[a as usize] && on[b as usize];
         let sides = tile.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).filter(between);
         let sides: Vec<[u32; 2]> = sides.collect();
         let known: HashSet<[u32; 2]> = sides.iter().copied().collect();
         let edges = sides.into_iter().filter(|&[a, b]| !known.contains(&[b, a])).collect();
         let vertices = on.iter().filter(|&&on| on).count();
-        Outline { edges, on, vertices }
+        Boundary { edges, on, vertices }
     }
 
-    /// The triangulation of the vertices `kept`, within the outline.
+    /// Returns the triangulation of the vertices that are `kept`, within the boundary.
     fn fill(&self, tile: &Tile, kept: &[bool]) -> Result<Vec<[u32; 3]>> {
         let vertices: Vec<u32> = (0..).zip(kept).filter(|(_, kept)| **kept).map(|(v, _)| v).collect();
         let mut number = vec![u32::MAX; kept.len()];
@@ -102,40 +108,33 @@ impl Outline {
     }
 }
 
-fn plane(point: [i32; 3]) -> Site {
-    [point[0], point[1]]
-}
-
-/// Keeps of each cell of a grid with about `cells` cells the vertex whose height is nearest to the mean of the cell's.
+/// Keeps one vertex in each cell of a grid with about `cells` cells: the one whose height is nearest to the mean height of the cell.
 fn keep_by_grid(tile: &Tile, cells: usize, kept: &mut [bool]) {
-    let Some([low, high]) = tile.bounds().filter(|_| cells > 0) else { return };
-    let size = [0, 1].map(|k| high[k] as f64 - low[k] as f64 + 1.0);
-    let side = (size[0] * size[1] / cells as f64).sqrt();
-    let [columns, rows] = size.map(|size| (size / side).ceil().clamp(1.0, cells as f64) as usize);
-    let cell = |p: &[i32; 3]| {
-        let [column, row] = [0, 1].map(|k| ((p[k] as f64 - low[k] as f64) / side) as usize);
-        row.min(rows - 1) * columns + column.min(columns - 1)
+    let Some(bounds) = Bounds::of_points(tile.positions.iter().map(|&p| plane(p))).filter(|_| cells > 0) else {
+        return;
     };
-    let mut sums = vec![(0i64, 0i64); columns * rows];
+    let area = [0, 1].map(|axis| (bounds.extent(axis) + 1) as f64).iter().product::<f64>();
+    let grid = SquareGrid::new(bounds, (area / cells as f64).sqrt(), cells as f64);
+    let mut sums = vec![(0i64, 0i64); grid.cells()];
     for p in &tile.positions {
-        let sum = &mut sums[cell(p)];
+        let sum = &mut sums[grid.cell(p[0], p[1])];
         *sum = (sum.0 + p[2] as i64, sum.1 + 1);
     }
-    let mut nearest = vec![(i64::MAX, u32::MAX); columns * rows];
+    let mut nearest = vec![(i64::MAX, u32::MAX); grid.cells()];
     for (v, p) in (0..).zip(&tile.positions) {
-        let at = cell(p);
+        let at = grid.cell(p[0], p[1]);
         let (sum, count) = sums[at];
         nearest[at] = nearest[at].min(((p[2] as i64 - sum / count).abs(), v));
     }
     nearest.iter().filter(|(_, v)| *v != u32::MAX).for_each(|&(_, v)| kept[v as usize] = true);
 }
 
-/// Keeps of the triangles of `coarse` that are furthest off the terrain the vertex that each is furthest off, `count` at the most; how
-/// many.
+/// Compares the triangles of `coarse` with the terrain and keeps the vertices with the greatest distances: one a triangle, `count` in
+/// all at most. Returns the number of vertices kept.
 fn keep_furthest(tile: &Tile, coarse: &[[u32; 3]], count: usize, kept: &mut [bool]) -> usize {
-    let mut furthest: Vec<(u64, u32)> = Sieve::new(&tile.positions, LOOKED_AT).furthest(coarse).collect();
+    let mut furthest: Vec<(u64, u32)> = VertexCells::new(&tile.positions, LOOKED_AT).furthest(coarse).collect();
     if furthest.len() > count {
-        // Distances are not negative, so their bits are in their order.
+        // Distances are not negative, so their bits are in the same order.
         furthest.sort_unstable_by(|a, b| b.cmp(a));
         furthest.truncate(count);
     }

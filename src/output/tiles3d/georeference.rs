@@ -1,32 +1,34 @@
-//! `georeference.json`: how to get from the scene back to the source's coordinates, for people and programs.
+//! `georeference.json`: the way from the scene back to the source's coordinates, for people and programs.
 
 use serde::Serialize;
 
+use crate::geometry::Bounds;
 use crate::geometry::lattice::Lattice;
 use crate::output::frame::{Extras, Frame};
+use crate::{Error, Result};
 
 /// The content of `georeference.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Georeference {
-    /// Offset, resolution, metres in a unit and WKT, as in the tiles.
+    /// The offset, resolution, metres in a unit and WKT, as in the tiles.
     #[serde(flatten)]
     pub extras: Extras,
-    /// Name of the source unit of x and y.
+    /// The name of the source unit of x and y.
     pub unit: String,
-    /// EPSG code of the coordinate reference system, where it is known.
+    /// The EPSG code of the coordinate reference system, if it is known.
     pub epsg: Option<u32>,
-    /// Least and greatest x, y, z of all sites in source units.
+    /// The least and greatest x, y, z of all sites in source units.
     pub bounds: [[f64; 3]; 2],
     /// The rule in words.
     pub rule: &'static str,
 }
 
 impl Georeference {
-    /// For a job whose sites have these least and greatest lattice integers x, y, z.
+    /// Returns the content for a job whose sites have these bounds.
     pub fn new(
         frame: &Frame,
         lattice: &Lattice,
-        bounds: [[i32; 3]; 2],
+        bounds: Bounds<3>,
         unit: impl Into<String>,
         epsg: Option<u32>,
     ) -> Georeference {
@@ -34,20 +36,23 @@ impl Georeference {
             extras: frame.extras().clone(),
             unit: unit.into(),
             epsg,
-            bounds: bounds.map(|corner| [0, 1, 2].map(|axis| lattice.world(axis, corner[axis]))),
+            bounds: [bounds.min, bounds.max].map(|corner| [0, 1, 2].map(|axis| lattice.world(axis, corner[axis]))),
             rule: "With (gx, gy, gz) a position in metres after the node transforms: x = offset[0] + gx / \
                    metres_per_unit, y = offset[1] - gz / metres_per_unit, z = offset[2] + gy / metres_per_unit_z.",
         }
     }
 
-    /// The text of the file; `globe` is where the terrain lies on the globe, if that is known.
-    pub fn to_json(&self, globe: Option<impl Serialize>) -> String {
+    /// Returns the text of the file. `globe` says where the terrain lies on the globe, if that is known.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] if `globe` cannot be written as JSON.
+    pub fn to_json(&self, globe: Option<impl Serialize>) -> Result<String> {
         let whole = serde_json::to_value(self).and_then(|mut whole| {
             whole["globe"] = serde_json::to_value(globe)?;
             serde_json::to_string_pretty(&whole)
         });
-        let mut text = whole.expect("numbers and strings always serialize");
+        let mut text = whole.map_err(|e| Error::Broken(format!("the georeference cannot be written: {e}")))?;
         text.push('\n');
-        text
+        Ok(text)
     }
 }

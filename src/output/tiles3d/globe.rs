@@ -1,33 +1,44 @@
-//! Where a terrain in a projected coordinate system lies on the WGS 84 ellipsoid.
+//! Places a terrain in a projected coordinate system on the WGS 84 ellipsoid.
+//!
+//! The sines of this file and of `proj4rs` come from the machine's mathematics library, so the last digits of a transform may differ
+//! between machines.
 
 use glam::{DAffine3, DMat4};
 use proj4rs::Proj;
 use proj4rs::transform::transform;
 
-/// Half axes of the WGS 84 ellipsoid: the greater in metres, and the square of its eccentricity.
+/// The greater half axis of the WGS 84 ellipsoid in metres.
 const SEMI_MAJOR: f64 = 6_378_137.0;
+
+/// The square of the eccentricity of the WGS 84 ellipsoid.
 const ECCENTRICITY_2: f64 = 0.006_694_379_990_141_317;
 
-/// The way from a projected system to the ellipsoid.
+/// The map from a projected system to the ellipsoid.
 pub struct Globe {
     from: Proj,
     to: Proj,
-    /// Metres of one unit of x and y.
-    metres: f64,
+    /// Metres in a unit of x and y.
+    metres_per_unit: f64,
 }
 
 impl Globe {
-    /// For the system that `definition` describes in the way of PROJ.4; a sentence where that cannot be done.
+    /// Returns the map from the system that `definition` describes in the form of PROJ.4.
+    ///
+    /// # Errors
+    /// A sentence that says why there is no such map.
     pub fn new(definition: &str, metres_per_unit: f64) -> Result<Globe, String> {
         let parse = |text: &str| Proj::from_proj_string(text).map_err(|e| format!("{text}: {e}"));
         let from = parse(definition)?;
         if from.is_latlong() || from.is_geocent() {
             return Err("it is not a projected system".into());
         }
-        Ok(Globe { from, to: parse("+proj=longlat +datum=WGS84 +no_defs")?, metres: metres_per_unit })
+        Ok(Globe { from, to: parse("+proj=longlat +datum=WGS84 +no_defs")?, metres_per_unit })
     }
 
-    /// Earth-centred x, y, z in metres of the place at `x`, `y` (source units) `height` metres above the ellipsoid.
+    /// Returns the earth-centred x, y, z in metres of the place at `x`, `y` (source units), `height` metres above the ellipsoid.
+    ///
+    /// # Errors
+    /// A sentence if the place is outside the range of the projection.
     pub fn place(&self, x: f64, y: f64, height: f64) -> Result<[f64; 3], String> {
         let [longitude, latitude] = self.geographic(x, y)?;
         let (sin, cos) = latitude.sin_cos();
@@ -36,21 +47,27 @@ impl Globe {
         Ok([around * longitude.cos(), around * longitude.sin(), (normal * (1.0 - ECCENTRICITY_2) + height) * sin])
     }
 
-    /// Longitude and latitude in radians.
+    /// Returns the longitude and latitude of a place (source units) in radians.
+    ///
+    /// # Errors
+    /// As [`Globe::place`].
     pub fn geographic(&self, x: f64, y: f64) -> Result<[f64; 2], String> {
         let mut point = (x, y, 0.0);
         transform(&self.from, &self.to, &mut point).map_err(|e| e.to_string())?;
         if point.0.is_finite() && point.1.is_finite() { Ok([point.0, point.1]) } else { Err("out of range".into()) }
     }
 
-    /// The linear map, column by column as in 3D Tiles, of metres east, north and up from (`x`, `y`, `height`) to earth-centred
-    /// ones that is exact to first order there.
+    /// Returns the linear map from metres east, north and up of (`x`, `y`, `height`) to earth-centred metres that is exact to first
+    /// order there, column by column as in 3D Tiles.
+    ///
+    /// # Errors
+    /// As [`Globe::place`].
     pub fn tangent(&self, x: f64, y: f64, height: f64) -> Result<[f64; 16], String> {
         let origin = self.place(x, y, height)?;
-        // Differences over so far lose neither to rounding nor to the curvature.
+        /// Metres. Differences over this distance lose little to rounding and little to the curvature.
         const STEP: f64 = 10.0;
         let along = |dx: f64, dy: f64| -> Result<[f64; 3], String> {
-            let (dx, dy) = (dx * STEP / self.metres, dy * STEP / self.metres);
+            let (dx, dy) = (dx * STEP / self.metres_per_unit, dy * STEP / self.metres_per_unit);
             let (ahead, behind) = (self.place(x + dx, y + dy, height)?, self.place(x - dx, y - dy, height)?);
             Ok([0, 1, 2].map(|k| (ahead[k] - behind[k]) / (2.0 * STEP)))
         };
@@ -66,16 +83,16 @@ impl Globe {
     }
 }
 
-/// Where `transform` puts a place of the tileset, metres.
-pub fn applied(transform: &[f64; 16], place: [f64; 3]) -> [f64; 3] {
+/// Returns the place in metres to which `transform` maps a place of the tileset.
+pub fn transform_point(transform: &[f64; 16], place: [f64; 3]) -> [f64; 3] {
     affine(transform).transform_point3(place.into()).into()
 }
 
-/// The transform that leads to where `inner` does when `outer` comes after it. `outer` must not be flat.
-pub fn relative(outer: &[f64; 16], inner: &[f64; 16]) -> [f64; 16] {
+/// Returns the transform that, followed by `outer`, leads to the same place as `inner`. `outer` must have an inverse.
+pub fn relative_transform(outer: &[f64; 16], inner: &[f64; 16]) -> [f64; 16] {
     let (outer, inner) = (affine(outer), affine(inner));
     let back = outer.matrix3.inverse();
-    // Earth-centred places differ by far less than they are long: the difference first.
+    // Earth-centred places are far longer than their difference, so it is taken first.
     let translation = back * (inner.translation - outer.translation);
     DMat4::from(DAffine3 { matrix3: back * inner.matrix3, translation }).to_cols_array()
 }

@@ -1,4 +1,4 @@
-//! 3D Tiles: the tileset, and the way from the plane to the globe.
+//! 3D Tiles: the tileset, and the map from the plane to the globe.
 
 pub mod georeference;
 pub mod globe;

@@ -1,13 +1,15 @@
-//! Simplified terrains cover what the original covers, and are as far off as they say.
+//! Tests that simplified terrains cover the ground of the original and are no further from it than they say.
 
 use proptest::prelude::*;
 
 use crate::geometry::lattice::{Lattice, shortest_decimal};
 use crate::geometry::predicates::orient2d;
-use crate::output::lod::simplify::*;
+use crate::output::frame::Frame;
+use crate::output::lod::simplify::simplify;
+use crate::output::tile::Tile;
 use crate::triangulation::reference::triangulate;
 
-/// All steps a metre.
+/// A frame whose steps are metres.
 fn frame() -> Frame {
     let decimal = |v: f64| shortest_decimal(v).unwrap();
     let lattice = Lattice { offset: [decimal(0.0); 3], resolution: decimal(1.0), resolution_z: decimal(1.0) };
@@ -21,7 +23,7 @@ fn terrain(mut points: Vec<[i32; 3]>) -> Tile {
     Tile { triangles: triangulate(&sites).unwrap().triangles, positions: points, ..Tile::default() }
 }
 
-/// Twice the area; asserts that all triangles are counterclockwise.
+/// Returns twice the area, and asserts that all triangles are counterclockwise.
 fn area(tile: &Tile) -> i64 {
     let areas = tile.triangles.iter().map(|t| {
         let [a, b, c] = t.map(|v| tile.positions[v as usize]).map(|p| [p[0], p[1]]);
@@ -30,30 +32,30 @@ fn area(tile: &Tile) -> i64 {
     areas.inspect(|&area| assert!(area > 0)).sum()
 }
 
-/// The height of `tile` over a place, or nothing outside.
+/// Returns the height of `tile` at a place, or `None` outside.
 fn height(tile: &Tile, place: [f64; 2]) -> Option<f64> {
     tile.triangles.iter().find_map(|t| {
         let corners = t.map(|v| tile.positions[v as usize].map(f64::from));
-        let beside =
+        let side =
             |a: [f64; 3], b: [f64; 3]| (a[0] - place[0]) * (b[1] - place[1]) - (b[0] - place[0]) * (a[1] - place[1]);
-        let weights = [beside(corners[1], corners[2]), beside(corners[2], corners[0]), beside(corners[0], corners[1])];
+        let weights = [side(corners[1], corners[2]), side(corners[2], corners[0]), side(corners[0], corners[1])];
         let total: f64 = weights.iter().sum();
         weights.iter().all(|&w| w >= 0.0).then(|| (0..3).map(|i| weights[i] * corners[i][2]).sum::<f64>() / total)
     })
 }
 
 #[test]
-fn a_plane_keeps_its_outline_and_is_nowhere_off() {
+fn a_plane_keeps_its_boundary_and_has_no_error() {
     let plane = terrain((0..400).map(|i| [i % 20 * 10, i / 20 * 10, i % 20 * 3 + i / 20 * 7]).collect());
     let simple = simplify(&frame(), &plane, 1).unwrap();
     assert!(simple.error < 1e-8, "{}", simple.error);
     assert_eq!(area(&simple.tile), area(&plane));
-    // The 76 vertices of the outline, and triangles between them.
+    // The 76 vertices of the boundary, and the triangles between them.
     assert_eq!((simple.tile.positions.len(), simple.tile.triangles.len()), (76, 74));
 }
 
 #[test]
-fn nothing_inside_means_nothing_to_do() {
+fn a_tile_without_inner_vertices_stays_as_it_is() {
     let fan = terrain(vec![[0, 0, 5], [9, 0, 5], [0, 9, 1]]);
     let simple = simplify(&frame(), &fan, 1).unwrap();
     assert_eq!((simple.tile, simple.error), (fan, 0.0));
@@ -61,7 +63,7 @@ fn nothing_inside_means_nothing_to_do() {
 
 proptest! {
     #[test]
-    fn the_ground_is_the_same_and_the_error_is_true(
+    fn simplified_terrains_cover_the_same_ground_within_their_error(
         points in prop::collection::vec([-40i32..40, -40i32..40, 0i32..60], 8..200),
         share in 2usize..8,
         places in prop::collection::vec([-40.0f64..40.0, -40.0f64..40.0], 40),
@@ -78,7 +80,7 @@ proptest! {
             }
         }
         prop_assert!(greatest <= simple.error + 1e-9, "{} of {}", greatest, simple.error);
-        // No bound by the height of everything where the distance can be measured.
+        // The error is measured, not bounded by the range of all heights.
         let vertices = tile.positions.iter().filter_map(|p| {
             Some((height(&simple.tile, [p[0] as f64, p[1] as f64])? - p[2] as f64).abs())
         });

@@ -1,17 +1,20 @@
-//! The plane around some points cut into cells of one size, row by row.
+//! A grid of cells over some points of the plane, all of one size, to find what lies near a triangle.
+//!
+//! Unlike [`crate::geometry::square_grid::SquareGrid`] it fits a number of cells to the points: cells are as wide as the points'
+//! box divided by whole numbers, and not square.
 
-/// Where the cells lie.
-pub(crate) struct Cells {
+/// The cells, numbered row by row.
+pub(crate) struct CellGrid {
     low: [f64; 2],
-    /// Cells in a lattice step.
+    /// Cells in a lattice step along each axis.
     scale: [f64; 2],
     columns: usize,
     rows: usize,
 }
 
-impl Cells {
-    /// About so many cells around `positions` (lattice x, y, z).
-    pub(crate) fn new(positions: &[[i32; 3]], about: usize) -> Cells {
+impl CellGrid {
+    /// Returns about `about` cells over `positions` (lattice x, y, z).
+    pub(crate) fn new(positions: &[[i32; 3]], about: usize) -> CellGrid {
         let none = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
         let [low, high] = positions.iter().fold(none, |[low, high], p| {
             let p = [p[0] as f64, p[1] as f64];
@@ -22,35 +25,35 @@ impl Cells {
         let columns = (about * size[0] / size[1]).sqrt().ceil().clamp(1.0, about);
         let rows = (about / columns).ceil();
         let scale = [columns / (size[0] + 1.0), rows / (size[1] + 1.0)];
-        Cells { low, scale, columns: columns as usize, rows: rows as usize }
+        CellGrid { low, scale, columns: columns as usize, rows: rows as usize }
     }
 
-    /// How many there are.
+    /// Returns the number of cells.
     pub(crate) fn count(&self) -> usize {
         self.columns * self.rows
     }
 
-    /// The number of the cell in this row and column.
+    /// Returns the number of the cell in this row and column.
     pub(crate) fn at(&self, row: usize, column: usize) -> usize {
         row * self.columns + column
     }
 
-    /// The number of the cell around a point.
+    /// Returns the number of the cell around a point.
     pub(crate) fn of(&self, p: &[i32; 3]) -> u32 {
         self.at(self.row(p[1] as f64), self.column(p[0] as f64)) as u32
     }
 
-    /// The column at `x`, or the outermost one on that side.
+    /// Returns the column at `x`, or the outermost one on that side.
     pub(crate) fn column(&self, x: f64) -> usize {
         (((x - self.low[0]) * self.scale[0]) as usize).min(self.columns - 1)
     }
 
-    /// The row at `y`, or the outermost one on that side.
+    /// Returns the row at `y`, or the outermost one on that side.
     pub(crate) fn row(&self, y: f64) -> usize {
         (((y - self.low[1]) * self.scale[1]) as usize).min(self.rows - 1)
     }
 
-    /// The first and last column and the first and last row of the cells around a triangle.
+    /// Returns the first and last column and the first and last row of the cells that a triangle's box touches.
     pub(crate) fn around(&self, corners: &[[i32; 3]; 3]) -> [[usize; 2]; 2] {
         let ends = |k: usize| {
             let [a, b, c] = corners.map(|p| p[k]);
@@ -59,7 +62,7 @@ impl Cells {
         [ends(0).map(|x| self.column(x)), ends(1).map(|y| self.row(y))]
     }
 
-    /// The first and the last column in which the triangle lies in `row`, maybe with one to spare for rounding.
+    /// Returns the first and the last column that the triangle touches in `row`. Rounding may add one column at either end.
     pub(crate) fn span(&self, corners: &[[i32; 3]; 3], row: usize) -> [usize; 2] {
         let y_of = |row: f64| self.low[1] + row / self.scale[1];
         let (south, north) = (y_of(row as f64 - 0.01), y_of(row as f64 + 1.01));

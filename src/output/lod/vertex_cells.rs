@@ -1,0 +1,92 @@
+//! The vertices of a terrain by the cells of a grid, to find those inside a simplified triangle.
+
+use crate::geometry::Site;
+use crate::geometry::predicates::orient2d;
+use crate::output::lod::cell_grid::CellGrid;
+
+/// The vertices, sorted by cell.
+pub(crate) struct VertexCells<'a> {
+    positions: &'a [[i32; 3]],
+    cells: CellGrid,
+    /// The vertices of cell c are `sorted[starts[c]..starts[c + 1]]`.
+    starts: Vec<u32>,
+    sorted: Vec<[i32; 3]>,
+    /// The numbers of the sorted vertices.
+    numbers: Vec<u32>,
+}
+
+impl<'a> VertexCells<'a> {
+    /// Sorts one of every `every` vertices.
+    pub(crate) fn new(positions: &'a [[i32; 3]], every: usize) -> VertexCells<'a> {
+        let cells = CellGrid::new(positions, positions.len() / every + 1);
+        let cell_of: Vec<u32> = positions.iter().step_by(every).map(|p| cells.of(p)).collect();
+        let mut starts = vec![0; cells.count() + 1];
+        cell_of.iter().for_each(|&cell| starts[cell as usize] += 1);
+        let mut end = 0;
+        for start in &mut starts {
+            end += *start;
+            *start = end;
+        }
+        let mut sorted = vec![[0; 3]; cell_of.len()];
+        let mut numbers = vec![0; cell_of.len()];
+        for (i, &cell) in cell_of.iter().enumerate().rev() {
+            let v = i * every;
+            let at = &mut starts[cell as usize];
+            *at -= 1;
+            (sorted[*at as usize], numbers[*at as usize]) = (positions[v], v as u32);
+        }
+        VertexCells { positions, cells, starts, sorted, numbers }
+    }
+
+    /// Returns for every triangle of `coarse` the vertex with the greatest vertical distance from it, as the bits of that distance
+    /// and the number of the vertex. Triangles that meet all their vertices are left out.
+    pub(crate) fn furthest(&self, coarse: &[[u32; 3]]) -> impl Iterator<Item = (u64, u32)> {
+        let found = coarse.iter().map(|triangle| self.furthest_inside(triangle));
+        found.filter(|(distance, _)| *distance > 0.0).map(|(distance, v)| (distance.to_bits(), v))
+    }
+
+    /// Returns the greatest vertical distance between a triangle and a vertex over or under it, and the number of that vertex.
+    pub(crate) fn furthest_inside(&self, triangle: &[u32; 3]) -> (f64, u32) {
+        let corners = triangle.map(|v| self.positions[v as usize]);
+        let ys = corners.map(|p| p[1]);
+        let (first, last) = (ys[0].min(ys[1]).min(ys[2]), ys[0].max(ys[1]).max(ys[2]));
+        let mut greatest = (0.0f64, 0);
+        for row in self.cells.row(first as f64)..=self.cells.row(last as f64) {
+            let [west, east] = self.cells.span(&corners, row);
+            let [start, end] = [self.cells.at(row, west), self.cells.at(row, east) + 1].map(|cell| self.starts[cell]);
+            for at in start as usize..end as usize {
+                let distance = vertical_distance(&corners, self.sorted[at]);
+                if distance > greatest.0 {
+                    greatest = (distance, self.numbers[at]);
+                }
+            }
+        }
+        greatest
+    }
+}
+
+/// Returns the vertical distance between `p` and a counterclockwise triangle, or 0 if `p` is neither over nor under it.
+fn vertical_distance(corners: &[[i32; 3]; 3], p: [i32; 3]) -> f64 {
+    let [a, b, c] = *corners;
+    let weight = |from, to| orient2d(plane(from), plane(to), plane(p));
+    let of_a = weight(b, c);
+    if of_a < 0 {
+        return 0.0;
+    }
+    let of_b = weight(c, a);
+    if of_b < 0 {
+        return 0.0;
+    }
+    let weights = [of_a, of_b, weight(a, b)];
+    if weights[2] < 0 {
+        return 0.0;
+    }
+    let total: f64 = weights.iter().map(|&w| w as f64).sum();
+    let height = |k: usize| weights[k] as f64 * (corners[k][2] as f64 - p[2] as f64);
+    ((height(0) + height(1) + height(2)) / total).abs()
+}
+
+/// Returns the x and y of a lattice point.
+pub(crate) fn plane(point: [i32; 3]) -> Site {
+    [point[0], point[1]]
+}
