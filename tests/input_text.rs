@@ -18,7 +18,7 @@ fn small_texts_are_read_whatever_their_layout() {
     let expected = [("autzen-point-format-3.txt", 106, true), ("crlf_test.txt", 10, false), ("quoted2.txt", 9, false)];
     for (name, points, rgb) in expected {
         let cloud = read(&shared.join("data").join(name)).unwrap();
-        assert_eq!((cloud.tally.kept, cloud.tally.malformed), (points, 0), "{name}");
+        assert_eq!((cloud.counts.kept, cloud.counts.malformed), (points, 0), "{name}");
         assert_eq!((cloud.source.format, cloud.source.has_rgb), (FileFormat::Text, rgb), "{name}");
         assert!(cloud.source.warnings.is_empty(), "{name}");
     }
@@ -30,9 +30,9 @@ fn text_gives_the_same_points_as_the_laz_it_was_made_from() {
     let laz = open(&shared.join("data/Topography.laz"), &TextOptions::default()).unwrap();
     let csv = open(&shared.join("data/topography.csv"), &TextOptions::default()).unwrap();
     let lattice = lattice(&csv);
-    let (from_laz, laz_tally) = decode(&laz, &rules(&laz, &lattice)).unwrap();
-    let (from_csv, csv_tally) = decode(&csv, &rules(&csv, &lattice)).unwrap();
-    assert_eq!((laz_tally.rounded_xy, csv_tally.rounded_xy), (0, 0));
+    let (from_laz, laz_counts) = decode(&laz, &rules(&laz, &lattice)).unwrap();
+    let (from_csv, csv_counts) = decode(&csv, &rules(&csv, &lattice)).unwrap();
+    assert_eq!((laz_counts.rounded_xy, csv_counts.rounded_xy), (0, 0));
     assert_eq!(from_laz.len(), 73_403);
     assert!(from_laz.iter().zip(&from_csv).all(|(a, b)| (a.position, a.z, a.order()) == (b.position, b.z, b.order())));
 }
@@ -64,8 +64,8 @@ fn texts_of_many_layouts_say_the_same() {
     ];
     for layout in layouts {
         let cloud = text(layout).unwrap_or_else(|error| panic!("{layout:?}: {error}"));
-        assert_eq!(coordinates(&cloud), [[1.5, 2.0, 3.25], [4.0, 5.0, 6.0]], "{layout:?}: {:?}", cloud.tally.examples);
-        assert_eq!(cloud.tally.malformed, 0, "{layout:?}");
+        assert_eq!(coordinates(&cloud), [[1.5, 2.0, 3.25], [4.0, 5.0, 6.0]], "{layout:?}: {:?}", cloud.counts.examples);
+        assert_eq!(cloud.counts.malformed, 0, "{layout:?}");
     }
 }
 
@@ -103,8 +103,8 @@ fn malformed_lines_are_counted_and_named() {
     let long = "1".repeat(100_000);
     let content = format!("x,y,z\n1,2,3\n4,five,6\n7,8\n# fine\nnan,1,2\n{long}\n1,inf,2\n9,9,9\n1e300,0,0\n");
     let cloud = text(&content).unwrap();
-    assert_eq!((cloud.tally.kept, cloud.tally.malformed), (2, 6));
-    for (example, words) in cloud.tally.examples.iter().zip([
+    assert_eq!((cloud.counts.kept, cloud.counts.malformed), (2, 6));
+    for (example, words) in cloud.counts.examples.iter().zip([
         "line 3: column 2 (y) is \"five\", not a number",
         "line 4: column 3 (z) is missing",
         "line 6: column 1 (x) is \"nan\"",
@@ -139,7 +139,7 @@ fn what_is_no_table_is_refused() {
 fn noise_beyond_fifteen_decimals_is_rounded_and_counted() {
     let cloud = text("0.30000000000000004,1,2\n0.5,1,2.5\n").unwrap();
     assert_eq!(cloud.source.axes[0].scale, Decimal::new(1, 1));
-    assert_eq!((cloud.tally.rounded_xy, cloud.tally.rounded_z), (1, 0));
+    assert_eq!((cloud.counts.rounded_xy, cloud.counts.rounded_z), (1, 0));
 }
 
 #[test]
@@ -150,7 +150,7 @@ fn a_text_of_many_blocks_keeps_its_order() {
     }
     let cloud = text(&content).unwrap();
     assert!(cloud.source.chunks() > 1);
-    assert_eq!((cloud.tally.kept, cloud.tally.malformed), (300_000, 0));
+    assert_eq!((cloud.counts.kept, cloud.counts.malformed), (300_000, 0));
     assert!(cloud.points.iter().enumerate().all(|(i, p)| p.order() == i as u64 && p.z == i as i32));
 }
 

@@ -223,6 +223,24 @@ mod tests {
     }
 
     #[test]
+    fn options_are_read_back_as_they_were_written() {
+        let odd = "[input]\nfiles = [\"a.laz\"]\nclasses = [2]\nbounds = [0.1, -3, 7e9, 2.5]\nresolution = 0.003\nunit = \"us-foot\"\n\
+                   [triangulation]\nmax_points_per_tile = 77\n[gpu]\ntexture = 512\nadapter = \"x\"\n\
+                   [output]\ndirectory = \"out\"\nmax_edge = 0.1\nmax_points_per_level_tile = 1234\n\
+                   [limits]\nmemory = \"1.4 GiB\"\nthreads = 3\n";
+        for text in
+            [LEAST, odd, &odd.replace("0.003", "10").replace("512", "\"max\"").replace("= 0.1\n", "= \"auto\"\n")]
+        {
+            let options = parse(text).unwrap();
+            let written = serde_json::to_string(&options).unwrap();
+            let read: JobOptions = serde_json::from_str(&written).unwrap();
+            assert_eq!(serde_json::to_string(&read).unwrap(), written);
+            assert_eq!(read.input.resolution, options.input.resolution);
+            assert_eq!((read.output.max_edge, read.limits.memory), (options.output.max_edge, options.limits.memory));
+        }
+    }
+
+    #[test]
     fn a_key_under_both_its_names_is_an_error() {
         let both = error(&format!("{LEAST}[triangulation]\nvoronoi = \"jfa\"\n[gpu]\nvoronoi = \"exact\"\n"));
         assert!(both.contains("[gpu] voronoi"), "{both}");

@@ -57,7 +57,8 @@ pub fn shortest_decimal(value: f64) -> Option<Decimal> {
 
 /// The exact map from one axis of an input, `world = offset + scale * raw`, to the lattice:
 /// `integer = round((raw * mul + add) / div)`, halves away from zero.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "[String; 3]", try_from = "[String; 3]")]
 pub struct AxisMap {
     mul: i128,
     add: i128,
@@ -79,12 +80,16 @@ impl AxisMap {
         let integer = |d: Decimal| 10i128.checked_pow(digits - d.scale())?.checked_mul(d.mantissa());
         let (mul, add, div) = (integer(scale)?, integer(shift)?, integer(resolution)?);
         let common = gcd(gcd(mul, add.abs()), div);
-        let (mul, add, div) = (mul / common, add / common, div / common);
-        let narrow =
-            (mul < 1 << 29 && add.abs() < 1 << 61 && div < 1 << 61).then_some([mul as i64, add as i64, div as i64]);
-        let map = AxisMap { mul, add, div, narrow };
-        // Any 32-bit integer and any mantissa up to 10^18 can be mapped without overflow.
-        (map.mul < 1 << 60 && map.add.abs() < 1 << 120 && map.div < 1 << 120).then_some(map)
+        AxisMap::from_integers(mul / common, add / common, div / common)
+    }
+
+    /// Returns the map of these integers. Returns `None` if `mul` or `div` is not positive, or a number is too large.
+    fn from_integers(mul: i128, add: i128, div: i128) -> Option<AxisMap> {
+        let narrow = (mul < 1 << 29 && add.unsigned_abs() < 1 << 61 && div < 1 << 61)
+            .then_some([mul as i64, add as i64, div as i64]);
+        // Room for any 32-bit or 10^18 mantissa without overflow.
+        let fits = (1..1 << 60).contains(&mul) && add.unsigned_abs() < 1 << 120 && (1..1 << 120).contains(&div);
+        fits.then_some(AxisMap { mul, add, div, narrow })
     }
 
     /// Returns the lattice integer of `raw` and whether it was rounded, or `None` if it is outside the range of `i32`.
@@ -116,6 +121,28 @@ impl AxisMap {
         Some((i32::try_from(quotient + up as i128).ok()?, rest != 0))
     }
 }
+
+/// A map is written as the digits of `mul`, `add` and `div`, since JSON readers do not keep all digits of large numbers.
+impl From<AxisMap> for [String; 3] {
+    fn from(map: AxisMap) -> [String; 3] {
+        [map.mul, map.add, map.div].map(|number| number.to_string())
+    }
+}
+
+impl TryFrom<[String; 3]> for AxisMap {
+    type Error = InvalidAxisMap;
+
+    fn try_from(numbers: [String; 3]) -> Result<AxisMap, InvalidAxisMap> {
+        let [mul, add, div] = numbers.each_ref().map(|number| number.parse().ok());
+        let map = mul.zip(add).zip(div).and_then(|((mul, add), div)| AxisMap::from_integers(mul, add, div));
+        map.ok_or(InvalidAxisMap(numbers))
+    }
+}
+
+/// Three numbers that are not the integers of an [`AxisMap`].
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0:?} are not the integers of a map to the lattice")]
+pub struct InvalidAxisMap([String; 3]);
 
 fn gcd(a: i128, b: i128) -> i128 {
     if b == 0 { a } else { gcd(b, a % b) }
@@ -182,6 +209,23 @@ mod tests {
             let map = AxisMap::new(offset, scale, Decimal::new(123, 2), step).unwrap();
             proptest::prop_assert!(map.narrow.is_some());
             proptest::prop_assert_eq!(map.apply(raw.into()), map.apply_wide(raw.into()));
+        }
+    }
+
+    #[test]
+    fn maps_are_read_back_as_they_were_written() {
+        let wide =
+            AxisMap::new(decimal("1"), decimal("0.001"), decimal("0"), decimal("12345678901234567890.123")).unwrap();
+        let narrow = AxisMap::new(decimal("-0.5"), decimal("0.01"), decimal("0"), decimal("0.03")).unwrap();
+        for map in [wide, narrow] {
+            let text = serde_json::to_string(&map).unwrap();
+            assert_eq!(serde_json::from_str::<AxisMap>(&text).unwrap(), map, "{text}");
+        }
+        let least = i128::MIN.to_string();
+        for [mul, add, div] in [["1", "0", "0"], ["0", "0", "1"], ["-1", "0", "1"], ["1", &least, "1"], ["1", "x", "1"]]
+        {
+            let text = format!("[\"{mul}\",\"{add}\",\"{div}\"]");
+            assert!(serde_json::from_str::<AxisMap>(&text).is_err(), "{text}");
         }
     }
 

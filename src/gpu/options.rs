@@ -29,7 +29,7 @@ pub enum VoronoiMethod {
 
 /// The side of the texture on a GPU.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(try_from = "toml::Value", into = "String")]
+#[serde(try_from = "toml::Value", into = "toml::Value")]
 pub enum TextureSide {
     /// Chosen by the number of sites, within what the adapter supports.
     #[default]
@@ -53,12 +53,12 @@ impl TryFrom<toml::Value> for TextureSide {
     }
 }
 
-impl From<TextureSide> for String {
-    fn from(texture: TextureSide) -> String {
+impl From<TextureSide> for toml::Value {
+    fn from(texture: TextureSide) -> toml::Value {
         match texture {
-            TextureSide::Auto => "auto".into(),
-            TextureSide::Max => "max".into(),
-            TextureSide::Side(side) => side.to_string(),
+            TextureSide::Auto => toml::Value::String("auto".into()),
+            TextureSide::Max => toml::Value::String("max".into()),
+            TextureSide::Side(side) => toml::Value::Integer(side.into()),
         }
     }
 }

@@ -1,18 +1,20 @@
-//! What a cloud holds, as its header or a first pass says it: for people, and as JSON.
+//! What a point cloud holds, as its header or a first pass over it says: for people, and as JSON.
 
 use std::fmt;
 
 use serde::Serialize;
 
+use crate::Warnings;
 use crate::input::crs::system::Crs;
+use crate::input::points::axis::AXIS_NAMES;
 use crate::input::source::{FileFormat, Source};
 
-/// The answer of `info`. `Display` gives it for people, `Serialize` for programs.
+/// The output of `gdt-batch info`: `Display` is for people, `Serialize` for programs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SourceDescription {
     /// The file.
     pub file: String,
-    /// Bytes of the file.
+    /// Its size in bytes.
     pub size: u64,
     /// How it holds its points.
     pub format: FileFormat,
@@ -20,13 +22,13 @@ pub struct SourceDescription {
     pub version: Option<String>,
     /// LAS point format.
     pub point_format: Option<u8>,
-    /// Number of points it says it has.
+    /// The number of points that it says it has.
     pub points: u64,
-    /// Number of points by return, from the first return on, as the header claims.
+    /// The number of points by return, from the first return on, as the header claims.
     pub points_by_return: Vec<u64>,
-    /// Least x, y, z; what the header claims for LAS.
+    /// Least x, y, z; as the header claims for LAS.
     pub min: [f64; 3],
-    /// Greatest x, y, z, likewise.
+    /// Greatest x, y, z; likewise.
     pub max: [f64; 3],
     /// Steps of x, y, z, exact.
     pub scale: [String; 3],
@@ -36,17 +38,18 @@ pub struct SourceDescription {
     pub color: bool,
     /// Whether points have a classification.
     pub classification: bool,
-    /// Independent parts it is decoded in.
+    /// The number of parts that can be decoded independently.
+    #[serde(rename = "pieces")]
     pub chunks: usize,
     /// The coordinate reference system.
     pub crs: Crs,
-    /// Metres of one unit of x and y.
+    /// The length of one unit of x and y in metres.
     pub metres_per_unit: Option<f64>,
-    /// What is odd about the file.
-    pub warnings: Vec<String>,
+    /// What is unusual about the file.
+    pub warnings: Warnings,
 }
 
-/// What `source` holds.
+/// Describes `source`.
 pub fn describe(source: &Source) -> SourceDescription {
     let last = source.by_return.iter().rposition(|&count| count > 0).map_or(0, |last| last + 1);
     SourceDescription {
@@ -105,14 +108,14 @@ impl fmt::Display for SourceDescription {
         if !self.points_by_return.is_empty() {
             writeln!(f, "  returns  {:?}", self.points_by_return)?;
         }
-        for (axis, name) in ["x", "y", "z"].iter().enumerate() {
+        for (axis, name) in AXIS_NAMES.into_iter().enumerate() {
             let (min, max, step, offset) = (self.min[axis], self.max[axis], &self.scale[axis], &self.offset[axis]);
             let decimals = step.split_once('.').map_or(0, |(_, decimals)| decimals.len());
             writeln!(f, "  {name}        {min:.decimals$} to {max:.decimals$}, step {step}, offset {offset}")?;
         }
         writeln!(f, "  crs      {}", self.crs.label())?;
         writeln!(f, "  unit     {} in x and y, {} in z", self.crs.horizontal.name(), self.vertical())?;
-        for warning in &self.warnings {
+        for warning in self.warnings.iter() {
             writeln!(f, "  warning  {warning}")?;
         }
         Ok(())

@@ -1,7 +1,9 @@
 //! Point clouds in: what a file holds, and its points on the lattice, chunk by chunk.
 //!
-//! [`open`] looks at one file and gives a [`Source`]; its chunks are decoded independently on any thread. On the way every
-//! record passes the [`PointRules`], and the [`PointCounts`] says what became of each.
+//! [`open`] looks at one file and returns a [`Source`]. Its chunks are decoded independently, on any thread. Every record passes
+//! the filter, which applies the [`PointRules`], and [`PointCounts`] says what happened to the records.
+//!
+//! A new file format is a room of its own beside `las` and `text`, and a variant of `PointData` in `source.rs`.
 
 mod crs;
 mod file;
@@ -15,7 +17,8 @@ mod text;
 pub use crs::system::Crs;
 pub use crs::unit::Unit;
 pub use points::axis::Axis;
+pub use points::counts::PointCounts;
 pub use points::point::Point;
-pub use points::rules::{PointCounts, PointRules};
+pub use points::rules::PointRules;
 pub use source::{FileFormat, Source, open};
 pub use text::options::TextOptions;

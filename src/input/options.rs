@@ -1,44 +1,45 @@
 //! The options of `[input]`.
 
-use crate::geometry::lattice::shortest_decimal;
-use crate::input::text::options::TextOptions;
 use rust_decimal::Decimal;
 use serde::{Deserialize, Serialize};
 
-/// `[input]`: which points.
+use crate::geometry::lattice::shortest_decimal;
+use crate::input::text::options::TextOptions;
+
+/// `[input]`: which points a job reads.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InputOptions {
     /// Paths or globs, relative to the configuration file.
     pub files: Vec<String>,
-    /// Keep only these classes; default: all but noise (7, 18).
+    /// Keep only these classes. The default is all classes but noise (7, 18).
     #[serde(default)]
     pub classes: Option<Vec<u8>>,
-    /// Keep only what lies in [xmin, ymin, xmax, ymax], in source units, borders included.
+    /// Keep only the points within this rectangle.
     #[serde(default)]
     pub bounds: Option<SourceBounds>,
-    /// Which of several points with the same x and y stays.
+    /// Which of several points with the same x and y the job keeps.
     #[serde(default)]
     pub duplicates: Duplicates,
     /// The unit of x and y.
     #[serde(default)]
     pub unit: UnitChoice,
-    /// The step of the lattice in x and y, in source units.
+    /// The step of the lattice in x and y.
     #[serde(default)]
     pub resolution: ResolutionChoice,
-    /// The fraction of malformed records or lines that is put up with, 0 to 1.
+    /// The fraction of malformed records or lines up to which the job goes on.
     #[serde(default, alias = "malformed_share")]
     pub max_malformed_fraction: Fraction,
-    /// What becomes of a job with a file that cannot be used.
+    /// What the job does with a file that cannot be used.
     #[serde(default)]
     pub on_bad_file: OnBadFile,
-    /// How text files are laid out, where detection is not to be trusted.
+    /// How text files are laid out, if detection gets it wrong.
     #[serde(default)]
     pub csv: TextOptions,
 }
 
 impl InputOptions {
-    /// Which of the 256 classification codes are kept.
+    /// Returns which of the 256 classification codes the job keeps.
     pub fn kept_classes(&self) -> [bool; 256] {
         match &self.classes {
             Some(classes) => {
@@ -51,7 +52,7 @@ impl InputOptions {
     }
 }
 
-/// Which of several points with the same x and y stays.
+/// Which of several points with the same x and y the job keeps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Duplicates {
@@ -64,14 +65,14 @@ pub enum Duplicates {
     First,
 }
 
-/// What becomes of a job with a file that is no point cloud, is damaged, or has too many malformed records.
+/// What the job does with a file that is not a point cloud, is damaged, or has too many malformed records.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum OnBadFile {
     /// It stops with an error.
     #[default]
     Stop,
-    /// It leaves the file out, all of it, and says so.
+    /// It leaves the whole file out and says so.
     Skip,
 }
 
@@ -79,10 +80,10 @@ pub enum OnBadFile {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum UnitChoice {
-    /// As the CRS says; metres where there is none.
+    /// The unit that the CRS says, or metres if there is no CRS.
     #[default]
     Auto,
-    /// 1 m.
+    /// The metre.
     Metre,
     /// The international foot, 0.3048 m.
     Foot,
@@ -90,63 +91,109 @@ pub enum UnitChoice {
     UsFoot,
 }
 
-/// A rectangle [xmin, ymin, xmax, ymax] in source units.
+/// What is wrong with the value of an option.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum InvalidValue {
+    /// Not a rectangle.
+    #[error("bounds are [xmin, ymin, xmax, ymax] with xmin < xmax and ymin < ymax, not {0:?}")]
+    Bounds([f64; 4]),
+    /// Not a step.
+    #[error("resolution is \"auto\" or a positive number of source units, such as 0.01")]
+    Resolution,
+    /// Not a fraction.
+    #[error("a fraction lies between 0 and 1, not {0}")]
+    Fraction(f64),
+}
+
+/// A rectangle [xmin, ymin, xmax, ymax] in source units, borders included.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "[f64; 4]")]
 pub struct SourceBounds(pub [f64; 4]);
 
-/// The step of the lattice: `None` means "auto".
+impl TryFrom<[f64; 4]> for SourceBounds {
+    type Error = InvalidValue;
+
+    fn try_from(b: [f64; 4]) -> Result<SourceBounds, InvalidValue> {
+        if b.iter().any(|v| !v.is_finite()) || b[0] >= b[2] || b[1] >= b[3] {
+            return Err(InvalidValue::Bounds(b));
+        }
+        Ok(SourceBounds(b))
+    }
+}
+
+/// The step of the lattice in x and y.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "toml::Value", into = "String")]
-pub struct ResolutionChoice(pub Option<Decimal>);
+pub enum ResolutionChoice {
+    /// The job chooses it from the steps of its inputs.
+    #[default]
+    Auto,
+    /// This step in source units, above 0.
+    Step(Decimal),
+}
 
+impl ResolutionChoice {
+    /// Returns the user's step, if there is one.
+    pub fn step(self) -> Option<Decimal> {
+        match self {
+            ResolutionChoice::Auto => None,
+            ResolutionChoice::Step(step) => Some(step),
+        }
+    }
+}
+
+/// A user writes a number. A step that a program wrote down is text, so that no digit is lost.
 impl TryFrom<toml::Value> for ResolutionChoice {
-    type Error = String;
+    type Error = InvalidValue;
 
-    fn try_from(value: toml::Value) -> std::result::Result<ResolutionChoice, String> {
+    fn try_from(value: toml::Value) -> Result<ResolutionChoice, InvalidValue> {
         let number = match value {
-            toml::Value::String(s) if s == "auto" => return Ok(ResolutionChoice(None)),
-            toml::Value::Integer(i) => Some(Decimal::from(i)),
-            toml::Value::Float(f) => shortest_decimal(f),
+            toml::Value::String(text) if text == "auto" => return Ok(ResolutionChoice::Auto),
+            toml::Value::String(text) => Decimal::from_str_exact(&text).ok(),
+            toml::Value::Integer(number) => Some(Decimal::from(number)),
+            toml::Value::Float(number) => shortest_decimal(number),
             _ => None,
         };
-        match number {
-            Some(step) if step > Decimal::ZERO => Ok(ResolutionChoice(Some(step))),
-            _ => Err("resolution is \"auto\" or a positive number of source units, such as 0.01".into()),
-        }
+        let step = number.filter(|step| *step > Decimal::ZERO).ok_or(InvalidValue::Resolution)?;
+        Ok(ResolutionChoice::Step(step))
     }
 }
 
 impl From<ResolutionChoice> for String {
     fn from(resolution: ResolutionChoice) -> String {
-        resolution.0.map_or("auto".into(), |step| step.to_string())
+        resolution.step().map_or("auto".into(), |step| step.to_string())
     }
 }
 
-/// A share between 0 and 1.
+/// A number from 0 to 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "f64")]
 pub struct Fraction(pub f64);
 
 impl TryFrom<f64> for Fraction {
-    type Error = String;
+    type Error = InvalidValue;
 
-    fn try_from(share: f64) -> std::result::Result<Fraction, String> {
-        if (0.0..=1.0).contains(&share) {
-            Ok(Fraction(share))
-        } else {
-            Err(format!("a share lies between 0 and 1, not {share}"))
-        }
+    fn try_from(fraction: f64) -> Result<Fraction, InvalidValue> {
+        if (0.0..=1.0).contains(&fraction) { Ok(Fraction(fraction)) } else { Err(InvalidValue::Fraction(fraction)) }
     }
 }
 
-impl TryFrom<[f64; 4]> for SourceBounds {
-    type Error = String;
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-    fn try_from(b: [f64; 4]) -> std::result::Result<SourceBounds, String> {
-        if b.iter().any(|v| !v.is_finite()) || b[0] >= b[2] || b[1] >= b[3] {
-            return Err(format!("bounds are [xmin, ymin, xmax, ymax] with xmin < xmax and ymin < ymax, not {b:?}"));
+    #[test]
+    fn options_are_read_back_as_they_were_written() {
+        for resolution in ["0.01", "1e-7", "25", "\"auto\""] {
+            let text = format!(
+                "files = [\"a\"]\nclasses = [2, 9]\nbounds = [0.1, 0, 1e300, 4]\nresolution = {resolution}\n\
+                 max_malformed_fraction = 0.3\ncsv = {{ delimiter = \";\" }}"
+            );
+            let options: InputOptions = toml::from_str(&text).unwrap();
+            let written = serde_json::to_string(&options).unwrap();
+            let read: InputOptions = serde_json::from_str(&written).unwrap();
+            assert_eq!((read.resolution, read.bounds), (options.resolution, options.bounds), "{written}");
+            assert_eq!(serde_json::to_string(&read).unwrap(), written);
         }
-        Ok(SourceBounds(b))
     }
 }

@@ -1,4 +1,4 @@
-//! A point cloud that has been looked at and can be decoded chunk by chunk.
+//! A point cloud file that has been opened: what it says, and how to decode its points chunk by chunk.
 
 use std::path::{Path, PathBuf};
 
@@ -14,12 +14,13 @@ use crate::input::las::laz::CompressedPoints;
 use crate::input::las::uncompressed::UncompressedPoints;
 use crate::input::las::vlr;
 use crate::input::points::axis::Axis;
+use crate::input::points::counts::PointCounts;
 use crate::input::points::filter::PointFilter;
 use crate::input::points::point::Point;
-use crate::input::points::rules::{PointCounts, PointRules};
+use crate::input::points::rules::PointRules;
 use crate::input::text::options::TextOptions;
 use crate::input::text::table::TextTable;
-use crate::{Error, Result};
+use crate::{Error, Result, Warnings};
 
 /// How a file holds its points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -27,19 +28,22 @@ use crate::{Error, Result};
 pub enum FileFormat {
     /// Uncompressed LAS.
     Las,
-    /// Compressed LAS, COPC included.
+    /// Compressed LAS, including COPC.
     Laz,
     /// A table of numbers as text.
     Text,
 }
 
-/// A point cloud file whose header, or text, has been looked at. Nothing it says of its points is to be trusted but
-/// what [`Source::decode`] gives.
-#[derive(Clone, Debug)]
+/// A point cloud file that has been opened. What it says about its points is a claim of the file; only [`Source::decode`] tells
+/// the truth.
+///
+/// A source can be written down and read back, in JSON without loss: it holds no open file, its decimals are written as text, and
+/// none of its floating-point numbers is infinite or NaN. Its path must be UTF-8 for that.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Source {
     /// The file.
     pub path: PathBuf,
-    /// Its size in bytes when it was looked at; a change later is an error.
+    /// Its size in bytes when it was opened. Decoding fails if the size changes later.
     pub size: u64,
     /// How it holds its points.
     pub format: FileFormat,
@@ -47,18 +51,18 @@ pub struct Source {
     pub version: Option<[u8; 2]>,
     /// LAS point format, 0 to 10; `None` for text.
     pub point_format: Option<u8>,
-    /// The number of records, those included that the file promises and does not have.
+    /// The number of records, including the records missing from a truncated file.
     pub records: u64,
-    /// How many of them the file is known not to have; decoding counts these as malformed.
+    /// The number of records that are known to be missing. Decoding counts them as malformed.
     pub missing: u64,
-    /// Least x, y, z: of all points for text, what the header claims for LAS (often wrong).
+    /// Least x, y, z: of all points for text, as the header claims for LAS (often wrong). Finite.
     pub min: [f64; 3],
-    /// Greatest x, y, z, likewise.
+    /// Greatest x, y, z; likewise.
     pub max: [f64; 3],
     /// What raw integers mean in x, y, z.
     pub axes: [Axis; 3],
-    /// A step in x and in y of which every coordinate is a whole multiple, counted from the axis' offset: the coarsest
-    /// there is for text, the scale for LAS.
+    /// A step in x and a step in y that divide every coordinate, counted from the axis' offset: the largest such step for text,
+    /// the scale for LAS.
     pub grid: [Decimal; 2],
     /// Whether points have a colour.
     pub has_rgb: bool,
@@ -68,24 +72,26 @@ pub struct Source {
     pub crs: Crs,
     /// The number of points by return, from the first on, as a LAS header claims it; empty for text.
     pub by_return: Vec<u64>,
-    /// What the user should know.
-    pub warnings: Vec<String>,
-    body: PointData,
+    /// What the user should know about the file.
+    pub warnings: Warnings,
+    points: PointData,
 }
 
-#[derive(Clone, Debug)]
+/// Where the points are in the file and how to decode them.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 enum PointData {
     Las(UncompressedPoints),
     Laz(CompressedPoints),
     Text(TextTable),
 }
 
-/// Looks at the file at `path`: reads the header of LAS or LAZ, or all of a text once, on the threads of the current
-/// rayon pool.
+/// Opens the file at `path` and finds out what it holds. Reads the header of LAS or LAZ, or all of a text once, on the threads of
+/// the current rayon pool.
 ///
 /// # Errors
-/// `Input` where the file is not a point cloud or is damaged beyond reading, `Io` where it cannot be read, `Config` where
-/// `text` contradicts itself.
+/// `Input` if the file is not a point cloud or is damaged beyond reading, `Io` if it cannot be read, `Config` if `text` is
+/// contradictory.
 pub fn open(path: &Path, text: &TextOptions) -> Result<Source> {
     let file = RandomAccessFile::open(path)?;
     let mut start = [0; 64];
@@ -95,12 +101,12 @@ pub fn open(path: &Path, text: &TextOptions) -> Result<Source> {
     if start.starts_with(b"LASF") {
         return open_las(&file);
     }
-    refuse(path, start)?;
+    refuse_other_formats(path, start)?;
     open_text(&file, text)
 }
 
-/// Says what a file is that is certainly no point cloud.
-fn refuse(path: &Path, start: &[u8]) -> Result<()> {
+/// Fails if the first bytes of a file show that it is neither LAS nor text, and says what it is.
+fn refuse_other_formats(path: &Path, start: &[u8]) -> Result<()> {
     if start.is_empty() {
         return Err(Error::input(path, "is empty"));
     }
@@ -124,15 +130,16 @@ fn refuse(path: &Path, start: &[u8]) -> Result<()> {
 }
 
 fn open_las(file: &RandomAccessFile) -> Result<Source> {
-    let (header, mut warnings) = LasHeader::read(file)?;
+    let mut warnings = Warnings::default();
+    let header = LasHeader::read(file, &mut warnings)?;
     let vlrs = vlr::list(file, &header, &mut warnings)?;
     let crs = crs_records::read(file, &vlrs, &mut warnings)?;
-    let (missing, body) = if header.compressed {
-        let chunks = CompressedPoints::read(file, &header, &vlrs, &mut warnings)?;
-        (chunks.missing, PointData::Laz(chunks))
+    let (missing, points) = if header.compressed {
+        let points = CompressedPoints::read(file, &header, &vlrs, &mut warnings)?;
+        (points.missing, PointData::Laz(points))
     } else {
-        let records = UncompressedPoints::new(&header, file.size());
-        (records.missing, PointData::Las(records))
+        let points = UncompressedPoints::new(&header, file.size());
+        (points.missing, PointData::Las(points))
     };
     if missing > 0 {
         let held = header.records - missing;
@@ -155,12 +162,13 @@ fn open_las(file: &RandomAccessFile) -> Result<Source> {
         crs,
         by_return: header.by_return,
         warnings,
-        body,
+        points,
     })
 }
 
 fn open_text(file: &RandomAccessFile, options: &TextOptions) -> Result<Source> {
-    let (table, warnings) = TextTable::scan(file, options)?;
+    let mut warnings = Warnings::default();
+    let table = TextTable::scan(file, options, &mut warnings)?;
     Ok(Source {
         path: file.path().to_path_buf(),
         size: file.size(),
@@ -178,26 +186,29 @@ fn open_text(file: &RandomAccessFile, options: &TextOptions) -> Result<Source> {
         crs: Crs::default(),
         by_return: Vec::new(),
         warnings,
-        body: PointData::Text(table),
+        points: PointData::Text(table),
     })
 }
 
 impl Source {
-    /// The number of independent parts, of about 50,000 records each where the format allows; 0 for a file without records.
+    /// Returns the number of chunks: the parts of the source that can be decoded independently. Where the format allows, a chunk
+    /// has about 50,000 records. A file without records has no chunk.
+    ///
+    /// For LAZ, a chunk of the source is one chunk of the file, or a run of several if those are small.
     pub fn chunks(&self) -> usize {
-        match &self.body {
-            PointData::Las(records) => records.chunks(),
-            PointData::Laz(chunks) => chunks.chunks(),
-            PointData::Text(table) => table.chunks(),
+        match &self.points {
+            PointData::Las(points) => points.chunk_count(),
+            PointData::Laz(points) => points.chunk_count(),
+            PointData::Text(table) => table.chunk_count(),
         }
     }
 
-    /// Decodes part `chunk` (below [`Source::chunks`]) and hands the points that pass `rules` to `sink` in record order, at
-    /// most 65,536 at a time. The point of record `i` of the source gets the order `rules.first_order + i`. UncompressedPoints that
-    /// cannot be read are counted as malformed; whether that is too many is for the caller to say.
+    /// Decodes chunk `chunk` (below [`Source::chunks`]) and hands the points that pass `rules` to `sink` in record order, at
+    /// most 65,536 at a time. The point of record `i` of the source gets the order `rules.first_order + i`. Records that
+    /// cannot be read are counted as malformed; the caller decides whether there are too many.
     ///
     /// # Errors
-    /// `Io` or `Input` where the file cannot be read or has changed since, and what `sink` returns.
+    /// `Io` or `Input` if the file cannot be read or has changed since it was opened, and the errors of `sink`.
     pub fn decode(
         &self,
         chunk: usize,
@@ -206,9 +217,9 @@ impl Source {
     ) -> Result<PointCounts> {
         let file = RandomAccessFile::reopen(&self.path, self.size)?;
         let mut filter = PointFilter::new(&self.path, &self.axes, rules, sink);
-        match &self.body {
-            PointData::Las(records) => records.decode(&file, chunk, rules, &mut filter)?,
-            PointData::Laz(chunks) => chunks.decode(&file, chunk, rules, &mut filter)?,
+        match &self.points {
+            PointData::Las(points) => points.decode(&file, chunk, rules, &mut filter)?,
+            PointData::Laz(points) => points.decode(&file, chunk, rules, &mut filter)?,
             PointData::Text(table) => table.decode(&file, chunk, &mut filter)?,
         }
         filter.finish()

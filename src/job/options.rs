@@ -108,8 +108,9 @@ impl TryFrom<String> for MemoryLimit {
 }
 
 impl From<MemoryLimit> for String {
+    /// Returns the exact number of bytes; what is displayed is rounded.
     fn from(memory: MemoryLimit) -> String {
-        memory.to_string()
+        format!("{} B", memory.0)
     }
 }
 
@@ -130,6 +131,7 @@ fn parse_memory(text: &str) -> Option<u64> {
     let split = text.find(|c: char| !c.is_ascii_digit() && c != '.')?;
     let value: f64 = text[..split].parse().ok()?;
     let unit: f64 = match text[split..].trim().to_ascii_lowercase().as_str() {
+        "b" => 1.0,
         "kib" => 1024.0,
         "mib" => 1024.0 * 1024.0,
         "gib" => 1024.0 * 1024.0 * 1024.0,

@@ -99,7 +99,7 @@ pub enum ColorChoice {
 
 /// How long an edge of a triangle may be in the plane.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "toml::Value", into = "String")]
+#[serde(try_from = "toml::Value", into = "toml::Value")]
 pub enum MaxEdge {
     /// As long as it is: the terrain is the whole triangulation.
     #[default]
@@ -128,19 +128,19 @@ impl TryFrom<toml::Value> for MaxEdge {
     }
 }
 
-impl From<MaxEdge> for String {
-    fn from(max_edge: MaxEdge) -> String {
+impl From<MaxEdge> for toml::Value {
+    fn from(max_edge: MaxEdge) -> toml::Value {
         match max_edge {
-            MaxEdge::None => "none".into(),
-            MaxEdge::Auto => "auto".into(),
-            MaxEdge::Length(length) => length.to_string(),
+            MaxEdge::None => toml::Value::String("none".into()),
+            MaxEdge::Auto => toml::Value::String("auto".into()),
+            MaxEdge::Length(length) => toml::Value::Float(length),
         }
     }
 }
 
 /// How many sites a coarser tile holds at the most.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(try_from = "toml::Value", into = "String")]
+#[serde(try_from = "toml::Value", into = "toml::Value")]
 pub struct MaxPointsPerLevelTile(pub u64);
 
 impl Default for MaxPointsPerLevelTile {
@@ -162,8 +162,8 @@ impl TryFrom<toml::Value> for MaxPointsPerLevelTile {
     }
 }
 
-impl From<MaxPointsPerLevelTile> for String {
-    fn from(sites: MaxPointsPerLevelTile) -> String {
-        sites.0.to_string()
+impl From<MaxPointsPerLevelTile> for toml::Value {
+    fn from(points: MaxPointsPerLevelTile) -> toml::Value {
+        toml::Value::Integer(points.0 as i64)
     }
 }

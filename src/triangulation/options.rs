@@ -30,7 +30,7 @@ pub enum Backend {
 
 /// The most sites that a tile holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(try_from = "toml::Value", into = "String")]
+#[serde(try_from = "toml::Value", into = "toml::Value")]
 pub struct MaxPointsPerTile(pub u64);
 
 impl MaxPointsPerTile {
@@ -56,8 +56,8 @@ impl TryFrom<toml::Value> for MaxPointsPerTile {
     }
 }
 
-impl From<MaxPointsPerTile> for String {
-    fn from(sites: MaxPointsPerTile) -> String {
-        sites.0.to_string()
+impl From<MaxPointsPerTile> for toml::Value {
+    fn from(points: MaxPointsPerTile) -> toml::Value {
+        toml::Value::Integer(points.0 as i64)
     }
 }

@@ -1,4 +1,4 @@
-//! A file read whole, for tests of the input.
+//! Reads whole files, for tests of the input.
 
 use std::path::Path;
 
@@ -8,15 +8,15 @@ use gdt_batch::input::{Point, PointCounts, PointRules, Source, TextOptions, open
 use rust_decimal::Decimal;
 use rust_decimal::prelude::ToPrimitive;
 
-/// A file, all its points, and the lattice they are on.
+/// A file, all its points, and the lattice on which they lie.
 pub(crate) struct Cloud {
     pub(crate) source: Source,
     pub(crate) lattice: Lattice,
     pub(crate) points: Vec<Point>,
-    pub(crate) tally: PointCounts,
+    pub(crate) counts: PointCounts,
 }
 
-/// A lattice for `source` with its middle in the middle, of the finer of the steps in x and y if that fits.
+/// Returns a lattice around the middle of `source`. Its step is the finer of the steps in x and y if that fits, else the coarser.
 pub(crate) fn lattice(source: &Source) -> Lattice {
     let middle = |axis: usize| {
         let value = (source.min[axis] + source.max[axis]) / 2.0;
@@ -29,6 +29,7 @@ pub(crate) fn lattice(source: &Source) -> Lattice {
     Lattice { offset: [middle(0), middle(1), Decimal::ZERO], resolution, resolution_z: source.axes[2].scale }
 }
 
+/// Returns rules that keep every point of `source` on `lattice`.
 pub(crate) fn rules(source: &Source, lattice: &Lattice) -> PointRules {
     let map = |axis: usize| {
         let own = source.axes[axis];
@@ -37,34 +38,35 @@ pub(crate) fn rules(source: &Source, lattice: &Lattice) -> PointRules {
     PointRules { maps: [map(0), map(1), map(2)], classes: [true; 256], bounds: None, first_order: 0, rgb: true }
 }
 
+/// Decodes all chunks in order and checks that the counts agree with the points.
 pub(crate) fn decode(source: &Source, rules: &PointRules) -> Result<(Vec<Point>, PointCounts)> {
-    let (mut points, mut tally) = (Vec::new(), PointCounts::default());
+    let (mut points, mut counts) = (Vec::new(), PointCounts::default());
     for chunk in 0..source.chunks() {
-        tally += source.decode(chunk, rules, &mut |slice| {
+        counts += source.decode(chunk, rules, &mut |slice| {
             assert!(!slice.is_empty() && slice.len() <= 65_536);
             points.extend_from_slice(slice);
             Ok(())
         })?;
     }
-    let dropped = tally.withheld + tally.other_class + tally.out_of_bounds + tally.malformed;
-    assert_eq!(tally.read, dropped + tally.kept);
-    assert_eq!(tally.kept, points.len() as u64);
-    assert_eq!(tally.read, source.records);
-    Ok((points, tally))
+    let dropped = counts.withheld + counts.other_class + counts.out_of_bounds + counts.malformed;
+    assert_eq!(counts.read, dropped + counts.kept);
+    assert_eq!(counts.kept, points.len() as u64);
+    assert_eq!(counts.read, source.records);
+    Ok((points, counts))
 }
 
 pub(crate) fn read_with(path: &Path, options: &TextOptions) -> Result<Cloud> {
     let source = open(path, options)?;
     let lattice = lattice(&source);
-    let (points, tally) = decode(&source, &rules(&source, &lattice))?;
-    Ok(Cloud { source, lattice, points, tally })
+    let (points, counts) = decode(&source, &rules(&source, &lattice))?;
+    Ok(Cloud { source, lattice, points, counts })
 }
 
 pub(crate) fn read(path: &Path) -> Result<Cloud> {
     read_with(path, &TextOptions::default())
 }
 
-/// A file of `bytes` under a name with `extension`, gone when dropped.
+/// Writes `bytes` to a file whose name ends in `extension`. Dropping the path removes the file.
 pub(crate) fn file(extension: &str, bytes: &[u8]) -> tempfile::TempPath {
     let file = tempfile::Builder::new().suffix(extension).tempfile().unwrap();
     std::fs::write(file.path(), bytes).unwrap();
@@ -75,7 +77,7 @@ pub(crate) fn read_bytes(extension: &str, bytes: &[u8]) -> Result<Cloud> {
     read(&file(extension, bytes))
 }
 
-/// Opens and decodes; whatever comes, it must come back.
+/// Opens and decodes `bytes`, which must not panic or hang.
 pub(crate) fn survives(extension: &str, bytes: &[u8]) {
     let path = file(extension, bytes);
     let Ok(source) = open(&path, &TextOptions::default()) else { return };

@@ -73,7 +73,7 @@ fn wrong_configurations_are_refused_with_the_line() {
         ("[output]", "classes = [300]\n[output]", &["line 3", "300"]),
         ("[output]", "duplicates = \"last\"\n[output]", &["line 3", "last", "lowest"]),
         ("[output]", "resolution = -1\n[output]", &["line 3", "resolution"]),
-        ("[output]", "max_malformed_fraction = 2.0\n[output]", &["line 3", "share"]),
+        ("[output]", "max_malformed_fraction = 2.0\n[output]", &["line 3", "fraction"]),
         ("[output]", "[input.csv]\ndelimeter = \",\"\n[output]", &["line 4", "delimeter"]),
         ("[output]", "[triangulation]\nmax_points_per_tile = 1\n[output]", &["line 4", "max_points_per_tile"]),
         ("[output]", "[triangulation]\nbackend = \"cuda\"\n[output]", &["line 4", "cuda"]),

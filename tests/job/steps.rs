@@ -2,6 +2,7 @@
 //! the triangulation of all sites at once.
 
 use gdt_batch::geometry::Site;
+use gdt_batch::job::durable::atomic_file::publish;
 use gdt_batch::job::durable::directory::JobDirectory;
 use gdt_batch::job::index::NodeIndex;
 use gdt_batch::job::mesh::leaf::triangulate_leaf;
@@ -10,6 +11,7 @@ use gdt_batch::job::options::JobOptions;
 use gdt_batch::job::partition::point_file::PointFile;
 use gdt_batch::job::partition::read::read_points;
 use gdt_batch::job::partition::result::Partition;
+use gdt_batch::job::plan::job_plan::Plan;
 use gdt_batch::job::plan::lattice_choice::LatticeCoarsening;
 use gdt_batch::job::plan::scan::make_plan;
 use gdt_batch::job::progress::stage::ProgressOutput;
@@ -30,6 +32,15 @@ fn canonical(mut corners: Triangle) -> Triangle {
     corners
 }
 
+/// The plan after it was written to its file and read back, as another process has it.
+fn written_and_read(plan: &Plan, directory: &JobDirectory) -> Plan {
+    let pending = plan.write(&directory.plan()).unwrap();
+    publish(&[pending.path]).unwrap();
+    let read = Plan::read(&directory.plan()).unwrap();
+    assert_eq!(serde_json::to_string(&read).unwrap(), serde_json::to_string(plan).unwrap());
+    read
+}
+
 /// Plans, reads, triangulates every leaf and merges every merge node.
 fn run_steps(job: &Job, options: &JobOptions) -> (Store, Partition) {
     let directory = JobDirectory::new(&job.out());
@@ -37,6 +48,7 @@ fn run_steps(job: &Job, options: &JobOptions) -> (Store, Partition) {
     let mut plan = make_plan(options, LatticeCoarsening::default()).unwrap();
     // The buffers get a sixth of this.
     plan.options.limits.memory.0 = 6 << 20;
+    let plan = written_and_read(&plan, &directory);
     let stage = ProgressOutput::Quiet.stage("read", 0, "points");
     let partition = read_points(&plan, &directory, &stage).unwrap();
     let store = Store::create(directory.store()).unwrap();

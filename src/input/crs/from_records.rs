@@ -1,16 +1,16 @@
 //! The one coordinate reference system of a file that may describe two.
 
-use crate::Result;
 use crate::input::crs::from_wkt;
 use crate::input::crs::geotiff::{self, GeoKeys};
 use crate::input::crs::system::Crs;
+use crate::{Result, Warnings};
 
-/// The system that the texts, in their order, and the keys of a file describe. Text wins over GeoTIFF keys; an empty one counts as
-/// none.
+/// Returns the system that a file describes by `texts`, of which the first readable one counts, or else by `keys`. An empty text
+/// counts as none.
 pub(crate) fn from_records(
     texts: impl Iterator<Item = Result<Vec<u8>>>,
     keys: &GeoKeys,
-    warnings: &mut Vec<String>,
+    warnings: &mut Warnings,
 ) -> Result<Crs> {
     let text = from_texts(texts, warnings)?;
     let keys = geotiff::parse(keys);
@@ -28,14 +28,14 @@ pub(crate) fn from_records(
     Ok(text.or(keys).unwrap_or_default())
 }
 
-fn from_texts(texts: impl Iterator<Item = Result<Vec<u8>>>, warnings: &mut Vec<String>) -> Result<Option<Crs>> {
+fn from_texts(texts: impl Iterator<Item = Result<Vec<u8>>>, warnings: &mut Warnings) -> Result<Option<Crs>> {
     for bytes in texts {
         let bytes = bytes?;
         let text = String::from_utf8_lossy(&bytes);
         match from_wkt::parse(&text) {
             Some(crs) => return Ok(Some(crs)),
             None if text.trim_matches(['\0', ' ', '"', '\'']).is_empty() => {}
-            None => warnings.push("its coordinate system is not well-known text that can be read".to_string()),
+            None => warnings.push("its coordinate system is not well-known text that can be read"),
         }
     }
     Ok(None)

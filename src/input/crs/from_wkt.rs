@@ -4,14 +4,14 @@ use crate::input::crs::system::Crs;
 use crate::input::crs::unit::Unit;
 use crate::input::crs::wkt::{GEOGRAPHIC, LOCAL, PROJECTED, VERTICAL, WktNode, length, parts, unbound, units};
 
-/// The system of an EPSG code.
+/// Returns the system of an EPSG code; `None` for a code that is not in the list of known ones.
 pub(crate) fn from_epsg(code: u32) -> Option<Crs> {
     let definition = crs_definitions::from_code(u16::try_from(code).ok()?)?;
     let crs = parse(definition.wkt)?;
     Some(Crs { epsg: Some(code), ..crs })
 }
 
-/// What `text` says; `None` where it is not well-known text of a coordinate reference system.
+/// Returns the system that `text` describes; `None` if it is not the well-known text of a coordinate reference system.
 pub(crate) fn parse(text: &str) -> Option<Crs> {
     let roots = WktNode::parse_all(text)?;
     let parts: Vec<&WktNode> = roots.iter().flat_map(parts).map(unbound).collect();
@@ -23,14 +23,15 @@ pub(crate) fn parse(text: &str) -> Option<Crs> {
     Some(Crs {
         wkt: Some(text.trim_end_matches(['\0', ' ', '\n', '\r', '\t']).to_string()),
         epsg: epsg(horizontal),
-        horizontal: unit.map_or(Unit::Unknown, |unit| if geographic { angle(unit) } else { Unit::of(length(unit)) }),
+        horizontal: unit
+            .map_or(Unit::Unknown, |unit| if geographic { angle(unit) } else { Unit::from_metres(length(unit)) }),
         vertical,
         name: horizontal.text(0).map(str::to_string).filter(|name| !name.is_empty()),
     })
 }
 
 fn angle(unit: &WktNode) -> Unit {
-    if unit.keyword == "LENGTHUNIT" { Unit::of(length(unit)) } else { Unit::Degree }
+    if unit.keyword == "LENGTHUNIT" { Unit::from_metres(length(unit)) } else { Unit::Degree }
 }
 
 fn epsg(node: &WktNode) -> Option<u32> {
@@ -68,21 +69,21 @@ mod tests {
     }
 
     #[test]
-    fn geographic_systems_are_in_degrees_and_bound_ones_are_looked_into() {
+    fn geographic_systems_are_in_degrees_and_a_bound_system_is_its_source() {
         assert_eq!(parse(r#"GEOGCS["WGS 84",UNIT["degree",0.0174532925199433]]"#).unwrap().horizontal, Unit::Degree);
         let bound = r#"BOUNDCRS[SOURCECRS[PROJCRS["P",LENGTHUNIT["metre",1]]],TARGETCRS[GEOGCRS["W"]]]"#;
         assert_eq!(parse(bound).unwrap().horizontal, Unit::Metre);
     }
 
     #[test]
-    fn two_systems_side_by_side_are_a_compound_one() {
+    fn two_systems_separated_by_a_comma_are_a_compound_system() {
         let text = r#"PROJCS["P",GEOGCS["G",UNIT["Degree",0.0174]],UNIT["Foot_US",0.3048006096012192]],VERTCS["V",UNIT["Meter",1.0]]"#;
         let crs = parse(text).unwrap();
         assert_eq!((crs.horizontal, crs.vertical, crs.name.as_deref()), (Unit::UsFoot, Some(1.0), Some("P")));
     }
 
     #[test]
-    fn damage_is_no_system() {
+    fn damaged_text_is_no_system() {
         let deep = "A[".repeat(100_000);
         for text in
             ["", "hello", "PROJCS[", r#"PROJCS["x""#, "PROJCS[]]", "VERT_CS[\"v\",UNIT[\"metre\",1]]", deep.as_str()]

@@ -1,4 +1,4 @@
-//! Coordinate reference systems as GeoTIFF keys (OGC 19-008r4, as LAS holds them in three records).
+//! Coordinate reference systems as GeoTIFF keys (OGC 19-008r4), which LAS stores in three records.
 
 use crate::input::crs::from_wkt::from_epsg;
 use crate::input::crs::system::Crs;
@@ -14,25 +14,28 @@ const VERTICAL_UNITS: u16 = 4099;
 /// The citations of the projected, the geographic and any system.
 const CITATIONS: [u16; 3] = [3073, 2049, 1026];
 
-/// A code of this value stands for a definition in other keys.
+/// The code that stands for a definition in other keys.
 const USER_DEFINED: u16 = 32767;
 
-/// Where the values of keys are that do not fit the directory.
-const DOUBLES: u16 = 34736;
-const TEXTS: u16 = 34737;
+/// The record of the key directory.
+pub(crate) const DIRECTORY: u16 = 34735;
+/// The record of the 64-bit floating-point values.
+pub(crate) const DOUBLES: u16 = 34736;
+/// The record of the texts.
+pub(crate) const TEXTS: u16 = 34737;
 
-/// The three records, as they are in the file.
+/// The bytes of the three records, as they are in the file.
 pub(crate) struct GeoKeys {
-    /// The key directory: numbers of 16 bits.
+    /// [`DIRECTORY`]: 16-bit integers.
     pub(crate) directory: Vec<u8>,
-    /// Values of 64 bits.
+    /// [`DOUBLES`].
     pub(crate) doubles: Vec<u8>,
-    /// Texts.
+    /// [`TEXTS`].
     pub(crate) texts: Vec<u8>,
 }
 
 impl GeoKeys {
-    /// The place, count and value of `key`.
+    /// Returns the record, count and value (or index in the record) of `key`.
     fn entry(&self, key: u16) -> Option<(u16, u16, u16)> {
         let numbers = |index: usize| self.directory.chunks_exact(8).nth(index);
         let count = uint16(numbers(0)?, 6) as usize;
@@ -41,23 +44,23 @@ impl GeoKeys {
     }
 
     fn code(&self, key: u16) -> Option<u16> {
-        self.entry(key).filter(|(place, ..)| *place == 0).map(|(_, _, value)| value).filter(|value| *value != 0)
+        self.entry(key).filter(|(record, ..)| *record == 0).map(|(_, _, value)| value).filter(|value| *value != 0)
     }
 
     fn double(&self, key: u16) -> Option<f64> {
-        let (place, _, index) = self.entry(key)?;
+        let (record, _, index) = self.entry(key)?;
         let bytes = self.doubles.chunks_exact(8).nth(index as usize)?;
-        (place == DOUBLES).then(|| float64(bytes, 0))
+        (record == DOUBLES).then(|| float64(bytes, 0))
     }
 
     fn text(&self, key: u16) -> Option<String> {
-        let (place, count, start) = self.entry(key)?;
+        let (record, count, start) = self.entry(key)?;
         let bytes = self.texts.get(start as usize..start as usize + count as usize)?;
         let text = String::from_utf8_lossy(bytes).trim_matches(['|', '\0', ' ']).to_string();
-        (place == TEXTS && !text.is_empty()).then_some(text)
+        (record == TEXTS && !text.is_empty()).then_some(text)
     }
 
-    /// The linear unit of the plane, if a key gives one.
+    /// Returns the metres of the unit of x and y, if a key gives it.
     fn linear_unit(&self) -> Option<f64> {
         match self.code(LINEAR_UNITS)? {
             USER_DEFINED => self.double(LINEAR_UNIT_SIZE).filter(|size| size.is_finite() && *size > 0.0),
@@ -66,18 +69,18 @@ impl GeoKeys {
     }
 }
 
-/// Metres of a unit of length by its EPSG code.
+/// Returns the metres of a unit of length by its EPSG code.
 fn metres(code: u16) -> Option<f64> {
     match code {
         9001 => Some(1.0),
-        9002 => Some(0.3048),
+        9002 => Some(Unit::FOOT),
         9003 => Some(Unit::US_FOOT),
         9036 => Some(1000.0),
         _ => None,
     }
 }
 
-/// What the keys say; `None` where they say nothing.
+/// Returns the system that the keys describe; `None` if they say nothing.
 pub(crate) fn parse(records: &GeoKeys) -> Option<Crs> {
     let model = records.code(MODEL_TYPE);
     let projected = records.code(PROJECTED_TYPE).filter(|_| model != Some(2));
@@ -87,11 +90,11 @@ pub(crate) fn parse(records: &GeoKeys) -> Option<Crs> {
     let degrees = projected.is_none() && (model == Some(2) || (model.is_none() && epsg.is_some()));
     let horizontal = match records.linear_unit() {
         _ if degrees => Unit::Degree,
-        Some(metres) => Unit::of(Some(metres)),
+        Some(metres) => Unit::from_metres(Some(metres)),
         None => known.horizontal,
     };
     let crs = Crs {
-        // The text of the code would say the wrong unit where a key says another.
+        // If a key gives another unit than the code, the text of the code would be wrong.
         wkt: known.wkt.filter(|_| known.horizontal == horizontal),
         epsg,
         horizontal,
@@ -131,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn units_and_names_of_the_users_own() {
+    fn user_defined_units_and_names_are_read() {
         let keys = [
             [1024, 0, 1, 1],
             [1026, TEXTS, 8, 0],
@@ -144,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn geographic_systems_are_in_degrees_and_damage_says_nothing() {
+    fn geographic_systems_are_in_degrees_and_damaged_keys_are_no_system() {
         assert_eq!(parse(&records(&[[1024, 0, 1, 2], [2048, 0, 1, 4326]], &[])).unwrap().horizontal, Unit::Degree);
         assert_eq!(parse(&records(&[[3076, DOUBLES, 9, 9], [1026, TEXTS, 9, 9000]], &[])), None);
         let cut = GeoKeys { directory: vec![1, 0, 1], doubles: Vec::new(), texts: Vec::new() };

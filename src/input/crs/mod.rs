@@ -1,4 +1,5 @@
-//! Coordinate reference systems, as far as a terrain needs them: the units, a text for readers, and whether two agree.
+//! Coordinate reference systems, as far as a terrain needs them: the units, a text for readers, and whether two systems agree.
+//! This room knows no files: the readers of file formats hand it the records that describe the system.
 
 pub(crate) mod from_records;
 pub(crate) mod from_wkt;

@@ -1,9 +1,9 @@
-//! The definition of a projected system in the way of PROJ.4, from its EPSG code or from its well-known text.
+//! The definition of a projected system as a PROJ.4 string, from its EPSG code or from its well-known text.
 
 use crate::input::crs::wkt::{PROJECTED, WktNode, comparable_name, find};
 
-/// Parameters of projections: names in WKT, letters and digits in lower case, and that of PROJ.4.
-const PARAMETERS: [(&str, &str); 20] = [
+/// The parameters of projections: the name in well-known text, as `comparable_name` spells it, and the name in PROJ.4.
+const PARAMETERS: [(&str, &str); 19] = [
     ("centralmeridian", "lon_0"),
     ("longitudeofcenter", "lon_0"),
     ("longitudeoforigin", "lon_0"),
@@ -23,10 +23,9 @@ const PARAMETERS: [(&str, &str); 20] = [
     ("eastingatfalseorigin", "x_0"),
     ("falsenorthing", "y_0"),
     ("northingatfalseorigin", "y_0"),
-    ("azimuth", "alpha"),
 ];
 
-/// Projections whose parameters these are.
+/// The projections that can be written as PROJ.4: the name of the method in well-known text and the name in PROJ.4.
 const METHODS: [(&str, &str); 10] = [
     ("transversemercator", "tmerc"),
     ("gausskruger", "tmerc"),
@@ -40,7 +39,7 @@ const METHODS: [(&str, &str); 10] = [
     ("lambertazimuthalequalarea", "laea"),
 ];
 
-/// The definition of the system of this code or this text; `None` where neither gives one.
+/// Returns the definition of the system of this code, or else of this text; `None` if neither gives one.
 pub(crate) fn definition(epsg: Option<u32>, wkt: Option<&str>) -> Option<String> {
     let of_code = |code| Some(crs_definitions::from_code(u16::try_from(code).ok()?)?.proj4.to_string());
     epsg.and_then(of_code).or_else(|| of_text(wkt?))
@@ -57,14 +56,10 @@ fn of_text(text: &str) -> Option<String> {
         let (name, value) = (comparable_name(parameter.text(0)?), parameter.number(1)?);
         let (_, short) = PARAMETERS.iter().find(|(long, _)| *long == name)?;
         // PROJ.4 takes false eastings and northings in metres.
-        let factor = if short.ends_with("_0") && (*short == "x_0" || *short == "y_0") {
-            parameter.unit_metres().unwrap_or(metres)
-        } else {
-            1.0
-        };
+        let factor = if *short == "x_0" || *short == "y_0" { parameter.unit_metres().unwrap_or(metres) } else { 1.0 };
         words.push(format!("+{short}={}", value * factor));
     }
-    // A cone with one parallel has it at the origin.
+    // A cone with one standard parallel has it at the origin.
     let latitude = words.iter().find_map(|word| word.strip_prefix("+lat_0="));
     if *projection == "lcc" && !words.iter().any(|word| word.starts_with("+lat_1=")) {
         words.push(format!("+lat_1={}", latitude?));
@@ -74,7 +69,8 @@ fn of_text(text: &str) -> Option<String> {
     Some(words.join(" "))
 }
 
-/// The ellipsoid, and the shift to WGS 84 where the text gives it; else none, which is off by a metre or two for NAD83 and ETRS89.
+/// Returns the ellipsoid and the shift to WGS 84. If the text gives no shift, the shift is zero for the datums that agree with
+/// WGS 84 to a metre or two, such as NAD83 and ETRS89, and unknown for all others.
 fn datum(system: &WktNode) -> Option<String> {
     let base = system.child(&["GEOGCS", "BASEGEOGCRS", "BASEGEODCRS"])?;
     let datum = base.child(&["DATUM", "TRF", "GEODETICDATUM", "ENSEMBLE"])?;
@@ -90,7 +86,7 @@ fn datum(system: &WktNode) -> Option<String> {
     greenwich.then(|| format!("{shape} +towgs84={shift}"))
 }
 
-/// Whether the datum is one of those that agree with WGS 84 to a metre or two.
+/// Returns whether the datum is one of those that agree with WGS 84 to a metre or two.
 fn is_close_to_wgs84(base: &WktNode) -> bool {
     let name = comparable_name(base.text(0).unwrap_or_default());
     [
@@ -121,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn a_text_in_feet_gives_metres() {
+    fn false_eastings_in_feet_are_converted_to_metres() {
         let text = r#"PROJCS["a",GEOGCS["GCS_North_American_1983_HARN",DATUM["d",SPHEROID["GRS 1980",6378137,298.25]],
             PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]],PROJECTION["Lambert_Conformal_Conic_2SP"],
             PARAMETER["standard_parallel_1",43],PARAMETER["standard_parallel_2",45.5],PARAMETER["latitude_of_origin",41.75],
@@ -132,7 +128,7 @@ mod tests {
             "+proj=lcc +lat_1=43 +lat_2=45.5 +lat_0=41.75 +lon_0=-120.5 +x_0=304.8 +y_0=0 +a=6378137 +rf=298.25 +towgs84=0,0,0 \
              +to_meter=0.3048 +no_defs"
         );
-        // A datum that may be hundreds of metres off is not guessed.
+        // The shift of a datum that may be hundreds of metres off is not guessed.
         let other = text.replace("GCS_North_American_1983_HARN", "European 1950");
         assert_eq!(definition(None, Some(&other)), None);
     }

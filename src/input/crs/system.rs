@@ -1,4 +1,4 @@
-//! Coordinate reference systems, as far as a terrain needs them: the units, a text for readers, and whether two agree.
+//! What a file says about its coordinate reference system, and whether two files agree.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,30 +6,30 @@ use crate::input::crs::proj4;
 use crate::input::crs::unit::Unit;
 use crate::input::crs::wkt::{self, comparable_name};
 
-/// What a file says of its coordinate reference system.
+/// What a file says about its coordinate reference system.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Crs {
-    /// Its well-known text, version 1 or 2; where the file has only a code, the text of that code.
+    /// Its well-known text, version 1 or 2. If the file has only an EPSG code, this is the text of that code.
     pub wkt: Option<String>,
     /// The EPSG code of the horizontal system.
     pub epsg: Option<u32>,
     /// The unit of x and y.
     pub horizontal: Unit,
-    /// Metres of one unit of z, where the file says it.
+    /// The length of one unit of z in metres, if the file gives it.
     pub vertical: Option<f64>,
     /// The name of the horizontal system.
     pub name: Option<String>,
 }
 
 impl Crs {
-    /// Metres of one unit of x and y; `None` for degrees and where it is not known.
+    /// Returns the length of one unit of x and y in metres; `None` for degrees and for an unknown unit.
     pub fn metres_per_unit(&self) -> Option<f64> {
         self.horizontal.metres_per_unit()
     }
 
-    /// Whether nothing says that the two differ: what one does not know agrees with anything. Compared are the units, the
-    /// EPSG codes; where one has no code, texts by the parameters of their projections or their names, and names alone where
-    /// neither has a text.
+    /// Returns whether nothing says that the two systems differ: what one file does not say agrees with anything. Units must
+    /// agree. If both have an EPSG code, the codes decide. If both have a text, the parameters of the projections or the names
+    /// must agree. If neither has a text, the names must agree.
     pub fn same_as(&self, other: &Crs) -> bool {
         if !same_unit(self.horizontal, other.horizontal) || differ(self.vertical, other.vertical, close) {
             return false;
@@ -38,29 +38,29 @@ impl Crs {
             return own == others;
         }
         match (&self.wkt, &other.wkt) {
-            (Some(own), Some(others)) => same_text(own, others) || self.same_name(other),
+            (Some(own), Some(others)) => same_projection(own, others) || self.same_name(other),
             (None, None) => self.same_name(other),
             _ => true,
         }
     }
 
-    /// Its definition in the way of PROJ.4, which leads to longitude and latitude; `None` where that is not known.
-    pub fn definition(&self) -> Option<String> {
+    /// Returns the system's definition as a PROJ.4 string, from which longitude and latitude can be computed; `None` if neither
+    /// the code nor the text gives one.
+    pub fn proj4_definition(&self) -> Option<String> {
         proj4::definition(self.epsg, self.wkt.as_deref())
     }
 
-    /// The name of the system of its heights, where the text gives one.
+    /// Returns the name of the vertical system, if the text gives one.
     pub fn vertical_name(&self) -> Option<String> {
         wkt::vertical_name(self.wkt.as_deref()?)
     }
 
     fn same_name(&self, other: &Crs) -> bool {
-        !differ(self.name.as_deref(), other.name.as_deref(), |own, others| {
-            comparable_name(own) == comparable_name(others)
-        })
+        let same = |own, others| comparable_name(own) == comparable_name(others);
+        !differ(self.name.as_deref(), other.name.as_deref(), same)
     }
 
-    /// A short name for messages.
+    /// Returns a short name for messages.
     pub fn label(&self) -> String {
         match (&self.name, self.epsg) {
             (Some(name), Some(code)) => format!("{name} (EPSG:{code})"),
@@ -79,6 +79,7 @@ fn same_unit(own: Unit, others: Unit) -> bool {
     }
 }
 
+/// Returns whether both are known and not the same.
 fn differ<T: Copy>(own: Option<T>, others: Option<T>, same: impl Fn(T, T) -> bool) -> bool {
     matches!((own, others), (Some(own), Some(others)) if !same(own, others))
 }
@@ -87,9 +88,9 @@ fn close(own: f64, others: f64) -> bool {
     (own - others).abs() <= 1e-8 * own.abs().max(others.abs()).max(1e-3)
 }
 
-/// Whether both project, and with the same parameters. Writers leave out some and spell others differently, so only those
-/// of one name are compared.
-fn same_text(own: &str, others: &str) -> bool {
+/// Returns whether both texts describe a projection and the parameters that both name are equal. Writers leave out some
+/// parameters and spell others differently, so only parameters of the same name are compared.
+fn same_projection(own: &str, others: &str) -> bool {
     let (own, others) = (wkt::parameters(own), wkt::parameters(others));
     let both = !own.is_empty() && !others.is_empty();
     both && own.iter().all(|(name, value)| others.iter().all(|(other, theirs)| name != other || close(*value, *theirs)))
@@ -101,7 +102,7 @@ mod tests {
     use crate::input::crs::from_wkt::from_epsg;
 
     #[test]
-    fn what_is_not_known_agrees_and_what_differs_does_not() {
+    fn unknown_parts_agree_and_different_parts_do_not() {
         let utm = from_epsg(26915).unwrap();
         let named = Crs { epsg: None, ..utm.clone() };
         assert!(Crs::default().same_as(&utm) && utm.same_as(&Crs::default()));

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A unit of x and y.
+/// The unit of x and y.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Unit {
@@ -10,11 +10,11 @@ pub enum Unit {
     Metre,
     /// The international foot, 0.3048 m.
     Foot,
-    /// The foot of the US survey, 1200/3937 m.
+    /// The US survey foot, 1200/3937 m.
     UsFoot,
     /// Degrees of longitude and latitude, or another angle.
     Degree,
-    /// Another unit of so many metres.
+    /// Another unit of length, in metres.
     Other(f64),
     /// The file does not say.
     #[default]
@@ -22,33 +22,36 @@ pub enum Unit {
 }
 
 impl Unit {
-    /// Metres of the foot of the US survey.
+    /// The international foot in metres.
+    pub const FOOT: f64 = 0.3048;
+
+    /// The US survey foot in metres.
     pub const US_FOOT: f64 = 1200.0 / 3937.0;
 
-    /// The unit of so many metres. The two feet differ by 6e-7 m; texts give them with 9 digits or more.
-    pub(crate) fn of(metres: Option<f64>) -> Unit {
+    /// Returns the unit of this length. The two feet differ by 6e-7 m; files give them with 9 digits or more.
+    pub(crate) fn from_metres(metres: Option<f64>) -> Unit {
         let near = |value: f64, other: f64| (value - other).abs() < 1e-8;
         match metres {
             None => Unit::Unknown,
             Some(value) if near(value, 1.0) => Unit::Metre,
-            Some(value) if near(value, 0.3048) => Unit::Foot,
+            Some(value) if near(value, Unit::FOOT) => Unit::Foot,
             Some(value) if near(value, Unit::US_FOOT) => Unit::UsFoot,
             Some(value) => Unit::Other(value),
         }
     }
 
-    /// Metres of one unit; `None` for angles and where it is not known.
+    /// Returns the length of one unit in metres; `None` for angles and for an unknown unit.
     pub fn metres_per_unit(&self) -> Option<f64> {
         match self {
             Unit::Metre => Some(1.0),
-            Unit::Foot => Some(0.3048),
+            Unit::Foot => Some(Unit::FOOT),
             Unit::UsFoot => Some(Unit::US_FOOT),
             Unit::Other(metres) => Some(*metres),
             Unit::Degree | Unit::Unknown => None,
         }
     }
 
-    /// The unit's name for a reader.
+    /// Returns the unit's name for messages.
     pub fn name(&self) -> String {
         match self {
             Unit::Metre => "metre".into(),
@@ -67,8 +70,8 @@ mod tests {
 
     #[test]
     fn the_two_feet_are_told_apart() {
-        assert_eq!(Unit::of(Some(0.3048)), Unit::Foot);
-        assert_eq!(Unit::of(Some(0.304800609601219)), Unit::UsFoot);
-        assert_eq!(Unit::of(Some(0.3048006096)), Unit::UsFoot);
+        assert_eq!(Unit::from_metres(Some(0.3048)), Unit::Foot);
+        assert_eq!(Unit::from_metres(Some(0.304800609601219)), Unit::UsFoot);
+        assert_eq!(Unit::from_metres(Some(0.3048006096)), Unit::UsFoot);
     }
 }

@@ -1,24 +1,25 @@
 //! Well-known text of coordinate reference systems, versions 1 (OGC 01-009) and 2 (ISO 19162): units, names, codes.
 
-/// Nesting deeper than this is damage.
+/// The deepest nesting that is read; deeper text is damaged.
 const DEEPEST: usize = 40;
 
-/// `KEYWORD[value, value, ...]`.
+/// A node of the text: `KEYWORD[value, value, ...]`.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct WktNode {
     pub(crate) keyword: String,
     values: Vec<WktValue>,
 }
 
+/// A value of a node.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum WktValue {
+enum WktValue {
     Text(String),
     Number(f64),
     WktNode(WktNode),
 }
 
 impl WktNode {
-    /// The systems that `text` holds: one, or as some writers have it a horizontal and a vertical one parted by a comma.
+    /// Returns the systems in `text`: one, or, from some writers, a horizontal and a vertical one separated by a comma.
     pub(crate) fn parse_all(text: &str) -> Option<Vec<WktNode>> {
         const FILLING: [char; 5] = ['\0', ' ', '\n', '\r', '\t'];
         let mut rest = text.trim_matches(FILLING);
@@ -66,7 +67,7 @@ impl WktNode {
         if let Some(WktValue::Text(text)) = self.values.get(index) { Some(text) } else { None }
     }
 
-    /// Metres of its unit of length.
+    /// Returns the metres of its unit of length.
     pub(crate) fn unit_metres(&self) -> Option<f64> {
         units(self).0.and_then(length)
     }
@@ -96,7 +97,7 @@ impl WktValue {
     }
 }
 
-/// The text up to the closing quote, where a doubled quote stands for one.
+/// Reads the text up to the closing quote; a doubled quote stands for one.
 fn read_quoted<'a>(quoted: &'a str, rest: &mut &'a str) -> Option<WktValue> {
     let mut text = String::new();
     let mut left = quoted;
@@ -123,19 +124,19 @@ pub(crate) const VERTICAL: [&str; 4] = ["VERT_CS", "VERTCS", "VERTCRS", "VERTICA
 const COMPOUND: [&str; 2] = ["COMPD_CS", "COMPOUNDCRS"];
 const UNITS: [&str; 3] = ["UNIT", "LENGTHUNIT", "ANGLEUNIT"];
 
-/// The part of the system in `text` whose keyword is one of these.
+/// Returns the first part of the system in `text` that has one of these keywords.
 pub(crate) fn find(text: &str, keywords: &[&str]) -> Option<WktNode> {
     let roots = WktNode::parse_all(text)?;
     let mut parts = roots.iter().flat_map(parts).map(unbound);
     parts.find(|part| keywords.contains(&part.keyword.as_str())).cloned()
 }
 
-/// The name of the vertical system in `text`.
+/// Returns the name of the vertical system in `text`.
 pub(crate) fn vertical_name(text: &str) -> Option<String> {
     find(text, &VERTICAL)?.text(0).map(str::to_string).filter(|name| !name.is_empty())
 }
 
-/// The parameters of the projection in `text`, names in one spelling, sorted; empty where there are none.
+/// Returns the parameters of the projection in `text`, sorted by name; names are as [`comparable_name`] spells them.
 pub(crate) fn parameters(text: &str) -> Vec<(String, f64)> {
     let mut found = Vec::new();
     for root in WktNode::parse_all(text).unwrap_or_default() {
@@ -151,18 +152,18 @@ fn collect_parameters(node: &WktNode, found: &mut Vec<(String, f64)>) {
     {
         found.push((comparable_name(name), value));
     }
-    // The base of a bound system also carries parameters, those of the datum shift, which say nothing of the plane.
+    // A bound system also has parameters of its datum shift, which say nothing about the projection.
     for child in node.children().filter(|child| child.keyword != "ABRIDGEDTRANSFORMATION") {
         collect_parameters(child, found);
     }
 }
 
-/// The parts of a compound system, or the system itself.
+/// Returns the parts of a compound system, or the system itself.
 pub(crate) fn parts(node: &WktNode) -> Vec<&WktNode> {
     if COMPOUND.contains(&node.keyword.as_str()) { node.children().collect() } else { vec![node] }
 }
 
-/// The system that a bound one is about.
+/// Returns the source system of a bound system, or the system itself.
 pub(crate) fn unbound(node: &WktNode) -> &WktNode {
     if node.keyword != "BOUNDCRS" {
         return node;
@@ -170,7 +171,7 @@ pub(crate) fn unbound(node: &WktNode) -> &WktNode {
     node.child(&["SOURCECRS"]).and_then(|source| source.children().next()).unwrap_or(node)
 }
 
-/// The unit of the first axis, or of all, and that of a third axis if there is one.
+/// Returns the unit of the first axis, or of all axes, and the unit of the third axis if there is one.
 pub(crate) fn units(node: &WktNode) -> (Option<&WktNode>, Option<&WktNode>) {
     let common = node.child(&UNITS);
     let axes: Vec<&WktNode> = node.children().filter(|child| child.keyword == "AXIS").collect();
@@ -179,7 +180,7 @@ pub(crate) fn units(node: &WktNode) -> (Option<&WktNode>, Option<&WktNode>) {
     (of_axis(0).or(common), third)
 }
 
-/// Metres of a unit of length.
+/// Returns the metres of a unit of length; `None` for an angle.
 pub(crate) fn length(unit: &WktNode) -> Option<f64> {
     let factor = unit.number(1).filter(|factor| factor.is_finite() && *factor > 0.0)?;
     (unit.keyword != "ANGLEUNIT" && !is_angle_name(unit)).then_some(factor)
@@ -190,7 +191,7 @@ fn is_angle_name(unit: &WktNode) -> bool {
     name.starts_with("degree") || name.starts_with("radian") || name.starts_with("grad")
 }
 
-/// Letters and digits of a name in lower case: writers disagree on the rest.
+/// Returns the letters and digits of a name in lower case: writers disagree on the rest.
 pub(crate) fn comparable_name(name: &str) -> String {
     name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
 }

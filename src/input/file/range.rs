@@ -1,4 +1,4 @@
-//! A part of a file as a stream.
+//! A range of a file's bytes as a stream.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -6,29 +6,30 @@ use std::ops::Range;
 
 use crate::positional_io::read_at;
 
-/// What to say of a file that ends before its size.
+/// The message for a file that ends before the size it had when it was opened.
 pub(crate) const SHRUNK: &str = "it became shorter while it was read; run again when it is complete";
 
-/// Bytes a [`FileRange`] reads at once.
+/// The number of bytes that a [`FileRange`] reads at once.
 const BUFFER: usize = 1 << 16;
 
-/// A part of a file as a stream that ends where the part ends. Skipped bytes are not read.
+/// A buffered reader of a range of a file. It ends where the range ends, and does not read the bytes that a caller skips.
 pub(crate) struct FileRange {
     file: File,
-    /// Position in the file of the first byte after the buffer.
+    /// The position in the file of the first byte after the buffer.
     next: u64,
     end: u64,
     buffer: Vec<u8>,
+    /// The position in the buffer of the next byte to hand out.
     at: usize,
 }
 
 impl FileRange {
-    /// A reader of the bytes of `range` of `file`.
+    /// Returns a reader of the bytes of `range` in `file`.
     pub(crate) fn new(file: File, range: Range<u64>) -> FileRange {
         FileRange { file, next: range.start, end: range.end, buffer: Vec::new(), at: 0 }
     }
 
-    /// Reads on into `out`, as much as is left of the part. That there is less in the file is an error.
+    /// Reads into `out` past the buffer, at most to the end of the range. Fails if the file ends before the range does.
     fn read_direct(&mut self, out: &mut [u8]) -> io::Result<usize> {
         let size = self.end.saturating_sub(self.next).min(out.len() as u64) as usize;
         if size == 0 {
@@ -91,7 +92,7 @@ impl Read for FileRange {
 }
 
 impl Seek for FileRange {
-    /// Positions are those of the file.
+    /// Seeks to a position, which counts from the start of the file and not of the range.
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         let here = self.next - (self.buffer.len() - self.at) as u64;
         let target = match to {

@@ -4,14 +4,19 @@ use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Once;
 
+/// The message of a panic.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub(crate) struct Panicked(String);
+
 thread_local! {
     static QUIET: Cell<bool> = const { Cell::new(false) };
 }
 
 static HOOK: Once = Once::new();
 
-/// Runs `work`; a panic in it stays off the screen and comes back as its message.
-pub(crate) fn catch_panic<T>(work: impl FnOnce() -> T) -> Result<T, String> {
+/// Runs `work`. If it panics, returns the panic's message and prints nothing. The caller must drop what `work` was changing.
+pub(crate) fn catch_panic<T>(work: impl FnOnce() -> T) -> Result<T, Panicked> {
     HOOK.call_once(|| {
         let shown = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |info| {
@@ -21,12 +26,11 @@ pub(crate) fn catch_panic<T>(work: impl FnOnce() -> T) -> Result<T, String> {
         }));
     });
     QUIET.set(true);
-    // The caller drops what `work` was changing when it fails.
     let result = catch_unwind(AssertUnwindSafe(work));
     QUIET.set(false);
     result.map_err(|payload| {
         let text = payload.downcast_ref::<&str>().map(|s| s.to_string());
-        text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no message".to_string())
+        Panicked(text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no message".to_string()))
     })
 }
 
@@ -35,10 +39,10 @@ mod tests {
     use super::catch_panic;
 
     #[test]
-    fn a_panic_comes_back_as_its_message() {
+    fn a_panic_becomes_its_message() {
         assert_eq!(catch_panic(|| 7), Ok(7));
         let bytes: Vec<u8> = Vec::new();
-        let message = catch_panic(|| bytes[3]).unwrap_err();
+        let message = catch_panic(|| bytes[3]).unwrap_err().to_string();
         assert!(message.contains("out of bounds"), "{message}");
     }
 }

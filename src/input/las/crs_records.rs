@@ -1,26 +1,29 @@
 //! The records of a LAS file that describe its coordinate reference system.
 
-use crate::Result;
 use crate::input::crs::from_records::from_records;
-use crate::input::crs::geotiff::GeoKeys;
+use crate::input::crs::geotiff::{DIRECTORY, DOUBLES, GeoKeys, TEXTS};
 use crate::input::crs::system::Crs;
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::las::vlr::Vlr;
+use crate::{Result, Warnings};
 
-/// The users under which well-known text is stored: LAS 1.4's, and that of libLAS before it.
-const TEXT_RECORDS: [(&str, u16); 2] = [("LASF_Projection", 2112), ("liblas", 2112)];
+/// The user of the records that LAS itself defines.
+const PROJECTION: &str = "LASF_Projection";
 
-/// The system that the records of `file` describe.
-pub(crate) fn read(file: &RandomAccessFile, vlrs: &[Vlr], warnings: &mut Vec<String>) -> Result<Crs> {
+/// User and id of the records that hold well-known text: the record of LAS 1.4, and the earlier one of libLAS.
+const TEXT_RECORDS: [(&str, u16); 2] = [(PROJECTION, 2112), ("liblas", 2112)];
+
+/// Returns the system that the records of `file` describe.
+pub(crate) fn read(file: &RandomAccessFile, vlrs: &[Vlr], warnings: &mut Warnings) -> Result<Crs> {
     let texts = TEXT_RECORDS.iter().flat_map(|(user, id)| vlrs.iter().filter(|vlr| vlr.is(user, *id)));
     let keys = GeoKeys {
-        directory: record(file, vlrs, 34735)?,
-        doubles: record(file, vlrs, 34736)?,
-        texts: record(file, vlrs, 34737)?,
+        directory: record(file, vlrs, DIRECTORY)?,
+        doubles: record(file, vlrs, DOUBLES)?,
+        texts: record(file, vlrs, TEXTS)?,
     };
     from_records(texts.map(|vlr| vlr.read(file)), &keys, warnings)
 }
 
 fn record(file: &RandomAccessFile, vlrs: &[Vlr], id: u16) -> Result<Vec<u8>> {
-    vlrs.iter().find(|vlr| vlr.is("LASF_Projection", id)).map_or(Ok(Vec::new()), |vlr| vlr.read(file))
+    vlrs.iter().find(|vlr| vlr.is(PROJECTION, id)).map_or(Ok(Vec::new()), |vlr| vlr.read(file))
 }

@@ -1,23 +1,25 @@
 //! Where the fields of a LAS point record lie, by point format.
 
+use serde::{Deserialize, Serialize};
+
 use crate::input::file::bytes::{int32, uint16};
 use crate::input::points::record::PointRecord;
 
 /// The least record length of each point format, in bytes (LAS 1.4 R15, section 2.6).
-pub(crate) const LENGTHS: [u16; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
+pub(crate) const LEAST_LENGTHS: [u16; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
 
 /// The positions of the fields that are read, in bytes from the start of a record.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct RecordLayout {
-    /// PointRecord length in bytes, extra bytes included.
+    /// Record length in bytes, including extra bytes.
     pub(crate) length: usize,
-    /// Whether this is a format of LAS 1.4 (6 to 10).
-    pub(crate) extended: bool,
+    /// Whether this is a point format of LAS 1.4 (6 to 10).
+    extended: bool,
     rgb: Option<usize>,
 }
 
 impl RecordLayout {
-    /// The layout of point format `format` (0 to 10) with records of `length` bytes.
+    /// Returns the layout of point format `format` (0 to 10) with records of `length` bytes.
     pub(crate) fn new(format: u8, length: u16) -> RecordLayout {
         let rgb = match format {
             2 => Some(20),
@@ -28,7 +30,7 @@ impl RecordLayout {
         RecordLayout { length: length as usize, extended: format >= 6, rgb }
     }
 
-    /// Whether records hold red, green and blue.
+    /// Returns whether records hold red, green and blue.
     pub(crate) fn has_rgb(&self) -> bool {
         self.rgb.is_some()
     }

@@ -1,17 +1,17 @@
 //! Compressed point records: LASzip chunks, pointwise and layered, each decoded from its own bytes.
 //!
-//! The format is described in Isenburg 2013, "LASzip: lossless compression of lidar data"; the decoders are those of the
-//! `laz` crate, which may panic on hostile data and is therefore called under guard.
+//! The format is described in Isenburg 2013, "LASzip: lossless compression of lidar data". The decoders are those of the `laz`
+//! crate. They may panic on hostile data, so every call is wrapped in [`catch_panic`].
 
 use std::io;
-use std::ops::Range;
 
 use laz::record::RecordDecompressor;
 use laz::{DecompressionSelection, LazVlr};
+use serde::{Deserialize, Serialize};
 
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::file::range::FileRange;
-use crate::input::las::catch_panic::catch_panic;
+use crate::input::las::catch_panic::{Panicked, catch_panic};
 use crate::input::las::chunk_table::{self, LazChunk};
 use crate::input::las::compression::LazCompression;
 use crate::input::las::header::LasHeader;
@@ -20,26 +20,48 @@ use crate::input::las::uncompressed::push_records;
 use crate::input::las::vlr::Vlr;
 use crate::input::points::filter::PointFilter;
 use crate::input::points::rules::PointRules;
-use crate::{Error, Result};
+use crate::{Error, Result, Warnings};
 
-/// Records a chunk has at least, if there are as many; small chunks (COPC has them) go together.
-const PIECE: u64 = 50_000;
+/// The least number of records of a chunk of the source, as long as there are enough. Smaller LAZ chunks (COPC has them) go
+/// together.
+const LEAST_RECORDS: u64 = 50_000;
 
-/// Decoded bytes held at once, unless a single record is longer.
+/// The number of decoded bytes held at once, unless a single record is longer.
 const BLOCK: usize = 1 << 17;
 
-/// The most bytes of a layered chunk that are held to decode it: its layers must be in memory together.
+/// The most bytes of a layered chunk that is decoded: its layers must be in memory together.
 const LARGEST_CHUNK: u64 = 1 << 26;
 
 /// The point data of a LAZ file.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct CompressedPoints {
     layout: RecordLayout,
     compression: LazCompression,
-    laz_chunks: Vec<LazChunk>,
-    chunks: Vec<Range<usize>>,
-    /// Records that the header promises and no chunk holds.
+    /// The chunks of the source, each a run of LAZ chunks. Usually that is one LAZ chunk, since writers put 50,000 records into
+    /// each.
+    chunks: Vec<Vec<LazChunk>>,
+    /// The number of records that the header promises and no chunk holds.
     pub(crate) missing: u64,
+}
+
+/// Why the rest of a chunk cannot be decoded.
+#[derive(Debug, thiserror::Error)]
+enum ChunkError {
+    #[error("{0}")]
+    Decoder(#[from] laz::LasZipError),
+    #[error("{0}")]
+    Panicked(#[from] Panicked),
+    #[error("its data ends before its points do")]
+    CutShort,
+    #[error("its layers do not fit in it")]
+    Layers,
+    #[error("it says itself that it has only {0} points")]
+    FewerPoints(u64),
+    #[error("it has {0} bytes, which must be in memory together; write the file again with smaller chunks")]
+    TooLarge(u64),
+    /// This is not about the chunk: the file cannot be read, or the job stops.
+    #[error(transparent)]
+    Stopped(#[from] Error),
 }
 
 impl CompressedPoints {
@@ -48,31 +70,32 @@ impl CompressedPoints {
         file: &RandomAccessFile,
         header: &LasHeader,
         vlrs: &[Vlr],
-        warnings: &mut Vec<String>,
+        warnings: &mut Warnings,
     ) -> Result<CompressedPoints> {
         let Some(vlr) = vlrs.iter().find(|vlr| vlr.is(LazVlr::USER_ID, LazVlr::RECORD_ID)) else {
             let what = "says its points are compressed, but has no LASzip record; the file is damaged";
             return Err(Error::input(file.path(), what));
         };
-        let compression =
-            LazCompression::parse(&vlr.read(file)?, header).map_err(|what| Error::input(file.path(), what))?;
+        let compression = LazCompression::parse(&vlr.read(file)?, header)
+            .map_err(|error| Error::input(file.path(), error.to_string()))?;
         let laz_chunks = chunk_table::find(file, header, &compression, warnings)?;
         let missing = header.records - laz_chunks.iter().map(|chunk| chunk.count).sum::<u64>();
         let layout = RecordLayout::new(header.format, header.record_length);
-        Ok(CompressedPoints { layout, compression, chunks: group(&laz_chunks), laz_chunks, missing })
+        Ok(CompressedPoints { layout, compression, chunks: group(laz_chunks), missing })
     }
 
-    /// The number of records, those missing included.
+    /// Returns the number of records, including the missing ones.
     fn records(&self) -> u64 {
-        self.laz_chunks.last().map_or(0, |chunk| chunk.first + chunk.count) + self.missing
+        let last = self.chunks.last().and_then(|chunk| chunk.last());
+        last.map_or(0, |last| last.first + last.count) + self.missing
     }
 
-    /// The number of chunks; at least one where records are missing, to count them.
-    pub(crate) fn chunks(&self) -> usize {
+    /// Returns the number of chunks of the source. There is at least one if records are missing, so that decoding counts them.
+    pub(crate) fn chunk_count(&self) -> usize {
         self.chunks.len().max((self.missing > 0) as usize)
     }
 
-    /// Sends the records of `chunk` through `filter`.
+    /// Sends the records of chunk `chunk` of the source through `filter`.
     pub(crate) fn decode(
         &self,
         file: &RandomAccessFile,
@@ -80,22 +103,20 @@ impl CompressedPoints {
         rules: &PointRules,
         filter: &mut PointFilter,
     ) -> Result<()> {
-        for index in self.chunks.get(chunk).cloned().unwrap_or_default() {
-            let chunk = &self.laz_chunks[index];
-            let mut run = ChunkDecoder { chunks: self, file, index, rules, next: chunk.first };
-            if let Err(what) = run.decode(filter)? {
-                let (left, at) = (chunk.first + chunk.count - run.next, run.next);
-                filter.malformed(left, || {
-                    format!("chunk {index} is damaged at point {at}: {what}; {left} points are lost, so copy it again or allow the loss")
-                });
+        for laz_chunk in self.chunks.get(chunk).into_iter().flatten() {
+            let mut decoder = ChunkDecoder { points: self, file, chunk: laz_chunk, rules, next: laz_chunk.first };
+            match decoder.decode(filter) {
+                Ok(()) => {}
+                Err(ChunkError::Stopped(error)) => return Err(error),
+                Err(damage) => decoder.count_lost(&damage, filter),
             }
         }
-        if chunk + 1 == self.chunks() && self.missing > 0 {
+        if chunk + 1 == self.chunk_count() && self.missing > 0 {
             let (all, missing) = (self.records(), self.missing);
             filter.malformed(missing, || {
                 format!(
-                    "the header promises {all} points, but the compressed data ends {missing} before; copy it again, or \
-                     allow the loss"
+                    "the header promises {all} points, but the compressed data ends {missing} points before; copy the file \
+                     again, or allow the loss"
                 )
             });
         }
@@ -103,105 +124,104 @@ impl CompressedPoints {
     }
 }
 
-/// Cuts the chunks in chunks.
-fn group(laz_chunks: &[LazChunk]) -> Vec<Range<usize>> {
-    let mut chunks = Vec::new();
-    let (mut start, mut records) = (0, 0);
-    for (index, chunk) in laz_chunks.iter().enumerate() {
-        records += chunk.count;
-        if records >= PIECE || index + 1 == laz_chunks.len() {
-            chunks.push(start..index + 1);
-            (start, records) = (index + 1, 0);
+/// Groups the LAZ chunks into chunks of the source.
+fn group(laz_chunks: Vec<LazChunk>) -> Vec<Vec<LazChunk>> {
+    let (mut chunks, mut chunk, mut records) = (Vec::new(), Vec::new(), 0);
+    for laz_chunk in laz_chunks {
+        records += laz_chunk.count;
+        chunk.push(laz_chunk);
+        if records >= LEAST_RECORDS {
+            chunks.push(std::mem::take(&mut chunk));
+            records = 0;
         }
+    }
+    if !chunk.is_empty() {
+        chunks.push(chunk);
     }
     chunks
 }
 
-/// One chunk on its way through the decoder.
+/// Decodes one LAZ chunk.
 struct ChunkDecoder<'a> {
-    chunks: &'a CompressedPoints,
+    points: &'a CompressedPoints,
     file: &'a RandomAccessFile,
-    index: usize,
+    chunk: &'a LazChunk,
     rules: &'a PointRules,
-    /// The number of the next record.
+    /// The number of the next record in the file.
     next: u64,
 }
 
-/// Inside: what is wrong with the data. Outside: what stops the job.
-type Judged<T> = Result<std::result::Result<T, String>>;
-
 impl ChunkDecoder<'_> {
-    /// Decodes the chunk as far as it goes; `self.next` then says how far.
-    fn decode(&mut self, filter: &mut PointFilter) -> Judged<()> {
-        let chunk = &self.chunks.laz_chunks[self.index];
-        let end = chunk.first + chunk.count;
-        let held = match self.layered_count(chunk)? {
-            Ok(held) => held.min(chunk.count),
-            Err(what) => return Ok(Err(what)),
-        };
-        let mut window = self.file.range(chunk.bytes.clone())?;
-        while self.next < chunk.first + held {
-            let stop = self.next.saturating_add(chunk.restart).min(chunk.first + held);
-            window = match self.decode_run(window, stop, filter)? {
-                Ok(window) => window,
-                Err(what) => return Ok(Err(what)),
-            };
+    /// Decodes the chunk as far as possible; `self.next` then says how far.
+    fn decode(&mut self, filter: &mut PointFilter) -> std::result::Result<(), ChunkError> {
+        let held = self.records_held()?.min(self.chunk.count);
+        let end = self.chunk.first + held;
+        let mut range = self.file.range(self.chunk.bytes.clone())?;
+        while self.next < end {
+            let stop = self.chunk.restart.map_or(end, |records| self.next.saturating_add(records).min(end));
+            range = self.decode_run(range, stop, filter)?;
         }
-        Ok(if self.next < end { Err(format!("it says itself that it has only {held} points")) } else { Ok(()) })
+        if held < self.chunk.count { Err(ChunkError::FewerPoints(held)) } else { Ok(()) }
     }
 
-    /// The number of points a layered chunk says it has; that of the chunk table for others.
-    fn layered_count(&self, chunk: &LazChunk) -> Judged<u64> {
-        let Some(layers) = &self.chunks.compression.layers else {
-            return Ok(Ok(chunk.count));
+    /// Counts the records from `self.next` to the end of the chunk as malformed.
+    fn count_lost(&self, damage: &ChunkError, filter: &mut PointFilter) {
+        let LazChunk { number, first, count, .. } = self.chunk;
+        let (at, left) = (self.next, first + count - self.next);
+        filter.malformed(left, || {
+            format!(
+                "chunk {number} is damaged at point {at}: {damage}; {left} points are lost, so copy the file again or allow the \
+                 loss"
+            )
+        });
+    }
+
+    /// Returns the number of records that a layered chunk says it has; for other chunks, the number in the chunk table.
+    fn records_held(&self) -> std::result::Result<u64, ChunkError> {
+        let Some(layers) = &self.points.compression.layers else {
+            return Ok(self.chunk.count);
         };
-        let size = chunk.bytes.end - chunk.bytes.start;
+        let size = self.chunk.bytes.end - self.chunk.bytes.start;
         if size > LARGEST_CHUNK {
-            return Ok(Err(format!(
-                "it has {size} bytes, which must be in memory together; write the file again with smaller chunks"
-            )));
+            return Err(ChunkError::TooLarge(size));
         }
-        Ok(match layers.read(self.file, chunk.bytes.clone())? {
-            Some((count, _)) => Ok(count),
-            None => Err("its layers do not fit in it".to_string()),
-        })
+        let head = layers.read_head(self.file, self.chunk.bytes.clone())?;
+        Ok(head.ok_or(ChunkError::Layers)?.records)
     }
 
-    /// Decodes the records up to number `stop`, with fresh models, and gives the window back.
-    fn decode_run(&mut self, window: FileRange, stop: u64, filter: &mut PointFilter) -> Judged<FileRange> {
+    /// Decodes the records up to number `stop` with fresh models, and returns the range, now behind these records.
+    fn decode_run(
+        &mut self,
+        range: FileRange,
+        stop: u64,
+        filter: &mut PointFilter,
+    ) -> std::result::Result<FileRange, ChunkError> {
         let selection = self.selection();
-        let mut decoder = match catch_panic(|| self.chunks.compression.decoder(window, selection)) {
-            Ok(Ok(decoder)) => decoder,
-            Ok(Err(error)) => return Ok(Err(error.to_string())),
-            Err(panic) => return Ok(Err(panic)),
-        };
-        let length = self.chunks.layout.length;
+        let mut decoder = catch_panic(|| self.points.compression.decoder(range, selection))??;
+        let length = self.points.layout.length;
         let mut block = vec![0; (BLOCK / length).clamp(1, (stop - self.next) as usize) * length];
         while self.next < stop {
             let wanted = ((block.len() / length) as u64).min(stop - self.next) as usize * length;
             let mut done = 0;
             let outcome = catch_panic(|| decode_block(decoder.as_mut(), &mut block[..wanted], length, &mut done));
-            push_records(&self.chunks.layout, &block[..done], self.next, self.rules, filter)?;
+            push_records(&self.points.layout, &block[..done], self.next, self.rules, filter)?;
             self.next += (done / length) as u64;
-            match outcome {
-                Ok(Ok(())) => {}
-                Ok(Err(error)) if error.kind() == io::ErrorKind::UnexpectedEof => {
-                    return Ok(Err("its data ends before its points do".to_string()));
-                }
-                Ok(Err(error)) => return Err(Error::io("read", self.file.path())(error)),
-                Err(panic) => return Ok(Err(panic)),
-            }
+            outcome?.map_err(|error| match error.kind() {
+                io::ErrorKind::UnexpectedEof => ChunkError::CutShort,
+                _ => ChunkError::Stopped(Error::io("read", self.file.path())(error)),
+            })?;
         }
-        Ok(Ok(decoder.box_into_inner()))
+        Ok(decoder.box_into_inner())
     }
 
+    /// Returns the fields to decompress.
     fn selection(&self) -> DecompressionSelection {
         let needed = DecompressionSelection::base().decompress_z().decompress_classification().decompress_flags();
-        if self.rules.rgb && self.chunks.layout.has_rgb() { needed.decompress_rgb() } else { needed }
+        if self.rules.rgb && self.points.layout.has_rgb() { needed.decompress_rgb() } else { needed }
     }
 }
 
-/// Decodes record after record into `block`; `done` counts the bytes, also when it fails.
+/// Decodes record after record into `block`. `done` counts the decoded bytes, even if decoding fails.
 fn decode_block(
     decoder: &mut dyn RecordDecompressor<FileRange>,
     block: &mut [u8],

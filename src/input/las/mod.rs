@@ -1,4 +1,4 @@
-//! LAS and LAZ files: headers, variable-length records, and their points, compressed or not.
+//! LAS and LAZ files: headers, variable length records, and their points, compressed or not.
 
 pub(crate) mod catch_panic;
 pub(crate) mod chunk_table;

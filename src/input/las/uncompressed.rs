@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use serde::{Deserialize, Serialize};
+
 use crate::Result;
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::las::header::LasHeader;
@@ -9,42 +11,37 @@ use crate::input::las::layout::RecordLayout;
 use crate::input::points::filter::PointFilter;
 use crate::input::points::rules::PointRules;
 
-/// UncompressedPoints of a chunk.
-const PIECE: u64 = 50_000;
+/// The number of records of a chunk.
+const CHUNK: u64 = 50_000;
 
-/// Bytes read at once, unless a single record is longer.
+/// The number of bytes read at once, unless a single record is longer.
 const BLOCK: usize = 1 << 18;
 
 /// The point data of a LAS file.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct UncompressedPoints {
     layout: RecordLayout,
     points_at: u64,
-    /// Whole records that the file holds.
+    /// The number of whole records in the file.
     whole: u64,
-    /// UncompressedPoints that the header promises and the file does not hold.
+    /// The number of records that the header promises and the file does not hold.
     pub(crate) missing: u64,
 }
 
 impl UncompressedPoints {
-    /// The records of a file of `file_size` bytes.
+    /// Returns the records of a file of `file_size` bytes.
     pub(crate) fn new(header: &LasHeader, file_size: u64) -> UncompressedPoints {
         let layout = RecordLayout::new(header.format, header.record_length);
-        let extended = header.evlrs.0;
-        let end = if header.evlrs.1 > 0 && extended > header.points_at { extended.min(file_size) } else { file_size };
-        let room = (end - header.points_at) / layout.length as u64;
+        let (extended_at, extended) = header.evlrs;
+        let points_end = if extended > 0 && extended_at > header.points_at { extended_at } else { file_size };
+        let room = (points_end.min(file_size) - header.points_at) / layout.length as u64;
         let whole = header.records.min(room);
         UncompressedPoints { layout, points_at: header.points_at, whole, missing: header.records - whole }
     }
 
-    /// The number of chunks; at least one where records are missing, to count them.
-    pub(crate) fn chunks(&self) -> usize {
-        (self.whole.div_ceil(PIECE) as usize).max((self.missing > 0) as usize)
-    }
-
-    fn range(&self, chunk: usize) -> Range<u64> {
-        let first = chunk as u64 * PIECE;
-        first..(first + PIECE).min(self.whole)
+    /// Returns the number of chunks. There is at least one if records are missing, so that decoding counts them.
+    pub(crate) fn chunk_count(&self) -> usize {
+        (self.whole.div_ceil(CHUNK) as usize).max((self.missing > 0) as usize)
     }
 
     /// Sends the records of `chunk` through `filter`.
@@ -57,7 +54,7 @@ impl UncompressedPoints {
     ) -> Result<()> {
         let length = self.layout.length;
         let mut block = vec![0; (BLOCK / length).max(1) * length];
-        let Range { start: mut number, end } = self.range(chunk);
+        let Range { start: mut number, end } = self.records_of(chunk);
         while number < end {
             let count = ((block.len() / length) as u64).min(end - number);
             let bytes = &mut block[..count as usize * length];
@@ -65,7 +62,7 @@ impl UncompressedPoints {
             push_records(&self.layout, bytes, number, rules, filter)?;
             number += count;
         }
-        if chunk + 1 == self.chunks() && self.missing > 0 {
+        if chunk + 1 == self.chunk_count() && self.missing > 0 {
             let (whole, missing) = (self.whole, self.missing);
             filter.malformed(missing, || {
                 format!(
@@ -77,9 +74,14 @@ impl UncompressedPoints {
         }
         Ok(())
     }
+
+    fn records_of(&self, chunk: usize) -> Range<u64> {
+        let first = chunk as u64 * CHUNK;
+        first..(first + CHUNK).min(self.whole)
+    }
 }
 
-/// Sends whole records, the first of which has `number`, through `filter`.
+/// Sends whole records through `filter`. The first of them has the number `number` in the file.
 pub(crate) fn push_records(
     layout: &RecordLayout,
     bytes: &[u8],

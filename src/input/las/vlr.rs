@@ -2,21 +2,21 @@
 
 use std::ops::Range;
 
-use crate::Result;
 use crate::input::file::bytes::{uint16, uint64};
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::las::header::LasHeader;
+use crate::{Result, Warnings};
 
-/// Bytes before the data of a variable length record.
+/// The number of bytes before the data of a variable length record.
 const HEAD: u64 = 54;
 
-/// Bytes before the data of an extended one.
+/// The number of bytes before the data of an extended variable length record.
 const EXTENDED_HEAD: u64 = 60;
 
-/// The most variable length records that are looked at; real files have a few.
+/// The most records that are looked at; real files have a few.
 const MOST: u32 = 10_000;
 
-/// The longest record that is read into memory. A coordinate system's text has some thousand bytes.
+/// The longest record that is read, in bytes. The text of a coordinate system has some thousand bytes.
 const LONGEST: u64 = 1 << 20;
 
 /// One variable length record.
@@ -28,19 +28,19 @@ pub(crate) struct Vlr {
 }
 
 impl Vlr {
-    /// Whether this is the record `id` of `user`.
+    /// Returns whether this is the record `id` of `user`.
     pub(crate) fn is(&self, user: &str, id: u16) -> bool {
         self.id == id && self.user == user
     }
 
-    /// The record's data; empty where it is longer than any record this program reads.
+    /// Reads the record's data. The data of a record that is longer than 1 MiB counts as empty.
     pub(crate) fn read(&self, file: &RandomAccessFile) -> Result<Vec<u8>> {
         if self.data.end - self.data.start > LONGEST { Ok(Vec::new()) } else { file.bytes(self.data.clone()) }
     }
 }
 
-/// All records that lie in the file, and a warning where the header promises more.
-pub(crate) fn list(file: &RandomAccessFile, header: &LasHeader, warnings: &mut Vec<String>) -> Result<Vec<Vlr>> {
+/// Lists all records that lie in the file. Warns if the header promises more.
+pub(crate) fn list(file: &RandomAccessFile, header: &LasHeader, warnings: &mut Warnings) -> Result<Vec<Vlr>> {
     let ordinary = VlrSequence { range: header.size..header.points_at, count: header.vlrs, head: HEAD };
     let mut vlrs = ordinary.walk(file)?;
     if (vlrs.len() as u32) < header.vlrs.min(MOST) {
@@ -65,10 +65,11 @@ pub(crate) fn list(file: &RandomAccessFile, header: &LasHeader, warnings: &mut V
     Ok(vlrs)
 }
 
-/// A stretch of the file that holds records one after the other.
+/// A range of the file that holds records one after the other.
 struct VlrSequence {
     range: Range<u64>,
     count: u32,
+    /// The number of bytes before the data of each record.
     head: u64,
 }
 

@@ -1,68 +1,70 @@
-//! One record at a time through the rules: filters, the way to the lattice, the tally, and slices of points to the sink.
+//! The filter: applies the rules to one record at a time, maps its coordinates to the lattice, counts it, and hands points on.
 
 use std::path::Path;
 
 use crate::Result;
 use crate::geometry::lattice::REACH;
-use crate::input::points::axis::Axis;
+use crate::input::points::axis::{AXIS_NAMES, Axis};
+use crate::input::points::counts::PointCounts;
 use crate::input::points::point::Point;
 use crate::input::points::record::PointRecord;
-use crate::input::points::rules::{PointCounts, PointRules};
+use crate::input::points::rules::PointRules;
 
-/// Points handed to the sink at once, at most: 384 KiB of them, which stays in the second-level cache.
+/// The most points handed to the sink at once: 384 KiB of them, which stays in the second-level cache.
 const SLICE: usize = 1 << 14;
 
-/// Where the points of a source go, in record order.
+/// Takes the points of a source, in record order.
 pub(crate) type Sink<'a> = &'a mut dyn FnMut(&[Point]) -> Result<()>;
 
-/// Lattice integers in x, y and z, and whether they were rounded; `None` where they do not fit.
+/// Lattice integers in x, y and z, each with whether it was rounded; `None` where the integer does not fit an `i32`.
 type Mapped = [Option<(i32, bool)>; 3];
 
-/// The rules at work on one chunk of a source.
+/// Filters the records of one chunk of a source.
 pub(crate) struct PointFilter<'a> {
     path: &'a Path,
     axes: &'a [Axis; 3],
     rules: &'a PointRules,
     sink: Sink<'a>,
     points: Vec<Point>,
-    tally: PointCounts,
+    counts: PointCounts,
 }
 
 impl<'a> PointFilter<'a> {
+    /// Returns a filter for records of the file at `path` with these `axes`; points that pass `rules` go to `sink`.
     pub(crate) fn new(path: &'a Path, axes: &'a [Axis; 3], rules: &'a PointRules, sink: Sink<'a>) -> PointFilter<'a> {
-        PointFilter { path, axes, rules, sink, points: Vec::with_capacity(SLICE), tally: PointCounts::default() }
+        PointFilter { path, axes, rules, sink, points: Vec::with_capacity(SLICE), counts: PointCounts::default() }
     }
 
-    /// Judges record `number` of the source (from 0); `place` names it in an example ("point 12", "line 13").
+    /// Filters record `number` of the source (from 0). `place` names it for a message ("point 12", "line 13").
     #[inline]
     pub(crate) fn push(&mut self, number: u64, record: &PointRecord, place: impl Fn() -> String) -> Result<()> {
         if record.withheld {
-            self.tally.withheld += 1;
+            self.counts.withheld += 1;
             return Ok(());
         }
         if !self.rules.classes[record.class as usize] {
-            self.tally.other_class += 1;
+            self.counts.other_class += 1;
             return Ok(());
         }
-        // One by one: `map` would become a call here, for every record.
+        // One by one: `array::map` compiles to a call for every record here.
         let [x, y, z] = &self.rules.maps;
         let mapped = [x.apply(record.raw[0]), y.apply(record.raw[1]), z.apply(record.raw[2])];
         if !self.in_bounds(&mapped) {
-            self.tally.out_of_bounds += 1;
+            self.counts.out_of_bounds += 1;
             return Ok(());
         }
         match mapped {
-            [Some((x, round_x)), Some((y, round_y)), Some((z, round_z))] if reached(x) && reached(y) => {
-                self.tally.rounded_xy += (round_x | round_y | record.rounded[0]) as u64;
-                self.tally.rounded_z += (round_z | record.rounded[1]) as u64;
+            [Some((x, round_x)), Some((y, round_y)), Some((z, round_z))] if in_reach(x) && in_reach(y) => {
+                self.counts.rounded_xy += (round_x | round_y | record.rounded[0]) as u64;
+                self.counts.rounded_z += (round_z | record.rounded[1]) as u64;
                 self.keep(Point::new([x, y], z, record.rgb, record.class, self.rules.first_order + number))
             }
             _ => {
-                let (value, name) = self.outside(record, &mapped);
+                let (value, name) = self.out_of_reach(record, &mapped);
                 self.malformed(1, || {
                     format!(
-                        "{}: {name} = {value} lies outside the range the job's lattice reaches; leave such points out with \
-                         bounds, or choose a coarser resolution",
+                        "{}: {name} = {value} lies outside the range that the job's lattice reaches; leave such points out \
+                         with bounds, or choose a coarser resolution",
                         place()
                     )
                 });
@@ -73,30 +75,31 @@ impl<'a> PointFilter<'a> {
 
     #[inline]
     fn in_bounds(&self, mapped: &Mapped) -> bool {
-        let inside = |axis: usize, low, high| mapped[axis].is_some_and(|(value, _)| value >= low && value <= high);
-        self.rules.bounds.is_none_or(|[x_min, y_min, x_max, y_max]| inside(0, x_min, x_max) && inside(1, y_min, y_max))
+        let Some(bounds) = &self.rules.bounds else { return true };
+        let inside = |axis: usize| mapped[axis].is_some_and(|(v, _)| v >= bounds.min[axis] && v <= bounds.max[axis]);
+        inside(0) && inside(1)
     }
 
     #[inline]
     fn keep(&mut self, point: Point) -> Result<()> {
-        self.tally.kept += 1;
-        self.tally.max_rgb = self.tally.max_rgb.max(point.rgb[0].max(point.rgb[1]).max(point.rgb[2]));
+        self.counts.kept += 1;
+        self.counts.max_rgb = self.counts.max_rgb.max(point.rgb[0].max(point.rgb[1]).max(point.rgb[2]));
         self.points.push(point);
         if self.points.len() == SLICE { self.flush() } else { Ok(()) }
     }
 
-    /// Counts `count` records that cannot be used.
+    /// Counts `count` records that cannot be used; `what` says why.
     pub(crate) fn malformed(&mut self, count: u64, what: impl FnOnce() -> String) {
         let path = self.path;
-        self.tally.add_malformed(count, || format!("{}: {}", path.display(), what()));
+        self.counts.add_malformed(count, || format!("{}: {}", path.display(), what()));
     }
 
-    /// Hands on what is left and gives the tally.
+    /// Hands on the last points and returns the counts.
     pub(crate) fn finish(mut self) -> Result<PointCounts> {
         self.flush()?;
-        let PointCounts { withheld, other_class, out_of_bounds, malformed, kept, .. } = self.tally;
-        self.tally.read = withheld + other_class + out_of_bounds + malformed + kept;
-        Ok(self.tally)
+        let PointCounts { withheld, other_class, out_of_bounds, malformed, kept, .. } = self.counts;
+        self.counts.read = withheld + other_class + out_of_bounds + malformed + kept;
+        Ok(self.counts)
     }
 
     fn flush(&mut self) -> Result<()> {
@@ -107,15 +110,16 @@ impl<'a> PointFilter<'a> {
         Ok(())
     }
 
-    /// The value that has left the lattice, and its axis.
+    /// Returns the first coordinate that is outside the lattice's reach, and the name of its axis.
     #[cold]
-    fn outside(&self, record: &PointRecord, mapped: &Mapped) -> (f64, &'static str) {
-        let out = |axis: usize| mapped[axis].is_none_or(|(v, _)| axis < 2 && !reached(v));
-        let axis = (0..3).find(|&axis| out(axis)).unwrap_or(2);
-        (self.axes[axis].value(record.raw[axis]), ["x", "y", "z"][axis])
+    fn out_of_reach(&self, record: &PointRecord, mapped: &Mapped) -> (f64, &'static str) {
+        let is_out = |axis: usize| mapped[axis].is_none_or(|(v, _)| axis < 2 && !in_reach(v));
+        let axis = (0..3).find(|&axis| is_out(axis)).unwrap_or(2);
+        (self.axes[axis].value(record.raw[axis]), AXIS_NAMES[axis])
     }
 }
 
-fn reached(value: i32) -> bool {
+/// Returns whether a lattice integer in x or y is within reach. Unlike `value.abs() <= REACH`, this is right for `i32::MIN`.
+fn in_reach(value: i32) -> bool {
     (-REACH..=REACH).contains(&value)
 }

@@ -1,6 +1,7 @@
-//! From a record of any source to a point on the lattice.
+//! The way of one record from any source to a point on the lattice: its raw integers, the rules, the filter, the counts.
 
 pub(crate) mod axis;
+pub(crate) mod counts;
 pub(crate) mod filter;
 pub(crate) mod point;
 pub(crate) mod record;

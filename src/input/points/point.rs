@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-/// A point that passed the filters, in lattice steps. 24 bytes without padding, so that slices of it are slices of bytes.
+/// A point that passed the filter, in lattice steps. It has 24 bytes without padding, so a slice of points is a slice of bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 pub struct Point {
@@ -19,18 +19,18 @@ pub struct Point {
 }
 
 impl Point {
-    /// A point; `order` is its number in the whole job, counting the records of all files in the order of the
+    /// Returns a point. `order` is its number in the whole job, counting the records of all files in the order of the
     /// configuration, and must be below 2^40.
     pub fn new(position: [i32; 2], z: i32, rgb: [u16; 3], class: u8, order: u64) -> Point {
         Point { position, z, rgb, class, order_high: (order >> 32) as u8, order_low: order as u32 }
     }
 
-    /// Lattice integers x, y, z.
+    /// Returns the lattice integers x, y, z.
     pub fn corner(&self) -> [i32; 3] {
         [self.position[0], self.position[1], self.z]
     }
 
-    /// The number of this point's record in the whole job.
+    /// Returns the number of this point's record in the whole job.
     pub fn order(&self) -> u64 {
         (self.order_high as u64) << 32 | self.order_low as u64
     }

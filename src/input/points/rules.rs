@@ -1,77 +1,38 @@
-//! Which points a job keeps, where they land on the lattice, and the count of what became of every record.
-
-use std::ops::AddAssign;
+//! Which points a job keeps, and where they land on the lattice.
 
 use serde::{Deserialize, Serialize};
 
+use crate::geometry::Bounds;
 use crate::geometry::lattice::AxisMap;
 
-/// How many malformed records a [`PointCounts`] describes.
-pub(crate) const EXAMPLES: usize = 5;
-
 /// What decoding a source needs to know of the job.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PointRules {
-    /// The way from the source's axes x, y and z to the lattice.
+    /// The maps from the source's axes x, y and z to the lattice.
     pub maps: [AxisMap; 3],
-    /// Whether points of each classification code are kept.
+    /// Whether the job keeps points of each classification code.
+    #[serde(with = "class_list")]
     pub classes: [bool; 256],
-    /// Keep only points within these lattice integers: xmin, ymin, xmax, ymax, all inclusive.
-    pub bounds: Option<[i32; 4]>,
+    /// Keep only points within these bounds in x and y. If `min` exceeds `max` on an axis, no lattice point lies within the
+    /// user's bounds, and no point is kept.
+    pub bounds: Option<Bounds<2>>,
     /// The number in the whole job of the source's first record.
     pub first_order: u64,
-    /// Whether the points' colours are wanted; without, they are 0 and layered LAZ decodes faster.
+    /// Whether the job wants the points' colours. If not, colours are 0 and layered LAZ decodes faster.
     pub rgb: bool,
 }
 
-/// What became of the records of a source, or of a part of it:
-/// `read = withheld + other_class + out_of_bounds + malformed + kept`.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct PointCounts {
-    /// Records seen, those included that the file promises and does not have.
-    pub read: u64,
-    /// Dropped: flagged as withheld.
-    pub withheld: u64,
-    /// Dropped: of a class that is not wanted.
-    pub other_class: u64,
-    /// Dropped: outside the job's bounds.
-    pub out_of_bounds: u64,
-    /// Dropped: not readable, or outside the lattice.
-    pub malformed: u64,
-    /// Kept points whose x or y was rounded to the lattice.
-    pub rounded_xy: u64,
-    /// Kept points whose z was rounded to the lattice.
-    pub rounded_z: u64,
-    /// Points handed on.
-    pub kept: u64,
-    /// The largest red, green or blue of the points handed on.
-    pub max_rgb: u16,
-    /// The first few malformed records: file, record or line, and what is wrong.
-    pub examples: Vec<String>,
-}
+/// Classes are written as the list of the codes that are kept.
+mod class_list {
+    use serde::{Deserialize, Deserializer, Serializer};
 
-impl PointCounts {
-    /// Counts `count` malformed records that `example` describes.
-    pub(crate) fn add_malformed(&mut self, count: u64, example: impl FnOnce() -> String) {
-        self.malformed += count;
-        if self.examples.len() < EXAMPLES {
-            self.examples.push(example());
-        }
+    pub(super) fn serialize<S: Serializer>(classes: &[bool; 256], serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq((0..=u8::MAX).filter(|&class| classes[class as usize]))
     }
-}
 
-impl AddAssign for PointCounts {
-    fn add_assign(&mut self, other: PointCounts) {
-        self.read += other.read;
-        self.withheld += other.withheld;
-        self.other_class += other.other_class;
-        self.out_of_bounds += other.out_of_bounds;
-        self.malformed += other.malformed;
-        self.rounded_xy += other.rounded_xy;
-        self.rounded_z += other.rounded_z;
-        self.kept += other.kept;
-        self.max_rgb = self.max_rgb.max(other.max_rgb);
-        self.examples.extend(other.examples);
-        self.examples.truncate(EXAMPLES);
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[bool; 256], D::Error> {
+        let mut classes = [false; 256];
+        Vec::<u8>::deserialize(deserializer)?.into_iter().for_each(|class| classes[class as usize] = true);
+        Ok(classes)
     }
 }

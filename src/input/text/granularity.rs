@@ -1,11 +1,12 @@
-//! The coarsest grid that a column of numbers lies on.
+//! The coarsest grid on which a column of numbers lies.
 
-use crate::input::text::number::Number;
-use crate::input::text::number::POWERS;
 use rust_decimal::Decimal;
+use serde::{Deserialize, Serialize};
 
-/// The largest step, `step / 10^decimals`, of which all numbers seen are whole multiples; 0 while only zeros were seen.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+use crate::input::text::number::{Number, POWERS};
+
+/// The largest step, `step / 10^decimals`, that divides all numbers seen so far; 0 if all of them were 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Granularity {
     step: u64,
     decimals: u8,
@@ -27,12 +28,12 @@ impl Granularity {
     pub(crate) fn add(&mut self, other: &Granularity) {
         let decimals = self.decimals.max(other.decimals);
         let scaled = |g: &Granularity| g.step.checked_mul(POWERS[(decimals - g.decimals) as usize] as u64);
-        // A number too long to compare is taken to need its last digit.
+        // A number that is too long to compare is assumed to need its last digit.
         let step = scaled(self).zip(scaled(other)).map_or(1, |(a, b)| gcd(a, b));
         *self = Granularity { step, decimals };
     }
 
-    /// The step; `None` while only zeros were seen.
+    /// Returns the step; `None` if all numbers seen were 0.
     pub(crate) fn value(&self) -> Option<Decimal> {
         let step = Decimal::from_i128_with_scale(self.step.into(), self.decimals.into()).normalize();
         (self.step > 0).then_some(step)
@@ -54,7 +55,7 @@ mod tests {
     }
 
     #[test]
-    fn the_grid_behind_the_digits() {
+    fn the_step_is_the_largest_that_divides_all_numbers() {
         assert_eq!(step(&["273357.14525", "-273357.14500", "0"]).unwrap(), "0.00025");
         assert_eq!(step(&["440750", "441890"]).unwrap(), "10");
         assert_eq!(step(&["0.5", "0.75", "3"]).unwrap(), "0.25");

@@ -1,4 +1,4 @@
-//! Blocks of text, cut into lines: a line belongs to the block in which it begins.
+//! The lines of a chunk of text. A line belongs to the chunk in which it begins.
 
 use std::ops::Range;
 
@@ -7,13 +7,10 @@ use memchr::memchr;
 use crate::Result;
 use crate::input::file::random_access::RandomAccessFile;
 
-/// Bytes of a block.
-pub(crate) const BLOCK: u64 = 2 << 20;
-
 /// The longest line that is read, in bytes.
 pub(crate) const LONGEST: usize = 1 << 16;
 
-/// A line without its end.
+/// A line without its line end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum TextLine<'a> {
     /// The line's bytes.
@@ -22,8 +19,8 @@ pub(crate) enum TextLine<'a> {
     TooLong,
 }
 
-/// Calls `each` for every line that begins in `range`. Lines begin at `first`, or after a line feed.
-/// Gives the number of lines.
+/// Calls `each` for every line that begins in `range`, with the line's number from 0. Lines begin at byte `first` of the file and
+/// after each line feed. Returns the number of lines.
 pub(crate) fn for_each_line(
     file: &RandomAccessFile,
     first: u64,
@@ -61,14 +58,14 @@ fn without_return(line: &[u8]) -> &[u8] {
 mod tests {
     use super::*;
 
-    fn lines(text: &[u8], block: u64) -> Vec<Option<Vec<u8>>> {
+    fn lines(text: &[u8], chunk: u64) -> Vec<Option<Vec<u8>>> {
         let path = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(path.path(), text).unwrap();
         let file = RandomAccessFile::open(path.path()).unwrap();
         let mut all = Vec::new();
         let mut start = 0;
         while start < file.size() {
-            let range = start..(start + block).min(file.size());
+            let range = start..(start + chunk).min(file.size());
             let collect = |_, line: TextLine| {
                 all.push(if let TextLine::Whole(line) = line { Some(line.to_vec()) } else { None });
                 Ok(())
@@ -80,17 +77,17 @@ mod tests {
     }
 
     #[test]
-    fn every_line_is_seen_once_whatever_the_blocks() {
+    fn every_line_is_seen_once_for_every_size_of_chunks() {
         let text = b"one\r\n\ntwo\nthree is longer\n\n\nlast";
         let expected: Vec<_> =
             ["one", "", "two", "three is longer", "", "", "last"].map(|l| Some(l.as_bytes().to_vec())).into();
-        for block in 1..40 {
-            assert_eq!(lines(text, block), expected, "blocks of {block}");
+        for chunk in 1..40 {
+            assert_eq!(lines(text, chunk), expected, "chunks of {chunk}");
         }
     }
 
     #[test]
-    fn a_line_too_long_is_one_line_in_bounded_memory() {
+    fn a_line_that_is_too_long_is_one_line() {
         let mut text = b"1 2 3\n".to_vec();
         text.extend(std::iter::repeat_n(b'7', 3 * LONGEST));
         text.extend(b"\n4 5 6\n");

@@ -1,9 +1,9 @@
-//! Decimal numbers as exact integers: mantissa and number of decimals, without floating point on the way.
+//! Decimal numbers as exact integers: a mantissa and a number of decimals. No floating point is involved.
 
-/// The most decimals that are kept; further ones are noise of floating point and are rounded away.
+/// The most decimals that are kept. Further decimals are noise of floating-point arithmetic, and are rounded away.
 pub(crate) const MOST_DECIMALS: u8 = 15;
 
-/// The most digits that surely fit an `i64`.
+/// The most digits that always fit an `i64`.
 const MOST_DIGITS: usize = 18;
 
 /// Powers of ten that fit an `i64`.
@@ -17,7 +17,7 @@ pub(crate) const POWERS: [i64; 19] = {
     powers
 };
 
-/// `mantissa / 10^decimals`.
+/// The number `mantissa / 10^decimals`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Number {
     pub(crate) mantissa: i64,
@@ -28,8 +28,8 @@ pub(crate) struct Number {
 }
 
 impl Number {
-    /// The plain number at the start of `bytes`, as far as its digits go, and its length; `None` where there is none or
-    /// it is not a plain one. What follows it is the caller's to check.
+    /// Reads the plain number at the start of `bytes` and returns it with its length; `None` if there is none or it is not plain
+    /// (a sign +, too many digits). The caller checks what follows it.
     #[inline]
     pub(crate) fn read(bytes: &[u8]) -> Option<(Number, usize)> {
         let negative = bytes.first() == Some(&b'-');
@@ -58,8 +58,8 @@ impl Number {
         Some((Number { mantissa, decimals: decimals as u8, rounded: false }, at))
     }
 
-    /// The number that all of `text` says, an exponent and any number of digits included; `None` where it says none,
-    /// or one of more than 18 digits before the point.
+    /// Returns the number that all of `text` says, which may have an exponent and any number of digits; `None` if it is not a
+    /// number, or has more than 18 digits before the point.
     pub(crate) fn parse(text: &[u8]) -> Option<Number> {
         if let Some((number, length)) = Number::read(text)
             && length == text.len()
@@ -78,7 +78,7 @@ impl Number {
         Some(if negative { Number { mantissa: -number.mantissa, ..number } } else { number })
     }
 
-    /// The same number with as few decimals as it needs.
+    /// Returns the same number with as few decimals as it needs.
     pub(crate) fn shortest(mut self) -> Number {
         while self.decimals > 0 && self.mantissa % 10 == 0 {
             self.mantissa /= 10;
@@ -87,7 +87,7 @@ impl Number {
         self
     }
 
-    /// The integer in steps of `10^-decimals`, and whether anything was rounded; `None` where it does not fit.
+    /// Returns the number in steps of `10^-decimals`, and whether it was rounded; `None` if it does not fit.
     #[inline]
     pub(crate) fn steps(&self, decimals: u8) -> Option<(i64, bool)> {
         if self.decimals <= decimals {
@@ -98,7 +98,7 @@ impl Number {
         Some((steps, rounded || self.rounded))
     }
 
-    /// The nearest floating-point number, but for at most one unit in the last place where there are more than 15 digits.
+    /// Returns the nearest floating-point number, or one of its neighbours if there are more than 15 digits.
     #[inline]
     pub(crate) fn value(&self) -> f64 {
         self.mantissa as f64 / POWERS[self.decimals as usize] as f64
@@ -156,7 +156,7 @@ impl Digits {
     }
 }
 
-/// `mantissa / 10^digits` to the nearest integer, halves away from zero, and whether it was rounded.
+/// Returns `mantissa / 10^digits`, rounded to the nearest integer (halves away from zero), and whether it was rounded.
 fn divide(mantissa: i64, digits: u32) -> (i64, bool) {
     let Some(&divisor) = POWERS.get(digits as usize) else {
         return (0, mantissa != 0);
@@ -166,7 +166,7 @@ fn divide(mantissa: i64, digits: u32) -> (i64, bool) {
     (quotient + if up { rest.signum() } else { 0 }, rest != 0)
 }
 
-/// The exponent after the letter e; far too large ones are cut to what is too large all the same.
+/// Reads the exponent after the letter e. An exponent beyond 2^20 becomes 2^20, which is too large as well.
 fn exponent(text: &[u8]) -> Option<i64> {
     let (sign, digits) = match text.first()? {
         b'-' => (-1, &text[1..]),
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn exponents_and_long_numbers_are_exact_where_they_fit() {
+    fn exponents_and_long_numbers_are_exact_if_they_fit() {
         assert_eq!(parse("1.5e3"), Some((1500, 0, false)));
         assert_eq!(parse("6.3557779E+05"), Some((63557779, 2, false)));
         assert_eq!(parse("25e-5"), Some((25, 5, false)));
@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_is_refused() {
+    fn text_that_is_not_a_number_is_refused() {
         for text in [
             "",
             "-",

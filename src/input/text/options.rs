@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// How a text file is laid out; what is not given is detected. The table `[input.csv]` of the configuration.
+/// `[input.csv]`: how a text file is laid out. An option that is not given is detected.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TextOptions {
@@ -10,9 +10,9 @@ pub struct TextOptions {
     pub delimiter: Option<char>,
     /// Whether the first line names the columns.
     pub header: Option<bool>,
-    /// The names of the columns from left to right, in place of those of a header. Used are x, y, z, and where there are
-    /// such, r, g, b and class; all others are skipped.
+    /// The names of the columns from left to right, which replace the names of a header. The columns x, y, z are used, and r, g, b
+    /// and class if they are there; all others are skipped.
     pub columns: Option<Vec<String>>,
-    /// What a line to be skipped begins with; `#` or `//` if not given, nothing if empty.
+    /// Lines that begin with this text are skipped. The default is `#` or `//`; an empty text skips no line.
     pub comment: Option<String>,
 }

@@ -5,7 +5,7 @@ use crate::geometry::lattice::Lattice;
 use crate::input::Crs;
 use crate::input::PointRules;
 use crate::input::Source;
-use crate::job::durable::atomic_file::{PendingFile, write_pending_json};
+use crate::job::durable::atomic_file::{PendingFile, write_pending};
 use crate::job::options::JobOptions;
 use crate::job::plan::lattice_choice::LatticeCoarsening;
 use crate::output::frame::Frame;
@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 /// What a job reads and where it puts it. The plan holds everything that the later steps need beside what earlier steps stored:
 /// no step looks at a header again, or computes anything again that depends on a machine's mathematics library.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Plan {
     /// What the user wants.
     pub options: JobOptions,
@@ -42,7 +42,7 @@ pub struct Plan {
 }
 
 /// An input and the rules for its points.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PlannedInput {
     /// What its header says.
     pub source: Source,
@@ -72,7 +72,8 @@ impl Plan {
     /// # Errors
     /// [`Error::Io`] if writing fails.
     pub fn write(&self, path: &Path) -> Result<PendingFile> {
-        write_pending_json(path, &"STUB")
+        let text = serde_json::to_vec(self).map_err(|e| Error::Broken(format!("{}: {e}", path.display())))?;
+        write_pending(path, &text)
     }
 
     /// Reads the plan in the file at `path`.
@@ -81,8 +82,6 @@ impl Plan {
     /// [`Error::Io`] if the file cannot be read, [`Error::Broken`] if it holds no plan.
     pub fn read(path: &Path) -> Result<Plan> {
         let text = std::fs::read(path).map_err(Error::io("read", path))?;
-        serde_json::from_slice::<String>(&text)
-            .map(|_| -> Plan { unimplemented!() })
-            .map_err(|e| Error::Broken(format!("{}: {e}", path.display())))
+        serde_json::from_slice(&text).map_err(|e| Error::Broken(format!("{}: {e}", path.display())))
     }
 }

@@ -85,9 +85,7 @@ fn try_plan(
 ) -> Result<(Plan, Vec<PointRules>)> {
     let mut warnings = Warnings::default();
     warnings.extend(unreadable_names(&options.input));
-    sources
-        .iter()
-        .for_each(|source| warnings.extend(source.warnings.iter().map(|w| format!("{}: {w}", source.path.display()))));
+    sources.iter().for_each(|source| warnings.extend_from_file(&source.path, &source.warnings));
     warnings.shorten(MAX_WARNINGS);
     let records = sources.iter().map(|s| s.records).sum();
     if records >= MAX_RECORDS {
@@ -98,7 +96,7 @@ fn try_plan(
     let (unit, metres) = horizontal_unit(options.input.unit, &crs, &mut warnings)?;
     let extent = Extent::of(sources, &options.input, metres)?;
     let metres_z = crs.vertical.unwrap_or(metres);
-    let wanted = options.input.resolution.0;
+    let wanted = options.input.resolution.step();
     let lattice = choose_lattice(sources, &extent, [metres, metres_z], wanted, coarsening, &mut warnings)?;
     if metres_z != metres {
         warnings.push(format!(
@@ -124,19 +122,20 @@ fn try_plan(
     Ok((plan, rules))
 }
 
-/// Returns the lattice integers xmin, ymin, xmax, ymax of the points within `bounds`, borders included.
-fn lattice_clip(lattice: &Lattice, bounds: [f64; 4]) -> [i32; 4] {
-    std::array::from_fn(|i| {
+/// Returns the lattice box of the points within `bounds`, borders included. It is inside out if no lattice point is.
+fn lattice_clip(lattice: &Lattice, bounds: [f64; 4]) -> Bounds<2> {
+    let [xmin, ymin, xmax, ymax] = std::array::from_fn(|i| {
         let steps = shortest_decimal(bounds[i])
             .and_then(|b| b.checked_sub(lattice.offset[i % 2])?.checked_div(lattice.resolution));
         let steps = steps.map(|s| if i < 2 { s.ceil() } else { s.floor() }).and_then(|s| s.to_i64());
         // A bound beyond all numbers is as far out as sites can lie.
         let far = if bounds[i] < 0.0 { -(REACH as i64) } else { REACH as i64 };
         steps.unwrap_or(far).clamp(-(REACH as i64), REACH as i64) as i32
-    })
+    });
+    Bounds { min: [xmin, ymin], max: [xmax, ymax] }
 }
 
-fn lattice_extent(lattice: &Lattice, extent: &Extent, clip: Option<[i32; 4]>) -> Bounds<2> {
+fn lattice_extent(lattice: &Lattice, extent: &Extent, clip: Option<Bounds<2>>) -> Bounds<2> {
     let steps = |value: f64, axis: usize| {
         let offset = lattice.offset[axis].to_f64().unwrap_or(0.0);
         ((value - offset) / lattice.resolution.to_f64().unwrap_or(1.0)).clamp(-(REACH as f64), REACH as f64) as i32
@@ -144,8 +143,8 @@ fn lattice_extent(lattice: &Lattice, extent: &Extent, clip: Option<[i32; 4]>) ->
     let [mut min, mut max] = [extent.min, extent.max].map(|corner| [steps(corner[0], 0), steps(corner[1], 1)]);
     if let Some(clip) = clip {
         for axis in 0..2 {
-            min[axis] = min[axis].max(clip[axis]).min(clip[axis + 2]);
-            max[axis] = max[axis].min(clip[axis + 2]).max(min[axis]);
+            min[axis] = min[axis].max(clip.min[axis]).min(clip.max[axis]);
+            max[axis] = max[axis].min(clip.max[axis]).max(min[axis]);
         }
     }
     Bounds { min, max }
@@ -155,7 +154,7 @@ fn point_rules(
     sources: &[Source],
     options: &JobOptions,
     lattice: &Lattice,
-    bounds: Option<[i32; 4]>,
+    bounds: Option<Bounds<2>>,
 ) -> Result<Vec<PointRules>> {
     let rgb = matches!(options.output.color, ColorChoice::Auto | ColorChoice::Rgb);
     let classes = options.input.kept_classes();

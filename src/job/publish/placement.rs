@@ -54,7 +54,7 @@ struct Ground<'a> {
 /// # Errors
 /// [`NotPlaced`] says why the terrain cannot be placed; then nothing is.
 pub fn place(crs: &Crs, frame: &Frame, height_offset: f64, root: &mut Node) -> Result<Placement, NotPlaced> {
-    let definition = crs.definition().ok_or_else(|| match &crs.name {
+    let definition = crs.proj4_definition().ok_or_else(|| match &crs.name {
         Some(name) => format!("{name} has no definition that leads to longitude and latitude"),
         None => "no input names its coordinate system".to_string(),
     });

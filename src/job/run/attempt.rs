@@ -71,7 +71,7 @@ pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, walk: Wal
             true => (&mut coarsening.vertical, "z"),
             false => (&mut coarsening.horizontal, "x and y"),
         };
-        let may_coarsen = vertical || options.input.resolution.0.is_none();
+        let may_coarsen = vertical || options.input.resolution.step().is_none();
         if !may_coarsen || *power >= MAX_COARSENINGS {
             return Err(Error::TooFine { vertical, what });
         }

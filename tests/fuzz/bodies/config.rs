@@ -15,7 +15,7 @@ pub(crate) fn config(bytes: &[u8]) {
     assert!(!config.input.files.is_empty());
     assert!((0.0..=1.0).contains(&config.input.max_malformed_fraction.0));
     assert!(config.input.bounds.is_none_or(|b| b.0[0] < b.0[2] && b.0[1] < b.0[3]));
-    assert!(config.input.resolution.0.is_none_or(|step| step > rust_decimal::Decimal::ZERO));
+    assert!(config.input.resolution.step().is_none_or(|step| step > rust_decimal::Decimal::ZERO));
     assert!(config.limits.memory.0 >= 128 << 20 && (1..=1024).contains(&config.threads()));
     assert!(config.triangulation.max_points_per_tile.0 >= 3);
     assert!(config.input.kept_classes().contains(&true));

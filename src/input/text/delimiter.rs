@@ -1,0 +1,83 @@
+//! What separates the columns of a line, and how a line is split.
+
+use memchr::{memchr, memchr2};
+use serde::{Deserialize, Serialize};
+
+use crate::{Error, Result};
+
+/// What separates two columns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) enum Delimiter {
+    /// One character, with or without spaces around it.
+    Byte(u8),
+    /// Any run of spaces and tabs.
+    Blank,
+}
+
+/// The delimiters that detection tries, in this order: spaces may surround a comma, and a column that tabs separate may hold spaces.
+pub(crate) const CANDIDATES: [Delimiter; 4] =
+    [Delimiter::Byte(b';'), Delimiter::Byte(b'\t'), Delimiter::Byte(b','), Delimiter::Blank];
+
+impl Delimiter {
+    /// Returns the delimiter that the option names. Fails if the character can be part of a number or of a name.
+    pub(crate) fn from_option(delimiter: char) -> Result<Delimiter> {
+        match delimiter {
+            ' ' => Ok(Delimiter::Blank),
+            '\t' => Ok(Delimiter::Byte(b'\t')),
+            ',' | ';' | '|' | ':' | '/' | '!' | '&' | '*' | '~' | '^' | '%' | '$' | '@' | '_' => {
+                Ok(Delimiter::Byte(delimiter as u8))
+            }
+            _ => Err(Error::Config(format!(
+                "[input.csv] delimiter = {delimiter:?} cannot separate numbers; use a comma, a semicolon, a tab or a space"
+            ))),
+        }
+    }
+
+    /// Returns the column at the start of `line`, without spaces and quotes around it, and the rest of the line after the
+    /// delimiter, if there is a delimiter.
+    pub(crate) fn split<'a>(&self, line: &'a [u8]) -> (&'a [u8], Option<&'a [u8]>) {
+        let line = if *self == Delimiter::Blank { line.trim_ascii_start() } else { line };
+        let quoted = quoted_length(line.trim_ascii_start())
+            .map_or(0, |length| length + line.len() - line.trim_ascii_start().len());
+        let after = &line[quoted..];
+        let (end, rest) = match self {
+            Delimiter::Byte(byte) => match memchr(*byte, after) {
+                Some(at) => (quoted + at, Some(&after[at + 1..])),
+                None => (line.len(), None),
+            },
+            Delimiter::Blank => match memchr2(b' ', b'\t', after) {
+                Some(at) => {
+                    let rest = after[at..].trim_ascii_start();
+                    (quoted + at, (!rest.is_empty()).then_some(rest))
+                }
+                None => (line.len(), None),
+            },
+        };
+        (unquoted(line[..end].trim_ascii()), rest)
+    }
+
+    /// Returns all columns of `line`.
+    pub(crate) fn fields<'a>(&self, line: &'a [u8]) -> Vec<&'a [u8]> {
+        let mut fields = Vec::new();
+        let mut rest = Some(line);
+        while let Some(line) = rest {
+            let (field, after) = self.split(line);
+            fields.push(field);
+            rest = after;
+        }
+        fields
+    }
+}
+
+/// Returns the length of the quoted text that `line` begins with, quotes included.
+fn quoted_length(line: &[u8]) -> Option<usize> {
+    let quote = *line.first().filter(|byte| matches!(byte, b'"' | b'\''))?;
+    memchr(quote, &line[1..]).map(|at| at + 2)
+}
+
+fn unquoted(field: &[u8]) -> &[u8] {
+    match field {
+        [b'"', inner @ .., b'"'] | [b'\'', inner @ .., b'\''] => inner.trim_ascii(),
+        _ => field,
+    }
+}

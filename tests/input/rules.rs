@@ -1,0 +1,77 @@
+//! The rules of a job: which points are kept, and where they land on the lattice.
+
+use gdt_batch::Error;
+use gdt_batch::geometry::Bounds;
+use gdt_batch::geometry::lattice::{Lattice, REACH};
+use gdt_batch::input::{Point, TextOptions, open};
+
+use crate::cloud::{decode, file, lattice, rules};
+use crate::las_file::LasFile;
+
+#[test]
+fn class_bounds_order_and_color_rules_hold() {
+    let path = file(".las", &LasFile::new(2, 2, 0, 1000).las());
+    let source = open(&path, &TextOptions::default()).unwrap();
+    let mut rules = rules(&source, &lattice(&source));
+    let (all, _) = decode(&source, &rules).unwrap();
+    rules.classes = std::array::from_fn(|class| class == 5 || class == 6);
+    rules.bounds = Some(Bounds { min: [-1000, -2000], max: [3000, 4000] });
+    (rules.first_order, rules.rgb) = (1 << 36, false);
+    let (some, counts) = decode(&source, &rules).unwrap();
+    let inside = |p: &Point| (-1000..=3000).contains(&p.position[0]) && (-2000..=4000).contains(&p.position[1]);
+    let wanted = all.iter().filter(|p| (p.class == 5 || p.class == 6) && inside(p));
+    let wanted: Vec<Point> =
+        wanted.map(|p| Point::new(p.position, p.z, [0; 3], p.class, p.order() + (1 << 36))).collect();
+    assert_eq!(some, wanted);
+    assert!(counts.withheld > 0 && counts.other_class > 0 && counts.out_of_bounds > 0, "{counts:?}");
+}
+
+#[test]
+fn points_outside_the_lattice_are_malformed_and_named() {
+    let mut made = LasFile::new(2, 0, 0, 10);
+    made.records[4 * 20..4 * 20 + 4].copy_from_slice(&i32::MAX.to_le_bytes());
+    let path = file(".las", &made.las());
+    let source = open(&path, &TextOptions::default()).unwrap();
+    let lattice = lattice(&source);
+    let mut rules = rules(&source, &lattice);
+    let (_, counts) = decode(&source, &rules).unwrap();
+    assert_eq!((counts.malformed, counts.examples.len()), (1, 1));
+    assert!(counts.examples[0].contains("point 4: x = 21974836.47 lies outside"), "{}", counts.examples[0]);
+    rules.bounds = Some(Bounds { min: [-REACH; 2], max: [REACH; 2] });
+    let (_, counts) = decode(&source, &rules).unwrap();
+    assert_eq!((counts.malformed, counts.out_of_bounds), (0, 1));
+}
+
+#[test]
+fn an_error_of_the_sink_stops_the_decoding() {
+    let path = file(".las", &LasFile::new(2, 1, 0, 1000).las());
+    let source = open(&path, &TextOptions::default()).unwrap();
+    let rules = rules(&source, &lattice(&source));
+    let refuse = &mut |_: &[Point]| Err(Error::Memory("none left".to_string()));
+    assert_eq!(source.decode(0, &rules, refuse).unwrap_err().exit_code(), 1);
+}
+
+#[test]
+fn the_least_lattice_integer_is_outside_the_lattice() {
+    let mut made = LasFile::new(2, 0, 0, 3);
+    for (record, raw) in [i32::MIN, -REACH - 1, -REACH].into_iter().enumerate() {
+        made.records[20 * record..][..4].copy_from_slice(&raw.to_le_bytes());
+    }
+    let path = file(".las", &made.las());
+    let source = open(&path, &TextOptions::default()).unwrap();
+    let [x, y, z] = source.axes;
+    let lattice = Lattice { offset: [x.offset, y.offset, z.offset], resolution: x.scale, resolution_z: z.scale };
+    let (points, counts) = decode(&source, &rules(&source, &lattice)).unwrap();
+    assert_eq!((points.len(), counts.malformed), (1, 2));
+    assert_eq!(points[0].position[0], -REACH);
+}
+
+#[test]
+fn bounds_without_a_lattice_point_keep_no_point() {
+    let path = file(".las", &LasFile::new(2, 0, 0, 100).las());
+    let source = open(&path, &TextOptions::default()).unwrap();
+    let mut rules = rules(&source, &lattice(&source));
+    rules.bounds = Some(Bounds { min: [5, -REACH], max: [4, REACH] });
+    let (points, counts) = decode(&source, &rules).unwrap();
+    assert!(points.is_empty() && counts.out_of_bounds + counts.withheld == 100, "{counts:?}");
+}
