@@ -1,54 +1,56 @@
-//! The acceptance check: whatever the steps before did, a mesh that passes is the canonical Delaunay triangulation.
+//! The acceptance check. Whatever the steps before it did, a mesh that passes is the canonical Delaunay triangulation.
 //!
-//! Checked of the finished mesh, with exact predicates and from the output alone:
+//! It checks the finished mesh with exact predicates, and from nothing but the output:
 //! 1. every triangle is strictly counterclockwise;
 //! 2. twins are mutual and have the same two ends;
-//! 3. the half-edges without twin form one closed loop that never turns right, never turns back, and turns round once;
+//! 3. the half-edges without a twin form one closed loop that never turns right, never turns back, and turns around once;
 //! 4. every site is a corner, and `T = 2 n - h - 2` for `T` triangles, `n` sites and `h` hull edges;
-//! 5. no edge inside fails the canonical in-circle test.
+//! 5. no inner edge fails the canonical in-circle test.
 //!
-//! Why that is enough. Glue the triangles along their twins. Around a corner they form fans, closed ones inside and open ones
-//! that start and end at hull edges. As all triangles are counterclockwise, the angles of a closed fan add up to `2 pi k` with
-//! `k >= 1`, and those of an open one, at a hull vertex where the loop turns left by `0 <= a < pi`, to `pi - a + 2 pi k` with
-//! `k >= 0`. The loop has one open fan at each of its `h` vertices, which are distinct as it turns only once, and the turns add
-//! up to `2 pi`. With `c` closed fans the sum of all angles is therefore `pi T >= 2 pi c + pi h - 2 pi`, that is
-//! `T >= 2 c + h - 2`. Every site has a fan, so `c + h >= n`; with (4), `2 n - h - 2 = T >= 2 c + h - 2`, so `c + h <= n`. Hence each site
-//! has exactly one fan, each closed fan goes round exactly once, and no open fan goes round more than it must. So the map of the
-//! glued surface to the plane is a local homeomorphism inside, and maps its one boundary onto a convex polygon. A
-//! component without boundary would be compact and open in the plane, so there is none; and a point is covered as
-//! often as the boundary winds round it: once inside the polygon, never outside. That is a triangulation of the convex hull with
-//! all sites as corners. By (5) it is locally Delaunay, which by Delaunay's lemma (on the lifted surface, symbolically perturbed
-//! as the tie rule says) makes it the canonical Delaunay triangulation.
+//! Why this is enough: glue the triangles along their twins. Around a corner they form fans: closed fans inside, and open fans that
+//! start and end at hull edges. Because all triangles are counterclockwise, the angles of a closed fan add up to `2 pi k` with
+//! `k >= 1`. The angles of an open fan, at a hull vertex where the loop turns left by `0 <= a < pi`, add up to `pi - a + 2 pi k` with
+//! `k >= 0`. The loop has one open fan at each of its `h` vertices, which are distinct because the loop turns around only once, and
+//! its turns add up to `2 pi`. If there are `c` closed fans, the sum of all angles is therefore `pi T >= 2 pi c + pi h - 2 pi`, that
+//! is, `T >= 2 c + h - 2`. Every site has a fan, so `c + h >= n`. With (4), `2 n - h - 2 = T >= 2 c + h - 2`, so `c + h <= n`. Hence
+//! each site has exactly one fan, each closed fan goes around exactly once, and no open fan goes around more than it must.
+//!
+//! So the map of the glued surface to the plane is a local homeomorphism inside, and it maps the one boundary of the surface onto a
+//! convex polygon. A component without a boundary would be compact and open in the plane, so there is none. A point is covered as
+//! often as the boundary winds around it: once inside the polygon, never outside. That is a triangulation of the convex hull with
+//! all sites as corners. By (5) it is locally Delaunay. By Delaunay's lemma (on the lifted surface, symbolically perturbed as the
+//! tie rule says) it is then the canonical Delaunay triangulation.
 
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
 use crate::mesh::half_edge::{HULL, HalfEdgeMesh};
-use crate::voronoi::closed_mesh::{ClosedMesh, OUTSIDE};
+use crate::voronoi::closed_mesh::ClosedMesh;
 use crate::voronoi::edge_tester::EdgeTester;
+use crate::voronoi::index::{ClosedEdge, VertexIndex};
 use crate::voronoi::rejection::Rejection;
 
 /// Buffers of the check.
 #[derive(Default)]
 pub(super) struct AcceptanceCheck {
     used: Vec<bool>,
-    successor: Vec<u32>,
-    hull: Vec<[u32; 2]>,
-    edges: EdgeTester,
-    doubtful: Vec<u32>,
+    successor: Vec<VertexIndex>,
+    hull: Vec<[VertexIndex; 2]>,
+    tester: EdgeTester,
+    doubtful: Vec<ClosedEdge>,
 }
 
 impl AcceptanceCheck {
-    /// Checks the compacted triangles of `sphere` over `sites` and writes them to `mesh`, its corners being positions in the
-    /// input by `order`.
+    /// Checks the compacted triangles of `closed` over `sites` and writes them to `mesh`. The corners of `mesh` are positions in the
+    /// input, which `order` lists by vertex.
     pub(super) fn accept(
         &mut self,
-        sphere: &ClosedMesh,
+        closed: &ClosedMesh,
         sites: &[Site],
         order: &[u32],
         mesh: &mut HalfEdgeMesh,
     ) -> Result<(), Rejection> {
         let sites = &sites[..order.len()];
-        let (n, front, records) = (sites.len(), sphere.front() as usize, sphere.records());
+        let (n, front, records) = (sites.len(), closed.front().at(), closed.records());
         let triangles = (records.len() - front) / 8;
         self.used.clear();
         self.used.resize(n, false);
@@ -61,7 +63,7 @@ impl AcceptanceCheck {
             let first = (start - front) / 8;
             self.write_triangles(&records[start..end], sites, order, &mut mesh.triangles[first..])?;
             self.write_twins(&records[start..end], front as u32, &mut mesh.twins[3 * first..]);
-            links += self.check_edges(sphere, sites, start, end)?;
+            links += self.check_edges(closed, sites, start, end)?;
         }
         if 2 * links + self.hull.len() != 3 * triangles {
             return Err(Rejection::NotAccepted("twins do not fit"));
@@ -72,7 +74,7 @@ impl AcceptanceCheck {
         self.check_hull(sites)
     }
 
-    /// Point 1, and notes the corners for point 4.
+    /// Checks point 1, and notes the corners for point 4.
     fn write_triangles(
         &mut self,
         block: &[u32],
@@ -99,84 +101,83 @@ impl AcceptanceCheck {
         }
     }
 
-    /// Numbers the twins as in a mesh, and notes the hull for point 3.
+    /// Numbers the twins as in a half-edge mesh, and notes the hull for point 3.
     fn write_twins(&mut self, block: &[u32], front: u32, twins: &mut [u32]) {
         for (record, twins) in block.chunks_exact(8).zip(twins.chunks_exact_mut(3)) {
             for i in 0..3 {
                 let g = record[4 + i];
                 twins[i] = (g.wrapping_sub(front) >> 3).wrapping_mul(3).wrapping_add(g & 7);
-                if g == OUTSIDE {
+                if g == ClosedEdge::OUTSIDE.0 {
                     twins[i] = HULL;
-                    self.hull.push([record[i], record[(i + 1) % 3]]);
+                    self.hull.push([record[i], record[(i + 1) % 3]].map(VertexIndex));
                 }
             }
         }
     }
 
-    /// Points 2 and 5 for the edges of a block; returns how many pairs of twins there are. As every pair is found once, from
-    /// its greater half-edge, all half-edges are paired if the pairs are half as many as they.
+    /// Checks points 2 and 5 for the edges of a block; returns the number of pairs of twins. Every pair is found once, from its
+    /// greater half-edge. So all half-edges are paired if there are half as many pairs as half-edges.
     fn check_edges(
         &mut self,
-        sphere: &ClosedMesh,
+        closed: &ClosedMesh,
         sites: &[Site],
         start: usize,
         end: usize,
     ) -> Result<usize, Rejection> {
         self.doubtful.clear();
-        let links = self.edges.test::<true>(sphere, sites, start, end, &mut self.doubtful);
+        let links = self.tester.test::<true>(closed, sites, start, end, &mut self.doubtful);
         if links.broken {
             return Err(Rejection::NotAccepted("twins do not fit"));
         }
-        match self.doubtful.iter().any(|&h| sphere.fails(sites, h)) {
+        match self.doubtful.iter().any(|&h| closed.fails(sites, h)) {
             true => Err(Rejection::NotAccepted("an edge is not Delaunay")),
             false => Ok(links.count),
         }
     }
 
-    /// Point 3.
+    /// Checks point 3.
     fn check_hull(&mut self, sites: &[Site]) -> Result<(), Rejection> {
-        const NONE: u32 = u32::MAX;
-        let fault = Rejection::NotAccepted("the hull is not convex");
+        let rejection = Rejection::NotAccepted("the hull is not convex");
         self.successor.clear();
-        self.successor.resize(sites.len(), NONE);
+        self.successor.resize(sites.len(), VertexIndex::NONE);
         for &[u, v] in &self.hull {
-            if std::mem::replace(&mut self.successor[u as usize], v) != NONE {
-                return Err(fault);
+            if std::mem::replace(&mut self.successor[u.at()], v) != VertexIndex::NONE {
+                return Err(rejection);
             }
         }
-        let Some(&[first, second]) = self.hull.first() else { return Err(fault) };
+        let Some(&[first, second]) = self.hull.first() else { return Err(rejection) };
         let (mut u, mut v) = (first, second);
         let mut rounds = 0;
         for _ in 0..self.hull.len() {
-            let w = self.successor[v as usize];
-            if w == NONE {
-                return Err(fault);
+            let w = self.successor[v.at()];
+            if w == VertexIndex::NONE {
+                return Err(rejection);
             }
-            let [p, q, r] = [u, v, w].map(|i| sites[i as usize]);
-            if !goes_on(p, q, r) {
-                return Err(fault);
+            let [p, q, r] = [u, v, w].map(|vertex| vertex.site(sites));
+            if !turns_left_or_continues(p, q, r) {
+                return Err(rejection);
             }
             rounds += (!is_upward(p, q) && is_upward(q, r)) as usize;
             (u, v) = (v, w);
             if u == first && rounds == 0 {
-                return Err(fault);
+                return Err(rejection);
             }
         }
         match u == first && rounds == 1 {
             true => Ok(()),
-            false => Err(fault),
+            false => Err(rejection),
         }
     }
 }
 
-/// Whether the path p, q, r turns left or goes straight on.
-fn goes_on(p: Site, q: Site, r: Site) -> bool {
+/// Returns whether the path p, q, r turns left or continues straight ahead.
+fn turns_left_or_continues(p: Site, q: Site, r: Site) -> bool {
     let turn = orient2d(p, q, r);
     let [dx, dy] = [0, 1].map(|i| (q[i] as i64 - p[i] as i64) * (r[i] as i64 - q[i] as i64));
     turn > 0 || (turn == 0 && dx + dy > 0)
 }
 
-/// Whether the direction from p to q has an angle in [0, pi).
+/// Returns whether the direction from p to q has an angle in [0, pi).
 fn is_upward(p: Site, q: Site) -> bool {
     q[1] > p[1] || (q[1] == p[1] && q[0] > p[0])
 }

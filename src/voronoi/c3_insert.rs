@@ -1,36 +1,37 @@
-//! Step C3: insert the sites that are missing and those that were taken out. Each is found by walking through the mesh,
-//! which is Delaunay by then, and made Delaunay at once.
+//! Step C3: insert the sites that are missing or were removed. A walk through the mesh, which is Delaunay by then, finds the place
+//! of each. After each insertion the mesh is made Delaunay again at once.
 
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
 use crate::voronoi::c4_flip::FlipQueue;
-use crate::voronoi::closed_mesh::{ClosedMesh, next, previous};
+use crate::voronoi::closed_mesh::ClosedMesh;
 use crate::voronoi::g1_write_sites::SiteTexture;
 use crate::voronoi::g6_triangles::TextureScan;
+use crate::voronoi::index::{ClosedEdge, VertexIndex};
 use crate::voronoi::rejection::Rejection;
 
-/// Where a new vertex goes: into a triangle, maybe onto one of its edges.
+/// Where a new vertex goes: into a triangle, and if it lies on a side of the triangle, onto that side.
 struct InsertionPoint {
-    triangle: u32,
-    on: Option<u32>,
+    triangle: ClosedEdge,
+    on: Option<ClosedEdge>,
 }
 
-/// Inserts the sites `removed` from the mesh and those missing in `texture`.
+/// Inserts the sites that were `removed` from the mesh and those that are missing in `texture`.
 pub(super) fn insert_all(
-    sphere: &mut ClosedMesh,
+    mesh: &mut ClosedMesh,
     texture: &SiteTexture,
     scan: &TextureScan,
-    removed: &[[u32; 2]],
+    removed: &[(VertexIndex, ClosedEdge)],
     flips: &mut FlipQueue,
 ) -> Result<(), Rejection> {
-    for &[vertex, near] in removed {
-        insert(sphere, &texture.sites, vertex, near, flips)?;
+    for &(vertex, near) in removed {
+        insert(mesh, &texture.sites, vertex, near, flips)?;
     }
-    let (mut last_pixel, mut last) = (u32::MAX, 0);
-    for (vertex, &pixel) in (texture.placed as u32..).zip(&texture.missing) {
-        // The one before, if it was in this pixel or the next, is nearer than what the scan left here.
+    let (mut last_pixel, mut last) = (u32::MAX, ClosedEdge::default());
+    for (vertex, &pixel) in (texture.placed as u32..).map(VertexIndex).zip(&texture.missing) {
+        // If the last site was in this pixel or the one before it, it is nearer than the triangle that the scan made here.
         let near = if pixel.wrapping_sub(last_pixel) < 2 { last } else { scan.start_near(pixel) };
-        last = insert(sphere, &texture.sites, vertex, near, flips)?;
+        last = insert(mesh, &texture.sites, vertex, near, flips)?;
         last_pixel = pixel;
     }
     Ok(())
@@ -38,48 +39,47 @@ pub(super) fn insert_all(
 
 /// Inserts `vertex`, looking for its place from half-edge `near` on; returns a half-edge near it.
 fn insert(
-    sphere: &mut ClosedMesh,
+    mesh: &mut ClosedMesh,
     sites: &[Site],
-    vertex: u32,
-    near: u32,
+    vertex: VertexIndex,
+    near: ClosedEdge,
     flips: &mut FlipQueue,
-) -> Result<u32, Rejection> {
-    let place = locate(sphere, sites, sites[vertex as usize], near, flips)?;
-    let sides = sphere.split(place.triangle, vertex);
+) -> Result<ClosedEdge, Rejection> {
+    let place = locate(mesh, sites, vertex.site(sites), near, flips)?;
+    let sides = mesh.split(place.triangle, vertex);
     flips.suspects.extend(sides);
     if let Some(side) = place.on {
-        let h = sides[(side & 3) as usize];
-        let g = sphere.twin(h);
-        sphere.flip(h);
-        flips.suspects.extend([h, previous(h), g, previous(g)]);
+        let h = sides[side.corner()];
+        let g = mesh.twin(h);
+        mesh.flip(h);
+        flips.suspects.extend([h, h.previous(), g, g.previous()]);
     }
-    flips.run(sphere, sites)?;
+    flips.run(mesh, sites)?;
     Ok(sides[0])
 }
 
 fn locate(
-    sphere: &ClosedMesh,
+    mesh: &ClosedMesh,
     sites: &[Site],
     p: Site,
-    near: u32,
+    near: ClosedEdge,
     flips: &mut FlipQueue,
 ) -> Result<InsertionPoint, Rejection> {
-    let mut h = start(sphere, near)?;
+    let mut h = start(mesh, near)?;
     loop {
         flips.step()?;
-        let [a, b, c] = [h, next(h), previous(h)];
-        let at = |e: u32| sites[sphere.origin(e) as usize];
-        let (pa, pb, pc) = (at(a), at(b), at(c));
-        let sides = [orient2d(pa, pb, p), orient2d(pb, pc, p), orient2d(pc, pa, p)];
-        match sides.iter().position(|&s| s < 0) {
+        let edges = [h, h.next(), h.previous()];
+        let [a, b, c] = edges.map(|edge| mesh.origin(edge).site(sites));
+        let turns = [orient2d(a, b, p), orient2d(b, c, p), orient2d(c, a, p)];
+        match turns.iter().position(|&turn| turn < 0) {
             Some(i) => {
-                h = sphere.twin([a, b, c][i]);
-                if sphere.is_ghost(h) {
+                h = mesh.twin(edges[i]);
+                if mesh.is_ghost(h) {
                     return Ok(InsertionPoint { triangle: h, on: None });
                 }
             }
             None => {
-                let mut on = [a, b, c].into_iter().zip(sides).filter(|&(_, s)| s == 0).map(|(e, _)| e);
+                let mut on = edges.into_iter().zip(turns).filter(|&(_, turn)| turn == 0).map(|(edge, _)| edge);
                 let place = InsertionPoint { triangle: h, on: on.next() };
                 return on.next().map_or(Ok(place), |_| Err(Rejection::NotAccepted("two sites in one place")));
             }
@@ -87,12 +87,12 @@ fn locate(
     }
 }
 
-/// A half-edge of a finite triangle at or after `near`.
-fn start(sphere: &ClosedMesh, near: u32) -> Result<u32, Rejection> {
-    let finite = |h: u32| sphere.corners(h).is_some_and(|c| !c.contains(&sphere.infinity()));
-    if near < sphere.end() && finite(near) {
-        return Ok(near & !7);
+/// Returns a half-edge of a finite triangle at or after `near`.
+fn start(mesh: &ClosedMesh, near: ClosedEdge) -> Result<ClosedEdge, Rejection> {
+    let is_finite = |h: ClosedEdge| mesh.corners(h).is_some_and(|c| !c.contains(&mesh.infinity()));
+    if near < mesh.end() && is_finite(near) {
+        return Ok(near.triangle());
     }
-    let after = sphere.triangles().filter(|&h| h >= near);
-    after.chain(sphere.triangles()).find(|&h| finite(h)).ok_or(Rejection::NotAccepted("no triangle"))
+    let after = mesh.triangles().filter(|&h| h >= near);
+    after.chain(mesh.triangles()).find(|&h| is_finite(h)).ok_or(Rejection::NotAccepted("no triangle"))
 }

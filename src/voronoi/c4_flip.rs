@@ -1,76 +1,77 @@
 //! Step C4: flip edges until all are Delaunay (Lawson), by the canonical in-circle test.
 
 use crate::geometry::Site;
-use crate::voronoi::closed_mesh::{ClosedMesh, previous};
+use crate::voronoi::closed_mesh::ClosedMesh;
+use crate::voronoi::index::ClosedEdge;
 use crate::voronoi::rejection::Rejection;
 
-/// Flips and steps allowed per site; more are a sign of a mesh that is no triangulation, or of a leaf that this is no
-/// way to do.
+/// Flips and steps that are allowed per site. If more are needed, the mesh is not a triangulation, or the pipeline does not suit the
+/// leaf.
 const STEPS_PER_SITE: u64 = 64;
 
-/// The edges still to be tested, and the effort so far.
+/// The edges that are still to be tested, and the effort so far.
 #[derive(Default)]
 pub(super) struct FlipQueue {
     /// Edges that may not be Delaunay. All others are.
-    pub(super) suspects: Vec<u32>,
-    /// Edges that could not be flipped while the scan went on.
-    pub(super) later: Vec<u32>,
-    /// Flips done.
+    pub(super) suspects: Vec<ClosedEdge>,
+    /// Edges that could not be flipped during the scan.
+    pub(super) later: Vec<ClosedEdge>,
+    /// The number of flips done.
     pub(super) done: u64,
-    left: u64,
+    steps_left: u64,
 }
 
 impl FlipQueue {
-    /// Starts anew for a leaf of `sites` sites.
+    /// Clears the queue for a leaf of `sites` sites.
     pub(super) fn reset(&mut self, sites: usize) {
         self.suspects.clear();
         self.later.clear();
         self.done = 0;
-        self.left = STEPS_PER_SITE * sites as u64 + 1024;
+        self.steps_left = STEPS_PER_SITE * sites as u64 + 1024;
     }
 
-    /// Counts one step of bounded work.
+    /// Counts one step of work, which is bounded.
     #[inline(always)]
     pub(super) fn step(&mut self) -> Result<(), Rejection> {
-        self.left = self.left.checked_sub(1).ok_or(Rejection::NotAccepted("no end in sight"))?;
+        self.steps_left = self.steps_left.checked_sub(1).ok_or(Rejection::NotAccepted("no end in sight"))?;
         Ok(())
     }
 
-    /// Flips what can be flipped while the scan goes on and sites are not yet where they belong: only where both triangles
-    /// are counterclockwise afterwards. The others wait in `later`.
-    pub(super) fn run_early(&mut self, sphere: &mut ClosedMesh, sites: &[Site]) -> Result<(), Rejection> {
+    /// Flips what can be flipped during the scan, while sites are not yet at their true places: only edges whose two triangles are
+    /// counterclockwise afterwards. The others wait in `later`.
+    pub(super) fn run_early(&mut self, mesh: &mut ClosedMesh, sites: &[Site]) -> Result<(), Rejection> {
         while let Some(h) = self.suspects.pop() {
-            let g = sphere.twin(h);
-            // An open edge is tested when its other triangle comes; those to infinity are for step C1.
-            if g < sphere.front() || !sphere.fails_inside(sites, h) {
+            let g = mesh.twin(h);
+            // An open edge is tested when its second triangle exists. Edges to infinity are left to step C1.
+            if g < mesh.front() || !mesh.fails_inside(sites, h) {
                 continue;
             }
-            if !sphere.is_convex(sites, h) {
+            if !mesh.is_convex(sites, h) {
                 self.later.push(h);
                 continue;
             }
-            self.flip(sphere, h)?;
+            self.flip(mesh, h)?;
         }
         Ok(())
     }
 
-    /// Flips until every edge is Delaunay.
-    pub(super) fn run(&mut self, sphere: &mut ClosedMesh, sites: &[Site]) -> Result<(), Rejection> {
+    /// Flips edges until every edge is Delaunay.
+    pub(super) fn run(&mut self, mesh: &mut ClosedMesh, sites: &[Site]) -> Result<(), Rejection> {
         while let Some(h) = self.suspects.pop() {
-            if !sphere.is_free(h) && sphere.fails(sites, h) {
-                self.flip(sphere, h)?;
+            if !mesh.is_free(h) && mesh.fails(sites, h) {
+                self.flip(mesh, h)?;
             }
         }
         Ok(())
     }
 
     #[inline(always)]
-    fn flip(&mut self, sphere: &mut ClosedMesh, h: u32) -> Result<(), Rejection> {
+    fn flip(&mut self, mesh: &mut ClosedMesh, h: ClosedEdge) -> Result<(), Rejection> {
         self.step()?;
         self.done += 1;
-        let g = sphere.twin(h);
-        sphere.flip(h);
-        self.suspects.extend([h, previous(h), g, previous(g)]);
+        let g = mesh.twin(h);
+        mesh.flip(h);
+        self.suspects.extend([h, h.previous(), g, g.previous()]);
         Ok(())
     }
 }

@@ -1,44 +1,32 @@
-//! The mesh while it is being made: a triangulation of the sphere, in which the hull is closed by ghost triangles to a
-//! vertex at infinity. Every half-edge has a twin, so that flips, insertions and removals need no special cases.
+//! The mesh while it is being made: a triangulation of the sphere, in which ghost triangles join the hull to a vertex at
+//! infinity. Every half-edge has a twin, so flips, insertions and removals need no special cases.
 //!
-//! A triangle is one record of eight numbers: three corners (counterclockwise) and a spare, three twins and a spare.
-//! Half-edge `8 t + i` starts at corner `i` of record `t`, so that corner and twin are one load each. The first records are
-//! *slots*, the open ends of Voronoi edges while the texture is scanned (see `g6_triangles`).
+//! A triangle is a record of eight numbers: three corners (counterclockwise) and an unused number, three twins and an unused
+//! number. So a corner and a twin are one load each. The first records are *slots*, which stand for the open ends of Voronoi edges
+//! while the texture is scanned (see `g6_triangles`).
 
 use crate::geometry::Site;
 use crate::geometry::predicates::{in_circle, orient2d};
+use crate::voronoi::index::{ClosedEdge, VertexIndex};
 
-/// In a corner: the record is free.
-pub(super) const FREE: u32 = u32::MAX;
-/// In a twin, at the very end: there was a ghost triangle.
-pub(super) const OUTSIDE: u32 = u32::MAX;
+const FREE: u32 = VertexIndex::NONE.0;
 
 /// A closed triangulated surface over sites; see the module.
 #[derive(Default)]
 pub(super) struct ClosedMesh {
-    /// Only as far as `end`; the rest is room, kept from leaf to leaf.
+    /// The records up to `end`. What follows is room that is kept from leaf to leaf.
     records: Vec<u32>,
     end: usize,
+    /// The number of records that hold slots.
     slots: usize,
-    free: Vec<u32>,
-    infinity: u32,
-}
-
-/// The half-edge after `h` in its triangle: by a table of two-bit numbers, since a branch would be wrong one time in three.
-#[inline(always)]
-pub(super) fn next(h: u32) -> u32 {
-    (h & !3) | (0b00_10_01 >> (2 * (h & 3)) & 3)
-}
-
-/// The half-edge before `h` in its triangle.
-#[inline(always)]
-pub(super) fn previous(h: u32) -> u32 {
-    (h & !3) | (0b01_00_10 >> (2 * (h & 3)) & 3)
+    /// The triangles whose records are free.
+    free: Vec<ClosedEdge>,
+    infinity: VertexIndex,
 }
 
 impl ClosedMesh {
-    /// Forgets everything; makes room for `slots` slots and the triangles of `sites` sites. Vertex `infinity` is the ghost.
-    pub(super) fn reset(&mut self, slots: usize, sites: usize, infinity: u32) {
+    /// Clears the mesh, and makes room for `slots` slots and for the triangles of `sites` sites. Vertex `infinity` is the ghost.
+    pub(super) fn reset(&mut self, slots: usize, sites: usize, infinity: VertexIndex) {
         self.slots = slots.div_ceil(4);
         self.end = 8 * self.slots;
         let room = self.end + 8 * (2 * sites + sites / 8 + 64);
@@ -50,315 +38,318 @@ impl ClosedMesh {
         self.infinity = infinity;
     }
 
-    /// The half-edge that stands for slot `i`. Only its twin has a meaning.
+    /// Returns the half-edge that stands for slot `i`. It has a twin, but no origin.
     #[inline(always)]
-    pub(super) const fn slot(i: usize) -> u32 {
-        ((i >> 2) << 3 | (i & 3)) as u32
+    pub(super) const fn slot(i: usize) -> ClosedEdge {
+        ClosedEdge(((i >> 2) << 3 | (i & 3)) as u32)
     }
 
-    /// The vertex at infinity.
+    /// Returns the vertex at infinity.
     #[inline(always)]
-    pub(super) fn infinity(&self) -> u32 {
+    pub(super) fn infinity(&self) -> VertexIndex {
         self.infinity
     }
 
-    /// The first half-edge of every record that may hold a triangle.
-    pub(super) fn triangles(&self) -> impl Iterator<Item = u32> + use<> {
-        (self.front()..self.end()).step_by(8)
+    /// Returns the first half-edge of every record that may hold a triangle.
+    pub(super) fn triangles(&self) -> impl Iterator<Item = ClosedEdge> + use<> {
+        (self.front().0..self.end().0).step_by(8).map(ClosedEdge)
     }
 
-    /// All records, eight numbers each; half-edge h starts at `records[h]` and its twin is `records[h + 4]`.
+    /// Returns all records, eight numbers each. Half-edge `h` starts at vertex `records[h]`, and its twin is `records[h + 4]`.
     pub(super) fn records(&self) -> &[u32] {
         &self.records[..self.end]
     }
 
-    /// The number of triangles, ghosts included.
+    /// Returns the number of triangles, including ghosts.
     pub(super) fn len(&self) -> usize {
         self.end / 8 - self.slots - self.free.len()
     }
 
-    /// The first half-edge of the next triangle that is added while none is free.
+    /// Returns the first half-edge of the first triangle.
     #[inline(always)]
-    pub(super) fn end(&self) -> u32 {
-        self.end as u32
+    pub(super) fn front(&self) -> ClosedEdge {
+        ClosedEdge((8 * self.slots) as u32)
+    }
+
+    /// Returns the first half-edge of the next triangle that is added at the end.
+    #[inline(always)]
+    pub(super) fn end(&self) -> ClosedEdge {
+        ClosedEdge(self.end as u32)
     }
 
     #[inline(always)]
-    pub(super) fn origin(&self, h: u32) -> u32 {
-        self.records[h as usize]
+    pub(super) fn origin(&self, h: ClosedEdge) -> VertexIndex {
+        VertexIndex(self.records[h.at()])
     }
 
     #[inline(always)]
-    pub(super) fn destination(&self, h: u32) -> u32 {
-        self.origin(next(h))
+    pub(super) fn destination(&self, h: ClosedEdge) -> VertexIndex {
+        self.origin(h.next())
     }
 
     #[inline(always)]
-    pub(super) fn apex(&self, h: u32) -> u32 {
-        self.origin(previous(h))
+    pub(super) fn apex(&self, h: ClosedEdge) -> VertexIndex {
+        self.origin(h.previous())
     }
 
     #[inline(always)]
-    pub(super) fn twin(&self, h: u32) -> u32 {
-        self.records[h as usize + 4]
+    pub(super) fn twin(&self, h: ClosedEdge) -> ClosedEdge {
+        ClosedEdge(self.records[h.at() + 4])
     }
 
     #[inline(always)]
-    pub(super) fn set_twin(&mut self, h: u32, to: u32) {
-        self.records[h as usize + 4] = to;
+    fn set_twin(&mut self, h: ClosedEdge, to: ClosedEdge) {
+        self.records[h.at() + 4] = to.0;
+    }
+
+    /// Makes two half-edges each other's twins.
+    #[inline(always)]
+    pub(super) fn link(&mut self, h: ClosedEdge, g: ClosedEdge) {
+        self.set_twin(h, g);
+        self.set_twin(g, h);
+    }
+
+    /// Returns the corners of the triangle of `h`, or `None` if its record is free.
+    #[inline(always)]
+    pub(super) fn corners(&self, h: ClosedEdge) -> Option<[VertexIndex; 3]> {
+        let corners = h.triangle().sides().map(|side| self.origin(side));
+        (corners[0] != VertexIndex::NONE).then_some(corners)
     }
 
     #[inline(always)]
-    pub(super) fn link(&mut self, h: u32, g: u32) {
-        self.records[h as usize + 4] = g;
-        self.records[g as usize + 4] = h;
-    }
-
-    /// The corners of the triangle of `h`, or `None` for a free record.
-    #[inline(always)]
-    pub(super) fn corners(&self, h: u32) -> Option<[u32; 3]> {
-        let at = (h & !7) as usize;
-        let c = [self.records[at], self.records[at + 1], self.records[at + 2]];
-        (c[0] != FREE).then_some(c)
+    pub(super) fn is_free(&self, h: ClosedEdge) -> bool {
+        self.origin(h.triangle()) == VertexIndex::NONE
     }
 
     #[inline(always)]
-    pub(super) fn is_free(&self, h: u32) -> bool {
-        self.records[(h & !7) as usize] == FREE
+    fn set_corners(&mut self, h: ClosedEdge, [a, b, c]: [VertexIndex; 3]) {
+        let at = h.triangle().at();
+        self.records[at..at + 3].copy_from_slice(&[a.0, b.0, c.0]);
     }
 
+    /// Adds a triangle without twins at the end; returns its first half-edge.
     #[inline(always)]
-    fn set_corners(&mut self, h: u32, corners: [u32; 3]) {
-        let at = (h & !7) as usize;
-        self.records[at..at + 3].copy_from_slice(&corners);
-    }
-
-    /// A new triangle without twins; its first half-edge.
-    #[inline(always)]
-    pub(super) fn push(&mut self, a: u32, b: u32, c: u32) -> u32 {
+    pub(super) fn push(&mut self, [a, b, c]: [VertexIndex; 3]) -> ClosedEdge {
         let h = self.end;
         if h + 8 > self.records.len() {
             self.records.resize(2 * h + 8, FREE);
         }
         let record = &mut self.records[h..h + 8];
-        (record[0], record[1], record[2]) = (a, b, c);
+        (record[0], record[1], record[2]) = (a.0, b.0, c.0);
         self.end = h + 8;
-        h as u32
+        ClosedEdge(h as u32)
     }
 
-    fn add(&mut self, corners: [u32; 3]) -> u32 {
+    /// Adds a triangle without twins, in a free record if there is one; returns its first half-edge.
+    fn add(&mut self, corners: [VertexIndex; 3]) -> ClosedEdge {
         match self.free.pop() {
             Some(h) => {
                 self.set_corners(h, corners);
                 h
             }
-            None => self.push(corners[0], corners[1], corners[2]),
+            None => self.push(corners),
         }
     }
 
-    fn release(&mut self, h: u32) {
-        self.set_corners(h, [FREE; 3]);
-        self.free.push(h & !7);
+    fn release(&mut self, h: ClosedEdge) {
+        self.set_corners(h, [VertexIndex::NONE; 3]);
+        self.free.push(h.triangle());
     }
 
-    /// Whether the triangle of `h` has the vertex at infinity.
+    /// Returns whether the vertex at infinity is a corner of the triangle of `h`.
     #[inline(always)]
-    pub(super) fn is_ghost(&self, h: u32) -> bool {
+    pub(super) fn is_ghost(&self, h: ClosedEdge) -> bool {
         self.corners(h).is_some_and(|c| c.contains(&self.infinity))
     }
 
-    /// Replaces edge `h` by the other diagonal of its two triangles. With `g` the twin of `h`, the diagonal is then `next(h)`
-    /// and `next(g)`, and the rim `h`, `previous(h)`, `g`, `previous(g)`.
+    /// Replaces edge `h` by the other diagonal of its two triangles. If `g` is the twin of `h`, the diagonal is then `h.next()` and
+    /// `g.next()`, and the outline of the two triangles is `h`, `h.previous()`, `g`, `g.previous()`.
     #[inline(always)]
-    pub(super) fn flip(&mut self, h: u32) {
+    pub(super) fn flip(&mut self, h: ClosedEdge) {
         let g = self.twin(h);
-        let (h_next, g_next) = (next(h), next(g));
+        let (h_next, g_next) = (h.next(), g.next());
         let (h_apex, g_apex) = (self.apex(h), self.apex(g));
         let (outer_h, outer_g) = (self.twin(h_next), self.twin(g_next));
-        self.records[h_next as usize] = g_apex;
-        self.records[g_next as usize] = h_apex;
+        self.records[h_next.at()] = g_apex.0;
+        self.records[g_next.at()] = h_apex.0;
         self.link(h, outer_g);
         self.link(g, outer_h);
         self.link(h_next, g_next);
     }
 
     /// Splits the triangle of `h` at the new vertex `v`; returns the half-edges of the old triangle's sides.
-    pub(super) fn split(&mut self, h: u32, v: u32) -> [u32; 3] {
-        let h0 = h & !7;
-        let (a, b, c) = (self.origin(h0), self.origin(h0 + 1), self.origin(h0 + 2));
-        let (outer1, outer2) = (self.twin(h0 + 1), self.twin(h0 + 2));
+    pub(super) fn split(&mut self, h: ClosedEdge, v: VertexIndex) -> [ClosedEdge; 3] {
+        let h0 = h.triangle();
+        let [a, b, c] = h0.sides().map(|side| self.origin(side));
+        let (outer1, outer2) = (self.twin(h0.side(1)), self.twin(h0.side(2)));
         self.set_corners(h0, [a, b, v]);
         let h1 = self.add([b, c, v]);
         let h2 = self.add([c, a, v]);
         self.link(h1, outer1);
         self.link(h2, outer2);
-        self.link(h0 + 1, h1 + 2);
-        self.link(h1 + 1, h2 + 2);
-        self.link(h2 + 1, h0 + 2);
+        self.link(h0.side(1), h1.side(2));
+        self.link(h1.side(1), h2.side(2));
+        self.link(h2.side(1), h0.side(2));
         [h0, h1, h2]
     }
 
-    /// Takes the vertex at the start of `h` out and fills the hole, `fill` listing the new triangles by the numbers of
-    /// `star`'s sides. Calls `changed` with every half-edge of the new triangles.
-    pub(super) fn replace_star(&mut self, star: &OneRing, fill: &HoleFilling, mut changed: impl FnMut(u32)) {
-        for &side in &star.sides {
+    /// Removes the triangles of `ring` and fills the hole with the triangles of `fill`. Calls `changed` with every half-edge of the
+    /// new triangles.
+    pub(super) fn fill_hole(&mut self, ring: &OneRing, fill: &HoleFilling, mut changed: impl FnMut(ClosedEdge)) {
+        for &side in &ring.sides {
             self.release(side);
         }
-        // The open half-edge of every side of the remaining hole: at first those outside.
-        let mut open = star.outside.clone();
+        // The half-edge on the other side of each side of the remaining hole.
+        let mut open = ring.outside.clone();
         for &[i, j, k] in &fill.ears {
-            let corners = [star.vertices[i], star.vertices[j], star.vertices[k]];
-            let h = self.add(corners);
+            let h = self.add([i, j, k].map(|side| ring.vertices[side]));
             self.link(h, open[i]);
-            self.link(h + 1, open[j]);
-            open[i] = h + 2;
-            (0..3).for_each(|e| changed(h + e));
+            self.link(h.side(1), open[j]);
+            open[i] = h.side(2);
+            h.sides().into_iter().for_each(&mut changed);
         }
         let [i, j] = fill.seam;
         self.link(open[i], open[j]);
         changed(open[i]);
     }
 
-    /// The triangles around the vertex at the start of `h`, or `None` if there are more than [`OneRing::MOST`], or they leave no hole
-    /// that could be filled.
-    pub(super) fn star(&self, h: u32) -> Option<OneRing> {
-        let mut star = OneRing::default();
-        let mut spoke = h;
+    /// Returns the triangles around the origin of `h`, or `None` if there are more than [`OneRing::MAX_TRIANGLES`] or they leave no
+    /// hole that can be filled.
+    pub(super) fn one_ring(&self, h: ClosedEdge) -> Option<OneRing> {
+        let mut ring = OneRing::default();
+        let mut outgoing = h;
         loop {
-            let side = next(spoke);
-            star.sides.push(side);
-            star.vertices.push(self.origin(side));
-            star.outside.push(self.twin(side));
-            spoke = self.twin(previous(spoke));
-            if spoke == h {
-                return star.leaves_a_hole().then_some(star);
+            let side = outgoing.next();
+            ring.sides.push(side);
+            ring.vertices.push(self.origin(side));
+            ring.outside.push(self.twin(side));
+            outgoing = self.twin(outgoing.previous());
+            if outgoing == h {
+                return ring.leaves_a_hole().then_some(ring);
             }
-            if star.sides.len() == OneRing::MOST {
+            if ring.sides.len() == OneRing::MAX_TRIANGLES {
                 return None;
             }
         }
     }
 
-    /// Whether edge `h` should be flipped: in a valid triangulation, by the canonical in-circle test, or, for an
-    /// edge to infinity, because the hull has a pocket there.
+    /// Returns whether edge `h` of a valid triangulation should be flipped: because it fails the canonical in-circle test, or, if it
+    /// leads to infinity, because the hull has a pocket there.
     #[inline(always)]
-    pub(super) fn fails(&self, sites: &[Site], h: u32) -> bool {
-        let g = self.twin(h);
-        let (u, v, w, z) = (self.origin(h), self.origin(g), self.apex(h), self.apex(g));
-        let most = u.max(v).max(w).max(z);
-        if most == self.infinity {
-            return self.pocket(sites, u, v, w, z);
+    pub(super) fn fails(&self, sites: &[Site], h: ClosedEdge) -> bool {
+        let [u, v, w, z] = self.quadrilateral(h);
+        if u.0.max(v.0).max(w.0).max(z.0) == self.infinity.0 {
+            return self.is_pocket(sites, [u, v, w, z]);
         }
-        let at = |i: u32| sites[i as usize];
-        in_circle(at(u), at(v), at(w), at(z))
+        in_circle(u.site(sites), v.site(sites), w.site(sites), z.site(sites))
     }
 
-    /// Whether edge `h` between two finite triangles should be flipped.
+    /// Returns whether edge `h` between two finite triangles should be flipped.
     #[inline(always)]
-    pub(super) fn fails_inside(&self, sites: &[Site], h: u32) -> bool {
-        let g = self.twin(h);
-        let (u, v, w, z) = (self.origin(h), self.origin(g), self.apex(h), self.apex(g));
-        let at = |i: u32| sites[i as usize];
-        u.max(v).max(w).max(z) != self.infinity && in_circle(at(u), at(v), at(w), at(z))
+    pub(super) fn fails_inside(&self, sites: &[Site], h: ClosedEdge) -> bool {
+        let [u, v, w, z] = self.quadrilateral(h);
+        u.0.max(v.0).max(w.0).max(z.0) != self.infinity.0
+            && in_circle(u.site(sites), v.site(sites), w.site(sites), z.site(sites))
     }
 
-    /// Whether flipping edge `h`, its triangles finite, leaves two counterclockwise triangles.
+    /// Returns whether both triangles are counterclockwise after a flip of edge `h` between two finite triangles.
     #[inline(always)]
-    pub(super) fn is_convex(&self, sites: &[Site], h: u32) -> bool {
-        let g = self.twin(h);
-        let at = |i: u32| sites[i as usize];
-        let (u, v, w, z) = (at(self.origin(h)), at(self.origin(g)), at(self.apex(h)), at(self.apex(g)));
+    pub(super) fn is_convex(&self, sites: &[Site], h: ClosedEdge) -> bool {
+        let [u, v, w, z] = self.quadrilateral(h).map(|vertex| vertex.site(sites));
         orient2d(z, w, u) > 0 && orient2d(w, z, v) > 0
     }
 
+    /// Returns the two ends of edge `h`, the apex of its triangle and the apex of its twin's triangle.
+    #[inline(always)]
+    pub(super) fn quadrilateral(&self, h: ClosedEdge) -> [VertexIndex; 4] {
+        let g = self.twin(h);
+        [self.origin(h), self.origin(g), self.apex(h), self.apex(g)]
+    }
+
     #[cold]
-    fn pocket(&self, sites: &[Site], u: u32, v: u32, w: u32, z: u32) -> bool {
-        let at = |i: u32| sites[i as usize];
+    fn is_pocket(&self, sites: &[Site], [u, v, w, z]: [VertexIndex; 4]) -> bool {
         let infinity = self.infinity;
         if w == z || w == infinity || z == infinity {
             false
         } else if u == infinity {
-            orient2d(at(v), at(w), at(z)) > 0
+            orient2d(v.site(sites), w.site(sites), z.site(sites)) > 0
         } else {
-            orient2d(at(u), at(z), at(w)) > 0
+            orient2d(u.site(sites), z.site(sites), w.site(sites)) > 0
         }
     }
 
-    /// Moves the finite triangles to the front and marks the hull.
+    /// Removes the ghosts and the free records, and marks the hull.
     pub(super) fn compact(&mut self) {
         let infinity = self.infinity;
         let mut holes = std::mem::take(&mut self.free);
         for h in self.triangles() {
             let Some(corners) = self.corners(h) else { continue };
             if let Some(i) = corners.iter().position(|&c| c == infinity) {
-                let outside = self.twin(next(h + i as u32));
+                let outside = self.twin(h.side(i as u32).next());
                 if self.corners(outside).is_some_and(|c| !c.contains(&infinity)) {
-                    self.set_twin(outside, OUTSIDE);
+                    self.set_twin(outside, ClosedEdge::OUTSIDE);
                 }
                 holes.push(h);
             }
         }
-        self.fill_holes(&mut holes);
+        self.close_gaps(&mut holes);
         self.free = holes;
         self.free.clear();
     }
 
-    /// Moves triangles from the end into `holes`, so that no hole is left.
-    fn fill_holes(&mut self, holes: &mut [u32]) {
+    /// Moves triangles from the end into the records `holes`, until none of them is left in between.
+    fn close_gaps(&mut self, holes: &mut [ClosedEdge]) {
         for &hole in holes.iter() {
-            self.records[hole as usize] = FREE;
+            self.records[hole.at()] = FREE;
         }
         holes.sort_unstable();
         for &hole in holes.iter() {
             while self.end > 8 * self.slots && self.records[self.end - 8] == FREE {
                 self.end -= 8;
             }
-            if hole as usize >= self.end {
+            if hole.at() >= self.end {
                 break;
             }
             self.end -= 8;
-            self.records.copy_within(self.end..self.end + 8, hole as usize);
-            for e in 0..3 {
-                let twin = self.twin(hole + e);
-                if twin != OUTSIDE && (twin as usize) < self.end {
-                    self.set_twin(twin, hole + e);
+            self.records.copy_within(self.end..self.end + 8, hole.at());
+            for side in hole.sides() {
+                let twin = self.twin(side);
+                if twin != ClosedEdge::OUTSIDE && twin.at() < self.end {
+                    self.set_twin(twin, side);
                 }
             }
         }
     }
-
-    /// The first half-edge of the first triangle.
-    pub(super) fn front(&self) -> u32 {
-        (8 * self.slots) as u32
-    }
 }
 
-/// The triangles around one vertex, counterclockwise, and the hole they would leave.
+/// The triangles around one vertex, counterclockwise, and the hole that they would leave.
 #[derive(Default)]
 pub(super) struct OneRing {
-    /// The side of each triangle that faces the vertex.
-    sides: Vec<u32>,
-    /// The vertex at which the side starts.
-    pub(super) vertices: Vec<u32>,
-    /// The twin of the side.
-    outside: Vec<u32>,
+    /// The side of each triangle that is opposite to the vertex.
+    sides: Vec<ClosedEdge>,
+    /// The vertex at which each side starts.
+    pub(super) vertices: Vec<VertexIndex>,
+    /// The twin of each side.
+    outside: Vec<ClosedEdge>,
 }
 
 impl OneRing {
-    const MOST: usize = 48;
+    const MAX_TRIANGLES: usize = 48;
 
-    /// No triangle is there twice, and no two of them share a side opposite to the vertex: where the diagram was wrong, a triangle
-    /// may have its vertex twice, or be glued to itself.
+    /// Returns whether no triangle occurs twice, and no two triangles share a side opposite to the vertex. Where the diagram was
+    /// wrong, a triangle may have its vertex twice, or may be its own neighbour.
     fn leaves_a_hole(&self) -> bool {
-        let is_new = |(at, side): (usize, &u32)| self.sides[..at].iter().all(|before| before & !7 != side & !7);
+        let is_new = |(at, side): (usize, &ClosedEdge)| {
+            self.sides[..at].iter().all(|before| before.triangle() != side.triangle())
+        };
         self.sides.len() > 1
             && self.sides.iter().enumerate().all(is_new)
             && self.outside.iter().all(|outside| !self.sides.contains(outside))
     }
 }
 
-/// How to fill the hole of a [`OneRing`]: triangles in the order they are cut off, by side numbers. Cutting off (i, j, k) joins
-/// sides i and j to one that keeps the number i. At the end two sides are left.
+/// How to fill the hole of a [`OneRing`]: the triangles in the order in which they are cut off, by the numbers of the ring's sides.
+/// Cutting off (i, j, k) joins sides i and j to one side, which keeps the number i. At the end the two sides of the seam are left.
 pub(super) struct HoleFilling {
     pub(super) ears: Vec<[usize; 3]>,
     pub(super) seam: [usize; 2],

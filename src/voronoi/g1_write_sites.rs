@@ -1,16 +1,19 @@
-//! Step G1: write the sites into a texture. One site wins a pixel; a loser moves to the free pixel beside it, or is missing.
+//! Step G1: write the sites into a texture. One site wins a pixel. Another site of that pixel moves to the next pixel in the row, if
+//! that is free, or is missing.
 //!
 //! The sites are numbered by row and column of their pixels, which is the order in which all later steps meet them.
 
 use crate::geometry::lattice::REACH;
 use crate::geometry::{Bounds, Site};
 use crate::voronoi::counts::PipelineCounts;
+use crate::voronoi::index::VertexIndex;
 use crate::voronoi::rejection::Rejection;
 use crate::voronoi::texture_request::{TextureRequest, pixels_along};
 
-/// Largest share of missing sites with which going on pays.
-const MOST_MISSING: f64 = 0.4;
+/// The largest fraction of missing sites with which the pipeline is still worthwhile.
+const MAX_MISSING: f64 = 0.4;
 
+/// A pixel of the row at hand that has no site.
 const EMPTY: u32 = u32::MAX;
 
 /// A texture with the sites in it. Pixel (x, y) is column x from the west, row y from the south.
@@ -18,23 +21,27 @@ const EMPTY: u32 = u32::MAX;
 pub(super) struct SiteTexture {
     pub(super) width: usize,
     pub(super) height: usize,
-    /// 64-pixel words in a row.
+    /// Words of 64 pixels in a row.
     pub(super) words: usize,
-    /// Bit x % 64 of word `y * words + x / 64`: there is a site in pixel (x, y).
+    /// Bit x % 64 of word `y * words + x / 64` says whether pixel (x, y) has a site.
     pub(super) occupied: Vec<u64>,
-    /// The number of the site in a pixel, where there is one, at `64 * words * y + x`. Whatever else there is, is left from before.
-    numbers: Vec<u32>,
-    /// Position in the input of every site, by number: first those in the texture, then the missing ones.
+    /// The vertex in a pixel that has a site, at `64 * words * y + x`. Other entries are left from earlier leaves.
+    vertices: Vec<VertexIndex>,
+    /// The position of every site in the input, by vertex: first the sites in the texture, then the missing ones.
     pub(super) order: Vec<u32>,
-    /// Coordinates by number, and one more for the vertex at infinity.
+    /// The site of every vertex, with one more entry for the vertex at infinity.
     pub(super) sites: Vec<Site>,
-    /// How many sites are in the texture.
+    /// The number of sites in the texture.
     pub(super) placed: usize,
-    /// The pixel (y << 16 | x) that each missing site belongs to.
+    /// The pixel (y << 16 | x) to which each missing site belongs.
     pub(super) missing: Vec<u32>,
+    /// The pixel (y << 16 | x) of every site of the input, then the missing sites' positions in the input.
     pixels: Vec<u32>,
+    /// The end of every row in `rows`.
     row_ends: Vec<u32>,
+    /// The pixel column and the position in the input of every site, row by row.
     rows: Vec<[u32; 2]>,
+    /// The position in the input of the site in each pixel of the row at hand.
     row: Vec<u32>,
     losers: Vec<[u32; 2]>,
 }
@@ -50,11 +57,11 @@ impl SiteTexture {
         let scale = self.fit(sites, request)?;
         self.sort_by_row(sites, scale);
         self.clear(sites.len());
-        let most_missing = (MOST_MISSING * sites.len() as f64) as usize;
+        let max_missing = (MAX_MISSING * sites.len() as f64) as usize;
         for y in 0..self.height {
             self.write_row(sites, y, counts);
-            // At once: whoever cuts what is crowded may have to ask many times.
-            if self.missing.len() > most_missing {
+            // Stop early: a caller that cuts a crowded leaf may have to try many times.
+            if self.missing.len() > max_missing {
                 return Err(Rejection::Crowded);
             }
         }
@@ -63,14 +70,14 @@ impl SiteTexture {
         Ok(())
     }
 
-    /// The number of the site in the pixel `label` (y << 16 | x).
+    /// Returns the vertex in the pixel `label` (y << 16 | x).
     #[inline(always)]
-    pub(super) fn number(&self, label: u32) -> u32 {
+    pub(super) fn vertex(&self, label: u32) -> VertexIndex {
         let (x, y) = ((label & 0xffff) as usize, (label >> 16) as usize);
-        self.numbers[64 * self.words * y + x]
+        self.vertices[64 * self.words * y + x]
     }
 
-    /// Chooses width and height with the shape of the sites' bounding box; returns the origin and pixels per lattice step.
+    /// Chooses a width and height in the proportions of the sites' bounding box; returns the origin and the pixels per lattice step.
     fn fit(&mut self, sites: &[Site], request: &TextureRequest) -> Result<(Site, f64), Rejection> {
         let bounds = Bounds::of_points(sites.iter().copied()).ok_or(Rejection::TooFew)?;
         let within_reach = |c: &i32| (-REACH..=REACH).contains(c);
@@ -84,7 +91,7 @@ impl SiteTexture {
         Ok((bounds.min, scale))
     }
 
-    /// The pixel (y << 16 | x) of every site in the texture, by number.
+    /// Returns the pixel (y << 16 | x) of every site in the texture, by vertex.
     pub(super) fn placed_pixels(&self) -> Vec<u32> {
         let mut pixels = Vec::with_capacity(self.placed);
         for (at, &word) in self.occupied.iter().enumerate() {
@@ -98,14 +105,14 @@ impl SiteTexture {
         pixels
     }
 
-    /// Whether `label` (y << 16 | x) is a pixel of the texture with a site in it.
+    /// Returns whether `label` (y << 16 | x) is a pixel of the texture that has a site.
     #[inline(always)]
     pub(super) fn has_site(&self, label: u32) -> bool {
         let (x, y) = ((label & 0xffff) as usize, (label >> 16) as usize);
         x < self.width && y < self.height && self.occupied[y * self.words + x / 64] >> (x % 64) & 1 != 0
     }
 
-    /// Fills `rows` with (pixel column, position in the input), row by row, and `row_ends`.
+    /// Fills `rows` and `row_ends`.
     fn sort_by_row(&mut self, sites: &[Site], (low, scale): (Site, f64)) {
         self.row_ends.clear();
         self.row_ends.resize(self.height + 1, 0);
@@ -132,8 +139,8 @@ impl SiteTexture {
         self.occupied.clear();
         self.occupied.resize(self.words * self.height, 0);
         let pixels = 64 * self.words * self.height;
-        if self.numbers.len() < pixels {
-            self.numbers.resize(pixels, 0);
+        if self.vertices.len() < pixels {
+            self.vertices.resize(pixels, VertexIndex::default());
         }
         self.order.clear();
         self.order.reserve(sites);
@@ -158,7 +165,7 @@ impl SiteTexture {
             }
         }
         if self.losers.len() > self.width / 8 {
-            // Where many sites will be missing, they are inserted one beside the other.
+            // If many sites will be missing, neighbours should be inserted one after the other.
             self.losers.sort_unstable_by_key(|&[_, i]| sites[i as usize]);
         }
         for at in 0..self.losers.len() {
@@ -170,7 +177,7 @@ impl SiteTexture {
             while bits != 0 {
                 let x = (word - y * self.words) * 64 + bits.trailing_zeros() as usize;
                 let i = std::mem::replace(&mut self.row[x], EMPTY);
-                self.numbers[64 * self.words * y + x] = self.sites.len() as u32;
+                self.vertices[64 * self.words * y + x] = VertexIndex(self.sites.len() as u32);
                 self.order.push(i);
                 self.sites.push(sites[i as usize]);
                 bits &= bits - 1;
@@ -178,7 +185,8 @@ impl SiteTexture {
         }
     }
 
-    /// Site `i` has lost pixel `x`: it or the winner moves one pixel west or east, so that their order in x holds.
+    /// Places site `i`, which has lost pixel `x`: it or the winner moves one pixel west or east, in the order of their x. Returns false
+    /// if it is missing.
     fn place_loser(&mut self, sites: &[Site], y: usize, x: usize, i: u32) -> bool {
         let winner = self.row[x];
         let key = |i: u32| (sites[i as usize], i);
@@ -195,13 +203,13 @@ impl SiteTexture {
             true
         } else {
             self.missing.push((y << 16 | x) as u32);
-            // Kept at the end of the row buffer's list until all placed sites have their numbers.
+            // Kept at the end of this list until all placed sites have their numbers.
             self.pixels.push(i);
             false
         }
     }
 
-    /// Gives the missing sites the numbers after those in the texture, and infinity the last one.
+    /// Gives the missing sites the numbers after those in the texture, and the vertex at infinity the last number.
     fn append_missing(&mut self, sites: &[Site]) {
         self.placed = self.sites.len();
         let missing = &self.pixels[sites.len()..];

@@ -1,44 +1,45 @@
-//! Step G2: the exact discrete Voronoi diagram. The label of a pixel is the pixel (y << 16 | x) of its nearest site, nearest
-//! being least (d^2, x, y) of the site's pixel. That rule for ties keeps the mesh clean.
+//! Step G2: the exact discrete Voronoi diagram. The label of a pixel is the pixel (y << 16 | x) of its nearest site: the site's
+//! pixel with the least (d^2, x, y). This rule for ties keeps the mesh clean.
 //!
-//! Columns, then rows: first the distance to the nearest site north of every pixel in its column, for the whole texture; then,
-//! row by row from the south, the distance to the nearest site south, the nearer of both as one 16-bit key a column, and for
-//! every pixel the least key over the columns around it. The key is `d^2 << 8 | (dx + 8) << 4 | (dy + 8)`, so that one `min`
-//! gives distance, tie rule and label. It reaches seven pixels far; pixels with no site so near take the lower envelope of
-//! the columns' parabolas (Felzenszwalb and Huttenlocher 2012), which is exact at any distance.
+//! Columns come first: for the whole texture, the distance of every pixel to the nearest site north of it in its column. Then come
+//! rows, from the south: the distance to the nearest site south in the column, the nearer of both as one 16-bit key per column, and
+//! for every pixel the least key over the columns around it. The key is `d^2 << 8 | (dx + 8) << 4 | (dy + 8)`, so that one `min`
+//! decides distance, tie rule and label. Keys reach seven pixels far. Pixels without a site that near use the lower envelope of the
+//! columns' parabolas (Felzenszwalb and Huttenlocher 2012), which is exact at any distance.
 
 use crate::voronoi::g1_write_sites::SiteTexture;
 
-/// The label of what lies outside the texture.
+/// The label of pixels outside the texture.
 pub(super) const FRAME: u32 = u32::MAX;
 
-/// Key of "no site within seven pixels"; so are all larger ones.
+/// The least key that means "no site within seven pixels".
 const FAR: i16 = 64 << 8;
+/// How many pixels far keys reach.
 const REACH: usize = 7;
 /// Keys are computed for this many pixels at a time.
 const BLOCK: usize = 32;
-/// A distance in a column that stands for itself and all larger ones.
+/// The distance in a column that stands for itself and for all larger ones.
 const LONG: u8 = u8::MAX;
 
-/// Rows of labels, from the south.
+/// Computes the rows of labels, from the south.
 #[derive(Default)]
 pub(super) struct LabelRows {
     stride: usize,
-    /// Distance to the nearest site at or north of every pixel.
+    /// The distance of every pixel to the nearest site at or north of it.
     north: Vec<u8>,
-    /// For the row at hand, distance to the nearest site at or south of it.
+    /// For the row at hand, the distance to the nearest site at or south of it.
     south: Vec<u8>,
     /// For the row at hand, the row of that site + 1, or 0.
     south_row: Vec<u32>,
-    /// One key a column, with `REACH` + 1 on either side.
+    /// One key per column, with `REACH` + 1 more on either side.
     columns: Vec<i16>,
     keys: Vec<i16>,
     envelope: Vec<Parabola>,
-    /// The labels of all pixels, if somebody else has made them.
+    /// The labels of all pixels, if a backend has computed them.
     given: Option<Vec<u32>>,
 }
 
-/// A site seen from a row: it is nearest from pixel `from` on, until the next one is.
+/// A site seen from a row. It is the nearest from pixel `from` on, until the next parabola starts.
 #[derive(Clone, Copy)]
 struct Parabola {
     from: i64,
@@ -62,9 +63,10 @@ impl LabelRows {
         self.measure_north(texture);
     }
 
-    /// Takes the labels of all pixels of `texture`, row by row, from somebody who need not be trusted: whether they can be used.
+    /// Takes the labels of all pixels of `texture`, row by row, from a backend that need not be trusted; returns whether they can be
+    /// used.
     pub(super) fn take(&mut self, texture: &SiteTexture, labels: Vec<u32>) -> bool {
-        // Neighbours mostly have the same label, which need not be looked up again.
+        // Most neighbours have the same label, which is looked up only once.
         let mut runs = labels.chunk_by(|a, b| a == b);
         let whole = labels.len() == texture.width * texture.height && runs.all(|run| texture.has_site(run[0]));
         self.given = whole.then_some(labels);
@@ -80,7 +82,7 @@ impl LabelRows {
         }
     }
 
-    /// Writes the labels of row `y` to `labels[1..=width]`. Rows must be asked for in order.
+    /// Writes the labels of row `y` to `labels[1..=width]`. Callers must ask for the rows in order.
     pub(super) fn row(&mut self, texture: &SiteTexture, y: usize, labels: &mut [u32]) {
         if let Some(given) = &self.given {
             labels[1..=texture.width].copy_from_slice(&given[y * texture.width..][..texture.width]);
@@ -112,7 +114,7 @@ impl LabelRows {
                 continue;
             }
             let end = (x..labels.len()).find(|&i| self.keys[i] < FAR).unwrap_or(labels.len());
-            // Along a row, the columns of the labels only grow: those of the run lie between its neighbours'.
+            // Along a row, the columns of the labels never decrease: those of the run lie between those of its neighbours.
             let first = if x == 0 { 0 } else { labels[x - 1] & 0xffff };
             let last = if end == labels.len() { labels.len() as u32 - 1 } else { labels[end] & 0xffff };
             self.build_envelope(texture, y, first as usize..last as usize + 1, x as i64);
@@ -127,7 +129,7 @@ impl LabelRows {
         }
     }
 
-    /// The lower envelope, from pixel `start` on, of the sites nearest to row `y` in `columns`.
+    /// Builds the lower envelope, from pixel `start` on, of the sites nearest to row `y` in `columns`.
     fn build_envelope(&mut self, texture: &SiteTexture, y: usize, columns: std::ops::Range<usize>, start: i64) {
         self.envelope.clear();
         for x in columns {
@@ -147,7 +149,7 @@ impl LabelRows {
         }
     }
 
-    /// The row of the site of column `x` that is nearest to row `y`; of two, the southern one.
+    /// Returns the row of the site in column `x` that is nearest to row `y`. Of two at the same distance, the southern one wins.
     fn nearest_in_column(&self, height: usize, x: usize, y: usize) -> Option<usize> {
         let south = (self.south_row[x] as usize).checked_sub(1);
         let mut north = y;
@@ -163,14 +165,14 @@ impl LabelRows {
 }
 
 impl Parabola {
-    /// The first pixel at which `self`, from a column further east, is strictly nearer than `other`.
+    /// Returns the first pixel at which `self`, whose column is further east, is strictly nearer than `other`.
     fn overtakes(&self, other: &Parabola) -> i64 {
         let squares = self.column.pow(2) - other.column.pow(2) + self.height - other.height;
         squares.div_euclid(2 * (self.column - other.column)) + 1
     }
 }
 
-/// Distances to the nearest occupied pixel on one side, one row further on.
+/// Moves distances to the nearest occupied pixel on one side by one row.
 fn grow(distances: &mut [u8], occupied: &[u64]) {
     for distance in distances.iter_mut() {
         *distance = distance.saturating_add(1);
@@ -189,7 +191,7 @@ fn for_each_bit(words: &[u64], mut f: impl FnMut(usize)) {
     }
 }
 
-/// The key of the nearer of both sites of each column; of two, the southern one.
+/// Computes the key of the nearer of the two sites of each column. At the same distance, the southern one wins.
 fn column_keys(south: &[u8], north: &[u8], keys: &mut [i16]) {
     for ((key, &south), &north) in keys.iter_mut().zip(south).zip(north) {
         let distance = south.min(north).min(8) as i16;
@@ -198,7 +200,7 @@ fn column_keys(south: &[u8], north: &[u8], keys: &mut [i16]) {
     }
 }
 
-/// The least key of every pixel over the columns within reach; whether any of the first `width` pixels has none.
+/// Computes the least key of every pixel over the columns within reach; returns whether any of the first `width` pixels has none.
 fn nearest_keys(columns: &[i16], keys: &mut [i16], width: usize) -> bool {
     let (whole, rest) = (width / BLOCK, width % BLOCK);
     let mut far = false;
@@ -227,7 +229,7 @@ fn nearest_keys_of_block(columns: &[i16], keys: &mut [i16], width: usize) -> boo
             *best = (*best).min(w + west).min(e + east);
         }
         worst = best[..width].iter().fold(0, |worst, &key| key.max(worst));
-        // No site further off can come nearer, or as near.
+        // No site further away can be as near.
         if worst < (((r + 1) * (r + 1)) << 8) as i16 {
             break;
         }

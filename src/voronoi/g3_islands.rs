@@ -1,117 +1,118 @@
-//! Step G3: islands. A thin Voronoi region can fall apart into pixels that do not touch, each of which then looks like a
-//! region of its own: the scan makes a second fan of triangles around the same site, somewhere else.
+//! Step G3: islands. A thin Voronoi region can fall apart into pixels that do not touch. Each piece then looks like a region of its
+//! own, and the scan makes a second fan of triangles around the same site in another place.
 //!
-//! The paper recolours such pixels before it looks for corners. Here, where they are rare, the surplus fan is taken out of
-//! the mesh, which is the same as if its pixels had taken the colours around them. As the site lies outside its island, some
-//! triangle around it is not counterclockwise, so that only those need to be looked at.
+//! The paper recolours such pixels before it looks for corners. Here they are rare, so the surplus fan is removed from the mesh. The
+//! result is the same as if its pixels had taken the colours around them. The site lies outside its island, so some triangle of the
+//! surplus fan is not counterclockwise: only fans with such triangles are examined.
 
 use crate::geometry::Site;
-use crate::voronoi::c2_shift::{ShiftRepair, orientation};
-use crate::voronoi::closed_mesh::{ClosedMesh, next, previous};
+use crate::voronoi::c2_shift::{ShiftRepair, is_inverted};
+use crate::voronoi::closed_mesh::ClosedMesh;
 use crate::voronoi::counts::PipelineCounts;
+use crate::voronoi::index::{ClosedEdge, VertexIndex};
 use crate::voronoi::rejection::Rejection;
 use std::cmp::Reverse;
 
 /// Fans with more triangles than this are not followed.
-const MOST: usize = 64;
+const MAX_TRIANGLES: usize = 64;
 
 /// Buffers of the search.
 #[derive(Default)]
 pub(super) struct IslandSearch {
-    /// By site, how many triangles have it as a corner.
+    /// The number of triangles that have a vertex as a corner, by vertex.
     degrees: Vec<u16>,
     fans: Vec<TriangleFan>,
 }
 
-/// A closed fan of triangles around a site that has more than one; the least of them is most likely the one that holds the site.
+/// A closed fan of triangles around a vertex that has several fans. The least fan is most likely the one that contains the site.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct TriangleFan {
-    site: u32,
-    /// Triangles that are not counterclockwise.
+    vertex: VertexIndex,
+    /// The number of triangles that are not counterclockwise.
     inverted: usize,
     degree: Reverse<usize>,
-    /// The least half-edge that starts at the site.
-    spoke: u32,
+    /// The least half-edge that starts at the vertex.
+    outgoing: ClosedEdge,
 }
 
 impl IslandSearch {
-    /// Takes out what surplus fans there are. A sphere of `v` vertices has `2 v - 4` triangles, and every island adds two.
+    /// Removes all surplus fans. A sphere of `v` vertices has `2 v - 4` triangles, and every island adds two.
     pub(super) fn remove(
         &mut self,
-        sphere: &mut ClosedMesh,
+        mesh: &mut ClosedMesh,
         sites: &[Site],
         placed: usize,
         shift: &mut ShiftRepair,
         counts: &mut PipelineCounts,
     ) -> Result<(), Rejection> {
-        // Nothing has been taken out yet.
+        // No vertex has been removed yet.
         let mut expected = 2 * placed - 2;
-        while sphere.len() > expected {
-            let before = sphere.len();
-            self.remove_apart(sphere, sites, shift, counts);
+        while mesh.len() > expected {
+            let before = mesh.len();
+            self.remove_apart(mesh, sites, shift, counts);
             expected = 2 * (placed - shift.removed.len()) - 2;
-            if sphere.len() == before {
+            if mesh.len() == before {
                 return Err(Rejection::NotAccepted("an island could not be removed"));
             }
         }
-        match sphere.len() == expected {
+        match mesh.len() == expected {
             true => Ok(()),
             false => Err(Rejection::NotAccepted("the discrete Voronoi diagram is not a sphere")),
         }
     }
 
-    /// Takes out those surplus fans that have no other fan within. An island may lie within an island, and so may a whole region.
+    /// Removes the surplus fans that contain no other fan. An island may lie within an island, and so may a whole region.
     fn remove_apart(
         &mut self,
-        sphere: &mut ClosedMesh,
+        mesh: &mut ClosedMesh,
         sites: &[Site],
         shift: &mut ShiftRepair,
         counts: &mut PipelineCounts,
     ) {
-        self.count_degrees(sphere, sites.len());
-        self.find_fans(sphere, sites, &shift.inverted);
-        for fans in self.fans.chunk_by(|a, b| a.site == b.site) {
-            // If every fan of the site is listed, the best is the first.
+        self.count_degrees(mesh, sites.len());
+        self.find_fans(mesh, sites, &shift.inverted);
+        for fans in self.fans.chunk_by(|a, b| a.vertex == b.vertex) {
+            // If every fan of the vertex is listed, the first is the best and stays.
             let listed: usize = fans.iter().map(|fan| fan.degree.0).sum();
-            let all = listed == self.degrees[fans[0].site as usize] as usize;
+            let all = listed == self.degrees[fans[0].vertex.at()] as usize;
             for found in &fans[all as usize..] {
-                // One beside it may have gone.
-                if fan(sphere, sites, found.spoke).as_ref() != Some(found) {
+                // A neighbouring fan may have been removed, and this one with it.
+                if fan(mesh, sites, found.outgoing).as_ref() != Some(found) {
                     continue;
                 }
-                if shift.dissolve(sphere, sites, found.spoke) {
+                if shift.remove_island(mesh, sites, found.outgoing) {
                     counts.islands += 1;
-                } else if let Some(h) = self.enclosed(sphere, found) {
-                    shift.take_out(sphere, sites, h, true);
+                } else if let Some(h) = self.enclosed(mesh, found) {
+                    shift.remove(mesh, sites, h, true);
                 }
             }
         }
     }
 
-    /// A half-edge that starts at a site whose only triangles are two of `fan`.
-    fn enclosed(&self, sphere: &ClosedMesh, fan: &TriangleFan) -> Option<u32> {
-        let around = |spoke: &u32| Some(sphere.twin(previous(*spoke)));
-        let sides = std::iter::successors(Some(fan.spoke), around).take(fan.degree.0).map(next);
-        let mut behind = sides.map(|side| sphere.twin(side));
-        behind.find(|&h| sphere.origin(h) != sphere.infinity() && self.degrees[sphere.origin(h) as usize] == 2)
+    /// Returns a half-edge that starts at a vertex whose only triangles are two of `fan`.
+    fn enclosed(&self, mesh: &ClosedMesh, fan: &TriangleFan) -> Option<ClosedEdge> {
+        let turn = |outgoing: &ClosedEdge| Some(mesh.twin(outgoing.previous()));
+        let sides = std::iter::successors(Some(fan.outgoing), turn).take(fan.degree.0).map(ClosedEdge::next);
+        let mut behind = sides.map(|side| mesh.twin(side));
+        behind.find(|&h| mesh.origin(h) != mesh.infinity() && self.degrees[mesh.origin(h).at()] == 2)
     }
 
-    fn count_degrees(&mut self, sphere: &ClosedMesh, sites: usize) {
+    fn count_degrees(&mut self, mesh: &ClosedMesh, sites: usize) {
         self.degrees.clear();
         self.degrees.resize(sites, 0);
-        for corners in sphere.triangles().filter_map(|t| sphere.corners(t)) {
+        for corners in mesh.triangles().filter_map(|t| mesh.corners(t)) {
             for vertex in corners {
-                let degree = &mut self.degrees[vertex as usize];
+                let degree = &mut self.degrees[vertex.at()];
                 *degree = degree.saturating_add(1);
             }
         }
     }
 
-    /// Lists the fans that have an inverted triangle and are not all there is around their site.
-    fn find_fans(&mut self, sphere: &ClosedMesh, sites: &[Site], inverted: &[u32]) {
+    /// Lists the fans that have an inverted triangle and are not the only fan of their vertex.
+    fn find_fans(&mut self, mesh: &ClosedMesh, sites: &[Site], inverted: &[ClosedEdge]) {
         self.fans.clear();
-        for h in inverted.iter().flat_map(|&t| t..t + 3) {
-            let fan = fan(sphere, sites, h).filter(|fan| fan.degree.0 < self.degrees[fan.site as usize] as usize);
+        for h in inverted.iter().flat_map(|t| t.sides()) {
+            let fan = fan(mesh, sites, h).filter(|fan| fan.degree.0 < self.degrees[fan.vertex.at()] as usize);
             self.fans.extend(fan);
         }
         self.fans.sort_unstable();
@@ -119,19 +120,19 @@ impl IslandSearch {
     }
 }
 
-/// The fan around the start of `h`, if its triangle is still there.
-fn fan(sphere: &ClosedMesh, sites: &[Site], h: u32) -> Option<TriangleFan> {
-    if sphere.is_free(h) {
+/// Returns the fan around the origin of `h`, if the triangle of `h` still exists.
+fn fan(mesh: &ClosedMesh, sites: &[Site], h: ClosedEdge) -> Option<TriangleFan> {
+    if mesh.is_free(h) {
         return None;
     }
-    let mut fan = TriangleFan { site: sphere.origin(h), inverted: 0, degree: Reverse(0), spoke: h };
-    let mut spoke = h;
-    while fan.degree.0 < MOST {
-        fan.inverted += orientation(sphere, sites, spoke & !7).is_some_and(|area| area <= 0) as usize;
+    let mut fan = TriangleFan { vertex: mesh.origin(h), inverted: 0, degree: Reverse(0), outgoing: h };
+    let mut outgoing = h;
+    while fan.degree.0 < MAX_TRIANGLES {
+        fan.inverted += is_inverted(mesh, sites, outgoing) as usize;
         fan.degree.0 += 1;
-        fan.spoke = fan.spoke.min(spoke);
-        spoke = sphere.twin(previous(spoke));
-        if spoke == h {
+        fan.outgoing = fan.outgoing.min(outgoing);
+        outgoing = mesh.twin(outgoing.previous());
+        if outgoing == h {
             return Some(fan);
         }
     }

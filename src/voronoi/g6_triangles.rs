@@ -1,18 +1,18 @@
 //! Steps G4 to G6 in one scan: find the corners of the texture where three or four colours meet, and make their triangles,
 //! linked to their neighbours from the start.
 //!
-//! Between any two pixels of different colour runs a piece of a Voronoi edge: an *arm* of the corners at both its ends. A corner
-//! with two arms is a bend of an edge, one with three is a Voronoi vertex: a triangle, each half-edge of which crosses
-//! one arm. The corners are met row by row from the south, each row from the west. The end of every edge that is still
-//! open is kept in a slot: one for each column, for the arm that goes north from there, and one for the arm that goes
-//! east. A slot is a half-edge like those of triangles, its twin the other end of the Voronoi edge (maybe another slot), so that following
+//! Between any two pixels of different colours runs a piece of a Voronoi edge: an *arm* of the corners at both its ends. A corner
+//! with two arms is a bend of an edge. A corner with three arms is a Voronoi vertex, that is, a triangle, and each half-edge of the
+//! triangle crosses one arm. The scan meets the corners row by row from the south, and each row from the west. It keeps the end of
+//! every open edge in a slot: one slot per column for the arm that goes north from there, and one for the arm that goes east. A slot
+//! is a half-edge like those of triangles, and its twin is the other end of the Voronoi edge, which may be a slot too. So following
 //! an edge, joining two ends and linking two triangles are all the same two writes.
 //!
-//! The frame around the texture counts as the colour "infinity": its triangles are the ghosts that close the sphere.
-//! Step G5's prefix sums are needed only where rows are done in parallel.
+//! The frame around the texture counts as the colour "infinity". Its triangles are the ghosts that close the sphere. Step G5's
+//! prefix sums are needed only where rows are processed in parallel.
 //!
-//! Step C2's tests of what a row has made and most flips of step C4 follow at once, while it is in the cache. Flips do not
-//! mind open edges, as slots are half-edges too.
+//! Step C2's tests of what a row has made, and most flips of step C4, follow at once, while the row is in the cache. Flips work with
+//! open edges too, because slots are half-edges.
 
 use crate::geometry::predicates::{in_circle, orient2d};
 use crate::voronoi::c2_shift::ShiftRepair;
@@ -20,6 +20,7 @@ use crate::voronoi::c4_flip::FlipQueue;
 use crate::voronoi::closed_mesh::ClosedMesh;
 use crate::voronoi::g1_write_sites::SiteTexture;
 use crate::voronoi::g2_voronoi::{FRAME, LabelRows};
+use crate::voronoi::index::{ClosedEdge, VertexIndex};
 use crate::voronoi::rejection::Rejection;
 
 /// Buffers of the scan.
@@ -30,32 +31,32 @@ pub(super) struct TextureScan {
     south_walls: Vec<u64>,
     north_walls: Vec<u64>,
     floors: Vec<u64>,
-    /// By word of the texture, the first triangle made there: where to start looking for a site of that word.
-    starts: Vec<u32>,
+    /// The first triangle made in each word of the texture, where the search for a site of that word starts.
+    starts: Vec<ClosedEdge>,
 }
 
-/// The slot of the open arm going east.
-const EAST: u32 = ClosedMesh::slot(0);
+/// The slot of the open arm that goes east.
+const EAST: ClosedEdge = ClosedMesh::slot(0);
 /// A slot for links that are not needed.
-const WASTE: u32 = ClosedMesh::slot(1);
+const UNUSED: ClosedEdge = ClosedMesh::slot(1);
 
-/// The slot of the open arm going north from corner `x`.
+/// Returns the slot of the open arm that goes north from corner `x`.
 #[inline(always)]
-fn column(x: usize) -> u32 {
+fn column(x: usize) -> ClosedEdge {
     ClosedMesh::slot(x + 2)
 }
 
 impl TextureScan {
-    /// Fills `sphere` with the triangles of the discrete Voronoi diagram of `texture`.
+    /// Fills `mesh` with the triangles of the discrete Voronoi diagram of `texture`.
     pub(super) fn run(
         &mut self,
         texture: &SiteTexture,
-        voronoi: &mut LabelRows,
-        sphere: &mut ClosedMesh,
+        labels: &mut LabelRows,
+        mesh: &mut ClosedMesh,
         shift: &mut ShiftRepair,
         flips: &mut FlipQueue,
     ) -> Result<(), Rejection> {
-        sphere.reset(texture.width + 3, texture.placed, (texture.sites.len() - 1) as u32);
+        mesh.reset(texture.width + 3, texture.placed, VertexIndex((texture.sites.len() - 1) as u32));
         let words = texture.width / 64 + 1;
         for row in [&mut self.south, &mut self.north] {
             row.clear();
@@ -66,16 +67,16 @@ impl TextureScan {
             walls.resize(words + 1, 0);
         }
         self.starts.clear();
-        let mut tested = sphere.front() as usize;
+        let mut tested = mesh.front().at();
         for y in 0..=texture.height {
             if y < texture.height {
-                voronoi.row(texture, y, &mut self.north);
+                labels.row(texture, y, &mut self.north);
             } else {
                 self.north.fill(FRAME);
             }
-            self.scan_row(texture, sphere, &mut flips.suspects);
-            tested = shift.test(sphere, &texture.sites, tested, y == texture.height, &mut flips.suspects);
-            flips.run_early(sphere, &texture.sites)?;
+            self.scan_row(texture, mesh, &mut flips.suspects);
+            tested = shift.test(mesh, &texture.sites, tested, y == texture.height, &mut flips.suspects);
+            flips.run_early(mesh, &texture.sites)?;
             std::mem::swap(&mut self.south, &mut self.north);
             std::mem::swap(&mut self.south_walls, &mut self.north_walls);
         }
@@ -83,14 +84,14 @@ impl TextureScan {
         Ok(())
     }
 
-    /// A triangle near the site of a pixel (y << 16 | x).
-    pub(super) fn start_near(&self, pixel: u32) -> u32 {
+    /// Returns a triangle near the site of a pixel (y << 16 | x).
+    pub(super) fn start_near(&self, pixel: u32) -> ClosedEdge {
         let words = self.floors.len() - 1;
         self.starts[(pixel >> 16) as usize * words + (pixel & 0xffff) as usize / 64]
     }
 
-    /// Visits the corners between two rows. Corner x has pixel x - 1, at index x of a row, in its west.
-    fn scan_row(&mut self, texture: &SiteTexture, sphere: &mut ClosedMesh, suspects: &mut Vec<u32>) {
+    /// Visits the corners between two rows. To the west of corner x lies pixel x - 1, which has index x in a row.
+    fn scan_row(&mut self, texture: &SiteTexture, mesh: &mut ClosedMesh, suspects: &mut Vec<ClosedEdge>) {
         let words = self.floors.len() - 1;
         for word in 0..words {
             let (north, south) = (&self.north[word * 64..][..65], &self.south[word * 64..][..65]);
@@ -98,107 +99,111 @@ impl TextureScan {
             self.floors[word] = differences(&south[..64], &north[..64]);
         }
         for word in 0..words {
-            self.starts.push(sphere.end());
+            self.starts.push(mesh.end());
             let (s, n, w) = (self.south_walls[word], self.north_walls[word], self.floors[word]);
             let e = w >> 1 | self.floors[word + 1] << 63;
-            // Not those without arms, nor those an edge goes straight through.
+            // All corners except those without arms and those that an edge passes straight through.
             let mut corners = (s ^ n) | (w ^ e) | (s & n & w & e);
             while corners != 0 {
                 let bit = corners.trailing_zeros();
                 let arms = (w >> bit & 1) | (s >> bit & 1) << 1 | (e >> bit & 1) << 2 | (n >> bit & 1) << 3;
-                self.corner(texture, sphere, word * 64 + bit as usize, arms as u32, suspects);
+                self.corner(texture, mesh, word * 64 + bit as usize, arms as u32, suspects);
                 corners &= corners - 1;
             }
         }
     }
 
-    /// Does what the arms (west, south, east, north: bits 0 to 3) of corner `x` ask for.
+    /// Does what the arms (west, south, east, north: bits 0 to 3) of corner `x` require.
     #[inline(always)]
-    fn corner(&self, texture: &SiteTexture, sphere: &mut ClosedMesh, x: usize, arms: u32, suspects: &mut Vec<u32>) {
-        // Three arms, or a bend: told apart by one branch, and each of their shapes treated alike, because no
-        // processor can foresee which comes next.
+    fn corner(
+        &self,
+        texture: &SiteTexture,
+        mesh: &mut ClosedMesh,
+        x: usize,
+        arms: u32,
+        suspects: &mut Vec<ClosedEdge>,
+    ) {
+        // One branch separates bends from corners with three arms. All shapes of each are treated alike, because no processor can
+        // predict which shape comes next.
         match arms.count_ones() {
-            2 => bend(sphere, x, arms, suspects),
-            3 => self.three_colours(texture, sphere, x, arms),
-            _ => self.four_arms(texture, sphere, x, suspects),
+            2 => bend(mesh, x, arms, suspects),
+            3 => self.three_colours(texture, mesh, x, arms),
+            _ => self.four_arms(texture, mesh, x, suspects),
         }
     }
 
     #[inline(always)]
-    fn three_colours(&self, texture: &SiteTexture, sphere: &mut ClosedMesh, x: usize, arms: u32) {
+    fn three_colours(&self, texture: &SiteTexture, mesh: &mut ClosedMesh, x: usize, arms: u32) {
         let (west, south, east, north) = (arms & 1 != 0, arms & 2 != 0, arms & 4 != 0, arms & 8 != 0);
         let (sw, se, ne, nw) = (self.south[x], self.south[x + 1], self.north[x + 1], self.north[x]);
         let (b, c) = (if south { se } else { ne }, if north & west { nw } else { ne });
-        let (sw, b, c) = (number(texture, sphere, sw), number(texture, sphere, b), number(texture, sphere, c));
-        let t = sphere.push(sw, b, c);
-        let (from_west, from_south) = (sphere.twin(EAST), sphere.twin(column(x)));
-        // The half-edges across the arms, from the south one round; where an arm is missing, waste paper is linked.
-        let or_waste = |there: bool, h: u32| if there { h } else { WASTE };
-        sphere.link(or_waste(south, t), or_waste(south, from_south));
-        sphere.link(or_waste(west, t + 2), or_waste(west, from_west));
-        sphere.link(or_waste(east, t + south as u32), or_waste(east, EAST));
-        sphere.link(or_waste(north, t + 2 - west as u32), or_waste(north, column(x)));
+        let t = mesh.push([sw, b, c].map(|label| vertex(texture, mesh, label)));
+        let (from_west, from_south) = (mesh.twin(EAST), mesh.twin(column(x)));
+        // The half-edges across the arms, counterclockwise from the south. For a missing arm, unused slots are linked.
+        let or_unused = |exists: bool, h: ClosedEdge| if exists { h } else { UNUSED };
+        mesh.link(or_unused(south, t), or_unused(south, from_south));
+        mesh.link(or_unused(west, t.side(2)), or_unused(west, from_west));
+        mesh.link(or_unused(east, t.side(south as u32)), or_unused(east, EAST));
+        mesh.link(or_unused(north, t.side(2 - west as u32)), or_unused(north, column(x)));
     }
 
-    /// Four colours, or fewer: pixels of one colour across the corner hang together there, so that no three colours meet.
-    fn four_arms(&self, texture: &SiteTexture, sphere: &mut ClosedMesh, x: usize, suspects: &mut Vec<u32>) {
+    /// Handles a corner with four arms. If two pixels of one colour face each other across the corner, they are connected there, and
+    /// no three colours meet. Otherwise four colours meet.
+    fn four_arms(&self, texture: &SiteTexture, mesh: &mut ClosedMesh, x: usize, suspects: &mut Vec<ClosedEdge>) {
         let labels = [self.south[x], self.south[x + 1], self.north[x + 1], self.north[x]];
-        let (from_west, from_south) = (sphere.twin(EAST), sphere.twin(column(x)));
+        let (from_west, from_south) = (mesh.twin(EAST), mesh.twin(column(x)));
         if labels[0] == labels[2] {
-            sphere.link(column(x), from_west);
-            sphere.link(EAST, from_south);
+            mesh.link(column(x), from_west);
+            mesh.link(EAST, from_south);
         } else if labels[1] == labels[3] {
-            join(sphere, from_west, from_south, suspects);
-            sphere.link(EAST, column(x));
+            join(mesh, from_west, from_south, suspects);
+            mesh.link(EAST, column(x));
         } else {
-            let [sw, se, ne, nw] = labels;
-            let (sw, se) = (number(texture, sphere, sw), number(texture, sphere, se));
-            let (ne, nw) = (number(texture, sphere, ne), number(texture, sphere, nw));
-            let [s, e, n, w] = two_triangles(texture, sphere, [sw, se, ne, nw]);
-            sphere.link(from_south, s);
-            sphere.link(from_west, w);
-            sphere.link(e, EAST);
-            sphere.link(n, column(x));
+            let vertices = labels.map(|label| vertex(texture, mesh, label));
+            let [s, e, n, w] = two_triangles(texture, mesh, vertices);
+            mesh.link(from_south, s);
+            mesh.link(from_west, w);
+            mesh.link(e, EAST);
+            mesh.link(n, column(x));
         }
     }
 }
 
-/// The Voronoi edge that has one end in the west or east and one in the south or north.
+/// Joins the two arms of a bend: one end of the Voronoi edge lies in the west or east, the other in the south or north.
 #[inline(always)]
-fn bend(sphere: &mut ClosedMesh, x: usize, arms: u32, suspects: &mut Vec<u32>) {
-    let across = if arms & 1 != 0 { sphere.twin(EAST) } else { EAST };
-    let along = if arms & 2 != 0 { sphere.twin(column(x)) } else { column(x) };
-    join(sphere, across, along, suspects);
+fn bend(mesh: &mut ClosedMesh, x: usize, arms: u32, suspects: &mut Vec<ClosedEdge>) {
+    let across = if arms & 1 != 0 { mesh.twin(EAST) } else { EAST };
+    let along = if arms & 2 != 0 { mesh.twin(column(x)) } else { column(x) };
+    join(mesh, across, along, suspects);
 }
 
-/// Links the ends of a Voronoi edge. If both are triangles, both have been tested before they had this edge.
+/// Links the ends of a Voronoi edge. If both ends are triangles, they were tested before they had this edge, so it is a suspect.
 #[inline(always)]
-fn join(sphere: &mut ClosedMesh, a: u32, b: u32, suspects: &mut Vec<u32>) {
-    sphere.link(a, b);
-    if a.min(b) >= sphere.front() {
+fn join(mesh: &mut ClosedMesh, a: ClosedEdge, b: ClosedEdge, suspects: &mut Vec<ClosedEdge>) {
+    mesh.link(a, b);
+    if a.0.min(b.0) >= mesh.front().0 {
         suspects.push(a);
     }
 }
 
 #[inline(always)]
-fn number(texture: &SiteTexture, sphere: &ClosedMesh, label: u32) -> u32 {
-    if label == FRAME { sphere.infinity() } else { texture.number(label) }
+fn vertex(texture: &SiteTexture, mesh: &ClosedMesh, label: u32) -> VertexIndex {
+    if label == FRAME { mesh.infinity() } else { texture.vertex(label) }
 }
 
-/// Two triangles for four colours around a corner; the half-edges on its south, east, north and west arm.
-fn two_triangles(texture: &SiteTexture, sphere: &mut ClosedMesh, [sw, se, ne, nw]: [u32; 4]) -> [u32; 4] {
-    let at = |v: u32| texture.sites[v as usize];
-    let (a, b, c, d) = (at(sw), at(se), at(ne), at(nw));
+/// Makes two triangles for four colours around a corner; returns the half-edges on its south, east, north and west arms.
+fn two_triangles(texture: &SiteTexture, mesh: &mut ClosedMesh, [sw, se, ne, nw]: [VertexIndex; 4]) -> [ClosedEdge; 4] {
+    let [a, b, c, d] = [sw, se, ne, nw].map(|v| v.site(&texture.sites));
     if orient2d(a, b, c) > 0 && orient2d(a, c, d) > 0 && !in_circle(a, b, c, d) {
-        let t = sphere.push(sw, se, ne);
-        let u = sphere.push(sw, ne, nw);
-        sphere.link(t + 2, u);
-        [t, t + 1, u + 1, u + 2]
+        let t = mesh.push([sw, se, ne]);
+        let u = mesh.push([sw, ne, nw]);
+        mesh.link(t.side(2), u);
+        [t, t.side(1), u.side(1), u.side(2)]
     } else {
-        let t = sphere.push(sw, se, nw);
-        let u = sphere.push(se, ne, nw);
-        sphere.link(t + 1, u + 2);
-        [t, u, u + 1, t + 2]
+        let t = mesh.push([sw, se, nw]);
+        let u = mesh.push([se, ne, nw]);
+        mesh.link(t.side(1), u.side(2));
+        [t, u, u.side(1), t.side(2)]
     }
 }
 

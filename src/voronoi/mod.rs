@@ -31,6 +31,7 @@ mod g1_write_sites;
 mod g2_voronoi;
 mod g3_islands;
 mod g6_triangles;
+mod index;
 pub mod rejection;
 #[cfg(test)]
 pub(crate) mod test_cases;
