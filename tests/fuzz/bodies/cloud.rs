@@ -41,7 +41,7 @@ fn read(path: &Path, options: &TextOptions) {
     let mut seen = 0;
     for chunk in 0..source.chunks() {
         match decode(&source, chunk, &rules, &mut seen) {
-            Ok(tally) => check(&tally),
+            Ok(counts) => check(&counts),
             Err(Error::Memory(_)) => return,
             Err(error) => panic!("{error}"),
         }
@@ -89,12 +89,15 @@ fn decode(source: &Source, chunk: usize, rules: &PointRules, seen: &mut u64) -> 
         *seen += points.len() as u64;
         if *seen > ENOUGH { Err(Error::Memory("enough".into())) } else { Ok(()) }
     };
-    let tally = source.decode(chunk, rules, &mut sink)?;
-    assert_eq!(tally.kept, kept);
-    Ok(tally)
+    let counts = source.decode(chunk, rules, &mut sink)?;
+    assert_eq!(counts.kept, kept);
+    Ok(counts)
 }
 
-fn check(tally: &PointCounts) {
-    assert_eq!(tally.read, tally.withheld + tally.other_class + tally.out_of_bounds + tally.malformed + tally.kept);
-    assert_eq!(tally.malformed > 0, !tally.examples.is_empty());
+fn check(counts: &PointCounts) {
+    assert_eq!(
+        counts.read,
+        counts.withheld + counts.other_class + counts.out_of_bounds + counts.malformed + counts.kept
+    );
+    assert_eq!(counts.malformed > 0, !counts.examples.is_empty());
 }
