@@ -1,5 +1,5 @@
-//! A terrain made up from a seed, to try things on and to test with: hills with a lake, scanned in rows as from an
-//! aircraft, with classes and colours.
+//! A synthetic terrain for trials and tests: hills with a lake, made from a seed and scanned in rows as from an aircraft, with
+//! classes and colours.
 
 use crate::{Error, Result};
 use las::point::{Classification, Format};
@@ -7,13 +7,13 @@ use las::{Builder, Color, Point, Transform, Vector, Vlr, Writer};
 use std::f64::consts::TAU;
 use std::path::Path;
 
-/// Points a square metre.
+/// Points per square metre.
 const DENSITY: f64 = 4.0;
 /// UTM coordinates of the south-west corner.
 const CORNER: [f64; 2] = [565_000.0, 5_933_000.0];
-/// Metres a step.
+/// The step of the coordinates in metres.
 const SCALE: f64 = 0.01;
-/// The level of the lake.
+/// The level of the lake in metres.
 const WATER: f64 = 41.0;
 
 /// ETRS89 / UTM zone 32N in the well-known text of OGC 01-009.
@@ -23,17 +23,17 @@ PROJECTION[\"Transverse_Mercator\"],PARAMETER[\"latitude_of_origin\",0],PARAMETE
 PARAMETER[\"scale_factor\",0.9996],PARAMETER[\"false_easting\",500000],PARAMETER[\"false_northing\",0],\
 UNIT[\"metre\",1],AUTHORITY[\"EPSG\",\"25832\"]]";
 
-/// Writes `points` points of the terrain of `seed` to `path`, LAZ if it ends so, else LAS.
+/// Writes `points` points of the terrain of `seed` to `path`, as LAS or LAZ according to its extension.
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be written, [`Error::Config`] if its name ends otherwise or there is to be no point.
+/// [`Error::Io`] if the file cannot be written, [`Error::Config`] if it has another extension or `points` is 0.
 pub fn write(path: &Path, points: u64, seed: u64) -> Result<()> {
-    let ending = path.extension().map(|e| e.to_ascii_lowercase());
-    if !ending.is_some_and(|ending| ending == "las" || ending == "laz") {
-        return Err(Error::Config(format!("{}: the name of a sample ends in .las or .laz", path.display())));
+    let extension = path.extension().map(|e| e.to_ascii_lowercase());
+    if !extension.is_some_and(|extension| extension == "las" || extension == "laz") {
+        return Err(Error::Config(format!("{}: the name of a sample must end in .las or .laz", path.display())));
     }
     if points == 0 {
-        return Err(Error::Config("a sample has at least one point".into()));
+        return Err(Error::Config("a sample needs at least one point".into()));
     }
     if let Some(parent) = path.parent().filter(|p| !p.as_os_str().is_empty()) {
         std::fs::create_dir_all(parent).map_err(Error::io("create the directory", parent))?;
@@ -89,7 +89,7 @@ fn point(column: u64, row: u64, seed: u64) -> Point {
     }
 }
 
-/// Metres above the datum: a few octaves of noise.
+/// Returns the height of the ground in metres: a few octaves of noise.
 fn height([x, y]: [f64; 2], seed: u64) -> f64 {
     let octave = |i: u32| {
         let wave = 400.0 / f64::from(1 << i);
@@ -98,7 +98,7 @@ fn height([x, y]: [f64; 2], seed: u64) -> f64 {
     50.0 + (0..7).map(octave).sum::<f64>()
 }
 
-/// Gradient noise between -1 and 1 (Perlin 1985, "An Image Synthesizer").
+/// Returns gradient noise between -1 and 1 (Perlin 1985, "An Image Synthesizer").
 fn noise([x, y]: [f64; 2], seed: u64) -> f64 {
     let (column, row) = (x.floor(), y.floor());
     let (u, v) = (x - column, y - row);

@@ -1,4 +1,4 @@
-//! Points as text in: every layout people use, options, malformed lines, and anything at all.
+//! Points as text: the layouts that people use, options, malformed lines, and any bytes at all.
 
 #[path = "common/cloud.rs"]
 mod cloud;
@@ -13,7 +13,7 @@ use proptest::prelude::*;
 use rust_decimal::Decimal;
 
 #[test]
-fn small_texts_are_read_whatever_their_layout() {
+fn small_real_texts_of_every_layout_are_read() {
     let Some(shared) = common::shared() else { return };
     let expected = [("autzen-point-format-3.txt", 106, true), ("crlf_test.txt", 10, false), ("quoted2.txt", 9, false)];
     for (name, points, rgb) in expected {
@@ -25,7 +25,7 @@ fn small_texts_are_read_whatever_their_layout() {
 }
 
 #[test]
-fn text_gives_the_same_points_as_the_laz_it_was_made_from() {
+fn a_text_has_the_same_points_as_the_laz_file_from_which_it_was_made() {
     let Some(shared) = common::shared() else { return };
     let laz = open(&shared.join("data/Topography.laz"), &TextOptions::default()).unwrap();
     let csv = open(&shared.join("data/topography.csv"), &TextOptions::default()).unwrap();
@@ -47,7 +47,7 @@ fn coordinates(cloud: &Cloud) -> Vec<[f64; 3]> {
 }
 
 #[test]
-fn texts_of_many_layouts_say_the_same() {
+fn texts_of_many_layouts_have_the_same_points() {
     let layouts = [
         "1.5,2,3.25\n4,5,6\n",
         "x,y,z\n1.5,2,3.25\n4,5,6",
@@ -78,7 +78,7 @@ fn colors_and_classes_of_texts_are_read() {
 }
 
 #[test]
-fn options_overrule_what_would_be_detected() {
+fn options_overrule_detection() {
     let path = file(".csv", b"a|b|c|d\n%skip\n9|1|2|3\n8|4|5|6\n");
     let columns = Some(["_", "y", "x", "z"].map(String::from).to_vec());
     let options = TextOptions { delimiter: Some('|'), header: Some(true), columns, comment: Some("%".to_string()) };
@@ -118,7 +118,7 @@ fn malformed_lines_are_counted_and_named() {
 }
 
 #[test]
-fn what_is_no_table_is_refused() {
+fn a_file_that_is_not_a_table_is_refused() {
     for (content, words) in [
         ("", "is empty"),
         ("\n\n# nothing\n", "no line with numbers"),
@@ -143,7 +143,7 @@ fn noise_beyond_fifteen_decimals_is_rounded_and_counted() {
 }
 
 #[test]
-fn a_text_of_many_blocks_keeps_its_order() {
+fn a_text_of_many_chunks_keeps_its_order() {
     let mut content = String::from("x y z\n");
     for i in 0..300_000 {
         content.push_str(&format!("{} {} {}.{:02}\n", i, i % 1000, i / 100, i % 100));

@@ -1,25 +1,25 @@
-//! LAS and LAZ files made in memory, sound ones and ones with a wrong byte here and there.
+//! LAS and LAZ files made in memory.
 
 use std::io::{Cursor, Write};
 
 use laz::{LasZipCompressor, LazItemRecordBuilder, LazVlr, LazVlrBuilder};
 
-/// Least record lengths by point format.
+/// The least record length of each point format.
 const LENGTHS: [u16; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
 
-/// A LAS file to be written: records of `format` with `extra` more bytes each, in a file of version 1.`minor`.
+/// A LAS file of version 1.`minor`, with records of point format `format` that have `extra` more bytes each.
 #[derive(Clone)]
 pub(crate) struct LasFile {
     pub(crate) minor: u8,
     pub(crate) format: u8,
     pub(crate) extra: u16,
-    /// Bytes between header and points, which no record claims.
+    /// The number of bytes between the header and the points that belong to no record.
     pub(crate) stray: usize,
     pub(crate) records: Vec<u8>,
 }
 
 impl LasFile {
-    /// `count` points along a spiral with made-up classes, colours and flags; every 17th is withheld.
+    /// Makes `count` points along a spiral, with classes, colours and flags. Every 17th point is withheld.
     pub(crate) fn new(minor: u8, format: u8, extra: u16, count: usize) -> LasFile {
         let length = (LENGTHS[format as usize] + extra) as usize;
         let mut records = Vec::with_capacity(count * length);
@@ -63,7 +63,7 @@ impl LasFile {
         bytes
     }
 
-    /// The file, not compressed.
+    /// Returns the bytes of the file, not compressed.
     pub(crate) fn las(&self) -> Vec<u8> {
         let mut bytes = self.header(0, false);
         bytes.extend(std::iter::repeat_n(0xdd, self.stray));
@@ -71,7 +71,8 @@ impl LasFile {
         bytes
     }
 
-    /// The file, compressed in chunks of the given numbers of points if `variable`, or all of the first number.
+    /// Returns the bytes of the file, compressed: in chunks of these numbers of points if `variable`, else in chunks of the first
+    /// number of points.
     pub(crate) fn laz(&self, chunks: &[usize], variable: bool) -> Vec<u8> {
         let items = LazItemRecordBuilder::default_for_point_format_id(self.format, self.extra).unwrap();
         let builder = LazVlrBuilder::new(items);
@@ -91,7 +92,7 @@ impl LasFile {
         bytes.extend(data);
         bytes.extend(std::iter::repeat_n(0xdd, self.stray));
         if self.records.is_empty() {
-            // The compressor would write its table over the header.
+            // Without points, the compressor would write its table over the header.
             return bytes;
         }
         let mut out = Cursor::new(Vec::new());
@@ -111,7 +112,7 @@ impl LasFile {
     }
 }
 
-/// Position of the point data of a file, as its header says.
+/// Returns the position of the point data in a file, as its header says.
 pub(crate) fn points_at(bytes: &[u8]) -> usize {
     u32::from_le_bytes(bytes[96..100].try_into().unwrap()) as usize
 }

@@ -1,9 +1,9 @@
-//! What several test files need.
+//! Helpers that several tests share.
 
 use std::path::PathBuf;
 
-/// The folder of shared test data: beside the repository, or where GDT_SHARED says. Tests that need it say plainly when
-/// it is absent and pass.
+/// Returns the folder of shared test data: next to the repository, or the folder that GDT_SHARED names. If there is none, says so
+/// on standard error; the test that asks for it then passes.
 pub(crate) fn shared() -> Option<PathBuf> {
     let beside = || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared");
     let folder = std::env::var_os("GDT_SHARED").map_or_else(beside, PathBuf::from);

@@ -1,6 +1,6 @@
-//! Random numbers that are the same on every machine.
+//! Pseudo-random numbers that are the same on every machine.
 
-/// A reproducible stream of random numbers (splitmix64).
+/// A reproducible stream of pseudo-random numbers (splitmix64).
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
@@ -12,7 +12,7 @@ impl Random {
         v ^ (v >> 31)
     }
 
-    /// A whole number from 0 to `limit`, exclusive.
+    /// Returns an integer from 0 to `limit`, exclusive.
     pub(crate) fn below(&mut self, limit: u64) -> u64 {
         ((self.bits() as u128 * limit as u128) >> 64) as u64
     }

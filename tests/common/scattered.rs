@@ -1,4 +1,4 @@
-//! Clouds of random points on whole coordinates, and how they are written.
+//! Clouds of random points with integer coordinates, and how to write them to a file.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 use crate::random::Random;
 
 impl Random {
-    /// A number from 0 to 1, exclusive.
+    /// Returns a number from 0 to 1, exclusive.
     pub(crate) fn unit(&mut self) -> f64 {
         self.below(1 << 53) as f64 / (1u64 << 53) as f64
     }
 
-    /// Two independent normal variables (Box and Muller 1958).
+    /// Returns two independent normal variables (Box and Muller 1958).
     pub(crate) fn normal(&mut self) -> [f64; 2] {
         let radius = (-2.0 * (1.0 - self.unit()).ln()).sqrt();
         let (sin, cos) = (self.unit() * std::f64::consts::TAU).sin_cos();
@@ -22,7 +22,7 @@ impl Random {
 /// Points x, y, z.
 pub(crate) type Cloud = Vec<[i64; 3]>;
 
-/// Side of the square that the clouds lie in.
+/// The side of the square in which the clouds lie.
 const SIDE: f64 = 200_000.0;
 
 pub(crate) fn with_heights(places: impl IntoIterator<Item = [i64; 2]>) -> Cloud {
@@ -33,7 +33,7 @@ pub(crate) fn rounded(x: f64, y: f64) -> [i64; 2] {
     [x.round() as i64, y.round() as i64]
 }
 
-/// One round blob: dense in the middle, sparse outside.
+/// Returns one round blob: dense in the middle, sparse outside.
 pub(crate) fn gaussian(count: usize) -> Cloud {
     let mut random = Random(1);
     with_heights((0..count).map(|_| {
@@ -42,7 +42,7 @@ pub(crate) fn gaussian(count: usize) -> Cloud {
     }))
 }
 
-/// Blobs of very different density, and a few points anywhere; in the densest many coincide.
+/// Returns blobs of very different density and a few points anywhere. Many points of the densest blob coincide.
 pub(crate) fn clusters(count: usize) -> Cloud {
     let mut random = Random(2);
     let blobs: Vec<[f64; 3]> = (0..32)
@@ -58,13 +58,13 @@ pub(crate) fn clusters(count: usize) -> Cloud {
     }))
 }
 
-/// Points anywhere.
+/// Returns points anywhere in a square.
 pub(crate) fn uniform(count: usize, side: u64, seed: u64) -> Cloud {
     let mut random = Random(seed);
     with_heights((0..count).map(|_| [random.below(side) as i64, random.below(side) as i64]))
 }
 
-/// Writes the cloud as text under `name`.
+/// Writes the cloud as text to the file `name` in `folder`, and returns its path.
 pub(crate) fn write(folder: &Path, name: &str, cloud: &[[i64; 3]]) -> PathBuf {
     let mut text = String::from("x,y,z\n");
     for [x, y, z] in cloud {

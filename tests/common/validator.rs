@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::process::Command;
 
-/// Validates every GLB below `folder`, which must hold at least `least` of them: none may have an error or a warning.
-/// Where the validator is not installed that is said, and nothing is tested; under tests/run it is a failure.
+/// Validates every GLB below `folder`, which must hold at least `least` of them: none may have an error or a warning. If the
+/// validator is not installed, says so and tests nothing; under tests/run, fails.
 #[track_caller]
 pub(crate) fn validate(folder: &Path, least: usize) {
     let npm = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/npm");
@@ -18,6 +18,6 @@ pub(crate) fn validate(folder: &Path, least: usize) {
     assert!(output.status.success(), "{said}{}", String::from_utf8_lossy(&output.stderr));
     let summary = said.lines().last().expect("the validator ends with a summary");
     let files: usize =
-        summary.split(' ').next().and_then(|files| files.parse().ok()).expect("that begins with a number");
+        summary.split(' ').next().and_then(|files| files.parse().ok()).expect("the summary begins with a number");
     assert!(files >= least && summary.contains(" 0 errors, 0 warnings"), "{summary}");
 }

@@ -30,7 +30,7 @@ fn every_point_format_is_read_uncompressed_and_compressed() {
 }
 
 #[test]
-fn files_without_points_have_no_pieces() {
+fn files_without_points_have_no_chunks() {
     for format in [1, 7] {
         let file = LasFile::new(4, format, 0, 0);
         for bytes in [file.las(), file.laz(&[50], false), file.laz(&[50], true)] {

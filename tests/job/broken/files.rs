@@ -1,4 +1,4 @@
-//! Broken files that others have met.
+//! Broken files from the test data of other projects.
 
 use std::path::Path;
 
@@ -25,7 +25,7 @@ pub(super) fn cases(folder: &Path) -> Vec<Case> {
     .map(|(name, settings, gives)| {
         let bytes = std::fs::read(folder.join(name)).unwrap();
         let extension = [".las", ".laz", ".txt"].into_iter().find(|extension| name.ends_with(extension)).unwrap();
-        // The sentence must name the file, whatever it is called.
+        // The sentence must name the file, which has another name here.
         case(name, extension, bytes, renamed(gives)).with(settings)
     })
     .collect()

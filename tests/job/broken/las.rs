@@ -1,12 +1,12 @@
-//! Uncompressed LAS: every header field wrong in turn, in every version; variable length records; cuts.
+//! Uncompressed LAS: every header field wrong in turn, in every version; variable length records; truncated files.
 
 use super::{Case, Gives, Read, Refused, case};
 use crate::las_file::LasFile;
 
-/// Records of a file.
+/// The number of records of a file.
 const COUNT: u64 = 200;
 
-/// A sound file of version 1.`minor`.
+/// Returns a sound file of version 1.`minor`.
 fn sound(minor: u8) -> LasFile {
     LasFile::new(minor, [0, 1, 2, 4, 7][minor as usize], 0, COUNT as usize)
 }
@@ -21,7 +21,7 @@ fn double(value: f64) -> Vec<u8> {
     value.to_le_bytes().to_vec()
 }
 
-/// Name, position, wrong value and what comes of it, for fields that all versions have.
+/// Returns name, position, wrong value and its result, for the fields that all versions have.
 fn common_fields() -> Vec<(&'static str, usize, Vec<u8>, Gives)> {
     let nothing_wrong = || Read(COUNT, 0, "");
     vec![
@@ -65,7 +65,7 @@ fn common_fields() -> Vec<(&'static str, usize, Vec<u8>, Gives)> {
     ]
 }
 
-/// Fields of LAS 1.3 and 1.4 alone.
+/// Returns the same for the fields that not all versions have.
 fn later_fields(minor: u8) -> Vec<(&'static str, usize, Vec<u8>, Gives)> {
     let mut fields = Vec::new();
     if minor >= 3 {
@@ -94,7 +94,7 @@ fn later_fields(minor: u8) -> Vec<(&'static str, usize, Vec<u8>, Gives)> {
     fields
 }
 
-/// Every field wrong in turn, in every version.
+/// Returns a case for every wrong field in every version.
 pub(super) fn header_fields() -> Vec<Case> {
     let mut cases = Vec::new();
     for minor in 0..=4 {
@@ -114,7 +114,7 @@ pub(super) fn header_fields() -> Vec<Case> {
     cases
 }
 
-/// `bytes` with a variable length record of `user` before the points that says it has `length` bytes.
+/// Returns `bytes` with one more variable length record before the points. It says that it has `length` bytes.
 fn with_record(bytes: &[u8], user: &str, id: u16, length: u16, data: &[u8]) -> Vec<u8> {
     let size = u16::from_le_bytes(bytes[94..96].try_into().unwrap()) as usize;
     let mut record = vec![0; 54];
@@ -126,7 +126,7 @@ fn with_record(bytes: &[u8], user: &str, id: u16, length: u16, data: &[u8]) -> V
     [&patched(&header, 100, &[1, 0, 0, 0])[..], &record, &bytes[size..]].concat()
 }
 
-/// Wrong records between header and points, wrong points, and files that end too early.
+/// Returns cases of wrong records between header and points, wrong points, and files that end too early.
 pub(super) fn records_and_cuts() -> Vec<Case> {
     let plain = sound(2).las();
     let text = |data: &[u8]| with_record(&plain, "LASF_Projection", 2112, data.len() as u16, data);
@@ -183,7 +183,7 @@ pub(super) fn records_and_cuts() -> Vec<Case> {
     }
     for (name, at, value) in [("x", 0, i32::MIN), ("y", 4, i32::MAX), ("z", 8, i32::MIN)] {
         let point = patched(&plain, 227 + 50 * length + at, &value.to_le_bytes());
-        // One wild point among sound ones is a point like any other; the lattice adapts or says that it does not.
+        // One point far away among sound ones is a point like any other: the lattice adapts to it.
         cases.push(case(format!("a wild {name}"), ".las", point, Read(COUNT, 0, "")));
     }
     cases

@@ -1,4 +1,4 @@
-//! Compressed files: the LASzip record, the chunk table and the chunks wrong in turn, in both kinds of compression; cuts.
+//! Compressed files: the LASzip record, the chunk table and the chunks wrong in turn, in both kinds of compression; truncated files.
 
 use super::{Case, Gives, Read, Refused, case};
 use crate::las_file::{LasFile, points_at};
@@ -9,12 +9,12 @@ fn number(bytes: &[u8], at: usize) -> u64 {
     u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap())
 }
 
-/// A file of the older, pointwise compression, or of the newer, layered one.
+/// Returns a sound file of the older, pointwise compression or of the newer, layered one.
 fn sound(layered: bool) -> LasFile {
     if layered { LasFile::new(4, 7, 0, COUNT as usize) } else { LasFile::new(2, 3, 0, COUNT as usize) }
 }
 
-/// What is wrong, where in the LASzip record, and what comes of it.
+/// Returns name, position, wrong value and its result, for the fields of the LASzip record.
 fn record_fields() -> Vec<(&'static str, usize, Vec<u8>, Gives)> {
     let damaged = |words| Refused(3, words);
     vec![
@@ -75,7 +75,7 @@ fn of_kind(layered: bool, bytes: &[u8]) -> Vec<Case> {
     add(&mut cases, "table of noise", noise, one_by_one());
     let mut zeros = bytes.to_vec();
     zeros[points + 8 + 40..table].fill(0);
-    // Without layers there is nothing to check: zeros decode to some points.
+    // Pointwise compression has nothing to check: zeros decode to some points.
     let gives = if layered { Refused(3, "malformed") } else { Read(COUNT, 0, "") };
     add(&mut cases, "zeros for chunks", zeros, gives);
     for sixth in 0..6 {

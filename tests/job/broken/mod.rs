@@ -1,5 +1,5 @@
-//! Broken, hostile and odd inputs in a table of what each must give: a sentence and an exit code, or the points that can be
-//! read and what is said of the others. Each runs with little memory and may not hang; none may panic.
+//! Broken, hostile and odd inputs, in a table of what each must give: a sentence and an exit code, or the points that can be read
+//! and a warning about the others. Each runs with little memory. None may hang or panic.
 
 mod files;
 mod las;
@@ -13,21 +13,21 @@ use std::io::Write;
 use crate::common::shared;
 use crate::program::{Job, Said, gdt_batch_within, number};
 
-/// Address space that is plenty for small files and far below what hostile headers claim.
+/// Enough address space for small files, and far below what hostile headers claim.
 const PLENTY_MIB: u64 = 1_536;
 
-/// What is in the file.
+/// The content of the file.
 enum Content {
     Bytes(Vec<u8>),
-    /// As many of these bytes, for files too large to be held twice.
+    /// These bytes, repeated this many times: for files that are too large to be held in memory.
     Repeated(Vec<u8>, usize),
 }
 
-/// What the job must come to.
+/// What the job must give.
 enum Gives {
-    /// This exit code, and words of the one sentence that says why.
+    /// An error with this exit code and these words in its one sentence.
     Refused(i32, &'static str),
-    /// A mesh: so many records read and malformed, and words of a warning.
+    /// A mesh: the number of records that were read, the number of malformed ones, and words of a warning.
     Read(u64, u64, &'static str),
 }
 use Gives::{Read, Refused};
@@ -51,8 +51,8 @@ impl Case {
         Case { settings, ..self }
     }
 
-    /// Runs it; the difference between what it gives and what it must give.
-    fn fault(&self) -> Option<String> {
+    /// Runs the job. Returns the difference between what it gives and what it must give.
+    fn difference(&self) -> Option<String> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(format!("cloud{}", self.extension));
         match &self.content {
@@ -64,12 +64,12 @@ impl Case {
         }
         let job = Job::on(&[path]).with("input", self.settings).threads(2);
         let said = gdt_batch_within(PLENTY_MIB, job.folder(), &["--json", "--quiet", job.config().to_str().unwrap()]);
-        self.gives.fault(&said).map(|fault| format!("{}: {fault}", self.name))
+        self.gives.difference(&said).map(|difference| format!("{}: {difference}", self.name))
     }
 }
 
 impl Gives {
-    fn fault(&self, said: &Said) -> Option<String> {
+    fn difference(&self, said: &Said) -> Option<String> {
         let sentences = said.err.trim_end().lines().count();
         match self {
             _ if said.code != 0 && (sentences != 1 || !said.err.starts_with("error: ")) => {
@@ -94,8 +94,8 @@ impl Gives {
 #[track_caller]
 fn hold(cases: Vec<Case>, least: usize) {
     assert!(cases.len() >= least, "only {} rows", cases.len());
-    let faults: Vec<String> = cases.iter().filter_map(Case::fault).collect();
-    assert!(faults.is_empty(), "{} of {}:\n{}", faults.len(), cases.len(), faults.join("\n"));
+    let differences: Vec<String> = cases.iter().filter_map(Case::difference).collect();
+    assert!(differences.is_empty(), "{} of {}:\n{}", differences.len(), cases.len(), differences.join("\n"));
 }
 
 #[test]
@@ -119,7 +119,7 @@ fn wrong_texts() {
 }
 
 #[test]
-fn shapes_that_make_no_terrain_or_hardly_one() {
+fn shapes_that_make_no_terrain_or_an_odd_one() {
     hold(shapes::cases(), 12);
 }
 

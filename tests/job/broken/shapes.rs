@@ -1,4 +1,4 @@
-//! Clouds that are well written, but have the shape of no terrain, or of a very odd one.
+//! Sound files whose points make no terrain, or a very odd one.
 
 use std::fmt::Write;
 

@@ -1,4 +1,4 @@
-//! Texts that are no tables, or hardly.
+//! Texts that are not tables, or barely.
 
 use super::{Case, Content, Gives, Read, Refused, case};
 
