@@ -32,7 +32,7 @@ fn canonical(mut corners: Triangle) -> Triangle {
     corners
 }
 
-/// The plan after it was written to its file and read back, as another process has it.
+/// Writes the plan to its file and reads it back, as another process does.
 fn written_and_read(plan: &Plan, directory: &JobDirectory) -> Plan {
     let pending = plan.write(&directory.plan()).unwrap();
     publish(&[pending.path]).unwrap();
