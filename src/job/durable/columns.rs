@@ -1,27 +1,27 @@
 //! A record of the store: a few columns of plain values, in the machine's byte order.
 //!
-//! A column is the number of its values as a `u64`, then the values, then zeros up to a multiple of eight bytes: so values are
-//! aligned in the file, and slices of it can be used as they are.
+//! A column is the number of its values as a `u128`, then the values, then zeros up to a multiple of 16 bytes: so values of any type
+//! are aligned in the file, and slices of it can be used as they are.
 
 use crate::job::durable::mapped::MappedSlice;
 use crate::job::durable::store::{RecordKey, RecordPlace, RecordRef, Store};
 use crate::{Error, Result};
 use bytemuck::Pod;
 
-/// Bytes to which columns are padded.
-const ALIGNMENT: usize = 8;
+/// Bytes to which columns are padded: the alignment of `u128`, the largest of plain values.
+const ALIGNMENT: usize = size_of::<u128>();
 
 /// Collects columns and writes them as one record.
 #[derive(Default)]
 pub struct ColumnWriter<'a> {
     /// The number of values of each column, and their bytes.
-    columns: Vec<([u8; 8], &'a [u8])>,
+    columns: Vec<([u8; ALIGNMENT], &'a [u8])>,
 }
 
 impl<'a> ColumnWriter<'a> {
     /// Adds a column.
     pub fn push<T: Pod>(mut self, column: &'a [T]) -> ColumnWriter<'a> {
-        self.columns.push(((column.len() as u64).to_ne_bytes(), bytemuck::cast_slice(column)));
+        self.columns.push(((column.len() as u128).to_ne_bytes(), bytemuck::cast_slice(column)));
         self
     }
 
@@ -78,12 +78,12 @@ impl<'a, K: RecordKey> ColumnReader<'a, K> {
 
     /// Reads the number of values in the next column, and checks that the record holds them all.
     fn count<T: Pod>(&mut self) -> Result<usize> {
-        if self.rest.length < 8 {
+        if self.rest.length < ALIGNMENT as u64 {
             return Err(self.ends_too_early());
         }
-        let count = self.store.read::<u64>(self.key, self.rest.at, 1)?[0];
-        self.skip(8)?;
-        let fits = count.checked_mul(size_of::<T>() as u64).is_some_and(|bytes| bytes <= self.rest.length);
+        let count = self.store.read::<u128>(self.key, self.rest.at, 1)?[0];
+        self.skip(ALIGNMENT as u64)?;
+        let fits = count.checked_mul(size_of::<T>() as u128).is_some_and(|bytes| bytes <= self.rest.length as u128);
         if fits { Ok(count as usize) } else { Err(self.ends_too_early()) }
     }
 

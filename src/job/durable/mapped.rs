@@ -24,8 +24,8 @@ pub struct MappedSlice<T> {
 #[derive(Debug)]
 enum Bytes {
     Mapped(Mmap),
-    /// Eight-byte words keep the values aligned; the block may end within the last one.
-    Read(Vec<u64>, usize),
+    /// Words of 16 bytes keep values of any type aligned; the block may end within the last one.
+    Read(Vec<u128>, usize),
 }
 
 impl<T: Pod> MappedSlice<T> {
@@ -52,7 +52,7 @@ impl<T: Pod> Deref for MappedSlice<T> {
 }
 
 fn read(file: &File, at: u64, length: usize) -> Result<Bytes> {
-    let mut words = vec![0u64; length.div_ceil(8)];
+    let mut words = vec![0u128; length.div_ceil(size_of::<u128>())];
     read_exact_at(file, &mut bytemuck::cast_slice_mut(&mut words)[..length], at)?;
     Ok(Bytes::Read(words, length))
 }

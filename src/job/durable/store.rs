@@ -246,9 +246,9 @@ mod tests {
         let store = Store::create(paths(folder.path())).unwrap();
         (0..STORE_FILES).for_each(|tile| _ = put(&store, Key::Leaf(tile), &[1]));
         let lengths = paths(folder.path()).map(|path| path.metadata().unwrap().len());
-        // The number of values, one value, and four bytes of padding.
-        assert_eq!(lengths, [16; STORE_FILES]);
-        assert_eq!(store.bytes(), 16 * STORE_FILES as u64);
+        // The number of values, one value, and twelve bytes of padding.
+        assert_eq!(lengths, [32; STORE_FILES]);
+        assert_eq!(store.bytes(), 32 * STORE_FILES as u64);
     }
 
     #[test]
@@ -256,13 +256,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let store = Store::<Key>::create(paths(folder.path())).unwrap();
         for length in [0, 1, 2, 3, 5, 10_000, 30_001] {
-            let (bytes, words): (Vec<u8>, Vec<u64>) = (0..length).map(|i| (i as u8, i * 3)).unzip();
+            let (bytes, words): (Vec<u8>, Vec<u128>) = (0..length).map(|i| (i as u8, i as u128 * 3)).unzip();
             let triples: Vec<[u16; 3]> = (0..length).map(|i| [i as u16; 3]).collect();
             let writer = ColumnWriter::default().push(&bytes).push(&words).push(&triples);
             writer.write(&store, Key::Leaf(0)).unwrap();
             let mut columns = ColumnReader::open(&store, Key::Leaf(0)).unwrap();
             assert_eq!(*columns.column::<u8>().unwrap(), bytes);
-            assert_eq!(*columns.column::<u64>().unwrap(), words);
+            assert_eq!(*columns.column::<u128>().unwrap(), words);
             if length > 2 {
                 assert_eq!(*columns.column_part::<[u16; 3]>(2, length as usize - 2).unwrap(), triples[2..]);
             } else {
