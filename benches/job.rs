@@ -1,9 +1,13 @@
-//! The whole job against decoding alone: `cargo bench --bench job [FILE.laz] [RUNS]`.
+//! Compares the whole job with decoding alone: `cargo bench --bench job [-- FILE.laz [RUNS]]`.
 //!
-//! Alternates, in one process, between one thread that only decodes the file with the `las` crate, the whole job on it with plain
-//! tiles alone, the same on the same points as LAS, and the job with all there is for viewers: tiles packed with meshopt, and levels
-//! of detail. Prints medians, their ratios and the stages of the median jobs. Without FILE it takes autzen.laz from the test data if
-//! that is there, else a sample terrain of 4 million points.
+//! In each run, one process does four things in turn:
+//! - one thread only decodes the file with the `las` crate;
+//! - a whole job writes plain tiles alone;
+//! - the same job reads the same points as LAS;
+//! - a job writes everything that viewers use: tiles packed with meshopt, and levels of detail.
+//!
+//! It prints the medians, their ratios, and the stages of the median jobs. The default FILE is autzen.laz from the test data, or a
+//! sample terrain of 4 million points if there is none. The default number of RUNS is 5.
 
 use gdt_batch::job::progress::stage::ProgressOutput;
 use gdt_batch::job::report::job_report::Report;
@@ -13,7 +17,7 @@ use std::time::Instant;
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
 const PLAIN: &str = "compression = \"none\"\nlevels = false";
-const FULL: &str = "format = \"tiles\"";
+const FULL: &str = "format = \"3dtiles\"";
 
 fn main() -> Outcome<()> {
     let mut arguments = std::env::args().skip(1).filter(|a| !a.starts_with("--"));
@@ -62,7 +66,7 @@ fn default_file(scratch: &Path) -> Outcome<PathBuf> {
     Ok(sample)
 }
 
-/// Seconds that one thread takes to decode every record, as fast as the `las` crate can: into one buffer, in batches.
+/// Returns the seconds that one thread takes to decode every record as fast as the `las` crate can: in batches, into one buffer.
 fn decode(file: &Path) -> Outcome<f64> {
     let start = Instant::now();
     let mut reader = las::Reader::from_path(file)?;
@@ -71,7 +75,7 @@ fn decode(file: &Path) -> Outcome<f64> {
     Ok(start.elapsed().as_secs_f64())
 }
 
-/// The same points without compression.
+/// Writes the same points without compression, and returns the path.
 fn as_las(file: &Path, scratch: &Path) -> Outcome<PathBuf> {
     let path = scratch.join("unpacked.las");
     let mut reader = las::Reader::from_path(file)?;
@@ -84,6 +88,7 @@ fn as_las(file: &Path, scratch: &Path) -> Outcome<PathBuf> {
     Ok(path)
 }
 
+/// Runs a job and returns its report, in which the wall time includes writing the report and cleaning up.
 fn job(file: &Path, output: &Path, look: &str) -> Outcome<Report> {
     let config = output.with_extension("toml");
     std::fs::write(
@@ -96,14 +101,13 @@ fn job(file: &Path, output: &Path, look: &str) -> Outcome<Report> {
     )?;
     let start = Instant::now();
     let mut report = gdt_batch::job::run(&gdt_batch::config::load(&config)?, ProgressOutput::Quiet)?;
-    // With the report itself, and cleaning up.
     report.wall_s = start.elapsed().as_secs_f64();
     empty(output)?;
     Ok(report)
 }
 
-/// Gives back the room that the files in `folder` take, so that every job finds the same disk and memory in use before. The files
-/// stay: for minutes after many have been removed, ext4 is slow to make new ones.
+/// Truncates the files in `folder`, so that every job starts with the same disk and memory in use. The files themselves stay: after
+/// many files were removed, ext4 is slow to make new ones for minutes.
 fn empty(folder: &Path) -> Outcome<()> {
     for entry in std::fs::read_dir(folder)? {
         let path = entry?.path();

@@ -1,10 +1,10 @@
-//! What users install has no faults on purpose built in: see CONTRIBUTING.md.
+//! The program that users install has no faults on purpose built in: see CONTRIBUTING.md.
 #![cfg(not(feature = "fault-injection"))]
 
 use std::fs;
 use std::process::Command;
 
-/// Each of these kills a build with the feature at its first commit or at its end.
+/// Each of these kills a build that has the feature, at its first commit or when it cleans up.
 const FAULTS: [&str; 5] = ["commit:1", "published:1", "torn:1", "committed:1", "cleaning:1"];
 
 #[test]

@@ -14,6 +14,7 @@ use crate::verify::source_grid::SourceGrid;
 
 /// Checks `mesh` of tile number `tile`, adds what it finds to `findings`, and returns the border of the mesh.
 pub(super) fn check_mesh(mesh: &TilePart, tile: u32, grid: &SourceGrid, findings: &mut Findings) -> MeshBorder {
+    findings.triangles += mesh.triangles.len() as u64;
     let Some(points) = lattice_points(mesh, tile, grid, findings) else { return MeshBorder::default() };
     let sites: Vec<Site> = points.iter().map(|p| [p[0], p[1]]).collect();
     let mut check = MeshCheck { mesh, sites, tile, grid, findings };
@@ -28,17 +29,29 @@ pub(super) fn check_mesh(mesh: &TilePart, tile: u32, grid: &SourceGrid, findings
 
 /// Returns the lattice integers of the vertices, or `None` if some are not on the lattice.
 fn lattice_points(mesh: &TilePart, tile: u32, grid: &SourceGrid, findings: &mut Findings) -> Option<Vec<[i32; 3]>> {
-    let mut points = Vec::with_capacity(mesh.positions.len());
-    let is_plain = mesh.scale == [1.0; 3];
-    for v in 0..mesh.positions.len() {
-        let world = mesh.world(v);
-        let point = if is_plain { grid.integers(world) } else { grid.integers_on(world, mesh.scale) };
-        match point {
-            Some(point) => points.push(point),
-            None => findings.failures.note(Failure::OffLattice, tile, || format!("{world:?} m")),
+    let as_plain = |world| grid.integers(world);
+    let as_quantized = |world| grid.integers_on(world, mesh.scale);
+    // A plain mesh has the scale 1. So has a quantized mesh with steps of one metre.
+    let may_be_plain = mesh.scale == [1.0; 3];
+    let plain = if may_be_plain { points_of(mesh, as_plain) } else { None };
+    let points = plain.or_else(|| points_of(mesh, as_quantized));
+    if points.is_none() {
+        for world in (0..mesh.positions.len()).map(|v| mesh.world(v)) {
+            let point = if may_be_plain { as_plain(world) } else { as_quantized(world) };
+            if point.is_none() {
+                findings.failures.note(Failure::OffLattice, tile, || format!("{world:?} m"));
+            }
         }
     }
-    (points.len() == mesh.positions.len()).then_some(points)
+    points
+}
+
+fn points_of(mesh: &TilePart, integers: impl Fn([f64; 3]) -> Option<[i32; 3]>) -> Option<Vec<[i32; 3]>> {
+    let mut points = Vec::with_capacity(mesh.positions.len());
+    for v in 0..mesh.positions.len() {
+        points.push(integers(mesh.world(v))?);
+    }
+    Some(points)
 }
 
 struct MeshCheck<'a> {
@@ -63,7 +76,6 @@ impl MeshCheck<'_> {
             self.findings.double_area += double_area(a, b, c);
             self.findings.digest.add(triangle.map(|v| coordinates[v as usize]));
         }
-        self.findings.triangles += self.mesh.triangles.len() as u64;
     }
 
     /// Matches the half-edges within the mesh and checks the edges between them. Half-edges that stay unmatched, doubles

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use crate::output::frame::Extras;
 use crate::output::gltf::read::{held_bytes, read_extras};
+use crate::output::layout::OutputLayout;
 use crate::{Error, Result};
 
 /// Checking a tile takes at most this many times the memory of its meshes.
@@ -30,7 +31,8 @@ impl TileFiles {
     /// # Errors
     /// [`Error::Config`] if there are no tiles, [`Error::Io`] or [`Error::Input`] if no tile can be read.
     pub(super) fn find(directory: &Path) -> Result<TileFiles> {
-        let folder = folder_of_tiles(directory)?;
+        let layout = OutputLayout::new(directory);
+        let folder = folder_of_tiles(&layout)?;
         let mut paths = glb_files(&folder)?;
         let terrain = paths.len();
         let Some(first) = paths.first() else {
@@ -38,7 +40,7 @@ impl TileFiles {
         };
         let readable = paths.iter().find_map(|path| read_extras(path).ok());
         let extras = readable.map_or_else(|| read_extras(first), Ok)?;
-        let cut = directory.join("cut");
+        let cut = layout.cut();
         if cut.is_dir() {
             paths.extend(glb_files(&cut)?);
         }
@@ -70,9 +72,9 @@ impl TileFiles {
     }
 }
 
-/// Returns the folder of the tiles in the output `directory` of a job.
-fn folder_of_tiles(directory: &Path) -> Result<PathBuf> {
-    let folder = directory.join("tiles");
+/// Returns the folder of the tiles.
+fn folder_of_tiles(layout: &OutputLayout) -> Result<PathBuf> {
+    let (directory, folder) = (layout.directory(), layout.tiles());
     match directory.metadata() {
         Err(e) if e.kind() == ErrorKind::NotFound => Err(no_output(directory, "is not there")),
         Err(e) => Err(Error::io("read", directory)(e)),

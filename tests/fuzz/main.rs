@@ -1,5 +1,5 @@
-//! The fuzz targets on the stable toolchain: every input of `tests/corpus`, which holds seeds and whatever fuzzing has found
-//! to go wrong, and a bounded number of mutations of them, the same in every run.
+//! The fuzz targets on the stable toolchain: every input of `tests/corpus`, which holds seeds and all that fuzzing has found, and a
+//! bounded number of mutations of them, the same in every run. `GDT_MUTATIONS=n` makes n of each target.
 
 mod bodies;
 #[path = "../common/random.rs"]
@@ -11,10 +11,10 @@ use std::path::{Path, PathBuf};
 
 use random::Random;
 
-/// Bytes that often stand at a border of something.
+/// Bytes that are often at the limit of something.
 const ODD: [u8; 8] = [0, 1, 0x7f, 0x80, 0xff, b'\n', b'"', b'['];
 
-/// Runs `body` over the corpus of `target` and `mutations` changed copies.
+/// Runs `body` over the corpus of `target` and this many changed copies.
 #[track_caller]
 fn fuzz(target: &str, mutations: usize, body: fn(&[u8])) {
     let seeds = corpus(target);
@@ -22,6 +22,7 @@ fn fuzz(target: &str, mutations: usize, body: fn(&[u8])) {
     for (path, bytes) in &seeds {
         assert!(survives(body, bytes), "{}", path.display());
     }
+    let mutations = std::env::var("GDT_MUTATIONS").map_or(mutations, |number| number.parse().unwrap());
     let mut random = Random(20);
     for number in 0..mutations {
         let any = |random: &mut Random| seeds[random.below(seeds.len() as u64) as usize].1.as_slice();

@@ -1,5 +1,5 @@
-//! Bad files among good ones: the job stops, or goes on as if they had never been named, and says so loudly. Files that
-//! change under a job's hands.
+//! Bad files among good ones: the job stops, or leaves them out as if nobody had named them and says so. Files that change while
+//! a job reads them.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ use serde_json::Value;
 use crate::las_file::{LasFile, points_at};
 use crate::program::{Job, Said, number};
 
-/// Writes `bytes` under `name`.
+/// Writes `bytes` to a file called `name`.
 fn write(folder: &Path, name: &str, bytes: &[u8]) -> PathBuf {
     let path = folder.join(name);
     fs::write(&path, bytes).unwrap();
@@ -28,13 +28,13 @@ fn good(folder: &Path) -> PathBuf {
     write(folder, "good.laz", &LasFile::new(4, 7, 0, 3000).laz(&[500], false))
 }
 
-/// A layered LAZ of 900 points, the middle third of which is damaged, in steps of `scale`.
+/// Returns a layered LAZ of 900 points in steps of `scale`. Its second chunk, 300 points, is damaged.
 fn damaged(scale: f64) -> Vec<u8> {
     let file = LasFile::new(4, 7, 0, 900);
     let mut bytes = file.laz(&[300], false);
     let mut at = points_at(&bytes) + 8;
     let numbers = |bytes: &[u8], at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
-    // Over the first chunk: a record, its number of points, the size of each of ten layers, and the layers.
+    // Skip the first chunk: a record, its number of points, the sizes of its ten layers, and the layers.
     let layers: usize = (1..=10).map(|layer| numbers(&bytes, at + file.length() as usize + 4 * layer)).sum();
     at += file.length() as usize + 4 + 4 * 10 + layers;
     let size_of_a_layer = at + file.length() as usize + 4;
@@ -49,7 +49,7 @@ fn skipping(files: &[PathBuf]) -> Job {
     Job::on(files).with("input", "on_bad_file = \"skip\"").tiles_of(200).threads(2)
 }
 
-/// What the job of `files` says and reports; its mesh must be that of `good` alone.
+/// Runs a job on `files` that skips bad ones. Asserts that its mesh is that of `good` alone. Returns its output and its report.
 #[track_caller]
 fn skips(files: &[PathBuf], good: &Path) -> (Said, Value) {
     let job = skipping(files);
@@ -62,7 +62,7 @@ fn skips(files: &[PathBuf], good: &Path) -> (Said, Value) {
 }
 
 #[test]
-fn files_bad_at_first_sight_are_left_out_and_shouted_about() {
+fn bad_files_that_the_plan_finds_are_left_out_and_listed() {
     let folder = tempfile::tempdir().unwrap();
     let good = good(folder.path());
     let whole = fs::read(&good).unwrap();
@@ -87,14 +87,14 @@ fn files_bad_at_first_sight_are_left_out_and_shouted_about() {
     let check = job.run_with(&["check"]).succeeded().out;
     assert!(check.contains("LEFT OUT: 3 of 4 input files") && check.contains("page.laz"), "{check}");
     let quiet = job.run_with(&["--quiet", "--json"]).succeeded();
-    assert_eq!((quiet.err.lines().count(), files_of(&quiet.json())), (1, 3), "even when quiet: {}", quiet.err);
+    assert_eq!((quiet.err.lines().count(), files_of(&quiet.json())), (1, 3), "one line when quiet: {}", quiet.err);
 }
 
 #[test]
-fn a_file_damaged_in_its_middle_is_left_out_whole() {
+fn a_file_that_is_damaged_in_its_middle_is_left_out_whole() {
     let folder = tempfile::tempdir().unwrap();
     let good = good(folder.path());
-    // With the good file's step; and with a finer one, so that the whole job would lie on a finer lattice.
+    // With the step of the good file, and with a finer one, which would make the lattice of the whole job finer.
     for scale in [0.01, 0.0005] {
         let bad = write(folder.path(), "damaged.laz", &damaged(scale));
         for files in [[bad.clone(), good.clone()], [good.clone(), bad.clone()]] {
@@ -109,21 +109,21 @@ fn a_file_damaged_in_its_middle_is_left_out_whole() {
 }
 
 #[test]
-fn each_file_is_judged_by_itself() {
+fn with_skip_the_malformed_fraction_applies_to_each_file() {
     let folder = tempfile::tempdir().unwrap();
     let rows = |count: usize| (0..count).map(|i| format!("{},{},{}\n", i * 7 % 101, i * i % 89, i)).collect::<String>();
     let good = write(folder.path(), "large.csv", rows(1000).as_bytes());
     let sound = write(folder.path(), "sound.csv", (rows(96) + &"1,2\n".repeat(4)).as_bytes());
     let bad = write(folder.path(), "bad.csv", (rows(94) + &"1,2\n".repeat(6)).as_bytes());
     let job = Job::on(&[good, sound, bad]).with("input", "max_malformed_fraction = 0.05");
-    assert_eq!(number(&job.report()["points"]["malformed"]), 10, "ten of 1200 is little, and one share for all");
+    assert_eq!(number(&job.report()["points"]["malformed"]), 10, "one fraction for all files: 10 of 1200 is little");
     let report = job.with("input", "on_bad_file = \"skip\"").report();
     assert_eq!((number(&report["points"]["read"]), number(&report["points"]["malformed"])), (1100, 4));
     assert!(report["skipped"][0]["file"].as_str().unwrap().ends_with("bad.csv"), "{}", report["skipped"]);
 }
 
 #[test]
-fn a_job_of_bad_files_alone_is_an_error() {
+fn a_job_with_only_bad_files_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let empty = write(folder.path(), "empty.las", b"");
     let bad = write(folder.path(), "damaged.laz", &damaged(0.01));
@@ -131,7 +131,7 @@ fn a_job_of_bad_files_alone_is_an_error() {
     skipping(&[empty, bad]).run().refused(3, &["no input is left", "all 2 are bad"]);
 }
 
-/// A job that has looked at its inputs, and what it has found.
+/// Makes the plan of a job on one good file.
 fn planned(folder: &Path) -> (JobDirectory, Plan) {
     let good = good(folder);
     let job = skipping(&[good]);
@@ -139,7 +139,7 @@ fn planned(folder: &Path) -> (JobDirectory, Plan) {
     (JobDirectory::new(&folder.join("out")), plan)
 }
 
-/// What step 2 says after `change` to the input.
+/// Returns the error of the step that reads the points when `change` alters the input after the plan was made.
 fn error_after(change: impl Fn(&Path)) -> Error {
     let folder = tempfile::tempdir().unwrap();
     let (directory, plan) = planned(folder.path());
@@ -150,7 +150,7 @@ fn error_after(change: impl Fn(&Path)) -> Error {
 }
 
 #[test]
-fn what_changes_while_it_is_read_may_be_tried_again_even_where_bad_files_are_skipped() {
+fn a_job_whose_file_changes_after_the_plan_may_be_retried_even_with_skip() {
     let cut = |path: &Path| {
         let bytes = fs::read(path).unwrap();
         fs::write(path, &bytes[..bytes.len() / 2]).unwrap();

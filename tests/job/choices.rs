@@ -1,4 +1,4 @@
-//! What the configuration chooses: which points stay, and how they look.
+//! Options that choose which points stay and how the tiles look.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use tempfile::TempDir;
 
 use crate::program::{Job, number};
 
-/// A square with points inside, some at one place; every point has a colour and a class.
+/// A square with points inside, three of them at one place. Every point has a colour and a class.
 const POINTS: &str = "x,y,z,red,green,blue,classification
 0,0,1,255,0,0,2
 10,0,2,0,255,0,2
@@ -32,7 +32,7 @@ impl Square {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("square.csv");
         std::fs::write(&path, POINTS).unwrap();
-        // Plain, so that values come back as they are meant.
+        // Without packing, so that the values come back exactly.
         Square { job: Job::on(&[&path]).with("output", "compression = \"none\""), _folder: folder }
     }
 
@@ -40,7 +40,7 @@ impl Square {
         Square { job: self.job.with(section, line), ..self }
     }
 
-    /// Runs the job, proves the mesh, and gives the report and the one tile.
+    /// Runs the job and proves the mesh. Returns the report and the only tile.
     #[track_caller]
     fn run(&self) -> (Value, TileFile) {
         let report = self.job.report();
@@ -48,14 +48,14 @@ impl Square {
         (report, read_tile(&self.job.out().join("tiles/000000.glb")).unwrap())
     }
 
-    /// Height, by place, of the vertices.
+    /// Returns the heights of the vertices by place.
     #[track_caller]
     fn heights(&self) -> BTreeMap<[i64; 2], f64> {
         let (_, tile) = self.run();
         places(&tile).into_iter().map(|[x, y, z]| ([x as i64, y as i64], z)).collect()
     }
 
-    /// Colour, by place, of the vertices, as bytes of linear intensity.
+    /// Returns the colours of the vertices by place, as 16-bit linear intensities.
     #[track_caller]
     fn colors(&self) -> Option<BTreeMap<[i64; 2], [u16; 3]>> {
         let (_, tile) = self.run();
@@ -65,7 +65,7 @@ impl Square {
     }
 }
 
-/// Source coordinates of the vertices of a tile of one part.
+/// Returns the source coordinates of the vertices of a tile that has one part.
 fn places(tile: &TileFile) -> Vec<[f64; 3]> {
     let source = SourceGrid::new(&tile.extras).unwrap();
     let part = &tile.parts[0];
@@ -73,18 +73,18 @@ fn places(tile: &TileFile) -> Vec<[f64; 3]> {
 }
 
 #[test]
-fn one_of_the_points_at_a_place_stays() {
+fn duplicates_decides_which_point_at_a_place_stays() {
     for (rule, z) in [("lowest", 10.0), ("highest", 30.0), ("first", 20.0)] {
         let square = Square::new().with("input", &format!("duplicates = \"{rule}\""));
         let heights = square.heights();
         assert_eq!((heights.len(), heights[&[5, 5]]), (5, z), "{rule}");
         assert_eq!((heights[&[0, 10]], heights[&[10, 10]]), (3.0, 4.0), "{rule}");
     }
-    assert_eq!(Square::new().heights()[&[5, 5]], 10.0, "the lowest unless told otherwise");
+    assert_eq!(Square::new().heights()[&[5, 5]], 10.0, "the lowest is the default");
 }
 
 #[test]
-fn noise_stays_out_unless_asked_for() {
+fn noise_is_left_out_unless_classes_names_it() {
     let (report, _) = Square::new().run();
     assert_eq!((number(&report["points"]["other_class"]), number(&report["duplicates"])), (2, 2));
     let heights = Square::new().with("input", "classes = [2, 6, 7]").heights();
@@ -92,7 +92,7 @@ fn noise_stays_out_unless_asked_for() {
 }
 
 #[test]
-fn bounds_hold_their_borders() {
+fn bounds_keep_the_points_on_their_borders() {
     let square = Square::new().with("input", "bounds = [0, 0, 10, 9.5]").with("input", "classes = [2, 6, 7, 9, 18]");
     let (report, tile) = square.run();
     assert_eq!(number(&report["points"]["out_of_bounds"]), 2);
@@ -102,18 +102,18 @@ fn bounds_hold_their_borders() {
 }
 
 #[test]
-fn colors_are_the_points_own_and_linear() {
+fn colors_are_those_of_the_points_and_linear() {
     let square = || Square::new().with("input", "duplicates = \"first\"");
     let own = square().with("output", "color = \"rgb\"").colors().unwrap();
     assert_eq!((own[&[0, 0]], own[&[10, 10]], own[&[5, 5]]), ([65535, 0, 0], [65535; 3], [0; 3]));
-    assert_eq!(square().colors().unwrap(), own, "auto takes the points' own where there are any");
+    assert_eq!(square().colors().unwrap(), own, "auto takes the colours of the points if they have any");
     let lowest = Square::new().with("output", "color = \"rgb\"").colors().unwrap();
     // sRGB 51/255 is 0.033105 of full intensity.
     assert_eq!(lowest[&[5, 5]], [2170; 3]);
 }
 
 #[test]
-fn colors_by_class_and_height_and_none() {
+fn colors_can_show_class_or_height_or_be_left_out() {
     let by_class = Square::new().with("output", "color = \"class\"").colors().unwrap();
     assert_eq!(by_class[&[0, 0]], by_class[&[10, 0]]);
     assert_eq!(by_class[&[10, 10]], by_class[&[5, 5]]);
@@ -125,17 +125,17 @@ fn colors_by_class_and_height_and_none() {
 }
 
 #[test]
-fn normals_are_unit_vectors_or_absent() {
+fn normals_are_unit_vectors_or_left_out() {
     let (_, tile) = Square::new().run();
     for [x, y, z] in tile.parts[0].normals.as_ref().unwrap() {
-        assert!(*y > 0.0 && (x * x + y * y + z * z - 1.0).abs() < 1e-5, "up, and one long");
+        assert!(*y > 0.0 && (x * x + y * y + z * z - 1.0).abs() < 1e-5, "points up and has length one");
     }
     let (_, bare) = Square::new().with("output", "normals = false").run();
     assert!(bare.parts[0].normals.is_none() && bare.parts[0].colors.is_some());
 }
 
 #[test]
-fn the_unit_scales_the_scene_and_not_the_source() {
+fn the_unit_scales_the_scene_but_not_the_source_coordinates() {
     for (unit, metres) in [("metre", 1.0), ("foot", 0.3048), ("us-foot", 1200.0 / 3937.0)] {
         let (_, tile) = Square::new().with("input", &format!("unit = \"{unit}\"")).run();
         let x = (0..5).map(|v| tile.parts[0].world(v)[0]);

@@ -1,4 +1,4 @@
-//! Configurations: the shipped ones run, wrong ones are refused with the line, and what cannot be written is said.
+//! Configurations: the shipped ones run, wrong ones are refused with the line, and an output that cannot be written is named.
 
 use std::fs;
 use std::path::Path;
@@ -14,7 +14,7 @@ fn folder_with_cloud() -> tempfile::TempDir {
     folder
 }
 
-/// A folder with a copy of `configs` and the sample terrain that they name.
+/// A folder with copies of the shipped configurations and with the sample terrain that they name.
 fn shipped() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let configs = folder.path().join("configs");
@@ -37,12 +37,12 @@ fn the_shipped_configurations_run() {
         for name in ["terrain.glb", "georeference.json", "report.json", "preview.png"] {
             assert!(folder.path().join(out).join(name).is_file(), "{config}: no {name}");
         }
-        assert!(!folder.path().join(out).join("job").exists(), "{config}: temporary files are left");
+        assert!(!folder.path().join(out).join("job").exists(), "{config}: no temporary file stays");
     }
 }
 
 #[test]
-fn the_full_configuration_shows_every_option_at_its_default() {
+fn the_full_configuration_shows_every_option_with_its_default() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/full.toml");
     let mut full = gdt_batch::config::load(&path).unwrap();
     (full.input.classes, full.input.bounds) = (None, None);
@@ -64,7 +64,7 @@ fn the_full_configuration_shows_every_option_at_its_default() {
 }
 
 #[test]
-fn wrong_configurations_are_refused_with_the_line() {
+fn wrong_configurations_are_refused_with_the_line_number() {
     let folder = folder_with_cloud();
     for (from, to, words) in [
         ("files", "fils", &["line 2", "fils"][..]),
@@ -99,29 +99,29 @@ fn wrong_configurations_are_refused_with_the_line() {
 }
 
 #[test]
-fn a_configuration_that_is_none_is_refused() {
+fn a_command_line_without_a_readable_configuration_is_refused() {
     let folder = folder_with_cloud();
     gdt_batch(folder.path(), &["no.toml"]).refused(2, &["no configuration file no.toml"]);
     gdt_batch(folder.path(), &["."]).refused(2, &["cannot read the configuration"]);
     fs::write(folder.path().join("binary.toml"), [0xff, 0xfe, 0x00]).unwrap();
     gdt_batch(folder.path(), &["binary.toml"]).refused(2, &["binary.toml"]);
     gdt_batch(folder.path(), &["--no-such-option"]).refused(2, &["--no-such-option"]);
-    assert_eq!(gdt_batch::<&str>(folder.path(), &[]).code, 2, "no argument at all shows the help");
+    assert_eq!(gdt_batch::<&str>(folder.path(), &[]).code, 2, "without arguments it shows the help");
 }
 
 #[test]
 #[cfg(target_os = "linux")]
-fn an_output_directory_that_cannot_be_made_may_be_tried_again() {
+fn a_job_that_cannot_make_its_output_directory_may_be_retried() {
     let folder = folder_with_cloud();
     // Not even root can write there.
     fs::write(folder.path().join("job.toml"), LEAST.replace("\"out\"", "\"/proc/none/out\"")).unwrap();
     gdt_batch(folder.path(), &["job.toml"]).refused(1, &["/proc/none/out", "cannot write"]);
 }
 
-/// Whatever else stands where the job needs to write is named before the first point is read, and stays.
+/// Before it reads the first point, a job names anything else that stands where it needs to write, and leaves it there.
 #[test]
 #[cfg(unix)]
-fn what_is_in_the_way_of_the_output_is_named() {
+fn anything_in_the_way_of_the_output_is_named() {
     let folder = folder_with_cloud();
     fs::write(folder.path().join("job.toml"), LEAST).unwrap();
     let there = |name: &str| folder.path().join(name);
@@ -130,7 +130,7 @@ fn what_is_in_the_way_of_the_output_is_named() {
             gdt_batch(folder.path(), arguments).refused(2, &[&format!("{name} {words}"), "move it away"]);
         }
     };
-    // As files, and as links that lead nowhere; what is removed here was still there.
+    // As files, and as links that lead nowhere. That they can be removed here shows that the job left them alone.
     let by_files = |name: &str| {
         fs::write(there(name), "theirs").unwrap();
         refused(name, "is not a directory");
@@ -148,7 +148,7 @@ fn what_is_in_the_way_of_the_output_is_named() {
         refused(name, "is a directory");
         fs::remove_dir(there(name)).unwrap();
     }
-    // A file that no job wrote, where one would.
+    // A file that no job wrote, in the place of the report.
     fs::write(there("out/report.json"), "theirs").unwrap();
     for arguments in [&["job.toml"][..], &["check", "job.toml"]] {
         gdt_batch(folder.path(), arguments).refused(2, &["out/report.json", "would write over", "move it away"]);
@@ -158,7 +158,7 @@ fn what_is_in_the_way_of_the_output_is_named() {
 }
 
 #[test]
-fn help_teaches() {
+fn help_names_the_commands_examples_and_exit_codes() {
     let help = gdt_batch(Path::new("."), &["--help"]).succeeded().out;
     for words in ["check", "verify", "info", "sample", "Examples", "Exit codes", "configs/full.toml"] {
         assert!(help.contains(words), "{words}");

@@ -1,4 +1,4 @@
-//! Long triangles are left out of the terrain, and nothing of the exact mesh is lost.
+//! `max_edge` leaves long triangles out of the terrain, and the exact mesh loses none.
 
 use std::fs;
 
@@ -10,13 +10,13 @@ use crate::levels::{borders_are_the_exact_ones, errors_are_true};
 use crate::program::{Job, gdt_batch, number};
 use crate::tileset::{extent, keeps_the_rules, tiles, triangles};
 
-/// Two square fields of points 10 apart, and a void 2,000 wide between them.
+/// Two square fields of points 10 apart, with a void 2,000 wide between them.
 fn two_fields() -> clouds::Cloud {
     let field = |west: i64| (0..60 * 60).map(move |i| [west + i % 60 * 10, i / 60 * 10 + i % 3, i % 7]);
     field(0).chain(field(2_600)).collect()
 }
 
-/// The digest of only what is written, after a look at the whole; takes `cut/` away.
+/// Removes `cut/` and returns the digest of the remaining triangles.
 #[track_caller]
 fn digest_of_written(job: &Job) -> String {
     fs::remove_dir_all(job.out().join("cut")).unwrap();
@@ -26,7 +26,7 @@ fn digest_of_written(job: &Job) -> String {
 }
 
 #[test]
-fn what_is_left_out_does_not_depend_on_the_tiles_and_the_whole_is_exact() {
+fn the_triangles_left_out_do_not_depend_on_the_tiles_and_the_whole_mesh_is_exact() {
     let folder = tempfile::tempdir().unwrap();
     let file = clouds::write(folder.path(), "cloud.csv", &two_fields());
     let whole = Job::on(&[&file]).digest();
@@ -69,7 +69,7 @@ fn coarser_levels_leave_the_void_empty_too() {
         let west = mesh.iter().filter(|t| is_west(t) == 3).count();
         both_sides += usize::from(west > 0 && west < mesh.len());
     }
-    assert!(both_sides > 0, "a level has ground on both sides");
+    assert!(both_sides > 0, "some level has ground on both sides");
 }
 
 #[test]
@@ -90,7 +90,7 @@ fn the_void_is_empty_in_the_preview() {
 }
 
 #[test]
-fn a_lost_file_of_what_was_left_out_is_noticed() {
+fn verify_notices_a_missing_file_of_triangles_that_were_left_out() {
     let folder = tempfile::tempdir().unwrap();
     let file = clouds::write(folder.path(), "cloud.csv", &two_fields());
     let job = Job::on(&[&file]).tiles_of(1_000).with("output", "max_edge = \"auto\"");
@@ -103,7 +103,7 @@ fn a_lost_file_of_what_was_left_out_is_noticed() {
 }
 
 #[test]
-fn all_or_nothing_may_be_left_out() {
+fn leaving_out_all_triangles_is_refused_and_leaving_out_none_is_fine() {
     let folder = tempfile::tempdir().unwrap();
     let file = clouds::write(folder.path(), "cloud.csv", &two_fields());
     Job::on(&[&file]).with("output", "max_edge = 1").run().refused(2, &["max_edge", "all", "greater"]);
@@ -113,12 +113,12 @@ fn all_or_nothing_may_be_left_out() {
     let job = job.with("output", "").with("input", "bounds = [0, 0, 590, 700]");
     let report: Value = job.report();
     assert_eq!(number(&report["cut_triangles"]), 0);
-    assert!(!job.out().join("cut").exists(), "nothing of an earlier job stays");
+    assert!(!job.out().join("cut").exists(), "no file of an earlier job stays");
     job.verified();
 }
 
 #[test]
-fn a_real_river() {
+fn a_real_river_is_left_out_alike_with_any_tiles() {
     let Some(data) = shared().map(|shared| shared.join("data")) else { return };
     let ground = |sites| {
         let job = Job::on(&[data.join("Topography.laz")]).with("input", "classes = [2]").tiles_of(sites);

@@ -9,10 +9,10 @@ use crate::program::Job;
 use crate::random::Random;
 use crate::tileset::{Tile, applied, error, height, keeps_the_rules, numbers, tiles, triangles};
 
-/// Source coordinates of the middle.
+/// Source coordinates of the middle of the area.
 const MIDDLE: [f64; 3] = [500_000.0, 4_000_000.0, 0.0];
 
-/// A LAS file of points in UTM zone 33 north, steps of 1 cm from [`MIDDLE`].
+/// Returns a LAS file in UTM zone 33 north. The points are in steps of 1 cm from [`MIDDLE`].
 fn utm(points: &[[i32; 3]]) -> Vec<u8> {
     let keys: [u16; 12] = [1, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, 32633];
     let mut bytes = vec![0; 227];
@@ -41,7 +41,8 @@ fn utm(points: &[[i32; 3]]) -> Vec<u8> {
     bytes
 }
 
-/// `side` times `side` points, spread over a square that reaches `half` metres from `centre` and up to its sides, 200 m high at most.
+/// Returns `side` times `side` points in a square. Its sides are `half` metres from `centre` and have points on them. Heights are
+/// below 200 m.
 fn square(side: i32, half: f64, centre: [f64; 2]) -> Vec<[i32; 3]> {
     let mut random = Random(7);
     let mut along = |i: i32, centre: f64| {
@@ -58,7 +59,7 @@ fn georeference(job: &Job, name: &str) -> Value {
     serde_json::from_slice::<Value>(&text).unwrap()[name].take()
 }
 
-/// Earth-centred places of places in the source, by another way than the program's: PROJ's own geocentric coordinates.
+/// Computes earth-centred positions of source coordinates, not as the program does: with PROJ's own geocentric coordinates.
 struct Truth {
     utm: Proj,
     geocentric: Proj,
@@ -70,7 +71,7 @@ impl Truth {
         Truth { utm: proj("+proj=utm +zone=33 +datum=WGS84"), geocentric: proj("+proj=geocent +datum=WGS84") }
     }
 
-    /// For a place of the scene, whose origin is at `offset` in the source.
+    /// Returns the position of a place of the scene. The scene's origin is at `offset` in the source.
     fn place(&self, offset: [f64; 3], place: [f64; 3]) -> [f64; 3] {
         let [x, y, z] = [0, 1, 2].map(|k| offset[k] + place[k]);
         let mut point = (x, y, z);
@@ -83,7 +84,7 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
 }
 
-/// A job on these points, and its tiles, which are packed with meshopt and keep the rules.
+/// Runs a job on these points. Returns it with its tiles, which are packed with meshopt and keep the rules of 3D Tiles.
 fn job(points: &[[i32; 3]]) -> (Job, Vec<Tile>) {
     let folder = tempfile::tempdir().unwrap();
     let cloud = folder.path().join("cloud.las");
@@ -96,7 +97,7 @@ fn job(points: &[[i32; 3]]) -> (Job, Vec<Tile>) {
     (job, tiles)
 }
 
-/// A job on an area 100 km wide.
+/// Runs a job on an area 100 km wide.
 pub(crate) fn wide() -> (Job, Vec<Tile>) {
     job(&square(200, 50_000.0, [0.0; 2]))
 }
@@ -127,16 +128,16 @@ fn a_wide_area_follows_the_curve_of_the_earth() {
         }
     }
     eprintln!("promised {promise} m, off {off} m, gap {gap} m, with one transform {flat} m");
-    // A resolution's half at most from rounding to steps, and what two ways of reckoning differ by.
+    // Rounding to steps, at most half the resolution, and the difference between the two computations.
     let rounding = 0.01;
     assert!(off <= promise + rounding && gap <= 2.0 * promise, "{off}, {gap}, {promise}");
-    assert!(promise < 1.5 * off, "{promise} m are promised, and no more than {off} used");
+    assert!(promise < 1.5 * off, "the promise of {promise} m is too loose: the greatest error is {off} m");
     assert!(gap > 0.0 && flat > 300.0 && off < flat / 20.0, "{off} of {flat}, {gap}");
 }
 
-/// Where coarser tiles lie flat across the earth's curve, that is part of their error.
+/// Coarser tiles are flat where the earth is curved: their error includes that.
 #[test]
-fn errors_of_wide_tiles_are_true_on_the_globe() {
+fn errors_of_wide_tiles_hold_on_the_globe() {
     let (job, tiles) = wide();
     let meshes: Vec<_> = tiles.iter().map(|tile| triangles(&job, tile)).collect();
     let mut random = Random(3);
@@ -150,22 +151,25 @@ fn errors_of_wide_tiles_are_true_on_the_globe() {
                 let off = distance(shown, applied(&tile.placed, exact));
                 assert!(off <= error(&tiles[above].json) + 1e-6, "{off} of {}", tiles[above].json["geometricError"]);
                 looked += 1;
-                // No height is off by more than all heights differ.
+                // Heights alone are never off by more than their whole range.
                 vertical += usize::from(off <= 200.0);
             }
         }
     }
-    assert!(looked > 3_000 && vertical < looked, "{looked} places, {vertical} off by no more than heights are");
+    assert!(
+        looked > 3_000 && vertical < looked,
+        "{looked} places, {vertical} of them off by no more than the range of heights"
+    );
 }
 
-/// Triangles that bridge a void 60 km wide do not pull the tiles they are in away from the ground.
+/// Triangles across a void 60 km wide do not pull their tiles away from the ground.
 #[test]
-fn long_triangles_leave_the_ground_where_it_belongs() {
+fn long_triangles_do_not_move_the_ground() {
     let fields = [square(60, 2_000.0, [-30_000.0, 0.0]), square(60, 2_000.0, [30_000.0, 0.0])].concat();
     let (job, tiles) = job(&fields);
     let offset: [f64; 3] = numbers(&georeference(&job, "offset")).unwrap();
     let truth = Truth::new();
-    // Every vertex in the tile that puts it best.
+    // For every vertex the error in the tile that places it best.
     let mut best = HashMap::new();
     for tile in tiles.iter().filter(|tile| is_exact(tile)) {
         for place in triangles(&job, tile).into_iter().flatten() {

@@ -1,11 +1,11 @@
-//! The Khronos validator has nothing to say about what whole jobs write.
+//! The Khronos validator finds no error and no warning in what whole jobs write.
 
 use crate::clouds;
 use crate::common::shared;
 use crate::program::Job;
 use crate::validator::validate;
 
-/// Runs the job and validates every GLB; there must be at least `least` of them.
+/// Runs the job and validates every GLB file. There must be at least `least` of them.
 #[track_caller]
 fn validated(job: &Job, least: usize) {
     job.report();
@@ -13,7 +13,7 @@ fn validated(job: &Job, least: usize) {
 }
 
 #[test]
-fn many_small_tiles() {
+fn many_small_tiles_are_valid() {
     let folder = tempfile::tempdir().unwrap();
     let cloud = clouds::write(folder.path(), "cloud.csv", &clouds::clusters(30_000));
     validated(&Job::on(&[&cloud]).tiles_of(1_000), 30);
@@ -25,7 +25,7 @@ fn many_small_tiles() {
 }
 
 #[test]
-fn thin_and_flat_ones() {
+fn thin_and_flat_tiles_are_valid() {
     let folder = tempfile::tempdir().unwrap();
     let line = clouds::write(folder.path(), "line.csv", &clouds::line(5_000, 1));
     validated(&Job::on(&[line]).tiles_of(1_000), 5);
@@ -34,10 +34,10 @@ fn thin_and_flat_ones() {
 }
 
 #[test]
-fn real_ones() {
+fn tiles_of_real_files_are_valid() {
     let Some(data) = shared().map(|shared| shared.join("data")) else { return };
     validated(&Job::on(&[data.join("autzen_trim.las")]).tiles_of(4_000), 28);
-    // Fine steps over a wide area: several meshes in one tile.
+    // Fine steps over a wide area need several meshes in one tile.
     validated(&Job::on(&[data.join("simple1_4.las")]).with("input", "unit = \"metre\""), 2);
     validated(&Job::on(&[data.join("append-bug.laz")]).with("output", "color = \"class\""), 2);
 }

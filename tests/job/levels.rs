@@ -1,4 +1,4 @@
-//! Coarser levels and `tileset.json`: the rules of 3D Tiles, borders that fit, errors that are true.
+//! Coarser levels and `tileset.json`: the rules of 3D Tiles, borders that meet, errors that hold.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -15,7 +15,7 @@ fn bits(point: [f64; 3]) -> [u64; 3] {
     point.map(|v| (v + 0.0).to_bits())
 }
 
-/// The directed edges with a triangle on one side only.
+/// Returns the directed edges that have a triangle on one side only.
 fn outline(triangles: &[[[f64; 3]; 3]]) -> BTreeSet<[[u64; 3]; 2]> {
     let mut edges = BTreeSet::new();
     for t in triangles {
@@ -49,7 +49,7 @@ fn small(cloud: &Path) -> Job {
 }
 
 #[test]
-fn levels_keep_the_rules_their_borders_and_their_word() {
+fn levels_keep_the_rules_the_exact_borders_and_their_errors() {
     let folder = tempfile::tempdir().unwrap();
     for (name, cloud) in [("hills.csv", hills(20_000, 5)), ("clusters.csv", clouds::clusters(12_000))] {
         let job = small(&clouds::write(folder.path(), name, &cloud));
@@ -66,7 +66,7 @@ fn levels_keep_the_rules_their_borders_and_their_word() {
     }
 }
 
-/// So tiles of any levels that lie side by side meet without a crack.
+/// Asserts that coarser tiles have the outline of their leaves. So neighbours of any levels meet without a crack.
 pub(crate) fn borders_are_the_exact_ones(job: &Job, tiles: &[Tile]) {
     for tile in tiles.iter().filter(|tile| !tile.json["children"].is_null()) {
         let below: Vec<_> = tile.leaves.iter().flat_map(|&leaf| triangles(job, &tiles[leaf])).collect();
@@ -76,6 +76,7 @@ pub(crate) fn borders_are_the_exact_ones(job: &Job, tiles: &[Tile]) {
     }
 }
 
+/// Asserts that no coarser tile is off by more than its geometric error, at random places of the exact mesh.
 pub(crate) fn errors_are_true(job: &Job, tiles: &[Tile], name: &str) {
     let meshes: Vec<_> = tiles.iter().map(|tile| triangles(job, tile)).collect();
     let mut random = Random(9);
@@ -88,7 +89,7 @@ pub(crate) fn errors_are_true(job: &Job, tiles: &[Tile], name: &str) {
         let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
         let [x, y, z] = [0, 1, 2].map(|k| t[0][k] + u * (t[1][k] - t[0][k]) + v * (t[2][k] - t[0][k]));
         for &above in &tiles[leaf].above {
-            // On an edge rounding may put the place beside both triangles.
+            // Rounding may put a place on an edge outside both triangles.
             let Some(coarse) = meshes[above].iter().find_map(|t| height(t, [x, y])) else { continue };
             let off = (coarse - z).abs();
             assert!(off <= error(&tiles[above].json) + 1e-6, "{name}: {off} at {x}, {y}");
@@ -100,7 +101,7 @@ pub(crate) fn errors_are_true(job: &Job, tiles: &[Tile], name: &str) {
 }
 
 #[test]
-fn the_form_is_the_users_choice() {
+fn format_decides_which_files_are_written() {
     let folder = tempfile::tempdir().unwrap();
     let cloud = clouds::write(folder.path(), "cloud.csv", &hills(3_000, 1));
     let there = |settings: &str| {
@@ -143,7 +144,7 @@ fn a_coordinate_system_places_the_tileset_on_the_globe() {
         assert!((found[0] - longitude).abs() < 0.2 && (found[1] - latitude).abs() < 0.2, "{name}: {found:?}");
         let radius = (t[12] * t[12] + t[13] * t[13] + t[14] * t[14]).sqrt();
         assert!((6.35e6..6.39e6).contains(&radius), "{name}: {radius}");
-        // East, north and up, a metre each but for the scale of the projection, and right-handed.
+        // The columns are east, north and up, right-handed, each a metre long apart from the projection's scale.
         let column = |k: usize| [t[4 * k], t[4 * k + 1], t[4 * k + 2]];
         for k in 0..3 {
             let length = column(k).iter().map(|v| v * v).sum::<f64>().sqrt();

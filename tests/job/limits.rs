@@ -1,4 +1,4 @@
-//! Memory stays within what the configuration grants, whatever the cloud.
+//! A job keeps to the memory limit of the configuration with any cloud.
 
 use serde_json::Value;
 
@@ -15,7 +15,7 @@ fn stays_within(report: &Value, mebibytes: u64) {
 }
 
 #[test]
-fn three_million_points_in_128_mib() {
+fn three_million_points_fit_in_128_mib() {
     let folder = tempfile::tempdir().unwrap();
     gdt_batch(folder.path(), &["sample", "terrain.las", "--points", "3000000"]).succeeded();
     let job = Job::on(&[folder.path().join("terrain.las")]).with("limits", "memory = \"128 MiB\"");
@@ -27,7 +27,7 @@ fn three_million_points_in_128_mib() {
 }
 
 #[test]
-fn a_crowd_in_one_corner_in_128_mib() {
+fn a_crowd_in_one_corner_fits_in_128_mib() {
     let folder = tempfile::tempdir().unwrap();
     let mut cloud = clouds::uniform(1_500_000, 3_000, 8);
     cloud.extend([[6_000_000, 6_000_000, 0], [6_000_000, 0, 0], [0, 6_000_000, 0]]);
@@ -39,7 +39,7 @@ fn a_crowd_in_one_corner_in_128_mib() {
 }
 
 #[test]
-fn two_million_points_on_one_spot_in_128_mib() {
+fn two_million_points_on_one_spot_fit_in_128_mib() {
     let folder = tempfile::tempdir().unwrap();
     let mut cloud = vec![[500, 500, 7]; 2_000_000];
     cloud.extend(clouds::uniform(1_000, 1_000, 3));

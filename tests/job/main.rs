@@ -1,4 +1,4 @@
-//! Whole jobs, run as a user runs them: the program on a configuration file, and the proof from what it has written.
+//! Whole jobs as a user runs them: the program on a configuration file, and `verify` on what it wrote.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -25,10 +25,10 @@ mod khronos;
 mod levels;
 mod limits;
 mod messages;
+mod overlap;
 mod preflight;
 mod real;
 mod same_mesh;
 mod steps;
 mod viewers;
-mod woven;
 mod written;

@@ -1,4 +1,4 @@
-//! What the program says: of broken files, before a job, and to machines.
+//! What the program prints: about broken files, before a job, and as JSON.
 
 use std::fs;
 
@@ -10,7 +10,7 @@ use crate::program::{Job, gdt_batch, gdt_batch_within, number};
 const PLENTY_MIB: u64 = 1_536;
 
 #[test]
-fn broken_files_are_refused_or_read_as_far_as_they_go() {
+fn broken_files_are_refused_or_read_as_far_as_possible() {
     let Some(shared) = shared() else { return };
     for (name, code, words) in [
         ("1.2-no-points.las", 3, &["1.2-no-points.las", "1065", "max_malformed_fraction"][..]),
@@ -37,7 +37,7 @@ fn broken_files_are_refused_or_read_as_far_as_they_go() {
 }
 
 #[test]
-fn what_is_left_of_a_broken_file_is_read_on_request() {
+fn the_good_points_of_a_broken_file_are_read_on_request() {
     let Some(shared) = shared() else { return };
     for (name, kept, lost) in [("1.2-with-color-clipped.las", 1_064, 1), ("truncated-mid-chunk.laz", 44_372, 29_031)] {
         let job = Job::on(&[shared.join("data/bad").join(name)]).with("input", "max_malformed_fraction = 0.5");
@@ -77,7 +77,7 @@ fn unreadable_files_are_named() {
 
 #[test]
 #[cfg(unix)]
-fn what_is_no_file_is_not_waited_for() {
+fn pipes_and_devices_are_refused_without_waiting_for_them() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir_all(folder.path().join("out/tiles")).unwrap();
     for name in ["pipe.csv", "out/tiles/000000.glb"] {
@@ -99,7 +99,7 @@ fn small_job() -> (tempfile::TempDir, Job) {
 }
 
 #[test]
-fn check_tells_and_writes_nothing() {
+fn check_describes_the_job_and_writes_nothing() {
     let (_folder, job) = small_job();
     let files = || {
         let mut names: Vec<_> = fs::read_dir(job.folder()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
@@ -118,7 +118,7 @@ fn check_tells_and_writes_nothing() {
 }
 
 #[test]
-fn quiet_is_quiet_and_json_is_json() {
+fn quiet_prints_nothing_and_json_prints_only_json() {
     let (_folder, job) = small_job();
     let quiet = job.run_with(&["--quiet"]).succeeded();
     assert_eq!((quiet.out.as_str(), quiet.err.as_str()), ("", ""));
@@ -126,7 +126,7 @@ fn quiet_is_quiet_and_json_is_json() {
     for words in ["points read", "triangles", "tiles", "peak memory", "triangulate"] {
         assert!(loud.out.contains(words), "{words}: {}", loud.out);
     }
-    assert!(loud.err.contains("mesh: done"), "a log gets a line a stage: {}", loud.err);
+    assert!(loud.err.contains("mesh: done"), "a log gets a line for each stage: {}", loud.err);
     let json = job.run_with(&["--json", "-q"]).succeeded();
     assert_eq!(json.err, "");
     let stages = json.json()["stages"].as_array().unwrap().len();
@@ -136,9 +136,9 @@ fn quiet_is_quiet_and_json_is_json() {
 }
 
 #[test]
-fn verify_tells_sabotage_from_exactness() {
+fn verify_finds_a_missing_a_turned_and_a_truncated_tile() {
     let (_folder, job) = small_job();
-    // Plain, so that corners stand at the end of a tile.
+    // Without packing the corners are at the end of a tile.
     let job = job.with("output", "compression = \"none\"");
     let digest = job.digest();
     let tiles = job.out().join("tiles");
@@ -149,7 +149,7 @@ fn verify_tells_sabotage_from_exactness() {
     fs::remove_file(victim).unwrap();
     verify().refused(4, &["does not hold"]);
     assert!(verify().out.contains("FAILS: "));
-    // Two corners of the last triangle change places: it turns the wrong way.
+    // Swap two corners of the last triangle, so that it turns the wrong way.
     let mut turned = good.clone();
     let end = good.len() - (good.len() - 2) % 2;
     let last = (0..end).rev().find(|&at| at % 2 == 0 && good[at..at + 2] != good[at - 2..at]).unwrap();

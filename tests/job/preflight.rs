@@ -1,4 +1,4 @@
-//! Before a job: what it will need is estimated, compared with what there is, and refused unless one insists.
+//! Before a job, the program estimates the disk and memory that it needs, and refuses it if there is less, unless forced.
 
 use std::fs;
 use std::path::Path;
@@ -15,7 +15,7 @@ fn small_job(folder: &Path) -> Job {
 }
 
 #[test]
-fn what_is_not_there_is_refused_and_may_be_tried_again() {
+fn a_job_refused_for_disk_memory_or_an_unwritable_output_may_be_retried() {
     let folder = tempfile::tempdir().unwrap();
     let preflight = check::check(&gdt_batch::config::load(&small_job(folder.path()).config()).unwrap()).unwrap();
     preflight.passes().unwrap();
@@ -34,18 +34,18 @@ fn what_is_not_there_is_refused_and_may_be_tried_again() {
 }
 
 #[test]
-fn the_estimate_of_the_disk_is_no_guess() {
+fn the_disk_estimate_is_close_to_what_the_job_writes() {
     let folder = tempfile::tempdir().unwrap();
     let job = small_job(folder.path());
     let estimate = job.run_with(&["check", "--json"]).succeeded().json();
     let report = job.report();
     for (estimated, real) in [("temporary", "bytes_temporary"), ("results", "bytes_written")] {
         let ratio = number(&estimate[estimated]) as f64 / number(&report[real]) as f64;
-        assert!((0.9..2.0).contains(&ratio), "{estimated}: {ratio} times what it came to");
+        assert!((0.9..2.0).contains(&ratio), "{estimated}: {ratio} times the real size");
     }
 }
 
-/// A file of few bytes that promises four thousand million points in one chunk.
+/// Returns a small file that claims to hold four thousand million points in one chunk.
 fn bomb() -> Vec<u8> {
     let mut bytes = LasFile::new(4, 7, 0, 1000).laz(&[1000], false);
     let chunk_size = 375 + 54 + 12;

@@ -1,4 +1,4 @@
-//! Runs the program and reads what it says.
+//! Runs the program and reads what it prints.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -9,10 +9,10 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// Longer than any job of the tests takes on a slow machine: what runs on hangs.
+/// Longer than any job of the tests takes on a slow machine. A run that takes longer hangs.
 const HANGS: Duration = Duration::from_secs(300);
 
-/// What a run of the program came to.
+/// The exit code and the output of a run.
 #[derive(Debug)]
 pub(crate) struct Said {
     pub(crate) code: i32,
@@ -21,7 +21,7 @@ pub(crate) struct Said {
 }
 
 impl Said {
-    /// Standard output as JSON.
+    /// Parses standard output as JSON.
     #[track_caller]
     pub(crate) fn json(&self) -> Value {
         serde_json::from_str(&self.out).unwrap_or_else(|e| panic!("{e}: {self:?}"))
@@ -33,7 +33,7 @@ impl Said {
         self
     }
 
-    /// Asserts the exit code, and that the last paragraph of standard error holds all `words`.
+    /// Asserts the exit code, and that the error message contains all `words`.
     #[track_caller]
     pub(crate) fn refused(&self, code: i32, words: &[&str]) {
         let message = &self.err[self.err.find("error: ").unwrap_or_else(|| panic!("no error: {self:?}"))..];
@@ -48,7 +48,7 @@ pub(crate) fn gdt_batch<S: AsRef<std::ffi::OsStr>>(folder: &Path, arguments: &[S
     finish(Command::new(env!("CARGO_BIN_EXE_gdt-batch")).args(arguments).current_dir(folder))
 }
 
-/// Runs the program with no more than `mebibytes` of address space, so that it cannot even ask for more.
+/// Runs the program with `mebibytes` of address space, so that it cannot even ask for more.
 #[track_caller]
 pub(crate) fn gdt_batch_within(mebibytes: u64, folder: &Path, arguments: &[&str]) -> Said {
     let mut command = Command::new("sh");
@@ -56,7 +56,7 @@ pub(crate) fn gdt_batch_within(mebibytes: u64, folder: &Path, arguments: &[&str]
     finish(command.arg(env!("CARGO_BIN_EXE_gdt-batch")).args(arguments).current_dir(folder))
 }
 
-/// Waits for `command`, but not for ever, and makes sure that it has not panicked.
+/// Waits for `command`, but not for ever, and asserts that it did not panic.
 #[track_caller]
 fn finish(command: &mut Command) -> Said {
     let logs = tempfile::tempdir().unwrap();
@@ -80,21 +80,21 @@ fn finish(command: &mut Command) -> Said {
     said
 }
 
-/// A configuration in a folder of its own, to which it also writes.
+/// A configuration in a folder of its own, to which the job also writes.
 pub(crate) struct Job {
     folder: TempDir,
     sections: BTreeMap<&'static str, String>,
 }
 
 impl Job {
-    /// The least configuration for these files.
+    /// Returns the smallest configuration for these files.
     pub(crate) fn on<P: AsRef<Path>>(files: &[P]) -> Job {
         let names: Vec<&str> = files.iter().map(|file| file.as_ref().to_str().unwrap()).collect();
         let job = Job { folder: tempfile::tempdir().unwrap(), sections: BTreeMap::new() };
         job.with("input", &format!("files = {names:?}")).with("output", "directory = \"out\"")
     }
 
-    /// With one more line in a section.
+    /// Adds a line to a section.
     pub(crate) fn with(mut self, section: &'static str, line: &str) -> Job {
         *self.sections.entry(section).or_default() += &format!("{line}\n");
         self
@@ -112,12 +112,12 @@ impl Job {
         self.folder.path()
     }
 
-    /// Where it writes.
+    /// Returns the output directory.
     pub(crate) fn out(&self) -> PathBuf {
         self.folder.path().join("out")
     }
 
-    /// Writes the configuration and gives its path.
+    /// Writes the configuration and returns its path.
     pub(crate) fn config(&self) -> PathBuf {
         let text: String = self.sections.iter().map(|(name, lines)| format!("[{name}]\n{lines}")).collect();
         let path = self.folder.path().join("job.toml");
@@ -125,7 +125,7 @@ impl Job {
         path
     }
 
-    /// Runs it with these arguments before the configuration.
+    /// Runs the job with these arguments before the configuration.
     #[track_caller]
     pub(crate) fn run_with(&self, arguments: &[&str]) -> Said {
         let config = self.config();
@@ -137,13 +137,13 @@ impl Job {
         self.run_with(&[])
     }
 
-    /// Runs it, which must succeed, and gives the report.
+    /// Runs the job, asserts that it succeeds, and returns the report.
     #[track_caller]
     pub(crate) fn report(&self) -> Value {
         self.run_with(&["--json", "--quiet"]).succeeded().json()
     }
 
-    /// What `verify` says of what is written, which must hold.
+    /// Runs `verify` on the output, asserts that it holds, and returns what `verify` prints.
     #[track_caller]
     pub(crate) fn verified(&self) -> Value {
         let verdict = gdt_batch(self.folder(), &["verify", "out", "--json"]).succeeded().json();
@@ -151,7 +151,7 @@ impl Job {
         verdict
     }
 
-    /// Runs it and gives the digest of the mesh, which must be exact.
+    /// Runs the job, asserts that the mesh is exact, and returns its digest.
     #[track_caller]
     pub(crate) fn digest(&self) -> String {
         self.report();
@@ -159,8 +159,8 @@ impl Job {
     }
 }
 
-/// A number of a report.
+/// Returns a number of a report.
 #[track_caller]
 pub(crate) fn number(value: &Value) -> u64 {
-    value.as_u64().unwrap_or_else(|| panic!("{value} is no number"))
+    value.as_u64().unwrap_or_else(|| panic!("{value} is not a number"))
 }

@@ -1,4 +1,4 @@
-//! The real files: each ends with a mesh that `verify` proves, or with a sentence that says why not.
+//! Real files: each gives a mesh that `verify` proves, or an error that says why not.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,8 @@ fn data() -> Option<PathBuf> {
     Some(shared()?.join("data"))
 }
 
-/// Runs the job and holds its report against itself and against what `verify` finds in the tiles.
+/// Runs the job. Asserts that the figures of its report agree with each other and with what `verify` finds in the tiles.
+/// Returns the report and the digest.
 #[track_caller]
 fn proved(job: &Job) -> (Value, String) {
     let report = job.report();
@@ -32,7 +33,7 @@ fn proved(job: &Job) -> (Value, String) {
 }
 
 #[test]
-fn every_file_becomes_the_exact_triangulation() {
+fn every_file_gives_an_exact_triangulation() {
     let Some(data) = data() else { return };
     for (name, settings, read, sites) in [
         ("autzen_trim.las", "", 110_000, 109_993),
@@ -59,7 +60,7 @@ fn every_file_becomes_the_exact_triangulation() {
 }
 
 #[test]
-fn the_same_points_make_the_same_mesh_whatever_holds_them() {
+fn the_same_points_give_the_same_mesh_from_any_files() {
     let Some(data) = data() else { return };
     let digest = |names: &[&str]| {
         let files: Vec<PathBuf> = names.iter().map(|name| data.join(name)).collect();
@@ -76,7 +77,7 @@ fn the_same_points_make_the_same_mesh_whatever_holds_them() {
 }
 
 #[test]
-fn topography_is_the_same_as_text() {
+fn topography_as_text_gives_the_same_mesh() {
     let Some(data) = data() else { return };
     let digest = |name: &str, settings: &str| proved(&Job::on(&[data.join(name)]).with("input", settings)).1;
     let binary = digest("Topography.laz", "");
@@ -84,7 +85,7 @@ fn topography_is_the_same_as_text() {
 }
 
 #[test]
-fn ground_and_water_alone() {
+fn classes_can_keep_ground_and_water_alone() {
     let Some(data) = data() else { return };
     let job = Job::on(&[data.join("Topography.laz")]).with("input", "classes = [2, 9]");
     let (report, _) = proved(&job);
@@ -93,7 +94,7 @@ fn ground_and_water_alone() {
 }
 
 #[test]
-fn a_single_point_is_no_terrain() {
+fn a_single_point_is_refused() {
     let Some(data) = data() else { return };
     Job::on(&[data.join("utm15.las")]).run().refused(3, &["no triangle", "three different places"]);
 }
@@ -127,9 +128,9 @@ fn info_describes_every_file() {
     }
 }
 
-/// Ten million points take minutes without a release build; GDT_TEST_LARGE=1 asks for them.
+/// Ten million points take minutes in a debug build, so this runs only with GDT_TEST_LARGE=1.
 #[test]
-fn the_large_file() {
+fn the_large_file_gives_an_exact_triangulation() {
     let Some(data) = data() else { return };
     if std::env::var_os("GDT_TEST_LARGE").is_none() {
         eprintln!("not tested: autzen.laz with its 10 653 336 points; set GDT_TEST_LARGE=1");

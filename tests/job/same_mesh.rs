@@ -1,4 +1,4 @@
-//! The same points give the same mesh: whatever the tiles, the threads, the order and the backend.
+//! The same points give the same mesh with any tiles, threads, order and backend.
 
 use std::path::PathBuf;
 
@@ -6,10 +6,10 @@ use crate::clouds::{self, Cloud};
 use crate::common::shared;
 use crate::program::Job;
 
-/// More than any cloud here has.
+/// More points than any cloud here has.
 const ALL_IN_ONE: u64 = 1_000_000;
 
-/// Runs `job` in every way and gives the one digest.
+/// Runs `job` in several ways, asserts that all give the same digest, and returns it.
 #[track_caller]
 fn one_digest(job: impl Fn() -> Job) -> String {
     let expected = job().tiles_of(ALL_IN_ONE).with("triangulation", "backend = \"reference\"").threads(1).digest();
@@ -23,7 +23,7 @@ fn one_digest(job: impl Fn() -> Job) -> String {
     expected
 }
 
-/// The same for a made-up cloud, in one file and cut into three in another order.
+/// Asserts the same for a synthetic cloud, in one file, and in three files in another order.
 #[track_caller]
 fn one_digest_of(cloud: &Cloud) {
     let folder = tempfile::tempdir().unwrap();
@@ -40,13 +40,13 @@ fn one_digest_of(cloud: &Cloud) {
 }
 
 #[test]
-fn autzen_trim() {
+fn autzen_trim_gives_one_mesh() {
     let Some(shared) = shared() else { return };
     one_digest(|| Job::on(&[shared.join("data/autzen_trim.las")]));
 }
 
 #[test]
-fn however_it_is_packed() {
+fn compression_does_not_change_the_mesh() {
     let Some(shared) = shared() else { return };
     let packed = |file: &str, compression: &str| {
         let job = Job::on(&[shared.join("data").join(file)]).tiles_of(10_000);
@@ -59,13 +59,13 @@ fn however_it_is_packed() {
 }
 
 #[test]
-fn a_real_lattice() {
+fn a_real_lattice_gives_one_mesh() {
     let Some(shared) = shared() else { return };
     one_digest(|| Job::on(&[shared.join("data/simple1_4.las")]).with("input", "unit = \"metre\""));
 }
 
 #[test]
-fn crop_in_either_order() {
+fn the_order_of_the_files_does_not_change_the_mesh() {
     let Some(shared) = shared() else { return };
     let files = ["data/crop_1.laz", "data/crop_2.laz"].map(|name| shared.join(name));
     let swapped = [&files[1], &files[0]];
@@ -73,37 +73,37 @@ fn crop_in_either_order() {
 }
 
 #[test]
-fn a_gaussian_blob() {
+fn a_gaussian_blob_gives_one_mesh() {
     one_digest_of(&clouds::gaussian(60_000));
 }
 
 #[test]
-fn clusters() {
+fn clusters_give_one_mesh() {
     one_digest_of(&clouds::clusters(60_000));
 }
 
 #[test]
-fn a_grid() {
+fn a_grid_gives_one_mesh() {
     one_digest_of(&clouds::grid(200, 150));
 }
 
 #[test]
-fn a_circle() {
+fn a_circle_gives_one_mesh() {
     one_digest_of(&clouds::circle(20_000));
 }
 
 #[test]
-fn an_exact_circle() {
+fn an_exact_circle_gives_one_mesh() {
     one_digest_of(&clouds::exact_circle(1_185_665));
 }
 
 #[test]
-fn a_line() {
+fn a_nearly_straight_line_gives_one_mesh() {
     one_digest_of(&clouds::line(20_000, 1));
 }
 
 #[test]
-fn thousands_on_one_spot() {
+fn thousands_of_points_on_two_spots_give_one_mesh() {
     let mut cloud = clouds::uniform(5_000, 30_000, 5);
     cloud.extend((0..6_000).map(|i| [15_000, 15_000, i % 100]));
     cloud.extend((0..6_000).map(|i| [15_001, 15_000, i % 100]));
@@ -111,14 +111,14 @@ fn thousands_on_one_spot() {
 }
 
 #[test]
-fn a_crowd_far_from_the_rest() {
+fn a_crowd_far_from_the_other_points_gives_one_mesh() {
     let mut cloud = clouds::uniform(20_000, 300, 6);
     cloud.extend([[7_000_000, 0, 1], [0, 7_000_000, 2], [-700_000, -700_000, 3]]);
     one_digest_of(&cloud);
 }
 
 #[test]
-fn what_makes_no_triangle_is_refused() {
+fn points_that_make_no_triangle_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     for (name, cloud) in [
         ("one", vec![[5, 5, 1]]),

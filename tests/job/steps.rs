@@ -1,5 +1,5 @@
-//! The steps of a job by hand, on many small clouds cut into tiny tiles: the final triangles of all nodes together are
-//! the triangulation of all sites at once.
+//! Runs the steps of a job by hand, on many small clouds cut into tiny tiles. The final triangles of all nodes together are the
+//! triangulation of all sites at once.
 
 use gdt_batch::geometry::Site;
 use gdt_batch::job::durable::atomic_file::publish;
@@ -25,7 +25,7 @@ use crate::random::Random;
 
 type Triangle = [Site; 3];
 
-/// Turned so that the least corner comes first.
+/// Rotates the corners so that the least comes first.
 fn canonical(mut corners: Triangle) -> Triangle {
     let first = (0..3).min_by_key(|&i| corners[i]).unwrap();
     corners.rotate_left(first);
@@ -65,7 +65,7 @@ fn run_steps(job: &Job, options: &JobOptions) -> (Store, Partition) {
     (store, partition)
 }
 
-/// All sites, and all triangles that leaves and merge nodes made final, sorted.
+/// Returns all sites, and all triangles that leaves and merge nodes made final, sorted.
 fn collect(store: &Store, partition: &Partition) -> (Vec<Site>, Vec<Triangle>) {
     let (mut sites, mut triangles) = (Vec::new(), Vec::new());
     for tile in partition.tree.tiles() {
@@ -102,7 +102,7 @@ fn assert_exact(cloud: &Cloud, max_points_per_tile: u64, what: &str) {
     );
 }
 
-/// The points of `cloud` turned by an angle with whole sine and cosine, and shuffled.
+/// Returns the points of `cloud` in another order, turned by atan(4/3) and five times as far apart, so still on whole coordinates.
 fn turned_and_shuffled(cloud: Cloud, random: &mut Random) -> Cloud {
     let mut turned: Cloud = cloud.into_iter().map(|[x, y, z]| [3 * x - 4 * y, 4 * x + 3 * y, z]).collect();
     for i in (1..turned.len()).rev() {
@@ -111,7 +111,7 @@ fn turned_and_shuffled(cloud: Cloud, random: &mut Random) -> Cloud {
     turned
 }
 
-/// A cloud of kind `kind`: lattices, turned lattices, cocircular points, lines, random points, and mixtures.
+/// Returns a cloud of kind `kind`: random points, turned lattices, cocircular points, mixtures, lines or columns.
 fn small_cloud(kind: u64, random: &mut Random) -> (Cloud, &'static str) {
     let seed = random.below(1 << 40);
     let count = 20 + random.below(180) as usize;
@@ -133,7 +133,7 @@ fn small_cloud(kind: u64, random: &mut Random) -> (Cloud, &'static str) {
 }
 
 #[test]
-fn small_clouds_in_tiny_tiles() {
+fn small_clouds_in_tiny_tiles_give_the_exact_mesh() {
     let mut random = Random(20_261_120);
     for round in 0..40 {
         for kind in 0..7 {
@@ -144,7 +144,7 @@ fn small_clouds_in_tiny_tiles() {
 }
 
 #[test]
-fn lines_end_without_a_triangle() {
+fn points_on_a_line_give_no_triangle() {
     for max_points_per_tile in [5, 13, 40] {
         assert_exact(&clouds::line(100, 0), max_points_per_tile, "line");
         assert_exact(&vec![[3, 3, 3]; 100], max_points_per_tile, "one spot");

@@ -15,17 +15,17 @@ const UNMOVED: Transform = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.
 /// A tile of the tileset.
 pub(crate) struct Tile {
     pub(crate) json: Value,
-    /// Places of its parents, nearest first.
+    /// Indices of its ancestors, nearest first.
     pub(crate) above: Vec<usize>,
-    /// Places of the leaves at or below it.
+    /// Indices of the leaves at or below it.
     pub(crate) leaves: Vec<usize>,
-    /// From its own frame to its parent's.
+    /// The transform from its own frame to its parent's.
     step: Transform,
-    /// From its own frame to the world.
+    /// The transform from its own frame to the world.
     pub(crate) placed: Transform,
 }
 
-/// All tiles, children after their parents.
+/// Returns all tiles, children after their parents.
 pub(crate) fn tiles(job: &Job) -> Vec<Tile> {
     fn add(found: &mut Vec<Tile>, json: &Value, above: &[usize]) {
         let own = found.len();
@@ -53,22 +53,22 @@ pub(crate) fn error(tile: &Value) -> f64 {
     tile["geometricError"].as_f64().unwrap()
 }
 
-/// A list of so many numbers, or nothing.
+/// Returns a list of `N` numbers, or `None` if the value is something else.
 pub(crate) fn numbers<const N: usize>(value: &Value) -> Option<[f64; N]> {
     serde_json::from_value::<Vec<f64>>(value.clone()).ok()?.try_into().ok()
 }
 
-/// The transform that comes from doing `inner` and then `outer`.
+/// Returns the transform that applies `inner` and then `outer`.
 fn product(outer: &Transform, inner: &Transform) -> Transform {
     std::array::from_fn(|i| (0..4).map(|k| outer[4 * k + i % 4] * inner[i / 4 * 4 + k]).sum())
 }
 
-/// Where `transform` puts a place.
+/// Returns where `transform` puts a place.
 pub(crate) fn applied(transform: &Transform, [x, y, z]: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|k| transform[k] * x + transform[4 + k] * y + transform[8 + k] * z + transform[12 + k])
 }
 
-/// Least and greatest x, y, z.
+/// Returns the least and the greatest x, y, z of the tile's box.
 pub(crate) fn extent(tile: &Value) -> [[f64; 3]; 2] {
     let numbers: [f64; 12] = numbers(&tile["boundingVolume"]["box"]).unwrap();
     let half = [numbers[3], numbers[7], numbers[11]];
@@ -76,18 +76,18 @@ pub(crate) fn extent(tile: &Value) -> [[f64; 3]; 2] {
     [-1.0, 1.0].map(|side| [0, 1, 2].map(|k| numbers[k] + side * half[k]))
 }
 
-/// Whether a place lies in a box; sums of a centre and half a side, and places on the globe, are rounded.
+/// Tells whether a place lies in a box. Both are rounded: a box is a centre and half sides, and a place went through transforms.
 fn is_within(place: [f64; 3], [low, high]: [[f64; 3]; 2]) -> bool {
     (0..3).all(|k| place[k] >= low[k] - 1e-6 && place[k] <= high[k] + 1e-6)
 }
 
-/// Whether the box of `tile`, where its transform puts it, lies in the box of its parent.
+/// Tells whether the box of `tile`, where its transform puts it, lies in the box of its parent.
 fn is_in_its_parents(tile: &Tile, parent: &Tile) -> bool {
     let (own, outer) = (extent(&tile.json), extent(&parent.json));
     (0..8).all(|i| is_within(applied(&tile.step, [0, 1, 2].map(|k| own[i >> k & 1][k])), outer))
 }
 
-/// The triangles of a tile's content, x east, y north, z up in metres from the scene's origin.
+/// Returns the triangles of a tile's content: x east, y north, z up, in metres from the scene's origin.
 pub(crate) fn triangles(job: &Job, tile: &Tile) -> Vec<[[f64; 3]; 3]> {
     let path = job.out().join(tile.json["content"]["uri"].as_str().unwrap());
     let mut found = Vec::new();
@@ -101,7 +101,7 @@ pub(crate) fn triangles(job: &Job, tile: &Tile) -> Vec<[[f64; 3]; 3]> {
     found
 }
 
-/// The height over x, y in a triangle, or else nothing.
+/// Returns the height of a triangle at x, y, or `None` outside it.
 pub(crate) fn height(t: &[[f64; 3]; 3], [x, y]: [f64; 2]) -> Option<f64> {
     let area = |a: [f64; 3], b: [f64; 3]| (a[0] - x) * (b[1] - y) - (b[0] - x) * (a[1] - y);
     let weights = [area(t[1], t[2]), area(t[2], t[0]), area(t[0], t[1])];
@@ -109,7 +109,7 @@ pub(crate) fn height(t: &[[f64; 3]; 3], [x, y]: [f64; 2]) -> Option<f64> {
     weights.iter().all(|&w| w >= 0.0).then(|| (0..3).map(|i| weights[i] * t[i][2]).sum::<f64>() / total)
 }
 
-/// The rules of 3D Tiles 1.1, and that every GLB is shown by one tile.
+/// Asserts the rules of 3D Tiles 1.1, and that every GLB file is the content of exactly one tile.
 #[track_caller]
 pub(crate) fn keeps_the_rules(job: &Job, tiles: &[Tile]) {
     let mut shown = BTreeMap::<String, usize>::new();

@@ -1,5 +1,5 @@
-//! Programs that show terrain open what a job has written, and show all of it where it belongs: three.js and CesiumJS in a headless
-//! browser, and Blender on request.
+//! Viewers open what a job wrote and show all of it in the right place: three.js and CesiumJS in a headless browser, and Blender on
+//! request.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -16,7 +16,7 @@ use crate::random::Random;
 use crate::tileset::{Tile, applied, extent, keeps_the_rules, tiles, triangles};
 use crate::validator::validate;
 
-/// Chromium, if it is there; under tests/run it has to be.
+/// Returns the path of Chromium, or `None` if it or an npm package is missing. Under tests/run that is a failure.
 fn chromium() -> Option<PathBuf> {
     let npm = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/npm/node_modules");
     let is_there = ["three", "3d-tiles-renderer", "cesium"].iter().all(|package| npm.join(package).is_dir());
@@ -29,7 +29,7 @@ fn chromium() -> Option<PathBuf> {
     found
 }
 
-/// A file that asks for the heights at `places`.
+/// Writes a file that asks for the heights at `places`, and returns its path.
 fn request(job: &Job, places: &[[f64; 3]]) -> PathBuf {
     let places: Vec<[f64; 2]> = places.iter().map(|p| [p[0], p[1]]).collect();
     let request = job.folder().join("request.json");
@@ -37,7 +37,7 @@ fn request(job: &Job, places: &[[f64; 3]]) -> PathBuf {
     request
 }
 
-/// What a page of tests/npm shows of the job in the browser, heights at `places` included.
+/// Opens the output of the job in a page of tests/npm. Returns what the page shows, with the heights at `places`.
 #[track_caller]
 fn seen(job: &Job, chromium: &Path, page: &str, places: &[[f64; 3]]) -> Value {
     let request = request(job, places);
@@ -48,11 +48,11 @@ fn seen(job: &Job, chromium: &Path, page: &str, places: &[[f64; 3]]) -> Value {
     let output = output.expect("node runs");
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     assert!(output.status.success(), "{}{}", text(&output.stdout), text(&output.stderr));
-    assert!(std::fs::metadata(&screenshot).unwrap().len() > 10_000, "an empty picture");
+    assert!(std::fs::metadata(&screenshot).unwrap().len() > 10_000, "the picture is empty");
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// The middles of a dozen triangles of the finest mesh, in the frame of the root.
+/// Returns the middles of a dozen triangles of the finest mesh, in the frame of the root.
 fn middles(job: &Job, tiles: &[Tile]) -> Vec<[f64; 3]> {
     let mut random = Random(4);
     let middle = |_| {
@@ -65,7 +65,7 @@ fn middles(job: &Job, tiles: &[Tile]) -> Vec<[f64; 3]> {
     (0..12).map(middle).collect()
 }
 
-/// The finest mesh, whole and at its heights.
+/// Asserts that the view has all triangles of the finest mesh, and the expected heights.
 #[track_caller]
 fn is_exact(view: &Value, report: &Value, expected: &[[f64; 3]]) {
     assert_eq!(view["triangles"], report["triangles"]);
@@ -77,7 +77,7 @@ fn is_exact(view: &Value, report: &Value, expected: &[[f64; 3]]) {
     }
 }
 
-/// The box of what is shown is that of the root, side by side.
+/// Asserts that the view has the bounds of the root's box.
 #[track_caller]
 fn is_as_large(view: &Value, root: &Tile) {
     let all = extent(&root.json);
@@ -85,7 +85,7 @@ fn is_as_large(view: &Value, root: &Tile) {
     assert!((0..3).all(|k| (0..2).all(|side| (found[side][k] - all[side][k]).abs() < 0.02)), "{found:?} {all:?}");
 }
 
-/// The root's content alone.
+/// Asserts that the view has only the content of the root.
 #[track_caller]
 fn is_coarsest(view: &Value, job: &Job, tiles: &[Tile]) {
     assert_eq!(number(&view["triangles"]), triangles(job, &tiles[0]).len() as u64);
@@ -121,7 +121,7 @@ fn a_browser_shows_the_tileset_and_the_file() {
     }
 }
 
-/// A real cloud with a coordinate system, in a handful of tiles.
+/// Returns a job on a real cloud with a coordinate system, in a few tiles.
 fn stadium() -> Option<Job> {
     let cloud = shared()?.join("data/autzen_trim.las");
     Some(Job::on(&[cloud]).tiles_of(6_000).with("output", "max_points_per_level_tile = 6000"))
@@ -154,7 +154,7 @@ fn seen_on_the_globe(job: &Job, report: &Value, tiles: &[Tile], chromium: &Path)
     seen
 }
 
-/// Minutes on a software GPU; GDT_TEST_LARGE=1 asks for it.
+/// This takes minutes on a software GPU, so it runs only with GDT_TEST_LARGE=1.
 #[test]
 fn a_browser_shows_the_large_file() {
     let (Some(chromium), Some(data)) = (chromium(), shared()) else { return };
@@ -165,7 +165,7 @@ fn a_browser_shows_the_large_file() {
     shows(&Job::on(&[data.join("data/autzen.laz")]).with("output", "format = \"3dtiles\""), &chromium);
 }
 
-/// GDT_BPY names a Python that has Blender's module `bpy`.
+/// This needs Blender's module `bpy`: GDT_BPY names a Python that has it.
 #[test]
 fn blender_opens_the_file() {
     let Some(python) = std::env::var_os("GDT_BPY") else {
@@ -186,7 +186,7 @@ fn blender_opens_the_file() {
         let output = output.expect("GDT_BPY runs");
         let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
         assert!(output.status.success(), "{}{}", text(&output.stdout), text(&output.stderr));
-        // Blender talks, too.
+        // Blender prints lines of its own before.
         let seen: Value = serde_json::from_str(text(&output.stdout).lines().last().unwrap()).unwrap();
         is_exact(&seen, &report, &places);
         is_as_large(&seen, &tiles[0]);

@@ -1,4 +1,4 @@
-//! The written bytes depend on the configuration and the input alone.
+//! The bytes that a job writes depend on nothing but the configuration and the input.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -11,7 +11,7 @@ use serde_json::Value;
 use crate::clouds;
 use crate::program::{Job, number};
 
-/// All files below `folder` but the report, which holds times.
+/// Returns all files below `folder` except the report, which holds times.
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();
     for entry in fs::read_dir(folder).unwrap() {
@@ -51,7 +51,7 @@ fn threads_and_repetition_change_no_byte() {
 }
 
 #[test]
-fn nothing_of_an_earlier_job_stays() {
+fn no_tile_of_an_earlier_job_stays() {
     let folder = tempfile::tempdir().unwrap();
     let cloud = clouds::write(folder.path(), "cloud.csv", &clouds::gaussian(20_000));
     let job = Job::on(&[&cloud]).tiles_of(1_000);
@@ -75,12 +75,12 @@ fn the_report_adds_up_the_bytes() {
 }
 
 #[test]
-fn terrain_glb_is_all_tiles_in_one() {
+fn terrain_glb_holds_the_mesh_of_all_tiles() {
     let folder = tempfile::tempdir().unwrap();
     let cloud = clouds::write(folder.path(), "cloud.csv", &clouds::gaussian(20_000));
     let job = Job::on(&[&cloud]).tiles_of(2_000);
     let digest = job.digest();
-    // Alone in a directory of tiles it proves as well.
+    // `verify` proves it alone in a directory of tiles as well.
     let alone = folder.path().join("alone/tiles");
     fs::create_dir_all(&alone).unwrap();
     fs::copy(job.out().join("terrain.glb"), alone.join("terrain.glb")).unwrap();

@@ -1,4 +1,4 @@
-// The page of cesium.html: shows the tileset coarse and fine where it lies on the globe, and tells the server what is to be seen.
+// The page of cesium.html: shows the tileset in its place on the globe, coarse and fine, and sends the server what it shows.
 const { Cartesian3, Cartographic, Cesium3DTileset, CesiumWidget, Color, DirectionalLight, HeadingPitchRange, Math: Angles, Matrix4, Ray } = window.Cesium;
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
@@ -13,7 +13,7 @@ function emptyScene() {
   return scene;
 }
 
-// From the south, from above, and the light from the south-east.
+// Looks from the south and from above, with the light from the south-east.
 function lookAt(scene, tileset) {
   const { center, radius } = tileset.boundingSphere;
   scene.camera.lookAt(center, new HeadingPitchRange(0, Angles.toRadians(-45), radius * 2));
@@ -21,9 +21,9 @@ function lookAt(scene, tileset) {
   scene.light = new DirectionalLight({ direction: Cartesian3.normalize(direction, direction), intensity: 3 });
 }
 
-// The height over x, y, in the tileset's own frame, straight down. Not by getHeight, which looks towards the centre of the earth: that is
-// 0.2 degrees off the plumb line at these latitudes, and where laser points stand one above the other, on walls and tree trunks, triangles
-// rise 300 m a metre, so that the two sight lines meet the terrain metres apart.
+// Returns the height at x, y in the tileset's own frame, looking straight down. getHeight would look towards the centre of the
+// earth, 0.2 degrees off the plumb line at these latitudes. On walls and tree trunks laser points lie above each other, and triangles
+// rise 300 m per metre. There the two lines of sight would meet the terrain metres apart.
 function heightOver(scene, tileset, [x, y]) {
   const toWorld = tileset.root.computedTransform;
   const origin = Matrix4.multiplyByPoint(toWorld, new Cartesian3(x, y, 1e5), new Cartesian3());
@@ -32,7 +32,7 @@ function heightOver(scene, tileset, [x, y]) {
   return found ? Matrix4.multiplyByPoint(Matrix4.inverse(toWorld, new Matrix4()), found, new Cartesian3()).z : null;
 }
 
-// The screen space error in pixels at which CesiumJS shows the root alone: above that of the tileset it would show nothing at all.
+// Returns a screen space error in pixels at which CesiumJS shows the root alone. Above that of the tileset it would show nothing.
 async function coarseError(scene, tileset) {
   const { geometricError, root } = await (await fetch('/out/tileset.json')).json();
   const { center, radius } = tileset.boundingSphere;

@@ -1,5 +1,5 @@
 // node validate.mjs PATH...: runs the Khronos glTF validator on every .glb file under the paths.
-// Prints what it has to say; exit code 1 on any error or warning, or where there is no file.
+// Prints what the validator reports. The exit code is 1 after an error or a warning, or if there is no file.
 import { readFile, readdir, stat } from 'node:fs/promises';
 import { join } from 'node:path';
 import validator from 'gltf-validator';

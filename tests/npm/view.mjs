@@ -1,7 +1,7 @@
-// node view.mjs OUTPUT CHROMIUM SCREENSHOT.png [PAGE [REQUEST.json]]: opens what a job has written to the folder OUTPUT in a headless
-// Chromium, and prints as JSON what it shows: triangles, bounds, and the heights at the places [x, y] that the request lists as
-// "places", metres from the scene's origin. PAGE "view", which is meant where none is given, shows tileset.json with 3d-tiles-renderer
-// and terrain.glb with GLTFLoader, both of three.js; "cesium" shows tileset.json on the globe, with CesiumJS.
+// node view.mjs OUTPUT CHROMIUM SCREENSHOT.png [PAGE [REQUEST.json]]: opens what a job wrote to the folder OUTPUT in a headless
+// Chromium and prints as JSON what it shows: triangles, bounds, and the heights at the "places" of the request, a list of [x, y] in
+// metres from the scene's origin. PAGE "view", the default, shows tileset.json with 3d-tiles-renderer and terrain.glb with
+// GLTFLoader, both in three.js. PAGE "cesium" shows tileset.json on the globe with CesiumJS.
 import { createServer } from 'node:http';
 import { mkdtemp, readFile, rm, writeFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';

@@ -1,5 +1,4 @@
-// The page of view.html: shows the single file, and the tileset coarse and fine, as far as they are there, and tells the server what
-// is to be seen.
+// The page of view.html: shows the single file, and the tileset coarse and fine, if they exist, and sends the server what it shows.
 import * as THREE from 'three';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 import { MeshoptDecoder } from 'three/addons/libs/meshopt_decoder.module.js';
@@ -20,7 +19,7 @@ function sceneWith(object, up) {
   return scene;
 }
 
-// From the south, from above.
+// Looks from the south and from above.
 function cameraOver(box, up) {
   const centre = box.getCenter(new THREE.Vector3());
   const size = box.getSize(new THREE.Vector3()).length();
@@ -77,7 +76,7 @@ async function showTiles(places) {
   tiles.addEventListener('load-tileset', () => { loaded = true; });
   const failures = [];
   tiles.addEventListener('load-error', (event) => failures.push(String(event.error)));
-  // The globe is turned back under the camera, whose floats are small then.
+  // This undoes the tileset's transform, so that the camera is near the origin and single precision suffices.
   const frame = new THREE.Group();
   toWorld.clone().invert().decompose(frame.position, frame.quaternion, frame.scale);
   frame.matrixAutoUpdate = false;
@@ -103,7 +102,7 @@ async function showTiles(places) {
       if (failures.length > 0) throw new Error(failures.join('; '));
     }
     renderer.render(scene, camera);
-    // In the tileset's own coordinates: the frame has already turned the globe back.
+    // The frame has undone the transform, so these are the tileset's own coordinates.
     seen[name] = facts(tiles.group, places, new THREE.Matrix4(), 'z');
   }
   return { ...seen, picture: picture() };

@@ -1,9 +1,10 @@
 //! Verification holds on exact meshes, however they are cut, and its digest knows only the triangles.
 
+use gdt_batch::output::Compression;
 use gdt_batch::output::frame::Frame;
 use gdt_batch::verify::{Verdict, verify};
 
-use crate::model::{cloud, cut, cut_by_place, grid, lattice, terrain, utm, write_tiles};
+use crate::model::{cloud, cut, cut_by_place, grid, lattice, terrain, utm, write_tiles, write_tiles_as};
 use crate::random::Random;
 
 const MEMORY: u64 = 1 << 28;
@@ -66,6 +67,19 @@ fn parts_are_verified_like_tiles() {
     let verdict = verdict_of(&frame, &cut_by_place(&terrain(&frame, &grid(40, 25, 1_000_000)), 2));
     assert_eq!(verdict.failures, Vec::<String>::new());
     assert_eq!((verdict.sites, verdict.triangles), (1_000, 2 * 39 * 24));
+}
+
+#[test]
+fn quantized_steps_of_one_metre_are_not_taken_for_plain_positions() {
+    let frame = Frame::new(&lattice([0.0; 3], 1.5, 1.25), 1.0, 1.0, None).unwrap().packed();
+    let tiles = cut_by_place(&terrain(&frame, &cloud(11, 500, 100_000)), 2);
+    for compression in [Compression::Quantized, Compression::Meshopt] {
+        let directory = tempfile::tempdir().unwrap();
+        write_tiles_as(compression, directory.path(), &frame, &tiles);
+        let verdict = verify(directory.path(), MEMORY).unwrap();
+        assert_eq!(verdict.failures, Vec::<String>::new());
+        assert_eq!(verdict.sites, 500);
+    }
 }
 
 #[test]

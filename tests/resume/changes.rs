@@ -1,4 +1,4 @@
-//! What has changed since a run was interrupted is named, and decides from where it goes on.
+//! Changes between an interrupted run and the next: the job names them, and they decide which steps it keeps.
 
 use std::fs;
 use std::path::Path;
@@ -12,7 +12,7 @@ fn base() -> Setup {
     Setup::tiles_of(2_000).output("color = \"elevation\"")
 }
 
-/// Kills the job `base` at its `count`-th commit, runs it as `setup`, and gives what was said and the steps taken over.
+/// Kills the job `base` at its `count`-th commit and runs it as `setup`. Returns standard error and the number of steps kept.
 #[track_caller]
 fn change_to(rig: &mut Rig, count: u64, setup: &Setup) -> (String, u64) {
     rig.forget();
@@ -29,7 +29,7 @@ fn rig() -> Rig {
 }
 
 #[test]
-fn means_may_change() {
+fn threads_memory_and_backend_may_change() {
     let mut rig = rig();
     for setup in
         [base().threads(2), Setup { limits: "memory = \"1 GiB\"\nthreads = 1".into(), ..base() }, base().backend("cpu")]
@@ -40,15 +40,15 @@ fn means_may_change() {
 }
 
 #[test]
-fn another_look_keeps_the_mesh() {
+fn another_style_keeps_the_mesh() {
     let mut rig = rig();
     let elevation = "color = \"elevation\"";
-    let looks = [
+    let styles = [
         ("[output] color", Setup { output: base().output.replace(elevation, "color = \"none\""), ..base() }),
         ("[output] normals", base().output("normals = false")),
     ];
-    // Once among the leaves, once among the tiles.
-    for ((key, setup), count) in looks.iter().zip([12, 45]) {
+    // One kill is among the leaves, the other among the tiles.
+    for ((key, setup), count) in styles.iter().zip([12, 45]) {
         let (said, resumed) = change_to(&mut rig, count, setup);
         assert!(said.contains(key) && said.contains("written again"), "{said}");
         assert!(resumed >= 12 && resumed < count.max(13), "{resumed} steps");
@@ -56,7 +56,7 @@ fn another_look_keeps_the_mesh() {
 }
 
 #[test]
-fn another_mesh_starts_over_and_says_why() {
+fn an_option_of_the_mesh_starts_over_and_is_named() {
     let mut rig = rig();
     for (key, setup) in [
         ("[triangulation] max_points_per_tile", Setup { triangulation: "max_points_per_tile = 1500".into(), ..base() }),
@@ -70,7 +70,7 @@ fn another_mesh_starts_over_and_says_why() {
 }
 
 #[test]
-fn another_input_starts_over_and_says_which() {
+fn a_changed_input_starts_over_and_is_named() {
     let mut rig = rig();
     let path = rig.folder.path().join("cloud.csv");
     let text = fs::read_to_string(&path).unwrap();
@@ -85,7 +85,7 @@ fn another_input_starts_over_and_says_which() {
     let said = rig.run().succeeded().err;
     assert!(said.contains("cloud.csv") && said.contains("starting over"), "{said}");
     assert_eq!(rig.is_complete("an input that grew")["resumed"], 0);
-    // The same size and the same time, but another digit in the middle.
+    // The same size and time, but another digit near the end.
     kill(&rig);
     let written = fs::metadata(&path).unwrap().modified().unwrap();
     let at = text.len() - 3;
@@ -96,7 +96,7 @@ fn another_input_starts_over_and_says_which() {
     let said = rig.run().succeeded().err;
     assert!(said.contains("cloud.csv") && said.contains("starting over"), "{said}");
     rig.is_complete("an input with another digit");
-    // Another file beside it.
+    // A second file.
     kill(&rig);
     let more = scattered::uniform(500, 50_000, 5);
     scattered::write(rig.folder.path(), "more.csv", &more);
@@ -107,7 +107,7 @@ fn another_input_starts_over_and_says_which() {
 }
 
 #[test]
-fn restart_starts_over_under_its_old_name_too() {
+fn restart_starts_over_also_under_its_old_name() {
     let rig = rig();
     for name in ["--restart", "--fresh"] {
         assert!(rig.run_to("committed", 30).was_killed());
@@ -126,20 +126,20 @@ fn a_finished_job_runs_from_the_start() {
     assert_eq!(rig.completes("twice")["resumed"], 0);
 }
 
-/// Changes a byte at each of `places`, parts of its length.
+/// Changes a byte of the file at each of `places`, which are fractions of its length.
 fn damage(path: &Path, places: &[f64]) {
     let mut bytes = fs::read(path).unwrap();
     let length = bytes.len() as f64;
-    // Which of the files have records by now depends on the threads; the first always has the partition.
+    // Which files have records by now depends on the threads. The first always has the partition.
     let places = if bytes.is_empty() { &[] } else { places };
     places.iter().for_each(|place| bytes[(place * length) as usize] ^= 0x10);
     fs::write(path, bytes).unwrap();
 }
 
 #[test]
-fn what_is_damaged_is_made_again() {
+fn damaged_records_of_the_store_are_made_again() {
     let rig = rig();
-    // Among the leaves, the rims and the tiles.
+    // Among the leaves, the border normals and the tiles.
     for count in [10, 20, 30, 45] {
         for places in [&[0.1][..], &[0.5, 0.9], &[0.999]] {
             rig.forget();
@@ -158,12 +158,12 @@ fn what_is_damaged_is_made_again() {
     rig.forget();
     assert!(rig.run_to("committed", 30).was_killed());
     fs::remove_file(&rig.stores()[3]).unwrap();
-    let report = rig.completes("one file of the store is gone");
-    assert!(report["resumed"].as_u64().unwrap() > 5, "the steps of the others stay");
+    let report = rig.completes("a file of the store is missing");
+    assert!(report["resumed"].as_u64().unwrap() > 5, "the steps in the other files stay");
 }
 
 #[test]
-fn files_of_another_version_make_room_at_once() {
+fn files_of_another_version_are_removed_at_once() {
     let rig = rig();
     assert!(rig.run_to("committed", 10).was_killed());
     let old = rig.out().join("job/steps.store");
@@ -174,7 +174,7 @@ fn files_of_another_version_make_room_at_once() {
 }
 
 #[test]
-fn tiles_that_are_damaged_or_gone_are_written_again() {
+fn damaged_or_missing_tiles_are_written_again() {
     let rig = rig();
     assert!(rig.run_to("committed", 45).was_killed());
     let tiles = || fs::read_dir(rig.out().join("tiles")).unwrap().map(|entry| entry.unwrap().path());
@@ -187,11 +187,11 @@ fn tiles_that_are_damaged_or_gone_are_written_again() {
         }
     }
     let resumed = rig.completes("damaged tiles")["resumed"].as_u64().unwrap();
-    assert!((20..45).contains(&resumed), "{resumed} steps: all but the tiles");
+    assert!((20..45).contains(&resumed), "{resumed} steps instead of all but the tiles");
 }
 
 #[test]
-fn points_that_are_damaged_are_read_again() {
+fn damaged_points_are_read_again() {
     let rig = rig();
     assert!(rig.run_to("committed", 3).was_killed());
     let points = rig.out().join("job/points");
@@ -204,7 +204,7 @@ fn points_that_are_damaged_are_read_again() {
 }
 
 #[test]
-fn a_journal_that_is_no_journal_is_no_obstacle() {
+fn a_job_with_a_broken_journal_starts_over() {
     let rig = rig();
     for garbage in [&b""[..], b"\n\n", b"\xff\xfe\x00", b"0000000000000000 {}\n"] {
         rig.forget();
@@ -215,13 +215,13 @@ fn a_journal_that_is_no_journal_is_no_obstacle() {
 }
 
 #[test]
-fn what_an_earlier_job_has_made_stays_until_the_new_mesh_is_there() {
+fn results_of_an_earlier_job_stay_until_the_new_mesh_is_there() {
     let mut rig = rig();
     rig.completes("once");
     let earlier = files(&rig.out());
     let path = rig.folder.path().join("cloud.csv");
     fs::write(&path, fs::read_to_string(&path).unwrap() + "17,17,17\n").unwrap();
-    // Among the leaves and their merges.
+    // Among the leaves and merges.
     assert!(rig.run_to("committed", 20).was_killed());
     let mut found = files(&rig.out());
     found.retain(|name, _| !name.starts_with("job/"));
@@ -230,9 +230,9 @@ fn what_an_earlier_job_has_made_stays_until_the_new_mesh_is_there() {
     rig.completes("with another point");
 }
 
-/// Tiles come early, so an interrupted run may have left some when the next one turns out to be impossible.
+/// A job writes tiles early. So an interrupted run may leave some, and then the next run may find that the job is impossible.
 #[test]
-fn a_run_that_fails_for_good_leaves_no_parts_of_an_interrupted_one() {
+fn a_run_that_fails_for_good_removes_the_files_of_an_interrupted_run() {
     let rig = rig();
     let path = rig.folder.path().join("cloud.csv");
     let text = fs::read_to_string(&path).unwrap();
@@ -246,21 +246,21 @@ fn a_run_that_fails_for_good_leaves_no_parts_of_an_interrupted_one() {
     rig.completes("good again");
 }
 
-/// With "auto" all leaves are counted once more, those too whose tiles are there.
+/// With "auto" the next run counts the sites of all leaves again, even of those whose tiles are written.
 #[test]
-fn leaves_that_are_counted_again_must_be_whole() {
+fn damaged_leaves_are_made_again_before_auto_counts_their_sites() {
     let rig = Rig::new(&scattered::gaussian(20_000), &base().output("max_edge = \"auto\"")).committing_every(0);
     assert!(rig.run_to("committed", 45).was_killed());
     let journal = fs::read_to_string(rig.out().join("job/journal")).unwrap();
     let entries = journal.lines().skip(1).map(|line| line.split_once(' ').unwrap().1);
     let entries: Vec<Value> = entries.map(|text| serde_json::from_str(text).unwrap()).collect();
-    let exported = |tile: &Value| entries.iter().any(|entry| entry["step"]["WriteTile"] == *tile);
+    let is_written = |tile: &Value| entries.iter().any(|entry| entry["step"]["WriteTile"] == *tile);
     let stores = rig.stores();
     let mut bytes = stores.each_ref().map(|store| fs::read(store).unwrap());
     let mut lost = 0;
     for stored in entries.iter().flat_map(|entry| entry["stored"].as_array().unwrap()) {
         let leaf = &stored["key"]["Leaf"];
-        if leaf.is_u64() && exported(leaf) {
+        if leaf.is_u64() && is_written(leaf) {
             let [at, length] = ["at", "length"].map(|name| stored[name].as_u64().unwrap() as usize);
             bytes[leaf.as_u64().unwrap() as usize % stores.len()][at..at + length].fill(0);
             lost += 1;

@@ -1,4 +1,4 @@
-//! Disks that fill up, at every stage.
+//! Disks that fill up at every stage.
 
 use std::collections::BTreeSet;
 use std::process::Command;
@@ -6,14 +6,14 @@ use std::process::Command;
 use crate::rig::{Rig, Run, Setup};
 use crate::scattered;
 
-/// A run in which no file may become larger than so many bytes.
+/// Starts a run in which no file may become larger than `kibibytes` KiB.
 fn limited(rig: &Rig, kibibytes: u64) -> Run {
     let mut command = Command::new("bash");
     command.arg("-c").arg(format!("ulimit -f {kibibytes} && exec \"$0\" --force job.toml"));
     Run::start(command.arg(env!("CARGO_BIN_EXE_gdt-batch")).env("GDT_COMMIT_MS", "0").current_dir(rig.folder.path()))
 }
 
-/// Where a run stopped: the file that could not be written, without its number, and how many steps were finished.
+/// Returns where a run stopped: the file that it could not write, without its number, and what it said of the finished steps.
 fn place(said: &str) -> (String, String) {
     let after = |text: &'static str| said.split(text).nth(1).unwrap_or_default();
     let file = after("error: cannot write ").split(": ").next().unwrap_or_default();
@@ -22,7 +22,7 @@ fn place(said: &str) -> (String, String) {
 }
 
 #[test]
-fn a_file_that_may_not_grow_stops_any_stage() {
+fn a_job_that_reached_a_file_size_limit_at_any_stage_goes_on_without_it() {
     let rig = Rig::new(&scattered::gaussian(20_000), &Setup::tiles_of(2_000)).committing_every(0);
     let mut places = BTreeSet::new();
     for count in [0, 1, 8, 14, 30, 40] {
@@ -39,7 +39,7 @@ fn a_file_that_may_not_grow_stops_any_stage() {
     assert!(places.len() >= 5, "{places:?}");
 }
 
-/// Fills a file system of $1 KiB, then makes room and goes on. Prints what the first run said.
+/// Runs the job on a file system of $1 KiB, then makes room and runs it again. Prints what the first run said.
 const FILL: &str = r#"
 set -u
 mount -t tmpfs -o size=$1k tmpfs out || exit 77
@@ -51,7 +51,7 @@ cp -r out copy
 exit $code
 "#;
 
-/// A command that may mount, if there is one: for root in a mount namespace, for others in a user namespace as well.
+/// Returns a command that runs `FILL` as root of its own user and mount namespaces, where it may mount.
 fn mounting(rig: &Rig, kibibytes: u64) -> Command {
     let mut command = Command::new("unshare");
     command.args(["--user", "--map-root-user", "--mount", "bash", "-c", FILL, env!("CARGO_BIN_EXE_gdt-batch")]);
@@ -60,7 +60,7 @@ fn mounting(rig: &Rig, kibibytes: u64) -> Command {
 }
 
 #[test]
-fn a_disk_that_fills_up_stops_any_stage() {
+fn a_job_whose_disk_was_full_at_any_stage_goes_on_when_there_is_room() {
     let rig = Rig::new(&scattered::gaussian(20_000), &Setup::tiles_of(2_000));
     let can_mount = Command::new("unshare")
         .args(["--user", "--map-root-user", "--mount", "mount", "-t", "tmpfs", "tmpfs", "/mnt"])
@@ -72,7 +72,7 @@ fn a_disk_that_fills_up_stops_any_stage() {
     }
     let mut places = BTreeSet::new();
     let copy = rig.folder.path().join("copy");
-    // The points, the leaves, and then mostly the pixels of the preview.
+    // The points and the leaves fill the smaller sizes, mostly the pixels of the preview the larger ones.
     let kibibytes = [256, 768, 1024, 1280, 1536, 1792].into_iter().chain((2..40).map(|mebibytes| mebibytes << 10));
     for kibibytes in kibibytes {
         std::fs::create_dir(rig.out()).unwrap();

@@ -1,4 +1,4 @@
-//! SIGKILL at every commit of the journal and at random moments.
+//! SIGKILL at every commit of the journal, and at random moments.
 
 use std::time::{Duration, Instant};
 
@@ -6,15 +6,16 @@ use crate::random::Random;
 use crate::rig::{Rig, Run, Setup};
 use crate::scattered;
 
-/// Where a commit can be cut off: before it; with the results under their names and no record; in the middle of the record;
-/// after it.
+/// Where a kill can hit a commit: before it; when the results have their final names but the journal lacks the record; when half of
+/// the record is written; after it.
 const PLACES: [&str; 4] = ["commit", "published", "torn", "committed"];
 
 fn small_job(setup: &Setup) -> Rig {
     Rig::new(&scattered::clusters(20_000), setup).committing_every(0)
 }
 
-/// Kills the run at every `stride`-th time that it comes to `place`, each time from the start, and goes on; returns the kills.
+/// For every `stride`-th time that a run comes to `place`: starts over, kills the run there and runs the job again. Returns the
+/// number of kills.
 #[track_caller]
 fn kill_at_each(rig: &Rig, place: &str, stride: usize) -> u64 {
     let mut kills = 0;
@@ -29,28 +30,28 @@ fn kill_at_each(rig: &Rig, place: &str, stride: usize) -> u64 {
         rig.has_nothing_half_written(&what);
         let was_over = rig.out().join("report.json").exists();
         let resumed = rig.completes(&what)["resumed"].as_u64().unwrap();
-        // The record under way may be there or not, those before it must.
-        assert!(was_over || resumed + 1 >= count, "{what}: only {resumed} steps were taken over");
+        // The record of this commit may be there or not. Those before it must be.
+        assert!(was_over || resumed + 1 >= count, "{what}: only {resumed} steps were kept");
     }
     kills
 }
 
 #[test]
-fn killed_at_every_commit() {
+fn a_job_killed_at_any_commit_goes_on_where_it_stopped() {
     let rig = small_job(&Setup::tiles_of(3_500));
     let kills: u64 = PLACES.iter().map(|place| kill_at_each(&rig, place, 1)).sum();
     assert!(kills >= 110, "only {kills} kills");
 }
 
 #[test]
-fn killed_at_commits_with_two_threads() {
+fn a_job_of_two_threads_killed_at_a_commit_goes_on_where_it_stopped() {
     let rig = small_job(&Setup::tiles_of(3_500).threads(2));
     let kills: u64 = PLACES.iter().map(|place| kill_at_each(&rig, place, 4)).sum();
     assert!(kills >= 25, "only {kills} kills");
 }
 
 #[test]
-fn killed_while_triangles_are_left_out_below_levels() {
+fn a_job_with_max_edge_and_levels_goes_on_where_it_was_killed() {
     let setup = Setup::tiles_of(2_000).output("max_edge = \"auto\"").output("max_points_per_level_tile = 1000");
     let rig = small_job(&setup);
     for folder in ["cut/", "levels/"] {
@@ -61,16 +62,16 @@ fn killed_while_triangles_are_left_out_below_levels() {
 }
 
 #[test]
-fn killed_again_and_again_while_it_goes_on() {
+fn a_job_killed_again_and_again_still_ends() {
     let rig = small_job(&Setup::tiles_of(3_500).threads(2));
     for place in PLACES {
         rig.forget();
         let mut kills = 0;
-        // Every run gets two commits further.
+        // Every run gets two commits further than the one before.
         while rig.run_to(place, 3).was_killed() {
             rig.has_nothing_half_written(place);
             kills += 1;
-            assert!(kills < 100, "{place}: it does not get on");
+            assert!(kills < 100, "{place}: it makes no progress");
         }
         assert!(kills >= 5, "{place}: only {kills} kills");
         rig.is_complete(place);
@@ -78,9 +79,9 @@ fn killed_again_and_again_while_it_goes_on() {
 }
 
 #[test]
-fn killed_while_it_cleans_up() {
+fn a_job_killed_while_it_cleans_up_is_not_done_again() {
     let rig = small_job(&Setup::tiles_of(5_000));
-    // The store, the points and, last of all, the journal.
+    // It removes the store, the points and, last, the journal.
     let steps = rig.stores().len() as u64 + 2;
     assert!(!rig.run_to("cleaning", steps + 1).was_killed());
     rig.forget();
@@ -88,7 +89,7 @@ fn killed_while_it_cleans_up() {
         assert!(rig.run_to("cleaning", count).was_killed());
         let before = std::fs::read(rig.out().join("report.json")).unwrap();
         rig.completes(&format!("cleaning, {count}"));
-        // As long as the journal is there, the job is known to be complete, and nothing is done again.
+        // While the journal is there, it shows that the job is complete, and no step runs again.
         let after = std::fs::read(rig.out().join("report.json")).unwrap();
         assert!(before == after || count == steps, "cleaning, {count}: done again");
         rig.forget();
@@ -99,7 +100,7 @@ fn kills_wanted(otherwise: u64) -> u64 {
     std::env::var("GDT_KILLS").ok().and_then(|text| text.parse().ok()).unwrap_or(otherwise)
 }
 
-/// Kills runs at random moments until there were `kills` of them; every run goes on where the one before was.
+/// Kills runs at random moments, `kills` times. Every run goes on where the one before was killed.
 #[track_caller]
 fn kill_at_random(rig: &Rig, seed: u64, kills: u64) {
     let mut random = Random(seed);
@@ -129,24 +130,24 @@ fn kill_at_random(rig: &Rig, seed: u64, kills: u64) {
 }
 
 #[test]
-fn killed_at_random_with_one_thread() {
+fn a_job_of_one_thread_killed_at_random_moments_ends_with_the_same_bytes() {
     let rig = Rig::new(&scattered::gaussian(40_000), &Setup::tiles_of(2_000)).committing_every(10);
     kill_at_random(&rig, 1, kills_wanted(45));
 }
 
 #[test]
-fn killed_at_random_with_two_threads() {
+fn a_job_of_two_threads_killed_at_random_moments_ends_with_the_same_bytes() {
     let rig = Rig::new(&scattered::gaussian(40_000), &Setup::tiles_of(2_000).threads(2)).committing_every(10);
     kill_at_random(&rig, 2, kills_wanted(45));
 }
 
 #[test]
-fn killed_with_a_gpu() {
+fn a_job_on_a_gpu_goes_on_where_it_was_killed() {
     let setup = Setup::tiles_of(3_500).threads(2).backend("gpu");
     let there = std::process::Command::new(env!("CARGO_BIN_EXE_gdt-batch")).arg("gpu").arg("--side").arg("64").output();
     if !there.is_ok_and(|output| output.status.success()) {
-        assert!(std::env::var_os("GDT_TEST_ALL").is_none(), "no GPU, not even of software");
-        eprintln!("skipped: there is no GPU here; Debian's mesa-vulkan-drivers brings one of software that will do");
+        assert!(std::env::var_os("GDT_TEST_ALL").is_none(), "no GPU, not even a software renderer");
+        eprintln!("skipped: there is no GPU here; the software renderer of Debian's mesa-vulkan-drivers is enough");
         return;
     }
     let rig = small_job(&setup);

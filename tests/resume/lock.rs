@@ -1,10 +1,10 @@
-//! Two processes, one directory.
+//! Two processes with one output directory.
 
 use crate::rig::{Rig, Run, Setup};
 use crate::scattered;
 
 #[test]
-fn a_second_process_is_told_who_is_there() {
+fn a_second_process_is_told_which_process_works_in_the_directory() {
     let rig = Rig::new(&scattered::gaussian(40_000), &Setup::tiles_of(1_000)).committing_every(0);
     let mut first = Run::start(&mut rig.command());
     let journal = rig.out().join("job/journal");
@@ -12,14 +12,14 @@ fn a_second_process_is_told_who_is_there() {
     first.signal("STOP");
     let second = rig.run().stopped(&["is working in", "another [output] directory"]);
     assert!(second.err.contains(&first.child.id().to_string()), "{}", second.err);
-    assert!(!second.err.contains("run the same command again"), "it has nothing to go on with: {}", second.err);
+    assert!(!second.err.contains("run the same command again"), "it has no steps to go on with: {}", second.err);
     first.signal("CONT");
     first.end().succeeded();
     rig.is_complete("after a second process");
 }
 
 #[test]
-fn the_lock_of_a_process_that_was_killed_is_no_obstacle() {
+fn the_lock_of_a_killed_process_does_not_stop_the_next_run() {
     let rig = Rig::new(&scattered::gaussian(20_000), &Setup::tiles_of(2_000)).committing_every(0);
     assert!(rig.run_to("committed", 5).was_killed());
     assert!(rig.out().join("job/lock").exists());

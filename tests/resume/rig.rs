@@ -1,4 +1,4 @@
-//! A job in a folder of its own, the bytes it must end with, and how to disturb it.
+//! A job in a folder of its own, the bytes that it must end with, and ways to disturb it.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -13,10 +13,10 @@ use tempfile::TempDir;
 
 use crate::scattered;
 
-/// Longer than any job here takes on a slow machine: what runs on hangs.
+/// Longer than any job here takes on a slow machine. A run that takes longer hangs.
 const HANGS: Duration = Duration::from_secs(300);
 
-/// What a job is, in the lines of its configuration.
+/// The lines of a job's configuration, by section.
 #[derive(Clone)]
 pub(crate) struct Setup {
     pub(crate) input: String,
@@ -26,7 +26,7 @@ pub(crate) struct Setup {
 }
 
 impl Setup {
-    /// On the cloud of the folder, cut into tiles of so many sites.
+    /// Returns a job on the cloud in its folder, cut into tiles of at most `sites` points.
     pub(crate) fn tiles_of(sites: u64) -> Setup {
         Setup {
             input: "files = [\"cloud.csv\"]".into(),
@@ -45,7 +45,7 @@ impl Setup {
         self
     }
 
-    /// With one more line in `[output]`.
+    /// Adds a line to `[output]`.
     pub(crate) fn output(mut self, line: &str) -> Setup {
         self.output += &format!("\n{line}");
         self
@@ -99,7 +99,7 @@ impl Run {
         Run { child: child.expect("the program starts"), logs }
     }
 
-    /// Waits for the end, but not for ever, and makes sure that nothing has panicked.
+    /// Waits for the end, but not for ever, and asserts that nothing panicked.
     #[track_caller]
     pub(crate) fn end(mut self) -> End {
         let start = Instant::now();
@@ -122,20 +122,20 @@ impl Run {
     /// Sends a signal by its name.
     pub(crate) fn signal(&self, name: &str) {
         let sent = Command::new("kill").args(["-s", name, &self.child.id().to_string()]).status().unwrap();
-        assert!(sent.success(), "{name} goes to a process that is there");
+        assert!(sent.success(), "no process to send {name} to");
     }
 
-    /// Waits until `condition` holds while the run is under way.
+    /// Waits until `condition` holds, and asserts that the run goes on until then.
     #[track_caller]
     pub(crate) fn wait_until(&mut self, condition: impl Fn() -> bool) {
         while !condition() {
-            assert!(self.child.try_wait().unwrap().is_none(), "the run is over too early");
+            assert!(self.child.try_wait().unwrap().is_none(), "the run ended too early");
             std::thread::sleep(Duration::from_millis(1));
         }
     }
 }
 
-/// A job, and what it writes if nobody disturbs it.
+/// A job, and what it writes when nothing disturbs it.
 pub(crate) struct Rig {
     pub(crate) folder: TempDir,
     pub(crate) expected: BTreeMap<String, Vec<u8>>,
@@ -154,7 +154,7 @@ impl Rig {
         rig
     }
 
-    /// From here on the job is `setup`, and what it must write is found out in another directory.
+    /// Makes `setup` the job from here on, and runs it undisturbed in another directory to learn what it must write.
     #[track_caller]
     pub(crate) fn expect(&mut self, setup: &Setup) {
         let undisturbed = Setup { output: setup.output.replace("\"out\"", "\"undisturbed\""), ..setup.clone() };
@@ -170,7 +170,7 @@ impl Rig {
         fs::write(self.folder.path().join("job.toml"), setup.text()).unwrap();
     }
 
-    /// With so many milliseconds between two commits of the journal; without any, every record is a commit of its own.
+    /// Sets the milliseconds between two commits of the journal. With 0 every record is a commit of its own.
     pub(crate) fn committing_every(mut self, milliseconds: u64) -> Rig {
         self.environment.push(("GDT_COMMIT_MS", milliseconds.to_string()));
         self
@@ -180,7 +180,7 @@ impl Rig {
         self.folder.path().join("out")
     }
 
-    /// The program on the configuration.
+    /// Returns the command that runs the program on the configuration.
     pub(crate) fn command(&self) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_gdt-batch"));
         command.arg("job.toml").current_dir(self.folder.path()).envs(self.environment.iter().map(|(k, v)| (k, v)));
@@ -192,13 +192,13 @@ impl Rig {
         Run::start(&mut self.command()).end()
     }
 
-    /// Runs until the place `name` is come to for the `count`-th time, where the process is killed.
+    /// Runs until the process comes to the place `name` for the `count`-th time, which kills it.
     #[track_caller]
     pub(crate) fn run_to(&self, name: &str, count: u64) -> End {
         Run::start(self.command().env("GDT_FAULT", format!("{name}:{count}"))).end()
     }
 
-    /// Runs to the end, and compares all that is written.
+    /// Runs to the end and compares everything that was written. Returns the report.
     #[track_caller]
     pub(crate) fn completes(&self, what: &str) -> Value {
         let end = self.run();
@@ -206,7 +206,7 @@ impl Rig {
         self.is_complete(what)
     }
 
-    /// Asserts that the results are what they must be; gives the report.
+    /// Asserts that the results are what they must be. Returns the report.
     #[track_caller]
     pub(crate) fn is_complete(&self, what: &str) -> Value {
         let found = files(&self.out());
@@ -219,7 +219,7 @@ impl Rig {
         serde_json::from_slice(&text).unwrap()
     }
 
-    /// Asserts that whatever is there under its final name is whole.
+    /// Asserts that every file with its final name is whole.
     #[track_caller]
     pub(crate) fn has_nothing_half_written(&self, what: &str) {
         for (name, bytes) in files(&self.out()) {
@@ -229,17 +229,18 @@ impl Rig {
         }
     }
 
-    /// How many steps the journal has.
+    /// Returns the number of steps in the journal.
     pub(crate) fn steps(&self) -> usize {
         let journal = fs::read(self.out().join("job/journal")).unwrap_or_default();
         journal.iter().filter(|&&byte| byte == b'\n').count().saturating_sub(1)
     }
 
-    /// The files with the results of the steps.
+    /// Returns the files with the results of the steps.
     pub(crate) fn stores(&self) -> [PathBuf; STORE_FILES] {
         JobDirectory::new(&self.out()).store()
     }
 
+    /// Removes the output directory.
     pub(crate) fn forget(&self) {
         if self.out().exists() {
             fs::remove_dir_all(self.out()).unwrap();
@@ -247,7 +248,7 @@ impl Rig {
     }
 }
 
-/// All files below `folder` but the report, which holds times.
+/// Returns all files below `folder` except the report, which holds times.
 pub(crate) fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();
     let Ok(entries) = fs::read_dir(folder) else { return found };
@@ -263,10 +264,10 @@ pub(crate) fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     found
 }
 
-/// A report without what no two runs have in common.
+/// Returns a report without the figures that differ between runs.
 fn lasting(text: &[u8]) -> Value {
     let mut report: Value = serde_json::from_slice(text).unwrap();
-    // A step that was cut off has left bytes in the store that nobody needs.
+    // The temporary bytes differ because an interrupted step leaves bytes in the store that no step needs.
     let changing =
         ["wall_s", "cpu_s", "stages", "steps", "peak_memory", "resumed", "threads", "memory_limit", "bytes_temporary"];
     for name in changing {

@@ -1,20 +1,20 @@
-//! Ctrl-C and its kin.
+//! Ctrl-C and SIGTERM.
 
 use std::time::Duration;
 
 use crate::rig::{Rig, Run, Setup};
 use crate::scattered;
 
-/// A job of many steps that each wait for the disk: long enough to be met on its way.
+/// Returns a job of many steps that each wait for the disk, long enough for signals to arrive while it runs.
 fn long_job(threads: usize) -> Rig {
     Rig::new(&scattered::gaussian(60_000), &Setup::tiles_of(500).threads(threads)).committing_every(0)
 }
 
 #[test]
-fn sigterm_and_ctrl_c_stop_it_and_it_goes_on() {
+fn a_job_stopped_by_sigterm_or_ctrl_c_goes_on_where_it_stopped() {
     for (signal, threads) in [("TERM", 1), ("INT", 2)] {
         let rig = long_job(threads);
-        // Among the leaves, among the rims, among the tiles.
+        // Among the leaves, the border normals and the tiles.
         for steps in [50, 250, 400] {
             let mut run = Run::start(&mut rig.command());
             run.wait_until(|| rig.steps() > steps);
@@ -31,7 +31,7 @@ fn sigterm_and_ctrl_c_stop_it_and_it_goes_on() {
 }
 
 #[test]
-fn what_is_interrupted_before_the_first_step_leaves_nothing() {
+fn a_job_interrupted_before_its_first_step_leaves_nothing() {
     let rig = Rig::new(&scattered::gaussian(400_000), &Setup::tiles_of(20_000));
     let mut run = Run::start(&mut rig.command());
     let points = rig.out().join("job/points");
@@ -45,8 +45,8 @@ fn what_is_interrupted_before_the_first_step_leaves_nothing() {
 }
 
 #[test]
-fn a_second_ctrl_c_ends_it_at_once() {
-    // One leaf that takes long, and in which nobody looks for signals.
+fn a_second_ctrl_c_ends_the_job_at_once() {
+    // One leaf that takes long and does not check for signals.
     let rig =
         Rig::new(&scattered::gaussian(400_000), &Setup::tiles_of(500_000).backend("reference")).committing_every(0);
     let mut run = Run::start(&mut rig.command());
@@ -57,6 +57,6 @@ fn a_second_ctrl_c_ends_it_at_once() {
     run.signal("INT");
     let end = run.end();
     assert_eq!(end.status.code(), Some(1), "{end:?}");
-    assert!(!end.err.contains("interrupted"), "it did not come to say so: {}", end.err);
+    assert!(!end.err.contains("interrupted"), "the job ended before it could say so: {}", end.err);
     rig.completes("after a second Ctrl-C");
 }

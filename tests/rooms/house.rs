@@ -1,20 +1,21 @@
-//! Finds the file that defines what another file imports.
+//! Finds for every import the file that defines it.
 
 use std::collections::BTreeMap;
 
 use crate::source::{NamedPath, paths};
 
-/// An import: `from` names `path`, which `to` defines. Files are relative to `src`.
+/// An import: the file `from` names `path`, which the file `to` defines. Files are relative to `src`.
 pub(crate) struct Arrow {
     pub(crate) from: String,
     pub(crate) to: String,
     pub(crate) line: usize,
     pub(crate) path: String,
-    /// Whether a mod.rs (or lib.rs) only passes the name on from its own folder, which other files see through.
+    /// Whether a mod.rs or lib.rs only re-exports a name from its own folder. An import through it leads to the file that defines
+    /// the name.
     pub(crate) passes_on: bool,
 }
 
-/// All modules of the crate by their place, such as "job/plan/scan", or "" for lib.rs.
+/// All modules of the crate by place, such as "job/plan/scan", or "" for lib.rs.
 pub(crate) struct House(BTreeMap<String, Module>);
 
 struct Module {
@@ -23,13 +24,13 @@ struct Module {
 }
 
 impl House {
-    /// `files` are names relative to `src` and texts.
+    /// Reads the files of a crate: their names relative to `src`, and their texts.
     pub(crate) fn new<'a>(files: impl IntoIterator<Item = (&'a str, &'a str)>) -> House {
         let module = |(file, text): (&str, &str)| (place(file), Module { file: file.into(), paths: paths(text) });
         House(files.into_iter().filter(|(file, _)| !is_test(file)).map(module).collect())
     }
 
-    /// Returns every import of a file from another, each pair of files once.
+    /// Returns the imports between files, one for each pair of files.
     pub(crate) fn arrows(&self) -> Vec<Arrow> {
         let mut arrows = BTreeMap::new();
         for (place, module) in &self.0 {
@@ -47,7 +48,8 @@ impl House {
         arrows.into_values().collect()
     }
 
-    /// The same path from the root of the crate; `None` if it leads to another crate or to an item of the file itself.
+    /// Returns the path, as the module at `place` names it, from the root of the crate. `None` if it leads to another crate or to
+    /// an item of the module itself.
     fn absolute(&self, place: &str, path: &[String]) -> Option<Vec<String>> {
         let (first, rest) = path.split_first()?;
         match first.as_str() {
@@ -69,7 +71,7 @@ impl House {
         Some(path)
     }
 
-    /// The file that defines what stands at a path from the root, seen through re-exports.
+    /// Follows re-exports and returns the file that defines the item at a path from the root.
     fn definition(&self, path: &[String]) -> String {
         let mut place = String::new();
         for (at, segment) in path.iter().enumerate() {
@@ -86,7 +88,7 @@ impl House {
         self.0.get(&place).map_or_else(|| child(&place, "mod.rs"), |module| module.file.clone())
     }
 
-    /// Whether there is a file or a folder at this place.
+    /// Tells whether there is a file or a folder at this place.
     fn is_module(&self, place: &str) -> bool {
         self.0.contains_key(place) || self.0.keys().any(|other| other.starts_with(&format!("{place}/")))
     }
@@ -96,12 +98,12 @@ impl House {
     }
 }
 
-/// The folder of a file that names the modules of its folder.
+/// Returns the folder of a mod.rs or lib.rs, or `None` for other files.
 fn facade_folder(file: &str) -> Option<&str> {
     file.strip_suffix("mod.rs").or(file.strip_suffix("lib.rs"))
 }
 
-/// Whether a file holds tests only.
+/// Tells whether a file holds only tests.
 fn is_test(file: &str) -> bool {
     file == "tests.rs" || file.ends_with("/tests.rs")
 }

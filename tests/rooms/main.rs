@@ -1,5 +1,5 @@
-//! The rooms of `src` and the directions between them: reads what every file imports and fails with the arrow that breaks a rule.
-//! `rules.rs` has the rules.
+//! The rooms of `src` and the directions between them: a test reads the imports of every file and fails with the arrow that breaks
+//! a rule. `rules.rs` holds the rules.
 
 mod house;
 mod rules;
@@ -11,12 +11,12 @@ use std::path::Path;
 
 use house::House;
 
-/// Returns the sentences about what is broken among `files` (names relative to `src`, and texts).
+/// Returns a sentence for every rule that `files` break. A file is a name relative to `src`, and a text.
 fn broken<'a>(files: impl IntoIterator<Item = (&'a str, &'a str)>) -> Vec<String> {
     rules::broken(&House::new(files).arrows())
 }
 
-/// The Rust files of `src`.
+/// Returns the Rust files of `src`: names and texts.
 fn real_files() -> BTreeMap<String, String> {
     let mut files = BTreeMap::new();
     collect(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), "", &mut files);
@@ -57,7 +57,7 @@ fn one_wrong_use_in_the_source_is_found() {
     assert!(after.iter().any(|sentence| sentence.starts_with(&wrong)), "{}", after.join("\n"));
 }
 
-/// A crate in which everything that is allowed happens.
+/// A crate that uses everything that is allowed.
 const SOUND: [(&str, &str); 9] = [
     ("lib.rs", "pub mod input; pub mod job; mod error; pub use error::Error;"),
     ("error.rs", "pub enum Error {}"),
@@ -76,7 +76,7 @@ fn a_sound_crate_passes() {
 }
 
 #[test]
-fn circles_are_found_with_each_arrow() {
+fn a_circle_is_reported_with_all_its_arrows() {
     let files =
         [("a.rs", "\nuse crate::b::B;"), ("b.rs", "fn f() { crate::c::g() }"), ("c.rs", "use crate::{a::A as Z};")];
     let circle = "a circle in src/: a.rs -> b.rs -> c.rs -> a.rs\n    src/a.rs:2 imports crate::b::B from src/b.rs\n    \
@@ -85,7 +85,7 @@ fn circles_are_found_with_each_arrow() {
 }
 
 #[test]
-fn circles_between_rooms_are_found_though_no_file_is_in_one() {
+fn circles_between_rooms_are_found_even_if_no_file_is_in_one() {
     let files = [("a/x.rs", "use crate::b::x::X;"), ("b/y.rs", "use crate::a::y::Y;"), ("a/y.rs", ""), ("b/x.rs", "")];
     assert!(broken(files)[0].starts_with("a circle in src/: a -> b -> a"));
     let sub = files.map(|(file, text)| (format!("r/{file}"), text.replace("crate", "crate::r")));
@@ -117,7 +117,7 @@ fn a_file_that_imports_from_its_own_mod_file_is_in_a_circle_with_it() {
 }
 
 #[test]
-fn a_mod_file_passes_on_only_what_is_in_its_own_folder() {
+fn a_mod_file_may_re_export_only_from_its_own_folder() {
     let files = [("input/mod.rs", "pub use crate::job::plan::Plan;"), ("job/plan.rs", "")];
     assert_eq!(broken(files).len(), 1);
 }

@@ -1,17 +1,17 @@
-//! The rules: who may import whom. A broken rule is a sentence that names the arrow.
+//! The rules: which room may import which. A broken rule gives a sentence that names the arrow.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use crate::house::Arrow;
 
-/// No file in `rooms` imports anything from `never`. A room is a folder; a file at its own place counts as one.
+/// No file in `rooms` imports anything from `never`. A room is a folder, or a file that is named without its ending.
 struct Rule {
     rooms: &'static [&'static str],
     never: &'static [&'static str],
     why: &'static str,
 }
 
-/// The steps of a job: each imports only from those before it.
+/// The rooms of a job's steps, in order. Each imports only from those before it.
 const STEPS: [&str; 6] = ["job/plan", "job/partition", "job/mesh", "job/tiles", "job/levels", "job/publish"];
 
 const RULES: [Rule; 7] = [
@@ -21,16 +21,20 @@ const RULES: [Rule; 7] = [
         why: "a library room knows no job",
     },
     Rule { rooms: &["verify"], never: &["config", "job", "cli"], why: "the proof shares nothing with the job" },
-    Rule { rooms: &["job"], never: &["config", "verify", "cli"], why: "a job takes options from anywhere" },
+    Rule {
+        rooms: &["job"],
+        never: &["config", "verify", "cli"],
+        why: "a job does not know where its options come from",
+    },
     Rule {
         rooms: &["job/durable", "job/progress"],
         never: &["job/records", "job/plan", "job/partition", "job/mesh", "job/tiles", "job/levels", "job/publish"],
         why: "durable and progress know no step",
     },
     Rule {
-        rooms: &["job/durable", "job/progress", "job/records", "job/options"],
+        rooms: &["job/durable", "job/progress", "job/records", "job/options", "job/index"],
         never: &["job/run", "job/preflight", "job/report", "job/mod"],
-        why: "what all steps share knows none of their users",
+        why: "what all steps share does not know the rooms that use it",
     },
     Rule {
         rooms: &STEPS,
@@ -50,7 +54,7 @@ pub(crate) fn broken(arrows: &[Arrow]) -> Vec<String> {
     directions.chain(circles(arrows)).collect()
 }
 
-/// The arrow as a line that leads to it.
+/// Returns a line that describes the arrow and leads to it.
 fn text(arrow: &Arrow) -> String {
     format!("src/{}:{} imports {} from src/{}", arrow.from, arrow.line, arrow.path, arrow.to)
 }
@@ -77,8 +81,8 @@ fn is_in(file: &str, room: &str) -> bool {
     file.strip_prefix(room).is_some_and(|rest| rest == ".rs" || rest.starts_with('/'))
 }
 
-/// Finds circles in every folder between its files and its sub-folders, each of which counts as one with all that is in it.
-/// So files are never in a circle either, in one room or in several.
+/// Finds circles in every folder, between its files and its sub-folders. A sub-folder counts as one, with everything in it. Where
+/// there is none, no files are in a circle either, in one room or in several.
 fn circles(arrows: &[Arrow]) -> Vec<String> {
     let arrows: Vec<&Arrow> = arrows.iter().filter(|arrow| !arrow.passes_on).collect();
     let folders = |file: &str| -> Vec<String> { file.match_indices('/').map(|(at, _)| file[..=at].into()).collect() };
@@ -86,7 +90,7 @@ fn circles(arrows: &[Arrow]) -> Vec<String> {
     all.iter().flat_map(|folder| circles_in(folder, &arrows)).collect()
 }
 
-/// The shortest circles of a folder. One that shares an arrow with a shorter one waits until that is gone.
+/// Returns the shortest circles of a folder. A circle that shares an arrow with a shorter one is reported when that one is gone.
 fn circles_in(folder: &str, arrows: &[&Arrow]) -> Vec<String> {
     let mut graph = Graph::new();
     for arrow in arrows {
@@ -110,7 +114,7 @@ fn circles_in(folder: &str, arrows: &[&Arrow]) -> Vec<String> {
     texts
 }
 
-/// The file or sub-folder of `folder` that `file` is in.
+/// Returns the name of the file or sub-folder of `folder` that `file` is in.
 fn entry<'a>(folder: &str, file: &'a str) -> Option<&'a str> {
     let rest = file.strip_prefix(folder)?;
     Some(rest.split_once('/').map_or(rest, |(sub, _)| sub))
@@ -118,7 +122,7 @@ fn entry<'a>(folder: &str, file: &'a str) -> Option<&'a str> {
 
 type Graph<'a> = BTreeMap<&'a str, BTreeMap<&'a str, &'a Arrow>>;
 
-/// The shortest way along arrows, with both ends.
+/// Returns the shortest way along arrows, with both ends.
 fn way<'a>(graph: &Graph<'a>, from: &'a str, to: &'a str) -> Option<Vec<&'a str>> {
     let (mut ways, mut seen) = (VecDeque::from([vec![from]]), BTreeSet::from([from]));
     while let Some(way) = ways.pop_front() {

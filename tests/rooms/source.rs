@@ -1,11 +1,11 @@
-//! Reads the paths that a Rust source file names, without a parser: from its tokens.
+//! Reads the paths in a Rust source file from its tokens, without a parser.
 
-/// A path of names, such as `crate::input::Point`, in a `use` or anywhere else in the code.
+/// A path such as `crate::input::Point`, in a `use` or anywhere else in the code.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct NamedPath {
     pub(crate) segments: Vec<String>,
     pub(crate) line: usize,
-    /// The name that a `use` gives to the item.
+    /// The name that a `use` gives the item.
     pub(crate) binds: Option<String>,
     /// Whether it is a `pub use`, of any visibility.
     pub(crate) reexport: bool,
@@ -16,7 +16,7 @@ struct Token<'a> {
     line: usize,
 }
 
-/// Returns all paths of a file except those in items that are `#[cfg(test)]`.
+/// Returns all paths of a file, except those in `#[cfg(test)]` items.
 pub(crate) fn paths(source: &str) -> Vec<NamedPath> {
     let tokens = without_tests(tokens(source));
     let text = |at: usize| tokens.get(at).map_or("", |token| token.text);
@@ -39,7 +39,7 @@ pub(crate) fn paths(source: &str) -> Vec<NamedPath> {
     paths
 }
 
-/// Adds the paths of one tree of a `use`; `at` moves to the token behind it.
+/// Adds the paths of one tree of a `use`, and moves `at` to the token behind the tree.
 fn use_tree(tokens: &[Token], at: &mut usize, prefix: &[String], reexport: bool, paths: &mut Vec<NamedPath>) {
     let (mut segments, mut name, line) = (prefix.to_vec(), None, tokens[*at].line);
     while let Some(token) = tokens.get(*at) {
@@ -69,7 +69,7 @@ fn use_tree(tokens: &[Token], at: &mut usize, prefix: &[String], reexport: bool,
     }
 }
 
-/// Leaves out each `#[cfg(test)]` with the item that follows it.
+/// Removes each `#[cfg(test)]` and the item that follows it.
 fn without_tests(tokens: Vec<Token>) -> Vec<Token> {
     const TEST: [&str; 7] = ["#", "[", "cfg", "(", "test", ")", "]"];
     let (mut kept, mut at) = (Vec::new(), 0);
@@ -85,7 +85,7 @@ fn without_tests(tokens: Vec<Token>) -> Vec<Token> {
     kept.into_iter().filter_map(|at| tokens[at].take()).collect()
 }
 
-/// The number of tokens of an item: up to its `;`, or to the `}` that closes its body.
+/// Returns the number of tokens of an item: up to its `;`, or to the `}` that ends its body.
 fn item_length(tokens: &[Token]) -> usize {
     let (mut depth, mut is_use) = (0, false);
     for (at, token) in tokens.iter().enumerate() {
@@ -102,7 +102,7 @@ fn item_length(tokens: &[Token]) -> usize {
     tokens.len()
 }
 
-/// Cuts a file into tokens and drops blanks, comments and literals of text.
+/// Cuts a file into tokens, without white space, comments, and string and character literals.
 fn tokens(source: &str) -> Vec<Token<'_>> {
     let (mut tokens, mut rest, mut line) = (Vec::new(), source, 1);
     while !rest.is_empty() {
@@ -117,7 +117,7 @@ fn tokens(source: &str) -> Vec<Token<'_>> {
     tokens
 }
 
-/// The length of the token at the beginning of `rest`, which is not empty, and whether it is code.
+/// Returns the length of the token at the start of `rest`, and whether it is code. `rest` is not empty.
 fn next_token(rest: &str) -> (usize, bool) {
     let until = |end: &str, from: usize| rest[from..].find(end).map_or(rest.len(), |found| from + found + end.len());
     let first = rest.chars().next().map_or(1, char::len_utf8);
@@ -142,7 +142,7 @@ fn next_token(rest: &str) -> (usize, bool) {
     }
 }
 
-/// The length of the literal that begins with a quotation mark.
+/// Returns the length of the literal at the start of `rest`, which begins with `quote`.
 fn quoted_length(rest: &str, quote: u8) -> usize {
     let bytes = rest.as_bytes();
     let mut at = 1;
@@ -152,7 +152,7 @@ fn quoted_length(rest: &str, quote: u8) -> usize {
     (at + 1).min(rest.len())
 }
 
-/// Whether an apostrophe begins a character and not a lifetime.
+/// Tells whether the apostrophe at the start of `rest` begins a character literal and not a lifetime.
 fn is_char_literal(rest: &str) -> bool {
     let mut characters = rest.chars().skip(1);
     characters.next() == Some('\\') || characters.next() == Some('\'')

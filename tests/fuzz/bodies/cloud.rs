@@ -1,4 +1,4 @@
-//! A point cloud of any bytes: opened, planned for, decoded.
+//! A point cloud of any bytes: opened, decoded, and put through a whole job.
 
 use std::path::Path;
 use std::sync::LazyLock;
@@ -6,18 +6,28 @@ use std::sync::LazyLock;
 use gdt_batch::geometry::lattice::{AxisMap, REACH};
 use gdt_batch::input::{Point, PointCounts, PointRules, Source, TextOptions, open};
 use gdt_batch::job::options::JobOptions;
-use gdt_batch::job::plan::lattice_choice::LatticeCoarsening;
-use gdt_batch::job::plan::scan;
 use gdt_batch::{Error, Result};
 
-use super::with_file;
+use super::{job, with_file};
 
-/// More points than this are not waited for: a few bytes may promise very many.
-const ENOUGH: u64 = 200_000;
+/// Decoding stops at this many points, since a few bytes may promise very many.
+const MOST_DECODED: u64 = 200_000;
+
+/// A job on more points is not run, since it takes too long.
+const MOST_IN_A_JOB: u64 = 20_000;
+
+/// Lines of `[output]`, to try everything that is written.
+const OUTPUTS: [&str; 5] = [
+    "compression = \"meshopt\"\nmax_edge = \"auto\"",
+    "compression = \"quantized\"\nnormals = false",
+    "compression = \"none\"\ncolor = \"class\"",
+    "format = \"glb\"\ncolor = \"none\"\nlevels = false",
+    "",
+];
 
 /// The bytes of a LAS or LAZ file.
 pub(crate) fn las(bytes: &[u8]) {
-    with_file(".las", bytes, |path| read(path, &TextOptions::default()));
+    with_file(".las", bytes, |path| read(path, &TextOptions::default(), bytes.len()));
 }
 
 /// The first byte says which options are set, the others are the text.
@@ -31,35 +41,29 @@ pub(crate) fn text(bytes: &[u8]) {
         columns: bit(4).then(columns),
         comment: bit(5).then(|| "%".to_owned()),
     };
-    with_file(".csv", text, |path| read(path, &options));
+    with_file(".csv", text, |path| read(path, &options, text.len()));
 }
 
-fn read(path: &Path, options: &TextOptions) {
-    let Ok(source) = open(path, options) else { return };
-    plan(path, options);
-    let Some(rules) = rules(&source) else { return };
-    let mut seen = 0;
-    for chunk in 0..source.chunks() {
-        match decode(&source, chunk, &rules, &mut seen) {
-            Ok(tally) => check(&tally),
-            Err(Error::Memory(_)) => return,
-            Err(error) => panic!("{error}"),
-        }
+/// `choice` picks the output options.
+fn read(path: &Path, text: &TextOptions, choice: usize) {
+    let Ok(source) = open(path, text) else { return };
+    let options = options(path, text, choice);
+    let has_job = job::preflight(&options);
+    let points = rules(&source).map_or(Some(0), |rules| decode_all(&source, &rules));
+    if has_job && points.is_some_and(|points| points <= MOST_IN_A_JOB) {
+        job::run_and_verify(options);
     }
 }
 
-/// The first step of a job on the file: whatever its header says, a plan or a sentence.
-fn plan(path: &Path, options: &TextOptions) {
-    static CONFIG: LazyLock<JobOptions> = LazyLock::new(|| {
-        let text = b"[input]\nfiles = [\"a\"]\n[output]\ndirectory = \"out\"\n[limits]\nthreads = 1\n";
-        with_file(".toml", text, |path| gdt_batch::config::load(path).expect("the least configuration"))
+fn options(path: &Path, text: &TextOptions, choice: usize) -> JobOptions {
+    static OPTIONS: LazyLock<[JobOptions; OUTPUTS.len()]> = LazyLock::new(|| {
+        OUTPUTS.map(|lines| job::options(&job::OPTIONS.replace("[output]", &format!("[output]\n{lines}"))))
     });
-    let mut config = CONFIG.clone();
-    config.input.files = vec![path.to_str().expect("a plain path").to_owned()];
-    config.input.csv = options.clone();
-    if let Err(error) = scan::make_plan(&config, LatticeCoarsening::default()) {
-        assert!(matches!(error.exit_code(), 2 | 3) && error.to_string().len() < 4000, "{error}");
-    }
+    let mut options = OPTIONS[choice % OUTPUTS.len()].clone();
+    options.input.files = vec![path.to_str().expect("a plain path").to_owned()];
+    options.input.csv = text.clone();
+    options.input.max_malformed_fraction.0 = [0.0, 1.0][choice % 2];
+    options
 }
 
 /// A lattice that is the file's own steps.
@@ -77,7 +81,20 @@ fn rules(source: &Source) -> Option<PointRules> {
     })
 }
 
-fn decode(source: &Source, chunk: usize, rules: &PointRules, seen: &mut u64) -> Result<PointCounts> {
+/// Returns the number of points, or `None` if there are more than [`MOST_DECODED`].
+fn decode_all(source: &Source, rules: &PointRules) -> Option<u64> {
+    let mut decoded = 0;
+    for chunk in 0..source.chunks() {
+        match decode(source, chunk, rules, &mut decoded) {
+            Ok(counts) => check(&counts),
+            Err(Error::Memory(_)) => return None,
+            Err(error) => panic!("{error}"),
+        }
+    }
+    Some(decoded)
+}
+
+fn decode(source: &Source, chunk: usize, rules: &PointRules, decoded: &mut u64) -> Result<PointCounts> {
     let (mut kept, mut next) = (0, 0);
     let mut sink = |points: &[Point]| {
         for point in points {
@@ -86,15 +103,18 @@ fn decode(source: &Source, chunk: usize, rules: &PointRules, seen: &mut u64) -> 
             next = point.order() + 1;
         }
         kept += points.len() as u64;
-        *seen += points.len() as u64;
-        if *seen > ENOUGH { Err(Error::Memory("enough".into())) } else { Ok(()) }
+        *decoded += points.len() as u64;
+        if *decoded > MOST_DECODED { Err(Error::Memory("enough".into())) } else { Ok(()) }
     };
-    let tally = source.decode(chunk, rules, &mut sink)?;
-    assert_eq!(tally.kept, kept);
-    Ok(tally)
+    let counts = source.decode(chunk, rules, &mut sink)?;
+    assert_eq!(counts.kept, kept);
+    Ok(counts)
 }
 
-fn check(tally: &PointCounts) {
-    assert_eq!(tally.read, tally.withheld + tally.other_class + tally.out_of_bounds + tally.malformed + tally.kept);
-    assert_eq!(tally.malformed > 0, !tally.examples.is_empty());
+fn check(counts: &PointCounts) {
+    assert_eq!(
+        counts.read,
+        counts.withheld + counts.other_class + counts.out_of_bounds + counts.malformed + counts.kept
+    );
+    assert_eq!(counts.malformed > 0, !counts.examples.is_empty());
 }
