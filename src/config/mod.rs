@@ -228,7 +228,9 @@ mod tests {
                    [triangulation]\nmax_points_per_tile = 77\n[gpu]\ntexture = 512\nadapter = \"x\"\n\
                    [output]\ndirectory = \"out\"\nmax_edge = 0.1\nmax_points_per_level_tile = 1234\n\
                    [limits]\nmemory = \"1.4 GiB\"\nthreads = 3\n";
-        for text in [LEAST, odd, &odd.replace("0.003", "10").replace("512", "\"max\"").replace("= 0.1\n", "= \"auto\"\n")] {
+        for text in
+            [LEAST, odd, &odd.replace("0.003", "10").replace("512", "\"max\"").replace("= 0.1\n", "= \"auto\"\n")]
+        {
             let options = parse(text).unwrap();
             let written = serde_json::to_string(&options).unwrap();
             let read: JobOptions = serde_json::from_str(&written).unwrap();

@@ -8,7 +8,6 @@ use bytemuck::Pod;
 use memmap2::{Mmap, MmapOptions};
 use std::fs::File;
 use std::io::{Error, ErrorKind, Result};
-use std::marker::PhantomData;
 use std::ops::Deref;
 
 /// Blocks of fewer bytes than this are read into memory, which takes less time than mapping them.
@@ -16,27 +15,31 @@ const LEAST_MAPPED: usize = 16 << 10;
 
 /// Values that lie in a block of a file, to be read as a slice.
 #[derive(Debug)]
-pub struct MappedSlice<T> {
-    bytes: Bytes,
-    values: PhantomData<T>,
-}
+pub struct MappedSlice<T>(Values<T>);
 
 #[derive(Debug)]
-enum Bytes {
+enum Values<T> {
     Mapped(Mmap),
-    /// Eight-byte words keep the values aligned; the block may end within the last one.
-    Read(Vec<u64>, usize),
+    Read(Vec<T>),
 }
 
 impl<T: Pod> MappedSlice<T> {
-    /// Maps `count` values from byte `at` of `file` on. `at` must be a multiple of the values' alignment.
+    /// Maps `count` values from byte `at` of `file` on. Few values, and values that are not aligned in the file, are read instead.
     ///
     /// # Errors
     /// What the operating system says; `UnexpectedEof` if the file ends before the last value.
     pub fn read(file: &File, at: u64, count: usize) -> Result<MappedSlice<T>> {
         let length = count.checked_mul(size_of::<T>()).ok_or(ErrorKind::UnexpectedEof)?;
-        let bytes = if length < LEAST_MAPPED { read(file, at, length)? } else { map(file, at, length)? };
-        Ok(MappedSlice { bytes, values: PhantomData })
+        if length >= LEAST_MAPPED {
+            if at.is_multiple_of(align_of::<T>() as u64) {
+                return Ok(MappedSlice(Values::Mapped(map(file, at, length)?)));
+            }
+            // A damaged count must not ask for all the memory there is.
+            holds(file, at, length)?;
+        }
+        let mut values = vec![T::zeroed(); count];
+        read_exact_at(file, bytemuck::cast_slice_mut(&mut values), at)?;
+        Ok(MappedSlice(Values::Read(values)))
     }
 }
 
@@ -44,30 +47,27 @@ impl<T: Pod> Deref for MappedSlice<T> {
     type Target = [T];
 
     fn deref(&self) -> &[T] {
-        bytemuck::cast_slice(match &self.bytes {
-            Bytes::Mapped(map) => map,
-            Bytes::Read(words, length) => &bytemuck::cast_slice(words)[..*length],
-        })
+        match &self.0 {
+            Values::Mapped(map) => bytemuck::cast_slice(map),
+            Values::Read(values) => values,
+        }
     }
 }
 
-fn read(file: &File, at: u64, length: usize) -> Result<Bytes> {
-    let mut words = vec![0u64; length.div_ceil(8)];
-    read_exact_at(file, &mut bytemuck::cast_slice_mut(&mut words)[..length], at)?;
-    Ok(Bytes::Read(words, length))
-}
-
-fn map(file: &File, at: u64, length: usize) -> Result<Bytes> {
-    // Reading a mapped page beyond the end of the file would kill the process.
+/// Checks that the file has `length` bytes from byte `at` on.
+fn holds(file: &File, at: u64, length: usize) -> Result<()> {
     let end = at.checked_add(length as u64).ok_or(ErrorKind::UnexpectedEof)?;
-    if file.metadata()?.len() < end {
-        return Err(ErrorKind::UnexpectedEof.into());
-    }
+    if file.metadata()?.len() < end { Err(ErrorKind::UnexpectedEof.into()) } else { Ok(()) }
+}
+
+fn map(file: &File, at: u64, length: usize) -> Result<Mmap> {
+    // Reading a mapped page beyond the end of the file would kill the process.
+    holds(file, at, length)?;
     // SAFETY: The bytes of the map do not change while it exists. This process has written them already, it never writes to the
     // same place twice or shortens the file while it has readers, and its lock keeps other runs of the program out of the folder.
     let map = unsafe { MmapOptions::new().offset(at).len(length).map(file)? };
     load_pages(&map, file, at)?;
-    Ok(Bytes::Mapped(map))
+    Ok(map)
 }
 
 /// Loads all pages of the map. A disk that cannot be read becomes an error here; later it would kill the process.
@@ -77,7 +77,7 @@ fn load_pages(map: &Mmap, file: &File, at: u64) -> Result<()> {
     match map.advise(memmap2::Advice::PopulateRead) {
         Err(e) if e.raw_os_error() == Some(EFAULT) => {
             // A plain read tells the reason.
-            read(file, at, map.len())?;
+            read_exact_at(file, &mut vec![0; map.len()], at)?;
             Err(Error::other("a part of the file cannot be mapped"))
         }
         // Linux before 5.14 does not know the advice: pages come when they are touched.
@@ -109,5 +109,18 @@ mod tests {
             assert_eq!(error.kind(), ErrorKind::UnexpectedEof, "{first}, {count}");
         }
         assert!(MappedSlice::<u32>::read(&file, 0, usize::MAX).is_err());
+    }
+
+    #[test]
+    fn wide_values_need_not_be_aligned_in_the_file() {
+        let mut file = tempfile::tempfile().unwrap();
+        let values: Vec<[i128; 3]> = (0..2_000).map(|value| [value, -value, 1 << 100]).collect();
+        file.write_all(&[0; 8]).unwrap();
+        file.write_all(bytemuck::cast_slice(&values)).unwrap();
+        for (first, count) in [(0, 0), (0, 1), (3, 7), (0, 2_000), (1, 1_999)] {
+            let at = 8 + first as u64 * size_of::<[i128; 3]>() as u64;
+            let slice = MappedSlice::<[i128; 3]>::read(&file, at, count).unwrap();
+            assert_eq!(&slice[..], &values[first..first + count]);
+        }
     }
 }
