@@ -10,7 +10,7 @@ use gdt_batch::job::options::RunOptions;
 use gdt_batch::job::preflight::check;
 use gdt_batch::job::progress::stage::ProgressOutput;
 use gdt_batch::job::report::skipped::skipped_summary;
-use gdt_batch::output::layout::OutputLayout;
+use gdt_batch::output::file_names::OutputFiles;
 use gdt_batch::{Error, Result, config, input, interrupt, sample, say, verify};
 use serde::Serialize;
 use std::fmt::Display;
@@ -63,7 +63,7 @@ fn run_job(path: &Path, cli: &Cli) -> Result<ExitCode> {
     let report = job::run(&config, options)?;
     print_result(&report, cli.print)?;
     if let Some(summary) = skipped_summary(report.files, &report.skipped) {
-        say(&format!("{summary}: see {}", OutputLayout::new(&config.output.directory).report().display()));
+        say(&format!("{summary}: see {}", OutputFiles::new(&config.output.directory).report().display()));
     }
     Ok(ExitCode::SUCCESS)
 }

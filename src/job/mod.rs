@@ -7,6 +7,7 @@
 pub mod durable;
 pub mod index;
 pub mod levels;
+pub(crate) mod machine;
 pub mod mesh;
 pub mod options;
 pub mod partition;

@@ -4,9 +4,9 @@
 
 pub mod color;
 pub mod compression;
+pub mod file_names;
 pub mod frame;
 pub mod gltf;
-pub mod layout;
 pub mod lod;
 pub mod normals;
 pub mod options;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use crate::output::layout::OutputLayout;
+use crate::output::file_names::OutputFiles;
 use crate::{Error, Result};
 
 /// The counts of a report; `None` for those that it lacks.
@@ -20,7 +20,7 @@ pub(super) struct ReportedCounts {
 impl ReportedCounts {
     /// Reads the report in the output `directory` of a job; there need not be one.
     pub(super) fn read(directory: &Path) -> Result<ReportedCounts> {
-        let path = OutputLayout::new(directory).report();
+        let path = OutputFiles::new(directory).report();
         if !path.exists() {
             return Ok(ReportedCounts::default());
         }

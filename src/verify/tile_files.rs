@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
+use crate::output::file_names::OutputFiles;
 use crate::output::frame::Extras;
 use crate::output::gltf::read::{held_bytes, read_extras};
-use crate::output::layout::OutputLayout;
 use crate::{Error, Result};
 
 /// Checking a tile takes at most this many times the memory of its meshes.
@@ -31,7 +31,7 @@ impl TileFiles {
     /// # Errors
     /// [`Error::Config`] if there are no tiles, [`Error::Io`] or [`Error::Input`] if no tile can be read.
     pub(super) fn find(directory: &Path) -> Result<TileFiles> {
-        let layout = OutputLayout::new(directory);
+        let layout = OutputFiles::new(directory);
         let folder = folder_of_tiles(&layout)?;
         let mut paths = glb_files(&folder)?;
         let terrain = paths.len();
@@ -73,7 +73,7 @@ impl TileFiles {
 }
 
 /// Returns the folder of the tiles.
-fn folder_of_tiles(layout: &OutputLayout) -> Result<PathBuf> {
+fn folder_of_tiles(layout: &OutputFiles) -> Result<PathBuf> {
     let (directory, folder) = (layout.directory(), layout.tiles());
     match directory.metadata() {
         Err(e) if e.kind() == ErrorKind::NotFound => Err(no_output(directory, "is not there")),

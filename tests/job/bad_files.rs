@@ -10,7 +10,7 @@ use gdt_batch::job::durable::directory::JobDirectory;
 use gdt_batch::job::partition::read::read_points;
 use gdt_batch::job::plan::job_plan::Plan;
 use gdt_batch::job::plan::lattice_choice::LatticeCoarsening;
-use gdt_batch::job::plan::scan::make_plan;
+use gdt_batch::job::plan::make_plan::make_plan;
 use gdt_batch::job::progress::stage::ProgressOutput;
 use serde_json::Value;
 

@@ -13,7 +13,7 @@ use gdt_batch::job::partition::read::read_points;
 use gdt_batch::job::partition::result::Partition;
 use gdt_batch::job::plan::job_plan::Plan;
 use gdt_batch::job::plan::lattice_choice::LatticeCoarsening;
-use gdt_batch::job::plan::scan::make_plan;
+use gdt_batch::job::plan::make_plan::make_plan;
 use gdt_batch::job::progress::stage::ProgressOutput;
 use gdt_batch::job::records::{Leaf, Seam, Store};
 use gdt_batch::triangulation::options::{Backend, TriangulationOptions};

@@ -2,7 +2,7 @@
 
 use crate::job::durable::atomic_file::{partial_path, remove_file};
 use crate::job::durable::lock::{Lock, lock_file};
-use crate::output::layout::OutputLayout;
+use crate::output::file_names::OutputFiles;
 use crate::{Error, Result, fault};
 use rayon::prelude::*;
 use serde_json::Value;
@@ -16,19 +16,19 @@ pub const STORE_FILES: usize = 8;
 /// The files of one job: its results, and what it keeps for itself in `job`.
 #[derive(Clone, Debug)]
 pub struct JobDirectory {
-    output: OutputLayout,
+    output: OutputFiles,
     job: PathBuf,
 }
 
 impl JobDirectory {
     /// Returns the directory of the job that writes to `output`.
     pub fn new(output: &Path) -> JobDirectory {
-        let output = OutputLayout::new(output);
+        let output = OutputFiles::new(output);
         JobDirectory { job: output.job(), output }
     }
 
     /// Returns the paths of the results.
-    pub fn output(&self) -> &OutputLayout {
+    pub fn output(&self) -> &OutputFiles {
         &self.output
     }
 

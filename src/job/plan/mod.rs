@@ -8,4 +8,4 @@ pub mod fingerprint;
 pub mod inputs;
 pub mod job_plan;
 pub mod lattice_choice;
-pub mod scan;
+pub mod make_plan;

@@ -2,13 +2,13 @@
 
 use crate::input::Source;
 use crate::job::durable::directory::JobDirectory;
+use crate::job::machine;
 use crate::job::options::JobOptions;
 use crate::job::plan::budget::workers;
 use crate::job::plan::job_plan::{Plan, SkippedInput};
 use crate::job::plan::lattice_choice::LatticeCoarsening;
-use crate::job::plan::scan::make_plan;
+use crate::job::plan::make_plan::make_plan;
 use crate::job::preflight::estimate::{self, DiskEstimate};
-use crate::job::progress::machine;
 use crate::job::progress::text::{grouped, mebibytes};
 use crate::job::publish::limits::MAX_TRIANGLES_IN_ONE_FILE;
 use crate::job::report::skipped::write_skipped;

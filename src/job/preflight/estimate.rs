@@ -2,13 +2,13 @@
 
 use crate::input::Point;
 use crate::job::levels::hierarchy::{BYTES_PER_LEVEL_SITE, LevelSizes};
+use crate::job::machine;
 use crate::job::options::JobOptions;
 use crate::job::partition::tree_builder::buffer_bytes;
 use crate::job::plan::budget::{BYTES_PER_LEAF_SITE, read_buffer_memory};
 use crate::job::plan::job_plan::Plan;
-use crate::job::progress::machine;
 use crate::output::Compression;
-use crate::output::layout::OutputLayout;
+use crate::output::file_names::OutputFiles;
 use crate::output::preview::canvas::{LONGER_SIDE, PreviewPixel};
 
 /// Bytes that the store takes for a site: its position, colour, class and two triangles.
@@ -104,7 +104,7 @@ fn level_memory(options: &JobOptions, points: u64, threads: usize) -> u64 {
 
 /// Returns the bytes of the files that an earlier job left and that this one replaces.
 pub(crate) fn replaced_bytes(plan: &Plan) -> u64 {
-    let output = OutputLayout::new(&plan.options.output.directory);
+    let output = OutputFiles::new(&plan.options.output.directory);
     let mut folders = vec![output.directory().to_path_buf(), output.job()];
     folders.extend(output.glb_folders());
     let entries = folders.iter().filter_map(|folder| std::fs::read_dir(folder).ok());

@@ -1,8 +1,7 @@
-//! How far a job is, how long it will take, and what the machine has left. Nothing here knows what a step does.
+//! How far a job is, and how long it will take. Nothing here knows what a step does.
 
 pub(crate) mod activity;
 pub mod clock;
-pub mod machine;
 pub mod stage;
 pub mod stats;
 pub mod text;

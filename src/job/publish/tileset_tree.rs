@@ -5,8 +5,8 @@ use crate::job::index::TileIndex;
 use crate::job::levels::hierarchy::{ChildTile, Hierarchy};
 use crate::job::partition::tree::{Cell, Tree};
 use crate::job::records::{LevelSummary, Store, TileSummary};
+use crate::output::file_names::{level_uri, tile_uri};
 use crate::output::frame::Frame;
-use crate::output::layout::{level_uri, tile_uri};
 use crate::output::tiles3d::tileset::{TilesetNode, tileset_json};
 use crate::{Error, Result};
 

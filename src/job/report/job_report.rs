@@ -3,11 +3,11 @@
 use crate::Warnings;
 use crate::geometry::lattice::Lattice;
 use crate::input::PointCounts;
-use crate::job::levels::level::LevelStats;
+use crate::job::levels::make_level::LevelStats;
+use crate::job::machine;
 use crate::job::mesh::leaf::LeafStats;
 use crate::job::plan::job_plan::{Plan, SkippedInput};
 use crate::job::progress::clock::JobClock;
-use crate::job::progress::machine;
 use crate::job::progress::stats::StageStats;
 use crate::job::progress::text::grouped;
 use crate::job::tiles::write_tile::TileStats;

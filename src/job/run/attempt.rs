@@ -9,7 +9,7 @@ use crate::job::plan::budget::workers;
 use crate::job::plan::fingerprint::{Fingerprint, JobHeader};
 use crate::job::plan::job_plan::Plan;
 use crate::job::plan::lattice_choice::LatticeCoarsening;
-use crate::job::plan::scan::make_plan;
+use crate::job::plan::make_plan::make_plan;
 use crate::job::preflight::check::Preflight;
 use crate::job::progress::clock::JobClock;
 use crate::job::progress::stage::JobProgress;

@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::job::levels::hierarchy::{Hierarchy, LevelSizes};
-use crate::job::levels::level::{LevelStats, make_level};
+use crate::job::levels::make_level::{LevelStats, make_level};
 use crate::job::partition::result::Partition;
 use crate::job::plan::job_plan::Plan;
 use crate::job::records::JobStep;

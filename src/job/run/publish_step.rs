@@ -2,7 +2,7 @@
 
 use crate::geometry::Bounds;
 use crate::job::durable::atomic_file::write_pending_json;
-use crate::job::levels::level::LevelStats;
+use crate::job::levels::make_level::LevelStats;
 use crate::job::mesh::leaf::LeafStats;
 use crate::job::partition::result::Partition;
 use crate::job::plan::job_plan::Plan;

@@ -4,7 +4,7 @@ use crate::Result;
 use crate::job::partition::read::read_points;
 use crate::job::partition::result::Partition;
 use crate::job::plan::job_plan::{Plan, SkippedInput};
-use crate::job::plan::scan::replan_without;
+use crate::job::plan::make_plan::replan_without;
 use crate::job::progress::stage::JobProgress;
 use crate::job::records::{JobStep, StepOutput};
 use crate::job::run::context::RunContext;

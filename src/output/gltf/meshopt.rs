@@ -6,9 +6,9 @@ use gltf::json::{Value, buffer, extensions};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, json};
 
+use crate::output::gltf::check_json::Decoded;
 use crate::output::gltf::encoding::{from_exponential, from_octahedral};
 use crate::output::gltf::schema::MESHOPT;
-use crate::output::gltf::strict::Decoded;
 
 /// Bytes of a tile in memory for every byte of its file, at most: the vertex codec unpacks one byte to up to 64, and 2-byte positions
 /// become 4-byte ones.

@@ -1,5 +1,6 @@
 //! glTF: writes tiles as GLB files, packed or plain, and reads them back.
 
+pub(crate) mod check_json;
 pub(crate) mod container;
 pub(crate) mod document;
 pub mod encoding;
@@ -10,5 +11,4 @@ pub(crate) mod parts;
 pub mod read;
 pub(crate) mod schema;
 pub(crate) mod stored_view;
-pub(crate) mod strict;
 pub(crate) mod vertex_order;

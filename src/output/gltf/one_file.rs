@@ -11,11 +11,11 @@ use gltf::json::scene::Scene;
 use gltf::json::validation::{Checked::Valid, USize64};
 use gltf::json::{Index, Root};
 
+use crate::output::gltf::check_json::{Decoded, RawDocument};
 use crate::output::gltf::container::{GlbFile, write_head};
 use crate::output::gltf::document::{asset, buffer};
 use crate::output::gltf::schema::{QUANTIZATION, to_text};
 use crate::output::gltf::stored_view::StoredView;
-use crate::output::gltf::strict::{Decoded, RawDocument};
 use crate::{Error, Result, interrupt};
 
 /// Writes to `out` one GLB file with all tiles (GLB files of one job, at least one) as nodes of one scene, in this order.

@@ -13,10 +13,10 @@ use gltf::json::scene::{Node, Scene};
 use gltf::json::validation::Checked::Valid;
 
 use crate::output::frame::Extras;
+use crate::output::gltf::check_json::{Decoded, RawDocument};
 use crate::output::gltf::container::GlbFile;
 use crate::output::gltf::meshopt::MOST_EXPANSION;
 use crate::output::gltf::stored_view::StoredView;
-use crate::output::gltf::strict::{Decoded, RawDocument};
 use crate::{Error, Result};
 
 /// A GLB file of this program, as it is on the disk.

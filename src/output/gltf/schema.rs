@@ -1,5 +1,5 @@
 //! The JSON chunk of a GLB. The types of `gltf-json` are its one description: for writing here, for reading in
-//! [`crate::output::gltf::strict`].
+//! [`crate::output::gltf::check_json`].
 
 use std::io;
 

@@ -4,8 +4,8 @@ use std::borrow::Cow;
 
 use gltf::json::buffer::View;
 
+use crate::output::gltf::check_json::Decoded;
 use crate::output::gltf::meshopt::PackedView;
-use crate::output::gltf::strict::Decoded;
 
 /// The data of a buffer view in the binary chunk, packed or not.
 #[derive(Clone, Copy, Debug)]

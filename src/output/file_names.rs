@@ -8,14 +8,14 @@ const CUT: &str = "cut";
 
 /// The paths in one output directory. Nothing else in the crate spells these names.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct OutputLayout {
+pub struct OutputFiles {
     directory: PathBuf,
 }
 
-impl OutputLayout {
+impl OutputFiles {
     /// Returns the layout of `directory`, which need not exist.
-    pub fn new(directory: &Path) -> OutputLayout {
-        OutputLayout { directory: directory.to_path_buf() }
+    pub fn new(directory: &Path) -> OutputFiles {
+        OutputFiles { directory: directory.to_path_buf() }
     }
 
     /// Returns the output directory itself.
@@ -109,7 +109,7 @@ mod tests {
 
     #[test]
     fn uris_and_paths_name_the_same_files() {
-        let layout = OutputLayout::new(Path::new("out"));
+        let layout = OutputFiles::new(Path::new("out"));
         assert_eq!(tile_uri(7), "tiles/000007.glb");
         assert_eq!(layout.tile(7), layout.tiles().join("000007.glb"));
         assert_eq!(layout.level(1_234_567), layout.directory().join("levels").join("1234567.glb"));

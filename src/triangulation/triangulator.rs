@@ -1,0 +1,127 @@
+//! The choice of backend for a leaf: the pipeline on the CPU, with a GPU, or the reference.
+
+use crate::geometry::Site;
+use crate::gpu::device::hardware_is_likely;
+use crate::gpu::executor::{Executor, GpuUse};
+use crate::gpu::options::GpuOptions;
+use crate::mesh::half_edge::HalfEdgeMesh;
+use crate::triangulation::options::{Backend, TriangulationOptions};
+use crate::triangulation::reference;
+use crate::voronoi::counts::PipelineCounts;
+use crate::voronoi::diagram_backend::DiagramBackend;
+use crate::voronoi::rejection::Rejection;
+use crate::voronoi::{self, PipelineBuffers};
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::cell::RefCell;
+use std::ops::AddAssign;
+
+/// How many leaves were triangulated in which way.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TriangulationCounts {
+    /// Leaves that the discrete-Voronoi pipeline triangulated.
+    pub pipeline: u64,
+    /// Leaves that only `spade` tried: all with `backend = "reference"`, else those that are too small for the pipeline.
+    pub reference: u64,
+    /// Leaves that the pipeline gave up because too many sites shared a pixel, and that `spade` triangulated.
+    pub crowded: u64,
+    /// Leaves whose mesh failed the pipeline's acceptance check, and that `spade` triangulated.
+    pub not_accepted: u64,
+    /// What the pipeline counted.
+    pub counts: PipelineCounts,
+}
+
+impl AddAssign for TriangulationCounts {
+    fn add_assign(&mut self, other: TriangulationCounts) {
+        self.pipeline += other.pipeline;
+        self.reference += other.reference;
+        self.crowded += other.crowded;
+        self.not_accepted += other.not_accepted;
+        self.counts += other.counts;
+    }
+}
+
+thread_local! {
+    /// The pipeline's buffers. They are kept from leaf to leaf, so that each thread faults in their pages only once.
+    static BUFFERS: RefCell<PipelineBuffers> = RefCell::default();
+}
+
+/// Triangulates leaves: with the pipeline on the worker's own thread, which a GPU may help, or with the reference.
+pub struct Triangulator {
+    pipeline: bool,
+    gpu: Option<Executor>,
+}
+
+/// Bytes that the CPU needs per pixel of a GPU's texture: the label, where the site is listed, and a share of a buffer.
+const BYTES_PER_PIXEL: u64 = 12;
+/// "auto" uses no GPU if the whole job has less memory than this, because drivers would take too large a share of it.
+const MIN_MEMORY: u64 = 1 << 30;
+
+impl Triangulator {
+    /// Returns the triangulator that the configuration asks for, for leaves on `threads` threads at once within `memory` bytes.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if the configuration requires a GPU and none is suitable. If it only allows a GPU, the triangulator works
+    /// without one.
+    pub fn new(config: &TriangulationOptions, gpu: &GpuOptions, memory: u64, threads: usize) -> Result<Triangulator> {
+        let pipeline = config.backend != Backend::Reference;
+        let gpu_use = match config.backend {
+            Backend::Gpu => GpuUse::Required,
+            Backend::Auto if memory >= MIN_MEMORY && hardware_is_likely() => GpuUse::Optional,
+            _ => return Ok(Triangulator { pipeline, gpu: None }),
+        };
+        match Executor::start(gpu, gpu_use, memory / 4 / threads as u64 / BYTES_PER_PIXEL) {
+            Ok(gpu) => Ok(Triangulator { pipeline, gpu: Some(gpu) }),
+            Err(_) if gpu_use == GpuUse::Optional => Ok(Triangulator { pipeline, gpu: None }),
+            Err(why) => Err(Error::Config(format!(
+                "[triangulation] backend = \"gpu\": {why}; `gdt-batch gpu` lists the adapters, and backend = \"auto\" needs no GPU"
+            ))),
+        }
+    }
+
+    /// Returns the name of the GPU that helps.
+    pub fn gpu(&self) -> Option<&str> {
+        self.gpu.as_ref().map(|gpu| gpu.adapter.as_str())
+    }
+
+    /// Returns the seconds that every step has taken on the GPU itself; nothing if the GPU has no timestamps.
+    pub fn gpu_steps(&self) -> Vec<(&'static str, f64)> {
+        self.gpu.as_ref().map(Executor::step_seconds).unwrap_or_default()
+    }
+
+    /// Computes the canonical Delaunay triangulation of distinct `sites`.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] if even the reference triangulation fails.
+    pub fn triangulate(&self, sites: &[Site]) -> Result<(HalfEdgeMesh, TriangulationCounts)> {
+        let mut outcome = TriangulationCounts::default();
+        if self.pipeline {
+            let gpu = self.gpu.as_ref().map(|gpu| gpu as &dyn DiagramBackend);
+            match BUFFERS.with_borrow_mut(|buffers| voronoi::triangulate_with(sites, gpu, buffers)) {
+                Ok((mesh, counts)) => return Ok((mesh, TriangulationCounts { pipeline: 1, counts, ..outcome })),
+                Err(Rejection::Crowded) => outcome.crowded = 1,
+                Err(Rejection::NotAccepted(_)) => outcome.not_accepted = 1,
+                Err(Rejection::TooFew | Rejection::TooMany | Rejection::OutOfReach) => outcome.reference = 1,
+            }
+        } else {
+            outcome.reference = 1;
+        }
+        Ok((reference::triangulate(sites)?, outcome))
+    }
+}
+
+/// Computes the canonical Delaunay triangulation of distinct `sites` on this thread alone.
+///
+/// # Errors
+/// As [`Triangulator::triangulate`].
+pub fn canonical(sites: &[Site]) -> Result<HalfEdgeMesh> {
+    match BUFFERS.with_borrow_mut(|buffers| voronoi::triangulate(sites, buffers)) {
+        Ok((mesh, _)) => Ok(mesh),
+        Err(_) => reference::triangulate(sites),
+    }
+}
+
+/// Takes back a mesh that is no longer needed, so that this thread's next leaf uses its memory.
+pub fn recycle(mesh: HalfEdgeMesh) {
+    BUFFERS.with_borrow_mut(|buffers| buffers.recycle(mesh));
+}
