@@ -77,6 +77,7 @@ fn cross_narrow(a: [i32; 3], b: [i32; 3], c: [i32; 3]) -> [i64; 3] {
     [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx]
 }
 
+#[expect(clippy::arithmetic_side_effects, reason = "T is i64 or i128")]
 #[inline(always)]
 fn accumulate<T: Copy + std::ops::AddAssign>(
     positions: &[[i32; 3]],

@@ -73,12 +73,12 @@ fn allowed_malformed(fraction: f64, records: u64) -> u64 {
     (fraction * records as f64) as u64
 }
 
-/// What each input held, in the order of the inputs. Inputs without pieces are not listed.
+/// What each input held, in the order of the inputs. Inputs without chunks are not listed.
 #[derive(Default)]
 struct ByInput(Vec<(usize, PointSummary)>);
 
 impl ByInput {
-    /// Adds what later pieces held.
+    /// Adds what later chunks held.
     fn append(mut self, later: ByInput) -> ByInput {
         let mut later = later.0.into_iter();
         match (self.0.last_mut(), later.next()) {
@@ -90,32 +90,32 @@ impl ByInput {
     }
 }
 
-/// Decodes all pieces of all inputs in parallel and hands the points to the buckets of the grid.
+/// Decodes all chunks of all inputs in parallel and hands the points to the buckets of the grid.
 fn decode_all(plan: &Plan, grid: &Grid, buckets: &Buckets, stage: &Stage) -> Result<ByInput> {
-    let pieces: Vec<(usize, usize)> = plan
+    let chunks: Vec<(usize, usize)> = plan
         .inputs
         .iter()
         .enumerate()
-        .flat_map(|(index, input)| (0..input.source.chunks()).map(move |piece| (index, piece)))
+        .flat_map(|(index, input)| (0..input.source.chunks()).map(move |chunk| (index, chunk)))
         .collect();
     let options = &plan.options.input;
     let allowed = allowed_malformed(options.max_malformed_fraction.0, plan.records);
     let malformed = AtomicU64::new(0);
-    let decode = |&(index, piece): &(usize, usize)| -> Result<ByInput> {
+    let decode = |&(index, chunk): &(usize, usize)| -> Result<ByInput> {
         interrupt::check()?;
         let input = &plan.inputs[index];
         let mut sorter = BucketSorter::new(grid, buckets);
-        let counts = input.source.decode(piece, &input.rules, &mut |points| sorter.add(points))?;
+        let counts = input.source.decode(chunk, &input.rules, &mut |points| sorter.add(points))?;
         stage.advance(counts.read);
         let so_far = malformed.fetch_add(counts.malformed, Ordering::Relaxed) + counts.malformed;
-        // Only a piece with malformed records of its own reports that there are too many: another may be sound.
+        // Only a chunk with malformed records of its own reports that there are too many: another may be sound.
         if options.on_bad_file == OnBadFile::Stop && counts.malformed > 0 && so_far > allowed {
             return Err(stop_at(&input.source, &counts, so_far, plan.records));
         }
         Ok(ByInput(vec![(index, PointSummary { counts, bounds: sorter.bounds() })]))
     };
-    // The reduction keeps the order of the pieces.
-    pieces.par_iter().with_max_len(1).map(decode).try_reduce(ByInput::default, |a, b| Ok(a.append(b)))
+    // The reduction keeps the order of the chunks.
+    chunks.par_iter().with_max_len(1).map(decode).try_reduce(ByInput::default, |a, b| Ok(a.append(b)))
 }
 
 fn stop_at(source: &Source, counts: &PointCounts, malformed: u64, records: u64) -> Error {

@@ -100,25 +100,25 @@ fn header_box(source: &Source, classes: &[bool; 256]) -> Result<Option<SourceBox
 /// The number of raw steps in a step of the measurement: every raw integer then lies within reach of the lattice.
 const MEASURE: i64 = 16;
 
-/// Returns the box of the points of `pieces` that have one of `classes`, to within [`MEASURE`] raw steps; `None` without a point.
-fn measure(source: &Source, classes: &[bool; 256], pieces: Range<usize>) -> Result<Option<SourceBox>> {
+/// Returns the box of the points of `chunks` that have one of `classes`, to within [`MEASURE`] raw steps; `None` without a point.
+fn measure(source: &Source, classes: &[bool; 256], chunks: Range<usize>) -> Result<Option<SourceBox>> {
     let map = |axis: &Axis| AxisMap::new(axis.offset, axis.scale, axis.offset, axis.scale.checked_mul(MEASURE.into())?);
     let [Some(x), Some(y), Some(z)] = source.axes.each_ref().map(map) else {
         return Ok(Some([source.min, source.max]));
     };
     let rules = PointRules { maps: [x, y, z], classes: *classes, bounds: None, first_order: 0, rgb: false };
     let union = |a: Option<Bounds<3>>, b| a.into_iter().chain(b).reduce(Bounds::union);
-    let measure_piece = |piece| {
+    let measure_chunk = |chunk| {
         interrupt::check()?;
         let mut found = None;
-        source.decode(piece, &rules, &mut |points| {
+        source.decode(chunk, &rules, &mut |points| {
             let bounds = Bounds::of_points(points.iter().map(|p| [p.position[0], p.position[1], p.z]));
             found = union(found, bounds);
             Ok(())
         })?;
         Ok(found)
     };
-    let found = pieces.into_par_iter().map(measure_piece).try_reduce(|| None, |a, b| Ok(union(a, b)))?;
+    let found = chunks.into_par_iter().map(measure_chunk).try_reduce(|| None, |a, b| Ok(union(a, b)))?;
     let value = |axis: usize, steps: i32| source.axes[axis].value(steps as i64 * MEASURE);
     let corner = |corner: [i32; 3]| [0, 1, 2].map(|axis| value(axis, corner[axis]));
     Ok(found.map(|bounds| [corner(bounds.min), corner(bounds.max)]))
