@@ -40,7 +40,7 @@ const SHORT_REACH: f64 = 65535.0;
 /// below 2^33 steps, and the translation is exact as f32.
 const SHORT_GRID: f64 = 512.0;
 
-/// The range of a lattice step in metres. Others are not those of a terrain and would leave the range of f32.
+/// The range of a lattice step in metres. Others would leave the range of f32, and no terrain has them.
 const RESOLUTION_BOUNDS: std::ops::Range<f64> = 1e-12..1e12;
 
 /// The numbers that lead from a glTF scene back to the source, as written to `scenes[0].extras`:
@@ -176,7 +176,7 @@ impl Frame {
         Frame { horizontal: AxisScale::packed(xy), vertical: AxisScale::packed(up), ..self }
     }
 
-    /// Returns what is written for readers.
+    /// Returns the numbers that are written for readers.
     pub fn extras(&self) -> &Extras {
         &self.extras
     }

@@ -13,7 +13,7 @@ pub struct OutputOptions {
     /// Where vertex colours come from.
     #[serde(default)]
     pub color: ColorChoice,
-    /// Whether vertices carry normals.
+    /// Whether vertices have normals.
     #[serde(default = "yes")]
     pub normals: bool,
     /// The files for viewers.
@@ -51,7 +51,7 @@ fn yes() -> bool {
     true
 }
 
-/// The files that are written for viewers besides the exact tiles.
+/// The files for viewers. The exact tiles are written in any case.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum OutputFormat {

@@ -1,4 +1,4 @@
-//! One scene of all tiles.
+//! Tests of `terrain.glb`, the scene of all tiles.
 
 use gdt_batch::output::Compression;
 use gdt_batch::output::gltf::one_file::write_terrain;
@@ -28,7 +28,7 @@ fn the_scene_has_the_parts_of_all_tiles() {
 }
 
 #[test]
-fn what_is_packed_is_unpacked_in_the_scene() {
+fn packed_tiles_are_unpacked_in_the_scene() {
     let (frame, directory) = (utm(), tempfile::tempdir().unwrap());
     let tiles = cut_by_place(&terrain(&frame, &cloud(22, 2_000, 20_000)), 2);
     write_tiles_as(Compression::Meshopt, directory.path(), &frame, &tiles);

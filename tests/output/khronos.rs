@@ -1,4 +1,4 @@
-//! The Khronos validator has nothing to say about what is written.
+//! The Khronos validator finds nothing wrong with the files.
 
 use gdt_batch::output::frame::Frame;
 use gdt_batch::output::gltf::one_file::write_terrain;
@@ -8,7 +8,7 @@ use crate::model::{cloud, cut_by_place, grid, lattice, terrain, utm, write_tiles
 use crate::validator::validate;
 
 #[test]
-fn the_khronos_validator_finds_nothing() {
+fn the_khronos_validator_accepts_plain_tiles() {
     let directory = tempfile::tempdir().unwrap();
     let (frame, mesh) = (utm(), terrain(&utm(), &cloud(41, 3_000, 200_000)));
     let tiles = cut_by_place(&mesh, 3);
@@ -27,9 +27,9 @@ fn the_khronos_validator_finds_nothing() {
 }
 
 #[test]
-fn nor_about_what_is_packed() {
+fn the_khronos_validator_accepts_packed_tiles() {
     let directory = tempfile::tempdir().unwrap();
-    // Heights on finer steps than the plane, and a tile of several parts.
+    // Heights have finer steps than the plane, and one tile has several parts.
     let frame = Frame::new(&lattice([4e5, 6e6, 0.0], 0.01, 0.001), 1.0, 1.0, None).unwrap();
     let mesh = terrain(&frame, &cloud(42, 3_000, 20_000));
     let tiles = cut_by_place(&mesh, 3);

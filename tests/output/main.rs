@@ -1,4 +1,4 @@
-//! What is written is what was meant: tiles, their borders, the picture, and that verification sees what is wrong.
+//! Tests of the files that are written (tiles, their borders, the picture), and of the verification that checks them.
 
 #[path = "../common/random.rs"]
 mod random;

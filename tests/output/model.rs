@@ -1,4 +1,4 @@
-//! Small exact triangulations, cut into tiles at will.
+//! Small exact triangulations, and ways to cut them into tiles.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -14,18 +14,18 @@ use spade::{DelaunayTriangulation, Point2, Triangulation};
 
 use crate::random::Random;
 
-/// A lattice from the texts of its numbers.
+/// Returns the lattice with these numbers, read as decimals.
 pub(crate) fn lattice(offset: [f64; 3], resolution: f64, resolution_z: f64) -> Lattice {
     let decimal = |v: f64| shortest_decimal(v).unwrap();
     Lattice { offset: offset.map(decimal), resolution: decimal(resolution), resolution_z: decimal(resolution_z) }
 }
 
-/// The frame of a job in metres at UTM coordinates, steps of a centimetre.
+/// Returns the frame of a job in metres at UTM coordinates, with steps of a centimetre.
 pub(crate) fn utm() -> Frame {
     Frame::new(&lattice([273357.14, 5274357.14, 788.99], 0.01, 0.01), 1.0, 1.0, Some("LOCAL_CS[\"x\"]".into())).unwrap()
 }
 
-/// Random points, distinct in x and y, within `extent` lattice steps of zero.
+/// Returns random points, distinct in x and y, within `extent` lattice steps of zero.
 pub(crate) fn cloud(seed: u64, count: usize, extent: u64) -> Vec<[i32; 3]> {
     let mut random = Random(seed);
     let mut coordinate = |limit: u64| random.below(2 * limit + 1) as i64 as i32 - limit as i32;
@@ -36,7 +36,7 @@ pub(crate) fn cloud(seed: u64, count: usize, extent: u64) -> Vec<[i32; 3]> {
     points
 }
 
-/// A regular grid: every cell a tie.
+/// Returns the points of a regular grid, in which every cell is a tie.
 pub(crate) fn grid(columns: i32, rows: i32, step: i32) -> Vec<[i32; 3]> {
     (0..columns * rows)
         .map(|i| (i % columns, i / columns))
@@ -44,7 +44,7 @@ pub(crate) fn grid(columns: i32, rows: i32, step: i32) -> Vec<[i32; 3]> {
         .collect()
 }
 
-/// The canonical Delaunay triangulation: spade's, then flips until no edge is wrong.
+/// Returns the canonical Delaunay triangulation: that of spade, with edges flipped until none is wrong.
 pub(crate) fn triangulate(points: &[[i32; 3]]) -> Vec<[u32; 3]> {
     let mut delaunay = DelaunayTriangulation::<Point2<f64>>::new();
     for p in points {
@@ -58,7 +58,7 @@ pub(crate) fn triangulate(points: &[[i32; 3]]) -> Vec<[u32; 3]> {
     triangles
 }
 
-/// Flips edges that share no triangle; whether there were any to flip.
+/// Flips wrong edges that share no triangle, and tells whether there were any.
 fn flip_once(points: &[[i32; 3]], triangles: &mut [[u32; 3]]) -> bool {
     let site = |v: u32| [points[v as usize][0], points[v as usize][1]];
     let edges = edges(triangles);
@@ -74,13 +74,13 @@ fn flip_once(points: &[[i32; 3]], triangles: &mut [[u32; 3]]) -> bool {
     any
 }
 
-/// Directed edges with their triangle and its third corner.
+/// Returns the directed edges with their triangle and its third corner.
 pub(crate) fn edges(triangles: &[[u32; 3]]) -> HashMap<(u32, u32), (usize, u32)> {
     let of = |(t, &[a, b, c]): (usize, &[u32; 3])| [((a, b), (t, c)), ((b, c), (t, a)), ((c, a), (t, b))];
     triangles.iter().enumerate().flat_map(of).collect()
 }
 
-/// A mesh with normals and colours.
+/// Returns the triangulation of `points` with normals and colours.
 pub(crate) fn terrain(frame: &Frame, points: &[[i32; 3]]) -> Tile {
     let triangles = triangulate(points);
     assert!(triangles.iter().all(|t| {
@@ -131,7 +131,7 @@ pub(crate) fn cut_by_place(mesh: &Tile, side: usize) -> Vec<Tile> {
 /// Every way to write a tile.
 pub(crate) const COMPRESSIONS: [Compression; 3] = [Compression::None, Compression::Quantized, Compression::Meshopt];
 
-/// The frame that goes with a compression.
+/// Returns the frame that goes with a compression.
 pub(crate) fn framed(frame: &Frame, compression: Compression) -> Frame {
     if compression == Compression::None { frame.clone() } else { frame.clone().packed() }
 }
@@ -151,7 +151,7 @@ pub(crate) fn write_tiles_as(compression: Compression, directory: &Path, frame: 
     }
 }
 
-/// The bytes of the GLB file of `tile`.
+/// Returns the bytes of the GLB file of `tile`.
 pub(crate) fn encode_tile(frame: &Frame, tile: &Tile, compression: Compression) -> gdt_batch::Result<Vec<u8>> {
     let mut glb = GlbEncoder::default();
     glb.encode(frame, tile, compression)?;

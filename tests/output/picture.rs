@@ -1,4 +1,4 @@
-//! The picture covers the terrain, every pixel once.
+//! Tests of the preview.
 
 use gdt_batch::geometry::predicates::orient2d;
 use gdt_batch::output::preview::canvas::{Canvas, LONGER_SIDE, PreviewPixel};
@@ -9,7 +9,7 @@ use crate::model::{cloud, cut, grid, terrain, utm};
 use crate::random::Random;
 
 #[test]
-fn a_rectangle_is_covered_wholly_and_once() {
+fn every_pixel_of_a_rectangle_is_drawn_once() {
     let frame = utm();
     for (columns, rows, step) in [(20, 20, 6_000), (5, 9, 1), (2, 2, 1), (300, 2, 77)] {
         let mesh = terrain(&frame, &grid(columns, rows, step));
@@ -44,7 +44,7 @@ fn the_picture_is_a_png_of_its_size() {
 }
 
 #[test]
-fn a_slope_to_the_light_is_brighter() {
+fn a_slope_towards_the_light_is_brighter() {
     let frame = utm();
     let roof = |x: i32| 300 - (x - 300).abs();
     let points: Vec<[i32; 3]> = (0..=60).flat_map(|x| [0, 300, 600].map(|y| [10 * x, y, roof(10 * x)])).collect();
@@ -66,7 +66,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(4))]
 
     #[test]
-    fn tiles_draw_what_the_whole_draws(seed: u64, extent in 3u64..(1 << 29), tiles in 1usize..6) {
+    fn tiles_draw_the_pixels_of_the_whole(seed: u64, extent in 3u64..(1 << 29), tiles in 1usize..6) {
         let frame = utm();
         let points = cloud(seed, 40, extent);
         let collinear = points.windows(3).all(|w| orient2d([w[0][0], w[0][1]], [w[1][0], w[1][1]], [w[2][0], w[2][1]]) == 0);

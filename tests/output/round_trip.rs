@@ -1,4 +1,4 @@
-//! Tiles read back are the tiles written.
+//! Tests that tiles read back are the tiles written.
 
 use std::collections::HashMap;
 
@@ -32,7 +32,7 @@ fn there_and_back_as(compression: Compression, frame: &Frame, tile: &Tile) -> Ti
     read_bytes(&bytes).unwrap()
 }
 
-/// The lattice integers of all parts, joined.
+/// Returns the lattice integers of all parts, one after the other.
 fn integers(file: &TileFile) -> Vec<[i32; 3]> {
     file.parts.iter().flat_map(|part| integers_of(file, part)).collect()
 }
@@ -46,7 +46,7 @@ fn integers_of(file: &TileFile, part: &TilePart) -> Vec<[i32; 3]> {
     (0..part.positions.len()).map(|v| of(part.world(v)).unwrap()).collect()
 }
 
-/// The triangles of all parts by the lattice integers of their corners, least corner first, sorted.
+/// Returns the triangles of all parts as the lattice integers of their corners, least corner first, sorted.
 fn triangles(file: &TileFile) -> Vec<[[i32; 3]; 3]> {
     let of_part = |part: &TilePart| {
         let points = integers_of(file, part);
@@ -87,7 +87,7 @@ fn packed_tiles_hold_the_same_vertices_and_triangles() {
     }
 }
 
-/// What a viewer makes of packed normals, whatever the steps of x and y beside those of z: it divides them by the node's scale.
+/// A viewer divides packed normals by the node's scale. They come out right for any ratio of the steps.
 #[test]
 fn packed_normals_are_true_on_any_lattice() {
     for (resolution_z, most) in [(0.0001, 1.0f64), (0.01, 1.25), (0.003, 5.0), (1.0, 1.0)] {
@@ -111,7 +111,7 @@ fn packed_normals_are_true_on_any_lattice() {
 }
 
 #[test]
-fn packing_is_worth_it() {
+fn packed_tiles_are_small() {
     let tile = terrain(&utm(), &grid(150, 150, 40));
     let size = |compression| {
         let bytes = encode_tile(&framed(&utm(), compression), &tile, compression).unwrap();
@@ -131,7 +131,7 @@ fn tiles_wider_than_16_bits_are_in_single_precision() {
         assert!(files.iter().all(|file| file.parts.len() == 1));
         files[2].parts[0].positions.as_flattened().iter().all(|v| (0.0..=65535.0).contains(v))
     };
-    // 64 m are the reach: 60 m, 120 m, 1200 m, and 60 m with one point 200 m away.
+    // 16 bits reach 64 m. The tiles are 60 m, 120 m and 1200 m wide, and 60 m with one point 200 m away.
     assert!(is_short(&grid(61, 61, 1_000)));
     assert!(!is_short(&grid(61, 61, 2_000)));
     assert!(!is_short(&grid(61, 61, 20_000)));
@@ -141,7 +141,7 @@ fn tiles_wider_than_16_bits_are_in_single_precision() {
 }
 
 #[test]
-fn packing_is_worth_it_for_wide_tiles_too() {
+fn wide_packed_tiles_are_nearly_as_small() {
     let frame = framed(&Frame::new(&lattice([0.0; 3], 0.001, 0.001), 1.0, 1.0, None).unwrap(), Compression::Meshopt);
     let size = |points: &[[i32; 3]]| {
         let tile = terrain(&frame, points);
@@ -168,7 +168,7 @@ fn a_tile_comes_back_whole() {
 }
 
 #[test]
-fn the_rule_of_the_extras_leads_to_the_source() {
+fn the_extras_lead_back_to_the_source() {
     let (foot, us_foot) = (0.3048, 1200.0 / 3937.0);
     let frame = Frame::new(&lattice([635577.79, 848882.15, 406.14], 0.01, 0.001), foot, us_foot, None).unwrap();
     let tile = terrain(&frame, &cloud(2, 300, 400_000));
@@ -215,7 +215,7 @@ fn wide_tiles_are_cut_into_parts() {
 }
 
 #[test]
-fn a_triangle_too_long_for_gltf_is_refused_with_the_remedy() {
+fn a_triangle_too_long_for_gltf_is_refused_and_the_error_says_what_to_do() {
     let frame = Frame::new(&lattice([0.0; 3], 1e-6, 0.001), 1.0, 1.0, None).unwrap();
     let triangle = |length: i32| Tile {
         positions: vec![[0, 0, 0], [length, 0, 0], [0, 1000, 0]],
@@ -245,7 +245,7 @@ fn a_small_job_gets_finer_steps_and_a_wide_one_does_not() {
 }
 
 #[test]
-fn a_job_at_the_ends_of_the_lattice_comes_back() {
+fn tiles_at_the_ends_of_the_lattice_come_back() {
     let reach = 1 << 29;
     for (resolution, unit) in [(0.001, 1.0), (0.00025, 0.3048), (1.0, 1.0), (7.0, 0.9)] {
         let frame = Frame::new(&lattice([1e5, -2e6, 0.0], resolution, resolution), unit, unit, None).unwrap();
@@ -302,7 +302,7 @@ proptest! {
             let place = random.below(damaged.len() as u64) as usize;
             damaged[place] = random.below(256) as u8;
         }
-        // Whatever comes of it, it comes without a panic, and what is read fits together.
+        // The file may be readable still. Then its parts fit together.
         if let Ok(file) = read_bytes(&damaged) {
             for part in &file.parts {
                 prop_assert!(part.triangles.as_flattened().iter().all(|&v| (v as usize) < part.positions.len()));
@@ -322,7 +322,7 @@ fn hostile_packed_files_take_no_memory() {
         assert_eq!(from.len(), to.len());
         read_bytes(&file).unwrap_err().to_string()
     };
-    // 30 vertices in the extension's words, and the corners of the triangles.
+    // The extension's numbers of 30 vertices, and of the corners of the triangles.
     assert!(said("\"byteStride\":8,\"count\":30", "\"byteStride\":8,\"count\":99").contains("damaged"));
     assert!(said("\"byteStride\":8,\"count\":30", "\"byteStride\":9,\"count\":30").contains("of 9 bytes"));
     let corners = format!("\"byteStride\":2,\"count\":{}", 3 * tile.triangles.len());

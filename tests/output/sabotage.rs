@@ -1,11 +1,11 @@
-//! Verification sees every kind of fault.
+//! Tests that verification finds every kind of fault.
 
 use gdt_batch::output::Tile;
 use gdt_batch::verify::{Verdict, verify};
 
 use crate::model::{COMPRESSIONS, cloud, cut_by_place, edges, grid, terrain, utm, write_tiles, write_tiles_as};
 
-/// What verification says of nine good tiles after `harm`; the same however they are packed.
+/// Returns what verification finds in nine good tiles after `harm`. It is the same for every compression.
 fn failures(harm: impl FnOnce(&mut Vec<Tile>)) -> String {
     let frame = utm();
     let mut tiles = cut_by_place(&terrain(&frame, &cloud(11, 900, 20_000)), 3);
@@ -17,7 +17,7 @@ fn failures(harm: impl FnOnce(&mut Vec<Tile>)) -> String {
         assert_eq!(verdict.holds(), verdict.failures.is_empty());
         verdict
     });
-    // Examples are the first that is found, and packing changes the order.
+    // An example is the first that was found, and packing changes the order.
     let kinds = |verdict: &Verdict| {
         let kind = |failure: &String| failure.split(':').next().unwrap().to_owned();
         verdict.failures.iter().map(kind).collect::<Vec<_>>()
@@ -32,24 +32,25 @@ fn says(failures: &str, expected: &[&str]) {
     assert!(expected.iter().all(|text| failures.contains(text)), "{failures}");
 }
 
-/// A vertex of tile 4 that another tile has too, and the number of the tile.
+/// Returns a vertex of tile 4 that another tile has too.
 fn shared_vertex(tiles: &[Tile]) -> usize {
     let shared = |p: &[i32; 3]| tiles.iter().filter(|tile| tile.positions.contains(p)).count() > 1;
     tiles[4].positions.iter().position(shared).unwrap()
 }
 
+/// Returns a vertex of tile 4 that no other tile has.
 fn inner_vertex(tiles: &[Tile]) -> usize {
     let shared = |p: &[i32; 3]| tiles.iter().filter(|tile| tile.positions.contains(p)).count() > 1;
     tiles[4].positions.iter().position(|p| !shared(p)).unwrap()
 }
 
 #[test]
-fn nothing_is_wrong_without_harm() {
+fn good_tiles_have_no_fault() {
     assert_eq!(failures(|_| {}), "");
 }
 
 #[test]
-fn a_flipped_edge() {
+fn a_flipped_edge_is_found() {
     let flip = |tiles: &mut Vec<Tile>| {
         let tile = &mut tiles[4];
         let edges = edges(&tile.triangles);
@@ -66,7 +67,7 @@ fn a_flipped_edge() {
 }
 
 #[test]
-fn a_flipped_tie() {
+fn a_flipped_tie_is_found() {
     let frame = utm();
     let mut mesh = terrain(&frame, &grid(3, 3, 10));
     let edges = edges(&mesh.triangles);
@@ -83,7 +84,7 @@ fn a_flipped_tie() {
 }
 
 #[test]
-fn a_dropped_triangle() {
+fn a_missing_triangle_is_found() {
     let drop = |tiles: &mut Vec<Tile>| {
         let tile = &mut tiles[4];
         let v = (0..tile.positions.len() as u32)
@@ -96,13 +97,13 @@ fn a_dropped_triangle() {
 }
 
 #[test]
-fn a_dropped_tile() {
+fn a_missing_tile_is_found() {
     says(&failures(|tiles| drop(tiles.remove(4))), &["boundary"]);
     says(&failures(|tiles| drop(tiles.remove(0))), &["boundary is not convex"]);
 }
 
 #[test]
-fn a_triangle_twice() {
+fn a_repeated_triangle_is_found() {
     says(&failures(|tiles| tiles[4].triangles.extend_from_within(..1)), &["used more than once", "Euler"]);
     let elsewhere = |tiles: &mut Vec<Tile>| {
         let copy = Tile { triangles: vec![[0, 1, 2]], ..Tile::default() };
@@ -116,22 +117,22 @@ fn a_triangle_twice() {
             ..copy
         });
     };
-    // Only in another tile: its edges are all in use there, on both sides, so they are left over here.
+    // The copy is in another tile. Its edges are in use on both sides in the first one, so here they are left over.
     says(&failures(elsewhere), &["Euler", "area"]);
 }
 
 #[test]
-fn a_whole_tile_twice() {
+fn a_repeated_tile_is_found() {
     says(&failures(|tiles| tiles.push(tiles[4].clone())), &["used more than once"]);
 }
 
 #[test]
-fn a_turned_triangle() {
+fn a_clockwise_triangle_is_found() {
     says(&failures(|tiles| tiles[4].triangles[0].swap(0, 1)), &["not counterclockwise"]);
 }
 
 #[test]
-fn a_vertex_one_step_off_in_one_tile() {
+fn a_vertex_moved_by_one_step_is_found() {
     let moved = |tiles: &mut Vec<Tile>| {
         let v = shared_vertex(tiles);
         tiles[4].positions[v][0] += 1;
@@ -140,7 +141,7 @@ fn a_vertex_one_step_off_in_one_tile() {
 }
 
 #[test]
-fn another_height_normal_or_colour_in_one_tile() {
+fn a_different_height_normal_or_colour_in_one_tile_is_found() {
     let height = |tiles: &mut Vec<Tile>| {
         let v = shared_vertex(tiles);
         tiles[4].positions[v][2] += 1;
@@ -159,7 +160,7 @@ fn another_height_normal_or_colour_in_one_tile() {
 }
 
 #[test]
-fn a_vertex_without_a_triangle() {
+fn a_vertex_without_a_triangle_is_found() {
     let unused = |tiles: &mut Vec<Tile>| {
         tiles[4].positions.push([7, 7, 7]);
         tiles[4].normals.as_mut().unwrap().push([0.0, 0.0, 1.0]);
@@ -169,8 +170,7 @@ fn a_vertex_without_a_triangle() {
 }
 
 #[test]
-fn a_missing_site() {
-    // Its star is filled again, though not with Delaunay triangles: a fan.
+fn a_missing_site_is_found() {
     let taken_out = |tiles: &mut Vec<Tile>| {
         let v = inner_vertex(tiles) as u32;
         let star: Vec<[u32; 3]> = tiles[4].triangles.iter().copied().filter(|t| t.contains(&v)).collect();
@@ -181,7 +181,7 @@ fn a_missing_site() {
 }
 
 #[test]
-fn another_number_in_the_report() {
+fn wrong_numbers_in_the_report_are_found() {
     let frame = utm();
     let directory = tempfile::tempdir().unwrap();
     let mesh = terrain(&frame, &cloud(12, 50, 20_000));
@@ -198,7 +198,7 @@ fn another_number_in_the_report() {
 }
 
 #[test]
-fn a_damaged_tile_and_one_of_another_job() {
+fn a_damaged_tile_and_a_tile_of_another_job_are_found() {
     let frame = utm();
     let mesh = terrain(&frame, &cloud(13, 200, 20_000));
     let directory = tempfile::tempdir().unwrap();
@@ -217,7 +217,7 @@ fn a_damaged_tile_and_one_of_another_job() {
 }
 
 #[test]
-fn a_directory_without_tiles() {
+fn a_directory_without_tiles_is_refused() {
     let directory = tempfile::tempdir().unwrap();
     let refused = |path: &std::path::Path, words: &str| {
         let error = verify(path, 1 << 28).unwrap_err();

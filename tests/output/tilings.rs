@@ -1,4 +1,4 @@
-//! Verification holds on exact meshes, however they are cut, and its digest knows only the triangles.
+//! Tests that verification accepts exact meshes, however they are cut, and that its digest depends on the triangles alone.
 
 use gdt_batch::output::Compression;
 use gdt_batch::output::frame::Frame;
@@ -16,7 +16,7 @@ fn verdict_of(frame: &Frame, tiles: &[gdt_batch::output::Tile]) -> Verdict {
 }
 
 #[test]
-fn every_tiling_has_the_same_verdict_but_for_the_borders() {
+fn every_tiling_has_the_same_verdict_except_for_the_borders() {
     let frame = utm();
     let mesh = terrain(&frame, &cloud(7, 2_000, 100_000));
     let mut random = Random(1);
@@ -34,7 +34,7 @@ fn every_tiling_has_the_same_verdict_but_for_the_borders() {
 }
 
 #[test]
-fn ties_are_counted_and_hold() {
+fn ties_are_counted_and_accepted() {
     let frame = utm();
     let mesh = terrain(&frame, &grid(30, 20, 100));
     for tiles in [vec![mesh.clone()], cut_by_place(&mesh, 3)] {
@@ -45,7 +45,7 @@ fn ties_are_counted_and_hold() {
 }
 
 #[test]
-fn the_digest_does_not_know_the_lattice() {
+fn the_digest_does_not_depend_on_the_lattice() {
     let points = cloud(8, 400, 10_000);
     let coarse = lattice([273357.145, 5274357.144, 788.993], 0.00025, 0.001);
     let fine = lattice([273357.0, 5274358.0, 700.0], 0.00001, 0.00001);
@@ -83,7 +83,7 @@ fn quantized_steps_of_one_metre_are_not_taken_for_plain_positions() {
 }
 
 #[test]
-fn what_does_not_fit_in_memory_goes_to_files() {
+fn records_that_do_not_fit_in_memory_go_to_files() {
     let frame = utm();
     let mesh = terrain(&frame, &cloud(9, 8_000, 100_000));
     let directory = tempfile::tempdir().unwrap();

@@ -1,7 +1,7 @@
 //! Reads the JSON chunk of a GLB into the types of `gltf-json`, and refuses what they do not refuse themselves.
 //!
 //! Those types skip fields that they do not know, cut integers to 32 bits and round numbers to single precision. A damaged file could
-//! so be taken for a good one. Here a text is compared with what was read of it ([`Confirm`]), and elements may have only those
+//! so pass for a good one. Here a text is compared with the value that was read from it ([`Confirm`]), and elements may have only the
 //! fields that this program writes.
 
 use std::fmt;
@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 use serde_json::{Map, Number, Value, json};
 
-/// What is decoded, or a sentence that says why it cannot be.
+/// A decoded value, or a sentence that says what is wrong with the file.
 pub(crate) type Decoded<T> = Result<T, String>;
 
 /// Longest text of a node, a mesh, an accessor or a buffer view, in bytes. A hostile element takes up to a hundred times as much
@@ -57,12 +57,12 @@ impl RawDocument<'_> {
         self.scenes.iter().map(|text| named("scene", text, scene(text.get())))
     }
 
-    /// Returns all nodes. Each has a mesh; other than that a name, a translation and a scale at most.
+    /// Returns all nodes. Each has a mesh, and may have a name, a translation and a scale.
     pub(crate) fn nodes(&self) -> impl Iterator<Item = Decoded<Node>> {
         self.nodes.iter().map(|text| named("node", text, node(text.get())))
     }
 
-    /// Returns all meshes. Their primitives have positions and indices; other than that normals, colours and a material at most.
+    /// Returns all meshes. Their primitives have positions and indices, and may have normals, colours and a material.
     pub(crate) fn meshes(&self) -> impl Iterator<Item = Decoded<Mesh>> {
         self.meshes.iter().map(|text| named("mesh", text, mesh(text.get())))
     }
@@ -78,7 +78,7 @@ impl RawDocument<'_> {
     }
 }
 
-/// Says which element is wrong.
+/// Adds to an error which element it is about.
 fn named<T>(kind: &str, text: &RawValue, element: Decoded<T>) -> Decoded<T> {
     element.map_err(|what| {
         let text = text.get();
@@ -226,7 +226,7 @@ fn confirm(text: &str, read: Value, open: bool) -> Decoded<()> {
     Confirm { read, open }.deserialize(&mut deserializer).map_err(|e| e.to_string())
 }
 
-/// Compares what is being parsed with what has been read of it.
+/// Compares a text, while it is parsed, with the value that was read from it before.
 struct Confirm {
     read: Value,
     open: bool,

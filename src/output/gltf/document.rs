@@ -28,7 +28,7 @@ use crate::{Error, Result};
 
 /// The buffer of the binary chunk.
 const STORED: u32 = 0;
-/// The buffer that stands for what readers unpack.
+/// The buffer of the unpacked data, which no file holds.
 const UNPACKED: u32 = 1;
 
 /// A document and its binary chunk while they are put together.
@@ -39,7 +39,7 @@ pub(crate) struct DocumentBuilder<'a> {
     colored: bool,
     /// The binary chunk; its length is a multiple of 4.
     binary: Vec<u8>,
-    /// Bytes of the buffer that stands for what readers unpack; a multiple of 4.
+    /// The length of the buffer of the unpacked data in bytes, a multiple of 4.
     unpacked: u64,
 }
 
@@ -50,7 +50,7 @@ impl<'a> DocumentBuilder<'a> {
         DocumentBuilder { frame, compression, root: Root::default(), colored: false, binary, unpacked: 0 }
     }
 
-    /// Appends a node, its mesh and their data.
+    /// Appends a node, its mesh and the data of both.
     pub(crate) fn add_part(&mut self, part: &SplitPart) -> Result<()> {
         let tile = &*part.tile;
         let (triangles, order) = match self.compression {
@@ -147,8 +147,7 @@ impl<'a> DocumentBuilder<'a> {
         self.add_attribute(colors, order, color_bytes, ElementType::normalized(ComponentType::U8, Type::Vec4))
     }
 
-    /// Appends an accessor and a buffer view of what `convert` makes of the vertices' `values`: of those with the numbers in `order`,
-    /// or of all as they are.
+    /// Appends an accessor and a buffer view of the vertices' `values`, converted, in this `order` of vertices if there is one.
     fn add_attribute<T: Copy, B: Pod>(
         &mut self,
         values: &[T],
@@ -211,7 +210,7 @@ impl<'a> DocumentBuilder<'a> {
         })
     }
 
-    /// Appends to the binary chunk what `convert` makes of `values`.
+    /// Appends the converted `values` to the binary chunk, and returns their view.
     fn add_plain<T: Copy, B: Pod>(&mut self, values: &[T], convert: impl Fn(T) -> B) -> View {
         let start = self.binary.len();
         append_converted(&mut self.binary, values, convert);
@@ -219,7 +218,8 @@ impl<'a> DocumentBuilder<'a> {
         view(STORED, start as u64, (values.len() * size_of::<B>()) as u64)
     }
 
-    /// Appends to the binary chunk `count` elements of `size` bytes that readers have to unpack.
+    /// Appends `packed` data of `count` elements of `size` bytes each to the binary chunk, and returns the view of the unpacked
+    /// elements.
     fn add_packed(
         &mut self,
         packed: &[u8],
@@ -302,7 +302,7 @@ impl ElementType {
     }
 }
 
-/// Returns who wrote the file, and to which version of glTF.
+/// Returns the version of glTF and the name of this program.
 pub(crate) fn asset() -> Asset {
     Asset { generator: Some(GENERATOR.into()), ..Asset::default() }
 }
@@ -325,7 +325,7 @@ fn view(buffer: u32, start: u64, length: u64) -> View {
     }
 }
 
-/// Appends what `convert` makes of `values`, in pieces that stay in the cache.
+/// Appends the converted `values`, in pieces that stay in the cache.
 #[multiversion(targets("x86_64+avx2"))]
 fn append_converted<T: Copy, B: Pod>(bytes: &mut Vec<u8>, values: &[T], convert: impl Fn(T) -> B) {
     let mut piece = [B::zeroed(); 256];

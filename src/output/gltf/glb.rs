@@ -8,7 +8,7 @@ use crate::output::gltf::document::DocumentBuilder;
 use crate::output::gltf::parts::{split, split_short};
 use crate::output::tile::Tile;
 
-/// Makes the bytes of GLB files, one after the other in the same memory.
+/// Encodes GLB files one after the other, in the same memory.
 #[derive(Debug, Default)]
 pub struct GlbEncoder {
     head: Vec<u8>,
@@ -16,7 +16,7 @@ pub struct GlbEncoder {
 }
 
 impl GlbEncoder {
-    /// Makes the bytes of the file of `tile`. The same tile gives the same bytes. Unless `compression` is none, `frame` should be
+    /// Encodes the file of `tile`. The same tile gives the same bytes. Unless `compression` is none, `frame` should be
     /// [`Frame::packed`].
     ///
     /// # Errors

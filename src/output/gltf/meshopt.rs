@@ -109,7 +109,7 @@ impl PackedView {
     }
 }
 
-/// Returns the extensions of a buffer that holds nothing but room for what readers unpack.
+/// Returns the extensions of the buffer of the unpacked data, which no file holds.
 pub(crate) fn fallback_buffer() -> extensions::buffer::Buffer {
     extensions::buffer::Buffer { others: only_meshopt(json!({"fallback": true})) }
 }

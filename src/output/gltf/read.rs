@@ -86,7 +86,7 @@ fn read_document(path: &Path, file: &GlbFile) -> Result<TileDocument> {
     TileDocument::new(&document).map_err(not_ours)
 }
 
-/// What the document of a tile says that is needed to decode it. All indices may be out of range.
+/// The parts of a document that decoding a tile needs. Any index may be out of range.
 struct TileDocument {
     scene: usize,
     scenes: Vec<TileScene>,
@@ -117,7 +117,7 @@ struct Surface {
     indices: usize,
 }
 
-/// What an accessor gives.
+/// The elements that an accessor describes.
 struct Elements {
     view: usize,
     component: ComponentType,

@@ -32,7 +32,7 @@ pub(crate) fn to_text(root: &Root, colored: bool) -> Result<Vec<u8>> {
     Ok(text)
 }
 
-/// A root whose material is apart: the crate's material would write all its defaults, and single precision's digits of a colour.
+/// A root and its material. The crate's own material would write every default and the digits that single precision gives a colour.
 #[derive(Serialize)]
 struct Document<'a> {
     #[serde(flatten)]
