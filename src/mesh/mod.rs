@@ -4,4 +4,5 @@
 pub mod adjacency;
 pub mod flip;
 pub mod half_edge;
+pub mod index;
 pub mod region;
