@@ -33,7 +33,7 @@ pub enum Error {
     #[error("interrupted")]
     Interrupted,
     /// A job stopped, and its finished steps are kept (the exit code of `why`).
-    #[error("{why}\n{steps} finished steps are kept in {}: run the same command again to continue", job.display())]
+    #[error("{why}\nfinished steps are kept in {} ({steps}): run the same command again, without --restart, to go on", job.display())]
     Resumable {
         /// Why the job stopped.
         why: Box<Error>,

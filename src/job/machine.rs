@@ -38,9 +38,9 @@ fn free_in_groups(groups: &str, root: &Path) -> Option<u64> {
         let mut fields = line.splitn(3, ':');
         let (number, controllers, path) = (fields.next()?, fields.next()?, fields.next()?);
         if number == "0" && controllers.is_empty() {
-            least_free(root, path, ["memory.max", "memory.current"])
+            least_free(root, path, &GroupFiles::V2)
         } else if controllers.split(',').any(|controller| controller == "memory") {
-            least_free(&root.join("memory"), path, ["memory.limit_in_bytes", "memory.usage_in_bytes"])
+            least_free(&root.join("memory"), path, &GroupFiles::V1)
         } else {
             None
         }
@@ -48,12 +48,36 @@ fn free_in_groups(groups: &str, root: &Path) -> Option<u64> {
     groups.lines().filter_map(free_in).min()
 }
 
-/// Returns the least that any group from `root` down to `path` leaves. `files` names the limit and the usage.
-fn least_free(root: &Path, path: &str, files: [&str; 2]) -> Option<u64> {
+/// What the files of a control group are called.
+struct GroupFiles {
+    limit: &'static str,
+    usage: &'static str,
+    /// The rows of `memory.stat` with the bytes of cached files, which the usage includes.
+    cached: [&'static str; 2],
+}
+
+impl GroupFiles {
+    const V1: GroupFiles = GroupFiles {
+        limit: "memory.limit_in_bytes",
+        usage: "memory.usage_in_bytes",
+        cached: ["total_inactive_file", "total_active_file"],
+    };
+    const V2: GroupFiles =
+        GroupFiles { limit: "memory.max", usage: "memory.current", cached: ["inactive_file", "active_file"] };
+}
+
+/// Returns the least that any group from `root` down to `path` leaves.
+fn least_free(root: &Path, path: &str, files: &GroupFiles) -> Option<u64> {
     let number = |file: PathBuf| fs::read_to_string(file).ok()?.trim().parse::<u64>().ok();
     let free = |group: &Path| {
-        let [limit, usage] = files.map(|name| number(group.join(name)));
-        Some(limit?.saturating_sub(usage?))
+        let (limit, usage) = (number(group.join(files.limit))?, number(group.join(files.usage))?);
+        // The system drops cached files before it runs out of memory.
+        let stat = fs::read_to_string(group.join("memory.stat")).unwrap_or_default();
+        let row = |name: &str| -> Option<u64> {
+            stat.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(' ')?.parse().ok())
+        };
+        let cached: u64 = files.cached.iter().filter_map(|name| row(name)).sum();
+        Some(limit.saturating_sub(usage.saturating_sub(cached)))
     };
     // A container may see its own group as the root, whatever the path says.
     let own = root.join(path.trim_start_matches('/'));
@@ -94,6 +118,15 @@ mod tests {
         assert_eq!(free_in_groups("0::/slurm\n", root.path()), None, "no group has a limit");
         assert_eq!(free_in_groups("0::/gone/elsewhere\n", root.path()), None);
         assert_eq!(free_in_groups("", root.path()), None);
+    }
+
+    #[test]
+    fn cached_files_do_not_count_as_used() {
+        let root = tempfile::tempdir().unwrap();
+        group(root.path(), "a", ["memory.max", "memory.current"], ["1000\n", "950\n"]);
+        let stat = "anon 50\ninactive_file 600\nactive_file 200\ninactive_file_other 7\n";
+        fs::write(root.path().join("a/memory.stat"), stat).unwrap();
+        assert_eq!(free_in_groups("0::/a\n", root.path()), Some(850));
     }
 
     #[test]

@@ -158,15 +158,15 @@ impl Leaf {
     pub fn load(store: &Store, tile: TileIndex) -> Result<Leaf> {
         let mut columns = ColumnReader::open(store, StepRecord::Leaf(tile))?;
         let mut leaf = Leaf {
-            positions: columns.column()?.to_vec(),
-            rgb: columns.column()?.to_vec(),
-            class: columns.column()?.to_vec(),
+            positions: columns.column_vec()?,
+            rgb: columns.column_vec()?,
+            class: columns.column_vec()?,
             triangles: Vec::new(),
         };
         leaf.triangles = if has_short_corners(&leaf.positions) {
             columns.column::<[u16; 3]>()?.iter().map(|t| t.map(u32::from)).collect()
         } else {
-            columns.column()?.to_vec()
+            columns.column_vec()?
         };
         Ok(leaf)
     }
@@ -209,7 +209,7 @@ impl Frontier {
     /// [`Error::Io`], or [`Error::Broken`] if there is none.
     pub fn load(store: &Store, node: NodeIndex) -> Result<Frontier> {
         let mut columns = ColumnReader::open(store, StepRecord::Frontier(node))?;
-        Ok(Frontier { sites: columns.column()?.to_vec(), boundary: columns.column()?.to_vec() })
+        Ok(Frontier { sites: columns.column_vec()?, boundary: columns.column_vec()? })
     }
 
     /// Returns the tiles that own sites of it, ascending.
@@ -298,11 +298,7 @@ impl PartialNormals {
     /// [`Error::Io`], or [`Error::Broken`] if there is none.
     pub fn load(store: &Store, tile: TileIndex) -> Result<PartialNormals> {
         let mut columns = ColumnReader::open(store, StepRecord::PartialNormals(tile))?;
-        Ok(PartialNormals {
-            sums: columns.column()?.to_vec(),
-            rgb: columns.column()?.to_vec(),
-            class: columns.column()?.to_vec(),
-        })
+        Ok(PartialNormals { sums: columns.column_vec()?, rgb: columns.column_vec()?, class: columns.column_vec()? })
     }
 }
 
@@ -339,7 +335,7 @@ impl FinishedBorder {
     /// [`Error::Io`], or [`Error::Broken`] if there is none.
     pub fn load(store: &Store, tile: TileIndex) -> Result<FinishedBorder> {
         let mut columns = ColumnReader::open(store, StepRecord::FinishedBorder(tile))?;
-        Ok(FinishedBorder(columns.column()?.to_vec()))
+        Ok(FinishedBorder(columns.column_vec()?))
     }
 
     /// Returns the vertex of `site`.
@@ -419,6 +415,6 @@ impl LevelSummary {
         let mut columns = ColumnReader::open(store, StepRecord::Level(node))?;
         let own = columns.column()?;
         let [own] = own[..] else { return Err(Error::Broken(format!("the record of coarser tile {node} is damaged"))) };
-        Ok(LevelSummary { own, leaves: columns.column()?.to_vec() })
+        Ok(LevelSummary { own, leaves: columns.column_vec()? })
     }
 }

@@ -199,7 +199,7 @@ fn damaged_points_are_read_again() {
     bytes.iter_mut().for_each(|byte| *byte = !*byte);
     fs::write(&points, bytes).unwrap();
     let said = rig.run().succeeded().err;
-    assert!(said.contains("not whole; starting over"), "{said}");
+    assert!(said.contains("is damaged; starting over"), "{said}");
     rig.is_complete("damaged points");
 }
 
@@ -258,7 +258,7 @@ fn damaged_leaves_are_made_again_before_auto_counts_their_sites() {
     let stores = rig.stores();
     let mut bytes = stores.each_ref().map(|store| fs::read(store).unwrap());
     let mut lost = 0;
-    for stored in entries.iter().flat_map(|entry| entry["stored"].as_array().unwrap()) {
+    for stored in entries.iter().flat_map(|entry| entry["records"].as_array().unwrap()) {
         let leaf = &stored["key"]["Leaf"];
         if leaf.is_u64() && is_written(leaf) {
             let [at, length] = ["at", "length"].map(|name| stored[name].as_u64().unwrap() as usize);

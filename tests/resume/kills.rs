@@ -81,8 +81,8 @@ fn a_job_killed_again_and_again_still_ends() {
 #[test]
 fn a_job_killed_while_it_cleans_up_is_not_done_again() {
     let rig = small_job(&Setup::tiles_of(5_000));
-    // It removes the store, the points and, last, the journal.
-    let steps = rig.stores().len() as u64 + 2;
+    // It removes the store, the points, the plan and, last, the journal.
+    let steps = rig.stores().len() as u64 + 3;
     assert!(!rig.run_to("cleaning", steps + 1).was_killed());
     rig.forget();
     for count in 1..=steps {

@@ -64,6 +64,17 @@ impl<'a, K: RecordKey> ColumnReader<'a, K> {
         Ok(column)
     }
 
+    /// Returns the next column as values of the caller's own, read without a map in between.
+    ///
+    /// # Errors
+    /// As [`ColumnReader::column`].
+    pub fn column_vec<T: Pod>(&mut self) -> Result<Vec<T>> {
+        let count = self.count::<T>()?;
+        let column = self.store.read_vec(self.key, self.rest.at, count)?;
+        self.skip((count * size_of::<T>()).next_multiple_of(ALIGNMENT) as u64)?;
+        Ok(column)
+    }
+
     /// Returns `count` values of the last column from the one at `first` on, without reading the others.
     ///
     /// # Errors

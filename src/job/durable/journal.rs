@@ -106,8 +106,9 @@ fn parse_line<T: DeserializeOwned>(line: &str) -> Option<T> {
     is_whole.then(|| serde_json::from_str(text).ok())?
 }
 
-/// The journal that an earlier run left: its header and its entries, up to the first damaged line.
-pub type ReadJournal<H, S, K> = (H, Vec<JournalEntry<S, K>>);
+/// The journal that an earlier run left: its header, unless that is damaged or of another version, and its entries up to the first
+/// damaged line.
+pub type ReadJournal<H, S, K> = (Option<H>, Vec<JournalEntry<S, K>>);
 
 /// Reads the journal that an earlier run left.
 ///
@@ -126,8 +127,9 @@ where
     };
     let text = String::from_utf8_lossy(&bytes);
     let mut lines = text.split_inclusive('\n');
-    let header = lines.next().and_then(parse_line);
-    Ok(header.map(|header| (header, lines.map_while(parse_line).collect())))
+    let header: Option<H> = lines.next().and_then(parse_line);
+    let entries = if header.is_some() { lines.map_while(parse_line).collect() } else { Vec::new() };
+    Ok(Some((header, entries)))
 }
 
 /// A position in the journal of a run: after a number of records. The default is the start.

@@ -1,13 +1,13 @@
 //! Reading parts of the job's own files through memory maps, a block at a time.
 //!
-//! A map is made for one block, is read, and goes: so mapped pages never add up to more than the blocks that threads work on. Only
+//! A map is made for one block, is read, and goes: so mapped pages never add up to more than the blocks that threads look at. Only
 //! files that this process writes under its lock are mapped, never a user's.
 
 use crate::positional_io::read_exact_at;
 use bytemuck::Pod;
 use memmap2::{Mmap, MmapOptions};
 use std::fs::File;
-use std::io::{Error, ErrorKind, Result};
+use std::io::{ErrorKind, Result};
 use std::marker::PhantomData;
 use std::ops::Deref;
 
@@ -35,7 +35,9 @@ impl<T: Pod> MappedSlice<T> {
     /// What the operating system says; `UnexpectedEof` if the file ends before the last value.
     pub fn read(file: &File, at: u64, count: usize) -> Result<MappedSlice<T>> {
         let length = count.checked_mul(size_of::<T>()).ok_or(ErrorKind::UnexpectedEof)?;
-        let bytes = if length < LEAST_MAPPED { read(file, at, length)? } else { map(file, at, length)? };
+        let mapped = if length < LEAST_MAPPED { None } else { map(file, at, length) };
+        // Some file systems cannot map files, and a disk that cannot be read is told by a plain read.
+        let bytes = mapped.map_or_else(|| read(file, at, length), Ok)?;
         Ok(MappedSlice { bytes, values: PhantomData })
     }
 }
@@ -57,36 +59,30 @@ fn read(file: &File, at: u64, length: usize) -> Result<Bytes> {
     Ok(Bytes::Read(words, length))
 }
 
-fn map(file: &File, at: u64, length: usize) -> Result<Bytes> {
+/// Maps the block and loads its pages. Returns `None` if that fails for any reason.
+fn map(file: &File, at: u64, length: usize) -> Option<Bytes> {
     // Reading a mapped page beyond the end of the file would kill the process.
-    let end = at.checked_add(length as u64).ok_or(ErrorKind::UnexpectedEof)?;
-    if file.metadata()?.len() < end {
-        return Err(ErrorKind::UnexpectedEof.into());
+    let end = at.checked_add(length as u64)?;
+    if file.metadata().ok()?.len() < end {
+        return None;
     }
     // SAFETY: The bytes of the map do not change while it exists. This process has written them already, it never writes to the
     // same place twice or shortens the file while it has readers, and its lock keeps other runs of the program out of the folder.
-    let map = unsafe { MmapOptions::new().offset(at).len(length).map(file)? };
-    load_pages(&map, file, at)?;
-    Ok(Bytes::Mapped(map))
+    let map = unsafe { MmapOptions::new().offset(at).len(length).map(file).ok()? };
+    // If a page cannot be read, this fails here; touching the page later would kill the process.
+    load_pages(&map).ok()?;
+    Some(Bytes::Mapped(map))
 }
 
-/// Loads all pages of the map. A disk that cannot be read becomes an error here; later it would kill the process.
+/// Loads all pages of the map. Fails before Linux 5.14, which does not know the advice.
 #[cfg(target_os = "linux")]
-fn load_pages(map: &Mmap, file: &File, at: u64) -> Result<()> {
-    const EFAULT: i32 = 14;
-    match map.advise(memmap2::Advice::PopulateRead) {
-        Err(e) if e.raw_os_error() == Some(EFAULT) => {
-            // A plain read tells the reason.
-            read(file, at, map.len())?;
-            Err(Error::other("a part of the file cannot be mapped"))
-        }
-        // Linux before 5.14 does not know the advice: pages come when they are touched.
-        _ => Ok(()),
-    }
+fn load_pages(map: &Mmap) -> Result<()> {
+    map.advise(memmap2::Advice::PopulateRead)
 }
 
+/// Other systems have no such advice: there a disk that fails later ends the process, and the job can go on from its journal.
 #[cfg(not(target_os = "linux"))]
-fn load_pages(_map: &Mmap, _file: &File, _at: u64) -> Result<()> {
+fn load_pages(_map: &Mmap) -> Result<()> {
     Ok(())
 }
 

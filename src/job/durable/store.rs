@@ -9,7 +9,7 @@
 
 use crate::job::durable::directory::STORE_FILES;
 use crate::job::durable::mapped::MappedSlice;
-use crate::positional_io::write_all_at;
+use crate::positional_io::{read_exact_at, write_all_at};
 use crate::{Error, Result};
 use bytemuck::Pod;
 use serde::de::DeserializeOwned;
@@ -195,6 +195,15 @@ impl<K: RecordKey> Store<K> {
         MappedSlice::read(&store.file, at, count).map_err(Error::io("read", &store.path))
     }
 
+    /// Reads `count` values from byte `at` of the file of `key` on into memory of the caller's own.
+    pub(crate) fn read_vec<T: Pod>(&self, key: K, at: u64, count: usize) -> Result<Vec<T>> {
+        let store = self.file(key);
+        let mut values = vec![T::zeroed(); count];
+        let bytes = bytemuck::cast_slice_mut(&mut values);
+        read_exact_at(&store.file, bytes, at).map_err(Error::io("read", &store.path))?;
+        Ok(values)
+    }
+
     /// Returns the number of bytes of all records.
     pub fn bytes(&self) -> u64 {
         self.files.iter().map(|store| store.end.load(Ordering::Relaxed)).sum()
@@ -261,7 +270,7 @@ mod tests {
             let writer = ColumnWriter::default().push(&bytes).push(&words).push(&triples);
             writer.write(&store, Key::Leaf(0)).unwrap();
             let mut columns = ColumnReader::open(&store, Key::Leaf(0)).unwrap();
-            assert_eq!(*columns.column::<u8>().unwrap(), bytes);
+            assert_eq!(columns.column_vec::<u8>().unwrap(), bytes);
             assert_eq!(*columns.column::<u128>().unwrap(), words);
             if length > 2 {
                 assert_eq!(*columns.column_part::<[u16; 3]>(2, length as usize - 2).unwrap(), triples[2..]);

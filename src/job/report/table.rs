@@ -8,12 +8,12 @@ use std::fmt;
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{:<12} {:>9} {:>9} {:>9} {:>14}  rate", "stage", "from s", "wall s", "cpu s", "done")?;
+        writeln!(f, "{:<14} {:>9} {:>9} {:>9} {:>14}  rate", "stage", "from s", "wall s", "cpu s", "done")?;
         for stage in &self.stages {
             let rate = if stage.done > 0 { stage.done as f64 / stage.wall_s.max(1e-9) } else { 0.0 };
             writeln!(
                 f,
-                "{:<12} {:>9.2} {:>9.2} {:>9.2} {:>14}  {} {}/s",
+                "{:<14} {:>9.2} {:>9.2} {:>9.2} {:>14}  {} {}/s",
                 stage.stage,
                 stage.start_s,
                 stage.wall_s,
@@ -23,7 +23,7 @@ impl fmt::Display for Report {
                 stage.unit
             )?;
         }
-        writeln!(f, "{:<12} {:>9} {:>9.2} {:>9.2}\n", "all", "", self.wall_s, self.cpu_s)?;
+        writeln!(f, "{:<14} {:>9} {:>9.2} {:>9.2}\n", "all", "", self.wall_s, self.cpu_s)?;
         for (unit, steps) in [("cpu s", &self.steps.cpu), ("gpu s", &self.steps.gpu)] {
             for (i, StepSeconds { step, seconds }) in steps.iter().enumerate() {
                 let head = if i == 0 { format!("triangulate by step, {unit}") } else { String::new() };

@@ -56,13 +56,11 @@ pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, walk: Wal
     let (mut lock, mut earlier) = (None, None);
     if directory.journal().exists() {
         lock = Some(directory.lock()?);
-        earlier = EarlierRun::read(&directory)?;
-    }
-    if let Some(earlier) = earlier.as_mut().filter(|_| run.restart) {
-        earlier.forget_steps();
+        earlier = read_earlier(&directory, run)?;
     }
     let job = JobRequest { options, run, triangulator, directory, fingerprint, clock, walk };
-    let mut coarsening = earlier.as_ref().map_or_else(Default::default, |run| run.coarsening(&job.fingerprint));
+    let coarsening = earlier.as_ref().and_then(|earlier| earlier.coarsening(&job.fingerprint));
+    let mut coarsening = coarsening.unwrap_or_default();
     loop {
         let outcome = attempt(&job, coarsening, earlier.take(), lock.take());
         // Only the finished mesh knows its longest triangle. To round in advance would often round for nothing.
@@ -78,6 +76,19 @@ pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, walk: Wal
         run.progress.note(&format!("{what}; starting again with a coarser step in {axes}"));
         *power += 1;
     }
+}
+
+/// Reads what an earlier run left, unless the job is to start over. Whether it left a part of its results counts in any case.
+fn read_earlier(directory: &JobDirectory, run: RunOptions) -> Result<Option<EarlierRun>> {
+    let mut earlier = EarlierRun::read(directory)?;
+    if let Some(earlier) = earlier.as_mut() {
+        if run.restart {
+            earlier.forget();
+        } else if !earlier.is_readable() {
+            run.progress.note("the journal of the earlier run is damaged or of another version; starting over");
+        }
+    }
+    Ok(earlier)
 }
 
 fn attempt(
@@ -102,7 +113,16 @@ fn attempt(
         Preflight::of(&plan, threads).passes()?;
     }
     directory.check_results_are_ours()?;
-    let _lock = lock.map_or_else(|| directory.lock(), Ok)?;
+    let mut earlier = earlier;
+    let _lock = match lock {
+        Some(lock) => lock,
+        None => {
+            let lock = directory.lock()?;
+            // Another process may have begun the job, and stopped, since this one looked.
+            earlier = read_earlier(directory, run)?;
+            lock
+        }
+    };
     if let Some(earlier) = &earlier {
         if let Some(report) = earlier.complete_report(directory, &header)? {
             progress.note("the interrupted run had written all its results");

@@ -23,7 +23,8 @@ use std::path::PathBuf;
 
 /// An earlier run of a job in the same directory, as its journal tells. The journal is read once.
 pub struct EarlierRun {
-    header: JobHeader,
+    /// `None` if another version of the program wrote the journal, or it is damaged.
+    header: Option<JobHeader>,
     entries: Vec<JournalEntry>,
     /// Whether the run left a part of its results. Before it wrote them, it removed those of the job before, with their report.
     has_partial_results: bool,
@@ -35,34 +36,37 @@ impl EarlierRun {
     /// # Errors
     /// [`Error::Io`] if it cannot be read.
     pub fn read(directory: &JobDirectory) -> Result<Option<EarlierRun>> {
-        let read = journal::read::<JobHeader, JobStep, _>(directory)?;
-        Ok(read.map(|(header, entries)| {
-            let wrote_tiles = entries.iter().any(|entry: &JournalEntry| matches!(entry.step, JobStep::WriteTile(_)));
-            let has_partial_results = wrote_tiles && !directory.output().report().exists();
-            EarlierRun { header, entries, has_partial_results }
-        }))
+        let Some((header, entries)) = journal::read::<JobHeader, JobStep, _>(directory)? else { return Ok(None) };
+        // What an unreadable journal tells of is unknown.
+        let may_have_written = |entry: &JournalEntry| matches!(entry.step, JobStep::WriteTile(_));
+        let has_written = header.is_none() || entries.iter().any(may_have_written);
+        let has_partial_results = has_written && !directory.output().report().exists();
+        Ok(Some(EarlierRun { header, entries, has_partial_results }))
+    }
+
+    /// Tells whether its journal can be read.
+    pub fn is_readable(&self) -> bool {
+        self.header.is_some()
     }
 
     /// Forgets all steps, so that the job starts over.
-    pub fn forget_steps(&mut self) {
+    pub fn forget(&mut self) {
+        self.header = None;
         self.entries.clear();
     }
 
-    /// Tells whether the job with this fingerprint has the same mesh.
-    fn has_mesh_of(&self, fingerprint: &Fingerprint) -> bool {
-        !self.entries.is_empty() && !matches!(fingerprint.since(&self.header.fingerprint), JobChange::Mesh(_))
-    }
-
     /// Returns how much coarser the lattice became, if the job with this fingerprint has the same mesh.
-    pub fn coarsening(&self, fingerprint: &Fingerprint) -> LatticeCoarsening {
-        if self.has_mesh_of(fingerprint) { self.header.coarsening } else { LatticeCoarsening::default() }
+    pub fn coarsening(&self, fingerprint: &Fingerprint) -> Option<LatticeCoarsening> {
+        let header = self.header.as_ref()?;
+        let is_same = !matches!(fingerprint.since(&header.fingerprint), JobChange::Mesh(_));
+        is_same.then_some(header.coarsening)
     }
 
     /// Returns the plan that the run wrote, with the present `options`, if it is whole and the mesh is that of the job with
     /// `header`.
     pub fn plan(&self, directory: &JobDirectory, header: &JobHeader, options: &JobOptions) -> Option<Plan> {
         let entry = self.entries.iter().find(|entry| entry.step == JobStep::Partition)?;
-        let is_same = self.header.coarsening == header.coarsening && self.has_mesh_of(&header.fingerprint);
+        let is_same = self.coarsening(&header.fingerprint) == Some(header.coarsening);
         let plan = is_same && entry.files.iter().all(|file| file.is_whole(directory));
         let plan = plan.then(|| Plan::read(&directory.plan()).ok())??;
         Some(Plan { options: options.clone(), ..plan })
@@ -76,8 +80,9 @@ impl EarlierRun {
         let is_written = |entry: &JournalEntry| {
             entry.step == JobStep::Report && entry.files.iter().all(|file| file.is_whole(directory))
         };
-        let is_same = self.header.coarsening == header.coarsening
-            && header.fingerprint.since(&self.header.fingerprint) == JobChange::Nothing;
+        let is_same = self.header.as_ref().is_some_and(|old| {
+            old.coarsening == header.coarsening && header.fingerprint.since(&old.fingerprint) == JobChange::Nothing
+        });
         if !is_same || !self.entries.iter().any(is_written) {
             return Ok(None);
         }
@@ -149,6 +154,7 @@ fn review(
     progress: ProgressOutput,
 ) -> Result<Option<KeptSteps>> {
     let EarlierRun { header: old, mut entries, .. } = earlier;
+    let Some(old) = old else { return Ok(None) };
     if entries.is_empty() || old.coarsening != header.coarsening {
         return Ok(None);
     }
