@@ -1,14 +1,14 @@
-//! Leaf triangulation on one thread beside `spade` and `delaunator`, on the same points in the same run.
+//! Leaf triangulation on one thread compared with `spade` and `delaunator`, on the same points in the same run.
 //!
-//! `cargo bench --bench kernel [-- NAME...] [-- --all]`: the cases whose names contain a NAME; `--all` adds those of 4 M
-//! points and more. Every case is a list of leaves; what the kernel rejects is halved and tried again, and goes to the reference
-//! when small, as in a job. Runs alternate; the medians are printed. Real data is read from `../shared/data`, or from
-//! `$GDT_SHARED/data`, where there is any.
+//! `cargo bench --bench kernel [-- NAME...] [-- --all]` runs the cases whose names contain a NAME; `--all` adds those of 4 M points
+//! and more. Every case is a list of leaves. A leaf that the kernel rejects is halved and tried again; small leaves go to the
+//! reference. Runs alternate, and the medians are printed. Real data is read from `$GDT_SHARED/data` or `../shared/data`, if it
+//! exists.
 
 mod points;
 
 use delaunator::Point;
-use gdt_batch::geometry::Site;
+use gdt_batch::geometry::{Bounds, Site};
 use gdt_batch::triangulation::reference;
 use gdt_batch::voronoi::counts::{PipelineCounts, STEP_NAMES};
 use gdt_batch::voronoi::{PipelineBuffers, triangulate};
@@ -16,9 +16,9 @@ use points::{Random, distinct, gaussian, median, uniform};
 use spade::{DelaunayTriangulation, Point2, Triangulation};
 use std::path::PathBuf;
 
-/// Leaves as a job cuts them by default.
+/// The size of leaves in a job, by default.
 const LEAF: usize = 50_000;
-/// Leaves smaller than this are not cut further.
+/// Leaves up to this size are not cut further.
 const SMALL: usize = 3_000;
 
 struct Case {
@@ -80,7 +80,7 @@ fn cases(all: bool) -> Vec<(String, Make)> {
     cases
 }
 
-/// Runs the three in turn until each has had about a second, at least three times, and prints the medians.
+/// Runs the three in turn until each has run for about a second, at least three times, and prints the medians.
 fn measure(case: &Case, buffers: &mut PipelineBuffers) -> (usize, PipelineCounts) {
     let sites: usize = case.leaves.iter().map(Vec::len).sum();
     let points = |s: &Site| Point2::new(s[0] as f64, s[1] as f64);
@@ -128,7 +128,7 @@ fn measure(case: &Case, buffers: &mut PipelineBuffers) -> (usize, PipelineCounts
     (sites, counts)
 }
 
-/// Triangulates a leaf, or its halves if it is rejected; returns how many sites went to the reference.
+/// Triangulates a leaf, or its halves if it is rejected; returns the number of sites that went to the reference.
 fn kernel(leaf: &[Site], buffers: &mut PipelineBuffers, counts: &mut PipelineCounts) -> usize {
     match triangulate(leaf, buffers) {
         Ok((mesh, more)) => {
@@ -164,22 +164,19 @@ fn print_steps(totals: &[(String, (usize, PipelineCounts))]) {
     }
 }
 
-/// Nanoseconds this thread has run, so that other work on the machine counts as little as possible.
+/// Returns the nanoseconds that this thread has run, so that other work on the machine counts as little as possible.
 fn cpu_time() -> f64 {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     time.tv_sec as f64 * 1e9 + time.tv_nsec as f64
 }
 
-/// Cuts at the median of the longer side until no part has more than `leaf` sites.
+/// Cuts the sites at the median of the longer side until no part has more than `leaf` sites.
 fn cut(mut sites: Vec<Site>, leaf: usize) -> Vec<Vec<Site>> {
     if sites.len() <= leaf {
         return vec![sites];
     }
-    let extent = |axis: usize| {
-        let (low, high) = sites.iter().fold((i32::MAX, i32::MIN), |(l, h), s| (l.min(s[axis]), h.max(s[axis])));
-        high as i64 - low as i64
-    };
-    let axis = (extent(1) > extent(0)) as usize;
+    let bounds = Bounds::of_points(sites.iter().copied()).expect("a leaf has sites");
+    let axis = (bounds.extent(1) > bounds.extent(0)) as usize;
     let half = sites.len() / 2;
     sites.select_nth_unstable_by_key(half, |s| s[axis]);
     let other = sites.split_off(half);
@@ -188,12 +185,12 @@ fn cut(mut sites: Vec<Site>, leaf: usize) -> Vec<Vec<Site>> {
     leaves
 }
 
-/// The distinct sites of a file of the shared test data.
+/// Reads the distinct sites of a file of the shared test data.
 fn shared(name: &str) -> Option<Vec<Site>> {
     let folder = std::env::var_os("GDT_SHARED").map(PathBuf::from);
     let folder = folder.unwrap_or_else(|| PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared")));
     let Ok(mut reader) = las::Reader::from_path(folder.join("data").join(name)) else {
-        println!("{name} is not there");
+        println!("{name} was not found");
         return None;
     };
     let points = reader.read_all().ok()?;

@@ -1,14 +1,18 @@
 //! The paper's own experiments, its figures 9 and 10: the time of every step against the number of sites and the size of the
-//! texture, on one CPU thread and on whatever GPU there is.
+//! texture, on one CPU thread and on the GPU of this machine.
 //!
 //! `cargo bench --bench paper [-- ROUNDS]` prints tables in Markdown, in milliseconds of wall time:
-//! 9(a), (b) the whole pipeline with textures of fixed and of suitable size, beside `spade` and `delaunator`; 9(c) its steps with
-//! a texture of 4096 x 4096; 9(d) as (b), normally distributed; 10 the steps on a million sites with textures of 512 to 4096.
 //!
-//! All ways take turns on the same sites; a first round warms up, then medians of ROUNDS (5) are taken, of each step by itself, so
-//! that they need not add up to the total. "Shaders" are G1 to G6 on the GPU, by its own timestamps. "GPU and CPU" is what a job with
-//! `backend = "gpu"` does: G1 to G3 there, the rest here. "Plain loops" are the shaders' twins, which are to be read; timed once.
-//! `WGPU_ADAPTER_NAME` names an adapter; a renderer in software, which the tables then say, is taken if there is no other.
+//! - 9(a), (b): the whole pipeline with textures of fixed and of suitable size, compared with `spade` and `delaunator`;
+//! - 9(c): its steps with a texture of 4096 x 4096;
+//! - 9(d): as (b), with normally distributed sites;
+//! - 10: the steps on a million sites with textures of 512 to 4096 pixels a side.
+//!
+//! All methods take turns on the same sites. After a round to warm up, the tables show medians of ROUNDS (5) rounds. Each step has a
+//! median of its own, so steps need not add up to the total. "Shaders" are G1 to G6 on the GPU, by its own timestamps. "GPU and CPU"
+//! is what a job with `backend = "gpu"` does: G1 to G3 on the GPU, the rest on the CPU. "Plain loops" are the shaders' twins, which
+//! are written to be read, and are timed once. `WGPU_ADAPTER_NAME` names an adapter. If there is no hardware GPU, a software renderer
+//! is used, and the tables say so.
 
 mod points;
 
@@ -61,25 +65,25 @@ fn main() {
     figure_10(&uniform(1_000_000), gpu.as_ref(), rounds);
 }
 
-/// All ways on every input, the GPU's on the largest texture.
+/// Measures all methods on every input. Methods of the GPU use the largest texture.
 fn figure_9(inputs: &[Vec<Site>], gpu: Option<&RefCell<Gpu>>, rounds: usize) -> Vec<Vec<Measured>> {
     let measure_one = |sites: &Vec<Site>| {
-        let mut ways = on_cpu_with_any(sites);
-        ways.push(by_delaunator(sites));
-        ways.extend(gpu.into_iter().flat_map(|gpu| on_gpu_alone_and_helped(gpu, sites, FIXED)));
-        measure(ways, rounds)
+        let mut methods = on_cpu_with_any(sites);
+        methods.push(by_delaunator(sites));
+        methods.extend(gpu.into_iter().flat_map(|gpu| on_gpu_alone_and_helped(gpu, sites, FIXED)));
+        measure(methods, rounds)
     };
     inputs.iter().map(measure_one).collect()
 }
 
-/// The steps on all textures, and what they met.
+/// Measures the steps on all textures, and prints what they counted.
 fn figure_10(sites: &[Site], gpu: Option<&RefCell<Gpu>>, rounds: usize) {
-    let mut ways = on_cpu_with_any(sites);
+    let mut methods = on_cpu_with_any(sites);
     for (gpu, side) in gpu.into_iter().flat_map(|gpu| SIDES.map(|side| (gpu, side))) {
-        ways.extend(on_gpu_alone_and_helped(gpu, sites, side));
-        ways.push(by_shaders(gpu, sites, side, VoronoiMethod::Jfa));
+        methods.extend(on_gpu_alone_and_helped(gpu, sites, side));
+        methods.push(by_shaders(gpu, sites, side, VoronoiMethod::Jfa));
     }
-    let mut groups = by_side(&measure(ways, rounds));
+    let mut groups = by_side(&measure(methods, rounds));
     groups.push(("plain loops, one thread".into(), SIDES.map(|side| plain_loops(sites, side)).into()));
     print_steps("Figure 10: uniform, 1 M sites", &SIDES.map(|side| side.to_string()), &groups);
     print_counts(&groups[0].1);
@@ -87,44 +91,44 @@ fn figure_10(sites: &[Site], gpu: Option<&RefCell<Gpu>>, rounds: usize) {
 
 // Runs.
 
-/// What a run took, in milliseconds; where there is no total, the steps are not all of the way.
+/// The times of a run in milliseconds. There is no total if the steps are only a part of the pipeline.
 #[derive(Clone, Default)]
 struct Run {
     total: Option<f64>,
     steps: Vec<(&'static str, f64)>,
     counts: PipelineCounts,
-    /// How often `spade` fits in.
+    /// The time of `spade` divided by the total.
     times_spade: f64,
 }
 
 type Outcome = Result<Run, String>;
 
-/// A way to do it, for which sites on which texture.
-struct Way<'a> {
+/// A method to triangulate some sites, with the side of its texture.
+struct Method<'a> {
     name: String,
     side: Option<u32>,
     run: Box<dyn FnMut() -> Outcome + 'a>,
 }
 
-/// A way's name, the side of its texture, and what came of it.
+/// A method's name, the side of its texture, and its outcome.
 type Measured = (String, Option<u32>, Outcome);
 
-/// Runs `ways`, of which one is `spade`.
-fn measure(mut ways: Vec<Way>, rounds: usize) -> Vec<Measured> {
-    let mut outcomes = alternate(&mut ways, rounds);
-    let spade = ways.iter().zip(&outcomes).find(|(way, _)| way.name == SPADE);
+/// Runs `methods`, one of which is `spade`.
+fn measure(mut methods: Vec<Method>, rounds: usize) -> Vec<Measured> {
+    let mut outcomes = alternate(&mut methods, rounds);
+    let spade = methods.iter().zip(&outcomes).find(|(method, _)| method.name == SPADE);
     let spade = spade.and_then(|(_, outcome)| outcome.as_ref().ok()?.total).unwrap_or(f64::NAN);
     for run in outcomes.iter_mut().flatten() {
         run.times_spade = spade / run.total.unwrap_or(f64::NAN);
     }
-    ways.into_iter().zip(outcomes).map(|(way, outcome)| (way.name, way.side, outcome)).collect()
+    methods.into_iter().zip(outcomes).map(|(method, outcome)| (method.name, method.side, outcome)).collect()
 }
 
-fn alternate(ways: &mut [Way], rounds: usize) -> Vec<Outcome> {
-    let mut outcomes: Vec<Vec<Outcome>> = ways.iter().map(|_| Vec::new()).collect();
+fn alternate(methods: &mut [Method], rounds: usize) -> Vec<Outcome> {
+    let mut outcomes: Vec<Vec<Outcome>> = methods.iter().map(|_| Vec::new()).collect();
     for round in 0..=rounds {
-        for (way, outcomes) in ways.iter_mut().zip(&mut outcomes) {
-            let outcome = (way.run)();
+        for (method, outcomes) in methods.iter_mut().zip(&mut outcomes) {
+            let outcome = (method.run)();
             if round > 0 {
                 outcomes.push(outcome);
             }
@@ -141,34 +145,34 @@ fn medians(runs: Vec<Run>) -> Run {
     Run { total: totals.map(median), steps, ..last }
 }
 
-/// What `f` returns, and the milliseconds that it took.
+/// Returns the result of `f`, and the milliseconds that it took.
 fn timed<T>(f: impl FnOnce() -> T) -> (T, f64) {
     let start = Instant::now();
     let value = f();
     (value, 1000.0 * start.elapsed().as_secs_f64())
 }
 
-// Ways on the CPU.
+// Methods on the CPU.
 
 const CPU: &str = "CPU, one thread";
 const SPADE: &str = "spade";
 
-/// `spade`, and the pipeline with every texture.
-fn on_cpu_with_any(sites: &[Site]) -> Vec<Way<'_>> {
+/// Returns `spade`, and the pipeline with every texture.
+fn on_cpu_with_any(sites: &[Site]) -> Vec<Method<'_>> {
     let sides = SIDES.into_iter().map(Some);
     let pipelines = std::iter::once(None).chain(sides).map(|side| on_cpu(sites, side));
     std::iter::once(by_spade(sites)).chain(pipelines).collect()
 }
 
-/// The pipeline on this thread, with a texture of `side` or else of the size that suits.
-fn on_cpu<'a>(sites: &'a [Site], side: Option<u32>) -> Way<'a> {
+/// Returns the pipeline on this thread, with a texture of `side` or of suitable size.
+fn on_cpu<'a>(sites: &'a [Site], side: Option<u32>) -> Method<'a> {
     let request = side.map_or(TextureRequest::default(), |side| TextureRequest {
         resolution: TextureResolution::Side(side),
         ..TextureRequest::default()
     });
     let mut buffers = PipelineBuffers::with_texture(request);
     let run = move || pipeline(&mut buffers, |buffers| triangulate(sites, buffers));
-    Way { name: CPU.into(), side, run: Box::new(run) }
+    Method { name: CPU.into(), side, run: Box::new(run) }
 }
 
 fn pipeline(
@@ -179,13 +183,13 @@ fn pipeline(
     let (mesh, counts) = done.map_err(|why| why.to_string())?;
     buffers.recycle(black_box(mesh));
     let milliseconds = counts.nanoseconds.map(|time| time as f64 / 1e6);
-    // The last step is to wait for the GPU.
+    // The last step is the wait for the GPU.
     let steps =
         STEP_NAMES.into_iter().zip(milliseconds).take(STEP_NAMES.len() - (counts.on_gpu == 0) as usize).collect();
     Ok(Run { total: Some(total), steps, counts, ..Run::default() })
 }
 
-fn by_spade<'a>(sites: &[Site]) -> Way<'a> {
+fn by_spade<'a>(sites: &[Site]) -> Method<'a> {
     let points: Vec<_> = sites.iter().map(|s| Point2::new(f64::from(s[0]), f64::from(s[1]))).collect();
     library(SPADE, move || {
         let mesh = DelaunayTriangulation::<Point2<f64>>::bulk_load(points.clone()).expect("finite");
@@ -193,19 +197,19 @@ fn by_spade<'a>(sites: &[Site]) -> Way<'a> {
     })
 }
 
-fn by_delaunator<'a>(sites: &[Site]) -> Way<'a> {
+fn by_delaunator<'a>(sites: &[Site]) -> Method<'a> {
     let points: Vec<_> = sites.iter().map(|s| Point { x: f64::from(s[0]), y: f64::from(s[1]) }).collect();
     library("delaunator", move || {
         black_box(delaunator::triangulate(&points));
     })
 }
 
-fn library<'a>(name: &str, mut f: impl FnMut() + 'a) -> Way<'a> {
+fn library<'a>(name: &str, mut f: impl FnMut() + 'a) -> Method<'a> {
     let run = move || Ok(Run { total: Some(timed(&mut f).1), ..Run::default() });
-    Way { name: name.into(), side: None, run: Box::new(run) }
+    Method { name: name.into(), side: None, run: Box::new(run) }
 }
 
-/// The shaders' twins, once each.
+/// Times the shaders' twins, once each.
 fn plain_loops(sites: &[Site], side: u32) -> Outcome {
     let (size, pixels) = placed(sites, side)?;
     let (texture, g1) = timed(|| twins::write_sites(size, &pixels));
@@ -220,7 +224,7 @@ fn plain_loops(sites: &[Site], side: u32) -> Outcome {
     Ok(Run { steps, ..Run::default() })
 }
 
-/// Somebody who makes no diagrams, but keeps what is asked of him.
+/// A backend that computes no diagrams, but keeps the last request.
 struct Listener(u32, Mutex<Option<(TextureSize, Vec<u32>)>>);
 
 impl DiagramBackend for Listener {
@@ -236,7 +240,7 @@ impl DiagramBackend for Listener {
     }
 }
 
-/// The texture of `sites`, and the pixel of each that has one.
+/// Returns the size of the texture of `sites`, and the pixel of each site that has one.
 fn placed(sites: &[Site], side: u32) -> Result<(TextureSize, Vec<u32>), String> {
     let listener = Listener(side, Mutex::new(None));
     let done = triangulate_with(sites, Some(&listener), &mut PipelineBuffers::default());
@@ -244,12 +248,12 @@ fn placed(sites: &[Site], side: u32) -> Result<(TextureSize, Vec<u32>), String> 
     heard.ok_or_else(|| done.err().map_or("no texture was made".into(), |why| why.to_string()))
 }
 
-// Ways on the GPU.
+// Methods on the GPU.
 
 struct Gpu {
     /// The adapter's name.
     name: String,
-    /// Whether it is one, or only a program that behaves so.
+    /// Whether it is hardware or a software renderer.
     kind: &'static str,
     engine: GpuEngine,
     buffers: BufferSet,
@@ -270,14 +274,14 @@ impl Gpu {
         })
     }
 
-    /// Steps G1 to G6, by the GPU's own timestamps.
+    /// Times steps G1 to G6 by the GPU's own timestamps.
     fn run(
         &mut self,
         size: TextureSize,
         pixels: &[u32],
         voronoi: VoronoiMethod,
     ) -> Result<[f64; GpuStep::ALL.len()], GpuError> {
-        // At most two triangles a site, and some for what the texture gets wrong.
+        // A site has at most two triangles; leave some room for what the texture gets wrong.
         let room = 2 * pixels.len() + pixels.len() / 4 + 64;
         let mut recording = Recording::labels(size, pixels.to_vec(), voronoi);
         recording.commands.extend(Recording::triangles(size, room as u32).commands);
@@ -287,13 +291,13 @@ impl Gpu {
     }
 }
 
-/// The exact shaders, and the pipeline with their help.
-fn on_gpu_alone_and_helped<'a>(gpu: &'a RefCell<Gpu>, sites: &'a [Site], side: u32) -> Vec<Way<'a>> {
+/// Returns the exact shaders, and the pipeline with their help.
+fn on_gpu_alone_and_helped<'a>(gpu: &'a RefCell<Gpu>, sites: &'a [Site], side: u32) -> Vec<Method<'a>> {
     let shaders = by_shaders(gpu, sites, side, VoronoiMethod::Exact);
     std::iter::once(shaders).chain(on_gpu_and_cpu(gpu.borrow().kind, sites, side)).collect()
 }
 
-fn by_shaders<'a>(gpu: &'a RefCell<Gpu>, sites: &[Site], side: u32, voronoi: VoronoiMethod) -> Way<'a> {
+fn by_shaders<'a>(gpu: &'a RefCell<Gpu>, sites: &[Site], side: u32, voronoi: VoronoiMethod) -> Method<'a> {
     let placed = placed(sites, side);
     let transform = if voronoi == VoronoiMethod::Jfa { "1+JFA" } else { "exact" };
     let name = format!("{}, shaders, {transform}", gpu.borrow().kind);
@@ -305,31 +309,31 @@ fn by_shaders<'a>(gpu: &'a RefCell<Gpu>, sites: &[Site], side: u32, voronoi: Vor
         }
         Ok(Run { steps: GpuStep::ALL.map(GpuStep::name).into_iter().zip(times).collect(), ..Run::default() })
     };
-    Way { name, side: Some(side), run: Box::new(run) }
+    Method { name, side: Some(side), run: Box::new(run) }
 }
 
-/// The pipeline with the GPU's help, if it gives any.
-fn on_gpu_and_cpu<'a>(kind: &str, sites: &'a [Site], side: u32) -> Option<Way<'a>> {
+/// Returns the pipeline with the GPU's help, if there is a GPU.
+fn on_gpu_and_cpu<'a>(kind: &str, sites: &'a [Site], side: u32) -> Option<Method<'a>> {
     let options = GpuOptions { texture: TextureSide::Side(side), ..GpuOptions::default() };
     let executor = Executor::start(&options, GpuUse::Required, u64::MAX).ok()?;
     let mut buffers = PipelineBuffers::default();
     let run = move || {
         let mut run = pipeline(&mut buffers, |buffers| triangulate_with(sites, Some(&executor), buffers))?;
         if run.counts.on_gpu == 0 {
-            return Err("the GPU did not take it".into());
+            return Err("the GPU did not compute the diagram".into());
         }
-        // In the order of what happens, and named after what is left here.
+        // Put the steps in the order in which they happen, and name them after what is left on the CPU.
         run.steps.rotate_right(1);
         run.steps.swap(0, 1);
         (run.steps[1].0, run.steps[2].0) = ("upload, G1 to G3, read back", "G4-G6 triangles, most flips");
         Ok(run)
     };
-    Some(Way { name: format!("{kind} and CPU"), side: Some(side), run: Box::new(run) })
+    Some(Method { name: format!("{kind} and CPU"), side: Some(side), run: Box::new(run) })
 }
 
 // Tables.
 
-/// A name for rows that belong together, and an outcome for each column.
+/// The name of a group of rows, and an outcome for each column.
 type Group = (String, Vec<Outcome>);
 
 fn find(runs: &[Measured], name: &str, side: Option<u32>) -> Outcome {
@@ -337,13 +341,13 @@ fn find(runs: &[Measured], name: &str, side: Option<u32>) -> Outcome {
     found.map_or_else(|| Err("not measured".into()), |run| run.2.clone())
 }
 
-/// The groups of ways with a texture of `side`; a column for every number of sites.
+/// Returns the groups of methods with a texture of `side`, with a column for every number of sites.
 fn by_sites(runs: &[Vec<Measured>], side: u32) -> Vec<Group> {
     let names = runs[0].iter().filter(|run| run.1 == Some(side)).map(|run| run.0.clone());
     names.map(|name| (name.clone(), runs.iter().map(|runs| find(runs, &name, Some(side))).collect())).collect()
 }
 
-/// The groups of ways that have textures; a column for every side.
+/// Returns the groups of methods that have textures, with a column for every side.
 fn by_side(runs: &[Measured]) -> Vec<Group> {
     let names = runs.iter().filter(|run| run.1 == Some(FIXED)).map(|run| run.0.clone());
     names.map(|name| (name.clone(), SIDES.map(|side| find(runs, &name, Some(side))).into())).collect()
@@ -361,11 +365,11 @@ fn print_head(title: &str, columns: &[String]) {
     println!("\n{title}\n\n| | {} |\n|---{}|", columns.join(" | "), "|---".repeat(columns.len()));
 }
 
-/// The total of every way: milliseconds, and in brackets how often it fits into `spade`'s.
+/// Prints the total of every method in milliseconds, and in brackets the time of `spade` divided by it.
 fn print_totals(title: &str, runs: &[Vec<Measured>]) {
     print_head(title, &SITES.map(thousands));
-    let ways = runs[0].iter().filter(|run| run.2.as_ref().map_or(true, |run| run.total.is_some()));
-    for (name, side, _) in ways {
+    let methods = runs[0].iter().filter(|run| run.2.as_ref().map_or(true, |run| run.total.is_some()));
+    for (name, side, _) in methods {
         let texture = match (side, name == CPU) {
             (Some(side), _) => format!(", {side} x {side}"),
             (None, true) => ", 5 pixels a site".into(),
@@ -378,10 +382,10 @@ fn print_totals(title: &str, runs: &[Vec<Measured>]) {
         let cells: Vec<_> = runs.iter().map(cell).collect();
         println!("| {name}{texture} | {} |", cells.join(" | "));
     }
-    print_whys(runs.iter().flatten().map(|run| &run.2));
+    print_reasons(runs.iter().flatten().map(|run| &run.2));
 }
 
-/// The steps of every group, its total, and how often that fits into `spade`'s.
+/// Prints the steps of every group, its total, and the time of `spade` divided by the total.
 fn print_steps(title: &str, columns: &[String], groups: &[Group]) {
     print_head(title, columns);
     for (name, outcomes) in groups {
@@ -399,16 +403,16 @@ fn print_steps(title: &str, columns: &[String], groups: &[Group]) {
             row("x spade", &|run| format!("{:.2}", run.times_spade));
         }
     }
-    print_whys(groups.iter().flat_map(|group| &group.1));
+    print_reasons(groups.iter().flat_map(|group| &group.1));
 }
 
-/// Why there are cells with nothing in them.
-fn print_whys<'a>(outcomes: impl Iterator<Item = &'a Outcome>) {
-    let whys: BTreeSet<_> = outcomes.filter_map(|outcome| outcome.as_ref().err()).collect();
-    whys.iter().for_each(|why| println!("\n-: {why}"));
+/// Prints why some cells are empty.
+fn print_reasons<'a>(outcomes: impl Iterator<Item = &'a Outcome>) {
+    let reasons: BTreeSet<_> = outcomes.filter_map(|outcome| outcome.as_ref().err()).collect();
+    reasons.iter().for_each(|why| println!("\n-: {why}"));
 }
 
-/// What the steps met, as percentages of the sites.
+/// Prints what the steps counted, as percentages of the sites.
 fn print_counts(outcomes: &[Outcome]) {
     print_head("Of a hundred sites (CPU)", &SIDES.map(|side| side.to_string()));
     let count = |label: &str, of: fn(&PipelineCounts) -> u64| {
@@ -417,9 +421,9 @@ fn print_counts(outcomes: &[Outcome]) {
         println!("| {label} | {} |", cells.join(" | "));
     };
     count("missing", |c| c.missing);
-    count("moved to the pixel beside", |c| c.moved);
+    count("moved to a neighbouring pixel", |c| c.moved);
     count("islands", |c| c.islands);
     count("inverted triangles", |c| c.inverted);
-    count("taken out for it", |c| c.removed);
+    count("removed for it", |c| c.removed);
     count("flips", |c| c.flips);
 }

@@ -1,12 +1,12 @@
-// Step G1: write the sites into the texture. Of several sites of one pixel the first in the list wins, whatever the order in
-// which the invocations run: `texture` holds the greatest complement of a site's number, so that 0 means "no site".
+// Step G1: write the sites into the texture. Of several sites in one pixel, the first in the list wins, in whatever order the
+// invocations run: `texture` holds the greatest complement of a site's number, and 0 means "no site".
 
 struct Params {
     width: u32,
     height: u32,
-    // Sites in the list.
+    // The number of sites in the list.
     sites: u32,
-    // Invocations in a row of the dispatch.
+    // The number of invocations in a row of the dispatch.
     invocations: u32,
 }
 

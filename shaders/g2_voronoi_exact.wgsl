@@ -1,13 +1,12 @@
-// Step G2, exact: the label of a pixel is the pixel (y << 16 | x) of its nearest site, nearest being least (d^2, x, y) of the
-// site's pixel.
+// Step G2, exact: the label of a pixel is the pixel (y << 16 | x) of its nearest site: the site's pixel with the least (d^2, x, y).
 //
-// Columns, then rows. A column is cut in bands of 32 rows (parallel banding, Cao et al. 2010), each of which is one word: bit i
-// says that row i of the band has a site. With the nearest sites south and north of the band beside it, the nearest site of any
-// pixel in its own column is two bit operations away and need not be stored.
+// Columns come first, then rows. A column is cut into bands of 32 rows (parallel banding, Cao et al. 2010). Each band is one word,
+// whose bit i says whether row i of the band has a site. Together with the nearest sites south and north of the band, two bit
+// operations find the nearest site of any pixel in its own column, so it need not be stored.
 //
-// Along a row the columns of the labels never decrease, so that a pixel needs to look only at the columns between the labels of
-// two pixels already known. `rows` is called with wide strides first (256, then 16, then 1), which bounds the work at about a
-// hundred columns a pixel on average, whatever the input.
+// Along a row, the columns of the labels never decrease, so a pixel examines only the columns between the labels of two pixels that
+// are already known. `rows` runs with wide strides first (256, then 16, then 1). That bounds the work at about a hundred columns per
+// pixel on average, for any input.
 
 const NONE = 0xffffffffu;
 const BAND = 32u;
@@ -15,10 +14,10 @@ const BAND = 32u;
 struct Params {
     width: u32,
     height: u32,
-    // `rows`: the first row of this dispatch, and how far apart its pixels are.
+    // `rows`: the first row of this dispatch, and the distance between its pixels.
     first_row: u32,
     stride: u32,
-    // `rows`: how far apart the pixels are whose labels are known; 0: none is known.
+    // `rows`: the distance between the pixels whose labels are known; 0 if none is known.
     known: u32,
 }
 
@@ -32,7 +31,7 @@ struct Params {
 @group(0) @binding(7) var<storage, read> north: array<u32>;
 @group(0) @binding(8) var<storage, read_write> labels: array<u32>;
 
-// One invocation a column and band: gathers the band's word.
+// Gathers the word of a band. One invocation per column and band.
 @compute @workgroup_size(64)
 fn columns(@builtin(global_invocation_id) id: vec3u) {
     let x = id.x;
@@ -50,7 +49,7 @@ fn columns(@builtin(global_invocation_id) id: vec3u) {
     words_out[id.y * params.width + x] = word;
 }
 
-// One invocation a column: carries the nearest sites over the bands.
+// Carries the nearest sites across the bands. One invocation per column.
 @compute @workgroup_size(64)
 fn carry(@builtin(global_invocation_id) id: vec3u) {
     let x = id.x;
@@ -76,7 +75,8 @@ fn carry(@builtin(global_invocation_id) id: vec3u) {
     }
 }
 
-// The row of the site of column x that is nearest to row y; of two, the southern one; NONE if the column is empty.
+// Returns the row of the site in column x that is nearest to row y, or NONE if the column is empty. Of two at the same distance,
+// the southern one wins.
 fn nearest_in_column(x: u32, y: u32) -> u32 {
     let at = y / BAND * params.width + x;
     let bit = y % BAND;
@@ -97,7 +97,7 @@ fn nearest_in_column(x: u32, y: u32) -> u32 {
     return select(n, s, n == NONE || y - s <= n - y);
 }
 
-// One invocation for every stride-th pixel of a row: labels it.
+// Labels every stride-th pixel of a row. One invocation per pixel.
 @compute @workgroup_size(32, 8)
 fn rows(@builtin(global_invocation_id) id: vec3u) {
     let x = id.x * params.stride;
@@ -123,7 +123,7 @@ fn rows(@builtin(global_invocation_id) id: vec3u) {
     labels[row + x] = nearest(x, y, low, high);
 }
 
-// The label of pixel (x, y), known to lie in the columns from low to high: outward from x.
+// Returns the label of pixel (x, y), which is known to lie in the columns from low to high. Searches outward from x.
 fn nearest(x: u32, y: u32, low: u32, high: u32) -> u32 {
     var best = NONE;
     var label = NONE;
@@ -134,7 +134,7 @@ fn nearest(x: u32, y: u32, low: u32, high: u32) -> u32 {
     if x > high {
         r = x - high;
     }
-    // Equal distance must still be looked at in the west, where it wins.
+    // A site at the same distance in the west still wins, so the loop includes equality.
     while r * r <= best && (x >= low + r || x + r <= high) {
         if x >= low + r && x - r <= high {
             let row = nearest_in_column(x - r, y);

@@ -1,6 +1,6 @@
-// Step G2, the paper's 1+JFA: every pixel looks at the labels of the eight pixels `step` away and takes the nearest site, nearest
-// being least (d^2, x, y) of the site's pixel; with step 1, then with half the texture's side, a quarter, and so on down to 1.
-// A few pixels in a million end with a label that is not the nearest.
+// Step G2, the paper's 1+JFA: every pixel examines the labels of the eight pixels `step` away and takes the nearest site: the site's
+// pixel with the least (d^2, x, y). The step is 1, then half the texture's side, a quarter, and so on down to 1. A few pixels in a
+// million end with a label that is not the nearest.
 
 const NONE = 0xffffffffu;
 
@@ -59,7 +59,7 @@ fn flood(@builtin(global_invocation_id) id: vec3u) {
     after[u32(y) * params.width + u32(x)] = label;
 }
 
-// Whether label a comes before label b by (x, y).
+// Returns whether label a comes before label b in the order of (x, y).
 fn is_before(a: u32, b: u32) -> bool {
     let turned_a = (a << 16u) | (a >> 16u);
     let turned_b = (b << 16u) | (b >> 16u);

@@ -1,17 +1,17 @@
-// Step G3: a pixel that has lost touch with its site is given the colour of the nearest other site among its neighbours'. It has
-// lost touch if none of the neighbours that lie towards the site (three, or one where the site lies straight along an
-// axis) has its colour.
+// Step G3: a pixel that has lost touch with its site takes the colour of the nearest other site among those of its neighbours. It has
+// lost touch if none of the neighbours in the direction of the site (three, or one if the site lies straight along an axis) has its
+// colour.
 //
-// A round is three dispatches: `find` lists all such pixels of the texture with their new colours, `arrange` says how many
-// workgroups the next two need, `recolour` writes the colours. So the result does not depend on the order of the list. If it
-// overflows, which takes a texture with islands everywhere, the labels stay as they are.
+// A round is three dispatches: `find` lists all such pixels of the texture with their new colours, `arrange` computes how many
+// workgroups the next two dispatches need, and `recolour` writes the colours. So the result does not depend on the order of the list.
+// If the list overflows, which takes a texture full of islands, the labels stay as they are.
 
 const NONE = 0xffffffffu;
 
 struct Params {
     width: u32,
     height: u32,
-    // How many pixels the list has room for.
+    // The number of pixels for which the list has room.
     room: u32,
     // Workgroups of `find` in x and y.
     find_x: u32,
@@ -20,7 +20,7 @@ struct Params {
 
 struct Islands {
     count: atomic<u32>,
-    // Pixel and new label, two numbers each.
+    // Two numbers per island: its pixel and its new label.
     list: array<u32>,
 }
 
@@ -28,7 +28,7 @@ struct Islands {
 @group(0) @binding(1) var<storage, read> labels: array<u32>;
 @group(0) @binding(2) var<storage, read_write> islands: Islands;
 @group(0) @binding(3) var<storage, read_write> labels_out: array<u32>;
-// Workgroups of the next `recolour` (0 to 2) and of the next `find` (3 to 5).
+// The workgroups of the next `recolour` (numbers 0 to 2) and of the next `find` (numbers 3 to 5).
 @group(0) @binding(4) var<storage, read_write> workgroups: array<u32>;
 
 fn label_at(p: vec2i) -> u32 {
@@ -42,20 +42,20 @@ fn is_island(p: vec2i, label: u32) -> bool {
     if all(towards == vec2i(0)) {
         return false;
     }
-    // Where the site lies straight along an axis, two of the three are the same pixel and the third is p itself.
+    // If the site lies straight along an axis, two of the three neighbours are the same pixel and the third is p itself.
     let touches_x = towards.x != 0 && label_at(p + along_x) == label;
     let touches_y = towards.y != 0 && label_at(p + along_y) == label;
     return !touches_x && !touches_y && label_at(p + towards) != label;
 }
 
-// Whether label a comes before label b by (x, y).
+// Returns whether label a comes before label b in the order of (x, y).
 fn is_before(a: u32, b: u32) -> bool {
     let turned_a = (a << 16u) | (a >> 16u);
     let turned_b = (b << 16u) | (b >> 16u);
     return turned_a < turned_b;
 }
 
-// The nearest site among the neighbours', least (d^2, x, y), but not `label`.
+// Returns the nearest site, with the least (d^2, x, y), among the labels of the neighbours other than `label`.
 fn other_colour(p: vec2i, label: u32) -> u32 {
     let size = vec2i(i32(params.width), i32(params.height));
     var best = NONE;
@@ -105,13 +105,13 @@ fn find(@builtin(global_invocation_id) id: vec3u) {
 @compute @workgroup_size(1)
 fn arrange() {
     let count = atomicLoad(&islands.count);
-    let goes_on = count > 0u && count <= params.room;
-    let groups = select(0u, (count + 63u) / 64u, goes_on);
+    let is_active = count > 0u && count <= params.room;
+    let groups = select(0u, (count + 63u) / 64u, is_active);
     workgroups[0] = min(groups, 65535u);
     workgroups[1] = (groups + 65534u) / 65535u;
     workgroups[2] = 1u;
-    workgroups[3] = select(0u, params.find_x, goes_on);
-    workgroups[4] = select(0u, params.find_y, goes_on);
+    workgroups[3] = select(0u, params.find_x, is_active);
+    workgroups[4] = select(0u, params.find_y, is_active);
     workgroups[5] = 1u;
 }
 

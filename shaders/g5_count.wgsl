@@ -1,18 +1,18 @@
-// Step G5: prefix sums of the numbers of triangles, so that step G6 knows where to write and costs as much as its output.
+// Step G5: prefix sums of the numbers of triangles, so that step G6 knows where to write and does no more work than its output needs.
 //
-// Without barriers: `sum` adds 64 neighbours of one level up to one number of the next, until one is left, the total; `spread`
-// goes down again and replaces every number by the sum of those before it. All levels lie in one buffer.
+// There are no barriers. `sum` adds 64 neighbours of one level to one number of the next, until one number is left, the total.
+// `spread` then goes down again and replaces every number by the sum of those before it. All levels lie in one buffer.
 
 const BLOCK = 64u;
 
 struct Params {
-    // Where the level starts and how many numbers it has.
+    // The position of the level's first number, and how many numbers the level has.
     first: u32,
     length: u32,
-    // Where the next level starts; `spread`: 0 in `has_next` if the next level is the total.
+    // The position of the next level's first number. In `spread`, `has_next` is 0 if the next level is the total.
     next: u32,
     has_next: u32,
-    // Invocations in a row of the dispatch.
+    // The number of invocations in a row of the dispatch.
     invocations: u32,
 }
 

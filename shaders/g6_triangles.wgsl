@@ -1,13 +1,13 @@
-// Step G6: the triangles, as triples of site numbers, counterclockwise from the southwestern pixel's site; in the order of the
-// corners, row by row. Four colours make two triangles, by the diagonal from the southwest.
+// Step G6: write the triangles as triples of site numbers, counterclockwise from the site of the southwestern pixel, in the order of
+// the corners, row by row. Four colours make two triangles, cut along the diagonal from the southwest.
 
 struct Params {
     width: u32,
     height: u32,
     segments: u32,
-    // Invocations in a row of the dispatch.
+    // The number of invocations in a row of the dispatch.
     invocations: u32,
-    // How many triangles there is room for.
+    // The number of triangles for which there is room.
     room: u32,
 }
 
@@ -15,7 +15,7 @@ struct Params {
 @group(0) @binding(1) var<storage, read> labels: array<u32>;
 @group(0) @binding(2) var<storage, read> texture: array<u32>;
 @group(0) @binding(3) var<storage, read> vertices: array<vec2u>;
-// Triangles before every segment.
+// The number of triangles before every segment.
 @group(0) @binding(4) var<storage, read> before: array<u32>;
 @group(0) @binding(5) var<storage, read_write> triangles: array<u32>;
 
@@ -55,7 +55,7 @@ fn emit(@builtin(global_invocation_id) id: vec3u) {
             put(at + 1u, sw, ne, nw);
             at += 2u;
         } else {
-            // One neighbouring pair has one colour: leave its second pixel out.
+            // One pair of neighbours has the same colour: skip its second pixel.
             let b = select(se, ne, se == sw);
             let c = select(nw, ne, nw == sw || nw == ne);
             put(at, sw, b, c);

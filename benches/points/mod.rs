@@ -1,8 +1,8 @@
-//! What the benchmarks share: made-up sites, and the median.
+//! What the benchmarks share: generated sites, and the median.
 
 use gdt_batch::geometry::Site;
 
-/// xorshift64*.
+/// A small generator: xorshift64*.
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
@@ -19,26 +19,26 @@ impl Random {
     }
 }
 
-/// `n` sites in a square.
+/// Returns `n` sites in a square, uniformly distributed.
 pub(crate) fn uniform(n: usize) -> Vec<Site> {
     let mut random = Random(1);
     distinct((0..n).map(|_| [0; 2].map(|_| (random.unit() * 1e8) as i32)).collect())
 }
 
-/// `n` sites round a centre, normally distributed.
+/// Returns `n` sites around a centre, normally distributed.
 pub(crate) fn gaussian(n: usize) -> Vec<Site> {
     let mut random = Random(2);
     distinct((0..n).map(|_| random.normal().map(|c| (c * 1e7) as i32)).collect())
 }
 
-/// Distinct sites in the order of their first use.
+/// Returns the distinct sites, in the order in which they first occur.
 pub(crate) fn distinct(mut sites: Vec<Site>) -> Vec<Site> {
     let mut seen = std::collections::HashSet::with_capacity(sites.len());
     sites.retain(|&s| seen.insert(s));
     sites
 }
 
-/// The middle one of `times`.
+/// Returns the median of `times`.
 pub(crate) fn median(mut times: Vec<f64>) -> f64 {
     times.sort_by(f64::total_cmp);
     times[times.len() / 2]

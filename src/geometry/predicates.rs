@@ -142,7 +142,7 @@ mod tests {
     use crate::geometry::lattice::REACH;
     use proptest::prelude::*;
 
-    /// xorshift64*, within 2^bits of zero.
+    /// Returns a number within 2^bits of zero (xorshift64*).
     fn number(state: &mut u64, bits: u32) -> i32 {
         *state ^= *state >> 12;
         *state ^= *state << 25;
@@ -207,7 +207,7 @@ mod tests {
         [-reach..=reach, -reach..=reach]
     }
 
-    /// A distance from zero, of any order of magnitude.
+    /// Generates a distance from zero, of any order of magnitude.
     fn reach() -> impl Strategy<Value = i32> {
         (0..=29).prop_map(|bits| 1 << bits)
     }
@@ -216,13 +216,13 @@ mod tests {
         reach().prop_flat_map(|reach| [(); 4].map(|()| site_within(reach)))
     }
 
-    /// Coordinates at the ends of the range, so that differences reach 2^30.
+    /// Generates coordinates at the ends of the range, so that differences reach 2^30.
     fn extreme() -> impl Strategy<Value = [Site; 4]> {
         let coordinate = || prop_oneof![Just(-REACH), Just(REACH), Just(0), -REACH..=-REACH + 2, REACH - 2..=REACH];
         [(); 4].map(|()| [coordinate(), coordinate()])
     }
 
-    /// Sites on the line through two sites, or up to two steps off.
+    /// Generates sites on the line through two sites, or up to two steps off.
     fn near_a_line() -> impl Strategy<Value = [Site; 4]> {
         let parts = (
             site_within(REACH),
@@ -238,7 +238,7 @@ mod tests {
         })
     }
 
-    /// Four sites of one circle: a site, turned by right angles and mirrored around a centre.
+    /// Generates four sites of one circle: a site turned by right angles and mirrored around a centre.
     fn cocircular() -> impl Strategy<Value = [Site; 4]> {
         (site_within(REACH / 2), site_within(REACH / 2), [(); 4].map(|()| 0..8usize)).prop_map(
             |([x, y], [p, q], turns)| {
@@ -248,7 +248,7 @@ mod tests {
         )
     }
 
-    /// The same, up to one step off the circle.
+    /// Generates four sites up to one step off a circle.
     fn near_a_circle() -> impl Strategy<Value = [Site; 4]> {
         (cocircular(), [(); 4].map(|()| site_within(1))).prop_map(|(sites, off)| {
             [0, 1, 2, 3].map(|i| clamped([0, 1].map(|k| i64::from(sites[i][k]) + i64::from(off[i][k]))))

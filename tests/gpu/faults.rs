@@ -1,4 +1,4 @@
-//! What goes wrong on a device is an answer, never a panic.
+//! Failures of a device are errors, never panics.
 
 use super::rig::Rig;
 use gdt_batch::gpu::buffer_id::BufferId;
@@ -8,7 +8,7 @@ use gdt_batch::gpu::steps::{GpuCommand, Recording};
 use gdt_batch::gpu::texture_size::TextureSize;
 
 #[test]
-fn a_lost_device_says_so() {
+fn a_lost_device_is_an_error() {
     let Some(mut rig) = Rig::new() else { return };
     let recording =
         Recording::labels(TextureSize { width: 100, height: 100 }, vec![5, 7 << 16 | 9], VoronoiMethod::Exact);
@@ -21,7 +21,7 @@ fn a_lost_device_says_so() {
 }
 
 #[test]
-fn a_texture_beyond_the_limits_does_not_fit_and_the_device_lives_on() {
+fn a_texture_beyond_the_limits_does_not_fit_and_the_device_still_works() {
     let Some(mut rig) = Rig::new() else { return };
     let too_large = Recording { commands: vec![GpuCommand::Reserve(BufferId::Labels, 1 << 40)] };
     assert_eq!(rig.try_run(&too_large), Err(GpuError::OutOfMemory));
@@ -30,7 +30,7 @@ fn a_texture_beyond_the_limits_does_not_fit_and_the_device_lives_on() {
 }
 
 #[test]
-fn a_buffer_that_nobody_made_is_refused() {
+fn a_buffer_that_was_never_reserved_is_refused() {
     let Some(mut rig) = Rig::new() else { return };
     let error = rig.try_run(&Recording { commands: vec![GpuCommand::Clear(BufferId::Counts, 4)] }).unwrap_err();
     assert!(matches!(error, GpuError::Refused(_)), "{error}");

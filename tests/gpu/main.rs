@@ -1,4 +1,4 @@
-//! The shaders against their plain Rust twins, number by number, on whatever adapter there is: software Vulkan will do.
+//! The shaders against their plain Rust twins, number by number, on any adapter. Software Vulkan is sufficient.
 
 mod faults;
 mod leaves;

@@ -1,8 +1,8 @@
-//! Textures of sites to try things on.
+//! Textures of sites for the tests.
 
 use gdt_batch::gpu::texture_size::TextureSize;
 
-/// A small generator (xorshift64*), so that cases are the same everywhere.
+/// A small generator (xorshift64*), so that cases are the same on every machine.
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
@@ -13,12 +13,12 @@ impl Random {
         ((self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 32) % u64::from(end)) as u32
     }
 
-    /// `count` pixels (y << 16 | x), some of them maybe the same.
+    /// Returns `count` pixels (y << 16 | x), which may contain duplicates.
     pub(crate) fn pixels(&mut self, size: TextureSize, count: usize) -> Vec<u32> {
         (0..count).map(|_| self.below(size.height) << 16 | self.below(size.width)).collect()
     }
 
-    /// Pixels in `spots` heaps, which leave wide voids.
+    /// Returns pixels in `spots` heaps with wide voids between them.
     pub(crate) fn heaps(&mut self, size: TextureSize, count: usize, spots: usize) -> Vec<u32> {
         let centres = self.pixels(size, spots);
         let reach = (size.width.min(size.height) / 16).max(1);
@@ -32,7 +32,7 @@ impl Random {
     }
 }
 
-/// What the tests go through: a name, the texture's size, the pixels of the sites.
+/// Returns the cases of the tests: a name, the size of the texture, the pixels of the sites.
 pub(crate) fn cases() -> Vec<(&'static str, TextureSize, Vec<u32>)> {
     let mut random = Random(0x9e37_79b9_7f4a_7c15);
     let size = |width, height| TextureSize { width, height };

@@ -1,4 +1,4 @@
-//! A machine on the first adapter that will do, and how to get numbers back from it.
+//! An engine on the first suitable adapter, and how to get numbers back from it.
 
 use gdt_batch::gpu::buffer_id::BufferId;
 use gdt_batch::gpu::buffers::BufferSet;
@@ -15,7 +15,7 @@ pub(crate) struct Rig {
 }
 
 impl Rig {
-    /// `None`, said plainly, on a machine without any adapter.
+    /// Opens an adapter. Returns `None`, with a message, on a machine without any adapter.
     pub(crate) fn new() -> Option<Rig> {
         let adapters = device::adapters();
         let infos: Vec<_> = adapters.iter().map(|adapter| adapter.get_info()).collect();
@@ -26,18 +26,18 @@ impl Rig {
             }
             Err(why) => {
                 assert!(std::env::var_os("GDT_TEST_ALL").is_none(), "{why}");
-                eprintln!("skipped: {why}; Debian's mesa-vulkan-drivers brings a software GPU that will do");
+                eprintln!("skipped: {why}; Debian's mesa-vulkan-drivers has a software GPU that is sufficient");
                 None
             }
         }
     }
 
-    /// The pixels of the largest texture.
+    /// Returns the number of pixels of the largest texture.
     pub(crate) fn max_pixels(&self) -> u64 {
         device::max_pixels(&self.engine.device().limits)
     }
 
-    /// Every step against its twin.
+    /// Compares every step with its twin.
     pub(crate) fn compare(&mut self, size: TextureSize, pixels: &[u32]) -> Vec<StepComparison> {
         compare(&mut self.engine, &mut self.buffers, size, pixels).expect("the steps run")
     }
@@ -56,8 +56,8 @@ impl Rig {
         self.engine.start(&mut self.buffers, recording).expect("the steps run");
     }
 
-    /// The first `count` numbers of buffer `name`.
-    pub(crate) fn numbers(&mut self, name: BufferId, count: u64) -> Vec<u32> {
-        self.engine.numbers(&mut self.buffers, name, count).expect("they come back")
+    /// Returns the first `count` numbers of buffer `id`.
+    pub(crate) fn numbers(&mut self, id: BufferId, count: u64) -> Vec<u32> {
+        self.engine.numbers(&mut self.buffers, id, count).expect("they come back")
     }
 }

@@ -1,4 +1,4 @@
-//! Every step against its twin: random, dense, sparse, tiny, one row, one column, full, empty.
+//! Every step against its twin, on textures that are random, dense, sparse, tiny, one row, one column, full or empty.
 
 use super::random::{Random, cases};
 use super::rig::Rig;
@@ -21,8 +21,8 @@ fn every_step_is_the_same_bit_for_bit() {
     }
 }
 
-/// The longest rows and columns there are; the whole square where the adapter binds so much, as no software does.
-/// Minutes on software, so GDT_TEST_LARGE=1 asks for it.
+/// Tests the longest rows and columns, and the whole square if the adapter can bind it, which no software renderer can. It takes
+/// minutes on software, so it needs GDT_TEST_LARGE=1.
 #[test]
 fn the_largest_texture_is_the_same_bit_for_bit() {
     if std::env::var_os("GDT_TEST_LARGE").is_none() {
@@ -33,7 +33,7 @@ fn the_largest_texture_is_the_same_bit_for_bit() {
     let across = (rig.max_pixels() / u64::from(side)).min(u64::from(side)) as u32;
     for (width, height) in [(side, across), (across, side)] {
         let size = TextureSize { width, height };
-        // Triangles of more sites would not fit a buffer of software.
+        // The triangles of more sites would not fit a buffer of a software renderer.
         for count in [40, size.pixels() as usize / 16] {
             let pixels = Random(11).pixels(size, count);
             let differing: Vec<_> = rig.compare(size, &pixels).into_iter().filter(|c| c.differing > 0).collect();
@@ -43,9 +43,9 @@ fn the_largest_texture_is_the_same_bit_for_bit() {
     }
 }
 
-/// The twin of the exact transform against the definition itself, and jump flooding not far from it.
+/// The twin of the exact transform agrees with the definition, and jump flooding almost does.
 #[test]
-fn the_twins_do_what_they_are_for() {
+fn the_twins_compute_nearest_sites() {
     let mut random = Random(3);
     for (width, height, count) in [(1, 1, 1), (40, 30, 7), (40, 30, 300), (3, 200, 9), (120, 2, 30), (64, 64, 1)] {
         let size = TextureSize { width, height };
@@ -63,9 +63,9 @@ fn the_twins_do_what_they_are_for() {
     }
 }
 
-/// Islands as they would be if the diagram were worse: whole patches of labels put where they do not belong.
+/// The islands of a worse diagram: whole patches of labels lie where they do not belong.
 #[test]
-fn islands_go_the_same_way_wherever_they_are() {
+fn islands_anywhere_are_removed_as_by_the_twin() {
     let Some(mut rig) = Rig::new() else { return };
     let size = TextureSize { width: 200, height: 150 };
     let mut random = Random(7);
