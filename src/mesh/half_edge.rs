@@ -1,54 +1,63 @@
 //! The topology of a triangulation: which sites make a triangle, and which triangles share an edge.
 
-/// The twin of a half-edge on the hull, which has no triangle on its other side.
-pub const HULL: u32 = u32::MAX;
+use crate::mesh::index::{HalfEdgeIndex, SiteIndex};
 
 /// A triangle mesh as half-edges. Half-edge `3 t + i` of triangle `t` starts at its `i`-th corner and ends at the next;
 /// corners are counterclockwise.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct HalfEdgeMesh {
-    /// The three corners of every triangle, as indices of sites.
-    pub triangles: Vec<[u32; 3]>,
-    /// For every half-edge the half-edge in the opposite direction, or [`HULL`]. Three times as long as `triangles`.
-    pub twins: Vec<u32>,
+    /// The three corners of every triangle.
+    pub triangles: Vec<[SiteIndex; 3]>,
+    /// The half-edge in the opposite direction of every half-edge, or [`HalfEdgeIndex::HULL`]. Three times as long as `triangles`.
+    pub twins: Vec<HalfEdgeIndex>,
 }
 
 impl HalfEdgeMesh {
+    /// Returns the three corners of every triangle as plain numbers.
+    pub fn corners(&self) -> &[[u32; 3]] {
+        bytemuck::cast_slice(&self.triangles)
+    }
+
+    /// Returns all half-edges.
+    pub fn half_edges(&self) -> impl Iterator<Item = HalfEdgeIndex> + use<> {
+        (0..self.twins.len()).map(HalfEdgeIndex::new)
+    }
+
+    /// Returns the half-edges on the hull.
+    pub fn hull(&self) -> impl Iterator<Item = HalfEdgeIndex> {
+        self.half_edges().filter(|&h| self.twin(h) == HalfEdgeIndex::HULL)
+    }
+
+    /// Returns the half-edge in the opposite direction of `h`, or [`HalfEdgeIndex::HULL`].
+    #[inline(always)]
+    pub fn twin(&self, h: HalfEdgeIndex) -> HalfEdgeIndex {
+        self.twins[h.get()]
+    }
+
     /// Returns the site at which half-edge `h` starts.
     #[inline(always)]
-    pub fn origin(&self, h: u32) -> u32 {
-        self.triangles[h as usize / 3][h as usize % 3]
+    pub fn origin(&self, h: HalfEdgeIndex) -> SiteIndex {
+        self.triangles[h.triangle()][h.corner()]
     }
 
     /// Returns the site at which half-edge `h` ends.
     #[inline(always)]
-    pub fn destination(&self, h: u32) -> u32 {
-        self.origin(next(h))
+    pub fn destination(&self, h: HalfEdgeIndex) -> SiteIndex {
+        self.origin(h.next())
     }
 
     /// Returns the corner of the triangle of `h` that is not on `h`.
     #[inline(always)]
-    pub fn apex(&self, h: u32) -> u32 {
-        self.origin(previous(h))
+    pub fn apex(&self, h: HalfEdgeIndex) -> SiteIndex {
+        self.origin(h.previous())
     }
 
-    /// Returns the triangles around the site at which half-edge `h` starts, counterclockwise. If the site lies on the hull, `h` must
+    /// Returns the positions of the triangles around the origin of `h`, counterclockwise. If the origin lies on the hull, `h` must
     /// lie on the hull too.
-    pub fn around(&self, h: u32) -> impl Iterator<Item = u32> {
-        let turn =
-            move |&outgoing: &u32| Some(self.twins[previous(outgoing) as usize]).filter(|&g| g != HULL && g != h);
-        std::iter::successors(Some(h), turn).map(|outgoing| outgoing / 3)
+    pub fn around(&self, h: HalfEdgeIndex) -> impl Iterator<Item = usize> {
+        let turn = move |outgoing: &HalfEdgeIndex| {
+            Some(self.twin(outgoing.previous())).filter(|&g| g != HalfEdgeIndex::HULL && g != h)
+        };
+        std::iter::successors(Some(h), turn).map(HalfEdgeIndex::triangle)
     }
-}
-
-/// Returns the half-edge after `h` in its triangle.
-#[inline(always)]
-pub fn next(h: u32) -> u32 {
-    if h % 3 == 2 { h - 2 } else { h + 1 }
-}
-
-/// Returns the half-edge before `h` in its triangle.
-#[inline(always)]
-pub fn previous(h: u32) -> u32 {
-    if h.is_multiple_of(3) { h + 2 } else { h - 1 }
 }

@@ -3,4 +3,5 @@
 
 pub mod flip;
 pub mod half_edge;
+pub mod index;
 pub mod region;

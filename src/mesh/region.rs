@@ -1,6 +1,7 @@
 //! The part of a triangulation within given edges.
 
-use crate::mesh::half_edge::{HULL, HalfEdgeMesh};
+use crate::mesh::half_edge::HalfEdgeMesh;
+use crate::mesh::index::{HalfEdgeIndex, SiteIndex};
 use crate::{Error, Result};
 
 /// Marks the triangles of `mesh` that lie to the left of the directed edges `boundary`, which are given by their sites: those that a
@@ -9,10 +10,10 @@ use crate::{Error, Result};
 /// # Errors
 /// [`Error::Broken`] if a boundary edge is missing from the mesh. This should be impossible: an edge of the triangulation of all
 /// sites is an edge of the triangulation of any subset with its two ends.
-pub fn covered(mesh: &HalfEdgeMesh, boundary: &[[u32; 2]]) -> Result<Vec<bool>> {
+pub fn covered(mesh: &HalfEdgeMesh, boundary: &[[SiteIndex; 2]]) -> Result<Vec<bool>> {
     let edges = EdgesByOrigin::new(boundary);
-    let half_edges = 0..mesh.twins.len() as u32;
-    let is_boundary: Vec<bool> = half_edges.clone().map(|h| edges.has(mesh.origin(h), mesh.destination(h))).collect();
+    let is_boundary: Vec<bool> =
+        mesh.half_edges().map(|h| edges.contains([mesh.origin(h), mesh.destination(h)])).collect();
     let found = is_boundary.iter().filter(|&&b| b).count();
     if found != boundary.len() {
         return Err(Error::Broken(format!(
@@ -22,15 +23,16 @@ pub fn covered(mesh: &HalfEdgeMesh, boundary: &[[u32; 2]]) -> Result<Vec<bool>> 
         )));
     }
     let mut covered = vec![false; mesh.triangles.len()];
-    let mut pending: Vec<u32> = half_edges.filter(|&h| is_boundary[h as usize]).map(|h| h / 3).collect();
+    let starts = mesh.half_edges().filter(|h| is_boundary[h.get()]);
+    let mut pending: Vec<usize> = starts.map(HalfEdgeIndex::triangle).collect();
     while let Some(triangle) = pending.pop() {
-        if std::mem::replace(&mut covered[triangle as usize], true) {
+        if std::mem::replace(&mut covered[triangle], true) {
             continue;
         }
-        for h in 3 * triangle..3 * triangle + 3 {
-            let twin = mesh.twins[h as usize];
-            if !is_boundary[h as usize] && twin != HULL {
-                pending.push(twin / 3);
+        for h in HalfEdgeIndex::of_triangle(triangle) {
+            let twin = mesh.twin(h);
+            if !is_boundary[h.get()] && twin != HalfEdgeIndex::HULL {
+                pending.push(twin.triangle());
             }
         }
     }
@@ -41,24 +43,24 @@ pub fn covered(mesh: &HalfEdgeMesh, boundary: &[[u32; 2]]) -> Result<Vec<bool>> 
 struct EdgesByOrigin {
     /// The position in `ends` of the first edge of each site, and the position after the last edge.
     first: Vec<u32>,
-    ends: Vec<u32>,
+    ends: Vec<SiteIndex>,
 }
 
 impl EdgesByOrigin {
-    fn new(edges: &[[u32; 2]]) -> EdgesByOrigin {
+    fn new(edges: &[[SiteIndex; 2]]) -> EdgesByOrigin {
         let mut edges = edges.to_vec();
         edges.sort_unstable();
-        let sites = edges.last().map_or(0, |edge| edge[0] + 1);
-        let mut first = Vec::with_capacity(sites as usize + 1);
+        let sites = edges.last().map_or(0, |edge| edge[0].get() + 1);
+        let mut first = Vec::with_capacity(sites + 1);
         for (at, edge) in (0..).zip(&edges) {
-            first.resize(edge[0] as usize + 1, at);
+            first.resize(edge[0].get() + 1, at);
         }
         first.push(edges.len() as u32);
         EdgesByOrigin { first, ends: edges.iter().map(|edge| edge[1]).collect() }
     }
 
-    fn has(&self, origin: u32, destination: u32) -> bool {
-        let origin = origin as usize;
+    fn contains(&self, [origin, destination]: [SiteIndex; 2]) -> bool {
+        let origin = origin.get();
         let range =
             (origin + 1 < self.first.len()).then(|| self.first[origin] as usize..self.first[origin + 1] as usize);
         range.is_some_and(|range| self.ends[range].contains(&destination))

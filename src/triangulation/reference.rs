@@ -5,12 +5,13 @@ use crate::Error;
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
 use crate::mesh::flip::legalize;
-use crate::mesh::half_edge::{HULL, HalfEdgeMesh};
+use crate::mesh::half_edge::HalfEdgeMesh;
+use crate::mesh::index::{HalfEdgeIndex, SiteIndex};
 use spade::{DelaunayTriangulation, HasPosition, InsertionError, Point2, Triangulation as _};
 
 struct SpadeVertex {
     site: Site,
-    index: u32,
+    index: SiteIndex,
 }
 
 impl HasPosition for SpadeVertex {
@@ -44,7 +45,7 @@ pub fn triangulate(sites: &[Site]) -> crate::Result<HalfEdgeMesh> {
 }
 
 fn vertices(sites: &[Site]) -> impl Iterator<Item = SpadeVertex> {
-    sites.iter().enumerate().map(|(i, &site)| SpadeVertex { site, index: i as u32 })
+    sites.iter().enumerate().map(|(i, &site)| SpadeVertex { site, index: SiteIndex::new(i) })
 }
 
 /// If the sites lie in a strip that is more than this many times longer than wide, they are inserted from one end to the other.
@@ -97,20 +98,20 @@ fn collinear(sites: &[Site]) -> bool {
 
 fn to_mesh(delaunay: &DelaunayTriangulation<SpadeVertex>) -> HalfEdgeMesh {
     let faces = delaunay.num_inner_faces();
-    let mut half_edge_of = vec![HULL; delaunay.num_directed_edges()];
-    let mut mesh = HalfEdgeMesh { triangles: Vec::with_capacity(faces), twins: vec![HULL; 3 * faces] };
+    let mut half_edge_of = vec![HalfEdgeIndex::HULL; delaunay.num_directed_edges()];
+    let mut mesh = HalfEdgeMesh { triangles: Vec::with_capacity(faces), twins: vec![HalfEdgeIndex::HULL; 3 * faces] };
     for face in delaunay.inner_faces() {
-        let first = 3 * mesh.triangles.len() as u32;
+        let half_edges = HalfEdgeIndex::of_triangle(mesh.triangles.len());
         let edges = face.adjacent_edges();
         mesh.triangles.push(edges.map(|e| e.from().data().index));
-        for (h, edge) in (first..).zip(&edges) {
+        for (h, edge) in half_edges.into_iter().zip(&edges) {
             half_edge_of[edge.fix().index()] = h;
         }
     }
     for face in delaunay.inner_faces() {
         for edge in face.adjacent_edges() {
             let h = half_edge_of[edge.fix().index()];
-            mesh.twins[h as usize] = half_edge_of[edge.rev().fix().index()];
+            mesh.twins[h.get()] = half_edge_of[edge.rev().fix().index()];
         }
     }
     mesh
@@ -137,7 +138,7 @@ mod tests {
             .collect();
         let mesh = triangulate(&circle).unwrap();
         assert_eq!(mesh.triangles.len(), circle.len() - 2);
-        assert!((0..mesh.twins.len() as u32).all(|h| !fails(&mesh, &circle, h)));
+        assert!(mesh.half_edges().all(|h| !fails(&mesh, &circle, h)));
     }
 
     #[test]
@@ -153,8 +154,8 @@ mod tests {
                 (0..3000).map(|i| [direction[0] * i + i % 3, direction[1] * i + i * i % 5]).collect();
             assert!(strip_axis(&strip).is_some());
             let mesh = triangulate(&strip).unwrap();
-            assert!((0..mesh.twins.len() as u32).all(|h| !fails(&mesh, &strip, h)));
-            let hull = mesh.twins.iter().filter(|twin| **twin == HULL).count();
+            assert!(mesh.half_edges().all(|h| !fails(&mesh, &strip, h)));
+            let hull = mesh.hull().count();
             assert_eq!(mesh.triangles.len(), 2 * strip.len() - hull - 2);
         }
         assert_eq!(strip_axis(&[[0, 0], [7, 1], [3, 9], [-4, 2]]), None);
@@ -167,7 +168,7 @@ mod tests {
             .triangles
             .iter()
             .map(|t| {
-                let mut corners = t.map(|v| sites[v as usize]);
+                let mut corners = t.map(|v| sites[v.get()]);
                 let first = (0..3).min_by_key(|&i| corners[i]).unwrap();
                 corners.rotate_left(first);
                 corners

@@ -23,7 +23,8 @@
 
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
-use crate::mesh::half_edge::{HULL, HalfEdgeMesh};
+use crate::mesh::half_edge::HalfEdgeMesh;
+use crate::mesh::index::{HalfEdgeIndex, SiteIndex};
 use crate::voronoi::closed_mesh::ClosedMesh;
 use crate::voronoi::edge_tester::EdgeTester;
 use crate::voronoi::index::{ClosedEdge, VertexIndex};
@@ -46,17 +47,17 @@ impl AcceptanceCheck {
         &mut self,
         closed: &ClosedMesh,
         sites: &[Site],
-        order: &[u32],
+        order: &[SiteIndex],
         mesh: &mut HalfEdgeMesh,
     ) -> Result<(), Rejection> {
         let sites = &sites[..order.len()];
-        let (n, front, records) = (sites.len(), closed.front().at(), closed.records());
+        let (n, front, records) = (sites.len(), closed.front().get(), closed.records());
         let triangles = (records.len() - front) / 8;
         self.used.clear();
         self.used.resize(n, false);
         self.hull.clear();
-        mesh.triangles.resize(triangles, [0; 3]);
-        mesh.twins.resize(3 * triangles, HULL);
+        mesh.triangles.resize(triangles, [SiteIndex::default(); 3]);
+        mesh.twins.resize(3 * triangles, HalfEdgeIndex::HULL);
         let mut links = 0;
         for start in (front..records.len()).step_by(EdgeTester::BLOCK) {
             let end = records.len().min(start + EdgeTester::BLOCK);
@@ -79,8 +80,8 @@ impl AcceptanceCheck {
         &mut self,
         block: &[u32],
         sites: &[Site],
-        order: &[u32],
-        triangles: &mut [[u32; 3]],
+        order: &[SiteIndex],
+        triangles: &mut [[SiteIndex; 3]],
     ) -> Result<(), Rejection> {
         let n = sites.len();
         let (order, used) = (&order[..n], &mut self.used[..n]);
@@ -102,13 +103,13 @@ impl AcceptanceCheck {
     }
 
     /// Numbers the twins as in a half-edge mesh, and notes the hull for point 3.
-    fn write_twins(&mut self, block: &[u32], front: u32, twins: &mut [u32]) {
+    fn write_twins(&mut self, block: &[u32], front: u32, twins: &mut [HalfEdgeIndex]) {
         for (record, twins) in block.chunks_exact(8).zip(twins.chunks_exact_mut(3)) {
             for i in 0..3 {
                 let g = record[4 + i];
-                twins[i] = (g.wrapping_sub(front) >> 3).wrapping_mul(3).wrapping_add(g & 7);
+                twins[i] = HalfEdgeIndex((g.wrapping_sub(front) >> 3).wrapping_mul(3).wrapping_add(g & 7));
                 if g == ClosedEdge::OUTSIDE.0 {
-                    twins[i] = HULL;
+                    twins[i] = HalfEdgeIndex::HULL;
                     self.hull.push([record[i], record[(i + 1) % 3]].map(VertexIndex));
                 }
             }
@@ -141,7 +142,7 @@ impl AcceptanceCheck {
         self.successor.clear();
         self.successor.resize(sites.len(), VertexIndex::NONE);
         for &[u, v] in &self.hull {
-            if std::mem::replace(&mut self.successor[u.at()], v) != VertexIndex::NONE {
+            if std::mem::replace(&mut self.successor[u.get()], v) != VertexIndex::NONE {
                 return Err(rejection);
             }
         }
@@ -149,7 +150,7 @@ impl AcceptanceCheck {
         let (mut u, mut v) = (first, second);
         let mut rounds = 0;
         for _ in 0..self.hull.len() {
-            let w = self.successor[v.at()];
+            let w = self.successor[v.get()];
             if w == VertexIndex::NONE {
                 return Err(rejection);
             }

@@ -79,7 +79,7 @@ impl ClosedMesh {
 
     #[inline(always)]
     pub(super) fn origin(&self, h: ClosedEdge) -> VertexIndex {
-        VertexIndex(self.records[h.at()])
+        VertexIndex(self.records[h.get()])
     }
 
     #[inline(always)]
@@ -94,12 +94,12 @@ impl ClosedMesh {
 
     #[inline(always)]
     pub(super) fn twin(&self, h: ClosedEdge) -> ClosedEdge {
-        ClosedEdge(self.records[h.at() + 4])
+        ClosedEdge(self.records[h.get() + 4])
     }
 
     #[inline(always)]
     fn set_twin(&mut self, h: ClosedEdge, to: ClosedEdge) {
-        self.records[h.at() + 4] = to.0;
+        self.records[h.get() + 4] = to.0;
     }
 
     /// Makes two half-edges each other's twins.
@@ -123,7 +123,7 @@ impl ClosedMesh {
 
     #[inline(always)]
     fn set_corners(&mut self, h: ClosedEdge, [a, b, c]: [VertexIndex; 3]) {
-        let at = h.triangle().at();
+        let at = h.triangle().get();
         self.records[at..at + 3].copy_from_slice(&[a.0, b.0, c.0]);
     }
 
@@ -170,8 +170,8 @@ impl ClosedMesh {
         let (h_next, g_next) = (h.next(), g.next());
         let (h_apex, g_apex) = (self.apex(h), self.apex(g));
         let (outer_h, outer_g) = (self.twin(h_next), self.twin(g_next));
-        self.records[h_next.at()] = g_apex.0;
-        self.records[g_next.at()] = h_apex.0;
+        self.records[h_next.get()] = g_apex.0;
+        self.records[g_next.get()] = h_apex.0;
         self.link(h, outer_g);
         self.link(g, outer_h);
         self.link(h_next, g_next);
@@ -300,21 +300,21 @@ impl ClosedMesh {
     /// Moves triangles from the end into the records `holes`, until none of them is left in between.
     fn close_gaps(&mut self, holes: &mut [ClosedEdge]) {
         for &hole in holes.iter() {
-            self.records[hole.at()] = FREE;
+            self.records[hole.get()] = FREE;
         }
         holes.sort_unstable();
         for &hole in holes.iter() {
             while self.end > 8 * self.slots && self.records[self.end - 8] == FREE {
                 self.end -= 8;
             }
-            if hole.at() >= self.end {
+            if hole.get() >= self.end {
                 break;
             }
             self.end -= 8;
-            self.records.copy_within(self.end..self.end + 8, hole.at());
+            self.records.copy_within(self.end..self.end + 8, hole.get());
             for side in hole.sides() {
                 let twin = self.twin(side);
-                if twin != ClosedEdge::OUTSIDE && twin.at() < self.end {
+                if twin != ClosedEdge::OUTSIDE && twin.get() < self.end {
                     self.set_twin(twin, side);
                 }
             }

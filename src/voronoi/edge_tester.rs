@@ -49,18 +49,18 @@ impl EdgeTester {
             }
         }
         for (lane, &h) in edges[..links.count].iter().enumerate() {
-            let t = h.triangle().at();
+            let t = h.triangle().get();
             let record = &records[t..t + 8];
             let g = ClosedEdge(record[4 + h.corner()]);
             if CHECK && g.0 & 7 > 2 {
                 links.broken = true;
                 continue;
             }
-            let opposite = records[g.previous().at()];
+            let opposite = records[g.previous().get()];
             if CHECK {
-                let there = records[h.at()] ^ records[g.next().at()];
-                let back = records[h.next().at()] ^ records[g.at()];
-                links.broken |= (there | back | (records[g.at() + 4] ^ h.0)) != 0;
+                let there = records[h.get()] ^ records[g.next().get()];
+                let back = records[h.next().get()] ^ records[g.get()];
+                links.broken |= (there | back | (records[g.get() + 4] ^ h.0)) != 0;
                 if opposite as usize >= sites.len() {
                     links.broken = true;
                     continue;

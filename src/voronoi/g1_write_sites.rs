@@ -5,6 +5,7 @@
 
 use crate::geometry::lattice::REACH;
 use crate::geometry::{Bounds, Site};
+use crate::mesh::index::SiteIndex;
 use crate::voronoi::counts::PipelineCounts;
 use crate::voronoi::index::VertexIndex;
 use crate::voronoi::rejection::Rejection;
@@ -14,7 +15,7 @@ use crate::voronoi::texture_request::{TextureRequest, pixels_along};
 const MAX_MISSING: f64 = 0.4;
 
 /// A pixel of the row at hand that has no site.
-const EMPTY: u32 = u32::MAX;
+const EMPTY: SiteIndex = SiteIndex(u32::MAX);
 
 /// A texture with the sites in it. Pixel (x, y) is column x from the west, row y from the south.
 #[derive(Default)]
@@ -28,22 +29,24 @@ pub(super) struct SiteTexture {
     /// The vertex in a pixel that has a site, at `64 * words * y + x`. Other entries are left from earlier leaves.
     vertices: Vec<VertexIndex>,
     /// The position of every site in the input, by vertex: first the sites in the texture, then the missing ones.
-    pub(super) order: Vec<u32>,
+    pub(super) order: Vec<SiteIndex>,
     /// The site of every vertex, with one more entry for the vertex at infinity.
     pub(super) sites: Vec<Site>,
     /// The number of sites in the texture.
     pub(super) placed: usize,
     /// The pixel (y << 16 | x) to which each missing site belongs.
     pub(super) missing: Vec<u32>,
-    /// The pixel (y << 16 | x) of every site of the input, then the missing sites' positions in the input.
+    /// The pixel (y << 16 | x) of every site of the input.
     pixels: Vec<u32>,
+    /// The missing sites, in the order of `missing`.
+    missing_sites: Vec<SiteIndex>,
     /// The end of every row in `rows`.
     row_ends: Vec<u32>,
     /// The pixel column and the position in the input of every site, row by row.
-    rows: Vec<[u32; 2]>,
+    rows: Vec<(u32, SiteIndex)>,
     /// The position in the input of the site in each pixel of the row at hand.
-    row: Vec<u32>,
-    losers: Vec<[u32; 2]>,
+    row: Vec<SiteIndex>,
+    losers: Vec<(u32, SiteIndex)>,
 }
 
 impl SiteTexture {
@@ -127,10 +130,10 @@ impl SiteTexture {
         for y in 0..self.height {
             self.row_ends[y + 1] += self.row_ends[y];
         }
-        self.rows.resize(sites.len(), [0; 2]);
+        self.rows.resize(sites.len(), (0, SiteIndex::default()));
         for (i, &pixel) in self.pixels.iter().enumerate() {
             let end = &mut self.row_ends[(pixel >> 16) as usize];
-            self.rows[*end as usize] = [pixel & 0xffff, i as u32];
+            self.rows[*end as usize] = (pixel & 0xffff, SiteIndex::new(i));
             *end += 1;
         }
     }
@@ -147,6 +150,7 @@ impl SiteTexture {
         self.sites.clear();
         self.sites.reserve(sites + 1);
         self.missing.clear();
+        self.missing_sites.clear();
         self.row.clear();
         self.row.resize(self.width, EMPTY);
     }
@@ -155,21 +159,21 @@ impl SiteTexture {
     fn write_row(&mut self, sites: &[Site], y: usize, counts: &mut PipelineCounts) {
         let first = if y == 0 { 0 } else { self.row_ends[y - 1] as usize };
         self.losers.clear();
-        for &[x, i] in &self.rows[first..self.row_ends[y] as usize] {
+        for &(x, i) in &self.rows[first..self.row_ends[y] as usize] {
             let winner = &mut self.row[x as usize];
             if *winner == EMPTY {
                 *winner = i;
                 self.occupied[y * self.words + x as usize / 64] |= 1 << (x % 64);
             } else {
-                self.losers.push([x, i]);
+                self.losers.push((x, i));
             }
         }
         if self.losers.len() > self.width / 8 {
             // If many sites will be missing, neighbours should be inserted one after the other.
-            self.losers.sort_unstable_by_key(|&[_, i]| sites[i as usize]);
+            self.losers.sort_unstable_by_key(|&(_, i)| sites[i.get()]);
         }
         for at in 0..self.losers.len() {
-            let [x, i] = self.losers[at];
+            let (x, i) = self.losers[at];
             counts.moved += self.place_loser(sites, y, x as usize, i) as u64;
         }
         for word in y * self.words..(y + 1) * self.words {
@@ -179,7 +183,7 @@ impl SiteTexture {
                 let i = std::mem::replace(&mut self.row[x], EMPTY);
                 self.vertices[64 * self.words * y + x] = VertexIndex(self.sites.len() as u32);
                 self.order.push(i);
-                self.sites.push(sites[i as usize]);
+                self.sites.push(sites[i.get()]);
                 bits &= bits - 1;
             }
         }
@@ -187,9 +191,9 @@ impl SiteTexture {
 
     /// Places site `i`, which has lost pixel `x`: it or the winner moves one pixel west or east, in the order of their x. Returns false
     /// if it is missing.
-    fn place_loser(&mut self, sites: &[Site], y: usize, x: usize, i: u32) -> bool {
+    fn place_loser(&mut self, sites: &[Site], y: usize, x: usize, i: SiteIndex) -> bool {
         let winner = self.row[x];
-        let key = |i: u32| (sites[i as usize], i);
+        let key = |i: SiteIndex| (sites[i.get()], i);
         let (west, east) = if key(i) < key(winner) { (i, winner) } else { (winner, i) };
         if x + 1 < self.width && self.row[x + 1] == EMPTY {
             self.row[x] = west;
@@ -203,8 +207,7 @@ impl SiteTexture {
             true
         } else {
             self.missing.push((y << 16 | x) as u32);
-            // Kept at the end of this list until all placed sites have their numbers.
-            self.pixels.push(i);
+            self.missing_sites.push(i);
             false
         }
     }
@@ -212,9 +215,8 @@ impl SiteTexture {
     /// Gives the missing sites the numbers after those in the texture, and the vertex at infinity the last number.
     fn append_missing(&mut self, sites: &[Site]) {
         self.placed = self.sites.len();
-        let missing = &self.pixels[sites.len()..];
-        self.order.extend_from_slice(missing);
-        self.sites.extend(missing.iter().map(|&i| sites[i as usize]));
+        self.order.extend_from_slice(&self.missing_sites);
+        self.sites.extend(self.missing_sites.iter().map(|&i| sites[i.get()]));
         self.sites.push([0; 2]);
     }
 }

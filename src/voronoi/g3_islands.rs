@@ -74,7 +74,7 @@ impl IslandSearch {
         for fans in self.fans.chunk_by(|a, b| a.vertex == b.vertex) {
             // If every fan of the vertex is listed, the first is the best and stays.
             let listed: usize = fans.iter().map(|fan| fan.degree.0).sum();
-            let all = listed == self.degrees[fans[0].vertex.at()] as usize;
+            let all = listed == self.degrees[fans[0].vertex.get()] as usize;
             for found in &fans[all as usize..] {
                 // A neighbouring fan may have been removed, and this one with it.
                 if fan(mesh, sites, found.outgoing).as_ref() != Some(found) {
@@ -94,7 +94,7 @@ impl IslandSearch {
         let turn = |outgoing: &ClosedEdge| Some(mesh.twin(outgoing.previous()));
         let sides = std::iter::successors(Some(fan.outgoing), turn).take(fan.degree.0).map(ClosedEdge::next);
         let mut behind = sides.map(|side| mesh.twin(side));
-        behind.find(|&h| mesh.origin(h) != mesh.infinity() && self.degrees[mesh.origin(h).at()] == 2)
+        behind.find(|&h| mesh.origin(h) != mesh.infinity() && self.degrees[mesh.origin(h).get()] == 2)
     }
 
     fn count_degrees(&mut self, mesh: &ClosedMesh, sites: usize) {
@@ -102,7 +102,7 @@ impl IslandSearch {
         self.degrees.resize(sites, 0);
         for corners in mesh.triangles().filter_map(|t| mesh.corners(t)) {
             for vertex in corners {
-                let degree = &mut self.degrees[vertex.at()];
+                let degree = &mut self.degrees[vertex.get()];
                 *degree = degree.saturating_add(1);
             }
         }
@@ -112,7 +112,7 @@ impl IslandSearch {
     fn find_fans(&mut self, mesh: &ClosedMesh, sites: &[Site], inverted: &[ClosedEdge]) {
         self.fans.clear();
         for h in inverted.iter().flat_map(|t| t.sides()) {
-            let fan = fan(mesh, sites, h).filter(|fan| fan.degree.0 < self.degrees[fan.vertex.at()] as usize);
+            let fan = fan(mesh, sites, h).filter(|fan| fan.degree.0 < self.degrees[fan.vertex.get()] as usize);
             self.fans.extend(fan);
         }
         self.fans.sort_unstable();

@@ -67,7 +67,7 @@ impl TextureScan {
             walls.resize(words + 1, 0);
         }
         self.starts.clear();
-        let mut tested = mesh.front().at();
+        let mut tested = mesh.front().get();
         for y in 0..=texture.height {
             if y < texture.height {
                 labels.row(texture, y, &mut self.north);

@@ -14,7 +14,7 @@ impl ClosedEdge {
 
     /// Returns the position of the half-edge's origin in the records of the mesh.
     #[inline(always)]
-    pub(super) fn at(self) -> usize {
+    pub(super) fn get(self) -> usize {
         self.0 as usize
     }
 
@@ -67,7 +67,7 @@ impl VertexIndex {
 
     /// Returns the vertex's position in a list with an entry for every vertex.
     #[inline(always)]
-    pub(super) fn at(self) -> usize {
+    pub(super) fn get(self) -> usize {
         self.0 as usize
     }
 

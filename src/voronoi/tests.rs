@@ -14,7 +14,7 @@ use std::collections::BTreeSet;
 
 /// Returns the set of triangles, each from its least corner.
 fn triangles(mesh: &HalfEdgeMesh) -> BTreeSet<[u32; 3]> {
-    mesh.triangles.iter().map(|&[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().unwrap()).collect()
+    mesh.corners().iter().map(|&[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().unwrap()).collect()
 }
 
 #[test]

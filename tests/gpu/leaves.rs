@@ -1,4 +1,4 @@
-//! Whole leaves and whole jobs with a GPU's help: the same mesh as without.
+//! Whole leaves and whole jobs with a GPU's help give the same mesh as without.
 
 use super::random::Random;
 use super::rig::Rig;
@@ -22,7 +22,7 @@ fn settings(backend: Backend) -> TriangulationOptions {
 
 fn solve(config: &TriangulationOptions, gpu: &GpuOptions, sites: &[Site]) -> (BTreeSet<[u32; 3]>, TriangulationCounts) {
     let (mesh, outcome) = Triangulator::new(config, gpu, MEMORY, 2).unwrap().triangulate(sites).unwrap();
-    let turned = mesh.triangles.iter().map(|&[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().unwrap());
+    let turned = mesh.corners().iter().map(|&[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().unwrap());
     (turned.collect(), outcome)
 }
 
@@ -51,7 +51,7 @@ fn inputs() -> Vec<(&'static str, Vec<Site>)> {
 }
 
 #[test]
-fn a_leaf_has_the_same_triangles_whoever_makes_its_diagram() {
+fn a_leaf_has_the_same_triangles_with_every_backend() {
     if Rig::new().is_none() {
         return;
     }
@@ -65,7 +65,7 @@ fn a_leaf_has_the_same_triangles_whoever_makes_its_diagram() {
                 let (on_gpu, outcome) =
                     solve(&settings(Backend::Gpu), &GpuOptions { voronoi, texture, adapter: None }, &sites);
                 assert!(on_gpu == expected, "{name}, {voronoi:?}, {texture:?}");
-                // A texture that is too coarse for the input is a reason to go another way; any other is not.
+                // Only a texture that is too coarse for the input may be a reason to reject it.
                 if texture == TextureSide::Auto {
                     assert_eq!((outcome.pipeline, outcome.counts.on_gpu), (1, 1), "{name}, {voronoi:?}");
                 }
@@ -74,7 +74,7 @@ fn a_leaf_has_the_same_triangles_whoever_makes_its_diagram() {
     }
 }
 
-/// Somebody whose diagrams are wrong.
+/// A backend whose diagrams are wrong.
 struct Liar(fn(u32, u32, &[u32]) -> Vec<u32>);
 
 impl DiagramBackend for Liar {
@@ -88,10 +88,10 @@ impl DiagramBackend for Liar {
 }
 
 #[test]
-fn a_wrong_diagram_makes_no_wrong_mesh() {
+fn a_wrong_diagram_never_makes_a_wrong_mesh() {
     let (_, sites) = inputs().swap_remove(0);
     let (expected, _) = solve(&settings(Backend::Reference), &GpuOptions::default(), &sites);
-    // Whether every label is a pixel with a site, so that only the mesh shows the lie.
+    // The flag says whether every label is a pixel with a site, so that only the mesh shows the lie.
     let liars: [(&str, bool, Liar); 6] = [
         ("too few labels", false, Liar(|_, _, pixels| pixels.to_vec())),
         ("none at all", false, Liar(|_, _, _| Vec::new())),
@@ -111,7 +111,7 @@ fn a_wrong_diagram_makes_no_wrong_mesh() {
         match voronoi::triangulate_with(&sites, Some(&liar), &mut PipelineBuffers::default()) {
             Ok((mesh, counts)) => {
                 let turn = |&[a, b, c]: &[u32; 3]| [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().unwrap();
-                assert!(mesh.triangles.iter().map(turn).collect::<BTreeSet<_>>() == expected, "{name}");
+                assert!(mesh.corners().iter().map(turn).collect::<BTreeSet<_>>() == expected, "{name}");
                 assert_eq!(counts.on_gpu, plausible as u64, "{name}");
             }
             Err(why) => assert!(plausible && matches!(why, Rejection::NotAccepted(_)), "{name}: {why}"),
@@ -120,7 +120,7 @@ fn a_wrong_diagram_makes_no_wrong_mesh() {
 }
 
 #[test]
-fn without_the_gpu_that_is_named_there_is_an_error_or_none() {
+fn a_gpu_that_does_not_exist_is_an_error_if_required_and_none_otherwise() {
     let nameless = GpuOptions { adapter: Some("no GPU has this name".into()), ..GpuOptions::default() };
     let error = Triangulator::new(&settings(Backend::Gpu), &nameless, MEMORY, 1).err().expect("there is no such GPU");
     assert_eq!(error.exit_code(), 2);

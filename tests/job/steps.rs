@@ -91,7 +91,7 @@ fn assert_exact(cloud: &Cloud, max_points_per_tile: u64, what: &str) {
     let (store, partition) = run_steps(&job, &gdt_batch::config::load(&job.config()).unwrap());
     let (sites, triangles) = collect(&store, &partition);
     let mesh = reference::triangulate(&sites).unwrap();
-    let mut expected: Vec<Triangle> = mesh.triangles.iter().map(|t| canonical(t.map(|v| sites[v as usize]))).collect();
+    let mut expected: Vec<Triangle> = mesh.triangles.iter().map(|t| canonical(t.map(|v| sites[v.get()]))).collect();
     expected.sort_unstable();
     let count = |t: &[Triangle]| t.len();
     assert!(

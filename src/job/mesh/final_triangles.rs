@@ -6,7 +6,8 @@
 
 use crate::geometry::Site;
 use crate::job::partition::tree::Cell;
-use crate::mesh::half_edge::{HULL, HalfEdgeMesh};
+use crate::mesh::half_edge::HalfEdgeMesh;
+use crate::mesh::index::{HalfEdgeIndex, SiteIndex};
 
 /// What a node decides about a triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,9 +26,9 @@ pub struct FinalTriangles {
     /// The state of every triangle of the node's mesh.
     pub states: Vec<TriangleState>,
     /// The sites that go up, ascending.
-    pub frontier: Vec<u32>,
-    /// For each of them a half-edge that starts there: the one on the hull if there is one; [`HULL`] if the site has no triangle.
-    pub half_edges: Vec<u32>,
+    pub frontier: Vec<SiteIndex>,
+    /// For each of them a half-edge that starts there: the one on the hull if there is one; `None` if the site has no triangle.
+    pub half_edges: Vec<Option<HalfEdgeIndex>>,
     /// The directed edges with final ground on their left and none on their right, as positions in `frontier`.
     pub boundary: Vec<[u32; 2]>,
 }
@@ -48,7 +49,7 @@ pub fn find_final(
     let states = (0..mesh.triangles.len()).map(state).collect();
     let mut found = FinalTriangles { states, frontier: Vec::new(), half_edges: Vec::new(), boundary: Vec::new() };
     if let Some(cell) = cell {
-        let hull: Vec<u32> = (0..).zip(&mesh.twins).filter(|(_, twin)| **twin == HULL).map(|(h, _)| h).collect();
+        let hull: Vec<HalfEdgeIndex> = mesh.hull().collect();
         let pending = found.mark_pending(mesh, sites, cell, &hull);
         let position = found.find_frontier(mesh, &pending, &hull, sites.len());
         found.find_boundary(mesh, &pending, &hull, &position);
@@ -58,48 +59,56 @@ pub fn find_final(
 
 impl FinalTriangles {
     /// Marks the triangles that a node above decides, and returns them, ascending.
-    fn mark_pending(&mut self, mesh: &HalfEdgeMesh, sites: &[Site], cell: &Cell, hull: &[u32]) -> Vec<u32> {
+    fn mark_pending(&mut self, mesh: &HalfEdgeMesh, sites: &[Site], cell: &Cell, hull: &[HalfEdgeIndex]) -> Vec<usize> {
         let mut reached = vec![false; mesh.triangles.len()];
-        let mut flood: Vec<u32> = hull.iter().map(|h| h / 3).collect();
+        let mut flood: Vec<usize> = hull.iter().map(|h| h.triangle()).collect();
         let mut pending = Vec::new();
-        while let Some(triangle) = flood.pop() {
-            let t = triangle as usize;
-            let [a, b, c] = mesh.triangles[t].map(|v| sites[v as usize]);
+        while let Some(t) = flood.pop() {
+            let [a, b, c] = mesh.triangles[t].map(|v| sites[v.get()]);
             if std::mem::replace(&mut reached[t], true) || cell.holds_disc(a, b, c) {
                 continue;
             }
             if self.states[t] == TriangleState::Final {
                 self.states[t] = TriangleState::Pending;
-                pending.push(triangle);
+                pending.push(t);
             }
-            flood.extend(mesh.twins[3 * t..3 * t + 3].iter().filter(|&&twin| twin != HULL).map(|twin| twin / 3));
+            let twins = HalfEdgeIndex::of_triangle(t).map(|h| mesh.twin(h));
+            flood.extend(twins.into_iter().filter(|&twin| twin != HalfEdgeIndex::HULL).map(HalfEdgeIndex::triangle));
         }
         pending.sort_unstable();
         pending
     }
 
-    /// Fills `frontier` and `half_edges`, and returns the position of every site in the frontier.
-    fn find_frontier(&mut self, mesh: &HalfEdgeMesh, pending: &[u32], hull: &[u32], sites: usize) -> Vec<u32> {
-        const INSIDE: u32 = u32::MAX - 1;
-        // A half-edge from every site of the frontier. If there is no triangle, every site lies on the hull.
-        let mut position = vec![if mesh.triangles.is_empty() { HULL } else { INSIDE }; sites];
-        for h in pending.iter().flat_map(|t| 3 * t..3 * t + 3).chain(hull.iter().copied()) {
-            position[mesh.origin(h) as usize] = h;
+    /// Fills `frontier` and `half_edges`, and returns the position of every frontier site in the frontier.
+    fn find_frontier(
+        &mut self,
+        mesh: &HalfEdgeMesh,
+        pending: &[usize],
+        hull: &[HalfEdgeIndex],
+        sites: usize,
+    ) -> Vec<u32> {
+        let mut starts = vec![None; sites];
+        for h in pending.iter().flat_map(|&t| HalfEdgeIndex::of_triangle(t)).chain(hull.iter().copied()) {
+            starts[mesh.origin(h).get()] = Some(h);
         }
-        for (site, position) in position.iter_mut().enumerate().filter(|(_, h)| **h != INSIDE) {
-            self.half_edges.push(std::mem::replace(position, self.frontier.len() as u32));
-            self.frontier.push(site as u32);
+        let mut position = vec![0; sites];
+        // If there is no triangle, every site lies on the hull.
+        let is_frontier = |start: &Option<HalfEdgeIndex>| start.is_some() || mesh.triangles.is_empty();
+        for (site, start) in starts.into_iter().enumerate().filter(|(_, start)| is_frontier(start)) {
+            position[site] = self.frontier.len() as u32;
+            self.frontier.push(SiteIndex::new(site));
+            self.half_edges.push(start);
         }
         position
     }
 
     /// Fills `boundary` with the edges of final ground that pending triangles see from outside, and those on the hull.
-    fn find_boundary(&mut self, mesh: &HalfEdgeMesh, pending: &[u32], hull: &[u32], position: &[u32]) {
-        let is_pending = |h: u32| self.states[h as usize / 3] == TriangleState::Pending;
-        let seen = pending.iter().flat_map(|t| 3 * t..3 * t + 3).map(|h| mesh.twins[h as usize]);
-        let inner = seen.filter(|&h| h != HULL && !is_pending(h));
+    fn find_boundary(&mut self, mesh: &HalfEdgeMesh, pending: &[usize], hull: &[HalfEdgeIndex], position: &[u32]) {
+        let is_pending = |h: HalfEdgeIndex| self.states[h.triangle()] == TriangleState::Pending;
+        let seen = pending.iter().flat_map(|&t| HalfEdgeIndex::of_triangle(t)).map(|h| mesh.twin(h));
+        let inner = seen.filter(|&h| h != HalfEdgeIndex::HULL && !is_pending(h));
         let outer = hull.iter().copied().filter(|&h| !is_pending(h));
-        let ends = |h: u32| [mesh.origin(h), mesh.destination(h)].map(|v| position[v as usize]);
+        let ends = |h: HalfEdgeIndex| [mesh.origin(h), mesh.destination(h)].map(|v| position[v.get()]);
         self.boundary = inner.chain(outer).map(ends).collect();
     }
 }
@@ -149,12 +158,12 @@ mod tests {
             let mesh = canonical(&sites).unwrap();
             let found = find_final(&mesh, &sites, Some(&cell), |_| false);
             for (corners, state) in mesh.triangles.iter().zip(&found.states) {
-                let [a, b, c] = corners.map(|v| sites[v as usize]);
+                let [a, b, c] = corners.map(|v| sites[v.get()]);
                 prop_assert!(*state == TriangleState::Pending || !reaches_out(&cell, [a, b, c]), "{a:?} {b:?} {c:?} in {cell:?}");
                 prop_assert!(*state == TriangleState::Final || !cell.holds_disc(a, b, c));
             }
-            for (&site, &spoke) in found.frontier.iter().zip(&found.half_edges) {
-                let around = (spoke != HULL).then(|| mesh.around(spoke)).into_iter().flatten();
+            for (&site, &start) in found.frontier.iter().zip(&found.half_edges) {
+                let around = start.into_iter().flat_map(|start| mesh.around(start));
                 let corners = mesh.triangles.iter().flatten().filter(|&&v| v == site).count();
                 prop_assert_eq!(around.count(), corners);
             }

@@ -11,7 +11,8 @@ use crate::job::partition::point_file::PointFile;
 use crate::job::partition::result::Partition;
 use crate::job::plan::job_plan::Plan;
 use crate::job::records::{BorderVertex, Frontier, Leaf, PartialNormals, StepOutput, Store};
-use crate::mesh::half_edge::{HULL, HalfEdgeMesh};
+use crate::mesh::half_edge::HalfEdgeMesh;
+use crate::mesh::index::{HalfEdgeIndex, SiteIndex};
 use crate::output::normals::{self, NormalSum};
 use crate::triangulation::{self, TriangulationCounts, Triangulator};
 use serde::{Deserialize, Serialize};
@@ -62,9 +63,9 @@ pub fn triangulate_leaf(
     check_precision(&mesh, &sites, &found.states, PrecisionLimit::of(&plan.frame))?;
     let normals = partial_normals(&mesh, &found, &points);
     let is_final = |(_, state): &(&[u32; 3], &TriangleState)| **state == TriangleState::Final;
-    let triangles = mesh.triangles.iter().zip(&found.states).filter(is_final).map(|(triangle, _)| *triangle);
+    let triangles = mesh.corners().iter().zip(&found.states).filter(is_final).map(|(triangle, _)| *triangle);
     let (leaf, triangles) = Leaf::save(store, tile, &points, triangles)?;
-    let vertex = |&site: &u32| BorderVertex { tile, site, position: points[site as usize].corner() };
+    let vertex = |&site: &SiteIndex| BorderVertex { tile, site: site.0, position: points[site.get()].corner() };
     let frontier = Frontier { sites: found.frontier.iter().map(vertex).collect(), boundary: found.boundary };
     let records = vec![normals.save(store, tile)?, leaf, frontier.save(store, node)?];
     triangulation::recycle(mesh);
@@ -77,12 +78,12 @@ fn check_precision(mesh: &HalfEdgeMesh, sites: &[Site], states: &[TriangleState]
         return Ok(());
     }
     let mut final_ones = mesh.triangles.iter().zip(states).filter(|(_, state)| **state == TriangleState::Final);
-    final_ones.try_for_each(|(corners, _)| limit.check(corners.map(|v| sites[v as usize])))
+    final_ones.try_for_each(|(corners, _)| limit.check(corners.map(|v| sites[v.get()])))
 }
 
 /// Returns what the leaf knows of the normals on its frontier. The seams add their triangles when all of them are known.
 fn partial_normals(mesh: &HalfEdgeMesh, found: &FinalTriangles, points: &[Point]) -> PartialNormals {
-    let sites = || found.frontier.iter().map(|&site| &points[site as usize]);
+    let sites = || found.frontier.iter().map(|&site| &points[site.get()]);
     PartialNormals {
         sums: found.half_edges.iter().map(|&start| final_normals_around(mesh, found, points, start)).collect(),
         rgb: sites().map(|point| point.rgb).collect(),
@@ -91,9 +92,14 @@ fn partial_normals(mesh: &HalfEdgeMesh, found: &FinalTriangles, points: &[Point]
 }
 
 /// Returns the sum of the normals of the final triangles around the origin of half-edge `start`.
-fn final_normals_around(mesh: &HalfEdgeMesh, found: &FinalTriangles, points: &[Point], start: u32) -> NormalSum {
-    let around = (start != HULL).then(|| mesh.around(start)).into_iter().flatten();
-    let final_ones = around.map(|t| t as usize).filter(|&t| found.states[t] == TriangleState::Final);
-    let corners = final_ones.map(|t| mesh.triangles[t].map(|v| points[v as usize].corner()));
+fn final_normals_around(
+    mesh: &HalfEdgeMesh,
+    found: &FinalTriangles,
+    points: &[Point],
+    start: Option<HalfEdgeIndex>,
+) -> NormalSum {
+    let around = start.into_iter().flat_map(|start| mesh.around(start));
+    let final_ones = around.filter(|&t| found.states[t] == TriangleState::Final);
+    let corners = final_ones.map(|t| mesh.triangles[t].map(|v| points[v.get()].corner()));
     corners.map(|[a, b, c]| normals::cross(a, b, c)).fold([0; 3], normals::add)
 }

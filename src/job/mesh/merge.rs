@@ -32,7 +32,7 @@ pub fn merge_frontiers(
     check_memory(union.sites.len(), memory)?;
     let sites: Vec<Site> = union.sites.iter().map(BorderVertex::plane).collect();
     let mesh = reference::triangulate(&sites)?;
-    let covered = covered(&mesh, &union.boundary)?;
+    let covered = covered(&mesh, bytemuck::cast_slice(&union.boundary))?;
     let cell = tree.node(node).parent.map(|_| &tree.node(node).cell);
     let found = find_final(&mesh, &sites, cell, |triangle| covered[triangle]);
     let seam: Vec<SeamTriangle> = mesh
@@ -40,11 +40,11 @@ pub fn merge_frontiers(
         .iter()
         .zip(&found.states)
         .filter(|(_, state)| **state == TriangleState::Final)
-        .map(|(corners, _)| corners.map(|v| union.sites[v as usize]))
+        .map(|(corners, _)| corners.map(|v| union.sites[v.get()]))
         .collect();
     let limit = PrecisionLimit::of(&plan.frame);
     seam.iter().try_for_each(|corners| limit.check(corners.map(|corner| corner.plane())))?;
-    let frontier = found.frontier.iter().map(|&site| union.sites[site as usize]).collect();
+    let frontier = found.frontier.iter().map(|&site| union.sites[site.get()]).collect();
     let frontier = Frontier { sites: frontier, boundary: found.boundary };
     let records = vec![Seam::new(&seam).save(store, node)?, frontier.save(store, node)?];
     let above = frontier.tiles();

@@ -13,6 +13,7 @@
 mod tests;
 
 use crate::geometry::Site;
+use crate::mesh::index::SiteIndex;
 use crate::mesh::region::covered;
 use crate::output::Tile;
 use crate::output::frame::Frame;
@@ -86,14 +87,14 @@ impl Outline {
     /// The triangulation of the vertices `kept`, within the outline.
     fn fill(&self, tile: &Tile, kept: &[bool]) -> Result<Vec<[u32; 3]>> {
         let vertices: Vec<u32> = (0..).zip(kept).filter(|(_, kept)| **kept).map(|(v, _)| v).collect();
-        let mut number = vec![u32::MAX; kept.len()];
-        vertices.iter().zip(0..).for_each(|(&v, n)| number[v as usize] = n);
+        let mut number = vec![SiteIndex(u32::MAX); kept.len()];
+        vertices.iter().zip(0..).for_each(|(&v, n)| number[v as usize] = SiteIndex(n));
         let sites: Vec<Site> = vertices.iter().map(|&v| plane(tile.positions[v as usize])).collect();
         let mesh = canonical(&sites)?;
-        let edges: Vec<[u32; 2]> = self.edges.iter().map(|edge| edge.map(|v| number[v as usize])).collect();
+        let edges: Vec<_> = self.edges.iter().map(|edge| edge.map(|v| number[v as usize])).collect();
         let covered = covered(&mesh, &edges)?;
         let inside = mesh.triangles.iter().zip(covered).filter(|(_, covered)| *covered);
-        let triangles: Vec<_> = inside.map(|(t, _)| t.map(|v| vertices[v as usize])).collect();
+        let triangles: Vec<_> = inside.map(|(t, _)| t.map(|v| vertices[v.get()])).collect();
         triangulation::recycle(mesh);
         if triangles.is_empty() {
             return Err(Error::Broken("a terrain without triangles cannot be simplified".into()));

@@ -296,7 +296,7 @@ fn apart(corners: &[[i32; 3]; 3], p: [i32; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::half_edge::{HULL, HalfEdgeMesh};
+    use crate::mesh::half_edge::HalfEdgeMesh;
     use crate::triangulation::canonical;
     use proptest::prelude::*;
 
@@ -323,18 +323,16 @@ mod tests {
             let fine = triangulation(&positions, &all);
             let mut kept = vec![false; positions.len()];
             kept.iter_mut().step_by(every).for_each(|kept| *kept = true);
-            for h in (0..fine.twins.len() as u32).filter(|&h| fine.twins[h as usize] == HULL) {
-                kept[fine.origin(h) as usize] = true;
-            }
+            fine.hull().for_each(|h| kept[fine.origin(h).get()] = true);
             let kept: Vec<u32> = all.into_iter().filter(|&v| kept[v as usize]).collect();
             let coarse = triangulation(&positions, &kept).triangles;
-            let coarse: Vec<[u32; 3]> = coarse.iter().map(|t| t.map(|v| kept[v as usize])).collect();
+            let coarse: Vec<[u32; 3]> = coarse.iter().map(|t| t.map(|v| kept[v.get()])).collect();
 
-            let (fans, sieve) = (Fans::new(&positions, &fine.triangles), Sieve::new(&positions, 1));
+            let (fans, sieve) = (Fans::new(&positions, fine.corners()), Sieve::new(&positions, 1));
             let mut steps = u64::MAX;
             let furthest = coarse.iter().map(|t| fans.crossings(t, &mut steps).unwrap().max(sieve.inside_one(t).0));
             let furthest = furthest.fold(0.0, f64::max);
-            let found = deviation(&positions, &fine.triangles, &coarse);
+            let found = deviation(&positions, fine.corners(), &coarse);
             prop_assert!(found == 0.0 && furthest == 0.0 || found == furthest + 1e-9, "{} and {}", found, furthest);
         }
     }

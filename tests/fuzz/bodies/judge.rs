@@ -4,7 +4,8 @@
 use std::collections::{HashMap, HashSet};
 
 use gdt_batch::geometry::Site;
-use gdt_batch::mesh::half_edge::{HULL, HalfEdgeMesh};
+use gdt_batch::mesh::half_edge::HalfEdgeMesh;
+use gdt_batch::mesh::index::HalfEdgeIndex;
 
 /// Panics unless every triangle turns left, edges meet in pairs, the hull is convex and holds every site on it, Euler's formula
 /// holds, and every edge is Delaunay with ties decided by the rule: the lexicographically last of four counts as outside.
@@ -15,7 +16,7 @@ pub(crate) fn judge(sites: &[Site], mesh: &HalfEdgeMesh) {
     }
     let at = |v: u32| sites[v as usize];
     let mut apex_of: HashMap<[u32; 2], u32> = HashMap::new();
-    for &[a, b, c] in &mesh.triangles {
+    for &[a, b, c] in mesh.corners() {
         assert!(area(at(a), at(b), at(c)) > 0, "a triangle that does not turn left");
         for (edge, apex) in [([a, b], c), ([b, c], a), ([c, a], b)] {
             assert!(apex_of.insert(edge, apex).is_none(), "two triangles on one side of an edge");
@@ -29,13 +30,13 @@ pub(crate) fn judge(sites: &[Site], mesh: &HalfEdgeMesh) {
         }
     }
     check_hull(sites, &hull);
-    let used: HashSet<u32> = mesh.triangles.iter().flatten().copied().collect();
+    let used: HashSet<u32> = mesh.corners().iter().flatten().copied().collect();
     assert_eq!(used.len(), sites.len(), "a site without a triangle");
     assert_eq!(mesh.triangles.len(), 2 * sites.len() - hull.len() - 2, "Euler's formula");
-    assert_eq!(mesh.twins.iter().filter(|twin| **twin == HULL).count(), hull.len());
-    for (h, &twin) in mesh.twins.iter().enumerate().filter(|(_, twin)| **twin != HULL) {
-        assert_eq!(mesh.twins[twin as usize] as usize, h, "twins that are none");
-        assert_eq!(mesh.origin(h as u32), mesh.destination(twin), "twins with other ends");
+    assert_eq!(mesh.hull().count(), hull.len());
+    for (h, twin) in mesh.half_edges().map(|h| (h, mesh.twin(h))).filter(|(_, twin)| *twin != HalfEdgeIndex::HULL) {
+        assert_eq!(mesh.twin(twin), h, "twins that are none");
+        assert_eq!(mesh.origin(h), mesh.destination(twin), "twins with other ends");
     }
 }
 

@@ -1,4 +1,4 @@
-//! The triangulator on sites that provoke ties: few bits a coordinate, so that many are cocircular or collinear.
+//! The triangulator on sites that provoke ties: coordinates have few bits, so many sites are cocircular or collinear.
 
 use std::collections::BTreeSet;
 
@@ -9,11 +9,11 @@ use gdt_batch::triangulation::{Triangulator, reference};
 
 use super::judge;
 
-/// More are slow to judge.
-const MOST: usize = 1500;
+/// The most sites of a case, because judging more is slow.
+const MAX_SITES: usize = 1500;
 
-/// The first byte says how the others become sites: how many bits a coordinate has, how far apart they are, and whether they
-/// are sheared, which makes parallelograms of squares.
+/// Judges the triangulation of the sites in `bytes`. The first byte says how the others become sites: how many bits a coordinate has,
+/// how far apart the sites are, and whether they are sheared, which turns squares into parallelograms.
 pub(crate) fn sites(bytes: &[u8]) {
     let sites = sites_of(bytes);
     let wanted = TriangulationOptions { backend: Backend::Cpu, ..TriangulationOptions::default() };
@@ -34,8 +34,8 @@ fn sites_of(bytes: &[u8]) -> Vec<Site> {
         let [x, y] = [coordinate(pair[0]), coordinate(pair[1])];
         [step * (x + shear as i32 * y / 2), step * (y - shear as i32 * x / 3)]
     };
-    // Distinct and in rows, as a leaf has them.
-    let distinct: BTreeSet<[i32; 2]> = bytes.chunks_exact(2).take(MOST).map(site).map(|[x, y]| [y, x]).collect();
+    // Sites are distinct and in rows, as in a leaf.
+    let distinct: BTreeSet<[i32; 2]> = bytes.chunks_exact(2).take(MAX_SITES).map(site).map(|[x, y]| [y, x]).collect();
     distinct.into_iter().map(|[y, x]| [x, y]).collect()
 }
 
@@ -44,5 +44,5 @@ fn triangles(mesh: &HalfEdgeMesh) -> BTreeSet<[u32; 3]> {
         let least = (0..3).min_by_key(|&i| corners[i]).unwrap_or(0);
         [0, 1, 2].map(|i| corners[(least + i) % 3])
     };
-    mesh.triangles.iter().map(turned).collect()
+    mesh.corners().iter().map(turned).collect()
 }

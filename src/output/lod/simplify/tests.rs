@@ -18,7 +18,7 @@ fn terrain(mut points: Vec<[i32; 3]>) -> Tile {
     points.sort_unstable();
     points.dedup_by_key(|p| [p[0], p[1]]);
     let sites: Vec<[i32; 2]> = points.iter().map(|p| [p[0], p[1]]).collect();
-    Tile { triangles: triangulate(&sites).unwrap().triangles, positions: points, ..Tile::default() }
+    Tile { triangles: triangulate(&sites).unwrap().corners().to_vec(), positions: points, ..Tile::default() }
 }
 
 /// Twice the area; asserts that all triangles are counterclockwise.
