@@ -5,8 +5,8 @@ use crate::input::crs::geotiff::{self, GeoKeys};
 use crate::input::crs::system::Crs;
 use crate::{Result, Warnings};
 
-/// Returns the system that a file describes by `texts`, of which the first readable one counts, or else by `keys`. An empty text
-/// counts as none.
+/// Returns the system that the first readable one of `texts` describes, or else `keys`. Warns about a text that is neither readable
+/// nor empty, and about a text and keys that differ.
 pub(crate) fn from_records(
     texts: impl Iterator<Item = Result<Vec<u8>>>,
     keys: &GeoKeys,

@@ -88,8 +88,8 @@ fn close(own: f64, others: f64) -> bool {
     (own - others).abs() <= 1e-8 * own.abs().max(others.abs()).max(1e-3)
 }
 
-/// Returns whether both texts describe a projection and the parameters that both name are equal. Writers leave out some
-/// parameters and spell others differently, so only parameters of the same name are compared.
+/// Returns whether both texts describe a projection with the same parameters. Writers leave out some parameters and spell others
+/// differently, so only parameters that have the same name in both texts are compared.
 fn same_projection(own: &str, others: &str) -> bool {
     let (own, others) = (wkt::parameters(own), wkt::parameters(others));
     let both = !own.is_empty() && !others.is_empty();

@@ -28,8 +28,8 @@ pub(crate) struct Number {
 }
 
 impl Number {
-    /// Reads the plain number at the start of `bytes` and returns it with its length; `None` if there is none or it is not plain
-    /// (a sign +, too many digits). The caller checks what follows it.
+    /// Reads the number at the start of `bytes` and returns it with its length; the caller checks what follows it. Returns `None`
+    /// if there is no number, or only [`Number::parse`] can read it: it begins with a plus sign, or has many digits.
     #[inline]
     pub(crate) fn read(bytes: &[u8]) -> Option<(Number, usize)> {
         let negative = bytes.first() == Some(&b'-');
