@@ -3,8 +3,8 @@
 use serde::de::{Deserialize, Deserializer, Error};
 use serde::ser::{Serialize, Serializer};
 
-/// The box of all lattice points p with `min <= p <= max` on each of `N` axes. A box always holds at least one point; where there
-/// may be none, use `Option<Bounds<N>>`.
+/// The box of all lattice points p with `min <= p <= max` on each of `N` axes. A box made from points holds at least one. A box
+/// whose `min` exceeds its `max` holds none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Bounds<const N: usize> {
     /// The least lattice integer on each axis.

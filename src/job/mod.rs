@@ -1,8 +1,9 @@
 //! A job, from the options to the report. [`run()`] shows its walk through the steps; each step has a room of its own.
 //!
-//! A step that runs once for each tile or node is a function of the plan, the index and the store: it finds in the store what
-//! earlier steps wrote, and writes its own result there. So steps can run in any order that puts children before parents, and an
-//! interrupted job goes on from the steps that its journal has.
+//! A step that runs once for each tile or node takes the plan, the results of the steps for the whole job (the tree, the style), the
+//! index and the store, but never the running job. It finds in the store what earlier steps wrote, and writes its own result there.
+//! So steps can run in any order that puts children before parents, and an interrupted job goes on from the steps that its journal
+//! has.
 
 pub mod durable;
 pub mod index;
@@ -39,8 +40,8 @@ use crate::{Error, Result};
 /// Runs the whole job, or what an interrupted run left of it.
 ///
 /// # Errors
-/// Every error of every step; see [`Error`]. With [`Error::Resumable`] the finished steps are kept; with any other error no
-/// temporary files are left.
+/// Every error of every step; see [`Error`]. With [`Error::Resumable`] the finished steps are kept. With any other error of a step no
+/// temporary files are left; an error before the first step leaves the directory as it was.
 pub fn run(options: &JobOptions, run: impl Into<RunOptions>) -> Result<Report> {
     // Step 1, the plan, and what is around every attempt: the directory, its lock, the journal.
     run_until_it_fits(options, run.into(), walk)

@@ -178,11 +178,6 @@ impl<K: RecordKey> Store<K> {
         Ok(RecordRef { key, at, length, hash: hasher.digest() })
     }
 
-    /// Tells whether there is a record of `key`.
-    pub fn has(&self, key: K) -> bool {
-        self.places.read().unwrap_or_else(PoisonError::into_inner).contains_key(&key)
-    }
-
     /// Returns where the record of `key` is.
     pub(crate) fn place(&self, key: K) -> Result<RecordPlace> {
         let places = self.places.read().unwrap_or_else(PoisonError::into_inner);
@@ -313,7 +308,7 @@ mod tests {
         let kept = put(&store, Key::Border(0), &[1, 2, 3]);
         put(&store, Key::Border(1), &[4, 5, 6]);
         let store = Store::open(paths.clone(), [kept].iter()).unwrap();
-        assert!(store.has(Key::Border(0)) && !store.has(Key::Border(1)));
+        assert!(store.place(Key::Border(0)).is_ok() && store.place(Key::Border(1)).is_err());
         let added = put(&store, Key::Seam(7), &[8]);
         let store = Store::open(paths.clone(), [kept, added].iter()).unwrap();
         assert_eq!(

@@ -124,6 +124,7 @@ fn measure(source: &Source, classes: &[bool; 256], chunks: Range<usize>) -> Resu
     Ok(found.map(|bounds| [corner(bounds.min), corner(bounds.max)]))
 }
 
-fn to_float(step: Decimal) -> f64 {
+/// Returns `step` as a floating-point number.
+pub(crate) fn to_float(step: Decimal) -> f64 {
     step.to_f64().unwrap_or(f64::NAN)
 }

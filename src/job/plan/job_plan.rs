@@ -13,8 +13,9 @@ use crate::{Error, Result, Warnings};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// What a job reads and where it puts it. The plan holds everything that the later steps need beside what earlier steps stored:
-/// no step looks at a header again, or computes anything again that depends on a machine's mathematics library.
+/// What a job reads and where it puts it. The plan holds everything that later steps need besides what earlier steps stored: no step
+/// reads a header again. What steps compute from it is the same on every machine, except the transforms onto the globe, which the
+/// step that publishes computes once.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Plan {
     /// What the user wants.

@@ -2,11 +2,10 @@
 
 use crate::geometry::lattice::{Lattice, REACH, shortest_decimal};
 use crate::input::Source;
-use crate::job::plan::extent::Extent;
+use crate::job::plan::extent::{Extent, to_float};
 use crate::output::frame::Frame;
 use crate::{Error, Result, Warnings};
 use rust_decimal::Decimal;
-use rust_decimal::prelude::ToPrimitive;
 use serde::{Deserialize, Serialize};
 
 /// By how many powers of ten the lattice is coarser than it would be, because a finer one proved too fine for the mesh.
@@ -62,11 +61,11 @@ fn is_told_apart(farthest: f64, step: f64) -> bool {
 /// from one end of the extent to the other is longer.
 const LIKELY_SPAN: f64 = 0.8;
 
-/// A step in metres. No scanner measures x and y more finely, so the lattice of a wide extent may be rounded to this without asking.
+/// A step in metres. No scanner measures x and y more finely, so finer steps of a wide extent may be coarsened without asking.
 const FINE_ENOUGH: f64 = 0.0099;
 
 /// Returns the step in x and y: the one that the user sets, or else the finest of the inputs with which a triangle across the whole
-/// extent can be written. For that reason alone it becomes no coarser than a centimetre; beyond that the mesh itself decides
+/// extent can be written. A step of a centimetre or more is not coarsened for that reason; there the mesh itself decides
 /// ([`Error::TooFine`]).
 fn horizontal_step(
     sources: &[Source],
@@ -78,8 +77,9 @@ fn horizontal_step(
 ) -> Result<Decimal> {
     let size = extent.size(0).max(extent.size(1));
     let farthest = extent.farthest(0).max(extent.farthest(1));
-    let fits = |step: Decimal| size < 2.0 * REACH as f64 * 0.99 * float(step) && is_told_apart(farthest, float(step));
-    let is_writable = |step: Decimal| LIKELY_SPAN * size * metres < Frame::longest_at(float(step) * metres);
+    let fits =
+        |step: Decimal| size < 2.0 * REACH as f64 * 0.99 * to_float(step) && is_told_apart(farthest, to_float(step));
+    let is_writable = |step: Decimal| LIKELY_SPAN * size * metres < Frame::longest_at(to_float(step) * metres);
     if let Some(step) = wanted {
         return if fits(step) { Ok(step) } else { Err(too_fine(step, size, farthest)) };
     }
@@ -89,7 +89,7 @@ fn horizontal_step(
     let lossless = [scales, grids].into_iter().flatten().find(|&step| fits(step) && is_writable(step));
     let first = lossless.unwrap_or(finest);
     let mut step = first;
-    while !fits(step) || (!is_writable(step) && float(step) * metres < FINE_ENOUGH) {
+    while !fits(step) || (!is_writable(step) && to_float(step) * metres < FINE_ENOUGH) {
         step = times_power_of_ten(step, 1)?;
     }
     step = times_power_of_ten(step, coarsening)?;
@@ -120,8 +120,8 @@ fn vertical_step(
     let finest = sources.iter().map(|s| s.axes[2].scale).min().unwrap_or(Decimal::ONE);
     let mut step = finest;
     let fits = |step: Decimal| {
-        extent.size(2) * metres < Frame::longest_at(float(step) * metres)
-            && is_told_apart(extent.farthest(2), float(step))
+        extent.size(2) * metres < Frame::longest_at(to_float(step) * metres)
+            && is_told_apart(extent.farthest(2), to_float(step))
     };
     while !fits(step) {
         step = times_power_of_ten(step, 1)?;
@@ -164,10 +164,6 @@ fn times_power_of_ten(step: Decimal, power: u32) -> Result<Decimal> {
         Error::Config("the inputs span too much for any terrain: check their coordinates, or set [input] bounds".into())
     })?;
     Ok(step.normalize())
-}
-
-fn float(step: Decimal) -> f64 {
-    step.to_f64().unwrap_or(f64::NAN)
 }
 
 /// Returns where between two multiples of the step the lattice lies: the least remainder of the inputs' offsets, so that the order
