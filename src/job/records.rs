@@ -7,6 +7,7 @@ use crate::job::durable::columns::{ColumnReader, ColumnWriter};
 use crate::job::durable::journal::{self, StepKey};
 use crate::job::durable::store::{self, RecordKey};
 use crate::job::index::{NodeIndex, TileIndex};
+use crate::mesh::index::SiteIndex;
 use crate::output::normals::NormalSum;
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
@@ -92,7 +93,7 @@ pub struct BorderVertex {
     /// The tile that owns the site.
     pub tile: TileIndex,
     /// The number of the site in that tile.
-    pub site: u32,
+    pub site: SiteIndex,
     /// Lattice integers x, y, z.
     pub position: [i32; 3],
 }
@@ -307,7 +308,7 @@ impl PartialNormals {
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct BorderAttributes {
     /// Its number in its tile.
-    pub site: u32,
+    pub site: SiteIndex,
     /// Unit normal along the source's axes, from lengths in metres.
     pub normal: [f32; 3],
     /// Colour as read.
@@ -339,7 +340,7 @@ impl FinishedBorder {
     }
 
     /// Returns the vertex of `site`.
-    pub fn find(&self, site: u32) -> Option<&BorderAttributes> {
+    pub fn find(&self, site: SiteIndex) -> Option<&BorderAttributes> {
         self.0.binary_search_by_key(&site, |vertex| vertex.site).ok().map(|at| &self.0[at])
     }
 }

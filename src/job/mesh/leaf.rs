@@ -65,7 +65,7 @@ pub fn triangulate_leaf(
     let is_final = |(_, state): &(&[u32; 3], &TriangleState)| **state == TriangleState::Final;
     let triangles = mesh.corners().iter().zip(&found.states).filter(is_final).map(|(triangle, _)| *triangle);
     let (leaf, triangles) = Leaf::save(store, tile, &points, triangles)?;
-    let vertex = |&site: &SiteIndex| BorderVertex { tile, site: site.0, position: points[site.get()].corner() };
+    let vertex = |&site: &SiteIndex| BorderVertex { tile, site, position: points[site.get()].corner() };
     let frontier = Frontier { sites: found.frontier.iter().map(vertex).collect(), boundary: found.boundary };
     let records = vec![normals.save(store, tile)?, leaf, frontier.save(store, node)?];
     triangulation::recycle(mesh);

@@ -22,7 +22,7 @@ use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 
 /// An earlier run of a job in the same directory, as its journal tells. The journal is read once.
-pub struct EarlierRun {
+pub(crate) struct EarlierRun {
     /// `None` if another version of the program wrote the journal, or it is damaged.
     header: Option<JobHeader>,
     entries: Vec<JournalEntry>,
@@ -35,7 +35,7 @@ impl EarlierRun {
     ///
     /// # Errors
     /// [`Error::Io`] if it cannot be read.
-    pub fn read(directory: &JobDirectory) -> Result<Option<EarlierRun>> {
+    pub(crate) fn read(directory: &JobDirectory) -> Result<Option<EarlierRun>> {
         let Some((header, entries)) = journal::read::<JobHeader, JobStep, _>(directory)? else { return Ok(None) };
         // What an unreadable journal tells of is unknown.
         let may_have_written = |entry: &JournalEntry| matches!(entry.step, JobStep::WriteTile(_));
@@ -45,18 +45,18 @@ impl EarlierRun {
     }
 
     /// Tells whether its journal can be read.
-    pub fn is_readable(&self) -> bool {
+    pub(crate) fn is_readable(&self) -> bool {
         self.header.is_some()
     }
 
     /// Forgets all steps, so that the job starts over.
-    pub fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         self.header = None;
         self.entries.clear();
     }
 
     /// Returns how much coarser the lattice became, if the job with this fingerprint has the same mesh.
-    pub fn coarsening(&self, fingerprint: &Fingerprint) -> Option<LatticeCoarsening> {
+    pub(crate) fn coarsening(&self, fingerprint: &Fingerprint) -> Option<LatticeCoarsening> {
         let header = self.header.as_ref()?;
         let is_same = !matches!(fingerprint.since(&header.fingerprint), JobChange::Mesh(_));
         is_same.then_some(header.coarsening)
@@ -64,7 +64,7 @@ impl EarlierRun {
 
     /// Returns the plan that the run wrote, with the present `options`, if it is whole and the mesh is that of the job with
     /// `header`.
-    pub fn plan(&self, directory: &JobDirectory, header: &JobHeader, options: &JobOptions) -> Option<Plan> {
+    pub(crate) fn plan(&self, directory: &JobDirectory, header: &JobHeader, options: &JobOptions) -> Option<Plan> {
         let entry = self.entries.iter().find(|entry| entry.step == JobStep::Partition)?;
         let is_same = self.coarsening(&header.fingerprint) == Some(header.coarsening);
         let plan = is_same && entry.files.iter().all(|file| file.is_whole(directory));
@@ -76,7 +76,7 @@ impl EarlierRun {
     ///
     /// # Errors
     /// [`Error::Io`] if the report cannot be read.
-    pub fn complete_report(&self, directory: &JobDirectory, header: &JobHeader) -> Result<Option<Report>> {
+    pub(crate) fn complete_report(&self, directory: &JobDirectory, header: &JobHeader) -> Result<Option<Report>> {
         let is_written = |entry: &JournalEntry| {
             entry.step == JobStep::Report && entry.files.iter().all(|file| file.is_whole(directory))
         };
@@ -93,17 +93,17 @@ impl EarlierRun {
 }
 
 /// Where a run begins.
-pub struct RunStart<'a> {
+pub(crate) struct RunStart<'a> {
     /// What the finished steps stored.
-    pub store: Store,
+    pub(crate) store: Store,
     /// Which steps are finished.
-    pub journal: Journal<'a>,
+    pub(crate) journal: Journal<'a>,
     /// What reading the points found, if that is finished.
-    pub partition: Option<Partition>,
+    pub(crate) partition: Option<Partition>,
     /// The files that stay, as the journal names them.
-    pub kept: HashSet<PathBuf>,
+    pub(crate) kept: HashSet<PathBuf>,
     /// Whether the output directory holds a part of the results.
-    pub has_partial_results: bool,
+    pub(crate) has_partial_results: bool,
 }
 
 /// Begins a run of the job with `header` in its locked directory: takes over what is the same and whole from the earlier run, and
@@ -111,7 +111,7 @@ pub struct RunStart<'a> {
 ///
 /// # Errors
 /// [`Error::Io`] on the job directory.
-pub fn start<'a>(
+pub(crate) fn start<'a>(
     directory: &'a JobDirectory,
     header: &JobHeader,
     earlier: Option<EarlierRun>,

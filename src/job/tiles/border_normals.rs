@@ -65,5 +65,5 @@ fn sums_of_kept(store: &Store, tile: TileIndex, frontier: &Frontier, style: &Til
     let Leaf { positions, mut triangles, .. } = Leaf::load(store, tile)?;
     style.max_edge.take(&positions, &mut triangles);
     let sums = NormalSums::new(&positions, &triangles);
-    Ok(frontier.sites.iter().map(|vertex| sums.get(vertex.site as usize)).collect())
+    Ok(frontier.sites.iter().map(|vertex| sums.get(vertex.site.get())).collect())
 }

@@ -3,6 +3,7 @@
 use crate::job::index::TileIndex;
 use crate::job::records::{BorderVertex, FinishedBorder, Leaf, SeamTriangle, Store};
 use crate::job::tiles::style::TileStyle;
+use crate::mesh::index::SiteIndex;
 use crate::output::Tile;
 use crate::output::normals::NormalSums;
 use crate::{Error, Result};
@@ -25,7 +26,7 @@ impl TileContent {
         let cut = style.max_edge.take(&leaf.positions, &mut leaf.triangles);
         let mut normals = NormalSums::new(&leaf.positions, &leaf.triangles).unit_normals(&style.frame);
         for vertex in &border.0 {
-            normals[vertex.site as usize] = vertex.normal;
+            normals[vertex.site.get()] = vertex.normal;
         }
         let colors = match &style.coloring {
             Some(coloring) => coloring.colors(&leaf.positions, &leaf.rgb, &leaf.class),
@@ -44,13 +45,13 @@ impl TileContent {
         style: &TileStyle,
     ) -> Result<u64> {
         let mut neighbours = NeighbourBorders { store, borders: HashMap::new() };
-        let mut vertex_of: HashMap<(TileIndex, u32), u32> = HashMap::new();
+        let mut vertex_of: HashMap<(TileIndex, SiteIndex), u32> = HashMap::new();
         let before = self.triangles.len();
         for triangle in seam {
             let mut corners = [0; 3];
             for (corner, border) in corners.iter_mut().zip(&triangle) {
                 *corner = match vertex_of.get(&(border.tile, border.site)) {
-                    _ if border.tile == tile => border.site,
+                    _ if border.tile == tile => border.site.0,
                     Some(&vertex) => vertex,
                     None => {
                         let vertex = self.add_vertex(border, &mut neighbours, style)?;
@@ -74,7 +75,7 @@ impl TileContent {
         let vertex = neighbours.of(border.tile)?.find(border.site).ok_or_else(|| {
             Error::Broken(format!(
                 "a seam uses site {} of tile {}, whose border does not have it",
-                border.site, border.tile
+                border.site.0, border.tile
             ))
         })?;
         self.positions.push(border.position);
