@@ -22,6 +22,7 @@ pub struct JobOptions {
     /// What the job may use of the machine.
     pub limits: Limits,
     /// What the user should know about the options themselves.
+    #[serde(default, skip_serializing_if = "Warnings::is_empty")]
     pub warnings: Warnings,
 }
 

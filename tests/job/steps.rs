@@ -45,10 +45,10 @@ fn written_and_read(plan: &Plan, directory: &JobDirectory) -> Plan {
 fn run_steps(job: &Job, options: &JobOptions) -> (Store, Partition) {
     let directory = JobDirectory::new(&job.out());
     directory.create().unwrap();
-    let mut plan = make_plan(options, LatticeCoarsening::default()).unwrap();
+    let plan = make_plan(options, LatticeCoarsening::default()).unwrap();
+    let mut plan = written_and_read(&plan, &directory);
     // The buffers get a sixth of this.
     plan.options.limits.memory.0 = 6 << 20;
-    let plan = written_and_read(&plan, &directory);
     let stage = ProgressOutput::Quiet.stage("read", 0, "points");
     let partition = read_points(&plan, &directory, &stage).unwrap();
     let store = Store::create(directory.store()).unwrap();

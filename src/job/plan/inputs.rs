@@ -96,7 +96,7 @@ pub fn check_missing_records(sources: &[Source], options: &InputOptions) -> Resu
         Some(first) => Err(Error::input(
             &first.path,
             format!(
-                "the header promises {} records, but {} of them are missing: the file is cut off or its header is wrong. Copy it \
+                "says that it holds {} records, but {} of them are not there: the file is cut off or its header is wrong. Copy it \
                  again, or raise [input] max_malformed_fraction to use what is there",
                 first.records, first.missing
             ),

@@ -187,7 +187,7 @@ fn phase(sources: &[Source], axis: usize, step: Decimal) -> Result<Decimal> {
 fn lattice_point_near(near: f64, phase: Decimal, step: Decimal) -> Result<Decimal> {
     let out_of_range = || {
         Error::Config(format!(
-            "coordinates around {near:e} have too many digits for the lattice step {step}: check the inputs"
+            "coordinates around {near:e} need more digits than this program has for steps of {step}: check the inputs"
         ))
     };
     let near = shortest_decimal(near.round()).ok_or_else(out_of_range)?;
