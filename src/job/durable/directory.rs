@@ -182,7 +182,7 @@ impl JobDirectory {
             None => Ok(()),
             Some(found) => Err(Error::Config(format!(
                 "{} exists, a job would overwrite or remove it, and nothing says that an earlier job wrote it: choose another \
-                 [output] directory, or move the file away",
+                 [output] directory, or move it away",
                 found.display()
             ))),
         }
