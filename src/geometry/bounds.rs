@@ -29,7 +29,7 @@ impl<const N: usize> Bounds<N> {
     }
 
     /// Grows the box until it holds `point`.
-    #[inline]
+    #[inline(always)]
     pub fn include(&mut self, point: [i32; N]) {
         for (axis, value) in point.into_iter().enumerate() {
             self.min[axis] = self.min[axis].min(value);

@@ -57,7 +57,7 @@ impl<'a, K: RecordKey> ColumnReader<'a, K> {
     ///
     /// # Errors
     /// [`Error::Io`] if reading fails, [`Error::Broken`] if the record is shorter than the column says.
-    pub fn column<T: Pod>(&mut self) -> Result<MappedSlice<T>> {
+    pub fn column<T: Pod>(&mut self) -> Result<MappedSlice<'static, T>> {
         let count = self.count::<T>()?;
         let column = self.store.read(self.key, self.rest.at, count)?;
         self.skip((count * size_of::<T>()).next_multiple_of(ALIGNMENT) as u64)?;
@@ -79,7 +79,7 @@ impl<'a, K: RecordKey> ColumnReader<'a, K> {
     ///
     /// # Errors
     /// As [`ColumnReader::column`].
-    pub fn column_part<T: Pod>(mut self, first: usize, count: usize) -> Result<MappedSlice<T>> {
+    pub fn column_part<T: Pod>(mut self, first: usize, count: usize) -> Result<MappedSlice<'static, T>> {
         let length = self.count::<T>()?;
         if first.checked_add(count).is_none_or(|end| end > length) {
             return Err(self.ends_too_early());

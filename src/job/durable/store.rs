@@ -185,7 +185,7 @@ impl<K: RecordKey> Store<K> {
     }
 
     /// Reads `count` values from byte `at` of the file of `key` on.
-    pub(crate) fn read<T: Pod>(&self, key: K, at: u64, count: usize) -> Result<MappedSlice<T>> {
+    pub(crate) fn read<T: Pod>(&self, key: K, at: u64, count: usize) -> Result<MappedSlice<'static, T>> {
         let store = self.file(key);
         MappedSlice::read(&store.file, at, count).map_err(Error::io("read", &store.path))
     }

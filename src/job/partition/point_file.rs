@@ -1,7 +1,7 @@
 //! The point file: the points between reading and triangulating, in blocks that each hold points of one bucket.
 
 use crate::input::Point;
-use crate::job::durable::mapped::MappedSlice;
+use crate::job::durable::mapped::{MappedFile, MappedSlice};
 use crate::positional_io::write_all_at;
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
@@ -26,6 +26,8 @@ pub struct PointBlock {
 pub struct PointFile {
     path: PathBuf,
     file: File,
+    /// The map of a finished file; of a growing one, blocks are mapped one by one.
+    map: MappedFile,
     points: AtomicU64,
 }
 
@@ -39,6 +41,7 @@ impl PointFile {
         Ok(PointFile {
             path: path.to_path_buf(),
             file: file.map_err(Error::io("create", path))?,
+            map: MappedFile::default(),
             points: AtomicU64::new(0),
         })
     }
@@ -49,7 +52,8 @@ impl PointFile {
     /// [`Error::Io`] if it cannot be opened.
     pub fn open(path: &Path) -> Result<PointFile> {
         let file = File::open(path).map_err(Error::io("open", path))?;
-        Ok(PointFile { path: path.to_path_buf(), file, points: AtomicU64::new(0) })
+        let map = MappedFile::new(&file);
+        Ok(PointFile { path: path.to_path_buf(), file, map, points: AtomicU64::new(0) })
     }
 
     /// Returns the number of bytes written so far.
@@ -77,9 +81,9 @@ impl PointFile {
     ///
     /// # Errors
     /// [`Error::Io`] if they cannot be read.
-    pub fn read(&self, block: PointBlock) -> Result<MappedSlice<Point>> {
+    pub fn read(&self, block: PointBlock) -> Result<MappedSlice<'_, Point>> {
         let at = block.first * size_of::<Point>() as u64;
-        MappedSlice::read(&self.file, at, block.points as usize).map_err(Error::io("read", &self.path))
+        self.map.slice(&self.file, at, block.points as usize).map_err(Error::io("read", &self.path))
     }
 }
 
