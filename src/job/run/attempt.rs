@@ -123,12 +123,11 @@ fn attempt(
             lock
         }
     };
-    if let Some(earlier) = &earlier {
-        if let Some(report) = earlier.complete_report(directory, &header)? {
-            progress.note("the interrupted run had written all its results");
-            on_threads(threads, || directory.remove_job())?;
-            return Ok(report);
-        }
+    let complete = earlier.as_ref().map(|earlier| earlier.complete_report(directory, &header)).transpose()?;
+    if let Some(report) = complete.flatten() {
+        progress.note("the interrupted run had written all its results");
+        on_threads(threads, || directory.remove_job())?;
+        return Ok(report);
     }
     on_threads(threads, || {
         let start = resume::start(directory, &header, earlier, options.output.max_edge, run.progress)?;
