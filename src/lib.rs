@@ -1,6 +1,6 @@
 //! Streams point clouds of any size into one exact Delaunay triangulation and writes it as glTF terrain.
 //!
-//! Start reading at [`job::run`], which lists the steps of a job in order; ARCHITECTURE.md follows the data.
+//! Start reading at [`job::run()`], which lists the steps of a job in order; ARCHITECTURE.md follows the data.
 
 #![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
 

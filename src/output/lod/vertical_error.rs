@@ -3,8 +3,8 @@
 //!
 //! Both terrains are linear over every triangle. So their difference is linear over every piece that the two sets of edges together
 //! cut the ground into, and it is greatest at a corner of such a piece. A corner is a vertex of the fine mesh (the vertices of the
-//! coarse mesh are among them), or a place where a fine and a coarse edge cross. [`FineMesh`] finds the crossings by walking along a
-//! coarse edge through the fine mesh, and [`VertexCells`] finds the fine vertices in a coarse triangle. [`HeightBounds`] bounds the
+//! coarse mesh are among them), or a place where a fine and a coarse edge cross. `FineMesh` finds the crossings by walking along a
+//! coarse edge through the fine mesh, and `VertexCells` finds the fine vertices in a coarse triangle. `HeightBounds` bounds the
 //! error of a coarse triangle in advance, so that few triangles need this.
 
 use crate::geometry::predicates::orient2d;
