@@ -1,5 +1,5 @@
-//! Step G1: write the sites into a texture. One site wins a pixel. Another site of that pixel moves to the next pixel in the row, if
-//! that is free, or is missing.
+//! Step G1: write the sites into a texture. One site wins a pixel. Another site of that pixel moves to a free pixel next to it in the
+//! row, or is missing.
 //!
 //! The sites are numbered by row and column of their pixels, which is the order in which all later steps meet them.
 
@@ -189,8 +189,8 @@ impl SiteTexture {
         }
     }
 
-    /// Places site `i`, which has lost pixel `x`: it or the winner moves one pixel west or east, in the order of their x. Returns false
-    /// if it is missing.
+    /// Places site `i`, which has lost pixel `x`: it or the winner moves one pixel west or east, in the order of their x. Returns
+    /// false if the site is missing.
     fn place_loser(&mut self, sites: &[Site], y: usize, x: usize, i: SiteIndex) -> bool {
         let winner = self.row[x];
         let key = |i: SiteIndex| (sites[i.get()], i);
