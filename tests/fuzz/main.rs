@@ -1,5 +1,5 @@
 //! The fuzz targets on the stable toolchain: every input of `tests/corpus`, which holds seeds and all that fuzzing has found, and a
-//! bounded number of mutations of them, the same in every run. `GDT_MUTATIONS=n` makes n of each target.
+//! bounded number of mutations of them, the same in every run. `GDT_MUTATIONS=n` makes n of each test.
 
 mod bodies;
 #[path = "../common/random.rs"]
@@ -79,20 +79,35 @@ fn mutate(bytes: &mut Vec<u8>, other: &[u8], random: &mut Random) {
 
 #[test]
 fn las() {
-    fuzz("las", 4000, bodies::cloud::las);
+    fuzz("las", 4000, bodies::cloud::las_without_job);
 }
 
 #[test]
 fn text() {
-    fuzz("text", 4000, bodies::cloud::text);
+    fuzz("text", 4000, bodies::cloud::text_without_job);
 }
 
 #[test]
 fn config() {
-    fuzz("config", 4000, bodies::config::config);
+    fuzz("config", 4000, bodies::config::config_without_job);
 }
 
 #[test]
 fn sites() {
     fuzz("sites", 2000, bodies::sites::sites);
+}
+
+#[test]
+fn jobs_on_las() {
+    fuzz("las", 200, bodies::cloud::las);
+}
+
+#[test]
+fn jobs_on_text() {
+    fuzz("text", 300, bodies::cloud::text);
+}
+
+#[test]
+fn jobs_on_config() {
+    fuzz("config", 300, bodies::config::config);
 }

@@ -16,8 +16,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// Blocks of fewer bytes than this are read into memory, which takes less time than a map of their own.
 const LEAST_MAPPED: usize = 256 << 10;
 
-/// The pages of a whole file are removed whenever this many bytes of it have been looked at.
+/// The pages of a whole file are removed whenever about this many bytes of it may be resident.
 const MOST_RESIDENT: usize = 4 << 20;
+
+/// Bytes around a part that Linux maps with it if they are in the file cache.
+const MAPPED_AROUND: usize = 64 << 10;
 
 /// Values that lie in a block of a file, to be read as a slice.
 #[derive(Debug)]
@@ -66,8 +69,8 @@ impl<T: Pod> Deref for MappedSlice<'_, T> {
 #[derive(Debug, Default)]
 pub struct MappedFile {
     map: Option<Mmap>,
-    /// Bytes that have been looked at since pages were last removed.
-    looked_at: AtomicUsize,
+    /// Bytes that may have become resident since pages were last removed.
+    resident: AtomicUsize,
 }
 
 impl MappedFile {
@@ -76,7 +79,7 @@ impl MappedFile {
         // SAFETY: The file is finished: nothing writes to it or shortens it while the map exists, and the lock of the job keeps other
         // runs of the program out of the folder.
         let map = unsafe { MmapOptions::new().map(file) };
-        MappedFile { map: map.ok(), looked_at: AtomicUsize::new(0) }
+        MappedFile { map: map.ok(), resident: AtomicUsize::new(0) }
     }
 
     /// Returns `count` values from byte `at` of `file` on, which must be the file that is mapped. `at` must be a multiple of the
@@ -97,8 +100,9 @@ impl MappedFile {
         let map = self.map.as_ref()?;
         let start = usize::try_from(at).ok()?;
         let part = map.get(start..start.checked_add(length)?)?;
-        if self.looked_at.fetch_add(length, Ordering::Relaxed) > MOST_RESIDENT {
-            self.looked_at.store(0, Ordering::Relaxed);
+        let loaded = length + MAPPED_AROUND;
+        if self.resident.fetch_add(loaded, Ordering::Relaxed) > MOST_RESIDENT {
+            self.resident.store(loaded, Ordering::Relaxed);
             remove_pages(map);
         }
         load_pages(map, start, length).ok()?;

@@ -1,4 +1,4 @@
-//! A point cloud of any bytes: opened, decoded, and put through a whole job.
+//! A point cloud of any bytes: opened, planned for, decoded, and put through a whole job.
 
 use std::path::Path;
 use std::sync::LazyLock;
@@ -25,13 +25,31 @@ const OUTPUTS: [&str; 5] = [
     "",
 ];
 
-/// The bytes of a LAS or LAZ file.
+/// The bytes of a LAS or LAZ file, with a whole job.
 pub(crate) fn las(bytes: &[u8]) {
-    with_file(".las", bytes, |path| read(path, &TextOptions::default(), bytes.len()));
+    with_las(bytes, job::run_and_verify);
 }
 
-/// The first byte says which options are set, the others are the text.
+/// The same up to the decoded points, which takes a tenth of the time.
+pub(crate) fn las_without_job(bytes: &[u8]) {
+    with_las(bytes, drop);
+}
+
+/// The first byte says which options are set, the others are the text. With a whole job.
 pub(crate) fn text(bytes: &[u8]) {
+    with_text(bytes, job::run_and_verify);
+}
+
+/// The same up to the decoded points, which takes a tenth of the time.
+pub(crate) fn text_without_job(bytes: &[u8]) {
+    with_text(bytes, drop);
+}
+
+fn with_las(bytes: &[u8], run: fn(JobOptions)) {
+    with_file(".las", bytes, |path| read(path, &TextOptions::default(), bytes.len(), run));
+}
+
+fn with_text(bytes: &[u8], run: fn(JobOptions)) {
     let Some((&choice, text)) = bytes.split_first() else { return };
     let bit = |bit: u8| choice >> bit & 1 == 1;
     let columns = || ["z", "-", "x", "y", "class"].map(String::from).to_vec();
@@ -41,17 +59,17 @@ pub(crate) fn text(bytes: &[u8]) {
         columns: bit(4).then(columns),
         comment: bit(5).then(|| "%".to_owned()),
     };
-    with_file(".csv", text, |path| read(path, &options, text.len()));
+    with_file(".csv", text, |path| read(path, &options, text.len(), run));
 }
 
-/// `choice` picks the output options.
-fn read(path: &Path, text: &TextOptions, choice: usize) {
+/// Reads the file and calls `run` if there is a job of a reasonable size; `choice` picks the output options.
+fn read(path: &Path, text: &TextOptions, choice: usize, run: fn(JobOptions)) {
     let Ok(source) = open(path, text) else { return };
     let options = options(path, text, choice);
     let has_job = job::preflight(&options);
     let points = rules(&source).map_or(Some(0), |rules| decode_all(&source, &rules));
     if has_job && points.is_some_and(|points| points <= MOST_IN_A_JOB) {
-        job::run_and_verify(options);
+        run(options);
     }
 }
 

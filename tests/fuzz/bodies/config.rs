@@ -5,8 +5,18 @@ use gdt_batch::triangulation::options::Backend;
 
 use super::{job, with_file};
 
-/// The bytes of a configuration file. What is accepted keeps what the documentation promises.
+/// The bytes of a configuration file, with a whole job.
 pub(crate) fn config(bytes: &[u8]) {
+    with_config(bytes, run);
+}
+
+/// The same without a job.
+pub(crate) fn config_without_job(bytes: &[u8]) {
+    with_config(bytes, drop);
+}
+
+/// Loads the configuration and calls `run` if it is accepted. Then it keeps what the documentation promises.
+fn with_config(bytes: &[u8], run: fn(JobOptions)) {
     let options = match with_file(".toml", bytes, gdt_batch::config::load) {
         Ok(options) => options,
         Err(error) => {
