@@ -43,6 +43,7 @@ pub fn covered(mesh: &HalfEdgeMesh, boundary: &[[SiteIndex; 2]]) -> Result<Vec<b
 struct EdgesByOrigin {
     /// The position in `ends` of the first edge of each site, and the position after the last edge.
     first: Vec<u32>,
+    /// The ends of the edges of each site, ascending.
     ends: Vec<SiteIndex>,
 }
 
@@ -63,6 +64,7 @@ impl EdgesByOrigin {
         let origin = origin.get();
         let range =
             (origin + 1 < self.first.len()).then(|| self.first[origin] as usize..self.first[origin + 1] as usize);
-        range.is_some_and(|range| self.ends[range].contains(&destination))
+        // A site in the middle of a star may have as many edges as there are sites.
+        range.is_some_and(|range| self.ends[range].binary_search(&destination).is_ok())
     }
 }

@@ -1,5 +1,6 @@
 //! The Delaunay triangulation of the sites of one tile. It is the same whichever backend computes it.
 
+pub mod divide_and_conquer;
 pub mod options;
 pub mod reference;
 #[cfg(test)]

@@ -1,7 +1,7 @@
-//! The pipeline against the reference on random sites of every kind that is known to be hard.
+//! The pipeline, and divide and conquer, against the reference on random sites of every kind that is known to be hard.
 
 use crate::mesh::half_edge::HalfEdgeMesh;
-use crate::triangulation::reference;
+use crate::triangulation::{divide_and_conquer, reference};
 use crate::voronoi::test_cases::{KINDS, Random, case};
 use crate::voronoi::{PipelineBuffers, triangulate};
 use std::collections::{BTreeMap, BTreeSet};
@@ -22,12 +22,11 @@ fn random_cases_are_canonical_or_rejected() {
         let kind = KINDS[i % KINDS.len()];
         let n = 3 + (2000.0f64.powf(random.unit()) - 1.0) as usize;
         let sites = case(kind, n, &mut random);
+        let expected = triangles(&reference::triangulate(&sites).unwrap());
+        let divided = divide_and_conquer::triangulate(&sites).unwrap();
+        assert_eq!(triangles(&divided), expected, "divide and conquer, case {i}, {kind}: {sites:?}");
         match triangulate(&sites, &mut buffers) {
-            Ok((mesh, _)) => assert_eq!(
-                triangles(&mesh),
-                triangles(&reference::triangulate(&sites).unwrap()),
-                "case {i}, {kind}: {sites:?}"
-            ),
+            Ok((mesh, _)) => assert_eq!(triangles(&mesh), expected, "case {i}, {kind}: {sites:?}"),
             Err(why) => {
                 refused += (kind == "uniform" && sites.len() >= 1000) as usize;
                 *rejected.entry((kind, why.to_string())).or_default() += 1;

@@ -1,4 +1,5 @@
-//! The choice of backend for a leaf: the pipeline on the CPU, with a GPU, or the reference.
+//! The choice of backend for a leaf: the pipeline on the CPU, with a GPU, or the reference. What the pipeline rejects is divided and
+//! conquered.
 
 use crate::geometry::Site;
 use crate::gpu::device::hardware_is_likely;
@@ -6,7 +7,7 @@ use crate::gpu::executor::{Executor, GpuUse};
 use crate::gpu::options::GpuOptions;
 use crate::mesh::half_edge::HalfEdgeMesh;
 use crate::triangulation::options::{Backend, TriangulationOptions};
-use crate::triangulation::reference;
+use crate::triangulation::{divide_and_conquer, reference};
 use crate::voronoi::counts::PipelineCounts;
 use crate::voronoi::diagram_backend::DiagramBackend;
 use crate::voronoi::rejection::Rejection;
@@ -21,11 +22,13 @@ use std::ops::AddAssign;
 pub struct TriangulationCounts {
     /// Leaves that the discrete-Voronoi pipeline triangulated.
     pub pipeline: u64,
-    /// Leaves that only `spade` tried: all with `backend = "reference"`, else those that are too small for the pipeline.
+    /// Leaves that `spade` triangulated: all with `backend = "reference"`.
     pub reference: u64,
-    /// Leaves that the pipeline gave up because too many sites shared a pixel, and that `spade` triangulated.
+    /// Leaves that are too small for the pipeline, and were divided and conquered.
+    pub small: u64,
+    /// Leaves that the pipeline gave up because too many sites shared a pixel, and that were divided and conquered.
     pub crowded: u64,
-    /// Leaves whose mesh failed the pipeline's acceptance check, and that `spade` triangulated.
+    /// Leaves whose mesh failed the pipeline's acceptance check, and that were divided and conquered.
     pub not_accepted: u64,
     /// What the pipeline counted.
     pub counts: PipelineCounts,
@@ -35,6 +38,7 @@ impl AddAssign for TriangulationCounts {
     fn add_assign(&mut self, other: TriangulationCounts) {
         self.pipeline += other.pipeline;
         self.reference += other.reference;
+        self.small += other.small;
         self.crowded += other.crowded;
         self.not_accepted += other.not_accepted;
         self.counts += other.counts;
@@ -92,21 +96,21 @@ impl Triangulator {
     /// Computes the canonical Delaunay triangulation of distinct `sites`.
     ///
     /// # Errors
-    /// [`Error::Broken`] if even the reference triangulation fails.
+    /// [`Error::Interrupted`] if the process was asked to stop, [`Error::Broken`] if two sites coincide.
     pub fn triangulate(&self, sites: &[Site]) -> Result<(HalfEdgeMesh, TriangulationCounts)> {
         let mut outcome = TriangulationCounts::default();
-        if self.pipeline {
-            let gpu = self.gpu.as_ref().map(|gpu| gpu as &dyn DiagramBackend);
-            match BUFFERS.with_borrow_mut(|buffers| voronoi::triangulate_with(sites, gpu, buffers)) {
-                Ok((mesh, counts)) => return Ok((mesh, TriangulationCounts { pipeline: 1, counts, ..outcome })),
-                Err(Rejection::Crowded) => outcome.crowded = 1,
-                Err(Rejection::NotAccepted(_)) => outcome.not_accepted = 1,
-                Err(Rejection::TooFew | Rejection::TooMany | Rejection::OutOfReach) => outcome.reference = 1,
-            }
-        } else {
+        if !self.pipeline {
             outcome.reference = 1;
+            return Ok((reference::triangulate(sites)?, outcome));
         }
-        Ok((reference::triangulate(sites)?, outcome))
+        let gpu = self.gpu.as_ref().map(|gpu| gpu as &dyn DiagramBackend);
+        match BUFFERS.with_borrow_mut(|buffers| voronoi::triangulate_with(sites, gpu, buffers)) {
+            Ok((mesh, counts)) => return Ok((mesh, TriangulationCounts { pipeline: 1, counts, ..outcome })),
+            Err(Rejection::Crowded) => outcome.crowded = 1,
+            Err(Rejection::NotAccepted(_)) => outcome.not_accepted = 1,
+            Err(Rejection::TooFew | Rejection::TooMany | Rejection::OutOfReach) => outcome.small = 1,
+        }
+        Ok((divide_and_conquer::triangulate(sites)?, outcome))
     }
 }
 
@@ -117,7 +121,7 @@ impl Triangulator {
 pub fn canonical(sites: &[Site]) -> Result<HalfEdgeMesh> {
     match BUFFERS.with_borrow_mut(|buffers| voronoi::triangulate(sites, buffers)) {
         Ok((mesh, _)) => Ok(mesh),
-        Err(_) => reference::triangulate(sites),
+        Err(_) => divide_and_conquer::triangulate(sites),
     }
 }
 

@@ -24,7 +24,7 @@ impl Random {
 }
 
 /// The kinds of input that are known to be hard.
-pub(crate) const KINDS: [&str; 10] = [
+pub(crate) const KINDS: [&str; 15] = [
     "uniform",
     "coarse",
     "disc",
@@ -35,6 +35,11 @@ pub(crate) const KINDS: [&str; 10] = [
     "parallelogram",
     "clusters",
     "void",
+    "line and one",
+    "two lines",
+    "cross",
+    "parabola",
+    "facing arcs",
 ];
 
 /// Returns about `n` distinct sites of one of the [`KINDS`].
@@ -69,6 +74,12 @@ pub(crate) fn case(kind: &str, n: usize, random: &mut Random) -> Vec<Site> {
                 let a = random.unit() * std::f64::consts::TAU;
                 [centre[0] + (spread * a.cos()) as i32, centre[1] + (spread * a.sin()) as i32]
             }
+            "line and one" if i == 0 => [by * 50, cx * 70],
+            "line and one" => [ax * i, ay * i],
+            "two lines" => [ax * (i / 2) + i % 2 * bx, ay * (i / 2) + i % 2 * by],
+            "cross" => [[ax * i, ay * i], [by * i, bx * i]][(i % 2) as usize],
+            "parabola" => [i * p, i * i],
+            "facing arcs" => [i * p, [i * (n as i32 - i), 500 * n as i32 - i * (n as i32 - i)][(i % 2) as usize]],
             _ => loop {
                 let at = [random.below(1000), random.below(1000)];
                 if (at[0] - cx).pow(2) + (at[1] - cy).pow(2) > 400 * 400 {

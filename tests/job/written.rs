@@ -70,7 +70,7 @@ fn the_report_adds_up_the_bytes() {
     let bytes: usize = files(&job.out()).values().map(Vec::len).sum();
     assert_eq!(number(&report["bytes_written"]), bytes as u64);
     let figures = &report["leaves"]["outcome"];
-    let ways = ["pipeline", "reference", "crowded", "not_accepted"].map(|way| number(&figures[way]));
+    let ways = ["pipeline", "reference", "small", "crowded", "not_accepted"].map(|way| number(&figures[way]));
     assert!(ways.iter().sum::<u64>() >= number(&report["tiles"]), "every tile was triangulated: {figures}");
 }
 

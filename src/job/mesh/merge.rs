@@ -9,7 +9,7 @@ use crate::job::partition::tree::Tree;
 use crate::job::plan::job_plan::Plan;
 use crate::job::records::{BorderVertex, Frontier, Seam, SeamTriangle, StepOutput, Store};
 use crate::mesh::region::covered;
-use crate::triangulation::reference;
+use crate::triangulation::divide_and_conquer;
 use crate::{Error, Result};
 
 /// The peak number of bytes that merging takes for each frontier site: `spade`, the mesh and the marks.
@@ -31,7 +31,7 @@ pub fn merge_frontiers(
     let union = join(store, &tree.merged_by(node))?;
     check_memory(union.sites.len(), memory)?;
     let sites: Vec<Site> = union.sites.iter().map(BorderVertex::plane).collect();
-    let mesh = reference::triangulate(&sites)?;
+    let mesh = divide_and_conquer::triangulate(&sites)?;
     let covered = covered(&mesh, bytemuck::cast_slice(&union.boundary))?;
     let cell = tree.node(node).parent.map(|_| &tree.node(node).cell);
     let found = find_final(&mesh, &sites, cell, |triangle| covered[triangle]);

@@ -48,14 +48,15 @@ impl fmt::Display for Report {
             let levels = &self.levels;
             row("coarser tiles", format!("{}, at most {:.2} m off", grouped(levels.files), levels.error_m))?;
         }
-        let TriangulationCounts { pipeline, reference, crowded, not_accepted, counts } = &self.leaves.outcome;
-        let leaves = pipeline + reference + crowded + not_accepted;
+        let TriangulationCounts { pipeline, reference, small, crowded, not_accepted, counts } = &self.leaves.outcome;
+        let divided = small + crowded + not_accepted;
         row(
             "leaves",
             format!(
-                "{}, of them by spade {} ({crowded} crowded, {not_accepted} not accepted, {reference} other)",
-                grouped(leaves),
-                grouped(leaves - pipeline)
+                "{}, of them divided and conquered {} ({crowded} crowded, {not_accepted} not accepted, {small} small), by spade {}",
+                grouped(pipeline + divided + reference),
+                grouped(divided),
+                grouped(*reference)
             ),
         )?;
         row("  sites moved to other pixels", grouped(counts.moved))?;
