@@ -8,6 +8,9 @@ const VERTICES_PER_CELL: usize = 8;
 /// A triangle in more cells than this counts everywhere, so that a fan of slivers takes no longer than other terrains.
 const MOST_CELLS: usize = 64;
 
+/// A simplified triangle whose box has more cells than this is compared with the heights of the whole terrain.
+const MOST_CELLS_COMPARED: usize = 1 << 12;
+
 /// The heights of a terrain, cell by cell.
 pub(crate) struct HeightBounds<'a> {
     positions: &'a [[i32; 3]],
@@ -16,10 +19,17 @@ pub(crate) struct HeightBounds<'a> {
     ranges: Vec<[i32; 2]>,
     /// The least and the greatest height of triangles that are in more than [`MOST_CELLS`].
     everywhere: [i32; 2],
+    /// The least and the greatest height of the terrain.
+    all: [i32; 2],
 }
 
 /// The range that holds no height.
 const NONE: [i32; 2] = [i32::MAX, i32::MIN];
+
+/// Returns the number of cells between the first and the last column and row.
+fn cells_in(columns: [usize; 2], rows: [usize; 2]) -> usize {
+    (columns[1] - columns[0] + 1) * (rows[1] - rows[0] + 1)
+}
 
 fn union(a: [i32; 2], b: [i32; 2]) -> [i32; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
@@ -30,8 +40,9 @@ impl<'a> HeightBounds<'a> {
     pub(crate) fn new(positions: &'a [[i32; 3]], fine: &[[u32; 3]]) -> HeightBounds<'a> {
         let cells = CellGrid::new(positions, positions.len() / VERTICES_PER_CELL + 1);
         let ranges = vec![NONE; cells.count()];
-        let mut bounds = HeightBounds { positions, cells, ranges, everywhere: NONE };
+        let mut bounds = HeightBounds { positions, cells, ranges, everywhere: NONE, all: NONE };
         fine.iter().for_each(|triangle| bounds.add(triangle));
+        bounds.all = bounds.ranges.iter().copied().fold(bounds.everywhere, union);
         bounds
     }
 
@@ -39,7 +50,7 @@ impl<'a> HeightBounds<'a> {
     fn add(&mut self, triangle: &[u32; 3]) {
         let (corners, range) = self.corners(triangle);
         let [columns, rows] = self.cells.around(&corners);
-        if (columns[1] - columns[0] + 1) * (rows[1] - rows[0] + 1) > MOST_CELLS {
+        if cells_in(columns, rows) > MOST_CELLS {
             self.everywhere = union(self.everywhere, range);
             return;
         }
@@ -61,9 +72,13 @@ impl<'a> HeightBounds<'a> {
         let (corners, [low, high]) = self.corners(triangle);
         let [columns, rows] = self.cells.around(&corners);
         let mut terrain = self.everywhere;
-        for row in rows[0]..=rows[1] {
-            let ranges = &self.ranges[self.cells.at(row, columns[0])..=self.cells.at(row, columns[1])];
-            terrain = ranges.iter().copied().fold(terrain, union);
+        if cells_in(columns, rows) > MOST_CELLS_COMPARED {
+            terrain = self.all;
+        } else {
+            for row in rows[0]..=rows[1] {
+                let ranges = &self.ranges[self.cells.at(row, columns[0])..=self.cells.at(row, columns[1])];
+                terrain = ranges.iter().copied().fold(terrain, union);
+            }
         }
         let above = high as i64 - terrain[0] as i64;
         let below = terrain[1] as i64 - low as i64;

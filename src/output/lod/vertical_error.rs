@@ -15,6 +15,9 @@ use crate::output::lod::vertex_cells::{VertexCells, plane};
 /// Steps of a walk along an edge, on average. A mesh that needs more has nothing but slivers, and gets a rougher bound.
 const STEPS_PER_EDGE: u64 = 64;
 
+/// Looking through this many triangles around a vertex counts as a step. Few vertices have as many, but the hub of a fan may have all.
+const TRIANGLES_PER_STEP: u64 = 8;
+
 /// The number of triangles that are measured in the order of their bounds.
 const SORTED: usize = 256;
 
@@ -77,6 +80,11 @@ impl<'a> FineMesh<'a> {
         self.adjacency.around(a).iter().find(|edge| edge[0] == b).map(|edge| edge[1])
     }
 
+    /// Returns the steps that it takes to look at all triangles around `v`.
+    fn steps_around(&self, v: u32) -> u64 {
+        1 + self.adjacency.around(v).len() as u64 / TRIANGLES_PER_STEP
+    }
+
     /// Returns the greatest distance where an edge of a coarse triangle crosses an edge of this mesh. `None` if that takes more than
     /// `steps`, or if the edge leaves the mesh.
     fn error_at_crossings(&self, &[a, b, c]: &[u32; 3], steps: &mut u64) -> Option<f64> {
@@ -94,7 +102,8 @@ impl<'a> FineMesh<'a> {
         let mut greatest = 0.0f64;
         let mut at = WalkPosition::Vertex(from);
         loop {
-            *steps = steps.checked_sub(1)?;
+            let (WalkPosition::Vertex(v) | WalkPosition::Edge(_, v)) = at;
+            *steps = steps.checked_sub(self.steps_around(v))?;
             at = match at {
                 WalkPosition::Vertex(v) if v == to => return Some(greatest),
                 WalkPosition::Vertex(v) => self.leave_vertex(v, to, &edge)?,

@@ -136,7 +136,11 @@ impl<'a> DrawnTriangle<'a> {
     }
 
     fn draw(&self, columns: [i64; 2], rows: [i64; 2], pixels: &mut Vec<PreviewPixel>) {
+        let sliver = (rows[1] - rows[0] >= SLIVER_ROWS).then(|| Sliver::new(self));
         for row in rows[0]..rows[1] {
+            if sliver.as_ref().is_some_and(|sliver| sliver.misses(row)) {
+                continue;
+            }
             let (edges, [first, last]) = self.covered(columns, row);
             for column in first..last {
                 let weights = edges.map(|(value, step)| value.wrapping_add((column - columns[0]).wrapping_mul(step)));
@@ -174,6 +178,47 @@ impl<'a> DrawnTriangle<'a> {
             (value, step)
         });
         (edges, range)
+    }
+}
+
+/// The borders of a high triangle in floating point. Most rows of a sliver lie between two centres, and this finds most of those rows
+/// without a division. The exact edge functions decide the others.
+struct Sliver {
+    /// For every edge the row and column at which it starts and ends, its row first, and the columns that it moves in a row.
+    edges: [([f64; 2], [f64; 2], f64); 3],
+}
+
+/// Triangles over fewer rows are drawn without a look at their borders.
+const SLIVER_ROWS: i64 = 16;
+
+impl Sliver {
+    fn new(triangle: &DrawnTriangle) -> Sliver {
+        let canvas = triangle.canvas;
+        let places = triangle.places.map(|p| [1, 0].map(|k| (p[k] - canvas.center) as f64 / canvas.pitch as f64));
+        let edges = [0, 1, 2].map(|k| {
+            let (a, b) = (places[k], places[(k + 1) % 3]);
+            let (low, high) = if a[0] <= b[0] { (a, b) } else { (b, a) };
+            let slope = if high[0] > low[0] { (high[1] - low[1]) / (high[0] - low[0]) } else { 0.0 };
+            (low, high, slope)
+        });
+        Sliver { edges }
+    }
+
+    /// Tells whether the triangle surely covers no centre in `row`.
+    fn misses(&self, row: i64) -> bool {
+        let row = row as f64;
+        // Far more than rounding can move a border.
+        let spare = 1e-4;
+        let mut columns = [f64::INFINITY, f64::NEG_INFINITY];
+        for (low, high, slope) in &self.edges {
+            if row >= low[0] - spare && row <= high[0] + spare {
+                // No edge in reach of a row is so flat that its slope says little; it counts with all its columns.
+                let at = low[1] + slope * (row - low[0]);
+                let ends = if high[0] - low[0] < 1.0 { [low[1], high[1]] } else { [at, at] };
+                columns = [columns[0].min(ends[0]).min(ends[1]), columns[1].max(ends[0]).max(ends[1])];
+            }
+        }
+        (columns[0] - spare).ceil() > columns[1] + spare
     }
 }
 
