@@ -137,7 +137,7 @@ impl Projection {
         let angle = base.map_or(1.0, |base| degrees(base.unit()));
         let mut parameters = BTreeMap::new();
         for node in conversion.children().filter(|child| child.keyword == "PARAMETER") {
-            let (long, value) = (node.text(0)?, node.number(1)?);
+            let (long, value) = (node.text(0)?, node.number(1).filter(|value| value.is_finite())?);
             let name = parameter(long).map_or_else(|| comparable_name(long), str::to_string);
             let factor = match name.as_str() {
                 "x_0" | "y_0" => node.unit_metres().unwrap_or(metres),
