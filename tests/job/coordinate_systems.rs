@@ -202,6 +202,20 @@ fn nad83_2011_by_parameters_is_placed_on_the_globe() {
 }
 
 #[test]
+fn a_text_is_placed_on_the_globe_by_the_crs_that_the_user_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cloud.csv");
+    let rows: String =
+        (0..100).map(|i| format!("{},{},{}\n", 500_000 + i % 10 * 7, 4_000_000 + i / 10 * 9, i % 3)).collect();
+    fs::write(&path, rows).unwrap();
+    assert!(warnings(&Job::on(&[&path]).report()).contains("globe"));
+    let report = Job::on(&[&path]).with("input", "crs = \"EPSG:26915+6360\"").report();
+    let said = warnings(&report);
+    assert!(!said.contains("globe") && !said.contains("unit of its coordinates"), "{said}");
+    assert!(said.contains("heights are in another unit"), "{said}");
+}
+
+#[test]
 fn a_crs_that_is_not_known_is_an_error_of_the_configuration() {
     let folder = tempfile::tempdir().unwrap();
     let file = write(folder.path(), "a.las", &[]);

@@ -98,7 +98,7 @@ impl Datum {
 /// Returns the half axes of an ellipsoid; the inverse flattening of a sphere is written as 0.
 fn half_axes(greater: f64, inverse_flattening: f64) -> Option<[f64; 2]> {
     let flattening = if inverse_flattening > 0.0 { 1.0 / inverse_flattening } else { 0.0 };
-    (greater.is_finite() && greater > 0.0).then(|| [greater, greater * (1.0 - flattening)])
+    (greater.is_finite() && greater > 0.0).then_some([greater, greater * (1.0 - flattening)])
 }
 
 /// Returns the name as all writers would spell it; `None` if it says nothing.
