@@ -14,8 +14,10 @@ mod points;
 mod source;
 mod text;
 
-pub use crs::system::Crs;
+pub use crs::choice::CrsChoice;
+pub use crs::system::{Crs, CrsKind};
 pub use crs::unit::Unit;
+pub use crs::vertical::VerticalSystem;
 pub use points::axis::Axis;
 pub use points::counts::PointCounts;
 pub use points::point::Point;

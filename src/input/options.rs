@@ -4,6 +4,7 @@ use rust_decimal::Decimal;
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::lattice::shortest_decimal;
+use crate::input::crs::choice::CrsChoice;
 use crate::input::text::options::TextOptions;
 
 /// `[input]`: which points a job reads.
@@ -21,6 +22,9 @@ pub struct InputOptions {
     /// Which of several points with the same x and y the job keeps.
     #[serde(default)]
     pub duplicates: Duplicates,
+    /// The coordinate reference system of all files.
+    #[serde(default)]
+    pub crs: CrsChoice,
     /// The unit of x and y.
     #[serde(default)]
     pub unit: UnitChoice,

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use rust_decimal::Decimal;
 use serde::{Deserialize, Serialize};
 
+use crate::input::crs::plausible::plausible;
 use crate::input::crs::system::Crs;
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::las::crs_records;
@@ -134,6 +135,7 @@ fn open_las(file: &RandomAccessFile) -> Result<Source> {
     let header = LasHeader::read(file, &mut warnings)?;
     let vlrs = vlr::list(file, &header, &mut warnings)?;
     let crs = crs_records::read(file, &vlrs, &mut warnings)?;
+    let crs = plausible(crs, header.min, header.max, &mut warnings);
     let (missing, points) = if header.compressed {
         let points = CompressedPoints::read(file, &header, &vlrs, &mut warnings)?;
         (points.missing, PointData::Laz(points))

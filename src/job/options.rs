@@ -99,8 +99,11 @@ impl TryFrom<String> for MemoryLimit {
     type Error = String;
 
     fn try_from(text: String) -> std::result::Result<MemoryLimit, String> {
-        let bytes = parse_memory(&text)
-            .ok_or_else(|| format!("memory is a text such as \"4 GiB\" or \"800 MB\", not {text:?}"))?;
+        let bytes = parse_memory(&text).ok_or_else(|| {
+            format!(
+                "memory is a text such as \"4 GiB\", \"4G\" (the same) or \"800 MB\" (800 million bytes), not {text:?}"
+            )
+        })?;
         if bytes < MemoryLimit::LEAST {
             return Err(format!("memory must be at least {}", MemoryLimit(MemoryLimit::LEAST)));
         }
@@ -127,16 +130,18 @@ impl std::fmt::Display for MemoryLimit {
     }
 }
 
+/// Returns the bytes of a text. A letter alone is a power of 1024, as for `java -Xmx`, Docker and Slurm; with a B it is a power of
+/// 1000.
 fn parse_memory(text: &str) -> Option<u64> {
     let text = text.trim();
     let split = text.find(|c: char| !c.is_ascii_digit() && c != '.')?;
     let value: f64 = text[..split].parse().ok()?;
     let unit: f64 = match text[split..].trim().to_ascii_lowercase().as_str() {
         "b" => 1.0,
-        "kib" => 1024.0,
-        "mib" => 1024.0 * 1024.0,
-        "gib" => 1024.0 * 1024.0 * 1024.0,
-        "tib" => 1024.0 * 1024.0 * 1024.0 * 1024.0,
+        "kib" | "k" => 1024.0,
+        "mib" | "m" => 1024.0 * 1024.0,
+        "gib" | "g" => 1024.0 * 1024.0 * 1024.0,
+        "tib" | "t" => 1024.0 * 1024.0 * 1024.0 * 1024.0,
         "kb" => 1e3,
         "mb" => 1e6,
         "gb" => 1e9,
@@ -154,6 +159,11 @@ mod tests {
     fn amounts_of_memory() {
         assert_eq!(parse_memory("4 GiB"), Some(4 << 30));
         assert_eq!(parse_memory("1.5GB"), Some(1_500_000_000));
+        assert_eq!(parse_memory("4G"), Some(4 << 30));
+        assert_eq!(parse_memory("4 g"), parse_memory("4GiB"));
+        assert_eq!((parse_memory("800M"), parse_memory("800 MiB")), (Some(800 << 20), Some(800 << 20)));
+        assert_eq!((parse_memory("800MB"), parse_memory("4GB")), (Some(800_000_000), Some(4_000_000_000)));
+        assert_eq!(parse_memory("4 Gi"), None);
         assert_eq!(parse_memory("12"), None);
         assert_eq!(parse_memory("GiB"), None);
         assert_eq!(MemoryLimit(1 << 30).to_string(), "1 GiB");

@@ -2,8 +2,10 @@
 
 use serde_json::Value;
 
+use gdt_batch::job::progress::stage::ProgressOutput;
+
 use crate::clouds;
-use crate::program::{Job, gdt_batch, number};
+use crate::program::{Job, Said, gdt_batch, number};
 
 #[track_caller]
 fn stays_within(report: &Value, mebibytes: u64) {
@@ -60,4 +62,45 @@ fn tiles_too_large_for_the_memory_are_refused() {
     });
     many.run().refused(2, &["max_points_per_tile", "memory"]);
     few.digest();
+}
+
+/// Returns the limit that the message says to set.
+#[track_caller]
+fn advised(said: &Said) -> String {
+    let (_, after) = said.err.split_once("set memory = \"").unwrap_or_else(|| panic!("{}", said.err));
+    after.split_once('"').unwrap().0.to_string()
+}
+
+#[test]
+fn one_raise_of_the_memory_suffices_for_large_tiles() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = clouds::write(folder.path(), "many.csv", &clouds::uniform(250_000, 100_000, 3));
+    let job = |memory: &str| Job::on(&[&file]).tiles_of(5_000_000).with("limits", &format!("memory = {memory:?}"));
+    let said = job("128M").run();
+    said.refused(2, &["max_points_per_tile"]);
+    let job = job(&advised(&said));
+    job.run().succeeded();
+    job.verified();
+}
+
+#[test]
+fn one_raise_of_the_memory_suffices_for_points_that_no_tile_can_decide() {
+    let folder = tempfile::tempdir().unwrap();
+    // Two short lines far apart: the disc of every triangle is wider than any cell.
+    let cloud: Vec<[i64; 3]> = (0..16_000).map(|i| [i / 2, i % 2 * 1_000_000, i % 7]).collect();
+    let file = clouds::write(folder.path(), "lines.csv", &cloud);
+    let job = Job::on(&[&file]).tiles_of(1_000).threads(1);
+    let mut options = gdt_batch::config::load(&job.config()).unwrap();
+    // Less than a configuration may say, so that few points are too many.
+    options.limits.memory.0 = 11 << 20;
+    let error = gdt_batch::job::run(&options, ProgressOutput::Quiet).unwrap_err();
+    assert_eq!(error.exit_code(), 1);
+    let said = error.to_string();
+    assert!(said.contains("no tile can decide") && said.contains("finished steps are kept"), "{said}");
+    let (_, after) = said.split_once("set memory = \"").unwrap();
+    let mebibytes: u64 = after.split_once(" MiB").unwrap().0.parse().unwrap();
+    options.limits.memory.0 = mebibytes << 20;
+    let report = gdt_batch::job::run(&options, ProgressOutput::Quiet).unwrap();
+    assert!(report.resumed > 10, "the leaves of the first run are kept: {}", report.resumed);
+    job.verified();
 }

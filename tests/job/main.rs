@@ -19,6 +19,7 @@ mod bad_files;
 mod broken;
 mod choices;
 mod configuration;
+mod coordinate_systems;
 mod cutting;
 mod globe;
 mod khronos;

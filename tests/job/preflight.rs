@@ -71,3 +71,94 @@ fn a_job_larger_than_the_disk_is_refused_unless_forced() {
     assert!(!job.out().exists(), "a refused job writes nothing");
     job.run_with(&["--force"]).refused(3, &["bomb.laz", "only 1000 points"]);
 }
+
+/// Returns the header of a LAS file with `count` points between 0 and these greatest x, y and z.
+fn header(count: u32, max: [f64; 3]) -> Vec<u8> {
+    let mut bytes = vec![0; 227];
+    let mut put = |at: usize, value: &[u8]| bytes[at..at + value.len()].copy_from_slice(value);
+    put(0, b"LASF");
+    put(24, &[1, 2]);
+    put(94, &227u16.to_le_bytes());
+    put(96, &227u32.to_le_bytes());
+    put(105, &20u16.to_le_bytes());
+    put(107, &count.to_le_bytes());
+    for (axis, greatest) in max.into_iter().enumerate() {
+        put(131 + 8 * axis, &1.0f64.to_le_bytes());
+        put(179 + 16 * axis, &greatest.to_le_bytes());
+    }
+    bytes
+}
+
+/// Writes a LAS file of points along the x axis, a metre apart in rows of eight, in the order of x. Every eighth is ground.
+fn strip(path: &Path, count: u32) {
+    let mut bytes = header(count, [(count / 8) as f64, 7.0, 99.0]);
+    for i in 0..count {
+        for value in [i / 8, i % 8, i * 7 % 100] {
+            bytes.extend(value.to_le_bytes());
+        }
+        bytes.extend([0, 0, 9, if i % 8 == 0 { 2 } else { 1 }, 0, 0, 0, 0]);
+    }
+    fs::write(path, bytes).unwrap();
+}
+
+#[test]
+fn the_estimates_count_what_bounds_and_classes_leave() {
+    let folder = tempfile::tempdir().unwrap();
+    let count = 2_000_000;
+    let file = folder.path().join("strip.las");
+    strip(&file, count);
+    let check = |line: &str| Job::on(&[&file]).with("input", line).run_with(&["check", "--json"]).succeeded().json();
+    let all = check("");
+    assert_eq!(number(&all["kept"]), count as u64);
+    let kept_and_disk = |line: &str| {
+        let json = check(line);
+        [number(&json["kept"]), number(&json["results"]) + number(&json["temporary"])]
+    };
+    let whole = number(&all["results"]) + number(&all["temporary"]);
+    // A fortieth of the strip: a chunk. The sample allows for what it does not see.
+    let [kept, disk] = kept_and_disk("bounds = [100000, 0, 106249, 7]");
+    assert!((50_000..300_000).contains(&kept), "{kept}");
+    assert!(disk < whole / 4, "{disk} of {whole}");
+    let [kept, _] = kept_and_disk("bounds = [-5, -5, -1, -1]");
+    assert_eq!(kept, 0, "the header's box is elsewhere");
+    let [kept, _] = kept_and_disk("bounds = [-5, -5, 1e6, 8]");
+    assert_eq!(kept, count as u64, "the header's box is inside");
+    let [kept, _] = kept_and_disk("classes = [2]");
+    assert!((250_000..320_000).contains(&kept), "an eighth is ground: {kept}");
+    let [kept, _] = kept_and_disk("classes = [40]");
+    assert!(kept < count as u64 / 16, "{kept}");
+}
+
+#[test]
+fn a_job_on_a_part_of_a_cloud_takes_no_more_disk_than_estimated() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("strip.las");
+    strip(&file, 400_000);
+    let job = Job::on(&[&file]).with("input", "bounds = [10000, 0, 19999, 7]");
+    let estimate = job.run_with(&["check", "--json"]).succeeded().json();
+    assert_eq!(number(&estimate["kept"]), 80_000, "all chunks are in the sample");
+    let report = job.report();
+    for (estimated, real) in [("temporary", "bytes_temporary"), ("results", "bytes_written")] {
+        let ratio = number(&estimate[estimated]) as f64 / number(&report[real]) as f64;
+        assert!((0.9..3.0).contains(&ratio), "{estimated}: {ratio} times the real size");
+    }
+}
+
+#[test]
+fn a_job_on_a_small_part_of_a_cloud_larger_than_the_disk_is_not_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("huge.las");
+    let count = 2_000_000_000u32;
+    fs::write(&path, header(count, [1e6; 3])).unwrap();
+    // A hole takes no disk: all points are at 0, 0, 0.
+    fs::OpenOptions::new().write(true).open(&path).unwrap().set_len(227 + 20 * count as u64).unwrap();
+    let check = |line: &str| Job::on(&[&path]).with("input", line).run_with(&["check", "--json"]);
+    let [need, free] = ["disk", "disk_free"].map(|name| number(&check("").json()[name]));
+    assert!(need > 100 << 30, "{need}");
+    if need > free {
+        check("").refused(1, &["make room"]);
+        // The headers do not tell how much the bounds leave. The more it takes to know, the larger the sample.
+        let part = check("bounds = [500000, 500000, 600000, 600000]").succeeded().json();
+        assert!(number(&part["disk"]) <= free && number(&part["kept"]) < count as u64 / 20, "{part}");
+    }
+}

@@ -1,7 +1,8 @@
 //! The one coordinate reference system of a file that may describe two.
 
 use crate::input::crs::from_wkt;
-use crate::input::crs::geotiff::{self, GeoKeys};
+use crate::input::crs::geokeys::GeoKeys;
+use crate::input::crs::geotiff;
 use crate::input::crs::system::Crs;
 use crate::{Result, Warnings};
 
@@ -15,14 +16,14 @@ pub(crate) fn from_records(
     let text = from_texts(texts, warnings)?;
     let keys = geotiff::parse(keys);
     if let (Some(text), Some(keys)) = (&text, &keys)
-        && !text.same_as(keys)
+        && let differences = text.differences(keys)
+        && !differences.is_empty()
     {
         warnings.push(format!(
-            "its two coordinate systems differ: {} in {} as text (used), {} in {} as GeoTIFF keys",
+            "its two coordinate systems differ: {} as text (used) and {} as GeoTIFF keys differ in {}",
             text.label(),
-            text.horizontal.name(),
             keys.label(),
-            keys.horizontal.name()
+            differences.join(" and ")
         ));
     }
     Ok(text.or(keys).unwrap_or_default())

@@ -1,13 +1,14 @@
 //! The coordinate reference system that a well-known text describes.
 
-use crate::input::crs::system::Crs;
+use crate::input::crs::form::text_of_code;
+use crate::input::crs::system::{Crs, CrsKind};
 use crate::input::crs::unit::Unit;
+use crate::input::crs::vertical::VerticalSystem;
 use crate::input::crs::wkt::{GEOGRAPHIC, LOCAL, PROJECTED, VERTICAL, WktNode, length, parts, unbound, units};
 
 /// Returns the system of an EPSG code; `None` for a code that is not in the list of known ones.
 pub(crate) fn from_epsg(code: u32) -> Option<Crs> {
-    let definition = crs_definitions::from_code(u16::try_from(code).ok()?)?;
-    let crs = parse(definition.wkt)?;
+    let crs = parse(text_of_code(code)?)?;
     Some(Crs { epsg: Some(code), ..crs })
 }
 
@@ -17,34 +18,40 @@ pub(crate) fn parse(text: &str) -> Option<Crs> {
     let parts: Vec<&WktNode> = roots.iter().flat_map(parts).map(unbound).collect();
     let find = |keywords: &[&str]| parts.iter().find(|part| keywords.contains(&part.keyword.as_str())).copied();
     let horizontal = find(&PROJECTED).or_else(|| find(&GEOGRAPHIC)).or_else(|| find(&LOCAL))?;
-    let geographic = GEOGRAPHIC[..5].contains(&horizontal.keyword.as_str());
+    let kind = kind(horizontal);
     let (unit, third) = units(horizontal);
-    let vertical = find(&VERTICAL).and_then(|vertical| units(vertical).0).or(third).and_then(length);
+    let vertical = find(&VERTICAL);
+    let unit_of_height = vertical.and_then(|vertical| units(vertical).0).or(third).and_then(length);
     Some(Crs {
         wkt: Some(text.trim_end_matches(['\0', ' ', '\n', '\r', '\t']).to_string()),
-        epsg: epsg(horizontal),
-        horizontal: unit
-            .map_or(Unit::Unknown, |unit| if geographic { angle(unit) } else { Unit::from_metres(length(unit)) }),
-        vertical,
+        epsg: horizontal.epsg(),
+        kind,
+        horizontal: unit.map_or(Unit::Unknown, |unit| match kind {
+            CrsKind::Geographic => angle(unit),
+            _ => Unit::from_metres(length(unit)),
+        }),
+        vertical: unit_of_height,
+        vertical_system: vertical.and_then(VerticalSystem::of),
         name: horizontal.text(0).map(str::to_string).filter(|name| !name.is_empty()),
     })
+}
+
+fn kind(system: &WktNode) -> CrsKind {
+    match system.keyword.as_str() {
+        keyword if PROJECTED.contains(&keyword) => CrsKind::Projected,
+        keyword if LOCAL.contains(&keyword) => CrsKind::Local,
+        _ if system.is_geocentric() => CrsKind::Geocentric,
+        _ => CrsKind::Geographic,
+    }
 }
 
 fn angle(unit: &WktNode) -> Unit {
     if unit.keyword == "LENGTHUNIT" { Unit::from_metres(length(unit)) } else { Unit::Degree }
 }
 
-fn epsg(node: &WktNode) -> Option<u32> {
-    let authority = node.child(&["AUTHORITY", "ID"])?;
-    let code = authority.number(1)?;
-    let valid = authority.text(0)?.eq_ignore_ascii_case("EPSG") && code > 0.0 && code < 1e6 && code.fract() == 0.0;
-    valid.then_some(code as u32)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::input::crs::wkt::parameters;
 
     const COMPOUND_2: &str = r#"COMPOUNDCRS["a + b",PROJCRS["a",BASEGEOGCRS["g",DATUM["d",ELLIPSOID["e",6378137,298.25,
         LENGTHUNIT["metre",1]]],PRIMEM["Greenwich",0,ANGLEUNIT["degree",0.0174532925199433]]],CONVERSION["c",
@@ -58,7 +65,7 @@ mod tests {
         let crs = parse(COMPOUND_2).unwrap();
         assert_eq!((crs.horizontal, crs.vertical), (Unit::UsFoot, Some(1.0)));
         assert_eq!((crs.epsg, crs.name.as_deref()), (Some(2276), Some("a")));
-        assert_eq!(parameters(COMPOUND_2), [("falseeasting".to_string(), 1.0)]);
+        assert_eq!(crs.vertical_system.unwrap().label(), "b");
     }
 
     #[test]

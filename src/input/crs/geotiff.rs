@@ -1,71 +1,28 @@
-//! Coordinate reference systems as GeoTIFF keys (OGC 19-008r4), which LAS stores in three records.
+//! Coordinate reference systems as GeoTIFF keys.
 
-use crate::input::crs::from_wkt::from_epsg;
-use crate::input::crs::system::Crs;
+use crate::input::crs::from_wkt::{self, from_epsg};
+use crate::input::crs::geokeys::{GeoKeys, USER_DEFINED};
+use crate::input::crs::geotiff_text;
+use crate::input::crs::system::{Crs, CrsKind};
 use crate::input::crs::unit::Unit;
-use crate::input::file::bytes::{float64, uint16};
+use crate::input::crs::vertical::VerticalSystem;
 
 const MODEL_TYPE: u16 = 1024;
 const GEOGRAPHIC_TYPE: u16 = 2048;
 const PROJECTED_TYPE: u16 = 3072;
 const LINEAR_UNITS: u16 = 3076;
 const LINEAR_UNIT_SIZE: u16 = 3077;
+const VERTICAL_TYPE: u16 = 4096;
+const VERTICAL_CITATION: u16 = 4097;
 const VERTICAL_UNITS: u16 = 4099;
 /// The citations of the projected, the geographic and any system.
 const CITATIONS: [u16; 3] = [3073, 2049, 1026];
 
-/// The code that stands for a definition in other keys.
-const USER_DEFINED: u16 = 32767;
-
-/// The record of the key directory.
-pub(crate) const DIRECTORY: u16 = 34735;
-/// The record of the 64-bit floating-point values.
-pub(crate) const DOUBLES: u16 = 34736;
-/// The record of the texts.
-pub(crate) const TEXTS: u16 = 34737;
-
-/// The bytes of the three records, as they are in the file.
-pub(crate) struct GeoKeys {
-    /// [`DIRECTORY`]: 16-bit integers.
-    pub(crate) directory: Vec<u8>,
-    /// [`DOUBLES`].
-    pub(crate) doubles: Vec<u8>,
-    /// [`TEXTS`].
-    pub(crate) texts: Vec<u8>,
-}
-
-impl GeoKeys {
-    /// Returns the record, count and value (or index in the record) of `key`.
-    fn entry(&self, key: u16) -> Option<(u16, u16, u16)> {
-        let numbers = |index: usize| self.directory.chunks_exact(8).nth(index);
-        let count = uint16(numbers(0)?, 6) as usize;
-        let entry = (1..=count).map_while(numbers).find(|entry| uint16(entry, 0) == key)?;
-        Some((uint16(entry, 2), uint16(entry, 4), uint16(entry, 6)))
-    }
-
-    fn code(&self, key: u16) -> Option<u16> {
-        self.entry(key).filter(|(record, ..)| *record == 0).map(|(_, _, value)| value).filter(|value| *value != 0)
-    }
-
-    fn double(&self, key: u16) -> Option<f64> {
-        let (record, _, index) = self.entry(key)?;
-        let bytes = self.doubles.chunks_exact(8).nth(index as usize)?;
-        (record == DOUBLES).then(|| float64(bytes, 0))
-    }
-
-    fn text(&self, key: u16) -> Option<String> {
-        let (record, count, start) = self.entry(key)?;
-        let bytes = self.texts.get(start as usize..start as usize + count as usize)?;
-        let text = String::from_utf8_lossy(bytes).trim_matches(['|', '\0', ' ']).to_string();
-        (record == TEXTS && !text.is_empty()).then_some(text)
-    }
-
-    /// Returns the metres of the unit of x and y, if a key gives it.
-    fn linear_unit(&self) -> Option<f64> {
-        match self.code(LINEAR_UNITS)? {
-            USER_DEFINED => self.double(LINEAR_UNIT_SIZE).filter(|size| size.is_finite() && *size > 0.0),
-            code => metres(code),
-        }
+/// Returns the metres of the unit of x and y, if a key gives it.
+fn linear_unit(keys: &GeoKeys) -> Option<f64> {
+    match keys.code(LINEAR_UNITS)? {
+        USER_DEFINED => keys.double(LINEAR_UNIT_SIZE).filter(|size| *size > 0.0),
+        code => metres(code),
     }
 }
 
@@ -81,32 +38,59 @@ fn metres(code: u16) -> Option<f64> {
 }
 
 /// Returns the system that the keys describe; `None` if they say nothing.
-pub(crate) fn parse(records: &GeoKeys) -> Option<Crs> {
-    let model = records.code(MODEL_TYPE);
-    let projected = records.code(PROJECTED_TYPE).filter(|_| model != Some(2));
-    let code = projected.or_else(|| records.code(GEOGRAPHIC_TYPE).filter(|_| model != Some(1)));
+pub(crate) fn parse(keys: &GeoKeys) -> Option<Crs> {
+    let model = keys.code(MODEL_TYPE);
+    let projected = keys.code(PROJECTED_TYPE).filter(|_| !matches!(model, Some(2 | 3)));
+    let code = projected.or_else(|| keys.code(GEOGRAPHIC_TYPE).filter(|_| model != Some(1)));
     let epsg = code.filter(|code| *code != USER_DEFINED).map(u32::from);
-    let known = epsg.and_then(from_epsg).unwrap_or_default();
-    let degrees = projected.is_none() && (model == Some(2) || (model.is_none() && epsg.is_some()));
-    let horizontal = match records.linear_unit() {
-        _ if degrees => Unit::Degree,
+    let name = CITATIONS.iter().find_map(|key| keys.text(*key));
+    let unit = linear_unit(keys);
+    let of_code = epsg.and_then(from_epsg);
+    let is_defined = projected == Some(USER_DEFINED);
+    let defined = || from_wkt::parse(&geotiff_text::projected(keys, name.as_deref(), unit?)?);
+    let known = of_code.or_else(|| defined().filter(|_| is_defined)).unwrap_or_default();
+    let kind = kind(model, projected.is_some(), epsg.is_some(), known.kind);
+    let horizontal = match unit {
+        _ if kind == CrsKind::Geographic => Unit::Degree,
         Some(metres) => Unit::from_metres(Some(metres)),
+        None if kind == CrsKind::Geocentric => Unit::Metre,
         None => known.horizontal,
     };
+    let heights = VerticalSystem {
+        epsg: keys.code(VERTICAL_TYPE).filter(|code| *code != USER_DEFINED).map(u32::from),
+        name: keys.text(VERTICAL_CITATION),
+        datum: None,
+    };
+    let unit_of_height = keys.code(VERTICAL_UNITS).and_then(metres).or_else(|| heights.metres_of_code());
     let crs = Crs {
         // If a key gives another unit than the code, the text of the code would be wrong.
         wkt: known.wkt.filter(|_| known.horizontal == horizontal),
         epsg,
+        kind,
         horizontal,
-        vertical: records.code(VERTICAL_UNITS).and_then(metres),
-        name: known.name.or_else(|| CITATIONS.iter().find_map(|key| records.text(*key))),
+        vertical: unit_of_height.or(known.vertical),
+        vertical_system: Some(heights).filter(|system| *system != VerticalSystem::default()).or(known.vertical_system),
+        name: known.name.or(name),
     };
     (crs != Crs::default()).then_some(crs)
+}
+
+/// Returns the kind that the keys say, or else that of the code.
+fn kind(model: Option<u16>, is_projected: bool, has_code: bool, known: CrsKind) -> CrsKind {
+    match model {
+        Some(3) => CrsKind::Geocentric,
+        _ if known != CrsKind::Unknown => known,
+        _ if is_projected => CrsKind::Projected,
+        Some(2) => CrsKind::Geographic,
+        None if has_code => CrsKind::Geographic,
+        _ => CrsKind::Unknown,
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::input::crs::geokeys::{DOUBLES, TEXTS};
 
     fn records(keys: &[[u16; 4]], doubles: &[f64]) -> GeoKeys {
         let mut all = vec![[1, 1, 0, keys.len() as u16]];
@@ -152,5 +136,59 @@ mod tests {
         assert_eq!(parse(&records(&[[3076, DOUBLES, 9, 9], [1026, TEXTS, 9, 9000]], &[])), None);
         let cut = GeoKeys { directory: vec![1, 0, 1], doubles: Vec::new(), texts: Vec::new() };
         assert_eq!(parse(&cut), None);
+    }
+
+    /// NAD83 / UTM zone 15N, but for what `changes` says otherwise.
+    fn user_defined(changes: &[[u16; 4]], doubles: &[f64]) -> Crs {
+        let mut keys: Vec<[u16; 4]> = vec![
+            [1024, 0, 1, 1],
+            [2048, 0, 1, 4269],
+            [3072, 0, 1, USER_DEFINED],
+            [3074, 0, 1, 16015],
+            [3076, 0, 1, 9001],
+        ];
+        for change in changes {
+            keys.retain(|key| key[0] != change[0]);
+            keys.push(*change);
+        }
+        parse(&records(&keys, doubles)).unwrap()
+    }
+
+    #[test]
+    fn user_defined_keys_are_compared_with_codes_by_what_they_say() {
+        let [utm, nad27, zone_16] = [26915, 26715, 26916].map(|code| from_epsg(code).unwrap());
+        let own = user_defined(&[], &[]);
+        assert_eq!(own.differences(&utm), [""; 0]);
+        assert_eq!(own.differences(&nad27), ["the datum (NAD83, NAD27)"]);
+        assert_eq!(own.differences(&zone_16), ["the longitude of the origin (-93, -87)"]);
+        assert!(own.proj4_definition().unwrap().contains("+proj=tmerc"));
+        let written_out = [
+            [3074, 0, 1, USER_DEFINED],
+            [3075, 0, 1, 1],
+            [3080, DOUBLES, 1, 0],
+            [3081, DOUBLES, 1, 1],
+            [3082, DOUBLES, 1, 2],
+            [3083, DOUBLES, 1, 1],
+            [3092, DOUBLES, 1, 3],
+        ];
+        assert_eq!(user_defined(&written_out, &[-93.0, 0.0, 500_000.0, 0.9996]).differences(&utm), [""; 0]);
+        assert_eq!(user_defined(&written_out, &[-93.0, 0.0, 500_000.0, 0.9999]).differences(&utm).len(), 1);
+        // Keys that do not say the projection leave it in doubt.
+        assert_eq!(user_defined(&[[3074, 0, 1, 10_101], [3073, TEXTS, 8, 0]], &[]).differences(&utm).len(), 1);
+    }
+
+    #[test]
+    fn geocentric_systems_are_known_by_the_model_and_by_the_code() {
+        for keys in [&[[1024, 0, 1, 3], [2048, 0, 1, 4326]][..], &[[1024, 0, 1, 3]], &[[2048, 0, 1, 4978]]] {
+            assert_eq!(parse(&records(keys, &[])).unwrap().kind, CrsKind::Geocentric, "{keys:?}");
+        }
+    }
+
+    #[test]
+    fn the_datum_of_heights_is_read() {
+        let crs = parse(&records(&[[3072, 0, 1, 25832], [4096, 0, 1, 5941], [4099, 0, 1, 9001]], &[])).unwrap();
+        assert_eq!(crs.differences(&from_epsg(5972).unwrap()), [""; 0]);
+        let other = parse(&records(&[[3072, 0, 1, 25832], [4096, 0, 1, 5776], [4099, 0, 1, 9001]], &[])).unwrap();
+        assert_eq!(crs.differences(&other), ["the datum of heights (EPSG:5941, EPSG:5776)"]);
     }
 }

@@ -1,10 +1,18 @@
 //! Coordinate reference systems, as far as a terrain needs them: the units, a text for readers, and whether two systems agree.
 //! This room knows no files: the readers of file formats hand it the records that describe the system.
 
+pub(crate) mod choice;
+pub(crate) mod datum;
+pub(crate) mod form;
 pub(crate) mod from_records;
 pub(crate) mod from_wkt;
+pub(crate) mod geokeys;
 pub(crate) mod geotiff;
+pub(crate) mod geotiff_text;
+pub(crate) mod plausible;
 pub(crate) mod proj4;
+pub(crate) mod projection;
 pub(crate) mod system;
 pub(crate) mod unit;
+pub(crate) mod vertical;
 pub(crate) mod wkt;

@@ -1,43 +1,11 @@
 //! The definition of a projected system as a PROJ.4 string, from its EPSG code or from its well-known text.
 
-use crate::input::crs::wkt::{PROJECTED, WktNode, comparable_name, find};
+use crate::input::crs::datum::Datum;
+use crate::input::crs::projection::{method, parameter};
+use crate::input::crs::wkt::{BASE, DATUM, PROJECTED, WktNode, find};
 
-/// The parameters of projections: the name in well-known text, as `comparable_name` spells it, and the name in PROJ.4.
-const PARAMETERS: [(&str, &str); 19] = [
-    ("centralmeridian", "lon_0"),
-    ("longitudeofcenter", "lon_0"),
-    ("longitudeoforigin", "lon_0"),
-    ("longitudeofnaturalorigin", "lon_0"),
-    ("longitudeoffalseorigin", "lon_0"),
-    ("latitudeoforigin", "lat_0"),
-    ("latitudeofcenter", "lat_0"),
-    ("latitudeofnaturalorigin", "lat_0"),
-    ("latitudeoffalseorigin", "lat_0"),
-    ("standardparallel1", "lat_1"),
-    ("latitudeof1ststandardparallel", "lat_1"),
-    ("standardparallel2", "lat_2"),
-    ("latitudeof2ndstandardparallel", "lat_2"),
-    ("scalefactor", "k_0"),
-    ("scalefactoratnaturalorigin", "k_0"),
-    ("falseeasting", "x_0"),
-    ("eastingatfalseorigin", "x_0"),
-    ("falsenorthing", "y_0"),
-    ("northingatfalseorigin", "y_0"),
-];
-
-/// The projections that can be written as PROJ.4: the name of the method in well-known text and the name in PROJ.4.
-const METHODS: [(&str, &str); 10] = [
-    ("transversemercator", "tmerc"),
-    ("gausskruger", "tmerc"),
-    ("lambertconformalconic2sp", "lcc"),
-    ("lambertconicconformal2sp", "lcc"),
-    ("lambertconformalconic1sp", "lcc"),
-    ("lambertconicconformal1sp", "lcc"),
-    ("lambertconformalconic", "lcc"),
-    ("albersconicequalarea", "aea"),
-    ("albersequalarea", "aea"),
-    ("lambertazimuthalequalarea", "laea"),
-];
+/// The methods whose parameters in well-known text are all that PROJ.4 needs.
+const METHODS: [&str; 4] = ["tmerc", "lcc", "aea", "laea"];
 
 /// Returns the definition of the system of this code, or else of this text; `None` if neither gives one.
 pub(crate) fn definition(epsg: Option<u32>, wkt: Option<&str>) -> Option<String> {
@@ -48,20 +16,21 @@ pub(crate) fn definition(epsg: Option<u32>, wkt: Option<&str>) -> Option<String>
 fn of_text(text: &str) -> Option<String> {
     let system = find(text, &PROJECTED)?;
     let conversion = system.child(&["CONVERSION"]).unwrap_or(&system);
-    let method = comparable_name(conversion.child(&["PROJECTION", "METHOD"])?.text(0)?);
-    let (_, projection) = METHODS.iter().find(|(name, _)| *name == method)?;
+    let projection = method(conversion.child(&["PROJECTION", "METHOD"])?.text(0)?)?;
+    if !METHODS.contains(&projection) {
+        return None;
+    }
     let mut words = vec![format!("+proj={projection}")];
     let metres = system.unit_metres()?;
-    for parameter in conversion.children().filter(|child| child.keyword == "PARAMETER") {
-        let (name, value) = (comparable_name(parameter.text(0)?), parameter.number(1)?);
-        let (_, short) = PARAMETERS.iter().find(|(long, _)| *long == name)?;
+    for node in conversion.children().filter(|child| child.keyword == "PARAMETER") {
+        let (short, value) = (parameter(node.text(0)?)?, node.number(1)?);
         // PROJ.4 takes false eastings and northings in metres.
-        let factor = if *short == "x_0" || *short == "y_0" { parameter.unit_metres().unwrap_or(metres) } else { 1.0 };
+        let factor = if short == "x_0" || short == "y_0" { node.unit_metres().unwrap_or(metres) } else { 1.0 };
         words.push(format!("+{short}={}", value * factor));
     }
     // A cone with one standard parallel has it at the origin.
     let latitude = words.iter().find_map(|word| word.strip_prefix("+lat_0="));
-    if *projection == "lcc" && !words.iter().any(|word| word.starts_with("+lat_1=")) {
+    if projection == "lcc" && !words.iter().any(|word| word.starts_with("+lat_1=")) {
         words.push(format!("+lat_1={}", latitude?));
     }
     words.push(datum(&system)?);
@@ -72,38 +41,18 @@ fn of_text(text: &str) -> Option<String> {
 /// Returns the ellipsoid and the shift to WGS 84. If the text gives no shift, the shift is zero for the datums that agree with
 /// WGS 84 to a metre or two, such as NAD83 and ETRS89, and unknown for all others.
 fn datum(system: &WktNode) -> Option<String> {
-    let base = system.child(&["GEOGCS", "BASEGEOGCRS", "BASEGEODCRS"])?;
-    let datum = base.child(&["DATUM", "TRF", "GEODETICDATUM", "ENSEMBLE"])?;
+    let base = system.child(&BASE)?;
+    let datum = base.child(&DATUM)?;
     let spheroid = datum.child(&["SPHEROID", "ELLIPSOID"])?;
     let (axis, flattening) = (spheroid.number(1)?, spheroid.number(2)?);
     let shift = match datum.child(&["TOWGS84"]) {
         Some(shift) => (0..7).map(|k| shift.number(k).unwrap_or(0.0).to_string()).collect::<Vec<_>>().join(","),
-        None if is_close_to_wgs84(base) => "0,0,0".into(),
+        None if Datum::of(base)?.is_close_to_wgs84() => "0,0,0".into(),
         None => return None,
     };
     let greenwich = base.child(&["PRIMEM", "PRIMEMERIDIAN"]).is_none_or(|meridian| meridian.number(1) == Some(0.0));
     let shape = if flattening > 0.0 { format!("+a={axis} +rf={flattening}") } else { format!("+a={axis} +b={axis}") };
     greenwich.then(|| format!("{shape} +towgs84={shift}"))
-}
-
-/// Returns whether the datum is one of those that agree with WGS 84 to a metre or two.
-fn is_close_to_wgs84(base: &WktNode) -> bool {
-    let name = comparable_name(base.text(0).unwrap_or_default());
-    [
-        "wgs84",
-        "wgs1984",
-        "nad83",
-        "northamerican1983",
-        "etrs89",
-        "etrs1989",
-        "rgf93",
-        "rgf1993",
-        "gda94",
-        "gda2020",
-        "jgd20",
-    ]
-    .iter()
-    .any(|known| name.contains(known))
 }
 
 #[cfg(test)]

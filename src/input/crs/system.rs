@@ -2,23 +2,58 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::input::crs::form::CrsForm;
 use crate::input::crs::proj4;
 use crate::input::crs::unit::Unit;
-use crate::input::crs::wkt::{self, comparable_name};
+use crate::input::crs::vertical::VerticalSystem;
+use crate::input::crs::wkt::comparable_name;
 
 /// What a file says about its coordinate reference system.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Crs {
-    /// Its well-known text, version 1 or 2. If the file has only an EPSG code, this is the text of that code.
+    /// Its well-known text, version 1 or 2. If the file has only a code or keys, this is the text of these.
     pub wkt: Option<String>,
     /// The EPSG code of the horizontal system.
     pub epsg: Option<u32>,
+    /// What its coordinates are.
+    pub kind: CrsKind,
     /// The unit of x and y.
     pub horizontal: Unit,
     /// The length of one unit of z in metres, if the file gives it.
     pub vertical: Option<f64>,
+    /// The system that heights count in, if the file gives it.
+    pub vertical_system: Option<VerticalSystem>,
     /// The name of the horizontal system.
     pub name: Option<String>,
+}
+
+/// What the coordinates of a system are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum CrsKind {
+    /// Lengths on a map.
+    Projected,
+    /// Longitude and latitude.
+    Geographic,
+    /// Lengths from the middle of the earth.
+    Geocentric,
+    /// Lengths from some place.
+    Local,
+    /// The file does not say.
+    #[default]
+    Unknown,
+}
+
+impl CrsKind {
+    fn name(self) -> &'static str {
+        match self {
+            CrsKind::Projected => "projected",
+            CrsKind::Geographic => "longitude and latitude",
+            CrsKind::Geocentric => "geocentric",
+            CrsKind::Local => "local",
+            CrsKind::Unknown => "unknown",
+        }
+    }
 }
 
 impl Crs {
@@ -27,21 +62,68 @@ impl Crs {
         self.horizontal.metres_per_unit()
     }
 
-    /// Returns whether nothing says that the two systems differ: what one file does not say agrees with anything. Units must
-    /// agree. If both have an EPSG code, the codes decide. If both have a text, the parameters of the projections or the names
-    /// must agree. If neither has a text, the names must agree.
+    /// Returns whether it says where the coordinates are. One that knows only a unit does not.
+    pub fn is_named(&self) -> bool {
+        self.epsg.is_some() || self.name.is_some() || self.wkt.is_some()
+    }
+
+    /// Returns whether nothing says that the two systems differ.
     pub fn same_as(&self, other: &Crs) -> bool {
-        if !same_unit(self.horizontal, other.horizontal) || differ(self.vertical, other.vertical, close) {
-            return false;
+        self.differences(other).is_empty()
+    }
+
+    /// Returns in what the two systems differ, or in what they cannot be compared, in words that a sentence can name. What one file
+    /// does not say agrees with anything.
+    ///
+    /// If both have the same EPSG code, the code decides. Otherwise datums and projections are compared by what they are, not by the
+    /// name of the system.
+    pub fn differences(&self, other: &Crs) -> Vec<String> {
+        let known = |kind| kind != CrsKind::Unknown;
+        if known(self.kind) && known(other.kind) && self.kind != other.kind {
+            return vec![format!("the kind of coordinates ({}, {})", self.kind.name(), other.kind.name())];
         }
-        if let (Some(own), Some(others)) = (self.epsg, other.epsg) {
-            return own == others;
+        let mut found = self.differences_in_place(other);
+        if !same_unit(self.horizontal, other.horizontal) {
+            found.push(format!("the unit of x and y ({}, {})", self.horizontal.name(), other.horizontal.name()));
         }
-        match (&self.wkt, &other.wkt) {
-            (Some(own), Some(others)) => same_projection(own, others) || self.same_name(other),
-            (None, None) => self.same_name(other),
-            _ => true,
+        if let (Some(own), Some(others)) = (self.vertical, other.vertical)
+            && !close(own, others)
+        {
+            let name = |metres| Unit::from_metres(Some(metres)).name();
+            found.push(format!("the unit of height ({}, {})", name(own), name(others)));
         }
+        let vertical = self.vertical_system.as_ref().zip(other.vertical_system.as_ref());
+        found.extend(vertical.and_then(|(own, others)| own.difference(others)));
+        found
+    }
+
+    fn differences_in_place(&self, other: &Crs) -> Vec<String> {
+        if self.epsg.is_some() && self.epsg == other.epsg {
+            return Vec::new();
+        }
+        match (self.form(), other.form()) {
+            (Some(own), Some(others)) => own.differences(&others),
+            (own, _) => {
+                // Two of which one is not known can only agree by name.
+                let names = (self.comparable_name(), other.comparable_name());
+                let doubtful = matches!(&names, (Some(own), Some(others)) if own != others);
+                let unclear = if own.is_none() { self } else { other };
+                let what = || format!("the name, and {} does not say its projection", unclear.label());
+                doubtful.then(what).into_iter().collect()
+            }
+        }
+    }
+
+    /// Returns what the system is compared by. A text says more than a code.
+    fn form(&self) -> Option<CrsForm> {
+        let text = self.wkt.as_deref().and_then(CrsForm::of_text);
+        text.or_else(|| CrsForm::of_code(self.epsg?))
+    }
+
+    fn comparable_name(&self) -> Option<String> {
+        let name =
+            self.name.as_deref().map(comparable_name).filter(|name| !["unknown", "unnamed"].contains(&name.as_str()));
+        name.or_else(|| self.epsg.map(|code| format!("epsg{code}")))
     }
 
     /// Returns the system's definition as a PROJ.4 string, from which longitude and latitude can be computed; `None` if neither
@@ -50,14 +132,9 @@ impl Crs {
         proj4::definition(self.epsg, self.wkt.as_deref())
     }
 
-    /// Returns the name of the vertical system, if the text gives one.
+    /// Returns the name of the vertical system, if the file gives one.
     pub fn vertical_name(&self) -> Option<String> {
-        wkt::vertical_name(self.wkt.as_deref()?)
-    }
-
-    fn same_name(&self, other: &Crs) -> bool {
-        let same = |own, others| comparable_name(own) == comparable_name(others);
-        !differ(self.name.as_deref(), other.name.as_deref(), same)
+        self.vertical_system.as_ref()?.name.clone()
     }
 
     /// Returns a short name for messages.
@@ -79,27 +156,14 @@ fn same_unit(own: Unit, others: Unit) -> bool {
     }
 }
 
-/// Returns whether both are known and not the same.
-fn differ<T: Copy>(own: Option<T>, others: Option<T>, same: impl Fn(T, T) -> bool) -> bool {
-    matches!((own, others), (Some(own), Some(others)) if !same(own, others))
-}
-
 fn close(own: f64, others: f64) -> bool {
     (own - others).abs() <= 1e-8 * own.abs().max(others.abs()).max(1e-3)
-}
-
-/// Returns whether both texts describe a projection with the same parameters. Writers leave out some parameters and spell others
-/// differently, so only parameters that have the same name in both texts are compared.
-fn same_projection(own: &str, others: &str) -> bool {
-    let (own, others) = (wkt::parameters(own), wkt::parameters(others));
-    let both = !own.is_empty() && !others.is_empty();
-    both && own.iter().all(|(name, value)| others.iter().all(|(other, theirs)| name != other || close(*value, *theirs)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::input::crs::from_wkt::from_epsg;
+    use crate::input::crs::from_wkt::{from_epsg, parse};
 
     #[test]
     fn unknown_parts_agree_and_different_parts_do_not() {
@@ -111,5 +175,75 @@ mod tests {
         assert!(!named.same_as(&Crs { epsg: None, ..from_epsg(26916).unwrap() }));
         assert!(!utm.same_as(&Crs { horizontal: Unit::Foot, ..utm.clone() }));
         assert!(!Crs { vertical: Some(1.0), ..utm.clone() }.same_as(&Crs { vertical: Some(0.3048), ..utm.clone() }));
+    }
+
+    /// ESRI's text of a UTM zone, without a code.
+    fn esri(system: &str, datum: &str, spheroid: &str, meridian: f64) -> Crs {
+        let text = format!(
+            r#"PROJCS["{system}",GEOGCS["GCS_{datum}",DATUM["D_{datum}",SPHEROID[{spheroid}]],PRIMEM["Greenwich",0.0],
+            UNIT["Degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",500000.0],
+            PARAMETER["False_Northing",0.0],PARAMETER["Central_Meridian",{meridian:.1}],PARAMETER["Scale_Factor",0.9996],
+            PARAMETER["Latitude_Of_Origin",0.0],UNIT["Meter",1.0]]"#
+        );
+        parse(&text).unwrap()
+    }
+
+    const CLARKE: &str = r#""Clarke_1866",6378206.4,294.9786982"#;
+    const GRS80: &str = r#""GRS_1980",6378137.0,298.257222101"#;
+
+    #[test]
+    fn esri_texts_without_codes_are_told_apart_by_their_datum_and_agree_with_the_code() {
+        let old = esri("UTM_15N", "North_American_1927", CLARKE, -93.0);
+        let new = esri("UTM_15N", "North_American_1983", GRS80, -93.0);
+        assert_eq!(old.differences(&new), ["the datum (GCS_North_American_1927, GCS_North_American_1983)"]);
+        let [nad27, nad83, nad83_2011] = [26715, 26915, 6344].map(|code| from_epsg(code).unwrap());
+        assert!(old.same_as(&nad27) && new.same_as(&nad83));
+        assert_eq!(old.differences(&nad83).len(), 1);
+        assert!(esri("NAD_1983_2011_UTM_Zone_15N", "NAD_1983_2011", GRS80, -93.0).same_as(&nad83_2011));
+        let zone_16 = esri("UTM_15N", "North_American_1983", GRS80, -87.0);
+        assert_eq!(new.differences(&zone_16), ["the longitude of the origin (-93, -87)"]);
+        // WGS 84 has the same ellipsoid to a tenth of a millimetre.
+        let wgs84 = from_epsg(32615).unwrap();
+        assert_eq!(nad83.differences(&wgs84), ["the datum (NAD83, WGS 84)"]);
+    }
+
+    #[test]
+    fn codes_of_one_system_agree_and_so_do_its_ways_to_be_written() {
+        let same = |own: u32, other: u32| from_epsg(own).unwrap().same_as(&from_epsg(other).unwrap());
+        // ETRS89 / UTM 32N, with northings first, with heights, and with the zone in the easting.
+        assert!(same(25832, 3044) && same(25832, 5972));
+        assert!(!same(25832, 4647));
+        // Two axes west and south.
+        assert!(!same(5513, 5514));
+        let of_code = from_epsg(2154).unwrap();
+        let text = r#"PROJCRS["Lambert",BASEGEOGCRS["x",DATUM["Reseau Geodesique Francais 1993",ELLIPSOID["GRS 1980",6378137,
+            298.2572221]]],CONVERSION["c",METHOD["Lambert Conic Conformal (2SP)"],PARAMETER["Latitude of false origin",46.5],
+            PARAMETER["Longitude of false origin",3],PARAMETER["Latitude of 1st standard parallel",44],
+            PARAMETER["Latitude of 2nd standard parallel",49],PARAMETER["Easting at false origin",700000],
+            PARAMETER["Northing at false origin",6600000]],CS[Cartesian,2],AXIS["x",east],AXIS["y",north],LENGTHUNIT["metre",1]]"#;
+        assert_eq!(parse(text).unwrap().differences(&of_code), [""; 0]);
+        let moved = parse(&text.replace("6600000", "6600000.1")).unwrap();
+        assert_eq!(moved.differences(&of_code), ["the false northing in metres (6600000.1, 6600000)"]);
+    }
+
+    #[test]
+    fn what_cannot_be_compared_is_a_difference_unless_the_names_agree() {
+        let named = |name: &str| Crs { name: Some(name.into()), ..Crs::default() };
+        let utm = from_epsg(26915).unwrap();
+        assert!(named("City grid").same_as(&named("city_grid")));
+        assert!(named("NAD83 / UTM zone 15N").same_as(&utm));
+        let doubt = utm.differences(&named("City grid"));
+        assert!(doubt.len() == 1 && doubt[0].contains("City grid"), "{doubt:?}");
+    }
+
+    #[test]
+    fn geocentric_systems_are_known_by_code_and_by_either_version_of_the_text() {
+        let version_2 = r#"GEODCRS["WGS 84",DATUM["World Geodetic System 1984",ELLIPSOID["WGS 84",6378137,298.257223563]],
+            CS[Cartesian,3],AXIS["(X)",geocentricX],AXIS["(Y)",geocentricY],AXIS["(Z)",geocentricZ],LENGTHUNIT["metre",1]]"#;
+        for crs in [from_epsg(4978), parse(version_2)] {
+            let crs = crs.unwrap();
+            assert_eq!((crs.kind, crs.horizontal), (CrsKind::Geocentric, Unit::Metre));
+        }
+        assert_eq!(from_epsg(4979).unwrap().kind, CrsKind::Geographic);
     }
 }

@@ -29,7 +29,7 @@ impl Unit {
     pub const US_FOOT: f64 = 1200.0 / 3937.0;
 
     /// Returns the unit of this length. The two feet differ by 6e-7 m; files give them with 9 digits or more.
-    pub(crate) fn from_metres(metres: Option<f64>) -> Unit {
+    pub fn from_metres(metres: Option<f64>) -> Unit {
         let near = |value: f64, other: f64| (value - other).abs() < 1e-8;
         match metres {
             None => Unit::Unknown,

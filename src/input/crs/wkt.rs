@@ -67,9 +67,30 @@ impl WktNode {
         if let Some(WktValue::Text(text)) = self.values.get(index) { Some(text) } else { None }
     }
 
+    /// Returns the node of its unit: the unit of the first axis, or of all.
+    pub(crate) fn unit(&self) -> Option<&WktNode> {
+        units(self).0
+    }
+
     /// Returns the metres of its unit of length.
     pub(crate) fn unit_metres(&self) -> Option<f64> {
-        units(self).0.and_then(length)
+        self.unit().and_then(length)
+    }
+
+    /// Returns its EPSG code.
+    pub(crate) fn epsg(&self) -> Option<u32> {
+        let authority = self.child(&["AUTHORITY", "ID"])?;
+        let code = authority.number(1)?;
+        let valid = authority.text(0)?.eq_ignore_ascii_case("EPSG") && code > 0.0 && code < 1e6 && code.fract() == 0.0;
+        valid.then_some(code as u32)
+    }
+
+    /// Returns whether it is a system of x, y and z that count from the middle of the earth.
+    pub(crate) fn is_geocentric(&self) -> bool {
+        let axes = self.child(&["CS"]).and_then(|axes| axes.text(0));
+        self.keyword == "GEOCCS"
+            || (GEOGRAPHIC.contains(&self.keyword.as_str())
+                && axes.is_some_and(|kind| kind.eq_ignore_ascii_case("cartesian")))
     }
 
     pub(crate) fn number(&self, index: usize) -> Option<f64> {
@@ -121,6 +142,9 @@ pub(crate) const PROJECTED: [&str; 3] = ["PROJCS", "PROJCRS", "PROJECTEDCRS"];
 pub(crate) const GEOGRAPHIC: [&str; 6] = ["GEOGCS", "GEOGCRS", "GEOGRAPHICCRS", "GEODCRS", "GEODETICCRS", "GEOCCS"];
 pub(crate) const LOCAL: [&str; 3] = ["LOCAL_CS", "ENGCRS", "ENGINEERINGCRS"];
 pub(crate) const VERTICAL: [&str; 4] = ["VERT_CS", "VERTCS", "VERTCRS", "VERTICALCRS"];
+/// The geographic system of a projected one.
+pub(crate) const BASE: [&str; 3] = ["GEOGCS", "BASEGEOGCRS", "BASEGEODCRS"];
+pub(crate) const DATUM: [&str; 4] = ["DATUM", "TRF", "GEODETICDATUM", "ENSEMBLE"];
 const COMPOUND: [&str; 2] = ["COMPD_CS", "COMPOUNDCRS"];
 const UNITS: [&str; 3] = ["UNIT", "LENGTHUNIT", "ANGLEUNIT"];
 
@@ -129,33 +153,6 @@ pub(crate) fn find(text: &str, keywords: &[&str]) -> Option<WktNode> {
     let roots = WktNode::parse_all(text)?;
     let mut parts = roots.iter().flat_map(parts).map(unbound);
     parts.find(|part| keywords.contains(&part.keyword.as_str())).cloned()
-}
-
-/// Returns the name of the vertical system in `text`.
-pub(crate) fn vertical_name(text: &str) -> Option<String> {
-    find(text, &VERTICAL)?.text(0).map(str::to_string).filter(|name| !name.is_empty())
-}
-
-/// Returns the parameters of the projection in `text`, sorted by name; names are as [`comparable_name`] spells them.
-pub(crate) fn parameters(text: &str) -> Vec<(String, f64)> {
-    let mut found = Vec::new();
-    for root in WktNode::parse_all(text).unwrap_or_default() {
-        collect_parameters(&root, &mut found);
-    }
-    found.sort_by(|a, b| a.0.cmp(&b.0));
-    found
-}
-
-fn collect_parameters(node: &WktNode, found: &mut Vec<(String, f64)>) {
-    if node.keyword == "PARAMETER"
-        && let (Some(name), Some(value)) = (node.text(0), node.number(1))
-    {
-        found.push((comparable_name(name), value));
-    }
-    // A bound system also has parameters of its datum shift, which say nothing about the projection.
-    for child in node.children().filter(|child| child.keyword != "ABRIDGEDTRANSFORMATION") {
-        collect_parameters(child, found);
-    }
 }
 
 /// Returns the parts of a compound system, or the system itself.
@@ -186,9 +183,22 @@ pub(crate) fn length(unit: &WktNode) -> Option<f64> {
     (unit.keyword != "ANGLEUNIT" && !is_angle_name(unit)).then_some(factor)
 }
 
+/// Returns the degrees of a unit of angle; 1 without a unit.
+pub(crate) fn degrees(unit: Option<&WktNode>) -> f64 {
+    let name = unit.and_then(|unit| unit.text(0)).unwrap_or("degree").to_ascii_lowercase();
+    if name.starts_with("degree") {
+        // Writers round its radians.
+        return 1.0;
+    }
+    if name.starts_with("grad") || name.starts_with("gon") {
+        return 0.9;
+    }
+    unit.and_then(|unit| unit.number(1)).filter(|factor| factor.is_finite()).map_or(1.0, f64::to_degrees)
+}
+
 fn is_angle_name(unit: &WktNode) -> bool {
     let name = unit.text(0).unwrap_or_default().to_ascii_lowercase();
-    name.starts_with("degree") || name.starts_with("radian") || name.starts_with("grad")
+    name.starts_with("degree") || name.starts_with("radian") || name.starts_with("grad") || name.starts_with("gon")
 }
 
 /// Returns the letters and digits of a name in lower case: writers disagree on the rest.

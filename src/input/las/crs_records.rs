@@ -1,7 +1,7 @@
 //! The records of a LAS file that describe its coordinate reference system.
 
 use crate::input::crs::from_records::from_records;
-use crate::input::crs::geotiff::{DIRECTORY, DOUBLES, GeoKeys, TEXTS};
+use crate::input::crs::geokeys::{DIRECTORY, DOUBLES, GeoKeys, TEXTS};
 use crate::input::crs::system::Crs;
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::las::vlr::Vlr;

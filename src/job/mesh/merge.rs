@@ -6,14 +6,12 @@ use crate::job::index::{NodeIndex, TileIndex};
 use crate::job::mesh::final_triangles::{TriangleState, find_final};
 use crate::job::mesh::precision_limit::PrecisionLimit;
 use crate::job::partition::tree::Tree;
+use crate::job::plan::budget::BYTES_PER_MERGED_SITE;
 use crate::job::plan::job_plan::Plan;
 use crate::job::records::{BorderVertex, Frontier, Seam, SeamTriangle, StepOutput, Store};
 use crate::mesh::region::covered;
 use crate::triangulation::divide_and_conquer;
 use crate::{Error, Result};
-
-/// The peak number of bytes that merging takes for each frontier site: `spade`, the mesh and the marks.
-const BYTES_PER_SITE: u64 = 600;
 
 /// Merges the frontiers below merge node `node`, which must be in the store. Returns the tiles that this finishes: those that have
 /// sites in a frontier below, and none in the frontier that goes up.
@@ -65,7 +63,7 @@ fn join(store: &Store, nodes: &[NodeIndex]) -> Result<Frontier> {
 }
 
 fn check_memory(sites: usize, memory: u64) -> Result<()> {
-    let needed = sites as u64 * BYTES_PER_SITE;
+    let needed = sites as u64 * BYTES_PER_MERGED_SITE;
     if needed <= memory {
         return Ok(());
     }

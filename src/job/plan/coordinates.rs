@@ -1,37 +1,122 @@
 //! The CRS and the units that all inputs of a job have in common.
 
-use crate::input::Source;
 use crate::input::options::UnitChoice;
-use crate::input::{Crs, Unit};
+use crate::input::{Crs, CrsChoice, CrsKind, Source, Unit};
 use crate::{Error, Result, Warnings};
 
-/// Returns the CRS of all sources. A source without one agrees with any.
+/// Returns the CRS of all sources. What a source does not say, the others say for it; a warning says so.
 ///
 /// # Errors
-/// [`Error::Config`] if two sources differ.
-pub fn common_crs(sources: &[Source]) -> Result<Crs> {
-    let known = |s: &&Source| s.crs != Crs::default();
-    let Some(first) = sources.iter().find(known) else { return Ok(Crs::default()) };
-    for other in sources.iter().filter(known) {
-        if !first.crs.same_as(&other.crs) {
-            let name = |s: &Source| s.crs.name.clone().unwrap_or_else(|| "an unnamed CRS".into());
-            return Err(Error::Config(format!(
-                "{} is in {}, but {} is in {}: one job takes one CRS, so transform one of them first or run two jobs",
-                first.path.display(),
-                name(first),
-                other.path.display(),
-                name(other),
-            )));
+/// [`Error::Config`] if two sources differ, or cannot be compared, and the user does not say which CRS to take.
+pub fn common_crs(sources: &[Source], choice: &CrsChoice, warnings: &mut Warnings) -> Result<Crs> {
+    let crs = match choice {
+        CrsChoice::Auto => return agreed(sources, warnings),
+        CrsChoice::None => Crs::default(),
+        CrsChoice::First => sources.iter().find(|s| s.crs.is_named()).map(|s| s.crs.clone()).unwrap_or_default(),
+        CrsChoice::Given { crs, .. } => (**crs).clone(),
+    };
+    let overruled: Vec<(&Source, Vec<String>)> =
+        sources.iter().map(|s| (s, crs.differences(&s.crs))).filter(|(_, found)| !found.is_empty()).collect();
+    if let Some((first, differences)) = overruled.first() {
+        warnings.push(format!(
+            "[input] crs takes all inputs as {}, though {} of {} say otherwise, such as {} ({}), which differs in {}",
+            crs.label(),
+            overruled.len(),
+            sources.len(),
+            first.path.display(),
+            first.crs.label(),
+            differences.join(" and ")
+        ));
+    }
+    Ok(crs)
+}
+
+/// Returns the CRS that all sources agree on.
+fn agreed(sources: &[Source], warnings: &mut Warnings) -> Result<Crs> {
+    let mut distinct: Vec<&Source> = Vec::new();
+    for source in sources.iter().filter(|s| s.crs != Crs::default()) {
+        if !distinct.iter().any(|known| known.crs == source.crs) {
+            distinct.push(source);
         }
     }
-    Ok(first.crs.clone())
+    // The most complete ones, whatever the order of the files: each must agree with both.
+    let is_placed = |crs: &Crs| (crs.wkt.is_some(), crs.epsg.is_some(), crs.name.is_some());
+    let is_high = |crs: &Crs| (crs.vertical_system.is_some(), crs.vertical.is_some());
+    let text = |crs: &Crs| (crs.label(), crs.wkt.clone());
+    let place = distinct.iter().max_by_key(|s| (is_placed(&s.crs), is_high(&s.crs), text(&s.crs)));
+    let height = distinct.iter().max_by_key(|s| (is_high(&s.crs), is_placed(&s.crs), text(&s.crs)));
+    let (Some(place), Some(height)) = (place, height) else { return Ok(Crs::default()) };
+    for (reference, other) in [place, height].into_iter().flat_map(|r| distinct.iter().map(move |s| (r, s))) {
+        let differences = reference.crs.differences(&other.crs);
+        if !differences.is_empty() {
+            return Err(two_systems(reference, other, &differences));
+        }
+    }
+    let mut crs = place.crs.clone();
+    crs.vertical = crs.vertical.or(height.crs.vertical);
+    crs.vertical_system = crs.vertical_system.or_else(|| height.crs.vertical_system.clone());
+    if crs.horizontal == Unit::Unknown {
+        let known = distinct.iter().map(|s| s.crs.horizontal).find(|unit| *unit != Unit::Unknown);
+        crs.horizontal = known.unwrap_or_default();
+    }
+    warn_of_gaps(sources, &crs, warnings);
+    Ok(crs)
 }
+
+fn two_systems(own: &Source, other: &Source, differences: &[String]) -> Error {
+    Error::Config(format!(
+        "{} is in {}, but {} is in {}. They differ in {}. One job takes one CRS: transform one of them first, or run two jobs. If a \
+         record is wrong, say with [input] crs what all files are in, such as \"EPSG:26915\", or \"first\" for what the first file \
+         says",
+        own.path.display(),
+        own.crs.label(),
+        other.path.display(),
+        other.crs.label(),
+        differences.join(" and ")
+    ))
+}
+
+/// Warns about sources that say less than `crs`, which the others say.
+fn warn_of_gaps(sources: &[Source], crs: &Crs, warnings: &mut Warnings) {
+    let count = sources.len();
+    let nameless: Vec<&Source> = sources.iter().filter(|s| !s.crs.is_named()).collect();
+    if let (true, Some(first)) = (crs.is_named(), nameless.first()) {
+        warnings.push(format!(
+            "{} of {count} inputs name no CRS, such as {}: they are taken to be in {}, as the others are",
+            nameless.len(),
+            first.path.display(),
+            crs.label()
+        ));
+    }
+    // Without a unit of height, heights are in the unit of x and y.
+    let Some(metres) = crs.vertical.filter(|metres| crs.metres_per_unit() != Some(*metres)) else { return };
+    let silent: Vec<&Source> = sources.iter().filter(|s| s.crs.vertical.is_none()).collect();
+    if let Some(first) = silent.first() {
+        warnings.push(format!(
+            "{} of {count} inputs do not say the unit of their heights, such as {}: it is taken to be {}, as in the others",
+            silent.len(),
+            first.path.display(),
+            Unit::from_metres(Some(metres)).name()
+        ));
+    }
+}
+
+/// What to do about coordinates that are not on a map.
+const TRANSFORM: &str = "Transform the points to a projected CRS first, for example with `pdal translate \
+    --writers.las.scale_x=0.01 --writers.las.scale_y=0.01 in.laz out.laz reprojection --filters.reprojection.out_srs=EPSG:...`";
 
 /// Returns the name of the unit of x and y and its length in metres.
 ///
 /// # Errors
-/// [`Error::Config`] if the coordinates are in degrees.
+/// [`Error::Config`] if the coordinates are in degrees or count from the middle of the earth.
 pub fn horizontal_unit(choice: UnitChoice, crs: &Crs, warnings: &mut Warnings) -> Result<(&'static str, f64)> {
+    if crs.kind == CrsKind::Geocentric {
+        return Err(Error::Config(format!(
+            "the coordinates are geocentric ({}): they count from the middle of the earth, and z is no height. {TRANSFORM}; if the CRS \
+             record is wrong, say with [input] crs what the files are in, or \"none\" for a plane",
+            crs.label()
+        )));
+    }
     let unit = match choice {
         UnitChoice::Auto => crs.horizontal,
         UnitChoice::Metre => Unit::Metre,
@@ -49,10 +134,8 @@ pub fn horizontal_unit(choice: UnitChoice, crs: &Crs, warnings: &mut Warnings) -
             Ok((key_of(Unit::Metre), 1.0))
         }
         _ => Err(Error::Config(format!(
-            "the coordinates are in degrees ({}), and a Delaunay triangulation in degrees is distorted: transform the points to a \
-             projected CRS first, for example with `pdal translate --writers.las.scale_x=0.01 --writers.las.scale_y=0.01 in.laz \
-             out.laz reprojection --filters.reprojection.out_srs=EPSG:...`; if the CRS record is wrong, set [input] unit = \
-             \"metre\"",
+            "the coordinates are in degrees ({}), and a Delaunay triangulation in degrees is distorted. {TRANSFORM}; if the CRS record \
+             is wrong, say with [input] crs what the files are in, or set [input] unit = \"metre\"",
             crs.name.as_deref().unwrap_or("geographic CRS"),
         ))),
     }

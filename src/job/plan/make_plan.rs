@@ -92,7 +92,7 @@ fn try_plan(
         return Err(Error::Config(format!("{records} records are more than one job can hold (2^40)")));
     }
     check_missing_records(sources, &options.input)?;
-    let crs = common_crs(sources)?;
+    let crs = common_crs(sources, &options.input.crs, &mut warnings)?;
     let (unit, metres) = horizontal_unit(options.input.unit, &crs, &mut warnings)?;
     let extent = Extent::of(sources, &options.input, metres)?;
     let metres_z = crs.vertical.unwrap_or(metres);

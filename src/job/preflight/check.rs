@@ -9,6 +9,7 @@ use crate::job::plan::job_plan::{Plan, SkippedInput};
 use crate::job::plan::lattice_choice::LatticeCoarsening;
 use crate::job::plan::make_plan::make_plan;
 use crate::job::preflight::estimate::{self, DiskEstimate};
+use crate::job::preflight::kept_points::{KeptPoints, has_filter};
 use crate::job::progress::text::{grouped, mebibytes};
 use crate::job::publish::limits::MAX_TRIANGLES_IN_ONE_FILE;
 use crate::job::report::skipped::write_skipped;
@@ -24,6 +25,8 @@ pub struct Preflight {
     pub files: Vec<(PathBuf, String, u64)>,
     /// Records in all inputs.
     pub records: u64,
+    /// How many points the job keeps at most, as far as headers and a sample of the points tell.
+    pub kept: u64,
     /// About how many tiles.
     pub tiles: u64,
     /// Steps of the lattice in x and y, and in z.
@@ -72,26 +75,51 @@ pub fn check(options: &JobOptions) -> Result<Preflight> {
     directory.check_results_are_ours()?;
     let plan = make_plan(options, LatticeCoarsening::default())?;
     let threads = workers(options, plan.records)?;
-    Ok(Preflight::of(&plan, threads))
+    if has_filter(&plan) {
+        closer_look(&plan, threads)
+    } else {
+        Ok(Preflight::of(&plan, threads, KeptPoints::by_headers(&plan)))
+    }
+}
+
+/// Checks that the machine has what the job of `plan` needs. Reads a sample of the points, on the threads of the current rayon pool,
+/// only if the headers leave it in doubt.
+///
+/// # Errors
+/// As [`Preflight::passes`].
+pub(crate) fn require_room(plan: &Plan, threads: usize) -> Result<()> {
+    let mut preflight = Preflight::of(plan, threads, KeptPoints::by_headers(plan));
+    if has_filter(plan) && preflight.disk_is_short() {
+        preflight = closer_look(plan, threads)?;
+    }
+    preflight.passes()
+}
+
+/// Looks at as many points as it takes to know whether the disk suffices.
+fn closer_look(plan: &Plan, threads: usize) -> Result<Preflight> {
+    let is_short = |kept| Preflight::of(plan, threads, kept).disk_is_short();
+    let kept = KeptPoints::by_sample(plan, |least, most| is_short(least) || !is_short(most))?;
+    Ok(Preflight::of(plan, threads, kept))
 }
 
 impl Preflight {
-    /// Returns what the job of `plan` would do on `threads` threads.
-    pub(crate) fn of(plan: &Plan, threads: usize) -> Preflight {
+    /// Returns what the job of `plan` would do on `threads` threads if it keeps `kept` points.
+    fn of(plan: &Plan, threads: usize, kept: KeptPoints) -> Preflight {
         let options = &plan.options;
         let resolution = plan.frame.extras().resolution;
-        let DiskEstimate { points, store, results } = DiskEstimate::of(plan, MAX_TRIANGLES_IN_ONE_FILE);
+        let DiskEstimate { points, store, results } = DiskEstimate::of(plan, kept, MAX_TRIANGLES_IN_ONE_FILE);
         let describe = |source: &Source| (source.path.clone(), format!("{:?}", source.format), source.records);
         Preflight {
             files: plan.inputs.iter().map(|input| describe(&input.source)).collect(),
             records: plan.records,
-            tiles: estimate::tiles(plan),
+            kept: kept.0,
+            tiles: estimate::tiles(plan, kept),
             resolution: [plan.lattice.resolution.to_string(), plan.lattice.resolution_z.to_string()],
             size: [0, 1].map(|axis| plan.extent.extent(axis) as f64 * resolution),
             unit: plan.unit.clone(),
             crs: plan.crs.name.clone(),
             threads,
-            memory: estimate::memory(plan, threads),
+            memory: estimate::memory(plan, kept, threads),
             memory_limit: options.limits.memory.0,
             memory_free: machine::free_memory(),
             temporary: points + store,
@@ -104,6 +132,10 @@ impl Preflight {
             warnings: plan.all_warnings(),
             skipped: plan.skipped.clone(),
         }
+    }
+
+    fn disk_is_short(&self) -> bool {
+        self.disk_free.is_some_and(|free| free < self.disk)
     }
 
     /// Checks that the machine has what the job needs.
@@ -140,6 +172,9 @@ impl fmt::Display for Preflight {
         }
         let mut row = |name: &str, value: String| writeln!(f, "{name:<18} {value}");
         row("points", grouped(self.records))?;
+        if self.kept < self.records {
+            row("points kept", format!("about {} or fewer", grouped(self.kept)))?;
+        }
         row("tiles", format!("about {}", grouped(self.tiles)))?;
         row("area", format!("{:.1} x {:.1} {}", self.size[0], self.size[1], self.unit))?;
         row("lattice step", format!("{} (z {})", self.resolution[0], self.resolution[1]))?;

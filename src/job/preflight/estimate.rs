@@ -7,6 +7,7 @@ use crate::job::options::JobOptions;
 use crate::job::partition::tree_builder::buffer_bytes;
 use crate::job::plan::budget::{BYTES_PER_LEAF_SITE, read_buffer_memory};
 use crate::job::plan::job_plan::Plan;
+use crate::job::preflight::kept_points::KeptPoints;
 use crate::output::Compression;
 use crate::output::file_names::OutputFiles;
 use crate::output::preview::canvas::{LONGER_SIDE, PreviewPixel};
@@ -43,9 +44,10 @@ pub(crate) struct DiskEstimate {
 }
 
 impl DiskEstimate {
-    /// Returns the estimate for the job of `plan`. A `terrain.glb` is written for up to `max_one_file` triangles.
-    pub(crate) fn of(plan: &Plan, max_one_file: u64) -> DiskEstimate {
-        let (points, tiles) = (points(plan), tiles(plan));
+    /// Returns the estimate for the job of `plan` with at most `kept` points. A `terrain.glb` is written for up to `max_one_file`
+    /// triangles.
+    pub(crate) fn of(plan: &Plan, kept: KeptPoints, max_one_file: u64) -> DiskEstimate {
+        let (points, tiles) = (kept.0, tiles(plan, kept));
         let per_tile = plan.options.triangulation.max_points_per_tile.0;
         DiskEstimate {
             points: points * size_of::<Point>() as u64,
@@ -56,19 +58,14 @@ impl DiskEstimate {
 }
 
 /// Tells whether the disk has ample room for all other files besides the points, which are there already.
-pub(crate) fn has_room_besides_points(plan: &Plan, max_one_file: u64) -> bool {
-    let DiskEstimate { store, results, .. } = DiskEstimate::of(plan, max_one_file);
+pub(crate) fn has_room_besides_points(plan: &Plan, kept: KeptPoints, max_one_file: u64) -> bool {
+    let DiskEstimate { store, results, .. } = DiskEstimate::of(plan, kept, max_one_file);
     machine::free_disk(&plan.options.output.directory).is_some_and(|free| (store + results) / 4 * 5 <= free)
 }
 
-/// Returns the number of records, except those known to be missing.
-fn points(plan: &Plan) -> u64 {
-    plan.records - plan.inputs.iter().map(|input| input.source.missing).sum::<u64>()
-}
-
 /// Returns about how many tiles there will be: tiles come out between half full and full.
-pub(crate) fn tiles(plan: &Plan) -> u64 {
-    (points(plan) * 4).div_ceil(plan.options.triangulation.max_points_per_tile.0 * 3)
+pub(crate) fn tiles(plan: &Plan, kept: KeptPoints) -> u64 {
+    (kept.0 * 4).div_ceil(plan.options.triangulation.max_points_per_tile.0 * 3)
 }
 
 fn store_bytes(points: u64, per_tile: u64, tiles: u64) -> u64 {
@@ -87,8 +84,8 @@ fn result_bytes(points: u64, tiles: u64, compression: Compression, max_one_file:
 }
 
 /// Returns about how many bytes of memory the job of `plan` takes on `threads` threads.
-pub(crate) fn memory(plan: &Plan, threads: usize) -> u64 {
-    let (options, points) = (&plan.options, points(plan));
+pub(crate) fn memory(plan: &Plan, kept: KeptPoints, threads: usize) -> u64 {
+    let (options, points) = (&plan.options, kept.0);
     let per_tile = options.triangulation.max_points_per_tile.0;
     let leaves = per_tile.min(points) * BYTES_PER_LEAF_SITE * threads as u64;
     let levels = level_memory(options, points, threads);

@@ -10,7 +10,7 @@ use crate::job::plan::fingerprint::{Fingerprint, JobHeader};
 use crate::job::plan::job_plan::Plan;
 use crate::job::plan::lattice_choice::LatticeCoarsening;
 use crate::job::plan::make_plan::make_plan;
-use crate::job::preflight::check::Preflight;
+use crate::job::preflight::check::require_room;
 use crate::job::progress::clock::JobClock;
 use crate::job::progress::stage::JobProgress;
 use crate::job::report::job_report::Report;
@@ -110,7 +110,7 @@ fn attempt(
     note_skipped(&plan.skipped, progress);
     let threads = workers(options, plan.records)?;
     if !run.force {
-        Preflight::of(&plan, threads).passes()?;
+        on_threads(threads, || require_room(&plan, threads))?;
     }
     directory.check_results_are_ours()?;
     let mut earlier = earlier;

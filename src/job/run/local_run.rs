@@ -10,12 +10,14 @@ use crate::job::partition::point_file::PointFile;
 use crate::job::partition::result::Partition;
 use crate::job::plan::job_plan::Plan;
 use crate::job::preflight::estimate::has_room_besides_points;
+use crate::job::preflight::kept_points::KeptPoints;
 use crate::job::publish::limits::MAX_TRIANGLES_IN_ONE_FILE;
 use crate::job::records::JobStep;
 use crate::job::run::context::RunContext;
 use crate::job::run::threads::run_concurrently;
 use crate::job::run::tile_queue::{TileQueue, WrittenTiles};
 use crate::job::run::tree_walk::TreeWalk;
+use crate::job::run::unmerged::Unmerged;
 use crate::job::tiles::max_edge::MaxEdgeRule;
 use crate::job::tiles::style::TileStyle;
 use crate::output::options::MaxEdge;
@@ -43,20 +45,22 @@ pub(crate) fn mesh_and_tiles(
     let activity = run.progress.activity("triangulate", "points");
     let queue = TileQueue::new(run, partition, &stage);
     let points = open_points(run, partition)?;
-    let walk = TreeWalk { run, plan, partition, points, stage: &stage, activity: &activity, queue: &queue };
+    let unmerged = Unmerged::default();
+    let walk = TreeWalk { run, plan, partition, points, stage: &stage, activity: &activity, queue: &queue, unmerged };
     let style = |sites| {
         let max_edge = max_edge_rule(run, plan, partition, bounds, sites)?;
         let style = TileStyle::new(plan, &partition.summary, bounds, max_edge);
         let canvas = Canvas::new(&style.frame, bounds);
         Ok((style, canvas))
     };
-    let writes_at_once = may_write_at_once(run, plan);
+    let writes_at_once = may_write_at_once(run, plan, KeptPoints(partition.summary.counts.kept));
     let walked = rayon::scope(|scope| {
         if writes_at_once {
             // The number of sites matters only to a rule for which the tiles have to wait.
             queue.attempt(|| style(0).and_then(|(style, canvas)| queue.begin(scope, style, canvas)))?;
         }
         let leaves = walk.walk(scope, NodeIndex::ROOT)?;
+        queue.attempt(|| walk.check_merged())?;
         let all_leaves = run.journal.position();
         // This closes the point file: an open file is not freed when it is removed.
         drop(walk);
@@ -82,10 +86,10 @@ fn open_points(run: &RunContext, partition: &Partition) -> Result<Option<PointFi
 
 /// Tells whether tiles may be written before all are triangulated. They must wait if they replace the results of an earlier job,
 /// because this one may still fail; if all sites decide how a tile looks; and if the disk has no room for them besides the points.
-fn may_write_at_once(run: &RunContext, plan: &Plan) -> bool {
+fn may_write_at_once(run: &RunContext, plan: &Plan, kept: KeptPoints) -> bool {
     !run.directory.output().report().exists()
         && plan.options.output.max_edge != MaxEdge::Auto
-        && has_room_besides_points(plan, MAX_TRIANGLES_IN_ONE_FILE)
+        && has_room_besides_points(plan, kept, MAX_TRIANGLES_IN_ONE_FILE)
 }
 
 /// Returns the rule that leaves triangles out.

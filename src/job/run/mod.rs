@@ -11,3 +11,4 @@ pub(crate) mod stage_costs;
 pub(crate) mod threads;
 pub(crate) mod tile_queue;
 pub(crate) mod tree_walk;
+pub(crate) mod unmerged;

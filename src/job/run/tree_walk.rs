@@ -10,10 +10,11 @@ use crate::job::plan::budget::merge_memory;
 use crate::job::plan::job_plan::Plan;
 use crate::job::progress::activity::Activity;
 use crate::job::progress::stage::Stage;
-use crate::job::records::{JobStep, StepOutput};
+use crate::job::records::{Frontier, JobStep, StepOutput};
 use crate::job::run::context::RunContext;
 use crate::job::run::stage_costs::triangulated_share;
 use crate::job::run::tile_queue::TileQueue;
+use crate::job::run::unmerged::Unmerged;
 use crate::job::tiles::dependencies::FinishedTile;
 use crate::{Error, Result};
 use rayon::Scope;
@@ -29,6 +30,8 @@ pub(crate) struct TreeWalk<'a> {
     pub(crate) activity: &'a Activity,
     /// Takes the tiles that are finished.
     pub(crate) queue: &'a TileQueue<'a>,
+    /// Takes the nodes that do not fit the memory.
+    pub(crate) unmerged: Unmerged,
 }
 
 impl<'a> TreeWalk<'a> {
@@ -70,11 +73,38 @@ impl<'a> TreeWalk<'a> {
 
     fn merge(&self, scope: &Scope<'a>, node: NodeIndex) -> Result<()> {
         let RunContext { store, journal, threads, .. } = *self.run;
+        let below = self.partition.tree.merged_by(node);
+        if below.iter().any(|&child| self.unmerged.sites(child).is_some()) {
+            return self.leave_out(node, &below);
+        }
         let memory = merge_memory(&self.plan.options, node == NodeIndex::ROOT, threads);
         let merge = || self.activity.time(0, || merge_frontiers(self.plan, &self.partition.tree, store, memory, node));
-        for tile in journal.step(JobStep::Merge(node), merge)? {
-            self.queue.push(scope, FinishedTile { tile, last_merge: node });
+        match journal.step(JobStep::Merge(node), merge) {
+            Err(Error::Memory(_)) => self.leave_out(node, &below),
+            merged => {
+                for tile in merged? {
+                    self.queue.push(scope, FinishedTile { tile, last_merge: node });
+                }
+                Ok(())
+            }
         }
+    }
+
+    /// Notes that `node` is not merged. It never passes up more sites than come from `below`.
+    fn leave_out(&self, node: NodeIndex, below: &[NodeIndex]) -> Result<()> {
+        let sites = |child: &NodeIndex| match self.unmerged.sites(*child) {
+            Some(sites) => Ok(sites),
+            None => Frontier::load(self.run.store, *child).map(|frontier| frontier.sites.len() as u64),
+        };
+        self.unmerged.add(node, below.iter().map(sites).sum::<Result<u64>>()?);
         Ok(())
+    }
+
+    /// Checks that all merge nodes were merged, once the walk is done.
+    ///
+    /// # Errors
+    /// [`Error::Memory`] if some did not fit.
+    pub(crate) fn check_merged(&self) -> Result<()> {
+        self.unmerged.check(&self.plan.options)
     }
 }

@@ -1,0 +1,114 @@
+//! The coordinate reference system that a user names for all inputs.
+
+use crate::input::crs::from_wkt::{from_epsg, parse};
+use crate::input::crs::system::Crs;
+use crate::input::crs::vertical::VerticalSystem;
+use serde::{Deserialize, Serialize};
+
+/// The value of `[input] crs`: which coordinate reference system the inputs are in.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub enum CrsChoice {
+    /// What the files say, if all that say it agree.
+    #[default]
+    Auto,
+    /// What the first file says that says anything. The others are taken to be in it too.
+    First,
+    /// None: the coordinates are a plane.
+    None,
+    /// This one, whatever the files say.
+    Given {
+        /// As the user wrote it: codes or well-known text.
+        text: String,
+        /// What it means.
+        crs: Box<Crs>,
+    },
+}
+
+impl TryFrom<String> for CrsChoice {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<CrsChoice, String> {
+        match text.trim() {
+            "auto" => Ok(CrsChoice::Auto),
+            "first" => Ok(CrsChoice::First),
+            "none" => Ok(CrsChoice::None),
+            named => match of_codes(named)?.or_else(|| parse(named)) {
+                Some(crs) => Ok(CrsChoice::Given { crs: Box::new(crs), text }),
+                None => Err(format!(
+                    "crs is \"auto\", \"first\", \"none\", an EPSG code such as \"EPSG:26915\" or \"EPSG:26915+5703\", or \
+                     well-known text, not {text:?}"
+                )),
+            },
+        }
+    }
+}
+
+impl From<CrsChoice> for String {
+    fn from(choice: CrsChoice) -> String {
+        match choice {
+            CrsChoice::Auto => "auto".into(),
+            CrsChoice::First => "first".into(),
+            CrsChoice::None => "none".into(),
+            CrsChoice::Given { text, .. } => text,
+        }
+    }
+}
+
+/// Returns the system of `EPSG:n` or `EPSG:n+m`; `None` if the text is of another kind.
+fn of_codes(text: &str) -> Result<Option<Crs>, String> {
+    let Some((authority, codes)) = text.split_once(':') else { return Ok(None) };
+    let (horizontal, vertical) = codes.split_once('+').map_or((codes, None), |(n, m)| (n, Some(m)));
+    let number = |code: &str| code.trim().parse::<u32>().ok();
+    let (true, Some(code)) = (authority.trim().eq_ignore_ascii_case("EPSG"), number(horizontal)) else {
+        return Ok(None);
+    };
+    let unknown = |code: &str| format!("crs: EPSG:{code} is not in the list of known codes; give its well-known text");
+    let mut crs = from_epsg(code).ok_or_else(|| unknown(horizontal))?;
+    if let Some(vertical) = vertical {
+        let system = number(vertical).map(|code| VerticalSystem { epsg: Some(code), ..VerticalSystem::default() });
+        let metres = system.as_ref().and_then(VerticalSystem::metres_of_code).ok_or_else(|| unknown(vertical))?;
+        crs.vertical = Some(metres);
+        crs.vertical_system = system;
+    }
+    Ok(Some(crs))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::crs::unit::Unit;
+
+    fn given(text: &str) -> Crs {
+        match CrsChoice::try_from(text.to_string()).unwrap() {
+            CrsChoice::Given { crs, .. } => *crs,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn codes_and_texts_are_read() {
+        assert_eq!(given("EPSG:26915").epsg, Some(26915));
+        let compound = given("epsg:26915+6360");
+        assert_eq!((compound.horizontal, compound.vertical), (Unit::Metre, Some(Unit::US_FOOT)));
+        assert_eq!(
+            given(r#"PROJCS["P",GEOGCS["G",UNIT["degree",0.0174]],UNIT["foot",0.3048]]"#).horizontal,
+            Unit::Foot
+        );
+        for (text, word) in [("EPSG:1", "EPSG:1 is not"), ("EPSG:26915+1", "EPSG:1 is not"), ("UTM 15N", "EPSG:26915")]
+        {
+            let error = CrsChoice::try_from(text.to_string()).unwrap_err();
+            assert!(error.contains(word), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_choice_is_read_back_as_it_was_written() {
+        for text in ["auto", "first", "none", "EPSG:2949"] {
+            let choice = CrsChoice::try_from(text.to_string()).unwrap();
+            assert_eq!(String::from(choice.clone()), text);
+            let written = serde_json::to_string(&choice).unwrap();
+            assert_eq!(serde_json::from_str::<CrsChoice>(&written).unwrap(), choice);
+        }
+    }
+}

@@ -1,0 +1,53 @@
+//! The keys of GeoTIFF (OGC 19-008r4), which LAS stores in three records.
+
+use crate::input::file::bytes::{float64, uint16};
+
+/// The code that stands for a definition in other keys.
+pub(crate) const USER_DEFINED: u16 = 32767;
+
+/// The record of the key directory.
+pub(crate) const DIRECTORY: u16 = 34735;
+/// The record of the 64-bit floating-point values.
+pub(crate) const DOUBLES: u16 = 34736;
+/// The record of the texts.
+pub(crate) const TEXTS: u16 = 34737;
+
+/// The bytes of the three records, as they are in the file.
+pub(crate) struct GeoKeys {
+    /// [`DIRECTORY`]: 16-bit integers.
+    pub(crate) directory: Vec<u8>,
+    /// [`DOUBLES`].
+    pub(crate) doubles: Vec<u8>,
+    /// [`TEXTS`].
+    pub(crate) texts: Vec<u8>,
+}
+
+impl GeoKeys {
+    /// Returns the record, count and value (or index in the record) of `key`.
+    fn entry(&self, key: u16) -> Option<(u16, u16, u16)> {
+        let numbers = |index: usize| self.directory.chunks_exact(8).nth(index);
+        let count = uint16(numbers(0)?, 6) as usize;
+        let entry = (1..=count).map_while(numbers).find(|entry| uint16(entry, 0) == key)?;
+        Some((uint16(entry, 2), uint16(entry, 4), uint16(entry, 6)))
+    }
+
+    /// Returns the number of `key`; 0 says nothing.
+    pub(crate) fn code(&self, key: u16) -> Option<u16> {
+        self.entry(key).filter(|(record, ..)| *record == 0).map(|(_, _, value)| value).filter(|value| *value != 0)
+    }
+
+    /// Returns the finite floating-point value of `key`.
+    pub(crate) fn double(&self, key: u16) -> Option<f64> {
+        let (record, _, index) = self.entry(key)?;
+        let bytes = self.doubles.chunks_exact(8).nth(index as usize)?;
+        Some(float64(bytes, 0)).filter(|value| record == DOUBLES && value.is_finite())
+    }
+
+    /// Returns the text of `key`.
+    pub(crate) fn text(&self, key: u16) -> Option<String> {
+        let (record, count, start) = self.entry(key)?;
+        let bytes = self.texts.get(start as usize..start as usize + count as usize)?;
+        let text = String::from_utf8_lossy(bytes).trim_matches(['|', '\0', ' ']).to_string();
+        (record == TEXTS && !text.is_empty()).then_some(text)
+    }
+}

@@ -1,0 +1,124 @@
+//! The well-known text of a projected system that GeoTIFF keys define themselves, so that it is compared, placed and written like any
+//! other.
+
+use crate::input::crs::form::text_of_code;
+use crate::input::crs::geokeys::{GeoKeys, USER_DEFINED};
+
+const GEOGRAPHIC_TYPE: u16 = 2048;
+const GEOGRAPHIC_CITATION: u16 = 2049;
+const DATUM: u16 = 2050;
+const ELLIPSOID: u16 = 2056;
+const GREATER_AXIS: u16 = 2057;
+const LESSER_AXIS: u16 = 2058;
+const INVERSE_FLATTENING: u16 = 2059;
+const PRIME_MERIDIAN: u16 = 2061;
+const PROJECTION: u16 = 3074;
+const METHOD: u16 = 3075;
+
+/// Ellipsoids by their EPSG codes: the greater half axis and the inverse flattening.
+const ELLIPSOIDS: [(u16, f64, f64); 6] = [
+    (7019, 6_378_137.0, 298.257_222_101),
+    (7030, 6_378_137.0, 298.257_223_563),
+    (7008, 6_378_206.4, 294.978_698_213_898),
+    (7004, 6_377_397.155, 299.152_812_8),
+    (7022, 6_378_388.0, 297.0),
+    (7001, 6_377_563.396, 299.324_964_6),
+];
+
+/// The keys of a parameter, in the order in which they are looked for, and its name in well-known text.
+type Parameter = (&'static [u16], &'static str);
+
+const LONGITUDE: Parameter = (&[3080, 3084, 3088, 3095], "central_meridian");
+const LATITUDE: Parameter = (&[3081, 3085, 3089], "latitude_of_origin");
+const FIRST: Parameter = (&[3078], "standard_parallel_1");
+const SECOND: Parameter = (&[3079], "standard_parallel_2");
+const SCALE: Parameter = (&[3092, 3093], "scale_factor");
+const EASTING: Parameter = (&[3082, 3086, 3090], "false_easting");
+const NORTHING: Parameter = (&[3083, 3087, 3091], "false_northing");
+
+/// The methods by their numbers in GeoTIFF. No parameter of them has a name that is not here.
+const METHODS: [(u16, &str, &[Parameter]); 7] = [
+    (1, "Transverse_Mercator", &[LATITUDE, LONGITUDE, SCALE, EASTING, NORTHING]),
+    (7, "Mercator_1SP", &[LATITUDE, LONGITUDE, SCALE, EASTING, NORTHING]),
+    (8, "Lambert_Conformal_Conic_2SP", &[FIRST, SECOND, LATITUDE, LONGITUDE, EASTING, NORTHING]),
+    (9, "Lambert_Conformal_Conic_1SP", &[LATITUDE, LONGITUDE, SCALE, EASTING, NORTHING]),
+    (10, "Lambert_Azimuthal_Equal_Area", &[LATITUDE, LONGITUDE, EASTING, NORTHING]),
+    (11, "Albers_Conic_Equal_Area", &[FIRST, SECOND, LATITUDE, LONGITUDE, EASTING, NORTHING]),
+    (16, "Oblique_Stereographic", &[LATITUDE, LONGITUDE, SCALE, EASTING, NORTHING]),
+];
+
+/// Returns the text of the system that the keys define, with x and y in a unit of so many `metres`; `None` if they do not say all of
+/// it. Angles must be in degrees, as GeoTIFF has them unless a key says otherwise.
+pub(crate) fn projected(keys: &GeoKeys, name: Option<&str>, metres: f64) -> Option<String> {
+    const ANGULAR_UNITS: u16 = 2054;
+    if keys.code(ANGULAR_UNITS).is_some_and(|unit| unit != 9102) {
+        return None;
+    }
+    let projection = zone(keys, metres).or_else(|| written_out(keys))?;
+    let name = quoted(name.unwrap_or_default());
+    Some(format!(r#"PROJCS["{name}",{},{projection},UNIT["{}",{metres}]]"#, base(keys)?, unit_name(metres)))
+}
+
+fn unit_name(metres: f64) -> &'static str {
+    if metres == 1.0 { "metre" } else { "unit" }
+}
+
+fn quoted(name: &str) -> String {
+    name.replace('"', "'")
+}
+
+/// Returns a zone of the universal transverse Mercator: 160zz north of the equator and 161zz south of it.
+fn zone(keys: &GeoKeys, metres: f64) -> Option<String> {
+    let code = keys.code(PROJECTION)?;
+    let (zone, northing) = match code {
+        16_001..=16_060 => (code - 16_000, 0.0),
+        16_101..=16_160 => (code - 16_100, 1e7 / metres),
+        _ => return None,
+    };
+    let (meridian, easting) = (6 * zone as i32 - 183, 5e5 / metres);
+    Some(format!(
+        r#"PROJECTION["Transverse_Mercator"],PARAMETER["latitude_of_origin",0],PARAMETER["central_meridian",{meridian}],PARAMETER["scale_factor",0.9996],PARAMETER["false_easting",{easting}],PARAMETER["false_northing",{northing}]"#
+    ))
+}
+
+fn written_out(keys: &GeoKeys) -> Option<String> {
+    let method = keys.code(METHOD)?;
+    let (_, name, parameters) = METHODS.iter().find(|(number, ..)| *number == method)?;
+    let mut text = format!(r#"PROJECTION["{name}"]"#);
+    let mut found = false;
+    for (candidates, name) in *parameters {
+        if let Some(value) = candidates.iter().find_map(|key| keys.double(*key)) {
+            text.push_str(&format!(r#",PARAMETER["{name}",{value}]"#));
+            found = true;
+        }
+    }
+    found.then_some(text)
+}
+
+/// Returns the geographic system: that of the code, that of the datum's code, or one with the ellipsoid that the keys give.
+fn base(keys: &GeoKeys) -> Option<String> {
+    let code = keys.code(GEOGRAPHIC_TYPE).filter(|code| *code != USER_DEFINED);
+    // EPSG numbered its first datums 2000 above their geographic systems.
+    let of_datum = || keys.code(DATUM).filter(|code| (6001..=6999).contains(code)).map(|code| code - 2000);
+    let code = code.or_else(of_datum);
+    if let Some(text) = code.and_then(|code| text_of_code(code.into())).filter(|text| text.starts_with("GEOGCS[")) {
+        return Some(text.to_string());
+    }
+    let meridian = keys.double(PRIME_MERIDIAN).unwrap_or(0.0);
+    let (greater, inverse) = ellipsoid(keys)?;
+    let name = quoted(&keys.text(GEOGRAPHIC_CITATION).unwrap_or_else(|| "unknown".into()));
+    Some(format!(
+        r#"GEOGCS["{name}",DATUM["{name}",SPHEROID["unknown",{greater},{inverse}]],PRIMEM["unknown",{meridian}],UNIT["degree",0.0174532925199433]]"#
+    ))
+}
+
+/// Returns the greater half axis and the inverse flattening.
+fn ellipsoid(keys: &GeoKeys) -> Option<(f64, f64)> {
+    if let Some(greater) = keys.double(GREATER_AXIS) {
+        let flattened = |lesser: f64| if lesser < greater { greater / (greater - lesser) } else { 0.0 };
+        let inverse = keys.double(INVERSE_FLATTENING).or_else(|| keys.double(LESSER_AXIS).map(flattened))?;
+        return Some((greater, inverse));
+    }
+    let code = keys.code(ELLIPSOID)?;
+    ELLIPSOIDS.iter().find(|(known, ..)| *known == code).map(|(_, greater, inverse)| (*greater, *inverse))
+}

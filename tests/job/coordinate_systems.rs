@@ -1,0 +1,224 @@
+//! Which coordinate systems a job takes, and which of them it takes together.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::common::shared;
+use crate::las_file::LasFile;
+use crate::program::Job;
+
+const TEXT: u16 = 2112;
+const KEYS: u16 = 34735;
+const CLARKE: &str = r#""Clarke_1866",6378206.4,294.9786982"#;
+const GRS80: &str = r#""GRS_1980",6378137.0,298.257222101"#;
+
+/// Writes a sound LAS file with these records of coordinate systems.
+fn write(folder: &Path, name: &str, records: &[(u16, Vec<u8>)]) -> PathBuf {
+    let plain = LasFile::new(2, 0, 0, 200).las();
+    let (header, points) = plain.split_at(227);
+    let mut bytes = header.to_vec();
+    for (id, data) in records {
+        let mut record = [0; 54];
+        record[2..17].copy_from_slice(b"LASF_Projection");
+        record[18..20].copy_from_slice(&id.to_le_bytes());
+        record[20..22].copy_from_slice(&(data.len() as u16).to_le_bytes());
+        bytes.extend(record);
+        bytes.extend(data);
+    }
+    let points_at = bytes.len() as u32;
+    bytes[96..100].copy_from_slice(&points_at.to_le_bytes());
+    bytes[100..104].copy_from_slice(&(records.len() as u32).to_le_bytes());
+    // The box: greatest and least of x, y and z.
+    for (at, value) in [502_000.0f64, 498_000.0, 4_002_000.0, 3_998_000.0, 1.0, -1.0].into_iter().enumerate() {
+        bytes[179 + 8 * at..][..8].copy_from_slice(&value.to_le_bytes());
+    }
+    bytes.extend(points);
+    let path = folder.join(name);
+    fs::write(&path, bytes).unwrap();
+    path
+}
+
+fn text(text: &str) -> (u16, Vec<u8>) {
+    (TEXT, text.as_bytes().to_vec())
+}
+
+fn keys(keys: &[[u16; 4]]) -> (u16, Vec<u8>) {
+    let all = std::iter::once([1, 1, 0, keys.len() as u16]).chain(keys.iter().copied());
+    (KEYS, all.flatten().flat_map(u16::to_le_bytes).collect())
+}
+
+fn code(code: u16) -> (u16, Vec<u8>) {
+    keys(&[[1024, 0, 1, 1], [3072, 0, 1, code]])
+}
+
+/// ESRI's text of UTM zone 15, without a code.
+fn esri(datum: &str, spheroid: &str) -> String {
+    format!(
+        r#"PROJCS["UTM_15N",GEOGCS["GCS_{datum}",DATUM["D_{datum}",SPHEROID[{spheroid}]],PRIMEM["Greenwich",0.0],
+        UNIT["Degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",500000.0],
+        PARAMETER["False_Northing",0.0],PARAMETER["Central_Meridian",-93.0],PARAMETER["Scale_Factor",0.9996],
+        PARAMETER["Latitude_Of_Origin",0.0],UNIT["Meter",1.0]]"#
+    )
+}
+
+/// The same with heights.
+fn with_heights(system: &str, datum: &str, unit: &str) -> String {
+    let plane = esri("North_American_1983", GRS80);
+    format!(r#"COMPD_CS["c",{plane},VERT_CS["{system}",VERT_DATUM["{datum}",2005],UNIT[{unit}],AXIS["Up",UP]]]"#)
+}
+
+fn warnings(report: &Value) -> String {
+    report["warnings"].to_string()
+}
+
+#[test]
+fn geocentric_coordinates_are_refused_by_code_text_and_keys() {
+    let folder = tempfile::tempdir().unwrap();
+    let version_1 = r#"GEOCCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0],
+        UNIT["metre",1],AXIS["Geocentric X",OTHER],AXIS["Geocentric Y",OTHER],AXIS["Geocentric Z",NORTH]]"#;
+    let version_2 = r#"GEODCRS["WGS 84",DATUM["World Geodetic System 1984",ELLIPSOID["WGS 84",6378137,298.257223563]],
+        CS[Cartesian,3],AXIS["(X)",geocentricX],AXIS["(Y)",geocentricY],AXIS["(Z)",geocentricZ],LENGTHUNIT["metre",1]]"#;
+    for (name, record) in [
+        ("version_1.las", text(version_1)),
+        ("version_2.las", text(version_2)),
+        ("code.las", keys(&[[2048, 0, 1, 4978]])),
+        ("model.las", keys(&[[1024, 0, 1, 3], [2048, 0, 1, 4326]])),
+    ] {
+        let file = write(folder.path(), name, &[record]);
+        let words = ["geocentric", "z is no height", "pdal translate", "[input] crs"];
+        Job::on(&[&file]).run().refused(2, &words);
+        Job::on(&[&file]).with("input", "unit = \"metre\"").run().refused(2, &words);
+        Job::on(&[&file]).with("input", "crs = \"none\"").report();
+    }
+}
+
+#[test]
+fn texts_without_codes_whose_datums_differ_are_refused_unless_the_user_says_which() {
+    let folder = tempfile::tempdir().unwrap();
+    let old = write(folder.path(), "old.las", &[text(&esri("North_American_1927", CLARKE))]);
+    let new = write(folder.path(), "new.las", &[text(&esri("North_American_1983", GRS80))]);
+    let words = ["old.las", "new.las", "the datum", "1927", "1983", "one CRS", "[input] crs"];
+    Job::on(&[&old, &new]).run().refused(2, &words);
+    Job::on(&[&new, &old]).run().refused(2, &words);
+    for (choice, used) in [("first", "UTM_15N"), ("EPSG:26915", "NAD83 / UTM zone 15N")] {
+        let job = Job::on(&[&old, &new]).with("input", &format!("crs = \"{choice}\""));
+        let report = job.report();
+        assert_eq!(report["crs"], used);
+        assert!(warnings(&report).contains("which differs in the datum"), "{report}");
+        job.verified();
+    }
+    let coded = write(folder.path(), "coded.las", &[code(26915)]);
+    assert_eq!(warnings(&Job::on(&[&new, &coded]).report()), "[]");
+    Job::on(&[&old, &coded]).run().refused(2, &["the datum (", "NAD83"]);
+}
+
+#[test]
+fn user_defined_keys_are_compared_with_codes() {
+    let folder = tempfile::tempdir().unwrap();
+    let defined = |datum: u16| {
+        keys(&[[1024, 0, 1, 1], [2048, 0, 1, datum], [3072, 0, 1, 32767], [3074, 0, 1, 16015], [3076, 0, 1, 9001]])
+    };
+    let [nad83, nad27] =
+        [("nad83.las", 4269), ("nad27.las", 4267)].map(|(name, datum)| write(folder.path(), name, &[defined(datum)]));
+    let [utm15, utm16] =
+        [("15.las", 26915), ("16.las", 26916)].map(|(name, utm)| write(folder.path(), name, &[code(utm)]));
+    let job = Job::on(&[&nad83, &utm15]);
+    assert_eq!(warnings(&job.report()), "[]");
+    Job::on(&[&nad27, &utm15]).run().refused(2, &["nad27.las", "15.las", "the datum (", "NAD27", "NAD83"]);
+    Job::on(&[&nad83, &utm16]).run().refused(2, &["nad83.las", "16.las", "longitude of the origin (", "-93", "-87"]);
+}
+
+#[test]
+fn a_file_without_a_crs_beside_others_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let bare = write(folder.path(), "bare.las", &[]);
+    let coded = write(folder.path(), "coded.las", &[code(26915)]);
+    for files in [[&bare, &coded], [&coded, &bare]] {
+        let report = Job::on(&files).report();
+        let said = warnings(&report);
+        assert!(said.contains("1 of 2 inputs name no CRS") && said.contains("bare.las"), "{said}");
+        assert_eq!(report["crs"], "NAD83 / UTM zone 15N");
+    }
+    assert!(!warnings(&Job::on(&[&bare]).report()).contains("name no CRS"));
+}
+
+#[test]
+fn units_and_datums_of_height_are_told_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let (metre, foot) = (r#""metre",1"#, r#""US survey foot",0.304800609601219"#);
+    let write = |name: &str, record| write(folder.path(), name, &[record]);
+    let metres = write("metres.las", text(&with_heights("NAVD88 height", "North American Vertical Datum 1988", metre)));
+    let feet =
+        write("feet.las", text(&with_heights("NAVD88 height (ftUS)", "North American Vertical Datum 1988", foot)));
+    let older =
+        write("older.las", text(&with_heights("NGVD29 height (m)", "National Geodetic Vertical Datum 1929", metre)));
+    let plane = write("plane.las", text(&esri("North_American_1983", GRS80)));
+    let refused = |files: [&PathBuf; 2], words: &[&str]| Job::on(&files).run().refused(2, words);
+    refused([&metres, &feet], &["differ in the unit of height (", "US survey foot", "metre", "[input] crs"]);
+    refused([&metres, &older], &["differ in the datum of heights (", "NAVD88", "NGVD29"]);
+    // Whatever the order, what one file says of its heights counts for those that say nothing.
+    for files in [[&plane, &feet], [&feet, &plane]] {
+        let job = Job::on(&files);
+        let said = warnings(&job.report());
+        assert!(
+            said.contains("1 of 2 inputs do not say the unit of their heights") && said.contains("plane.las"),
+            "{said}"
+        );
+        let georeference: Value =
+            serde_json::from_slice(&fs::read(job.out().join("georeference.json")).unwrap()).unwrap();
+        assert_eq!(georeference["metres_per_unit_z"], 0.304800609601219);
+    }
+}
+
+#[test]
+fn degrees_in_the_hundred_thousands_are_a_plane_in_metres() {
+    let folder = tempfile::tempdir().unwrap();
+    let degrees = keys(&[[1024, 0, 1, 2], [2048, 0, 1, 4326]]);
+    let scan = write(folder.path(), "scan.las", &[degrees]);
+    let job = Job::on(&[&scan]);
+    let report = job.report();
+    let said = warnings(&report);
+    assert!(said.contains("scan.las") && said.contains("WGS 84") && said.contains("no longitude"), "{said}");
+    assert_eq!((report["unit"].as_str(), report["crs"].as_str()), (Some("metre"), None));
+    job.verified();
+    let given = Job::on(&[&scan]).with("input", "crs = \"EPSG:26915\"").report();
+    assert_eq!(given["crs"], "NAD83 / UTM zone 15N");
+}
+
+#[test]
+fn nad83_2011_by_parameters_is_placed_on_the_globe() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = write(folder.path(), "new.las", &[text(&esri("NAD_1983_2011", GRS80))]);
+    let coded = write(folder.path(), "coded.las", &[code(6344)]);
+    let report = Job::on(&[&file, &coded]).report();
+    assert_eq!(warnings(&report), "[]");
+    let alone = Job::on(&[&file]);
+    assert!(!warnings(&alone.report()).contains("globe"));
+    let Some(shared) = shared() else { return };
+    let real = Job::on(&[shared.join("data/file_with_both_wkt_and_geotiff_vlrs.las")]).report();
+    assert!(!warnings(&real).contains("globe"), "{real}");
+}
+
+#[test]
+fn a_text_is_placed_on_the_globe_by_the_crs_that_the_user_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cloud.csv");
+    let rows: String =
+        (0..100).map(|i| format!("{},{},{}\n", 500_000 + i % 10 * 7, 4_000_000 + i / 10 * 9, i % 3)).collect();
+    fs::write(&path, rows).unwrap();
+    assert!(warnings(&Job::on(&[&path]).report()).contains("globe"));
+    let report = Job::on(&[&path]).with("input", "crs = \"EPSG:26915+6360\"").report();
+    let said = warnings(&report);
+    assert!(!said.contains("globe") && !said.contains("unit of its coordinates"), "{said}");
+    assert!(said.contains("heights are in another unit"), "{said}");
+}
+
+#[test]
+fn a_crs_that_is_not_known_is_an_error_of_the_configuration() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = write(folder.path(), "a.las", &[]);
+    Job::on(&[&file]).with("input", "crs = \"UTM 15\"").run().refused(2, &["line", "EPSG:26915", "well-known text"]);
+    Job::on(&[&file]).with("input", "crs = \"EPSG:4978\"").run().refused(2, &["geocentric"]);
+}
