@@ -20,6 +20,7 @@ mod broken;
 mod choices;
 mod configuration;
 mod cutting;
+mod decimals;
 mod globe;
 mod khronos;
 mod levels;

@@ -78,6 +78,12 @@ impl Number {
         Some(if negative { Number { mantissa: -number.mantissa, ..number } } else { number })
     }
 
+    /// Returns whether the number has more digits than double precision holds, some of which may be noise.
+    #[inline]
+    pub(crate) fn is_long(&self) -> bool {
+        self.rounded || self.mantissa.unsigned_abs() >= POWERS[15].unsigned_abs()
+    }
+
     /// Returns the same number with as few decimals as it needs.
     pub(crate) fn shortest(mut self) -> Number {
         while self.decimals > 0 && self.mantissa % 10 == 0 {
