@@ -9,26 +9,51 @@ use crate::input::text::number::{Number, POWERS};
 /// Every number of up to 15 digits survives double precision. More digits are those of the binary number.
 const DIGITS_OF_A_DOUBLE: u32 = 15;
 
+/// Nine digits tell all numbers of single precision apart.
+const DIGITS_OF_A_SINGLE: u64 = 1_000_000_000;
+
 /// A number that is this close to a shorter one, in parts of the shorter one's last digit, was meant to be the shorter one.
 const CLOSE: u128 = 1_000_000;
 
 /// A number that has fewer digits than this after rounding to 15 is as short as people and instruments write numbers.
 const SHORT: i64 = POWERS[13];
 
-/// Returns what was meant by a number with more digits than double precision holds, in as few decimals as that needs; `None` if it
-/// has no such digits.
+/// What was meant by a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Meaning {
+    /// In as few decimals as it needs.
+    pub(crate) number: Number,
+    /// Whether it was printed from single precision.
+    pub(crate) single: bool,
+}
+
+/// Returns what was meant by a number with more digits than double precision holds; `None` if it has no such digits.
 #[cold]
-pub(crate) fn meaning(number: &Number) -> Option<Number> {
+pub(crate) fn meaning(number: &Number) -> Option<Meaning> {
     let exact = number.shortest();
     if !exact.is_long() || (exact.decimals == 0 && !exact.rounded) {
         return None;
     }
     let digits = exact.mantissa.unsigned_abs().checked_ilog10().map_or(1, |log| log + 1);
     let double = rounded(&exact, digits.saturating_sub(DIGITS_OF_A_DOUBLE));
+    let meant = |number| Some(Meaning { number, single: false });
     if digits > DIGITS_OF_A_DOUBLE && double.mantissa.abs() < SHORT {
-        return Some(double);
+        return meant(double);
     }
-    Some(neighbour(&exact).or_else(|| single(&exact)).unwrap_or(double))
+    match (neighbour(&exact), single(&exact)) {
+        (Some(number), _) => meant(number),
+        (None, Some(number)) => Some(Meaning { number, single: true }),
+        (None, None) => meant(double),
+    }
+}
+
+/// Returns the number of decimals that `number` needs, which has no more than it needs, if it was printed from single precision: some
+/// such numbers are no longer than those that people write.
+#[cold]
+pub(crate) fn decimals_from_single(number: &Number) -> u8 {
+    let is_longer = number.mantissa.unsigned_abs() >= DIGITS_OF_A_SINGLE;
+    let meant = if is_longer { single(number) } else { None };
+    meant.map_or(number.decimals, |meant| meant.decimals)
 }
 
 /// Returns `number` without its last `surplus` digits, at most all of its decimals.
@@ -65,7 +90,7 @@ mod tests {
     use super::*;
 
     fn meant(text: &str) -> Option<String> {
-        let number = meaning(&Number::parse(text.as_bytes()).unwrap())?;
+        let number = meaning(&Number::parse(text.as_bytes()).unwrap())?.number;
         Some(rust_decimal::Decimal::new(number.mantissa, number.decimals.into()).to_string())
     }
 
@@ -98,7 +123,7 @@ mod tests {
             let noisy = f64::from_bits(value.to_bits().wrapping_add_signed(if value == 0.0 { 0 } else { ulps }));
             for text in [format!("{noisy}"), format!("{noisy:.18e}")] {
                 let number = Number::parse(text.as_bytes()).unwrap();
-                let meant = meaning(&number).unwrap_or(number.shortest());
+                let meant = meaning(&number).map_or(number.shortest(), |meant| meant.number);
                 prop_assert_eq!(meant.steps(2), Some((cents, false)), "{} gave {:?}", text, meant);
             }
         }

@@ -19,6 +19,9 @@ const FAR: f64 = 10.0;
 /// The fraction of the rows beyond either end of their middle.
 const TAIL: f64 = 0.05;
 
+/// Of fewer rows nobody can say where the middle is.
+const LEAST_ROWS: usize = 5;
+
 /// One row in so many may be an outlier. If there are more, they are a part of the terrain.
 const RARE: u64 = 50;
 
@@ -57,8 +60,8 @@ pub(crate) fn plausible_box(
             Ok(())
         })?;
     }
-    let cut = (values[0].len() as f64 * TAIL) as usize;
-    if cut == 0 {
+    let cut = ((values[0].len() as f64 * TAIL) as usize).max(1);
+    if values[0].len() < LEAST_ROWS {
         return Ok(None);
     }
     let mut plausible = RowBox::empty();

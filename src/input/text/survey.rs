@@ -39,6 +39,10 @@ pub(crate) struct Findings {
     pub(crate) decimals: [u8; 3],
     /// The coarsest grid on which every x and every y lies, apart from digits that are noise.
     pub(crate) grid: [Granularity; 2],
+    /// As `decimals`, if all numbers were printed from single precision.
+    pub(crate) decimals_from_single: [u8; 3],
+    /// The number of numbers that certainly were.
+    pub(crate) singles: u64,
     /// The number of numbers with digits that are noise.
     pub(crate) noisy: u64,
     /// The first of them.
@@ -47,7 +51,21 @@ pub(crate) struct Findings {
 
 impl Findings {
     fn none() -> Findings {
-        Findings { rows: 0, bounds: RowBox::empty(), decimals: [0; 3], grid: Default::default(), noisy: 0, noise: None }
+        Findings {
+            rows: 0,
+            bounds: RowBox::empty(),
+            decimals: [0; 3],
+            grid: Default::default(),
+            decimals_from_single: [0; 3],
+            singles: 0,
+            noisy: 0,
+            noise: None,
+        }
+    }
+
+    /// Returns whether the numbers were printed from single precision.
+    pub(crate) fn are_single(&self) -> bool {
+        self.singles > 0 && self.singles >= self.rows / 10
     }
 
     #[inline]
@@ -59,7 +77,8 @@ impl Findings {
                 Some(meant) => {
                     self.noisy += 1;
                     self.noise = self.noise.or(Some(*number));
-                    self.see_digits(axis, &meant);
+                    self.singles += meant.single as u64;
+                    self.see_digits(axis, &meant.number);
                 }
                 None => self.see_digits(axis, number),
             }
@@ -68,8 +87,12 @@ impl Findings {
 
     #[inline]
     fn see_digits(&mut self, axis: usize, number: &Number) {
-        if number.decimals > self.decimals[axis] {
-            self.decimals[axis] = self.decimals[axis].max(number.shortest().decimals);
+        // Never more than `decimals`.
+        if number.decimals > self.decimals_from_single[axis] {
+            let number = number.shortest();
+            self.decimals[axis] = self.decimals[axis].max(number.decimals);
+            let decimals = noise::decimals_from_single(&number);
+            self.decimals_from_single[axis] = self.decimals_from_single[axis].max(decimals);
         }
         if let Some(grid) = self.grid.get_mut(axis) {
             grid.see(number);
@@ -81,10 +104,12 @@ impl Findings {
         self.bounds.add(&other.bounds);
         for axis in 0..3 {
             self.decimals[axis] = self.decimals[axis].max(other.decimals[axis]);
+            self.decimals_from_single[axis] = self.decimals_from_single[axis].max(other.decimals_from_single[axis]);
         }
         for (grid, other) in self.grid.iter_mut().zip(&other.grid) {
             grid.add(other);
         }
+        self.singles += other.singles;
         self.noisy += other.noisy;
         self.noise = self.noise.or(other.noise);
     }

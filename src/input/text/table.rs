@@ -71,8 +71,11 @@ impl WantedRows {
     fn new(found: &Findings) -> WantedRows {
         let bounds = found.bounds.some();
         let farthest = |axis: usize| bounds.map_or(0.0, |bounds| bounds.farthest(axis));
-        let decimals = std::array::from_fn(|axis| fitting(found.decimals[axis], farthest(axis)));
-        WantedRows { rows: found.rows, bounds, decimals, grid: found.grid }
+        let single = found.are_single();
+        let needed = if single { found.decimals_from_single } else { found.decimals };
+        let decimals: [u8; 3] = std::array::from_fn(|axis| fitting(needed[axis], farthest(axis)));
+        let grid = if single { [0, 1].map(|axis| Granularity::of_decimals(decimals[axis])) } else { found.grid };
+        WantedRows { rows: found.rows, bounds, decimals, grid }
     }
 }
 
@@ -264,7 +267,7 @@ fn survey(file: &RandomAccessFile, columns: &Columns, rows: &Range<u64>, wanted:
 fn noise_warning(found: &Findings) -> Option<String> {
     let text = |number: &Number| Decimal::new(number.mantissa, number.decimals.into());
     let first = found.noise?;
-    let meant = noise::meaning(&first)?;
+    let meant = noise::meaning(&first)?.number;
     Some(format!(
         "{} numbers have more digits than floating point holds, such as {}, which counts as {}",
         found.noisy,
