@@ -9,7 +9,7 @@ use crate::input::text::decimal_comma;
 use crate::input::text::delimiter::{CANDIDATES, Delimiter};
 use crate::input::text::header::{self, names_in_comments, separator_line};
 use crate::input::text::lines::is_skipped;
-use crate::input::text::names::{named_columns, truncate};
+use crate::input::text::names::{NamedColumns, named_columns, truncate};
 use crate::input::text::number::Number;
 use crate::input::text::options::TextOptions;
 use crate::input::text::role::ColumnRole;
@@ -30,6 +30,8 @@ pub(crate) struct Columns {
     pub(crate) roles: Vec<ColumnRole>,
     /// How many columns the text itself names. A row with more is malformed.
     pub(crate) named: Option<usize>,
+    /// Whether one of the first rows has. Without it, the first pass looks only at the columns that are used, for speed.
+    pub(crate) has_surplus: bool,
     /// Whether colours are numbers from 0 to 1.
     pub(crate) unit_colors: bool,
     /// Lines that begin with one of these are skipped.
@@ -86,36 +88,21 @@ impl Columns {
             names_in_comments(&lines[..end], &comments, &candidates, row)
         };
         let found = match (&options.columns, header.names) {
-            (Some(names), _) => Some(
-                named_columns(names.iter().map(|name| name.as_bytes()))
-                    .map_err(|error| Error::Config(format!("[input.csv] columns {error}")))?,
-            ),
+            (Some(names), _) => Some(named_by_user(names)?),
             (None, Some(names)) => Some(names.map_err(|what| Error::input(path, what))?),
             (None, None) => commented(),
         };
-        let mut roles = found.as_ref().map_or(COORDINATES.to_vec(), |found| found.roles.clone());
-        if !colors {
-            roles
-                .iter_mut()
-                .filter(|role| matches!(role, ColumnRole::Color(_)))
-                .for_each(|role| *role = ColumnRole::Skipped);
-            truncate(&mut roles);
-        }
+        let roles = used_roles(found.as_ref(), colors);
         let delimiter = row_delimiter(&candidates, &roles, data);
-        match &found {
-            None if decimal_comma::is_used(delimiter, data) => return Err(Error::input(path, DECIMAL_COMMA)),
-            None if texts.last().is_some_and(|row| delimiter.fields(row).len() > 3) => warnings.push(
-                "no line names the columns: the first three are taken for x, y and z; say otherwise with `columns` under \
-                 [input.csv]",
-            ),
-            Some(found) if found.feet => warnings.push(
-                "the names of the columns say feet, but not which: set [input] unit to \"foot\" or \"us-foot\"",
-            ),
-            _ => {}
+        if found.is_none() && decimal_comma::is_used(delimiter, data) {
+            return Err(Error::input(path, DECIMAL_COMMA));
         }
+        let columns_of_last = texts.last().map_or(0, |row| delimiter.fields(row).len());
+        warnings.extend(names_warning(found.as_ref(), columns_of_last));
         let named = found.as_ref().filter(|_| options.columns.is_none()).map(|found| found.count);
         let unit_colors = has_unit_colors(delimiter, &roles, data);
-        let columns = Columns { delimiter, roles, named, unit_colors, comments };
+        let has_surplus = named.is_some_and(|named| data.iter().any(|row| delimiter.has_more_than(named, row)));
+        let columns = Columns { delimiter, roles, named, has_surplus, unit_colors, comments };
         Ok(DetectedColumns { columns, header_lines, degrees: found.is_some_and(|found| found.degrees) })
     }
 
@@ -129,6 +116,35 @@ impl Columns {
     pub(crate) fn have(&self, wanted: ColumnRole) -> bool {
         self.roles.contains(&wanted)
     }
+}
+
+fn named_by_user(names: &[String]) -> Result<NamedColumns> {
+    named_columns(names.iter().map(|name| name.as_bytes()))
+        .map_err(|error| Error::Config(format!("[input.csv] columns {error}")))
+}
+
+/// Returns what the columns hold that are used. Without names, the first three are x, y and z.
+fn used_roles(found: Option<&NamedColumns>, colors: bool) -> Vec<ColumnRole> {
+    let mut roles = found.map_or(COORDINATES.to_vec(), |found| found.roles.clone());
+    if !colors {
+        let is_color = |role: &&mut ColumnRole| matches!(role, ColumnRole::Color(_));
+        roles.iter_mut().filter(is_color).for_each(|role| *role = ColumnRole::Skipped);
+        truncate(&mut roles);
+    }
+    roles
+}
+
+fn names_warning(found: Option<&NamedColumns>, columns: usize) -> Option<String> {
+    let warning = match found {
+        None if columns > 3 => {
+            "no line names the columns: the first three are taken for x, y and z; say otherwise with `columns` under [input.csv]"
+        }
+        Some(found) if found.feet => {
+            "the names of the columns say feet, but not which: set [input] unit to \"foot\" or \"us-foot\""
+        }
+        _ => return None,
+    };
+    Some(warning.to_string())
 }
 
 fn comments(options: &TextOptions) -> Result<Vec<String>> {
@@ -159,7 +175,8 @@ fn row_delimiter(candidates: &[Delimiter], roles: &[ColumnRole], rows: &[&[u8]])
 /// Returns whether the colours of these rows are numbers from 0 to 1, some of them with decimals.
 fn has_unit_colors(delimiter: Delimiter, roles: &[ColumnRole], rows: &[&[u8]]) -> bool {
     let mut decimals = false;
-    for row in rows {
+    let has_colors = roles.iter().any(|role| matches!(role, ColumnRole::Color(_)));
+    for row in rows.iter().filter(|_| has_colors) {
         let fields = delimiter.fields(row);
         for (field, role) in fields.iter().zip(roles) {
             let color = matches!(role, ColumnRole::Color(_)).then(|| Number::parse(field)).flatten();

@@ -47,7 +47,7 @@ pub(crate) fn find(file: &RandomAccessFile, columns: &Columns, rows: &Range<u64>
     if columns.skips(last) || last.ends_with(b"\r") {
         return Ok(None);
     }
-    let mut reader = RowReader::new(columns);
+    let mut reader = RowReader::new(columns, true);
     // The tail may begin inside a line.
     let whole = tail[..feed].split(|byte| *byte == b'\n').skip((from > rows.start) as usize);
     let ends: Vec<RowEnd> = whole

@@ -1,6 +1,6 @@
 //! What separates the columns of a line, and how a line is split.
 
-use memchr::{memchr, memchr_iter, memchr2};
+use memchr::{memchr, memchr2};
 use serde::{Deserialize, Serialize};
 
 use crate::{Error, Result};
@@ -59,7 +59,7 @@ impl Delimiter {
     /// Returns whether `line` has more columns than `most`, apart from an empty last one.
     pub(crate) fn has_more_than(&self, most: usize, line: &[u8]) -> bool {
         if let Delimiter::Byte(byte) = self
-            && memchr_iter(*byte, line).count() < most
+            && line.iter().filter(|other| *other == byte).count() < most
         {
             return false;
         }

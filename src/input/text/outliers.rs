@@ -47,7 +47,7 @@ pub(crate) fn plausible_box(
             Ok(())
         })?;
         let stride = lines / ROWS_OF_A_CHUNK + 1;
-        let mut reader = RowReader::new(columns);
+        let mut reader = RowReader::new(columns, columns.has_surplus);
         for_each_line(file, first, chunk.clone(), |index, line| {
             if let TextLine::Whole(line) = line
                 && index % stride == 0

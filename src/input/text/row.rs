@@ -63,12 +63,14 @@ pub(crate) struct RowReader<'a> {
     pub(crate) numbers: [Number; 3],
     rgb: [u16; 3],
     class: u8,
+    /// Whether to count the columns that are not used.
+    thorough: bool,
 }
 
 impl<'a> RowReader<'a> {
-    /// Returns a reader of rows with these columns.
-    pub(crate) fn new(columns: &'a Columns) -> RowReader<'a> {
-        RowReader { columns, numbers: [Number::default(); 3], rgb: [0; 3], class: 0 }
+    /// Returns a reader of rows with these columns. A thorough one counts the columns that are not used as well.
+    pub(crate) fn new(columns: &'a Columns, thorough: bool) -> RowReader<'a> {
+        RowReader { columns, numbers: [Number::default(); 3], rgb: [0; 3], class: 0, thorough }
     }
 
     /// Reads the columns of `line` that are used.
@@ -83,8 +85,10 @@ impl<'a> RowReader<'a> {
                 continue;
             }
             let unexpected = |expected| RowError::Unexpected { column, expected };
-            let taken = take_number(delimiter, line).or_else(|| nothing(delimiter, line, role));
-            let (number, after) = taken.ok_or(unexpected("a number"))?;
+            let (number, after) = match take_number(delimiter, line) {
+                Some(taken) => taken,
+                None => nothing(delimiter, line, role).ok_or(unexpected("a number"))?,
+            };
             rest = after;
             match role {
                 ColumnRole::Coordinate(axis) => self.numbers[axis] = number,
@@ -96,10 +100,18 @@ impl<'a> RowReader<'a> {
                 ColumnRole::Skipped => {}
             }
         }
-        match (rest, self.columns.named) {
-            (Some(_), Some(named)) if delimiter.has_more_than(named, line) => Err(RowError::Surplus),
+        match rest {
+            Some(rest) if self.is_surplus(rest) => Err(RowError::Surplus),
             _ => Ok(()),
         }
+    }
+
+    /// Returns whether `rest`, the line after the columns that are used, has more columns than the header names.
+    #[inline]
+    fn is_surplus(&self, rest: &[u8]) -> bool {
+        let Some(named) = self.columns.named else { return false };
+        let unused = named.saturating_sub(self.columns.roles.len());
+        (self.thorough || unused == 0) && self.columns.delimiter.has_more_than(unused, rest)
     }
 
     /// Returns the class of the last row.

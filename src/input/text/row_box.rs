@@ -23,7 +23,7 @@ impl RowBox {
     }
 
     /// Takes one more row into the box.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn see(&mut self, numbers: &[Number; 3]) {
         for (axis, number) in numbers.iter().enumerate() {
             let value = number.value();

@@ -68,10 +68,21 @@ impl Findings {
         self.singles > 0 && self.singles >= self.rows / 10
     }
 
-    #[inline]
+    #[inline(always)]
     fn see(&mut self, numbers: &[Number; 3]) {
         self.rows += 1;
         self.bounds.see(numbers);
+        if Number::may_be_long(numbers) {
+            return self.see_long(numbers);
+        }
+        for (axis, number) in numbers.iter().enumerate() {
+            self.see_digits(axis, number);
+        }
+    }
+
+    /// Takes a row into account in which a number may have digits that are noise.
+    #[cold]
+    fn see_long(&mut self, numbers: &[Number; 3]) {
         for (axis, number) in numbers.iter().enumerate() {
             match number.is_long().then(|| noise::meaning(number)).flatten() {
                 Some(meant) => {
@@ -85,17 +96,23 @@ impl Findings {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn see_digits(&mut self, axis: usize, number: &Number) {
         // Never more than `decimals`.
         if number.decimals > self.decimals_from_single[axis] {
-            let number = number.shortest();
-            self.decimals[axis] = self.decimals[axis].max(number.decimals);
-            let decimals = noise::decimals_from_single(&number);
-            self.decimals_from_single[axis] = self.decimals_from_single[axis].max(decimals);
+            self.see_decimals(axis, number);
         }
         if let Some(grid) = self.grid.get_mut(axis) {
             grid.see(number);
+        }
+    }
+
+    fn see_decimals(&mut self, axis: usize, number: &Number) {
+        let number = number.shortest();
+        self.decimals[axis] = self.decimals[axis].max(number.decimals);
+        if number.decimals > self.decimals_from_single[axis] {
+            let decimals = noise::decimals_from_single(&number);
+            self.decimals_from_single[axis] = self.decimals_from_single[axis].max(decimals);
         }
     }
 
@@ -137,7 +154,7 @@ impl Survey {
         wanted: Wanted,
     ) -> Result<Survey> {
         let mut survey = Survey::empty();
-        let mut reader = RowReader::new(columns);
+        let mut reader = RowReader::new(columns, columns.has_surplus);
         let is_all = wanted.choice.is_all() && wanted.within.is_none();
         survey.lines = for_each_line(file, first, range, |_, line| {
             match line {

@@ -213,7 +213,7 @@ impl TextTable {
         let ChunkStart { mut row, line: first_line } = self.chunks[chunk];
         let WantedRows { bounds, ref decimals, .. } = *self.held();
         let within = bounds.filter(|_| self.without_outliers.is_some());
-        let mut reader = RowReader::new(&self.columns);
+        let mut reader = RowReader::new(&self.columns, true);
         let range = chunk_range(&self.rows, chunk as u64);
         for_each_line(file, self.rows.start, range, |index, line| {
             let number = || first_line + index;
