@@ -7,6 +7,9 @@ use serde::{Deserialize, Serialize};
 /// Lattice integers in x and y lie within this distance of zero, so that the predicates cannot overflow.
 pub const REACH: i32 = 1 << 29;
 
+/// The raw integer of a coordinate that no other raw integer can hold. It lies outside every lattice.
+pub const BEYOND: i64 = i64::MIN;
+
 /// The lattice of a job, in source units.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Lattice {
@@ -115,6 +118,9 @@ impl AxisMap {
     }
 
     fn apply_wide(&self, raw: i64) -> Option<(i32, bool)> {
+        if raw == BEYOND {
+            return None;
+        }
         let numerator = raw as i128 * self.mul + self.add;
         let (quotient, rest) = (numerator.div_euclid(self.div), numerator.rem_euclid(self.div));
         let up = 2 * rest > self.div || (2 * rest == self.div && numerator >= 0);

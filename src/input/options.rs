@@ -31,6 +31,9 @@ pub struct InputOptions {
     /// The step of the lattice in x and y.
     #[serde(default)]
     pub resolution: ResolutionChoice,
+    /// The step of the lattice in z.
+    #[serde(default)]
+    pub resolution_z: ResolutionChoice,
     /// The fraction of malformed records or lines up to which the job goes on.
     #[serde(default, alias = "malformed_share")]
     pub max_malformed_fraction: Fraction,
@@ -125,7 +128,7 @@ impl TryFrom<[f64; 4]> for SourceBounds {
     }
 }
 
-/// The step of the lattice in x and y.
+/// A step of the lattice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "toml::Value", into = "String")]
 pub enum ResolutionChoice {

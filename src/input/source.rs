@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::input::crs::plausible::plausible;
 use crate::input::crs::system::Crs;
+use crate::input::crs::unit::Unit;
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::las::crs_records;
 use crate::input::las::header::LasHeader;
@@ -14,14 +15,16 @@ use crate::input::las::layout::RecordLayout;
 use crate::input::las::laz::CompressedPoints;
 use crate::input::las::uncompressed::UncompressedPoints;
 use crate::input::las::vlr;
+use crate::input::other_formats::refuse_other_formats;
 use crate::input::points::axis::Axis;
 use crate::input::points::counts::PointCounts;
 use crate::input::points::filter::PointFilter;
 use crate::input::points::point::Point;
 use crate::input::points::rules::PointRules;
 use crate::input::text::options::TextOptions;
+use crate::input::text::row_choice::RowChoice;
 use crate::input::text::table::TextTable;
-use crate::{Error, Result, Warnings};
+use crate::{Result, Warnings};
 
 /// How a file holds its points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -94,8 +97,16 @@ enum PointData {
 /// `Input` if the file is not a point cloud or is damaged beyond reading, `Io` if it cannot be read, `Config` if `text` is
 /// contradictory.
 pub fn open(path: &Path, text: &TextOptions) -> Result<Source> {
+    open_chosen(path, text, &RowChoice::all())
+}
+
+/// As [`open`], for a job that wants only the rows of `choice`: the others have no say about the axes and the grid of a text.
+///
+/// # Errors
+/// As [`open`].
+pub fn open_chosen(path: &Path, text: &TextOptions, choice: &RowChoice) -> Result<Source> {
     let file = RandomAccessFile::open(path)?;
-    let mut start = [0; 64];
+    let mut start = [0; 256];
     let held = file.size().min(start.len() as u64) as usize;
     file.read_exact_at(&mut start[..held], 0)?;
     let start = &start[..held];
@@ -103,31 +114,7 @@ pub fn open(path: &Path, text: &TextOptions) -> Result<Source> {
         return open_las(&file);
     }
     refuse_other_formats(path, start)?;
-    open_text(&file, text)
-}
-
-/// Fails if the first bytes of a file show that it is neither LAS nor text, and says what it is.
-fn refuse_other_formats(path: &Path, start: &[u8]) -> Result<()> {
-    if start.is_empty() {
-        return Err(Error::input(path, "is empty"));
-    }
-    if start.starts_with(b"version https://git-lfs.github.com/spec") {
-        let what = "is a Git LFS pointer, not the point cloud itself; fetch that with `git lfs pull`";
-        return Err(Error::input(path, what));
-    }
-    let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    if extension == "las" || extension == "laz" {
-        let what = "does not begin with the letters LASF, so it is not LAS or LAZ; copy or download it again";
-        return Err(Error::input(path, what));
-    }
-    if start.starts_with(&[0xff, 0xfe]) || start.starts_with(&[0xfe, 0xff]) {
-        return Err(Error::input(path, "is text in UTF-16; save it as UTF-8"));
-    }
-    if start.contains(&0) {
-        let what = "is neither LAS nor LAZ nor UTF-8 text; convert it to one of those first";
-        return Err(Error::input(path, what));
-    }
-    Ok(())
+    open_text(&file, text, choice)
 }
 
 fn open_las(file: &RandomAccessFile) -> Result<Source> {
@@ -168,9 +155,10 @@ fn open_las(file: &RandomAccessFile) -> Result<Source> {
     })
 }
 
-fn open_text(file: &RandomAccessFile, options: &TextOptions) -> Result<Source> {
+fn open_text(file: &RandomAccessFile, options: &TextOptions, choice: &RowChoice) -> Result<Source> {
     let mut warnings = Warnings::default();
-    let table = TextTable::scan(file, options, &mut warnings)?;
+    let table = TextTable::scan(file, options, choice, &mut warnings)?;
+    let horizontal = if table.degrees { Unit::Degree } else { Unit::Unknown };
     Ok(Source {
         path: file.path().to_path_buf(),
         size: file.size(),
@@ -185,7 +173,7 @@ fn open_text(file: &RandomAccessFile, options: &TextOptions) -> Result<Source> {
         grid: table.grid(),
         has_rgb: table.has_rgb(),
         has_class: table.has_class(),
-        crs: Crs::default(),
+        crs: Crs { horizontal, ..Crs::default() },
         by_return: Vec::new(),
         warnings,
         points: PointData::Text(table),
@@ -193,6 +181,44 @@ fn open_text(file: &RandomAccessFile, options: &TextOptions) -> Result<Source> {
 }
 
 impl Source {
+    /// Returns the box of the points that the job wants, its least and its greatest x, y, z, if that is known without decoding: for
+    /// text. Rows that are left out as outliers are not in it.
+    pub fn wanted_box(&self) -> Option<[[f64; 3]; 2]> {
+        match &self.points {
+            PointData::Text(table) => table.wanted_box(),
+            _ => None,
+        }
+    }
+
+    /// Returns the number of records that decoding will count as malformed, as far as it is known without decoding.
+    pub fn known_malformed(&self) -> u64 {
+        match &self.points {
+            PointData::Text(table) => table.malformed(),
+            _ => self.missing,
+        }
+    }
+
+    /// Leaves out the few rows of a text that lie so far from all others that they are mistakes: decoding counts them as malformed,
+    /// and they have no say about the axes and the grid. `choice` is that with which the source was opened. Returns whether there
+    /// are such rows.
+    ///
+    /// # Errors
+    /// `Io` if the file cannot be read.
+    pub fn tell_outliers(&mut self, choice: &RowChoice) -> Result<bool> {
+        let PointData::Text(table) = &mut self.points else { return Ok(false) };
+        let told = table.tell_outliers(&RandomAccessFile::reopen(&self.path, self.size)?, choice)?;
+        (self.axes, self.grid) = (table.axes(), table.grid());
+        Ok(told)
+    }
+
+    /// Undoes [`Source::tell_outliers`].
+    pub fn keep_outliers(&mut self) {
+        if let PointData::Text(table) = &mut self.points {
+            table.keep_outliers();
+            (self.axes, self.grid) = (table.axes(), table.grid());
+        }
+    }
+
     /// Returns the number of chunks: the parts of the source that can be decoded independently. Where the format allows, a chunk
     /// has about 50,000 records. A file without records has no chunk.
     ///

@@ -11,6 +11,7 @@ mod las_file;
 mod damaged;
 mod formats;
 mod headers;
+mod layouts;
 mod real;
 mod rules;
 mod written_down;

@@ -21,6 +21,7 @@ mod choices;
 mod configuration;
 mod coordinate_systems;
 mod cutting;
+mod decimals;
 mod globe;
 mod khronos;
 mod levels;

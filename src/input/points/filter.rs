@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::Result;
-use crate::geometry::lattice::REACH;
+use crate::geometry::lattice::{BEYOND, REACH};
 use crate::input::points::axis::{AXIS_NAMES, Axis};
 use crate::input::points::counts::PointCounts;
 use crate::input::points::point::Point;
@@ -73,6 +73,19 @@ impl<'a> PointFilter<'a> {
         }
     }
 
+    /// Counts a record that lies too far from all others as malformed, unless the job does not want it anyway. `what` describes it.
+    #[cold]
+    pub(crate) fn push_outlier(&mut self, record: &PointRecord, what: impl FnOnce() -> String) {
+        let [x, y, z] = &self.rules.maps;
+        if !self.rules.classes[record.class as usize] {
+            self.counts.other_class += 1;
+        } else if !self.in_bounds(&[x.apply(record.raw[0]), y.apply(record.raw[1]), z.apply(record.raw[2])]) {
+            self.counts.out_of_bounds += 1;
+        } else {
+            self.malformed(1, what);
+        }
+    }
+
     #[inline]
     fn in_bounds(&self, mapped: &Mapped) -> bool {
         let Some(bounds) = &self.rules.bounds else { return true };
@@ -112,10 +125,14 @@ impl<'a> PointFilter<'a> {
 
     /// Returns the first coordinate that is outside the lattice's reach, and the name of its axis.
     #[cold]
-    fn out_of_reach(&self, record: &PointRecord, mapped: &Mapped) -> (f64, &'static str) {
+    fn out_of_reach(&self, record: &PointRecord, mapped: &Mapped) -> (String, &'static str) {
         let is_out = |axis: usize| mapped[axis].is_none_or(|(v, _)| axis < 2 && !in_reach(v));
         let axis = (0..3).find(|&axis| is_out(axis)).unwrap_or(2);
-        (self.axes[axis].value(record.raw[axis]), AXIS_NAMES[axis])
+        let value = match record.raw[axis] {
+            BEYOND => format!("more than 10^18 steps of {}", self.axes[axis].scale),
+            raw => self.axes[axis].value(raw).to_string(),
+        };
+        (value, AXIS_NAMES[axis])
     }
 }
 

@@ -5,55 +5,21 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::input::text::decimal_comma;
 use crate::input::text::delimiter::{CANDIDATES, Delimiter};
+use crate::input::text::header::{self, names_in_comments, separator_line};
+use crate::input::text::lines::is_skipped;
+use crate::input::text::names::{NamedColumns, named_columns, truncate};
 use crate::input::text::number::Number;
 use crate::input::text::options::TextOptions;
+use crate::input::text::role::ColumnRole;
 use crate::{Error, Result, Warnings};
 
-/// What a column holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) enum ColumnRole {
-    /// x, y or z.
-    Coordinate(usize),
-    /// Red, green or blue.
-    Color(usize),
-    /// The classification.
-    Class,
-    /// Nothing of use.
-    Skipped,
-}
+/// The columns of a text that nothing names.
+const COORDINATES: [ColumnRole; 3] = [ColumnRole::Coordinate(0), ColumnRole::Coordinate(1), ColumnRole::Coordinate(2)];
 
-/// The names that people give to columns.
-const NAMES: [(&[&str], ColumnRole); 7] = [
-    (&["x", "easting", "east", "lon", "long", "longitude"], ColumnRole::Coordinate(0)),
-    (&["y", "northing", "north", "lat", "latitude"], ColumnRole::Coordinate(1)),
-    (&["z", "elevation", "elev", "height", "altitude", "alt"], ColumnRole::Coordinate(2)),
-    (&["r", "red"], ColumnRole::Color(0)),
-    (&["g", "green"], ColumnRole::Color(1)),
-    (&["b", "blue"], ColumnRole::Color(2)),
-    (&["class", "classification"], ColumnRole::Class),
-];
-
-/// What is wrong with the names of columns.
-#[derive(Debug, thiserror::Error)]
-enum NamesError {
-    #[error("names {count} columns {name}")]
-    Repeated { count: usize, name: &'static str },
-    #[error("names no column {0}")]
-    Missing(&'static str),
-}
-
-/// What is wrong with a line that should name the columns.
-#[derive(Debug, thiserror::Error)]
-enum HeaderLineError {
-    #[error(
-        "has neither three numbers nor names of columns; numbers have a point before their decimals, and a comma, a semicolon, \
-         a tab or spaces between them"
-    )]
-    NoNames,
-    #[error("{0}; name the columns with `columns` under [input.csv]")]
-    Names(#[from] NamesError),
-}
+const DECIMAL_COMMA: &str = "has commas both between columns and before decimals, as in 565000,25,5933000,50; write it again with points \
+                             before decimals or with semicolons between columns, or name its columns with `columns` under [input.csv]";
 
 /// How the lines of a text are to be read.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -62,6 +28,12 @@ pub(crate) struct Columns {
     pub(crate) delimiter: Delimiter,
     /// What each column holds, up to the last column that is used.
     pub(crate) roles: Vec<ColumnRole>,
+    /// How many columns the text itself names. A row with more is malformed.
+    pub(crate) named: Option<usize>,
+    /// Whether one of the first rows has. Without it, the first pass looks only at the columns that are used, for speed.
+    pub(crate) has_surplus: bool,
+    /// Whether colours are numbers from 0 to 1.
+    pub(crate) unit_colors: bool,
     /// Lines that begin with one of these are skipped.
     comments: Vec<String>,
 }
@@ -69,48 +41,69 @@ pub(crate) struct Columns {
 /// What the lines at the start of a text show.
 pub(crate) struct DetectedColumns {
     pub(crate) columns: Columns,
-    /// Whether the first line that is neither blank nor a comment is no row.
-    pub(crate) header: bool,
+    /// How many lines come before the rows: up to the last one of a header.
+    pub(crate) header_lines: usize,
+    /// Whether x and y are named as longitude and latitude.
+    pub(crate) degrees: bool,
 }
 
 impl Columns {
-    /// Finds out how the text in `path` is laid out; `lines` are its first lines.
+    /// Finds out how the text in `path` is laid out; `lines` are its first lines. `colors` tells whether its colours are wanted.
     pub(crate) fn detect(
         path: &Path,
         lines: &[&[u8]],
         options: &TextOptions,
+        colors: bool,
         warnings: &mut Warnings,
     ) -> Result<DetectedColumns> {
         let comments = comments(options)?;
-        let rows: Vec<&[u8]> = lines.iter().copied().filter(|line| !is_skipped(line, &comments)).collect();
-        let Some((&first, after)) = rows.split_first() else {
+        let mut rows: Vec<(usize, &[u8])> = lines.iter().copied().enumerate().collect();
+        rows.retain(|(_, line)| !is_skipped(line, &comments));
+        let Some(&(first_at, first)) = rows.first() else {
             return Err(Error::input(path, "has no line with numbers in it"));
         };
-        let candidates = match options.delimiter {
+        let mut header_lines = 0;
+        let mut given = options.delimiter;
+        if let Some(separator) = separator_line(first).filter(|_| rows.len() > 1) {
+            given = given.or(Some(separator));
+            header_lines = first_at + 1;
+            rows.remove(0);
+        }
+        let candidates = match given {
             Some(delimiter) => vec![Delimiter::from_option(delimiter)?],
             None => CANDIDATES.to_vec(),
         };
-        let header = options.header.unwrap_or_else(|| !candidates.iter().any(|d| numbers(*d, first) >= 3));
-        let named = header && options.columns.is_none() && !is_count(first);
-        if header && is_count(first) {
+        let texts: Vec<&[u8]> = rows.iter().map(|(_, line)| *line).collect();
+        let header = header::find(&texts, &candidates, options.header, options.columns.is_some());
+        if header.count {
             warnings.push("the first line holds one number, taken for the number of points and skipped");
         }
-        let roles = match &options.columns {
-            Some(names) => roles(names.iter().map(|name| name.as_bytes()))
-                .map_err(|error| Error::Config(format!("[input.csv] columns {error}")))?,
-            None if named => header_roles(&candidates, first)
-                .map_err(|error| Error::input(path, format!("the first line, {}, {error}", shown(first))))?,
-            None => vec![ColumnRole::Coordinate(0), ColumnRole::Coordinate(1), ColumnRole::Coordinate(2)],
-        };
-        let delimiter = row_delimiter(&candidates, &roles, if header { after } else { &rows });
-        let unnamed = !named && options.columns.is_none();
-        if unnamed && rows.last().is_some_and(|row| delimiter.fields(row).len() > 3) {
-            warnings.push(
-                "no line names the columns: the first three are taken for x, y and z; say otherwise with `columns` under \
-                 [input.csv]",
-            );
+        if let Some((at, _)) = header.lines.checked_sub(1).and_then(|last| rows.get(last)) {
+            header_lines = at + 1;
         }
-        Ok(DetectedColumns { columns: Columns { delimiter, roles, comments }, header })
+        let data = &texts[header.lines..];
+        let commented = || {
+            let row = data.first().filter(|_| options.header != Some(false))?;
+            let end = rows.get(header.lines)?.0;
+            names_in_comments(&lines[..end], &comments, &candidates, row)
+        };
+        let found = match (&options.columns, header.names) {
+            (Some(names), _) => Some(named_by_user(names)?),
+            (None, Some(names)) => Some(names.map_err(|what| Error::input(path, what))?),
+            (None, None) => commented(),
+        };
+        let roles = used_roles(found.as_ref(), colors);
+        let delimiter = row_delimiter(&candidates, &roles, data);
+        if found.is_none() && decimal_comma::is_used(delimiter, data) {
+            return Err(Error::input(path, DECIMAL_COMMA));
+        }
+        let columns_of_last = texts.last().map_or(0, |row| delimiter.fields(row).len());
+        warnings.extend(names_warning(found.as_ref(), columns_of_last));
+        let named = found.as_ref().filter(|_| options.columns.is_none()).map(|found| found.count);
+        let unit_colors = has_unit_colors(delimiter, &roles, data);
+        let has_surplus = named.is_some_and(|named| data.iter().any(|row| delimiter.has_more_than(named, row)));
+        let columns = Columns { delimiter, roles, named, has_surplus, unit_colors, comments };
+        Ok(DetectedColumns { columns, header_lines, degrees: found.is_some_and(|found| found.degrees) })
     }
 
     /// Returns whether `line` is blank or a comment.
@@ -125,6 +118,35 @@ impl Columns {
     }
 }
 
+fn named_by_user(names: &[String]) -> Result<NamedColumns> {
+    named_columns(names.iter().map(|name| name.as_bytes()))
+        .map_err(|error| Error::Config(format!("[input.csv] columns {error}")))
+}
+
+/// Returns what the columns hold that are used. Without names, the first three are x, y and z.
+fn used_roles(found: Option<&NamedColumns>, colors: bool) -> Vec<ColumnRole> {
+    let mut roles = found.map_or(COORDINATES.to_vec(), |found| found.roles.clone());
+    if !colors {
+        let is_color = |role: &&mut ColumnRole| matches!(role, ColumnRole::Color(_));
+        roles.iter_mut().filter(is_color).for_each(|role| *role = ColumnRole::Skipped);
+        truncate(&mut roles);
+    }
+    roles
+}
+
+fn names_warning(found: Option<&NamedColumns>, columns: usize) -> Option<String> {
+    let warning = match found {
+        None if columns > 3 => {
+            "no line names the columns: the first three are taken for x, y and z; say otherwise with `columns` under [input.csv]"
+        }
+        Some(found) if found.feet => {
+            "the names of the columns say feet, but not which: set [input] unit to \"foot\" or \"us-foot\""
+        }
+        _ => return None,
+    };
+    Some(warning.to_string())
+}
+
 fn comments(options: &TextOptions) -> Result<Vec<String>> {
     match &options.comment {
         Some(comment) if comment.is_empty() => Ok(Vec::new()),
@@ -133,78 +155,6 @@ fn comments(options: &TextOptions) -> Result<Vec<String>> {
         ))),
         Some(comment) => Ok(vec![comment.clone()]),
         None => Ok(vec!["#".to_string(), "//".to_string()]),
-    }
-}
-
-#[inline]
-fn is_skipped(line: &[u8], comments: &[String]) -> bool {
-    // Most rows begin with a digit, and no comment does.
-    if line.first().is_some_and(u8::is_ascii_digit) {
-        return false;
-    }
-    let line = line.trim_ascii_start();
-    line.is_empty() || comments.iter().any(|comment| line.starts_with(comment.as_bytes()))
-}
-
-/// Returns the number of columns of `line` that are numbers.
-fn numbers(delimiter: Delimiter, line: &[u8]) -> usize {
-    delimiter.fields(line).iter().filter(|field| is_number(field)).count()
-}
-
-fn is_number(field: &[u8]) -> bool {
-    std::str::from_utf8(field).is_ok_and(|text| text.parse::<f64>().is_ok())
-}
-
-/// Returns whether `line` is one whole number. Some formats have a line with the number of points before the points.
-fn is_count(line: &[u8]) -> bool {
-    let line = line.trim_ascii();
-    !line.is_empty() && line.iter().all(u8::is_ascii_digit)
-}
-
-/// Returns the roles that `line` names under the first delimiter that gives x, y and z, or what is wrong under the delimiter that
-/// gives most columns. All delimiters are tried, the `candidates` for the rows first: a header may use another one.
-fn header_roles(candidates: &[Delimiter], line: &[u8]) -> std::result::Result<Vec<ColumnRole>, HeaderLineError> {
-    if !line.iter().any(|byte| byte.is_ascii_alphabetic()) {
-        return Err(HeaderLineError::NoNames);
-    }
-    let others = CANDIDATES.iter().filter(|other| !candidates.contains(other));
-    let candidates: Vec<Delimiter> = candidates.iter().chain(others).copied().collect();
-    let split = |delimiter: &Delimiter| roles(delimiter.fields(line).into_iter());
-    if let Some(found) = candidates.iter().find_map(|delimiter| split(delimiter).ok()) {
-        return Ok(found);
-    }
-    let most = candidates.iter().max_by_key(|delimiter| delimiter.fields(line).len());
-    Ok(split(most.unwrap_or(&Delimiter::Blank))?)
-}
-
-fn roles<'a>(names: impl Iterator<Item = &'a [u8]>) -> std::result::Result<Vec<ColumnRole>, NamesError> {
-    let mut roles: Vec<ColumnRole> = names.map(role).collect();
-    for (names, role) in NAMES {
-        let count = roles.iter().filter(|other| **other == role).count();
-        if count > 1 {
-            return Err(NamesError::Repeated { count, name: names[0] });
-        }
-        if count == 0 && matches!(role, ColumnRole::Coordinate(_)) {
-            return Err(NamesError::Missing(names[0]));
-        }
-    }
-    drop_partial_color(&mut roles);
-    let used = roles.iter().rposition(|role| *role != ColumnRole::Skipped).map_or(0, |last| last + 1);
-    roles.truncate(used);
-    Ok(roles)
-}
-
-fn role(name: &[u8]) -> ColumnRole {
-    let name = String::from_utf8_lossy(name).trim().to_lowercase();
-    NAMES.iter().find(|(names, _)| names.contains(&name.as_str())).map_or(ColumnRole::Skipped, |&(_, role)| role)
-}
-
-/// Skips the columns of colours unless red, green and blue are all there.
-fn drop_partial_color(roles: &mut [ColumnRole]) {
-    if !(0..3).all(|channel| roles.contains(&ColumnRole::Color(channel))) {
-        for role in roles.iter_mut().filter(|role| matches!(role, ColumnRole::Color(_))) {
-            *role = ColumnRole::Skipped;
-        }
     }
 }
 
@@ -222,11 +172,21 @@ fn row_delimiter(candidates: &[Delimiter], roles: &[ColumnRole], rows: &[&[u8]])
     candidates.iter().min_by_key(|delimiter| Reverse(fitting(delimiter))).copied().unwrap_or(Delimiter::Blank)
 }
 
-/// Returns the start of `text` in quotes, for a message.
-pub(crate) fn shown(text: &[u8]) -> String {
-    const MOST: usize = 60;
-    let text = String::from_utf8_lossy(&text[..text.len().min(4 * MOST)]).into_owned();
-    let short: String = text.chars().take(MOST).collect();
-    let dots = if short.len() < text.len() { "..." } else { "" };
-    format!("{short:?}{dots}")
+/// Returns whether the colours of these rows are numbers from 0 to 1, some of them with decimals.
+fn has_unit_colors(delimiter: Delimiter, roles: &[ColumnRole], rows: &[&[u8]]) -> bool {
+    let mut decimals = false;
+    let has_colors = roles.iter().any(|role| matches!(role, ColumnRole::Color(_)));
+    for row in rows.iter().filter(|_| has_colors) {
+        let fields = delimiter.fields(row);
+        for (field, role) in fields.iter().zip(roles) {
+            let color = matches!(role, ColumnRole::Color(_)).then(|| Number::parse(field)).flatten();
+            if let Some(color) = color {
+                if !(0.0..=1.0).contains(&color.value()) {
+                    return false;
+                }
+                decimals |= color.shortest().decimals > 0;
+            }
+        }
+    }
+    decimals
 }

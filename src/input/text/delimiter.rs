@@ -15,8 +15,8 @@ pub(crate) enum Delimiter {
 }
 
 /// The delimiters that detection tries, in this order: spaces may surround a comma, and a column that tabs separate may hold spaces.
-pub(crate) const CANDIDATES: [Delimiter; 4] =
-    [Delimiter::Byte(b';'), Delimiter::Byte(b'\t'), Delimiter::Byte(b','), Delimiter::Blank];
+pub(crate) const CANDIDATES: [Delimiter; 5] =
+    [Delimiter::Byte(b';'), Delimiter::Byte(b'\t'), Delimiter::Byte(b'|'), Delimiter::Byte(b','), Delimiter::Blank];
 
 impl Delimiter {
     /// Returns the delimiter that the option names. Fails if the character can be part of a number or of a name.
@@ -56,6 +56,23 @@ impl Delimiter {
         (unquoted(line[..end].trim_ascii()), rest)
     }
 
+    /// Returns whether `line` has more columns than `most`, apart from an empty last one.
+    pub(crate) fn has_more_than(&self, most: usize, line: &[u8]) -> bool {
+        if let Delimiter::Byte(byte) = self
+            && line.iter().filter(|other| *other == byte).count() < most
+        {
+            return false;
+        }
+        let fields = self.fields(line);
+        let empty = fields.last().is_some_and(|field| field.is_empty()) as usize;
+        fields.len() - empty > most
+    }
+
+    /// Returns the number of columns of `line` that are numbers.
+    pub(crate) fn numbers(&self, line: &[u8]) -> usize {
+        self.fields(line).iter().filter(|field| is_number(field)).count()
+    }
+
     /// Returns all columns of `line`.
     pub(crate) fn fields<'a>(&self, line: &'a [u8]) -> Vec<&'a [u8]> {
         let mut fields = Vec::new();
@@ -69,10 +86,21 @@ impl Delimiter {
     }
 }
 
-/// Returns the length of the quoted text that `line` begins with, quotes included.
+fn is_number(field: &[u8]) -> bool {
+    std::str::from_utf8(field).is_ok_and(|text| text.parse::<f64>().is_ok())
+}
+
+/// Returns the length of the quoted text that `line` begins with, quotes included. A quote that is doubled is a part of the text.
 fn quoted_length(line: &[u8]) -> Option<usize> {
     let quote = *line.first().filter(|byte| matches!(byte, b'"' | b'\''))?;
-    memchr(quote, &line[1..]).map(|at| at + 2)
+    let mut length = 1;
+    loop {
+        length += memchr(quote, &line[length..])? + 1;
+        if line.get(length) != Some(&quote) {
+            return Some(length);
+        }
+        length += 1;
+    }
 }
 
 fn unquoted(field: &[u8]) -> &[u8] {

@@ -13,6 +13,11 @@ pub(crate) struct Granularity {
 }
 
 impl Granularity {
+    /// Returns the step of numbers with this many decimals.
+    pub(crate) fn of_decimals(decimals: u8) -> Granularity {
+        Granularity { step: 1, decimals }
+    }
+
     /// Takes one more number into account.
     #[inline]
     pub(crate) fn see(&mut self, number: &Number) {

@@ -50,8 +50,29 @@ pub(crate) fn for_each_line(
     Ok(count)
 }
 
-fn without_return(line: &[u8]) -> &[u8] {
+/// Returns the line without the carriage return at its end.
+pub(crate) fn without_return(line: &[u8]) -> &[u8] {
     line.strip_suffix(b"\r").unwrap_or(line)
+}
+
+/// Returns whether `line` is blank or begins with one of `comments`.
+#[inline]
+pub(crate) fn is_skipped(line: &[u8], comments: &[String]) -> bool {
+    // Most rows begin with a digit, and no comment does.
+    if line.first().is_some_and(u8::is_ascii_digit) {
+        return false;
+    }
+    let line = line.trim_ascii_start();
+    line.is_empty() || comments.iter().any(|comment| line.starts_with(comment.as_bytes()))
+}
+
+/// Returns the start of `text` in quotes, for a message.
+pub(crate) fn shown(text: &[u8]) -> String {
+    const MOST: usize = 60;
+    let text = String::from_utf8_lossy(&text[..text.len().min(4 * MOST)]).into_owned();
+    let short: String = text.chars().take(MOST).collect();
+    let dots = if short.len() < text.len() { "..." } else { "" };
+    format!("{short:?}{dots}")
 }
 
 #[cfg(test)]

@@ -2,11 +2,20 @@
 //! are decoded independently.
 
 pub(crate) mod columns;
+pub(crate) mod cut_off;
+pub(crate) mod decimal_comma;
 pub(crate) mod delimiter;
 pub(crate) mod granularity;
+pub(crate) mod header;
 pub(crate) mod lines;
+pub(crate) mod names;
+pub(crate) mod noise;
 pub(crate) mod number;
 pub(crate) mod options;
+pub(crate) mod outliers;
+pub(crate) mod role;
 pub(crate) mod row;
+pub(crate) mod row_box;
+pub(crate) mod row_choice;
 pub(crate) mod survey;
 pub(crate) mod table;

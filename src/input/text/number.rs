@@ -78,6 +78,20 @@ impl Number {
         Some(if negative { Number { mantissa: -number.mantissa, ..number } } else { number })
     }
 
+    /// Returns whether the number has more digits than double precision holds, some of which may be noise.
+    #[inline]
+    pub(crate) fn is_long(&self) -> bool {
+        self.rounded || self.mantissa.unsigned_abs() >= POWERS[15].unsigned_abs()
+    }
+
+    /// Returns whether one of the numbers may be [long](Number::is_long): quickly, and for a few that are not.
+    #[inline(always)]
+    pub(crate) fn may_be_long(numbers: &[Number; 3]) -> bool {
+        let [x, y, z] = numbers;
+        let bits = x.mantissa.unsigned_abs() | y.mantissa.unsigned_abs() | z.mantissa.unsigned_abs();
+        bits >= 1 << 49 || x.rounded || y.rounded || z.rounded
+    }
+
     /// Returns the same number with as few decimals as it needs.
     pub(crate) fn shortest(mut self) -> Number {
         while self.decimals > 0 && self.mantissa % 10 == 0 {

@@ -1,10 +1,13 @@
 //! One line of a text as a record.
 
+use crate::geometry::lattice::BEYOND;
 use crate::input::points::axis::AXIS_NAMES;
 use crate::input::points::record::PointRecord;
-use crate::input::text::columns::{ColumnRole, Columns, shown};
+use crate::input::text::columns::Columns;
 use crate::input::text::delimiter::Delimiter;
+use crate::input::text::lines::shown;
 use crate::input::text::number::Number;
+use crate::input::text::role::ColumnRole;
 
 /// Why a line cannot be used. Columns count from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,12 +16,21 @@ pub(crate) enum RowError {
     Missing { column: usize },
     /// The column holds something else than `expected`.
     Unexpected { column: usize, expected: &'static str },
+    /// The line has more columns than the header names.
+    Surplus,
 }
 
 impl RowError {
     /// Returns a sentence about `line`, for people.
     pub(crate) fn describe(&self, columns: &Columns, line: &[u8]) -> String {
-        let (RowError::Missing { column } | RowError::Unexpected { column, .. }) = *self;
+        let (RowError::Missing { column } | RowError::Unexpected { column, .. }) = *self else {
+            let (named, found) = (columns.named.unwrap_or_default(), columns.delimiter.fields(line).len());
+            return format!(
+                "{} has {found} columns, but the header names {named}; decimals have a point and no comma before them, and text \
+                 with the delimiter in it stands in quotes",
+                shown(line)
+            );
+        };
         let name = match columns.roles[column] {
             ColumnRole::Coordinate(axis) => AXIS_NAMES[axis],
             ColumnRole::Color(channel) => ["red", "green", "blue"][channel],
@@ -29,10 +41,19 @@ impl RowError {
             RowError::Missing { .. } => format!("{place} is missing in {}", shown(line)),
             RowError::Unexpected { expected, .. } => {
                 let field = columns.delimiter.fields(line).get(column).copied().unwrap_or_default();
-                format!("{place} is {}, not {expected}", shown(field))
+                let hint =
+                    if is_decimal_comma(field) { ": decimals have a point before them, not a comma" } else { "" };
+                format!("{place} is {}, not {expected}{hint}", shown(field))
             }
+            RowError::Surplus => String::new(),
         }
     }
+}
+
+/// Returns whether `field` would be a number with a point in place of its comma.
+fn is_decimal_comma(field: &[u8]) -> bool {
+    let pointed: Vec<u8> = field.iter().map(|byte| if *byte == b',' { b'.' } else { *byte }).collect();
+    pointed != field && Number::parse(&pointed).is_some()
 }
 
 /// Reads rows and keeps the numbers of the last one.
@@ -42,12 +63,14 @@ pub(crate) struct RowReader<'a> {
     pub(crate) numbers: [Number; 3],
     rgb: [u16; 3],
     class: u8,
+    /// Whether to count the columns that are not used.
+    thorough: bool,
 }
 
 impl<'a> RowReader<'a> {
-    /// Returns a reader of rows with these columns.
-    pub(crate) fn new(columns: &'a Columns) -> RowReader<'a> {
-        RowReader { columns, numbers: [Number::default(); 3], rgb: [0; 3], class: 0 }
+    /// Returns a reader of rows with these columns. A thorough one counts the columns that are not used as well.
+    pub(crate) fn new(columns: &'a Columns, thorough: bool) -> RowReader<'a> {
+        RowReader { columns, numbers: [Number::default(); 3], rgb: [0; 3], class: 0, thorough }
     }
 
     /// Reads the columns of `line` that are used.
@@ -62,38 +85,51 @@ impl<'a> RowReader<'a> {
                 continue;
             }
             let unexpected = |expected| RowError::Unexpected { column, expected };
-            let (number, after) = take_number(delimiter, line).ok_or(unexpected("a number"))?;
+            let (number, after) = match take_number(delimiter, line) {
+                Some(taken) => taken,
+                None => nothing(delimiter, line, role).ok_or(unexpected("a number"))?,
+            };
             rest = after;
             match role {
                 ColumnRole::Coordinate(axis) => self.numbers[axis] = number,
                 ColumnRole::Color(channel) => {
-                    self.rgb[channel] = whole(number).ok_or(unexpected("a whole number from 0 to 65535"))?;
+                    let color = if self.columns.unit_colors { unit_color(number) } else { nearest_color(number) };
+                    self.rgb[channel] = color.ok_or(unexpected("a whole number from 0 to 65535"))?;
                 }
                 ColumnRole::Class => self.class = whole(number).ok_or(unexpected("a whole number from 0 to 255"))?,
                 ColumnRole::Skipped => {}
             }
         }
-        Ok(())
+        match rest {
+            Some(rest) if self.is_surplus(rest) => Err(RowError::Surplus),
+            _ => Ok(()),
+        }
+    }
+
+    /// Returns whether `rest`, the line after the columns that are used, has more columns than the header names.
+    #[inline]
+    fn is_surplus(&self, rest: &[u8]) -> bool {
+        let Some(named) = self.columns.named else { return false };
+        let unused = named.saturating_sub(self.columns.roles.len());
+        (self.thorough || unused == 0) && self.columns.delimiter.has_more_than(unused, rest)
+    }
+
+    /// Returns the class of the last row.
+    pub(crate) fn class(&self) -> u8 {
+        self.class
     }
 
     /// Returns the last row in steps of `10^-decimals` on each axis.
     #[inline]
-    pub(crate) fn record(&self, decimals: &[u8; 3]) -> Result<PointRecord, RowError> {
+    pub(crate) fn record(&self, decimals: &[u8; 3]) -> PointRecord {
         let mut raw = [0; 3];
         let mut rounded = [false; 2];
         for axis in 0..3 {
-            let steps = self.numbers[axis].steps(decimals[axis]);
-            let (value, inexact) = steps.ok_or_else(|| self.too_large(axis))?;
+            let (value, inexact) = self.numbers[axis].steps(decimals[axis]).unwrap_or((BEYOND, true));
             raw[axis] = value;
             rounded[axis / 2] |= inexact;
         }
-        Ok(PointRecord { raw, rgb: self.rgb, class: self.class, withheld: false, rounded })
-    }
-
-    #[cold]
-    fn too_large(&self, axis: usize) -> RowError {
-        let column = self.columns.roles.iter().position(|role| *role == ColumnRole::Coordinate(axis)).unwrap_or(0);
-        RowError::Unexpected { column, expected: "a number of a usable size" }
+        PointRecord { raw, rgb: self.rgb, class: self.class, withheld: false, rounded }
     }
 }
 
@@ -117,6 +153,25 @@ fn take_number(delimiter: Delimiter, line: &[u8]) -> Option<(Number, Option<&[u8
     }
     let (field, rest) = delimiter.split(line);
     Some((Number::parse(field)?, rest))
+}
+
+/// Returns 0 for a colour or a class that is not there, and the rest of the line after it.
+#[cold]
+fn nothing(delimiter: Delimiter, line: &[u8], role: ColumnRole) -> Option<(Number, Option<&[u8]>)> {
+    let (field, rest) = delimiter.split(line);
+    let optional = !matches!(role, ColumnRole::Coordinate(_));
+    (optional && field.is_empty()).then_some((Number::default(), rest))
+}
+
+/// Returns the colour for a number from 0 to 1.
+fn unit_color(number: Number) -> Option<u16> {
+    Some((number.value().clamp(0.0, 1.0) * u16::MAX as f64).round() as u16)
+}
+
+/// Returns the colour nearest to `number`; `None` if no colour is that dark or bright.
+fn nearest_color(number: Number) -> Option<u16> {
+    let (nearest, _) = number.steps(0)?;
+    u16::try_from(nearest).ok()
 }
 
 /// Returns `number` as an integer; `None` if it has decimals or does not fit.

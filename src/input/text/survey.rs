@@ -7,8 +7,11 @@ use crate::input::file::random_access::RandomAccessFile;
 use crate::input::text::columns::Columns;
 use crate::input::text::granularity::Granularity;
 use crate::input::text::lines::{TextLine, for_each_line};
+use crate::input::text::noise;
 use crate::input::text::number::Number;
 use crate::input::text::row::RowReader;
+use crate::input::text::row_box::RowBox;
+use crate::input::text::row_choice::RowChoice;
 
 /// What the first pass finds in a chunk, or in all chunks.
 #[derive(Clone, Debug)]
@@ -17,27 +20,129 @@ pub(crate) struct Survey {
     pub(crate) lines: u64,
     /// The number of rows, including malformed rows.
     pub(crate) rows: u64,
-    /// The least x, y, z; infinite as long as there is no row that can be read.
-    pub(crate) min: [f64; 3],
-    /// The greatest x, y, z; likewise.
-    pub(crate) max: [f64; 3],
-    /// The most decimals that an x, a y and a z needs.
+    /// The number of malformed rows.
+    pub(crate) malformed: u64,
+    /// What the rows hold that the job wants.
+    pub(crate) wanted: Findings,
+    /// The box of the other rows.
+    pub(crate) others: RowBox,
+}
+
+/// What rows hold.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Findings {
+    /// The number of rows.
+    pub(crate) rows: u64,
+    /// Their box.
+    pub(crate) bounds: RowBox,
+    /// The most decimals that an x, a y and a z needs, apart from digits that are noise.
     pub(crate) decimals: [u8; 3],
-    /// The coarsest grid on which every x and every y lies.
+    /// The coarsest grid on which every x and every y lies, apart from digits that are noise.
     pub(crate) grid: [Granularity; 2],
+    /// As `decimals`, if all numbers were printed from single precision.
+    pub(crate) decimals_from_single: [u8; 3],
+    /// The number of numbers that certainly were.
+    pub(crate) singles: u64,
+    /// The number of numbers with digits that are noise.
+    pub(crate) noisy: u64,
+    /// The first of them.
+    pub(crate) noise: Option<Number>,
+}
+
+impl Findings {
+    fn none() -> Findings {
+        Findings {
+            rows: 0,
+            bounds: RowBox::empty(),
+            decimals: [0; 3],
+            grid: Default::default(),
+            decimals_from_single: [0; 3],
+            singles: 0,
+            noisy: 0,
+            noise: None,
+        }
+    }
+
+    /// Returns whether the numbers were printed from single precision.
+    pub(crate) fn are_single(&self) -> bool {
+        self.singles > 0 && self.singles >= self.rows / 10
+    }
+
+    #[inline(always)]
+    fn see(&mut self, numbers: &[Number; 3]) {
+        self.rows += 1;
+        self.bounds.see(numbers);
+        if Number::may_be_long(numbers) {
+            return self.see_long(numbers);
+        }
+        for (axis, number) in numbers.iter().enumerate() {
+            self.see_digits(axis, number);
+        }
+    }
+
+    /// Takes a row into account in which a number may have digits that are noise.
+    #[cold]
+    fn see_long(&mut self, numbers: &[Number; 3]) {
+        for (axis, number) in numbers.iter().enumerate() {
+            match number.is_long().then(|| noise::meaning(number)).flatten() {
+                Some(meant) => {
+                    self.noisy += 1;
+                    self.noise = self.noise.or(Some(*number));
+                    self.singles += meant.single as u64;
+                    self.see_digits(axis, &meant.number);
+                }
+                None => self.see_digits(axis, number),
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn see_digits(&mut self, axis: usize, number: &Number) {
+        // Never more than `decimals`.
+        if number.decimals > self.decimals_from_single[axis] {
+            self.see_decimals(axis, number);
+        }
+        if let Some(grid) = self.grid.get_mut(axis) {
+            grid.see(number);
+        }
+    }
+
+    fn see_decimals(&mut self, axis: usize, number: &Number) {
+        let number = number.shortest();
+        self.decimals[axis] = self.decimals[axis].max(number.decimals);
+        if number.decimals > self.decimals_from_single[axis] {
+            let decimals = noise::decimals_from_single(&number);
+            self.decimals_from_single[axis] = self.decimals_from_single[axis].max(decimals);
+        }
+    }
+
+    fn add(&mut self, other: &Findings) {
+        self.rows += other.rows;
+        self.bounds.add(&other.bounds);
+        for axis in 0..3 {
+            self.decimals[axis] = self.decimals[axis].max(other.decimals[axis]);
+            self.decimals_from_single[axis] = self.decimals_from_single[axis].max(other.decimals_from_single[axis]);
+        }
+        for (grid, other) in self.grid.iter_mut().zip(&other.grid) {
+            grid.add(other);
+        }
+        self.singles += other.singles;
+        self.noisy += other.noisy;
+        self.noise = self.noise.or(other.noise);
+    }
+}
+
+/// Which rows a survey looks at: those of a job, within a box if there is one.
+#[derive(Clone, Copy)]
+pub(crate) struct Wanted<'a> {
+    pub(crate) choice: &'a RowChoice,
+    pub(crate) within: Option<RowBox>,
 }
 
 impl Survey {
     /// Returns the survey of no line.
     pub(crate) fn empty() -> Survey {
-        Survey {
-            lines: 0,
-            rows: 0,
-            min: [f64::INFINITY; 3],
-            max: [f64::NEG_INFINITY; 3],
-            decimals: [0; 3],
-            grid: Default::default(),
-        }
+        Survey { lines: 0, rows: 0, malformed: 0, wanted: Findings::none(), others: RowBox::empty() }
     }
 
     /// Surveys the lines that begin in `range`. The first row of the text is at byte `first`.
@@ -46,14 +151,22 @@ impl Survey {
         columns: &Columns,
         first: u64,
         range: Range<u64>,
+        wanted: Wanted,
     ) -> Result<Survey> {
         let mut survey = Survey::empty();
-        let mut reader = RowReader::new(columns);
+        let mut reader = RowReader::new(columns, columns.has_surplus);
+        let is_all = wanted.choice.is_all() && wanted.within.is_none();
         survey.lines = for_each_line(file, first, range, |_, line| {
             match line {
                 TextLine::Whole(line) if columns.skips(line) => return Ok(()),
-                TextLine::Whole(line) if reader.read(line).is_ok() => survey.see(&reader.numbers),
-                _ => {}
+                TextLine::Whole(line) if reader.read(line).is_ok() => {
+                    if is_all || wanted.has(&reader) {
+                        survey.wanted.see(&reader.numbers);
+                    } else {
+                        survey.others.see(&reader.numbers);
+                    }
+                }
+                _ => survey.malformed += 1,
             }
             survey.rows += 1;
             Ok(())
@@ -61,32 +174,27 @@ impl Survey {
         Ok(survey)
     }
 
-    #[inline]
-    fn see(&mut self, numbers: &[Number; 3]) {
-        for (axis, number) in numbers.iter().enumerate() {
-            let value = number.value();
-            self.min[axis] = self.min[axis].min(value);
-            self.max[axis] = self.max[axis].max(value);
-            if number.decimals > self.decimals[axis] {
-                self.decimals[axis] = self.decimals[axis].max(number.shortest().decimals);
-            }
-        }
-        for (grid, number) in self.grid.iter_mut().zip(numbers) {
-            grid.see(number);
-        }
-    }
-
     /// Adds the survey of the lines that follow.
     pub(crate) fn add(&mut self, other: &Survey) {
         self.lines += other.lines;
         self.rows += other.rows;
-        for axis in 0..3 {
-            self.min[axis] = self.min[axis].min(other.min[axis]);
-            self.max[axis] = self.max[axis].max(other.max[axis]);
-            self.decimals[axis] = self.decimals[axis].max(other.decimals[axis]);
-        }
-        for (grid, other) in self.grid.iter_mut().zip(&other.grid) {
-            grid.add(other);
-        }
+        self.malformed += other.malformed;
+        self.wanted.add(&other.wanted);
+        self.others.add(&other.others);
+    }
+
+    /// Returns the box of all rows that can be read.
+    pub(crate) fn bounds(&self) -> Option<RowBox> {
+        let mut all = self.wanted.bounds;
+        all.add(&self.others);
+        all.some()
+    }
+}
+
+impl Wanted<'_> {
+    /// Returns whether the last row of `reader` is wanted.
+    pub(crate) fn has(&self, reader: &RowReader) -> bool {
+        self.choice.wants(&reader.numbers, reader.class())
+            && self.within.is_none_or(|within| within.holds(&reader.numbers))
     }
 }

@@ -7,19 +7,28 @@ use rust_decimal::Decimal;
 use serde::{Deserialize, Serialize};
 
 use crate::input::file::random_access::RandomAccessFile;
-use crate::input::points::axis::Axis;
+use crate::input::points::axis::{AXIS_NAMES, Axis};
 use crate::input::points::filter::PointFilter;
-use crate::input::text::columns::{ColumnRole, Columns};
+use crate::input::text::columns::Columns;
+use crate::input::text::cut_off;
 use crate::input::text::granularity::Granularity;
-use crate::input::text::lines::{LONGEST, TextLine, for_each_line};
-use crate::input::text::number::{MOST_DECIMALS, POWERS};
+use crate::input::text::lines::{LONGEST, TextLine, for_each_line, shown, without_return};
+use crate::input::text::noise;
+use crate::input::text::number::{MOST_DECIMALS, Number, POWERS};
 use crate::input::text::options::TextOptions;
+use crate::input::text::outliers::{are_rare, plausible_box};
+use crate::input::text::role::ColumnRole;
 use crate::input::text::row::RowReader;
-use crate::input::text::survey::Survey;
+use crate::input::text::row_box::RowBox;
+use crate::input::text::row_choice::RowChoice;
+use crate::input::text::survey::{Findings, Survey, Wanted};
 use crate::{Result, Warnings, interrupt};
 
 /// The number of bytes of a chunk.
 const CHUNK: u64 = 2 << 20;
+
+/// The number of chunks that show where most rows lie.
+const SAMPLED_CHUNKS: u64 = 16;
 
 /// The number of bytes at the start of a text that show how it is laid out.
 const SAMPLE: u64 = 1 << 17;
@@ -28,17 +37,46 @@ const SAMPLE: u64 = 1 << 17;
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct TextTable {
     columns: Columns,
-    /// The bytes of the rows, from the first row to the end of the file.
+    /// The bytes of the rows, from the first row to the end of the last row that is whole.
     rows: Range<u64>,
     chunks: Vec<ChunkStart>,
+    /// What is wrong with the line after the rows, if the file was cut off in it.
+    cut: Option<(u64, String)>,
     /// The number of rows, including malformed rows.
     pub(crate) records: u64,
-    /// The least x, y, z; 0 if there is no row that can be read.
+    /// The number of malformed rows. Rows that [`TextTable::tell_outliers`] found are not among them.
+    malformed: u64,
+    /// The least x, y, z of all rows; 0 if there is no row that can be read.
     pub(crate) min: [f64; 3],
     /// The greatest x, y, z; likewise.
     pub(crate) max: [f64; 3],
+    /// Whether the coordinates are degrees, by the names of their columns.
+    pub(crate) degrees: bool,
+    /// What the rows hold that the job wants.
+    wanted: WantedRows,
+    /// What they hold without outliers, if these are left out.
+    without_outliers: Option<WantedRows>,
+}
+
+/// What the lattice has to hold.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+struct WantedRows {
+    rows: u64,
+    bounds: Option<RowBox>,
     decimals: [u8; 3],
     grid: [Granularity; 2],
+}
+
+impl WantedRows {
+    fn new(found: &Findings) -> WantedRows {
+        let bounds = found.bounds.some();
+        let farthest = |axis: usize| bounds.map_or(0.0, |bounds| bounds.farthest(axis));
+        let single = found.are_single();
+        let needed = if single { found.decimals_from_single } else { found.decimals };
+        let decimals: [u8; 3] = std::array::from_fn(|axis| fitting(needed[axis], farthest(axis)));
+        let grid = if single { [0, 1].map(|axis| Granularity::of_decimals(decimals[axis])) } else { found.grid };
+        WantedRows { rows: found.rows, bounds, decimals, grid }
+    }
 }
 
 /// The numbers of the first row and the first line of a chunk. Rows count from 0 and lines from 1, as editors count them.
@@ -57,38 +95,102 @@ struct FirstRow {
 }
 
 impl TextTable {
-    /// Reads all of `file` once, on the threads of the current rayon pool.
-    pub(crate) fn scan(file: &RandomAccessFile, options: &TextOptions, warnings: &mut Warnings) -> Result<TextTable> {
-        let (columns, first) = detect(file, options, warnings)?;
-        let rows = first.at..file.size();
-        let count = (rows.end - rows.start).div_ceil(CHUNK);
-        let survey = |index| {
-            interrupt::check()?;
-            Survey::of_range(file, &columns, rows.start, chunk_range(&rows, index))
-        };
-        let surveys: Vec<Survey> = (0..count).into_par_iter().map(survey).collect::<Result<_>>()?;
+    /// Reads all of `file` once, on the threads of the current rayon pool. Only the rows of `choice` have a say about the axes.
+    pub(crate) fn scan(
+        file: &RandomAccessFile,
+        options: &TextOptions,
+        choice: &RowChoice,
+        warnings: &mut Warnings,
+    ) -> Result<TextTable> {
+        let Layout { columns, first, named_degrees } = detect(file, options, choice.colors, warnings)?;
+        let mut rows = first.at..file.size();
+        let cut = cut_off::find(file, &columns, &rows)?;
+        rows.end = cut.as_ref().map_or(rows.end, |cut| cut.at);
+        let surveys = survey(file, &columns, &rows, Wanted { choice, within: None })?;
         let (mut chunks, mut all) = (Vec::with_capacity(surveys.len()), Survey::empty());
         for survey in &surveys {
             chunks.push(ChunkStart { row: all.rows, line: first.line + all.lines });
             all.add(survey);
         }
-        let is_readable = all.min[0] <= all.max[0];
-        if all.rows > 0 && !is_readable {
+        let bounds = all.bounds();
+        if all.rows > 0 && bounds.is_none() {
             warnings.push("no line has numbers where x, y and z should be");
         }
-        let [min, max] = if is_readable { [all.min, all.max] } else { [[0.0; 3]; 2] };
-        let decimals = std::array::from_fn(|axis| fitting(all.decimals[axis], min[axis].abs().max(max[axis].abs())));
-        Ok(TextTable { columns, rows, chunks, records: all.rows, min, max, decimals, grid: all.grid })
+        warnings.extend(noise_warning(&all.wanted));
+        let cut = cut.map(|cut| (first.line + all.lines, cut.what));
+        let RowBox { min, max } = bounds.unwrap_or(RowBox { min: [0.0; 3], max: [0.0; 3] });
+        let malformed = all.malformed + cut.is_some() as u64;
+        let records = all.rows + cut.is_some() as u64;
+        let degrees =
+            named_degrees && bounds.is_some_and(|bounds| bounds.farthest(0) <= 360.0 && bounds.farthest(1) <= 90.0);
+        let wanted = WantedRows::new(&all.wanted);
+        Ok(TextTable {
+            columns,
+            rows,
+            chunks,
+            cut,
+            records,
+            malformed,
+            min,
+            max,
+            degrees,
+            wanted,
+            without_outliers: None,
+        })
+    }
+
+    /// Finds the few rows that lie so far from all others that they are mistakes, and leaves them out: decoding counts them as
+    /// malformed. Returns whether there are any.
+    pub(crate) fn tell_outliers(&mut self, file: &RandomAccessFile, choice: &RowChoice) -> Result<bool> {
+        let Some(bounds) = self.wanted.bounds else { return Ok(false) };
+        let chunks = self.chunk_count() as u64;
+        let sampled: Vec<Range<u64>> = (0..SAMPLED_CHUNKS.min(chunks))
+            .map(|index| chunk_range(&self.rows, index * chunks / SAMPLED_CHUNKS.min(chunks)))
+            .collect();
+        let all = Wanted { choice, within: None };
+        let plausible = plausible_box(file, &self.columns, self.rows.start, &sampled, all)?;
+        let Some(within) = plausible.filter(|plausible| !plausible.holds_box(&bounds)) else { return Ok(false) };
+        let surveys = survey(file, &self.columns, &self.rows, Wanted { choice, within: Some(within) })?;
+        let mut rest = Survey::empty();
+        surveys.iter().for_each(|survey| rest.add(survey));
+        let outliers = self.wanted.rows - rest.wanted.rows;
+        let told = are_rare(outliers, self.wanted.rows);
+        self.without_outliers = told.then(|| WantedRows::new(&rest.wanted));
+        Ok(told)
+    }
+
+    /// Undoes [`TextTable::tell_outliers`].
+    pub(crate) fn keep_outliers(&mut self) {
+        self.without_outliers = None;
+    }
+
+    fn held(&self) -> &WantedRows {
+        self.without_outliers.as_ref().unwrap_or(&self.wanted)
+    }
+
+    /// Returns the number of rows that are left out as outliers.
+    pub(crate) fn outliers(&self) -> u64 {
+        self.wanted.rows - self.held().rows
+    }
+
+    /// Returns the number of rows that decoding will count as malformed.
+    pub(crate) fn malformed(&self) -> u64 {
+        self.malformed + self.outliers()
+    }
+
+    /// Returns the box of the rows that the lattice has to hold; `None` if there is none.
+    pub(crate) fn wanted_box(&self) -> Option<[[f64; 3]; 2]> {
+        self.held().bounds.map(|bounds| [bounds.min, bounds.max])
     }
 
     /// Returns the axes: steps of the most decimals found, counted from 0.
     pub(crate) fn axes(&self) -> [Axis; 3] {
-        self.decimals.map(|decimals| Axis { offset: Decimal::ZERO, scale: Decimal::new(1, decimals as u32) })
+        self.held().decimals.map(|decimals| Axis { offset: Decimal::ZERO, scale: Decimal::new(1, decimals as u32) })
     }
 
     /// Returns the largest step that divides every x, and the one that divides every y.
     pub(crate) fn grid(&self) -> [Decimal; 2] {
-        [0, 1].map(|axis| self.grid[axis].value().unwrap_or(Decimal::ONE))
+        [0, 1].map(|axis| self.held().grid[axis].value().unwrap_or(Decimal::ONE))
     }
 
     /// Returns whether rows have red, green and blue.
@@ -109,15 +211,22 @@ impl TextTable {
     /// Sends the rows of `chunk` through `filter`.
     pub(crate) fn decode(&self, file: &RandomAccessFile, chunk: usize, filter: &mut PointFilter) -> Result<()> {
         let ChunkStart { mut row, line: first_line } = self.chunks[chunk];
-        let mut reader = RowReader::new(&self.columns);
+        let WantedRows { bounds, ref decimals, .. } = *self.held();
+        let within = bounds.filter(|_| self.without_outliers.is_some());
+        let mut reader = RowReader::new(&self.columns, true);
         let range = chunk_range(&self.rows, chunk as u64);
         for_each_line(file, self.rows.start, range, |index, line| {
             let number = || first_line + index;
             match line {
                 TextLine::Whole(line) if self.columns.skips(line) => return Ok(()),
-                TextLine::Whole(line) => match reader.read(line).and_then(|()| reader.record(&self.decimals)) {
-                    Ok(record) => filter.push(row, &record, || format!("line {}", number()))?,
-                    Err(error) => {
+                TextLine::Whole(line) => match (reader.read(line), &within) {
+                    (Ok(()), Some(within)) if !within.holds(&reader.numbers) => {
+                        filter.push_outlier(&reader.record(decimals), || {
+                            format!("line {}: {} lies {}", number(), shown(line), far_from(within))
+                        });
+                    }
+                    (Ok(()), _) => filter.push(row, &reader.record(decimals), || format!("line {}", number()))?,
+                    (Err(error), _) => {
                         filter.malformed(1, || format!("line {}: {}", number(), error.describe(&self.columns, line)));
                     }
                 },
@@ -126,8 +235,45 @@ impl TextTable {
             row += 1;
             Ok(())
         })?;
+        if let Some((line, what)) = self.cut.as_ref().filter(|_| chunk + 1 == self.chunks.len()) {
+            filter.malformed(1, || format!("line {line}: {what}"));
+        }
         Ok(())
     }
+}
+
+fn far_from(RowBox { min, max }: &RowBox) -> String {
+    let axis = |axis: usize| format!("{} from {} to {}", AXIS_NAMES[axis], min[axis], max[axis]);
+    format!(
+        "far from all other rows ({}, {}, {}), and no lattice holds both at full precision: leave it out with [input] bounds or \
+         max_malformed_fraction, or set resolution or resolution_z so coarse that it fits",
+        axis(0),
+        axis(1),
+        axis(2)
+    )
+}
+
+/// Surveys all rows, chunk by chunk.
+fn survey(file: &RandomAccessFile, columns: &Columns, rows: &Range<u64>, wanted: Wanted) -> Result<Vec<Survey>> {
+    let count = (rows.end - rows.start).div_ceil(CHUNK);
+    let survey = |index| {
+        interrupt::check()?;
+        Survey::of_range(file, columns, rows.start, chunk_range(rows, index), wanted)
+    };
+    (0..count).into_par_iter().map(survey).collect()
+}
+
+/// Returns a warning about numbers with digits that are noise.
+fn noise_warning(found: &Findings) -> Option<String> {
+    let text = |number: &Number| Decimal::new(number.mantissa, number.decimals.into());
+    let first = found.noise?;
+    let meant = noise::meaning(&first)?.number;
+    Some(format!(
+        "{} numbers have more digits than floating point holds, such as {}, which counts as {}",
+        found.noisy,
+        text(&first),
+        text(&meant)
+    ))
 }
 
 fn chunk_range(rows: &Range<u64>, index: u64) -> Range<u64> {
@@ -135,8 +281,15 @@ fn chunk_range(rows: &Range<u64>, index: u64) -> Range<u64> {
     start..(start + CHUNK).min(rows.end)
 }
 
+/// How a text is laid out.
+struct Layout {
+    columns: Columns,
+    first: FirstRow,
+    named_degrees: bool,
+}
+
 /// Finds out how the text is laid out and where its rows begin.
-fn detect(file: &RandomAccessFile, options: &TextOptions, warnings: &mut Warnings) -> Result<(Columns, FirstRow)> {
+fn detect(file: &RandomAccessFile, options: &TextOptions, colors: bool, warnings: &mut Warnings) -> Result<Layout> {
     let sample = file.bytes(0..file.size().min(SAMPLE))?;
     let mark = if sample.starts_with(&[0xef, 0xbb, 0xbf]) { 3 } else { 0 };
     let mut lines: Vec<&[u8]> = sample[mark..].split(|&byte| byte == b'\n').collect();
@@ -144,15 +297,12 @@ fn detect(file: &RandomAccessFile, options: &TextOptions, warnings: &mut Warning
         // The sample may end in the middle of the last line.
         lines.pop();
     }
-    let plain: Vec<&[u8]> = lines.iter().map(|line| line.strip_suffix(b"\r").unwrap_or(line)).collect();
-    let found = Columns::detect(file.path(), &plain, options, warnings)?;
-    if !found.header {
-        return Ok((found.columns, FirstRow { at: mark as u64, line: 1 }));
-    }
-    let header = plain.iter().position(|line| !found.columns.skips(line)).unwrap_or(0);
-    let before: usize = lines[..=header].iter().map(|line| line.len() + 1).sum();
+    let plain: Vec<&[u8]> = lines.iter().copied().map(without_return).collect();
+    let found = Columns::detect(file.path(), &plain, options, colors, warnings)?;
+    let before: usize = lines[..found.header_lines].iter().map(|line| line.len() + 1).sum();
     let at = ((mark + before) as u64).min(file.size());
-    Ok((found.columns, FirstRow { at, line: header as u64 + 2 }))
+    let first = FirstRow { at, line: found.header_lines as u64 + 1 };
+    Ok(Layout { columns: found.columns, first, named_degrees: found.degrees })
 }
 
 /// Returns the most decimals, up to `decimals`, that leave numbers up to `largest` within 18 digits.

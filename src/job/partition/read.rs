@@ -1,7 +1,6 @@
 //! Reading the points: every input is decoded once, and its points go to the buckets of a grid, from which the tree is grown.
 
 use crate::input::options::OnBadFile;
-use crate::input::{PointCounts, Source};
 use crate::job::durable::directory::JobDirectory;
 use crate::job::partition::bucket_sorter::BucketSorter;
 use crate::job::partition::buckets::Buckets;
@@ -11,8 +10,9 @@ use crate::job::partition::result::{Partition, PointSummary};
 use crate::job::partition::tree_builder::{TreeBuilder, wanted_buckets};
 use crate::job::plan::budget::read_buffer_memory;
 use crate::job::plan::job_plan::{Plan, SkippedInput};
+use crate::job::plan::text_inputs::{allowed_malformed, stop_at, too_many_malformed};
 use crate::job::progress::stage::Stage;
-use crate::{Error, Result, interrupt};
+use crate::{Result, interrupt};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -69,10 +69,6 @@ fn judge(plan: &Plan, by_input: ByInput) -> JudgedInputs {
     judged
 }
 
-fn allowed_malformed(fraction: f64, records: u64) -> u64 {
-    (fraction * records as f64) as u64
-}
-
 /// What each input held, in the order of the inputs. Inputs without chunks are not listed.
 #[derive(Default)]
 struct ByInput(Vec<(usize, PointSummary)>);
@@ -116,21 +112,4 @@ fn decode_all(plan: &Plan, grid: &Grid, buckets: &Buckets, stage: &Stage) -> Res
     };
     // The reduction keeps the order of the chunks.
     chunks.par_iter().with_max_len(1).map(decode).try_reduce(ByInput::default, |a, b| Ok(a.append(b)))
-}
-
-fn stop_at(source: &Source, counts: &PointCounts, malformed: u64, records: u64) -> Error {
-    let what = too_many_malformed(counts, malformed, records);
-    Error::input(
-        &source.path,
-        format!(
-            "{what}. Repair the file, leave it out (on_bad_file = \"skip\"), or raise max_malformed_fraction to read the rest"
-        ),
-    )
-}
-
-fn too_many_malformed(counts: &PointCounts, malformed: u64, records: u64) -> String {
-    let examples = counts.examples.join("; ");
-    format!(
-        "{malformed} of {records} records are malformed, more than [input] max_malformed_fraction allows: {examples}"
-    )
 }

@@ -83,8 +83,12 @@ impl Extent {
 
 /// Returns the box of a source by its header, or by its points if the first of them show that the header is wrong.
 fn header_box(source: &Source, classes: &[bool; 256]) -> Result<Option<SourceBox>> {
+    // Every row of a text has been looked at.
+    if source.format == FileFormat::Text {
+        return Ok(source.wanted_box());
+    }
     let header = [source.min, source.max];
-    if source.format == FileFormat::Text || source.chunks() == 0 {
+    if source.chunks() == 0 {
         return Ok((source.records > 0).then_some(header));
     }
     // The measurement is coarse: allow for two of its steps.
@@ -102,6 +106,9 @@ const MEASURE: i64 = 16;
 
 /// Returns the box of the points of `chunks` that have one of `classes`, to within [`MEASURE`] raw steps; `None` without a point.
 fn measure(source: &Source, classes: &[bool; 256], chunks: Range<usize>) -> Result<Option<SourceBox>> {
+    if source.format == FileFormat::Text {
+        return Ok(source.wanted_box());
+    }
     let map = |axis: &Axis| AxisMap::new(axis.offset, axis.scale, axis.offset, axis.scale.checked_mul(MEASURE.into())?);
     let [Some(x), Some(y), Some(z)] = source.axes.each_ref().map(map) else {
         return Ok(Some([source.min, source.max]));

@@ -1,7 +1,7 @@
 //! The input files: which ones the options name, and what their headers say.
 
 use crate::input::options::{InputOptions, OnBadFile};
-use crate::input::{Source, open};
+use crate::input::{RowChoice, Source, open_chosen};
 use crate::job::plan::job_plan::SkippedInput;
 use crate::{Error, Result};
 use rayon::prelude::*;
@@ -47,13 +47,13 @@ fn nothing_at(pattern: &str) -> String {
     }
 }
 
-/// Opens all inputs. Where bad files are to be left out, returns them apart.
+/// Opens all inputs, for the rows of `choice` in texts. Where bad files are to be left out, returns them apart.
 ///
 /// # Errors
 /// [`Error::Input`] if a file is bad and must not be left out, [`Error::Io`] if one cannot be read.
-pub fn open_all(options: &InputOptions) -> Result<(Vec<Source>, Vec<SkippedInput>)> {
+pub fn open_all(options: &InputOptions, choice: &RowChoice) -> Result<(Vec<Source>, Vec<SkippedInput>)> {
     let paths = input_paths(options)?;
-    let opened: Vec<Result<Source>> = paths.par_iter().map(|path| open(path, &options.csv)).collect();
+    let opened: Vec<Result<Source>> = paths.par_iter().map(|path| open_chosen(path, &options.csv, choice)).collect();
     let (mut sources, mut skipped) = (Vec::with_capacity(opened.len()), Vec::new());
     for source in opened {
         match source {

@@ -17,22 +17,79 @@ pub struct LatticeCoarsening {
     pub vertical: u32,
 }
 
-/// Returns the lattice for `sources` within `extent`. `metres` is the length of the unit of x and y, `metres_z` of that of z;
-/// `wanted` is the step that the user sets. A warning says what had to be rounded.
+/// What a lattice is to be like.
+pub(crate) struct LatticeWish {
+    /// The length of the unit of x and y, and of that of z.
+    pub(crate) metres: [f64; 2],
+    /// The step in x and y, and the step in z, that the user sets.
+    pub(crate) steps: [Option<Decimal>; 2],
+    /// How much coarser than the inputs ask for.
+    pub(crate) coarsening: LatticeCoarsening,
+}
+
+/// Returns the lattice for `sources` within `extent`. A warning says what had to be rounded.
 ///
 /// # Errors
-/// [`Error::Config`] if the wanted step does not fit, or no step does.
+/// [`Error::Config`] if a wanted step does not fit, or no step does.
 pub(crate) fn choose_lattice(
     sources: &[Source],
     extent: &Extent,
-    [metres, metres_z]: [f64; 2],
-    wanted: Option<Decimal>,
-    coarsening: LatticeCoarsening,
+    wish: &LatticeWish,
     warnings: &mut Warnings,
 ) -> Result<Lattice> {
-    let resolution = horizontal_step(sources, extent, metres, wanted, coarsening.horizontal, warnings)?;
-    let resolution_z = vertical_step(sources, extent, metres_z, coarsening.vertical, warnings)?;
-    place(sources, extent, resolution, resolution_z)
+    let horizontal = horizontal_step(sources, extent, wish)?;
+    let vertical = vertical_step(sources, extent, wish)?;
+    if horizontal.step != horizontal.finest {
+        let (step, finest) = (horizontal.step, horizontal.finest);
+        let size = extent.size(0).max(extent.size(1));
+        warnings.push(format!(
+            "x and y are rounded to {step}: glTF's single precision cannot hold every triangle that an area of {size:.0} units may \
+             have in steps of {finest}"
+        ));
+    }
+    if vertical.step != vertical.finest {
+        let (step, finest, size) = (vertical.step, vertical.finest, extent.size(2));
+        warnings.push(format!(
+            "heights are rounded to {step}: glTF's single precision cannot hold {size:.0} units in steps of {finest}"
+        ));
+    }
+    place(sources, extent, horizontal.step, vertical.step)
+}
+
+/// A step that has been chosen.
+struct ChosenStep {
+    step: Decimal,
+    /// The step without anything that makes it coarser.
+    finest: Decimal,
+    /// Whether a triangle across the whole extent can be written in steps of `finest`.
+    lossless: bool,
+}
+
+/// How well a lattice can hold an extent.
+pub(crate) struct Fineness {
+    /// In x and y, and in z; `None` if no lattice can.
+    steps: [Option<ChosenStep>; 2],
+}
+
+/// Returns how well a lattice can hold `extent`.
+pub(crate) fn fineness(sources: &[Source], extent: &Extent, wish: &LatticeWish) -> Fineness {
+    Fineness { steps: [horizontal_step(sources, extent, wish).ok(), vertical_step(sources, extent, wish).ok()] }
+}
+
+impl Fineness {
+    /// Returns whether nothing need be rounded.
+    pub(crate) fn is_lossless(&self) -> bool {
+        self.steps.iter().all(|step| step.as_ref().is_some_and(|step| step.lossless))
+    }
+
+    /// Returns whether the lattice is finer than that of `other`, or holds what that one does not.
+    pub(crate) fn is_better_than(&self, other: &Fineness) -> bool {
+        let is_better = |(own, others): (&Option<ChosenStep>, &Option<ChosenStep>)| match (own, others) {
+            (Some(own), Some(others)) => own.step < others.step || own.lossless && !others.lossless,
+            (own, others) => own.is_some() && others.is_none(),
+        };
+        self.steps.iter().zip(&other.steps).any(is_better)
+    }
 }
 
 /// Places a lattice with these steps: its offset is near the middle of the extent in x and y and at its foot in z, and the inputs'
@@ -67,39 +124,31 @@ const FINE_ENOUGH: f64 = 0.0099;
 /// Returns the step in x and y: the one that the user sets, or else the finest of the inputs with which a triangle across the whole
 /// extent can be written. A step of a centimetre or more is not coarsened for that reason; there the mesh itself decides
 /// ([`Error::TooFine`]).
-fn horizontal_step(
-    sources: &[Source],
-    extent: &Extent,
-    metres: f64,
-    wanted: Option<Decimal>,
-    coarsening: u32,
-    warnings: &mut Warnings,
-) -> Result<Decimal> {
+fn horizontal_step(sources: &[Source], extent: &Extent, wish: &LatticeWish) -> Result<ChosenStep> {
+    let metres = wish.metres[0];
     let size = extent.size(0).max(extent.size(1));
     let farthest = extent.farthest(0).max(extent.farthest(1));
     let fits =
         |step: Decimal| size < 2.0 * REACH as f64 * 0.99 * to_float(step) && is_told_apart(farthest, to_float(step));
     let is_writable = |step: Decimal| LIKELY_SPAN * size * metres < Frame::longest_at(to_float(step) * metres);
-    if let Some(step) = wanted {
-        return if fits(step) { Ok(step) } else { Err(too_fine(step, size, farthest)) };
+    if let Some(step) = wish.steps[0] {
+        return if fits(step) {
+            Ok(ChosenStep { step, finest: step, lossless: true })
+        } else {
+            Err(too_fine(step, size, farthest))
+        };
     }
     let finest = sources.iter().flat_map(|s| [s.axes[0].scale, s.axes[1].scale]).min().unwrap_or(Decimal::ONE);
     let scales = common_step(sources, |source, axis| source.axes[axis].scale);
     let grids = common_step(sources, |source, axis| source.grid[axis]);
     let lossless = [scales, grids].into_iter().flatten().find(|&step| fits(step) && is_writable(step));
-    let first = lossless.unwrap_or(finest);
-    let mut step = first;
+    let finest = lossless.unwrap_or(finest);
+    let mut step = finest;
     while !fits(step) || (!is_writable(step) && to_float(step) * metres < FINE_ENOUGH) {
         step = times_power_of_ten(step, 1)?;
     }
-    step = times_power_of_ten(step, coarsening)?;
-    if step != first {
-        warnings.push(format!(
-            "x and y are rounded to {step}: glTF's single precision cannot hold every triangle that an area of {size:.0} units may \
-             have in steps of {first}"
-        ));
-    }
-    Ok(step)
+    step = times_power_of_ten(step, wish.coarsening.horizontal)?;
+    Ok(ChosenStep { step, finest, lossless: lossless.is_some() })
 }
 
 fn too_fine(step: Decimal, size: f64, farthest: f64) -> Error {
@@ -109,31 +158,33 @@ fn too_fine(step: Decimal, size: f64, farthest: f64) -> Error {
     ))
 }
 
-/// Returns the step in z: the finest of the inputs with which all heights between the lowest and the highest can be written.
-fn vertical_step(
-    sources: &[Source],
-    extent: &Extent,
-    metres: f64,
-    coarsening: u32,
-    warnings: &mut Warnings,
-) -> Result<Decimal> {
-    let finest = sources.iter().map(|s| s.axes[2].scale).min().unwrap_or(Decimal::ONE);
-    let mut step = finest;
+/// Returns the step in z: the one that the user sets, or else the finest of the inputs with which all heights between the lowest and
+/// the highest can be written.
+fn vertical_step(sources: &[Source], extent: &Extent, wish: &LatticeWish) -> Result<ChosenStep> {
+    let metres = wish.metres[1];
     let fits = |step: Decimal| {
         extent.size(2) * metres < Frame::longest_at(to_float(step) * metres)
             && is_told_apart(extent.farthest(2), to_float(step))
     };
+    if let Some(step) = wish.steps[1] {
+        return if fits(step) {
+            Ok(ChosenStep { step, finest: step, lossless: true })
+        } else {
+            Err(Error::Config(format!(
+                "[input] resolution_z = {step} is too fine for heights from {} to {}: glTF's single precision holds at most 2^25 steps \
+                 of half of it",
+                extent.min[2], extent.max[2]
+            )))
+        };
+    }
+    let finest = sources.iter().map(|s| s.axes[2].scale).min().unwrap_or(Decimal::ONE);
+    let mut step = finest;
     while !fits(step) {
         step = times_power_of_ten(step, 1)?;
     }
-    step = times_power_of_ten(step, coarsening)?;
-    if step != finest {
-        let size = extent.size(2);
-        warnings.push(format!(
-            "heights are rounded to {step}: glTF's single precision cannot hold {size:.0} units in steps of {finest}"
-        ));
-    }
-    Ok(step)
+    let lossless = step == finest;
+    step = times_power_of_ten(step, wish.coarsening.vertical)?;
+    Ok(ChosenStep { step, finest, lossless })
 }
 
 /// Returns the largest step on which the points of all inputs lie, where `step_of` gives the step of one input on one axis: the

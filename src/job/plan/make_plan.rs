@@ -9,9 +9,9 @@ use crate::job::plan::coordinates::{common_crs, horizontal_unit};
 use crate::job::plan::extent::Extent;
 use crate::job::plan::inputs::{check_missing_records, open_all, unreadable_names};
 use crate::job::plan::job_plan::{Plan, PlannedInput, SkippedInput};
-use crate::job::plan::lattice_choice::{LatticeCoarsening, choose_lattice};
+use crate::job::plan::lattice_choice::{LatticeCoarsening, LatticeWish, choose_lattice, fineness};
+use crate::job::plan::text_inputs::{check_malformed_rows, refuse_degrees, row_choice, wants_colors};
 use crate::output::frame::Frame;
-use crate::output::options::ColorChoice;
 use crate::{Error, Result, Warnings};
 use rust_decimal::prelude::ToPrimitive;
 
@@ -27,7 +27,7 @@ const MAX_WARNINGS: usize = 50;
 /// [`Error::Config`] if there are no inputs or they do not fit together; [`Error::Input`] if one is bad and must not be left
 /// out; [`Error::NoTerrain`] if none is left; [`Error::Io`] if one cannot be read.
 pub fn make_plan(options: &JobOptions, coarsening: LatticeCoarsening) -> Result<Plan> {
-    let (sources, skipped) = open_all(&options.input)?;
+    let (sources, skipped) = open_all(&options.input, &row_choice(options))?;
     plan_sources(sources, skipped, options, coarsening)
 }
 
@@ -60,7 +60,7 @@ fn plan_sources(
                 first.why
             )));
         }
-        match try_plan(&sources, options, coarsening) {
+        match try_plan(&mut sources, options, coarsening) {
             Err(Error::Input { path, what })
                 if options.input.on_bad_file == OnBadFile::Skip && sources.iter().any(|s| s.path == path) =>
             {
@@ -79,7 +79,7 @@ fn plan_sources(
 
 /// Returns a plan that does not hold the inputs yet, and the rules for the points of each.
 fn try_plan(
-    sources: &[Source],
+    sources: &mut [Source],
     options: &JobOptions,
     coarsening: LatticeCoarsening,
 ) -> Result<(Plan, Vec<PointRules>)> {
@@ -92,12 +92,17 @@ fn try_plan(
         return Err(Error::Config(format!("{records} records are more than one job can hold (2^40)")));
     }
     check_missing_records(sources, &options.input)?;
+    refuse_degrees(sources, options.input.unit)?;
     let crs = common_crs(sources, &options.input.crs, &mut warnings)?;
     let (unit, metres) = horizontal_unit(options.input.unit, &crs, &mut warnings)?;
-    let extent = Extent::of(sources, &options.input, metres)?;
     let metres_z = crs.vertical.unwrap_or(metres);
-    let wanted = options.input.resolution.step();
-    let lattice = choose_lattice(sources, &extent, [metres, metres_z], wanted, coarsening, &mut warnings)?;
+    let wish = LatticeWish {
+        metres: [metres, metres_z],
+        steps: [options.input.resolution.step(), options.input.resolution_z.step()],
+        coarsening,
+    };
+    let extent = extent_without_outliers(sources, options, &wish)?;
+    let lattice = choose_lattice(sources, &extent, &wish, &mut warnings)?;
     if metres_z != metres {
         warnings.push(format!(
             "heights are in another unit than x and y ({metres_z} m and {metres} m): glTF has both in metres, see metres_per_unit_z"
@@ -106,6 +111,7 @@ fn try_plan(
     let frame = Frame::new(&lattice, metres, metres_z, crs.wkt.clone())?;
     let clip = options.input.bounds.map(|b| lattice_clip(&lattice, b.0));
     let rules = point_rules(sources, options, &lattice, clip)?;
+    check_malformed_rows(sources, &rules, options)?;
     let plan = Plan {
         options: options.clone(),
         inputs: Vec::new(),
@@ -120,6 +126,30 @@ fn try_plan(
         warnings,
     };
     Ok((plan, rules))
+}
+
+/// Returns the box of the sources. If no lattice holds all of it at the precision of the inputs, and some rows of texts lie so far
+/// from all others that they are mistakes, these are left out, provided that this helps.
+fn extent_without_outliers(sources: &mut [Source], options: &JobOptions, wish: &LatticeWish) -> Result<Extent> {
+    sources.iter_mut().for_each(Source::keep_outliers);
+    let all = Extent::of(sources, &options.input, wish.metres[0])?;
+    let before = fineness(sources, &all, wish);
+    if before.is_lossless() {
+        return Ok(all);
+    }
+    let choice = row_choice(options);
+    let mut told = false;
+    for source in sources.iter_mut() {
+        told |= source.tell_outliers(&choice)?;
+    }
+    if told {
+        let rest = Extent::of(sources, &options.input, wish.metres[0])?;
+        if fineness(sources, &rest, wish).is_better_than(&before) {
+            return Ok(rest);
+        }
+        sources.iter_mut().for_each(Source::keep_outliers);
+    }
+    Ok(all)
 }
 
 /// Returns the lattice box of the points within `bounds`, borders included. It is inside out if no lattice point is.
@@ -156,7 +186,7 @@ fn point_rules(
     lattice: &Lattice,
     bounds: Option<Bounds<2>>,
 ) -> Result<Vec<PointRules>> {
-    let rgb = matches!(options.output.color, ColorChoice::Auto | ColorChoice::Rgb);
+    let rgb = wants_colors(options);
     let classes = options.input.kept_classes();
     let mut first_order = 0;
     let mut rules = Vec::with_capacity(sources.len());

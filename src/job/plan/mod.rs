@@ -9,3 +9,4 @@ pub mod inputs;
 pub mod job_plan;
 pub mod lattice_choice;
 pub mod make_plan;
+pub(crate) mod text_inputs;

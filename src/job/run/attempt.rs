@@ -69,7 +69,8 @@ pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, walk: Wal
             true => (&mut coarsening.vertical, "z"),
             false => (&mut coarsening.horizontal, "x and y"),
         };
-        let may_coarsen = vertical || options.input.resolution.step().is_none();
+        let set = if vertical { options.input.resolution_z } else { options.input.resolution };
+        let may_coarsen = set.step().is_none();
         if !may_coarsen || *power >= MAX_COARSENINGS {
             return Err(Error::TooFine { vertical, what });
         }

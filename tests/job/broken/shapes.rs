@@ -41,12 +41,8 @@ pub(super) fn cases() -> Vec<Case> {
             square.iter().map(|p| [p[0] + 1e17, p[1], p[2]]).collect(),
             Refused(3, "make no triangle in steps of 100"),
         ),
-        text("one point far away", and_square(vec![[1e15, 0.0, 0.0]]), Refused(3, "x = 1000000000000000 lies outside")),
-        text(
-            "one point high above",
-            and_square(vec![[5.0, 5.0, 1e15]]),
-            Refused(3, "z = 1000000000000000 lies outside"),
-        ),
+        text("one point far away", and_square(vec![[1e15, 0.0, 0.0]]), Refused(3, "far from all other rows")),
+        text("one point high above", and_square(vec![[5.0, 5.0, 1e15]]), Refused(3, "far from all other rows")),
         text("heights that differ by much", and_square(vec![[5.0, 5.0, 1e6]]), Read(5, 0, "")),
     ]
 }

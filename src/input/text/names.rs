@@ -1,0 +1,238 @@
+//! The names that people give to columns.
+
+use crate::input::text::role::ColumnRole;
+
+/// The names of one role, the clearest first: if several columns have one, that with the clearest name is taken.
+type Names = (&'static [&'static str], ColumnRole);
+
+/// Names without case, blanks, points, hyphens and underscores, and without a unit in brackets.
+const NAMES: [Names; 7] = [
+    (
+        &[
+            "x",
+            "pointx",
+            "xcoord",
+            "xcoordinate",
+            "coordx",
+            "coordinatex",
+            "posx",
+            "xm",
+            "easting",
+            "eastings",
+            "east",
+            "rechtswert",
+            "ostwert",
+            "utmx",
+            "utme",
+            "rechts",
+            "rw",
+            "e",
+            "lon",
+            "longitude",
+            "long",
+            "lng",
+        ],
+        ColumnRole::Coordinate(0),
+    ),
+    (
+        &[
+            "y",
+            "pointy",
+            "ycoord",
+            "ycoordinate",
+            "coordy",
+            "coordinatey",
+            "posy",
+            "ym",
+            "northing",
+            "northings",
+            "north",
+            "hochwert",
+            "nordwert",
+            "utmy",
+            "utmn",
+            "hoch",
+            "hw",
+            "n",
+            "lat",
+            "latitude",
+        ],
+        ColumnRole::Coordinate(1),
+    ),
+    (
+        &[
+            "z",
+            "pointz",
+            "zcoord",
+            "zcoordinate",
+            "coordz",
+            "coordinatez",
+            "posz",
+            "zm",
+            "elevation",
+            "elev",
+            "height",
+            "altitude",
+            "alt",
+            "hoehe",
+            "höhe",
+            "h",
+        ],
+        ColumnRole::Coordinate(2),
+    ),
+    (&["r", "red"], ColumnRole::Color(0)),
+    (&["g", "green"], ColumnRole::Color(1)),
+    (&["b", "blue"], ColumnRole::Color(2)),
+    (&["class", "classification"], ColumnRole::Class),
+];
+
+/// The names of longitude and latitude.
+const DEGREES: [&[&str]; 2] = [&["lon", "longitude", "long", "lng"], &["lat", "latitude"]];
+
+/// What is wrong with the names of columns.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum NamesError {
+    #[error("names {count} columns {name}")]
+    Repeated { count: usize, name: &'static str },
+    #[error("names no column {0}")]
+    Missing(&'static str),
+}
+
+/// What the names of columns say.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct NamedColumns {
+    /// What each column holds, up to the last column that is used.
+    pub(crate) roles: Vec<ColumnRole>,
+    /// The number of names.
+    pub(crate) count: usize,
+    /// Whether x and y are named as longitude and latitude, or as degrees.
+    pub(crate) degrees: bool,
+    /// Whether x, y or z is named as feet.
+    pub(crate) feet: bool,
+}
+
+/// A column's name.
+struct Name {
+    /// As [`NAMES`] has it.
+    plain: String,
+    /// What is in brackets after it.
+    unit: String,
+}
+
+impl Name {
+    fn read(text: &[u8]) -> Name {
+        let text = String::from_utf8_lossy(text).trim().to_lowercase();
+        let (name, unit) = match text.find(['[', '(', '{']) {
+            Some(at) if at > 0 && text.ends_with([']', ')', '}']) => text.split_at(at),
+            _ => (text.as_str(), ""),
+        };
+        let plain = name.chars().filter(|c| !matches!(c, ' ' | '\t' | '_' | '-' | '.')).collect();
+        Name { plain, unit: unit.trim_matches(['[', ']', '(', ')', '{', '}', ' ']).to_string() }
+    }
+
+    /// Returns what the column holds, and how unclear the name is.
+    fn role(&self) -> Option<(usize, ColumnRole)> {
+        let rank = |names: &[&str]| names.iter().position(|name| *name == self.plain);
+        NAMES.iter().find_map(|(names, role)| Some((rank(names)?, *role)))
+    }
+}
+
+/// Returns what columns with these names hold.
+pub(crate) fn named_columns<'a>(
+    names: impl Iterator<Item = &'a [u8]>,
+) -> std::result::Result<NamedColumns, NamesError> {
+    let mut names: Vec<Name> = names.map(Name::read).collect();
+    while names.last().is_some_and(|name| name.plain.is_empty()) {
+        names.pop();
+    }
+    let mut roles = vec![ColumnRole::Skipped; names.len()];
+    let mut places = [None; 3];
+    for (known, role) in NAMES {
+        let best = names.iter().filter_map(Name::role).filter(|found| found.1 == role).map(|found| found.0).min();
+        let same = |name: &Name| best.is_some() && name.role() == best.map(|rank| (rank, role));
+        match (names.iter().filter(|name| same(name)).count(), role) {
+            (0, ColumnRole::Coordinate(_)) => return Err(NamesError::Missing(known[0])),
+            (0, _) => continue,
+            (1, _) => {}
+            (count, _) => return Err(NamesError::Repeated { count, name: known[0] }),
+        }
+        let place = names.iter().position(same);
+        if let (ColumnRole::Coordinate(axis), Some(place)) = (role, place) {
+            places[axis] = Some(&names[place]);
+        }
+        place.into_iter().for_each(|place| roles[place] = role);
+    }
+    drop_partial_color(&mut roles);
+    truncate(&mut roles);
+    let is = |axis: usize, test: &dyn Fn(&Name) -> bool| places[axis].is_some_and(test);
+    let degree = |axis: usize| {
+        is(axis, &|name| {
+            DEGREES[axis].contains(&name.plain.as_str()) || matches!(name.unit.as_str(), "deg" | "°" | "degrees")
+        })
+    };
+    let foot = |name: &Name| matches!(name.unit.as_str(), "ft" | "feet" | "foot" | "us-ft" | "usft" | "ftus" | "us ft");
+    Ok(NamedColumns {
+        roles,
+        count: names.len(),
+        degrees: degree(0) && degree(1),
+        feet: (0..3).any(|axis| is(axis, &foot)),
+    })
+}
+
+/// Removes the columns after the last one that is used.
+pub(crate) fn truncate(roles: &mut Vec<ColumnRole>) {
+    let used = roles.iter().rposition(|role| *role != ColumnRole::Skipped).map_or(0, |last| last + 1);
+    roles.truncate(used);
+}
+
+/// Skips the columns of colours unless red, green and blue are all there.
+fn drop_partial_color(roles: &mut [ColumnRole]) {
+    if !(0..3).all(|channel| roles.contains(&ColumnRole::Color(channel))) {
+        for role in roles.iter_mut().filter(|role| matches!(role, ColumnRole::Color(_))) {
+            *role = ColumnRole::Skipped;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn coordinates(line: &str) -> Option<[usize; 3]> {
+        let named = named_columns(line.split(';').map(str::as_bytes)).ok()?;
+        let place = |axis| named.roles.iter().position(|role| *role == ColumnRole::Coordinate(axis));
+        Some([place(0)?, place(1)?, place(2)?])
+    }
+
+    #[test]
+    fn names_of_many_kinds_are_known() {
+        for line in [
+            "POINT_X;POINT_Y;POINT_Z",
+            "X [m];Y [m];Z [m]",
+            "x(m);y(m);z(m)",
+            "Rechtswert;Hochwert;Höhe",
+            "East;North;Height",
+            "X_Coord;Y_Coord;Elev.",
+            "E;N;H",
+            "Easting (m);Northing (m);Elevation (m)",
+        ] {
+            assert_eq!(coordinates(line), Some([0, 1, 2]), "{line}");
+        }
+    }
+
+    #[test]
+    fn of_several_names_the_clearest_is_taken() {
+        assert_eq!(coordinates("lon;lat;easting;northing;height;z"), Some([2, 3, 5]));
+        assert_eq!(coordinates("n;h;x;y;z"), Some([2, 3, 4]));
+        assert_eq!(coordinates("x;x;y;z"), None);
+    }
+
+    #[test]
+    fn degrees_and_feet_are_seen() {
+        let named = |line: &str| named_columns(line.split(';').map(str::as_bytes)).unwrap();
+        assert!(named("longitude;latitude;height").degrees && named("x [deg];y [°];z").degrees);
+        assert!(!named("lon;lat;x;y;z").degrees && !named("x;lat;z").degrees);
+        assert!(named("x [ft];y [ft];z [ft]").feet && !named("x [m];y [m];z [m]").feet);
+        assert_eq!(named("x;y;z;;").count, 3);
+    }
+}

@@ -1,0 +1,80 @@
+//! Rows that lie so far from all others that they are mistakes, such as 0, 0, 0 among coordinates of a national grid.
+
+use std::ops::Range;
+
+use crate::Result;
+use crate::input::file::random_access::RandomAccessFile;
+use crate::input::text::columns::Columns;
+use crate::input::text::lines::{TextLine, for_each_line};
+use crate::input::text::row::RowReader;
+use crate::input::text::row_box::RowBox;
+use crate::input::text::survey::Wanted;
+
+/// The most rows of a chunk that are looked at.
+const ROWS_OF_A_CHUNK: u64 = 4096;
+
+/// The sizes of the middle of the rows by which an outlier at least lies outside it.
+const FAR: f64 = 10.0;
+
+/// The fraction of the rows beyond either end of their middle.
+const TAIL: f64 = 0.05;
+
+/// Of fewer rows nobody can say where the middle is.
+const LEAST_ROWS: usize = 5;
+
+/// One row in so many may be an outlier. If there are more, they are a part of the terrain.
+const RARE: u64 = 50;
+
+/// Returns whether so few of `rows` are outliers that they are mistakes.
+pub(crate) fn are_rare(outliers: u64, rows: u64) -> bool {
+    outliers > 0 && outliers <= (rows / RARE).max(1)
+}
+
+/// Returns the box outside which a row is an outlier, by a sample of the wanted rows in these chunks, given as byte ranges; `None` if
+/// there are too few rows to tell.
+pub(crate) fn plausible_box(
+    file: &RandomAccessFile,
+    columns: &Columns,
+    first: u64,
+    chunks: &[Range<u64>],
+    wanted: Wanted,
+) -> Result<Option<RowBox>> {
+    let mut values: [Vec<f64>; 3] = Default::default();
+    for chunk in chunks {
+        let mut lines = 0;
+        for_each_line(file, first, chunk.clone(), |_, _| {
+            lines += 1;
+            Ok(())
+        })?;
+        let stride = lines / ROWS_OF_A_CHUNK + 1;
+        let mut reader = RowReader::new(columns, columns.has_surplus);
+        for_each_line(file, first, chunk.clone(), |index, line| {
+            if let TextLine::Whole(line) = line
+                && index % stride == 0
+                && !columns.skips(line)
+                && reader.read(line).is_ok()
+                && wanted.has(&reader)
+            {
+                (0..3).for_each(|axis| values[axis].push(reader.numbers[axis].value()));
+            }
+            Ok(())
+        })?;
+    }
+    let cut = ((values[0].len() as f64 * TAIL) as usize).max(1);
+    if values[0].len() < LEAST_ROWS {
+        return Ok(None);
+    }
+    let mut plausible = RowBox::empty();
+    for (axis, values) in values.iter_mut().enumerate() {
+        values.sort_unstable_by(f64::total_cmp);
+        let (low, high) = (values[cut], values[values.len() - 1 - cut]);
+        plausible.min[axis] = low;
+        plausible.max[axis] = high;
+    }
+    // A strip or a plane is narrow on one axis, which says nothing about how far its rows may lie apart there.
+    let size = |axis: usize| plausible.max[axis] - plausible.min[axis];
+    let widest = size(0).max(size(1)).max(size(2));
+    let margin = FAR * widest;
+    Ok((margin > 0.0)
+        .then(|| RowBox { min: plausible.min.map(|low| low - margin), max: plausible.max.map(|high| high + margin) }))
+}

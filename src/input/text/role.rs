@@ -1,0 +1,16 @@
+//! What columns hold.
+
+use serde::{Deserialize, Serialize};
+
+/// What a column holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) enum ColumnRole {
+    /// x, y or z.
+    Coordinate(usize),
+    /// Red, green or blue.
+    Color(usize),
+    /// The classification.
+    Class,
+    /// Nothing of use.
+    Skipped,
+}

@@ -1,0 +1,35 @@
+//! Which rows of a text a job wants. The others have no say about the lattice.
+
+use crate::input::text::number::Number;
+
+/// Which rows of a text a job wants.
+#[derive(Clone, Debug)]
+pub struct RowChoice {
+    /// Only rows within this rectangle: least x and y, greatest x and y.
+    pub bounds: Option<[f64; 4]>,
+    /// Only rows of these classes.
+    pub classes: [bool; 256],
+    /// Whether colours are read if the text has them.
+    pub colors: bool,
+}
+
+impl RowChoice {
+    /// Returns the choice of all rows, with their colours.
+    pub fn all() -> RowChoice {
+        RowChoice { bounds: None, classes: [true; 256], colors: true }
+    }
+
+    /// Returns whether every row is wanted.
+    pub(crate) fn is_all(&self) -> bool {
+        self.bounds.is_none() && self.classes.iter().all(|&wanted| wanted)
+    }
+
+    /// Returns whether the row with these x, y, z and this class is wanted.
+    pub(crate) fn wants(&self, numbers: &[Number; 3], class: u8) -> bool {
+        let inside = |[x_min, y_min, x_max, y_max]: [f64; 4]| {
+            let (x, y) = (numbers[0].value(), numbers[1].value());
+            x >= x_min && x <= x_max && y >= y_min && y <= y_max
+        };
+        self.classes[class as usize] && self.bounds.is_none_or(inside)
+    }
+}
