@@ -14,7 +14,7 @@ use std::path::Path;
 use crate::random::Random;
 
 /// A change, or a place that the program came to.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) enum Change {
     Create { inode: u64, path: String },
     Write { inode: u64, at: usize, bytes: Vec<u8> },
@@ -213,12 +213,14 @@ impl Disk {
         }
         let mut random = Random(if let Loss::Some(seed) = loss { seed } else { 0 });
         let mut names = self.names.clone();
+        // A name may depend on many others, so that some disks keep most of them.
+        let kept_of_eight = [1, 4, 7][random.below(3) as usize];
         for (change, synced) in &name_changes {
             let mut stays = |_: &str| match loss {
                 _ if *synced => true,
                 Loss::Everything | Loss::Names => false,
                 Loss::Bytes => true,
-                Loss::Some(_) => random.below(2) == 0,
+                Loss::Some(_) => random.below(8) < kept_of_eight,
             };
             apply(change, &mut names, &mut stays);
         }

@@ -80,6 +80,18 @@ fn fail_again_and_again(rig: &Rig, wanted: usize) {
     }
 }
 
+/// Counts the moments at which a power failure leaves a report beside results that are not whole, if only those of the program's
+/// changes were made that `is_made` keeps.
+fn broken_promises(run: &TracedRun, whole: &[Files], is_made: impl Fn(&Change) -> bool) -> usize {
+    let changes: Vec<Change> = run.changes.iter().filter(|change| is_made(change)).cloned().collect();
+    let is_broken = |moment: usize, loss| {
+        let left = run.before.after(&changes[..moment], loss);
+        left.contains_key("out/report.json") && !whole.contains(&results(&left))
+    };
+    let moments = (0..=changes.len()).filter(|&at| at == changes.len() || changes[at].is_decisive());
+    moments.filter(|&at| (0..8).any(|seed| is_broken(at, Loss::Some(seed))) || is_broken(at, Loss::Bytes)).count()
+}
+
 /// A job with files of every kind.
 fn setup() -> Setup {
     Setup::tiles_of(2_500).output("max_edge = 4000").output("max_points_per_level_tile = 1500")
@@ -109,4 +121,22 @@ fn a_power_failure_leaves_the_results_of_the_earlier_job_or_those_of_this_one() 
     folder_of(&rig, &scattered::clusters(12_000));
     rig.expect(&setup());
     fail_again_and_again(&rig, 50);
+}
+
+/// Every sync is needed, and the model of the disk notices if it is left out.
+#[test]
+fn a_program_that_does_not_sync_breaks_its_promise() {
+    let mut rig = Rig::new(&scattered::gaussian(3_000), &setup()).committing_every(0);
+    rig.completes("the earlier job");
+    scattered::write(rig.folder.path(), "cloud.csv", &scattered::clusters(4_000));
+    rig.expect(&setup());
+    let run = traced(&rig, "without a power failure");
+    let whole = [results(&run.before.files()), results(&Disk::read(rig.folder.path(), "out").files())];
+    assert_eq!(broken_promises(&run, &whole, |_| true), 0);
+    assert!(broken_promises(&run, &whole, |change| !matches!(change, Change::Sync { .. })) > 0, "no file is synced");
+    assert!(broken_promises(&run, &whole, |change| !matches!(change, Change::SyncFolder { .. })) > 0, "no folder is");
+    for folder in ["out", "out/tiles", "out/levels", "out/cut"] {
+        let is_made = |change: &Change| !matches!(change, Change::SyncFolder { path } if path == folder);
+        assert!(broken_promises(&run, &whole, is_made) > 0, "{folder} is not synced");
+    }
 }

@@ -84,7 +84,7 @@ fn a_read_error_on_the_store_stops_the_job_and_the_next_run_ends_with_the_same_b
 fn a_read_error_on_the_journal_or_the_results_stops_the_job_and_the_next_run_ends_with_the_same_bytes() {
     let rig = rig();
     for name in ["read-journal", "read-result"] {
-        for count in [10, 30] {
+        for count in [6, 14] {
             rig.forget();
             assert!(rig.run_to("committed", count).was_killed());
             for visit in [1, 2, 5] {
