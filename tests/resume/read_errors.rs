@@ -80,6 +80,13 @@ fn a_read_error_on_the_store_stops_the_job_and_the_next_run_ends_with_the_same_b
     assert!(fail_at_each(&rig, "read-store", 23) >= 10);
 }
 
+/// Levels and terrain.glb are made from the tiles.
+#[test]
+fn a_read_error_on_the_tiles_stops_the_job_and_the_next_run_ends_with_the_same_bytes() {
+    let rig = rig();
+    assert!(fail_at_each(&rig, "read-result", 4) >= 3);
+}
+
 #[test]
 fn a_read_error_on_the_journal_or_the_results_stops_the_job_and_the_next_run_ends_with_the_same_bytes() {
     let rig = rig();
