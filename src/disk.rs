@@ -85,7 +85,11 @@ pub(crate) fn create_folder(path: &Path) -> Result<()> {
     match traced(|| fs::create_dir(path), |()| (format!("folder {}", path.display()), &[])) {
         // Another thread was faster.
         Err(e) if e.kind() == ErrorKind::AlreadyExists && path.is_dir() => Ok(()),
-        outcome => outcome.and_then(|()| sync_folder(above)),
+        outcome => outcome.and_then(|()| match sync_folder(above) {
+            // Somebody else's folder: one may create in it, but not open it.
+            Err(e) if e.kind() == ErrorKind::PermissionDenied => Ok(()),
+            synced => synced,
+        }),
     }
 }
 
