@@ -33,7 +33,7 @@ pub enum Error {
     #[error("interrupted")]
     Interrupted,
     /// A job stopped, and its finished steps are kept (the exit code of `why`).
-    #[error("{why}\nfinished steps are kept in {} ({steps}): run the same command again, without --restart, to go on", job.display())]
+    #[error("{why}\nfinished steps are kept in {} ({steps}): {}, without --restart, to go on", job.display(), again(why))]
     Resumable {
         /// Why the job stopped.
         why: Box<Error>,
@@ -73,6 +73,13 @@ pub enum Error {
 
 fn process(holder: &str) -> String {
     if holder.is_empty() { "another process".into() } else { format!("process {holder}") }
+}
+
+fn again(why: &Error) -> &'static str {
+    match why {
+        Error::Config(_) => "correct the configuration and run the same command again",
+        _ => "run the same command again",
+    }
 }
 
 /// Returns what a user can do about an error of the operating system, or nothing.

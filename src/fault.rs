@@ -1,7 +1,10 @@
-//! Faults on purpose: tests kill the process at places where a kill could do harm. CONTRIBUTING.md says how.
+//! Faults on purpose: tests kill the process at places where a kill could do harm, let reads fail, and have every change of a file
+//! written down. CONTRIBUTING.md says how.
 //!
 //! Only builds with the feature `fault-injection` look for them. In all other builds these functions do nothing and read no
 //! environment variable.
+
+use std::io;
 
 /// Ends the process like `kill -9`: nothing is flushed, nothing is cleaned up.
 pub(crate) fn die() -> ! {
@@ -12,46 +15,90 @@ pub(crate) fn die() -> ! {
 
 /// Marks a place where a test may kill the process.
 pub(crate) fn point(name: &str) {
+    mark(name);
     if is_due(name) {
         die();
     }
 }
 
-pub(crate) use injection::{commit_interval, is_due};
+/// Marks a place that reads from a disk, which a test may let fail as a broken disk does.
+pub(crate) fn read(name: &str) -> io::Result<()> {
+    if is_due(name) { Err(io::Error::from_raw_os_error(EIO)) } else { Ok(()) }
+}
+
+/// "Input/output error".
+const EIO: i32 = 5;
+
+pub(crate) use injection::{commit_interval, is_due, mark, traced};
 
 #[cfg(feature = "fault-injection")]
 mod injection {
-    use std::sync::LazyLock;
+    use std::fs::File;
+    use std::io::{self, Write};
     use std::sync::atomic::{AtomicU64, Ordering};
+    use std::sync::{LazyLock, Mutex, PoisonError};
     use std::time::Duration;
 
-    /// `GDT_FAULT=name:n` kills the process when it comes to the place of that name for the n-th time.
+    /// `GDT_FAULT=name:n` makes the process fail when it comes to the place of that name for the n-th time; `name:n+` also at every
+    /// later time.
     struct RequestedFault {
         name: String,
-        countdown: AtomicU64,
+        count: u64,
+        and_later: bool,
+        visits: AtomicU64,
     }
 
     static REQUESTED: LazyLock<Option<RequestedFault>> = LazyLock::new(|| {
         let text = std::env::var("GDT_FAULT").ok()?;
         let (name, count) = text.split_once(':')?;
-        Some(RequestedFault { name: name.into(), countdown: AtomicU64::new(count.parse().ok()?) })
+        let and_later = count.ends_with('+');
+        let count = count.trim_end_matches('+').parse().ok()?;
+        Some(RequestedFault { name: name.into(), count, and_later, visits: AtomicU64::new(0) })
     });
 
-    /// Counts a visit to the place called `name` and returns whether the process must die there this time.
+    /// Counts a visit to the place called `name` and returns whether the process must fail there this time.
     pub(crate) fn is_due(name: &str) -> bool {
-        REQUESTED
-            .as_ref()
-            .is_some_and(|fault| fault.name == name && fault.countdown.fetch_sub(1, Ordering::Relaxed) == 1)
+        REQUESTED.as_ref().is_some_and(|fault| {
+            fault.name == name && {
+                let visit = fault.visits.fetch_add(1, Ordering::Relaxed) + 1;
+                visit == fault.count || fault.and_later && visit > fault.count
+            }
+        })
     }
 
     /// Returns the least time between two commits of the journal if a test sets it (`GDT_COMMIT_MS`).
     pub(crate) fn commit_interval() -> Option<Duration> {
         std::env::var("GDT_COMMIT_MS").ok()?.parse().ok().map(Duration::from_millis)
     }
+
+    /// The file in which all changes of files are written down (`GDT_TRACE`).
+    static TRACE: LazyLock<Option<Mutex<File>>> =
+        LazyLock::new(|| std::env::var_os("GDT_TRACE").and_then(|path| File::create(path).ok()).map(Mutex::new));
+
+    /// Does a change and writes it down: a line, and the bytes that it announces. One change at a time, so that the order is the
+    /// true one.
+    pub(crate) fn traced<'a, T>(
+        change: impl FnOnce() -> io::Result<T>,
+        describe: impl FnOnce(&T) -> (String, &'a [u8]),
+    ) -> io::Result<T> {
+        let Some(trace) = TRACE.as_ref() else { return change() };
+        let mut trace = trace.lock().unwrap_or_else(PoisonError::into_inner);
+        let done = change()?;
+        let (line, bytes) = describe(&done);
+        trace.write_all(&[line.as_bytes(), b"\n", bytes].concat())?;
+        Ok(done)
+    }
+
+    /// Writes down that the process came to the place called `name`.
+    pub(crate) fn mark(name: &str) {
+        // Only the tests read the trace, and they notice if it is cut off.
+        let _ = traced(|| Ok(()), |()| (format!("mark {name}"), &[]));
+    }
 }
 
 #[cfg(not(feature = "fault-injection"))]
 mod injection {
+    use std::io;
     use std::time::Duration;
 
     #[inline(always)]
@@ -63,4 +110,15 @@ mod injection {
     pub(crate) fn commit_interval() -> Option<Duration> {
         None
     }
+
+    #[inline(always)]
+    pub(crate) fn traced<'a, T>(
+        change: impl FnOnce() -> io::Result<T>,
+        _: impl FnOnce(&T) -> (String, &'a [u8]),
+    ) -> io::Result<T> {
+        change()
+    }
+
+    #[inline(always)]
+    pub(crate) fn mark(_: &str) {}
 }

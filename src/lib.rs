@@ -6,6 +6,7 @@
 
 pub mod cli;
 pub mod config;
+mod disk;
 pub mod error;
 mod fault;
 pub mod geometry;

@@ -33,6 +33,11 @@ impl Warnings {
         self.0.iter().map(String::as_str)
     }
 
+    /// Returns all warnings, to be changed.
+    pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = &mut String> {
+        self.0.iter_mut()
+    }
+
     /// Returns whether there are no warnings.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()

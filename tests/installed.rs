@@ -4,8 +4,10 @@
 use std::fs;
 use std::process::Command;
 
-/// Each of these kills a build that has the feature, at its first commit or when it cleans up.
-const FAULTS: [&str; 5] = ["commit:1", "published:1", "torn:1", "committed:1", "cleaning:1"];
+/// Each of these ends a run of a build that has the feature: at its first commit, when results take their places, when it cleans
+/// up, or with a read error.
+const FAULTS: [&str; 8] =
+    ["commit:1", "published:1", "torn:1", "committed:1", "replacing:1", "cleaning:1", "read-input:1", "read-store:1+"];
 
 #[test]
 fn no_environment_variable_kills_the_installed_program() {
@@ -16,7 +18,8 @@ fn no_environment_variable_kills_the_installed_program() {
     for fault in FAULTS {
         let mut program = Command::new(env!("CARGO_BIN_EXE_gdt-batch"));
         program.arg("job.toml").current_dir(folder.path()).env("GDT_FAULT", fault).env("GDT_COMMIT_MS", "0");
-        let output = program.output().unwrap();
+        let output = program.env("GDT_TRACE", "trace").output().unwrap();
         assert!(output.status.success(), "{fault}: {output:?}");
+        assert!(!folder.path().join("trace").exists(), "changes of files are written down");
     }
 }

@@ -1,6 +1,9 @@
 //! Reads configuration files: TOML in, checked options out. An unknown key, a wrong type or an impossible value is an error that
 //! shows the line.
 
+mod paths;
+
+use crate::config::paths::{Anchored, anchor};
 use crate::gpu::options::{GpuOptions, TextureSide, VoronoiMethod};
 use crate::input::options::InputOptions;
 use crate::job::options::{JobOptions, Limits};
@@ -81,15 +84,25 @@ pub fn load(path: &Path) -> Result<JobOptions> {
         }
         Err(e) => return Err(Error::Config(format!("cannot read the configuration {}: {e}", path.display()))),
     };
-    let mut options = parse(&text).map_err(|e| Error::Config(format!("{}: {e}", path.display())))?;
-    let base = path.parent().unwrap_or(Path::new(""));
-    options.output.directory = base.join(&options.output.directory);
+    let refused = |what: String| Error::Config(format!("{}: {what}", path.display()));
+    let mut options = parse(&text).map_err(refused)?;
+    resolve_paths(&mut options, path.parent().unwrap_or(Path::new(""))).map_err(refused)?;
+    Ok(options)
+}
+
+/// Makes the paths count from the working directory instead of `base`, the directory of the configuration.
+fn resolve_paths(options: &mut JobOptions, base: &Path) -> std::result::Result<(), String> {
+    if let Some(directory) = options.output.directory.to_str() {
+        let Anchored { base, path } = anchor("[output] directory", directory, base)?;
+        options.output.directory = base.join(path);
+    }
     for file in &mut options.input.files {
-        if !Path::new(file).is_absolute() {
-            *file = format!("{}{file}", glob_prefix(base));
+        let Anchored { base, path } = anchor("[input] files", file, base)?;
+        if !Path::new(path).is_absolute() {
+            *file = format!("{}{path}", glob_prefix(&base));
         }
     }
-    Ok(options)
+    Ok(())
 }
 
 /// Reads and checks the text of a configuration. The error shows the line.

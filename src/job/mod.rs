@@ -21,11 +21,11 @@ pub mod report;
 pub mod run;
 pub mod tiles;
 
-use crate::geometry::Bounds;
 use crate::job::mesh::precision_limit::PrecisionLimit;
 use crate::job::options::{JobOptions, RunOptions};
-use crate::job::partition::result::{Partition, PointSummary};
+use crate::job::partition::result::Partition;
 use crate::job::plan::job_plan::Plan;
+use crate::job::plan::no_points::no_point_is_left;
 use crate::job::report::job_report::Report;
 use crate::job::run::attempt::run_until_it_fits;
 use crate::job::run::context::RunContext;
@@ -40,8 +40,9 @@ use crate::{Error, Result};
 /// Runs the whole job, or what an interrupted run left of it.
 ///
 /// # Errors
-/// Every error of every step; see [`Error`]. With [`Error::Resumable`] the finished steps are kept. With any other error of a step no
-/// temporary files are left; an error before the first step leaves the directory as it was.
+/// Every error of every step; see [`Error`]. Whatever fails, the results of an earlier job stay as they are. With
+/// [`Error::Resumable`] the finished steps are kept. With any other error of a step no temporary files are left; an error before the
+/// first step leaves the directory as it was.
 pub fn run(options: &JobOptions, run: impl Into<RunOptions>) -> Result<Report> {
     // Step 1, the plan, and what is around every attempt: the directory, its lock, the journal.
     run_until_it_fits(options, run.into(), walk)
@@ -51,7 +52,8 @@ pub fn run(options: &JobOptions, run: impl Into<RunOptions>) -> Result<Report> {
 fn walk(run: &RunContext, plan: Plan, earlier: Option<Partition>) -> Result<Report> {
     // Step 2, partition/: the points by tile, and the tree.
     let (plan, partition) = read_step::read(run, plan, earlier)?;
-    let bounds = some_points(&partition.summary)?;
+    let summary = &partition.summary;
+    let bounds = summary.bounds.ok_or_else(|| no_point_is_left(&plan, &summary.counts))?;
     PrecisionLimit::of(&plan.frame).check_heights(bounds)?;
     // Steps 3 and 4, mesh/: leaves and merges. Steps 5 and 6, tiles/: border normals and tiles, each as soon as it is finished.
     let mesh = mesh_and_tiles(run, &plan, &partition, bounds)?;
@@ -69,18 +71,6 @@ fn walk(run: &RunContext, plan: Plan, earlier: Option<Partition>) -> Result<Repo
             write_report(run, &plan, &partition, mesh.leaves, tiles.stats, published)
         },
     )
-}
-
-/// Returns the box of the points.
-fn some_points(summary: &PointSummary) -> Result<Bounds<3>> {
-    summary.bounds.ok_or_else(|| {
-        let counts = &summary.counts;
-        Error::NoTerrain(format!(
-            "no point is left to triangulate: of {} read, {} are malformed, {} withheld, {} of other classes, {} out of bounds; check \
-             [input] classes and bounds",
-            counts.read, counts.malformed, counts.withheld, counts.other_class, counts.out_of_bounds
-        ))
-    })
 }
 
 /// Checks that there is a terrain to look at.

@@ -166,6 +166,74 @@ fn help_names_the_commands_examples_and_exit_codes() {
 }
 
 #[test]
+fn a_tilde_is_the_home_directory_and_variables_are_refused_by_name() {
+    let folder = folder_with_cloud();
+    let run = |files: &str, out: &str| {
+        let text = LEAST.replace("cloud.csv", files).replace("\"out\"", &format!("{out:?}"));
+        fs::create_dir_all(folder.path().join("jobs")).unwrap();
+        fs::write(folder.path().join("jobs/job.toml"), text).unwrap();
+        let mut program = std::process::Command::new(env!("CARGO_BIN_EXE_gdt-batch"));
+        let program = program.arg("jobs/job.toml").current_dir(folder.path()).env("HOME", folder.path());
+        let output = program.env("CLOUDS", "/data/clouds").env_remove("GDT_NOT_SET").output().unwrap();
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let (code, said) = run("~/cl*.csv", "~/home out");
+    assert_eq!(code, Some(0), "{said}");
+    assert!(folder.path().join("home out/report.json").is_file());
+    for (files, out, words) in [
+        ("$CLOUDS/*.laz", "out", &["[input] files", "$CLOUDS", "CLOUDS is /data/clouds"][..]),
+        ("~/cloud.csv", "${GDT_NOT_SET}/out", &["[output] directory", "${GDT_NOT_SET}", "is not set"]),
+        ("~someone/cloud.csv", "out", &["~someone", "your own home directory"]),
+    ] {
+        let (code, said) = run(files, out);
+        assert_eq!(code, Some(2), "{said}");
+        assert!(words.iter().all(|word| said.contains(word)), "{words:?}: {said}");
+    }
+    assert!(!folder.path().join("jobs/${GDT_NOT_SET}").exists());
+    // What is really called so is meant.
+    fs::create_dir_all(folder.path().join("jobs/$CLOUDS")).unwrap();
+    fs::copy(folder.path().join("cloud.csv"), folder.path().join("jobs/$CLOUDS/a.csv")).unwrap();
+    let (code, said) = run("$CLOUDS/a.csv", "out");
+    assert_eq!(code, Some(0), "{said}");
+}
+
+#[test]
+fn a_job_whose_points_are_all_out_of_bounds_says_where_they_lie() {
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = folder.path().join("cloud.csv");
+    fs::write(&cloud, "x,y,z\n1000.123,5000.5,1\n1200,5100,2\n1100,5200.987,3\n").unwrap();
+    let job = |bounds: &str| Job::on(&[&cloud]).with("input", &format!("bounds = {bounds}"));
+    let place = "[1000.12, 5000.50, 1200.00, 5200.99]";
+    job("[0, 0, 10, 10]").run().refused(3, &["3 out of bounds", "[0.0, 0.0, 10.0, 10.0]", place]);
+    assert!(!job("[0, 0, 10, 10]").run().err.contains("exchanged"));
+    job("[5000, 1000, 5200, 1200]").run().refused(3, &[place, "x and y look exchanged"]);
+    job(place).report();
+}
+
+/// Results take their places at once, which the system does on one disk only.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_folder_of_results_on_another_disk_is_refused_before_the_job() {
+    use std::os::unix::fs::MetadataExt;
+    let folder = folder_with_cloud();
+    let Ok(elsewhere) = tempfile::tempdir_in("/dev/shm") else { return eprintln!("skipped: no /dev/shm") };
+    if elsewhere.path().metadata().unwrap().dev() == folder.path().metadata().unwrap().dev() {
+        return eprintln!("skipped: /dev/shm is the disk of the tests");
+    }
+    fs::write(folder.path().join("job.toml"), LEAST).unwrap();
+    fs::create_dir(folder.path().join("out")).unwrap();
+    let tiles = folder.path().join("out/tiles");
+    std::os::unix::fs::symlink(elsewhere.path(), &tiles).unwrap();
+    gdt_batch(folder.path(), &["job.toml"]).refused(2, &["out/tiles is on another disk"]);
+    // On the same disk a link is as good as a folder.
+    fs::remove_file(&tiles).unwrap();
+    fs::create_dir(folder.path().join("there")).unwrap();
+    std::os::unix::fs::symlink("../there", &tiles).unwrap();
+    gdt_batch(folder.path(), &["job.toml"]).succeeded();
+    assert!(folder.path().join("there/000000.glb").is_file() && tiles.is_symlink());
+}
+
+#[test]
 fn paths_are_relative_to_the_configuration() {
     let folder = tempfile::tempdir().unwrap();
     let odd = folder.path().join("odd [name] *");

@@ -55,6 +55,22 @@ fn bomb() -> Vec<u8> {
     bytes
 }
 
+/// They stay until the new ones are whole, so their room is not free.
+#[test]
+fn the_results_of_an_earlier_job_do_not_count_as_room_on_the_disk() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = crate::clouds::write(folder.path(), "cloud.csv", &crate::clouds::uniform(40_000, 100_000, 5));
+    let job = Job::on(&[file]);
+    let check = || job.run_with(&["check", "--json"]).succeeded().json();
+    assert_eq!(number(&check()["disk_earlier"]), 0);
+    let written = number(&job.report()["bytes_written"]);
+    let earlier = number(&check()["disk_earlier"]);
+    // And the report.
+    assert!((written..written + 20_000).contains(&earlier), "{earlier} instead of {written}");
+    let text = job.run_with(&["check"]).succeeded().out;
+    assert!(text.contains("stay until the new ones are whole"), "{text}");
+}
+
 #[test]
 fn a_job_larger_than_the_disk_is_refused_unless_forced() {
     let folder = tempfile::tempdir().unwrap();

@@ -177,7 +177,7 @@ fn files_of_another_version_are_removed_at_once() {
 fn damaged_or_missing_tiles_are_written_again() {
     let rig = rig();
     assert!(rig.run_to("committed", 45).was_killed());
-    let tiles = || fs::read_dir(rig.out().join("tiles")).unwrap().map(|entry| entry.unwrap().path());
+    let tiles = || fs::read_dir(rig.out().join("job/results/tiles")).unwrap().map(|entry| entry.unwrap().path());
     assert!(tiles().count() >= 3);
     for (i, path) in tiles().enumerate() {
         match i % 3 {
@@ -237,7 +237,7 @@ fn a_run_that_fails_for_good_removes_the_files_of_an_interrupted_run() {
     let path = rig.folder.path().join("cloud.csv");
     let text = fs::read_to_string(&path).unwrap();
     assert!(rig.run_to("committed", 45).was_killed());
-    assert!(files(&rig.out().join("tiles")).len() >= 3);
+    assert!(files(&rig.out().join("job/results/tiles")).len() >= 3);
     fs::write(&path, text.clone() + "no,point,this\n").unwrap();
     let end = rig.run();
     assert_eq!(end.status.code(), Some(3), "{end:?}");

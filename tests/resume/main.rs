@@ -5,6 +5,7 @@
 //! of each test that kills at random moments.
 #![cfg(unix)]
 
+mod disk_model;
 #[path = "../common/random.rs"]
 mod random;
 mod rig;
@@ -13,6 +14,10 @@ mod scattered;
 
 mod changes;
 mod disk;
+mod earlier_results;
 mod kills;
 mod lock;
+mod places;
+mod power;
+mod read_errors;
 mod signals;

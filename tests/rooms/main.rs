@@ -172,3 +172,36 @@ fn every_rule_of_direction_holds() {
     assert_eq!(wrong.map(count), wrong.map(|_| 1));
     assert_eq!(right.map(count), right.map(|_| 0));
 }
+
+/// The calls that change files. `src/disk.rs` makes them for a job, so that tests can make up what a power failure leaves.
+const CHANGES: [&str; 12] = [
+    "fs::rename(",
+    "fs::remove_",
+    "fs::create_dir",
+    "fs::write(",
+    "fs::copy(",
+    "fs::hard_link(",
+    "File::create",
+    ".create(true)",
+    ".append(true)",
+    ".sync_all(",
+    ".sync_data(",
+    ".set_len(",
+];
+
+#[test]
+fn a_job_changes_files_only_through_the_layer_that_tests_can_watch() {
+    let files = real_files();
+    let of_job = files.iter().filter(|(name, _)| name.starts_with("job/") || name.starts_with("output/"));
+    for (name, text) in of_job {
+        let code = text.split("#[cfg(test)]").next().unwrap();
+        let code = code.replace("PointFile::create", "");
+        let lines = code.lines().filter(|line| !line.trim_start().starts_with("//"));
+        let around: Vec<&str> = lines.filter(|line| CHANGES.iter().any(|call| line.contains(call))).collect();
+        assert!(around.is_empty(), "src/{name} goes around src/disk.rs: {around:?}");
+    }
+    assert!(
+        CHANGES.iter().filter(|call| files["disk.rs"].contains(**call)).count() >= 7,
+        "the calls have other names now"
+    );
+}

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use crate::input::file::range::{FileRange, SHRUNK};
 use crate::positional_io::read_exact_at;
-use crate::{Error, Result};
+use crate::{Error, Result, fault};
 
 /// A file that is open for reading and whose size is known.
 pub(crate) struct RandomAccessFile {
@@ -53,7 +53,8 @@ impl RandomAccessFile {
 
     /// Fills `buffer` with the bytes from position `offset` on.
     pub(crate) fn read_exact_at(&self, buffer: &mut [u8], offset: u64) -> Result<()> {
-        read_exact_at(&self.file, buffer, offset).map_err(|error| match error.kind() {
+        let outcome = fault::read("read-input").and_then(|()| read_exact_at(&self.file, buffer, offset));
+        outcome.map_err(|error| match error.kind() {
             io::ErrorKind::UnexpectedEof => Error::io("read", &self.path)(io::Error::other(SHRUNK)),
             _ => Error::io("read", &self.path)(error),
         })

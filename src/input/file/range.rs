@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::ops::Range;
 
+use crate::fault;
 use crate::positional_io::read_at;
 
 /// The message for a file that ends before the size it had when it was opened.
@@ -35,6 +36,7 @@ impl FileRange {
         if size == 0 {
             return Ok(0);
         }
+        fault::read("read-input")?;
         match read_at(&self.file, &mut out[..size], self.next)? {
             0 => Err(io::Error::other(SHRUNK)),
             count => {

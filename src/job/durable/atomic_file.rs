@@ -2,10 +2,11 @@
 //!
 //! A step writes a file under its partial name ([`write_pending`]). [`publish`] brings it to the disk and then renames it.
 
-use crate::{Error, Result};
+use crate::disk::WriteFrom;
+use crate::{Error, Result, disk, fault};
 use serde::Serialize;
 use std::collections::BTreeSet;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::thread::ScopedJoinHandle;
@@ -36,8 +37,11 @@ pub fn write_pending(path: &Path, content: &[u8]) -> Result<PendingFile> {
 /// [`Error::Io`] if writing fails.
 pub fn write_pending_pieces(path: &Path, pieces: &[&[u8]]) -> Result<PendingFile> {
     let partial = partial_path(path);
-    let write = |mut file: File| pieces.iter().try_for_each(|piece| file.write_all(piece));
-    File::create(&partial).and_then(write).map_err(Error::io("write", &partial))?;
+    let write = |file: File| {
+        let mut file = WriteFrom { file: &file, at: 0 };
+        pieces.iter().try_for_each(|piece| file.write_all(piece))
+    };
+    disk::create(&partial).and_then(write).map_err(Error::io("write", &partial))?;
     let mut hasher = Xxh3::new();
     pieces.iter().for_each(|piece| hasher.update(piece));
     let bytes = pieces.iter().map(|piece| piece.len() as u64).sum();
@@ -71,7 +75,8 @@ pub fn digest(path: &Path) -> Result<(u64, u64)> {
     let mut file = File::open(path).map_err(Error::io("open", path))?;
     let (mut hasher, mut bytes, mut buffer) = (Xxh3::new(), 0, vec![0; 1 << 18]);
     loop {
-        let count = file.read(&mut buffer).map_err(Error::io("read", path))?;
+        let count =
+            fault::read("read-result").and_then(|()| file.read(&mut buffer)).map_err(Error::io("read", path))?;
         if count == 0 {
             return Ok((bytes, hasher.digest()));
         }
@@ -95,10 +100,10 @@ const PARALLEL_SYNCS: usize = 8;
 pub fn publish(paths: &[PathBuf]) -> Result<()> {
     sync_partial_files(paths)?;
     for path in paths {
-        fs::rename(partial_path(path), path).map_err(Error::io("rename the finished file to", path))?;
+        disk::rename(&partial_path(path), path).map_err(Error::io("rename the finished file to", path))?;
     }
     let folders: BTreeSet<&Path> = paths.iter().filter_map(|path| path.parent()).collect();
-    folders.into_iter().try_for_each(sync_directory)
+    folders.into_iter().try_for_each(sync_folder)
 }
 
 /// Brings pending files to the disk on several threads: overlapping waits take little longer than one.
@@ -121,20 +126,16 @@ fn sync_partial_files(paths: &[PathBuf]) -> Result<()> {
 }
 
 fn sync_file(path: &Path) -> Result<()> {
-    let file = File::options().write(true).open(path).map_err(Error::io("open", path))?;
-    file.sync_all().map_err(Error::io("write", path))
+    let file = disk::open(path).map_err(Error::io("open", path))?;
+    disk::sync(&file).map_err(Error::io("write", path))
 }
 
-/// Brings the names in `directory` to the disk, on systems that can.
+/// Brings the names in `folder` to the disk.
 ///
 /// # Errors
 /// [`Error::Io`] if that fails.
-fn sync_directory(directory: &Path) -> Result<()> {
-    if cfg!(not(unix)) {
-        return Ok(());
-    }
-    let file = File::open(directory).map_err(Error::io("open", directory))?;
-    file.sync_all().map_err(Error::io("write", directory))
+pub fn sync_folder(folder: &Path) -> Result<()> {
+    disk::sync_folder(folder).map_err(Error::io("write", folder))
 }
 
 /// Removes the file at `path` if it exists.
@@ -142,8 +143,5 @@ fn sync_directory(directory: &Path) -> Result<()> {
 /// # Errors
 /// [`Error::Io`] if it cannot be removed.
 pub fn remove_file(path: &Path) -> Result<()> {
-    match fs::remove_file(path) {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io("remove", path)(e)),
-        _ => Ok(()),
-    }
+    disk::remove_file(path).map_err(Error::io("remove", path))
 }

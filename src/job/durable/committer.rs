@@ -1,8 +1,9 @@
 //! The thread that brings records and results to the disk while others work. It commits many together, because waiting for the
 //! disk is what costs time.
 
+use crate::disk::WriteFrom;
 use crate::job::durable::atomic_file::publish;
-use crate::{Error, Result, fault};
+use crate::{Error, Result, disk, fault};
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -73,11 +74,11 @@ impl CommitterShared {
 impl Committer {
     /// Starts the thread for the journal at `path`.
     pub(crate) fn start(path: &Path) -> Result<Committer> {
-        let file = File::options().append(true).open(path).map_err(Error::io("open", path))?;
+        let file = JournalFile::open(path)?;
         let interval = fault::commit_interval().unwrap_or(INTERVAL);
         let shared = Arc::new(CommitterShared::default());
-        let (of_thread, path) = (shared.clone(), path.to_path_buf());
-        let run = move || run(&of_thread, &file, &path, interval);
+        let of_thread = shared.clone();
+        let run = move || run(&of_thread, file, interval);
         let thread = std::thread::Builder::new().name("journal".into()).spawn(run);
         let thread = Some(thread.map_err(|e| Error::Memory(format!("cannot start a thread: {e}")))?);
         Ok(Committer { shared, thread, interval, start: Instant::now() })
@@ -143,7 +144,7 @@ impl Drop for Committer {
     }
 }
 
-fn run(shared: &CommitterShared, file: &File, path: &Path, interval: Duration) {
+fn run(shared: &CommitterShared, mut file: JournalFile, interval: Duration) {
     let interval = interval.max(Duration::from_millis(1));
     let mut rest = interval;
     loop {
@@ -156,7 +157,7 @@ fn run(shared: &CommitterShared, file: &File, path: &Path, interval: Duration) {
         state.wanted = false;
         drop(state);
         let begun = Instant::now();
-        let outcome = due.then(|| commit(batch, file, path));
+        let outcome = due.then(|| commit(batch, &mut file));
         rest = interval.max(LONGEST_REST.min(begun.elapsed()));
         let mut state = shared.state();
         match outcome {
@@ -172,6 +173,29 @@ fn run(shared: &CommitterShared, file: &File, path: &Path, interval: Duration) {
     }
 }
 
+/// The journal, to which lines are appended.
+struct JournalFile {
+    file: File,
+    path: PathBuf,
+    end: u64,
+}
+
+impl JournalFile {
+    fn open(path: &Path) -> Result<JournalFile> {
+        let file = disk::open(path).map_err(Error::io("open", path))?;
+        let end = file.metadata().map_err(Error::io("read", path))?.len();
+        Ok(JournalFile { file, path: path.into(), end })
+    }
+
+    /// Appends lines and waits until they are on the disk.
+    fn append(&mut self, lines: &[u8]) -> Result<()> {
+        let mut writer = WriteFrom { file: &self.file, at: self.end };
+        let written = writer.write_all(lines);
+        self.end = writer.at;
+        written.and_then(|()| disk::sync_data(&self.file)).map_err(Error::io("write", &self.path))
+    }
+}
+
 /// Returns the same error again. Everybody who waits gets it, because nobody knows whose error will be shown.
 fn copy_of(error: &Error) -> Error {
     match error {
@@ -184,17 +208,17 @@ fn copy_of(error: &Error) -> Error {
 }
 
 /// Publishes the files, then writes the lines: so whatever the journal says is true, whenever the machine stops.
-fn commit(batch: CommitBatch, mut file: &File, path: &Path) -> Result<()> {
+fn commit(batch: CommitBatch, journal: &mut JournalFile) -> Result<()> {
     fault::point("commit");
     publish(&batch.files)?;
     fault::point("published");
     let lines = batch.lines.as_bytes();
     if fault::is_due("torn") {
         // What a power failure may leave of it.
-        let _ = file.write_all(&lines[..lines.len() / 2]);
+        let _ = journal.append(&lines[..lines.len() / 2]);
         fault::die();
     }
-    file.write_all(lines).and_then(|()| file.sync_data()).map_err(Error::io("write", path))?;
+    journal.append(lines)?;
     fault::point("committed");
     Ok(())
 }

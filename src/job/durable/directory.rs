@@ -1,9 +1,9 @@
 //! The job directory, which holds everything that a job needs to go on, and the results beside it.
 
-use crate::job::durable::atomic_file::{partial_path, remove_file};
+use crate::job::durable::atomic_file::{partial_path, remove_file, sync_folder};
 use crate::job::durable::lock::{Lock, lock_file};
 use crate::output::file_names::OutputFiles;
-use crate::{Error, Result, fault};
+use crate::{Error, Result, disk, fault};
 use rayon::prelude::*;
 use serde_json::Value;
 use std::collections::HashSet;
@@ -13,23 +13,31 @@ use std::path::{Path, PathBuf};
 /// The number of files that the records of a store are dealt out to.
 pub const STORE_FILES: usize = 8;
 
-/// The files of one job: its results, and what it keeps for itself in `job`.
+/// The files of one job: its results, and what it keeps for itself in `job`. Results wait there too until all are whole; then
+/// [`JobDirectory::replace_results`] puts them in the place of those of an earlier job.
 #[derive(Clone, Debug)]
 pub struct JobDirectory {
-    output: OutputFiles,
+    results: OutputFiles,
+    waiting: OutputFiles,
     job: PathBuf,
 }
 
 impl JobDirectory {
     /// Returns the directory of the job that writes to `output`.
     pub fn new(output: &Path) -> JobDirectory {
-        let output = OutputFiles::new(output);
-        JobDirectory { job: output.job(), output }
+        let results = OutputFiles::new(output);
+        let job = results.job();
+        JobDirectory { waiting: OutputFiles::new(&job.join("results")), job, results }
     }
 
-    /// Returns the paths of the results.
+    /// Returns the paths of the results while the job is under way: that is where steps write and find them.
     pub fn output(&self) -> &OutputFiles {
-        &self.output
+        &self.waiting
+    }
+
+    /// Returns the paths of the results of a finished job.
+    pub fn results(&self) -> &OutputFiles {
+        &self.results
     }
 
     /// Returns the job directory itself.
@@ -57,14 +65,21 @@ impl JobDirectory {
         std::array::from_fn(|file| self.job.join(format!("steps.{file}.store")))
     }
 
-    /// Returns the name that the journal gives to the file at `path`: its path from the output directory.
+    /// Returns the name that the journal gives to the file at `path`: the path that it has, or will have, from the output directory.
     pub fn name(&self, path: &Path) -> PathBuf {
-        path.strip_prefix(self.output.directory()).unwrap_or(path).to_path_buf()
+        let name = path.strip_prefix(self.waiting.directory());
+        name.or_else(|_| path.strip_prefix(self.results.directory())).unwrap_or(path).to_path_buf()
     }
 
-    /// Returns the path of the file with this name.
+    /// Returns the path of the file with this name while the job is under way.
     pub fn file(&self, name: &Path) -> PathBuf {
-        self.output.directory().join(name)
+        let folder = if self.is_result(name) { self.waiting.directory() } else { self.results.directory() };
+        folder.join(name)
+    }
+
+    /// Tells whether a file with this name is a result, not what a job keeps for itself.
+    pub fn is_result(&self, name: &Path) -> bool {
+        !self.results.directory().join(name).starts_with(&self.job)
     }
 
     /// Takes the lock of the job directory, which it creates if need be.
@@ -75,89 +90,109 @@ impl JobDirectory {
         Lock::take(&self.job)
     }
 
-    /// Takes the lock and removes everything that an earlier job left.
+    /// Takes the lock, removes everything that an interrupted run left, and makes the folder of the tiles.
     ///
     /// # Errors
-    /// As [`JobDirectory::lock`] and [`JobDirectory::remove_results`].
+    /// As [`JobDirectory::lock`] and [`JobDirectory::clear`].
     pub fn create(&self) -> Result<Lock> {
         let lock = self.lock()?;
         remove_file(&self.journal())?;
-        self.remove_job_files(&HashSet::new())?;
-        self.remove_results(&HashSet::new())?;
+        self.clear(&HashSet::new())?;
         Ok(lock)
     }
 
-    /// Removes what an earlier run left for its steps, except the files that `keep` names as the journal does.
+    /// Removes what an earlier run left for its steps, and the results that wait, except the files that `keep` names as the journal
+    /// does. Makes the folder of the tiles.
     ///
     /// # Errors
-    /// [`Error::Io`] if a file cannot be removed.
-    pub fn remove_job_files(&self, keep: &HashSet<PathBuf>) -> Result<()> {
+    /// [`Error::Io`] if a file cannot be removed or the folder cannot be made.
+    pub fn clear(&self, keep: &HashSet<PathBuf>) -> Result<()> {
         let entries = fs::read_dir(&self.job).map_err(Error::io("read", &self.job))?;
         let paths = entries.map(|entry| Ok(entry.map_err(Error::io("read", &self.job))?.path()));
         let mut paths = paths.collect::<Result<Vec<PathBuf>>>()?;
         // All names go, because other versions of the program use other names.
         let stays = [self.journal(), lock_file(&self.job)];
         paths.retain(|path| !stays.contains(path) && !path.is_dir());
-        self.remove_unless_kept(&paths, keep)
+        paths.extend(files_of(&self.waiting)?);
+        paths.retain(|path| !keep.contains(&self.name(path)));
+        paths.iter().try_for_each(|path| remove_file(path))?;
+        create_folder(&self.waiting.tiles())
     }
 
-    /// Creates the folder of the tiles, and removes the results of an earlier run, whole or partial, except the files that `keep`
-    /// names.
+    /// Puts the results that wait, all those that `names` names, in the place of the results of an earlier job. Goes on where an
+    /// earlier call was cut off.
+    ///
+    /// Every file is replaced at once, so there is no moment without one. As long as some are old and some are new there is no
+    /// report.
     ///
     /// # Errors
-    /// [`Error::Io`] if the folder cannot be made or a file cannot be removed.
-    pub fn remove_results(&self, keep: &HashSet<PathBuf>) -> Result<()> {
-        create_folder(&self.output.tiles())?;
-        let results = self.existing_results()?;
-        let partials: Vec<PathBuf> = results.iter().map(|path| partial_path(path)).collect();
-        self.remove_unless_kept(&results, keep)?;
-        self.remove_unless_kept(&partials, keep)?;
-        // This fails, as it should, where a folder holds files that the job keeps or that somebody else owns.
-        let _ = fs::remove_dir(self.output.cut());
-        let _ = fs::remove_dir(self.output.levels());
-        Ok(())
+    /// [`Error::Io`] if a file cannot be renamed or removed.
+    pub fn replace_results(&self, names: &HashSet<PathBuf>) -> Result<()> {
+        let [report, folder] = [self.results.report(), self.results.directory().to_path_buf()];
+        let new_report = self.waiting.report();
+        if !new_report.exists() {
+            // It goes last.
+            return Ok(());
+        }
+        remove_file(&report)?;
+        sync_folder(&folder)?;
+        for path in files_of(&self.waiting)?.iter().filter(|path| **path != new_report) {
+            fault::point("replacing");
+            self.replace(path)?;
+        }
+        let outdated = files_of(&self.results)?.into_iter().filter(|path| !names.contains(&self.name(path)));
+        outdated.into_iter().try_for_each(|path| remove_file(&path))?;
+        for folder in self.results.glb_folders().iter().filter(|folder| folder.is_dir()) {
+            // This fails, as it should, where a folder holds files of this job or of somebody else.
+            if disk::remove_folder(folder).is_err() {
+                sync_folder(folder)?;
+            }
+        }
+        sync_folder(&folder)?;
+        fault::point("replacing");
+        self.replace(&new_report)?;
+        sync_folder(&folder)
     }
 
-    /// Removes the results of a run that has failed for good.
-    ///
-    /// # Errors
-    /// As [`JobDirectory::remove_results`].
-    pub fn withdraw_results(&self) -> Result<()> {
-        self.remove_results(&HashSet::new())?;
-        let _ = fs::remove_dir(self.output.tiles());
-        Ok(())
+    /// Puts one waiting result in its place, if it has not gone there.
+    fn replace(&self, waiting: &Path) -> Result<()> {
+        let name = self.name(waiting);
+        if !waiting.exists() || waiting.extension().is_some_and(|ending| ending == "partial") {
+            return Ok(());
+        }
+        let path = self.results.directory().join(name);
+        path.parent().map_or(Ok(()), create_folder)?;
+        disk::rename(waiting, &path).map_err(Error::io("rename the finished file to", &path))
     }
 
-    fn remove_unless_kept(&self, paths: &[PathBuf], keep: &HashSet<PathBuf>) -> Result<()> {
-        paths.iter().filter(|path| !keep.contains(&self.name(path))).try_for_each(|path| remove_file(path))
+    /// Returns the paths of all results of an earlier job that may exist.
+    pub(crate) fn earlier_results(&self) -> Vec<PathBuf> {
+        files_of(&self.results).unwrap_or_default()
     }
 
-    /// Returns the paths of all results that may exist: the fixed names, and the numbered files that do.
-    fn existing_results(&self) -> Result<Vec<PathBuf>> {
-        let output = &self.output;
-        let numbered = output.glb_folders().into_iter().filter(|folder| folder.is_dir());
-        let numbered = numbered.map(|folder| numbered_files(&folder)).collect::<Result<Vec<_>>>()?;
-        // The report comes first: wherever a removal is cut off, results beside a report are complete.
-        let mut results =
-            vec![output.report(), output.terrain(), output.tileset(), output.georeference(), output.preview()];
-        results.extend(numbered.concat());
-        Ok(results)
+    /// Returns the paths of all results that may wait.
+    pub(crate) fn waiting_results(&self) -> Vec<PathBuf> {
+        files_of(&self.waiting).unwrap_or_default()
     }
 
-    /// Checks that no file, and no dangling link, is where a job needs a folder, and that no folder is where it writes a file.
+    /// Checks that no file, and no dangling link, is where a job needs a folder, that no folder is where it writes a file, and that
+    /// all folders are on one disk.
     ///
     /// # Errors
     /// [`Error::Config`] names what is in the way.
     pub fn check_nothing_in_the_way(&self) -> Result<()> {
-        let mut folders = vec![self.job.clone()];
-        folders.extend(self.output.glb_folders());
-        let mut folders = self.output.directory().ancestors().chain(folders.iter().map(PathBuf::as_path));
+        let mut own = vec![self.job.clone()];
+        own.extend(self.results.glb_folders());
+        let mut folders = self.results.directory().ancestors().chain(own.iter().map(PathBuf::as_path));
         let is_in_the_way = |path: &&Path| path.symlink_metadata().is_ok() && !path.is_dir();
         let (found, what, wanted) = if let Some(found) = folders.find(is_in_the_way) {
             let what = if found.exists() { "is not a directory" } else { "is a link that leads nowhere" };
             (found.to_path_buf(), what, "a directory")
-        } else if let Some(found) = self.existing_results()?.into_iter().find(|path| path.is_dir()) {
+        } else if let Some(found) = files_of(&self.results)?.into_iter().find(|path| path.is_dir()) {
             (found, "is a directory", "a file")
+        } else if let Some(found) = own.into_iter().find(|path| is_elsewhere(path, self.results.directory())) {
+            // Results could not take their places at once.
+            (found, "is on another disk than the output directory", "a directory of the same disk")
         } else {
             return Ok(());
         };
@@ -172,13 +207,12 @@ impl JobDirectory {
     /// # Errors
     /// [`Error::Config`] if such files exist and nothing says that a job wrote them.
     pub fn check_results_are_ours(&self) -> Result<()> {
-        let report = fs::read(self.output.report()).ok().and_then(|text| serde_json::from_slice::<Value>(&text).ok());
+        let report = fs::read(self.results.report()).ok().and_then(|text| serde_json::from_slice::<Value>(&text).ok());
         let is_ours = |report: &Value| report["generator"].as_str().is_some_and(|by| by.starts_with("gdt-batch"));
         if self.journal().exists() || report.as_ref().is_some_and(is_ours) {
             return Ok(());
         }
-        let mut results = self.existing_results()?.into_iter().flat_map(|path| [partial_path(&path), path]);
-        match results.find(|path| path.symlink_metadata().is_ok()) {
+        match files_of(&self.results)?.into_iter().find(|path| path.symlink_metadata().is_ok()) {
             None => Ok(()),
             Some(found) => Err(Error::Config(format!(
                 "{} exists, a job would overwrite or remove it, and nothing says that an earlier job wrote it: choose another \
@@ -197,11 +231,10 @@ impl JobDirectory {
         self.store().into_par_iter().chain([self.points()]).try_for_each(|file| remove_at_end(&file))?;
         remove_at_end(&self.plan())?;
         remove_at_end(&self.journal())?;
+        let waiting = self.waiting.directory();
+        disk::remove_tree(waiting).map_err(Error::io("remove", waiting))?;
         // The lock goes last, because it marks the directory as a job's own: a kill before that leaves what the next job may take.
-        match fs::remove_dir_all(&self.job) {
-            Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io("remove", &self.job)(e)),
-            _ => Ok(()),
-        }
+        disk::remove_tree(&self.job).map_err(Error::io("remove", &self.job))
     }
 }
 
@@ -216,7 +249,31 @@ fn remove_at_end(file: &Path) -> Result<()> {
 /// # Errors
 /// [`Error::Io`] if it cannot be made.
 pub fn create_folder(path: &Path) -> Result<()> {
-    fs::create_dir_all(path).map_err(Error::io("create the directory", path))
+    disk::create_folder(path).map_err(Error::io("create the directory", path))
+}
+
+/// Returns the paths of all files that a job may have left in `folder`, under their names or their partial names: the fixed names,
+/// and the numbered files that exist.
+fn files_of(folder: &OutputFiles) -> Result<Vec<PathBuf>> {
+    let mut files = vec![folder.report(), folder.terrain(), folder.tileset(), folder.georeference(), folder.preview()];
+    let partials: Vec<PathBuf> = files.iter().map(|path| partial_path(path)).collect();
+    files.extend(partials);
+    for folder in folder.glb_folders().iter().filter(|folder| folder.is_dir()) {
+        files.extend(numbered_files(folder)?);
+    }
+    Ok(files)
+}
+
+/// Tells whether both folders exist, and on different disks.
+#[cfg(unix)]
+fn is_elsewhere(folder: &Path, other: &Path) -> bool {
+    let disk = |path: &Path| path.metadata().ok().map(|data| std::os::unix::fs::MetadataExt::dev(&data));
+    disk(folder).zip(disk(other)).is_some_and(|(a, b)| a != b)
+}
+
+#[cfg(not(unix))]
+fn is_elsewhere(_: &Path, _: &Path) -> bool {
+    false
 }
 
 /// Returns the files in `folder` that have the name of a numbered result, whole or partial.
@@ -234,17 +291,25 @@ fn numbered_files(folder: &Path) -> Result<Vec<PathBuf>> {
 mod tests {
     use super::*;
 
+    fn names(names: &[&str]) -> HashSet<PathBuf> {
+        names.iter().map(PathBuf::from).collect()
+    }
+
     #[test]
     fn files_of_others_stay() {
         let output = tempfile::tempdir().unwrap();
         let directory = JobDirectory::new(output.path());
-        let tiles = directory.output().tiles();
-        fs::create_dir_all(&tiles).unwrap();
-        let [theirs, old] = ["roof.glb", "000007.glb"].map(|name| tiles.join(name));
+        for folder in directory.results().glb_folders() {
+            fs::create_dir_all(folder).unwrap();
+        }
+        let [theirs, old] = ["cut/roof.glb", "tiles/000007.glb"].map(|name| output.path().join(name));
         fs::write(&theirs, "x").unwrap();
         fs::write(&old, "x").unwrap();
         drop(directory.create().unwrap());
-        assert!(theirs.exists() && !old.exists());
+        assert!(theirs.exists() && old.exists());
+        fs::write(directory.output().report(), "{}").unwrap();
+        directory.replace_results(&names(&["report.json"])).unwrap();
+        assert!(theirs.exists() && !old.exists() && !directory.results().levels().exists());
         // A kill may leave an empty job directory: the next job may take it.
         directory.remove_job().unwrap();
         fs::create_dir(output.path().join("job")).unwrap();
@@ -252,6 +317,40 @@ mod tests {
         fs::rename(output.path().join("job/lock"), output.path().join("job/theirs")).unwrap();
         let error = directory.create().unwrap_err();
         assert_eq!(error.exit_code(), 2, "{error}");
+    }
+
+    /// Wherever it was cut off, replacing goes on to the same end, and as long as it is not there, no report tells of results.
+    #[test]
+    fn replacing_goes_on_where_it_was_cut_off() {
+        let new = ["tiles/000000.glb", "tiles/000002.glb", "levels/000001.glb", "tileset.json", "report.json"];
+        for done in 0..=new.len() {
+            let output = tempfile::tempdir().unwrap();
+            let directory = JobDirectory::new(output.path());
+            let _lock = directory.create().unwrap();
+            let write = |folder: &OutputFiles, name: &str, text: &str| {
+                let path = folder.directory().join(name);
+                fs::create_dir_all(path.parent().unwrap()).unwrap();
+                fs::write(path, text).unwrap();
+            };
+            for name in ["tiles/000000.glb", "tiles/000001.glb", "cut/000000.glb", "terrain.glb", "report.json"] {
+                write(directory.results(), name, "old");
+            }
+            new.iter().for_each(|name| write(directory.output(), name, "new"));
+            if done > 0 {
+                fs::remove_file(directory.results().report()).unwrap();
+            }
+            for name in &new[..done] {
+                directory.replace(&directory.file(Path::new(name))).unwrap();
+            }
+            directory.replace_results(&names(&new)).unwrap();
+            let found = files_of(directory.results()).unwrap().into_iter().filter(|path| path.exists());
+            let found: HashSet<PathBuf> = found.map(|path| directory.name(&path)).collect();
+            // The report goes last. When it is there, nothing more is done.
+            if done < new.len() {
+                assert_eq!(found, names(&new), "cut off after {done}");
+            }
+            assert!(new.iter().all(|name| fs::read(output.path().join(name)).unwrap() == b"new"), "{done}");
+        }
     }
 
     #[test]

@@ -9,14 +9,14 @@ use crate::job::durable::atomic_file::{PendingFile, digest, publish, write_pendi
 use crate::job::durable::committer::{CommitBatch, Committer};
 use crate::job::durable::directory::JobDirectory;
 use crate::job::durable::store::{RecordKey, RecordRef};
-use crate::{Error, Result, interrupt};
+use crate::{Error, Result, fault, interrupt};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 use std::collections::HashMap;
 use std::fmt::Debug;
 use std::hash::Hash;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::xxh3_64;
 
 /// What the job calls its steps.
@@ -69,7 +69,16 @@ impl PublishedFile {
 
     /// Tells whether the file exists and holds what was written.
     pub fn is_whole(&self, directory: &JobDirectory) -> bool {
-        digest(&directory.file(&self.name)).is_ok_and(|found| found == (self.bytes, self.hash))
+        self.is_at(&directory.file(&self.name))
+    }
+
+    /// Tells whether the file is whole among the results of a finished job.
+    pub fn is_in_place(&self, directory: &JobDirectory) -> bool {
+        self.is_at(&directory.results().directory().join(&self.name))
+    }
+
+    fn is_at(&self, path: &Path) -> bool {
+        digest(path).is_ok_and(|found| found == (self.bytes, self.hash))
     }
 }
 
@@ -121,7 +130,7 @@ where
     K: RecordKey,
 {
     let path = directory.journal();
-    let bytes = match std::fs::read(&path) {
+    let bytes = match fault::read("read-journal").and_then(|()| std::fs::read(&path)) {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
         outcome => outcome.map_err(Error::io("read", &path))?,
     };

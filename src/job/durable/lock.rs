@@ -1,6 +1,7 @@
 //! The lock that keeps a second process out of a job directory.
 
-use crate::{Error, Result};
+use crate::disk::WriteFrom;
+use crate::{Error, Result, disk};
 use std::fs::{self, File, TryLockError};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -20,7 +21,7 @@ impl Lock {
     pub fn take(job: &Path) -> Result<Lock> {
         // A kill can leave an empty directory.
         let is_new = fs::read_dir(job).map_or(true, |mut entries| entries.next().is_none());
-        fs::create_dir_all(job).map_err(Error::io("create the directory", job))?;
+        disk::create_folder(job).map_err(Error::io("create the directory", job))?;
         let path = lock_file(job);
         if !is_new && !path.exists() {
             return Err(Error::Config(format!(
@@ -28,8 +29,7 @@ impl Lock {
                 job.display()
             )));
         }
-        let file = File::options().read(true).write(true).create(true).truncate(false).open(&path);
-        let mut file = file.map_err(Error::io("open", &path))?;
+        let mut file = disk::open_or_create(&path).map_err(Error::io("open", &path))?;
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => {
                 let mut holder = String::new();
@@ -42,7 +42,8 @@ impl Lock {
             }
             _ => {}
         }
-        file.set_len(0).and_then(|()| write!(file, "{}", std::process::id())).map_err(Error::io("write", &path))?;
+        let process = || write!(WriteFrom { file: &file, at: 0 }, "{}", std::process::id());
+        disk::set_length(&file, 0).and_then(|()| process()).map_err(Error::io("write", &path))?;
         Ok(Lock { _file: file })
     }
 }

@@ -7,10 +7,11 @@
 //! The journal knows where each record is and the hash of its bytes. So a store can be opened again after a kill, whatever the kill
 //! left behind the last known record.
 
+use crate::disk::WriteFrom;
 use crate::job::durable::directory::STORE_FILES;
 use crate::job::durable::mapped::MappedSlice;
-use crate::positional_io::{read_exact_at, write_all_at};
-use crate::{Error, Result};
+use crate::positional_io::read_exact_at;
+use crate::{Error, Result, disk, fault};
 use bytemuck::Pod;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -18,7 +19,7 @@ use std::collections::HashMap;
 use std::fmt::Debug;
 use std::fs::File;
 use std::hash::Hash;
-use std::io::{self, BufWriter, Write};
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{PoisonError, RwLock};
@@ -59,24 +60,6 @@ pub struct RecordRef<K> {
     hash: u64,
 }
 
-/// Writes to a file from a place on, independent of the file's cursor.
-struct WriteFrom<'a> {
-    file: &'a File,
-    at: u64,
-}
-
-impl Write for WriteFrom<'_> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        write_all_at(self.file, bytes, self.at)?;
-        self.at += bytes.len() as u64;
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
 /// The results of all steps of a job, on disk. Several threads may write and read at the same time.
 #[derive(Debug)]
 pub struct Store<K> {
@@ -98,8 +81,8 @@ impl<K: RecordKey> Store<K> {
     /// [`Error::Io`] if a file cannot be made.
     pub fn create(paths: [PathBuf; STORE_FILES]) -> Result<Store<K>> {
         let create = |path: PathBuf| {
-            let file = File::options().read(true).write(true).create(true).truncate(true).open(&path);
-            Ok(StoreFile { file: file.map_err(Error::io("create", &path))?, path, end: AtomicU64::new(0) })
+            let file = disk::create(&path).map_err(Error::io("create", &path))?;
+            Ok(StoreFile { file, path, end: AtomicU64::new(0) })
         };
         let files = paths.into_iter().map(create).collect::<Result<_>>()?;
         Ok(Store { files, places: RwLock::default() })
@@ -121,8 +104,7 @@ impl<K: RecordKey> Store<K> {
         }
         let open = |(path, end): (PathBuf, u64)| {
             // If a file is missing, only its own records are lost.
-            let file = File::options().read(true).write(true).create(true).truncate(false).open(&path);
-            let file = file.map_err(Error::io("open", &path))?;
+            let file = disk::open_or_create(&path).map_err(Error::io("open", &path))?;
             Ok(StoreFile { path, file, end: AtomicU64::new(end) })
         };
         let files = paths.into_iter().zip(ends).map(open).collect::<Result<_>>()?;
@@ -140,7 +122,7 @@ impl<K: RecordKey> Store<K> {
     /// # Errors
     /// [`Error::Io`] if a file cannot be synced.
     pub fn sync(&self) -> Result<()> {
-        self.files.iter().try_for_each(|store| store.file.sync_data().map_err(Error::io("write", &store.path)))
+        self.files.iter().try_for_each(|store| disk::sync_data(&store.file).map_err(Error::io("write", &store.path)))
     }
 
     fn file(&self, key: K) -> &StoreFile {
@@ -187,7 +169,8 @@ impl<K: RecordKey> Store<K> {
     /// Reads `count` values from byte `at` of the file of `key` on.
     pub(crate) fn read<T: Pod>(&self, key: K, at: u64, count: usize) -> Result<MappedSlice<'static, T>> {
         let store = self.file(key);
-        MappedSlice::read(&store.file, at, count).map_err(Error::io("read", &store.path))
+        let outcome = fault::read("read-store").and_then(|()| MappedSlice::read(&store.file, at, count));
+        outcome.map_err(Error::io("read", &store.path))
     }
 
     /// Reads `count` values from byte `at` of the file of `key` on into memory of the caller's own.
@@ -195,7 +178,8 @@ impl<K: RecordKey> Store<K> {
         let store = self.file(key);
         let mut values = vec![T::zeroed(); count];
         let bytes = bytemuck::cast_slice_mut(&mut values);
-        read_exact_at(&store.file, bytes, at).map_err(Error::io("read", &store.path))?;
+        let outcome = fault::read("read-store").and_then(|()| read_exact_at(&store.file, bytes, at));
+        outcome.map_err(Error::io("read", &store.path))?;
         Ok(values)
     }
 

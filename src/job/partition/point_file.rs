@@ -2,8 +2,7 @@
 
 use crate::input::Point;
 use crate::job::durable::mapped::{MappedFile, MappedSlice};
-use crate::positional_io::write_all_at;
-use crate::{Error, Result};
+use crate::{Error, Result, disk, fault};
 use bytemuck::{Pod, Zeroable};
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -37,7 +36,7 @@ impl PointFile {
     /// # Errors
     /// [`Error::Io`] if it cannot be made.
     pub fn create(path: &Path) -> Result<PointFile> {
-        let file = File::options().read(true).write(true).create(true).truncate(true).open(path);
+        let file = disk::create(path);
         Ok(PointFile {
             path: path.to_path_buf(),
             file: file.map_err(Error::io("create", path))?,
@@ -68,7 +67,7 @@ impl PointFile {
     pub fn append(&self, points: &[Point]) -> Result<PointBlock> {
         let first = self.points.fetch_add(points.len() as u64, Ordering::Relaxed);
         let at = first * size_of::<Point>() as u64;
-        write_all_at(&self.file, bytemuck::cast_slice(points), at).map_err(Error::io("write", &self.path))?;
+        disk::write_all_at(&self.file, bytemuck::cast_slice(points), at).map_err(Error::io("write", &self.path))?;
         Ok(PointBlock { first, points: points.len() as u32, hash: hash(points) })
     }
 
@@ -83,7 +82,8 @@ impl PointFile {
     /// [`Error::Io`] if they cannot be read.
     pub fn read(&self, block: PointBlock) -> Result<MappedSlice<'_, Point>> {
         let at = block.first * size_of::<Point>() as u64;
-        self.map.slice(&self.file, at, block.points as usize).map_err(Error::io("read", &self.path))
+        let slice = || self.map.slice(&self.file, at, block.points as usize);
+        fault::read("read-points").and_then(|()| slice()).map_err(Error::io("read", &self.path))
     }
 }
 

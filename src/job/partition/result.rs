@@ -6,6 +6,7 @@ use crate::job::durable::columns::{ColumnReader, ColumnWriter};
 use crate::job::index::TileIndex;
 use crate::job::partition::point_file::PointBlock;
 use crate::job::partition::tree::Tree;
+use crate::job::plan::input_identity::RenamedInputs;
 use crate::job::plan::job_plan::SkippedInput;
 use crate::job::records::{RecordRef, StepRecord, Store};
 use crate::{Error, Result};
@@ -47,6 +48,12 @@ impl Partition {
     /// Returns the number of points in `tile`.
     pub fn points(&self, tile: TileIndex) -> u64 {
         self.blocks[tile.get()].iter().map(|block| block.points as u64).sum()
+    }
+
+    /// Calls the inputs what they are called by now.
+    pub(crate) fn rename_inputs(&mut self, renamed: &RenamedInputs) {
+        self.skipped.iter_mut().for_each(|skipped| skipped.rename(renamed));
+        self.summary.counts.examples.iter_mut().for_each(|example| renamed.rename_in(example));
     }
 
     /// Writes its record.

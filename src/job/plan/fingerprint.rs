@@ -1,19 +1,13 @@
 //! What identifies a job: whether a run may go on from what an earlier one left.
 
 use crate::job::options::JobOptions;
+use crate::job::plan::input_identity::{InputIdentities, RenamedInputs};
 use crate::job::plan::inputs::input_paths;
 use crate::job::plan::lattice_choice::LatticeCoarsening;
 use crate::output::options::ColorChoice;
-use crate::positional_io::read_exact_at;
 use crate::{Error, Result};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
-use std::collections::HashMap;
-use std::fs::File;
-use std::path::{Path, PathBuf};
-use std::time::SystemTime;
-use xxhash_rust::xxh3::Xxh3;
 
 /// The first line of a job's journal.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -29,7 +23,7 @@ pub struct JobHeader {
 pub(crate) const LAYOUT: u32 = 6;
 
 /// What the results of a job depend on.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Fingerprint {
     /// Program, version, [`LAYOUT`] and byte order: the files in the job directory are not for exchange.
     program: String,
@@ -38,21 +32,9 @@ pub struct Fingerprint {
     /// The options that only the style of the tiles depends on.
     style: Map<String, Value>,
     /// The inputs.
-    files: Vec<InputIdentity>,
+    files: InputIdentities,
     /// The memory limit in bytes. Only the number of levels depends on it.
     pub memory: u64,
-}
-
-/// What identifies an input file.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-struct InputIdentity {
-    /// As the report names it.
-    path: PathBuf,
-    bytes: u64,
-    /// When it was written, in nanoseconds since 1970.
-    modified: u64,
-    /// The XXH3 of its beginning, its end and samples between them.
-    samples: u64,
 }
 
 /// How a job differs from an earlier one.
@@ -84,7 +66,7 @@ impl Fingerprint {
             mesh,
             style: named_values(&options.output, "output", &["directory"])?,
             memory: options.limits.memory.0,
-            files: paths.par_iter().map(|path| InputIdentity::of(path)).collect::<Result<_>>()?,
+            files: InputIdentities::of(&paths)?,
         })
     }
 
@@ -94,13 +76,23 @@ impl Fingerprint {
             return JobChange::Mesh(format!("the program ({}, now {})", earlier.program, self.program));
         }
         let mut mesh = changed_values(&earlier.mesh, &self.mesh);
-        mesh.extend(changed_files(&earlier.files, &self.files));
+        mesh.extend(self.files.since(&earlier.files));
         let style = changed_values(&earlier.style, &self.style);
         match (mesh.is_empty(), style.is_empty()) {
             (false, _) => JobChange::Mesh(first_few(mesh)),
             (true, false) => JobChange::Style(first_few(style)),
             (true, true) => JobChange::Nothing,
         }
+    }
+
+    /// Returns what the inputs are called by now, where nothing else about them has changed since `earlier`.
+    pub(crate) fn renamed_inputs(&self, earlier: &Fingerprint) -> RenamedInputs {
+        self.files.renamed_since(&earlier.files)
+    }
+
+    /// Returns this fingerprint with the inputs called as in `earlier`: what an earlier run wrote calls them so.
+    pub(crate) fn with_names_of(&self, earlier: &Fingerprint) -> Fingerprint {
+        Fingerprint { files: earlier.files.clone(), ..self.clone() }
     }
 }
 
@@ -119,58 +111,10 @@ fn changed_values(earlier: &Map<String, Value>, now: &Map<String, Value>) -> Vec
     now.keys().filter(differs).chain(gone).cloned().collect()
 }
 
-fn changed_files(earlier: &[InputIdentity], now: &[InputIdentity]) -> Vec<String> {
-    let by_path = |files: &'_ [InputIdentity]| files.iter().map(|file| (file.path.clone(), file.clone())).collect();
-    let (known, present): (HashMap<_, _>, HashMap<_, _>) = (by_path(earlier), by_path(now));
-    let change = |file: &InputIdentity| match known.get(&file.path) {
-        Some(other) if other == file => None,
-        Some(_) => Some(file.path.display().to_string()),
-        None => Some(format!("{} (new)", file.path.display())),
-    };
-    let gone = earlier.iter().filter(|file| !present.contains_key(&file.path));
-    let gone = gone.map(|file| format!("{} (gone)", file.path.display()));
-    let changed: Vec<String> = now.iter().filter_map(change).chain(gone).collect();
-    let reordered = changed.is_empty() && earlier != now;
-    if reordered { vec!["the order of the inputs".into()] } else { changed }
-}
-
 /// Returns the first few of `names` as a text.
 fn first_few(names: Vec<String>) -> String {
     const MAX_NAMES: usize = 5;
     let more = names.len().saturating_sub(MAX_NAMES);
     let named = names[..names.len() - more].join(", ");
     if more > 0 { format!("{named} and {more} more") } else { named }
-}
-
-/// Bytes that are hashed at the beginning and at the end of a file.
-const END_BYTES: u64 = 64 << 10;
-/// Bytes of a sample between them.
-const SAMPLE_BYTES: u64 = 4 << 10;
-/// The number of samples between them.
-const SAMPLES: u64 = 16;
-
-impl InputIdentity {
-    fn of(path: &Path) -> Result<InputIdentity> {
-        let file = File::open(path).map_err(Error::io("read", path))?;
-        let data = file.metadata().map_err(Error::io("read", path))?;
-        let modified = data.modified().ok().and_then(|time| time.duration_since(SystemTime::UNIX_EPOCH).ok());
-        Ok(InputIdentity {
-            path: path.to_path_buf(),
-            bytes: data.len(),
-            modified: modified.map_or(0, |age| age.as_nanos() as u64),
-            samples: hash_of_samples(&file, data.len()).map_err(Error::io("read", path))?,
-        })
-    }
-}
-
-fn hash_of_samples(file: &File, bytes: u64) -> std::io::Result<u64> {
-    let last = bytes.saturating_sub(END_BYTES);
-    let between = (1..=SAMPLES).map(|i| (last / (SAMPLES + 1) * i, SAMPLE_BYTES));
-    let (mut hasher, mut buffer) = (Xxh3::new(), Vec::new());
-    for (at, length) in [(0, END_BYTES), (last, END_BYTES)].into_iter().chain(between) {
-        buffer.resize(length.min(bytes - at) as usize, 0);
-        read_exact_at(file, &mut buffer, at)?;
-        hasher.update(&buffer);
-    }
-    Ok(hasher.digest())
 }

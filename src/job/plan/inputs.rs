@@ -2,13 +2,14 @@
 
 use crate::input::options::{InputOptions, OnBadFile};
 use crate::input::{RowChoice, Source, open_chosen};
+use crate::job::plan::input_identity::place;
 use crate::job::plan::job_plan::SkippedInput;
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-/// Returns the files that the options name, in their order, each once.
+/// Returns the files that the options name, in their order, each once: two paths that lead to the same file count as one.
 ///
 /// # Errors
 /// [`Error::Config`] if a pattern names none, [`Error::Io`] if a folder cannot be read.
@@ -19,7 +20,7 @@ pub fn input_paths(options: &InputOptions) -> Result<Vec<PathBuf>> {
         if found.is_empty() {
             return Err(Error::Config(format!("[input] files: {}", nothing_at(pattern))));
         }
-        paths.extend(found.into_iter().filter(|path| known.insert(path.clone())));
+        paths.extend(found.into_iter().filter(|path| known.insert(place(path))));
     }
     Ok(paths)
 }

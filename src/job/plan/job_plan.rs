@@ -7,6 +7,7 @@ use crate::input::PointRules;
 use crate::input::Source;
 use crate::job::durable::atomic_file::{PendingFile, write_pending};
 use crate::job::options::JobOptions;
+use crate::job::plan::input_identity::RenamedInputs;
 use crate::job::plan::lattice_choice::LatticeCoarsening;
 use crate::output::frame::Frame;
 use crate::{Error, Result, Warnings};
@@ -60,12 +61,27 @@ pub struct SkippedInput {
     pub why: String,
 }
 
+impl SkippedInput {
+    /// Calls the input what it is called by now.
+    pub(crate) fn rename(&mut self, renamed: &RenamedInputs) {
+        renamed.rename(&mut self.file);
+        renamed.rename_in(&mut self.why);
+    }
+}
+
 impl Plan {
     /// Returns what the user should know about the options and the inputs.
     pub fn all_warnings(&self) -> Warnings {
         let mut warnings = self.options.warnings.clone();
         warnings.extend(self.warnings.clone());
         warnings
+    }
+
+    /// Calls the inputs what they are called by now.
+    pub(crate) fn rename_inputs(&mut self, renamed: &RenamedInputs) {
+        self.inputs.iter_mut().for_each(|input| renamed.rename(&mut input.source.path));
+        self.skipped.iter_mut().for_each(|skipped| skipped.rename(renamed));
+        self.warnings.iter_mut().for_each(|warning| renamed.rename_in(warning));
     }
 
     /// Writes the plan as the pending file at `path`.

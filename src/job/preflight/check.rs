@@ -52,9 +52,11 @@ pub struct Preflight {
     /// The least number of bytes that the disk must have. With room for all files, results are written while all temporary files
     /// still exist; with less, some of these are removed before.
     pub disk: u64,
-    /// Bytes free on the disk of the output directory, including what an earlier job takes there; `None` if the system does not
+    /// Bytes free on the disk of the output directory, including what an interrupted run takes there; `None` if the system does not
     /// tell.
     pub disk_free: Option<u64>,
+    /// Bytes that the results of an earlier job take in the output directory. They stay until the new ones are whole.
+    pub disk_earlier: u64,
     /// The output directory.
     pub output: PathBuf,
     /// The backend that triangulates.
@@ -126,7 +128,8 @@ impl Preflight {
             results,
             // The points may go before the results come.
             disk: store + points.max(results),
-            disk_free: machine::free_disk(&options.output.directory).map(|free| free + estimate::replaced_bytes(plan)),
+            disk_free: machine::free_disk(&options.output.directory).map(|free| free + estimate::own_bytes(plan)),
+            disk_earlier: estimate::earlier_bytes(plan),
             output: options.output.directory.clone(),
             backend: format!("{:?}", options.triangulation.backend).to_lowercase(),
             warnings: plan.all_warnings(),
@@ -147,9 +150,10 @@ impl Preflight {
         machine::check_writable(&self.output)?;
         if let Some(free) = self.disk_free.filter(|free| *free < self.disk) {
             let what = format!(
-                "the job takes about {} there, and {} are free or its own already (--force runs it anyway)",
+                "the job takes about {} there, and {} are free or its own already{} (--force runs it anyway)",
                 mebibytes(self.disk),
-                mebibytes(free)
+                mebibytes(free),
+                self.earlier_results()
             );
             return Err(Error::io("write to", &self.output)(io::Error::new(io::ErrorKind::StorageFull, what)));
         }
@@ -161,6 +165,17 @@ impl Preflight {
                 mebibytes(free)
             ))),
             None => Ok(()),
+        }
+    }
+
+    /// Returns what a small disk would gain without the results of an earlier job, or nothing.
+    fn earlier_results(&self) -> String {
+        match self.disk_earlier {
+            0 => String::new(),
+            bytes => format!(
+                "; the results of an earlier job, {}, stay until the new ones are whole: without them there is more room",
+                mebibytes(bytes)
+            ),
         }
     }
 }
@@ -186,6 +201,12 @@ impl fmt::Display for Preflight {
         row("temporary files", format!("about {}", mebibytes(self.temporary)))?;
         row("results", format!("about {}", mebibytes(self.results)))?;
         row("disk", format!("at least about {}, {} free", mebibytes(self.disk), free(self.disk_free)))?;
+        if self.disk_earlier > 0 {
+            row(
+                "earlier results",
+                format!("{}, which stay until the new ones are whole", mebibytes(self.disk_earlier)),
+            )?;
+        }
         for warning in self.warnings.iter() {
             writeln!(f, "warning: {warning}")?;
         }

@@ -1,6 +1,7 @@
 //! Estimates of the disk and the memory that a job needs.
 
 use crate::input::Point;
+use crate::job::durable::directory::JobDirectory;
 use crate::job::levels::hierarchy::{BYTES_PER_LEVEL_SITE, LevelSizes};
 use crate::job::machine;
 use crate::job::options::JobOptions;
@@ -9,8 +10,8 @@ use crate::job::plan::budget::{BYTES_PER_LEAF_SITE, read_buffer_memory};
 use crate::job::plan::job_plan::Plan;
 use crate::job::preflight::kept_points::KeptPoints;
 use crate::output::Compression;
-use crate::output::file_names::OutputFiles;
 use crate::output::preview::canvas::{LONGER_SIDE, PreviewPixel};
+use std::path::PathBuf;
 
 /// Bytes that the store takes for a site: its position, colour, class and two triangles.
 const STORE_PER_SITE: u64 = 12 + 6 + 1 + 2 * 12;
@@ -99,12 +100,20 @@ fn level_memory(options: &JobOptions, points: u64, threads: usize) -> u64 {
     if options.output.levels { (one * threads as u64).min(sizes.memory) } else { 0 }
 }
 
-/// Returns the bytes of the files that an earlier job left and that this one replaces.
-pub(crate) fn replaced_bytes(plan: &Plan) -> u64 {
-    let output = OutputFiles::new(&plan.options.output.directory);
-    let mut folders = vec![output.directory().to_path_buf(), output.job()];
-    folders.extend(output.glb_folders());
-    let entries = folders.iter().filter_map(|folder| std::fs::read_dir(folder).ok());
-    let files = entries.flatten().flatten().filter_map(|entry| entry.metadata().ok()).filter(|meta| meta.is_file());
-    files.map(|meta| meta.len()).sum()
+/// Returns the bytes of the files that an interrupted run left and that this one takes over or replaces.
+pub(crate) fn own_bytes(plan: &Plan) -> u64 {
+    let directory = JobDirectory::new(&plan.options.output.directory);
+    let entries = std::fs::read_dir(directory.job()).into_iter().flatten().flatten();
+    bytes_of(entries.map(|entry| entry.path())) + bytes_of(directory.waiting_results())
+}
+
+/// Returns the bytes of the results of an earlier job, which stay until those of this one are whole.
+pub(crate) fn earlier_bytes(plan: &Plan) -> u64 {
+    bytes_of(JobDirectory::new(&plan.options.output.directory).earlier_results())
+}
+
+/// Returns the bytes of those of `paths` that are files.
+fn bytes_of(paths: impl IntoIterator<Item = PathBuf>) -> u64 {
+    let data = paths.into_iter().filter_map(|path| path.metadata().ok());
+    data.filter(|data| data.is_file()).map(|data| data.len()).sum()
 }

@@ -22,7 +22,6 @@ use crate::job::run::threads::on_threads;
 use crate::triangulation::Triangulator;
 use crate::{Error, Result};
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Give up after this many tenfold coarsenings: what is left is no terrain.
 const MAX_COARSENINGS: u32 = 6;
@@ -79,10 +78,12 @@ pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, walk: Wal
     }
 }
 
-/// Reads what an earlier run left, unless the job is to start over. Whether it left a part of its results counts in any case.
+/// Reads what an earlier run left, unless the job is to start over. If it left all its results, they take their places in any case:
+/// it may have been cut off among them.
 fn read_earlier(directory: &JobDirectory, run: RunOptions) -> Result<Option<EarlierRun>> {
     let mut earlier = EarlierRun::read(directory)?;
     if let Some(earlier) = earlier.as_mut() {
+        earlier.place_whole_results(directory)?;
         if run.restart {
             earlier.forget();
         } else if !earlier.is_readable() {
@@ -132,7 +133,7 @@ fn attempt(
     }
     on_threads(threads, || {
         let start = resume::start(directory, &header, earlier, options.output.max_edge, run.progress)?;
-        let RunStart { store, journal, partition, kept, has_partial_results } = start;
+        let RunStart { store, journal, partition } = start;
         let context = RunContext {
             triangulator: &job.triangulator,
             directory,
@@ -141,35 +142,38 @@ fn attempt(
             progress,
             threads,
             clock,
-            kept,
-            has_partial_results: AtomicBool::new(has_partial_results),
             stages: Mutex::new(vec![planned]),
         };
         let outcome = (job.walk)(&context, plan, partition);
-        let has_partial_results = context.has_partial_results.load(Ordering::Relaxed);
         drop(context);
         // Finished steps reach the disk before a message says that they are kept.
         let steps = journal.close();
         // An open file is not freed when it is removed.
         drop(store);
-        end(directory, outcome, steps, has_partial_results)
+        end(directory, outcome, steps)
     })
 }
 
-/// Ends an attempt: keeps the finished steps if the job can go on from them, or else removes them.
-fn end(directory: &JobDirectory, outcome: Result<Report>, steps: u64, has_partial_results: bool) -> Result<Report> {
+/// Ends an attempt: puts the results in place, or keeps the finished steps if the job can go on from them. Removes everything else.
+fn end(directory: &JobDirectory, outcome: Result<Report>, steps: u64) -> Result<Report> {
+    let outcome = outcome.and_then(|report| {
+        let run = EarlierRun::read(directory)?;
+        run.map_or(Ok(()), |run| run.place_results(directory))?;
+        Ok(report)
+    });
     match outcome {
-        Err(why) if why.exit_code() == 1 && steps > 0 => {
+        Err(why) if may_go_on(&why) && steps > 0 => {
             Err(Error::Resumable { why: Box::new(why), steps, job: directory.job().into() })
         }
         outcome => {
-            let withdrawn = match outcome.is_err() && has_partial_results {
-                true => directory.withdraw_results(),
-                false => Ok(()),
-            };
+            let cleaned = directory.remove_job();
             // The first error is the one to report.
-            let cleaned = withdrawn.and_then(|()| directory.remove_job());
             outcome.and_then(|report| cleaned.map(|()| report))
         }
     }
+}
+
+/// Tells whether another run can make use of the finished steps: with the same options, or with others for how tiles look.
+fn may_go_on(why: &Error) -> bool {
+    why.exit_code() == 1 || matches!(why, Error::Config(_))
 }

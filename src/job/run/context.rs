@@ -9,9 +9,6 @@ use crate::job::progress::stage::{JobProgress, Stage};
 use crate::job::progress::stats::StageStats;
 use crate::job::records::{JobStep, Journal, Store};
 use crate::triangulation::Triangulator;
-use std::collections::HashSet;
-use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// A run whose directory is locked, with its store and journal.
@@ -23,10 +20,6 @@ pub(crate) struct RunContext<'a> {
     pub(crate) progress: &'a JobProgress,
     pub(crate) threads: usize,
     pub(crate) clock: JobClock,
-    /// The results of an earlier run that stay, as the journal names them.
-    pub(crate) kept: HashSet<PathBuf>,
-    /// Whether the output directory may hold a part of this job's results.
-    pub(crate) has_partial_results: AtomicBool,
     /// The stages that have ended.
     pub(crate) stages: Mutex<Vec<StageStats>>,
 }
@@ -45,12 +38,6 @@ impl RunContext<'_> {
     /// Returns the stages that have ended.
     pub(crate) fn stages(&self) -> MutexGuard<'_, Vec<StageStats>> {
         self.stages.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Notes that from now on the output directory holds a part of this job's results, and removes those of an earlier job.
-    pub(crate) fn begin_results(&self) -> Result<()> {
-        self.has_partial_results.store(true, Ordering::Relaxed);
-        self.directory.remove_results(&self.kept)
     }
 
     /// Removes the points. At `all_leaves` the journal has all leaves: from there on the store is enough.

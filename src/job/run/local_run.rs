@@ -53,11 +53,11 @@ pub(crate) fn mesh_and_tiles(
         let canvas = Canvas::new(&style.frame, bounds);
         Ok((style, canvas))
     };
-    let writes_at_once = may_write_at_once(run, plan, KeptPoints(partition.summary.counts.kept));
+    let writes_at_once = may_write_at_once(plan, KeptPoints(partition.summary.counts.kept));
     let walked = rayon::scope(|scope| {
         if writes_at_once {
             // The number of sites matters only to a rule for which the tiles have to wait.
-            queue.attempt(|| style(0).and_then(|(style, canvas)| queue.begin(scope, style, canvas)))?;
+            queue.attempt(|| style(0).map(|(style, canvas)| queue.begin(scope, style, canvas)))?;
         }
         let leaves = walk.walk(scope, NodeIndex::ROOT)?;
         queue.attempt(|| walk.check_merged())?;
@@ -67,7 +67,7 @@ pub(crate) fn mesh_and_tiles(
         if !writes_at_once {
             // Not while tiles are written: on a small disk the results need the room.
             let style = || run_concurrently(|| run.remove_points(all_leaves), || style(leaves.sites));
-            queue.attempt(|| style().and_then(|(style, canvas)| queue.begin(scope, style, canvas)))?;
+            queue.attempt(|| style().map(|(style, canvas)| queue.begin(scope, style, canvas)))?;
         }
         Some((leaves, all_leaves))
     });
@@ -84,12 +84,10 @@ fn open_points(run: &RunContext, partition: &Partition) -> Result<Option<PointFi
     if all_done { Ok(None) } else { PointFile::open(&run.directory.points()).map(Some) }
 }
 
-/// Tells whether tiles may be written before all are triangulated. They must wait if they replace the results of an earlier job,
-/// because this one may still fail; if all sites decide how a tile looks; and if the disk has no room for them besides the points.
-fn may_write_at_once(run: &RunContext, plan: &Plan, kept: KeptPoints) -> bool {
-    !run.directory.output().report().exists()
-        && plan.options.output.max_edge != MaxEdge::Auto
-        && has_room_besides_points(plan, kept, MAX_TRIANGLES_IN_ONE_FILE)
+/// Tells whether tiles may be written before all are triangulated. They must wait if all sites decide how a tile looks, and if the
+/// disk has no room for them besides the points.
+fn may_write_at_once(plan: &Plan, kept: KeptPoints) -> bool {
+    plan.options.output.max_edge != MaxEdge::Auto && has_room_besides_points(plan, kept, MAX_TRIANGLES_IN_ONE_FILE)
 }
 
 /// Returns the rule that leaves triangles out.

@@ -4,7 +4,7 @@
 //! nothing but the job. So a step that runs again writes the same as before, and the steps after it stay.
 
 use crate::job::durable::directory::{JobDirectory, STORE_FILES};
-use crate::job::durable::journal;
+use crate::job::durable::journal::{self, PublishedFile};
 use crate::job::index::{NodeIndex, TileIndex};
 use crate::job::options::JobOptions;
 use crate::job::partition::point_file::PointFile;
@@ -26,8 +26,8 @@ pub(crate) struct EarlierRun {
     /// `None` if another version of the program wrote the journal, or it is damaged.
     header: Option<JobHeader>,
     entries: Vec<JournalEntry>,
-    /// Whether the run left a part of its results. Before it wrote them, it removed those of the job before, with their report.
-    has_partial_results: bool,
+    /// Whether all its results are in place.
+    is_complete: bool,
 }
 
 impl EarlierRun {
@@ -36,12 +36,39 @@ impl EarlierRun {
     /// # Errors
     /// [`Error::Io`] if it cannot be read.
     pub(crate) fn read(directory: &JobDirectory) -> Result<Option<EarlierRun>> {
-        let Some((header, entries)) = journal::read::<JobHeader, JobStep, _>(directory)? else { return Ok(None) };
-        // What an unreadable journal tells of is unknown.
-        let may_have_written = |entry: &JournalEntry| matches!(entry.step, JobStep::WriteTile(_));
-        let has_written = header.is_none() || entries.iter().any(may_have_written);
-        let has_partial_results = has_written && !directory.output().report().exists();
-        Ok(Some(EarlierRun { header, entries, has_partial_results }))
+        let run = journal::read::<JobHeader, JobStep, _>(directory)?;
+        Ok(run.map(|(header, entries)| EarlierRun { header, entries, is_complete: false }))
+    }
+
+    /// Puts the results in place if the run had written them all. From then on they are what the output directory holds, whatever
+    /// this run does.
+    ///
+    /// # Errors
+    /// As [`JobDirectory::replace_results`].
+    pub(crate) fn place_whole_results(&mut self, directory: &JobDirectory) -> Result<()> {
+        let is_whole = |file: &PublishedFile| {
+            interrupt::check()?;
+            Ok(file.is_whole(directory) || file.is_in_place(directory))
+        };
+        let is_written = self.entries.iter().any(|entry| entry.step == JobStep::Report);
+        if !is_written || !self.results(directory).try_fold(true, |all, file| Ok(all && is_whole(file)?))? {
+            return Ok(());
+        }
+        self.is_complete = true;
+        self.place_results(directory)
+    }
+
+    /// Puts the results in place.
+    ///
+    /// # Errors
+    /// As [`JobDirectory::replace_results`].
+    pub(crate) fn place_results(&self, directory: &JobDirectory) -> Result<()> {
+        directory.replace_results(&self.results(directory).map(|file| file.name.clone()).collect())
+    }
+
+    fn results<'a>(&'a self, directory: &'a JobDirectory) -> impl Iterator<Item = &'a PublishedFile> {
+        let files = self.entries.iter().flat_map(|entry| &entry.files);
+        files.filter(|file| directory.is_result(&file.name))
     }
 
     /// Tells whether its journal can be read.
@@ -53,6 +80,7 @@ impl EarlierRun {
     pub(crate) fn forget(&mut self) {
         self.header = None;
         self.entries.clear();
+        self.is_complete = false;
     }
 
     /// Returns how much coarser the lattice became, if the job with this fingerprint has the same mesh.
@@ -68,8 +96,10 @@ impl EarlierRun {
         let entry = self.entries.iter().find(|entry| entry.step == JobStep::Partition)?;
         let is_same = self.coarsening(&header.fingerprint) == Some(header.coarsening);
         let plan = is_same && entry.files.iter().all(|file| file.is_whole(directory));
-        let plan = plan.then(|| Plan::read(&directory.plan()).ok())??;
-        Some(Plan { options: options.clone(), ..plan })
+        let mut plan = plan.then(|| Plan::read(&directory.plan()).ok())??;
+        plan.options = options.clone();
+        plan.rename_inputs(&header.fingerprint.renamed_inputs(&self.header.as_ref()?.fingerprint));
+        Some(plan)
     }
 
     /// Returns the report of the job with `header` if the run was interrupted only while it cleaned up.
@@ -77,16 +107,13 @@ impl EarlierRun {
     /// # Errors
     /// [`Error::Io`] if the report cannot be read.
     pub(crate) fn complete_report(&self, directory: &JobDirectory, header: &JobHeader) -> Result<Option<Report>> {
-        let is_written = |entry: &JournalEntry| {
-            entry.step == JobStep::Report && entry.files.iter().all(|file| file.is_whole(directory))
-        };
         let is_same = self.header.as_ref().is_some_and(|old| {
             old.coarsening == header.coarsening && header.fingerprint.since(&old.fingerprint) == JobChange::Nothing
         });
-        if !is_same || !self.entries.iter().any(is_written) {
+        if !is_same || !self.is_complete {
             return Ok(None);
         }
-        let path = directory.output().report();
+        let path = directory.results().report();
         let text = std::fs::read(&path).map_err(Error::io("read", &path))?;
         Ok(serde_json::from_slice(&text).ok())
     }
@@ -100,10 +127,6 @@ pub(crate) struct RunStart<'a> {
     pub(crate) journal: Journal<'a>,
     /// What reading the points found, if that is finished.
     pub(crate) partition: Option<Partition>,
-    /// The files that stay, as the journal names them.
-    pub(crate) kept: HashSet<PathBuf>,
-    /// Whether the output directory holds a part of the results.
-    pub(crate) has_partial_results: bool,
 }
 
 /// Begins a run of the job with `header` in its locked directory: takes over what is the same and whole from the earlier run, and
@@ -118,22 +141,18 @@ pub(crate) fn start<'a>(
     max_edge: MaxEdge,
     progress: ProgressOutput,
 ) -> Result<RunStart<'a>> {
-    let has_partial_results = earlier.as_ref().is_some_and(|earlier| earlier.has_partial_results);
     let kept = earlier.map(|earlier| review(directory, header, earlier, max_edge, progress)).transpose()?;
-    let KeptSteps { entries, files, partition } = kept.flatten().unwrap_or_default();
-    if has_partial_results && entries.is_empty() {
-        // Once the old journal is gone, nothing tells whose results they are.
-        directory.remove_results(&HashSet::new())?;
-    }
+    let KeptSteps { entries, files, partition, names } = kept.flatten().unwrap_or_default();
     if !entries.is_empty() {
         progress.note(&format!("going on with an interrupted run: {} steps are done", entries.len()));
     }
     let records: Vec<RecordRef> = entries.iter().flat_map(|entry| &entry.records).copied().collect();
-    let journal = Journal::begin(directory, header, entries)?;
-    directory.remove_job_files(&files)?;
+    let header = JobHeader { fingerprint: names.unwrap_or(header.fingerprint.clone()), ..*header };
+    let journal = Journal::begin(directory, &header, entries)?;
+    directory.clear(&files)?;
     let paths: [PathBuf; STORE_FILES] = directory.store();
     let store = if records.is_empty() { Store::create(paths)? } else { Store::open(paths, records.iter())? };
-    Ok(RunStart { store, journal, partition, kept: files, has_partial_results })
+    Ok(RunStart { store, journal, partition })
 }
 
 /// The steps that stay, and what they left.
@@ -143,6 +162,8 @@ struct KeptSteps {
     /// The files that later steps need, as the journal names them.
     files: HashSet<PathBuf>,
     partition: Option<Partition>,
+    /// The fingerprint of the job with the names of the inputs that these steps know.
+    names: Option<Fingerprint>,
 }
 
 /// Returns the steps of an earlier run that stay, or `None` if the job starts over.
@@ -176,8 +197,13 @@ fn review(
     }
     let stage = progress.stage("check", entries.len() as u64, "steps");
     let counts_leaves = max_edge == MaxEdge::Auto;
-    let kept = ResumeReview::of(directory, entries, counts_leaves, &stage)?.map(ResumeReview::into_kept);
+    let mut kept = ResumeReview::of(directory, entries, counts_leaves, &stage)?.map(ResumeReview::into_kept);
     stage.finish();
+    if let Some(kept) = kept.as_mut() {
+        let renamed = header.fingerprint.renamed_inputs(&old.fingerprint);
+        kept.partition.iter_mut().for_each(|partition| partition.rename_inputs(&renamed));
+        kept.names = Some(header.fingerprint.with_names_of(&old.fingerprint));
+    }
     if kept.is_none() {
         progress.note("what the interrupted run left is damaged; starting over");
     }
@@ -286,6 +312,6 @@ impl ResumeReview {
         files.extend(self.directory.store().iter().map(|path| self.directory.name(path)));
         // The journal must not depend on the order of a hash map.
         entries.sort_by_key(|entry| entry.step);
-        KeptSteps { entries, files, partition: Some(self.partition) }
+        KeptSteps { entries, files, partition: Some(self.partition), names: None }
     }
 }

@@ -63,19 +63,14 @@ impl<'a> TileQueue<'a> {
         }
     }
 
-    /// Lets tiles be written from now on, beginning with those that are finished already. Removes the results of an earlier job.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if these cannot be removed.
-    pub(crate) fn begin<'s>(&'s self, scope: &Scope<'s>, style: TileStyle, canvas: Canvas) -> Result<()> {
-        self.run.begin_results()?;
+    /// Lets tiles be written from now on, beginning with those that are finished already.
+    pub(crate) fn begin<'s>(&'s self, scope: &Scope<'s>, style: TileStyle, canvas: Canvas) {
         let mut state = self.state();
         // The lock is held here, so that no thread holds back a tile after these are taken.
         self.style.get_or_init(|| (style, canvas));
         let held = std::mem::take(&mut state.held);
         drop(state);
         held.into_iter().for_each(|tile| self.start(scope, tile));
-        Ok(())
     }
 
     /// Takes a finished tile.

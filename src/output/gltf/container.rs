@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use crate::{Error, Result};
+use crate::{Error, Result, fault};
 
 const MAGIC: u32 = u32::from_le_bytes(*b"glTF");
 const VERSION: u32 = 2;
@@ -29,7 +29,7 @@ impl GlbFile {
         if !path.metadata().map_err(Error::io("open", path))?.is_file() {
             return Err(Error::input(path, "is not a regular file"));
         }
-        let mut file = File::open(path).map_err(Error::io("open", path))?;
+        let mut file = fault::read("read-result").and_then(|()| File::open(path)).map_err(Error::io("open", path))?;
         let size = file.metadata().map_err(Error::io("read", path))?.len();
         let damaged = |what: &str| Error::input(path, format!("not a whole GLB file: {what}"));
         if size < 20 {

@@ -1,7 +1,6 @@
 //! Joins tile files into one scene, for viewers that open a single file. What `EXT_meshopt_compression` packs is unpacked,
 //! because not all viewers know that extension.
 
-use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
@@ -11,12 +10,13 @@ use gltf::json::scene::Scene;
 use gltf::json::validation::{Checked::Valid, USize64};
 use gltf::json::{Index, Root};
 
+use crate::disk::WriteFrom;
 use crate::output::gltf::check_json::{Decoded, RawDocument};
 use crate::output::gltf::container::{GlbFile, write_head};
 use crate::output::gltf::document::{asset, buffer};
 use crate::output::gltf::schema::{QUANTIZATION, to_text};
 use crate::output::gltf::stored_view::StoredView;
-use crate::{Error, Result, interrupt};
+use crate::{Error, Result, disk, interrupt};
 
 /// Writes to `out` one GLB file with all tiles (GLB files of one job, at least one) as nodes of one scene, in this order.
 /// One tile is held in memory at a time, and the descriptions of all.
@@ -33,8 +33,8 @@ pub fn write_terrain(out: &Path, tiles: &[PathBuf]) -> Result<()> {
     let length = joined.length;
     let mut head = Vec::new();
     write_head(joined.finish()?, length, &mut head)?;
-    let file = File::create(out).map_err(Error::io("create", out))?;
-    let mut file = BufWriter::with_capacity(1 << 20, file);
+    let file = disk::create(out).map_err(Error::io("create", out))?;
+    let mut file = BufWriter::with_capacity(1 << 20, WriteFrom { file: &file, at: 0 });
     file.write_all(&head).map_err(Error::io("write", out))?;
     let mut written = 0;
     for path in tiles {

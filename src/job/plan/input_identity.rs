@@ -1,0 +1,189 @@
+//! What identifies an input: whether a file is the one that an earlier run read, whatever it is called by now.
+
+use crate::positional_io::read_exact_at;
+use crate::{Error, Result, fault};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::HashSet;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+use xxhash_rust::xxh3::Xxh3;
+
+/// The inputs of a job in their order.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct InputIdentities(Vec<InputIdentity>);
+
+/// What identifies an input file.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct InputIdentity {
+    /// As messages and the report name it. It depends on the working directory.
+    path: PathBuf,
+    /// Its place, whatever the working directory, and however many links lead there. It changes with a folder that is moved.
+    place: String,
+    content: ContentIdentity,
+}
+
+/// What identifies the content of a file. With the same content the mesh is the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+struct ContentIdentity {
+    bytes: u64,
+    /// When it was written, in nanoseconds since 1970.
+    modified: u64,
+    /// The XXH3 of its beginning, its end and samples between them.
+    samples: u64,
+}
+
+/// Returns the place of the file at `path`: the same for all paths that lead to it.
+pub(crate) fn place(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_path_buf())
+}
+
+impl InputIdentities {
+    /// Returns the identities of the files at `paths`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if one cannot be read.
+    pub(crate) fn of(paths: &[PathBuf]) -> Result<InputIdentities> {
+        paths.par_iter().map(|path| InputIdentity::of(path)).collect::<Result<_>>().map(InputIdentities)
+    }
+
+    /// Returns the names of the files that have changed since `earlier`; none if the files have the same contents in the same
+    /// order.
+    pub(crate) fn since(&self, earlier: &InputIdentities) -> Vec<String> {
+        let contents = |files: &[InputIdentity]| files.iter().map(|file| file.content).collect::<Vec<_>>();
+        let (known, present) = (contents(&earlier.0), contents(&self.0));
+        if known == present {
+            return Vec::new();
+        }
+        let places = |files: &[InputIdentity]| files.iter().map(|file| file.place.clone()).collect::<HashSet<_>>();
+        let (known_places, places) = (places(&earlier.0), places(&self.0));
+        let change = |file: &InputIdentity| match (known.contains(&file.content), known_places.contains(&file.place)) {
+            (true, _) => None,
+            (false, true) => Some(file.path.display().to_string()),
+            (false, false) => Some(format!("{} (new)", file.path.display())),
+        };
+        let is_gone = |file: &&InputIdentity| !present.contains(&file.content) && !places.contains(&file.place);
+        let gone = earlier.0.iter().filter(is_gone).map(|file| format!("{} (gone)", file.path.display()));
+        let changed: Vec<String> = self.0.iter().filter_map(change).chain(gone).collect();
+        if changed.is_empty() { vec!["the order of the inputs".into()] } else { changed }
+    }
+
+    /// Returns what the inputs are called by now. They must have the same contents in the same order as `earlier`.
+    pub(crate) fn renamed_since(&self, earlier: &InputIdentities) -> RenamedInputs {
+        let pairs = earlier.0.iter().zip(&self.0).map(|(old, new)| (old.path.clone(), new.path.clone()));
+        RenamedInputs(pairs.filter(|(old, new)| old != new).collect())
+    }
+}
+
+impl InputIdentity {
+    fn of(path: &Path) -> Result<InputIdentity> {
+        Ok(InputIdentity {
+            path: path.to_path_buf(),
+            place: place(path).to_string_lossy().into_owned(),
+            content: ContentIdentity::of(path).map_err(Error::io("read", path))?,
+        })
+    }
+}
+
+/// Inputs that have other paths than an earlier run knew: it had another working directory, or their folder has moved.
+#[derive(Clone, Debug, Default)]
+pub struct RenamedInputs(Vec<(PathBuf, PathBuf)>);
+
+impl RenamedInputs {
+    /// Changes the path of an input to the present one.
+    pub(crate) fn rename(&self, path: &mut PathBuf) {
+        if let Some((_, new)) = self.0.iter().find(|(old, _)| old == path) {
+            path.clone_from(new);
+        }
+    }
+
+    /// Changes the path of an input in a sentence about it to the present one. A colon and a blank come after the path.
+    pub(crate) fn rename_in(&self, text: &mut String) {
+        let renamed = self.0.iter().find_map(|(old, new)| {
+            let (old, new) = (format!("{}: ", old.display()), format!("{}: ", new.display()));
+            let starts = text.strip_prefix(&old).map(|rest| format!("{new}{rest}"));
+            starts.or_else(|| {
+                text.contains(&format!(" {old}")).then(|| text.replace(&format!(" {old}"), &format!(" {new}")))
+            })
+        });
+        if let Some(renamed) = renamed {
+            *text = renamed;
+        }
+    }
+}
+
+/// Bytes that are hashed at the beginning and at the end of a file.
+const END_BYTES: u64 = 64 << 10;
+/// Bytes of a sample between them.
+const SAMPLE_BYTES: u64 = 4 << 10;
+/// The number of samples between them.
+const SAMPLES: u64 = 16;
+
+impl ContentIdentity {
+    fn of(path: &Path) -> std::io::Result<ContentIdentity> {
+        let file = File::open(path)?;
+        let data = file.metadata()?;
+        let modified = data.modified().ok().and_then(|time| time.duration_since(SystemTime::UNIX_EPOCH).ok());
+        Ok(ContentIdentity {
+            bytes: data.len(),
+            modified: modified.map_or(0, |age| age.as_nanos() as u64),
+            samples: hash_of_samples(&file, data.len())?,
+        })
+    }
+}
+
+fn hash_of_samples(file: &File, bytes: u64) -> std::io::Result<u64> {
+    let last = bytes.saturating_sub(END_BYTES);
+    let between = (1..=SAMPLES).map(|i| (last / (SAMPLES + 1) * i, SAMPLE_BYTES));
+    let (mut hasher, mut buffer) = (Xxh3::new(), Vec::new());
+    for (at, length) in [(0, END_BYTES), (last, END_BYTES)].into_iter().chain(between) {
+        buffer.resize(length.min(bytes - at) as usize, 0);
+        fault::read("read-input")?;
+        read_exact_at(file, &mut buffer, at)?;
+        hasher.update(&buffer);
+    }
+    Ok(hasher.digest())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn identities(files: &[(&str, u64)]) -> InputIdentities {
+        let content = |samples| ContentIdentity { bytes: 1, modified: 2, samples };
+        let identity = |&(path, samples): &(&str, u64)| InputIdentity {
+            path: path.into(),
+            place: format!("/home/{path}"),
+            content: content(samples),
+        };
+        InputIdentities(files.iter().map(identity).collect())
+    }
+
+    #[test]
+    fn only_what_is_in_the_files_counts() {
+        let now = identities(&[("a", 1), ("b", 2)]);
+        assert!(now.since(&identities(&[("x/a", 1), ("y/b", 2)])).is_empty());
+        assert_eq!(now.since(&identities(&[("b", 2), ("a", 1)])), ["the order of the inputs"]);
+        assert_eq!(now.since(&identities(&[("a", 1), ("b", 3)])), ["b"]);
+        assert_eq!(now.since(&identities(&[("a", 1), ("c", 3)])), ["b (new)", "c (gone)"]);
+        assert_eq!(now.since(&identities(&[("x/a", 1)])), ["b (new)"]);
+        assert_eq!(now.since(&identities(&[("a", 1), ("b", 2), ("b", 2)])), ["the order of the inputs"]);
+    }
+
+    #[test]
+    fn sentences_name_files_by_their_present_paths() {
+        let renamed = identities(&[("b", 1), ("a", 2)]).renamed_since(&identities(&[("a", 1), ("b", 2)]));
+        let text = |text: &str| {
+            let mut text = text.to_string();
+            renamed.rename_in(&mut text);
+            text
+        };
+        assert_eq!(text("a: line 3: a word"), "b: line 3: a word");
+        assert_eq!(text("2 of 3 are malformed: b: line 1; b: line 2"), "2 of 3 are malformed: a: line 1; a: line 2");
+        assert_eq!(text("x/a: line 3"), "x/a: line 3");
+        let mut path = PathBuf::from("b");
+        renamed.rename(&mut path);
+        assert_eq!(path, Path::new("a"));
+    }
+}

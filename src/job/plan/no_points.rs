@@ -1,0 +1,45 @@
+//! The message for a job of which no point is left: it says what became of the points, and where they lie if not within the bounds.
+
+use crate::Error;
+use crate::input::PointCounts;
+use crate::job::plan::job_plan::Plan;
+
+/// A rectangle [xmin, ymin, xmax, ymax] in source units.
+type Rectangle = [f64; 4];
+
+/// Returns the error for a job of which no point is left.
+pub fn no_point_is_left(plan: &Plan, counts: &PointCounts) -> Error {
+    let remedy = match plan.options.input.bounds.zip(box_of_inputs(plan)) {
+        Some((bounds, inputs)) if counts.out_of_bounds > 0 => compare(bounds.0, inputs),
+        _ => "check [input] classes and bounds".into(),
+    };
+    Error::NoTerrain(format!(
+        "no point is left to triangulate: of {} read, {} are malformed, {} withheld, {} of other classes, {} out of bounds; {remedy}",
+        counts.read, counts.malformed, counts.withheld, counts.other_class, counts.out_of_bounds
+    ))
+}
+
+/// Returns the rectangle of all inputs, as far as their headers can be believed.
+fn box_of_inputs(plan: &Plan) -> Option<Rectangle> {
+    let sources = plan.inputs.iter().map(|input| &input.source).filter(|source| source.records > 0);
+    let boxes = sources.map(|source| [source.min[0], source.min[1], source.max[0], source.max[1]]);
+    boxes.reduce(|a, b| [a[0].min(b[0]), a[1].min(b[1]), a[2].max(b[2]), a[3].max(b[3])])
+}
+
+fn compare(bounds: Rectangle, inputs: Rectangle) -> String {
+    let exchanged = [inputs[1], inputs[0], inputs[3], inputs[2]];
+    let hint = match meet(bounds, exchanged) && !meet(bounds, inputs) {
+        true => "; x and y look exchanged: bounds are [xmin, ymin, xmax, ymax]",
+        false => "",
+    };
+    // Rounded outwards, so that they can be copied.
+    let [xmin, ymin] = [inputs[0], inputs[1]].map(|low| (low * 100.0).floor() / 100.0);
+    let [xmax, ymax] = [inputs[2], inputs[3]].map(|high| (high * 100.0).ceil() / 100.0);
+    format!(
+        "[input] bounds are {bounds:?}, and by their headers the inputs lie in [{xmin:.2}, {ymin:.2}, {xmax:.2}, {ymax:.2}]{hint}"
+    )
+}
+
+fn meet(a: Rectangle, b: Rectangle) -> bool {
+    (0..2).all(|axis| a[axis] <= b[axis + 2] && b[axis] <= a[axis + 2])
+}
