@@ -11,11 +11,13 @@ pub mod info;
 mod las;
 pub mod options;
 mod points;
+pub mod samples;
 mod source;
 mod text;
 
 pub use crs::system::Crs;
 pub use crs::unit::Unit;
+pub use file::random_access::not_a_file;
 pub use points::axis::Axis;
 pub use points::counts::PointCounts;
 pub use points::point::Point;

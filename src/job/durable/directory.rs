@@ -138,13 +138,30 @@ impl JobDirectory {
         let numbered = output.glb_folders().into_iter().filter(|folder| folder.is_dir());
         let numbered = numbered.map(|folder| numbered_files(&folder)).collect::<Result<Vec<_>>>()?;
         // The report comes first: wherever a removal is cut off, results beside a report are complete.
-        let mut results =
-            vec![output.report(), output.terrain(), output.tileset(), output.georeference(), output.preview()];
+        let mut results = vec![
+            output.report(),
+            output.checksums(),
+            output.terrain(),
+            output.tileset(),
+            output.georeference(),
+            output.preview(),
+        ];
         results.extend(numbered.concat());
         Ok(results)
     }
 
-    /// Checks that no file, and no dangling link, is where a job needs a folder, and that no folder is where it writes a file.
+    /// Returns the paths of all files that the job may read or write in its directory.
+    fn existing_files(&self) -> Result<Vec<PathBuf>> {
+        let mut files = vec![self.journal(), self.plan(), self.points(), lock_file(&self.job)];
+        files.extend(self.store());
+        files.extend(self.existing_results()?);
+        let partials: Vec<PathBuf> = files.iter().map(|path| partial_path(path)).collect();
+        files.extend(partials);
+        Ok(files)
+    }
+
+    /// Checks that no file, and no dangling link, is where a job needs a folder, and that no folder, pipe or device is where it reads or
+    /// writes a file: opening a pipe would wait for another process.
     ///
     /// # Errors
     /// [`Error::Config`] names what is in the way.
@@ -156,8 +173,9 @@ impl JobDirectory {
         let (found, what, wanted) = if let Some(found) = folders.find(is_in_the_way) {
             let what = if found.exists() { "is not a directory" } else { "is a link that leads nowhere" };
             (found.to_path_buf(), what, "a directory")
-        } else if let Some(found) = self.existing_results()?.into_iter().find(|path| path.is_dir()) {
-            (found, "is a directory", "a file")
+        } else if let Some(found) = self.existing_files()?.into_iter().find(|path| is_no_file(path)) {
+            let what = if found.is_dir() { "is a directory" } else { "is a pipe or a device" };
+            (found, what, "a file")
         } else {
             return Ok(());
         };
@@ -203,6 +221,11 @@ impl JobDirectory {
             _ => Ok(()),
         }
     }
+}
+
+/// Tells whether something other than a regular file, or a link to one, is at `path`.
+fn is_no_file(path: &Path) -> bool {
+    path.metadata().is_ok_and(|meta| !meta.is_file())
 }
 
 fn remove_at_end(file: &Path) -> Result<()> {

@@ -1,19 +1,17 @@
 //! What identifies a job: whether a run may go on from what an earlier one left.
 
+use crate::input::samples::{FileSamples, fingerprint_of};
 use crate::job::options::JobOptions;
 use crate::job::plan::inputs::input_paths;
 use crate::job::plan::lattice_choice::LatticeCoarsening;
 use crate::output::options::ColorChoice;
-use crate::positional_io::read_exact_at;
 use crate::{Error, Result};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::collections::HashMap;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
-use xxhash_rust::xxh3::Xxh3;
 
 /// The first line of a job's journal.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -26,7 +24,7 @@ pub struct JobHeader {
 
 /// Version of the records in the store, of the plan, and of which nodes merge. It changes with every change of these, so that no
 /// run misreads what another version left.
-pub(crate) const LAYOUT: u32 = 5;
+pub(crate) const LAYOUT: u32 = 6;
 
 /// What the results of a job depend on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -48,11 +46,10 @@ pub struct Fingerprint {
 struct InputIdentity {
     /// As the report names it.
     path: PathBuf,
-    bytes: u64,
     /// When it was written, in nanoseconds since 1970.
     modified: u64,
-    /// The XXH3 of its beginning, its end and samples between them.
-    samples: u64,
+    #[serde(flatten)]
+    content: FileSamples,
 }
 
 /// How a job differs from an earlier one.
@@ -86,6 +83,11 @@ impl Fingerprint {
             memory: options.limits.memory.0,
             files: paths.par_iter().map(|path| InputIdentity::of(path)).collect::<Result<_>>()?,
         })
+    }
+
+    /// Returns what tells the content of the inputs from that of others, whatever their names.
+    pub fn of_inputs(&self) -> String {
+        fingerprint_of(self.files.iter().map(|file| file.content).collect())
     }
 
     /// Returns what has changed since `earlier`.
@@ -142,35 +144,14 @@ fn first_few(names: Vec<String>) -> String {
     if more > 0 { format!("{named} and {more} more") } else { named }
 }
 
-/// Bytes that are hashed at the beginning and at the end of a file.
-const END_BYTES: u64 = 64 << 10;
-/// Bytes of a sample between them.
-const SAMPLE_BYTES: u64 = 4 << 10;
-/// The number of samples between them.
-const SAMPLES: u64 = 16;
-
 impl InputIdentity {
     fn of(path: &Path) -> Result<InputIdentity> {
-        let file = File::open(path).map_err(Error::io("read", path))?;
-        let data = file.metadata().map_err(Error::io("read", path))?;
+        let data = path.metadata().map_err(Error::io("read", path))?;
         let modified = data.modified().ok().and_then(|time| time.duration_since(SystemTime::UNIX_EPOCH).ok());
         Ok(InputIdentity {
             path: path.to_path_buf(),
-            bytes: data.len(),
             modified: modified.map_or(0, |age| age.as_nanos() as u64),
-            samples: hash_of_samples(&file, data.len()).map_err(Error::io("read", path))?,
+            content: FileSamples::of(path)?,
         })
     }
-}
-
-fn hash_of_samples(file: &File, bytes: u64) -> std::io::Result<u64> {
-    let last = bytes.saturating_sub(END_BYTES);
-    let between = (1..=SAMPLES).map(|i| (last / (SAMPLES + 1) * i, SAMPLE_BYTES));
-    let (mut hasher, mut buffer) = (Xxh3::new(), Vec::new());
-    for (at, length) in [(0, END_BYTES), (last, END_BYTES)].into_iter().chain(between) {
-        buffer.resize(length.min(bytes - at) as usize, 0);
-        read_exact_at(file, &mut buffer, at)?;
-        hasher.update(&buffer);
-    }
-    Ok(hasher.digest())
 }

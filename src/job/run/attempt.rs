@@ -18,7 +18,7 @@ use crate::job::run::context::RunContext;
 use crate::job::run::read_step::note_skipped;
 use crate::job::run::resume::{self, EarlierRun, RunStart};
 use crate::job::run::stage_costs::stage_costs;
-use crate::job::run::threads::on_threads;
+use crate::threads::on_threads;
 use crate::triangulation::Triangulator;
 use crate::{Error, Result};
 use std::sync::Mutex;
@@ -140,6 +140,7 @@ fn attempt(
             progress,
             threads,
             clock,
+            inputs_fingerprint: job.fingerprint.of_inputs(),
             kept,
             has_partial_results: AtomicBool::new(has_partial_results),
             stages: Mutex::new(vec![planned]),
@@ -158,7 +159,7 @@ fn attempt(
 /// Ends an attempt: keeps the finished steps if the job can go on from them, or else removes them.
 fn end(directory: &JobDirectory, outcome: Result<Report>, steps: u64, has_partial_results: bool) -> Result<Report> {
     match outcome {
-        Err(why) if why.exit_code() == 1 && steps > 0 => {
+        Err(why) if (why.exit_code() == 1 || matches!(why, Error::Io { .. })) && steps > 0 => {
             Err(Error::Resumable { why: Box::new(why), steps, job: directory.job().into() })
         }
         outcome => {

@@ -23,6 +23,8 @@ pub(crate) struct RunContext<'a> {
     pub(crate) progress: &'a JobProgress,
     pub(crate) threads: usize,
     pub(crate) clock: JobClock,
+    /// What tells the content of the inputs from that of others.
+    pub(crate) inputs_fingerprint: String,
     /// The results of an earlier run that stay, as the journal names them.
     pub(crate) kept: HashSet<PathBuf>,
     /// Whether the output directory may hold a part of this job's results.
