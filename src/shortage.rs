@@ -28,7 +28,8 @@ pub fn listen() -> Result<()> {
     address_space::require(LEAST, address_space::at_start(), || "the program".into())
 }
 
-/// Rust says "memory allocation of ... bytes failed" and aborts: there is no stable way to return an error instead.
+/// Rust says "memory allocation of ... bytes failed" and aborts: there is no stable way to return an error instead. Other aborts, as after
+/// a panic while panicking, get that exit code too; they say what they are.
 #[cfg(unix)]
 fn end_aborts() -> Result<()> {
     use std::sync::Arc;

@@ -47,7 +47,7 @@ pub struct Verdict {
     pub verdict: Conclusion,
     /// Whether nothing is wrong with the mesh itself.
     #[serde(skip)]
-    is_mesh_sound: bool,
+    pub is_mesh_sound: bool,
 }
 
 /// What follows from everything that was found.
