@@ -51,6 +51,7 @@ fn exit_code() -> i32 {
 
 /// Returns what a panic says if it stands for a lack of memory or threads.
 fn shortage(info: &PanicHookInfo) -> Option<String> {
-    let text = info.payload_as_str()?;
+    let payload = info.payload();
+    let text = payload.downcast_ref::<&str>().copied().or(payload.downcast_ref::<String>().map(String::as_str))?;
     SHORTAGES.iter().any(|shortage| text.contains(shortage)).then(|| text.to_owned())
 }
