@@ -62,7 +62,7 @@ fn default_file(scratch: &Path) -> Outcome<PathBuf> {
         return Ok(autzen);
     }
     let sample = scratch.join("sample.laz");
-    gdt_batch::sample::write(&sample, 4_000_000, 1)?;
+    gdt_batch::sample::write(&sample, 4_000_000, 1, true)?;
     Ok(sample)
 }
 

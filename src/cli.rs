@@ -10,6 +10,7 @@ Examples:
   gdt-batch configs/quickstart.toml     run a job
   gdt-batch check job.toml              what would the job read, how large is it, does it fit?
   gdt-batch verify out                  prove that the tiles in out are the exact Delaunay triangulation
+  gdt-batch verify out --input *.laz    and that its vertices are the points of these files
 
 The shortest configuration:
   [input]
@@ -24,7 +25,7 @@ Exit codes:
   0  done
   1  may be retried (disk, memory, Ctrl-C)
   2  command line or configuration
-  3  bad input
+  3  bad input; for verify: nothing is wrong, but not everything can be proved
   4  a guarantee does not hold (verify failed, or an internal check)";
 
 /// Turns point clouds of any size into one exact Delaunay terrain, written as glTF tiles.
@@ -69,13 +70,19 @@ pub enum CliCommand {
         /// The configuration of the job.
         config: PathBuf,
     },
-    /// Read the written tiles back and prove with exact arithmetic that they are the Delaunay triangulation.
+    /// Read the results back and prove with exact arithmetic that the tiles are the Delaunay triangulation.
+    ///
+    /// Also compares every file with the checksums that the job has left. Exit code 0: proved. 3: nothing is wrong, but something that
+    /// the proof needs is missing. 4: something is wrong.
     Verify {
         /// The output directory of a job.
         directory: PathBuf,
         /// The memory that verify may use, such as "4 GiB".
         #[arg(long, default_value = "4 GiB", value_parser = memory)]
         memory: u64,
+        /// The files that the job has read: prove that the vertices are their points, heights included.
+        #[arg(long, num_args = 1.., value_name = "FILE")]
+        input: Vec<PathBuf>,
     },
     /// Show what point clouds contain.
     Info {
@@ -102,6 +109,9 @@ pub enum CliCommand {
         /// Each seed gives another terrain.
         #[arg(long, default_value_t = 1)]
         seed: u64,
+        /// Overwrite the file if it is there.
+        #[arg(long)]
+        overwrite: bool,
     },
 }
 

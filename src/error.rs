@@ -8,7 +8,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 /// Every failure of this crate. `Display` says which file, which record or line, what is wrong and what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The operating system refused an operation that may succeed later (exit code 1).
+    /// The operating system refused an operation that may succeed later (exit code 1), or the path leads nowhere (exit code 2).
     #[error("cannot {action} {}: {source}{}", path.display(), remedy(source))]
     Io {
         /// The operation as a verb: "read", "create", "write".
@@ -90,8 +90,26 @@ fn remedy(error: &std::io::Error) -> &'static str {
         }
         std::io::ErrorKind::FileTooLarge => "; raise the limit on the size of files (ulimit -f), and run again",
         std::io::ErrorKind::PermissionDenied => "; check the permissions",
+        _ if is_about_the_path(error) => "; correct the path",
         _ => "",
     }
+}
+
+/// Tells whether the path itself is wrong, so that no retry can help: something else where a folder should be, links in a circle, a name
+/// that is too long or that no system has.
+fn is_about_the_path(error: &std::io::Error) -> bool {
+    use std::io::ErrorKind::{AlreadyExists, InvalidFilename, NotADirectory};
+    matches!(error.kind(), NotADirectory | InvalidFilename | AlreadyExists) || is_circle_of_links(error)
+}
+
+#[cfg(target_os = "linux")]
+fn is_circle_of_links(error: &std::io::Error) -> bool {
+    error.raw_os_error() == Some(rustix::io::Errno::LOOP.raw_os_error())
+}
+
+#[cfg(not(target_os = "linux"))]
+fn is_circle_of_links(_: &std::io::Error) -> bool {
+    false
 }
 
 impl Error {
@@ -99,6 +117,7 @@ impl Error {
     /// hold.
     pub fn exit_code(&self) -> u8 {
         match self {
+            Error::Io { source, .. } if is_about_the_path(source) => 2,
             Error::Io { .. } | Error::InUse { .. } | Error::Memory(_) | Error::Interrupted => 1,
             Error::Resumable { why, .. } => why.exit_code(),
             Error::Config(_) | Error::TooFine { .. } => 2,

@@ -7,15 +7,16 @@ use std::sync::{Arc, LazyLock};
 /// Whether a signal has come. Signals concern the whole process, so this is global.
 static STOP: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 
-/// Makes Ctrl-C and SIGTERM set what [`check`] sees; a second one ends the process at once. Also turns the signal for a file that
-/// grows beyond the limit of the shell into an error of the write. The hangup signal keeps its meaning, so that `nohup` works.
+/// Makes Ctrl-C, SIGTERM and the hangup of the terminal (unless `nohup` says to ignore it) set what [`check`] sees; a second signal
+/// ends the process at once. Also turns the signal for a file that grows beyond the limit of the shell into an error of the write.
 ///
 /// # Errors
 /// [`Error::Io`] if the system refuses.
 pub fn listen() -> Result<()> {
     use signal_hook::consts::{SIGINT, SIGTERM};
     let exit_code = i32::from(Error::Interrupted.exit_code());
-    for signal in [SIGINT, SIGTERM] {
+    let hangup = hangup().filter(|signal| !is_ignored(*signal));
+    for signal in [SIGINT, SIGTERM].into_iter().chain(hangup) {
         // In this order. Otherwise the first signal would find the flag set and end the process.
         signal_hook::flag::register_conditional_shutdown(signal, exit_code, STOP.clone())
             .and_then(|_| signal_hook::flag::register(signal, STOP.clone()))
@@ -25,6 +26,25 @@ pub fn listen() -> Result<()> {
     signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default())
         .map_err(Error::io("listen to the signals of", "the system"))?;
     Ok(())
+}
+
+#[cfg(unix)]
+fn hangup() -> Option<i32> {
+    Some(signal_hook::consts::SIGHUP)
+}
+
+#[cfg(not(unix))]
+fn hangup() -> Option<i32> {
+    None
+}
+
+/// Tells whether this process ignores the signal, as `nohup` makes it. Where the system does not tell, the signal counts as ignored:
+/// it keeps its meaning.
+fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let bits = ignored.and_then(|bits| u64::from_str_radix(bits.trim(), 16).ok());
+    bits.is_none_or(|bits| bits >> (signal - 1) & 1 == 1)
 }
 
 /// Returns an error if the process was asked to stop. Long work calls this between its pieces.

@@ -4,6 +4,7 @@
 
 #![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
 
+mod address_space;
 pub mod cli;
 pub mod config;
 mod disk;
@@ -18,6 +19,8 @@ pub mod mesh;
 pub mod output;
 pub mod positional_io;
 pub mod sample;
+pub mod shortage;
+pub mod threads;
 pub mod triangulation;
 pub mod verify;
 pub mod voronoi;

@@ -11,7 +11,9 @@ use gdt_batch::job::preflight::check;
 use gdt_batch::job::progress::stage::ProgressOutput;
 use gdt_batch::job::report::skipped::skipped_summary;
 use gdt_batch::output::file_names::OutputFiles;
-use gdt_batch::{Error, Result, config, input, interrupt, sample, say, verify};
+use gdt_batch::threads::{self, on_threads};
+use gdt_batch::verify::Conclusion;
+use gdt_batch::{Error, Result, config, input, interrupt, sample, say, shortage, verify};
 use serde::Serialize;
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
@@ -20,7 +22,7 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     // clap itself exits with code 2 if the command line is wrong.
-    match run(Cli::parse()) {
+    match shortage::listen().and_then(|()| run(Cli::parse())) {
         Ok(code) => code,
         Err(error) => {
             say(&format!("error: {error}"));
@@ -37,11 +39,12 @@ fn run(cli: Cli) -> Result<ExitCode> {
             Err(Error::Config(format!("{config} and a command: name the configuration after the command, or alone")))
         }
         (Some(CliCommand::Check { config }), _) => check_job(config, print),
-        (Some(CliCommand::Verify { directory, memory }), _) => verify_output(directory, *memory, print),
+        (Some(CliCommand::Verify { directory, memory, input }), _) => verify_output(directory, *memory, input, print),
         (Some(CliCommand::Info { files }), _) => show_info(files, print),
         (Some(CliCommand::Gpu { adapter, side }), _) => test_gpu(adapter.as_deref(), *side, print),
-        (Some(CliCommand::Sample { file, points, seed }), _) => {
-            sample::write(file, *points, *seed).map(|()| ExitCode::SUCCESS)
+        (Some(CliCommand::Sample { file, points, seed, overwrite }), _) => {
+            interrupt::listen()?;
+            sample::write(file, *points, *seed, *overwrite).map(|()| ExitCode::SUCCESS)
         }
         (None, Some(config)) => run_job(config, &cli),
         (None, None) => Err(Error::Config("name a configuration file; --help shows how".into())),
@@ -61,7 +64,16 @@ fn run_job(path: &Path, cli: &Cli) -> Result<ExitCode> {
     let config = config::load(path)?;
     interrupt::listen()?;
     let report = job::run(&config, options)?;
-    print_result(&report, cli.print)?;
+    if let Err(error) = print_result(&report, cli.print) {
+        let report = OutputFiles::new(&config.output.directory).report();
+        let done = format!("the job is done, and its report is in {}", report.display());
+        if cli.print.json {
+            say(&done);
+            return Err(error);
+        }
+        // The results are there: to run the job again would only repeat it.
+        say(&format!("{done}, but it cannot be shown: {error}"));
+    }
     if let Some(summary) = skipped_summary(report.files, &report.skipped) {
         say(&format!("{summary}: see {}", OutputFiles::new(&config.output.directory).report().display()));
     }
@@ -69,19 +81,23 @@ fn run_job(path: &Path, cli: &Cli) -> Result<ExitCode> {
 }
 
 fn check_job(path: &Path, print: PrintOptions) -> Result<ExitCode> {
-    let preflight = check::check(&config::load(path)?)?;
+    let config = config::load(path)?;
+    let preflight = on_threads(config.threads(), || check::check(&config))?;
     print_result(&preflight, print)?;
     preflight.passes().map(|()| ExitCode::SUCCESS)
 }
 
-fn verify_output(directory: &Path, memory: u64, print: PrintOptions) -> Result<ExitCode> {
-    let verdict = verify::verify(directory, memory)?;
-    print_result(&verdict, print)?;
-    if verdict.holds() {
-        return Ok(ExitCode::SUCCESS);
+/// Verifies the output of a job. With `--quiet` too, an error says what is wrong or cannot be proved.
+fn verify_output(directory: &Path, memory: u64, inputs: &[PathBuf], print: PrintOptions) -> Result<ExitCode> {
+    none_is_missing(inputs)?;
+    let verdict = on_threads(threads::available(), || verify::verify_against(directory, memory, inputs))?;
+    let printed = print_result(&verdict, print);
+    if verdict.verdict == Conclusion::Proved {
+        return printed.map(|()| ExitCode::SUCCESS);
     }
-    say(&format!("error: {} does not hold the exact Delaunay triangulation", directory.display()));
-    Ok(ExitCode::from(4))
+    let first = verdict.failures.first().or(verdict.unproved.as_ref()).map_or("", String::as_str);
+    say(&format!("error: {}: {}: {first}", directory.display(), verdict.sentence()));
+    Ok(ExitCode::from(verdict.verdict.exit_code()))
 }
 
 fn test_gpu(adapter: Option<&str>, side: Option<u32>, print: PrintOptions) -> Result<ExitCode> {
@@ -95,15 +111,22 @@ fn test_gpu(adapter: Option<&str>, side: Option<u32>, print: PrintOptions) -> Re
 }
 
 fn show_info(files: &[PathBuf], print: PrintOptions) -> Result<ExitCode> {
-    let is_missing = |file: &&PathBuf| file.symlink_metadata().is_err_and(|e| e.kind() == ErrorKind::NotFound);
-    if let Some(missing) = files.iter().find(is_missing) {
-        return Err(Error::Config(format!("there is no file {}: name the point clouds to look at", missing.display())));
-    }
+    none_is_missing(files)?;
     for file in files {
-        let source = input::open(file, &input::TextOptions::default())?;
+        let source = on_threads(threads::available(), || input::open(file, &input::TextOptions::default()))?;
         print_result(&input::info::describe(&source), print)?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+fn none_is_missing(files: &[PathBuf]) -> Result<()> {
+    let is_missing = |file: &&PathBuf| file.symlink_metadata().is_err_and(|e| e.kind() == ErrorKind::NotFound);
+    match files.iter().find(is_missing) {
+        Some(missing) => {
+            Err(Error::Config(format!("there is no file {}: name the point clouds to look at", missing.display())))
+        }
+        None => Ok(()),
+    }
 }
 
 /// Prints a result for people or as JSON.

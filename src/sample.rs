@@ -1,10 +1,12 @@
 //! A synthetic terrain for trials and tests: hills with a lake, made from a seed and scanned in rows as from an aircraft, with
 //! classes and colours.
 
-use crate::{Error, Result};
+use crate::{Error, Result, interrupt};
 use las::point::{Classification, Format};
 use las::{Builder, Color, Point, Transform, Vector, Vlr, Writer};
 use std::f64::consts::TAU;
+use std::fs::File;
+use std::io::{BufWriter, ErrorKind, Write};
 use std::path::Path;
 
 /// Points per square metre.
@@ -13,6 +15,8 @@ const DENSITY: f64 = 4.0;
 const CORNER: [f64; 2] = [565_000.0, 5_933_000.0];
 /// The step of the coordinates in metres.
 const SCALE: f64 = 0.01;
+/// Between so many points the writer looks whether it should stop.
+const CHECKED_EVERY: u64 = 10_000;
 /// The level of the lake in metres.
 const WATER: f64 = 41.0;
 
@@ -23,13 +27,16 @@ PROJECTION[\"Transverse_Mercator\"],PARAMETER[\"latitude_of_origin\",0],PARAMETE
 PARAMETER[\"scale_factor\",0.9996],PARAMETER[\"false_easting\",500000],PARAMETER[\"false_northing\",0],\
 UNIT[\"metre\",1],AUTHORITY[\"EPSG\",\"25832\"]]";
 
-/// Writes `points` points of the terrain of `seed` to `path`, as LAS or LAZ according to its extension.
+/// Writes `points` points of the terrain of `seed` to `path`, as LAS or LAZ according to its extension. Leaves no file behind if that
+/// fails.
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be written, [`Error::Config`] if it has another extension or `points` is 0.
-pub fn write(path: &Path, points: u64, seed: u64) -> Result<()> {
+/// [`Error::Io`] if the file cannot be written, [`Error::Interrupted`], [`Error::Config`] if it has another extension, if `points`
+/// is 0, or if there is such a file already and `overwrite` is not set.
+pub fn write(path: &Path, points: u64, seed: u64, overwrite: bool) -> Result<()> {
     let extension = path.extension().map(|e| e.to_ascii_lowercase());
-    if !extension.is_some_and(|extension| extension == "las" || extension == "laz") {
+    let is_laz = extension.as_ref().is_some_and(|extension| extension == "laz");
+    if !is_laz && extension.is_none_or(|extension| extension != "las") {
         return Err(Error::Config(format!("{}: the name of a sample must end in .las or .laz", path.display())));
     }
     if points == 0 {
@@ -38,19 +45,51 @@ pub fn write(path: &Path, points: u64, seed: u64) -> Result<()> {
     if let Some(parent) = path.parent().filter(|p| !p.as_os_str().is_empty()) {
         std::fs::create_dir_all(parent).map_err(Error::io("create the directory", parent))?;
     }
-    let failed = |e: las::Error| Error::Io { action: "write", path: path.into(), source: std::io::Error::other(e) };
-    let mut writer = Writer::from_path(path, header().map_err(failed)?).map_err(failed)?;
-    let side = (points as f64).sqrt().ceil().max(1.0) as u64;
-    for number in 0..points {
-        writer.write_point(point(number % side, number / side, seed)).map_err(failed)?;
+    let file = if overwrite { File::create(path) } else { File::create_new(path) };
+    let file = file.map_err(|error| match error.kind() {
+        ErrorKind::AlreadyExists => Error::Config(format!(
+            "{} exists already: give another name, remove it, or add --overwrite",
+            path.display()
+        )),
+        _ => Error::io("create", path)(error),
+    })?;
+    let written = write_points(file, is_laz, points, seed);
+    if written.is_err() {
+        // The first error is the one to report.
+        let _ = std::fs::remove_file(path);
     }
-    writer.close().map_err(failed)
+    written.map_err(|failure| match failure {
+        Failure::Interrupted => Error::Interrupted,
+        Failure::Las(las::Error::Io(error)) | Failure::Io(error) => Error::io("write", path)(error),
+        Failure::Las(error) => Error::io("write", path)(std::io::Error::other(error)),
+    })
 }
 
-fn header() -> las::Result<las::Header> {
+/// Why a sample is not written.
+enum Failure {
+    Interrupted,
+    Io(std::io::Error),
+    Las(las::Error),
+}
+
+fn write_points(file: File, is_laz: bool, points: u64, seed: u64) -> std::result::Result<(), Failure> {
+    let mut writer =
+        header(is_laz).and_then(|header| Writer::new(BufWriter::new(file), header)).map_err(Failure::Las)?;
+    let side = (points as f64).sqrt().ceil().max(1.0) as u64;
+    for number in 0..points {
+        if number % CHECKED_EVERY == 0 {
+            interrupt::check().map_err(|_| Failure::Interrupted)?;
+        }
+        writer.write_point(point(number % side, number / side, seed)).map_err(Failure::Las)?;
+    }
+    writer.into_inner().map_err(Failure::Las)?.flush().map_err(Failure::Io)
+}
+
+fn header(is_laz: bool) -> las::Result<las::Header> {
     let axis = |offset: f64| Transform { scale: SCALE, offset };
     let mut builder = Builder::from((1, 4));
     builder.point_format = Format::new(7)?;
+    builder.point_format.is_compressed = is_laz;
     builder.transforms = Vector { x: axis(CORNER[0]), y: axis(CORNER[1]), z: axis(0.0) };
     builder.has_wkt_crs = true;
     builder.vlrs.push(Vlr {

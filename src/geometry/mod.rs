@@ -5,6 +5,8 @@ pub mod lattice;
 pub mod predicates;
 mod site;
 pub mod square_grid;
+mod vertex_digest;
 
 pub use bounds::Bounds;
 pub use site::Site;
+pub use vertex_digest::VertexDigest;

@@ -12,6 +12,7 @@ mod las;
 pub mod options;
 mod other_formats;
 mod points;
+pub mod samples;
 mod source;
 mod text;
 
@@ -19,6 +20,7 @@ pub use crs::choice::CrsChoice;
 pub use crs::system::{Crs, CrsKind};
 pub use crs::unit::Unit;
 pub use crs::vertical::VerticalSystem;
+pub use file::random_access::not_a_file;
 pub use points::axis::Axis;
 pub use points::counts::PointCounts;
 pub use points::point::Point;

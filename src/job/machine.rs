@@ -1,6 +1,6 @@
 //! What the machine has to offer, as far as it tells.
 
-use crate::{Error, Result};
+use crate::{Error, Result, address_space};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -22,8 +22,14 @@ fn nearest_existing(directory: &Path) -> &Path {
     directory.ancestors().find(|d| d.exists()).unwrap_or(Path::new("."))
 }
 
-/// Returns the bytes of memory that this process can have before the system swaps or kills; `None` if the system does not tell.
+/// Returns the bytes of memory that this process can have before the system swaps, kills or refuses; `None` if the system does not
+/// tell.
 pub(crate) fn free_memory() -> Option<u64> {
+    free_outside().into_iter().chain(address_space::at_start()).min()
+}
+
+/// Returns the bytes of memory that the machine and the control groups of this process leave.
+fn free_outside() -> Option<u64> {
     let table = fs::read_to_string("/proc/meminfo").ok()?;
     let machine = kibibytes(&table, "MemAvailable:")? * 1024;
     let groups = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();

@@ -5,6 +5,7 @@ use crate::gpu::options::GpuOptions;
 use crate::input::options::InputOptions;
 use crate::job::progress::stage::ProgressOutput;
 use crate::output::options::OutputOptions;
+use crate::threads::available;
 use crate::triangulation::options::TriangulationOptions;
 use serde::{Deserialize, Serialize};
 
@@ -30,7 +31,7 @@ impl JobOptions {
     /// The number of worker threads.
     pub fn threads(&self) -> usize {
         match self.limits.threads.0 {
-            0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
+            0 => available(),
             n => n,
         }
     }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 const TILES: &str = "tiles";
 const LEVELS: &str = "levels";
 const CUT: &str = "cut";
+const CHECKSUMS: &str = "XXH128SUMS";
 
 /// The paths in one output directory. Nothing else in the crate spells these names.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -76,6 +77,11 @@ impl OutputFiles {
     /// Returns the report for machines.
     pub fn report(&self) -> PathBuf {
         self.directory.join("report.json")
+    }
+
+    /// Returns the list of all other results with their checksums, as `xxhsum -c` reads it.
+    pub fn checksums(&self) -> PathBuf {
+        self.directory.join(CHECKSUMS)
     }
 
     /// Returns the picture of the whole terrain.

@@ -43,8 +43,11 @@ impl KeyedRecord for BorderEdge {
 pub(super) struct BorderSite {
     pub(super) site: Site,
     pub(super) tile: u32,
+    /// Its lattice integer in z.
+    pub(super) height: i32,
     /// 1 in the files of `cut/`, which have neither normals nor colours.
     pub(super) unshaded: u32,
+    pub(super) unused: u32,
     /// Hash of the position in the scene.
     pub(super) position: u64,
     /// Hash of normal and colour.

@@ -5,7 +5,7 @@ use std::path::Path;
 use rayon::slice::ParallelSliceMut;
 
 use crate::Result;
-use crate::geometry::Site;
+use crate::geometry::{Site, VertexDigest};
 use crate::verify::border::{BorderEdge, BorderSite, MeshBorder};
 use crate::verify::exact::{EdgeState, edge_state};
 use crate::verify::failures::{Failure, Failures};
@@ -59,6 +59,8 @@ pub(super) struct BorderMatches {
     pub(super) ties: u64,
     /// Distinct sites on borders.
     pub(super) sites: u64,
+    /// The digest of these sites with their heights.
+    pub(super) vertices: VertexDigest,
 }
 
 impl BorderMatches {
@@ -96,6 +98,7 @@ impl BorderMatches {
     fn add_site(&mut self, group: &[BorderSite], grid: &SourceGrid, names: &[String]) {
         self.sites += 1;
         let first = group[0];
+        self.vertices.add([first.site[0], first.site[1], first.height]);
         let both = |other: &BorderSite| {
             format!("{} in {} and {}", grid.site_text(first.site), name(names, first.tile), name(names, other.tile))
         };

@@ -1,5 +1,6 @@
 //! The sums over all checked meshes.
 
+use crate::geometry::VertexDigest;
 use crate::verify::digest::Digest;
 use crate::verify::failures::Failures;
 
@@ -17,6 +18,8 @@ pub(super) struct Findings {
     /// Twice the area of the triangles, in square lattice steps.
     pub(super) double_area: i128,
     pub(super) digest: Digest,
+    /// The digest of the vertices that lie on no border.
+    pub(super) vertices: VertexDigest,
 }
 
 impl Findings {
@@ -31,6 +34,7 @@ impl Findings {
             ties: self.ties + other.ties,
             double_area: self.double_area + other.double_area,
             digest: self.digest.join(other.digest),
+            vertices: self.vertices.join(other.vertices),
         }
     }
 }

@@ -11,6 +11,9 @@ use crate::{Error, Result};
 /// Records are divided by key into this many buckets. Grouping holds one bucket at a time in memory.
 const BUCKETS: usize = 64;
 
+/// Records are read back from a file in blocks of this many.
+const BLOCK: usize = 1 << 13;
+
 /// A record with a key.
 pub(super) trait KeyedRecord: Pod {
     /// Returns a hash of the key, the same for all records with that key.
@@ -65,24 +68,90 @@ impl<R: KeyedRecord> KeyedRecords<R> {
         Ok(())
     }
 
-    /// Calls `body` once for each bucket with all its records. Records with the same key are in the same bucket.
+    /// Calls `body` for groups of records until it has seen all. Records with the same key are in the same group. A group is a bucket, or
+    /// a part of one that has too many records for the memory.
     pub(super) fn for_each_bucket(mut self, mut body: impl FnMut(&mut Vec<R>)) -> Result<()> {
         for number in 0..BUCKETS {
-            let mut bucket = std::mem::take(&mut self.buckets[number]);
-            if let Some(file) = self.files.get_mut(number) {
-                load(file, &mut bucket).map_err(Error::io("read a temporary file in", &self.directory))?;
-            }
-            body(&mut bucket);
+            let held = std::mem::take(&mut self.buckets[number]);
+            let failed = Error::io("read a temporary file in", &self.directory);
+            let file = self.files.get(number);
+            for_each_part(held, file, self.limit, &mut body).map_err(failed)?;
         }
         Ok(())
     }
 }
 
-/// Appends the records of a file to a bucket.
-fn load<R: KeyedRecord>(file: &mut File, bucket: &mut Vec<R>) -> std::io::Result<()> {
-    let bytes = file.seek(SeekFrom::End(0))? as usize;
-    file.seek(SeekFrom::Start(0))?;
-    let held = bucket.len();
-    bucket.resize(held + bytes / size_of::<R>(), R::zeroed());
-    file.read_exact(cast_slice_mut(&mut bucket[held..]))
+/// Calls `body` for each part of a bucket, of which some records are `held` and the others in a file.
+fn for_each_part<R: KeyedRecord>(
+    held: Vec<R>,
+    file: Option<&File>,
+    limit: usize,
+    body: &mut impl FnMut(&mut Vec<R>),
+) -> std::io::Result<()> {
+    let Some(mut file) = file else {
+        let mut held = held;
+        body(&mut held);
+        return Ok(());
+    };
+    let stored = file.seek(SeekFrom::End(0))? as usize / size_of::<R>();
+    let parts = (held.len() + stored).div_ceil(limit).max(1) as u64;
+    let mut block = vec![R::zeroed(); BLOCK.min(stored)];
+    for part in 0..parts {
+        let is_in_part = |record: &&R| record.key_hash() % parts == part;
+        let mut records: Vec<R> = held.iter().filter(is_in_part).copied().collect();
+        file.seek(SeekFrom::Start(0))?;
+        let mut left = stored;
+        while left > 0 {
+            let block = &mut block[..left.min(BLOCK)];
+            file.read_exact(cast_slice_mut(block))?;
+            records.extend(block.iter().filter(is_in_part));
+            left -= block.len();
+        }
+        body(&mut records);
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+    use std::collections::HashSet;
+
+    #[repr(C)]
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    struct Pair {
+        key: u64,
+        value: u64,
+    }
+
+    impl KeyedRecord for Pair {
+        fn key_hash(&self) -> u64 {
+            xxhash_rust::xxh3::xxh3_64(&self.key.to_le_bytes())
+        }
+    }
+
+    #[test]
+    fn equal_keys_meet_and_no_group_is_much_larger_than_the_memory() {
+        let folder = tempfile::tempdir().unwrap();
+        for (memory, largest_expected) in [(1 << 30, 400_000), (0, 1_300)] {
+            let mut records = KeyedRecords::new(folder.path().to_path_buf(), memory);
+            for value in 0..3 {
+                let pairs: Vec<Pair> = (0..100_000).map(|key| Pair { key, value }).collect();
+                pairs.chunks(900).for_each(|chunk| records.extend(chunk).unwrap());
+            }
+            let (mut seen, mut count, mut largest) = (HashSet::new(), 0, 0);
+            records
+                .for_each_bucket(|group| {
+                    largest = largest.max(group.len());
+                    count += group.len();
+                    let keys: HashSet<u64> = group.iter().map(|pair| pair.key).collect();
+                    assert_eq!(group.len(), 3 * keys.len(), "all values of a key are together");
+                    keys.into_iter().for_each(|key| assert!(seen.insert(key)));
+                })
+                .unwrap();
+            assert_eq!((count, seen.len()), (300_000, 100_000));
+            assert!(largest < largest_expected, "{largest} records with {memory} bytes");
+        }
+    }
 }

@@ -12,19 +12,25 @@ use crate::verify::findings::Findings;
 use crate::verify::half_edges::HalfEdgesByOrigin;
 use crate::verify::source_grid::SourceGrid;
 
-/// Checks `mesh` of tile number `tile`, adds what it finds to `findings`, and returns the border of the mesh.
-pub(super) fn check_mesh(mesh: &TilePart, tile: u32, grid: &SourceGrid, findings: &mut Findings) -> MeshBorder {
+/// Checks `mesh` of tile number `tile`, adds what it finds to `findings`, and returns the border of the mesh and the lattice integers
+/// of its vertices.
+pub(super) fn check_mesh(
+    mesh: &TilePart,
+    tile: u32,
+    grid: &SourceGrid,
+    findings: &mut Findings,
+) -> (MeshBorder, Vec<[i32; 3]>) {
     findings.triangles += mesh.triangles.len() as u64;
-    let Some(points) = lattice_points(mesh, tile, grid, findings) else { return MeshBorder::default() };
+    let Some(points) = lattice_points(mesh, tile, grid, findings) else { return Default::default() };
     let sites: Vec<Site> = points.iter().map(|p| [p[0], p[1]]).collect();
-    let mut check = MeshCheck { mesh, sites, tile, grid, findings };
-    check.check_triangles(&points);
+    let mut check = MeshCheck { mesh, points: &points, sites, tile, grid, findings };
+    check.check_triangles();
     let mut half_edges = HalfEdgesByOrigin::new(&mesh.triangles, points.len());
     check.check_edges(&mut half_edges);
     let border = check.border(&half_edges);
     let unused = check.check_use(&half_edges);
     findings.inner_sites += (points.len() - unused - border.sites.len()) as u64;
-    border
+    (border, points)
 }
 
 /// Returns the lattice integers of the vertices, or `None` if some are not on the lattice.
@@ -56,6 +62,8 @@ fn points_of(mesh: &TilePart, integers: impl Fn([f64; 3]) -> Option<[i32; 3]>) -
 
 struct MeshCheck<'a> {
     mesh: &'a TilePart,
+    /// The lattice integers of the vertices.
+    points: &'a [[i32; 3]],
     /// The sites of the vertices.
     sites: Vec<Site>,
     tile: u32,
@@ -65,8 +73,8 @@ struct MeshCheck<'a> {
 
 impl MeshCheck<'_> {
     /// Checks the orientation of the triangles; adds them to area and digest.
-    fn check_triangles(&mut self, points: &[[i32; 3]]) {
-        let coordinates: Vec<[f64; 3]> = points.iter().map(|&p| self.grid.coordinates(p)).collect();
+    fn check_triangles(&mut self) {
+        let coordinates: Vec<[f64; 3]> = self.points.iter().map(|&p| self.grid.coordinates(p)).collect();
         for &triangle in &self.mesh.triangles {
             let [a, b, c] = triangle.map(|v| self.sites[v as usize]);
             if side(a, b, c).is_le() {
@@ -93,8 +101,8 @@ impl MeshCheck<'_> {
         });
     }
 
-    /// Returns the half-edges that stayed unmatched, and their ends.
-    fn border(&self, half_edges: &HalfEdgesByOrigin) -> MeshBorder {
+    /// Returns the half-edges that stayed unmatched, and their ends. Adds the other vertices to their digest.
+    fn border(&mut self, half_edges: &HalfEdgesByOrigin) -> MeshBorder {
         let mut edges = Vec::new();
         let mut is_end = vec![false; self.sites.len()];
         for from in 0..self.sites.len() {
@@ -104,6 +112,9 @@ impl MeshCheck<'_> {
                 is_end[from] = true;
                 is_end[half_edge.to() as usize] = true;
             }
+        }
+        for v in (0..self.sites.len()).filter(|&v| !is_end[v] && half_edges.degree(v) > 0) {
+            self.findings.vertices.add(self.points[v]);
         }
         let ends = (0..self.sites.len()).filter(|&v| is_end[v]);
         MeshBorder { edges, sites: ends.map(|v| self.border_site(v)).collect() }
@@ -117,7 +128,8 @@ impl MeshCheck<'_> {
         let mut shading = [0; 20];
         shading[..12].copy_from_slice(cast_slice(&normal));
         shading[12..].copy_from_slice(cast_slice(&color));
-        BorderSite { site: self.sites[v], position, shading: xxh3_64(&shading), tile: self.tile, unshaded: 0 }
+        let (site, height) = (self.sites[v], self.points[v][2]);
+        BorderSite { site, position, shading: xxh3_64(&shading), tile: self.tile, height, unshaded: 0, unused: 0 }
     }
 
     /// Notes the vertices without a triangle and returns their number.

@@ -43,6 +43,13 @@
 //! and `cut/` together, except that normals and colours are not compared with `cut/`, which has none. If the report says that
 //! triangles were left out and `cut/` is gone, only checks 1, 4 and the first sentence of 2 are made, and check 3 between
 //! the triangles that are there; the verdict says so.
+//!
+//! # What the job wrote
+//!
+//! All this holds for a terrain that somebody has changed consistently: with one vertex raised, or all tiles moved. So every file of the
+//! job is compared with the checksum in `XXH128SUMS`, and that file with the one in `report.json`, which has its own. The report
+//! also has the lattice and a digest of all vertices with their heights. Whoever forges all of these is found out by the inputs
+//! alone: [`verify_against`] reads them again and proves that the vertices are their points.
 
 mod border;
 mod border_matching;
@@ -52,14 +59,16 @@ mod failures;
 mod findings;
 mod half_edges;
 mod hull;
+mod inputs;
 mod keyed_records;
 mod mesh_check;
-mod reported_counts;
+mod report;
 mod source_grid;
 mod tile_files;
 mod verdict;
+mod written_files;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
@@ -67,38 +76,69 @@ use rayon::prelude::*;
 
 pub use digest::{Digest, digest_of};
 pub use source_grid::{SourceGrid, SourceGridError};
-pub use verdict::Verdict;
+pub use verdict::{Conclusion, Verdict};
 
 use crate::output::gltf::read::{TileFile, read_tile};
 use crate::verify::border_matching::Borders;
 use crate::verify::failures::Failure;
 use crate::verify::findings::Findings;
+use crate::verify::inputs::{Inputs, Places};
 use crate::verify::mesh_check::check_mesh;
-use crate::verify::reported_counts::ReportedCounts;
+use crate::verify::report::ReadReport;
 use crate::verify::tile_files::TileFiles;
-use crate::{Error, Result};
+use crate::verify::verdict::CheckedMesh;
+use crate::verify::written_files::WrittenFiles;
+use crate::{Error, Result, address_space};
 
-/// Checks the tiles in the output `directory` of a job within about `memory` bytes. The verdict lists what does not hold.
+/// Checks what is in the output `directory` of a job within about `memory` bytes. The verdict lists what does not hold.
 ///
 /// # Errors
 /// [`Error::Config`] if there are no tiles, [`Error::Memory`] if one tile alone needs more memory, [`Error::Io`] if the system
-/// cannot read a tile, [`Error::Input`] if no tile can be read or the report is damaged.
+/// cannot read a tile.
 pub fn verify(directory: &Path, memory: u64) -> Result<Verdict> {
-    let files = TileFiles::find(directory)?;
-    let grid = SourceGrid::new(&files.extras).map_err(|error| Error::input(&files.paths[0], error.to_string()))?;
-    let lanes = files.lanes(memory / 2)?;
+    verify_against(directory, memory, &[])
+}
+
+/// As [`verify`]; proves also that the vertices are the points of the files `inputs`, if there are any.
+///
+/// # Errors
+/// As [`verify`], and [`Error::Io`] or [`Error::Input`] if an input cannot be read.
+pub fn verify_against(directory: &Path, memory: u64, inputs: &[PathBuf]) -> Result<Verdict> {
+    let memory = address_space::at_start().map_or(memory, |left| memory.min(left));
+    let found = TileFiles::find(directory);
+    if let Err(error @ (Error::Config(_) | Error::Io { .. })) = found {
+        return Err(error);
+    }
+    let report = ReadReport::read(directory);
+    let written = WrittenFiles::check(directory, report.facts.file_list);
+    let unusable = |what: String| Ok(Verdict::without_mesh(what, &report, &written));
+    let files = match found {
+        Ok(files) => files,
+        Err(error) => return unusable(error.to_string()),
+    };
+    let grid = match SourceGrid::new(&files.extras) {
+        Ok(grid) => grid,
+        Err(error) => return unusable(format!("{}: {error}", files.paths[0].display())),
+    };
+    let inputs = match inputs {
+        [] => None,
+        inputs => Some(Inputs::open(inputs, &report.facts, &files.extras)?),
+    };
     let run = Verification {
         borders: Mutex::new(Borders::new(directory, memory / 4)),
+        places: inputs.is_some().then(|| Places::new(directory, memory / 4)),
         files: &files,
         grid: &grid,
         next: AtomicUsize::new(0),
     };
+    let lanes = files.lanes(memory / 2)?;
     let findings =
         (0..lanes).into_par_iter().map(|_| run.check_files()).try_reduce(Findings::default, |a, b| Ok(a.merge(b)))?;
     let borders = run.borders.into_inner().unwrap_or_else(PoisonError::into_inner);
     let names = files.names();
     let matches = borders.match_all(&grid, &names)?;
-    Ok(Verdict::new(files.terrain, findings, matches, ReportedCounts::read(directory)?, &names))
+    let proof = inputs.zip(run.places).map(|(inputs, places)| inputs.compare(places, &grid)).transpose()?;
+    Ok(Verdict::new(CheckedMesh { files: &files, findings, matches }, &report, &written, proof))
 }
 
 /// What the threads share that check files.
@@ -106,6 +146,8 @@ struct Verification<'a> {
     files: &'a TileFiles,
     grid: &'a SourceGrid,
     borders: Mutex<Borders>,
+    /// The vertices of all tiles, if they are to be compared with the inputs.
+    places: Option<Places>,
     /// The number of the next file to check.
     next: AtomicUsize,
 }
@@ -135,7 +177,10 @@ impl Verification<'_> {
             return Ok(());
         }
         for mesh in &tile.parts {
-            let mut border = check_mesh(mesh, number as u32, self.grid, findings);
+            let (mut border, vertices) = check_mesh(mesh, number as u32, self.grid, findings);
+            if let Some(places) = &self.places {
+                places.add_vertices(&vertices)?;
+            }
             if number >= self.files.terrain {
                 findings.cut_triangles += mesh.triangles.len() as u64;
                 border.sites.iter_mut().for_each(|site| site.unshaded = 1);

@@ -4,15 +4,18 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::geometry::Site;
+use crate::geometry::{Site, VertexDigest};
 use crate::verify::border_matching::BorderMatches;
 use crate::verify::exact::cross;
 use crate::verify::findings::Findings;
 use crate::verify::hull::check_boundary;
-use crate::verify::reported_counts::ReportedCounts;
+use crate::verify::inputs::InputProof;
+use crate::verify::report::ReadReport;
+use crate::verify::tile_files::TileFiles;
+use crate::verify::written_files::WrittenFiles;
 
 /// The counts of a verified mesh, and what does not hold.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Verdict {
     /// Tile files.
     pub tiles: u64,
@@ -30,23 +33,67 @@ pub struct Verdict {
     pub ties: u64,
     /// 32 hexadecimal digits that depend on the triangles of the mesh, not on the tiles: see [`Digest`](crate::verify::Digest).
     pub digest: String,
-    /// What does not hold, in sentences; empty if the mesh is the exact Delaunay triangulation.
+    /// The digest of the vertices, heights included: see [`VertexDigest`].
+    pub vertex_digest: String,
+    /// The files that are as the job wrote them, by their checksums.
+    pub files: u64,
+    /// The points of the inputs that the job wanted, if the vertices were compared with them.
+    pub points: Option<u64>,
+    /// What does not hold, in sentences.
     pub failures: Vec<String>,
-    /// What could not be proved: the files of the triangles that were left out are gone, or there is no report.
+    /// What could not be proved because something is missing: `cut/`, the report, or another file.
     pub unproved: Option<String>,
+    /// The conclusion.
+    pub verdict: Conclusion,
+    /// Whether nothing is wrong with the mesh itself.
+    #[serde(skip)]
+    pub is_mesh_sound: bool,
+}
+
+/// What follows from everything that was found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Conclusion {
+    /// The tiles are the exact Delaunay triangulation, and every file is as the job wrote it.
+    Proved,
+    /// Nothing is wrong, but something that the proof needs is missing.
+    AsFarAsCanBeTold,
+    /// Something is wrong.
+    #[default]
+    Failed,
+}
+
+impl Conclusion {
+    /// Returns the exit code of `verify`. What is missing counts as a bad input: it was not given the whole output.
+    pub fn exit_code(self) -> u8 {
+        match self {
+            Conclusion::Proved => 0,
+            Conclusion::AsFarAsCanBeTold => 3,
+            Conclusion::Failed => 4,
+        }
+    }
+}
+
+/// The checked meshes of all tiles.
+pub(super) struct CheckedMesh<'a> {
+    pub(super) files: &'a TileFiles,
+    pub(super) findings: Findings,
+    pub(super) matches: BorderMatches,
 }
 
 impl Verdict {
-    /// Draws the conclusion from all findings; `tiles` is the number of the terrain's tiles, `names` are those of all files.
+    /// Draws the conclusion from everything that was found.
     pub(super) fn new(
-        tiles: usize,
-        mut findings: Findings,
-        matches: BorderMatches,
-        reported: ReportedCounts,
-        names: &[String],
+        mesh: CheckedMesh,
+        report: &ReadReport,
+        written: &WrittenFiles,
+        inputs: Option<InputProof>,
     ) -> Verdict {
+        let CheckedMesh { files, mut findings, matches } = mesh;
+        let facts = &report.facts;
+        let vertices = findings.vertices.join(matches.vertices);
         let mut verdict = Verdict {
-            tiles: tiles as u64,
+            tiles: files.terrain as u64,
             sites: findings.inner_sites + matches.sites,
             triangles: findings.triangles,
             cut: findings.cut_triangles,
@@ -54,32 +101,81 @@ impl Verdict {
             edges_across_tiles: matches.edges_across_tiles,
             ties: findings.ties + matches.ties,
             digest: findings.digest.to_string(),
-            failures: Vec::new(),
-            unproved: None,
+            vertex_digest: vertices.to_string(),
+            ..Verdict::default()
         };
         findings.failures.merge(matches.failures);
-        verdict.failures = findings.failures.sentences(names);
-        let gone = reported.cut_triangles.filter(|&count| count > 0 && verdict.cut == 0);
+        verdict.failures = findings.failures.sentences(&files.names());
+        let gone = facts.cut_triangles.filter(|&count| count > 0 && verdict.cut == 0);
         if let Some(gone) = gone {
-            verdict.unproved = Some(format!(
+            verdict.doubt(format!(
                 "{gone} triangles were left out (max_edge), and the folder cut/ that should hold them is gone: no edge is used twice in \
                  one direction, and all edges with two triangles are Delaunay, but triangles may overlap and sites may be missing"
             ));
         } else {
             verdict.check_hull(matches.hull, findings.double_area);
             verdict.check_euler();
-            verdict.check_count("sites", verdict.sites, reported.sites);
-            verdict.check_count("triangles left out", verdict.cut, reported.cut_triangles);
+            verdict.check_count("sites", verdict.sites, facts.sites);
+            verdict.check_count("triangles left out", verdict.cut, facts.cut_triangles);
+            verdict.check_vertices(vertices, facts.vertex_digest);
         }
-        verdict.check_count("triangles", verdict.triangles - verdict.cut, reported.triangles);
-        if reported.sites.is_none() && verdict.unproved.is_none() {
-            verdict.unproved =
-                Some("sites may be missing: there is no report.json that says how many there are".into());
-        }
-        verdict
+        verdict.check_count("triangles", verdict.triangles - verdict.cut, facts.triangles);
+        verdict.failures.extend(facts.lattice_failure(&files.extras));
+        // Without cut/ its sites are missing too, which says nothing about the inputs.
+        verdict.add_inputs(inputs, gone.is_some());
+        verdict.is_mesh_sound = verdict.failures.is_empty();
+        verdict.conclude(report, written)
     }
 
-    /// Whether the tiles are the exact Delaunay triangulation, except for what [`Verdict::unproved`] says.
+    /// The verdict if no tile can be used.
+    pub(super) fn without_mesh(what: String, report: &ReadReport, written: &WrittenFiles) -> Verdict {
+        Verdict { failures: vec![what], ..Verdict::default() }.conclude(report, written)
+    }
+
+    fn add_inputs(&mut self, inputs: Option<InputProof>, is_cut_gone: bool) {
+        let Some(InputProof { points, failures, unproved }) = inputs else { return };
+        self.points = Some(points);
+        if is_cut_gone {
+            self.doubt("the vertices cannot be compared with the inputs without cut/".into());
+        } else {
+            self.failures.extend(failures);
+            unproved.into_iter().for_each(|what| self.doubt(what));
+        }
+    }
+
+    fn conclude(mut self, report: &ReadReport, written: &WrittenFiles) -> Verdict {
+        self.files = written.unchanged;
+        self.failures.extend(report.failure.iter().chain(&written.failures).cloned());
+        report.unproved.iter().chain(&written.unproved).for_each(|what| self.doubt(what.clone()));
+        self.verdict = match (self.failures.is_empty(), self.unproved.is_none()) {
+            (true, true) => Conclusion::Proved,
+            (true, false) => Conclusion::AsFarAsCanBeTold,
+            (false, _) => Conclusion::Failed,
+        };
+        self
+    }
+
+    /// Adds something that cannot be proved.
+    fn doubt(&mut self, what: String) {
+        self.unproved = Some(match self.unproved.take() {
+            Some(first) => format!("{first}; {what}"),
+            None => what,
+        });
+    }
+
+    /// Returns the conclusion as a sentence.
+    pub fn sentence(&self) -> &'static str {
+        match (self.verdict, self.is_mesh_sound, self.points.is_some()) {
+            (Conclusion::Proved, _, true) => "proved: the exact Delaunay triangulation of the inputs' points",
+            (Conclusion::Proved, _, false) => "proved: the exact Delaunay triangulation",
+            (Conclusion::AsFarAsCanBeTold, ..) => "Delaunay as far as can be told, but not proved",
+            (Conclusion::Failed, true, _) => "failed: files are not as the job wrote them",
+            (Conclusion::Failed, false, true) => "failed: not the Delaunay triangulation of the inputs' points",
+            (Conclusion::Failed, false, false) => "failed: not the Delaunay triangulation that the job wrote",
+        }
+    }
+
+    /// Whether nothing is wrong; [`Verdict::unproved`] says what could not be proved.
     pub fn holds(&self) -> bool {
         self.failures.is_empty()
     }
@@ -102,6 +198,14 @@ impl Verdict {
             self.failures.push(format!(
                 "there are {} triangles, but {} sites and {} hull edges need {euler} (Euler)",
                 self.triangles, self.sites, self.hull_edges
+            ));
+        }
+    }
+
+    fn check_vertices(&mut self, found: VertexDigest, reported: Option<VertexDigest>) {
+        if let Some(reported) = reported.filter(|reported| *reported != found) {
+            self.failures.push(format!(
+                "the vertices are not those of the job: their digest is {found}, report.json says {reported}"
             ));
         }
     }
@@ -130,17 +234,17 @@ impl fmt::Display for Verdict {
             writeln!(f, "{:<20}{:>34}", "triangles left out", self.cut)?;
         }
         writeln!(f, "{:<20}{:>34}", "digest", self.digest)?;
+        writeln!(f, "{:<20}{:>34}", "digest of vertices", self.vertex_digest)?;
+        writeln!(f, "{:<20}{:>34}", "unchanged files", self.files)?;
+        if let Some(points) = self.points {
+            writeln!(f, "{:<20}{:>34}", "points of the inputs", points)?;
+        }
         for failure in &self.failures {
             writeln!(f, "FAILS: {failure}")?;
         }
         if let Some(unproved) = &self.unproved {
             writeln!(f, "not proved: {unproved}")?;
         }
-        let verdict = match (self.holds(), self.unproved.is_some()) {
-            (true, false) => "the exact Delaunay triangulation",
-            (true, true) => "Delaunay, as far as it is proved",
-            (false, _) => "not the Delaunay triangulation",
-        };
-        writeln!(f, "{:<20}{verdict:>34}", "verdict")
+        writeln!(f, "{:<20}{:>34}", "verdict", self.sentence())
     }
 }

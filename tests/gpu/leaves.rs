@@ -135,7 +135,7 @@ fn a_job_has_the_same_digest_on_every_backend() {
     }
     let folder = tempfile::tempdir().unwrap();
     let cloud = folder.path().join("cloud.las");
-    gdt_batch::sample::write(&cloud, 60_000, 3).unwrap();
+    gdt_batch::sample::write(&cloud, 60_000, 3, false).unwrap();
     let mut digests = BTreeSet::new();
     for (i, lines) in [
         "backend = \"reference\"",

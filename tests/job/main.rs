@@ -31,6 +31,8 @@ mod overlap;
 mod preflight;
 mod real;
 mod same_mesh;
+mod shortage;
 mod steps;
+mod tampering;
 mod viewers;
 mod written;

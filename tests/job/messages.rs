@@ -4,7 +4,7 @@ use std::fs;
 
 use crate::clouds;
 use crate::common::shared;
-use crate::program::{Job, gdt_batch, gdt_batch_within, number};
+use crate::program::{Job, gdt_batch, gdt_batch_into, gdt_batch_within, number};
 
 /// Address space that is plenty for small files and far below what hostile headers claim.
 const PLENTY_MIB: u64 = 1_536;
@@ -84,11 +84,111 @@ fn pipes_and_devices_are_refused_without_waiting_for_them() {
         let made = std::process::Command::new("mkfifo").arg(folder.path().join(name)).status().unwrap();
         assert!(made.success());
     }
-    gdt_batch(folder.path(), &["verify", "out"]).refused(3, &["000000.glb", "regular file"]);
+    gdt_batch(folder.path(), &["verify", "out"]).refused(4, &["000000.glb", "regular file"]);
     for path in ["pipe.csv", "/dev/zero"] {
         gdt_batch(folder.path(), &["info", path]).refused(3, &[path, "regular file"]);
     }
-    Job::on(&[folder.path().join("pipe.csv")]).run().refused(2, &["pipe.csv", "files"]);
+    gdt_batch(folder.path(), &["info", "pipe.csv"]).refused(3, &["is a pipe", "cannot be read twice"]);
+    for name in ["pipe.csv", "*.csv"] {
+        Job::on(&[folder.path().join(name)])
+            .run()
+            .refused(2, &["pipe.csv", "files", "is a pipe", "cannot be read twice"]);
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn a_pipe_in_the_place_of_a_file_of_the_job_is_named_and_not_waited_for() {
+    let (_folder, job) = small_job();
+    job.report();
+    let done = job.out();
+    let names = [
+        "job/journal",
+        "job/lock",
+        "job/plan.json",
+        "job/points",
+        "job/steps.3.store",
+        "report.json",
+        "XXH128SUMS",
+        "tileset.json",
+        "tiles/000001.glb",
+        "tiles/000002.partial",
+        "levels/000000.glb",
+        "preview.partial",
+    ];
+    for name in names {
+        let path = done.join(name);
+        let _ = fs::remove_file(&path);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
+        job.run().refused(2, &[name, "is a pipe or a device", "move it away"]);
+        let config = job.config();
+        gdt_batch(job.folder(), &["check", config.to_str().unwrap()]).refused(2, &[name, "is a pipe or a device"]);
+        if !name.starts_with("job/") && !name.ends_with(".partial") {
+            let word = name.trim_start_matches("levels/000000.glb");
+            let said = gdt_batch(job.folder(), &["verify", "out"]);
+            assert!(said.code == 4 || name.starts_with("levels") && said.code == 0, "{name}: {said:?}");
+            assert!(said.out.contains(word), "{name}: {}", said.out);
+        }
+        fs::remove_dir_all(&done).unwrap();
+        job.report();
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn a_path_that_leads_nowhere_is_no_reason_to_try_again() {
+    let (_folder, job) = small_job();
+    job.report();
+    fs::write(job.folder().join("file.las"), "LASF").unwrap();
+    std::os::unix::fs::symlink("loop.las", job.folder().join("loop.las")).unwrap();
+    let long = "x".repeat(300);
+    for path in ["file.las/x", "loop.las", "loop.las/x", &long] {
+        gdt_batch(job.folder(), &["info", path]).refused(2, &[path]);
+        gdt_batch(job.folder(), &["verify", path]).refused(2, &[path]);
+        gdt_batch(job.folder(), &["sample", &format!("{path}/x.las")]).refused(2, &[path]);
+        gdt_batch(job.folder(), &["verify", "out", "--input", path]).refused(2, &[path]);
+        Job::on(&[job.folder().join(path)]).run().refused(2, &[path]);
+        gdt_batch(job.folder(), &[path]).refused(2, &[path]);
+    }
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_standard_output_does_not_undo_a_finished_job() {
+    let (_folder, job) = small_job();
+    let config = job.config();
+    let config = config.to_str().unwrap();
+    let said = gdt_batch_into("/dev/full", job.folder(), &[config]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert!(
+        said.err.contains("the job is done, and its report is in") && said.err.contains("No space left"),
+        "{}",
+        said.err
+    );
+    job.verified();
+    let said = gdt_batch_into("/dev/full", job.folder(), &["--json", config]);
+    said.refused(1, &["standard output", "No space left"]);
+    assert!(said.err.contains("the job is done"), "{}", said.err);
+    gdt_batch_into("/dev/full", job.folder(), &["verify", "out"]).refused(1, &["standard output"]);
+    fs::remove_file(job.out().join("tiles/000001.glb")).unwrap();
+    gdt_batch_into("/dev/full", job.folder(), &["verify", "out"]).refused(4, &["not the Delaunay triangulation"]);
+}
+
+#[test]
+fn a_sample_overwrites_no_file_unless_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("new/terrain.laz");
+    let sample =
+        |more: &[&str]| gdt_batch(folder.path(), &[&["sample", "new/terrain.laz", "--points", "100"], more].concat());
+    sample(&[]).succeeded();
+    let first = fs::read(&path).unwrap();
+    sample(&["--seed", "2"]).refused(2, &["new/terrain.laz exists", "--overwrite"]);
+    assert!(fs::read(&path).unwrap() == first);
+    sample(&["--seed", "2", "--overwrite"]).succeeded();
+    assert!(fs::read(&path).unwrap() != first);
+    let said = gdt_batch(folder.path(), &["info", "new/terrain.laz"]).succeeded();
+    assert!(said.out.contains("LAZ 1.4") && said.out.contains("100"), "{}", said.out);
 }
 
 fn small_job() -> (tempfile::TempDir, Job) {
@@ -147,7 +247,7 @@ fn verify_finds_a_missing_a_turned_and_a_truncated_tile() {
     let (victim, good) = (&names[names.len() / 2], fs::read(&names[names.len() / 2]).unwrap());
     let verify = || gdt_batch(job.folder(), &["verify", "out"]);
     fs::remove_file(victim).unwrap();
-    verify().refused(4, &["does not hold"]);
+    verify().refused(4, &["failed: not the Delaunay triangulation"]);
     assert!(verify().out.contains("FAILS: "));
     // Swap two corners of the last triangle, so that it turns the wrong way.
     let mut turned = good.clone();
@@ -156,9 +256,9 @@ fn verify_finds_a_missing_a_turned_and_a_truncated_tile() {
     (turned[last - 2], turned[last - 1], turned[last], turned[last + 1]) =
         (good[last], good[last + 1], good[last - 2], good[last - 1]);
     fs::write(victim, &turned).unwrap();
-    verify().refused(4, &["does not hold"]);
+    verify().refused(4, &["failed: not the Delaunay triangulation"]);
     fs::write(victim, &good[..good.len() / 2]).unwrap();
-    verify().refused(4, &["does not hold"]);
+    verify().refused(4, &["failed: not the Delaunay triangulation"]);
     fs::write(victim, &good).unwrap();
     assert_eq!(job.verified()["digest"], digest.as_str());
 }

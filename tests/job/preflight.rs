@@ -15,19 +15,20 @@ fn small_job(folder: &Path) -> Job {
 }
 
 #[test]
-fn a_job_refused_for_disk_memory_or_an_unwritable_output_may_be_retried() {
+fn a_job_refused_for_disk_or_memory_may_be_retried_and_one_below_a_file_not() {
     let folder = tempfile::tempdir().unwrap();
     let preflight = check::check(&gdt_batch::config::load(&small_job(folder.path()).config()).unwrap()).unwrap();
     preflight.passes().unwrap();
     let need = preflight.disk;
-    let file = folder.path().join("cloud.csv");
-    for (lacking, words) in [
-        (Preflight { disk_free: Some(need - 1), ..preflight.clone() }, ["make room or choose another", "--force"]),
-        (Preflight { memory_free: Some(1 << 20), ..preflight.clone() }, ["lower [limits] threads", "--force"]),
-        (Preflight { output: file.join("out"), ..preflight.clone() }, ["cannot write to", "cloud.csv/out"]),
+    let below_a_file = folder.path().join("cloud.csv/out");
+    for (lacking, code, words) in [
+        (Preflight { disk_free: Some(need - 1), ..preflight.clone() }, 1, ["make room or choose another", "--force"]),
+        (Preflight { memory_free: Some(1 << 20), ..preflight.clone() }, 1, ["lower [limits] threads", "--force"]),
+        // No retry can make a folder below a file.
+        (Preflight { output: below_a_file, ..preflight.clone() }, 2, ["cannot write to", "cloud.csv/out"]),
     ] {
         let error = lacking.passes().unwrap_err();
-        assert_eq!(error.exit_code(), 1, "{error}");
+        assert_eq!(error.exit_code(), code, "{error}");
         assert!(words.iter().all(|word| error.to_string().contains(word)), "{error}");
     }
     Preflight { disk_free: Some(need), memory_free: None, ..preflight }.passes().unwrap();

@@ -48,11 +48,27 @@ pub(crate) fn gdt_batch<S: AsRef<std::ffi::OsStr>>(folder: &Path, arguments: &[S
     finish(Command::new(env!("CARGO_BIN_EXE_gdt-batch")).args(arguments).current_dir(folder))
 }
 
+/// Runs the program with its standard output going to the file `out`.
+#[track_caller]
+pub(crate) fn gdt_batch_into(out: &str, folder: &Path, arguments: &[&str]) -> Said {
+    let mut command = Command::new("sh");
+    command.arg("-c").arg(format!("exec \"$0\" \"$@\" > {out}"));
+    finish(command.arg(env!("CARGO_BIN_EXE_gdt-batch")).args(arguments).current_dir(folder))
+}
+
 /// Runs the program with `mebibytes` of address space, so that it cannot even ask for more.
 #[track_caller]
 pub(crate) fn gdt_batch_within(mebibytes: u64, folder: &Path, arguments: &[&str]) -> Said {
+    gdt_batch_within_kib(mebibytes * 1024, folder, arguments)
+}
+
+/// Runs the program with `kibibytes` of address space.
+#[track_caller]
+pub(crate) fn gdt_batch_within_kib(kibibytes: u64, folder: &Path, arguments: &[&str]) -> Said {
     let mut command = Command::new("sh");
-    command.arg("-c").arg(format!("ulimit -v {} && exec \"$0\" \"$@\"", mebibytes * 1024));
+    command.arg("-c").arg(format!("ulimit -v {kibibytes} && exec \"$0\" \"$@\""));
+    // Without memory a stack trace takes longer than the run.
+    command.env("RUST_BACKTRACE", "0");
     finish(command.arg(env!("CARGO_BIN_EXE_gdt-batch")).args(arguments).current_dir(folder))
 }
 

@@ -1,4 +1,4 @@
-//! Ctrl-C and SIGTERM.
+//! Ctrl-C, SIGTERM and the hangup of a terminal.
 
 use std::time::Duration;
 
@@ -11,8 +11,8 @@ fn long_job(threads: usize) -> Rig {
 }
 
 #[test]
-fn a_job_stopped_by_sigterm_or_ctrl_c_goes_on_where_it_stopped() {
-    for (signal, threads) in [("TERM", 1), ("INT", 2)] {
+fn a_job_stopped_by_sigterm_ctrl_c_or_a_hangup_goes_on_where_it_stopped() {
+    for (signal, threads) in [("TERM", 1), ("INT", 2), ("HUP", 2)] {
         let rig = long_job(threads);
         // Among the leaves, the border normals and the tiles.
         for steps in [50, 250, 400] {
@@ -28,6 +28,18 @@ fn a_job_stopped_by_sigterm_or_ctrl_c_goes_on_where_it_stopped() {
         }
         assert!(rig.completes(signal)["resumed"].as_u64() > Some(100));
     }
+}
+
+#[test]
+fn a_job_under_nohup_does_not_end_with_its_terminal() {
+    let rig = long_job(2);
+    let mut command = std::process::Command::new("sh");
+    command.args(["-c", "trap '' HUP; exec \"$0\" job.toml", env!("CARGO_BIN_EXE_gdt-batch")]);
+    let mut run = Run::start(command.current_dir(rig.folder.path()).env("GDT_COMMIT_MS", "0"));
+    run.wait_until(|| rig.steps() > 50);
+    run.signal("HUP");
+    run.end().succeeded();
+    rig.is_complete("after a hangup");
 }
 
 #[test]

@@ -21,7 +21,7 @@ impl RandomAccessFile {
     pub(crate) fn open(path: &Path) -> Result<RandomAccessFile> {
         // Ask before opening: opening a pipe would wait until another process writes to it.
         if !path.metadata().map_err(Error::io("read", path))?.is_file() {
-            return Err(Error::input(path, "is not a regular file; give the point-cloud files themselves"));
+            return Err(Error::input(path, kind_text(path)));
         }
         let file = File::open(path).map_err(Error::io("read", path))?;
         let size = file.metadata().map_err(Error::io("read", path))?.len();
@@ -72,6 +72,34 @@ impl RandomAccessFile {
         let file = self.file.try_clone().map_err(Error::io("read", &self.path))?;
         Ok(FileRange::new(file, range))
     }
+}
+
+/// Returns a sentence about what is at `path` if it is there and no regular file.
+pub fn not_a_file(path: &Path) -> Option<String> {
+    let is_none = path.metadata().is_ok_and(|meta| !meta.is_file());
+    is_none.then(|| format!("{} {}", path.display(), kind_text(path)))
+}
+
+/// Says what is at `path`, which is no regular file.
+fn kind_text(path: &Path) -> &'static str {
+    if path.is_dir() {
+        "is a directory, not a regular file; name the point clouds in it"
+    } else if is_pipe(path) {
+        "is a pipe, not a regular file, and cannot be read twice; save what comes out of it as a file, and name that"
+    } else {
+        "is a device, not a regular file; name a point cloud"
+    }
+}
+
+#[cfg(unix)]
+fn is_pipe(path: &Path) -> bool {
+    use std::os::unix::fs::FileTypeExt;
+    path.metadata().is_ok_and(|meta| meta.file_type().is_fifo() || meta.file_type().is_socket())
+}
+
+#[cfg(not(unix))]
+fn is_pipe(_: &Path) -> bool {
+    false
 }
 
 #[cfg(test)]

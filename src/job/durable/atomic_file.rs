@@ -3,11 +3,11 @@
 //! A step writes a file under its partial name ([`write_pending`]). [`publish`] brings it to the disk and then renames it.
 
 use crate::disk::WriteFrom;
-use crate::{Error, Result, disk, fault};
-use serde::Serialize;
+use crate::output::checksums::Checksum;
+use crate::{Error, Result, disk};
 use std::collections::BTreeSet;
 use std::fs::File;
-use std::io::{Read, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::thread::ScopedJoinHandle;
 use xxhash_rust::xxh3::Xxh3;
@@ -19,8 +19,8 @@ pub struct PendingFile {
     pub path: PathBuf,
     /// Its size in bytes.
     pub bytes: u64,
-    /// The XXH3 of its content.
-    pub hash: u64,
+    /// The checksum of its content.
+    pub checksum: Checksum,
 }
 
 /// Writes `content` under the [`partial_path`] of `path`.
@@ -45,17 +45,7 @@ pub fn write_pending_pieces(path: &Path, pieces: &[&[u8]]) -> Result<PendingFile
     let mut hasher = Xxh3::new();
     pieces.iter().for_each(|piece| hasher.update(piece));
     let bytes = pieces.iter().map(|piece| piece.len() as u64).sum();
-    Ok(PendingFile { path: path.into(), bytes, hash: hasher.digest() })
-}
-
-/// Writes `value` as JSON under the [`partial_path`] of `path`.
-///
-/// # Errors
-/// [`Error::Io`] if writing fails.
-pub fn write_pending_json(path: &Path, value: &impl Serialize) -> Result<PendingFile> {
-    let mut text = serde_json::to_vec_pretty(value).map_err(|e| Error::Broken(format!("{}: {e}", path.display())))?;
-    text.push(b'\n');
-    write_pending(path, &text)
+    Ok(PendingFile { path: path.into(), bytes, checksum: Checksum::of_hasher(&hasher) })
 }
 
 /// Returns the pending file of `path` when something else has written it under its [`partial_path`].
@@ -63,26 +53,9 @@ pub fn write_pending_json(path: &Path, value: &impl Serialize) -> Result<Pending
 /// # Errors
 /// [`Error::Io`] if the file cannot be read.
 pub fn find_pending(path: &Path) -> Result<PendingFile> {
-    let (bytes, hash) = digest(&partial_path(path))?;
-    Ok(PendingFile { path: path.into(), bytes, hash })
-}
-
-/// Returns the size and the XXH3 of the file at `path`.
-///
-/// # Errors
-/// [`Error::Io`] if the file cannot be read.
-pub fn digest(path: &Path) -> Result<(u64, u64)> {
-    let mut file = File::open(path).map_err(Error::io("open", path))?;
-    let (mut hasher, mut bytes, mut buffer) = (Xxh3::new(), 0, vec![0; 1 << 18]);
-    loop {
-        let count =
-            fault::read("read-result").and_then(|()| file.read(&mut buffer)).map_err(Error::io("read", path))?;
-        if count == 0 {
-            return Ok((bytes, hasher.digest()));
-        }
-        hasher.update(&buffer[..count]);
-        bytes += count as u64;
-    }
+    let partial = partial_path(path);
+    let (bytes, checksum) = Checksum::of_file(&partial).map_err(Error::io("read", &partial))?;
+    Ok(PendingFile { path: path.into(), bytes, checksum })
 }
 
 /// Returns the name under which the file at `path` waits until it is whole.

@@ -175,8 +175,19 @@ impl JobDirectory {
         files_of(&self.waiting).unwrap_or_default()
     }
 
-    /// Checks that no file, and no dangling link, is where a job needs a folder, that no folder is where it writes a file, and that
-    /// all folders are on one disk.
+    /// Returns the paths of all files that the job may read or write in its directory.
+    fn existing_files(&self) -> Result<Vec<PathBuf>> {
+        let mut files = vec![self.journal(), self.plan(), self.points(), lock_file(&self.job)];
+        files.extend(self.store());
+        files.extend(files_of(&self.results)?);
+        files.extend(files_of(&self.waiting)?);
+        let partials: Vec<PathBuf> = files.iter().map(|path| partial_path(path)).collect();
+        files.extend(partials);
+        Ok(files)
+    }
+
+    /// Checks that no file, and no dangling link, is where a job needs a folder, that no folder, pipe or device is where it reads or
+    /// writes a file (opening a pipe would wait for another process), and that all folders are on one disk.
     ///
     /// # Errors
     /// [`Error::Config`] names what is in the way.
@@ -188,8 +199,9 @@ impl JobDirectory {
         let (found, what, wanted) = if let Some(found) = folders.find(is_in_the_way) {
             let what = if found.exists() { "is not a directory" } else { "is a link that leads nowhere" };
             (found.to_path_buf(), what, "a directory")
-        } else if let Some(found) = files_of(&self.results)?.into_iter().find(|path| path.is_dir()) {
-            (found, "is a directory", "a file")
+        } else if let Some(found) = self.existing_files()?.into_iter().find(|path| is_no_file(path)) {
+            let what = if found.is_dir() { "is a directory" } else { "is a pipe or a device" };
+            (found, what, "a file")
         } else if let Some(found) = own.into_iter().find(|path| is_elsewhere(path, self.results.directory())) {
             // Results could not take their places at once.
             (found, "is on another disk than the output directory", "a directory of the same disk")
@@ -238,6 +250,11 @@ impl JobDirectory {
     }
 }
 
+/// Tells whether something other than a regular file, or a link to one, is at `path`.
+fn is_no_file(path: &Path) -> bool {
+    path.metadata().is_ok_and(|meta| !meta.is_file())
+}
+
 fn remove_at_end(file: &Path) -> Result<()> {
     remove_file(file)?;
     fault::point("cleaning");
@@ -255,7 +272,14 @@ pub fn create_folder(path: &Path) -> Result<()> {
 /// Returns the paths of all files that a job may have left in `folder`, under their names or their partial names: the fixed names,
 /// and the numbered files that exist.
 fn files_of(folder: &OutputFiles) -> Result<Vec<PathBuf>> {
-    let mut files = vec![folder.report(), folder.terrain(), folder.tileset(), folder.georeference(), folder.preview()];
+    let mut files = vec![
+        folder.report(),
+        folder.checksums(),
+        folder.terrain(),
+        folder.tileset(),
+        folder.georeference(),
+        folder.preview(),
+    ];
     let partials: Vec<PathBuf> = files.iter().map(|path| partial_path(path)).collect();
     files.extend(partials);
     for folder in folder.glb_folders().iter().filter(|folder| folder.is_dir()) {

@@ -5,10 +5,11 @@
 //! Everything from the first damaged line on counts as never written. The job says what its header, its steps (`S`) and its
 //! records (`K`) are.
 
-use crate::job::durable::atomic_file::{PendingFile, digest, publish, write_pending};
+use crate::job::durable::atomic_file::{PendingFile, publish, write_pending};
 use crate::job::durable::committer::{CommitBatch, Committer};
 use crate::job::durable::directory::JobDirectory;
 use crate::job::durable::store::{RecordKey, RecordRef};
+use crate::output::checksums::Checksum;
 use crate::{Error, Result, fault, interrupt};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -17,6 +18,7 @@ use std::collections::HashMap;
 use std::fmt::Debug;
 use std::hash::Hash;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 use xxhash_rust::xxh3::xxh3_64;
 
 /// What the job calls its steps.
@@ -58,13 +60,14 @@ pub struct PublishedFile {
     /// Its path from the output directory.
     pub name: PathBuf,
     bytes: u64,
-    hash: u64,
+    /// The checksum of its content.
+    pub checksum: Checksum,
 }
 
 impl PublishedFile {
     /// Returns what the journal keeps of a pending file.
     pub fn of(directory: &JobDirectory, file: &PendingFile) -> PublishedFile {
-        PublishedFile { name: directory.name(&file.path), bytes: file.bytes, hash: file.hash }
+        PublishedFile { name: directory.name(&file.path), bytes: file.bytes, checksum: file.checksum }
     }
 
     /// Tells whether the file exists and holds what was written.
@@ -78,7 +81,7 @@ impl PublishedFile {
     }
 
     fn is_at(&self, path: &Path) -> bool {
-        digest(path).is_ok_and(|found| found == (self.bytes, self.hash))
+        Checksum::of_file(path).is_ok_and(|found| found == (self.bytes, self.checksum))
     }
 }
 
@@ -149,6 +152,8 @@ pub struct JournalPosition(u64);
 pub struct Journal<'a, S, K> {
     directory: &'a JobDirectory,
     taken_over: HashMap<S, JournalEntry<S, K>>,
+    /// The files of all steps that are finished, in the order in which they were recorded.
+    files: Mutex<Vec<PublishedFile>>,
     committer: Committer,
 }
 
@@ -169,8 +174,9 @@ impl<'a, S: StepKey, K: RecordKey> Journal<'a, S, K> {
         let path = directory.journal();
         write_pending(&path, text.as_bytes())?;
         publish(std::slice::from_ref(&path))?;
+        let files = Mutex::new(entries.iter().flat_map(|entry| &entry.files).cloned().collect());
         let taken_over = entries.into_iter().map(|entry| (entry.step, entry)).collect();
-        Ok(Journal { directory, taken_over, committer: Committer::start(&path)? })
+        Ok(Journal { directory, taken_over, files, committer: Committer::start(&path)? })
     }
 
     /// Tells whether an earlier run finished `step`.
@@ -205,9 +211,17 @@ impl<'a, S: StepKey, K: RecordKey> Journal<'a, S, K> {
     /// [`Error::Io`] if an earlier record could not be committed.
     pub fn record<T: Serialize>(&self, step: S, output: StepOutput<T, K>) -> Result<T> {
         let entry = JournalEntry::new(self.directory, step, &output)?;
+        self.files.lock().unwrap_or_else(PoisonError::into_inner).extend(entry.files.iter().cloned());
         let files = output.files.into_iter().map(|file| file.path).collect();
         self.committer.add(CommitBatch { lines: to_line(&entry)?, files })?;
         Ok(output.stats)
+    }
+
+    /// Returns the files of all steps that are finished, by name.
+    pub fn files(&self) -> Vec<PublishedFile> {
+        let mut files = self.files.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        files.sort_by(|a, b| a.name.cmp(&b.name));
+        files
     }
 
     /// Waits until everything recorded is on the disk and all results have their names.

@@ -4,6 +4,7 @@
 //! soon: a map of one block with the block, and those of a whole file whenever a few MiB of it have been looked at. Removing pages
 //! interrupts all threads, so small blocks are not worth a map of their own.
 
+use crate::address_space;
 use crate::positional_io::read_exact_at;
 use bytemuck::Pod;
 use memmap2::{Mmap, MmapOptions};
@@ -76,6 +77,11 @@ pub struct MappedFile {
 impl MappedFile {
     /// Maps `file`, which must not change any more.
     pub fn new(file: &File) -> MappedFile {
+        let length = file.metadata().map_or(0, |meta| meta.len());
+        // Where the address space is limited, the steps need it for more than this.
+        if address_space::left().is_some_and(|left| left / 4 < length) {
+            return MappedFile::default();
+        }
         // SAFETY: The file is finished: nothing writes to it or shortens it while the map exists, and the lock of the job keeps other
         // runs of the program out of the folder.
         let map = unsafe { MmapOptions::new().map(file) };

@@ -1,7 +1,7 @@
 //! Step 3, once for each tile: triangulates the sites of a leaf, and stores the triangles that are final and the frontier.
 
 use crate::Result;
-use crate::geometry::Site;
+use crate::geometry::{Site, VertexDigest};
 use crate::input::Point;
 use crate::job::index::TileIndex;
 use crate::job::mesh::final_triangles::{FinalTriangles, TriangleState, find_final};
@@ -27,6 +27,8 @@ pub struct LeafStats {
     pub duplicates: u64,
     /// Triangles that leaves made final.
     pub triangles: u64,
+    /// The digest of the sites with their heights.
+    pub vertices: VertexDigest,
     /// How the leaves were triangulated.
     pub outcome: TriangulationCounts,
 }
@@ -36,6 +38,7 @@ impl AddAssign for LeafStats {
         self.sites += other.sites;
         self.duplicates += other.duplicates;
         self.triangles += other.triangles;
+        self.vertices = self.vertices.join(other.vertices);
         self.outcome += other.outcome;
     }
 }
@@ -69,7 +72,8 @@ pub fn triangulate_leaf(
     let frontier = Frontier { sites: found.frontier.iter().map(vertex).collect(), boundary: found.boundary };
     let records = vec![normals.save(store, tile)?, leaf, frontier.save(store, node)?];
     triangulation::recycle(mesh);
-    Ok(StepOutput::new(LeafStats { sites: sites.len() as u64, duplicates, triangles, outcome }, records))
+    let vertices = VertexDigest::of(points.iter().map(Point::corner));
+    Ok(StepOutput::new(LeafStats { sites: sites.len() as u64, duplicates, triangles, vertices, outcome }, records))
 }
 
 /// Checks that single precision can hold all final triangles.

@@ -1,5 +1,6 @@
 //! What identifies a job: whether a run may go on from what an earlier one left.
 
+use crate::input::samples::fingerprint_of;
 use crate::job::options::JobOptions;
 use crate::job::plan::input_identity::{InputIdentities, RenamedInputs};
 use crate::job::plan::inputs::input_paths;
@@ -68,6 +69,11 @@ impl Fingerprint {
             memory: options.limits.memory.0,
             files: InputIdentities::of(&paths)?,
         })
+    }
+
+    /// Returns what tells the content of the inputs from that of others, whatever their names.
+    pub fn of_inputs(&self) -> String {
+        fingerprint_of(self.files.samples())
     }
 
     /// Returns what has changed since `earlier`.

@@ -1,14 +1,12 @@
 //! What identifies an input: whether a file is the one that an earlier run read, whatever it is called by now.
 
-use crate::positional_io::read_exact_at;
-use crate::{Error, Result, fault};
+use crate::input::samples::FileSamples;
+use crate::{Error, Result};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
-use xxhash_rust::xxh3::Xxh3;
 
 /// The inputs of a job in their order.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -27,11 +25,10 @@ struct InputIdentity {
 /// What identifies the content of a file. With the same content the mesh is the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 struct ContentIdentity {
-    bytes: u64,
+    #[serde(flatten)]
+    samples: FileSamples,
     /// When it was written, in nanoseconds since 1970.
     modified: u64,
-    /// The XXH3 of its beginning, its end and samples between them.
-    samples: u64,
 }
 
 /// Returns the place of the file at `path`: the same for all paths that lead to it.
@@ -46,6 +43,11 @@ impl InputIdentities {
     /// [`Error::Io`] if one cannot be read.
     pub(crate) fn of(paths: &[PathBuf]) -> Result<InputIdentities> {
         paths.par_iter().map(|path| InputIdentity::of(path)).collect::<Result<_>>().map(InputIdentities)
+    }
+
+    /// Returns what the files hold, as far as samples tell.
+    pub(crate) fn samples(&self) -> Vec<FileSamples> {
+        self.0.iter().map(|file| file.content.samples).collect()
     }
 
     /// Returns the names of the files that have changed since `earlier`; none if the files have the same contents in the same
@@ -81,7 +83,7 @@ impl InputIdentity {
         Ok(InputIdentity {
             path: path.to_path_buf(),
             place: place(path).to_string_lossy().into_owned(),
-            content: ContentIdentity::of(path).map_err(Error::io("read", path))?,
+            content: ContentIdentity::of(path)?,
         })
     }
 }
@@ -113,37 +115,15 @@ impl RenamedInputs {
     }
 }
 
-/// Bytes that are hashed at the beginning and at the end of a file.
-const END_BYTES: u64 = 64 << 10;
-/// Bytes of a sample between them.
-const SAMPLE_BYTES: u64 = 4 << 10;
-/// The number of samples between them.
-const SAMPLES: u64 = 16;
-
 impl ContentIdentity {
-    fn of(path: &Path) -> std::io::Result<ContentIdentity> {
-        let file = File::open(path)?;
-        let data = file.metadata()?;
+    fn of(path: &Path) -> Result<ContentIdentity> {
+        let data = path.metadata().map_err(Error::io("read", path))?;
         let modified = data.modified().ok().and_then(|time| time.duration_since(SystemTime::UNIX_EPOCH).ok());
         Ok(ContentIdentity {
-            bytes: data.len(),
+            samples: FileSamples::of(path)?,
             modified: modified.map_or(0, |age| age.as_nanos() as u64),
-            samples: hash_of_samples(&file, data.len())?,
         })
     }
-}
-
-fn hash_of_samples(file: &File, bytes: u64) -> std::io::Result<u64> {
-    let last = bytes.saturating_sub(END_BYTES);
-    let between = (1..=SAMPLES).map(|i| (last / (SAMPLES + 1) * i, SAMPLE_BYTES));
-    let (mut hasher, mut buffer) = (Xxh3::new(), Vec::new());
-    for (at, length) in [(0, END_BYTES), (last, END_BYTES)].into_iter().chain(between) {
-        buffer.resize(length.min(bytes - at) as usize, 0);
-        fault::read("read-input")?;
-        read_exact_at(file, &mut buffer, at)?;
-        hasher.update(&buffer);
-    }
-    Ok(hasher.digest())
 }
 
 #[cfg(test)]
@@ -151,7 +131,7 @@ mod tests {
     use super::*;
 
     fn identities(files: &[(&str, u64)]) -> InputIdentities {
-        let content = |samples| ContentIdentity { bytes: 1, modified: 2, samples };
+        let content = |samples| ContentIdentity { samples: FileSamples { bytes: 1, samples }, modified: 2 };
         let identity = |&(path, samples): &(&str, u64)| InputIdentity {
             path: path.into(),
             place: format!("/home/{path}"),

@@ -1,7 +1,7 @@
 //! The input files: which ones the options name, and what their headers say.
 
 use crate::input::options::{InputOptions, OnBadFile};
-use crate::input::{RowChoice, Source, open_chosen};
+use crate::input::{RowChoice, Source, not_a_file, open_chosen};
 use crate::job::plan::input_identity::place;
 use crate::job::plan::job_plan::SkippedInput;
 use crate::{Error, Result};
@@ -32,11 +32,14 @@ fn files_of(pattern: &str) -> Result<Vec<PathBuf>> {
     for path in found {
         files.push(path.map_err(|e| Error::io("read", e.path().to_path_buf())(e.into()))?);
     }
-    files.retain(|path| path.is_file());
+    files.retain(|path| !path.is_dir());
     if files.is_empty() && Path::new(pattern).is_file() {
         files.push(pattern.into());
     }
-    Ok(files)
+    match files.iter().find_map(|path| not_a_file(path)) {
+        Some(what) => Err(Error::Config(format!("[input] files: {what}"))),
+        None => Ok(files),
+    }
 }
 
 fn nothing_at(pattern: &str) -> String {

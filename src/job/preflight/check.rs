@@ -13,7 +13,7 @@ use crate::job::preflight::kept_points::{KeptPoints, has_filter};
 use crate::job::progress::text::{grouped, mebibytes};
 use crate::job::publish::limits::MAX_TRIANGLES_IN_ONE_FILE;
 use crate::job::report::skipped::write_skipped;
-use crate::{Error, Result, Warnings};
+use crate::{Error, Result, Warnings, address_space};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::{fmt, io};
@@ -157,6 +157,7 @@ impl Preflight {
             );
             return Err(Error::io("write to", &self.output)(io::Error::new(io::ErrorKind::StorageFull, what)));
         }
+        address_space::require(self.memory, address_space::at_start(), || "the job".into())?;
         match self.memory_free.filter(|free| *free < self.memory) {
             Some(free) => Err(Error::Memory(format!(
                 "the job takes about {}, and this machine has {} free; end other programs, or lower [limits] threads or \

@@ -1,8 +1,10 @@
 //! The report of a finished job, as `report.json` holds it for machines.
 
 use crate::Warnings;
+use crate::geometry::VertexDigest;
 use crate::geometry::lattice::Lattice;
 use crate::input::PointCounts;
+use crate::input::options::InputOptions;
 use crate::job::levels::make_level::LevelStats;
 use crate::job::machine;
 use crate::job::mesh::leaf::LeafStats;
@@ -11,7 +13,9 @@ use crate::job::progress::clock::JobClock;
 use crate::job::progress::stats::StageStats;
 use crate::job::progress::text::grouped;
 use crate::job::tiles::write_tile::TileStats;
+use crate::output::checksums::{Checksum, seal};
 use crate::voronoi::counts::STEP_NAMES;
+use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
 /// The report of a finished job.
@@ -73,6 +77,16 @@ pub struct Report {
     pub stages: Vec<StageStats>,
     /// What the user should know.
     pub warnings: Warnings,
+    /// What the user wants of the inputs; the files themselves are not listed.
+    pub input: InputOptions,
+    /// Tells the content of all inputs from that of others, whatever their names and their order: a hash of sizes and samples.
+    pub inputs_fingerprint: String,
+    /// The digest of all vertices with their heights, on the lattice.
+    pub vertex_digest: VertexDigest,
+    /// The checksum of `XXH128SUMS`, which has those of all other results.
+    pub file_list: Checksum,
+    /// The checksum of this report, with zeros in place of it.
+    pub checksum: Checksum,
 }
 
 /// Seconds by step of the pipeline.
@@ -133,6 +147,10 @@ pub struct ReportParts {
     pub resumed: u64,
     /// The start of the job.
     pub clock: JobClock,
+    /// What tells the content of the inputs from that of others.
+    pub inputs_fingerprint: String,
+    /// The checksum of the list of the other results.
+    pub file_list: Checksum,
 }
 
 impl Report {
@@ -178,6 +196,28 @@ impl Report {
             cpu_s: parts.clock.cpu_s(),
             stages: parts.stages,
             warnings,
+            input: InputOptions { files: Vec::new(), ..plan.options.input.clone() },
+            inputs_fingerprint: parts.inputs_fingerprint,
+            vertex_digest: parts.leaves.vertices,
+            file_list: parts.file_list,
+            checksum: Checksum::default(),
         }
+    }
+
+    /// Returns the report with its checksum, and its text.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] if it cannot be written as JSON.
+    pub fn sealed(mut self) -> Result<(Report, Vec<u8>)> {
+        self.checksum = Checksum::default();
+        let (checksum, _) = seal(&self.text()?).ok_or_else(|| Error::Broken("the report has no checksum".into()))?;
+        self.checksum = checksum;
+        let text = self.text()?;
+        Ok((self, text))
+    }
+
+    fn text(&self) -> Result<Vec<u8>> {
+        let text = serde_json::to_string_pretty(self).map_err(|e| Error::Broken(format!("the report: {e}")))?;
+        Ok((text + "\n").into_bytes())
     }
 }

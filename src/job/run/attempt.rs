@@ -18,7 +18,7 @@ use crate::job::run::context::RunContext;
 use crate::job::run::read_step::note_skipped;
 use crate::job::run::resume::{self, EarlierRun, RunStart};
 use crate::job::run::stage_costs::stage_costs;
-use crate::job::run::threads::on_threads;
+use crate::threads::on_threads;
 use crate::triangulation::Triangulator;
 use crate::{Error, Result};
 use std::sync::Mutex;
@@ -142,6 +142,7 @@ fn attempt(
             progress,
             threads,
             clock,
+            inputs_fingerprint: job.fingerprint.of_inputs(),
             stages: Mutex::new(vec![planned]),
         };
         let outcome = (job.walk)(&context, plan, partition);
@@ -175,5 +176,5 @@ fn end(directory: &JobDirectory, outcome: Result<Report>, steps: u64) -> Result<
 
 /// Tells whether another run can make use of the finished steps: with the same options, or with others for how tiles look.
 fn may_go_on(why: &Error) -> bool {
-    why.exit_code() == 1 || matches!(why, Error::Config(_))
+    why.exit_code() == 1 || matches!(why, Error::Config(_) | Error::Io { .. })
 }

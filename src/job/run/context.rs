@@ -20,6 +20,8 @@ pub(crate) struct RunContext<'a> {
     pub(crate) progress: &'a JobProgress,
     pub(crate) threads: usize,
     pub(crate) clock: JobClock,
+    /// What tells the content of the inputs from that of others.
+    pub(crate) inputs_fingerprint: String,
     /// The stages that have ended.
     pub(crate) stages: Mutex<Vec<StageStats>>,
 }

@@ -7,8 +7,8 @@ use crate::job::partition::result::Partition;
 use crate::job::plan::job_plan::Plan;
 use crate::job::records::JobStep;
 use crate::job::run::context::RunContext;
-use crate::job::run::threads::on_threads;
 use crate::job::tiles::style::TileStyle;
+use crate::threads::on_threads;
 use rayon::prelude::*;
 
 /// The coarser tiles of a job.

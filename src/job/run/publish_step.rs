@@ -1,7 +1,7 @@
 //! Running step 8 and writing the report.
 
 use crate::geometry::Bounds;
-use crate::job::durable::atomic_file::write_pending_json;
+use crate::job::durable::atomic_file::{PendingFile, write_pending};
 use crate::job::levels::make_level::LevelStats;
 use crate::job::mesh::leaf::LeafStats;
 use crate::job::partition::result::Partition;
@@ -17,9 +17,11 @@ use crate::job::run::levels_step::LevelResult;
 use crate::job::run::threads::run_concurrently;
 use crate::job::run::tile_queue::WrittenTiles;
 use crate::job::tiles::write_tile::TileStats;
+use crate::output::checksums::list_text;
 use crate::output::options::OutputFormat;
 use crate::output::tiles3d::georeference::Georeference;
 use crate::{Result, Warnings};
+use std::path::{Path, PathBuf};
 
 /// Tells whether viewers get 3D Tiles: where the user wants them, or where one file would be too large.
 pub(crate) fn wants_tileset(plan: &Plan, written: &TileStats) -> bool {
@@ -93,6 +95,7 @@ pub(crate) fn write_report(
     tiles: TileStats,
     published: Published,
 ) -> Result<Report> {
+    let list = write_file_list(run)?;
     let parts = ReportParts {
         points: partition.summary.counts.clone(),
         leaves,
@@ -101,17 +104,36 @@ pub(crate) fn write_report(
         tiles,
         levels: published.levels,
         warnings: published.warnings,
-        other_bytes: published.bytes,
+        other_bytes: published.bytes + list.bytes,
         temporary: partition.point_bytes + run.store.bytes(),
         stages: std::mem::take(&mut *run.stages()),
         threads: run.threads,
         memory: plan.options.limits.memory.0,
         resumed: run.journal.taken_over(),
         clock: run.clock,
+        inputs_fingerprint: run.inputs_fingerprint.clone(),
+        file_list: list.checksum,
     };
-    let report = Report::new(plan, parts);
-    let files = vec![write_pending_json(&run.directory.output().report(), &report)?];
+    let (report, text) = Report::new(plan, parts).sealed()?;
+    // The report comes last: it says that all results are there.
+    let files = vec![list, write_pending(&run.directory.output().report(), &text)?];
     run.journal.record(JobStep::Report, StepOutput { files, ..StepOutput::new((), Vec::new()) })?;
     run.journal.commit()?;
     Ok(report)
+}
+
+/// Writes the list of all results so far with their checksums, which the journal has.
+fn write_file_list(run: &RunContext) -> Result<PendingFile> {
+    let output = run.directory.output();
+    let own = [output.job(), output.checksums(), output.report()].map(|path| run.directory.name(&path));
+    let is_result = |name: &PathBuf| !own.iter().any(|own| name.starts_with(own));
+    let files = run.journal.files().into_iter().filter(|file| is_result(&file.name));
+    let files: Vec<_> = files.map(|file| (slashed(&file.name), file.checksum)).collect();
+    write_pending(&output.checksums(), list_text(&files).as_bytes())
+}
+
+/// Returns a path with slashes on every system.
+fn slashed(path: &Path) -> String {
+    let parts: Vec<_> = path.iter().map(|part| part.to_string_lossy()).collect();
+    parts.join("/")
 }

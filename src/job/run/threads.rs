@@ -1,16 +1,6 @@
-//! Running work on threads.
+//! Running work while another thread waits.
 
-use crate::{Error, Result};
-
-/// Runs `work` in a rayon pool of `threads` threads.
-///
-/// # Errors
-/// [`Error::Memory`] if the threads cannot be started, and the errors of `work`.
-pub(crate) fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> Result<T> + Send) -> Result<T> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool = pool.map_err(|e| Error::Memory(format!("cannot start {threads} threads: {e}")))?;
-    pool.install(work)
-}
+use crate::Result;
 
 /// Runs `work` while another thread runs `waiting`, which mostly waits for the disk. If no thread can be started, runs one after
 /// the other.

@@ -1,0 +1,26 @@
+//! Running work on a pool of threads.
+
+use crate::{Error, Result, address_space};
+
+/// The address space that a thread takes: its stack, and what starting it takes besides.
+const BYTES_PER_THREAD: u64 = (2 << 20) + (64 << 10);
+/// The address space that must be left besides the threads.
+const RESERVE: u64 = 4 << 20;
+
+/// Runs `work` in a rayon pool of `threads` threads.
+///
+/// # Errors
+/// [`Error::Memory`] if the threads cannot be started, and the errors of `work`.
+pub fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> Result<T> + Send) -> Result<T> {
+    // A thread that starts without room for its signal stack would end the process.
+    let bytes = RESERVE + BYTES_PER_THREAD * threads as u64;
+    address_space::require(bytes, address_space::left(), || format!("starting {threads} threads"))?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|e| Error::Memory(format!("cannot start {threads} threads: {e}")))?;
+    pool.install(work)
+}
+
+/// Returns how many threads the machine runs at the same time.
+pub fn available() -> usize {
+    std::thread::available_parallelism().map_or(1, |n| n.get())
+}

@@ -1,0 +1,68 @@
+//! Too little memory, at every amount: the program says so and exits with 1. It never aborts or panics.
+
+use std::path::Path;
+
+use crate::clouds;
+use crate::program::{Job, gdt_batch, gdt_batch_within_kib};
+
+/// Runs the program with more and more address space until it succeeds a few times. Returns how many runs were refused.
+#[track_caller]
+fn refused_until_it_fits(folder: &Path, arguments: &[&str], before: impl Fn()) -> usize {
+    let (mut refused, mut fitted, mut kibibytes) = (0, 0, 20_000);
+    while fitted < 3 {
+        before();
+        let said = gdt_batch_within_kib(kibibytes, folder, arguments);
+        match said.code {
+            0 => fitted += 1,
+            // The system could not even load the program.
+            127 => {}
+            code => {
+                let has_words =
+                    ["memory", "cannot start", "Cannot allocate"].iter().any(|word| said.err.contains(word));
+                assert!(code == 1 && has_words, "{arguments:?} with {kibibytes} KiB: {said:?}");
+                (refused, fitted) = (refused + 1, 0);
+            }
+        }
+        // Coarser steps where there is more: some hundred runs in all.
+        kibibytes += 200 + kibibytes / 14;
+        assert!(kibibytes < 8 << 20, "{arguments:?} never fits: {said:?}");
+    }
+    refused
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn with_any_amount_of_address_space_a_command_succeeds_or_says_that_memory_is_short() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = clouds::write(folder.path(), "cloud.csv", &clouds::uniform(6_000, 40_000, 4));
+    gdt_batch(folder.path(), &["sample", "cloud.laz", "--points", "20000"]).succeeded();
+    let laz = folder.path().join("cloud.laz");
+    for (cloud, threads) in [(&text, 4), (&laz, 1)] {
+        let job = Job::on(&[cloud]).tiles_of(2_000).threads(threads);
+        let (config, out) = (job.config(), job.out());
+        let config = config.to_str().unwrap();
+        let restart = || _ = std::fs::remove_dir_all(&out);
+        assert!(refused_until_it_fits(job.folder(), &["--force", "--quiet", config], restart) > 3);
+    }
+    let job = Job::on(&[&text]).tiles_of(2_000).threads(4);
+    let config = job.config();
+    let config = config.to_str().unwrap();
+    assert!(refused_until_it_fits(job.folder(), &[config], || {}) > 3);
+    assert!(refused_until_it_fits(job.folder(), &["check", config], || {}) > 3);
+    let with_input = ["verify", "out", "--input", text.to_str().unwrap()];
+    assert!(refused_until_it_fits(job.folder(), &with_input, || {}) > 1);
+    for arguments in [&["info", "cloud.csv"][..], &["info", "cloud.laz"], &["sample", "s.laz", "--overwrite"]] {
+        refused_until_it_fits(folder.path(), arguments, || {});
+    }
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_job_that_the_address_space_does_not_hold_is_refused_with_the_limit_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = clouds::write(folder.path(), "cloud.csv", &clouds::uniform(100_000, 100_000, 4));
+    let job = Job::on(&[&text]).threads(2);
+    let config = job.config();
+    let said = gdt_batch_within_kib(100 << 10, job.folder(), &[config.to_str().unwrap()]);
+    said.refused(1, &["not enough memory", "the job takes about", "ulimit -v", "raise it"]);
+}
