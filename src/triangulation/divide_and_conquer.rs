@@ -13,9 +13,6 @@ use crate::mesh::half_edge::HalfEdgeMesh;
 use crate::mesh::index::{HalfEdgeIndex, SiteIndex};
 use crate::{Error, Result, interrupt};
 
-/// The peak number of bytes for each site: the sorted sites, the edges, and the mesh.
-pub const BYTES_PER_SITE: u64 = 160;
-
 /// Parts with more sites than this ask before they are joined whether the process should stop.
 const SITES_BETWEEN_CHECKS: usize = 1 << 14;
 

@@ -1,6 +1,7 @@
 //! Tests of the preview.
 
 use gdt_batch::geometry::predicates::orient2d;
+use gdt_batch::output::Tile;
 use gdt_batch::output::preview::canvas::{Canvas, LONGER_SIDE, PreviewPixel};
 use gdt_batch::output::preview::picture::Picture;
 use proptest::prelude::*;
@@ -27,6 +28,35 @@ fn every_pixel_of_a_rectangle_is_drawn_once() {
     }
 }
 
+/// Slivers over many rows are drawn in another way than other triangles.
+#[test]
+fn a_fan_of_slivers_covers_the_pixels_of_its_outline_once() {
+    let frame = utm();
+    for [end, hub] in
+        [[[90_000, 0], [40_000, 70_000]], [[0, 80_000], [90_000, 30_000]], [[70_000, 70_000], [90_000, 100]]]
+    {
+        let count = 3_000;
+        let on_line = |i: i32| [end[0] / count * i, end[1] / count * i, 0];
+        let points: Vec<[i32; 3]> = (0..=count).map(on_line).chain([[hub[0], hub[1], 500]]).collect();
+        let hub = points.len() as u32 - 1;
+        let turned = |a: u32, b: u32| {
+            let [p, q, r] = [a, b, hub].map(|v| [points[v as usize][0], points[v as usize][1]]);
+            if orient2d(p, q, r) > 0 { [a, b, hub] } else { [b, a, hub] }
+        };
+        let tile = |triangles: Vec<[u32; 3]>| Tile { triangles, positions: points.clone(), ..Tile::default() };
+        let fan = tile((0..hub - 1).map(|i| turned(i, i + 1)).collect());
+        let outline = tile(vec![turned(0, hub - 1)]);
+        let canvas = Canvas::new(&frame, fan.bounds().unwrap());
+        let pixels = |tile: &Tile| {
+            let mut pixels: Vec<u32> = canvas.draw(tile).iter().map(|pixel| pixel.pixel).collect();
+            pixels.sort_unstable();
+            pixels
+        };
+        assert!(pixels(&outline).len() > 100_000);
+        assert!(pixels(&fan) == pixels(&outline));
+    }
+}
+
 #[test]
 fn the_picture_is_a_png_of_its_size() {
     let frame = utm();
@@ -48,7 +78,7 @@ fn a_slope_towards_the_light_is_brighter() {
     let frame = utm();
     let roof = |x: i32| 300 - (x - 300).abs();
     let points: Vec<[i32; 3]> = (0..=60).flat_map(|x| [0, 300, 600].map(|y| [10 * x, y, roof(10 * x)])).collect();
-    let mesh = gdt_batch::output::Tile { colors: Some(vec![[30_000; 3]; points.len()]), ..terrain(&frame, &points) };
+    let mesh = Tile { colors: Some(vec![[30_000; 3]; points.len()]), ..terrain(&frame, &points) };
     let canvas = Canvas::new(&frame, mesh.bounds().unwrap());
     let mut picture = Picture::new(&canvas);
     picture.add(0, &canvas.draw(&mesh));

@@ -54,15 +54,16 @@ pub fn simplify(frame: &Frame, tile: &Tile, triangles: usize) -> Result<Simplifi
     let inside = tile.positions.len() - boundary.vertices;
     let least = (triangles as f64 * LEAST_INSIDE) as usize;
     let wanted = (triangles / 2).saturating_sub(boundary.vertices / 2).max(least).min(inside);
-    let (mut kept, mut coarse) = (boundary.on.clone(), tile.triangles.clone());
-    if wanted < inside {
-        let by_grid = (wanted as f64 * BY_GRID) as usize;
-        keep_by_grid(tile, by_grid, &mut kept);
+    if wanted >= inside {
+        return Ok(Simplified { tile: tile.subset(tile.triangles.clone()), error: 0.0 });
+    }
+    let mut kept = boundary.on.clone();
+    let by_grid = (wanted as f64 * BY_GRID) as usize;
+    keep_by_grid(tile, by_grid, &mut kept);
+    let mut coarse = boundary.fill(tile, &kept)?;
+    let rest = (boundary.vertices + wanted).saturating_sub(kept.iter().filter(|&&kept| kept).count());
+    if keep_furthest(tile, &coarse, rest, &mut kept) > 0 {
         coarse = boundary.fill(tile, &kept)?;
-        let rest = (boundary.vertices + wanted).saturating_sub(kept.iter().filter(|&&kept| kept).count());
-        if keep_furthest(tile, &coarse, rest, &mut kept) > 0 {
-            coarse = boundary.fill(tile, &kept)?;
-        }
     }
     let error = vertical_error(&tile.positions, &tile.triangles, &coarse) * frame.resolution_metres()[1];
     Ok(Simplified { tile: tile.subset(coarse), error })

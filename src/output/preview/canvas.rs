@@ -184,41 +184,60 @@ impl<'a> DrawnTriangle<'a> {
 /// The borders of a high triangle in floating point. Most rows of a sliver lie between two centres, and this finds most of those rows
 /// without a division. The exact edge functions decide the others.
 struct Sliver {
-    /// For every edge the row and column at which it starts and ends, its row first, and the columns that it moves in a row.
-    edges: [([f64; 2], [f64; 2], f64); 3],
+    /// The rows of the three corners, from above.
+    rows: [f64; 3],
+    /// From the first corner to the last.
+    long: Border,
+    /// From the first corner to the second, and from there to the last.
+    short: [Border; 2],
 }
 
 /// Triangles over fewer rows are drawn without a look at their borders.
 const SLIVER_ROWS: i64 = 16;
 
+/// A line by its column in row 0 and the columns that it moves in a row.
+#[derive(Clone, Copy)]
+struct Border {
+    column: f64,
+    slope: f64,
+}
+
+impl Border {
+    fn between(a: [f64; 2], b: [f64; 2]) -> Border {
+        let slope = if b[0] > a[0] { (b[1] - a[1]) / (b[0] - a[0]) } else { 0.0 };
+        Border { column: a[1] - slope * a[0], slope }
+    }
+
+    fn at(self, row: f64) -> f64 {
+        self.column + self.slope * row
+    }
+}
+
 impl Sliver {
     fn new(triangle: &DrawnTriangle) -> Sliver {
         let canvas = triangle.canvas;
-        let places = triangle.places.map(|p| [1, 0].map(|k| (p[k] - canvas.center) as f64 / canvas.pitch as f64));
-        let edges = [0, 1, 2].map(|k| {
-            let (a, b) = (places[k], places[(k + 1) % 3]);
-            let (low, high) = if a[0] <= b[0] { (a, b) } else { (b, a) };
-            let slope = if high[0] > low[0] { (high[1] - low[1]) / (high[0] - low[0]) } else { 0.0 };
-            (low, high, slope)
-        });
-        Sliver { edges }
+        let mut corners = triangle.places.map(|p| [1, 0].map(|k| (p[k] - canvas.center) as f64 / canvas.pitch as f64));
+        corners.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
+        let [a, b, c] = corners;
+        Sliver {
+            rows: corners.map(|corner| corner[0]),
+            long: Border::between(a, c),
+            short: [Border::between(a, b), Border::between(b, c)],
+        }
     }
 
     /// Tells whether the triangle surely covers no centre in `row`.
     fn misses(&self, row: i64) -> bool {
         let row = row as f64;
-        // Far more than rounding can move a border.
-        let spare = 1e-4;
-        let mut columns = [f64::INFINITY, f64::NEG_INFINITY];
-        for (low, high, slope) in &self.edges {
-            if row >= low[0] - spare && row <= high[0] + spare {
-                // No edge in reach of a row is so flat that its slope says little; it counts with all its columns.
-                let at = low[1] + slope * (row - low[0]);
-                let ends = if high[0] - low[0] < 1.0 { [low[1], high[1]] } else { [at, at] };
-                columns = [columns[0].min(ends[0]).min(ends[1]), columns[1].max(ends[0]).max(ends[1])];
-            }
+        let [first, second, last] = self.rows;
+        // Within a row of a corner a border may be so flat that rounding moves it far.
+        if row < first + 1.0 || (row - second).abs() < 1.0 || row > last - 1.0 {
+            return false;
         }
-        (columns[0] - spare).ceil() > columns[1] + spare
+        let (a, b) = (self.long.at(row), self.short[usize::from(row > second)].at(row));
+        // Far more than rounding can move a border that is at least a row high.
+        let spare = 1e-4;
+        (a.min(b) - spare).ceil() > a.max(b) + spare
     }
 }
 
