@@ -23,6 +23,7 @@ mod coordinate_systems;
 mod cutting;
 mod decimals;
 mod globe;
+mod hard_shapes;
 mod khronos;
 mod levels;
 mod limits;
