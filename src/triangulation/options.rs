@@ -24,7 +24,7 @@ pub enum Backend {
     Cpu,
     /// The discrete-Voronoi pipeline on a GPU.
     Gpu,
-    /// `spade` alone: slower, for tests and comparisons.
+    /// `spade` alone: slower, and quadratic on sites along lines; for tests and comparisons.
     Reference,
 }
 
