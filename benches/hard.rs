@@ -18,10 +18,15 @@ const RUNS: usize = 3;
 /// Returns a site by its number and the number of all sites.
 type Shape = fn(usize, usize) -> [f64; 2];
 
-const SHAPES: [(&str, Shape); 10] = [
+const SHAPES: [(&str, Shape); 12] = [
     ("line and one", |i, n| if i == 0 { [SIDE / 2.0, SIDE / 3.0] } else { [along(i, n), 0.0] }),
     ("diagonal and one", |i, n| if i == 0 { [SIDE, 0.0] } else { [along(i, n); 2] }),
     ("two lines", |i, n| [along(i, n), SIDE / 10.0 * (i % 2) as f64]),
+    ("thin strip", |i, n| [along(i, n), (i * 7919 % 10) as f64]),
+    ("dense north edge", |i, n| match i % 10 {
+        0..7 => [(i * 7919 % n) as f64 / n as f64 * SIDE, (i * 104_729 % n) as f64 / n as f64 * SIDE],
+        _ => [along(i, n), SIDE],
+    }),
     ("cross", |i, n| if i % 2 == 0 { [along(i, n), SIDE / 2.0] } else { [SIDE / 2.0, along(i, n)] }),
     ("parabola", |i, n| [along(i, n), (along(i, n) - SIDE / 2.0).powi(2) / SIDE]),
     ("facing parabolas", |i, n| {

@@ -232,20 +232,20 @@ pub struct Seam {
 impl Seam {
     /// Sorts `triangles` by the tiles that they touch.
     pub fn new(triangles: &[SeamTriangle]) -> Seam {
-        let mut touching: Vec<(TileIndex, SeamTriangle)> = Vec::with_capacity(triangles.len() * 2);
-        for triangle in triangles {
+        let mut touching: Vec<(TileIndex, u32)> = Vec::with_capacity(triangles.len() * 2);
+        for (at, triangle) in (0..).zip(triangles) {
             let mut tiles = triangle.map(|corner| corner.tile);
             tiles.sort_unstable();
-            touching.extend((0..3).filter(|&i| i == 0 || tiles[i] != tiles[i - 1]).map(|i| (tiles[i], *triangle)));
+            touching.extend((0..3).filter(|&i| i == 0 || tiles[i] != tiles[i - 1]).map(|i| (tiles[i], at)));
         }
-        touching.sort_unstable();
-        let mut seam = Seam::default();
-        for (tile, triangle) in touching {
+        touching.sort_unstable_by_key(|&(tile, at)| (tile, triangles[at as usize]));
+        let mut seam = Seam { index: Vec::new(), triangles: Vec::with_capacity(touching.len()) };
+        for (tile, at) in touching {
             match seam.index.last_mut() {
                 Some([last, _, count]) if *last == tile.0 => *count += 1,
                 _ => seam.index.push([tile.0, seam.triangles.len() as u32, 1]),
             }
-            seam.triangles.push(triangle);
+            seam.triangles.push(triangles[at as usize]);
         }
         seam
     }

@@ -7,11 +7,15 @@
 //! that joining meets no ties at all.
 
 use crate::geometry::Site;
+use crate::geometry::lattice::REACH;
 use crate::geometry::predicates::{in_circle, orient2d};
 use crate::mesh::flip::legalize;
 use crate::mesh::half_edge::HalfEdgeMesh;
 use crate::mesh::index::{HalfEdgeIndex, SiteIndex};
 use crate::{Error, Result, interrupt};
+
+/// Sites have up to six directed edges each, on average.
+const MAX_SITES: usize = u32::MAX as usize / 6;
 
 /// Parts with more sites than this ask before they are joined whether the process should stop.
 const SITES_BETWEEN_CHECKS: usize = 1 << 14;
@@ -20,8 +24,12 @@ const SITES_BETWEEN_CHECKS: usize = 1 << 14;
 /// lie on one line.
 ///
 /// # Errors
-/// [`Error::Interrupted`] if the process was asked to stop, [`Error::Broken`] if two sites coincide.
+/// [`Error::Interrupted`] if the process was asked to stop, [`Error::Broken`] if two sites coincide, if a coordinate exceeds
+/// [`REACH`], or if there are too many sites for 32-bit numbers of their edges.
 pub fn triangulate(sites: &[Site]) -> Result<HalfEdgeMesh> {
+    if sites.len() > MAX_SITES || sites.as_flattened().iter().any(|c| !(-REACH..=REACH).contains(c)) {
+        return Err(Error::Broken("a site is out of reach, or there are too many for one node".into()));
+    }
     let mut order: Vec<SiteIndex> = (0..sites.len()).map(SiteIndex::new).collect();
     order.sort_unstable_by_key(|&i| sites[i.get()]);
     let sorted: Vec<Site> = order.iter().map(|&i| sites[i.get()]).collect();
@@ -325,6 +333,14 @@ mod tests {
     fn two_sites_in_one_place_are_an_error() {
         let error = triangulate(&[[0, 0], [4, 1], [0, 0], [2, 2]]).unwrap_err();
         assert!(matches!(error, Error::Broken(_)), "{error}");
+    }
+
+    #[test]
+    fn sites_out_of_reach_are_an_error() {
+        for far in [[REACH + 1, 0], [0, -REACH - 1], [i32::MIN, 5]] {
+            assert!(matches!(triangulate(&[[0, 0], [4, 1], far]), Err(Error::Broken(_))));
+        }
+        assert_eq!(triangulate(&[[-REACH, -REACH], [REACH, -REACH], [0, REACH]]).unwrap().triangles.len(), 1);
     }
 
     #[test]

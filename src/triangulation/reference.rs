@@ -1,5 +1,4 @@
-//! The reference: `spade`, then canonical flips. It triangulates the inner nodes of the tree and the leaves that the pipeline
-//! rejects, and the tests compare the pipeline with it.
+//! The reference: `spade`, then canonical flips. The tests compare the pipeline, and divide and conquer, with it.
 
 use crate::Error;
 use crate::geometry::Site;

@@ -24,7 +24,7 @@ pub struct TriangulationCounts {
     pub pipeline: u64,
     /// Leaves that `spade` triangulated: all with `backend = "reference"`.
     pub reference: u64,
-    /// Leaves that are too small for the pipeline, and were divided and conquered.
+    /// Leaves that are too small (or too large) for the pipeline, and were divided and conquered.
     pub small: u64,
     /// Leaves that the pipeline gave up because too many sites shared a pixel, and that were divided and conquered.
     pub crowded: u64,
@@ -96,7 +96,7 @@ impl Triangulator {
     /// Computes the canonical Delaunay triangulation of distinct `sites`.
     ///
     /// # Errors
-    /// [`Error::Interrupted`] if the process was asked to stop, [`Error::Broken`] if two sites coincide.
+    /// [`Error::Interrupted`] if the process was asked to stop, [`Error::Broken`] if two sites coincide or one is out of reach.
     pub fn triangulate(&self, sites: &[Site]) -> Result<(HalfEdgeMesh, TriangulationCounts)> {
         let mut outcome = TriangulationCounts::default();
         if !self.pipeline {

@@ -87,12 +87,16 @@ fn locate(
     }
 }
 
-/// Returns a half-edge of a finite triangle at or after `near`.
+/// Returns a half-edge of a finite triangle: that of `near`, its neighbour if `near` is a ghost, or one that comes soon after it.
 fn start(mesh: &ClosedMesh, near: ClosedEdge) -> Result<ClosedEdge, Rejection> {
     let is_finite = |h: ClosedEdge| mesh.corners(h).is_some_and(|c| !c.contains(&mesh.infinity()));
-    if near < mesh.end() && is_finite(near) {
-        return Ok(near.triangle());
+    let first = near.triangle().max(mesh.front());
+    if first < mesh.end() && !mesh.is_free(first) {
+        let beyond = first.sides().into_iter().map(|side| mesh.twin(side));
+        if let Some(h) = std::iter::once(first).chain(beyond).find(|&h| h < mesh.end() && is_finite(h)) {
+            return Ok(h.triangle());
+        }
     }
-    let after = mesh.triangles().filter(|&h| h >= near);
+    let after = (first.0..mesh.end().0).step_by(8).map(ClosedEdge);
     after.chain(mesh.triangles()).find(|&h| is_finite(h)).ok_or(Rejection::NotAccepted("no triangle"))
 }

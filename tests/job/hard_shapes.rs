@@ -41,3 +41,20 @@ fn a_cross() {
 fn a_parabola() {
     gives_one_mesh(|i| [10 * i, (i - COUNT / 2) * (i - COUNT / 2) / 5_000]);
 }
+
+#[test]
+fn a_circle_and_its_centre() {
+    gives_one_mesh(|i| {
+        let (sin, cos) = (i as f64).sin_cos();
+        if i == 0 { [0, 0] } else { [1e8 * cos, 1e8 * sin].map(|c| c.round() as i64) }
+    });
+}
+
+#[test]
+fn a_dense_ring_and_one_point_far_away() {
+    gives_one_mesh(|i| {
+        let (sin, cos) = (i as f64).sin_cos();
+        let radius = if i % 2 == 0 { 50_000.0 } else { 49_000.0 * (i as f64 / COUNT as f64).sqrt() };
+        if i == 0 { [400_000_000; 2] } else { [radius * cos, radius * sin].map(|c| c.round() as i64) }
+    });
+}

@@ -40,6 +40,8 @@ pub fn merge_frontiers(
         .filter(|(_, state)| **state == TriangleState::Final)
         .map(|(corners, _)| corners.map(|v| union.sites[v.get()]))
         .collect();
+    // The seam takes as much memory as the mesh.
+    drop((mesh, sites, covered));
     let limit = PrecisionLimit::of(&plan.frame);
     seam.iter().try_for_each(|corners| limit.check(corners.map(|corner| corner.plane())))?;
     let frontier = found.frontier.iter().map(|&site| union.sites[site.get()]).collect();

@@ -4,6 +4,9 @@ use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
 use crate::output::lod::cell_grid::CellGrid;
 
+/// Vertices that are looked at for a simplified triangle, on average, before the search gives up.
+const VERTICES_PER_TRIANGLE: u64 = 2048;
+
 /// The vertices, sorted by cell.
 pub(crate) struct VertexCells<'a> {
     positions: &'a [[i32; 3]],
@@ -40,13 +43,22 @@ impl<'a> VertexCells<'a> {
 
     /// Returns for every triangle of `coarse` the vertex with the greatest vertical distance from it, as the bits of that distance
     /// and the number of the vertex. Triangles that meet all their vertices are left out.
+    ///
+    /// Stops looking where that would take far longer than usual: where nearly all vertices lie in one cell.
     pub(crate) fn furthest(&self, coarse: &[[u32; 3]]) -> impl Iterator<Item = (u64, u32)> {
-        let found = coarse.iter().map(|triangle| self.furthest_inside(triangle));
+        let mut steps = Self::steps_for(coarse.len());
+        let found = coarse.iter().map_while(move |triangle| self.furthest_inside(triangle, &mut steps));
         found.filter(|(distance, _)| *distance > 0.0).map(|(distance, v)| (distance.to_bits(), v))
     }
 
-    /// Returns the greatest vertical distance between a triangle and a vertex over or under it, and the number of that vertex.
-    pub(crate) fn furthest_inside(&self, triangle: &[u32; 3]) -> (f64, u32) {
+    /// Returns the number of vertices that may be looked at for this number of triangles. Terrains need far fewer.
+    pub(crate) fn steps_for(triangles: usize) -> u64 {
+        VERTICES_PER_TRIANGLE * (triangles as u64 + 1000)
+    }
+
+    /// Returns the greatest vertical distance between a triangle and a vertex over or under it, and the number of that vertex. `None`
+    /// if that means to look at more than `steps` vertices.
+    pub(crate) fn furthest_inside(&self, triangle: &[u32; 3], steps: &mut u64) -> Option<(f64, u32)> {
         let corners = triangle.map(|v| self.positions[v as usize]);
         let ys = corners.map(|p| p[1]);
         let (first, last) = (ys[0].min(ys[1]).min(ys[2]), ys[0].max(ys[1]).max(ys[2]));
@@ -54,6 +66,7 @@ impl<'a> VertexCells<'a> {
         for row in self.cells.row(first as f64)..=self.cells.row(last as f64) {
             let [west, east] = self.cells.span(&corners, row);
             let [start, end] = [self.cells.at(row, west), self.cells.at(row, east) + 1].map(|cell| self.starts[cell]);
+            *steps = steps.checked_sub(u64::from(end.saturating_sub(start)))?;
             for at in start as usize..end as usize {
                 let distance = vertical_distance(&corners, self.sorted[at]);
                 if distance > greatest.0 {
@@ -61,7 +74,7 @@ impl<'a> VertexCells<'a> {
                 }
             }
         }
-        greatest
+        Some(greatest)
     }
 }
 

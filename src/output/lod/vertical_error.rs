@@ -35,14 +35,17 @@ pub fn vertical_error(positions: &[[i32; 3]], fine: &[[u32; 3]], coarse: &[[u32;
     bounds[..sorted].sort_unstable_by(|a, b| b.cmp(a));
     let (mesh, vertices) = (FineMesh::new(positions, fine), VertexCells::new(positions, 1));
     let mut steps = STEPS_PER_EDGE * (3 * coarse.len() as u64 + 1000);
+    let mut vertex_steps = VertexCells::steps_for(coarse.len());
     let mut greatest = 0.0f64;
     for (bound, triangle) in bounds {
         if bound as f64 > greatest {
             let triangle = &coarse[triangle as usize];
-            let Some(at_crossings) = mesh.error_at_crossings(triangle, &mut steps) else {
+            let at_crossings = mesh.error_at_crossings(triangle, &mut steps);
+            let at_vertices = vertices.furthest_inside(triangle, &mut vertex_steps);
+            let (Some(at_crossings), Some((at_vertices, _))) = (at_crossings, at_vertices) else {
                 return height_range(positions);
             };
-            greatest = greatest.max(at_crossings).max(vertices.furthest_inside(triangle).0);
+            greatest = greatest.max(at_crossings).max(at_vertices);
         }
     }
     // Rounding loses about 2^-50 of a height.
@@ -228,8 +231,8 @@ mod tests {
             let coarse: Vec<[u32; 3]> = coarse.iter().map(|t| t.map(|v| kept[v.get()])).collect();
 
             let (mesh, vertices) = (FineMesh::new(&positions, fine.corners()), VertexCells::new(&positions, 1));
-            let mut steps = u64::MAX;
-            let furthest = coarse.iter().map(|t| mesh.error_at_crossings(t, &mut steps).unwrap().max(vertices.furthest_inside(t).0));
+            let (mut steps, mut vertex_steps) = (u64::MAX, u64::MAX);
+            let furthest = coarse.iter().map(|t| mesh.error_at_crossings(t, &mut steps).unwrap().max(vertices.furthest_inside(t, &mut vertex_steps).unwrap().0));
             let furthest = furthest.fold(0.0, f64::max);
             let found = vertical_error(&positions, fine.corners(), &coarse);
             prop_assert!(found == 0.0 && furthest == 0.0 || found == furthest + 1e-9, "{} and {}", found, furthest);
