@@ -54,7 +54,7 @@ fn a_circle_and_its_centre() {
 fn a_dense_ring_and_one_point_far_away() {
     gives_one_mesh(|i| {
         let (sin, cos) = (i as f64).sin_cos();
-        let radius = if i % 2 == 0 { 50_000.0 } else { 49_000.0 * (i as f64 / COUNT as f64).sqrt() };
-        if i == 0 { [400_000_000; 2] } else { [radius * cos, radius * sin].map(|c| c.round() as i64) }
+        let radius = if i % 2 == 0 { 5_000.0 } else { 4_900.0 * (i as f64 / COUNT as f64).sqrt() };
+        if i == 0 { [5_000_000; 2] } else { [radius * cos, radius * sin].map(|c| c.round() as i64) }
     });
 }
