@@ -164,10 +164,10 @@ impl JobDirectory {
         own.extend(self.results.glb_folders());
         let mut folders = self.results.directory().ancestors().chain(own.iter().map(PathBuf::as_path));
         let is_in_the_way = |path: &Path| Ok(is_there(path)? && !is_folder(path)?);
-        let (found, what, wanted) = if let Some(found) = find(&mut folders, |path| is_in_the_way(path))? {
+        let (found, what, wanted) = if let Some(found) = find(&mut folders, is_in_the_way)? {
             let what = if exists(found)? { "is not a directory" } else { "is a link that leads nowhere" };
             (found.to_path_buf(), what, "a directory")
-        } else if let Some(found) = find(&mut self.existing_files()?.into_iter(), |path| is_no_file(path))? {
+        } else if let Some(found) = find(&mut self.existing_files()?.into_iter(), is_no_file)? {
             let what = if is_folder(&found)? { "is a directory" } else { "is a pipe or a device" };
             (found, what, "a file")
         } else if let Some(found) = own.into_iter().find(|path| is_elsewhere(path, self.results.directory())) {
@@ -197,7 +197,7 @@ impl JobDirectory {
         if exists(&lock_file(&self.job))? || report.as_ref().is_some_and(is_ours) {
             return Ok(());
         }
-        match find(&mut files_of(&self.results)?.into_iter(), |path| is_there(path))? {
+        match find(&mut files_of(&self.results)?.into_iter(), is_there)? {
             None => Ok(()),
             Some(found) => Err(Error::Config(format!(
                 "{} exists, a job would overwrite or remove it, and nothing says that an earlier job wrote it: choose another \
