@@ -1,29 +1,46 @@
-//! The address space that the process may take, where a limit is set (`ulimit -v`).
+//! The memory that the process may take, where a limit is set: on its address space (`ulimit -v`) or on its data (`ulimit -d`).
 
 use crate::{Error, Result};
 use std::sync::OnceLock;
 
-static AT_START: OnceLock<Option<u64>> = OnceLock::new();
+static AT_START: OnceLock<Option<Left>> = OnceLock::new();
+
+/// What a limit leaves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Left {
+    pub(crate) bytes: u64,
+    /// The limit, for people.
+    limit: &'static str,
+}
 
 /// Returns what [`left`] returned when this was called for the first time. The program calls it before it starts threads: they reserve
 /// far more address space than they take, and give it back when others need it.
-pub(crate) fn at_start() -> Option<u64> {
+pub(crate) fn at_start() -> Option<Left> {
     *AT_START.get_or_init(left)
 }
 
-/// Returns the bytes of address space that are left; `None` if there is no limit or the system does not tell.
+/// Returns what the tighter limit leaves; `None` if there is no limit or the system does not tell.
 #[cfg(target_os = "linux")]
-pub(crate) fn left() -> Option<u64> {
-    let limit = rustix::process::getrlimit(rustix::process::Resource::As).current?;
+pub(crate) fn left() -> Option<Left> {
+    use rustix::process::{Resource, getrlimit};
+    let limits = [
+        (Resource::As, "VmSize:", "address space (ulimit -v)"),
+        (Resource::Data, "VmData:", "data of a process (ulimit -d)"),
+    ];
+    let mut limits = limits.into_iter().filter_map(|(what, row, limit)| Some((getrlimit(what).current?, row, limit)));
+    let first = limits.next()?;
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let size = status.lines().find_map(|line| line.strip_prefix("VmSize:"))?;
-    let kibibytes: u64 = size.split_whitespace().next()?.parse().ok()?;
-    Some(limit.saturating_sub(kibibytes * 1024))
+    let left = |(bytes, row, limit): (u64, &str, &'static str)| {
+        let taken = status.lines().find_map(|line| line.strip_prefix(row))?;
+        let kibibytes: u64 = taken.split_whitespace().next()?.parse().ok()?;
+        Some(Left { bytes: bytes.saturating_sub(kibibytes * 1024), limit })
+    };
+    std::iter::once(first).chain(limits).filter_map(left).min()
 }
 
-/// Returns the bytes of address space that are left; `None` if there is no limit or the system does not tell.
+/// Returns what the tighter limit leaves; `None` if there is no limit or the system does not tell.
 #[cfg(not(target_os = "linux"))]
-pub(crate) fn left() -> Option<u64> {
+pub(crate) fn left() -> Option<Left> {
     None
 }
 
@@ -31,14 +48,21 @@ pub(crate) fn left() -> Option<u64> {
 ///
 /// # Errors
 /// [`Error::Memory`] if they are.
-pub(crate) fn require(bytes: u64, left: Option<u64>, what: impl FnOnce() -> String) -> Result<()> {
-    match left.filter(|left| *left < bytes) {
+pub(crate) fn require(bytes: u64, left: Option<Left>, what: impl FnOnce() -> String) -> Result<()> {
+    match left.filter(|left| left.bytes < bytes) {
         None => Ok(()),
         Some(left) => Err(Error::Memory(format!(
-            "{} takes about {} MiB, and the limit on the address space (ulimit -v) leaves {} MiB: raise it",
+            "{} takes about {} MiB, and {}: raise it",
             what(),
             bytes.div_ceil(1 << 20),
-            left >> 20
+            left.sentence()
         ))),
+    }
+}
+
+impl Left {
+    /// Says what is left of which limit.
+    pub(crate) fn sentence(self) -> String {
+        format!("the limit on the {} leaves {} MiB", self.limit, self.bytes >> 20)
     }
 }

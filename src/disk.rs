@@ -1,13 +1,14 @@
-//! The layer through which a job changes files: making, writing, renaming, removing them and bringing them to the disk.
+//! The layer through which a job changes files: making, writing, renaming, removing them and bringing them to the disk. It also
+//! tells what is there, so that an error never passes for "nothing is there".
 //!
 //! It adds nothing to the calls of the system. But builds for tests can write down every change, and then make up what a power
 //! failure at any moment may leave of them (CONTRIBUTING.md). The test `rooms` finds changes that go around this layer.
 
 use crate::fault::traced;
-use crate::positional_io;
+use crate::{fault, positional_io};
 use std::fs::{self, File, Metadata};
 use std::io::{ErrorKind, Result, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Creates the file at `path`, or empties it.
 pub(crate) fn create(path: &Path) -> Result<File> {
@@ -77,14 +78,14 @@ fn unless_missing(outcome: Result<()>) -> Result<()> {
 /// Creates the folder at `path`, and those above it, if need be, and waits until their names are on the disk: otherwise a power
 /// failure could take a folder away with everything that was brought to the disk in it.
 pub(crate) fn create_folder(path: &Path) -> Result<()> {
-    if path.as_os_str().is_empty() || path.is_dir() {
+    if path.as_os_str().is_empty() || is_folder(path)? {
         return Ok(());
     }
     let above = path.parent().unwrap_or(Path::new(""));
     create_folder(above)?;
     match traced(|| fs::create_dir(path), |()| (format!("folder {}", path.display()), &[])) {
         // Another thread was faster.
-        Err(e) if e.kind() == ErrorKind::AlreadyExists && path.is_dir() => Ok(()),
+        Err(e) if e.kind() == ErrorKind::AlreadyExists && is_folder(path)? => Ok(()),
         outcome => outcome.and_then(|()| match sync_folder(above) {
             // Somebody else's folder: one may create in it, but not open it.
             Err(e) if e.kind() == ErrorKind::PermissionDenied => Ok(()),
@@ -95,12 +96,71 @@ pub(crate) fn create_folder(path: &Path) -> Result<()> {
 
 /// Waits until the names in the folder at `path` are on the disk, on systems that can.
 pub(crate) fn sync_folder(path: &Path) -> Result<()> {
-    if cfg!(not(unix)) {
-        return Ok(());
+    OpenFolder::open(path)?.sync()
+}
+
+/// A folder that can be synced without opening it again, which could fail.
+pub(crate) struct OpenFolder {
+    path: PathBuf,
+    /// `None` on systems that cannot sync a folder.
+    handle: Option<File>,
+}
+
+impl OpenFolder {
+    /// Opens the folder at `path`.
+    pub(crate) fn open(path: &Path) -> Result<OpenFolder> {
+        let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
+        let handle = cfg!(unix).then(|| File::open(path)).transpose()?;
+        Ok(OpenFolder { path: path.into(), handle })
     }
-    let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
-    let folder = File::open(path)?;
-    traced(|| folder.sync_all(), |()| (format!("sync-folder {}", path.display()), &[]))
+
+    /// Returns the path of the folder.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Waits until the names in the folder are on the disk.
+    pub(crate) fn sync(&self) -> Result<()> {
+        match &self.handle {
+            Some(folder) => traced(|| folder.sync_all(), |()| (format!("sync-folder {}", self.path.display()), &[])),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Returns what the system says of what is at `path`, or where a link at `path` leads. `None` if nothing is there.
+pub(crate) fn metadata(path: &Path) -> Result<Option<Metadata>> {
+    unless_nothing(fault::read("stat").and_then(|()| fs::metadata(path)))
+}
+
+/// As [`metadata`], of a link itself.
+pub(crate) fn link_metadata(path: &Path) -> Result<Option<Metadata>> {
+    unless_nothing(fault::read("stat").and_then(|()| fs::symlink_metadata(path)))
+}
+
+fn unless_nothing(outcome: Result<Metadata>) -> Result<Option<Metadata>> {
+    match outcome {
+        Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => Ok(None),
+        outcome => outcome.map(Some),
+    }
+}
+
+/// Tells whether something is at `path`.
+pub(crate) fn exists(path: &Path) -> Result<bool> {
+    metadata(path).map(|data| data.is_some())
+}
+
+/// Tells whether a folder is at `path`.
+pub(crate) fn is_folder(path: &Path) -> Result<bool> {
+    metadata(path).map(|data| data.is_some_and(|data| data.is_dir()))
+}
+
+/// Returns the paths of everything in the folder at `path`; nothing if there is no such folder.
+pub(crate) fn list(path: &Path) -> Result<Vec<PathBuf>> {
+    match fault::read("list").and_then(|()| fs::read_dir(path)) {
+        Err(e) if e.kind() == ErrorKind::NotFound => Ok(Vec::new()),
+        entries => entries?.map(|entry| entry.map(|entry| entry.path())).collect(),
+    }
 }
 
 /// Writes to a file from a position on, one piece after the other.

@@ -26,6 +26,15 @@ pub enum Error {
         /// The process id of the other process; empty if it has not written it yet.
         holder: String,
     },
+    /// A job has not put all its results in place (exit code 1).
+    #[error(
+        "{}: a job is under way here, or was stopped, so its results are not all in place: run the job again, or wait for it",
+        directory.display()
+    )]
+    Unfinished {
+        /// The output directory.
+        directory: PathBuf,
+    },
     /// The job does not fit the memory it was given (exit code 1).
     #[error("not enough memory: {0}")]
     Memory(String),
@@ -118,7 +127,11 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Io { source, .. } if is_about_the_path(source) => 2,
-            Error::Io { .. } | Error::InUse { .. } | Error::Memory(_) | Error::Interrupted => 1,
+            Error::Io { .. }
+            | Error::InUse { .. }
+            | Error::Unfinished { .. }
+            | Error::Memory(_)
+            | Error::Interrupted => 1,
             Error::Resumable { why, .. } => why.exit_code(),
             Error::Config(_) | Error::TooFine { .. } => 2,
             Error::Input { .. } | Error::NoTerrain(_) => 3,

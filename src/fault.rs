@@ -21,7 +21,7 @@ pub(crate) fn point(name: &str) {
     }
 }
 
-/// Marks a place that reads from a disk, which a test may let fail as a broken disk does.
+/// Marks a place that reads from a disk, or asks what is there, which a test may let fail as a broken disk does.
 pub(crate) fn read(name: &str) -> io::Result<()> {
     if is_due(name) { Err(io::Error::from_raw_os_error(EIO)) } else { Ok(()) }
 }
@@ -75,9 +75,17 @@ mod injection {
     static TRACE: LazyLock<Option<Mutex<File>>> =
         LazyLock::new(|| std::env::var_os("GDT_TRACE").and_then(|path| File::create(path).ok()).map(Mutex::new));
 
+    /// Does a change, unless it must fail, and writes it down.
+    pub(crate) fn traced<'a, T>(
+        change: impl FnOnce() -> io::Result<T>,
+        describe: impl FnOnce(&T) -> (String, &'a [u8]),
+    ) -> io::Result<T> {
+        written_down(|| super::read("change").and_then(|()| change()), describe)
+    }
+
     /// Does a change and writes it down: a line, and the bytes that it announces. One change at a time, so that the order is the
     /// true one.
-    pub(crate) fn traced<'a, T>(
+    fn written_down<'a, T>(
         change: impl FnOnce() -> io::Result<T>,
         describe: impl FnOnce(&T) -> (String, &'a [u8]),
     ) -> io::Result<T> {
@@ -92,7 +100,7 @@ mod injection {
     /// Writes down that the process came to the place called `name`.
     pub(crate) fn mark(name: &str) {
         // Only the tests read the trace, and they notice if it is cut off.
-        let _ = traced(|| Ok(()), |()| (format!("mark {name}"), &[]));
+        let _ = written_down(|| Ok(()), |()| (format!("mark {name}"), &[]));
     }
 }
 

@@ -32,7 +32,8 @@ UNIT[\"metre\",1],AUTHORITY[\"EPSG\",\"25832\"]]";
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be written, [`Error::Interrupted`], [`Error::Config`] if it has another extension, if `points`
-/// is 0, or if there is such a file already and `overwrite` is not set.
+/// is 0, if there is such a file already and `overwrite` is not set, or something that is no
+/// regular file.
 pub fn write(path: &Path, points: u64, seed: u64, overwrite: bool) -> Result<()> {
     let extension = path.extension().map(|e| e.to_ascii_lowercase());
     let is_laz = extension.as_ref().is_some_and(|extension| extension == "laz");
@@ -44,6 +45,10 @@ pub fn write(path: &Path, points: u64, seed: u64, overwrite: bool) -> Result<()>
     }
     if let Some(parent) = path.parent().filter(|p| !p.as_os_str().is_empty()) {
         std::fs::create_dir_all(parent).map_err(Error::io("create the directory", parent))?;
+    }
+    if path.metadata().is_ok_and(|data| !data.is_file()) {
+        // Opening a pipe would wait until another process reads from it.
+        return Err(Error::Config(format!("{} is there and is no regular file: give another name", path.display())));
     }
     let file = if overwrite { File::create(path) } else { File::create_new(path) };
     let file = file.map_err(|error| match error.kind() {

@@ -3,45 +3,60 @@
 
 use crate::{Error, Result, address_space, say};
 use std::panic::PanicHookInfo;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-/// The least address space that the program needs for anything at all.
-const LEAST: u64 = 16 << 20;
+/// The least memory that the program needs for anything at all.
+const LEAST: u64 = 32 << 20;
+/// With less, the program says in advance what to do if it does not suffice: once it runs out there is no memory to say it.
+const TIGHT: u64 = 128 << 20;
 
 /// What panics say that stand for a lack of memory or threads. Rust's own threads and libraries that start some panic with these.
 const SHORTAGES: [&str; 5] =
-    ["os error 11", "os error 12", "code: 11,", "code: 12,", "failed to allocate an alternative stack"];
+    ["os error 11)", "os error 12)", "code: 11,", "code: 12,", "failed to allocate an alternative stack"];
 
 /// Makes a lack of memory end the process with its exit code from now on, and checks that there is some.
 ///
 /// # Errors
 /// [`Error::Memory`] if there is hardly any, [`Error::Io`] if the system refuses.
 pub fn listen() -> Result<()> {
-    end_aborts()?;
+    let panicked = Arc::new(AtomicBool::new(false));
+    end_aborts(&panicked)?;
     let shown = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| match shortage(info) {
         Some(what) => {
             say(&format!("error: not enough memory: {what}"));
             std::process::exit(exit_code());
         }
-        None => shown(info),
+        None => {
+            panicked.store(true, Ordering::Relaxed);
+            shown(info);
+        }
     }));
-    address_space::require(LEAST, address_space::at_start(), || "the program".into())
+    let left = address_space::at_start();
+    address_space::require(LEAST, left, || "the program".into())?;
+    if let Some(left) = left.filter(|left| left.bytes < TIGHT) {
+        say(&format!("{}: if a memory allocation fails, there was not enough memory, so raise it", left.sentence()));
+    }
+    Ok(())
 }
 
-/// Rust says "memory allocation of ... bytes failed" and aborts: there is no stable way to return an error instead. Other aborts, as after
-/// a panic while panicking, get that exit code too; they say what they are.
+/// Rust says "memory allocation of ... bytes failed" and aborts: there is no stable way to return an error instead. A process that has
+/// `panicked` aborts if it panics again meanwhile: that is an internal fault.
 #[cfg(unix)]
-fn end_aborts() -> Result<()> {
-    use std::sync::Arc;
-    use std::sync::atomic::AtomicBool;
-    let always = Arc::new(AtomicBool::new(true));
-    signal_hook::flag::register_conditional_shutdown(signal_hook::consts::SIGABRT, exit_code(), always)
+fn end_aborts(panicked: &Arc<AtomicBool>) -> Result<()> {
+    use signal_hook::consts::SIGABRT;
+    use signal_hook::flag::register_conditional_shutdown;
+    let internal = i32::from(Error::Broken(String::new()).exit_code());
+    // The first whose condition holds ends the process.
+    register_conditional_shutdown(SIGABRT, internal, panicked.clone())
+        .and_then(|_| register_conditional_shutdown(SIGABRT, exit_code(), Arc::new(AtomicBool::new(true))))
         .map(drop)
         .map_err(Error::io("listen to the signals of", "the system"))
 }
 
 #[cfg(not(unix))]
-fn end_aborts() -> Result<()> {
+fn end_aborts(_: &Arc<AtomicBool>) -> Result<()> {
     Ok(())
 }
 
@@ -53,5 +68,26 @@ fn exit_code() -> i32 {
 fn shortage(info: &PanicHookInfo) -> Option<String> {
     let payload = info.payload();
     let text = payload.downcast_ref::<&str>().copied().or(payload.downcast_ref::<String>().map(String::as_str))?;
-    SHORTAGES.iter().any(|shortage| text.contains(shortage)).then(|| text.to_owned())
+    is_shortage(text).then(|| text.to_owned())
+}
+
+fn is_shortage(text: &str) -> bool {
+    SHORTAGES.iter().any(|shortage| text.contains(shortage))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_shortage;
+
+    #[test]
+    fn only_the_two_errors_of_too_little_count() {
+        let text = |code| format!("cannot start: {}", std::io::Error::from_raw_os_error(code));
+        let debug = |code| format!("failed: {:?}", std::io::Error::from_raw_os_error(code));
+        assert!([11, 12].into_iter().all(|code| is_shortage(&text(code)) && is_shortage(&debug(code))));
+        assert!(
+            ![1, 2, 110, 111, 112, 119, 121]
+                .into_iter()
+                .any(|code| is_shortage(&text(code)) || is_shortage(&debug(code)))
+        );
+    }
 }

@@ -6,8 +6,18 @@ use std::process::Command;
 
 /// Each of these ends a run of a build that has the feature: at its first commit, when results take their places, when it cleans
 /// up, or with a read error.
-const FAULTS: [&str; 8] =
-    ["commit:1", "published:1", "torn:1", "committed:1", "replacing:1", "cleaning:1", "read-input:1", "read-store:1+"];
+const FAULTS: [&str; 10] = [
+    "commit:1",
+    "published:1",
+    "torn:1",
+    "committed:1",
+    "replacing:1",
+    "cleaning:1",
+    "read-input:1",
+    "read-store:1+",
+    "stat:1",
+    "change:1",
+];
 
 #[test]
 fn no_environment_variable_kills_the_installed_program() {

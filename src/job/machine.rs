@@ -25,7 +25,7 @@ fn nearest_existing(directory: &Path) -> &Path {
 /// Returns the bytes of memory that this process can have before the system swaps, kills or refuses; `None` if the system does not
 /// tell.
 pub(crate) fn free_memory() -> Option<u64> {
-    free_outside().into_iter().chain(address_space::at_start()).min()
+    free_outside().into_iter().chain(address_space::at_start().map(|left| left.bytes)).min()
 }
 
 /// Returns the bytes of memory that the machine and the control groups of this process leave.

@@ -93,6 +93,11 @@ impl OutputFiles {
     pub fn job(&self) -> PathBuf {
         self.directory.join("job")
     }
+
+    /// Returns the list of the steps that a job has finished. It is there from the first step until all results are in place.
+    pub fn journal(&self) -> PathBuf {
+        self.job().join("journal")
+    }
 }
 
 /// Returns the path of exact tile number `tile` from the output directory, as `tileset.json` names it.

@@ -78,6 +78,7 @@ pub use digest::{Digest, digest_of};
 pub use source_grid::{SourceGrid, SourceGridError};
 pub use verdict::{Conclusion, Verdict};
 
+use crate::output::file_names::OutputFiles;
 use crate::output::gltf::read::{TileFile, read_tile};
 use crate::verify::border_matching::Borders;
 use crate::verify::failures::Failure;
@@ -88,7 +89,7 @@ use crate::verify::report::ReadReport;
 use crate::verify::tile_files::TileFiles;
 use crate::verify::verdict::CheckedMesh;
 use crate::verify::written_files::WrittenFiles;
-use crate::{Error, Result, address_space};
+use crate::{Error, Result, address_space, disk};
 
 /// Checks what is in the output `directory` of a job within about `memory` bytes. The verdict lists what does not hold.
 ///
@@ -104,7 +105,8 @@ pub fn verify(directory: &Path, memory: u64) -> Result<Verdict> {
 /// # Errors
 /// As [`verify`], and [`Error::Io`] or [`Error::Input`] if an input cannot be read.
 pub fn verify_against(directory: &Path, memory: u64, inputs: &[PathBuf]) -> Result<Verdict> {
-    let memory = address_space::at_start().map_or(memory, |left| memory.min(left));
+    let memory = address_space::at_start().map_or(memory, |left| memory.min(left.bytes));
+    refuse_unfinished(directory)?;
     let found = TileFiles::find(directory);
     if let Err(error @ (Error::Config(_) | Error::Io { .. })) = found {
         return Err(error);
@@ -139,6 +141,17 @@ pub fn verify_against(directory: &Path, memory: u64, inputs: &[PathBuf]) -> Resu
     let matches = borders.match_all(&grid, &names)?;
     let proof = inputs.zip(run.places).map(|(inputs, places)| inputs.compare(places, &grid)).transpose()?;
     Ok(Verdict::new(CheckedMesh { files: &files, findings, matches }, &report, &written, proof))
+}
+
+/// Refuses results among which some may be of one job and some of another: a job has a journal until all its results are in place,
+/// and removes the report of the job before first.
+fn refuse_unfinished(directory: &Path) -> Result<()> {
+    let output = OutputFiles::new(directory);
+    let is_there = |path: PathBuf| disk::exists(&path).map_err(Error::io("read", &path));
+    if is_there(output.journal())? && !is_there(output.report())? {
+        return Err(Error::Unfinished { directory: directory.into() });
+    }
+    Ok(())
 }
 
 /// What the threads share that check files.

@@ -175,6 +175,22 @@ fn a_full_standard_output_does_not_undo_a_finished_job() {
     gdt_batch_into("/dev/full", job.folder(), &["verify", "out"]).refused(4, &["not the Delaunay triangulation"]);
 }
 
+/// To open a pipe for writing is to wait for a reader.
+#[test]
+#[cfg(unix)]
+fn a_sample_never_goes_into_a_pipe_or_a_directory() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("pipe.laz");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    std::fs::create_dir(folder.path().join("folder.las")).unwrap();
+    for name in ["pipe.laz", "folder.las"] {
+        for arguments in [&["sample", name, "--overwrite"][..], &["sample", name]] {
+            gdt_batch(folder.path(), arguments).refused(2, &[name, "is no regular file", "give another name"]);
+        }
+    }
+    assert!(pipe.exists());
+}
+
 #[test]
 fn a_sample_overwrites_no_file_unless_told() {
     let folder = tempfile::tempdir().unwrap();

@@ -63,6 +63,75 @@ fn a_job_that_the_address_space_does_not_hold_is_refused_with_the_limit_by_name(
     let text = clouds::write(folder.path(), "cloud.csv", &clouds::uniform(100_000, 100_000, 4));
     let job = Job::on(&[&text]).threads(2);
     let config = job.config();
-    let said = gdt_batch_within_kib(100 << 10, job.folder(), &[config.to_str().unwrap()]);
+    let said = gdt_batch_within_kib(150 << 10, job.folder(), &[config.to_str().unwrap()]);
     said.refused(1, &["not enough memory", "the job takes about", "ulimit -v", "raise it"]);
+}
+
+/// Runs one test of this program by itself, in a process where the variable GDT_TEST_ABORT is set, and returns how that ended.
+#[cfg(unix)]
+fn ended(test: &str) -> (Option<i32>, String) {
+    let mut command = std::process::Command::new(std::env::current_exe().unwrap());
+    let output = command.args([test, "--exact", "--nocapture"]).env("GDT_TEST_ABORT", "1").output().unwrap();
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+#[cfg(unix)]
+fn is_child() -> bool {
+    let is_child = std::env::var_os("GDT_TEST_ABORT").is_some();
+    if is_child {
+        gdt_batch::shortage::listen().unwrap();
+    }
+    is_child
+}
+
+#[test]
+#[cfg(unix)]
+fn an_allocation_that_fails_ends_the_program_with_1() {
+    if is_child() {
+        std::hint::black_box(Vec::<u8>::with_capacity(isize::MAX as usize));
+    }
+    let (code, said) = ended("shortage::an_allocation_that_fails_ends_the_program_with_1");
+    assert!(code == Some(1) && said.contains("memory allocation of"), "{code:?}: {said}");
+}
+
+#[test]
+#[cfg(unix)]
+fn a_panic_while_panicking_ends_the_program_with_4() {
+    struct Again;
+    impl Drop for Again {
+        fn drop(&mut self) {
+            panic!("again");
+        }
+    }
+    if is_child() {
+        let _again = Again;
+        panic!("first");
+    }
+    let (code, said) = ended("shortage::a_panic_while_panicking_ends_the_program_with_4");
+    assert!(code == Some(4) && said.contains("again"), "{code:?}: {said}");
+}
+
+/// Runs the program with little room for its data, which a limit on the address space does not see.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_limit_on_the_data_is_named_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = clouds::write(folder.path(), "cloud.csv", &clouds::uniform(6_000, 40_000, 4));
+    let job = Job::on(&[&text]).tiles_of(2_000).threads(2);
+    let run = |mebibytes: u64, arguments: &str| {
+        let line = format!("ulimit -d {} && exec \"$0\" {arguments} job.toml", mebibytes * 1024);
+        let mut command = std::process::Command::new("sh");
+        command.arg("-c").arg(line).arg(env!("CARGO_BIN_EXE_gdt-batch")).current_dir(job.folder());
+        let output = command.output().unwrap();
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    job.config();
+    for mebibytes in [10, 20, 30] {
+        let (code, said) = run(mebibytes, "");
+        assert!(code == Some(1) && said.contains("not enough memory") && said.contains("ulimit -d"), "{said}");
+    }
+    for mebibytes in [40, 60, 80, 100] {
+        let (code, said) = run(mebibytes, "--force --quiet --restart");
+        assert!(code == Some(0) || code == Some(1) && said.contains("ulimit -d"), "{mebibytes} MiB: {code:?}, {said}");
+    }
 }

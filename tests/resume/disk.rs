@@ -59,14 +59,58 @@ fn mounting(rig: &Rig, kibibytes: u64) -> Command {
     command
 }
 
+/// Runs a small job, a job that fills the disk, and a job that fits once what the second one left is gone.
+const FILL_AND_GO_ON: &str = r#"
+set -u
+mount -t tmpfs -o size=40m tmpfs out || exit 77
+"$0" --quiet small.toml || exit 78
+"$0" --quiet --force large.toml 2>&1 && exit 79
+"$0" --quiet $1 medium.toml 2>&1 || exit 80
+cp -r out copy
+"#;
+
+#[test]
+fn after_a_job_that_filled_the_disk_another_one_runs_in_its_directory() {
+    if !can_mount() {
+        eprintln!("skipped: no file system can be mounted here");
+        return;
+    }
+    let setup = Setup::tiles_of(20_000);
+    let mut rig = Rig::new(&scattered::gaussian(2_000), &setup);
+    for (name, points) in [("small", 5_000), ("large", 400_000), ("medium", 20_000)] {
+        scattered::write(rig.folder.path(), &format!("{name}.csv"), &scattered::gaussian(points));
+        let input = format!("files = [\"{name}.csv\"]");
+        rig.configure(&Setup { input: input.clone(), ..setup.clone() });
+        std::fs::rename(rig.folder.path().join("job.toml"), rig.folder.path().join(format!("{name}.toml"))).unwrap();
+        if name == "medium" {
+            std::fs::remove_dir_all(rig.folder.path().join("undisturbed")).unwrap();
+            rig.expect(&Setup { input, ..setup.clone() });
+        }
+    }
+    for flag in ["", "--restart"] {
+        std::fs::create_dir(rig.out()).unwrap();
+        let mut command = Command::new("unshare");
+        command.args(["--user", "--map-root-user", "--mount", "bash", "-c", FILL_AND_GO_ON]);
+        let command = command.arg(env!("CARGO_BIN_EXE_gdt-batch")).arg(flag).current_dir(rig.folder.path());
+        let end = Run::start(command).end();
+        assert!(end.status.success() && end.out.contains("No space left"), "{end:?}");
+        std::fs::remove_dir(rig.out()).unwrap();
+        std::fs::rename(rig.folder.path().join("copy"), rig.out()).unwrap();
+        rig.is_complete(flag);
+        rig.forget();
+    }
+}
+
+/// Tells whether this user may mount a file system in a namespace of its own.
+fn can_mount() -> bool {
+    let mount = ["--user", "--map-root-user", "--mount", "mount", "-t", "tmpfs", "tmpfs", "/mnt"];
+    Command::new("unshare").args(mount).output().is_ok_and(|output| output.status.success())
+}
+
 #[test]
 fn a_job_whose_disk_was_full_at_any_stage_goes_on_when_there_is_room() {
     let rig = Rig::new(&scattered::gaussian(20_000), &Setup::tiles_of(2_000));
-    let can_mount = Command::new("unshare")
-        .args(["--user", "--map-root-user", "--mount", "mount", "-t", "tmpfs", "tmpfs", "/mnt"])
-        .output()
-        .is_ok_and(|output| output.status.success());
-    if !can_mount {
+    if !can_mount() {
         eprintln!("skipped: no file system can be mounted here");
         return;
     }

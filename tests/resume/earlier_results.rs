@@ -10,18 +10,18 @@ use crate::scattered;
 type Bytes = BTreeMap<String, Vec<u8>>;
 
 /// A rig whose output directory holds the results of a job. It has another cloud by now.
-struct Earlier {
-    rig: Rig,
+pub(crate) struct Earlier {
+    pub(crate) rig: Rig,
     results: Bytes,
-    report: Vec<u8>,
+    pub(crate) report: Vec<u8>,
 }
 
-fn base() -> Setup {
+pub(crate) fn base() -> Setup {
     Setup::tiles_of(1_500).output("max_edge = 9000").output("max_points_per_level_tile = 1000")
 }
 
 impl Earlier {
-    fn new() -> Earlier {
+    pub(crate) fn new() -> Earlier {
         let mut rig = Rig::new(&scattered::gaussian(9_000), &base()).committing_every(0);
         rig.completes("the earlier job");
         let results = files(&rig.out());
@@ -36,7 +36,7 @@ impl Earlier {
 
     /// Asserts that every byte of the results is still there.
     #[track_caller]
-    fn stay(&self, what: &str) {
+    pub(crate) fn stay(&self, what: &str) {
         let mut found = files(&self.rig.out());
         found.retain(|name, _| !name.starts_with("job/"));
         let differ: Vec<_> = self.results.iter().filter(|(name, bytes)| found.get(*name) != Some(bytes)).collect();
@@ -45,7 +45,7 @@ impl Earlier {
     }
 
     /// Makes the output directory hold these results again.
-    fn put_back(&self) {
+    pub(crate) fn put_back(&self) {
         self.rig.forget();
         for (name, bytes) in self.results.iter().chain([(&"report.json".to_string(), &self.report)]) {
             let path = self.rig.out().join(name);
@@ -144,6 +144,8 @@ fn a_job_killed_while_its_results_take_their_places_is_complete_after_the_next_r
         rig.configure(&base());
         assert!(rig.run_to("replacing", count).was_killed(), "{count} of {steps}");
         assert!(!rig.out().join("report.json").exists(), "some results are old and some are new");
+        let refused = gdt_batch::verify::verify(&rig.out(), 1 << 28).unwrap_err();
+        assert!(refused.exit_code() == 1 && refused.to_string().contains("run the job again"), "{refused}");
         // Whatever the next run is asked for, it finds the results whole.
         match count % 3 {
             0 => _ = rig.completes(&format!("replacing, {count}"))["resumed"],
@@ -164,7 +166,7 @@ fn a_job_killed_while_its_results_take_their_places_is_complete_after_the_next_r
 }
 
 #[track_caller]
-fn found_whole(rig: &Rig, count: u64) {
+pub(crate) fn found_whole(rig: &Rig, count: u64) {
     let mut found = files(&rig.out());
     found.retain(|name, _| !name.starts_with("job/"));
     assert!(found == rig.expected && rig.out().join("report.json").exists(), "{count}: {:?}", found.keys());

@@ -15,6 +15,7 @@ mod scattered;
 mod changes;
 mod disk;
 mod earlier_results;
+mod failing_disk;
 mod kills;
 mod lock;
 mod places;

@@ -1,13 +1,16 @@
 //! The job directory, which holds everything that a job needs to go on, and the results beside it.
 
-use crate::job::durable::atomic_file::{partial_path, remove_file, sync_folder};
+use crate::job::durable::atomic_file::{partial_path, remove_file};
+use crate::job::durable::listing::{entries, exists, files_of};
 use crate::job::durable::lock::{Lock, lock_file};
+use crate::job::durable::replacement::Replacement;
+use crate::output::checksums::read_file;
 use crate::output::file_names::OutputFiles;
 use crate::{Error, Result, disk, fault};
 use rayon::prelude::*;
 use serde_json::Value;
 use std::collections::HashSet;
-use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// The number of files that the records of a store are dealt out to.
@@ -52,7 +55,7 @@ impl JobDirectory {
 
     /// Returns the path of the journal of finished steps.
     pub fn journal(&self) -> PathBuf {
-        self.job.join("journal")
+        self.results.journal()
     }
 
     /// Returns the path of the file that holds the points between reading and triangulating.
@@ -107,62 +110,27 @@ impl JobDirectory {
     /// # Errors
     /// [`Error::Io`] if a file cannot be removed or the folder cannot be made.
     pub fn clear(&self, keep: &HashSet<PathBuf>) -> Result<()> {
-        let entries = fs::read_dir(&self.job).map_err(Error::io("read", &self.job))?;
-        let paths = entries.map(|entry| Ok(entry.map_err(Error::io("read", &self.job))?.path()));
-        let mut paths = paths.collect::<Result<Vec<PathBuf>>>()?;
-        // All names go, because other versions of the program use other names.
         let stays = [self.journal(), lock_file(&self.job)];
-        paths.retain(|path| !stays.contains(path) && !path.is_dir());
-        paths.extend(files_of(&self.waiting)?);
+        let mut paths = files_of(&self.waiting)?;
+        // All names go, because other versions of the program use other names.
+        for path in entries(&self.job)? {
+            if !stays.contains(&path) && !is_folder(&path)? {
+                paths.push(path);
+            }
+        }
         paths.retain(|path| !keep.contains(&self.name(path)));
         paths.iter().try_for_each(|path| remove_file(path))?;
         create_folder(&self.waiting.tiles())
     }
 
-    /// Puts the results that wait, all those that `names` names, in the place of the results of an earlier job. Goes on where an
-    /// earlier call was cut off.
-    ///
-    /// Every file is replaced at once, so there is no moment without one. As long as some are old and some are new there is no
-    /// report.
+    /// Puts the results with these `names`, which wait, in the place of the results of an earlier job. Goes on where an earlier call
+    /// was cut off. If this succeeds, all of them are in place.
     ///
     /// # Errors
-    /// [`Error::Io`] if a file cannot be renamed or removed.
+    /// [`Error::Io`] if a file is missing, or cannot be renamed or removed.
     pub fn replace_results(&self, names: &HashSet<PathBuf>) -> Result<()> {
-        let [report, folder] = [self.results.report(), self.results.directory().to_path_buf()];
-        let new_report = self.waiting.report();
-        if !new_report.exists() {
-            // It goes last.
-            return Ok(());
-        }
-        remove_file(&report)?;
-        sync_folder(&folder)?;
-        for path in files_of(&self.waiting)?.iter().filter(|path| **path != new_report) {
-            fault::point("replacing");
-            self.replace(path)?;
-        }
-        let outdated = files_of(&self.results)?.into_iter().filter(|path| !names.contains(&self.name(path)));
-        outdated.into_iter().try_for_each(|path| remove_file(&path))?;
-        for folder in self.results.glb_folders().iter().filter(|folder| folder.is_dir()) {
-            // This fails, as it should, where a folder holds files of this job or of somebody else.
-            if disk::remove_folder(folder).is_err() {
-                sync_folder(folder)?;
-            }
-        }
-        sync_folder(&folder)?;
-        fault::point("replacing");
-        self.replace(&new_report)?;
-        sync_folder(&folder)
-    }
-
-    /// Puts one waiting result in its place, if it has not gone there.
-    fn replace(&self, waiting: &Path) -> Result<()> {
-        let name = self.name(waiting);
-        if !waiting.exists() || waiting.extension().is_some_and(|ending| ending == "partial") {
-            return Ok(());
-        }
-        let path = self.results.directory().join(name);
-        path.parent().map_or(Ok(()), create_folder)?;
-        disk::rename(waiting, &path).map_err(Error::io("rename the finished file to", &path))
+        let replacement = Replacement::prepare(&self.results, &self.waiting, names)?;
+        replacement.map_or(Ok(()), |replacement| replacement.carry_out())
     }
 
     /// Returns the paths of all results of an earlier job that may exist.
@@ -195,12 +163,12 @@ impl JobDirectory {
         let mut own = vec![self.job.clone()];
         own.extend(self.results.glb_folders());
         let mut folders = self.results.directory().ancestors().chain(own.iter().map(PathBuf::as_path));
-        let is_in_the_way = |path: &&Path| path.symlink_metadata().is_ok() && !path.is_dir();
-        let (found, what, wanted) = if let Some(found) = folders.find(is_in_the_way) {
-            let what = if found.exists() { "is not a directory" } else { "is a link that leads nowhere" };
+        let is_in_the_way = |path: &Path| Ok(is_there(path)? && !is_folder(path)?);
+        let (found, what, wanted) = if let Some(found) = find(&mut folders, is_in_the_way)? {
+            let what = if exists(found)? { "is not a directory" } else { "is a link that leads nowhere" };
             (found.to_path_buf(), what, "a directory")
-        } else if let Some(found) = self.existing_files()?.into_iter().find(|path| is_no_file(path)) {
-            let what = if found.is_dir() { "is a directory" } else { "is a pipe or a device" };
+        } else if let Some(found) = find(&mut self.existing_files()?.into_iter(), is_no_file)? {
+            let what = if is_folder(&found)? { "is a directory" } else { "is a pipe or a device" };
             (found, what, "a file")
         } else if let Some(found) = own.into_iter().find(|path| is_elsewhere(path, self.results.directory())) {
             // Results could not take their places at once.
@@ -219,12 +187,17 @@ impl JobDirectory {
     /// # Errors
     /// [`Error::Config`] if such files exist and nothing says that a job wrote them.
     pub fn check_results_are_ours(&self) -> Result<()> {
-        let report = fs::read(self.results.report()).ok().and_then(|text| serde_json::from_slice::<Value>(&text).ok());
+        let report = self.results.report();
+        let report = match read_file(&report) {
+            Err(e) if e.kind() == ErrorKind::NotFound => None,
+            text => serde_json::from_slice::<Value>(&text.map_err(Error::io("read", &report))?).ok(),
+        };
         let is_ours = |report: &Value| report["generator"].as_str().is_some_and(|by| by.starts_with("gdt-batch"));
-        if self.journal().exists() || report.as_ref().is_some_and(is_ours) {
+        // Only a job that had passed this check took the lock and left it.
+        if exists(&lock_file(&self.job))? || report.as_ref().is_some_and(is_ours) {
             return Ok(());
         }
-        match files_of(&self.results)?.into_iter().find(|path| path.symlink_metadata().is_ok()) {
+        match find(&mut files_of(&self.results)?.into_iter(), is_there)? {
             None => Ok(()),
             Some(found) => Err(Error::Config(format!(
                 "{} exists, a job would overwrite or remove it, and nothing says that an earlier job wrote it: choose another \
@@ -251,8 +224,31 @@ impl JobDirectory {
 }
 
 /// Tells whether something other than a regular file, or a link to one, is at `path`.
-fn is_no_file(path: &Path) -> bool {
-    path.metadata().is_ok_and(|meta| !meta.is_file())
+fn is_no_file(path: &Path) -> Result<bool> {
+    let data = disk::metadata(path).map_err(Error::io("read", path))?;
+    Ok(data.is_some_and(|data| !data.is_file()))
+}
+
+fn is_folder(path: &Path) -> Result<bool> {
+    disk::is_folder(path).map_err(Error::io("read", path))
+}
+
+/// Tells whether something is at `path`, if only a link that leads nowhere.
+fn is_there(path: &Path) -> Result<bool> {
+    disk::link_metadata(path).map(|data| data.is_some()).map_err(Error::io("read", path))
+}
+
+/// Returns the first of `paths` for which `holds`, if that can be told of all before it.
+fn find<P: AsRef<Path>>(
+    paths: &mut dyn Iterator<Item = P>,
+    holds: impl Fn(&Path) -> Result<bool>,
+) -> Result<Option<P>> {
+    for path in paths {
+        if holds(path.as_ref())? {
+            return Ok(Some(path));
+        }
+    }
+    Ok(None)
 }
 
 fn remove_at_end(file: &Path) -> Result<()> {
@@ -269,25 +265,6 @@ pub fn create_folder(path: &Path) -> Result<()> {
     disk::create_folder(path).map_err(Error::io("create the directory", path))
 }
 
-/// Returns the paths of all files that a job may have left in `folder`, under their names or their partial names: the fixed names,
-/// and the numbered files that exist.
-fn files_of(folder: &OutputFiles) -> Result<Vec<PathBuf>> {
-    let mut files = vec![
-        folder.report(),
-        folder.checksums(),
-        folder.terrain(),
-        folder.tileset(),
-        folder.georeference(),
-        folder.preview(),
-    ];
-    let partials: Vec<PathBuf> = files.iter().map(|path| partial_path(path)).collect();
-    files.extend(partials);
-    for folder in folder.glb_folders().iter().filter(|folder| folder.is_dir()) {
-        files.extend(numbered_files(folder)?);
-    }
-    Ok(files)
-}
-
 /// Tells whether both folders exist, and on different disks.
 #[cfg(unix)]
 fn is_elsewhere(folder: &Path, other: &Path) -> bool {
@@ -300,20 +277,10 @@ fn is_elsewhere(_: &Path, _: &Path) -> bool {
     false
 }
 
-/// Returns the files in `folder` that have the name of a numbered result, whole or partial.
-fn numbered_files(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = fs::read_dir(folder).map_err(Error::io("read", folder))?;
-    let paths = entries.map(|entry| Ok(entry.map_err(Error::io("read", folder))?.path()));
-    let is_numbered = |path: &PathBuf| {
-        let number = path.file_stem().is_some_and(|s| s.to_string_lossy().bytes().all(|b| b.is_ascii_digit()));
-        number && path.extension().is_some_and(|e| e == "glb" || e == "partial")
-    };
-    paths.filter(|path| path.as_ref().map_or(true, is_numbered)).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     fn names(names: &[&str]) -> HashSet<PathBuf> {
         names.iter().map(PathBuf::from).collect()
@@ -364,7 +331,8 @@ mod tests {
                 fs::remove_file(directory.results().report()).unwrap();
             }
             for name in &new[..done] {
-                directory.replace(&directory.file(Path::new(name))).unwrap();
+                fs::create_dir_all(output.path().join(name).parent().unwrap()).unwrap();
+                fs::rename(directory.file(Path::new(name)), output.path().join(name)).unwrap();
             }
             directory.replace_results(&names(&new)).unwrap();
             let found = files_of(directory.results()).unwrap().into_iter().filter(|path| path.exists());

@@ -2,8 +2,8 @@
 
 use crate::disk::WriteFrom;
 use crate::{Error, Result, disk};
-use std::fs::{self, File, TryLockError};
-use std::io::{Read, Write};
+use std::fs::{File, TryLockError};
+use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// A held lock. The system releases it with the process, so a kill leaves nothing to clean up.
@@ -20,10 +20,10 @@ impl Lock {
     /// [`Error::Config`] if the directory is not a job directory.
     pub fn take(job: &Path) -> Result<Lock> {
         // A kill can leave an empty directory.
-        let is_new = fs::read_dir(job).map_or(true, |mut entries| entries.next().is_none());
+        let is_new = disk::list(job).map_err(Error::io("read", job))?.is_empty();
         disk::create_folder(job).map_err(Error::io("create the directory", job))?;
         let path = lock_file(job);
-        if !is_new && !path.exists() {
+        if !is_new && !disk::exists(&path).map_err(Error::io("read", &path))? {
             return Err(Error::Config(format!(
                 "{} exists and is not a job directory of this program: choose another [output] directory",
                 job.display()
@@ -37,13 +37,17 @@ impl Lock {
                 return Err(Error::InUse { directory: job.into(), holder });
             }
             // Some network file systems have no locks: there a second job goes unnoticed.
-            Err(TryLockError::Error(e)) if e.kind() != std::io::ErrorKind::Unsupported => {
+            Err(TryLockError::Error(e)) if e.kind() != ErrorKind::Unsupported => {
                 return Err(Error::io("lock", &path)(e));
             }
             _ => {}
         }
         let process = || write!(WriteFrom { file: &file, at: 0 }, "{}", std::process::id());
-        disk::set_length(&file, 0).and_then(|()| process()).map_err(Error::io("write", &path))?;
+        match disk::set_length(&file, 0).and_then(|()| process()) {
+            // The lock holds all the same, and this process may be the one that makes room.
+            Err(e) if matches!(e.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded) => {}
+            outcome => outcome.map_err(Error::io("write", &path))?,
+        }
         Ok(Lock { _file: file })
     }
 }

@@ -79,7 +79,7 @@ impl MappedFile {
     pub fn new(file: &File) -> MappedFile {
         let length = file.metadata().map_or(0, |meta| meta.len());
         // Where the address space is limited, the steps need it for more than this.
-        if address_space::left().is_some_and(|left| left / 4 < length) {
+        if address_space::left().is_some_and(|left| left.bytes / 4 < length) {
             return MappedFile::default();
         }
         // SAFETY: The file is finished: nothing writes to it or shortens it while the map exists, and the lock of the job keeps other

@@ -7,6 +7,8 @@ pub mod columns;
 pub(crate) mod committer;
 pub mod directory;
 pub mod journal;
+mod listing;
 pub mod lock;
 pub mod mapped;
+mod replacement;
 pub mod store;

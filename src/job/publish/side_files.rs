@@ -1,6 +1,5 @@
 //! Writing the files beside the tiles: the georeference, the preview, `tileset.json` and `terrain.glb`.
 
-use crate::Result;
 use crate::job::durable::atomic_file::{find_pending, partial_path, write_pending};
 use crate::job::durable::columns::ColumnReader;
 use crate::job::durable::directory::JobDirectory;
@@ -9,6 +8,8 @@ use crate::job::records::{StepOutput, StepRecord, Store};
 use crate::output::gltf::one_file::write_terrain;
 use crate::output::preview::canvas::{Canvas, PreviewPixel};
 use crate::output::preview::picture::Picture;
+use crate::{Error, Result, disk};
+use std::path::PathBuf;
 
 /// What the files beside the tiles hold.
 pub struct SideFiles {
@@ -40,7 +41,9 @@ pub fn write_side_files(
         files.push(write_pending(&output.tileset(), tileset.as_bytes())?);
     }
     if content.one_file {
-        let paths: Vec<_> = (0..tiles).map(|tile| output.tile(tile)).filter(|path| path.exists()).collect();
+        let written = |path: PathBuf| Ok(disk::exists(&path).map_err(Error::io("read", &path))?.then_some(path));
+        let paths = (0..tiles).filter_map(|tile| written(output.tile(tile)).transpose());
+        let paths = paths.collect::<Result<Vec<PathBuf>>>()?;
         write_terrain(&partial_path(&output.terrain()), &paths)?;
         files.push(find_pending(&output.terrain())?);
     }

@@ -20,7 +20,7 @@ use crate::job::run::resume::{self, EarlierRun, RunStart};
 use crate::job::run::stage_costs::stage_costs;
 use crate::threads::on_threads;
 use crate::triangulation::Triangulator;
-use crate::{Error, Result};
+use crate::{Error, Result, disk};
 use std::sync::Mutex;
 
 /// Give up after this many tenfold coarsenings: what is left is no terrain.
@@ -46,17 +46,19 @@ struct JobRequest<'a> {
 /// See [`crate::job::run`].
 pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, walk: Walk) -> Result<Report> {
     let clock = JobClock::start();
-    // First of all, so that a job that must have a GPU fails at once if there is none.
-    let memory = options.limits.memory.0;
-    let triangulator = Triangulator::new(&options.triangulation, &options.gpu, memory, options.threads())?;
     let directory = JobDirectory::new(&options.output.directory);
     directory.check_nothing_in_the_way()?;
-    let fingerprint = on_threads(workers(options, 0)?, || Fingerprint::of(options))?;
     let (mut lock, mut earlier) = (None, None);
-    if directory.journal().exists() {
+    let journal = directory.journal();
+    if disk::exists(&journal).map_err(Error::io("read", &journal))? {
+        // Before anything else can fail: an earlier run may have been cut off while its results took their places.
         lock = Some(directory.lock()?);
         earlier = read_earlier(&directory, run)?;
     }
+    // Before the inputs, so that a job that must have a GPU fails at once if there is none.
+    let memory = options.limits.memory.0;
+    let triangulator = Triangulator::new(&options.triangulation, &options.gpu, memory, options.threads())?;
+    let fingerprint = on_threads(workers(options, 0)?, || Fingerprint::of(options))?;
     let job = JobRequest { options, run, triangulator, directory, fingerprint, clock, walk };
     let coarsening = earlier.as_ref().and_then(|earlier| earlier.coarsening(&job.fingerprint));
     let mut coarsening = coarsening.unwrap_or_default();
@@ -158,8 +160,7 @@ fn attempt(
 /// Ends an attempt: puts the results in place, or keeps the finished steps if the job can go on from them. Removes everything else.
 fn end(directory: &JobDirectory, outcome: Result<Report>, steps: u64) -> Result<Report> {
     let outcome = outcome.and_then(|report| {
-        let run = EarlierRun::read(directory)?;
-        run.map_or(Ok(()), |run| run.place_results(directory))?;
+        EarlierRun::of_finished_job(directory)?.place_results(directory)?;
         Ok(report)
     });
     match outcome {

@@ -3,6 +3,7 @@
 //! A step stays if everything that it wrote is there and whole, or if nothing needs that any more. The output of a step depends on
 //! nothing but the job. So a step that runs again writes the same as before, and the steps after it stay.
 
+use crate::job::durable::atomic_file::remove_file;
 use crate::job::durable::directory::{JobDirectory, STORE_FILES};
 use crate::job::durable::journal::{self, PublishedFile};
 use crate::job::index::{NodeIndex, TileIndex};
@@ -19,6 +20,7 @@ use crate::output::options::MaxEdge;
 use crate::{Error, Result, interrupt};
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
+use std::io::{self, ErrorKind};
 use std::path::PathBuf;
 
 /// An earlier run of a job in the same directory, as its journal tells. The journal is read once.
@@ -40,6 +42,20 @@ impl EarlierRun {
         Ok(run.map(|(header, entries)| EarlierRun { header, entries, is_complete: false }))
     }
 
+    /// Reads the journal of a job that has just written its report.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the journal cannot be read, or does not name the report: then it does not name all results either.
+    pub(crate) fn of_finished_job(directory: &JobDirectory) -> Result<EarlierRun> {
+        let damaged = || io::Error::new(ErrorKind::InvalidData, "it has changed since the job wrote it");
+        let run = EarlierRun::read(directory)?.filter(EarlierRun::has_report);
+        run.ok_or_else(|| Error::io("read", directory.journal())(damaged()))
+    }
+
+    fn has_report(&self) -> bool {
+        self.entries.iter().any(|entry| entry.step == JobStep::Report)
+    }
+
     /// Puts the results in place if the run had written them all. From then on they are what the output directory holds, whatever
     /// this run does.
     ///
@@ -50,8 +66,7 @@ impl EarlierRun {
             interrupt::check()?;
             Ok(file.is_whole(directory) || file.is_in_place(directory))
         };
-        let is_written = self.entries.iter().any(|entry| entry.step == JobStep::Report);
-        if !is_written || !self.results(directory).try_fold(true, |all, file| Ok(all && is_whole(file)?))? {
+        if !self.has_report() || !self.results(directory).try_fold(true, |all, file| Ok(all && is_whole(file)?))? {
             return Ok(());
         }
         self.is_complete = true;
@@ -148,8 +163,13 @@ pub(crate) fn start<'a>(
     }
     let records: Vec<RecordRef> = entries.iter().flat_map(|entry| &entry.records).copied().collect();
     let header = JobHeader { fingerprint: names.unwrap_or(header.fingerprint.clone()), ..*header };
-    let journal = Journal::begin(directory, &header, entries)?;
+    // What does not stay goes first, or a disk that it filled would have no room for the new journal. Until that is there, the old one
+    // names steps whose output is gone, and a run after a kill finds that out. One that names nothing that stays goes too.
+    if entries.is_empty() {
+        remove_file(&directory.journal())?;
+    }
     directory.clear(&files)?;
+    let journal = Journal::begin(directory, &header, entries)?;
     let paths: [PathBuf; STORE_FILES] = directory.store();
     let store = if records.is_empty() { Store::create(paths)? } else { Store::open(paths, records.iter())? };
     Ok(RunStart { store, journal, partition })

@@ -1,0 +1,120 @@
+//! Putting the results of a job in the place of those of an earlier one.
+//!
+//! Everything that can be found out, made or opened in advance is, while the earlier results are still whole: after that only
+//! renames, removals and syncs are left that can fail. Between the removal of the old report and the arrival of the new one some
+//! files are old and some are new, and there is no report. If a failure ends the run there, the next run goes on with it.
+
+use crate::disk::OpenFolder;
+use crate::job::durable::atomic_file::remove_file;
+use crate::job::durable::listing::{exists, files_of, is_partial};
+use crate::output::file_names::OutputFiles;
+use crate::{Error, Result, disk, fault};
+use std::collections::HashSet;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// What is to be done to put the results of a job in place.
+pub(crate) struct Replacement {
+    /// The report of the earlier job, or the place of the new one.
+    report: PathBuf,
+    new_report: PathBuf,
+    /// The results that wait besides the report, and their places.
+    waiting: Vec<(PathBuf, PathBuf)>,
+    /// Results of the earlier job that this one does not have.
+    outdated: Vec<PathBuf>,
+    /// What a killed run of an early version of the program left half-written. No result.
+    partial: Vec<PathBuf>,
+    directory: OpenFolder,
+    glb_folders: Vec<OpenFolder>,
+}
+
+impl Replacement {
+    /// Finds out what is to be done until the directory `results` holds the files with these `names` and no other results. Some of them
+    /// are in `waiting`, and some may be in their places already. Returns `None` if all are.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a file is in neither place, or the system does not tell; if a folder cannot be made or opened. No result has
+    /// been touched then.
+    pub(crate) fn prepare(
+        results: &OutputFiles,
+        waiting: &OutputFiles,
+        names: &HashSet<PathBuf>,
+    ) -> Result<Option<Replacement>> {
+        let [report, new_report] = [results, waiting].map(OutputFiles::report);
+        if !exists(&new_report)? && exists(&report)? {
+            // It goes last.
+            return Ok(None);
+        }
+        let mut found = Vec::new();
+        for name in names {
+            let [place, waits] = [results, waiting].map(|folder| folder.directory().join(name));
+            if exists(&waits)? {
+                found.push((waits, place));
+            } else if waits == new_report || !exists(&place)? {
+                let gone =
+                    io::Error::new(io::ErrorKind::NotFound, "it is gone, and it is not among the results either");
+                return Err(Error::io("read", &waits)(gone));
+            }
+        }
+        found.retain(|(waits, _)| *waits != new_report);
+        // What is done must not depend on the order of a hash set.
+        found.sort_unstable();
+        let mut others = Vec::new();
+        for path in files_of(results)? {
+            let name = path.strip_prefix(results.directory()).unwrap_or(&path);
+            if path != report && !names.contains(name) && exists(&path)? {
+                others.push(path);
+            }
+        }
+        let (partial, outdated) = others.into_iter().partition(|path| is_partial(path));
+        let folders: HashSet<&Path> = found.iter().filter_map(|(_, place)| place.parent()).collect();
+        folders
+            .into_iter()
+            .try_for_each(|path| disk::create_folder(path).map_err(Error::io("create the directory", path)))?;
+        let open = |path: &Path| OpenFolder::open(path).map_err(Error::io("open", path));
+        let mut glb_folders = Vec::new();
+        for folder in results.glb_folders() {
+            if exists(&folder)? {
+                glb_folders.push(open(&folder)?);
+            }
+        }
+        let directory = open(results.directory())?;
+        Ok(Some(Replacement { report, new_report, waiting: found, outdated, partial, directory, glb_folders }))
+    }
+
+    /// Does it. Every file is replaced at once, so there is no moment without one.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a file cannot be renamed or removed, or a folder cannot be synced.
+    pub(crate) fn carry_out(&self) -> Result<()> {
+        remove_file(&self.report)?;
+        sync(&self.directory)?;
+        for (waits, place) in &self.waiting {
+            fault::point("replacing");
+            rename(waits, place)?;
+        }
+        self.outdated.iter().try_for_each(|path| remove_file(path))?;
+        for path in &self.partial {
+            // It does not matter to the results whether it goes.
+            let _ = disk::remove_file(path);
+        }
+        for folder in &self.glb_folders {
+            // This fails, as it should, where a folder holds files of this job or of somebody else.
+            if disk::remove_folder(folder.path()).is_err() {
+                sync(folder)?;
+            }
+        }
+        sync(&self.directory)?;
+        fault::point("replacing");
+        rename(&self.new_report, &self.report)?;
+        sync(&self.directory)
+    }
+}
+
+fn rename(from: &Path, to: &Path) -> Result<()> {
+    disk::rename(from, to).map_err(Error::io("rename the finished file to", to))
+}
+
+fn sync(folder: &OpenFolder) -> Result<()> {
+    folder.sync().map_err(Error::io("write", folder.path()))
+}
