@@ -211,6 +211,14 @@ impl Source {
         Ok(told)
     }
 
+    /// Returns the number of rows that [`Source::tell_outliers`] leaves out.
+    pub fn outliers(&self) -> u64 {
+        match &self.points {
+            PointData::Text(table) => table.outliers(),
+            _ => 0,
+        }
+    }
+
     /// Undoes [`Source::tell_outliers`].
     pub fn keep_outliers(&mut self) {
         if let PointData::Text(table) = &mut self.points {

@@ -106,7 +106,7 @@ pub fn verify(directory: &Path, memory: u64) -> Result<Verdict> {
 pub fn verify_against(directory: &Path, memory: u64, inputs: &[PathBuf]) -> Result<Verdict> {
     let memory = address_space::at_start().map_or(memory, |left| memory.min(left));
     let found = TileFiles::find(directory);
-    if let Err(error @ (Error::Config(_) | Error::Io { .. })) = found {
+    if let Err(error @ Error::Io { .. }) = found {
         return Err(error);
     }
     let report = ReadReport::read(directory);
@@ -114,6 +114,11 @@ pub fn verify_against(directory: &Path, memory: u64, inputs: &[PathBuf]) -> Resu
     let unusable = |what: String| Ok(Verdict::without_mesh(what, &report, &written));
     let files = match found {
         Ok(files) => files,
+        // Where a job was finished, they were there.
+        Err(Error::Config(_)) if report.is_of_a_job() || written.has_list => {
+            return unusable("the tiles are gone: tiles/ is not there, or has no .glb file".into());
+        }
+        Err(error @ Error::Config(_)) => return Err(error),
         Err(error) => return unusable(error.to_string()),
     };
     let grid = match SourceGrid::new(&files.extras) {
