@@ -221,7 +221,9 @@ impl Verdict {
 fn what_is_gone_of_cut(facts: &ReportedFacts, written: &WrittenFiles, found: u64) -> Option<String> {
     if let (Some(first), true) = (written.cut_gone.first(), found > 0) {
         let count = written.cut_gone.len();
-        return Some(format!("{count} files of cut/, which holds what max_edge left out, are gone, the first of them {first}"));
+        return Some(format!(
+            "{count} files of cut/, which holds what max_edge left out, are gone, the first of them {first}"
+        ));
     }
     let all = facts.cut_triangles.filter(|&count| count > 0 && found == 0);
     let gone = "triangles were left out (max_edge), and the folder cut/ that should hold them is gone";
