@@ -17,7 +17,7 @@ mod source;
 mod text;
 
 pub use crs::choice::CrsChoice;
-pub use crs::system::{Crs, CrsKind};
+pub use crs::system::{ComparableCrs, Crs, CrsKind};
 pub use crs::unit::Unit;
 pub use crs::vertical::VerticalSystem;
 pub use file::random_access::not_a_file;
@@ -27,4 +27,4 @@ pub use points::point::Point;
 pub use points::rules::PointRules;
 pub use source::{FileFormat, Source, open, open_chosen};
 pub use text::options::TextOptions;
-pub use text::row_choice::RowChoice;
+pub use text::row_choice::{RowChoice, TextReading};

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::geometry::lattice::shortest_decimal;
 use crate::input::crs::choice::CrsChoice;
 use crate::input::text::options::TextOptions;
+use crate::input::text::row_choice::RowChoice;
 
 /// `[input]`: which points a job reads.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -56,6 +57,11 @@ impl InputOptions {
             }
             None => std::array::from_fn(|class| class != 7 && class != 18),
         }
+    }
+
+    /// Returns which rows of a text the job wants, with or without their `colors`.
+    pub fn row_choice(&self, colors: bool) -> RowChoice {
+        RowChoice { bounds: self.bounds.map(|bounds| bounds.0), classes: self.kept_classes(), colors }
     }
 }
 

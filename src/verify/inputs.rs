@@ -13,7 +13,7 @@ use crate::geometry::lattice::{AxisMap, Lattice, REACH, shortest_decimal};
 use crate::geometry::{Bounds, Site};
 use crate::input::options::Duplicates;
 use crate::input::samples::{FileSamples, fingerprint_of};
-use crate::input::{Point, PointRules, Source, TextOptions, open};
+use crate::input::{Point, PointRules, RowChoice, Source, TextOptions, TextReading, open_chosen};
 use crate::output::frame::Extras;
 use crate::verify::keyed_records::{KeyedRecord, KeyedRecords};
 use crate::verify::report::ReportedFacts;
@@ -88,13 +88,25 @@ impl<'a> Inputs<'a> {
     /// # Errors
     /// [`Error::Io`] or [`Error::Input`] if one cannot be read.
     pub(super) fn open(files: &'a [PathBuf], facts: &'a ReportedFacts, extras: &Extras) -> Result<Inputs<'a>> {
-        let text = facts.input.as_ref().map_or_else(TextOptions::default, |input| input.csv.clone());
+        let reading = facts.texts.unwrap_or(TextReading { colors: true, outliers_left_out: false });
+        let (text, choice) = match &facts.input {
+            Some(input) => (input.csv.clone(), input.row_choice(reading.colors)),
+            None => (TextOptions::default(), RowChoice { colors: reading.colors, ..RowChoice::all() }),
+        };
+        // As the job opened it: what it did not want has no say about the digits of a text.
+        let open_again = |file: &PathBuf| {
+            let mut source = open_chosen(file, &text, &choice)?;
+            if reading.outliers_left_out {
+                source.tell_outliers(&choice)?;
+            }
+            Ok(source)
+        };
         let is_skipped = |file: &Path| {
             let same = |skipped: &Path| skipped == file || skipped.canonicalize().ok() == file.canonicalize().ok();
             facts.skipped.iter().any(|skipped| same(&skipped.file))
         };
         let used = files.iter().filter(|file| !is_skipped(file));
-        let sources = used.map(|file| open(file, &text)).collect::<Result<_>>()?;
+        let sources = used.map(open_again).collect::<Result<_>>()?;
         Ok(Inputs { facts, lattice: lattice_of(facts, extras)?, sources, files })
     }
 

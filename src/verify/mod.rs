@@ -40,8 +40,8 @@
 //! # Triangles that are left out
 //!
 //! The triangles that `[output] max_edge` leaves out of the terrain are in `cut/`. All checks are made on the triangles in `tiles/`
-//! and `cut/` together, except that normals and colours are not compared with `cut/`, which has none. If the report says that
-//! triangles were left out and `cut/` is gone, only checks 1, 4 and the first sentence of 2 are made, and check 3 between
+//! and `cut/` together, except that normals and colours are not compared with `cut/`, which has none. If the report or
+//! the list of files says that some of `cut/` is gone, only checks 1, 4 and the first sentence of 2 are made, and check 3 between
 //! the triangles that are there; the verdict says so.
 //!
 //! # What the job wrote
@@ -94,7 +94,7 @@ use crate::{Error, Result, address_space, disk};
 /// Checks what is in the output `directory` of a job within about `memory` bytes. The verdict lists what does not hold.
 ///
 /// # Errors
-/// [`Error::Config`] if there are no tiles, [`Error::Memory`] if one tile alone needs more memory, [`Error::Io`] if the system
+/// [`Error::Config`] if it is no output of a job, [`Error::Memory`] if one tile alone needs more memory, [`Error::Io`] if the system
 /// cannot read a tile.
 pub fn verify(directory: &Path, memory: u64) -> Result<Verdict> {
     verify_against(directory, memory, &[])
@@ -108,7 +108,7 @@ pub fn verify_against(directory: &Path, memory: u64, inputs: &[PathBuf]) -> Resu
     let memory = address_space::at_start().map_or(memory, |left| memory.min(left.bytes));
     refuse_unfinished(directory)?;
     let found = TileFiles::find(directory);
-    if let Err(error @ (Error::Config(_) | Error::Io { .. })) = found {
+    if let Err(error @ Error::Io { .. }) = found {
         return Err(error);
     }
     let report = ReadReport::read(directory);
@@ -116,6 +116,11 @@ pub fn verify_against(directory: &Path, memory: u64, inputs: &[PathBuf]) -> Resu
     let unusable = |what: String| Ok(Verdict::without_mesh(what, &report, &written));
     let files = match found {
         Ok(files) => files,
+        // Where a job was finished, they were there.
+        Err(Error::Config(_)) if directory.is_dir() && (report.is_of_a_job() || written.has_list) => {
+            return unusable("the tiles are gone: tiles/ is not there, or has no .glb file".into());
+        }
+        Err(error @ Error::Config(_)) => return Err(error),
         Err(error) => return unusable(error.to_string()),
     };
     let grid = match SourceGrid::new(&files.extras) {

@@ -7,6 +7,7 @@ use serde::Deserialize;
 
 use crate::geometry::VertexDigest;
 use crate::geometry::lattice::Lattice;
+use crate::input::TextReading;
 use crate::input::options::InputOptions;
 use crate::output::checksums::{Checksum, read_file, seal};
 use crate::output::file_names::OutputFiles;
@@ -23,6 +24,8 @@ pub(super) struct ReportedFacts {
     pub(super) lattice: Option<Lattice>,
     /// What the job wanted of its inputs.
     pub(super) input: Option<InputOptions>,
+    /// How the job read its texts. Earlier versions did not say it.
+    pub(super) texts: Option<TextReading>,
     /// The inputs that were left out because they are bad.
     #[serde(default)]
     pub(super) skipped: Vec<SkippedFile>,
@@ -70,6 +73,11 @@ impl ReadReport {
             (Err(error), _) => ReadReport::failed(format!("it is no report of this program: {error}")),
             (Ok(_), _) => ReadReport::failed("it is not as the job wrote it: its own checksum does not fit".into()),
         }
+    }
+
+    /// Tells whether it is the report of a job, as the job wrote it.
+    pub(super) fn is_of_a_job(&self) -> bool {
+        self.facts.sites.is_some()
     }
 
     fn failed(what: String) -> ReadReport {

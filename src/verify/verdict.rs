@@ -10,7 +10,7 @@ use crate::verify::exact::cross;
 use crate::verify::findings::Findings;
 use crate::verify::hull::check_boundary;
 use crate::verify::inputs::InputProof;
-use crate::verify::report::ReadReport;
+use crate::verify::report::{ReadReport, ReportedFacts};
 use crate::verify::tile_files::TileFiles;
 use crate::verify::written_files::WrittenFiles;
 
@@ -106,11 +106,11 @@ impl Verdict {
         };
         findings.failures.merge(matches.failures);
         verdict.failures = findings.failures.sentences(&files.names());
-        let gone = facts.cut_triangles.filter(|&count| count > 0 && verdict.cut == 0);
-        if let Some(gone) = gone {
+        let gone = what_is_gone_of_cut(facts, written, verdict.cut);
+        if let Some(gone) = &gone {
             verdict.doubt(format!(
-                "{gone} triangles were left out (max_edge), and the folder cut/ that should hold them is gone: no edge is used twice in \
-                 one direction, and all edges with two triangles are Delaunay, but triangles may overlap and sites may be missing"
+                "{gone}: no edge is used twice in one direction, and all edges with two triangles are Delaunay, but triangles may \
+                 overlap and sites may be missing"
             ));
         } else {
             verdict.check_hull(matches.hull, findings.double_area);
@@ -215,6 +215,19 @@ impl Verdict {
             self.failures.push(format!("{counted} {name}, where report.json says {reported}"));
         }
     }
+}
+
+/// Says what is missing of the triangles that were left out of the terrain, of which `found` are there; `None` if nothing is known to be.
+fn what_is_gone_of_cut(facts: &ReportedFacts, written: &WrittenFiles, found: u64) -> Option<String> {
+    if let (Some(first), true) = (written.cut_gone.first(), found > 0) {
+        let count = written.cut_gone.len();
+        return Some(format!(
+            "{count} files of cut/, which holds what max_edge left out, are gone, the first of them {first}"
+        ));
+    }
+    let all = facts.cut_triangles.filter(|&count| count > 0 && found == 0);
+    let gone = "triangles were left out (max_edge), and the folder cut/ that should hold them is gone";
+    all.map(|all| format!("{all} {gone}")).or_else(|| (!written.cut_gone.is_empty()).then(|| gone.to_owned()))
 }
 
 impl fmt::Display for Verdict {

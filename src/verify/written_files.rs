@@ -18,6 +18,10 @@ pub(super) struct WrittenFiles {
     /// The files that are as the job wrote them.
     pub(super) unchanged: u64,
     pub(super) failures: Vec<String>,
+    /// Whether the list of the files is there.
+    pub(super) has_list: bool,
+    /// The files of `cut/` that are gone, in the order of the list.
+    pub(super) cut_gone: Vec<String>,
     /// What cannot be proved for lack of files.
     pub(super) unproved: Option<String>,
 }
@@ -53,7 +57,7 @@ impl WrittenFiles {
     }
 
     fn failed(what: String) -> WrittenFiles {
-        WrittenFiles { failures: vec![what], ..WrittenFiles::default() }
+        WrittenFiles { failures: vec![what], has_list: true, ..WrittenFiles::default() }
     }
 }
 
@@ -64,14 +68,15 @@ fn is_inside(name: &str) -> bool {
 
 fn compare(output: &OutputFiles, files: &[(String, Checksum)]) -> WrittenFiles {
     let states: Vec<State> = files.par_iter().map(|(name, wanted)| state(output, name, *wanted)).collect();
-    let (mut checked, mut changed, mut gone) = (WrittenFiles::default(), Vec::new(), Vec::new());
+    let (mut changed, mut gone) = (Vec::new(), Vec::new());
+    let mut checked = WrittenFiles { has_list: true, ..WrittenFiles::default() };
     for ((name, _), state) in files.iter().zip(states) {
         match state {
             State::Unchanged => checked.unchanged += 1,
             State::Changed(how) => changed.push(format!("{name} is not as the job wrote it: {how}")),
             State::Gone if is_in(output, name, &output.tiles()) => changed.push(format!("{name} is gone")),
             // The verdict says what can be proved without them.
-            State::Gone if is_in(output, name, &output.cut()) && !output.cut().is_dir() => {}
+            State::Gone if is_in(output, name, &output.cut()) => checked.cut_gone.push(name.clone()),
             State::Gone => gone.push(name.as_str()),
         }
     }
@@ -101,10 +106,10 @@ fn is_in(output: &OutputFiles, name: &str, folder: &Path) -> bool {
     output.directory().join(name).starts_with(folder)
 }
 
-/// Returns a sentence for every tile that is not in the list.
+/// Returns a sentence for every tile, coarser tile and part left out that is not in the list.
 fn unlisted(output: &OutputFiles, files: &[(String, Checksum)]) -> Vec<String> {
     let listed: HashSet<_> = files.iter().map(|(name, _)| output.directory().join(name)).collect();
-    let entries = [output.tiles(), output.cut()].into_iter().filter_map(|folder| std::fs::read_dir(folder).ok());
+    let entries = output.glb_folders().into_iter().filter_map(|folder| std::fs::read_dir(folder).ok());
     let paths = entries.flatten().flatten().map(|entry| entry.path());
     let mut paths: Vec<_> = paths.filter(|path| path.extension().is_some_and(|e| e == "glb")).collect();
     paths.retain(|path| !listed.contains(path));

@@ -173,6 +173,80 @@ fn units_and_datums_of_height_are_told_apart() {
 }
 
 #[test]
+fn a_file_of_unknown_datum_does_not_let_two_datums_pass() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, system: String| write(folder.path(), name, &[text(&system)]);
+    const WGS84: &str = r#""WGS_1984",6378137.0,298.257223563"#;
+    let named = esri("Unknown", GRS80).replace("UTM_15N", "Zone 15");
+    let [unknown, nad83, wgs84] = [
+        write("unknown.las", named),
+        write("nad83.las", esri("North_American_1983", GRS80)),
+        write("wgs84.las", esri("WGS_1984", WGS84)),
+    ];
+    for files in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+        let files = files.map(|index| [&unknown, &nad83, &wgs84][index]);
+        Job::on(&files).run().refused(2, &["nad83.las", "wgs84.las", "the datum (", "WGS_1984", "one CRS"]);
+    }
+    for files in [[&unknown, &nad83], [&nad83, &unknown]] {
+        let report = Job::on(&files).report();
+        let said = warnings(&report);
+        assert!(
+            said.contains("1 of 2 inputs do not say their datum, such as") && said.contains("unknown.las"),
+            "{said}"
+        );
+        assert!(said.contains("taken to be GCS_North_American_1983"), "{said}");
+        assert_eq!(report["crs"], "UTM_15N");
+    }
+    assert!(!warnings(&Job::on(&[&unknown]).report()).contains("do not say their datum"));
+}
+
+#[test]
+fn a_projection_without_its_origin_is_not_placed_and_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = esri("North_American_1983", GRS80);
+    let lost = whole.replace(r#"PARAMETER["Central_Meridian",-93.0],"#, "");
+    let unreadable = whole.replace("-93.0", "nan");
+    // There are fewer doubles than the key points at.
+    let defined = [
+        [1024, 0, 1, 1],
+        [2048, 0, 1, 4269],
+        [3072, 0, 1, 32767],
+        [3075, 0, 1, 1],
+        [3076, 0, 1, 9001],
+        [3080, 34736, 1, 90],
+    ];
+    for (name, record, what) in [
+        ("lost.las", text(&lost), "it does not give the longitude of the origin"),
+        ("unreadable.las", text(&unreadable), "its Central_Meridian is no number"),
+        ("keys.las", keys(&defined), "GeoTIFF key 3080 has no number that can be read"),
+    ] {
+        let file = write(folder.path(), name, &[record]);
+        let job = Job::on(&[&file]);
+        let said = warnings(&job.report());
+        assert!(said.contains(name) && said.contains(what) && said.contains("globe"), "{said}");
+        let tileset: Value = serde_json::from_slice(&fs::read(job.out().join("tileset.json")).unwrap()).unwrap();
+        assert!(tileset["root"].get("transform").is_none(), "{tileset}");
+    }
+    let file = write(folder.path(), "plain.las", &[]);
+    let given = Job::on(&[&file]).with("input", &format!("crs = '''{lost}'''")).report();
+    assert!(warnings(&given).contains("[input] crs (UTM_15N): nobody can tell"), "{given}");
+}
+
+#[test]
+fn a_unit_that_is_no_length_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = esri("North_American_1983", GRS80);
+    for (unit, shown) in [("0", "0"), ("-1", "-1"), ("nan", "NaN")] {
+        let system = whole.replace(r#""Meter",1.0"#, &format!(r#""Meter",{unit}"#));
+        let file = write(folder.path(), "bad.las", &[text(&system)]);
+        let said = warnings(&Job::on(&[&file]).report());
+        let named = format!("its coordinate system (UTM_15N): its unit of x and y is Meter with {shown}");
+        assert!(said.contains("bad.las") && said.contains(&named), "{said}");
+        assert!(said.contains("no input says a unit of length"), "{said}");
+    }
+}
+
+#[test]
 fn degrees_in_the_hundred_thousands_are_a_plane_in_metres() {
     let folder = tempfile::tempdir().unwrap();
     let degrees = keys(&[[1024, 0, 1, 2], [2048, 0, 1, 4326]]);

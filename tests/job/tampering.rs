@@ -260,6 +260,103 @@ fn exit_code_and_last_line_tell_proved_from_as_far_as_can_be_told() {
 }
 
 #[test]
+fn a_part_of_what_was_left_out_may_be_gone() {
+    let (_folder, cloud, job) = every_file("none");
+    let inputs = ["--input", cloud.to_str().unwrap()];
+    const TOLD: &str = "Delaunay as far as can be told, but not proved";
+    let (first, bytes) = files(&job.out(), "").into_iter().find(|(name, _)| name.starts_with("cut/")).unwrap();
+    let count = fs::read_dir(job.out().join("cut")).unwrap().count();
+    assert!(count > 1, "{count}");
+    fs::remove_file(job.out().join(&first)).unwrap();
+    let unproved = verdict(&job.out()).unproved.unwrap();
+    assert!(unproved.contains("1 files of cut/") && unproved.contains(&first), "{unproved}");
+    ends_with(&job, &[], 3, TOLD);
+    ends_with(&job, &inputs, 3, TOLD);
+    // The list says what is gone if the report is gone too.
+    let aside = |name: &str| fs::rename(job.out().join(name), job.folder().join(name)).unwrap();
+    let back = |name: &str| fs::rename(job.folder().join(name), job.out().join(name)).unwrap();
+    aside("report.json");
+    ends_with(&job, &[], 3, TOLD);
+    aside("cut");
+    ends_with(&job, &[], 3, TOLD);
+    back("cut");
+    back("report.json");
+    // What is there must still be right.
+    let tile = fs::read(job.out().join("tiles/000001.glb")).unwrap();
+    fs::write(job.out().join("tiles/000001.glb"), &tile[..tile.len() / 2]).unwrap();
+    is_found(&job.out(), "tiles/000001.glb", "half");
+    fs::write(job.out().join("tiles/000001.glb"), tile).unwrap();
+    fs::write(job.out().join(&first), bytes).unwrap();
+    ends_with(&job, &inputs, 0, "proved: the exact Delaunay triangulation of the inputs' points");
+}
+
+#[test]
+fn an_output_without_its_tiles_fails() {
+    let (_folder, _, job) = every_file("none");
+    let gone = || {
+        is_found(&job.out(), "the tiles are gone", "the loss");
+        ends_with(&job, &[], 4, "failed: not the Delaunay triangulation that the job wrote");
+    };
+    let aside = |name: &str| fs::rename(job.out().join(name), job.folder().join(name)).unwrap();
+    aside("tiles");
+    gone();
+    is_found(&job.out(), "tiles/000000.glb is gone", "the loss");
+    fs::create_dir(job.out().join("tiles")).unwrap();
+    gone();
+    aside("XXH128SUMS");
+    gone();
+    aside("report.json");
+    gdt_batch(job.folder(), &["verify", "out"]).refused(2, &["output directory of a finished job"]);
+    fs::rename(job.folder().join("XXH128SUMS"), job.out().join("XXH128SUMS")).unwrap();
+    gone();
+}
+
+#[test]
+fn a_file_that_the_job_did_not_write_is_found_in_every_folder() {
+    let (_folder, _, job) = every_file("none");
+    for folder in ["tiles", "levels", "cut"] {
+        let (_, own) = files(&job.out(), "").into_iter().find(|(found, _)| found.starts_with(folder)).unwrap();
+        let name = format!("{folder}/theirs.glb");
+        fs::write(job.out().join(&name), own).unwrap();
+        is_found(&job.out(), &format!("{name} is not a file that the job wrote"), "a strange file");
+        fs::remove_file(job.out().join(&name)).unwrap();
+    }
+    assert_eq!(verdict(&job.out()).verdict, Conclusion::Proved);
+}
+
+#[test]
+fn texts_are_read_again_as_the_job_has_read_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut random = Random(4);
+    let mut rows = |digits: usize, more: &str| -> String {
+        let mut place = |from: f64| from + random.below(10_000_000_000) as f64 * 1e-8;
+        let mut row = || {
+            let [x, y, z] = [565_000.0, 5_933_000.0, 0.0].map(&mut place);
+            format!("{x:.digits$},{y:.digits$},{z:.digits$}{more}\n")
+        };
+        (0..300).map(|_| row()).collect()
+    };
+    for (text, section, line) in [
+        // A row out of bounds that no lattice holds beside the others.
+        (format!("x,y,z\n{}9e16,5933000,3\n", rows(3, "")), "input", "bounds = [565000, 5933000, 565100.5, 5933100.5]"),
+        // One of a class that is not wanted.
+        (format!("x,y,z,class\n{}9e16,5933000,3,7\n", rows(3, ",2")), "input", "classes = [2]"),
+        // Colours that nobody wants, and that cannot be read.
+        (format!("x,y,z,red,green,blue\n{}", rows(3, ",a,b,c")), "output", "color = \"none\""),
+        // A row that the job leaves out, because no lattice holds it beside the others.
+        (format!("x,y,z\n{}570000.5,5933050.5,12.5\n", rows(8, "")), "input", "max_malformed_fraction = 0.01"),
+    ] {
+        let path = folder.path().join("cloud.csv");
+        fs::write(&path, text).unwrap();
+        let job = Job::on(&[&path]).with(section, line);
+        let report = job.report();
+        assert_eq!(report["points"]["kept"], 300, "{line}");
+        let said = gdt_batch(job.folder(), &["verify", "out", "--json", "--input", path.to_str().unwrap()]);
+        assert_eq!((said.code, &said.json()["points"]), (0, &report["points"]["kept"]), "{line}: {said:?}");
+    }
+}
+
+#[test]
 fn a_report_of_an_older_version_proves_less_but_nothing_wrong() {
     let (_folder, cloud, job) = every_file("none");
     let path = job.out().join("report.json");

@@ -56,24 +56,32 @@ pub(crate) struct Datum {
 }
 
 impl Datum {
-    /// Returns the datum of a geographic or geocentric system.
+    /// Returns the datum of a geographic or geocentric system; `None` if it says none, or not where its longitudes begin.
     pub(crate) fn of(system: &WktNode) -> Option<Datum> {
         let datum = system.child(&DATUM)?;
         let spheroid = datum.child(&["SPHEROID", "ELLIPSOID"]);
         let texts: Vec<&str> = [system.text(0), datum.text(0)].into_iter().flatten().collect();
-        let meridian = system.child(&["PRIMEM", "PRIMEMERIDIAN"]).and_then(|meridian| meridian.number(1));
+        let meridian = match system.child(&["PRIMEM", "PRIMEMERIDIAN"]) {
+            Some(meridian) => meridian.number(1).filter(|degrees| degrees.is_finite())?,
+            None => 0.0,
+        };
         Some(Datum {
             label: texts.iter().find(|text| comparable(text).is_some()).map(|text| text.to_string()),
             names: texts.iter().filter_map(|text| comparable(text)).collect(),
             codes: [system.epsg(), datum.epsg()],
             ellipsoid: spheroid.and_then(|spheroid| half_axes(spheroid.number(1)?, spheroid.number(2)?)),
-            meridian: meridian.unwrap_or(0.0),
+            meridian,
         })
     }
 
     /// Returns whether the datum agrees with WGS 84 to a metre or two.
     pub(crate) fn is_close_to_wgs84(&self) -> bool {
         self.names.iter().any(|name| CLOSE_TO_WGS84.iter().any(|close| name.starts_with(close)))
+    }
+
+    /// Returns its name; `None` if its ellipsoid is all that is known.
+    pub(crate) fn name(&self) -> Option<&str> {
+        self.label.as_deref()
     }
 
     /// Says in what the two differ. Names that differ are a difference: no parameter tells NAD83 from WGS 84. A datum without a name

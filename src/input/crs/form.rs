@@ -29,6 +29,11 @@ impl CrsForm {
         CrsForm::of_text(text_of_code(code)?)
     }
 
+    /// Returns the name of the datum, if the text gives one.
+    pub(crate) fn datum_name(&self) -> Option<&str> {
+        self.datum.as_ref()?.name()
+    }
+
     /// Says in what the two differ: an entry for the datum and one for the projection. A text without a datum agrees with any.
     pub(crate) fn differences(&self, other: &CrsForm) -> Vec<String> {
         let datum = self.datum.as_ref().zip(other.datum.as_ref()).and_then(|(own, others)| own.difference(others));

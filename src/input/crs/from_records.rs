@@ -7,14 +7,21 @@ use crate::input::crs::system::Crs;
 use crate::{Result, Warnings};
 
 /// Returns the system that the first readable one of `texts` describes, or else `keys`. Warns about a text that is neither readable
-/// nor empty, and about a text and keys that differ.
+/// nor empty, about what is said in a way that cannot be used, and about a text and keys that differ.
 pub(crate) fn from_records(
     texts: impl Iterator<Item = Result<Vec<u8>>>,
     keys: &GeoKeys,
     warnings: &mut Warnings,
 ) -> Result<Crs> {
     let text = from_texts(texts, warnings)?;
-    let keys = geotiff::parse(keys);
+    let (records, keys) = (keys, geotiff::parse(keys));
+    let used = text.as_ref().or(keys.as_ref());
+    let doubts = text.as_ref().map_or_else(|| geotiff::doubts(records), Crs::doubts);
+    for doubt in doubts {
+        let label = used.map_or("unknown".into(), Crs::label);
+        warnings
+            .push(format!("its coordinate system ({label}): {doubt} (set [input] crs or unit to say what is meant)"));
+    }
     if let (Some(text), Some(keys)) = (&text, &keys)
         && let differences = text.differences(keys)
         && !differences.is_empty()

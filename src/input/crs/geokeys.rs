@@ -36,6 +36,11 @@ impl GeoKeys {
         self.entry(key).filter(|(record, ..)| *record == 0).map(|(_, _, value)| value).filter(|value| *value != 0)
     }
 
+    /// Returns whether `key` is there, but has no finite floating-point value.
+    pub(crate) fn lacks_double(&self, key: u16) -> bool {
+        self.entry(key).is_some() && self.double(key).is_none()
+    }
+
     /// Returns the finite floating-point value of `key`.
     pub(crate) fn double(&self, key: u16) -> Option<f64> {
         let (record, _, index) = self.entry(key)?;

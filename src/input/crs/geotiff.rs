@@ -26,6 +26,22 @@ fn linear_unit(keys: &GeoKeys) -> Option<f64> {
     }
 }
 
+/// Says what of the keys is there, but cannot be used.
+pub(crate) fn doubts(keys: &GeoKeys) -> Vec<String> {
+    let unit = keys.code(LINEAR_UNITS).filter(|_| linear_unit(keys).is_none()).map(|code| match code {
+        USER_DEFINED => format!("GeoTIFF key {LINEAR_UNIT_SIZE}, the unit of x and y, is no length"),
+        code => format!("GeoTIFF key {LINEAR_UNITS}, the unit of x and y, has the code {code}, which is not known"),
+    });
+    let height = keys.code(VERTICAL_UNITS).filter(|code| metres(*code).is_none());
+    let height = height.map(|code| {
+        format!("GeoTIFF key {VERTICAL_UNITS}, the unit of heights, has the code {code}, which is not known")
+    });
+    let is_defined = keys.code(PROJECTED_TYPE) == Some(USER_DEFINED);
+    let projection = is_defined.then(|| geotiff_text::problem(keys)).flatten();
+    let projection = projection.map(|what| format!("nobody can tell where its coordinates are: {what}"));
+    unit.into_iter().chain(height).chain(projection).collect()
+}
+
 /// Returns the metres of a unit of length by its EPSG code.
 fn metres(code: u16) -> Option<f64> {
     match code {
@@ -175,6 +191,47 @@ mod tests {
         assert_eq!(user_defined(&written_out, &[-93.0, 0.0, 500_000.0, 0.9999]).differences(&utm).len(), 1);
         // Keys that do not say the projection leave it in doubt.
         assert_eq!(user_defined(&[[3074, 0, 1, 10_101], [3073, TEXTS, 8, 0]], &[]).differences(&utm).len(), 1);
+    }
+
+    #[test]
+    fn a_parameter_that_is_missing_or_unreadable_leaves_the_projection_unknown() {
+        let all: Vec<[u16; 4]> = vec![
+            [1024, 0, 1, 1],
+            [2048, 0, 1, 4269],
+            [3072, 0, 1, USER_DEFINED],
+            [3074, 0, 1, USER_DEFINED],
+            [3075, 0, 1, 1],
+            [3076, 0, 1, 9001],
+            [3080, DOUBLES, 1, 0],
+            [3081, DOUBLES, 1, 1],
+            [3082, DOUBLES, 1, 2],
+            [3083, DOUBLES, 1, 1],
+            [3092, DOUBLES, 1, 3],
+        ];
+        let doubles = [-93.0, 0.0, 500_000.0, 0.9996, f64::NAN];
+        let doubts = |changed: u16, entry: Option<[u16; 4]>| {
+            let keys: Vec<[u16; 4]> = all.iter().filter(|key| key[0] != changed).copied().chain(entry).collect();
+            let keys = records(&keys, &doubles);
+            let (crs, doubts) = (parse(&keys).unwrap(), doubts(&keys));
+            assert_eq!(crs.proj4_definition().is_some(), doubts.is_empty(), "{changed}: {doubts:?}");
+            assert_eq!(crs.kind, CrsKind::Projected);
+            doubts.concat()
+        };
+        assert_eq!(doubts(0, None), "");
+        assert!(doubts(3080, None).ends_with("it does not give the longitude of the origin"));
+        assert!(doubts(3081, None).ends_with("it does not give the latitude of the origin"));
+        // GeoTIFF, like well-known text, has a value for these.
+        for key in [3082, 3083, 3092] {
+            assert_eq!(doubts(key, None), "", "{key}");
+        }
+        for key in [3080, 3081, 3082, 3083, 3092, 2061] {
+            for entry in [[key, DOUBLES, 1, 4], [key, DOUBLES, 1, 90], [key, 0, 1, 7]] {
+                assert!(doubts(key, Some(entry)).ends_with(&format!("key {key} has no number that can be read")));
+            }
+        }
+        for entry in [[3076, 0, 1, 9999], [3076, 0, 1, USER_DEFINED]] {
+            assert!(doubts(3076, Some(entry)).contains("the unit of x and y"));
+        }
     }
 
     #[test]

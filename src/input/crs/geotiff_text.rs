@@ -3,6 +3,8 @@
 
 use crate::input::crs::form::text_of_code;
 use crate::input::crs::geokeys::{GeoKeys, USER_DEFINED};
+use crate::input::crs::projection::Projection;
+use crate::input::crs::wkt::{PROJECTED, find};
 
 const GEOGRAPHIC_TYPE: u16 = 2048;
 const GEOGRAPHIC_CITATION: u16 = 2049;
@@ -11,6 +13,7 @@ const ELLIPSOID: u16 = 2056;
 const GREATER_AXIS: u16 = 2057;
 const LESSER_AXIS: u16 = 2058;
 const INVERSE_FLATTENING: u16 = 2059;
+const PRIME_MERIDIAN_CODE: u16 = 2051;
 const PRIME_MERIDIAN: u16 = 2061;
 const PROJECTION: u16 = 3074;
 const METHOD: u16 = 3075;
@@ -54,7 +57,7 @@ pub(crate) fn projected(keys: &GeoKeys, name: Option<&str>, metres: f64) -> Opti
     if keys.code(ANGULAR_UNITS).is_some_and(|unit| unit != 9102) {
         return None;
     }
-    let projection = zone(keys, metres).or_else(|| written_out(keys))?;
+    let projection = zone(keys, metres).or_else(|| written_out(keys).filter(|_| problem(keys).is_none()))?;
     let name = quoted(name.unwrap_or_default());
     Some(format!(r#"PROJCS["{name}",{},{projection},UNIT["{}",{metres}]]"#, base(keys)?, unit_name(metres)))
 }
@@ -82,17 +85,32 @@ fn zone(keys: &GeoKeys, metres: f64) -> Option<String> {
 }
 
 fn written_out(keys: &GeoKeys) -> Option<String> {
-    let method = keys.code(METHOD)?;
-    let (_, name, parameters) = METHODS.iter().find(|(number, ..)| *number == method)?;
+    let (_, name, parameters) = method(keys)?;
     let mut text = format!(r#"PROJECTION["{name}"]"#);
-    let mut found = false;
     for (candidates, name) in *parameters {
         if let Some(value) = candidates.iter().find_map(|key| keys.double(*key)) {
             text.push_str(&format!(r#",PARAMETER["{name}",{value}]"#));
-            found = true;
         }
     }
-    found.then_some(text)
+    Some(text)
+}
+
+fn method(keys: &GeoKeys) -> Option<&'static (u16, &'static str, &'static [Parameter])> {
+    let method = keys.code(METHOD)?;
+    METHODS.iter().find(|(number, ..)| *number == method)
+}
+
+/// Says which parameter of the projection that the keys write out is not there, or which key cannot be read. Anything else in its place
+/// would be a guess. Returns `None` for a projection that has a code, or of a method that is not known.
+pub(crate) fn problem(keys: &GeoKeys) -> Option<String> {
+    let (_, _, parameters) = method(keys).filter(|_| zone(keys, 1.0).is_none())?;
+    let of_parameters = parameters.iter().flat_map(|(candidates, _)| candidates.iter());
+    let of_base = [GREATER_AXIS, LESSER_AXIS, INVERSE_FLATTENING, PRIME_MERIDIAN];
+    if let Some(key) = of_parameters.chain(&of_base).find(|key| keys.lacks_double(**key)) {
+        return Some(format!("GeoTIFF key {key} has no number that can be read"));
+    }
+    let system = find(&format!(r#"PROJCS["",{}]"#, written_out(keys)?), &PROJECTED)?;
+    Projection::read(&system)?.err()
 }
 
 /// Returns the geographic system: that of the code, that of the datum's code, or one with the ellipsoid that the keys give.
@@ -104,7 +122,9 @@ fn base(keys: &GeoKeys) -> Option<String> {
     if let Some(text) = code.and_then(|code| text_of_code(code.into())).filter(|text| text.starts_with("GEOGCS[")) {
         return Some(text.to_string());
     }
-    let meridian = keys.double(PRIME_MERIDIAN).unwrap_or(0.0);
+    const GREENWICH: u16 = 8901;
+    let is_elsewhere = keys.code(PRIME_MERIDIAN_CODE).is_some_and(|code| code != GREENWICH);
+    let meridian = keys.double(PRIME_MERIDIAN).or_else(|| (!is_elsewhere).then_some(0.0))?;
     let (greater, inverse) = ellipsoid(keys)?;
     let name = quoted(&keys.text(GEOGRAPHIC_CITATION).unwrap_or_else(|| "unknown".into()));
     Some(format!(

@@ -3,6 +3,7 @@
 
 pub(crate) mod choice;
 pub(crate) mod datum;
+pub(crate) mod doubts;
 pub(crate) mod form;
 pub(crate) mod from_records;
 pub(crate) mod from_wkt;

@@ -1,7 +1,7 @@
 //! The definition of a projected system as a PROJ.4 string, from its EPSG code or from its well-known text.
 
 use crate::input::crs::datum::Datum;
-use crate::input::crs::projection::{method, parameter};
+use crate::input::crs::projection::{Projection, method, parameter};
 use crate::input::crs::wkt::{BASE, DATUM, PROJECTED, WktNode, find};
 
 /// The methods whose parameters in well-known text are all that PROJ.4 needs.
@@ -15,6 +15,8 @@ pub(crate) fn definition(epsg: Option<u32>, wkt: Option<&str>) -> Option<String>
 
 fn of_text(text: &str) -> Option<String> {
     let system = find(text, &PROJECTED)?;
+    // A projection with a parameter missing or unreadable is somewhere else.
+    Projection::of(&system)?;
     let conversion = system.child(&["CONVERSION"]).unwrap_or(&system);
     let projection = method(conversion.child(&["PROJECTION", "METHOD"])?.text(0)?)?;
     if !METHODS.contains(&projection) {

@@ -94,6 +94,33 @@ const METHODS: [(&str, &str); 39] = [
     ("obliquemercator", "omerc centre"),
 ];
 
+/// The parameters without which nobody knows where a method has its origin. One of the names in each inner list is enough. False eastings and northings are 0 and scales are 1 where a text leaves them out, as the standard says.
+const ORIGINS: [(&str, &[&[&str]]); 14] = [
+    ("tmerc", &[&["lon_0"], &["lat_0"]]),
+    ("tmerc south", &[&["lon_0"], &["lat_0"]]),
+    ("lcc", &[&["lon_0"], &["lat_0"]]),
+    ("aea", &[&["lon_0"], &["lat_0"], &["lat_1"]]),
+    ("laea", &[&["lon_0"], &["lat_0"]]),
+    ("sterea", &[&["lon_0"], &["lat_0"]]),
+    ("stere", &[&["lon_0"], &["lat_0", "lat_1"]]),
+    ("merc", &[&["lon_0"]]),
+    (WEB_MERCATOR, &[&["lon_0"]]),
+    ("cass", &[&["lon_0"], &["lat_0"]]),
+    ("poly", &[&["lon_0"], &["lat_0"]]),
+    ("krovak", &[&["lon_0"], &["lat_0"]]),
+    ("omerc origin", &[&["lon_0"], &["lat_0"], &["alpha"]]),
+    ("omerc centre", &[&["lon_0"], &["lat_0"], &["alpha"]]),
+];
+
+/// The parameters that methods need whose names say that they have them.
+const PARALLELS: [(&str, &[&str]); 5] = [
+    ("lambertconformalconic2sp", &["lat_1", "lat_2"]),
+    ("lambertconicconformal2sp", &["lat_1", "lat_2"]),
+    ("mercator2sp", &["lat_1"]),
+    ("mercatorvariantb", &["lat_1"]),
+    ("polarstereographicvariantb", &["lat_1"]),
+];
+
 /// The Mercator projection of web maps: of the ellipsoid's coordinates, but by the formulas of the sphere.
 const WEB_MERCATOR: &str = "webmerc";
 
@@ -127,28 +154,27 @@ pub(crate) struct Projection {
 }
 
 impl Projection {
-    /// Returns the projection of a projected system.
+    /// Returns the projection of a projected system; `None` if the system does not say all of it.
     pub(crate) fn of(system: &WktNode) -> Option<Projection> {
+        Projection::read(system)?.ok()
+    }
+
+    /// Returns the projection of a projected system, or says which parameter it lacks, or which cannot be read. Returns `None` if the
+    /// system names no method.
+    pub(crate) fn read(system: &WktNode) -> Option<Result<Projection, String>> {
         let conversion = system.child(&["CONVERSION", "DERIVINGCONVERSION"]).unwrap_or(system);
         let name = conversion.child(&["PROJECTION", "METHOD"])?.text(0)?;
         let method = if is_web_mercator(system) { WEB_MERCATOR } else { method(name).unwrap_or(name) };
-        let metres = system.unit_metres().unwrap_or(1.0);
-        let base = system.child(&["GEOGCS", "BASEGEOGCRS", "BASEGEODCRS"]);
-        let angle = base.map_or(1.0, |base| degrees(base.unit()));
-        let mut parameters = BTreeMap::new();
-        for node in conversion.children().filter(|child| child.keyword == "PARAMETER") {
-            let (long, value) = (node.text(0)?, node.number(1).filter(|value| value.is_finite())?);
-            let name = parameter(long).map_or_else(|| comparable_name(long), str::to_string);
-            let factor = match name.as_str() {
-                "x_0" | "y_0" => node.unit_metres().unwrap_or(metres),
-                "k_0" | "x_scale" | "y_scale" => 1.0,
-                _ => node.unit().map_or(angle, |unit| degrees(Some(unit))),
-            };
-            parameters.insert(name, value * factor);
-        }
-        let mut projection = Projection { method: method.to_string(), parameters, westward: westward(system) };
-        projection.normalise();
-        Some(projection)
+        let parameters =
+            parameters(system, conversion).and_then(|parameters| match missing(name, method, &parameters) {
+                Some(missing) => Err(format!("it does not give {missing}")),
+                None => Ok(parameters),
+            });
+        Some(parameters.map(|parameters| {
+            let mut projection = Projection { method: method.to_string(), parameters, westward: westward(system) };
+            projection.normalise();
+            projection
+        }))
     }
 
     /// Writes what can be said in several ways in one of them.
@@ -194,6 +220,38 @@ impl Projection {
     }
 }
 
+/// Reads the parameters: angles in degrees, lengths in metres. Fails with what is wrong with the first that cannot be read.
+fn parameters(system: &WktNode, conversion: &WktNode) -> Result<BTreeMap<String, f64>, String> {
+    let metres = system.unit_metres().unwrap_or(1.0);
+    let base = system.child(&["GEOGCS", "BASEGEOGCRS", "BASEGEODCRS"]);
+    let angle = base.map_or(1.0, |base| degrees(base.unit()));
+    let mut parameters = BTreeMap::new();
+    for node in conversion.children().filter(|child| child.keyword == "PARAMETER") {
+        let long = node.text(0).ok_or("it has a parameter without a name")?;
+        let name = parameter(long).map_or_else(|| comparable_name(long), str::to_string);
+        let factor = match name.as_str() {
+            "x_0" | "y_0" => node.unit().map_or(Some(metres), |_| node.unit_metres()),
+            "k_0" | "x_scale" | "y_scale" => Some(1.0),
+            _ => Some(node.unit().map_or(angle, |unit| degrees(Some(unit)))),
+        };
+        let value = node.number(1).zip(factor).map(|(value, factor)| value * factor);
+        let value = value.filter(|value| value.is_finite()).ok_or_else(|| format!("its {long} is no number"))?;
+        parameters.insert(name, value);
+    }
+    Ok(parameters)
+}
+
+/// Returns the first parameter that a method needs and the text lacks, in words.
+fn missing(name: &str, method: &str, parameters: &BTreeMap<String, f64>) -> Option<String> {
+    let has = |name: &str| parameters.contains_key(name);
+    let origins = ORIGINS.iter().filter(|(known, _)| *known == method).flat_map(|(_, needed)| needed.iter());
+    let lost = origins.copied().find(|any| !any.iter().any(|name| has(name))).and_then(|any| any.first().copied());
+    let name = comparable_name(name);
+    let parallels = PARALLELS.iter().filter(|(known, _)| *known == name).flat_map(|(_, needed)| needed.iter());
+    let lost = lost.or_else(|| parallels.copied().find(|name| !has(name)))?;
+    Some(format!("the {}", long_name(lost)))
+}
+
 /// Version 1 of the text has no name for this method. Writers add its definition for PROJ.4.
 fn is_web_mercator(system: &WktNode) -> bool {
     let extension = system.child(&["EXTENSION"]).and_then(|extension| extension.text(1));
@@ -225,8 +283,30 @@ fn long_name(name: &str) -> &str {
         "lat_0" => "latitude of the origin",
         "lat_1" | "lat_2" => "standard parallel",
         "k_0" => "scale factor",
+        "alpha" => "azimuth",
         "x_0" => "false easting in metres",
         "y_0" => "false northing in metres",
         other => other,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::crs::wkt::{PROJECTED, find};
+
+    #[test]
+    fn every_projection_with_a_code_says_all_of_it() {
+        let mut known = 0;
+        for code in 1..=u16::MAX {
+            let Some(system) = crs_definitions::from_code(code).and_then(|crs| find(crs.wkt, &PROJECTED)) else {
+                continue;
+            };
+            if let Some(read) = Projection::read(&system) {
+                known += 1;
+                assert!(read.is_ok(), "EPSG:{code}: {read:?}");
+            }
+        }
+        assert!(known > 4_000, "{known}");
     }
 }

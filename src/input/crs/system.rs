@@ -78,11 +78,11 @@ impl Crs {
     /// If both have the same EPSG code, the code decides. Otherwise datums and projections are compared by what they are, not by the
     /// name of the system.
     pub fn differences(&self, other: &Crs) -> Vec<String> {
-        let known = |kind| kind != CrsKind::Unknown;
-        if known(self.kind) && known(other.kind) && self.kind != other.kind {
-            return vec![format!("the kind of coordinates ({}, {})", self.kind.name(), other.kind.name())];
-        }
-        let mut found = self.differences_in_place(other);
+        ComparableCrs::of(self).differences(&ComparableCrs::of(other))
+    }
+
+    fn differences_besides_place(&self, other: &Crs) -> Vec<String> {
+        let mut found = Vec::new();
         if !same_unit(self.horizontal, other.horizontal) {
             found.push(format!("the unit of x and y ({}, {})", self.horizontal.name(), other.horizontal.name()));
         }
@@ -97,25 +97,8 @@ impl Crs {
         found
     }
 
-    fn differences_in_place(&self, other: &Crs) -> Vec<String> {
-        if self.epsg.is_some() && self.epsg == other.epsg {
-            return Vec::new();
-        }
-        match (self.form(), other.form()) {
-            (Some(own), Some(others)) => own.differences(&others),
-            (own, _) => {
-                // Two of which one is not known can only agree by name.
-                let names = (self.comparable_name(), other.comparable_name());
-                let doubtful = matches!(&names, (Some(own), Some(others)) if own != others);
-                let unclear = if own.is_none() { self } else { other };
-                let what = || format!("the name, and {} does not say its projection", unclear.label());
-                doubtful.then(what).into_iter().collect()
-            }
-        }
-    }
-
     /// Returns what the system is compared by. A text says more than a code.
-    fn form(&self) -> Option<CrsForm> {
+    pub(crate) fn form(&self) -> Option<CrsForm> {
         let text = self.wkt.as_deref().and_then(CrsForm::of_text);
         text.or_else(|| CrsForm::of_code(self.epsg?))
     }
@@ -144,6 +127,57 @@ impl Crs {
             (Some(name), None) => name.clone(),
             (None, Some(code)) => format!("EPSG:{code}"),
             (None, None) => "unknown".to_string(),
+        }
+    }
+}
+
+/// A system that has been taken apart, to be compared with many others.
+pub struct ComparableCrs<'a> {
+    crs: &'a Crs,
+    form: Option<CrsForm>,
+}
+
+impl<'a> ComparableCrs<'a> {
+    /// Takes the system apart.
+    pub fn of(crs: &'a Crs) -> ComparableCrs<'a> {
+        ComparableCrs { crs, form: crs.form() }
+    }
+
+    /// Returns the name of the datum, if the system says one.
+    pub fn datum_name(&self) -> Option<&str> {
+        self.form.as_ref()?.datum_name()
+    }
+
+    /// Returns whether the system says its projection, but not the name of its datum.
+    pub fn lacks_datum(&self) -> bool {
+        self.form.is_some() && self.datum_name().is_none()
+    }
+
+    /// As [`Crs::differences`].
+    pub fn differences(&self, other: &ComparableCrs) -> Vec<String> {
+        let (own, others) = (self.crs.kind, other.crs.kind);
+        if own != others && own != CrsKind::Unknown && others != CrsKind::Unknown {
+            return vec![format!("the kind of coordinates ({}, {})", own.name(), others.name())];
+        }
+        let mut found = self.differences_in_place(other);
+        found.extend(self.crs.differences_besides_place(other.crs));
+        found
+    }
+
+    fn differences_in_place(&self, other: &ComparableCrs) -> Vec<String> {
+        if self.crs.epsg.is_some() && self.crs.epsg == other.crs.epsg {
+            return Vec::new();
+        }
+        match (&self.form, &other.form) {
+            (Some(own), Some(others)) => own.differences(others),
+            _ => {
+                // Two of which one is not known can only agree by name.
+                let names = (self.crs.comparable_name(), other.crs.comparable_name());
+                let doubtful = matches!(&names, (Some(own), Some(others)) if own != others);
+                let unclear = if self.form.is_none() { self.crs } else { other.crs };
+                let what = || format!("the name, and {} does not say its projection", unclear.label());
+                doubtful.then(what).into_iter().collect()
+            }
         }
     }
 }

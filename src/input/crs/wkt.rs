@@ -193,7 +193,9 @@ pub(crate) fn degrees(unit: Option<&WktNode>) -> f64 {
     if name.starts_with("grad") || name.starts_with("gon") {
         return 0.9;
     }
-    unit.and_then(|unit| unit.number(1)).filter(|factor| factor.is_finite()).map_or(1.0, f64::to_degrees)
+    unit.and_then(|unit| unit.number(1))
+        .filter(|factor| factor.is_finite() && *factor > 0.0)
+        .map_or(1.0, f64::to_degrees)
 }
 
 fn is_angle_name(unit: &WktNode) -> bool {

@@ -1,6 +1,18 @@
 //! Which rows of a text a job wants. The others have no say about the lattice.
 
+use serde::{Deserialize, Serialize};
+
 use crate::input::text::number::Number;
+
+/// How a job has read its texts, as far as the options of `[input]` do not say it. Whoever reads them in the same way finds the same
+/// points.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct TextReading {
+    /// Whether colours were read. If they were, a row without them is malformed.
+    pub colors: bool,
+    /// Whether rows were left out that lie far from all others.
+    pub outliers_left_out: bool,
+}
 
 /// Which rows of a text a job wants.
 #[derive(Clone, Debug)]

@@ -1,7 +1,7 @@
 //! The CRS and the units that all inputs of a job have in common.
 
 use crate::input::options::UnitChoice;
-use crate::input::{Crs, CrsChoice, CrsKind, Source, Unit};
+use crate::input::{ComparableCrs, Crs, CrsChoice, CrsKind, Source, Unit};
 use crate::{Error, Result, Warnings};
 
 /// Returns the CRS of all sources. What a source does not say, the others say for it; a warning says so.
@@ -13,7 +13,10 @@ pub fn common_crs(sources: &[Source], choice: &CrsChoice, warnings: &mut Warning
         CrsChoice::Auto => return agreed(sources, warnings),
         CrsChoice::None => Crs::default(),
         CrsChoice::First => sources.iter().find(|s| s.crs.is_named()).map(|s| s.crs.clone()).unwrap_or_default(),
-        CrsChoice::Given { crs, .. } => (**crs).clone(),
+        CrsChoice::Given { crs, .. } => {
+            crs.doubts().into_iter().for_each(|doubt| warnings.push(format!("[input] crs ({}): {doubt}", crs.label())));
+            (**crs).clone()
+        }
     };
     let overruled: Vec<(&Source, Vec<String>)> =
         sources.iter().map(|s| (s, crs.differences(&s.crs))).filter(|(_, found)| !found.is_empty()).collect();
@@ -33,34 +36,60 @@ pub fn common_crs(sources: &[Source], choice: &CrsChoice, warnings: &mut Warning
 
 /// Returns the CRS that all sources agree on.
 fn agreed(sources: &[Source], warnings: &mut Warnings) -> Result<Crs> {
-    let mut distinct: Vec<&Source> = Vec::new();
+    let mut distinct: Vec<(&Source, ComparableCrs)> = Vec::new();
     for source in sources.iter().filter(|s| s.crs != Crs::default()) {
-        if !distinct.iter().any(|known| known.crs == source.crs) {
-            distinct.push(source);
+        if !distinct.iter().any(|(known, _)| known.crs == source.crs) {
+            distinct.push((source, ComparableCrs::of(&source.crs)));
         }
     }
-    // The most complete ones, whatever the order of the files: each must agree with both.
+    refuse_differences(&distinct)?;
+    // The most complete ones, whatever the order of the files.
     let is_placed = |crs: &Crs| (crs.wkt.is_some(), crs.epsg.is_some(), crs.name.is_some());
     let is_high = |crs: &Crs| (crs.vertical_system.is_some(), crs.vertical.is_some());
     let text = |crs: &Crs| (crs.label(), crs.wkt.clone());
-    let place = distinct.iter().max_by_key(|s| (is_placed(&s.crs), is_high(&s.crs), text(&s.crs)));
-    let height = distinct.iter().max_by_key(|s| (is_high(&s.crs), is_placed(&s.crs), text(&s.crs)));
-    let (Some(place), Some(height)) = (place, height) else { return Ok(Crs::default()) };
-    for (reference, other) in [place, height].into_iter().flat_map(|r| distinct.iter().map(move |s| (r, s))) {
-        let differences = reference.crs.differences(&other.crs);
-        if !differences.is_empty() {
-            return Err(two_systems(reference, other, &differences));
-        }
-    }
+    let place = distinct.iter().max_by_key(|(Source { crs, .. }, comparable)| {
+        (comparable.datum_name().is_some(), is_placed(crs), is_high(crs), text(crs))
+    });
+    let height = distinct.iter().max_by_key(|(Source { crs, .. }, _)| (is_high(crs), is_placed(crs), text(crs)));
+    let (Some((place, comparable)), Some((height, _))) = (place, height) else { return Ok(Crs::default()) };
     let mut crs = place.crs.clone();
     crs.vertical = crs.vertical.or(height.crs.vertical);
     crs.vertical_system = crs.vertical_system.or_else(|| height.crs.vertical_system.clone());
     if crs.horizontal == Unit::Unknown {
-        let known = distinct.iter().map(|s| s.crs.horizontal).find(|unit| *unit != Unit::Unknown);
+        let known = distinct.iter().map(|(s, _)| s.crs.horizontal).find(|unit| *unit != Unit::Unknown);
         crs.horizontal = known.unwrap_or_default();
     }
     warn_of_gaps(sources, &crs, warnings);
+    if let Some(datum) = comparable.datum_name() {
+        let lacks_datum = |crs: &Crs| distinct.iter().any(|(s, comparable)| s.crs == *crs && comparable.lacks_datum());
+        warn_of_datums(sources.iter().filter(|s| lacks_datum(&s.crs)).collect(), sources.len(), datum, warnings);
+    }
     Ok(crs)
+}
+
+/// Fails if any two of the sources differ. Two that differ may both agree with a third that says less, so every pair counts.
+fn refuse_differences(distinct: &[(&Source, ComparableCrs)]) -> Result<()> {
+    for (index, (own, crs)) in distinct.iter().enumerate() {
+        for (other, others) in &distinct[index + 1..] {
+            let differences = crs.differences(others);
+            if !differences.is_empty() {
+                return Err(two_systems(own, other, &differences));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Warns about the sources `without` a datum, where others say one.
+fn warn_of_datums(without: Vec<&Source>, count: usize, datum: &str, warnings: &mut Warnings) {
+    if let Some(first) = without.first() {
+        warnings.push(format!(
+            "{} of {count} inputs do not say their datum, such as {} ({}): it is taken to be {datum}, as in the others",
+            without.len(),
+            first.path.display(),
+            first.crs.label()
+        ));
+    }
 }
 
 fn two_systems(own: &Source, other: &Source, differences: &[String]) -> Error {
@@ -129,7 +158,7 @@ pub fn horizontal_unit(choice: UnitChoice, crs: &Crs, warnings: &mut Warnings) -
     match unit {
         Unit::Unknown => {
             warnings.push(
-                "no input says the unit of its coordinates: they are taken as metres (set [input] unit to say otherwise)",
+                "no input says a unit of length for its coordinates: they are taken as metres (set [input] unit to say otherwise)",
             );
             Ok((key_of(Unit::Metre), 1.0))
         }

@@ -1,19 +1,22 @@
 //! What the plan knows of texts, which are read once before it is made: rows that nobody wants, mistakes, degrees.
 
 use crate::input::options::{OnBadFile, UnitChoice};
-use crate::input::{FileFormat, PointCounts, PointRules, RowChoice, Source, Unit};
+use crate::input::{FileFormat, PointCounts, PointRules, RowChoice, Source, TextReading, Unit};
 use crate::job::options::JobOptions;
+use crate::job::plan::job_plan::Plan;
 use crate::output::options::ColorChoice;
 use crate::{Error, Result, interrupt};
 use rayon::prelude::*;
 
 /// Returns which rows of a text the job wants.
 pub(crate) fn row_choice(options: &JobOptions) -> RowChoice {
-    RowChoice {
-        bounds: options.input.bounds.map(|bounds| bounds.0),
-        classes: options.input.kept_classes(),
-        colors: wants_colors(options),
-    }
+    options.input.row_choice(wants_colors(options))
+}
+
+/// Returns how the texts of a plan are read.
+pub(crate) fn text_reading(plan: &Plan) -> TextReading {
+    let outliers_left_out = plan.inputs.iter().any(|input| input.source.outliers() > 0);
+    TextReading { colors: wants_colors(&plan.options), outliers_left_out }
 }
 
 /// Returns whether the job wants the points' own colours.

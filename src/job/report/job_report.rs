@@ -3,12 +3,13 @@
 use crate::Warnings;
 use crate::geometry::VertexDigest;
 use crate::geometry::lattice::Lattice;
-use crate::input::PointCounts;
 use crate::input::options::InputOptions;
+use crate::input::{PointCounts, TextReading};
 use crate::job::levels::make_level::LevelStats;
 use crate::job::machine;
 use crate::job::mesh::leaf::LeafStats;
 use crate::job::plan::job_plan::{Plan, SkippedInput};
+use crate::job::plan::text_inputs::text_reading;
 use crate::job::progress::clock::JobClock;
 use crate::job::progress::stats::StageStats;
 use crate::job::progress::text::grouped;
@@ -79,6 +80,8 @@ pub struct Report {
     pub warnings: Warnings,
     /// What the user wants of the inputs; the files themselves are not listed.
     pub input: InputOptions,
+    /// How texts were read.
+    pub texts: TextReading,
     /// Tells the content of all inputs from that of others, whatever their names and their order: a hash of sizes and samples.
     pub inputs_fingerprint: String,
     /// The digest of all vertices with their heights, on the lattice.
@@ -197,6 +200,7 @@ impl Report {
             stages: parts.stages,
             warnings,
             input: InputOptions { files: Vec::new(), ..plan.options.input.clone() },
+            texts: text_reading(plan),
             inputs_fingerprint: parts.inputs_fingerprint,
             vertex_digest: parts.leaves.vertices,
             file_list: parts.file_list,

@@ -1,0 +1,95 @@
+//! What a well-known text says in a way that cannot be used. Nothing may silently take its place.
+
+use crate::input::crs::projection::Projection;
+use crate::input::crs::system::{Crs, CrsKind};
+use crate::input::crs::wkt::{GEOGRAPHIC, LOCAL, PROJECTED, VERTICAL, WktNode, find, length, units};
+
+impl Crs {
+    /// Says what of the system's text is there, but cannot be used, and which parameter its projection lacks.
+    pub fn doubts(&self) -> Vec<String> {
+        let Some(text) = self.wkt.as_deref() else { return Vec::new() };
+        let unit = |keywords: &[&str]| find(text, keywords).and_then(|system| bad_unit(&system));
+        let horizontal = match self.kind {
+            CrsKind::Projected => unit(&PROJECTED),
+            CrsKind::Geocentric => unit(&GEOGRAPHIC),
+            CrsKind::Local => unit(&LOCAL),
+            CrsKind::Geographic | CrsKind::Unknown => None,
+        };
+        let horizontal = horizontal.map(|what| format!("its unit of x and y is {what}"));
+        let vertical = unit(&VERTICAL).map(|what| format!("its unit of heights is {what}"));
+        // A code says all that the text lacks.
+        let system = if self.form().is_none() { find(text, &PROJECTED) } else { None };
+        let projection = system.and_then(|system| Projection::read(&system)?.err());
+        let projection = projection.map(|what| format!("nobody can tell where its coordinates are: {what}"));
+        horizontal.into_iter().chain(vertical).chain(projection).collect()
+    }
+}
+
+/// Says what is wrong with the unit of a system; `None` if it is a length, or if there is none.
+fn bad_unit(system: &WktNode) -> Option<String> {
+    let unit = units(system).0.filter(|unit| length(unit).is_none())?;
+    let metres = unit.number(1).map_or("no number".into(), |metres| format!("{metres}"));
+    Some(format!("{} with {metres} in place of its length in metres", unit.text(0).unwrap_or("unnamed")))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::input::crs::from_wkt::parse;
+
+    const UTM: &str = r#"PROJCS["UTM",GEOGCS["GCS_North_American_1983",DATUM["D_North_American_1983",
+        SPHEROID["GRS_1980",6378137.0,298.257222101]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],
+        PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",500000.0],PARAMETER["False_Northing",0.0],
+        PARAMETER["Central_Meridian",-93.0],PARAMETER["Scale_Factor",0.9996],PARAMETER["Latitude_Of_Origin",0.0],
+        UNIT["Meter",1.0]]"#;
+
+    fn doubts(from: &str, to: &str) -> Vec<String> {
+        let text = UTM.replace(from, to);
+        assert!(from.is_empty() || text != UTM, "{from}");
+        let crs = parse(&text).unwrap();
+        let doubts = crs.doubts();
+        let lacks_unit = doubts.iter().any(|doubt| doubt.contains("unit"));
+        assert_eq!(crs.proj4_definition().is_some(), doubts.is_empty(), "{doubts:?}");
+        assert_eq!(crs.metres_per_unit().is_none(), lacks_unit, "{doubts:?}");
+        doubts
+    }
+
+    #[test]
+    fn an_origin_that_is_missing_or_unreadable_leaves_the_place_unknown() {
+        assert_eq!(doubts("", ""), [""; 0]);
+        // What the standard has a value for may be missing.
+        let plain = UTM.replace(r#"PARAMETER["False_Northing",0.0],"#, "");
+        assert_eq!(parse(&plain).unwrap().doubts(), [""; 0]);
+        for (from, to, what) in [
+            (r#"PARAMETER["Central_Meridian",-93.0],"#, "", "it does not give the longitude of the origin"),
+            (r#"PARAMETER["Latitude_Of_Origin",0.0],"#, "", "it does not give the latitude of the origin"),
+            ("-93.0", "nan", "its Central_Meridian is no number"),
+            ("500000.0", "\"east\"", "its False_Easting is no number"),
+            ("0.9996", "inf", "its Scale_Factor is no number"),
+        ] {
+            assert_eq!(doubts(from, to), [format!("nobody can tell where its coordinates are: {what}")], "{to}");
+        }
+        let cone = |parameters: &str| {
+            let text = UTM.replace("Transverse_Mercator", "Lambert_Conformal_Conic_2SP");
+            parse(&text.replace(r#"PARAMETER["Scale_Factor",0.9996],"#, parameters)).unwrap().doubts().len()
+        };
+        let (first, second) = (r#"PARAMETER["Standard_Parallel_1",44],"#, r#"PARAMETER["Standard_Parallel_2",49],"#);
+        assert_eq!((cone(first), cone(second), cone(&format!("{first}{second}"))), (1, 1, 0));
+        // The code says what the text lacks.
+        let coded = UTM
+            .replace(r#"PARAMETER["Central_Meridian",-93.0],"#, "")
+            .replace("1.0]]", r#"1.0],AUTHORITY["EPSG","26915"]]"#);
+        assert_eq!(parse(&coded).unwrap().doubts(), [""; 0]);
+    }
+
+    #[test]
+    fn a_unit_that_is_no_length_is_named() {
+        for (unit, shown) in [("0.0", "0"), ("-1.0", "-1"), ("nan", "NaN"), ("\"long\"", "no number")] {
+            let found = doubts(r#""Meter",1.0"#, &format!(r#""Meter",{unit}"#));
+            assert_eq!(found, [format!("its unit of x and y is Meter with {shown} in place of its length in metres")]);
+        }
+        let heights = format!(r#"COMPD_CS["c",{UTM},VERT_CS["v",VERT_DATUM["d",2005],UNIT["foot",0]]]"#);
+        let crs = parse(&heights).unwrap();
+        assert_eq!(crs.doubts(), ["its unit of heights is foot with 0 in place of its length in metres"]);
+        assert_eq!(crs.vertical, None);
+    }
+}
