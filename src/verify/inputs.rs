@@ -13,7 +13,7 @@ use crate::geometry::lattice::{AxisMap, Lattice, REACH, shortest_decimal};
 use crate::geometry::{Bounds, Site};
 use crate::input::options::Duplicates;
 use crate::input::samples::{FileSamples, fingerprint_of};
-use crate::input::{Point, PointRules, Source, TextOptions, open};
+use crate::input::{Point, PointRules, RowChoice, Source, TextOptions, open_chosen};
 use crate::output::frame::Extras;
 use crate::verify::keyed_records::{KeyedRecord, KeyedRecords};
 use crate::verify::report::ReportedFacts;
@@ -94,7 +94,13 @@ impl<'a> Inputs<'a> {
             facts.skipped.iter().any(|skipped| same(&skipped.file))
         };
         let used = files.iter().filter(|file| !is_skipped(file));
-        let sources = used.map(|file| open(file, &text)).collect::<Result<_>>()?;
+        // The job has read the rows of texts in the same way: those within its bounds before they are rounded to the lattice.
+        let choice = facts.input.as_ref().map_or_else(RowChoice::all, |input| RowChoice {
+            bounds: input.bounds.map(|bounds| bounds.0),
+            classes: input.kept_classes(),
+            ..RowChoice::all()
+        });
+        let sources = used.map(|file| open_chosen(file, &text, &choice)).collect::<Result<_>>()?;
         Ok(Inputs { facts, lattice: lattice_of(facts, extras)?, sources, files })
     }
 
