@@ -87,7 +87,7 @@ pub struct Source {
 enum PointData {
     Las(UncompressedPoints),
     Laz(CompressedPoints),
-    Text(TextTable),
+    Text(Box<TextTable>),
 }
 
 /// Opens the file at `path` and finds out what it holds. Reads the header of LAS or LAZ, or all of a text once, on the threads of
@@ -176,7 +176,7 @@ fn open_text(file: &RandomAccessFile, options: &TextOptions, choice: &RowChoice)
         crs: Crs { horizontal, ..Crs::default() },
         by_return: Vec::new(),
         warnings,
-        points: PointData::Text(table),
+        points: PointData::Text(Box::new(table)),
     })
 }
 

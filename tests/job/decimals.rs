@@ -166,7 +166,7 @@ fn a_terrestrial_scan_has_no_outliers() {
     let mut scan = |decimals: usize| -> String {
         let row = |()| {
             // As dense as 1/r^2 along the ground, up to 900 m.
-            let (r, angle) = (1.5 / (1.0 - random.unit() * (1.0 - 1.5 / 900.0)), random.unit() * 6.283);
+            let (r, angle) = (1.5 / (1.0 - random.unit() * (1.0 - 1.5 / 900.0)), random.unit() * std::f64::consts::TAU);
             let [x, y] = [565_000.0 + r * f64::cos(angle), 5_933_000.0 + r * f64::sin(angle)];
             format!("{x:.decimals$} {y:.decimals$} {:.decimals$}\n", 3.0 * random.unit())
         };

@@ -218,8 +218,9 @@ mod tests {
         let small = |i: usize| format!("{},{:02},{},{},{},{}", i, i % 90, i % 7, 11 + i % 80, i % 5, 12);
         assert_eq!(used(Names::CoordinatesFirst, &table(50, small)), decimals);
         // Decimals of zeros are left out.
-        let dropped =
-            |i: usize| if i % 10 == 0 { format!("{i},{},5,3", 2 * i) } else { format!("{i},{},{i},5,3,1", i % 10) };
+        let dropped = |i: usize| {
+            if i.is_multiple_of(10) { format!("{i},{},5,3", 2 * i) } else { format!("{i},{},{i},5,3,1", i % 10) }
+        };
         for names in [Names::None, Names::CoordinatesFirst, Names::Others] {
             assert_eq!(used(names, &table(50, dropped)), decimals);
         }
@@ -251,7 +252,7 @@ mod tests {
         let classed = |i: usize| format!("{},{},{},2", 565_000 + i, 5_933_000 + 7 * i, 12 + i % 90);
         let local = |i: usize| format!("{},{},{},{}", 40 * i, 70 * i % 900, i % 90, 3 * i % 256);
         let padded = |i: usize| format!("{:05},{:05},{:05},{:03},000,012", 3 * i, 7 * i % 1000, i % 90, i % 256);
-        let empty = |i: usize| format!("{i},{},{},{}", 3 * i, i % 9, if i % 2 == 0 { "" } else { "5" });
+        let empty = |i: usize| format!("{i},{},{},{}", 3 * i, i % 9, if i.is_multiple_of(2) { "" } else { "5" });
         let triples = |i: usize| format!("{i},{},{}", 7 * i % 50, i % 4);
         for text in [
             table(300, colored),
