@@ -199,14 +199,15 @@ impl Source {
     }
 
     /// Leaves out the few rows of a text that lie so far from all others that they are mistakes: decoding counts them as malformed,
-    /// and they have no say about the axes and the grid. `choice` is that with which the source was opened. Returns whether there
-    /// are such rows.
+    /// and they have no say about the axes and the grid. `choice` is that with which the source was opened. `even_among_few`
+    /// tells whether one row of a few may be such a row. Returns whether there are such rows.
     ///
     /// # Errors
     /// `Io` if the file cannot be read.
-    pub fn tell_outliers(&mut self, choice: &RowChoice) -> Result<bool> {
+    pub fn tell_outliers(&mut self, choice: &RowChoice, even_among_few: bool) -> Result<bool> {
         let PointData::Text(table) = &mut self.points else { return Ok(false) };
-        let told = table.tell_outliers(&RandomAccessFile::reopen(&self.path, self.size)?, choice)?;
+        let file = RandomAccessFile::reopen(&self.path, self.size)?;
+        let told = table.tell_outliers(&file, choice, even_among_few)?;
         (self.axes, self.grid) = (table.axes(), table.grid());
         Ok(told)
     }

@@ -1,9 +1,10 @@
 //! The layouts of texts that programs write: names of columns, lines before them, delimiters, colours.
 
 use gdt_batch::Result;
-use gdt_batch::input::Point;
+use gdt_batch::input::{Point, TextOptions, open};
 
-use crate::cloud::{Cloud, read_bytes};
+use crate::cloud::{Cloud, file, read_bytes};
+use crate::first_warning;
 
 fn text(content: &str) -> Result<Cloud> {
     read_bytes(".csv", content.as_bytes())
@@ -73,12 +74,62 @@ fn a_decimal_comma_between_commas_is_refused() {
         let error = text(content).err().unwrap_or_else(|| panic!("{content:?} was read"));
         assert!(error.exit_code() == 3 && error.to_string().contains("before decimals"), "{error}");
     }
-    let cloud = text("x,y,z\n565000,25,5933000,50,12,1\n").unwrap();
-    assert_eq!((cloud.counts.kept, cloud.counts.malformed), (0, 1));
+    for header in ["x,y,z", "x,y,z,r,g,b", "x,y,z,i,j", "Rechtswert,Hochwert,Hoehe,Code,Datum,Bem"] {
+        let rows: String = (0..50).map(|i| format!("{},25,{},5,12,1\n", 565_000 + i, 5_933_000 + 7 * i)).collect();
+        let error = text(&format!("{header}\n{rows}")).err().unwrap_or_else(|| panic!("{header:?} was read"));
+        assert!(error.exit_code() == 3 && error.to_string().contains("before decimals"), "{error}");
+    }
     let cloud = text("x;y;z\n1,5;2,5;3,5\n").unwrap();
     assert!(cloud.counts.examples[0].contains("decimals have a point"), "{:?}", cloud.counts.examples);
     // Colours in whole numbers are no decimals.
     assert_eq!(text("565000,5933000,12,255,128,3\n565001,5933001,13,255,128,3\n").unwrap().counts.kept, 2);
+}
+
+#[test]
+fn whole_columns_that_may_be_decimals_need_names() {
+    let rows: String = (0..50).map(|i| format!("{},{},12,{}\n", 565_000 + i, 5_933_000 + 7 * i, 10 + i % 90)).collect();
+    let error = text(&rows).err().expect("was read");
+    assert!(error.exit_code() == 3 && error.to_string().contains("columns"), "{error}");
+    assert_eq!(text(&format!("x,y,z,intensity\n{rows}")).unwrap().counts.kept, 50);
+    let columns = Some(["x", "y", "z", "i"].map(str::to_owned).to_vec());
+    let path = file(".csv", rows.as_bytes());
+    assert_eq!(open(&path, &TextOptions { columns, ..TextOptions::default() }).unwrap().records, 50);
+}
+
+#[test]
+fn a_title_is_no_header() {
+    for title in ["My x y z file", "Points x y z"] {
+        let error = text(&format!("{title}\n1.5,2,3.25\n4,5,6\n")).err().expect("was read");
+        assert!(error.exit_code() == 3 && error.to_string().contains("and the rows have 3"), "{error}");
+        assert_two_points(&format!("{title}\nz,y,x\n3.25,2,1.5\n6,5,4\n"));
+    }
+    assert_two_points("z y x\n3.25,2,1.5\n6,5,4\n");
+    assert_two_points("z,y,x,note,more\n3.25,2,1.5,a\n6,5,4,b\n");
+}
+
+#[test]
+fn any_number_of_comments_may_come_before_the_rows() {
+    let comments: String = (0..20_000).map(|i| format!("# {i} comment\n")).collect();
+    assert!(comments.len() > 1 << 18);
+    assert_two_points(&format!("{comments}z;y;x\n3.25;2;1.5\n6;5;4\n"));
+    assert_two_points(&format!("\u{feff}{comments}# z;y;x\n3.25;2;1.5\n6;5;4\n"));
+}
+
+#[test]
+fn coordinates_too_small_to_tell_apart_are_refused() {
+    let rows: String = (1..50).map(|i| format!("{i}e-16 {}e-17 {i}\n", i * i)).collect();
+    let error = text(&rows).err().expect("was read");
+    assert!(error.exit_code() == 3 && error.to_string().contains("smaller unit"), "{error}");
+    assert_eq!(text("1e-400 0 2\n1 0 3\n").unwrap().counts.kept, 2);
+}
+
+#[test]
+fn a_last_line_that_may_be_cut_off_gives_a_warning() {
+    let rows: String = (0..20).map(|i| format!("{i} {} {}\n", 3 * i, 1000 + i)).collect();
+    let cut = text(&rows[..rows.len() - 3]).unwrap();
+    assert_eq!(cut.counts.kept, 20);
+    assert!(first_warning(&cut).contains("may be cut off"), "{}", first_warning(&cut));
+    assert_eq!(first_warning(&text(rows.trim_end()).unwrap()), "");
 }
 
 #[test]

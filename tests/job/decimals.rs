@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use serde_json::Value;
 
-use crate::program::{Job, number};
+use crate::program::{Job, gdt_batch, number};
 use crate::random::Random;
 
 /// Coordinates in UTM with this many decimals, over a square of `size` metres.
@@ -161,6 +161,64 @@ fn outliers_of_a_long_text_are_told_wherever_they_are() {
 }
 
 #[test]
+fn a_terrestrial_scan_has_no_outliers() {
+    let mut random = Random(11);
+    let mut scan = |decimals: usize| -> String {
+        let row = |()| {
+            // As dense as 1/r^2 along the ground, up to 900 m.
+            let (r, angle) = (1.5 / (1.0 - random.unit() * (1.0 - 1.5 / 900.0)), random.unit() * std::f64::consts::TAU);
+            let [x, y] = [565_000.0 + r * f64::cos(angle), 5_933_000.0 + r * f64::sin(angle)];
+            format!("{x:.decimals$} {y:.decimals$} {:.decimals$}\n", 3.0 * random.unit())
+        };
+        (0..5000).map(|_| ()).map(row).collect()
+    };
+    let text = Text::new(&format!("{}565880.5 5933000.5 1\n", scan(8)));
+    let (report, _) = run(&text.job());
+    assert_eq!((number(&report["points"]["kept"]), steps(&report)[0]), (5001, "0.001"), "{report}");
+}
+
+#[test]
+fn a_row_of_a_few_is_no_outlier_unless_it_spoils_the_rest() {
+    let few = "0.001 0 0\n10.002 0 1\n5 10 1.003\n5 5 1\n2 8 1\n3 3 3\n";
+    let text = Text::new(&format!("{few}100000 500 3\n"));
+    let (report, _) = run(&text.job());
+    assert_eq!(number(&report["points"]["kept"]), 7);
+    let text = Text::new(&format!("{few}9e14 500000 3\n"));
+    text.job().run().refused(3, &["1 of 7 records", "far from all other rows"]);
+}
+
+#[test]
+fn what_to_do_about_outliers_is_said_once() {
+    let text = Text::new(&format!("{}{}", centimetres(300, plain), "0,0,0\n".repeat(5)));
+    let said = text.job().run();
+    assert_eq!(said.code, 3, "{}", said.err);
+    assert_eq!(said.err.matches("far from all other rows").count(), 5, "{}", said.err);
+    assert_eq!(said.err.matches("[input] bounds or").count(), 1, "{}", said.err);
+}
+
+#[test]
+fn bounds_hold_for_the_numbers_in_the_text() {
+    let clean = centimetres(300, plain);
+    let bounds = "bounds = [565000.0, 5933000.0, 565150.0, 5934000.0]";
+    let (before, digest) = run(&Text::new(&clean).job().with("input", bounds));
+    let text = Text::new(&format!("{clean}565150.004,5933050.00,1.00\n564999.996,5933050.00,1.00\n"));
+    let job = text.job().with("input", bounds);
+    let (report, found) = run(&job);
+    assert_eq!(report["points"]["kept"], before["points"]["kept"]);
+    assert_eq!(number(&report["points"]["out_of_bounds"]), number(&before["points"]["out_of_bounds"]) + 2);
+    assert_eq!(found, digest);
+    let output = job.out();
+    let args = ["verify", output.to_str().unwrap(), "--input", text.path.to_str().unwrap()];
+    gdt_batch(job.folder(), &args).succeeded();
+}
+
+#[test]
+fn texts_have_no_headers_that_say_where_they_lie() {
+    let said = Text::new(&centimetres(50, plain)).job().with("input", "bounds = [0.0, 0.0, 1.0, 1.0]").run();
+    assert!(said.err.contains("the inputs lie in [565") && !said.err.contains("header"), "{}", said.err);
+}
+
+#[test]
 fn two_places_are_no_outliers() {
     let far: String = centimetres(300, |value| format!("{:.2}", value + 4e6)).split_once('\n').unwrap().1.to_owned();
     let text = Text::new(&(centimetres(300, plain) + &far));
@@ -236,9 +294,16 @@ fn degrees_are_refused_by_the_names_of_columns() {
         text.job().run().refused(2, &["cloud.csv", "degrees", "projected CRS", "unit"]);
         run(&text.job().with("input", "unit = \"metre\""));
     }
+    // A few rows that are mistakes do not make metres of degrees, wherever they lie.
+    for stray in ["565000,5933000,1", "-9999,-9999,-9999", "9,91,1"] {
+        let text = Text::new(&format!("lon,lat,h\n{rows}{stray}\n"));
+        text.job().run().refused(2, &["degrees"]);
+        text.job().with("input", "bounds = [9.0, 48.0, 10.0, 49.0]").run().refused(2, &["degrees"]);
+    }
     run(&Text::new(&format!("x,y,z\n{rows}")).job());
     let metres = centimetres(50, plain).replace("x,y,z", "lon,lat,z");
     run(&Text::new(&metres).job());
+    run(&Text::new(&format!("{metres}0,0,0\n")).job().with("input", "resolution = 1\nresolution_z = 1"));
 }
 
 #[test]

@@ -73,6 +73,17 @@ impl<'a> PointFilter<'a> {
         }
     }
 
+    /// Counts a record of this class that lies outside the job's bounds, though its lattice point may not.
+    #[inline]
+    pub(crate) fn push_out_of_bounds(&mut self, class: u8) {
+        let count = if self.rules.classes[class as usize] {
+            &mut self.counts.out_of_bounds
+        } else {
+            &mut self.counts.other_class
+        };
+        *count += 1;
+    }
+
     /// Counts a record that lies too far from all others as malformed, unless the job does not want it anyway. `what` describes it.
     #[cold]
     pub(crate) fn push_outlier(&mut self, record: &PointRecord, what: impl FnOnce() -> String) {

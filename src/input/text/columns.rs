@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::input::text::decimal_comma;
+use crate::input::text::decimal_comma::{self, CommaUse, Names};
 use crate::input::text::delimiter::{CANDIDATES, Delimiter};
 use crate::input::text::header::{self, names_in_comments, separator_line};
 use crate::input::text::lines::is_skipped;
@@ -18,8 +18,14 @@ use crate::{Error, Result, Warnings};
 /// The columns of a text that nothing names.
 const COORDINATES: [ColumnRole; 3] = [ColumnRole::Coordinate(0), ColumnRole::Coordinate(1), ColumnRole::Coordinate(2)];
 
-const DECIMAL_COMMA: &str = "has commas both between columns and before decimals, as in 565000,25,5933000,50; write it again with points \
-                             before decimals or with semicolons between columns, or name its columns with `columns` under [input.csv]";
+const DECIMAL_COMMA: &str = "has commas both between columns and before decimals, as in 565000,25,5933000,50: all its columns are whole \
+                             numbers; write it again with points before decimals or with semicolons between columns, or name its \
+                             columns with `columns` under [input.csv]";
+
+const UNCLEAR_COMMA: &str = "has only whole numbers with commas between them, more than three in a row, and no names: the commas may also \
+                             stand before decimals, as in 565000,25,5933000,50; if they do not, name its columns with `columns` under \
+                             [input.csv], for example [\"x\", \"y\", \"z\", \"class\"], and if they do, write it again with points before \
+                             decimals or with semicolons between columns";
 
 /// How the lines of a text are to be read.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -94,8 +100,8 @@ impl Columns {
         };
         let roles = used_roles(found.as_ref(), colors);
         let delimiter = row_delimiter(&candidates, &roles, data);
-        if found.is_none() && decimal_comma::is_used(delimiter, data) {
-            return Err(Error::input(path, DECIMAL_COMMA));
+        if options.columns.is_none() {
+            refuse_decimal_comma(path, delimiter, found.as_ref(), data)?;
         }
         let columns_of_last = texts.last().map_or(0, |row| delimiter.fields(row).len());
         warnings.extend(names_warning(found.as_ref(), columns_of_last));
@@ -147,7 +153,21 @@ fn names_warning(found: Option<&NamedColumns>, columns: usize) -> Option<String>
     Some(warning.to_string())
 }
 
-fn comments(options: &TextOptions) -> Result<Vec<String>> {
+fn refuse_decimal_comma(path: &Path, delimiter: Delimiter, found: Option<&NamedColumns>, rows: &[&[u8]]) -> Result<()> {
+    let names = match found {
+        None => Names::None,
+        Some(found) if found.roles.starts_with(&COORDINATES) => Names::CoordinatesFirst,
+        Some(_) => Names::Others,
+    };
+    match decimal_comma::second_use(delimiter, names, rows) {
+        Some(CommaUse::Decimals) => Err(Error::input(path, DECIMAL_COMMA)),
+        Some(CommaUse::Unclear) => Err(Error::input(path, UNCLEAR_COMMA)),
+        None => Ok(()),
+    }
+}
+
+/// Returns what begins the lines that are skipped.
+pub(crate) fn comments(options: &TextOptions) -> Result<Vec<String>> {
     match &options.comment {
         Some(comment) if comment.is_empty() => Ok(Vec::new()),
         Some(comment) if comment.starts_with(|c: char| c.is_ascii_digit()) => Err(Error::Config(format!(

@@ -5,51 +5,268 @@ use crate::input::text::delimiter::Delimiter;
 /// Heights and depths of the Earth have fewer digits before their point.
 const DIGITS_OF_NO_HEIGHT: usize = 6;
 
-/// Decimals have at most as many digits if a number that follows is to be told from them.
-const FEW_DIGITS: usize = 3;
+/// Decimals have at most as many digits if they are to be told from coordinates.
+const MOST_DECIMALS: usize = 4;
 
-/// Returns whether the commas of these rows without names stand both between columns and before decimals. Then all columns are
-/// whole, and every second one holds decimals: it begins with zeros, or the third column, which would be z, is a number that no
-/// height is.
-pub(crate) fn is_used(delimiter: Delimiter, rows: &[&[u8]]) -> bool {
-    if delimiter != Delimiter::Byte(b',') || rows.is_empty() {
+/// Of fewer rows nobody can say what is common to them by chance.
+const LEAST_ROWS: usize = 8;
+
+/// One row in so many may be broken.
+const BROKEN: usize = 10;
+
+/// One row in so many has another number of columns because it is broken, not because its decimals were zeros.
+const RAGGED: usize = 50;
+
+/// Rows without names and with more columns hold more than coordinates with decimals and a number.
+const MOST_COLUMNS: usize = 7;
+
+/// Which of x, y and z have decimals, as bits. x and y are written alike, so both have them or neither.
+const PATTERNS: [usize; 3] = [0b011, Z_ALONE, 0b111];
+
+/// Only z has decimals.
+const Z_ALONE: usize = 0b100;
+
+/// What the commas of rows stand for, if not only between columns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum CommaUse {
+    /// Before decimals as well.
+    Decimals,
+    /// Nobody can tell.
+    Unclear,
+}
+
+/// What is known of the columns without looking at the rows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Names {
+    /// Nothing.
+    None,
+    /// They begin with x, y, z.
+    CoordinatesFirst,
+    /// They begin with something else.
+    Others,
+}
+
+/// The columns of a row that are all whole numbers.
+type WholeRow<'a> = Vec<&'a [u8]>;
+
+/// Returns what the commas of these rows stand for; `None` if they stand between columns. Decimals after a comma are whole numbers in a
+/// column of their own, so one number with a point in it shows that the commas stand between columns.
+pub(crate) fn second_use(delimiter: Delimiter, names: Names, rows: &[&[u8]]) -> Option<CommaUse> {
+    if delimiter != Delimiter::Byte(b',') {
+        return None;
+    }
+    let all: Vec<Vec<&[u8]>> = rows.iter().map(|row| delimiter.fields(row)).collect();
+    let looked_at = |row: &Vec<&[u8]>| row.len().min(MOST_COLUMNS - 1);
+    let has_point = |row: &Vec<&[u8]>| row[..looked_at(row)].iter().any(|field| is_pointed(field));
+    if all.iter().any(has_point) {
+        return None;
+    }
+    let count = all.len();
+    let is_whole_row = |row: &Vec<&[u8]>| row.len() >= 3 && row[..looked_at(row)].iter().all(|field| is_whole(field));
+    let whole: Vec<WholeRow> = all.into_iter().filter(is_whole_row).collect();
+    if whole.is_empty() || (count - whole.len()) * BROKEN > count {
+        return None;
+    }
+    let first = names != Names::Others;
+    if first && (have_no_heights(&whole) || have_zeros(&whole, names)) || are_ragged(&whole) {
+        return Some(CommaUse::Decimals);
+    }
+    (names == Names::None && may_be_decimals(&whole)).then_some(CommaUse::Unclear)
+}
+
+fn is_pointed(field: &[u8]) -> bool {
+    let digits = |byte: &u8| byte.is_ascii_digit() || matches!(byte, b'.' | b'-' | b'+');
+    field.len() > 1 && field.contains(&b'.') && field.iter().all(digits)
+}
+
+fn is_whole(field: &[u8]) -> bool {
+    let digits = field.strip_prefix(b"-").unwrap_or(field);
+    !digits.is_empty() && digits.iter().all(u8::is_ascii_digit)
+}
+
+fn digits(field: &[u8]) -> usize {
+    field.strip_prefix(b"-").unwrap_or(field).len()
+}
+
+fn is_padded(field: &[u8]) -> bool {
+    field.len() > 1 && field[0] == b'0'
+}
+
+/// Returns whether the third column is a number that no height is, and the second as short as decimals: no terrain is that high
+/// and that narrow.
+fn have_no_heights(rows: &[WholeRow]) -> bool {
+    let no_height = |row: &&WholeRow| {
+        row.len() > 3 && digits(row[2]) >= DIGITS_OF_NO_HEIGHT && digits(row[1]) <= MOST_DECIMALS && row[1][0] != b'-'
+    };
+    rows.iter().filter(no_height).count() * 2 > rows.len()
+}
+
+/// Returns whether numbers in the columns of decimals begin with zeros, and none in those before them: who pads coordinates pads
+/// all of them.
+fn have_zeros(rows: &[WholeRow], names: Names) -> bool {
+    // Named columns after z hold what they say, such as colours with three digits each.
+    let (columns, least): (&[usize], usize) =
+        if names == Names::CoordinatesFirst { (&[1], 4) } else { (&[1, 3, 5], 6) };
+    let padded =
+        |columns: &[usize]| rows.iter().any(|row| columns.iter().any(|&c| row.get(c).is_some_and(|f| is_padded(f))));
+    let signed = |row: &WholeRow| columns.iter().any(|&column| row[column][0] == b'-');
+    let fits = rows.iter().all(|row| row.len() >= least && !signed(row));
+    fits && padded(columns) && !padded(&[0, 2, 4])
+}
+
+/// Returns whether rows differ in the number of their columns: writers of tables leave no column out, but programs leave out decimals
+/// that are zeros, and the comma before them.
+fn are_ragged(rows: &[WholeRow]) -> bool {
+    let usual = usual_length(rows);
+    let others = rows.iter().filter(|row| row.len() != usual).count();
+    rows.len() >= LEAST_ROWS && others >= 2 && others * RAGGED >= rows.len()
+}
+
+fn usual_length(rows: &[WholeRow]) -> usize {
+    let with_length = |length: usize| rows.iter().filter(|row| row.len() == length).count();
+    // No more columns matter to any rule here.
+    (3..=2 * MOST_COLUMNS).max_by_key(|&length| with_length(length)).unwrap_or(3)
+}
+
+/// Returns whether columns that nothing names can be read as coordinates with decimals, with or without the number of the row before
+/// them.
+fn may_be_decimals(rows: &[WholeRow]) -> bool {
+    let usual = usual_length(rows);
+    let rows: Vec<&WholeRow> = rows.iter().filter(|row| row.len() == usual).collect();
+    if rows.len() < LEAST_ROWS || !(4..=MOST_COLUMNS).contains(&usual) {
         return false;
     }
-    let rows: Vec<Vec<&[u8]>> = rows.iter().map(|row| delimiter.fields(row)).collect();
-    let is_whole = |field: &&[u8]| {
-        let digits = field.strip_prefix(b"-").unwrap_or(field);
-        !digits.is_empty() && digits.iter().all(u8::is_ascii_digit)
-    };
-    let looks_doubled = |row: &Vec<&[u8]>| {
-        let no_sign = |column: usize| row[column][0] != b'-';
-        row.len() >= 6 && row[..6].iter().all(is_whole) && [1, 3, 5].into_iter().all(no_sign)
-    };
-    let has_zeros =
-        |row: &Vec<&[u8]>| [1, 3, 5].into_iter().any(|column| row[column].len() > 1 && row[column][0] == b'0');
-    let no_height = |row: &Vec<&[u8]>| {
-        let digits = |column: usize| row[column].strip_prefix(b"-").unwrap_or(row[column]).len();
-        digits(2) >= DIGITS_OF_NO_HEIGHT && digits(1) <= FEW_DIGITS && digits(3) <= FEW_DIGITS
-    };
-    rows.iter().all(looks_doubled) && (rows.iter().any(has_zeros) || rows.iter().all(no_height))
+    let starts = if are_numbered(&rows) { 0..2 } else { 0..1 };
+    starts.into_iter().any(|start| PATTERNS.iter().any(|pattern| fits_pattern(&rows, start, *pattern)))
+}
+
+/// Returns whether the first column counts the rows.
+fn are_numbered(rows: &[&WholeRow]) -> bool {
+    let number = |row: &&WholeRow| std::str::from_utf8(row[0]).ok()?.parse::<i64>().ok();
+    let numbers: Option<Vec<i64>> = rows.iter().map(number).collect();
+    numbers.is_some_and(|numbers| numbers.windows(2).all(|pair| pair[0].checked_add(1) == Some(pair[1])))
+}
+
+/// Returns whether the columns from `start` on can be x, y and z if those have decimals whose bits are set in `pattern`.
+fn fits_pattern(rows: &[&WholeRow], start: usize, pattern: usize) -> bool {
+    let mut column = start;
+    for axis in 0..3 {
+        column += 1;
+        if pattern & (1 << axis) == 0 {
+            continue;
+        }
+        // If z alone has decimals, they differ from row to row: a column that does not holds something else, such as a class.
+        let alone = pattern == Z_ALONE;
+        if column >= rows[0].len() || !are_decimals(rows, column) || (alone && are_same(rows, column)) {
+            return false;
+        }
+        column += 1;
+    }
+    column <= rows[0].len()
+}
+
+fn are_same(rows: &[&WholeRow], column: usize) -> bool {
+    rows.iter().all(|row| row[column] == rows[0][column])
+}
+
+/// Returns whether a column looks like decimals: few digits without a sign, and either as many in all rows or none with a zero at the
+/// end. Most columns with anything else fail both.
+fn are_decimals(rows: &[&WholeRow], column: usize) -> bool {
+    let fields = || rows.iter().map(|row| row[column]);
+    let short = fields().all(|field| field[0] != b'-' && field.len() <= MOST_DECIMALS);
+    let fixed = fields().all(|field| field.len() == rows[0][column].len());
+    let trimmed = fields().all(|field| field == b"0" || !field.ends_with(b"0"));
+    short && (fixed || trimmed)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn used(text: &str) -> bool {
+    fn used(names: Names, text: &str) -> Option<CommaUse> {
         let rows: Vec<&[u8]> = text.lines().map(str::as_bytes).collect();
-        is_used(Delimiter::Byte(b','), &rows)
+        second_use(Delimiter::Byte(b','), names, &rows)
+    }
+
+    fn table(rows: usize, row: impl Fn(usize) -> String) -> String {
+        (0..rows).map(|i| row(i) + "\n").collect()
     }
 
     #[test]
     fn commas_with_two_meanings_are_seen() {
-        assert!(used("565000,25,5933000,50,12,1\n565001,25,5933001,50,12,3"));
-        assert!(used("12,05,50,50,12,10\n12,15,50,55,13,10"));
-        assert!(used("565000,25,5933000,50,12,1,255,0,0"));
-        assert!(!used("565000,5933000,12,255,128,3\n565001,5933001,13,255,128,3"));
-        assert!(!used("12,5,50,5,12,1"));
-        assert!(!used("565000,25,5933000.5,50,12,1"));
-        assert!(!used("1,2,3"));
+        let decimals = Some(CommaUse::Decimals);
+        assert_eq!(used(Names::None, "565000,25,5933000,50,12,1\n565001,25,5933001,50,12,3"), decimals);
+        assert_eq!(used(Names::None, "12,05,50,50,12,10\n12,15,50,55,13,10"), decimals);
+        assert_eq!(used(Names::None, "565000,25,5933000,50,12,1,255,0,0"), decimals);
+        assert_eq!(used(Names::None, "565000,5933000,12,255,128,3\n565001,5933001,13,255,128,3"), None);
+        assert_eq!(used(Names::None, "12,5,50,5,12,1"), None);
+        assert_eq!(used(Names::None, "565000,25,5933000.5,50,12,1"), None);
+        assert_eq!(used(Names::None, "1,2,3"), None);
+    }
+
+    #[test]
+    fn decimal_commas_are_seen_under_names_in_ragged_rows_and_with_whole_heights() {
+        let decimals = Some(CommaUse::Decimals);
+        let six =
+            |i: usize| format!("{},{},{},{},{},{}", 565_000 + i, i % 9, 5_933_000 + 7 * i, 50 + i % 40, 12, i % 10);
+        let five = |i: usize| format!("{},{},{},{},{}", 565_000 + i, 10 + i % 80, 5_933_000 + 7 * i, i % 90, 12);
+        for names in [Names::None, Names::CoordinatesFirst] {
+            assert_eq!(used(names, &table(50, six)), decimals);
+            assert_eq!(used(names, &table(50, |i| if i == 10 { five(i) } else { six(i) })), decimals);
+            assert_eq!(used(names, &table(50, five)), decimals);
+        }
+        let small = |i: usize| format!("{},{:02},{},{},{},{}", i, i % 90, i % 7, 11 + i % 80, i % 5, 12);
+        assert_eq!(used(Names::CoordinatesFirst, &table(50, small)), decimals);
+        // Decimals of zeros are left out.
+        let dropped = |i: usize| {
+            if i.is_multiple_of(10) { format!("{i},{},5,3", 2 * i) } else { format!("{i},{},{i},5,3,1", i % 10) }
+        };
+        for names in [Names::None, Names::CoordinatesFirst, Names::Others] {
+            assert_eq!(used(names, &table(50, dropped)), decimals);
+        }
+    }
+
+    #[test]
+    fn whole_columns_that_may_be_decimals_are_unclear_unless_they_have_names() {
+        let numbered = |i: usize| {
+            format!("{i},{},{},{},{},{},5", 565_000 + 3 * i, 10 + i % 90, 5_933_000 + i, 10 + 7 * i % 90, i % 9)
+        };
+        let heights = |i: usize| format!("{},{},12,{}", 565_000 + i, 5_933_000 + 7 * i, 10 + i % 90);
+        let local = |i: usize| {
+            format!("{},{},{},{},{},{}", 100 + i, i % 10, 200 + 7 * i % 100, i * 3 % 10, 7 + i % 9, i * 7 % 10)
+        };
+        let centres = |i: usize| format!("{},5,{},5,{}", i % 9, i / 9, 3 + i % 4);
+        for text in [table(50, numbered), table(50, heights), table(50, local), table(50, centres)] {
+            assert_eq!(used(Names::None, &text), Some(CommaUse::Unclear), "{text}");
+            assert_eq!(used(Names::CoordinatesFirst, &text), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn tables_of_whole_numbers_are_tables() {
+        let colored = |i: usize| {
+            format!("{},{},{},{},{},{}", 565_000 + i, 5_933_000 + 7 * i, 12 + i % 90, i % 256, 5 * i % 256, 70)
+        };
+        let intense =
+            |i: usize| format!("{},{},{},{}", 5_650_000 + 13 * i, 59_330_000 + 7 * i, 1_200 + i, 17 * i % 3000);
+        let classed = |i: usize| format!("{},{},{},2", 565_000 + i, 5_933_000 + 7 * i, 12 + i % 90);
+        let local = |i: usize| format!("{},{},{},{}", 40 * i, 70 * i % 900, i % 90, 3 * i % 256);
+        let padded = |i: usize| format!("{:05},{:05},{:05},{:03},000,012", 3 * i, 7 * i % 1000, i % 90, i % 256);
+        let empty = |i: usize| format!("{i},{},{},{}", 3 * i, i % 9, if i.is_multiple_of(2) { "" } else { "5" });
+        let triples = |i: usize| format!("{i},{},{}", 7 * i % 50, i % 4);
+        for text in [
+            table(300, colored),
+            table(300, intense),
+            table(300, classed),
+            table(300, local),
+            table(300, empty),
+            table(300, triples),
+            table(300, |i| if i == 9 { "7,8,9,10,11".into() } else { triples(i) }),
+            table(300, |i| if i == 9 { "7,8".into() } else { triples(i) }),
+        ] {
+            assert_eq!(used(Names::None, &text), None, "{}", &text[..60]);
+            assert_eq!(used(Names::CoordinatesFirst, &text), None, "{}", &text[..60]);
+        }
+        assert_eq!(used(Names::CoordinatesFirst, &table(300, padded)), None);
     }
 }

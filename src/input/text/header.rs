@@ -3,6 +3,10 @@
 use crate::input::text::delimiter::{CANDIDATES, Delimiter};
 use crate::input::text::lines::{is_skipped, shown};
 use crate::input::text::names::{NamedColumns, NamesError, named_columns};
+use crate::input::text::role::ColumnRole;
+
+/// The number of rows whose columns are compared with the names in a header.
+const ROWS_FOR_NAMES: usize = 20;
 
 /// What is wrong with a line that should name the columns.
 #[derive(Debug, thiserror::Error)]
@@ -14,6 +18,10 @@ pub(crate) enum HeaderLineError {
     NoNames,
     #[error("{0}; name the columns with `columns` under [input.csv]")]
     Names(#[from] NamesError),
+    #[error(
+        "looks like names of {names} columns, and the rows have {rows}; name the columns with `columns` under [input.csv]"
+    )]
+    OtherCount { names: usize, rows: usize },
 }
 
 /// The lines before the first row.
@@ -41,7 +49,9 @@ pub(crate) fn find(rows: &[&[u8]], candidates: &[Delimiter], wanted: Option<bool
     }
     // Without any row, the first line is what the message is about.
     let lines = if before == rows.len() { &rows[..1] } else { &rows[..before] };
-    let found = lines.iter().enumerate().rev().find_map(|(at, line)| Some((at, header_names(candidates, line).ok()?)));
+    let data = &rows[before..];
+    let names = |line: &[u8]| header_names(candidates, line, data);
+    let found = lines.iter().enumerate().rev().find_map(|(at, line)| Some((at, names(line).ok()?)));
     // After the names there may be units. A line with a number in it is a row that is broken.
     let is_about_rows = |line: &&&[u8]| candidates.iter().all(|delimiter| delimiter.numbers(line) == 0);
     let after = |at: usize| at + 1 + lines[at + 1..].iter().take_while(is_about_rows).count();
@@ -50,7 +60,7 @@ pub(crate) fn find(rows: &[&[u8]], candidates: &[Delimiter], wanted: Option<bool
         None if named => Header { lines: after(0), names: None, count: is_count(lines[0]) },
         None if is_count(lines[0]) => Header { lines: 1, names: None, count: true },
         None => {
-            let error = header_names(candidates, lines[0]).err().map(|error| error.to_string()).unwrap_or_default();
+            let error = names(lines[0]).err().map(|error| error.to_string()).unwrap_or_default();
             Header { lines: 1, names: Some(Err(format!("the first line, {}, {error}", shown(lines[0])))), count: false }
         }
     }
@@ -69,7 +79,7 @@ pub(crate) fn names_in_comments(
         let comment = comments.iter().find(|comment| line.starts_with(comment.as_bytes()))?;
         let text = &line[comment.len()..];
         let marks = text.iter().take_while(|byte| matches!(byte, b'#' | b'/')).count();
-        let names = header_names(candidates, text[marks..].trim_ascii()).ok()?;
+        let names = header_names(candidates, text[marks..].trim_ascii(), &[]).ok()?;
         let fits = |delimiter: &Delimiter| delimiter.numbers(row) >= 3 && delimiter.fields(row).len() == names.count;
         candidates.iter().any(fits).then_some(names)
     };
@@ -91,18 +101,46 @@ fn is_count(line: &[u8]) -> bool {
     !line.is_empty() && line.iter().all(u8::is_ascii_digit)
 }
 
-/// Returns what `line` names under the first delimiter that gives x, y and z, or what is wrong under the delimiter that gives most
-/// columns. All delimiters are tried, the `candidates` for the rows first: a header may use another one.
-fn header_names(candidates: &[Delimiter], line: &[u8]) -> Result<NamedColumns, HeaderLineError> {
+/// Returns what `line` names under the first delimiter that gives x, y and z and fits `rows`, or what is wrong under the delimiter that
+/// gives most columns. All delimiters are tried, the `candidates` for the rows first: a header may use another one.
+fn header_names(candidates: &[Delimiter], line: &[u8], rows: &[&[u8]]) -> Result<NamedColumns, HeaderLineError> {
     if !line.iter().any(|byte| byte.is_ascii_alphabetic()) {
         return Err(HeaderLineError::NoNames);
     }
     let others = CANDIDATES.iter().filter(|other| !candidates.contains(other));
-    let candidates: Vec<Delimiter> = candidates.iter().chain(others).copied().collect();
+    let all: Vec<Delimiter> = candidates.iter().chain(others).copied().collect();
     let split = |delimiter: &Delimiter| named_columns(delimiter.fields(line).into_iter());
-    if let Some(found) = candidates.iter().find_map(|delimiter| split(delimiter).ok()) {
-        return Ok(found);
+    let found: Vec<(Delimiter, NamedColumns)> =
+        all.iter().filter_map(|delimiter| Some((*delimiter, split(delimiter).ok()?))).collect();
+    if let Some((_, names)) = found.iter().find(|(delimiter, names)| fits_rows(*delimiter, names, candidates, rows)) {
+        return Ok(names.clone());
     }
-    let most = candidates.iter().max_by_key(|delimiter| delimiter.fields(line).len());
+    if let Some((_, names)) = found.first() {
+        let columns = |row: &&[u8]| candidates.iter().find(|d| d.numbers(row) >= 3).map(|d| columns_of(*d, row));
+        let rows = rows.first().and_then(columns).unwrap_or(0);
+        return Err(HeaderLineError::OtherCount { names: names.count, rows });
+    }
+    let most = all.iter().max_by_key(|delimiter| delimiter.fields(line).len());
     Ok(split(most.unwrap_or(&Delimiter::Blank))?)
+}
+
+/// Returns whether names that this delimiter parts can be those of the columns of `rows`: as many, or with the delimiter of the rows and
+/// x, y and z among their columns. A title such as "My x y z file" names some by chance.
+fn fits_rows(delimiter: Delimiter, names: &NamedColumns, candidates: &[Delimiter], rows: &[&[u8]]) -> bool {
+    let coordinates = |role: &ColumnRole| matches!(role, ColumnRole::Coordinate(_));
+    let needed = names.roles.iter().rposition(coordinates).map_or(0, |last| last + 1);
+    let fits = |(own, row): (Delimiter, &[u8])| {
+        let columns = columns_of(own, row);
+        columns == names.count || (own == delimiter && columns >= needed)
+    };
+    let rows = rows.iter().take(ROWS_FOR_NAMES);
+    let mut readings = rows.flat_map(|row| candidates.iter().map(move |own| (*own, *row)));
+    let mut with_numbers = readings.by_ref().filter(|(own, row)| own.numbers(row) >= 3).peekable();
+    with_numbers.peek().is_none() || with_numbers.any(fits)
+}
+
+/// Returns the number of columns, without an empty last one.
+fn columns_of(delimiter: Delimiter, row: &[u8]) -> usize {
+    let fields = delimiter.fields(row);
+    fields.len() - fields.last().is_some_and(|last| last.is_empty()) as usize
 }

@@ -25,14 +25,24 @@ const LEAST_ROWS: usize = 5;
 /// One row in so many may be an outlier. If there are more, they are a part of the terrain.
 const RARE: u64 = 50;
 
-/// Returns whether so few of `rows` are outliers that they are mistakes.
-pub(crate) fn are_rare(outliers: u64, rows: u64) -> bool {
-    outliers > 0 && outliers <= (rows / RARE).max(1)
+/// Returns whether so few of `rows` are outliers that they are mistakes. Of a few rows none is, unless `even_among_few`: then one may be.
+pub(crate) fn are_rare(outliers: u64, rows: u64, even_among_few: bool) -> bool {
+    outliers > 0 && outliers <= (rows / RARE).max(even_among_few as u64)
 }
 
-/// Returns the box outside which a row is an outlier, by a sample of the wanted rows in these chunks, given as byte ranges; `None` if
+/// Returns the box outside which a row is an outlier, given the box of the [middle](middle_box) of the rows; `None` if that is a point.
+pub(crate) fn plausible_box(middle: &RowBox) -> Option<RowBox> {
+    // A strip or a plane is narrow on one axis, which says nothing about how far its rows may lie apart there.
+    let size = |axis: usize| middle.max[axis] - middle.min[axis];
+    let widest = size(0).max(size(1)).max(size(2));
+    let margin = FAR * widest;
+    (margin > 0.0)
+        .then(|| RowBox { min: middle.min.map(|low| low - margin), max: middle.max.map(|high| high + margin) })
+}
+
+/// Returns the box of nine in ten rows on each axis, by a sample of the wanted rows in these chunks, given as byte ranges; `None` if
 /// there are too few rows to tell.
-pub(crate) fn plausible_box(
+pub(crate) fn middle_box(
     file: &RandomAccessFile,
     columns: &Columns,
     first: u64,
@@ -64,17 +74,10 @@ pub(crate) fn plausible_box(
     if values[0].len() < LEAST_ROWS {
         return Ok(None);
     }
-    let mut plausible = RowBox::empty();
+    let mut middle = RowBox::empty();
     for (axis, values) in values.iter_mut().enumerate() {
         values.sort_unstable_by(f64::total_cmp);
-        let (low, high) = (values[cut], values[values.len() - 1 - cut]);
-        plausible.min[axis] = low;
-        plausible.max[axis] = high;
+        (middle.min[axis], middle.max[axis]) = (values[cut], values[values.len() - 1 - cut]);
     }
-    // A strip or a plane is narrow on one axis, which says nothing about how far its rows may lie apart there.
-    let size = |axis: usize| plausible.max[axis] - plausible.min[axis];
-    let widest = size(0).max(size(1)).max(size(2));
-    let margin = FAR * widest;
-    Ok((margin > 0.0)
-        .then(|| RowBox { min: plausible.min.map(|low| low - margin), max: plausible.max.map(|high| high + margin) }))
+    Ok(Some(middle))
 }

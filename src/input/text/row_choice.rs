@@ -38,10 +38,13 @@ impl RowChoice {
 
     /// Returns whether the row with these x, y, z and this class is wanted.
     pub(crate) fn wants(&self, numbers: &[Number; 3], class: u8) -> bool {
-        let inside = |[x_min, y_min, x_max, y_max]: [f64; 4]| {
-            let (x, y) = (numbers[0].value(), numbers[1].value());
-            x >= x_min && x <= x_max && y >= y_min && y <= y_max
-        };
-        self.classes[class as usize] && self.bounds.is_none_or(inside)
+        self.classes[class as usize] && self.bounds.is_none_or(|bounds| is_within(bounds, numbers))
     }
+}
+
+/// Returns whether x and y lie within these bounds, borders included.
+#[inline]
+pub(crate) fn is_within([x_min, y_min, x_max, y_max]: [f64; 4], numbers: &[Number; 3]) -> bool {
+    let (x, y) = (numbers[0].value(), numbers[1].value());
+    x >= x_min && x <= x_max && y >= y_min && y <= y_max
 }

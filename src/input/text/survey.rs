@@ -24,6 +24,8 @@ pub(crate) struct Survey {
     pub(crate) malformed: u64,
     /// What the rows hold that the job wants.
     pub(crate) wanted: Findings,
+    /// The number of rows that the job wants, but that lie outside the box in which it looks.
+    pub(crate) outliers: u64,
     /// The box of the other rows.
     pub(crate) others: RowBox,
 }
@@ -142,7 +144,7 @@ pub(crate) struct Wanted<'a> {
 impl Survey {
     /// Returns the survey of no line.
     pub(crate) fn empty() -> Survey {
-        Survey { lines: 0, rows: 0, malformed: 0, wanted: Findings::none(), others: RowBox::empty() }
+        Survey { lines: 0, rows: 0, malformed: 0, wanted: Findings::none(), outliers: 0, others: RowBox::empty() }
     }
 
     /// Surveys the lines that begin in `range`. The first row of the text is at byte `first`.
@@ -163,6 +165,7 @@ impl Survey {
                     if is_all || wanted.has(&reader) {
                         survey.wanted.see(&reader.numbers);
                     } else {
+                        survey.outliers += wanted.choice.wants(&reader.numbers, reader.class()) as u64;
                         survey.others.see(&reader.numbers);
                     }
                 }
@@ -180,6 +183,7 @@ impl Survey {
         self.rows += other.rows;
         self.malformed += other.malformed;
         self.wanted.add(&other.wanted);
+        self.outliers += other.outliers;
         self.others.add(&other.others);
     }
 

@@ -9,20 +9,20 @@ use serde::{Deserialize, Serialize};
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::points::axis::{AXIS_NAMES, Axis};
 use crate::input::points::filter::PointFilter;
-use crate::input::text::columns::Columns;
-use crate::input::text::cut_off;
+use crate::input::text::columns::{Columns, comments};
+use crate::input::text::cut_off::{self, Ending};
 use crate::input::text::granularity::Granularity;
-use crate::input::text::lines::{LONGEST, TextLine, for_each_line, shown, without_return};
+use crate::input::text::lines::{LONGEST, TextLine, for_each_line, is_skipped, shown, without_return};
 use crate::input::text::noise;
 use crate::input::text::number::{MOST_DECIMALS, Number, POWERS};
 use crate::input::text::options::TextOptions;
-use crate::input::text::outliers::{are_rare, plausible_box};
+use crate::input::text::outliers::{are_rare, middle_box, plausible_box};
 use crate::input::text::role::ColumnRole;
 use crate::input::text::row::RowReader;
 use crate::input::text::row_box::RowBox;
-use crate::input::text::row_choice::RowChoice;
+use crate::input::text::row_choice::{RowChoice, is_within};
 use crate::input::text::survey::{Findings, Survey, Wanted};
-use crate::{Result, Warnings, interrupt};
+use crate::{Error, Result, Warnings, interrupt};
 
 /// The number of bytes of a chunk.
 const CHUNK: u64 = 2 << 20;
@@ -30,8 +30,14 @@ const CHUNK: u64 = 2 << 20;
 /// The number of chunks that show where most rows lie.
 const SAMPLED_CHUNKS: u64 = 16;
 
-/// The number of bytes at the start of a text that show how it is laid out.
+/// The number of bytes at the start of a text that show how it is laid out. If all of them are comments, more are looked at.
 const SAMPLE: u64 = 1 << 17;
+
+/// The most bytes of comments before the first row.
+const MOST_COMMENTS: u64 = 1 << 26;
+
+/// If all x and y are smaller, the decimals that are kept do not tell them apart.
+const TINY: f64 = 1e-12;
 
 /// A text after the first pass over it.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -56,6 +62,10 @@ pub(crate) struct TextTable {
     wanted: WantedRows,
     /// What they hold without outliers, if these are left out.
     without_outliers: Option<WantedRows>,
+    /// The first chunk with outliers: the message about one of them says what to do.
+    first_outlier_in: Option<usize>,
+    /// The bounds that the job wants. They hold for the numbers in the text, before these are rounded to a lattice.
+    bounds: Option<[f64; 4]>,
 }
 
 /// What the lattice has to hold.
@@ -104,7 +114,14 @@ impl TextTable {
     ) -> Result<TextTable> {
         let Layout { columns, first, named_degrees } = detect(file, options, choice.colors, warnings)?;
         let mut rows = first.at..file.size();
-        let cut = cut_off::find(file, &columns, &rows)?;
+        let cut = match cut_off::find(file, &columns, &rows)? {
+            Ending::CutOff(cut) => Some(cut),
+            Ending::Doubtful(warning) => {
+                warnings.push(warning);
+                None
+            }
+            Ending::Whole => None,
+        };
         rows.end = cut.as_ref().map_or(rows.end, |cut| cut.at);
         let surveys = survey(file, &columns, &rows, Wanted { choice, within: None })?;
         let (mut chunks, mut all) = (Vec::with_capacity(surveys.len()), Survey::empty());
@@ -116,15 +133,14 @@ impl TextTable {
         if all.rows > 0 && bounds.is_none() {
             warnings.push("no line has numbers where x, y and z should be");
         }
+        refuse_tiny(file, &all.wanted)?;
         warnings.extend(noise_warning(&all.wanted));
         let cut = cut.map(|cut| (first.line + all.lines, cut.what));
         let RowBox { min, max } = bounds.unwrap_or(RowBox { min: [0.0; 3], max: [0.0; 3] });
         let malformed = all.malformed + cut.is_some() as u64;
         let records = all.rows + cut.is_some() as u64;
-        let degrees =
-            named_degrees && bounds.is_some_and(|bounds| bounds.farthest(0) <= 360.0 && bounds.farthest(1) <= 90.0);
         let wanted = WantedRows::new(&all.wanted);
-        Ok(TextTable {
+        let mut table = TextTable {
             columns,
             rows,
             chunks,
@@ -133,29 +149,52 @@ impl TextTable {
             malformed,
             min,
             max,
-            degrees,
+            degrees: false,
             wanted,
             without_outliers: None,
-        })
+            first_outlier_in: None,
+            bounds: choice.bounds,
+        };
+        table.degrees = named_degrees && table.has_degrees(file, choice)?;
+        Ok(table)
     }
 
-    /// Finds the few rows that lie so far from all others that they are mistakes, and leaves them out: decoding counts them as
-    /// malformed. Returns whether there are any.
-    pub(crate) fn tell_outliers(&mut self, file: &RandomAccessFile, choice: &RowChoice) -> Result<bool> {
-        let Some(bounds) = self.wanted.bounds else { return Ok(false) };
+    /// Returns whether x and y can be degrees. A few rows that are mistakes, and rows that the job does not want, say nothing about it.
+    fn has_degrees(&self, file: &RandomAccessFile, choice: &RowChoice) -> Result<bool> {
+        let Some(wanted) = self.wanted.bounds else { return Ok(false) };
+        if wanted.farthest(0) <= 360.0 && wanted.farthest(1) <= 90.0 {
+            return Ok(true);
+        }
+        let middle = self.middle(file, choice)?.unwrap_or(wanted);
+        Ok((0..2).all(|axis| middle.nearest(axis) <= [360.0, 90.0][axis]))
+    }
+
+    /// Returns the box in which most rows lie; `None` if there are too few rows to tell.
+    fn middle(&self, file: &RandomAccessFile, choice: &RowChoice) -> Result<Option<RowBox>> {
         let chunks = self.chunk_count() as u64;
         let sampled: Vec<Range<u64>> = (0..SAMPLED_CHUNKS.min(chunks))
             .map(|index| chunk_range(&self.rows, index * chunks / SAMPLED_CHUNKS.min(chunks)))
             .collect();
-        let all = Wanted { choice, within: None };
-        let plausible = plausible_box(file, &self.columns, self.rows.start, &sampled, all)?;
+        middle_box(file, &self.columns, self.rows.start, &sampled, Wanted { choice, within: None })
+    }
+
+    /// Finds the few rows that lie so far from all others that they are mistakes, and leaves them out: decoding counts them as
+    /// malformed. `even_among_few` tells whether one row of a few may be one. Returns whether there are any.
+    pub(crate) fn tell_outliers(
+        &mut self,
+        file: &RandomAccessFile,
+        choice: &RowChoice,
+        even_among_few: bool,
+    ) -> Result<bool> {
+        let Some(bounds) = self.wanted.bounds else { return Ok(false) };
+        let plausible = self.middle(file, choice)?.and_then(|middle| plausible_box(&middle));
         let Some(within) = plausible.filter(|plausible| !plausible.holds_box(&bounds)) else { return Ok(false) };
         let surveys = survey(file, &self.columns, &self.rows, Wanted { choice, within: Some(within) })?;
         let mut rest = Survey::empty();
         surveys.iter().for_each(|survey| rest.add(survey));
-        let outliers = self.wanted.rows - rest.wanted.rows;
-        let told = are_rare(outliers, self.wanted.rows);
+        let told = are_rare(rest.outliers, self.wanted.rows, even_among_few);
         self.without_outliers = told.then(|| WantedRows::new(&rest.wanted));
+        self.first_outlier_in = surveys.iter().position(|survey| survey.outliers > 0);
         Ok(told)
     }
 
@@ -214,15 +253,20 @@ impl TextTable {
         let WantedRows { bounds, ref decimals, .. } = *self.held();
         let within = bounds.filter(|_| self.without_outliers.is_some());
         let mut reader = RowReader::new(&self.columns, true);
+        let is_outside = |reader: &RowReader| self.bounds.is_some_and(|bounds| !is_within(bounds, &reader.numbers));
+        let mut explained = self.first_outlier_in != Some(chunk);
         let range = chunk_range(&self.rows, chunk as u64);
         for_each_line(file, self.rows.start, range, |index, line| {
             let number = || first_line + index;
             match line {
                 TextLine::Whole(line) if self.columns.skips(line) => return Ok(()),
                 TextLine::Whole(line) => match (reader.read(line), &within) {
+                    (Ok(()), _) if is_outside(&reader) => filter.push_out_of_bounds(reader.class()),
                     (Ok(()), Some(within)) if !within.holds(&reader.numbers) => {
                         filter.push_outlier(&reader.record(decimals), || {
-                            format!("line {}: {} lies {}", number(), shown(line), far_from(within))
+                            let what = if explained { String::new() } else { far_from(within) };
+                            explained = true;
+                            format!("line {}: {} lies far from all other rows{what}", number(), shown(line))
                         });
                     }
                     (Ok(()), _) => filter.push(row, &reader.record(decimals), || format!("line {}", number()))?,
@@ -242,15 +286,31 @@ impl TextTable {
     }
 }
 
+/// Returns what to say about the first outlier.
 fn far_from(RowBox { min, max }: &RowBox) -> String {
     let axis = |axis: usize| format!("{} from {} to {}", AXIS_NAMES[axis], min[axis], max[axis]);
     format!(
-        "far from all other rows ({}, {}, {}), and no lattice holds both at full precision: leave it out with [input] bounds or \
-         max_malformed_fraction, or set resolution or resolution_z so coarse that it fits",
+        " ({}, {}, {}), and no lattice holds both at full precision: leave such rows out with [input] bounds or \
+         max_malformed_fraction, or set resolution or resolution_z so coarse that they fit",
         axis(0),
         axis(1),
         axis(2)
     )
+}
+
+/// Fails if x and y are so small that they are not told apart by the decimals that are kept.
+fn refuse_tiny(file: &RandomAccessFile, found: &Findings) -> Result<()> {
+    let is_tiny = |bounds: RowBox| bounds.farthest(0) < TINY && bounds.farthest(1) < TINY;
+    if found.noisy == 0 || !found.bounds.some().is_some_and(is_tiny) {
+        return Ok(());
+    }
+    Err(Error::input(
+        file.path(),
+        format!(
+            "has no x or y beyond {TINY:e}, and more decimals than {MOST_DECIMALS} are not read: write it in a smaller unit, such as \
+             micrometres"
+        ),
+    ))
 }
 
 /// Surveys all rows, chunk by chunk.
@@ -290,10 +350,10 @@ struct Layout {
 
 /// Finds out how the text is laid out and where its rows begin.
 fn detect(file: &RandomAccessFile, options: &TextOptions, colors: bool, warnings: &mut Warnings) -> Result<Layout> {
-    let sample = file.bytes(0..file.size().min(SAMPLE))?;
-    let mark = if sample.starts_with(&[0xef, 0xbb, 0xbf]) { 3 } else { 0 };
+    let sample = sample(file, &comments(options)?)?;
+    let mark = mark_length(&sample);
     let mut lines: Vec<&[u8]> = sample[mark..].split(|&byte| byte == b'\n').collect();
-    if lines.len() > 1 && file.size() > SAMPLE {
+    if lines.len() > 1 && file.size() > sample.len() as u64 {
         // The sample may end in the middle of the last line.
         lines.pop();
     }
@@ -308,4 +368,30 @@ fn detect(file: &RandomAccessFile, options: &TextOptions, colors: bool, warnings
 /// Returns the most decimals, up to `decimals`, that leave numbers up to `largest` within 18 digits.
 fn fitting(decimals: u8, largest: f64) -> u8 {
     (0..=decimals.min(MOST_DECIMALS)).rev().find(|&d| largest * POWERS[d as usize] as f64 <= 1e18).unwrap_or(0)
+}
+
+/// Returns the length of the byte order mark that `text` begins with.
+fn mark_length(text: &[u8]) -> usize {
+    if text.starts_with(&[0xef, 0xbb, 0xbf]) { 3 } else { 0 }
+}
+
+/// Returns the start of a text: what comes before the first row, and some rows.
+fn sample(file: &RandomAccessFile, comments: &[String]) -> Result<Vec<u8>> {
+    let mut length = SAMPLE;
+    loop {
+        let sample = file.bytes(0..file.size().min(length))?;
+        let lines = sample[mark_length(&sample)..].split(|&byte| byte == b'\n');
+        let before = lines.take_while(|line| is_skipped(without_return(line), comments));
+        let skipped: u64 = before.map(|line| line.len() as u64 + 1).sum();
+        let wanted = skipped + SAMPLE;
+        if wanted <= length || sample.len() as u64 == file.size() {
+            return Ok(sample);
+        }
+        if length >= MOST_COMMENTS {
+            let what = format!("has no line with numbers in its first {} MiB", MOST_COMMENTS >> 20);
+            return Err(Error::input(file.path(), what));
+        }
+        // A line of comment may go on after the sample.
+        length = wanted.max(length * 2);
+    }
 }

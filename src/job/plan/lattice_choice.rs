@@ -69,26 +69,52 @@ struct ChosenStep {
 pub(crate) struct Fineness {
     /// In x and y, and in z; `None` if no lattice can.
     steps: [Option<ChosenStep>; 2],
+    /// The length of the unit of x and y, and of that of z.
+    metres: [f64; 2],
 }
+
+/// A step in metres. Nobody misses what is finer, so nothing is left out of a lattice for the sake of a finer step.
+const MEANINGFUL: f64 = 0.00101;
+
+/// A step in metres. With a coarser one, a terrain is none.
+const USELESS: f64 = 1.0;
 
 /// Returns how well a lattice can hold `extent`.
 pub(crate) fn fineness(sources: &[Source], extent: &Extent, wish: &LatticeWish) -> Fineness {
-    Fineness { steps: [horizontal_step(sources, extent, wish).ok(), vertical_step(sources, extent, wish).ok()] }
+    let steps = [horizontal_step(sources, extent, wish).ok(), vertical_step(sources, extent, wish).ok()];
+    Fineness { steps, metres: wish.metres }
 }
 
 impl Fineness {
-    /// Returns whether nothing need be rounded.
-    pub(crate) fn is_lossless(&self) -> bool {
-        self.steps.iter().all(|step| step.as_ref().is_some_and(|step| step.lossless))
+    /// Returns whether each step holds what the inputs mean, or is so fine that nobody misses the rest.
+    pub(crate) fn is_meaningful(&self) -> bool {
+        self.steps.iter().zip(self.metres).all(|(step, metres)| step.as_ref().is_some_and(|step| step.is_fine(metres)))
     }
 
-    /// Returns whether the lattice is finer than that of `other`, or holds what that one does not.
+    /// Returns whether a step is so coarse that the points make no terrain, or there is none.
+    pub(crate) fn is_useless(&self) -> bool {
+        let is_useless = |(step, metres): (&Option<ChosenStep>, f64)| {
+            step.as_ref().is_none_or(|step| !step.lossless && to_float(step.step) * metres > USELESS)
+        };
+        self.steps.iter().zip(self.metres).any(is_useless)
+    }
+
+    /// Returns whether the lattice is finer than that of `other` where that one is coarse, or holds what that one does not.
     pub(crate) fn is_better_than(&self, other: &Fineness) -> bool {
-        let is_better = |(own, others): (&Option<ChosenStep>, &Option<ChosenStep>)| match (own, others) {
-            (Some(own), Some(others)) => own.step < others.step || own.lossless && !others.lossless,
+        let is_better = |((own, others), metres): ((&Option<ChosenStep>, &Option<ChosenStep>), f64)| match (own, others)
+        {
+            (Some(own), Some(others)) => {
+                !others.is_fine(metres) && (own.step < others.step || own.lossless && !others.lossless)
+            }
             (own, others) => own.is_some() && others.is_none(),
         };
-        self.steps.iter().zip(&other.steps).any(is_better)
+        self.steps.iter().zip(&other.steps).zip(self.metres).any(is_better)
+    }
+}
+
+impl ChosenStep {
+    fn is_fine(&self, metres: f64) -> bool {
+        self.lossless || to_float(self.step) * metres <= MEANINGFUL
     }
 }
 

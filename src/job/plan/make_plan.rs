@@ -128,19 +128,19 @@ fn try_plan(
     Ok((plan, rules))
 }
 
-/// Returns the box of the sources. If no lattice holds all of it at the precision of the inputs, and some rows of texts lie so far
+/// Returns the box of the sources. If no lattice holds all of it at the precision of the inputs or to a millimetre, and some rows of texts lie so far
 /// from all others that they are mistakes, these are left out, provided that this helps.
 fn extent_without_outliers(sources: &mut [Source], options: &JobOptions, wish: &LatticeWish) -> Result<Extent> {
     sources.iter_mut().for_each(Source::keep_outliers);
     let all = Extent::of(sources, &options.input, wish.metres[0])?;
     let before = fineness(sources, &all, wish);
-    if before.is_lossless() {
+    if before.is_meaningful() {
         return Ok(all);
     }
     let choice = row_choice(options);
     let mut told = false;
     for source in sources.iter_mut() {
-        told |= source.tell_outliers(&choice)?;
+        told |= source.tell_outliers(&choice, before.is_useless())?;
     }
     if told {
         let rest = Extent::of(sources, &options.input, wish.metres[0])?;

@@ -1,7 +1,7 @@
 //! The message for a job of which no point is left: it says what became of the points, and where they lie if not within the bounds.
 
 use crate::Error;
-use crate::input::PointCounts;
+use crate::input::{FileFormat, PointCounts};
 use crate::job::plan::job_plan::Plan;
 
 /// A rectangle [xmin, ymin, xmax, ymax] in source units.
@@ -10,7 +10,7 @@ type Rectangle = [f64; 4];
 /// Returns the error for a job of which no point is left.
 pub fn no_point_is_left(plan: &Plan, counts: &PointCounts) -> Error {
     let remedy = match plan.options.input.bounds.zip(box_of_inputs(plan)) {
-        Some((bounds, inputs)) if counts.out_of_bounds > 0 => compare(bounds.0, inputs),
+        Some((bounds, inputs)) if counts.out_of_bounds > 0 => compare(bounds.0, inputs, are_from_headers(plan)),
         _ => "check [input] classes and bounds".into(),
     };
     Error::NoTerrain(format!(
@@ -26,7 +26,12 @@ fn box_of_inputs(plan: &Plan) -> Option<Rectangle> {
     boxes.reduce(|a, b| [a[0].min(b[0]), a[1].min(b[1]), a[2].max(b[2]), a[3].max(b[3])])
 }
 
-fn compare(bounds: Rectangle, inputs: Rectangle) -> String {
+/// Returns whether the rectangle of all inputs is what headers say. Of texts it is that of their rows.
+fn are_from_headers(plan: &Plan) -> bool {
+    plan.inputs.iter().any(|input| input.source.format != FileFormat::Text)
+}
+
+fn compare(bounds: Rectangle, inputs: Rectangle, from_headers: bool) -> String {
     let exchanged = [inputs[1], inputs[0], inputs[3], inputs[2]];
     let hint = match meet(bounds, exchanged) && !meet(bounds, inputs) {
         true => "; x and y look exchanged: bounds are [xmin, ymin, xmax, ymax]",
@@ -35,8 +40,9 @@ fn compare(bounds: Rectangle, inputs: Rectangle) -> String {
     // Rounded outwards, so that they can be copied.
     let [xmin, ymin] = [inputs[0], inputs[1]].map(|low| (low * 100.0).floor() / 100.0);
     let [xmax, ymax] = [inputs[2], inputs[3]].map(|high| (high * 100.0).ceil() / 100.0);
+    let by_headers = if from_headers { " by their headers" } else { "" };
     format!(
-        "[input] bounds are {bounds:?}, and by their headers the inputs lie in [{xmin:.2}, {ymin:.2}, {xmax:.2}, {ymax:.2}]{hint}"
+        "[input] bounds are {bounds:?}, and{by_headers} the inputs lie in [{xmin:.2}, {ymin:.2}, {xmax:.2}, {ymax:.2}]{hint}"
     )
 }
 
