@@ -220,6 +220,11 @@ impl Source {
         }
     }
 
+    /// Tells whether [`Source::tell_outliers`] leaves out one row of a few.
+    pub fn has_outlier_among_few(&self) -> bool {
+        matches!(&self.points, PointData::Text(table) if table.has_outlier_among_few())
+    }
+
     /// Undoes [`Source::tell_outliers`].
     pub fn keep_outliers(&mut self) {
         if let PointData::Text(table) = &mut self.points {

@@ -88,7 +88,7 @@ impl<'a> Inputs<'a> {
     /// # Errors
     /// [`Error::Io`] or [`Error::Input`] if one cannot be read.
     pub(super) fn open(files: &'a [PathBuf], facts: &'a ReportedFacts, extras: &Extras) -> Result<Inputs<'a>> {
-        let reading = facts.texts.unwrap_or(TextReading { colors: true, outliers_left_out: false });
+        let reading = facts.texts.unwrap_or(TextReading { colors: true, ..TextReading::default() });
         let (text, choice) = match &facts.input {
             Some(input) => (input.csv.clone(), input.row_choice(reading.colors)),
             None => (TextOptions::default(), RowChoice { colors: reading.colors, ..RowChoice::all() }),
@@ -97,7 +97,7 @@ impl<'a> Inputs<'a> {
         let open_again = |file: &PathBuf| {
             let mut source = open_chosen(file, &text, &choice)?;
             if reading.outliers_left_out {
-                source.tell_outliers(&choice)?;
+                source.tell_outliers(&choice, reading.even_among_few)?;
             }
             Ok(source)
         };

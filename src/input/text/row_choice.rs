@@ -6,12 +6,14 @@ use crate::input::text::number::Number;
 
 /// How a job has read its texts, as far as the options of `[input]` do not say it. Whoever reads them in the same way finds the same
 /// points.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct TextReading {
     /// Whether colours were read. If they were, a row without them is malformed.
     pub colors: bool,
     /// Whether rows were left out that lie far from all others.
     pub outliers_left_out: bool,
+    /// Whether one row of a few was such a row.
+    pub even_among_few: bool,
 }
 
 /// Which rows of a text a job wants.

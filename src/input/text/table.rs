@@ -198,6 +198,11 @@ impl TextTable {
         Ok(told)
     }
 
+    /// Tells whether one row of so few is left out that only a request to look among few explains it.
+    pub(crate) fn has_outlier_among_few(&self) -> bool {
+        self.outliers() > 0 && !are_rare(self.outliers(), self.wanted.rows, false)
+    }
+
     /// Undoes [`TextTable::tell_outliers`].
     pub(crate) fn keep_outliers(&mut self) {
         self.without_outliers = None;

@@ -15,8 +15,12 @@ pub(crate) fn row_choice(options: &JobOptions) -> RowChoice {
 
 /// Returns how the texts of a plan are read.
 pub(crate) fn text_reading(plan: &Plan) -> TextReading {
-    let outliers_left_out = plan.inputs.iter().any(|input| input.source.outliers() > 0);
-    TextReading { colors: wants_colors(&plan.options), outliers_left_out }
+    let sources = || plan.inputs.iter().map(|input| &input.source);
+    TextReading {
+        colors: wants_colors(&plan.options),
+        outliers_left_out: sources().any(|source| source.outliers() > 0),
+        even_among_few: sources().any(Source::has_outlier_among_few),
+    }
 }
 
 /// Returns whether the job wants the points' own colours.
