@@ -9,7 +9,7 @@ use gdt_batch::job;
 use gdt_batch::job::options::RunOptions;
 use gdt_batch::job::preflight::check;
 use gdt_batch::job::progress::stage::ProgressOutput;
-use gdt_batch::job::report::skipped::skipped_summary;
+use gdt_batch::job::report::skipped_inputs::skipped_summary;
 use gdt_batch::output::file_names::OutputFiles;
 use gdt_batch::threads::{self, on_threads};
 use gdt_batch::verify::Conclusion;

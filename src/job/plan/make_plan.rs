@@ -5,7 +5,7 @@ use crate::geometry::lattice::{AxisMap, Lattice, REACH, shortest_decimal};
 use crate::input::options::OnBadFile;
 use crate::input::{Axis, PointRules, Source};
 use crate::job::options::JobOptions;
-use crate::job::plan::coordinates::{common_crs, horizontal_unit};
+use crate::job::plan::common_crs::{common_crs, horizontal_unit};
 use crate::job::plan::extent::Extent;
 use crate::job::plan::inputs::{check_missing_records, open_all, unreadable_names};
 use crate::job::plan::job_plan::{Plan, PlannedInput, SkippedInput};

@@ -2,7 +2,7 @@
 //! read back, so that every later step is a function of the plan, an index and the store.
 
 pub mod budget;
-pub mod coordinates;
+pub mod common_crs;
 pub mod extent;
 pub mod fingerprint;
 pub mod input_identity;

@@ -2,7 +2,7 @@
 
 pub(crate) mod activity;
 pub mod clock;
+pub mod number_text;
 pub mod stage;
 pub mod stats;
-pub mod text;
 pub(crate) mod time_left;

@@ -2,8 +2,8 @@
 
 use crate::job::progress::activity::Activity;
 use crate::job::progress::clock::JobClock;
+use crate::job::progress::number_text::rough_time;
 use crate::job::progress::stats::StageStats;
-use crate::job::progress::text::rough_time;
 use crate::job::progress::time_left::TimeLeft;
 use crate::say;
 use indicatif::{HumanCount, ProgressBar, ProgressState, ProgressStyle};

@@ -1,5 +1,5 @@
 //! The report of a finished job, for people and for machines.
 
 pub mod job_report;
-pub mod skipped;
+pub mod skipped_inputs;
 mod table;

@@ -1,8 +1,8 @@
 //! The report as a table for people.
 
-use crate::job::progress::text::{grouped, precise_mebibytes};
+use crate::job::progress::number_text::{grouped, precise_mebibytes};
 use crate::job::report::job_report::{Report, StepSeconds};
-use crate::job::report::skipped::write_skipped;
+use crate::job::report::skipped_inputs::write_skipped;
 use crate::triangulation::TriangulationCounts;
 use std::fmt;
 

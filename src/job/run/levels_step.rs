@@ -6,7 +6,7 @@ use crate::job::levels::make_level::{LevelStats, make_level};
 use crate::job::partition::result::Partition;
 use crate::job::plan::job_plan::Plan;
 use crate::job::records::JobStep;
-use crate::job::run::context::RunContext;
+use crate::job::run::run_context::RunContext;
 use crate::job::tiles::style::TileStyle;
 use crate::threads::on_threads;
 use rayon::prelude::*;

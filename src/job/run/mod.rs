@@ -1,12 +1,12 @@
 //! Running the steps of a job in this process: the only room that knows all of them.
 
 pub(crate) mod attempt;
-pub(crate) mod context;
 pub(crate) mod levels_step;
-pub(crate) mod local_run;
+pub(crate) mod mesh_and_tiles;
 pub(crate) mod publish_step;
 pub(crate) mod read_step;
 pub(crate) mod resume;
+pub(crate) mod run_context;
 pub(crate) mod stage_costs;
 pub(crate) mod threads;
 pub(crate) mod tile_queue;

@@ -7,7 +7,7 @@ use crate::job::plan::job_plan::{Plan, SkippedInput};
 use crate::job::plan::make_plan::replan_without;
 use crate::job::progress::stage::JobProgress;
 use crate::job::records::{JobStep, StepOutput};
-use crate::job::run::context::RunContext;
+use crate::job::run::run_context::RunContext;
 
 /// Reads the points, unless an earlier run did.
 ///

@@ -4,7 +4,7 @@ use crate::job::partition::result::Partition;
 use crate::job::progress::activity::Activity;
 use crate::job::progress::stage::Stage;
 use crate::job::records::JobStep;
-use crate::job::run::context::RunContext;
+use crate::job::run::run_context::RunContext;
 use crate::job::run::stage_costs::triangulated_share;
 use crate::job::tiles::border_normals::finish_border_normals;
 use crate::job::tiles::dependencies::{FinishedTile, TileDependencies};

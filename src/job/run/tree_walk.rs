@@ -11,7 +11,7 @@ use crate::job::plan::job_plan::Plan;
 use crate::job::progress::activity::Activity;
 use crate::job::progress::stage::Stage;
 use crate::job::records::{Frontier, JobStep, StepOutput};
-use crate::job::run::context::RunContext;
+use crate::job::run::run_context::RunContext;
 use crate::job::run::stage_costs::triangulated_share;
 use crate::job::run::tile_queue::TileQueue;
 use crate::job::run::unmerged::Unmerged;

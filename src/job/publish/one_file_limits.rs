@@ -1,6 +1,6 @@
 //! When a terrain fits one file.
 
-use crate::job::progress::text::grouped;
+use crate::job::progress::number_text::grouped;
 use crate::job::tiles::write_tile::TileStats;
 
 /// Viewers do not open a single file with more triangles.
