@@ -344,7 +344,7 @@ fn texts_are_read_again_as_the_job_has_read_them() {
         // Colours that nobody wants, and that cannot be read.
         (format!("x,y,z,red,green,blue\n{}", rows(3, ",a,b,c")), "output", "color = \"none\""),
         // A row that the job leaves out, because no lattice holds it beside the others.
-        (format!("x,y,z\n{}570000.5,5933050.5,12.5\n", rows(8, "")), "input", "max_malformed_fraction = 0.01"),
+        (format!("x,y,z\n{}99570000.5,5933050.5,12.5\n", rows(8, "")), "input", "max_malformed_fraction = 0.01"),
     ] {
         let path = folder.path().join("cloud.csv");
         fs::write(&path, text).unwrap();
