@@ -20,7 +20,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Reads all inputs of the plan: leaves the points in the job directory and returns what later steps need to know of them.
 ///
 /// # Errors
-/// [`Error::Input`] if too many records are malformed and bad files must not be left out, [`Error::Io`] if an input cannot be
+/// [`crate::Error::Input`] if too many records are malformed and bad files must not be left out, [`crate::Error::Io`] if an input cannot be
 /// read or the point file cannot be written.
 pub fn read_points(plan: &Plan, directory: &JobDirectory, stage: &Stage) -> Result<Partition> {
     let file = PointFile::create(&directory.points())?;

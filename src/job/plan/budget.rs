@@ -48,7 +48,7 @@ pub fn merge_memory(options: &JobOptions, is_root: bool, threads: usize) -> u64 
     memory.saturating_sub(tile.saturating_mul(threads as u64 - 1))
 }
 
-/// Returns the least [limits] memory, as a user writes it, of which the part for work is at least `working` bytes.
+/// Returns the least `[limits] memory`, as a user writes it, of which the part for work is at least `working` bytes.
 fn limit_for(working: u64) -> String {
     // A round number that is a whole number of bytes.
     const STEP: u64 = 64 << 20;
@@ -56,7 +56,7 @@ fn limit_for(working: u64) -> String {
     format!("{} MiB", limit >> 20)
 }
 
-/// Returns the [limits] memory with which these merges fit, on all the threads that the user wants: whether each is at the root, and
+/// Returns the `[limits] memory` with which these merges fit, on all the threads that the user wants: whether each is at the root, and
 /// its sites.
 pub fn memory_for_merges(options: &JobOptions, merges: impl Iterator<Item = (bool, u64)>) -> String {
     let threads = options.threads() as u64;
