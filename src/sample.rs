@@ -32,8 +32,7 @@ UNIT[\"metre\",1],AUTHORITY[\"EPSG\",\"25832\"]]";
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be written, [`Error::Interrupted`], [`Error::Config`] if it has another extension, if `points`
-/// is 0, if there is such a file already and `overwrite` is not set, or something that is no
-/// regular file.
+/// is 0, if there is such a file already and `overwrite` is not set, or if something else than a file is there.
 pub fn write(path: &Path, points: u64, seed: u64, overwrite: bool) -> Result<()> {
     let extension = path.extension().map(|e| e.to_ascii_lowercase());
     let is_laz = extension.as_ref().is_some_and(|extension| extension == "laz");

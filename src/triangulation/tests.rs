@@ -1,5 +1,8 @@
 //! The pipeline, and divide and conquer, against the reference on random sites of every kind that is known to be hard.
 
+use crate::Result;
+use crate::geometry::Site;
+use crate::mesh::flip::fails;
 use crate::mesh::half_edge::HalfEdgeMesh;
 use crate::triangulation::{divide_and_conquer, reference};
 use crate::voronoi::test_cases::{KINDS, Random, case};
@@ -35,4 +38,30 @@ fn random_cases_are_canonical_or_rejected() {
     }
     eprintln!("of {} cases of each kind, rejected: {rejected:#?}", cases / KINDS.len());
     assert_eq!(refused, 0, "large uniform cases were rejected");
+}
+
+/// What triangulates besides the pipeline.
+const OTHERS: [fn(&[Site]) -> Result<HalfEdgeMesh>; 2] = [reference::triangulate, divide_and_conquer::triangulate];
+
+#[test]
+fn no_edge_fails_among_cocircular_sites() {
+    let circle: Vec<Site> = (-65..=65)
+        .flat_map(|x: i32| (-65..=65).map(move |y: i32| [x, y]))
+        .filter(|[x, y]| x * x + y * y == 65 * 65)
+        .collect();
+    for triangulate in OTHERS {
+        let mesh = triangulate(&circle).unwrap();
+        assert_eq!(mesh.triangles.len(), circle.len() - 2);
+        assert!(mesh.half_edges().all(|h| !fails(&mesh, &circle, h)));
+    }
+}
+
+#[test]
+fn sites_on_a_line_make_no_triangle() {
+    let vertical: Vec<Site> = (0..100).map(|i| [7, 3 * i]).collect();
+    for triangulate in OTHERS {
+        for line in [&[][..], &[[3, 4]], &[[0, 0], [1, 1], [5, 5]], &vertical] {
+            assert!(triangulate(line).unwrap().triangles.is_empty());
+        }
+    }
 }

@@ -154,6 +154,18 @@ mod tests {
         assert_eq!(parse(&cut), None);
     }
 
+    /// A transverse Mercator projection. The doubles are the longitude and latitude of the origin, the false easting and the scale; the
+    /// false northing is the latitude once more.
+    const PARAMETERS: [[u16; 4]; 7] = [
+        [3074, 0, 1, USER_DEFINED],
+        [3075, 0, 1, 1],
+        [3080, DOUBLES, 1, 0],
+        [3081, DOUBLES, 1, 1],
+        [3082, DOUBLES, 1, 2],
+        [3083, DOUBLES, 1, 1],
+        [3092, DOUBLES, 1, 3],
+    ];
+
     /// NAD83 / UTM zone 15N, but for what `changes` says otherwise.
     fn user_defined(changes: &[[u16; 4]], doubles: &[f64]) -> Crs {
         let mut keys: Vec<[u16; 4]> = vec![
@@ -178,36 +190,16 @@ mod tests {
         assert_eq!(own.differences(&nad27), ["the datum (NAD83, NAD27)"]);
         assert_eq!(own.differences(&zone_16), ["the longitude of the origin (-93, -87)"]);
         assert!(own.proj4_definition().unwrap().contains("+proj=tmerc"));
-        let written_out = [
-            [3074, 0, 1, USER_DEFINED],
-            [3075, 0, 1, 1],
-            [3080, DOUBLES, 1, 0],
-            [3081, DOUBLES, 1, 1],
-            [3082, DOUBLES, 1, 2],
-            [3083, DOUBLES, 1, 1],
-            [3092, DOUBLES, 1, 3],
-        ];
-        assert_eq!(user_defined(&written_out, &[-93.0, 0.0, 500_000.0, 0.9996]).differences(&utm), [""; 0]);
-        assert_eq!(user_defined(&written_out, &[-93.0, 0.0, 500_000.0, 0.9999]).differences(&utm).len(), 1);
+        assert_eq!(user_defined(&PARAMETERS, &[-93.0, 0.0, 500_000.0, 0.9996]).differences(&utm), [""; 0]);
+        assert_eq!(user_defined(&PARAMETERS, &[-93.0, 0.0, 500_000.0, 0.9999]).differences(&utm).len(), 1);
         // Keys that do not say the projection leave it in doubt.
         assert_eq!(user_defined(&[[3074, 0, 1, 10_101], [3073, TEXTS, 8, 0]], &[]).differences(&utm).len(), 1);
     }
 
     #[test]
     fn a_parameter_that_is_missing_or_unreadable_leaves_the_projection_unknown() {
-        let all: Vec<[u16; 4]> = vec![
-            [1024, 0, 1, 1],
-            [2048, 0, 1, 4269],
-            [3072, 0, 1, USER_DEFINED],
-            [3074, 0, 1, USER_DEFINED],
-            [3075, 0, 1, 1],
-            [3076, 0, 1, 9001],
-            [3080, DOUBLES, 1, 0],
-            [3081, DOUBLES, 1, 1],
-            [3082, DOUBLES, 1, 2],
-            [3083, DOUBLES, 1, 1],
-            [3092, DOUBLES, 1, 3],
-        ];
+        let geographic = [[1024, 0, 1, 1], [2048, 0, 1, 4269], [3072, 0, 1, USER_DEFINED], [3076, 0, 1, 9001]];
+        let all: Vec<[u16; 4]> = geographic.into_iter().chain(PARAMETERS).collect();
         let doubles = [-93.0, 0.0, 500_000.0, 0.9996, f64::NAN];
         let doubts = |changed: u16, entry: Option<[u16; 4]>| {
             let keys: Vec<[u16; 4]> = all.iter().filter(|key| key[0] != changed).copied().chain(entry).collect();
