@@ -429,6 +429,7 @@ fn xxhsum_reads_the_list() {
     let (_folder, _, job) = every_file("meshopt");
     let check = || std::process::Command::new("xxhsum").args(["-c", "XXH128SUMS"]).current_dir(job.out()).output();
     let Ok(checked) = check() else {
+        assert!(std::env::var_os("GDT_TEST_ALL").is_none(), "there is no program xxhsum");
         eprintln!("skipped: there is no program xxhsum");
         return;
     };
