@@ -1,4 +1,4 @@
-//! Sites on which triangulating takes quadratic time in many programs: `cargo bench --bench hard [-- NAME...] [-- --sites N]`.
+//! Sites on which triangulating takes quadratic time in many programs: `cargo bench --bench hard [-- [NAME...] [--sites N]]`.
 //!
 //! A leaf of N sites (1,000,000 if nothing else is said) is triangulated as a job does it: by the pipeline, and by divide and conquer
 //! if the pipeline rejects it. The last column compares the time with that of as many random sites in the same run. `spade` runs on

@@ -1,7 +1,7 @@
 //! The layer through which a job changes files: making, writing, renaming, removing them and bringing them to the disk. It also
 //! tells what is there, so that an error never passes for "nothing is there".
 //!
-//! It adds nothing to the calls of the system. But builds for tests can write down every change, and then make up what a power
+//! It adds little to the calls of the system. But builds for tests can write down every change, and then make up what a power
 //! failure at any moment may leave of them (CONTRIBUTING.md). The test `rooms` finds changes that go around this layer.
 
 use crate::fault::traced;

@@ -8,7 +8,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 /// Every failure of this crate. `Display` says which file, which record or line, what is wrong and what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The operating system refused an operation that may succeed later (exit code 1), or the path leads nowhere (exit code 2).
+    /// The operating system refused an operation: it may succeed later (exit code 1), or the path itself is wrong (exit code 2).
     #[error("cannot {action} {}: {source}{}", path.display(), remedy(source))]
     Io {
         /// The operation as a verb: "read", "create", "write".

@@ -95,6 +95,9 @@ fn verify_output(directory: &Path, memory: u64, inputs: &[PathBuf], print: Print
     if verdict.verdict == Conclusion::Proved {
         return printed.map(|()| ExitCode::SUCCESS);
     }
+    if let Err(error) = printed {
+        say(&format!("error: {error}"));
+    }
     let first = verdict.failures.first().or(verdict.unproved.as_ref()).map_or("", String::as_str);
     say(&format!("error: {}: {}: {first}", directory.display(), verdict.sentence()));
     Ok(ExitCode::from(verdict.verdict.exit_code()))
@@ -122,9 +125,7 @@ fn show_info(files: &[PathBuf], print: PrintOptions) -> Result<ExitCode> {
 fn none_is_missing(files: &[PathBuf]) -> Result<()> {
     let is_missing = |file: &&PathBuf| file.symlink_metadata().is_err_and(|e| e.kind() == ErrorKind::NotFound);
     match files.iter().find(is_missing) {
-        Some(missing) => {
-            Err(Error::Config(format!("there is no file {}: name the point clouds to look at", missing.display())))
-        }
+        Some(missing) => Err(Error::Config(format!("there is no file {}: correct its name", missing.display()))),
         None => Ok(()),
     }
 }

@@ -57,36 +57,28 @@ pub fn write(path: &Path, points: u64, seed: u64, overwrite: bool) -> Result<()>
         )),
         _ => Error::io("create", path)(error),
     })?;
-    let written = write_points(file, is_laz, points, seed);
+    let written = write_points(file, path, is_laz, points, seed);
     if written.is_err() {
         // The first error is the one to report.
         let _ = std::fs::remove_file(path);
     }
-    written.map_err(|failure| match failure {
-        Failure::Interrupted => Error::Interrupted,
-        Failure::Las(las::Error::Io(error)) | Failure::Io(error) => Error::io("write", path)(error),
-        Failure::Las(error) => Error::io("write", path)(std::io::Error::other(error)),
-    })
+    written
 }
 
-/// Why a sample is not written.
-enum Failure {
-    Interrupted,
-    Io(std::io::Error),
-    Las(las::Error),
-}
-
-fn write_points(file: File, is_laz: bool, points: u64, seed: u64) -> std::result::Result<(), Failure> {
-    let mut writer =
-        header(is_laz).and_then(|header| Writer::new(BufWriter::new(file), header)).map_err(Failure::Las)?;
+fn write_points(file: File, path: &Path, is_laz: bool, points: u64, seed: u64) -> Result<()> {
+    let failed = |error| match error {
+        las::Error::Io(error) => Error::io("write", path)(error),
+        error => Error::io("write", path)(std::io::Error::other(error)),
+    };
+    let mut writer = header(is_laz).and_then(|header| Writer::new(BufWriter::new(file), header)).map_err(failed)?;
     let side = (points as f64).sqrt().ceil().max(1.0) as u64;
     for number in 0..points {
         if number % CHECKED_EVERY == 0 {
-            interrupt::check().map_err(|_| Failure::Interrupted)?;
+            interrupt::check()?;
         }
-        writer.write_point(point(number % side, number / side, seed)).map_err(Failure::Las)?;
+        writer.write_point(point(number % side, number / side, seed)).map_err(failed)?;
     }
-    writer.into_inner().map_err(Failure::Las)?.flush().map_err(Failure::Io)
+    writer.into_inner().map_err(failed)?.flush().map_err(Error::io("write", path))
 }
 
 fn header(is_laz: bool) -> las::Result<las::Header> {

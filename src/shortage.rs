@@ -11,7 +11,7 @@ const LEAST: u64 = 32 << 20;
 /// With less, the program says in advance what to do if it does not suffice: once it runs out there is no memory to say it.
 const TIGHT: u64 = 128 << 20;
 
-/// What panics say that stand for a lack of memory or threads. Rust's own threads and libraries that start some panic with these.
+/// Texts in panics that mean a lack of memory or threads: the standard library, and libraries that start threads, panic with these.
 const SHORTAGES: [&str; 5] =
     ["os error 11)", "os error 12)", "code: 11,", "code: 12,", "failed to allocate an alternative stack"];
 
@@ -36,7 +36,7 @@ pub fn listen() -> Result<()> {
     let left = address_space::at_start();
     address_space::require(LEAST, left, || "the program".into())?;
     if let Some(left) = left.filter(|left| left.bytes < TIGHT) {
-        say(&format!("{}: if a memory allocation fails, there was not enough memory, so raise it", left.sentence()));
+        say(&format!("{}: if a memory allocation fails, raise this limit", left.sentence()));
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! Running work on a pool of threads.
+//! Running work on a pool of threads, and while another thread waits.
 
 use crate::{Error, Result, address_space};
 
@@ -18,6 +18,25 @@ pub fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> Result<T> + Se
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|e| Error::Memory(format!("cannot start {threads} threads: {e}")))?;
     pool.install(work)
+}
+
+/// Runs `work` while another thread runs `waiting`, which mostly waits for the disk. If no thread can be started, runs one after
+/// the other.
+///
+/// # Errors
+/// Those of `work`, then those of `waiting`.
+pub(crate) fn run_concurrently<T>(
+    waiting: impl Fn() -> Result<()> + Sync,
+    work: impl FnOnce() -> Result<T>,
+) -> Result<T> {
+    std::thread::scope(|scope| match std::thread::Builder::new().spawn_scoped(scope, &waiting) {
+        Ok(thread) => {
+            let outcome = work();
+            let waited = thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+            outcome.and_then(|outcome| waited.map(|()| outcome))
+        }
+        Err(_) => waiting().and_then(|()| work()),
+    })
 }
 
 /// Returns how many threads the machine runs at the same time.

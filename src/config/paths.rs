@@ -3,7 +3,7 @@
 //! `~/` is the home directory, as everywhere. Variables are refused: the same configuration would read and write somewhere else in
 //! another shell, or, where a variable is not set, in a folder called `$NAME`.
 
-use std::path::{Path, PathBuf};
+use std::path::{Path, PathBuf, is_separator};
 
 /// A path, and the directory that it counts from.
 #[derive(Debug, PartialEq)]
@@ -42,10 +42,6 @@ pub(crate) fn anchor<'a>(option: &str, path: &'a str, base: &Path) -> Result<Anc
     }
 }
 
-fn is_separator(c: char) -> bool {
-    std::path::is_separator(c)
-}
-
 /// Tells whether the folder or file whose name has such a sign is really called so.
 fn exists_as_written(path: &str, base: &Path) -> bool {
     let Some(at) = path.find(['~', '$', '%']) else { return false };
@@ -56,7 +52,7 @@ fn exists_as_written(path: &str, base: &Path) -> bool {
 /// Returns the name of the first variable in `path`, as a shell of Unix or Windows writes one.
 fn variable_in(path: &str) -> Option<&str> {
     let is_part = |c: char| c.is_ascii_alphanumeric() || c == '_';
-    let name_in = |text: &'_ str| -> usize {
+    let name_length = |text: &str| -> usize {
         let starts = text.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_');
         if starts { text.find(|c| !is_part(c)).unwrap_or(text.len()) } else { 0 }
     };
@@ -67,7 +63,7 @@ fn variable_in(path: &str) -> Option<&str> {
             ("$", None) => (rest, ""),
             _ => (rest, "%"),
         };
-        let length = name_in(rest);
+        let length = name_length(rest);
         if length > 0 && rest[length..].starts_with(end) {
             return Some(&rest[..length]);
         }

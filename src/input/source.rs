@@ -204,15 +204,15 @@ impl Source {
     ///
     /// # Errors
     /// `Io` if the file cannot be read.
-    pub fn tell_outliers(&mut self, choice: &RowChoice, even_among_few: bool) -> Result<bool> {
+    pub fn leave_out_outliers(&mut self, choice: &RowChoice, even_among_few: bool) -> Result<bool> {
         let PointData::Text(table) = &mut self.points else { return Ok(false) };
         let file = RandomAccessFile::reopen(&self.path, self.size)?;
-        let told = table.tell_outliers(&file, choice, even_among_few)?;
+        let left_out = table.leave_out_outliers(&file, choice, even_among_few)?;
         (self.axes, self.grid) = (table.axes(), table.grid());
-        Ok(told)
+        Ok(left_out)
     }
 
-    /// Returns the number of rows that [`Source::tell_outliers`] leaves out.
+    /// Returns the number of rows that [`Source::leave_out_outliers`] leaves out.
     pub fn outliers(&self) -> u64 {
         match &self.points {
             PointData::Text(table) => table.outliers(),
@@ -220,12 +220,12 @@ impl Source {
         }
     }
 
-    /// Tells whether [`Source::tell_outliers`] leaves out one row of a few.
+    /// Returns whether a row is left out that would be kept without `even_among_few`.
     pub fn has_outlier_among_few(&self) -> bool {
         matches!(&self.points, PointData::Text(table) if table.has_outlier_among_few())
     }
 
-    /// Undoes [`Source::tell_outliers`].
+    /// Undoes [`Source::leave_out_outliers`].
     pub fn keep_outliers(&mut self) {
         if let PointData::Text(table) = &mut self.points {
             table.keep_outliers();

@@ -33,8 +33,8 @@ use crate::job::run::mesh_and_tiles::mesh_and_tiles;
 use crate::job::run::publish_step::{publish, wants_tileset, write_report};
 use crate::job::run::read_step;
 use crate::job::run::run_context::RunContext;
-use crate::job::run::threads::run_concurrently;
 use crate::job::tiles::write_tile::TileStats;
+use crate::threads::run_concurrently;
 use crate::{Error, Result};
 
 /// Runs the whole job, or what an interrupted run left of it.

@@ -213,6 +213,14 @@ impl Frontier {
         Ok(Frontier { sites: columns.column_vec()?, boundary: columns.column_vec()? })
     }
 
+    /// Returns the number of sites of the frontier of `node`, without reading the rest of its record.
+    ///
+    /// # Errors
+    /// As [`Frontier::load`].
+    pub fn count(store: &Store, node: NodeIndex) -> Result<u64> {
+        Ok(ColumnReader::open(store, StepRecord::Frontier(node))?.column::<BorderVertex>()?.len() as u64)
+    }
+
     /// Returns the tiles that own sites of it, ascending.
     pub fn tiles(&self) -> Vec<TileIndex> {
         let mut tiles: Vec<TileIndex> = self.sites.iter().map(|vertex| vertex.tile).collect();

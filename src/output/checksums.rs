@@ -14,7 +14,7 @@ use crate::fault;
 use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::{Xxh3, xxh3_128};
 
-/// What stands in front of the checksum in the text of a report, from the end of which it is searched.
+/// What stands in front of the checksum in the text of a report. The last place with it counts.
 const SEAL: &str = "\"checksum\": \"";
 /// Hexadecimal digits of a checksum.
 const DIGITS: usize = 32;

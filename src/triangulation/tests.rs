@@ -40,8 +40,10 @@ fn random_cases_are_canonical_or_rejected() {
     assert_eq!(refused, 0, "large uniform cases were rejected");
 }
 
+type Triangulate = fn(&[Site]) -> Result<HalfEdgeMesh>;
+
 /// What triangulates besides the pipeline.
-const OTHERS: [fn(&[Site]) -> Result<HalfEdgeMesh>; 2] = [reference::triangulate, divide_and_conquer::triangulate];
+const OTHERS: [Triangulate; 2] = [reference::triangulate, divide_and_conquer::triangulate];
 
 #[test]
 fn no_edge_fails_among_cocircular_sites() {

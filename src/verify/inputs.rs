@@ -97,7 +97,7 @@ impl<'a> Inputs<'a> {
         let open_again = |file: &PathBuf| {
             let mut source = open_chosen(file, &text, &choice)?;
             if reading.outliers_left_out {
-                source.tell_outliers(&choice, reading.even_among_few)?;
+                source.leave_out_outliers(&choice, reading.even_among_few)?;
             }
             Ok(source)
         };

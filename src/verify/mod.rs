@@ -41,15 +41,15 @@
 //!
 //! The triangles that `[output] max_edge` leaves out of the terrain are in `cut/`. All checks are made on the triangles in `tiles/`
 //! and `cut/` together, except that normals and colours are not compared with `cut/`, which has none. If the report or
-//! the list of files says that some of `cut/` is gone, only checks 1, 4 and the first sentence of 2 are made, and check 3 between
+//! the list of files shows that some of `cut/` is gone, only checks 1, 4 and the first sentence of 2 are made, and check 3 between
 //! the triangles that are there; the verdict says so.
 //!
 //! # What the job wrote
 //!
-//! All this holds for a terrain that somebody has changed consistently: with one vertex raised, or all tiles moved. So every file of the
-//! job is compared with the checksum in `XXH128SUMS`, and that file with the one in `report.json`, which has its own. The report
-//! also has the lattice and a digest of all vertices with their heights. Whoever forges all of these is found out by the inputs
-//! alone: [`verify_against`] reads them again and proves that the vertices are their points.
+//! All of this also holds for a terrain that was changed consistently: one vertex raised, say, or all tiles moved. So every file is
+//! compared with its checksum in `XXH128SUMS`. The checksum of `XXH128SUMS` is in `report.json`, which also holds one of itself, the
+//! lattice, and a digest of all vertices with their heights. If somebody has forged all of these, only the inputs can show it:
+//! [`verify_against`] reads them again and proves that the vertices are their points.
 
 mod border;
 mod border_matching;
@@ -94,8 +94,8 @@ use crate::{Error, Result, address_space, disk};
 /// Checks what is in the output `directory` of a job within about `memory` bytes. The verdict lists what does not hold.
 ///
 /// # Errors
-/// [`Error::Config`] if it is no output of a job, [`Error::Memory`] if one tile alone needs more memory, [`Error::Io`] if the system
-/// cannot read a tile.
+/// [`Error::Config`] if it is no output of a job, [`Error::Unfinished`] if its results are not all in place, [`Error::Memory`] if one
+/// tile alone needs more memory, [`Error::Io`] if the system cannot read a tile.
 pub fn verify(directory: &Path, memory: u64) -> Result<Verdict> {
     verify_against(directory, memory, &[])
 }

@@ -6,6 +6,7 @@ use std::path::{Component, Path};
 
 use rayon::prelude::*;
 
+use crate::disk;
 use crate::output::checksums::{Checksum, parse_list, read_file};
 use crate::output::file_names::OutputFiles;
 
@@ -109,11 +110,17 @@ fn is_in(output: &OutputFiles, name: &str, folder: &Path) -> bool {
 /// Returns a sentence for every tile, coarser tile and part left out that is not in the list.
 fn unlisted(output: &OutputFiles, files: &[(String, Checksum)]) -> Vec<String> {
     let listed: HashSet<_> = files.iter().map(|(name, _)| output.directory().join(name)).collect();
-    let entries = output.glb_folders().into_iter().filter_map(|folder| std::fs::read_dir(folder).ok());
-    let paths = entries.flatten().flatten().map(|entry| entry.path());
-    let mut paths: Vec<_> = paths.filter(|path| path.extension().is_some_and(|e| e == "glb")).collect();
-    paths.retain(|path| !listed.contains(path));
-    paths.sort_unstable();
     let name = |path: &Path| path.strip_prefix(output.directory()).unwrap_or(path).display().to_string();
-    paths.iter().map(|path| format!("{} is not a file that the job wrote", name(path))).collect()
+    let mut sentences = Vec::new();
+    for folder in output.glb_folders() {
+        match disk::list(&folder) {
+            Err(error) => sentences.push(format!("{} cannot be read: {error}", name(&folder))),
+            Ok(mut paths) => {
+                paths.retain(|path| path.extension().is_some_and(|e| e == "glb") && !listed.contains(path));
+                paths.sort_unstable();
+                sentences.extend(paths.iter().map(|path| format!("{} is not a file that the job wrote", name(path))));
+            }
+        }
+    }
+    sentences
 }

@@ -267,6 +267,17 @@ fn real_points_keep_their_step_beside_noise_and_mistakes() {
 }
 
 #[test]
+fn an_outlier_within_the_bounds_is_malformed() {
+    let Some(shared) = crate::common::shared() else { return };
+    let clean = fs::read_to_string(shared.join("data/topography.csv")).unwrap();
+    let text = Text::new(&format!("{}\n0,0,0\n", clean.trim_end()));
+    let job = || text.job().with("input", "bounds = [-1.0, -1.0, 1e7, 1e7]");
+    job().run().refused(3, &["1 of 73404 records", "line 73405", "0,0,0"]);
+    let report = job().with("input", "max_malformed_fraction = 0.001").report();
+    assert_eq!([&report["points"]["malformed"], &report["points"]["out_of_bounds"]].map(number), [1, 0]);
+}
+
+#[test]
 fn a_text_that_was_cut_off_is_refused() {
     let clean = centimetres(300, plain);
     for cut in [2, 3, 4, 5] {
@@ -293,7 +304,11 @@ fn degrees_are_refused_by_the_names_of_columns() {
         let text = Text::new(&format!("{header}\n{rows}"));
         text.job().run().refused(2, &["cloud.csv", "degrees", "projected CRS", "unit"]);
         run(&text.job().with("input", "unit = \"metre\""));
+        run(&text.job().with("input", "crs = \"none\""));
     }
+    // Metres may begin at zero.
+    let local: String = (0..50).map(|i| format!("{},{},1\n", i * 1000, i * i % 50 * 1000)).collect();
+    run(&Text::new(&format!("lon,lat,z\n{local}")).job());
     // A few rows that are mistakes do not make metres of degrees, wherever they lie.
     for stray in ["565000,5933000,1", "-9999,-9999,-9999", "9,91,1"] {
         let text = Text::new(&format!("lon,lat,h\n{rows}{stray}\n"));

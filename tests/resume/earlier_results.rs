@@ -165,6 +165,19 @@ fn a_job_killed_while_its_results_take_their_places_is_complete_after_the_next_r
     assert!(!rig.run_to("replacing", steps + 1).was_killed());
 }
 
+/// The run after a damaged result writes another report. The journal must not name the old one beside it.
+#[test]
+fn a_damaged_result_and_a_second_kill_leave_a_job_that_the_next_run_completes() {
+    let earlier = Earlier::new();
+    let rig = &earlier.rig;
+    assert!(rig.run_to("replacing", 1).was_killed());
+    fs::write(rig.out().join("job/results/preview.png"), "damaged").unwrap();
+    assert!(rig.run_to("replacing", 3).was_killed());
+    rig.configure(&with_output("max_edge = 9000", "max_edge = 0.001"));
+    assert_eq!(rig.run().status.code(), Some(2));
+    found_whole(rig, 3);
+}
+
 #[track_caller]
 pub(crate) fn found_whole(rig: &Rig, count: u64) {
     let mut found = files(&rig.out());

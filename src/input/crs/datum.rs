@@ -1,11 +1,11 @@
 //! The datum of a system in a comparable form: its names and codes, the ellipsoid and the prime meridian.
 
-use crate::input::crs::wkt::{DATUM, WktNode};
+use crate::input::crs::wkt::{DATUM, WktNode, degrees};
 
 /// Ellipsoids that are in use differ by metres, or by less than a millimetre. Then only names tell the datums apart.
 const ELLIPSOID_TOLERANCE: f64 = 1.0;
 
-/// A ten-thousandth of a degree is 10 m. Writers round the meridian of Paris to less.
+/// In degrees: a tenth of a metre. Writers round the meridian of Paris to less.
 const MERIDIAN_TOLERANCE: f64 = 1e-6;
 
 /// Long names and the short ones that other writers use.
@@ -62,7 +62,9 @@ impl Datum {
         let spheroid = datum.child(&["SPHEROID", "ELLIPSOID"]);
         let texts: Vec<&str> = [system.text(0), datum.text(0)].into_iter().flatten().collect();
         let meridian = match system.child(&["PRIMEM", "PRIMEMERIDIAN"]) {
-            Some(meridian) => meridian.number(1).filter(|degrees| degrees.is_finite())?,
+            Some(meridian) => {
+                meridian.number(1).map(|value| value * degrees(meridian.unit())).filter(|east| east.is_finite())?
+            }
             None => 0.0,
         };
         Some(Datum {
@@ -157,5 +159,17 @@ mod tests {
         for nothing in ["", "unknown", "D_Unknown", "Not_specified_based_on_GRS_1980_ellipsoid"] {
             assert_eq!(comparable(nothing), None, "{nothing}");
         }
+    }
+    #[test]
+    fn a_prime_meridian_counts_in_its_own_unit() {
+        let datum = |meridian: &str| {
+            let text = format!(
+                r#"GEOGCRS["NTF (Paris)",DATUM["Nouvelle Triangulation Francaise (Paris)",ELLIPSOID["Clarke 1880 (IGN)",6378249.2,293.466021293627]],PRIMEM["Paris",{meridian}]]"#
+            );
+            Datum::of(WktNode::parse_all(&text).unwrap().first().unwrap()).unwrap()
+        };
+        let grads = datum(r#"2.5969213,ANGLEUNIT["grad",0.0157079632679489]"#);
+        assert_eq!(grads.difference(&datum("2.33722917")), None);
+        assert!(grads.difference(&datum("2.5969213")).unwrap().contains("the prime meridian"));
     }
 }

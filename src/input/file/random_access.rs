@@ -76,8 +76,8 @@ impl RandomAccessFile {
 
 /// Returns a sentence about what is at `path` if it is there and no regular file.
 pub fn not_a_file(path: &Path) -> Option<String> {
-    let is_none = path.metadata().is_ok_and(|meta| !meta.is_file());
-    is_none.then(|| format!("{} {}", path.display(), kind_text(path)))
+    let is_other = path.metadata().is_ok_and(|meta| !meta.is_file());
+    is_other.then(|| format!("{} {}", path.display(), kind_text(path)))
 }
 
 /// Says what is at `path`, which is no regular file.

@@ -84,16 +84,14 @@ impl<'a> PointFilter<'a> {
         *count += 1;
     }
 
-    /// Counts a record that lies too far from all others as malformed, unless the job does not want it anyway. `what` describes it.
+    /// Counts a record within the job's bounds that lies too far from all others as malformed, unless the job does not want its class.
+    /// `what` describes it.
     #[cold]
-    pub(crate) fn push_outlier(&mut self, record: &PointRecord, what: impl FnOnce() -> String) {
-        let [x, y, z] = &self.rules.maps;
-        if !self.rules.classes[record.class as usize] {
-            self.counts.other_class += 1;
-        } else if !self.in_bounds(&[x.apply(record.raw[0]), y.apply(record.raw[1]), z.apply(record.raw[2])]) {
-            self.counts.out_of_bounds += 1;
-        } else {
+    pub(crate) fn push_outlier(&mut self, class: u8, what: impl FnOnce() -> String) {
+        if self.rules.classes[class as usize] {
             self.malformed(1, what);
+        } else {
+            self.counts.other_class += 1;
         }
     }
 

@@ -146,7 +146,7 @@ fn names_warning(found: Option<&NamedColumns>, columns: usize) -> Option<String>
             "no line names the columns: the first three are taken for x, y and z; say otherwise with `columns` under [input.csv]"
         }
         Some(found) if found.feet => {
-            "the names of the columns say feet, but not which: set [input] unit to \"foot\" or \"us-foot\""
+            "the names of the columns say feet, but not which: they count as metres unless [input] unit (\"foot\" or \"us-foot\") or a CRS says it"
         }
         _ => return None,
     };

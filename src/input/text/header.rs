@@ -134,8 +134,8 @@ fn fits_rows(delimiter: Delimiter, names: &NamedColumns, candidates: &[Delimiter
         columns == names.count || (own == delimiter && columns >= needed)
     };
     let rows = rows.iter().take(ROWS_FOR_NAMES);
-    let mut readings = rows.flat_map(|row| candidates.iter().map(move |own| (*own, *row)));
-    let mut with_numbers = readings.by_ref().filter(|(own, row)| own.numbers(row) >= 3).peekable();
+    let readings = rows.flat_map(|row| candidates.iter().map(move |own| (*own, *row)));
+    let mut with_numbers = readings.filter(|(own, row)| own.numbers(row) >= 3).peekable();
     with_numbers.peek().is_none() || with_numbers.any(fits)
 }
 

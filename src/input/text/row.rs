@@ -23,29 +23,30 @@ pub(crate) enum RowError {
 impl RowError {
     /// Returns a sentence about `line`, for people.
     pub(crate) fn describe(&self, columns: &Columns, line: &[u8]) -> String {
-        let (RowError::Missing { column } | RowError::Unexpected { column, .. }) = *self else {
-            let (named, found) = (columns.named.unwrap_or_default(), columns.delimiter.fields(line).len());
-            return format!(
-                "{} has {found} columns, but the header names {named}; decimals have a point and no comma before them, and text \
-                 with the delimiter in it stands in quotes",
-                shown(line)
-            );
+        let place = |column: usize| {
+            let name = match columns.roles[column] {
+                ColumnRole::Coordinate(axis) => AXIS_NAMES[axis],
+                ColumnRole::Color(channel) => ["red", "green", "blue"][channel],
+                ColumnRole::Class | ColumnRole::Skipped => "class",
+            };
+            format!("column {} ({name})", column + 1)
         };
-        let name = match columns.roles[column] {
-            ColumnRole::Coordinate(axis) => AXIS_NAMES[axis],
-            ColumnRole::Color(channel) => ["red", "green", "blue"][channel],
-            ColumnRole::Class | ColumnRole::Skipped => "class",
-        };
-        let place = format!("column {} ({name})", column + 1);
-        match self {
-            RowError::Missing { .. } => format!("{place} is missing in {}", shown(line)),
-            RowError::Unexpected { expected, .. } => {
+        match *self {
+            RowError::Missing { column } => format!("{} is missing in {}", place(column), shown(line)),
+            RowError::Unexpected { column, expected } => {
                 let field = columns.delimiter.fields(line).get(column).copied().unwrap_or_default();
                 let hint =
                     if is_decimal_comma(field) { ": decimals have a point before them, not a comma" } else { "" };
-                format!("{place} is {}, not {expected}{hint}", shown(field))
+                format!("{} is {}, not {expected}{hint}", place(column), shown(field))
             }
-            RowError::Surplus => String::new(),
+            RowError::Surplus => {
+                let (named, found) = (columns.named.unwrap_or_default(), columns.delimiter.fields(line).len());
+                format!(
+                    "{} has {found} columns, but the header names {named}; decimals have a point and no comma before them, and \
+                     text with the delimiter in it stands in quotes",
+                    shown(line)
+                )
+            }
         }
     }
 }

@@ -51,11 +51,6 @@ impl RowBox {
         (0..3).all(|axis| self.min[axis] <= other.min[axis] && other.max[axis] <= self.max[axis])
     }
 
-    /// Returns the least distance from zero along `axis`.
-    pub(crate) fn nearest(&self, axis: usize) -> f64 {
-        self.min[axis].max(-self.max[axis]).max(0.0)
-    }
-
     /// Returns the greatest distance from zero along `axis`.
     pub(crate) fn farthest(&self, axis: usize) -> f64 {
         self.min[axis].abs().max(self.max[axis].abs())

@@ -50,7 +50,7 @@ pub(crate) struct TextTable {
     cut: Option<(u64, String)>,
     /// The number of rows, including malformed rows.
     pub(crate) records: u64,
-    /// The number of malformed rows. Rows that [`TextTable::tell_outliers`] found are not among them.
+    /// The number of malformed rows. Rows that [`TextTable::leave_out_outliers`] found are not among them.
     malformed: u64,
     /// The least x, y, z of all rows; 0 if there is no row that can be read.
     pub(crate) min: [f64; 3],
@@ -166,7 +166,7 @@ impl TextTable {
             return Ok(true);
         }
         let middle = self.middle(file, choice)?.unwrap_or(wanted);
-        Ok((0..2).all(|axis| middle.nearest(axis) <= [360.0, 90.0][axis]))
+        Ok(middle.farthest(0) <= 360.0 && middle.farthest(1) <= 90.0)
     }
 
     /// Returns the box in which most rows lie; `None` if there are too few rows to tell.
@@ -180,7 +180,7 @@ impl TextTable {
 
     /// Finds the few rows that lie so far from all others that they are mistakes, and leaves them out: decoding counts them as
     /// malformed. `even_among_few` tells whether one row of a few may be one. Returns whether there are any.
-    pub(crate) fn tell_outliers(
+    pub(crate) fn leave_out_outliers(
         &mut self,
         file: &RandomAccessFile,
         choice: &RowChoice,
@@ -192,18 +192,18 @@ impl TextTable {
         let surveys = survey(file, &self.columns, &self.rows, Wanted { choice, within: Some(within) })?;
         let mut rest = Survey::empty();
         surveys.iter().for_each(|survey| rest.add(survey));
-        let told = are_rare(rest.outliers, self.wanted.rows, even_among_few);
-        self.without_outliers = told.then(|| WantedRows::new(&rest.wanted));
+        let left_out = are_rare(rest.outliers, self.wanted.rows, even_among_few);
+        self.without_outliers = left_out.then(|| WantedRows::new(&rest.wanted));
         self.first_outlier_in = surveys.iter().position(|survey| survey.outliers > 0);
-        Ok(told)
+        Ok(left_out)
     }
 
-    /// Tells whether one row of so few is left out that only a request to look among few explains it.
+    /// Returns whether a row is left out that would be kept without `even_among_few`.
     pub(crate) fn has_outlier_among_few(&self) -> bool {
         self.outliers() > 0 && !are_rare(self.outliers(), self.wanted.rows, false)
     }
 
-    /// Undoes [`TextTable::tell_outliers`].
+    /// Undoes [`TextTable::leave_out_outliers`].
     pub(crate) fn keep_outliers(&mut self) {
         self.without_outliers = None;
     }
@@ -268,7 +268,7 @@ impl TextTable {
                 TextLine::Whole(line) => match (reader.read(line), &within) {
                     (Ok(()), _) if is_outside(&reader) => filter.push_out_of_bounds(reader.class()),
                     (Ok(()), Some(within)) if !within.holds(&reader.numbers) => {
-                        filter.push_outlier(&reader.record(decimals), || {
+                        filter.push_outlier(reader.class(), || {
                             let what = if explained { String::new() } else { far_from(within) };
                             explained = true;
                             format!("line {}: {} lies far from all other rows{what}", number(), shown(line))

@@ -101,7 +101,7 @@ impl MappedFile {
         }
     }
 
-    /// Returns a part of the map, its pages loaded, or `None` if that fails for any reason.
+    /// Returns a part of the map after loading its pages, or `None` if that fails for any reason.
     fn part(&self, at: u64, length: usize) -> Option<&[u8]> {
         let map = self.map.as_ref()?;
         let start = usize::try_from(at).ok()?;
@@ -153,7 +153,8 @@ fn load_pages(_map: &Mmap, _start: usize, _length: usize) -> Result<()> {
     Ok(())
 }
 
-/// Takes the pages of the map out of this process. They stay in the system's file cache, and come back when they are touched.
+/// Takes the pages of the map out of this process. They stay in the system's file cache, and come back when they are touched. If the
+/// cache has dropped one by then and the disk fails, that ends the process, and the job can go on from its journal.
 #[cfg(unix)]
 fn remove_pages(map: &Mmap) {
     // SAFETY: The map is a shared, read-only map of a file that does not change: a page that comes back has the same bytes. So the

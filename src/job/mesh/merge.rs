@@ -26,8 +26,9 @@ pub fn merge_frontiers(
     memory: u64,
     node: NodeIndex,
 ) -> Result<StepOutput<Vec<TileIndex>>> {
-    let union = join(store, &tree.merged_by(node))?;
-    check_memory(union.sites.len(), memory)?;
+    let below = tree.merged_by(node);
+    check_memory(below.iter().map(|&child| Frontier::count(store, child)).sum::<Result<u64>>()?, memory)?;
+    let union = join(store, &below)?;
     let sites: Vec<Site> = union.sites.iter().map(BorderVertex::plane).collect();
     let mesh = divide_and_conquer::triangulate(&sites)?;
     let covered = covered(&mesh, bytemuck::cast_slice(&union.boundary))?;
@@ -64,14 +65,10 @@ fn join(store: &Store, nodes: &[NodeIndex]) -> Result<Frontier> {
     Ok(union)
 }
 
-fn check_memory(sites: usize, memory: u64) -> Result<()> {
-    let needed = sites as u64 * BYTES_PER_MERGED_SITE;
+fn check_memory(sites: u64, memory: u64) -> Result<()> {
+    let needed = sites * BYTES_PER_MERGED_SITE;
     if needed <= memory {
         return Ok(());
     }
-    Err(Error::Memory(format!(
-        "{sites} sites lie on circles or triangles that no tile can decide alone, and joining them takes about {} MiB; raise \
-         [limits] memory",
-        needed >> 20
-    )))
+    Err(Error::Memory(format!("joining {sites} sites takes about {} MiB; raise [limits] memory", needed >> 20)))
 }

@@ -22,7 +22,7 @@ pub fn common_crs(sources: &[Source], choice: &CrsChoice, warnings: &mut Warning
         sources.iter().map(|s| (s, crs.differences(&s.crs))).filter(|(_, found)| !found.is_empty()).collect();
     if let Some((first, differences)) = overruled.first() {
         warnings.push(format!(
-            "[input] crs takes all inputs as {}, though {} of {} say otherwise, such as {} ({}), which differs in {}",
+            "[input] crs takes all inputs as {}, though {} of {} say otherwise, such as {}: {} differs in {}",
             crs.label(),
             overruled.len(),
             sources.len(),
@@ -84,10 +84,9 @@ fn refuse_differences(distinct: &[(&Source, ComparableCrs)]) -> Result<()> {
 fn warn_of_datums(without: Vec<&Source>, count: usize, datum: &str, warnings: &mut Warnings) {
     if let Some(first) = without.first() {
         warnings.push(format!(
-            "{} of {count} inputs do not say their datum, such as {} ({}): it is taken to be {datum}, as in the others",
+            "{} of {count} inputs do not say their datum, such as {}: it is taken to be {datum}, as in the others",
             without.len(),
-            first.path.display(),
-            first.crs.label()
+            first.path.display()
         ));
     }
 }

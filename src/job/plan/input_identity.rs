@@ -4,7 +4,7 @@ use crate::input::samples::FileSamples;
 use crate::{Error, Result};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
@@ -58,6 +58,7 @@ impl InputIdentities {
         if known == present {
             return Vec::new();
         }
+        let [known, present] = [known, present].map(|contents| contents.into_iter().collect::<HashSet<_>>());
         let places = |files: &[InputIdentity]| files.iter().map(|file| file.place.clone()).collect::<HashSet<_>>();
         let (known_places, places) = (places(&earlier.0), places(&self.0));
         let change = |file: &InputIdentity| match (known.contains(&file.content), known_places.contains(&file.place)) {
@@ -90,12 +91,12 @@ impl InputIdentity {
 
 /// Inputs that have other paths than an earlier run knew: it had another working directory, or their folder has moved.
 #[derive(Clone, Debug, Default)]
-pub struct RenamedInputs(Vec<(PathBuf, PathBuf)>);
+pub struct RenamedInputs(BTreeMap<PathBuf, PathBuf>);
 
 impl RenamedInputs {
     /// Changes the path of an input to the present one.
     pub(crate) fn rename(&self, path: &mut PathBuf) {
-        if let Some((_, new)) = self.0.iter().find(|(old, _)| old == path) {
+        if let Some(new) = self.0.get(path) {
             path.clone_from(new);
         }
     }

@@ -197,8 +197,8 @@ fn vertical_step(sources: &[Source], extent: &Extent, wish: &LatticeWish) -> Res
             Ok(ChosenStep { step, finest: step, lossless: true })
         } else {
             Err(Error::Config(format!(
-                "[input] resolution_z = {step} is too fine for heights from {} to {}: glTF's single precision holds at most 2^25 steps \
-                 of half of it",
+                "[input] resolution_z = {step} is too fine for heights from {} to {}: floating point cannot hold them in such steps; \
+                 set a coarser one, or \"auto\"",
                 extent.min[2], extent.max[2]
             )))
         };

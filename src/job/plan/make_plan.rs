@@ -92,7 +92,7 @@ fn try_plan(
         return Err(Error::Config(format!("{records} records are more than one job can hold (2^40)")));
     }
     check_missing_records(sources, &options.input)?;
-    refuse_degrees(sources, options.input.unit)?;
+    refuse_degrees(sources, &options.input)?;
     let crs = common_crs(sources, &options.input.crs, &mut warnings)?;
     let (unit, metres) = horizontal_unit(options.input.unit, &crs, &mut warnings)?;
     let metres_z = crs.vertical.unwrap_or(metres);
@@ -138,11 +138,11 @@ fn extent_without_outliers(sources: &mut [Source], options: &JobOptions, wish: &
         return Ok(all);
     }
     let choice = row_choice(options);
-    let mut told = false;
+    let mut left_out = false;
     for source in sources.iter_mut() {
-        told |= source.tell_outliers(&choice, before.is_useless())?;
+        left_out |= source.leave_out_outliers(&choice, before.is_useless())?;
     }
-    if told {
+    if left_out {
         let rest = Extent::of(sources, &options.input, wish.metres[0])?;
         if fineness(sources, &rest, wish).is_better_than(&before) {
             return Ok(rest);

@@ -1,7 +1,7 @@
 //! What the plan knows of texts, which are read once before it is made: rows that nobody wants, mistakes, degrees.
 
-use crate::input::options::{OnBadFile, UnitChoice};
-use crate::input::{FileFormat, PointCounts, PointRules, RowChoice, Source, TextReading, Unit};
+use crate::input::options::{InputOptions, OnBadFile, UnitChoice};
+use crate::input::{CrsChoice, FileFormat, PointCounts, PointRules, RowChoice, Source, TextReading, Unit};
 use crate::job::options::JobOptions;
 use crate::job::plan::job_plan::Plan;
 use crate::output::options::ColorChoice;
@@ -32,13 +32,14 @@ pub(crate) fn wants_colors(options: &JobOptions) -> bool {
 ///
 /// # Errors
 /// [`Error::Config`] names the first such file.
-pub(crate) fn refuse_degrees(sources: &[Source], unit: UnitChoice) -> Result<()> {
+pub(crate) fn refuse_degrees(sources: &[Source], options: &InputOptions) -> Result<()> {
     let is_in_degrees = |s: &&Source| s.format == FileFormat::Text && s.crs.horizontal == Unit::Degree;
+    let is_open = options.unit == UnitChoice::Auto && matches!(options.crs, CrsChoice::Auto | CrsChoice::First);
     match sources.iter().find(is_in_degrees) {
-        Some(source) if unit == UnitChoice::Auto => Err(Error::Config(format!(
+        Some(source) if is_open => Err(Error::Config(format!(
             "{}: its columns are named as degrees and hold them (x from {} to {}, y from {} to {}), and a Delaunay triangulation in \
              degrees is distorted: transform the points to a projected CRS first, for example with `cs2cs` or `pdal translate`; if \
-             they are no degrees, set [input] unit, for example to \"metre\"",
+             they are no degrees, set [input] unit, for example to \"metre\", or [input] crs",
             source.path.display(),
             source.min[0],
             source.max[0],

@@ -91,7 +91,8 @@ pub fn check(options: &JobOptions) -> Result<Preflight> {
 /// As [`Preflight::passes`].
 pub(crate) fn require_room(plan: &Plan, threads: usize) -> Result<()> {
     let mut preflight = Preflight::of(plan, threads, KeptPoints::by_headers(plan));
-    if has_filter(plan) && preflight.disk_is_short() {
+    let memory_is_short = preflight.memory_free.is_some_and(|free| free < preflight.memory);
+    if has_filter(plan) && (preflight.disk_is_short() || memory_is_short) {
         preflight = closer_look(plan, threads)?;
     }
     preflight.passes()

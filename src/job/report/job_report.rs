@@ -213,9 +213,8 @@ impl Report {
     /// # Errors
     /// [`Error::Broken`] if it cannot be written as JSON.
     pub fn sealed(mut self) -> Result<(Report, Vec<u8>)> {
-        self.checksum = Checksum::default();
-        let (checksum, _) = seal(&self.text()?).ok_or_else(|| Error::Broken("the report has no checksum".into()))?;
-        self.checksum = checksum;
+        let seal = seal(&self.text()?).ok_or_else(|| Error::Broken("the report has no checksum".into()))?;
+        self.checksum = seal.0;
         let text = self.text()?;
         Ok((self, text))
     }

@@ -14,7 +14,6 @@ use crate::job::preflight::kept_points::KeptPoints;
 use crate::job::publish::one_file_limits::MAX_TRIANGLES_IN_ONE_FILE;
 use crate::job::records::JobStep;
 use crate::job::run::run_context::RunContext;
-use crate::job::run::threads::run_concurrently;
 use crate::job::run::tile_queue::{TileQueue, WrittenTiles};
 use crate::job::run::tree_walk::TreeWalk;
 use crate::job::run::unmerged::Unmerged;
@@ -22,6 +21,7 @@ use crate::job::tiles::max_edge::MaxEdgeRule;
 use crate::job::tiles::style::TileStyle;
 use crate::output::options::MaxEdge;
 use crate::output::preview::canvas::Canvas;
+use crate::threads::run_concurrently;
 
 /// The whole mesh, written as tiles.
 pub(crate) struct MeshInTiles {
@@ -60,7 +60,7 @@ pub(crate) fn mesh_and_tiles(
             queue.attempt(|| style(0).map(|(style, canvas)| queue.begin(scope, style, canvas)))?;
         }
         let leaves = walk.walk(scope, NodeIndex::ROOT)?;
-        queue.attempt(|| walk.check_merged())?;
+        queue.attempt(|| walk.unmerged.check(&plan.options))?;
         let all_leaves = run.journal.position();
         // This closes the point file: an open file is not freed when it is removed.
         drop(walk);

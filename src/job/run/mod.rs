@@ -8,7 +8,6 @@ pub(crate) mod read_step;
 pub(crate) mod resume;
 pub(crate) mod run_context;
 pub(crate) mod stage_costs;
-pub(crate) mod threads;
 pub(crate) mod tile_queue;
 pub(crate) mod tree_walk;
 pub(crate) mod unmerged;

@@ -14,14 +14,14 @@ use crate::job::records::{JobStep, StepOutput};
 use crate::job::report::job_report::{Report, ReportParts};
 use crate::job::run::levels_step::LevelResult;
 use crate::job::run::run_context::RunContext;
-use crate::job::run::threads::run_concurrently;
 use crate::job::run::tile_queue::WrittenTiles;
 use crate::job::tiles::write_tile::TileStats;
 use crate::output::checksums::list_text;
 use crate::output::options::OutputFormat;
 use crate::output::tiles3d::georeference::Georeference;
+use crate::threads::run_concurrently;
 use crate::{Result, Warnings};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Tells whether viewers get 3D Tiles: where the user wants them, or where one file would be too large.
 pub(crate) fn wants_tileset(plan: &Plan, written: &TileStats) -> bool {
@@ -122,12 +122,12 @@ pub(crate) fn write_report(
     Ok(report)
 }
 
-/// Writes the list of all results so far with their checksums, which the journal has.
+/// Writes the list of all results so far. Their checksums are in the journal.
 fn write_file_list(run: &RunContext) -> Result<PendingFile> {
-    let output = run.directory.output();
-    let own = [output.job(), output.checksums(), output.report()].map(|path| run.directory.name(&path));
-    let is_result = |name: &PathBuf| !own.iter().any(|own| name.starts_with(own));
-    let files = run.journal.files().into_iter().filter(|file| is_result(&file.name));
+    let (directory, output) = (run.directory, run.directory.output());
+    let own = [output.checksums(), output.report()].map(|path| directory.name(&path));
+    let files = run.journal.files().into_iter();
+    let files = files.filter(|file| directory.is_result(&file.name) && !own.contains(&file.name));
     let files: Vec<_> = files.map(|file| (slashed(&file.name), file.checksum)).collect();
     write_pending(&output.checksums(), list_text(&files).as_bytes())
 }

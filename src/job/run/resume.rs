@@ -163,8 +163,8 @@ pub(crate) fn start<'a>(
     }
     let records: Vec<RecordRef> = entries.iter().flat_map(|entry| &entry.records).copied().collect();
     let header = JobHeader { fingerprint: names.unwrap_or(header.fingerprint.clone()), ..*header };
-    // What does not stay goes first, or a disk that it filled would have no room for the new journal. Until that is there, the old one
-    // names steps whose output is gone, and a run after a kill finds that out. One that names nothing that stays goes too.
+    // What does not stay is removed first: it may fill the disk, and the new journal needs room. Until the new journal is there, the
+    // old one names steps whose output is gone; after a kill the next run notices. If no step stays, the old journal is removed too.
     if entries.is_empty() {
         remove_file(&directory.journal())?;
     }
@@ -316,7 +316,9 @@ impl ResumeReview {
             JobStep::Merge(node) => self.merge_stays(node),
             JobStep::BorderNormals(tile) => self.border_stays(tile),
             JobStep::Partition | JobStep::WriteTile(_) | JobStep::Level(_) => self.whole.contains(&step),
-            JobStep::Publish | JobStep::Report => self.all_written && self.whole.contains(&step),
+            JobStep::Publish => self.all_written && self.whole.contains(&step),
+            // A run with all its results whole does not come here. Any other writes a new report, and the journal must name only one.
+            JobStep::Report => false,
         }
     }
 

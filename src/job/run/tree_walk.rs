@@ -94,17 +94,9 @@ impl<'a> TreeWalk<'a> {
     fn leave_out(&self, node: NodeIndex, below: &[NodeIndex]) -> Result<()> {
         let sites = |child: &NodeIndex| match self.unmerged.sites(*child) {
             Some(sites) => Ok(sites),
-            None => Frontier::load(self.run.store, *child).map(|frontier| frontier.sites.len() as u64),
+            None => Frontier::count(self.run.store, *child),
         };
         self.unmerged.add(node, below.iter().map(sites).sum::<Result<u64>>()?);
         Ok(())
-    }
-
-    /// Checks that all merge nodes were merged, once the walk is done.
-    ///
-    /// # Errors
-    /// [`Error::Memory`] if some did not fit.
-    pub(crate) fn check_merged(&self) -> Result<()> {
-        self.unmerged.check(&self.plan.options)
     }
 }
