@@ -102,11 +102,12 @@ fn texts_without_codes_whose_datums_differ_are_refused_unless_the_user_says_whic
     let words = ["old.las", "new.las", "the datum", "1927", "1983", "one CRS", "[input] crs"];
     Job::on(&[&old, &new]).run().refused(2, &words);
     Job::on(&[&new, &old]).run().refused(2, &words);
-    for (choice, used) in [("first", "UTM_15N"), ("EPSG:26915", "NAD83 / UTM zone 15N")] {
+    for (choice, used, other) in [("first", "UTM_15N", "new.las"), ("EPSG:26915", "NAD83 / UTM zone 15N", "old.las")] {
         let job = Job::on(&[&old, &new]).with("input", &format!("crs = \"{choice}\""));
         let report = job.report();
         assert_eq!(report["crs"], used);
-        assert!(warnings(&report).contains("which differs in the datum"), "{report}");
+        assert!(warnings(&report).contains(&format!("{other}: ")), "{report}");
+        assert!(warnings(&report).contains("differs in the datum"), "{report}");
         job.verified();
     }
     let coded = write(folder.path(), "coded.las", &[code(26915)]);
