@@ -1,6 +1,8 @@
 //! Running work on a pool of threads, and while another thread waits.
 
-use crate::{Error, Result, address_space};
+use crate::{Error, Result, address_space, interrupt};
+use std::sync::mpsc::{RecvTimeoutError, sync_channel};
+use std::time::Duration;
 
 /// The address space that a thread takes: its stack, and what starting it takes besides.
 const BYTES_PER_THREAD: u64 = (2 << 20) + (64 << 10);
@@ -37,6 +39,30 @@ pub(crate) fn run_concurrently<T>(
         }
         Err(_) => waiting().and_then(|()| work()),
     })
+}
+
+/// Runs `work`, which cannot be stopped, on a thread of its own. If the process is asked to stop meanwhile, nobody waits for it any
+/// longer, and it ends with the process.
+///
+/// # Errors
+/// Those of `work`, [`Error::Interrupted`], or [`Error::Memory`] if no thread can be started.
+pub fn unless_interrupted<T: Send + 'static>(work: impl FnOnce() -> Result<T> + Send + 'static) -> Result<T> {
+    let (sender, receiver) = sync_channel(1);
+    let send = move || {
+        // After an interruption nobody receives it.
+        let _ = sender.send(work());
+    };
+    let thread = std::thread::Builder::new().spawn(send);
+    thread.map_err(|e| Error::Memory(format!("cannot start a thread: {e}")))?;
+    loop {
+        match receiver.recv_timeout(Duration::from_millis(100)) {
+            Ok(outcome) => return outcome,
+            Err(RecvTimeoutError::Timeout) => interrupt::check()?,
+            Err(RecvTimeoutError::Disconnected) => {
+                return Err(Error::Broken("a thread ended without a result".into()));
+            }
+        }
+    }
 }
 
 /// Returns how many threads the machine runs at the same time.

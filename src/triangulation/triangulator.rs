@@ -6,6 +6,7 @@ use crate::gpu::device::hardware_is_likely;
 use crate::gpu::executor::{Executor, GpuUse};
 use crate::gpu::options::GpuOptions;
 use crate::mesh::half_edge::HalfEdgeMesh;
+use crate::threads::unless_interrupted;
 use crate::triangulation::options::{Backend, TriangulationOptions};
 use crate::triangulation::{divide_and_conquer, reference};
 use crate::voronoi::counts::PipelineCounts;
@@ -101,7 +102,9 @@ impl Triangulator {
         let mut outcome = TriangulationCounts::default();
         if !self.pipeline {
             outcome.reference = 1;
-            return Ok((reference::triangulate(sites)?, outcome));
+            // `spade` takes quadratic time on some sites, and cannot be stopped.
+            let sites = sites.to_vec();
+            return Ok((unless_interrupted(move || reference::triangulate(&sites))?, outcome));
         }
         let gpu = self.gpu.as_ref().map(|gpu| gpu as &dyn DiagramBackend);
         match BUFFERS.with_borrow_mut(|buffers| voronoi::triangulate_with(sites, gpu, buffers)) {

@@ -157,3 +157,30 @@ fn a_coordinate_system_places_the_tileset_on_the_globe() {
         assert!(georeference["globe"]["distortion_m"].as_f64().unwrap() < 0.2, "{name}");
     }
 }
+
+/// Of every triangle that stays, all vertices are on the boundary, so coarser tiles are as large as the finer ones together.
+#[test]
+fn a_terrain_of_scraps_has_only_the_levels_that_fit_the_memory() {
+    let scraps = (0..120_000i64).flat_map(|i| {
+        let [x, y] = [i % 400, i / 400].map(|k| 500 * k);
+        [[x, y, i % 7], [x + 100, y + 20, i % 5], [x + 30, y + 90, i % 3]]
+    });
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = clouds::write(folder.path(), "cloud.csv", &scraps.collect::<Vec<_>>());
+    let levels = |memory: &str| {
+        let job = Job::on(&[&cloud]).tiles_of(10_000).with("limits", memory);
+        let job = job.with("output", "max_edge = 150\nmax_points_per_level_tile = 10000");
+        let report = job.report();
+        job.verified();
+        let tiles = tiles(&job);
+        let inner: Vec<&Value> =
+            tiles.iter().map(|tile| &tile.json).filter(|tile| !tile["children"].is_null()).collect();
+        let with_mesh = inner.iter().filter(|tile| !tile["content"].is_null()).count();
+        assert_eq!(number(&report["levels"]["files"]), with_mesh as u64);
+        assert_eq!(report["warnings"].to_string().contains("coarser tiles are left out"), with_mesh < inner.len());
+        (inner.len(), with_mesh)
+    };
+    let ((inner, all), (_, some)) = (levels(""), levels("memory = \"256 MiB\""));
+    assert_eq!(inner, all);
+    assert!(0 < some && some < all, "{some} of {all}");
+}

@@ -57,13 +57,28 @@ fn a_job_interrupted_before_its_first_step_leaves_nothing() {
 }
 
 #[test]
-fn a_second_ctrl_c_ends_the_job_at_once() {
-    // One leaf that takes long and does not check for signals.
-    let rig =
-        Rig::new(&scattered::gaussian(400_000), &Setup::tiles_of(500_000).backend("reference")).committing_every(0);
+fn the_reference_is_left_behind_when_the_job_is_stopped() {
+    // One leaf, which takes `spade` longer than a run may last here.
+    let line = (0..300_000).map(|i| if i == 0 { [40_000, 70_000] } else { [2 * i, 0] });
+    let setup = Setup::tiles_of(1_000_000);
+    let rig = Rig::new(&scattered::with_heights(line), &setup).committing_every(0);
+    rig.configure(&setup.clone().backend("reference"));
     let mut run = Run::start(&mut rig.command());
     run.wait_until(|| rig.steps() == 1);
-    std::thread::sleep(Duration::from_millis(100));
+    std::thread::sleep(Duration::from_millis(50));
+    run.signal("TERM");
+    run.end().stopped(&["error: interrupted"]);
+    rig.configure(&setup);
+    rig.completes("with another backend");
+}
+
+#[test]
+fn a_second_ctrl_c_ends_the_job_at_once() {
+    // One leaf that takes long and does not check for signals.
+    let rig = Rig::new(&scattered::uniform(800_000, 1_000_000, 1), &Setup::tiles_of(1_000_000)).committing_every(0);
+    let mut run = Run::start(&mut rig.command());
+    run.wait_until(|| rig.steps() == 1);
+    std::thread::sleep(Duration::from_millis(50));
     run.signal("INT");
     std::thread::sleep(Duration::from_millis(20));
     run.signal("INT");

@@ -4,8 +4,8 @@
 use crate::job::index::{NodeIndex, TileIndex};
 use crate::job::partition::tree::{NodeKind, Tree};
 
-/// Bytes that a site takes while the meshes of a tile's children are joined and simplified.
-pub const BYTES_PER_LEVEL_SITE: u64 = 550;
+/// Bytes that a vertex takes while the meshes of a tile's children are joined and simplified.
+pub const BYTES_PER_LEVEL_VERTEX: u64 = 550;
 
 /// Bytes that the process takes, including what its allocator keeps from earlier steps.
 const KEPT: u64 = 104 << 20;
@@ -28,10 +28,6 @@ pub struct CoarseTile {
     pub children: Vec<ChildTile>,
     /// 1 if all children are exact tiles, else one more than the highest child.
     pub height: usize,
-    /// About how many points its children's meshes have.
-    pub sites: u64,
-    /// Whether it has a mesh. It has none if that takes more memory than there is, or if a child has none for that reason.
-    pub content: bool,
 }
 
 /// The tiles of the tileset.
@@ -55,7 +51,7 @@ impl LevelSizes {
     /// that earlier steps leave free.
     pub fn new(sites: u64, memory: u64) -> LevelSizes {
         let memory = memory.saturating_sub(KEPT).max(memory / 5).min(memory / 4 * 3);
-        LevelSizes { sites: sites.min(memory / (4 * BYTES_PER_LEVEL_SITE)).max(1), memory }
+        LevelSizes { sites: sites.min(memory / (4 * BYTES_PER_LEVEL_VERTEX)).max(1), memory }
     }
 
     /// Returns about how many triangles a tile gets whose children together have `triangles`.
@@ -67,7 +63,7 @@ impl LevelSizes {
 impl Hierarchy {
     /// Builds the hierarchy over `tree`; `points` is the number of points of every tile.
     pub fn new(tree: &Tree, points: &[u64], sizes: LevelSizes) -> Hierarchy {
-        let mut builder = HierarchyBuilder { tree, sites: sites_below(tree, points), points, sizes, tiles: Vec::new() };
+        let mut builder = HierarchyBuilder { tree, sites: sites_below(tree, points), sizes, tiles: Vec::new() };
         if !tree.nodes.is_empty() {
             builder.grow(NodeIndex::ROOT, None);
         }
@@ -79,12 +75,6 @@ impl Hierarchy {
         let highest = self.tiles.iter().map(|tile| tile.height).max().unwrap_or(0);
         let at = |height: usize| (0..self.tiles.len()).filter(|&i| self.tiles[i].height == height).collect();
         (1..=highest).map(at).collect()
-    }
-
-    /// Returns the bytes of memory that making the largest of them takes.
-    pub fn largest(&self) -> u64 {
-        let with_content = self.tiles.iter().filter(|tile| tile.content);
-        with_content.map(|tile| tile.sites.saturating_mul(BYTES_PER_LEVEL_SITE)).max().unwrap_or(0)
     }
 }
 
@@ -107,7 +97,6 @@ struct HierarchyBuilder<'a> {
     tree: &'a Tree,
     /// Points below each node.
     sites: Vec<u64>,
-    points: &'a [u64],
     sizes: LevelSizes,
     tiles: Vec<CoarseTile>,
 }
@@ -139,14 +128,7 @@ impl HierarchyBuilder<'_> {
     fn add_tile(&mut self, node: NodeIndex, children: Vec<ChildTile>) -> ChildTile {
         let coarse = |child: &ChildTile| if let ChildTile::Coarse(at) = *child { Some(&self.tiles[at]) } else { None };
         let height = children.iter().filter_map(coarse).map(|tile| tile.height).max().unwrap_or(0) + 1;
-        let sites = children.iter().map(|child| match *child {
-            ChildTile::Exact(tile) => self.points[tile.get()],
-            ChildTile::Coarse(at) => self.sizes.target(2 * self.tiles[at].sites as usize) as u64 / 2,
-        });
-        let sites: u64 = sites.sum();
-        let fits = sites.saturating_mul(BYTES_PER_LEVEL_SITE) <= self.sizes.memory;
-        let content = fits && children.iter().filter_map(coarse).all(|tile| tile.content);
-        self.tiles.push(CoarseTile { node, children, height, sites, content });
+        self.tiles.push(CoarseTile { node, children, height });
         ChildTile::Coarse(self.tiles.len() - 1)
     }
 }
@@ -175,37 +157,30 @@ mod tests {
         tree
     }
 
-    fn hierarchy(depth: u32, points: u64, sites: u64, memory: u64) -> Hierarchy {
+    fn hierarchy(depth: u32, points: u64, sites: u64) -> Hierarchy {
         let tree = balanced(depth);
-        Hierarchy::new(&tree, &vec![points; tree.leaves.len()], LevelSizes { sites, memory })
+        Hierarchy::new(&tree, &vec![points; tree.leaves.len()], LevelSizes { sites, memory: u64::MAX })
     }
 
     #[test]
     fn four_leaves_make_a_tile_and_four_tiles_the_next() {
         for points in [26_000, 37_500, 50_000] {
-            let hierarchy = hierarchy(4, points, 50_000, u64::MAX);
+            let hierarchy = hierarchy(4, points, 50_000);
             assert_eq!(hierarchy.by_height().iter().map(Vec::len).collect::<Vec<_>>(), [4, 1], "{points}");
-            assert!(hierarchy.tiles.iter().all(|tile| tile.children.len() == 4 && tile.content));
+            assert!(hierarchy.tiles.iter().all(|tile| tile.children.len() == 4));
             assert_eq!(hierarchy.tiles[0].children, [0, 1, 2, 3].map(|tile| ChildTile::Exact(TileIndex(tile))));
         }
     }
 
     #[test]
     fn small_leaves_are_grouped_in_dozens_and_large_ones_in_fours_or_twos() {
-        assert_eq!(hierarchy(5, 5_000, 50_000, u64::MAX).tiles[0].children.len(), 32);
-        let large = hierarchy(4, 1_000_000, 50_000, u64::MAX);
+        assert_eq!(hierarchy(5, 5_000, 50_000).tiles[0].children.len(), 32);
+        let large = hierarchy(4, 1_000_000, 50_000);
         assert!(large.tiles.iter().all(|tile| (2..=4).contains(&tile.children.len())), "{large:?}");
     }
 
     #[test]
-    fn a_tile_that_does_not_fit_has_no_mesh_nor_has_any_above_it() {
-        let hierarchy = hierarchy(4, 50_000, 50_000, 1_000_000);
-        assert!(hierarchy.tiles.iter().all(|tile| !tile.content));
-        assert_eq!(hierarchy.largest(), 0);
-    }
-
-    #[test]
     fn one_leaf_needs_no_levels() {
-        assert_eq!(hierarchy(0, 100, 50_000, u64::MAX), Hierarchy::default());
+        assert_eq!(hierarchy(0, 100, 50_000), Hierarchy::default());
     }
 }

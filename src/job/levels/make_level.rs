@@ -3,18 +3,19 @@
 use crate::geometry::Bounds;
 use crate::job::durable::directory::{JobDirectory, create_folder};
 use crate::job::index::NodeIndex;
-use crate::job::levels::hierarchy::{ChildTile, Hierarchy, LevelSizes};
+use crate::job::levels::hierarchy::{BYTES_PER_LEVEL_VERTEX, ChildTile, Hierarchy, LevelSizes};
+use crate::job::levels::shared_memory::{SharedMemory, Taken};
 use crate::job::records::{LevelSummary, StepOutput, Store, TileSummary};
 use crate::job::tiles::style::TileStyle;
 use crate::job::tiles::write_tile::write_glb;
 use crate::output::frame::Frame;
 use crate::output::gltf::read::{TileFile, read_tile};
 use crate::output::lod::join::join;
-use crate::output::lod::simplify::simplify;
+use crate::output::lod::simplify::{Simplified, simplify};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The figures of one coarser tile, or of all.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
@@ -27,6 +28,8 @@ pub struct LevelStats {
     pub bytes: u64,
     /// The greatest vertical distance between one of them and the exact mesh in metres.
     pub error_m: f64,
+    /// Coarser tiles without a mesh, because the tiles below them take too much memory.
+    pub left_out: u64,
 }
 
 impl AddAssign for LevelStats {
@@ -35,108 +38,116 @@ impl AddAssign for LevelStats {
         self.triangles += other.triangles;
         self.bytes += other.bytes;
         self.error_m = self.error_m.max(other.error_m);
+        self.left_out += other.left_out;
     }
+}
+
+/// Where the coarser tiles of a job are made.
+pub struct LevelRoom<'a> {
+    /// Holds the tiles, finer and coarser.
+    pub directory: &'a JobDirectory,
+    /// Holds what `tileset.json` says of them.
+    pub store: &'a Store,
+    /// The coarser tiles.
+    pub hierarchy: &'a Hierarchy,
+    /// How tiles look.
+    pub style: &'a TileStyle,
+    /// How large coarser tiles are to be.
+    pub sizes: LevelSizes,
+    /// What all that are made at one time may take; `None` makes no meshes.
+    pub memory: Option<&'a SharedMemory>,
 }
 
 /// Makes coarser tile `index` of the hierarchy, whose children must exist. Stores what `tileset.json` says of it and of the exact
-/// tiles among its children. With `content` it writes the mesh too.
+/// tiles among its children. It has no mesh if its children have too many vertices for the memory, or if one of them has none for
+/// that reason.
 ///
 /// # Errors
 /// [`Error::Io`] on the output or the store, [`Error::Broken`] if a file is not what an earlier step wrote.
-pub fn make_level(
-    directory: &JobDirectory,
-    store: &Store,
-    hierarchy: &Hierarchy,
-    index: usize,
-    style: &TileStyle,
-    sizes: LevelSizes,
-    content: bool,
-) -> Result<StepOutput<LevelStats>> {
-    let coarse = &hierarchy.tiles[index];
-    let mut children = ChildMeshes::default();
-    for &child in &coarse.children {
-        children.add(directory, store, hierarchy, child, content && coarse.content)?;
-    }
-    let ChildMeshes { files: meshes, leaves, bounds, error } = children;
+pub fn make_level(room: &LevelRoom, index: usize) -> Result<StepOutput<LevelStats>> {
+    let coarse = &room.hierarchy.tiles[index];
+    let children = coarse.children.iter().map(|&child| Child::find(room, child)).collect::<Result<Vec<_>>>()?;
+    let bounds = children.iter().filter_map(|child| child.own.bounds()).reduce(Bounds::union);
     let (mut stats, mut files) = (LevelStats::default(), Vec::new());
-    let mut own = TileSummary::new(bounds, false);
-    if content && coarse.content && !meshes.is_empty() {
-        let joined = join(&style.frame, &meshes).map_err(|what| contradiction(coarse.node, &what))?;
-        drop(meshes);
-        let simple = simplify(&style.frame, &joined, sizes.target(joined.triangles.len()))?;
-        // No error is greater than the range of heights: both meshes lie within it.
-        own.error = (error + simple.error).min(height_range(&style.frame, bounds));
-        own.content = 1;
-        create_folder(&directory.output().levels())?;
-        let written = write_glb(&directory.output().level(coarse.node.get()), &simple.tile, style)?;
-        let triangles = simple.tile.triangles.len() as u64;
-        stats = LevelStats { files: 1, triangles, bytes: written.bytes, error_m: own.error };
-        files.push(written);
+    let mut own = TileSummary::new(bounds, 0);
+    if let (Some(memory), Some(bounds)) = (room.memory, bounds) {
+        match memory_for(memory, &children) {
+            None => stats.left_out = 1,
+            Some(_taken) => {
+                let simple = simplified(room, coarse.node, &children)?;
+                // No error is greater than the range of heights: both meshes lie within it.
+                let below = children.iter().map(|child| child.own.error).fold(0.0, f64::max);
+                own.error = (below + simple.error).min(height_range(&room.style.frame, bounds));
+                own.vertices = simple.tile.positions.len() as u32;
+                create_folder(&room.directory.output().levels())?;
+                let written = write_glb(&room.directory.output().level(coarse.node.get()), &simple.tile, room.style)?;
+                let triangles = simple.tile.triangles.len() as u64;
+                stats = LevelStats { files: 1, triangles, bytes: written.bytes, error_m: own.error, left_out: 0 };
+                files.push(written);
+            }
+        }
     }
-    let record = LevelSummary { own, leaves }.save(store, coarse.node)?;
+    let leaves = children.iter().filter(|child| child.exact).map(|child| child.own).collect();
+    let record = LevelSummary { own, leaves }.save(room.store, coarse.node)?;
     Ok(StepOutput { files, ..StepOutput::new(stats, vec![record]) })
 }
 
+/// Takes the memory that joining and simplifying `children` needs. Returns `None` if there is not so much, or if one of them has been
+/// left out.
+fn memory_for<'a>(memory: &'a SharedMemory, children: &[Child]) -> Option<Taken<'a>> {
+    let vertices: u64 = children.iter().map(|child| u64::from(child.own.vertices)).sum();
+    let whole = children.iter().all(|child| child.own.vertices > 0 || child.own.bounds().is_none());
+    whole.then(|| memory.take(vertices.saturating_mul(BYTES_PER_LEVEL_VERTEX))).flatten()
+}
+
+/// Joins and simplifies the meshes of `children`, the tiles below `node`.
+fn simplified(room: &LevelRoom, node: NodeIndex, children: &[Child]) -> Result<Simplified> {
+    let meshes = children.iter().filter(|child| child.own.vertices > 0).map(|child| read_own(&child.path));
+    let meshes = meshes.collect::<Result<Vec<_>>>()?;
+    let joined = join(&room.style.frame, &meshes).map_err(|what| contradiction(node, &what))?;
+    drop(meshes);
+    simplify(&room.style.frame, &joined, room.sizes.target(joined.triangles.len()))
+}
+
 /// Returns the range of heights in metres.
-fn height_range(frame: &Frame, bounds: Option<Bounds<3>>) -> f64 {
-    bounds.map_or(0.0, |bounds| bounds.extent(2) as f64 * frame.resolution_metres()[1])
+fn height_range(frame: &Frame, bounds: Bounds<3>) -> f64 {
+    bounds.extent(2) as f64 * frame.resolution_metres()[1]
 }
 
 fn contradiction(node: NodeIndex, what: &impl std::fmt::Display) -> Error {
     Error::Broken(format!("the tiles below node {node} do not fit together: {what}"))
 }
 
-/// The children of a coarser tile.
-#[derive(Default)]
-struct ChildMeshes {
-    files: Vec<TileFile>,
-    /// The exact tiles among them.
-    leaves: Vec<TileSummary>,
-    bounds: Option<Bounds<3>>,
-    /// The greatest error of a child in metres.
-    error: f64,
+/// A tile that a coarser one is made from.
+struct Child {
+    /// What `tileset.json` says of it.
+    own: TileSummary,
+    /// Whether it is an exact tile.
+    exact: bool,
+    /// Its GLB, if there is one.
+    path: PathBuf,
 }
 
-impl ChildMeshes {
-    /// Adds a child, and its mesh if `with_mesh` is set.
-    fn add(
-        &mut self,
-        directory: &JobDirectory,
-        store: &Store,
-        hierarchy: &Hierarchy,
-        child: ChildTile,
-        with_mesh: bool,
-    ) -> Result<()> {
+impl Child {
+    fn find(room: &LevelRoom, child: ChildTile) -> Result<Child> {
+        let output = room.directory.output();
         match child {
             ChildTile::Exact(tile) => {
-                let own = TileSummary::load(store, tile)?;
-                self.widen(own.bounds());
-                if with_mesh && own.content > 0 {
-                    self.files.push(read_own(directory.output().tile(tile.get()))?);
-                }
-                self.leaves.push(own);
+                let own = TileSummary::load(room.store, tile)?;
+                Ok(Child { own, exact: true, path: output.tile(tile.get()) })
             }
             ChildTile::Coarse(index) => {
-                let node = hierarchy.tiles[index].node;
-                let own = LevelSummary::load(store, node)?.own;
-                self.widen(own.bounds());
-                self.error = self.error.max(own.error);
-                if with_mesh && own.content > 0 {
-                    self.files.push(read_own(directory.output().level(node.get()))?);
-                }
+                let node = room.hierarchy.tiles[index].node;
+                let own = LevelSummary::load(room.store, node)?.own;
+                Ok(Child { own, exact: false, path: output.level(node.get()) })
             }
         }
-        Ok(())
-    }
-
-    fn widen(&mut self, bounds: Option<Bounds<3>>) {
-        self.bounds = self.bounds.into_iter().chain(bounds).reduce(Bounds::union);
     }
 }
 
 /// Reads a tile that this program wrote a moment ago: if it is bad, the program is.
-fn read_own(path: PathBuf) -> Result<TileFile> {
-    read_tile(&path).map_err(|error| match error {
+fn read_own(path: &Path) -> Result<TileFile> {
+    read_tile(path).map_err(|error| match error {
         Error::Input { .. } => Error::Broken(error.to_string()),
         other => other,
     })

@@ -2,3 +2,4 @@
 
 pub mod hierarchy;
 pub mod make_level;
+pub mod shared_memory;

@@ -2,7 +2,7 @@
 
 use crate::input::Point;
 use crate::job::durable::directory::JobDirectory;
-use crate::job::levels::hierarchy::{BYTES_PER_LEVEL_SITE, LevelSizes};
+use crate::job::levels::hierarchy::{BYTES_PER_LEVEL_VERTEX, LevelSizes};
 use crate::job::machine;
 use crate::job::options::JobOptions;
 use crate::job::partition::tree_builder::buffer_bytes;
@@ -96,7 +96,7 @@ pub(crate) fn memory(plan: &Plan, kept: KeptPoints, threads: usize) -> u64 {
 
 fn level_memory(options: &JobOptions, points: u64, threads: usize) -> u64 {
     let sizes = LevelSizes::new(options.output.max_points_per_level_tile.0, options.limits.memory.0);
-    let one = (4 * sizes.sites).min(points) * BYTES_PER_LEVEL_SITE;
+    let one = (4 * sizes.sites).min(points) * BYTES_PER_LEVEL_VERTEX;
     if options.output.levels { (one * threads as u64).min(sizes.memory) } else { 0 }
 }
 

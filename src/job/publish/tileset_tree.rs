@@ -50,7 +50,7 @@ fn coarse_node(store: &Store, tree: &Tree, hierarchy: &Hierarchy, index: usize) 
 
 /// Returns the node of one tile without its children, or `None` if the tile has no triangle.
 fn node(tile: &TileSummary, cell: &Cell, uri: String) -> Option<TilesetNode> {
-    let (uri, bounds) = ((tile.content > 0).then_some(uri), tile.bounds()?);
+    let (uri, bounds) = ((tile.vertices > 0).then_some(uri), tile.bounds()?);
     let (error, middle) = (tile.error, middle(cell, bounds));
     Some(TilesetNode { uri, bounds, middle, error, transform: None, children: Vec::new() })
 }

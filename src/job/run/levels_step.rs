@@ -2,7 +2,8 @@
 
 use crate::Result;
 use crate::job::levels::hierarchy::{Hierarchy, LevelSizes};
-use crate::job::levels::make_level::{LevelStats, make_level};
+use crate::job::levels::make_level::{LevelRoom, LevelStats, make_level};
+use crate::job::levels::shared_memory::SharedMemory;
 use crate::job::partition::result::Partition;
 use crate::job::plan::job_plan::Plan;
 use crate::job::records::JobStep;
@@ -18,7 +19,8 @@ pub(crate) struct LevelResult {
     pub(crate) warning: Option<String>,
 }
 
-/// Makes the coarser tiles. Those of one height are made in parallel, as many at a time as the memory has room for.
+/// Makes the coarser tiles. Those of one height are made in parallel, as many at a time as the memory
+/// has room for.
 ///
 /// # Errors
 /// Those of [`make_level`].
@@ -33,13 +35,17 @@ pub(crate) fn make_levels(
     let sizes = LevelSizes::new(output.max_points_per_level_tile.0, plan.options.limits.memory.0);
     let hierarchy = Hierarchy::new(&partition.tree, &points, sizes);
     let stage = run.progress.stage("levels", hierarchy.tiles.len() as u64, "tiles");
-    let parallel = match hierarchy.largest() {
-        largest if output.levels && largest > 0 => (sizes.memory / largest).clamp(1, run.threads as u64) as usize,
-        _ => run.threads,
+    let memory = SharedMemory::new(sizes.memory);
+    let room = LevelRoom {
+        directory: run.directory,
+        store: run.store,
+        hierarchy: &hierarchy,
+        style,
+        sizes,
+        memory: output.levels.then_some(&memory),
     };
     let make = |index: usize| {
-        let work = || make_level(run.directory, run.store, &hierarchy, index, style, sizes, output.levels);
-        let stats = run.journal.step(JobStep::Level(hierarchy.tiles[index].node), work)?;
+        let stats = run.journal.step(JobStep::Level(hierarchy.tiles[index].node), || make_level(&room, index))?;
         stage.advance(1);
         Ok(stats)
     };
@@ -47,7 +53,7 @@ pub(crate) fn make_levels(
         a += b;
         Ok(a)
     };
-    let stats = on_threads(parallel, || {
+    let stats = on_threads(run.threads, || {
         let mut all = LevelStats::default();
         for height in hierarchy.by_height() {
             if output.levels {
@@ -59,16 +65,16 @@ pub(crate) fn make_levels(
         Ok(all)
     })?;
     run.add_stage(stage.finish());
-    let warning = left_out_warning(plan, &hierarchy);
+    let warning = left_out_warning(plan, &hierarchy, stats.left_out);
     Ok(LevelResult { hierarchy, stats, warning })
 }
 
-fn left_out_warning(plan: &Plan, hierarchy: &Hierarchy) -> Option<String> {
-    let without = hierarchy.tiles.iter().filter(|tile| !tile.content).count();
-    (plan.options.output.levels && without > 0).then(|| {
+fn left_out_warning(plan: &Plan, hierarchy: &Hierarchy, without: u64) -> Option<String> {
+    (without > 0).then(|| {
         format!(
-            "{without} of {} coarser tiles are left out, because the tiles below them are too large for [limits] memory = \"{}\": \
-             viewers load the finer ones at once; lower [triangulation] max_points_per_tile or raise memory",
+            "{without} of {} coarser tiles are left out, because the tiles below them have too many vertices for [limits] memory = \"{}\": \
+             viewers load the finer ones at once; raise memory, lower [triangulation] max_points_per_tile, or cut less with \
+             [output] max_edge",
             hierarchy.tiles.len(),
             plan.options.limits.memory
         )

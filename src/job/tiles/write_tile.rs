@@ -72,9 +72,10 @@ pub fn write_tile(
         ..TileStats::default()
     };
     let pixels = ColumnWriter::default().push(&canvas.draw(&kept)).write(store, StepRecord::Pixels(tile))?;
-    let summary = TileSummary::new(kept.bounds(), !kept.triangles.is_empty()).save(store, tile)?;
+    let vertices = if kept.triangles.is_empty() { 0 } else { kept.positions.len() };
+    let summary = TileSummary::new(kept.bounds(), vertices).save(store, tile)?;
     let mut files = Vec::new();
-    if !kept.triangles.is_empty() {
+    if vertices > 0 {
         files.push(write_glb(&directory.output().tile(tile.get()), &kept, style)?);
         stats.files = 1;
     }
