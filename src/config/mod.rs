@@ -8,7 +8,7 @@ use crate::gpu::options::{GpuOptions, TextureSide, VoronoiMethod};
 use crate::input::options::InputOptions;
 use crate::job::options::{JobOptions, Limits};
 use crate::output::options::OutputOptions;
-use crate::triangulation::options::{Backend, MaxPointsPerTile, TriangulationOptions};
+use crate::triangulation::options::{Backend, MaxPointsPerPart, MaxPointsPerTile, TriangulationOptions};
 use crate::{Error, Result, Warnings};
 use serde::Deserialize;
 use std::path::Path;
@@ -38,6 +38,7 @@ struct TriangulationTable {
     backend: Backend,
     #[serde(alias = "sites_per_tile")]
     max_points_per_tile: MaxPointsPerTile,
+    max_points_per_part: MaxPointsPerPart,
     voronoi: Option<VoronoiMethod>,
     adapter: Option<String>,
     texture: Option<TextureSide>,
@@ -124,7 +125,8 @@ fn parse(text: &str) -> std::result::Result<JobOptions, String> {
             "[output] height_offset must be a number of metres from -{MAX_HEIGHT_OFFSET} to {MAX_HEIGHT_OFFSET}"
         ));
     }
-    let TriangulationTable { backend, max_points_per_tile, voronoi, adapter, texture } = file.triangulation;
+    let TriangulationTable { backend, max_points_per_tile, max_points_per_part, voronoi, adapter, texture } =
+        file.triangulation;
     let gpu = GpuOptions {
         voronoi: one_of("voronoi", file.gpu.voronoi, voronoi)?.unwrap_or_default(),
         adapter: one_of("adapter", file.gpu.adapter, adapter)?,
@@ -132,7 +134,7 @@ fn parse(text: &str) -> std::result::Result<JobOptions, String> {
     };
     Ok(JobOptions {
         input: file.input,
-        triangulation: TriangulationOptions { backend, max_points_per_tile },
+        triangulation: TriangulationOptions { backend, max_points_per_tile, max_points_per_part },
         gpu,
         output: file.output,
         limits: file.limits,

@@ -58,16 +58,17 @@ fn walk(run: &RunContext, plan: Plan, earlier: Option<Partition>) -> Result<Repo
     // Steps 3 and 4, mesh/: leaves and merges. Steps 5 and 6, tiles/: border normals and tiles, each as soon as it is finished.
     let mesh = mesh_and_tiles(run, &plan, &partition, bounds)?;
     let tiles = &mesh.tiles;
+    let look = tiles.look.as_ref().ok_or_else(|| Error::Broken("the tiles have no look".into()))?;
     some_triangles(&tiles.stats, &plan)?;
     // From here on the store is enough.
     run_concurrently(
         || run.remove_points(mesh.all_leaves),
         || {
             // Step 7, levels/: coarser tiles.
-            let make_levels = || make_levels(run, &plan, &partition, &tiles.style);
+            let make_levels = || make_levels(run, &plan, &partition, &look.style);
             let levels = wants_tileset(&plan, &tiles.stats).then(make_levels).transpose()?;
             // Step 8, publish/: what is beside the tiles, and the report.
-            let published = publish(run, &plan, &partition, bounds, tiles, levels)?;
+            let published = publish(run, &plan, &partition, bounds, &tiles.stats, look, levels)?;
             write_report(run, &plan, &partition, mesh.leaves, tiles.stats, published)
         },
     )

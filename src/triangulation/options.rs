@@ -11,6 +11,8 @@ pub struct TriangulationOptions {
     /// The most sites that a tile holds.
     #[serde(alias = "sites_per_tile")]
     pub max_points_per_tile: MaxPointsPerTile,
+    /// About how many points a part of the job has.
+    pub max_points_per_part: MaxPointsPerPart,
 }
 
 /// What triangulates the tiles.
@@ -26,6 +28,36 @@ pub enum Backend {
     Gpu,
     /// `spade` alone: slower, and quadratic on sites along lines; for tests and comparisons.
     Reference,
+}
+
+/// About how many points a part of the job has, as far as the headers tell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "i64", into = "i64")]
+pub struct MaxPointsPerPart(pub u64);
+
+impl Default for MaxPointsPerPart {
+    /// A part of this size takes half a minute of one core and less than a gigabyte of disk, and what parts cost besides their points is
+    /// little.
+    fn default() -> MaxPointsPerPart {
+        MaxPointsPerPart(20_000_000)
+    }
+}
+
+impl TryFrom<i64> for MaxPointsPerPart {
+    type Error = String;
+
+    fn try_from(points: i64) -> std::result::Result<MaxPointsPerPart, String> {
+        match points {
+            100..=1_000_000_000_000 => Ok(MaxPointsPerPart(points as u64)),
+            _ => Err("max_points_per_part is a whole number from 100 to 1000000000000".into()),
+        }
+    }
+}
+
+impl From<MaxPointsPerPart> for i64 {
+    fn from(points: MaxPointsPerPart) -> i64 {
+        points.0 as i64
+    }
 }
 
 /// The most sites that a tile holds.

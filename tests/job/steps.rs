@@ -60,7 +60,8 @@ fn run_steps(job: &Job, options: &JobOptions) -> (Store, Partition) {
         triangulate_leaf(&plan, &partition, &points, &store, &triangulator, tile).unwrap();
     }
     for node in (0..tree.nodes.len()).rev().map(NodeIndex::new).filter(|&node| tree.is_merge(node)) {
-        merge_frontiers(&plan, tree, &store, 1 << 28, node).unwrap();
+        let below: Vec<_> = tree.merged_by(node).into_iter().map(|child| (&store, child)).collect();
+        merge_frontiers(&plan, tree.node(node).cell, &below, &store, 1 << 28, node).unwrap();
     }
     (store, partition)
 }

@@ -134,7 +134,7 @@ impl Child {
         match child {
             ChildTile::Exact(tile) => {
                 let own = TileSummary::load(room.store, tile)?;
-                Ok(Child { own, exact: true, path: output.tile(tile.get()) })
+                Ok(Child { own, exact: true, path: output.tile(tile.number()) })
             }
             ChildTile::Coarse(index) => {
                 let node = room.hierarchy.tiles[index].node;

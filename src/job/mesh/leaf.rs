@@ -60,9 +60,8 @@ pub fn triangulate_leaf(
     let sites: Vec<Site> = points.iter().map(|p| p.position).collect();
     let (mesh, outcome) = triangulator.triangulate(&sites)?;
     let node = partition.tree.leaf(tile);
-    let is_root = partition.tree.node(node).parent.is_none();
-    let cell = (!is_root).then_some(&partition.tree.node(node).cell);
-    let found = find_final(&mesh, &sites, cell, |_| false);
+    let cell = partition.tree.node(node).cell.with_border();
+    let found = find_final(&mesh, &sites, cell.as_ref(), |_| false);
     check_precision(&mesh, &sites, &found.states, PrecisionLimit::of(&plan.frame))?;
     let normals = partial_normals(&mesh, &found, &points);
     let is_final = |(_, state): &(&[u32; 3], &TriangleState)| **state == TriangleState::Final;

@@ -5,7 +5,7 @@ use crate::geometry::Site;
 use crate::job::index::{NodeIndex, TileIndex};
 use crate::job::mesh::final_triangles::{TriangleState, find_final};
 use crate::job::mesh::precision_limit::PrecisionLimit;
-use crate::job::partition::tree::Tree;
+use crate::job::partition::tree::Cell;
 use crate::job::plan::budget::BYTES_PER_MERGED_SITE;
 use crate::job::plan::job_plan::Plan;
 use crate::job::records::{BorderVertex, Frontier, Seam, SeamTriangle, StepOutput, Store};
@@ -13,27 +13,27 @@ use crate::mesh::region::covered;
 use crate::triangulation::divide_and_conquer;
 use crate::{Error, Result};
 
-/// Merges the frontiers below merge node `node`, which must be in the store. Returns the tiles that this finishes: those that have
-/// sites in a frontier below, and none in the frontier that goes up.
+/// Merges the frontiers `below` of merge node `node`, which decides `cell`. Returns the tiles that this finishes: those that have sites
+/// in a frontier below, and none in the frontier that goes up.
 ///
 /// # Errors
 /// [`Error::Memory`] if the frontiers do not fit `memory` bytes, [`Error::TooFine`] if a triangle is too long to be written,
 /// [`Error::Io`] on the store, [`Error::Broken`] if the frontiers contradict each other.
 pub fn merge_frontiers(
     plan: &Plan,
-    tree: &Tree,
+    cell: Cell,
+    below: &[(&Store, NodeIndex)],
     store: &Store,
     memory: u64,
     node: NodeIndex,
 ) -> Result<StepOutput<Vec<TileIndex>>> {
-    let below = tree.merged_by(node);
-    check_memory(below.iter().map(|&child| Frontier::count(store, child)).sum::<Result<u64>>()?, memory)?;
-    let union = join(store, &below)?;
+    check_memory(below.iter().map(|&(store, child)| Frontier::count(store, child)).sum::<Result<u64>>()?, memory)?;
+    let union = join(below)?;
     let sites: Vec<Site> = union.sites.iter().map(BorderVertex::plane).collect();
     let mesh = divide_and_conquer::triangulate(&sites)?;
     let covered = covered(&mesh, bytemuck::cast_slice(&union.boundary))?;
-    let cell = tree.node(node).parent.map(|_| &tree.node(node).cell);
-    let found = find_final(&mesh, &sites, cell, |triangle| covered[triangle]);
+    let cell = cell.with_border();
+    let found = find_final(&mesh, &sites, cell.as_ref(), |triangle| covered[triangle]);
     let seam: Vec<SeamTriangle> = mesh
         .triangles
         .iter()
@@ -53,10 +53,10 @@ pub fn merge_frontiers(
     Ok(StepOutput::new(finished.collect(), records))
 }
 
-/// Joins the frontiers of `nodes` into one.
-fn join(store: &Store, nodes: &[NodeIndex]) -> Result<Frontier> {
+/// Joins frontiers into one.
+fn join(frontiers: &[(&Store, NodeIndex)]) -> Result<Frontier> {
     let mut union = Frontier::default();
-    for &node in nodes {
+    for &(store, node) in frontiers {
         let Frontier { sites, boundary } = Frontier::load(store, node)?;
         let offset = union.sites.len() as u32;
         union.sites.extend(sites);

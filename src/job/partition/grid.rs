@@ -24,6 +24,13 @@ pub struct GridSpan {
     max: [u32; 2],
 }
 
+impl GridSpan {
+    /// Tells whether the rectangles share a bucket.
+    pub fn meets(self, other: GridSpan) -> bool {
+        (0..2).all(|axis| self.min[axis] < other.max[axis] && other.min[axis] < self.max[axis])
+    }
+}
+
 impl Grid {
     /// Returns a grid of about `buckets` buckets, and no more, over the lattice points of `bounds`.
     pub fn over(bounds: Bounds<2>, buckets: u64) -> Grid {
@@ -68,6 +75,34 @@ impl Grid {
         let columns = self.columns;
         (span.min[1]..span.max[1])
             .flat_map(move |row| (span.min[0]..span.max[0]).map(move |column| (row * columns + column) as usize))
+    }
+
+    /// Returns the rectangle of the buckets of all lattice points of `bounds`.
+    pub fn span_of(&self, bounds: Bounds<2>) -> GridSpan {
+        let place = |corner: Site| {
+            let bucket = self.bucket(corner);
+            [bucket % self.columns, bucket / self.columns]
+        };
+        GridSpan { min: place(bounds.min), max: place(bounds.max).map(|line| line + 1) }
+    }
+
+    /// Returns the buckets of the lattice points of `bounds`, each with the box of those that it has.
+    pub fn shared_with(&self, bounds: Bounds<2>) -> impl Iterator<Item = (usize, Bounds<2>)> {
+        let span = self.span_of(bounds);
+        self.in_span(span).map(move |bucket| {
+            let lines = [bucket as u32 % self.columns, bucket as u32 / self.columns];
+            let mut shared = bounds;
+            for axis in 0..2 {
+                // The outermost buckets have the points beyond the grid too.
+                if lines[axis] > span.min[axis] {
+                    shared.min[axis] = self.line(axis, lines[axis]) as i32;
+                }
+                if lines[axis] + 1 < span.max[axis] {
+                    shared.max[axis] = (self.line(axis, lines[axis] + 1) - 1) as i32;
+                }
+            }
+            (bucket, shared)
+        })
     }
 
     /// Returns the lattice coordinate where row or column `line` begins along `axis`.
@@ -126,7 +161,11 @@ impl GridSums {
     /// Cuts `span` across its longer side where the halves are most nearly equal. Each half holds points, and the two cells divide
     /// `cell`. Returns `None` if all points are in one bucket.
     pub fn cut(&self, span: GridSpan, cell: Cell) -> Option<[(GridSpan, Cell); 2]> {
-        let span = self.trim(span);
+        self.halve(self.trim(span), cell)
+    }
+
+    /// As [`GridSums::cut`], but the halves have all buckets of `span`, and either may be empty.
+    pub fn halve(&self, span: GridSpan, cell: Cell) -> Option<[(GridSpan, Cell); 2]> {
         let lines = [0, 1].map(|axis| span.max[axis] - span.min[axis]);
         let axis = if lines[0] >= lines[1] { 0 } else { 1 };
         if lines[axis] < 2 {

@@ -2,7 +2,7 @@
 
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
-use crate::job::index::{NodeIndex, TileIndex};
+use crate::job::index::{NodeIndex, PartIndex, TileIndex};
 use serde::{Deserialize, Serialize};
 
 /// A half-open rectangle of lattice points, `min <= (x, y) < max`. The outermost cells reach to [`Cell::FAR`].
@@ -20,6 +20,11 @@ impl Cell {
 
     /// The whole plane.
     pub const PLANE: Cell = Cell { min: [-Cell::FAR; 2], max: [Cell::FAR; 2] };
+
+    /// Returns the cell, or `None` if it is the whole plane.
+    pub fn with_border(self) -> Option<Cell> {
+        (self != Cell::PLANE).then_some(self)
+    }
 
     /// Cuts the cell at coordinate `at` of `axis`; a point at `at` is in the second part.
     pub fn cut(&self, axis: usize, at: i64) -> [Cell; 2] {
@@ -86,9 +91,11 @@ pub struct TreeNode {
     pub kind: NodeKind,
 }
 
-/// The k-d tree. Node 0 is the root, and tiles are numbered in depth-first order.
+/// The k-d tree of a part. Node 0 is the root, and tiles are numbered in depth-first order.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Tree {
+    /// The part of the job that it cuts.
+    pub part: PartIndex,
     /// All nodes. Children come after their parent.
     pub nodes: Vec<TreeNode>,
     /// The node of every tile.
@@ -113,7 +120,8 @@ impl Tree {
 
     /// Returns all tiles, ascending.
     pub fn tiles(&self) -> impl DoubleEndedIterator<Item = TileIndex> + ExactSizeIterator + Clone {
-        (0..self.leaves.len()).map(TileIndex::new)
+        let part = self.part;
+        (0..self.leaves.len()).map(move |index| part.tile(index))
     }
 
     /// Returns the nodes above `node`, nearest first.
@@ -170,7 +178,7 @@ mod tests {
             parent: number.checked_sub(1).map(NodeIndex::new),
             kind: NodeKind::Inner([NodeIndex::new(number + 1); 2]),
         };
-        let tree = Tree { nodes: (0..12).map(inner).collect(), leaves: Vec::new() };
+        let tree = Tree { nodes: (0..12).map(inner).collect(), ..Tree::default() };
         let merges: Vec<usize> = (0..12).filter(|&node| tree.is_merge(NodeIndex::new(node))).collect();
         assert_eq!((LAYOUT, merges), (7, vec![0, 2, 5, 8, 11]));
     }

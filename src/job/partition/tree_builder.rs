@@ -1,7 +1,7 @@
 //! Growing the tree over the buckets. A bucket with more points than a tile may hold goes to a finer grid of its own.
 
 use crate::geometry::Bounds;
-use crate::job::index::{NodeIndex, TileIndex};
+use crate::job::index::NodeIndex;
 use crate::job::partition::bucket_sorter::BucketSorter;
 use crate::job::partition::buckets::{Bucket, Buckets};
 use crate::job::partition::grid::{Grid, GridSpan, GridSums};
@@ -109,7 +109,7 @@ impl<'a> TreeBuilder<'a> {
     }
 
     fn add_leaf(&mut self, cell: Cell, parent: Option<NodeIndex>, bucket: Bucket) -> NodeIndex {
-        let node = self.add(TreeNode { cell, parent, kind: NodeKind::Leaf(TileIndex::new(self.blocks.len())) });
+        let node = self.add(TreeNode { cell, parent, kind: NodeKind::Leaf(self.tree.part.tile(self.blocks.len())) });
         self.tree.leaves.push(node);
         self.blocks.push(bucket.blocks);
         node

@@ -17,25 +17,27 @@ pub(crate) struct Extent {
     pub(crate) min: [f64; 3],
     /// Greatest x, y, z.
     pub(crate) max: [f64; 3],
+    /// The boxes of the sources by themselves; `None` for one without points.
+    pub(crate) boxes: Vec<Option<SourceBox>>,
 }
 
 /// If the headers would coarsen the lattice by so much, the points are looked at: a wrong header is more likely.
 const SUSPICIOUS: f64 = 100.0;
 
 /// The box of one source in source units: its least and its greatest x, y, z.
-type SourceBox = [[f64; 3]; 2];
+pub(crate) type SourceBox = [[f64; 3]; 2];
 
 impl Extent {
     /// Returns the box of `sources`: what their headers say, unless the points show that a header is wrong.
     pub(crate) fn of(sources: &[Source], options: &InputOptions, metres: f64) -> Result<Extent> {
         let classes = options.kept_classes();
         let boxes = sources.par_iter().map(|s| header_box(s, &classes)).collect::<Result<Vec<_>>>()?;
-        let extent = Extent::around(&boxes, options);
+        let extent = Extent::around(boxes, options);
         if !extent.is_suspicious(sources, metres) {
             return Ok(extent);
         }
         let boxes = sources.par_iter().map(|s| measure(s, &classes, 0..s.chunks())).collect::<Result<Vec<_>>>()?;
-        Ok(Extent::around(&boxes, options))
+        Ok(Extent::around(boxes, options))
     }
 
     /// Tells whether the box is far too wide or too high for the inputs' steps.
@@ -47,9 +49,9 @@ impl Extent {
         (0..3).any(is_too_wide)
     }
 
-    fn around(boxes: &[Option<SourceBox>], options: &InputOptions) -> Extent {
-        let mut extent = Extent { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
-        for [min, max] in boxes.iter().flatten() {
+    fn around(boxes: Vec<Option<SourceBox>>, options: &InputOptions) -> Extent {
+        let mut extent = Extent { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3], boxes };
+        for [min, max] in extent.boxes.iter().flatten() {
             for axis in 0..3 {
                 extent.min[axis] = extent.min[axis].min(min[axis]);
                 extent.max[axis] = extent.max[axis].max(max[axis]);

@@ -33,6 +33,8 @@ pub struct Plan {
     pub lattice: Lattice,
     /// The box of the inputs on the lattice as their headers claim it, within `[input] bounds`.
     pub extent: Bounds<2>,
+    /// What a job of several parts must know before all points are read; `None` for a job of one part.
+    pub claims: Option<Claims>,
     /// The CRS of the job.
     pub crs: Crs,
     /// The name of the unit of x and y.
@@ -50,6 +52,34 @@ pub struct PlannedInput {
     pub source: Source,
     /// How its points come to the lattice, and which of them are kept.
     pub rules: PointRules,
+    /// The lattice box of its points, as far as its header tells.
+    pub claimed: Bounds<2>,
+}
+
+/// What headers and the first chunks of the inputs say of all points. All tiles have one style, so it cannot wait for the last point. If
+/// a point shows that a claim is wrong, the job starts again as one part.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct Claims {
+    /// The lattice box of the points.
+    pub bounds: Bounds<3>,
+    /// The greatest red, green or blue. Only whether it exceeds 0, and 255, counts.
+    pub max_rgb: u16,
+}
+
+impl Claims {
+    /// Tells whether points within `bounds`, of which `max_rgb` is the greatest colour, contradict the claims.
+    pub fn are_broken_by(&self, bounds: Bounds<3>, max_rgb: u16) -> bool {
+        self.bounds.union(bounds) != self.bounds || range_of_colors(max_rgb) > range_of_colors(self.max_rgb)
+    }
+}
+
+/// Returns 0 for no colours, 1 for colours of eight bits, 2 for longer ones.
+fn range_of_colors(max_rgb: u16) -> u8 {
+    match max_rgb {
+        0 => 0,
+        1..=255 => 1,
+        _ => 2,
+    }
 }
 
 /// An input that is left out because it is bad.
@@ -70,6 +100,11 @@ impl SkippedInput {
 }
 
 impl Plan {
+    /// Tells whether the job is one part.
+    pub fn is_one_part(&self) -> bool {
+        self.claims.is_none()
+    }
+
     /// Returns what the user should know about the options and the inputs.
     pub fn all_warnings(&self) -> Warnings {
         let mut warnings = self.options.warnings.clone();

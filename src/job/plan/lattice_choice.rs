@@ -8,13 +8,17 @@ use crate::{Error, Result, Warnings};
 use rust_decimal::Decimal;
 use serde::{Deserialize, Serialize};
 
-/// By how many powers of ten the lattice is coarser than it would be, because a finer one proved too fine for the mesh.
+/// What earlier attempts at the job showed: by how many powers of ten the lattice is coarser than it would be, because a finer one
+/// proved too fine for the mesh, and whether headers can be believed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LatticeCoarsening {
     /// In x and y.
     pub horizontal: u32,
     /// In z.
     pub vertical: u32,
+    /// Whether the job is one part whatever its size, because a header proved wrong.
+    #[serde(default)]
+    pub one_part: bool,
 }
 
 /// What a lattice is to be like.

@@ -6,13 +6,14 @@ use crate::input::options::OnBadFile;
 use crate::input::{Axis, PointRules, Source};
 use crate::job::options::JobOptions;
 use crate::job::plan::common_crs::{common_crs, horizontal_unit};
-use crate::job::plan::extent::Extent;
+use crate::job::plan::extent::{Extent, SourceBox, to_float};
 use crate::job::plan::inputs::{check_missing_records, open_all, unreadable_names};
-use crate::job::plan::job_plan::{Plan, PlannedInput, SkippedInput};
+use crate::job::plan::job_plan::{Claims, Plan, PlannedInput, SkippedInput};
 use crate::job::plan::lattice_choice::{LatticeCoarsening, LatticeWish, choose_lattice, fineness};
 use crate::job::plan::text_inputs::{check_malformed_rows, refuse_degrees, row_choice, wants_colors};
 use crate::output::frame::Frame;
 use crate::{Error, Result, Warnings};
+use rayon::prelude::*;
 use rust_decimal::prelude::ToPrimitive;
 
 /// A point's number in the job is kept in 40 bits.
@@ -69,7 +70,7 @@ fn plan_sources(
             }
             planned => {
                 let (plan, rules) = planned?;
-                let planned_input = |(source, rules)| PlannedInput { source, rules };
+                let planned_input = |(source, (rules, claimed))| PlannedInput { source, rules, claimed };
                 let inputs = sources.into_iter().zip(rules).map(planned_input).collect();
                 return Ok(Plan { inputs, skipped, ..plan });
             }
@@ -77,12 +78,12 @@ fn plan_sources(
     }
 }
 
-/// Returns a plan that does not hold the inputs yet, and the rules for the points of each.
+/// Returns a plan that does not hold the inputs yet, and the rules for the points of each, and the box that each claims.
 fn try_plan(
     sources: &mut [Source],
     options: &JobOptions,
     coarsening: LatticeCoarsening,
-) -> Result<(Plan, Vec<PointRules>)> {
+) -> Result<(Plan, Vec<(PointRules, Bounds<2>)>)> {
     let mut warnings = Warnings::default();
     warnings.extend(unreadable_names(&options.input));
     sources.iter().for_each(|source| warnings.extend_from_file(&source.path, &source.warnings));
@@ -112,20 +113,60 @@ fn try_plan(
     let clip = options.input.bounds.map(|b| lattice_clip(&lattice, b.0));
     let rules = point_rules(sources, options, &lattice, clip)?;
     check_malformed_rows(sources, &rules, options)?;
+    let clipped = lattice_extent(&lattice, &extent, clip);
+    let claimed = extent.boxes.iter().map(|claim| claimed_box(&lattice, claim, clipped)).collect::<Vec<_>>();
+    let has_parts = !coarsening.one_part && records > options.triangulation.max_points_per_part.0 / 2 * 3;
+    let claims = has_parts.then(|| claims(sources, &rules, &lattice, &extent, clipped)).transpose()?;
     let plan = Plan {
+        claims,
         options: options.clone(),
         inputs: Vec::new(),
         skipped: Vec::new(),
         records,
         coarsening,
-        extent: lattice_extent(&lattice, &extent, clip),
+        extent: clipped,
         lattice,
         crs,
         unit: unit.into(),
         frame,
         warnings,
     };
-    Ok((plan, rules))
+    Ok((plan, rules.into_iter().zip(claimed).collect()))
+}
+
+/// Returns the lattice box of a source that claims the box `claim`, within `extent`. A source that claims nothing may have points
+/// everywhere.
+fn claimed_box(lattice: &Lattice, claim: &Option<SourceBox>, extent: Bounds<2>) -> Bounds<2> {
+    let Some([min, max]) = claim else { return extent };
+    let claim = Extent { min: *min, max: *max, boxes: Vec::new() };
+    let Bounds { min, max } = lattice_extent(lattice, &claim, Some(extent));
+    // Rounding may be off by a step on either side.
+    let [min, max] = [(min, -1), (max, 1)].map(|(corner, step)| corner.map(|value| value + step));
+    let within = |corner: [i32; 2]| [0, 1].map(|axis| corner[axis].clamp(extent.min[axis], extent.max[axis]));
+    Bounds { min: within(min), max: within(max) }
+}
+
+/// Returns what the sources claim of all points.
+fn claims(
+    sources: &[Source],
+    rules: &[PointRules],
+    lattice: &Lattice,
+    extent: &Extent,
+    clipped: Bounds<2>,
+) -> Result<Claims> {
+    let steps = |value: f64| (value - lattice.offset[2].to_f64().unwrap_or(0.0)) / to_float(lattice.step(2));
+    let [low, high] = [steps(extent.min[2]).floor() - 1.0, steps(extent.max[2]).ceil() + 1.0].map(|z| z as i32);
+    let bounds = Bounds {
+        min: [clipped.min[0].saturating_sub(1), clipped.min[1].saturating_sub(1), low],
+        max: [clipped.max[0].saturating_add(1), clipped.max[1].saturating_add(1), high],
+    };
+    let first_colors = |(source, rules): (&Source, &PointRules)| match source.chunks() {
+        0 => Ok(0),
+        _ if !rules.rgb || !source.has_rgb => Ok(0),
+        _ => source.decode(0, rules, &mut |_| Ok(())).map(|counts| counts.max_rgb),
+    };
+    let max_rgb = sources.par_iter().zip(rules).map(first_colors).try_reduce(|| 0, |a, b| Ok(a.max(b)))?;
+    Ok(Claims { bounds, max_rgb })
 }
 
 /// Returns the box of the sources. If no lattice holds all of it at the precision of the inputs or to a millimetre, and some rows of texts lie so far

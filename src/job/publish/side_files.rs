@@ -3,7 +3,7 @@
 use crate::job::durable::atomic_file::{find_pending, partial_path, write_pending};
 use crate::job::durable::columns::ColumnReader;
 use crate::job::durable::directory::JobDirectory;
-use crate::job::index::TileIndex;
+use crate::job::index::PartIndex;
 use crate::job::records::{StepOutput, StepRecord, Store};
 use crate::output::gltf::one_file::write_terrain;
 use crate::output::preview::canvas::{Canvas, PreviewPixel};
@@ -54,7 +54,7 @@ pub fn write_side_files(
 /// Returns the preview as PNG.
 fn draw_preview(store: &Store, canvas: &Canvas, tiles: usize) -> Result<Vec<u8>> {
     let mut picture = Picture::new(canvas);
-    for tile in (0..tiles).map(TileIndex::new) {
+    for tile in (0..tiles).map(|tile| PartIndex::FIRST.tile(tile)) {
         picture.add(tile.0, &ColumnReader::open(store, StepRecord::Pixels(tile))?.column::<PreviewPixel>()?);
     }
     picture.png()

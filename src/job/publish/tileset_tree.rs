@@ -40,7 +40,7 @@ fn coarse_node(store: &Store, tree: &Tree, hierarchy: &Hierarchy, index: usize) 
             ChildTile::Coarse(below) => coarse_node(store, tree, hierarchy, below)?,
             ChildTile::Exact(tile) => {
                 let cell = &tree.node(tree.leaf(tile)).cell;
-                leaves.next().and_then(|leaf| node(leaf, cell, tile_uri(tile.get())))
+                leaves.next().and_then(|leaf| node(leaf, cell, tile_uri(tile.number())))
             }
         });
     }

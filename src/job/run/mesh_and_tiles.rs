@@ -1,7 +1,6 @@
 //! Running steps 3 to 6 at the same time: tiles that no node above can change are finished and written while others are still
 //! triangulated and merged.
 
-use crate::Result;
 use crate::geometry::Bounds;
 use crate::job::durable::journal::JournalPosition;
 use crate::job::index::NodeIndex;
@@ -14,16 +13,16 @@ use crate::job::preflight::kept_points::KeptPoints;
 use crate::job::publish::one_file_limits::MAX_TRIANGLES_IN_ONE_FILE;
 use crate::job::records::JobStep;
 use crate::job::run::run_context::RunContext;
-use crate::job::run::tile_queue::{TileQueue, WrittenTiles};
+use crate::job::run::tile_queue::{TileLook, TileQueue, WrittenTiles};
 use crate::job::run::tree_walk::TreeWalk;
 use crate::job::run::unmerged::Unmerged;
 use crate::job::tiles::max_edge::MaxEdgeRule;
-use crate::job::tiles::style::TileStyle;
 use crate::output::options::MaxEdge;
-use crate::output::preview::canvas::Canvas;
 use crate::threads::run_concurrently;
+use crate::{Error, Result};
+use std::sync::Arc;
 
-/// The whole mesh, written as tiles.
+/// The mesh of a part, written as tiles as far as it is finished.
 pub(crate) struct MeshInTiles {
     pub(crate) leaves: LeafStats,
     pub(crate) tiles: WrittenTiles,
@@ -31,7 +30,17 @@ pub(crate) struct MeshInTiles {
     pub(crate) all_leaves: JournalPosition,
 }
 
-/// Triangulates all leaves, merges their frontiers and writes the tiles.
+/// When tiles may be written.
+pub(crate) enum Writing {
+    /// As soon as they are finished.
+    AtOnce(Arc<TileLook>),
+    /// Once all leaves are done.
+    AfterLeaves,
+    /// Not before the whole job is triangulated.
+    Later,
+}
+
+/// Triangulates all leaves of a job of one part, merges their frontiers and writes the tiles. Its points are within `bounds`.
 ///
 /// # Errors
 /// Those of the four steps.
@@ -41,33 +50,53 @@ pub(crate) fn mesh_and_tiles(
     partition: &Partition,
     bounds: Bounds<3>,
 ) -> Result<MeshInTiles> {
+    let look = |sites| {
+        let max_edge = max_edge_rule(run, plan, partition, bounds, sites)?;
+        Ok(Arc::new(TileLook::new(plan, partition.summary.counts.max_rgb, bounds, max_edge)))
+    };
+    let writing = match may_write_at_once(plan, KeptPoints(partition.summary.counts.kept)) {
+        // The number of sites matters only to a rule for which the tiles have to wait.
+        true => Writing::AtOnce(look(0)?),
+        false => Writing::AfterLeaves,
+    };
+    let mesh = mesh_part(run, plan, partition, writing, look)?;
+    match mesh.tiles.waiting.len() {
+        0 => Ok(mesh),
+        waiting => Err(Error::Broken(format!("{waiting} tiles were not written"))),
+    }
+}
+
+/// Triangulates all leaves of a part, merges their frontiers, and writes the tiles that are finished: all of them if the part is the
+/// whole job. `look` returns how tiles look, given the number of sites.
+///
+/// # Errors
+/// Those of the four steps.
+pub(crate) fn mesh_part(
+    run: &RunContext,
+    plan: &Plan,
+    partition: &Partition,
+    writing: Writing,
+    look: impl Fn(u64) -> Result<Arc<TileLook>> + Sync,
+) -> Result<MeshInTiles> {
     let stage = run.progress.stage("mesh", partition.summary.counts.kept, "points");
     let activity = run.progress.activity("triangulate", "points");
     let queue = TileQueue::new(run, partition, &stage);
     let points = open_points(run, partition)?;
     let unmerged = Unmerged::default();
     let walk = TreeWalk { run, plan, partition, points, stage: &stage, activity: &activity, queue: &queue, unmerged };
-    let style = |sites| {
-        let max_edge = max_edge_rule(run, plan, partition, bounds, sites)?;
-        let style = TileStyle::new(plan, &partition.summary, bounds, max_edge);
-        let canvas = Canvas::new(&style.frame, bounds);
-        Ok((style, canvas))
-    };
-    let writes_at_once = may_write_at_once(plan, KeptPoints(partition.summary.counts.kept));
     let walked = rayon::scope(|scope| {
-        if writes_at_once {
-            // The number of sites matters only to a rule for which the tiles have to wait.
-            queue.attempt(|| style(0).map(|(style, canvas)| queue.begin(scope, style, canvas)))?;
+        if let Writing::AtOnce(look) = &writing {
+            queue.begin(scope, look.clone());
         }
         let leaves = walk.walk(scope, NodeIndex::ROOT)?;
         queue.attempt(|| walk.unmerged.check(&plan.options))?;
         let all_leaves = run.journal.position();
         // This closes the point file: an open file is not freed when it is removed.
         drop(walk);
-        if !writes_at_once {
+        if let Writing::AfterLeaves = writing {
             // Not while tiles are written: on a small disk the results need the room.
-            let style = || run_concurrently(|| run.remove_points(all_leaves), || style(leaves.sites));
-            queue.attempt(|| style().map(|(style, canvas)| queue.begin(scope, style, canvas)))?;
+            let look = || run_concurrently(|| run.remove_points(all_leaves), || look(leaves.sites));
+            queue.attempt(|| look().map(|look| queue.begin(scope, look)))?;
         }
         Some((leaves, all_leaves))
     });

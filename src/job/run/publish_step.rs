@@ -14,7 +14,7 @@ use crate::job::records::{JobStep, StepOutput};
 use crate::job::report::job_report::{Report, ReportParts};
 use crate::job::run::levels_step::LevelResult;
 use crate::job::run::run_context::RunContext;
-use crate::job::run::tile_queue::WrittenTiles;
+use crate::job::run::tile_queue::TileLook;
 use crate::job::tiles::write_tile::TileStats;
 use crate::output::checksums::list_text;
 use crate::output::options::OutputFormat;
@@ -45,7 +45,8 @@ pub(crate) fn publish(
     plan: &Plan,
     partition: &Partition,
     bounds: Bounds<3>,
-    tiles: &WrittenTiles,
+    tiles: &TileStats,
+    look: &TileLook,
     levels: Option<LevelResult>,
 ) -> Result<Published> {
     let stage = run.progress.stage("publish", 1, "job");
@@ -54,14 +55,14 @@ pub(crate) fn publish(
         (Warnings::default(), None, None, LevelStats::default());
     if let Some(levels) = levels {
         let mut root = tileset_root(run.store, &partition.tree, &levels.hierarchy)?;
-        let placed = place(&plan.crs, &tiles.style.frame, output.height_offset, &mut root);
+        let placed = place(&plan.crs, &look.style.frame, output.height_offset, &mut root);
         warnings.extend(placement_warning(&placed));
         warnings.extend(levels.warning);
-        tileset = Some(tileset_text(&tiles.style.frame, &root));
+        tileset = Some(tileset_text(&look.style.frame, &root));
         (placement, stats) = (placed.ok(), levels.stats);
     }
     let georeference = Georeference::new(&plan.frame, &plan.lattice, bounds, &plan.unit, plan.crs.epsg);
-    let fits = fits_one_file(&tiles.stats);
+    let fits = fits_one_file(tiles);
     let content = SideFiles {
         georeference: georeference.to_json(placement.as_ref())?,
         tileset,
@@ -72,11 +73,11 @@ pub(crate) fn publish(
         run.journal.commit()?;
     }
     let count = partition.tree.leaves.len();
-    let write = || write_side_files(run.directory, run.store, &content, &tiles.canvas, count);
+    let write = || write_side_files(run.directory, run.store, &content, &look.canvas, count);
     // The tiles reach the disk meanwhile, before the report says how long that took.
     let bytes = run_concurrently(|| run.journal.commit(), || run.journal.step(JobStep::Publish, write))?;
     if !fits && output.format == OutputFormat::Glb {
-        warnings.push(too_large_for_one_file(&tiles.stats));
+        warnings.push(too_large_for_one_file(tiles));
     }
     stage.advance(1);
     run.add_stage(stage.finish());

@@ -1,20 +1,25 @@
 //! Running steps 5 and 6, each tile as soon as it can be done: while other tiles are still triangulated, once writing has begun.
 
+use crate::geometry::Bounds;
+use crate::job::index::TileIndex;
 use crate::job::partition::result::Partition;
+use crate::job::plan::job_plan::Plan;
 use crate::job::progress::activity::Activity;
 use crate::job::progress::stage::Stage;
-use crate::job::records::JobStep;
+use crate::job::records::{FinishedBorder, JobStep};
 use crate::job::run::run_context::RunContext;
 use crate::job::run::stage_costs::triangulated_share;
 use crate::job::tiles::border_normals::finish_border_normals;
 use crate::job::tiles::dependencies::{FinishedTile, TileDependencies};
+use crate::job::tiles::max_edge::MaxEdgeRule;
+use crate::job::tiles::seam::seam_of;
 use crate::job::tiles::style::TileStyle;
 use crate::job::tiles::write_tile::{TileStats, write_tile};
 use crate::output::preview::canvas::Canvas;
 use crate::{Error, Result};
 use rayon::Scope;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 /// Finishes and writes tiles. Any thread may call its methods.
 pub(crate) struct TileQueue<'a> {
@@ -23,8 +28,8 @@ pub(crate) struct TileQueue<'a> {
     stage: &'a Stage,
     border_normals: Activity,
     write: Activity,
-    /// How tiles look and what they are drawn on; set when tiles may be written.
-    style: OnceLock<(TileStyle, Canvas)>,
+    /// Set when tiles may be written.
+    look: OnceLock<Arc<TileLook>>,
     state: Mutex<QueueState>,
     has_failed: AtomicBool,
 }
@@ -33,41 +38,60 @@ struct QueueState {
     /// Tiles that were finished before tiles may be written.
     held: Vec<FinishedTile>,
     dependencies: TileDependencies,
-    written: usize,
+    /// Which tiles of the part are written.
+    written: Vec<bool>,
     stats: TileStats,
     /// The first error.
     failure: Option<Error>,
 }
 
-/// Totals over all tiles.
-pub(crate) struct WrittenTiles {
+/// How tiles look, and what they are drawn on.
+pub(crate) struct TileLook {
     pub(crate) style: TileStyle,
     pub(crate) canvas: Canvas,
+}
+
+/// What became of the tiles of a part.
+pub(crate) struct WrittenTiles {
+    /// How they look; `None` if none may be written yet.
+    pub(crate) look: Option<Arc<TileLook>>,
+    /// Totals over those that are written.
     pub(crate) stats: TileStats,
+    /// Those that wait for other parts, ascending.
+    pub(crate) waiting: Vec<TileIndex>,
+}
+
+impl TileLook {
+    /// Returns the look of a job whose points are within `bounds`, and whose greatest colour is `max_rgb`.
+    pub(crate) fn new(plan: &Plan, max_rgb: u16, bounds: Bounds<3>, max_edge: MaxEdgeRule) -> TileLook {
+        let style = TileStyle::new(plan, max_rgb, bounds, max_edge);
+        let canvas = Canvas::new(&style.frame, bounds);
+        TileLook { style, canvas }
+    }
 }
 
 impl<'a> TileQueue<'a> {
     pub(crate) fn new(run: &'a RunContext<'a>, partition: &'a Partition, stage: &'a Stage) -> TileQueue<'a> {
-        let dependencies = TileDependencies::new(partition.tree.leaves.len());
-        let state =
-            QueueState { held: Vec::new(), dependencies, written: 0, stats: TileStats::default(), failure: None };
+        let tiles = partition.tree.leaves.len();
+        let (dependencies, written) = (TileDependencies::new(tiles), vec![false; tiles]);
+        let state = QueueState { held: Vec::new(), dependencies, written, stats: TileStats::default(), failure: None };
         TileQueue {
             run,
             partition,
             stage,
             border_normals: run.progress.activity("border normals", "tiles"),
             write: run.progress.activity("write", "points"),
-            style: OnceLock::new(),
+            look: OnceLock::new(),
             state: Mutex::new(state),
             has_failed: AtomicBool::new(false),
         }
     }
 
     /// Lets tiles be written from now on, beginning with those that are finished already.
-    pub(crate) fn begin<'s>(&'s self, scope: &Scope<'s>, style: TileStyle, canvas: Canvas) {
+    pub(crate) fn begin<'s>(&'s self, scope: &Scope<'s>, look: Arc<TileLook>) {
         let mut state = self.state();
         // The lock is held here, so that no thread holds back a tile after these are taken.
-        self.style.get_or_init(|| (style, canvas));
+        self.look.get_or_init(|| look);
         let held = std::mem::take(&mut state.held);
         drop(state);
         held.into_iter().for_each(|tile| self.start(scope, tile));
@@ -76,7 +100,7 @@ impl<'a> TileQueue<'a> {
     /// Takes a finished tile.
     pub(crate) fn push<'s>(&'s self, scope: &Scope<'s>, tile: FinishedTile) {
         let mut state = self.state();
-        if self.style.get().is_none() {
+        if self.look.get().is_none() {
             state.held.push(tile);
             return;
         }
@@ -96,22 +120,20 @@ impl<'a> TileQueue<'a> {
         work().map_err(keep).ok()
     }
 
-    /// Ends the queue and returns the totals over all tiles. Adds its stages to the report.
+    /// Ends the queue. Adds its stages to the report.
     ///
     /// # Errors
-    /// The first error of all; [`Error::Broken`] if a tile was not written.
+    /// The first error of all.
     pub(crate) fn finish(self) -> Result<WrittenTiles> {
         let state = self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
         if let Some(failure) = state.failure {
             return Err(failure);
         }
-        let style = self.style.into_inner().filter(|_| state.written == self.partition.tree.leaves.len());
-        let Some((style, canvas)) = style else {
-            return Err(Error::Broken(format!("only {} tiles were written", state.written)));
-        };
         self.run.add_stage(self.border_normals.finish());
         self.run.add_stage(self.write.finish());
-        Ok(WrittenTiles { style, canvas, stats: state.stats })
+        let waiting = self.partition.tree.tiles().zip(&state.written).filter(|(_, written)| !**written);
+        let waiting = waiting.map(|(tile, _)| tile).collect();
+        Ok(WrittenTiles { look: self.look.into_inner(), stats: state.stats, waiting })
     }
 
     fn start<'s>(&'s self, scope: &Scope<'s>, tile: FinishedTile) {
@@ -127,8 +149,9 @@ impl<'a> TileQueue<'a> {
     /// Finishes the border normals of a tile and returns the tiles that can be written now.
     fn finish_border(&self, finished: FinishedTile) -> Result<Vec<FinishedTile>> {
         let RunContext { journal, store, .. } = *self.run;
-        let (style, _) = self.style()?;
-        let work = || finish_border_normals(store, &self.partition.tree, style, finished);
+        let style = &self.look()?.style;
+        let tree = &self.partition.tree;
+        let work = || finish_border_normals(store, tree, style, finished.tile, &seam_of(store, tree, finished)?);
         let step = JobStep::BorderNormals(finished.tile);
         let neighbours = journal.step(step, || self.border_normals.time(1, work))?;
         Ok(self.state().dependencies.border_done(finished, &neighbours))
@@ -136,20 +159,22 @@ impl<'a> TileQueue<'a> {
 
     fn write(&self, finished: FinishedTile) -> Result<()> {
         let RunContext { journal, directory, store, .. } = *self.run;
-        let (style, canvas) = self.style()?;
-        let work = || write_tile(directory, store, &self.partition.tree, style, canvas, finished);
+        let TileLook { style, canvas } = self.look()?;
+        let seam = || seam_of(store, &self.partition.tree, finished);
+        let border_of = |tile| FinishedBorder::load(store, tile);
+        let work = || write_tile(directory, store, style, canvas, finished.tile, &seam()?, &border_of);
         let (step, points) = (JobStep::WriteTile(finished.tile), self.partition.points(finished.tile));
         let stats = journal.step(step, || self.write.time(points, work))?;
         let mut state = self.state();
         state.stats += stats;
-        state.written += 1;
+        state.written[finished.tile.get()] = true;
         drop(state);
         self.run.count(self.stage, step, points - triangulated_share(points));
         Ok(())
     }
 
-    fn style(&self) -> Result<&(TileStyle, Canvas)> {
-        self.style.get().ok_or_else(|| Error::Broken("a tile is written too early".into()))
+    fn look(&self) -> Result<&TileLook> {
+        self.look.get().map(|look| &**look).ok_or_else(|| Error::Broken("a tile is written too early".into()))
     }
 
     fn state(&self) -> MutexGuard<'_, QueueState> {

@@ -5,7 +5,7 @@ use crate::job::mesh::leaf::{LeafStats, triangulate_leaf};
 use crate::job::mesh::merge::merge_frontiers;
 use crate::job::partition::point_file::PointFile;
 use crate::job::partition::result::Partition;
-use crate::job::partition::tree::NodeKind;
+use crate::job::partition::tree::{Cell, NodeKind};
 use crate::job::plan::budget::merge_memory;
 use crate::job::plan::job_plan::Plan;
 use crate::job::progress::activity::Activity;
@@ -58,7 +58,7 @@ impl<'a> TreeWalk<'a> {
         let stats: LeafStats = self.run.journal.step(step, triangulate)?;
         self.run.count(self.stage, step, triangulated_share(points));
         // Any other leaf passes its hull up.
-        if node == NodeIndex::ROOT || stats.sites == 0 {
+        if self.partition.tree.node(node).cell == Cell::PLANE || stats.sites == 0 {
             self.queue.push(scope, FinishedTile { tile, last_merge: node });
         }
         Ok(stats)
@@ -78,7 +78,9 @@ impl<'a> TreeWalk<'a> {
             return self.leave_out(node, &below);
         }
         let memory = merge_memory(&self.plan.options, node == NodeIndex::ROOT, threads);
-        let merge = || self.activity.time(0, || merge_frontiers(self.plan, &self.partition.tree, store, memory, node));
+        let sources: Vec<_> = below.iter().map(|&child| (store, child)).collect();
+        let cell = self.partition.tree.node(node).cell;
+        let merge = || self.activity.time(0, || merge_frontiers(self.plan, cell, &sources, store, memory, node));
         match journal.step(JobStep::Merge(node), merge) {
             Err(Error::Memory(_)) => self.leave_out(node, &below),
             merged => {

@@ -7,13 +7,11 @@ use crate::job::records::{
     BorderAttributes, BorderVertex, FinishedBorder, Frontier, Leaf, PartialNormals, SeamTriangle, StepOutput, Store,
     owner,
 };
-use crate::job::tiles::dependencies::FinishedTile;
-use crate::job::tiles::seam::seam_of;
 use crate::job::tiles::style::TileStyle;
 use crate::output::normals::{self, NormalSum, NormalSums};
 use crate::{Error, Result};
 
-/// Stores the finished frontier of a tile. Returns the other tiles that have corners of the tile's own triangles.
+/// Stores the finished frontier of `tile`, whose seam is `seam`. Returns the other tiles that have corners of the tile's own triangles.
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Broken`] on the store.
@@ -21,16 +19,30 @@ pub fn finish_border_normals(
     store: &Store,
     tree: &Tree,
     style: &TileStyle,
-    finished: FinishedTile,
+    tile: TileIndex,
+    seam: &[SeamTriangle],
 ) -> Result<StepOutput<Vec<TileIndex>>> {
-    let tile = finished.tile;
+    let border = finished_border(store, tree, style, tile, seam)?;
+    Ok(StepOutput::new(neighbours(seam, tile), vec![border.save(store, tile)?]))
+}
+
+/// Returns the finished frontier of `tile`, whose seam is `seam`.
+///
+/// # Errors
+/// As [`finish_border_normals`].
+pub fn finished_border(
+    store: &Store,
+    tree: &Tree,
+    style: &TileStyle,
+    tile: TileIndex,
+    seam: &[SeamTriangle],
+) -> Result<FinishedBorder> {
     let frontier = Frontier::load(store, tree.leaf(tile))?;
     let PartialNormals { mut sums, rgb, class } = PartialNormals::load(store, tile)?;
     if !style.max_edge.keeps_all() {
         sums = sums_of_kept(store, tile, &frontier, style)?;
     }
     let is_kept = |t: &SeamTriangle| !style.max_edge.leaves_out(t.map(|corner| corner.position));
-    let seam = seam_of(store, tree, finished)?;
     for &[a, b, c] in seam.iter().filter(|triangle| is_kept(triangle)) {
         let normal = normals::cross(a.position, b.position, c.position);
         for corner in [a, b, c].iter().filter(|corner| corner.tile == tile) {
@@ -46,8 +58,7 @@ pub fn finish_border_normals(
         rgb: rgb[at],
         class: class[at] as u16,
     };
-    let border = FinishedBorder(frontier.sites.iter().enumerate().map(finish).collect());
-    Ok(StepOutput::new(neighbours(&seam, tile), vec![border.save(store, tile)?]))
+    Ok(FinishedBorder(frontier.sites.iter().enumerate().map(finish).collect()))
 }
 
 /// Returns the other tiles at corners of the triangles that `tile` owns.

@@ -6,7 +6,7 @@
 use crate::Result;
 use crate::geometry::Bounds;
 use crate::geometry::square_grid::SquareGrid;
-use crate::job::index::TileIndex;
+use crate::job::index::PartIndex;
 use crate::job::records::{Leaf, Store};
 use crate::output::frame::Frame;
 use crate::output::options::MaxEdge;
@@ -113,7 +113,7 @@ impl SiteSpacing {
         let mut spacing = SiteSpacing::empty(bounds, sites);
         let counts: Vec<AtomicU32> = spacing.counts.iter().map(|_| AtomicU32::new(0)).collect();
         (0..tiles).into_par_iter().try_for_each(|tile| {
-            Leaf::visit_positions(store, TileIndex::new(tile), |&position| {
+            Leaf::visit_positions(store, PartIndex::FIRST.tile(tile), |&position| {
                 counts[spacing.cell(position)].fetch_add(1, Ordering::Relaxed);
             })
         })?;

@@ -1,7 +1,6 @@
 //! How the tiles of a job look. All tiles have one style, so that they fit together.
 
 use crate::geometry::Bounds;
-use crate::job::partition::result::PointSummary;
 use crate::job::plan::job_plan::Plan;
 use crate::job::tiles::max_edge::MaxEdgeRule;
 use crate::output::Compression;
@@ -25,10 +24,9 @@ pub struct TileStyle {
 }
 
 impl TileStyle {
-    /// Returns the style of the tiles of a job whose points are within `bounds`.
-    pub fn new(plan: &Plan, summary: &PointSummary, bounds: Bounds<3>, max_edge: MaxEdgeRule) -> TileStyle {
+    /// Returns the style of the tiles of a job whose points are within `bounds`, and whose greatest colour is `max_rgb`.
+    pub fn new(plan: &Plan, max_rgb: u16, bounds: Bounds<3>, max_edge: MaxEdgeRule) -> TileStyle {
         let output = &plan.options.output;
-        let max_rgb = summary.counts.max_rgb;
         let elevation = Coloring::Elevation { low: bounds.min[2], high: bounds.max[2] };
         let coloring = match output.color {
             ColorChoice::None => None,

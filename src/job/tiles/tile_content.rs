@@ -1,7 +1,7 @@
 //! Putting a tile together: the triangles of its leaf, then those of the seam that it owns, with finished normals and colours.
 
 use crate::job::index::TileIndex;
-use crate::job::records::{BorderVertex, FinishedBorder, Leaf, SeamTriangle, Store};
+use crate::job::records::{BorderVertex, FinishedBorder, Leaf, SeamTriangle};
 use crate::job::tiles::style::TileStyle;
 use crate::mesh::index::SiteIndex;
 use crate::output::Tile;
@@ -39,12 +39,12 @@ impl TileContent {
     /// that are not left out.
     pub(crate) fn add_seam(
         &mut self,
-        store: &Store,
+        border_of: BorderOf,
         tile: TileIndex,
         seam: impl Iterator<Item = SeamTriangle>,
         style: &TileStyle,
     ) -> Result<u64> {
-        let mut neighbours = NeighbourBorders { store, borders: HashMap::new() };
+        let mut neighbours = NeighbourBorders { border_of, borders: HashMap::new() };
         let mut vertex_of: HashMap<(TileIndex, SiteIndex), u32> = HashMap::new();
         let before = self.triangles.len();
         for triangle in seam {
@@ -127,9 +127,12 @@ fn keep<T: Copy>(values: &mut Vec<T>, wanted: &[bool]) {
     values.truncate(kept);
 }
 
+/// Returns the finished frontier of a tile.
+pub(crate) type BorderOf<'a> = &'a dyn Fn(TileIndex) -> Result<FinishedBorder>;
+
 /// The finished borders of other tiles, each read when it is first needed.
 struct NeighbourBorders<'a> {
-    store: &'a Store,
+    border_of: BorderOf<'a>,
     borders: HashMap<TileIndex, FinishedBorder>,
 }
 
@@ -137,7 +140,7 @@ impl NeighbourBorders<'_> {
     fn of(&mut self, tile: TileIndex) -> Result<&FinishedBorder> {
         Ok(match self.borders.entry(tile) {
             Entry::Occupied(entry) => entry.into_mut(),
-            Entry::Vacant(entry) => entry.insert(FinishedBorder::load(self.store, tile)?),
+            Entry::Vacant(entry) => entry.insert((self.border_of)(tile)?),
         })
     }
 }

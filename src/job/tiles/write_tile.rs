@@ -5,12 +5,10 @@ use crate::Result;
 use crate::job::durable::atomic_file::{PendingFile, write_pending_pieces};
 use crate::job::durable::columns::ColumnWriter;
 use crate::job::durable::directory::{JobDirectory, create_folder};
-use crate::job::partition::tree::Tree;
-use crate::job::records::{FinishedBorder, Leaf, StepOutput, StepRecord, Store, TileSummary, owner};
-use crate::job::tiles::dependencies::FinishedTile;
-use crate::job::tiles::seam::seam_of;
+use crate::job::index::TileIndex;
+use crate::job::records::{FinishedBorder, Leaf, SeamTriangle, StepOutput, StepRecord, Store, TileSummary, owner};
 use crate::job::tiles::style::TileStyle;
-use crate::job::tiles::tile_content::TileContent;
+use crate::job::tiles::tile_content::{BorderOf, TileContent};
 use crate::output::Tile;
 use crate::output::gltf::glb::GlbEncoder;
 use crate::output::preview::canvas::Canvas;
@@ -44,25 +42,25 @@ impl AddAssign for TileStats {
     }
 }
 
-/// Writes the GLB of a tile, and one of its triangles that are left out. Stores its part of the preview and what `tileset.json` says
-/// of it.
+/// Writes the GLB of `tile`, whose seam is `seam`, and one of its triangles that are left out. Stores its pixels of the preview and what
+/// `tileset.json` says of it. `border_of` returns the finished frontiers of other tiles.
 ///
 /// # Errors
 /// [`crate::Error::Io`] on the output or the store, [`crate::Error::Config`] if a triangle is too long for f32.
 pub fn write_tile(
     directory: &JobDirectory,
     store: &Store,
-    tree: &Tree,
     style: &TileStyle,
     canvas: &Canvas,
-    finished: FinishedTile,
+    tile: TileIndex,
+    seam: &[SeamTriangle],
+    border_of: BorderOf,
 ) -> Result<StepOutput<TileStats>> {
-    let tile = finished.tile;
     let leaf = Leaf::load(store, tile)?;
     let border = FinishedBorder::load(store, tile)?;
     let mut content = TileContent::of_leaf(leaf, &border, style);
-    let own = seam_of(store, tree, finished)?.into_iter().filter(|triangle| owner(triangle) == tile);
-    let seam_triangles = content.add_seam(store, tile, own, style)?;
+    let own = seam.iter().copied().filter(|triangle| owner(triangle) == tile);
+    let seam_triangles = content.add_seam(border_of, tile, own, style)?;
     let left_out = content.left_out();
     let kept = content.into_tile(style);
     let mut stats = TileStats {
@@ -76,12 +74,12 @@ pub fn write_tile(
     let summary = TileSummary::new(kept.bounds(), vertices).save(store, tile)?;
     let mut files = Vec::new();
     if vertices > 0 {
-        files.push(write_glb(&directory.output().tile(tile.get()), &kept, style)?);
+        files.push(write_glb(&directory.output().tile(tile.number()), &kept, style)?);
         stats.files = 1;
     }
     if !left_out.triangles.is_empty() {
         create_folder(&directory.output().cut())?;
-        files.push(write_glb(&directory.output().cut_tile(tile.get()), &left_out, style)?);
+        files.push(write_glb(&directory.output().cut_tile(tile.number()), &left_out, style)?);
     }
     stats.bytes = files.iter().map(|file| file.bytes).sum();
     Ok(StepOutput { files, ..StepOutput::new(stats, vec![pixels, summary]) })

@@ -1,0 +1,121 @@
+//! The parts of a job: the plane is cut along the buckets of the grid into cells of about the wanted number of points, as far as the
+//! headers tell. So a part is complete as soon as every input whose box meets its cell has been read ("spatial finalization", Isenburg
+//! et al. 2006, "Streaming Computation of Delaunay Triangulations"). What a part really holds decides only how its own tree is cut.
+
+use crate::geometry::Bounds;
+use crate::job::index::{NodeIndex, PartIndex};
+use crate::job::partition::grid::{Grid, GridSpan, GridSums};
+use crate::job::partition::tree::{Cell, NodeKind, Tree, TreeNode};
+use crate::job::partition::tree_builder::wanted_buckets;
+use crate::job::plan::job_plan::{Plan, PlannedInput};
+
+/// The parts of a job. They depend on its plan alone.
+pub struct Parts {
+    /// The buckets that points are sorted into while they are read. A bucket belongs to one part.
+    pub grid: Grid,
+    /// The tree above the parts. Its leaves are the parts, in the order in which they are done.
+    pub tree: Tree,
+    spans: Vec<GridSpan>,
+    part_of: Vec<PartIndex>,
+    /// The buckets that each input may have points in.
+    reach: Vec<GridSpan>,
+}
+
+impl Parts {
+    /// Cuts the plane for the job of `plan`.
+    pub fn of(plan: &Plan) -> Parts {
+        let triangulation = &plan.options.triangulation;
+        let grid = Grid::over(plan.extent, wanted_buckets(plan.records, triangulation.max_points_per_tile.0));
+        let reach: Vec<GridSpan> = plan.inputs.iter().map(|input| grid.span_of(input.claimed)).collect();
+        let most = if plan.is_one_part() { u64::MAX } else { points_per_part(plan) };
+        let mut cutter =
+            PartCutter { tree: Tree::default(), spans: Vec::new(), sums: expected_points(&grid, &plan.inputs), most };
+        cutter.cut(Cell::PLANE, None, grid.span());
+        let PartCutter { mut tree, spans, .. } = cutter;
+        // The nodes above the parts have numbers of their own.
+        tree.part = PartIndex::new(spans.len());
+        let mut part_of = vec![PartIndex::FIRST; grid.buckets()];
+        for (part, &span) in spans.iter().enumerate() {
+            grid.in_span(span).for_each(|bucket| part_of[bucket] = PartIndex::new(part));
+        }
+        Parts { grid, tree, spans, part_of, reach }
+    }
+
+    /// Returns all parts in the order in which they are done.
+    pub fn all(&self) -> impl ExactSizeIterator<Item = PartIndex> + Clone {
+        (0..self.spans.len()).map(PartIndex::new)
+    }
+
+    /// Returns the node of a part in the tree above the parts.
+    pub fn node(&self, part: PartIndex) -> NodeIndex {
+        self.tree.leaves[part.get()]
+    }
+
+    /// Returns the part of the plane that `part` decides.
+    pub fn cell(&self, part: PartIndex) -> Cell {
+        self.tree.node(self.node(part)).cell
+    }
+
+    /// Returns the buckets of `part`.
+    pub fn span(&self, part: PartIndex) -> GridSpan {
+        self.spans[part.get()]
+    }
+
+    /// Returns the part that a bucket belongs to.
+    pub fn part_of(&self, bucket: usize) -> PartIndex {
+        self.part_of[bucket]
+    }
+
+    /// Returns the inputs that may have points in `part` and in none of the parts before it.
+    pub fn new_inputs(&self, part: PartIndex) -> Vec<usize> {
+        let meets = |input: usize, part: PartIndex| self.reach[input].meets(self.span(part));
+        let earlier = |input: usize| (0..part.get()).any(|before| meets(input, PartIndex::new(before)));
+        (0..self.reach.len()).filter(|&input| meets(input, part) && !earlier(input)).collect()
+    }
+}
+
+/// Returns about how many points a part is to have. Numbers of tiles leave room for a limited number of parts.
+fn points_per_part(plan: &Plan) -> u64 {
+    plan.options.triangulation.max_points_per_part.0.max(plan.records.div_ceil(PartIndex::MOST as u64 / 2))
+}
+
+/// Returns how many points the buckets hold if the points of each input are spread evenly over its box.
+fn expected_points(grid: &Grid, inputs: &[PlannedInput]) -> GridSums {
+    let mut points = vec![0u64; grid.buckets()];
+    for input in inputs {
+        let area = |bounds: Bounds<2>| [0, 1].map(|axis| bounds.extent(axis) as u128 + 1).iter().product::<u128>();
+        let whole = area(input.claimed);
+        for (bucket, shared) in grid.shared_with(input.claimed) {
+            points[bucket] += (u128::from(input.source.records) * area(shared) / whole) as u64;
+        }
+    }
+    GridSums::new(*grid, points.into_iter())
+}
+
+struct PartCutter {
+    tree: Tree,
+    spans: Vec<GridSpan>,
+    sums: GridSums,
+    /// The most points that a part is expected to have.
+    most: u64,
+}
+
+impl PartCutter {
+    fn cut(&mut self, cell: Cell, parent: Option<NodeIndex>, span: GridSpan) -> NodeIndex {
+        let node = NodeIndex::new(self.tree.nodes.len());
+        let halves = if self.sums.points(span) > self.most { self.sums.halve(span, cell) } else { None };
+        let leaf = NodeKind::Leaf(PartIndex::new(self.spans.len()).tile(0));
+        self.tree.nodes.push(TreeNode { cell, parent, kind: leaf });
+        match halves {
+            None => {
+                self.tree.leaves.push(node);
+                self.spans.push(span);
+            }
+            Some(halves) => {
+                let children = halves.map(|(half, half_cell)| self.cut(half_cell, Some(node), half));
+                self.tree.nodes[node.get()].kind = NodeKind::Inner(children);
+            }
+        }
+        node
+    }
+}
