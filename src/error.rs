@@ -54,6 +54,9 @@ pub enum Error {
     /// The command line or the configuration is wrong (exit code 2).
     #[error("{0}")]
     Config(String),
+    /// What was read contradicts the headers, so a job of several parts starts again as one part (exit code 4: no user sees it).
+    #[error("what was read contradicts the header of a file")]
+    NeedsOnePart,
     /// The mesh has a triangle too long for single precision at the resolution of the job (exit code 2).
     #[error(
         "{what}: set a coarser [input] resolution or narrower bounds, or leave out the classes that are not terrain"
@@ -135,7 +138,7 @@ impl Error {
             Error::Resumable { why, .. } => why.exit_code(),
             Error::Config(_) | Error::TooFine { .. } => 2,
             Error::Input { .. } | Error::NoTerrain(_) => 3,
-            Error::Broken(_) => 4,
+            Error::Broken(_) | Error::NeedsOnePart => 4,
         }
     }
 

@@ -21,16 +21,20 @@ pub mod report;
 pub mod run;
 pub mod tiles;
 
+use crate::job::index::PartIndex;
+use crate::job::levels::make_level::Child;
 use crate::job::mesh::precision_limit::PrecisionLimit;
 use crate::job::options::{JobOptions, RunOptions};
 use crate::job::partition::result::Partition;
 use crate::job::plan::job_plan::Plan;
 use crate::job::plan::no_points::no_point_is_left;
+use crate::job::publish::side_files::StoredTiles;
+use crate::job::publish::tileset_tree::TilesOfTree;
 use crate::job::report::job_report::Report;
 use crate::job::run::attempt::run_until_it_fits;
-use crate::job::run::levels_step::make_levels;
+use crate::job::run::levels_step::{hierarchy_of, make_levels};
 use crate::job::run::mesh_and_tiles::mesh_and_tiles;
-use crate::job::run::publish_step::{publish, wants_tileset, write_report};
+use crate::job::run::publish_step::{MeshFigures, TilesetContent, WrittenFiles, publish, wants_tileset, write_report};
 use crate::job::run::read_step;
 use crate::job::run::run_context::RunContext;
 use crate::job::tiles::write_tile::TileStats;
@@ -65,13 +69,37 @@ fn walk(run: &RunContext, plan: Plan, earlier: Option<Partition>) -> Result<Repo
         || run.remove_points(mesh.all_leaves),
         || {
             // Step 7, levels/: coarser tiles.
-            let make_levels = || make_levels(run, &plan, &partition, &look.style);
-            let levels = wants_tileset(&plan, &tiles.stats).then(make_levels).transpose()?;
+            let levels = wants_tileset(&plan, &tiles.stats).then(|| {
+                let hierarchy = hierarchy_of(&plan, &partition);
+                make_levels(run, &plan, PartIndex::FIRST, hierarchy, &look.style, &no_other_part)
+            });
+            let levels = levels.transpose()?;
             // Step 8, publish/: what is beside the tiles, and the report.
-            let published = publish(run, &plan, &partition, bounds, &tiles.stats, look, levels)?;
-            write_report(run, &plan, &partition, mesh.leaves, tiles.stats, published)
+            let tree = &partition.tree;
+            let tileset = levels.map(|levels| {
+                let part_root = &|_| Ok(None);
+                let root = TilesOfTree { store: run.store, tree, hierarchy: &levels.hierarchy, part_root }.root()?;
+                TilesetContent::new(root, levels.stats)
+            });
+            let (tileset, all) = (tileset.transpose()?, StoredTiles { store: run.store, tree });
+            let files = WrittenFiles { stats: tiles.stats, tiles: &all };
+            let published = publish(run, &plan, bounds, &files, look, tileset)?;
+            let figures = MeshFigures {
+                points: summary.counts.clone(),
+                leaves: mesh.leaves,
+                tiles: tiles.stats,
+                temporary: partition.point_bytes + run.store.bytes(),
+                resumed: 0,
+                files: Vec::new(),
+            };
+            write_report(run, &plan, figures, published)
         },
     )
+}
+
+/// In a job of one part no tile needs another.
+fn no_other_part(part: PartIndex) -> Result<Child> {
+    Err(Error::Broken(format!("there is no part {part}")))
 }
 
 /// Checks that there is a terrain to look at.

@@ -6,7 +6,7 @@ use crate::input::Point;
 use crate::job::durable::columns::{ColumnReader, ColumnWriter};
 use crate::job::durable::journal::{self, StepKey};
 use crate::job::durable::store::{self, RecordKey};
-use crate::job::index::{NodeIndex, TileIndex};
+use crate::job::index::{NodeIndex, PartIndex, TileIndex};
 use crate::mesh::index::SiteIndex;
 use crate::output::normals::NormalSum;
 use crate::{Error, Result};
@@ -27,16 +27,24 @@ pub type JournalEntry = journal::JournalEntry<JobStep, StepRecord>;
 /// A step of a job, for one tile or one tree node where it runs once for each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum JobStep {
-    /// Reads the points and cuts the plane into tiles.
+    /// Plans a job of several parts.
+    Plan,
+    /// Reads the points of a part and cuts it into tiles.
     Partition,
+    /// Reads the inputs that a part is the first to need.
+    Read(PartIndex),
     /// Triangulates a tile.
     Leaf(TileIndex),
     /// Merges what the nodes below a node left pending.
     Merge(NodeIndex),
+    /// Triangulates a part and writes the tiles that need no other part.
+    MeshPart,
     /// Finishes the normals on a tile's border.
     BorderNormals(TileIndex),
     /// Writes a tile.
     WriteTile(TileIndex),
+    /// Writes the tiles of a part that have waited for other parts.
+    WriteWaiting,
     /// Makes a coarser tile.
     Level(NodeIndex),
     /// Writes what is beside the tiles, except the report.
@@ -64,6 +72,8 @@ pub enum StepRecord {
     Pixels(TileIndex),
     /// The result of the step that reads the points.
     Partition,
+    /// The points by bucket that a step has read.
+    Read(PartIndex),
     /// [`LevelSummary`]
     Level(NodeIndex),
     /// [`TileSummary`] of an exact tile.
@@ -82,6 +92,7 @@ impl RecordKey for StepRecord {
             StepRecord::Partition => [7, 0],
             StepRecord::Level(node) => [8, node.0],
             StepRecord::Tile(tile) => [9, tile.0],
+            StepRecord::Read(part) => [10, part.0],
         }
     }
 }

@@ -4,6 +4,7 @@ use crate::job::durable::atomic_file::{partial_path, remove_file};
 use crate::job::durable::listing::{entries, exists, files_of};
 use crate::job::durable::lock::{Lock, lock_file};
 use crate::job::durable::replacement::Replacement;
+use crate::job::index::PartIndex;
 use crate::output::checksums::read_file;
 use crate::output::file_names::OutputFiles;
 use crate::{Error, Result, disk, fault};
@@ -23,6 +24,7 @@ pub struct JobDirectory {
     results: OutputFiles,
     waiting: OutputFiles,
     job: PathBuf,
+    points: PathBuf,
 }
 
 impl JobDirectory {
@@ -30,7 +32,28 @@ impl JobDirectory {
     pub fn new(output: &Path) -> JobDirectory {
         let results = OutputFiles::new(output);
         let job = results.job();
-        JobDirectory { waiting: OutputFiles::new(&job.join("results")), job, results }
+        JobDirectory { waiting: OutputFiles::new(&job.join("results")), points: job.join("points"), job, results }
+    }
+
+    /// Returns the directory in which a part of the job keeps its steps. Its results are those of the job.
+    pub fn part(&self, part: PartIndex) -> JobDirectory {
+        let points = self.readers().join(format!("{part}.points"));
+        JobDirectory { job: self.parts().join(part.to_string()), points, ..self.clone() }
+    }
+
+    /// Returns the directory in which the nodes above the parts keep their steps. Their results are those of the job.
+    pub fn join(&self) -> JobDirectory {
+        JobDirectory { job: self.job.join("join"), ..self.clone() }
+    }
+
+    /// Returns the folder of the parts' own folders.
+    pub fn parts(&self) -> PathBuf {
+        self.job.join("parts")
+    }
+
+    /// Returns the folder of the points by part.
+    pub fn readers(&self) -> PathBuf {
+        self.job.join("points-by-part")
     }
 
     /// Returns the paths of the results while the job is under way: that is where steps write and find them.
@@ -55,12 +78,12 @@ impl JobDirectory {
 
     /// Returns the path of the journal of finished steps.
     pub fn journal(&self) -> PathBuf {
-        self.results.journal()
+        self.job.join("journal")
     }
 
     /// Returns the path of the file that holds the points between reading and triangulating.
     pub fn points(&self) -> PathBuf {
-        self.job.join("points")
+        self.points.clone()
     }
 
     /// Returns the paths of the store's files.
@@ -110,17 +133,35 @@ impl JobDirectory {
     /// # Errors
     /// [`Error::Io`] if a file cannot be removed or the folder cannot be made.
     pub fn clear(&self, keep: &HashSet<PathBuf>) -> Result<()> {
+        let mut results = files_of(&self.waiting)?;
+        results.retain(|path| !keep.contains(&self.name(path)));
+        results.iter().try_for_each(|path| remove_file(path))?;
+        self.clear_own(keep)?;
+        create_folder(&self.waiting.tiles())
+    }
+
+    /// Removes what an earlier run left for its steps in this folder, except the files that `keep` names as the journal does.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a file cannot be removed.
+    pub fn clear_own(&self, keep: &HashSet<PathBuf>) -> Result<()> {
         let stays = [self.journal(), lock_file(&self.job)];
-        let mut paths = files_of(&self.waiting)?;
         // All names go, because other versions of the program use other names.
         for path in entries(&self.job)? {
-            if !stays.contains(&path) && !is_folder(&path)? {
-                paths.push(path);
+            if !stays.contains(&path) && !is_folder(&path)? && !keep.contains(&self.name(&path)) {
+                remove_file(&path)?;
             }
         }
-        paths.retain(|path| !keep.contains(&self.name(path)));
-        paths.iter().try_for_each(|path| remove_file(path))?;
-        create_folder(&self.waiting.tiles())
+        Ok(())
+    }
+
+    /// Removes what a job of several parts keeps besides the job's own files.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a file cannot be removed.
+    pub fn clear_parts(&self) -> Result<()> {
+        let folders = [self.parts(), self.readers(), self.join().job];
+        folders.iter().try_for_each(|folder| disk::remove_tree(folder).map_err(Error::io("remove", folder)))
     }
 
     /// Puts the results with these `names`, which wait, in the place of the results of an earlier job. Goes on where an earlier call
@@ -218,6 +259,7 @@ impl JobDirectory {
         remove_at_end(&self.journal())?;
         let waiting = self.waiting.directory();
         disk::remove_tree(waiting).map_err(Error::io("remove", waiting))?;
+        self.clear_parts()?;
         // The lock goes last, because it marks the directory as a job's own: a kill before that leaves what the next job may take.
         disk::remove_tree(&self.job).map_err(Error::io("remove", &self.job))
     }

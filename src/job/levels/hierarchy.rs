@@ -1,7 +1,7 @@
 //! Which nodes of the tree viewers see as tiles of `tileset.json`: all leaves, and the inner nodes that become coarser tiles. A level
 //! has a quarter of the sites of the one below, so all levels together cost about a third of the leaves.
 
-use crate::job::index::{NodeIndex, TileIndex};
+use crate::job::index::{NodeIndex, PartIndex, TileIndex};
 use crate::job::partition::tree::{NodeKind, Tree};
 
 /// Bytes that a vertex takes while the meshes of a tile's children are joined and simplified.
@@ -15,6 +15,8 @@ const KEPT: u64 = 104 << 20;
 pub enum ChildTile {
     /// An exact tile.
     Exact(TileIndex),
+    /// The topmost tile of a part.
+    Part(PartIndex),
     /// A coarser tile, by its index in [`Hierarchy::tiles`].
     Coarse(usize),
 }
@@ -30,7 +32,7 @@ pub struct CoarseTile {
     pub height: usize,
 }
 
-/// The tiles of the tileset.
+/// The tiles of the tileset, or those of one part, or those above the parts.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Hierarchy {
     /// The coarser tiles. Children come before their parent, and the root is last. Empty if one tile holds everything.
@@ -61,9 +63,18 @@ impl LevelSizes {
 }
 
 impl Hierarchy {
-    /// Builds the hierarchy over `tree`; `points` is the number of points of every tile.
+    /// Builds the hierarchy over `tree`; `points` is the number of points of every leaf, in their order.
     pub fn new(tree: &Tree, points: &[u64], sizes: LevelSizes) -> Hierarchy {
-        let mut builder = HierarchyBuilder { tree, sites: sites_below(tree, points), sizes, tiles: Vec::new() };
+        Hierarchy::over(tree, points, sizes, ChildTile::Exact)
+    }
+
+    /// Builds the hierarchy above the parts, whose numbers of points are `points`.
+    pub fn above_parts(tree: &Tree, points: &[u64], sizes: LevelSizes) -> Hierarchy {
+        Hierarchy::over(tree, points, sizes, |tile| ChildTile::Part(tile.part()))
+    }
+
+    fn over(tree: &Tree, points: &[u64], sizes: LevelSizes, leaf: fn(TileIndex) -> ChildTile) -> Hierarchy {
+        let mut builder = HierarchyBuilder { tree, sites: sites_below(tree, points), sizes, leaf, tiles: Vec::new() };
         if !tree.nodes.is_empty() {
             builder.grow(NodeIndex::ROOT, None);
         }
@@ -81,11 +92,9 @@ impl Hierarchy {
 /// Returns the number of points below every node.
 fn sites_below(tree: &Tree, points: &[u64]) -> Vec<u64> {
     let mut sites = vec![0; tree.nodes.len()];
+    tree.leaves.iter().zip(points).for_each(|(leaf, &points)| sites[leaf.get()] = points);
     // Children come after their parent.
     for (node, of) in tree.nodes.iter().enumerate().rev() {
-        if let NodeKind::Leaf(tile) = of.kind {
-            sites[node] = points[tile.get()];
-        }
         if let Some(parent) = of.parent {
             sites[parent.get()] += sites[node];
         }
@@ -98,6 +107,7 @@ struct HierarchyBuilder<'a> {
     /// Points below each node.
     sites: Vec<u64>,
     sizes: LevelSizes,
+    leaf: fn(TileIndex) -> ChildTile,
     tiles: Vec<CoarseTile>,
 }
 
@@ -105,7 +115,7 @@ impl HierarchyBuilder<'_> {
     /// Returns the tiles at or below `node`; `above` is the level of the nearest tile above.
     fn grow(&mut self, node: NodeIndex, above: Option<u32>) -> Vec<ChildTile> {
         match self.tree.node(node).kind {
-            NodeKind::Leaf(tile) => vec![ChildTile::Exact(tile)],
+            NodeKind::Leaf(tile) => vec![(self.leaf)(tile)],
             NodeKind::Inner(children) => {
                 let level = self.level(node);
                 let below = children.map(|child| self.grow(child, Some(level))).concat();

@@ -2,9 +2,10 @@
 
 use crate::geometry::Bounds;
 use crate::job::durable::directory::{JobDirectory, create_folder};
-use crate::job::index::NodeIndex;
+use crate::job::index::{NodeIndex, PartIndex};
 use crate::job::levels::hierarchy::{BYTES_PER_LEVEL_VERTEX, ChildTile, Hierarchy, LevelSizes};
 use crate::job::levels::shared_memory::{SharedMemory, Taken};
+use crate::job::partition::tree::{NodeKind, Tree};
 use crate::job::records::{LevelSummary, StepOutput, Store, TileSummary};
 use crate::job::tiles::style::TileStyle;
 use crate::job::tiles::write_tile::write_glb;
@@ -56,7 +57,14 @@ pub struct LevelRoom<'a> {
     pub sizes: LevelSizes,
     /// What all that are made at one time may take; `None` makes no meshes.
     pub memory: Option<&'a SharedMemory>,
+    /// The part that they belong to; for those above the parts, the number of parts.
+    pub part: PartIndex,
+    /// Returns the topmost tile of a part.
+    pub top_of: TopOf<'a>,
 }
+
+/// Returns the topmost tile of a part.
+pub type TopOf<'a> = &'a (dyn Fn(PartIndex) -> Result<Child> + Sync);
 
 /// Makes coarser tile `index` of the hierarchy, whose children must exist. Stores what `tileset.json` says of it and of the exact
 /// tiles among its children. It has no mesh if its children have too many vertices for the memory, or if one of them has none for
@@ -80,7 +88,11 @@ pub fn make_level(room: &LevelRoom, index: usize) -> Result<StepOutput<LevelStat
                 own.error = (below + simple.error).min(height_range(&room.style.frame, bounds));
                 own.vertices = simple.tile.positions.len() as u32;
                 create_folder(&room.directory.output().levels())?;
-                let written = write_glb(&room.directory.output().level(coarse.node.get()), &simple.tile, room.style)?;
+                let written = write_glb(
+                    &room.directory.output().level(room.part.node_number(coarse.node)),
+                    &simple.tile,
+                    room.style,
+                )?;
                 let triangles = simple.tile.triangles.len() as u64;
                 stats = LevelStats { files: 1, triangles, bytes: written.bytes, error_m: own.error, left_out: 0 };
                 files.push(written);
@@ -119,10 +131,10 @@ fn contradiction(node: NodeIndex, what: &impl std::fmt::Display) -> Error {
 }
 
 /// A tile that a coarser one is made from.
-struct Child {
+pub struct Child {
     /// What `tileset.json` says of it.
     own: TileSummary,
-    /// Whether it is an exact tile.
+    /// Whether it is an exact tile of the same part.
     exact: bool,
     /// Its GLB, if there is one.
     path: PathBuf,
@@ -139,9 +151,26 @@ impl Child {
             ChildTile::Coarse(index) => {
                 let node = room.hierarchy.tiles[index].node;
                 let own = LevelSummary::load(room.store, node)?.own;
-                Ok(Child { own, exact: false, path: output.level(node.get()) })
+                Ok(Child { own, exact: false, path: output.level(room.part.node_number(node)) })
             }
+            ChildTile::Part(part) => (room.top_of)(part),
         }
+    }
+
+    /// Returns the topmost tile of the part that `tree` cuts.
+    ///
+    /// # Errors
+    /// [`Error::Io`] or [`Error::Broken`] on the part's store.
+    pub fn top(directory: &JobDirectory, store: &Store, tree: &Tree) -> Result<Child> {
+        let output = directory.output();
+        let (own, path) = match tree.node(NodeIndex::ROOT).kind {
+            NodeKind::Leaf(tile) => (TileSummary::load(store, tile)?, output.tile(tile.number())),
+            NodeKind::Inner(_) => {
+                let own = LevelSummary::load(store, NodeIndex::ROOT)?.own;
+                (own, output.level(tree.part.node_number(NodeIndex::ROOT)))
+            }
+        };
+        Ok(Child { own, exact: false, path })
     }
 }
 

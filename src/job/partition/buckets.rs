@@ -1,8 +1,8 @@
 //! Collecting points by bucket from many threads: each bucket has a buffer that is written to the point file when it is full.
 
-use crate::Result;
 use crate::input::Point;
 use crate::job::partition::point_file::{PointBlock, PointFile};
+use crate::{Error, Result};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -47,7 +47,8 @@ const LARGEST_BLOCK: u64 = 4096;
 
 /// Buckets that several threads fill at the same time.
 pub struct Buckets<'a> {
-    file: &'a PointFile,
+    /// The file that each bucket is written to; `None` if it must not get another point.
+    files: Vec<Option<&'a PointFile>>,
     /// Points that a buffer holds.
     capacity: usize,
     open: Vec<Mutex<OpenBucket>>,
@@ -60,10 +61,17 @@ struct OpenBucket {
 }
 
 impl<'a> Buckets<'a> {
-    /// Returns `count` empty buckets that together buffer at most `memory` bytes.
+    /// Returns `count` empty buckets in one file that together buffer at most `memory` bytes.
     pub fn new(file: &'a PointFile, count: usize, memory: u64) -> Buckets<'a> {
+        Buckets::on(vec![Some(file); count], memory)
+    }
+
+    /// Returns an empty bucket for each of `files`, which is where it is written to. Together they buffer at most `memory` bytes. A bucket
+    /// without a file refuses points.
+    pub fn on(files: Vec<Option<&'a PointFile>>, memory: u64) -> Buckets<'a> {
+        let count = files.len();
         let capacity = (memory / count as u64 / size_of::<Point>() as u64).clamp(LEAST_BLOCK, LARGEST_BLOCK) as usize;
-        Buckets { file, capacity, open: (0..count).map(|_| Mutex::default()).collect() }
+        Buckets { files, capacity, open: (0..count).map(|_| Mutex::default()).collect() }
     }
 
     /// Returns the bytes of one buffer where memory is ample.
@@ -74,7 +82,7 @@ impl<'a> Buckets<'a> {
     /// Adds `points`, which all belong to bucket `index`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`] if a full buffer cannot be written.
+    /// [`crate::Error::Io`] if a full buffer cannot be written, [`crate::Error::NeedsOnePart`] if the bucket has no file.
     pub fn extend(&self, index: usize, mut points: &[Point]) -> Result<()> {
         let mut open = lock(&self.open[index]);
         while !points.is_empty() {
@@ -85,14 +93,15 @@ impl<'a> Buckets<'a> {
             open.buffer.extend_from_slice(now);
             points = later;
             if open.buffer.len() == self.capacity {
-                self.flush(&mut open)?;
+                self.flush(index, &mut open)?;
             }
         }
         Ok(())
     }
 
-    fn flush(&self, open: &mut OpenBucket) -> Result<()> {
-        let block = self.file.append(&open.buffer)?;
+    fn flush(&self, index: usize, open: &mut OpenBucket) -> Result<()> {
+        let file = self.files[index].ok_or(Error::NeedsOnePart)?;
+        let block = file.append(&open.buffer)?;
         open.bucket.blocks.push(block);
         open.bucket.points += block.points as u64;
         open.buffer.clear();
@@ -104,15 +113,15 @@ impl<'a> Buckets<'a> {
     /// # Errors
     /// [`crate::Error::Io`] if a buffer cannot be written.
     pub fn finish(self) -> Result<Vec<Bucket>> {
-        let finish = |open: &Mutex<OpenBucket>| {
+        let finish = |(index, open): (usize, &Mutex<OpenBucket>)| {
             let mut open = lock(open);
             if !open.buffer.is_empty() {
-                self.flush(&mut open)?;
+                self.flush(index, &mut open)?;
             }
             open.buffer = Vec::new();
             Ok(std::mem::take(&mut open.bucket))
         };
-        self.open.par_iter().map(finish).collect()
+        self.open.par_iter().enumerate().map(finish).collect()
     }
 }
 

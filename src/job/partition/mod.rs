@@ -3,6 +3,7 @@
 pub(crate) mod bucket_sorter;
 pub mod buckets;
 pub mod grid;
+pub mod part_points;
 pub mod parts;
 pub mod point_file;
 pub mod read;

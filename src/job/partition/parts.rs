@@ -19,6 +19,8 @@ pub struct Parts {
     part_of: Vec<PartIndex>,
     /// The buckets that each input may have points in.
     reach: Vec<GridSpan>,
+    /// The inputs that each part is the first to need.
+    new_inputs: Vec<Vec<usize>>,
 }
 
 impl Parts {
@@ -38,7 +40,13 @@ impl Parts {
         for (part, &span) in spans.iter().enumerate() {
             grid.in_span(span).for_each(|bucket| part_of[bucket] = PartIndex::new(part));
         }
-        Parts { grid, tree, spans, part_of, reach }
+        let mut new_inputs = vec![Vec::new(); spans.len()];
+        for (input, reach) in reach.iter().enumerate() {
+            // Every bucket belongs to a part.
+            let first = spans.iter().position(|span| reach.meets(*span)).unwrap_or(0);
+            new_inputs[first].push(input);
+        }
+        Parts { grid, tree, spans, part_of, reach, new_inputs }
     }
 
     /// Returns all parts in the order in which they are done.
@@ -61,16 +69,24 @@ impl Parts {
         self.spans[part.get()]
     }
 
+    /// Returns the buckets of `part`.
+    pub fn buckets_of(&self, part: PartIndex) -> impl Iterator<Item = usize> {
+        self.grid.in_span(self.span(part))
+    }
+
+    /// Tells whether an input may have points in `part`.
+    pub fn reaches(&self, input: usize, part: PartIndex) -> bool {
+        self.reach[input].meets(self.span(part))
+    }
+
     /// Returns the part that a bucket belongs to.
     pub fn part_of(&self, bucket: usize) -> PartIndex {
         self.part_of[bucket]
     }
 
     /// Returns the inputs that may have points in `part` and in none of the parts before it.
-    pub fn new_inputs(&self, part: PartIndex) -> Vec<usize> {
-        let meets = |input: usize, part: PartIndex| self.reach[input].meets(self.span(part));
-        let earlier = |input: usize| (0..part.get()).any(|before| meets(input, PartIndex::new(before)));
-        (0..self.reach.len()).filter(|&input| meets(input, part) && !earlier(input)).collect()
+    pub fn new_inputs(&self, part: PartIndex) -> &[usize] {
+        &self.new_inputs[part.get()]
     }
 }
 

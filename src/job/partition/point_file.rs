@@ -21,6 +21,13 @@ pub struct PointBlock {
     pub hash: u32,
 }
 
+impl PointBlock {
+    /// Returns the position after the last point.
+    pub fn end(&self) -> u64 {
+        self.first + u64::from(self.points)
+    }
+}
+
 /// The point file. It only grows; several threads append blocks to it in any order.
 pub struct PointFile {
     path: PathBuf,
@@ -43,6 +50,23 @@ impl PointFile {
             map: MappedFile::default(),
             points: AtomicU64::new(0),
         })
+    }
+
+    /// Opens the point file at `path`, or makes one. New blocks follow the first `points` points.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be opened or made.
+    pub fn append_to(path: &Path, points: u64) -> Result<PointFile> {
+        let file = disk::open_or_create(path).map_err(Error::io("open", path))?;
+        Ok(PointFile { path: path.to_path_buf(), file, map: MappedFile::default(), points: AtomicU64::new(points) })
+    }
+
+    /// Waits until all blocks are on the disk.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if they cannot be written.
+    pub fn sync(&self) -> Result<()> {
+        disk::sync_data(&self.file).map_err(Error::io("write", &self.path))
     }
 
     /// Opens the finished point file at `path` for reading.

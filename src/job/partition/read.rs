@@ -2,11 +2,13 @@
 
 use crate::input::options::OnBadFile;
 use crate::job::durable::directory::JobDirectory;
+use crate::job::index::PartIndex;
 use crate::job::partition::bucket_sorter::BucketSorter;
 use crate::job::partition::buckets::Buckets;
 use crate::job::partition::grid::Grid;
 use crate::job::partition::point_file::PointFile;
 use crate::job::partition::result::{Partition, PointSummary};
+use crate::job::partition::tree::Cell;
 use crate::job::partition::tree_builder::{TreeBuilder, wanted_buckets};
 use crate::job::plan::budget::read_buffer_memory;
 use crate::job::plan::job_plan::{Plan, SkippedInput};
@@ -28,7 +30,7 @@ pub fn read_points(plan: &Plan, directory: &JobDirectory, stage: &Stage) -> Resu
     let memory = read_buffer_memory(&plan.options);
     let grid = Grid::over(plan.extent, wanted_buckets(plan.records, max_points_per_tile));
     let buckets = Buckets::new(&file, grid.buckets(), memory);
-    let by_input = decode_all(plan, &grid, &buckets, stage)?;
+    let by_input = decode(plan, 0..plan.inputs.len(), 0, &grid, &buckets, stage)?;
     let mut buckets = buckets.finish()?;
     let JudgedInputs { summary, skipped, orders } = judge(plan, by_input);
     if !orders.is_empty() {
@@ -36,22 +38,22 @@ pub fn read_points(plan: &Plan, directory: &JobDirectory, stage: &Stage) -> Resu
     }
     let mut builder = TreeBuilder::new(&file, max_points_per_tile, memory);
     if summary.counts.kept > 0 {
-        builder.grow_root(&grid, buckets)?;
+        builder.grow_root(PartIndex::FIRST, Cell::PLANE, &grid, grid.span(), buckets)?;
     }
     let (tree, blocks) = builder.finish();
     Ok(Partition { tree, blocks, summary, point_bytes: file.bytes(), skipped })
 }
 
 /// What the inputs held, apart from those that are to be left out.
-struct JudgedInputs {
-    summary: PointSummary,
-    skipped: Vec<SkippedInput>,
+pub(crate) struct JudgedInputs {
+    pub(crate) summary: PointSummary,
+    pub(crate) skipped: Vec<SkippedInput>,
     /// The numbers of the records of those left out.
-    orders: Vec<Range<u64>>,
+    pub(crate) orders: Vec<Range<u64>>,
 }
 
 /// Sums up the inputs. Each is judged by itself, so the others have no say in whether it is left out.
-fn judge(plan: &Plan, by_input: ByInput) -> JudgedInputs {
+pub(crate) fn judge(plan: &Plan, by_input: ByInput) -> JudgedInputs {
     let options = &plan.options.input;
     let mut judged = JudgedInputs { summary: PointSummary::default(), skipped: Vec::new(), orders: Vec::new() };
     for (index, summary) in by_input.0 {
@@ -71,7 +73,7 @@ fn judge(plan: &Plan, by_input: ByInput) -> JudgedInputs {
 
 /// What each input held, in the order of the inputs. Inputs without chunks are not listed.
 #[derive(Default)]
-struct ByInput(Vec<(usize, PointSummary)>);
+pub(crate) struct ByInput(Vec<(usize, PointSummary)>);
 
 impl ByInput {
     /// Adds what later chunks held.
@@ -86,18 +88,21 @@ impl ByInput {
     }
 }
 
-/// Decodes all chunks of all inputs in parallel and hands the points to the buckets of the grid.
-fn decode_all(plan: &Plan, grid: &Grid, buckets: &Buckets, stage: &Stage) -> Result<ByInput> {
-    let chunks: Vec<(usize, usize)> = plan
-        .inputs
-        .iter()
-        .enumerate()
-        .flat_map(|(index, input)| (0..input.source.chunks()).map(move |chunk| (index, chunk)))
-        .collect();
+/// Decodes all chunks of these inputs in parallel and hands the points to the buckets of the grid. `malformed` records were found before.
+pub(crate) fn decode(
+    plan: &Plan,
+    inputs: impl Iterator<Item = usize>,
+    malformed: u64,
+    grid: &Grid,
+    buckets: &Buckets,
+    stage: &Stage,
+) -> Result<ByInput> {
+    let chunks_of = |index: usize| (0..plan.inputs[index].source.chunks()).map(move |chunk| (index, chunk));
+    let chunks: Vec<(usize, usize)> = inputs.flat_map(chunks_of).collect();
     let options = &plan.options.input;
     let allowed = allowed_malformed(options.max_malformed_fraction.0, plan.records);
-    let malformed = AtomicU64::new(0);
-    let decode = |&(index, chunk): &(usize, usize)| -> Result<ByInput> {
+    let malformed = AtomicU64::new(malformed);
+    let decode_chunk = |&(index, chunk): &(usize, usize)| -> Result<ByInput> {
         interrupt::check()?;
         let input = &plan.inputs[index];
         let mut sorter = BucketSorter::new(grid, buckets);
@@ -111,5 +116,5 @@ fn decode_all(plan: &Plan, grid: &Grid, buckets: &Buckets, stage: &Stage) -> Res
         Ok(ByInput(vec![(index, PointSummary { counts, bounds: sorter.bounds() })]))
     };
     // The reduction keeps the order of the chunks.
-    chunks.par_iter().with_max_len(1).map(decode).try_reduce(ByInput::default, |a, b| Ok(a.append(b)))
+    chunks.par_iter().with_max_len(1).map(decode_chunk).try_reduce(ByInput::default, |a, b| Ok(a.append(b)))
 }

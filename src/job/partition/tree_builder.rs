@@ -1,7 +1,7 @@
 //! Growing the tree over the buckets. A bucket with more points than a tile may hold goes to a finer grid of its own.
 
 use crate::geometry::Bounds;
-use crate::job::index::NodeIndex;
+use crate::job::index::{NodeIndex, PartIndex};
 use crate::job::partition::bucket_sorter::BucketSorter;
 use crate::job::partition::buckets::{Bucket, Buckets};
 use crate::job::partition::grid::{Grid, GridSpan, GridSums};
@@ -40,9 +40,18 @@ impl<'a> TreeBuilder<'a> {
         TreeBuilder { file, max_points_per_tile, memory, tree: Tree::default(), blocks: Vec::new() }
     }
 
-    /// Grows the whole tree over the buckets of `grid`.
-    pub(crate) fn grow_root(&mut self, grid: &Grid, buckets: Vec<Bucket>) -> Result<()> {
-        self.grow(Cell::PLANE, None, grid, buckets).map(|_| ())
+    /// Grows the tree of `part`, which decides `cell`, over the buckets in `span` of `grid`.
+    pub(crate) fn grow_root(
+        &mut self,
+        part: PartIndex,
+        cell: Cell,
+        grid: &Grid,
+        span: GridSpan,
+        mut buckets: Vec<Bucket>,
+    ) -> Result<()> {
+        self.tree.part = part;
+        let sums = GridSums::new(*grid, buckets.iter().map(|bucket| bucket.points));
+        self.divide(cell, None, grid, &sums, &mut buckets, span).map(|_| ())
     }
 
     /// Returns the tree and the blocks of each tile.

@@ -3,7 +3,8 @@
 use crate::job::durable::atomic_file::{find_pending, partial_path, write_pending};
 use crate::job::durable::columns::ColumnReader;
 use crate::job::durable::directory::JobDirectory;
-use crate::job::index::PartIndex;
+use crate::job::index::TileIndex;
+use crate::job::partition::tree::Tree;
 use crate::job::records::{StepOutput, StepRecord, Store};
 use crate::output::gltf::one_file::write_terrain;
 use crate::output::preview::canvas::{Canvas, PreviewPixel};
@@ -27,23 +28,25 @@ pub struct SideFiles {
 /// [`crate::Error::Io`] on the output or the store, [`crate::Error::Broken`] if they are not what earlier steps wrote.
 pub fn write_side_files(
     directory: &JobDirectory,
-    store: &Store,
     content: &SideFiles,
     canvas: &Canvas,
-    tiles: usize,
+    tiles: &dyn EachTile,
 ) -> Result<StepOutput<u64>> {
     let output = directory.output();
     let mut files = vec![
         write_pending(&output.georeference(), content.georeference.as_bytes())?,
-        write_pending(&output.preview(), &draw_preview(store, canvas, tiles)?)?,
+        write_pending(&output.preview(), &draw_preview(canvas, tiles)?)?,
     ];
     if let Some(tileset) = &content.tileset {
         files.push(write_pending(&output.tileset(), tileset.as_bytes())?);
     }
     if content.one_file {
         let written = |path: PathBuf| Ok(disk::exists(&path).map_err(Error::io("read", &path))?.then_some(path));
-        let paths = (0..tiles).filter_map(|tile| written(output.tile(tile)).transpose());
-        let paths = paths.collect::<Result<Vec<PathBuf>>>()?;
+        let mut paths = Vec::new();
+        tiles.visit(&mut |_, tile| {
+            paths.extend(written(output.tile(tile.number()))?);
+            Ok(())
+        })?;
         write_terrain(&partial_path(&output.terrain()), &paths)?;
         files.push(find_pending(&output.terrain())?);
     }
@@ -51,11 +54,35 @@ pub fn write_side_files(
     Ok(StepOutput { files, ..StepOutput::new(bytes, Vec::new()) })
 }
 
-/// Returns the preview as PNG.
-fn draw_preview(store: &Store, canvas: &Canvas, tiles: usize) -> Result<Vec<u8>> {
-    let mut picture = Picture::new(canvas);
-    for tile in (0..tiles).map(|tile| PartIndex::FIRST.tile(tile)) {
-        picture.add(tile.0, &ColumnReader::open(store, StepRecord::Pixels(tile))?.column::<PreviewPixel>()?);
+/// All tiles of a job.
+pub trait EachTile: Sync {
+    /// Calls `visit` with each tile, in their order, and the store that has its records.
+    ///
+    /// # Errors
+    /// Those of `visit`, and of opening a store.
+    fn visit(&self, visit: &mut dyn FnMut(&Store, TileIndex) -> Result<()>) -> Result<()>;
+}
+
+/// The tiles of one part.
+pub struct StoredTiles<'a> {
+    /// Has their records.
+    pub store: &'a Store,
+    /// The tree whose leaves they are.
+    pub tree: &'a Tree,
+}
+
+impl EachTile for StoredTiles<'_> {
+    fn visit(&self, visit: &mut dyn FnMut(&Store, TileIndex) -> Result<()>) -> Result<()> {
+        self.tree.tiles().try_for_each(|tile| visit(self.store, tile))
     }
+}
+
+/// Returns the preview as PNG.
+fn draw_preview(canvas: &Canvas, tiles: &dyn EachTile) -> Result<Vec<u8>> {
+    let mut picture = Picture::new(canvas);
+    tiles.visit(&mut |store, tile| {
+        picture.add(tile.0, &ColumnReader::open(store, StepRecord::Pixels(tile))?.column::<PreviewPixel>()?);
+        Ok(())
+    })?;
     picture.png()
 }

@@ -1,26 +1,60 @@
 //! The tree of tiles in `tileset.json`, from what the tiles and levels stored.
 
+use crate::Result;
 use crate::geometry::Bounds;
-use crate::job::index::TileIndex;
+use crate::job::index::{NodeIndex, PartIndex};
 use crate::job::levels::hierarchy::{ChildTile, Hierarchy};
 use crate::job::partition::tree::{Cell, Tree};
 use crate::job::records::{LevelSummary, Store, TileSummary};
 use crate::output::file_names::{level_uri, tile_uri};
 use crate::output::frame::Frame;
 use crate::output::tiles3d::tileset::{TilesetNode, tileset_json};
-use crate::{Error, Result};
 
-/// Returns the root of the tiles, none of them placed on the globe yet.
-///
-/// # Errors
-/// [`Error::Io`] on the store, [`Error::Broken`] if there is no tile.
-pub fn tileset_root(store: &Store, tree: &Tree, hierarchy: &Hierarchy) -> Result<TilesetNode> {
-    let root = match hierarchy.tiles.len().checked_sub(1) {
-        Some(last) => coarse_node(store, tree, hierarchy, last)?,
-        // A small job has one tile.
-        None => node(&TileSummary::load(store, TileIndex(0))?, &Cell::PLANE, tile_uri(0)),
-    };
-    root.ok_or_else(|| Error::Broken("there is no tile to list in tileset.json".into()))
+/// The tiles over one tree, and what is known of them.
+pub struct TilesOfTree<'a> {
+    /// Has what the steps stored.
+    pub store: &'a Store,
+    /// The tree.
+    pub tree: &'a Tree,
+    /// The coarser tiles over it.
+    pub hierarchy: &'a Hierarchy,
+    /// Returns the root of the tiles of a part, if the leaves of the tree are parts.
+    pub part_root: &'a dyn Fn(PartIndex) -> Result<Option<TilesetNode>>,
+}
+
+impl TilesOfTree<'_> {
+    /// Returns the root of the tiles, none of them placed on the globe yet; `None` if there is no triangle.
+    ///
+    /// # Errors
+    /// [`Error::Io`] or [`Error::Broken`] on the store.
+    pub fn root(&self) -> Result<Option<TilesetNode>> {
+        if let Some(last) = self.hierarchy.tiles.len().checked_sub(1) {
+            return self.coarse_node(last);
+        }
+        // Few points make one tile.
+        let tile = self.tree.part.tile(0);
+        Ok(node(&TileSummary::load(self.store, tile)?, &self.tree.node(NodeIndex::ROOT).cell, tile_uri(tile.number())))
+    }
+
+    fn coarse_node(&self, index: usize) -> Result<Option<TilesetNode>> {
+        let coarse = &self.hierarchy.tiles[index];
+        let LevelSummary { own, leaves } = LevelSummary::load(self.store, coarse.node)?;
+        let mut leaves = leaves.iter();
+        let mut children = Vec::new();
+        for &child in &coarse.children {
+            children.extend(match child {
+                ChildTile::Coarse(below) => self.coarse_node(below)?,
+                ChildTile::Part(part) => (self.part_root)(part)?,
+                ChildTile::Exact(tile) => {
+                    let cell = &self.tree.node(self.tree.leaf(tile)).cell;
+                    leaves.next().and_then(|leaf| node(leaf, cell, tile_uri(tile.number())))
+                }
+            });
+        }
+        let uri = level_uri(self.tree.part.node_number(coarse.node));
+        let node = node(&own, &self.tree.node(coarse.node).cell, uri);
+        Ok(node.map(|node| TilesetNode { children, ..node }))
+    }
 }
 
 /// Returns the text of `tileset.json`.
@@ -28,24 +62,6 @@ pub fn tileset_text(frame: &Frame, root: &TilesetNode) -> String {
     let mut text = tileset_json(frame, root).to_string();
     text.push('\n');
     text
-}
-
-fn coarse_node(store: &Store, tree: &Tree, hierarchy: &Hierarchy, index: usize) -> Result<Option<TilesetNode>> {
-    let coarse = &hierarchy.tiles[index];
-    let LevelSummary { own, leaves } = LevelSummary::load(store, coarse.node)?;
-    let mut leaves = leaves.iter();
-    let mut children = Vec::new();
-    for &child in &coarse.children {
-        children.extend(match child {
-            ChildTile::Coarse(below) => coarse_node(store, tree, hierarchy, below)?,
-            ChildTile::Exact(tile) => {
-                let cell = &tree.node(tree.leaf(tile)).cell;
-                leaves.next().and_then(|leaf| node(leaf, cell, tile_uri(tile.number())))
-            }
-        });
-    }
-    let node = node(&own, &tree.node(coarse.node).cell, level_uri(coarse.node.get()));
-    Ok(node.map(|node| TilesetNode { children, ..node }))
 }
 
 /// Returns the node of one tile without its children, or `None` if the tile has no triangle.

@@ -1,8 +1,9 @@
 //! Running step 7 for all coarser tiles.
 
 use crate::Result;
+use crate::job::index::PartIndex;
 use crate::job::levels::hierarchy::{Hierarchy, LevelSizes};
-use crate::job::levels::make_level::{LevelRoom, LevelStats, make_level};
+use crate::job::levels::make_level::{LevelRoom, LevelStats, TopOf, make_level};
 use crate::job::levels::shared_memory::SharedMemory;
 use crate::job::partition::result::Partition;
 use crate::job::plan::job_plan::Plan;
@@ -12,38 +13,43 @@ use crate::job::tiles::style::TileStyle;
 use crate::threads::on_threads;
 use rayon::prelude::*;
 
-/// The coarser tiles of a job.
+/// The coarser tiles of a job, or of a part.
 pub(crate) struct LevelResult {
     pub(crate) hierarchy: Hierarchy,
     pub(crate) stats: LevelStats,
-    pub(crate) warning: Option<String>,
 }
 
-/// Makes the coarser tiles. Those of one height are made in parallel, as many at a time as the memory
-/// has room for.
+/// Returns how large the coarser tiles of a job are to be.
+pub(crate) fn level_sizes(plan: &Plan) -> LevelSizes {
+    LevelSizes::new(plan.options.output.max_points_per_level_tile.0, plan.options.limits.memory.0)
+}
+
+/// Returns the coarser tiles of a part.
+pub(crate) fn hierarchy_of(plan: &Plan, partition: &Partition) -> Hierarchy {
+    let points: Vec<u64> = partition.tree.tiles().map(|tile| partition.points(tile)).collect();
+    Hierarchy::new(&partition.tree, &points, level_sizes(plan))
+}
+
+/// Makes the coarser tiles of `hierarchy`, over the tree of `part`. Those of one height are made in parallel, as many at a time as the
+/// memory has room for. `top_of` returns the topmost tiles of other parts.
 ///
 /// # Errors
 /// Those of [`make_level`].
 pub(crate) fn make_levels(
     run: &RunContext,
     plan: &Plan,
-    partition: &Partition,
+    part: PartIndex,
+    hierarchy: Hierarchy,
     style: &TileStyle,
+    top_of: TopOf,
 ) -> Result<LevelResult> {
     let output = &plan.options.output;
-    let points: Vec<u64> = partition.tree.tiles().map(|tile| partition.points(tile)).collect();
-    let sizes = LevelSizes::new(output.max_points_per_level_tile.0, plan.options.limits.memory.0);
-    let hierarchy = Hierarchy::new(&partition.tree, &points, sizes);
+    let sizes = level_sizes(plan);
     let stage = run.progress.stage("levels", hierarchy.tiles.len() as u64, "tiles");
     let memory = SharedMemory::new(sizes.memory);
-    let room = LevelRoom {
-        directory: run.directory,
-        store: run.store,
-        hierarchy: &hierarchy,
-        style,
-        sizes,
-        memory: output.levels.then_some(&memory),
-    };
+    let memory = output.levels.then_some(&memory);
+    let (directory, store) = (run.directory, run.store);
+    let room = LevelRoom { directory, store, hierarchy: &hierarchy, style, sizes, memory, part, top_of };
     let make = |index: usize| {
         let stats = run.journal.step(JobStep::Level(hierarchy.tiles[index].node), || make_level(&room, index))?;
         stage.advance(1);
@@ -65,17 +71,18 @@ pub(crate) fn make_levels(
         Ok(all)
     })?;
     run.add_stage(stage.finish());
-    let warning = left_out_warning(plan, &hierarchy, stats.left_out);
-    Ok(LevelResult { hierarchy, stats, warning })
+    Ok(LevelResult { hierarchy, stats })
 }
 
-fn left_out_warning(plan: &Plan, hierarchy: &Hierarchy, without: u64) -> Option<String> {
-    (without > 0).then(|| {
+/// Returns what the user should know about coarser tiles without a mesh.
+pub(crate) fn left_out_warning(plan: &Plan, levels: &LevelStats) -> Option<String> {
+    (levels.left_out > 0).then(|| {
         format!(
-            "{without} of {} coarser tiles are left out, because the tiles below them have too many vertices for [limits] memory = \"{}\": \
+            "{} of {} coarser tiles are left out, because the tiles below them have too many vertices for [limits] memory = \"{}\": \
              viewers load the finer ones at once; raise memory, lower [triangulation] max_points_per_tile, or cut less with \
              [output] max_edge",
-            hierarchy.tiles.len(),
+            levels.left_out,
+            levels.files + levels.left_out,
             plan.options.limits.memory
         )
     })

@@ -31,11 +31,11 @@ pub(crate) struct MeshInTiles {
 }
 
 /// When tiles may be written.
-pub(crate) enum Writing {
+pub(crate) enum Writing<'a> {
     /// As soon as they are finished.
     AtOnce(Arc<TileLook>),
-    /// Once all leaves are done.
-    AfterLeaves,
+    /// Once all leaves are done: then the number of sites tells how tiles look.
+    AfterLeaves(&'a (dyn Fn(u64) -> Result<Arc<TileLook>> + Sync)),
     /// Not before the whole job is triangulated.
     Later,
 }
@@ -57,9 +57,9 @@ pub(crate) fn mesh_and_tiles(
     let writing = match may_write_at_once(plan, KeptPoints(partition.summary.counts.kept)) {
         // The number of sites matters only to a rule for which the tiles have to wait.
         true => Writing::AtOnce(look(0)?),
-        false => Writing::AfterLeaves,
+        false => Writing::AfterLeaves(&look),
     };
-    let mesh = mesh_part(run, plan, partition, writing, look)?;
+    let mesh = mesh_part(run, plan, partition, writing)?;
     match mesh.tiles.waiting.len() {
         0 => Ok(mesh),
         waiting => Err(Error::Broken(format!("{waiting} tiles were not written"))),
@@ -67,17 +67,11 @@ pub(crate) fn mesh_and_tiles(
 }
 
 /// Triangulates all leaves of a part, merges their frontiers, and writes the tiles that are finished: all of them if the part is the
-/// whole job. `look` returns how tiles look, given the number of sites.
+/// whole job.
 ///
 /// # Errors
 /// Those of the four steps.
-pub(crate) fn mesh_part(
-    run: &RunContext,
-    plan: &Plan,
-    partition: &Partition,
-    writing: Writing,
-    look: impl Fn(u64) -> Result<Arc<TileLook>> + Sync,
-) -> Result<MeshInTiles> {
+pub(crate) fn mesh_part(run: &RunContext, plan: &Plan, partition: &Partition, writing: Writing) -> Result<MeshInTiles> {
     let stage = run.progress.stage("mesh", partition.summary.counts.kept, "points");
     let activity = run.progress.activity("triangulate", "points");
     let queue = TileQueue::new(run, partition, &stage);
@@ -93,7 +87,7 @@ pub(crate) fn mesh_part(
         let all_leaves = run.journal.position();
         // This closes the point file: an open file is not freed when it is removed.
         drop(walk);
-        if let Writing::AfterLeaves = writing {
+        if let Writing::AfterLeaves(look) = writing {
             // Not while tiles are written: on a small disk the results need the room.
             let look = || run_concurrently(|| run.remove_points(all_leaves), || look(leaves.sites));
             queue.attempt(|| look().map(|look| queue.begin(scope, look)))?;

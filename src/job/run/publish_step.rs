@@ -1,31 +1,69 @@
 //! Running step 8 and writing the report.
 
 use crate::geometry::Bounds;
+use crate::input::PointCounts;
 use crate::job::durable::atomic_file::{PendingFile, write_pending};
+use crate::job::durable::journal::PublishedFile;
 use crate::job::levels::make_level::LevelStats;
 use crate::job::mesh::leaf::LeafStats;
-use crate::job::partition::result::Partition;
 use crate::job::plan::job_plan::Plan;
 use crate::job::publish::one_file_limits::{fits_one_file, too_large_for_one_file};
 use crate::job::publish::placement::{place, placement_warning};
-use crate::job::publish::side_files::{SideFiles, write_side_files};
-use crate::job::publish::tileset_tree::{tileset_root, tileset_text};
+use crate::job::publish::side_files::{EachTile, SideFiles, write_side_files};
+use crate::job::publish::tileset_tree::tileset_text;
 use crate::job::records::{JobStep, StepOutput};
 use crate::job::report::job_report::{Report, ReportParts};
-use crate::job::run::levels_step::LevelResult;
+use crate::job::run::levels_step::left_out_warning;
 use crate::job::run::run_context::RunContext;
 use crate::job::run::tile_queue::TileLook;
 use crate::job::tiles::write_tile::TileStats;
 use crate::output::checksums::list_text;
 use crate::output::options::OutputFormat;
 use crate::output::tiles3d::georeference::Georeference;
+use crate::output::tiles3d::tileset::TilesetNode;
 use crate::threads::run_concurrently;
-use crate::{Result, Warnings};
+use crate::{Error, Result, Warnings};
 use std::path::Path;
 
 /// Tells whether viewers get 3D Tiles: where the user wants them, or where one file would be too large.
 pub(crate) fn wants_tileset(plan: &Plan, written: &TileStats) -> bool {
     plan.options.output.format != OutputFormat::Glb || !fits_one_file(written)
+}
+
+/// The tiles that are written.
+pub(crate) struct WrittenFiles<'a> {
+    pub(crate) stats: TileStats,
+    pub(crate) tiles: &'a dyn EachTile,
+}
+
+/// What viewers of 3D Tiles get.
+pub(crate) struct TilesetContent {
+    pub(crate) root: TilesetNode,
+    pub(crate) levels: LevelStats,
+}
+
+impl TilesetContent {
+    /// Returns the content with this root.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] if there is none.
+    pub(crate) fn new(root: Option<TilesetNode>, levels: LevelStats) -> Result<TilesetContent> {
+        let root = root.ok_or_else(|| Error::Broken("there is no tile to list in tileset.json".into()))?;
+        Ok(TilesetContent { root, levels })
+    }
+}
+
+/// What the report says of the mesh.
+pub(crate) struct MeshFigures {
+    pub(crate) points: PointCounts,
+    pub(crate) leaves: LeafStats,
+    pub(crate) tiles: TileStats,
+    /// Bytes of temporary files.
+    pub(crate) temporary: u64,
+    /// Steps of parts that an interrupted run had finished.
+    pub(crate) resumed: u64,
+    /// Results that the journals of parts name.
+    pub(crate) files: Vec<PublishedFile>,
 }
 
 /// What step 8 gives back.
@@ -43,37 +81,34 @@ pub(crate) struct Published {
 pub(crate) fn publish(
     run: &RunContext,
     plan: &Plan,
-    partition: &Partition,
     bounds: Bounds<3>,
-    tiles: &TileStats,
+    written: &WrittenFiles,
     look: &TileLook,
-    levels: Option<LevelResult>,
+    tileset: Option<TilesetContent>,
 ) -> Result<Published> {
     let stage = run.progress.stage("publish", 1, "job");
     let output = &plan.options.output;
-    let (mut warnings, mut tileset, mut placement, mut stats) =
-        (Warnings::default(), None, None, LevelStats::default());
-    if let Some(levels) = levels {
-        let mut root = tileset_root(run.store, &partition.tree, &levels.hierarchy)?;
+    let (mut warnings, mut text, mut placement, mut stats) = (Warnings::default(), None, None, LevelStats::default());
+    if let Some(TilesetContent { mut root, levels }) = tileset {
         let placed = place(&plan.crs, &look.style.frame, output.height_offset, &mut root);
         warnings.extend(placement_warning(&placed));
-        warnings.extend(levels.warning);
-        tileset = Some(tileset_text(&look.style.frame, &root));
-        (placement, stats) = (placed.ok(), levels.stats);
+        warnings.extend(left_out_warning(plan, &levels));
+        text = Some(tileset_text(&look.style.frame, &root));
+        (placement, stats) = (placed.ok(), levels);
     }
     let georeference = Georeference::new(&plan.frame, &plan.lattice, bounds, &plan.unit, plan.crs.epsg);
+    let tiles = &written.stats;
     let fits = fits_one_file(tiles);
     let content = SideFiles {
         georeference: georeference.to_json(placement.as_ref())?,
-        tileset,
+        tileset: text,
         one_file: fits && output.format != OutputFormat::Tiles3d,
     };
     if content.one_file {
         // terrain.glb is made from the tiles, which must have their names.
         run.journal.commit()?;
     }
-    let count = partition.tree.leaves.len();
-    let write = || write_side_files(run.directory, run.store, &content, &look.canvas, count);
+    let write = || write_side_files(run.directory, &content, &look.canvas, written.tiles);
     // The tiles reach the disk meanwhile, before the report says how long that took.
     let bytes = run_concurrently(|| run.journal.commit(), || run.journal.step(JobStep::Publish, write))?;
     if !fits && output.format == OutputFormat::Glb {
@@ -88,17 +123,11 @@ pub(crate) fn publish(
 ///
 /// # Errors
 /// [`crate::Error::Io`] if it cannot be written.
-pub(crate) fn write_report(
-    run: &RunContext,
-    plan: &Plan,
-    partition: &Partition,
-    leaves: LeafStats,
-    tiles: TileStats,
-    published: Published,
-) -> Result<Report> {
-    let list = write_file_list(run)?;
+pub(crate) fn write_report(run: &RunContext, plan: &Plan, mesh: MeshFigures, published: Published) -> Result<Report> {
+    let MeshFigures { points, leaves, tiles, temporary, resumed, files } = mesh;
+    let list = write_file_list(run, files)?;
     let parts = ReportParts {
-        points: partition.summary.counts.clone(),
+        points,
         leaves,
         gpu: run.triangulator.gpu().map(str::to_owned),
         gpu_steps: run.triangulator.gpu_steps(),
@@ -106,11 +135,11 @@ pub(crate) fn write_report(
         levels: published.levels,
         warnings: published.warnings,
         other_bytes: published.bytes + list.bytes,
-        temporary: partition.point_bytes + run.store.bytes(),
+        temporary,
         stages: std::mem::take(&mut *run.stages()),
         threads: run.threads,
         memory: plan.options.limits.memory.0,
-        resumed: run.journal.taken_over(),
+        resumed: run.journal.taken_over() + resumed,
         clock: run.clock,
         inputs_fingerprint: run.inputs_fingerprint.clone(),
         file_list: list.checksum,
@@ -123,13 +152,14 @@ pub(crate) fn write_report(
     Ok(report)
 }
 
-/// Writes the list of all results so far. Their checksums are in the journal.
-fn write_file_list(run: &RunContext) -> Result<PendingFile> {
+/// Writes the list of all results so far. Their checksums are in the job's journal, and those of parts are `others`.
+fn write_file_list(run: &RunContext, others: Vec<PublishedFile>) -> Result<PendingFile> {
     let (directory, output) = (run.directory, run.directory.output());
     let own = [output.checksums(), output.report()].map(|path| directory.name(&path));
-    let files = run.journal.files().into_iter();
-    let files = files.filter(|file| directory.is_result(&file.name) && !own.contains(&file.name));
-    let files: Vec<_> = files.map(|file| (slashed(&file.name), file.checksum)).collect();
+    let mut files: Vec<PublishedFile> = run.journal.files().into_iter().chain(others).collect();
+    files.retain(|file| directory.is_result(&file.name) && !own.contains(&file.name));
+    files.sort_by(|a, b| a.name.cmp(&b.name));
+    let files: Vec<_> = files.into_iter().map(|file| (slashed(&file.name), file.checksum)).collect();
     write_pending(&output.checksums(), list_text(&files).as_bytes())
 }
 

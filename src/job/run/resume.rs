@@ -26,8 +26,8 @@ use std::path::PathBuf;
 /// An earlier run of a job in the same directory, as its journal tells. The journal is read once.
 pub(crate) struct EarlierRun {
     /// `None` if another version of the program wrote the journal, or it is damaged.
-    header: Option<JobHeader>,
-    entries: Vec<JournalEntry>,
+    pub(super) header: Option<JobHeader>,
+    pub(super) entries: Vec<JournalEntry>,
     /// Whether all its results are in place.
     is_complete: bool,
 }
@@ -108,7 +108,7 @@ impl EarlierRun {
     /// Returns the plan that the run wrote, with the present `options`, if it is whole and the mesh is that of the job with
     /// `header`.
     pub(crate) fn plan(&self, directory: &JobDirectory, header: &JobHeader, options: &JobOptions) -> Option<Plan> {
-        let entry = self.entries.iter().find(|entry| entry.step == JobStep::Partition)?;
+        let entry = self.entries.iter().find(|entry| matches!(entry.step, JobStep::Partition | JobStep::Plan))?;
         let is_same = self.coarsening(&header.fingerprint) == Some(header.coarsening);
         let plan = is_same && entry.files.iter().all(|file| file.is_whole(directory));
         let mut plan = plan.then(|| Plan::read(&directory.plan()).ok())??;
@@ -168,20 +168,25 @@ pub(crate) fn start<'a>(
     if entries.is_empty() {
         remove_file(&directory.journal())?;
     }
+    directory.clear_parts()?;
     directory.clear(&files)?;
     let journal = Journal::begin(directory, &header, entries)?;
+    Ok(RunStart { store: open_store(directory, &records)?, journal, partition })
+}
+
+/// Opens the store with these records.
+pub(super) fn open_store(directory: &JobDirectory, records: &[RecordRef]) -> Result<Store> {
     let paths: [PathBuf; STORE_FILES] = directory.store();
-    let store = if records.is_empty() { Store::create(paths)? } else { Store::open(paths, records.iter())? };
-    Ok(RunStart { store, journal, partition })
+    if records.is_empty() { Store::create(paths) } else { Store::open(paths, records.iter()) }
 }
 
 /// The steps that stay, and what they left.
 #[derive(Default)]
-struct KeptSteps {
-    entries: Vec<JournalEntry>,
+pub(super) struct KeptSteps {
+    pub(super) entries: Vec<JournalEntry>,
     /// The files that later steps need, as the journal names them.
-    files: HashSet<PathBuf>,
-    partition: Option<Partition>,
+    pub(super) files: HashSet<PathBuf>,
+    pub(super) partition: Option<Partition>,
     /// The fingerprint of the job with the names of the inputs that these steps know.
     names: Option<Fingerprint>,
 }
@@ -231,7 +236,7 @@ fn review(
 }
 
 /// A look at what an interrupted run left.
-struct ResumeReview {
+pub(super) struct ResumeReview {
     directory: JobDirectory,
     partition: Partition,
     entries: HashMap<JobStep, JournalEntry>,
@@ -245,7 +250,7 @@ struct ResumeReview {
 
 impl ResumeReview {
     /// Returns `None` if the points are gone, though a leaf needs them, or if the partition is damaged.
-    fn of(
+    pub(super) fn of(
         directory: &JobDirectory,
         entries: Vec<JournalEntry>,
         counts_leaves: bool,
@@ -319,10 +324,12 @@ impl ResumeReview {
             JobStep::Publish => self.all_written && self.whole.contains(&step),
             // A run with all its results whole does not come here. Any other writes a new report, and the journal must name only one.
             JobStep::Report => false,
+            // A job of one part has none of these, and a part that has them is not looked at.
+            JobStep::Plan | JobStep::Read(_) | JobStep::MeshPart | JobStep::WriteWaiting => false,
         }
     }
 
-    fn into_kept(self) -> KeptSteps {
+    pub(super) fn into_kept(self) -> KeptSteps {
         let stays: HashSet<JobStep> = self.entries.keys().copied().filter(|&step| self.step_stays(step)).collect();
         let mut files = HashSet::new();
         if !self.partition.tree.tiles().all(|tile| stays.contains(&JobStep::Leaf(tile))) {
