@@ -34,10 +34,11 @@ use crate::job::report::job_report::Report;
 use crate::job::run::attempt::run_until_it_fits;
 use crate::job::run::levels_step::{hierarchy_of, make_levels};
 use crate::job::run::mesh_and_tiles::mesh_and_tiles;
-use crate::job::run::publish_step::{MeshFigures, TilesetContent, WrittenFiles, publish, wants_tileset, write_report};
-use crate::job::run::read_step;
+use crate::job::run::publish_step::{
+    MeshFigures, TilesetContent, WrittenFiles, publish, some_triangles, wants_tileset, write_report,
+};
 use crate::job::run::run_context::RunContext;
-use crate::job::tiles::write_tile::TileStats;
+use crate::job::run::{parts, read_step};
 use crate::threads::run_concurrently;
 use crate::{Error, Result};
 
@@ -54,6 +55,9 @@ pub fn run(options: &JobOptions, run: impl Into<RunOptions>) -> Result<Report> {
 
 /// The walk through the steps after the plan.
 fn walk(run: &RunContext, plan: Plan, earlier: Option<Partition>) -> Result<Report> {
+    if !plan.is_one_part() {
+        return parts::walk(run, &plan);
+    }
     // Step 2, partition/: the points by tile, and the tree.
     let (plan, partition) = read_step::read(run, plan, earlier)?;
     let summary = &partition.summary;
@@ -100,21 +104,4 @@ fn walk(run: &RunContext, plan: Plan, earlier: Option<Partition>) -> Result<Repo
 /// In a job of one part no tile needs another.
 fn no_other_part(part: PartIndex) -> Result<Child> {
     Err(Error::Broken(format!("there is no part {part}")))
-}
-
-/// Checks that there is a terrain to look at.
-fn some_triangles(written: &TileStats, plan: &Plan) -> Result<()> {
-    if written.triangles > 0 {
-        return Ok(());
-    }
-    if written.cut_triangles > 0 {
-        return Err(Error::Config(format!(
-            "[output] max_edge leaves out all {} triangles: give a greater one",
-            written.cut_triangles
-        )));
-    }
-    Err(Error::NoTerrain(format!(
-        "the points make no triangle in steps of {}: a triangle takes three different places in x and y that are not on one line",
-        plan.lattice.resolution
-    )))
 }

@@ -337,7 +337,7 @@ pub struct BorderAttributes {
 }
 
 /// The finished frontier of one leaf, by ascending site.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct FinishedBorder(pub Vec<BorderAttributes>);
 
 impl FinishedBorder {

@@ -29,6 +29,7 @@ mod levels;
 mod limits;
 mod messages;
 mod overlap;
+mod parts;
 mod preflight;
 mod real;
 mod same_mesh;

@@ -46,6 +46,16 @@ impl JobDirectory {
         JobDirectory { job: self.job.join("join"), ..self.clone() }
     }
 
+    /// Returns the directories of all parts that have one, and that of the nodes above the parts.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if they cannot be listed.
+    pub fn folders_of_parts(&self) -> Result<Vec<JobDirectory>> {
+        let number = |path: PathBuf| path.file_name()?.to_str()?.parse().ok().map(PartIndex);
+        let parts = entries(&self.parts())?.into_iter().filter_map(number).map(|part| self.part(part));
+        Ok(parts.chain([self.join()]).collect())
+    }
+
     /// Returns the folder of the parts' own folders.
     pub fn parts(&self) -> PathBuf {
         self.job.join("parts")

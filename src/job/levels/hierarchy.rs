@@ -152,7 +152,7 @@ mod tests {
     fn balanced(depth: u32) -> Tree {
         fn grow(tree: &mut Tree, parent: Option<NodeIndex>, depth: u32) -> NodeIndex {
             let node = NodeIndex::new(tree.nodes.len());
-            let kind = NodeKind::Leaf(TileIndex::new(tree.leaves.len()));
+            let kind = NodeKind::Leaf(PartIndex::FIRST.tile(tree.leaves.len()));
             tree.nodes.push(TreeNode { cell: Cell::PLANE, parent, kind });
             if depth == 0 {
                 tree.leaves.push(node);

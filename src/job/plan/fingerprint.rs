@@ -17,6 +17,9 @@ pub struct JobHeader {
     pub fingerprint: Fingerprint,
     /// How much coarser than the inputs ask for the lattice is.
     pub coarsening: LatticeCoarsening,
+    /// Tells the folders of this job's parts from those of others; 0 for a job of one part.
+    #[serde(default)]
+    pub id: u64,
 }
 
 /// Version of the records in the store, of the plan, and of which nodes merge. It changes with every change of these, so that no

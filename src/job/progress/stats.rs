@@ -19,3 +19,12 @@ pub struct StageStats {
     /// The name of its units.
     pub unit: String,
 }
+
+impl StageStats {
+    /// Adds what the same stage of another part took.
+    pub fn add(&mut self, other: &StageStats) {
+        self.wall_s += other.wall_s;
+        self.cpu_s += other.cpu_s;
+        self.done += other.done;
+    }
+}

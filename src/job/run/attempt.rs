@@ -65,6 +65,11 @@ pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, walk: Wal
     loop {
         let outcome = attempt(&job, coarsening, earlier.take(), lock.take());
         // Only the finished mesh knows its longest triangle. To round in advance would often round for nothing.
+        if let (Err(Error::NeedsOnePart), false) = (&outcome, coarsening.one_part) {
+            run.progress.note("what was read contradicts the header of a file; starting again without parts");
+            coarsening.one_part = true;
+            continue;
+        }
         let Err(Error::TooFine { vertical, what }) = outcome else { return outcome };
         let (power, axes) = match vertical {
             true => (&mut coarsening.vertical, "z"),
@@ -102,7 +107,7 @@ fn attempt(
     lock: Option<Lock>,
 ) -> Result<Report> {
     let JobRequest { options, run, ref directory, clock, .. } = *job;
-    let header = JobHeader { fingerprint: job.fingerprint.clone(), coarsening };
+    let header = JobHeader { fingerprint: job.fingerprint.clone(), coarsening, id: 0 };
     let stage = JobProgress::new(run.progress, clock, Vec::new()).stage("plan", 1, "job");
     let plan = match earlier.as_ref().and_then(|earlier| earlier.plan(directory, &header, options)) {
         Some(plan) => plan,
@@ -134,8 +139,11 @@ fn attempt(
         return Ok(report);
     }
     on_threads(threads, || {
-        let start = resume::start(directory, &header, earlier, options.output.max_edge, run.progress)?;
-        let RunStart { store, journal, partition } = start;
+        let start = match plan.is_one_part() {
+            true => resume::start(directory, &header, earlier, options.output.max_edge, run.progress)?,
+            false => resume::start_parts(directory, &header, earlier, run.progress)?,
+        };
+        let RunStart { store, journal, partition, job_id } = start;
         let context = RunContext {
             triangulator: &job.triangulator,
             directory,
@@ -145,6 +153,7 @@ fn attempt(
             threads,
             clock,
             inputs_fingerprint: job.fingerprint.of_inputs(),
+            job_id,
             stages: Mutex::new(vec![planned]),
         };
         let outcome = (job.walk)(&context, plan, partition);

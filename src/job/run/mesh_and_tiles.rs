@@ -3,7 +3,7 @@
 
 use crate::geometry::Bounds;
 use crate::job::durable::journal::JournalPosition;
-use crate::job::index::NodeIndex;
+use crate::job::index::{NodeIndex, TileIndex};
 use crate::job::mesh::leaf::LeafStats;
 use crate::job::partition::point_file::PointFile;
 use crate::job::partition::result::Partition;
@@ -11,7 +11,7 @@ use crate::job::plan::job_plan::Plan;
 use crate::job::preflight::estimate::has_room_besides_points;
 use crate::job::preflight::kept_points::KeptPoints;
 use crate::job::publish::one_file_limits::MAX_TRIANGLES_IN_ONE_FILE;
-use crate::job::records::JobStep;
+use crate::job::records::{JobStep, Leaf};
 use crate::job::run::run_context::RunContext;
 use crate::job::run::tile_queue::{TileLook, TileQueue, WrittenTiles};
 use crate::job::run::tree_walk::TreeWalk;
@@ -20,6 +20,7 @@ use crate::job::tiles::max_edge::MaxEdgeRule;
 use crate::output::options::MaxEdge;
 use crate::threads::run_concurrently;
 use crate::{Error, Result};
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// The mesh of a part, written as tiles as far as it is finished.
@@ -125,6 +126,9 @@ fn max_edge_rule(
         // No step needs the rule, and the leaves that it counts may be gone.
         return Ok(MaxEdgeRule::KeepAll);
     }
-    let (choice, tiles) = (plan.options.output.max_edge, partition.tree.leaves.len());
-    MaxEdgeRule::new(choice, &plan.frame, run.store, tiles, sites, bounds)
+    let visit_sites = |visit: &(dyn Fn(&[i32; 3]) + Sync)| {
+        let tiles: Vec<TileIndex> = partition.tree.tiles().collect();
+        tiles.into_par_iter().try_for_each(|tile| Leaf::visit_positions(run.store, tile, visit))
+    };
+    MaxEdgeRule::new(plan.options.output.max_edge, &plan.frame, sites, bounds, &visit_sites)
 }

@@ -3,6 +3,8 @@
 pub(crate) mod attempt;
 pub(crate) mod levels_step;
 pub(crate) mod mesh_and_tiles;
+pub(crate) mod part_entries;
+pub(crate) mod parts;
 pub(crate) mod publish_step;
 pub(crate) mod read_step;
 pub(crate) mod resume;

@@ -66,6 +66,23 @@ pub(crate) struct MeshFigures {
     pub(crate) files: Vec<PublishedFile>,
 }
 
+/// Checks that there is a terrain to look at.
+pub(crate) fn some_triangles(written: &TileStats, plan: &Plan) -> Result<()> {
+    if written.triangles > 0 {
+        return Ok(());
+    }
+    if written.cut_triangles > 0 {
+        return Err(Error::Config(format!(
+            "[output] max_edge leaves out all {} triangles: give a greater one",
+            written.cut_triangles
+        )));
+    }
+    Err(Error::NoTerrain(format!(
+        "the points make no triangle in steps of {}: a triangle takes three different places in x and y that are not on one line",
+        plan.lattice.resolution
+    )))
+}
+
 /// What step 8 gives back.
 pub(crate) struct Published {
     /// Bytes of the results besides the tiles.

@@ -4,7 +4,7 @@
 //! nothing but the job. So a step that runs again writes the same as before, and the steps after it stay.
 
 use crate::job::durable::atomic_file::remove_file;
-use crate::job::durable::directory::{JobDirectory, STORE_FILES};
+use crate::job::durable::directory::{JobDirectory, create_folder};
 use crate::job::durable::journal::{self, PublishedFile};
 use crate::job::index::{NodeIndex, TileIndex};
 use crate::job::options::JobOptions;
@@ -13,9 +13,10 @@ use crate::job::partition::result::Partition;
 use crate::job::plan::fingerprint::{Fingerprint, JobChange, JobHeader};
 use crate::job::plan::job_plan::Plan;
 use crate::job::plan::lattice_choice::LatticeCoarsening;
-use crate::job::progress::stage::{ProgressOutput, Stage};
-use crate::job::records::{JobStep, Journal, JournalEntry, RecordRef, Store};
+use crate::job::progress::stage::{JobProgress, ProgressOutput, Stage};
+use crate::job::records::{JobStep, Journal, JournalEntry, Store};
 use crate::job::report::job_report::Report;
+use crate::job::run::part_entries::{files_of_parts, open_store, records_of};
 use crate::output::options::MaxEdge;
 use crate::{Error, Result, interrupt};
 use rayon::prelude::*;
@@ -28,6 +29,8 @@ pub(crate) struct EarlierRun {
     /// `None` if another version of the program wrote the journal, or it is damaged.
     pub(super) header: Option<JobHeader>,
     pub(super) entries: Vec<JournalEntry>,
+    /// The results that the journals of its parts name.
+    of_parts: Vec<PublishedFile>,
     /// Whether all its results are in place.
     is_complete: bool,
 }
@@ -39,7 +42,12 @@ impl EarlierRun {
     /// [`Error::Io`] if it cannot be read.
     pub(crate) fn read(directory: &JobDirectory) -> Result<Option<EarlierRun>> {
         let run = journal::read::<JobHeader, JobStep, _>(directory)?;
-        Ok(run.map(|(header, entries)| EarlierRun { header, entries, is_complete: false }))
+        let Some((header, entries)) = run else { return Ok(None) };
+        let of_parts = match &header {
+            Some(JobHeader { id: id @ 1.., .. }) => files_of_parts(directory, *id)?,
+            _ => Vec::new(),
+        };
+        Ok(Some(EarlierRun { header, entries, of_parts, is_complete: false }))
     }
 
     /// Reads the journal of a job that has just written its report.
@@ -82,7 +90,7 @@ impl EarlierRun {
     }
 
     fn results<'a>(&'a self, directory: &'a JobDirectory) -> impl Iterator<Item = &'a PublishedFile> {
-        let files = self.entries.iter().flat_map(|entry| &entry.files);
+        let files = self.entries.iter().flat_map(|entry| &entry.files).chain(&self.of_parts);
         files.filter(|file| directory.is_result(&file.name))
     }
 
@@ -142,6 +150,8 @@ pub(crate) struct RunStart<'a> {
     pub(crate) journal: Journal<'a>,
     /// What reading the points found, if that is finished.
     pub(crate) partition: Option<Partition>,
+    /// Tells the folders of this job's parts from those of others.
+    pub(crate) job_id: u64,
 }
 
 /// Begins a run of the job with `header` in its locked directory: takes over what is the same and whole from the earlier run, and
@@ -161,7 +171,7 @@ pub(crate) fn start<'a>(
     if !entries.is_empty() {
         progress.note(&format!("going on with an interrupted run: {} steps are done", entries.len()));
     }
-    let records: Vec<RecordRef> = entries.iter().flat_map(|entry| &entry.records).copied().collect();
+    let records = records_of(&entries);
     let header = JobHeader { fingerprint: names.unwrap_or(header.fingerprint.clone()), ..*header };
     // What does not stay is removed first: it may fill the disk, and the new journal needs room. Until the new journal is there, the
     // old one names steps whose output is gone; after a kill the next run notices. If no step stays, the old journal is removed too.
@@ -171,13 +181,86 @@ pub(crate) fn start<'a>(
     directory.clear_parts()?;
     directory.clear(&files)?;
     let journal = Journal::begin(directory, &header, entries)?;
-    Ok(RunStart { store: open_store(directory, &records)?, journal, partition })
+    Ok(RunStart { store: open_store(directory, &records)?, journal, partition, job_id: 0 })
 }
 
-/// Opens the store with these records.
-pub(super) fn open_store(directory: &JobDirectory, records: &[RecordRef]) -> Result<Store> {
-    let paths: [PathBuf; STORE_FILES] = directory.store();
-    if records.is_empty() { Store::create(paths) } else { Store::open(paths, records.iter()) }
+/// As [`start`], for a job of several parts. What is in the folders of its parts stays if the job is the same.
+///
+/// # Errors
+/// [`Error::Io`] on the job directory.
+pub(crate) fn start_parts<'a>(
+    directory: &'a JobDirectory,
+    header: &JobHeader,
+    earlier: Option<EarlierRun>,
+    progress: ProgressOutput,
+) -> Result<RunStart<'a>> {
+    let same = earlier.and_then(|earlier| same_job_of_parts(header, earlier, progress));
+    let (entries, header) = match same {
+        Some((old, entries)) => {
+            progress.note("going on with an interrupted run of several parts");
+            let fingerprint = header.fingerprint.with_names_of(&old.fingerprint);
+            (entries, JobHeader { fingerprint, coarsening: header.coarsening, id: old.id })
+        }
+        None => {
+            remove_file(&directory.journal())?;
+            directory.clear_parts()?;
+            directory.clear(&HashSet::new())?;
+            (Vec::new(), JobHeader { id: new_id(), ..header.clone() })
+        }
+    };
+    create_folder(&directory.output().tiles())?;
+    let records = records_of(&entries);
+    let store = open_store(directory, &records)?;
+    let journal = Journal::begin(directory, &header, entries)?;
+    Ok(RunStart { store, journal, partition: None, job_id: header.id })
+}
+
+/// Returns the header of an earlier run of the same job and its entries that stay: the plan, and what was read.
+fn same_job_of_parts(
+    header: &JobHeader,
+    earlier: EarlierRun,
+    progress: ProgressOutput,
+) -> Option<(JobHeader, Vec<JournalEntry>)> {
+    let EarlierRun { header: old, mut entries, .. } = earlier;
+    let old = old.filter(|old| old.coarsening == header.coarsening && old.id != 0)?;
+    match header.fingerprint.since(&old.fingerprint) {
+        JobChange::Nothing => {}
+        JobChange::Style(what) | JobChange::Mesh(what) => {
+            progress.note(&format!("changed since the interrupted run: {what}; starting over"));
+            return None;
+        }
+    }
+    entries.retain(|entry| matches!(entry.step, JobStep::Plan | JobStep::Read(_)));
+    Some((old, entries))
+}
+
+/// Returns a number that no other run has.
+fn new_id() -> u64 {
+    let time = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    let nanoseconds = time.map_or(0, |time| time.as_nanos() as u64);
+    (nanoseconds ^ u64::from(std::process::id()) << 40).max(1)
+}
+
+/// Returns the entries of a part that stay, and its partition if that does.
+///
+/// # Errors
+/// [`Error::Io`] on its folder.
+pub(crate) fn resume_part(
+    directory: &JobDirectory,
+    entries: Vec<JournalEntry>,
+    max_edge: MaxEdge,
+    progress: &JobProgress,
+) -> Result<(Vec<JournalEntry>, Option<Partition>)> {
+    let stage = progress.stage("check", entries.len() as u64, "steps");
+    let review = match entries.is_empty() {
+        true => None,
+        false => ResumeReview::of(directory, entries, max_edge == MaxEdge::Auto, &stage)?,
+    };
+    stage.finish();
+    let KeptSteps { entries, files, partition, .. } = review.map(ResumeReview::into_kept).unwrap_or_default();
+    create_folder(directory.job())?;
+    directory.clear_own(&files)?;
+    Ok((entries, partition))
 }
 
 /// The steps that stay, and what they left.

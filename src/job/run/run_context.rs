@@ -22,6 +22,8 @@ pub(crate) struct RunContext<'a> {
     pub(crate) clock: JobClock,
     /// What tells the content of the inputs from that of others.
     pub(crate) inputs_fingerprint: String,
+    /// Tells the folders of this job's parts from those of others.
+    pub(crate) job_id: u64,
     /// The stages that have ended.
     pub(crate) stages: Mutex<Vec<StageStats>>,
 }
@@ -35,6 +37,17 @@ impl RunContext<'_> {
     /// Adds a stage to the report.
     pub(crate) fn add_stage(&self, stage: StageStats) {
         self.stages().push(stage);
+    }
+
+    /// Adds the stages of a part to those of the same names.
+    pub(crate) fn add_stages(&self, part: RunContext) {
+        let mut stages = self.stages();
+        for added in part.stages.into_inner().unwrap_or_else(PoisonError::into_inner) {
+            match stages.iter_mut().find(|stage| stage.stage == added.stage) {
+                Some(stage) => stage.add(&added),
+                None => stages.push(added),
+            }
+        }
     }
 
     /// Returns the stages that have ended.

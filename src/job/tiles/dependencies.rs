@@ -56,6 +56,7 @@ impl TileDependencies {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::job::index::PartIndex;
     use proptest::prelude::*;
 
     proptest! {
@@ -67,13 +68,13 @@ mod tests {
         ) {
             let neighbours = |tile: usize| {
                 let edges = edges.iter().filter(|(a, b)| *a == tile && a != b);
-                edges.map(|edge| TileIndex::new(edge.1)).collect::<Vec<TileIndex>>()
+                edges.map(|edge| PartIndex::FIRST.tile(edge.1)).collect::<Vec<TileIndex>>()
             };
             let mut dependencies = TileDependencies::new(12);
             let mut written = Vec::new();
             for (at, &tile) in order.iter().enumerate() {
                 let done = &order[..=at];
-                let finished = FinishedTile { tile: TileIndex::new(tile), last_merge: NodeIndex::new(tile + 100) };
+                let finished = FinishedTile { tile: PartIndex::FIRST.tile(tile), last_merge: NodeIndex::new(tile + 100) };
                 for ready in dependencies.border_done(finished, &neighbours(tile)) {
                     prop_assert_eq!(ready.last_merge.get(), ready.tile.get() + 100);
                     written.push(ready.tile.get());

@@ -6,11 +6,8 @@
 use crate::Result;
 use crate::geometry::Bounds;
 use crate::geometry::square_grid::SquareGrid;
-use crate::job::index::PartIndex;
-use crate::job::records::{Leaf, Store};
 use crate::output::frame::Frame;
 use crate::output::options::MaxEdge;
-use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// With "auto", the longest edge is this many times the spacing of the sites around the triangle.
@@ -21,6 +18,9 @@ const SITES_PER_CELL: u128 = 256;
 
 /// With "auto", the largest number of cells.
 const MAX_CELLS: u64 = 1 << 22;
+
+/// Calls a function with the position of every site, on any thread and in any order.
+pub type VisitSites<'a> = &'a dyn Fn(&(dyn Fn(&[i32; 3]) + Sync)) -> Result<()>;
 
 /// The rule that leaves triangles out.
 #[derive(Debug, Default)]
@@ -35,28 +35,26 @@ pub enum MaxEdgeRule {
 }
 
 impl MaxEdgeRule {
-    /// Returns the rule that the user chose. The `sites` within `bounds` must be in the store, in tiles 0 to `tiles`, if the rule is
-    /// "auto".
+    /// Returns the rule that the user chose. `visit_sites` visits all `sites`, which are within `bounds`; only "auto" calls it.
     ///
     /// # Errors
-    /// [`crate::Error::Io`] or [`crate::Error::Broken`] on the store.
+    /// Those of `visit_sites`.
     pub fn new(
         choice: MaxEdge,
         frame: &Frame,
-        store: &Store,
-        tiles: usize,
         sites: u64,
         bounds: Bounds<3>,
+        visit_sites: VisitSites,
     ) -> Result<MaxEdgeRule> {
-        Ok(match choice {
-            MaxEdge::None => MaxEdgeRule::KeepAll,
+        match choice {
+            MaxEdge::None => Ok(MaxEdgeRule::KeepAll),
             MaxEdge::Length(length) => {
                 let steps = length / frame.extras().resolution;
                 // A length that is a whole number of steps in decimal may be a little less in binary.
-                MaxEdgeRule::Length((steps * steps * (1.0 + 1e-12)) as u64)
+                Ok(MaxEdgeRule::Length((steps * steps * (1.0 + 1e-12)) as u64))
             }
-            MaxEdge::Auto => MaxEdgeRule::Spacing(SiteSpacing::measure(store, tiles, sites, bounds)?),
-        })
+            MaxEdge::Auto => SiteSpacing::measure(sites, bounds, visit_sites).map(MaxEdgeRule::Spacing),
+        }
     }
 
     /// Tells whether the rule leaves out nothing at all.
@@ -108,14 +106,12 @@ pub struct SiteSpacing {
 }
 
 impl SiteSpacing {
-    /// Counts the sites of all tiles.
-    fn measure(store: &Store, tiles: usize, sites: u64, bounds: Bounds<3>) -> Result<SiteSpacing> {
+    /// Counts all sites.
+    fn measure(sites: u64, bounds: Bounds<3>, visit_sites: VisitSites) -> Result<SiteSpacing> {
         let mut spacing = SiteSpacing::empty(bounds, sites);
         let counts: Vec<AtomicU32> = spacing.counts.iter().map(|_| AtomicU32::new(0)).collect();
-        (0..tiles).into_par_iter().try_for_each(|tile| {
-            Leaf::visit_positions(store, PartIndex::FIRST.tile(tile), |&position| {
-                counts[spacing.cell(position)].fetch_add(1, Ordering::Relaxed);
-            })
+        visit_sites(&|&position| {
+            counts[spacing.cell(position)].fetch_add(1, Ordering::Relaxed);
         })?;
         spacing.counts = counts.into_iter().map(AtomicU32::into_inner).collect();
         spacing.spread();

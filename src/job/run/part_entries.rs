@@ -1,0 +1,58 @@
+//! What the journals of parts say, and opening the stores that they describe.
+
+use crate::Result;
+use crate::job::durable::directory::{JobDirectory, STORE_FILES};
+use crate::job::durable::journal::{self, PublishedFile};
+use crate::job::index::PartIndex;
+use crate::job::records::{JobStep, JournalEntry, RecordRef, StepRecord, Store};
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// The first line of the journal of a part. The nodes above the parts have the number after the last part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct PartHeader {
+    /// The run that began the job.
+    pub(crate) job: u64,
+    pub(crate) part: PartIndex,
+}
+
+/// Returns the entries of the journal in `directory` if it is that of `header`.
+///
+/// # Errors
+/// [`crate::Error::Io`] if it cannot be read.
+pub(crate) fn entries_of(directory: &JobDirectory, header: PartHeader) -> Result<Vec<JournalEntry>> {
+    entries_if(directory, |found| found == header)
+}
+
+fn entries_if(directory: &JobDirectory, is_wanted: impl Fn(PartHeader) -> bool) -> Result<Vec<JournalEntry>> {
+    let read = journal::read::<PartHeader, JobStep, StepRecord>(directory)?;
+    let own = read.filter(|(found, _)| found.is_some_and(is_wanted));
+    Ok(own.map(|(_, entries)| entries).unwrap_or_default())
+}
+
+/// Returns the results that the journals of all parts of `job` name.
+///
+/// # Errors
+/// [`crate::Error::Io`] if one cannot be read.
+pub(crate) fn files_of_parts(directory: &JobDirectory, job: u64) -> Result<Vec<PublishedFile>> {
+    let mut files = Vec::new();
+    for folder in directory.folders_of_parts()? {
+        let entries = entries_if(&folder, |found| found.job == job)?;
+        files.extend(entries.into_iter().flat_map(|entry| entry.files).filter(|file| directory.is_result(&file.name)));
+    }
+    Ok(files)
+}
+
+/// Returns the records that `entries` name.
+pub(crate) fn records_of(entries: &[JournalEntry]) -> Vec<RecordRef> {
+    entries.iter().flat_map(|entry| &entry.records).copied().collect()
+}
+
+/// Opens the store in `directory` with these records.
+///
+/// # Errors
+/// [`crate::Error::Io`].
+pub(crate) fn open_store(directory: &JobDirectory, records: &[RecordRef]) -> Result<Store> {
+    let paths: [PathBuf; STORE_FILES] = directory.store();
+    if records.is_empty() { Store::create(paths) } else { Store::open(paths, records.iter()) }
+}

@@ -1,0 +1,110 @@
+//! The merges above the parts.
+
+use crate::Result;
+use crate::job::durable::directory::JobDirectory;
+use crate::job::index::{NodeIndex, PartIndex, TileIndex};
+use crate::job::mesh::merge::merge_frontiers;
+use crate::job::partition::tree::{NodeKind, Tree};
+use crate::job::plan::budget::merge_memory;
+use crate::job::records::{JobStep, JournalEntry, Seam, SeamTriangle, Store};
+use crate::job::run::part_entries::{PartHeader, entries_of, open_store, records_of};
+use crate::job::run::parts::PartsJob;
+use crate::job::run::parts::part_journal::PartSession;
+use crate::job::run::parts::part_store::{OpenPart, PartStores};
+use crate::job::run::run_context::RunContext;
+use std::sync::Arc;
+
+/// The merges above the parts, done.
+pub(crate) struct JoinedParts {
+    pub(crate) directory: JobDirectory,
+    pub(crate) store: Store,
+    pub(crate) header: PartHeader,
+}
+
+/// Merges what the parts send up, or what an interrupted run left of it.
+///
+/// # Errors
+/// Those of [`merge_frontiers`].
+pub(crate) fn join_parts(job: &PartsJob, stores: &PartStores) -> Result<JoinedParts> {
+    let PartsJob { run, parts, .. } = *job;
+    let directory = run.directory.join();
+    let header = PartHeader { job: run.job_id, part: PartIndex::new(parts.all().len()) };
+    let entries = whole_entries(&directory, entries_of(&directory, header)?)?;
+    let session = PartSession::begin(&directory, header, entries)?;
+    let stage = run.progress.stage("join", parts.all().len() as u64, "parts");
+    merge_below(job, stores, &session.context(run), NodeIndex::ROOT)?;
+    stage.advance(parts.all().len() as u64);
+    run.add_stage(stage.finish());
+    if run.journal.is_worth_syncing() {
+        session.store.sync()?;
+    }
+    session.end()?;
+    let entries = entries_of(&directory, header)?;
+    let records = records_of(&entries);
+    Ok(JoinedParts { store: open_store(&directory, &records)?, directory, header })
+}
+
+/// Returns the entries whose records hold what was written.
+fn whole_entries(directory: &JobDirectory, mut entries: Vec<JournalEntry>) -> Result<Vec<JournalEntry>> {
+    let records = records_of(&entries);
+    if !records.is_empty() {
+        let store = open_store(directory, &records)?;
+        entries.retain(|entry| {
+            entry.records.iter().all(|record| store.is_whole(record))
+                && entry.files.iter().all(|file| file.is_whole(directory))
+        });
+    }
+    Ok(entries)
+}
+
+/// Merges at all merge nodes at and below `node`, children first.
+fn merge_below(job: &PartsJob, stores: &PartStores, context: &RunContext, node: NodeIndex) -> Result<()> {
+    let tree = &job.parts.tree;
+    let NodeKind::Inner([low, high]) = tree.node(node).kind else { return Ok(()) };
+    let below = |child| merge_below(job, stores, context, child);
+    let (low, high) = rayon::join(|| below(low), || below(high));
+    low.and(high)?;
+    if !tree.is_merge(node) {
+        return Ok(());
+    }
+    let merge = || {
+        let below = tree.merged_by(node);
+        let open = |child: &NodeIndex| match tree.node(*child).kind {
+            NodeKind::Leaf(tile) => stores.open(tile.part()).map(Some),
+            NodeKind::Inner(_) => Ok(None),
+        };
+        let opened: Vec<Option<Arc<OpenPart>>> = below.iter().map(open).collect::<Result<_>>()?;
+        let sources: Vec<(&Store, NodeIndex)> = below
+            .iter()
+            .zip(&opened)
+            .map(|(&child, part)| part.as_ref().map_or((context.store, child), |part| (&part.store, NodeIndex::ROOT)))
+            .collect();
+        let memory = merge_memory(&job.plan.options, node == NodeIndex::ROOT, context.threads);
+        merge_frontiers(job.plan, tree.node(node).cell, &sources, context.store, memory, node)
+    };
+    context.journal.step(JobStep::Merge(node), merge).map(|_: Vec<TileIndex>| ())
+}
+
+impl JoinedParts {
+    /// Returns all triangles of seams that touch `tile` of the part with `store` and `tree`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`] or [`crate::Error::Broken`] on a store.
+    pub(crate) fn seam_of(
+        &self,
+        job: &PartsJob,
+        store: &Store,
+        tree: &Tree,
+        tile: TileIndex,
+    ) -> Result<Vec<SeamTriangle>> {
+        let above = &job.parts.tree;
+        let mut seam = Vec::new();
+        for node in tree.merges_above(tree.leaf(tile)) {
+            seam.extend(Seam::touching(store, node, tile)?);
+        }
+        for node in above.merges_above(job.parts.node(tile.part())) {
+            seam.extend(Seam::touching(&self.store, node, tile)?);
+        }
+        Ok(seam)
+    }
+}

@@ -1,0 +1,144 @@
+//! Reading and meshing the parts in their order.
+
+use crate::Result;
+use crate::job::durable::atomic_file::remove_file;
+use crate::job::index::PartIndex;
+use crate::job::index::TileIndex;
+use crate::job::mesh::leaf::LeafStats;
+use crate::job::mesh::precision_limit::PrecisionLimit;
+use crate::job::partition::part_points::{PartPoints, ReadBatch};
+use crate::job::partition::result::PointSummary;
+use crate::job::plan::job_plan::Claims;
+use crate::job::plan::no_points::no_point_is_left;
+use crate::job::records::{JobStep, StepOutput};
+use crate::job::run::mesh_and_tiles::{Writing, mesh_part};
+use crate::job::run::part_entries::{PartHeader, entries_of};
+use crate::job::run::parts::PartsJob;
+use crate::job::run::parts::part_journal::PartSession;
+use crate::job::run::resume::resume_part;
+use crate::job::run::tile_queue::TileLook;
+use crate::job::tiles::max_edge::MaxEdgeRule;
+use crate::job::tiles::write_tile::TileStats;
+use crate::output::options::MaxEdge;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// What is known of a part once it is meshed.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub(crate) struct MeshedPart {
+    /// Points before duplicates are dropped.
+    pub(crate) points: u64,
+    pub(crate) leaves: LeafStats,
+    /// The tiles that are written.
+    pub(crate) tiles: TileStats,
+    /// The tiles that wait for other parts.
+    pub(crate) waiting: Vec<TileIndex>,
+    /// Bytes of the point file and of the store.
+    pub(crate) temporary: u64,
+}
+
+/// All parts, meshed.
+pub(crate) struct MeshedParts {
+    pub(crate) parts: Vec<MeshedPart>,
+    pub(crate) summary: PointSummary,
+    /// Steps that an interrupted run had finished.
+    pub(crate) resumed: u64,
+}
+
+/// Reads and meshes all parts, or those that an interrupted run left.
+///
+/// # Errors
+/// Those of the steps; [`Error::NeedsOnePart`] if what is read contradicts the headers.
+pub(crate) fn mesh_all(job: &PartsJob) -> Result<MeshedParts> {
+    let PartsJob { plan, parts, .. } = *job;
+    let look = early_look(job)?;
+    let mut points = PartPoints::new(plan, parts);
+    let mut meshed = MeshedParts { parts: Vec::new(), summary: PointSummary::default(), resumed: 0 };
+    for part in parts.all() {
+        points.add(read_for(job, &points, part)?);
+        let (found, resumed) = mesh_one(job, &points, part, look.as_ref())?;
+        meshed.parts.push(found);
+        meshed.resumed += resumed;
+    }
+    meshed.summary = points.summary.clone();
+    let bounds = meshed.summary.bounds.ok_or_else(|| no_point_is_left(plan, &meshed.summary.counts))?;
+    PrecisionLimit::of(&plan.frame).check_heights(bounds)?;
+    Ok(meshed)
+}
+
+/// Returns how tiles look, unless all sites decide that.
+fn early_look(job: &PartsJob) -> Result<Option<Arc<TileLook>>> {
+    let output = &job.plan.options.output;
+    match (output.max_edge, job.plan.claims) {
+        (MaxEdge::Auto, _) | (_, None) => Ok(None),
+        (choice, Some(Claims { bounds, max_rgb })) => {
+            // No rule but "auto" looks at the sites.
+            let rule = MaxEdgeRule::new(choice, &job.plan.frame, 0, bounds, &|_| Ok(()))?;
+            Ok(Some(Arc::new(TileLook::new(job.plan, max_rgb, bounds, rule))))
+        }
+    }
+}
+
+/// Reads the inputs that `part` is the first to need, unless an earlier run has.
+fn read_for(job: &PartsJob, points: &PartPoints, part: PartIndex) -> Result<ReadBatch> {
+    let PartsJob { run, plan, parts } = *job;
+    let step = JobStep::Read(part);
+    if run.journal.has(step) {
+        return ReadBatch::load(run.store, part);
+    }
+    let records = parts.new_inputs(part).iter().map(|&input| plan.inputs[input].source.records).sum();
+    let stage = run.progress.stage("read", records, "points");
+    let batch = points.read(run.directory, part, run.journal.is_worth_syncing(), &stage)?;
+    run.add_stage(stage.finish());
+    run.journal.record(step, StepOutput::new((), vec![batch.save(run.store, part)?]))?;
+    // What the part frees must not be needed again.
+    run.journal.commit()?;
+    Ok(batch)
+}
+
+/// Meshes a part whose points have all been read, unless an earlier run has. Returns also the steps that were taken over.
+fn mesh_one(
+    job: &PartsJob,
+    points: &PartPoints,
+    part: PartIndex,
+    look: Option<&Arc<TileLook>>,
+) -> Result<(MeshedPart, u64)> {
+    let PartsJob { run, plan, .. } = *job;
+    let directory = &run.directory.part(part);
+    let header = PartHeader { job: run.job_id, part };
+    let entries = entries_of(directory, header)?;
+    if let Some(done) = entries.iter().find(|entry| entry.step == JobStep::MeshPart) {
+        remove_file(&directory.points())?;
+        return Ok((done.stats()?, entries.len() as u64));
+    }
+    let (entries, partition) = resume_part(directory, entries, plan.options.output.max_edge, run.progress)?;
+    let session = PartSession::begin(directory, header, entries)?;
+    let context = session.context(run);
+    let partition = match partition {
+        Some(partition) => partition,
+        None => {
+            let partition = points.partition(run.directory, part)?;
+            let record = partition.save(&session.store)?;
+            session.journal.record(JobStep::Partition, StepOutput::new((), vec![record]))?;
+            partition
+        }
+    };
+    let writing = look.map_or(Writing::Later, |look| Writing::AtOnce(look.clone()));
+    let mesh = mesh_part(&context, plan, &partition, writing)?;
+    run.add_stages(context);
+    let meshed = MeshedPart {
+        points: partition.summary.counts.kept,
+        leaves: mesh.leaves,
+        tiles: mesh.tiles.stats,
+        waiting: mesh.tiles.waiting,
+        temporary: partition.point_bytes + session.store.bytes(),
+    };
+    session.journal.commit()?;
+    if run.journal.is_worth_syncing() {
+        session.store.sync()?;
+    }
+    session.journal.record(JobStep::MeshPart, StepOutput::new(meshed.clone(), Vec::new()))?;
+    let resumed = session.end()?;
+    remove_file(&directory.points())?;
+    Ok((meshed, resumed))
+}

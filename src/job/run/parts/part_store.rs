@@ -1,0 +1,59 @@
+//! The stores of parts that are meshed, opened when they are needed.
+
+use crate::Result;
+use crate::job::durable::directory::JobDirectory;
+use crate::job::index::PartIndex;
+use crate::job::partition::result::Partition;
+use crate::job::records::{JournalEntry, Store};
+use crate::job::run::part_entries::{PartHeader, entries_of, open_store, records_of};
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// A part whose records can be read.
+pub(crate) struct OpenPart {
+    pub(crate) store: Store,
+    pub(crate) partition: Partition,
+    pub(crate) entries: Vec<JournalEntry>,
+}
+
+/// How many parts stay open for the next who asks. Each has a few open files.
+const KEPT_OPEN: usize = 24;
+
+/// The stores of all parts.
+pub(crate) struct PartStores {
+    directory: JobDirectory,
+    job: u64,
+    open: Mutex<VecDeque<(PartIndex, Arc<OpenPart>)>>,
+}
+
+impl PartStores {
+    pub(crate) fn new(directory: &JobDirectory, job: u64) -> PartStores {
+        PartStores { directory: directory.clone(), job, open: Mutex::default() }
+    }
+
+    /// Opens the store of `part`, which must be meshed.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`] or [`crate::Error::Broken`] on its folder.
+    pub(crate) fn open(&self, part: PartIndex) -> Result<Arc<OpenPart>> {
+        let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, found)) = open.iter().find(|(number, _)| *number == part) {
+            return Ok(found.clone());
+        }
+        let directory = self.directory.part(part);
+        let entries = entries_of(&directory, PartHeader { job: self.job, part })?;
+        let records = records_of(&entries);
+        let store = open_store(&directory, &records)?;
+        let opened = Arc::new(OpenPart { partition: Partition::load(&store)?, store, entries });
+        open.push_back((part, opened.clone()));
+        if open.len() > KEPT_OPEN {
+            open.pop_front();
+        }
+        Ok(opened)
+    }
+
+    /// Closes the store of `part`, which is about to change.
+    pub(crate) fn close(&self, part: PartIndex) {
+        self.open.lock().unwrap_or_else(PoisonError::into_inner).retain(|(number, _)| *number != part);
+    }
+}

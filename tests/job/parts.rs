@@ -1,0 +1,106 @@
+//! A job of several parts gives the mesh of a job of one part, with the same borders, levels and report.
+
+use crate::clouds::{self, Cloud};
+use crate::levels::{borders_are_the_exact_ones, errors_are_true, hills};
+use crate::program::{Job, number};
+use crate::tileset::{keeps_the_rules, tiles};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Writes `cloud` as files of neighbouring points, as surveys come.
+fn in_files(folder: &Path, cloud: &Cloud, side: i64) -> Vec<PathBuf> {
+    let mut files: BTreeMap<[i64; 2], Cloud> = BTreeMap::new();
+    cloud.iter().for_each(|point| {
+        files.entry([point[0].div_euclid(side), point[1].div_euclid(side)]).or_default().push(*point)
+    });
+    let write = |([x, y], points): (&[i64; 2], &Cloud)| clouds::write(folder, &format!("{x}_{y}.csv"), points);
+    files.iter().map(write).collect()
+}
+
+fn in_parts(files: &[PathBuf], points: u64) -> Job {
+    Job::on(files).tiles_of(500).with("triangulation", &format!("max_points_per_part = {points}"))
+}
+
+/// Asserts that jobs of few and of many parts give the same mesh.
+#[track_caller]
+fn gives_one_mesh(cloud: &Cloud, side: i64) {
+    let folder = tempfile::tempdir().unwrap();
+    let files = in_files(folder.path(), cloud, side);
+    let expected = Job::on(&files).tiles_of(500).digest();
+    for points in [800, 3_000, 10_000] {
+        assert_eq!(in_parts(&files, points).digest(), expected, "{points} points a part");
+    }
+    let whole = clouds::write(folder.path(), "whole.csv", cloud);
+    assert_eq!(in_parts(&[whole], 2_000).digest(), expected, "one file");
+}
+
+#[test]
+fn random_points() {
+    gives_one_mesh(&clouds::uniform(20_000, 20_000, 7), 4_000);
+}
+
+#[test]
+fn clusters() {
+    gives_one_mesh(&clouds::clusters(20_000), 150_000);
+}
+
+#[test]
+fn a_lattice_of_cocircular_points() {
+    gives_one_mesh(&clouds::grid(130, 130), 13_000);
+}
+
+#[test]
+fn points_on_a_circle() {
+    gives_one_mesh(&clouds::circle(6_000), 5_000);
+}
+
+#[test]
+fn a_line_and_empty_parts() {
+    gives_one_mesh(&clouds::line(8_000, 3), 9_000);
+}
+
+#[test]
+fn the_bytes_do_not_depend_on_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = in_files(folder.path(), &hills(20_000, 3), 4_000);
+    let bytes = |threads: usize| {
+        let job = in_parts(&files, 2_500).threads(threads);
+        job.report();
+        std::fs::read_to_string(job.out().join("XXH128SUMS")).unwrap().lines().map(str::to_owned).collect::<Vec<_>>()
+    };
+    let (one, four) = (bytes(1), bytes(4));
+    assert!(one.len() > 40);
+    assert_eq!(one, four);
+}
+
+#[test]
+fn levels_reach_over_the_parts() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = in_files(folder.path(), &hills(20_000, 5), 5_000);
+    let job = in_parts(&files, 3_000).with("output", "max_points_per_level_tile = 500");
+    let report = job.report();
+    job.verified();
+    let tiles = tiles(&job);
+    keeps_the_rules(&job, &tiles);
+    let coarser = tiles.iter().filter(|tile| !tile.json["children"].is_null());
+    assert_eq!(number(&report["levels"]["files"]), coarser.count() as u64);
+    borders_are_the_exact_ones(&job, &tiles);
+    errors_are_true(&job, &tiles, "hills in parts");
+}
+
+#[test]
+fn max_edge_cuts_the_same_triangles() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = in_files(folder.path(), &clouds::clusters(15_000), 150_000);
+    for max_edge in ["\"auto\"", "3000.0"] {
+        let cut = |job: Job| {
+            let job = job.with("output", &format!("max_edge = {max_edge}"));
+            let report = job.report();
+            job.verified();
+            [number(&report["triangles"]), number(&report["cut_triangles"])]
+        };
+        let whole = cut(Job::on(&files).tiles_of(500));
+        assert!(whole[1] > 0);
+        assert_eq!(cut(in_parts(&files, 2_000)), whole, "{max_edge}");
+    }
+}
