@@ -93,7 +93,6 @@ fn walk(run: &RunContext, plan: Plan, earlier: Option<Partition>) -> Result<Repo
                 leaves: mesh.leaves,
                 tiles: tiles.stats,
                 temporary: partition.point_bytes + run.store.bytes(),
-                resumed: 0,
                 files: Vec::new(),
             };
             write_report(run, &plan, figures, published)

@@ -143,6 +143,35 @@ fn a_job_of_two_threads_killed_at_random_moments_ends_with_the_same_bytes() {
     kill_at_random(&rig, 2, kills_wanted(45));
 }
 
+/// Returns a job of several parts, on files of neighbouring points.
+fn job_of_parts(setup: Setup) -> Rig {
+    let cloud = scattered::gaussian(24_000);
+    let folder = tempfile::tempdir().unwrap();
+    let rig = Rig::of_files(folder, &cloud, 60_000, &setup);
+    assert!(rig.expected.len() > 60);
+    rig
+}
+
+fn parts_of(points: u64, threads: usize) -> Setup {
+    let setup = Setup::tiles_of(700).threads(threads);
+    Setup { triangulation: format!("{}\nmax_points_per_part = {points}", setup.triangulation), ..setup }
+}
+
+#[test]
+fn a_job_of_parts_killed_at_any_commit_goes_on_where_it_stopped() {
+    let rig = job_of_parts(parts_of(4_000, 1)).committing_every(0);
+    let kills: u64 = PLACES.iter().map(|place| kill_at_each(&rig, place, 13)).sum();
+    assert!(kills >= 40, "only {kills} kills");
+}
+
+#[test]
+fn a_job_of_parts_killed_at_random_moments_ends_with_the_same_bytes() {
+    for (seed, threads) in [(5, 1), (6, 2)] {
+        let rig = job_of_parts(parts_of(3_000, threads)).committing_every(10);
+        kill_at_random(&rig, seed, kills_wanted(45));
+    }
+}
+
 #[test]
 fn a_job_on_a_gpu_goes_on_where_it_was_killed() {
     let setup = Setup::tiles_of(3_500).threads(2).backend("gpu");

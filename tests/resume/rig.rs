@@ -154,6 +154,20 @@ impl Rig {
         rig
     }
 
+    /// Writes the cloud as files of neighbouring points, which are in squares with sides of `side`, and runs the job once, undisturbed.
+    #[track_caller]
+    pub(crate) fn of_files(folder: TempDir, cloud: &[[i64; 3]], side: i64, setup: &Setup) -> Rig {
+        let mut files: BTreeMap<[i64; 2], Vec<[i64; 3]>> = BTreeMap::new();
+        cloud.iter().for_each(|point| files.entry([0, 1].map(|k| point[k].div_euclid(side))).or_default().push(*point));
+        for ([x, y], points) in &files {
+            scattered::write(folder.path(), &format!("part_{x}_{y}.csv"), points);
+        }
+        let setup = Setup { input: setup.input.replace("cloud.csv", "part_*.csv"), ..setup.clone() };
+        let mut rig = Rig { folder, expected: BTreeMap::new(), report: Value::Null, environment: Vec::new() };
+        rig.expect(&setup);
+        rig
+    }
+
     /// Makes `setup` the job from here on, and runs it undisturbed in another directory to learn what it must write.
     #[track_caller]
     pub(crate) fn expect(&mut self, setup: &Setup) {

@@ -143,7 +143,7 @@ fn attempt(
             true => resume::start(directory, &header, earlier, options.output.max_edge, run.progress)?,
             false => resume::start_parts(directory, &header, earlier, run.progress)?,
         };
-        let RunStart { store, journal, partition, job_id } = start;
+        let RunStart { store, journal, partition, job_id, resumed } = start;
         let context = RunContext {
             triangulator: &job.triangulator,
             directory,
@@ -154,6 +154,7 @@ fn attempt(
             clock,
             inputs_fingerprint: job.fingerprint.of_inputs(),
             job_id,
+            resumed: journal.taken_over() + resumed,
             stages: Mutex::new(vec![planned]),
         };
         let outcome = (job.walk)(&context, plan, partition);

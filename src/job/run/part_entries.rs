@@ -30,17 +30,30 @@ fn entries_if(directory: &JobDirectory, is_wanted: impl Fn(PartHeader) -> bool) 
     Ok(own.map(|(_, entries)| entries).unwrap_or_default())
 }
 
-/// Returns the results that the journals of all parts of `job` name.
-///
-/// # Errors
-/// [`crate::Error::Io`] if one cannot be read.
-pub(crate) fn files_of_parts(directory: &JobDirectory, job: u64) -> Result<Vec<PublishedFile>> {
-    let mut files = Vec::new();
-    for folder in directory.folders_of_parts()? {
-        let entries = entries_if(&folder, |found| found.job == job)?;
-        files.extend(entries.into_iter().flat_map(|entry| entry.files).filter(|file| directory.is_result(&file.name)));
+/// What the journals of all parts of a job name.
+#[derive(Default)]
+pub(crate) struct StepsOfParts {
+    /// The number of finished steps.
+    pub(crate) count: u64,
+    /// The results.
+    pub(crate) files: Vec<PublishedFile>,
+}
+
+impl StepsOfParts {
+    /// Reads the journals of all parts of `job`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`] if one cannot be read.
+    pub(crate) fn of(directory: &JobDirectory, job: u64) -> Result<StepsOfParts> {
+        let mut steps = StepsOfParts::default();
+        for folder in directory.folders_of_parts()? {
+            let entries = entries_if(&folder, |found| found.job == job)?;
+            steps.count += entries.len() as u64;
+            let files = entries.into_iter().flat_map(|entry| entry.files);
+            steps.files.extend(files.filter(|file| directory.is_result(&file.name)));
+        }
+        Ok(steps)
     }
-    Ok(files)
 }
 
 /// Returns the records that `entries` name.

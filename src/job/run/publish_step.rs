@@ -60,8 +60,6 @@ pub(crate) struct MeshFigures {
     pub(crate) tiles: TileStats,
     /// Bytes of temporary files.
     pub(crate) temporary: u64,
-    /// Steps of parts that an interrupted run had finished.
-    pub(crate) resumed: u64,
     /// Results that the journals of parts name.
     pub(crate) files: Vec<PublishedFile>,
 }
@@ -141,7 +139,7 @@ pub(crate) fn publish(
 /// # Errors
 /// [`crate::Error::Io`] if it cannot be written.
 pub(crate) fn write_report(run: &RunContext, plan: &Plan, mesh: MeshFigures, published: Published) -> Result<Report> {
-    let MeshFigures { points, leaves, tiles, temporary, resumed, files } = mesh;
+    let MeshFigures { points, leaves, tiles, temporary, files } = mesh;
     let list = write_file_list(run, files)?;
     let parts = ReportParts {
         points,
@@ -156,7 +154,7 @@ pub(crate) fn write_report(run: &RunContext, plan: &Plan, mesh: MeshFigures, pub
         stages: std::mem::take(&mut *run.stages()),
         threads: run.threads,
         memory: plan.options.limits.memory.0,
-        resumed: run.journal.taken_over() + resumed,
+        resumed: run.resumed,
         clock: run.clock,
         inputs_fingerprint: run.inputs_fingerprint.clone(),
         file_list: list.checksum,

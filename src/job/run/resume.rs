@@ -16,7 +16,7 @@ use crate::job::plan::lattice_choice::LatticeCoarsening;
 use crate::job::progress::stage::{JobProgress, ProgressOutput, Stage};
 use crate::job::records::{JobStep, Journal, JournalEntry, Store};
 use crate::job::report::job_report::Report;
-use crate::job::run::part_entries::{files_of_parts, open_store, records_of};
+use crate::job::run::part_entries::{StepsOfParts, open_store, records_of};
 use crate::output::options::MaxEdge;
 use crate::{Error, Result, interrupt};
 use rayon::prelude::*;
@@ -29,8 +29,8 @@ pub(crate) struct EarlierRun {
     /// `None` if another version of the program wrote the journal, or it is damaged.
     pub(super) header: Option<JobHeader>,
     pub(super) entries: Vec<JournalEntry>,
-    /// The results that the journals of its parts name.
-    of_parts: Vec<PublishedFile>,
+    /// What the journals of its parts name.
+    of_parts: StepsOfParts,
     /// Whether all its results are in place.
     is_complete: bool,
 }
@@ -44,8 +44,8 @@ impl EarlierRun {
         let run = journal::read::<JobHeader, JobStep, _>(directory)?;
         let Some((header, entries)) = run else { return Ok(None) };
         let of_parts = match &header {
-            Some(JobHeader { id: id @ 1.., .. }) => files_of_parts(directory, *id)?,
-            _ => Vec::new(),
+            Some(JobHeader { id: id @ 1.., .. }) => StepsOfParts::of(directory, *id)?,
+            _ => StepsOfParts::default(),
         };
         Ok(Some(EarlierRun { header, entries, of_parts, is_complete: false }))
     }
@@ -90,7 +90,7 @@ impl EarlierRun {
     }
 
     fn results<'a>(&'a self, directory: &'a JobDirectory) -> impl Iterator<Item = &'a PublishedFile> {
-        let files = self.entries.iter().flat_map(|entry| &entry.files).chain(&self.of_parts);
+        let files = self.entries.iter().flat_map(|entry| &entry.files).chain(&self.of_parts.files);
         files.filter(|file| directory.is_result(&file.name))
     }
 
@@ -152,6 +152,8 @@ pub(crate) struct RunStart<'a> {
     pub(crate) partition: Option<Partition>,
     /// Tells the folders of this job's parts from those of others.
     pub(crate) job_id: u64,
+    /// The number of finished steps of parts.
+    pub(crate) resumed: u64,
 }
 
 /// Begins a run of the job with `header` in its locked directory: takes over what is the same and whole from the earlier run, and
@@ -181,7 +183,7 @@ pub(crate) fn start<'a>(
     directory.clear_parts()?;
     directory.clear(&files)?;
     let journal = Journal::begin(directory, &header, entries)?;
-    Ok(RunStart { store: open_store(directory, &records)?, journal, partition, job_id: 0 })
+    Ok(RunStart { store: open_store(directory, &records)?, journal, partition, job_id: 0, resumed: 0 })
 }
 
 /// As [`start`], for a job of several parts. What is in the folders of its parts stays if the job is the same.
@@ -195,33 +197,35 @@ pub(crate) fn start_parts<'a>(
     progress: ProgressOutput,
 ) -> Result<RunStart<'a>> {
     let same = earlier.and_then(|earlier| same_job_of_parts(header, earlier, progress));
-    let (entries, header) = match same {
-        Some((old, entries)) => {
-            progress.note("going on with an interrupted run of several parts");
+    let (entries, header, resumed) = match same {
+        Some((old, entries, of_parts)) => {
+            let steps = entries.len() as u64 + of_parts;
+            progress.note(&format!("going on with an interrupted run: {steps} steps are done"));
             let fingerprint = header.fingerprint.with_names_of(&old.fingerprint);
-            (entries, JobHeader { fingerprint, coarsening: header.coarsening, id: old.id })
+            (entries, JobHeader { fingerprint, coarsening: header.coarsening, id: old.id }, of_parts)
         }
         None => {
             remove_file(&directory.journal())?;
             directory.clear_parts()?;
             directory.clear(&HashSet::new())?;
-            (Vec::new(), JobHeader { id: new_id(), ..header.clone() })
+            (Vec::new(), JobHeader { id: new_id(), ..header.clone() }, 0)
         }
     };
     create_folder(&directory.output().tiles())?;
     let records = records_of(&entries);
     let store = open_store(directory, &records)?;
     let journal = Journal::begin(directory, &header, entries)?;
-    Ok(RunStart { store, journal, partition: None, job_id: header.id })
+    Ok(RunStart { store, journal, partition: None, job_id: header.id, resumed })
 }
 
-/// Returns the header of an earlier run of the same job and its entries that stay: the plan, and what was read.
+/// Returns the header of an earlier run of the same job, its entries that stay (the plan, and what was read), and the number of steps of
+/// its parts.
 fn same_job_of_parts(
     header: &JobHeader,
     earlier: EarlierRun,
     progress: ProgressOutput,
-) -> Option<(JobHeader, Vec<JournalEntry>)> {
-    let EarlierRun { header: old, mut entries, .. } = earlier;
+) -> Option<(JobHeader, Vec<JournalEntry>, u64)> {
+    let EarlierRun { header: old, mut entries, of_parts, .. } = earlier;
     let old = old.filter(|old| old.coarsening == header.coarsening && old.id != 0)?;
     match header.fingerprint.since(&old.fingerprint) {
         JobChange::Nothing => {}
@@ -231,7 +235,7 @@ fn same_job_of_parts(
         }
     }
     entries.retain(|entry| matches!(entry.step, JobStep::Plan | JobStep::Read(_)));
-    Some((old, entries))
+    Some((old, entries, of_parts.count))
 }
 
 /// Returns a number that no other run has.

@@ -24,6 +24,8 @@ pub(crate) struct RunContext<'a> {
     pub(crate) inputs_fingerprint: String,
     /// Tells the folders of this job's parts from those of others.
     pub(crate) job_id: u64,
+    /// The number of steps that an interrupted run had finished.
+    pub(crate) resumed: u64,
     /// The stages that have ended.
     pub(crate) stages: Mutex<Vec<StageStats>>,
 }

@@ -41,8 +41,6 @@ pub(crate) struct MeshedPart {
 pub(crate) struct MeshedParts {
     pub(crate) parts: Vec<MeshedPart>,
     pub(crate) summary: PointSummary,
-    /// Steps that an interrupted run had finished.
-    pub(crate) resumed: u64,
 }
 
 /// Reads and meshes all parts, or those that an interrupted run left.
@@ -53,12 +51,10 @@ pub(crate) fn mesh_all(job: &PartsJob) -> Result<MeshedParts> {
     let PartsJob { plan, parts, .. } = *job;
     let look = early_look(job)?;
     let mut points = PartPoints::new(plan, parts);
-    let mut meshed = MeshedParts { parts: Vec::new(), summary: PointSummary::default(), resumed: 0 };
+    let mut meshed = MeshedParts { parts: Vec::new(), summary: PointSummary::default() };
     for part in parts.all() {
         points.add(read_for(job, &points, part)?);
-        let (found, resumed) = mesh_one(job, &points, part, look.as_ref())?;
-        meshed.parts.push(found);
-        meshed.resumed += resumed;
+        meshed.parts.push(mesh_one(job, &points, part, look.as_ref())?);
     }
     meshed.summary = points.summary.clone();
     let bounds = meshed.summary.bounds.ok_or_else(|| no_point_is_left(plan, &meshed.summary.counts))?;
@@ -96,20 +92,15 @@ fn read_for(job: &PartsJob, points: &PartPoints, part: PartIndex) -> Result<Read
     Ok(batch)
 }
 
-/// Meshes a part whose points have all been read, unless an earlier run has. Returns also the steps that were taken over.
-fn mesh_one(
-    job: &PartsJob,
-    points: &PartPoints,
-    part: PartIndex,
-    look: Option<&Arc<TileLook>>,
-) -> Result<(MeshedPart, u64)> {
+/// Meshes a part whose points have all been read, unless an earlier run has.
+fn mesh_one(job: &PartsJob, points: &PartPoints, part: PartIndex, look: Option<&Arc<TileLook>>) -> Result<MeshedPart> {
     let PartsJob { run, plan, .. } = *job;
     let directory = &run.directory.part(part);
     let header = PartHeader { job: run.job_id, part };
     let entries = entries_of(directory, header)?;
     if let Some(done) = entries.iter().find(|entry| entry.step == JobStep::MeshPart) {
         remove_file(&directory.points())?;
-        return Ok((done.stats()?, entries.len() as u64));
+        return done.stats();
     }
     let (entries, partition) = resume_part(directory, entries, plan.options.output.max_edge, run.progress)?;
     let session = PartSession::begin(directory, header, entries)?;
@@ -138,7 +129,7 @@ fn mesh_one(
         session.store.sync()?;
     }
     session.journal.record(JobStep::MeshPart, StepOutput::new(meshed.clone(), Vec::new()))?;
-    let resumed = session.end()?;
+    session.end()?;
     remove_file(&directory.points())?;
-    Ok((meshed, resumed))
+    Ok(meshed)
 }

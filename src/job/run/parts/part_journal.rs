@@ -47,18 +47,18 @@ impl<'a> PartSession<'a> {
             clock: run.clock,
             inputs_fingerprint: String::new(),
             job_id: run.job_id,
+            resumed: run.resumed,
             stages: Mutex::default(),
         }
     }
 
-    /// Waits until everything is on the disk, if that is worth it, and ends the session. Returns the steps that it took over.
+    /// Ends the session once the journal has all of it.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub(crate) fn end(self) -> Result<u64> {
+    pub(crate) fn end(self) -> Result<()> {
         self.journal.commit()?;
-        let taken_over = self.journal.taken_over();
         self.journal.close();
-        Ok(taken_over)
+        Ok(())
     }
 }

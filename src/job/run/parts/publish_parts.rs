@@ -11,7 +11,7 @@ use crate::job::publish::tileset_tree::TilesOfTree;
 use crate::job::records::Store;
 use crate::job::report::job_report::Report;
 use crate::job::run::levels_step::{hierarchy_of, level_sizes, make_levels};
-use crate::job::run::part_entries::{PartHeader, entries_of, files_of_parts};
+use crate::job::run::part_entries::{PartHeader, StepsOfParts, entries_of};
 use crate::job::run::parts::PartsJob;
 use crate::job::run::parts::join::JoinedParts;
 use crate::job::run::parts::mesh_phase::MeshedParts;
@@ -53,8 +53,7 @@ pub(crate) fn publish_parts(
         leaves,
         tiles,
         temporary: meshed.parts.iter().map(|part| part.temporary).sum(),
-        resumed: meshed.resumed,
-        files: files_of_parts(run.directory, run.job_id)?,
+        files: StepsOfParts::of(run.directory, run.job_id)?.files,
     };
     write_report(run, plan, figures, published)
 }
