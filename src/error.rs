@@ -5,11 +5,14 @@ use std::path::{Path, PathBuf};
 /// The result of everything in this crate that can fail.
 pub type Result<T> = std::result::Result<T, Error>;
 
+/// What errors call the standard output.
+pub const STANDARD_OUTPUT: &str = "standard output";
+
 /// Every failure of this crate. `Display` says which file, which record or line, what is wrong and what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The operating system refused an operation: it may succeed later (exit code 1), or the path itself is wrong (exit code 2).
-    #[error("cannot {action} {}: {source}{}", path.display(), remedy(source))]
+    #[error("cannot {action} {}: {source}{}", path.display(), remedy(path, source))]
     Io {
         /// The operation as a verb: "read", "create", "write".
         action: &'static str,
@@ -95,8 +98,10 @@ fn again(why: &Error) -> &'static str {
 }
 
 /// Returns what a user can do about an error of the operating system, or nothing.
-fn remedy(error: &std::io::Error) -> &'static str {
+fn remedy(path: &Path, error: &std::io::Error) -> &'static str {
     match error.kind() {
+        // What is printed has no directory to choose.
+        std::io::ErrorKind::StorageFull if path == Path::new(STANDARD_OUTPUT) => "; make room, and run again",
         std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded => {
             "; make room or choose another [output] directory, and run again"
         }

@@ -142,6 +142,6 @@ fn print_result(result: &(impl Display + Serialize), print: PrintOptions) -> Res
     match writeln!(std::io::stdout(), "{}", text.trim_end()) {
         // The reader has closed the pipe because it has read enough.
         Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(()),
-        outcome => outcome.map_err(Error::io("write to", "standard output")),
+        outcome => outcome.map_err(Error::io("write to", gdt_batch::error::STANDARD_OUTPUT)),
     }
 }

@@ -64,7 +64,8 @@ impl TileFiles {
         let each = self.largest.saturating_mul(MEMORY_FACTOR).max(1);
         match (memory / each) as usize {
             0 if each > 2 * memory => Err(Error::Memory(format!(
-                "the largest tile takes about {} MiB to verify: set a higher memory limit",
+                "the largest tile takes about {} MiB to verify: set --memory \"{} MiB\" or more",
+                each >> 20,
                 each >> 20
             ))),
             lanes => Ok(lanes.clamp(1, rayon::current_num_threads())),

@@ -14,10 +14,14 @@ const NEIGHBOURS: usize = 6;
 const MAX_ROUNDS: usize = 12;
 /// In the first rounds, vertices are removed only where that leaves a clean hole.
 const CLEAN_ROUNDS: usize = 4;
+/// Looking for a vertex walks around the hull. If all walks together take more steps for each site than this, the leaf is rejected: on
+/// narrow curves nearly all sites are on the hull, and most of them are removed.
+const STEPS_PER_SITE: usize = 64;
 
 /// Makes the hull convex. `shift` records what changes and which vertices are removed: where thin regions reach the frame, vertices
 /// that belong inside may be on the hull.
 pub(super) fn complete_hull(mesh: &mut ClosedMesh, sites: &[Site], shift: &mut ShiftRepair) -> Result<(), Rejection> {
+    let mut steps = STEPS_PER_SITE * sites.len();
     for round in 0..MAX_ROUNDS {
         let rays = rays(mesh)?;
         let blocked = fill_pockets(mesh, sites, rays, shift);
@@ -27,7 +31,8 @@ pub(super) fn complete_hull(mesh: &mut ClosedMesh, sites: &[Site], shift: &mut S
         }
         let before = shift.removed.len();
         for vertex in hull.sharp_corners(sites, round >= 2).chain(blocked) {
-            remove(mesh, sites, vertex, shift, round >= CLEAN_ROUNDS);
+            let walked = remove(mesh, sites, vertex, shift, round >= CLEAN_ROUNDS);
+            steps = steps.checked_sub(walked).ok_or(Rejection::NotAccepted("too many vertices must leave the hull"))?;
         }
         shift.repair(mesh, sites)?;
         if shift.removed.len() == before && round > CLEAN_ROUNDS {
@@ -63,12 +68,19 @@ fn fill_pockets(
     blocked
 }
 
-/// Removes `vertex` if it is still on the hull.
-fn remove(mesh: &mut ClosedMesh, sites: &[Site], vertex: VertexIndex, shift: &mut ShiftRepair, even_if_inverted: bool) {
+/// Removes `vertex` if it is still on the hull. Returns the number of vertices of the hull.
+fn remove(
+    mesh: &mut ClosedMesh,
+    sites: &[Site],
+    vertex: VertexIndex,
+    shift: &mut ShiftRepair,
+    even_if_inverted: bool,
+) -> usize {
     let rays = rays(mesh).unwrap_or_default();
     if let Some(&h) = rays.iter().find(|&&h| mesh.destination(h) == vertex) {
         shift.remove(mesh, sites, h.next(), even_if_inverted);
     }
+    rays.len()
 }
 
 /// The vertices of the hull, counterclockwise.

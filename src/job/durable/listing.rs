@@ -24,10 +24,14 @@ pub(crate) fn files_of(folder: &OutputFiles) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
+/// The digits of the number in the name of a result, at least. Shorter names are those of other programs.
+const NUMBER_LENGTH: usize = 6;
+
 /// Returns the files in `folder` that have the name of a numbered result, whole or partial.
 fn numbered_files(folder: &Path) -> Result<Vec<PathBuf>> {
+    let is_number = |stem: &str| stem.len() >= NUMBER_LENGTH && stem.bytes().all(|b| b.is_ascii_digit());
     let is_numbered = |path: &PathBuf| {
-        let number = path.file_stem().is_some_and(|s| s.to_string_lossy().bytes().all(|b| b.is_ascii_digit()));
+        let number = path.file_stem().is_some_and(|stem| is_number(&stem.to_string_lossy()));
         number && (path.extension().is_some_and(|e| e == "glb") || is_partial(path))
     };
     let mut paths = entries(folder)?;

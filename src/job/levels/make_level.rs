@@ -4,7 +4,6 @@ use crate::geometry::Bounds;
 use crate::job::durable::directory::{JobDirectory, create_folder};
 use crate::job::index::{NodeIndex, PartIndex};
 use crate::job::levels::hierarchy::{BYTES_PER_LEVEL_VERTEX, ChildTile, Hierarchy, LevelSizes};
-use crate::job::levels::shared_memory::{SharedMemory, Taken};
 use crate::job::partition::tree::{NodeKind, Tree};
 use crate::job::records::{LevelSummary, StepOutput, Store, TileSummary};
 use crate::job::tiles::style::TileStyle;
@@ -55,8 +54,8 @@ pub struct LevelRoom<'a> {
     pub style: &'a TileStyle,
     /// How large coarser tiles are to be.
     pub sizes: LevelSizes,
-    /// What all that are made at one time may take; `None` makes no meshes.
-    pub memory: Option<&'a SharedMemory>,
+    /// Whether they have meshes.
+    pub meshes: bool,
     /// The part that they belong to; for those above the parts, the number of parts.
     pub part: PartIndex,
     /// Returns the topmost tile of a part.
@@ -78,10 +77,10 @@ pub fn make_level(room: &LevelRoom, index: usize) -> Result<StepOutput<LevelStat
     let bounds = children.iter().filter_map(|child| child.own.bounds()).reduce(Bounds::union);
     let (mut stats, mut files) = (LevelStats::default(), Vec::new());
     let mut own = TileSummary::new(bounds, 0);
-    if let (Some(memory), Some(bounds)) = (room.memory, bounds) {
-        match memory_for(memory, &children) {
+    if let (true, Some(bounds)) = (room.meshes, bounds) {
+        match memory_for(&children).filter(|bytes| *bytes <= room.sizes.memory) {
             None => stats.left_out = 1,
-            Some(_taken) => {
+            Some(_) => {
                 let simple = simplified(room, coarse.node, &children)?;
                 // No error is greater than the range of heights: both meshes lie within it.
                 let below = children.iter().map(|child| child.own.error).fold(0.0, f64::max);
@@ -104,12 +103,21 @@ pub fn make_level(room: &LevelRoom, index: usize) -> Result<StepOutput<LevelStat
     Ok(StepOutput { files, ..StepOutput::new(stats, vec![record]) })
 }
 
-/// Takes the memory that joining and simplifying `children` needs. Returns `None` if there is not so much, or if one of them has been
-/// left out.
-fn memory_for<'a>(memory: &'a SharedMemory, children: &[Child]) -> Option<Taken<'a>> {
+/// Returns the bytes of memory that making coarser tile `index` takes, whose children must exist: 0 if it gets no mesh.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Broken`] on the store.
+pub fn level_memory(room: &LevelRoom, index: usize) -> Result<u64> {
+    let children = room.hierarchy.tiles[index].children.iter().map(|&child| Child::find(room, child));
+    let needed = memory_for(&children.collect::<Result<Vec<_>>>()?);
+    Ok(needed.filter(|bytes| room.meshes && *bytes <= room.sizes.memory).unwrap_or(0))
+}
+
+/// Returns the bytes of memory that joining and simplifying `children` takes; `None` if one of them has been left out.
+fn memory_for(children: &[Child]) -> Option<u64> {
     let vertices: u64 = children.iter().map(|child| u64::from(child.own.vertices)).sum();
     let whole = children.iter().all(|child| child.own.vertices > 0 || child.own.bounds().is_none());
-    whole.then(|| memory.take(vertices.saturating_mul(BYTES_PER_LEVEL_VERTEX))).flatten()
+    whole.then(|| vertices.saturating_mul(BYTES_PER_LEVEL_VERTEX))
 }
 
 /// Joins and simplifies the meshes of `children`, the tiles below `node`.

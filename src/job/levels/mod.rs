@@ -2,4 +2,3 @@
 
 pub mod hierarchy;
 pub mod make_level;
-pub mod shared_memory;

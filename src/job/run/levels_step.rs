@@ -3,8 +3,7 @@
 use crate::Result;
 use crate::job::index::PartIndex;
 use crate::job::levels::hierarchy::{Hierarchy, LevelSizes};
-use crate::job::levels::make_level::{LevelRoom, LevelStats, TopOf, make_level};
-use crate::job::levels::shared_memory::SharedMemory;
+use crate::job::levels::make_level::{LevelRoom, LevelStats, TopOf, level_memory, make_level};
 use crate::job::partition::result::Partition;
 use crate::job::plan::job_plan::Plan;
 use crate::job::records::JobStep;
@@ -46,10 +45,8 @@ pub(crate) fn make_levels(
     let output = &plan.options.output;
     let sizes = level_sizes(plan);
     let stage = run.progress.stage("levels", hierarchy.tiles.len() as u64, "tiles");
-    let memory = SharedMemory::new(sizes.memory);
-    let memory = output.levels.then_some(&memory);
     let (directory, store) = (run.directory, run.store);
-    let room = LevelRoom { directory, store, hierarchy: &hierarchy, style, sizes, memory, part, top_of };
+    let room = LevelRoom { directory, store, hierarchy: &hierarchy, style, sizes, meshes: output.levels, part, top_of };
     let make = |index: usize| {
         let stats = run.journal.step(JobStep::Level(hierarchy.tiles[index].node), || make_level(&room, index))?;
         stage.advance(1);
@@ -59,19 +56,37 @@ pub(crate) fn make_levels(
         a += b;
         Ok(a)
     };
-    let stats = on_threads(run.threads, || {
-        let mut all = LevelStats::default();
-        for height in hierarchy.by_height() {
-            if output.levels {
-                // A level reads the tiles below, which must have their names.
-                run.journal.commit()?;
-            }
-            all += height.into_par_iter().with_max_len(1).map(make).try_reduce(LevelStats::default, sum)?;
+    let mut stats = LevelStats::default();
+    for height in hierarchy.by_height() {
+        if output.levels {
+            // A level reads the tiles below, which must have their names.
+            run.journal.commit()?;
         }
-        Ok(all)
-    })?;
+        for (tiles, threads) in batches(&room, height, run.threads)? {
+            // Threads keep the memory of the largest mesh that they have made, so each batch has its own.
+            let make_all = || tiles.into_par_iter().with_max_len(1).map(make).try_reduce(LevelStats::default, sum);
+            stats += on_threads(threads, make_all)?;
+        }
+    }
     run.add_stage(stage.finish());
     Ok(LevelResult { hierarchy, stats })
+}
+
+/// Divides coarser tiles into those that can be made on all `threads` at once and those that take more memory, each with the number of
+/// threads.
+fn batches(room: &LevelRoom, tiles: Vec<usize>, threads: usize) -> Result<[(Vec<usize>, usize); 2]> {
+    let each = room.sizes.memory / threads as u64;
+    let (mut small, mut large, mut largest) = (Vec::new(), Vec::new(), 1);
+    for tile in tiles {
+        match level_memory(room, tile)? {
+            bytes if bytes <= each => small.push(tile),
+            bytes => {
+                largest = largest.max(bytes);
+                large.push(tile);
+            }
+        }
+    }
+    Ok([(small, threads), (large, ((room.sizes.memory / largest) as usize).clamp(1, threads))])
 }
 
 /// Returns what the user should know about coarser tiles without a mesh.

@@ -30,7 +30,9 @@ impl Unmerged {
     pub(crate) fn check(&self, options: &JobOptions) -> Result<()> {
         let nodes = self.nodes();
         let Some(most) = nodes.values().max() else { return Ok(()) };
-        let needs = nodes.iter().map(|(node, sites)| (*node == NodeIndex::ROOT, *sites));
+        // If the mesh proves too fine for the lattice, that of a coarser one has somewhat more to merge.
+        let more = if options.input.resolution.step().is_none() { 10 } else { 0 };
+        let needs = nodes.iter().map(|(node, sites)| (*node == NodeIndex::ROOT, sites + sites / 100 * more));
         Err(Error::Memory(format!(
             "{most} sites lie on circles or triangles that no tile can decide alone, and [limits] memory = \"{}\" has no room to join \
              them on {} threads; set memory = \"{}\", which is enough for all that is left, or less together with fewer [limits] \

@@ -23,7 +23,7 @@ use crate::output::lod::vertex_cells::{VertexCells, plane};
 use crate::output::lod::vertical_error::vertical_error;
 use crate::output::tile::Tile;
 use crate::triangulation::{self, canonical};
-use crate::{Error, Result};
+use crate::{Error, Result, interrupt};
 use std::collections::HashSet;
 
 /// A simplified terrain.
@@ -48,7 +48,7 @@ const BY_GRID: f64 = 0.6;
 /// many edges.
 ///
 /// # Errors
-/// [`Error::Broken`] if the boundary is not that of a part of a Delaunay triangulation.
+/// [`Error::Broken`] if the boundary is not that of a part of a Delaunay triangulation, [`Error::Interrupted`].
 pub fn simplify(frame: &Frame, tile: &Tile, triangles: usize) -> Result<Simplified> {
     let boundary = Boundary::of(tile);
     let inside = tile.positions.len() - boundary.vertices;
@@ -65,6 +65,7 @@ pub fn simplify(frame: &Frame, tile: &Tile, triangles: usize) -> Result<Simplifi
     if keep_furthest(tile, &coarse, rest, &mut kept) > 0 {
         coarse = boundary.fill(tile, &kept)?;
     }
+    interrupt::check()?;
     let error = vertical_error(&tile.positions, &tile.triangles, &coarse) * frame.resolution_metres()[1];
     Ok(Simplified { tile: tile.subset(coarse), error })
 }
@@ -97,6 +98,7 @@ impl Boundary {
         let mut number = vec![SiteIndex(u32::MAX); kept.len()];
         vertices.iter().zip(0..).for_each(|(&v, n)| number[v as usize] = SiteIndex(n));
         let sites: Vec<Site> = vertices.iter().map(|&v| plane(tile.positions[v as usize])).collect();
+        interrupt::check()?;
         let mesh = canonical(&sites)?;
         let edges: Vec<_> = self.edges.iter().map(|edge| edge.map(|v| number[v as usize])).collect();
         let covered = covered(&mesh, &edges)?;
