@@ -1,7 +1,7 @@
 //! Step 7, once for each coarser tile: reads the meshes of its children back from their files, joins and simplifies them.
 
 use crate::geometry::Bounds;
-use crate::job::durable::directory::{JobDirectory, create_folder};
+use crate::job::durable::directory::JobDirectory;
 use crate::job::index::NodeIndex;
 use crate::job::levels::hierarchy::{BYTES_PER_LEVEL_VERTEX, ChildTile, Hierarchy, LevelSizes};
 use crate::job::levels::shared_memory::{SharedMemory, Taken};
@@ -79,7 +79,6 @@ pub fn make_level(room: &LevelRoom, index: usize) -> Result<StepOutput<LevelStat
                 let below = children.iter().map(|child| child.own.error).fold(0.0, f64::max);
                 own.error = (below + simple.error).min(height_range(&room.style.frame, bounds));
                 own.vertices = simple.tile.positions.len() as u32;
-                create_folder(&room.directory.output().levels())?;
                 let written = write_glb(&room.directory.output().level(coarse.node.get()), &simple.tile, room.style)?;
                 let triangles = simple.tile.triangles.len() as u64;
                 stats = LevelStats { files: 1, triangles, bytes: written.bytes, error_m: own.error, left_out: 0 };

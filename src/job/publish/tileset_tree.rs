@@ -6,8 +6,7 @@ use crate::job::levels::hierarchy::{ChildTile, Hierarchy};
 use crate::job::partition::tree::{Cell, Tree};
 use crate::job::records::{LevelSummary, Store, TileSummary};
 use crate::output::file_names::{level_uri, tile_uri};
-use crate::output::frame::Frame;
-use crate::output::tiles3d::tileset::{TilesetNode, tileset_json};
+use crate::output::tiles3d::tileset::TilesetNode;
 use crate::{Error, Result};
 
 /// Returns the root of the tiles, none of them placed on the globe yet.
@@ -21,13 +20,6 @@ pub fn tileset_root(store: &Store, tree: &Tree, hierarchy: &Hierarchy) -> Result
         None => node(&TileSummary::load(store, TileIndex(0))?, &Cell::PLANE, tile_uri(0)),
     };
     root.ok_or_else(|| Error::Broken("there is no tile to list in tileset.json".into()))
-}
-
-/// Returns the text of `tileset.json`.
-pub fn tileset_text(frame: &Frame, root: &TilesetNode) -> String {
-    let mut text = tileset_json(frame, root).to_string();
-    text.push('\n');
-    text
 }
 
 fn coarse_node(store: &Store, tree: &Tree, hierarchy: &Hierarchy, index: usize) -> Result<Option<TilesetNode>> {
@@ -52,7 +44,7 @@ fn coarse_node(store: &Store, tree: &Tree, hierarchy: &Hierarchy, index: usize) 
 fn node(tile: &TileSummary, cell: &Cell, uri: String) -> Option<TilesetNode> {
     let (uri, bounds) = ((tile.vertices > 0).then_some(uri), tile.bounds()?);
     let (error, middle) = (tile.error, middle(cell, bounds));
-    Some(TilesetNode { uri, bounds, middle, error, transform: None, children: Vec::new() })
+    Some(TilesetNode { uri, bounds, middle, error, transform: None, file: None, children: Vec::new() })
 }
 
 /// Returns the middle of the part of `bounds` in the tile's cell, or of all of it if no part is. A triangle along the hull can be as

@@ -9,7 +9,7 @@ use crate::job::plan::job_plan::Plan;
 use crate::job::publish::one_file_limits::{fits_one_file, too_large_for_one_file};
 use crate::job::publish::placement::{place, placement_warning};
 use crate::job::publish::side_files::{SideFiles, write_side_files};
-use crate::job::publish::tileset_tree::{tileset_root, tileset_text};
+use crate::job::publish::tileset_tree::tileset_root;
 use crate::job::records::{JobStep, StepOutput};
 use crate::job::report::job_report::{Report, ReportParts};
 use crate::job::run::levels_step::LevelResult;
@@ -18,6 +18,7 @@ use crate::job::run::tile_queue::WrittenTiles;
 use crate::job::tiles::write_tile::TileStats;
 use crate::output::checksums::list_text;
 use crate::output::options::OutputFormat;
+use crate::output::tiles3d::division::divide;
 use crate::output::tiles3d::georeference::Georeference;
 use crate::threads::run_concurrently;
 use crate::{Result, Warnings};
@@ -57,7 +58,8 @@ pub(crate) fn publish(
         let placed = place(&plan.crs, &tiles.style.frame, output.height_offset, &mut root);
         warnings.extend(placement_warning(&placed));
         warnings.extend(levels.warning);
-        tileset = Some(tileset_text(&tiles.style.frame, &root));
+        divide(&mut root);
+        tileset = Some((&tiles.style.frame, root));
         (placement, stats) = (placed.ok(), levels.stats);
     }
     let georeference = Georeference::new(&plan.frame, &plan.lattice, bounds, &plan.unit, plan.crs.epsg);
