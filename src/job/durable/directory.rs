@@ -1,6 +1,6 @@
 //! The job directory, which holds everything that a job needs to go on, and the results beside it.
 
-use crate::job::durable::atomic_file::{partial_path, remove_file};
+use crate::job::durable::atomic_file::{create_folder, partial_path, remove_file};
 use crate::job::durable::listing::{Leftovers, entries, exists, is_folder};
 use crate::job::durable::lock::{Lock, lock_file};
 use crate::job::durable::replacement::Replacement;
@@ -252,22 +252,6 @@ fn remove_at_end(file: &Path) -> Result<()> {
     remove_file(file)?;
     fault::point("cleaning");
     Ok(())
-}
-
-/// Creates the folder at `path`, and those above it, if need be.
-///
-/// # Errors
-/// [`Error::Io`] if it cannot be made.
-pub fn create_folder(path: &Path) -> Result<()> {
-    disk::create_folder(path).map_err(Error::io("create the directory", path))
-}
-
-/// Creates the folder that the file at `path` is to be in, and those above it, if need be.
-///
-/// # Errors
-/// [`Error::Io`] if it cannot be made.
-pub fn create_folder_of(path: &Path) -> Result<()> {
-    path.parent().map_or(Ok(()), create_folder)
 }
 
 /// Tells whether both folders exist, and on different disks.

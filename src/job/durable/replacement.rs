@@ -5,8 +5,7 @@
 //! files are old and some are new, and there is no report. If a failure ends the run there, the next run goes on with it.
 
 use crate::disk::OpenFolder;
-use crate::job::durable::atomic_file::{remove_file, sync_folder};
-use crate::job::durable::directory::create_folder;
+use crate::job::durable::atomic_file::{create_folder, remove_file, sync_folder};
 use crate::job::durable::listing::{Leftovers, exists, is_partial};
 use crate::output::file_names::OutputFiles;
 use crate::{Error, Result, disk, fault};

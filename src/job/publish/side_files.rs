@@ -1,8 +1,8 @@
 //! Writing the files beside the tiles: the georeference, the preview, the tilesets and `terrain.glb`.
 
-use crate::job::durable::atomic_file::{PendingFile, find_pending, partial_path, write_pending};
+use crate::job::durable::atomic_file::{PendingFile, create_folder_of, find_pending, partial_path, write_pending};
 use crate::job::durable::columns::ColumnReader;
-use crate::job::durable::directory::{JobDirectory, create_folder_of};
+use crate::job::durable::directory::JobDirectory;
 use crate::job::index::TileIndex;
 use crate::job::records::{StepOutput, StepRecord, Store};
 use crate::output::frame::Frame;

@@ -42,16 +42,6 @@ impl EarlierRun {
         Ok(run.map(|(header, entries)| EarlierRun { header, entries, is_complete: false }))
     }
 
-    /// Reads the journal of a job that has just written its report.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if the journal cannot be read, or does not name the report: then it does not name all results either.
-    pub(crate) fn of_finished_job(directory: &JobDirectory) -> Result<EarlierRun> {
-        let damaged = || io::Error::new(ErrorKind::InvalidData, "it has changed since the job wrote it");
-        let run = EarlierRun::read(directory)?.filter(EarlierRun::has_report);
-        run.ok_or_else(|| Error::io("read", directory.journal())(damaged()))
-    }
-
     fn has_report(&self) -> bool {
         self.entries.iter().any(|entry| entry.step == JobStep::Report)
     }
@@ -70,14 +60,6 @@ impl EarlierRun {
             return Ok(());
         }
         self.is_complete = true;
-        self.place_results(directory)
-    }
-
-    /// Puts the results in place.
-    ///
-    /// # Errors
-    /// As [`JobDirectory::replace_results`].
-    pub(crate) fn place_results(&self, directory: &JobDirectory) -> Result<()> {
         directory.replace_results(&self.results(directory).map(|file| file.name.clone()).collect())
     }
 
@@ -132,6 +114,24 @@ impl EarlierRun {
         let text = std::fs::read(&path).map_err(Error::io("read", &path))?;
         Ok(serde_json::from_slice(&text).ok())
     }
+}
+
+/// Puts the results of a job in place that has just written its report.
+///
+/// # Errors
+/// As [`JobDirectory::replace_results`]; [`Error::Io`] if the journal cannot be read, or does not name the report: then it does not
+/// name all results either.
+pub(crate) fn place_results_of_finished_job(directory: &JobDirectory) -> Result<()> {
+    let (mut names, mut has_report) = (HashSet::new(), false);
+    journal::visit_files::<JobHeader, JobStep>(directory, |step, files| {
+        has_report |= step == JobStep::Report;
+        names.extend(files.into_iter().map(|file| file.name).filter(|name| directory.is_result(name)));
+    })?;
+    if !has_report {
+        let damaged = io::Error::new(ErrorKind::InvalidData, "it has changed since the job wrote it");
+        return Err(Error::io("read", directory.journal())(damaged));
+    }
+    directory.replace_results(&names)
 }
 
 /// Where a run begins.

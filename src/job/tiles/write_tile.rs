@@ -2,9 +2,9 @@
 //! the preview.
 
 use crate::Result;
-use crate::job::durable::atomic_file::{PendingFile, write_pending_pieces};
+use crate::job::durable::atomic_file::{PendingFile, create_folder_of, write_pending_pieces};
 use crate::job::durable::columns::ColumnWriter;
-use crate::job::durable::directory::{JobDirectory, create_folder_of};
+use crate::job::durable::directory::JobDirectory;
 use crate::job::partition::tree::Tree;
 use crate::job::records::{FinishedBorder, Leaf, StepOutput, StepRecord, Store, TileSummary, owner};
 use crate::job::tiles::dependencies::FinishedTile;
