@@ -105,7 +105,7 @@ pub(crate) fn wide() -> (Job, Vec<Tile>) {
 
 /// Runs a job on the same area, with so many tiles that the tileset is several files.
 pub(crate) fn wide_in_many_tiles() -> (Job, Vec<Tile>) {
-    job(&square(200, 50_000.0, [0.0; 2]), 45)
+    job(&square(200, 50_000.0, [0.0; 2]), 24)
 }
 
 fn is_exact(tile: &Tile) -> bool {
