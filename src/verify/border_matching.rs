@@ -11,6 +11,7 @@ use crate::verify::exact::{EdgeState, edge_state};
 use crate::verify::failures::{Failure, Failures};
 use crate::verify::keyed_records::KeyedRecords;
 use crate::verify::source_grid::SourceGrid;
+use crate::verify::tile_files::TileFiles;
 
 /// The borders of all meshes that have been checked so far.
 pub(super) struct Borders {
@@ -32,16 +33,16 @@ impl Borders {
         self.sites.extend(&border.sites)
     }
 
-    /// Matches all borders; `names` are the names of the tiles.
-    pub(super) fn match_all(self, grid: &SourceGrid, names: &[String]) -> Result<BorderMatches> {
+    /// Matches all borders of the meshes in `files`.
+    pub(super) fn match_all(self, grid: &SourceGrid, files: &TileFiles) -> Result<BorderMatches> {
         let mut matches = BorderMatches::default();
         self.edges.for_each_bucket(|edges| {
             edges.par_sort_unstable();
-            edges.chunk_by(|a, b| a.ends == b.ends).for_each(|group| matches.add_edge(group, grid, names));
+            edges.chunk_by(|a, b| a.ends == b.ends).for_each(|group| matches.add_edge(group, grid, files));
         })?;
         self.sites.for_each_bucket(|sites| {
             sites.par_sort_unstable();
-            sites.chunk_by(|a, b| a.site == b.site).for_each(|group| matches.add_site(group, grid, names));
+            sites.chunk_by(|a, b| a.site == b.site).for_each(|group| matches.add_site(group, grid, files));
         })?;
         Ok(matches)
     }
@@ -65,13 +66,13 @@ pub(super) struct BorderMatches {
 
 impl BorderMatches {
     /// Adds an edge; `group` holds every use of it on a border.
-    fn add_edge(&mut self, group: &[BorderEdge], grid: &SourceGrid, names: &[String]) {
+    fn add_edge(&mut self, group: &[BorderEdge], grid: &SourceGrid, files: &TileFiles) {
         match group {
             [edge] => self.hull.push(edge.directed()),
-            [left, right] if left.reversed != right.reversed => self.add_pair(left, right, grid, names),
+            [left, right] if left.reversed != right.reversed => self.add_pair(left, right, grid, files),
             [first, ..] => {
                 let [a, b] = first.ends;
-                let tiles: Vec<&str> = group.iter().map(|edge| name(names, edge.tile)).collect();
+                let tiles: Vec<String> = group.iter().map(|edge| files.name(edge.tile)).collect();
                 self.failures.note(Failure::Overused, first.tile, || {
                     format!("{} {} times, in {}", grid.edge_text(a, b), group.len(), tiles.join(", "))
                 });
@@ -80,7 +81,7 @@ impl BorderMatches {
         }
     }
 
-    fn add_pair(&mut self, left: &BorderEdge, right: &BorderEdge, grid: &SourceGrid, names: &[String]) {
+    fn add_pair(&mut self, left: &BorderEdge, right: &BorderEdge, grid: &SourceGrid, files: &TileFiles) {
         self.edges_across_tiles += (left.tile != right.tile) as u64;
         let [a, c] = right.directed();
         // The triangles (c, a, left's apex) and (a, c, right's apex).
@@ -88,19 +89,19 @@ impl BorderMatches {
             EdgeState::Delaunay => {}
             EdgeState::Tie => self.ties += 1,
             EdgeState::NotDelaunay => self.failures.note(Failure::NotDelaunay, left.tile, || {
-                let [left, right] = [left, right].map(|edge| name(names, edge.tile));
+                let [left, right] = [left, right].map(|edge| files.name(edge.tile));
                 format!("{} between {left} and {right}", grid.edge_text(a, c))
             }),
         }
     }
 
     /// Adds a site; `group` holds what each mesh says of it.
-    fn add_site(&mut self, group: &[BorderSite], grid: &SourceGrid, names: &[String]) {
+    fn add_site(&mut self, group: &[BorderSite], grid: &SourceGrid, files: &TileFiles) {
         self.sites += 1;
         let first = group[0];
         self.vertices.add([first.site[0], first.site[1], first.height]);
         let both = |other: &BorderSite| {
-            format!("{} in {} and {}", grid.site_text(first.site), name(names, first.tile), name(names, other.tile))
+            format!("{} in {} and {}", grid.site_text(first.site), files.name(first.tile), files.name(other.tile))
         };
         if let Some(other) = group.iter().find(|site| site.position != first.position) {
             self.failures.note(Failure::PlaceDiffers, first.tile, || both(other));
@@ -111,8 +112,4 @@ impl BorderMatches {
             self.failures.note(Failure::ShadingDiffers, first.tile, || both(other));
         }
     }
-}
-
-fn name(names: &[String], tile: u32) -> &str {
-    names.get(tile as usize).map_or("?", String::as_str)
 }

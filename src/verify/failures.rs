@@ -67,10 +67,10 @@ impl Failures {
         }
     }
 
-    /// Returns one sentence for each kind; `names` are the names of the tiles.
-    pub(super) fn sentences(&self, names: &[String]) -> Vec<String> {
+    /// Returns one sentence for each kind; `name` gives the name of a tile.
+    pub(super) fn sentences(&self, name: impl Fn(u32) -> String) -> Vec<String> {
         let sentence = |(failure, found): (&Failure, &Occurrences)| {
-            let name = names.get(found.tile as usize).map_or("?", String::as_str);
+            let name = name(found.tile);
             format!("{} {}, the first in {name}: {}", found.count, failure.plural(), found.example)
         };
         self.0.iter().map(sentence).collect()
@@ -90,11 +90,11 @@ mod tests {
         others.note(Failure::Unused, 1, text(3));
         others.note(Failure::OffLattice, 0, text(4));
         some.merge(others);
-        let names = ["a", "b"].map(String::from);
+        let name = |tile: u32| ["a", "b"][tile as usize].to_owned();
         let sentences = [
             "1 vertices not on the lattice, the first in a: 4".to_owned(),
             "3 vertices without a triangle, the first in b: 3".to_owned(),
         ];
-        assert_eq!(some.sentences(&names), sentences);
+        assert_eq!(some.sentences(name), sentences);
     }
 }

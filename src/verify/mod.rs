@@ -56,6 +56,7 @@ mod border_matching;
 mod digest;
 mod exact;
 mod failures;
+mod file_search;
 mod findings;
 mod half_edges;
 mod hull;
@@ -142,8 +143,7 @@ pub fn verify_against(directory: &Path, memory: u64, inputs: &[PathBuf]) -> Resu
     let findings =
         (0..lanes).into_par_iter().map(|_| run.check_files()).try_reduce(Findings::default, |a, b| Ok(a.merge(b)))?;
     let borders = run.borders.into_inner().unwrap_or_else(PoisonError::into_inner);
-    let names = files.names();
-    let matches = borders.match_all(&grid, &names)?;
+    let matches = borders.match_all(&grid, &files)?;
     let proof = inputs.zip(run.places).map(|(inputs, places)| inputs.compare(places, &grid)).transpose()?;
     Ok(Verdict::new(CheckedMesh { files: &files, findings, matches }, &report, &written, proof))
 }

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use crate::output::file_names::OutputFiles;
 use crate::output::frame::Extras;
 use crate::output::gltf::read::{held_bytes, read_extras};
+use crate::verify::file_search::files_below;
 use crate::{Error, Result};
 
 /// Checking a tile takes at most this many times the memory of its meshes.
@@ -49,11 +50,11 @@ impl TileFiles {
         Ok(TileFiles { paths, terrain, extras, largest })
     }
 
-    /// Returns the names of the files for people.
-    pub(super) fn names(&self) -> Vec<String> {
-        let name = |p: &PathBuf| p.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let (terrain, cut) = self.paths.split_at(self.terrain);
-        terrain.iter().map(name).chain(cut.iter().map(|p| format!("cut/{}", name(p)))).collect()
+    /// Returns the name of a file for people.
+    pub(super) fn name(&self, number: u32) -> String {
+        let number = number as usize;
+        let name = self.paths.get(number).and_then(|path| path.file_name()).unwrap_or_default().to_string_lossy();
+        if number < self.terrain { name.into_owned() } else { format!("cut/{name}") }
     }
 
     /// Returns how many files may be checked at the same time within `memory` bytes.
@@ -89,15 +90,10 @@ fn no_output(path: &Path, what: &str) -> Error {
     Error::Config(format!("{} {what}: name the output directory of a finished job", path.display()))
 }
 
-/// Returns the GLB files in `folder`, sorted by name.
+/// Returns the GLB files in `folder` and in the folders in it, sorted by path.
 fn glb_files(folder: &Path) -> Result<Vec<PathBuf>> {
-    let mut paths = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(Error::io("read", folder))? {
-        let path = entry.map_err(Error::io("read", folder))?.path();
-        if path.extension().is_some_and(|e| e == "glb") {
-            paths.push(path);
-        }
-    }
-    paths.sort();
+    let found = files_below(folder, "glb");
+    let mut paths = found.map_err(|(folder, error)| Error::io("read", folder)(error))?;
+    paths.sort_unstable();
     Ok(paths)
 }

@@ -105,7 +105,7 @@ impl Verdict {
             ..Verdict::default()
         };
         findings.failures.merge(matches.failures);
-        verdict.failures = findings.failures.sentences(&files.names());
+        verdict.failures = findings.failures.sentences(|tile| files.name(tile));
         let gone = what_is_gone_of_cut(facts, written, verdict.cut);
         if let Some(gone) = &gone {
             verdict.doubt(format!(

@@ -6,9 +6,9 @@ use std::path::{Component, Path};
 
 use rayon::prelude::*;
 
-use crate::disk;
 use crate::output::checksums::{Checksum, parse_list, read_file};
 use crate::output::file_names::OutputFiles;
+use crate::verify::file_search::files_below;
 
 /// More names than this would hide what else is wrong.
 const MAX_NAMES: usize = 20;
@@ -107,16 +107,16 @@ fn is_in(output: &OutputFiles, name: &str, folder: &Path) -> bool {
     output.directory().join(name).starts_with(folder)
 }
 
-/// Returns a sentence for every tile, coarser tile and part left out that is not in the list.
+/// Returns a sentence for every tile, coarser tile, part left out and external tileset that is not in the list.
 fn unlisted(output: &OutputFiles, files: &[(String, Checksum)]) -> Vec<String> {
     let listed: HashSet<_> = files.iter().map(|(name, _)| output.directory().join(name)).collect();
     let name = |path: &Path| path.strip_prefix(output.directory()).unwrap_or(path).display().to_string();
     let mut sentences = Vec::new();
-    for folder in output.glb_folders() {
-        match disk::list(&folder) {
-            Err(error) => sentences.push(format!("{} cannot be read: {error}", name(&folder))),
+    for (folder, ending) in output.numbered_folders() {
+        match files_below(&folder, ending) {
+            Err((folder, error)) => sentences.push(format!("{} cannot be read: {error}", name(&folder))),
             Ok(mut paths) => {
-                paths.retain(|path| path.extension().is_some_and(|e| e == "glb") && !listed.contains(path));
+                paths.retain(|path| !listed.contains(path));
                 paths.sort_unstable();
                 sentences.extend(paths.iter().map(|path| format!("{} is not a file that the job wrote", name(path))));
             }

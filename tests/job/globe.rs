@@ -85,11 +85,12 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// Runs a job on these points. Returns it with its tiles, which are packed with meshopt and keep the rules of 3D Tiles.
-fn job(points: &[[i32; 3]]) -> (Job, Vec<Tile>) {
+fn job(points: &[[i32; 3]], tiles_of: u64) -> (Job, Vec<Tile>) {
     let folder = tempfile::tempdir().unwrap();
     let cloud = folder.path().join("cloud.las");
     std::fs::write(&cloud, utm(points)).unwrap();
-    let job = Job::on(&[&cloud]).tiles_of(500).with("output", "max_points_per_level_tile = 500\nformat = \"3dtiles\"");
+    let levels = format!("max_points_per_level_tile = {}\nformat = \"3dtiles\"", tiles_of.max(100));
+    let job = Job::on(&[&cloud]).tiles_of(tiles_of).with("output", &levels);
     job.report();
     job.verified();
     let tiles = tiles(&job);
@@ -99,7 +100,12 @@ fn job(points: &[[i32; 3]]) -> (Job, Vec<Tile>) {
 
 /// Runs a job on an area 100 km wide.
 pub(crate) fn wide() -> (Job, Vec<Tile>) {
-    job(&square(200, 50_000.0, [0.0; 2]))
+    job(&square(200, 50_000.0, [0.0; 2]), 500)
+}
+
+/// Runs a job on the same area, with so many tiles that the tileset is several files.
+pub(crate) fn wide_in_many_tiles() -> (Job, Vec<Tile>) {
+    job(&square(200, 50_000.0, [0.0; 2]), 24)
 }
 
 fn is_exact(tile: &Tile) -> bool {
@@ -166,7 +172,7 @@ fn errors_of_wide_tiles_hold_on_the_globe() {
 #[test]
 fn long_triangles_do_not_move_the_ground() {
     let fields = [square(60, 2_000.0, [-30_000.0, 0.0]), square(60, 2_000.0, [30_000.0, 0.0])].concat();
-    let (job, tiles) = job(&fields);
+    let (job, tiles) = job(&fields, 500);
     let offset: [f64; 3] = numbers(&georeference(&job, "offset")).unwrap();
     let truth = Truth::new();
     // For every vertex the error in the tile that places it best.
@@ -184,7 +190,7 @@ fn long_triangles_do_not_move_the_ground() {
 
 #[test]
 fn a_small_area_has_one_transform() {
-    let (job, tiles) = job(&square(70, 1_000.0, [0.0; 2]));
+    let (job, tiles) = job(&square(70, 1_000.0, [0.0; 2]), 500);
     let globe = georeference(&job, "globe");
     assert_eq!(Some(tiles[0].placed), numbers(&globe["transform"]));
     assert!(tiles.len() > 5 && tiles[1..].iter().all(|tile| tile.json["transform"].is_null()));

@@ -27,6 +27,7 @@ mod hard_shapes;
 mod khronos;
 mod levels;
 mod limits;
+mod many_tiles;
 mod messages;
 mod overlap;
 mod parts;

@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use crate::clouds;
 use crate::program::Job;
+use crate::tileset::files_below;
 
 /// Returns the seconds from the start of the job to the start and to the end of stage `name`.
 fn span(report: &Value, name: &str) -> [f64; 2] {
@@ -17,10 +18,7 @@ fn span(report: &Value, name: &str) -> [f64; 2] {
 
 /// Returns the tiles, the levels and the files next to them, except the report.
 fn results(job: &Job) -> BTreeMap<PathBuf, Vec<u8>> {
-    let folders = [job.out(), job.out().join("tiles"), job.out().join("levels")];
-    let entries = folders.iter().flat_map(|folder| std::fs::read_dir(folder).unwrap());
-    let files =
-        entries.map(|entry| entry.unwrap().path()).filter(|path| path.is_file() && !path.ends_with("report.json"));
+    let files = files_below(&job.out()).into_iter().filter(|path| !path.ends_with("report.json"));
     files.map(|path| (path.strip_prefix(job.out()).unwrap().to_path_buf(), std::fs::read(&path).unwrap())).collect()
 }
 

@@ -1,6 +1,7 @@
-//! Reads `tileset.json` as viewers do, and checks it against the rules of 3D Tiles.
+//! Reads `tileset.json` and external tilesets as viewers do, and checks them against the rules of 3D Tiles.
 
 use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use gdt_batch::output::gltf::read::read_tile;
 use serde_json::Value;
@@ -12,8 +13,9 @@ pub(crate) type Transform = [f64; 16];
 
 const UNMOVED: Transform = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
 
-/// A tile of the tileset.
+/// A tile of the tileset. The tile that stands for an external tileset is not one of its own.
 pub(crate) struct Tile {
+    /// What its file says of it. The URI of its content is the path from the output directory.
     pub(crate) json: Value,
     /// Indices of its ancestors, nearest first.
     pub(crate) above: Vec<usize>,
@@ -27,26 +29,88 @@ pub(crate) struct Tile {
 
 /// Returns all tiles, children after their parents.
 pub(crate) fn tiles(job: &Job) -> Vec<Tile> {
-    fn add(found: &mut Vec<Tile>, json: &Value, above: &[usize]) {
-        let own = found.len();
+    let mut reader = TilesetReader { job, found: Vec::new(), files: Vec::new() };
+    reader.file("tileset.json", &[]);
+    // Every file of the folder is in use, once.
+    let mut expected: Vec<String> = files_below(&job.out().join("tilesets"))
+        .iter()
+        .map(|path| path.strip_prefix(job.out()).unwrap().to_str().unwrap().to_owned())
+        .collect();
+    expected.push("tileset.json".into());
+    expected.sort_unstable();
+    reader.files.sort_unstable();
+    assert_eq!(reader.files, expected);
+    reader.found
+}
+
+/// Returns the files in `folder` and in the folders in it; none if there is no such folder.
+pub(crate) fn files_below(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().map(|entry| entry.unwrap().path());
+    entries.flat_map(|path| if path.is_dir() { files_below(&path) } else { vec![path] }).collect()
+}
+
+/// Returns the path from the output directory to which `uri` leads from the file at `from`.
+fn resolved(from: &str, uri: &str) -> String {
+    let mut parts: Vec<&str> = from.split('/').collect();
+    parts.pop();
+    for part in uri.split('/') {
+        if part == ".." { assert!(parts.pop().is_some(), "{uri} leads out of the directory") } else { parts.push(part) }
+    }
+    parts.join("/")
+}
+
+struct TilesetReader<'a> {
+    job: &'a Job,
+    found: Vec<Tile>,
+    /// The paths of the files that were read.
+    files: Vec<String>,
+}
+
+impl TilesetReader<'_> {
+    /// Reads a file whose root lies below the tiles `above`, and returns the root.
+    fn file(&mut self, name: &str, above: &[usize]) -> Value {
+        let text = std::fs::read(self.job.out().join(name)).unwrap();
+        assert!(text.len() <= 1_000_000, "{name} has {} bytes", text.len());
+        let json: Value = serde_json::from_slice(&text).unwrap();
+        assert_eq!(json["asset"]["version"], "1.1");
+        assert!(error(&json) >= error(&json["root"]));
+        assert_eq!(json["root"]["refine"], "REPLACE");
+        self.files.push(name.into());
+        let mut root = json["root"].clone();
+        if !above.is_empty() {
+            root.as_object_mut().unwrap().remove("refine");
+        }
+        self.tile(name, &root, above);
+        root
+    }
+
+    fn tile(&mut self, file: &str, json: &Value, above: &[usize]) {
+        let mut json = json.clone();
+        if let Some(uri) = json["content"]["uri"].as_str() {
+            let path = resolved(file, uri);
+            if path.ends_with(".json") {
+                assert!(json["children"].is_null() && json["transform"].is_null() && json["refine"].is_null());
+                let own = self.found.len();
+                let root = self.file(&path, above);
+                assert_eq!(json["geometricError"], root["geometricError"]);
+                // Its box, which has no transform, holds that of the root.
+                assert!(is_in(&self.found[own], &json), "{path}");
+                return;
+            }
+            json["content"]["uri"] = path.into();
+        }
+        let own = self.found.len();
         let step = numbers(&json["transform"]).unwrap_or(UNMOVED);
-        let placed = above.first().map_or(step, |&parent| product(&found[parent].placed, &step));
-        found.push(Tile { json: json.clone(), above: above.to_vec(), leaves: Vec::new(), step, placed });
-        let children = json["children"].as_array();
+        let placed = above.first().map_or(step, |&parent| product(&self.found[parent].placed, &step));
+        let children = json["children"].as_array().cloned();
+        self.found.push(Tile { json, above: above.to_vec(), leaves: Vec::new(), step, placed });
         if children.is_none() {
-            found[own].leaves.push(own);
-            above.iter().for_each(|&parent| found[parent].leaves.push(own));
+            self.found[own].leaves.push(own);
+            above.iter().for_each(|&parent| self.found[parent].leaves.push(own));
         }
         let above: Vec<usize> = [&[own], above].concat();
-        children.into_iter().flatten().for_each(|child| add(found, child, &above));
+        children.iter().flatten().for_each(|child| self.tile(file, child, &above));
     }
-    let json: Value = serde_json::from_slice(&std::fs::read(job.out().join("tileset.json")).unwrap()).unwrap();
-    assert_eq!(json["asset"]["version"], "1.1");
-    assert!(error(&json) >= error(&json["root"]));
-    assert_eq!(json["root"]["refine"], "REPLACE");
-    let mut found = Vec::new();
-    add(&mut found, &json["root"], &[]);
-    found
 }
 
 pub(crate) fn error(tile: &Value) -> f64 {
@@ -81,9 +145,9 @@ fn is_within(place: [f64; 3], [low, high]: [[f64; 3]; 2]) -> bool {
     (0..3).all(|k| place[k] >= low[k] - 1e-6 && place[k] <= high[k] + 1e-6)
 }
 
-/// Tells whether the box of `tile`, where its transform puts it, lies in the box of its parent.
-fn is_in_its_parents(tile: &Tile, parent: &Tile) -> bool {
-    let (own, outer) = (extent(&tile.json), extent(&parent.json));
+/// Tells whether the box of `tile`, where its transform puts it, lies in the box of the tile `outer`.
+fn is_in(tile: &Tile, outer: &Value) -> bool {
+    let (own, outer) = (extent(&tile.json), extent(outer));
     (0..8).all(|i| is_within(applied(&tile.step, [0, 1, 2].map(|k| own[i >> k & 1][k])), outer))
 }
 
@@ -116,7 +180,7 @@ pub(crate) fn keeps_the_rules(job: &Job, tiles: &[Tile]) {
     for tile in tiles {
         let own = extent(&tile.json);
         if let Some(&parent) = tile.above.first() {
-            assert!(is_in_its_parents(tile, &tiles[parent]), "{}", tile.json["boundingVolume"]);
+            assert!(is_in(tile, &tiles[parent].json), "{}", tile.json["boundingVolume"]);
             assert!(error(&tile.json) <= error(&tiles[parent].json));
             assert!(tile.json["refine"].is_null());
         }
@@ -127,7 +191,7 @@ pub(crate) fn keeps_the_rules(job: &Job, tiles: &[Tile]) {
         assert_eq!(uri.starts_with("tiles/"), tile.json["children"].is_null(), "{uri}");
         assert!(uri.starts_with("levels/") || error(&tile.json) == 0.0, "{uri}");
     }
-    let files = |folder: &str| std::fs::read_dir(job.out().join(folder)).map_or(0, |entries| entries.count());
+    let files = |folder: &str| files_below(&job.out().join(folder)).len();
     assert!(shown.values().all(|&count| count == 1));
     assert_eq!(shown.len(), files("tiles") + files("levels"));
 }

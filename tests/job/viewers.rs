@@ -9,11 +9,11 @@ use serde_json::{Value, json};
 
 use crate::clouds;
 use crate::common::shared;
-use crate::globe::wide;
+use crate::globe::{wide, wide_in_many_tiles};
 use crate::levels::hills;
 use crate::program::{Job, number};
 use crate::random::Random;
-use crate::tileset::{Tile, applied, extent, keeps_the_rules, tiles, triangles};
+use crate::tileset::{Tile, applied, extent, files_below, keeps_the_rules, tiles, triangles};
 use crate::validator::validate;
 
 /// Returns the path of Chromium, or `None` if it or an npm package is missing. Under tests/run that is a failure.
@@ -143,6 +143,22 @@ fn a_browser_shows_a_wide_area_on_the_globe() {
     let (job, tiles) = wide();
     let report: Value = serde_json::from_slice(&std::fs::read(job.out().join("report.json")).unwrap()).unwrap();
     seen_on_the_globe(&job, &report, &tiles, &chromium);
+}
+
+/// Both viewers open a tileset of external tilesets, whose transforms lead from file to file.
+#[test]
+fn browsers_show_a_tileset_of_external_tilesets() {
+    let Some(chromium) = chromium() else { return };
+    let (job, tiles) = wide_in_many_tiles();
+    assert!(files_below(&job.out().join("tilesets")).len() > 1);
+    let report: Value = serde_json::from_slice(&std::fs::read(job.out().join("report.json")).unwrap()).unwrap();
+    seen_on_the_globe(&job, &report, &tiles, &chromium);
+    let places = middles(&job, &tiles);
+    let seen = seen(&job, &chromium, "view", &places);
+    assert_eq!(seen["fine"]["triangles"], report["triangles"]);
+    is_coarsest(&seen["coarse"], &job, &tiles);
+    let heights = seen["fine"]["heights"].as_array().unwrap();
+    assert!(heights.len() == places.len() && heights.iter().all(Value::is_number), "{heights:?}");
 }
 
 #[track_caller]

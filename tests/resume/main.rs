@@ -18,6 +18,7 @@ mod earlier_results;
 mod failing_disk;
 mod kills;
 mod lock;
+mod many_tiles;
 mod places;
 mod power;
 mod read_errors;

@@ -7,7 +7,7 @@ use crate::output::checksums::Checksum;
 use crate::{Error, Result, disk};
 use std::collections::BTreeSet;
 use std::fs::File;
-use std::io::Write;
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::thread::ScopedJoinHandle;
 use xxhash_rust::xxh3::Xxh3;
@@ -46,6 +46,21 @@ pub fn write_pending_pieces(path: &Path, pieces: &[&[u8]]) -> Result<PendingFile
     pieces.iter().for_each(|piece| hasher.update(piece));
     let bytes = pieces.iter().map(|piece| piece.len() as u64).sum();
     Ok(PendingFile { path: path.into(), bytes, checksum: Checksum::of_hasher(&hasher) })
+}
+
+/// Writes the lines under the [`partial_path`] of `path`, without holding all of them in memory.
+///
+/// # Errors
+/// [`Error::Io`] if writing fails, and the first error of a line.
+pub fn write_pending_lines(path: &Path, lines: impl IntoIterator<Item = Result<String>>) -> Result<()> {
+    const BUFFER: usize = 1 << 20;
+    let partial = partial_path(path);
+    let file = disk::create(&partial).map_err(Error::io("write", &partial))?;
+    let mut writer = BufWriter::with_capacity(BUFFER, WriteFrom { file: &file, at: 0 });
+    for line in lines {
+        writer.write_all(line?.as_bytes()).map_err(Error::io("write", &partial))?;
+    }
+    writer.flush().map_err(Error::io("write", &partial))
 }
 
 /// Returns the pending file of `path` when something else has written it under its [`partial_path`].
@@ -109,6 +124,22 @@ fn sync_file(path: &Path) -> Result<()> {
 /// [`Error::Io`] if that fails.
 pub fn sync_folder(folder: &Path) -> Result<()> {
     disk::sync_folder(folder).map_err(Error::io("write", folder))
+}
+
+/// Creates the folder at `path`, and those above it, if need be.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be made.
+pub fn create_folder(path: &Path) -> Result<()> {
+    disk::create_folder(path).map_err(Error::io("create the directory", path))
+}
+
+/// Creates the folder that the file at `path` is to be in, and those above it, if need be.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be made.
+pub fn create_folder_of(path: &Path) -> Result<()> {
+    path.parent().map_or(Ok(()), create_folder)
 }
 
 /// Removes the file at `path` if it exists.

@@ -1,7 +1,7 @@
 //! The job directory, which holds everything that a job needs to go on, and the results beside it.
 
-use crate::job::durable::atomic_file::{partial_path, remove_file};
-use crate::job::durable::listing::{entries, exists, files_of};
+use crate::job::durable::atomic_file::{create_folder, partial_path, remove_file};
+use crate::job::durable::listing::{Leftovers, entries, exists, is_folder};
 use crate::job::durable::lock::{Lock, lock_file};
 use crate::job::durable::replacement::Replacement;
 use crate::job::index::PartIndex;
@@ -143,7 +143,7 @@ impl JobDirectory {
     /// # Errors
     /// [`Error::Io`] if a file cannot be removed or the folder cannot be made.
     pub fn clear(&self, keep: &HashSet<PathBuf>) -> Result<()> {
-        let mut results = files_of(&self.waiting)?;
+        let mut results = Leftovers::of(&self.waiting)?.files;
         results.retain(|path| !keep.contains(&self.name(path)));
         results.iter().try_for_each(|path| remove_file(path))?;
         self.clear_own(keep)?;
@@ -186,23 +186,21 @@ impl JobDirectory {
 
     /// Returns the paths of all results of an earlier job that may exist.
     pub(crate) fn earlier_results(&self) -> Vec<PathBuf> {
-        files_of(&self.results).unwrap_or_default()
+        Leftovers::of(&self.results).unwrap_or_default().files
     }
 
     /// Returns the paths of all results that may wait.
     pub(crate) fn waiting_results(&self) -> Vec<PathBuf> {
-        files_of(&self.waiting).unwrap_or_default()
+        Leftovers::of(&self.waiting).unwrap_or_default().files
     }
 
-    /// Returns the paths of all files that the job may read or write in its directory.
-    fn existing_files(&self) -> Result<Vec<PathBuf>> {
+    /// Returns the paths of the files that the job keeps for itself, under their names or their partial names.
+    fn own_files(&self) -> Vec<PathBuf> {
         let mut files = vec![self.journal(), self.plan(), self.points(), lock_file(&self.job)];
         files.extend(self.store());
-        files.extend(files_of(&self.results)?);
-        files.extend(files_of(&self.waiting)?);
         let partials: Vec<PathBuf> = files.iter().map(|path| partial_path(path)).collect();
         files.extend(partials);
-        Ok(files)
+        files
     }
 
     /// Checks that no file, and no dangling link, is where a job needs a folder, that no folder, pipe or device is where it reads or
@@ -212,13 +210,16 @@ impl JobDirectory {
     /// [`Error::Config`] names what is in the way.
     pub fn check_nothing_in_the_way(&self) -> Result<()> {
         let mut own = vec![self.job.clone()];
-        own.extend(self.results.glb_folders());
+        own.extend(self.results.numbered_folders().map(|(folder, _)| folder));
+        let [results, waiting] = [Leftovers::of(&self.results)?, Leftovers::of(&self.waiting)?];
+        own.extend([results.no_folders, waiting.no_folders, results.folders].concat());
+        let mut files = self.own_files().into_iter().chain(results.files).chain(waiting.files);
         let mut folders = self.results.directory().ancestors().chain(own.iter().map(PathBuf::as_path));
         let is_in_the_way = |path: &Path| Ok(is_there(path)? && !is_folder(path)?);
         let (found, what, wanted) = if let Some(found) = find(&mut folders, is_in_the_way)? {
             let what = if exists(found)? { "is not a directory" } else { "is a link that leads nowhere" };
             (found.to_path_buf(), what, "a directory")
-        } else if let Some(found) = find(&mut self.existing_files()?.into_iter(), is_no_file)? {
+        } else if let Some(found) = find(&mut files, is_no_file)? {
             let what = if is_folder(&found)? { "is a directory" } else { "is a pipe or a device" };
             (found, what, "a file")
         } else if let Some(found) = own.into_iter().find(|path| is_elsewhere(path, self.results.directory())) {
@@ -248,7 +249,7 @@ impl JobDirectory {
         if exists(&lock_file(&self.job))? || report.as_ref().is_some_and(is_ours) {
             return Ok(());
         }
-        match find(&mut files_of(&self.results)?.into_iter(), is_there)? {
+        match find(&mut Leftovers::of(&self.results)?.files.into_iter(), is_there)? {
             None => Ok(()),
             Some(found) => Err(Error::Config(format!(
                 "{} exists, a job would overwrite or remove it, and nothing says that an earlier job wrote it: choose another \
@@ -281,10 +282,6 @@ fn is_no_file(path: &Path) -> Result<bool> {
     Ok(data.is_some_and(|data| !data.is_file()))
 }
 
-fn is_folder(path: &Path) -> Result<bool> {
-    disk::is_folder(path).map_err(Error::io("read", path))
-}
-
 /// Tells whether something is at `path`, if only a link that leads nowhere.
 fn is_there(path: &Path) -> Result<bool> {
     disk::link_metadata(path).map(|data| data.is_some()).map_err(Error::io("read", path))
@@ -307,14 +304,6 @@ fn remove_at_end(file: &Path) -> Result<()> {
     remove_file(file)?;
     fault::point("cleaning");
     Ok(())
-}
-
-/// Creates the folder at `path`, and those above it, if need be.
-///
-/// # Errors
-/// [`Error::Io`] if it cannot be made.
-pub fn create_folder(path: &Path) -> Result<()> {
-    disk::create_folder(path).map_err(Error::io("create the directory", path))
 }
 
 /// Tells whether both folders exist, and on different disks.
@@ -342,7 +331,7 @@ mod tests {
     fn files_of_others_stay() {
         let output = tempfile::tempdir().unwrap();
         let directory = JobDirectory::new(output.path());
-        for folder in directory.results().glb_folders() {
+        for (folder, _) in directory.results().numbered_folders() {
             fs::create_dir_all(folder).unwrap();
         }
         let [theirs, old] = ["cut/roof.glb", "tiles/000007.glb"].map(|name| output.path().join(name));
@@ -365,7 +354,14 @@ mod tests {
     /// Wherever it was cut off, replacing goes on to the same end, and as long as it is not there, no report tells of results.
     #[test]
     fn replacing_goes_on_where_it_was_cut_off() {
-        let new = ["tiles/000000.glb", "tiles/000002.glb", "levels/000001.glb", "tileset.json", "report.json"];
+        let new = [
+            "tiles/000000.glb",
+            "tiles/001/000300.glb",
+            "levels/000001.glb",
+            "tilesets/000000.json",
+            "tileset.json",
+            "report.json",
+        ];
         for done in 0..=new.len() {
             let output = tempfile::tempdir().unwrap();
             let directory = JobDirectory::new(output.path());
@@ -375,7 +371,16 @@ mod tests {
                 fs::create_dir_all(path.parent().unwrap()).unwrap();
                 fs::write(path, text).unwrap();
             };
-            for name in ["tiles/000000.glb", "tiles/000001.glb", "cut/000000.glb", "terrain.glb", "report.json"] {
+            for name in [
+                "tiles/000000.glb",
+                // An earlier version had no folders below.
+                "tiles/000300.glb",
+                "tiles/256/300/076800.glb",
+                "levels/001/000256.glb",
+                "cut/002/000512.glb",
+                "terrain.glb",
+                "report.json",
+            ] {
                 write(directory.results(), name, "old");
             }
             new.iter().for_each(|name| write(directory.output(), name, "new"));
@@ -387,13 +392,17 @@ mod tests {
                 fs::rename(directory.file(Path::new(name)), output.path().join(name)).unwrap();
             }
             directory.replace_results(&names(&new)).unwrap();
-            let found = files_of(directory.results()).unwrap().into_iter().filter(|path| path.exists());
+            let found = Leftovers::of(directory.results()).unwrap().files.into_iter().filter(|path| path.exists());
             let found: HashSet<PathBuf> = found.map(|path| directory.name(&path)).collect();
             // The report goes last. When it is there, nothing more is done.
             if done < new.len() {
                 assert_eq!(found, names(&new), "cut off after {done}");
             }
             assert!(new.iter().all(|name| fs::read(output.path().join(name)).unwrap() == b"new"), "{done}");
+            if done < new.len() {
+                let gone = ["tiles/256", "levels/001", "cut"];
+                assert!(gone.iter().all(|folder| !output.path().join(folder).exists()), "cut off after {done}");
+            }
         }
     }
 

@@ -5,7 +5,7 @@
 //! Everything from the first damaged line on counts as never written. The job says what its header, its steps (`S`) and its
 //! records (`K`) are.
 
-use crate::job::durable::atomic_file::{PendingFile, publish, write_pending};
+use crate::job::durable::atomic_file::{PendingFile, publish, write_pending_lines};
 use crate::job::durable::committer::{CommitBatch, Committer};
 use crate::job::durable::directory::JobDirectory;
 use crate::job::durable::store::{RecordKey, RecordRef};
@@ -16,7 +16,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 use std::collections::HashMap;
 use std::fmt::Debug;
+use std::fs::File;
 use std::hash::Hash;
+use std::io::{BufRead, BufReader, ErrorKind};
+use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use xxhash_rust::xxh3::xxh3_64;
@@ -97,8 +100,12 @@ impl<S: StepKey, K: RecordKey> JournalEntry<S, K> {
     /// # Errors
     /// [`Error::Broken`] if they are those of another kind of step.
     pub fn stats<T: DeserializeOwned>(&self) -> Result<T> {
-        serde_json::from_str(self.stats.get()).map_err(|e| Error::Broken(format!("the journal: {:?}: {e}", self.step)))
+        figures(self.step, &self.stats)
     }
+}
+
+fn figures<T: DeserializeOwned>(step: impl Debug, stats: &RawValue) -> Result<T> {
+    serde_json::from_str(stats.get()).map_err(|e| Error::Broken(format!("the journal: {step:?}: {e}")))
 }
 
 fn unwritable(error: serde_json::Error) -> Error {
@@ -118,6 +125,35 @@ fn parse_line<T: DeserializeOwned>(line: &str) -> Option<T> {
     is_whole.then(|| serde_json::from_str(text).ok())?
 }
 
+/// The lines of a journal up to the first damaged one, read one at a time: the journal of a large job has hundreds of megabytes.
+struct JournalLines {
+    path: PathBuf,
+    reader: BufReader<File>,
+    line: Vec<u8>,
+}
+
+impl JournalLines {
+    /// Opens the journal that an earlier run left, if there is one.
+    fn open(directory: &JobDirectory) -> Result<Option<JournalLines>> {
+        const BUFFER: usize = 1 << 18;
+        let path = directory.journal();
+        match fault::read("read-journal").and_then(|()| File::open(&path)) {
+            Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
+            file => {
+                let file = file.map_err(Error::io("read", &path))?;
+                Ok(Some(JournalLines { path, reader: BufReader::with_capacity(BUFFER, file), line: Vec::new() }))
+            }
+        }
+    }
+
+    /// Returns the value of the next line, or `None` if there is none or it is damaged.
+    fn next<T: DeserializeOwned>(&mut self) -> Result<Option<T>> {
+        self.line.clear();
+        self.reader.read_until(b'\n', &mut self.line).map_err(Error::io("read", &self.path))?;
+        Ok(std::str::from_utf8(&self.line).ok().and_then(parse_line))
+    }
+}
+
 /// The journal that an earlier run left: its header, unless that is damaged or of another version, and its entries up to the first
 /// damaged line.
 pub type ReadJournal<H, S, K> = (Option<H>, Vec<JournalEntry<S, K>>);
@@ -132,16 +168,37 @@ where
     S: StepKey,
     K: RecordKey,
 {
-    let path = directory.journal();
-    let bytes = match fault::read("read-journal").and_then(|()| std::fs::read(&path)) {
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        outcome => outcome.map_err(Error::io("read", &path))?,
-    };
-    let text = String::from_utf8_lossy(&bytes);
-    let mut lines = text.split_inclusive('\n');
-    let header: Option<H> = lines.next().and_then(parse_line);
-    let entries = if header.is_some() { lines.map_while(parse_line).collect() } else { Vec::new() };
+    let Some(mut lines) = JournalLines::open(directory)? else { return Ok(None) };
+    let (header, mut entries) = (lines.next()?, Vec::new());
+    while let Some(entry) = if header.is_some() { lines.next()? } else { None } {
+        entries.push(entry);
+    }
     Ok(Some((header, entries)))
+}
+
+/// The step and the files of a line.
+#[derive(Deserialize)]
+struct FilesOfStep<S> {
+    step: S,
+    files: Vec<PublishedFile>,
+}
+
+/// Calls `visit` with the steps and the files of the journal that an earlier run left, up to the first damaged line.
+///
+/// # Errors
+/// [`Error::Io`] if the journal cannot be read.
+pub fn visit_files<H, S>(directory: &JobDirectory, mut visit: impl FnMut(S, Vec<PublishedFile>)) -> Result<()>
+where
+    H: DeserializeOwned,
+    S: StepKey,
+{
+    let Some(mut lines) = JournalLines::open(directory)? else { return Ok(()) };
+    if lines.next::<H>()?.is_some() {
+        while let Some(FilesOfStep { step, files }) = lines.next()? {
+            visit(step, files);
+        }
+    }
+    Ok(())
 }
 
 /// A position in the journal of a run: after a number of records. The default is the start.
@@ -151,10 +208,12 @@ pub struct JournalPosition(u64);
 /// The journal of a run. Any thread may call its methods.
 pub struct Journal<'a, S, K> {
     directory: &'a JobDirectory,
-    taken_over: HashMap<S, JournalEntry<S, K>>,
+    /// The figures of the steps that an earlier run finished.
+    taken_over: HashMap<S, Box<RawValue>>,
     /// The files of all steps that are finished, in the order in which they were recorded.
     files: Mutex<Vec<PublishedFile>>,
     committer: Committer,
+    records: PhantomData<fn(K)>,
 }
 
 impl<'a, S: StepKey, K: RecordKey> Journal<'a, S, K> {
@@ -167,16 +226,16 @@ impl<'a, S: StepKey, K: RecordKey> Journal<'a, S, K> {
         header: &impl Serialize,
         entries: Vec<JournalEntry<S, K>>,
     ) -> Result<Journal<'a, S, K>> {
-        let mut text = to_line(header)?;
-        for entry in &entries {
-            text += &to_line(entry)?;
-        }
         let path = directory.journal();
-        write_pending(&path, text.as_bytes())?;
+        write_pending_lines(&path, std::iter::once(to_line(header)).chain(entries.iter().map(to_line)))?;
         publish(std::slice::from_ref(&path))?;
-        let files = Mutex::new(entries.iter().flat_map(|entry| &entry.files).cloned().collect());
-        let taken_over = entries.into_iter().map(|entry| (entry.step, entry)).collect();
-        Ok(Journal { directory, taken_over, files, committer: Committer::start(&path)? })
+        let (mut files, mut taken_over) = (Vec::new(), HashMap::with_capacity(entries.len()));
+        for entry in entries {
+            files.extend(entry.files);
+            taken_over.insert(entry.step, entry.stats);
+        }
+        let (files, records) = (Mutex::new(files), PhantomData);
+        Ok(Journal { directory, taken_over, files, committer: Committer::start(&path)?, records })
     }
 
     /// Tells whether an earlier run finished `step`.
@@ -192,13 +251,14 @@ impl<'a, S: StepKey, K: RecordKey> Journal<'a, S, K> {
     /// Returns the figures of `step`: those of an earlier run that finished it, or else those of `work`, which is then recorded.
     ///
     /// # Errors
-    /// [`Error::Interrupted`], [`Error::Io`] on the journal, and the errors of `work`.
+    /// [`Error::Interrupted`], [`Error::Io`] on the journal, [`Error::Broken`] if the figures are those of another kind of step, and
+    /// the errors of `work`.
     pub fn step<T>(&self, step: S, work: impl FnOnce() -> Result<StepOutput<T, K>>) -> Result<T>
     where
         T: Serialize + DeserializeOwned,
     {
-        if let Some(entry) = self.taken_over.get(&step) {
-            return entry.stats();
+        if let Some(stats) = self.taken_over.get(&step) {
+            return figures(step, stats);
         }
         interrupt::check()?;
         self.record(step, work()?)

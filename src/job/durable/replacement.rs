@@ -5,8 +5,8 @@
 //! files are old and some are new, and there is no report. If a failure ends the run there, the next run goes on with it.
 
 use crate::disk::OpenFolder;
-use crate::job::durable::atomic_file::remove_file;
-use crate::job::durable::listing::{exists, files_of, is_partial};
+use crate::job::durable::atomic_file::{create_folder, remove_file, sync_folder};
+use crate::job::durable::listing::{Leftovers, exists, is_partial};
 use crate::output::file_names::OutputFiles;
 use crate::{Error, Result, disk, fault};
 use std::collections::HashSet;
@@ -25,7 +25,8 @@ pub(crate) struct Replacement {
     /// What a killed run of an early version of the program left half-written. No result.
     partial: Vec<PathBuf>,
     directory: OpenFolder,
-    glb_folders: Vec<OpenFolder>,
+    /// The folders of numbered files, each after those in it. They can be opened, but they are too many to keep open.
+    numbered_folders: Vec<PathBuf>,
 }
 
 impl Replacement {
@@ -60,7 +61,7 @@ impl Replacement {
         // What is done must not depend on the order of a hash set.
         found.sort_unstable();
         let mut others = Vec::new();
-        for path in files_of(results)? {
+        for path in Leftovers::of(results)?.files {
             let name = path.strip_prefix(results.directory()).unwrap_or(&path);
             if path != report && !names.contains(name) && exists(&path)? {
                 others.push(path);
@@ -68,18 +69,11 @@ impl Replacement {
         }
         let (partial, outdated) = others.into_iter().partition(|path| is_partial(path));
         let folders: HashSet<&Path> = found.iter().filter_map(|(_, place)| place.parent()).collect();
-        folders
-            .into_iter()
-            .try_for_each(|path| disk::create_folder(path).map_err(Error::io("create the directory", path)))?;
-        let open = |path: &Path| OpenFolder::open(path).map_err(Error::io("open", path));
-        let mut glb_folders = Vec::new();
-        for folder in results.glb_folders() {
-            if exists(&folder)? {
-                glb_folders.push(open(&folder)?);
-            }
-        }
+        folders.into_iter().try_for_each(create_folder)?;
+        let numbered_folders = Leftovers::of(results)?.folders;
+        numbered_folders.iter().try_for_each(|path| open(path).map(|_| ()))?;
         let directory = open(results.directory())?;
-        Ok(Some(Replacement { report, new_report, waiting: found, outdated, partial, directory, glb_folders }))
+        Ok(Some(Replacement { report, new_report, waiting: found, outdated, partial, directory, numbered_folders }))
     }
 
     /// Does it. Every file is replaced at once, so there is no moment without one.
@@ -98,10 +92,10 @@ impl Replacement {
             // It does not matter to the results whether it goes.
             let _ = disk::remove_file(path);
         }
-        for folder in &self.glb_folders {
+        for folder in &self.numbered_folders {
             // This fails, as it should, where a folder holds files of this job or of somebody else.
-            if disk::remove_folder(folder.path()).is_err() {
-                sync(folder)?;
+            if disk::remove_folder(folder).is_err() {
+                sync_folder(folder)?;
             }
         }
         sync(&self.directory)?;
@@ -109,6 +103,10 @@ impl Replacement {
         rename(&self.new_report, &self.report)?;
         sync(&self.directory)
     }
+}
+
+fn open(folder: &Path) -> Result<OpenFolder> {
+    OpenFolder::open(folder).map_err(Error::io("open", folder))
 }
 
 fn rename(from: &Path, to: &Path) -> Result<()> {

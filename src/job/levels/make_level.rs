@@ -1,7 +1,7 @@
 //! Step 7, once for each coarser tile: reads the meshes of its children back from their files, joins and simplifies them.
 
 use crate::geometry::Bounds;
-use crate::job::durable::directory::{JobDirectory, create_folder};
+use crate::job::durable::directory::JobDirectory;
 use crate::job::index::{NodeIndex, PartIndex};
 use crate::job::levels::hierarchy::{BYTES_PER_LEVEL_VERTEX, ChildTile, Hierarchy, LevelSizes};
 use crate::job::partition::tree::{NodeKind, Tree};
@@ -86,12 +86,8 @@ pub fn make_level(room: &LevelRoom, index: usize) -> Result<StepOutput<LevelStat
                 let below = children.iter().map(|child| child.own.error).fold(0.0, f64::max);
                 own.error = (below + simple.error).min(height_range(&room.style.frame, bounds));
                 own.vertices = simple.tile.positions.len() as u32;
-                create_folder(&room.directory.output().levels())?;
-                let written = write_glb(
-                    &room.directory.output().level(room.part.node_number(coarse.node)),
-                    &simple.tile,
-                    room.style,
-                )?;
+                let path = room.directory.output().level(room.part.node_number(coarse.node));
+                let written = write_glb(&path, &simple.tile, room.style)?;
                 let triangles = simple.tile.triangles.len() as u64;
                 stats = LevelStats { files: 1, triangles, bytes: written.bytes, error_m: own.error, left_out: 0 };
                 files.push(written);

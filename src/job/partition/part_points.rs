@@ -1,8 +1,9 @@
 //! Reading the points of a job of several parts: before a part is done, the inputs that it is the first to need are read whole, and their
 //! points go to the files of all parts that they reach.
 
+use crate::job::durable::atomic_file::create_folder;
 use crate::job::durable::columns::{ColumnReader, ColumnWriter};
-use crate::job::durable::directory::{JobDirectory, create_folder};
+use crate::job::durable::directory::JobDirectory;
 use crate::job::index::PartIndex;
 use crate::job::partition::buckets::{Bucket, Buckets};
 use crate::job::partition::parts::Parts;

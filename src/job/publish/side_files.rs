@@ -1,23 +1,25 @@
-//! Writing the files beside the tiles: the georeference, the preview, `tileset.json` and `terrain.glb`.
+//! Writing the files beside the tiles: the georeference, the preview, the tilesets and `terrain.glb`.
 
-use crate::job::durable::atomic_file::{find_pending, partial_path, write_pending};
+use crate::job::durable::atomic_file::{PendingFile, create_folder_of, find_pending, partial_path, write_pending};
 use crate::job::durable::columns::ColumnReader;
 use crate::job::durable::directory::JobDirectory;
 use crate::job::index::TileIndex;
 use crate::job::partition::tree::Tree;
 use crate::job::records::{StepOutput, StepRecord, Store};
+use crate::output::frame::Frame;
 use crate::output::gltf::one_file::write_terrain;
 use crate::output::preview::canvas::{Canvas, PreviewPixel};
 use crate::output::preview::picture::Picture;
+use crate::output::tiles3d::tileset::{TilesetNode, write_tilesets};
 use crate::{Error, Result, disk};
 use std::path::PathBuf;
 
 /// What the files beside the tiles hold.
-pub struct SideFiles {
+pub struct SideFiles<'a> {
     /// The text of `georeference.json`.
     pub georeference: String,
-    /// The text of `tileset.json`, if there is to be one.
-    pub tileset: Option<String>,
+    /// The map of all tiles, and the root of the tileset, if there is to be one.
+    pub tileset: Option<(&'a Frame, TilesetNode)>,
     /// Whether there is to be a `terrain.glb`. It is made from the tiles, which must have their names.
     pub one_file: bool,
 }
@@ -37,8 +39,8 @@ pub fn write_side_files(
         write_pending(&output.georeference(), content.georeference.as_bytes())?,
         write_pending(&output.preview(), &draw_preview(canvas, tiles)?)?,
     ];
-    if let Some(tileset) = &content.tileset {
-        files.push(write_pending(&output.tileset(), tileset.as_bytes())?);
+    if let Some((frame, root)) = &content.tileset {
+        files.extend(pending_tilesets(directory, frame, root)?);
     }
     if content.one_file {
         let written = |path: PathBuf| Ok(disk::exists(&path).map_err(Error::io("read", &path))?.then_some(path));
@@ -52,6 +54,18 @@ pub fn write_side_files(
     }
     let bytes = files.iter().map(|file| file.bytes).sum();
     Ok(StepOutput { files, ..StepOutput::new(bytes, Vec::new()) })
+}
+
+/// Writes `tileset.json` and the external tilesets.
+fn pending_tilesets(directory: &JobDirectory, frame: &Frame, root: &TilesetNode) -> Result<Vec<PendingFile>> {
+    let (output, mut files) = (directory.output(), Vec::new());
+    write_tilesets(frame, root, |number, text| {
+        let path = number.map_or_else(|| output.tileset(), |number| output.external_tileset(number));
+        create_folder_of(&path)?;
+        files.push(write_pending(&path, text.as_bytes())?);
+        Ok::<(), Error>(())
+    })?;
+    Ok(files)
 }
 
 /// All tiles of a job.

@@ -7,8 +7,7 @@ use crate::job::levels::hierarchy::{ChildTile, Hierarchy};
 use crate::job::partition::tree::{Cell, Tree};
 use crate::job::records::{LevelSummary, Store, TileSummary};
 use crate::output::file_names::{level_uri, tile_uri};
-use crate::output::frame::Frame;
-use crate::output::tiles3d::tileset::{TilesetNode, tileset_json};
+use crate::output::tiles3d::tileset::TilesetNode;
 
 /// The tiles over one tree, and what is known of them.
 pub struct TilesOfTree<'a> {
@@ -57,18 +56,11 @@ impl TilesOfTree<'_> {
     }
 }
 
-/// Returns the text of `tileset.json`.
-pub fn tileset_text(frame: &Frame, root: &TilesetNode) -> String {
-    let mut text = tileset_json(frame, root).to_string();
-    text.push('\n');
-    text
-}
-
 /// Returns the node of one tile without its children, or `None` if the tile has no triangle.
 fn node(tile: &TileSummary, cell: &Cell, uri: String) -> Option<TilesetNode> {
     let (uri, bounds) = ((tile.vertices > 0).then_some(uri), tile.bounds()?);
     let (error, middle) = (tile.error, middle(cell, bounds));
-    Some(TilesetNode { uri, bounds, middle, error, transform: None, children: Vec::new() })
+    Some(TilesetNode { uri, bounds, middle, error, transform: None, file: None, children: Vec::new() })
 }
 
 /// Returns the middle of the part of `bounds` in the tile's cell, or of all of it if no part is. A triangle along the hull can be as

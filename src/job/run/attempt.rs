@@ -15,7 +15,7 @@ use crate::job::progress::clock::JobClock;
 use crate::job::progress::stage::JobProgress;
 use crate::job::report::job_report::Report;
 use crate::job::run::read_step::note_skipped;
-use crate::job::run::resume::{self, EarlierRun, RunStart};
+use crate::job::run::resume::{self, EarlierRun, RunStart, place_results_of_finished_job};
 use crate::job::run::run_context::RunContext;
 use crate::job::run::stage_costs::stage_costs;
 use crate::threads::on_threads;
@@ -170,7 +170,7 @@ fn attempt(
 /// Ends an attempt: puts the results in place, or keeps the finished steps if the job can go on from them. Removes everything else.
 fn end(directory: &JobDirectory, outcome: Result<Report>, steps: u64) -> Result<Report> {
     let outcome = outcome.and_then(|report| {
-        EarlierRun::of_finished_job(directory)?.place_results(directory)?;
+        place_results_of_finished_job(directory)?;
         Ok(report)
     });
     match outcome {

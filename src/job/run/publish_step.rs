@@ -10,7 +10,6 @@ use crate::job::plan::job_plan::Plan;
 use crate::job::publish::one_file_limits::{fits_one_file, too_large_for_one_file};
 use crate::job::publish::placement::{place, placement_warning};
 use crate::job::publish::side_files::{EachTile, SideFiles, write_side_files};
-use crate::job::publish::tileset_tree::tileset_text;
 use crate::job::records::{JobStep, StepOutput};
 use crate::job::report::job_report::{Report, ReportParts};
 use crate::job::run::levels_step::left_out_warning;
@@ -19,6 +18,7 @@ use crate::job::run::tile_queue::TileLook;
 use crate::job::tiles::write_tile::TileStats;
 use crate::output::checksums::list_text;
 use crate::output::options::OutputFormat;
+use crate::output::tiles3d::division::divide;
 use crate::output::tiles3d::georeference::Georeference;
 use crate::output::tiles3d::tileset::TilesetNode;
 use crate::threads::run_concurrently;
@@ -108,7 +108,8 @@ pub(crate) fn publish(
         let placed = place(&plan.crs, &look.style.frame, output.height_offset, &mut root);
         warnings.extend(placement_warning(&placed));
         warnings.extend(left_out_warning(plan, &levels));
-        text = Some(tileset_text(&look.style.frame, &root));
+        divide(&mut root);
+        text = Some((&look.style.frame, root));
         (placement, stats) = (placed.ok(), levels);
     }
     let georeference = Georeference::new(&plan.frame, &plan.lattice, bounds, &plan.unit, plan.crs.epsg);

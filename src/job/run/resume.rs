@@ -3,8 +3,8 @@
 //! A step stays if everything that it wrote is there and whole, or if nothing needs that any more. The output of a step depends on
 //! nothing but the job. So a step that runs again writes the same as before, and the steps after it stay.
 
-use crate::job::durable::atomic_file::remove_file;
-use crate::job::durable::directory::{JobDirectory, create_folder};
+use crate::job::durable::atomic_file::{create_folder, remove_file};
+use crate::job::durable::directory::JobDirectory;
 use crate::job::durable::journal::{self, PublishedFile};
 use crate::job::index::{NodeIndex, TileIndex};
 use crate::job::options::JobOptions;
@@ -16,7 +16,7 @@ use crate::job::plan::lattice_choice::LatticeCoarsening;
 use crate::job::progress::stage::{JobProgress, ProgressOutput, Stage};
 use crate::job::records::{JobStep, Journal, JournalEntry, Store};
 use crate::job::report::job_report::Report;
-use crate::job::run::part_entries::{StepsOfParts, open_store, records_of};
+use crate::job::run::part_entries::{PartHeader, StepsOfParts, open_store, records_of};
 use crate::output::options::MaxEdge;
 use crate::{Error, Result, interrupt};
 use rayon::prelude::*;
@@ -50,16 +50,6 @@ impl EarlierRun {
         Ok(Some(EarlierRun { header, entries, of_parts, is_complete: false }))
     }
 
-    /// Reads the journal of a job that has just written its report.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if the journal cannot be read, or does not name the report: then it does not name all results either.
-    pub(crate) fn of_finished_job(directory: &JobDirectory) -> Result<EarlierRun> {
-        let damaged = || io::Error::new(ErrorKind::InvalidData, "it has changed since the job wrote it");
-        let run = EarlierRun::read(directory)?.filter(EarlierRun::has_report);
-        run.ok_or_else(|| Error::io("read", directory.journal())(damaged()))
-    }
-
     fn has_report(&self) -> bool {
         self.entries.iter().any(|entry| entry.step == JobStep::Report)
     }
@@ -78,14 +68,6 @@ impl EarlierRun {
             return Ok(());
         }
         self.is_complete = true;
-        self.place_results(directory)
-    }
-
-    /// Puts the results in place.
-    ///
-    /// # Errors
-    /// As [`JobDirectory::replace_results`].
-    pub(crate) fn place_results(&self, directory: &JobDirectory) -> Result<()> {
         directory.replace_results(&self.results(directory).map(|file| file.name.clone()).collect())
     }
 
@@ -103,6 +85,7 @@ impl EarlierRun {
     pub(crate) fn forget(&mut self) {
         self.header = None;
         self.entries.clear();
+        self.of_parts = StepsOfParts::default();
         self.is_complete = false;
     }
 
@@ -140,6 +123,29 @@ impl EarlierRun {
         let text = std::fs::read(&path).map_err(Error::io("read", &path))?;
         Ok(serde_json::from_slice(&text).ok())
     }
+}
+
+/// Puts the results of a job in place that has just written its report.
+///
+/// # Errors
+/// As [`JobDirectory::replace_results`]; [`Error::Io`] if the journal cannot be read, or does not name the report: then it does not
+/// name all results either.
+pub(crate) fn place_results_of_finished_job(directory: &JobDirectory) -> Result<()> {
+    let (mut names, mut has_report) = (HashSet::new(), false);
+    let mut visit = |step, files: Vec<PublishedFile>| {
+        has_report |= step == JobStep::Report;
+        names.extend(files.into_iter().map(|file| file.name).filter(|name| directory.is_result(name)));
+    };
+    journal::visit_files::<JobHeader, JobStep>(directory, &mut visit)?;
+    // There are no folders but those of this job: it has removed all others.
+    for part in directory.folders_of_parts()? {
+        journal::visit_files::<PartHeader, JobStep>(&part, &mut visit)?;
+    }
+    if !has_report {
+        let damaged = io::Error::new(ErrorKind::InvalidData, "it has changed since the job wrote it");
+        return Err(Error::io("read", directory.journal())(damaged));
+    }
+    directory.replace_results(&names)
 }
 
 /// Where a run begins.

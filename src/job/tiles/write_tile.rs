@@ -2,9 +2,9 @@
 //! the preview.
 
 use crate::Result;
-use crate::job::durable::atomic_file::{PendingFile, write_pending_pieces};
+use crate::job::durable::atomic_file::{PendingFile, create_folder_of, write_pending_pieces};
 use crate::job::durable::columns::ColumnWriter;
-use crate::job::durable::directory::{JobDirectory, create_folder};
+use crate::job::durable::directory::JobDirectory;
 use crate::job::index::TileIndex;
 use crate::job::records::{FinishedBorder, Leaf, SeamTriangle, StepOutput, StepRecord, Store, TileSummary, owner};
 use crate::job::tiles::style::TileStyle;
@@ -78,7 +78,6 @@ pub fn write_tile(
         stats.files = 1;
     }
     if !left_out.triangles.is_empty() {
-        create_folder(&directory.output().cut())?;
         files.push(write_glb(&directory.output().cut_tile(tile.number()), &left_out, style)?);
     }
     stats.bytes = files.iter().map(|file| file.bytes).sum();
@@ -90,11 +89,12 @@ thread_local! {
     static GLB: RefCell<GlbEncoder> = RefCell::default();
 }
 
-/// Writes a tile as a pending GLB file.
+/// Writes a tile as a pending GLB file, and makes its folder.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if writing fails, [`crate::Error::Config`] if a triangle is too long for f32.
 pub fn write_glb(path: &Path, content: &Tile, style: &TileStyle) -> Result<PendingFile> {
+    create_folder_of(path)?;
     GLB.with_borrow_mut(|glb| {
         glb.encode(&style.frame, content, style.compression)?;
         write_pending_pieces(path, &glb.pieces())
