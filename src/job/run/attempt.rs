@@ -18,6 +18,7 @@ use crate::job::run::read_step::note_skipped;
 use crate::job::run::resume::{self, EarlierRun, RunStart};
 use crate::job::run::run_context::RunContext;
 use crate::job::run::stage_costs::stage_costs;
+use crate::job::run::temporary_bytes::TemporaryBytes;
 use crate::threads::on_threads;
 use crate::triangulation::Triangulator;
 use crate::{Error, Result, disk};
@@ -145,6 +146,7 @@ fn attempt(
             threads,
             clock,
             inputs_fingerprint: job.fingerprint.of_inputs(),
+            temporary: TemporaryBytes::default(),
             stages: Mutex::new(vec![planned]),
         };
         let outcome = (job.walk)(&context, plan, partition);

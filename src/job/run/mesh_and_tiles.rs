@@ -13,6 +13,7 @@ use crate::job::preflight::estimate::has_room_besides_points;
 use crate::job::preflight::kept_points::KeptPoints;
 use crate::job::publish::one_file_limits::MAX_TRIANGLES_IN_ONE_FILE;
 use crate::job::records::JobStep;
+use crate::job::run::freeing::{Freeing, while_freeing};
 use crate::job::run::run_context::RunContext;
 use crate::job::run::tile_queue::{TileQueue, WrittenTiles};
 use crate::job::run::tree_walk::TreeWalk;
@@ -34,26 +35,37 @@ pub(crate) struct MeshInTiles {
 /// Triangulates all leaves, merges their frontiers and writes the tiles.
 ///
 /// # Errors
-/// Those of the four steps.
+/// Those of the four steps, and of [`while_freeing`].
 pub(crate) fn mesh_and_tiles(
     run: &RunContext,
     plan: &Plan,
     partition: &Partition,
     bounds: Bounds<3>,
 ) -> Result<MeshInTiles> {
+    while_freeing(run, plan, partition, |freeing| do_steps(run, plan, partition, bounds, freeing))
+}
+
+fn do_steps(
+    run: &RunContext,
+    plan: &Plan,
+    partition: &Partition,
+    bounds: Bounds<3>,
+    freeing: &Freeing,
+) -> Result<MeshInTiles> {
     let stage = run.progress.stage("mesh", partition.summary.counts.kept, "points");
     let activity = run.progress.activity("triangulate", "points");
-    let queue = TileQueue::new(run, partition, &stage);
+    let queue = TileQueue::new(run, partition, &stage, freeing);
     let points = open_points(run, partition)?;
     let unmerged = Unmerged::default();
-    let walk = TreeWalk { run, plan, partition, points, stage: &stage, activity: &activity, queue: &queue, unmerged };
+    let walk =
+        TreeWalk { run, plan, partition, points, stage: &stage, activity: &activity, queue: &queue, freeing, unmerged };
     let style = |sites| {
         let max_edge = max_edge_rule(run, plan, partition, bounds, sites)?;
         let style = TileStyle::new(plan, &partition.summary, bounds, max_edge);
         let canvas = Canvas::new(&style.frame, bounds);
         Ok((style, canvas))
     };
-    let writes_at_once = may_write_at_once(plan, KeptPoints(partition.summary.counts.kept));
+    let writes_at_once = may_write_at_once(plan, KeptPoints(partition.summary.counts.kept), freeing.is_on());
     let walked = rayon::scope(|scope| {
         if writes_at_once {
             // The number of sites matters only to a rule for which the tiles have to wait.
@@ -85,9 +97,10 @@ fn open_points(run: &RunContext, partition: &Partition) -> Result<Option<PointFi
 }
 
 /// Tells whether tiles may be written before all are triangulated. They must wait if all sites decide how a tile looks, and if the
-/// disk has no room for them besides the points.
-fn may_write_at_once(plan: &Plan, kept: KeptPoints) -> bool {
-    plan.options.output.max_edge != MaxEdge::Auto && has_room_besides_points(plan, kept, MAX_TRIANGLES_IN_ONE_FILE)
+/// disk has no room for them besides the points. But points that are freed meanwhile make room.
+fn may_write_at_once(plan: &Plan, kept: KeptPoints, frees: bool) -> bool {
+    let has_room = || frees || has_room_besides_points(plan, kept, MAX_TRIANGLES_IN_ONE_FILE);
+    plan.options.output.max_edge != MaxEdge::Auto && has_room()
 }
 
 /// Returns the rule that leaves triangles out.

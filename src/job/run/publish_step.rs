@@ -105,7 +105,7 @@ pub(crate) fn write_report(
         levels: published.levels,
         warnings: published.warnings,
         other_bytes: published.bytes + list.bytes,
-        temporary: partition.point_bytes + run.store.bytes(),
+        temporary: run.temporary.measure(partition, run.store),
         stages: std::mem::take(&mut *run.stages()),
         threads: run.threads,
         memory: plan.options.limits.memory.0,

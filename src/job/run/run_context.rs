@@ -8,6 +8,7 @@ use crate::job::progress::clock::JobClock;
 use crate::job::progress::stage::{JobProgress, Stage};
 use crate::job::progress::stats::StageStats;
 use crate::job::records::{JobStep, Journal, Store};
+use crate::job::run::temporary_bytes::TemporaryBytes;
 use crate::triangulation::Triangulator;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -22,6 +23,8 @@ pub(crate) struct RunContext<'a> {
     pub(crate) clock: JobClock,
     /// What tells the content of the inputs from that of others.
     pub(crate) inputs_fingerprint: String,
+    /// What the temporary files take.
+    pub(crate) temporary: TemporaryBytes,
     /// The stages that have ended.
     pub(crate) stages: Mutex<Vec<StageStats>>,
 }

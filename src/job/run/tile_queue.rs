@@ -4,6 +4,7 @@ use crate::job::partition::result::Partition;
 use crate::job::progress::activity::Activity;
 use crate::job::progress::stage::Stage;
 use crate::job::records::JobStep;
+use crate::job::run::freeing::Freeing;
 use crate::job::run::run_context::RunContext;
 use crate::job::run::stage_costs::triangulated_share;
 use crate::job::tiles::border_normals::finish_border_normals;
@@ -21,6 +22,8 @@ pub(crate) struct TileQueue<'a> {
     run: &'a RunContext<'a>,
     partition: &'a Partition,
     stage: &'a Stage,
+    /// Takes the leaves that are not needed any more.
+    freeing: &'a Freeing,
     border_normals: Activity,
     write: Activity,
     /// How tiles look and what they are drawn on; set when tiles may be written.
@@ -47,7 +50,12 @@ pub(crate) struct WrittenTiles {
 }
 
 impl<'a> TileQueue<'a> {
-    pub(crate) fn new(run: &'a RunContext<'a>, partition: &'a Partition, stage: &'a Stage) -> TileQueue<'a> {
+    pub(crate) fn new(
+        run: &'a RunContext<'a>,
+        partition: &'a Partition,
+        stage: &'a Stage,
+        freeing: &'a Freeing,
+    ) -> TileQueue<'a> {
         let dependencies = TileDependencies::new(partition.tree.leaves.len());
         let state =
             QueueState { held: Vec::new(), dependencies, written: 0, stats: TileStats::default(), failure: None };
@@ -55,6 +63,7 @@ impl<'a> TileQueue<'a> {
             run,
             partition,
             stage,
+            freeing,
             border_normals: run.progress.activity("border normals", "tiles"),
             write: run.progress.activity("write", "points"),
             style: OnceLock::new(),
@@ -140,6 +149,7 @@ impl<'a> TileQueue<'a> {
         let work = || write_tile(directory, store, &self.partition.tree, style, canvas, finished);
         let (step, points) = (JobStep::WriteTile(finished.tile), self.partition.points(finished.tile));
         let stats = journal.step(step, || self.write.time(points, work))?;
+        self.freeing.tile_written(finished.tile);
         let mut state = self.state();
         state.stats += stats;
         state.written += 1;
