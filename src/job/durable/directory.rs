@@ -218,7 +218,9 @@ impl JobDirectory {
         remove_at_end(&self.journal())?;
         let waiting = self.waiting.directory();
         disk::remove_tree(waiting).map_err(Error::io("remove", waiting))?;
-        // The lock goes last, because it marks the directory as a job's own: a kill before that leaves what the next job may take.
+        // The lock goes last, because it marks the directory as a job's own: a kill or a power failure before that leaves what the
+        // next job may take.
+        disk::sync_folder(&self.job).map_err(Error::io("write", &self.job))?;
         disk::remove_tree(&self.job).map_err(Error::io("remove", &self.job))
     }
 }

@@ -172,6 +172,11 @@ impl<K: RecordKey> Store<K> {
         places.get(&key).copied().ok_or_else(|| Error::Broken(format!("{} has no {key:?}", self.path(key).display())))
     }
 
+    /// Returns the bytes of the record of `key`; 0 if there is none.
+    pub fn length(&self, key: K) -> u64 {
+        self.place(key).map_or(0, |place| place.length)
+    }
+
     /// Reads `count` values from byte `at` of the file of `key` on.
     pub(crate) fn read<T: Pod>(&self, key: K, at: u64, count: usize) -> Result<MappedSlice<'static, T>> {
         let store = self.file(key);

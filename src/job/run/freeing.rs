@@ -1,5 +1,5 @@
 //! Giving the room of what no step needs any more back to the disk while the job goes on: the points of a tile once it is
-//! triangulated, and its sites and triangles once it is written.
+//! triangulated, and what its leaf left once it is written.
 //!
 //! What takes their place must outlast a power failure first. So a thread waits until the journal and the store are on the disk, and
 //! it does so for many tiles at a time. After that the next run takes their steps as done (`resume.rs`).
@@ -13,54 +13,135 @@ use crate::job::run::run_context::RunContext;
 use crate::output::options::MaxEdge;
 use crate::{Error, Result, disk, fault};
 use std::io::ErrorKind;
-use std::ops::Range;
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::Builder;
 
-/// At most about this many bytes wait to be freed. Each time, everything in the store is brought to the disk.
-const MOST_WAITING: u64 = 64 << 20;
+/// About this many bytes are freed at a time. Each time, everything in the store is brought to the disk.
+const AT_A_TIME: u64 = 64 << 20;
 /// In small jobs, this share of the points.
-const WAITING_SHARE: u64 = 16;
+const SHARE: u64 = 16;
 
 /// What no step needs any more.
-enum Unneeded {
-    /// The points of a tile.
-    Points(TileIndex),
-    /// The [`crate::job::records::Leaf`] of a tile.
-    Leaf(TileIndex),
+#[derive(Default)]
+struct Unneeded {
+    /// The tiles whose points are not needed.
+    points: Vec<TileIndex>,
+    /// The tiles whose leaves are not needed.
+    leaves: Vec<TileIndex>,
+    bytes: u64,
 }
 
 /// Takes what no step needs any more. Any thread may call its methods.
-pub(crate) struct Freeing {
-    /// `None` if everything is kept.
-    sender: Option<Sender<Unneeded>>,
-    /// Whether nothing counts the sites of all leaves again after an interruption.
+pub(crate) struct Freeing<'a> {
+    run: &'a RunContext<'a>,
+    partition: &'a Partition,
+    is_on: bool,
+    /// Whether leaves are freed too: with "auto" the next run counts the sites of all of them again.
     frees_leaves: bool,
+    /// How many bytes are freed at a time.
+    at_a_time: u64,
+    state: Mutex<FreeingState>,
+    /// Wakes the thread, and those who wait for it.
+    changed: Condvar,
 }
 
-impl Freeing {
+#[derive(Default)]
+struct FreeingState {
+    waiting: Unneeded,
+    /// Nobody adds anything any more, or the thread has ended.
+    is_over: bool,
+}
+
+impl Freeing<'_> {
     /// Tells whether anything is freed.
     pub(crate) fn is_on(&self) -> bool {
-        self.sender.is_some()
+        self.is_on
     }
 
     /// Notes that the journal has the leaf of `tile`: its points are not needed any more.
     pub(crate) fn leaf_done(&self, tile: TileIndex) {
-        self.send(Unneeded::Points(tile));
+        if self.is_on {
+            let bytes = self.partition.points_bytes(tile);
+            self.add(bytes, |waiting| waiting.points.push(tile));
+        }
     }
 
-    /// Notes that the journal has that `tile` is written: its leaf is not needed any more.
+    /// Notes that the journal has that `tile` is written: what its leaf left is not needed any more.
     pub(crate) fn tile_written(&self, tile: TileIndex) {
-        if self.frees_leaves {
-            self.send(Unneeded::Leaf(tile));
+        if self.is_on && self.frees_leaves {
+            let bytes = records_of_leaf(self.partition, tile).iter().map(|&record| self.run.store.length(record)).sum();
+            self.add(bytes, |waiting| waiting.leaves.push(tile));
         }
     }
 
-    fn send(&self, unneeded: Unneeded) {
-        if let Some(sender) = &self.sender {
-            // If the thread has failed, its error comes at the end.
-            let _ = sender.send(unneeded);
+    fn add(&self, bytes: u64, add: impl FnOnce(&mut Unneeded)) {
+        // On a slow disk the steps wait, or they would fill it.
+        let is_much = |state: &mut FreeingState| state.waiting.bytes > 2 * self.at_a_time && !state.is_over;
+        let mut state = self.changed.wait_while(self.state(), is_much).unwrap_or_else(PoisonError::into_inner);
+        add(&mut state.waiting);
+        state.waiting.bytes += bytes;
+        self.changed.notify_all();
+    }
+
+    /// Frees what is added until it is over. What is left by then goes soon, with its file.
+    fn free_all(&self) -> Result<()> {
+        loop {
+            let is_little = |state: &mut FreeingState| state.waiting.bytes <= self.at_a_time && !state.is_over;
+            let state = self.changed.wait_while(self.state(), is_little);
+            let mut state = state.unwrap_or_else(PoisonError::into_inner);
+            if state.is_over {
+                return Ok(());
+            }
+            let unneeded = std::mem::take(&mut state.waiting);
+            drop(state);
+            self.changed.notify_all();
+            self.free(unneeded)?;
         }
+    }
+
+    /// Brings what replaces `unneeded` to the disk, and frees it.
+    fn free(&self, unneeded: Unneeded) -> Result<()> {
+        let Freeing { run, partition, .. } = *self;
+        run.journal.commit_to(run.journal.position())?;
+        run.store.sync()?;
+        run.temporary.measure(partition, run.store);
+        fault::point("freeing");
+        let records = unneeded.leaves.iter().flat_map(|&tile| records_of_leaf(partition, tile));
+        records.into_iter().try_for_each(|record| run.store.free(record))?;
+        let blocks = unneeded.points.iter().flat_map(|tile| &partition.blocks[tile.get()]);
+        let blocks: Vec<PointBlock> = blocks.copied().collect();
+        let path = run.directory.points();
+        // It is opened each time, because an open file is not freed when it is removed.
+        let freed = match disk::open(&path) {
+            Err(e) if e.kind() == ErrorKind::NotFound => Ok(0),
+            file => file.and_then(|file| disk::free(&file, &pages_of(&blocks))),
+        };
+        run.temporary.points_freed(freed.map_err(Error::io("write", &path))?);
+        fault::point("freed");
+        Ok(())
+    }
+
+    fn end(&self) {
+        self.state().is_over = true;
+        self.changed.notify_all();
+    }
+
+    fn state(&self) -> MutexGuard<'_, FreeingState> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Returns the records that the leaf of `tile` writes. Only steps of the tile itself, and the merge above it, read them.
+fn records_of_leaf(partition: &Partition, tile: TileIndex) -> [StepRecord; 3] {
+    [StepRecord::Leaf(tile), StepRecord::PartialNormals(tile), StepRecord::Frontier(partition.tree.leaf(tile))]
+}
+
+/// Ends the freeing even if there is a panic, so that nobody waits for ever.
+struct EndOfFreeing<'a>(&'a Freeing<'a>);
+
+impl Drop for EndOfFreeing<'_> {
+    fn drop(&mut self) {
+        self.0.end();
     }
 }
 
@@ -75,74 +156,29 @@ pub(crate) fn while_freeing<T>(
     work: impl FnOnce(&Freeing) -> Result<T>,
 ) -> Result<T> {
     let options = &plan.options;
-    let frees_leaves = options.output.max_edge != MaxEdge::Auto;
-    if options.limits.keep_steps.keeps(partition.summary.counts.kept) {
-        return work(&Freeing { sender: None, frees_leaves });
+    let freeing = &Freeing {
+        run,
+        partition,
+        is_on: !options.limits.keep_steps.keeps(partition.summary.counts.kept),
+        frees_leaves: options.output.max_edge != MaxEdge::Auto,
+        at_a_time: (partition.point_bytes / SHARE).min(AT_A_TIME),
+        state: Mutex::default(),
+        changed: Condvar::new(),
+    };
+    if !freeing.is_on {
+        return work(freeing);
     }
     std::thread::scope(|scope| {
-        let (sender, receiver) = channel();
-        let free = move || free_all(run, partition, receiver);
+        let free = || {
+            let _end = EndOfFreeing(freeing);
+            freeing.free_all()
+        };
         let thread = Builder::new().name("freeing".into()).spawn_scoped(scope, free);
         let thread = thread.map_err(|e| Error::Memory(format!("cannot start a thread: {e}")))?;
-        let freeing = Freeing { sender: Some(sender), frees_leaves };
-        let outcome = work(&freeing);
-        // This ends the thread.
-        drop(freeing);
+        let end = EndOfFreeing(freeing);
+        let outcome = work(freeing);
+        drop(end);
         let freed = thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
         outcome.and_then(|outcome| freed.map(|()| outcome))
     })
-}
-
-/// What waits until it may be freed.
-#[derive(Default)]
-struct Waiting {
-    points: Vec<TileIndex>,
-    leaves: Vec<TileIndex>,
-    bytes: u64,
-}
-
-/// Frees what `receiver` gets until nobody can send any more. What waits by then goes soon, with its file.
-fn free_all(run: &RunContext, partition: &Partition, receiver: Receiver<Unneeded>) -> Result<()> {
-    let most_waiting = (partition.point_bytes / WAITING_SHARE).min(MOST_WAITING);
-    let mut waiting = Waiting::default();
-    for unneeded in receiver {
-        match unneeded {
-            Unneeded::Points(tile) => {
-                waiting.points.push(tile);
-                waiting.bytes += pages_of(&partition.blocks[tile.get()]).iter().map(length).sum::<u64>();
-            }
-            Unneeded::Leaf(tile) => {
-                waiting.leaves.push(tile);
-                waiting.bytes += run.store.place(StepRecord::Leaf(tile))?.length;
-            }
-        }
-        if waiting.bytes > most_waiting {
-            free(run, partition, std::mem::take(&mut waiting))?;
-        }
-    }
-    Ok(())
-}
-
-/// Brings what replaces `unneeded` to the disk, and frees it.
-fn free(run: &RunContext, partition: &Partition, unneeded: Waiting) -> Result<()> {
-    run.journal.commit_to(run.journal.position())?;
-    run.store.sync()?;
-    run.temporary.measure(partition, run.store);
-    fault::point("freeing");
-    unneeded.leaves.into_iter().try_for_each(|tile| run.store.free(StepRecord::Leaf(tile)))?;
-    let blocks: Vec<PointBlock> =
-        unneeded.points.iter().flat_map(|tile| &partition.blocks[tile.get()]).copied().collect();
-    let path = run.directory.points();
-    // It is opened each time, because an open file is not freed when it is removed.
-    let freed = match disk::open(&path) {
-        Err(e) if e.kind() == ErrorKind::NotFound => Ok(0),
-        file => file.and_then(|file| disk::free(&file, &pages_of(&blocks))),
-    };
-    run.temporary.points_freed(freed.map_err(Error::io("write", &path))?);
-    fault::point("freed");
-    Ok(())
-}
-
-fn length(range: &Range<u64>) -> u64 {
-    range.end - range.start
 }

@@ -23,7 +23,7 @@ pub(crate) struct TileQueue<'a> {
     partition: &'a Partition,
     stage: &'a Stage,
     /// Takes the leaves that are not needed any more.
-    freeing: &'a Freeing,
+    freeing: &'a Freeing<'a>,
     border_normals: Activity,
     write: Activity,
     /// How tiles look and what they are drawn on; set when tiles may be written.
@@ -54,7 +54,7 @@ impl<'a> TileQueue<'a> {
         run: &'a RunContext<'a>,
         partition: &'a Partition,
         stage: &'a Stage,
-        freeing: &'a Freeing,
+        freeing: &'a Freeing<'a>,
     ) -> TileQueue<'a> {
         let dependencies = TileDependencies::new(partition.tree.leaves.len());
         let state =

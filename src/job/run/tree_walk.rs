@@ -32,7 +32,7 @@ pub(crate) struct TreeWalk<'a> {
     /// Takes the tiles that are finished.
     pub(crate) queue: &'a TileQueue<'a>,
     /// Takes the points that are not needed any more.
-    pub(crate) freeing: &'a Freeing,
+    pub(crate) freeing: &'a Freeing<'a>,
     /// Takes the nodes that do not fit the memory.
     pub(crate) unmerged: Unmerged,
 }
