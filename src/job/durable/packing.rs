@@ -6,6 +6,7 @@
 //! 256). Full groups are laid out for vector instructions; the last one in pieces of 32, so that little is padded.
 
 use bitpacking::{BitPacker, BitPacker1x, BitPacker8x};
+use multiversion::multiversion;
 
 /// Values of a full group.
 const GROUP: usize = BitPacker8x::BLOCK_LEN;
@@ -55,12 +56,7 @@ pub fn unpack<'a, T, const N: usize>(
 /// Appends the first `length` values of `column`, and leaves differences in it.
 fn pack_column(column: &mut Column, length: usize, bytes: &mut Vec<u8>) {
     let values = &mut column[..length];
-    let least = values.iter().fold(i32::MAX, |least, &value| least.min(value as i32)) as u32;
-    let mut used = 0;
-    for value in values.iter_mut() {
-        *value = value.wrapping_sub(least);
-        used |= *value;
-    }
+    let (least, used) = subtract_least(values);
     let shift = if used == 0 { 0 } else { used.trailing_zeros() };
     let width = (u32::BITS - (used >> shift).leading_zeros()) as u8;
     bytes.extend_from_slice(&least.to_ne_bytes());
@@ -99,8 +95,25 @@ fn unpack_column<'a>(bytes: &'a [u8], length: usize, column: &mut Column) -> Opt
             }
         }
     }
-    column[..length].iter_mut().for_each(|value| *value = (*value << shift).wrapping_add(least));
+    add_least(&mut column[..length], shift, least);
     Some(rest)
+}
+
+/// Leaves the differences to the least of `values`. Returns the least, and the bits that any difference has.
+#[multiversion(targets("x86_64+avx2"))]
+fn subtract_least(values: &mut [u32]) -> (u32, u32) {
+    let least = values.iter().fold(i32::MAX, |least, &value| least.min(value as i32)) as u32;
+    let mut used = 0;
+    for value in values {
+        *value = value.wrapping_sub(least);
+        used |= *value;
+    }
+    (least, used)
+}
+
+#[multiversion(targets("x86_64+avx2"))]
+fn add_least(values: &mut [u32], shift: u32, least: u32) {
+    values.iter_mut().for_each(|value| *value = (*value << shift).wrapping_add(least));
 }
 
 /// Returns the bytes that `length` values of a group take.

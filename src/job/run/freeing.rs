@@ -19,7 +19,7 @@ use std::thread::Builder;
 /// About this many bytes are freed at a time. Each time, everything in the store is brought to the disk.
 const AT_A_TIME: u64 = 64 << 20;
 /// In small jobs, this share of the points.
-const SHARE: u64 = 16;
+const SHARE: u64 = 32;
 
 /// What no step needs any more.
 #[derive(Default)]
