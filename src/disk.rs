@@ -8,6 +8,7 @@ use crate::fault::traced;
 use crate::{fault, positional_io};
 use std::fs::{self, File, Metadata};
 use std::io::{ErrorKind, Result, Write};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Creates the file at `path`, or empties it.
@@ -38,6 +39,38 @@ pub(crate) fn write_all_at(file: &File, bytes: &[u8], at: u64) -> Result<()> {
 /// Cuts `file` off after `length` bytes.
 pub(crate) fn set_length(file: &File, length: u64) -> Result<()> {
     traced(|| file.set_len(length), |()| (format!("length {} {length}", number(file)), &[]))
+}
+
+/// Gives the room of `ranges` of `file` back to the disk: they read as zeros afterwards. Returns the number of bytes. A system or a
+/// file system that cannot do it keeps them, which costs room and nothing else.
+pub(crate) fn free(file: &File, ranges: &[Range<u64>]) -> Result<u64> {
+    let mut freed = 0;
+    for range in ranges {
+        let length = range.end - range.start;
+        let punch = || punch_hole(file, range.start, length);
+        match traced(punch, |()| (format!("free {} {} {length}", number(file), range.start), &[])) {
+            Err(e) if e.kind() == ErrorKind::Unsupported => return Ok(freed),
+            outcome => outcome?,
+        }
+        freed += length;
+    }
+    Ok(freed)
+}
+
+#[cfg(target_os = "linux")]
+fn punch_hole(file: &File, at: u64, length: u64) -> Result<()> {
+    use rustix::fs::{FallocateFlags, fallocate};
+    use rustix::io::{Errno, retry_on_intr};
+    let flags = FallocateFlags::PUNCH_HOLE | FallocateFlags::KEEP_SIZE;
+    retry_on_intr(|| fallocate(file, flags, at, length)).map_err(|code| match code {
+        Errno::OPNOTSUPP | Errno::NOSYS => ErrorKind::Unsupported.into(),
+        code => code.into(),
+    })
+}
+
+#[cfg(not(target_os = "linux"))]
+fn punch_hole(_: &File, _: u64, _: u64) -> Result<()> {
+    Err(ErrorKind::Unsupported.into())
 }
 
 /// Waits until what was written to `file` is on the disk.

@@ -9,6 +9,17 @@ pub(crate) fn free_disk(directory: &Path) -> Option<u64> {
     fs4::available_space(nearest_existing(directory)).ok()
 }
 
+/// Returns the bytes of disk that a file takes: less than its length if parts of it were freed.
+#[cfg(unix)]
+pub(crate) fn allocated(data: &fs::Metadata) -> u64 {
+    std::os::unix::fs::MetadataExt::blocks(data) * 512
+}
+
+#[cfg(not(unix))]
+pub(crate) fn allocated(data: &fs::Metadata) -> u64 {
+    data.len()
+}
+
 /// Checks that a file can be made on the disk of `directory`, which need not exist yet. Leaves nothing behind.
 ///
 /// # Errors

@@ -92,7 +92,7 @@ fn walk(run: &RunContext, plan: Plan, earlier: Option<Partition>) -> Result<Repo
                 points: summary.counts.clone(),
                 leaves: mesh.leaves,
                 tiles: tiles.stats,
-                temporary: partition.point_bytes + run.store.bytes(),
+                temporary: run.temporary.measure(&partition, run.store),
                 files: Vec::new(),
             };
             write_report(run, &plan, figures, published)

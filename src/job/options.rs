@@ -62,6 +62,60 @@ pub struct Limits {
     pub memory: MemoryLimit,
     /// Worker threads; 0: one per core.
     pub threads: Threads,
+    /// Whether finished steps stay on the disk until the end of the job.
+    pub keep_steps: KeepSteps,
+}
+
+/// Whether points and steps stay on the disk until the job is done, though no later step needs them. If they do, an interrupted job
+/// can go on with another style; if not, it takes less than half of the disk.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "toml::Value", into = "toml::Value")]
+pub enum KeepSteps {
+    /// In jobs that are done again soon.
+    #[default]
+    Auto,
+    /// Yes.
+    Always,
+    /// No.
+    Never,
+}
+
+impl KeepSteps {
+    /// With "auto", jobs of fewer points keep their steps. They take less than a gigabyte or two for it, and are done again within
+    /// minutes.
+    const FEW_POINTS: u64 = 50_000_000;
+
+    /// Tells whether a job of `points` points keeps its steps.
+    pub fn keeps(self, points: u64) -> bool {
+        match self {
+            KeepSteps::Auto => points < KeepSteps::FEW_POINTS,
+            KeepSteps::Always => true,
+            KeepSteps::Never => false,
+        }
+    }
+}
+
+impl TryFrom<toml::Value> for KeepSteps {
+    type Error = String;
+
+    fn try_from(value: toml::Value) -> std::result::Result<KeepSteps, String> {
+        match value {
+            toml::Value::String(s) if s == "auto" => Ok(KeepSteps::Auto),
+            toml::Value::Boolean(true) => Ok(KeepSteps::Always),
+            toml::Value::Boolean(false) => Ok(KeepSteps::Never),
+            _ => Err("keep_steps is \"auto\", true or false".into()),
+        }
+    }
+}
+
+impl From<KeepSteps> for toml::Value {
+    fn from(keep: KeepSteps) -> toml::Value {
+        match keep {
+            KeepSteps::Auto => toml::Value::String("auto".into()),
+            KeepSteps::Always => toml::Value::Boolean(true),
+            KeepSteps::Never => toml::Value::Boolean(false),
+        }
+    }
 }
 
 /// How many worker threads; 0: one per core.

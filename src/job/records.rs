@@ -5,6 +5,7 @@ use crate::geometry::{Bounds, Site};
 use crate::input::Point;
 use crate::job::durable::columns::{ColumnReader, ColumnWriter};
 use crate::job::durable::journal::{self, StepKey};
+use crate::job::durable::packing::{pack, unpack};
 use crate::job::durable::store::{self, RecordKey};
 use crate::job::index::{NodeIndex, PartIndex, TileIndex};
 use crate::mesh::index::SiteIndex;
@@ -149,12 +150,14 @@ impl Leaf {
         triangles: impl Iterator<Item = [u32; 3]>,
     ) -> Result<(RecordRef, u64)> {
         let key = StepRecord::Leaf(tile);
-        let positions: Vec<[i32; 3]> = points.iter().map(Point::corner).collect();
-        let rgb: Vec<[u16; 3]> = points.iter().map(|p| p.rgb).collect();
-        let class: Vec<u8> = points.iter().map(|p| p.class).collect();
-        let columns = ColumnWriter::default().push(&positions).push(&rgb).push(&class);
-        // These records are most of what a job stores: corners take two bytes where that is enough.
-        if has_short_corners(&positions) {
+        // These records are most of what a job stores, so they are packed.
+        let (count, mut positions, mut attributes) = ([points.len() as u64], Vec::new(), Vec::new());
+        pack(points, |point| point.corner().map(|value| value as u32), &mut positions);
+        pack(points, |point| point.rgb.map(u32::from), &mut attributes);
+        pack(points, |point| [point.class as u32], &mut attributes);
+        let columns = ColumnWriter::default().push(&count).push(&positions).push(&attributes);
+        // Packing triangles would take more time than it saves, but corners take two bytes where that is enough.
+        if has_short_corners(points.len()) {
             let triangles: Vec<[u16; 3]> = triangles.map(|t| t.map(|v| v as u16)).collect();
             Ok((columns.push(&triangles).write(store, key)?, triangles.len() as u64))
         } else {
@@ -169,18 +172,32 @@ impl Leaf {
     /// [`Error::Io`], or [`Error::Broken`] if there is none.
     pub fn load(store: &Store, tile: TileIndex) -> Result<Leaf> {
         let mut columns = ColumnReader::open(store, StepRecord::Leaf(tile))?;
-        let mut leaf = Leaf {
-            positions: columns.column_vec()?,
-            rgb: columns.column_vec()?,
-            class: columns.column_vec()?,
-            triangles: Vec::new(),
-        };
-        leaf.triangles = if has_short_corners(&leaf.positions) {
+        let (count, positions) = Leaf::read_positions(&mut columns, tile)?;
+        let attributes = columns.column::<u8>()?;
+        let (mut rgb, mut class) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        unpack(&attributes, count, |rgb| rgb.map(|value| value as u16), &mut rgb)
+            .and_then(|rest| unpack(rest, count, |[class]| class as u8, &mut class))
+            .ok_or_else(|| Leaf::damaged(tile))?;
+        let triangles = if has_short_corners(count) {
             columns.column::<[u16; 3]>()?.iter().map(|t| t.map(u32::from)).collect()
         } else {
             columns.column_vec()?
         };
-        Ok(leaf)
+        Ok(Leaf { positions, rgb, class, triangles })
+    }
+
+    fn read_positions(columns: &mut ColumnReader<StepRecord>, tile: TileIndex) -> Result<(usize, Vec<[i32; 3]>)> {
+        // Where the record was freed there are zeros, and so no number.
+        let count = columns.column::<u64>()?;
+        let &[count] = &count[..] else { return Err(Leaf::damaged(tile)) };
+        let packed = columns.column::<u8>()?;
+        let mut positions = Vec::with_capacity((count as usize).min(packed.len()));
+        let rest = unpack(&packed, count as usize, |corner| corner.map(|value| value as i32), &mut positions);
+        rest.map(|_| (count as usize, positions)).ok_or_else(|| Leaf::damaged(tile))
+    }
+
+    fn damaged(tile: TileIndex) -> Error {
+        Error::Broken(format!("the leaf of tile {tile} in the store is damaged"))
     }
 
     /// Calls `visit` with the positions of the sites of `tile`, without reading the rest of its record.
@@ -188,13 +205,14 @@ impl Leaf {
     /// # Errors
     /// As [`Leaf::load`].
     pub fn visit_positions(store: &Store, tile: TileIndex, visit: impl FnMut(&[i32; 3])) -> Result<()> {
-        ColumnReader::open(store, StepRecord::Leaf(tile))?.column::<[i32; 3]>()?.iter().for_each(visit);
+        let (_, positions) = Leaf::read_positions(&mut ColumnReader::open(store, StepRecord::Leaf(tile))?, tile)?;
+        positions.iter().for_each(visit);
         Ok(())
     }
 }
 
-fn has_short_corners(positions: &[[i32; 3]]) -> bool {
-    positions.len() <= 1 << 16
+fn has_short_corners(sites: usize) -> bool {
+    sites <= 1 << 16
 }
 
 /// What a node passes to the merge node above it.

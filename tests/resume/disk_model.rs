@@ -2,8 +2,8 @@
 //! what the disk may hold if the power fails after one of them.
 //!
 //! Only what was synced is sure to be there: the bytes of a file once the file is synced, its name once its folder is. Of everything
-//! else any part may be lost, also a later change without an earlier one, and a write may be torn or leave garbage. A rename
-//! happens or does not, as journaling file systems promise.
+//! else any part may be lost, also a later change without an earlier one, and a write may be torn or leave garbage. What was freed may
+//! be gone at once, whatever else is lost. A rename happens or does not, as journaling file systems promise.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt;
@@ -19,6 +19,7 @@ pub(crate) enum Change {
     Create { inode: u64, path: String },
     Write { inode: u64, at: usize, bytes: Vec<u8> },
     Length { inode: u64, length: usize },
+    Free { inode: u64, at: usize, length: usize },
     Sync { inode: u64 },
     Rename { from: String, to: String },
     Remove { path: String },
@@ -65,6 +66,10 @@ pub(crate) fn read_trace(path: &Path) -> Vec<Change> {
                 at += length;
                 Change::Write { inode: inode as u64, at: position, bytes: text[at - length..at].to_vec() }
             }
+            "free" => {
+                let [inode, at, length] = numbers()[..] else { panic!("{line}") };
+                Change::Free { inode: inode as u64, at, length }
+            }
             "length" => Change::Length { inode: numbers()[0] as u64, length: numbers()[1] },
             "sync" => Change::Sync { inode: numbers()[0] as u64 },
             "rename" => {
@@ -86,7 +91,7 @@ pub(crate) fn read_trace(path: &Path) -> Vec<Change> {
 pub(crate) enum Loss {
     /// All are lost.
     Everything,
-    /// Bytes are lost, names stay.
+    /// Bytes are lost, but names stay, and what was freed is gone.
     Bytes,
     /// Names are lost, bytes stay.
     Names,
@@ -101,8 +106,16 @@ pub(crate) type Files = BTreeMap<String, Option<Vec<u8>>>;
 #[derive(Clone, Default)]
 struct Node {
     on_disk: Vec<u8>,
-    /// What was not synced: the new length, and bytes at a position.
-    pending: Vec<(Option<usize>, usize, Vec<u8>)>,
+    /// What was not synced.
+    pending: Vec<Pending>,
+}
+
+/// A change of a file that may be lost.
+#[derive(Clone)]
+enum Pending {
+    Length(usize),
+    Bytes(usize, Vec<u8>),
+    Free(usize, usize),
 }
 
 /// A change of names.
@@ -174,7 +187,7 @@ impl Disk {
                     let known = by_inode.get(inode).copied().filter(|node| seen.get(path) == Some(&Some(*node)));
                     match known {
                         Some(node) => {
-                            nodes[node].pending.push((Some(0), 0, Vec::new()));
+                            nodes[node].pending.push(Pending::Length(0));
                             None
                         }
                         None => {
@@ -185,11 +198,15 @@ impl Disk {
                     }
                 }
                 Change::Write { inode, at, bytes } => {
-                    nodes[by_inode[inode]].pending.push((None, *at, bytes.clone()));
+                    nodes[by_inode[inode]].pending.push(Pending::Bytes(*at, bytes.clone()));
                     None
                 }
                 Change::Length { inode, length } => {
-                    nodes[by_inode[inode]].pending.push((Some(*length), 0, Vec::new()));
+                    nodes[by_inode[inode]].pending.push(Pending::Length(*length));
+                    None
+                }
+                Change::Free { inode, at, length } => {
+                    nodes[by_inode[inode]].pending.push(Pending::Free(*at, *length));
                     None
                 }
                 Change::Sync { inode } => {
@@ -263,39 +280,51 @@ fn apply(change: &NameChange, names: &mut BTreeMap<String, Option<usize>>, stays
 
 impl Node {
     fn sync(&mut self) {
-        for (length, at, bytes) in std::mem::take(&mut self.pending) {
-            put(&mut self.on_disk, length, at, &bytes);
+        for change in std::mem::take(&mut self.pending) {
+            put(&mut self.on_disk, &change);
         }
     }
 
     fn after(mut self, loss: Loss, random: &mut Random) -> Vec<u8> {
-        for (length, at, bytes) in std::mem::take(&mut self.pending) {
-            match loss {
-                Loss::Names => put(&mut self.on_disk, length, at, &bytes),
-                Loss::Everything | Loss::Bytes => {}
-                Loss::Some(_) => match random.below(5) {
-                    0 | 1 => put(&mut self.on_disk, length, at, &bytes),
-                    2 => {}
-                    3 => {
-                        // Torn: a part of it, of any length.
+        for change in std::mem::take(&mut self.pending) {
+            let stays = match loss {
+                Loss::Names => true,
+                Loss::Everything => false,
+                Loss::Bytes => matches!(change, Pending::Free(..)),
+                Loss::Some(_) => random.below(5) < 2,
+            };
+            let change = match (change, loss) {
+                (change, _) if stays => change,
+                (Pending::Bytes(at, bytes), Loss::Some(_)) => match random.below(3) {
+                    0 => continue,
+                    // Torn: a part of it, of any length.
+                    1 => {
                         let part = random.below(bytes.len() as u64 + 1) as usize;
-                        put(&mut self.on_disk, length, at, &bytes[..part]);
+                        Pending::Bytes(at, bytes[..part].to_vec())
                     }
                     // The file has grown, but these blocks were never written.
-                    _ => put(&mut self.on_disk, length, at, &vec![random.below(256) as u8; bytes.len()]),
+                    _ => Pending::Bytes(at, vec![random.below(256) as u8; bytes.len()]),
                 },
-            }
+                _ => continue,
+            };
+            put(&mut self.on_disk, &change);
         }
         self.on_disk
     }
 }
 
-fn put(content: &mut Vec<u8>, length: Option<usize>, at: usize, bytes: &[u8]) {
-    if let Some(length) = length {
-        content.resize(length, 0);
-    } else if !bytes.is_empty() {
-        content.resize(content.len().max(at + bytes.len()), 0);
-        content[at..at + bytes.len()].copy_from_slice(bytes);
+fn put(content: &mut Vec<u8>, change: &Pending) {
+    match change {
+        Pending::Length(length) => content.resize(*length, 0),
+        Pending::Bytes(_, bytes) if bytes.is_empty() => {}
+        Pending::Bytes(at, bytes) => {
+            content.resize(content.len().max(at + bytes.len()), 0);
+            content[*at..at + bytes.len()].copy_from_slice(bytes);
+        }
+        Pending::Free(at, length) => {
+            let end = content.len();
+            content[*at.min(&end)..(at + length).min(end)].fill(0);
+        }
     }
 }
 

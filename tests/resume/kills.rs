@@ -8,16 +8,16 @@ use crate::scattered;
 
 /// Where a kill can hit a commit: before it; when the results have their final names but the journal lacks the record; when half of
 /// the record is written; after it.
-const PLACES: [&str; 4] = ["commit", "published", "torn", "committed"];
+pub(crate) const PLACES: [&str; 4] = ["commit", "published", "torn", "committed"];
 
-fn small_job(setup: &Setup) -> Rig {
+pub(crate) fn small_job(setup: &Setup) -> Rig {
     Rig::new(&scattered::clusters(20_000), setup).committing_every(0)
 }
 
 /// For every `stride`-th time that a run comes to `place`: starts over, kills the run there and runs the job again. Returns the
 /// number of kills.
 #[track_caller]
-fn kill_at_each(rig: &Rig, place: &str, stride: usize) -> u64 {
+pub(crate) fn kill_at_each(rig: &Rig, place: &str, stride: usize) -> u64 {
     let mut kills = 0;
     for count in (1u64..).step_by(stride) {
         rig.forget();
@@ -98,13 +98,13 @@ fn a_job_killed_while_it_cleans_up_is_not_done_again() {
     }
 }
 
-fn kills_wanted(otherwise: u64) -> u64 {
+pub(crate) fn kills_wanted(otherwise: u64) -> u64 {
     std::env::var("GDT_KILLS").ok().and_then(|text| text.parse().ok()).unwrap_or(otherwise)
 }
 
 /// Kills runs at random moments, `kills` times. Every run goes on where the one before was killed.
 #[track_caller]
-fn kill_at_random(rig: &Rig, seed: u64, kills: u64) {
+pub(crate) fn kill_at_random(rig: &Rig, seed: u64, kills: u64) {
     let mut random = Random(seed);
     let start = Instant::now();
     rig.run().succeeded();

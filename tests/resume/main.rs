@@ -16,6 +16,7 @@ mod changes;
 mod disk;
 mod earlier_results;
 mod failing_disk;
+mod freeing;
 mod kills;
 mod lock;
 mod many_tiles;

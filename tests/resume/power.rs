@@ -16,16 +16,16 @@ fn failures_wanted(otherwise: usize) -> usize {
 }
 
 /// A run whose changes were written down.
-struct TracedRun {
-    before: Disk,
-    changes: Vec<Change>,
+pub(crate) struct TracedRun {
+    pub(crate) before: Disk,
+    pub(crate) changes: Vec<Change>,
     /// How many changes there were at each moment that is worth a power failure.
     moments: Vec<usize>,
 }
 
 /// Runs the job to its end and writes down every change.
 #[track_caller]
-fn traced(rig: &Rig, what: &str) -> TracedRun {
+pub(crate) fn traced(rig: &Rig, what: &str) -> TracedRun {
     let trace: PathBuf = rig.folder.path().join("trace");
     let before = Disk::read(rig.folder.path(), "out");
     let end = Run::start(rig.command().env("GDT_TRACE", &trace)).end();
@@ -57,7 +57,7 @@ fn fail(rig: &Rig, left: &Files, whole: &[Files], what: &str) {
 /// Lets the power fail at about `wanted` moments spread over a whole run, each time with another loss, and once more in the run
 /// that goes on from what was left.
 #[track_caller]
-fn fail_again_and_again(rig: &Rig, wanted: usize) {
+pub(crate) fn fail_again_and_again(rig: &Rig, wanted: usize) {
     let first = traced(rig, "without a power failure");
     let whole = [results(&first.before.files()), results(&Disk::read(rig.folder.path(), "out").files())];
     let step = (first.moments.len() / failures_wanted(wanted)).max(1);
@@ -93,7 +93,7 @@ fn broken_promises(run: &TracedRun, whole: &[Files], is_made: impl Fn(&Change) -
 }
 
 /// A job with files of every kind.
-fn setup() -> Setup {
+pub(crate) fn setup() -> Setup {
     Setup::tiles_of(2_500).output("max_edge = 4000").output("max_points_per_level_tile = 1500")
 }
 

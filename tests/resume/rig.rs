@@ -45,6 +45,12 @@ impl Setup {
         self
     }
 
+    /// Frees what no step needs any more.
+    pub(crate) fn freeing(mut self) -> Setup {
+        self.limits += "\nkeep_steps = false";
+        self
+    }
+
     /// Adds a line to `[output]`.
     pub(crate) fn output(mut self, line: &str) -> Setup {
         self.output += &format!("\n{line}");

@@ -1,4 +1,4 @@
-//! One input point on the lattice, as it is spilled to disk.
+//! One input point on the lattice, as the job reads and packs it.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -23,6 +23,29 @@ impl Point {
     /// configuration, and must be below 2^40.
     pub fn new(position: [i32; 2], z: i32, rgb: [u16; 3], class: u8, order: u64) -> Point {
         Point { position, z, rgb, class, order_high: (order >> 32) as u8, order_low: order as u32 }
+    }
+
+    /// Returns the point as columns that a group of neighbours can be packed by.
+    #[inline]
+    pub fn columns(&self) -> [u32; 8] {
+        let [x, y] = self.position.map(|value| value as u32);
+        let [r, g, b] = self.rgb.map(u32::from);
+        // The high byte hardly ever changes, so it takes no bits beside the class.
+        let class = self.class as u32 | (self.order_high as u32) << 8;
+        [x, y, self.z as u32, r, g, b, class, self.order_low]
+    }
+
+    /// Returns the point with these [`Point::columns`].
+    #[inline]
+    pub fn of_columns([x, y, z, r, g, b, class, order_low]: [u32; 8]) -> Point {
+        Point {
+            position: [x as i32, y as i32],
+            z: z as i32,
+            rgb: [r as u16, g as u16, b as u16],
+            class: class as u8,
+            order_high: (class >> 8) as u8,
+            order_low,
+        }
     }
 
     /// Returns the lattice integers x, y, z.

@@ -271,7 +271,9 @@ impl JobDirectory {
         let waiting = self.waiting.directory();
         disk::remove_tree(waiting).map_err(Error::io("remove", waiting))?;
         self.clear_parts()?;
-        // The lock goes last, because it marks the directory as a job's own: a kill before that leaves what the next job may take.
+        // The lock goes last, because it marks the directory as a job's own: a kill or a power failure before that leaves what the
+        // next job may take.
+        disk::sync_folder(&self.job).map_err(Error::io("write", &self.job))?;
         disk::remove_tree(&self.job).map_err(Error::io("remove", &self.job))
     }
 }

@@ -75,15 +75,15 @@ pub struct MappedFile {
 }
 
 impl MappedFile {
-    /// Maps `file`, which must not change any more.
+    /// Maps `file`. What is read of it must not change any more; other parts may be freed.
     pub fn new(file: &File) -> MappedFile {
         let length = file.metadata().map_or(0, |meta| meta.len());
         // Where the address space is limited, the steps need it for more than this.
         if address_space::left().is_some_and(|left| left.bytes / 4 < length) {
             return MappedFile::default();
         }
-        // SAFETY: The file is finished: nothing writes to it or shortens it while the map exists, and the lock of the job keeps other
-        // runs of the program out of the folder.
+        // SAFETY: The file is finished: nothing writes to it or shortens it while the map exists, a part of it is freed only when
+        // nobody reads that part any more, and the lock of the job keeps other runs of the program out of the folder.
         let map = unsafe { MmapOptions::new().map(file) };
         MappedFile { map: map.ok(), resident: AtomicUsize::new(0) }
     }
@@ -134,7 +134,8 @@ fn map_block(file: &File, at: u64, length: usize) -> Option<Bytes<'static>> {
         return None;
     }
     // SAFETY: The bytes of the map do not change while it exists. This process has written them already, it never writes to the
-    // same place twice or shortens the file while it has readers, and its lock keeps other runs of the program out of the folder.
+    // same place twice, shortens the file or frees the place while it has readers, and its lock keeps other runs of the program out
+    // of the folder.
     let map = unsafe { MmapOptions::new().offset(at).len(length).map(file).ok()? };
     load_pages(&map, 0, length).ok()?;
     Some(Bytes::Mapped(map))
@@ -157,8 +158,8 @@ fn load_pages(_map: &Mmap, _start: usize, _length: usize) -> Result<()> {
 /// cache has dropped one by then and the disk fails, that ends the process, and the job can go on from its journal.
 #[cfg(unix)]
 fn remove_pages(map: &Mmap) {
-    // SAFETY: The map is a shared, read-only map of a file that does not change: a page that comes back has the same bytes. So the
-    // slices that other threads hold stay valid.
+    // SAFETY: The map is a shared, read-only map of a file of which nothing changes that anybody reads: a page that comes back has
+    // the same bytes. So the slices that other threads hold stay valid.
     let removed = unsafe { map.unchecked_advise(memmap2::UncheckedAdvice::DontNeed) };
     // If the system refuses, the pages stay resident, which costs memory and nothing else.
     let _ = removed;

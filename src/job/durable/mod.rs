@@ -10,5 +10,6 @@ pub mod journal;
 mod listing;
 pub mod lock;
 pub mod mapped;
+pub mod packing;
 mod replacement;
 pub mod store;

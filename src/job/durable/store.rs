@@ -1,4 +1,5 @@
-//! The store: what steps leave for later steps, one record for each result, in a few files that only grow.
+//! The store: what steps leave for later steps, one record for each result, in a few files that only grow, until the room of records
+//! that no step needs any more is given back to the disk.
 //!
 //! Not one file for each result: creating and removing thousands of small files takes a large part of a job's time on common file
 //! systems. Not one file for all: threads would wait for each other while they write, and one thread would free the whole file at
@@ -24,6 +25,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{PoisonError, RwLock};
 use xxhash_rust::xxh3::Xxh3;
+
+/// Bytes of a page: what file systems give to files and take back.
+pub const PAGE: u64 = 4096;
 
 /// What a record holds. The job says what there is.
 pub trait RecordKey: Copy + Debug + Eq + Hash + Send + Sync + Serialize + DeserializeOwned {
@@ -72,6 +76,8 @@ struct StoreFile {
     path: PathBuf,
     file: File,
     end: AtomicU64,
+    /// The bytes that were given back to the disk.
+    freed: AtomicU64,
 }
 
 impl<K: RecordKey> Store<K> {
@@ -82,7 +88,7 @@ impl<K: RecordKey> Store<K> {
     pub fn create(paths: [PathBuf; STORE_FILES]) -> Result<Store<K>> {
         let create = |path: PathBuf| {
             let file = disk::create(&path).map_err(Error::io("create", &path))?;
-            Ok(StoreFile { file, path, end: AtomicU64::new(0) })
+            Ok(StoreFile { file, path, end: AtomicU64::new(0), freed: AtomicU64::new(0) })
         };
         let files = paths.into_iter().map(create).collect::<Result<_>>()?;
         Ok(Store { files, places: RwLock::default() })
@@ -105,7 +111,7 @@ impl<K: RecordKey> Store<K> {
         let open = |(path, end): (PathBuf, u64)| {
             // If a file is missing, only its own records are lost.
             let file = disk::open_or_create(&path).map_err(Error::io("open", &path))?;
-            Ok(StoreFile { path, file, end: AtomicU64::new(end) })
+            Ok(StoreFile { path, file, end: AtomicU64::new(end), freed: AtomicU64::new(0) })
         };
         let files = paths.into_iter().zip(ends).map(open).collect::<Result<_>>()?;
         Ok(Store { files, places: RwLock::new(places) })
@@ -166,6 +172,11 @@ impl<K: RecordKey> Store<K> {
         places.get(&key).copied().ok_or_else(|| Error::Broken(format!("{} has no {key:?}", self.path(key).display())))
     }
 
+    /// Returns the bytes of the record of `key`; 0 if there is none.
+    pub fn length(&self, key: K) -> u64 {
+        self.place(key).map_or(0, |place| place.length)
+    }
+
     /// Reads `count` values from byte `at` of the file of `key` on.
     pub(crate) fn read<T: Pod>(&self, key: K, at: u64, count: usize) -> Result<MappedSlice<'static, T>> {
         let store = self.file(key);
@@ -183,9 +194,25 @@ impl<K: RecordKey> Store<K> {
         Ok(values)
     }
 
-    /// Returns the number of bytes of all records.
+    /// Gives the room of the record of `key` back to the disk. From then on there is no such record.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if that fails.
+    pub fn free(&self, key: K) -> Result<()> {
+        let place = self.places.write().unwrap_or_else(PoisonError::into_inner).remove(&key);
+        let Some(RecordPlace { at, length }) = place else { return Ok(()) };
+        let store = self.file(key);
+        // Only whole pages can be freed.
+        let pages = at.next_multiple_of(PAGE)..(at + length) / PAGE * PAGE;
+        let freed = if pages.is_empty() { Ok(0) } else { disk::free(&store.file, &[pages]) };
+        store.freed.fetch_add(freed.map_err(Error::io("write", &store.path))?, Ordering::Relaxed);
+        Ok(())
+    }
+
+    /// Returns the number of bytes of all records that were not freed.
     pub fn bytes(&self) -> u64 {
-        self.files.iter().map(|store| store.end.load(Ordering::Relaxed)).sum()
+        let bytes = |store: &StoreFile| store.end.load(Ordering::Relaxed) - store.freed.load(Ordering::Relaxed);
+        self.files.iter().map(bytes).sum()
     }
 
     /// Returns the path of the file that the record of `key` is in, or would be in.

@@ -17,7 +17,7 @@ pub fn load_sites(file: &PointFile, blocks: &[PointBlock], rule: Duplicates) -> 
     let mut points = Vec::with_capacity(blocks.iter().map(|b| b.points as usize).sum::<usize>().min(1 << 20));
     let (mut kept, mut duplicates) = (0, 0);
     for &block in blocks {
-        points.extend_from_slice(&file.read(block)?);
+        file.read(block, &mut points)?;
         if points.len() > (2 * kept).max(1 << 20) {
             duplicates += keep_one(&mut points, rule);
             kept = points.len();

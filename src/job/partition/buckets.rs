@@ -1,7 +1,7 @@
 //! Collecting points by bucket from many threads: each bucket has a buffer that is written to the point file when it is full.
 
 use crate::input::Point;
-use crate::job::partition::point_file::{PointBlock, PointFile};
+use crate::job::partition::point_file::{PointBlock, PointFile, PointRun};
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -28,22 +28,28 @@ impl Bucket {
             let after = orders.partition_point(|range| range.start <= order);
             after == 0 || orders[after - 1].end <= order
         };
-        for block in &mut self.blocks {
-            let points: Vec<Point> = file.read(*block)?.iter().copied().filter(is_wanted).collect();
-            if points.len() < block.points as usize {
-                *block = file.append(&points)?;
+        let (mut run, mut points) = (PointRun::default(), Vec::new());
+        for block in std::mem::take(&mut self.blocks) {
+            points.clear();
+            file.read(block, &mut points)?;
+            points.retain(is_wanted);
+            match points.len() {
+                0 => {}
+                kept if kept == block.points as usize => self.blocks.push(block),
+                _ => self.blocks.push(file.append(&mut run, &points, false)?),
             }
         }
-        self.blocks.retain(|block| block.points > 0);
         self.points = self.blocks.iter().map(|block| block.points as u64).sum();
         Ok(())
     }
 }
 
-/// Smaller blocks cost more system calls than their memory is worth.
+/// Smaller blocks cost more system calls than their memory is worth, and more bytes, because points are packed in groups of 256.
 const LEAST_BLOCK: u64 = 64;
 /// Larger blocks read no faster.
 const LARGEST_BLOCK: u64 = 4096;
+/// Points are packed in pieces of this many, so that a block of whole pieces is not padded.
+const PIECE: u64 = 32;
 
 /// Buckets that several threads fill at the same time.
 pub struct Buckets<'a> {
@@ -57,6 +63,7 @@ pub struct Buckets<'a> {
 #[derive(Default)]
 struct OpenBucket {
     buffer: Vec<Point>,
+    run: PointRun,
     bucket: Bucket,
 }
 
@@ -70,7 +77,8 @@ impl<'a> Buckets<'a> {
     /// without a file refuses points.
     pub fn on(files: Vec<Option<&'a PointFile>>, memory: u64) -> Buckets<'a> {
         let count = files.len();
-        let capacity = (memory / count as u64 / size_of::<Point>() as u64).clamp(LEAST_BLOCK, LARGEST_BLOCK) as usize;
+        let room = memory / count as u64 / size_of::<Point>() as u64;
+        let capacity = (room / PIECE * PIECE).clamp(LEAST_BLOCK, LARGEST_BLOCK) as usize;
         Buckets { files, capacity, open: (0..count).map(|_| Mutex::default()).collect() }
     }
 
@@ -93,15 +101,15 @@ impl<'a> Buckets<'a> {
             open.buffer.extend_from_slice(now);
             points = later;
             if open.buffer.len() == self.capacity {
-                self.flush(index, &mut open)?;
+                self.flush(index, &mut open, false)?;
             }
         }
         Ok(())
     }
 
-    fn flush(&self, index: usize, open: &mut OpenBucket) -> Result<()> {
+    fn flush(&self, index: usize, open: &mut OpenBucket, is_last: bool) -> Result<()> {
         let file = self.files[index].ok_or(Error::NeedsOnePart)?;
-        let block = file.append(&open.buffer)?;
+        let block = file.append(&mut open.run, &open.buffer, is_last)?;
         open.bucket.blocks.push(block);
         open.bucket.points += block.points as u64;
         open.buffer.clear();
@@ -116,7 +124,7 @@ impl<'a> Buckets<'a> {
         let finish = |(index, open): (usize, &Mutex<OpenBucket>)| {
             let mut open = lock(open);
             if !open.buffer.is_empty() {
-                self.flush(index, &mut open)?;
+                self.flush(index, &mut open, true)?;
             }
             open.buffer = Vec::new();
             Ok(std::mem::take(&mut open.bucket))
@@ -142,8 +150,9 @@ mod tests {
         buckets.extend(0, &points).unwrap();
         let mut bucket = buckets.finish().unwrap().remove(0);
         bucket.remove_records(&file, &[0..1, 64..64, 100..300, 999..2000]).unwrap();
-        let mut orders = Vec::new();
-        bucket.blocks.iter().for_each(|&block| orders.extend(file.read(block).unwrap().iter().map(Point::order)));
+        let mut left = Vec::new();
+        bucket.blocks.iter().for_each(|&block| file.read(block, &mut left).unwrap());
+        let orders: Vec<u64> = left.iter().map(Point::order).collect();
         assert_eq!(orders, (1..100).chain(300..999).collect::<Vec<u64>>());
         assert_eq!(bucket.points, 798);
         bucket.remove_records(&file, &[0..500, 500..1000]).unwrap();

@@ -107,13 +107,16 @@ impl<'a> PartPoints<'a> {
         if other < part || !inputs.iter().any(|&input| self.parts.reaches(input, other)) {
             return Ok(None);
         }
-        PointFile::append_to(&directory.part(other).points(), self.end(other)).map(Some)
+        PointFile::append_to(&directory.part(other).points(), self.blocks_of(other)).map(Some)
     }
 
-    /// Returns where the file of `part` ends.
-    fn end(&self, part: PartIndex) -> u64 {
-        let blocks = self.parts.buckets_of(part).flat_map(|bucket| &self.blocks[bucket]);
-        blocks.map(PointBlock::end).max().unwrap_or(0)
+    fn blocks_of(&self, part: PartIndex) -> impl Iterator<Item = &PointBlock> {
+        self.parts.buckets_of(part).flat_map(|bucket| &self.blocks[bucket])
+    }
+
+    /// Returns the bytes of the points of `part`.
+    pub fn bytes(&self, part: PartIndex) -> u64 {
+        self.blocks_of(part).map(PointBlock::bytes).sum()
     }
 
     /// Adds what has been read.
@@ -128,7 +131,7 @@ impl<'a> PartPoints<'a> {
     /// [`Error::Io`] on its point file, [`Error::Config`] if it would have too many tiles.
     pub fn partition(&self, directory: &JobDirectory, part: PartIndex) -> Result<Partition> {
         let (plan, parts) = (self.plan, self.parts);
-        let file = PointFile::append_to(&directory.part(part).points(), self.end(part))?;
+        let file = PointFile::append_to(&directory.part(part).points(), self.blocks_of(part))?;
         let max_points_per_tile = plan.options.triangulation.max_points_per_tile.0;
         let mut builder = TreeBuilder::new(&file, max_points_per_tile, read_buffer_memory(&plan.options));
         let mut buckets = vec![Bucket::default(); parts.grid.buckets()];

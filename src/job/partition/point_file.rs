@@ -1,32 +1,67 @@
-//! The point file: the points between reading and triangulating, in blocks that each hold points of one bucket.
+//! The point file: the points between reading and triangulating, packed in blocks that each hold points of one bucket.
+//!
+//! A bucket appends its blocks to **runs** of whole pages that it shares with no other. So the points of a tile can be given back to
+//! the disk while others are still needed.
 
 use crate::input::Point;
 use crate::job::durable::mapped::{MappedFile, MappedSlice};
+use crate::job::durable::packing::{pack, unpack};
+use crate::job::durable::store::PAGE;
 use crate::{Error, Result, disk, fault};
 use bytemuck::{Pod, Zeroable};
 use std::fs::File;
+use std::io::{self, ErrorKind};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use xxhash_rust::xxh3::xxh3_64;
 
-/// A run of points of one bucket in the point file.
+/// Bytes of a run where more blocks will follow. What is left of it takes no room on the disk.
+const RUN: u64 = 64 << 10;
+
+/// Some points of one bucket in the point file.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 pub struct PointBlock {
-    /// The position in the file of the first point, counted in points.
-    pub first: u64,
+    /// The position in the file of the first byte.
+    at: u64,
+    /// The XXH3 of the bytes.
+    hash: u64,
+    /// The number of bytes.
+    bytes: u32,
     /// The number of points.
     pub points: u32,
-    /// The lower half of the XXH3 of their bytes.
-    pub hash: u32,
 }
 
 impl PointBlock {
-    /// Returns the position after the last point.
-    pub fn end(&self) -> u64 {
-        self.first + u64::from(self.points)
+    /// Returns the number of bytes.
+    pub fn bytes(&self) -> u64 {
+        u64::from(self.bytes)
+    }
+
+    fn range(&self) -> Range<u64> {
+        self.at..self.at + self.bytes as u64
     }
 }
+
+/// Returns the pages of `blocks`, which are all those of one or more buckets, in as few ranges as possible.
+pub fn pages_of(blocks: &[PointBlock]) -> Vec<Range<u64>> {
+    let pages = |block: &PointBlock| block.at / PAGE * PAGE..block.range().end.next_multiple_of(PAGE);
+    let mut pages: Vec<Range<u64>> = blocks.iter().map(pages).collect();
+    pages.sort_unstable_by_key(|range| range.start);
+    pages.dedup_by(|next, range| {
+        let continues = next.start <= range.end;
+        if continues {
+            range.end = range.end.max(next.end);
+        }
+        continues
+    });
+    pages
+}
+
+/// What a bucket has left of its last run.
+#[derive(Debug, Default)]
+pub struct PointRun(Range<u64>);
 
 /// The point file. It only grows; several threads append blocks to it in any order.
 pub struct PointFile {
@@ -34,7 +69,10 @@ pub struct PointFile {
     file: File,
     /// The map of a finished file; of a growing one, blocks are mapped one by one.
     map: MappedFile,
-    points: AtomicU64,
+    /// Where the next run begins.
+    end: AtomicU64,
+    /// The bytes in all blocks that were not freed.
+    bytes: AtomicU64,
 }
 
 impl PointFile {
@@ -43,22 +81,22 @@ impl PointFile {
     /// # Errors
     /// [`Error::Io`] if it cannot be made.
     pub fn create(path: &Path) -> Result<PointFile> {
-        let file = disk::create(path);
-        Ok(PointFile {
-            path: path.to_path_buf(),
-            file: file.map_err(Error::io("create", path))?,
-            map: MappedFile::default(),
-            points: AtomicU64::new(0),
-        })
+        let file = disk::create(path).map_err(Error::io("create", path))?;
+        Ok(PointFile::new(path, file, MappedFile::default()))
     }
 
-    /// Opens the point file at `path`, or makes one. New blocks follow the first `points` points.
+    /// Opens the point file at `path`, which holds `blocks`, or makes one. New blocks follow them.
     ///
     /// # Errors
     /// [`Error::Io`] if it cannot be opened or made.
-    pub fn append_to(path: &Path, points: u64) -> Result<PointFile> {
+    pub fn append_to<'a>(path: &Path, blocks: impl Iterator<Item = &'a PointBlock>) -> Result<PointFile> {
         let file = disk::open_or_create(path).map_err(Error::io("open", path))?;
-        Ok(PointFile { path: path.to_path_buf(), file, map: MappedFile::default(), points: AtomicU64::new(points) })
+        let own = PointFile::new(path, file, MappedFile::default());
+        for block in blocks {
+            own.end.fetch_max(block.range().end.next_multiple_of(PAGE), Ordering::Relaxed);
+            own.bytes.fetch_add(block.bytes(), Ordering::Relaxed);
+        }
+        Ok(own)
     }
 
     /// Waits until all blocks are on the disk.
@@ -76,41 +114,147 @@ impl PointFile {
     pub fn open(path: &Path) -> Result<PointFile> {
         let file = File::open(path).map_err(Error::io("open", path))?;
         let map = MappedFile::new(&file);
-        Ok(PointFile { path: path.to_path_buf(), file, map, points: AtomicU64::new(0) })
+        Ok(PointFile::new(path, file, map))
     }
 
-    /// Returns the number of bytes written so far.
+    fn new(path: &Path, file: File, map: MappedFile) -> PointFile {
+        PointFile { path: path.to_path_buf(), file, map, end: AtomicU64::new(0), bytes: AtomicU64::new(0) }
+    }
+
+    /// Returns the number of bytes in all blocks that were not freed.
     pub fn bytes(&self) -> u64 {
-        self.points.load(Ordering::Relaxed) * size_of::<Point>() as u64
+        self.bytes.load(Ordering::Relaxed)
     }
 
-    /// Appends a block.
+    /// Appends a block to the `run` of its bucket, or begins another one; a short one if it `is_last`.
     ///
     /// # Errors
     /// [`Error::Io`] if it cannot be written.
-    pub fn append(&self, points: &[Point]) -> Result<PointBlock> {
-        let first = self.points.fetch_add(points.len() as u64, Ordering::Relaxed);
-        let at = first * size_of::<Point>() as u64;
-        disk::write_all_at(&self.file, bytemuck::cast_slice(points), at).map_err(Error::io("write", &self.path))?;
-        Ok(PointBlock { first, points: points.len() as u32, hash: hash(points) })
+    pub fn append(&self, run: &mut PointRun, points: &[Point], is_last: bool) -> Result<PointBlock> {
+        let mut packed = Vec::with_capacity(points.len() * size_of::<Point>() / 2);
+        pack(points, Point::columns, &mut packed);
+        let bytes = packed.len() as u64;
+        if run.0.end - run.0.start < bytes {
+            let length = if is_last { bytes.next_multiple_of(PAGE) } else { bytes.next_multiple_of(RUN) };
+            let start = self.end.fetch_add(length, Ordering::Relaxed);
+            run.0 = start..start + length;
+        }
+        let at = run.0.start;
+        disk::write_all_at(&self.file, &packed, at).map_err(Error::io("write", &self.path))?;
+        run.0.start += bytes;
+        self.bytes.fetch_add(bytes, Ordering::Relaxed);
+        Ok(PointBlock { at, hash: xxh3_64(&packed), bytes: bytes as u32, points: points.len() as u32 })
+    }
+
+    /// Gives the room of `blocks` back to the disk: all those of one or more buckets.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if that fails.
+    pub fn free(&self, blocks: &[PointBlock]) -> Result<()> {
+        let freed = disk::free(&self.file, &pages_of(blocks)).map_err(Error::io("write", &self.path))?;
+        if freed > 0 {
+            self.bytes.fetch_sub(blocks.iter().map(|block| block.bytes as u64).sum(), Ordering::Relaxed);
+        }
+        Ok(())
     }
 
     /// Tells whether `block` holds what was written to it.
     pub fn is_whole(&self, block: PointBlock) -> bool {
-        self.read(block).is_ok_and(|points| hash(&points) == block.hash)
+        self.packed(block).is_ok_and(|bytes| xxh3_64(&bytes) == block.hash)
     }
 
-    /// Returns the points of `block`.
+    /// Appends the points of `block` to `points`.
     ///
     /// # Errors
     /// [`Error::Io`] if they cannot be read.
-    pub fn read(&self, block: PointBlock) -> Result<MappedSlice<'_, Point>> {
-        let at = block.first * size_of::<Point>() as u64;
-        let slice = || self.map.slice(&self.file, at, block.points as usize);
+    pub fn read(&self, block: PointBlock, points: &mut Vec<Point>) -> Result<()> {
+        let packed = self.packed(block)?;
+        let rest = unpack(&packed, block.points as usize, Point::of_columns, points);
+        let damaged = || Error::io("read", &self.path)(io::Error::new(ErrorKind::InvalidData, "a block is damaged"));
+        if rest.is_some_and(<[u8]>::is_empty) { Ok(()) } else { Err(damaged()) }
+    }
+
+    fn packed(&self, block: PointBlock) -> Result<MappedSlice<'_, u8>> {
+        let slice = || self.map.slice(&self.file, block.at, block.bytes as usize);
         fault::read("read-points").and_then(|()| slice()).map_err(Error::io("read", &self.path))
     }
 }
 
-fn hash(points: &[Point]) -> u32 {
-    xxh3_64(bytemuck::cast_slice(points)) as u32
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn points(count: u32, of: impl Fn(u32) -> Point) -> Vec<Point> {
+        (0..count).map(of).collect()
+    }
+
+    fn file() -> (tempfile::TempDir, PointFile) {
+        let folder = tempfile::tempdir().unwrap();
+        let file = PointFile::create(&folder.path().join("points")).unwrap();
+        (folder, file)
+    }
+
+    #[test]
+    fn extreme_points_come_back() {
+        let (_folder, file) = file();
+        let (most, least) = (1 << 29, -(1 << 29));
+        let extremes = [
+            Point::new([most, least], i32::MAX, [u16::MAX, 0, 257], u8::MAX, (1 << 40) - 1),
+            Point::new([least, most], i32::MIN, [0, u16::MAX, 256], 0, 0),
+            Point::new([0, -1], 0, [1, 2, 3], 2, u32::MAX as u64),
+            Point::new([1, 0], -1, [0; 3], 1, u32::MAX as u64 + 1),
+        ];
+        let mut run = PointRun::default();
+        let mut blocks = Vec::new();
+        for count in [0, 1, 31, 32, 255, 256, 257, 4096, 5000] {
+            let points = points(count, |i| extremes[(i % 4 * i / 3 % 4) as usize]);
+            let block = file.append(&mut run, &points, false).unwrap();
+            assert!(file.is_whole(block));
+            blocks.push((block, points));
+        }
+        for (block, expected) in &blocks {
+            let mut read = vec![extremes[0]];
+            file.read(*block, &mut read).unwrap();
+            assert_eq!(read[1..], expected[..]);
+        }
+    }
+
+    #[test]
+    fn neighbours_take_less_than_half_the_bytes() {
+        let (_folder, file) = file();
+        let point = |i: u32| {
+            let at = |step: u32| (i.wrapping_mul(step) >> 15) as i32;
+            Point::new(
+                [at(2_654_435_761) & 8191, at(40_503_001) & 8191],
+                at(97) & 2047,
+                [(i & 255) as u16 * 256; 3],
+                2,
+                i as u64,
+            )
+        };
+        let block = file.append(&mut PointRun::default(), &points(4096, point), false).unwrap();
+        assert!(block.bytes < 4096 * 10, "{} bytes", block.bytes);
+    }
+
+    #[test]
+    fn buckets_share_no_page() {
+        let (_folder, file) = file();
+        let mut runs: Vec<PointRun> = (0..5).map(|_| PointRun::default()).collect();
+        let mut blocks = vec![Vec::new(); 5];
+        for turn in 0..200 {
+            let bucket = turn * 7 % 5;
+            let point = |i: u32| Point::new([i as i32 * 77_777, 5], 9, [i as u16; 3], 1, (i * turn as u32) as u64);
+            let block = file.append(&mut runs[bucket], &points(50 + turn as u32 * 3, point), turn > 180).unwrap();
+            blocks[bucket].push(block);
+        }
+        let mut pages: Vec<Range<u64>> = blocks.iter().flat_map(|blocks| pages_of(blocks)).collect();
+        pages.sort_unstable_by_key(|range| range.start);
+        assert!(pages.windows(2).all(|two| two[0].end <= two[1].start), "{pages:?}");
+        file.free(&blocks[2]).unwrap();
+        for (bucket, blocks) in blocks.iter().enumerate() {
+            let is_whole = blocks.iter().all(|&block| file.is_whole(block));
+            assert_eq!(is_whole, bucket != 2 || cfg!(not(target_os = "linux")), "{bucket}");
+        }
+        assert!(file.bytes() < blocks.concat().iter().map(|block| block.bytes as u64).sum());
+    }
 }

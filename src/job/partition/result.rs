@@ -4,7 +4,7 @@ use crate::geometry::Bounds;
 use crate::input::PointCounts;
 use crate::job::durable::columns::{ColumnReader, ColumnWriter};
 use crate::job::index::TileIndex;
-use crate::job::partition::point_file::PointBlock;
+use crate::job::partition::point_file::{PointBlock, pages_of};
 use crate::job::partition::tree::Tree;
 use crate::job::plan::input_identity::RenamedInputs;
 use crate::job::plan::job_plan::SkippedInput;
@@ -48,6 +48,11 @@ impl Partition {
     /// Returns the number of points in `tile`.
     pub fn points(&self, tile: TileIndex) -> u64 {
         self.blocks[tile.get()].iter().map(|block| block.points as u64).sum()
+    }
+
+    /// Returns the bytes that the points of `tile` take in the point file.
+    pub(crate) fn points_bytes(&self, tile: TileIndex) -> u64 {
+        pages_of(&self.blocks[tile.get()]).iter().map(|pages| pages.end - pages.start).sum()
     }
 
     /// Calls the inputs what they are called by now.

@@ -105,14 +105,22 @@ impl<'a> TreeBuilder<'a> {
         let finer = Buckets::new(self.file, grid.buckets(), self.memory);
         bucket.blocks.par_iter().try_for_each(|&block| {
             interrupt::check()?;
-            BucketSorter::new(&grid, &finer).add(&self.file.read(block)?)
+            let mut points = Vec::new();
+            self.file.read(block, &mut points)?;
+            BucketSorter::new(&grid, &finer).add(&points)
         })?;
-        self.grow(cell, parent, &grid, finer.finish()?)
+        let finer = finer.finish()?;
+        self.file.free(&bucket.blocks)?;
+        self.grow(cell, parent, &grid, finer)
     }
 
     /// Returns the box of the points in `blocks`.
     fn bounds(&self, blocks: &[PointBlock]) -> Result<Option<Bounds<2>>> {
-        let of_block = |&block: &PointBlock| Ok(Bounds::of_points(self.file.read(block)?.iter().map(|p| p.position)));
+        let of_block = |&block: &PointBlock| {
+            let mut points = Vec::new();
+            self.file.read(block, &mut points)?;
+            Ok(Bounds::of_points(points.iter().map(|p| p.position)))
+        };
         let union = |a: Option<Bounds<2>>, b| Ok(a.into_iter().chain(b).reduce(Bounds::union));
         blocks.par_iter().map(of_block).try_reduce(|| None, union)
     }

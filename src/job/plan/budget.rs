@@ -87,7 +87,10 @@ mod tests {
             "gpu":{{"voronoi":"auto","adapter":null,"texture":"auto"}},"output":{{"directory":"out"}},"limits":{{}}}}"#
         );
         let options: JobOptions = serde_json::from_str(&text).unwrap();
-        JobOptions { limits: Limits { memory: MemoryLimit(memory), threads: Threads(threads) }, ..options }
+        JobOptions {
+            limits: Limits { memory: MemoryLimit(memory), threads: Threads(threads), ..Limits::default() },
+            ..options
+        }
     }
 
     fn bytes(limit: String) -> u64 {

@@ -45,12 +45,12 @@ pub struct Preflight {
     pub memory_limit: u64,
     /// Bytes of memory free on this machine; `None` if the system does not tell.
     pub memory_free: Option<u64>,
-    /// About how many bytes the temporary files take.
+    /// About how many bytes the temporary files take at most at one time.
     pub temporary: u64,
     /// About how many bytes the results take.
     pub results: u64,
     /// The least number of bytes that the disk must have. With room for all files, results are written while all temporary files
-    /// still exist; with less, some of these are removed before.
+    /// still exist, unless the job frees them as it goes; with less, some of these are removed before.
     pub disk: u64,
     /// Bytes free on the disk of the output directory, including what an interrupted run takes there; `None` if the system does not
     /// tell.
@@ -110,7 +110,7 @@ impl Preflight {
     fn of(plan: &Plan, threads: usize, kept: KeptPoints) -> Preflight {
         let options = &plan.options;
         let resolution = plan.frame.extras().resolution;
-        let DiskEstimate { points, store, results } = DiskEstimate::of(plan, kept, MAX_TRIANGLES_IN_ONE_FILE);
+        let disk = DiskEstimate::of(plan, kept, MAX_TRIANGLES_IN_ONE_FILE);
         let describe = |source: &Source| (source.path.clone(), format!("{:?}", source.format), source.records);
         Preflight {
             files: plan.inputs.iter().map(|input| describe(&input.source)).collect(),
@@ -125,10 +125,9 @@ impl Preflight {
             memory: estimate::memory(plan, kept, threads),
             memory_limit: options.limits.memory.0,
             memory_free: machine::free_memory(),
-            temporary: points + store,
-            results,
-            // The points may go before the results come.
-            disk: store + points.max(results),
+            temporary: disk.temporary,
+            results: disk.results,
+            disk: disk.least,
             disk_free: machine::free_disk(&options.output.directory).map(|free| free + estimate::own_bytes(plan)),
             disk_earlier: estimate::earlier_bytes(plan),
             output: options.output.directory.clone(),

@@ -1,6 +1,5 @@
 //! Estimates of the disk and the memory that a job needs.
 
-use crate::input::Point;
 use crate::job::durable::directory::JobDirectory;
 use crate::job::levels::hierarchy::{BYTES_PER_LEVEL_VERTEX, LevelSizes};
 use crate::job::machine;
@@ -10,11 +9,14 @@ use crate::job::plan::budget::{BYTES_PER_LEAF_SITE, read_buffer_memory};
 use crate::job::plan::job_plan::Plan;
 use crate::job::preflight::kept_points::KeptPoints;
 use crate::output::Compression;
+use crate::output::options::MaxEdge;
 use crate::output::preview::canvas::{LONGER_SIDE, PreviewPixel};
 use std::path::PathBuf;
 
-/// Bytes that the store takes for a site: its position, colour, class and two triangles.
-const STORE_PER_SITE: u64 = 12 + 6 + 1 + 2 * 12;
+/// Bytes that the packed point file takes for a point; 9 to 10 where points are dense.
+const BYTES_PER_POINT: u64 = 12;
+/// Bytes that the store takes for a site: its packed position, colour and class, and two triangles.
+const STORE_PER_SITE: u64 = 9 + 2 * 6;
 /// Bytes that the store takes for a site on a tile's frontier, in all records that it is in.
 const STORE_PER_BORDER_SITE: u64 = 500;
 /// Bytes of a GLB besides its arrays.
@@ -36,12 +38,14 @@ fn result_per_site(compression: Compression) -> u64 {
 
 /// About how many bytes a job's files take.
 pub(crate) struct DiskEstimate {
-    /// The point file.
-    pub(crate) points: u64,
-    /// The store.
-    pub(crate) store: u64,
+    /// The point file and the store, as much of them as there is at one time.
+    pub(crate) temporary: u64,
+    /// The store, if nothing of it is freed.
+    store: u64,
     /// The results.
     pub(crate) results: u64,
+    /// The least that the disk must have for all together.
+    pub(crate) least: u64,
 }
 
 impl DiskEstimate {
@@ -49,13 +53,32 @@ impl DiskEstimate {
     /// triangles.
     pub(crate) fn of(plan: &Plan, kept: KeptPoints, max_one_file: u64) -> DiskEstimate {
         let (points, tiles) = (kept.0, tiles(plan, kept));
-        let per_tile = plan.options.triangulation.max_points_per_tile.0;
-        DiskEstimate {
-            points: points * size_of::<Point>() as u64,
-            store: store_bytes(points, per_tile, tiles),
-            results: result_bytes(points, tiles, plan.options.output.packing(), max_one_file),
+        let options = &plan.options;
+        let (point_file, leaves) = (points * BYTES_PER_POINT, points * STORE_PER_SITE);
+        let border = border_bytes(points, options.triangulation.max_points_per_tile.0, tiles);
+        let store = leaves + border;
+        let results = result_bytes(points, tiles, options.output.packing(), max_one_file);
+        if options.limits.keep_steps.keeps(points) {
+            // The points may go before the results come.
+            return DiskEstimate {
+                temporary: point_file + store,
+                store,
+                results,
+                least: store + point_file.max(results),
+            };
         }
+        // Points go while the store grows, and leaves while the results grow.
+        let most =
+            if options.output.max_edge == MaxEdge::Auto { store } else { border + waiting_leaves(leaves, tiles) };
+        DiskEstimate { temporary: point_file.max(most), store, results, least: point_file.max(most + results) }
     }
+}
+
+/// Returns the bytes of leaves whose tiles are not written yet, at most at one time. Tiles along the borders of large parts of the
+/// tree wait until these parts are joined.
+fn waiting_leaves(leaves: u64, tiles: u64) -> u64 {
+    const SHARE: u64 = 20;
+    leaves / tiles.isqrt().max(SHARE) * SHARE
 }
 
 /// Tells whether the disk has ample room for all other files besides the points, which are there already.
@@ -69,10 +92,11 @@ pub(crate) fn tiles(plan: &Plan, kept: KeptPoints) -> u64 {
     (kept.0 * 4).div_ceil(plan.options.triangulation.max_points_per_tile.0 * 3)
 }
 
-fn store_bytes(points: u64, per_tile: u64, tiles: u64) -> u64 {
+/// Returns the bytes of the records that stay until the job is done.
+fn border_bytes(points: u64, per_tile: u64, tiles: u64) -> u64 {
     // A tile of n sites has about 2.2 sqrt(n) on its frontier.
     let border_sites = (2.2 * (per_tile.min(points) as f64).sqrt()) as u64 * tiles;
-    points * STORE_PER_SITE + border_sites * STORE_PER_BORDER_SITE + PIXELS * size_of::<PreviewPixel>() as u64
+    border_sites * STORE_PER_BORDER_SITE + PIXELS * size_of::<PreviewPixel>() as u64
 }
 
 fn result_bytes(points: u64, tiles: u64, compression: Compression, max_one_file: u64) -> u64 {
@@ -115,5 +139,5 @@ pub(crate) fn earlier_bytes(plan: &Plan) -> u64 {
 /// Returns the bytes of those of `paths` that are files.
 fn bytes_of(paths: impl IntoIterator<Item = PathBuf>) -> u64 {
     let data = paths.into_iter().filter_map(|path| path.metadata().ok());
-    data.filter(|data| data.is_file()).map(|data| data.len()).sum()
+    data.filter(|data| data.is_file()).map(|data| data.len().min(machine::allocated(&data))).sum()
 }

@@ -18,6 +18,7 @@ use crate::job::run::read_step::note_skipped;
 use crate::job::run::resume::{self, EarlierRun, RunStart, place_results_of_finished_job};
 use crate::job::run::run_context::RunContext;
 use crate::job::run::stage_costs::stage_costs;
+use crate::job::run::temporary_bytes::TemporaryBytes;
 use crate::threads::on_threads;
 use crate::triangulation::Triangulator;
 use crate::{Error, Result, disk};
@@ -155,6 +156,7 @@ fn attempt(
             inputs_fingerprint: job.fingerprint.of_inputs(),
             job_id,
             resumed: journal.taken_over() + resumed,
+            temporary: TemporaryBytes::default(),
             stages: Mutex::new(vec![planned]),
         };
         let outcome = (job.walk)(&context, plan, partition);

@@ -12,6 +12,7 @@ use crate::job::preflight::estimate::has_room_besides_points;
 use crate::job::preflight::kept_points::KeptPoints;
 use crate::job::publish::one_file_limits::MAX_TRIANGLES_IN_ONE_FILE;
 use crate::job::records::{JobStep, Leaf};
+use crate::job::run::freeing::{Freeing, frees, while_freeing};
 use crate::job::run::run_context::RunContext;
 use crate::job::run::tile_queue::{TileLook, TileQueue, WrittenTiles};
 use crate::job::run::tree_walk::TreeWalk;
@@ -44,7 +45,7 @@ pub(crate) enum Writing<'a> {
 /// Triangulates all leaves of a job of one part, merges their frontiers and writes the tiles. Its points are within `bounds`.
 ///
 /// # Errors
-/// Those of the four steps.
+/// Those of the four steps, and of [`while_freeing`].
 pub(crate) fn mesh_and_tiles(
     run: &RunContext,
     plan: &Plan,
@@ -55,7 +56,7 @@ pub(crate) fn mesh_and_tiles(
         let max_edge = max_edge_rule(run, plan, partition, bounds, sites)?;
         Ok(Arc::new(TileLook::new(plan, partition.summary.counts.max_rgb, bounds, max_edge)))
     };
-    let writing = match may_write_at_once(plan, KeptPoints(partition.summary.counts.kept)) {
+    let writing = match may_write_at_once(plan, KeptPoints(partition.summary.counts.kept), frees(plan, partition)) {
         // The number of sites matters only to a rule for which the tiles have to wait.
         true => Writing::AtOnce(look(0)?),
         false => Writing::AfterLeaves(&look),
@@ -71,14 +72,25 @@ pub(crate) fn mesh_and_tiles(
 /// whole job.
 ///
 /// # Errors
-/// Those of the four steps.
+/// Those of the four steps, and of [`while_freeing`].
 pub(crate) fn mesh_part(run: &RunContext, plan: &Plan, partition: &Partition, writing: Writing) -> Result<MeshInTiles> {
+    while_freeing(run, plan, partition, |freeing| do_steps(run, plan, partition, writing, freeing))
+}
+
+fn do_steps(
+    run: &RunContext,
+    plan: &Plan,
+    partition: &Partition,
+    writing: Writing,
+    freeing: &Freeing,
+) -> Result<MeshInTiles> {
     let stage = run.progress.stage("mesh", partition.summary.counts.kept, "points");
     let activity = run.progress.activity("triangulate", "points");
-    let queue = TileQueue::new(run, partition, &stage);
+    let queue = TileQueue::new(run, partition, &stage, freeing);
     let points = open_points(run, partition)?;
     let unmerged = Unmerged::default();
-    let walk = TreeWalk { run, plan, partition, points, stage: &stage, activity: &activity, queue: &queue, unmerged };
+    let walk =
+        TreeWalk { run, plan, partition, points, stage: &stage, activity: &activity, queue: &queue, freeing, unmerged };
     let walked = rayon::scope(|scope| {
         if let Writing::AtOnce(look) = &writing {
             queue.begin(scope, look.clone());
@@ -109,9 +121,10 @@ fn open_points(run: &RunContext, partition: &Partition) -> Result<Option<PointFi
 }
 
 /// Tells whether tiles may be written before all are triangulated. They must wait if all sites decide how a tile looks, and if the
-/// disk has no room for them besides the points.
-fn may_write_at_once(plan: &Plan, kept: KeptPoints) -> bool {
-    plan.options.output.max_edge != MaxEdge::Auto && has_room_besides_points(plan, kept, MAX_TRIANGLES_IN_ONE_FILE)
+/// disk has no room for them besides the points. But points that are freed meanwhile make room.
+fn may_write_at_once(plan: &Plan, kept: KeptPoints, frees: bool) -> bool {
+    let has_room = || frees || has_room_besides_points(plan, kept, MAX_TRIANGLES_IN_ONE_FILE);
+    plan.options.output.max_edge != MaxEdge::Auto && has_room()
 }
 
 /// Returns the rule that leaves triangles out.

@@ -1,6 +1,7 @@
 //! Running the steps of a job in this process: the only room that knows all of them.
 
 pub(crate) mod attempt;
+pub(crate) mod freeing;
 pub(crate) mod levels_step;
 pub(crate) mod mesh_and_tiles;
 pub(crate) mod part_entries;
@@ -10,6 +11,7 @@ pub(crate) mod read_step;
 pub(crate) mod resume;
 pub(crate) mod run_context;
 pub(crate) mod stage_costs;
+pub(crate) mod temporary_bytes;
 pub(crate) mod tile_queue;
 pub(crate) mod tree_walk;
 pub(crate) mod unmerged;

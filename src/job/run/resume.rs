@@ -297,7 +297,8 @@ fn review(
     if entries.is_empty() || old.coarsening != header.coarsening {
         return Ok(None);
     }
-    match header.fingerprint.since(&old.fingerprint) {
+    let change = header.fingerprint.since(&old.fingerprint);
+    match &change {
         JobChange::Nothing => {}
         JobChange::Style(what) => {
             progress.note(&format!("changed since the interrupted run: {what}; the tiles are written again"));
@@ -323,7 +324,13 @@ fn review(
         kept.names = Some(header.fingerprint.with_names_of(&old.fingerprint));
     }
     if kept.is_none() {
-        progress.note("what the interrupted run left is damaged; starting over");
+        let why = match change {
+            JobChange::Style(_) => {
+                "the interrupted run has freed what that takes ([limits] keep_steps), or it is damaged"
+            }
+            _ => "what the interrupted run left is damaged",
+        };
+        progress.note(&format!("{why}; starting over"));
     }
     Ok(kept)
 }

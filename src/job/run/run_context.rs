@@ -8,6 +8,7 @@ use crate::job::progress::clock::JobClock;
 use crate::job::progress::stage::{JobProgress, Stage};
 use crate::job::progress::stats::StageStats;
 use crate::job::records::{JobStep, Journal, Store};
+use crate::job::run::temporary_bytes::TemporaryBytes;
 use crate::triangulation::Triangulator;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -26,6 +27,8 @@ pub(crate) struct RunContext<'a> {
     pub(crate) job_id: u64,
     /// The number of steps that an interrupted run had finished.
     pub(crate) resumed: u64,
+    /// What the temporary files take.
+    pub(crate) temporary: TemporaryBytes,
     /// The stages that have ended.
     pub(crate) stages: Mutex<Vec<StageStats>>,
 }

@@ -7,6 +7,7 @@ use crate::job::plan::job_plan::Plan;
 use crate::job::progress::activity::Activity;
 use crate::job::progress::stage::Stage;
 use crate::job::records::{FinishedBorder, JobStep};
+use crate::job::run::freeing::Freeing;
 use crate::job::run::run_context::RunContext;
 use crate::job::run::stage_costs::triangulated_share;
 use crate::job::tiles::border_normals::finish_border_normals;
@@ -26,6 +27,8 @@ pub(crate) struct TileQueue<'a> {
     run: &'a RunContext<'a>,
     partition: &'a Partition,
     stage: &'a Stage,
+    /// Takes the leaves that are not needed any more.
+    freeing: &'a Freeing<'a>,
     border_normals: Activity,
     write: Activity,
     /// Set when tiles may be written.
@@ -71,7 +74,12 @@ impl TileLook {
 }
 
 impl<'a> TileQueue<'a> {
-    pub(crate) fn new(run: &'a RunContext<'a>, partition: &'a Partition, stage: &'a Stage) -> TileQueue<'a> {
+    pub(crate) fn new(
+        run: &'a RunContext<'a>,
+        partition: &'a Partition,
+        stage: &'a Stage,
+        freeing: &'a Freeing<'a>,
+    ) -> TileQueue<'a> {
         let tiles = partition.tree.leaves.len();
         let (dependencies, written) = (TileDependencies::new(tiles), vec![false; tiles]);
         let state = QueueState { held: Vec::new(), dependencies, written, stats: TileStats::default(), failure: None };
@@ -79,6 +87,7 @@ impl<'a> TileQueue<'a> {
             run,
             partition,
             stage,
+            freeing,
             border_normals: run.progress.activity("border normals", "tiles"),
             write: run.progress.activity("write", "points"),
             look: OnceLock::new(),
@@ -165,6 +174,7 @@ impl<'a> TileQueue<'a> {
         let work = || write_tile(directory, store, style, canvas, finished.tile, &seam()?, &border_of);
         let (step, points) = (JobStep::WriteTile(finished.tile), self.partition.points(finished.tile));
         let stats = journal.step(step, || self.write.time(points, work))?;
+        self.freeing.tile_written(finished.tile);
         let mut state = self.state();
         state.stats += stats;
         state.written[finished.tile.get()] = true;

@@ -11,6 +11,7 @@ use crate::job::plan::job_plan::Plan;
 use crate::job::progress::activity::Activity;
 use crate::job::progress::stage::Stage;
 use crate::job::records::{Frontier, JobStep, StepOutput};
+use crate::job::run::freeing::Freeing;
 use crate::job::run::run_context::RunContext;
 use crate::job::run::stage_costs::triangulated_share;
 use crate::job::run::tile_queue::TileQueue;
@@ -30,6 +31,8 @@ pub(crate) struct TreeWalk<'a> {
     pub(crate) activity: &'a Activity,
     /// Takes the tiles that are finished.
     pub(crate) queue: &'a TileQueue<'a>,
+    /// Takes the points that are not needed any more.
+    pub(crate) freeing: &'a Freeing<'a>,
     /// Takes the nodes that do not fit the memory.
     pub(crate) unmerged: Unmerged,
 }
@@ -56,6 +59,7 @@ impl<'a> TreeWalk<'a> {
         let (step, points) = (JobStep::Leaf(tile), self.partition.points(tile));
         let triangulate = || self.activity.time(points, || self.triangulate(tile));
         let stats: LeafStats = self.run.journal.step(step, triangulate)?;
+        self.freeing.leaf_done(tile);
         self.run.count(self.stage, step, triangulated_share(points));
         // Any other leaf passes its hull up.
         if self.partition.tree.node(node).cell == Cell::PLANE || stats.sites == 0 {

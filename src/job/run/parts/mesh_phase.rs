@@ -33,8 +33,10 @@ pub(crate) struct MeshedPart {
     pub(crate) tiles: TileStats,
     /// The tiles that wait for other parts.
     pub(crate) waiting: Vec<TileIndex>,
-    /// Bytes of the point file and of the store.
+    /// The most bytes of temporary files while it was meshed: its own, the points of later parts, and what earlier parts keep.
     pub(crate) temporary: u64,
+    /// Bytes that its store keeps.
+    pub(crate) stored: u64,
 }
 
 /// All parts, meshed.
@@ -54,7 +56,9 @@ pub(crate) fn mesh_all(job: &PartsJob) -> Result<MeshedParts> {
     let mut meshed = MeshedParts { parts: Vec::new(), summary: PointSummary::default() };
     for part in parts.all() {
         points.add(read_for(job, &points, part)?);
-        meshed.parts.push(mesh_one(job, &points, part, look.as_ref())?);
+        let later = parts.all().skip(part.get() + 1).map(|later| points.bytes(later)).sum::<u64>();
+        let others = later + meshed.parts.iter().map(|part| part.stored).sum::<u64>();
+        meshed.parts.push(mesh_one(job, &points, part, look.as_ref(), others)?);
     }
     meshed.summary = points.summary.clone();
     let bounds = meshed.summary.bounds.ok_or_else(|| no_point_is_left(plan, &meshed.summary.counts))?;
@@ -92,8 +96,14 @@ fn read_for(job: &PartsJob, points: &PartPoints, part: PartIndex) -> Result<Read
     Ok(batch)
 }
 
-/// Meshes a part whose points have all been read, unless an earlier run has.
-fn mesh_one(job: &PartsJob, points: &PartPoints, part: PartIndex, look: Option<&Arc<TileLook>>) -> Result<MeshedPart> {
+/// Meshes a part whose points have all been read, unless an earlier run has. Temporary files of other parts take `others` bytes.
+fn mesh_one(
+    job: &PartsJob,
+    points: &PartPoints,
+    part: PartIndex,
+    look: Option<&Arc<TileLook>>,
+    others: u64,
+) -> Result<MeshedPart> {
     let PartsJob { run, plan, .. } = *job;
     let directory = &run.directory.part(part);
     let header = PartHeader { job: run.job_id, part };
@@ -116,13 +126,15 @@ fn mesh_one(job: &PartsJob, points: &PartPoints, part: PartIndex, look: Option<&
     };
     let writing = look.map_or(Writing::Later, |look| Writing::AtOnce(look.clone()));
     let mesh = mesh_part(&context, plan, &partition, writing)?;
+    let own = context.temporary.measure(&partition, context.store);
     run.add_stages(context);
     let meshed = MeshedPart {
         points: partition.summary.counts.kept,
         leaves: mesh.leaves,
         tiles: mesh.tiles.stats,
         waiting: mesh.tiles.waiting,
-        temporary: partition.point_bytes + session.store.bytes(),
+        temporary: own + others,
+        stored: session.store.bytes(),
     };
     session.journal.commit()?;
     if run.journal.is_worth_syncing() {

@@ -6,6 +6,7 @@ use crate::job::durable::lock::Lock;
 use crate::job::records::{Journal, JournalEntry, Store};
 use crate::job::run::part_entries::{PartHeader, open_store, records_of};
 use crate::job::run::run_context::RunContext;
+use crate::job::run::temporary_bytes::TemporaryBytes;
 use std::sync::Mutex;
 
 /// A folder of steps that this process writes to.
@@ -48,6 +49,7 @@ impl<'a> PartSession<'a> {
             inputs_fingerprint: String::new(),
             job_id: run.job_id,
             resumed: run.resumed,
+            temporary: TemporaryBytes::default(),
             stages: Mutex::default(),
         }
     }

@@ -52,7 +52,7 @@ pub(crate) fn publish_parts(
         points: meshed.summary.counts.clone(),
         leaves,
         tiles,
-        temporary: meshed.parts.iter().map(|part| part.temporary).sum(),
+        temporary: meshed.parts.iter().map(|part| part.temporary).max().unwrap_or(0),
         files: StepsOfParts::of(run.directory, run.job_id)?.files,
     };
     write_report(run, plan, figures, published)
