@@ -58,7 +58,7 @@ impl DiskEstimate {
         let border = border_bytes(points, options.triangulation.max_points_per_tile.0, tiles);
         let store = leaves + border;
         let results = result_bytes(points, tiles, options.output.packing(), max_one_file);
-        if options.limits.keep_steps.keeps(points) {
+        if plan.is_one_part() && options.limits.keep_steps.keeps(points) {
             // The points may go before the results come.
             return DiskEstimate {
                 temporary: point_file + store,
@@ -69,14 +69,18 @@ impl DiskEstimate {
         }
         // Points go while the store grows, and leaves while the results grow.
         let most =
-            if options.output.max_edge == MaxEdge::Auto { store } else { border + waiting_leaves(leaves, tiles) };
+            if options.output.max_edge == MaxEdge::Auto { store } else { border + waiting_leaves(plan, leaves, tiles) };
         DiskEstimate { temporary: point_file.max(most), store, results, least: point_file.max(most + results) }
     }
 }
 
 /// Returns the bytes of leaves whose tiles are not written yet, at most at one time. Tiles along the borders of large parts of the
 /// tree wait until these parts are joined.
-fn waiting_leaves(leaves: u64, tiles: u64) -> u64 {
+fn waiting_leaves(plan: &Plan, leaves: u64, tiles: u64) -> u64 {
+    if !plan.is_one_part() {
+        // All tiles along the border of a part wait, a fifth of some hundred.
+        return leaves / 4;
+    }
     const SHARE: u64 = 20;
     leaves / tiles.isqrt().max(SHARE) * SHARE
 }
