@@ -139,6 +139,20 @@ fn a_file_in_the_place_of_a_folder_is_named() {
     assert_eq!(fs::read(job.out().join("tiles/001")).unwrap(), b"theirs");
 }
 
+/// Tiles of few points below large coarser ones: their list alone would be too long.
+#[test]
+fn a_tile_with_thousands_of_children_is_several_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = clouds::write(folder.path(), "cloud.csv", &hills(9_000, 5));
+    let job = Job::on(&[&cloud]).tiles_of(4).with("output", "format = \"3dtiles\"");
+    let report = job.report();
+    assert_eq!(number(&report["levels"]["files"]), 1);
+    let tiles = tiles(&job);
+    keeps_the_rules(&job, &tiles);
+    let groups = tiles.iter().filter(|tile| tile.json["content"].is_null()).count() as u64;
+    assert!(groups > 1 && tiles.len() as u64 == number(&report["tiles"]) + 1 + groups, "{groups}");
+}
+
 /// Nobody has to read all tiles to show the first.
 #[test]
 fn the_main_file_lists_only_the_coarsest_tiles() {
