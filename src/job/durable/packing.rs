@@ -152,7 +152,7 @@ mod tests {
         assert_eq!(round_trip(&[]), 0);
         assert_eq!(round_trip(&[[7, u32::MAX]; 256]), header);
         // Differences of 0 to 255, and multiples of 512 up to 15: 8 and 4 bits.
-        let values: Vec<[u32; 2]> = (0..256).map(|i| [(i as u32).wrapping_sub(100), 5 + (i % 16) * 512]).collect();
+        let values: Vec<[u32; 2]> = (0..256).map(|i: u32| [i.wrapping_sub(100), 5 + (i % 16) * 512]).collect();
         assert_eq!(round_trip(&values), header + 256 + 128);
         // In pieces of 32: the last 4 values take as much as 32.
         assert_eq!(round_trip(&values[..100]), header + 4 * 28 + 4 * 16);

@@ -131,7 +131,7 @@ impl PointFile {
     /// # Errors
     /// [`Error::Io`] if it cannot be written.
     pub fn append(&self, run: &mut PointRun, points: &[Point], is_last: bool) -> Result<PointBlock> {
-        let mut packed = Vec::with_capacity(points.len() * size_of::<Point>() / 2);
+        let mut packed = Vec::with_capacity(size_of_val(points) / 2);
         pack(points, Point::columns, &mut packed);
         let bytes = packed.len() as u64;
         if run.0.end - run.0.start < bytes {
