@@ -1,6 +1,6 @@
 //! The coordinate reference system that a well-known text describes.
 
-use crate::input::crs::form::text_of_code;
+use crate::input::crs::codes::text_of_code;
 use crate::input::crs::system::{Crs, CrsKind};
 use crate::input::crs::unit::Unit;
 use crate::input::crs::vertical::VerticalSystem;

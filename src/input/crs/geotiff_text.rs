@@ -1,7 +1,7 @@
 //! The well-known text of a projected system that GeoTIFF keys define themselves, so that it is compared, placed and written like any
 //! other.
 
-use crate::input::crs::form::text_of_code;
+use crate::input::crs::codes::text_of_code;
 use crate::input::crs::geokeys::{GeoKeys, USER_DEFINED};
 use crate::input::crs::projection::Projection;
 use crate::input::crs::wkt::{PROJECTED, find};

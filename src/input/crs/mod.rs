@@ -2,7 +2,9 @@
 //! This room knows no files: the readers of file formats hand it the records that describe the system.
 
 pub(crate) mod choice;
+pub(crate) mod codes;
 pub(crate) mod datum;
+pub(crate) mod datum_names;
 pub(crate) mod doubts;
 pub(crate) mod form;
 pub(crate) mod from_records;
