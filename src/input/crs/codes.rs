@@ -27,6 +27,14 @@ pub(crate) fn text_of_code(code: u32) -> Option<&'static str> {
     systems().get(&code).copied().or_else(|| Some(crs_definitions::from_code(u16::try_from(code).ok()?)?.wkt))
 }
 
+/// Returns the well-known text of the geographic system whose datum has this code; of several, that with the least code.
+pub(crate) fn text_of_datum(datum: u32) -> Option<&'static str> {
+    // The datum's code stands behind its ellipsoid.
+    let authority = format!(r#",AUTHORITY["EPSG","{datum}"]],PRIMEM["#);
+    let mut texts = (1..=u32::from(u16::MAX)).filter_map(text_of_code);
+    texts.find(|text| text.starts_with("GEOGCS[") && text.contains(&authority))
+}
+
 /// Returns the definition for PROJ.4 of an EPSG code; `None` for a code of which only the text is known.
 pub(crate) fn proj4_of_code(code: u32) -> Option<&'static str> {
     if systems().contains_key(&code) {
@@ -81,7 +89,10 @@ mod tests {
         for code in systems().keys() {
             let crs = from_epsg(*code).unwrap();
             let lost = (crs.form().is_none(), crs.metres_per_unit().is_none());
-            assert!(!lost.0 && (!lost.1 || crs.kind == crate::input::crs::system::CrsKind::Geographic), "EPSG:{code}: {crs:?}");
+            assert!(
+                !lost.0 && (!lost.1 || crs.kind == crate::input::crs::system::CrsKind::Geographic),
+                "EPSG:{code}: {crs:?}"
+            );
         }
     }
 

@@ -118,9 +118,8 @@ impl Datum {
         }
         let same_code = self.codes.iter().zip(other.codes).any(|(own, others)| own.is_some() && *own == others);
         let same = |own: &Option<String>, others: &Option<String>| own.is_some() && own == others;
-        let same_name = same(&self.datum, &other.datum)
-            || same(&self.datum, &other.system)
-            || same(&self.system, &other.datum);
+        let same_name =
+            same(&self.datum, &other.datum) || same(&self.datum, &other.system) || same(&self.system, &other.datum);
         // Where the names of the datums differ, only a name that stands for one datum may say that they are the same.
         let says_datum = |datum: &Datum| datum.datum.is_some() || datum.codes[1].is_some();
         let may_decide = || !(says_datum(self) && says_datum(other)) || self.system.as_deref().is_some_and(is_known);
@@ -158,5 +157,67 @@ mod tests {
         let grads = datum(r#"2.5969213,ANGLEUNIT["grad",0.0157079632679489]"#);
         assert_eq!(grads.difference(&datum("2.33722917")), None);
         assert!(grads.difference(&datum("2.5969213")).unwrap().contains("the prime meridian"));
+    }
+
+    fn named(system: &str, datum: &str, shift: &str) -> Datum {
+        let text = format!(r#"GEOGCS["{system}",DATUM["{datum}",SPHEROID["International 1924",6378388,297]{shift}]]"#);
+        Datum::of(WktNode::parse_all(&text).unwrap().first().unwrap()).unwrap()
+    }
+
+    #[test]
+    fn a_name_that_any_system_may_have_does_not_hide_two_datums() {
+        for name in ["Geographic Coordinate System", "LL84", "My system"] {
+            let found = named(name, "European_Datum_1950", "").difference(&named(name, "Monte_Mario", "")).unwrap();
+            assert!(found.contains("ed50") && found.contains("montemario"), "{found}");
+        }
+        assert_eq!(named("ED50", "European_Datum_1950", "").difference(&named("ED50", "D_Euro_50", "")), None);
+        assert_eq!(named("LL84", "European_Datum_1950", "").difference(&named("LL84", "D_European_1950", "")), None);
+    }
+
+    #[test]
+    fn datums_without_names_are_told_apart_by_their_way_to_wgs84() {
+        let nameless = |shift: &str| named("unknown", "Unknown based on International 1924 ellipsoid", shift);
+        let (first, second) =
+            (",TOWGS84[598.1,73.7,418.2,0.202,0.045,-2.455,6.7]", ",TOWGS84[577.326,90.129,463.919,0,0,0,0]");
+        assert!(nameless(first).difference(&nameless(second)).unwrap().contains("the shift of the datum to WGS 84"));
+        assert_eq!(nameless(first).difference(&nameless(first)), None);
+        assert_eq!(nameless(first).difference(&nameless("")), None);
+        // A datum that has a name has many ways.
+        assert_eq!(named("ED50", "ED50", first).difference(&named("ED50", "ED50", second)), None);
+    }
+
+    #[test]
+    fn the_way_to_wgs84_of_a_bound_system_counts() {
+        let bound = |x: f64, method: &str, rotation: f64| {
+            let base = r#"BASEGEOGCRS["unknown",DATUM["unknown",ELLIPSOID["e",6378388,297]]]"#;
+            let names = ["X-axis translation", "y", "z", "X-axis rotation", "b", "c"];
+            let values = [x, 0.0, 0.0, rotation, 0.0, 0.0];
+            let all: String =
+                names.iter().zip(values).map(|(name, value)| format!(r#",PARAMETER["{name}",{value}]"#)).collect();
+            let text = format!(
+                r#"BOUNDCRS[SOURCECRS[PROJCRS["p",{base},CONVERSION["c",METHOD["Mercator (variant A)"],
+                PARAMETER["Longitude of natural origin",0]],LENGTHUNIT["metre",1]]],TARGETCRS[GEOGCRS["WGS 84"]],
+                ABRIDGEDTRANSFORMATION["t",METHOD["{method}"]{all},PARAMETER["Scale difference",1]]]"#
+            );
+            crate::input::crs::from_wkt::parse(&text).unwrap()
+        };
+        let own = bound(100.0, "Position Vector transformation", 1.0);
+        assert!(own.same_as(&bound(100.0, "Coordinate Frame rotation", -1.0)));
+        assert!(
+            own.differences(&bound(200.0, "Position Vector transformation", 1.0))[0].contains("shift of the datum")
+        );
+        assert!(!own.same_as(&bound(100.0, "Coordinate Frame rotation", 1.0)));
+    }
+
+    #[test]
+    fn an_ellipsoid_counts_in_its_own_unit() {
+        let datum = |axis: &str| {
+            let text = format!(r#"GEOGCRS["x",DATUM["x",ELLIPSOID["Clarke 1858",{axis},294.260676369]]]"#);
+            Datum::of(WktNode::parse_all(&text).unwrap().first().unwrap()).unwrap()
+        };
+        assert!(datum("20926348").difference(&datum("6378293.645")).is_some());
+        let text = r#"GEOGCRS["x",DATUM["x",ELLIPSOID["Clarke 1858",20926348,294.260676369,LENGTHUNIT["Clarke's foot",0.3047972654]]]]"#;
+        let feet = Datum::of(WktNode::parse_all(text).unwrap().first().unwrap()).unwrap();
+        assert_eq!(feet.difference(&datum("6378293.645")), None);
     }
 }

@@ -105,7 +105,8 @@ pub(crate) fn datum_name(name: &str) -> Option<String> {
         joined = joined.replace(long, short);
     }
     let says_nothing = joined.is_empty() || NO_NAMES.iter().any(|none| joined.contains(none));
-    let alias = ALIASES.binary_search_by(|(other, _)| (*other).cmp(joined.as_str())).ok().and_then(|at| ALIASES.get(at));
+    let alias =
+        ALIASES.binary_search_by(|(other, _)| (*other).cmp(joined.as_str())).ok().and_then(|at| ALIASES.get(at));
     (!says_nothing).then(|| alias.map_or(joined, |(_, name)| name.to_string()))
 }
 

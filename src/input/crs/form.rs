@@ -36,6 +36,11 @@ impl CrsForm {
         self.datum.as_ref()?.name()
     }
 
+    /// Returns the false easting and northing in metres; `None` for a system without a projection.
+    pub(crate) fn false_origin(&self) -> Option<[f64; 2]> {
+        Some(self.projection.as_ref()?.false_origin())
+    }
+
     /// Says in what the two differ: an entry for the datum and one for the projection. A text without a datum agrees with any.
     pub(crate) fn differences(&self, other: &CrsForm) -> Vec<String> {
         let datum = self.datum.as_ref().zip(other.datum.as_ref()).and_then(|(own, others)| own.difference(others));

@@ -33,6 +33,7 @@ pub(crate) fn parse(text: &str) -> Option<Crs> {
         vertical: unit_of_height,
         vertical_system: vertical.and_then(VerticalSystem::of),
         name: horizontal.text(0).map(str::to_string).filter(|name| !name.is_empty()),
+        unread_keys: Vec::new(),
     })
 }
 

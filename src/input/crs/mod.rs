@@ -11,6 +11,7 @@ pub(crate) mod from_records;
 pub(crate) mod from_wkt;
 pub(crate) mod geokeys;
 pub(crate) mod geotiff;
+pub(crate) mod geotiff_esri;
 pub(crate) mod geotiff_text;
 pub(crate) mod plausible;
 pub(crate) mod proj4;

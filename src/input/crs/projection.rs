@@ -55,7 +55,7 @@ const PARAMETERS: [(&str, &str); 45] = [
 ];
 
 /// The methods of projections: the name in well-known text and the name in PROJ.4, or one of that kind.
-const METHODS: [(&str, &str); 50] = [
+const METHODS: [(&str, &str); 52] = [
     ("transversemercator", "tmerc"),
     ("transversemercator3d", "tmerc"),
     ("gausskruger", "tmerc"),
@@ -100,6 +100,8 @@ const METHODS: [(&str, &str); 50] = [
     ("hotineobliquemercatorvariantb", "omerc centre"),
     ("obliquemercator", "omerc centre"),
     ("rectifiedskeworthomorphiccenter", "omerc centre"),
+    ("localorthographic", "ortho"),
+    ("local", "ortho"),
     ("colombiaurban", "col_urban"),
     ("igacplanocartesiano", "col_urban"),
     ("equirectangular", "eqc"),
@@ -237,12 +239,18 @@ impl Projection {
     pub(crate) fn proj4(&self) -> Option<String> {
         const METHODS: [&str; 4] = ["tmerc", "lcc", "aea", "laea"];
         const NAMES: [&str; 7] = ["lon_0", "lat_0", "lat_1", "lat_2", "k_0", "x_0", "y_0"];
-        let known = METHODS.contains(&self.method.as_str()) && self.parameters.keys().all(|name| NAMES.contains(&name.as_str()));
+        let known = METHODS.contains(&self.method.as_str())
+            && self.parameters.keys().all(|name| NAMES.contains(&name.as_str()));
         if !known || self.westward == Some(true) {
             return None;
         }
         let words = self.parameters.iter().map(|(name, value)| format!(" +{name}={value}"));
         Some(format!("+proj={}{}", self.method, words.collect::<String>()))
+    }
+
+    /// Returns the false easting and northing in metres.
+    pub(crate) fn false_origin(&self) -> [f64; 2] {
+        ["x_0", "y_0"].map(|name| self.parameters.get(name).copied().unwrap_or(0.0))
     }
 
     /// Says in what the two differ: what a sentence can name, as it is here and as it is in `other`.
@@ -282,6 +290,22 @@ fn parameters(system: &WktNode, conversion: &WktNode) -> Result<BTreeMap<String,
         parameters.insert(name, value);
     }
     Ok(parameters)
+}
+
+/// Returns the method and the parameters of a projected system as it has them, to compare two that cannot be read.
+pub(crate) fn projection_values(system: &WktNode) -> Vec<String> {
+    let conversion = system.child(&["CONVERSION", "DERIVINGCONVERSION"]).unwrap_or(system);
+    let method = conversion.child(&["PROJECTION", "METHOD"]).and_then(|method| method.text(0));
+    let value = |node: &WktNode| {
+        let long = comparable_name(node.text(0).unwrap_or_default());
+        let value =
+            node.number(1).map_or_else(|| node.text(1).unwrap_or("no number").to_string(), |value| value.to_string());
+        format!("{} = {value}", parameter(&long).unwrap_or(&long))
+    };
+    let parameters = conversion.children().filter(|child| child.keyword == "PARAMETER").map(value);
+    let mut all: Vec<String> = method.map(comparable_name).into_iter().chain(parameters).collect();
+    all.sort_unstable();
+    all
 }
 
 /// Returns the first parameter that a method needs and the text lacks, in words.

@@ -88,12 +88,15 @@ impl VerticalSystem {
     /// Returns whether z counts downwards; `None` if neither the code nor the name of the system says so.
     fn is_depth(&self) -> Option<bool> {
         let of_code = self.epsg.and_then(|code| heights().get(&code)).map(|code| code.is_depth);
-        of_code.or_else(|| self.name.as_deref().map(|name| comparable_name(name).contains("depth")))
+        let name = comparable_name(self.name.as_deref().unwrap_or_default());
+        let is_height = name.contains("height").then_some(false);
+        of_code.or_else(|| if name.contains("depth") { Some(true) } else { is_height })
     }
 
     /// Returns its code if that is all that is known.
     fn unknown_code(&self) -> Option<u32> {
-        let is_known = |code: &u32| heights().contains_key(code) || heights().values().any(|known| known.datum == *code);
+        let is_known =
+            |code: &u32| heights().contains_key(code) || heights().values().any(|known| known.datum == *code);
         self.epsg.filter(|code| !is_known(code) && self.name.is_none() && self.datum.is_none())
     }
 }
@@ -101,7 +104,8 @@ impl VerticalSystem {
 fn known_name(name: &str) -> Option<String> {
     const ENDS: [&str; 6] = ["ftus", "usft", "ft", "heights", "height", "depth"];
     let own = ENDS.iter().fold(name, |name, end| name.trim_end_matches(*end));
-    let varied = || VARIED.iter().find(|(parts, _)| parts.iter().any(|part| name.contains(part))).map(|(_, datum)| *datum);
+    let varied =
+        || VARIED.iter().find(|(parts, _)| parts.iter().any(|part| name.contains(part))).map(|(_, datum)| *datum);
     if let Some(datum) = height_datum(own).or_else(varied) {
         return Some(datum.to_string());
     }
