@@ -34,7 +34,7 @@ const NO_NAMES: [&str; 5] = ["unknown", "unnamed", "notspecified", "undefined", 
 
 /// Names that share nothing with those of the EPSG dataset, mostly ESRI's, and the names there; also names that the dataset has given up.
 /// They are in order.
-const ALIASES: [(&str, &str); 57] = [
+const ALIASES: [(&str, &str); 56] = [
     ("anna165", "cocosislands65"),
     ("astro52", "marcusisland52"),
     ("australian66", "agd66"),
@@ -74,7 +74,6 @@ const ALIASES: [(&str, &str); 57] = [
     ("marcariosolis", "macariosolis"),
     ("mexicanof93", "mexicoitrf92"),
     ("nad27definition76", "nad2776"),
-    ("nad83csrsv2", "nad83csrs"),
     ("nepalnagarkot", "nepal81"),
     ("newzealand49", "nzgd49"),
     ("pdo93", "psd93"),
@@ -152,5 +151,22 @@ mod tests {
         for nothing in ["", "unknown", "D_Unknown", "Not_specified_based_on_GRS_1980_ellipsoid"] {
             assert_eq!(datum_name(nothing), None, "{nothing}");
         }
+    }
+
+    #[test]
+    fn names_of_esri_and_names_that_epsg_has_given_up_are_those_of_today() {
+        assert!(ALIASES.is_sorted());
+        for (name, _) in ALIASES {
+            assert_ne!(datum_name(name).as_deref(), Some(name));
+        }
+        for (esri, epsg) in [
+            ("GCS_Belge_1972", "BD72"),
+            ("GCS_Pulkovo_1942_Adj_1958", "Pulkovo 1942(58)"),
+            ("D_New_Zealand_1949", "NZGD49"),
+            ("Luxembourg 1930", "LUREF"),
+        ] {
+            assert_eq!(datum_name(esri), datum_name(epsg));
+        }
+        assert_ne!(datum_name("NAD83(CSRS)v2"), datum_name("NAD83(CSRS)"));
     }
 }

@@ -94,8 +94,7 @@ pub(crate) fn parse(keys: &GeoKeys) -> Option<Crs> {
         datum: None,
     };
     let unit_of_height = keys.code(VERTICAL_UNITS).and_then(metres).or_else(|| heights.metres_of_code());
-    let is_read = known.form().is_some();
-    let crs = Crs {
+    let mut crs = Crs {
         // If a key gives another unit than the code, the text of the code would be wrong.
         wkt: known.wkt.filter(|_| known.horizontal == horizontal),
         epsg,
@@ -104,8 +103,11 @@ pub(crate) fn parse(keys: &GeoKeys) -> Option<Crs> {
         vertical: unit_of_height.or(known.vertical),
         vertical_system: Some(heights).filter(|system| *system != VerticalSystem::default()).or(known.vertical_system),
         name: known.name.or(name),
-        unread_keys: if is_defined && !is_read { geotiff_text::definition(keys) } else { Vec::new() },
+        unread_keys: Vec::new(),
     };
+    if is_defined && crs.form().is_none() {
+        crs.unread_keys = geotiff_text::definition(keys);
+    }
     (crs != Crs::default()).then_some(crs)
 }
 

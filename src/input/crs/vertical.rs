@@ -88,9 +88,7 @@ impl VerticalSystem {
     /// Returns whether z counts downwards; `None` if neither the code nor the name of the system says so.
     fn is_depth(&self) -> Option<bool> {
         let of_code = self.epsg.and_then(|code| heights().get(&code)).map(|code| code.is_depth);
-        let name = comparable_name(self.name.as_deref().unwrap_or_default());
-        let is_height = name.contains("height").then_some(false);
-        of_code.or_else(|| if name.contains("depth") { Some(true) } else { is_height })
+        of_code.or_else(|| self.name.as_deref().map(|name| comparable_name(name).contains("depth")))
     }
 
     /// Returns its code if that is all that is known.
