@@ -15,7 +15,7 @@ const CLARKE: &str = r#""Clarke_1866",6378206.4,294.9786982"#;
 const GRS80: &str = r#""GRS_1980",6378137.0,298.257222101"#;
 
 /// Writes a sound LAS file with these records of coordinate systems.
-fn write(folder: &Path, name: &str, records: &[(u16, Vec<u8>)]) -> PathBuf {
+pub(crate) fn write(folder: &Path, name: &str, records: &[(u16, Vec<u8>)]) -> PathBuf {
     let plain = LasFile::new(2, 0, 0, 200).las();
     let (header, points) = plain.split_at(227);
     let mut bytes = header.to_vec();
@@ -40,16 +40,16 @@ fn write(folder: &Path, name: &str, records: &[(u16, Vec<u8>)]) -> PathBuf {
     path
 }
 
-fn text(text: &str) -> (u16, Vec<u8>) {
+pub(crate) fn text(text: &str) -> (u16, Vec<u8>) {
     (TEXT, text.as_bytes().to_vec())
 }
 
-fn keys(keys: &[[u16; 4]]) -> (u16, Vec<u8>) {
+pub(crate) fn keys(keys: &[[u16; 4]]) -> (u16, Vec<u8>) {
     let all = std::iter::once([1, 1, 0, keys.len() as u16]).chain(keys.iter().copied());
     (KEYS, all.flatten().flat_map(u16::to_le_bytes).collect())
 }
 
-fn code(code: u16) -> (u16, Vec<u8>) {
+pub(crate) fn code(code: u16) -> (u16, Vec<u8>) {
     keys(&[[1024, 0, 1, 1], [3072, 0, 1, code]])
 }
 
@@ -69,7 +69,7 @@ fn with_heights(system: &str, datum: &str, unit: &str) -> String {
     format!(r#"COMPD_CS["c",{plane},VERT_CS["{system}",VERT_DATUM["{datum}",2005],UNIT[{unit}],AXIS["Up",UP]]]"#)
 }
 
-fn warnings(report: &Value) -> String {
+pub(crate) fn warnings(report: &Value) -> String {
     report["warnings"].to_string()
 }
 

@@ -22,6 +22,7 @@ mod configuration;
 mod coordinate_systems;
 mod cutting;
 mod decimals;
+mod doubtful_systems;
 mod globe;
 mod hard_shapes;
 mod khronos;

@@ -1,5 +1,6 @@
 //! The datum of a system in a comparable form: its names and codes, the ellipsoid and the prime meridian.
 
+use crate::input::crs::datum_names::{datum_name, is_known};
 use crate::input::crs::wkt::{DATUM, WktNode, degrees};
 
 /// Ellipsoids that are in use differ by metres, or by less than a millimetre. Then only names tell the datums apart.
@@ -8,33 +9,8 @@ const ELLIPSOID_TOLERANCE: f64 = 1.0;
 /// In degrees: a tenth of a metre. Writers round the meridian of Paris to less.
 const MERIDIAN_TOLERANCE: f64 = 1e-6;
 
-/// Long names and the short ones that other writers use.
-const SHORT_NAMES: [(&str, &str); 21] = [
-    ("worldgeodeticsystem", "wgs"),
-    ("northamericandatum", "nad"),
-    ("northamerican", "nad"),
-    ("europeanterrestrialreferencesystem", "etrs"),
-    ("europeandatum", "ed"),
-    ("european", "ed"),
-    ("geocentricdatumofaustralia", "gda"),
-    ("australiangeodeticdatum", "agd"),
-    ("reseaugeodesiquefrancais", "rgf"),
-    ("japanesegeodeticdatum", "jgd"),
-    ("newzealandgeodeticdatum", "nzgd"),
-    ("internationalterrestrialreferenceframe", "itrf"),
-    ("ordnancesurveyofgreatbritain", "osgb"),
-    ("highaccuracyreferencenetwork", "harn"),
-    ("highaccuracyregionalnetwork", "harn"),
-    ("canadianspatialreferencesystem", "csrs"),
-    ("nationalspatialreferencesystem", ""),
-    ("nsrs2007", "2007"),
-    ("ensemble", ""),
-    ("datum", ""),
-    ("rgf93v1", "rgf93"),
-];
-
-/// What stands for a name where the writer knew none.
-const NO_NAMES: [&str; 5] = ["unknown", "unnamed", "notspecified", "undefined", "userdefined"];
+/// A centimetre or two on the ground, in metres, seconds of arc and millionths.
+const SHIFT_TOLERANCES: [f64; 7] = [0.02, 0.02, 0.02, 5e-4, 5e-4, 5e-4, 3e-3];
 
 /// The datums that agree with WGS 84 to a metre or two, by the beginning of their comparable names.
 const CLOSE_TO_WGS84: [&str; 11] =
@@ -45,14 +21,18 @@ const CLOSE_TO_WGS84: [&str; 11] =
 pub(crate) struct Datum {
     /// The first name, for messages.
     label: Option<String>,
-    /// The comparable names of the geographic system and of the datum.
-    names: Vec<String>,
+    /// The comparable name of the geographic system.
+    system: Option<String>,
+    /// The comparable name of the datum.
+    datum: Option<String>,
     /// The EPSG codes of the geographic system and of the datum.
     codes: [Option<u32>; 2],
     /// The greater and the lesser half axis in metres.
     ellipsoid: Option<[f64; 2]>,
     /// Degrees east of Greenwich.
     meridian: f64,
+    /// The seven parameters of the way to WGS 84: metres, seconds of arc, millionths.
+    shift: Option<[f64; 7]>,
 }
 
 impl Datum {
@@ -68,17 +48,19 @@ impl Datum {
             None => 0.0,
         };
         Some(Datum {
-            label: texts.iter().find(|text| comparable(text).is_some()).map(|text| text.to_string()),
-            names: texts.iter().filter_map(|text| comparable(text)).collect(),
+            label: texts.iter().find(|text| datum_name(text).is_some()).map(|text| text.to_string()),
+            system: system.text(0).and_then(datum_name),
+            datum: datum.text(0).and_then(datum_name),
             codes: [system.epsg(), datum.epsg()],
-            ellipsoid: spheroid.and_then(|spheroid| half_axes(spheroid.number(1)?, spheroid.number(2)?)),
+            ellipsoid: spheroid.and_then(half_axes),
             meridian,
+            shift: datum.child(&["TOWGS84"]).map(|shift| std::array::from_fn(|k| shift.number(k).unwrap_or(0.0))),
         })
     }
 
     /// Returns whether the datum agrees with WGS 84 to a metre or two.
     pub(crate) fn is_close_to_wgs84(&self) -> bool {
-        self.names.iter().any(|name| CLOSE_TO_WGS84.iter().any(|close| name.starts_with(close)))
+        self.names().any(|name| CLOSE_TO_WGS84.iter().any(|close| name.starts_with(close)))
     }
 
     /// Returns its name; `None` if its ellipsoid is all that is known.
@@ -86,80 +68,84 @@ impl Datum {
         self.label.as_deref()
     }
 
+    /// Returns its half axes in metres.
+    pub(crate) fn ellipsoid(&self) -> Option<[f64; 2]> {
+        self.ellipsoid
+    }
+
+    /// Takes the way to WGS 84 that stands outside of the datum, in a bound system.
+    pub(crate) fn set_shift(&mut self, shift: Option<[f64; 7]>) {
+        self.shift = self.shift.or(shift);
+    }
+
+    fn names(&self) -> impl Iterator<Item = &String> {
+        self.system.iter().chain(&self.datum)
+    }
+
     /// Says in what the two differ. Names that differ are a difference: no parameter tells NAD83 from WGS 84. A datum without a name
-    /// is known by its ellipsoid only.
+    /// is known by its ellipsoid and its way to WGS 84 only.
     pub(crate) fn difference(&self, other: &Datum) -> Option<String> {
         if (self.meridian - other.meridian).abs() > MERIDIAN_TOLERANCE {
             return Some(format!("the prime meridian ({}, {} degrees)", self.meridian, other.meridian));
         }
-        let nameless = self.names.is_empty() || other.names.is_empty();
-        let same_code = self.codes.iter().zip(other.codes).any(|(own, others)| own.is_some() && *own == others);
-        let same_name = self.names.iter().any(|name| other.names.contains(name));
-        let named = |datum: &Datum| datum.label.clone().unwrap_or_else(|| "unnamed".into());
-        if !nameless && !same_code && !same_name {
-            return Some(format!("the datum ({}, {})", named(self), named(other)));
+        if self.has_other_name(other) {
+            let named = |datum: &Datum| datum.label.clone().unwrap_or_else(|| "unnamed".into());
+            let names = [self, other].map(named);
+            let [own, others] = if names[0] == names[1] { [self, other].map(Datum::full_name) } else { names };
+            return Some(format!("the datum ({own}, {others})"));
         }
+        self.difference_in_ellipsoid(other).or_else(|| self.difference_in_shift(other))
+    }
+
+    /// Says whether the ellipsoids differ.
+    pub(crate) fn difference_in_ellipsoid(&self, other: &Datum) -> Option<String> {
         let (own, others) = (self.ellipsoid?, other.ellipsoid?);
         let differs = (0..2).any(|axis| (own[axis] - others[axis]).abs() > ELLIPSOID_TOLERANCE);
         differs.then(|| format!("the ellipsoid (half axes of {own:?} m, {others:?} m)"))
     }
+
+    /// Says whether the ways to WGS 84 of two datums without names differ. One datum with a name has many such ways.
+    fn difference_in_shift(&self, other: &Datum) -> Option<String> {
+        let (own, others) = (self.shift?, other.shift?);
+        let nameless = self.names().chain(other.names()).next().is_none();
+        let differs = (0..7).any(|k| (own[k] - others[k]).abs() > SHIFT_TOLERANCES[k]);
+        (nameless && differs).then(|| format!("the shift of the datum to WGS 84 ({own:?}, {others:?})"))
+    }
+
+    fn has_other_name(&self, other: &Datum) -> bool {
+        if self.names().next().is_none() || other.names().next().is_none() {
+            return false;
+        }
+        let same_code = self.codes.iter().zip(other.codes).any(|(own, others)| own.is_some() && *own == others);
+        let same = |own: &Option<String>, others: &Option<String>| own.is_some() && own == others;
+        let same_name =
+            same(&self.datum, &other.datum) || same(&self.datum, &other.system) || same(&self.system, &other.datum);
+        // Where the names of the datums differ, only a name that stands for one datum may say that they are the same.
+        let says_datum = |datum: &Datum| datum.datum.is_some() || datum.codes[1].is_some();
+        let may_decide = || !(says_datum(self) && says_datum(other)) || self.system.as_deref().is_some_and(is_known);
+        let same_system = || same(&self.system, &other.system) && may_decide();
+        !(same_code || same_name || same_system())
+    }
+
+    /// Returns the names of the system and of the datum, for two whose systems have the same name.
+    fn full_name(&self) -> String {
+        let datum = self.datum.clone().or_else(|| self.codes[1].map(|code| format!("EPSG:{code}")));
+        format!("{} of {}", self.label.as_deref().unwrap_or("unnamed"), datum.as_deref().unwrap_or("no datum"))
+    }
 }
 
-/// Returns the half axes of an ellipsoid; the inverse flattening of a sphere is written as 0.
-fn half_axes(greater: f64, inverse_flattening: f64) -> Option<[f64; 2]> {
+/// Returns the half axes of an ellipsoid in metres; the inverse flattening of a sphere is written as 0.
+fn half_axes(spheroid: &WktNode) -> Option<[f64; 2]> {
+    let (greater, inverse_flattening) = (spheroid.number(1)?, spheroid.number(2)?);
+    let greater = greater * spheroid.unit_metres().unwrap_or(1.0);
     let flattening = if inverse_flattening > 0.0 { 1.0 / inverse_flattening } else { 0.0 };
     (greater.is_finite() && greater > 0.0).then_some([greater, greater * (1.0 - flattening)])
-}
-
-/// Returns the name as all writers would spell it; `None` if it says nothing.
-fn comparable(name: &str) -> Option<String> {
-    let lower = name.to_ascii_lowercase();
-    let own = lower.strip_prefix("d_").or_else(|| lower.strip_prefix("gcs_")).unwrap_or(&lower);
-    // CH1903 and CH1903+ are two datums.
-    let words = own.split(|c: char| !c.is_alphanumeric() && c != '+');
-    let mut joined: String = words.map(without_century).collect();
-    for (long, short) in SHORT_NAMES {
-        joined = joined.replace(long, short);
-    }
-    let says_nothing = joined.is_empty() || NO_NAMES.iter().any(|none| joined.contains(none));
-    (!says_nothing).then_some(joined)
-}
-
-/// Writes a year of the twentieth century at the end of a word with two digits.
-fn without_century(word: &str) -> String {
-    let digits = word.len() - word.trim_end_matches(|c: char| c.is_ascii_digit()).len();
-    let (letters, number) = word.split_at(word.len() - digits);
-    match number.strip_prefix("19") {
-        Some(year) if digits == 4 => format!("{letters}{year}"),
-        _ => word.to_string(),
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn one_datum_has_one_name_whoever_writes_it() {
-        for names in [
-            ["NAD83(2011)", "NAD83_National_Spatial_Reference_System_2011", "D_NAD_1983_2011", "GCS_NAD_1983_2011"],
-            ["NAD83", "North_American_Datum_1983", "D_North_American_1983", "GCS_North_American_1983"],
-            ["NAD83(HARN)", "NAD83_High_Accuracy_Reference_Network", "D_North_American_1983_HARN", "NAD83 (HARN)"],
-            ["NAD83(NSRS2007)", "NAD83_National_Spatial_Reference_System_2007", "D_NAD_1983_NSRS2007", "NAD83(2007)"],
-            ["WGS 84", "WGS_1984", "World Geodetic System 1984 ensemble", "GCS_WGS_1984"],
-            ["ETRS89", "European_Terrestrial_Reference_System_1989", "D_ETRS_1989", "GCS_ETRS_1989"],
-            ["ED50", "European_Datum_1950", "D_European_1950", "GCS_European_1950"],
-            ["RGF93", "Reseau_Geodesique_Francais_1993", "D_RGF_1993", "RGF93 v1"],
-        ] {
-            let all: Vec<_> = names.iter().map(|name| comparable(name).unwrap()).collect();
-            assert!(all.iter().all(|name| *name == all[0]), "{names:?}: {all:?}");
-        }
-        assert_ne!(comparable("CH1903"), comparable("CH1903+"));
-        assert_ne!(comparable("NAD83"), comparable("NAD83(CSRS)"));
-        for nothing in ["", "unknown", "D_Unknown", "Not_specified_based_on_GRS_1980_ellipsoid"] {
-            assert_eq!(comparable(nothing), None, "{nothing}");
-        }
-    }
     #[test]
     fn a_prime_meridian_counts_in_its_own_unit() {
         let datum = |meridian: &str| {
@@ -171,5 +157,67 @@ mod tests {
         let grads = datum(r#"2.5969213,ANGLEUNIT["grad",0.0157079632679489]"#);
         assert_eq!(grads.difference(&datum("2.33722917")), None);
         assert!(grads.difference(&datum("2.5969213")).unwrap().contains("the prime meridian"));
+    }
+
+    fn named(system: &str, datum: &str, shift: &str) -> Datum {
+        let text = format!(r#"GEOGCS["{system}",DATUM["{datum}",SPHEROID["International 1924",6378388,297]{shift}]]"#);
+        Datum::of(WktNode::parse_all(&text).unwrap().first().unwrap()).unwrap()
+    }
+
+    #[test]
+    fn a_name_that_any_system_may_have_does_not_hide_two_datums() {
+        for name in ["Geographic Coordinate System", "LL84", "My system"] {
+            let found = named(name, "European_Datum_1950", "").difference(&named(name, "Monte_Mario", "")).unwrap();
+            assert!(found.contains("ed50") && found.contains("montemario"), "{found}");
+        }
+        assert_eq!(named("ED50", "European_Datum_1950", "").difference(&named("ED50", "D_Euro_50", "")), None);
+        assert_eq!(named("LL84", "European_Datum_1950", "").difference(&named("LL84", "D_European_1950", "")), None);
+    }
+
+    #[test]
+    fn datums_without_names_are_told_apart_by_their_way_to_wgs84() {
+        let nameless = |shift: &str| named("unknown", "Unknown based on International 1924 ellipsoid", shift);
+        let (first, second) =
+            (",TOWGS84[598.1,73.7,418.2,0.202,0.045,-2.455,6.7]", ",TOWGS84[577.326,90.129,463.919,0,0,0,0]");
+        assert!(nameless(first).difference(&nameless(second)).unwrap().contains("the shift of the datum to WGS 84"));
+        assert_eq!(nameless(first).difference(&nameless(first)), None);
+        assert_eq!(nameless(first).difference(&nameless("")), None);
+        // A datum that has a name has many ways.
+        assert_eq!(named("ED50", "ED50", first).difference(&named("ED50", "ED50", second)), None);
+    }
+
+    #[test]
+    fn the_way_to_wgs84_of_a_bound_system_counts() {
+        let bound = |x: f64, method: &str, rotation: f64| {
+            let base = r#"BASEGEOGCRS["unknown",DATUM["unknown",ELLIPSOID["e",6378388,297]]]"#;
+            let names = ["X-axis translation", "y", "z", "X-axis rotation", "b", "c"];
+            let values = [x, 0.0, 0.0, rotation, 0.0, 0.0];
+            let all: String =
+                names.iter().zip(values).map(|(name, value)| format!(r#",PARAMETER["{name}",{value}]"#)).collect();
+            let text = format!(
+                r#"BOUNDCRS[SOURCECRS[PROJCRS["p",{base},CONVERSION["c",METHOD["Mercator (variant A)"],
+                PARAMETER["Longitude of natural origin",0]],LENGTHUNIT["metre",1]]],TARGETCRS[GEOGCRS["WGS 84"]],
+                ABRIDGEDTRANSFORMATION["t",METHOD["{method}"]{all},PARAMETER["Scale difference",1]]]"#
+            );
+            crate::input::crs::from_wkt::parse(&text).unwrap()
+        };
+        let own = bound(100.0, "Position Vector transformation", 1.0);
+        assert!(own.same_as(&bound(100.0, "Coordinate Frame rotation", -1.0)));
+        assert!(
+            own.differences(&bound(200.0, "Position Vector transformation", 1.0))[0].contains("shift of the datum")
+        );
+        assert!(!own.same_as(&bound(100.0, "Coordinate Frame rotation", 1.0)));
+    }
+
+    #[test]
+    fn an_ellipsoid_counts_in_its_own_unit() {
+        let datum = |axis: &str| {
+            let text = format!(r#"GEOGCRS["x",DATUM["x",ELLIPSOID["Clarke 1858",{axis},294.260676369]]]"#);
+            Datum::of(WktNode::parse_all(&text).unwrap().first().unwrap()).unwrap()
+        };
+        assert!(datum("20926348").difference(&datum("6378293.645")).is_some());
+        let text = r#"GEOGCRS["x",DATUM["x",ELLIPSOID["Clarke 1858",20926348,294.260676369,LENGTHUNIT["Clarke's foot",0.3047972654]]]]"#;
+        let feet = Datum::of(WktNode::parse_all(text).unwrap().first().unwrap()).unwrap();
+        assert_eq!(feet.difference(&datum("6378293.645")), None);
     }
 }

@@ -1,5 +1,6 @@
 //! What a well-known text says in a way that cannot be used. Nothing may silently take its place.
 
+use crate::input::crs::form::CrsForm;
 use crate::input::crs::projection::Projection;
 use crate::input::crs::system::{Crs, CrsKind};
 use crate::input::crs::wkt::{GEOGRAPHIC, LOCAL, PROJECTED, VERTICAL, WktNode, find, length, units};
@@ -21,7 +22,18 @@ impl Crs {
         let system = if self.form().is_none() { find(text, &PROJECTED) } else { None };
         let projection = system.and_then(|system| Projection::read(&system)?.err());
         let projection = projection.map(|what| format!("nobody can tell where its coordinates are: {what}"));
-        horizontal.into_iter().chain(vertical).chain(projection).collect()
+        let code = self.difference_to_code().map(|what| {
+            let code = self.epsg.unwrap_or_default();
+            format!("its text and its code EPSG:{code} differ in {what}; the text is used")
+        });
+        horizontal.into_iter().chain(vertical).chain(projection).chain(code).collect()
+    }
+
+    /// Says in what the parameters of the system's text differ from those of its code.
+    pub(crate) fn difference_to_code(&self) -> Option<String> {
+        let (own, known) = (CrsForm::of_text(self.wkt.as_deref()?)?, CrsForm::of_code(self.epsg?)?);
+        let differences = own.differences_in_parameters(&known);
+        (!differences.is_empty()).then(|| differences.join(" and "))
     }
 }
 

@@ -1,8 +1,9 @@
 //! The form in which systems are compared: what decides where a place has its coordinates, and no name of the system.
 
+use crate::input::crs::codes::text_of_code;
 use crate::input::crs::datum::Datum;
 use crate::input::crs::projection::Projection;
-use crate::input::crs::wkt::{BASE, GEOGRAPHIC, PROJECTED, find};
+use crate::input::crs::wkt::{BASE, GEOGRAPHIC, PROJECTED, bound_shift, find};
 
 /// The datum and the projection of a system. The unit is not a part of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,10 +19,11 @@ impl CrsForm {
         if let Some(system) = find(text, &PROJECTED) {
             // Without the method, nothing is known of where its places are.
             let projection = Some(Projection::of(&system)?);
-            return Some(CrsForm { datum: system.child(&BASE).and_then(Datum::of), projection });
+            let datum = system.child(&BASE).and_then(Datum::of).map(|datum| with_shift(datum, text));
+            return Some(CrsForm { datum, projection });
         }
         let datum = Datum::of(&find(text, &GEOGRAPHIC)?)?;
-        Some(CrsForm { datum: Some(datum), projection: None })
+        Some(CrsForm { datum: Some(with_shift(datum, text)), projection: None })
     }
 
     /// Returns the form of the system of an EPSG code.
@@ -34,16 +36,31 @@ impl CrsForm {
         self.datum.as_ref()?.name()
     }
 
+    /// Returns the false easting and northing in metres; `None` for a system without a projection.
+    pub(crate) fn false_origin(&self) -> Option<[f64; 2]> {
+        Some(self.projection.as_ref()?.false_origin())
+    }
+
     /// Says in what the two differ: an entry for the datum and one for the projection. A text without a datum agrees with any.
     pub(crate) fn differences(&self, other: &CrsForm) -> Vec<String> {
         let datum = self.datum.as_ref().zip(other.datum.as_ref()).and_then(|(own, others)| own.difference(others));
-        let projections = self.projection.as_ref().zip(other.projection.as_ref());
-        let projection = projections.and_then(|(own, others)| own.difference(others));
-        datum.into_iter().chain(projection).collect()
+        datum.into_iter().chain(self.difference_in_projection(other)).collect()
+    }
+
+    /// As [`CrsForm::differences`] of two systems with the same code. The dataset renames its datums, so that names do not count.
+    pub(crate) fn differences_in_parameters(&self, other: &CrsForm) -> Vec<String> {
+        let datums = self.datum.as_ref().zip(other.datum.as_ref());
+        let ellipsoid = datums.and_then(|(own, others)| own.difference_in_ellipsoid(others));
+        ellipsoid.into_iter().chain(self.difference_in_projection(other)).collect()
+    }
+
+    fn difference_in_projection(&self, other: &CrsForm) -> Option<String> {
+        let (own, others) = self.projection.as_ref().zip(other.projection.as_ref())?;
+        own.difference(others)
     }
 }
 
-/// Returns the well-known text of an EPSG code; `None` for a code that is not in the list of known ones.
-pub(crate) fn text_of_code(code: u32) -> Option<&'static str> {
-    Some(crs_definitions::from_code(u16::try_from(code).ok()?)?.wkt)
+fn with_shift(mut datum: Datum, text: &str) -> Datum {
+    datum.set_shift(bound_shift(text));
+    datum
 }

@@ -1,6 +1,6 @@
 //! The coordinate reference system that a well-known text describes.
 
-use crate::input::crs::form::text_of_code;
+use crate::input::crs::codes::text_of_code;
 use crate::input::crs::system::{Crs, CrsKind};
 use crate::input::crs::unit::Unit;
 use crate::input::crs::vertical::VerticalSystem;
@@ -33,6 +33,7 @@ pub(crate) fn parse(text: &str) -> Option<Crs> {
         vertical: unit_of_height,
         vertical_system: vertical.and_then(VerticalSystem::of),
         name: horizontal.text(0).map(str::to_string).filter(|name| !name.is_empty()),
+        unread_keys: Vec::new(),
     })
 }
 

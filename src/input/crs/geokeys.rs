@@ -1,6 +1,7 @@
 //! The keys of GeoTIFF (OGC 19-008r4), which LAS stores in three records.
 
 use crate::input::file::bytes::{float64, uint16};
+use std::ops::RangeInclusive;
 
 /// The code that stands for a definition in other keys.
 pub(crate) const USER_DEFINED: u16 = 32767;
@@ -23,12 +24,31 @@ pub(crate) struct GeoKeys {
 }
 
 impl GeoKeys {
+    /// Returns the bytes of the entries of the directory.
+    fn entries(&self) -> impl Iterator<Item = &[u8]> {
+        let mut numbers = self.directory.chunks_exact(8);
+        let count = numbers.next().map_or(0, |head| uint16(head, 6) as usize);
+        numbers.take(count)
+    }
+
     /// Returns the record, count and value (or index in the record) of `key`.
     fn entry(&self, key: u16) -> Option<(u16, u16, u16)> {
-        let numbers = |index: usize| self.directory.chunks_exact(8).nth(index);
-        let count = uint16(numbers(0)?, 6) as usize;
-        let entry = (1..=count).map_while(numbers).find(|entry| uint16(entry, 0) == key)?;
+        let entry = self.entries().find(|entry| uint16(entry, 0) == key)?;
         Some((uint16(entry, 2), uint16(entry, 4), uint16(entry, 6)))
+    }
+
+    /// Returns the keys in `range` that have numbers, as `key=value`.
+    pub(crate) fn numbers(&self, range: RangeInclusive<u16>) -> Vec<String> {
+        let mut keys: Vec<u16> =
+            self.entries().map(|entry| uint16(entry, 0)).filter(|key| range.contains(key)).collect();
+        keys.sort_unstable();
+        keys.dedup();
+        let value = |key: u16| match self.entry(key)? {
+            (TEXTS, ..) => None,
+            (0, _, value) => Some(format!("{key}={value}")),
+            _ => Some(format!("{key}={}", self.double(key).map_or("?".into(), |value| value.to_string()))),
+        };
+        keys.into_iter().filter_map(value).collect()
     }
 
     /// Returns the number of `key`; 0 says nothing.

@@ -2,7 +2,8 @@
 
 use crate::input::crs::from_wkt::{self, from_epsg};
 use crate::input::crs::geokeys::{GeoKeys, USER_DEFINED};
-use crate::input::crs::geotiff_text;
+use crate::input::crs::geotiff_esri as esri;
+use crate::input::crs::geotiff_text::{self, METHOD, PROJECTION};
 use crate::input::crs::system::{Crs, CrsKind};
 use crate::input::crs::unit::Unit;
 use crate::input::crs::vertical::VerticalSystem;
@@ -36,10 +37,22 @@ pub(crate) fn doubts(keys: &GeoKeys) -> Vec<String> {
     let height = height.map(|code| {
         format!("GeoTIFF key {VERTICAL_UNITS}, the unit of heights, has the code {code}, which is not known")
     });
-    let is_defined = keys.code(PROJECTED_TYPE) == Some(USER_DEFINED);
-    let projection = is_defined.then(|| geotiff_text::problem(keys)).flatten();
+    let is_unknown = parse(keys).is_some_and(|crs| crs.form().is_none());
+    let problem = match projected(keys) {
+        Some(USER_DEFINED) => geotiff_text::problem(keys),
+        code => code.map(|code| format!("EPSG:{code} is not in the list of known codes")),
+    };
+    let projection = problem.filter(|_| is_unknown);
     let projection = projection.map(|what| format!("nobody can tell where its coordinates are: {what}"));
     unit.into_iter().chain(height).chain(projection).collect()
+}
+
+/// Returns the code of the projected system. Some writers leave it out where other keys define the projection.
+fn projected(keys: &GeoKeys) -> Option<u16> {
+    let model = keys.code(MODEL_TYPE);
+    let is_defined = || model == Some(1) && [PROJECTION, METHOD].iter().any(|key| keys.code(*key).is_some());
+    let code = keys.code(PROJECTED_TYPE).or_else(|| is_defined().then_some(USER_DEFINED));
+    code.filter(|_| !matches!(model, Some(2 | 3)))
 }
 
 /// Returns the metres of a unit of length by its EPSG code.
@@ -56,15 +69,18 @@ fn metres(code: u16) -> Option<f64> {
 /// Returns the system that the keys describe; `None` if they say nothing.
 pub(crate) fn parse(keys: &GeoKeys) -> Option<Crs> {
     let model = keys.code(MODEL_TYPE);
-    let projected = keys.code(PROJECTED_TYPE).filter(|_| !matches!(model, Some(2 | 3)));
+    let projected = projected(keys);
     let code = projected.or_else(|| keys.code(GEOGRAPHIC_TYPE).filter(|_| model != Some(1)));
     let epsg = code.filter(|code| *code != USER_DEFINED).map(u32::from);
-    let name = CITATIONS.iter().find_map(|key| keys.text(*key));
+    let name = CITATIONS.iter().filter_map(|key| keys.text(*key)).find_map(|text| esri::title(&text));
     let unit = linear_unit(keys);
     let of_code = epsg.and_then(from_epsg);
     let is_defined = projected == Some(USER_DEFINED);
     let defined = || from_wkt::parse(&geotiff_text::projected(keys, name.as_deref(), unit?)?);
-    let known = of_code.or_else(|| defined().filter(|_| is_defined)).unwrap_or_default();
+    // ESRI's programs write their text into a citation.
+    let written = || CITATIONS.iter().filter_map(|key| keys.text(*key)).find_map(|text| esri::system(&text));
+    let written = || written().filter(|crs| projected.is_some() == (crs.kind == CrsKind::Projected));
+    let known = of_code.or_else(written).or_else(|| defined().filter(|_| is_defined)).unwrap_or_default();
     let kind = kind(model, projected.is_some(), epsg.is_some(), known.kind);
     let horizontal = match unit {
         _ if kind == CrsKind::Geographic => Unit::Degree,
@@ -74,11 +90,11 @@ pub(crate) fn parse(keys: &GeoKeys) -> Option<Crs> {
     };
     let heights = VerticalSystem {
         epsg: keys.code(VERTICAL_TYPE).filter(|code| *code != USER_DEFINED).map(u32::from),
-        name: keys.text(VERTICAL_CITATION),
+        name: keys.text(VERTICAL_CITATION).and_then(|text| esri::title(&text)),
         datum: None,
     };
     let unit_of_height = keys.code(VERTICAL_UNITS).and_then(metres).or_else(|| heights.metres_of_code());
-    let crs = Crs {
+    let mut crs = Crs {
         // If a key gives another unit than the code, the text of the code would be wrong.
         wkt: known.wkt.filter(|_| known.horizontal == horizontal),
         epsg,
@@ -87,7 +103,11 @@ pub(crate) fn parse(keys: &GeoKeys) -> Option<Crs> {
         vertical: unit_of_height.or(known.vertical),
         vertical_system: Some(heights).filter(|system| *system != VerticalSystem::default()).or(known.vertical_system),
         name: known.name.or(name),
+        unread_keys: Vec::new(),
     };
+    if is_defined && crs.form().is_none() {
+        crs.unread_keys = geotiff_text::definition(keys);
+    }
     (crs != Crs::default()).then_some(crs)
 }
 
@@ -239,5 +259,99 @@ mod tests {
         assert_eq!(crs.differences(&from_epsg(5972).unwrap()), [""; 0]);
         let other = parse(&records(&[[3072, 0, 1, 25832], [4096, 0, 1, 5776], [4099, 0, 1, 9001]], &[])).unwrap();
         assert_eq!(crs.differences(&other), ["the datum of heights (EPSG:5941, EPSG:5776)"]);
+    }
+
+    #[test]
+    fn projections_that_only_codes_and_methods_define_are_told_apart_by_their_keys() {
+        let of_code = |code| user_defined(&[[3074, 0, 1, code]], &[]);
+        assert!(of_code(10_131).same_as(&of_code(10_131)) && of_code(10_131).is_named());
+        let found = of_code(10_131).differences(&of_code(10_132));
+        assert_eq!(found, ["what defines the projection (GeoTIFF key 3074=10131, GeoTIFF key 3074=10132)"]);
+        let utm = from_epsg(26915).unwrap();
+        assert!(utm.differences(&of_code(10_131))[0].contains("does not say its projection"));
+        // An oblique Mercator projection.
+        let oblique = |doubles: &[f64]| {
+            let keys = [[3088, DOUBLES, 1, 0], [3089, DOUBLES, 1, 1], [3094, DOUBLES, 1, 2]];
+            let method = [[3074, 0, 1, USER_DEFINED], [3075, 0, 1, 3]];
+            user_defined(&[&keys[..], &method[..]].concat(), doubles)
+        };
+        assert!(oblique(&[7.4, 46.9, 90.0]).same_as(&oblique(&[7.4, 46.9, 90.0])));
+        let found = oblique(&[7.4, 46.9, 90.0]).differences(&oblique(&[1.4, 40.0, 50.0]));
+        assert_eq!(found, ["what defines the projection (GeoTIFF key 3088=7.4, GeoTIFF key 3088=1.4)"]);
+        // The name of both is the citation.
+        let cited = |code| user_defined(&[[3074, 0, 1, code], [3073, TEXTS, 8, 0]], &[]);
+        assert!(!cited(10_131).same_as(&cited(10_132)));
+        // Some writers leave out the key of the system.
+        let keys = [[1024, 0, 1, 1], [3074, 0, 1, 10_131], [3076, 0, 1, 9001]];
+        assert!(!parse(&records(&keys, &[])).unwrap().same_as(&of_code(10_132)));
+    }
+
+    #[test]
+    fn keys_that_are_not_known_are_a_doubt() {
+        let doubts = |keys: &[[u16; 4]]| {
+            let base = [[1024, 0, 1, 1], [2048, 0, 1, 4269], [3076, 0, 1, 9001]];
+            doubts(&records(&[&base[..], keys].concat(), &[-93.0, 0.0, 500_000.0, 0.9996])).concat()
+        };
+        assert!(
+            doubts(&[[3072, 0, 1, USER_DEFINED], [3074, 0, 1, 10_131]])
+                .contains("key 3074, its projection, has the code 10131")
+        );
+        let method = [[3072, 0, 1, USER_DEFINED], [3074, 0, 1, USER_DEFINED], [3075, 0, 1, 3]];
+        assert!(doubts(&method).contains("key 3075, the method of its projection, has the code 3"));
+        let angles = [&[[3072, 0, 1, USER_DEFINED], [2054, 0, 1, 9103]], &PARAMETERS[..]].concat();
+        assert!(doubts(&angles).contains("key 2054, the unit of its angles, has the code 9103"));
+        assert!(doubts(&[[3072, 0, 1, 50_001]]).contains("EPSG:50001 is not in the list of known codes"));
+        assert_eq!(doubts(&[[3072, 0, 1, 26915]]), "");
+    }
+
+    #[test]
+    fn angles_count_in_their_own_unit() {
+        let utm = from_epsg(26915).unwrap();
+        let keys = |unit: u16| [&[[2054, 0, 1, unit]], &PARAMETERS[..]].concat();
+        let grads = user_defined(&keys(9105), &[-93.0 / 0.9, 0.0, 500_000.0, 0.9996]);
+        assert_eq!(grads.differences(&utm), [""; 0]);
+        let radians = user_defined(&keys(9101), &[-93f64.to_radians(), 0.0, 500_000.0, 0.9996]);
+        assert_eq!(radians.differences(&utm), [""; 0]);
+        let west = user_defined(&keys(9105), &[-93.0, 0.0, 500_000.0, 0.9996]);
+        assert!(west.differences(&utm)[0].contains("the longitude of the origin"));
+        // The geographic system is in grads, the keys are in degrees.
+        let paris = user_defined(&[&[[2048, 0, 1, 4807]], &PARAMETERS[..]].concat(), &[-93.0, 0.0, 500_000.0, 0.9996]);
+        assert!(paris.differences(&utm).iter().all(|what| !what.contains("longitude of the origin")), "{paris:?}");
+    }
+
+    #[test]
+    fn the_citations_of_esri_are_read() {
+        let cited = |key: u16, text: &str, geographic: u16| {
+            let keys =
+                [&[[2048, 0, 1, geographic], [key, TEXTS, text.len() as u16, 0], [2056, 0, 1, 7019]], &PARAMETERS[..]];
+            let mut all = vec![[1024, 0, 1, 1], [3072, 0, 1, USER_DEFINED], [3076, 0, 1, 9001]];
+            all.extend(keys.concat());
+            let mut keys = records(&all, &[-93.0, 0.0, 500_000.0, 0.9996]);
+            keys.texts = text.as_bytes().to_vec();
+            parse(&keys).unwrap()
+        };
+        let own = from_epsg(6344).unwrap();
+        let parts = "GCS Name = GCS_NAD_1983_2011|Datum = D_NAD_1983_2011|Ellipsoid = GRS_1980|Primem = Greenwich||";
+        let read = cited(2049, parts, USER_DEFINED);
+        assert_eq!(read.differences(&own), [""; 0]);
+        assert!(read.differences(&from_epsg(26915).unwrap())[0].contains("GCS_NAD_1983_2011, NAD83"));
+        let text = r#"ESRI PE String = PROJCS["NAD_1983_2011_UTM_Zone_15N",GEOGCS["GCS_NAD_1983_2011",DATUM["D_NAD_1983_2011",
+            SPHEROID["GRS_1980",6378137.0,298.257222101]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],
+            PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",500000.0],PARAMETER["False_Northing",0.0],
+            PARAMETER["Central_Meridian",-93.0],PARAMETER["Scale_Factor",0.9996],PARAMETER["Latitude_Of_Origin",0.0],
+            UNIT["Meter",1.0]]|"#;
+        let read = cited(3073, text, 4269);
+        assert_eq!((read.differences(&own), read.name.as_deref()), (vec![], Some("NAD_1983_2011_UTM_Zone_15N")));
+        assert_eq!(cited(3073, "PCS Name = My_UTM|", 6318).name.as_deref(), Some("My_UTM"));
+        // The code of the datum, without that of the system.
+        let keys = [
+            [1024, 0, 1, 1],
+            [2048, 0, 1, USER_DEFINED],
+            [2050, 0, 1, 1116],
+            [3072, 0, 1, USER_DEFINED],
+            [3074, 0, 1, 16015],
+            [3076, 0, 1, 9001],
+        ];
+        assert_eq!(parse(&records(&keys, &[])).unwrap().differences(&own), [""; 0]);
     }
 }

@@ -1,10 +1,12 @@
 //! The well-known text of a projected system that GeoTIFF keys define themselves, so that it is compared, placed and written like any
 //! other.
 
-use crate::input::crs::form::text_of_code;
+use crate::input::crs::codes::{text_of_code, text_of_datum};
 use crate::input::crs::geokeys::{GeoKeys, USER_DEFINED};
+use crate::input::crs::geotiff_esri as esri;
 use crate::input::crs::projection::Projection;
-use crate::input::crs::wkt::{PROJECTED, find};
+use crate::input::crs::wkt::{PROJECTED, WktNode, degrees, find};
+use std::ops::RangeInclusive;
 
 const GEOGRAPHIC_TYPE: u16 = 2048;
 const GEOGRAPHIC_CITATION: u16 = 2049;
@@ -15,8 +17,12 @@ const LESSER_AXIS: u16 = 2058;
 const INVERSE_FLATTENING: u16 = 2059;
 const PRIME_MERIDIAN_CODE: u16 = 2051;
 const PRIME_MERIDIAN: u16 = 2061;
-const PROJECTION: u16 = 3074;
-const METHOD: u16 = 3075;
+/// The key of a projection that has a code.
+pub(crate) const PROJECTION: u16 = 3074;
+/// The key of the method of a projection that other keys define.
+pub(crate) const METHOD: u16 = 3075;
+const ANGULAR_UNIT: u16 = 2054;
+const ANGULAR_UNIT_SIZE: u16 = 2055;
 
 /// Ellipsoids by their EPSG codes: the greater half axis and the inverse flattening.
 const ELLIPSOIDS: [(u16, f64, f64); 6] = [
@@ -51,15 +57,38 @@ const METHODS: [(u16, &str, &[Parameter]); 7] = [
 ];
 
 /// Returns the text of the system that the keys define, with x and y in a unit of so many `metres`; `None` if they do not say all of
-/// it. Angles must be in degrees, as GeoTIFF has them unless a key says otherwise.
+/// it.
 pub(crate) fn projected(keys: &GeoKeys, name: Option<&str>, metres: f64) -> Option<String> {
-    const ANGULAR_UNITS: u16 = 2054;
-    if keys.code(ANGULAR_UNITS).is_some_and(|unit| unit != 9102) {
-        return None;
-    }
-    let projection = zone(keys, metres).or_else(|| written_out(keys).filter(|_| problem(keys).is_none()))?;
+    let base = base(keys)?;
+    // A text has its angles in the unit of its geographic system.
+    let unit = WktNode::parse_all(&base)?.first().map_or(1.0, |base| degrees(base.unit()));
+    let written = || written_out(keys, unit).filter(|_| problem(keys).is_none());
+    let projection = zone(keys, metres, unit).or_else(written)?;
     let name = quoted(name.unwrap_or_default());
-    Some(format!(r#"PROJCS["{name}",{},{projection},UNIT["{}",{metres}]]"#, base(keys)?, unit_name(metres)))
+    Some(format!(r#"PROJCS["{name}",{base},{projection},UNIT["{}",{metres}]]"#, unit_name(metres)))
+}
+
+/// Returns the keys that say where the places of a system are, to compare two whose projection cannot be read. The units of x and y are
+/// compared elsewhere.
+pub(crate) fn definition(keys: &GeoKeys) -> Vec<String> {
+    const OF_DATUM: RangeInclusive<u16> = 2048..=2062;
+    const OF_PROJECTION: RangeInclusive<u16> = 3074..=3096;
+    const LINEAR: [&str; 4] = ["2052=", "2053=", "3076=", "3077="];
+    let all = keys.numbers(OF_DATUM).into_iter().chain(keys.numbers(OF_PROJECTION));
+    all.filter(|value| !LINEAR.iter().any(|key| value.starts_with(key)))
+        .map(|value| format!("GeoTIFF key {value}"))
+        .collect()
+}
+
+/// Returns the degrees of the unit of angles; `None` for one that is not known.
+fn angle(keys: &GeoKeys) -> Option<f64> {
+    match keys.code(ANGULAR_UNIT) {
+        None | Some(9102 | 9122) => Some(1.0),
+        Some(9101) => Some(1f64.to_degrees()),
+        Some(9105 | 9106) => Some(0.9),
+        Some(USER_DEFINED) => keys.double(ANGULAR_UNIT_SIZE).filter(|size| *size > 0.0).map(f64::to_degrees),
+        Some(_) => None,
+    }
 }
 
 fn unit_name(metres: f64) -> &'static str {
@@ -71,24 +100,28 @@ fn quoted(name: &str) -> String {
 }
 
 /// Returns a zone of the universal transverse Mercator: 160zz north of the equator and 161zz south of it.
-fn zone(keys: &GeoKeys, metres: f64) -> Option<String> {
+fn zone(keys: &GeoKeys, metres: f64, unit: f64) -> Option<String> {
     let code = keys.code(PROJECTION)?;
     let (zone, northing) = match code {
         16_001..=16_060 => (code - 16_000, 0.0),
         16_101..=16_160 => (code - 16_100, 1e7 / metres),
         _ => return None,
     };
-    let (meridian, easting) = (6 * zone as i32 - 183, 5e5 / metres);
+    let (meridian, easting) = (f64::from(6 * i32::from(zone) - 183) / unit, 5e5 / metres);
     Some(format!(
         r#"PROJECTION["Transverse_Mercator"],PARAMETER["latitude_of_origin",0],PARAMETER["central_meridian",{meridian}],PARAMETER["scale_factor",0.9996],PARAMETER["false_easting",{easting}],PARAMETER["false_northing",{northing}]"#
     ))
 }
 
-fn written_out(keys: &GeoKeys) -> Option<String> {
+/// Returns the projection that the keys write out, with its angles in a unit of so many degrees.
+fn written_out(keys: &GeoKeys, unit: f64) -> Option<String> {
     let (_, name, parameters) = method(keys)?;
+    let angle = angle(keys)? / unit;
     let mut text = format!(r#"PROJECTION["{name}"]"#);
     for (candidates, name) in *parameters {
-        if let Some(value) = candidates.iter().find_map(|key| keys.double(*key)) {
+        let is_angle = [LONGITUDE.1, LATITUDE.1, FIRST.1, SECOND.1].contains(name);
+        let factor = if is_angle { angle } else { 1.0 };
+        if let Some(value) = candidates.iter().find_map(|key| keys.double(*key)).map(|value| value * factor) {
             text.push_str(&format!(r#",PARAMETER["{name}",{value}]"#));
         }
     }
@@ -100,35 +133,53 @@ fn method(keys: &GeoKeys) -> Option<&'static (u16, &'static str, &'static [Param
     METHODS.iter().find(|(number, ..)| *number == method)
 }
 
-/// Says which parameter of the projection that the keys write out is not there, or which key cannot be read. Anything else in its place
-/// would be a guess. Returns `None` for a projection that has a code, or of a method that is not known.
+/// Says what keeps the projection that the keys define from being known: a code or a method that is not in the list, or a key that is
+/// not there or cannot be read. Anything else in its place would be a guess.
 pub(crate) fn problem(keys: &GeoKeys) -> Option<String> {
-    let (_, _, parameters) = method(keys).filter(|_| zone(keys, 1.0).is_none())?;
+    if zone(keys, 1.0, 1.0).is_some() {
+        return None;
+    }
+    let unknown = |key: u16, what: &str| {
+        let code = keys.code(key)?;
+        Some(format!("GeoTIFF key {key}, {what}, has the code {code}, which is not known"))
+    };
+    let Some((_, _, parameters)) = method(keys) else {
+        let of_method = || unknown(METHOD, "the method of its projection");
+        let of_code = keys.code(PROJECTION).filter(|code| *code != USER_DEFINED);
+        return of_code.and_then(|_| unknown(PROJECTION, "its projection")).or_else(of_method);
+    };
+    if angle(keys).is_none() {
+        return unknown(ANGULAR_UNIT, "the unit of its angles");
+    }
     let of_parameters = parameters.iter().flat_map(|(candidates, _)| candidates.iter());
     let of_base = [GREATER_AXIS, LESSER_AXIS, INVERSE_FLATTENING, PRIME_MERIDIAN];
     if let Some(key) = of_parameters.chain(&of_base).find(|key| keys.lacks_double(**key)) {
         return Some(format!("GeoTIFF key {key} has no number that can be read"));
     }
-    let system = find(&format!(r#"PROJCS["",{}]"#, written_out(keys)?), &PROJECTED)?;
+    let system = find(&format!(r#"PROJCS["",{}]"#, written_out(keys, 1.0)?), &PROJECTED)?;
     Projection::read(&system)?.err()
 }
 
 /// Returns the geographic system: that of the code, that of the datum's code, or one with the ellipsoid that the keys give.
 fn base(keys: &GeoKeys) -> Option<String> {
     let code = keys.code(GEOGRAPHIC_TYPE).filter(|code| *code != USER_DEFINED);
-    // EPSG numbered its first datums 2000 above their geographic systems.
-    let of_datum = || keys.code(DATUM).filter(|code| (6001..=6999).contains(code)).map(|code| code - 2000);
-    let code = code.or_else(of_datum);
-    if let Some(text) = code.and_then(|code| text_of_code(code.into())).filter(|text| text.starts_with("GEOGCS[")) {
+    let is_base = |text: &&str| text.starts_with("GEOGCS[");
+    let of_code = code.and_then(|code| text_of_code(code.into())).filter(is_base);
+    let of_datum = || keys.code(DATUM).filter(|code| *code != USER_DEFINED).and_then(|code| text_of_datum(code.into()));
+    if let Some(text) = of_code.or_else(of_datum) {
         return Some(text.to_string());
     }
     const GREENWICH: u16 = 8901;
     let is_elsewhere = keys.code(PRIME_MERIDIAN_CODE).is_some_and(|code| code != GREENWICH);
     let meridian = keys.double(PRIME_MERIDIAN).or_else(|| (!is_elsewhere).then_some(0.0))?;
     let (greater, inverse) = ellipsoid(keys)?;
-    let name = quoted(&keys.text(GEOGRAPHIC_CITATION).unwrap_or_else(|| "unknown".into()));
+    // Key 2061 is in the unit of angles.
+    let meridian = meridian * angle(keys)?;
+    let citation = keys.text(GEOGRAPHIC_CITATION).unwrap_or_else(|| "unknown".into());
+    let name = quoted(esri::part(&citation, "GCS Name").unwrap_or(&citation));
+    let datum = quoted(esri::part(&citation, "Datum").unwrap_or(&name));
     Some(format!(
-        r#"GEOGCS["{name}",DATUM["{name}",SPHEROID["unknown",{greater},{inverse}]],PRIMEM["unknown",{meridian}],UNIT["degree",0.0174532925199433]]"#
+        r#"GEOGCS["{name}",DATUM["{datum}",SPHEROID["unknown",{greater},{inverse}]],PRIMEM["unknown",{meridian}],UNIT["degree",0.0174532925199433]]"#
     ))
 }
 

@@ -2,13 +2,16 @@
 //! This room knows no files: the readers of file formats hand it the records that describe the system.
 
 pub(crate) mod choice;
+pub(crate) mod codes;
 pub(crate) mod datum;
+pub(crate) mod datum_names;
 pub(crate) mod doubts;
 pub(crate) mod form;
 pub(crate) mod from_records;
 pub(crate) mod from_wkt;
 pub(crate) mod geokeys;
 pub(crate) mod geotiff;
+pub(crate) mod geotiff_esri;
 pub(crate) mod geotiff_text;
 pub(crate) mod plausible;
 pub(crate) mod proj4;

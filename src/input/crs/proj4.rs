@@ -1,43 +1,21 @@
 //! The definition of a projected system as a PROJ.4 string, from its EPSG code or from its well-known text.
 
+use crate::input::crs::codes::proj4_of_code;
 use crate::input::crs::datum::Datum;
-use crate::input::crs::projection::{Projection, method, parameter};
+use crate::input::crs::projection::Projection;
 use crate::input::crs::wkt::{BASE, DATUM, PROJECTED, WktNode, find};
-
-/// The methods whose parameters in well-known text are all that PROJ.4 needs.
-const METHODS: [&str; 4] = ["tmerc", "lcc", "aea", "laea"];
 
 /// Returns the definition of the system of this code, or else of this text; `None` if neither gives one.
 pub(crate) fn definition(epsg: Option<u32>, wkt: Option<&str>) -> Option<String> {
-    let of_code = |code| Some(crs_definitions::from_code(u16::try_from(code).ok()?)?.proj4.to_string());
-    epsg.and_then(of_code).or_else(|| of_text(wkt?))
+    let of_code = epsg.and_then(proj4_of_code).map(str::to_string);
+    of_code.or_else(|| of_text(wkt?))
 }
 
 fn of_text(text: &str) -> Option<String> {
     let system = find(text, &PROJECTED)?;
     // A projection with a parameter missing or unreadable is somewhere else.
-    Projection::of(&system)?;
-    let conversion = system.child(&["CONVERSION"]).unwrap_or(&system);
-    let projection = method(conversion.child(&["PROJECTION", "METHOD"])?.text(0)?)?;
-    if !METHODS.contains(&projection) {
-        return None;
-    }
-    let mut words = vec![format!("+proj={projection}")];
-    let metres = system.unit_metres()?;
-    for node in conversion.children().filter(|child| child.keyword == "PARAMETER") {
-        let (short, value) = (parameter(node.text(0)?)?, node.number(1)?);
-        // PROJ.4 takes false eastings and northings in metres.
-        let factor = if short == "x_0" || short == "y_0" { node.unit_metres().unwrap_or(metres) } else { 1.0 };
-        words.push(format!("+{short}={}", value * factor));
-    }
-    // A cone with one standard parallel has it at the origin.
-    let latitude = words.iter().find_map(|word| word.strip_prefix("+lat_0="));
-    if projection == "lcc" && !words.iter().any(|word| word.starts_with("+lat_1=")) {
-        words.push(format!("+lat_1={}", latitude?));
-    }
-    words.push(datum(&system)?);
-    words.push(format!("+to_meter={metres} +no_defs"));
-    Some(words.join(" "))
+    let projection = Projection::of(&system)?.proj4()?;
+    Some(format!("{projection} {} +to_meter={} +no_defs", datum(&system)?, system.unit_metres()?))
 }
 
 /// Returns the ellipsoid and the shift to WGS 84. If the text gives no shift, the shift is zero for the datums that agree with
@@ -46,7 +24,7 @@ fn datum(system: &WktNode) -> Option<String> {
     let base = system.child(&BASE)?;
     let datum = base.child(&DATUM)?;
     let spheroid = datum.child(&["SPHEROID", "ELLIPSOID"])?;
-    let (axis, flattening) = (spheroid.number(1)?, spheroid.number(2)?);
+    let (axis, flattening) = (spheroid.number(1)? * spheroid.unit_metres().unwrap_or(1.0), spheroid.number(2)?);
     let shift = match datum.child(&["TOWGS84"]) {
         Some(shift) => (0..7).map(|k| shift.number(k).unwrap_or(0.0).to_string()).collect::<Vec<_>>().join(","),
         None if Datum::of(base)?.is_close_to_wgs84() => "0,0,0".into(),
@@ -76,7 +54,7 @@ mod tests {
             UNIT["foot",0.3048]]"#;
         assert_eq!(
             definition(None, Some(text)).unwrap(),
-            "+proj=lcc +lat_1=43 +lat_2=45.5 +lat_0=41.75 +lon_0=-120.5 +x_0=304.8 +y_0=0 +a=6378137 +rf=298.25 +towgs84=0,0,0 \
+            "+proj=lcc +lat_0=41.75 +lat_1=45.5 +lat_2=43 +lon_0=-120.5 +x_0=304.8 +y_0=0 +a=6378137 +rf=298.25 +towgs84=0,0,0 \
              +to_meter=0.3048 +no_defs"
         );
         // The shift of a datum that may be hundreds of metres off is not guessed.

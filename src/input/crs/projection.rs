@@ -1,11 +1,12 @@
 //! Map projections in one comparable form, whatever text describes them: the method by its name in PROJ.4, angles in degrees, lengths
 //! in metres.
 
-use crate::input::crs::wkt::{WktNode, comparable_name, degrees};
+use crate::input::crs::datum::Datum;
+use crate::input::crs::wkt::{BASE, WktNode, comparable_name, degrees};
 use std::collections::BTreeMap;
 
 /// The parameters of projections: the name in well-known text, as `comparable_name` spells it, and the name in PROJ.4.
-const PARAMETERS: [(&str, &str); 43] = [
+const PARAMETERS: [(&str, &str); 45] = [
     ("centralmeridian", "lon_0"),
     ("longitudeofcenter", "lon_0"),
     ("longitudeoforigin", "lon_0"),
@@ -47,16 +48,21 @@ const PARAMETERS: [(&str, &str); 43] = [
     ("xyplanerotation", "gamma"),
     ("pseudostandardparallel1", "lat_pseudo"),
     ("latitudeofpseudostandardparallel", "lat_pseudo"),
+    ("height", "h_0"),
+    ("projectionplaneoriginheight", "h_0"),
     ("xscale", "x_scale"),
     ("yscale", "y_scale"),
 ];
 
 /// The methods of projections: the name in well-known text and the name in PROJ.4, or one of that kind.
-const METHODS: [(&str, &str); 39] = [
+const METHODS: [(&str, &str); 52] = [
     ("transversemercator", "tmerc"),
+    ("transversemercator3d", "tmerc"),
     ("gausskruger", "tmerc"),
     ("lambertconformalconic2sp", "lcc"),
     ("lambertconicconformal2sp", "lcc"),
+    ("lambertconformalconic2spbelgium", "lcc belgium"),
+    ("lambertconicconformal2spbelgium", "lcc belgium"),
     ("lambertconformalconic1sp", "lcc"),
     ("lambertconicconformal1sp", "lcc"),
     ("lambertconformalconic", "lcc"),
@@ -71,6 +77,7 @@ const METHODS: [(&str, &str); 39] = [
     ("polarstereographicvariantb", "stere"),
     ("stereographicnorthpole", "stere"),
     ("stereographicsouthpole", "stere"),
+    ("stereographic", "stere"),
     ("mercator", "merc"),
     ("mercator1sp", "merc"),
     ("mercator2sp", "merc"),
@@ -92,6 +99,15 @@ const METHODS: [(&str, &str); 39] = [
     ("hotineobliquemercatorazimuthcenter", "omerc centre"),
     ("hotineobliquemercatorvariantb", "omerc centre"),
     ("obliquemercator", "omerc centre"),
+    ("rectifiedskeworthomorphiccenter", "omerc centre"),
+    ("localorthographic", "ortho"),
+    ("local", "ortho"),
+    ("colombiaurban", "col_urban"),
+    ("igacplanocartesiano", "col_urban"),
+    ("equirectangular", "eqc"),
+    ("equidistantcylindrical", "eqc"),
+    ("cylindricalequalarea", "cea"),
+    ("lambertcylindricalequalarea", "cea"),
 ];
 
 /// The parameters without which nobody knows where a method has its origin. One of the names in each inner list is enough. False eastings and northings are 0 and scales are 1 where a text leaves them out, as the standard says.
@@ -133,13 +149,13 @@ const ANGLE_TOLERANCE: f64 = 1e-7;
 const SCALE_TOLERANCE: f64 = 1e-8;
 
 /// Returns the PROJ.4 name of a method of well-known text.
-pub(crate) fn method(name: &str) -> Option<&'static str> {
+fn method(name: &str) -> Option<&'static str> {
     let name = comparable_name(name);
     METHODS.iter().find(|(long, _)| *long == name).map(|(_, short)| *short)
 }
 
 /// Returns the PROJ.4 name of a parameter of well-known text.
-pub(crate) fn parameter(name: &str) -> Option<&'static str> {
+fn parameter(name: &str) -> Option<&'static str> {
     let name = comparable_name(name);
     PARAMETERS.iter().find(|(long, _)| *long == name).map(|(_, short)| *short)
 }
@@ -147,7 +163,10 @@ pub(crate) fn parameter(name: &str) -> Option<&'static str> {
 /// A projection. Parameters that have their default are left out.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Projection {
+    /// The name in PROJ.4, or the comparable name of a method that is not known.
     method: String,
+    /// The name in the text, for messages.
+    label: String,
     parameters: BTreeMap<String, f64>,
     /// Whether x grows to the west; `None` if the text does not say.
     westward: Option<bool>,
@@ -164,21 +183,23 @@ impl Projection {
     pub(crate) fn read(system: &WktNode) -> Option<Result<Projection, String>> {
         let conversion = system.child(&["CONVERSION", "DERIVINGCONVERSION"]).unwrap_or(system);
         let name = conversion.child(&["PROJECTION", "METHOD"])?.text(0)?;
-        let method = if is_web_mercator(system) { WEB_MERCATOR } else { method(name).unwrap_or(name) };
+        let comparable = comparable_name(name);
+        let method = if is_web_mercator(system) { WEB_MERCATOR } else { method(name).unwrap_or(&comparable) };
         let parameters =
             parameters(system, conversion).and_then(|parameters| match missing(name, method, &parameters) {
                 Some(missing) => Err(format!("it does not give {missing}")),
                 None => Ok(parameters),
             });
         Some(parameters.map(|parameters| {
-            let mut projection = Projection { method: method.to_string(), parameters, westward: westward(system) };
-            projection.normalise();
+            let (method, label) = (method.to_string(), name.to_string());
+            let mut projection = Projection { method, label, parameters, westward: westward(system) };
+            projection.normalise(system);
             projection
         }))
     }
 
     /// Writes what can be said in several ways in one of them.
-    fn normalise(&mut self) {
+    fn normalise(&mut self, system: &WktNode) {
         let parameters = &mut self.parameters;
         let get = |parameters: &BTreeMap<String, f64>, name: &str| parameters.get(name).copied();
         match self.method.as_str() {
@@ -195,6 +216,18 @@ impl Projection {
                     parameters.insert("lat_0".into(), parallel);
                 }
             }
+            "merc" => {
+                if let Some(parallel) = parameters.remove("lat_1") {
+                    let base = system.child(&BASE).and_then(Datum::of);
+                    let scale = scale_at(parallel, base.and_then(|base| base.ellipsoid()));
+                    parameters.entry("k_0".into()).or_insert(scale);
+                }
+            }
+            "omerc origin" | "omerc centre" => {
+                // Where the text does not say it, the grid is turned so that north is up in the middle.
+                let azimuth = get(parameters, "alpha").unwrap_or(0.0);
+                parameters.entry("gamma".into()).or_insert(azimuth);
+            }
             // The others are constants of the method. Some writers name them, and not all in the same way.
             "krovak" => parameters.retain(|name, _| ["lat_0", "lon_0", "k_0", "x_0", "y_0"].contains(&name.as_str())),
             WEB_MERCATOR => parameters.retain(|name, _| ["lon_0", "x_0", "y_0"].contains(&name.as_str())),
@@ -202,10 +235,28 @@ impl Projection {
         }
     }
 
+    /// Returns the projection in the words of PROJ.4, without ellipsoid and unit; `None` if these parameters are not all that it needs.
+    pub(crate) fn proj4(&self) -> Option<String> {
+        const METHODS: [&str; 4] = ["tmerc", "lcc", "aea", "laea"];
+        const NAMES: [&str; 7] = ["lon_0", "lat_0", "lat_1", "lat_2", "k_0", "x_0", "y_0"];
+        let known = METHODS.contains(&self.method.as_str())
+            && self.parameters.keys().all(|name| NAMES.contains(&name.as_str()));
+        if !known || self.westward == Some(true) {
+            return None;
+        }
+        let words = self.parameters.iter().map(|(name, value)| format!(" +{name}={value}"));
+        Some(format!("+proj={}{}", self.method, words.collect::<String>()))
+    }
+
+    /// Returns the false easting and northing in metres.
+    pub(crate) fn false_origin(&self) -> [f64; 2] {
+        ["x_0", "y_0"].map(|name| self.parameters.get(name).copied().unwrap_or(0.0))
+    }
+
     /// Says in what the two differ: what a sentence can name, as it is here and as it is in `other`.
     pub(crate) fn difference(&self, other: &Projection) -> Option<String> {
         if self.method != other.method {
-            return Some(format!("the projection ({}, {})", self.method, other.method));
+            return Some(format!("the projection ({}, {})", self.label, other.label));
         }
         if matches!((self.westward, other.westward), (Some(own), Some(others)) if own != others) {
             return Some("the direction of the axes".into());
@@ -214,7 +265,7 @@ impl Projection {
         names.sort_unstable();
         names.dedup();
         let value = |of: &Projection, name: &str| of.parameters.get(name).copied().unwrap_or(default(name));
-        let differs = |name: &&&String| (value(self, name) - value(other, name)).abs() > tolerance(name);
+        let differs = |name: &&&String| distance(name, value(self, name), value(other, name)) > tolerance(name);
         let first = names.iter().find(differs)?;
         Some(format!("the {} ({}, {})", long_name(first), value(self, first), value(other, first)))
     }
@@ -230,8 +281,8 @@ fn parameters(system: &WktNode, conversion: &WktNode) -> Result<BTreeMap<String,
         let long = node.text(0).ok_or("it has a parameter without a name")?;
         let name = parameter(long).map_or_else(|| comparable_name(long), str::to_string);
         let factor = match name.as_str() {
-            "x_0" | "y_0" => node.unit().map_or(Some(metres), |_| node.unit_metres()),
-            "k_0" | "x_scale" | "y_scale" => Some(1.0),
+            name if is_length(name) => node.unit().map_or(Some(metres), |_| node.unit_metres()),
+            name if is_scale(name) => Some(1.0),
             _ => Some(node.unit().map_or(angle, |unit| degrees(Some(unit)))),
         };
         let value = node.number(1).zip(factor).map(|(value, factor)| value * factor);
@@ -239,6 +290,22 @@ fn parameters(system: &WktNode, conversion: &WktNode) -> Result<BTreeMap<String,
         parameters.insert(name, value);
     }
     Ok(parameters)
+}
+
+/// Returns the method and the parameters of a projected system as it has them, to compare two that cannot be read.
+pub(crate) fn projection_values(system: &WktNode) -> Vec<String> {
+    let conversion = system.child(&["CONVERSION", "DERIVINGCONVERSION"]).unwrap_or(system);
+    let method = conversion.child(&["PROJECTION", "METHOD"]).and_then(|method| method.text(0));
+    let value = |node: &WktNode| {
+        let long = comparable_name(node.text(0).unwrap_or_default());
+        let value =
+            node.number(1).map_or_else(|| node.text(1).unwrap_or("no number").to_string(), |value| value.to_string());
+        format!("{} = {value}", parameter(&long).unwrap_or(&long))
+    };
+    let parameters = conversion.children().filter(|child| child.keyword == "PARAMETER").map(value);
+    let mut all: Vec<String> = method.map(comparable_name).into_iter().chain(parameters).collect();
+    all.sort_unstable();
+    all
 }
 
 /// Returns the first parameter that a method needs and the text lacks, in words.
@@ -266,13 +333,34 @@ fn westward(system: &WktNode) -> Option<bool> {
 }
 
 fn default(name: &str) -> f64 {
-    if ["k_0", "x_scale", "y_scale"].contains(&name) { 1.0 } else { 0.0 }
+    if is_scale(name) { 1.0 } else { 0.0 }
+}
+
+/// Returns how far two values of a parameter are apart. A whole turn is nothing.
+fn distance(name: &str, own: f64, other: f64) -> f64 {
+    let apart = (own - other).abs();
+    if is_length(name) || is_scale(name) { apart } else { (apart % 360.0).min(360.0 - apart % 360.0) }
+}
+
+/// Returns the scale at the equator of a Mercator projection that is true to scale at the parallel.
+fn scale_at(parallel: f64, ellipsoid: Option<[f64; 2]>) -> f64 {
+    let eccentricity = ellipsoid.map_or(0.0, |[greater, lesser]| 1.0 - (lesser / greater).powi(2));
+    let (sine, cosine) = parallel.to_radians().sin_cos();
+    cosine / (1.0 - eccentricity * sine * sine).sqrt()
+}
+
+fn is_length(name: &str) -> bool {
+    ["x_0", "y_0", "h_0"].contains(&name)
+}
+
+fn is_scale(name: &str) -> bool {
+    ["k_0", "x_scale", "y_scale"].contains(&name)
 }
 
 fn tolerance(name: &str) -> f64 {
     match name {
-        "x_0" | "y_0" => LENGTH_TOLERANCE,
-        "k_0" | "x_scale" | "y_scale" => SCALE_TOLERANCE,
+        name if is_length(name) => LENGTH_TOLERANCE,
+        name if is_scale(name) => SCALE_TOLERANCE,
         _ => ANGLE_TOLERANCE,
     }
 }
@@ -284,8 +372,11 @@ fn long_name(name: &str) -> &str {
         "lat_1" | "lat_2" => "standard parallel",
         "k_0" => "scale factor",
         "alpha" => "azimuth",
+        "gamma" => "angle between the grid and the oblique line",
+        "x_scale" | "y_scale" => "scale of an axis",
         "x_0" => "false easting in metres",
         "y_0" => "false northing in metres",
+        "h_0" => "height of the plane in metres",
         other => other,
     }
 }

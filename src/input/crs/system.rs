@@ -2,11 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::input::crs::codes::text_of_code;
 use crate::input::crs::form::CrsForm;
 use crate::input::crs::proj4;
+use crate::input::crs::projection::projection_values;
 use crate::input::crs::unit::Unit;
 use crate::input::crs::vertical::VerticalSystem;
-use crate::input::crs::wkt::comparable_name;
+use crate::input::crs::wkt::{PROJECTED, comparable_name, find};
 
 /// What a file says about its coordinate reference system.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -25,6 +27,9 @@ pub struct Crs {
     pub vertical_system: Option<VerticalSystem>,
     /// The name of the horizontal system.
     pub name: Option<String>,
+    /// What the GeoTIFF keys say of a projection that nothing here can read: `key=value`, by which two such systems can be compared.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub unread_keys: Vec<String>,
 }
 
 /// What the coordinates of a system are.
@@ -64,7 +69,7 @@ impl Crs {
 
     /// Returns whether it says where the coordinates are. One that knows only a unit does not.
     pub fn is_named(&self) -> bool {
-        self.epsg.is_some() || self.name.is_some() || self.wkt.is_some()
+        self.epsg.is_some() || self.name.is_some() || self.wkt.is_some() || !self.unread_keys.is_empty()
     }
 
     /// Returns whether nothing says that the two systems differ.
@@ -75,8 +80,8 @@ impl Crs {
     /// Returns in what the two systems differ, or in what they cannot be compared, in words that a sentence can name. What one file
     /// does not say agrees with anything.
     ///
-    /// If both have the same EPSG code, the code decides. Otherwise datums and projections are compared by what they are, not by the
-    /// name of the system.
+    /// Datums and projections are compared by what they are, not by the name of the system. If both have the same EPSG code, the names
+    /// of the datums do not count.
     pub fn differences(&self, other: &Crs) -> Vec<String> {
         ComparableCrs::of(self).differences(&ComparableCrs::of(other))
     }
@@ -106,13 +111,24 @@ impl Crs {
     fn comparable_name(&self) -> Option<String> {
         let name =
             self.name.as_deref().map(comparable_name).filter(|name| !["unknown", "unnamed"].contains(&name.as_str()));
-        name.or_else(|| self.epsg.map(|code| format!("epsg{code}")))
+        let keys = || (!self.unread_keys.is_empty()).then(|| self.unread_keys.concat());
+        name.or_else(|| self.epsg.map(|code| format!("epsg{code}"))).or_else(keys)
+    }
+
+    /// Returns what defines a system that has no comparable form: the values of its keys, or of its text.
+    fn unread(&self) -> Vec<String> {
+        let Some(system) = self.wkt.as_deref().and_then(|text| find(text, &PROJECTED)) else {
+            return self.unread_keys.clone();
+        };
+        projection_values(&system)
     }
 
     /// Returns the system's definition as a PROJ.4 string, from which longitude and latitude can be computed; `None` if neither
     /// the code nor the text gives one.
     pub fn proj4_definition(&self) -> Option<String> {
-        proj4::definition(self.epsg, self.wkt.as_deref())
+        // A code whose text says otherwise is not what the coordinates are in.
+        let epsg = self.epsg.filter(|_| self.difference_to_code().is_none());
+        proj4::definition(epsg, self.wkt.as_deref())
     }
 
     /// Returns the name of the vertical system, if the file gives one.
@@ -126,6 +142,7 @@ impl Crs {
             (Some(name), Some(code)) => format!("{name} (EPSG:{code})"),
             (Some(name), None) => name.clone(),
             (None, Some(code)) => format!("EPSG:{code}"),
+            (None, None) if !self.unread_keys.is_empty() => "a projection that GeoTIFF keys define".to_string(),
             (None, None) => "unknown".to_string(),
         }
     }
@@ -165,20 +182,43 @@ impl<'a> ComparableCrs<'a> {
     }
 
     fn differences_in_place(&self, other: &ComparableCrs) -> Vec<String> {
-        if self.crs.epsg.is_some() && self.crs.epsg == other.crs.epsg {
-            return Vec::new();
-        }
+        let same_code = self.crs.epsg.is_some() && self.crs.epsg == other.crs.epsg;
         match (&self.form, &other.form) {
+            (Some(own), Some(others)) if same_code => own.differences_in_parameters(others),
             (Some(own), Some(others)) => own.differences(others),
-            _ => {
-                // Two of which one is not known can only agree by name.
-                let names = (self.crs.comparable_name(), other.crs.comparable_name());
-                let doubtful = matches!(&names, (Some(own), Some(others)) if own != others);
-                let unclear = if self.form.is_none() { self.crs } else { other.crs };
-                let what = || format!("the name, and {} does not say its projection", unclear.label());
-                doubtful.then(what).into_iter().collect()
+            _ if same_code => Vec::new(),
+            _ => self.doubt(other).into_iter().collect(),
+        }
+    }
+
+    /// Says why two systems are taken to differ of which at least one has no form.
+    fn doubt(&self, other: &ComparableCrs) -> Option<String> {
+        let (own, others) = (self.crs, other.crs);
+        let unclear = if self.form.is_none() { own } else { others };
+        let reason = match unclear.epsg {
+            Some(code) if text_of_code(code).is_none() => format!("EPSG:{code} is not in the list of known codes"),
+            _ => format!("{} does not say its projection in a way that can be read", unclear.label()),
+        };
+        if let (Some(code), Some(other_code)) = (own.epsg, others.epsg) {
+            return Some(format!("the code (EPSG:{code}, EPSG:{other_code}), and {reason}"));
+        }
+        if self.form.is_none() && other.form.is_none() {
+            let (own, others) = (own.unread(), others.unread());
+            let only = |these: &[String], those: &[String]| these.iter().find(|value| !those.contains(value)).cloned();
+            let lost = || "nothing".to_string();
+            if own != others && !own.is_empty() && !others.is_empty() {
+                let (first, second) = (only(&own, &others), only(&others, &own));
+                let (first, second) = (first.unwrap_or_else(lost), second.unwrap_or_else(lost));
+                return Some(format!("what defines the projection ({first}, {second})"));
+            }
+            if own == others && !own.is_empty() {
+                return None;
             }
         }
+        // Two of which one is not known can only agree by name.
+        let names = (own.comparable_name(), others.comparable_name());
+        let doubtful = matches!(&names, (Some(own), Some(others)) if own != others);
+        doubtful.then(|| format!("the name, and {reason}"))
     }
 }
 
@@ -258,6 +298,65 @@ mod tests {
         assert_eq!(parse(text).unwrap().differences(&of_code), [""; 0]);
         let moved = parse(&text.replace("6600000", "6600000.1")).unwrap();
         assert_eq!(moved.differences(&of_code), ["the false northing in metres (6600000.1, 6600000)"]);
+    }
+
+    #[test]
+    fn esris_text_agrees_with_the_code_of_the_same_system() {
+        let texts: Vec<(u32, Crs)> = include_str!("codes/esri_texts.tsv")
+            .lines()
+            .map(|line| {
+                line.split_once('\t').map(|(code, text)| (code.parse().unwrap(), parse(text).unwrap())).unwrap()
+            })
+            .collect();
+        assert!(texts.len() > 20);
+        for (index, (code, crs)) in texts.iter().enumerate() {
+            assert_eq!(crs.differences(&from_epsg(*code).unwrap()), [""; 0], "EPSG:{code}");
+            for (other, others) in &texts[index + 1..] {
+                assert!(!crs.same_as(others), "EPSG:{code}, EPSG:{other}");
+            }
+        }
+    }
+
+    #[test]
+    fn one_code_with_other_parameters_is_another_system() {
+        let right = from_epsg(31467).unwrap();
+        let text = right
+            .wkt
+            .clone()
+            .unwrap()
+            .replace("3500000", "4500000")
+            .replace("\"central_meridian\",9", "\"central_meridian\",12");
+        let wrong = Crs { epsg: Some(31467), ..parse(&text).unwrap() };
+        assert_eq!(right.differences(&wrong), ["the longitude of the origin (9, 12)"]);
+        assert_eq!(right.doubts(), [""; 0]);
+        let doubt = "its text and its code EPSG:31467 differ in the longitude of the origin (12, 9); the text is used";
+        assert_eq!(wrong.doubts(), [doubt]);
+        // The code would place it elsewhere.
+        assert!(!wrong.proj4_definition().unwrap_or_default().contains("+lon_0=9 "), "{:?}", wrong.proj4_definition());
+        // The dataset has renamed this datum, and the code is still the same.
+        let renamed = parse(&right.wkt.clone().unwrap().replace("DHDN", "Main triangle net")).unwrap();
+        assert!(right.same_as(&Crs { epsg: Some(31467), ..renamed }));
+    }
+
+    #[test]
+    fn two_codes_that_are_not_in_the_list_differ_whatever_the_name() {
+        let coded = |code| Crs { epsg: Some(code), name: Some("Local".into()), ..Crs::default() };
+        assert!(coded(65_001).same_as(&coded(65_001)));
+        let found = coded(65_001).differences(&coded(65_002));
+        assert_eq!(found, ["the code (EPSG:65001, EPSG:65002), and EPSG:65001 is not in the list of known codes"]);
+        assert_eq!(from_epsg(26915).unwrap().differences(&coded(65_001)).len(), 1);
+    }
+
+    #[test]
+    fn texts_that_lack_a_parameter_are_compared_by_those_that_they_have() {
+        let text = |easting: u32| {
+            parse(&format!(
+                r#"PROJCS["My grid",GEOGCS["g"],PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",{easting}],UNIT["metre",1]]"#
+            ))
+            .unwrap()
+        };
+        assert!(text(1).same_as(&text(1)));
+        assert_eq!(text(1).differences(&text(2)), ["what defines the projection (x_0 = 1, x_0 = 2)"]);
     }
 
     #[test]

@@ -1,28 +1,27 @@
 //! The system that heights count in.
 
+use crate::input::crs::codes::{height_datum, heights};
 use crate::input::crs::unit::Unit;
 use crate::input::crs::wkt::{WktNode, comparable_name};
 use serde::{Deserialize, Serialize};
 
-/// Parts of comparable names and codes of vertical systems, with one name for each datum. The codes are those of systems and, below
-/// 5200, those of datums, which old files have instead.
-const KNOWN: [(&[&str], &[u32], &str); 16] = [
-    (&["navd88", "navd1988", "northamericanverticaldatum"], &[5703, 6360, 8228, 5103], "navd88"),
-    (&["ngvd29", "ngvd1929", "nationalgeodeticvertical"], &[5702, 7968, 5102], "ngvd29"),
-    (&["egm96", "egm1996"], &[5773, 5171], "egm96"),
-    (&["egm2008"], &[3855, 1027], "egm2008"),
-    (&["nn2000", "norwaynormalnull2000"], &[5941, 1096], "nn2000"),
-    (&["ign69", "nivellementgeneraldelafranceign69"], &[5720, 5119], "ign69"),
-    (&["dhhn2016", "deutscheshaupthoehennetz2016"], &[7837, 1170], "dhhn2016"),
-    (&["dhhn92", "dhhn1992", "deutscheshaupthoehennetz1992"], &[5783, 5181], "dhhn92"),
-    (&["newlyn"], &[5701, 5101], "odn"),
-    (&["normaalamsterdamspeil"], &[5709, 5109], "nap"),
-    (&["rh2000", "rikets2000", "riketshojdsystem2000"], &[5613, 5177], "rh2000"),
-    (&["australianheightdatum"], &[5711, 5111], "ahd"),
-    (&["cgvd28", "canadiangeodeticverticaldatumof1928"], &[5713, 5114], "cgvd28"),
-    (&["cgvd2013", "canadiangeodeticverticaldatumof2013"], &[6647, 1127], "cgvd2013"),
-    (&["evrf2007", "europeanverticalreferenceframe2007"], &[5621, 5215], "evrf2007"),
-    (&["evrf2000", "europeanverticalreferenceframe2000"], &[5730, 5129], "evrf2000"),
+/// Parts of comparable names that writers vary, and the code of the datum. The rest is in the tables of `codes.rs`.
+const VARIED: [(&[&str], u32); 15] = [
+    (&["navd88", "navd1988", "northamericanverticaldatum"], 5103),
+    (&["ngvd29", "ngvd1929", "nationalgeodeticvertical"], 5102),
+    (&["egm96", "egm1996"], 5171),
+    (&["egm2008"], 1027),
+    (&["ign69", "nivellementgeneraldelafranceign69"], 5119),
+    (&["dhhn2016", "deutscheshaupthoehennetz2016"], 1170),
+    (&["dhhn92", "dhhn1992", "deutscheshaupthoehennetz1992"], 5181),
+    (&["newlyn"], 5101),
+    (&["normaalamsterdamspeil"], 5109),
+    (&["rh2000", "rikets2000", "riketshojdsystem2000"], 5177),
+    (&["australianheightdatum"], 5111),
+    (&["evrf2007", "europeanverticalreferenceframe2007"], 5215),
+    (&["evrf2000", "europeanverticalreferenceframe2000"], 5129),
+    (&["cgvd28", "canadiangeodeticverticaldatumof1928"], 5114),
+    (&["cgvd2013", "canadiangeodeticverticaldatumof2013"], 1127),
 ];
 
 /// What a file says of the system that its heights count in.
@@ -47,12 +46,8 @@ impl VerticalSystem {
 
     /// Returns the metres of a unit of height by its code; `None` for a code that is not known.
     pub(crate) fn metres_of_code(&self) -> Option<f64> {
-        match self.epsg? {
-            5702 | 6360 => Some(Unit::US_FOOT),
-            8228 => Some(Unit::FOOT),
-            code => KNOWN.iter().any(|(_, codes, _)| codes.contains(&code)).then_some(1.0),
-        }
-        .filter(|_| self.epsg.is_some_and(|code| code == 3855 || code > 5215))
+        // By way of the unit, two ways to round a foot are one.
+        Unit::from_metres(heights().get(&self.epsg?).map(|code| code.metres)).metres_per_unit()
     }
 
     /// Returns the name for messages.
@@ -61,32 +56,57 @@ impl VerticalSystem {
         name.unwrap_or_else(|| self.epsg.map_or("unnamed".into(), |code| format!("EPSG:{code}")))
     }
 
-    /// Says in what the datums differ; a system that says nothing agrees with all.
+    /// Says in what the datums differ, or in what they cannot be compared; a system that says nothing agrees with all.
     pub(crate) fn difference(&self, other: &VerticalSystem) -> Option<String> {
         let (own, others) = (self.keys(), other.keys());
-        let differs = !own.is_empty() && !others.is_empty() && !own.iter().any(|key| others.contains(key));
-        differs.then(|| format!("the datum of heights ({}, {})", self.label(), other.label()))
+        if own.is_empty() || others.is_empty() {
+            return None;
+        }
+        let (label, other_label) = (self.label(), other.label());
+        if !own.iter().any(|key| others.contains(key)) {
+            let unknown = self.unknown_code().or_else(|| other.unknown_code());
+            let doubt = unknown.map_or(String::new(), |code| {
+                format!(", and EPSG:{code} is not in the list of known codes of heights")
+            });
+            return Some(format!("the datum of heights ({label}, {other_label}{doubt})"));
+        }
+        let differs = matches!((self.is_depth(), other.is_depth()), (Some(own), Some(others)) if own != others);
+        differs.then(|| format!("the direction of heights, one of which are depths ({label}, {other_label})"))
     }
 
-    /// Returns all that the datum may be known by.
+    /// Returns all that the datum may be known by: codes of the dataset, or comparable names.
     fn keys(&self) -> Vec<String> {
         let names = [&self.name, &self.datum].into_iter().flatten().map(|name| comparable_name(name));
-        let mut keys: Vec<String> = names.filter_map(known_name).collect();
+        let mut keys: Vec<String> = names.filter_map(|name| known_name(&name)).collect();
         if let Some(code) = self.epsg {
-            let known = KNOWN.iter().find(|(_, codes, _)| codes.contains(&code));
-            keys.push(known.map_or_else(|| format!("epsg {code}"), |(.., name)| name.to_string()));
+            // Old files have the code of the datum in place of that of the system.
+            keys.push(heights().get(&code).map_or(code, |known| known.datum).to_string());
         }
         keys
     }
+
+    /// Returns whether z counts downwards; `None` if neither the code nor the name of the system says so.
+    fn is_depth(&self) -> Option<bool> {
+        let of_code = self.epsg.and_then(|code| heights().get(&code)).map(|code| code.is_depth);
+        of_code.or_else(|| self.name.as_deref().map(|name| comparable_name(name).contains("depth")))
+    }
+
+    /// Returns its code if that is all that is known.
+    fn unknown_code(&self) -> Option<u32> {
+        let is_known =
+            |code: &u32| heights().contains_key(code) || heights().values().any(|known| known.datum == *code);
+        self.epsg.filter(|code| !is_known(code) && self.name.is_none() && self.datum.is_none())
+    }
 }
 
-fn known_name(name: String) -> Option<String> {
-    let known = KNOWN.iter().find(|(parts, ..)| parts.iter().any(|part| name.contains(part)));
-    if let Some((.., short)) = known {
-        return Some(short.to_string());
+fn known_name(name: &str) -> Option<String> {
+    const ENDS: [&str; 6] = ["ftus", "usft", "ft", "heights", "height", "depth"];
+    let own = ENDS.iter().fold(name, |name, end| name.trim_end_matches(*end));
+    let varied =
+        || VARIED.iter().find(|(parts, _)| parts.iter().any(|part| name.contains(part))).map(|(_, datum)| *datum);
+    if let Some(datum) = height_datum(own).or_else(varied) {
+        return Some(datum.to_string());
     }
-    let own =
-        ["ftus", "usft", "ft", "heights", "height"].iter().fold(name.as_str(), |name, end| name.trim_end_matches(*end));
     (!["", "unknown", "unnamed", "none", "undefined"].contains(&own)).then(|| own.to_string())
 }
 
@@ -107,5 +127,29 @@ mod tests {
         assert_eq!(VerticalSystem::default().difference(&coded(5703)), None);
         let differs = coded(5702).difference(&named("NAVD88 - Geoid12B (Meters)")).unwrap();
         assert_eq!(differs, "the datum of heights (EPSG:5702, NAVD88 - Geoid12B (Meters))");
+    }
+
+    #[test]
+    fn a_code_agrees_with_the_names_that_epsg_and_esri_have_for_it() {
+        let named = |name: &str| VerticalSystem { name: Some(name.into()), ..VerticalSystem::default() };
+        let coded = |code| VerticalSystem { epsg: Some(code), ..VerticalSystem::default() };
+        for (code, names) in [
+            (7839, ["NZVD2016 height", "NZVD2016"]),
+            (5728, ["LN02 height", "Landesnivellement_1902"]),
+            (3900, ["N2000 height", "N2000"]),
+            (5710, ["Ostend height", "Oostende"]),
+            (5705, ["Baltic 1977 height", "Baltic"]),
+            (5214, ["Genoa 1942 height", "Genoa"]),
+        ] {
+            for name in names {
+                assert_eq!(coded(code).difference(&named(name)), None, "{code} {name}");
+                assert_eq!(named(name).difference(&named(names[0])), None, "{code} {name}");
+            }
+            assert_eq!(coded(code).metres_of_code(), Some(1.0));
+            assert!(coded(code).difference(&named("NAVD88 height")).is_some());
+        }
+        let unknown = coded(31_000).difference(&named("LN02 height")).unwrap();
+        assert!(unknown.contains("EPSG:31000 is not in the list of known codes of heights"), "{unknown}");
+        assert!(coded(5703).difference(&coded(6357)).unwrap().contains("depths"));
     }
 }

@@ -168,6 +168,24 @@ pub(crate) fn unbound(node: &WktNode) -> &WktNode {
     node.child(&["SOURCECRS"]).and_then(|source| source.children().next()).unwrap_or(node)
 }
 
+/// Returns the seven parameters of the way to WGS 84 of the first bound system in `text`, if it gives them.
+pub(crate) fn bound_shift(text: &str) -> Option<[f64; 7]> {
+    let roots = WktNode::parse_all(text)?;
+    let bound = roots.iter().flat_map(parts).find(|part| part.keyword == "BOUNDCRS")?;
+    let transformation = bound.child(&["ABRIDGEDTRANSFORMATION"])?;
+    let method = transformation.child(&["METHOD"]).and_then(|method| method.text(0)).map(comparable_name);
+    // The one method turns the points, the other one the axes.
+    let sign = if method.is_some_and(|method| method.contains("coordinateframe")) { -1.0 } else { 1.0 };
+    let parameters = transformation.children().filter(|child| child.keyword == "PARAMETER");
+    let all: Vec<f64> = parameters.map(|parameter| parameter.number(1)).collect::<Option<_>>()?;
+    match all.as_slice() {
+        [x, y, z] => Some([*x, *y, *z, 0.0, 0.0, 0.0, 0.0]),
+        // Its scale is a factor.
+        [x, y, z, a, b, c, scale] => Some([*x, *y, *z, sign * a, sign * b, sign * c, (scale - 1.0) * 1e6]),
+        _ => None,
+    }
+}
+
 /// Returns the unit of the first axis, or of all axes, and the unit of the third axis if there is one.
 pub(crate) fn units(node: &WktNode) -> (Option<&WktNode>, Option<&WktNode>) {
     let common = node.child(&UNITS);

@@ -137,11 +137,21 @@ const TRANSFORM: &str = "Transform the points to a projected CRS first, for exam
 ///
 /// # Errors
 /// [`Error::Config`] if the coordinates are in degrees or count from the middle of the earth.
-pub fn horizontal_unit(choice: UnitChoice, crs: &Crs, warnings: &mut Warnings) -> Result<(&'static str, f64)> {
+pub fn horizontal_unit(
+    choice: UnitChoice,
+    chosen: &CrsChoice,
+    crs: &Crs,
+    warnings: &mut Warnings,
+) -> Result<(&'static str, f64)> {
+    // What the user says is no record of a file.
+    let what_to_do = match chosen {
+        CrsChoice::Given { .. } => "if the files are in another CRS than [input] crs says, name that one",
+        _ => "if the CRS record is wrong, say with [input] crs what the files are in",
+    };
     if crs.kind == CrsKind::Geocentric {
         return Err(Error::Config(format!(
-            "the coordinates are geocentric ({}): they count from the middle of the earth, and z is no height. {TRANSFORM}; if the CRS \
-             record is wrong, say with [input] crs what the files are in, or \"none\" for a plane",
+            "the coordinates are geocentric ({}): they count from the middle of the earth, and z is no height. {TRANSFORM}; \
+             {what_to_do}, or \"none\" for a plane",
             crs.label()
         )));
     }
@@ -162,8 +172,8 @@ pub fn horizontal_unit(choice: UnitChoice, crs: &Crs, warnings: &mut Warnings) -
             Ok((key_of(Unit::Metre), 1.0))
         }
         _ => Err(Error::Config(format!(
-            "the coordinates are in degrees ({}), and a Delaunay triangulation in degrees is distorted. {TRANSFORM}; if the CRS record \
-             is wrong, say with [input] crs what the files are in, or set [input] unit = \"metre\"",
+            "the coordinates are in degrees ({}), and a Delaunay triangulation in degrees is distorted. {TRANSFORM}; \
+             {what_to_do}, or set [input] unit = \"metre\"",
             crs.name.as_deref().unwrap_or("geographic CRS"),
         ))),
     }

@@ -95,7 +95,7 @@ fn try_plan(
     check_missing_records(sources, &options.input)?;
     refuse_degrees(sources, &options.input)?;
     let crs = common_crs(sources, &options.input.crs, &mut warnings)?;
-    let (unit, metres) = horizontal_unit(options.input.unit, &crs, &mut warnings)?;
+    let (unit, metres) = horizontal_unit(options.input.unit, &options.input.crs, &crs, &mut warnings)?;
     let metres_z = crs.vertical.unwrap_or(metres);
     let wish = LatticeWish {
         metres: [metres, metres_z],
