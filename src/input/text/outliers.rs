@@ -1,6 +1,8 @@
 //! Rows that lie so far from all others that they are mistakes, such as 0, 0, 0 among coordinates of a national grid.
 
-use std::ops::Range;
+use std::ops::{AddAssign, Range};
+
+use serde::{Deserialize, Serialize};
 
 use crate::Result;
 use crate::input::file::random_access::RandomAccessFile;
@@ -8,7 +10,7 @@ use crate::input::text::columns::Columns;
 use crate::input::text::lines::{TextLine, for_each_line};
 use crate::input::text::row::RowReader;
 use crate::input::text::row_box::RowBox;
-use crate::input::text::survey::Wanted;
+use crate::input::text::survey::{Survey, Wanted};
 
 /// The most rows of a chunk that are looked at.
 const ROWS_OF_A_CHUNK: u64 = 4096;
@@ -25,9 +27,33 @@ const LEAST_ROWS: usize = 5;
 /// One row in so many may be an outlier. If there are more, they are a part of the terrain.
 const RARE: u64 = 50;
 
-/// Returns whether so few of `rows` are outliers that they are mistakes. Of a few rows none is, unless `even_among_few`: then one may be.
-pub(crate) fn are_rare(outliers: u64, rows: u64, even_among_few: bool) -> bool {
-    outliers > 0 && outliers <= (rows / RARE).max(even_among_few as u64)
+/// Rows that lie far from all others.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Outliers {
+    /// How many rows they are.
+    pub rows: u64,
+    /// At how many places they lie, or the number of rows. Rows at one place are one mistake, such as 0, 0, 0 for "nothing measured".
+    pub places: u64,
+}
+
+impl Outliers {
+    /// Returns the outliers that a survey has found.
+    pub(crate) fn of(survey: &Survey) -> Outliers {
+        let rows = survey.outliers;
+        Outliers { rows, places: if survey.outlier_box.is_point() { rows.min(1) } else { rows } }
+    }
+
+    /// Returns whether they are so few among `rows` that they are mistakes. Of a few rows none is, unless `even_among_few`: then one may be.
+    pub fn are_rare(&self, rows: u64, even_among_few: bool) -> bool {
+        self.places > 0 && self.places <= (rows / RARE).max(even_among_few as u64)
+    }
+}
+
+impl AddAssign for Outliers {
+    fn add_assign(&mut self, other: Outliers) {
+        self.rows += other.rows;
+        self.places += other.places;
+    }
 }
 
 /// Returns the box outside which a row is an outlier, given the box of the [middle](middle_box) of the rows; `None` if that is a point.
@@ -57,7 +83,7 @@ pub(crate) fn middle_box(
             Ok(())
         })?;
         let stride = lines / ROWS_OF_A_CHUNK + 1;
-        let mut reader = RowReader::new(columns, columns.has_surplus);
+        let mut reader = RowReader::new(columns);
         for_each_line(file, first, chunk.clone(), |index, line| {
             if let TextLine::Whole(line) = line
                 && index % stride == 0

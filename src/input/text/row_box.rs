@@ -40,6 +40,11 @@ impl RowBox {
         }
     }
 
+    /// Returns whether all rows of the box lie at one place.
+    pub(crate) fn is_point(&self) -> bool {
+        self.min == self.max
+    }
+
     /// Returns whether the row lies in the box, borders included.
     #[inline]
     pub(crate) fn holds(&self, numbers: &[Number; 3]) -> bool {
@@ -49,6 +54,12 @@ impl RowBox {
     /// Returns whether all of `other` lies in the box.
     pub(crate) fn holds_box(&self, other: &RowBox) -> bool {
         (0..3).all(|axis| self.min[axis] <= other.min[axis] && other.max[axis] <= self.max[axis])
+    }
+
+    /// Returns how far the row lies from the middle of the box, on the axis on which it is farthest.
+    pub(crate) fn distance_to(&self, numbers: &[Number; 3]) -> f64 {
+        let distance = |axis: usize| (numbers[axis].value() - (self.min[axis] + self.max[axis]) / 2.0).abs();
+        distance(0).max(distance(1)).max(distance(2))
     }
 
     /// Returns the greatest distance from zero along `axis`.

@@ -76,8 +76,11 @@ pub(crate) struct Fineness {
 /// A step in metres. Nobody misses what is finer, so nothing is left out of a lattice for the sake of a finer step.
 const MEANINGFUL: f64 = 0.00101;
 
-/// A step in metres. With a coarser one, a terrain is none.
-const USELESS: f64 = 1.0;
+/// A step in metres. With this or a coarser one, a terrain is none.
+const USELESS: f64 = 0.3;
+
+/// A step in metres. If the inputs are rounded to a coarser one, the user should know which point makes them that wide.
+const COARSE: f64 = 0.0101;
 
 /// Returns how well a lattice can hold `extent`.
 pub(crate) fn fineness(sources: &[Source], extent: &Extent, wish: &LatticeWish) -> Fineness {
@@ -94,9 +97,17 @@ impl Fineness {
     /// Returns whether a step is so coarse that the points make no terrain, or there is none.
     pub(crate) fn is_useless(&self) -> bool {
         let is_useless = |(step, metres): (&Option<ChosenStep>, f64)| {
-            step.as_ref().is_none_or(|step| !step.lossless && to_float(step.step) * metres > USELESS)
+            step.as_ref().is_none_or(|step| !step.lossless && to_float(step.step) * metres >= USELESS)
         };
         self.steps.iter().zip(self.metres).any(is_useless)
+    }
+
+    /// Returns whether a step is coarsened to more than a centimetre.
+    pub(crate) fn is_coarse(&self) -> bool {
+        let is_coarse = |(step, metres): (&Option<ChosenStep>, f64)| {
+            step.as_ref().is_some_and(|s| s.step != s.finest && to_float(s.step) * metres > COARSE)
+        };
+        self.steps.iter().zip(self.metres).any(is_coarse)
     }
 
     /// Returns whether the lattice is finer than that of `other` where that one is coarse, or holds what that one does not.
