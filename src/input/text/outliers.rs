@@ -8,6 +8,7 @@ use crate::Result;
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::text::columns::Columns;
 use crate::input::text::lines::{TextLine, for_each_line};
+use crate::input::text::number::Number;
 use crate::input::text::row::RowReader;
 use crate::input::text::row_box::RowBox;
 use crate::input::text::survey::{Survey, Wanted};
@@ -56,7 +57,23 @@ impl AddAssign for Outliers {
     }
 }
 
-/// Returns the box outside which a row is an outlier, given the box of the [middle](middle_box) of the rows; `None` if that is a point.
+/// Where most rows lie.
+pub(crate) struct Middle {
+    /// The box of nine in ten rows on each axis.
+    pub(crate) bounds: RowBox,
+    /// The median of each axis.
+    pub(crate) centre: [f64; 3],
+}
+
+impl Middle {
+    /// Returns how far a row lies from the centre, on the axis on which it is farthest.
+    pub(crate) fn distance_to(&self, numbers: &[Number; 3]) -> f64 {
+        let distance = |axis: usize| (numbers[axis].value() - self.centre[axis]).abs();
+        distance(0).max(distance(1)).max(distance(2))
+    }
+}
+
+/// Returns the box outside which a row is an outlier, given the box of the [middle] of the rows; `None` if that is a point.
 pub(crate) fn plausible_box(middle: &RowBox) -> Option<RowBox> {
     // A strip or a plane is narrow on one axis, which says nothing about how far its rows may lie apart there.
     let size = |axis: usize| middle.max[axis] - middle.min[axis];
@@ -66,15 +83,15 @@ pub(crate) fn plausible_box(middle: &RowBox) -> Option<RowBox> {
         .then(|| RowBox { min: middle.min.map(|low| low - margin), max: middle.max.map(|high| high + margin) })
 }
 
-/// Returns the box of nine in ten rows on each axis, by a sample of the wanted rows in these chunks, given as byte ranges; `None` if
+/// Returns where most rows lie, by a sample of the wanted rows in these chunks, given as byte ranges; `None` if
 /// there are too few rows to tell.
-pub(crate) fn middle_box(
+pub(crate) fn middle(
     file: &RandomAccessFile,
     columns: &Columns,
     first: u64,
     chunks: &[Range<u64>],
     wanted: Wanted,
-) -> Result<Option<RowBox>> {
+) -> Result<Option<Middle>> {
     let mut values: [Vec<f64>; 3] = Default::default();
     for chunk in chunks {
         let mut lines = 0;
@@ -100,10 +117,11 @@ pub(crate) fn middle_box(
     if values[0].len() < LEAST_ROWS {
         return Ok(None);
     }
-    let mut middle = RowBox::empty();
+    let (mut bounds, mut centre) = (RowBox::empty(), [0.0; 3]);
     for (axis, values) in values.iter_mut().enumerate() {
         values.sort_unstable_by(f64::total_cmp);
-        (middle.min[axis], middle.max[axis]) = (values[cut], values[values.len() - 1 - cut]);
+        (bounds.min[axis], bounds.max[axis]) = (values[cut], values[values.len() - 1 - cut]);
+        centre[axis] = values[values.len() / 2];
     }
-    Ok(Some(middle))
+    Ok(Some(Middle { bounds, centre }))
 }

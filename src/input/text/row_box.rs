@@ -56,12 +56,6 @@ impl RowBox {
         (0..3).all(|axis| self.min[axis] <= other.min[axis] && other.max[axis] <= self.max[axis])
     }
 
-    /// Returns how far the row lies from the middle of the box, on the axis on which it is farthest.
-    pub(crate) fn distance_to(&self, numbers: &[Number; 3]) -> f64 {
-        let distance = |axis: usize| (numbers[axis].value() - (self.min[axis] + self.max[axis]) / 2.0).abs();
-        distance(0).max(distance(1)).max(distance(2))
-    }
-
     /// Returns the greatest distance from zero along `axis`.
     pub(crate) fn farthest(&self, axis: usize) -> f64 {
         self.min[axis].abs().max(self.max[axis].abs())

@@ -18,7 +18,7 @@ use crate::input::text::lines::{LONGEST, TextLine, for_each_line, shown};
 use crate::input::text::noise_warning::noise_warning;
 use crate::input::text::number::{MOST_DECIMALS, POWERS};
 use crate::input::text::options::TextOptions;
-use crate::input::text::outliers::{Outliers, middle_box, plausible_box};
+use crate::input::text::outliers::{Middle, Outliers, middle, plausible_box};
 use crate::input::text::role::ColumnRole;
 use crate::input::text::row::RowReader;
 use crate::input::text::row_box::RowBox;
@@ -163,13 +163,13 @@ impl TextTable {
             first_outlier_in: None,
             bounds: choice.bounds,
         };
-        if named_degrees && units.horizontal == Unit::Unknown {
+        if named_degrees && units.horizontal == Unit::Unknown && bounds.is_some() {
             if table.has_degrees(file, choice)? {
                 table.unit = Unit::Degree;
             } else {
                 warnings.push(format!(
                     "its columns are named as longitude and latitude, but hold no degrees (x from {} to {}, y from {} to {}): they count as \
-                     metres. Degrees and minutes in one number, or degrees times ten million, must be made degrees and transformed first",
+                     lengths. Degrees and minutes in one number, or degrees times ten million, must be made degrees and transformed first",
                     min[0], max[0], min[1], max[1]
                 ));
             }
@@ -183,23 +183,23 @@ impl TextTable {
         let Some(wanted) = self.wanted.bounds else { return Ok(false) };
         let fits = |rows: &RowBox, x: f64, y: f64| rows.farthest(0) <= x && rows.farthest(1) <= y;
         let are_degrees = |rows: &RowBox| fits(rows, 360.0, 90.0) || fits(rows, 90.0, 360.0);
-        Ok(are_degrees(&wanted) || self.middle(file, choice)?.is_some_and(|middle| are_degrees(&middle)))
+        Ok(are_degrees(&wanted) || self.middle(file, choice)?.is_some_and(|middle| are_degrees(&middle.bounds)))
     }
 
-    /// Returns the box in which most rows lie; `None` if there are too few rows to tell.
-    fn middle(&self, file: &RandomAccessFile, choice: &RowChoice) -> Result<Option<RowBox>> {
+    /// Returns where most rows lie; `None` if there are too few rows to tell.
+    fn middle(&self, file: &RandomAccessFile, choice: &RowChoice) -> Result<Option<Middle>> {
         let chunks = self.chunk_count() as u64;
         let sampled: Vec<Range<u64>> = (0..SAMPLED_CHUNKS.min(chunks))
             .map(|index| chunk_range(&self.rows, index * chunks / SAMPLED_CHUNKS.min(chunks)))
             .collect();
-        middle_box(file, &self.columns, self.rows.start, &sampled, Wanted { choice, within: None })
+        middle(file, &self.columns, self.rows.start, &sampled, Wanted { choice, within: None })
     }
 
     /// Finds the rows that lie so far from all others that they are mistakes, if they are few, and leaves them out: decoding counts them
     /// as malformed. Returns how many there are.
     pub(crate) fn leave_out_outliers(&mut self, file: &RandomAccessFile, choice: &RowChoice) -> Result<Outliers> {
         let Some(bounds) = self.wanted.bounds else { return Ok(Outliers::default()) };
-        let plausible = self.middle(file, choice)?.and_then(|middle| plausible_box(&middle));
+        let plausible = self.middle(file, choice)?.and_then(|middle| plausible_box(&middle.bounds));
         let Some(within) = plausible.filter(|plausible| !plausible.holds_box(&bounds)) else {
             return Ok(Outliers::default());
         };
@@ -229,6 +229,7 @@ impl TextTable {
         let Some(middle) = self.middle(file, choice)? else { return Ok(None) };
         let mut farthest: Option<FarRow> = None;
         for (chunk, start) in self.chunks.iter().enumerate() {
+            interrupt::check()?;
             let mut reader = RowReader::new(&self.columns);
             let wanted = Wanted { choice, within: self.held().bounds };
             for_each_line(file, self.rows.start, chunk_range(&self.rows, chunk as u64), |index, line| {
