@@ -61,7 +61,12 @@ impl InputOptions {
 
     /// Returns which rows of a text the job wants, with or without their `colors`.
     pub fn row_choice(&self, colors: bool) -> RowChoice {
-        RowChoice { bounds: self.bounds.map(|bounds| bounds.0), classes: self.kept_classes(), colors }
+        RowChoice {
+            bounds: self.bounds.map(|bounds| bounds.0),
+            classes: self.kept_classes(),
+            strict_classes: self.classes.is_some(),
+            colors,
+        }
     }
 }
 

@@ -7,7 +7,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::input::crs::plausible::plausible;
 use crate::input::crs::system::Crs;
-use crate::input::crs::unit::Unit;
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::las::crs_records;
 use crate::input::las::header::LasHeader;
@@ -20,8 +19,10 @@ use crate::input::points::axis::Axis;
 use crate::input::points::counts::PointCounts;
 use crate::input::points::filter::PointFilter;
 use crate::input::points::point::Point;
+use crate::input::points::raw_bounds::RawBounds;
 use crate::input::points::rules::PointRules;
 use crate::input::text::options::TextOptions;
+use crate::input::text::outliers::Outliers;
 use crate::input::text::row_choice::RowChoice;
 use crate::input::text::table::TextTable;
 use crate::{Result, Warnings};
@@ -158,7 +159,6 @@ fn open_las(file: &RandomAccessFile) -> Result<Source> {
 fn open_text(file: &RandomAccessFile, options: &TextOptions, choice: &RowChoice) -> Result<Source> {
     let mut warnings = Warnings::default();
     let table = TextTable::scan(file, options, choice, &mut warnings)?;
-    let horizontal = if table.degrees { Unit::Degree } else { Unit::Unknown };
     Ok(Source {
         path: file.path().to_path_buf(),
         size: file.size(),
@@ -173,7 +173,7 @@ fn open_text(file: &RandomAccessFile, options: &TextOptions, choice: &RowChoice)
         grid: table.grid(),
         has_rgb: table.has_rgb(),
         has_class: table.has_class(),
-        crs: Crs { horizontal, ..Crs::default() },
+        crs: Crs { horizontal: table.unit, vertical: table.unit_z, ..Crs::default() },
         by_return: Vec::new(),
         warnings,
         points: PointData::Text(Box::new(table)),
@@ -198,18 +198,43 @@ impl Source {
         }
     }
 
-    /// Leaves out the few rows of a text that lie so far from all others that they are mistakes: decoding counts them as malformed,
-    /// and they have no say about the axes and the grid. `choice` is that with which the source was opened. `even_among_few`
-    /// tells whether one row of a few may be such a row. Returns whether there are such rows.
+    /// Leaves out the rows of a text that lie so far from all others that they are mistakes, if they are few: decoding counts them as
+    /// malformed, and they have no say about the axes and the grid. `choice` is that with which the source was opened. Returns how many
+    /// there are; whether they are few, the caller decides, who knows the other files.
     ///
     /// # Errors
     /// `Io` if the file cannot be read.
-    pub fn leave_out_outliers(&mut self, choice: &RowChoice, even_among_few: bool) -> Result<bool> {
-        let PointData::Text(table) = &mut self.points else { return Ok(false) };
+    pub fn leave_out_outliers(&mut self, choice: &RowChoice) -> Result<Outliers> {
+        let PointData::Text(table) = &mut self.points else { return Ok(Outliers::default()) };
         let file = RandomAccessFile::reopen(&self.path, self.size)?;
-        let left_out = table.leave_out_outliers(&file, choice, even_among_few)?;
+        let found = table.leave_out_outliers(&file, choice)?;
         (self.axes, self.grid) = (table.axes(), table.grid());
-        Ok(left_out)
+        Ok(found)
+    }
+
+    /// Returns the number of rows of a text that the job wants, outliers included.
+    pub fn wanted_rows(&self) -> u64 {
+        match &self.points {
+            PointData::Text(table) => table.wanted_rows(),
+            _ => 0,
+        }
+    }
+
+    /// Returns how far the row of a text lies from the middle of all that lies farthest from it, and a description of it.
+    ///
+    /// # Errors
+    /// `Io` if the file cannot be read.
+    pub fn farthest_row(&self, choice: &RowChoice) -> Result<Option<(f64, String)>> {
+        let PointData::Text(table) = &self.points else { return Ok(None) };
+        let file = RandomAccessFile::reopen(&self.path, self.size)?;
+        let place = |line: u64, text: &str| format!("{}: line {line}: {text}", self.path.display());
+        Ok(table.farthest_row(&file, choice)?.map(|row| (row.distance, place(row.line, &row.text))))
+    }
+
+    /// Returns the raw integers within these bounds in x and y: least x and y, greatest x and y, borders included. `None` for text, which
+    /// compares the numbers that it holds.
+    pub fn raw_bounds(&self, bounds: [f64; 4]) -> Option<RawBounds> {
+        (self.format != FileFormat::Text).then(|| RawBounds::of(&self.axes, bounds))
     }
 
     /// Returns the number of rows that [`Source::leave_out_outliers`] leaves out.
@@ -220,9 +245,9 @@ impl Source {
         }
     }
 
-    /// Returns whether a row is left out that would be kept without `even_among_few`.
-    pub fn has_outlier_among_few(&self) -> bool {
-        matches!(&self.points, PointData::Text(table) if table.has_outlier_among_few())
+    /// Returns whether rows are left out that are not rare in this file.
+    pub fn has_frequent_outliers(&self) -> bool {
+        matches!(&self.points, PointData::Text(table) if table.has_frequent_outliers())
     }
 
     /// Undoes [`Source::leave_out_outliers`].

@@ -6,11 +6,10 @@ use std::sync::{Mutex, PoisonError};
 
 use bytemuck::{Pod, Zeroable, bytes_of};
 use rayon::prelude::*;
-use rust_decimal::prelude::ToPrimitive;
 use xxhash_rust::xxh3::xxh3_64;
 
-use crate::geometry::lattice::{AxisMap, Lattice, REACH, shortest_decimal};
-use crate::geometry::{Bounds, Site};
+use crate::geometry::Site;
+use crate::geometry::lattice::{AxisMap, Lattice, shortest_decimal};
 use crate::input::options::Duplicates;
 use crate::input::samples::{FileSamples, fingerprint_of};
 use crate::input::{Point, PointRules, RowChoice, Source, TextOptions, TextReading, open_chosen};
@@ -97,7 +96,10 @@ impl<'a> Inputs<'a> {
         let open_again = |file: &PathBuf| {
             let mut source = open_chosen(file, &text, &choice)?;
             if reading.outliers_left_out {
-                source.leave_out_outliers(&choice, reading.even_among_few)?;
+                source.leave_out_outliers(&choice)?;
+                if source.has_frequent_outliers() && !reading.even_among_few {
+                    source.keep_outliers();
+                }
             }
             Ok(source)
         };
@@ -146,7 +148,7 @@ impl<'a> Inputs<'a> {
         Ok(PointRules {
             maps: [map(0)?, map(1)?, map(2)?],
             classes: input.map_or([true; 256], |input| input.kept_classes()),
-            bounds: input.and_then(|input| input.bounds).map(|bounds| clip(lattice, bounds.0)),
+            bounds: input.and_then(|input| input.bounds).and_then(|bounds| source.raw_bounds(bounds.0)),
             first_order,
             rgb: false,
         })
@@ -188,19 +190,6 @@ fn lattice_of(facts: &ReportedFacts, extras: &Extras) -> Result<Lattice> {
         resolution: decimal(extras.resolution)?,
         resolution_z: decimal(extras.resolution_z)?,
     })
-}
-
-/// Returns the box of the lattice points within `bounds`, borders included. It is inside out if there is none.
-fn clip(lattice: &Lattice, [xmin, ymin, xmax, ymax]: [f64; 4]) -> Bounds<2> {
-    let steps = |bound: f64, axis: usize, is_upper: bool| {
-        let exact = shortest_decimal(bound).and_then(|bound| bound.checked_sub(lattice.offset[axis]));
-        let steps = exact.and_then(|from| from.checked_div(lattice.resolution));
-        let steps = steps.and_then(|steps| if is_upper { steps.floor() } else { steps.ceil() }.to_i64());
-        // A bound beyond all numbers is as far out as sites can lie.
-        let far = if bound < 0.0 { -i64::from(REACH) } else { i64::from(REACH) };
-        steps.unwrap_or(far).clamp(-i64::from(REACH), i64::from(REACH)) as i32
-    };
-    Bounds { min: [steps(xmin, 0, false), steps(ymin, 1, false)], max: [steps(xmax, 0, true), steps(ymax, 1, true)] }
 }
 
 /// In what the vertices and the points of the inputs differ.

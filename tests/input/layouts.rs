@@ -1,7 +1,7 @@
 //! The layouts of texts that programs write: names of columns, lines before them, delimiters, colours.
 
 use gdt_batch::Result;
-use gdt_batch::input::{Point, TextOptions, open};
+use gdt_batch::input::{Point, TextOptions, Unit, open};
 
 use crate::cloud::{Cloud, file, read_bytes};
 use crate::first_warning;
@@ -56,8 +56,175 @@ fn lines_before_the_rows_are_understood() {
     ] {
         assert_two_points(content);
     }
-    // A comment that names other columns than the rows have says nothing about them.
-    assert_two_points("# z y x of the hill\n1.5 2 3.25\n4 5 6\n");
+    // A comment that says what is so without it may have more words.
+    assert_two_points("# x y z of the hill\n1.5 2 3.25\n4 5 6\n");
+    let error = text("# z y x of the hill\n3.25 2 1.5\n6 5 4\n").err().expect("was read");
+    assert!(error.exit_code() == 3 && error.to_string().contains("names x, y and z, but"), "{error}");
+}
+
+#[test]
+fn a_commented_header_fits_as_a_plain_one_does() {
+    for content in [
+        "# z,y,x\n3.25,2,1.5,\n6,5,4,\n",
+        "# z,y,x,\n3.25,2,1.5,\n6,5,4,\n",
+        "# z;y;x\n3.25;2;1.5;\n6;5;4\n",
+        "# Z Y X\n3.25 2 1.5 9\n6 5 4 9\n",
+        "# Columns: Z Y X\n3.25 2 1.5\n6 5 4\n",
+        "# Columns: Z Y X\n3.25 2 1.5 9\n6 5 4 9\n",
+        "# z y x\n# made by me\n3.25 2 1.5\n6 5 4\n",
+        "# z y x\n6 5 4\n3.25 2 1.5\n",
+    ] {
+        let cloud = text(content).unwrap_or_else(|error| panic!("{content:?}: {error}"));
+        assert_eq!(cloud.counts.malformed, 0, "{content:?}");
+        assert_eq!((cloud.source.min, cloud.source.max), ([1.5, 2.0, 3.25], [4.0, 5.0, 6.0]), "{content:?}");
+    }
+}
+
+#[test]
+fn names_after_a_title_of_numbers_are_not_lost() {
+    for names in ["y x z", "y,x,z"] {
+        let error = text(&format!("Scan 2023 05 12\n{names}\n2 1.5 3.25\n5 4 6\n")).err().expect("was read");
+        assert!(error.exit_code() == 3 && error.to_string().contains("names the columns"), "{error}");
+    }
+    let path = file(".csv", b"Scan 2023 05 12\ny x z\n1.5 2 3.25\n4 5 6\n");
+    let options = TextOptions { header: Some(false), ..TextOptions::default() };
+    assert_eq!(open(&path, &options).unwrap().known_malformed(), 2);
+}
+
+#[test]
+fn the_number_of_a_point_is_not_taken_for_x() {
+    for row in [
+        |i: usize| format!("{},{}.5,{}.25,{}.1\n", i + 1, 5_933_000 + i, 565_000 + i * i % 7, 12 + i % 5),
+        |i| format!("{} {}.5 {}.25 {}.1 GND\n", 100 + 3 * i, 5_933_000 + i, 565_000 + i * i % 7, 12 + i % 5),
+    ] {
+        let rows: String = (0..20).map(row).collect();
+        let error = text(&rows).err().expect("was read");
+        assert!(error.exit_code() == 3 && error.to_string().contains("counts the rows"), "{error}");
+        assert_eq!(text(&format!("id y x z code\n{}", rows.replace(',', " "))).unwrap().source.max[2], 16.1);
+    }
+}
+
+#[test]
+fn units_beside_and_below_the_names_are_used() {
+    let crs = |text_of: &str| text(text_of).unwrap_or_else(|error| panic!("{text_of:?}: {error}")).source.crs;
+    let rows = "1.5;2;3.25\n4;5;6\n";
+    for (header, unit, vertical) in [
+        ("x [m];y [m];z [m]", Unit::Metre, None),
+        ("x [mm];y [mm];z [mm]", Unit::Other(0.001), None),
+        ("x [km];y [km];z [m]", Unit::Other(1000.0), Some(1.0)),
+        ("x;y;z\n[m];[m];[cm]", Unit::Metre, Some(0.01)),
+        ("x;y;z\nft;ft;ft", Unit::Foot, None),
+        ("x [us-ft];y [us-ft];z [us-ft]", Unit::UsFoot, None),
+        ("x;y;z", Unit::Unknown, None),
+        ("x (local);y (local);z (NAVD88)", Unit::Unknown, None),
+        ("lon;lat;z\ndeg;deg;m", Unit::Degree, Some(1.0)),
+        ("x [dd];y [dd];z", Unit::Degree, None),
+    ] {
+        let found = crs(&format!("{header}\n{rows}"));
+        assert_eq!((found.horizontal, found.vertical), (unit, vertical), "{header}");
+    }
+    for (header, words) in
+        [("x [m];y [ft];z", "m for x and ft for y"), ("x [m];y [m];z\nmm;mm;mm", "the line below it says mm")]
+    {
+        let error = text(&format!("{header}\n{rows}")).err().expect("was read");
+        assert!(error.exit_code() == 3 && error.to_string().contains(words), "{error}");
+    }
+}
+
+#[test]
+fn decimal_commas_are_read_where_something_else_parts_columns() {
+    for content in [
+        "1,5;2;3,25\n4;5;6\n",
+        "x;y;z\n1,5;2,0;3,25\n4,0;5,0;6,0\n",
+        "sep=;\r\n\"z\";\"y\";\"x\"\r\n\"3,25\";\"2\";\"1,5\"\r\n6;5;4\r\n",
+        "1,5\t2\t3,25\n4\t5\t6\n",
+        "1,5 2,0 3,25\n4 5 6\n",
+        "Punkt;Rechtswert;Hochwert;Höhe;Bemerkung\nA,1;1,5;2,0;3,25;Baum, alt\nA,2;4;5;6;\n",
+        "z,y,x\n3,25;2;1,5\n6;5;4\n",
+        "1,5e0;2;3,25\n4;5;6\n",
+    ] {
+        assert_two_points(content);
+    }
+    let cloud = text("x;y;z\n1,5;2;3\n2,5;1.234;3\n1,5;1.234,5;3\n").unwrap();
+    assert_eq!((cloud.counts.kept, cloud.counts.malformed), (1, 2));
+    assert!(cloud.counts.examples[0].contains("a comma before them in this file"), "{:?}", cloud.counts.examples);
+}
+
+#[test]
+fn the_last_of_decimal_commas_can_be_cut_off() {
+    let rows: String = (0..20).map(|i| format!("{i},50;{},25;{},125\n", 3 * i, 1000 + i)).collect();
+    let cut = text(&rows[..rows.len() - 3]).unwrap();
+    assert_eq!((cut.counts.kept, cut.counts.malformed), (19, 1));
+}
+
+#[test]
+fn names_for_some_columns_do_not_hide_decimal_commas() {
+    let rows: String =
+        (0..50).map(|i| format!("{},25,{},50,12,{}\n", 565_000 + i, 5_933_000 + 7 * i, i % 10)).collect();
+    let path = file(".csv", rows.as_bytes());
+    let named = |names: &[&str]| {
+        let columns = Some(names.iter().map(|name| name.to_string()).collect());
+        open(&path, &TextOptions { columns, ..TextOptions::default() })
+    };
+    let error = named(&["x", "y", "z"]).err().expect("was read");
+    assert!(error.exit_code() == 3 && error.to_string().contains("all of its columns"), "{error}");
+    assert_eq!(named(&["x", "_", "y", "_", "z", "_"]).unwrap().records, 50);
+}
+
+#[test]
+fn a_whole_table_without_some_of_its_last_column_is_read() {
+    let row =
+        |i: usize| format!("{},{},{}{}\n", 565_000 + i, 5_933_000 + 7 * i, 12 + i, if i % 3 == 0 { "" } else { ",2" });
+    let rows: String = (0..50).map(row).collect();
+    assert_eq!(text(&format!("x,y,z,note\n{rows}")).unwrap().counts.kept, 50);
+}
+
+#[test]
+fn the_columns_of_late_rows_are_counted_before_they_are_read() {
+    let rows: String = (0..20_000).map(|i| format!("{i}.25,{}.5,{}.1,7\n", 3 * i, i % 9)).collect();
+    let late = format!("x,y,z,i\n{rows}565000.25,5933000.50,12.123456,1,2,3\n");
+    assert!(late.len() > 1 << 18);
+    let cloud = text(&late).unwrap();
+    assert_eq!((cloud.source.known_malformed(), cloud.counts.malformed), (1, 1));
+    assert_eq!(cloud.source.axes[2].scale.to_string(), "0.1");
+}
+
+#[test]
+fn messages_about_rows_name_the_right_column() {
+    for (content, words) in [
+        ("1 2 3\n1 2 1e30\n", "column 3 (z) is \"1e30\", which is too large"),
+        ("1 2 3\n1 2 -3.4028235e+38\n", "\"-3.4028235e+38\", which is too large"),
+        ("id,desc,x,y,z\n1,a,1,2,3\n77\n", "column 2 is missing"),
+        ("P1 565026.16 5933012.3 12.1\nP2 565027.16 5933013.3 12.2\n", "column 1 (x) is \"P1\""),
+    ] {
+        let cloud = text(content).unwrap();
+        assert!(cloud.counts.examples[0].contains(words), "{content:?}: {:?}", cloud.counts.examples);
+    }
+}
+
+#[test]
+fn the_warning_about_noise_shows_what_is_written() {
+    let cloud = text("5.650231400000000139e+05 1 2\n1 2 3\n").unwrap();
+    let warning = first_warning(&cloud);
+    assert!(warning.contains("such as 5.650231400000000139e+05, which counts as 565023.14"), "{warning}");
+}
+
+#[test]
+fn heights_from_single_precision_move_neither_x_nor_y() {
+    let z = |i: usize| f64::from((100_000 + 37 * i) as f32 / 1000.0);
+    for count in [4, 5, 9, 40, 400] {
+        let rows: String = (0..count)
+            .map(|i| {
+                format!("{} {} {:.14}\n", 1_565_000.125 + 0.25 * i as f64, 5_400_000.125 + 0.25 * (i % 7) as f64, z(i))
+            })
+            .collect();
+        let cloud = text(&rows).unwrap();
+        assert_eq!(cloud.source.axes.map(|axis| axis.scale.to_string()), ["0.001"; 3], "{count} rows");
+        assert_eq!((cloud.source.min[0], cloud.counts.rounded_xy), (1_565_000.125, 0), "{count} rows");
+    }
+    // One such number of a few says nothing about the others.
+    let few = text("1 2 3.125\n2 3 4.0625\n4 5 12.300000190734863\n5 7 1000000.0625\n").unwrap();
+    assert_eq!((few.source.axes[2].scale.to_string(), few.counts.rounded_z), ("0.0001".to_string(), 1));
 }
 
 #[test]
@@ -79,7 +246,7 @@ fn a_decimal_comma_between_commas_is_refused() {
         let error = text(&format!("{header}\n{rows}")).err().unwrap_or_else(|| panic!("{header:?} was read"));
         assert!(error.exit_code() == 3 && error.to_string().contains("before decimals"), "{error}");
     }
-    let cloud = text("x;y;z\n1,5;2,5;3,5\n").unwrap();
+    let cloud = text("x;y;z\n1.5;2.5;3\n1.5;2.5;3.5\n1,5;2,5;3,5\n").unwrap();
     assert!(cloud.counts.examples[0].contains("decimals have a point"), "{:?}", cloud.counts.examples);
     // Colours in whole numbers are no decimals.
     assert_eq!(text("565000,5933000,12,255,128,3\n565001,5933001,13,255,128,3\n").unwrap().counts.kept, 2);
@@ -156,6 +323,22 @@ fn colours_from_0_to_1_and_an_empty_class_are_read() {
     assert_eq!(found, [([32768, 0, 65535], 0), ([65535, 16384, 0], 2)]);
     let cloud = assert_two_points("x,y,z,r,g,b\n1.5,2,3.25,12.6,,255\n4,5,6,1,0,0\n");
     assert_eq!(cloud.points[0].rgb, [13, 0, 255]);
+}
+
+#[test]
+fn colours_and_classes_that_cannot_be_read_lose_no_point() {
+    for class in ["Ground", "nan", "-1", "1000", "2.5"] {
+        let cloud = assert_two_points(&format!("x,y,z,class\n1.5,2,3.25,{class}\n4,5,6,2\n"));
+        assert_eq!([cloud.points[0].class, cloud.points[1].class], [0, 2], "{class}");
+        assert!(first_warning(&cloud).contains(class), "{}", first_warning(&cloud));
+    }
+    for color in ["nan", "ff", "-5", "70000"] {
+        let cloud = assert_two_points(&format!("x,y,z,r,g,b\n1.5,2,3.25,1,2,{color}\n4,5,6,4,5,6\n"));
+        assert_eq!(cloud.points[0].rgb, [1, 2, 0], "{color}");
+        assert!(first_warning(&cloud).contains("they are read as 0"), "{}", first_warning(&cloud));
+        let cloud = assert_two_points(&format!("x,y,z,r,g,b\n1.5,2,3.25,1,2,{color}\n4,5,6,4,{color},6\n"));
+        assert!(!cloud.source.has_rgb && first_warning(&cloud).contains("left out"), "{}", first_warning(&cloud));
+    }
 }
 
 #[test]

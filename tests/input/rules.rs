@@ -1,9 +1,8 @@
 //! The rules of a job: which points are kept, and where they land on the lattice.
 
 use gdt_batch::Error;
-use gdt_batch::geometry::Bounds;
 use gdt_batch::geometry::lattice::{Lattice, REACH};
-use gdt_batch::input::{Point, TextOptions, open};
+use gdt_batch::input::{Point, RawBounds, TextOptions, open};
 
 use crate::cloud::{decode, file, lattice, rules};
 use crate::las_file::LasFile;
@@ -12,10 +11,13 @@ use crate::las_file::LasFile;
 fn class_bounds_order_and_color_rules_hold() {
     let path = file(".las", &LasFile::new(2, 2, 0, 1000).las());
     let source = open(&path, &TextOptions::default()).unwrap();
-    let mut rules = rules(&source, &lattice(&source));
+    let lattice = lattice(&source);
+    let mut rules = rules(&source, &lattice);
     let (all, _) = decode(&source, &rules).unwrap();
+    let world = |axis: usize, steps: i32| lattice.world(axis, steps);
+    let corners = [world(0, -1000) - 0.004, world(1, -2000) - 0.004, world(0, 3000) + 0.004, world(1, 4000) + 0.004];
     rules.classes = std::array::from_fn(|class| class == 5 || class == 6);
-    rules.bounds = Some(Bounds { min: [-1000, -2000], max: [3000, 4000] });
+    rules.bounds = source.raw_bounds(corners);
     (rules.first_order, rules.rgb) = (1 << 36, false);
     let (some, counts) = decode(&source, &rules).unwrap();
     let inside = |p: &Point| (-1000..=3000).contains(&p.position[0]) && (-2000..=4000).contains(&p.position[1]);
@@ -37,7 +39,7 @@ fn points_outside_the_lattice_are_malformed_and_named() {
     let (_, counts) = decode(&source, &rules).unwrap();
     assert_eq!((counts.malformed, counts.examples.len()), (1, 1));
     assert!(counts.examples[0].contains("point 4: x = 21974836.47 lies outside"), "{}", counts.examples[0]);
-    rules.bounds = Some(Bounds { min: [-REACH; 2], max: [REACH; 2] });
+    rules.bounds = source.raw_bounds([-1e7, -1e7, 1e7, 1e7]);
     let (_, counts) = decode(&source, &rules).unwrap();
     assert_eq!((counts.malformed, counts.out_of_bounds), (0, 1));
 }
@@ -71,7 +73,7 @@ fn bounds_without_a_lattice_point_keep_no_point() {
     let path = file(".las", &LasFile::new(2, 0, 0, 100).las());
     let source = open(&path, &TextOptions::default()).unwrap();
     let mut rules = rules(&source, &lattice(&source));
-    rules.bounds = Some(Bounds { min: [5, -REACH], max: [4, REACH] });
+    rules.bounds = Some(RawBounds { min: [5, i64::MIN], max: [4, i64::MAX] });
     let (points, counts) = decode(&source, &rules).unwrap();
     assert!(points.is_empty() && counts.out_of_bounds + counts.withheld == 100, "{counts:?}");
 }

@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-use gdt_batch::geometry::Bounds;
-use gdt_batch::input::{PointRules, Source, TextOptions, open};
+use gdt_batch::input::{PointRules, RawBounds, Source, TextOptions, open};
 use rayon::prelude::*;
 
 use crate::cloud::{decode, file, lattice, rules};
@@ -16,7 +15,7 @@ fn assert_survives_json(path: &Path, options: &TextOptions) -> Source {
     let source = open(path, options).unwrap();
     let mut rules = rules(&source, &lattice(&source));
     rules.classes = std::array::from_fn(|class| class % 3 != 1);
-    rules.bounds = Some(Bounds { min: [-100_000, -90_000], max: [100_000, 90_000] });
+    rules.bounds = Some(RawBounds { min: [-100_000, -90_000], max: [100_000, i64::MAX] });
     rules.first_order = (1 << 40) - 1 - source.records;
     let text = serde_json::to_string(&(&source, &rules)).unwrap();
     let (read_source, read_rules): (Source, PointRules) = serde_json::from_str(&text).unwrap();

@@ -38,5 +38,6 @@ mod same_mesh;
 mod shortage;
 mod steps;
 mod tampering;
+mod texts;
 mod viewers;
 mod written;

@@ -46,13 +46,13 @@ impl<'a> PointFilter<'a> {
             self.counts.other_class += 1;
             return Ok(());
         }
-        // One by one: `array::map` compiles to a call for every record here.
-        let [x, y, z] = &self.rules.maps;
-        let mapped = [x.apply(record.raw[0]), y.apply(record.raw[1]), z.apply(record.raw[2])];
-        if !self.in_bounds(&mapped) {
+        if self.rules.bounds.as_ref().is_some_and(|bounds| !bounds.hold(&record.raw)) {
             self.counts.out_of_bounds += 1;
             return Ok(());
         }
+        // One by one: `array::map` compiles to a call for every record here.
+        let [x, y, z] = &self.rules.maps;
+        let mapped = [x.apply(record.raw[0]), y.apply(record.raw[1]), z.apply(record.raw[2])];
         match mapped {
             [Some((x, round_x)), Some((y, round_y)), Some((z, round_z))] if in_reach(x) && in_reach(y) => {
                 self.counts.rounded_xy += (round_x | round_y | record.rounded[0]) as u64;
@@ -93,13 +93,6 @@ impl<'a> PointFilter<'a> {
         } else {
             self.counts.other_class += 1;
         }
-    }
-
-    #[inline]
-    fn in_bounds(&self, mapped: &Mapped) -> bool {
-        let Some(bounds) = &self.rules.bounds else { return true };
-        let inside = |axis: usize| mapped[axis].is_some_and(|(v, _)| v >= bounds.min[axis] && v <= bounds.max[axis]);
-        inside(0) && inside(1)
     }
 
     #[inline]

@@ -4,5 +4,6 @@ pub(crate) mod axis;
 pub(crate) mod counts;
 pub(crate) mod filter;
 pub(crate) mod point;
+pub(crate) mod raw_bounds;
 pub(crate) mod record;
 pub(crate) mod rules;

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::geometry::Bounds;
 use crate::geometry::lattice::AxisMap;
+use crate::input::points::raw_bounds::RawBounds;
 
 /// What decoding a source needs to know of the job.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -13,9 +13,8 @@ pub struct PointRules {
     /// Whether the job keeps points of each classification code.
     #[serde(with = "class_list")]
     pub classes: [bool; 256],
-    /// Keep only points within these bounds in x and y. If `min` exceeds `max` on an axis, no lattice point lies within the
-    /// user's bounds, and no point is kept.
-    pub bounds: Option<Bounds<2>>,
+    /// Keep only points with raw integers within these bounds in x and y.
+    pub bounds: Option<RawBounds>,
     /// The number in the whole job of the source's first record.
     pub first_order: u64,
     /// Whether the job wants the points' colours. If not, colours are 0 and layered LAZ decodes faster.

@@ -1,31 +1,45 @@
 //! What the columns of a text mean, as the options say or as the first lines show.
 
+use std::borrow::Cow;
 use std::cmp::Reverse;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::input::text::comment_names::names_in_comments;
 use crate::input::text::decimal_comma::{self, CommaUse, Names};
+use crate::input::text::decimal_sign::{self, DecimalSign};
 use crate::input::text::delimiter::{CANDIDATES, Delimiter};
-use crate::input::text::header::{self, names_in_comments, separator_line};
+use crate::input::text::header::{self, names_among_rows, separator_line};
 use crate::input::text::lines::is_skipped;
 use crate::input::text::names::{NamedColumns, named_columns, truncate};
 use crate::input::text::number::Number;
+use crate::input::text::numbered::are_numbered;
+use crate::input::text::optional_columns::{drop_unreadable_colors, has_unit_colors, unreadable_class};
 use crate::input::text::options::TextOptions;
 use crate::input::text::role::ColumnRole;
+use crate::input::text::row_choice::RowChoice;
+use crate::input::text::units::UnitsOfAxes;
 use crate::{Error, Result, Warnings};
 
 /// The columns of a text that nothing names.
 const COORDINATES: [ColumnRole; 3] = [ColumnRole::Coordinate(0), ColumnRole::Coordinate(1), ColumnRole::Coordinate(2)];
 
 const DECIMAL_COMMA: &str = "has commas both between columns and before decimals, as in 565000,25,5933000,50: all its columns are whole \
-                             numbers; write it again with points before decimals or with semicolons between columns, or name its \
-                             columns with `columns` under [input.csv]";
+                             numbers; write it again with points before decimals or with semicolons between columns, or name all \
+                             of its columns with `columns` under [input.csv]";
 
 const UNCLEAR_COMMA: &str = "has only whole numbers with commas between them, more than three in a row, and no names: the commas may also \
-                             stand before decimals, as in 565000,25,5933000,50; if they do not, name its columns with `columns` under \
+                             stand before decimals, as in 565000,25,5933000,50; if they do not, name all of its columns with `columns` under \
                              [input.csv], for example [\"x\", \"y\", \"z\", \"class\"], and if they do, write it again with points before \
                              decimals or with semicolons between columns";
+
+const UNCLEAR_THOUSANDS: &str = "has commas that may stand before decimals or between thousands, as in 565,000: write it again with points \
+                                 before decimals, and nothing between thousands";
+
+const NUMBERED: &str = "has columns that no line names, and the first of them counts the rows: it looks like the number of the point, and \
+                        not like x; name the columns with `columns` under [input.csv], for example [\"id\", \"x\", \"y\", \"z\"], or \
+                        [\"x\", \"y\", \"z\"] if the first is x";
 
 /// How the lines of a text are to be read.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -36,8 +50,10 @@ pub(crate) struct Columns {
     pub(crate) roles: Vec<ColumnRole>,
     /// How many columns the text itself names. A row with more is malformed.
     pub(crate) named: Option<usize>,
-    /// Whether one of the first rows has. Without it, the first pass looks only at the columns that are used, for speed.
-    pub(crate) has_surplus: bool,
+    /// Whether decimals have a comma before them, not a point.
+    pub(crate) decimal_comma: bool,
+    /// Whether a row is malformed if its class cannot be read.
+    pub(crate) strict_classes: bool,
     /// Whether colours are numbers from 0 to 1.
     pub(crate) unit_colors: bool,
     /// Lines that begin with one of these are skipped.
@@ -51,15 +67,18 @@ pub(crate) struct DetectedColumns {
     pub(crate) header_lines: usize,
     /// Whether x and y are named as longitude and latitude.
     pub(crate) degrees: bool,
+    /// What the names say about units.
+    pub(crate) units: UnitsOfAxes,
 }
 
 impl Columns {
-    /// Finds out how the text in `path` is laid out; `lines` are its first lines. `colors` tells whether its colours are wanted.
+    /// Finds out how the text in `path` is laid out; `lines` are its first lines. `choice` tells which rows are wanted, and
+    /// whether with their colours.
     pub(crate) fn detect(
         path: &Path,
         lines: &[&[u8]],
         options: &TextOptions,
-        colors: bool,
+        choice: &RowChoice,
         warnings: &mut Warnings,
     ) -> Result<DetectedColumns> {
         let comments = comments(options)?;
@@ -75,11 +94,20 @@ impl Columns {
             header_lines = first_at + 1;
             rows.remove(0);
         }
-        let candidates = match given {
+        let mut candidates = match given {
             Some(delimiter) => vec![Delimiter::from_option(delimiter)?],
             None => CANDIDATES.to_vec(),
         };
-        let texts: Vec<&[u8]> = rows.iter().map(|(_, line)| *line).collect();
+        let written: Vec<&[u8]> = rows.iter().map(|(_, line)| *line).collect();
+        let decimal_comma = has_decimal_commas(path, &written, &candidates)?;
+        let pointed: Vec<Cow<[u8]>>;
+        let texts: Vec<&[u8]> = if decimal_comma {
+            candidates.retain(|delimiter| *delimiter != Delimiter::Byte(b','));
+            pointed = written.iter().map(|line| decimal_sign::pointed(line, &candidates)).collect();
+            pointed.iter().map(|line| &**line).collect()
+        } else {
+            written
+        };
         let header = header::find(&texts, &candidates, options.header, options.columns.is_some());
         if header.count {
             warnings.push("the first line holds one number, taken for the number of points and skipped");
@@ -88,28 +116,45 @@ impl Columns {
             header_lines = at + 1;
         }
         let data = &texts[header.lines..];
-        let commented = || {
-            let row = data.first().filter(|_| options.header != Some(false))?;
-            let end = rows.get(header.lines)?.0;
-            names_in_comments(&lines[..end], &comments, &candidates, row)
-        };
+        let bad = |what: String| Error::input(path, what);
         let found = match (&options.columns, header.names) {
             (Some(names), _) => Some(named_by_user(names)?),
-            (None, Some(names)) => Some(names.map_err(|what| Error::input(path, what))?),
-            (None, None) => commented(),
+            (None, Some(names)) => Some(names.map_err(bad)?),
+            (None, None) if options.header == Some(false) => None,
+            (None, None) => {
+                let end = rows.get(header.lines).map_or(0, |row| row.0);
+                let named = names_in_comments(&lines[..end], &comments, &candidates, data).map_err(bad)?;
+                names_among_rows(data, &candidates)
+                    .filter(|_| named.is_none())
+                    .map_or(Ok(named), |what| Err(bad(what)))?
+            }
         };
-        let roles = used_roles(found.as_ref(), colors);
+        let mut roles = used_roles(found.as_ref(), choice.colors);
         let delimiter = row_delimiter(&candidates, &roles, data);
-        if options.columns.is_none() {
-            refuse_decimal_comma(path, delimiter, found.as_ref(), data)?;
+        if options.columns.as_ref().is_none_or(|names| data.iter().any(|row| delimiter.has_more_than(names.len(), row)))
+        {
+            refuse_decimal_comma(path, delimiter, found.as_ref().filter(|_| options.columns.is_none()), data)?;
+        }
+        if found.is_none() && are_numbered(delimiter, data) {
+            return Err(bad(NUMBERED.to_string()));
         }
         let columns_of_last = texts.last().map_or(0, |row| delimiter.fields(row).len());
-        warnings.extend(names_warning(found.as_ref(), columns_of_last));
+        let units = found.as_ref().map_or(Ok(UnitsOfAxes::default()), NamedColumns::units);
+        let units = units.map_err(|what| bad(format!("its header {what}")))?;
+        warnings.extend(names_warning(found.as_ref(), &units, columns_of_last));
         let named = found.as_ref().filter(|_| options.columns.is_none()).map(|found| found.count);
         let unit_colors = has_unit_colors(delimiter, &roles, data);
-        let has_surplus = named.is_some_and(|named| data.iter().any(|row| delimiter.has_more_than(named, row)));
-        let columns = Columns { delimiter, roles, named, has_surplus, unit_colors, comments };
-        Ok(DetectedColumns { columns, header_lines, degrees: found.is_some_and(|found| found.degrees) })
+        warnings.extend(drop_unreadable_colors(delimiter, &mut roles, unit_colors, data));
+        truncate(&mut roles);
+        let strict_classes = choice.strict_classes;
+        warnings.extend(unreadable_class(delimiter, &roles, data).filter(|_| !strict_classes));
+        let columns = Columns { delimiter, roles, named, decimal_comma, strict_classes, unit_colors, comments };
+        Ok(DetectedColumns { columns, header_lines, degrees: found.is_some_and(|found| found.degrees), units })
+    }
+
+    /// Returns the sign before decimals.
+    pub(crate) fn decimal_sign(&self) -> u8 {
+        if self.decimal_comma { b',' } else { b'.' }
     }
 
     /// Returns whether `line` is blank or a comment.
@@ -121,6 +166,15 @@ impl Columns {
     /// Returns whether a column has the role `wanted`.
     pub(crate) fn have(&self, wanted: ColumnRole) -> bool {
         self.roles.contains(&wanted)
+    }
+}
+
+/// Returns whether decimals have a comma before them.
+fn has_decimal_commas(path: &Path, rows: &[&[u8]], candidates: &[Delimiter]) -> Result<bool> {
+    match decimal_sign::find(rows, candidates) {
+        DecimalSign::Point => Ok(false),
+        DecimalSign::Comma => Ok(true),
+        DecimalSign::Unclear => Err(Error::input(path, UNCLEAR_THOUSANDS)),
     }
 }
 
@@ -140,13 +194,14 @@ fn used_roles(found: Option<&NamedColumns>, colors: bool) -> Vec<ColumnRole> {
     roles
 }
 
-fn names_warning(found: Option<&NamedColumns>, columns: usize) -> Option<String> {
+fn names_warning(found: Option<&NamedColumns>, units: &UnitsOfAxes, columns: usize) -> Option<String> {
     let warning = match found {
         None if columns > 3 => {
             "no line names the columns: the first three are taken for x, y and z; say otherwise with `columns` under [input.csv]"
         }
-        Some(found) if found.feet => {
-            "the names of the columns say feet, but not which: they count as metres unless [input] unit (\"foot\" or \"us-foot\") or a CRS says it"
+        Some(_) if units.some_foot => {
+            "the names of the columns say feet, but not which: they count as international feet (0.3048 m); if they are US survey feet, \
+             set [input] unit = \"us-foot\""
         }
         _ => return None,
     };
@@ -159,7 +214,7 @@ fn refuse_decimal_comma(path: &Path, delimiter: Delimiter, found: Option<&NamedC
         Some(found) if found.roles.starts_with(&COORDINATES) => Names::CoordinatesFirst,
         Some(_) => Names::Others,
     };
-    match decimal_comma::second_use(delimiter, names, rows) {
+    match decimal_comma::second_use(delimiter, names, found.map(|found| found.count), rows) {
         Some(CommaUse::Decimals) => Err(Error::input(path, DECIMAL_COMMA)),
         Some(CommaUse::Unclear) => Err(Error::input(path, UNCLEAR_COMMA)),
         None => Ok(()),
@@ -188,25 +243,14 @@ fn row_delimiter(candidates: &[Delimiter], roles: &[ColumnRole], rows: &[&[u8]])
         };
         roles.iter().enumerate().all(number)
     };
-    let fitting = |delimiter: &&Delimiter| rows.iter().filter(|row| fits(**delimiter, row)).count();
-    candidates.iter().min_by_key(|delimiter| Reverse(fitting(delimiter))).copied().unwrap_or(Delimiter::Blank)
-}
-
-/// Returns whether the colours of these rows are numbers from 0 to 1, some of them with decimals.
-fn has_unit_colors(delimiter: Delimiter, roles: &[ColumnRole], rows: &[&[u8]]) -> bool {
-    let mut decimals = false;
-    let has_colors = roles.iter().any(|role| matches!(role, ColumnRole::Color(_)));
-    for row in rows.iter().filter(|_| has_colors) {
-        let fields = delimiter.fields(row);
-        for (field, role) in fields.iter().zip(roles) {
-            let color = matches!(role, ColumnRole::Color(_)).then(|| Number::parse(field)).flatten();
-            if let Some(color) = color {
-                if !(0.0..=1.0).contains(&color.value()) {
-                    return false;
-                }
-                decimals |= color.shortest().decimals > 0;
-            }
-        }
+    let fitting = |delimiter: &Delimiter| rows.iter().filter(|row| fits(*delimiter, row)).count();
+    let numbers = |delimiter: &Delimiter| rows.iter().map(|row| delimiter.numbers(row)).sum::<usize>();
+    let best = candidates.iter().map(|delimiter| (Reverse(fitting(delimiter)), delimiter)).min_by_key(|best| best.0);
+    match best {
+        // No row can be read: at least the messages about them name the right columns.
+        Some((Reverse(0), _)) => candidates.iter().min_by_key(|delimiter| Reverse(numbers(delimiter))),
+        best => best.map(|(_, delimiter)| delimiter),
     }
-    decimals
+    .copied()
+    .unwrap_or(Delimiter::Blank)
 }

@@ -44,7 +44,7 @@ impl RowEnd {
     fn of(columns: &Columns, line: &[u8]) -> RowEnd {
         let fields = columns.delimiter.fields(line);
         let last = fields.last().copied().unwrap_or_default();
-        let point = last.iter().position(|byte| *byte == b'.');
+        let point = last.iter().position(|byte| *byte == columns.decimal_sign());
         RowEnd {
             columns: fields.len(),
             after_point: point.map_or(0, |point| last.len() - point - 1),
@@ -63,7 +63,7 @@ pub(crate) fn find(file: &RandomAccessFile, columns: &Columns, rows: &Range<u64>
     if columns.skips(last) || last.ends_with(b"\r") {
         return Ok(Ending::Whole);
     }
-    let mut reader = RowReader::new(columns, true);
+    let mut reader = RowReader::new(columns);
     // The tail may begin inside a line.
     let whole = tail[..feed].split(|byte| *byte == b'\n').skip((from > rows.start) as usize);
     let ends: Vec<RowEnd> = whole

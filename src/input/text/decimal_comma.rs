@@ -50,8 +50,8 @@ pub(crate) enum Names {
 type WholeRow<'a> = Vec<&'a [u8]>;
 
 /// Returns what the commas of these rows stand for; `None` if they stand between columns. Decimals after a comma are whole numbers in a
-/// column of their own, so one number with a point in it shows that the commas stand between columns.
-pub(crate) fn second_use(delimiter: Delimiter, names: Names, rows: &[&[u8]]) -> Option<CommaUse> {
+/// column of their own, so one number with a point in it shows that the commas stand between columns. `named` is the number of names.
+pub(crate) fn second_use(delimiter: Delimiter, names: Names, named: Option<usize>, rows: &[&[u8]]) -> Option<CommaUse> {
     if delimiter != Delimiter::Byte(b',') {
         return None;
     }
@@ -68,7 +68,7 @@ pub(crate) fn second_use(delimiter: Delimiter, names: Names, rows: &[&[u8]]) -> 
         return None;
     }
     let first = names != Names::Others;
-    if first && (have_no_heights(&whole) || have_zeros(&whole, names)) || are_ragged(&whole) {
+    if first && (have_no_heights(&whole) || have_zeros(&whole, names)) || are_ragged(&whole, named) {
         return Some(CommaUse::Decimals);
     }
     (names == Names::None && may_be_decimals(&whole)).then_some(CommaUse::Unclear)
@@ -114,10 +114,13 @@ fn have_zeros(rows: &[WholeRow], names: Names) -> bool {
     fits && padded(columns) && !padded(&[0, 2, 4])
 }
 
-/// Returns whether rows differ in the number of their columns: writers of tables leave no column out, but programs leave out decimals
-/// that are zeros, and the comma before them.
-fn are_ragged(rows: &[WholeRow]) -> bool {
+/// Returns whether rows differ in the number of their columns: programs leave out decimals that are zeros, and the comma before them.
+/// Writers of tables leave out the last column at most.
+fn are_ragged(rows: &[WholeRow], named: Option<usize>) -> bool {
     let usual = usual_length(rows);
+    if rows.iter().all(|row| row.len() == usual || row.len() + 1 == usual) && named.is_none_or(|named| named == usual) {
+        return false;
+    }
     let others = rows.iter().filter(|row| row.len() != usual).count();
     rows.len() >= LEAST_ROWS && others >= 2 && others * RAGGED >= rows.len()
 }
@@ -185,7 +188,7 @@ mod tests {
 
     fn used(names: Names, text: &str) -> Option<CommaUse> {
         let rows: Vec<&[u8]> = text.lines().map(str::as_bytes).collect();
-        second_use(Delimiter::Byte(b','), names, &rows)
+        second_use(Delimiter::Byte(b','), names, None, &rows)
     }
 
     fn table(rows: usize, row: impl Fn(usize) -> String) -> String {
@@ -240,6 +243,20 @@ mod tests {
             assert_eq!(used(Names::None, &text), Some(CommaUse::Unclear), "{text}");
             assert_eq!(used(Names::CoordinatesFirst, &text), None, "{text}");
         }
+    }
+
+    #[test]
+    fn a_table_without_some_of_its_last_column_is_a_table() {
+        let classed = |i: usize| {
+            let class = if i.is_multiple_of(3) { "" } else { ",2" };
+            format!("{},{},{}{class}", 565_000 + i, 5_933_000 + 7 * i, 12 + i % 90)
+        };
+        let text = table(300, classed);
+        let rows: Vec<&[u8]> = text.lines().map(str::as_bytes).collect();
+        assert_eq!(second_use(Delimiter::Byte(b','), Names::CoordinatesFirst, Some(4), &rows), None);
+        assert_eq!(second_use(Delimiter::Byte(b','), Names::None, None, &rows), None);
+        let decimals = Some(CommaUse::Decimals);
+        assert_eq!(second_use(Delimiter::Byte(b','), Names::CoordinatesFirst, Some(3), &rows), decimals);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! What separates the columns of a line, and how a line is split.
 
-use memchr::{memchr, memchr2};
+use memchr::{memchr, memchr_iter, memchr2, memchr2_iter};
 use serde::{Deserialize, Serialize};
 
 use crate::{Error, Result};
@@ -58,14 +58,19 @@ impl Delimiter {
 
     /// Returns whether `line` has more columns than `most`, apart from an empty last one.
     pub(crate) fn has_more_than(&self, most: usize, line: &[u8]) -> bool {
-        if let Delimiter::Byte(byte) = self
-            && line.iter().filter(|other| *other == byte).count() < most
-        {
+        let delimiters = match self {
+            Delimiter::Byte(byte) => memchr_iter(*byte, line).count(),
+            Delimiter::Blank => memchr2_iter(b' ', b'\t', line).count(),
+        };
+        if delimiters < most {
             return false;
         }
-        let fields = self.fields(line);
-        let empty = fields.last().is_some_and(|field| field.is_empty()) as usize;
-        fields.len() - empty > most
+        let (mut columns, mut is_last_empty, mut rest) = (0, false, Some(line));
+        while let Some(line) = rest {
+            let (field, after) = self.split(line);
+            (columns, is_last_empty, rest) = (columns + 1, field.is_empty(), after);
+        }
+        columns - is_last_empty as usize > most
     }
 
     /// Returns the number of columns of `line` that are numbers.

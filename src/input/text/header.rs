@@ -1,12 +1,12 @@
 //! The lines before the first row: titles, the names of columns, units, the number of points.
 
 use crate::input::text::delimiter::{CANDIDATES, Delimiter};
-use crate::input::text::lines::{is_skipped, shown};
+use crate::input::text::lines::shown;
 use crate::input::text::names::{NamedColumns, NamesError, named_columns};
 use crate::input::text::role::ColumnRole;
 
 /// The number of rows whose columns are compared with the names in a header.
-const ROWS_FOR_NAMES: usize = 20;
+pub(crate) const ROWS_FOR_NAMES: usize = 20;
 
 /// What is wrong with a line that should name the columns.
 #[derive(Debug, thiserror::Error)]
@@ -22,6 +22,8 @@ pub(crate) enum HeaderLineError {
         "looks like names of {names} columns, and the rows have {rows}; name the columns with `columns` under [input.csv]"
     )]
     OtherCount { names: usize, rows: usize },
+    #[error("{0}")]
+    Units(String),
 }
 
 /// The lines before the first row.
@@ -56,7 +58,12 @@ pub(crate) fn find(rows: &[&[u8]], candidates: &[Delimiter], wanted: Option<bool
     let is_about_rows = |line: &&&[u8]| candidates.iter().all(|delimiter| delimiter.numbers(line) == 0);
     let after = |at: usize| at + 1 + lines[at + 1..].iter().take_while(is_about_rows).count();
     match found {
-        Some((at, names)) => Header { lines: after(at), names: Some(Ok(names)), count: false },
+        Some((at, names)) => {
+            let (before, after) = (&lines[at], after(at));
+            let named = with_units(names, &lines[at + 1..after]);
+            let named = named.map_err(|error| format!("the line of names, {}, {error}", shown(before)));
+            Header { lines: after, names: Some(named), count: false }
+        }
         None if named => Header { lines: after(0), names: None, count: is_count(lines[0]) },
         None if is_count(lines[0]) => Header { lines: 1, names: None, count: true },
         None => {
@@ -66,24 +73,29 @@ pub(crate) fn find(rows: &[&[u8]], candidates: &[Delimiter], wanted: Option<bool
     }
 }
 
-/// Returns the names in the last comment before the first row that names as many columns as `row` has.
-pub(crate) fn names_in_comments(
-    lines: &[&[u8]],
-    comments: &[String],
-    candidates: &[Delimiter],
-    row: &[u8],
-) -> Option<NamedColumns> {
-    let starts = lines.iter().filter(|line| !line.trim_ascii().is_empty() && is_skipped(line, comments));
-    let named = |line: &&[u8]| {
-        let line = line.trim_ascii_start();
-        let comment = comments.iter().find(|comment| line.starts_with(comment.as_bytes()))?;
-        let text = &line[comment.len()..];
-        let marks = text.iter().take_while(|byte| matches!(byte, b'#' | b'/')).count();
-        let names = header_names(candidates, text[marks..].trim_ascii(), &[]).ok()?;
-        let fits = |delimiter: &Delimiter| delimiter.numbers(row) >= 3 && delimiter.fields(row).len() == names.count;
-        candidates.iter().any(fits).then_some(names)
-    };
-    starts.rev().find_map(named)
+/// Returns these names with the units of the lines below them.
+fn with_units(mut names: NamedColumns, below: &[&[u8]]) -> Result<NamedColumns, HeaderLineError> {
+    for line in below {
+        for delimiter in CANDIDATES {
+            names.add_units(&delimiter.fields(line)).map_err(HeaderLineError::Units)?;
+        }
+    }
+    names.units().map_err(HeaderLineError::Units)?;
+    Ok(names)
+}
+
+/// Returns a sentence about a line among the first of these rows that is none, but names x, y and z: a title with numbers in it may stand
+/// before it.
+pub(crate) fn names_among_rows(rows: &[&[u8]], candidates: &[Delimiter]) -> Option<String> {
+    let is_row = |line: &[u8]| candidates.iter().any(|delimiter| delimiter.numbers(line) >= 3);
+    let has_names = |line: &&&[u8]| !is_row(line) && header_names(candidates, line, &[]).is_ok();
+    rows.iter().take(ROWS_FOR_NAMES).find(has_names).map(|line| {
+        format!(
+            "the line {} names the columns, but a line with three numbers in it stands before it: remove what comes before the names, or \
+             name the columns with `columns` under [input.csv]",
+            shown(line)
+        )
+    })
 }
 
 /// Returns the delimiter that the line `sep=;` names, which Excel reads and writes before a table.
@@ -103,7 +115,11 @@ fn is_count(line: &[u8]) -> bool {
 
 /// Returns what `line` names under the first delimiter that gives x, y and z and fits `rows`, or what is wrong under the delimiter that
 /// gives most columns. All delimiters are tried, the `candidates` for the rows first: a header may use another one.
-fn header_names(candidates: &[Delimiter], line: &[u8], rows: &[&[u8]]) -> Result<NamedColumns, HeaderLineError> {
+pub(crate) fn header_names(
+    candidates: &[Delimiter],
+    line: &[u8],
+    rows: &[&[u8]],
+) -> Result<NamedColumns, HeaderLineError> {
     if !line.iter().any(|byte| byte.is_ascii_alphabetic()) {
         return Err(HeaderLineError::NoNames);
     }
@@ -140,7 +156,7 @@ fn fits_rows(delimiter: Delimiter, names: &NamedColumns, candidates: &[Delimiter
 }
 
 /// Returns the number of columns, without an empty last one.
-fn columns_of(delimiter: Delimiter, row: &[u8]) -> usize {
+pub(crate) fn columns_of(delimiter: Delimiter, row: &[u8]) -> usize {
     let fields = delimiter.fields(row);
     fields.len() - fields.last().is_some_and(|last| last.is_empty()) as usize
 }

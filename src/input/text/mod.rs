@@ -2,15 +2,21 @@
 //! are decoded independently.
 
 pub(crate) mod columns;
+pub(crate) mod comment_names;
 pub(crate) mod cut_off;
 pub(crate) mod decimal_comma;
+pub(crate) mod decimal_sign;
 pub(crate) mod delimiter;
 pub(crate) mod granularity;
 pub(crate) mod header;
+pub(crate) mod layout;
 pub(crate) mod lines;
 pub(crate) mod names;
 pub(crate) mod noise;
+pub(crate) mod noise_warning;
 pub(crate) mod number;
+pub(crate) mod numbered;
+pub(crate) mod optional_columns;
 pub(crate) mod options;
 pub(crate) mod outliers;
 pub(crate) mod role;
@@ -19,3 +25,4 @@ pub(crate) mod row_box;
 pub(crate) mod row_choice;
 pub(crate) mod survey;
 pub(crate) mod table;
+pub(crate) mod units;

@@ -1,6 +1,7 @@
 //! The names that people give to columns.
 
 use crate::input::text::role::ColumnRole;
+use crate::input::text::units::{TextUnit, TextUnits, UnitsOfAxes};
 
 /// The names of one role, the clearest first: if several columns have one, that with the clearest name is taken.
 type Names = (&'static [&'static str], ColumnRole);
@@ -99,16 +100,43 @@ pub(crate) enum NamesError {
 }
 
 /// What the names of columns say.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct NamedColumns {
     /// What each column holds, up to the last column that is used.
     pub(crate) roles: Vec<ColumnRole>,
     /// The number of names.
     pub(crate) count: usize,
-    /// Whether x and y are named as longitude and latitude, or as degrees.
+    /// Whether x and y are named as longitude and latitude.
     pub(crate) degrees: bool,
-    /// Whether x, y or z is named as feet.
-    pub(crate) feet: bool,
+    /// What is known of their units.
+    units: TextUnits,
+}
+
+impl NamedColumns {
+    /// Returns the column of the axis.
+    pub(crate) fn place(&self, axis: usize) -> Option<usize> {
+        self.roles.iter().position(|role| *role == ColumnRole::Coordinate(axis))
+    }
+
+    /// Returns what the names say about units.
+    ///
+    /// # Errors
+    /// A sentence, if they contradict each other.
+    pub(crate) fn units(&self) -> Result<UnitsOfAxes, String> {
+        self.units.of_axes()
+    }
+
+    /// Takes the units of a line below the names into account, if it is one.
+    ///
+    /// # Errors
+    /// A sentence, if the names say other units.
+    pub(crate) fn add_units(&mut self, fields: &[&[u8]]) -> Result<(), String> {
+        let unit = |axis: usize| {
+            let field = fields.get(self.place(axis)?)?;
+            TextUnit::read(std::str::from_utf8(field).ok()?)
+        };
+        self.units.add_line([unit(0), unit(1), unit(2)])
+    }
 }
 
 /// A column's name.
@@ -165,18 +193,9 @@ pub(crate) fn named_columns<'a>(
     drop_partial_color(&mut roles);
     truncate(&mut roles);
     let is = |axis: usize, test: &dyn Fn(&Name) -> bool| places[axis].is_some_and(test);
-    let degree = |axis: usize| {
-        is(axis, &|name| {
-            DEGREES[axis].contains(&name.plain.as_str()) || matches!(name.unit.as_str(), "deg" | "°" | "degrees")
-        })
-    };
-    let foot = |name: &Name| matches!(name.unit.as_str(), "ft" | "feet" | "foot" | "us-ft" | "usft" | "ftus" | "us ft");
-    Ok(NamedColumns {
-        roles,
-        count: names.len(),
-        degrees: degree(0) && degree(1),
-        feet: (0..3).any(|axis| is(axis, &foot)),
-    })
+    let degree = |axis: usize| is(axis, &|name| DEGREES[axis].contains(&name.plain.as_str()));
+    let units = TextUnits(places.map(|name| name.and_then(|name| TextUnit::read(&name.unit))));
+    Ok(NamedColumns { roles, count: names.len(), degrees: degree(0) && degree(1), units })
 }
 
 /// Removes the columns after the last one that is used.
@@ -228,11 +247,16 @@ mod tests {
     }
 
     #[test]
-    fn degrees_and_feet_are_seen() {
+    fn degrees_and_units_are_seen() {
         let named = |line: &str| named_columns(line.split(';').map(str::as_bytes)).unwrap();
-        assert!(named("longitude;latitude;height").degrees && named("x [deg];y [°];z").degrees);
+        assert!(named("longitude;latitude;height").degrees);
         assert!(!named("lon;lat;x;y;z").degrees && !named("x;lat;z").degrees);
-        assert!(named("x [ft];y [ft];z [ft]").feet && !named("x [m];y [m];z [m]").feet);
+        assert!(named("x [ft];y [ft];z [ft]").units().unwrap().some_foot);
+        assert!(!named("x [m];y [m];z [m]").units().unwrap().some_foot);
+        let mut below = named("x;y;z");
+        below.add_units(&[b"m", b"m", b"cm"]).unwrap();
+        assert_eq!(below.units(), named("x [m];y [m];z [cm]").units());
+        assert!(named("x [m];y [m];z [m]").add_units(&[b"mm", b"mm", b"mm"]).is_err());
         assert_eq!(named("x;y;z;;").count, 3);
     }
 }

@@ -1,14 +1,17 @@
 //! Rows that lie so far from all others that they are mistakes, such as 0, 0, 0 among coordinates of a national grid.
 
-use std::ops::Range;
+use std::ops::{AddAssign, Range};
+
+use serde::{Deserialize, Serialize};
 
 use crate::Result;
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::text::columns::Columns;
 use crate::input::text::lines::{TextLine, for_each_line};
+use crate::input::text::number::Number;
 use crate::input::text::row::RowReader;
 use crate::input::text::row_box::RowBox;
-use crate::input::text::survey::Wanted;
+use crate::input::text::survey::{Survey, Wanted};
 
 /// The most rows of a chunk that are looked at.
 const ROWS_OF_A_CHUNK: u64 = 4096;
@@ -25,12 +28,52 @@ const LEAST_ROWS: usize = 5;
 /// One row in so many may be an outlier. If there are more, they are a part of the terrain.
 const RARE: u64 = 50;
 
-/// Returns whether so few of `rows` are outliers that they are mistakes. Of a few rows none is, unless `even_among_few`: then one may be.
-pub(crate) fn are_rare(outliers: u64, rows: u64, even_among_few: bool) -> bool {
-    outliers > 0 && outliers <= (rows / RARE).max(even_among_few as u64)
+/// Rows that lie far from all others.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Outliers {
+    /// How many rows they are.
+    pub rows: u64,
+    /// At how many places they lie, or the number of rows. Rows at one place are one mistake, such as 0, 0, 0 for "nothing measured".
+    pub places: u64,
 }
 
-/// Returns the box outside which a row is an outlier, given the box of the [middle](middle_box) of the rows; `None` if that is a point.
+impl Outliers {
+    /// Returns the outliers that a survey has found.
+    pub(crate) fn of(survey: &Survey) -> Outliers {
+        let rows = survey.outliers;
+        Outliers { rows, places: if survey.outlier_box.is_point() { rows.min(1) } else { rows } }
+    }
+
+    /// Returns whether they are so few among `rows` that they are mistakes. Of a few rows none is, unless `even_among_few`: then one may be.
+    pub fn are_rare(&self, rows: u64, even_among_few: bool) -> bool {
+        self.places > 0 && self.places <= (rows / RARE).max(even_among_few as u64)
+    }
+}
+
+impl AddAssign for Outliers {
+    fn add_assign(&mut self, other: Outliers) {
+        self.rows += other.rows;
+        self.places += other.places;
+    }
+}
+
+/// Where most rows lie.
+pub(crate) struct Middle {
+    /// The box of nine in ten rows on each axis.
+    pub(crate) bounds: RowBox,
+    /// The median of each axis.
+    pub(crate) centre: [f64; 3],
+}
+
+impl Middle {
+    /// Returns how far a row lies from the centre, on the axis on which it is farthest.
+    pub(crate) fn distance_to(&self, numbers: &[Number; 3]) -> f64 {
+        let distance = |axis: usize| (numbers[axis].value() - self.centre[axis]).abs();
+        distance(0).max(distance(1)).max(distance(2))
+    }
+}
+
+/// Returns the box outside which a row is an outlier, given the box of the [middle] of the rows; `None` if that is a point.
 pub(crate) fn plausible_box(middle: &RowBox) -> Option<RowBox> {
     // A strip or a plane is narrow on one axis, which says nothing about how far its rows may lie apart there.
     let size = |axis: usize| middle.max[axis] - middle.min[axis];
@@ -40,15 +83,15 @@ pub(crate) fn plausible_box(middle: &RowBox) -> Option<RowBox> {
         .then(|| RowBox { min: middle.min.map(|low| low - margin), max: middle.max.map(|high| high + margin) })
 }
 
-/// Returns the box of nine in ten rows on each axis, by a sample of the wanted rows in these chunks, given as byte ranges; `None` if
+/// Returns where most rows lie, by a sample of the wanted rows in these chunks, given as byte ranges; `None` if
 /// there are too few rows to tell.
-pub(crate) fn middle_box(
+pub(crate) fn middle(
     file: &RandomAccessFile,
     columns: &Columns,
     first: u64,
     chunks: &[Range<u64>],
     wanted: Wanted,
-) -> Result<Option<RowBox>> {
+) -> Result<Option<Middle>> {
     let mut values: [Vec<f64>; 3] = Default::default();
     for chunk in chunks {
         let mut lines = 0;
@@ -57,7 +100,7 @@ pub(crate) fn middle_box(
             Ok(())
         })?;
         let stride = lines / ROWS_OF_A_CHUNK + 1;
-        let mut reader = RowReader::new(columns, columns.has_surplus);
+        let mut reader = RowReader::new(columns);
         for_each_line(file, first, chunk.clone(), |index, line| {
             if let TextLine::Whole(line) = line
                 && index % stride == 0
@@ -74,10 +117,11 @@ pub(crate) fn middle_box(
     if values[0].len() < LEAST_ROWS {
         return Ok(None);
     }
-    let mut middle = RowBox::empty();
+    let (mut bounds, mut centre) = (RowBox::empty(), [0.0; 3]);
     for (axis, values) in values.iter_mut().enumerate() {
         values.sort_unstable_by(f64::total_cmp);
-        (middle.min[axis], middle.max[axis]) = (values[cut], values[values.len() - 1 - cut]);
+        (bounds.min[axis], bounds.max[axis]) = (values[cut], values[values.len() - 1 - cut]);
+        centre[axis] = values[values.len() / 2];
     }
-    Ok(Some(middle))
+    Ok(Some(Middle { bounds, centre }))
 }

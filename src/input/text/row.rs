@@ -4,9 +4,11 @@ use crate::geometry::lattice::BEYOND;
 use crate::input::points::axis::AXIS_NAMES;
 use crate::input::points::record::PointRecord;
 use crate::input::text::columns::Columns;
+use crate::input::text::decimal_sign::swapped;
 use crate::input::text::delimiter::Delimiter;
 use crate::input::text::lines::shown;
 use crate::input::text::number::Number;
+use crate::input::text::optional_columns::{class_of, color_of};
 use crate::input::text::role::ColumnRole;
 
 /// Why a line cannot be used. Columns count from 0.
@@ -27,7 +29,8 @@ impl RowError {
             let name = match columns.roles[column] {
                 ColumnRole::Coordinate(axis) => AXIS_NAMES[axis],
                 ColumnRole::Color(channel) => ["red", "green", "blue"][channel],
-                ColumnRole::Class | ColumnRole::Skipped => "class",
+                ColumnRole::Class => "class",
+                ColumnRole::Skipped => return format!("column {}", column + 1),
             };
             format!("column {} ({name})", column + 1)
         };
@@ -35,8 +38,18 @@ impl RowError {
             RowError::Missing { column } => format!("{} is missing in {}", place(column), shown(line)),
             RowError::Unexpected { column, expected } => {
                 let field = columns.delimiter.fields(line).get(column).copied().unwrap_or_default();
-                let hint =
-                    if is_decimal_comma(field) { ": decimals have a point before them, not a comma" } else { "" };
+                if is_too_large(field) {
+                    return format!(
+                        "{} is {}, which is too large: at most 18 digits are read before the point",
+                        place(column),
+                        shown(field)
+                    );
+                }
+                let hint = match columns.decimal_comma {
+                    false if is_decimal_comma(field) => ": decimals have a point before them, not a comma",
+                    true if field.contains(&b'.') => ": decimals have a comma before them in this file, not a point",
+                    _ => "",
+                };
                 format!("{} is {}, not {expected}{hint}", place(column), shown(field))
             }
             RowError::Surplus => {
@@ -49,6 +62,13 @@ impl RowError {
             }
         }
     }
+}
+
+/// Returns whether `field` is a number, but too large to be read.
+fn is_too_large(field: &[u8]) -> bool {
+    let value = std::str::from_utf8(field).ok().and_then(|text| text.parse::<f64>().ok());
+    let is_written_out = field.iter().any(u8::is_ascii_digit);
+    is_written_out && value.is_some_and(|value| value.abs() >= 0.99e18)
 }
 
 /// Returns whether `field` would be a number with a point in place of its comma.
@@ -64,19 +84,35 @@ pub(crate) struct RowReader<'a> {
     pub(crate) numbers: [Number; 3],
     rgb: [u16; 3],
     class: u8,
-    /// Whether to count the columns that are not used.
-    thorough: bool,
+    /// The last row with points before decimals, if the text has commas there.
+    pointed: Vec<u8>,
 }
 
 impl<'a> RowReader<'a> {
-    /// Returns a reader of rows with these columns. A thorough one counts the columns that are not used as well.
-    pub(crate) fn new(columns: &'a Columns, thorough: bool) -> RowReader<'a> {
-        RowReader { columns, numbers: [Number::default(); 3], rgb: [0; 3], class: 0, thorough }
+    /// Returns a reader of rows with these columns.
+    pub(crate) fn new(columns: &'a Columns) -> RowReader<'a> {
+        RowReader { columns, numbers: [Number::default(); 3], rgb: [0; 3], class: 0, pointed: Vec::new() }
     }
 
     /// Reads the columns of `line` that are used.
     #[inline]
     pub(crate) fn read(&mut self, line: &[u8]) -> Result<(), RowError> {
+        if self.columns.decimal_comma { self.read_with_commas(line) } else { self.read_with_points(line) }
+    }
+
+    /// Reads a line with commas before decimals.
+    #[cold]
+    fn read_with_commas(&mut self, line: &[u8]) -> Result<(), RowError> {
+        let mut pointed = std::mem::take(&mut self.pointed);
+        pointed.clear();
+        pointed.extend(line.iter().map(swapped));
+        let read = self.read_with_points(&pointed);
+        self.pointed = pointed;
+        read
+    }
+
+    #[inline]
+    fn read_with_points(&mut self, line: &[u8]) -> Result<(), RowError> {
         let delimiter = self.columns.delimiter;
         let mut rest = Some(line);
         for (column, &role) in self.columns.roles.iter().enumerate() {
@@ -88,16 +124,19 @@ impl<'a> RowReader<'a> {
             let unexpected = |expected| RowError::Unexpected { column, expected };
             let (number, after) = match take_number(delimiter, line) {
                 Some(taken) => taken,
-                None => nothing(delimiter, line, role).ok_or(unexpected("a number"))?,
+                None => self.nothing(line, role).ok_or(unexpected("a number"))?,
             };
             rest = after;
             match role {
                 ColumnRole::Coordinate(axis) => self.numbers[axis] = number,
+                // A colour that is none is black, and no reason to lose the point.
                 ColumnRole::Color(channel) => {
-                    let color = if self.columns.unit_colors { unit_color(number) } else { nearest_color(number) };
-                    self.rgb[channel] = color.ok_or(unexpected("a whole number from 0 to 65535"))?;
+                    self.rgb[channel] = color_of(number, self.columns.unit_colors).unwrap_or(0);
                 }
-                ColumnRole::Class => self.class = whole(number).ok_or(unexpected("a whole number from 0 to 255"))?,
+                ColumnRole::Class => {
+                    let class = class_of(number).or((!self.columns.strict_classes).then_some(0));
+                    self.class = class.ok_or(unexpected("a whole number from 0 to 255"))?;
+                }
                 ColumnRole::Skipped => {}
             }
         }
@@ -107,12 +146,24 @@ impl<'a> RowReader<'a> {
         }
     }
 
+    /// Returns 0 for a colour or a class that is not there or cannot be read, and the rest of the line after it.
+    #[cold]
+    fn nothing<'b>(&self, line: &'b [u8], role: ColumnRole) -> Option<(Number, Option<&'b [u8]>)> {
+        let (field, rest) = self.columns.delimiter.split(line);
+        let is_optional = match role {
+            ColumnRole::Coordinate(_) => false,
+            ColumnRole::Class => field.is_empty() || !self.columns.strict_classes,
+            ColumnRole::Color(_) | ColumnRole::Skipped => true,
+        };
+        is_optional.then_some((Number::default(), rest))
+    }
+
     /// Returns whether `rest`, the line after the columns that are used, has more columns than the header names.
     #[inline]
     fn is_surplus(&self, rest: &[u8]) -> bool {
         let Some(named) = self.columns.named else { return false };
         let unused = named.saturating_sub(self.columns.roles.len());
-        (self.thorough || unused == 0) && self.columns.delimiter.has_more_than(unused, rest)
+        self.columns.delimiter.has_more_than(unused, rest)
     }
 
     /// Returns the class of the last row.
@@ -154,29 +205,4 @@ fn take_number(delimiter: Delimiter, line: &[u8]) -> Option<(Number, Option<&[u8
     }
     let (field, rest) = delimiter.split(line);
     Some((Number::parse(field)?, rest))
-}
-
-/// Returns 0 for a colour or a class that is not there, and the rest of the line after it.
-#[cold]
-fn nothing(delimiter: Delimiter, line: &[u8], role: ColumnRole) -> Option<(Number, Option<&[u8]>)> {
-    let (field, rest) = delimiter.split(line);
-    let optional = !matches!(role, ColumnRole::Coordinate(_));
-    (optional && field.is_empty()).then_some((Number::default(), rest))
-}
-
-/// Returns the colour for a number from 0 to 1.
-fn unit_color(number: Number) -> Option<u16> {
-    Some((number.value().clamp(0.0, 1.0) * u16::MAX as f64).round() as u16)
-}
-
-/// Returns the colour nearest to `number`; `None` if no colour is that dark or bright.
-fn nearest_color(number: Number) -> Option<u16> {
-    let (nearest, _) = number.steps(0)?;
-    u16::try_from(nearest).ok()
-}
-
-/// Returns `number` as an integer; `None` if it has decimals or does not fit.
-fn whole<T: TryFrom<i64>>(number: Number) -> Option<T> {
-    let number = number.shortest();
-    if number.decimals == 0 && !number.rounded { T::try_from(number.mantissa).ok() } else { None }
 }

@@ -40,6 +40,11 @@ impl RowBox {
         }
     }
 
+    /// Returns whether all rows of the box lie at one place.
+    pub(crate) fn is_point(&self) -> bool {
+        self.min == self.max
+    }
+
     /// Returns whether the row lies in the box, borders included.
     #[inline]
     pub(crate) fn holds(&self, numbers: &[Number; 3]) -> bool {

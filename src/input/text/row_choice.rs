@@ -12,7 +12,7 @@ pub struct TextReading {
     pub colors: bool,
     /// Whether rows were left out that lie far from all others.
     pub outliers_left_out: bool,
-    /// Whether one row of a few was such a row.
+    /// Whether they were left out of a file too in which such rows are not rare: of a few rows one, or as many as are rare in all files.
     pub even_among_few: bool,
 }
 
@@ -23,6 +23,8 @@ pub struct RowChoice {
     pub bounds: Option<[f64; 4]>,
     /// Only rows of these classes.
     pub classes: [bool; 256],
+    /// Whether the user has said which classes. If not, a class that cannot be read counts as 0.
+    pub strict_classes: bool,
     /// Whether colours are read if the text has them.
     pub colors: bool,
 }
@@ -30,7 +32,7 @@ pub struct RowChoice {
 impl RowChoice {
     /// Returns the choice of all rows, with their colours.
     pub fn all() -> RowChoice {
-        RowChoice { bounds: None, classes: [true; 256], colors: true }
+        RowChoice { bounds: None, classes: [true; 256], strict_classes: false, colors: true }
     }
 
     /// Returns whether every row is wanted.

@@ -13,6 +13,9 @@ use crate::input::text::row::RowReader;
 use crate::input::text::row_box::RowBox;
 use crate::input::text::row_choice::RowChoice;
 
+/// Of fewer rows, one number from single precision may be there by chance.
+const FEW_ROWS: u64 = 10;
+
 /// What the first pass finds in a chunk, or in all chunks.
 #[derive(Clone, Debug)]
 pub(crate) struct Survey {
@@ -26,6 +29,8 @@ pub(crate) struct Survey {
     pub(crate) wanted: Findings,
     /// The number of rows that the job wants, but that lie outside the box in which it looks.
     pub(crate) outliers: u64,
+    /// Their box.
+    pub(crate) outlier_box: RowBox,
     /// The box of the other rows.
     pub(crate) others: RowBox,
 }
@@ -41,10 +46,10 @@ pub(crate) struct Findings {
     pub(crate) decimals: [u8; 3],
     /// The coarsest grid on which every x and every y lies, apart from digits that are noise.
     pub(crate) grid: [Granularity; 2],
-    /// As `decimals`, if all numbers were printed from single precision.
+    /// As `decimals`, where all numbers of the axis were printed from single precision.
     pub(crate) decimals_from_single: [u8; 3],
-    /// The number of numbers that certainly were.
-    pub(crate) singles: u64,
+    /// The number of x, y and z that certainly were.
+    pub(crate) singles: [u64; 3],
     /// The number of numbers with digits that are noise.
     pub(crate) noisy: u64,
     /// The first of them.
@@ -59,15 +64,17 @@ impl Findings {
             decimals: [0; 3],
             grid: Default::default(),
             decimals_from_single: [0; 3],
-            singles: 0,
+            singles: [0; 3],
             noisy: 0,
             noise: None,
         }
     }
 
-    /// Returns whether the numbers were printed from single precision.
-    pub(crate) fn are_single(&self) -> bool {
-        self.singles > 0 && self.singles >= self.rows / 10
+    /// Returns whether the numbers of an axis were printed from single precision. Heights may come from another source than x and y, so
+    /// every axis counts for itself.
+    pub(crate) fn are_single(&self, axis: usize) -> bool {
+        let (singles, rows) = (self.singles[axis], self.rows);
+        if rows < FEW_ROWS { singles * 2 > rows } else { singles > 0 && singles >= rows / 10 }
     }
 
     #[inline(always)]
@@ -90,7 +97,7 @@ impl Findings {
                 Some(meant) => {
                     self.noisy += 1;
                     self.noise = self.noise.or(Some(*number));
-                    self.singles += meant.single as u64;
+                    self.singles[axis] += meant.single as u64;
                     self.see_digits(axis, &meant.number);
                 }
                 None => self.see_digits(axis, number),
@@ -124,11 +131,11 @@ impl Findings {
         for axis in 0..3 {
             self.decimals[axis] = self.decimals[axis].max(other.decimals[axis]);
             self.decimals_from_single[axis] = self.decimals_from_single[axis].max(other.decimals_from_single[axis]);
+            self.singles[axis] += other.singles[axis];
         }
         for (grid, other) in self.grid.iter_mut().zip(&other.grid) {
             grid.add(other);
         }
-        self.singles += other.singles;
         self.noisy += other.noisy;
         self.noise = self.noise.or(other.noise);
     }
@@ -144,7 +151,16 @@ pub(crate) struct Wanted<'a> {
 impl Survey {
     /// Returns the survey of no line.
     pub(crate) fn empty() -> Survey {
-        Survey { lines: 0, rows: 0, malformed: 0, wanted: Findings::none(), outliers: 0, others: RowBox::empty() }
+        let none = RowBox::empty();
+        Survey {
+            lines: 0,
+            rows: 0,
+            malformed: 0,
+            wanted: Findings::none(),
+            outliers: 0,
+            outlier_box: none,
+            others: none,
+        }
     }
 
     /// Surveys the lines that begin in `range`. The first row of the text is at byte `first`.
@@ -156,7 +172,7 @@ impl Survey {
         wanted: Wanted,
     ) -> Result<Survey> {
         let mut survey = Survey::empty();
-        let mut reader = RowReader::new(columns, columns.has_surplus);
+        let mut reader = RowReader::new(columns);
         let is_all = wanted.choice.is_all() && wanted.within.is_none();
         survey.lines = for_each_line(file, first, range, |_, line| {
             match line {
@@ -165,7 +181,10 @@ impl Survey {
                     if is_all || wanted.has(&reader) {
                         survey.wanted.see(&reader.numbers);
                     } else {
-                        survey.outliers += wanted.choice.wants(&reader.numbers, reader.class()) as u64;
+                        if wanted.choice.wants(&reader.numbers, reader.class()) {
+                            survey.outliers += 1;
+                            survey.outlier_box.see(&reader.numbers);
+                        }
                         survey.others.see(&reader.numbers);
                     }
                 }
@@ -184,6 +203,7 @@ impl Survey {
         self.malformed += other.malformed;
         self.wanted.add(&other.wanted);
         self.outliers += other.outliers;
+        self.outlier_box.add(&other.outlier_box);
         self.others.add(&other.others);
     }
 

@@ -6,17 +6,19 @@ use rayon::prelude::*;
 use rust_decimal::Decimal;
 use serde::{Deserialize, Serialize};
 
+use crate::input::crs::unit::Unit;
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::points::axis::{AXIS_NAMES, Axis};
 use crate::input::points::filter::PointFilter;
-use crate::input::text::columns::{Columns, comments};
+use crate::input::text::columns::Columns;
 use crate::input::text::cut_off::{self, Ending};
 use crate::input::text::granularity::Granularity;
-use crate::input::text::lines::{LONGEST, TextLine, for_each_line, is_skipped, shown, without_return};
-use crate::input::text::noise;
-use crate::input::text::number::{MOST_DECIMALS, Number, POWERS};
+use crate::input::text::layout::{Layout, detect};
+use crate::input::text::lines::{LONGEST, TextLine, for_each_line, shown};
+use crate::input::text::noise_warning::noise_warning;
+use crate::input::text::number::{MOST_DECIMALS, POWERS};
 use crate::input::text::options::TextOptions;
-use crate::input::text::outliers::{are_rare, middle_box, plausible_box};
+use crate::input::text::outliers::{Middle, Outliers, middle, plausible_box};
 use crate::input::text::role::ColumnRole;
 use crate::input::text::row::RowReader;
 use crate::input::text::row_box::RowBox;
@@ -29,12 +31,6 @@ const CHUNK: u64 = 2 << 20;
 
 /// The number of chunks that show where most rows lie.
 const SAMPLED_CHUNKS: u64 = 16;
-
-/// The number of bytes at the start of a text that show how it is laid out. If all of them are comments, more are looked at.
-const SAMPLE: u64 = 1 << 17;
-
-/// The most bytes of comments before the first row.
-const MOST_COMMENTS: u64 = 1 << 26;
 
 /// If all x and y are smaller, the decimals that are kept do not tell them apart.
 const TINY: f64 = 1e-12;
@@ -56,12 +52,16 @@ pub(crate) struct TextTable {
     pub(crate) min: [f64; 3],
     /// The greatest x, y, z; likewise.
     pub(crate) max: [f64; 3],
-    /// Whether the coordinates are degrees, by the names of their columns.
-    pub(crate) degrees: bool,
+    /// The unit of x and y, by the names of their columns.
+    pub(crate) unit: Unit,
+    /// The length of the unit of z, if the names say another.
+    pub(crate) unit_z: Option<f64>,
     /// What the rows hold that the job wants.
     wanted: WantedRows,
     /// What they hold without outliers, if these are left out.
     without_outliers: Option<WantedRows>,
+    /// The outliers, if they are left out.
+    outliers: Outliers,
     /// The first chunk with outliers: the message about one of them says what to do.
     first_outlier_in: Option<usize>,
     /// The bounds that the job wants. They hold for the numbers in the text, before these are rounded to a lattice.
@@ -81,26 +81,30 @@ impl WantedRows {
     fn new(found: &Findings) -> WantedRows {
         let bounds = found.bounds.some();
         let farthest = |axis: usize| bounds.map_or(0.0, |bounds| bounds.farthest(axis));
-        let single = found.are_single();
-        let needed = if single { found.decimals_from_single } else { found.decimals };
-        let decimals: [u8; 3] = std::array::from_fn(|axis| fitting(needed[axis], farthest(axis)));
-        let grid = if single { [0, 1].map(|axis| Granularity::of_decimals(decimals[axis])) } else { found.grid };
+        let single: [bool; 3] = std::array::from_fn(|axis| found.are_single(axis));
+        let needed = |axis: usize| if single[axis] { found.decimals_from_single[axis] } else { found.decimals[axis] };
+        let decimals: [u8; 3] = std::array::from_fn(|axis| fitting(needed(axis), farthest(axis)));
+        let grid = |axis: usize| if single[axis] { Granularity::of_decimals(decimals[axis]) } else { found.grid[axis] };
+        let grid = [grid(0), grid(1)];
         WantedRows { rows: found.rows, bounds, decimals, grid }
     }
+}
+
+/// A row that lies far from the middle of all.
+#[derive(Clone, Debug)]
+pub(crate) struct FarRow {
+    /// How far, on the axis on which it is farthest.
+    pub(crate) distance: f64,
+    /// The number of its line, from 1.
+    pub(crate) line: u64,
+    /// The line, in quotes.
+    pub(crate) text: String,
 }
 
 /// The numbers of the first row and the first line of a chunk. Rows count from 0 and lines from 1, as editors count them.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct ChunkStart {
     row: u64,
-    line: u64,
-}
-
-/// Where the rows of a text begin.
-struct FirstRow {
-    /// The position of its first byte.
-    at: u64,
-    /// The number of its line.
     line: u64,
 }
 
@@ -112,7 +116,7 @@ impl TextTable {
         choice: &RowChoice,
         warnings: &mut Warnings,
     ) -> Result<TextTable> {
-        let Layout { columns, first, named_degrees } = detect(file, options, choice.colors, warnings)?;
+        let Layout { columns, first, named_degrees, units } = detect(file, options, choice, warnings)?;
         let mut rows = first.at..file.size();
         let cut = match cut_off::find(file, &columns, &rows)? {
             Ending::CutOff(cut) => Some(cut),
@@ -134,7 +138,9 @@ impl TextTable {
             warnings.push("no line has numbers where x, y and z should be");
         }
         refuse_tiny(file, &all.wanted)?;
-        warnings.extend(noise_warning(&all.wanted));
+        let noisy_chunk = surveys.iter().position(|survey| survey.wanted.noisy > 0);
+        let noisy = noisy_chunk.map(|chunk| chunk_range(&rows, chunk as u64));
+        warnings.extend(noise_warning(file, &columns, &all.wanted, rows.start, noisy)?);
         let cut = cut.map(|cut| (first.line + all.lines, cut.what));
         let RowBox { min, max } = bounds.unwrap_or(RowBox { min: [0.0; 3], max: [0.0; 3] });
         let malformed = all.malformed + cut.is_some() as u64;
@@ -149,63 +155,103 @@ impl TextTable {
             malformed,
             min,
             max,
-            degrees: false,
+            unit: units.horizontal,
+            unit_z: units.vertical,
             wanted,
             without_outliers: None,
+            outliers: Outliers::default(),
             first_outlier_in: None,
             bounds: choice.bounds,
         };
-        table.degrees = named_degrees && table.has_degrees(file, choice)?;
+        if named_degrees && units.horizontal == Unit::Unknown && bounds.is_some() {
+            if table.has_degrees(file, choice)? {
+                table.unit = Unit::Degree;
+            } else {
+                warnings.push(format!(
+                    "its columns are named as longitude and latitude, but hold no degrees (x from {} to {}, y from {} to {}): they count as \
+                     lengths. Degrees and minutes in one number, or degrees times ten million, must be made degrees and transformed first",
+                    min[0], max[0], min[1], max[1]
+                ));
+            }
+        }
         Ok(table)
     }
 
-    /// Returns whether x and y can be degrees. A few rows that are mistakes, and rows that the job does not want, say nothing about it.
+    /// Returns whether x and y can be degrees, in this order or the other. A few rows that are mistakes, and rows that the job does not
+    /// want, say nothing about it.
     fn has_degrees(&self, file: &RandomAccessFile, choice: &RowChoice) -> Result<bool> {
         let Some(wanted) = self.wanted.bounds else { return Ok(false) };
-        if wanted.farthest(0) <= 360.0 && wanted.farthest(1) <= 90.0 {
-            return Ok(true);
-        }
-        let middle = self.middle(file, choice)?.unwrap_or(wanted);
-        Ok(middle.farthest(0) <= 360.0 && middle.farthest(1) <= 90.0)
+        let fits = |rows: &RowBox, x: f64, y: f64| rows.farthest(0) <= x && rows.farthest(1) <= y;
+        let are_degrees = |rows: &RowBox| fits(rows, 360.0, 90.0) || fits(rows, 90.0, 360.0);
+        Ok(are_degrees(&wanted) || self.middle(file, choice)?.is_some_and(|middle| are_degrees(&middle.bounds)))
     }
 
-    /// Returns the box in which most rows lie; `None` if there are too few rows to tell.
-    fn middle(&self, file: &RandomAccessFile, choice: &RowChoice) -> Result<Option<RowBox>> {
+    /// Returns where most rows lie; `None` if there are too few rows to tell.
+    fn middle(&self, file: &RandomAccessFile, choice: &RowChoice) -> Result<Option<Middle>> {
         let chunks = self.chunk_count() as u64;
         let sampled: Vec<Range<u64>> = (0..SAMPLED_CHUNKS.min(chunks))
             .map(|index| chunk_range(&self.rows, index * chunks / SAMPLED_CHUNKS.min(chunks)))
             .collect();
-        middle_box(file, &self.columns, self.rows.start, &sampled, Wanted { choice, within: None })
+        middle(file, &self.columns, self.rows.start, &sampled, Wanted { choice, within: None })
     }
 
-    /// Finds the few rows that lie so far from all others that they are mistakes, and leaves them out: decoding counts them as
-    /// malformed. `even_among_few` tells whether one row of a few may be one. Returns whether there are any.
-    pub(crate) fn leave_out_outliers(
-        &mut self,
-        file: &RandomAccessFile,
-        choice: &RowChoice,
-        even_among_few: bool,
-    ) -> Result<bool> {
-        let Some(bounds) = self.wanted.bounds else { return Ok(false) };
-        let plausible = self.middle(file, choice)?.and_then(|middle| plausible_box(&middle));
-        let Some(within) = plausible.filter(|plausible| !plausible.holds_box(&bounds)) else { return Ok(false) };
+    /// Finds the rows that lie so far from all others that they are mistakes, if they are few, and leaves them out: decoding counts them
+    /// as malformed. Returns how many there are.
+    pub(crate) fn leave_out_outliers(&mut self, file: &RandomAccessFile, choice: &RowChoice) -> Result<Outliers> {
+        let Some(bounds) = self.wanted.bounds else { return Ok(Outliers::default()) };
+        let plausible = self.middle(file, choice)?.and_then(|middle| plausible_box(&middle.bounds));
+        let Some(within) = plausible.filter(|plausible| !plausible.holds_box(&bounds)) else {
+            return Ok(Outliers::default());
+        };
         let surveys = survey(file, &self.columns, &self.rows, Wanted { choice, within: Some(within) })?;
         let mut rest = Survey::empty();
         surveys.iter().for_each(|survey| rest.add(survey));
-        let left_out = are_rare(rest.outliers, self.wanted.rows, even_among_few);
-        self.without_outliers = left_out.then(|| WantedRows::new(&rest.wanted));
+        self.outliers = Outliers::of(&rest);
+        self.without_outliers = (self.outliers.rows > 0).then(|| WantedRows::new(&rest.wanted));
         self.first_outlier_in = surveys.iter().position(|survey| survey.outliers > 0);
-        Ok(left_out)
+        Ok(self.outliers)
     }
 
-    /// Returns whether a row is left out that would be kept without `even_among_few`.
-    pub(crate) fn has_outlier_among_few(&self) -> bool {
-        self.outliers() > 0 && !are_rare(self.outliers(), self.wanted.rows, false)
+    /// Returns whether rows are left out that are not rare in this file.
+    pub(crate) fn has_frequent_outliers(&self) -> bool {
+        self.outliers.rows > 0 && !self.outliers.are_rare(self.wanted.rows, false)
     }
 
     /// Undoes [`TextTable::leave_out_outliers`].
     pub(crate) fn keep_outliers(&mut self) {
         self.without_outliers = None;
+        self.outliers = Outliers::default();
+    }
+
+    /// Returns the wanted row that lies farthest from the middle of all, and the line on which it stands; `None` if there are too few rows
+    /// to tell.
+    pub(crate) fn farthest_row(&self, file: &RandomAccessFile, choice: &RowChoice) -> Result<Option<FarRow>> {
+        let Some(middle) = self.middle(file, choice)? else { return Ok(None) };
+        let mut farthest: Option<FarRow> = None;
+        for (chunk, start) in self.chunks.iter().enumerate() {
+            interrupt::check()?;
+            let mut reader = RowReader::new(&self.columns);
+            let wanted = Wanted { choice, within: self.held().bounds };
+            for_each_line(file, self.rows.start, chunk_range(&self.rows, chunk as u64), |index, line| {
+                if let TextLine::Whole(line) = line
+                    && !self.columns.skips(line)
+                    && reader.read(line).is_ok()
+                    && wanted.has(&reader)
+                {
+                    let distance = middle.distance_to(&reader.numbers);
+                    if farthest.as_ref().is_none_or(|known| distance > known.distance) {
+                        farthest = Some(FarRow { distance, line: start.line + index, text: shown(line) });
+                    }
+                }
+                Ok(())
+            })?;
+        }
+        Ok(farthest)
+    }
+
+    /// Returns the number of rows that the job wants, apart from those that are left out.
+    pub(crate) fn wanted_rows(&self) -> u64 {
+        self.wanted.rows
     }
 
     fn held(&self) -> &WantedRows {
@@ -257,7 +303,7 @@ impl TextTable {
         let ChunkStart { mut row, line: first_line } = self.chunks[chunk];
         let WantedRows { bounds, ref decimals, .. } = *self.held();
         let within = bounds.filter(|_| self.without_outliers.is_some());
-        let mut reader = RowReader::new(&self.columns, true);
+        let mut reader = RowReader::new(&self.columns);
         let is_outside = |reader: &RowReader| self.bounds.is_some_and(|bounds| !is_within(bounds, &reader.numbers));
         let mut explained = self.first_outlier_in != Some(chunk);
         let range = chunk_range(&self.rows, chunk as u64);
@@ -328,75 +374,12 @@ fn survey(file: &RandomAccessFile, columns: &Columns, rows: &Range<u64>, wanted:
     (0..count).into_par_iter().map(survey).collect()
 }
 
-/// Returns a warning about numbers with digits that are noise.
-fn noise_warning(found: &Findings) -> Option<String> {
-    let text = |number: &Number| Decimal::new(number.mantissa, number.decimals.into());
-    let first = found.noise?;
-    let meant = noise::meaning(&first)?.number;
-    Some(format!(
-        "{} numbers have more digits than floating point holds, such as {}, which counts as {}",
-        found.noisy,
-        text(&first),
-        text(&meant)
-    ))
-}
-
 fn chunk_range(rows: &Range<u64>, index: u64) -> Range<u64> {
     let start = rows.start + index * CHUNK;
     start..(start + CHUNK).min(rows.end)
 }
 
-/// How a text is laid out.
-struct Layout {
-    columns: Columns,
-    first: FirstRow,
-    named_degrees: bool,
-}
-
-/// Finds out how the text is laid out and where its rows begin.
-fn detect(file: &RandomAccessFile, options: &TextOptions, colors: bool, warnings: &mut Warnings) -> Result<Layout> {
-    let sample = sample(file, &comments(options)?)?;
-    let mark = mark_length(&sample);
-    let mut lines: Vec<&[u8]> = sample[mark..].split(|&byte| byte == b'\n').collect();
-    if lines.len() > 1 && file.size() > sample.len() as u64 {
-        // The sample may end in the middle of the last line.
-        lines.pop();
-    }
-    let plain: Vec<&[u8]> = lines.iter().copied().map(without_return).collect();
-    let found = Columns::detect(file.path(), &plain, options, colors, warnings)?;
-    let before: usize = lines[..found.header_lines].iter().map(|line| line.len() + 1).sum();
-    let at = ((mark + before) as u64).min(file.size());
-    let first = FirstRow { at, line: found.header_lines as u64 + 1 };
-    Ok(Layout { columns: found.columns, first, named_degrees: found.degrees })
-}
-
 /// Returns the most decimals, up to `decimals`, that leave numbers up to `largest` within 18 digits.
 fn fitting(decimals: u8, largest: f64) -> u8 {
     (0..=decimals.min(MOST_DECIMALS)).rev().find(|&d| largest * POWERS[d as usize] as f64 <= 1e18).unwrap_or(0)
-}
-
-/// Returns the length of the byte order mark that `text` begins with.
-fn mark_length(text: &[u8]) -> usize {
-    if text.starts_with(&[0xef, 0xbb, 0xbf]) { 3 } else { 0 }
-}
-
-/// Returns the start of a text: what comes before the first row, and some rows.
-fn sample(file: &RandomAccessFile, comments: &[String]) -> Result<Vec<u8>> {
-    let mut length = SAMPLE;
-    loop {
-        let sample = file.bytes(0..file.size().min(length))?;
-        let lines = sample[mark_length(&sample)..].split(|&byte| byte == b'\n');
-        let before = lines.take_while(|line| is_skipped(without_return(line), comments));
-        let skipped: u64 = before.map(|line| line.len() as u64 + 1).sum();
-        let wanted = skipped + SAMPLE;
-        if wanted <= length || sample.len() as u64 == file.size() {
-            return Ok(sample);
-        }
-        if length >= MOST_COMMENTS {
-            let what = format!("has no line with numbers in its first {} MiB", MOST_COMMENTS >> 20);
-            return Err(Error::input(file.path(), what));
-        }
-        // A line of comment may go on after the sample.
-        length = wanted.max(length * 2);
-    }
 }

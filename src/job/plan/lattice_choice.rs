@@ -67,6 +67,8 @@ struct ChosenStep {
     finest: Decimal,
     /// Whether a triangle across the whole extent can be written in steps of `finest`.
     lossless: bool,
+    /// The step in which such a triangle can be written. If there is one, the mesh will need it.
+    writable: Decimal,
 }
 
 /// How well a lattice can hold an extent.
@@ -80,8 +82,11 @@ pub(crate) struct Fineness {
 /// A step in metres. Nobody misses what is finer, so nothing is left out of a lattice for the sake of a finer step.
 const MEANINGFUL: f64 = 0.00101;
 
-/// A step in metres. With a coarser one, a terrain is none.
-const USELESS: f64 = 1.0;
+/// A step in metres. A lattice this coarse or coarser is no lattice for points that one other point makes it so coarse for.
+const USELESS: f64 = 0.099;
+
+/// A step in metres. If the inputs are rounded to a coarser one, the user should know which point makes them that wide.
+const COARSE: f64 = 0.0101;
 
 /// Returns how well a lattice can hold `extent`.
 pub(crate) fn fineness(sources: &[Source], extent: &Extent, wish: &LatticeWish) -> Fineness {
@@ -95,12 +100,21 @@ impl Fineness {
         self.steps.iter().zip(self.metres).all(|(step, metres)| step.as_ref().is_some_and(|step| step.is_fine(metres)))
     }
 
-    /// Returns whether a step is so coarse that the points make no terrain, or there is none.
+    /// Returns whether a step will be so coarse that the points make no terrain, if one of them is as far out as the extent says, or there
+    /// is none.
     pub(crate) fn is_useless(&self) -> bool {
         let is_useless = |(step, metres): (&Option<ChosenStep>, f64)| {
-            step.as_ref().is_none_or(|step| !step.lossless && to_float(step.step) * metres > USELESS)
+            step.as_ref().is_none_or(|step| !step.lossless && to_float(step.writable) * metres >= USELESS)
         };
         self.steps.iter().zip(self.metres).any(is_useless)
+    }
+
+    /// Returns whether a step is coarsened to more than a centimetre.
+    pub(crate) fn is_coarse(&self) -> bool {
+        let is_coarse = |(step, metres): (&Option<ChosenStep>, f64)| {
+            step.as_ref().is_some_and(|s| s.step != s.finest && to_float(s.step) * metres > COARSE)
+        };
+        self.steps.iter().zip(self.metres).any(is_coarse)
     }
 
     /// Returns whether the lattice is finer than that of `other` where that one is coarse, or holds what that one does not.
@@ -163,7 +177,7 @@ fn horizontal_step(sources: &[Source], extent: &Extent, wish: &LatticeWish) -> R
     let is_writable = |step: Decimal| LIKELY_SPAN * size * metres < Frame::longest_at(to_float(step) * metres);
     if let Some(step) = wish.steps[0] {
         return if fits(step) {
-            Ok(ChosenStep { step, finest: step, lossless: true })
+            Ok(ChosenStep { step, finest: step, lossless: true, writable: step })
         } else {
             Err(too_fine(step, size, farthest))
         };
@@ -177,8 +191,12 @@ fn horizontal_step(sources: &[Source], extent: &Extent, wish: &LatticeWish) -> R
     while !fits(step) || (!is_writable(step) && to_float(step) * metres < FINE_ENOUGH) {
         step = times_power_of_ten(step, 1)?;
     }
+    let mut writable = step;
+    while !is_writable(writable) {
+        writable = times_power_of_ten(writable, 1)?;
+    }
     step = times_power_of_ten(step, wish.coarsening.horizontal)?;
-    Ok(ChosenStep { step, finest, lossless: lossless.is_some() })
+    Ok(ChosenStep { step, finest, lossless: lossless.is_some(), writable })
 }
 
 fn too_fine(step: Decimal, size: f64, farthest: f64) -> Error {
@@ -198,7 +216,7 @@ fn vertical_step(sources: &[Source], extent: &Extent, wish: &LatticeWish) -> Res
     };
     if let Some(step) = wish.steps[1] {
         return if fits(step) {
-            Ok(ChosenStep { step, finest: step, lossless: true })
+            Ok(ChosenStep { step, finest: step, lossless: true, writable: step })
         } else {
             Err(Error::Config(format!(
                 "[input] resolution_z = {step} is too fine for heights from {} to {}: floating point cannot hold them in such steps; \
@@ -212,9 +230,9 @@ fn vertical_step(sources: &[Source], extent: &Extent, wish: &LatticeWish) -> Res
     while !fits(step) {
         step = times_power_of_ten(step, 1)?;
     }
-    let lossless = step == finest;
+    let (lossless, writable) = (step == finest, step);
     step = times_power_of_ten(step, wish.coarsening.vertical)?;
-    Ok(ChosenStep { step, finest, lossless })
+    Ok(ChosenStep { step, finest, lossless, writable })
 }
 
 /// Returns the largest step on which the points of all inputs lie, where `step_of` gives the step of one input on one axis: the

@@ -10,7 +10,10 @@ use crate::job::plan::extent::{Extent, SourceBox, to_float};
 use crate::job::plan::inputs::{check_missing_records, open_all, unreadable_names};
 use crate::job::plan::job_plan::{Claims, Plan, PlannedInput, SkippedInput};
 use crate::job::plan::lattice_choice::{LatticeCoarsening, LatticeWish, choose_lattice, fineness};
-use crate::job::plan::text_inputs::{check_malformed_rows, refuse_degrees, row_choice, wants_colors};
+use crate::job::plan::text_inputs::{
+    check_malformed_rows, farthest_row, leave_out_outliers, refuse_degrees, refuse_missing_classes, row_choice,
+    wants_colors,
+};
 use crate::output::frame::Frame;
 use crate::{Error, Result, Warnings};
 use rayon::prelude::*;
@@ -94,6 +97,7 @@ fn try_plan(
     }
     check_missing_records(sources, &options.input)?;
     refuse_degrees(sources, &options.input)?;
+    refuse_missing_classes(sources, &options.input)?;
     let crs = common_crs(sources, &options.input.crs, &mut warnings)?;
     let (unit, metres) = horizontal_unit(options.input.unit, &options.input.crs, &crs, &mut warnings)?;
     let metres_z = crs.vertical.unwrap_or(metres);
@@ -104,6 +108,9 @@ fn try_plan(
     };
     let extent = extent_without_outliers(sources, options, &wish)?;
     let lattice = choose_lattice(sources, &extent, &wish, &mut warnings)?;
+    if fineness(sources, &extent, &wish).is_coarse() {
+        warnings.extend(farthest_row(sources, options)?);
+    }
     if metres_z != metres {
         warnings.push(format!(
             "heights are in another unit than x and y ({metres_z} m and {metres} m): glTF has both in metres, see metres_per_unit_z"
@@ -111,7 +118,7 @@ fn try_plan(
     }
     let frame = Frame::new(&lattice, metres, metres_z, crs.wkt.clone())?;
     let clip = options.input.bounds.map(|b| lattice_clip(&lattice, b.0));
-    let rules = point_rules(sources, options, &lattice, clip)?;
+    let rules = point_rules(sources, options, &lattice)?;
     check_malformed_rows(sources, &rules, options)?;
     let clipped = lattice_extent(&lattice, &extent, clip);
     let claimed = extent.boxes.iter().map(|claim| claimed_box(&lattice, claim, clipped)).collect::<Vec<_>>();
@@ -178,12 +185,7 @@ fn extent_without_outliers(sources: &mut [Source], options: &JobOptions, wish: &
     if before.is_meaningful() {
         return Ok(all);
     }
-    let choice = row_choice(options);
-    let mut left_out = false;
-    for source in sources.iter_mut() {
-        left_out |= source.leave_out_outliers(&choice, before.is_useless())?;
-    }
-    if left_out {
+    if leave_out_outliers(sources, options, before.is_useless())? {
         let rest = Extent::of(sources, &options.input, wish.metres[0])?;
         if fineness(sources, &rest, wish).is_better_than(&before) {
             return Ok(rest);
@@ -193,7 +195,8 @@ fn extent_without_outliers(sources: &mut [Source], options: &JobOptions, wish: &
     Ok(all)
 }
 
-/// Returns the lattice box of the points within `bounds`, borders included. It is inside out if no lattice point is.
+/// Returns the lattice box of `bounds`, for the size of the job. Which points lie within them, their raw integers decide. It is inside out
+/// if no lattice point is.
 fn lattice_clip(lattice: &Lattice, bounds: [f64; 4]) -> Bounds<2> {
     let [xmin, ymin, xmax, ymax] = std::array::from_fn(|i| {
         let steps = shortest_decimal(bounds[i])
@@ -221,18 +224,14 @@ fn lattice_extent(lattice: &Lattice, extent: &Extent, clip: Option<Bounds<2>>) -
     Bounds { min, max }
 }
 
-fn point_rules(
-    sources: &[Source],
-    options: &JobOptions,
-    lattice: &Lattice,
-    bounds: Option<Bounds<2>>,
-) -> Result<Vec<PointRules>> {
+fn point_rules(sources: &[Source], options: &JobOptions, lattice: &Lattice) -> Result<Vec<PointRules>> {
     let rgb = wants_colors(options);
     let classes = options.input.kept_classes();
     let mut first_order = 0;
     let mut rules = Vec::with_capacity(sources.len());
     for source in sources {
         let maps = [axis_map(source, 0, lattice)?, axis_map(source, 1, lattice)?, axis_map(source, 2, lattice)?];
+        let bounds = options.input.bounds.and_then(|bounds| source.raw_bounds(bounds.0));
         rules.push(PointRules { maps, classes, bounds, first_order, rgb });
         first_order += source.records;
     }

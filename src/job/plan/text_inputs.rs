@@ -1,7 +1,7 @@
 //! What the plan knows of texts, which are read once before it is made: rows that nobody wants, mistakes, degrees.
 
 use crate::input::options::{InputOptions, OnBadFile, UnitChoice};
-use crate::input::{CrsChoice, FileFormat, PointCounts, PointRules, RowChoice, Source, TextReading, Unit};
+use crate::input::{CrsChoice, FileFormat, Outliers, PointCounts, PointRules, RowChoice, Source, TextReading, Unit};
 use crate::job::options::JobOptions;
 use crate::job::plan::job_plan::Plan;
 use crate::output::options::ColorChoice;
@@ -19,7 +19,7 @@ pub(crate) fn text_reading(plan: &Plan) -> TextReading {
     TextReading {
         colors: wants_colors(&plan.options),
         outliers_left_out: sources().any(|source| source.outliers() > 0),
-        even_among_few: sources().any(Source::has_outlier_among_few),
+        even_among_few: sources().any(Source::has_frequent_outliers),
     }
 }
 
@@ -37,17 +37,76 @@ pub(crate) fn refuse_degrees(sources: &[Source], options: &InputOptions) -> Resu
     let is_open = options.unit == UnitChoice::Auto && matches!(options.crs, CrsChoice::Auto | CrsChoice::First);
     match sources.iter().find(is_in_degrees) {
         Some(source) if is_open => Err(Error::Config(format!(
-            "{}: its columns are named as degrees and hold them (x from {} to {}, y from {} to {}), and a Delaunay triangulation in \
+            "{}: its columns are named as degrees (x from {} to {}, y from {} to {}{}), and a Delaunay triangulation in \
              degrees is distorted: transform the points to a projected CRS first, for example with `cs2cs` or `pdal translate`; if \
              they are no degrees, set [input] unit, for example to \"metre\", or [input] crs",
             source.path.display(),
             source.min[0],
             source.max[0],
             source.min[1],
-            source.max[1]
+            source.max[1],
+            if is_exchanged(source) { "; longitude and latitude look exchanged" } else { "" }
         ))),
         _ => Ok(()),
     }
+}
+
+/// Returns whether y is no latitude, and x is one.
+fn is_exchanged(source: &Source) -> bool {
+    let farthest = |axis: usize| source.min[axis].abs().max(source.max[axis].abs());
+    farthest(1) > 90.0 && farthest(0) <= 90.0
+}
+
+/// Fails if the user asks for classes, and a text has none: all of its points would be left out.
+///
+/// # Errors
+/// [`Error::Config`] names the first such file.
+pub(crate) fn refuse_missing_classes(sources: &[Source], options: &InputOptions) -> Result<()> {
+    // A point without a class counts as one of class 0.
+    let Some(classes) = options.classes.as_ref().filter(|classes| !classes.contains(&0)) else { return Ok(()) };
+    let lacks_classes = |source: &&Source| source.format == FileFormat::Text && !source.has_class;
+    match sources.iter().find(lacks_classes) {
+        Some(source) => Err(Error::Config(format!(
+            "[input] classes = {classes:?}, but {} has no column of classes, so that none of its points would be left: add 0 to the classes to \
+             keep points without a class, name the column with `columns` under [input.csv], or leave the file out",
+            source.path.display()
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// Leaves out the rows that lie so far from all others that they are mistakes: all of them if they are rare in the job, or else those of
+/// files in which they are rare. `even_among_few` tells whether one of a few rows may be one. Returns whether there are any.
+///
+/// # Errors
+/// [`Error::Io`] if a file cannot be read.
+pub(crate) fn leave_out_outliers(sources: &mut [Source], options: &JobOptions, even_among_few: bool) -> Result<bool> {
+    let choice = row_choice(options);
+    let (mut all, mut rows) = (Outliers::default(), 0);
+    for source in sources.iter_mut() {
+        all += source.leave_out_outliers(&choice)?;
+        rows += source.wanted_rows();
+    }
+    if !all.are_rare(rows, even_among_few) {
+        sources.iter_mut().filter(|source| source.has_frequent_outliers()).for_each(Source::keep_outliers);
+    }
+    Ok(sources.iter().any(|source| source.outliers() > 0))
+}
+
+/// Returns a warning about the row that lies farthest from the middle of its file, because it makes the lattice coarse.
+///
+/// # Errors
+/// [`Error::Io`] if a file cannot be read.
+pub(crate) fn farthest_row(sources: &[Source], options: &JobOptions) -> Result<Option<String>> {
+    let choice = row_choice(options);
+    let mut farthest: Option<(f64, String)> = None;
+    for source in sources {
+        let row = source.farthest_row(&choice)?;
+        farthest = row.into_iter().chain(farthest).max_by(|a, b| a.0.total_cmp(&b.0));
+    }
+    Ok(farthest.map(|(_, row)| {
+        format!("the row farthest from the others is {row}; if it is a mistake, remove it or leave it out with [input] bounds")
+    }))
 }
 
 /// Returns how many of `records` may be malformed.

@@ -1,0 +1,130 @@
+//! Names of columns in a comment before the rows, such as `# x y z`.
+
+use crate::input::text::delimiter::{CANDIDATES, Delimiter};
+use crate::input::text::header::{ROWS_FOR_NAMES, columns_of};
+use crate::input::text::lines::{is_skipped, shown};
+use crate::input::text::names::{NamedColumns, named_columns};
+
+/// Returns the names in the last comment among `lines` that names the columns of `rows`, the first of the text.
+///
+/// # Errors
+/// A sentence, if comments name x, y and z, but none of them can mean these columns.
+pub(crate) fn names_in_comments(
+    lines: &[&[u8]],
+    comments: &[String],
+    candidates: &[Delimiter],
+    rows: &[&[u8]],
+) -> Result<Option<NamedColumns>, String> {
+    let rows = Rows { rows: &rows[..rows.len().min(ROWS_FOR_NAMES)], candidates };
+    let mut misfit = None;
+    for line in lines.iter().rev().filter(|line| !line.trim_ascii().is_empty() && is_skipped(line, comments)) {
+        for text in texts_of(line, comments) {
+            let others = candidates.iter().filter(|own| !CANDIDATES.contains(own));
+            let readings = CANDIDATES.iter().chain(others).filter_map(|delimiter| {
+                let fields = Some(delimiter.fields(text)).filter(|fields| fields.len() >= 3)?;
+                let names = named_columns(fields.into_iter()).ok()?;
+                Some((*delimiter, names))
+            });
+            for (delimiter, names) in readings {
+                match rows.fit(delimiter, &names) {
+                    Some(names) => return Ok(Some(names)),
+                    None if rows.mean_the_same(&names) => {}
+                    None => misfit = misfit.or(Some((line, names.count))),
+                }
+            }
+        }
+    }
+    match misfit {
+        None => Ok(None),
+        Some((line, names)) => Err(format!(
+            "the comment {} names x, y and z, but it has {names} words and the rows have {} columns: say which is which with `columns` under \
+             [input.csv]",
+            shown(line),
+            rows.columns().max().unwrap_or(0)
+        )),
+    }
+}
+
+/// Returns what may be names in a comment: what follows its last colon, and all of its text.
+fn texts_of<'a>(line: &'a [u8], comments: &[String]) -> Vec<&'a [u8]> {
+    let line = line.trim_ascii_start();
+    let Some(comment) = comments.iter().find(|comment| line.starts_with(comment.as_bytes())) else { return Vec::new() };
+    let text = &line[comment.len()..];
+    let marks = text.iter().take_while(|byte| matches!(byte, b'#' | b'/')).count();
+    let text = text[marks..].trim_ascii();
+    // "Columns: x y z" are three names.
+    let after_colon = text.iter().rposition(|byte| *byte == b':').map(|colon| text[colon + 1..].trim_ascii());
+    [after_colon, Some(text)].into_iter().flatten().collect()
+}
+
+/// The first rows of a text, and what may part their columns.
+struct Rows<'a> {
+    rows: &'a [&'a [u8]],
+    candidates: &'a [Delimiter],
+}
+
+impl Rows<'_> {
+    /// Returns the delimiters under which rows have three numbers, and how many columns they have then.
+    fn readings(&self) -> impl Iterator<Item = (Delimiter, usize)> {
+        let readings = self.rows.iter().flat_map(|row| self.candidates.iter().map(move |own| (*own, *row)));
+        readings.filter(|(own, row)| own.numbers(row) >= 3).map(|(own, row)| (own, columns_of(own, row)))
+    }
+
+    fn columns(&self) -> impl Iterator<Item = usize> {
+        self.readings().map(|(_, columns)| columns)
+    }
+
+    /// Returns names that this delimiter parts, if they are as many as the columns, or the names of the first of them. Then columns
+    /// without a name have none.
+    fn fit(&self, delimiter: Delimiter, names: &NamedColumns) -> Option<NamedColumns> {
+        if self.columns().any(|columns| columns == names.count) {
+            return Some(names.clone());
+        }
+        let wider = self.readings().filter(|(own, columns)| *own == delimiter && *columns > names.count);
+        let mut names = names.clone();
+        names.count = wider.map(|(_, columns)| columns).max()?;
+        Some(names)
+    }
+
+    /// Returns whether columns without names mean the same: x, y and z come first, or are all there is in the order x, y, z.
+    fn mean_the_same(&self, names: &NamedColumns) -> bool {
+        let places = [0, 1, 2].map(|axis| names.place(axis));
+        places == [Some(0), Some(1), Some(2)] || (places.is_sorted() && self.columns().all(|columns| columns == 3))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn places(comment: &str, row: &str) -> Result<Option<[usize; 3]>, ()> {
+        let comments = ["#".to_string()];
+        let found = names_in_comments(&[comment.as_bytes()], &comments, &CANDIDATES, &[row.as_bytes()]);
+        let place = |names: NamedColumns| [0, 1, 2].map(|axis| names.place(axis).unwrap());
+        found.map(|names| names.map(place)).map_err(drop)
+    }
+
+    #[test]
+    fn comments_that_name_the_columns_are_headers() {
+        let swapped = Ok(Some([1, 0, 2]));
+        for (comment, row) in [
+            ("# y,x,z", "2,1,3,"),
+            ("# y;x;z", "2;1;3;"),
+            ("# Y X Z", "2 1 3 4"),
+            ("# Columns: Y X Z", "2 1 3"),
+            ("## Columns (m): y, x, z", "2 1 3"),
+            ("# y,x,z", "2 1 3"),
+        ] {
+            assert_eq!(places(comment, row), swapped, "{comment}");
+        }
+        for comment in ["# x y z of the hill", "# points with x y z", "# made today"] {
+            assert_eq!(places(comment, "1 2 3"), Ok(None), "{comment}");
+        }
+        assert_eq!(places("# x y z i r g b", "1 2 3 4"), Ok(None));
+        for (comment, row) in
+            [("# z y x of the hill", "1 2 3"), ("# rows of id x y z", "1 2 3 4"), ("# y,x,z", "2;1;3;4")]
+        {
+            assert_eq!(places(comment, row), Err(()), "{comment}");
+        }
+    }
+}

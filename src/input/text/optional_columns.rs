@@ -1,0 +1,91 @@
+//! Columns of colours and classes: what they hold, and what of them cannot be read. A point is a point without them.
+
+use crate::input::text::delimiter::Delimiter;
+use crate::input::text::lines::shown;
+use crate::input::text::number::Number;
+use crate::input::text::role::ColumnRole;
+
+/// Returns the colour that `number` stands for; `None` if no colour is that dark or bright.
+#[inline]
+pub(crate) fn color_of(number: Number, is_unit: bool) -> Option<u16> {
+    if is_unit {
+        return Some((number.value().clamp(0.0, 1.0) * u16::MAX as f64).round() as u16);
+    }
+    let (nearest, _) = number.steps(0)?;
+    u16::try_from(nearest).ok()
+}
+
+/// Returns the class that `number` stands for; `None` if it is no whole number from 0 to 255.
+#[inline]
+pub(crate) fn class_of(number: Number) -> Option<u8> {
+    let number = number.shortest();
+    if number.decimals == 0 && !number.rounded { u8::try_from(number.mantissa).ok() } else { None }
+}
+
+/// Skips the columns of colours if most of these rows have none that can be read. Returns a warning if one has not.
+pub(crate) fn drop_unreadable_colors(
+    delimiter: Delimiter,
+    roles: &mut [ColumnRole],
+    is_unit: bool,
+    rows: &[&[u8]],
+) -> Option<String> {
+    let is_color = |role: &ColumnRole| matches!(role, ColumnRole::Color(_));
+    let bad = |row: &&&[u8]| {
+        let color = |field: &[u8]| Number::parse(field).and_then(|number| color_of(number, is_unit));
+        unreadable(delimiter, roles, row, is_color, |field| color(field).is_some())
+    };
+    let found: Vec<String> = rows.iter().filter_map(|row| bad(&row)).collect();
+    let example = found.first()?;
+    if found.len() * 2 <= rows.len() {
+        return Some(format!("some colours are no numbers from 0 to 65535, such as {example}: they are read as 0"));
+    }
+    for role in roles.iter_mut().filter(|role| is_color(role)) {
+        *role = ColumnRole::Skipped;
+    }
+    Some(format!("its colours are no numbers from 0 to 65535, such as {example}: they are left out"))
+}
+
+/// Returns a warning if one of these rows has a class that cannot be read.
+pub(crate) fn unreadable_class(delimiter: Delimiter, roles: &[ColumnRole], rows: &[&[u8]]) -> Option<String> {
+    let is_class = |role: &ColumnRole| *role == ColumnRole::Class;
+    let class = |field: &[u8]| Number::parse(field).and_then(class_of);
+    let example = rows.iter().find_map(|row| unreadable(delimiter, roles, row, is_class, |f| class(f).is_some()))?;
+    Some(format!(
+        "some classes are no whole numbers from 0 to 255, such as {example}: they count as 0, \"never classified\""
+    ))
+}
+
+/// Returns the first column of `row` with a wanted role that holds something which cannot be read, for a message.
+fn unreadable(
+    delimiter: Delimiter,
+    roles: &[ColumnRole],
+    row: &[u8],
+    is_wanted: impl Fn(&ColumnRole) -> bool,
+    is_readable: impl Fn(&[u8]) -> bool,
+) -> Option<String> {
+    if !roles.iter().any(&is_wanted) {
+        return None;
+    }
+    let fields = delimiter.fields(row);
+    let mut columns = fields.iter().zip(roles).filter(|(_, role)| is_wanted(role));
+    columns.find(|(field, _)| !field.is_empty() && !is_readable(field)).map(|(field, _)| shown(field))
+}
+
+/// Returns whether the colours of these rows are numbers from 0 to 1, some of them with decimals.
+pub(crate) fn has_unit_colors(delimiter: Delimiter, roles: &[ColumnRole], rows: &[&[u8]]) -> bool {
+    let mut decimals = false;
+    let has_colors = roles.iter().any(|role| matches!(role, ColumnRole::Color(_)));
+    for row in rows.iter().filter(|_| has_colors) {
+        let fields = delimiter.fields(row);
+        for (field, role) in fields.iter().zip(roles) {
+            let color = matches!(role, ColumnRole::Color(_)).then(|| Number::parse(field)).flatten();
+            if let Some(color) = color {
+                if !(0.0..=1.0).contains(&color.value()) {
+                    return false;
+                }
+                decimals |= color.shortest().decimals > 0;
+            }
+        }
+    }
+    decimals
+}

@@ -1,0 +1,135 @@
+//! The units of x, y and z, as the names of columns or a line below them say them.
+
+use crate::input::crs::unit::Unit;
+use crate::input::points::axis::AXIS_NAMES;
+
+/// A unit that people write beside a name.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct TextUnit {
+    /// The clearest of its names.
+    name: &'static str,
+    /// Its length; `None` for an angle.
+    metres: Option<f64>,
+}
+
+/// The units that are known: their names, the clearest first, and their lengths.
+const UNITS: [(&[&str], Option<f64>); 10] = [
+    (&["m", "metre", "metres", "meter", "meters"], Some(1.0)),
+    (&["dm", "decimetre", "decimetres", "decimeter", "decimeters"], Some(0.1)),
+    (&["cm", "centimetre", "centimetres", "centimeter", "centimeters"], Some(0.01)),
+    (&["mm", "millimetre", "millimetres", "millimeter", "millimeters"], Some(0.001)),
+    (&["km", "kilometre", "kilometres", "kilometer", "kilometers"], Some(1000.0)),
+    (&["us-ft", "usft", "us ft", "ftus", "us_ft", "sft", "us survey foot", "us survey feet"], Some(Unit::US_FOOT)),
+    (&["ft", "feet", "foot", "ift"], Some(Unit::FOOT)),
+    (&["in", "inch", "inches"], Some(0.0254)),
+    (&["degrees", "degree", "deg", "dd", "°", "dms", "decimal degrees", "decimal degree"], None),
+    (&["radians", "radian", "rad", "gon", "grad"], None),
+];
+
+impl TextUnit {
+    /// Returns the unit that `text` names, in brackets or not.
+    pub(crate) fn read(text: &str) -> Option<TextUnit> {
+        let plain = text.trim_matches(['[', ']', '(', ')', '{', '}', ' ', '.']).to_lowercase();
+        let (names, metres) = UNITS.iter().find(|(names, _)| names.contains(&plain.as_str()))?;
+        Some(TextUnit { name: names[0], metres: *metres })
+    }
+}
+
+/// The units of x, y and z, as far as a text says them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct TextUnits(pub(crate) [Option<TextUnit>; 3]);
+
+/// What the units of a text mean for its coordinates.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct UnitsOfAxes {
+    /// The unit of x and y.
+    pub(crate) horizontal: Unit,
+    /// The length of the unit of z, if it is another.
+    pub(crate) vertical: Option<f64>,
+    /// Whether a unit is a foot, of which there are two.
+    pub(crate) some_foot: bool,
+}
+
+impl TextUnits {
+    /// Takes the units of a line below the names into account: those of the columns of x, y and z. A line that does not give x and y a
+    /// unit each is no line of units.
+    ///
+    /// # Errors
+    /// A sentence, if the names say another unit.
+    pub(crate) fn add_line(&mut self, line: [Option<TextUnit>; 3]) -> Result<(), String> {
+        if line[0].is_none() || line[1].is_none() {
+            return Ok(());
+        }
+        for (axis, (own, below)) in self.0.iter_mut().zip(line).enumerate() {
+            match (*own, below) {
+                (Some(named), Some(below)) if named != below => {
+                    let (axis, named, below) = (AXIS_NAMES[axis], named.name, below.name);
+                    return Err(format!("says {named} for {axis}, and the line below it says {below}"));
+                }
+                _ => *own = own.or(below),
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns what the units mean together.
+    ///
+    /// # Errors
+    /// A sentence, if x and y are in different units, or z is in degrees.
+    pub(crate) fn of_axes(&self) -> Result<UnitsOfAxes, String> {
+        let [x, y, z] = self.0;
+        if let (Some(x), Some(y)) = (x, y)
+            && x != y
+        {
+            return Err(format!("says {} for x and {} for y: write both in one unit", x.name, y.name));
+        }
+        let horizontal = x.or(y);
+        if let Some(z) = z.filter(|z| z.metres.is_none()) {
+            return Err(format!("says {} for z: write heights in metres", z.name));
+        }
+        let unit = horizontal.map_or(Unit::Unknown, |unit| unit.metres.map_or(Unit::Degree, of_length));
+        Ok(UnitsOfAxes {
+            horizontal: unit,
+            vertical: z.filter(|_| z != horizontal).and_then(|z| z.metres),
+            some_foot: self.0.iter().flatten().any(|unit| unit.name == "ft"),
+        })
+    }
+}
+
+fn of_length(metres: f64) -> Unit {
+    Unit::from_metres(Some(metres))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn units(names: [&str; 3]) -> TextUnits {
+        TextUnits(names.map(TextUnit::read))
+    }
+
+    #[test]
+    fn units_of_many_spellings_are_used() {
+        let of = |names| units(names).of_axes().unwrap();
+        assert_eq!(of(["m", "[m]", "(Meter)"]), UnitsOfAxes { horizontal: Unit::Metre, ..UnitsOfAxes::default() });
+        assert_eq!(of(["mm", "mm", "mm"]).horizontal, Unit::Other(0.001));
+        assert_eq!(of(["km", "km", "m"]).vertical, Some(1.0));
+        assert_eq!(of(["m", "m", "cm"]).vertical, Some(0.01));
+        assert_eq!((of(["ft", "ft", "ft"]).horizontal, of(["feet", "ft", "ft"]).some_foot), (Unit::Foot, true));
+        assert_eq!(of(["us-ft", "usft", "US ft"]), UnitsOfAxes { horizontal: Unit::UsFoot, ..UnitsOfAxes::default() });
+        assert_eq!(of(["dd", "°", "m"]).horizontal, Unit::Degree);
+        assert_eq!(of(["local", "", "NAVD88"]), UnitsOfAxes::default());
+    }
+
+    #[test]
+    fn units_that_contradict_each_other_are_errors() {
+        assert!(units(["m", "ft", "m"]).of_axes().unwrap_err().contains("m for x and ft for y"));
+        assert!(units(["deg", "deg", "deg"]).of_axes().unwrap_err().contains("for z"));
+        let mut named = units(["m", "m", ""]);
+        assert!(named.add_line(units(["cm", "cm", "cm"]).0).unwrap_err().contains("line below"));
+        let mut named = units(["", "", ""]);
+        named.add_line(units(["m", "m", "cm"]).0).unwrap();
+        assert_eq!(named, units(["m", "m", "cm"]));
+        named.add_line(units(["", "", "mm"]).0).unwrap();
+    }
+}
