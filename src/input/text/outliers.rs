@@ -1,6 +1,6 @@
 //! Rows that lie so far from all others that they are mistakes, such as 0, 0, 0 among coordinates of a national grid.
 
-use std::ops::{AddAssign, Range};
+use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
@@ -44,16 +44,15 @@ impl Outliers {
         Outliers { rows, places: if survey.outlier_box.is_point() { rows.min(1) } else { rows } }
     }
 
+    /// Counts those of another file as well.
+    pub fn add(&mut self, other: Outliers) {
+        self.rows += other.rows;
+        self.places += other.places;
+    }
+
     /// Returns whether they are so few among `rows` that they are mistakes. Of a few rows none is, unless `even_among_few`: then one may be.
     pub fn are_rare(&self, rows: u64, even_among_few: bool) -> bool {
         self.places > 0 && self.places <= (rows / RARE).max(even_among_few as u64)
-    }
-}
-
-impl AddAssign for Outliers {
-    fn add_assign(&mut self, other: Outliers) {
-        self.rows += other.rows;
-        self.places += other.places;
     }
 }
 

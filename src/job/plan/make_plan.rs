@@ -109,7 +109,7 @@ fn try_plan(
     let extent = extent_without_outliers(sources, options, &wish)?;
     let lattice = choose_lattice(sources, &extent, &wish, &mut warnings)?;
     if fineness(sources, &extent, &wish).is_coarse() {
-        warnings.extend(farthest_row(sources, options)?);
+        warnings.extend(farthest_row(sources, options, &extent)?);
     }
     if metres_z != metres {
         warnings.push(format!(

@@ -3,6 +3,7 @@
 use crate::input::options::{InputOptions, OnBadFile, UnitChoice};
 use crate::input::{CrsChoice, FileFormat, Outliers, PointCounts, PointRules, RowChoice, Source, TextReading, Unit};
 use crate::job::options::JobOptions;
+use crate::job::plan::extent::Extent;
 use crate::job::plan::job_plan::Plan;
 use crate::output::options::ColorChoice;
 use crate::{Error, Result, interrupt};
@@ -84,7 +85,7 @@ pub(crate) fn leave_out_outliers(sources: &mut [Source], options: &JobOptions, e
     let choice = row_choice(options);
     let (mut all, mut rows) = (Outliers::default(), 0);
     for source in sources.iter_mut() {
-        all += source.leave_out_outliers(&choice)?;
+        all.add(source.leave_out_outliers(&choice)?);
         rows += source.wanted_rows();
     }
     if !all.are_rare(rows, even_among_few) {
@@ -93,18 +94,20 @@ pub(crate) fn leave_out_outliers(sources: &mut [Source], options: &JobOptions, e
     Ok(sources.iter().any(|source| source.outliers() > 0))
 }
 
-/// Returns a warning about the row that lies farthest from the middle of its file, because it makes the lattice coarse.
+/// Returns a warning about the row that lies farthest from the middle of its file, if it makes the lattice coarse: if it lies half as far
+/// out as the job is wide, or farther. Files that lie far apart do so without such a row.
 ///
 /// # Errors
 /// [`Error::Io`] if a file cannot be read.
-pub(crate) fn farthest_row(sources: &[Source], options: &JobOptions) -> Result<Option<String>> {
+pub(crate) fn farthest_row(sources: &[Source], options: &JobOptions, extent: &Extent) -> Result<Option<String>> {
     let choice = row_choice(options);
     let mut farthest: Option<(f64, String)> = None;
     for source in sources {
         let row = source.farthest_row(&choice)?;
         farthest = row.into_iter().chain(farthest).max_by(|a, b| a.0.total_cmp(&b.0));
     }
-    Ok(farthest.map(|(_, row)| {
+    let size = extent.size(0).max(extent.size(1)).max(extent.size(2));
+    Ok(farthest.filter(|(distance, _)| 2.0 * distance >= size).map(|(_, row)| {
         format!("the row farthest from the others is {row}; if it is a mistake, remove it or leave it out with [input] bounds")
     }))
 }
