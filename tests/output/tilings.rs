@@ -93,5 +93,5 @@ fn records_that_do_not_fit_in_memory_go_to_files() {
     assert_eq!(tight.failures, Vec::<String>::new());
     assert_eq!(tight, roomy);
     assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 1, "nothing is left behind");
-    assert!(verify(directory.path(), 1 << 10).unwrap_err().to_string().contains("memory limit"));
+    assert!(verify(directory.path(), 1 << 10).unwrap_err().to_string().contains("--memory"));
 }

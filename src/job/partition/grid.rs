@@ -92,13 +92,13 @@ impl Grid {
         self.in_span(span).map(move |bucket| {
             let lines = [bucket as u32 % self.columns, bucket as u32 / self.columns];
             let mut shared = bounds;
-            for axis in 0..2 {
+            for (axis, line) in lines.into_iter().enumerate() {
                 // The outermost buckets have the points beyond the grid too.
-                if lines[axis] > span.min[axis] {
-                    shared.min[axis] = self.line(axis, lines[axis]) as i32;
+                if line > span.min[axis] {
+                    shared.min[axis] = self.line(axis, line) as i32;
                 }
-                if lines[axis] + 1 < span.max[axis] {
-                    shared.max[axis] = (self.line(axis, lines[axis] + 1) - 1) as i32;
+                if line + 1 < span.max[axis] {
+                    shared.max[axis] = (self.line(axis, line + 1) - 1) as i32;
                 }
             }
             (bucket, shared)

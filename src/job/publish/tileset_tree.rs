@@ -25,7 +25,7 @@ impl TilesOfTree<'_> {
     /// Returns the root of the tiles, none of them placed on the globe yet; `None` if there is no triangle.
     ///
     /// # Errors
-    /// [`Error::Io`] or [`Error::Broken`] on the store.
+    /// [`crate::Error::Io`] or [`crate::Error::Broken`] on the store.
     pub fn root(&self) -> Result<Option<TilesetNode>> {
         if let Some(last) = self.hierarchy.tiles.len().checked_sub(1) {
             return self.coarse_node(last);

@@ -8,9 +8,9 @@ use crate::job::partition::tree::{NodeKind, Tree};
 use crate::job::plan::budget::merge_memory;
 use crate::job::records::{JobStep, JournalEntry, Seam, SeamTriangle, Store};
 use crate::job::run::part_entries::{PartHeader, entries_of, open_store, records_of};
-use crate::job::run::parts::PartsJob;
 use crate::job::run::parts::part_journal::PartSession;
 use crate::job::run::parts::part_store::{OpenPart, PartStores};
+use crate::job::run::parts::parts_job::PartsJob;
 use crate::job::run::run_context::RunContext;
 use std::sync::Arc;
 

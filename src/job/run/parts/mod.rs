@@ -7,6 +7,7 @@ mod join;
 mod mesh_phase;
 mod part_journal;
 mod part_store;
+mod parts_job;
 mod publish_parts;
 mod tile_phase;
 
@@ -18,16 +19,10 @@ use crate::job::report::job_report::Report;
 use crate::job::run::parts::join::join_parts;
 use crate::job::run::parts::mesh_phase::mesh_all;
 use crate::job::run::parts::part_store::PartStores;
+use crate::job::run::parts::parts_job::PartsJob;
 use crate::job::run::parts::publish_parts::publish_parts;
 use crate::job::run::parts::tile_phase::{final_look, finish_tiles};
 use crate::job::run::run_context::RunContext;
-
-/// What all phases know.
-pub(crate) struct PartsJob<'a> {
-    pub(crate) run: &'a RunContext<'a>,
-    pub(crate) plan: &'a Plan,
-    pub(crate) parts: &'a Parts,
-}
 
 /// The walk through the phases after the plan.
 ///

@@ -12,11 +12,11 @@ use crate::job::records::Store;
 use crate::job::report::job_report::Report;
 use crate::job::run::levels_step::{hierarchy_of, level_sizes, make_levels};
 use crate::job::run::part_entries::{PartHeader, StepsOfParts, entries_of};
-use crate::job::run::parts::PartsJob;
 use crate::job::run::parts::join::JoinedParts;
 use crate::job::run::parts::mesh_phase::MeshedParts;
 use crate::job::run::parts::part_journal::PartSession;
 use crate::job::run::parts::part_store::PartStores;
+use crate::job::run::parts::parts_job::PartsJob;
 use crate::job::run::publish_step::{
     MeshFigures, TilesetContent, WrittenFiles, publish, some_triangles, wants_tileset, write_report,
 };
