@@ -60,6 +60,9 @@ pub enum Error {
     /// What was read contradicts the headers, so a job of several parts starts again as one part (exit code 4: no user sees it).
     #[error("what was read contradicts the header of a file")]
     NeedsOnePart,
+    /// What an interrupted run left is damaged, so the job starts over (exit code 4: no user sees it).
+    #[error("what the interrupted run left is damaged")]
+    DamagedSteps,
     /// The mesh has a triangle too long for single precision at the resolution of the job (exit code 2).
     #[error(
         "{what}: set a coarser [input] resolution or narrower bounds, or leave out the classes that are not terrain"
@@ -143,7 +146,7 @@ impl Error {
             Error::Resumable { why, .. } => why.exit_code(),
             Error::Config(_) | Error::TooFine { .. } => 2,
             Error::Input { .. } | Error::NoTerrain(_) => 3,
-            Error::Broken(_) | Error::NeedsOnePart => 4,
+            Error::Broken(_) | Error::NeedsOnePart | Error::DamagedSteps => 4,
         }
     }
 

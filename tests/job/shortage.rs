@@ -8,7 +8,8 @@ use crate::program::{Job, gdt_batch, gdt_batch_within_kib};
 /// Runs the program with more and more address space until it succeeds a few times. Returns how many runs were refused.
 #[track_caller]
 fn refused_until_it_fits(folder: &Path, arguments: &[&str], before: impl Fn()) -> usize {
-    let (mut refused, mut fitted, mut kibibytes) = (0, 0, 20_000);
+    // With less, the system cannot even map the program.
+    let (mut refused, mut fitted, mut kibibytes) = (0, 0, 24_000);
     while fitted < 3 {
         before();
         let said = gdt_batch_within_kib(kibibytes, folder, arguments);

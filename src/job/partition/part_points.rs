@@ -16,6 +16,7 @@ use crate::job::plan::job_plan::Plan;
 use crate::job::progress::stage::Stage;
 use crate::job::records::{RecordRef, StepRecord, Store};
 use crate::{Error, Result};
+use rayon::prelude::*;
 
 /// What the inputs that one part needs first held.
 #[derive(Debug, Default)]
@@ -114,6 +115,13 @@ impl<'a> PartPoints<'a> {
         self.parts.buckets_of(part).flat_map(|bucket| &self.blocks[bucket])
     }
 
+    /// Tells whether the file of `part` holds what was written to it.
+    pub fn are_whole(&self, directory: &JobDirectory, part: PartIndex) -> bool {
+        let blocks: Vec<PointBlock> = self.blocks_of(part).copied().collect();
+        let file = PointFile::open(&directory.part(part).points());
+        blocks.is_empty() || file.is_ok_and(|file| blocks.par_iter().all(|&block| file.is_whole(block)))
+    }
+
     /// Returns the bytes of the points of `part`.
     pub fn bytes(&self, part: PartIndex) -> u64 {
         self.blocks_of(part).map(PointBlock::bytes).sum()
@@ -133,7 +141,7 @@ impl<'a> PartPoints<'a> {
         let (plan, parts) = (self.plan, self.parts);
         let file = PointFile::append_to(&directory.part(part).points(), self.blocks_of(part))?;
         let max_points_per_tile = plan.options.triangulation.max_points_per_tile.0;
-        let mut builder = TreeBuilder::new(&file, max_points_per_tile, read_buffer_memory(&plan.options));
+        let mut builder = TreeBuilder::repeatable(&file, max_points_per_tile, read_buffer_memory(&plan.options));
         let mut buckets = vec![Bucket::default(); parts.grid.buckets()];
         for bucket in parts.buckets_of(part) {
             let blocks = self.blocks[bucket].clone();

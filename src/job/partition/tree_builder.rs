@@ -31,13 +31,27 @@ pub(crate) struct TreeBuilder<'a> {
     max_points_per_tile: u64,
     /// Bytes for buffers.
     memory: u64,
+    /// Whether the points of a bucket stay once they are in smaller ones.
+    keeps_crowded: bool,
     tree: Tree,
     blocks: Vec<Vec<PointBlock>>,
 }
 
 impl<'a> TreeBuilder<'a> {
     pub(crate) fn new(file: &'a PointFile, max_points_per_tile: u64, memory: u64) -> TreeBuilder<'a> {
-        TreeBuilder { file, max_points_per_tile, memory, tree: Tree::default(), blocks: Vec::new() }
+        TreeBuilder {
+            file,
+            max_points_per_tile,
+            memory,
+            keeps_crowded: false,
+            tree: Tree::default(),
+            blocks: Vec::new(),
+        }
+    }
+
+    /// As [`TreeBuilder::new`], but the points of crowded buckets stay, so that the tree can be grown again after an interruption.
+    pub(crate) fn repeatable(file: &'a PointFile, max_points_per_tile: u64, memory: u64) -> TreeBuilder<'a> {
+        TreeBuilder { keeps_crowded: true, ..TreeBuilder::new(file, max_points_per_tile, memory) }
     }
 
     /// Grows the tree of `part`, which decides `cell`, over the buckets in `span` of `grid`.
@@ -110,7 +124,9 @@ impl<'a> TreeBuilder<'a> {
             BucketSorter::new(&grid, &finer).add(&points)
         })?;
         let finer = finer.finish()?;
-        self.file.free(&bucket.blocks)?;
+        if !self.keeps_crowded {
+            self.file.free(&bucket.blocks)?;
+        }
         self.grow(cell, parent, &grid, finer)
     }
 

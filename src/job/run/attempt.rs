@@ -71,6 +71,10 @@ pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, walk: Wal
             coarsening.one_part = true;
             continue;
         }
+        if let Err(Error::DamagedSteps) = outcome {
+            run.progress.note("what the interrupted run left is damaged; starting over");
+            continue;
+        }
         let Err(Error::TooFine { vertical, what }) = outcome else { return outcome };
         let (power, axes) = match vertical {
             true => (&mut coarsening.vertical, "z"),

@@ -202,7 +202,7 @@ pub(crate) fn start_parts<'a>(
     earlier: Option<EarlierRun>,
     progress: ProgressOutput,
 ) -> Result<RunStart<'a>> {
-    let same = earlier.and_then(|earlier| same_job_of_parts(header, earlier, progress));
+    let same = earlier.and_then(|earlier| same_job_of_parts(directory, header, earlier, progress));
     let (entries, header, resumed) = match same {
         Some((old, entries, of_parts)) => {
             let steps = entries.len() as u64 + of_parts;
@@ -227,6 +227,7 @@ pub(crate) fn start_parts<'a>(
 /// Returns the header of an earlier run of the same job, its entries that stay (the plan, and what was read), and the number of steps of
 /// its parts.
 fn same_job_of_parts(
+    directory: &JobDirectory,
     header: &JobHeader,
     earlier: EarlierRun,
     progress: ProgressOutput,
@@ -241,6 +242,13 @@ fn same_job_of_parts(
         }
     }
     entries.retain(|entry| matches!(entry.step, JobStep::Plan | JobStep::Read(_)));
+    let records = records_of(&entries);
+    let is_whole =
+        open_store(directory, &records).is_ok_and(|store| records.iter().all(|record| store.is_whole(record)));
+    if !records.is_empty() && !is_whole {
+        progress.note("what the interrupted run left is damaged; starting over");
+        return None;
+    }
     Some((old, entries, of_parts.count))
 }
 

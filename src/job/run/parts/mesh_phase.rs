@@ -1,7 +1,7 @@
 //! Reading and meshing the parts in their order.
 
-use crate::Result;
 use crate::job::durable::atomic_file::remove_file;
+use crate::job::durable::directory::JobDirectory;
 use crate::job::index::PartIndex;
 use crate::job::index::TileIndex;
 use crate::job::mesh::leaf::LeafStats;
@@ -10,9 +10,9 @@ use crate::job::partition::part_points::{PartPoints, ReadBatch};
 use crate::job::partition::result::PointSummary;
 use crate::job::plan::job_plan::Claims;
 use crate::job::plan::no_points::no_point_is_left;
-use crate::job::records::{JobStep, StepOutput};
+use crate::job::records::{JobStep, JournalEntry, StepOutput};
 use crate::job::run::mesh_and_tiles::{Writing, mesh_part};
-use crate::job::run::part_entries::{PartHeader, entries_of};
+use crate::job::run::part_entries::{PartHeader, entries_of, open_store, records_of};
 use crate::job::run::parts::part_journal::PartSession;
 use crate::job::run::parts::parts_job::PartsJob;
 use crate::job::run::resume::resume_part;
@@ -20,6 +20,7 @@ use crate::job::run::tile_queue::TileLook;
 use crate::job::tiles::max_edge::MaxEdgeRule;
 use crate::job::tiles::write_tile::TileStats;
 use crate::output::options::MaxEdge;
+use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -96,6 +97,23 @@ fn read_for(job: &PartsJob, points: &PartPoints, part: PartIndex) -> Result<Read
     Ok(batch)
 }
 
+/// Removes from the journal the steps after the one at position `done` that a power failure has damaged: they can be done again.
+fn keep_whole_steps_after(
+    directory: &JobDirectory,
+    header: PartHeader,
+    entries: Vec<JournalEntry>,
+    done: usize,
+) -> Result<()> {
+    let store = open_store(directory, &records_of(&entries))?;
+    let is_whole = |entry: &JournalEntry| {
+        entry.records.iter().all(|record| store.is_whole(record))
+            && entry.files.iter().all(|file| file.is_whole(directory))
+    };
+    let whole =
+        (0..).zip(entries).filter(|(at, entry)| *at <= done || is_whole(entry)).map(|(_, entry)| entry).collect();
+    PartSession::begin(directory, header, whole)?.end()
+}
+
 /// Meshes a part whose points have all been read, unless an earlier run has. Temporary files of other parts take `others` bytes.
 fn mesh_one(
     job: &PartsJob,
@@ -108,9 +126,13 @@ fn mesh_one(
     let directory = &run.directory.part(part);
     let header = PartHeader { job: run.job_id, part };
     let entries = entries_of(directory, header)?;
-    if let Some(done) = entries.iter().find(|entry| entry.step == JobStep::MeshPart) {
+    if let Some(done) = entries.iter().position(|entry| entry.step == JobStep::MeshPart) {
+        let meshed = entries[done].stats()?;
+        if run.resumed > 0 {
+            keep_whole_steps_after(directory, header, entries, done)?;
+        }
         remove_file(&directory.points())?;
-        return done.stats();
+        return Ok(meshed);
     }
     let (entries, partition) = resume_part(directory, entries, plan.options.output.max_edge, run.progress)?;
     let session = PartSession::begin(directory, header, entries)?;
@@ -118,6 +140,9 @@ fn mesh_one(
     let partition = match partition {
         Some(partition) => partition,
         None => {
+            if run.resumed > 0 && !points.are_whole(run.directory, part) {
+                return Err(Error::DamagedSteps);
+            }
             let partition = points.partition(run.directory, part)?;
             let record = partition.save(&session.store)?;
             session.journal.record(JobStep::Partition, StepOutput::new((), vec![record]))?;
@@ -137,9 +162,8 @@ fn mesh_one(
         stored: session.store.bytes(),
     };
     session.journal.commit()?;
-    if run.journal.is_worth_syncing() {
-        session.store.sync()?;
-    }
+    // From here on nothing tells whether the store is whole, and the points are gone.
+    session.store.sync()?;
     session.journal.record(JobStep::MeshPart, StepOutput::new(meshed.clone(), Vec::new()))?;
     session.end()?;
     remove_file(&directory.points())?;
