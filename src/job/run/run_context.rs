@@ -39,20 +39,19 @@ impl RunContext<'_> {
         if self.journal.has(step) { stage.take_over(amount) } else { stage.advance(amount) }
     }
 
-    /// Adds a stage to the report.
-    pub(crate) fn add_stage(&self, stage: StageStats) {
-        self.stages().push(stage);
+    /// Adds a stage to the report, or to the stage of the same name: parts have the same stages.
+    pub(crate) fn add_stage(&self, added: StageStats) {
+        let mut stages = self.stages();
+        match stages.iter_mut().find(|stage| stage.stage == added.stage) {
+            Some(stage) => stage.add(&added),
+            None => stages.push(added),
+        }
     }
 
     /// Adds the stages of a part to those of the same names.
     pub(crate) fn add_stages(&self, part: RunContext) {
-        let mut stages = self.stages();
-        for added in part.stages.into_inner().unwrap_or_else(PoisonError::into_inner) {
-            match stages.iter_mut().find(|stage| stage.stage == added.stage) {
-                Some(stage) => stage.add(&added),
-                None => stages.push(added),
-            }
-        }
+        let stages = part.stages.into_inner().unwrap_or_else(PoisonError::into_inner);
+        stages.into_iter().for_each(|stage| self.add_stage(stage));
     }
 
     /// Returns the stages that have ended.

@@ -87,6 +87,9 @@ fn read_for(job: &PartsJob, points: &PartPoints, part: PartIndex) -> Result<Read
     if run.journal.has(step) {
         return ReadBatch::load(run.store, part);
     }
+    if parts.new_inputs(part).is_empty() {
+        return Ok(ReadBatch::default());
+    }
     let records = parts.new_inputs(part).iter().map(|&input| plan.inputs[input].source.records).sum();
     let stage = run.progress.stage("read", records, "points");
     let batch = points.read(run.directory, part, run.journal.is_worth_syncing(), &stage)?;

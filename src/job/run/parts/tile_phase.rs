@@ -50,7 +50,7 @@ pub(crate) fn finish_tiles(
     meshed: &MeshedParts,
 ) -> Result<TileStats> {
     let waiting = meshed.parts.iter().map(|part| part.waiting.len() as u64).sum();
-    let stage = job.run.progress.stage("write", waiting, "tiles");
+    let stage = job.run.progress.stage("write borders", waiting, "tiles");
     let borders = &ForeignBorders { job, stores, joined, look, known: Mutex::default() };
     let mut all = TileStats::default();
     for (part, meshed) in job.parts.all().zip(&meshed.parts) {
