@@ -40,6 +40,8 @@ pub(crate) struct Freeing<'a> {
     frees_leaves: bool,
     /// How many bytes are freed at a time.
     at_a_time: u64,
+    /// Whether what is left in the end is freed too.
+    frees_rest: bool,
     state: Mutex<FreeingState>,
     /// Wakes the thread, and those who wait for it.
     changed: Condvar,
@@ -78,17 +80,21 @@ impl Freeing<'_> {
         self.changed.notify_all();
     }
 
-    /// Frees what is added until it is over. What is left by then goes soon, with its file.
+    /// Frees what is added until it is over. What is left by then goes soon, with its file, unless other parts are still to be done.
     fn free_all(&self) -> Result<()> {
         loop {
             let is_little = |state: &mut FreeingState| state.waiting.bytes <= self.at_a_time && !state.is_over;
             let state = self.changed.wait_while(self.state(), is_little);
             let mut state = state.unwrap_or_else(PoisonError::into_inner);
-            if state.is_over {
+            let is_over = state.is_over;
+            if is_over && !self.frees_rest {
                 return Ok(());
             }
             let unneeded = std::mem::take(&mut state.waiting);
             drop(state);
+            if is_over {
+                return self.free(unneeded);
+            }
             self.changed.notify_all();
             self.free(unneeded)?;
         }
@@ -162,6 +168,7 @@ pub(crate) fn while_freeing<T>(
         is_on: frees(plan, partition),
         frees_leaves: options.output.max_edge != MaxEdge::Auto,
         at_a_time: if plan.is_one_part() { (partition.point_bytes / SHARE).min(AT_A_TIME) } else { AT_A_TIME },
+        frees_rest: !plan.is_one_part(),
         state: Mutex::default(),
         changed: Condvar::new(),
     };
