@@ -37,7 +37,7 @@ impl JobDirectory {
 
     /// Returns the directory in which a part of the job keeps its steps. Its results are those of the job.
     pub fn part(&self, part: PartIndex) -> JobDirectory {
-        let points = self.readers().join(format!("{part}.points"));
+        let points = self.points_by_part().join(format!("{part}.points"));
         JobDirectory { job: self.parts().join(part.to_string()), points, ..self.clone() }
     }
 
@@ -62,7 +62,7 @@ impl JobDirectory {
     }
 
     /// Returns the folder of the points by part.
-    pub fn readers(&self) -> PathBuf {
+    pub fn points_by_part(&self) -> PathBuf {
         self.job.join("points-by-part")
     }
 
@@ -170,7 +170,7 @@ impl JobDirectory {
     /// # Errors
     /// [`Error::Io`] if a file cannot be removed.
     pub fn clear_parts(&self) -> Result<()> {
-        let folders = [self.parts(), self.readers(), self.join().job];
+        let folders = [self.parts(), self.points_by_part(), self.join().job];
         folders.iter().try_for_each(|folder| disk::remove_tree(folder).map_err(Error::io("remove", folder)))
     }
 

@@ -76,7 +76,7 @@ impl<'a> PartPoints<'a> {
     pub fn read(&self, directory: &JobDirectory, part: PartIndex, sync: bool, stage: &Stage) -> Result<ReadBatch> {
         let (plan, parts) = (self.plan, self.parts);
         let inputs = parts.new_inputs(part);
-        create_folder(&directory.readers())?;
+        create_folder(&directory.points_by_part())?;
         let files: Vec<Option<PointFile>> =
             parts.all().map(|p| self.open(directory, part, p, inputs)).collect::<Result<_>>()?;
         let file_of = |bucket: usize| files[parts.part_of(bucket).get()].as_ref();

@@ -4,7 +4,7 @@ use crate::Result;
 use crate::job::durable::directory::{JobDirectory, STORE_FILES};
 use crate::job::durable::journal::{self, PublishedFile};
 use crate::job::index::PartIndex;
-use crate::job::records::{JobStep, JournalEntry, RecordRef, StepRecord, Store};
+use crate::job::records::{JobStep, Journal, JournalEntry, RecordRef, StepRecord, Store};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -54,6 +54,26 @@ impl StepsOfParts {
         }
         Ok(steps)
     }
+}
+
+/// Removes the steps that make coarser tiles from the journals of all parts: with another memory limit others are left out.
+///
+/// # Errors
+/// [`crate::Error::Io`] if a journal cannot be read or written.
+pub(crate) fn forget_levels(directory: &JobDirectory) -> Result<()> {
+    for folder in directory.folders_of_parts()? {
+        let read = journal::read::<PartHeader, JobStep, StepRecord>(&folder)?;
+        if let Some((Some(header), mut entries)) = read {
+            entries.retain(|entry| !matches!(entry.step, JobStep::Level(_)));
+            Journal::begin(&folder, &header, entries)?.close();
+        }
+    }
+    Ok(())
+}
+
+/// Tells whether the records and the files of a step hold what was written.
+pub(crate) fn is_whole(directory: &JobDirectory, store: &Store, entry: &JournalEntry) -> bool {
+    entry.records.iter().all(|record| store.is_whole(record)) && entry.files.iter().all(|file| file.is_whole(directory))
 }
 
 /// Returns the records that `entries` name.

@@ -16,7 +16,7 @@ use crate::job::plan::lattice_choice::LatticeCoarsening;
 use crate::job::progress::stage::{JobProgress, ProgressOutput, Stage};
 use crate::job::records::{JobStep, Journal, JournalEntry, Store};
 use crate::job::report::job_report::Report;
-use crate::job::run::part_entries::{PartHeader, StepsOfParts, open_store, records_of};
+use crate::job::run::part_entries::{PartHeader, StepsOfParts, forget_levels, open_store, records_of};
 use crate::output::options::MaxEdge;
 use crate::{Error, Result, interrupt};
 use rayon::prelude::*;
@@ -205,6 +205,9 @@ pub(crate) fn start_parts<'a>(
     let same = earlier.and_then(|earlier| same_job_of_parts(directory, header, earlier, progress));
     let (entries, header, resumed) = match same {
         Some((old, entries, of_parts)) => {
+            if header.fingerprint.memory != old.fingerprint.memory {
+                forget_levels(directory)?;
+            }
             let steps = entries.len() as u64 + of_parts;
             progress.note(&format!("going on with an interrupted run: {steps} steps are done"));
             let fingerprint = header.fingerprint.with_names_of(&old.fingerprint);

@@ -7,7 +7,7 @@ use crate::job::mesh::merge::merge_frontiers;
 use crate::job::partition::tree::{NodeKind, Tree};
 use crate::job::plan::budget::merge_memory;
 use crate::job::records::{JobStep, JournalEntry, Seam, SeamTriangle, Store};
-use crate::job::run::part_entries::{PartHeader, entries_of, open_store, records_of};
+use crate::job::run::part_entries::{PartHeader, entries_of, is_whole, open_store, records_of};
 use crate::job::run::parts::part_journal::PartSession;
 use crate::job::run::parts::part_store::{OpenPart, PartStores};
 use crate::job::run::parts::parts_job::PartsJob;
@@ -49,10 +49,7 @@ fn whole_entries(directory: &JobDirectory, mut entries: Vec<JournalEntry>) -> Re
     let records = records_of(&entries);
     if !records.is_empty() {
         let store = open_store(directory, &records)?;
-        entries.retain(|entry| {
-            entry.records.iter().all(|record| store.is_whole(record))
-                && entry.files.iter().all(|file| file.is_whole(directory))
-        });
+        entries.retain(|entry| is_whole(directory, &store, entry));
     }
     Ok(entries)
 }

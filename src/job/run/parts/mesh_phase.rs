@@ -2,8 +2,7 @@
 
 use crate::job::durable::atomic_file::remove_file;
 use crate::job::durable::directory::JobDirectory;
-use crate::job::index::PartIndex;
-use crate::job::index::TileIndex;
+use crate::job::index::{PartIndex, TileIndex};
 use crate::job::mesh::leaf::LeafStats;
 use crate::job::mesh::precision_limit::PrecisionLimit;
 use crate::job::partition::part_points::{PartPoints, ReadBatch};
@@ -12,7 +11,7 @@ use crate::job::plan::job_plan::Claims;
 use crate::job::plan::no_points::no_point_is_left;
 use crate::job::records::{JobStep, JournalEntry, StepOutput};
 use crate::job::run::mesh_and_tiles::{Writing, mesh_part};
-use crate::job::run::part_entries::{PartHeader, entries_of, open_store, records_of};
+use crate::job::run::part_entries::{PartHeader, entries_of, is_whole, open_store, records_of};
 use crate::job::run::parts::part_journal::PartSession;
 use crate::job::run::parts::parts_job::PartsJob;
 use crate::job::run::resume::resume_part;
@@ -108,12 +107,8 @@ fn keep_whole_steps_after(
     done: usize,
 ) -> Result<()> {
     let store = open_store(directory, &records_of(&entries))?;
-    let is_whole = |entry: &JournalEntry| {
-        entry.records.iter().all(|record| store.is_whole(record))
-            && entry.files.iter().all(|file| file.is_whole(directory))
-    };
-    let whole =
-        (0..).zip(entries).filter(|(at, entry)| *at <= done || is_whole(entry)).map(|(_, entry)| entry).collect();
+    let stays = |at: usize, entry: &JournalEntry| at <= done || is_whole(directory, &store, entry);
+    let whole = (0..).zip(entries).filter(|(at, entry)| stays(*at, entry)).map(|(_, entry)| entry).collect();
     PartSession::begin(directory, header, whole)?.end()
 }
 
