@@ -1,6 +1,7 @@
 //! A job of several parts gives the mesh of a job of one part, with the same borders, levels and report.
 
 use crate::clouds::{self, Cloud};
+use crate::las_file::LasFile;
 use crate::levels::{borders_are_the_exact_ones, errors_are_true, hills};
 use crate::program::{Job, number};
 use crate::tileset::{keeps_the_rules, tiles};
@@ -103,4 +104,24 @@ fn max_edge_cuts_the_same_triangles() {
         assert!(whole[1] > 0);
         assert_eq!(cut(in_parts(&files, 2_000)), whole, "{max_edge}");
     }
+}
+
+/// The header claims a box that holds the first points and not the last.
+#[test]
+fn a_header_that_proves_wrong_gives_one_part() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut bytes = LasFile::new(2, 2, 0, 120_000).las();
+    let reach = 10.0 * 60_000.0 * 0.01;
+    let claims =
+        [(179, 5e5 + reach), (187, 5e5 - reach), (195, 4e6 + reach), (203, 4e6 - reach), (211, 1.0), (219, -1.0)];
+    for (at, value) in claims {
+        bytes[at..at + 8].copy_from_slice(&f64::to_le_bytes(value));
+    }
+    let path = folder.path().join("spiral.las");
+    std::fs::write(&path, bytes).unwrap();
+    let job = || Job::on(&[&path]).tiles_of(10_000);
+    let parts = job().with("triangulation", "max_points_per_part = 20000");
+    let said = parts.run().succeeded();
+    assert!(said.err.contains("starting again without parts"), "{}", said.err);
+    assert_eq!(parts.verified()["digest"], serde_json::json!(job().digest()));
 }
