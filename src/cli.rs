@@ -1,5 +1,6 @@
 //! The command line: the commands and their options.
 
+use crate::job::phase::{MOST_TASKS, Phase, Task};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -83,6 +84,27 @@ pub enum CliCommand {
         /// The files that the job has read: prove that the vertices are their points, heights included.
         #[arg(long, num_args = 1.., value_name = "FILE")]
         input: Vec<PathBuf>,
+    },
+    /// Do one task of one phase of a large job, as schedulers of clusters start it.
+    ///
+    /// All tasks of all phases, on any machines that share the output directory, do the job together. The results have the same bytes
+    /// however many tasks there are. Exit code 1: the task may be tried again; if an earlier phase is not complete, the message names
+    /// its tasks that are missing.
+    Work {
+        /// The configuration of the job.
+        config: PathBuf,
+        /// The phase to work on.
+        #[arg(long, value_enum)]
+        phase: Phase,
+        /// The task: number i, from 1 on, of N. Default: what the environment of an array job says (Slurm, Kubernetes, AWS Batch).
+        #[arg(long, value_name = "i/N")]
+        task: Option<Task>,
+        /// The number of tasks, where the environment tells only the number of this one.
+        #[arg(long, value_name = "N", conflicts_with = "task", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_TASKS)))]
+        tasks: Option<u32>,
+        /// Worker threads of this task, instead of `[limits] threads`.
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+        threads: Option<u16>,
     },
     /// Show what point clouds contain.
     Info {

@@ -40,6 +40,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
         }
         (Some(CliCommand::Check { config }), _) => check_job(config, print),
         (Some(CliCommand::Verify { directory, memory, input }), _) => verify_output(directory, *memory, input, print),
+        (Some(CliCommand::Work { phase, .. }), _) => Err(Error::Config(format!("phase {phase} is not there yet"))),
         (Some(CliCommand::Info { files }), _) => show_info(files, print),
         (Some(CliCommand::Gpu { adapter, side }), _) => test_gpu(adapter.as_deref(), *side, print),
         (Some(CliCommand::Sample { file, points, seed, overwrite }), _) => {

@@ -12,6 +12,7 @@ pub(crate) mod machine;
 pub mod mesh;
 pub mod options;
 pub mod partition;
+pub mod phase;
 pub mod plan;
 pub mod preflight;
 pub mod progress;
