@@ -22,11 +22,11 @@ pub enum Error {
         source: std::io::Error,
     },
     /// Another process works in the job directory (exit code 1).
-    #[error("{} is working in {}: wait for it, or choose another [output] directory", process(holder), directory.display())]
+    #[error("{} is working in {}: wait for it, or choose another [output] directory", working(holder), directory.display())]
     InUse {
         /// The job directory.
         directory: PathBuf,
-        /// The process id of the other process; empty if it has not written it yet.
+        /// Which process it is, on which machine; empty if it has not written it yet.
         holder: String,
     },
     /// A job has not put all its results in place (exit code 1).
@@ -89,8 +89,8 @@ pub enum Error {
     Broken(String),
 }
 
-fn process(holder: &str) -> String {
-    if holder.is_empty() { "another process".into() } else { format!("process {holder}") }
+fn working(holder: &str) -> &str {
+    if holder.is_empty() { "another process" } else { holder }
 }
 
 fn again(why: &Error) -> &'static str {

@@ -95,6 +95,8 @@ fn walk(run: &RunContext, plan: Plan, earlier: Option<Partition>) -> Result<Repo
                 tiles: tiles.stats,
                 temporary: run.temporary.measure(&partition, run.store),
                 files: Vec::new(),
+                parts: 1,
+                slowest_part: None,
             };
             write_report(run, &plan, figures, published)
         },

@@ -301,6 +301,7 @@ fn lasting(text: &[u8]) -> Value {
         "threads",
         "memory_limit",
         "bytes_temporary",
+        "slowest_part",
         "checksum",
     ];
     for name in changing {

@@ -51,6 +51,12 @@ pub struct Report {
     pub gpu: Option<String>,
     /// What each step of the pipeline took for all leaves together.
     pub steps: PipelineTimes,
+    /// The number of parts.
+    #[serde(default)]
+    pub parts: u64,
+    /// The part that took the longest, in a job of several.
+    #[serde(default)]
+    pub slowest_part: Option<SlowestPart>,
     /// The lattice.
     pub lattice: Lattice,
     /// Unit of x and y.
@@ -90,6 +96,17 @@ pub struct Report {
     pub file_list: Checksum,
     /// The checksum of this report, with zeros in place of it.
     pub checksum: Checksum,
+}
+
+/// The part of a job whose phases took the longest.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct SlowestPart {
+    /// Its number, from 0 on.
+    pub part: u64,
+    /// Seconds that its phases took together.
+    pub seconds: f64,
+    /// Points that it has.
+    pub points: u64,
 }
 
 /// Seconds by step of the pipeline.
@@ -134,6 +151,10 @@ pub struct ReportParts {
     pub tiles: TileStats,
     /// The sum over all coarser tiles.
     pub levels: LevelStats,
+    /// The number of parts.
+    pub parts: u64,
+    /// The part that took the longest.
+    pub slowest_part: Option<SlowestPart>,
     /// What the user should know about the results.
     pub warnings: Warnings,
     /// Bytes of results besides the tiles.
@@ -186,6 +207,8 @@ impl Report {
             leaves: parts.leaves,
             gpu: parts.gpu,
             steps: PipelineTimes::new(&parts.leaves, &parts.gpu_steps),
+            parts: parts.parts,
+            slowest_part: parts.slowest_part,
             lattice: plan.lattice.clone(),
             unit: plan.unit.clone(),
             crs: plan.crs.name.clone(),

@@ -160,6 +160,7 @@ fn attempt(
             inputs_fingerprint: job.fingerprint.of_inputs(),
             job_id,
             resumed: journal.taken_over() + resumed,
+            checks: true,
             temporary: TemporaryBytes::default(),
             stages: Mutex::new(vec![planned]),
         };
