@@ -172,6 +172,11 @@ impl<K: RecordKey> Store<K> {
         places.get(&key).copied().ok_or_else(|| Error::Broken(format!("{} has no {key:?}", self.path(key).display())))
     }
 
+    /// Tells whether there is a record of `key`.
+    pub fn has(&self, key: K) -> bool {
+        self.place(key).is_ok()
+    }
+
     /// Returns the bytes of the record of `key`; 0 if there is none.
     pub fn length(&self, key: K) -> u64 {
         self.place(key).map_or(0, |place| place.length)

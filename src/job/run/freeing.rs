@@ -135,7 +135,7 @@ impl Freeing<'_> {
 }
 
 /// Returns the records that the leaf of `tile` writes. Only steps of the tile itself, and the merge above it, read them.
-fn records_of_leaf(partition: &Partition, tile: TileIndex) -> [StepRecord; 3] {
+pub(crate) fn records_of_leaf(partition: &Partition, tile: TileIndex) -> [StepRecord; 3] {
     [StepRecord::Leaf(tile), StepRecord::PartialNormals(tile), StepRecord::Frontier(partition.tree.leaf(tile))]
 }
 

@@ -41,6 +41,8 @@ struct QueueState {
     /// Tiles that were finished before tiles may be written.
     held: Vec<FinishedTile>,
     dependencies: TileDependencies,
+    /// Which tiles of the part no merge can change any more.
+    finished: Vec<bool>,
     /// Which tiles of the part are written.
     written: Vec<bool>,
     stats: TileStats,
@@ -62,6 +64,8 @@ pub(crate) struct WrittenTiles {
     pub(crate) stats: TileStats,
     /// Those that wait for other parts, ascending.
     pub(crate) waiting: Vec<TileIndex>,
+    /// Those among them that merges above the part may change.
+    pub(crate) open: Vec<TileIndex>,
 }
 
 impl TileLook {
@@ -81,8 +85,14 @@ impl<'a> TileQueue<'a> {
         freeing: &'a Freeing<'a>,
     ) -> TileQueue<'a> {
         let tiles = partition.tree.leaves.len();
-        let (dependencies, written) = (TileDependencies::new(tiles), vec![false; tiles]);
-        let state = QueueState { held: Vec::new(), dependencies, written, stats: TileStats::default(), failure: None };
+        let state = QueueState {
+            held: Vec::new(),
+            dependencies: TileDependencies::new(tiles),
+            finished: vec![false; tiles],
+            written: vec![false; tiles],
+            stats: TileStats::default(),
+            failure: None,
+        };
         TileQueue {
             run,
             partition,
@@ -109,6 +119,7 @@ impl<'a> TileQueue<'a> {
     /// Takes a finished tile.
     pub(crate) fn push<'s>(&'s self, scope: &Scope<'s>, tile: FinishedTile) {
         let mut state = self.state();
+        state.finished[tile.tile.get()] = true;
         if self.look.get().is_none() {
             state.held.push(tile);
             return;
@@ -140,9 +151,12 @@ impl<'a> TileQueue<'a> {
         }
         self.run.add_stage(self.border_normals.finish());
         self.run.add_stage(self.write.finish());
-        let waiting = self.partition.tree.tiles().zip(&state.written).filter(|(_, written)| !**written);
-        let waiting = waiting.map(|(tile, _)| tile).collect();
-        Ok(WrittenTiles { look: self.look.into_inner(), stats: state.stats, waiting })
+        let all_but = |done: &[bool]| {
+            let left = self.partition.tree.tiles().zip(done).filter(|(_, done)| !**done);
+            left.map(|(tile, _)| tile).collect()
+        };
+        let (waiting, open) = (all_but(&state.written), all_but(&state.finished));
+        Ok(WrittenTiles { look: self.look.into_inner(), stats: state.stats, waiting, open })
     }
 
     fn start<'s>(&'s self, scope: &Scope<'s>, tile: FinishedTile) {

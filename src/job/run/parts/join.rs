@@ -2,12 +2,12 @@
 
 use crate::Result;
 use crate::job::durable::directory::JobDirectory;
-use crate::job::index::{NodeIndex, TileIndex};
+use crate::job::index::{NodeIndex, PartIndex, TileIndex};
 use crate::job::mesh::merge::merge_frontiers;
 use crate::job::partition::tree::{NodeKind, Tree};
 use crate::job::plan::budget::merge_memory;
 use crate::job::progress::stats::StageStats;
-use crate::job::records::{JobStep, JournalEntry, Seam, SeamTriangle, Store};
+use crate::job::records::{JobStep, JournalEntry, Seam, SeamTriangle, StepRecord, Store};
 use crate::job::run::part_entries::{PartHeader, entries_of, is_whole, open_store, records_of};
 use crate::job::run::parts::done::Done;
 use crate::job::run::parts::look::{count_sites, final_look};
@@ -50,6 +50,52 @@ pub(crate) fn join_parts(job: &PartsJob, stores: &PartStores, sites: u64) -> Res
     Ok(())
 }
 
+/// Merges at those nodes above the parts that `last` was the last part to complete: all parts before it are meshed. Returns the tiles that no
+/// merge can change from now on.
+///
+/// # Errors
+/// As [`join_parts`].
+pub(crate) fn merge_through(job: &PartsJob, stores: &PartStores, last: PartIndex) -> Result<Vec<TileIndex>> {
+    let complete = nodes_completed_by(&job.parts.tree, job.parts.node(last));
+    if complete.is_empty() {
+        return Ok(Vec::new());
+    }
+    let directory = &job.directory.join();
+    let lock = directory.lock()?;
+    let header = job.header(job.above());
+    let session = PartSession::begin(directory, lock, header, entries_of(directory, header)?)?;
+    let context = &session.context(job);
+    let merges = complete.into_iter().map(|node| merge_at(job, stores, context, node));
+    let finished = merges.collect::<Result<Vec<_>>>()?;
+    // What the tiles needed that these merges finish may go now.
+    session.store.sync()?;
+    session.end()?;
+    Ok(finished.into_iter().flatten().collect())
+}
+
+/// Returns the merge nodes above `leaf` that have no later leaf, children first.
+fn nodes_completed_by(tree: &Tree, leaf: NodeIndex) -> Vec<NodeIndex> {
+    let (mut complete, mut node) = (Vec::new(), leaf);
+    while let Some(parent) = tree.node(node).parent {
+        match tree.node(parent).kind {
+            NodeKind::Inner([_, high]) if high == node => node = parent,
+            _ => break,
+        }
+        complete.extend(tree.is_merge(node).then_some(node));
+    }
+    complete
+}
+
+/// Removes from the journal of the merges what a power failure has damaged: it can be done again.
+///
+/// # Errors
+/// [`crate::Error::Io`] on its folder, [`crate::Error::InUse`] if another process has it.
+pub(crate) fn drop_damaged_merges(job: &PartsJob) -> Result<()> {
+    let (directory, header) = (&job.directory.join(), job.header(job.above()));
+    let lock = directory.lock()?;
+    PartSession::begin(directory, lock, header, whole_entries(directory, entries_of(directory, header)?)?)?.end()
+}
+
 /// Returns the entries whose records hold what was written.
 fn whole_entries(directory: &JobDirectory, mut entries: Vec<JournalEntry>) -> Result<Vec<JournalEntry>> {
     let (records, all) = (records_of(&entries), entries.len());
@@ -74,6 +120,12 @@ fn merge_below(job: &PartsJob, stores: &PartStores, context: &RunContext, node: 
     if !tree.is_merge(node) {
         return Ok(());
     }
+    merge_at(job, stores, context, node).map(|_| ())
+}
+
+/// Merges at `node`, unless that is done. Returns the tiles that this finishes.
+fn merge_at(job: &PartsJob, stores: &PartStores, context: &RunContext, node: NodeIndex) -> Result<Vec<TileIndex>> {
+    let tree = &job.parts.tree;
     let merge = || {
         let below = tree.merged_by(node);
         let open = |child: &NodeIndex| match tree.node(*child).kind {
@@ -89,7 +141,7 @@ fn merge_below(job: &PartsJob, stores: &PartStores, context: &RunContext, node: 
         let memory = merge_memory(&job.plan.options, node == NodeIndex::ROOT, context.threads);
         merge_frontiers(job.plan, tree.node(node).cell, &sources, context.store, memory, node)
     };
-    context.journal.step(JobStep::Merge(node), merge).map(|_: Vec<TileIndex>| ())
+    context.journal.step(JobStep::Merge(node), merge)
 }
 
 impl JoinedParts {
@@ -105,6 +157,16 @@ impl JoinedParts {
         };
         let store = open_store(&directory, &records_of(&entries))?;
         Ok(Some(JoinedParts { look: final_look(job, sites, &store)?, store, directory, header, stages }))
+    }
+
+    /// Opens what there is of the merges while parts are still to be done.
+    ///
+    /// # Errors
+    /// As [`JoinedParts::open`].
+    pub(crate) fn so_far(job: &PartsJob, look: Arc<TileLook>) -> Result<JoinedParts> {
+        let (directory, header) = (job.directory.join(), job.header(job.above()));
+        let store = open_store(&directory, &records_of(&entries_of(&directory, header)?))?;
+        Ok(JoinedParts { look, store, directory, header, stages: Vec::new() })
     }
 
     /// Returns all triangles of seams that touch `tile` of the part with `store` and `tree`.
@@ -123,7 +185,9 @@ impl JoinedParts {
         for node in tree.merges_above(tree.leaf(tile)) {
             seam.extend(Seam::touching(store, node, tile)?);
         }
-        for node in above.merges_above(job.parts.node(tile.part())) {
+        // A tile that is finished before all parts are merged has no seam above.
+        let is_merged = |node: &NodeIndex| self.store.has(StepRecord::Seam(*node));
+        for node in above.merges_above(job.parts.node(tile.part())).take_while(is_merged) {
             seam.extend(Seam::touching(&self.store, node, tile)?);
         }
         Ok(seam)

@@ -84,6 +84,7 @@ fn mesh(
         leaves: mesh.leaves,
         tiles: mesh.tiles.stats,
         waiting: mesh.tiles.waiting,
+        open: mesh.tiles.open,
         temporary: own + others.unwrap_or(0),
         by_task: others.is_none(),
         stored: session.store.bytes(),

@@ -15,6 +15,8 @@ pub(crate) struct MeshedPart {
     pub(crate) tiles: TileStats,
     /// The tiles that wait for other parts.
     pub(crate) waiting: Vec<TileIndex>,
+    /// Those among them that merges above the part may change.
+    pub(crate) open: Vec<TileIndex>,
     /// The most bytes of temporary files while it was meshed: its own, the points of later parts, and what earlier parts keep.
     pub(crate) temporary: u64,
     /// Whether a task meshed it, which knows nothing of other parts' files.

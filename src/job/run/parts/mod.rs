@@ -4,6 +4,7 @@
 //! the nodes above the parts. Every part has a folder, a journal and a store of its own.
 
 pub(crate) mod done;
+mod front;
 pub(crate) mod join;
 pub(crate) mod level_phase;
 pub(crate) mod look;
@@ -16,11 +17,14 @@ mod publish_parts;
 pub(crate) mod read_phase;
 pub(crate) mod tile_phase;
 
+use crate::job::index::PartIndex;
 use crate::job::partition::part_points::ReadInputs;
 use crate::job::partition::parts::Parts;
 use crate::job::plan::job_plan::Plan;
+use crate::job::progress::stats::StageStats;
 use crate::job::records::{JobStep, StepOutput};
 use crate::job::report::job_report::Report;
+use crate::job::run::parts::front::Front;
 use crate::job::run::parts::join::{JoinedParts, join_parts};
 use crate::job::run::parts::level_phase::levels_of_part;
 use crate::job::run::parts::look::early_look;
@@ -34,6 +38,7 @@ use crate::job::run::parts::tile_phase::{ForeignBorders, finish_part};
 use crate::job::run::publish_step::wants_tileset;
 use crate::job::run::run_context::RunContext;
 use crate::{Error, Result};
+use std::collections::HashMap;
 
 /// The walk through the phases after the plan.
 ///
@@ -43,20 +48,20 @@ pub(crate) fn walk(run: &RunContext, plan: &Plan) -> Result<Report> {
     let parts = &Parts::of(plan);
     let job = &PartsJob::of_run(run, plan, parts);
     write_plan(run, plan)?;
-    // Steps 2 to 6 for each part, as far as it needs no other.
-    let meshed = read_and_mesh(job)?;
-    // Step 4 for the nodes above the parts.
+    // Steps 2 to 6 for each part, as far as it needs no later one.
     let stores = &PartStores::new(job.directory, job.job_id);
+    let (meshed, mut before) = read_and_mesh(job, stores)?;
+    // Step 4 for the nodes above the parts.
     join_parts(job, stores, meshed.iter().map(|part| part.leaves.sites).sum())?;
     let joined = JoinedParts::open(job)?.ok_or_else(|| Error::Broken("the parts are not joined".into()))?;
     // Steps 5 and 6 for the tiles that have waited.
-    let borders = &ForeignBorders::new(job, stores, &joined);
+    let borders = &ForeignBorders::of_one_process(job, stores, &joined);
     let mut tiles = meshed.iter().map(|part| part.tiles).fold(Default::default(), |mut all, part| {
         all += part;
         all
     });
     for (part, meshed) in parts.all().zip(&meshed) {
-        tiles += finish_part(borders, part, &meshed.waiting)?;
+        tiles += finish_part(borders, part, &meshed.waiting, before.remove(&part))?;
     }
     // Step 7 for each part.
     let has_tileset = wants_tileset(plan, &tiles);
@@ -77,8 +82,10 @@ pub(crate) fn write_plan(run: &RunContext, plan: &Plan) -> Result<()> {
 }
 
 /// Reads and meshes all parts, or those that an interrupted run left.
-fn read_and_mesh(job: &PartsJob) -> Result<Vec<MeshedPart>> {
+/// Returns them, and what writing tiles of each took that have waited for others.
+fn read_and_mesh(job: &PartsJob, stores: &PartStores) -> Result<(Vec<MeshedPart>, HashMap<PartIndex, StageStats>)> {
     let look = early_look(job)?;
+    let mut front = look.clone().map(|look| Front::new(job, stores, look)).transpose()?;
     let (mut read, mut meshed) = (Vec::<ReadInputs>::new(), Vec::<MeshedPart>::new());
     // Bytes of points that wait, by part.
     let mut waiting = vec![0; job.parts.all().len()];
@@ -87,13 +94,18 @@ fn read_and_mesh(job: &PartsJob) -> Result<Vec<MeshedPart>> {
         let inputs = read_for(job, part, malformed)?;
         inputs.by_part.iter().for_each(|found| waiting[found.part.get()] += found.bytes);
         read.push(inputs);
-        let stored = meshed.iter().map(|part| part.stored).sum::<u64>();
+        let stored = match &front {
+            Some(front) => front.stored(),
+            None => meshed.iter().map(|part| part.stored).sum::<u64>(),
+        };
         let others = waiting[part.get() + 1..].iter().sum::<u64>() + stored;
-        meshed.push(mesh_one(job, part, look.as_ref(), Some(others))?);
+        let done = mesh_one(job, part, look.as_ref(), Some(others))?;
         if job.checks {
             drop_damaged_steps(job, part)?;
         }
+        front.as_mut().map(|front| front.pass(part, &done)).transpose()?;
+        meshed.push(done);
     }
     sum_up(job, read.iter())?;
-    Ok(meshed)
+    Ok((meshed, front.map(|front| front.stages).unwrap_or_default()))
 }

@@ -1,79 +1,182 @@
 //! The tiles that have waited for other parts.
 
 use crate::Result;
+use crate::job::durable::directory::JobDirectory;
 use crate::job::index::{PartIndex, TileIndex};
-use crate::job::records::{FinishedBorder, JobStep};
+use crate::job::partition::result::Partition;
+use crate::job::progress::stage::Stage;
+use crate::job::progress::stats::StageStats;
+use crate::job::records::{FinishedBorder, JobStep, SeamTriangle, StepRecord, Store};
 use crate::job::run::part_entries::entries_of;
 use crate::job::run::parts::done::Done;
 use crate::job::run::parts::join::JoinedParts;
 use crate::job::run::parts::part_journal::PartSession;
-use crate::job::run::parts::part_store::PartStores;
+use crate::job::run::parts::part_store::{OpenPart, PartStores};
 use crate::job::run::parts::parts_job::PartsJob;
 use crate::job::run::tile_queue::TileLook;
 use crate::job::tiles::border_normals::{finish_border_normals, finished_border};
 use crate::job::tiles::write_tile::{TileStats, write_tile};
 use rayon::prelude::*;
 use std::collections::HashMap;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
-/// Writes the tiles of `part` that have `waiting`, unless that is done. Returns the totals over them.
+/// Writes the tiles of `part` that have `waiting`, unless that is done. `before` is what writing some of them took already. Returns the
+/// totals over all of them.
 ///
 /// # Errors
 /// Those of the steps; [`crate::Error::InUse`] if another process has the part.
-pub(crate) fn finish_part(borders: &ForeignBorders, part: PartIndex, waiting: &[TileIndex]) -> Result<TileStats> {
-    let ForeignBorders { job, stores, joined, .. } = *borders;
-    let (directory, header) = (&job.directory.part(part), job.header(part));
-    let lock = directory.lock()?;
-    let entries = entries_of(directory, header)?;
+pub(crate) fn finish_part(
+    borders: &ForeignBorders,
+    part: PartIndex,
+    waiting: &[TileIndex],
+    before: Option<StageStats>,
+) -> Result<TileStats> {
+    let directory = &borders.job.directory.part(part);
+    let entries = entries_of(directory, borders.job.header(part))?;
     if let Some(done) = Done::find(&entries, JobStep::WriteWaiting)? {
         return Ok(done.figures);
     }
-    let open = stores.open(part)?;
-    let tree = &open.partition.tree;
-    // The store of the part grows, so nobody may go on with what is open now.
-    stores.close(part);
-    let session = PartSession::begin(directory, lock, header, entries)?;
-    let stage = job.progress.stage("write borders", waiting.len() as u64, "tiles");
-    let (store, journal) = (&session.store, &session.journal);
-    let TileLook { style, canvas } = &*joined.look;
-    let seam = |tile| joined.seam_of(job, store, tree, tile);
-    waiting.par_iter().try_for_each(|&tile| {
-        let work = || finish_border_normals(store, tree, style, tile, &seam(tile)?);
-        journal.step(JobStep::BorderNormals(tile), work).map(|_: Vec<TileIndex>| ())
-    })?;
-    let write = |&tile: &TileIndex| {
-        let border_of = |other: TileIndex| match other.part() == part {
-            true => FinishedBorder::load(store, other),
-            false => borders.of(other),
+    let session = BorderSession::begin(borders, directory, part, waiting.len())?;
+    session.finish_borders(waiting)?;
+    let stats = session.write_tiles(waiting)?;
+    let BorderSession { session, stage, .. } = session;
+    let mut took = stage.finish();
+    before.iter().for_each(|before| took.add(before));
+    session.finish(JobStep::WriteWaiting, stats, vec![took], Vec::new())
+}
+
+/// A part whose waiting tiles this process writes.
+pub(crate) struct BorderSession<'a> {
+    borders: &'a ForeignBorders<'a>,
+    session: PartSession<'a>,
+    open: Arc<OpenPart>,
+    part: PartIndex,
+    stage: Stage,
+}
+
+impl<'a> BorderSession<'a> {
+    /// Opens the folder of `part`, which is `directory`, to write some of `tiles` tiles.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`] or [`crate::Error::Broken`] on the folder, [`crate::Error::InUse`] if another process has the part.
+    pub(crate) fn begin(
+        borders: &'a ForeignBorders<'a>,
+        directory: &'a JobDirectory,
+        part: PartIndex,
+        tiles: usize,
+    ) -> Result<BorderSession<'a>> {
+        let ForeignBorders { job, stores, .. } = *borders;
+        let lock = directory.lock()?;
+        let header = job.header(part);
+        let entries = entries_of(directory, header)?;
+        let open = stores.open(part)?;
+        // The store of the part grows, so nobody may go on with what is open now.
+        stores.close(part);
+        let session = PartSession::begin(directory, lock, header, entries)?;
+        let stage = job.progress.stage("write borders", tiles as u64, "tiles");
+        Ok(BorderSession { borders, session, open, part, stage })
+    }
+
+    pub(crate) fn store(&self) -> &Store {
+        &self.session.store
+    }
+
+    pub(crate) fn partition(&self) -> &Partition {
+        &self.open.partition
+    }
+
+    fn seam(&self, tile: TileIndex) -> Result<Vec<SeamTriangle>> {
+        let ForeignBorders { job, joined, .. } = *self.borders;
+        joined.seam_of(job, self.store(), &self.partition().tree, tile)
+    }
+
+    /// Finishes the borders of `tiles`, which no merge can change any more. Returns each with the tiles that must be finished before it can
+    /// be written.
+    ///
+    /// # Errors
+    /// Those of [`finish_border_normals`].
+    pub(crate) fn finish_borders(&self, tiles: &[TileIndex]) -> Result<Vec<(TileIndex, Vec<TileIndex>)>> {
+        let (tree, style) = (&self.partition().tree, &self.borders.joined.look.style);
+        let finish = |&tile: &TileIndex| {
+            let work = || finish_border_normals(self.store(), tree, style, tile, &self.seam(tile)?);
+            Ok((tile, self.session.journal.step(JobStep::BorderNormals(tile), work)?))
         };
-        let work = || write_tile(directory, store, style, canvas, tile, &seam(tile)?, &border_of);
-        let stats = journal.step(JobStep::WriteTile(tile), work)?;
-        stage.advance(1);
-        Ok(stats)
-    };
-    let add = |mut a: TileStats, b| {
-        a += b;
-        Ok(a)
-    };
-    let stats = waiting.par_iter().map(write).try_reduce(TileStats::default, add)?;
-    session.finish(JobStep::WriteWaiting, stats, vec![stage.finish()], Vec::new())
+        tiles.par_iter().map(finish).collect()
+    }
+
+    /// Writes `tiles`, whose borders are finished. Returns the totals over them.
+    ///
+    /// # Errors
+    /// Those of [`write_tile`].
+    pub(crate) fn write_tiles(&self, tiles: &[TileIndex]) -> Result<TileStats> {
+        let TileLook { style, canvas } = &*self.borders.joined.look;
+        let border_of = |other: TileIndex| match other.part() == self.part {
+            true => FinishedBorder::load(self.store(), other),
+            false => self.borders.of(other),
+        };
+        let write = |&tile: &TileIndex| {
+            let (directory, store) = (self.session.directory, self.store());
+            let work = || write_tile(directory, store, style, canvas, tile, &self.seam(tile)?, &border_of);
+            let stats = self.session.journal.step(JobStep::WriteTile(tile), work)?;
+            self.stage.advance(1);
+            Ok(stats)
+        };
+        let add = |mut a: TileStats, b| {
+            a += b;
+            Ok(a)
+        };
+        tiles.par_iter().map(write).try_reduce(TileStats::default, add)
+    }
+
+    /// Waits until all that was written is on the disk.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    pub(crate) fn make_durable(&self) -> Result<()> {
+        self.session.journal.commit()?;
+        self.store().sync()
+    }
+
+    /// Ends the session while tiles still wait. Returns what it took.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    pub(crate) fn end(self) -> Result<StageStats> {
+        self.session.end()?;
+        Ok(self.stage.finish())
+    }
 }
 
 /// How many borders of other parts stay in memory, some ten kilobytes each.
 const MOST_KNOWN: usize = 1000;
 
-/// Finished borders of tiles of other parts. They are computed again rather than written: a part's folder has one writer.
+/// Finished borders of tiles of other parts.
 pub(crate) struct ForeignBorders<'a> {
     job: &'a PartsJob<'a>,
     stores: &'a PartStores,
     joined: &'a JoinedParts,
+    /// Whether borders that are stored are read. Otherwise all are computed again: another task may be writing them.
+    reads_stored: bool,
     known: Mutex<HashMap<TileIndex, FinishedBorder>>,
 }
 
 impl<'a> ForeignBorders<'a> {
-    /// Returns the borders of a job whose parts are joined.
-    pub(crate) fn new(job: &'a PartsJob<'a>, stores: &'a PartStores, joined: &'a JoinedParts) -> ForeignBorders<'a> {
-        ForeignBorders { job, stores, joined, known: Mutex::default() }
+    /// Returns the borders of a job that has other tasks.
+    pub(crate) fn of_tasks(
+        job: &'a PartsJob<'a>,
+        stores: &'a PartStores,
+        joined: &'a JoinedParts,
+    ) -> ForeignBorders<'a> {
+        ForeignBorders { job, stores, joined, reads_stored: false, known: Mutex::default() }
+    }
+
+    /// Returns the borders of a job that this process does alone. What a written tile needed may be gone.
+    pub(crate) fn of_one_process(
+        job: &'a PartsJob<'a>,
+        stores: &'a PartStores,
+        joined: &'a JoinedParts,
+    ) -> ForeignBorders<'a> {
+        ForeignBorders { job, stores, joined, reads_stored: true, known: Mutex::default() }
     }
 
     fn of(&self, tile: TileIndex) -> Result<FinishedBorder> {
@@ -81,15 +184,21 @@ impl<'a> ForeignBorders<'a> {
         if let Some(border) = known().get(&tile) {
             return Ok(border.clone());
         }
-        let part = self.stores.open(tile.part())?;
-        let seam = self.joined.seam_of(self.job, &part.store, &part.partition.tree, tile)?;
-        let style = &self.joined.look.style;
-        let border = finished_border(&part.store, &part.partition.tree, style, tile, &seam)?;
+        let border = self.find(tile)?;
         let mut known = known();
         if known.len() >= MOST_KNOWN {
             known.clear();
         }
         known.insert(tile, border.clone());
         Ok(border)
+    }
+
+    fn find(&self, tile: TileIndex) -> Result<FinishedBorder> {
+        let OpenPart { store, partition } = &*self.stores.open(tile.part())?;
+        if self.reads_stored && store.has(StepRecord::FinishedBorder(tile)) {
+            return FinishedBorder::load(store, tile);
+        }
+        let seam = self.joined.seam_of(self.job, store, &partition.tree, tile)?;
+        finished_border(store, &partition.tree, &self.joined.look.style, tile, &seam)
     }
 }
