@@ -16,10 +16,11 @@ mod publish_parts;
 pub(crate) mod read_phase;
 pub(crate) mod tile_phase;
 
+use crate::job::durable::directory::JobDirectory;
 use crate::job::partition::part_points::ReadInputs;
 use crate::job::partition::parts::Parts;
 use crate::job::plan::job_plan::Plan;
-use crate::job::records::{JobStep, StepOutput};
+use crate::job::records::{JobStep, Journal, StepOutput};
 use crate::job::report::job_report::Report;
 use crate::job::run::parts::join::{JoinedParts, join_parts};
 use crate::job::run::parts::level_phase::levels_of_part;
@@ -42,7 +43,7 @@ use crate::{Error, Result};
 pub(crate) fn walk(run: &RunContext, plan: &Plan) -> Result<Report> {
     let parts = &Parts::of(plan);
     let job = &PartsJob::of_run(run, plan, parts);
-    write_plan(run, plan)?;
+    write_plan(run.journal, run.directory, plan)?;
     // Steps 2 to 6 for each part, as far as it needs no other.
     let meshed = read_and_mesh(job)?;
     // Step 4 for the nodes above the parts.
@@ -69,9 +70,9 @@ pub(crate) fn walk(run: &RunContext, plan: &Plan) -> Result<Report> {
 ///
 /// # Errors
 /// [`Error::Io`] if it cannot be written.
-pub(crate) fn write_plan(run: &RunContext, plan: &Plan) -> Result<()> {
-    run.journal.step(JobStep::Plan, || {
-        let files = vec![plan.write(&run.directory.plan())?];
+pub(crate) fn write_plan(journal: &Journal, directory: &JobDirectory, plan: &Plan) -> Result<()> {
+    journal.step(JobStep::Plan, || {
+        let files = vec![plan.write(&directory.plan())?];
         Ok(StepOutput { files, ..StepOutput::new((), Vec::new()) })
     })
 }
