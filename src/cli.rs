@@ -106,6 +106,9 @@ pub enum CliCommand {
         /// Worker threads of this task, instead of `[limits] threads`.
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
         threads: Option<u16>,
+        /// Plan the job even if it does not seem to fit the disk or the memory of this machine.
+        #[arg(long)]
+        force: bool,
     },
     /// Send a large job to an engine that does its tasks.
     ///

@@ -46,12 +46,14 @@ fn run(cli: Cli) -> Result<ExitCode> {
         }
         (Some(CliCommand::Check { config }), _) => check_job(config, print),
         (Some(CliCommand::Verify { directory, memory, input }), _) => verify_output(directory, *memory, input, print),
-        (Some(CliCommand::Work { config, phase, task, tasks, threads }), _) => {
+        (Some(CliCommand::Work { config, phase, task, tasks, threads, force }), _) => {
             let task = match task {
                 Some(task) => *task,
                 None => Task::of_environment(*phase, *tasks, |name| std::env::var(name).ok())?,
             };
-            work(config, *phase, task, *threads, print)
+            let progress = ProgressOutput::detect(print.quiet);
+            let run = RunOptions { progress, force: *force, restart: false };
+            work(config, *phase, task, *threads, run, print)
         }
         (Some(CliCommand::Submit { config, engine, tasks, dry_run }), _) => {
             submit_job(config, *engine, *tasks, *dry_run, print)
@@ -103,13 +105,20 @@ fn show_report(report: &Report, config: &JobOptions, print: PrintOptions) -> Res
 }
 
 /// Does one task of one phase.
-fn work(path: &Path, phase: Phase, task: Task, threads: Option<u16>, print: PrintOptions) -> Result<ExitCode> {
+fn work(
+    path: &Path,
+    phase: Phase,
+    task: Task,
+    threads: Option<u16>,
+    run: RunOptions,
+    print: PrintOptions,
+) -> Result<ExitCode> {
     let mut config = config::load(path)?;
     if let Some(threads) = threads {
         config.limits.threads = Threads(threads.into());
     }
     interrupt::listen()?;
-    match job::work(&config, ProgressOutput::detect(print.quiet), phase, task)? {
+    match job::work(&config, run, phase, task)? {
         TaskOutcome::Published(report) => show_report(&report, &config, print),
         TaskOutcome::Done(done) => print_result(&done, print).map(|()| ExitCode::SUCCESS),
     }

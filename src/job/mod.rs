@@ -126,6 +126,7 @@ fn walk(run: &RunContext, plan: Plan, earlier: Option<Partition>) -> Result<Repo
                 files: Vec::new(),
                 parts: 1,
                 slowest_part: None,
+                cpu_s_of_tasks: 0.0,
             };
             write_report(run, &plan, figures, published)
         },

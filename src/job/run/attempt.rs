@@ -12,7 +12,7 @@ use crate::job::plan::lattice_choice::LatticeCoarsening;
 use crate::job::plan::make_plan::make_plan;
 use crate::job::preflight::check::require_room;
 use crate::job::progress::clock::JobClock;
-use crate::job::progress::stage::JobProgress;
+use crate::job::progress::stage::{JobProgress, ProgressOutput};
 use crate::job::report::job_report::Report;
 use crate::job::run::alone::Alone;
 use crate::job::run::read_step::note_skipped;
@@ -190,6 +190,10 @@ fn attempt(
     on_threads(threads, || {
         let start = match plan.is_one_part() {
             true => resume::start(directory, &header, earlier, options.output.max_edge, run.progress)?,
+            // That tasks have done steps is nothing to tell.
+            false if job.work == EarlierWork::ByTasks => {
+                resume::start_parts(directory, &header, earlier, ProgressOutput::Quiet)?
+            }
             false => resume::start_parts(directory, &header, earlier, run.progress)?,
         };
         let RunStart { store, journal, partition, job_id, resumed } = start;
