@@ -38,6 +38,24 @@ pub enum Error {
         /// The output directory.
         directory: PathBuf,
     },
+    /// A task came before what it needs was done (exit code 1).
+    #[error("{0}")]
+    TooEarly(String),
+    /// Tasks of a phase failed, and have said why (the worst of their exit codes).
+    #[error(
+        "the phase {phase} is not complete: of {count} tasks these failed: {}; run the same command again to go on",
+        list(failed)
+    )]
+    Tasks {
+        /// The phase.
+        phase: &'static str,
+        /// The numbers of the tasks.
+        failed: Vec<u32>,
+        /// How many tasks the phase has.
+        count: u32,
+        /// The worst exit code.
+        code: u8,
+    },
     /// The job does not fit the memory it was given (exit code 1).
     #[error("not enough memory: {0}")]
     Memory(String),
@@ -93,6 +111,10 @@ fn working(holder: &str) -> &str {
     if holder.is_empty() { "another process" } else { holder }
 }
 
+fn list(numbers: &[u32]) -> String {
+    numbers.iter().map(u32::to_string).collect::<Vec<_>>().join(", ")
+}
+
 fn again(why: &Error) -> &'static str {
     match why {
         Error::Config(_) => "correct the configuration and run the same command again",
@@ -141,9 +163,11 @@ impl Error {
             Error::Io { .. }
             | Error::InUse { .. }
             | Error::Unfinished { .. }
+            | Error::TooEarly(_)
             | Error::Memory(_)
             | Error::Interrupted => 1,
             Error::Resumable { why, .. } => why.exit_code(),
+            Error::Tasks { code, .. } => *code,
             Error::Config(_) | Error::TooFine { .. } => 2,
             Error::Input { .. } | Error::NoTerrain(_) => 3,
             Error::Broken(_) | Error::NeedsOnePart | Error::DamagedSteps => 4,

@@ -6,11 +6,17 @@ use clap::Parser;
 use gdt_batch::cli::{Cli, CliCommand, PrintOptions};
 use gdt_batch::gpu::selftest;
 use gdt_batch::job;
-use gdt_batch::job::options::RunOptions;
+use gdt_batch::job::options::{JobOptions, RunOptions, Threads};
+use gdt_batch::job::phase::{Phase, Task};
 use gdt_batch::job::preflight::check;
 use gdt_batch::job::progress::stage::ProgressOutput;
+use gdt_batch::job::report::job_report::Report;
 use gdt_batch::job::report::skipped_inputs::skipped_summary;
+use gdt_batch::job::report::task_outcome::TaskOutcome;
 use gdt_batch::output::file_names::OutputFiles;
+use gdt_batch::submit::Engine;
+use gdt_batch::submit::local::LocalEngine;
+use gdt_batch::submit::request::Request;
 use gdt_batch::threads::{self, on_threads};
 use gdt_batch::verify::Conclusion;
 use gdt_batch::{Error, Result, config, input, interrupt, sample, say, shortage, verify};
@@ -40,7 +46,21 @@ fn run(cli: Cli) -> Result<ExitCode> {
         }
         (Some(CliCommand::Check { config }), _) => check_job(config, print),
         (Some(CliCommand::Verify { directory, memory, input }), _) => verify_output(directory, *memory, input, print),
-        (Some(CliCommand::Work { phase, .. }), _) => Err(Error::Config(format!("phase {phase} is not there yet"))),
+        (Some(CliCommand::Work { config, phase, task, tasks, threads, force }), _) => {
+            let task = match task {
+                Some(task) => *task,
+                None => Task::of_environment(*phase, *tasks, |name| std::env::var(name).ok())?,
+            };
+            let progress = ProgressOutput::detect(print.quiet);
+            let run = RunOptions { progress, force: *force, restart: false };
+            work(config, *phase, task, *threads, run, print)
+        }
+        (Some(CliCommand::Submit { config, engine, tasks, dry_run }), _) => {
+            submit_job(config, *engine, *tasks, *dry_run, print)
+        }
+        (Some(CliCommand::Status { config, tasks }), _) => {
+            print_result(&job::status(&config::load(config)?, *tasks)?, print).map(|()| ExitCode::SUCCESS)
+        }
         (Some(CliCommand::Info { files }), _) => show_info(files, print),
         (Some(CliCommand::Gpu { adapter, side }), _) => test_gpu(adapter.as_deref(), *side, print),
         (Some(CliCommand::Sample { file, points, seed, overwrite }), _) => {
@@ -64,11 +84,14 @@ fn run_job(path: &Path, cli: &Cli) -> Result<ExitCode> {
     };
     let config = config::load(path)?;
     interrupt::listen()?;
-    let report = job::run(&config, options)?;
-    if let Err(error) = print_result(&report, cli.print) {
-        let report = OutputFiles::new(&config.output.directory).report();
-        let done = format!("the job is done, and its report is in {}", report.display());
-        if cli.print.json {
+    show_report(&job::run(&config, options)?, &config, cli.print)
+}
+
+fn show_report(report: &Report, config: &JobOptions, print: PrintOptions) -> Result<ExitCode> {
+    let file = OutputFiles::new(&config.output.directory).report();
+    if let Err(error) = print_result(report, print) {
+        let done = format!("the job is done, and its report is in {}", file.display());
+        if print.json {
             say(&done);
             return Err(error);
         }
@@ -76,9 +99,41 @@ fn run_job(path: &Path, cli: &Cli) -> Result<ExitCode> {
         say(&format!("{done}, but it cannot be shown: {error}"));
     }
     if let Some(summary) = skipped_summary(report.files, &report.skipped) {
-        say(&format!("{summary}: see {}", OutputFiles::new(&config.output.directory).report().display()));
+        say(&format!("{summary}: see {}", file.display()));
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Does one task of one phase.
+fn work(
+    path: &Path,
+    phase: Phase,
+    task: Task,
+    threads: Option<u16>,
+    run: RunOptions,
+    print: PrintOptions,
+) -> Result<ExitCode> {
+    let mut config = config::load(path)?;
+    if let Some(threads) = threads {
+        config.limits.threads = Threads(threads.into());
+    }
+    interrupt::listen()?;
+    match job::work(&config, run, phase, task)? {
+        TaskOutcome::Published(report) => show_report(&report, &config, print),
+        TaskOutcome::Done(done) => print_result(&done, print).map(|()| ExitCode::SUCCESS),
+    }
+}
+
+fn submit_job(path: &Path, engine: Engine, tasks: u32, dry_run: bool, print: PrintOptions) -> Result<ExitCode> {
+    let config = config::load(path)?;
+    let request = Request::new(path, &config, job::missing_tasks(&config, tasks)?)?;
+    match engine {
+        Engine::Local => {
+            interrupt::listen()?;
+            let local = LocalEngine::new(&request, tasks, print.quiet, print.json);
+            if dry_run { print_text(&local.show()) } else { local.run() }.map(|()| ExitCode::SUCCESS)
+        }
+    }
 }
 
 fn check_job(path: &Path, print: PrintOptions) -> Result<ExitCode> {
@@ -140,6 +195,10 @@ fn print_result(result: &(impl Display + Serialize), print: PrintOptions) -> Res
     } else {
         result.to_string()
     };
+    print_text(&text)
+}
+
+fn print_text(text: &str) -> Result<()> {
     match writeln!(std::io::stdout(), "{}", text.trim_end()) {
         // The reader has closed the pipe because it has read enough.
         Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(()),

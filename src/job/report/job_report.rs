@@ -73,14 +73,14 @@ pub struct Report {
     pub memory_limit: u64,
     /// Worker threads.
     pub threads: usize,
-    /// The number of steps that an interrupted run had finished. The stages do not include their times.
+    /// The number of steps that an interrupted run had finished. The stages include their times only in a job of several parts.
     pub resumed: u64,
-    /// Seconds from start to end.
+    /// Seconds from start to end, of the process that wrote the report.
     pub wall_s: f64,
     /// Seconds of processor time of all threads, including those of no stage.
     #[serde(default)]
     pub cpu_s: f64,
-    /// The stages in the order in which they begin. Some run at the same time.
+    /// The stages in the order in which they begin. Some run at the same time. Those of several parts are summed up.
     pub stages: Vec<StageStats>,
     /// What the user should know.
     pub warnings: Warnings,
@@ -155,6 +155,8 @@ pub struct ReportParts {
     pub parts: u64,
     /// The part that took the longest.
     pub slowest_part: Option<SlowestPart>,
+    /// Seconds of processor time of the tasks that did other phases.
+    pub cpu_s_of_tasks: f64,
     /// What the user should know about the results.
     pub warnings: Warnings,
     /// Bytes of results besides the tiles.
@@ -219,7 +221,7 @@ impl Report {
             threads: parts.threads,
             resumed: parts.resumed,
             wall_s: parts.clock.wall_s(),
-            cpu_s: parts.clock.cpu_s(),
+            cpu_s: parts.clock.cpu_s() + parts.cpu_s_of_tasks,
             stages: parts.stages,
             warnings,
             input: InputOptions { files: Vec::new(), ..plan.options.input.clone() },

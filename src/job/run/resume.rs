@@ -266,12 +266,15 @@ pub(crate) fn resume_part(
     // What the part read is for other parts too.
     let (mut kept, entries): (Vec<_>, Vec<_>) =
         entries.into_iter().partition(|entry| matches!(entry.step, JobStep::Read(_)));
-    let stage = progress.stage("check", entries.len() as u64, "steps");
     let review = match entries.is_empty() {
         true => None,
-        false => ResumeReview::of(directory, entries, max_edge == MaxEdge::Auto, &stage)?,
+        false => {
+            let stage = progress.stage("check", entries.len() as u64, "steps");
+            let review = ResumeReview::of(directory, entries, max_edge == MaxEdge::Auto, &stage)?;
+            stage.finish();
+            review
+        }
     };
-    stage.finish();
     let KeptSteps { entries, mut files, partition, .. } = review.map(ResumeReview::into_kept).unwrap_or_default();
     kept.extend(entries);
     if !kept.is_empty() {

@@ -19,6 +19,13 @@ use std::sync::Arc;
 /// The tiles of a part that are not written yet, each with the tiles that must be finished before it, if they are known.
 type WaitingTiles = BTreeMap<TileIndex, Option<Vec<TileIndex>>>;
 
+/// A part with tiles that are not written yet.
+struct WaitingPart {
+    tiles: WaitingTiles,
+    /// The tiles that touch other parts.
+    outer: HashSet<TileIndex>,
+}
+
 /// The tiles that wait for parts to come.
 pub(crate) struct Front<'a> {
     job: &'a PartsJob<'a>,
@@ -26,7 +33,7 @@ pub(crate) struct Front<'a> {
     look: Arc<TileLook>,
     /// The tiles that merges may still change.
     open: HashSet<TileIndex>,
-    waiting: BTreeMap<PartIndex, WaitingTiles>,
+    waiting: BTreeMap<PartIndex, WaitingPart>,
     /// The bytes that the store of each part keeps.
     stored: HashMap<PartIndex, u64>,
     /// What writing tiles of each part took.
@@ -61,7 +68,8 @@ impl<'a> Front<'a> {
         self.stored.insert(part, opened.store.bytes());
         drop(opened);
         self.open.extend(&meshed.open);
-        self.waiting.insert(part, meshed.waiting.iter().map(|&tile| (tile, None)).collect());
+        let tiles = meshed.waiting.iter().map(|&tile| (tile, None)).collect();
+        self.waiting.insert(part, WaitingPart { tiles, outer: meshed.open.iter().copied().collect() });
         let finished = merge_through(self.job, self.stores, part)?;
         if finished.is_empty() {
             return Ok(());
@@ -75,8 +83,8 @@ impl<'a> Front<'a> {
     fn write_ready_tiles(&mut self) -> Result<()> {
         let Front { job, stores, look, open, waiting, stored, stages } = self;
         let joined = JoinedParts::so_far(job, look.clone())?;
-        let borders = &ForeignBorders::of_one_process(job, stores, &joined);
-        for (&part, tiles) in waiting.iter_mut() {
+        let borders = &ForeignBorders::new(job, stores, &joined);
+        for (&part, WaitingPart { tiles, outer }) in waiting.iter_mut() {
             let is_due = |(tile, neighbours): (&TileIndex, &Option<Vec<TileIndex>>)| {
                 !open.contains(tile)
                     && neighbours.as_ref().is_none_or(|all| all.iter().all(|tile| !open.contains(tile)))
@@ -88,12 +96,15 @@ impl<'a> Front<'a> {
             let session = BorderSession::begin(borders, directory, part, tiles.len())?;
             let before = session.store().bytes();
             write_ready(&session, tiles, open)?;
+            if tiles.is_empty() {
+                free_inner_borders(&session, outer)?;
+            }
             let kept = stored.entry(part).or_default();
             *kept = (*kept + session.store().bytes()).saturating_sub(before);
             let stage = session.end()?;
             stages.entry(part).and_modify(|all| all.add(&stage)).or_insert(stage);
         }
-        waiting.retain(|_, tiles| !tiles.is_empty());
+        waiting.retain(|_, part| !part.tiles.is_empty());
         Ok(())
     }
 }
@@ -117,6 +128,15 @@ fn write_ready(session: &BorderSession, waiting: &mut WaitingTiles, open: &HashS
         records.into_iter().try_for_each(|record| session.store().free(record))?;
     }
     Ok(())
+}
+
+/// Gives back what no step needs any more once all tiles of a part are written: all but the borders of its `outer` tiles, which other parts
+/// may still ask for.
+fn free_inner_borders(session: &BorderSession, outer: &HashSet<TileIndex>) -> Result<()> {
+    let (store, tree) = (session.store(), &session.partition().tree);
+    let inner = tree.tiles().filter(|tile| !outer.contains(tile));
+    inner.into_iter().try_for_each(|tile| store.free(StepRecord::FinishedBorder(tile)))?;
+    (0..tree.nodes.len()).map(NodeIndex::new).try_for_each(|node| store.free(StepRecord::Seam(node)))
 }
 
 /// Gives back what no step needs any more once a part is meshed, and which is so in any later run: all but the frontier of the part, and

@@ -17,12 +17,13 @@ mod publish_parts;
 pub(crate) mod read_phase;
 pub(crate) mod tile_phase;
 
+use crate::job::durable::directory::JobDirectory;
 use crate::job::index::PartIndex;
 use crate::job::partition::part_points::ReadInputs;
 use crate::job::partition::parts::Parts;
 use crate::job::plan::job_plan::Plan;
 use crate::job::progress::stats::StageStats;
-use crate::job::records::{JobStep, StepOutput};
+use crate::job::records::{JobStep, Journal, StepOutput};
 use crate::job::report::job_report::Report;
 use crate::job::run::parts::front::Front;
 use crate::job::run::parts::join::{JoinedParts, join_parts};
@@ -47,7 +48,7 @@ use std::collections::HashMap;
 pub(crate) fn walk(run: &RunContext, plan: &Plan) -> Result<Report> {
     let parts = &Parts::of(plan);
     let job = &PartsJob::of_run(run, plan, parts);
-    write_plan(run, plan)?;
+    write_plan(run.journal, run.directory, plan)?;
     // Steps 2 to 6 for each part, as far as it needs no later one.
     let stores = &PartStores::new(job.directory, job.job_id);
     let (meshed, mut before) = read_and_mesh(job, stores)?;
@@ -55,7 +56,7 @@ pub(crate) fn walk(run: &RunContext, plan: &Plan) -> Result<Report> {
     join_parts(job, stores, meshed.iter().map(|part| part.leaves.sites).sum())?;
     let joined = JoinedParts::open(job)?.ok_or_else(|| Error::Broken("the parts are not joined".into()))?;
     // Steps 5 and 6 for the tiles that have waited.
-    let borders = &ForeignBorders::of_one_process(job, stores, &joined);
+    let borders = &ForeignBorders::new(job, stores, &joined);
     let mut tiles = meshed.iter().map(|part| part.tiles).fold(Default::default(), |mut all, part| {
         all += part;
         all
@@ -74,9 +75,9 @@ pub(crate) fn walk(run: &RunContext, plan: &Plan) -> Result<Report> {
 ///
 /// # Errors
 /// [`Error::Io`] if it cannot be written.
-pub(crate) fn write_plan(run: &RunContext, plan: &Plan) -> Result<()> {
-    run.journal.step(JobStep::Plan, || {
-        let files = vec![plan.write(&run.directory.plan())?];
+pub(crate) fn write_plan(journal: &Journal, directory: &JobDirectory, plan: &Plan) -> Result<()> {
+    journal.step(JobStep::Plan, || {
+        let files = vec![plan.write(&directory.plan())?];
         Ok(StepOutput { files, ..StepOutput::new((), Vec::new()) })
     })
 }

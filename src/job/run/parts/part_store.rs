@@ -1,18 +1,20 @@
 //! The stores of parts that are meshed, opened when they are needed.
 
 use crate::job::durable::directory::JobDirectory;
-use crate::job::index::PartIndex;
+use crate::job::index::{PartIndex, TileIndex};
 use crate::job::partition::result::Partition;
-use crate::job::records::{JobStep, Store};
+use crate::job::records::{JobStep, RecordRef, Store};
 use crate::job::run::part_entries::{PartHeader, entries_of, open_store, records_of};
 use crate::{Error, Result};
-use std::collections::VecDeque;
+use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// A part whose records can be read.
 pub(crate) struct OpenPart {
     pub(crate) store: Store,
     pub(crate) partition: Partition,
+    /// The records of finished borders.
+    pub(crate) borders: HashMap<TileIndex, RecordRef>,
 }
 
 /// How many parts stay open for the next who asks. Each has a few open files.
@@ -46,7 +48,12 @@ impl PartStores {
         }
         let records = records_of(&entries);
         let store = open_store(&directory, &records)?;
-        let opened = Arc::new(OpenPart { partition: Partition::load(&store)?, store });
+        let borders = entries.iter().filter_map(|entry| match entry.step {
+            JobStep::BorderNormals(tile) => Some((tile, *entry.records.first()?)),
+            _ => None,
+        });
+        let borders = borders.collect();
+        let opened = Arc::new(OpenPart { partition: Partition::load(&store)?, store, borders });
         open.push_back((part, opened.clone()));
         if open.len() > KEPT_OPEN {
             open.pop_front();

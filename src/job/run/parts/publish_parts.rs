@@ -57,6 +57,7 @@ pub(crate) fn publish_parts(
         files: StepsOfParts::of(job.directory, job.job_id)?.files,
         parts: parts.len() as u64,
         slowest_part: slowest(&parts),
+        cpu_s_of_tasks: if figures.by_tasks { processor_seconds(&parts) } else { 0.0 },
     };
     write_report(run, plan, figures, published)
 }
@@ -69,6 +70,8 @@ struct PartFigures {
     /// The points of each part.
     points: Vec<u64>,
     temporary: u64,
+    /// Whether tasks meshed the parts.
+    by_tasks: bool,
 }
 
 impl PartFigures {
@@ -92,7 +95,7 @@ impl PartFigures {
         let by_tasks = meshed.iter().any(|mesh| mesh.by_task);
         let temporary = if by_tasks { temporary.sum() } else { temporary.max().unwrap_or(0) };
         let points = meshed.iter().map(|mesh| mesh.points).collect();
-        Ok(PartFigures { leaves, tiles, levels, points, temporary })
+        Ok(PartFigures { leaves, tiles, levels, points, temporary, by_tasks })
     }
 }
 
@@ -104,6 +107,11 @@ fn add_stages(run: &RunContext, joined: &JoinedParts, parts: &[PartProgress]) {
             joined.stages.iter().for_each(|stage| run.add_stage(stage.clone()));
         }
     }
+}
+
+/// Returns the seconds of processor time of all phases of parts. The stages of meshing are kinds of work that go on at the same time.
+fn processor_seconds(parts: &[PartProgress]) -> f64 {
+    parts.iter().flat_map(PartProgress::stages).flatten().map(|stage| stage.cpu_s).sum()
 }
 
 fn slowest(parts: &[PartProgress]) -> Option<SlowestPart> {

@@ -6,7 +6,7 @@ use crate::job::index::{PartIndex, TileIndex};
 use crate::job::partition::result::Partition;
 use crate::job::progress::stage::Stage;
 use crate::job::progress::stats::StageStats;
-use crate::job::records::{FinishedBorder, JobStep, SeamTriangle, StepRecord, Store};
+use crate::job::records::{FinishedBorder, JobStep, SeamTriangle, Store};
 use crate::job::run::part_entries::entries_of;
 use crate::job::run::parts::done::Done;
 use crate::job::run::parts::join::JoinedParts;
@@ -150,33 +150,18 @@ impl<'a> BorderSession<'a> {
 /// How many borders of other parts stay in memory, some ten kilobytes each.
 const MOST_KNOWN: usize = 1000;
 
-/// Finished borders of tiles of other parts.
+/// Finished borders of tiles of other parts. Those that are not stored yet are computed: a part's folder has one writer.
 pub(crate) struct ForeignBorders<'a> {
     job: &'a PartsJob<'a>,
     stores: &'a PartStores,
     joined: &'a JoinedParts,
-    /// Whether borders that are stored are read. Otherwise all are computed again: another task may be writing them.
-    reads_stored: bool,
     known: Mutex<HashMap<TileIndex, FinishedBorder>>,
 }
 
 impl<'a> ForeignBorders<'a> {
-    /// Returns the borders of a job that has other tasks.
-    pub(crate) fn of_tasks(
-        job: &'a PartsJob<'a>,
-        stores: &'a PartStores,
-        joined: &'a JoinedParts,
-    ) -> ForeignBorders<'a> {
-        ForeignBorders { job, stores, joined, reads_stored: false, known: Mutex::default() }
-    }
-
-    /// Returns the borders of a job that this process does alone. What a written tile needed may be gone.
-    pub(crate) fn of_one_process(
-        job: &'a PartsJob<'a>,
-        stores: &'a PartStores,
-        joined: &'a JoinedParts,
-    ) -> ForeignBorders<'a> {
-        ForeignBorders { job, stores, joined, reads_stored: true, known: Mutex::default() }
+    /// Returns the borders of a job whose parts are joined as far as `joined` tells.
+    pub(crate) fn new(job: &'a PartsJob<'a>, stores: &'a PartStores, joined: &'a JoinedParts) -> ForeignBorders<'a> {
+        ForeignBorders { job, stores, joined, known: Mutex::default() }
     }
 
     fn of(&self, tile: TileIndex) -> Result<FinishedBorder> {
@@ -194,8 +179,9 @@ impl<'a> ForeignBorders<'a> {
     }
 
     fn find(&self, tile: TileIndex) -> Result<FinishedBorder> {
-        let OpenPart { store, partition } = &*self.stores.open(tile.part())?;
-        if self.reads_stored && store.has(StepRecord::FinishedBorder(tile)) {
+        let OpenPart { store, partition, borders } = &*self.stores.open(tile.part())?;
+        // Another machine may be writing it. But what a written tile needed may be gone, and then it is whole.
+        if borders.get(&tile).is_some_and(|record| store.is_whole(record)) {
             return FinishedBorder::load(store, tile);
         }
         let seam = self.joined.seam_of(self.job, store, &partition.tree, tile)?;
