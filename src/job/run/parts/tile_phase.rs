@@ -117,8 +117,13 @@ impl<'a> BorderSession<'a> {
         let write = |&tile: &TileIndex| {
             let (directory, store) = (self.session.directory, self.store());
             let work = || write_tile(directory, store, style, canvas, tile, &self.seam(tile)?, &border_of);
-            let stats = self.session.journal.step(JobStep::WriteTile(tile), work)?;
-            self.stage.advance(1);
+            let (step, journal) = (JobStep::WriteTile(tile), &self.session.journal);
+            let stats = journal.step(step, work)?;
+            if journal.has(step) {
+                self.stage.take_over(1)
+            } else {
+                self.stage.advance(1)
+            }
             Ok(stats)
         };
         let add = |mut a: TileStats, b| {
