@@ -1,6 +1,7 @@
 //! The command line: the commands and their options.
 
 use crate::job::phase::{MOST_TASKS, Phase, Task};
+use crate::submit::Engine;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -105,6 +106,26 @@ pub enum CliCommand {
         /// Worker threads of this task, instead of `[limits] threads`.
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
         threads: Option<u16>,
+    },
+    /// Send a large job to an engine that does its tasks on many machines.
+    ///
+    /// All machines must see the inputs, the configuration and the output directory under the same paths. If the job is under way, only
+    /// the tasks that are missing are sent: run the same command again after failures.
+    Submit {
+        /// The configuration of the job.
+        config: PathBuf,
+        /// The engine.
+        #[arg(long, value_enum)]
+        engine: Engine,
+        /// The number of tasks that each phase is dealt out to.
+        #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_TASKS)))]
+        tasks: u32,
+        /// Send nothing, and print what the engine would get.
+        #[arg(long)]
+        dry_run: bool,
+        /// Options of the engine: those of sbatch; for Kubernetes see `-- --help`.
+        #[arg(last = true, value_name = "ENGINE OPTIONS")]
+        added: Vec<String>,
     },
     /// Show what point clouds contain.
     Info {

@@ -20,6 +20,7 @@ pub mod output;
 pub mod positional_io;
 pub mod sample;
 pub mod shortage;
+pub mod submit;
 pub mod threads;
 pub mod triangulation;
 pub mod verify;

@@ -7,10 +7,13 @@ use gdt_batch::cli::{Cli, CliCommand, PrintOptions};
 use gdt_batch::gpu::selftest;
 use gdt_batch::job;
 use gdt_batch::job::options::RunOptions;
+use gdt_batch::job::phase::PhaseTasks;
 use gdt_batch::job::preflight::check;
 use gdt_batch::job::progress::stage::ProgressOutput;
 use gdt_batch::job::report::skipped_inputs::skipped_summary;
 use gdt_batch::output::file_names::OutputFiles;
+use gdt_batch::submit::Engine;
+use gdt_batch::submit::request::Request;
 use gdt_batch::threads::{self, on_threads};
 use gdt_batch::verify::Conclusion;
 use gdt_batch::{Error, Result, config, input, interrupt, sample, say, shortage, verify};
@@ -41,6 +44,10 @@ fn run(cli: Cli) -> Result<ExitCode> {
         (Some(CliCommand::Check { config }), _) => check_job(config, print),
         (Some(CliCommand::Verify { directory, memory, input }), _) => verify_output(directory, *memory, input, print),
         (Some(CliCommand::Work { phase, .. }), _) => Err(Error::Config(format!("phase {phase} is not there yet"))),
+        (Some(CliCommand::Submit { config, engine, tasks, dry_run, added }), _) => {
+            let request = Request::new(config, &config::load(config)?, PhaseTasks::all(*tasks))?;
+            submit_job(*engine, &request, *dry_run, added, print)
+        }
         (Some(CliCommand::Info { files }), _) => show_info(files, print),
         (Some(CliCommand::Gpu { adapter, side }), _) => test_gpu(adapter.as_deref(), *side, print),
         (Some(CliCommand::Sample { file, points, seed, overwrite }), _) => {
@@ -77,6 +84,21 @@ fn run_job(path: &Path, cli: &Cli) -> Result<ExitCode> {
     }
     if let Some(summary) = skipped_summary(report.files, &report.skipped) {
         say(&format!("{summary}: see {}", OutputFiles::new(&config.output.directory).report().display()));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn submit_job(
+    engine: Engine,
+    request: &Request,
+    dry_run: bool,
+    added: &[String],
+    print: PrintOptions,
+) -> Result<ExitCode> {
+    if dry_run {
+        print_text(&engine.show(request, added)?)?;
+    } else {
+        print_result(&engine.send(request, added)?, print)?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -140,6 +162,10 @@ fn print_result(result: &(impl Display + Serialize), print: PrintOptions) -> Res
     } else {
         result.to_string()
     };
+    print_text(&text)
+}
+
+fn print_text(text: &str) -> Result<()> {
     match writeln!(std::io::stdout(), "{}", text.trim_end()) {
         // The reader has closed the pipe because it has read enough.
         Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(()),
