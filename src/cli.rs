@@ -100,14 +100,17 @@ pub enum CliCommand {
         /// The task: number i, from 1 on, of N. Default: what the environment of an array job says (Slurm, Kubernetes, AWS Batch).
         #[arg(long, value_name = "i/N")]
         task: Option<Task>,
-        /// The number of tasks, where the environment tells only the number of this one.
+        /// The number of tasks that phases are dealt out to, where the environment tells only the number of this one.
         #[arg(long, value_name = "N", conflicts_with = "task", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_TASKS)))]
         tasks: Option<u32>,
         /// Worker threads of this task, instead of `[limits] threads`.
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
         threads: Option<u16>,
+        /// Plan the job even if it does not seem to fit the disk or the memory of this machine.
+        #[arg(long)]
+        force: bool,
     },
-    /// Send a large job to an engine that does its tasks on many machines.
+    /// Send a large job to an engine that does its tasks.
     ///
     /// All machines must see the inputs, the configuration and the output directory under the same paths. If the job is under way, only
     /// the tasks that are missing are sent: run the same command again after failures.
@@ -117,15 +120,23 @@ pub enum CliCommand {
         /// The engine.
         #[arg(long, value_enum)]
         engine: Engine,
-        /// The number of tasks that each phase is dealt out to.
+        /// The number of tasks that each phase is dealt out to. With `local`, as many run at once.
         #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_TASKS)))]
         tasks: u32,
         /// Send nothing, and print what the engine would get.
         #[arg(long)]
         dry_run: bool,
-        /// Options of the engine: those of sbatch; for Kubernetes see `-- --help`.
+        /// Options of the engine: with slurm those of sbatch; with kubernetes see `-- --help`.
         #[arg(last = true, value_name = "ENGINE OPTIONS")]
         added: Vec<String>,
+    },
+    /// Show how far a job is that tasks are doing, and what is missing.
+    Status {
+        /// The configuration of the job.
+        config: PathBuf,
+        /// The number of tasks that phases are dealt out to: names the tasks that are missing, rather than the parts.
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_TASKS)))]
+        tasks: Option<u32>,
     },
     /// Show what point clouds contain.
     Info {

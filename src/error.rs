@@ -22,11 +22,11 @@ pub enum Error {
         source: std::io::Error,
     },
     /// Another process works in the job directory (exit code 1).
-    #[error("{} is working in {}: wait for it, or choose another [output] directory", process(holder), directory.display())]
+    #[error("{} is working in {}: wait for it, or choose another [output] directory", working(holder), directory.display())]
     InUse {
         /// The job directory.
         directory: PathBuf,
-        /// The process id of the other process; empty if it has not written it yet.
+        /// Which process it is, on which machine; empty if it has not written it yet.
         holder: String,
     },
     /// A job has not put all its results in place (exit code 1).
@@ -37,6 +37,24 @@ pub enum Error {
     Unfinished {
         /// The output directory.
         directory: PathBuf,
+    },
+    /// A task came before what it needs was done (exit code 1).
+    #[error("{0}")]
+    TooEarly(String),
+    /// Tasks of a phase failed, and have said why (the worst of their exit codes).
+    #[error(
+        "the phase {phase} is not complete: of {count} tasks these failed: {}; run the same command again to go on",
+        list(failed)
+    )]
+    Tasks {
+        /// The phase.
+        phase: &'static str,
+        /// The numbers of the tasks.
+        failed: Vec<u32>,
+        /// How many tasks the phase has.
+        count: u32,
+        /// The worst exit code.
+        code: u8,
     },
     /// The job does not fit the memory it was given (exit code 1).
     #[error("not enough memory: {0}")]
@@ -92,8 +110,12 @@ pub enum Error {
     Broken(String),
 }
 
-fn process(holder: &str) -> String {
-    if holder.is_empty() { "another process".into() } else { format!("process {holder}") }
+fn working(holder: &str) -> &str {
+    if holder.is_empty() { "another process" } else { holder }
+}
+
+fn list(numbers: &[u32]) -> String {
+    numbers.iter().map(u32::to_string).collect::<Vec<_>>().join(", ")
 }
 
 fn again(why: &Error) -> &'static str {
@@ -144,10 +166,12 @@ impl Error {
             Error::Io { .. }
             | Error::InUse { .. }
             | Error::Unfinished { .. }
+            | Error::TooEarly(_)
             | Error::Memory(_)
             | Error::Engine(_)
             | Error::Interrupted => 1,
             Error::Resumable { why, .. } => why.exit_code(),
+            Error::Tasks { code, .. } => *code,
             Error::Config(_) | Error::TooFine { .. } => 2,
             Error::Input { .. } | Error::NoTerrain(_) => 3,
             Error::Broken(_) | Error::NeedsOnePart | Error::DamagedSteps => 4,

@@ -6,14 +6,17 @@ use clap::Parser;
 use gdt_batch::cli::{Cli, CliCommand, PrintOptions};
 use gdt_batch::gpu::selftest;
 use gdt_batch::job;
-use gdt_batch::job::options::RunOptions;
-use gdt_batch::job::phase::PhaseTasks;
+use gdt_batch::job::options::{JobOptions, RunOptions, Threads};
+use gdt_batch::job::phase::{Phase, PhaseTasks, Task};
 use gdt_batch::job::preflight::check;
 use gdt_batch::job::progress::stage::ProgressOutput;
+use gdt_batch::job::report::job_report::Report;
 use gdt_batch::job::report::skipped_inputs::skipped_summary;
+use gdt_batch::job::report::task_outcome::TaskOutcome;
 use gdt_batch::output::file_names::OutputFiles;
-use gdt_batch::submit::Engine;
+use gdt_batch::submit::local::LocalEngine;
 use gdt_batch::submit::request::Request;
+use gdt_batch::submit::{Engine, kubernetes, slurm};
 use gdt_batch::threads::{self, on_threads};
 use gdt_batch::verify::Conclusion;
 use gdt_batch::{Error, Result, config, input, interrupt, sample, say, shortage, verify};
@@ -43,10 +46,21 @@ fn run(cli: Cli) -> Result<ExitCode> {
         }
         (Some(CliCommand::Check { config }), _) => check_job(config, print),
         (Some(CliCommand::Verify { directory, memory, input }), _) => verify_output(directory, *memory, input, print),
-        (Some(CliCommand::Work { phase, .. }), _) => Err(Error::Config(format!("phase {phase} is not there yet"))),
+        (Some(CliCommand::Work { config, phase, task, tasks, threads, force }), _) => {
+            let task = match task {
+                Some(task) => *task,
+                None => Task::of_environment(*phase, *tasks, |name| std::env::var(name).ok())?,
+            };
+            let progress = ProgressOutput::detect(print.quiet);
+            let run = RunOptions { progress, force: *force, restart: false };
+            work(config, *phase, task, *threads, run, print)
+        }
         (Some(CliCommand::Submit { config, engine, tasks, dry_run, added }), _) => {
-            let request = Request::new(config, &config::load(config)?, PhaseTasks::all(*tasks))?;
-            submit_job(*engine, &request, *dry_run, added, print)
+            let request = request(config, *engine, *tasks)?;
+            if *dry_run { show_tasks(*engine, &request, added) } else { submit(*engine, &request, added, print) }
+        }
+        (Some(CliCommand::Status { config, tasks }), _) => {
+            print_result(&job::status(&config::load(config)?, *tasks)?, print).map(|()| ExitCode::SUCCESS)
         }
         (Some(CliCommand::Info { files }), _) => show_info(files, print),
         (Some(CliCommand::Gpu { adapter, side }), _) => test_gpu(adapter.as_deref(), *side, print),
@@ -71,11 +85,14 @@ fn run_job(path: &Path, cli: &Cli) -> Result<ExitCode> {
     };
     let config = config::load(path)?;
     interrupt::listen()?;
-    let report = job::run(&config, options)?;
-    if let Err(error) = print_result(&report, cli.print) {
-        let report = OutputFiles::new(&config.output.directory).report();
-        let done = format!("the job is done, and its report is in {}", report.display());
-        if cli.print.json {
+    show_report(&job::run(&config, options)?, &config, cli.print)
+}
+
+fn show_report(report: &Report, config: &JobOptions, print: PrintOptions) -> Result<ExitCode> {
+    let file = OutputFiles::new(&config.output.directory).report();
+    if let Err(error) = print_result(report, print) {
+        let done = format!("the job is done, and its report is in {}", file.display());
+        if print.json {
             say(&done);
             return Err(error);
         }
@@ -83,22 +100,58 @@ fn run_job(path: &Path, cli: &Cli) -> Result<ExitCode> {
         say(&format!("{done}, but it cannot be shown: {error}"));
     }
     if let Some(summary) = skipped_summary(report.files, &report.skipped) {
-        say(&format!("{summary}: see {}", OutputFiles::new(&config.output.directory).report().display()));
+        say(&format!("{summary}: see {}", file.display()));
     }
     Ok(ExitCode::SUCCESS)
 }
 
-fn submit_job(
-    engine: Engine,
-    request: &Request,
-    dry_run: bool,
-    added: &[String],
+/// Does one task of one phase.
+fn work(
+    path: &Path,
+    phase: Phase,
+    task: Task,
+    threads: Option<u16>,
+    run: RunOptions,
     print: PrintOptions,
 ) -> Result<ExitCode> {
-    if dry_run {
-        print_text(&engine.show(request, added)?)?;
-    } else {
-        print_result(&engine.send(request, added)?, print)?;
+    let mut config = config::load(path)?;
+    if let Some(threads) = threads {
+        config.limits.threads = Threads(threads.into());
+    }
+    interrupt::listen()?;
+    match job::work(&config, run, phase, task)? {
+        TaskOutcome::Published(report) => show_report(&report, &config, print),
+        TaskOutcome::Done(done) => print_result(&done, print).map(|()| ExitCode::SUCCESS),
+    }
+}
+
+/// Returns the tasks that are missing of the job that the configuration at `path` describes.
+fn request(path: &Path, engine: Engine, tasks: u32) -> Result<Request> {
+    let config = config::load(path)?;
+    // The inputs may be where only the pods of Kubernetes see them.
+    let is_out_of_sight = engine == Engine::Kubernetes && !config.output.directory.exists();
+    let phases = if is_out_of_sight { PhaseTasks::all(tasks) } else { job::missing_tasks(&config, tasks)? };
+    Request::new(path, &config, tasks, phases)
+}
+
+/// Prints what an engine would get.
+fn show_tasks(engine: Engine, request: &Request, added: &[String]) -> Result<ExitCode> {
+    let text = match engine {
+        Engine::Slurm => slurm::show(request, added)?,
+        Engine::Kubernetes => kubernetes::show(request, added)?,
+        Engine::Local => LocalEngine::new(request, added, false, false)?.show(),
+    };
+    print_text(&text).map(|()| ExitCode::SUCCESS)
+}
+
+fn submit(engine: Engine, request: &Request, added: &[String], print: PrintOptions) -> Result<ExitCode> {
+    match engine {
+        Engine::Slurm => print_result(&slurm::send(request, added)?, print)?,
+        Engine::Kubernetes => print_result(&kubernetes::send(request, added)?, print)?,
+        Engine::Local => {
+            interrupt::listen()?;
+            LocalEngine::new(request, added, print.quiet, print.json)?.run()?;
+        }
     }
     Ok(ExitCode::SUCCESS)
 }

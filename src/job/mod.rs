@@ -27,19 +27,22 @@ use crate::job::levels::make_level::Child;
 use crate::job::mesh::precision_limit::PrecisionLimit;
 use crate::job::options::{JobOptions, RunOptions};
 use crate::job::partition::result::Partition;
+use crate::job::phase::{Phase, PhaseTasks, Task};
 use crate::job::plan::job_plan::Plan;
 use crate::job::plan::no_points::no_point_is_left;
 use crate::job::publish::side_files::StoredTiles;
 use crate::job::publish::tileset_tree::TilesOfTree;
 use crate::job::report::job_report::Report;
-use crate::job::run::attempt::run_until_it_fits;
+use crate::job::report::job_status::JobStatus;
+use crate::job::report::task_outcome::TaskOutcome;
+use crate::job::run::attempt::{EarlierWork, run_until_it_fits};
 use crate::job::run::levels_step::{hierarchy_of, make_levels};
 use crate::job::run::mesh_and_tiles::mesh_and_tiles;
 use crate::job::run::publish_step::{
     MeshFigures, TilesetContent, WrittenFiles, publish, some_triangles, wants_tileset, write_report,
 };
 use crate::job::run::run_context::RunContext;
-use crate::job::run::{parts, read_step};
+use crate::job::run::{parts, read_step, tasks};
 use crate::threads::run_concurrently;
 use crate::{Error, Result};
 
@@ -51,7 +54,33 @@ use crate::{Error, Result};
 /// first step leaves the directory as it was.
 pub fn run(options: &JobOptions, run: impl Into<RunOptions>) -> Result<Report> {
     // Step 1, the plan, and what is around every attempt: the directory, its lock, the journal.
-    run_until_it_fits(options, run.into(), walk)
+    run_until_it_fits(options, run.into(), walk, EarlierWork::Interrupted)
+}
+
+/// Does one task of one phase of the job.
+///
+/// # Errors
+/// [`Error::TooEarly`] if an earlier phase is not complete, [`Error::InUse`] if another process has one of the task's parts, and the
+/// errors of the steps. What is done is kept in any case.
+pub fn work(options: &JobOptions, run: impl Into<RunOptions>, phase: Phase, task: Task) -> Result<TaskOutcome> {
+    tasks::work(options, run.into(), phase, task, walk)
+}
+
+/// Returns all phases of the job with the tasks that are missing, where phases are dealt out to `tasks` tasks: all of them if there is no
+/// plan of this job.
+///
+/// # Errors
+/// [`Error::Config`] if there are no inputs, [`Error::Io`] if one of them, or a journal, cannot be read.
+pub fn missing_tasks(options: &JobOptions, tasks: u32) -> Result<Vec<PhaseTasks>> {
+    tasks::missing::missing_tasks(options, tasks)
+}
+
+/// Returns how far the job is. If `tasks` is given, also which tasks are missing, where phases are dealt out to so many.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Broken`] on the job directory.
+pub fn status(options: &JobOptions, tasks: Option<u32>) -> Result<JobStatus> {
+    tasks::status::status(options, tasks)
 }
 
 /// The walk through the steps after the plan.
@@ -95,6 +124,9 @@ fn walk(run: &RunContext, plan: Plan, earlier: Option<Partition>) -> Result<Repo
                 tiles: tiles.stats,
                 temporary: run.temporary.measure(&partition, run.store),
                 files: Vec::new(),
+                parts: 1,
+                slowest_part: None,
+                cpu_s_of_tasks: 0.0,
             };
             write_report(run, &plan, figures, published)
         },

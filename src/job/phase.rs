@@ -96,17 +96,14 @@ pub struct Task {
 pub const MOST_TASKS: u32 = 1_000_000;
 
 impl Task {
-    /// The task of a phase that has only one.
-    pub const ONLY: Task = Task { number: 1, count: 1 };
-
     /// Returns the task that the environment of an array job names, as `variable` tells it. `count` is the number of tasks, if the
-    /// user says it. A phase with one task needs no array.
+    /// user says it. A phase with one task needs no array; `count` is that of the other phases then.
     ///
     /// # Errors
     /// [`Error::Config`] if the environment names no task or one that does not exist.
     pub fn of_environment(phase: Phase, count: Option<u32>, variable: impl Fn(&str) -> Option<String>) -> Result<Task> {
         if !phase.is_by_part() {
-            return Ok(Task::ONLY);
+            return Ok(Task { number: 1, count: count.unwrap_or(1) });
         }
         for (name, first) in INDICES {
             if let Some(text) = variable(name) {
@@ -216,6 +213,7 @@ mod tests {
             assert_eq!(task(None, &[(name, "0")]), Err(2));
         }
         assert_eq!(task(Some(8), &[]), Err(2));
-        assert_eq!(Task::of_environment(Phase::Join, None, |_| None).unwrap(), Task::ONLY);
+        let only = |count: Option<u32>| Task::of_environment(Phase::Join, count, |_| None).unwrap().to_string();
+        assert_eq!((only(None), only(Some(8))), ("1/1".into(), "1/8".into()));
     }
 }

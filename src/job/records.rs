@@ -44,10 +44,14 @@ pub enum JobStep {
     BorderNormals(TileIndex),
     /// Writes a tile.
     WriteTile(TileIndex),
+    /// Merges above the parts, and finds out how tiles look.
+    Join,
     /// Writes the tiles of a part that have waited for other parts.
     WriteWaiting,
     /// Makes a coarser tile.
     Level(NodeIndex),
+    /// Makes all coarser tiles of a part.
+    Levels,
     /// Writes what is beside the tiles, except the report.
     Publish,
     /// Writes the report: the job is complete.
@@ -73,8 +77,10 @@ pub enum StepRecord {
     Pixels(TileIndex),
     /// The result of the step that reads the points.
     Partition,
-    /// The points by bucket that a step has read.
+    /// The points by bucket that a reader has found.
     Read(PartIndex),
+    /// How many sites there are around every place.
+    Spacing,
     /// [`LevelSummary`]
     Level(NodeIndex),
     /// [`TileSummary`] of an exact tile.
@@ -94,6 +100,7 @@ impl RecordKey for StepRecord {
             StepRecord::Level(node) => [8, node.0],
             StepRecord::Tile(tile) => [9, tile.0],
             StepRecord::Read(part) => [10, part.0],
+            StepRecord::Spacing => [11, 0],
         }
     }
 }

@@ -71,7 +71,7 @@ fn volume(text: &str) -> std::result::Result<Volume, String> {
 ///
 /// # Errors
 /// [`Error::Config`] if the options that the user has `added` are wrong.
-pub(super) fn show(request: &Request, added: &[String]) -> Result<String> {
+pub fn show(request: &Request, added: &[String]) -> Result<String> {
     yaml(&jobs(request, &KubernetesOptions::read(request, added)?))
 }
 
@@ -79,7 +79,7 @@ pub(super) fn show(request: &Request, added: &[String]) -> Result<String> {
 ///
 /// # Errors
 /// [`Error::Config`] if the options that the user has `added` are wrong or there is no `kubectl`, [`Error::Engine`] if it refuses.
-pub(super) fn send(request: &Request, added: &[String]) -> Result<Submitted> {
+pub fn send(request: &Request, added: &[String]) -> Result<Submitted> {
     let options = KubernetesOptions::read(request, added)?;
     nothing_is_there(request, &options)?;
     kubectl(&options, &["apply", "--filename", "-"], &yaml(&jobs(request, &options))?)?;
@@ -89,7 +89,7 @@ pub(super) fn send(request: &Request, added: &[String]) -> Result<Submitted> {
         tasks: tasks.missing.clone(),
     };
     let jobs = request.phases.iter().map(sent).collect();
-    Ok(Submitted { engine: ENGINE, jobs, watch: Some(options.command(request, "get")), logs: None })
+    Ok(Submitted { engine: ENGINE, jobs, watch: options.command(request, "get"), logs: None })
 }
 
 impl KubernetesOptions {
@@ -185,7 +185,7 @@ fn pod(request: &Request, options: &KubernetesOptions, tasks: &PhaseTasks) -> Va
         "containers": [{
             "name": "work",
             "image": options.image,
-            "command": pod_command(&options.config_in_pods(request), tasks),
+            "command": pod_command(&options.config_in_pods(request), request.tasks, tasks),
             "resources": {"requests": resources, "limits": resources},
             "volumeMounts": mounts,
         }],
@@ -194,9 +194,9 @@ fn pod(request: &Request, options: &KubernetesOptions, tasks: &PhaseTasks) -> Va
 }
 
 /// Returns the command of a pod. If only some tasks are missing, a shell looks up which of them has the index of the pod.
-fn pod_command(config: &str, PhaseTasks { phase, count, missing }: &PhaseTasks) -> Vec<String> {
+fn pod_command(config: &str, total: u32, PhaseTasks { phase, count, missing }: &PhaseTasks) -> Vec<String> {
     let words = |words: &[&str]| words.iter().map(|word| word.to_string()).collect();
-    let (phase, total) = (phase.name(), count.to_string());
+    let (phase, total) = (phase.name(), total.to_string());
     if missing.len() as u64 == u64::from(*count) {
         return words(&["gdt-batch", "work", config, "--phase", phase, "--tasks", &total]);
     }
@@ -283,7 +283,7 @@ mod tests {
             assert_eq!(job["spec"]["completionMode"], "Indexed");
             let work = &job["spec"]["template"]["spec"]["containers"][0];
             let command = ["gdt-batch", "work", "/data/Big job.toml", "--phase", phase.name(), "--tasks"];
-            let command: Vec<String> = command.map(String::from).into_iter().chain([tasks.to_string()]).collect();
+            let command: Vec<String> = command.map(String::from).into_iter().chain(["5".into()]).collect();
             assert_eq!(work["command"], json!(command));
             assert_eq!(work["resources"], json!({"requests": {"memory": "4352Mi"}, "limits": {"memory": "4352Mi"}}));
         }
@@ -310,7 +310,7 @@ mod tests {
         std::fs::write(&stub, "#!/bin/sh\necho \"$@\"\n").unwrap();
         assert!(Command::new("chmod").arg("+x").arg(&stub).status().unwrap().success());
         let phases = vec![PhaseTasks { phase: Phase::Tiles, count: 64, missing: vec![3, 7, 41] }];
-        let jobs = read(&Request { phases, ..request("/data/it's $x.toml", 1) }, &[]);
+        let jobs = read(&Request { phases, ..request("/data/it's $x.toml", 64) }, &[]);
         assert_eq!(jobs[0]["spec"]["completions"], 3);
         let command: Vec<&str> = jobs[0]["spec"]["template"]["spec"]["containers"][0]["command"]
             .as_array()

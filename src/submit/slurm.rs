@@ -18,7 +18,7 @@ const DEFAULT_LIMIT: u32 = 1001;
 /// # Errors
 /// [`Error::Config`] if Slurm's commands are missing or an option cannot be added, [`Error::Engine`] if Slurm refuses or an earlier
 /// submission is still queued, [`Error::Io`] if a script cannot be written.
-pub(super) fn send(request: &Request, added: &[String]) -> Result<Submitted> {
+pub fn send(request: &Request, added: &[String]) -> Result<Submitted> {
     check_options(added)?;
     let limit = max_array_size()?;
     let sent = request.folder(ENGINE).join("submitted");
@@ -44,14 +44,14 @@ pub(super) fn send(request: &Request, added: &[String]) -> Result<Submitted> {
         }
         after = of_phase;
     }
-    Ok(Submitted { engine: ENGINE, jobs, watch: Some("squeue --me".into()), logs: Some(request.folder(ENGINE)) })
+    Ok(Submitted { engine: ENGINE, jobs, watch: "squeue --me".into(), logs: Some(request.folder(ENGINE)) })
 }
 
 /// Returns what [`send`] would do, as a script of the shell.
 ///
 /// # Errors
 /// [`Error::Config`] if an option cannot be added.
-pub(super) fn show(request: &Request, added: &[String]) -> Result<String> {
+pub fn show(request: &Request, added: &[String]) -> Result<String> {
     check_options(added)?;
     Ok(dry_run(request, max_array_size().unwrap_or(DEFAULT_LIMIT), added))
 }

@@ -30,18 +30,19 @@ fn script_path(request: &Request, phase: Phase) -> PathBuf {
 pub(super) fn scripts(request: &Request) -> Vec<Script> {
     let script = |tasks: &PhaseTasks| Script {
         path: script_path(request, tasks.phase),
-        text: script_text(request, tasks.phase, tasks.count),
+        text: script_text(request, tasks.phase),
     };
     request.phases.iter().map(script).collect()
 }
 
-fn script_text(request: &Request, phase: Phase, count: u32) -> String {
+fn script_text(request: &Request, phase: Phase) -> String {
+    let count = request.tasks;
     let (name, mebibytes) = (request.name(), request.mebibytes());
     let [program, config] = [&request.program, &request.config].map(|path| quoted(&path.to_string_lossy()));
     let cores = if request.threads == 0 { String::new() } else { format!(" --cpus-per-task={}", request.threads) };
     format!(
         r#"#!/bin/sh
-# Phase "{phase}" of a job, in {count} tasks. An element of the array is a task; the argument is added to its number.
+# Phase "{phase}" of a job. An element of the array is a task; the argument is added to its number.
 #SBATCH --job-name={name}-{phase}
 #SBATCH --nodes=1 --ntasks=1 --mem={mebibytes}M{cores}
 #SBATCH --requeue
@@ -152,7 +153,10 @@ mod tests {
     use std::process::Command;
 
     fn missing(phase: Phase, count: u32, missing: &[u32]) -> Request {
-        Request { phases: vec![PhaseTasks { phase, count, missing: missing.to_vec() }], ..request("/data/job.toml", 1) }
+        Request {
+            phases: vec![PhaseTasks { phase, count, missing: missing.to_vec() }],
+            ..request("/data/job.toml", count)
+        }
     }
 
     #[test]

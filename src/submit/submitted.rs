@@ -14,7 +14,7 @@ pub struct Submitted {
     /// The tasks, as the engine knows them.
     pub jobs: Vec<SentTasks>,
     /// A command that shows how they fare.
-    pub watch: Option<String>,
+    pub watch: String,
     /// Where the tasks' logs are, if they are files.
     pub logs: Option<PathBuf>,
 }
@@ -32,9 +32,6 @@ pub struct SentTasks {
 
 impl fmt::Display for Submitted {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.jobs.is_empty() {
-            return write!(f, "no task is missing: nothing was sent");
-        }
         for SentTasks { phase, job, tasks } in &self.jobs {
             let word = if tasks.len() == 1 { "task" } else { "tasks" };
             writeln!(f, "{phase}: {word} {} in job {job}", ranges(tasks))?;
@@ -42,6 +39,6 @@ impl fmt::Display for Submitted {
         if let Some(logs) = &self.logs {
             writeln!(f, "logs: {}", logs.display())?;
         }
-        self.watch.iter().try_for_each(|command| write!(f, "watch: {command}"))
+        write!(f, "watch: {}", self.watch)
     }
 }

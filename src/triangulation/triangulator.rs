@@ -63,6 +63,11 @@ const BYTES_PER_PIXEL: u64 = 12;
 const MIN_MEMORY: u64 = 1 << 30;
 
 impl Triangulator {
+    /// Returns the triangulator that the configuration asks for, but for a GPU.
+    pub fn without_gpu(config: &TriangulationOptions) -> Triangulator {
+        Triangulator { pipeline: config.backend != Backend::Reference, gpu: None }
+    }
+
     /// Returns the triangulator that the configuration asks for, for leaves on `threads` threads at once within `memory` bytes.
     ///
     /// # Errors

@@ -38,6 +38,7 @@ mod same_mesh;
 mod shortage;
 mod steps;
 mod tampering;
+mod tasks;
 mod texts;
 mod viewers;
 mod written;

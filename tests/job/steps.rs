@@ -8,7 +8,7 @@ use gdt_batch::job::index::NodeIndex;
 use gdt_batch::job::mesh::leaf::triangulate_leaf;
 use gdt_batch::job::mesh::merge::merge_frontiers;
 use gdt_batch::job::options::JobOptions;
-use gdt_batch::job::partition::point_file::PointFile;
+use gdt_batch::job::partition::point_file::PointFiles;
 use gdt_batch::job::partition::read::read_points;
 use gdt_batch::job::partition::result::Partition;
 use gdt_batch::job::plan::job_plan::Plan;
@@ -52,7 +52,7 @@ fn run_steps(job: &Job, options: &JobOptions) -> (Store, Partition) {
     let stage = ProgressOutput::Quiet.stage("read", 0, "points");
     let partition = read_points(&plan, &directory, &stage).unwrap();
     let store = Store::create(directory.store()).unwrap();
-    let points = PointFile::open(&directory.points()).unwrap();
+    let points = PointFiles::open(&directory.point_files().unwrap()).unwrap();
     let cpu = TriangulationOptions { backend: Backend::Cpu, ..TriangulationOptions::default() };
     let triangulator = Triangulator::new(&cpu, &gdt_batch::gpu::options::GpuOptions::default(), 1 << 28, 1).unwrap();
     let tree = &partition.tree;

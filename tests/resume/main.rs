@@ -24,3 +24,4 @@ mod places;
 mod power;
 mod read_errors;
 mod signals;
+mod tasks;

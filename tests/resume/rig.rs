@@ -202,8 +202,13 @@ impl Rig {
 
     /// Returns the command that runs the program on the configuration.
     pub(crate) fn command(&self) -> Command {
+        self.command_of(&["job.toml"])
+    }
+
+    /// Returns the command that runs the program with these arguments beside the configuration.
+    pub(crate) fn command_of(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_gdt-batch"));
-        command.arg("job.toml").current_dir(self.folder.path()).envs(self.environment.iter().map(|(k, v)| (k, v)));
+        command.args(arguments).current_dir(self.folder.path()).envs(self.environment.iter().map(|(k, v)| (k, v)));
         command
     }
 
@@ -301,6 +306,7 @@ fn lasting(text: &[u8]) -> Value {
         "threads",
         "memory_limit",
         "bytes_temporary",
+        "slowest_part",
         "checksum",
     ];
     for name in changing {

@@ -75,6 +75,15 @@ impl<'a, K: RecordKey> ColumnReader<'a, K> {
         Ok(column)
     }
 
+    /// Goes on to the column after the next.
+    ///
+    /// # Errors
+    /// As [`ColumnReader::column`].
+    pub fn skip_column<T: Pod>(&mut self) -> Result<()> {
+        let count = self.count::<T>()?;
+        self.skip((count * size_of::<T>()).next_multiple_of(ALIGNMENT) as u64)
+    }
+
     /// Returns `count` values of the last column from the one at `first` on, without reading the others.
     ///
     /// # Errors

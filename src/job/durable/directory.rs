@@ -24,7 +24,16 @@ pub struct JobDirectory {
     results: OutputFiles,
     waiting: OutputFiles,
     job: PathBuf,
-    points: PathBuf,
+    points: PointPlace,
+}
+
+/// Where the points are between reading and triangulating.
+#[derive(Clone, Debug)]
+enum PointPlace {
+    /// In one file.
+    File(PathBuf),
+    /// In a folder, with a file for each reader.
+    Folder(PathBuf),
 }
 
 impl JobDirectory {
@@ -32,12 +41,17 @@ impl JobDirectory {
     pub fn new(output: &Path) -> JobDirectory {
         let results = OutputFiles::new(output);
         let job = results.job();
-        JobDirectory { waiting: OutputFiles::new(&job.join("results")), points: job.join("points"), job, results }
+        JobDirectory {
+            waiting: OutputFiles::new(&job.join("results")),
+            points: PointPlace::File(job.join("points")),
+            job,
+            results,
+        }
     }
 
     /// Returns the directory in which a part of the job keeps its steps. Its results are those of the job.
     pub fn part(&self, part: PartIndex) -> JobDirectory {
-        let points = self.points_by_part().join(format!("{part}.points"));
+        let points = PointPlace::Folder(self.points_by_part().join(part.to_string()));
         JobDirectory { job: self.parts().join(part.to_string()), points, ..self.clone() }
     }
 
@@ -91,9 +105,43 @@ impl JobDirectory {
         self.job.join("journal")
     }
 
-    /// Returns the path of the file that holds the points between reading and triangulating.
+    /// Returns the path of the file or the folder that holds the points between reading and triangulating.
     pub fn points(&self) -> PathBuf {
-        self.points.clone()
+        let (PointPlace::File(path) | PointPlace::Folder(path)) = &self.points;
+        path.clone()
+    }
+
+    /// Returns the path of the point file with this number: that of the reader, in a job of several parts.
+    pub fn point_file(&self, number: u16) -> PathBuf {
+        match &self.points {
+            PointPlace::File(path) => path.clone(),
+            PointPlace::Folder(folder) => folder.join(format!("{number}.points")),
+        }
+    }
+
+    /// Returns the numbers and the paths of all point files.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if they cannot be listed.
+    pub fn point_files(&self) -> Result<Vec<(u16, PathBuf)>> {
+        let number = |path: &Path| path.file_name()?.to_str()?.strip_suffix(".points")?.parse().ok();
+        match &self.points {
+            PointPlace::File(path) => Ok(vec![(0, path.clone())]),
+            PointPlace::Folder(folder) => {
+                Ok(entries(folder)?.into_iter().filter_map(|path| Some((number(&path)?, path))).collect())
+            }
+        }
+    }
+
+    /// Removes the points.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if they cannot be removed.
+    pub fn remove_points(&self) -> Result<()> {
+        match &self.points {
+            PointPlace::File(path) => remove_file(path),
+            PointPlace::Folder(folder) => disk::remove_tree(folder).map_err(Error::io("remove", folder)),
+        }
     }
 
     /// Returns the paths of the store's files.
@@ -124,6 +172,14 @@ impl JobDirectory {
     /// As [`Lock::take`].
     pub fn lock(&self) -> Result<Lock> {
         Lock::take(&self.job)
+    }
+
+    /// Shares the lock of the job directory, which must be there, with other tasks of the job.
+    ///
+    /// # Errors
+    /// As [`Lock::share`].
+    pub fn share_lock(&self) -> Result<Lock> {
+        Lock::share(&self.job)
     }
 
     /// Takes the lock, removes everything that an interrupted run left, and makes the folder of the tiles.

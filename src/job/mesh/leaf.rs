@@ -7,7 +7,7 @@ use crate::job::index::TileIndex;
 use crate::job::mesh::final_triangles::{FinalTriangles, TriangleState, find_final};
 use crate::job::mesh::precision_limit::PrecisionLimit;
 use crate::job::mesh::sites::load_sites;
-use crate::job::partition::point_file::PointFile;
+use crate::job::partition::point_file::PointFiles;
 use crate::job::partition::result::Partition;
 use crate::job::plan::job_plan::Plan;
 use crate::job::records::{BorderVertex, Frontier, Leaf, PartialNormals, StepOutput, Store};
@@ -51,7 +51,7 @@ impl AddAssign for LeafStats {
 pub fn triangulate_leaf(
     plan: &Plan,
     partition: &Partition,
-    points: &PointFile,
+    points: &PointFiles,
     store: &Store,
     triangulator: &Triangulator,
     tile: TileIndex,

@@ -4,7 +4,7 @@ use crate::Result;
 use crate::geometry::Bounds;
 use crate::input::Point;
 use crate::input::options::Duplicates;
-use crate::job::partition::point_file::{PointBlock, PointFile};
+use crate::job::partition::point_file::{PointBlock, PointFiles};
 use multiversion::multiversion;
 use std::cmp::Reverse;
 
@@ -13,11 +13,11 @@ use std::cmp::Reverse;
 ///
 /// # Errors
 /// [`crate::Error::Io`] if the point file cannot be read.
-pub fn load_sites(file: &PointFile, blocks: &[PointBlock], rule: Duplicates) -> Result<(Vec<Point>, u64)> {
+pub fn load_sites(files: &PointFiles, blocks: &[PointBlock], rule: Duplicates) -> Result<(Vec<Point>, u64)> {
     let mut points = Vec::with_capacity(blocks.iter().map(|b| b.points as usize).sum::<usize>().min(1 << 20));
     let (mut kept, mut duplicates) = (0, 0);
     for &block in blocks {
-        file.read(block, &mut points)?;
+        files.read(block, &mut points)?;
         if points.len() > (2 * kept).max(1 << 20) {
             duplicates += keep_one(&mut points, rule);
             kept = points.len();

@@ -1,7 +1,7 @@
 //! Collecting points by bucket from many threads: each bucket has a buffer that is written to the point file when it is full.
 
 use crate::input::Point;
-use crate::job::partition::point_file::{PointBlock, PointFile, PointRun};
+use crate::job::partition::point_file::{PointBlock, PointFile, PointFiles, PointRun};
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -22,7 +22,7 @@ impl Bucket {
     ///
     /// # Errors
     /// [`crate::Error::Io`] if its blocks cannot be read or written.
-    pub fn remove_records(&mut self, file: &PointFile, orders: &[Range<u64>]) -> Result<()> {
+    pub fn remove_records(&mut self, files: &PointFiles, orders: &[Range<u64>]) -> Result<()> {
         let is_wanted = |point: &Point| {
             let order = point.order();
             let after = orders.partition_point(|range| range.start <= order);
@@ -31,12 +31,12 @@ impl Bucket {
         let (mut run, mut points) = (PointRun::default(), Vec::new());
         for block in std::mem::take(&mut self.blocks) {
             points.clear();
-            file.read(block, &mut points)?;
+            files.read(block, &mut points)?;
             points.retain(is_wanted);
             match points.len() {
                 0 => {}
                 kept if kept == block.points as usize => self.blocks.push(block),
-                _ => self.blocks.push(file.append(&mut run, &points, false)?),
+                _ => self.blocks.push(files.growing()?.append(&mut run, &points, false)?),
             }
         }
         self.points = self.blocks.iter().map(|block| block.points as u64).sum();
@@ -144,18 +144,19 @@ mod tests {
     #[test]
     fn only_the_points_of_the_given_records_are_removed() {
         let folder = tempfile::tempdir().unwrap();
-        let file = PointFile::create(&folder.path().join("points")).unwrap();
+        let file = PointFile::create(&folder.path().join("points"), 0).unwrap();
         let buckets = Buckets::new(&file, 1, 0);
         let points: Vec<Point> = (0..1000).map(|i| Point::new([i as i32, 0], 0, [0; 3], 0, i)).collect();
         buckets.extend(0, &points).unwrap();
         let mut bucket = buckets.finish().unwrap().remove(0);
-        bucket.remove_records(&file, &[0..1, 64..64, 100..300, 999..2000]).unwrap();
+        let files = PointFiles::open(&[]).unwrap().and(file);
+        bucket.remove_records(&files, &[0..1, 64..64, 100..300, 999..2000]).unwrap();
         let mut left = Vec::new();
-        bucket.blocks.iter().for_each(|&block| file.read(block, &mut left).unwrap());
+        bucket.blocks.iter().for_each(|&block| files.read(block, &mut left).unwrap());
         let orders: Vec<u64> = left.iter().map(Point::order).collect();
         assert_eq!(orders, (1..100).chain(300..999).collect::<Vec<u64>>());
         assert_eq!(bucket.points, 798);
-        bucket.remove_records(&file, &[0..500, 500..1000]).unwrap();
+        bucket.remove_records(&files, &[0..500, 500..1000]).unwrap();
         assert_eq!(bucket, Bucket::default());
     }
 }

@@ -1,151 +1,206 @@
 //! Reading the points of a job of several parts: before a part is done, the inputs that it is the first to need are read whole, and their
-//! points go to the files of all parts that they reach.
+//! points go to the parts that they reach, into a file for each.
+//!
+//! The part that reads inputs is called their **reader**. Its point files have its number, so every file has one writer.
 
+use crate::input::PointCounts;
+use crate::input::options::OnBadFile;
 use crate::job::durable::atomic_file::create_folder;
 use crate::job::durable::columns::{ColumnReader, ColumnWriter};
 use crate::job::durable::directory::JobDirectory;
 use crate::job::index::PartIndex;
 use crate::job::partition::buckets::{Bucket, Buckets};
 use crate::job::partition::parts::Parts;
-use crate::job::partition::point_file::{PointBlock, PointFile};
+use crate::job::partition::point_file::{PointBlock, PointFile, PointFiles};
 use crate::job::partition::read::{JudgedInputs, decode, judge};
 use crate::job::partition::result::{Partition, PointSummary};
 use crate::job::partition::tree_builder::TreeBuilder;
 use crate::job::plan::budget::read_buffer_memory;
 use crate::job::plan::job_plan::Plan;
+use crate::job::plan::text_inputs::{allowed_malformed, stop_at};
 use crate::job::progress::stage::Stage;
 use crate::job::records::{RecordRef, StepRecord, Store};
 use crate::{Error, Result};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
-/// What the inputs that one part needs first held.
-#[derive(Debug, Default)]
-pub struct ReadBatch {
-    /// The blocks that were written, each with the number of its bucket.
-    pub blocks: Vec<(u32, PointBlock)>,
-    /// Sums over these inputs.
-    pub summary: PointSummary,
+/// What a reader found for one part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PointsForPart {
+    /// The part.
+    pub part: PartIndex,
+    /// The number of blocks.
+    blocks: u64,
+    /// Their bytes.
+    pub bytes: u64,
 }
 
-impl ReadBatch {
-    /// Writes the record of the batch that `part` needs.
+/// What the inputs of a reader held.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct ReadInputs {
+    /// Sums over these inputs.
+    pub summary: PointSummary,
+    /// What was found for each part that has points in them, by part.
+    pub by_part: Vec<PointsForPart>,
+    /// The first input that has malformed records, and what it held.
+    malformed: Option<(usize, PointCounts)>,
+}
+
+/// The blocks that a reader has written, each with the number of its bucket, by part.
+#[derive(Debug, Default)]
+pub struct ReadBlocks {
+    buckets: Vec<u32>,
+    blocks: Vec<PointBlock>,
+}
+
+impl ReadBlocks {
+    /// Writes the record of `reader`.
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn save(&self, store: &Store, part: PartIndex) -> Result<RecordRef> {
-        let summary = serde_json::to_vec(&self.summary);
-        let summary = summary.map_err(|e| Error::Broken(format!("what was read cannot be written down: {e}")))?;
-        let (buckets, blocks): (Vec<u32>, Vec<PointBlock>) = self.blocks.iter().copied().unzip();
-        ColumnWriter::default().push(&summary).push(&buckets).push(&blocks).write(store, StepRecord::Read(part))
-    }
-
-    /// Reads the record of the batch that `part` needs.
-    ///
-    /// # Errors
-    /// [`Error::Io`], or [`Error::Broken`] if there is none.
-    pub fn load(store: &Store, part: PartIndex) -> Result<ReadBatch> {
-        let key = StepRecord::Read(part);
-        let mut columns = ColumnReader::open(store, key)?;
-        let broken = |e: serde_json::Error| Error::Broken(format!("{}: {e}", store.path(key).display()));
-        let summary = serde_json::from_slice(&columns.column::<u8>()?).map_err(broken)?;
-        let (buckets, blocks) = (columns.column::<u32>()?, columns.column::<PointBlock>()?);
-        Ok(ReadBatch { blocks: buckets.iter().copied().zip(blocks.iter().copied()).collect(), summary })
+    pub fn save(&self, store: &Store, reader: PartIndex) -> Result<RecordRef> {
+        ColumnWriter::default().push(&self.buckets).push(&self.blocks).write(store, StepRecord::Read(reader))
     }
 }
 
-/// The points of all parts, as far as they have been read.
-pub struct PartPoints<'a> {
+/// Reads the inputs that `reader` is the first to need, where `malformed` records were found before. With `sync` it waits for the disk.
+///
+/// # Errors
+/// [`Error::NeedsOnePart`] if a header is wrong or an input is bad and to be left out; [`Error::Input`] if too many records are
+/// malformed; [`Error::Io`] if an input cannot be read or a point file cannot be written.
+pub fn read_inputs(
+    plan: &Plan,
+    parts: &Parts,
+    directory: &JobDirectory,
+    reader: PartIndex,
+    malformed: u64,
+    sync: bool,
+    stage: &Stage,
+) -> Result<(ReadInputs, ReadBlocks)> {
+    let inputs = parts.new_inputs(reader);
+    let files = parts.all().map(|part| create(parts, directory, reader, part)).collect::<Result<Vec<_>>>()?;
+    let file_of = |bucket: usize| files[parts.part_of(bucket).get()].as_ref();
+    let buckets = Buckets::on((0..parts.grid.buckets()).map(file_of).collect(), read_buffer_memory(&plan.options));
+    let by_input = decode(plan, inputs.iter().copied(), malformed, &parts.grid, &buckets, stage)?;
+    let buckets = buckets.finish()?;
+    let bad = by_input.0.iter().find(|(_, summary)| summary.counts.malformed > 0);
+    let malformed = bad.map(|(input, summary)| (*input, summary.counts.clone()));
+    let JudgedInputs { summary, skipped, .. } = judge(plan, by_input);
+    let broken = |bounds| plan.claims.is_some_and(|claims| claims.are_broken_by(bounds, summary.counts.max_rgb));
+    if !skipped.is_empty() || summary.bounds.is_some_and(broken) {
+        return Err(Error::NeedsOnePart);
+    }
+    if sync {
+        files.iter().flatten().try_for_each(PointFile::sync)?;
+    }
+    let (mut by_part, mut read) = (Vec::new(), ReadBlocks::default());
+    for part in parts.all() {
+        let before = read.blocks.len();
+        for bucket in parts.buckets_of(part) {
+            read.blocks.extend(&buckets[bucket].blocks);
+            read.buckets.resize(read.blocks.len(), bucket as u32);
+        }
+        let blocks = &read.blocks[before..];
+        if !blocks.is_empty() {
+            let bytes = blocks.iter().map(PointBlock::bytes).sum();
+            by_part.push(PointsForPart { part, blocks: blocks.len() as u64, bytes });
+        }
+    }
+    Ok((ReadInputs { summary, by_part, malformed }, read))
+}
+
+/// Makes the reader's point file for `part` if one of its inputs reaches it.
+fn create(parts: &Parts, directory: &JobDirectory, reader: PartIndex, part: PartIndex) -> Result<Option<PointFile>> {
+    if !parts.new_inputs(reader).iter().any(|&input| parts.reaches(input, part)) {
+        return Ok(None);
+    }
+    let directory = directory.part(part);
+    create_folder(&directory.points())?;
+    PointFile::create(&directory.point_file(reader.0 as u16), reader.0 as u16).map(Some)
+}
+
+/// Checks that all inputs together have no more malformed records than they may. Each reader knows only its own.
+///
+/// # Errors
+/// [`Error::Input`] names the first file with such records.
+pub fn check_malformed<'a>(plan: &Plan, read: impl Iterator<Item = &'a ReadInputs> + Clone) -> Result<()> {
+    let malformed = read.clone().map(|inputs| inputs.summary.counts.malformed).sum();
+    let first = read.filter_map(|inputs| inputs.malformed.as_ref()).next();
+    match first {
+        // Where bad files are left out, each is judged by itself.
+        Some((input, counts))
+            if plan.options.input.on_bad_file == OnBadFile::Stop
+                && malformed > allowed_malformed(plan.options.input.max_malformed_fraction.0, plan.records) =>
+        {
+            Err(stop_at(&plan.inputs[*input].source, counts, malformed, plan.records))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The points of a part, which all of its readers have found.
+pub struct PointsOfPart<'a> {
     plan: &'a Plan,
     parts: &'a Parts,
-    blocks: Vec<Vec<PointBlock>>,
-    /// What has been read.
-    pub summary: PointSummary,
+    part: PartIndex,
+    /// The blocks, each with the number of its bucket.
+    blocks: Vec<(u32, PointBlock)>,
 }
 
-impl<'a> PartPoints<'a> {
-    /// Returns the state before anything has been read.
-    pub fn new(plan: &'a Plan, parts: &'a Parts) -> PartPoints<'a> {
-        PartPoints { plan, parts, blocks: vec![Vec::new(); parts.grid.buckets()], summary: PointSummary::default() }
+impl<'a> PointsOfPart<'a> {
+    /// Returns no points of `part`.
+    pub fn none(plan: &'a Plan, parts: &'a Parts, part: PartIndex) -> PointsOfPart<'a> {
+        PointsOfPart { plan, parts, part, blocks: Vec::new() }
     }
 
-    /// Reads the inputs that `part` is the first to need, where parts before it are done. With `sync` it waits for the disk.
+    /// Adds what `reader` has found for the part, with the store of the reader.
     ///
     /// # Errors
-    /// [`Error::NeedsOnePart`] if a header is wrong or an input is bad and to be left out; [`Error::Input`] if too many records are
-    /// malformed; [`Error::Io`] if an input cannot be read or a point file cannot be written.
-    pub fn read(&self, directory: &JobDirectory, part: PartIndex, sync: bool, stage: &Stage) -> Result<ReadBatch> {
-        let (plan, parts) = (self.plan, self.parts);
-        let inputs = parts.new_inputs(part);
-        create_folder(&directory.points_by_part())?;
-        let files: Vec<Option<PointFile>> =
-            parts.all().map(|p| self.open(directory, part, p, inputs)).collect::<Result<_>>()?;
-        let file_of = |bucket: usize| files[parts.part_of(bucket).get()].as_ref();
-        let buckets = Buckets::on((0..parts.grid.buckets()).map(file_of).collect(), read_buffer_memory(&plan.options));
-        let malformed = self.summary.counts.malformed;
-        let by_input = decode(plan, inputs.iter().copied(), malformed, &parts.grid, &buckets, stage)?;
-        let buckets = buckets.finish()?;
-        let JudgedInputs { summary, skipped, .. } = judge(plan, by_input);
-        let broken = |bounds| plan.claims.is_some_and(|claims| claims.are_broken_by(bounds, summary.counts.max_rgb));
-        if !skipped.is_empty() || summary.bounds.is_some_and(broken) {
-            return Err(Error::NeedsOnePart);
-        }
-        if sync {
-            files.iter().flatten().try_for_each(PointFile::sync)?;
-        }
-        let blocks =
-            (0..).zip(buckets).flat_map(|(index, bucket)| bucket.blocks.into_iter().map(move |block| (index, block)));
-        Ok(ReadBatch { blocks: blocks.collect(), summary })
+    /// [`Error::Io`] or [`Error::Broken`] on the store.
+    pub fn add(&mut self, reader: PartIndex, store: &Store, read: &ReadInputs) -> Result<()> {
+        let mut first = 0;
+        let own = read.by_part.iter().find(|found| {
+            let is_own = found.part == self.part;
+            first += if is_own { 0 } else { found.blocks as usize };
+            is_own
+        });
+        let Some(own) = own else { return Ok(()) };
+        let key = StepRecord::Read(reader);
+        let buckets = ColumnReader::open(store, key)?.column_part::<u32>(first, own.blocks as usize)?;
+        let mut columns = ColumnReader::open(store, key)?;
+        columns.skip_column::<u32>()?;
+        let blocks = columns.column_part::<PointBlock>(first, own.blocks as usize)?;
+        self.blocks.extend(buckets.iter().copied().zip(blocks.iter().copied()));
+        Ok(())
     }
 
-    /// Opens the file of `other` if it is not done before `part` and one of `inputs` reaches it.
-    fn open(
-        &self,
-        directory: &JobDirectory,
-        part: PartIndex,
-        other: PartIndex,
-        inputs: &[usize],
-    ) -> Result<Option<PointFile>> {
-        if other < part || !inputs.iter().any(|&input| self.parts.reaches(input, other)) {
-            return Ok(None);
-        }
-        PointFile::append_to(&directory.part(other).points(), self.blocks_of(other)).map(Some)
+    /// Tells whether the files of the part in `directory` hold what was written to them.
+    pub fn are_whole(&self, directory: &JobDirectory) -> bool {
+        let files = directory.point_files().and_then(|files| PointFiles::open(&files));
+        self.blocks.is_empty()
+            || files.is_ok_and(|files| self.blocks.par_iter().all(|(_, block)| files.is_whole(*block)))
     }
 
-    fn blocks_of(&self, part: PartIndex) -> impl Iterator<Item = &PointBlock> {
-        self.parts.buckets_of(part).flat_map(|bucket| &self.blocks[bucket])
-    }
-
-    /// Tells whether the file of `part` holds what was written to it.
-    pub fn are_whole(&self, directory: &JobDirectory, part: PartIndex) -> bool {
-        let blocks: Vec<PointBlock> = self.blocks_of(part).copied().collect();
-        let file = PointFile::open(&directory.part(part).points());
-        blocks.is_empty() || file.is_ok_and(|file| blocks.par_iter().all(|&block| file.is_whole(block)))
-    }
-
-    /// Returns the bytes of the points of `part`.
-    pub fn bytes(&self, part: PartIndex) -> u64 {
-        self.blocks_of(part).map(PointBlock::bytes).sum()
-    }
-
-    /// Adds what has been read.
-    pub fn add(&mut self, batch: ReadBatch) {
-        batch.blocks.into_iter().for_each(|(bucket, block)| self.blocks[bucket as usize].push(block));
-        self.summary += batch.summary;
-    }
-
-    /// Cuts `part`, whose points have all been read, into tiles.
+    /// Cuts the part into tiles. `directory` is that of the part.
     ///
     /// # Errors
-    /// [`Error::Io`] on its point file, [`Error::Config`] if it would have too many tiles.
-    pub fn partition(&self, directory: &JobDirectory, part: PartIndex) -> Result<Partition> {
-        let (plan, parts) = (self.plan, self.parts);
-        let file = PointFile::append_to(&directory.part(part).points(), self.blocks_of(part))?;
+    /// [`Error::Io`] on its point files, [`Error::Config`] if it would have too many tiles.
+    pub fn partition(self, directory: &JobDirectory) -> Result<Partition> {
+        let PointsOfPart { plan, parts, part, .. } = self;
+        // Crowded buckets are divided again into a file that no reader writes.
+        let own = parts.all().len() as u16;
+        let mut found = directory.point_files()?;
+        found.retain(|(number, _)| *number != own);
+        create_folder(&directory.points())?;
+        let files = PointFiles::open(&found)?.and(PointFile::create(&directory.point_file(own), own)?);
         let max_points_per_tile = plan.options.triangulation.max_points_per_tile.0;
-        let mut builder = TreeBuilder::repeatable(&file, max_points_per_tile, read_buffer_memory(&plan.options));
+        let mut builder = TreeBuilder::repeatable(&files, max_points_per_tile, read_buffer_memory(&plan.options));
+        let read_bytes: u64 = self.blocks.iter().map(|(_, block)| block.bytes()).sum();
         let mut buckets = vec![Bucket::default(); parts.grid.buckets()];
-        for bucket in parts.buckets_of(part) {
-            let blocks = self.blocks[bucket].clone();
-            buckets[bucket] = Bucket { points: blocks.iter().map(|block| u64::from(block.points)).sum(), blocks };
+        for (index, block) in self.blocks {
+            let bucket = &mut buckets[index as usize];
+            bucket.points += u64::from(block.points);
+            bucket.blocks.push(block);
         }
         let mut summary = PointSummary::default();
         summary.counts.kept = buckets.iter().map(|bucket| bucket.points).sum();
@@ -160,6 +215,7 @@ impl<'a> PartPoints<'a> {
                 PartIndex::STRIDE / 2
             )));
         }
-        Ok(Partition { tree, blocks, summary, point_bytes: file.bytes(), skipped: Vec::new() })
+        let point_bytes = read_bytes + files.growing()?.bytes();
+        Ok(Partition { tree, blocks, summary, point_bytes, skipped: Vec::new() })
     }
 }

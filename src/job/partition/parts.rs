@@ -21,6 +21,8 @@ pub struct Parts {
     reach: Vec<GridSpan>,
     /// The inputs that each part is the first to need.
     new_inputs: Vec<Vec<usize>>,
+    /// How many points each part is expected to have.
+    expected: Vec<u64>,
 }
 
 impl Parts {
@@ -33,7 +35,8 @@ impl Parts {
         let mut cutter =
             PartCutter { tree: Tree::default(), spans: Vec::new(), sums: expected_points(&grid, &plan.inputs), most };
         cutter.cut(Cell::PLANE, None, grid.span());
-        let PartCutter { mut tree, spans, .. } = cutter;
+        let PartCutter { mut tree, spans, sums, .. } = cutter;
+        let expected = spans.iter().map(|&span| sums.points(span)).collect();
         // The nodes above the parts have numbers of their own.
         tree.part = PartIndex::new(spans.len());
         let mut part_of = vec![PartIndex::FIRST; grid.buckets()];
@@ -46,7 +49,7 @@ impl Parts {
             let first = spans.iter().position(|span| reach.meets(*span)).unwrap_or(0);
             new_inputs[first].push(input);
         }
-        Parts { grid, tree, spans, part_of, reach, new_inputs }
+        Parts { grid, tree, spans, part_of, reach, new_inputs, expected }
     }
 
     /// Returns all parts in the order in which they are done.
@@ -77,6 +80,18 @@ impl Parts {
     /// Tells whether an input may have points in `part`.
     pub fn reaches(&self, input: usize, part: PartIndex) -> bool {
         self.reach[input].meets(self.span(part))
+    }
+
+    /// Returns the parts that read inputs which may have points in `part`.
+    pub fn readers_of(&self, part: PartIndex) -> impl Iterator<Item = PartIndex> {
+        // Later parts are the first to need only inputs that do not reach this one.
+        let reaches = move |reader: &PartIndex| self.new_inputs(*reader).iter().any(|&input| self.reaches(input, part));
+        self.all().take(part.get() + 1).filter(reaches)
+    }
+
+    /// Returns how many points `part` is expected to have.
+    pub fn expected_points(&self, part: PartIndex) -> u64 {
+        self.expected[part.get()]
     }
 
     /// Returns the part that a bucket belongs to.

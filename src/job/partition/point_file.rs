@@ -1,4 +1,5 @@
-//! The point file: the points between reading and triangulating, packed in blocks that each hold points of one bucket.
+//! Point files: the points between reading and triangulating, packed in blocks that each hold points of one bucket. A job of one part has
+//! one of them. A part of several has one from each reader that finds points for it, so that every file has one writer.
 //!
 //! A bucket appends its blocks to **runs** of whole pages that it shares with no other. So the points of a tile can be given back to
 //! the disk while others are still needed.
@@ -9,6 +10,7 @@ use crate::job::durable::packing::{pack, unpack};
 use crate::job::durable::store::PAGE;
 use crate::{Error, Result, disk, fault};
 use bytemuck::{Pod, Zeroable};
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, ErrorKind};
 use std::ops::Range;
@@ -19,7 +21,7 @@ use xxhash_rust::xxh3::xxh3_64;
 /// Bytes of a run where more blocks will follow. What is left of it takes no room on the disk.
 const RUN: u64 = 64 << 10;
 
-/// Some points of one bucket in the point file.
+/// Some points of one bucket in a point file.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 pub struct PointBlock {
@@ -30,7 +32,9 @@ pub struct PointBlock {
     /// The number of bytes.
     bytes: u32,
     /// The number of points.
-    pub points: u32,
+    pub points: u16,
+    /// The number of the point file.
+    file: u16,
 }
 
 impl PointBlock {
@@ -44,10 +48,18 @@ impl PointBlock {
     }
 }
 
-/// Returns the pages of `blocks`, which are all those of one or more buckets, in as few ranges as possible.
-pub fn pages_of(blocks: &[PointBlock]) -> Vec<Range<u64>> {
-    let pages = |block: &PointBlock| block.at / PAGE * PAGE..block.range().end.next_multiple_of(PAGE);
-    let mut pages: Vec<Range<u64>> = blocks.iter().map(pages).collect();
+/// Returns the pages of `blocks`, which are all those of one or more buckets, by the number of their file, in as few ranges as possible.
+pub fn pages_of(blocks: &[PointBlock]) -> BTreeMap<u16, Vec<Range<u64>>> {
+    let mut files: BTreeMap<u16, Vec<Range<u64>>> = BTreeMap::new();
+    for block in blocks {
+        let pages = block.at / PAGE * PAGE..block.range().end.next_multiple_of(PAGE);
+        files.entry(block.file).or_default().push(pages);
+    }
+    files.into_iter().map(|(file, pages)| (file, joined(pages))).collect()
+}
+
+/// Joins ranges that touch.
+fn joined(mut pages: Vec<Range<u64>>) -> Vec<Range<u64>> {
     pages.sort_unstable_by_key(|range| range.start);
     pages.dedup_by(|next, range| {
         let continues = next.start <= range.end;
@@ -63,8 +75,9 @@ pub fn pages_of(blocks: &[PointBlock]) -> Vec<Range<u64>> {
 #[derive(Debug, Default)]
 pub struct PointRun(Range<u64>);
 
-/// The point file. It only grows; several threads append blocks to it in any order.
+/// A point file. It only grows; several threads append blocks to it in any order.
 pub struct PointFile {
+    number: u16,
     path: PathBuf,
     file: File,
     /// The map of a finished file; of a growing one, blocks are mapped one by one.
@@ -76,27 +89,13 @@ pub struct PointFile {
 }
 
 impl PointFile {
-    /// Creates an empty point file at `path`.
+    /// Creates the empty point file with this `number` at `path`.
     ///
     /// # Errors
     /// [`Error::Io`] if it cannot be made.
-    pub fn create(path: &Path) -> Result<PointFile> {
+    pub fn create(path: &Path, number: u16) -> Result<PointFile> {
         let file = disk::create(path).map_err(Error::io("create", path))?;
-        Ok(PointFile::new(path, file, MappedFile::default()))
-    }
-
-    /// Opens the point file at `path`, which holds `blocks`, or makes one. New blocks follow them.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if it cannot be opened or made.
-    pub fn append_to<'a>(path: &Path, blocks: impl Iterator<Item = &'a PointBlock>) -> Result<PointFile> {
-        let file = disk::open_or_create(path).map_err(Error::io("open", path))?;
-        let own = PointFile::new(path, file, MappedFile::default());
-        for block in blocks {
-            own.end.fetch_max(block.range().end.next_multiple_of(PAGE), Ordering::Relaxed);
-            own.bytes.fetch_add(block.bytes(), Ordering::Relaxed);
-        }
-        Ok(own)
+        Ok(PointFile::new(path, number, file, MappedFile::default()))
     }
 
     /// Waits until all blocks are on the disk.
@@ -107,18 +106,15 @@ impl PointFile {
         disk::sync_data(&self.file).map_err(Error::io("write", &self.path))
     }
 
-    /// Opens the finished point file at `path` for reading.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if it cannot be opened.
-    pub fn open(path: &Path) -> Result<PointFile> {
+    /// Opens the finished point file with this `number` at `path` for reading.
+    fn open(path: &Path, number: u16) -> Result<PointFile> {
         let file = File::open(path).map_err(Error::io("open", path))?;
         let map = MappedFile::new(&file);
-        Ok(PointFile::new(path, file, map))
+        Ok(PointFile::new(path, number, file, map))
     }
 
-    fn new(path: &Path, file: File, map: MappedFile) -> PointFile {
-        PointFile { path: path.to_path_buf(), file, map, end: AtomicU64::new(0), bytes: AtomicU64::new(0) }
+    fn new(path: &Path, number: u16, file: File, map: MappedFile) -> PointFile {
+        PointFile { number, path: path.to_path_buf(), file, map, end: AtomicU64::new(0), bytes: AtomicU64::new(0) }
     }
 
     /// Returns the number of bytes in all blocks that were not freed.
@@ -143,15 +139,17 @@ impl PointFile {
         disk::write_all_at(&self.file, &packed, at).map_err(Error::io("write", &self.path))?;
         run.0.start += bytes;
         self.bytes.fetch_add(bytes, Ordering::Relaxed);
-        Ok(PointBlock { at, hash: xxh3_64(&packed), bytes: bytes as u32, points: points.len() as u32 })
+        let (bytes, file) = (bytes as u32, self.number);
+        Ok(PointBlock { at, hash: xxh3_64(&packed), bytes, points: points.len() as u16, file })
     }
 
-    /// Gives the room of `blocks` back to the disk: all those of one or more buckets.
+    /// Gives the room of `blocks` of this file back to the disk: all those of one or more buckets.
     ///
     /// # Errors
     /// [`Error::Io`] if that fails.
     pub fn free(&self, blocks: &[PointBlock]) -> Result<()> {
-        let freed = disk::free(&self.file, &pages_of(blocks)).map_err(Error::io("write", &self.path))?;
+        let pages = pages_of(blocks).remove(&self.number).unwrap_or_default();
+        let freed = disk::free(&self.file, &pages).map_err(Error::io("write", &self.path))?;
         if freed > 0 {
             self.bytes.fetch_sub(blocks.iter().map(|block| block.bytes as u64).sum(), Ordering::Relaxed);
         }
@@ -180,6 +178,53 @@ impl PointFile {
     }
 }
 
+/// The point files of a part, by their numbers. The last of them may grow.
+pub struct PointFiles(Vec<PointFile>);
+
+impl PointFiles {
+    /// Opens finished files for reading, given as their numbers and paths.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if one cannot be opened.
+    pub fn open(paths: &[(u16, PathBuf)]) -> Result<PointFiles> {
+        let open = |(number, path): &(u16, PathBuf)| PointFile::open(path, *number);
+        paths.iter().map(open).collect::<Result<_>>().map(PointFiles)
+    }
+
+    /// Adds a file.
+    #[must_use]
+    pub fn and(mut self, file: PointFile) -> PointFiles {
+        self.0.push(file);
+        self
+    }
+
+    /// Returns the file that may grow.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] if there is none.
+    pub fn growing(&self) -> Result<&PointFile> {
+        self.0.last().ok_or_else(|| Error::Broken("there is no point file to write to".into()))
+    }
+
+    /// Tells whether `block` holds what was written to it.
+    pub fn is_whole(&self, block: PointBlock) -> bool {
+        self.of(block).is_ok_and(|file| file.is_whole(block))
+    }
+
+    /// Appends the points of `block` to `points`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if they cannot be read, [`Error::Broken`] if their file is gone.
+    pub fn read(&self, block: PointBlock, points: &mut Vec<Point>) -> Result<()> {
+        self.of(block)?.read(block, points)
+    }
+
+    fn of(&self, block: PointBlock) -> Result<&PointFile> {
+        let file = self.0.iter().find(|file| file.number == block.file);
+        file.ok_or_else(|| Error::Broken(format!("point file {} is gone", block.file)))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -190,7 +235,7 @@ mod tests {
 
     fn file() -> (tempfile::TempDir, PointFile) {
         let folder = tempfile::tempdir().unwrap();
-        let file = PointFile::create(&folder.path().join("points")).unwrap();
+        let file = PointFile::create(&folder.path().join("points"), 0).unwrap();
         (folder, file)
     }
 
@@ -247,7 +292,8 @@ mod tests {
             let block = file.append(&mut runs[bucket], &points(50 + turn as u32 * 3, point), turn > 180).unwrap();
             blocks[bucket].push(block);
         }
-        let mut pages: Vec<Range<u64>> = blocks.iter().flat_map(|blocks| pages_of(blocks)).collect();
+        let mut pages: Vec<Range<u64>> =
+            blocks.iter().flat_map(|blocks| pages_of(blocks).remove(&0).unwrap()).collect();
         pages.sort_unstable_by_key(|range| range.start);
         assert!(pages.windows(2).all(|two| two[0].end <= two[1].start), "{pages:?}");
         file.free(&blocks[2]).unwrap();
@@ -256,5 +302,28 @@ mod tests {
             assert_eq!(is_whole, bucket != 2 || cfg!(not(target_os = "linux")), "{bucket}");
         }
         assert!(file.bytes() < blocks.concat().iter().map(|block| block.bytes as u64).sum());
+    }
+
+    #[test]
+    fn blocks_are_found_in_their_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |number: u16| folder.path().join(number.to_string());
+        let write = |number: u16| {
+            let file = PointFile::create(&path(number), number).unwrap();
+            let points = points(100, |i| Point::new([i as i32, number as i32], 0, [0; 3], 0, i as u64));
+            (file.append(&mut PointRun::default(), &points, true).unwrap(), points)
+        };
+        let written: Vec<_> = [7, 3, 2000].map(write).into();
+        let files = PointFiles::open(&[(3, path(3)), (7, path(7))]).unwrap();
+        for (block, expected) in &written[..2] {
+            let mut found = Vec::new();
+            files.read(*block, &mut found).unwrap();
+            assert_eq!(found, *expected);
+        }
+        assert!(!files.is_whole(written[2].0) && files.read(written[2].0, &mut Vec::new()).is_err());
+        let files = files.and(PointFile::open(&path(2000), 2000).unwrap());
+        assert!(written.iter().all(|(block, _)| files.is_whole(*block)));
+        let pages = pages_of(&written.iter().map(|(block, _)| *block).collect::<Vec<_>>());
+        assert_eq!(pages.keys().copied().collect::<Vec<_>>(), [3, 7, 2000]);
     }
 }

@@ -6,7 +6,7 @@ use crate::job::index::PartIndex;
 use crate::job::partition::bucket_sorter::BucketSorter;
 use crate::job::partition::buckets::Buckets;
 use crate::job::partition::grid::Grid;
-use crate::job::partition::point_file::PointFile;
+use crate::job::partition::point_file::{PointFile, PointFiles};
 use crate::job::partition::result::{Partition, PointSummary};
 use crate::job::partition::tree::Cell;
 use crate::job::partition::tree_builder::{TreeBuilder, wanted_buckets};
@@ -25,18 +25,19 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// [`crate::Error::Input`] if too many records are malformed and bad files must not be left out, [`crate::Error::Io`] if an input cannot be
 /// read or the point file cannot be written.
 pub fn read_points(plan: &Plan, directory: &JobDirectory, stage: &Stage) -> Result<Partition> {
-    let file = PointFile::create(&directory.points())?;
+    let files = PointFiles::open(&[])?.and(PointFile::create(&directory.point_file(0), 0)?);
+    let file = files.growing()?;
     let max_points_per_tile = plan.options.triangulation.max_points_per_tile.0;
     let memory = read_buffer_memory(&plan.options);
     let grid = Grid::over(plan.extent, wanted_buckets(plan.records, max_points_per_tile));
-    let buckets = Buckets::new(&file, grid.buckets(), memory);
+    let buckets = Buckets::new(file, grid.buckets(), memory);
     let by_input = decode(plan, 0..plan.inputs.len(), 0, &grid, &buckets, stage)?;
     let mut buckets = buckets.finish()?;
     let JudgedInputs { summary, skipped, orders } = judge(plan, by_input);
     if !orders.is_empty() {
-        buckets.par_iter_mut().try_for_each(|bucket| bucket.remove_records(&file, &orders))?;
+        buckets.par_iter_mut().try_for_each(|bucket| bucket.remove_records(&files, &orders))?;
     }
-    let mut builder = TreeBuilder::new(&file, max_points_per_tile, memory);
+    let mut builder = TreeBuilder::new(&files, max_points_per_tile, memory);
     if summary.counts.kept > 0 {
         builder.grow_root(PartIndex::FIRST, Cell::PLANE, &grid, grid.span(), buckets)?;
     }
@@ -73,7 +74,7 @@ pub(crate) fn judge(plan: &Plan, by_input: ByInput) -> JudgedInputs {
 
 /// What each input held, in the order of the inputs. Inputs without chunks are not listed.
 #[derive(Default)]
-pub(crate) struct ByInput(Vec<(usize, PointSummary)>);
+pub(crate) struct ByInput(pub(crate) Vec<(usize, PointSummary)>);
 
 impl ByInput {
     /// Adds what later chunks held.

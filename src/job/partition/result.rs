@@ -18,11 +18,11 @@ use std::ops::AddAssign;
 pub struct Partition {
     /// The tree over all points.
     pub tree: Tree,
-    /// Where the point file holds the points of each tile.
+    /// Where the point files hold the points of each tile.
     pub blocks: Vec<Vec<PointBlock>>,
     /// What was read.
     pub summary: PointSummary,
-    /// The size of the point file in bytes.
+    /// The size of the point files in bytes.
     pub point_bytes: u64,
     /// The inputs that proved bad while they were read and are left out. No other figure here counts them.
     pub skipped: Vec<SkippedInput>,
@@ -50,9 +50,9 @@ impl Partition {
         self.blocks[tile.get()].iter().map(|block| block.points as u64).sum()
     }
 
-    /// Returns the bytes that the points of `tile` take in the point file.
+    /// Returns the bytes that the points of `tile` take in the point files.
     pub(crate) fn points_bytes(&self, tile: TileIndex) -> u64 {
-        pages_of(&self.blocks[tile.get()]).iter().map(|pages| pages.end - pages.start).sum()
+        pages_of(&self.blocks[tile.get()]).values().flatten().map(|pages| pages.end - pages.start).sum()
     }
 
     /// Calls the inputs what they are called by now.

@@ -5,7 +5,7 @@ use crate::job::index::{NodeIndex, PartIndex};
 use crate::job::partition::bucket_sorter::BucketSorter;
 use crate::job::partition::buckets::{Bucket, Buckets};
 use crate::job::partition::grid::{Grid, GridSpan, GridSums};
-use crate::job::partition::point_file::{PointBlock, PointFile};
+use crate::job::partition::point_file::{PointBlock, PointFiles};
 use crate::job::partition::tree::{Cell, NodeKind, Tree, TreeNode};
 use crate::{Result, interrupt};
 use rayon::prelude::*;
@@ -27,7 +27,7 @@ pub fn buffer_bytes(points: u64, max_points_per_tile: u64, memory: u64) -> u64 {
 
 /// Grows the tree.
 pub(crate) struct TreeBuilder<'a> {
-    file: &'a PointFile,
+    files: &'a PointFiles,
     max_points_per_tile: u64,
     /// Bytes for buffers.
     memory: u64,
@@ -38,9 +38,9 @@ pub(crate) struct TreeBuilder<'a> {
 }
 
 impl<'a> TreeBuilder<'a> {
-    pub(crate) fn new(file: &'a PointFile, max_points_per_tile: u64, memory: u64) -> TreeBuilder<'a> {
+    pub(crate) fn new(files: &'a PointFiles, max_points_per_tile: u64, memory: u64) -> TreeBuilder<'a> {
         TreeBuilder {
-            file,
+            files,
             max_points_per_tile,
             memory,
             keeps_crowded: false,
@@ -50,8 +50,8 @@ impl<'a> TreeBuilder<'a> {
     }
 
     /// As [`TreeBuilder::new`], but the points of crowded buckets stay, so that the tree can be grown again after an interruption.
-    pub(crate) fn repeatable(file: &'a PointFile, max_points_per_tile: u64, memory: u64) -> TreeBuilder<'a> {
-        TreeBuilder { keeps_crowded: true, ..TreeBuilder::new(file, max_points_per_tile, memory) }
+    pub(crate) fn repeatable(files: &'a PointFiles, max_points_per_tile: u64, memory: u64) -> TreeBuilder<'a> {
+        TreeBuilder { keeps_crowded: true, ..TreeBuilder::new(files, max_points_per_tile, memory) }
     }
 
     /// Grows the tree of `part`, which decides `cell`, over the buckets in `span` of `grid`.
@@ -115,17 +115,18 @@ impl<'a> TreeBuilder<'a> {
         let Some(bounds) = bounds.filter(|bounds| bounds.min != bounds.max) else {
             return Ok(self.add_leaf(cell, parent, bucket));
         };
+        let file = self.files.growing()?;
         let grid = Grid::over(bounds, wanted_buckets(bucket.points, self.max_points_per_tile));
-        let finer = Buckets::new(self.file, grid.buckets(), self.memory);
+        let finer = Buckets::new(file, grid.buckets(), self.memory);
         bucket.blocks.par_iter().try_for_each(|&block| {
             interrupt::check()?;
             let mut points = Vec::new();
-            self.file.read(block, &mut points)?;
+            self.files.read(block, &mut points)?;
             BucketSorter::new(&grid, &finer).add(&points)
         })?;
         let finer = finer.finish()?;
         if !self.keeps_crowded {
-            self.file.free(&bucket.blocks)?;
+            file.free(&bucket.blocks)?;
         }
         self.grow(cell, parent, &grid, finer)
     }
@@ -134,7 +135,7 @@ impl<'a> TreeBuilder<'a> {
     fn bounds(&self, blocks: &[PointBlock]) -> Result<Option<Bounds<2>>> {
         let of_block = |&block: &PointBlock| {
             let mut points = Vec::new();
-            self.file.read(block, &mut points)?;
+            self.files.read(block, &mut points)?;
             Ok(Bounds::of_points(points.iter().map(|p| p.position)))
         };
         let union = |a: Option<Bounds<2>>, b| Ok(a.into_iter().chain(b).reduce(Bounds::union));

@@ -9,6 +9,7 @@ use crate::output::options::ColorChoice;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
+use std::path::{Path, PathBuf};
 
 /// The first line of a job's journal.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -24,7 +25,7 @@ pub struct JobHeader {
 
 /// Version of the records in the store, of the plan, of the names of results, and of which nodes merge. It changes with every change of these, so that no
 /// run misreads what another version left.
-pub(crate) const LAYOUT: u32 = 9;
+pub(crate) const LAYOUT: u32 = 10;
 
 /// What the results of a job depend on.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -58,7 +59,10 @@ impl Fingerprint {
     /// # Errors
     /// [`Error::Config`] if there are no inputs, [`Error::Io`] if one cannot be read.
     pub fn of(options: &JobOptions) -> Result<Fingerprint> {
-        let paths = input_paths(&options.input)?;
+        Fingerprint::of_files(options, InputIdentities::of(&input_paths(&options.input)?)?)
+    }
+
+    fn of_files(options: &JobOptions, files: InputIdentities) -> Result<Fingerprint> {
         let order = if cfg!(target_endian = "little") { "little-endian" } else { "big-endian" };
         let mut mesh = named_values(&options.input, "input", &["files"])?;
         mesh.extend(named_values(&options.triangulation, "triangulation", &["backend"])?);
@@ -70,8 +74,35 @@ impl Fingerprint {
             mesh,
             style: named_values(&options.output, "output", &["directory"])?,
             memory: options.limits.memory.0,
-            files: InputIdentities::of(&paths)?,
+            files,
         })
+    }
+
+    /// Returns what has changed in the program and the options since this fingerprint was made. It looks at no input.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] if the options cannot be written down.
+    pub(crate) fn changed_options(&self, options: &JobOptions) -> Result<Option<String>> {
+        let now = Fingerprint::of_files(options, InputIdentities::default())?;
+        let same_files = Fingerprint { files: InputIdentities::default(), ..self.clone() };
+        Ok(match now.since(&same_files) {
+            JobChange::Nothing if now.memory == self.memory => None,
+            JobChange::Nothing => Some("[limits] memory".into()),
+            JobChange::Style(what) | JobChange::Mesh(what) => Some(what),
+        })
+    }
+
+    /// Returns the present names of the inputs at `paths`, which are those that the options name now; `None` if they are other files.
+    pub(crate) fn present_names(&self, paths: &[PathBuf]) -> Option<RenamedInputs> {
+        self.files.present_names(paths)
+    }
+
+    /// Tells whether the input that had the path `known` still holds what it did. It is at `path` now.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be read.
+    pub(crate) fn has_same_content(&self, known: &Path, path: &Path) -> Result<bool> {
+        self.files.has_same_content(known, path)
     }
 
     /// Returns what tells the content of the inputs from that of others, whatever their names.

@@ -72,6 +72,23 @@ impl InputIdentities {
         if changed.is_empty() { vec!["the order of the inputs".into()] } else { changed }
     }
 
+    /// Returns what the inputs are called by now, if those at `paths` are as many, in the same order.
+    pub(crate) fn present_names(&self, paths: &[PathBuf]) -> Option<RenamedInputs> {
+        let pairs = self.0.iter().map(|file| file.path.clone()).zip(paths.iter().cloned());
+        let is_same = self.0.len() == paths.len();
+        is_same.then(|| RenamedInputs(pairs.filter(|(old, new)| old != new).collect()))
+    }
+
+    /// Tells whether the input that had the path `known` still holds what it did, as far as samples tell. It is at `path` now. Its time
+    /// does not count, because machines may see different ones.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be read.
+    pub(crate) fn has_same_content(&self, known: &Path, path: &Path) -> Result<bool> {
+        let samples = FileSamples::of(path)?;
+        Ok(self.0.iter().any(|file| file.path == known && file.content.samples == samples))
+    }
+
     /// Returns what the inputs are called by now. They must have the same contents in the same order as `earlier`.
     pub(crate) fn renamed_since(&self, earlier: &InputIdentities) -> RenamedInputs {
         let pairs = earlier.0.iter().zip(&self.0).map(|(old, new)| (old.path.clone(), new.path.clone()));

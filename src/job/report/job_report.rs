@@ -51,6 +51,12 @@ pub struct Report {
     pub gpu: Option<String>,
     /// What each step of the pipeline took for all leaves together.
     pub steps: PipelineTimes,
+    /// The number of parts.
+    #[serde(default)]
+    pub parts: u64,
+    /// The part that took the longest, in a job of several.
+    #[serde(default)]
+    pub slowest_part: Option<SlowestPart>,
     /// The lattice.
     pub lattice: Lattice,
     /// Unit of x and y.
@@ -67,14 +73,14 @@ pub struct Report {
     pub memory_limit: u64,
     /// Worker threads.
     pub threads: usize,
-    /// The number of steps that an interrupted run had finished. The stages do not include their times.
+    /// The number of steps that an interrupted run had finished. The stages include their times only in a job of several parts.
     pub resumed: u64,
-    /// Seconds from start to end.
+    /// Seconds from start to end, of the process that wrote the report.
     pub wall_s: f64,
     /// Seconds of processor time of all threads, including those of no stage.
     #[serde(default)]
     pub cpu_s: f64,
-    /// The stages in the order in which they begin. Some run at the same time.
+    /// The stages in the order in which they begin. Some run at the same time. Those of several parts are summed up.
     pub stages: Vec<StageStats>,
     /// What the user should know.
     pub warnings: Warnings,
@@ -90,6 +96,17 @@ pub struct Report {
     pub file_list: Checksum,
     /// The checksum of this report, with zeros in place of it.
     pub checksum: Checksum,
+}
+
+/// The part of a job whose phases took the longest.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct SlowestPart {
+    /// Its number, from 0 on.
+    pub part: u64,
+    /// Seconds that its phases took together.
+    pub seconds: f64,
+    /// Points that it has.
+    pub points: u64,
 }
 
 /// Seconds by step of the pipeline.
@@ -134,6 +151,12 @@ pub struct ReportParts {
     pub tiles: TileStats,
     /// The sum over all coarser tiles.
     pub levels: LevelStats,
+    /// The number of parts.
+    pub parts: u64,
+    /// The part that took the longest.
+    pub slowest_part: Option<SlowestPart>,
+    /// Seconds of processor time of the tasks that did other phases.
+    pub cpu_s_of_tasks: f64,
     /// What the user should know about the results.
     pub warnings: Warnings,
     /// Bytes of results besides the tiles.
@@ -186,6 +209,8 @@ impl Report {
             leaves: parts.leaves,
             gpu: parts.gpu,
             steps: PipelineTimes::new(&parts.leaves, &parts.gpu_steps),
+            parts: parts.parts,
+            slowest_part: parts.slowest_part,
             lattice: plan.lattice.clone(),
             unit: plan.unit.clone(),
             crs: plan.crs.name.clone(),
@@ -196,7 +221,7 @@ impl Report {
             threads: parts.threads,
             resumed: parts.resumed,
             wall_s: parts.clock.wall_s(),
-            cpu_s: parts.clock.cpu_s(),
+            cpu_s: parts.clock.cpu_s() + parts.cpu_s_of_tasks,
             stages: parts.stages,
             warnings,
             input: InputOptions { files: Vec::new(), ..plan.options.input.clone() },

@@ -1,5 +1,7 @@
 //! The report of a finished job, for people and for machines.
 
 pub mod job_report;
+pub mod job_status;
 pub mod skipped_inputs;
 mod table;
+pub mod task_outcome;

@@ -1,7 +1,7 @@
 //! The report as a table for people.
 
 use crate::job::progress::number_text::{grouped, precise_mebibytes};
-use crate::job::report::job_report::{Report, StepSeconds};
+use crate::job::report::job_report::{Report, SlowestPart, StepSeconds};
 use crate::job::report::skipped_inputs::write_skipped;
 use crate::triangulation::TriangulationCounts;
 use std::fmt;
@@ -68,6 +68,10 @@ impl fmt::Display for Report {
         row("  edges flipped", grouped(counts.flips))?;
         if let Some(gpu) = &self.gpu {
             row("  with the help of a GPU", format!("{} ({gpu})", grouped(self.leaves.outcome.counts.on_gpu)))?;
+        }
+        if let Some(SlowestPart { part, seconds, points }) = self.slowest_part {
+            let slowest = format!("the slowest, {part}, took {seconds:.1} s for {} points", grouped(points));
+            row("parts", format!("{}; {slowest}", grouped(self.parts)))?;
         }
         row("lattice step", format!("{} (z {}) {}", self.lattice.resolution, self.lattice.resolution_z, self.unit))?;
         row("written", precise_mebibytes(self.bytes_written))?;

@@ -12,8 +12,9 @@ use crate::job::plan::lattice_choice::LatticeCoarsening;
 use crate::job::plan::make_plan::make_plan;
 use crate::job::preflight::check::require_room;
 use crate::job::progress::clock::JobClock;
-use crate::job::progress::stage::JobProgress;
+use crate::job::progress::stage::{JobProgress, ProgressOutput};
 use crate::job::report::job_report::Report;
+use crate::job::run::alone::Alone;
 use crate::job::run::read_step::note_skipped;
 use crate::job::run::resume::{self, EarlierRun, RunStart, place_results_of_finished_job};
 use crate::job::run::run_context::RunContext;
@@ -24,11 +25,24 @@ use crate::triangulation::Triangulator;
 use crate::{Error, Result, disk};
 use std::sync::Mutex;
 
+/// What the user must know where a lock keeps nobody out.
+pub(crate) const NO_LOCKS: &str =
+    "the file system of the output directory has no locks: see to it that no other process works there";
+
 /// Give up after this many tenfold coarsenings: what is left is no terrain.
 const MAX_COARSENINGS: u32 = 6;
 
 /// The walk of a job through the steps after the plan. The partition is that of an earlier run, if one read the points.
 pub(crate) type Walk = fn(&RunContext, Plan, Option<Partition>) -> Result<Report>;
+
+/// Who has done what is there of a job.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum EarlierWork {
+    /// A run that was interrupted, so what it left may be damaged.
+    Interrupted,
+    /// Tasks, and all phases by part are complete: what is there is on the disk.
+    ByTasks,
+}
 
 /// What all attempts at a job have in common.
 struct JobRequest<'a> {
@@ -39,13 +53,19 @@ struct JobRequest<'a> {
     fingerprint: Fingerprint,
     clock: JobClock,
     walk: Walk,
+    work: EarlierWork,
 }
 
 /// Runs a job, or what an interrupted run left of it.
 ///
 /// # Errors
 /// See [`crate::job::run`].
-pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, walk: Walk) -> Result<Report> {
+pub(crate) fn run_until_it_fits(
+    options: &JobOptions,
+    run: RunOptions,
+    walk: Walk,
+    work: EarlierWork,
+) -> Result<Report> {
     let clock = JobClock::start();
     let directory = JobDirectory::new(&options.output.directory);
     directory.check_nothing_in_the_way()?;
@@ -58,11 +78,14 @@ pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, walk: Wal
     }
     // Before the inputs, so that a job that must have a GPU fails at once if there is none.
     let memory = options.limits.memory.0;
-    let triangulator = Triangulator::new(&options.triangulation, &options.gpu, memory, options.threads())?;
+    let triangulator = match work {
+        EarlierWork::Interrupted => Triangulator::new(&options.triangulation, &options.gpu, memory, options.threads())?,
+        // All is triangulated, and this machine may have no GPU.
+        EarlierWork::ByTasks => Triangulator::without_gpu(&options.triangulation),
+    };
     let fingerprint = on_threads(workers(options, 0)?, || Fingerprint::of(options))?;
-    let job = JobRequest { options, run, triangulator, directory, fingerprint, clock, walk };
-    let coarsening = earlier.as_ref().and_then(|earlier| earlier.coarsening(&job.fingerprint));
-    let mut coarsening = coarsening.unwrap_or_default();
+    let job = JobRequest { options, run, triangulator, directory, fingerprint, clock, walk, work };
+    let mut coarsening = coarsening_of(&job.directory, earlier.as_ref(), &job.fingerprint)?;
     loop {
         let outcome = attempt(&job, coarsening, earlier.take(), lock.take());
         // Only the finished mesh knows its longest triangle. To round in advance would often round for nothing.
@@ -80,9 +103,7 @@ pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, walk: Wal
             true => (&mut coarsening.vertical, "z"),
             false => (&mut coarsening.horizontal, "x and y"),
         };
-        let set = if vertical { options.input.resolution_z } else { options.input.resolution };
-        let may_coarsen = set.step().is_none();
-        if !may_coarsen || *power >= MAX_COARSENINGS {
+        if !may_coarsen(options, vertical) || *power >= MAX_COARSENINGS {
             return Err(Error::TooFine { vertical, what });
         }
         run.progress.note(&format!("{what}; starting again with a coarser step in {axes}"));
@@ -90,9 +111,29 @@ pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, walk: Wal
     }
 }
 
+/// Tells whether the lattice may become coarser, which it may not if the user has set its step.
+pub(crate) fn may_coarsen(options: &JobOptions, vertical: bool) -> bool {
+    let set = if vertical { options.input.resolution_z } else { options.input.resolution };
+    set.step().is_none()
+}
+
+/// Returns how much coarser the lattice is than the inputs ask for, and whether the job is one part, as far as an earlier run of the same
+/// job has found out.
+pub(crate) fn coarsening_of(
+    directory: &JobDirectory,
+    earlier: Option<&EarlierRun>,
+    fingerprint: &Fingerprint,
+) -> Result<LatticeCoarsening> {
+    let Some(mut known) = earlier.and_then(|earlier| earlier.coarsening(fingerprint)) else {
+        return Ok(LatticeCoarsening::default());
+    };
+    known.one_part |= Alone::find(directory)? == Some(Alone::InOnePart);
+    Ok(known)
+}
+
 /// Reads what an earlier run left, unless the job is to start over. If it left all its results, they take their places in any case:
 /// it may have been cut off among them.
-fn read_earlier(directory: &JobDirectory, run: RunOptions) -> Result<Option<EarlierRun>> {
+pub(crate) fn read_earlier(directory: &JobDirectory, run: RunOptions) -> Result<Option<EarlierRun>> {
     let mut earlier = EarlierRun::read(directory)?;
     if let Some(earlier) = earlier.as_mut() {
         earlier.place_whole_results(directory)?;
@@ -123,12 +164,12 @@ fn attempt(
     let progress = &JobProgress::new(run.progress, clock, stage_costs(&plan));
     note_skipped(&plan.skipped, progress);
     let threads = workers(options, plan.records)?;
-    if !run.force {
+    if !run.force && job.work == EarlierWork::Interrupted {
         on_threads(threads, || require_room(&plan, threads))?;
     }
     directory.check_results_are_ours()?;
     let mut earlier = earlier;
-    let _lock = match lock {
+    let lock_of_job = match lock {
         Some(lock) => lock,
         None => {
             let lock = directory.lock()?;
@@ -137,6 +178,9 @@ fn attempt(
             lock
         }
     };
+    if !lock_of_job.is_real() {
+        progress.note(NO_LOCKS);
+    }
     let complete = earlier.as_ref().map(|earlier| earlier.complete_report(directory, &header)).transpose()?;
     if let Some(report) = complete.flatten() {
         progress.note("the interrupted run had written all its results");
@@ -146,6 +190,10 @@ fn attempt(
     on_threads(threads, || {
         let start = match plan.is_one_part() {
             true => resume::start(directory, &header, earlier, options.output.max_edge, run.progress)?,
+            // That tasks have done steps is nothing to tell.
+            false if job.work == EarlierWork::ByTasks => {
+                resume::start_parts(directory, &header, earlier, ProgressOutput::Quiet)?
+            }
             false => resume::start_parts(directory, &header, earlier, run.progress)?,
         };
         let RunStart { store, journal, partition, job_id, resumed } = start;
@@ -159,7 +207,8 @@ fn attempt(
             clock,
             inputs_fingerprint: job.fingerprint.of_inputs(),
             job_id,
-            resumed: journal.taken_over() + resumed,
+            resumed: if job.work == EarlierWork::ByTasks { 0 } else { journal.taken_over() + resumed },
+            checks: job.work == EarlierWork::Interrupted,
             temporary: TemporaryBytes::default(),
             stages: Mutex::new(vec![planned]),
         };

@@ -111,13 +111,15 @@ impl Freeing<'_> {
         records.into_iter().try_for_each(|record| run.store.free(record))?;
         let blocks = unneeded.points.iter().flat_map(|tile| &partition.blocks[tile.get()]);
         let blocks: Vec<PointBlock> = blocks.copied().collect();
-        let path = run.directory.points();
-        // It is opened each time, because an open file is not freed when it is removed.
-        let freed = match disk::open(&path) {
-            Err(e) if e.kind() == ErrorKind::NotFound => Ok(0),
-            file => file.and_then(|file| disk::free(&file, &pages_of(&blocks))),
-        };
-        run.temporary.points_freed(freed.map_err(Error::io("write", &path))?);
+        for (file, pages) in pages_of(&blocks) {
+            let path = run.directory.point_file(file);
+            // It is opened each time, because an open file is not freed when it is removed.
+            let freed = match disk::open(&path) {
+                Err(e) if e.kind() == ErrorKind::NotFound => Ok(0),
+                file => file.and_then(|file| disk::free(&file, &pages)),
+            };
+            run.temporary.points_freed(freed.map_err(Error::io("write", &path))?);
+        }
         fault::point("freed");
         Ok(())
     }

@@ -5,7 +5,7 @@ use crate::geometry::Bounds;
 use crate::job::durable::journal::JournalPosition;
 use crate::job::index::{NodeIndex, TileIndex};
 use crate::job::mesh::leaf::LeafStats;
-use crate::job::partition::point_file::PointFile;
+use crate::job::partition::point_file::PointFiles;
 use crate::job::partition::result::Partition;
 use crate::job::plan::job_plan::Plan;
 use crate::job::preflight::estimate::has_room_besides_points;
@@ -98,7 +98,7 @@ fn do_steps(
         let leaves = walk.walk(scope, NodeIndex::ROOT)?;
         queue.attempt(|| walk.unmerged.check(&plan.options))?;
         let all_leaves = run.journal.position();
-        // This closes the point file: an open file is not freed when it is removed.
+        // This closes the point files: an open file is not freed when it is removed.
         drop(walk);
         if let Writing::AfterLeaves(look) = writing {
             // Not while tiles are written: on a small disk the results need the room.
@@ -114,10 +114,10 @@ fn do_steps(
     Ok(MeshInTiles { leaves, tiles, all_leaves })
 }
 
-/// Opens the point file if a leaf is still to be done.
-fn open_points(run: &RunContext, partition: &Partition) -> Result<Option<PointFile>> {
+/// Opens the point files if a leaf is still to be done.
+fn open_points(run: &RunContext, partition: &Partition) -> Result<Option<PointFiles>> {
     let all_done = partition.tree.tiles().all(|tile| run.journal.has(JobStep::Leaf(tile)));
-    if all_done { Ok(None) } else { PointFile::open(&run.directory.points()).map(Some) }
+    if all_done { Ok(None) } else { PointFiles::open(&run.directory.point_files()?).map(Some) }
 }
 
 /// Tells whether tiles may be written before all are triangulated. They must wait if all sites decide how a tile looks, and if the

@@ -1,5 +1,6 @@
 //! Running the steps of a job in this process: the only room that knows all of them.
 
+pub(crate) mod alone;
 pub(crate) mod attempt;
 pub(crate) mod freeing;
 pub(crate) mod levels_step;
@@ -11,6 +12,7 @@ pub(crate) mod read_step;
 pub(crate) mod resume;
 pub(crate) mod run_context;
 pub(crate) mod stage_costs;
+pub(crate) mod tasks;
 pub(crate) mod temporary_bytes;
 pub(crate) mod tile_queue;
 pub(crate) mod tree_walk;

@@ -24,6 +24,20 @@ pub(crate) fn entries_of(directory: &JobDirectory, header: PartHeader) -> Result
     entries_if(directory, |found| found == header)
 }
 
+/// Returns those entries of the journal in `directory` that are of `wanted` steps, if it is the journal of `header`.
+///
+/// # Errors
+/// [`crate::Error::Io`] if it cannot be read.
+pub(crate) fn entries_of_steps(
+    directory: &JobDirectory,
+    header: PartHeader,
+    wanted: impl Fn(JobStep) -> bool,
+) -> Result<Vec<JournalEntry>> {
+    let read = journal::read_steps::<PartHeader, JobStep, StepRecord>(directory, wanted)?;
+    let own = read.filter(|(found, _)| *found == Some(header));
+    Ok(own.map(|(_, entries)| entries).unwrap_or_default())
+}
+
 fn entries_if(directory: &JobDirectory, is_wanted: impl Fn(PartHeader) -> bool) -> Result<Vec<JournalEntry>> {
     let read = journal::read::<PartHeader, JobStep, StepRecord>(directory)?;
     let own = read.filter(|(found, _)| found.is_some_and(is_wanted));
@@ -64,7 +78,7 @@ pub(crate) fn forget_levels(directory: &JobDirectory) -> Result<()> {
     for folder in directory.folders_of_parts()? {
         let read = journal::read::<PartHeader, JobStep, StepRecord>(&folder)?;
         if let Some((Some(header), mut entries)) = read {
-            entries.retain(|entry| !matches!(entry.step, JobStep::Level(_)));
+            entries.retain(|entry| !matches!(entry.step, JobStep::Level(_) | JobStep::Levels));
             Journal::begin(&folder, &header, entries)?.close();
         }
     }

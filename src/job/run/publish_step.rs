@@ -11,7 +11,7 @@ use crate::job::publish::one_file_limits::{fits_one_file, too_large_for_one_file
 use crate::job::publish::placement::{place, placement_warning};
 use crate::job::publish::side_files::{EachTile, SideFiles, write_side_files};
 use crate::job::records::{JobStep, StepOutput};
-use crate::job::report::job_report::{Report, ReportParts};
+use crate::job::report::job_report::{Report, ReportParts, SlowestPart};
 use crate::job::run::levels_step::left_out_warning;
 use crate::job::run::run_context::RunContext;
 use crate::job::run::tile_queue::TileLook;
@@ -62,6 +62,11 @@ pub(crate) struct MeshFigures {
     pub(crate) temporary: u64,
     /// Results that the journals of parts name.
     pub(crate) files: Vec<PublishedFile>,
+    /// The number of parts.
+    pub(crate) parts: u64,
+    pub(crate) slowest_part: Option<SlowestPart>,
+    /// Seconds of processor time of the tasks that did other phases.
+    pub(crate) cpu_s_of_tasks: f64,
 }
 
 /// Checks that there is a terrain to look at.
@@ -140,9 +145,12 @@ pub(crate) fn publish(
 /// # Errors
 /// [`crate::Error::Io`] if it cannot be written.
 pub(crate) fn write_report(run: &RunContext, plan: &Plan, mesh: MeshFigures, published: Published) -> Result<Report> {
-    let MeshFigures { points, leaves, tiles, temporary, files } = mesh;
+    let MeshFigures { points, leaves, tiles, temporary, files, parts, slowest_part, cpu_s_of_tasks } = mesh;
     let list = write_file_list(run, files)?;
     let parts = ReportParts {
+        parts,
+        slowest_part,
+        cpu_s_of_tasks,
         points,
         leaves,
         gpu: run.triangulator.gpu().map(str::to_owned),

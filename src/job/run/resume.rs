@@ -8,7 +8,7 @@ use crate::job::durable::directory::JobDirectory;
 use crate::job::durable::journal::{self, PublishedFile};
 use crate::job::index::{NodeIndex, TileIndex};
 use crate::job::options::JobOptions;
-use crate::job::partition::point_file::PointFile;
+use crate::job::partition::point_file::PointFiles;
 use crate::job::partition::result::Partition;
 use crate::job::plan::fingerprint::{Fingerprint, JobChange, JobHeader};
 use crate::job::plan::job_plan::Plan;
@@ -202,7 +202,7 @@ pub(crate) fn start_parts<'a>(
     earlier: Option<EarlierRun>,
     progress: ProgressOutput,
 ) -> Result<RunStart<'a>> {
-    let same = earlier.and_then(|earlier| same_job_of_parts(directory, header, earlier, progress));
+    let same = earlier.and_then(|earlier| same_job_of_parts(header, earlier, progress));
     let (entries, header, resumed) = match same {
         Some((old, entries, of_parts)) => {
             if header.fingerprint.memory != old.fingerprint.memory {
@@ -227,10 +227,8 @@ pub(crate) fn start_parts<'a>(
     Ok(RunStart { store, journal, partition: None, job_id: header.id, resumed })
 }
 
-/// Returns the header of an earlier run of the same job, its entries that stay (the plan, and what was read), and the number of steps of
-/// its parts.
+/// Returns the header of an earlier run of the same job, its entry that stays (the plan), and the number of steps of its parts.
 fn same_job_of_parts(
-    directory: &JobDirectory,
     header: &JobHeader,
     earlier: EarlierRun,
     progress: ProgressOutput,
@@ -244,14 +242,7 @@ fn same_job_of_parts(
             return None;
         }
     }
-    entries.retain(|entry| matches!(entry.step, JobStep::Plan | JobStep::Read(_)));
-    let records = records_of(&entries);
-    let is_whole =
-        open_store(directory, &records).is_ok_and(|store| records.iter().all(|record| store.is_whole(record)));
-    if !records.is_empty() && !is_whole {
-        progress.note("what the interrupted run left is damaged; starting over");
-        return None;
-    }
+    entries.retain(|entry| entry.step == JobStep::Plan);
     Some((old, entries, of_parts.count))
 }
 
@@ -262,7 +253,7 @@ fn new_id() -> u64 {
     (nanoseconds ^ u64::from(std::process::id()) << 40).max(1)
 }
 
-/// Returns the entries of a part that stay, and its partition if that does.
+/// Returns the entries of a part, whose folder is locked, that stay, and its partition if that does.
 ///
 /// # Errors
 /// [`Error::Io`] on its folder.
@@ -272,16 +263,25 @@ pub(crate) fn resume_part(
     max_edge: MaxEdge,
     progress: &JobProgress,
 ) -> Result<(Vec<JournalEntry>, Option<Partition>)> {
-    let stage = progress.stage("check", entries.len() as u64, "steps");
+    // What the part read is for other parts too.
+    let (mut kept, entries): (Vec<_>, Vec<_>) =
+        entries.into_iter().partition(|entry| matches!(entry.step, JobStep::Read(_)));
     let review = match entries.is_empty() {
         true => None,
-        false => ResumeReview::of(directory, entries, max_edge == MaxEdge::Auto, &stage)?,
+        false => {
+            let stage = progress.stage("check", entries.len() as u64, "steps");
+            let review = ResumeReview::of(directory, entries, max_edge == MaxEdge::Auto, &stage)?;
+            stage.finish();
+            review
+        }
     };
-    stage.finish();
-    let KeptSteps { entries, files, partition, .. } = review.map(ResumeReview::into_kept).unwrap_or_default();
-    create_folder(directory.job())?;
+    let KeptSteps { entries, mut files, partition, .. } = review.map(ResumeReview::into_kept).unwrap_or_default();
+    kept.extend(entries);
+    if !kept.is_empty() {
+        files.extend(directory.store().iter().map(|path| directory.name(path)));
+    }
     directory.clear_own(&files)?;
-    Ok((entries, partition))
+    Ok((kept, partition))
 }
 
 /// The steps that stay, and what they left.
@@ -414,13 +414,14 @@ impl ResumeReview {
         self.stays(JobStep::Leaf(tile), !is_used_up)
     }
 
-    /// Tells whether the point file still holds the points of all leaves that are to be done.
+    /// Tells whether the point files still hold the points of all leaves that are to be done.
     fn has_needed_points(&self) -> bool {
         let mut missing = self.partition.tree.tiles().filter(|&tile| !self.leaf_stays(tile)).peekable();
         if missing.peek().is_none() {
             return true;
         }
-        let Ok(points) = PointFile::open(&self.directory.points()) else { return false };
+        let files = self.directory.point_files();
+        let Ok(points) = files.and_then(|files| PointFiles::open(&files)) else { return false };
         let is_whole =
             |tile: TileIndex| self.partition.blocks[tile.get()].par_iter().all(|&block| points.is_whole(block));
         missing.par_bridge().all(is_whole)
@@ -435,8 +436,13 @@ impl ResumeReview {
             JobStep::Publish => self.all_written && self.whole.contains(&step),
             // A run with all its results whole does not come here. Any other writes a new report, and the journal must name only one.
             JobStep::Report => false,
-            // A job of one part has none of these, and a part that has them is not looked at.
-            JobStep::Plan | JobStep::Read(_) | JobStep::MeshPart | JobStep::WriteWaiting => false,
+            // A job of one part has none of these. What a part has read stays anyway, and one that has the others is not looked at.
+            JobStep::Plan
+            | JobStep::Read(_)
+            | JobStep::MeshPart
+            | JobStep::Join
+            | JobStep::WriteWaiting
+            | JobStep::Levels => false,
         }
     }
 

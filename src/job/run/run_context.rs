@@ -1,7 +1,6 @@
 //! What the steps of a running job share.
 
 use crate::Result;
-use crate::job::durable::atomic_file::remove_file;
 use crate::job::durable::directory::JobDirectory;
 use crate::job::durable::journal::JournalPosition;
 use crate::job::progress::clock::JobClock;
@@ -27,6 +26,8 @@ pub(crate) struct RunContext<'a> {
     pub(crate) job_id: u64,
     /// The number of steps that an interrupted run had finished.
     pub(crate) resumed: u64,
+    /// Whether what it left is compared with its hashes.
+    pub(crate) checks: bool,
     /// What the temporary files take.
     pub(crate) temporary: TemporaryBytes,
     /// The stages that have ended.
@@ -48,12 +49,6 @@ impl RunContext<'_> {
         }
     }
 
-    /// Adds the stages of a part to those of the same names.
-    pub(crate) fn add_stages(&self, part: RunContext) {
-        let stages = part.stages.into_inner().unwrap_or_else(PoisonError::into_inner);
-        stages.into_iter().for_each(|stage| self.add_stage(stage));
-    }
-
     /// Returns the stages that have ended.
     pub(crate) fn stages(&self) -> MutexGuard<'_, Vec<StageStats>> {
         self.stages.lock().unwrap_or_else(PoisonError::into_inner)
@@ -65,6 +60,6 @@ impl RunContext<'_> {
         if self.journal.is_worth_syncing() {
             self.store.sync()?;
         }
-        remove_file(&self.directory.points())
+        self.directory.remove_points()
     }
 }

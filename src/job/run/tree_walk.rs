@@ -3,7 +3,7 @@
 use crate::job::index::{NodeIndex, TileIndex};
 use crate::job::mesh::leaf::{LeafStats, triangulate_leaf};
 use crate::job::mesh::merge::merge_frontiers;
-use crate::job::partition::point_file::PointFile;
+use crate::job::partition::point_file::PointFiles;
 use crate::job::partition::result::Partition;
 use crate::job::partition::tree::{Cell, NodeKind};
 use crate::job::plan::budget::merge_memory;
@@ -26,7 +26,7 @@ pub(crate) struct TreeWalk<'a> {
     pub(crate) plan: &'a Plan,
     pub(crate) partition: &'a Partition,
     /// The points; `None` if all leaves are done.
-    pub(crate) points: Option<PointFile>,
+    pub(crate) points: Option<PointFiles>,
     pub(crate) stage: &'a Stage,
     pub(crate) activity: &'a Activity,
     /// Takes the tiles that are finished.

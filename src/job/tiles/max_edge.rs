@@ -3,11 +3,11 @@
 //! The decision about a triangle depends on the triangle and on the sites alone, so neither the tiles nor the order of the work can
 //! change it. Triangles that are left out go to `cut/`: nothing of the exact mesh is lost.
 
-use crate::Result;
 use crate::geometry::Bounds;
 use crate::geometry::square_grid::SquareGrid;
 use crate::output::frame::Frame;
 use crate::output::options::MaxEdge;
+use crate::{Error, Result};
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// With "auto", the longest edge is this many times the spacing of the sites around the triangle.
@@ -54,6 +54,26 @@ impl MaxEdgeRule {
                 Ok(MaxEdgeRule::Length((steps * steps * (1.0 + 1e-12)) as u64))
             }
             MaxEdge::Auto => SiteSpacing::measure(sites, bounds, visit_sites).map(MaxEdgeRule::Spacing),
+        }
+    }
+
+    /// Returns the rule "auto" of a job that has counted its sites: all `sites`, which are within `bounds`, gave these `counts`.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] if they are those of another job.
+    pub fn of_counts(sites: u64, bounds: Bounds<3>, counts: Vec<u32>) -> Result<MaxEdgeRule> {
+        let empty = SiteSpacing::empty(bounds, sites);
+        match counts.len() == empty.counts.len() {
+            true => Ok(MaxEdgeRule::Spacing(SiteSpacing { counts, ..empty })),
+            false => Err(Error::Broken("the sites were counted in other cells".into())),
+        }
+    }
+
+    /// Returns what [`MaxEdgeRule::of_counts`] takes. A rule that looks at no sites has none.
+    pub fn counts(&self) -> &[u32] {
+        match self {
+            MaxEdgeRule::Spacing(spacing) => &spacing.counts,
+            MaxEdgeRule::KeepAll | MaxEdgeRule::Length(_) => &[],
         }
     }
 

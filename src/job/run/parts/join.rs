@@ -2,16 +2,20 @@
 
 use crate::Result;
 use crate::job::durable::directory::JobDirectory;
-use crate::job::index::{NodeIndex, PartIndex, TileIndex};
+use crate::job::index::{NodeIndex, TileIndex};
 use crate::job::mesh::merge::merge_frontiers;
 use crate::job::partition::tree::{NodeKind, Tree};
 use crate::job::plan::budget::merge_memory;
+use crate::job::progress::stats::StageStats;
 use crate::job::records::{JobStep, JournalEntry, Seam, SeamTriangle, Store};
 use crate::job::run::part_entries::{PartHeader, entries_of, is_whole, open_store, records_of};
+use crate::job::run::parts::done::Done;
+use crate::job::run::parts::look::{count_sites, final_look};
 use crate::job::run::parts::part_journal::PartSession;
 use crate::job::run::parts::part_store::{OpenPart, PartStores};
 use crate::job::run::parts::parts_job::PartsJob;
 use crate::job::run::run_context::RunContext;
+use crate::job::run::tile_queue::TileLook;
 use std::sync::Arc;
 
 /// The merges above the parts, done.
@@ -19,37 +23,43 @@ pub(crate) struct JoinedParts {
     pub(crate) directory: JobDirectory,
     pub(crate) store: Store,
     pub(crate) header: PartHeader,
+    /// How tiles look, now that all sites are known.
+    pub(crate) look: Arc<TileLook>,
+    pub(crate) stages: Vec<StageStats>,
 }
 
-/// Merges what the parts send up, or what an interrupted run left of it.
+/// Merges what the parts send up, or what an interrupted run left of it. The parts have `sites` sites.
 ///
 /// # Errors
-/// Those of [`merge_frontiers`].
-pub(crate) fn join_parts(job: &PartsJob, stores: &PartStores) -> Result<JoinedParts> {
-    let PartsJob { run, parts, .. } = *job;
-    let directory = run.directory.join();
-    let header = PartHeader { job: run.job_id, part: PartIndex::new(parts.all().len()) };
-    let entries = whole_entries(&directory, entries_of(&directory, header)?)?;
-    let session = PartSession::begin(&directory, header, entries)?;
-    let stage = run.progress.stage("join", parts.all().len() as u64, "parts");
-    merge_below(job, stores, &session.context(run), NodeIndex::ROOT)?;
-    stage.advance(parts.all().len() as u64);
-    run.add_stage(stage.finish());
-    if run.journal.is_worth_syncing() {
-        session.store.sync()?;
+/// Those of [`merge_frontiers`]; [`crate::Error::InUse`] if another process does it.
+pub(crate) fn join_parts(job: &PartsJob, stores: &PartStores, sites: u64) -> Result<()> {
+    let parts = job.parts.all().len() as u64;
+    let directory = &job.directory.join();
+    let lock = directory.lock()?;
+    let header = job.header(job.above());
+    let entries = whole_entries(directory, entries_of(directory, header)?)?;
+    if entries.iter().any(|entry| entry.step == JobStep::Join) {
+        return Ok(());
     }
-    session.end()?;
-    let entries = entries_of(&directory, header)?;
-    let records = records_of(&entries);
-    Ok(JoinedParts { store: open_store(&directory, &records)?, directory, header })
+    let session = PartSession::begin(directory, lock, header, entries)?;
+    let stage = job.progress.stage("join", parts, "parts");
+    merge_below(job, stores, &session.context(job), NodeIndex::ROOT)?;
+    let counts = count_sites(job, stores, sites, &session.store)?;
+    stage.advance(parts);
+    session.finish(JobStep::Join, sites, vec![stage.finish()], counts.into_iter().collect())?;
+    Ok(())
 }
 
 /// Returns the entries whose records hold what was written.
 fn whole_entries(directory: &JobDirectory, mut entries: Vec<JournalEntry>) -> Result<Vec<JournalEntry>> {
-    let records = records_of(&entries);
+    let (records, all) = (records_of(&entries), entries.len());
     if !records.is_empty() {
         let store = open_store(directory, &records)?;
         entries.retain(|entry| is_whole(directory, &store, entry));
+    }
+    if entries.len() < all {
+        // What is complete no longer is.
+        entries.retain(|entry| entry.step != JobStep::Join);
     }
     Ok(entries)
 }
@@ -83,6 +93,20 @@ fn merge_below(job: &PartsJob, stores: &PartStores, context: &RunContext, node: 
 }
 
 impl JoinedParts {
+    /// Opens what [`join_parts`] has left; `None` if it is not complete.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`] or [`crate::Error::Broken`] on its folder.
+    pub(crate) fn open(job: &PartsJob) -> Result<Option<JoinedParts>> {
+        let (directory, header) = (job.directory.join(), job.header(job.above()));
+        let entries = entries_of(&directory, header)?;
+        let Some(Done { figures: sites, stages, .. }) = Done::<u64>::find(&entries, JobStep::Join)? else {
+            return Ok(None);
+        };
+        let store = open_store(&directory, &records_of(&entries))?;
+        Ok(Some(JoinedParts { look: final_look(job, sites, &store)?, store, directory, header, stages }))
+    }
+
     /// Returns all triangles of seams that touch `tile` of the part with `store` and `tree`.
     ///
     /// # Errors

@@ -3,46 +3,98 @@
 //! A part is meshed as soon as all inputs that reach it have been read, and its points go then. Tiles that touch other parts wait for
 //! the nodes above the parts. Every part has a folder, a journal and a store of its own.
 
-mod join;
-mod mesh_phase;
+pub(crate) mod done;
+pub(crate) mod join;
+pub(crate) mod level_phase;
+pub(crate) mod look;
+pub(crate) mod mesh_phase;
+pub(crate) mod meshed_part;
 mod part_journal;
-mod part_store;
-mod parts_job;
+pub(crate) mod part_store;
+pub(crate) mod parts_job;
 mod publish_parts;
-mod tile_phase;
+pub(crate) mod read_phase;
+pub(crate) mod tile_phase;
 
-use crate::Result;
+use crate::job::durable::directory::JobDirectory;
+use crate::job::partition::part_points::ReadInputs;
 use crate::job::partition::parts::Parts;
 use crate::job::plan::job_plan::Plan;
-use crate::job::records::{JobStep, StepOutput};
+use crate::job::records::{JobStep, Journal, StepOutput};
 use crate::job::report::job_report::Report;
-use crate::job::run::parts::join::join_parts;
-use crate::job::run::parts::mesh_phase::mesh_all;
+use crate::job::run::parts::join::{JoinedParts, join_parts};
+use crate::job::run::parts::level_phase::levels_of_part;
+use crate::job::run::parts::look::early_look;
+use crate::job::run::parts::mesh_phase::{drop_damaged_steps, mesh_one};
+use crate::job::run::parts::meshed_part::MeshedPart;
 use crate::job::run::parts::part_store::PartStores;
 use crate::job::run::parts::parts_job::PartsJob;
 use crate::job::run::parts::publish_parts::publish_parts;
-use crate::job::run::parts::tile_phase::{final_look, finish_tiles};
+use crate::job::run::parts::read_phase::{read_for, sum_up};
+use crate::job::run::parts::tile_phase::{ForeignBorders, finish_part};
+use crate::job::run::publish_step::wants_tileset;
 use crate::job::run::run_context::RunContext;
+use crate::{Error, Result};
 
 /// The walk through the phases after the plan.
 ///
 /// # Errors
-/// Those of the steps; [`crate::Error::NeedsOnePart`] if what is read contradicts the headers.
+/// Those of the steps; [`Error::NeedsOnePart`] if what is read contradicts the headers.
 pub(crate) fn walk(run: &RunContext, plan: &Plan) -> Result<Report> {
     let parts = &Parts::of(plan);
-    let job = &PartsJob { run, plan, parts };
-    run.journal.step(JobStep::Plan, || {
-        let files = vec![plan.write(&run.directory.plan())?];
-        Ok(StepOutput { files, ..StepOutput::new((), Vec::new()) })
-    })?;
+    let job = &PartsJob::of_run(run, plan, parts);
+    write_plan(run.journal, run.directory, plan)?;
     // Steps 2 to 6 for each part, as far as it needs no other.
-    let meshed = mesh_all(job)?;
+    let meshed = read_and_mesh(job)?;
     // Step 4 for the nodes above the parts.
-    let stores = &PartStores::new(run.directory, run.job_id);
-    let joined = &join_parts(job, stores)?;
+    let stores = &PartStores::new(job.directory, job.job_id);
+    join_parts(job, stores, meshed.iter().map(|part| part.leaves.sites).sum())?;
+    let joined = JoinedParts::open(job)?.ok_or_else(|| Error::Broken("the parts are not joined".into()))?;
     // Steps 5 and 6 for the tiles that have waited.
-    let look = &final_look(job, stores, &meshed)?;
-    let written = finish_tiles(job, stores, joined, look, &meshed)?;
-    // Steps 7 and 8.
-    publish_parts(job, stores, joined, look, &meshed, written)
+    let borders = &ForeignBorders::new(job, stores, &joined);
+    let mut tiles = meshed.iter().map(|part| part.tiles).fold(Default::default(), |mut all, part| {
+        all += part;
+        all
+    });
+    for (part, meshed) in parts.all().zip(&meshed) {
+        tiles += finish_part(borders, part, &meshed.waiting)?;
+    }
+    // Step 7 for each part.
+    let has_tileset = wants_tileset(plan, &tiles);
+    parts.all().try_for_each(|part| levels_of_part(job, stores, &joined, part, has_tileset).map(|_| ()))?;
+    // Step 7 above the parts, and step 8.
+    publish_parts(run, job, stores, &joined)
+}
+
+/// Writes the plan down, unless that is done.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be written.
+pub(crate) fn write_plan(journal: &Journal, directory: &JobDirectory, plan: &Plan) -> Result<()> {
+    journal.step(JobStep::Plan, || {
+        let files = vec![plan.write(&directory.plan())?];
+        Ok(StepOutput { files, ..StepOutput::new((), Vec::new()) })
+    })
+}
+
+/// Reads and meshes all parts, or those that an interrupted run left.
+fn read_and_mesh(job: &PartsJob) -> Result<Vec<MeshedPart>> {
+    let look = early_look(job)?;
+    let (mut read, mut meshed) = (Vec::<ReadInputs>::new(), Vec::<MeshedPart>::new());
+    // Bytes of points that wait, by part.
+    let mut waiting = vec![0; job.parts.all().len()];
+    for part in job.parts.all() {
+        let malformed = read.iter().map(|inputs| inputs.summary.counts.malformed).sum();
+        let inputs = read_for(job, part, malformed)?;
+        inputs.by_part.iter().for_each(|found| waiting[found.part.get()] += found.bytes);
+        read.push(inputs);
+        let stored = meshed.iter().map(|part| part.stored).sum::<u64>();
+        let others = waiting[part.get() + 1..].iter().sum::<u64>() + stored;
+        meshed.push(mesh_one(job, part, look.as_ref(), Some(others))?);
+        if job.checks {
+            drop_damaged_steps(job, part)?;
+        }
+    }
+    sum_up(job, read.iter())?;
+    Ok(meshed)
 }

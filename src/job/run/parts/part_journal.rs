@@ -3,10 +3,15 @@
 use crate::Result;
 use crate::job::durable::directory::JobDirectory;
 use crate::job::durable::lock::Lock;
-use crate::job::records::{Journal, JournalEntry, Store};
+use crate::job::progress::clock::JobClock;
+use crate::job::progress::stats::StageStats;
+use crate::job::records::{JobStep, Journal, JournalEntry, RecordRef, StepOutput, Store};
 use crate::job::run::part_entries::{PartHeader, open_store, records_of};
+use crate::job::run::parts::done::Done;
+use crate::job::run::parts::parts_job::PartsJob;
 use crate::job::run::run_context::RunContext;
 use crate::job::run::temporary_bytes::TemporaryBytes;
+use serde::Serialize;
 use std::sync::Mutex;
 
 /// A folder of steps that this process writes to.
@@ -14,44 +19,67 @@ pub(crate) struct PartSession<'a> {
     pub(crate) directory: &'a JobDirectory,
     pub(crate) store: Store,
     pub(crate) journal: Journal<'a>,
+    clock: JobClock,
     _lock: Lock,
 }
 
 impl<'a> PartSession<'a> {
-    /// Goes on from `entries`, whose records are whole.
+    /// Goes on from `entries`, whose records are whole, in the locked `directory`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`] on the folder, [`crate::Error::InUse`] if another process has it.
+    /// [`crate::Error::Io`] on the folder.
     pub(crate) fn begin(
         directory: &'a JobDirectory,
+        lock: Lock,
         header: PartHeader,
         entries: Vec<JournalEntry>,
     ) -> Result<PartSession<'a>> {
-        let lock = directory.lock()?;
+        let clock = JobClock::start();
         let records = records_of(&entries);
         let journal = Journal::begin(directory, &header, entries)?;
-        Ok(PartSession { directory, store: open_store(directory, &records)?, journal, _lock: lock })
+        Ok(PartSession { directory, store: open_store(directory, &records)?, journal, clock, _lock: lock })
     }
 
     /// Returns the context of steps in this folder.
-    pub(crate) fn context<'s>(&'s self, run: &RunContext<'s>) -> RunContext<'s>
+    pub(crate) fn context<'s>(&'s self, job: &PartsJob<'s>) -> RunContext<'s>
     where
         'a: 's,
     {
         RunContext {
-            triangulator: run.triangulator,
+            triangulator: job.triangulator,
             directory: self.directory,
             store: &self.store,
             journal: &self.journal,
-            progress: run.progress,
-            threads: run.threads,
-            clock: run.clock,
+            progress: job.progress,
+            threads: job.threads,
+            clock: job.clock,
             inputs_fingerprint: String::new(),
-            job_id: run.job_id,
-            resumed: run.resumed,
+            job_id: job.job_id,
+            resumed: job.resumed,
+            checks: job.checks,
             temporary: TemporaryBytes::default(),
             stages: Mutex::default(),
         }
+    }
+
+    /// Ends the session with `step`, which says that a phase is complete: with its figures, what its stages took, and records that others
+    /// read. Everything is on the disk before, so nobody has to check it.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    pub(crate) fn finish<T: Serialize>(
+        self,
+        step: JobStep,
+        figures: T,
+        stages: Vec<StageStats>,
+        records: Vec<RecordRef>,
+    ) -> Result<T> {
+        self.journal.commit()?;
+        self.store.sync()?;
+        let done = Done { figures, seconds: self.clock.wall_s(), stages };
+        let done = self.journal.record(step, StepOutput::new(done, records))?;
+        self.end()?;
+        Ok(done.figures)
     }
 
     /// Ends the session once the journal has all of it.

@@ -1,11 +1,11 @@
 //! The stores of parts that are meshed, opened when they are needed.
 
-use crate::Result;
 use crate::job::durable::directory::JobDirectory;
 use crate::job::index::PartIndex;
 use crate::job::partition::result::Partition;
-use crate::job::records::{JournalEntry, Store};
+use crate::job::records::{JobStep, Store};
 use crate::job::run::part_entries::{PartHeader, entries_of, open_store, records_of};
+use crate::{Error, Result};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -13,7 +13,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub(crate) struct OpenPart {
     pub(crate) store: Store,
     pub(crate) partition: Partition,
-    pub(crate) entries: Vec<JournalEntry>,
 }
 
 /// How many parts stay open for the next who asks. Each has a few open files.
@@ -42,9 +41,12 @@ impl PartStores {
         }
         let directory = self.directory.part(part);
         let entries = entries_of(&directory, PartHeader { job: self.job, part })?;
+        if !entries.iter().any(|entry| entry.step == JobStep::MeshPart) {
+            return Err(Error::Broken(format!("part {part} is not meshed")));
+        }
         let records = records_of(&entries);
         let store = open_store(&directory, &records)?;
-        let opened = Arc::new(OpenPart { partition: Partition::load(&store)?, store, entries });
+        let opened = Arc::new(OpenPart { partition: Partition::load(&store)?, store });
         open.push_back((part, opened.clone()));
         if open.len() > KEPT_OPEN {
             open.pop_front();

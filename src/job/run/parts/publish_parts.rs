@@ -1,6 +1,5 @@
-//! Coarser tiles of a job of several parts, and what is beside the tiles.
+//! The coarser tiles above the parts of a job, and what is beside the tiles.
 
-use crate::Result;
 use crate::job::index::{PartIndex, TileIndex};
 use crate::job::levels::hierarchy::Hierarchy;
 use crate::job::levels::make_level::{Child, LevelStats};
@@ -9,99 +8,146 @@ use crate::job::plan::no_points::no_point_is_left;
 use crate::job::publish::side_files::{EachTile, StoredTiles};
 use crate::job::publish::tileset_tree::TilesOfTree;
 use crate::job::records::Store;
-use crate::job::report::job_report::Report;
+use crate::job::report::job_report::{Report, SlowestPart};
 use crate::job::run::levels_step::{hierarchy_of, level_sizes, make_levels};
-use crate::job::run::part_entries::{PartHeader, StepsOfParts, entries_of};
+use crate::job::run::part_entries::{StepsOfParts, entries_of};
+use crate::job::run::parts::done::{Done, PartProgress};
 use crate::job::run::parts::join::JoinedParts;
-use crate::job::run::parts::mesh_phase::MeshedParts;
+use crate::job::run::parts::meshed_part::MeshedPart;
 use crate::job::run::parts::part_journal::PartSession;
 use crate::job::run::parts::part_store::PartStores;
 use crate::job::run::parts::parts_job::PartsJob;
+use crate::job::run::parts::read_phase::sum_up;
 use crate::job::run::publish_step::{
     MeshFigures, TilesetContent, WrittenFiles, publish, some_triangles, wants_tileset, write_report,
 };
-use crate::job::run::tile_queue::TileLook;
+use crate::job::run::run_context::RunContext;
 use crate::job::tiles::write_tile::TileStats;
 use crate::output::tiles3d::tileset::TilesetNode;
+use crate::{Error, Result};
+use std::sync::PoisonError;
 
-/// Makes the coarser tiles, writes what is beside the tiles, and the report.
+/// Makes the coarser tiles above the parts, writes what is beside the tiles, and the report.
 ///
 /// # Errors
 /// Those of the steps.
 pub(crate) fn publish_parts(
+    run: &RunContext,
     job: &PartsJob,
     stores: &PartStores,
     joined: &JoinedParts,
-    look: &TileLook,
-    meshed: &MeshedParts,
-    late: TileStats,
 ) -> Result<Report> {
-    let PartsJob { run, plan, .. } = *job;
-    let (mut tiles, mut leaves) = (late, LeafStats::default());
-    for part in &meshed.parts {
-        tiles += part.tiles;
-        leaves += part.leaves;
-    }
-    some_triangles(&tiles, plan)?;
-    let bounds = meshed.summary.bounds.ok_or_else(|| no_point_is_left(plan, &meshed.summary.counts))?;
-    let tileset =
-        wants_tileset(plan, &tiles).then(|| levels_and_root(job, stores, joined, look, meshed)).transpose()?;
+    let plan = job.plan;
+    let parts = job.parts.all().map(|part| PartProgress::of(&job.directory.part(part), job.header(part)));
+    let parts = parts.collect::<Result<Vec<PartProgress>>>()?;
+    let figures = PartFigures::of(&parts)?;
+    some_triangles(&figures.tiles, plan)?;
+    let summary = sum_up(job, parts.iter().filter_map(|part| Some(&part.read.as_ref()?.figures)))?;
+    let bounds = summary.bounds.ok_or_else(|| no_point_is_left(plan, &summary.counts))?;
+    add_stages(run, joined, &parts);
+    let tileset = wants_tileset(plan, &figures.tiles).then(|| levels_and_root(run, job, stores, joined, &figures));
     let all = TilesOfParts { job, stores };
-    let published = publish(run, plan, bounds, &WrittenFiles { stats: tiles, tiles: &all }, look, tileset)?;
+    let written = WrittenFiles { stats: figures.tiles, tiles: &all };
+    let published = publish(run, plan, bounds, &written, &joined.look, tileset.transpose()?)?;
     let figures = MeshFigures {
-        points: meshed.summary.counts.clone(),
-        leaves,
-        tiles,
-        temporary: meshed.parts.iter().map(|part| part.temporary).max().unwrap_or(0),
-        files: StepsOfParts::of(run.directory, run.job_id)?.files,
+        points: summary.counts,
+        leaves: figures.leaves,
+        tiles: figures.tiles,
+        temporary: figures.temporary,
+        files: StepsOfParts::of(job.directory, job.job_id)?.files,
+        parts: parts.len() as u64,
+        slowest_part: slowest(&parts),
+        cpu_s_of_tasks: if figures.by_tasks { processor_seconds(&parts) } else { 0.0 },
     };
     write_report(run, plan, figures, published)
 }
 
-/// Makes the coarser tiles of all parts, then those above, and returns the root of all.
+/// What all parts hold together.
+struct PartFigures {
+    leaves: LeafStats,
+    tiles: TileStats,
+    levels: LevelStats,
+    /// The points of each part.
+    points: Vec<u64>,
+    temporary: u64,
+    /// Whether tasks meshed the parts.
+    by_tasks: bool,
+}
+
+impl PartFigures {
+    fn of(parts: &[PartProgress]) -> Result<PartFigures> {
+        fn figures<T>(part: usize, done: &Option<Done<T>>) -> Result<&T> {
+            let done = done.as_ref().map(|done| &done.figures);
+            done.ok_or_else(|| Error::Broken(format!("part {part} is not complete")))
+        }
+        let (mut leaves, mut tiles, mut levels) = (LeafStats::default(), TileStats::default(), LevelStats::default());
+        let mut meshed: Vec<&MeshedPart> = Vec::with_capacity(parts.len());
+        for (part, progress) in parts.iter().enumerate() {
+            let mesh = figures(part, &progress.mesh)?;
+            leaves += mesh.leaves;
+            tiles += mesh.tiles;
+            tiles += *figures(part, &progress.tiles)?;
+            levels += *figures(part, &progress.levels)?;
+            meshed.push(mesh);
+        }
+        let temporary = meshed.iter().map(|mesh| mesh.temporary);
+        // All tasks together may have had as much at the same time.
+        let by_tasks = meshed.iter().any(|mesh| mesh.by_task);
+        let temporary = if by_tasks { temporary.sum() } else { temporary.max().unwrap_or(0) };
+        let points = meshed.iter().map(|mesh| mesh.points).collect();
+        Ok(PartFigures { leaves, tiles, levels, points, temporary, by_tasks })
+    }
+}
+
+/// Adds the stages of all parts to the report, in the order of the phases.
+fn add_stages(run: &RunContext, joined: &JoinedParts, parts: &[PartProgress]) {
+    for (phase, after) in [(0, false), (1, true), (2, false), (3, false)] {
+        parts.iter().flat_map(|part| part.stages()[phase]).for_each(|stage| run.add_stage(stage.clone()));
+        if after {
+            joined.stages.iter().for_each(|stage| run.add_stage(stage.clone()));
+        }
+    }
+}
+
+/// Returns the seconds of processor time of all phases of parts. The stages of meshing are kinds of work that go on at the same time.
+fn processor_seconds(parts: &[PartProgress]) -> f64 {
+    parts.iter().flat_map(PartProgress::stages).flatten().map(|stage| stage.cpu_s).sum()
+}
+
+fn slowest(parts: &[PartProgress]) -> Option<SlowestPart> {
+    let (part, slowest) = parts.iter().enumerate().max_by(|(_, a), (_, b)| a.seconds().total_cmp(&b.seconds()))?;
+    let points = slowest.mesh.as_ref()?.figures.points;
+    Some(SlowestPart { part: part as u64, seconds: slowest.seconds(), points })
+}
+
+/// Makes the coarser tiles above the parts, and returns the root of all.
 fn levels_and_root(
+    run: &RunContext,
     job: &PartsJob,
     stores: &PartStores,
     joined: &JoinedParts,
-    look: &TileLook,
-    meshed: &MeshedParts,
+    figures: &PartFigures,
 ) -> Result<TilesetContent> {
-    let PartsJob { run, plan, parts } = *job;
-    let mut stats = LevelStats::default();
-    for part in parts.all() {
-        stats += levels_of_part(job, stores, look, part)?;
-    }
-    let points: Vec<u64> = meshed.parts.iter().map(|part| part.points).collect();
-    let hierarchy = Hierarchy::above_parts(&parts.tree, &points, level_sizes(plan));
-    let session = PartSession::begin(&joined.directory, joined.header, entries_of(&joined.directory, joined.header)?)?;
-    let context = session.context(run);
+    let PartsJob { plan, parts, .. } = *job;
+    let hierarchy = Hierarchy::above_parts(&parts.tree, &figures.points, level_sizes(plan));
+    let lock = joined.directory.lock()?;
+    let entries = entries_of(&joined.directory, joined.header)?;
+    let session = PartSession::begin(&joined.directory, lock, joined.header, entries)?;
+    let context = session.context(job);
     let top_of = |part: PartIndex| {
         let open = stores.open(part)?;
-        Child::top(run.directory, &open.store, &open.partition.tree)
+        Child::top(job.directory, &open.store, &open.partition.tree)
     };
-    let above = make_levels(&context, plan, parts.tree.part, hierarchy, &look.style, &top_of)?;
-    run.add_stages(context);
+    let above = make_levels(&context, plan, parts.tree.part, hierarchy, &joined.look.style, &top_of)?;
+    let stages = context.stages.into_inner().unwrap_or_else(PoisonError::into_inner);
+    stages.into_iter().for_each(|stage| run.add_stage(stage));
+    let mut stats = figures.levels;
     stats += above.stats;
     let part_root = |part: PartIndex| root_of_part(job, stores, part);
     let hierarchy = &above.hierarchy;
     let root = TilesOfTree { store: &session.store, tree: &parts.tree, hierarchy, part_root: &part_root }.root()?;
     session.end()?;
     TilesetContent::new(root, stats)
-}
-
-fn levels_of_part(job: &PartsJob, stores: &PartStores, look: &TileLook, part: PartIndex) -> Result<LevelStats> {
-    let open = stores.open(part)?;
-    stores.close(part);
-    let directory = job.run.directory.part(part);
-    let header = PartHeader { job: job.run.job_id, part };
-    let session = PartSession::begin(&directory, header, entries_of(&directory, header)?)?;
-    let context = session.context(job.run);
-    let hierarchy = hierarchy_of(job.plan, &open.partition);
-    let no_other = |other: PartIndex| Err(crate::Error::Broken(format!("part {part} has no tile of part {other}")));
-    let made = make_levels(&context, job.plan, part, hierarchy, &look.style, &no_other)?;
-    job.run.add_stages(context);
-    session.end()?;
-    Ok(made.stats)
 }
 
 fn root_of_part(job: &PartsJob, stores: &PartStores, part: PartIndex) -> Result<Option<TilesetNode>> {

@@ -1,0 +1,87 @@
+//! What the journals of parts say of phases that are complete.
+
+use crate::Result;
+use crate::job::durable::directory::JobDirectory;
+use crate::job::levels::make_level::LevelStats;
+use crate::job::partition::part_points::ReadInputs;
+use crate::job::phase::Phase;
+use crate::job::progress::stats::StageStats;
+use crate::job::records::{JobStep, JournalEntry};
+use crate::job::run::part_entries::{PartHeader, entries_of_steps};
+use crate::job::run::parts::meshed_part::MeshedPart;
+use crate::job::tiles::write_tile::TileStats;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+/// A phase of a part that is complete.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct Done<T> {
+    /// What later phases and the report need to know of it.
+    pub(crate) figures: T,
+    /// How long it took, as far as the last process did it.
+    pub(crate) seconds: f64,
+    pub(crate) stages: Vec<StageStats>,
+}
+
+impl<T: DeserializeOwned> Done<T> {
+    /// Returns what `entries` say of `step`, if it is complete.
+    ///
+    /// # Errors
+    /// [`crate::Error::Broken`] if they are not understood.
+    pub(crate) fn find(entries: &[JournalEntry], step: JobStep) -> Result<Option<Done<T>>> {
+        entries.iter().find(|entry| entry.step == step).map(JournalEntry::stats).transpose()
+    }
+}
+
+/// The phases of a part that are complete.
+pub(crate) struct PartProgress {
+    pub(crate) read: Option<Done<ReadInputs>>,
+    pub(crate) mesh: Option<Done<MeshedPart>>,
+    pub(crate) tiles: Option<Done<TileStats>>,
+    pub(crate) levels: Option<Done<LevelStats>>,
+}
+
+impl PartProgress {
+    /// Reads the journal in `directory`, which is that of the part with `header`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`] or [`crate::Error::Broken`] on the journal.
+    pub(crate) fn of(directory: &JobDirectory, header: PartHeader) -> Result<PartProgress> {
+        let steps = [JobStep::Read(header.part), JobStep::MeshPart, JobStep::WriteWaiting, JobStep::Levels];
+        let entries = entries_of_steps(directory, header, |step| steps.contains(&step))?;
+        let [read, mesh, tiles, levels] = steps;
+        Ok(PartProgress {
+            read: Done::find(&entries, read)?,
+            mesh: Done::find(&entries, mesh)?,
+            tiles: Done::find(&entries, tiles)?,
+            levels: Done::find(&entries, levels)?,
+        })
+    }
+
+    /// Tells whether `phase` is complete.
+    pub(crate) fn has(&self, phase: Phase) -> bool {
+        match phase {
+            Phase::Read => self.read.is_some(),
+            Phase::Mesh => self.mesh.is_some(),
+            Phase::Tiles => self.tiles.is_some(),
+            Phase::Levels => self.levels.is_some(),
+            Phase::Plan | Phase::Join | Phase::Publish => false,
+        }
+    }
+
+    /// Returns how long the phases took together.
+    pub(crate) fn seconds(&self) -> f64 {
+        fn of<T>(done: &Option<Done<T>>) -> f64 {
+            done.as_ref().map_or(0.0, |done| done.seconds)
+        }
+        of(&self.read) + of(&self.mesh) + of(&self.tiles) + of(&self.levels)
+    }
+
+    /// Returns the stages of the phases, in order.
+    pub(crate) fn stages(&self) -> [&[StageStats]; 4] {
+        fn of<T>(done: &Option<Done<T>>) -> &[StageStats] {
+            done.as_ref().map_or(&[], |done| &done.stages)
+        }
+        [of(&self.read), of(&self.mesh), of(&self.tiles), of(&self.levels)]
+    }
+}

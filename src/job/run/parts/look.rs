@@ -1,0 +1,75 @@
+//! How tiles look in a job of several parts.
+
+use crate::geometry::Bounds;
+use crate::job::durable::columns::{ColumnReader, ColumnWriter};
+use crate::job::index::TileIndex;
+use crate::job::plan::job_plan::Claims;
+use crate::job::records::{Leaf, RecordRef, StepRecord, Store};
+use crate::job::run::parts::part_store::PartStores;
+use crate::job::run::parts::parts_job::PartsJob;
+use crate::job::run::tile_queue::TileLook;
+use crate::job::tiles::max_edge::MaxEdgeRule;
+use crate::output::options::MaxEdge;
+use crate::{Error, Result};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Returns how tiles look, unless all sites decide that.
+///
+/// # Errors
+/// [`Error::Broken`] if the job has no claims.
+pub(crate) fn early_look(job: &PartsJob) -> Result<Option<Arc<TileLook>>> {
+    match job.plan.options.output.max_edge {
+        MaxEdge::Auto => Ok(None),
+        choice => {
+            // No rule but "auto" looks at the sites.
+            let rule = MaxEdgeRule::new(choice, &job.plan.frame, 0, bounds(job)?, &|_| Ok(()))?;
+            look(job, rule).map(|look| Some(Arc::new(look)))
+        }
+    }
+}
+
+/// Counts all `sites` for the rule that looks at them, if the job has it, and stores the counts.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Broken`] on a store.
+pub(crate) fn count_sites(job: &PartsJob, stores: &PartStores, sites: u64, store: &Store) -> Result<Option<RecordRef>> {
+    let choice = job.plan.options.output.max_edge;
+    if choice != MaxEdge::Auto {
+        return Ok(None);
+    }
+    let visit = |visit: &(dyn Fn(&[i32; 3]) + Sync)| {
+        job.parts.all().try_for_each(|part| {
+            let open = stores.open(part)?;
+            let tiles: Vec<TileIndex> = open.partition.tree.tiles().collect();
+            tiles.into_par_iter().try_for_each(|tile| Leaf::visit_positions(&open.store, tile, visit))
+        })
+    };
+    let rule = MaxEdgeRule::new(choice, &job.plan.frame, sites, bounds(job)?, &visit)?;
+    ColumnWriter::default().push(rule.counts()).write(store, StepRecord::Spacing).map(Some)
+}
+
+/// Returns how tiles look. If `sites` sites decide that, `store` has their counts.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Broken`] on the store.
+pub(crate) fn final_look(job: &PartsJob, sites: u64, store: &Store) -> Result<Arc<TileLook>> {
+    if let Some(look) = early_look(job)? {
+        return Ok(look);
+    }
+    let counts = ColumnReader::open(store, StepRecord::Spacing)?.column_vec()?;
+    look(job, MaxEdgeRule::of_counts(sites, bounds(job)?, counts)?).map(Arc::new)
+}
+
+fn look(job: &PartsJob, rule: MaxEdgeRule) -> Result<TileLook> {
+    let Claims { bounds, max_rgb } = claims(job)?;
+    Ok(TileLook::new(job.plan, max_rgb, bounds, rule))
+}
+
+fn bounds(job: &PartsJob) -> Result<Bounds<3>> {
+    claims(job).map(|claims| claims.bounds)
+}
+
+fn claims(job: &PartsJob) -> Result<Claims> {
+    job.plan.claims.ok_or_else(|| Error::Broken("a job of several parts has no claims".into()))
+}

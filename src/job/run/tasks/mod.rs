@@ -1,0 +1,67 @@
+//! Tasks: a job of several parts done by many processes, on any machines that share the output directory.
+//!
+//! A task takes the parts that fall to it, and does one phase of each. Nothing passes between tasks but the plan and the folders of
+//! parts, each of which has one writer at a time. So a task may be killed, run twice or run elsewhere, and the results have the same
+//! bytes, however many tasks there are.
+
+mod dealing;
+pub(crate) mod missing;
+mod part_tasks;
+mod plan_task;
+mod planned_job;
+pub(crate) mod status;
+
+use crate::Result;
+use crate::job::durable::directory::JobDirectory;
+use crate::job::options::{JobOptions, RunOptions};
+use crate::job::phase::{Phase, Task};
+use crate::job::progress::clock::JobClock;
+use crate::job::report::job_report::Report;
+use crate::job::report::task_outcome::{DoneTask, TaskOutcome};
+use crate::job::run::alone::Alone;
+use crate::job::run::attempt::{EarlierWork, Walk, run_until_it_fits};
+use crate::job::run::tasks::missing::{JobProgressByPart, too_early};
+use crate::job::run::tasks::part_tasks::work_on_parts;
+use crate::job::run::tasks::plan_task::plan;
+use crate::job::run::tasks::planned_job::PlannedJob;
+
+/// What tasks say when they have nothing to do.
+const LEFT: &str = "the phase publish does all of it in one process";
+
+/// Does one task of one phase of a job. `walk` is what a process does that does all of it.
+///
+/// # Errors
+/// See [`crate::job::work`].
+pub(crate) fn work(options: &JobOptions, run: RunOptions, phase: Phase, task: Task, walk: Walk) -> Result<TaskOutcome> {
+    let clock = JobClock::start();
+    let mut done = DoneTask::new(phase, task);
+    // A phase with one task is done by the first.
+    if phase.is_by_part() || task.number == 1 {
+        match phase {
+            Phase::Publish => {
+                return publish(options, run, task, walk).map(|report| TaskOutcome::Published(report.into()));
+            }
+            Phase::Plan => done.note = plan(options, run)?,
+            _ => (done.parts, done.note) = work_on_parts(options, run, phase, task)?,
+        }
+    }
+    done.seconds = clock.wall_s();
+    Ok(TaskOutcome::Done(done))
+}
+
+/// Publishes a job whose other phases are complete, or does all of a job that tasks have left to one process.
+fn publish(options: &JobOptions, run: RunOptions, task: Task, walk: Walk) -> Result<Report> {
+    let directory = &JobDirectory::new(&options.output.directory);
+    let work = match Alone::find(directory)? {
+        Some(_) => EarlierWork::Interrupted,
+        None => {
+            let job = PlannedJob::open(directory, options)?.ok_or_else(|| too_early(Phase::Plan, &[1], 1))?;
+            if !job.is_complete {
+                let progress = JobProgressByPart::of(&job)?;
+                Phase::ALL[..6].iter().try_for_each(|&phase| progress.require(phase, task.count, |_| true))?;
+            }
+            EarlierWork::ByTasks
+        }
+    };
+    run_until_it_fits(options, run, walk, work)
+}

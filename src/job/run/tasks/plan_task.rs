@@ -1,0 +1,69 @@
+//! The phase plan.
+
+use crate::job::durable::directory::JobDirectory;
+use crate::job::options::{JobOptions, RunOptions};
+use crate::job::plan::budget::workers;
+use crate::job::plan::fingerprint::{Fingerprint, JobChange, JobHeader};
+use crate::job::plan::make_plan::make_plan;
+use crate::job::preflight::check::require_room;
+use crate::job::progress::clock::JobClock;
+use crate::job::progress::stage::JobProgress;
+use crate::job::run::alone::Alone;
+use crate::job::run::attempt::{coarsening_of, read_earlier};
+use crate::job::run::parts::write_plan;
+use crate::job::run::read_step::note_skipped;
+use crate::job::run::resume;
+use crate::job::run::tasks::planned_job::planned;
+use crate::threads::on_threads;
+use crate::{Error, Result, disk};
+
+/// Plans the job, unless that is done. Returns what there is to say.
+///
+/// # Errors
+/// Those of the plan; [`Error::InUse`] if another process works in the job directory.
+pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> Result<Option<String>> {
+    let directory = &JobDirectory::new(&options.output.directory);
+    directory.check_nothing_in_the_way()?;
+    let fingerprint = on_threads(workers(options, 0)?, || Fingerprint::of(options))?;
+    if is_planned(directory, &fingerprint)? {
+        return Ok(Some("the job is planned already".into()));
+    }
+    directory.check_results_are_ours()?;
+    let _lock = directory.lock()?;
+    let earlier = read_earlier(directory, run)?;
+    let coarsening = coarsening_of(directory, earlier.as_ref(), &fingerprint)?;
+    let header = JobHeader { fingerprint, coarsening, id: 0 };
+    let known = earlier.as_ref().and_then(|earlier| earlier.plan(directory, &header, options));
+    let plan = match known {
+        Some(plan) => plan,
+        None => on_threads(workers(options, 0)?, || make_plan(options, coarsening))?,
+    };
+    note_skipped(&plan.skipped, &JobProgress::new(run.progress, JobClock::start(), Vec::new()));
+    let threads = workers(options, plan.records)?;
+    if !run.force {
+        on_threads(threads, || require_room(&plan, threads))?;
+    }
+    if plan.is_one_part() {
+        Alone::AsItIs.note(directory)?;
+        return Ok(Some(format!("the job has only {} points, which is one part; {}", plan.records, super::LEFT)));
+    }
+    on_threads(threads, || {
+        let start = resume::start_parts(directory, &header, earlier, run.progress)?;
+        write_plan(&start.journal, directory, &plan)?;
+        start.journal.commit()?;
+        start.journal.close();
+        Ok(None)
+    })
+}
+
+/// Tells whether the job with this fingerprint is planned. Nobody starts it over meanwhile.
+fn is_planned(directory: &JobDirectory, fingerprint: &Fingerprint) -> Result<bool> {
+    let journal = directory.journal();
+    if !disk::exists(&journal).map_err(Error::io("read", &journal))? {
+        return Ok(false);
+    }
+    let _lock = directory.share_lock()?;
+    let is_same =
+        |known: &Fingerprint| fingerprint.since(known) == JobChange::Nothing && fingerprint.memory == known.memory;
+    Ok(planned(directory)?.is_some_and(|(header, _)| is_same(&header.fingerprint)))
+}

@@ -1,0 +1,77 @@
+//! The job that the phase plan has left, as tasks find it.
+
+use crate::job::durable::directory::JobDirectory;
+use crate::job::durable::journal;
+use crate::job::options::JobOptions;
+use crate::job::partition::parts::Parts;
+use crate::job::plan::fingerprint::JobHeader;
+use crate::job::plan::inputs::input_paths;
+use crate::job::plan::job_plan::Plan;
+use crate::job::records::{JobStep, StepRecord};
+use crate::{Error, Result};
+
+/// A job of several parts that is planned.
+pub(crate) struct PlannedJob {
+    pub(crate) directory: JobDirectory,
+    pub(crate) header: JobHeader,
+    pub(crate) plan: Plan,
+    pub(crate) parts: Parts,
+    /// Whether all results are written, so that only their places are left to take.
+    pub(crate) is_complete: bool,
+}
+
+impl PlannedJob {
+    /// Opens the plan in the job directory; `None` if there is none of a job of several parts.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if the options have changed since; [`Error::Io`] or [`Error::Broken`] on the plan.
+    pub(crate) fn open(directory: &JobDirectory, options: &JobOptions) -> Result<Option<PlannedJob>> {
+        let Some((header, is_complete)) = planned(directory)? else { return Ok(None) };
+        if let Some(what) = header.fingerprint.changed_options(options)? {
+            return Err(Error::Config(format!("{what}: changed since the job was planned; {AGAIN}")));
+        }
+        let plan = Plan { options: options.clone(), ..Plan::read(&directory.plan())? };
+        Ok(Some(PlannedJob { directory: directory.clone(), header, parts: Parts::of(&plan), plan, is_complete }))
+    }
+
+    /// Checks that the inputs of these numbers are those that were planned, and calls them what they are called by now.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if one has changed, [`Error::Io`] if one cannot be read.
+    pub(crate) fn find_inputs(&mut self, inputs: impl Iterator<Item = usize>) -> Result<()> {
+        let fingerprint = &self.header.fingerprint;
+        let renamed = fingerprint.present_names(&input_paths(&self.plan.options.input)?);
+        let renamed = renamed.ok_or_else(|| Error::Config(format!("[input] files names other files now; {AGAIN}")))?;
+        let known: Vec<_> = self.plan.inputs.iter().map(|input| input.source.path.clone()).collect();
+        self.plan.rename_inputs(&renamed);
+        for input in inputs {
+            let now = &self.plan.inputs[input].source.path;
+            if !fingerprint.has_same_content(&known[input], now)? {
+                return Err(Error::Config(format!("{} has changed since the job was planned; {AGAIN}", now.display())));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Returns the header of the planned job of several parts in the job directory, and whether all its results are written.
+///
+/// # Errors
+/// [`Error::Io`] if its journal cannot be read.
+pub(crate) fn planned(directory: &JobDirectory) -> Result<Option<(JobHeader, bool)>> {
+    let wanted = |step| matches!(step, JobStep::Plan | JobStep::Report);
+    let read = journal::read_steps::<JobHeader, JobStep, StepRecord>(directory, wanted)?;
+    let Some((Some(header), entries)) = read else { return Ok(None) };
+    let is_planned = |step: JobStep| entries.iter().any(|entry| entry.step == step);
+    let is_whole = || {
+        entries
+            .iter()
+            .flat_map(|entry| &entry.files)
+            .filter(|file| !directory.is_result(&file.name))
+            .all(|file| file.is_whole(directory))
+    };
+    let is_planned_and_whole = header.id != 0 && is_planned(JobStep::Plan) && is_whole();
+    Ok(is_planned_and_whole.then(|| (header, is_planned(JobStep::Report))))
+}
+
+const AGAIN: &str = "run the phase plan again, or let gdt-batch submit do it";

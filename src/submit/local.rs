@@ -1,0 +1,154 @@
+//! The engine "local": the tasks of a job as processes of this program on this machine, phase after phase. For tests, and for machines
+//! without a scheduler.
+
+use crate::job::phase::{Phase, PhaseTasks};
+use crate::submit::request::Request;
+use crate::{Error, Result, interrupt, say, threads};
+use std::ffi::OsString;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::Duration;
+
+/// How often the engine looks whether a task has ended.
+const PAUSE: Duration = Duration::from_millis(10);
+
+/// Runs tasks on this machine.
+pub struct LocalEngine<'a> {
+    /// Phases are dealt out to as many tasks as may run at the same time.
+    request: &'a Request,
+    quiet: bool,
+    json: bool,
+}
+
+/// A task under way. It is asked to stop if nobody waits for it any more.
+struct RunningTask {
+    number: u32,
+    child: Child,
+}
+
+impl Drop for RunningTask {
+    fn drop(&mut self) {
+        if let Ok(None) = self.child.try_wait() {
+            terminate(&self.child);
+            // What it has done is kept, so its end is worth waiting for.
+            let _ = self.child.wait();
+        }
+    }
+}
+
+impl<'a> LocalEngine<'a> {
+    /// Returns the engine for `request`. It takes no options that the user could have `added`.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if the user has added some.
+    pub fn new(request: &'a Request, added: &[String], quiet: bool, json: bool) -> Result<LocalEngine<'a>> {
+        match added.first() {
+            None => Ok(LocalEngine { request, quiet, json }),
+            Some(option) => Err(Error::Config(format!("{option}: the engine local takes no options after --"))),
+        }
+    }
+
+    /// Returns the commands that [`LocalEngine::run`] would run.
+    pub fn show(&self) -> String {
+        let mut text = String::new();
+        for phase in &self.request.phases {
+            for &task in &phase.missing {
+                let words = self.arguments(phase, task);
+                let words: Vec<_> = words.iter().map(|word| word.to_string_lossy()).collect();
+                text += &format!("{} {}\n", self.request.program.display(), words.join(" "));
+            }
+        }
+        text
+    }
+
+    /// Runs the tasks, phase after phase. After a phase of which tasks failed there is no use in the next.
+    ///
+    /// # Errors
+    /// [`Error::Tasks`] if tasks fail, [`Error::Interrupted`], [`Error::Io`] if a process cannot be started.
+    pub fn run(&self) -> Result<()> {
+        self.request.phases.iter().try_for_each(|phase| self.run_phase(phase))
+    }
+
+    fn run_phase(&self, phase: &PhaseTasks) -> Result<()> {
+        let mut waiting = phase.missing.iter().copied();
+        let (mut running, mut failed, mut worst) = (Vec::<RunningTask>::new(), Vec::new(), 0);
+        loop {
+            while running.len() < self.request.tasks as usize {
+                let Some(task) = waiting.next() else { break };
+                running.push(self.start(phase, task)?);
+            }
+            if running.is_empty() {
+                break;
+            }
+            interrupt::check()?;
+            std::thread::sleep(PAUSE);
+            let mut ended = Vec::new();
+            for task in &mut running {
+                if let Some(status) = task.child.try_wait().map_err(Error::io("wait for", &self.request.program))? {
+                    ended.push((task.number, status));
+                }
+            }
+            running.retain(|task| ended.iter().all(|(number, _)| *number != task.number));
+            for (number, status) in ended.into_iter().filter(|(_, status)| !status.success()) {
+                failed.push(number);
+                worst = worst.max(code_of(status));
+            }
+        }
+        failed.sort_unstable();
+        let (phase, count) = (phase.phase, phase.count);
+        if failed.is_empty() { Ok(()) } else { Err(Error::Tasks { phase: phase.name(), failed, count, code: worst }) }
+    }
+
+    fn start(&self, phase: &PhaseTasks, task: u32) -> Result<RunningTask> {
+        let mut command = Command::new(&self.request.program);
+        command.args(self.arguments(phase, task)).stdin(Stdio::null());
+        if phase.phase == Phase::Publish {
+            // What it prints is what a job prints.
+            command.args(self.json.then_some("--json"));
+        } else {
+            command.stdout(Stdio::null());
+        }
+        command.args(self.quiet.then_some("--quiet"));
+        if !self.quiet && phase.missing.first() == Some(&task) {
+            say(&format!("phase {}: {} of {} tasks", phase.phase, phase.missing.len(), phase.count));
+        }
+        let child = command.spawn().map_err(Error::io("start", &self.request.program))?;
+        Ok(RunningTask { number: task, child })
+    }
+
+    fn arguments(&self, phase: &PhaseTasks, task: u32) -> Vec<OsString> {
+        let mut words: Vec<OsString> = vec!["work".into(), self.request.config.clone().into()];
+        words.extend(["--phase", phase.phase.name()].map(OsString::from));
+        match phase.phase.is_by_part() {
+            true => words.extend(["--task".into(), format!("{task}/{}", phase.count).into()]),
+            false => words.extend(["--tasks".into(), self.request.tasks.to_string().into()]),
+        }
+        words.extend(["--threads".into(), self.threads(phase).to_string().into()]);
+        words
+    }
+
+    /// Returns the threads of each task, so that all that run at the same time have as many together as the job is to have.
+    fn threads(&self, phase: &PhaseTasks) -> usize {
+        let wanted = match self.request.threads {
+            0 => threads::available(),
+            threads => threads,
+        };
+        (wanted / (self.request.tasks as usize).min(phase.missing.len()).max(1)).max(1)
+    }
+}
+
+/// Returns the exit code of a task. One that a signal has ended may be tried again.
+fn code_of(status: ExitStatus) -> u8 {
+    status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(1)
+}
+
+/// Asks a task to stop. It keeps what it has done.
+#[cfg(target_os = "linux")]
+fn terminate(child: &Child) {
+    if let Some(process) = i32::try_from(child.id()).ok().and_then(rustix::process::Pid::from_raw) {
+        // It may have ended by itself.
+        let _ = rustix::process::kill_process(process, rustix::process::Signal::TERM);
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+fn terminate(_: &Child) {}

@@ -1,0 +1,270 @@
+//! Jobs that tasks do: any number of them leave the bytes that one process leaves, and what they cannot do by parts, `publish` does.
+
+use crate::clouds::{self, Cloud};
+use crate::las_file::LasFile;
+use crate::levels::hills;
+use crate::program::{Job, Said, gdt_batch, number};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const PHASES: [&str; 7] = ["plan", "read", "mesh", "join", "tiles", "levels", "publish"];
+
+fn in_files(folder: &Path, cloud: &Cloud, side: i64) -> Vec<PathBuf> {
+    let mut files: BTreeMap<[i64; 2], Cloud> = BTreeMap::new();
+    cloud.iter().for_each(|point| {
+        files.entry([point[0].div_euclid(side), point[1].div_euclid(side)]).or_default().push(*point)
+    });
+    let write = |([x, y], points): (&[i64; 2], &Cloud)| clouds::write(folder, &format!("{x}_{y}.csv"), points);
+    files.iter().map(write).collect()
+}
+
+fn in_parts(files: &[PathBuf], points: u64) -> Job {
+    Job::on(files).tiles_of(500).with("triangulation", &format!("max_points_per_part = {points}"))
+}
+
+/// Returns the checksums of all results but the report.
+fn bytes(job: &Job) -> String {
+    fs::read_to_string(job.out().join("XXH128SUMS")).unwrap()
+}
+
+/// Runs the program with the configuration of `job` after the command.
+#[track_caller]
+fn command(job: &Job, command: &str, arguments: &[&str]) -> Said {
+    let config = job.config();
+    gdt_batch(job.folder(), &[&[command, config.to_str().unwrap()], arguments].concat())
+}
+
+#[track_caller]
+fn local(job: &Job, tasks: u32) -> Said {
+    command(job, "submit", &["--engine", "local", "--tasks", &tasks.to_string()])
+}
+
+#[track_caller]
+fn task(job: &Job, phase: &str, task: &str) -> Said {
+    command(job, "work", &["--phase", phase, "--task", task])
+}
+
+/// Does all tasks of the phases before `phase`.
+#[track_caller]
+fn up_to(job: &Job, phase: &str, tasks: u32) {
+    for before in PHASES.iter().take_while(|before| **before != phase) {
+        (1..=tasks).for_each(|number| _ = task(job, before, &format!("{number}/{tasks}")).succeeded());
+    }
+}
+
+#[track_caller]
+fn status(job: &Job, tasks: u32) -> Value {
+    command(job, "status", &["--json", "--tasks", &tasks.to_string()]).succeeded().json()
+}
+
+#[test]
+fn any_number_of_tasks_leaves_the_bytes_of_one_process() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = in_files(folder.path(), &hills(20_000, 3), 4_000);
+    for (section, line) in
+        [("output", "levels = true"), ("output", "max_edge = \"auto\""), ("output", "format = \"glb\"")]
+    {
+        let job = || in_parts(&files, 2_500).with(section, line);
+        let one = job();
+        let report = one.report();
+        assert!(number(&report["parts"]) > 5);
+        for tasks in [1, 3, 8] {
+            let many = job();
+            let said = local(&many, tasks).succeeded();
+            assert!(said.out.contains("parts") && said.out.contains("the slowest"), "{}", said.out);
+            assert_eq!(bytes(&many), bytes(&one), "{line}, {tasks} tasks");
+            assert!(!many.out().join("job").exists());
+            let written: Value = serde_json::from_slice(&fs::read(many.out().join("report.json")).unwrap()).unwrap();
+            for figure in ["sites", "triangles", "points", "levels", "vertex_digest", "parts", "tiles", "bytes_written"]
+            {
+                assert_eq!(written[figure], report[figure], "{figure}");
+            }
+            let stages = |report: &Value| -> Vec<Value> {
+                let stages = report["stages"].as_array().unwrap().iter();
+                stages.map(|stage| json!([stage["stage"], stage["done"]])).collect()
+            };
+            assert_eq!(stages(&written), stages(&report));
+        }
+        one.verified();
+    }
+}
+
+#[test]
+fn the_environment_tells_a_task_its_number() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = in_files(folder.path(), &hills(10_000, 4), 4_000);
+    let (job, one) = (in_parts(&files, 1_500), in_parts(&files, 1_500));
+    one.report();
+    let config = job.config();
+    let run = |phase: &str, variables: &[(&str, String)], more: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_gdt-batch"));
+        command.args(["work", config.to_str().unwrap(), "--phase", phase]).args(more).current_dir(job.folder());
+        command.envs(variables.iter().map(|(name, value)| (name, value))).output().unwrap()
+    };
+    for phase in PHASES {
+        for number in 1..=3 {
+            let slurm = |name: &'static str, value: u32| (name, value.to_string());
+            let index = number - 1;
+            let outcome = match phase {
+                "read" => run(phase, &[("JOB_COMPLETION_INDEX", index.to_string())], &["--tasks", "3"]),
+                "tiles" => run(phase, &[("AWS_BATCH_JOB_ARRAY_INDEX", index.to_string())], &["--tasks", "3"]),
+                "mesh" | "levels" => {
+                    let ends = [slurm("SLURM_ARRAY_TASK_MAX", 3), slurm("SLURM_ARRAY_TASK_COUNT", 3)];
+                    run(phase, &[slurm("SLURM_ARRAY_TASK_ID", number), ends[0].clone(), ends[1].clone()], &[])
+                }
+                _ if number == 1 => run(phase, &[], &["--tasks", "3"]),
+                _ => continue,
+            };
+            assert!(outcome.status.success(), "{phase}: {outcome:?}");
+        }
+    }
+    assert_eq!(bytes(&job), bytes(&one));
+    let nameless = run("mesh", &[], &[]);
+    assert_eq!(nameless.status.code(), Some(2), "{nameless:?}");
+}
+
+#[test]
+fn a_phase_too_early_names_what_is_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = in_files(folder.path(), &hills(12_000, 5), 4_000);
+    let job = in_parts(&files, 2_000);
+    for phase in &PHASES[1..] {
+        task(&job, phase, "1/3").refused(1, &["the phase plan is not complete"]);
+        assert!(!job.out().exists(), "a task makes no job");
+    }
+    up_to(&job, "read", 3);
+    task(&job, "read", "2/3").succeeded();
+    for (phase, missing) in [("join", "read is not complete: tasks 1, 3 of 3"), ("tiles", "join"), ("levels", "join")] {
+        task(&job, phase, "1/3").refused(1, &[missing, "gdt-batch submit"]);
+    }
+    task(&job, "publish", "1/3").refused(1, &["read is not complete: tasks 1, 3 of 3 are missing"]);
+    up_to(&job, "mesh", 3);
+    task(&job, "mesh", "1/3").succeeded();
+    task(&job, "mesh", "3/3").succeeded();
+    task(&job, "join", "1/3").refused(1, &["mesh is not complete: task 2 of 3 is missing"]);
+    let found = status(&job, 3);
+    assert_eq!(found["state"], "under-way");
+    let missing: Vec<&Value> =
+        found["phases"].as_array().unwrap().iter().map(|phase| &phase["missing_tasks"]).collect();
+    assert_eq!(json!(missing), json!([[], [], [2], [1], [1, 2, 3], [1, 2, 3], [1]]));
+    let mesh = &found["phases"][2];
+    assert_eq!(number(&mesh["done"]) + mesh["missing_parts"].as_array().unwrap().len() as u64, number(&mesh["of"]));
+    assert!(number(&mesh["of"]) > 3 && found["slowest_part"]["seconds"].as_f64().unwrap() > 0.0);
+    // Only what is missing is sent.
+    let shown = command(&job, "submit", &["--engine", "local", "--tasks", "3", "--dry-run"]).succeeded().out;
+    let tasks: Vec<&str> = shown.lines().filter_map(|line| line.split_once("--phase ")).map(|(_, task)| task).collect();
+    assert_eq!(tasks.len(), 9, "{shown}");
+    assert!(tasks[0].starts_with("mesh --task 2/3") && tasks[1].starts_with("join"), "{shown}");
+    local(&job, 3).succeeded();
+    job.verified();
+    assert_eq!(status(&job, 3)["state"], "done");
+}
+
+#[test]
+fn tasks_and_one_process_go_on_with_each_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = in_files(folder.path(), &hills(12_000, 6), 4_000);
+    let one = in_parts(&files, 2_000);
+    one.report();
+    for phase in &PHASES[1..] {
+        let job = in_parts(&files, 2_000);
+        up_to(&job, phase, 2);
+        // Twice changes nothing, and neither does half of a phase by as many tasks as nobody else has.
+        task(&job, PHASES[PHASES.iter().position(|other| other == phase).unwrap() - 1], "1/2").succeeded();
+        if *phase != "publish" {
+            task(&job, phase, "2/5").succeeded();
+        }
+        let report = job.report();
+        assert!(number(&report["resumed"]) > 0, "{phase}");
+        assert_eq!(bytes(&job), bytes(&one), "{phase}");
+    }
+}
+
+#[test]
+fn a_small_job_is_left_to_publish() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = in_files(folder.path(), &hills(3_000, 7), 4_000);
+    let (job, one) = (Job::on(&files).tiles_of(500), Job::on(&files).tiles_of(500));
+    one.report();
+    up_to(&job, "publish", 2);
+    assert!(task(&job, "mesh", "1/2").succeeded().out.contains("the phase publish does all of it"));
+    assert_eq!(status(&job, 2)["state"], "left-to-publish");
+    local(&job, 2).succeeded();
+    assert_eq!(bytes(&job), bytes(&one));
+}
+
+/// The header of one file claims a box that does not hold all its points, and another file is damaged and to be left out.
+#[test]
+fn one_bad_file_ends_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut files = in_files(folder.path(), &hills(12_000, 8), 4_000);
+    let mut text = fs::read_to_string(&files[5]).unwrap();
+    text.push_str("1.0,not a number,2\n");
+    fs::write(&files[5], &text).unwrap();
+    let mut bytes_of_spiral = LasFile::new(2, 2, 0, 120_000).las();
+    let reach = 10.0 * 60_000.0 * 0.01;
+    let claims =
+        [(179, 5e5 + reach), (187, 5e5 - reach), (195, 4e6 + reach), (203, 4e6 - reach), (211, 1.0), (219, -1.0)];
+    for (at, value) in claims {
+        bytes_of_spiral[at..at + 8].copy_from_slice(&f64::to_le_bytes(value));
+    }
+    let spiral = folder.path().join("spiral.las");
+    fs::write(&spiral, bytes_of_spiral).unwrap();
+    let skip = |files: &[PathBuf]| {
+        in_parts(files, 2_000).with("input", "on_bad_file = \"skip\"\nmax_malformed_fraction = 0.0")
+    };
+    let spirals =
+        |_: &[PathBuf]| Job::on(&[&spiral]).tiles_of(10_000).with("triangulation", "max_points_per_part = 20000");
+    for (what, job) in [("damaged", &skip as &dyn Fn(&[PathBuf]) -> Job), ("wrong header", &spirals)] {
+        let (many, one) = (job(&files), job(&files));
+        let report = one.report();
+        let said = local(&many, 3).succeeded();
+        assert_eq!(bytes(&many), bytes(&one), "{what}: {}", said.err);
+        let written: Value = serde_json::from_slice(&fs::read(many.out().join("report.json")).unwrap()).unwrap();
+        assert_eq!((&written["skipped"], &written["parts"]), (&report["skipped"], &report["parts"]), "{what}");
+    }
+    // Where bad files are not to be left out, the task that reads one says which it is.
+    files.truncate(12);
+    let stop = in_parts(&files, 2_000).with("input", "max_malformed_fraction = 0.0");
+    let said = local(&stop, 3);
+    assert_eq!(said.code, 3, "{}", said.err);
+    assert!(said.err.contains(files[5].file_name().unwrap().to_str().unwrap()), "{}", said.err);
+}
+
+/// Two clusters so far from each other that single precision cannot hold the triangles between them: the lattice becomes coarser.
+#[test]
+fn a_mesh_too_fine_is_left_to_publish() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |offset: i64| hills(4_000, 9).into_iter().map(move |[x, y, z]| [x + offset, y, z]);
+    let cloud: Cloud = at(0).chain(at(60_000_000)).collect();
+    let files = in_files(folder.path(), &cloud, 10_000);
+    let (many, one) = (in_parts(&files, 2_000), in_parts(&files, 2_000));
+    let said = one.run().succeeded();
+    assert!(said.err.contains("starting again with a coarser step"), "{}", said.err);
+    local(&many, 3).succeeded();
+    assert_eq!(bytes(&many), bytes(&one));
+}
+
+#[test]
+fn what_has_changed_since_the_plan_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = in_files(folder.path(), &hills(12_000, 10), 4_000);
+    let job = in_parts(&files, 2_000);
+    up_to(&job, "mesh", 2);
+    let job = job.with("output", "color = \"ramp\"");
+    for phase in &PHASES[2..] {
+        task(&job, phase, "1/2").refused(2, &["[output] color", "changed since the job was planned", "phase plan"]);
+    }
+    // The plan starts the job over.
+    local(&job, 2).succeeded();
+    job.verified();
+    let text = fs::read_to_string(&files[0]).unwrap();
+    up_to(&job, "read", 2);
+    fs::write(&files[0], text.lines().rev().map(|line| format!("{line}\n")).collect::<String>()).unwrap();
+    let said = [1, 2].map(|number| task(&job, "read", &format!("{number}/2")));
+    let refused = said.iter().find(|said| said.code != 0).expect("a task reads the file");
+    refused.refused(2, &[files[0].file_name().unwrap().to_str().unwrap(), "has changed since the job was planned"]);
+}

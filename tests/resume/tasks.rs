@@ -1,0 +1,167 @@
+//! Tasks that are killed, run twice, or come while another process works on the job.
+
+use crate::rig::{End, Rig, Run, Setup};
+use crate::scattered;
+use std::collections::BTreeSet;
+use std::fs;
+use std::process::Command;
+
+const PHASES: [&str; 7] = ["plan", "read", "mesh", "join", "tiles", "levels", "publish"];
+
+/// Returns a job of several parts, on files of neighbouring points.
+fn job_of_parts() -> Rig {
+    let setup = Setup::tiles_of(700);
+    let setup = Setup { triangulation: format!("{}\nmax_points_per_part = 4000", setup.triangulation), ..setup };
+    let rig = Rig::of_files(tempfile::tempdir().unwrap(), &scattered::gaussian(24_000), 60_000, &setup);
+    assert!(rig.expected.len() > 60);
+    rig
+}
+
+fn task(rig: &Rig, phase: &str, task: &str) -> Command {
+    rig.command_of(&["work", "job.toml", "--phase", phase, "--task", task])
+}
+
+fn local(rig: &Rig, tasks: u32) -> Command {
+    rig.command_of(&["submit", "job.toml", "--engine", "local", "--tasks", &tasks.to_string()])
+}
+
+fn run(mut command: Command) -> End {
+    Run::start(&mut command).end()
+}
+
+/// Does all tasks of the phases before `phase`.
+#[track_caller]
+fn up_to(rig: &Rig, phase: &str, tasks: u32) {
+    for before in PHASES.iter().take_while(|before| **before != phase) {
+        (1..=tasks).for_each(|number| _ = run(task(rig, before, &format!("{number}/{tasks}"))).succeeded());
+    }
+}
+
+#[track_caller]
+fn completes(rig: &Rig, tasks: u32, what: &str) {
+    let end = run(local(rig, tasks));
+    assert!(end.status.success(), "{what}: {end:?}");
+    rig.is_complete(what);
+    rig.forget();
+}
+
+#[test]
+fn tasks_killed_at_any_place_of_any_phase_leave_the_same_bytes() {
+    let rig = job_of_parts().committing_every(0);
+    let (mut kills, mut of_phase) = (0, BTreeSet::new());
+    let places = ["commit", "published", "torn", "committed"];
+    let more = [("mesh", "freeing"), ("mesh", "freed"), ("publish", "replacing"), ("publish", "cleaning")];
+    let all = PHASES.iter().flat_map(|phase| places.map(|place| (*phase, place)));
+    for (at, (phase, place)) in all.chain(more).enumerate() {
+        up_to(&rig, phase, 2);
+        let count = if phase == "plan" || phase == "join" { 1 } else { 1 + at as u64 % 4 };
+        for number in 1..=2 {
+            let mut killed = task(&rig, phase, &format!("{number}/2"));
+            let end = run({
+                killed.env("GDT_FAULT", format!("{place}:{count}"));
+                killed
+            });
+            assert!(end.was_killed() || end.status.success(), "{end:?}");
+            if end.was_killed() {
+                kills += 1;
+                of_phase.insert(phase);
+            }
+            rig.has_nothing_half_written(&format!("{phase}: {place} {count}"));
+        }
+        completes(&rig, 3, &format!("{phase}: {place} {count}"));
+    }
+    assert!(kills >= 32 && of_phase.len() == PHASES.len(), "{kills} kills in {of_phase:?}");
+}
+
+/// Returns the processes that `parent` has started.
+fn children(parent: u32) -> Vec<u32> {
+    let list = fs::read_to_string(format!("/proc/{parent}/task/{parent}/children")).unwrap_or_default();
+    list.split_whitespace().map(|process| process.parse().unwrap()).collect()
+}
+
+#[test]
+fn processes_of_local_killed_at_random_moments_leave_the_same_bytes() {
+    let rig = job_of_parts().committing_every(10);
+    let mut random = crate::random::Random::new(11);
+    let (mut killed, mut runs) = (0, 0);
+    while killed < 30 && runs < 200 {
+        runs += 1;
+        let run = Run::start(&mut local(&rig, 3));
+        std::thread::sleep(std::time::Duration::from_millis(random.below(400)));
+        // A task of it, or the engine itself.
+        let tasks = children(run.child.id());
+        let victim = match random.below(4) {
+            0 => Some(run.child.id()),
+            other => tasks.get(other as usize - 1).copied(),
+        };
+        let kill =
+            |process: u32| Command::new("kill").args(["-9", &process.to_string()]).output().unwrap().status.success();
+        killed += u64::from(victim.is_some_and(kill));
+        let end = run.end();
+        assert!(end.was_killed() || matches!(end.status.code(), Some(0 | 1)), "{end:?}");
+        if end.was_killed() {
+            // Its tasks go on without it.
+            while tasks.iter().any(|task| fs::metadata(format!("/proc/{task}")).is_ok()) {
+                std::thread::sleep(std::time::Duration::from_millis(1));
+            }
+        }
+        rig.has_nothing_half_written(&format!("kill {killed}"));
+        if end.status.success() {
+            rig.is_complete(&format!("after {killed} kills"));
+            rig.forget();
+        }
+    }
+    assert!(killed >= 20, "only {killed} kills");
+    completes(&rig, 8, "in the end");
+}
+
+#[test]
+fn a_second_worker_leaves_a_part_that_another_has() {
+    let rig = job_of_parts().committing_every(0);
+    up_to(&rig, "mesh", 1);
+    let mut first = Run::start(&mut task(&rig, "mesh", "1/1"));
+    let begun = rig.out().join("job/parts/0/steps.0.store");
+    let before = fs::metadata(&begun).map_or(0, |data| data.len());
+    first.wait_until(|| fs::metadata(&begun).is_ok_and(|data| data.len() > before));
+    first.signal("STOP");
+    let second = run(task(&rig, "mesh", "1/1")).stopped(&["part 0 is left out", "is working in"]);
+    assert!(second.err.contains(&format!("process {} on", first.child.id())), "{}", second.err);
+    // It has done the others.
+    run(task(&rig, "join", "1/1")).stopped(&["mesh is not complete: task 1 of 1 is missing"]);
+    // One process must wait for the tasks, and so must the phases that need the job alone.
+    rig.run().stopped(&["another task of this job is working in"]);
+    first.signal("CONT");
+    first.end().succeeded();
+    run(task(&rig, "join", "1/1")).succeeded();
+    completes(&rig, 2, "after a second worker");
+}
+
+#[test]
+fn tasks_wait_for_a_process_that_has_the_job_alone() {
+    let rig = job_of_parts().committing_every(0);
+    let mut alone = Run::start(&mut rig.command());
+    let begun = rig.out().join("job/parts/2");
+    alone.wait_until(|| begun.exists());
+    alone.signal("STOP");
+    for phase in ["read", "mesh", "join", "tiles", "levels"] {
+        run(task(&rig, phase, "1/1")).stopped(&[&format!("process {} on", alone.child.id()), "is working in"]);
+    }
+    alone.signal("CONT");
+    alone.end().succeeded();
+    rig.is_complete("beside tasks");
+}
+
+#[test]
+fn a_task_that_is_asked_to_stop_keeps_what_it_has_done() {
+    let rig = job_of_parts().committing_every(0);
+    up_to(&rig, "mesh", 1);
+    let mut asked = Run::start(&mut task(&rig, "mesh", "1/1"));
+    let begun = rig.out().join("job/parts/1/steps.1.store");
+    asked.wait_until(|| begun.exists());
+    asked.signal("TERM");
+    asked.end().stopped(&["interrupted"]);
+    let again = run(rig.command_of(&["status", "job.toml", "--json"])).succeeded();
+    let status: serde_json::Value = serde_json::from_str(&again.out).unwrap();
+    assert!(status["phases"][2]["done"].as_u64() >= Some(1), "{status}");
+    completes(&rig, 3, "after a signal");
+}
