@@ -126,6 +126,9 @@ pub enum CliCommand {
         /// Send nothing, and print what the engine would get.
         #[arg(long)]
         dry_run: bool,
+        /// Options of the engine: with slurm those of sbatch; with kubernetes see `-- --help`.
+        #[arg(last = true, value_name = "ENGINE OPTIONS")]
+        added: Vec<String>,
     },
     /// Show how far a job is that tasks are doing, and what is missing.
     Status {
