@@ -209,8 +209,14 @@ pub(crate) fn start_parts<'a>(
                 forget_levels(directory)?;
             }
             let steps = entries.len() as u64 + of_parts;
-            progress.note(&format!("going on with an interrupted run: {steps} steps are done"));
-            let fingerprint = header.fingerprint.with_names_of(&old.fingerprint);
+            if steps > 0 {
+                progress.note(&format!("going on with an interrupted run: {steps} steps are done"));
+            }
+            // Only a plan that stays calls the inputs what they were called.
+            let fingerprint = match entries.is_empty() {
+                true => header.fingerprint.clone(),
+                false => header.fingerprint.with_names_of(&old.fingerprint),
+            };
             (entries, JobHeader { fingerprint, coarsening: header.coarsening, id: old.id }, of_parts)
         }
         None => {
