@@ -303,12 +303,11 @@ mod tests {
     }
 
     /// The shell of the pod runs a `gdt-batch` that prints its arguments.
+    #[cfg(unix)]
     #[test]
     fn a_pod_of_some_tasks_does_the_one_of_its_index() {
         let folder = tempfile::tempdir().unwrap();
-        let stub = folder.path().join("gdt-batch");
-        std::fs::write(&stub, "#!/bin/sh\necho \"$@\"\n").unwrap();
-        assert!(Command::new("chmod").arg("+x").arg(&stub).status().unwrap().success());
+        std::os::unix::fs::symlink("/bin/echo", folder.path().join("gdt-batch")).unwrap();
         let phases = vec![PhaseTasks { phase: Phase::Tiles, count: 64, missing: vec![3, 7, 41] }];
         let jobs = read(&Request { phases, ..request("/data/it's $x.toml", 64) }, &[]);
         assert_eq!(jobs[0]["spec"]["completions"], 3);
