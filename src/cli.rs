@@ -120,7 +120,7 @@ pub enum CliCommand {
         /// The engine.
         #[arg(long, value_enum)]
         engine: Engine,
-        /// The number of tasks that each phase is dealt out to. With `local`, as many run at once.
+        /// The number of tasks that each phase is dealt out to. With `local`, at most as many run at once.
         #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_TASKS)))]
         tasks: u32,
         /// Send nothing, and print what the engine would get.

@@ -13,7 +13,6 @@ const PAUSE: Duration = Duration::from_millis(10);
 
 /// Runs tasks on this machine.
 pub struct LocalEngine<'a> {
-    /// Phases are dealt out to as many tasks as may run at the same time.
     request: &'a Request,
     quiet: bool,
     json: bool,
@@ -72,7 +71,7 @@ impl<'a> LocalEngine<'a> {
         let mut waiting = phase.missing.iter().copied();
         let (mut running, mut failed, mut worst) = (Vec::<RunningTask>::new(), Vec::new(), 0);
         loop {
-            while running.len() < self.request.tasks as usize {
+            while running.len() < self.at_once(phase) {
                 let Some(task) = waiting.next() else { break };
                 running.push(self.start(phase, task)?);
             }
@@ -126,13 +125,18 @@ impl<'a> LocalEngine<'a> {
         words
     }
 
+    /// Returns how many tasks run at the same time: no more than the machine can run.
+    fn at_once(&self, phase: &PhaseTasks) -> usize {
+        (self.request.tasks as usize).min(phase.missing.len()).min(threads::available()).max(1)
+    }
+
     /// Returns the threads of each task, so that all that run at the same time have as many together as the job is to have.
     fn threads(&self, phase: &PhaseTasks) -> usize {
         let wanted = match self.request.threads {
             0 => threads::available(),
             threads => threads,
         };
-        (wanted / (self.request.tasks as usize).min(phase.missing.len()).max(1)).max(1)
+        (wanted / self.at_once(phase)).max(1)
     }
 }
 
