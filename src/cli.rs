@@ -120,12 +120,15 @@ pub enum CliCommand {
         /// The engine.
         #[arg(long, value_enum)]
         engine: Engine,
-        /// The number of tasks that each phase is dealt out to. With `local`, as many run at once.
+        /// The number of tasks that each phase is dealt out to. With `local`, at most as many run at once.
         #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_TASKS)))]
         tasks: u32,
         /// Send nothing, and print what the engine would get.
         #[arg(long)]
         dry_run: bool,
+        /// Options of the engine: with slurm those of sbatch; with kubernetes see `-- --help`.
+        #[arg(last = true, value_name = "ENGINE OPTIONS")]
+        added: Vec<String>,
     },
     /// Show how far a job is that tasks are doing, and what is missing.
     Status {

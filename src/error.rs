@@ -59,6 +59,9 @@ pub enum Error {
     /// The job does not fit the memory it was given (exit code 1).
     #[error("not enough memory: {0}")]
     Memory(String),
+    /// The scheduler of a cluster refused something, or has something to do first (exit code 1).
+    #[error("{0}")]
+    Engine(String),
     /// The process was asked to stop (exit code 1).
     #[error("interrupted")]
     Interrupted,
@@ -165,6 +168,7 @@ impl Error {
             | Error::Unfinished { .. }
             | Error::TooEarly(_)
             | Error::Memory(_)
+            | Error::Engine(_)
             | Error::Interrupted => 1,
             Error::Resumable { why, .. } => why.exit_code(),
             Error::Tasks { code, .. } => *code,

@@ -7,16 +7,16 @@ use gdt_batch::cli::{Cli, CliCommand, PrintOptions};
 use gdt_batch::gpu::selftest;
 use gdt_batch::job;
 use gdt_batch::job::options::{JobOptions, RunOptions, Threads};
-use gdt_batch::job::phase::{Phase, Task};
+use gdt_batch::job::phase::{Phase, PhaseTasks, Task};
 use gdt_batch::job::preflight::check;
 use gdt_batch::job::progress::stage::ProgressOutput;
 use gdt_batch::job::report::job_report::Report;
 use gdt_batch::job::report::skipped_inputs::skipped_summary;
 use gdt_batch::job::report::task_outcome::TaskOutcome;
 use gdt_batch::output::file_names::OutputFiles;
-use gdt_batch::submit::Engine;
 use gdt_batch::submit::local::LocalEngine;
 use gdt_batch::submit::request::Request;
+use gdt_batch::submit::{Engine, kubernetes, slurm};
 use gdt_batch::threads::{self, on_threads};
 use gdt_batch::verify::Conclusion;
 use gdt_batch::{Error, Result, config, input, interrupt, sample, say, shortage, verify};
@@ -55,8 +55,9 @@ fn run(cli: Cli) -> Result<ExitCode> {
             let run = RunOptions { progress, force: *force, restart: false };
             work(config, *phase, task, *threads, run, print)
         }
-        (Some(CliCommand::Submit { config, engine, tasks, dry_run }), _) => {
-            submit_job(config, *engine, *tasks, *dry_run, print)
+        (Some(CliCommand::Submit { config, engine, tasks, dry_run, added }), _) => {
+            let request = request(config, *engine, *tasks)?;
+            if *dry_run { show_tasks(*engine, &request, added) } else { submit(*engine, &request, added, print) }
         }
         (Some(CliCommand::Status { config, tasks }), _) => {
             print_result(&job::status(&config::load(config)?, *tasks)?, print).map(|()| ExitCode::SUCCESS)
@@ -124,16 +125,35 @@ fn work(
     }
 }
 
-fn submit_job(path: &Path, engine: Engine, tasks: u32, dry_run: bool, print: PrintOptions) -> Result<ExitCode> {
+/// Returns the tasks that are missing of the job that the configuration at `path` describes.
+fn request(path: &Path, engine: Engine, tasks: u32) -> Result<Request> {
     let config = config::load(path)?;
-    let request = Request::new(path, &config, job::missing_tasks(&config, tasks)?)?;
+    // The inputs may be where only the pods of Kubernetes see them.
+    let is_out_of_sight = engine == Engine::Kubernetes && !config.output.directory.exists();
+    let phases = if is_out_of_sight { PhaseTasks::all(tasks) } else { job::missing_tasks(&config, tasks)? };
+    Request::new(path, &config, tasks, phases)
+}
+
+/// Prints what an engine would get.
+fn show_tasks(engine: Engine, request: &Request, added: &[String]) -> Result<ExitCode> {
+    let text = match engine {
+        Engine::Slurm => slurm::show(request, added)?,
+        Engine::Kubernetes => kubernetes::show(request, added)?,
+        Engine::Local => LocalEngine::new(request, added, false, false)?.show(),
+    };
+    print_text(&text).map(|()| ExitCode::SUCCESS)
+}
+
+fn submit(engine: Engine, request: &Request, added: &[String], print: PrintOptions) -> Result<ExitCode> {
     match engine {
+        Engine::Slurm => print_result(&slurm::send(request, added)?, print)?,
+        Engine::Kubernetes => print_result(&kubernetes::send(request, added)?, print)?,
         Engine::Local => {
             interrupt::listen()?;
-            let local = LocalEngine::new(&request, tasks, print.quiet, print.json);
-            if dry_run { print_text(&local.show()) } else { local.run() }.map(|()| ExitCode::SUCCESS)
+            LocalEngine::new(request, added, print.quiet, print.json)?.run()?;
         }
     }
+    Ok(ExitCode::SUCCESS)
 }
 
 fn check_job(path: &Path, print: PrintOptions) -> Result<ExitCode> {

@@ -14,8 +14,6 @@ const PAUSE: Duration = Duration::from_millis(10);
 /// Runs tasks on this machine.
 pub struct LocalEngine<'a> {
     request: &'a Request,
-    /// How many tasks phases are dealt out to, and the most that run at the same time.
-    tasks: u32,
     quiet: bool,
     json: bool,
 }
@@ -37,9 +35,15 @@ impl Drop for RunningTask {
 }
 
 impl<'a> LocalEngine<'a> {
-    /// Returns the engine for `request`, whose phases are dealt out to `tasks` tasks.
-    pub fn new(request: &'a Request, tasks: u32, quiet: bool, json: bool) -> LocalEngine<'a> {
-        LocalEngine { request, tasks, quiet, json }
+    /// Returns the engine for `request`. It takes no options that the user could have `added`.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if the user has added some.
+    pub fn new(request: &'a Request, added: &[String], quiet: bool, json: bool) -> Result<LocalEngine<'a>> {
+        match added.first() {
+            None => Ok(LocalEngine { request, quiet, json }),
+            Some(option) => Err(Error::Config(format!("{option}: the engine local takes no options after --"))),
+        }
     }
 
     /// Returns the commands that [`LocalEngine::run`] would run.
@@ -67,7 +71,7 @@ impl<'a> LocalEngine<'a> {
         let mut waiting = phase.missing.iter().copied();
         let (mut running, mut failed, mut worst) = (Vec::<RunningTask>::new(), Vec::new(), 0);
         loop {
-            while running.len() < self.tasks as usize {
+            while running.len() < self.at_once(phase) {
                 let Some(task) = waiting.next() else { break };
                 running.push(self.start(phase, task)?);
             }
@@ -115,10 +119,15 @@ impl<'a> LocalEngine<'a> {
         words.extend(["--phase", phase.phase.name()].map(OsString::from));
         match phase.phase.is_by_part() {
             true => words.extend(["--task".into(), format!("{task}/{}", phase.count).into()]),
-            false => words.extend(["--tasks".into(), self.tasks.to_string().into()]),
+            false => words.extend(["--tasks".into(), self.request.tasks.to_string().into()]),
         }
         words.extend(["--threads".into(), self.threads(phase).to_string().into()]);
         words
+    }
+
+    /// Returns how many tasks run at the same time: no more than the machine can run.
+    fn at_once(&self, phase: &PhaseTasks) -> usize {
+        (self.request.tasks as usize).min(phase.missing.len()).min(threads::available()).max(1)
     }
 
     /// Returns the threads of each task, so that all that run at the same time have as many together as the job is to have.
@@ -127,7 +136,7 @@ impl<'a> LocalEngine<'a> {
             0 => threads::available(),
             threads => threads,
         };
-        (wanted / (self.tasks as usize).min(phase.missing.len()).max(1)).max(1)
+        (wanted / self.at_once(phase)).max(1)
     }
 }
 

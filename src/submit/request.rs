@@ -12,6 +12,8 @@ pub struct Request {
     pub config: PathBuf,
     /// This program.
     pub program: PathBuf,
+    /// How many tasks a phase is dealt out to.
+    pub tasks: u32,
     /// The phases that have tasks to do, in their order.
     pub phases: Vec<PhaseTasks>,
     /// The memory that a task may take, in bytes.
@@ -21,15 +23,17 @@ pub struct Request {
 }
 
 impl Request {
-    /// Returns the request for the tasks that are missing of the job that the configuration at `config` describes.
+    /// Returns the request for the tasks that are missing of the job that the configuration at `config` describes: those in `phases`,
+    /// which are dealt out to `tasks` tasks.
     ///
     /// # Errors
     /// [`Error::Io`] if the system does not tell where the configuration or this program is.
-    pub fn new(config: &Path, options: &JobOptions, mut phases: Vec<PhaseTasks>) -> Result<Request> {
+    pub fn new(config: &Path, options: &JobOptions, tasks: u32, mut phases: Vec<PhaseTasks>) -> Result<Request> {
         phases.retain(|phase| !phase.missing.is_empty());
         Ok(Request {
             config: std::path::absolute(config).map_err(Error::io("find", config))?,
             program: std::env::current_exe().map_err(Error::io("find", "this program"))?,
+            tasks,
             phases,
             memory: options.limits.memory.0,
             threads: options.limits.threads.0,
@@ -72,6 +76,7 @@ pub(super) mod tests {
         Request {
             config: config.into(),
             program: "/opt/gdt-batch".into(),
+            tasks,
             phases: PhaseTasks::all(tasks),
             memory: 4 << 30,
             threads: 0,

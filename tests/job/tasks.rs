@@ -254,7 +254,7 @@ fn what_has_changed_since_the_plan_is_told() {
     let files = in_files(folder.path(), &hills(12_000, 10), 4_000);
     let job = in_parts(&files, 2_000);
     up_to(&job, "mesh", 2);
-    let job = job.with("output", "color = \"ramp\"");
+    let job = job.with("output", "color = \"elevation\"");
     for phase in &PHASES[2..] {
         task(&job, phase, "1/2").refused(2, &["[output] color", "changed since the job was planned", "phase plan"]);
     }

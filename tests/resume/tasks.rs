@@ -82,7 +82,7 @@ fn children(parent: u32) -> Vec<u32> {
 #[test]
 fn processes_of_local_killed_at_random_moments_leave_the_same_bytes() {
     let rig = job_of_parts().committing_every(10);
-    let mut random = crate::random::Random::new(11);
+    let mut random = crate::random::Random(11);
     let (mut killed, mut runs) = (0, 0);
     while killed < 30 && runs < 200 {
         runs += 1;
@@ -115,14 +115,20 @@ fn processes_of_local_killed_at_random_moments_leave_the_same_bytes() {
     completes(&rig, 8, "in the end");
 }
 
+/// Returns the bytes in the store of a part.
+fn stored(rig: &Rig, part: u32) -> u64 {
+    let folder = rig.out().join(format!("job/parts/{part}"));
+    let store = (0..8).map(|file| folder.join(format!("steps.{file}.store")));
+    store.filter_map(|path| fs::metadata(path).ok()).map(|data| data.len()).sum()
+}
+
 #[test]
 fn a_second_worker_leaves_a_part_that_another_has() {
     let rig = job_of_parts().committing_every(0);
     up_to(&rig, "mesh", 1);
+    let before = stored(&rig, 0);
     let mut first = Run::start(&mut task(&rig, "mesh", "1/1"));
-    let begun = rig.out().join("job/parts/0/steps.0.store");
-    let before = fs::metadata(&begun).map_or(0, |data| data.len());
-    first.wait_until(|| fs::metadata(&begun).is_ok_and(|data| data.len() > before));
+    first.wait_until(|| stored(&rig, 0) > before);
     first.signal("STOP");
     let second = run(task(&rig, "mesh", "1/1")).stopped(&["part 0 is left out", "is working in"]);
     assert!(second.err.contains(&format!("process {} on", first.child.id())), "{}", second.err);
@@ -155,9 +161,9 @@ fn tasks_wait_for_a_process_that_has_the_job_alone() {
 fn a_task_that_is_asked_to_stop_keeps_what_it_has_done() {
     let rig = job_of_parts().committing_every(0);
     up_to(&rig, "mesh", 1);
+    let before = stored(&rig, 1);
     let mut asked = Run::start(&mut task(&rig, "mesh", "1/1"));
-    let begun = rig.out().join("job/parts/1/steps.1.store");
-    asked.wait_until(|| begun.exists());
+    asked.wait_until(|| stored(&rig, 1) > before);
     asked.signal("TERM");
     asked.end().stopped(&["interrupted"]);
     let again = run(rig.command_of(&["status", "job.toml", "--json"])).succeeded();

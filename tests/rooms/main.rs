@@ -138,6 +138,8 @@ fn every_rule_of_direction_holds() {
         ("config/mod.rs", "input/source.rs"),
         ("job/mod.rs", "config/mod.rs"),
         ("job/run/a.rs", "verify/mod.rs"),
+        ("job/run/a.rs", "submit/mod.rs"),
+        ("verify/a.rs", "submit/mod.rs"),
         ("job/report/mod.rs", "cli.rs"),
         ("job/plan/a.rs", "job/partition/a.rs"),
         ("job/mesh/a.rs", "job/publish/a.rs"),

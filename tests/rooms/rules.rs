@@ -17,14 +17,18 @@ const STEPS: [&str; 6] = ["job/plan", "job/partition", "job/mesh", "job/tiles", 
 const RULES: [Rule; 7] = [
     Rule {
         rooms: &["geometry", "mesh", "voronoi", "gpu", "triangulation", "input", "output"],
-        never: &["config", "job", "verify", "cli"],
+        never: &["config", "job", "submit", "verify", "cli"],
         why: "a library room knows no job",
     },
-    Rule { rooms: &["verify"], never: &["config", "job", "cli"], why: "the proof shares nothing with the job" },
+    Rule {
+        rooms: &["verify"],
+        never: &["config", "job", "submit", "cli"],
+        why: "the proof shares nothing with the job",
+    },
     Rule {
         rooms: &["job"],
-        never: &["config", "verify", "cli"],
-        why: "a job does not know where its options come from",
+        never: &["config", "submit", "verify", "cli"],
+        why: "a job does not know where its options come from, nor who starts its tasks",
     },
     Rule {
         rooms: &["job/durable", "job/progress"],

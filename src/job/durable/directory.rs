@@ -330,7 +330,11 @@ impl JobDirectory {
         // The lock goes last, because it marks the directory as a job's own: a kill or a power failure before that leaves what the
         // next job may take.
         disk::sync_folder(&self.job).map_err(Error::io("write", &self.job))?;
-        disk::remove_tree(&self.job).map_err(Error::io("remove", &self.job))
+        match disk::remove_tree(&self.job) {
+            // This process still has the lock. The folder is empty when it ends, and the next job takes an empty one.
+            Err(_) if only_open_files_are_left(&self.job) => Ok(()),
+            outcome => outcome.map_err(Error::io("remove", &self.job)),
+        }
     }
 }
 
@@ -356,6 +360,13 @@ fn find<P: AsRef<Path>>(
         }
     }
     Ok(None)
+}
+
+/// Tells whether nothing is left in `folder` but files that were removed while a process had them open: NFS keeps them until they are
+/// closed, under names of its own.
+fn only_open_files_are_left(folder: &Path) -> bool {
+    let is_open = |path: &PathBuf| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(".nfs"));
+    disk::list(folder).is_ok_and(|left| !left.is_empty() && left.iter().all(is_open))
 }
 
 fn remove_at_end(file: &Path) -> Result<()> {
@@ -462,6 +473,16 @@ mod tests {
                 assert!(gone.iter().all(|folder| !output.path().join(folder).exists()), "cut off after {done}");
             }
         }
+    }
+
+    #[test]
+    fn files_that_nfs_keeps_while_they_are_open_are_told_from_others() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(!only_open_files_are_left(folder.path()));
+        fs::write(folder.path().join(".nfs0000000001c6a1f200000001"), "").unwrap();
+        assert!(only_open_files_are_left(folder.path()));
+        fs::write(folder.path().join("lock"), "").unwrap();
+        assert!(!only_open_files_are_left(folder.path()));
     }
 
     #[test]

@@ -15,6 +15,9 @@ pub(crate) enum Alone {
 }
 
 impl Alone {
+    /// What tasks say then.
+    pub(crate) const SENTENCE: &str = "the phase publish does all of it in one process";
+
     const ALL: [Alone; 2] = [Alone::InOnePart, Alone::AsItIs];
 
     fn path(self, directory: &JobDirectory) -> PathBuf {

@@ -17,6 +17,7 @@ use crate::job::report::job_report::Report;
 use crate::job::run::alone::Alone;
 use crate::job::run::read_step::note_skipped;
 use crate::job::run::resume::{self, EarlierRun, RunStart, place_results_of_finished_job};
+use crate::job::run::resume_parts::start_parts;
 use crate::job::run::run_context::RunContext;
 use crate::job::run::stage_costs::stage_costs;
 use crate::job::run::temporary_bytes::TemporaryBytes;
@@ -192,9 +193,9 @@ fn attempt(
             true => resume::start(directory, &header, earlier, options.output.max_edge, run.progress)?,
             // That tasks have done steps is nothing to tell.
             false if job.work == EarlierWork::ByTasks => {
-                resume::start_parts(directory, &header, earlier, ProgressOutput::Quiet)?
+                start_parts(directory, &header, earlier, ProgressOutput::Quiet)?
             }
-            false => resume::start_parts(directory, &header, earlier, run.progress)?,
+            false => start_parts(directory, &header, earlier, run.progress)?,
         };
         let RunStart { store, journal, partition, job_id, resumed } = start;
         let context = RunContext {

@@ -10,6 +10,7 @@ pub(crate) mod parts;
 pub(crate) mod publish_step;
 pub(crate) mod read_step;
 pub(crate) mod resume;
+pub(crate) mod resume_parts;
 pub(crate) mod run_context;
 pub(crate) mod stage_costs;
 pub(crate) mod tasks;

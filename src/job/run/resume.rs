@@ -3,7 +3,7 @@
 //! A step stays if everything that it wrote is there and whole, or if nothing needs that any more. The output of a step depends on
 //! nothing but the job. So a step that runs again writes the same as before, and the steps after it stay.
 
-use crate::job::durable::atomic_file::{create_folder, remove_file};
+use crate::job::durable::atomic_file::remove_file;
 use crate::job::durable::directory::JobDirectory;
 use crate::job::durable::journal::{self, PublishedFile};
 use crate::job::index::{NodeIndex, TileIndex};
@@ -13,10 +13,10 @@ use crate::job::partition::result::Partition;
 use crate::job::plan::fingerprint::{Fingerprint, JobChange, JobHeader};
 use crate::job::plan::job_plan::Plan;
 use crate::job::plan::lattice_choice::LatticeCoarsening;
-use crate::job::progress::stage::{JobProgress, ProgressOutput, Stage};
+use crate::job::progress::stage::{ProgressOutput, Stage};
 use crate::job::records::{JobStep, Journal, JournalEntry, Store};
 use crate::job::report::job_report::Report;
-use crate::job::run::part_entries::{PartHeader, StepsOfParts, forget_levels, open_store, records_of};
+use crate::job::run::part_entries::{PartHeader, StepsOfParts, open_store, records_of};
 use crate::output::options::MaxEdge;
 use crate::{Error, Result, interrupt};
 use rayon::prelude::*;
@@ -30,7 +30,7 @@ pub(crate) struct EarlierRun {
     pub(super) header: Option<JobHeader>,
     pub(super) entries: Vec<JournalEntry>,
     /// What the journals of its parts name.
-    of_parts: StepsOfParts,
+    pub(super) of_parts: StepsOfParts,
     /// Whether all its results are in place.
     is_complete: bool,
 }
@@ -190,98 +190,6 @@ pub(crate) fn start<'a>(
     directory.clear(&files)?;
     let journal = Journal::begin(directory, &header, entries)?;
     Ok(RunStart { store: open_store(directory, &records)?, journal, partition, job_id: 0, resumed: 0 })
-}
-
-/// As [`start`], for a job of several parts. What is in the folders of its parts stays if the job is the same.
-///
-/// # Errors
-/// [`Error::Io`] on the job directory.
-pub(crate) fn start_parts<'a>(
-    directory: &'a JobDirectory,
-    header: &JobHeader,
-    earlier: Option<EarlierRun>,
-    progress: ProgressOutput,
-) -> Result<RunStart<'a>> {
-    let same = earlier.and_then(|earlier| same_job_of_parts(header, earlier, progress));
-    let (entries, header, resumed) = match same {
-        Some((old, entries, of_parts)) => {
-            if header.fingerprint.memory != old.fingerprint.memory {
-                forget_levels(directory)?;
-            }
-            let steps = entries.len() as u64 + of_parts;
-            progress.note(&format!("going on with an interrupted run: {steps} steps are done"));
-            let fingerprint = header.fingerprint.with_names_of(&old.fingerprint);
-            (entries, JobHeader { fingerprint, coarsening: header.coarsening, id: old.id }, of_parts)
-        }
-        None => {
-            remove_file(&directory.journal())?;
-            directory.clear_parts()?;
-            directory.clear(&HashSet::new())?;
-            (Vec::new(), JobHeader { id: new_id(), ..header.clone() }, 0)
-        }
-    };
-    create_folder(&directory.output().tiles())?;
-    let records = records_of(&entries);
-    let store = open_store(directory, &records)?;
-    let journal = Journal::begin(directory, &header, entries)?;
-    Ok(RunStart { store, journal, partition: None, job_id: header.id, resumed })
-}
-
-/// Returns the header of an earlier run of the same job, its entry that stays (the plan), and the number of steps of its parts.
-fn same_job_of_parts(
-    header: &JobHeader,
-    earlier: EarlierRun,
-    progress: ProgressOutput,
-) -> Option<(JobHeader, Vec<JournalEntry>, u64)> {
-    let EarlierRun { header: old, mut entries, of_parts, .. } = earlier;
-    let old = old.filter(|old| old.coarsening == header.coarsening && old.id != 0)?;
-    match header.fingerprint.since(&old.fingerprint) {
-        JobChange::Nothing => {}
-        JobChange::Style(what) | JobChange::Mesh(what) => {
-            progress.note(&format!("changed since the interrupted run: {what}; starting over"));
-            return None;
-        }
-    }
-    entries.retain(|entry| entry.step == JobStep::Plan);
-    Some((old, entries, of_parts.count))
-}
-
-/// Returns a number that no other run has.
-fn new_id() -> u64 {
-    let time = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
-    let nanoseconds = time.map_or(0, |time| time.as_nanos() as u64);
-    (nanoseconds ^ u64::from(std::process::id()) << 40).max(1)
-}
-
-/// Returns the entries of a part, whose folder is locked, that stay, and its partition if that does.
-///
-/// # Errors
-/// [`Error::Io`] on its folder.
-pub(crate) fn resume_part(
-    directory: &JobDirectory,
-    entries: Vec<JournalEntry>,
-    max_edge: MaxEdge,
-    progress: &JobProgress,
-) -> Result<(Vec<JournalEntry>, Option<Partition>)> {
-    // What the part read is for other parts too.
-    let (mut kept, entries): (Vec<_>, Vec<_>) =
-        entries.into_iter().partition(|entry| matches!(entry.step, JobStep::Read(_)));
-    let review = match entries.is_empty() {
-        true => None,
-        false => {
-            let stage = progress.stage("check", entries.len() as u64, "steps");
-            let review = ResumeReview::of(directory, entries, max_edge == MaxEdge::Auto, &stage)?;
-            stage.finish();
-            review
-        }
-    };
-    let KeptSteps { entries, mut files, partition, .. } = review.map(ResumeReview::into_kept).unwrap_or_default();
-    kept.extend(entries);
-    if !kept.is_empty() {
-        files.extend(directory.store().iter().map(|path| directory.name(path)));
-    }
-    directory.clear_own(&files)?;
-    Ok((kept, partition))
 }
 
 /// The steps that stay, and what they left.

@@ -34,6 +34,7 @@ impl<T: DeserializeOwned> Done<T> {
 }
 
 /// The phases of a part that are complete.
+#[derive(Default)]
 pub(crate) struct PartProgress {
     pub(crate) read: Option<Done<ReadInputs>>,
     pub(crate) mesh: Option<Done<MeshedPart>>,

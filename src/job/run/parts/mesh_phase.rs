@@ -13,7 +13,7 @@ use crate::job::run::parts::meshed_part::MeshedPart;
 use crate::job::run::parts::part_journal::PartSession;
 use crate::job::run::parts::parts_job::PartsJob;
 use crate::job::run::parts::read_phase::points_of;
-use crate::job::run::resume::resume_part;
+use crate::job::run::resume_parts::resume_part;
 use crate::job::run::tile_queue::TileLook;
 use std::sync::{Arc, PoisonError};
 

@@ -29,8 +29,19 @@ impl<'a> JobProgressByPart<'a> {
     /// # Errors
     /// [`Error::Io`] or [`Error::Broken`] on a journal.
     pub(crate) fn of(job: &'a PlannedJob) -> Result<JobProgressByPart<'a>> {
+        JobProgressByPart::of_parts(job, |_| true)
+    }
+
+    /// Reads the journals of the `wanted` parts. Nothing of the others counts as done.
+    ///
+    /// # Errors
+    /// [`Error::Io`] or [`Error::Broken`] on a journal.
+    pub(crate) fn of_parts(job: &'a PlannedJob, wanted: impl Fn(PartIndex) -> bool) -> Result<JobProgressByPart<'a>> {
         let header = |part| PartHeader { job: job.header.id, part };
-        let part = |part| PartProgress::of(&job.directory.part(part), header(part));
+        let part = |part| match wanted(part) {
+            true => PartProgress::of(&job.directory.part(part), header(part)),
+            false => Ok(PartProgress::default()),
+        };
         let parts = job.parts.all().map(part).collect::<Result<_>>()?;
         let above = header(PartIndex::new(job.parts.all().len()));
         let joined = entries_of_steps(&job.directory.join(), above, |step| step == JobStep::Join)?;

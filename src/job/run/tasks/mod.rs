@@ -25,9 +25,6 @@ use crate::job::run::tasks::part_tasks::work_on_parts;
 use crate::job::run::tasks::plan_task::plan;
 use crate::job::run::tasks::planned_job::PlannedJob;
 
-/// What tasks say when they have nothing to do.
-const LEFT: &str = "the phase publish does all of it in one process";
-
 /// Does one task of one phase of a job. `walk` is what a process does that does all of it.
 ///
 /// # Errors

@@ -20,7 +20,6 @@ use crate::job::run::parts::parts_job::PartsJob;
 use crate::job::run::parts::read_phase::{read_for, sum_up};
 use crate::job::run::parts::tile_phase::{ForeignBorders, finish_part};
 use crate::job::run::publish_step::wants_tileset;
-use crate::job::run::tasks::LEFT;
 use crate::job::run::tasks::dealing::deal;
 use crate::job::run::tasks::missing::{JobProgressByPart, too_early};
 use crate::job::run::tasks::planned_job::PlannedJob;
@@ -47,7 +46,7 @@ pub(crate) fn work_on_parts(
         run.progress.note(NO_LOCKS);
     }
     if Alone::find(directory)?.is_some() {
-        return Ok((0, Some(format!("nothing to do: {LEFT}"))));
+        return Ok((0, Some(format!("nothing to do: {}", Alone::SENTENCE))));
     }
     let mut job = PlannedJob::open(directory, options)?.ok_or_else(|| too_early(Phase::Plan, &[1], 1))?;
     if job.is_complete {
@@ -70,7 +69,7 @@ pub(crate) fn work_on_parts(
         worked => return worked.map(|()| (mine.len() as u64, None)),
     };
     alone.note(directory)?;
-    Ok((mine.len() as u64, Some(format!("{why}; {LEFT}"))))
+    Ok((mine.len() as u64, Some(format!("{why}; {}", Alone::SENTENCE))))
 }
 
 /// Returns the parts of `phase` that fall to `task`. A phase with one task does all.
@@ -150,19 +149,16 @@ impl PartTask<'_> {
         in_use.map_or(Ok(()), Err)
     }
 
-    fn progress(&self) -> Result<JobProgressByPart<'_>> {
-        JobProgressByPart::of(self.job)
-    }
-
     fn mesh(&self, job: &PartsJob, mine: &[PartIndex]) -> Result<()> {
         let readers: Vec<PartIndex> = mine.iter().flat_map(|&part| job.parts.readers_of(part)).collect();
-        self.progress()?.require(Phase::Read, self.task.count, |part| readers.contains(&part))?;
+        let is_reader = |part: PartIndex| readers.contains(&part);
+        JobProgressByPart::of_parts(self.job, is_reader)?.require(Phase::Read, self.task.count, is_reader)?;
         let look = early_look(job)?;
         self.each(mine, |part| mesh_one(job, part, look.as_ref(), None).map(|_| ()))
     }
 
     fn join(&self, job: &PartsJob) -> Result<()> {
-        let progress = self.progress()?;
+        let progress = JobProgressByPart::of(self.job)?;
         let tasks = self.task.count;
         progress.require(Phase::Read, tasks, |_| true)?;
         progress.require(Phase::Mesh, tasks, |_| true)?;
@@ -173,7 +169,7 @@ impl PartTask<'_> {
     }
 
     fn tiles(&self, job: &PartsJob, mine: &[PartIndex]) -> Result<()> {
-        let progress = self.progress()?;
+        let progress = JobProgressByPart::of_parts(self.job, |part| mine.contains(&part))?;
         let joined = self.joined(job)?;
         let stores = &PartStores::new(job.directory, job.job_id);
         let borders = &ForeignBorders::new(job, stores, &joined);
@@ -186,11 +182,12 @@ impl PartTask<'_> {
     }
 
     fn levels(&self, job: &PartsJob, mine: &[PartIndex]) -> Result<()> {
-        let progress = self.progress()?;
-        let joined = self.joined(job)?;
-        // Only the size of all tiles together tells whether one file holds them.
+        // With this format, the size of all tiles together tells whether one file holds them.
         let needs_all = job.plan.options.output.format == OutputFormat::Glb;
-        progress.require(Phase::Tiles, self.task.count, |part| needs_all || mine.contains(&part))?;
+        let needs = |part: PartIndex| needs_all || mine.contains(&part);
+        let progress = JobProgressByPart::of_parts(self.job, needs)?;
+        let joined = self.joined(job)?;
+        progress.require(Phase::Tiles, self.task.count, needs)?;
         let has_tileset = wants_tileset(job.plan, &tiles_of(&progress.parts));
         let stores = &PartStores::new(job.directory, job.job_id);
         self.each(mine, |part| {

@@ -12,7 +12,7 @@ use crate::job::run::alone::Alone;
 use crate::job::run::attempt::{coarsening_of, read_earlier};
 use crate::job::run::parts::write_plan;
 use crate::job::run::read_step::note_skipped;
-use crate::job::run::resume;
+use crate::job::run::resume_parts::start_parts;
 use crate::job::run::tasks::planned_job::planned;
 use crate::threads::on_threads;
 use crate::{Error, Result, disk};
@@ -45,10 +45,10 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> Result<Option<Strin
     }
     if plan.is_one_part() {
         Alone::AsItIs.note(directory)?;
-        return Ok(Some(format!("the job has only {} points, which is one part; {}", plan.records, super::LEFT)));
+        return Ok(Some(format!("the job has only {} points, which is one part; {}", plan.records, Alone::SENTENCE)));
     }
     on_threads(threads, || {
-        let start = resume::start_parts(directory, &header, earlier, run.progress)?;
+        let start = start_parts(directory, &header, earlier, run.progress)?;
         write_plan(&start.journal, directory, &plan)?;
         start.journal.commit()?;
         start.journal.close();
