@@ -229,7 +229,19 @@ impl Projection {
                 parameters.entry("gamma".into()).or_insert(azimuth);
             }
             // The others are constants of the method. Some writers name them, and not all in the same way.
-            "krovak" => parameters.retain(|name, _| ["lat_0", "lon_0", "k_0", "x_0", "y_0"].contains(&name.as_str())),
+            "krovak" => {
+                let turn = ["x_scale", "y_scale", "gamma"].map(|name| get(parameters, name).unwrap_or(default(name)));
+                let is = |known: [f64; 3]| turn.iter().zip(known).all(|(own, known)| (own - known).abs() < 1e-9);
+                let says = ["x_scale", "y_scale", "gamma"].iter().any(|name| parameters.contains_key(*name));
+                // ESRI says with them which way the axes go: south and west, or east and north.
+                let known = if is([1.0, 1.0, 0.0]) { Some(true) } else { is([-1.0, 1.0, 90.0]).then_some(false) };
+                if says && known.is_some() {
+                    self.westward = known;
+                }
+                let constants = |name: &str| known.is_some() && ["x_scale", "y_scale", "gamma"].contains(&name);
+                let kept = ["lat_0", "lon_0", "k_0", "x_0", "y_0", "x_scale", "y_scale", "gamma"];
+                parameters.retain(|name, _| kept.contains(&name.as_str()) && !constants(name));
+            }
             WEB_MERCATOR => parameters.retain(|name, _| ["lon_0", "x_0", "y_0"].contains(&name.as_str())),
             _ => {}
         }
