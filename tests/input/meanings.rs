@@ -117,7 +117,7 @@ fn degrees_that_no_name_tells_are_a_warning() {
 
 #[test]
 fn the_message_names_the_column_that_is_missing() {
-    let error = text("Latitude (deg),Longitude (deg),Ellipsoidal depth (m)\n48.1,11.5,3\n").err().expect("was read");
+    let error = text("Latitude (deg),Longitude (deg),Geoidal height (m)\n48.1,11.5,3\n").err().expect("was read");
     assert!(error.to_string().contains("names no column z"), "{error}");
 }
 

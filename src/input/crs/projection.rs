@@ -399,6 +399,38 @@ mod tests {
     use crate::input::crs::wkt::{PROJECTED, find};
 
     #[test]
+    fn the_axes_of_krovak_are_those_of_esris_parameters() {
+        let read = |turn: &str| {
+            let text = format!(
+                r#"PROJCS["S-JTSK_Krovak",GEOGCS["GCS_S_JTSK",DATUM["D_S_JTSK",SPHEROID["Bessel_1841",6377397.155,299.1528128]],
+                PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],PROJECTION["Krovak"],PARAMETER["False_Easting",0.0],
+                PARAMETER["False_Northing",0.0],PARAMETER["Pseudo_Standard_Parallel_1",78.5],PARAMETER["Scale_Factor",0.9999],
+                PARAMETER["Azimuth",30.2881397527778],PARAMETER["Longitude_Of_Center",24.8333333333333],
+                PARAMETER["Latitude_Of_Center",49.5],{turn}UNIT["Meter",1.0]]"#
+            );
+            Projection::of(&find(&text, &PROJECTED).unwrap()).unwrap()
+        };
+        let turn = |x: f64, y: f64, angle: f64| {
+            read(&format!(
+                r#"PARAMETER["X_Scale",{x:.1}],PARAMETER["Y_Scale",{y:.1}],PARAMETER["XY_Plane_Rotation",{angle:.1}],"#
+            ))
+        };
+        let of_code =
+            |code| Projection::of(&find(crs_definitions::from_code(code).unwrap().wkt, &PROJECTED).unwrap()).unwrap();
+        let (south_west, east_north, odd) = (turn(1.0, 1.0, 0.0), turn(-1.0, 1.0, 90.0), turn(1.0, 1.0, 90.0));
+        let direction = Some("the direction of the axes".to_string());
+        assert_eq!(south_west.difference(&east_north), direction);
+        assert_eq!(
+            (south_west.difference(&of_code(5514)), east_north.difference(&of_code(5513))),
+            (direction.clone(), direction)
+        );
+        assert_eq!((south_west.difference(&of_code(5513)), east_north.difference(&of_code(5514))), (None, None));
+        assert!(odd.difference(&south_west).is_some() && odd.difference(&east_north).is_some());
+        // A text that does not say it agrees with both.
+        assert_eq!((read("").difference(&south_west), read("").difference(&east_north)), (None, None));
+    }
+
+    #[test]
     fn every_projection_with_a_code_says_all_of_it() {
         let mut known = 0;
         for code in 1..=u16::MAX {

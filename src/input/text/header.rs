@@ -114,7 +114,7 @@ fn is_count(line: &[u8]) -> bool {
 }
 
 /// Returns what `line` names under the first delimiter that gives x, y and z and fits `rows`, or what is wrong under the delimiter that
-/// gives most of x, y and z, and of several the one that gives most columns. All delimiters are tried, the `candidates` for the rows first: a header may use another one.
+/// gives most of x, y and z, and of several the one that gives as many columns as there are, or most. All delimiters are tried, the `candidates` for the rows first: a header may use another one.
 pub(crate) fn header_names(
     candidates: &[Delimiter],
     line: &[u8],
@@ -138,7 +138,8 @@ pub(crate) fn header_names(
     }
     let most = all.iter().max_by_key(|delimiter| {
         let fields = delimiter.fields(line);
-        (coordinates(fields.iter().copied()), fields.len())
+        let fits = rows.first().is_some_and(|row| columns_of(**delimiter, row) == fields.len());
+        (coordinates(fields.iter().copied()), fits, fields.len())
     });
     Ok(split(most.unwrap_or(&Delimiter::Blank))?)
 }

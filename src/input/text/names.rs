@@ -76,6 +76,8 @@ const NAMES: [Names; 7] = [
             "height",
             "altitude",
             "alt",
+            "ellipsoidalheight",
+            "orthometricheight",
             "hoehe",
             "höhe",
             "h",

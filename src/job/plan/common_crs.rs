@@ -185,8 +185,8 @@ fn two_systems(own: &Said, other: &Said, differences: &[String]) -> Error {
              what x, y and z of all texts are in"
         }
         true => {
-            "One job takes one unit of heights: convert one of them first, or run two jobs. If one is wrong, say with [input] crs = \
-             \"first\" that the first file is right"
+            "One job takes one unit of heights: convert one of them first, or run two jobs. If one is wrong, [input] crs = \"first\" takes \
+             that of the first file with a CRS, or of the first file if none has one"
         }
         false => {
             "One job takes one CRS: transform one of them first, or run two jobs. If a record is wrong, say with [input] crs what all files \
