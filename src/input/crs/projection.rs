@@ -228,19 +228,16 @@ impl Projection {
                 let azimuth = get(parameters, "alpha").unwrap_or(0.0);
                 parameters.entry("gamma".into()).or_insert(azimuth);
             }
-            // The others are constants of the method. Some writers name them, and not all in the same way.
+            // The other parameters are constants of the method. Some writers name them, and not all in the same way.
             "krovak" => {
-                let turn = ["x_scale", "y_scale", "gamma"].map(|name| get(parameters, name).unwrap_or(default(name)));
-                let is = |known: [f64; 3]| turn.iter().zip(known).all(|(own, known)| (own - known).abs() < 1e-9);
-                let says = ["x_scale", "y_scale", "gamma"].iter().any(|name| parameters.contains_key(*name));
-                // ESRI says with them which way the axes go: south and west, or east and north.
-                let known = if is([1.0, 1.0, 0.0]) { Some(true) } else { is([-1.0, 1.0, 90.0]).then_some(false) };
-                if says && known.is_some() {
-                    self.westward = known;
-                }
-                let constants = |name: &str| known.is_some() && ["x_scale", "y_scale", "gamma"].contains(&name);
-                let kept = ["lat_0", "lon_0", "k_0", "x_0", "y_0", "x_scale", "y_scale", "gamma"];
-                parameters.retain(|name, _| kept.contains(&name.as_str()) && !constants(name));
+                const TURN: [&str; 3] = ["x_scale", "y_scale", "gamma"];
+                let says_axes = TURN.iter().any(|name| parameters.contains_key(*name));
+                let axes = esris_axes(TURN.map(|name| get(parameters, name).unwrap_or(default(name))));
+                self.westward = axes.filter(|_| says_axes).or(self.westward);
+                let is_said = |name: &str| axes.is_some() && TURN.contains(&name);
+                let is_own =
+                    |name: &str| ["lat_0", "lon_0", "k_0", "x_0", "y_0"].contains(&name) || TURN.contains(&name);
+                parameters.retain(|name, _| is_own(name) && !is_said(name));
             }
             WEB_MERCATOR => parameters.retain(|name, _| ["lon_0", "x_0", "y_0"].contains(&name.as_str())),
             _ => {}
@@ -342,6 +339,13 @@ fn westward(system: &WktNode) -> Option<bool> {
     let directions: Vec<String> = axes.filter_map(|axis| axis.text(1)).map(str::to_ascii_lowercase).collect();
     let has = |direction: &str| directions.iter().any(|known| known == direction);
     (has("east") || has("west")).then(|| has("west"))
+}
+
+/// Returns whether x grows to the west by the scales and the turn of the axes in ESRI's texts of Krovak's projection; `None` if they are
+/// neither those of south and west nor those of east and north.
+fn esris_axes(turn: [f64; 3]) -> Option<bool> {
+    let is = |known: [f64; 3]| turn.iter().zip(known).all(|(own, known)| (own - known).abs() < 1e-9);
+    if is([1.0, 1.0, 0.0]) { Some(true) } else { is([-1.0, 1.0, 90.0]).then_some(false) }
 }
 
 fn default(name: &str) -> f64 {
