@@ -39,5 +39,6 @@ mod shortage;
 mod steps;
 mod tampering;
 mod texts;
+mod units;
 mod viewers;
 mod written;
