@@ -18,7 +18,7 @@ const RUNS: usize = 3;
 /// Returns a site by its number and the number of all sites.
 type Shape = fn(usize, usize) -> [f64; 2];
 
-const SHAPES: [(&str, Shape); 12] = [
+const SHAPES: [(&str, Shape); 13] = [
     ("line and one", |i, n| if i == 0 { [SIDE / 2.0, SIDE / 3.0] } else { [along(i, n), 0.0] }),
     ("diagonal and one", |i, n| if i == 0 { [SIDE, 0.0] } else { [along(i, n); 2] }),
     ("two lines", |i, n| [along(i, n), SIDE / 10.0 * (i % 2) as f64]),
@@ -29,6 +29,7 @@ const SHAPES: [(&str, Shape); 12] = [
     }),
     ("cross", |i, n| if i % 2 == 0 { [along(i, n), SIDE / 2.0] } else { [SIDE / 2.0, along(i, n)] }),
     ("parabola", |i, n| [along(i, n), (along(i, n) - SIDE / 2.0).powi(2) / SIDE]),
+    ("narrow parabola", |i, n| [along(i, n) / 500.0, (along(i, n) - SIDE / 2.0).powi(2) / SIDE * 4.0]),
     ("facing parabolas", |i, n| {
         let y = (along(i, n) - SIDE / 2.0).powi(2) / SIDE / 10.0;
         [along(i, n), if i % 2 == 0 { y } else { SIDE / 5.0 - y }]

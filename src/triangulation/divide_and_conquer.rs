@@ -17,8 +17,8 @@ use crate::{Error, Result, interrupt};
 /// Sites have up to six directed edges each, on average.
 const MAX_SITES: usize = u32::MAX as usize / 6;
 
-/// Parts with more sites than this ask before they are joined whether the process should stop.
-const SITES_BETWEEN_CHECKS: usize = 1 << 14;
+/// After this many sites or edges, the process asks whether it should stop.
+const STEPS_BETWEEN_CHECKS: usize = 1 << 14;
 
 /// Computes the canonical Delaunay triangulation of distinct `sites`. It has no triangle if there are fewer than three sites or all
 /// lie on one line.
@@ -41,7 +41,8 @@ pub fn triangulate(sites: &[Site]) -> Result<HalfEdgeMesh> {
     }
     let mut subdivision = Subdivision::new(&sorted);
     subdivision.triangulate(0, sorted.len())?;
-    let mut mesh = subdivision.into_mesh(&order);
+    let mut mesh = subdivision.into_mesh(&order)?;
+    interrupt::check()?;
     let flips = legalize(&mut mesh, sites);
     debug_assert_eq!(flips, 0, "joining decides every edge");
     Ok(mesh)
@@ -100,13 +101,13 @@ impl Subdivision<'_> {
             2 => Ok(self.segment(start)),
             3 => Ok(self.triangle(start)),
             n => {
-                if n > SITES_BETWEEN_CHECKS {
+                if n > STEPS_BETWEEN_CHECKS {
                     interrupt::check()?;
                 }
                 let middle = start + n / 2;
                 let left = self.triangulate(start, middle)?;
                 let right = self.triangulate(middle, end)?;
-                Ok(self.join(left, right))
+                self.join(left, right)
             }
         }
     }
@@ -134,19 +135,25 @@ impl Subdivision<'_> {
     }
 
     /// Joins two triangulations, all sites of the first before those of the second.
-    fn join(&mut self, left: HullEnds, right: HullEnds) -> HullEnds {
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`].
+    fn join(&mut self, left: HullEnds, right: HullEnds) -> Result<HullEnds> {
         let (left_inner, right_inner) = self.lower_tangent(left.last, right.first);
         let mut base = self.connect(right_inner.reversed(), left_inner);
         let first = if self.origin(left_inner) == self.origin(left.first) { base.reversed() } else { left.first };
         let last = if self.origin(right_inner) == self.origin(right.last) { base } else { right.last };
         // `base` leads from the right part to the left part, and moves up until it is the upper common tangent.
-        loop {
+        for step in 1.. {
+            if step % STEPS_BETWEEN_CHECKS == 0 {
+                interrupt::check()?;
+            }
             let first_left = self.edges[base.reversed().get()].counterclockwise;
             let from_left = self.candidate(base, first_left, |links| links.counterclockwise);
             let first_right = self.edges[base.get()].clockwise;
             let from_right = self.candidate(base, first_right, |links| links.clockwise);
             base = match (self.is_above(from_left, base), self.is_above(from_right, base)) {
-                (false, false) => return HullEnds { first, last },
+                (false, false) => break,
                 (true, false) => self.connect(base.reversed(), from_left.reversed()),
                 (false, true) => self.connect(from_right, base.reversed()),
                 (true, true) => {
@@ -163,6 +170,7 @@ impl Subdivision<'_> {
                 }
             };
         }
+        Ok(HullEnds { first, last })
     }
 
     /// Walks down both hulls to the lower common tangent; returns the hull edges that leave its two ends.
@@ -277,10 +285,16 @@ impl Subdivision<'_> {
     }
 
     /// Returns the triangles, with `order[i]` in the place of site `i`.
-    fn into_mesh(self, order: &[SiteIndex]) -> HalfEdgeMesh {
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`].
+    fn into_mesh(self, order: &[SiteIndex]) -> Result<HalfEdgeMesh> {
         let mut half_edge_of = vec![HalfEdgeIndex::HULL; self.edges.len()];
         let mut mesh = HalfEdgeMesh { triangles: Vec::with_capacity(2 * self.sites.len()), twins: Vec::new() };
         for edge in (0..self.edges.len() as u32).map(Edge) {
+            if edge.get() % STEPS_BETWEEN_CHECKS == 0 {
+                interrupt::check()?;
+            }
             if let Some(sides) = self.triangle_left_of(edge).filter(|_| half_edge_of[edge.get()] == HalfEdgeIndex::HULL)
             {
                 let half_edges = HalfEdgeIndex::of_triangle(mesh.triangles.len());
@@ -292,7 +306,7 @@ impl Subdivision<'_> {
         for (at, &h) in half_edge_of.iter().enumerate().filter(|(_, h)| **h != HalfEdgeIndex::HULL) {
             mesh.twins[h.get()] = half_edge_of[at ^ 1];
         }
-        mesh
+        Ok(mesh)
     }
 
     /// Returns the sides of the triangle on the left of `edge`, if there is one.

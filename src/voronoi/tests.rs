@@ -76,6 +76,17 @@ fn sites_without_a_triangle_are_rejected() {
     }
 }
 
+/// Nearly all sites of a narrow parabola are on the hull of the discrete mesh, and most of them must leave it. To walk around the hull for
+/// each would take quadratic time: here billions of steps.
+#[test]
+fn c1_gives_up_where_looking_for_vertices_would_take_quadratic_time() {
+    const COUNT: i64 = 100_000;
+    let place = |i: i64| [2 * i - COUNT, (2 * i - COUNT).pow(2) / 200].map(|c| c as i32);
+    let sites: Vec<Site> = (0..COUNT).map(place).collect();
+    let rejection = triangulate(&sites, &mut PipelineBuffers::default()).unwrap_err();
+    assert_eq!(rejection, Rejection::NotAccepted("too many vertices must leave the hull"));
+}
+
 #[test]
 fn labels_are_the_pixels_of_the_nearest_sites() {
     let mut random = Random(5);

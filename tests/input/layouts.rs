@@ -6,13 +6,13 @@ use gdt_batch::input::{Point, TextOptions, Unit, open};
 use crate::cloud::{Cloud, file, read_bytes};
 use crate::first_warning;
 
-fn text(content: &str) -> Result<Cloud> {
+pub(crate) fn text(content: &str) -> Result<Cloud> {
     read_bytes(".csv", content.as_bytes())
 }
 
 /// Asserts that the text holds (1.5, 2, 3.25) and (4, 5, 6).
 #[track_caller]
-fn assert_two_points(content: &str) -> Cloud {
+pub(crate) fn assert_two_points(content: &str) -> Cloud {
     let cloud = text(content).unwrap_or_else(|error| panic!("{content:?}: {error}"));
     let world = |p: &Point| [0, 1, 2].map(|axis| cloud.lattice.world(axis, p.corner()[axis]));
     let found: Vec<[f64; 3]> = cloud.points.iter().map(world).collect();
@@ -109,12 +109,13 @@ fn units_beside_and_below_the_names_are_used() {
     let crs = |text_of: &str| text(text_of).unwrap_or_else(|error| panic!("{text_of:?}: {error}")).source.crs;
     let rows = "1.5;2;3.25\n4;5;6\n";
     for (header, unit, vertical) in [
-        ("x [m];y [m];z [m]", Unit::Metre, None),
-        ("x [mm];y [mm];z [mm]", Unit::Other(0.001), None),
+        ("x [m];y [m];z [m]", Unit::Metre, Some(1.0)),
+        ("x [m];y [m];z", Unit::Metre, None),
+        ("x [mm];y [mm];z [mm]", Unit::Other(0.001), Some(0.001)),
         ("x [km];y [km];z [m]", Unit::Other(1000.0), Some(1.0)),
         ("x;y;z\n[m];[m];[cm]", Unit::Metre, Some(0.01)),
-        ("x;y;z\nft;ft;ft", Unit::Foot, None),
-        ("x [us-ft];y [us-ft];z [us-ft]", Unit::UsFoot, None),
+        ("x;y;z\nft;ft;ft", Unit::Foot, Some(Unit::FOOT)),
+        ("x [us-ft];y [us-ft];z [us-ft]", Unit::UsFoot, Some(Unit::US_FOOT)),
         ("x;y;z", Unit::Unknown, None),
         ("x (local);y (local);z (NAVD88)", Unit::Unknown, None),
         ("lon;lat;z\ndeg;deg;m", Unit::Degree, Some(1.0)),
@@ -122,6 +123,21 @@ fn units_beside_and_below_the_names_are_used() {
     ] {
         let found = crs(&format!("{header}\n{rows}"));
         assert_eq!((found.horizontal, found.vertical), (unit, vertical), "{header}");
+    }
+    // Names that the user gives take no unit away.
+    for header in ["a [ft];b [ft];c [cm]", "x;y;z\n[ft];[ft];[cm]", "# a [ft];b [ft];c [cm]"] {
+        let path = file(".csv", format!("{header}\n{rows}").as_bytes());
+        let named = |names: [&str; 3]| TextOptions {
+            columns: Some(names.map(str::to_owned).to_vec()),
+            ..TextOptions::default()
+        };
+        let crs = |names| open(&path, &named(names)).unwrap().crs;
+        assert_eq!(
+            (crs(["y", "x", "z"]).horizontal, crs(["y", "x", "z"]).vertical),
+            (Unit::Foot, Some(0.01)),
+            "{header}"
+        );
+        assert_eq!(crs(["x [m]", "y [m]", "z"]).horizontal, Unit::Metre);
     }
     for (header, words) in
         [("x [m];y [ft];z", "m for x and ft for y"), ("x [m];y [m];z\nmm;mm;mm", "the line below it says mm")]

@@ -12,6 +12,7 @@ mod damaged;
 mod formats;
 mod headers;
 mod layouts;
+mod meanings;
 mod real;
 mod rules;
 mod written_down;

@@ -150,6 +150,24 @@ fn an_outlier_is_told_from_the_rest() {
     assert_eq!((number(&report["points"]["kept"]), steps(&report)[0]), (301, "0.01"));
 }
 
+/// The step of so wide a text depends on the mesh, which is known only later.
+#[test]
+fn an_outlier_of_a_wide_text_is_told_from_the_rest() {
+    let mut random = Random(4);
+    let mut text = String::new();
+    for _ in 0..3000 {
+        let [x, y, z] = [(); 3].map(|()| random.below(20_000_000) as f64 / 100.0);
+        writeln!(text, "{:.2},{:.2},{:.2}", 400_000.0 + x, 5_500_000.0 + y, z / 400.0).unwrap();
+    }
+    Text::new(&format!("{text}0,0,0\n"))
+        .job()
+        .run()
+        .refused(3, &["1 of 3001 records", "line 3001", "far from all other rows"]);
+    // The mesh proves too fine for the step that `check` names.
+    let report = Text::new(&text).job().report();
+    assert_eq!((number(&report["points"]["kept"]), steps(&report)[0]), (3000, "0.1"));
+}
+
 #[test]
 fn outliers_of_a_long_text_are_told_wherever_they_are() {
     let clean = centimetres(150_000, plain);

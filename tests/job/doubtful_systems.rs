@@ -96,6 +96,35 @@ fn heights_of_a_code_agree_with_their_name() {
     Job::on(&[&named, &unknown]).run().refused(2, &["EPSG:30001 is not in the list of known codes of heights"]);
 }
 
+#[test]
+fn depths_are_told_from_heights_and_said_to_be_depths() {
+    let folder = tempfile::tempdir().unwrap();
+    let plane = r#"PROJCS["plane",GEOGCS["g",DATUM["D_ETRS_1989",SPHEROID["GRS_1980",6378137.0,298.257222101]],
+        PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",500000.0],
+        PARAMETER["False_Northing",0.0],PARAMETER["Central_Meridian",9.0],PARAMETER["Scale_Factor",0.9996],
+        PARAMETER["Latitude_Of_Origin",0.0],UNIT["Meter",1.0]]"#;
+    let axis = |way: &str| {
+        [text(&format!(
+            r#"COMPD_CS["c",{plane},VERT_CS["Local",VERT_DATUM["Local",2005],UNIT["metre",1],AXIS["z",{way}]]]"#
+        ))]
+    };
+    let esri = |way: &str| {
+        [text(&format!(
+            r#"{plane},VERTCS["Local",VDATUM["Local"],PARAMETER["Vertical_Shift",0.0],PARAMETER["Direction",{way}],UNIT["Meter",1.0]]"#
+        ))]
+    };
+    told_apart(&axis("UP"), &axis("DOWN"), &["the direction of heights, one of which are depths"]);
+    told_apart(&esri("1.0"), &esri("-1.0"), &["the direction of heights, one of which are depths"]);
+    told_apart(&axis("DOWN"), &esri("1.0"), &["the direction of heights, one of which are depths"]);
+    let [up, down] =
+        [("up.las", "1.0"), ("down.las", "-1.0")].map(|(name, way)| write(folder.path(), name, &esri(way)));
+    let said = warnings(&Job::on(&[&down]).report());
+    assert!(said.contains("down.las") && said.contains("its z counts downwards (Local)"), "{said}");
+    assert_eq!(warnings(&Job::on(&[&up]).report()), "[]");
+    let given = Job::on(&[&up]).with("input", "crs = \"EPSG:25832+5715\"").report();
+    assert!(warnings(&given).contains("its z counts downwards (EPSG:5715)"), "{given}");
+}
+
 /// Moves a file's box and points to longitude 11.5 and latitude 48.1.
 fn move_to_degrees(path: &Path) {
     let mut bytes = fs::read(path).unwrap();

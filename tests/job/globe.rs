@@ -1,6 +1,7 @@
 //! Wide areas follow the curve of the earth, tile by tile.
 
 use std::collections::HashMap;
+use std::fmt::Write;
 
 use proj4rs::{Proj, transform::transform};
 use serde_json::Value;
@@ -186,6 +187,34 @@ fn long_triangles_do_not_move_the_ground() {
     let worst = best.values().copied().fold(0.0, f64::max);
     let promise = georeference(&job, "globe")["distortion_m"].as_f64().unwrap();
     assert!(best.len() > 7_000 && worst < 0.2 && promise > 50.0, "{} places, {worst} m, {promise}", best.len());
+}
+
+/// A file may say another unit than the code that it names, and a user may say it of a text.
+#[test]
+fn coordinates_in_feet_are_where_they_belong_although_the_code_means_metres() {
+    const FOOT: f64 = 1200.0 / 3937.0;
+    let placed = |unit: &str, metres: f64| {
+        let folder = tempfile::tempdir().unwrap();
+        let mut random = Random(7);
+        let mut text = String::new();
+        for _ in 0..200 {
+            let [x, y, z] = [500_300.0, 5_000_000.0, 100.0].map(|from| (from + 100.0 * random.unit()) / metres);
+            writeln!(text, "{x:.3},{y:.3},{z:.3}").unwrap();
+        }
+        let cloud = folder.path().join("cloud.csv");
+        std::fs::write(&cloud, text).unwrap();
+        let job = Job::on(&[&cloud]).with("input", &format!("crs = \"EPSG:26915\"\nunit = \"{unit}\""));
+        let job = job.with("output", "format = \"3dtiles\"");
+        job.report();
+        (numbers::<16>(&georeference(&job, "globe")["transform"]).unwrap(), job)
+    };
+    let [(metres, _metre_job), (feet, _foot_job)] = [placed("metre", 1.0), placed("us-foot", FOOT)];
+    // Both have their origin near the middle of the area.
+    let apart = distance([metres[12], metres[13], metres[14]], [feet[12], feet[13], feet[14]]);
+    assert!(apart < 100.0, "{apart} m");
+    for (metres, feet) in metres[..12].iter().zip(&feet[..12]) {
+        assert!((metres - feet).abs() < 1e-4, "{metres} {feet}");
+    }
 }
 
 #[test]

@@ -43,6 +43,11 @@ fn a_parabola() {
 }
 
 #[test]
+fn a_narrow_parabola() {
+    gives_one_mesh(|i| [2 * i - COUNT, (2 * i - COUNT).pow(2) / 200]);
+}
+
+#[test]
 fn a_circle_and_its_centre() {
     gives_one_mesh(|i| {
         let (sin, cos) = (i as f64).sin_cos();

@@ -53,6 +53,16 @@ fn two_million_points_on_one_spot_fit_in_128_mib() {
     job.verified();
 }
 
+/// Every thread that makes a coarser tile holds the tiles below it, so sixteen at once would take 400 MB.
+#[test]
+fn coarser_tiles_of_many_threads_fit_in_256_mib() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = clouds::write(folder.path(), "square.csv", &clouds::uniform(2_000_000, 100_000, 8));
+    let job =
+        Job::on(&[file]).with("limits", "memory = \"256 MiB\"\nthreads = 16").with("output", "format = \"3dtiles\"");
+    stays_within(&job.tiles_of(5_000).report(), 256);
+}
+
 #[test]
 fn tiles_too_large_for_the_memory_are_refused() {
     let folder = tempfile::tempdir().unwrap();

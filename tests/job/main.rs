@@ -40,5 +40,6 @@ mod steps;
 mod tampering;
 mod tasks;
 mod texts;
+mod units;
 mod viewers;
 mod written;

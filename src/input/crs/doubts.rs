@@ -29,6 +29,15 @@ impl Crs {
         horizontal.into_iter().chain(vertical).chain(projection).chain(code).collect()
     }
 
+    /// Says that z counts downwards, if it does.
+    pub fn depths(&self) -> Option<String> {
+        let heights = self.vertical_system.as_ref().filter(|heights| heights.is_depth() == Some(true))?;
+        Some(format!(
+            "its z counts downwards ({}), and is taken as a height: the terrain is upside down (multiply z by -1 first)",
+            heights.label()
+        ))
+    }
+
     /// Says in what the parameters of the system's text differ from those of its code.
     pub(crate) fn difference_to_code(&self) -> Option<String> {
         let (own, known) = (CrsForm::of_text(self.wkt.as_deref()?)?, CrsForm::of_code(self.epsg?)?);

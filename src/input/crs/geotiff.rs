@@ -91,7 +91,7 @@ pub(crate) fn parse(keys: &GeoKeys) -> Option<Crs> {
     let heights = VerticalSystem {
         epsg: keys.code(VERTICAL_TYPE).filter(|code| *code != USER_DEFINED).map(u32::from),
         name: keys.text(VERTICAL_CITATION).and_then(|text| esri::title(&text)),
-        datum: None,
+        ..VerticalSystem::default()
     };
     let unit_of_height = keys.code(VERTICAL_UNITS).and_then(metres).or_else(|| heights.metres_of_code());
     let mut crs = Crs {

@@ -228,8 +228,17 @@ impl Projection {
                 let azimuth = get(parameters, "alpha").unwrap_or(0.0);
                 parameters.entry("gamma".into()).or_insert(azimuth);
             }
-            // The others are constants of the method. Some writers name them, and not all in the same way.
-            "krovak" => parameters.retain(|name, _| ["lat_0", "lon_0", "k_0", "x_0", "y_0"].contains(&name.as_str())),
+            // The other parameters are constants of the method. Some writers name them, and not all in the same way.
+            "krovak" => {
+                const TURN: [&str; 3] = ["x_scale", "y_scale", "gamma"];
+                let says_axes = TURN.iter().any(|name| parameters.contains_key(*name));
+                let axes = esris_axes(TURN.map(|name| get(parameters, name).unwrap_or(default(name))));
+                self.westward = axes.filter(|_| says_axes).or(self.westward);
+                let is_said = |name: &str| axes.is_some() && TURN.contains(&name);
+                let is_own =
+                    |name: &str| ["lat_0", "lon_0", "k_0", "x_0", "y_0"].contains(&name) || TURN.contains(&name);
+                parameters.retain(|name, _| is_own(name) && !is_said(name));
+            }
             WEB_MERCATOR => parameters.retain(|name, _| ["lon_0", "x_0", "y_0"].contains(&name.as_str())),
             _ => {}
         }
@@ -332,6 +341,13 @@ fn westward(system: &WktNode) -> Option<bool> {
     (has("east") || has("west")).then(|| has("west"))
 }
 
+/// Returns whether x grows to the west by the scales and the turn of the axes in ESRI's texts of Krovak's projection; `None` if they are
+/// neither those of south and west nor those of east and north.
+fn esris_axes(turn: [f64; 3]) -> Option<bool> {
+    let is = |known: [f64; 3]| turn.iter().zip(known).all(|(own, known)| (own - known).abs() < 1e-9);
+    if is([1.0, 1.0, 0.0]) { Some(true) } else { is([-1.0, 1.0, 90.0]).then_some(false) }
+}
+
 fn default(name: &str) -> f64 {
     if is_scale(name) { 1.0 } else { 0.0 }
 }
@@ -385,6 +401,38 @@ fn long_name(name: &str) -> &str {
 mod tests {
     use super::*;
     use crate::input::crs::wkt::{PROJECTED, find};
+
+    #[test]
+    fn the_axes_of_krovak_are_those_of_esris_parameters() {
+        let read = |turn: &str| {
+            let text = format!(
+                r#"PROJCS["S-JTSK_Krovak",GEOGCS["GCS_S_JTSK",DATUM["D_S_JTSK",SPHEROID["Bessel_1841",6377397.155,299.1528128]],
+                PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],PROJECTION["Krovak"],PARAMETER["False_Easting",0.0],
+                PARAMETER["False_Northing",0.0],PARAMETER["Pseudo_Standard_Parallel_1",78.5],PARAMETER["Scale_Factor",0.9999],
+                PARAMETER["Azimuth",30.2881397527778],PARAMETER["Longitude_Of_Center",24.8333333333333],
+                PARAMETER["Latitude_Of_Center",49.5],{turn}UNIT["Meter",1.0]]"#
+            );
+            Projection::of(&find(&text, &PROJECTED).unwrap()).unwrap()
+        };
+        let turn = |x: f64, y: f64, angle: f64| {
+            read(&format!(
+                r#"PARAMETER["X_Scale",{x:.1}],PARAMETER["Y_Scale",{y:.1}],PARAMETER["XY_Plane_Rotation",{angle:.1}],"#
+            ))
+        };
+        let of_code =
+            |code| Projection::of(&find(crs_definitions::from_code(code).unwrap().wkt, &PROJECTED).unwrap()).unwrap();
+        let (south_west, east_north, odd) = (turn(1.0, 1.0, 0.0), turn(-1.0, 1.0, 90.0), turn(1.0, 1.0, 90.0));
+        let direction = Some("the direction of the axes".to_string());
+        assert_eq!(south_west.difference(&east_north), direction);
+        assert_eq!(
+            (south_west.difference(&of_code(5514)), east_north.difference(&of_code(5513))),
+            (direction.clone(), direction)
+        );
+        assert_eq!((south_west.difference(&of_code(5513)), east_north.difference(&of_code(5514))), (None, None));
+        assert!(odd.difference(&south_west).is_some() && odd.difference(&east_north).is_some());
+        // A text that does not say it agrees with both.
+        assert_eq!((read("").difference(&south_west), read("").difference(&east_north)), (None, None));
+    }
 
     #[test]
     fn every_projection_with_a_code_says_all_of_it() {

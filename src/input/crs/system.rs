@@ -170,6 +170,19 @@ impl<'a> ComparableCrs<'a> {
         self.form.is_some() && self.datum_name().is_none()
     }
 
+    /// Returns whether nothing but its name, its code or its keys says where its coordinates are.
+    pub fn is_known_by_name(&self) -> bool {
+        self.form.is_none()
+    }
+
+    /// Returns a text that is the same for two systems only if they agree, and differ from the same systems in the same way.
+    pub fn kind(&self) -> String {
+        let crs = self.crs;
+        let names = self.form.is_none().then(|| (crs.name.as_ref(), crs.unread()));
+        let besides = (crs.horizontal, crs.vertical, &crs.vertical_system);
+        format!("{:?}", (crs.kind, crs.epsg, &self.form, names, besides))
+    }
+
     /// As [`Crs::differences`].
     pub fn differences(&self, other: &ComparableCrs) -> Vec<String> {
         let (own, others) = (self.crs.kind, other.crs.kind);

@@ -33,6 +33,9 @@ pub struct VerticalSystem {
     pub name: Option<String>,
     /// The name of its datum.
     pub datum: Option<String>,
+    /// Whether z counts downwards, if its text says so or the contrary.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub downward: Option<bool>,
 }
 
 impl VerticalSystem {
@@ -40,7 +43,12 @@ impl VerticalSystem {
     pub(crate) fn of(node: &WktNode) -> Option<VerticalSystem> {
         let datum = node.child(&["VERT_DATUM", "VDATUM", "VERTICALDATUM", "VRF", "DATUM"]);
         let text = |node: &WktNode| node.text(0).map(str::to_string).filter(|name| !name.is_empty());
-        let system = VerticalSystem { epsg: node.epsg(), name: text(node), datum: datum.and_then(text) };
+        let system = VerticalSystem {
+            epsg: node.epsg(),
+            name: text(node),
+            datum: datum.and_then(text),
+            downward: downward(node),
+        };
         (system != VerticalSystem::default()).then_some(system)
     }
 
@@ -59,11 +67,8 @@ impl VerticalSystem {
     /// Says in what the datums differ, or in what they cannot be compared; a system that says nothing agrees with all.
     pub(crate) fn difference(&self, other: &VerticalSystem) -> Option<String> {
         let (own, others) = (self.keys(), other.keys());
-        if own.is_empty() || others.is_empty() {
-            return None;
-        }
         let (label, other_label) = (self.label(), other.label());
-        if !own.iter().any(|key| others.contains(key)) {
+        if !own.is_empty() && !others.is_empty() && !own.iter().any(|key| others.contains(key)) {
             let unknown = self.unknown_code().or_else(|| other.unknown_code());
             let doubt = unknown.map_or(String::new(), |code| {
                 format!(", and EPSG:{code} is not in the list of known codes of heights")
@@ -85,10 +90,12 @@ impl VerticalSystem {
         keys
     }
 
-    /// Returns whether z counts downwards; `None` if neither the code nor the name of the system says so.
-    fn is_depth(&self) -> Option<bool> {
-        let of_code = self.epsg.and_then(|code| heights().get(&code)).map(|code| code.is_depth);
-        of_code.or_else(|| self.name.as_deref().map(|name| comparable_name(name).contains("depth")))
+    /// Returns whether z counts downwards; `None` if neither the text nor the code nor the name of the system says so.
+    pub(crate) fn is_depth(&self) -> Option<bool> {
+        let of_code = || self.epsg.and_then(|code| heights().get(&code)).map(|code| code.is_depth);
+        self.downward
+            .or_else(of_code)
+            .or_else(|| self.name.as_deref().map(|name| comparable_name(name).contains("depth")))
     }
 
     /// Returns its code if that is all that is known.
@@ -97,6 +104,17 @@ impl VerticalSystem {
             |code: &u32| heights().contains_key(code) || heights().values().any(|known| known.datum == *code);
         self.epsg.filter(|code| !is_known(code) && self.name.is_none() && self.datum.is_none())
     }
+}
+
+/// Returns whether the axis of a vertical system goes down, as its direction says, or ESRI's parameter for it.
+fn downward(node: &WktNode) -> Option<bool> {
+    let parameters = || node.children().filter(|child| child.keyword == "PARAMETER");
+    let is_direction = |child: &&WktNode| child.text(0).is_some_and(|name| name.eq_ignore_ascii_case("direction"));
+    let of_axis = node.child(&["AXIS"]).and_then(|axis| axis.text(1)).and_then(|direction| {
+        let is = |word: &str| direction.eq_ignore_ascii_case(word);
+        if is("down") { Some(true) } else { is("up").then_some(false) }
+    });
+    of_axis.or_else(|| parameters().find(is_direction)?.number(1).map(|direction| direction < 0.0))
 }
 
 fn known_name(name: &str) -> Option<String> {
@@ -151,5 +169,24 @@ mod tests {
         let unknown = coded(31_000).difference(&named("LN02 height")).unwrap();
         assert!(unknown.contains("EPSG:31000 is not in the list of known codes of heights"), "{unknown}");
         assert!(coded(5703).difference(&coded(6357)).unwrap().contains("depths"));
+    }
+
+    #[test]
+    fn heights_and_depths_are_told_apart_by_what_the_text_says_of_their_axis() {
+        let of = |text: &str| VerticalSystem::of(&WktNode::parse_all(text).unwrap()[0]).unwrap();
+        let datum = r#"VERT_DATUM["Local",2005],UNIT["metre",1]"#;
+        let [up, down] = ["UP", "DOWN"].map(|way| of(&format!(r#"VERT_CS["Local",{datum},AXIS["z",{way}]]"#)));
+        let esri = |way: &str| {
+            of(&format!(r#"VERTCS["Local",VDATUM["Local"],PARAMETER["Direction",{way}],UNIT["Meter",1.0]]"#))
+        };
+        let said = "the direction of heights, one of which are depths (Local, Local)";
+        for (height, depth) in [(&up, &down), (&esri("1.0"), &esri("-1.0")), (&up, &esri("-1.0"))] {
+            assert_eq!(height.difference(depth).as_deref(), Some(said));
+            assert_eq!((height.difference(height), depth.difference(depth)), (None, None));
+        }
+        let unknown = |way: &str| of(&format!(r#"VERT_CS["unknown",AXIS["z",{way}]]"#));
+        assert!(unknown("UP").difference(&unknown("DOWN")).is_some_and(|said| said.contains("depths")));
+        // The axis says more than the name.
+        assert_eq!(of(&format!(r#"VERT_CS["Local depth",{datum},AXIS["z",UP]]"#)).is_depth(), Some(false));
     }
 }

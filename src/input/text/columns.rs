@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::input::text::comment_names::names_in_comments;
+use crate::input::text::comment_names::{names_in_comments, texts_of};
 use crate::input::text::decimal_comma::{self, CommaUse, Names};
 use crate::input::text::decimal_sign::{self, DecimalSign};
 use crate::input::text::delimiter::{CANDIDATES, Delimiter};
@@ -15,7 +15,7 @@ use crate::input::text::lines::is_skipped;
 use crate::input::text::names::{NamedColumns, named_columns, truncate};
 use crate::input::text::number::Number;
 use crate::input::text::numbered::are_numbered;
-use crate::input::text::optional_columns::{drop_unreadable_colors, has_unit_colors, unreadable_class};
+use crate::input::text::optional_columns::{drop_unreadable_colors, unreadable_class};
 use crate::input::text::options::TextOptions;
 use crate::input::text::role::ColumnRole;
 use crate::input::text::row_choice::RowChoice;
@@ -50,11 +50,11 @@ pub(crate) struct Columns {
     pub(crate) roles: Vec<ColumnRole>,
     /// How many columns the text itself names. A row with more is malformed.
     pub(crate) named: Option<usize>,
-    /// Whether decimals have a comma before them, not a point.
+    /// Whether decimals have a comma before them, not a point. If commas are also the delimiter, only those in quotes are that.
     pub(crate) decimal_comma: bool,
     /// Whether a row is malformed if its class cannot be read.
     pub(crate) strict_classes: bool,
-    /// Whether colours are numbers from 0 to 1.
+    /// Whether colours are numbers from 0 to 1. Only all rows together show it.
     pub(crate) unit_colors: bool,
     /// Lines that begin with one of these are skipped.
     comments: Vec<String>,
@@ -99,15 +99,22 @@ impl Columns {
             None => CANDIDATES.to_vec(),
         };
         let written: Vec<&[u8]> = rows.iter().map(|(_, line)| *line).collect();
-        let decimal_comma = has_decimal_commas(path, &written, &candidates)?;
-        let pointed: Vec<Cow<[u8]>>;
-        let texts: Vec<&[u8]> = if decimal_comma {
-            candidates.retain(|delimiter| *delimiter != Delimiter::Byte(b','));
-            pointed = written.iter().map(|line| decimal_sign::pointed(line, &candidates)).collect();
-            pointed.iter().map(|line| &**line).collect()
-        } else {
-            written
+        let sign = decimal_sign::find(&written, &candidates);
+        let is_comma = |delimiter: &Delimiter| *delimiter == Delimiter::Byte(b',');
+        let pointed: Vec<Cow<[u8]>> = match sign {
+            DecimalSign::Unclear => return Err(Error::input(path, UNCLEAR_THOUSANDS)),
+            DecimalSign::Point => written.iter().map(|line| Cow::Borrowed(*line)).collect(),
+            DecimalSign::Comma => {
+                candidates.retain(|delimiter| !is_comma(delimiter));
+                written.iter().map(|line| decimal_sign::pointed(line, &candidates)).collect()
+            }
+            DecimalSign::QuotedComma => {
+                candidates.retain(is_comma);
+                written.iter().map(|line| decimal_sign::pointed_in_quotes(line)).collect()
+            }
         };
+        let texts: Vec<&[u8]> = pointed.iter().map(|line| &**line).collect();
+        let decimal_comma = sign != DecimalSign::Point;
         let header = header::find(&texts, &candidates, options.header, options.columns.is_some());
         if header.count {
             warnings.push("the first line holds one number, taken for the number of points and skipped");
@@ -118,7 +125,13 @@ impl Columns {
         let data = &texts[header.lines..];
         let bad = |what: String| Error::input(path, what);
         let found = match (&options.columns, header.names) {
-            (Some(names), _) => Some(named_by_user(names)?),
+            (Some(names), _) => {
+                let mut named = named_by_user(names)?;
+                let end = rows.get(header.lines).map_or(0, |row| row.0);
+                let comments = lines[..end].iter().flat_map(|line| texts_of(line, &comments));
+                texts[..header.lines].iter().copied().chain(comments).for_each(|line| named.add_units_beside(line));
+                Some(named)
+            }
             (None, Some(names)) => Some(names.map_err(bad)?),
             (None, None) if options.header == Some(false) => None,
             (None, None) => {
@@ -138,17 +151,19 @@ impl Columns {
         if found.is_none() && are_numbered(delimiter, data) {
             return Err(bad(NUMBERED.to_string()));
         }
-        let columns_of_last = texts.last().map_or(0, |row| delimiter.fields(row).len());
+        let is_filled = |field: &&[u8]| !field.is_empty();
+        let filled = |row: &&[u8]| delimiter.fields(row).iter().rposition(is_filled).map_or(0, |last| last + 1);
+        let columns_of_last = texts.last().map_or(0, filled);
         let units = found.as_ref().map_or(Ok(UnitsOfAxes::default()), NamedColumns::units);
         let units = units.map_err(|what| bad(format!("its header {what}")))?;
         warnings.extend(names_warning(found.as_ref(), &units, columns_of_last));
+        warnings.extend(unknown_units(found.as_ref()));
         let named = found.as_ref().filter(|_| options.columns.is_none()).map(|found| found.count);
-        let unit_colors = has_unit_colors(delimiter, &roles, data);
-        warnings.extend(drop_unreadable_colors(delimiter, &mut roles, unit_colors, data));
+        warnings.extend(drop_unreadable_colors(delimiter, &mut roles, data));
         truncate(&mut roles);
         let strict_classes = choice.strict_classes;
         warnings.extend(unreadable_class(delimiter, &roles, data).filter(|_| !strict_classes));
-        let columns = Columns { delimiter, roles, named, decimal_comma, strict_classes, unit_colors, comments };
+        let columns = Columns { delimiter, roles, named, decimal_comma, strict_classes, unit_colors: false, comments };
         Ok(DetectedColumns { columns, header_lines, degrees: found.is_some_and(|found| found.degrees), units })
     }
 
@@ -169,15 +184,6 @@ impl Columns {
     }
 }
 
-/// Returns whether decimals have a comma before them.
-fn has_decimal_commas(path: &Path, rows: &[&[u8]], candidates: &[Delimiter]) -> Result<bool> {
-    match decimal_sign::find(rows, candidates) {
-        DecimalSign::Point => Ok(false),
-        DecimalSign::Comma => Ok(true),
-        DecimalSign::Unclear => Err(Error::input(path, UNCLEAR_THOUSANDS)),
-    }
-}
-
 fn named_by_user(names: &[String]) -> Result<NamedColumns> {
     named_columns(names.iter().map(|name| name.as_bytes()))
         .map_err(|error| Error::Config(format!("[input.csv] columns {error}")))
@@ -192,6 +198,15 @@ fn used_roles(found: Option<&NamedColumns>, colors: bool) -> Vec<ColumnRole> {
         truncate(&mut roles);
     }
     roles
+}
+
+fn unknown_units(found: Option<&NamedColumns>) -> Option<String> {
+    let unknown = &found.filter(|found| !found.unknown_units.is_empty())?.unknown_units;
+    Some(format!(
+        "the names of its columns have \"{}\" in brackets, which is no unit that is known here: it is left aside (if it is a unit of length, \
+         set [input] unit)",
+        unknown.join("\" and \"")
+    ))
 }
 
 fn names_warning(found: Option<&NamedColumns>, units: &UnitsOfAxes, columns: usize) -> Option<String> {

@@ -1,9 +1,12 @@
 //! Names of columns in a comment before the rows, such as `# x y z`.
 
+use crate::input::text::decimal_comma::is_pointed;
 use crate::input::text::delimiter::{CANDIDATES, Delimiter};
 use crate::input::text::header::{ROWS_FOR_NAMES, columns_of};
 use crate::input::text::lines::{is_skipped, shown};
 use crate::input::text::names::{NamedColumns, named_columns};
+use crate::input::text::numbered::are_numbered;
+use crate::input::text::role::ColumnRole;
 
 /// Returns the names in the last comment among `lines` that names the columns of `rows`, the first of the text.
 ///
@@ -38,15 +41,20 @@ pub(crate) fn names_in_comments(
         None => Ok(None),
         Some((line, names)) => Err(format!(
             "the comment {} names x, y and z, but it has {names} words and the rows have {} columns: say which is which with `columns` under \
-             [input.csv]",
+             [input.csv]{}",
             shown(line),
-            rows.columns().max().unwrap_or(0)
+            rows.columns().max().unwrap_or(0),
+            if rows.may_have_decimal_commas(Delimiter::Byte(b',')) {
+                "; if commas also stand before decimals, as in 565000,25,5933000,50, write it again with points there"
+            } else {
+                ""
+            }
         )),
     }
 }
 
 /// Returns what may be names in a comment: what follows its last colon, and all of its text.
-fn texts_of<'a>(line: &'a [u8], comments: &[String]) -> Vec<&'a [u8]> {
+pub(crate) fn texts_of<'a>(line: &'a [u8], comments: &[String]) -> Vec<&'a [u8]> {
     let line = line.trim_ascii_start();
     let Some(comment) = comments.iter().find(|comment| line.starts_with(comment.as_bytes())) else { return Vec::new() };
     let text = &line[comment.len()..];
@@ -75,15 +83,28 @@ impl Rows<'_> {
     }
 
     /// Returns names that this delimiter parts, if they are as many as the columns, or the names of the first of them. Then columns
-    /// without a name have none.
+    /// without a name have none: a comment, unlike a header, need not name all. But there may be more columns than names because
+    /// commas stand before decimals, or because a number of the row comes before x.
     fn fit(&self, delimiter: Delimiter, names: &NamedColumns) -> Option<NamedColumns> {
         if self.columns().any(|columns| columns == names.count) {
             return Some(names.clone());
+        }
+        let begins_with_coordinate = matches!(names.roles.first(), Some(ColumnRole::Coordinate(_)));
+        if self.may_have_decimal_commas(delimiter) || begins_with_coordinate && are_numbered(delimiter, self.rows) {
+            return None;
         }
         let wider = self.readings().filter(|(own, columns)| *own == delimiter && *columns > names.count);
         let mut names = names.clone();
         names.count = wider.map(|(_, columns)| columns).max()?;
         Some(names)
+    }
+
+    /// Returns whether commas may stand before decimals as well: they part columns, and no number has a point.
+    fn may_have_decimal_commas(&self, delimiter: Delimiter) -> bool {
+        let has_point = |row: &&[u8]| delimiter.fields(row).iter().any(|field| is_pointed(field));
+        delimiter == Delimiter::Byte(b',')
+            && self.readings().any(|(own, _)| own == delimiter)
+            && !self.rows.iter().any(has_point)
     }
 
     /// Returns whether columns without names mean the same: x, y and z come first, or are all there is in the order x, y, z.
@@ -121,9 +142,15 @@ mod tests {
             assert_eq!(places(comment, "1 2 3"), Ok(None), "{comment}");
         }
         assert_eq!(places("# x y z i r g b", "1 2 3 4"), Ok(None));
-        for (comment, row) in
-            [("# z y x of the hill", "1 2 3"), ("# rows of id x y z", "1 2 3 4"), ("# y,x,z", "2;1;3;4")]
-        {
+        assert_eq!(places("# y,x,z", "2.5,1,3,4"), swapped);
+        assert_eq!(places("# x,y,z", "565013,44,5933084,74,25,3"), Ok(None));
+        for (comment, row) in [
+            ("# z y x of the hill", "1 2 3"),
+            ("# rows of id x y z", "1 2 3 4"),
+            ("# y,x,z", "2;1;3;4"),
+            ("# y,x,z", "5933084,74,565013,44,25,3"),
+            ("# id,x,y,z", "1,565013,44,5933084,74,25,3"),
+        ] {
             assert_eq!(places(comment, row), Err(()), "{comment}");
         }
     }

@@ -46,8 +46,11 @@ pub(crate) enum Names {
     Others,
 }
 
-/// The columns of a row that are all whole numbers.
+/// The columns of a row that are all whole numbers, or those at its start.
 type WholeRow<'a> = Vec<&'a [u8]>;
+
+/// A row with a text in it may begin with decimals if so many whole numbers stand before the text.
+const LEAST_COLUMNS: usize = 4;
 
 /// Returns what the commas of these rows stand for; `None` if they stand between columns. Decimals after a comma are whole numbers in a
 /// column of their own, so one number with a point in it shows that the commas stand between columns. `named` is the number of names.
@@ -63,18 +66,27 @@ pub(crate) fn second_use(delimiter: Delimiter, names: Names, named: Option<usize
     }
     let count = all.len();
     let is_whole_row = |row: &Vec<&[u8]>| row.len() >= 3 && row[..looked_at(row)].iter().all(|field| is_whole(field));
-    let whole: Vec<WholeRow> = all.into_iter().filter(is_whole_row).collect();
-    if whole.is_empty() || (count - whole.len()) * BROKEN > count {
+    let is_most = |rows: usize| rows > 0 && (count - rows) * BROKEN <= count;
+    let (whole, others): (Vec<WholeRow>, Vec<WholeRow>) = all.into_iter().partition(is_whole_row);
+    // The lengths of rows with texts in them say nothing: a text may hold a comma.
+    if is_most(whole.len()) && are_ragged(&whole, named) {
+        return Some(CommaUse::Decimals);
+    }
+    let before_text = others.into_iter().filter_map(|mut row| {
+        row.truncate(row.iter().take_while(|field| is_whole(field)).count());
+        (row.len() >= LEAST_COLUMNS).then_some(row)
+    });
+    let whole: Vec<WholeRow> = whole.into_iter().chain(before_text).collect();
+    if !is_most(whole.len()) {
         return None;
     }
-    let first = names != Names::Others;
-    if first && (have_no_heights(&whole) || have_zeros(&whole, names)) || are_ragged(&whole, named) {
+    if names != Names::Others && (have_no_heights(&whole) || have_zeros(&whole, names)) {
         return Some(CommaUse::Decimals);
     }
     (names == Names::None && may_be_decimals(&whole)).then_some(CommaUse::Unclear)
 }
 
-fn is_pointed(field: &[u8]) -> bool {
+pub(crate) fn is_pointed(field: &[u8]) -> bool {
     let digits = |byte: &u8| byte.is_ascii_digit() || matches!(byte, b'.' | b'-' | b'+');
     field.len() > 1 && field.contains(&b'.') && field.iter().all(digits)
 }
@@ -227,6 +239,24 @@ mod tests {
         for names in [Names::None, Names::CoordinatesFirst, Names::Others] {
             assert_eq!(used(names, &table(50, dropped)), decimals);
         }
+    }
+
+    #[test]
+    fn decimal_commas_are_seen_before_a_text() {
+        let coded = |i: usize| format!("{},{},{},{},{},GND", 565_013 + i, 44 + i % 50, 5_933_084 + i, 74 - i % 60, 25);
+        for names in [Names::None, Names::CoordinatesFirst] {
+            assert_eq!(used(names, &table(50, coded)), Some(CommaUse::Decimals));
+        }
+        let heights = |i: usize| format!("{},{},12,{},tree {i}", 565_000 + i, 5_933_000 + 7 * i, 10 + i % 90);
+        assert_eq!(used(Names::None, &table(50, heights)), Some(CommaUse::Unclear));
+        // Texts with commas in them.
+        let notes = |i: usize| {
+            let note = ["Baum", "Baum, alt", "", "7", "a,b,c"][i % 5];
+            format!("{},{},{},5,{note}", 565_000 + i, 5_933_000 + 7 * i, 12 + i % 90)
+        };
+        assert_eq!(used(Names::CoordinatesFirst, &table(300, notes)), None);
+        let triples = |i: usize| format!("{},{},{},GND", 565_000 + i, 5_933_000 + 7 * i, 12 + i % 90);
+        assert_eq!(used(Names::None, &table(300, triples)), None);
     }
 
     #[test]

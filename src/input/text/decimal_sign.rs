@@ -11,6 +11,8 @@ pub(crate) enum DecimalSign {
     Point,
     /// A comma; something else stands between columns.
     Comma,
+    /// A comma in quotes; commas without quotes stand between columns.
+    QuotedComma,
     /// A comma stands there or between thousands.
     Unclear,
 }
@@ -27,21 +29,35 @@ pub(crate) fn find(rows: &[&[u8]], candidates: &[Delimiter]) -> DecimalSign {
         return DecimalSign::Point;
     }
     let delimiters: Vec<Delimiter> = candidates.iter().copied().filter(|delimiter| *delimiter != COMMA).collect();
-    let (mut commas, mut points, mut thousands, mut gaps) = (0usize, 0usize, true, false);
-    for row in rows.iter().take(ROWS) {
-        if candidates.iter().any(|delimiter| delimiter.numbers(row) >= 3) {
-            let is_whole = !row.contains(&b'.') && delimiters.iter().any(|delimiter| delimiter.numbers(row) >= 3);
-            points += !is_whole as usize;
-        } else if let Some(numbers) = numbers_with_commas(row, &delimiters) {
-            commas += 1;
+    let has_three =
+        |row: &[u8], delimiters: &[Delimiter]| delimiters.iter().any(|delimiter| delimiter.numbers(row) >= 3);
+    let with_commas = |row| numbers_with_commas(row, &delimiters).map(|numbers| (false, numbers));
+    let in_quotes = |row| numbers_with_commas(row, candidates).map(|numbers| (true, numbers));
+    let (mut commas, mut quoted, mut points, mut plain) = (0usize, 0usize, 0usize, 0usize);
+    let (mut thousands, mut gaps) = (true, false);
+    for row in rows.iter().take(ROWS).copied() {
+        let (is_row, has_point) = (has_three(row, candidates), row.contains(&b'.'));
+        // Beside decimals there may be three whole numbers: colours, a class, the number of the point.
+        let found = if is_row && has_point { None } else { with_commas(row).or_else(|| in_quotes(row)) };
+        if let Some((is_quoted, numbers)) = found {
+            (commas, quoted) = (commas + !is_quoted as usize, quoted + is_quoted as usize);
             let is_decimal = |field: &&&[u8]| field.contains(&b',');
             thousands &= numbers.iter().filter(is_decimal).all(|field| may_have_thousands(field));
             gaps |= !numbers.iter().take(3).all(|field| field.contains(&b','));
+        } else if is_row {
+            // Commas that part whole numbers are no decimals, unless those are in quotes.
+            points += has_point as usize;
+            plain += (!has_point && !has_three(row, &delimiters)) as usize;
         }
     }
-    match commas > points {
-        // Numbers below a thousand have no comma between thousands, so it stands before decimals if all numbers have one.
-        true if thousands && gaps => DecimalSign::Unclear,
+    if quoted <= commas {
+        points += plain;
+    }
+    match commas + quoted > points {
+        // Numbers below a thousand have no comma between thousands, so it stands before decimals if all numbers have one. Who writes commas
+        // between columns writes thousands in quotes, so those have to be told apart by their digits.
+        true if thousands && (gaps || quoted > 0) => DecimalSign::Unclear,
+        true if quoted > commas => DecimalSign::QuotedComma,
         true => DecimalSign::Comma,
         false => DecimalSign::Point,
     }
@@ -53,6 +69,23 @@ pub(crate) fn pointed<'a>(line: &'a [u8], candidates: &[Delimiter]) -> Cow<'a, [
         Some(_) => line.iter().map(swapped).collect(),
         None => Cow::Borrowed(line),
     }
+}
+
+/// As [`pointed`], for lines in which only commas in quotes stand before decimals.
+pub(crate) fn pointed_in_quotes(line: &[u8]) -> Cow<'_, [u8]> {
+    match numbers_with_commas(line, &[COMMA]) {
+        Some(_) => swapped_in_quotes(line).collect(),
+        None => Cow::Borrowed(line),
+    }
+}
+
+/// Returns `line` with points in place of the commas in quotes, and the other way round.
+pub(crate) fn swapped_in_quotes(line: &[u8]) -> impl Iterator<Item = u8> {
+    let mut is_quoted = false;
+    line.iter().map(move |byte| {
+        is_quoted ^= *byte == b'"';
+        if is_quoted { swapped(byte) } else { *byte }
+    })
 }
 
 /// Returns the point for a comma and the comma for a point. A point between thousands then is no part of a number.
@@ -114,8 +147,15 @@ mod tests {
             "1,500;2,250;3,125",
             "0,500;2;3",
             "5,65e5;2,2e3;-3,1",
+            "565013,44;5933084,74;25,28;10;20;30",
+            "7 565013,44 5933084,74 25,28 10 20 30",
+            "id;x;y;z;intensity;class\n1;565013,44;5933084,74;25,28;100;2\n2;565014;5933085;25;101;2",
         ] {
             assert_eq!(sign(text), DecimalSign::Comma, "{text}");
+        }
+        for text in ["\"565013,44\",\"5933084,74\",\"25,28\"", "1,\"0,44\",\"84,742\",25,10,20", "a,\"1,5\",2,\"3,25\""]
+        {
+            assert_eq!(sign(text), DecimalSign::QuotedComma, "{text}");
         }
         for text in [
             "565000,25,5933000,50,12,1",
@@ -131,6 +171,7 @@ mod tests {
             assert_eq!(sign(text), DecimalSign::Point, "{text}");
         }
         assert_eq!(sign("565,000;933,012;12\n565,001;933,011;13"), DecimalSign::Unclear);
+        assert_eq!(sign("\"565,000\",\"933,012\",\"1,120\""), DecimalSign::Unclear);
     }
 
     #[test]
@@ -138,5 +179,7 @@ mod tests {
         assert_eq!(&*pointed(b"1.500,5;2;3,5;4", &[Delimiter::Byte(b';')]), b"1,500.5;2;3.5;4");
         assert_eq!(&*pointed(b"1,5;2;3,5", &[Delimiter::Byte(b';')]), b"1.5;2;3.5");
         assert_eq!(&*pointed(b"a;b,c;d", &[Delimiter::Byte(b';')]), b"a;b,c;d");
+        assert_eq!(&*pointed_in_quotes(b"\"1.500,5\",2,\"3,5\",4"), b"\"1,500.5\",2,\"3.5\",4");
+        assert_eq!(&*pointed_in_quotes(b"1,2,3"), b"1,2,3");
     }
 }

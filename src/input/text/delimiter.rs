@@ -96,12 +96,17 @@ fn is_number(field: &[u8]) -> bool {
 }
 
 /// Returns the length of the quoted text that `line` begins with, quotes included. A quote that is doubled is a part of the text.
+///
+/// An apostrophe may stand around a field, but it does not quote a delimiter: names begin with one ('s-Gravenhage), and the next may
+/// stand many columns further on.
 fn quoted_length(line: &[u8]) -> Option<usize> {
-    let quote = *line.first().filter(|byte| matches!(byte, b'"' | b'\''))?;
+    if line.first() != Some(&b'"') {
+        return None;
+    }
     let mut length = 1;
     loop {
-        length += memchr(quote, &line[length..])? + 1;
-        if line.get(length) != Some(&quote) {
+        length += memchr(b'"', &line[length..])? + 1;
+        if line.get(length) != Some(&b'"') {
             return Some(length);
         }
         length += 1;

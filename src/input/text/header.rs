@@ -2,7 +2,7 @@
 
 use crate::input::text::delimiter::{CANDIDATES, Delimiter};
 use crate::input::text::lines::shown;
-use crate::input::text::names::{NamedColumns, NamesError, named_columns};
+use crate::input::text::names::{NamedColumns, NamesError, coordinates, named_columns};
 use crate::input::text::role::ColumnRole;
 
 /// The number of rows whose columns are compared with the names in a header.
@@ -114,7 +114,7 @@ fn is_count(line: &[u8]) -> bool {
 }
 
 /// Returns what `line` names under the first delimiter that gives x, y and z and fits `rows`, or what is wrong under the delimiter that
-/// gives most columns. All delimiters are tried, the `candidates` for the rows first: a header may use another one.
+/// gives most of x, y and z, and of several the one that gives as many columns as there are, or most. All delimiters are tried, the `candidates` for the rows first: a header may use another one.
 pub(crate) fn header_names(
     candidates: &[Delimiter],
     line: &[u8],
@@ -136,15 +136,19 @@ pub(crate) fn header_names(
         let rows = rows.first().and_then(columns).unwrap_or(0);
         return Err(HeaderLineError::OtherCount { names: names.count, rows });
     }
-    let most = all.iter().max_by_key(|delimiter| delimiter.fields(line).len());
+    let most = all.iter().max_by_key(|delimiter| {
+        let fields = delimiter.fields(line);
+        let fits = rows.first().is_some_and(|row| columns_of(**delimiter, row) == fields.len());
+        (coordinates(fields.iter().copied()), fits, fields.len())
+    });
     Ok(split(most.unwrap_or(&Delimiter::Blank))?)
 }
 
 /// Returns whether names that this delimiter parts can be those of the columns of `rows`: as many, or with the delimiter of the rows and
 /// x, y and z among their columns. A title such as "My x y z file" names some by chance.
 fn fits_rows(delimiter: Delimiter, names: &NamedColumns, candidates: &[Delimiter], rows: &[&[u8]]) -> bool {
-    let coordinates = |role: &ColumnRole| matches!(role, ColumnRole::Coordinate(_));
-    let needed = names.roles.iter().rposition(coordinates).map_or(0, |last| last + 1);
+    let is_coordinate = |role: &ColumnRole| matches!(role, ColumnRole::Coordinate(_));
+    let needed = names.roles.iter().rposition(is_coordinate).map_or(0, |last| last + 1);
     let fits = |(own, row): (Delimiter, &[u8])| {
         let columns = columns_of(own, row);
         columns == names.count || (own == delimiter && columns >= needed)

@@ -6,6 +6,7 @@ pub(crate) mod comment_names;
 pub(crate) mod cut_off;
 pub(crate) mod decimal_comma;
 pub(crate) mod decimal_sign;
+pub(crate) mod degrees;
 pub(crate) mod delimiter;
 pub(crate) mod granularity;
 pub(crate) mod header;

@@ -1,5 +1,6 @@
 //! The names that people give to columns.
 
+use crate::input::text::delimiter::CANDIDATES;
 use crate::input::text::role::ColumnRole;
 use crate::input::text::units::{TextUnit, TextUnits, UnitsOfAxes};
 
@@ -75,6 +76,8 @@ const NAMES: [Names; 7] = [
             "height",
             "altitude",
             "alt",
+            "ellipsoidalheight",
+            "orthometricheight",
             "hoehe",
             "höhe",
             "h",
@@ -108,6 +111,8 @@ pub(crate) struct NamedColumns {
     pub(crate) count: usize,
     /// Whether x and y are named as longitude and latitude.
     pub(crate) degrees: bool,
+    /// What is in brackets after the names of x, y and z, and neither a unit that is known nor a name.
+    pub(crate) unknown_units: Vec<String>,
     /// What is known of their units.
     units: TextUnits,
 }
@@ -137,6 +142,20 @@ impl NamedColumns {
         };
         self.units.add_line([unit(0), unit(1), unit(2)])
     }
+
+    /// Takes the units of a line of the header into account where the names, which are the user's, say none: those in brackets after
+    /// other names of the same columns, and those of a line of units.
+    pub(crate) fn add_units_beside(&mut self, line: &[u8]) {
+        for delimiter in CANDIDATES {
+            let fields = delimiter.fields(line);
+            let field = |axis: usize| fields.get(self.place(axis)?).copied();
+            let [Some(x), Some(y), Some(z)] = [0, 1, 2].map(field) else { continue };
+            let beside = [x, y, z].map(|field| Name::read(field).unit());
+            let alone = [x, y, z].map(|field| TextUnit::read(&String::from_utf8_lossy(field)));
+            let found = if alone[0].is_some() && alone[1].is_some() { alone } else { beside };
+            self.units.complete(found);
+        }
+    }
 }
 
 /// A column's name.
@@ -154,15 +173,48 @@ impl Name {
             Some(at) if at > 0 && text.ends_with([']', ')', '}']) => text.split_at(at),
             _ => (text.as_str(), ""),
         };
-        let plain = name.chars().filter(|c| !matches!(c, ' ' | '\t' | '_' | '-' | '.')).collect();
-        Name { plain, unit: unit.trim_matches(['[', ']', '(', ')', '{', '}', ' ']).to_string() }
+        Name { plain: plain(name), unit: unit.trim_matches(['[', ']', '(', ')', '{', '}', ' ']).to_string() }
     }
 
-    /// Returns what the column holds, and how unclear the name is.
+    /// Returns what the column holds, and how unclear the name is. In some countries x is the northing, and brackets say so.
     fn role(&self) -> Option<(usize, ColumnRole)> {
-        let rank = |names: &[&str]| names.iter().position(|name| *name == self.plain);
-        NAMES.iter().find_map(|(names, role)| Some((rank(names)?, *role)))
+        let own = role_of(&self.plain)?;
+        let is_letter = |name: &str| name.contains(['x', 'y']);
+        let direction = self.words().find(|word| !is_letter(word) && is_on_map(role_of(word)));
+        match direction {
+            Some(direction) if is_letter(&self.plain) && is_on_map(Some(own)) => role_of(&direction),
+            _ => Some(own),
+        }
     }
+
+    /// Returns all that is in brackets, and the words of it.
+    fn words(&self) -> impl Iterator<Item = String> + use<'_> {
+        let words = self.unit.split([' ', ',', ';', '/']).filter(|word| word.chars().count() > 1);
+        std::iter::once(self.unit.as_str()).chain(words).map(plain)
+    }
+
+    fn unit(&self) -> Option<TextUnit> {
+        self.unit.split([',', ';']).find_map(TextUnit::read)
+    }
+
+    fn has_unknown_unit(&self) -> bool {
+        !self.unit.is_empty() && self.unit().is_none() && !self.words().any(|word| role_of(&word).is_some())
+    }
+}
+
+/// Returns a name as [`NAMES`] has it.
+fn plain(name: &str) -> String {
+    name.chars().filter(|c| !matches!(c, ' ' | '\t' | '_' | '-' | '.')).collect()
+}
+
+fn role_of(name: &str) -> Option<(usize, ColumnRole)> {
+    let rank = |names: &[&str]| names.iter().position(|known| *known == name);
+    NAMES.iter().find_map(|(names, role)| Some((rank(names)?, *role)))
+}
+
+/// Returns whether it is x or y.
+fn is_on_map(role: Option<(usize, ColumnRole)>) -> bool {
+    matches!(role, Some((_, ColumnRole::Coordinate(0 | 1))))
 }
 
 /// Returns what columns with these names hold.
@@ -194,8 +246,17 @@ pub(crate) fn named_columns<'a>(
     truncate(&mut roles);
     let is = |axis: usize, test: &dyn Fn(&Name) -> bool| places[axis].is_some_and(test);
     let degree = |axis: usize| is(axis, &|name| DEGREES[axis].contains(&name.plain.as_str()));
-    let units = TextUnits(places.map(|name| name.and_then(|name| TextUnit::read(&name.unit))));
-    Ok(NamedColumns { roles, count: names.len(), degrees: degree(0) && degree(1), units })
+    let units = TextUnits(places.map(|name| name.and_then(Name::unit)));
+    let unknown = places.into_iter().flatten().filter(|name| name.has_unknown_unit());
+    let mut unknown_units: Vec<String> = unknown.map(|name| name.unit.clone()).collect();
+    unknown_units.dedup();
+    Ok(NamedColumns { roles, count: names.len(), degrees: degree(0) && degree(1), unknown_units, units })
+}
+
+/// Returns how many of x, y and z the names name.
+pub(crate) fn coordinates<'a>(names: impl Iterator<Item = &'a [u8]>) -> usize {
+    let roles: Vec<ColumnRole> = names.filter_map(|name| Some(Name::read(name).role()?.1)).collect();
+    (0..3).filter(|axis| roles.contains(&ColumnRole::Coordinate(*axis))).count()
 }
 
 /// Removes the columns after the last one that is used.
@@ -237,6 +298,32 @@ mod tests {
         ] {
             assert_eq!(coordinates(line), Some([0, 1, 2]), "{line}");
         }
+    }
+
+    #[test]
+    fn a_direction_in_brackets_after_a_letter_is_followed() {
+        for line in [
+            "X (Northing);Y (Easting);Z",
+            "X [north];Y [east];Z [m]",
+            "X (Hochwert, m);Y (Rechtswert, m);Z",
+            "POINT_X (N);POINT_Y (E);Z",
+            "Northing (X);Easting (Y);Height",
+        ] {
+            assert_eq!(coordinates(line), Some([1, 0, 2]), "{line}");
+        }
+        for line in [
+            "X (Easting);Y (Northing);Z",
+            "Easting (m);Northing (m);Z",
+            "X (m);Y (m);Z (Height)",
+            "Easting (X);Northing (Y);Z",
+        ] {
+            assert_eq!(coordinates(line), Some([0, 1, 2]), "{line}");
+        }
+        assert_eq!(coordinates("X (Northing);Y;Z"), None);
+        let named = |line: &str| named_columns(line.split(';').map(str::as_bytes)).unwrap();
+        assert!(named("X (Northing, ft);Y (Easting, ft);Z").units().unwrap().some_foot);
+        assert_eq!(named("X (Easting);Y [m];Z (H)").unknown_units, [""; 0]);
+        assert_eq!(named("x (local);y (local);z [NAVD88]").unknown_units, ["local", "navd88"]);
     }
 
     #[test]

@@ -23,15 +23,10 @@ pub(crate) fn class_of(number: Number) -> Option<u8> {
 }
 
 /// Skips the columns of colours if most of these rows have none that can be read. Returns a warning if one has not.
-pub(crate) fn drop_unreadable_colors(
-    delimiter: Delimiter,
-    roles: &mut [ColumnRole],
-    is_unit: bool,
-    rows: &[&[u8]],
-) -> Option<String> {
+pub(crate) fn drop_unreadable_colors(delimiter: Delimiter, roles: &mut [ColumnRole], rows: &[&[u8]]) -> Option<String> {
     let is_color = |role: &ColumnRole| matches!(role, ColumnRole::Color(_));
     let bad = |row: &&&[u8]| {
-        let color = |field: &[u8]| Number::parse(field).and_then(|number| color_of(number, is_unit));
+        let color = |field: &[u8]| Number::parse(field).and_then(|number| color_of(number, false));
         unreadable(delimiter, roles, row, is_color, |field| color(field).is_some())
     };
     let found: Vec<String> = rows.iter().filter_map(|row| bad(&row)).collect();
@@ -71,21 +66,61 @@ fn unreadable(
     columns.find(|(field, _)| !field.is_empty() && !is_readable(field)).map(|(field, _)| shown(field))
 }
 
-/// Returns whether the colours of these rows are numbers from 0 to 1, some of them with decimals.
-pub(crate) fn has_unit_colors(delimiter: Delimiter, roles: &[ColumnRole], rows: &[&[u8]]) -> bool {
-    let mut decimals = false;
-    let has_colors = roles.iter().any(|role| matches!(role, ColumnRole::Color(_)));
-    for row in rows.iter().filter(|_| has_colors) {
-        let fields = delimiter.fields(row);
-        for (field, role) in fields.iter().zip(roles) {
-            let color = matches!(role, ColumnRole::Color(_)).then(|| Number::parse(field)).flatten();
-            if let Some(color) = color {
-                if !(0.0..=1.0).contains(&color.value()) {
-                    return false;
-                }
-                decimals |= color.shortest().decimals > 0;
-            }
+/// The colours of rows: from 0 to 1, or whole numbers. A whole text has one scale, and its first rows may be black.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct ColorScale {
+    /// The number of rows whose colours are from 0 to 1, one of them with decimals.
+    from_0_to_1: u64,
+    /// The number of rows with a colour that is not.
+    others: u64,
+}
+
+/// The colours of one row.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct RowColors {
+    is_beyond: bool,
+    has_decimals: bool,
+}
+
+impl RowColors {
+    #[inline]
+    pub(crate) fn see(&mut self, color: &Number) {
+        if color.decimals == 0 {
+            self.is_beyond |= !(0..=1).contains(&color.mantissa);
+        } else {
+            let value = color.value();
+            self.is_beyond |= !(0.0..=1.0).contains(&value);
+            self.has_decimals |= value.fract() != 0.0;
         }
     }
-    decimals
+}
+
+impl ColorScale {
+    #[inline]
+    pub(crate) fn see(&mut self, row: RowColors) {
+        self.from_0_to_1 += (row.has_decimals && !row.is_beyond) as u64;
+        self.others += row.is_beyond as u64;
+    }
+
+    pub(crate) fn add(&mut self, other: &ColorScale) {
+        self.from_0_to_1 += other.from_0_to_1;
+        self.others += other.others;
+    }
+
+    /// Returns whether most rows say that colours are from 0 to 1.
+    pub(crate) fn are_from_0_to_1(&self) -> bool {
+        self.from_0_to_1 > self.others
+    }
+
+    /// Returns a warning if more rows than a few mistakes say otherwise.
+    pub(crate) fn warning(&self) -> Option<String> {
+        const FEW: u64 = 1000;
+        let (low, high) = (self.from_0_to_1, self.others);
+        let taken = if self.are_from_0_to_1() { "as numbers from 0 to 1" } else { "as whole numbers" };
+        (low.min(high) * FEW > low.max(high)).then(|| {
+            format!(
+                "its colours are from 0 to 1 in {low} rows, with decimals, and greater or less in {high}: all of them are taken {taken}"
+            )
+        })
+    }
 }

@@ -4,11 +4,11 @@ use crate::geometry::lattice::BEYOND;
 use crate::input::points::axis::AXIS_NAMES;
 use crate::input::points::record::PointRecord;
 use crate::input::text::columns::Columns;
-use crate::input::text::decimal_sign::swapped;
+use crate::input::text::decimal_sign::{swapped, swapped_in_quotes};
 use crate::input::text::delimiter::Delimiter;
 use crate::input::text::lines::shown;
 use crate::input::text::number::Number;
-use crate::input::text::optional_columns::{class_of, color_of};
+use crate::input::text::optional_columns::{RowColors, class_of, color_of};
 use crate::input::text::role::ColumnRole;
 
 /// Why a line cannot be used. Columns count from 0.
@@ -83,6 +83,8 @@ pub(crate) struct RowReader<'a> {
     /// x, y and z.
     pub(crate) numbers: [Number; 3],
     rgb: [u16; 3],
+    /// What the colours of the last row show.
+    pub(crate) colors: RowColors,
     class: u8,
     /// The last row with points before decimals, if the text has commas there.
     pointed: Vec<u8>,
@@ -91,7 +93,8 @@ pub(crate) struct RowReader<'a> {
 impl<'a> RowReader<'a> {
     /// Returns a reader of rows with these columns.
     pub(crate) fn new(columns: &'a Columns) -> RowReader<'a> {
-        RowReader { columns, numbers: [Number::default(); 3], rgb: [0; 3], class: 0, pointed: Vec::new() }
+        let (numbers, colors) = ([Number::default(); 3], RowColors::default());
+        RowReader { columns, numbers, rgb: [0; 3], colors, class: 0, pointed: Vec::new() }
     }
 
     /// Reads the columns of `line` that are used.
@@ -105,7 +108,10 @@ impl<'a> RowReader<'a> {
     fn read_with_commas(&mut self, line: &[u8]) -> Result<(), RowError> {
         let mut pointed = std::mem::take(&mut self.pointed);
         pointed.clear();
-        pointed.extend(line.iter().map(swapped));
+        match self.columns.delimiter {
+            Delimiter::Byte(b',') => pointed.extend(swapped_in_quotes(line)),
+            _ => pointed.extend(line.iter().map(swapped)),
+        }
         let read = self.read_with_points(&pointed);
         self.pointed = pointed;
         read
@@ -115,6 +121,7 @@ impl<'a> RowReader<'a> {
     fn read_with_points(&mut self, line: &[u8]) -> Result<(), RowError> {
         let delimiter = self.columns.delimiter;
         let mut rest = Some(line);
+        self.colors = RowColors::default();
         for (column, &role) in self.columns.roles.iter().enumerate() {
             let line = rest.ok_or(RowError::Missing { column })?;
             if role == ColumnRole::Skipped {
@@ -131,6 +138,7 @@ impl<'a> RowReader<'a> {
                 ColumnRole::Coordinate(axis) => self.numbers[axis] = number,
                 // A colour that is none is black, and no reason to lose the point.
                 ColumnRole::Color(channel) => {
+                    self.colors.see(&number);
                     self.rgb[channel] = color_of(number, self.columns.unit_colors).unwrap_or(0);
                 }
                 ColumnRole::Class => {

@@ -9,6 +9,7 @@ use crate::input::text::granularity::Granularity;
 use crate::input::text::lines::{TextLine, for_each_line};
 use crate::input::text::noise;
 use crate::input::text::number::Number;
+use crate::input::text::optional_columns::ColorScale;
 use crate::input::text::row::RowReader;
 use crate::input::text::row_box::RowBox;
 use crate::input::text::row_choice::RowChoice;
@@ -27,6 +28,8 @@ pub(crate) struct Survey {
     pub(crate) malformed: u64,
     /// What the rows hold that the job wants.
     pub(crate) wanted: Findings,
+    /// The colours of all rows.
+    pub(crate) colors: ColorScale,
     /// The number of rows that the job wants, but that lie outside the box in which it looks.
     pub(crate) outliers: u64,
     /// Their box.
@@ -157,6 +160,7 @@ impl Survey {
             rows: 0,
             malformed: 0,
             wanted: Findings::none(),
+            colors: ColorScale::default(),
             outliers: 0,
             outlier_box: none,
             others: none,
@@ -178,6 +182,7 @@ impl Survey {
             match line {
                 TextLine::Whole(line) if columns.skips(line) => return Ok(()),
                 TextLine::Whole(line) if reader.read(line).is_ok() => {
+                    survey.colors.see(reader.colors);
                     if is_all || wanted.has(&reader) {
                         survey.wanted.see(&reader.numbers);
                     } else {
@@ -202,6 +207,7 @@ impl Survey {
         self.rows += other.rows;
         self.malformed += other.malformed;
         self.wanted.add(&other.wanted);
+        self.colors.add(&other.colors);
         self.outliers += other.outliers;
         self.outlier_box.add(&other.outlier_box);
         self.others.add(&other.others);

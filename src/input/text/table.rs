@@ -12,6 +12,7 @@ use crate::input::points::axis::{AXIS_NAMES, Axis};
 use crate::input::points::filter::PointFilter;
 use crate::input::text::columns::Columns;
 use crate::input::text::cut_off::{self, Ending};
+use crate::input::text::degrees;
 use crate::input::text::granularity::Granularity;
 use crate::input::text::layout::{Layout, detect};
 use crate::input::text::lines::{LONGEST, TextLine, for_each_line, shown};
@@ -54,7 +55,7 @@ pub(crate) struct TextTable {
     pub(crate) max: [f64; 3],
     /// The unit of x and y, by the names of their columns.
     pub(crate) unit: Unit,
-    /// The length of the unit of z, if the names say another.
+    /// The length of the unit of z, by the name of its column.
     pub(crate) unit_z: Option<f64>,
     /// What the rows hold that the job wants.
     wanted: WantedRows,
@@ -116,7 +117,7 @@ impl TextTable {
         choice: &RowChoice,
         warnings: &mut Warnings,
     ) -> Result<TextTable> {
-        let Layout { columns, first, named_degrees, units } = detect(file, options, choice, warnings)?;
+        let Layout { mut columns, first, named_degrees, units } = detect(file, options, choice, warnings)?;
         let mut rows = first.at..file.size();
         let cut = match cut_off::find(file, &columns, &rows)? {
             Ending::CutOff(cut) => Some(cut),
@@ -138,6 +139,8 @@ impl TextTable {
             warnings.push("no line has numbers where x, y and z should be");
         }
         refuse_tiny(file, &all.wanted)?;
+        columns.unit_colors = all.colors.are_from_0_to_1();
+        warnings.extend(all.colors.warning());
         let noisy_chunk = surveys.iter().position(|survey| survey.wanted.noisy > 0);
         let noisy = noisy_chunk.map(|chunk| chunk_range(&rows, chunk as u64));
         warnings.extend(noise_warning(file, &columns, &all.wanted, rows.start, noisy)?);
@@ -163,7 +166,11 @@ impl TextTable {
             first_outlier_in: None,
             bounds: choice.bounds,
         };
-        if named_degrees && units.horizontal == Unit::Unknown && bounds.is_some() {
+        let (is_open, rows) = (units.horizontal == Unit::Unknown, table.wanted.bounds);
+        if let (true, false, Some(rows)) = (is_open, named_degrees, rows) {
+            warnings.extend(degrees::warning(&rows, &table.wanted.decimals));
+        }
+        if named_degrees && is_open && bounds.is_some() {
             if table.has_degrees(file, choice)? {
                 table.unit = Unit::Degree;
             } else {
@@ -181,9 +188,7 @@ impl TextTable {
     /// want, say nothing about it.
     fn has_degrees(&self, file: &RandomAccessFile, choice: &RowChoice) -> Result<bool> {
         let Some(wanted) = self.wanted.bounds else { return Ok(false) };
-        let fits = |rows: &RowBox, x: f64, y: f64| rows.farthest(0) <= x && rows.farthest(1) <= y;
-        let are_degrees = |rows: &RowBox| fits(rows, 360.0, 90.0) || fits(rows, 90.0, 360.0);
-        Ok(are_degrees(&wanted) || self.middle(file, choice)?.is_some_and(|middle| are_degrees(&middle.bounds)))
+        Ok(degrees::can_be(&wanted) || self.middle(file, choice)?.is_some_and(|middle| degrees::can_be(&middle.bounds)))
     }
 
     /// Returns where most rows lie; `None` if there are too few rows to tell.

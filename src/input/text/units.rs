@@ -13,14 +13,32 @@ pub(crate) struct TextUnit {
 }
 
 /// The units that are known: their names, the clearest first, and their lengths.
-const UNITS: [(&[&str], Option<f64>); 10] = [
-    (&["m", "metre", "metres", "meter", "meters"], Some(1.0)),
+const UNITS: [(&[&str], Option<f64>); 11] = [
+    (&["m", "metre", "metres", "meter", "meters", "mètre", "mètres", "metro", "metros", "metri"], Some(1.0)),
     (&["dm", "decimetre", "decimetres", "decimeter", "decimeters"], Some(0.1)),
     (&["cm", "centimetre", "centimetres", "centimeter", "centimeters"], Some(0.01)),
     (&["mm", "millimetre", "millimetres", "millimeter", "millimeters"], Some(0.001)),
     (&["km", "kilometre", "kilometres", "kilometer", "kilometers"], Some(1000.0)),
-    (&["us-ft", "usft", "us ft", "ftus", "us_ft", "sft", "us survey foot", "us survey feet"], Some(Unit::US_FOOT)),
+    (
+        &[
+            "us-ft",
+            "usft",
+            "us ft",
+            "ftus",
+            "ft us",
+            "us_ft",
+            "sft",
+            "us foot",
+            "us feet",
+            "us survey foot",
+            "us survey feet",
+            "survey foot",
+            "survey feet",
+        ],
+        Some(Unit::US_FOOT),
+    ),
     (&["ft", "feet", "foot", "ift"], Some(Unit::FOOT)),
+    (&["yd", "yard", "yards"], Some(0.9144)),
     (&["in", "inch", "inches"], Some(0.0254)),
     (&["degrees", "degree", "deg", "dd", "°", "dms", "decimal degrees", "decimal degree"], None),
     (&["radians", "radian", "rad", "gon", "grad"], None),
@@ -30,7 +48,10 @@ impl TextUnit {
     /// Returns the unit that `text` names, in brackets or not.
     pub(crate) fn read(text: &str) -> Option<TextUnit> {
         let plain = text.trim_matches(['[', ']', '(', ')', '{', '}', ' ', '.']).to_lowercase();
-        let (names, metres) = UNITS.iter().find(|(names, _)| names.contains(&plain.as_str()))?;
+        let find = |name: &str| UNITS.iter().find(|(names, _)| names.contains(&name));
+        // The datum of heights may follow, as in "m NN" or "m.s.n.m".
+        let before_datum = || plain.split_once([' ', '.']).filter(|(unit, _)| ["m", "ft"].contains(unit));
+        let (names, metres) = find(&plain).or_else(|| find(before_datum()?.0))?;
         Some(TextUnit { name: names[0], metres: *metres })
     }
 }
@@ -44,7 +65,7 @@ pub(crate) struct TextUnits(pub(crate) [Option<TextUnit>; 3]);
 pub(crate) struct UnitsOfAxes {
     /// The unit of x and y.
     pub(crate) horizontal: Unit,
-    /// The length of the unit of z, if it is another.
+    /// The length of the unit of z.
     pub(crate) vertical: Option<f64>,
     /// Whether a unit is a foot, of which there are two.
     pub(crate) some_foot: bool,
@@ -72,6 +93,11 @@ impl TextUnits {
         Ok(())
     }
 
+    /// Takes these units where none is known.
+    pub(crate) fn complete(&mut self, others: [Option<TextUnit>; 3]) {
+        self.0.iter_mut().zip(others).for_each(|(own, other)| *own = own.or(other));
+    }
+
     /// Returns what the units mean together.
     ///
     /// # Errors
@@ -90,7 +116,7 @@ impl TextUnits {
         let unit = horizontal.map_or(Unit::Unknown, |unit| unit.metres.map_or(Unit::Degree, of_length));
         Ok(UnitsOfAxes {
             horizontal: unit,
-            vertical: z.filter(|_| z != horizontal).and_then(|z| z.metres),
+            vertical: z.and_then(|z| z.metres),
             some_foot: self.0.iter().flatten().any(|unit| unit.name == "ft"),
         })
     }
@@ -111,14 +137,22 @@ mod tests {
     #[test]
     fn units_of_many_spellings_are_used() {
         let of = |names| units(names).of_axes().unwrap();
-        assert_eq!(of(["m", "[m]", "(Meter)"]), UnitsOfAxes { horizontal: Unit::Metre, ..UnitsOfAxes::default() });
+        let all = |horizontal, metres| UnitsOfAxes { horizontal, vertical: Some(metres), ..UnitsOfAxes::default() };
+        assert_eq!(of(["m", "[m]", "(Meter)"]), all(Unit::Metre, 1.0));
         assert_eq!(of(["mm", "mm", "mm"]).horizontal, Unit::Other(0.001));
         assert_eq!(of(["km", "km", "m"]).vertical, Some(1.0));
         assert_eq!(of(["m", "m", "cm"]).vertical, Some(0.01));
         assert_eq!((of(["ft", "ft", "ft"]).horizontal, of(["feet", "ft", "ft"]).some_foot), (Unit::Foot, true));
-        assert_eq!(of(["us-ft", "usft", "US ft"]), UnitsOfAxes { horizontal: Unit::UsFoot, ..UnitsOfAxes::default() });
+        assert_eq!(of(["us-ft", "usft", "US ft"]), all(Unit::UsFoot, Unit::US_FOOT));
+        assert_eq!(of(["m", "m", ""]).vertical, None);
         assert_eq!(of(["dd", "°", "m"]).horizontal, Unit::Degree);
         assert_eq!(of(["local", "", "NAVD88"]), UnitsOfAxes::default());
+        assert_eq!(
+            of(["yd", "Yards", "ft NAVD88"]),
+            UnitsOfAxes { some_foot: true, ..all(Unit::Other(0.9144), Unit::FOOT) }
+        );
+        assert_eq!(of(["survey feet", "US Survey Feet", "ft US"]), all(Unit::UsFoot, Unit::US_FOOT));
+        assert_eq!(of(["Mètres", "m", "m ü. NHN"]), all(Unit::Metre, 1.0));
     }
 
     #[test]

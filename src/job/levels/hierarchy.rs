@@ -49,11 +49,12 @@ pub struct LevelSizes {
 }
 
 impl LevelSizes {
-    /// Returns the sizes for tiles of at most `sites` sites. They are smaller if four tiles do not fit the part of the job's `memory`
+    /// Returns the sizes for tiles of at most `sites` sites. They are smaller if five tiles do not fit the part of the job's `memory`
     /// that earlier steps leave free.
     pub fn new(sites: u64, memory: u64) -> LevelSizes {
         let memory = memory.saturating_sub(KEPT).max(memory / 5).min(memory / 4 * 3);
-        LevelSizes { sites: sites.min(memory / (4 * BYTES_PER_LEVEL_VERTEX)).max(1), memory }
+        // Tiles have vertices on their borders besides their sites, so there is room for a fifth one.
+        LevelSizes { sites: sites.min(memory / (5 * BYTES_PER_LEVEL_VERTEX)).max(1), memory }
     }
 
     /// Returns about how many triangles a tile gets whose children together have `triangles`.
@@ -187,6 +188,15 @@ mod tests {
         assert_eq!(hierarchy(5, 5_000, 50_000).tiles[0].children.len(), 32);
         let large = hierarchy(4, 1_000_000, 50_000);
         assert!(large.tiles.iter().all(|tile| (2..=4).contains(&tile.children.len())), "{large:?}");
+    }
+
+    /// Otherwise a tile that was made as large as the memory allows would be left out.
+    #[test]
+    fn four_tiles_fit_the_memory_with_the_vertices_on_their_borders() {
+        for memory in (100..300).map(|mebibytes| mebibytes << 20) {
+            let LevelSizes { sites, memory } = LevelSizes::new(1 << 40, memory);
+            assert!(4 * (sites + sites / 10) * BYTES_PER_LEVEL_VERTEX <= memory);
+        }
     }
 
     #[test]

@@ -11,7 +11,7 @@ use crate::job::plan::job_plan::Plan;
 use crate::job::records::{BorderVertex, Frontier, Seam, SeamTriangle, StepOutput, Store};
 use crate::mesh::region::covered;
 use crate::triangulation::divide_and_conquer;
-use crate::{Error, Result};
+use crate::{Error, Result, interrupt};
 
 /// Merges the frontiers `below` of merge node `node`, which decides `cell`. Returns the tiles that this finishes: those that have sites
 /// in a frontier below, and none in the frontier that goes up.
@@ -31,9 +31,12 @@ pub fn merge_frontiers(
     let union = join(below)?;
     let sites: Vec<Site> = union.sites.iter().map(BorderVertex::plane).collect();
     let mesh = divide_and_conquer::triangulate(&sites)?;
+    interrupt::check()?;
     let covered = covered(&mesh, bytemuck::cast_slice(&union.boundary))?;
+    interrupt::check()?;
     let cell = cell.with_border();
     let found = find_final(&mesh, &sites, cell.as_ref(), |triangle| covered[triangle]);
+    interrupt::check()?;
     let seam: Vec<SeamTriangle> = mesh
         .triangles
         .iter()
@@ -47,6 +50,7 @@ pub fn merge_frontiers(
     seam.iter().try_for_each(|corners| limit.check(corners.map(|corner| corner.plane())))?;
     let frontier = found.frontier.iter().map(|&site| union.sites[site.get()]).collect();
     let frontier = Frontier { sites: frontier, boundary: found.boundary };
+    interrupt::check()?;
     let records = vec![Seam::new(&seam).save(store, node)?, frontier.save(store, node)?];
     let above = frontier.tiles();
     let finished = union.tiles().into_iter().filter(|tile| above.binary_search(tile).is_err());

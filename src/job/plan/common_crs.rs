@@ -1,83 +1,156 @@
 //! The CRS and the units that all inputs of a job have in common.
 
 use crate::input::options::UnitChoice;
-use crate::input::{ComparableCrs, Crs, CrsChoice, CrsKind, Source, Unit};
+use crate::input::{ComparableCrs, Crs, CrsChoice, CrsKind, FileFormat, Source, Unit};
+use crate::job::plan::distinct_crs::DistinctCrs;
 use crate::{Error, Result, Warnings};
+use std::borrow::Cow;
+
+/// Lengths of units that differ by less are two kinds of foot.
+const FEET_APART: f64 = 1e-5;
+
+/// A source and what it says of its coordinates, as far as `[input] unit` does not overrule it.
+struct Said<'a> {
+    source: &'a Source,
+    crs: Cow<'a, Crs>,
+}
+
+impl Said<'_> {
+    /// `[input] unit` says what the columns of a text are in: x and y, and heights in the same unit.
+    fn of(source: &Source, unit: UnitChoice) -> Said<'_> {
+        let (chosen, named) = (unit_of(unit), source.crs.horizontal.metres_per_unit());
+        if source.format != FileFormat::Text || chosen == Unit::Unknown {
+            return Said { source, crs: Cow::Borrowed(&source.crs) };
+        }
+        let is_followed = |z: f64| Some(z) == named || are_feet(Unit::from_metres(Some(z)), chosen);
+        let vertical = source.crs.vertical.filter(|z| !is_followed(*z));
+        Said { source, crs: Cow::Owned(Crs { horizontal: Unit::Unknown, vertical, ..source.crs.clone() }) }
+    }
+
+    fn is_text(&self) -> bool {
+        self.source.format == FileFormat::Text
+    }
+}
 
 /// Returns the CRS of all sources. What a source does not say, the others say for it; a warning says so.
 ///
 /// # Errors
 /// [`Error::Config`] if two sources differ, or cannot be compared, and the user does not say which CRS to take.
-pub fn common_crs(sources: &[Source], choice: &CrsChoice, warnings: &mut Warnings) -> Result<Crs> {
-    let crs = match choice {
-        CrsChoice::Auto => return agreed(sources, warnings),
+pub fn common_crs(sources: &[Source], choice: &CrsChoice, unit: UnitChoice, warnings: &mut Warnings) -> Result<Crs> {
+    warn_of_other_units(sources, unit_of(unit), warnings);
+    let said: Vec<Said> = sources.iter().map(|source| Said::of(source, unit)).collect();
+    let mut crs = match choice {
+        CrsChoice::Auto => return agreed(&said, unit, warnings),
         CrsChoice::None => Crs::default(),
-        CrsChoice::First => sources.iter().find(|s| s.crs.is_named()).map(|s| s.crs.clone()).unwrap_or_default(),
+        CrsChoice::First => {
+            said.iter().find(|s| s.crs.is_named()).map(|s| s.crs.clone().into_owned()).unwrap_or_default()
+        }
         CrsChoice::Given { crs, .. } => {
-            crs.doubts().into_iter().for_each(|doubt| warnings.push(format!("[input] crs ({}): {doubt}", crs.label())));
+            let doubts = crs.doubts().into_iter().chain(crs.depths());
+            doubts.for_each(|doubt| warnings.push(format!("[input] crs ({}): {doubt}", crs.label())));
             (**crs).clone()
         }
     };
-    let overruled: Vec<(&Source, Vec<String>)> =
-        sources.iter().map(|s| (s, crs.differences(&s.crs))).filter(|(_, found)| !found.is_empty()).collect();
+    add_units(&mut crs, &said, choice, warnings)?;
+    let overruled: Vec<(&Said, Vec<String>)> =
+        said.iter().map(|s| (s, crs.differences(&s.crs))).filter(|(_, found)| !found.is_empty()).collect();
     if let Some((first, differences)) = overruled.first() {
         warnings.push(format!(
             "[input] crs takes all inputs as {}, though {} of {} say otherwise, such as {}: {} differs in {}",
-            crs.label(),
+            if crs.is_named() { crs.label() } else { format!("a plane in {}", crs.horizontal.name()) },
             overruled.len(),
             sources.len(),
-            first.path.display(),
-            first.crs.label(),
+            first.source.path.display(),
+            if first.crs.is_named() { first.crs.label() } else { "it".to_string() },
             differences.join(" and ")
         ));
     }
     Ok(crs)
 }
 
-/// Returns the CRS that all sources agree on.
-fn agreed(sources: &[Source], warnings: &mut Warnings) -> Result<Crs> {
-    let mut distinct: Vec<(&Source, ComparableCrs)> = Vec::new();
-    for source in sources.iter().filter(|s| s.crs != Crs::default()) {
-        if !distinct.iter().any(|(known, _)| known.crs == source.crs) {
-            distinct.push((source, ComparableCrs::of(&source.crs)));
+/// Gives `crs`, which the user chose, the units that the choice does not say: those of the files. Without a CRS, records of one say
+/// nothing, but the names of columns do.
+///
+/// # Errors
+/// [`Error::Config`] if the files differ, unless the user wants what the first of them says.
+fn add_units(crs: &mut Crs, said: &[Said], choice: &CrsChoice, warnings: &mut Warnings) -> Result<()> {
+    let counts = |s: &&Said| *choice != CrsChoice::None || s.is_text();
+    let is_first = *choice == CrsChoice::First;
+    if crs.horizontal == Unit::Unknown {
+        let length = |s: &Said| s.crs.metres_per_unit();
+        if let Some((_, metres)) = one_of(said.iter().filter(counts), length, "x and y", is_first)? {
+            crs.horizontal = Unit::from_metres(Some(metres));
         }
     }
-    refuse_differences(&distinct)?;
-    // The most complete ones, whatever the order of the files.
-    let is_placed = |crs: &Crs| (crs.wkt.is_some(), crs.epsg.is_some(), crs.name.is_some());
-    let is_high = |crs: &Crs| (crs.vertical_system.is_some(), crs.vertical.is_some());
-    let text = |crs: &Crs| (crs.label(), crs.wkt.clone());
-    let place = distinct.iter().max_by_key(|(Source { crs, .. }, comparable)| {
-        (comparable.datum_name().is_some(), is_placed(crs), is_high(crs), text(crs))
-    });
-    let height = distinct.iter().max_by_key(|(Source { crs, .. }, _)| (is_high(crs), is_placed(crs), text(crs)));
-    let (Some((place, comparable)), Some((height, _))) = (place, height) else { return Ok(Crs::default()) };
-    let mut crs = place.crs.clone();
-    crs.vertical = crs.vertical.or(height.crs.vertical);
-    crs.vertical_system = crs.vertical_system.or_else(|| height.crs.vertical_system.clone());
-    if crs.horizontal == Unit::Unknown {
-        let known = distinct.iter().map(|(s, _)| s.crs.horizontal).find(|unit| *unit != Unit::Unknown);
-        crs.horizontal = known.unwrap_or_default();
-    }
-    warn_of_gaps(sources, &crs, warnings);
-    if let Some(datum) = comparable.datum_name() {
-        let lacks_datum = |crs: &Crs| distinct.iter().any(|(s, comparable)| s.crs == *crs && comparable.lacks_datum());
-        warn_of_datums(sources.iter().filter(|s| lacks_datum(&s.crs)).collect(), sources.len(), datum, warnings);
-    }
-    Ok(crs)
-}
-
-/// Fails if any two of the sources differ. Two that differ may both agree with a third that says less, so every pair counts.
-fn refuse_differences(distinct: &[(&Source, ComparableCrs)]) -> Result<()> {
-    for (index, (own, crs)) in distinct.iter().enumerate() {
-        for (other, others) in &distinct[index + 1..] {
-            let differences = crs.differences(others);
-            if !differences.is_empty() {
-                return Err(two_systems(own, other, &differences));
-            }
+    if crs.vertical.is_none()
+        && let Some((of, metres)) = one_of(said.iter().filter(counts), |s| s.crs.vertical, "heights", is_first)?
+    {
+        crs.vertical = Some(metres);
+        if matches!(choice, CrsChoice::Given { .. }) && crs.metres_per_unit() != crs.vertical {
+            warnings.push(format!(
+                "[input] crs ({}) says no unit of heights: it is taken to be {}, as {} says (name a CRS of heights to say otherwise, such \
+                 as 5703 in \"EPSG:26915+5703\")",
+                crs.label(),
+                Unit::from_metres(Some(metres)).name(),
+                of.source.path.display()
+            ));
         }
     }
     Ok(())
+}
+
+/// Returns the length that the sources say, and the first that says it.
+fn one_of<'a>(
+    said: impl Iterator<Item = &'a Said<'a>>,
+    length: impl Fn(&Said) -> Option<f64>,
+    what: &str,
+    is_first: bool,
+) -> Result<Option<(&'a Said<'a>, f64)>> {
+    let mut lengths = said.filter_map(|s| Some((s, length(s)?)));
+    let Some((first, metres)) = lengths.next() else { return Ok(None) };
+    let differs = |other: f64| (other - metres).abs() > 1e-8 * metres;
+    match lengths.find(|(_, other)| !is_first && differs(*other)) {
+        None => Ok(Some((first, metres))),
+        Some((other, others)) => Err(Error::Config(format!(
+            "{} has {what} in {}, but {} has them in {}, and [input] crs says no unit for them: convert one of them, run two jobs, or say \
+             [input] crs = \"first\" if the first is right",
+            first.source.path.display(),
+            Unit::from_metres(Some(metres)).name(),
+            other.source.path.display(),
+            Unit::from_metres(Some(others)).name()
+        ))),
+    }
+}
+
+/// Returns the CRS that all sources agree on.
+fn agreed(said: &[Said], unit: UnitChoice, warnings: &mut Warnings) -> Result<Crs> {
+    let distinct = DistinctCrs::of(said.iter().map(|s| &*s.crs));
+    if let Some((own, other, differences)) = distinct.contradiction()? {
+        return Err(two_systems(&said[own], &said[other], &differences));
+    }
+    // The most complete ones, whatever the order of the files.
+    let systems = || distinct.systems.iter().map(|(first, comparable)| (&*said[*first].crs, comparable));
+    let is_placed = |crs: &Crs| (crs.wkt.is_some(), crs.epsg.is_some(), crs.name.is_some());
+    let is_high = |crs: &Crs| (crs.vertical_system.is_some(), crs.vertical.is_some());
+    let text = |crs: &Crs| (crs.label(), crs.wkt.clone());
+    let place = systems()
+        .max_by_key(|(crs, comparable)| (comparable.datum_name().is_some(), is_placed(crs), is_high(crs), text(crs)));
+    let height = systems().max_by_key(|(crs, _)| (is_high(crs), is_placed(crs), text(crs)));
+    let (Some((place, comparable)), Some((height, _))) = (place, height) else { return Ok(Crs::default()) };
+    let mut crs = place.clone();
+    crs.vertical = crs.vertical.or(height.vertical);
+    crs.vertical_system = crs.vertical_system.or_else(|| height.vertical_system.clone());
+    if crs.horizontal == Unit::Unknown {
+        let known = systems().map(|(crs, _)| crs.horizontal).find(|unit| *unit != Unit::Unknown);
+        crs.horizontal = known.unwrap_or_default();
+    }
+    warn_of_gaps(said, &crs, unit, warnings);
+    if let Some(datum) = comparable.datum_name() {
+        let lacks_datum = |input: &usize| distinct.of_input(*input).is_some_and(ComparableCrs::lacks_datum);
+        let without = (0..said.len()).filter(lacks_datum).map(|input| said[input].source).collect();
+        warn_of_datums(without, said.len(), datum, warnings);
+    }
+    Ok(crs)
 }
 
 /// Warns about the sources `without` a datum, where others say one.
@@ -91,41 +164,109 @@ fn warn_of_datums(without: Vec<&Source>, count: usize, datum: &str, warnings: &m
     }
 }
 
-fn two_systems(own: &Source, other: &Source, differences: &[String]) -> Error {
-    Error::Config(format!(
-        "{} is in {}, but {} is in {}. They differ in {}. One job takes one CRS: transform one of them first, or run two jobs. If a \
-         record is wrong, say with [input] crs what all files are in, such as \"EPSG:26915\", or \"first\" for what the first file \
-         says",
-        own.path.display(),
-        own.crs.label(),
-        other.path.display(),
-        other.crs.label(),
-        differences.join(" and ")
-    ))
+fn two_systems(own: &Said, other: &Said, differences: &[String]) -> Error {
+    let is_in = |said: &Said| {
+        let crs = &said.crs;
+        let path = said.source.path.display();
+        if crs.is_named() {
+            return format!("{path} is in {}", crs.label());
+        }
+        let z = crs.vertical.map(|metres| Unit::from_metres(Some(metres)).name());
+        match (crs.horizontal, z) {
+            (Unit::Unknown, Some(z)) => format!("{path} has z in {z}"),
+            (unit, Some(z)) if z != unit.name() => format!("{path} has its columns in {}, and z in {z}", unit.name()),
+            (unit, _) => format!("{path} has its columns in {}", unit.name()),
+        }
+    };
+    let are_units = !own.crs.is_named() || !other.crs.is_named();
+    let what_to_do = match are_units {
+        true if own.crs.metres_per_unit() != other.crs.metres_per_unit() => {
+            "One job takes one unit: convert one of them first, or run two jobs. If the names of columns are wrong, say with [input] unit \
+             what x, y and z of all texts are in"
+        }
+        true => {
+            "One job takes one unit of heights: convert one of them first, or run two jobs. If one is wrong, [input] crs = \"first\" takes \
+             that of the first file with a CRS, or of the first file if none has one"
+        }
+        false => {
+            "One job takes one CRS: transform one of them first, or run two jobs. If a record is wrong, say with [input] crs what all files \
+             are in, such as \"EPSG:26915\", or \"first\" for what the first file says"
+        }
+    };
+    let (own, other, differences) = (is_in(own), is_in(other), differences.join(" and "));
+    Error::Config(format!("{own}, but {other}. They differ in {differences}. {what_to_do}"))
 }
 
 /// Warns about sources that say less than `crs`, which the others say.
-fn warn_of_gaps(sources: &[Source], crs: &Crs, warnings: &mut Warnings) {
-    let count = sources.len();
-    let nameless: Vec<&Source> = sources.iter().filter(|s| !s.crs.is_named()).collect();
+fn warn_of_gaps(said: &[Said], crs: &Crs, unit: UnitChoice, warnings: &mut Warnings) {
+    let count = said.len();
+    let nameless: Vec<&Said> = said.iter().filter(|s| !s.crs.is_named()).collect();
     if let (true, Some(first)) = (crs.is_named(), nameless.first()) {
         warnings.push(format!(
             "{} of {count} inputs name no CRS, such as {}: they are taken to be in {}, as the others are",
             nameless.len(),
-            first.path.display(),
+            first.source.path.display(),
             crs.label()
+        ));
+    }
+    // Of those without a CRS beside a CRS it has been said.
+    let lacks_unit = |s: &&Said| s.crs.horizontal == Unit::Unknown && (s.crs.is_named() || !crs.is_named());
+    let without: Vec<&Said> = said.iter().filter(lacks_unit).collect();
+    if let (UnitChoice::Auto, Some(_), Some(first)) = (unit, crs.metres_per_unit(), without.first()) {
+        warnings.push(format!(
+            "{} of {count} inputs do not say the unit of their coordinates, such as {}: it is taken to be {}, as in the others",
+            without.len(),
+            first.source.path.display(),
+            crs.horizontal.name()
         ));
     }
     // Without a unit of height, heights are in the unit of x and y.
     let Some(metres) = crs.vertical.filter(|metres| crs.metres_per_unit() != Some(*metres)) else { return };
-    let silent: Vec<&Source> = sources.iter().filter(|s| s.crs.vertical.is_none()).collect();
+    let silent: Vec<&Said> = said.iter().filter(|s| s.crs.vertical.is_none()).collect();
     if let Some(first) = silent.first() {
         warnings.push(format!(
             "{} of {count} inputs do not say the unit of their heights, such as {}: it is taken to be {}, as in the others",
             silent.len(),
-            first.path.display(),
+            first.source.path.display(),
             Unit::from_metres(Some(metres)).name()
         ));
+    }
+}
+
+/// Warns about texts whose columns say another unit than the user.
+fn warn_of_other_units(sources: &[Source], chosen: Unit, warnings: &mut Warnings) {
+    let is_other = |source: &&Source| {
+        let own = source.crs.horizontal;
+        let lengths = own.metres_per_unit().zip(chosen.metres_per_unit());
+        source.format == FileFormat::Text
+            && lengths.is_some_and(|(own, chosen)| own != chosen)
+            && !are_feet(own, chosen)
+    };
+    let others: Vec<&Source> = sources.iter().filter(is_other).collect();
+    if let Some(first) = others.first() {
+        warnings.push(format!(
+            "[input] unit takes coordinates to be in {}, though the columns of {} of {} inputs say otherwise, such as {}: {}",
+            chosen.name(),
+            others.len(),
+            sources.len(),
+            first.path.display(),
+            first.crs.horizontal.name()
+        ));
+    }
+}
+
+/// Returns whether both are a foot, of which a text does not say which.
+fn are_feet(own: Unit, other: Unit) -> bool {
+    let is_foot = |unit: Unit| unit.metres_per_unit().is_some_and(|metres| (metres - Unit::FOOT).abs() < FEET_APART);
+    is_foot(own) && is_foot(other)
+}
+
+fn unit_of(choice: UnitChoice) -> Unit {
+    match choice {
+        UnitChoice::Auto => Unit::Unknown,
+        UnitChoice::Metre => Unit::Metre,
+        UnitChoice::Foot => Unit::Foot,
+        UnitChoice::UsFoot => Unit::UsFoot,
     }
 }
 
@@ -155,20 +296,20 @@ pub fn horizontal_unit(
             crs.label()
         )));
     }
-    let unit = match choice {
-        UnitChoice::Auto => crs.horizontal,
-        UnitChoice::Metre => Unit::Metre,
-        UnitChoice::Foot => Unit::Foot,
-        UnitChoice::UsFoot => Unit::UsFoot,
-    };
+    let unit = if choice == UnitChoice::Auto { crs.horizontal } else { unit_of(choice) };
     if let Some(metres) = unit.metres_per_unit() {
         return Ok((key_of(unit), metres));
     }
     match unit {
         Unit::Unknown => {
-            warnings.push(
-                "no input says a unit of length for its coordinates: they are taken as metres (set [input] unit to say otherwise)",
-            );
+            let why = match chosen {
+                CrsChoice::None => {
+                    "[input] crs = \"none\" leaves records of coordinate systems and their units aside, and no column says a \
+                                    unit of length that is known"
+                }
+                _ => "no input says a unit of length that is known",
+            };
+            warnings.push(format!("{why}: coordinates are taken as metres (set [input] unit to say otherwise)"));
             Ok((key_of(Unit::Metre), 1.0))
         }
         _ => Err(Error::Config(format!(

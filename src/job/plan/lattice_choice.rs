@@ -117,12 +117,14 @@ impl Fineness {
         self.steps.iter().zip(self.metres).any(is_coarse)
     }
 
-    /// Returns whether the lattice is finer than that of `other` where that one is coarse, or holds what that one does not.
+    /// Returns whether the lattice is finer than that of `other` where that one is coarse, or the mesh will let it be, or it holds what that
+    /// one does not.
     pub(crate) fn is_better_than(&self, other: &Fineness) -> bool {
         let is_better = |((own, others), metres): ((&Option<ChosenStep>, &Option<ChosenStep>), f64)| match (own, others)
         {
             (Some(own), Some(others)) => {
-                !others.is_fine(metres) && (own.step < others.step || own.lossless && !others.lossless)
+                let is_finer = own.step < others.step || own.writable < others.writable;
+                !others.is_fine(metres) && (is_finer || own.lossless && !others.lossless)
             }
             (own, others) => own.is_some() && others.is_none(),
         };

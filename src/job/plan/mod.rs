@@ -3,6 +3,7 @@
 
 pub mod budget;
 pub mod common_crs;
+pub(crate) mod distinct_crs;
 pub mod extent;
 pub mod fingerprint;
 pub mod input_identity;

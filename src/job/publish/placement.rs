@@ -60,8 +60,8 @@ pub fn place(crs: &Crs, frame: &Frame, height_offset: f64, root: &mut TilesetNod
         Some(name) => format!("{name} has no definition that leads to longitude and latitude"),
         None => "no input names its coordinate system".to_string(),
     });
-    let definition = definition.map_err(NotPlaced)?;
     let extras = frame.extras();
+    let definition = with_unit(&definition.map_err(NotPlaced)?, extras.metres_per_unit);
     let globe = Globe::new(&definition, extras.metres_per_unit)?;
     let ground = Ground { frame, globe, base: extras.offset[2] * extras.metres_per_unit_z + height_offset };
     let transform = ground.tangent(root.middle)?;
@@ -75,6 +75,24 @@ pub fn place(crs: &Crs, frame: &Frame, height_offset: f64, root: &mut TilesetNod
     }
     root.transform = Some(transform);
     Ok(Placement { definition, transform, per_tile, distortion_m, vertical_datum: crs.vertical_name(), height_offset })
+}
+
+/// Returns the system of `definition` with coordinates in units of `metres`. A file may say another unit than the code that it names.
+fn with_unit(definition: &str, metres: f64) -> String {
+    let is_unit = |word: &&str| word.starts_with("+units=") || word.starts_with("+to_meter=");
+    let (units, others): (Vec<&str>, Vec<&str>) = definition.split_whitespace().partition(is_unit);
+    let is_same = |unit: &&str| match unit.split_once('=') {
+        Some(("+units", "m")) => metres == 1.0,
+        Some(("+units", "ft")) => metres == 0.3048,
+        Some(("+units", "us-ft")) => metres == 1200.0 / 3937.0,
+        Some((_, value)) => value.parse().is_ok_and(|value: f64| (value - metres).abs() <= 1e-12 * metres),
+        None => false,
+    };
+    let is_metre = units.is_empty() && metres == 1.0;
+    if is_metre || (!units.is_empty() && units.iter().all(is_same)) {
+        return definition.to_string();
+    }
+    format!("{} +to_meter={metres}", others.join(" "))
 }
 
 impl Ground<'_> {

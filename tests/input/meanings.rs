@@ -1,0 +1,150 @@
+//! Texts that look like something else: decimal commas, directions and units in brackets, degrees, colours, apostrophes.
+
+use gdt_batch::input::Unit;
+
+use crate::first_warning;
+use crate::layouts::{assert_two_points, text};
+
+#[test]
+fn a_commented_header_does_not_hide_decimal_commas() {
+    let rows = |row: fn(usize) -> String| -> String { (0..50).map(row).collect() };
+    let plain = rows(|i| format!("{},{},{},{},25,{}\n", 565_013 + i, 44 - i % 30, 5_933_084 + i, 74 - i, i % 10));
+    let numbered =
+        rows(|i| format!("{i},{},{},{},{},25,{}\n", 565_013 + i, 44 - i % 30, 5_933_084 + i, 74 - i, i % 10));
+    let coded = rows(|i| format!("{},{},{},{},25,GND\n", 565_013 + i, 44 - i % 30, 5_933_084 + i, 74 - i));
+    for (comment, rows) in [
+        ("# x,y,z\n", &plain),
+        ("# y,x,z\n", &plain),
+        ("# z,x,y\n", &plain),
+        ("//X,Y,Z,R\n", &plain),
+        ("# id,x,y,z\n", &numbered),
+        ("# x,y,z,code\n", &coded),
+        ("x,y,z,code\n", &coded),
+        ("", &coded),
+    ] {
+        let error = text(&format!("{comment}{rows}")).err().unwrap_or_else(|| panic!("{comment:?} was read"));
+        let words = ["before decimals", "565000,25,5933000,50"];
+        assert!(
+            error.exit_code() == 3 && words.iter().all(|word| error.to_string().contains(word)),
+            "{comment:?}: {error}"
+        );
+    }
+    // A point shows that commas part columns.
+    assert_two_points("# z,y,x\n3.25,2,1.5,9\n6,5,4,9\n");
+    let counted: String =
+        (1..50).map(|i| format!("{i} {}.5 {}.25 7.1\n", 565_000 + i * i % 7, 5_933_000 + i)).collect();
+    let error = text(&format!("# x y z\n{counted}")).err().expect("was read");
+    assert!(error.exit_code() == 3 && error.to_string().contains("counts the rows"), "{error}");
+}
+
+#[test]
+fn decimal_commas_beside_whole_columns_are_read() {
+    for content in [
+        "1,5;2,0;3,25;10;20;30\n4,0;5,0;6,0;11;21;31\n",
+        "id;x;y;z;intensity;class\n1;1,5;2,0;3,25;100;2\n2;4;5;6;101;2\n",
+        "X\tY\tZ\tR\tG\tB\n1,5\t2,0\t3,25\t10\t20\t30\n4\t5\t6\t10\t20\t30\n",
+        "1,5 2,0 3,25 10 20 30\n4,0 5,0 6,0 10 20 30\n",
+    ] {
+        assert_two_points(content);
+    }
+}
+
+#[test]
+fn decimal_commas_in_quotes_are_read_between_commas() {
+    for content in [
+        "\"1,5\",\"2,0\",\"3,25\"\n\"4,0\",\"5,0\",\"6,0\"\n",
+        "name,z,y,x,r,g,b\r\n\"Baum, alt\",\"3,25\",2,\"1,5\",1,2,3\r\nb,6,5,\"4,0\",1,2,3\r\n",
+        "\"x\",\"y\",\"z\",i\n\"1,5\",2,\"3,25\",10\n4,5,6,20\n",
+    ] {
+        let cloud = assert_two_points(content);
+        assert!(cloud.points.iter().all(|point| !cloud.source.has_rgb || point.rgb == [1, 2, 3]), "{content:?}");
+    }
+    let error = text("\"565,000\",\"933,012\",\"1,120\"\n\"565,001\",\"933,013\",\"1,121\"\n").err().expect("was read");
+    assert!(error.exit_code() == 3 && error.to_string().contains("thousands"), "{error}");
+}
+
+#[test]
+fn an_apostrophe_quotes_no_delimiter() {
+    let rows = |before: &str, after: &str| format!("{before},1.5,2,3.25,{after}\n{before},4,5,6,{after}\n");
+    for (header, after) in
+        [("name,x,y,z,remark", "'t Hof"), ("name,x,y,z,remark,u,v,w", "'t,7,8,9"), ("name,x,y,z,r", "Hans'")]
+    {
+        assert_two_points(&format!("{header}\n{}", rows("'s-Gravenhage 7", after)));
+    }
+    assert_two_points("'z','y','x'\n'3.25','2','1.5'\n6,5,4\n");
+}
+
+#[test]
+fn a_letter_with_a_direction_in_brackets_is_read_by_the_direction() {
+    for header in ["Z;X (Northing);Y (Easting)", "Z [m];X [north];Y [east]", "Höhe;X (Hochwert);Y (Rechtswert)"] {
+        assert_two_points(&format!("{header}\n3.25;2;1.5\n6;5;4\n"));
+    }
+    assert_two_points("X (Easting);Y (Northing);Z\n1.5;2;3.25\n4;5;6\n");
+    let error = text("X (Northing);Y;Z\n1.5;2;3.25\n4;5;6\n").err().expect("was read");
+    assert!(error.exit_code() == 3 && error.to_string().contains("names no column x"), "{error}");
+}
+
+#[test]
+fn units_that_are_not_known_are_named() {
+    for (header, unknown) in [("x [rod];y [rod];z [rod]", "\"rod\""), ("x (local);y (local);z", "\"local\"")] {
+        let cloud = assert_two_points(&format!("{header}\n1.5;2;3.25\n4;5;6\n"));
+        let warning = first_warning(&cloud);
+        assert!(warning.contains(unknown) && warning.contains("no unit that is known"), "{header}: {warning:?}");
+    }
+    for header in
+        ["x [yd];y [yd];z [yd]", "x (survey feet);y (survey feet);z (m ü. NN)", "x [Mètres];y [Mètres];z (Höhe)"]
+    {
+        let cloud = assert_two_points(&format!("{header}\n1.5;2;3.25\n4;5;6\n"));
+        assert!(cloud.source.crs.horizontal != Unit::Unknown && first_warning(&cloud).is_empty(), "{header}");
+    }
+}
+
+#[test]
+fn degrees_that_no_name_tells_are_a_warning() {
+    let row =
+        |i: usize| format!("{:.7},{:.7},{}.5\n", 11.5 + i as f64 / 1e5, 48.1 + (i * i % 50) as f64 / 1e5, 500 + i % 9);
+    let rows: String = (0..50).map(row).collect();
+    for header in ["X,Y,Z\n", "POINT_X,POINT_Y,POINT_Z\n", ""] {
+        let cloud = text(&format!("{header}{rows}")).unwrap();
+        assert!(first_warning(&cloud).contains("as longitudes and latitudes are: they count as lengths"), "{header:?}");
+    }
+    assert_eq!(first_warning(&text(&format!("x [m],y [m],z [m]\n{rows}")).unwrap()), "");
+    // A scanner's own coordinates.
+    let scan: String =
+        (0..50).map(|i| format!("{:.7} {:.7} 1.2345678\n", (i as f64).sin(), (i as f64).cos())).collect();
+    assert_eq!(first_warning(&text(&scan).unwrap()), "");
+}
+
+#[test]
+fn the_message_names_the_column_that_is_missing() {
+    let error = text("Latitude (deg),Longitude (deg),Geoidal height (m)\n48.1,11.5,3\n").err().expect("was read");
+    assert!(error.to_string().contains("names no column z"), "{error}");
+}
+
+#[test]
+fn an_empty_last_column_is_no_column_without_a_name() {
+    for row in ["1,2,3,\n4,5,7,\n", "1,2,3,,\n4,5,7,,\n", " 1\t 2\t 3 \t\n 4\t 5\t 7 \t\n"] {
+        assert_eq!(first_warning(&text(row).unwrap()), "", "{row:?}");
+    }
+    assert!(first_warning(&text("1,2,3,9\n4,5,7,9\n").unwrap()).contains("no line names the columns"));
+}
+
+#[test]
+fn the_scale_of_colours_is_that_of_the_whole_text() {
+    let rows = |colors: &str, count: usize| -> String {
+        (0..count).map(|i| format!("{i}.250,{}.500,{}.125,{colors}\n", i * 7 % 1000, i % 9)).collect()
+    };
+    let last = |first: &str, count: usize, second: &str| {
+        let content = format!("x,y,z,r,g,b\n{}{}", rows(first, 5000), rows(second, count));
+        assert!(content.len() > 1 << 17);
+        let cloud = text(&content).unwrap();
+        let warned = first_warning(&cloud).contains("from 0 to 1 in");
+        (cloud.points[cloud.points.len() - 1].rgb, warned)
+    };
+    assert_eq!(last("0.000,0.000,0.000", 5000, "0.400,0.600,0.200"), ([26214, 39321, 13107], false));
+    assert_eq!(last("0.400,0.600,0.200", 5000, "0.400,0.600,0.200"), ([26214, 39321, 13107], false));
+    assert_eq!(last("0.4,0.6,0.2", 5100, "140,160,120"), ([140, 160, 120], true));
+    assert_eq!(last("0.4,0.6,0.2", 4000, "140,160,120"), ([65535; 3], true));
+    assert_eq!(last("0.4,0.6,0.2", 1, "140,160,120"), ([65535; 3], false));
+    assert_eq!(last("0,0,0", 5000, "140,160,120"), ([140, 160, 120], false));
+}

@@ -1,0 +1,141 @@
+//! The units of texts beside those of other files, and under the choices of the user.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::coordinate_systems::{code, keys, text, warnings, write};
+use crate::program::Job;
+
+const US_FOOT: f64 = 1200.0 / 3937.0;
+
+/// NAD83 / UTM 15N with heights in US feet.
+const FEET_OF_HEIGHT: [[u16; 4]; 4] = [[1024, 0, 1, 1], [3072, 0, 1, 26915], [4096, 0, 1, 5703], [4099, 0, 1, 9003]];
+
+fn csv(folder: &TempDir, name: &str, header: &str) -> PathBuf {
+    let row = |i: usize| format!("{}.25,{}.50,{}.75\n", 500_000 + i % 10 * 7, 4_000_000 + i / 10 * 9, i % 3);
+    let path = folder.path().join(name);
+    fs::write(&path, format!("{header}\n{}", (0..60).map(row).collect::<String>())).unwrap();
+    path
+}
+
+/// Returns the metres of a unit of x and y, and of z, and the warnings.
+#[track_caller]
+fn metres(files: &[&Path], input: &str) -> ([f64; 2], String) {
+    let job = Job::on(files).with("input", input);
+    let said = warnings(&job.report());
+    let place: Value = serde_json::from_slice(&fs::read(job.out().join("georeference.json")).unwrap()).unwrap();
+    (["metres_per_unit", "metres_per_unit_z"].map(|key| place[key].as_f64().unwrap()), said)
+}
+
+#[test]
+fn a_text_that_says_one_unit_for_all_columns_says_that_of_its_heights() {
+    let folder = tempfile::tempdir().unwrap();
+    let [metre, feet] = [("m.csv", "x [m],y [m],z [m]"), ("ft.csv", "x [us-ft],y [us-ft],z [us-ft]")]
+        .map(|(name, header)| csv(&folder, name, header));
+    let [centimetre, silent] = [("cm.csv", "x [m],y [m],z [cm]"), ("none.csv", "x [m],y [m],z")]
+        .map(|(name, header)| csv(&folder, name, header));
+    let heights = write(folder.path(), "heights.las", &[keys(&FEET_OF_HEIGHT)]);
+    let metres_of_height = [[1024, 0, 1, 1], [3072, 0, 1, 2276], [4096, 0, 1, 5703], [4099, 0, 1, 9001]];
+    let mixed = write(folder.path(), "mixed.las", &[keys(&metres_of_height)]);
+    for (files, words) in [
+        (
+            [&metre, &centimetre],
+            ["m.csv has its columns in metre", "and z in 0.01 m", "the unit of height (metre, 0.01 m)"],
+        ),
+        ([&metre, &heights], ["m.csv has its columns in metre", "heights.las is in NAD83", "the unit of height"]),
+        ([&feet, &mixed], ["has its columns in US survey foot", "mixed.las is in NAD83", "the unit of height"]),
+        ([&metre, &feet], ["columns in metre", "columns in US survey foot", "[input] unit"]),
+    ] {
+        Job::on(&files).run().refused(2, &words);
+        let swapped = Job::on(&[files[1], files[0]]).run();
+        swapped.refused(2, &["the unit of "]);
+        assert!(!swapped.err.contains("unknown"), "{swapped:?}");
+    }
+    let (found, said) = metres(&[&silent, &centimetre], "");
+    assert_eq!(found, [1.0, 0.01]);
+    assert!(
+        said.contains("1 of 2 inputs do not say the unit of their heights, such as") && said.contains("none.csv"),
+        "{said}"
+    );
+    assert_eq!(metres(&[&metre, &silent], "").0, [1.0, 1.0]);
+    // The first file is right, says the user.
+    assert_eq!(metres(&[&metre, &centimetre], "crs = \"first\"").0, [1.0, 1.0]);
+    assert_eq!(metres(&[&centimetre, &metre], "crs = \"first\"").0, [1.0, 0.01]);
+}
+
+#[test]
+fn a_crs_of_the_user_takes_no_unit_of_heights_away() {
+    let folder = tempfile::tempdir().unwrap();
+    let feet = csv(&folder, "feet.csv", "x [m],y [m],z [ft]");
+    let las = write(folder.path(), "feet.las", &[keys(&FEET_OF_HEIGHT)]);
+    for (file, metre) in [(&feet, 0.3048), (&las, US_FOOT)] {
+        let (found, said) = metres(&[file], "crs = \"EPSG:26915\"");
+        assert_eq!(found, [1.0, metre]);
+        assert!(said.contains("[input] crs (NAD83 / UTM zone 15N (EPSG:26915)) says no unit of heights"), "{said}");
+        assert_eq!(metres(&[file], "crs = \"EPSG:26915+5703\"").0, [1.0, 1.0]);
+    }
+    let both = Job::on(&[&feet, &las]).with("input", "crs = \"EPSG:26915\"").run();
+    both.refused(2, &["feet.csv has heights in foot", "feet.las has them in US survey foot", "crs = \"first\""]);
+}
+
+#[test]
+fn without_a_crs_the_units_of_columns_count() {
+    let folder = tempfile::tempdir().unwrap();
+    let feet = csv(&folder, "feet.csv", "x [ft],y [ft],z [ft]");
+    let other = csv(&folder, "mm.csv", "x [mm],y [mm],z [mm]");
+    let las = write(folder.path(), "feet.las", &[code(2276)]);
+    for choice in ["none", "first"] {
+        let (found, said) = metres(&[&feet], &format!("crs = \"{choice}\""));
+        assert_eq!(found, [0.3048, 0.3048]);
+        assert!(!said.contains("no input says"), "{said}");
+    }
+    Job::on(&[&feet, &other])
+        .with("input", "crs = \"none\"")
+        .run()
+        .refused(2, &["feet.csv has x and y in foot", "0.001 m"]);
+    let (found, said) = metres(&[&las], "crs = \"none\"");
+    assert_eq!(found, [1.0, 1.0]);
+    assert!(said.contains("leaves records of coordinate systems and their units aside"), "{said}");
+    let (found, said) = metres(&[&feet], "[input.csv]\ncolumns = [\"x\", \"y\", \"z\"]");
+    assert_eq!(found, [0.3048, 0.3048]);
+    assert!(!said.contains("no input says"), "{said}");
+}
+
+#[test]
+fn the_unit_of_the_user_is_that_of_all_columns() {
+    let folder = tempfile::tempdir().unwrap();
+    let [feet, metre] =
+        ["ft", "m"].map(|unit| csv(&folder, &format!("{unit}.csv"), &format!("x [{unit}],y [{unit}],z [{unit}]")));
+    // What a foot is, the text does not say.
+    let (found, said) = metres(&[&feet], "unit = \"us-foot\"");
+    assert_eq!(found, [US_FOOT, US_FOOT]);
+    assert!(!said.contains("say otherwise") && !said.contains("heights are in another unit"), "{said}");
+    let (found, said) = metres(&[&feet, &metre], "unit = \"metre\"");
+    assert_eq!(found, [1.0, 1.0]);
+    assert!(
+        said.contains("the columns of 1 of 2 inputs say otherwise, such as") && said.contains("ft.csv: foot"),
+        "{said}"
+    );
+    assert_eq!(metres(&[&csv(&folder, "cm.csv", "x [m],y [m],z [cm]")], "unit = \"foot\"").0, [0.3048, 0.01]);
+}
+
+#[test]
+fn files_without_a_unit_beside_a_text_with_one_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let other = csv(&folder, "mm.csv", "x [mm],y [mm],z [mm]");
+    let bare = csv(&folder, "bare.csv", "x,y,z");
+    let las = write(folder.path(), "bare.las", &[]);
+    for silent in [&bare, &las] {
+        let (found, said) = metres(&[&other, silent], "");
+        assert_eq!(found, [0.001, 0.001]);
+        let name = silent.file_name().unwrap().to_str().unwrap();
+        let words = "1 of 2 inputs do not say the unit of their coordinates, such as";
+        assert!(said.contains(words) && said.contains(&format!("{name}: it is taken to be 0.001 m")), "{said}");
+    }
+    let named = write(folder.path(), "named.las", &[text(r#"PROJCS["Site grid",GEOGCS["g"],PROJECTION["x"]]"#)]);
+    assert!(metres(&[&other, &named], "").1.contains("do not say the unit of their coordinates"));
+    assert!(!metres(&[&other, &bare], "unit = \"metre\"").1.contains("do not say the unit"));
+}
