@@ -1,7 +1,7 @@
 //! Sending tasks to Slurm, by its commands.
 
 use crate::submit::request::Request;
-use crate::submit::slurm_script::{Array, ENGINE, Script, arrays, dry_run, scripts};
+use crate::submit::slurm_script::{Array, ENGINE, Script, arrays, dry_run, scripts, sent_path};
 use crate::submit::submitted::{SentTasks, Submitted};
 use crate::{Error, Result, disk};
 use std::collections::HashSet;
@@ -21,7 +21,7 @@ const DEFAULT_LIMIT: u32 = 1001;
 pub fn send(request: &Request, added: &[String]) -> Result<Submitted> {
     check_options(added)?;
     let limit = max_array_size()?;
-    let sent = request.folder(ENGINE).join("submitted");
+    let sent = sent_path(request);
     nothing_is_queued(&sent)?;
     let arrays = arrays(request, limit);
     for folder in arrays.iter().flatten().map(|array| array.logs(request)) {

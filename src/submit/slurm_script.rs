@@ -26,6 +26,11 @@ fn script_path(request: &Request, phase: Phase) -> PathBuf {
     request.folder(ENGINE).join(format!("{phase}.sh"))
 }
 
+/// Returns the path of the file with the numbers that Slurm has given to the arrays.
+pub(super) fn sent_path(request: &Request) -> PathBuf {
+    request.folder(ENGINE).join("submitted")
+}
+
 /// Returns the scripts of the phases that have tasks to do.
 pub(super) fn scripts(request: &Request) -> Vec<Script> {
     let script = |tasks: &PhaseTasks| Script {
@@ -39,7 +44,11 @@ fn script_text(request: &Request, phase: Phase) -> String {
     let count = request.tasks;
     let (name, mebibytes) = (request.name(), request.mebibytes());
     let [program, config] = [&request.program, &request.config].map(|path| quoted(&path.to_string_lossy()));
-    let cores = if request.threads == 0 { String::new() } else { format!(" --cpus-per-task={}", request.threads) };
+    let (cores, threads) = match request.threads {
+        // As many as Slurm gives.
+        0 => (String::new(), " --threads \"$SLURM_CPUS_ON_NODE\""),
+        cores => (format!(" --cpus-per-task={cores}"), ""),
+    };
     format!(
         r#"#!/bin/sh
 # Phase "{phase}" of a job. An element of the array is a task; the argument is added to its number.
@@ -49,7 +58,7 @@ fn script_text(request: &Request, phase: Phase) -> String {
 #SBATCH --open-mode=append
 #SBATCH --signal=B:TERM@60
 # With exec the signals of Slurm reach the program, which stops with its finished steps on the disk.
-exec {program} work {config} --phase {phase} --task $((SLURM_ARRAY_TASK_ID + ${{1:-0}}))/{count} --threads "$SLURM_CPUS_ON_NODE"
+exec {program} work {config} --phase {phase} --task $((SLURM_ARRAY_TASK_ID + ${{1:-0}}))/{count}{threads}
 "#
     )
 }
@@ -126,7 +135,7 @@ pub(super) fn ranges(numbers: &[u32]) -> String {
 
 /// Returns what would be done as a script of the shell, which does it: it writes the scripts and calls `sbatch`.
 pub(super) fn dry_run(request: &Request, limit: u32, added: &[String]) -> String {
-    let (arrays, mut lines) = (arrays(request, limit), Vec::new());
+    let (arrays, mut lines) = (arrays(request, limit), vec!["set -e".to_owned()]);
     let word = |path: &Path| quoted(&path.to_string_lossy());
     for folder in arrays.iter().flatten().map(|array| array.logs(request)) {
         lines.push(format!("mkdir -p {}", word(&folder)));
@@ -134,12 +143,15 @@ pub(super) fn dry_run(request: &Request, limit: u32, added: &[String]) -> String
     for Script { path, text } in scripts(request) {
         lines.push(format!("cat > {} <<'END_OF_SCRIPT'\n{text}END_OF_SCRIPT", word(&path)));
     }
+    let sent = word(&sent_path(request));
+    lines.push(format!("> {sent}"));
     let mut after: Vec<String> = Vec::new();
     for arrays in arrays {
         for array in &arrays {
             let word = |word: String| if word.starts_with("--dependency=afterany:$") { word } else { quoted(&word) };
             let words: Vec<String> = array.arguments(request, &after, added).into_iter().map(word).collect();
-            lines.push(format!("{}=$(sbatch {})", array.variable(), words.join(" ")));
+            let variable = array.variable();
+            lines.push(format!("{variable}=$(sbatch {})\necho ${variable} >> {sent}", words.join(" ")));
         }
         after = arrays.iter().map(|array| format!("${}", array.variable())).collect();
     }
@@ -209,6 +221,7 @@ mod tests {
         assert!(text(&request).contains("--mem=4352M\n"), "{}", text(&request));
         (request.memory, request.threads) = ((1 << 30) + 1, 6);
         assert!(text(&request).contains("--mem=1281M --cpus-per-task=6\n"), "{}", text(&request));
+        assert!(!text(&request).contains("--threads"), "{}", text(&request));
         for line in ["#SBATCH --requeue", "#SBATCH --open-mode=append", "#SBATCH --signal=B:TERM@60"] {
             assert!(text(&request).lines().any(|found| found == line), "{line}");
         }
@@ -222,10 +235,14 @@ mod tests {
         let request = request(home.join("job.toml").to_str().unwrap(), 6);
         let shown = dry_run(&request, 4, &["--comment=two words".into()]);
         let stub = format!("sbatch() {{ echo \"$*\" >> {0}; wc -l < {0}; }}\n", calls.display());
+        let refused = Command::new("sh").args(["-c", &format!("sbatch() {{ return 1; }}\n{shown}")]).status().unwrap();
+        assert!(!refused.success() && std::fs::read(sent_path(&request)).unwrap().is_empty());
         assert!(Command::new("sh").args(["-c", &(stub + &shown)]).status().unwrap().success());
         for Script { path, text } in scripts(&request) {
             assert_eq!(std::fs::read_to_string(path).unwrap(), text);
         }
+        let numbers = (1..=11).map(|number| format!("{number}\n")).collect::<String>();
+        assert_eq!(std::fs::read_to_string(sent_path(&request)).unwrap(), numbers);
         assert!(home.join("job.slurm/read+4").is_dir() && home.join("job.slurm/publish").is_dir());
         let calls = std::fs::read_to_string(calls).unwrap();
         let calls: Vec<&str> = calls.lines().collect();

@@ -4,5 +4,8 @@
 mod common;
 mod kubernetes;
 mod rig;
+// Slurm is a program of Linux.
+#[cfg(target_os = "linux")]
 mod slurm;
+#[cfg(target_os = "linux")]
 mod slurm_daemons;

@@ -54,6 +54,7 @@ impl Rig {
     }
 
     /// Removes what tasks have written, and their logs.
+    #[cfg(target_os = "linux")]
     pub(crate) fn forget(&self) {
         for name in ["out", "out.slurm"] {
             let _ = fs::remove_dir_all(self.folder.path().join(name));
@@ -81,6 +82,7 @@ pub(crate) fn succeeded(output: Output) -> String {
 }
 
 /// Returns the path of a program of the system. If there is none, says so; under tests/run, fails.
+#[cfg(target_os = "linux")]
 pub(crate) fn program_of_system(name: &str) -> Option<PathBuf> {
     let path = std::env::var_os("PATH").unwrap_or_default();
     let folders = std::env::split_paths(&path).chain(["/usr/sbin", "/sbin"].map(PathBuf::from));

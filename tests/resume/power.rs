@@ -114,6 +114,15 @@ fn a_job_of_two_threads_that_commits_now_and_then_goes_on_after_a_power_failure(
 }
 
 #[test]
+fn a_job_of_parts_goes_on_after_a_power_failure() {
+    let setup = setup();
+    let setup = Setup { triangulation: format!("{}\nmax_points_per_part = 4000", setup.triangulation), ..setup };
+    let folder = tempfile::tempdir().unwrap();
+    let rig = Rig::of_files(folder, &scattered::gaussian(14_000), 60_000, &setup).committing_every(0);
+    fail_again_and_again(&rig, 25);
+}
+
+#[test]
 fn a_power_failure_leaves_the_results_of_the_earlier_job_or_those_of_this_one() {
     let folder_of = |rig: &Rig, cloud| scattered::write(rig.folder.path(), "cloud.csv", cloud);
     let mut rig = Rig::new(&scattered::gaussian(9_000), &setup()).committing_every(0);

@@ -144,6 +144,14 @@ impl JobDirectory {
         }
     }
 
+    /// Looks at what is in this folder. A network file system that remembers what was not there is right from then on.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the folder cannot be listed.
+    pub fn look(&self) -> Result<()> {
+        entries(&self.job).map(|_| ())
+    }
+
     /// Returns the paths of the store's files.
     pub fn store(&self) -> [PathBuf; STORE_FILES] {
         std::array::from_fn(|file| self.job.join(format!("steps.{file}.store")))

@@ -8,7 +8,7 @@ use crate::job::plan::fingerprint::JobHeader;
 use crate::job::plan::inputs::input_paths;
 use crate::job::plan::job_plan::Plan;
 use crate::job::records::{JobStep, StepRecord};
-use crate::{Error, Result};
+use crate::{Error, Result, disk};
 
 /// A job of several parts that is planned.
 pub(crate) struct PlannedJob {
@@ -59,6 +59,9 @@ impl PlannedJob {
 /// # Errors
 /// [`Error::Io`] if its journal cannot be read.
 pub(crate) fn planned(directory: &JobDirectory) -> Result<Option<(JobHeader, bool)>> {
+    // Other machines may have made the folders.
+    directory.look()?;
+    disk::list(&directory.parts()).map_err(Error::io("read", directory.parts()))?;
     let wanted = |step| matches!(step, JobStep::Plan | JobStep::Report);
     let read = journal::read_steps::<JobHeader, JobStep, StepRecord>(directory, wanted)?;
     let Some((Some(header), entries)) = read else { return Ok(None) };
