@@ -106,6 +106,25 @@ fn max_edge_cuts_the_same_triangles() {
     }
 }
 
+/// The rule looks at squares of the area that the points fill, which is not what headers claim.
+#[test]
+fn max_edge_auto_cuts_the_same_triangles_where_the_claims_are_wide() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = String::from("x,y,z\n");
+    for i in 0..6_000 {
+        text += &format!("5.00,{}.{:02},1\n", i / 100, i % 100);
+    }
+    let file = folder.path().join("line.csv");
+    std::fs::write(&file, text + "6.00,30.00,2\n").unwrap();
+    let kept = |job: Job| {
+        let report = job.with("output", "max_edge = \"auto\"").report();
+        [number(&report["triangles"]), number(&report["cut_triangles"])]
+    };
+    let whole = kept(Job::on(&[&file]).tiles_of(500));
+    assert!(whole[1] > 0);
+    assert_eq!(kept(in_parts(&[file], 2_000)), whole);
+}
+
 /// The header claims a box that holds the first points and not the last.
 #[test]
 fn a_header_that_proves_wrong_gives_one_part() {

@@ -172,6 +172,21 @@ fn a_job_of_parts_killed_at_random_moments_ends_with_the_same_bytes() {
     }
 }
 
+/// What was freed cannot be done again. So if a result is gone by then, the job starts over.
+#[test]
+fn a_job_of_parts_whose_results_are_lost_while_it_is_interrupted_starts_over() {
+    let rig = job_of_parts(parts_of(4_000, 1)).committing_every(0);
+    for lost in [1, 40] {
+        assert!(rig.run_to("replacing", 1).was_killed());
+        let results = rig.out().join("job/results/tiles");
+        let mut tiles: Vec<_> = std::fs::read_dir(&results).unwrap().map(|entry| entry.unwrap().path()).collect();
+        tiles.retain(|path| path.extension().is_some_and(|extension| extension == "glb"));
+        assert!(tiles.len() > 20, "{tiles:?}");
+        tiles.iter().take(lost).for_each(|tile| std::fs::remove_file(tile).unwrap());
+        rig.completes("after results were lost");
+    }
+}
+
 #[test]
 fn a_job_on_a_gpu_goes_on_where_it_was_killed() {
     let setup = Setup::tiles_of(3_500).threads(2).backend("gpu");

@@ -89,7 +89,7 @@ fn broken_promises(run: &TracedRun, whole: &[Files], is_made: impl Fn(&Change) -
         left.contains_key("out/report.json") && !whole.contains(&results(&left))
     };
     let moments = (0..=changes.len()).filter(|&at| at == changes.len() || changes[at].is_decisive());
-    moments.filter(|&at| (0..8).any(|seed| is_broken(at, Loss::Some(seed))) || is_broken(at, Loss::Bytes)).count()
+    moments.filter(|&at| (0..40).any(|seed| is_broken(at, Loss::Some(seed))) || is_broken(at, Loss::Bytes)).count()
 }
 
 /// A job with files of every kind.

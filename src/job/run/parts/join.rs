@@ -10,7 +10,7 @@ use crate::job::progress::stats::StageStats;
 use crate::job::records::{JobStep, JournalEntry, Seam, SeamTriangle, StepRecord, Store};
 use crate::job::run::part_entries::{PartHeader, entries_of, is_whole, open_store, records_of};
 use crate::job::run::parts::done::Done;
-use crate::job::run::parts::look::{count_sites, final_look};
+use crate::job::run::parts::look::{SitesOfParts, count_sites, final_look};
 use crate::job::run::parts::part_journal::PartSession;
 use crate::job::run::parts::part_store::{OpenPart, PartStores};
 use crate::job::run::parts::parts_job::PartsJob;
@@ -28,11 +28,11 @@ pub(crate) struct JoinedParts {
     pub(crate) stages: Vec<StageStats>,
 }
 
-/// Merges what the parts send up, or what an interrupted run left of it. The parts have `sites` sites.
+/// Merges what the parts send up, or what an interrupted run left of it. `all` is what the parts hold.
 ///
 /// # Errors
 /// Those of [`merge_frontiers`]; [`crate::Error::InUse`] if another process does it.
-pub(crate) fn join_parts(job: &PartsJob, stores: &PartStores, sites: u64) -> Result<()> {
+pub(crate) fn join_parts(job: &PartsJob, stores: &PartStores, all: SitesOfParts) -> Result<()> {
     let parts = job.parts.all().len() as u64;
     let directory = &job.directory.join();
     let lock = directory.lock()?;
@@ -44,9 +44,9 @@ pub(crate) fn join_parts(job: &PartsJob, stores: &PartStores, sites: u64) -> Res
     let session = PartSession::begin(directory, lock, header, entries)?;
     let stage = job.progress.stage("join", parts, "parts");
     merge_below(job, stores, &session.context(job), NodeIndex::ROOT)?;
-    let counts = count_sites(job, stores, sites, &session.store)?;
+    let counts = count_sites(job, stores, all, &session.store)?;
     stage.advance(parts);
-    session.finish(JobStep::Join, sites, vec![stage.finish()], counts.into_iter().collect())?;
+    session.finish(JobStep::Join, all, vec![stage.finish()], counts.into_iter().collect())?;
     Ok(())
 }
 
@@ -152,11 +152,11 @@ impl JoinedParts {
     pub(crate) fn open(job: &PartsJob) -> Result<Option<JoinedParts>> {
         let (directory, header) = (job.directory.join(), job.header(job.above()));
         let entries = entries_of(&directory, header)?;
-        let Some(Done { figures: sites, stages, .. }) = Done::<u64>::find(&entries, JobStep::Join)? else {
+        let Some(Done { figures: all, stages, .. }) = Done::<SitesOfParts>::find(&entries, JobStep::Join)? else {
             return Ok(None);
         };
         let store = open_store(&directory, &records_of(&entries))?;
-        Ok(Some(JoinedParts { look: final_look(job, sites, &store)?, store, directory, header, stages }))
+        Ok(Some(JoinedParts { look: final_look(job, all, &store)?, store, directory, header, stages }))
     }
 
     /// Opens what there is of the merges while parts are still to be done.

@@ -12,7 +12,16 @@ use crate::job::tiles::max_edge::MaxEdgeRule;
 use crate::output::options::MaxEdge;
 use crate::{Error, Result};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
+
+/// What all parts hold.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub(crate) struct SitesOfParts {
+    pub(crate) sites: u64,
+    /// The lattice box of the points.
+    pub(crate) bounds: Bounds<3>,
+}
 
 /// Returns how tiles look, unless all sites decide that.
 ///
@@ -29,11 +38,17 @@ pub(crate) fn early_look(job: &PartsJob) -> Result<Option<Arc<TileLook>>> {
     }
 }
 
-/// Counts all `sites` for the rule that looks at them, if the job has it, and stores the counts.
+/// Counts all sites for the rule that looks at them, if the job has it, and stores the counts. The claims would give the rule another grid
+/// than the points themselves do in a job of one part.
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Broken`] on a store.
-pub(crate) fn count_sites(job: &PartsJob, stores: &PartStores, sites: u64, store: &Store) -> Result<Option<RecordRef>> {
+pub(crate) fn count_sites(
+    job: &PartsJob,
+    stores: &PartStores,
+    all: SitesOfParts,
+    store: &Store,
+) -> Result<Option<RecordRef>> {
     let choice = job.plan.options.output.max_edge;
     if choice != MaxEdge::Auto {
         return Ok(None);
@@ -45,20 +60,20 @@ pub(crate) fn count_sites(job: &PartsJob, stores: &PartStores, sites: u64, store
             tiles.into_par_iter().try_for_each(|tile| Leaf::visit_positions(&open.store, tile, visit))
         })
     };
-    let rule = MaxEdgeRule::new(choice, &job.plan.frame, sites, bounds(job)?, &visit)?;
+    let rule = MaxEdgeRule::new(choice, &job.plan.frame, all.sites, all.bounds, &visit)?;
     ColumnWriter::default().push(rule.counts()).write(store, StepRecord::Spacing).map(Some)
 }
 
-/// Returns how tiles look. If `sites` sites decide that, `store` has their counts.
+/// Returns how tiles look. If all sites decide that, `store` has their counts.
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Broken`] on the store.
-pub(crate) fn final_look(job: &PartsJob, sites: u64, store: &Store) -> Result<Arc<TileLook>> {
+pub(crate) fn final_look(job: &PartsJob, all: SitesOfParts, store: &Store) -> Result<Arc<TileLook>> {
     if let Some(look) = early_look(job)? {
         return Ok(look);
     }
     let counts = ColumnReader::open(store, StepRecord::Spacing)?.column_vec()?;
-    look(job, MaxEdgeRule::of_counts(sites, bounds(job)?, counts)?).map(Arc::new)
+    look(job, MaxEdgeRule::of_counts(all.sites, all.bounds, counts)?).map(Arc::new)
 }
 
 fn look(job: &PartsJob, rule: MaxEdgeRule) -> Result<TileLook> {

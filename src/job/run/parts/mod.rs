@@ -17,6 +17,7 @@ mod publish_parts;
 pub(crate) mod read_phase;
 pub(crate) mod tile_phase;
 
+use crate::geometry::Bounds;
 use crate::job::durable::directory::JobDirectory;
 use crate::job::index::PartIndex;
 use crate::job::partition::part_points::ReadInputs;
@@ -28,7 +29,7 @@ use crate::job::report::job_report::Report;
 use crate::job::run::parts::front::Front;
 use crate::job::run::parts::join::{JoinedParts, join_parts};
 use crate::job::run::parts::level_phase::levels_of_part;
-use crate::job::run::parts::look::early_look;
+use crate::job::run::parts::look::{SitesOfParts, early_look};
 use crate::job::run::parts::mesh_phase::{drop_damaged_steps, mesh_one};
 use crate::job::run::parts::meshed_part::MeshedPart;
 use crate::job::run::parts::part_store::PartStores;
@@ -44,16 +45,25 @@ use std::collections::HashMap;
 /// The walk through the phases after the plan.
 ///
 /// # Errors
-/// Those of the steps; [`Error::NeedsOnePart`] if what is read contradicts the headers.
+/// Those of the steps; [`Error::NeedsOnePart`] if what is read contradicts the headers; [`Error::DamagedSteps`] if what an interrupted run
+/// left proves damaged.
 pub(crate) fn walk(run: &RunContext, plan: &Plan) -> Result<Report> {
+    // What was freed cannot be done again, so a missing result may show only when another step needs it.
+    do_phases(run, plan).map_err(|error| match error {
+        Error::Broken(_) if run.resumed > 0 => Error::DamagedSteps,
+        error => error,
+    })
+}
+
+fn do_phases(run: &RunContext, plan: &Plan) -> Result<Report> {
     let parts = &Parts::of(plan);
     let job = &PartsJob::of_run(run, plan, parts);
     write_plan(run.journal, run.directory, plan)?;
     // Steps 2 to 6 for each part, as far as it needs no later one.
     let stores = &PartStores::new(job.directory, job.job_id);
-    let (meshed, mut before) = read_and_mesh(job, stores)?;
+    let (meshed, bounds, mut before) = read_and_mesh(job, stores)?;
     // Step 4 for the nodes above the parts.
-    join_parts(job, stores, meshed.iter().map(|part| part.leaves.sites).sum())?;
+    join_parts(job, stores, SitesOfParts { sites: meshed.iter().map(|part| part.leaves.sites).sum(), bounds })?;
     let joined = JoinedParts::open(job)?.ok_or_else(|| Error::Broken("the parts are not joined".into()))?;
     // Steps 5 and 6 for the tiles that have waited.
     let borders = &ForeignBorders::new(job, stores, &joined);
@@ -82,9 +92,12 @@ pub(crate) fn write_plan(journal: &Journal, directory: &JobDirectory, plan: &Pla
     })
 }
 
-/// Reads and meshes all parts, or those that an interrupted run left.
-/// Returns them, and what writing tiles of each took that have waited for others.
-fn read_and_mesh(job: &PartsJob, stores: &PartStores) -> Result<(Vec<MeshedPart>, HashMap<PartIndex, StageStats>)> {
+/// Reads and meshes all parts, or those that an interrupted run left. Returns them, the box of all points, and what writing tiles of each
+/// part took that have waited for others.
+fn read_and_mesh(
+    job: &PartsJob,
+    stores: &PartStores,
+) -> Result<(Vec<MeshedPart>, Bounds<3>, HashMap<PartIndex, StageStats>)> {
     let look = early_look(job)?;
     let mut front = look.clone().map(|look| Front::new(job, stores, look)).transpose()?;
     let (mut read, mut meshed) = (Vec::<ReadInputs>::new(), Vec::<MeshedPart>::new());
@@ -107,6 +120,6 @@ fn read_and_mesh(job: &PartsJob, stores: &PartStores) -> Result<(Vec<MeshedPart>
         front.as_mut().map(|front| front.pass(part, &done)).transpose()?;
         meshed.push(done);
     }
-    sum_up(job, read.iter())?;
-    Ok((meshed, front.map(|front| front.stages).unwrap_or_default()))
+    let (_, bounds) = sum_up(job, read.iter())?;
+    Ok((meshed, bounds, front.map(|front| front.stages).unwrap_or_default()))
 }

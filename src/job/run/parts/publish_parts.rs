@@ -4,7 +4,6 @@ use crate::job::index::{PartIndex, TileIndex};
 use crate::job::levels::hierarchy::Hierarchy;
 use crate::job::levels::make_level::{Child, LevelStats};
 use crate::job::mesh::leaf::LeafStats;
-use crate::job::plan::no_points::no_point_is_left;
 use crate::job::publish::side_files::{EachTile, StoredTiles};
 use crate::job::publish::tileset_tree::TilesOfTree;
 use crate::job::records::Store;
@@ -42,8 +41,7 @@ pub(crate) fn publish_parts(
     let parts = parts.collect::<Result<Vec<PartProgress>>>()?;
     let figures = PartFigures::of(&parts)?;
     some_triangles(&figures.tiles, plan)?;
-    let summary = sum_up(job, parts.iter().filter_map(|part| Some(&part.read.as_ref()?.figures)))?;
-    let bounds = summary.bounds.ok_or_else(|| no_point_is_left(plan, &summary.counts))?;
+    let (summary, bounds) = sum_up(job, parts.iter().filter_map(|part| Some(&part.read.as_ref()?.figures)))?;
     add_stages(run, joined, &parts);
     let tileset = wants_tileset(plan, &figures.tiles).then(|| levels_and_root(run, job, stores, joined, &figures));
     let all = TilesOfParts { job, stores };

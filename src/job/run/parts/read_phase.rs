@@ -1,5 +1,6 @@
 //! Reading the inputs, each by the first part that needs it.
 
+use crate::geometry::Bounds;
 use crate::job::index::PartIndex;
 use crate::job::mesh::precision_limit::PrecisionLimit;
 use crate::job::partition::part_points::{PointsOfPart, ReadInputs, check_malformed, read_inputs};
@@ -68,16 +69,19 @@ pub(crate) fn points_of<'a>(job: &PartsJob<'a>, part: PartIndex) -> Result<Point
     Ok(points)
 }
 
-/// Sums up what all inputs held.
+/// Sums up what all inputs held. Returns the sums and the box of the points.
 ///
 /// # Errors
 /// [`Error::Input`] if too many records are malformed, [`Error::NoTerrain`] or [`Error::Config`] if no point is left,
 /// [`Error::TooFine`] if no mesh can hold the heights.
-pub(crate) fn sum_up<'a>(job: &PartsJob, read: impl Iterator<Item = &'a ReadInputs> + Clone) -> Result<PointSummary> {
+pub(crate) fn sum_up<'a>(
+    job: &PartsJob,
+    read: impl Iterator<Item = &'a ReadInputs> + Clone,
+) -> Result<(PointSummary, Bounds<3>)> {
     check_malformed(job.plan, read.clone())?;
     let mut summary = PointSummary::default();
     read.for_each(|inputs| summary += inputs.summary.clone());
     let bounds = summary.bounds.ok_or_else(|| no_point_is_left(job.plan, &summary.counts))?;
     PrecisionLimit::of(&job.plan.frame).check_heights(bounds)?;
-    Ok(summary)
+    Ok((summary, bounds))
 }

@@ -13,7 +13,7 @@ use crate::job::run::attempt::{NO_LOCKS, may_coarsen};
 use crate::job::run::parts::done::PartProgress;
 use crate::job::run::parts::join::{JoinedParts, join_parts};
 use crate::job::run::parts::level_phase::levels_of_part;
-use crate::job::run::parts::look::early_look;
+use crate::job::run::parts::look::{SitesOfParts, early_look};
 use crate::job::run::parts::mesh_phase::{drop_damaged_steps, mesh_one};
 use crate::job::run::parts::part_store::PartStores;
 use crate::job::run::parts::parts_job::PartsJob;
@@ -21,7 +21,7 @@ use crate::job::run::parts::read_phase::{read_for, sum_up};
 use crate::job::run::parts::tile_phase::{ForeignBorders, finish_part};
 use crate::job::run::publish_step::wants_tileset;
 use crate::job::run::tasks::dealing::deal;
-use crate::job::run::tasks::missing::{JobProgressByPart, too_early};
+use crate::job::run::tasks::missing::{JobProgressByPart, NOTHING_LEFT, is_done, not_planned, too_early};
 use crate::job::run::tasks::planned_job::PlannedJob;
 use crate::job::tiles::write_tile::TileStats;
 use crate::output::options::OutputFormat;
@@ -41,16 +41,18 @@ pub(crate) fn work_on_parts(
     task: Task,
 ) -> Result<(u64, Option<String>)> {
     let directory = &JobDirectory::new(&options.output.directory);
-    let lock = share(directory)?.ok_or_else(|| too_early(Phase::Plan, &[1], 1))?;
+    let Some(lock) = share(directory)? else {
+        return if is_done(directory, options)? { Ok((0, Some(NOTHING_LEFT.into()))) } else { Err(not_planned()) };
+    };
     if !lock.is_real() {
         run.progress.note(NO_LOCKS);
     }
     if Alone::find(directory)?.is_some() {
         return Ok((0, Some(format!("nothing to do: {}", Alone::SENTENCE))));
     }
-    let mut job = PlannedJob::open(directory, options)?.ok_or_else(|| too_early(Phase::Plan, &[1], 1))?;
+    let mut job = PlannedJob::open(directory, options)?.ok_or_else(not_planned)?;
     if job.is_complete {
-        return Ok((0, Some("nothing to do: all results are written".into())));
+        return Ok((0, Some(NOTHING_LEFT.into())));
     }
     let mine = parts_of(&job, phase, task);
     if mine.is_empty() {
@@ -65,7 +67,7 @@ pub(crate) fn work_on_parts(
     let (alone, why) = match worked {
         Err(Error::NeedsOnePart) => (Alone::InOnePart, "what was read contradicts the header of a file".into()),
         Err(Error::TooFine { vertical, what }) if may_coarsen(options, vertical) => (Alone::AsItIs, what),
-        Err(Error::DamagedSteps) => return Err(damaged(directory)),
+        Err(Error::DamagedSteps | Error::Broken(_)) => return Err(damaged(directory)),
         worked => return worked.map(|()| (mine.len() as u64, None)),
     };
     alone.note(directory)?;
@@ -162,10 +164,10 @@ impl PartTask<'_> {
         let tasks = self.task.count;
         progress.require(Phase::Read, tasks, |_| true)?;
         progress.require(Phase::Mesh, tasks, |_| true)?;
-        sum_up(job, progress.parts.iter().filter_map(|part| Some(&part.read.as_ref()?.figures)))?;
+        let (_, bounds) = sum_up(job, progress.parts.iter().filter_map(|part| Some(&part.read.as_ref()?.figures)))?;
         let mesh = progress.parts.iter().filter_map(|part| Some(&part.mesh.as_ref()?.figures));
         let stores = &PartStores::new(job.directory, job.job_id);
-        join_parts(job, stores, mesh.map(|mesh| mesh.leaves.sites).sum())
+        join_parts(job, stores, SitesOfParts { sites: mesh.map(|mesh| mesh.leaves.sites).sum(), bounds })
     }
 
     fn tiles(&self, job: &PartsJob, mine: &[PartIndex]) -> Result<()> {
