@@ -92,7 +92,7 @@ struct Simulation {
 }
 
 fn simulate(points: f64, law: f64, nanoseconds: f64) {
-    let wanted = (points / POINTS_PER_PART).min(MOST_PARTS).max(1.0);
+    let wanted = (points / POINTS_PER_PART).clamp(1.0, MOST_PARTS);
     let depth = wanted.log2().ceil() as u32;
     let size = [1usize << depth.div_ceil(2), 1usize << (depth / 2)];
     let parts = size[0] * size[1];

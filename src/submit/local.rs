@@ -3,6 +3,7 @@
 
 use crate::job::phase::{Phase, PhaseTasks};
 use crate::submit::request::Request;
+use crate::submit::shell::quoted;
 use crate::{Error, Result, interrupt, say, threads};
 use std::ffi::OsString;
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -51,9 +52,10 @@ impl<'a> LocalEngine<'a> {
         let mut text = String::new();
         for phase in &self.request.phases {
             for &task in &phase.missing {
-                let words = self.arguments(phase, task);
-                let words: Vec<_> = words.iter().map(|word| word.to_string_lossy()).collect();
-                text += &format!("{} {}\n", self.request.program.display(), words.join(" "));
+                let program = self.request.program.clone().into();
+                let words = std::iter::once(program).chain(self.arguments(phase, task));
+                let words: Vec<String> = words.map(|word: OsString| quoted(&word.to_string_lossy())).collect();
+                text += &format!("{}\n", words.join(" "));
             }
         }
         text

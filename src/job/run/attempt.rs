@@ -15,6 +15,7 @@ use crate::job::progress::clock::JobClock;
 use crate::job::progress::stage::{JobProgress, ProgressOutput};
 use crate::job::report::job_report::Report;
 use crate::job::run::alone::Alone;
+use crate::job::run::part_entries::StepsOfParts;
 use crate::job::run::read_step::note_skipped;
 use crate::job::run::resume::{self, EarlierRun, RunStart, place_results_of_finished_job};
 use crate::job::run::resume_parts::start_parts;
@@ -216,7 +217,8 @@ fn attempt(
         let outcome = (job.walk)(&context, plan, partition);
         drop(context);
         // Finished steps reach the disk before a message says that they are kept.
-        let steps = journal.close();
+        let of_parts = || StepsOfParts::of(directory, job_id).map_or(0, |steps| steps.count);
+        let steps = journal.close() + outcome.as_ref().err().map_or(0, |_| of_parts());
         // An open file is not freed when it is removed.
         drop(store);
         end(directory, outcome, steps)
