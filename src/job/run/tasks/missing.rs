@@ -7,16 +7,14 @@ use crate::job::phase::{Phase, PhaseTasks};
 use crate::job::plan::budget::workers;
 use crate::job::plan::fingerprint::{Fingerprint, JobChange};
 use crate::job::records::JobStep;
-use crate::job::report::job_report::Report;
 use crate::job::run::alone::Alone;
 use crate::job::run::part_entries::{PartHeader, entries_of_steps};
 use crate::job::run::parts::done::PartProgress;
 use crate::job::run::tasks::dealing::deal;
 use crate::job::run::tasks::planned_job::{PlannedJob, planned};
 use crate::threads::on_threads;
-use crate::{Error, Result, disk};
+use crate::{Error, Result};
 use std::collections::BTreeSet;
-use std::path::Path;
 
 /// What is done of a planned job.
 pub(crate) struct JobProgressByPart<'a> {
@@ -108,29 +106,12 @@ pub(crate) fn too_early(phase: Phase, missing: &[u32], count: u32) -> Error {
     ))
 }
 
-/// What a task says that comes after the results are written.
-pub(crate) const NOTHING_LEFT: &str = "nothing to do: all results are written";
-
-/// Returns the error of a task of a job that is not planned.
+/// Returns the error of a task of a job that is not planned, or is done: with other options it may be about to be planned again.
 pub(crate) fn not_planned() -> Error {
-    too_early(Phase::Plan, &[1], 1)
-}
-
-/// Tells whether nothing is left of the job but its results, as far as the report tells: it is about the same inputs.
-///
-/// # Errors
-/// [`Error::Io`] if the output directory or an input cannot be read.
-pub(crate) fn is_done(directory: &JobDirectory, options: &JobOptions) -> Result<bool> {
-    let path = directory.results().report();
-    let there = |path: &Path| disk::exists(path).map_err(Error::io("read", path));
-    if there(&directory.journal())? || !there(&path)? {
-        return Ok(false);
+    match too_early(Phase::Plan, &[1], 1) {
+        Error::TooEarly(why) => Error::TooEarly(format!("{why}. gdt-batch status tells whether the job is done")),
+        error => error,
     }
-    let text = std::fs::read(&path).map_err(Error::io("read", &path))?;
-    let report: Option<Report> = serde_json::from_slice(&text).ok();
-    let Some(report) = report else { return Ok(false) };
-    let fingerprint = on_threads(workers(options, 0)?, || Fingerprint::of(options))?;
-    Ok(report.inputs_fingerprint == fingerprint.of_inputs())
 }
 
 /// Returns all phases of a job with the tasks that are missing.

@@ -20,7 +20,7 @@ use crate::job::report::job_report::Report;
 use crate::job::report::task_outcome::{DoneTask, TaskOutcome};
 use crate::job::run::alone::Alone;
 use crate::job::run::attempt::{EarlierWork, Walk, run_until_it_fits};
-use crate::job::run::tasks::missing::{JobProgressByPart, NOTHING_LEFT, is_done, not_planned};
+use crate::job::run::tasks::missing::{JobProgressByPart, not_planned};
 use crate::job::run::tasks::part_tasks::work_on_parts;
 use crate::job::run::tasks::plan_task::plan;
 use crate::job::run::tasks::planned_job::PlannedJob;
@@ -35,9 +35,6 @@ pub(crate) fn work(options: &JobOptions, run: RunOptions, phase: Phase, task: Ta
     // A phase with one task is done by the first.
     if phase.is_by_part() || task.number == 1 {
         match phase {
-            Phase::Publish if is_done(&JobDirectory::new(&options.output.directory), options)? => {
-                done.note = Some(NOTHING_LEFT.into());
-            }
             Phase::Publish => {
                 return publish(options, run, task, walk).map(|report| TaskOutcome::Published(report.into()));
             }

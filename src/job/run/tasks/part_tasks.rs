@@ -21,7 +21,7 @@ use crate::job::run::parts::read_phase::{read_for, sum_up};
 use crate::job::run::parts::tile_phase::{ForeignBorders, finish_part};
 use crate::job::run::publish_step::wants_tileset;
 use crate::job::run::tasks::dealing::deal;
-use crate::job::run::tasks::missing::{JobProgressByPart, NOTHING_LEFT, is_done, not_planned, too_early};
+use crate::job::run::tasks::missing::{JobProgressByPart, not_planned, too_early};
 use crate::job::run::tasks::planned_job::PlannedJob;
 use crate::job::tiles::write_tile::TileStats;
 use crate::output::options::OutputFormat;
@@ -41,9 +41,7 @@ pub(crate) fn work_on_parts(
     task: Task,
 ) -> Result<(u64, Option<String>)> {
     let directory = &JobDirectory::new(&options.output.directory);
-    let Some(lock) = share(directory)? else {
-        return if is_done(directory, options)? { Ok((0, Some(NOTHING_LEFT.into()))) } else { Err(not_planned()) };
-    };
+    let lock = share(directory)?.ok_or_else(not_planned)?;
     if !lock.is_real() {
         run.progress.note(NO_LOCKS);
     }
@@ -52,7 +50,7 @@ pub(crate) fn work_on_parts(
     }
     let mut job = PlannedJob::open(directory, options)?.ok_or_else(not_planned)?;
     if job.is_complete {
-        return Ok((0, Some(NOTHING_LEFT.into())));
+        return Ok((0, Some("nothing to do: all results are written".into())));
     }
     let mine = parts_of(&job, phase, task);
     if mine.is_empty() {
@@ -67,7 +65,7 @@ pub(crate) fn work_on_parts(
     let (alone, why) = match worked {
         Err(Error::NeedsOnePart) => (Alone::InOnePart, "what was read contradicts the header of a file".into()),
         Err(Error::TooFine { vertical, what }) if may_coarsen(options, vertical) => (Alone::AsItIs, what),
-        Err(Error::DamagedSteps | Error::Broken(_)) => return Err(damaged(directory)),
+        Err(Error::DamagedSteps) => return Err(damaged(directory)),
         worked => return worked.map(|()| (mine.len() as u64, None)),
     };
     alone.note(directory)?;
