@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use crate::random::Random;
-use crate::rig::{Rig, Run, Setup};
+use crate::rig::{Rig, Run, Setup, files};
 use crate::scattered;
 
 /// Where a kill can hit a commit: before it; when the results have their final names but the journal lacks the record; when half of
@@ -178,11 +178,11 @@ fn a_job_of_parts_whose_results_are_lost_while_it_is_interrupted_starts_over() {
     let rig = job_of_parts(parts_of(4_000, 1)).committing_every(0);
     for lost in [1, 40] {
         assert!(rig.run_to("replacing", 1).was_killed());
-        let results = rig.out().join("job/results/tiles");
-        let mut tiles: Vec<_> = std::fs::read_dir(&results).unwrap().map(|entry| entry.unwrap().path()).collect();
-        tiles.retain(|path| path.extension().is_some_and(|extension| extension == "glb"));
-        assert!(tiles.len() > 20, "{tiles:?}");
-        tiles.iter().take(lost).for_each(|tile| std::fs::remove_file(tile).unwrap());
+        let results = rig.out().join("job/results");
+        let mut names: Vec<String> = files(&results).into_keys().collect();
+        names.retain(|name| name.starts_with("tiles/") && name.ends_with(".glb"));
+        assert!(names.len() > 40, "{names:?}");
+        names.iter().take(lost).for_each(|name| std::fs::remove_file(results.join(name)).unwrap());
         rig.completes("after results were lost");
     }
 }

@@ -15,7 +15,7 @@ fn a_job_stopped_by_sigterm_ctrl_c_or_a_hangup_goes_on_where_it_stopped() {
     for (signal, threads) in [("TERM", 1), ("INT", 2), ("HUP", 2)] {
         let rig = long_job(threads);
         // Among the leaves, the border normals and the tiles.
-        for steps in [50, 250, 400] {
+        for steps in [50, 200, 300] {
             let mut run = Run::start(&mut rig.command());
             run.wait_until(|| rig.steps() > steps);
             run.signal(signal);

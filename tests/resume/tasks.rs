@@ -131,7 +131,7 @@ fn a_second_worker_leaves_a_part_that_another_has() {
     let mut first = Run::start(&mut task(&rig, "mesh", "1/1"));
     first.wait_until(|| stored(&rig, 0) > before);
     first.signal("STOP");
-    let second = run(task(&rig, "mesh", "1/1")).stopped(&["part 0 is left out", "is working in"]);
+    let second = run(task(&rig, "mesh", "1/1")).stopped(&["is left out: process", "is working in"]);
     assert!(second.err.contains(&format!("process {} on", first.child.id())), "{}", second.err);
     // It has done the others.
     run(task(&rig, "join", "1/1")).stopped(&["mesh is not complete: task 1 of 1 is missing"]);

@@ -182,6 +182,14 @@ impl JobDirectory {
         Lock::take(&self.job)
     }
 
+    /// Takes the lock of the folder of a part, or of the merges above the parts, which it creates if need be.
+    ///
+    /// # Errors
+    /// As [`Lock::take_within`].
+    pub fn lock_within(&self) -> Result<Lock> {
+        Lock::take_within(&self.job)
+    }
+
     /// Shares the lock of the job directory, which must be there, with other tasks of the job.
     ///
     /// # Errors

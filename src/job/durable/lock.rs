@@ -25,7 +25,6 @@ impl Lock {
     pub fn take(job: &Path) -> Result<Lock> {
         // A kill can leave an empty directory.
         let is_new = disk::list(job).map_err(Error::io("read", job))?.is_empty();
-        disk::create_folder(job).map_err(Error::io("create the directory", job))?;
         let path = lock_file(job);
         if !is_new && !disk::exists(&path).map_err(Error::io("read", &path))? {
             return Err(Error::Config(format!(
@@ -33,6 +32,17 @@ impl Lock {
                 job.display()
             )));
         }
+        Lock::take_within(job)
+    }
+
+    /// Creates the folder `job` within a job directory if need be and takes its lock. Whatever is there is the job's own: a power failure
+    /// may have left other files and lost the lock file.
+    ///
+    /// # Errors
+    /// As [`Lock::take`].
+    pub fn take_within(job: &Path) -> Result<Lock> {
+        disk::create_folder(job).map_err(Error::io("create the directory", job))?;
+        let path = lock_file(job);
         let file = disk::open_or_create(&path).map_err(Error::io("open", &path))?;
         let is_real = is_held(file.try_lock(), &file, job)?;
         say_who(&file, &path, &this_process())?;

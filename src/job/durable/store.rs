@@ -64,6 +64,13 @@ pub struct RecordRef<K> {
     hash: u64,
 }
 
+impl<K: RecordKey> RecordRef<K> {
+    /// Returns what the record holds.
+    pub(crate) fn key(&self) -> K {
+        self.key
+    }
+}
+
 /// The results of all steps of a job, on disk. Several threads may write and read at the same time.
 #[derive(Debug)]
 pub struct Store<K> {

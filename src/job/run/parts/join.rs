@@ -35,7 +35,7 @@ pub(crate) struct JoinedParts {
 pub(crate) fn join_parts(job: &PartsJob, stores: &PartStores, all: SitesOfParts) -> Result<()> {
     let parts = job.parts.all().len() as u64;
     let directory = &job.directory.join();
-    let lock = directory.lock()?;
+    let lock = directory.lock_within()?;
     let header = job.header(job.above());
     let entries = whole_entries(directory, entries_of(directory, header)?)?;
     if entries.iter().any(|entry| entry.step == JobStep::Join) {
@@ -61,7 +61,7 @@ pub(crate) fn merge_through(job: &PartsJob, stores: &PartStores, last: PartIndex
         return Ok(Vec::new());
     }
     let directory = &job.directory.join();
-    let lock = directory.lock()?;
+    let lock = directory.lock_within()?;
     let header = job.header(job.above());
     let session = PartSession::begin(directory, lock, header, entries_of(directory, header)?)?;
     let context = &session.context(job);
@@ -92,7 +92,7 @@ fn nodes_completed_by(tree: &Tree, leaf: NodeIndex) -> Vec<NodeIndex> {
 /// [`crate::Error::Io`] on its folder, [`crate::Error::InUse`] if another process has it.
 pub(crate) fn drop_damaged_merges(job: &PartsJob) -> Result<()> {
     let (directory, header) = (&job.directory.join(), job.header(job.above()));
-    let lock = directory.lock()?;
+    let lock = directory.lock_within()?;
     PartSession::begin(directory, lock, header, whole_entries(directory, entries_of(directory, header)?)?)?.end()
 }
 

@@ -25,7 +25,7 @@ pub(crate) fn levels_of_part(
     has_tileset: bool,
 ) -> Result<LevelStats> {
     let (directory, header) = (&job.directory.part(part), job.header(part));
-    let lock = directory.lock()?;
+    let lock = directory.lock_within()?;
     let entries = entries_of(directory, header)?;
     if let Some(done) = Done::find(&entries, JobStep::Levels)? {
         return Ok(done.figures);

@@ -1,11 +1,10 @@
 //! Meshing a part whose points have all been read.
 
-use crate::Result;
 use crate::job::durable::directory::JobDirectory;
 use crate::job::index::PartIndex;
 use crate::job::partition::result::Partition;
 use crate::job::progress::stats::StageStats;
-use crate::job::records::{JobStep, JournalEntry, StepOutput};
+use crate::job::records::{JobStep, JournalEntry, StepOutput, StepRecord, Store};
 use crate::job::run::mesh_and_tiles::{Writing, mesh_part};
 use crate::job::run::part_entries::{entries_of, entries_of_steps, is_whole, open_store, records_of};
 use crate::job::run::parts::done::Done;
@@ -15,6 +14,7 @@ use crate::job::run::parts::parts_job::PartsJob;
 use crate::job::run::parts::read_phase::points_of;
 use crate::job::run::resume_parts::resume_part;
 use crate::job::run::tile_queue::TileLook;
+use crate::{Error, Result};
 use std::sync::{Arc, PoisonError};
 
 /// Meshes a part whose points have all been read, unless that is done. Temporary files of other parts take `others` bytes; `None` where
@@ -33,7 +33,7 @@ pub(crate) fn mesh_one(
     let meshed = match done(job, directory, part)? {
         Some(meshed) => meshed,
         None => {
-            let lock = directory.lock()?;
+            let lock = directory.lock_within()?;
             // Another process may have done it since.
             match done(job, directory, part)? {
                 Some(meshed) => meshed,
@@ -92,21 +92,41 @@ fn mesh(
     session.finish(JobStep::MeshPart, meshed, stages, Vec::new())
 }
 
+/// Tells whether what `step` needs, besides the steps that were lost with it, is still whole. It may have been freed, and a hole reads as
+/// zeros.
+fn can_do_again(store: &Store, entries: &[JournalEntry], step: JobStep) -> bool {
+    let (JobStep::BorderNormals(tile) | JobStep::WriteTile(tile)) = step else { return true };
+    let Ok(Partition { tree, .. }) = Partition::load(store) else { return false };
+    let seams: Vec<StepRecord> = tree.merges_above(tree.leaf(tile)).map(StepRecord::Seam).collect();
+    let is_needed = |step: JobStep, key: StepRecord| match step {
+        JobStep::Leaf(of) => of == tile,
+        JobStep::Merge(_) => seams.contains(&key),
+        // Those of its neighbours, at least.
+        JobStep::BorderNormals(_) => true,
+        _ => false,
+    };
+    let needed = entries.iter().flat_map(|entry| entry.records.iter().map(move |record| (entry.step, record)));
+    needed.filter(|(step, record)| is_needed(*step, record.key())).all(|(_, record)| store.is_whole(record))
+}
+
 /// Removes from the journal of a part that is meshed the later steps that a power failure has damaged: they can be done again.
 ///
 /// # Errors
-/// [`crate::Error::Io`] on the part's folder, [`crate::Error::InUse`] if another process has it.
+/// [`Error::DamagedSteps`] if they cannot; [`Error::Io`] on the part's folder, [`Error::InUse`] if another process has it.
 pub(crate) fn drop_damaged_steps(job: &PartsJob, part: PartIndex) -> Result<()> {
     let (directory, header) = (&job.directory.part(part), job.header(part));
-    let lock = directory.lock()?;
+    let lock = directory.lock_within()?;
     let mut entries = entries_of(directory, header)?;
     let Some(meshed) = entries.iter().position(|entry| entry.step == JobStep::MeshPart) else { return Ok(()) };
     let store = open_store(directory, &records_of(&entries))?;
     let later = entries.split_off(meshed + 1);
-    let before = later.len();
-    let mut later: Vec<JournalEntry> = later.into_iter().filter(|entry| is_whole(directory, &store, entry)).collect();
-    if later.len() == before {
+    let (mut later, lost): (Vec<JournalEntry>, Vec<JournalEntry>) =
+        later.into_iter().partition(|entry| is_whole(directory, &store, entry));
+    if lost.is_empty() {
         return Ok(());
+    }
+    if !lost.iter().all(|entry| can_do_again(&store, &entries, entry.step)) {
+        return Err(Error::DamagedSteps);
     }
     // What is complete no longer is.
     later.retain(|entry| !matches!(entry.step, JobStep::WriteWaiting | JobStep::Levels));

@@ -128,7 +128,7 @@ fn levels_and_root(
 ) -> Result<TilesetContent> {
     let PartsJob { plan, parts, .. } = *job;
     let hierarchy = Hierarchy::above_parts(&parts.tree, &figures.points, level_sizes(plan));
-    let lock = joined.directory.lock()?;
+    let lock = joined.directory.lock_within()?;
     let entries = entries_of(&joined.directory, joined.header)?;
     let session = PartSession::begin(&joined.directory, lock, joined.header, entries)?;
     let context = session.context(job);

@@ -27,7 +27,7 @@ pub(crate) fn read_for(job: &PartsJob, reader: PartIndex, malformed: u64) -> Res
         return Ok(done.figures);
     }
     let directory = &job.directory.part(reader);
-    let lock = directory.lock()?;
+    let lock = directory.lock_within()?;
     // Another process may have done it since.
     if let Some(done) = done(job, reader)? {
         return Ok(done.figures);

@@ -66,7 +66,7 @@ impl<'a> BorderSession<'a> {
         tiles: usize,
     ) -> Result<BorderSession<'a>> {
         let ForeignBorders { job, stores, .. } = *borders;
-        let lock = directory.lock()?;
+        let lock = directory.lock_within()?;
         let header = job.header(part);
         let entries = entries_of(directory, header)?;
         let open = stores.open(part)?;
