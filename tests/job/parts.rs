@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Writes `cloud` as files of neighbouring points, as surveys come.
-fn in_files(folder: &Path, cloud: &Cloud, side: i64) -> Vec<PathBuf> {
+pub(crate) fn in_files(folder: &Path, cloud: &Cloud, side: i64) -> Vec<PathBuf> {
     let mut files: BTreeMap<[i64; 2], Cloud> = BTreeMap::new();
     cloud.iter().for_each(|point| {
         files.entry([point[0].div_euclid(side), point[1].div_euclid(side)]).or_default().push(*point)
@@ -18,7 +18,8 @@ fn in_files(folder: &Path, cloud: &Cloud, side: i64) -> Vec<PathBuf> {
     files.iter().map(write).collect()
 }
 
-fn in_parts(files: &[PathBuf], points: u64) -> Job {
+/// Returns a job of small tiles whose parts have about so many points.
+pub(crate) fn in_parts(files: &[PathBuf], points: u64) -> Job {
     Job::on(files).tiles_of(500).with("triangulation", &format!("max_points_per_part = {points}"))
 }
 

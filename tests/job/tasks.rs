@@ -1,29 +1,16 @@
 //! Jobs that tasks do: any number of them leave the bytes that one process leaves, and what they cannot do by parts, `publish` does.
 
-use crate::clouds::{self, Cloud};
+use crate::clouds::Cloud;
 use crate::las_file::LasFile;
 use crate::levels::hills;
+use crate::parts::{in_files, in_parts};
 use crate::program::{Job, Said, gdt_batch, number};
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 
 const PHASES: [&str; 7] = ["plan", "read", "mesh", "join", "tiles", "levels", "publish"];
-
-fn in_files(folder: &Path, cloud: &Cloud, side: i64) -> Vec<PathBuf> {
-    let mut files: BTreeMap<[i64; 2], Cloud> = BTreeMap::new();
-    cloud.iter().for_each(|point| {
-        files.entry([point[0].div_euclid(side), point[1].div_euclid(side)]).or_default().push(*point)
-    });
-    let write = |([x, y], points): (&[i64; 2], &Cloud)| clouds::write(folder, &format!("{x}_{y}.csv"), points);
-    files.iter().map(write).collect()
-}
-
-fn in_parts(files: &[PathBuf], points: u64) -> Job {
-    Job::on(files).tiles_of(500).with("triangulation", &format!("max_points_per_part = {points}"))
-}
 
 /// Returns the checksums of all results but the report.
 fn bytes(job: &Job) -> String {

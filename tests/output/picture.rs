@@ -16,7 +16,7 @@ fn every_pixel_of_a_rectangle_is_drawn_once() {
         let mesh = terrain(&frame, &grid(columns, rows, step));
         let canvas = Canvas::new(&frame, mesh.bounds().unwrap());
         let [width, height] = canvas.size();
-        let mut pixels: Vec<u32> = canvas.draw(&mesh).iter().map(|pixel| pixel.pixel).collect();
+        let mut pixels: Vec<u32> = canvas.draw(&mesh).unwrap().iter().map(|pixel| pixel.pixel).collect();
         pixels.sort_unstable();
         // The last column or row may have its centre outside.
         assert!((LONGER_SIDE as u32 - 1..=LONGER_SIDE as u32).contains(&width.max(height)));
@@ -48,7 +48,7 @@ fn a_fan_of_slivers_covers_the_pixels_of_its_outline_once() {
         let outline = tile(vec![turned(0, hub - 1)]);
         let canvas = Canvas::new(&frame, fan.bounds().unwrap());
         let pixels = |tile: &Tile| {
-            let mut pixels: Vec<u32> = canvas.draw(tile).iter().map(|pixel| pixel.pixel).collect();
+            let mut pixels: Vec<u32> = canvas.draw(tile).unwrap().iter().map(|pixel| pixel.pixel).collect();
             pixels.sort_unstable();
             pixels
         };
@@ -63,14 +63,14 @@ fn the_picture_is_a_png_of_its_size() {
     let mesh = terrain(&frame, &cloud(31, 300, 50_000));
     let canvas = Canvas::new(&frame, mesh.bounds().unwrap());
     let mut picture = Picture::new(&canvas);
-    picture.add(0, &canvas.draw(&mesh));
+    picture.add(0, &canvas.draw(&mesh).unwrap());
     let png = picture.png().unwrap();
     let mut reader = png::Decoder::new(std::io::Cursor::new(&png)).read_info().unwrap();
     let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
     reader.next_frame(&mut pixels).unwrap();
     assert_eq!([reader.info().width, reader.info().height], canvas.size());
     let seen = pixels.chunks_exact(4).filter(|pixel| pixel[3] == 255).count();
-    assert_eq!(seen, canvas.draw(&mesh).len());
+    assert_eq!(seen, canvas.draw(&mesh).unwrap().len());
 }
 
 #[test]
@@ -81,7 +81,7 @@ fn a_slope_towards_the_light_is_brighter() {
     let mesh = Tile { colors: Some(vec![[30_000; 3]; points.len()]), ..terrain(&frame, &points) };
     let canvas = Canvas::new(&frame, mesh.bounds().unwrap());
     let mut picture = Picture::new(&canvas);
-    picture.add(0, &canvas.draw(&mesh));
+    picture.add(0, &canvas.draw(&mesh).unwrap());
     let png = picture.png().unwrap();
     let mut reader = png::Decoder::new(std::io::Cursor::new(&png)).read_info().unwrap();
     let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
@@ -107,11 +107,11 @@ proptest! {
             pixels.sort_unstable_by_key(|pixel| pixel.pixel);
             pixels
         };
-        let whole = by_pixel(canvas.draw(&mesh));
+        let whole = by_pixel(canvas.draw(&mesh).unwrap());
         prop_assert!(whole.windows(2).all(|pair| pair[0].pixel < pair[1].pixel));
         let mut random = Random(seed);
         let cut = cut(&mesh, tiles, |_| random.below(tiles as u64) as usize);
-        let pieces = by_pixel(cut.iter().rev().flat_map(|tile| canvas.draw(tile)).collect());
+        let pieces = by_pixel(cut.iter().rev().flat_map(|tile| canvas.draw(tile).unwrap()).collect());
         prop_assert!(pieces == whole);
     }
 }

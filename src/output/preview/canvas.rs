@@ -10,6 +10,7 @@ use crate::output::color::{height_color, to_srgb};
 use crate::output::frame::Frame;
 use crate::output::normals::{cross, unit_normal};
 use crate::output::tile::Tile;
+use crate::{Result, interrupt};
 
 /// Pixels along the longer side of the preview.
 pub const LONGER_SIDE: u64 = 1024;
@@ -80,14 +81,21 @@ impl Canvas {
     }
 
     /// Returns the pixels whose centres the triangles of `tile` cover.
-    pub fn draw(&self, tile: &Tile) -> Vec<PreviewPixel> {
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`](crate::Error::Interrupted) if the process was asked to stop.
+    pub fn draw(&self, tile: &Tile) -> Result<Vec<PreviewPixel>> {
         let cells: Vec<u32> = tile.positions.iter().map(|&p| self.cell(p)).collect();
-        let mut pixels = Vec::new();
+        let (mut pixels, mut drawn) = (Vec::new(), 0u32);
         for &triangle in &tile.triangles {
             let corners = triangle.map(|v| cells[v as usize]);
             // Most triangles lie between two rows or columns of centres and cover none.
             let differs = (corners[0] ^ corners[1]) | (corners[0] ^ corners[2]);
             if differs & 0xffff != 0 && differs >> 16 != 0 {
+                drawn += 1;
+                if drawn.is_multiple_of(TRIANGLES_BETWEEN_CHECKS) {
+                    interrupt::check()?;
+                }
                 let [columns, rows] = [0, 16].map(|shift| {
                     let at = corners.map(|cell| (cell >> shift & 0xffff) as i64);
                     [at[0].min(at[1]).min(at[2]), at[0].max(at[1]).max(at[2])]
@@ -95,7 +103,7 @@ impl Canvas {
                 DrawnTriangle::new(self, tile, triangle).draw(columns, rows, &mut pixels);
             }
         }
-        pixels
+        Ok(pixels)
     }
 
     /// Returns how far a point is right of and below the corner, in subdivisions: even numbers.
@@ -118,6 +126,9 @@ impl Canvas {
         index * self.pitch + self.center
     }
 }
+
+/// A million slivers as long as the terrain take seconds, so after this many the process asks whether it should stop.
+const TRIANGLES_BETWEEN_CHECKS: u32 = 1 << 12;
 
 /// A triangle that may cover pixels.
 struct DrawnTriangle<'a> {
