@@ -50,8 +50,8 @@ pub(crate) fn join_parts(job: &PartsJob, stores: &PartStores, all: SitesOfParts)
     Ok(())
 }
 
-/// Merges at those nodes above the parts that `last` was the last part to complete: all parts before it are meshed. Returns the tiles that no
-/// merge can change from now on.
+/// Merges at those nodes above the parts for which only part `last` was missing: all parts before it are meshed. Returns the tiles that
+/// no merge can change from now on.
 ///
 /// # Errors
 /// As [`join_parts`].
