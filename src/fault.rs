@@ -29,7 +29,7 @@ pub(crate) fn read(name: &str) -> io::Result<()> {
 /// "Input/output error".
 const EIO: i32 = 5;
 
-pub(crate) use injection::{commit_interval, is_due, mark, traced};
+pub(crate) use injection::{commit_interval, is_due, mark, processors, traced};
 
 #[cfg(feature = "fault-injection")]
 mod injection {
@@ -69,6 +69,11 @@ mod injection {
     /// Returns the least time between two commits of the journal if a test sets it (`GDT_COMMIT_MS`).
     pub(crate) fn commit_interval() -> Option<Duration> {
         std::env::var("GDT_COMMIT_MS").ok()?.parse().ok().map(Duration::from_millis)
+    }
+
+    /// Returns the number of processors if a test sets it (`GDT_PROCESSORS`).
+    pub(crate) fn processors() -> Option<usize> {
+        std::env::var("GDT_PROCESSORS").ok()?.parse().ok()
     }
 
     /// The file in which all changes of files are written down (`GDT_TRACE`).
@@ -116,6 +121,11 @@ mod injection {
 
     #[inline(always)]
     pub(crate) fn commit_interval() -> Option<Duration> {
+        None
+    }
+
+    #[inline(always)]
+    pub(crate) fn processors() -> Option<usize> {
         None
     }
 

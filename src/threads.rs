@@ -1,6 +1,6 @@
 //! Running work on a pool of threads, and while another thread waits.
 
-use crate::{Error, Result, address_space, interrupt};
+use crate::{Error, Result, address_space, fault, interrupt};
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::time::Duration;
 
@@ -67,5 +67,6 @@ pub fn unless_interrupted<T: Send + 'static>(work: impl FnOnce() -> Result<T> + 
 
 /// Returns how many threads the machine runs at the same time.
 pub fn available() -> usize {
-    std::thread::available_parallelism().map_or(1, |n| n.get())
+    let processors = || std::thread::available_parallelism().map_or(1, |n| n.get());
+    fault::processors().unwrap_or_else(processors)
 }

@@ -58,9 +58,22 @@ fn two_million_points_on_one_spot_fit_in_128_mib() {
 fn coarser_tiles_of_many_threads_fit_in_256_mib() {
     let folder = tempfile::tempdir().unwrap();
     let file = clouds::write(folder.path(), "square.csv", &clouds::uniform(2_000_000, 100_000, 8));
-    let job =
-        Job::on(&[file]).with("limits", "memory = \"256 MiB\"\nthreads = 16").with("output", "format = \"3dtiles\"");
-    stays_within(&job.tiles_of(5_000).report(), 256);
+    let job = Job::on(&[file]).with("limits", "memory = \"256 MiB\"").with("output", "format = \"3dtiles\"");
+    stays_within(&job.threads(16).processors(8).tiles_of(5_000).report(), 256);
+}
+
+/// More threads only take each other's cache.
+#[test]
+fn no_more_than_two_threads_start_for_each_processor() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = clouds::write(folder.path(), "few.csv", &clouds::uniform(1_000, 1_000, 3));
+    let started = |threads: usize| number(&Job::on(&[&file]).threads(threads).report()["threads"]);
+    let processors = started(0);
+    assert_eq!((started(1), started(1_000)), (1, 2 * processors));
+    if cfg!(feature = "fault-injection") {
+        let report = Job::on(&[&file]).threads(16).processors(3).report();
+        assert_eq!(number(&report["threads"]), 6);
+    }
 }
 
 #[test]

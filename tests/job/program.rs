@@ -100,13 +100,14 @@ fn finish(command: &mut Command) -> Said {
 pub(crate) struct Job {
     folder: TempDir,
     sections: BTreeMap<&'static str, String>,
+    processors: Option<usize>,
 }
 
 impl Job {
     /// Returns the smallest configuration for these files.
     pub(crate) fn on<P: AsRef<Path>>(files: &[P]) -> Job {
         let names: Vec<&str> = files.iter().map(|file| file.as_ref().to_str().unwrap()).collect();
-        let job = Job { folder: tempfile::tempdir().unwrap(), sections: BTreeMap::new() };
+        let job = Job { folder: tempfile::tempdir().unwrap(), sections: BTreeMap::new(), processors: None };
         job.with("input", &format!("files = {names:?}")).with("output", "directory = \"out\"")
     }
 
@@ -122,6 +123,11 @@ impl Job {
 
     pub(crate) fn threads(self, threads: usize) -> Job {
         self.with("limits", &format!("threads = {threads}"))
+    }
+
+    /// Lets a program with the feature `fault-injection` believe that it has so many processors.
+    pub(crate) fn processors(self, processors: usize) -> Job {
+        Job { processors: Some(processors), ..self }
     }
 
     pub(crate) fn folder(&self) -> &Path {
@@ -144,8 +150,9 @@ impl Job {
     /// Runs the job with these arguments before the configuration.
     #[track_caller]
     pub(crate) fn run_with(&self, arguments: &[&str]) -> Said {
-        let config = self.config();
-        gdt_batch(self.folder(), &[arguments, &[config.to_str().unwrap()]].concat())
+        let mut command = Command::new(env!("CARGO_BIN_EXE_gdt-batch"));
+        command.envs(self.processors.map(|count| ("GDT_PROCESSORS", count.to_string())));
+        finish(command.args(arguments).arg(self.config()).current_dir(self.folder()))
     }
 
     #[track_caller]
