@@ -190,6 +190,13 @@ impl Source {
         }
     }
 
+    /// Returns the least and the greatest x and y that the source claims; `None` for a header that gives no box.
+    pub fn claimed_rectangle(&self) -> Option<[[f64; 2]; 2]> {
+        let [min, max] = [self.min, self.max].map(|[x, y, _]| [x, y]);
+        let has_box = self.records <= 1 || (0..2).any(|axis| min[axis] < max[axis]);
+        has_box.then_some([min, max])
+    }
+
     /// Returns the number of records that decoding will count as malformed, as far as it is known without decoding.
     pub fn known_malformed(&self) -> u64 {
         match &self.points {
@@ -282,12 +289,26 @@ impl Source {
         rules: &PointRules,
         sink: &mut dyn FnMut(&[Point]) -> Result<()>,
     ) -> Result<PointCounts> {
+        self.decode_start(chunk, u64::MAX, rules, sink)
+    }
+
+    /// As [`Source::decode`], but takes no more than the first `records` records of the chunk, and of text about as many.
+    ///
+    /// # Errors
+    /// As [`Source::decode`].
+    pub fn decode_start(
+        &self,
+        chunk: usize,
+        records: u64,
+        rules: &PointRules,
+        sink: &mut dyn FnMut(&[Point]) -> Result<()>,
+    ) -> Result<PointCounts> {
         let file = RandomAccessFile::reopen(&self.path, self.size)?;
         let mut filter = PointFilter::new(&self.path, &self.axes, rules, sink);
         match &self.points {
-            PointData::Las(points) => points.decode(&file, chunk, rules, &mut filter)?,
-            PointData::Laz(points) => points.decode(&file, chunk, rules, &mut filter)?,
-            PointData::Text(table) => table.decode(&file, chunk, &mut filter)?,
+            PointData::Las(points) => points.decode(&file, chunk, records, rules, &mut filter)?,
+            PointData::Laz(points) => points.decode(&file, chunk, records, rules, &mut filter)?,
+            PointData::Text(table) => table.decode(&file, chunk, records, &mut filter)?,
         }
         filter.finish()
     }

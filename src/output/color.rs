@@ -1,9 +1,27 @@
 //! Vertex colours. glTF has linear colours; sources have sRGB colours, or none.
 
+use crate::geometry::Bounds;
+use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
 
 /// Linear red, green and blue, 65535 for full intensity.
 pub type LinearRgb = [u16; 3];
+
+/// The heights that the ramp of colours spans, in lattice integers. What is lower or higher has the colour of that end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct HeightRange {
+    /// The height with the first colour.
+    pub low: i32,
+    /// The height with the last colour.
+    pub high: i32,
+}
+
+impl HeightRange {
+    /// Returns the heights of a box.
+    pub fn of(bounds: Bounds<3>) -> HeightRange {
+        HeightRange { low: bounds.min[2], high: bounds.max[2] }
+    }
+}
 
 /// How the sites of a job get their colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,13 +31,8 @@ pub enum Coloring {
         /// Whether all values of the job are 0 to 255, in 16-bit fields.
         eight_bit: bool,
     },
-    /// By height, from the lowest to the highest lattice integer of the job.
-    Elevation {
-        /// Lowest lattice integer.
-        low: i32,
-        /// Highest lattice integer.
-        high: i32,
-    },
+    /// By height.
+    Elevation(HeightRange),
     /// By ASPRS classification.
     Class,
 }
@@ -47,14 +60,14 @@ impl Coloring {
         match *self {
             Coloring::Rgb { eight_bit: true } => rgb.map(|v| TO_LINEAR[v.min(255) as usize * 257]),
             Coloring::Rgb { eight_bit: false } => rgb.map(|v| TO_LINEAR[v as usize]),
-            Coloring::Elevation { low, high } => height_color(z, low, high),
+            Coloring::Elevation(range) => height_color(z, range),
             Coloring::Class => CLASS_COLORS.get(class as usize).unwrap_or(&OTHER_CLASS).map(decode_byte),
         }
     }
 }
 
-/// Returns the colour of height `z` on the ramp from `low` to `high`.
-pub fn height_color(z: i32, low: i32, high: i32) -> LinearRgb {
+/// Returns the colour of height `z` on the ramp over `range`.
+pub fn height_color(z: i32, HeightRange { low, high }: HeightRange) -> LinearRgb {
     let (above, span) = (z as i64 - low as i64, (high as i64 - low as i64).max(1));
     let last = RAMP.len() as i64 - 1;
     RAMP[(above * last / span).clamp(0, last) as usize]
@@ -146,13 +159,17 @@ const OTHER_CLASS: [u8; 3] = [150, 160, 180];
 mod tests {
     use super::*;
 
+    fn by_height(low: i32, high: i32) -> Coloring {
+        Coloring::Elevation(HeightRange { low, high })
+    }
+
     #[test]
     fn eight_bit_colours_are_those_of_the_same_sixteen_bit_values() {
         let (eight, sixteen) = (Coloring::Rgb { eight_bit: true }, Coloring::Rgb { eight_bit: false });
         for v in 0..=255 {
             assert_eq!(eight.color(0, [v, 0, 255], 0), sixteen.color(0, [v * 257, 0, 65535], 0));
         }
-        for coloring in [eight, sixteen, Coloring::Elevation { low: 0, high: 9 }, Coloring::Class] {
+        for coloring in [eight, sixteen, by_height(0, 9), Coloring::Class] {
             let (positions, rgb, class) = ([[0, 0, 3], [5, 5, 9]], [[1, 2, 300], [255, 65535, 256]], [2, 9]);
             let one_by_one = [0, 1].map(|i| coloring.color(positions[i][2], rgb[i], class[i]));
             assert_eq!(coloring.colors(&positions, &rgb, &class), one_by_one);
@@ -170,15 +187,17 @@ mod tests {
     }
 
     #[test]
-    fn the_ramp_spans_the_heights_of_the_job() {
-        let ramp = Coloring::Elevation { low: -100, high: 2_000_000_000 };
+    fn heights_beyond_the_ramp_have_the_colours_of_its_ends() {
+        let ramp = by_height(-100, 2_000_000_000);
         let color = |z| ramp.color(z, [0; 3], 0);
         assert_eq!(color(-100), RAMP_STOPS[0].map(decode_byte));
         assert_eq!(color(2_000_000_000), RAMP_STOPS[6].map(decode_byte));
         assert_eq!(color(i32::MIN), color(-100));
+        assert_eq!(color(i32::MAX), color(2_000_000_000));
         assert_ne!(color(0), color(1_000_000_000));
-        let flat = Coloring::Elevation { low: 5, high: 5 };
-        assert_eq!(flat.color(5, [0; 3], 0), RAMP_STOPS[0].map(decode_byte));
+        let flat = [4, 5, 6, i32::MAX].map(|z| by_height(5, 5).color(z, [0; 3], 0));
+        let [first, last] = [0, 6].map(|stop| RAMP_STOPS[stop].map(decode_byte));
+        assert_eq!(flat, [first, first, last, last]);
     }
 
     #[test]

@@ -15,6 +15,7 @@ mod layouts;
 mod meanings;
 mod real;
 mod rules;
+mod starts;
 mod written_down;
 
 use cloud::{Cloud, read_bytes, rules};

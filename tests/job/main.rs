@@ -25,6 +25,7 @@ mod decimals;
 mod doubtful_systems;
 mod globe;
 mod hard_shapes;
+mod heights;
 mod khronos;
 mod levels;
 mod limits;

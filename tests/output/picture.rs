@@ -2,6 +2,8 @@
 
 use gdt_batch::geometry::predicates::orient2d;
 use gdt_batch::output::Tile;
+use gdt_batch::output::color::HeightRange;
+use gdt_batch::output::frame::Frame;
 use gdt_batch::output::preview::canvas::{Canvas, LONGER_SIDE, PreviewPixel};
 use gdt_batch::output::preview::picture::Picture;
 use proptest::prelude::*;
@@ -9,12 +11,17 @@ use proptest::prelude::*;
 use crate::model::{cloud, cut, grid, terrain, utm};
 use crate::random::Random;
 
+fn canvas_of(frame: &Frame, mesh: &Tile) -> Canvas {
+    let bounds = mesh.bounds().unwrap();
+    Canvas::new(frame, bounds, HeightRange::of(bounds))
+}
+
 #[test]
 fn every_pixel_of_a_rectangle_is_drawn_once() {
     let frame = utm();
     for (columns, rows, step) in [(20, 20, 6_000), (5, 9, 1), (2, 2, 1), (300, 2, 77)] {
         let mesh = terrain(&frame, &grid(columns, rows, step));
-        let canvas = Canvas::new(&frame, mesh.bounds().unwrap());
+        let canvas = canvas_of(&frame, &mesh);
         let [width, height] = canvas.size();
         let mut pixels: Vec<u32> = canvas.draw(&mesh).unwrap().iter().map(|pixel| pixel.pixel).collect();
         pixels.sort_unstable();
@@ -46,7 +53,7 @@ fn a_fan_of_slivers_covers_the_pixels_of_its_outline_once() {
         let tile = |triangles: Vec<[u32; 3]>| Tile { triangles, positions: points.clone(), ..Tile::default() };
         let fan = tile((0..hub - 1).map(|i| turned(i, i + 1)).collect());
         let outline = tile(vec![turned(0, hub - 1)]);
-        let canvas = Canvas::new(&frame, fan.bounds().unwrap());
+        let canvas = canvas_of(&frame, &fan);
         let pixels = |tile: &Tile| {
             let mut pixels: Vec<u32> = canvas.draw(tile).unwrap().iter().map(|pixel| pixel.pixel).collect();
             pixels.sort_unstable();
@@ -61,7 +68,7 @@ fn a_fan_of_slivers_covers_the_pixels_of_its_outline_once() {
 fn the_picture_is_a_png_of_its_size() {
     let frame = utm();
     let mesh = terrain(&frame, &cloud(31, 300, 50_000));
-    let canvas = Canvas::new(&frame, mesh.bounds().unwrap());
+    let canvas = canvas_of(&frame, &mesh);
     let mut picture = Picture::new(&canvas);
     picture.add(0, &canvas.draw(&mesh).unwrap());
     let png = picture.png().unwrap();
@@ -79,7 +86,7 @@ fn a_slope_towards_the_light_is_brighter() {
     let roof = |x: i32| 300 - (x - 300).abs();
     let points: Vec<[i32; 3]> = (0..=60).flat_map(|x| [0, 300, 600].map(|y| [10 * x, y, roof(10 * x)])).collect();
     let mesh = Tile { colors: Some(vec![[30_000; 3]; points.len()]), ..terrain(&frame, &points) };
-    let canvas = Canvas::new(&frame, mesh.bounds().unwrap());
+    let canvas = canvas_of(&frame, &mesh);
     let mut picture = Picture::new(&canvas);
     picture.add(0, &canvas.draw(&mesh).unwrap());
     let png = picture.png().unwrap();
@@ -102,7 +109,7 @@ proptest! {
         let collinear = points.windows(3).all(|w| orient2d([w[0][0], w[0][1]], [w[1][0], w[1][1]], [w[2][0], w[2][1]]) == 0);
         prop_assume!(!collinear);
         let mesh = terrain(&frame, &points);
-        let canvas = Canvas::new(&frame, mesh.bounds().unwrap());
+        let canvas = canvas_of(&frame, &mesh);
         let by_pixel = |mut pixels: Vec<PreviewPixel>| {
             pixels.sort_unstable_by_key(|pixel| pixel.pixel);
             pixels

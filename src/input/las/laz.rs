@@ -95,23 +95,31 @@ impl CompressedPoints {
         self.chunks.len().max((self.missing > 0) as usize)
     }
 
-    /// Sends the records of chunk `chunk` of the source through `filter`.
+    /// Sends the first `records` records of chunk `chunk` of the source through `filter`.
     pub(crate) fn decode(
         &self,
         file: &RandomAccessFile,
         chunk: usize,
+        records: u64,
         rules: &PointRules,
         filter: &mut PointFilter,
     ) -> Result<()> {
+        let mut left = records;
         for laz_chunk in self.chunks.get(chunk).into_iter().flatten() {
-            let mut decoder = ChunkDecoder { points: self, file, chunk: laz_chunk, rules, next: laz_chunk.first };
+            if left == 0 {
+                return Ok(());
+            }
+            let wanted = laz_chunk.count.min(left);
+            left -= wanted;
+            let mut decoder =
+                ChunkDecoder { points: self, file, chunk: laz_chunk, rules, wanted, next: laz_chunk.first };
             match decoder.decode(filter) {
                 Ok(()) => {}
                 Err(ChunkError::Stopped(error)) => return Err(error),
                 Err(damage) => decoder.count_lost(&damage, filter),
             }
         }
-        if chunk + 1 == self.chunk_count() && self.missing > 0 {
+        if left > 0 && chunk + 1 == self.chunk_count() && self.missing > 0 {
             let (all, missing) = (self.records(), self.missing);
             filter.malformed(missing, || {
                 format!(
@@ -147,27 +155,29 @@ struct ChunkDecoder<'a> {
     file: &'a RandomAccessFile,
     chunk: &'a LazChunk,
     rules: &'a PointRules,
+    /// The number of records to decode, from the first.
+    wanted: u64,
     /// The number of the next record in the file.
     next: u64,
 }
 
 impl ChunkDecoder<'_> {
-    /// Decodes the chunk as far as possible; `self.next` then says how far.
+    /// Decodes the wanted records as far as possible; `self.next` then says how far.
     fn decode(&mut self, filter: &mut PointFilter) -> std::result::Result<(), ChunkError> {
-        let held = self.records_held()?.min(self.chunk.count);
+        let held = self.records_held()?.min(self.wanted);
         let end = self.chunk.first + held;
         let mut range = self.file.range(self.chunk.bytes.clone())?;
         while self.next < end {
             let stop = self.chunk.restart.map_or(end, |records| self.next.saturating_add(records).min(end));
             range = self.decode_run(range, stop, filter)?;
         }
-        if held < self.chunk.count { Err(ChunkError::FewerPoints(held)) } else { Ok(()) }
+        if held < self.wanted { Err(ChunkError::FewerPoints(held)) } else { Ok(()) }
     }
 
-    /// Counts the records from `self.next` to the end of the chunk as malformed.
+    /// Counts the wanted records from `self.next` on as malformed.
     fn count_lost(&self, damage: &ChunkError, filter: &mut PointFilter) {
-        let LazChunk { number, first, count, .. } = self.chunk;
-        let (at, left) = (self.next, first + count - self.next);
+        let LazChunk { number, first, .. } = self.chunk;
+        let (at, left) = (self.next, first + self.wanted - self.next);
         filter.malformed(left, || {
             format!(
                 "chunk {number} is damaged at point {at}: {damage}; {left} points are lost, so copy the file again or allow the \

@@ -44,17 +44,19 @@ impl UncompressedPoints {
         (self.whole.div_ceil(CHUNK) as usize).max((self.missing > 0) as usize)
     }
 
-    /// Sends the records of `chunk` through `filter`.
+    /// Sends the first `records` records of `chunk` through `filter`.
     pub(crate) fn decode(
         &self,
         file: &RandomAccessFile,
         chunk: usize,
+        records: u64,
         rules: &PointRules,
         filter: &mut PointFilter,
     ) -> Result<()> {
         let length = self.layout.length;
-        let mut block = vec![0; (BLOCK / length).max(1) * length];
-        let Range { start: mut number, end } = self.records_of(chunk);
+        let Range { start: mut number, end: end_of_chunk } = self.records_of(chunk);
+        let end = end_of_chunk.min(number.saturating_add(records));
+        let mut block = vec![0; (BLOCK / length).clamp(1, (end - number).max(1) as usize) * length];
         while number < end {
             let count = ((block.len() / length) as u64).min(end - number);
             let bytes = &mut block[..count as usize * length];
@@ -62,7 +64,7 @@ impl UncompressedPoints {
             push_records(&self.layout, bytes, number, rules, filter)?;
             number += count;
         }
-        if chunk + 1 == self.chunk_count() && self.missing > 0 {
+        if end == end_of_chunk && chunk + 1 == self.chunk_count() && self.missing > 0 {
             let (whole, missing) = (self.whole, self.missing);
             filter.malformed(missing, || {
                 format!(

@@ -303,15 +303,23 @@ impl TextTable {
         self.chunks.len()
     }
 
-    /// Sends the rows of `chunk` through `filter`.
-    pub(crate) fn decode(&self, file: &RandomAccessFile, chunk: usize, filter: &mut PointFilter) -> Result<()> {
+    /// Sends about the first `records` rows of `chunk` through `filter`.
+    pub(crate) fn decode(
+        &self,
+        file: &RandomAccessFile,
+        chunk: usize,
+        records: u64,
+        filter: &mut PointFilter,
+    ) -> Result<()> {
         let ChunkStart { mut row, line: first_line } = self.chunks[chunk];
         let WantedRows { bounds, ref decimals, .. } = *self.held();
         let within = bounds.filter(|_| self.without_outliers.is_some());
         let mut reader = RowReader::new(&self.columns);
         let is_outside = |reader: &RowReader| self.bounds.is_some_and(|bounds| !is_within(bounds, &reader.numbers));
         let mut explained = self.first_outlier_in != Some(chunk);
-        let range = chunk_range(&self.rows, chunk as u64);
+        let whole = chunk_range(&self.rows, chunk as u64);
+        let range = self.start_of(chunk, records);
+        let is_whole = range == whole;
         for_each_line(file, self.rows.start, range, |index, line| {
             let number = || first_line + index;
             match line {
@@ -335,10 +343,20 @@ impl TextTable {
             row += 1;
             Ok(())
         })?;
-        if let Some((line, what)) = self.cut.as_ref().filter(|_| chunk + 1 == self.chunks.len()) {
+        if let Some((line, what)) = self.cut.as_ref().filter(|_| is_whole && chunk + 1 == self.chunks.len()) {
             filter.malformed(1, || format!("line {line}: {what}"));
         }
         Ok(())
+    }
+
+    /// Returns the bytes of a chunk in which about its first `records` rows begin: all of them, or as many as these take if all rows
+    /// are as long.
+    fn start_of(&self, chunk: usize, records: u64) -> Range<u64> {
+        let Range { start, end } = chunk_range(&self.rows, chunk as u64);
+        let next = self.chunks.get(chunk + 1).map_or(self.records, |next| next.row);
+        let rows = next - self.chunks[chunk].row;
+        let bytes = (end - start) as u128 * records.min(rows) as u128 / rows.max(1) as u128;
+        if records < rows { start..start + bytes as u64 } else { start..end }
     }
 }
 

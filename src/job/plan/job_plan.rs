@@ -9,6 +9,7 @@ use crate::job::durable::atomic_file::{PendingFile, write_pending};
 use crate::job::options::JobOptions;
 use crate::job::plan::input_identity::RenamedInputs;
 use crate::job::plan::lattice_choice::LatticeCoarsening;
+use crate::output::color::HeightRange;
 use crate::output::frame::Frame;
 use crate::{Error, Result, Warnings};
 use serde::{Deserialize, Serialize};
@@ -35,6 +36,9 @@ pub struct Plan {
     pub extent: Bounds<2>,
     /// What a job of several parts must know before all points are read; `None` for a job of one part.
     pub claims: Option<Claims>,
+    /// The heights that a ramp of colours spans, by a sample of the points. `None` if they are too few to tell: then the box of the points,
+    /// or what is claimed of it, decides.
+    pub heights: Option<HeightRange>,
     /// The CRS of the job.
     pub crs: Crs,
     /// The name of the unit of x and y.

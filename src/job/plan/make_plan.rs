@@ -7,6 +7,7 @@ use crate::input::{Axis, PointRules, Source};
 use crate::job::options::JobOptions;
 use crate::job::plan::common_crs::{common_crs, horizontal_unit};
 use crate::job::plan::extent::{Extent, SourceBox, to_float};
+use crate::job::plan::height_range::HeightSample;
 use crate::job::plan::inputs::{check_missing_records, open_all, unreadable_names};
 use crate::job::plan::job_plan::{Claims, Plan, PlannedInput, SkippedInput};
 use crate::job::plan::lattice_choice::{LatticeCoarsening, LatticeWish, choose_lattice, fineness};
@@ -14,6 +15,7 @@ use crate::job::plan::text_inputs::{
     check_malformed_rows, farthest_row, leave_out_outliers, refuse_degrees, refuse_missing_classes, row_choice,
     wants_colors,
 };
+use crate::output::color::HeightRange;
 use crate::output::frame::Frame;
 use crate::{Error, Result, Warnings};
 use rayon::prelude::*;
@@ -124,6 +126,9 @@ fn try_plan(
     let claimed = extent.boxes.iter().map(|claim| claimed_box(&lattice, claim, clipped)).collect::<Vec<_>>();
     let has_parts = !coarsening.one_part && records > options.triangulation.max_points_per_part.0 / 2 * 3;
     let claims = has_parts.then(|| claims(sources, &rules, &lattice, &extent, clipped)).transpose()?;
+    let [low, high] = claimed_heights(&lattice, &extent).map(|z| z.round() as i32);
+    let sample = HeightSample::take(sources, &rules, options.input.bounds.map(|bounds| bounds.0))?;
+    let heights = sample.range_within(HeightRange { low, high });
     let plan = Plan {
         claims,
         options: options.clone(),
@@ -133,6 +138,7 @@ fn try_plan(
         coarsening,
         extent: clipped,
         lattice,
+        heights,
         crs,
         unit: unit.into(),
         frame,
@@ -161,8 +167,8 @@ fn claims(
     extent: &Extent,
     clipped: Bounds<2>,
 ) -> Result<Claims> {
-    let steps = |value: f64| (value - lattice.offset[2].to_f64().unwrap_or(0.0)) / to_float(lattice.step(2));
-    let [low, high] = [steps(extent.min[2]).floor() - 1.0, steps(extent.max[2]).ceil() + 1.0].map(|z| z as i32);
+    let [low, high] = claimed_heights(lattice, extent);
+    let [low, high] = [low.floor() - 1.0, high.ceil() + 1.0].map(|z| z as i32);
     let bounds = Bounds {
         min: [clipped.min[0].saturating_sub(1), clipped.min[1].saturating_sub(1), low],
         max: [clipped.max[0].saturating_add(1), clipped.max[1].saturating_add(1), high],
@@ -174,6 +180,12 @@ fn claims(
     };
     let max_rgb = sources.par_iter().zip(rules).map(first_colors).try_reduce(|| 0, |a, b| Ok(a.max(b)))?;
     Ok(Claims { bounds, max_rgb })
+}
+
+/// Returns the least and the greatest height that the sources claim, in steps of the lattice.
+fn claimed_heights(lattice: &Lattice, extent: &Extent) -> [f64; 2] {
+    let offset = lattice.offset[2].to_f64().unwrap_or(0.0);
+    [extent.min[2], extent.max[2]].map(|z| (z - offset) / to_float(lattice.step(2)))
 }
 
 /// Returns the box of the sources. If no lattice holds all of it at the precision of the inputs or to a millimetre, and some rows of texts lie so far

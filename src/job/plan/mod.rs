@@ -1,11 +1,12 @@
-//! Step 1: the plan says what a job is. It is made from the options and the inputs' headers alone, and it can be written down and
-//! read back, so that every later step is a function of the plan, an index and the store.
+//! Step 1: the plan says what a job is. It is made from the options, the inputs' headers and samples of their points. It can be
+//! written down and read back, so that every later step is a function of the plan, an index and the store.
 
 pub mod budget;
 pub mod common_crs;
 pub(crate) mod distinct_crs;
 pub mod extent;
 pub mod fingerprint;
+pub(crate) mod height_range;
 pub mod input_identity;
 pub mod inputs;
 pub mod job_plan;

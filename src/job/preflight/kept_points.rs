@@ -70,14 +70,11 @@ fn records(source: &Source) -> u64 {
 }
 
 fn share(plan: &Plan, input: &PlannedInput) -> Share {
-    let Source { min, max, .. } = input.source;
     let everything = if plan.options.input.classes.is_none() { Share::Everything } else { Share::Some };
     let Some(bounds) = plan.options.input.bounds else { return everything };
     let [low, high] = [[bounds.0[0], bounds.0[1]], [bounds.0[2], bounds.0[3]]];
     // A header that gives no box says nothing.
-    if input.source.records > 1 && (0..2).all(|axis| min[axis] >= max[axis]) {
-        return Share::Some;
-    }
+    let Some([min, max]) = input.source.claimed_rectangle() else { return Share::Some };
     let apart = (0..2).any(|axis| max[axis] < low[axis] || min[axis] > high[axis]);
     let inside = (0..2).all(|axis| min[axis] >= low[axis] && max[axis] <= high[axis]);
     match (apart, inside) {

@@ -16,6 +16,7 @@ use crate::job::tiles::max_edge::MaxEdgeRule;
 use crate::job::tiles::seam::seam_of;
 use crate::job::tiles::style::TileStyle;
 use crate::job::tiles::write_tile::{TileStats, write_tile};
+use crate::output::color::HeightRange;
 use crate::output::preview::canvas::Canvas;
 use crate::{Error, Result};
 use rayon::Scope;
@@ -71,8 +72,9 @@ pub(crate) struct WrittenTiles {
 impl TileLook {
     /// Returns the look of a job whose points are within `bounds`, and whose greatest colour is `max_rgb`.
     pub(crate) fn new(plan: &Plan, max_rgb: u16, bounds: Bounds<3>, max_edge: MaxEdgeRule) -> TileLook {
-        let style = TileStyle::new(plan, max_rgb, bounds, max_edge);
-        let canvas = Canvas::new(&style.frame, bounds);
+        let heights = plan.heights.unwrap_or(HeightRange::of(bounds));
+        let style = TileStyle::new(plan, max_rgb, bounds, heights, max_edge);
+        let canvas = Canvas::new(&style.frame, bounds, heights);
         TileLook { style, canvas }
     }
 }

@@ -4,7 +4,7 @@ use crate::geometry::Bounds;
 use crate::job::plan::job_plan::Plan;
 use crate::job::tiles::max_edge::MaxEdgeRule;
 use crate::output::Compression;
-use crate::output::color::Coloring;
+use crate::output::color::{Coloring, HeightRange};
 use crate::output::frame::Frame;
 use crate::output::options::ColorChoice;
 
@@ -24,15 +24,15 @@ pub struct TileStyle {
 }
 
 impl TileStyle {
-    /// Returns the style of the tiles of a job whose points are within `bounds`, and whose greatest colour is `max_rgb`.
-    pub fn new(plan: &Plan, max_rgb: u16, bounds: Bounds<3>, max_edge: MaxEdgeRule) -> TileStyle {
+    /// Returns the style of the tiles of a job whose points are within `bounds`, and whose greatest colour is `max_rgb`. A ramp of colours
+    /// spans `heights`.
+    pub fn new(plan: &Plan, max_rgb: u16, bounds: Bounds<3>, heights: HeightRange, max_edge: MaxEdgeRule) -> TileStyle {
         let output = &plan.options.output;
-        let elevation = Coloring::Elevation { low: bounds.min[2], high: bounds.max[2] };
         let coloring = match output.color {
             ColorChoice::None => None,
             ColorChoice::Class => Some(Coloring::Class),
-            ColorChoice::Elevation => Some(elevation),
-            ColorChoice::Auto | ColorChoice::Rgb if max_rgb == 0 => Some(elevation),
+            ColorChoice::Elevation => Some(Coloring::Elevation(heights)),
+            ColorChoice::Auto | ColorChoice::Rgb if max_rgb == 0 => Some(Coloring::Elevation(heights)),
             ColorChoice::Auto | ColorChoice::Rgb => Some(Coloring::Rgb { eight_bit: max_rgb <= 255 }),
         };
         let compression = output.packing();

@@ -6,7 +6,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::geometry::Bounds;
-use crate::output::color::{height_color, to_srgb};
+use crate::output::color::{HeightRange, height_color, to_srgb};
 use crate::output::frame::Frame;
 use crate::output::normals::{cross, unit_normal};
 use crate::output::tile::Tile;
@@ -24,8 +24,8 @@ pub struct Canvas {
     frame: Frame,
     /// The west and the north edge in lattice steps.
     corner: [i64; 2],
-    /// The least and greatest lattice integer of z.
-    heights: [i32; 2],
+    /// What the ramp spans that colours tiles without colours.
+    heights: HeightRange,
     /// The width in pixels.
     width: u32,
     /// The height in pixels.
@@ -55,8 +55,8 @@ pub struct PreviewPixel {
 }
 
 impl Canvas {
-    /// Returns the canvas for sites within `bounds`.
-    pub fn new(frame: &Frame, bounds: Bounds<3>) -> Canvas {
+    /// Returns the canvas for sites within `bounds`. Tiles without colours get those of a ramp over `heights`.
+    pub fn new(frame: &Frame, bounds: Bounds<3>, heights: HeightRange) -> Canvas {
         let span = [bounds.extent(0), bounds.extent(1)];
         let longer = span[0].max(span[1]).max(1);
         let shift = (1..).find(|&shift| longer << shift >= LEAST_SPAN).unwrap_or(1);
@@ -65,7 +65,7 @@ impl Canvas {
         Canvas {
             frame: frame.clone(),
             corner: [bounds.min[0] as i64, bounds.max[1] as i64],
-            heights: [bounds.min[2], bounds.max[2]],
+            heights,
             width,
             height,
             shift,
@@ -274,10 +274,9 @@ impl ShadedPoint<'_> {
     }
 
     fn color(&self) -> [u8; 3] {
-        let [low, high] = self.canvas.heights;
         let linear = self.interpolate(|v| match &self.tile.colors {
             Some(colors) => colors[v].map(f64::from),
-            None => height_color(self.tile.positions[v][2], low, high).map(f64::from),
+            None => height_color(self.tile.positions[v][2], self.canvas.heights).map(f64::from),
         });
         linear.map(|v| to_srgb((v + 0.5) as u16))
     }

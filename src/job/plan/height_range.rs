@@ -1,0 +1,157 @@
+//! The heights that a ramp of colours spans.
+//!
+//! One point of noise, or a header with a wrong greatest height, must not give all of a terrain one colour. So a sample of the points
+//! decides. It is the same for a job of one part and of several, whose tiles are coloured before the last point is read.
+
+use crate::input::{PointRules, Source};
+use crate::output::color::HeightRange;
+use crate::{Result, interrupt};
+use rayon::prelude::*;
+
+/// The most chunks of the inputs in which the sample looks.
+const MOST_CHUNKS: usize = 128;
+
+/// The records at which the sample looks, in all chunks together: half a percent of the reading of ten million.
+const RECORDS: u64 = 1 << 16;
+
+/// Fewer points tell too little, unless they are all that there are.
+const LEAST_POINTS: usize = 256;
+
+/// One point of so many may be noise, at either end.
+const NOISE: usize = 1000;
+
+/// A sample of the heights of the points that a job keeps.
+pub(crate) struct HeightSample {
+    /// Lattice integers of z, ascending.
+    heights: Vec<i32>,
+    /// The number of chunks in which it looked.
+    places: usize,
+    /// The number of records at which it looked.
+    seen: u64,
+    /// The number of all records.
+    records: u64,
+}
+
+impl HeightSample {
+    /// Looks at the first records of chunks at equal distances: clouds are stored by place or by time, so that neighbours are alike.
+    /// Sources that claim to have no point within `bounds`, the least x and y and the greatest, do not count.
+    ///
+    /// # Errors
+    /// Those of [`Source::decode`]: if a chunk counted as empty because the disk failed once, the next run would have other colours.
+    pub(crate) fn take(sources: &[Source], rules: &[PointRules], bounds: Option<[f64; 4]>) -> Result<HeightSample> {
+        let inputs: Vec<_> = sources.iter().zip(rules).filter(|(source, _)| may_reach(source, bounds)).collect();
+        let records = inputs.iter().map(|(source, _)| source.records - source.missing).sum();
+        // The number of all chunks up to and including those of each source.
+        let mut chunks = 0;
+        let up_to = |(source, _): &(&Source, _)| {
+            chunks += source.chunks();
+            chunks
+        };
+        let ends: Vec<usize> = inputs.iter().map(up_to).collect();
+        let places = chunks.min(MOST_CHUNKS);
+        let look = |place: usize| {
+            interrupt::check()?;
+            let chunk = (2 * place + 1) * chunks / (2 * places);
+            let at = ends.partition_point(|&end| end <= chunk);
+            let (source, rules) = inputs[at];
+            first_heights(source, rules, chunk + source.chunks() - ends[at], RECORDS / places as u64)
+        };
+        let found = (0..places).into_par_iter().map(look).collect::<Result<Vec<_>>>()?;
+        let seen = found.iter().map(|(_, seen)| seen).sum();
+        let mut heights: Vec<i32> = found.into_iter().flat_map(|(heights, _)| heights).collect();
+        heights.sort_unstable();
+        Ok(HeightSample { heights, places, seen, records })
+    }
+
+    /// Returns the heights that colours span, without what may be noise; `None` if the sample has too few points to tell. Where the
+    /// sample did not see all records, the range is as much wider as a slope would go on behind the last of them, but reaches no farther
+    /// than `claimed`.
+    pub(crate) fn range_within(&self, claimed: HeightRange) -> Option<HeightRange> {
+        let count = self.heights.len();
+        let saw_all = self.seen >= self.records;
+        if count == 0 || count < LEAST_POINTS && !saw_all {
+            return None;
+        }
+        let [low, high] = [count / NOISE, count - 1 - count / NOISE].map(|at| self.heights[at]);
+        if saw_all {
+            return Some(HeightRange { low, high });
+        }
+        // Between the first record that was seen and the last lie all places but one whole, and of that one as much as was seen.
+        let [seen, records, places] = [self.seen as i128, self.records as i128, self.places as i128];
+        let span = high as i128 - low as i128;
+        let beyond = span * (records - seen) / ((places - 1) * records + seen).max(1);
+        let within = |height: i128| height.clamp(i32::MIN as i128, i32::MAX as i128) as i32;
+        let wide = [within(low as i128 - beyond), within(high as i128 + beyond)];
+        Some(HeightRange { low: low.min(claimed.low.max(wide[0])), high: high.max(claimed.high.min(wide[1])) })
+    }
+}
+
+/// Tells whether a source may have points within `bounds`, as far as it claims.
+fn may_reach(source: &Source, bounds: Option<[f64; 4]>) -> bool {
+    let (Some([xmin, ymin, xmax, ymax]), Some([min, max])) = (bounds, source.claimed_rectangle()) else { return true };
+    min[0] <= xmax && min[1] <= ymax && max[0] >= xmin && max[1] >= ymin
+}
+
+/// Returns the heights of the points that the job keeps among the first `records` records of a chunk, and the number of these records.
+fn first_heights(source: &Source, rules: &PointRules, chunk: usize, records: u64) -> Result<(Vec<i32>, u64)> {
+    let rules = PointRules { rgb: false, ..rules.clone() };
+    let mut heights = Vec::new();
+    let counts = source.decode_start(chunk, records, &rules, &mut |points| {
+        heights.extend(points.iter().map(|point| point.z));
+        Ok(())
+    })?;
+    Ok((heights, counts.read))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WIDE: HeightRange = HeightRange { low: i32::MIN, high: i32::MAX };
+
+    /// A sample in `places` chunks of heights from 0 that saw every record that passed, of `records`.
+    fn sample(count: i32, places: usize, records: u64) -> HeightSample {
+        HeightSample { heights: (0..count).collect(), places, seen: count as u64, records }
+    }
+
+    fn range(low: i32, high: i32) -> Option<HeightRange> {
+        Some(HeightRange { low, high })
+    }
+
+    #[test]
+    fn one_of_a_thousand_at_either_end_may_be_noise() {
+        for (count, expected) in [
+            (1, range(0, 0)),
+            (999, range(0, 998)),
+            (1000, range(1, 998)),
+            (1999, range(1, 1997)),
+            (65_536, range(65, 65_470)),
+        ] {
+            assert_eq!(sample(count, 1, count as u64).range_within(WIDE), expected, "{count}");
+        }
+    }
+
+    #[test]
+    fn too_few_points_tell_nothing_unless_they_are_all() {
+        assert_eq!(sample(255, 4, 255).range_within(WIDE), range(0, 254));
+        assert_eq!(sample(255, 4, 256).range_within(WIDE), None);
+        assert!(sample(256, 4, 257).range_within(WIDE).is_some());
+        assert_eq!(sample(0, 0, 0).range_within(WIDE), None);
+    }
+
+    #[test]
+    fn the_range_goes_on_behind_the_sample_as_far_as_headers_claim() {
+        // Half of each of two places: a slope of 999 steps over three quarters ends a third higher.
+        assert_eq!(sample(999, 2, 1998).range_within(WIDE), range(-332, 1330));
+        for (claimed, expected) in
+            [((0, 998), (0, 998)), ((-9999, 1100), (-332, 1100)), ((500, 501), (0, 998)), ((2000, -2000), (0, 998))]
+        {
+            let claimed = HeightRange { low: claimed.0, high: claimed.1 };
+            assert_eq!(sample(999, 2, 1998).range_within(claimed), range(expected.0, expected.1), "{claimed:?}");
+        }
+        let mut heights = [i32::MIN, i32::MAX].repeat(400);
+        heights.sort_unstable();
+        let steep = HeightSample { heights, places: 1, seen: 800, records: 1 << 40 };
+        assert_eq!(steep.range_within(WIDE), range(i32::MIN, i32::MAX));
+    }
+}
