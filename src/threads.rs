@@ -1,8 +1,32 @@
 //! Running work on a pool of threads, and while another thread waits.
 
 use crate::{Error, Result, address_space, fault, interrupt};
+use std::cell::Cell;
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::time::Duration;
+
+thread_local! {
+    /// The seconds of processor time that this thread has spent on other work while its own waited.
+    static ELSEWHERE: Cell<f64> = const { Cell::new(0.0) };
+}
+
+/// Does another piece of work of the pool on this thread, while the thread's own piece waits for something. Returns whether there was any.
+pub(crate) fn do_other_work() -> bool {
+    let before = own_cpu_seconds();
+    let worked = matches!(rayon::yield_now(), Some(rayon::Yield::Executed));
+    ELSEWHERE.set(cpu_seconds() - before);
+    worked
+}
+
+/// Returns the seconds of processor time that this thread has spent so far, without what it did while its own work waited; NaN where
+/// the system does not tell.
+pub(crate) fn own_cpu_seconds() -> f64 {
+    cpu_seconds() - ELSEWHERE.get()
+}
+
+fn cpu_seconds() -> f64 {
+    cpu_time::ThreadTime::try_now().map_or(f64::NAN, |time| time.as_duration().as_secs_f64())
+}
 
 /// The address space that a thread takes: its stack, and what starting it takes besides.
 const BYTES_PER_THREAD: u64 = (2 << 20) + (64 << 10);

@@ -18,6 +18,10 @@ pub(super) struct GpuState {
     pub(super) max_pixels: AtomicU64,
     /// The number of workers that wait for a diagram.
     pub(super) waiting: AtomicUsize,
+    /// The number of requests without an answer, whether or not a worker still waits for it.
+    pub(super) unanswered: AtomicUsize,
+    /// How many workers in a row have stopped waiting.
+    pub(super) abandoned: AtomicUsize,
     /// Whether the GPU can no longer be used.
     pub(super) is_gone: AtomicBool,
     /// Nanoseconds per step on the GPU.
@@ -30,6 +34,8 @@ impl GpuState {
         GpuState {
             max_pixels: AtomicU64::new(max_pixels),
             waiting: AtomicUsize::new(0),
+            unanswered: AtomicUsize::new(0),
+            abandoned: AtomicUsize::new(0),
             is_gone: AtomicBool::new(false),
             times: Default::default(),
         }
@@ -40,13 +46,6 @@ impl GpuState {
 pub(super) struct DiagramRequest {
     pub(super) sites: TextureSites,
     pub(super) reply: SyncSender<DiagramReply>,
-}
-
-impl DiagramRequest {
-    fn answer(&self, reply: DiagramReply) {
-        // If sending fails, the worker no longer waits and needs no answer.
-        let _ = self.reply.send(reply);
-    }
 }
 
 /// The state of the GPU's thread.
@@ -90,14 +89,15 @@ impl<E: DiagramEngine> GpuThread<E> {
     fn launch(&mut self, request: DiagramRequest) {
         let is_gone = self.state.is_gone.load(Ordering::Acquire);
         let Some(slot) = self.free_slots.pop().filter(|_| !is_gone) else {
-            return request.answer(DiagramReply::Unavailable);
+            return self.answer(&request, DiagramReply::Unavailable);
         };
         match self.engine.start(slot, &request.sites) {
             Ok(pending) => self.in_flight.push_back(LeafInFlight { request, slot, pending }),
             Err(GpuError::OutOfMemory) => {
                 self.engine.free(slot);
                 self.free_slots.push(slot);
-                request.answer(self.shrink(request.sites.size.pixels()));
+                let reply = self.shrink(request.sites.size.pixels());
+                self.answer(&request, reply);
             }
             Err(error) => {
                 self.free_slots.push(slot);
@@ -115,10 +115,17 @@ impl<E: DiagramEngine> GpuThread<E> {
                 for (sum, time) in self.state.times.iter().zip(times) {
                     sum.fetch_add(time, Ordering::Relaxed);
                 }
-                request.answer(DiagramReply::Labels(labels));
+                self.answer(&request, DiagramReply::Labels(labels));
             }
             Err(error) => self.recover(request, &error),
         }
+    }
+
+    fn answer(&self, request: &DiagramRequest, reply: DiagramReply) {
+        self.state.abandoned.store(0, Ordering::Release);
+        self.state.unanswered.fetch_sub(1, Ordering::AcqRel);
+        // If sending fails, the worker no longer waits and needs no answer.
+        let _ = request.reply.send(reply);
     }
 
     /// Lowers the limit after a texture of `pixels` pixels did not fit.

@@ -4,6 +4,7 @@
 //! [`steps`] records which dispatches a step consists of, [`engine`] runs recordings on a device, and [`executor`] makes the
 //! discrete Voronoi diagrams of leaves on a thread of its own. Room `voronoi` turns a diagram into a mesh and proves that mesh.
 
+pub mod benefit;
 pub mod buffer_id;
 pub mod buffers;
 pub mod device;
@@ -11,6 +12,8 @@ mod diagram_engine;
 pub mod engine;
 pub mod error;
 pub mod executor;
+#[cfg(feature = "fault-injection")]
+mod fake_engine;
 mod gpu_thread;
 pub mod options;
 mod prefix_sums;

@@ -2,11 +2,11 @@
 //! conquered.
 
 use crate::geometry::Site;
-use crate::gpu::device::hardware_is_likely;
+use crate::gpu::benefit::GpuFigures;
 use crate::gpu::executor::{Executor, GpuUse};
 use crate::gpu::options::GpuOptions;
 use crate::mesh::half_edge::HalfEdgeMesh;
-use crate::threads::unless_interrupted;
+use crate::threads::{own_cpu_seconds, unless_interrupted};
 use crate::triangulation::options::{Backend, TriangulationOptions};
 use crate::triangulation::{divide_and_conquer, reference};
 use crate::voronoi::counts::PipelineCounts;
@@ -47,8 +47,16 @@ impl AddAssign for TriangulationCounts {
 }
 
 thread_local! {
-    /// The pipeline's buffers. They are kept from leaf to leaf, so that each thread faults in their pages only once.
-    static BUFFERS: RefCell<PipelineBuffers> = RefCell::default();
+    /// The pipeline's buffers that are not in use. They are kept from leaf to leaf, so that each thread faults in their pages only once.
+    /// While one leaf waits for a GPU, the thread may do another, which then has buffers of its own.
+    static BUFFERS: RefCell<Vec<PipelineBuffers>> = RefCell::default();
+}
+
+fn with_buffers<T>(work: impl FnOnce(&mut PipelineBuffers) -> T) -> T {
+    let mut buffers = BUFFERS.with_borrow_mut(Vec::pop).unwrap_or_default();
+    let outcome = work(&mut buffers);
+    BUFFERS.with_borrow_mut(|unused| unused.push(buffers));
+    outcome
 }
 
 /// Triangulates leaves: with the pipeline on the worker's own thread, which a GPU may help, or with the reference.
@@ -77,7 +85,7 @@ impl Triangulator {
         let pipeline = config.backend != Backend::Reference;
         let gpu_use = match config.backend {
             Backend::Gpu => GpuUse::Required,
-            Backend::Auto if memory >= MIN_MEMORY && hardware_is_likely() => GpuUse::Optional,
+            Backend::Auto if memory >= MIN_MEMORY && Executor::is_likely() => GpuUse::Optional,
             _ => return Ok(Triangulator { pipeline, gpu: None }),
         };
         match Executor::start(gpu, gpu_use, memory / 4 / threads as u64 / BYTES_PER_PIXEL) {
@@ -92,6 +100,11 @@ impl Triangulator {
     /// Returns the name of the GPU that helps.
     pub fn gpu(&self) -> Option<&str> {
         self.gpu.as_ref().map(|gpu| gpu.adapter.as_str())
+    }
+
+    /// Returns what the GPU did so far; `None` without one.
+    pub fn gpu_figures(&self) -> Option<GpuFigures> {
+        self.gpu.as_ref().map(|gpu| gpu.benefit.figures())
     }
 
     /// Returns the seconds that every step has taken on the GPU itself; nothing if the GPU has no timestamps.
@@ -111,14 +124,28 @@ impl Triangulator {
             let sites = sites.to_vec();
             return Ok((unless_interrupted(move || reference::triangulate(&sites))?, outcome));
         }
-        let gpu = self.gpu.as_ref().map(|gpu| gpu as &dyn DiagramBackend);
-        match BUFFERS.with_borrow_mut(|buffers| voronoi::triangulate_with(sites, gpu, buffers)) {
+        match self.by_pipeline(sites) {
             Ok((mesh, counts)) => return Ok((mesh, TriangulationCounts { pipeline: 1, counts, ..outcome })),
             Err(Rejection::Crowded) => outcome.crowded = 1,
             Err(Rejection::NotAccepted(_)) => outcome.not_accepted = 1,
             Err(Rejection::TooFew | Rejection::TooMany | Rejection::OutOfReach) => outcome.small = 1,
         }
         Ok((divide_and_conquer::triangulate(sites)?, outcome))
+    }
+
+    fn by_pipeline(&self, sites: &[Site]) -> std::result::Result<(HalfEdgeMesh, PipelineCounts), Rejection> {
+        let Some(gpu) = &self.gpu else { return with_buffers(|buffers| voronoi::triangulate(sites, buffers)) };
+        let asked = gpu.is_worth_asking();
+        let begun = own_cpu_seconds();
+        let helper = asked.then_some(gpu as &dyn DiagramBackend);
+        let done = with_buffers(|buffers| voronoi::triangulate_with(sites, helper, buffers))?;
+        let is_helped = done.1.on_gpu > 0;
+        // A leaf that has asked in vain has cost more than one alone.
+        match asked && !is_helped {
+            true => gpu.benefit.note_in_vain(),
+            false => gpu.benefit.note(is_helped, sites.len(), own_cpu_seconds() - begun),
+        }
+        Ok(done)
     }
 }
 
@@ -127,7 +154,7 @@ impl Triangulator {
 /// # Errors
 /// As [`Triangulator::triangulate`].
 pub fn canonical(sites: &[Site]) -> Result<HalfEdgeMesh> {
-    match BUFFERS.with_borrow_mut(|buffers| voronoi::triangulate(sites, buffers)) {
+    match with_buffers(|buffers| voronoi::triangulate(sites, buffers)) {
         Ok((mesh, _)) => Ok(mesh),
         Err(_) => divide_and_conquer::triangulate(sites),
     }
@@ -135,5 +162,5 @@ pub fn canonical(sites: &[Site]) -> Result<HalfEdgeMesh> {
 
 /// Takes back a mesh that is no longer needed, so that this thread's next leaf uses its memory.
 pub fn recycle(mesh: HalfEdgeMesh) {
-    BUFFERS.with_borrow_mut(|buffers| buffers.recycle(mesh));
+    with_buffers(|buffers| buffers.recycle(mesh));
 }

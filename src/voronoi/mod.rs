@@ -45,7 +45,7 @@ use crate::voronoi::accept::AcceptanceCheck;
 use crate::voronoi::c2_shift::ShiftRepair;
 use crate::voronoi::c4_flip::FlipQueue;
 use crate::voronoi::closed_mesh::ClosedMesh;
-use crate::voronoi::counts::{PipelineCounts, StepTimer, WAIT};
+use crate::voronoi::counts::{PipelineCounts, StepTimer};
 use crate::voronoi::diagram_backend::{DiagramBackend, DiagramReply};
 use crate::voronoi::g1_write_sites::SiteTexture;
 use crate::voronoi::g2_voronoi::LabelRows;
@@ -53,7 +53,6 @@ use crate::voronoi::g3_islands::IslandSearch;
 use crate::voronoi::g6_triangles::TextureScan;
 use crate::voronoi::rejection::Rejection;
 use crate::voronoi::texture_request::TextureRequest;
-use std::time::Instant;
 
 /// Buffers that [`triangulate`] reuses from leaf to leaf. Each thread has its own.
 #[derive(Default)]
@@ -109,7 +108,6 @@ pub fn triangulate_with(
 
     discretise(sites, backend, request, texture, labels, &mut counts)?;
     timer.finish(&mut counts, 0);
-    counts.nanoseconds[0] = counts.nanoseconds[0].saturating_sub(counts.nanoseconds[WAIT]);
     scan.run(texture, labels, closed, shift, flips)?;
     counts.inverted = shift.inverted.len() as u64;
     timer.finish(&mut counts, 1);
@@ -148,10 +146,7 @@ fn discretise(
         let before = *counts;
         loop {
             texture.write(sites, &backend.texture_request(), counts)?;
-            let asked = Instant::now();
-            let reply = backend.diagram(texture.width as u32, texture.height as u32, texture.placed_pixels());
-            counts.nanoseconds[WAIT] += asked.elapsed().as_nanos() as u64;
-            match reply {
+            match backend.diagram(texture.width as u32, texture.height as u32, texture.placed_pixels()) {
                 DiagramReply::Labels(given) => {
                     if labels.take(texture, given) {
                         counts.on_gpu = 1;

@@ -37,6 +37,7 @@ mod preflight;
 mod real;
 mod same_mesh;
 mod shortage;
+mod slow_gpus;
 mod steps;
 mod tampering;
 mod tasks;

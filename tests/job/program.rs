@@ -100,14 +100,14 @@ fn finish(command: &mut Command) -> Said {
 pub(crate) struct Job {
     folder: TempDir,
     sections: BTreeMap<&'static str, String>,
-    processors: Option<usize>,
+    environment: Vec<(&'static str, String)>,
 }
 
 impl Job {
     /// Returns the smallest configuration for these files.
     pub(crate) fn on<P: AsRef<Path>>(files: &[P]) -> Job {
         let names: Vec<&str> = files.iter().map(|file| file.as_ref().to_str().unwrap()).collect();
-        let job = Job { folder: tempfile::tempdir().unwrap(), sections: BTreeMap::new(), processors: None };
+        let job = Job { folder: tempfile::tempdir().unwrap(), sections: BTreeMap::new(), environment: Vec::new() };
         job.with("input", &format!("files = {names:?}")).with("output", "directory = \"out\"")
     }
 
@@ -127,7 +127,13 @@ impl Job {
 
     /// Lets a program with the feature `fault-injection` believe that it has so many processors.
     pub(crate) fn processors(self, processors: usize) -> Job {
-        Job { processors: Some(processors), ..self }
+        self.variable("GDT_PROCESSORS", &processors.to_string())
+    }
+
+    /// Sets a variable of the program's environment.
+    pub(crate) fn variable(mut self, name: &'static str, value: &str) -> Job {
+        self.environment.push((name, value.to_owned()));
+        self
     }
 
     pub(crate) fn folder(&self) -> &Path {
@@ -151,7 +157,7 @@ impl Job {
     #[track_caller]
     pub(crate) fn run_with(&self, arguments: &[&str]) -> Said {
         let mut command = Command::new(env!("CARGO_BIN_EXE_gdt-batch"));
-        command.envs(self.processors.map(|count| ("GDT_PROCESSORS", count.to_string())));
+        command.envs(self.environment.iter().map(|(name, value)| (name, value)));
         finish(command.args(arguments).arg(self.config()).current_dir(self.folder()))
     }
 

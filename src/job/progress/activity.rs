@@ -1,7 +1,8 @@
 //! Kinds of work that go on at the same time within a stage.
 
-use crate::job::progress::clock::{JobClock, thread_cpu_seconds};
+use crate::job::progress::clock::JobClock;
 use crate::job::progress::stats::StageStats;
+use crate::threads::own_cpu_seconds;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
@@ -31,9 +32,9 @@ impl Activity {
 
     /// Runs a piece of the work on this thread. It is worth `units` units.
     pub fn time<T>(&self, units: u64, piece: impl FnOnce() -> T) -> T {
-        let (begun, cpu_start) = (Instant::now(), thread_cpu_seconds());
+        let (begun, cpu_start) = (Instant::now(), own_cpu_seconds());
         let outcome = piece();
-        let (ended, cpu_s) = (Instant::now(), thread_cpu_seconds() - cpu_start);
+        let (ended, cpu_s) = (Instant::now(), own_cpu_seconds() - cpu_start);
         let mut work = self.work();
         work.span = Some(work.span.map_or([begun, ended], |[first, last]| [first.min(begun), last.max(ended)]));
         work.cpu_s += cpu_s;

@@ -36,11 +36,6 @@ impl JobClock {
     }
 }
 
-/// Returns the processor time of this thread so far in seconds.
-pub(crate) fn thread_cpu_seconds() -> f64 {
-    cpu_time::ThreadTime::try_now().map_or(f64::NAN, |t| t.as_duration().as_secs_f64())
-}
-
 /// Returns the processor time of this process so far in seconds.
 fn cpu_seconds() -> f64 {
     cpu_time::ProcessTime::try_now().map_or(f64::NAN, |t| t.as_duration().as_secs_f64())

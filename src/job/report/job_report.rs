@@ -3,6 +3,7 @@
 use crate::Warnings;
 use crate::geometry::VertexDigest;
 use crate::geometry::lattice::Lattice;
+use crate::gpu::benefit::GpuFigures;
 use crate::input::options::InputOptions;
 use crate::input::{PointCounts, TextReading};
 use crate::job::levels::make_level::LevelStats;
@@ -49,6 +50,9 @@ pub struct Report {
     pub leaves: LeafStats,
     /// The GPU that helped; `None` without one.
     pub gpu: Option<String>,
+    /// What it did.
+    #[serde(default)]
+    pub gpu_figures: Option<GpuFigures>,
     /// What each step of the pipeline took for all leaves together.
     pub steps: PipelineTimes,
     /// The number of parts.
@@ -145,6 +149,8 @@ pub struct ReportParts {
     pub leaves: LeafStats,
     /// The GPU that helped.
     pub gpu: Option<String>,
+    /// What it did.
+    pub gpu_figures: Option<GpuFigures>,
     /// Seconds by step on that GPU.
     pub gpu_steps: Vec<(&'static str, f64)>,
     /// The sum over all tiles.
@@ -208,6 +214,7 @@ impl Report {
             points: parts.points,
             leaves: parts.leaves,
             gpu: parts.gpu,
+            gpu_figures: parts.gpu_figures,
             steps: PipelineTimes::new(&parts.leaves, &parts.gpu_steps),
             parts: parts.parts,
             slowest_part: parts.slowest_part,

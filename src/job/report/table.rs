@@ -1,5 +1,6 @@
 //! The report as a table for people.
 
+use crate::gpu::benefit::GpuFigures;
 use crate::job::progress::number_text::{grouped, precise_mebibytes};
 use crate::job::report::job_report::{Report, SlowestPart, StepSeconds};
 use crate::job::report::skipped_inputs::write_skipped;
@@ -68,6 +69,13 @@ impl fmt::Display for Report {
         row("  edges flipped", grouped(counts.flips))?;
         if let Some(gpu) = &self.gpu {
             row("  with the help of a GPU", format!("{} ({gpu})", grouped(self.leaves.outcome.counts.on_gpu)))?;
+        }
+        if let Some(GpuFigures { ns_per_site_helped, ns_per_site_alone, given_up, .. }) = &self.gpu_figures {
+            let per_site = format!("{ns_per_site_helped:.0} with it, {ns_per_site_alone:.0} without");
+            row("  processor ns a site", per_site)?;
+            if let Some(why) = given_up {
+                row("  the GPU was given up", why.clone())?;
+            }
         }
         if let Some(SlowestPart { part, seconds, points }) = self.slowest_part {
             let slowest = format!("the slowest, {part}, took {seconds:.1} s for {} points", grouped(points));

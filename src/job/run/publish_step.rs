@@ -154,6 +154,7 @@ pub(crate) fn write_report(run: &RunContext, plan: &Plan, mesh: MeshFigures, pub
         points,
         leaves,
         gpu: run.triangulator.gpu().map(str::to_owned),
+        gpu_figures: run.triangulator.gpu_figures(),
         gpu_steps: run.triangulator.gpu_steps(),
         tiles,
         levels: published.levels,
