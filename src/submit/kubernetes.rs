@@ -185,7 +185,7 @@ fn pod(request: &Request, options: &KubernetesOptions, tasks: &PhaseTasks) -> Va
         "containers": [{
             "name": "work",
             "image": options.image,
-            "command": pod_command(&options.config_in_pods(request), request.tasks, tasks),
+            "command": pod_command(&options.config_in_pods(request), request, tasks),
             "resources": {"requests": resources, "limits": resources},
             "volumeMounts": mounts,
         }],
@@ -194,16 +194,18 @@ fn pod(request: &Request, options: &KubernetesOptions, tasks: &PhaseTasks) -> Va
 }
 
 /// Returns the command of a pod. If only some tasks are missing, a shell looks up which of them has the index of the pod.
-fn pod_command(config: &str, total: u32, PhaseTasks { phase, count, missing }: &PhaseTasks) -> Vec<String> {
+fn pod_command(config: &str, request: &Request, PhaseTasks { phase, count, missing }: &PhaseTasks) -> Vec<String> {
     let words = |words: &[&str]| words.iter().map(|word| word.to_string()).collect();
-    let (phase, total) = (phase.name(), total.to_string());
+    let (phase, total, more) = (phase.name(), request.tasks.to_string(), request.submission_words());
     if missing.len() as u64 == u64::from(*count) {
-        return words(&["gdt-batch", "work", config, "--phase", phase, "--tasks", &total]);
+        let all: Vec<String> = words(&["gdt-batch", "work", config, "--phase", phase, "--tasks", &total]);
+        return [all, more].concat();
     }
     let numbers: Vec<String> = missing.iter().map(u32::to_string).collect();
     let script = format!(
-        "set -- {} && shift \"$JOB_COMPLETION_INDEX\" && exec gdt-batch work \"$0\" --phase {phase} --task \"$1/{total}\"",
-        numbers.join(" ")
+        "set -- {} && shift \"$JOB_COMPLETION_INDEX\" && exec gdt-batch work \"$0\" --phase {phase} --task \"$1/{total}\"{}",
+        numbers.join(" "),
+        more.iter().map(|word| format!(" {word}")).collect::<String>()
     );
     words(&["/bin/sh", "-c", &script, config])
 }

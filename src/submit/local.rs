@@ -123,6 +123,7 @@ impl<'a> LocalEngine<'a> {
             true => words.extend(["--task".into(), format!("{task}/{}", phase.count).into()]),
             false => words.extend(["--tasks".into(), self.request.tasks.to_string().into()]),
         }
+        words.extend(self.request.submission_words().into_iter().map(OsString::from));
         words.extend(["--threads".into(), self.threads(phase).to_string().into()]);
         words
     }

@@ -8,6 +8,7 @@ use crate::input::{PointCounts, TextReading};
 use crate::job::levels::make_level::LevelStats;
 use crate::job::machine;
 use crate::job::mesh::leaf::LeafStats;
+use crate::job::plan::fingerprint::JobIdentity;
 use crate::job::plan::job_plan::{Plan, SkippedInput};
 use crate::job::plan::text_inputs::text_reading;
 use crate::job::progress::clock::JobClock;
@@ -90,6 +91,15 @@ pub struct Report {
     pub texts: TextReading,
     /// Tells the content of all inputs from that of others, whatever their names and their order: a hash of sizes and samples.
     pub inputs_fingerprint: String,
+    /// Tells the options, as far as results depend on them, and the version of the program from others.
+    #[serde(default)]
+    pub options_fingerprint: Option<Checksum>,
+    /// Tells the job from others: by its options, and by the sizes, times and samples of its inputs in their order.
+    #[serde(default)]
+    pub job_fingerprint: Option<Checksum>,
+    /// The number of the submission that started the job over (`gdt-batch submit --restart`); 0 if none did.
+    #[serde(default)]
+    pub submission: u64,
     /// The digest of all vertices with their heights, on the lattice.
     pub vertex_digest: VertexDigest,
     /// The checksum of `XXH128SUMS`, which has those of all other results.
@@ -173,8 +183,8 @@ pub struct ReportParts {
     pub resumed: u64,
     /// The start of the job.
     pub clock: JobClock,
-    /// What tells the content of the inputs from that of others.
-    pub inputs_fingerprint: String,
+    /// What tells the job from others.
+    pub identity: JobIdentity,
     /// The checksum of the list of the other results.
     pub file_list: Checksum,
 }
@@ -226,7 +236,10 @@ impl Report {
             warnings,
             input: InputOptions { files: Vec::new(), ..plan.options.input.clone() },
             texts: text_reading(plan),
-            inputs_fingerprint: parts.inputs_fingerprint,
+            inputs_fingerprint: parts.identity.inputs,
+            options_fingerprint: Some(parts.identity.options),
+            job_fingerprint: Some(parts.identity.job),
+            submission: parts.identity.submission,
             vertex_digest: parts.leaves.vertices,
             file_list: parts.file_list,
             checksum: Checksum::default(),

@@ -165,7 +165,7 @@ pub(crate) fn write_report(run: &RunContext, plan: &Plan, mesh: MeshFigures, pub
         memory: plan.options.limits.memory.0,
         resumed: run.resumed,
         clock: run.clock,
-        inputs_fingerprint: run.inputs_fingerprint.clone(),
+        identity: run.identity.clone(),
         file_list: list.checksum,
     };
     let (report, text) = Report::new(plan, parts).sealed()?;

@@ -31,6 +31,8 @@ pub(crate) struct EarlierRun {
     pub(super) entries: Vec<JournalEntry>,
     /// What the journals of its parts name.
     pub(super) of_parts: StepsOfParts,
+    /// The submission that started the job over; 0 if none did.
+    pub(crate) submission: u64,
     /// Whether all its results are in place.
     is_complete: bool,
 }
@@ -43,11 +45,12 @@ impl EarlierRun {
     pub(crate) fn read(directory: &JobDirectory) -> Result<Option<EarlierRun>> {
         let run = journal::read::<JobHeader, JobStep, _>(directory)?;
         let Some((header, entries)) = run else { return Ok(None) };
+        let submission = header.as_ref().map_or(0, |header| header.submission);
         let of_parts = match &header {
             Some(JobHeader { id: id @ 1.., .. }) => StepsOfParts::of(directory, *id)?,
             _ => StepsOfParts::default(),
         };
-        Ok(Some(EarlierRun { header, entries, of_parts, is_complete: false }))
+        Ok(Some(EarlierRun { submission, header, entries, of_parts, is_complete: false }))
     }
 
     fn has_report(&self) -> bool {

@@ -37,7 +37,7 @@ pub(crate) fn start_parts<'a>(
                 true => header.fingerprint.clone(),
                 false => header.fingerprint.with_names_of(&old.fingerprint),
             };
-            (entries, JobHeader { fingerprint, coarsening: header.coarsening, id: old.id }, of_parts)
+            (entries, JobHeader { fingerprint, id: old.id, ..*header }, of_parts)
         }
         None => {
             remove_file(&directory.journal())?;

@@ -3,6 +3,7 @@
 use crate::Result;
 use crate::job::durable::directory::JobDirectory;
 use crate::job::durable::journal::JournalPosition;
+use crate::job::plan::fingerprint::JobIdentity;
 use crate::job::progress::clock::JobClock;
 use crate::job::progress::stage::{JobProgress, Stage};
 use crate::job::progress::stats::StageStats;
@@ -20,8 +21,8 @@ pub(crate) struct RunContext<'a> {
     pub(crate) progress: &'a JobProgress,
     pub(crate) threads: usize,
     pub(crate) clock: JobClock,
-    /// What tells the content of the inputs from that of others.
-    pub(crate) inputs_fingerprint: String,
+    /// What tells the job from others.
+    pub(crate) identity: JobIdentity,
     /// Tells the folders of this job's parts from those of others.
     pub(crate) job_id: u64,
     /// The number of steps that an interrupted run had finished.

@@ -3,6 +3,7 @@
 use crate::Result;
 use crate::job::durable::directory::JobDirectory;
 use crate::job::durable::lock::Lock;
+use crate::job::plan::fingerprint::JobIdentity;
 use crate::job::progress::clock::JobClock;
 use crate::job::progress::stats::StageStats;
 use crate::job::records::{JobStep, Journal, JournalEntry, RecordRef, StepOutput, Store};
@@ -53,7 +54,7 @@ impl<'a> PartSession<'a> {
             progress: job.progress,
             threads: job.threads,
             clock: job.clock,
-            inputs_fingerprint: String::new(),
+            identity: JobIdentity::default(),
             job_id: job.job_id,
             resumed: job.resumed,
             checks: job.checks,
