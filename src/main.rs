@@ -164,7 +164,8 @@ fn submit(engine: Engine, request: &Request, added: &[String], print: PrintOptio
         Engine::Kubernetes => print_result(&kubernetes::send(request, added)?, print)?,
         Engine::Local => {
             interrupt::listen()?;
-            LocalEngine::new(request, added, print.quiet, print.json)?.run()?;
+            let engine = LocalEngine::new(request, added, print.quiet, print.json)?;
+            engine.run(|| job::missing_tasks_of_planned(&config::load(&request.config)?, request.tasks))?;
         }
     }
     Ok(ExitCode::SUCCESS)

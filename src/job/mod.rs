@@ -76,6 +76,14 @@ pub fn missing_tasks(options: &JobOptions, tasks: u32) -> Result<Vec<PhaseTasks>
     tasks::missing::missing_tasks(options, tasks)
 }
 
+/// As [`missing_tasks`], of a job that has just been planned: its phase `plan` is not missing.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Broken`] on the job directory.
+pub fn missing_tasks_of_planned(options: &JobOptions, tasks: u32) -> Result<Vec<PhaseTasks>> {
+    tasks::missing::missing_tasks_of_planned(options, tasks)
+}
+
 /// Returns a number for a submission that starts the job over. It is greater than those of earlier submissions, as far as clocks agree.
 pub fn new_submission() -> u64 {
     let time = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
@@ -133,6 +141,7 @@ fn walk(run: &RunContext, plan: Plan, earlier: Option<Partition>) -> Result<Repo
                 files: Vec::new(),
                 parts: 1,
                 slowest_part: None,
+                peak_memory: None,
                 cpu_s_of_tasks: 0.0,
             };
             write_report(run, &plan, figures, published)

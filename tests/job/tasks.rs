@@ -78,6 +78,9 @@ fn any_number_of_tasks_leaves_the_bytes_of_one_process() {
             {
                 assert_eq!(written[figure], report[figure], "{figure}");
             }
+            // It counts what other tasks took.
+            let slowest = written["slowest_part"]["seconds"].as_f64();
+            assert!(written["wall_s"].as_f64() >= slowest && slowest > Some(0.0), "{written}");
             let stages = |report: &Value| -> Vec<Value> {
                 let stages = report["stages"].as_array().unwrap().iter();
                 stages.map(|stage| json!([stage["stage"], stage["done"]])).collect()
@@ -86,6 +89,51 @@ fn any_number_of_tasks_leaves_the_bytes_of_one_process() {
         }
         one.verified();
     }
+}
+
+/// A user need not know how many parts there will be.
+#[test]
+fn local_starts_no_more_tasks_than_have_something_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = in_files(folder.path(), &hills(8_000, 15), 4_000);
+    let (job, one) = (in_parts(&files, 2_000), in_parts(&files, 2_000));
+    let parts = number(&one.report()["parts"]);
+    let started = |said: &Said| -> Vec<(String, u64)> {
+        let lines = said.err.lines().filter_map(|line| line.strip_prefix("phase ")?.split_once(": "));
+        let count = |(phase, text): (&str, &str)| {
+            let (count, of) = text.split_once(" of ")?;
+            of.starts_with('1').then(|| (phase.to_owned(), count.parse().unwrap()))
+        };
+        lines.filter_map(count).collect()
+    };
+    let said = local(&job, 1_000_000).succeeded();
+    let phases = started(&said);
+    assert_eq!(phases.len(), PHASES.len(), "{}", said.err);
+    assert!(phases.iter().all(|(_, count)| *count <= parts), "{parts} parts: {phases:?}");
+    assert_eq!(phases[2], ("mesh".to_owned(), parts));
+    assert_eq!(bytes(&job), bytes(&one));
+    let small = Job::on(&files).tiles_of(500);
+    let said = local(&small, 1_000_000).succeeded();
+    assert_eq!(started(&said), [("plan".to_owned(), 1), ("publish".to_owned(), 1)], "{}", said.err);
+}
+
+/// The report of a job of tasks says what the hungriest of them took, not what `publish` did.
+#[test]
+fn the_report_counts_the_memory_of_all_tasks() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = in_files(folder.path(), &hills(8_000, 16), 4_000);
+    let job = in_parts(&files, 2_000);
+    up_to(&job, "publish", 1);
+    let mut peaks = Vec::new();
+    for folder in fs::read_dir(job.out().join("job/parts")).unwrap() {
+        let journal = fs::read_to_string(folder.unwrap().path().join("journal")).unwrap();
+        let values = journal.split("\"peak_memory\":").skip(1);
+        peaks.extend(values.filter_map(|text| text.split([',', '}']).next()?.parse::<u64>().ok()));
+    }
+    assert!(peaks.len() > 8);
+    task(&job, "publish", "1/1").succeeded();
+    let report: Value = serde_json::from_slice(&fs::read(job.out().join("report.json")).unwrap()).unwrap();
+    assert!(report["peak_memory"].as_u64() >= peaks.into_iter().max(), "{report}");
 }
 
 #[test]

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 /// The first line of a job's journal.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -27,6 +28,9 @@ pub struct JobHeader {
     /// The submission that started it over; 0 if none did.
     #[serde(default)]
     pub submission: u64,
+    /// When a job of several parts was begun.
+    #[serde(default)]
+    pub begun: Option<SystemTime>,
 }
 
 /// What tells a job from others in its report.

@@ -68,7 +68,8 @@ pub struct Report {
     pub bytes_written: u64,
     /// The most bytes that temporary files took.
     pub bytes_temporary: u64,
-    /// The largest resident set of the process, in bytes; `None` where the system does not tell.
+    /// The largest resident set of a process of the job, in bytes; `None` where the system does not tell. Of tasks that did the phase
+    /// `plan` nothing is known.
     pub peak_memory: Option<u64>,
     /// The memory the job was given, in bytes.
     pub memory_limit: u64,
@@ -76,7 +77,7 @@ pub struct Report {
     pub threads: usize,
     /// The number of steps that an interrupted run had finished. The stages include their times only in a job of several parts.
     pub resumed: u64,
-    /// Seconds from start to end, of the process that wrote the report.
+    /// Seconds from start to end, of the process that wrote the report. If tasks did the job, from the end of their plan.
     pub wall_s: f64,
     /// Seconds of processor time of all threads, including those of no stage.
     #[serde(default)]
@@ -165,6 +166,10 @@ pub struct ReportParts {
     pub parts: u64,
     /// The part that took the longest.
     pub slowest_part: Option<SlowestPart>,
+    /// The largest resident set of the processes that did other phases, in bytes.
+    pub peak_memory: Option<u64>,
+    /// Seconds from start to end.
+    pub wall_s: f64,
     /// Seconds of processor time of the tasks that did other phases.
     pub cpu_s_of_tasks: f64,
     /// What the user should know about the results.
@@ -226,11 +231,11 @@ impl Report {
             crs: plan.crs.name.clone(),
             bytes_written: parts.tiles.bytes + parts.levels.bytes + parts.other_bytes,
             bytes_temporary: parts.temporary,
-            peak_memory: machine::peak_memory(),
+            peak_memory: machine::peak_memory().max(parts.peak_memory),
             memory_limit: parts.memory,
             threads: parts.threads,
             resumed: parts.resumed,
-            wall_s: parts.clock.wall_s(),
+            wall_s: parts.wall_s,
             cpu_s: parts.clock.cpu_s() + parts.cpu_s_of_tasks,
             stages: parts.stages,
             warnings,

@@ -167,7 +167,8 @@ fn attempt(
     lock: Option<Lock>,
 ) -> Result<Report> {
     let JobRequest { options, run, ref directory, clock, .. } = *job;
-    let header = JobHeader { fingerprint: job.fingerprint.clone(), coarsening, id: 0, submission: job.submission };
+    let header =
+        JobHeader { fingerprint: job.fingerprint.clone(), coarsening, id: 0, submission: job.submission, begun: None };
     let stage = JobProgress::new(run.progress, clock, Vec::new()).stage("plan", 1, "job");
     let plan = match earlier.as_ref().and_then(|earlier| earlier.plan(directory, &header, options)) {
         Some(plan) => plan,
@@ -195,6 +196,8 @@ fn attempt(
     if !lock_of_job.is_real() {
         progress.note(NO_LOCKS);
     }
+    // Tasks have worked since the plan, and this process only ends it.
+    let begun = earlier.as_ref().filter(|_| job.work == EarlierWork::ByTasks).and_then(|earlier| earlier.begun());
     let complete = earlier.as_ref().map(|earlier| earlier.complete_report(directory, &header)).transpose()?;
     if let Some(report) = complete.flatten() {
         progress.note("the interrupted run had written all its results");
@@ -219,6 +222,7 @@ fn attempt(
             progress,
             threads,
             clock,
+            begun,
             identity: job.fingerprint.identity(options, job.submission)?,
             job_id,
             resumed: if job.work == EarlierWork::ByTasks { 0 } else { journal.taken_over() + resumed },

@@ -23,6 +23,7 @@ use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use std::io::{self, ErrorKind};
 use std::path::PathBuf;
+use std::time::SystemTime;
 
 /// An earlier run of a job in the same directory, as its journal tells. The journal is read once.
 pub(crate) struct EarlierRun {
@@ -82,6 +83,11 @@ impl EarlierRun {
     /// Tells whether its journal can be read.
     pub(crate) fn is_readable(&self) -> bool {
         self.header.is_some()
+    }
+
+    /// Returns when the job was begun, if it is one of several parts.
+    pub(crate) fn begun(&self) -> Option<SystemTime> {
+        self.header.as_ref().and_then(|header| header.begun)
     }
 
     /// Forgets all steps, so that the job starts over.

@@ -11,6 +11,7 @@ use crate::job::records::{JobStep, Journal, Store};
 use crate::job::run::temporary_bytes::TemporaryBytes;
 use crate::triangulation::Triangulator;
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::SystemTime;
 
 /// A run whose directory is locked, with its store and journal.
 pub(crate) struct RunContext<'a> {
@@ -21,6 +22,8 @@ pub(crate) struct RunContext<'a> {
     pub(crate) progress: &'a JobProgress,
     pub(crate) threads: usize,
     pub(crate) clock: JobClock,
+    /// When tasks began what this run ends.
+    pub(crate) begun: Option<SystemTime>,
     /// What tells the job from others.
     pub(crate) identity: JobIdentity,
     /// Tells the folders of this job's parts from those of others.
@@ -39,6 +42,12 @@ impl RunContext<'_> {
     /// Counts the units of `step` as done, by this run or by an earlier one.
     pub(crate) fn count(&self, stage: &Stage, step: JobStep, amount: u64) {
         if self.journal.has(step) { stage.take_over(amount) } else { stage.advance(amount) }
+    }
+
+    /// Returns the seconds since the job began. Machines may have clocks that differ, so it is no less than what this process took.
+    pub(crate) fn wall_s(&self) -> f64 {
+        let since = self.begun.and_then(|begun| begun.elapsed().ok()).map_or(0.0, |since| since.as_secs_f64());
+        since.max(self.clock.wall_s())
     }
 
     /// Adds a stage to the report, or to the stage of the same name: parts have the same stages.

@@ -127,13 +127,26 @@ pub(crate) fn missing_tasks(options: &JobOptions, tasks: u32) -> Result<Vec<Phas
     let is_same =
         |known: &Fingerprint| fingerprint.since(known) == JobChange::Nothing && fingerprint.memory == known.memory;
     let known = planned(&directory, 0)?.filter(|(header, _)| is_same(&header.fingerprint));
-    let Some((_, is_complete)) = known else { return Ok(PhaseTasks::all(tasks)) };
-    if is_complete || Alone::find(&directory, 0)?.is_some() {
-        return Ok(of_each(tasks, |phase| if phase == Phase::Publish { vec![1] } else { Vec::new() }));
+    if known.is_some() { missing_tasks_of_planned(options, tasks) } else { Ok(PhaseTasks::all(tasks)) }
+}
+
+/// Returns all phases of a job that is planned with the tasks that are missing.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Broken`] on the job directory.
+pub(crate) fn missing_tasks_of_planned(options: &JobOptions, tasks: u32) -> Result<Vec<PhaseTasks>> {
+    let directory = JobDirectory::new(&options.output.directory);
+    let only_publish = || of_each(tasks, |phase| if phase == Phase::Publish { vec![1] } else { Vec::new() });
+    if Alone::find(&directory, 0)?.is_some() {
+        return Ok(only_publish());
     }
-    let Some(job) = PlannedJob::open(&directory, options, 0)? else { return Ok(PhaseTasks::all(tasks)) };
-    let progress = JobProgressByPart::of(&job)?;
-    Ok(of_each(tasks, |phase| progress.missing_tasks(phase, tasks)))
+    match PlannedJob::open(&directory, options, 0)? {
+        Some(job) if !job.is_complete => {
+            let progress = JobProgressByPart::of(&job)?;
+            Ok(of_each(tasks, |phase| progress.missing_tasks(phase, tasks)))
+        }
+        _ => Ok(only_publish()),
+    }
 }
 
 fn of_each(tasks: u32, missing: impl Fn(Phase) -> Vec<u32>) -> Vec<PhaseTasks> {

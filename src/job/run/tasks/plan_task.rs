@@ -33,7 +33,7 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> Result<Option<Strin
     let _lock = directory.lock()?;
     let earlier = read_earlier(directory, run)?;
     let coarsening = coarsening_of(directory, earlier.as_ref(), &fingerprint)?;
-    let header = JobHeader { fingerprint, coarsening, id: 0, submission: run.submission };
+    let header = JobHeader { fingerprint, coarsening, id: 0, submission: run.submission, begun: None };
     let known = earlier.as_ref().and_then(|earlier| earlier.plan(directory, &header, options));
     let plan = match known {
         Some(plan) => plan,
