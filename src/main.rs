@@ -58,7 +58,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
         (Some(CliCommand::Submit { config, engine, tasks, restart, dry_run, added }), _) => {
             let request = request(config, *engine, *tasks, *restart)?;
             if request.phases.is_empty() {
-                nothing_to_send(config, print)
+                nothing_to_send(config, *dry_run, print)
             } else if *dry_run {
                 show_tasks(*engine, &request, added)
             } else {
@@ -143,8 +143,12 @@ fn request(path: &Path, engine: Engine, tasks: u32, restart: bool) -> Result<Req
 }
 
 /// Says that a job is done, instead of sending it.
-fn nothing_to_send(path: &Path, print: PrintOptions) -> Result<ExitCode> {
+fn nothing_to_send(path: &Path, dry_run: bool, print: PrintOptions) -> Result<ExitCode> {
     say("nothing is sent, because the job is done; --restart does it again");
+    if dry_run {
+        // What it prints is for a shell or for kubectl.
+        return Ok(ExitCode::SUCCESS);
+    }
     print_result(&job::status(&config::load(path)?, None)?, print).map(|()| ExitCode::SUCCESS)
 }
 

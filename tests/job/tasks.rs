@@ -315,6 +315,7 @@ fn what_has_changed_since_the_plan_is_told() {
 }
 
 /// The inputs alone do not tell a job from others: a submission with another style would end at once.
+#[cfg(unix)]
 #[test]
 fn a_finished_job_is_not_finished_with_another_style() {
     let folder = tempfile::tempdir().unwrap();
@@ -378,7 +379,9 @@ fn a_finished_job_is_sent_only_to_start_it_over() {
     {
         let said = submit(engine, more).succeeded();
         assert!(said.err.contains("nothing is sent, because the job is done"), "{engine}: {}", said.err);
-        assert!(said.out.contains("done: all results are in place") && !said.out.contains("--phase"), "{}", said.out);
+        let expected = if more.is_empty() { "done: all results are in place" } else { "" };
+        assert!(said.out.trim_end().ends_with(expected) && !said.out.contains("--phase"), "{}", said.out);
+        assert_eq!(said.out.is_empty(), expected.is_empty(), "{}", said.out);
         let sent = submit(engine, &["--restart", "--dry-run"]).succeeded().out;
         assert_eq!(sent.matches("--phase").count(), sent.matches("--submission").count(), "{sent}");
         assert!(sent.contains("--submission"), "{engine}: {sent}");

@@ -36,11 +36,11 @@ pub struct JobHeader {
 /// What tells a job from others in its report.
 #[derive(Clone, Debug, Default)]
 pub struct JobIdentity {
-    /// The options: see [`Fingerprint::of_options`].
+    /// Tells the options, as far as results depend on them, from others.
     pub options: Checksum,
-    /// The options and the inputs: see [`Fingerprint::of_job`].
+    /// Tells the options and the inputs from others.
     pub job: Checksum,
-    /// What the inputs hold: see [`Fingerprint::of_inputs`].
+    /// Tells what the inputs hold from what others do.
     pub inputs: String,
     /// The submission that started it over; 0 if none did.
     pub submission: u64,
