@@ -243,3 +243,17 @@ fn another_job_is_not_finished_by_the_rest_of_the_first() {
     run(task(&rig, "publish", "1/1")).stopped(&["the phase plan is not complete"]);
     completes(&rig, 2, "another style");
 }
+
+/// A scheduler starts the task again that was killed, and nothing else.
+#[test]
+fn publish_that_does_a_small_job_alone_goes_on_by_itself() {
+    let rig = Rig::new(&scattered::gaussian(3_000), &Setup::tiles_of(700)).committing_every(0);
+    up_to(&rig, "publish", 1);
+    for count in 1..6 {
+        assert!(
+            Run::start(task(&rig, "publish", "1/1").env("GDT_FAULT", format!("commit:{count}"))).end().was_killed()
+        );
+    }
+    run(task(&rig, "publish", "1/1")).succeeded();
+    rig.is_complete("publish alone");
+}

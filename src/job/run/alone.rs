@@ -1,9 +1,11 @@
 //! A note in the job directory: tasks leave the job to one process, which does all of it when the others would publish. So one bad file
 //! ends no job on many machines.
 
+use crate::job::durable::atomic_file::remove_file;
 use crate::job::durable::directory::JobDirectory;
 use crate::{Error, Result, disk};
-use std::path::Path;
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
 
 /// How one process does the job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,6 +39,29 @@ impl Alone {
         disk::sync_folder(directory.job()).map_err(Error::io("write", directory.job()))
     }
 
+    /// Returns the notes that are there, as the journal would name them.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the job directory cannot be listed.
+    pub(crate) fn notes(directory: &JobDirectory) -> Result<HashSet<PathBuf>> {
+        let there = disk::list(directory.job()).map_err(Error::io("read", directory.job()))?;
+        let is_note = |path: &&PathBuf| Alone::ALL.into_iter().any(|alone| alone.is_said_by(path, 0));
+        Ok(there.iter().filter(is_note).map(|path| directory.name(path)).collect())
+    }
+
+    /// Removes all notes, because tasks do the job.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if one cannot be removed.
+    pub(crate) fn forget(directory: &JobDirectory) -> Result<()> {
+        Alone::notes(directory)?.iter().try_for_each(|name| remove_file(&directory.file(name)))
+    }
+
+    fn is_said_by(self, path: &Path, submission: u64) -> bool {
+        let name = path.file_name().and_then(|name| name.to_str()).and_then(|name| name.split_once('.'));
+        name.is_some_and(|(name, of)| name == self.name() && of.parse().is_ok_and(|of: u64| of >= submission))
+    }
+
     /// Returns what a note of `submission`, or of a later one, says, if there is one.
     ///
     /// # Errors
@@ -44,10 +69,6 @@ impl Alone {
     pub(crate) fn find(directory: &JobDirectory, submission: u64) -> Result<Option<Alone>> {
         // Some network file systems remember for a while that a file is not there, but not what is in a folder.
         let there = disk::list(directory.job()).map_err(Error::io("read", directory.job()))?;
-        let says = |path: &Path, alone: Alone| {
-            let name = path.file_name().and_then(|name| name.to_str()).and_then(|name| name.split_once('.'));
-            name.is_some_and(|(name, of)| name == alone.name() && of.parse().is_ok_and(|of: u64| of >= submission))
-        };
-        Ok(Alone::ALL.into_iter().find(|&alone| there.iter().any(|path| says(path, alone))))
+        Ok(Alone::ALL.into_iter().find(|alone| there.iter().any(|path| alone.is_said_by(path, submission))))
     }
 }

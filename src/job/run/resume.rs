@@ -16,6 +16,7 @@ use crate::job::plan::lattice_choice::LatticeCoarsening;
 use crate::job::progress::stage::{ProgressOutput, Stage};
 use crate::job::records::{JobStep, Journal, JournalEntry, Store};
 use crate::job::report::job_report::Report;
+use crate::job::run::alone::Alone;
 use crate::job::run::part_entries::{PartHeader, StepsOfParts, open_store, records_of};
 use crate::output::options::MaxEdge;
 use crate::{Error, Result, interrupt};
@@ -184,7 +185,7 @@ pub(crate) fn start<'a>(
     progress: ProgressOutput,
 ) -> Result<RunStart<'a>> {
     let kept = earlier.map(|earlier| review(directory, header, earlier, max_edge, progress)).transpose()?;
-    let KeptSteps { entries, files, partition, names } = kept.flatten().unwrap_or_default();
+    let KeptSteps { entries, mut files, partition, names } = kept.flatten().unwrap_or_default();
     if !entries.is_empty() {
         progress.note(&format!("going on with an interrupted run: {} steps are done", entries.len()));
     }
@@ -196,6 +197,8 @@ pub(crate) fn start<'a>(
         remove_file(&directory.journal())?;
     }
     directory.clear_parts()?;
+    // A task that is killed finds its note again.
+    files.extend(Alone::notes(directory)?);
     directory.clear(&files)?;
     let journal = Journal::begin(directory, &header, entries)?;
     Ok(RunStart { store: open_store(directory, &records)?, journal, partition, job_id: 0, resumed: 0 })

@@ -7,10 +7,10 @@ use crate::job::partition::result::Partition;
 use crate::job::plan::fingerprint::{JobChange, JobHeader};
 use crate::job::progress::stage::{JobProgress, ProgressOutput};
 use crate::job::records::{JobStep, Journal, JournalEntry};
+use crate::job::run::alone::Alone;
 use crate::job::run::part_entries::{forget_levels, open_store, records_of};
 use crate::job::run::resume::{EarlierRun, KeptSteps, ResumeReview, RunStart};
 use crate::output::options::MaxEdge;
-use std::collections::HashSet;
 use std::time::SystemTime;
 
 /// Begins a run of a job of several parts, as [`crate::job::run::resume::start`] does of others. What is in the folders of its parts stays if the job is the same.
@@ -43,7 +43,7 @@ pub(crate) fn start_parts<'a>(
         None => {
             remove_file(&directory.journal())?;
             directory.clear_parts()?;
-            directory.clear(&HashSet::new())?;
+            directory.clear(&Alone::notes(directory)?)?;
             (Vec::new(), JobHeader { id: new_id(), begun: Some(SystemTime::now()), ..header.clone() }, 0)
         }
     };

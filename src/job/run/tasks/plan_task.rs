@@ -48,6 +48,7 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> Result<Option<Strin
         Alone::AsItIs.note(directory, run.submission)?;
         return Ok(Some(format!("the job has only {} points, which is one part; {}", plan.records, Alone::SENTENCE)));
     }
+    Alone::forget(directory)?;
     on_threads(threads, || {
         let start = start_parts(directory, &header, earlier, run.progress)?;
         write_plan(&start.journal, directory, &plan)?;
