@@ -109,11 +109,14 @@ pub enum CliCommand {
         /// Plan the job even if it does not seem to fit the disk or the memory of this machine.
         #[arg(long)]
         force: bool,
+        /// The number of a submission that starts the job over, as `submit --restart` gives it: what was done before does not count.
+        #[arg(long, value_name = "NUMBER", default_value_t = 0, hide_default_value = true)]
+        submission: u64,
     },
     /// Send a large job to an engine that does its tasks.
     ///
     /// All machines must see the inputs, the configuration and the output directory under the same paths. If the job is under way, only
-    /// the tasks that are missing are sent: run the same command again after failures.
+    /// the tasks that are missing are sent: run the same command again after failures. If the job is done, nothing is sent.
     Submit {
         /// The configuration of the job.
         config: PathBuf,
@@ -123,6 +126,9 @@ pub enum CliCommand {
         /// The number of tasks that each phase is dealt out to. With `local`, at most as many run at once.
         #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_TASKS)))]
         tasks: u32,
+        /// Start the job over, also if it is done or under way.
+        #[arg(long)]
+        restart: bool,
         /// Send nothing, and print what the engine would get.
         #[arg(long)]
         dry_run: bool,

@@ -46,18 +46,24 @@ fn run(cli: Cli) -> Result<ExitCode> {
         }
         (Some(CliCommand::Check { config }), _) => check_job(config, print),
         (Some(CliCommand::Verify { directory, memory, input }), _) => verify_output(directory, *memory, input, print),
-        (Some(CliCommand::Work { config, phase, task, tasks, threads, force }), _) => {
+        (Some(CliCommand::Work { config, phase, task, tasks, threads, force, submission }), _) => {
             let task = match task {
                 Some(task) => *task,
                 None => Task::of_environment(*phase, *tasks, |name| std::env::var(name).ok())?,
             };
             let progress = ProgressOutput::detect(print.quiet);
-            let run = RunOptions { progress, force: *force, restart: false };
+            let run = RunOptions { progress, force: *force, restart: false, submission: *submission };
             work(config, *phase, task, *threads, run, print)
         }
-        (Some(CliCommand::Submit { config, engine, tasks, dry_run, added }), _) => {
-            let request = request(config, *engine, *tasks)?;
-            if *dry_run { show_tasks(*engine, &request, added) } else { submit(*engine, &request, added, print) }
+        (Some(CliCommand::Submit { config, engine, tasks, restart, dry_run, added }), _) => {
+            let request = request(config, *engine, *tasks, *restart)?;
+            if request.phases.is_empty() {
+                nothing_to_send(config, *dry_run, print)
+            } else if *dry_run {
+                show_tasks(*engine, &request, added)
+            } else {
+                submit(*engine, &request, added, print)
+            }
         }
         (Some(CliCommand::Status { config, tasks }), _) => {
             print_result(&job::status(&config::load(config)?, *tasks)?, print).map(|()| ExitCode::SUCCESS)
@@ -82,6 +88,7 @@ fn run_job(path: &Path, cli: &Cli) -> Result<ExitCode> {
         progress: ProgressOutput::detect(cli.print.quiet),
         force: cli.force,
         restart: cli.restart || cli.fresh,
+        submission: 0,
     };
     let config = config::load(path)?;
     interrupt::listen()?;
@@ -125,13 +132,24 @@ fn work(
     }
 }
 
-/// Returns the tasks that are missing of the job that the configuration at `path` describes.
-fn request(path: &Path, engine: Engine, tasks: u32) -> Result<Request> {
+/// Returns the tasks that are missing of the job that the configuration at `path` describes: all of them if it is to start over.
+fn request(path: &Path, engine: Engine, tasks: u32, restart: bool) -> Result<Request> {
     let config = config::load(path)?;
     // The inputs may be where only the pods of Kubernetes see them.
     let is_out_of_sight = engine == Engine::Kubernetes && !config.output.directory.exists();
-    let phases = if is_out_of_sight { PhaseTasks::all(tasks) } else { job::missing_tasks(&config, tasks)? };
-    Request::new(path, &config, tasks, phases)
+    let phases = if is_out_of_sight || restart { PhaseTasks::all(tasks) } else { job::missing_tasks(&config, tasks)? };
+    let submission = if restart { Some(job::new_submission()) } else { None };
+    Request::new(path, &config, tasks, submission, phases)
+}
+
+/// Says that a job is done, instead of sending it.
+fn nothing_to_send(path: &Path, dry_run: bool, print: PrintOptions) -> Result<ExitCode> {
+    say("nothing is sent, because the job is done; --restart does it again");
+    if dry_run {
+        // What it prints is for a shell or for kubectl.
+        return Ok(ExitCode::SUCCESS);
+    }
+    print_result(&job::status(&config::load(path)?, None)?, print).map(|()| ExitCode::SUCCESS)
 }
 
 /// Prints what an engine would get.
@@ -150,7 +168,8 @@ fn submit(engine: Engine, request: &Request, added: &[String], print: PrintOptio
         Engine::Kubernetes => print_result(&kubernetes::send(request, added)?, print)?,
         Engine::Local => {
             interrupt::listen()?;
-            LocalEngine::new(request, added, print.quiet, print.json)?.run()?;
+            let engine = LocalEngine::new(request, added, print.quiet, print.json)?;
+            engine.run(|| job::missing_tasks_of_planned(&config::load(&request.config)?, request.tasks))?;
         }
     }
     Ok(ExitCode::SUCCESS)

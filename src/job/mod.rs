@@ -45,6 +45,7 @@ use crate::job::run::run_context::RunContext;
 use crate::job::run::{parts, read_step, tasks};
 use crate::threads::run_concurrently;
 use crate::{Error, Result};
+use std::time::SystemTime;
 
 /// Runs the whole job, or what an interrupted run left of it.
 ///
@@ -67,12 +68,26 @@ pub fn work(options: &JobOptions, run: impl Into<RunOptions>, phase: Phase, task
 }
 
 /// Returns all phases of the job with the tasks that are missing, where phases are dealt out to `tasks` tasks: all of them if there is no
-/// plan of this job.
+/// plan of this job, and none if its results are in place.
 ///
 /// # Errors
 /// [`Error::Config`] if there are no inputs, [`Error::Io`] if one of them, or a journal, cannot be read.
 pub fn missing_tasks(options: &JobOptions, tasks: u32) -> Result<Vec<PhaseTasks>> {
     tasks::missing::missing_tasks(options, tasks)
+}
+
+/// As [`missing_tasks`], of a job that has just been planned: its phase `plan` is not missing.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Broken`] on the job directory.
+pub fn missing_tasks_of_planned(options: &JobOptions, tasks: u32) -> Result<Vec<PhaseTasks>> {
+    tasks::missing::missing_tasks_of_planned(options, tasks)
+}
+
+/// Returns a number for a submission that starts the job over. It is greater than those of earlier submissions, as far as clocks agree.
+pub fn new_submission() -> u64 {
+    let time = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+    time.map_or(1, |time| time.as_millis() as u64)
 }
 
 /// Returns how far the job is. If `tasks` is given, also which tasks are missing, where phases are dealt out to so many.
@@ -126,6 +141,7 @@ fn walk(run: &RunContext, plan: Plan, earlier: Option<Partition>) -> Result<Repo
                 files: Vec::new(),
                 parts: 1,
                 slowest_part: None,
+                peak_memory: None,
                 cpu_s_of_tasks: 0.0,
             };
             write_report(run, &plan, figures, published)

@@ -50,11 +50,13 @@ pub struct RunOptions {
     pub force: bool,
     /// Whether to start over instead of going on with an interrupted run.
     pub restart: bool,
+    /// The submission that starts the job over: what tasks did before it does not count. 0 if there is none.
+    pub submission: u64,
 }
 
 impl From<ProgressOutput> for RunOptions {
     fn from(progress: ProgressOutput) -> RunOptions {
-        RunOptions { progress, force: false, restart: false }
+        RunOptions { progress, force: false, restart: false, submission: 0 }
     }
 }
 

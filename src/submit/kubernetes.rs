@@ -26,6 +26,9 @@ const FINAL_EXIT_CODES: [u8; 3] = [2, 3, 4];
 /// The seconds that a task has to stop when it is asked to.
 const GRACE_SECONDS: u32 = 60;
 
+/// The most cores of a pod: as many as a job has threads.
+const MOST_CORES: u16 = 1024;
+
 /// The options after `--`.
 #[derive(Parser, Debug)]
 #[command(name = "gdt-batch submit --engine kubernetes --", no_binary_name = true, disable_version_flag = true)]
@@ -47,7 +50,7 @@ struct KubernetesOptions {
     #[arg(long)]
     namespace: Option<String>,
     /// The cores of a pod. Default: [limits] threads.
-    #[arg(long)]
+    #[arg(long, value_parser = cores, allow_negative_numbers = true)]
     cpu: Option<u16>,
 }
 
@@ -65,6 +68,13 @@ fn volume(text: &str) -> std::result::Result<Volume, String> {
         }
         _ => Err("a volume is the name of a claim, a colon and a folder, such as survey-data:/data".into()),
     }
+}
+
+fn cores(text: &str) -> std::result::Result<u16, String> {
+    let cores = text.parse().ok().filter(|cores| (1..=MOST_CORES).contains(cores));
+    cores.ok_or_else(|| {
+        format!("the cores of a pod are a whole number from 1 to {MOST_CORES}; without --cpu it gets those of [limits] threads")
+    })
 }
 
 /// Returns the Jobs for the tasks of `request` as YAML.
@@ -185,7 +195,7 @@ fn pod(request: &Request, options: &KubernetesOptions, tasks: &PhaseTasks) -> Va
         "containers": [{
             "name": "work",
             "image": options.image,
-            "command": pod_command(&options.config_in_pods(request), request.tasks, tasks),
+            "command": pod_command(&options.config_in_pods(request), request, tasks),
             "resources": {"requests": resources, "limits": resources},
             "volumeMounts": mounts,
         }],
@@ -194,16 +204,18 @@ fn pod(request: &Request, options: &KubernetesOptions, tasks: &PhaseTasks) -> Va
 }
 
 /// Returns the command of a pod. If only some tasks are missing, a shell looks up which of them has the index of the pod.
-fn pod_command(config: &str, total: u32, PhaseTasks { phase, count, missing }: &PhaseTasks) -> Vec<String> {
+fn pod_command(config: &str, request: &Request, PhaseTasks { phase, count, missing }: &PhaseTasks) -> Vec<String> {
     let words = |words: &[&str]| words.iter().map(|word| word.to_string()).collect();
-    let (phase, total) = (phase.name(), total.to_string());
+    let (phase, total, more) = (phase.name(), request.tasks.to_string(), request.submission_words());
     if missing.len() as u64 == u64::from(*count) {
-        return words(&["gdt-batch", "work", config, "--phase", phase, "--tasks", &total]);
+        let all: Vec<String> = words(&["gdt-batch", "work", config, "--phase", phase, "--tasks", &total]);
+        return [all, more].concat();
     }
     let numbers: Vec<String> = missing.iter().map(u32::to_string).collect();
     let script = format!(
-        "set -- {} && shift \"$JOB_COMPLETION_INDEX\" && exec gdt-batch work \"$0\" --phase {phase} --task \"$1/{total}\"",
-        numbers.join(" ")
+        "set -- {} && shift \"$JOB_COMPLETION_INDEX\" && exec gdt-batch work \"$0\" --phase {phase} --task \"$1/{total}\"{}",
+        numbers.join(" "),
+        more.iter().map(|word| format!(" {word}")).collect::<String>()
     );
     words(&["/bin/sh", "-c", &script, config])
 }
@@ -286,6 +298,28 @@ mod tests {
             let command: Vec<String> = command.map(String::from).into_iter().chain(["5".into()]).collect();
             assert_eq!(work["command"], json!(command));
             assert_eq!(work["resources"], json!({"requests": {"memory": "4352Mi"}, "limits": {"memory": "4352Mi"}}));
+        }
+    }
+
+    #[test]
+    fn cores_are_a_number_that_a_pod_can_have() {
+        for wrong in ["0", "-2", "1025", "two", "0.5", ""] {
+            let error = show(&request("/data/job.toml", 2), &words(&["--cpu", wrong])).unwrap_err();
+            assert_eq!(error.exit_code(), 2, "{wrong}");
+            assert!(error.to_string().contains("a whole number from 1 to 1024"), "{wrong}: {error}");
+        }
+        let job = read(&request("/data/job.toml", 2), &["--cpu", "8"]).remove(2);
+        assert_eq!(job["spec"]["template"]["spec"]["containers"][0]["resources"]["limits"]["cpu"], "8");
+    }
+
+    #[test]
+    fn a_submission_that_starts_over_tells_every_pod() {
+        let mut request = request("/data/job.toml", 64);
+        request.submission = Some(17);
+        request.phases[4].missing = vec![3, 7];
+        for job in read(&request, &[]) {
+            let command = job["spec"]["template"]["spec"]["containers"][0]["command"].to_string();
+            assert!(command.contains("--submission 17") || command.contains(r#""--submission","17""#), "{command}");
         }
     }
 

@@ -61,12 +61,23 @@ impl<'a> LocalEngine<'a> {
         text
     }
 
-    /// Runs the tasks, phase after phase. After a phase of which tasks failed there is no use in the next.
+    /// Runs the tasks, phase after phase. After a phase of which tasks failed there is no use in the next. Once the job is planned,
+    /// `missing` tells which tasks have something to do: only these are started, however many there are.
     ///
     /// # Errors
-    /// [`Error::Tasks`] if tasks fail, [`Error::Interrupted`], [`Error::Io`] if a process cannot be started.
-    pub fn run(&self) -> Result<()> {
-        self.request.phases.iter().try_for_each(|phase| self.run_phase(phase))
+    /// [`Error::Tasks`] if tasks fail, [`Error::Interrupted`], [`Error::Io`] if a process cannot be started, and those of `missing`.
+    pub fn run(&self, missing: impl FnOnce() -> Result<Vec<PhaseTasks>>) -> Result<()> {
+        match self.request.phases.split_first() {
+            Some((plan, _)) if plan.phase == Phase::Plan => {
+                self.run_phase(plan)?;
+                self.run_phases(&missing()?)
+            }
+            _ => self.run_phases(&self.request.phases),
+        }
+    }
+
+    fn run_phases(&self, phases: &[PhaseTasks]) -> Result<()> {
+        phases.iter().filter(|phase| !phase.missing.is_empty()).try_for_each(|phase| self.run_phase(phase))
     }
 
     fn run_phase(&self, phase: &PhaseTasks) -> Result<()> {
@@ -123,6 +134,7 @@ impl<'a> LocalEngine<'a> {
             true => words.extend(["--task".into(), format!("{task}/{}", phase.count).into()]),
             false => words.extend(["--tasks".into(), self.request.tasks.to_string().into()]),
         }
+        words.extend(self.request.submission_words().into_iter().map(OsString::from));
         words.extend(["--threads".into(), self.threads(phase).to_string().into()]);
         words
     }

@@ -14,6 +14,8 @@ pub struct Request {
     pub program: PathBuf,
     /// How many tasks a phase is dealt out to.
     pub tasks: u32,
+    /// The number of this submission, if it starts the job over.
+    pub submission: Option<u64>,
     /// The phases that have tasks to do, in their order.
     pub phases: Vec<PhaseTasks>,
     /// The memory that a task may take, in bytes.
@@ -28,12 +30,19 @@ impl Request {
     ///
     /// # Errors
     /// [`Error::Io`] if the system does not tell where the configuration or this program is.
-    pub fn new(config: &Path, options: &JobOptions, tasks: u32, mut phases: Vec<PhaseTasks>) -> Result<Request> {
+    pub fn new(
+        config: &Path,
+        options: &JobOptions,
+        tasks: u32,
+        submission: Option<u64>,
+        mut phases: Vec<PhaseTasks>,
+    ) -> Result<Request> {
         phases.retain(|phase| !phase.missing.is_empty());
         Ok(Request {
             config: std::path::absolute(config).map_err(Error::io("find", config))?,
             program: std::env::current_exe().map_err(Error::io("find", "this program"))?,
             tasks,
+            submission,
             phases,
             memory: options.limits.memory.0,
             threads: options.limits.threads.0,
@@ -47,6 +56,11 @@ impl Request {
         let name: String = stem.chars().map(plain).take(LONGEST_NAME).collect();
         let name = name.trim_matches('-');
         if name.is_empty() { "gdt-batch".into() } else { name.into() }
+    }
+
+    /// Returns what tells a task that this submission starts the job over: words after the command.
+    pub fn submission_words(&self) -> Vec<String> {
+        self.submission.map_or(Vec::new(), |number| vec!["--submission".into(), number.to_string()])
     }
 
     /// Returns the memory to ask for, for each task.
@@ -77,6 +91,7 @@ pub(super) mod tests {
             config: config.into(),
             program: "/opt/gdt-batch".into(),
             tasks,
+            submission: None,
             phases: PhaseTasks::all(tasks),
             memory: 4 << 30,
             threads: 0,

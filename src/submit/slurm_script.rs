@@ -49,6 +49,7 @@ fn script_text(request: &Request, phase: Phase) -> String {
         0 => (String::new(), " --threads \"$SLURM_CPUS_ON_NODE\""),
         cores => (format!(" --cpus-per-task={cores}"), ""),
     };
+    let more = request.submission_words().iter().map(|word| format!(" {word}")).collect::<String>();
     format!(
         r#"#!/bin/sh
 # Phase "{phase}" of a job. An element of the array is a task; the argument is added to its number.
@@ -58,7 +59,7 @@ fn script_text(request: &Request, phase: Phase) -> String {
 #SBATCH --open-mode=append
 #SBATCH --signal=B:TERM@60
 # With exec the signals of Slurm reach the program, which stops with its finished steps on the disk.
-exec {program} work {config} --phase {phase} --task $((SLURM_ARRAY_TASK_ID + ${{1:-0}}))/{count}{threads}
+exec {program} work {config} --phase {phase} --task $((SLURM_ARRAY_TASK_ID + ${{1:-0}}))/{count}{threads}{more}
 "#
     )
 }

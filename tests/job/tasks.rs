@@ -5,6 +5,7 @@ use crate::las_file::LasFile;
 use crate::levels::hills;
 use crate::parts::{in_files, in_parts};
 use crate::program::{Job, Said, gdt_batch, number};
+use gdt_batch::output::checksums::seal;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::PathBuf;
@@ -65,15 +66,21 @@ fn any_number_of_tasks_leaves_the_bytes_of_one_process() {
             assert_eq!(bytes(&many), bytes(&one), "{line}, {tasks} tasks");
             assert!(!many.out().join("job").exists());
             // A scheduler may start a task again that was done.
-            for phase in &PHASES[1..] {
-                task(&many, phase, "1/1").refused(1, &["the phase plan is not complete", "status tells"]);
+            for phase in &PHASES[..6] {
+                let again = task(&many, phase, "1/1").succeeded();
+                assert!(again.out.contains("all results are in place"), "{phase}: {}", again.out);
             }
+            let again = task(&many, "publish", "1/1").succeeded();
+            assert!(again.out.contains("the slowest") && !many.out().join("job").exists(), "{}", again.out);
             assert_eq!(bytes(&many), bytes(&one), "{line}, {tasks} tasks, started again");
             let written: Value = serde_json::from_slice(&fs::read(many.out().join("report.json")).unwrap()).unwrap();
             for figure in ["sites", "triangles", "points", "levels", "vertex_digest", "parts", "tiles", "bytes_written"]
             {
                 assert_eq!(written[figure], report[figure], "{figure}");
             }
+            // It counts what other tasks took.
+            let slowest = written["slowest_part"]["seconds"].as_f64();
+            assert!(written["wall_s"].as_f64() >= slowest && slowest > Some(0.0), "{written}");
             let stages = |report: &Value| -> Vec<Value> {
                 let stages = report["stages"].as_array().unwrap().iter();
                 stages.map(|stage| json!([stage["stage"], stage["done"]])).collect()
@@ -82,6 +89,51 @@ fn any_number_of_tasks_leaves_the_bytes_of_one_process() {
         }
         one.verified();
     }
+}
+
+/// A user need not know how many parts there will be.
+#[test]
+fn local_starts_no_more_tasks_than_have_something_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = in_files(folder.path(), &hills(8_000, 15), 4_000);
+    let (job, one) = (in_parts(&files, 2_000), in_parts(&files, 2_000));
+    let parts = number(&one.report()["parts"]);
+    let started = |said: &Said| -> Vec<(String, u64)> {
+        let lines = said.err.lines().filter_map(|line| line.strip_prefix("phase ")?.split_once(": "));
+        let count = |(phase, text): (&str, &str)| {
+            let (count, of) = text.split_once(" of ")?;
+            of.starts_with('1').then(|| (phase.to_owned(), count.parse().unwrap()))
+        };
+        lines.filter_map(count).collect()
+    };
+    let said = local(&job, 1_000_000).succeeded();
+    let phases = started(&said);
+    assert_eq!(phases.len(), PHASES.len(), "{}", said.err);
+    assert!(phases.iter().all(|(_, count)| *count <= parts), "{parts} parts: {phases:?}");
+    assert_eq!(phases[2], ("mesh".to_owned(), parts));
+    assert_eq!(bytes(&job), bytes(&one));
+    let small = Job::on(&files).tiles_of(500);
+    let said = local(&small, 1_000_000).succeeded();
+    assert_eq!(started(&said), [("plan".to_owned(), 1), ("publish".to_owned(), 1)], "{}", said.err);
+}
+
+/// The report of a job of tasks says what the hungriest of them took, not what `publish` did.
+#[test]
+fn the_report_counts_the_memory_of_all_tasks() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = in_files(folder.path(), &hills(8_000, 16), 4_000);
+    let job = in_parts(&files, 2_000);
+    up_to(&job, "publish", 1);
+    let mut peaks = Vec::new();
+    for folder in fs::read_dir(job.out().join("job/parts")).unwrap() {
+        let journal = fs::read_to_string(folder.unwrap().path().join("journal")).unwrap();
+        let values = journal.split("\"peak_memory\":").skip(1);
+        peaks.extend(values.filter_map(|text| text.split([',', '}']).next()?.parse::<u64>().ok()));
+    }
+    assert!(peaks.len() > 8);
+    task(&job, "publish", "1/1").succeeded();
+    let report: Value = serde_json::from_slice(&fs::read(job.out().join("report.json")).unwrap()).unwrap();
+    assert!(report["peak_memory"].as_u64() >= peaks.into_iter().max(), "{report}");
 }
 
 #[test]
@@ -253,10 +305,145 @@ fn what_has_changed_since_the_plan_is_told() {
     // The plan starts the job over.
     local(&job, 2).succeeded();
     job.verified();
+    fs::remove_dir_all(job.out()).unwrap();
     let text = fs::read_to_string(&files[0]).unwrap();
     up_to(&job, "read", 2);
     fs::write(&files[0], text.lines().rev().map(|line| format!("{line}\n")).collect::<String>()).unwrap();
     let said = [1, 2].map(|number| task(&job, "read", &format!("{number}/2")));
     let refused = said.iter().find(|said| said.code != 0).expect("a task reads the file");
     refused.refused(2, &[files[0].file_name().unwrap().to_str().unwrap(), "has changed since the job was planned"]);
+}
+
+/// The inputs alone do not tell a job from others: a submission with another style would end at once.
+#[cfg(unix)]
+#[test]
+fn a_finished_job_is_not_finished_with_another_style() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = in_files(folder.path(), &hills(8_000, 11), 4_000);
+    let job = in_parts(&files, 2_000);
+    local(&job, 2).succeeded();
+    assert_eq!(status(&job, 2)["state"], "done");
+    let before = bytes(&job);
+    // Limits that change no byte leave it as it is.
+    let job = job.with("limits", "threads = 1\nkeep_steps = false");
+    assert_eq!(status(&job, 2)["state"], "done");
+    let text = fs::read_to_string(job.config()).unwrap();
+    let other = job.folder().join("other.toml");
+    for line in ["[output]\ncolor = \"elevation\"", "[limits]\nmemory = \"1 GiB\"", "[input]\nclasses = [2]"] {
+        let (section, _) = line.split_once('\n').unwrap();
+        fs::write(&other, text.replace(section, line)).unwrap();
+        let run = |words: &[&str]| gdt_batch(job.folder(), words);
+        let said = run(&["status", "other.toml"]).succeeded().out;
+        assert!(said.contains("the results in place are of other options"), "{line}: {said}");
+        run(&["work", "other.toml", "--phase", "mesh", "--task", "1/1"])
+            .refused(1, &["the phase plan is not complete"]);
+    }
+    // The paths are not part of it.
+    let link = job.folder().join("link");
+    std::os::unix::fs::symlink(folder.path(), &link).unwrap();
+    fs::rename(job.out(), job.folder().join("moved")).unwrap();
+    let elsewhere = text.replace(folder.path().to_str().unwrap(), "link").replace("\"out\"", "\"moved\"");
+    assert!(elsewhere != text);
+    fs::write(&other, elsewhere).unwrap();
+    let said = gdt_batch(job.folder(), &["status", "other.toml"]).succeeded().out;
+    assert!(said.contains("done: all results are in place"), "{said}");
+    fs::rename(job.folder().join("moved"), job.out()).unwrap();
+    let job = job.with("output", "compression = \"none\"");
+    assert_eq!(status(&job, 2)["state"], "other-results");
+    local(&job, 2).succeeded();
+    assert_eq!(status(&job, 2)["state"], "done");
+    assert!(bytes(&job) != before);
+    job.verified();
+    // A changed input is another job too, also if only its time tells.
+    let text = fs::read(&files[0]).unwrap();
+    fs::write(&files[0], text).unwrap();
+    let later = std::time::SystemTime::now() + std::time::Duration::from_secs(5);
+    fs::File::options().append(true).open(&files[0]).unwrap().set_modified(later).unwrap();
+    assert_eq!(status(&job, 2)["state"], "other-results");
+}
+
+#[test]
+fn a_finished_job_is_sent_only_to_start_it_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = in_files(folder.path(), &hills(8_000, 12), 4_000);
+    let job = in_parts(&files, 2_000);
+    local(&job, 2).succeeded();
+    let (before, report) = (bytes(&job), fs::read(job.out().join("report.json")).unwrap());
+    let pods = ["--", "--image", "i", "--volume", "data:/"];
+    let submit = |engine: &str, more: &[&str]| {
+        let pods = if engine == "kubernetes" { &pods[..] } else { &[] };
+        command(&job, "submit", &[&["--engine", engine, "--tasks", "3"], more, pods].concat())
+    };
+    for (engine, more) in
+        [("local", &[][..]), ("local", &["--dry-run"]), ("slurm", &["--dry-run"]), ("kubernetes", &["--dry-run"])]
+    {
+        let said = submit(engine, more).succeeded();
+        assert!(said.err.contains("nothing is sent, because the job is done"), "{engine}: {}", said.err);
+        let expected = if more.is_empty() { "done: all results are in place" } else { "" };
+        assert!(said.out.trim_end().ends_with(expected) && !said.out.contains("--phase"), "{}", said.out);
+        assert_eq!(said.out.is_empty(), expected.is_empty(), "{}", said.out);
+        let sent = submit(engine, &["--restart", "--dry-run"]).succeeded().out;
+        assert_eq!(sent.matches("--phase").count(), sent.matches("--submission").count(), "{sent}");
+        assert!(sent.contains("--submission"), "{engine}: {sent}");
+    }
+    assert_eq!(fs::read(job.out().join("report.json")).unwrap(), report);
+    submit("local", &["--restart"]).succeeded();
+    assert!(fs::read(job.out().join("report.json")).unwrap() != report);
+    assert_eq!(bytes(&job), before);
+    submit("local", &[]).succeeded();
+    job.verified();
+}
+
+/// A scheduler may start the phases in any order, and a task twice: with the number of the submission nobody takes the results, the plan or
+/// the note of before for those that are to come.
+#[test]
+fn tasks_of_a_submission_that_starts_over_come_in_any_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = in_files(folder.path(), &hills(8_000, 13), 4_000);
+    for job in [in_parts(&files, 2_000), Job::on(&files).tiles_of(500)] {
+        let numbered = |phase: &str, number: &str| {
+            command(&job, "work", &["--phase", phase, "--task", "1/1", "--submission", number])
+        };
+        local(&job, 1).succeeded();
+        let before = bytes(&job);
+        up_to(&job, "publish", 1);
+        for number in ["7", "8"] {
+            for phase in &PHASES[1..] {
+                numbered(phase, number).refused(1, &["the phase plan is not complete"]);
+            }
+            let report = || fs::read(job.out().join("report.json")).unwrap();
+            let old = report();
+            for phase in PHASES {
+                numbered(phase, number).succeeded();
+                numbered(phase, number).succeeded();
+            }
+            assert!(report() != old && bytes(&job) == before, "{number}");
+            assert!(!job.out().join("job").exists());
+        }
+        // What came later counts too.
+        numbered("publish", "7").succeeded();
+        numbered("mesh", "9").refused(1, &["the phase plan is not complete"]);
+    }
+}
+
+/// A report of an earlier version says nothing of the options. It still tells what `verify` needs.
+#[test]
+fn a_report_without_fingerprints_is_that_of_another_job() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = in_files(folder.path(), &hills(3_000, 14), 4_000);
+    let job = Job::on(&files).tiles_of(500);
+    job.report();
+    assert_eq!(status(&job, 1)["state"], "done");
+    let path = job.out().join("report.json");
+    let text = fs::read_to_string(&path).unwrap();
+    let is_new =
+        |line: &&str| ["options_fingerprint", "job_fingerprint", "submission"].iter().any(|name| line.contains(name));
+    let old: String = text.lines().filter(|line| !is_new(line)).map(|line| format!("{line}\n")).collect();
+    let (checksum, found) = seal(old.as_bytes()).unwrap();
+    fs::write(&path, old.replace(&found.to_string(), &checksum.to_string())).unwrap();
+    assert_eq!(status(&job, 1)["state"], "other-results");
+    gdt_batch(job.folder(), &["verify", "out"]).succeeded();
+    // Nor does one that was changed tell that a job is done.
+    fs::write(&path, text.replacen("\"sites\": ", "\"sites\": 1", 1)).unwrap();
+    assert_eq!(status(&job, 1)["state"], "other-results");
 }

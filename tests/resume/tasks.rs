@@ -5,6 +5,7 @@ use crate::rig::{End, Rig, Run, Setup};
 use crate::scattered;
 use std::collections::BTreeSet;
 use std::fs;
+use std::path::Path;
 use std::process::Command;
 
 const PHASES: [&str; 7] = ["plan", "read", "mesh", "join", "tiles", "levels", "publish"];
@@ -171,4 +172,88 @@ fn a_task_that_is_asked_to_stop_keeps_what_it_has_done() {
     let status: serde_json::Value = serde_json::from_str(&again.out).unwrap();
     assert!(status["phases"][2]["done"].as_u64() >= Some(1), "{status}");
     completes(&rig, 3, "after a signal");
+}
+
+fn copy(from: &Path, to: &Path) {
+    let copied = Command::new("cp").arg("-r").args([from, to]).status().unwrap();
+    assert!(copied.success());
+}
+
+/// Does all phases but the last, kills `publish` at every place where it removes something, and then lets tasks, a submission or one process
+/// come. `tasks` is how many tasks there are.
+#[track_caller]
+fn kill_while_cleaning(rig: &Rig, tasks: u32) -> u64 {
+    up_to(rig, "publish", tasks);
+    let before = rig.folder.path().join("before");
+    copy(&rig.out(), &before);
+    let publish = || task(rig, "publish", "1/1");
+    for count in 1.. {
+        rig.forget();
+        copy(&before, &rig.out());
+        let killed = Run::start(publish().env("GDT_FAULT", format!("cleaning:{count}"))).end();
+        if !killed.was_killed() {
+            killed.succeeded();
+            return count - 1;
+        }
+        let what = &format!("cleaning, {count}");
+        let report = fs::read(rig.out().join("report.json")).unwrap();
+        let status = run(rig.command_of(&["status", "job.toml", "--json"])).succeeded();
+        assert_eq!(serde_json::from_str::<serde_json::Value>(&status.out).unwrap()["state"], "done", "{what}");
+        for phase in &PHASES[..6] {
+            let said = run(task(rig, phase, "1/1")).succeeded().out;
+            assert!(said.contains("all results are in place"), "{what}, {phase}: {said}");
+        }
+        let again = match count % 3 {
+            0 => publish(),
+            1 => rig.command(),
+            _ => local(rig, 2),
+        };
+        run(again).succeeded();
+        assert!(!rig.out().join("job").exists(), "{what}");
+        // The job was not done again.
+        assert!(fs::read(rig.out().join("report.json")).unwrap() == report, "{what}");
+        rig.is_complete(what);
+        run(publish()).succeeded();
+        rig.is_complete(what);
+    }
+    0
+}
+
+#[test]
+fn publish_killed_while_it_cleans_up_leaves_a_finished_job() {
+    assert!(kill_while_cleaning(&job_of_parts(), 2) > 20);
+}
+
+#[test]
+fn publish_of_a_small_job_killed_while_it_cleans_up_leaves_a_finished_job() {
+    let rig = Rig::new(&scattered::gaussian(3_000), &Setup::tiles_of(700));
+    assert!(kill_while_cleaning(&rig, 1) > 12);
+}
+
+/// Without a plan, the report alone cannot tell that a job with another style is done.
+#[test]
+fn another_job_is_not_finished_by_the_rest_of_the_first() {
+    let mut rig = job_of_parts();
+    up_to(&rig, "publish", 1);
+    let killed = Run::start(task(&rig, "publish", "1/1").env("GDT_FAULT", "cleaning:13")).end();
+    assert!(killed.was_killed() && !rig.out().join("job/journal").exists(), "{killed:?}");
+    let setup = Setup::tiles_of(700).output("compression = \"none\"");
+    let triangulation = format!("{}\nmax_points_per_part = 4000", setup.triangulation);
+    rig.expect(&Setup { triangulation, input: "files = [\"part_*.csv\"]".into(), ..setup });
+    run(task(&rig, "publish", "1/1")).stopped(&["the phase plan is not complete"]);
+    completes(&rig, 2, "another style");
+}
+
+/// A scheduler starts the task again that was killed, and nothing else.
+#[test]
+fn publish_that_does_a_small_job_alone_goes_on_by_itself() {
+    let rig = Rig::new(&scattered::gaussian(3_000), &Setup::tiles_of(700)).committing_every(0);
+    up_to(&rig, "publish", 1);
+    for count in 1..6 {
+        assert!(
+            Run::start(task(&rig, "publish", "1/1").env("GDT_FAULT", format!("commit:{count}"))).end().was_killed()
+        );
+    }
+    run(task(&rig, "publish", "1/1")).succeeded();
+    rig.is_complete("publish alone");
 }

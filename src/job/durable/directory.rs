@@ -1,17 +1,13 @@
 //! The job directory, which holds everything that a job needs to go on, and the results beside it.
 
-use crate::job::durable::atomic_file::{create_folder, partial_path, remove_file};
-use crate::job::durable::listing::{Leftovers, entries, exists, is_folder};
+use crate::job::durable::atomic_file::{create_folder, remove_file};
+use crate::job::durable::listing::{Leftovers, entries, is_folder};
 use crate::job::durable::lock::{Lock, lock_file};
 use crate::job::durable::replacement::Replacement;
 use crate::job::index::PartIndex;
-use crate::output::checksums::read_file;
 use crate::output::file_names::OutputFiles;
-use crate::{Error, Result, disk, fault};
-use rayon::prelude::*;
-use serde_json::Value;
+use crate::{Error, Result, disk};
 use std::collections::HashSet;
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// The number of files that the records of a store are dealt out to.
@@ -265,147 +261,12 @@ impl JobDirectory {
     pub(crate) fn waiting_results(&self) -> Vec<PathBuf> {
         Leftovers::of(&self.waiting).unwrap_or_default().files
     }
-
-    /// Returns the paths of the files that the job keeps for itself, under their names or their partial names.
-    fn own_files(&self) -> Vec<PathBuf> {
-        let mut files = vec![self.journal(), self.plan(), self.points(), lock_file(&self.job)];
-        files.extend(self.store());
-        let partials: Vec<PathBuf> = files.iter().map(|path| partial_path(path)).collect();
-        files.extend(partials);
-        files
-    }
-
-    /// Checks that no file, and no dangling link, is where a job needs a folder, that no folder, pipe or device is where it reads or
-    /// writes a file (opening a pipe would wait for another process), and that all folders are on one disk.
-    ///
-    /// # Errors
-    /// [`Error::Config`] names what is in the way.
-    pub fn check_nothing_in_the_way(&self) -> Result<()> {
-        let mut own = vec![self.job.clone()];
-        own.extend(self.results.numbered_folders().map(|(folder, _)| folder));
-        let [results, waiting] = [Leftovers::of(&self.results)?, Leftovers::of(&self.waiting)?];
-        own.extend([results.no_folders, waiting.no_folders, results.folders].concat());
-        let mut files = self.own_files().into_iter().chain(results.files).chain(waiting.files);
-        let mut folders = self.results.directory().ancestors().chain(own.iter().map(PathBuf::as_path));
-        let is_in_the_way = |path: &Path| Ok(is_there(path)? && !is_folder(path)?);
-        let (found, what, wanted) = if let Some(found) = find(&mut folders, is_in_the_way)? {
-            let what = if exists(found)? { "is not a directory" } else { "is a link that leads nowhere" };
-            (found.to_path_buf(), what, "a directory")
-        } else if let Some(found) = find(&mut files, is_no_file)? {
-            let what = if is_folder(&found)? { "is a directory" } else { "is a pipe or a device" };
-            (found, what, "a file")
-        } else if let Some(found) = own.into_iter().find(|path| is_elsewhere(path, self.results.directory())) {
-            // Results could not take their places at once.
-            (found, "is on another disk than the output directory", "a directory of the same disk")
-        } else {
-            return Ok(());
-        };
-        Err(Error::Config(format!(
-            "{} {what}, and the job needs {wanted} there: move it away, or choose another [output] directory",
-            found.display()
-        )))
-    }
-
-    /// Checks that a job wrote the files that this job would remove or overwrite.
-    ///
-    /// # Errors
-    /// [`Error::Config`] if such files exist and nothing says that a job wrote them.
-    pub fn check_results_are_ours(&self) -> Result<()> {
-        let report = self.results.report();
-        let report = match read_file(&report) {
-            Err(e) if e.kind() == ErrorKind::NotFound => None,
-            text => serde_json::from_slice::<Value>(&text.map_err(Error::io("read", &report))?).ok(),
-        };
-        let is_ours = |report: &Value| report["generator"].as_str().is_some_and(|by| by.starts_with("gdt-batch"));
-        // Only a job that had passed this check took the lock and left it.
-        if exists(&lock_file(&self.job))? || report.as_ref().is_some_and(is_ours) {
-            return Ok(());
-        }
-        match find(&mut Leftovers::of(&self.results)?.files.into_iter(), is_there)? {
-            None => Ok(()),
-            Some(found) => Err(Error::Config(format!(
-                "{} exists, a job would overwrite or remove it, and nothing says that an earlier job wrote it: choose another \
-                 [output] directory, or move it away",
-                found.display()
-            ))),
-        }
-    }
-
-    /// Removes everything that only the steps need.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if a file cannot be removed.
-    pub fn remove_job(&self) -> Result<()> {
-        // In parallel, because the system takes a while to free the cache of large files.
-        self.store().into_par_iter().chain([self.points()]).try_for_each(|file| remove_at_end(&file))?;
-        remove_at_end(&self.plan())?;
-        remove_at_end(&self.journal())?;
-        let waiting = self.waiting.directory();
-        disk::remove_tree(waiting).map_err(Error::io("remove", waiting))?;
-        self.clear_parts()?;
-        // The lock goes last, because it marks the directory as a job's own: a kill or a power failure before that leaves what the
-        // next job may take.
-        disk::sync_folder(&self.job).map_err(Error::io("write", &self.job))?;
-        match disk::remove_tree(&self.job) {
-            // This process still has the lock. The folder is empty when it ends, and the next job takes an empty one.
-            Err(_) if only_open_files_are_left(&self.job) => Ok(()),
-            outcome => outcome.map_err(Error::io("remove", &self.job)),
-        }
-    }
-}
-
-/// Tells whether something other than a regular file, or a link to one, is at `path`.
-fn is_no_file(path: &Path) -> Result<bool> {
-    let data = disk::metadata(path).map_err(Error::io("read", path))?;
-    Ok(data.is_some_and(|data| !data.is_file()))
-}
-
-/// Tells whether something is at `path`, if only a link that leads nowhere.
-fn is_there(path: &Path) -> Result<bool> {
-    disk::link_metadata(path).map(|data| data.is_some()).map_err(Error::io("read", path))
-}
-
-/// Returns the first of `paths` for which `holds`, if that can be told of all before it.
-fn find<P: AsRef<Path>>(
-    paths: &mut dyn Iterator<Item = P>,
-    holds: impl Fn(&Path) -> Result<bool>,
-) -> Result<Option<P>> {
-    for path in paths {
-        if holds(path.as_ref())? {
-            return Ok(Some(path));
-        }
-    }
-    Ok(None)
-}
-
-/// Tells whether nothing is left in `folder` but files that were removed while a process had them open: NFS keeps them until they are
-/// closed, under names of its own.
-fn only_open_files_are_left(folder: &Path) -> bool {
-    let is_open = |path: &PathBuf| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(".nfs"));
-    disk::list(folder).is_ok_and(|left| !left.is_empty() && left.iter().all(is_open))
-}
-
-fn remove_at_end(file: &Path) -> Result<()> {
-    remove_file(file)?;
-    fault::point("cleaning");
-    Ok(())
-}
-
-/// Tells whether both folders exist, and on different disks.
-#[cfg(unix)]
-fn is_elsewhere(folder: &Path, other: &Path) -> bool {
-    let disk = |path: &Path| path.metadata().ok().map(|data| std::os::unix::fs::MetadataExt::dev(&data));
-    disk(folder).zip(disk(other)).is_some_and(|(a, b)| a != b)
-}
-
-#[cfg(not(unix))]
-fn is_elsewhere(_: &Path, _: &Path) -> bool {
-    false
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::job::durable::cleaning::remove_job;
     use std::fs;
 
     fn names(names: &[&str]) -> HashSet<PathBuf> {
@@ -428,7 +289,7 @@ mod tests {
         directory.replace_results(&names(&["report.json"])).unwrap();
         assert!(theirs.exists() && !old.exists() && !directory.results().levels().exists());
         // A kill may leave an empty job directory: the next job may take it.
-        directory.remove_job().unwrap();
+        remove_job(&directory).unwrap();
         fs::create_dir(output.path().join("job")).unwrap();
         drop(directory.create().unwrap());
         fs::rename(output.path().join("job/lock"), output.path().join("job/theirs")).unwrap();
@@ -489,16 +350,6 @@ mod tests {
                 assert!(gone.iter().all(|folder| !output.path().join(folder).exists()), "cut off after {done}");
             }
         }
-    }
-
-    #[test]
-    fn files_that_nfs_keeps_while_they_are_open_are_told_from_others() {
-        let folder = tempfile::tempdir().unwrap();
-        assert!(!only_open_files_are_left(folder.path()));
-        fs::write(folder.path().join(".nfs0000000001c6a1f200000001"), "").unwrap();
-        assert!(only_open_files_are_left(folder.path()));
-        fs::write(folder.path().join("lock"), "").unwrap();
-        assert!(!only_open_files_are_left(folder.path()));
     }
 
     #[test]

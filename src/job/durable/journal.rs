@@ -173,12 +173,7 @@ where
     S: StepKey,
     K: RecordKey,
 {
-    let Some(mut lines) = JournalLines::open(directory)? else { return Ok(None) };
-    let (header, mut entries) = (lines.next()?, Vec::new());
-    while let Some(entry) = if header.is_some() { lines.next()? } else { None } {
-        entries.push(entry);
-    }
-    Ok(Some((header, entries)))
+    read_with(directory, JournalLines::next)
 }
 
 /// The step of a line.
@@ -197,12 +192,28 @@ where
     S: StepKey,
     K: RecordKey,
 {
+    read_with(directory, |lines| {
+        while let Some(StepOfLine { step }) = lines.next()? {
+            if wanted(step) {
+                return Ok(lines.again());
+            }
+        }
+        Ok(None)
+    })
+}
+
+/// Reads the header, and the entries that `next` returns, until it returns none.
+fn read_with<H, S, K>(
+    directory: &JobDirectory,
+    mut next: impl FnMut(&mut JournalLines) -> Result<Option<JournalEntry<S, K>>>,
+) -> Result<Option<ReadJournal<H, S, K>>>
+where
+    H: DeserializeOwned,
+{
     let Some(mut lines) = JournalLines::open(directory)? else { return Ok(None) };
     let (header, mut entries) = (lines.next()?, Vec::new());
-    while let Some(StepOfLine { step }) = if header.is_some() { lines.next()? } else { None } {
-        if wanted(step) {
-            entries.extend(lines.again());
-        }
+    while let Some(entry) = if header.is_some() { next(&mut lines)? } else { None } {
+        entries.push(entry);
     }
     Ok(Some((header, entries)))
 }

@@ -3,6 +3,7 @@
 //! [`journal::Journal`]).
 
 pub mod atomic_file;
+pub mod cleaning;
 pub mod columns;
 pub(crate) mod committer;
 pub mod directory;
@@ -10,6 +11,7 @@ pub mod journal;
 mod listing;
 pub mod lock;
 pub mod mapped;
+pub(crate) mod obstacles;
 pub mod packing;
 mod replacement;
 pub mod store;

@@ -5,11 +5,15 @@ use crate::job::options::JobOptions;
 use crate::job::plan::input_identity::{InputIdentities, RenamedInputs};
 use crate::job::plan::inputs::input_paths;
 use crate::job::plan::lattice_choice::LatticeCoarsening;
+use crate::output::checksums::Checksum;
 use crate::output::options::ColorChoice;
+use crate::triangulation::options::Backend;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 /// The first line of a job's journal.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -21,6 +25,25 @@ pub struct JobHeader {
     /// Tells the folders of this job's parts from those of others; 0 for a job of one part.
     #[serde(default)]
     pub id: u64,
+    /// The submission that started it over; 0 if none did.
+    #[serde(default)]
+    pub submission: u64,
+    /// When a job of several parts was begun.
+    #[serde(default)]
+    pub begun: Option<SystemTime>,
+}
+
+/// What tells a job from others in its report.
+#[derive(Clone, Debug, Default)]
+pub struct JobIdentity {
+    /// Tells the options, as far as results depend on them, from others.
+    pub options: Checksum,
+    /// Tells the options and the inputs from others.
+    pub job: Checksum,
+    /// Tells what the inputs hold from what others do.
+    pub inputs: String,
+    /// The submission that started it over; 0 if none did.
+    pub submission: u64,
 }
 
 /// Version of the records in the store, of the plan, of the names of results, and of which nodes merge. It changes with every change of these, so that no
@@ -103,6 +126,34 @@ impl Fingerprint {
     /// [`Error::Io`] if it cannot be read.
     pub(crate) fn has_same_content(&self, known: &Path, path: &Path) -> Result<bool> {
         self.files.has_same_content(known, path)
+    }
+
+    /// Returns what tells options from others that lead to other bytes. It looks at no input, and not at paths.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] if the options cannot be written down.
+    pub(crate) fn of_options(options: &JobOptions) -> Result<Checksum> {
+        let Fingerprint { program, mesh, style, memory, .. } =
+            Fingerprint::of_files(options, InputIdentities::default())?;
+        // The mesh is the same, but not the order of its triangles.
+        let is_reference = options.triangulation.backend == Backend::Reference;
+        let [mesh, style] = [&mesh, &style].map(|values| values.iter().collect::<BTreeMap<_, _>>());
+        let text = serde_json::to_vec(&(program, mesh, style, memory, is_reference));
+        Ok(Checksum::of(&text.map_err(|e| Error::Broken(format!("the options: {e}")))?))
+    }
+
+    /// Returns what tells a job from others that lead to other bytes. `options` is what [`Fingerprint::of_options`] says of its options.
+    pub(crate) fn of_job(&self, options: Checksum) -> Checksum {
+        Checksum::of(format!("{options} {}", self.files.text()).as_bytes())
+    }
+
+    /// Returns what tells the job with these `options` from others.
+    ///
+    /// # Errors
+    /// As [`Fingerprint::of_options`].
+    pub(crate) fn identity(&self, options: &JobOptions, submission: u64) -> Result<JobIdentity> {
+        let options = Fingerprint::of_options(options)?;
+        Ok(JobIdentity { options, job: self.of_job(options), inputs: self.of_inputs(), submission })
     }
 
     /// Returns what tells the content of the inputs from that of others, whatever their names.

@@ -50,6 +50,16 @@ impl InputIdentities {
         self.0.iter().map(|file| file.content.samples).collect()
     }
 
+    /// Returns what the files hold, in their order, as far as sizes, samples and times tell: whoever edits a few bytes in place changes at
+    /// least the time. Times count in whole seconds, because file systems keep different fractions.
+    pub(crate) fn text(&self) -> String {
+        let text = |InputIdentity { content, .. }: &InputIdentity| {
+            let ContentIdentity { samples: FileSamples { bytes, samples }, modified } = content;
+            format!("{bytes} {samples:016x} {}\n", modified / 1_000_000_000)
+        };
+        self.0.iter().map(text).collect()
+    }
+
     /// Returns the names of the files that have changed since `earlier`; none if the files have the same contents in the same
     /// order.
     pub(crate) fn since(&self, earlier: &InputIdentities) -> Vec<String> {

@@ -2,6 +2,7 @@
 
 use crate::input::Source;
 use crate::job::durable::directory::JobDirectory;
+use crate::job::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours};
 use crate::job::machine;
 use crate::job::options::JobOptions;
 use crate::job::plan::budget::workers;
@@ -73,8 +74,8 @@ pub struct Preflight {
 /// Every error that would stop the job before its first point; see [`make_plan`].
 pub fn check(options: &JobOptions) -> Result<Preflight> {
     let directory = JobDirectory::new(&options.output.directory);
-    directory.check_nothing_in_the_way()?;
-    directory.check_results_are_ours()?;
+    check_nothing_in_the_way(&directory)?;
+    check_results_are_ours(&directory)?;
     let plan = make_plan(options, LatticeCoarsening::default())?;
     let threads = workers(options, plan.records)?;
     if has_filter(&plan) {

@@ -9,6 +9,7 @@ use crate::input::{PointCounts, TextReading};
 use crate::job::levels::make_level::LevelStats;
 use crate::job::machine;
 use crate::job::mesh::leaf::LeafStats;
+use crate::job::plan::fingerprint::JobIdentity;
 use crate::job::plan::job_plan::{Plan, SkippedInput};
 use crate::job::plan::text_inputs::text_reading;
 use crate::job::progress::clock::JobClock;
@@ -71,7 +72,8 @@ pub struct Report {
     pub bytes_written: u64,
     /// The most bytes that temporary files took.
     pub bytes_temporary: u64,
-    /// The largest resident set of the process, in bytes; `None` where the system does not tell.
+    /// The largest resident set of a process of the job, in bytes; `None` where the system does not tell. Of tasks that did the phase
+    /// `plan` nothing is known.
     pub peak_memory: Option<u64>,
     /// The memory the job was given, in bytes.
     pub memory_limit: u64,
@@ -79,7 +81,7 @@ pub struct Report {
     pub threads: usize,
     /// The number of steps that an interrupted run had finished. The stages include their times only in a job of several parts.
     pub resumed: u64,
-    /// Seconds from start to end, of the process that wrote the report.
+    /// Seconds from start to end, of the process that wrote the report. If tasks did the job, from the end of their plan.
     pub wall_s: f64,
     /// Seconds of processor time of all threads, including those of no stage.
     #[serde(default)]
@@ -94,6 +96,15 @@ pub struct Report {
     pub texts: TextReading,
     /// Tells the content of all inputs from that of others, whatever their names and their order: a hash of sizes and samples.
     pub inputs_fingerprint: String,
+    /// Tells the options, as far as results depend on them, and the version of the program from others.
+    #[serde(default)]
+    pub options_fingerprint: Option<Checksum>,
+    /// Tells the job from others: by its options, and by the sizes, times and samples of its inputs in their order.
+    #[serde(default)]
+    pub job_fingerprint: Option<Checksum>,
+    /// The number of the submission that started the job over (`gdt-batch submit --restart`); 0 if none did.
+    #[serde(default)]
+    pub submission: u64,
     /// The digest of all vertices with their heights, on the lattice.
     pub vertex_digest: VertexDigest,
     /// The checksum of `XXH128SUMS`, which has those of all other results.
@@ -161,6 +172,10 @@ pub struct ReportParts {
     pub parts: u64,
     /// The part that took the longest.
     pub slowest_part: Option<SlowestPart>,
+    /// The largest resident set of the processes that did other phases, in bytes.
+    pub peak_memory: Option<u64>,
+    /// Seconds from start to end.
+    pub wall_s: f64,
     /// Seconds of processor time of the tasks that did other phases.
     pub cpu_s_of_tasks: f64,
     /// What the user should know about the results.
@@ -179,8 +194,8 @@ pub struct ReportParts {
     pub resumed: u64,
     /// The start of the job.
     pub clock: JobClock,
-    /// What tells the content of the inputs from that of others.
-    pub inputs_fingerprint: String,
+    /// What tells the job from others.
+    pub identity: JobIdentity,
     /// The checksum of the list of the other results.
     pub file_list: Checksum,
 }
@@ -223,17 +238,20 @@ impl Report {
             crs: plan.crs.name.clone(),
             bytes_written: parts.tiles.bytes + parts.levels.bytes + parts.other_bytes,
             bytes_temporary: parts.temporary,
-            peak_memory: machine::peak_memory(),
+            peak_memory: machine::peak_memory().max(parts.peak_memory),
             memory_limit: parts.memory,
             threads: parts.threads,
             resumed: parts.resumed,
-            wall_s: parts.clock.wall_s(),
+            wall_s: parts.wall_s,
             cpu_s: parts.clock.cpu_s() + parts.cpu_s_of_tasks,
             stages: parts.stages,
             warnings,
             input: InputOptions { files: Vec::new(), ..plan.options.input.clone() },
             texts: text_reading(plan),
-            inputs_fingerprint: parts.inputs_fingerprint,
+            inputs_fingerprint: parts.identity.inputs,
+            options_fingerprint: Some(parts.identity.options),
+            job_fingerprint: Some(parts.identity.job),
+            submission: parts.identity.submission,
             vertex_digest: parts.leaves.vertices,
             file_list: parts.file_list,
             checksum: Checksum::default(),

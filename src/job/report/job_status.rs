@@ -25,6 +25,9 @@ pub struct JobStatus {
 pub enum JobState {
     /// There is no plan of this job.
     NotPlanned,
+    /// There is no plan of this job, and the results in place are those of another: with other options or inputs, or of another version of
+    /// the program.
+    OtherResults,
     /// It is under way, or waits to go on.
     UnderWay,
     /// It is not done part by part: the phase publish does all of it.
@@ -52,6 +55,9 @@ impl fmt::Display for JobStatus {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let state = match self.state {
             JobState::NotPlanned => "there is no plan of this job yet",
+            JobState::OtherResults => {
+                "there is no plan of this job yet; the results in place are of other options, inputs, or program"
+            }
             JobState::UnderWay => "under way, or waiting to go on",
             JobState::LeftToPublish => "not done part by part: the phase publish does all of it",
             JobState::Done => "done: all results are in place",

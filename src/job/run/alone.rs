@@ -1,9 +1,11 @@
 //! A note in the job directory: tasks leave the job to one process, which does all of it when the others would publish. So one bad file
 //! ends no job on many machines.
 
+use crate::job::durable::atomic_file::remove_file;
 use crate::job::durable::directory::JobDirectory;
 use crate::{Error, Result, disk};
-use std::path::PathBuf;
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
 
 /// How one process does the job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,30 +22,53 @@ impl Alone {
 
     const ALL: [Alone; 2] = [Alone::InOnePart, Alone::AsItIs];
 
-    fn path(self, directory: &JobDirectory) -> PathBuf {
-        directory.job().join(match self {
+    fn name(self) -> &'static str {
+        match self {
             Alone::InOnePart => "alone-in-one-part",
             Alone::AsItIs => "alone",
-        })
+        }
     }
 
-    /// Leaves the note. Any number of tasks may do so, because the file is empty.
+    /// Leaves the note for the job of `submission`. Any number of tasks may do so, because the file is empty.
     ///
     /// # Errors
     /// [`Error::Io`] if it cannot be written.
-    pub(crate) fn note(self, directory: &JobDirectory) -> Result<()> {
-        let path = self.path(directory);
+    pub(crate) fn note(self, directory: &JobDirectory, submission: u64) -> Result<()> {
+        let path = directory.job().join(format!("{}.{submission}", self.name()));
         disk::open_or_create(&path).map_err(Error::io("create", &path))?;
         disk::sync_folder(directory.job()).map_err(Error::io("write", directory.job()))
     }
 
-    /// Returns what a note says, if there is one.
+    /// Returns the notes that are there, as the journal would name them.
     ///
     /// # Errors
     /// [`Error::Io`] if the job directory cannot be listed.
-    pub(crate) fn find(directory: &JobDirectory) -> Result<Option<Alone>> {
+    pub(crate) fn notes(directory: &JobDirectory) -> Result<HashSet<PathBuf>> {
+        let there = disk::list(directory.job()).map_err(Error::io("read", directory.job()))?;
+        let is_note = |path: &&PathBuf| Alone::ALL.into_iter().any(|alone| alone.is_said_by(path, 0));
+        Ok(there.iter().filter(is_note).map(|path| directory.name(path)).collect())
+    }
+
+    /// Removes all notes, because tasks do the job.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if one cannot be removed.
+    pub(crate) fn forget(directory: &JobDirectory) -> Result<()> {
+        Alone::notes(directory)?.iter().try_for_each(|name| remove_file(&directory.file(name)))
+    }
+
+    fn is_said_by(self, path: &Path, submission: u64) -> bool {
+        let name = path.file_name().and_then(|name| name.to_str()).and_then(|name| name.split_once('.'));
+        name.is_some_and(|(name, of)| name == self.name() && of.parse().is_ok_and(|of: u64| of >= submission))
+    }
+
+    /// Returns what a note of `submission`, or of a later one, says, if there is one.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the job directory cannot be listed.
+    pub(crate) fn find(directory: &JobDirectory, submission: u64) -> Result<Option<Alone>> {
         // Some network file systems remember for a while that a file is not there, but not what is in a folder.
         let there = disk::list(directory.job()).map_err(Error::io("read", directory.job()))?;
-        Ok(Alone::ALL.into_iter().find(|alone| there.contains(&alone.path(directory))))
+        Ok(Alone::ALL.into_iter().find(|alone| there.iter().any(|path| alone.is_said_by(path, submission))))
     }
 }

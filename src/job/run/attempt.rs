@@ -1,8 +1,10 @@
 //! Attempts at a job: each begins where the last run stopped, and ends with a clean directory or with steps to go on from. If the
 //! finished mesh proves too fine for single precision, another attempt takes a coarser lattice.
 
+use crate::job::durable::cleaning::remove_job;
 use crate::job::durable::directory::JobDirectory;
 use crate::job::durable::lock::Lock;
+use crate::job::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours};
 use crate::job::options::{JobOptions, RunOptions};
 use crate::job::partition::result::Partition;
 use crate::job::plan::budget::workers;
@@ -15,6 +17,7 @@ use crate::job::progress::clock::JobClock;
 use crate::job::progress::stage::{JobProgress, ProgressOutput};
 use crate::job::report::job_report::Report;
 use crate::job::run::alone::Alone;
+use crate::job::run::finished::{InPlace, results_in_place};
 use crate::job::run::part_entries::StepsOfParts;
 use crate::job::run::read_step::note_skipped;
 use crate::job::run::resume::{self, EarlierRun, RunStart, place_results_of_finished_job};
@@ -56,6 +59,8 @@ struct JobRequest<'a> {
     clock: JobClock,
     walk: Walk,
     work: EarlierWork,
+    /// The submission that started the job over; 0 if none did.
+    submission: u64,
 }
 
 /// Runs a job, or what an interrupted run left of it.
@@ -70,14 +75,21 @@ pub(crate) fn run_until_it_fits(
 ) -> Result<Report> {
     let clock = JobClock::start();
     let directory = JobDirectory::new(&options.output.directory);
-    directory.check_nothing_in_the_way()?;
+    check_nothing_in_the_way(&directory)?;
     let (mut lock, mut earlier) = (None, None);
-    let journal = directory.journal();
-    if disk::exists(&journal).map_err(Error::io("read", &journal))? {
+    if !disk::list(directory.job()).map_err(Error::io("read", directory.job()))?.is_empty() {
         // Before anything else can fail: an earlier run may have been cut off while its results took their places.
         lock = Some(directory.lock()?);
         earlier = read_earlier(&directory, run)?;
+        if let (None, false) = (&earlier, run.restart)
+            && let InPlace::ThisJob(report) = results_in_place(&directory, options, run.submission, || Ok(false))?
+        {
+            run.progress.note("the interrupted run had put all its results in place");
+            on_threads(workers(options, 0)?, || remove_job(&directory))?;
+            return Ok(*report);
+        }
     }
+    let submission = earlier.as_ref().map_or(0, |earlier| earlier.submission).max(run.submission);
     // Before the inputs, so that a job that must have a GPU fails at once if there is none.
     let memory = options.limits.memory.0;
     let triangulator = match work {
@@ -86,7 +98,7 @@ pub(crate) fn run_until_it_fits(
         EarlierWork::ByTasks => Triangulator::without_gpu(&options.triangulation),
     };
     let fingerprint = on_threads(workers(options, 0)?, || Fingerprint::of(options))?;
-    let job = JobRequest { options, run, triangulator, directory, fingerprint, clock, walk, work };
+    let job = JobRequest { options, run, triangulator, directory, fingerprint, clock, walk, work, submission };
     let mut coarsening = coarsening_of(&job.directory, earlier.as_ref(), &job.fingerprint)?;
     loop {
         let outcome = attempt(&job, coarsening, earlier.take(), lock.take());
@@ -129,7 +141,7 @@ pub(crate) fn coarsening_of(
     let Some(mut known) = earlier.and_then(|earlier| earlier.coarsening(fingerprint)) else {
         return Ok(LatticeCoarsening::default());
     };
-    known.one_part |= Alone::find(directory)? == Some(Alone::InOnePart);
+    known.one_part |= Alone::find(directory, 0)? == Some(Alone::InOnePart);
     Ok(known)
 }
 
@@ -139,7 +151,7 @@ pub(crate) fn read_earlier(directory: &JobDirectory, run: RunOptions) -> Result<
     let mut earlier = EarlierRun::read(directory)?;
     if let Some(earlier) = earlier.as_mut() {
         earlier.place_whole_results(directory)?;
-        if run.restart {
+        if run.restart || earlier.submission < run.submission {
             earlier.forget();
         } else if !earlier.is_readable() {
             run.progress.note("the journal of the earlier run is damaged or of another version; starting over");
@@ -155,7 +167,8 @@ fn attempt(
     lock: Option<Lock>,
 ) -> Result<Report> {
     let JobRequest { options, run, ref directory, clock, .. } = *job;
-    let header = JobHeader { fingerprint: job.fingerprint.clone(), coarsening, id: 0 };
+    let header =
+        JobHeader { fingerprint: job.fingerprint.clone(), coarsening, id: 0, submission: job.submission, begun: None };
     let stage = JobProgress::new(run.progress, clock, Vec::new()).stage("plan", 1, "job");
     let plan = match earlier.as_ref().and_then(|earlier| earlier.plan(directory, &header, options)) {
         Some(plan) => plan,
@@ -169,7 +182,7 @@ fn attempt(
     if !run.force && job.work == EarlierWork::Interrupted {
         on_threads(threads, || require_room(&plan, threads))?;
     }
-    directory.check_results_are_ours()?;
+    check_results_are_ours(directory)?;
     let mut earlier = earlier;
     let lock_of_job = match lock {
         Some(lock) => lock,
@@ -183,10 +196,12 @@ fn attempt(
     if !lock_of_job.is_real() {
         progress.note(NO_LOCKS);
     }
+    // Tasks have worked since the plan, and this process only ends it.
+    let begun = earlier.as_ref().filter(|_| job.work == EarlierWork::ByTasks).and_then(|earlier| earlier.begun());
     let complete = earlier.as_ref().map(|earlier| earlier.complete_report(directory, &header)).transpose()?;
     if let Some(report) = complete.flatten() {
         progress.note("the interrupted run had written all its results");
-        on_threads(threads, || directory.remove_job())?;
+        on_threads(threads, || remove_job(directory))?;
         return Ok(report);
     }
     on_threads(threads, || {
@@ -207,7 +222,8 @@ fn attempt(
             progress,
             threads,
             clock,
-            inputs_fingerprint: job.fingerprint.of_inputs(),
+            begun,
+            identity: job.fingerprint.identity(options, job.submission)?,
             job_id,
             resumed: if job.work == EarlierWork::ByTasks { 0 } else { journal.taken_over() + resumed },
             checks: job.work == EarlierWork::Interrupted,
@@ -236,7 +252,7 @@ fn end(directory: &JobDirectory, outcome: Result<Report>, steps: u64) -> Result<
             Err(Error::Resumable { why: Box::new(why), steps, job: directory.job().into() })
         }
         outcome => {
-            let cleaned = directory.remove_job();
+            let cleaned = remove_job(directory);
             // The first error is the one to report.
             outcome.and_then(|report| cleaned.map(|()| report))
         }

@@ -65,6 +65,8 @@ pub(crate) struct MeshFigures {
     /// The number of parts.
     pub(crate) parts: u64,
     pub(crate) slowest_part: Option<SlowestPart>,
+    /// The largest resident set of the processes that did other phases, in bytes.
+    pub(crate) peak_memory: Option<u64>,
     /// Seconds of processor time of the tasks that did other phases.
     pub(crate) cpu_s_of_tasks: f64,
 }
@@ -145,11 +147,14 @@ pub(crate) fn publish(
 /// # Errors
 /// [`crate::Error::Io`] if it cannot be written.
 pub(crate) fn write_report(run: &RunContext, plan: &Plan, mesh: MeshFigures, published: Published) -> Result<Report> {
-    let MeshFigures { points, leaves, tiles, temporary, files, parts, slowest_part, cpu_s_of_tasks } = mesh;
+    let MeshFigures { points, leaves, tiles, temporary, files, parts, slowest_part, peak_memory, cpu_s_of_tasks } =
+        mesh;
     let list = write_file_list(run, files)?;
     let parts = ReportParts {
         parts,
         slowest_part,
+        peak_memory,
+        wall_s: run.wall_s(),
         cpu_s_of_tasks,
         points,
         leaves,
@@ -166,7 +171,7 @@ pub(crate) fn write_report(run: &RunContext, plan: &Plan, mesh: MeshFigures, pub
         memory: plan.options.limits.memory.0,
         resumed: run.resumed,
         clock: run.clock,
-        inputs_fingerprint: run.inputs_fingerprint.clone(),
+        identity: run.identity.clone(),
         file_list: list.checksum,
     };
     let (report, text) = Report::new(plan, parts).sealed()?;

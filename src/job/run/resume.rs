@@ -16,6 +16,7 @@ use crate::job::plan::lattice_choice::LatticeCoarsening;
 use crate::job::progress::stage::{ProgressOutput, Stage};
 use crate::job::records::{JobStep, Journal, JournalEntry, Store};
 use crate::job::report::job_report::Report;
+use crate::job::run::alone::Alone;
 use crate::job::run::part_entries::{PartHeader, StepsOfParts, open_store, records_of};
 use crate::output::options::MaxEdge;
 use crate::{Error, Result, interrupt};
@@ -23,6 +24,7 @@ use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use std::io::{self, ErrorKind};
 use std::path::PathBuf;
+use std::time::SystemTime;
 
 /// An earlier run of a job in the same directory, as its journal tells. The journal is read once.
 pub(crate) struct EarlierRun {
@@ -31,6 +33,8 @@ pub(crate) struct EarlierRun {
     pub(super) entries: Vec<JournalEntry>,
     /// What the journals of its parts name.
     pub(super) of_parts: StepsOfParts,
+    /// The submission that started the job over; 0 if none did.
+    pub(crate) submission: u64,
     /// Whether all its results are in place.
     is_complete: bool,
 }
@@ -43,11 +47,12 @@ impl EarlierRun {
     pub(crate) fn read(directory: &JobDirectory) -> Result<Option<EarlierRun>> {
         let run = journal::read::<JobHeader, JobStep, _>(directory)?;
         let Some((header, entries)) = run else { return Ok(None) };
+        let submission = header.as_ref().map_or(0, |header| header.submission);
         let of_parts = match &header {
             Some(JobHeader { id: id @ 1.., .. }) => StepsOfParts::of(directory, *id)?,
             _ => StepsOfParts::default(),
         };
-        Ok(Some(EarlierRun { header, entries, of_parts, is_complete: false }))
+        Ok(Some(EarlierRun { submission, header, entries, of_parts, is_complete: false }))
     }
 
     fn has_report(&self) -> bool {
@@ -79,6 +84,11 @@ impl EarlierRun {
     /// Tells whether its journal can be read.
     pub(crate) fn is_readable(&self) -> bool {
         self.header.is_some()
+    }
+
+    /// Returns when the job was begun, if it is one of several parts.
+    pub(crate) fn begun(&self) -> Option<SystemTime> {
+        self.header.as_ref().and_then(|header| header.begun)
     }
 
     /// Forgets all steps, so that the job starts over.
@@ -175,7 +185,7 @@ pub(crate) fn start<'a>(
     progress: ProgressOutput,
 ) -> Result<RunStart<'a>> {
     let kept = earlier.map(|earlier| review(directory, header, earlier, max_edge, progress)).transpose()?;
-    let KeptSteps { entries, files, partition, names } = kept.flatten().unwrap_or_default();
+    let KeptSteps { entries, mut files, partition, names } = kept.flatten().unwrap_or_default();
     if !entries.is_empty() {
         progress.note(&format!("going on with an interrupted run: {} steps are done", entries.len()));
     }
@@ -187,6 +197,8 @@ pub(crate) fn start<'a>(
         remove_file(&directory.journal())?;
     }
     directory.clear_parts()?;
+    // A task that is killed finds its note again.
+    files.extend(Alone::notes(directory)?);
     directory.clear(&files)?;
     let journal = Journal::begin(directory, &header, entries)?;
     Ok(RunStart { store: open_store(directory, &records)?, journal, partition, job_id: 0, resumed: 0 })

@@ -7,10 +7,11 @@ use crate::job::partition::result::Partition;
 use crate::job::plan::fingerprint::{JobChange, JobHeader};
 use crate::job::progress::stage::{JobProgress, ProgressOutput};
 use crate::job::records::{JobStep, Journal, JournalEntry};
+use crate::job::run::alone::Alone;
 use crate::job::run::part_entries::{forget_levels, open_store, records_of};
 use crate::job::run::resume::{EarlierRun, KeptSteps, ResumeReview, RunStart};
 use crate::output::options::MaxEdge;
-use std::collections::HashSet;
+use std::time::SystemTime;
 
 /// Begins a run of a job of several parts, as [`crate::job::run::resume::start`] does of others. What is in the folders of its parts stays if the job is the same.
 ///
@@ -37,13 +38,13 @@ pub(crate) fn start_parts<'a>(
                 true => header.fingerprint.clone(),
                 false => header.fingerprint.with_names_of(&old.fingerprint),
             };
-            (entries, JobHeader { fingerprint, coarsening: header.coarsening, id: old.id }, of_parts)
+            (entries, JobHeader { fingerprint, id: old.id, begun: old.begun, ..*header }, of_parts)
         }
         None => {
             remove_file(&directory.journal())?;
             directory.clear_parts()?;
-            directory.clear(&HashSet::new())?;
-            (Vec::new(), JobHeader { id: new_id(), ..header.clone() }, 0)
+            directory.clear(&Alone::notes(directory)?)?;
+            (Vec::new(), JobHeader { id: new_id(), begun: Some(SystemTime::now()), ..header.clone() }, 0)
         }
     };
     create_folder(&directory.output().tiles())?;
@@ -74,7 +75,7 @@ fn same_job_of_parts(
 
 /// Returns a number that no other run has.
 fn new_id() -> u64 {
-    let time = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    let time = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
     let nanoseconds = time.map_or(0, |time| time.as_nanos() as u64);
     (nanoseconds ^ u64::from(std::process::id()) << 40).max(1)
 }

@@ -3,6 +3,7 @@
 use crate::Result;
 use crate::job::durable::directory::JobDirectory;
 use crate::job::durable::journal::JournalPosition;
+use crate::job::plan::fingerprint::JobIdentity;
 use crate::job::progress::clock::JobClock;
 use crate::job::progress::stage::{JobProgress, Stage};
 use crate::job::progress::stats::StageStats;
@@ -10,6 +11,7 @@ use crate::job::records::{JobStep, Journal, Store};
 use crate::job::run::temporary_bytes::TemporaryBytes;
 use crate::triangulation::Triangulator;
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::SystemTime;
 
 /// A run whose directory is locked, with its store and journal.
 pub(crate) struct RunContext<'a> {
@@ -20,8 +22,10 @@ pub(crate) struct RunContext<'a> {
     pub(crate) progress: &'a JobProgress,
     pub(crate) threads: usize,
     pub(crate) clock: JobClock,
-    /// What tells the content of the inputs from that of others.
-    pub(crate) inputs_fingerprint: String,
+    /// When tasks began what this run ends.
+    pub(crate) begun: Option<SystemTime>,
+    /// What tells the job from others.
+    pub(crate) identity: JobIdentity,
     /// Tells the folders of this job's parts from those of others.
     pub(crate) job_id: u64,
     /// The number of steps that an interrupted run had finished.
@@ -38,6 +42,12 @@ impl RunContext<'_> {
     /// Counts the units of `step` as done, by this run or by an earlier one.
     pub(crate) fn count(&self, stage: &Stage, step: JobStep, amount: u64) {
         if self.journal.has(step) { stage.take_over(amount) } else { stage.advance(amount) }
+    }
+
+    /// Returns the seconds since the job began. Machines may have clocks that differ, so it is no less than what this process took.
+    pub(crate) fn wall_s(&self) -> f64 {
+        let since = self.begun.and_then(|begun| begun.elapsed().ok()).map_or(0.0, |since| since.as_secs_f64());
+        since.max(self.clock.wall_s())
     }
 
     /// Adds a stage to the report, or to the stage of the same name: parts have the same stages.

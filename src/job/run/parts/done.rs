@@ -20,6 +20,8 @@ pub(crate) struct Done<T> {
     pub(crate) figures: T,
     /// How long it took, as far as the last process did it.
     pub(crate) seconds: f64,
+    /// The largest resident set of that process, in bytes, up to the end of the phase.
+    pub(crate) peak_memory: Option<u64>,
     pub(crate) stages: Vec<StageStats>,
 }
 
@@ -78,11 +80,36 @@ impl PartProgress {
         of(&self.read) + of(&self.mesh) + of(&self.tiles) + of(&self.levels)
     }
 
+    /// Returns the largest resident set of the processes that did the phases.
+    pub(crate) fn peak_memory(&self) -> Option<u64> {
+        fn of<T>(done: &Option<Done<T>>) -> Option<u64> {
+            done.as_ref().and_then(|done| done.peak_memory)
+        }
+        of(&self.read).max(of(&self.mesh)).max(of(&self.tiles)).max(of(&self.levels))
+    }
+
     /// Returns the stages of the phases, in order.
     pub(crate) fn stages(&self) -> [&[StageStats]; 4] {
         fn of<T>(done: &Option<Done<T>>) -> &[StageStats] {
             done.as_ref().map_or(&[], |done| &done.stages)
         }
         [of(&self.read), of(&self.mesh), of(&self.tiles), of(&self.levels)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_hungriest_phase_counts() {
+        fn done<T: Default>(peak_memory: Option<u64>) -> Option<Done<T>> {
+            Some(Done { figures: T::default(), seconds: 1.0, peak_memory, stages: Vec::new() })
+        }
+        assert_eq!(PartProgress::default().peak_memory(), None);
+        let progress = PartProgress { tiles: done(Some(7)), levels: done(Some(5)), ..PartProgress::default() };
+        assert_eq!(progress.peak_memory(), Some(7));
+        let progress = PartProgress { tiles: done(None), levels: done(Some(5)), ..PartProgress::default() };
+        assert_eq!(progress.peak_memory(), Some(5));
     }
 }

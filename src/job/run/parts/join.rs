@@ -26,6 +26,8 @@ pub(crate) struct JoinedParts {
     /// How tiles look, now that all sites are known.
     pub(crate) look: Arc<TileLook>,
     pub(crate) stages: Vec<StageStats>,
+    /// The largest resident set of the process that merged, in bytes.
+    pub(crate) peak_memory: Option<u64>,
 }
 
 /// Merges what the parts send up, or what an interrupted run left of it. `all` is what the parts hold.
@@ -152,11 +154,12 @@ impl JoinedParts {
     pub(crate) fn open(job: &PartsJob) -> Result<Option<JoinedParts>> {
         let (directory, header) = (job.directory.join(), job.header(job.above()));
         let entries = entries_of(&directory, header)?;
-        let Some(Done { figures: all, stages, .. }) = Done::<SitesOfParts>::find(&entries, JobStep::Join)? else {
+        let Some(Done { figures: all, stages, peak_memory, .. }) = Done::<SitesOfParts>::find(&entries, JobStep::Join)?
+        else {
             return Ok(None);
         };
         let store = open_store(&directory, &records_of(&entries))?;
-        Ok(Some(JoinedParts { look: final_look(job, all, &store)?, store, directory, header, stages }))
+        Ok(Some(JoinedParts { look: final_look(job, all, &store)?, store, directory, header, stages, peak_memory }))
     }
 
     /// Opens what there is of the merges while parts are still to be done.
@@ -166,7 +169,7 @@ impl JoinedParts {
     pub(crate) fn so_far(job: &PartsJob, look: Arc<TileLook>) -> Result<JoinedParts> {
         let (directory, header) = (job.directory.join(), job.header(job.above()));
         let store = open_store(&directory, &records_of(&entries_of(&directory, header)?))?;
-        Ok(JoinedParts { look, store, directory, header, stages: Vec::new() })
+        Ok(JoinedParts { look, store, directory, header, stages: Vec::new(), peak_memory: None })
     }
 
     /// Returns all triangles of seams that touch `tile` of the part with `store` and `tree`.

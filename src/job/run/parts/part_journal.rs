@@ -3,6 +3,8 @@
 use crate::Result;
 use crate::job::durable::directory::JobDirectory;
 use crate::job::durable::lock::Lock;
+use crate::job::machine;
+use crate::job::plan::fingerprint::JobIdentity;
 use crate::job::progress::clock::JobClock;
 use crate::job::progress::stats::StageStats;
 use crate::job::records::{JobStep, Journal, JournalEntry, RecordRef, StepOutput, Store};
@@ -53,7 +55,8 @@ impl<'a> PartSession<'a> {
             progress: job.progress,
             threads: job.threads,
             clock: job.clock,
-            inputs_fingerprint: String::new(),
+            begun: None,
+            identity: JobIdentity::default(),
             job_id: job.job_id,
             resumed: job.resumed,
             checks: job.checks,
@@ -76,7 +79,8 @@ impl<'a> PartSession<'a> {
     ) -> Result<T> {
         self.journal.commit()?;
         self.store.sync()?;
-        let done = Done { figures, seconds: self.clock.wall_s(), stages };
+        let (seconds, peak_memory) = (self.clock.wall_s(), machine::peak_memory());
+        let done = Done { figures, seconds, peak_memory, stages };
         let done = self.journal.record(step, StepOutput::new(done, records))?;
         self.end()?;
         Ok(done.figures)

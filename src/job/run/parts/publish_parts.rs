@@ -55,6 +55,7 @@ pub(crate) fn publish_parts(
         files: StepsOfParts::of(job.directory, job.job_id)?.files,
         parts: parts.len() as u64,
         slowest_part: slowest(&parts),
+        peak_memory: parts.iter().map(PartProgress::peak_memory).max().flatten().max(joined.peak_memory),
         cpu_s_of_tasks: if figures.by_tasks { processor_seconds(&parts) } else { 0.0 },
     };
     write_report(run, plan, figures, published)

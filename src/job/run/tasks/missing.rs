@@ -8,9 +8,11 @@ use crate::job::plan::budget::workers;
 use crate::job::plan::fingerprint::{Fingerprint, JobChange};
 use crate::job::records::JobStep;
 use crate::job::run::alone::Alone;
+use crate::job::run::finished::{InPlace, is_rest};
 use crate::job::run::part_entries::{PartHeader, entries_of_steps};
 use crate::job::run::parts::done::PartProgress;
 use crate::job::run::tasks::dealing::deal;
+use crate::job::run::tasks::finished_job::in_place;
 use crate::job::run::tasks::planned_job::{PlannedJob, planned};
 use crate::threads::on_threads;
 use crate::{Error, Result};
@@ -106,31 +108,45 @@ pub(crate) fn too_early(phase: Phase, missing: &[u32], count: u32) -> Error {
     ))
 }
 
-/// Returns the error of a task of a job that is not planned, or is done: with other options it may be about to be planned again.
+/// Returns the error of a task of a job that is not planned.
 pub(crate) fn not_planned() -> Error {
-    match too_early(Phase::Plan, &[1], 1) {
-        Error::TooEarly(why) => Error::TooEarly(format!("{why}. gdt-batch status tells whether the job is done")),
-        error => error,
-    }
+    too_early(Phase::Plan, &[1], 1)
 }
 
-/// Returns all phases of a job with the tasks that are missing.
+/// Returns all phases of a job with the tasks that are missing; of a finished job only `publish`, if it has something to remove.
 ///
 /// # Errors
 /// [`Error::Config`] if there are no inputs, [`Error::Io`] if one of them, or a journal, cannot be read.
 pub(crate) fn missing_tasks(options: &JobOptions, tasks: u32) -> Result<Vec<PhaseTasks>> {
     let directory = JobDirectory::new(&options.output.directory);
+    if let InPlace::ThisJob(_) = in_place(&directory, options, 0)? {
+        let has_rest = is_rest(&directory)?;
+        return Ok(of_each(tasks, |phase| if phase == Phase::Publish && has_rest { vec![1] } else { Vec::new() }));
+    }
     let fingerprint = on_threads(workers(options, 0)?, || Fingerprint::of(options))?;
     let is_same =
         |known: &Fingerprint| fingerprint.since(known) == JobChange::Nothing && fingerprint.memory == known.memory;
-    let known = planned(&directory)?.filter(|(header, _)| is_same(&header.fingerprint));
-    let Some((_, is_complete)) = known else { return Ok(PhaseTasks::all(tasks)) };
-    if is_complete || Alone::find(&directory)?.is_some() {
-        return Ok(of_each(tasks, |phase| if phase == Phase::Publish { vec![1] } else { Vec::new() }));
+    let known = planned(&directory, 0)?.filter(|(header, _)| is_same(&header.fingerprint));
+    if known.is_some() { missing_tasks_of_planned(options, tasks) } else { Ok(PhaseTasks::all(tasks)) }
+}
+
+/// Returns all phases of a job that is planned with the tasks that are missing.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Broken`] on the job directory.
+pub(crate) fn missing_tasks_of_planned(options: &JobOptions, tasks: u32) -> Result<Vec<PhaseTasks>> {
+    let directory = JobDirectory::new(&options.output.directory);
+    let only_publish = || of_each(tasks, |phase| if phase == Phase::Publish { vec![1] } else { Vec::new() });
+    if Alone::find(&directory, 0)?.is_some() {
+        return Ok(only_publish());
     }
-    let Some(job) = PlannedJob::open(&directory, options)? else { return Ok(PhaseTasks::all(tasks)) };
-    let progress = JobProgressByPart::of(&job)?;
-    Ok(of_each(tasks, |phase| progress.missing_tasks(phase, tasks)))
+    match PlannedJob::open(&directory, options, 0)? {
+        Some(job) if !job.is_complete => {
+            let progress = JobProgressByPart::of(&job)?;
+            Ok(of_each(tasks, |phase| progress.missing_tasks(phase, tasks)))
+        }
+        _ => Ok(only_publish()),
+    }
 }
 
 fn of_each(tasks: u32, missing: impl Fn(Phase) -> Vec<u32>) -> Vec<PhaseTasks> {

@@ -5,6 +5,7 @@
 //! bytes, however many tasks there are.
 
 mod dealing;
+mod finished_job;
 pub(crate) mod missing;
 mod part_tasks;
 mod plan_task;
@@ -20,6 +21,8 @@ use crate::job::report::job_report::Report;
 use crate::job::report::task_outcome::{DoneTask, TaskOutcome};
 use crate::job::run::alone::Alone;
 use crate::job::run::attempt::{EarlierWork, Walk, run_until_it_fits};
+use crate::job::run::finished::{InPlace, remove_rest};
+use crate::job::run::tasks::finished_job::in_place;
 use crate::job::run::tasks::missing::{JobProgressByPart, not_planned};
 use crate::job::run::tasks::part_tasks::work_on_parts;
 use crate::job::run::tasks::plan_task::plan;
@@ -34,12 +37,20 @@ pub(crate) fn work(options: &JobOptions, run: RunOptions, phase: Phase, task: Ta
     let mut done = DoneTask::new(phase, task);
     // A phase with one task is done by the first.
     if phase.is_by_part() || task.number == 1 {
-        match phase {
-            Phase::Publish => {
-                return publish(options, run, task, walk).map(|report| TaskOutcome::Published(report.into()));
+        let directory = &JobDirectory::new(&options.output.directory);
+        let in_place = in_place(directory, options, run.submission)?;
+        match (phase, in_place) {
+            (Phase::Publish, InPlace::ThisJob(report)) => {
+                remove_rest(directory, options.threads())?;
+                return Ok(TaskOutcome::Published(report));
             }
-            Phase::Plan => done.note = plan(options, run)?,
-            _ => (done.parts, done.note) = work_on_parts(options, run, phase, task)?,
+            (_, InPlace::ThisJob(_)) => done.note = Some("nothing to do: all results are in place".into()),
+            (Phase::Publish, _) => {
+                return publish(directory, options, run, task, walk)
+                    .map(|report| TaskOutcome::Published(report.into()));
+            }
+            (Phase::Plan, _) => done.note = plan(options, run)?,
+            (_, _) => (done.parts, done.note) = work_on_parts(options, run, phase, task)?,
         }
     }
     done.seconds = clock.wall_s();
@@ -47,12 +58,11 @@ pub(crate) fn work(options: &JobOptions, run: RunOptions, phase: Phase, task: Ta
 }
 
 /// Publishes a job whose other phases are complete, or does all of a job that tasks have left to one process.
-fn publish(options: &JobOptions, run: RunOptions, task: Task, walk: Walk) -> Result<Report> {
-    let directory = &JobDirectory::new(&options.output.directory);
-    let work = match Alone::find(directory)? {
+fn publish(directory: &JobDirectory, options: &JobOptions, run: RunOptions, task: Task, walk: Walk) -> Result<Report> {
+    let work = match Alone::find(directory, run.submission)? {
         Some(_) => EarlierWork::Interrupted,
         None => {
-            let job = PlannedJob::open(directory, options)?.ok_or_else(not_planned)?;
+            let job = PlannedJob::open(directory, options, run.submission)?.ok_or_else(not_planned)?;
             if !job.is_complete {
                 let progress = JobProgressByPart::of(&job)?;
                 Phase::ALL[..6].iter().try_for_each(|&phase| progress.require(phase, task.count, |_| true))?;

@@ -41,14 +41,14 @@ pub(crate) fn work_on_parts(
     task: Task,
 ) -> Result<(u64, Option<String>)> {
     let directory = &JobDirectory::new(&options.output.directory);
-    let lock = share(directory)?.ok_or_else(not_planned)?;
+    let lock = share(directory, run.submission)?.ok_or_else(not_planned)?;
     if !lock.is_real() {
         run.progress.note(NO_LOCKS);
     }
-    if Alone::find(directory)?.is_some() {
+    if Alone::find(directory, run.submission)?.is_some() {
         return Ok((0, Some(format!("nothing to do: {}", Alone::SENTENCE))));
     }
-    let mut job = PlannedJob::open(directory, options)?.ok_or_else(not_planned)?;
+    let mut job = PlannedJob::open(directory, options, run.submission)?.ok_or_else(not_planned)?;
     if job.is_complete {
         return Ok((0, Some("nothing to do: all results are written".into())));
     }
@@ -68,7 +68,7 @@ pub(crate) fn work_on_parts(
         Err(Error::DamagedSteps) => return Err(damaged(directory)),
         worked => return worked.map(|()| (mine.len() as u64, None)),
     };
-    alone.note(directory)?;
+    alone.note(directory, job.header.submission)?;
     Ok((mine.len() as u64, Some(format!("{why}; {}", Alone::SENTENCE))))
 }
 
@@ -79,10 +79,10 @@ fn parts_of(job: &PlannedJob, phase: Phase, task: Task) -> Vec<PartIndex> {
 }
 
 /// Shares the lock of the job directory; `None` if there is none.
-fn share(directory: &JobDirectory) -> Result<Option<Lock>> {
+fn share(directory: &JobDirectory, submission: u64) -> Result<Option<Lock>> {
     let journal = directory.journal();
     let is_there = disk::list(directory.job()).map_err(Error::io("read", directory.job()))?.contains(&journal);
-    let is_left = || Alone::find(directory).map(|alone| alone.is_some());
+    let is_left = || Alone::find(directory, submission).map(|alone| alone.is_some());
     if is_there || is_left()? { directory.share_lock().map(Some) } else { Ok(None) }
 }
 

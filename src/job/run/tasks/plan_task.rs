@@ -1,6 +1,7 @@
 //! The phase plan.
 
 use crate::job::durable::directory::JobDirectory;
+use crate::job::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours};
 use crate::job::options::{JobOptions, RunOptions};
 use crate::job::plan::budget::workers;
 use crate::job::plan::fingerprint::{Fingerprint, JobChange, JobHeader};
@@ -23,16 +24,16 @@ use crate::{Error, Result, disk};
 /// Those of the plan; [`Error::InUse`] if another process works in the job directory.
 pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> Result<Option<String>> {
     let directory = &JobDirectory::new(&options.output.directory);
-    directory.check_nothing_in_the_way()?;
+    check_nothing_in_the_way(directory)?;
     let fingerprint = on_threads(workers(options, 0)?, || Fingerprint::of(options))?;
-    if is_planned(directory, &fingerprint)? {
+    if is_planned(directory, &fingerprint, run.submission)? {
         return Ok(Some("the job is planned already".into()));
     }
-    directory.check_results_are_ours()?;
+    check_results_are_ours(directory)?;
     let _lock = directory.lock()?;
     let earlier = read_earlier(directory, run)?;
     let coarsening = coarsening_of(directory, earlier.as_ref(), &fingerprint)?;
-    let header = JobHeader { fingerprint, coarsening, id: 0 };
+    let header = JobHeader { fingerprint, coarsening, id: 0, submission: run.submission, begun: None };
     let known = earlier.as_ref().and_then(|earlier| earlier.plan(directory, &header, options));
     let plan = match known {
         Some(plan) => plan,
@@ -44,9 +45,10 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> Result<Option<Strin
         on_threads(threads, || require_room(&plan, threads))?;
     }
     if plan.is_one_part() {
-        Alone::AsItIs.note(directory)?;
+        Alone::AsItIs.note(directory, run.submission)?;
         return Ok(Some(format!("the job has only {} points, which is one part; {}", plan.records, Alone::SENTENCE)));
     }
+    Alone::forget(directory)?;
     on_threads(threads, || {
         let start = start_parts(directory, &header, earlier, run.progress)?;
         write_plan(&start.journal, directory, &plan)?;
@@ -57,7 +59,7 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> Result<Option<Strin
 }
 
 /// Tells whether the job with this fingerprint is planned. Nobody starts it over meanwhile.
-fn is_planned(directory: &JobDirectory, fingerprint: &Fingerprint) -> Result<bool> {
+fn is_planned(directory: &JobDirectory, fingerprint: &Fingerprint, submission: u64) -> Result<bool> {
     let journal = directory.journal();
     if !disk::exists(&journal).map_err(Error::io("read", &journal))? {
         return Ok(false);
@@ -65,5 +67,5 @@ fn is_planned(directory: &JobDirectory, fingerprint: &Fingerprint) -> Result<boo
     let _lock = directory.share_lock()?;
     let is_same =
         |known: &Fingerprint| fingerprint.since(known) == JobChange::Nothing && fingerprint.memory == known.memory;
-    Ok(planned(directory)?.is_some_and(|(header, _)| is_same(&header.fingerprint)))
+    Ok(planned(directory, submission)?.is_some_and(|(header, _)| is_same(&header.fingerprint)))
 }

@@ -21,12 +21,12 @@ pub(crate) struct PlannedJob {
 }
 
 impl PlannedJob {
-    /// Opens the plan in the job directory; `None` if there is none of a job of several parts.
+    /// Opens the plan in the job directory; `None` if there is none of a job of several parts, or only one from before `submission`.
     ///
     /// # Errors
     /// [`Error::Config`] if the options have changed since; [`Error::Io`] or [`Error::Broken`] on the plan.
-    pub(crate) fn open(directory: &JobDirectory, options: &JobOptions) -> Result<Option<PlannedJob>> {
-        let Some((header, is_complete)) = planned(directory)? else { return Ok(None) };
+    pub(crate) fn open(directory: &JobDirectory, options: &JobOptions, submission: u64) -> Result<Option<PlannedJob>> {
+        let Some((header, is_complete)) = planned(directory, submission)? else { return Ok(None) };
         if let Some(what) = header.fingerprint.changed_options(options)? {
             return Err(Error::Config(format!("{what}: changed since the job was planned; {AGAIN}")));
         }
@@ -54,11 +54,12 @@ impl PlannedJob {
     }
 }
 
-/// Returns the header of the planned job of several parts in the job directory, and whether all its results are written.
+/// Returns the header of the planned job of several parts in the job directory, and whether all its results are written. A plan from before
+/// `submission` does not count.
 ///
 /// # Errors
 /// [`Error::Io`] if its journal cannot be read.
-pub(crate) fn planned(directory: &JobDirectory) -> Result<Option<(JobHeader, bool)>> {
+pub(crate) fn planned(directory: &JobDirectory, submission: u64) -> Result<Option<(JobHeader, bool)>> {
     // Other machines may have made the folders.
     directory.look()?;
     disk::list(&directory.parts()).map_err(Error::io("read", directory.parts()))?;
@@ -73,7 +74,8 @@ pub(crate) fn planned(directory: &JobDirectory) -> Result<Option<(JobHeader, boo
             .filter(|file| !directory.is_result(&file.name))
             .all(|file| file.is_whole(directory))
     };
-    let is_planned_and_whole = header.id != 0 && is_planned(JobStep::Plan) && is_whole();
+    let is_planned_and_whole =
+        header.id != 0 && header.submission >= submission && is_planned(JobStep::Plan) && is_whole();
     Ok(is_planned_and_whole.then(|| (header, is_planned(JobStep::Report))))
 }
 

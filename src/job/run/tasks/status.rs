@@ -8,10 +8,10 @@ use crate::job::phase::Phase;
 use crate::job::report::job_report::SlowestPart;
 use crate::job::report::job_status::{JobState, JobStatus, PhaseStatus};
 use crate::job::run::alone::Alone;
+use crate::job::run::finished::InPlace;
+use crate::job::run::tasks::finished_job::in_place;
 use crate::job::run::tasks::missing::JobProgressByPart;
 use crate::job::run::tasks::planned_job::PlannedJob;
-use crate::{Error, disk};
-use std::path::Path;
 
 /// Returns how far the job is.
 ///
@@ -21,15 +21,15 @@ pub(crate) fn status(options: &JobOptions, tasks: Option<u32>) -> Result<JobStat
     let directory = JobDirectory::new(&options.output.directory);
     let output = options.output.directory.clone();
     let simple = |state| JobStatus { output: output.clone(), state, phases: Vec::new(), slowest_part: None };
-    let exists = |path: &Path| disk::exists(path).map_err(Error::io("read", path));
-    if !exists(directory.job())? {
-        let state = if exists(&directory.results().report())? { JobState::Done } else { JobState::NotPlanned };
-        return Ok(simple(state));
-    }
-    if Alone::find(&directory)?.is_some() {
+    if Alone::find(&directory, 0)?.is_some() {
         return Ok(simple(JobState::LeftToPublish));
     }
-    let Some(job) = PlannedJob::open(&directory, options)? else { return Ok(simple(JobState::NotPlanned)) };
+    let without_plan = match in_place(&directory, options, 0)? {
+        InPlace::ThisJob(_) => return Ok(simple(JobState::Done)),
+        InPlace::OtherJob => JobState::OtherResults,
+        InPlace::Nothing => JobState::NotPlanned,
+    };
+    let Some(job) = PlannedJob::open(&directory, options, 0)? else { return Ok(simple(without_plan)) };
     let progress = JobProgressByPart::of(&job)?;
     let phases = Phase::ALL.map(|phase| phase_status(&progress, phase, tasks)).to_vec();
     Ok(JobStatus { phases, slowest_part: slowest(&progress), ..simple(JobState::UnderWay) })
