@@ -55,8 +55,9 @@ impl Measured {
 
     fn judge(&mut self) {
         let [helped, alone] = [self.helped, self.alone].map(|costs| costs.per_site());
-        // Where the system does not tell processor times, neither comparison holds.
-        if !self.is_on_trial() && !(helped <= WORTHWHILE * alone) {
+        // Where the system does not tell processor times, this is false.
+        let is_worthwhile = helped <= WORTHWHILE * alone;
+        if !self.is_on_trial() && !is_worthwhile {
             self.give_up(&format!("a site takes {helped:.0} ns of a processor with its help, and {alone:.0} without"));
         }
     }

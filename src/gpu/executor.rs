@@ -164,7 +164,7 @@ impl Executor {
             match answer.recv_timeout(NAP) {
                 Ok(reply) => return Some(Some(reply)),
                 Err(RecvTimeoutError::Disconnected) => return Some(None),
-                Err(RecvTimeoutError::Timeout) => idle += begun.elapsed(),
+                Err(RecvTimeoutError::Timeout) => idle = idle.saturating_add(begun.elapsed()),
             }
             if patience.is_some_and(|patience| idle > patience) || interrupt::check().is_err() {
                 return None;
