@@ -246,9 +246,11 @@ impl Sliver {
             return false;
         }
         let (a, b) = (self.long.at(row), self.short[usize::from(row > second)].at(row));
-        // Far more than rounding can move a border that is at least a row high.
+        // Far more than rounding can move a border that is at least a row high. Borders lie within the corners' columns, so two more are
+        // positive, and are rounded down without a call.
         let spare = 1e-4;
-        (a.min(b) - spare).ceil() > a.max(b) + spare
+        let column_below = |at: f64| (at + 2.0) as i64;
+        column_below(a.min(b) - spare) == column_below(a.max(b) + spare)
     }
 }
 
