@@ -31,6 +31,10 @@ pub enum BufferId {
     Counts,
     /// Triples of site numbers.
     Triangles,
+    /// Two coordinates for each site.
+    Sites,
+    /// The answers of the exact predicates, one for each four sites.
+    Decisions,
     /// The copy of a result that the CPU reads.
     Staging,
 }

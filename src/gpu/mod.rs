@@ -12,6 +12,7 @@ pub mod engine;
 pub mod error;
 pub mod executor;
 mod gpu_thread;
+pub mod mesh_steps;
 pub mod options;
 mod prefix_sums;
 pub mod selftest;

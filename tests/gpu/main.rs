@@ -2,6 +2,7 @@
 
 mod faults;
 mod leaves;
+mod predicates;
 mod random;
 mod rig;
 mod twins;

@@ -9,6 +9,7 @@ mod g4_vertices;
 mod g5_count;
 mod g6_triangles;
 mod label;
+pub mod predicates;
 
 pub use g1_write_sites::write_sites;
 pub use g2_voronoi_exact::voronoi_exact;
