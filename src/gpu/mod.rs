@@ -11,6 +11,7 @@ mod diagram_engine;
 pub mod engine;
 pub mod error;
 pub mod executor;
+pub mod flip_marks;
 mod gpu_thread;
 pub mod mesh_steps;
 pub mod options;

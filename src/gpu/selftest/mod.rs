@@ -4,7 +4,7 @@
 mod compare;
 mod timing;
 
-pub use compare::{StepComparison, compare};
+pub use compare::{StepComparison, compare, compare_predicates};
 pub use timing::{TextureTiming, TimedStep};
 
 use crate::gpu::buffers::BufferSet;
@@ -125,6 +125,7 @@ fn fill(test: &mut SelfTest, device: Device, max_side: u32) -> std::result::Resu
         let size = TextureSize { width, height };
         test.comparisons.extend(compare(&mut engine, &mut buffers, size, &scatter(size, sites))?);
     }
+    test.comparisons.push(compare_predicates(&mut engine, &mut buffers)?);
     test.copy_bandwidth = timing::copy_bandwidth(&mut engine, &mut buffers)?;
     for side in SIDES.into_iter().filter(|&side| side <= max_side) {
         let size = TextureSize { width: side, height: side };
