@@ -8,7 +8,7 @@ use gdt_batch::geometry::Site;
 use gdt_batch::geometry::predicates::{in_circle, orient2d};
 use gdt_batch::gpu::buffer_id::BufferId;
 use gdt_batch::gpu::mesh_steps::FLIP_ROUNDS;
-use gdt_batch::gpu::steps::Recording;
+use gdt_batch::gpu::steps::{GpuCommand, Recording, WorkgroupCount};
 use gdt_batch::gpu::twins::c4_flip::{AT_INFINITY, FlipState, flip_round};
 use std::collections::BTreeSet;
 
@@ -232,4 +232,19 @@ fn all_orders_of_the_records_end_in_one_triangulation() {
     }
     assert!(results[0] == results[1]);
     assert!(results[0] != Flipped { records: &mesh.records, sites: &mesh.sites }.corners(), "nothing was flipped");
+}
+
+/// As many triangles as a buffer can hold that a shader can bind: 2 GiB.
+#[test]
+fn the_rounds_are_fixed_grids_that_every_adapter_accepts() {
+    let mut recording = Recording::default();
+    recording.flip(1 << 26);
+    let grids = recording.commands.iter().filter_map(|command| match command {
+        GpuCommand::Run(_, _, workgroups) => Some(workgroups),
+        _ => None,
+    });
+    let grids: Vec<_> = grids.collect();
+    assert_eq!(grids.len(), 36);
+    let fits = |n: &u32| (1..=65_535).contains(n);
+    assert!(grids.iter().all(|grid| matches!(grid, WorkgroupCount::Fixed(groups) if groups.iter().all(fits))));
 }

@@ -29,7 +29,7 @@ pub struct StepComparison {
 }
 
 impl StepComparison {
-    fn new(step: &'static str, shader: &[u32], twin: &[u32]) -> StepComparison {
+    pub(super) fn new(step: &'static str, shader: &[u32], twin: &[u32]) -> StepComparison {
         let pairs = || (0..).zip(shader).zip(twin).filter(|((_, a), b)| a != b).map(|((i, a), b)| (i, *a, *b));
         // Numbers that one of them lacks differ too.
         let differing = pairs().count() + shader.len().abs_diff(twin.len());
@@ -78,7 +78,7 @@ pub fn compare(
 ///
 /// # Errors
 /// [`GpuError`] of the device.
-pub fn compare_predicates(engine: &mut GpuEngine, buffers: &mut BufferSet) -> Result<StepComparison, GpuError> {
+pub(super) fn compare_predicates(engine: &mut GpuEngine, buffers: &mut BufferSet) -> Result<StepComparison, GpuError> {
     let quads: Vec<[Site; 4]> = (0..PREDICATE_QUADS).map(quad).collect();
     let mut recording = Recording::default();
     recording.decide(&quads);

@@ -2,9 +2,10 @@
 //! numbers as its twin, and how long each step takes.
 
 mod compare;
+mod flips;
 mod timing;
 
-pub use compare::{StepComparison, compare, compare_predicates};
+pub use compare::{StepComparison, compare};
 pub use timing::{TextureTiming, TimedStep};
 
 use crate::gpu::buffers::BufferSet;
@@ -125,7 +126,8 @@ fn fill(test: &mut SelfTest, device: Device, max_side: u32) -> std::result::Resu
         let size = TextureSize { width, height };
         test.comparisons.extend(compare(&mut engine, &mut buffers, size, &scatter(size, sites))?);
     }
-    test.comparisons.push(compare_predicates(&mut engine, &mut buffers)?);
+    test.comparisons.push(compare::compare_predicates(&mut engine, &mut buffers)?);
+    test.comparisons.extend(flips::compare_flips(&mut engine, &mut buffers)?);
     test.copy_bandwidth = timing::copy_bandwidth(&mut engine, &mut buffers)?;
     for side in SIDES.into_iter().filter(|&side| side <= max_side) {
         let size = TextureSize { width: side, height: side };
