@@ -31,6 +31,16 @@ pub enum BufferId {
     Counts,
     /// Triples of site numbers.
     Triangles,
+    /// Two coordinates for each site; the x of the vertex at infinity is the least of all.
+    Sites,
+    /// The mesh: eight numbers for each triangle, three corners, a note, three twins, a partner.
+    Records,
+    /// The highest claim on each triangle.
+    Claims,
+    /// Bits for each triangle; see `flip_marks`.
+    Marks,
+    /// The answers of the exact predicates, one for each four sites.
+    Decisions,
     /// The copy of a result that the CPU reads.
     Staging,
 }

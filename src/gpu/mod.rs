@@ -14,7 +14,9 @@ pub mod error;
 pub mod executor;
 #[cfg(feature = "fault-injection")]
 mod fake_engine;
+pub mod flip_marks;
 mod gpu_thread;
+pub mod mesh_steps;
 pub mod options;
 mod prefix_sums;
 pub mod selftest;

@@ -11,7 +11,7 @@ use crate::gpu::texture_size::TextureSize;
 pub struct ShaderProgram {
     /// The file in `shaders/`, without its extension.
     pub file: &'static str,
-    /// The text of the file.
+    /// The text of the file, after those of the files that it uses.
     pub source: &'static str,
     /// The function.
     pub entry: &'static str,
@@ -19,16 +19,21 @@ pub struct ShaderProgram {
     pub bindings: &'static [(u32, BufferId)],
 }
 
+/// Names an entry point of a shader: its file, the files that it uses if any, the function, the bindings of buffers.
 macro_rules! program {
-    ($file:literal, $entry:literal, $bindings:expr) => {
+    ($file:literal, $(uses $used:literal,)* $entry:literal, $bindings:expr) => {
         ShaderProgram {
             file: $file,
-            source: include_str!(concat!("../../shaders/", $file, ".wgsl")),
+            source: concat!(
+                $(include_str!(concat!("../../shaders/", $used, ".wgsl")),)*
+                include_str!(concat!("../../shaders/", $file, ".wgsl"))
+            ),
             entry: $entry,
             bindings: $bindings,
         }
     };
 }
+pub(super) use program;
 
 use BufferId::{Counts, Flood, Islands, Labels, North, Pixels, South, Texture, Triangles, Vertices, Words, Workgroups};
 
@@ -138,7 +143,7 @@ fn tiles(width: u32, rows: u32) -> WorkgroupCount {
 }
 
 /// Returns the workgroups of 64 that cover `count` invocations, and how many invocations a row of those workgroups has.
-fn line(count: u32) -> (WorkgroupCount, u32) {
+pub(super) fn line(count: u32) -> (WorkgroupCount, u32) {
     let groups = count.div_ceil(64);
     let x = groups.min(MAX_WORKGROUPS);
     (WorkgroupCount::Fixed([x, groups.div_ceil(x.max(1))]), 64 * x)
@@ -171,11 +176,11 @@ impl Recording {
         recording
     }
 
-    fn reserve(&mut self, id: BufferId, numbers: u64) {
+    pub(super) fn reserve(&mut self, id: BufferId, numbers: u64) {
         self.commands.push(GpuCommand::Reserve(id, 4 * numbers));
     }
 
-    fn run(&mut self, program: ShaderProgram, params: [u32; 5], workgroups: WorkgroupCount) {
+    pub(super) fn run(&mut self, program: ShaderProgram, params: [u32; 5], workgroups: WorkgroupCount) {
         self.commands.push(GpuCommand::Run(program, params, workgroups));
     }
 

@@ -1,7 +1,13 @@
 //! The shaders against their plain Rust twins, number by number, on any adapter. Software Vulkan is sufficient.
 
+mod clouds;
+#[path = "../common/mod.rs"]
+mod common;
 mod faults;
+mod flips;
 mod leaves;
+mod linked;
+mod predicates;
 mod random;
 mod rig;
 mod twins;

@@ -1,5 +1,6 @@
 //! Compares every step with its twin on the same input.
 
+use crate::geometry::Site;
 use crate::gpu::buffer_id::BufferId;
 use crate::gpu::buffers::BufferSet;
 use crate::gpu::engine::GpuEngine;
@@ -10,6 +11,9 @@ use crate::gpu::steps::Recording;
 use crate::gpu::texture_size::TextureSize;
 use crate::gpu::twins;
 use serde::Serialize;
+
+/// How often the exact predicates are compared.
+const PREDICATE_QUADS: u32 = 100_000;
 
 /// The comparison of one step with its twin.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -25,7 +29,7 @@ pub struct StepComparison {
 }
 
 impl StepComparison {
-    fn new(step: &'static str, shader: &[u32], twin: &[u32]) -> StepComparison {
+    pub(super) fn new(step: &'static str, shader: &[u32], twin: &[u32]) -> StepComparison {
         let pairs = || (0..).zip(shader).zip(twin).filter(|((_, a), b)| a != b).map(|((i, a), b)| (i, *a, *b));
         // Numbers that one of them lacks differ too.
         let differing = pairs().count() + shader.len().abs_diff(twin.len());
@@ -68,6 +72,28 @@ pub fn compare(
     comparisons.push(StepComparison::new("G2 exact", &labels, &exact));
     comparisons.extend(compare_triangles(engine, buffers, size, &exact, &texture)?);
     Ok(comparisons)
+}
+
+/// Compares the exact predicates on sites near each other, many of them on one circle or line, and far apart.
+///
+/// # Errors
+/// [`GpuError`] of the device.
+pub(super) fn compare_predicates(engine: &mut GpuEngine, buffers: &mut BufferSet) -> Result<StepComparison, GpuError> {
+    let quads: Vec<[Site; 4]> = (0..PREDICATE_QUADS).map(quad).collect();
+    let mut recording = Recording::default();
+    recording.decide(&quads);
+    engine.start(buffers, &recording)?;
+    let decisions = engine.numbers(buffers, BufferId::Decisions, u64::from(PREDICATE_QUADS))?;
+    Ok(StepComparison::new("predicates", &decisions, &twins::predicates::decide(&quads)))
+}
+
+/// Returns quad number `i`. Every other one has coordinates from 0 to 7, the others up to 2^28.
+fn quad(i: u32) -> [Site; 4] {
+    let bits = if i.is_multiple_of(2) { 3 } else { 28 };
+    let coordinate = |k: u32| {
+        ((8 * i + k).wrapping_mul(0x9e37_79b1).rotate_left(15).wrapping_mul(0x85eb_ca77) >> (32 - bits)) as i32
+    };
+    [0, 2, 4, 6].map(|k| [coordinate(k), coordinate(k + 1)])
 }
 
 /// Compares steps G4 to G6, which start from the labels in the engine's buffers.

@@ -2,6 +2,7 @@
 //! numbers as its twin, and how long each step takes.
 
 mod compare;
+mod flips;
 mod timing;
 
 pub use compare::{StepComparison, compare};
@@ -125,6 +126,8 @@ fn fill(test: &mut SelfTest, device: Device, max_side: u32) -> std::result::Resu
         let size = TextureSize { width, height };
         test.comparisons.extend(compare(&mut engine, &mut buffers, size, &scatter(size, sites))?);
     }
+    test.comparisons.push(compare::compare_predicates(&mut engine, &mut buffers)?);
+    test.comparisons.extend(flips::compare_flips(&mut engine, &mut buffers)?);
     test.copy_bandwidth = timing::copy_bandwidth(&mut engine, &mut buffers)?;
     for side in SIDES.into_iter().filter(|&side| side <= max_side) {
         let size = TextureSize { width: side, height: side };

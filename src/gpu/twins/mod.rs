@@ -1,6 +1,7 @@
 //! The steps as plain loops, one file for each shader. Read them side by side with the shaders: their numbers are compared with
 //! those of the shaders one by one. They are written to be plain, not fast. Room `voronoi` has the steps that the CPU runs in jobs.
 
+pub mod c4_flip;
 mod g1_write_sites;
 mod g2_voronoi_exact;
 mod g2_voronoi_jfa;
@@ -9,6 +10,7 @@ mod g4_vertices;
 mod g5_count;
 mod g6_triangles;
 mod label;
+pub mod predicates;
 
 pub use g1_write_sites::write_sites;
 pub use g2_voronoi_exact::voronoi_exact;
