@@ -136,11 +136,20 @@ impl NamedColumns {
     /// # Errors
     /// A sentence, if the names say other units.
     pub(crate) fn add_units(&mut self, fields: &[&[u8]]) -> Result<(), String> {
-        let unit = |axis: usize| {
-            let field = fields.get(self.place(axis)?)?;
-            TextUnit::read(std::str::from_utf8(field).ok()?)
-        };
-        self.units.add_line([unit(0), unit(1), unit(2)])
+        self.units.add_line(self.units_in(fields))
+    }
+
+    /// Takes the units of a comment below the names into account, if it says those of x, y and z and is no sentence.
+    ///
+    /// # Errors
+    /// A sentence, if the names say other units.
+    pub(crate) fn add_units_of_comment(&mut self, text: &[u8]) -> Result<(), String> {
+        let lines = CANDIDATES.map(|delimiter| self.units_in(&delimiter.fields(text)));
+        lines.into_iter().filter(|line| line.iter().all(Option::is_some)).try_for_each(|line| self.units.add_line(line))
+    }
+
+    fn units_in(&self, fields: &[&[u8]]) -> [Option<TextUnit>; 3] {
+        [0, 1, 2].map(|axis| unit_alone(fields.get(self.place(axis)?)?))
     }
 
     /// Takes the units of a line of the header into account where the names, which are the user's, say none: those in brackets after
@@ -151,7 +160,7 @@ impl NamedColumns {
             let field = |axis: usize| fields.get(self.place(axis)?).copied();
             let [Some(x), Some(y), Some(z)] = [0, 1, 2].map(field) else { continue };
             let beside = [x, y, z].map(|field| Name::read(field).unit());
-            let alone = [x, y, z].map(|field| TextUnit::read(&String::from_utf8_lossy(field)));
+            let alone = [x, y, z].map(unit_alone);
             let found = if alone[0].is_some() && alone[1].is_some() { alone } else { beside };
             self.units.complete(found);
         }
@@ -162,44 +171,79 @@ impl NamedColumns {
 struct Name {
     /// As [`NAMES`] has it.
     plain: String,
-    /// What is in brackets after it.
-    unit: String,
+    /// What is in brackets after it, with the brackets.
+    beside: String,
 }
 
 impl Name {
     fn read(text: &[u8]) -> Name {
         let text = String::from_utf8_lossy(text).trim().to_lowercase();
-        let (name, unit) = match text.find(['[', '(', '{']) {
+        let (name, beside) = match text.find(['[', '(', '{']) {
             Some(at) if at > 0 && text.ends_with([']', ')', '}']) => text.split_at(at),
             _ => (text.as_str(), ""),
         };
-        Name { plain: plain(name), unit: unit.trim_matches(['[', ']', '(', ')', '{', '}', ' ']).to_string() }
+        Name { plain: plain(name), beside: beside.to_string() }
     }
 
     /// Returns what the column holds, and how unclear the name is. In some countries x is the northing, and brackets say so.
     fn role(&self) -> Option<(usize, ColumnRole)> {
         let own = role_of(&self.plain)?;
         let is_letter = |name: &str| name.contains(['x', 'y']);
-        let direction = self.words().find(|word| !is_letter(word) && is_on_map(role_of(word)));
+        let direction = self.names_beside().find(|name| !is_letter(name) && is_on_map(role_of(name)));
         match direction {
             Some(direction) if is_letter(&self.plain) && is_on_map(Some(own)) => role_of(&direction),
             _ => Some(own),
         }
     }
 
-    /// Returns all that is in brackets, and the words of it.
-    fn words(&self) -> impl Iterator<Item = String> + use<'_> {
-        let words = self.unit.split([' ', ',', ';', '/']).filter(|word| word.chars().count() > 1);
-        std::iter::once(self.unit.as_str()).chain(words).map(plain)
+    /// Returns whether the name says that the column is the longitude, or the latitude.
+    fn is_degrees(&self, axis: usize) -> bool {
+        let is = |name: &str| DEGREES[axis].contains(&name);
+        is(&self.plain) || self.names_beside().any(|name| is(&name))
+    }
+
+    /// Returns what is in each pair of brackets, or before or after a comma there.
+    fn remarks(&self) -> impl Iterator<Item = &str> {
+        let remarks = self.beside.split(['[', ']', '(', ')', '{', '}', ',', ';']);
+        remarks.map(str::trim).filter(|remark| !remark.is_empty())
+    }
+
+    /// Returns the known names in brackets. A single letter among other words is none.
+    fn names_beside(&self) -> impl Iterator<Item = String> {
+        let words = |remark| words(remark).filter(|word| word.chars().count() > 1);
+        let names = self.remarks().flat_map(move |remark| std::iter::once(remark).chain(words(remark)));
+        names.map(plain).filter(|name| role_of(name).is_some())
+    }
+
+    /// Returns the words in brackets that are no names.
+    fn other_words(&self) -> Vec<&str> {
+        self.remarks().filter(|remark| role_of(&plain(remark)).is_none()).flat_map(other_words).collect()
     }
 
     fn unit(&self) -> Option<TextUnit> {
-        self.unit.split([',', ';']).find_map(TextUnit::read)
+        TextUnit::among(&self.other_words())
     }
 
-    fn has_unknown_unit(&self) -> bool {
-        !self.unit.is_empty() && self.unit().is_none() && !self.words().any(|word| role_of(&word).is_some())
+    /// Returns what is in brackets if that is neither a name nor a unit that is known.
+    fn unknown_unit(&self) -> Option<String> {
+        let words = self.other_words();
+        (!words.is_empty() && TextUnit::among(&words).is_none()).then(|| words.join(" "))
     }
+}
+
+fn words(text: &str) -> impl Iterator<Item = &str> {
+    text.split([' ', '\t', '/', ':']).filter(|word| !word.is_empty())
+}
+
+/// Returns the words that are no names.
+fn other_words(text: &str) -> impl Iterator<Item = &str> {
+    words(text).filter(|word| role_of(&plain(word)).is_none())
+}
+
+/// Returns the unit that a column of a line of units says, as in "m" or "deg E".
+fn unit_alone(field: &[u8]) -> Option<TextUnit> {
+    let text = String::from_utf8_lossy(field).to_lowercase();
+    TextUnit::read(&other_words(&text).collect::<Vec<_>>().join(" "))
 }
 
 /// Returns a name as [`NAMES`] has it.
@@ -244,11 +288,9 @@ pub(crate) fn named_columns<'a>(
     }
     drop_partial_color(&mut roles);
     truncate(&mut roles);
-    let is = |axis: usize, test: &dyn Fn(&Name) -> bool| places[axis].is_some_and(test);
-    let degree = |axis: usize| is(axis, &|name| DEGREES[axis].contains(&name.plain.as_str()));
+    let degree = |axis: usize| places[axis].is_some_and(|name| name.is_degrees(axis));
     let units = TextUnits(places.map(|name| name.and_then(Name::unit)));
-    let unknown = places.into_iter().flatten().filter(|name| name.has_unknown_unit());
-    let mut unknown_units: Vec<String> = unknown.map(|name| name.unit.clone()).collect();
+    let mut unknown_units: Vec<String> = places.into_iter().flatten().filter_map(Name::unknown_unit).collect();
     unknown_units.dedup();
     Ok(NamedColumns { roles, count: names.len(), degrees: degree(0) && degree(1), unknown_units, units })
 }
@@ -277,6 +319,7 @@ fn drop_partial_color(roles: &mut [ColumnRole]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::input::crs::unit::Unit;
 
     fn coordinates(line: &str) -> Option<[usize; 3]> {
         let named = named_columns(line.split(';').map(str::as_bytes)).ok()?;
@@ -323,7 +366,39 @@ mod tests {
         let named = |line: &str| named_columns(line.split(';').map(str::as_bytes)).unwrap();
         assert!(named("X (Northing, ft);Y (Easting, ft);Z").units().unwrap().some_foot);
         assert_eq!(named("X (Easting);Y [m];Z (H)").unknown_units, [""; 0]);
+        assert_eq!(named("X (Easting);Y [m];Z (ellipsoidal height)").unknown_units, [""; 0]);
         assert_eq!(named("x (local);y (local);z [NAVD88]").unknown_units, ["local", "navd88"]);
+        assert_eq!(named("X (Easting / rod);Y [Northing (rod)];Z (m.s.l.)").unknown_units, ["rod", "m.s.l."]);
+    }
+
+    #[test]
+    fn all_brackets_of_a_name_are_read() {
+        let named = |line: &str| named_columns(line.split(';').map(str::as_bytes)).unwrap();
+        for line in [
+            "X (Northing) [m];Y (Easting) [m];Z [m]",
+            "X [m] (Hochwert);Y [m] (Rechtswert);Z {m}",
+            "X [Northing (m)];Y [Easting (m)];Z [Height (m)]",
+            "X (N, m);Y (E, m);Z (H, m)",
+        ] {
+            assert_eq!(coordinates(line), Some([1, 0, 2]), "{line}");
+            assert_eq!(named(line).units().unwrap().horizontal, Unit::Metre, "{line}");
+            assert_eq!(named(line).units().unwrap().vertical, Some(1.0), "{line}");
+        }
+        for line in [
+            "Easting (X) [ft];Northing (Y) [ft];Z [ft]",
+            "X [Easting (ft)];Y [Northing (ft)];Z [Height (ft)]",
+            "X (Easting in feet);Y (Northing in feet);Z (in ft)",
+            "X (Easting ft);Y (Northing ft);Z (ft NAVD88)",
+            "X (Easting / ft);Y (Northing / ft);Z (Height / ft)",
+        ] {
+            assert_eq!(coordinates(line), Some([0, 1, 2]), "{line}");
+            let found = named(line).units().unwrap();
+            assert_eq!((found.horizontal, found.vertical), (Unit::Foot, Some(Unit::FOOT)), "{line}");
+            assert_eq!(named(line).unknown_units, [""; 0], "{line}");
+        }
+        for line in ["X [ft (US)];Y [ft (US)];Z [ft (US)]", "X [ft US survey];Y [ft-US];Z (foot us)"] {
+            assert_eq!(named(line).units().unwrap().horizontal, Unit::UsFoot, "{line}");
+        }
     }
 
     #[test]
@@ -338,6 +413,24 @@ mod tests {
         let named = |line: &str| named_columns(line.split(';').map(str::as_bytes)).unwrap();
         assert!(named("longitude;latitude;height").degrees);
         assert!(!named("lon;lat;x;y;z").degrees && !named("x;lat;z").degrees);
+        for line in [
+            "X (lon);Y (lat);Z",
+            "X (longitude);Y (latitude);Elevation",
+            "x [Longitude];y [Latitude];z [m]",
+            "x (lng);y (lat);z",
+            "Easting (lon);Northing (lat);z",
+            "X (lat);Y (lon);z",
+            "x [Longitude WGS84];y [Latitude WGS84];z",
+        ] {
+            assert!(named(line).degrees, "{line}");
+        }
+        for line in ["x (degrees east);y (degrees north);z", "x (deg E);y (deg N);z"] {
+            assert_eq!(named(line).units().unwrap().horizontal, Unit::Degree, "{line}");
+        }
+        let mut below = named("x;y;z");
+        below.add_units(&[b"deg E", b"deg N", b"m"]).unwrap();
+        assert_eq!(below.units().unwrap().horizontal, Unit::Degree);
+        assert_eq!(named("X (GK, 3 degree zones);Y (GK);z").units().unwrap().horizontal, Unit::Unknown);
         assert!(named("x [ft];y [ft];z [ft]").units().unwrap().some_foot);
         assert!(!named("x [m];y [m];z [m]").units().unwrap().some_foot);
         let mut below = named("x;y;z");
