@@ -36,11 +36,12 @@ fn a_signal_within_one_long_step_is_heeded_before_the_step_ends() {
     let line = (0..70_000).map(|i| if i == 0 { [40_001, 70_000] } else { [2 * i, 0] });
     let wide = || Rig::new(&scattered::with_heights(line.clone()), &Setup::tiles_of(40_000));
     let dense = || Rig::new(&scattered::uniform(60_000, 100_000, 1), &Setup::tiles_of(100_000));
-    // The merge asks often while it triangulates, and between its parts; the drawing of one tile asks often.
+    // The merge asks until the end of its triangulation, at every kind of place there, and between its parts; the drawing of one tile
+    // asks often.
     for (rig, place, counts) in [
-        (wide(), "divide_and_conquer", [1, 7, 16, 25]),
+        (wide(), "divide_and_conquer", [1, 20, 36, 52]),
         (wide(), "merge", [1, 2, 3, 4]),
-        (dense(), "canvas", [1, 2, 4, 8]),
+        (dense(), "canvas", [1, 2, 8, 16]),
     ] {
         for count in counts {
             rig.forget();
