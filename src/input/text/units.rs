@@ -54,10 +54,8 @@ impl TextUnit {
             _ => TextUnit::known(&window.join(" ")),
         };
         // More words say more: "us ft" is not "ft".
-        let found = (1..=count)
-            .rev()
-            .map(|length| -> Vec<TextUnit> { words.windows(length).enumerate().filter_map(read).collect() });
-        let found = found.into_iter().find(|units| !units.is_empty())?;
+        let of_length = |length| words.windows(length).enumerate().filter_map(read).collect::<Vec<_>>();
+        let found = (1..=count).rev().map(of_length).find(|units| !units.is_empty())?;
         found.iter().all(|unit| *unit == found[0]).then_some(found[0])
     }
 
