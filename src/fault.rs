@@ -29,12 +29,14 @@ pub(crate) fn read(name: &str) -> io::Result<()> {
 /// "Input/output error".
 const EIO: i32 = 5;
 
-pub(crate) use injection::{commit_interval, is_due, mark, processors, traced};
+pub(crate) use injection::{commit_interval, is_due, is_signalled, mark, processors, traced};
 
 #[cfg(feature = "fault-injection")]
 mod injection {
     use std::fs::File;
     use std::io::{self, Write};
+    use std::panic::Location;
+    use std::path::Path;
     use std::sync::atomic::{AtomicU64, Ordering};
     use std::sync::{LazyLock, Mutex, PoisonError};
     use std::time::Duration;
@@ -64,6 +66,12 @@ mod injection {
                 visit == fault.count || fault.and_later && visit > fault.count
             }
         })
+    }
+
+    /// Returns whether a test has a signal come now that this place asks for one. All places in a file have one name.
+    pub(crate) fn is_signalled(place: &Location) -> bool {
+        let file = Path::new(place.file()).file_stem().unwrap_or_default();
+        REQUESTED.is_some() && is_due(&format!("signal-{}", file.display()))
     }
 
     /// Returns the least time between two commits of the journal if a test sets it (`GDT_COMMIT_MS`).
@@ -112,10 +120,16 @@ mod injection {
 #[cfg(not(feature = "fault-injection"))]
 mod injection {
     use std::io;
+    use std::panic::Location;
     use std::time::Duration;
 
     #[inline(always)]
     pub(crate) fn is_due(_: &str) -> bool {
+        false
+    }
+
+    #[inline(always)]
+    pub(crate) fn is_signalled(_: &Location) -> bool {
         false
     }
 

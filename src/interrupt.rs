@@ -1,6 +1,7 @@
 //! Signals: long work checks between its pieces whether the process should stop, so that finished work is kept.
 
-use crate::{Error, Result};
+use crate::{Error, Result, fault};
+use std::panic::Location;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock};
 
@@ -51,6 +52,10 @@ fn is_ignored(signal: i32) -> bool {
 ///
 /// # Errors
 /// [`Error::Interrupted`] if the process was asked to stop.
+#[track_caller]
 pub fn check() -> Result<()> {
+    if fault::is_signalled(Location::caller()) {
+        STOP.store(true, Ordering::Relaxed);
+    }
     if STOP.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(()) }
 }

@@ -51,6 +51,8 @@ pub struct SourceDescription {
 
 /// Describes `source`.
 pub fn describe(source: &Source) -> SourceDescription {
+    let mut warnings = source.warnings.clone();
+    warnings.extend(source.crs.depths());
     let last = source.by_return.iter().rposition(|&count| count > 0).map_or(0, |last| last + 1);
     SourceDescription {
         file: source.path.display().to_string(),
@@ -69,7 +71,7 @@ pub fn describe(source: &Source) -> SourceDescription {
         chunks: source.chunks(),
         crs: source.crs.clone(),
         metres_per_unit: source.crs.metres_per_unit(),
-        warnings: source.warnings.clone(),
+        warnings,
     }
 }
 

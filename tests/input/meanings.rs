@@ -1,7 +1,8 @@
 //! Texts that look like something else: decimal commas, directions and units in brackets, degrees, colours, apostrophes.
 
-use gdt_batch::input::Unit;
+use gdt_batch::input::{TextOptions, Unit, open};
 
+use crate::cloud::file;
 use crate::first_warning;
 use crate::layouts::{assert_two_points, text};
 
@@ -50,6 +51,78 @@ fn decimal_commas_beside_whole_columns_are_read() {
 }
 
 #[test]
+fn a_date_beside_decimal_commas_is_no_decimal_point() {
+    let table = |line: &dyn Fn(&str) -> String| -> String {
+        [line("1;1,5;2,0;3,25;5;2"), line("2;4,0;5,0;6,0;5;3")].map(|row| row + "\n").concat()
+    };
+    for last in ["01.02.2024", "img1.jpg", "12:30:01.5", "v1.0", "scan_1.las", "2.5"] {
+        let header = "id;x;y;z;code;n;last\n";
+        let rows = table(&|row| format!("{row};{last}"));
+        assert_two_points(&format!("{header}{rows}"));
+        assert_two_points(&format!("{header}{rows}").replace(';', "\t"));
+        assert_two_points(&format!("{header}{rows}").replace(';', " "));
+        let quoted = |row: &str| row.split(';').map(|field| format!("\"{field}\"")).collect::<Vec<_>>().join(";");
+        assert_two_points(&format!("{header}{}", table(&|row| quoted(&format!("{row};{last}")))));
+        // What the user says of the layout changes nothing.
+        let path = file(".csv", format!("{header}{rows}").as_bytes());
+        let columns = Some(["id", "x", "y", "z"].map(str::to_owned).to_vec());
+        let options = TextOptions { delimiter: Some(';'), header: Some(true), columns, comment: None };
+        let source = open(&path, &options).unwrap();
+        assert_eq!((source.min, source.max), ([1.5, 2.0, 3.25], [4.0, 5.0, 6.0]), "{last}");
+        assert_eq!(source.known_malformed(), 0, "{last}");
+    }
+    // Points before decimals beside a column with commas, as of a list.
+    assert_two_points("x;y;z;lines\n1.5;2.0;3.25;1,2\n4.0;5.0;6.0;2,3\n");
+}
+
+#[test]
+fn wide_rows_with_commas_before_decimals_are_refused() {
+    let row = |i: usize| {
+        let (x, y, z) = (75_404 + i % 60, 80_200 + i / 60, 266 + i % 5);
+        format!("{x},{},{y},{},{z},{},127,68,44", i * 7 % 10, i * 3 % 10, i * i % 10)
+    };
+    let rows = |more: &str| (0..3000).map(|i| format!("{}{more}\n", row(i))).collect::<String>();
+    let wide = ",2,1,1,0,7";
+    for (comment, more) in [
+        ("# x y z red green blue\n", ""),
+        ("#x,y,z\n", ""),
+        ("# x,y,z,red,green,blue\n", ""),
+        ("", ""),
+        ("# x y z red green blue\n", wide),
+        ("#x,y,z\n", wide),
+    ] {
+        let error = text(&format!("{comment}{}", rows(more))).err().unwrap_or_else(|| panic!("{comment:?} was read"));
+        let words = ["before decimals", "columns", "565000,25,5933000,50"];
+        assert!(
+            error.exit_code() == 3 && words.iter().all(|word| error.to_string().contains(word)),
+            "{comment:?}: {error}"
+        );
+    }
+}
+
+#[test]
+fn wide_tables_of_whole_numbers_are_read() {
+    let row = |i: usize| {
+        let color = [i % 256, 5 * i % 256, i * i % 256].map(|channel| channel.to_string()).join(",");
+        format!("{},{},{},{color}", 565_000 + 3 * i, 5_933_000 + 7 * i, 12 + i % 90)
+    };
+    let more = |count: usize| (0..count).map(|more| format!(",{more}")).collect::<String>();
+    for (comment, count) in [
+        ("# x y z red green blue", 3),
+        ("# x y z", 3),
+        ("#x,y,z", 3),
+        ("#x,y,z", 14),
+        ("# made today", 3),
+        ("# made today", 14),
+        ("x,y,z,r,g,b,0,1,2,3,4,5,6,7,8,9,a,b,c", 13),
+    ] {
+        let rows: String = (0..3000).map(|i| format!("{}{}\n", row(i), more(count))).collect();
+        let cloud = text(&format!("{comment}\n{rows}")).unwrap_or_else(|error| panic!("{comment:?}: {error}"));
+        assert_eq!((cloud.counts.kept, cloud.source.max[0]), (3000, 573_997.0), "{comment:?}");
+    }
+}
+
+#[test]
 fn decimal_commas_in_quotes_are_read_between_commas() {
     for content in [
         "\"1,5\",\"2,0\",\"3,25\"\n\"4,0\",\"5,0\",\"6,0\"\n",
@@ -85,8 +158,58 @@ fn a_letter_with_a_direction_in_brackets_is_read_by_the_direction() {
 }
 
 #[test]
+fn all_brackets_after_a_name_are_read() {
+    for header in ["Z [m];X (Northing) [m];Y (Easting) [m]", "Z;X [m] (Hochwert);Y [m] (Rechtswert)"] {
+        let crs = assert_two_points(&format!("{header}\n3.25;2;1.5\n6;5;4\n")).source.crs;
+        assert_eq!(crs.horizontal, Unit::Metre, "{header}");
+    }
+    for header in [
+        "Easting (X) [ft];Northing (Y) [ft];Z [ft]",
+        "X [Easting (ft)];Y [Northing (ft)];Z [Height (ft)]",
+        "X (Easting in feet);Y (Northing in feet);Z (feet)",
+        "X (Easting ft);Y (Northing ft);Z (Height ft)",
+        "X (Easting / ft);Y (Northing / ft);Z (Height / ft)",
+    ] {
+        let cloud = assert_two_points(&format!("{header}\n1.5;2;3.25\n4;5;6\n"));
+        assert_eq!(
+            (cloud.source.crs.horizontal, cloud.source.crs.vertical),
+            (Unit::Foot, Some(Unit::FOOT)),
+            "{header}"
+        );
+        assert!(first_warning(&cloud).contains("international feet"), "{header}");
+    }
+    for header in ["X [ft (US)];Y [ft (US)];Z", "X [ft US survey];Y [ft US survey];Z", "X (foot us);Y [ft-US];Z"] {
+        let cloud = assert_two_points(&format!("{header}\n1.5;2;3.25\n4;5;6\n"));
+        assert_eq!(cloud.source.crs.horizontal, Unit::UsFoot, "{header}");
+        assert_eq!(first_warning(&cloud), "", "{header}");
+    }
+}
+
+#[test]
+fn units_in_a_comment_below_names_in_a_comment_are_used() {
+    for comments in ["# x,y,z\n# ft,ft,ft", "# x,y,z\n# made today\n#[ft],[ft],[ft]", "// x y z\n// units: ft ft ft"] {
+        let cloud = assert_two_points(&format!("{comments}\n1.5,2,3.25\n4,5,6\n"));
+        assert_eq!(
+            (cloud.source.crs.horizontal, cloud.source.crs.vertical),
+            (Unit::Foot, Some(Unit::FOOT)),
+            "{comments}"
+        );
+    }
+    // A sentence is no line of units.
+    let cloud = assert_two_points("# x y z\n# in m\n# ft, m, see below\n1.5,2,3.25\n4,5,6\n");
+    assert_eq!(cloud.source.crs.horizontal, Unit::Unknown);
+    let error = text("# x [m],y [m],z [m]\n# ft,ft,ft\n1.5,2,3.25\n4,5,6\n").err().expect("was read");
+    assert!(error.exit_code() == 3 && error.to_string().contains("the line below it says ft"), "{error}");
+}
+
+#[test]
 fn units_that_are_not_known_are_named() {
-    for (header, unknown) in [("x [rod];y [rod];z [rod]", "\"rod\""), ("x (local);y (local);z", "\"local\"")] {
+    for (header, unknown) in [
+        ("x [rod];y [rod];z [rod]", "\"rod\""),
+        ("x (local);y (local);z", "\"local\""),
+        ("X [Easting (rod)];Y [Northing (rod)];z", "\"rod\""),
+        ("x [m];y [m];Z (m.s.l.)", "\"m.s.l.\""),
+    ] {
         let cloud = assert_two_points(&format!("{header}\n1.5;2;3.25\n4;5;6\n"));
         let warning = first_warning(&cloud);
         assert!(warning.contains(unknown) && warning.contains("no unit that is known"), "{header}: {warning:?}");

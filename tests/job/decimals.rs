@@ -318,7 +318,18 @@ fn degrees_are_refused_by_the_names_of_columns() {
             format!("{:.7},{:.7},{}\n", 9.0 + random.unit() / 100.0, 48.0 + random.unit() / 100.0, random.below(90))
         })
         .collect();
-    for header in ["longitude,latitude,height", "lon,lat,z", "X [deg],Y [deg],Z"] {
+    for header in [
+        "longitude,latitude,height",
+        "lon,lat,z",
+        "X [deg],Y [deg],Z",
+        "X (lon),Y (lat),Z",
+        "X (longitude),Y (latitude),Elevation",
+        "x [Longitude],y [Latitude],z [m]",
+        "x (lng),y (lat),z",
+        "Easting (lon),Northing (lat),z",
+        "x (degrees east),y (degrees north),z",
+        "x,y,z\ndeg E,deg N,m",
+    ] {
         let text = Text::new(&format!("{header}\n{rows}"));
         text.job().run().refused(2, &["cloud.csv", "degrees", "projected CRS", "unit"]);
         run(&text.job().with("input", "unit = \"metre\""));

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::coordinate_systems::{code, keys, text, warnings, write};
-use crate::program::Job;
+use crate::program::{Job, gdt_batch};
 
 const DOUBLES: u16 = 34736;
 
@@ -121,6 +121,21 @@ fn depths_are_told_from_heights_and_said_to_be_depths() {
     let said = warnings(&Job::on(&[&down]).report());
     assert!(said.contains("down.las") && said.contains("its z counts downwards (Local)"), "{said}");
     assert_eq!(warnings(&Job::on(&[&up]).report()), "[]");
+    // Once the user has said what is meant, there is no more to say about the record.
+    for choice in ["EPSG:25832+7837", "none"] {
+        let said = warnings(&Job::on(&[&down]).with("input", &format!("crs = \"{choice}\"")).report());
+        assert!(!said.contains("upside down"), "{choice}: {said}");
+    }
+    let silent = write(folder.path(), "silent.las", &[text(plane)]);
+    for choice in ["auto", "first"] {
+        let said = Job::on(&[&down, &silent]).with("input", &format!("crs = \"{choice}\"")).report();
+        let said = warnings(&said);
+        assert!(said.contains("1 of 2 inputs, such as") && said.contains("its z counts downwards (Local)"), "{said}");
+        let words = "1 of 2 inputs do not say whether their z counts downwards, such as";
+        assert!(said.contains(words) && said.contains("silent.las: it is taken to count as"), "{choice}: {said}");
+    }
+    let info = gdt_batch(folder.path(), &["info", "down.las"]);
+    assert!(info.out.contains("its z counts downwards (Local)"), "{info:?}");
     let given = Job::on(&[&up]).with("input", "crs = \"EPSG:25832+5715\"").report();
     assert!(warnings(&given).contains("its z counts downwards (EPSG:5715)"), "{given}");
 }
@@ -159,5 +174,8 @@ fn what_the_user_says_is_not_called_a_record() {
     }
     let degrees = write(folder.path(), "degrees.las", &[keys(&[[1024, 0, 1, 2], [2048, 0, 1, 4326]])]);
     move_to_degrees(&degrees);
-    Job::on(&[&degrees]).run().refused(2, &["if the CRS record is wrong, say with [input] crs"]);
+    Job::on(&[&degrees]).run().refused(
+        2,
+        &["degrees.las: the coordinates are in degrees", "if the CRS record is wrong, say with [input] crs"],
+    );
 }

@@ -82,6 +82,20 @@ fn a_crs_of_the_user_takes_no_unit_of_heights_away() {
 }
 
 #[test]
+fn the_first_file_may_leave_the_unit_of_heights_to_another_with_a_warning() {
+    let folder = tempfile::tempdir().unwrap();
+    let plain = write(folder.path(), "m.las", &[code(26915)]);
+    let feet = [[1024, 0, 1, 1], [3072, 0, 1, 26915], [4096, 0, 1, 6360]];
+    let feet = write(folder.path(), "mzft.las", &[keys(&feet)]);
+    for choice in ["auto", "first"] {
+        let (found, said) = metres(&[&plain, &feet], &format!("crs = \"{choice}\""));
+        assert_eq!(found, [1.0, US_FOOT], "{choice}");
+        let words = "1 of 2 inputs do not say the unit of their heights, such as";
+        assert!(said.contains(words) && said.contains("m.las: it is taken to be US survey foot"), "{choice}: {said}");
+    }
+}
+
+#[test]
 fn without_a_crs_the_units_of_columns_count() {
     let folder = tempfile::tempdir().unwrap();
     let feet = csv(&folder, "feet.csv", "x [ft],y [ft],z [ft]");

@@ -31,6 +31,31 @@ fn a_job_stopped_by_sigterm_ctrl_c_or_a_hangup_goes_on_where_it_stopped() {
 }
 
 #[test]
+fn a_signal_within_one_long_step_is_heeded_before_the_step_ends() {
+    // All sites of a line are on the hull, so that the merge has all of them.
+    let line = (0..70_000).map(|i| if i == 0 { [40_001, 70_000] } else { [2 * i, 0] });
+    let wide = || Rig::new(&scattered::with_heights(line.clone()), &Setup::tiles_of(40_000));
+    let dense = || Rig::new(&scattered::uniform(60_000, 100_000, 1), &Setup::tiles_of(100_000));
+    // The merge asks until the end of its triangulation, at every kind of place there, and between its parts; the drawing of one tile
+    // asks often.
+    for (rig, place, counts) in [
+        (wide(), "divide_and_conquer", [1, 20, 36, 52]),
+        (wide(), "merge", [1, 2, 3, 4]),
+        (dense(), "canvas", [1, 2, 8, 16]),
+    ] {
+        for count in counts {
+            rig.forget();
+            let what = format!("signal-{place}");
+            let end = rig.run_to(&what, count);
+            assert_eq!(end.status.code(), Some(1), "{what}:{count}: {end:?}");
+            end.stopped(&["error: interrupted"]);
+            rig.has_nothing_half_written(&what);
+        }
+        rig.completes(place);
+    }
+}
+
+#[test]
 fn a_job_under_nohup_does_not_end_with_its_terminal() {
     let rig = long_job(2);
     let mut command = std::process::Command::new("sh");

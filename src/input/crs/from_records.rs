@@ -17,7 +17,7 @@ pub(crate) fn from_records(
     let (records, keys) = (keys, geotiff::parse(keys));
     let used = text.as_ref().or(keys.as_ref());
     let doubts = text.as_ref().map_or_else(|| geotiff::doubts(records), Crs::doubts);
-    for doubt in doubts.into_iter().chain(used.and_then(Crs::depths)) {
+    for doubt in doubts {
         let label = used.map_or("unknown".into(), Crs::label);
         warnings
             .push(format!("its coordinate system ({label}): {doubt} (set [input] crs or unit to say what is meant)"));

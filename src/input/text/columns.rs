@@ -29,7 +29,7 @@ const DECIMAL_COMMA: &str = "has commas both between columns and before decimals
                              numbers; write it again with points before decimals or with semicolons between columns, or name all \
                              of its columns with `columns` under [input.csv]";
 
-const UNCLEAR_COMMA: &str = "has only whole numbers with commas between them, more than three in a row, and no names: the commas may also \
+const UNCLEAR_COMMA: &str = "has only whole numbers with commas between them, more than three in a row, and no line names all of them: the commas may also \
                              stand before decimals, as in 565000,25,5933000,50; if they do not, name all of its columns with `columns` under \
                              [input.csv], for example [\"x\", \"y\", \"z\", \"class\"], and if they do, write it again with points before \
                              decimals or with semicolons between columns";
@@ -124,6 +124,7 @@ impl Columns {
         }
         let data = &texts[header.lines..];
         let bad = |what: String| Error::input(path, what);
+        let mut words = None;
         let found = match (&options.columns, header.names) {
             (Some(names), _) => {
                 let mut named = named_by_user(names)?;
@@ -136,7 +137,9 @@ impl Columns {
             (None, None) if options.header == Some(false) => None,
             (None, None) => {
                 let end = rows.get(header.lines).map_or(0, |row| row.0);
-                let named = names_in_comments(&lines[..end], &comments, &candidates, data).map_err(bad)?;
+                let in_comments = names_in_comments(&lines[..end], &comments, &candidates, data).map_err(bad)?;
+                words = in_comments.words;
+                let named = in_comments.named;
                 names_among_rows(data, &candidates)
                     .filter(|_| named.is_none())
                     .map_or(Ok(named), |what| Err(bad(what)))?
@@ -146,7 +149,8 @@ impl Columns {
         let delimiter = row_delimiter(&candidates, &roles, data);
         if options.columns.as_ref().is_none_or(|names| data.iter().any(|row| delimiter.has_more_than(names.len(), row)))
         {
-            refuse_decimal_comma(path, delimiter, found.as_ref().filter(|_| options.columns.is_none()), data)?;
+            let found = found.as_ref().filter(|_| options.columns.is_none());
+            refuse_decimal_comma(path, delimiter, found, words, data)?;
         }
         if found.is_none() && are_numbered(delimiter, data) {
             return Err(bad(NUMBERED.to_string()));
@@ -223,9 +227,16 @@ fn names_warning(found: Option<&NamedColumns>, units: &UnitsOfAxes, columns: usi
     Some(warning.to_string())
 }
 
-fn refuse_decimal_comma(path: &Path, delimiter: Delimiter, found: Option<&NamedColumns>, rows: &[&[u8]]) -> Result<()> {
+/// Fails if commas stand before decimals too, or may. `words` are those of a comment that begins with x, y and z.
+fn refuse_decimal_comma(
+    path: &Path,
+    delimiter: Delimiter,
+    found: Option<&NamedColumns>,
+    words: Option<usize>,
+    rows: &[&[u8]],
+) -> Result<()> {
     let names = match found {
-        None => Names::None,
+        None => words.map_or(Names::None, Names::InComment),
         Some(found) if found.roles.starts_with(&COORDINATES) => Names::CoordinatesFirst,
         Some(_) => Names::Others,
     };

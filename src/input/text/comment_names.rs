@@ -8,6 +8,15 @@ use crate::input::text::names::{NamedColumns, named_columns};
 use crate::input::text::numbered::are_numbered;
 use crate::input::text::role::ColumnRole;
 
+/// What comments say of columns.
+pub(crate) struct CommentNames {
+    /// The names of the columns.
+    pub(crate) named: Option<NamedColumns>,
+    /// The number of words of a comment that has other words than there are columns, but begins with x, y and z, as columns without
+    /// names do.
+    pub(crate) words: Option<usize>,
+}
+
 /// Returns the names in the last comment among `lines` that names the columns of `rows`, the first of the text.
 ///
 /// # Errors
@@ -17,10 +26,11 @@ pub(crate) fn names_in_comments(
     comments: &[String],
     candidates: &[Delimiter],
     rows: &[&[u8]],
-) -> Result<Option<NamedColumns>, String> {
+) -> Result<CommentNames, String> {
     let rows = Rows { rows: &rows[..rows.len().min(ROWS_FOR_NAMES)], candidates };
-    let mut misfit = None;
-    for line in lines.iter().rev().filter(|line| !line.trim_ascii().is_empty() && is_skipped(line, comments)) {
+    let (mut misfit, mut words) = (None, None);
+    let is_comment = |line: &&[u8]| !line.trim_ascii().is_empty() && is_skipped(line, comments);
+    for (at, line) in lines.iter().enumerate().rev().filter(|(_, line)| is_comment(line)) {
         for text in texts_of(line, comments) {
             let others = candidates.iter().filter(|own| !CANDIDATES.contains(own));
             let readings = CANDIDATES.iter().chain(others).filter_map(|delimiter| {
@@ -30,15 +40,20 @@ pub(crate) fn names_in_comments(
             });
             for (delimiter, names) in readings {
                 match rows.fit(delimiter, &names) {
-                    Some(names) => return Ok(Some(names)),
-                    None if rows.mean_the_same(&names) => {}
+                    Some(mut named) => {
+                        let mut below = lines[at + 1..].iter().flat_map(|line| texts_of(line, comments));
+                        let added = below.try_for_each(|text| named.add_units_of_comment(text));
+                        added.map_err(|what| format!("the comment {} {what}", shown(line)))?;
+                        return Ok(CommentNames { named: Some(named), words: None });
+                    }
+                    None if rows.mean_the_same(&names) => words = words.or(Some(names.count)),
                     None => misfit = misfit.or(Some((line, names.count))),
                 }
             }
         }
     }
     match misfit {
-        None => Ok(None),
+        None => Ok(CommentNames { named: None, words }),
         Some((line, names)) => Err(format!(
             "the comment {} names x, y and z, but it has {names} words and the rows have {} columns: say which is which with `columns` under \
              [input.csv]{}",
@@ -122,7 +137,7 @@ mod tests {
         let comments = ["#".to_string()];
         let found = names_in_comments(&[comment.as_bytes()], &comments, &CANDIDATES, &[row.as_bytes()]);
         let place = |names: NamedColumns| [0, 1, 2].map(|axis| names.place(axis).unwrap());
-        found.map(|names| names.map(place)).map_err(drop)
+        found.map(|found| found.named.map(place)).map_err(drop)
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! Rows in which a comma is both the delimiter and the sign before decimals, such as 565000,25,5933000,50,12,1.
 
+use std::collections::BTreeMap;
+
 use crate::input::text::delimiter::Delimiter;
 
 /// Heights and depths of the Earth have fewer digits before their point.
@@ -17,8 +19,14 @@ const BROKEN: usize = 10;
 /// One row in so many has another number of columns because it is broken, not because its decimals were zeros.
 const RAGGED: usize = 50;
 
-/// Rows without names and with more columns hold more than coordinates with decimals and a number.
-const MOST_COLUMNS: usize = 7;
+/// x, y and z take so many columns if all of them have decimals.
+const COLUMNS: usize = 6;
+
+/// Rows without names and with more columns hold more than the number of the point, coordinates with decimals, and a colour.
+const MOST_COLUMNS: usize = 10;
+
+/// Rows without names and with more columns hold colours or other whole numbers after z, not its decimals alone.
+const MOST_COLUMNS_Z_ALONE: usize = 7;
 
 /// Which of x, y and z have decimals, as bits. x and y are written alike, so both have them or neither.
 const PATTERNS: [usize; 3] = [0b011, Z_ALONE, 0b111];
@@ -40,6 +48,8 @@ pub(crate) enum CommaUse {
 pub(crate) enum Names {
     /// Nothing.
     None,
+    /// A comment has so many words, x, y and z first. It may name fewer columns than there are.
+    InComment(usize),
     /// They begin with x, y, z.
     CoordinatesFirst,
     /// They begin with something else.
@@ -59,7 +69,7 @@ pub(crate) fn second_use(delimiter: Delimiter, names: Names, named: Option<usize
         return None;
     }
     let all: Vec<Vec<&[u8]>> = rows.iter().map(|row| delimiter.fields(row)).collect();
-    let looked_at = |row: &Vec<&[u8]>| row.len().min(MOST_COLUMNS - 1);
+    let looked_at = |row: &Vec<&[u8]>| row.len().min(COLUMNS);
     let has_point = |row: &Vec<&[u8]>| row[..looked_at(row)].iter().any(|field| is_pointed(field));
     if all.iter().any(has_point) {
         return None;
@@ -83,12 +93,17 @@ pub(crate) fn second_use(delimiter: Delimiter, names: Names, named: Option<usize
     if names != Names::Others && (have_no_heights(&whole) || have_zeros(&whole, names)) {
         return Some(CommaUse::Decimals);
     }
-    (names == Names::None && may_be_decimals(&whole)).then_some(CommaUse::Unclear)
+    let words = match names {
+        Names::None => None,
+        Names::InComment(words) => Some(words),
+        Names::CoordinatesFirst | Names::Others => return None,
+    };
+    may_be_decimals(&whole, words).then_some(CommaUse::Unclear)
 }
 
+/// Returns whether `field` is a number with a point. A date, a time or the name of a file is none.
 pub(crate) fn is_pointed(field: &[u8]) -> bool {
-    let digits = |byte: &u8| byte.is_ascii_digit() || matches!(byte, b'.' | b'-' | b'+');
-    field.len() > 1 && field.contains(&b'.') && field.iter().all(digits)
+    field.contains(&b'.') && std::str::from_utf8(field).is_ok_and(|text| text.parse::<f64>().is_ok())
 }
 
 fn is_whole(field: &[u8]) -> bool {
@@ -138,21 +153,29 @@ fn are_ragged(rows: &[WholeRow], named: Option<usize>) -> bool {
 }
 
 fn usual_length(rows: &[WholeRow]) -> usize {
-    let with_length = |length: usize| rows.iter().filter(|row| row.len() == length).count();
-    // No more columns matter to any rule here.
-    (3..=2 * MOST_COLUMNS).max_by_key(|&length| with_length(length)).unwrap_or(3)
+    let mut with_length = BTreeMap::new();
+    rows.iter().for_each(|row| *with_length.entry(row.len()).or_insert(0) += 1);
+    with_length.into_iter().max_by_key(|(_, rows)| *rows).map_or(0, |(length, _)| length)
 }
 
 /// Returns whether columns that nothing names can be read as coordinates with decimals, with or without the number of the row before
-/// them.
-fn may_be_decimals(rows: &[WholeRow]) -> bool {
+/// them. If a comment has so many `words`, rows of any width can, if it has no word for the decimals.
+fn may_be_decimals(rows: &[WholeRow], words: Option<usize>) -> bool {
     let usual = usual_length(rows);
     let rows: Vec<&WholeRow> = rows.iter().filter(|row| row.len() == usual).collect();
-    if rows.len() < LEAST_ROWS || !(4..=MOST_COLUMNS).contains(&usual) {
+    if rows.len() < LEAST_ROWS || usual < 4 {
         return false;
     }
     let starts = if are_numbered(&rows) { 0..2 } else { 0..1 };
-    starts.into_iter().any(|start| PATTERNS.iter().any(|pattern| fits_pattern(&rows, start, *pattern)))
+    let is_usual = |pattern: usize| {
+        let unnamed = words.map_or(0, |words| usual.saturating_sub(words));
+        match pattern {
+            Z_ALONE => usual <= MOST_COLUMNS_Z_ALONE || unnamed == 1,
+            _ => usual <= MOST_COLUMNS || unnamed >= pattern.count_ones() as usize,
+        }
+    };
+    let patterns = || PATTERNS.into_iter().filter(|pattern| is_usual(*pattern));
+    starts.into_iter().any(|start| patterns().any(|pattern| fits_pattern(&rows, start, pattern)))
 }
 
 /// Returns whether the first column counts the rows.
@@ -216,6 +239,7 @@ mod tests {
         assert_eq!(used(Names::None, "565000,5933000,12,255,128,3\n565001,5933001,13,255,128,3"), None);
         assert_eq!(used(Names::None, "12,5,50,5,12,1"), None);
         assert_eq!(used(Names::None, "565000,25,5933000.5,50,12,1"), None);
+        assert_eq!(used(Names::None, "565000,25,5933000,50,12,01.02.2024"), decimals);
         assert_eq!(used(Names::None, "1,2,3"), None);
     }
 
@@ -272,6 +296,40 @@ mod tests {
         for text in [table(50, numbered), table(50, heights), table(50, local), table(50, centres)] {
             assert_eq!(used(Names::None, &text), Some(CommaUse::Unclear), "{text}");
             assert_eq!(used(Names::CoordinatesFirst, &text), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn decimals_are_seen_in_wide_rows_that_a_comment_names_in_part() {
+        let unclear = Some(CommaUse::Unclear);
+        let wide = |count: usize, i: usize| {
+            let row = [75_404 + i, i * 7 % 10, 80_200 + i * i % 99, i * 3 % 10, 266 + i % 9, i * 7 % 10, 127, 68, 44];
+            let row = row.into_iter().chain((0..20).map(|more| more + i % 7)).take(count);
+            row.map(|field| field.to_string()).collect::<Vec<_>>().join(",")
+        };
+        assert_eq!(used(Names::None, &table(300, |i| wide(9, i))), unclear);
+        assert_eq!(used(Names::None, &table(300, |i| format!("{i},{}", wide(9, i)))), unclear);
+        assert_eq!(used(Names::InComment(6), &table(300, |i| wide(9, i))), unclear);
+        assert_eq!(used(Names::InComment(20), &table(300, |i| wide(23, i))), unclear);
+        assert_eq!(used(Names::InComment(3), &table(300, |i| wide(12, i))), unclear);
+        let named = Names::InComment(20);
+        // x and y are whole.
+        let high = |count: usize, i: usize| {
+            let row =
+                [75_404 + 3 * i, 80_200 + i * i % 99, 266 + i % 9, i * 7 % 10, 127, 68, 44, 5 * i % 256, 3 * i % 256];
+            let row = row.into_iter().chain((0..20).map(|more| more + i % 7)).take(count);
+            row.map(|field| field.to_string()).collect::<Vec<_>>().join(",")
+        };
+        assert_eq!(used(Names::InComment(8), &table(300, |i| high(9, i))), unclear);
+        for (names, count) in [(Names::None, 9), (Names::None, 20), (Names::InComment(6), 9), (named, 20), (named, 24)]
+        {
+            assert_eq!(used(names, &table(300, |i| high(count, i))), None, "{names:?} {count}");
+        }
+        assert_eq!(used(Names::CoordinatesFirst, &table(300, |i| high(20, i))), None);
+        let colored =
+            |i: usize| format!("{},{},{},{},{},70,9,8,7", 1_000 + 3 * i, 40 * i, 12 + i % 90, i * 5 % 256, i * i % 256);
+        for names in [Names::None, Names::InComment(6), Names::InComment(8), Names::InComment(3)] {
+            assert_eq!(used(names, &table(300, colored)), None, "{names:?}");
         }
     }
 

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use crate::input::text::decimal_comma::is_pointed;
 use crate::input::text::delimiter::Delimiter;
 
 /// What stands before the decimals of a text.
@@ -22,8 +23,8 @@ const ROWS: usize = 300;
 
 const COMMA: Delimiter = Delimiter::Byte(b',');
 
-/// Returns the sign before the decimals of these rows. A row shows that it is a comma if it has three numbers that way, and not with
-/// points. The rows may have other rows among them, such as those of a header.
+/// Returns the sign before the decimals of these rows. A row shows that it is a comma if it has three numbers that way, and more of them
+/// with commas than with points. The rows may have other rows among them, such as those of a header.
 pub(crate) fn find(rows: &[&[u8]], candidates: &[Delimiter]) -> DecimalSign {
     if !rows.iter().take(ROWS).any(|row| row.contains(&b',')) {
         return DecimalSign::Point;
@@ -36,18 +37,18 @@ pub(crate) fn find(rows: &[&[u8]], candidates: &[Delimiter]) -> DecimalSign {
     let (mut commas, mut quoted, mut points, mut plain) = (0usize, 0usize, 0usize, 0usize);
     let (mut thousands, mut gaps) = (true, false);
     for row in rows.iter().take(ROWS).copied() {
-        let (is_row, has_point) = (has_three(row, candidates), row.contains(&b'.'));
-        // Beside decimals there may be three whole numbers: colours, a class, the number of the point.
-        let found = if is_row && has_point { None } else { with_commas(row).or_else(|| in_quotes(row)) };
+        let (is_row, with_points) = (has_three(row, candidates), numbers_with_points(row, candidates));
+        // Beside decimals there may be three whole numbers, such as colours, and a column that a program wrote with points.
+        let found = with_commas(row).or_else(|| in_quotes(row));
+        let found = found.filter(|(_, numbers)| numbers.iter().filter(|field| has(field, b',')).count() > with_points);
         if let Some((is_quoted, numbers)) = found {
             (commas, quoted) = (commas + !is_quoted as usize, quoted + is_quoted as usize);
-            let is_decimal = |field: &&&[u8]| field.contains(&b',');
-            thousands &= numbers.iter().filter(is_decimal).all(|field| may_have_thousands(field));
-            gaps |= !numbers.iter().take(3).all(|field| field.contains(&b','));
+            thousands &= numbers.iter().filter(|field| has(field, b',')).all(|field| may_have_thousands(field));
+            gaps |= !numbers.iter().take(3).all(|field| has(field, b','));
         } else if is_row {
             // Commas that part whole numbers are no decimals, unless those are in quotes.
-            points += has_point as usize;
-            plain += (!has_point && !has_three(row, &delimiters)) as usize;
+            points += (with_points > 0) as usize;
+            plain += (with_points == 0 && !has_three(row, &delimiters)) as usize;
         }
     }
     if quoted <= commas {
@@ -107,6 +108,17 @@ fn numbers_with_commas<'a>(row: &'a [u8], delimiters: &[Delimiter]) -> Option<Ve
     row.contains(&b',').then(|| delimiters.iter().map(numbers).find(is_row)).flatten()
 }
 
+/// Returns how many numbers of a row have a point, if it has three numbers that way. A date, a time or the name of a file is none.
+fn numbers_with_points(row: &[u8], candidates: &[Delimiter]) -> usize {
+    let rows = candidates.iter().filter(|delimiter| row.contains(&b'.') && delimiter.numbers(row) >= 3);
+    let pointed = |delimiter: &Delimiter| delimiter.fields(row).into_iter().filter(|field| is_pointed(field)).count();
+    rows.map(pointed).max().unwrap_or(0)
+}
+
+fn has(field: &[u8], sign: u8) -> bool {
+    field.contains(&sign)
+}
+
 /// Returns whether `field` is a number with nothing but a comma before its decimals, if it has any.
 fn is_number(field: &[u8]) -> bool {
     let comma = field.iter().position(|byte| *byte == b',');
@@ -150,11 +162,22 @@ mod tests {
             "565013,44;5933084,74;25,28;10;20;30",
             "7 565013,44 5933084,74 25,28 10 20 30",
             "id;x;y;z;intensity;class\n1;565013,44;5933084,74;25,28;100;2\n2;565014;5933085;25;101;2",
+            "1;565816,44;5933334,81;25,19;5;2;01.02.2024",
+            "1;565816,44;5933334,81;25,19;5;2;12:30:01.5",
+            "1;565816,44;5933334,81;25,19;10;20;30;img1.jpg",
+            "7\t565816,44\t5933334,81\t25,19\t5\t2\tv1.0",
+            "7 565816,44 5933334,81 25,19 5 2 scan_1.las",
+            "565816,44;5933334,81;25,19;5;2.5;1",
+            "1;\"565816,44\";\"5933334,81\";\"25,19\";5;01.02.2024",
         ] {
             assert_eq!(sign(text), DecimalSign::Comma, "{text}");
         }
-        for text in ["\"565013,44\",\"5933084,74\",\"25,28\"", "1,\"0,44\",\"84,742\",25,10,20", "a,\"1,5\",2,\"3,25\""]
-        {
+        for text in [
+            "\"565013,44\",\"5933084,74\",\"25,28\"",
+            "1,\"0,44\",\"84,742\",25,10,20",
+            "a,\"1,5\",2,\"3,25\"",
+            "7,\"1,5\",2,\"3,2\",2.5",
+        ] {
             assert_eq!(sign(text), DecimalSign::QuotedComma, "{text}");
         }
         for text in [
@@ -167,6 +190,8 @@ mod tests {
             "5,933,000;5,933,000;12",
             "x,y,z",
             "1 2 3 a,b",
+            "1.5;2.5;3;4,5",
+            "1.5;2;3;4,5",
         ] {
             assert_eq!(sign(text), DecimalSign::Point, "{text}");
         }

@@ -12,6 +12,7 @@ pub(crate) mod granularity;
 pub(crate) mod header;
 pub(crate) mod layout;
 pub(crate) mod lines;
+pub(crate) mod name;
 pub(crate) mod names;
 pub(crate) mod noise;
 pub(crate) mod noise_warning;

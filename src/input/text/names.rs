@@ -1,97 +1,9 @@
-//! The names that people give to columns.
+//! What the names of columns say together.
 
 use crate::input::text::delimiter::CANDIDATES;
+use crate::input::text::name::{NAMES, Name, unit_alone};
 use crate::input::text::role::ColumnRole;
 use crate::input::text::units::{TextUnit, TextUnits, UnitsOfAxes};
-
-/// The names of one role, the clearest first: if several columns have one, that with the clearest name is taken.
-type Names = (&'static [&'static str], ColumnRole);
-
-/// Names without case, blanks, points, hyphens and underscores, and without a unit in brackets.
-const NAMES: [Names; 7] = [
-    (
-        &[
-            "x",
-            "pointx",
-            "xcoord",
-            "xcoordinate",
-            "coordx",
-            "coordinatex",
-            "posx",
-            "xm",
-            "easting",
-            "eastings",
-            "east",
-            "rechtswert",
-            "ostwert",
-            "utmx",
-            "utme",
-            "rechts",
-            "rw",
-            "e",
-            "lon",
-            "longitude",
-            "long",
-            "lng",
-        ],
-        ColumnRole::Coordinate(0),
-    ),
-    (
-        &[
-            "y",
-            "pointy",
-            "ycoord",
-            "ycoordinate",
-            "coordy",
-            "coordinatey",
-            "posy",
-            "ym",
-            "northing",
-            "northings",
-            "north",
-            "hochwert",
-            "nordwert",
-            "utmy",
-            "utmn",
-            "hoch",
-            "hw",
-            "n",
-            "lat",
-            "latitude",
-        ],
-        ColumnRole::Coordinate(1),
-    ),
-    (
-        &[
-            "z",
-            "pointz",
-            "zcoord",
-            "zcoordinate",
-            "coordz",
-            "coordinatez",
-            "posz",
-            "zm",
-            "elevation",
-            "elev",
-            "height",
-            "altitude",
-            "alt",
-            "ellipsoidalheight",
-            "orthometricheight",
-            "hoehe",
-            "höhe",
-            "h",
-        ],
-        ColumnRole::Coordinate(2),
-    ),
-    (&["r", "red"], ColumnRole::Color(0)),
-    (&["g", "green"], ColumnRole::Color(1)),
-    (&["b", "blue"], ColumnRole::Color(2)),
-    (&["class", "classification"], ColumnRole::Class),
-];
-
-/// The names of longitude and latitude.
-const DEGREES: [&[&str]; 2] = [&["lon", "longitude", "long", "lng"], &["lat", "latitude"]];
 
 /// What is wrong with the names of columns.
 #[derive(Debug, thiserror::Error)]
@@ -136,11 +48,20 @@ impl NamedColumns {
     /// # Errors
     /// A sentence, if the names say other units.
     pub(crate) fn add_units(&mut self, fields: &[&[u8]]) -> Result<(), String> {
-        let unit = |axis: usize| {
-            let field = fields.get(self.place(axis)?)?;
-            TextUnit::read(std::str::from_utf8(field).ok()?)
-        };
-        self.units.add_line([unit(0), unit(1), unit(2)])
+        self.units.add_line(self.units_in(fields))
+    }
+
+    /// Takes the units of a comment below the names into account, if it says those of x, y and z and is no sentence.
+    ///
+    /// # Errors
+    /// A sentence, if the names say other units.
+    pub(crate) fn add_units_of_comment(&mut self, text: &[u8]) -> Result<(), String> {
+        let lines = CANDIDATES.map(|delimiter| self.units_in(&delimiter.fields(text)));
+        lines.into_iter().filter(|line| line.iter().all(Option::is_some)).try_for_each(|line| self.units.add_line(line))
+    }
+
+    fn units_in(&self, fields: &[&[u8]]) -> [Option<TextUnit>; 3] {
+        [0, 1, 2].map(|axis| unit_alone(fields.get(self.place(axis)?)?))
     }
 
     /// Takes the units of a line of the header into account where the names, which are the user's, say none: those in brackets after
@@ -151,70 +72,11 @@ impl NamedColumns {
             let field = |axis: usize| fields.get(self.place(axis)?).copied();
             let [Some(x), Some(y), Some(z)] = [0, 1, 2].map(field) else { continue };
             let beside = [x, y, z].map(|field| Name::read(field).unit());
-            let alone = [x, y, z].map(|field| TextUnit::read(&String::from_utf8_lossy(field)));
+            let alone = [x, y, z].map(unit_alone);
             let found = if alone[0].is_some() && alone[1].is_some() { alone } else { beside };
             self.units.complete(found);
         }
     }
-}
-
-/// A column's name.
-struct Name {
-    /// As [`NAMES`] has it.
-    plain: String,
-    /// What is in brackets after it.
-    unit: String,
-}
-
-impl Name {
-    fn read(text: &[u8]) -> Name {
-        let text = String::from_utf8_lossy(text).trim().to_lowercase();
-        let (name, unit) = match text.find(['[', '(', '{']) {
-            Some(at) if at > 0 && text.ends_with([']', ')', '}']) => text.split_at(at),
-            _ => (text.as_str(), ""),
-        };
-        Name { plain: plain(name), unit: unit.trim_matches(['[', ']', '(', ')', '{', '}', ' ']).to_string() }
-    }
-
-    /// Returns what the column holds, and how unclear the name is. In some countries x is the northing, and brackets say so.
-    fn role(&self) -> Option<(usize, ColumnRole)> {
-        let own = role_of(&self.plain)?;
-        let is_letter = |name: &str| name.contains(['x', 'y']);
-        let direction = self.words().find(|word| !is_letter(word) && is_on_map(role_of(word)));
-        match direction {
-            Some(direction) if is_letter(&self.plain) && is_on_map(Some(own)) => role_of(&direction),
-            _ => Some(own),
-        }
-    }
-
-    /// Returns all that is in brackets, and the words of it.
-    fn words(&self) -> impl Iterator<Item = String> + use<'_> {
-        let words = self.unit.split([' ', ',', ';', '/']).filter(|word| word.chars().count() > 1);
-        std::iter::once(self.unit.as_str()).chain(words).map(plain)
-    }
-
-    fn unit(&self) -> Option<TextUnit> {
-        self.unit.split([',', ';']).find_map(TextUnit::read)
-    }
-
-    fn has_unknown_unit(&self) -> bool {
-        !self.unit.is_empty() && self.unit().is_none() && !self.words().any(|word| role_of(&word).is_some())
-    }
-}
-
-/// Returns a name as [`NAMES`] has it.
-fn plain(name: &str) -> String {
-    name.chars().filter(|c| !matches!(c, ' ' | '\t' | '_' | '-' | '.')).collect()
-}
-
-fn role_of(name: &str) -> Option<(usize, ColumnRole)> {
-    let rank = |names: &[&str]| names.iter().position(|known| *known == name);
-    NAMES.iter().find_map(|(names, role)| Some((rank(names)?, *role)))
-}
-
-/// Returns whether it is x or y.
-fn is_on_map(role: Option<(usize, ColumnRole)>) -> bool {
-    matches!(role, Some((_, ColumnRole::Coordinate(0 | 1))))
 }
 
 /// Returns what columns with these names hold.
@@ -244,11 +106,9 @@ pub(crate) fn named_columns<'a>(
     }
     drop_partial_color(&mut roles);
     truncate(&mut roles);
-    let is = |axis: usize, test: &dyn Fn(&Name) -> bool| places[axis].is_some_and(test);
-    let degree = |axis: usize| is(axis, &|name| DEGREES[axis].contains(&name.plain.as_str()));
+    let degree = |axis: usize| places[axis].is_some_and(|name| name.is_degrees(axis));
     let units = TextUnits(places.map(|name| name.and_then(Name::unit)));
-    let unknown = places.into_iter().flatten().filter(|name| name.has_unknown_unit());
-    let mut unknown_units: Vec<String> = unknown.map(|name| name.unit.clone()).collect();
+    let mut unknown_units: Vec<String> = places.into_iter().flatten().filter_map(Name::unknown_unit).collect();
     unknown_units.dedup();
     Ok(NamedColumns { roles, count: names.len(), degrees: degree(0) && degree(1), unknown_units, units })
 }
@@ -277,6 +137,7 @@ fn drop_partial_color(roles: &mut [ColumnRole]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::input::crs::unit::Unit;
 
     fn coordinates(line: &str) -> Option<[usize; 3]> {
         let named = named_columns(line.split(';').map(str::as_bytes)).ok()?;
@@ -323,7 +184,39 @@ mod tests {
         let named = |line: &str| named_columns(line.split(';').map(str::as_bytes)).unwrap();
         assert!(named("X (Northing, ft);Y (Easting, ft);Z").units().unwrap().some_foot);
         assert_eq!(named("X (Easting);Y [m];Z (H)").unknown_units, [""; 0]);
+        assert_eq!(named("X (Easting);Y [m];Z (ellipsoidal height)").unknown_units, [""; 0]);
         assert_eq!(named("x (local);y (local);z [NAVD88]").unknown_units, ["local", "navd88"]);
+        assert_eq!(named("X (Easting / rod);Y [Northing (rod)];Z (m.s.l.)").unknown_units, ["rod", "m.s.l."]);
+    }
+
+    #[test]
+    fn all_brackets_of_a_name_are_read() {
+        let named = |line: &str| named_columns(line.split(';').map(str::as_bytes)).unwrap();
+        for line in [
+            "X (Northing) [m];Y (Easting) [m];Z [m]",
+            "X [m] (Hochwert);Y [m] (Rechtswert);Z {m}",
+            "X [Northing (m)];Y [Easting (m)];Z [Height (m)]",
+            "X (N, m);Y (E, m);Z (H, m)",
+        ] {
+            assert_eq!(coordinates(line), Some([1, 0, 2]), "{line}");
+            assert_eq!(named(line).units().unwrap().horizontal, Unit::Metre, "{line}");
+            assert_eq!(named(line).units().unwrap().vertical, Some(1.0), "{line}");
+        }
+        for line in [
+            "Easting (X) [ft];Northing (Y) [ft];Z [ft]",
+            "X [Easting (ft)];Y [Northing (ft)];Z [Height (ft)]",
+            "X (Easting in feet);Y (Northing in feet);Z (in ft)",
+            "X (Easting ft);Y (Northing ft);Z (ft NAVD88)",
+            "X (Easting / ft);Y (Northing / ft);Z (Height / ft)",
+        ] {
+            assert_eq!(coordinates(line), Some([0, 1, 2]), "{line}");
+            let found = named(line).units().unwrap();
+            assert_eq!((found.horizontal, found.vertical), (Unit::Foot, Some(Unit::FOOT)), "{line}");
+            assert_eq!(named(line).unknown_units, [""; 0], "{line}");
+        }
+        for line in ["X [ft (US)];Y [ft (US)];Z [ft (US)]", "X [ft US survey];Y [ft-US];Z (foot us)"] {
+            assert_eq!(named(line).units().unwrap().horizontal, Unit::UsFoot, "{line}");
+        }
     }
 
     #[test]
@@ -338,6 +231,24 @@ mod tests {
         let named = |line: &str| named_columns(line.split(';').map(str::as_bytes)).unwrap();
         assert!(named("longitude;latitude;height").degrees);
         assert!(!named("lon;lat;x;y;z").degrees && !named("x;lat;z").degrees);
+        for line in [
+            "X (lon);Y (lat);Z",
+            "X (longitude);Y (latitude);Elevation",
+            "x [Longitude];y [Latitude];z [m]",
+            "x (lng);y (lat);z",
+            "Easting (lon);Northing (lat);z",
+            "X (lat);Y (lon);z",
+            "x [Longitude WGS84];y [Latitude WGS84];z",
+        ] {
+            assert!(named(line).degrees, "{line}");
+        }
+        for line in ["x (degrees east);y (degrees north);z", "x (deg E);y (deg N);z"] {
+            assert_eq!(named(line).units().unwrap().horizontal, Unit::Degree, "{line}");
+        }
+        let mut below = named("x;y;z");
+        below.add_units(&[b"deg E", b"deg N", b"m"]).unwrap();
+        assert_eq!(below.units().unwrap().horizontal, Unit::Degree);
+        assert_eq!(named("X (GK, 3 degree zones);Y (GK);z").units().unwrap().horizontal, Unit::Unknown);
         assert!(named("x [ft];y [ft];z [ft]").units().unwrap().some_foot);
         assert!(!named("x [m];y [m];z [m]").units().unwrap().some_foot);
         let mut below = named("x;y;z");

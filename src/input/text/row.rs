@@ -46,7 +46,7 @@ impl RowError {
                     );
                 }
                 let hint = match columns.decimal_comma {
-                    false if is_decimal_comma(field) => ": decimals have a point before them, not a comma",
+                    false if is_decimal_comma(field) => ": decimals have a point before them in this file, not a comma",
                     true if field.contains(&b'.') => ": decimals have a comma before them in this file, not a point",
                     _ => "",
                 };

@@ -12,6 +12,9 @@ pub(crate) struct TextUnit {
     metres: Option<f64>,
 }
 
+/// The name of the foot that the United States measured their land in.
+const US_FOOT: &str = "us-ft";
+
 /// The units that are known: their names, the clearest first, and their lengths.
 const UNITS: [(&[&str], Option<f64>); 11] = [
     (&["m", "metre", "metres", "meter", "meters", "mètre", "mètres", "metro", "metros", "metri"], Some(1.0)),
@@ -19,24 +22,7 @@ const UNITS: [(&[&str], Option<f64>); 11] = [
     (&["cm", "centimetre", "centimetres", "centimeter", "centimeters"], Some(0.01)),
     (&["mm", "millimetre", "millimetres", "millimeter", "millimeters"], Some(0.001)),
     (&["km", "kilometre", "kilometres", "kilometer", "kilometers"], Some(1000.0)),
-    (
-        &[
-            "us-ft",
-            "usft",
-            "us ft",
-            "ftus",
-            "ft us",
-            "us_ft",
-            "sft",
-            "us foot",
-            "us feet",
-            "us survey foot",
-            "us survey feet",
-            "survey foot",
-            "survey feet",
-        ],
-        Some(Unit::US_FOOT),
-    ),
+    (&[US_FOOT, "sft", "ussft"], Some(Unit::US_FOOT)),
     (&["ft", "feet", "foot", "ift"], Some(Unit::FOOT)),
     (&["yd", "yard", "yards"], Some(0.9144)),
     (&["in", "inch", "inches"], Some(0.0254)),
@@ -45,15 +31,58 @@ const UNITS: [(&[&str], Option<f64>); 11] = [
 ];
 
 impl TextUnit {
-    /// Returns the unit that `text` names, in brackets or not.
+    /// Returns the unit that `text` names, in brackets or not. The datum of heights may follow, as in "m NN" or "m.s.n.m".
     pub(crate) fn read(text: &str) -> Option<TextUnit> {
-        let plain = text.trim_matches(['[', ']', '(', ')', '{', '}', ' ', '.']).to_lowercase();
-        let find = |name: &str| UNITS.iter().find(|(names, _)| names.contains(&name));
-        // The datum of heights may follow, as in "m NN" or "m.s.n.m".
+        let plain = plain(text);
         let before_datum = || plain.split_once([' ', '.']).filter(|(unit, _)| ["m", "ft"].contains(unit));
-        let (names, metres) = find(&plain).or_else(|| find(before_datum()?.0))?;
+        TextUnit::known(&plain).or_else(|| {
+            // "m.s.l." is the mean sea level.
+            let (unit, _) = before_datum().filter(|_| letters(&plain) != "msl")?;
+            TextUnit::known(unit)
+        })
+    }
+
+    /// Returns the one unit that stands among `words`, which are those of a remark.
+    pub(crate) fn among(words: &[&str]) -> Option<TextUnit> {
+        let count = words.len();
+        let starts_with_digit = |word: &str| word.starts_with(|c: char| c.is_ascii_digit());
+        let read = |(start, window): (usize, &[&str])| match window {
+            ["in"] if count > 1 => None,
+            // "3 degree zones", "a grid of 1 m".
+            _ if start > 0 && starts_with_digit(words[start - 1]) => None,
+            [word] => TextUnit::read(word),
+            _ => TextUnit::known(&window.join(" ")),
+        };
+        // More words say more: "us ft" is not "ft".
+        let of_length = |length| words.windows(length).enumerate().filter_map(read).collect::<Vec<_>>();
+        let found = (1..=count).rev().map(of_length).find(|units| !units.is_empty())?;
+        found.iter().all(|unit| *unit == found[0]).then_some(found[0])
+    }
+
+    /// Returns the unit with this name, and nothing else.
+    fn known(name: &str) -> Option<TextUnit> {
+        let plain = plain(name);
+        let is_us_foot = is_us_foot(&letters(&plain));
+        let (names, metres) =
+            UNITS.iter().find(|(names, _)| names.contains(&plain.as_str()) || is_us_foot && names[0] == US_FOOT)?;
         Some(TextUnit { name: names[0], metres: *metres })
     }
+}
+
+fn plain(text: &str) -> String {
+    text.trim_matches(['[', ']', '(', ')', '{', '}', ' ', '.']).to_lowercase()
+}
+
+fn letters(plain: &str) -> String {
+    plain.chars().filter(|c| !matches!(c, ' ' | '-' | '_' | '.')).collect()
+}
+
+/// Returns whether these letters name the foot of the surveys of the United States: people write "ft (US)", "U.S. survey feet", "usft".
+fn is_us_foot(letters: &str) -> bool {
+    ["feet", "foot", "ft"].iter().any(|foot| {
+        let beside = letters.strip_prefix(foot).or_else(|| letters.strip_suffix(foot));
+        beside.is_some_and(|beside| ["us", "survey", "ussurvey"].contains(&beside))
+    })
 }
 
 /// The units of x, y and z, as far as a text says them.
@@ -153,6 +182,33 @@ mod tests {
         );
         assert_eq!(of(["survey feet", "US Survey Feet", "ft US"]), all(Unit::UsFoot, Unit::US_FOOT));
         assert_eq!(of(["Mètres", "m", "m ü. NHN"]), all(Unit::Metre, 1.0));
+        for name in ["ft-US", "ft us survey", "foot us", "U.S. Survey Feet", "us_ft", "US feet"] {
+            assert_eq!(of([name; 3]), all(Unit::UsFoot, Unit::US_FOOT), "{name}");
+        }
+        assert_eq!(of(["m", "m", "m.s.n.m."]), all(Unit::Metre, 1.0));
+        assert_eq!(of(["m", "m", "(m.s.l.)"]).vertical, None);
+    }
+
+    #[test]
+    fn one_unit_is_found_among_other_words() {
+        let among = |words: &str| {
+            let words: Vec<&str> = words.split(' ').collect();
+            TextUnit::among(&words).map(|unit| unit.name)
+        };
+        for (words, unit) in [
+            ("in feet", "ft"),
+            ("navd88 us survey feet", "us-ft"),
+            ("ft us", "us-ft"),
+            ("in", "in"),
+            ("decimal degrees wgs84", "degrees"),
+            ("m nn", "m"),
+            ("m m", "m"),
+        ] {
+            assert_eq!(among(words), Some(unit), "{words}");
+        }
+        for words in ["gk 3 degree zones", "in zone 3", "ft or m", "navd88", "m.s.l."] {
+            assert_eq!(among(words), None, "{words}");
+        }
     }
 
     #[test]

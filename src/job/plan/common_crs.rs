@@ -40,7 +40,11 @@ pub fn common_crs(sources: &[Source], choice: &CrsChoice, unit: UnitChoice, warn
     warn_of_other_units(sources, unit_of(unit), warnings);
     let said: Vec<Said> = sources.iter().map(|source| Said::of(source, unit)).collect();
     let mut crs = match choice {
-        CrsChoice::Auto => return agreed(&said, unit, warnings),
+        CrsChoice::Auto => {
+            let crs = agreed(&said, unit, warnings)?;
+            warn_of_depths(&said, &crs, warnings);
+            return Ok(crs);
+        }
         CrsChoice::None => Crs::default(),
         CrsChoice::First => {
             said.iter().find(|s| s.crs.is_named()).map(|s| s.crs.clone().into_owned()).unwrap_or_default()
@@ -52,6 +56,10 @@ pub fn common_crs(sources: &[Source], choice: &CrsChoice, unit: UnitChoice, warn
         }
     };
     add_units(&mut crs, &said, choice, warnings)?;
+    if *choice == CrsChoice::First {
+        warn_of_gaps(&said, &crs, unit, warnings);
+        warn_of_depths(&said, &crs, warnings);
+    }
     let overruled: Vec<(&Said, Vec<String>)> =
         said.iter().map(|s| (s, crs.differences(&s.crs))).filter(|(_, found)| !found.is_empty()).collect();
     if let Some((first, differences)) = overruled.first() {
@@ -233,6 +241,27 @@ fn warn_of_gaps(said: &[Said], crs: &Crs, unit: UnitChoice, warnings: &mut Warni
     }
 }
 
+/// Warns about files whose heights count downwards, and about those that do not say which way theirs count beside them. What the user
+/// says of the CRS is no news to the user.
+fn warn_of_depths(said: &[Said], crs: &Crs, warnings: &mut Warnings) {
+    let count = said.len();
+    let downward: Vec<(&Said, String)> = said.iter().filter_map(|s| Some((s, s.crs.depths()?))).collect();
+    let Some((first, doubt)) = downward.first() else { return };
+    warnings.push(format!(
+        "{}{}: {doubt} (set [input] crs to say what is meant)",
+        if count == 1 { String::new() } else { format!("{} of {count} inputs, such as ", downward.len()) },
+        first.source.path.display()
+    ));
+    let silent: Vec<&Said> = said.iter().filter(|s| s.crs.vertical_system.is_none()).collect();
+    if let (Some(_), Some(first)) = (crs.depths(), silent.first()) {
+        warnings.push(format!(
+            "{} of {count} inputs do not say whether their z counts downwards, such as {}: it is taken to count as in the others",
+            silent.len(),
+            first.source.path.display()
+        ));
+    }
+}
+
 /// Warns about texts whose columns say another unit than the user.
 fn warn_of_other_units(sources: &[Source], chosen: Unit, warnings: &mut Warnings) {
     let is_other = |source: &&Source| {
@@ -279,11 +308,17 @@ const TRANSFORM: &str = "Transform the points to a projected CRS first, for exam
 /// # Errors
 /// [`Error::Config`] if the coordinates are in degrees or count from the middle of the earth.
 pub fn horizontal_unit(
+    sources: &[Source],
     choice: UnitChoice,
     chosen: &CrsChoice,
     crs: &Crs,
     warnings: &mut Warnings,
 ) -> Result<(&'static str, f64)> {
+    // The first file that says so; none if the user does.
+    let named = |is_meant: &dyn Fn(&Crs) -> bool| match sources.iter().find(|source| is_meant(&source.crs)) {
+        Some(source) if !matches!(chosen, CrsChoice::Given { .. }) => format!("{}: ", source.path.display()),
+        _ => String::new(),
+    };
     // What the user says is no record of a file.
     let what_to_do = match chosen {
         CrsChoice::Given { .. } => "if the files are in another CRS than [input] crs says, name that one",
@@ -291,8 +326,9 @@ pub fn horizontal_unit(
     };
     if crs.kind == CrsKind::Geocentric {
         return Err(Error::Config(format!(
-            "the coordinates are geocentric ({}): they count from the middle of the earth, and z is no height. {TRANSFORM}; \
+            "{}the coordinates are geocentric ({}): they count from the middle of the earth, and z is no height. {TRANSFORM}; \
              {what_to_do}, or \"none\" for a plane",
+            named(&|crs| crs.kind == CrsKind::Geocentric),
             crs.label()
         )));
     }
@@ -313,8 +349,9 @@ pub fn horizontal_unit(
             Ok((key_of(Unit::Metre), 1.0))
         }
         _ => Err(Error::Config(format!(
-            "the coordinates are in degrees ({}), and a Delaunay triangulation in degrees is distorted. {TRANSFORM}; \
+            "{}the coordinates are in degrees ({}), and a Delaunay triangulation in degrees is distorted. {TRANSFORM}; \
              {what_to_do}, or set [input] unit = \"metre\"",
+            named(&|crs| crs.horizontal == Unit::Degree),
             crs.name.as_deref().unwrap_or("geographic CRS"),
         ))),
     }

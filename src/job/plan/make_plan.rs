@@ -101,7 +101,7 @@ fn try_plan(
     refuse_degrees(sources, &options.input)?;
     refuse_missing_classes(sources, &options.input)?;
     let crs = common_crs(sources, &options.input.crs, options.input.unit, &mut warnings)?;
-    let (unit, metres) = horizontal_unit(options.input.unit, &options.input.crs, &crs, &mut warnings)?;
+    let (unit, metres) = horizontal_unit(sources, options.input.unit, &options.input.crs, &crs, &mut warnings)?;
     let metres_z = crs.vertical.unwrap_or(metres);
     let wish = LatticeWish {
         metres: [metres, metres_z],
