@@ -43,8 +43,9 @@ pub enum Error {
     TooEarly(String),
     /// Tasks of a phase failed, and have said why (the worst of their exit codes).
     #[error(
-        "the phase {phase} is not complete: of {count} tasks these failed: {}; run the same command again to go on",
-        list(failed)
+        "the phase {phase} is not complete: of {count} tasks these failed: {}; {}",
+        list(failed),
+        if *code == 1 { "run the same command again to go on" } else { "they have said why" }
     )]
     Tasks {
         /// The phase.

@@ -82,6 +82,8 @@ pub struct GpuFigures {
     pub helped: u64,
     /// Leaves that workers did alone.
     pub alone: u64,
+    /// Leaves that workers did after it had been asked in vain.
+    pub in_vain: u64,
     /// Nanoseconds of processor time a site with its help, among the last leaves; 0 if there were none.
     pub ns_per_site_helped: f64,
     /// As above, without its help.
@@ -144,6 +146,7 @@ impl GpuBenefit {
         GpuFigures {
             helped: measured.helped.leaves,
             alone: measured.alone.leaves,
+            in_vain: measured.in_vain,
             ns_per_site_helped: per_site(measured.helped),
             ns_per_site_alone: per_site(measured.alone),
             given_up: measured.given_up.clone(),

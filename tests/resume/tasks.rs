@@ -11,7 +11,7 @@ use std::process::Command;
 const PHASES: [&str; 7] = ["plan", "read", "mesh", "join", "tiles", "levels", "publish"];
 
 /// Returns a job of several parts, on files of neighbouring points.
-fn job_of_parts() -> Rig {
+pub(crate) fn job_of_parts() -> Rig {
     let setup = Setup::tiles_of(700);
     let setup = Setup { triangulation: format!("{}\nmax_points_per_part = 4000", setup.triangulation), ..setup };
     let rig = Rig::of_files(tempfile::tempdir().unwrap(), &scattered::gaussian(24_000), 60_000, &setup);
@@ -19,7 +19,7 @@ fn job_of_parts() -> Rig {
     rig
 }
 
-fn task(rig: &Rig, phase: &str, task: &str) -> Command {
+pub(crate) fn task(rig: &Rig, phase: &str, task: &str) -> Command {
     rig.command_of(&["work", "job.toml", "--phase", phase, "--task", task])
 }
 
@@ -27,13 +27,13 @@ fn local(rig: &Rig, tasks: u32) -> Command {
     rig.command_of(&["submit", "job.toml", "--engine", "local", "--tasks", &tasks.to_string()])
 }
 
-fn run(mut command: Command) -> End {
+pub(crate) fn run(mut command: Command) -> End {
     Run::start(&mut command).end()
 }
 
 /// Does all tasks of the phases before `phase`.
 #[track_caller]
-fn up_to(rig: &Rig, phase: &str, tasks: u32) {
+pub(crate) fn up_to(rig: &Rig, phase: &str, tasks: u32) {
     for before in PHASES.iter().take_while(|before| **before != phase) {
         (1..=tasks).for_each(|number| _ = run(task(rig, before, &format!("{number}/{tasks}"))).succeeded());
     }

@@ -78,6 +78,19 @@ impl PublishedFile {
         self.is_at(&directory.file(&self.name))
     }
 
+    /// As [`PublishedFile::is_whole`], where a read that fails must not pass for a file that is gone.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the file is there and cannot be read.
+    pub fn is_whole_for_sure(&self, directory: &JobDirectory) -> Result<bool> {
+        let path = directory.file(&self.name);
+        match Checksum::of_file(&path) {
+            Ok(found) => Ok(found == (self.bytes, self.checksum)),
+            Err(e) if e.kind() == ErrorKind::NotFound => Ok(false),
+            Err(e) => Err(Error::io("read", &path)(e)),
+        }
+    }
+
     /// Tells whether the file is whole among the results of a finished job.
     pub fn is_in_place(&self, directory: &JobDirectory) -> bool {
         self.is_at(&directory.results().directory().join(&self.name))

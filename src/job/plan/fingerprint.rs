@@ -65,6 +65,9 @@ pub struct Fingerprint {
     pub memory: u64,
 }
 
+/// What to do about a job that is no longer what tasks planned.
+pub(crate) const PLAN_AGAIN: &str = "run the phase plan again, or let gdt-batch submit do it";
+
 /// How a job differs from an earlier one.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum JobChange {
@@ -108,11 +111,18 @@ impl Fingerprint {
     pub(crate) fn changed_options(&self, options: &JobOptions) -> Result<Option<String>> {
         let now = Fingerprint::of_files(options, InputIdentities::default())?;
         let same_files = Fingerprint { files: InputIdentities::default(), ..self.clone() };
-        Ok(match now.since(&same_files) {
-            JobChange::Nothing if now.memory == self.memory => None,
+        Ok(now.since_planned(&same_files))
+    }
+
+    /// Returns what has changed since a job was planned with the fingerprint `planned`, maybe on another machine, to which files may seem to
+    /// have other times.
+    pub(crate) fn since_planned(&self, planned: &Fingerprint) -> Option<String> {
+        let without_times = |this: &Fingerprint| Fingerprint { files: this.files.without_times(), ..this.clone() };
+        match without_times(self).since(&without_times(planned)) {
+            JobChange::Nothing if self.memory == planned.memory => None,
             JobChange::Nothing => Some("[limits] memory".into()),
             JobChange::Style(what) | JobChange::Mesh(what) => Some(what),
-        })
+        }
     }
 
     /// Returns the present names of the inputs at `paths`, which are those that the options name now; `None` if they are other files.

@@ -27,7 +27,7 @@ struct InputIdentity {
 struct ContentIdentity {
     #[serde(flatten)]
     samples: FileSamples,
-    /// When it was written, in nanoseconds since 1970.
+    /// When it was written, in whole seconds since 1970, because file systems keep different fractions.
     modified: u64,
 }
 
@@ -51,13 +51,22 @@ impl InputIdentities {
     }
 
     /// Returns what the files hold, in their order, as far as sizes, samples and times tell: whoever edits a few bytes in place changes at
-    /// least the time. Times count in whole seconds, because file systems keep different fractions.
+    /// least the time.
     pub(crate) fn text(&self) -> String {
         let text = |InputIdentity { content, .. }: &InputIdentity| {
             let ContentIdentity { samples: FileSamples { bytes, samples }, modified } = content;
-            format!("{bytes} {samples:016x} {}\n", modified / 1_000_000_000)
+            format!("{bytes} {samples:016x} {modified}\n")
         };
         self.0.iter().map(text).collect()
+    }
+
+    /// Returns the same without the times of the files: machines may see different ones.
+    pub(crate) fn without_times(&self) -> InputIdentities {
+        let without = |file: &InputIdentity| InputIdentity {
+            content: ContentIdentity { modified: 0, ..file.content },
+            ..file.clone()
+        };
+        InputIdentities(self.0.iter().map(without).collect())
     }
 
     /// Returns the names of the files that have changed since `earlier`; none if the files have the same contents in the same
@@ -147,10 +156,7 @@ impl ContentIdentity {
     fn of(path: &Path) -> Result<ContentIdentity> {
         let data = path.metadata().map_err(Error::io("read", path))?;
         let modified = data.modified().ok().and_then(|time| time.duration_since(SystemTime::UNIX_EPOCH).ok());
-        Ok(ContentIdentity {
-            samples: FileSamples::of(path)?,
-            modified: modified.map_or(0, |age| age.as_nanos() as u64),
-        })
+        Ok(ContentIdentity { samples: FileSamples::of(path)?, modified: modified.map_or(0, |age| age.as_secs()) })
     }
 }
 

@@ -57,9 +57,24 @@ impl Alone {
         Alone::notes(directory)?.iter().try_for_each(|name| remove_file(&directory.file(name)))
     }
 
+    /// Returns the latest submission whose tasks have left a note; 0 without one.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the job directory cannot be listed.
+    pub(crate) fn submission(directory: &JobDirectory) -> Result<u64> {
+        let there = disk::list(directory.job()).map_err(Error::io("read", directory.job()))?;
+        let of_note = |path: &PathBuf| Alone::ALL.into_iter().find_map(|alone| alone.submission_in(path));
+        Ok(there.iter().filter_map(of_note).max().unwrap_or(0))
+    }
+
+    /// Returns the submission in the name of a note that says this; `None` if the file at `path` is none.
+    fn submission_in(self, path: &Path) -> Option<u64> {
+        let (name, submission) = path.file_name()?.to_str()?.split_once('.')?;
+        submission.parse().ok().filter(|_| name == self.name())
+    }
+
     fn is_said_by(self, path: &Path, submission: u64) -> bool {
-        let name = path.file_name().and_then(|name| name.to_str()).and_then(|name| name.split_once('.'));
-        name.is_some_and(|(name, of)| name == self.name() && of.parse().is_ok_and(|of: u64| of >= submission))
+        self.submission_in(path).is_some_and(|of| of >= submission)
     }
 
     /// Returns what a note of `submission`, or of a later one, says, if there is one.

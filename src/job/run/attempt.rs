@@ -17,7 +17,8 @@ use crate::job::progress::clock::JobClock;
 use crate::job::progress::stage::{JobProgress, ProgressOutput};
 use crate::job::report::job_report::Report;
 use crate::job::run::alone::Alone;
-use crate::job::run::finished::{InPlace, results_in_place};
+use crate::job::run::damage::damaged_by_tasks;
+use crate::job::run::finished::{InPlace, known_submission, results_in_place};
 use crate::job::run::part_entries::StepsOfParts;
 use crate::job::run::read_step::note_skipped;
 use crate::job::run::resume::{self, EarlierRun, RunStart, place_results_of_finished_job};
@@ -28,6 +29,7 @@ use crate::job::run::temporary_bytes::TemporaryBytes;
 use crate::threads::on_threads;
 use crate::triangulation::Triangulator;
 use crate::{Error, Result, disk};
+use std::io::ErrorKind;
 use std::sync::Mutex;
 
 /// What the user must know where a lock keeps nobody out.
@@ -89,7 +91,8 @@ pub(crate) fn run_until_it_fits(
             return Ok(*report);
         }
     }
-    let submission = earlier.as_ref().map_or(0, |earlier| earlier.submission).max(run.submission);
+    let known = earlier.as_ref().map_or(0, |earlier| earlier.submission);
+    let submission = known.max(run.submission).max(known_submission(&directory)?);
     // Before the inputs, so that a job that must have a GPU fails at once if there is none.
     let memory = options.limits.memory.0;
     let triangulator = match work {
@@ -98,6 +101,13 @@ pub(crate) fn run_until_it_fits(
         EarlierWork::ByTasks => Triangulator::without_gpu(&options.triangulation),
     };
     let fingerprint = on_threads(workers(options, 0)?, || Fingerprint::of(options))?;
+    let fingerprint = match (work, &earlier) {
+        (EarlierWork::ByTasks, Some(earlier)) => earlier.as_planned(fingerprint)?,
+        (EarlierWork::ByTasks, None) => {
+            return Err(Error::TooEarly("the plan of the job is gone: submit the job again".into()));
+        }
+        (EarlierWork::Interrupted, _) => fingerprint,
+    };
     let job = JobRequest { options, run, triangulator, directory, fingerprint, clock, walk, work, submission };
     let mut coarsening = coarsening_of(&job.directory, earlier.as_ref(), &job.fingerprint)?;
     loop {
@@ -109,6 +119,10 @@ pub(crate) fn run_until_it_fits(
             continue;
         }
         if let Err(Error::DamagedSteps) = outcome {
+            if work == EarlierWork::ByTasks {
+                // The work of many machines is not done again by one.
+                return Err(damaged_by_tasks(&job.directory));
+            }
             run.progress.note("what the interrupted run left is damaged; starting over");
             continue;
         }
@@ -226,7 +240,7 @@ fn attempt(
             identity: job.fingerprint.identity(options, job.submission)?,
             job_id,
             resumed: if job.work == EarlierWork::ByTasks { 0 } else { journal.taken_over() + resumed },
-            checks: job.work == EarlierWork::Interrupted,
+            is_by_tasks: job.work == EarlierWork::ByTasks,
             temporary: TemporaryBytes::default(),
             stages: Mutex::new(vec![planned]),
         };
@@ -237,17 +251,22 @@ fn attempt(
         let steps = journal.close() + outcome.as_ref().err().map_or(0, |_| of_parts());
         // An open file is not freed when it is removed.
         drop(store);
-        end(directory, outcome, steps)
+        end(directory, outcome, steps, job.work)
     })
 }
 
-/// Ends an attempt: puts the results in place, or keeps the finished steps if the job can go on from them. Removes everything else.
-fn end(directory: &JobDirectory, outcome: Result<Report>, steps: u64) -> Result<Report> {
-    let outcome = outcome.and_then(|report| {
-        place_results_of_finished_job(directory)?;
-        Ok(report)
+/// Ends an attempt: puts the results in place, or keeps the finished steps if the job can go on from them. Removes everything else, but
+/// never the work of tasks after an error.
+fn end(directory: &JobDirectory, outcome: Result<Report>, steps: u64, work: EarlierWork) -> Result<Report> {
+    let is_by_tasks = work == EarlierWork::ByTasks;
+    let outcome = outcome.and_then(|report| match place_results_of_finished_job(directory) {
+        Err(Error::Io { source, .. }) if is_by_tasks && source.kind() == ErrorKind::NotFound => {
+            Err(Error::DamagedSteps)
+        }
+        placed => placed.map(|()| report),
     });
     match outcome {
+        Err(why) if is_by_tasks && !may_go_on(&why) => Err(why),
         Err(why) if may_go_on(&why) && steps > 0 => {
             Err(Error::Resumable { why: Box::new(why), steps, job: directory.job().into() })
         }

@@ -57,9 +57,36 @@ pub(crate) fn results_in_place(
     if is_under_way()? {
         return Ok(InPlace::Nothing);
     }
-    let now = on_threads(workers(options, 0)?, || Fingerprint::of(options))?;
-    let is_same = report.job_fingerprint == Some(now.of_job(of_options));
+    let is_same = match on_threads(workers(options, 0)?, || Fingerprint::of(options)) {
+        Ok(now) => report.job_fingerprint == Some(now.of_job(of_options)),
+        // Who has moved the inputs away since has not undone the job.
+        Err(why) if are_inputs_gone(&why) => true,
+        Err(why) => return Err(why),
+    };
     Ok(if is_same { InPlace::ThisJob(report.into()) } else { InPlace::OtherJob })
+}
+
+fn are_inputs_gone(why: &Error) -> bool {
+    match why {
+        Error::Config(_) => true,
+        Error::Io { source, .. } => source.kind() == ErrorKind::NotFound,
+        _ => false,
+    }
+}
+
+/// Returns the latest submission that a note or a report in place tells of; 0 without one. What is done after it keeps its number, so that its
+/// late tasks find that the job is done.
+///
+/// # Errors
+/// [`Error::Io`] if the job directory or the report cannot be read.
+pub(crate) fn known_submission(directory: &JobDirectory) -> Result<u64> {
+    let path = directory.results().report();
+    let report = match read_file(&path) {
+        Err(e) if e.kind() == ErrorKind::NotFound => None,
+        text => serde_json::from_slice::<Report>(&text.map_err(Error::io("read", &path))?).ok(),
+    };
+    let of_report = report.map_or(0, |report| report.submission);
+    Ok(of_report.max(Alone::submission(directory)?))
 }
 
 /// Tells whether the job directory holds nothing but the rest of a finished job: neither a note nor the journal of a job that has not

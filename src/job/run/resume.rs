@@ -10,7 +10,7 @@ use crate::job::index::{NodeIndex, TileIndex};
 use crate::job::options::JobOptions;
 use crate::job::partition::point_file::PointFiles;
 use crate::job::partition::result::Partition;
-use crate::job::plan::fingerprint::{Fingerprint, JobChange, JobHeader};
+use crate::job::plan::fingerprint::{Fingerprint, JobChange, JobHeader, PLAN_AGAIN};
 use crate::job::plan::job_plan::Plan;
 use crate::job::plan::lattice_choice::LatticeCoarsening;
 use crate::job::progress::stage::{ProgressOutput, Stage};
@@ -79,6 +79,18 @@ impl EarlierRun {
     fn results<'a>(&'a self, directory: &'a JobDirectory) -> impl Iterator<Item = &'a PublishedFile> {
         let files = self.entries.iter().flat_map(|entry| &entry.files).chain(&self.of_parts.files);
         files.filter(|file| directory.is_result(&file.name))
+    }
+
+    /// Returns the fingerprint `now` of the job with the inputs as they were when tasks planned it: machines may see other times and names.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if the job has changed since.
+    pub(crate) fn as_planned(&self, now: Fingerprint) -> Result<Fingerprint> {
+        let Some(JobHeader { fingerprint: planned, .. }) = &self.header else { return Ok(now) };
+        match now.since_planned(planned) {
+            Some(what) => Err(Error::Config(format!("{what}: changed since the job was planned; {PLAN_AGAIN}"))),
+            None => Ok(now.with_names_of(planned)),
+        }
     }
 
     /// Tells whether its journal can be read.

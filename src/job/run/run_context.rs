@@ -30,8 +30,8 @@ pub(crate) struct RunContext<'a> {
     pub(crate) job_id: u64,
     /// The number of steps that an interrupted run had finished.
     pub(crate) resumed: u64,
-    /// Whether what it left is compared with its hashes.
-    pub(crate) checks: bool,
+    /// Whether what is there is the work of tasks, which is not compared with its hashes.
+    pub(crate) is_by_tasks: bool,
     /// What the temporary files take.
     pub(crate) temporary: TemporaryBytes,
     /// The stages that have ended.

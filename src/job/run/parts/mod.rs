@@ -26,6 +26,7 @@ use crate::job::plan::job_plan::Plan;
 use crate::job::progress::stats::StageStats;
 use crate::job::records::{JobStep, Journal, StepOutput};
 use crate::job::report::job_report::Report;
+use crate::job::run::damage::is_damage;
 use crate::job::run::parts::front::Front;
 use crate::job::run::parts::join::{JoinedParts, join_parts};
 use crate::job::run::parts::level_phase::levels_of_part;
@@ -49,8 +50,9 @@ use std::collections::HashMap;
 /// left proves damaged.
 pub(crate) fn walk(run: &RunContext, plan: &Plan) -> Result<Report> {
     // What was freed cannot be done again, so a missing result may show only when another step needs it.
+    let goes_on = run.resumed > 0 || run.is_by_tasks;
     do_phases(run, plan).map_err(|error| match error {
-        Error::Broken(_) if run.resumed > 0 => Error::DamagedSteps,
+        error if goes_on && is_damage(&error, run.directory) => Error::DamagedSteps,
         error => error,
     })
 }

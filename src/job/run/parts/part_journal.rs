@@ -59,7 +59,7 @@ impl<'a> PartSession<'a> {
             identity: JobIdentity::default(),
             job_id: job.job_id,
             resumed: job.resumed,
-            checks: job.checks,
+            is_by_tasks: false,
             temporary: TemporaryBytes::default(),
             stages: Mutex::default(),
         }

@@ -43,7 +43,7 @@ impl<'a> PartsJob<'a> {
             clock: run.clock,
             job_id: run.job_id,
             resumed: run.resumed,
-            checks: run.resumed > 0 && run.checks,
+            checks: run.resumed > 0 && !run.is_by_tasks,
             journal: Some(run.journal),
         }
     }

@@ -5,7 +5,7 @@ use crate::job::index::PartIndex;
 use crate::job::options::JobOptions;
 use crate::job::phase::{Phase, PhaseTasks};
 use crate::job::plan::budget::workers;
-use crate::job::plan::fingerprint::{Fingerprint, JobChange};
+use crate::job::plan::fingerprint::Fingerprint;
 use crate::job::records::JobStep;
 use crate::job::run::alone::Alone;
 use crate::job::run::finished::{InPlace, is_rest};
@@ -124,10 +124,9 @@ pub(crate) fn missing_tasks(options: &JobOptions, tasks: u32) -> Result<Vec<Phas
         return Ok(of_each(tasks, |phase| if phase == Phase::Publish && has_rest { vec![1] } else { Vec::new() }));
     }
     let fingerprint = on_threads(workers(options, 0)?, || Fingerprint::of(options))?;
-    let is_same =
-        |known: &Fingerprint| fingerprint.since(known) == JobChange::Nothing && fingerprint.memory == known.memory;
-    let known = planned(&directory, 0)?.filter(|(header, _)| is_same(&header.fingerprint));
-    if known.is_some() { missing_tasks_of_planned(options, tasks) } else { Ok(PhaseTasks::all(tasks)) }
+    let known = planned(&directory, 0)?;
+    let is_same = known.is_some_and(|(header, _)| fingerprint.since_planned(&header.fingerprint).is_none());
+    if is_same { missing_tasks_of_planned(options, tasks) } else { Ok(PhaseTasks::all(tasks)) }
 }
 
 /// Returns all phases of a job that is planned with the tasks that are missing.

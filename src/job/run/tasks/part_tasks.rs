@@ -10,6 +10,7 @@ use crate::job::progress::clock::JobClock;
 use crate::job::progress::stage::JobProgress;
 use crate::job::run::alone::Alone;
 use crate::job::run::attempt::{NO_LOCKS, may_coarsen};
+use crate::job::run::damage::{damaged_by_tasks, is_cut_off};
 use crate::job::run::parts::done::PartProgress;
 use crate::job::run::parts::join::{JoinedParts, join_parts};
 use crate::job::run::parts::level_phase::levels_of_part;
@@ -65,7 +66,8 @@ pub(crate) fn work_on_parts(
     let (alone, why) = match worked {
         Err(Error::NeedsOnePart) => (Alone::InOnePart, "what was read contradicts the header of a file".into()),
         Err(Error::TooFine { vertical, what }) if may_coarsen(options, vertical) => (Alone::AsItIs, what),
-        Err(Error::DamagedSteps) => return Err(damaged(directory)),
+        Err(Error::DamagedSteps) => return Err(damaged_by_tasks(directory)),
+        Err(error) if is_cut_off(&error, directory) => return Err(damaged_by_tasks(directory)),
         worked => return worked.map(|()| (mine.len() as u64, None)),
     };
     alone.note(directory, job.header.submission)?;
@@ -84,13 +86,6 @@ fn share(directory: &JobDirectory, submission: u64) -> Result<Option<Lock>> {
     let is_there = disk::list(directory.job()).map_err(Error::io("read", directory.job()))?.contains(&journal);
     let is_left = || Alone::find(directory, submission).map(|alone| alone.is_some());
     if is_there || is_left()? { directory.share_lock().map(Some) } else { Ok(None) }
-}
-
-fn damaged(directory: &JobDirectory) -> Error {
-    Error::TooEarly(format!(
-        "what earlier tasks left in {} is damaged: remove it, and submit the job again",
-        directory.job().display()
-    ))
 }
 
 /// A task of a phase that is done by parts, or of join.

@@ -4,13 +4,14 @@ use crate::job::durable::directory::JobDirectory;
 use crate::job::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours};
 use crate::job::options::{JobOptions, RunOptions};
 use crate::job::plan::budget::workers;
-use crate::job::plan::fingerprint::{Fingerprint, JobChange, JobHeader};
+use crate::job::plan::fingerprint::{Fingerprint, JobHeader};
 use crate::job::plan::make_plan::make_plan;
 use crate::job::preflight::check::require_room;
 use crate::job::progress::clock::JobClock;
 use crate::job::progress::stage::JobProgress;
 use crate::job::run::alone::Alone;
 use crate::job::run::attempt::{coarsening_of, read_earlier};
+use crate::job::run::finished::known_submission;
 use crate::job::run::parts::write_plan;
 use crate::job::run::read_step::note_skipped;
 use crate::job::run::resume_parts::start_parts;
@@ -33,7 +34,8 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> Result<Option<Strin
     let _lock = directory.lock()?;
     let earlier = read_earlier(directory, run)?;
     let coarsening = coarsening_of(directory, earlier.as_ref(), &fingerprint)?;
-    let header = JobHeader { fingerprint, coarsening, id: 0, submission: run.submission, begun: None };
+    let submission = run.submission.max(known_submission(directory)?);
+    let header = JobHeader { fingerprint, coarsening, id: 0, submission, begun: None };
     let known = earlier.as_ref().and_then(|earlier| earlier.plan(directory, &header, options));
     let plan = match known {
         Some(plan) => plan,
@@ -45,7 +47,7 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> Result<Option<Strin
         on_threads(threads, || require_room(&plan, threads))?;
     }
     if plan.is_one_part() {
-        Alone::AsItIs.note(directory, run.submission)?;
+        Alone::AsItIs.note(directory, submission)?;
         return Ok(Some(format!("the job has only {} points, which is one part; {}", plan.records, Alone::SENTENCE)));
     }
     Alone::forget(directory)?;
@@ -65,7 +67,6 @@ fn is_planned(directory: &JobDirectory, fingerprint: &Fingerprint, submission: u
         return Ok(false);
     }
     let _lock = directory.share_lock()?;
-    let is_same =
-        |known: &Fingerprint| fingerprint.since(known) == JobChange::Nothing && fingerprint.memory == known.memory;
-    Ok(planned(directory, submission)?.is_some_and(|(header, _)| is_same(&header.fingerprint)))
+    let known = planned(directory, submission)?;
+    Ok(known.is_some_and(|(header, _)| fingerprint.since_planned(&header.fingerprint).is_none()))
 }

@@ -4,7 +4,7 @@ use crate::job::durable::directory::JobDirectory;
 use crate::job::durable::journal;
 use crate::job::options::JobOptions;
 use crate::job::partition::parts::Parts;
-use crate::job::plan::fingerprint::JobHeader;
+use crate::job::plan::fingerprint::{JobHeader, PLAN_AGAIN};
 use crate::job::plan::inputs::input_paths;
 use crate::job::plan::job_plan::Plan;
 use crate::job::records::{JobStep, StepRecord};
@@ -28,7 +28,7 @@ impl PlannedJob {
     pub(crate) fn open(directory: &JobDirectory, options: &JobOptions, submission: u64) -> Result<Option<PlannedJob>> {
         let Some((header, is_complete)) = planned(directory, submission)? else { return Ok(None) };
         if let Some(what) = header.fingerprint.changed_options(options)? {
-            return Err(Error::Config(format!("{what}: changed since the job was planned; {AGAIN}")));
+            return Err(Error::Config(format!("{what}: changed since the job was planned; {PLAN_AGAIN}")));
         }
         let plan = Plan { options: options.clone(), ..Plan::read(&directory.plan())? };
         Ok(Some(PlannedJob { directory: directory.clone(), header, parts: Parts::of(&plan), plan, is_complete }))
@@ -41,13 +41,17 @@ impl PlannedJob {
     pub(crate) fn find_inputs(&mut self, inputs: impl Iterator<Item = usize>) -> Result<()> {
         let fingerprint = &self.header.fingerprint;
         let renamed = fingerprint.present_names(&input_paths(&self.plan.options.input)?);
-        let renamed = renamed.ok_or_else(|| Error::Config(format!("[input] files names other files now; {AGAIN}")))?;
+        let renamed =
+            renamed.ok_or_else(|| Error::Config(format!("[input] files names other files now; {PLAN_AGAIN}")))?;
         let known: Vec<_> = self.plan.inputs.iter().map(|input| input.source.path.clone()).collect();
         self.plan.rename_inputs(&renamed);
         for input in inputs {
             let now = &self.plan.inputs[input].source.path;
             if !fingerprint.has_same_content(&known[input], now)? {
-                return Err(Error::Config(format!("{} has changed since the job was planned; {AGAIN}", now.display())));
+                return Err(Error::Config(format!(
+                    "{} has changed since the job was planned; {PLAN_AGAIN}",
+                    now.display()
+                )));
             }
         }
         Ok(())
@@ -67,16 +71,10 @@ pub(crate) fn planned(directory: &JobDirectory, submission: u64) -> Result<Optio
     let read = journal::read_steps::<JobHeader, JobStep, StepRecord>(directory, wanted)?;
     let Some((Some(header), entries)) = read else { return Ok(None) };
     let is_planned = |step: JobStep| entries.iter().any(|entry| entry.step == step);
-    let is_whole = || {
-        entries
-            .iter()
-            .flat_map(|entry| &entry.files)
-            .filter(|file| !directory.is_result(&file.name))
-            .all(|file| file.is_whole(directory))
-    };
-    let is_planned_and_whole =
-        header.id != 0 && header.submission >= submission && is_planned(JobStep::Plan) && is_whole();
+    let mut own = entries.iter().flat_map(|entry| &entry.files).filter(|file| !directory.is_result(&file.name));
+    let is_planned_and_whole = header.id != 0
+        && header.submission >= submission
+        && is_planned(JobStep::Plan)
+        && own.try_fold(true, |all, file| Ok::<_, Error>(all && file.is_whole_for_sure(directory)?))?;
     Ok(is_planned_and_whole.then(|| (header, is_planned(JobStep::Report))))
 }
-
-const AGAIN: &str = "run the phase plan again, or let gdt-batch submit do it";
