@@ -132,13 +132,12 @@ impl Executor {
             self.state.unanswered.fetch_sub(1, Ordering::AcqRel);
             return None;
         }
-        self.wait_for(&answer, patience).unwrap_or_else(|| {
-            if self.state.abandoned.fetch_add(1, Ordering::AcqRel) + 1 >= MOST_ABANDONED {
-                self.state.is_gone.store(true, Ordering::Release);
-                self.benefit.give_up("it does not answer in time");
-            }
-            None
-        })
+        let reply = self.wait_for(&answer, patience);
+        if reply.is_none() && self.state.abandoned.fetch_add(1, Ordering::AcqRel) + 1 >= MOST_ABANDONED {
+            self.state.is_gone.store(true, Ordering::Release);
+            self.benefit.give_up("it does not answer in time");
+        }
+        reply
     }
 
     /// Returns how long an idle worker waits for the diagram of `sites` sites; `None` if as long as it takes.
@@ -147,23 +146,23 @@ impl Executor {
         (self.gpu_use == GpuUse::Optional).then(|| alone.map_or(PATIENCE, |alone| alone.min(PATIENCE)))
     }
 
-    /// Waits for an answer, and does other work meanwhile. Returns `None` once this thread has been idle for longer than `patience`, and
-    /// `Some(None)` if nobody answers any more.
-    fn wait_for(&self, answer: &Receiver<DiagramReply>, patience: Option<Duration>) -> Option<Option<DiagramReply>> {
+    /// Waits for an answer, and does other work meanwhile. Returns `None` once this thread has been idle for longer than `patience`, or is
+    /// to stop.
+    fn wait_for(&self, answer: &Receiver<DiagramReply>, patience: Option<Duration>) -> Option<DiagramReply> {
         // The memory has room for a few leaves that wait, besides one for each worker.
         let may_do_other_work = || self.state.waiting.load(Ordering::Acquire) <= MAX_IN_FLIGHT;
         let mut idle = Duration::ZERO;
         loop {
             match answer.try_recv() {
-                Ok(reply) => return Some(Some(reply)),
-                Err(TryRecvError::Disconnected) => return Some(None),
+                Ok(reply) => return Some(reply),
+                Err(TryRecvError::Disconnected) => return Some(DiagramReply::Unavailable),
                 Err(TryRecvError::Empty) if may_do_other_work() && do_other_work() => continue,
                 Err(TryRecvError::Empty) => {}
             }
             let begun = Instant::now();
             match answer.recv_timeout(NAP) {
-                Ok(reply) => return Some(Some(reply)),
-                Err(RecvTimeoutError::Disconnected) => return Some(None),
+                Ok(reply) => return Some(reply),
+                Err(RecvTimeoutError::Disconnected) => return Some(DiagramReply::Unavailable),
                 Err(RecvTimeoutError::Timeout) => idle = idle.saturating_add(begun.elapsed()),
             }
             if patience.is_some_and(|patience| idle > patience) || interrupt::check().is_err() {

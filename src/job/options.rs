@@ -32,7 +32,7 @@ pub struct JobOptions {
 const MOST_PER_PROCESSOR: usize = 2;
 
 impl JobOptions {
-    /// The number of worker threads: never more than two for each processor, whatever the user wants.
+    /// The number of worker threads, at most two for each processor.
     pub fn threads(&self) -> usize {
         match self.limits.threads.0 {
             0 => available(),

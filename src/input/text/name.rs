@@ -1,7 +1,7 @@
 //! The name that people give to a column, and what they write in brackets after it.
 
 use crate::input::text::role::ColumnRole;
-use crate::input::text::units::TextUnit;
+use crate::input::text::units::{TextUnit, letters};
 
 /// The names of one role, the clearest first: if several columns have one, that with the clearest name is taken.
 pub(crate) type Names = (&'static [&'static str], ColumnRole);
@@ -107,7 +107,7 @@ impl Name {
             Some(at) if at > 0 && text.ends_with([']', ')', '}']) => text.split_at(at),
             _ => (text.as_str(), ""),
         };
-        Name { plain: plain(name), beside: beside.to_string() }
+        Name { plain: letters(name), beside: beside.to_string() }
     }
 
     /// Returns what the column holds, and how unclear the name is. In some countries x is the northing, and brackets say so.
@@ -137,12 +137,12 @@ impl Name {
     fn names_beside(&self) -> impl Iterator<Item = String> {
         let words = |remark| words(remark).filter(|word| word.chars().count() > 1);
         let names = self.remarks().flat_map(move |remark| std::iter::once(remark).chain(words(remark)));
-        names.map(plain).filter(|name| role_of(name).is_some())
+        names.map(letters).filter(|name| role_of(name).is_some())
     }
 
     /// Returns the words in brackets that are no names.
     fn other_words(&self) -> Vec<&str> {
-        self.remarks().filter(|remark| role_of(&plain(remark)).is_none()).flat_map(other_words).collect()
+        self.remarks().filter(|remark| role_of(&letters(remark)).is_none()).flat_map(other_words).collect()
     }
 
     pub(crate) fn unit(&self) -> Option<TextUnit> {
@@ -162,18 +162,13 @@ fn words(text: &str) -> impl Iterator<Item = &str> {
 
 /// Returns the words that are no names.
 fn other_words(text: &str) -> impl Iterator<Item = &str> {
-    words(text).filter(|word| role_of(&plain(word)).is_none())
+    words(text).filter(|word| role_of(&letters(word)).is_none())
 }
 
 /// Returns the unit that a column of a line of units says, as in "m" or "deg E".
 pub(crate) fn unit_alone(field: &[u8]) -> Option<TextUnit> {
     let text = String::from_utf8_lossy(field).to_lowercase();
     TextUnit::read(&other_words(&text).collect::<Vec<_>>().join(" "))
-}
-
-/// Returns a name as [`NAMES`] has it.
-fn plain(name: &str) -> String {
-    name.chars().filter(|c| !matches!(c, ' ' | '\t' | '_' | '-' | '.')).collect()
 }
 
 fn role_of(name: &str) -> Option<(usize, ColumnRole)> {

@@ -73,8 +73,9 @@ fn plain(text: &str) -> String {
     text.trim_matches(['[', ']', '(', ')', '{', '}', ' ', '.']).to_lowercase()
 }
 
-fn letters(plain: &str) -> String {
-    plain.chars().filter(|c| !matches!(c, ' ' | '-' | '_' | '.')).collect()
+/// Returns what is left of a name without blanks, hyphens, underscores and points.
+pub(crate) fn letters(name: &str) -> String {
+    name.chars().filter(|c| !matches!(c, ' ' | '\t' | '-' | '_' | '.')).collect()
 }
 
 /// Returns whether these letters name the foot of the surveys of the United States: people write "ft (US)", "U.S. survey feet", "usft".

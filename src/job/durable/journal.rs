@@ -75,29 +75,28 @@ impl PublishedFile {
 
     /// Tells whether the file exists and holds what was written.
     pub fn is_whole(&self, directory: &JobDirectory) -> bool {
-        self.is_at(&directory.file(&self.name))
+        self.try_is_whole(directory).unwrap_or(false)
     }
 
     /// As [`PublishedFile::is_whole`], where a read that fails must not pass for a file that is gone.
     ///
     /// # Errors
     /// [`Error::Io`] if the file is there and cannot be read.
-    pub fn is_whole_for_sure(&self, directory: &JobDirectory) -> Result<bool> {
-        let path = directory.file(&self.name);
-        match Checksum::of_file(&path) {
-            Ok(found) => Ok(found == (self.bytes, self.checksum)),
-            Err(e) if e.kind() == ErrorKind::NotFound => Ok(false),
-            Err(e) => Err(Error::io("read", &path)(e)),
-        }
+    pub fn try_is_whole(&self, directory: &JobDirectory) -> Result<bool> {
+        self.is_at(&directory.file(&self.name))
     }
 
     /// Tells whether the file is whole among the results of a finished job.
     pub fn is_in_place(&self, directory: &JobDirectory) -> bool {
-        self.is_at(&directory.results().directory().join(&self.name))
+        self.is_at(&directory.results().directory().join(&self.name)).unwrap_or(false)
     }
 
-    fn is_at(&self, path: &Path) -> bool {
-        Checksum::of_file(path).is_ok_and(|found| found == (self.bytes, self.checksum))
+    fn is_at(&self, path: &Path) -> Result<bool> {
+        match Checksum::of_file(path) {
+            Ok(found) => Ok(found == (self.bytes, self.checksum)),
+            Err(e) if e.kind() == ErrorKind::NotFound => Ok(false),
+            Err(e) => Err(Error::io("read", path)(e)),
+        }
     }
 }
 

@@ -75,6 +75,6 @@ pub(crate) fn planned(directory: &JobDirectory, submission: u64) -> Result<Optio
     let is_planned_and_whole = header.id != 0
         && header.submission >= submission
         && is_planned(JobStep::Plan)
-        && own.try_fold(true, |all, file| Ok::<_, Error>(all && file.is_whole_for_sure(directory)?))?;
+        && own.try_fold(true, |all, file| Ok::<_, Error>(all && file.try_is_whole(directory)?))?;
     Ok(is_planned_and_whole.then(|| (header, is_planned(JobStep::Report))))
 }
