@@ -4,6 +4,7 @@
 //! [`steps`] records which dispatches a step consists of, [`engine`] runs recordings on a device, and [`executor`] makes the
 //! discrete Voronoi diagrams of leaves on a thread of its own. Room `voronoi` turns a diagram into a mesh and proves that mesh.
 
+pub mod atlas;
 pub mod benefit;
 pub mod buffer_id;
 pub mod buffers;

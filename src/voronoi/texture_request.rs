@@ -29,7 +29,7 @@ impl Default for TextureRequest {
 
 impl TextureRequest {
     /// Returns the pixels per lattice step for `sites` sites in a box of `extent` steps.
-    pub(super) fn scale(&self, extent: [f64; 2], sites: usize) -> f64 {
+    pub(crate) fn scale(&self, extent: [f64; 2], sites: usize) -> f64 {
         let longer = extent[0].max(extent[1]);
         let wanted = match self.resolution {
             TextureResolution::PixelsPerSite(pixels) => (pixels * sites as f64 / (extent[0] * extent[1])).sqrt(),
