@@ -107,16 +107,12 @@ impl AxisMap {
 
     fn round(&self, raw: i64) -> Option<(i32, bool)> {
         match self.narrow {
-            Some([mul, add, div]) if i32::try_from(raw).is_ok() => {
-                let numerator = raw * mul + add;
-                let (quotient, rest) = (numerator.div_euclid(div), numerator.rem_euclid(div));
-                let up = rest > div - rest || (rest == div - rest && numerator >= 0);
-                Some((i32::try_from(quotient + up as i64).ok()?, rest != 0))
-            }
+            Some([mul, add, div]) if i32::try_from(raw).is_ok() => divide(raw * mul + add, div),
             _ => self.apply_wide(raw),
         }
     }
 
+    #[inline(never)]
     fn apply_wide(&self, raw: i64) -> Option<(i32, bool)> {
         if raw == BEYOND {
             return None;
@@ -126,6 +122,22 @@ impl AxisMap {
         let up = 2 * rest > self.div || (2 * rest == self.div && numerator >= 0);
         Some((i32::try_from(quotient + up as i128).ok()?, rest != 0))
     }
+}
+
+/// Returns `numerator / div`, rounded with halves away from zero, and whether it was rounded. Returns `None` if it is outside the range of
+/// `i32`. Both numbers are less than 2^62. The decimals of a finer input are as good as random, so nothing here branches on them.
+fn divide(numerator: i64, div: i64) -> Option<(i32, bool)> {
+    let (size, sign) = (numerator.abs(), numerator.signum());
+    // Division in floating point is faster than that of whole numbers, and wrong by one at the most if the result fits an i32.
+    let estimate = size as f64 / div as f64 + 0.5;
+    if estimate > 4e9 {
+        return None;
+    }
+    let quotient = estimate as i64;
+    // The rest, and a half: between 0 and 1 if the estimate is right.
+    let rest = 2 * (size - quotient * div) + div;
+    let quotient = quotient + (rest >= 2 * div) as i64 - (rest < 0) as i64;
+    Some((i32::try_from(sign * quotient).ok()?, quotient * div != size))
 }
 
 /// A map is written as the digits of `mul`, `add` and `div`, since JSON readers do not keep all digits of large numbers.
@@ -215,6 +227,17 @@ mod tests {
             let map = AxisMap::new(offset, scale, Decimal::new(123, 2), step).unwrap();
             proptest::prop_assert!(map.narrow.is_some());
             proptest::prop_assert_eq!(map.apply(raw.into()), map.apply_wide(raw.into()));
+        }
+
+        #[test]
+        fn quotients_of_any_size_agree(numerator in -(1i64 << 61)..1 << 61, bits in 0u32..61, near: i32, is_half: bool) {
+            let div = (1i64 << bits) + i64::from(near.unsigned_abs()) % (1 << bits);
+            // A tie, or next to one, and anything.
+            let ties = [div / 2, div / 2 + 1].map(|half| i64::from(near) % ((1 << 60) / div + 1) * div + half);
+            for numerator in [numerator, ties[is_half as usize], -ties[is_half as usize]] {
+                let map = AxisMap { mul: 1, add: i128::from(numerator), div: i128::from(div), narrow: None };
+                proptest::prop_assert_eq!(divide(numerator, div), map.apply_wide(0), "{} / {}", numerator, div);
+            }
         }
     }
 
