@@ -18,7 +18,8 @@ use crate::output::color::LinearRgb;
 use crate::output::compression::Compression;
 use crate::output::frame::Frame;
 use crate::output::gltf::encoding::{
-    EXPONENTIAL_REACH, color_bytes, exponential, needs_long_normals, normal_bytes, normal_octahedral, normal_shorts,
+    EXPONENTIAL_REACH, color_bytes, exponential, needs_long_normals, normal_bytes, normal_long_octahedral,
+    normal_octahedral, normal_shorts,
 };
 use crate::output::gltf::meshopt::{PackedFilter, PackedMode, PackedView, fallback_buffer};
 use crate::output::gltf::parts::SplitPart;
@@ -121,22 +122,21 @@ impl<'a> DocumentBuilder<'a> {
             return self.add_attribute(normals, order, up, ElementType::new(ComponentType::F32, Type::Vec3));
         }
         let anisotropy = self.frame.anisotropy();
-        if needs_long_normals(anisotropy) {
-            let convert = |normal| normal_shorts(up(normal), anisotropy);
-            return self.add_attribute(
-                normals,
-                order,
-                convert,
-                ElementType::normalized(ComponentType::I16, Type::Vec3),
-            );
+        let is_packed = self.compression == Compression::Meshopt;
+        let bytes = ElementType::normalized(ComponentType::I8, Type::Vec3);
+        let shorts = ElementType::normalized(ComponentType::I16, Type::Vec3);
+        match (needs_long_normals(anisotropy), is_packed) {
+            (false, false) => self.add_attribute(normals, order, |n| normal_bytes(up(n), anisotropy), bytes),
+            (true, false) => self.add_attribute(normals, order, |n| normal_shorts(up(n), anisotropy), shorts),
+            (false, true) => {
+                let element = bytes.filtered(PackedFilter::Octahedral);
+                self.add_attribute(normals, order, |n| normal_octahedral(up(n), anisotropy), element)
+            }
+            (true, true) => {
+                let element = shorts.filtered(PackedFilter::Octahedral);
+                self.add_attribute(normals, order, |n| normal_long_octahedral(up(n), anisotropy), element)
+            }
         }
-        let element = ElementType::normalized(ComponentType::I8, Type::Vec3);
-        if self.compression == Compression::Quantized {
-            let convert = |normal| normal_bytes(up(normal), anisotropy);
-            return self.add_attribute(normals, order, convert, element);
-        }
-        let convert = |normal| normal_octahedral(up(normal), anisotropy);
-        self.add_attribute(normals, order, convert, element.filtered(PackedFilter::Octahedral))
     }
 
     fn add_colors(&mut self, colors: &[LinearRgb], order: Option<&[u32]>) -> Result<Index<Accessor>> {

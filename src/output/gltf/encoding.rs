@@ -33,28 +33,57 @@ fn stretched([x, y, z]: [f32; 3], anisotropy: f32, length: f32) -> [f32; 3] {
 /// Returns the normal as two signed bytes on the octahedron, 127 for 1, in the form of the octahedral filter of
 /// `EXT_meshopt_compression`, which packs better than three bytes.
 #[inline(always)]
-pub(crate) fn normal_octahedral([x, y, z]: [f32; 3], anisotropy: f32) -> [i8; 4] {
+pub(crate) fn normal_octahedral(normal: [f32; 3], anisotropy: f32) -> [i8; 4] {
+    let [u, v] = on_octahedron(normal, anisotropy, 127.0);
+    [u as i8, v as i8, 127, 0]
+}
+
+/// Does what [`normal_octahedral`] does, in signed 16 bits, of which as many are used as make the normals as accurate as 8 bits do
+/// without `anisotropy`.
+#[inline(always)]
+pub(crate) fn normal_long_octahedral(normal: [f32; 3], anisotropy: f32) -> [i16; 4] {
+    let stretch = anisotropy.max(1.0 / anisotropy);
+    let one = (128.0 * stretch).min(32768.0).ceil() - 1.0;
+    let [u, v] = on_octahedron(normal, anisotropy, one);
+    [u as i16, v as i16, one as i16, 0]
+}
+
+/// Returns the place of a normal, with its y stretched, on the octahedron whose corners are this far, `one`, from its middle.
+#[inline(always)]
+fn on_octahedron([x, y, z]: [f32; 3], anisotropy: f32, one: f32) -> [f32; 2] {
     let y = y * anisotropy;
     let scale = 1.0 / (x.abs() + y.abs() + z.abs());
     let (u, v) = (x * scale, y * scale);
     let (u, v) =
         if z >= 0.0 { (u, v) } else { (1.0f32.copysign(u) * (1.0 - v.abs()), 1.0f32.copysign(v) * (1.0 - u.abs())) };
-    let byte = |v: f32| (v * 127.0).round() as i8;
-    [byte(u), byte(v), 127, 0]
+    [u, v].map(|v| (v * one).round())
 }
 
-/// Returns the normal in signed bytes from the form of [`normal_octahedral`], as the filter does. Single precision and this order of
-/// operations make the result the same on every machine.
+/// Returns the normal in signed bytes from the form of [`normal_octahedral`], as the filter does.
 #[inline(always)]
 pub(crate) fn from_octahedral([u, v, one, padding]: [i8; 4]) -> [i8; 4] {
-    let one = f32::from(one.max(1));
-    let (u, v) = (f32::from(u) / one, f32::from(v) / one);
+    let [x, y, z] = off_octahedron([u, v, one].map(f32::from), 127.0).map(|v| v as i8);
+    [x, y, z, padding]
+}
+
+/// Returns the normal in signed 16 bits from the form of [`normal_long_octahedral`], as the filter does.
+#[inline(always)]
+pub(crate) fn from_long_octahedral([u, v, one, padding]: [i16; 4]) -> [i16; 4] {
+    let [x, y, z] = off_octahedron([u, v, one].map(f32::from), 32767.0).map(|v| v as i16);
+    [x, y, z, padding]
+}
+
+/// Returns the normal of a place on the octahedron, as whole numbers of this `length`. Single precision and this order of operations
+/// make the result the same on every machine.
+#[inline(always)]
+fn off_octahedron([u, v, one]: [f32; 3], length: f32) -> [f32; 3] {
+    let one = one.max(1.0);
+    let (u, v) = (u / one, v / one);
     let z = 1.0 - u.abs() - v.abs();
     let fold = (-z).max(0.0);
     let (x, y) = (u - fold.copysign(u), v - fold.copysign(v));
-    let scale = 127.0 / (x * x + y * y + z * z).sqrt();
-    let byte = |v: f32| (v * scale).round() as i8;
-    [byte(x), byte(y), byte(z), padding]
+    let scale = length / (x * x + y * y + z * z).sqrt();
+    [x, y, z].map(|v| (v * scale).round())
 }
 
 /// Whole numbers below this, and above its negative, have a form by [`exponential`].
@@ -115,6 +144,9 @@ mod tests {
         for (anisotropy, most) in [(1.0 / 256.0, 0.5), (0.125, 0.1), (8.0, 0.1), (256.0, 0.5)] {
             assert!(needs_long_normals(anisotropy));
             assert!(worst(&|n| error(n, normal_shorts(n, anisotropy), anisotropy)) < most);
+            assert!(
+                worst(&|n| error(n, from_long_octahedral(normal_long_octahedral(n, anisotropy)), anisotropy)) < 1.25
+            );
         }
     }
 
@@ -144,5 +176,12 @@ mod tests {
             assert!((0..4).all(|k| ours[k].abs_diff(theirs[0][k]) <= 1), "{packed:?}: {ours:?}, theirs {theirs:?}");
         }
         assert_eq!(from_octahedral([0, 0, 0, 0]), [0, 0, 127, 0]);
+        for (normal, anisotropy) in normals().flat_map(|normal| [(normal, 0.1), (normal, 8.0), (normal, 300.0)]) {
+            let packed = normal_long_octahedral(normal, anisotropy);
+            let mut theirs = [packed];
+            meshopt::decode_filter_oct(&mut theirs);
+            let ours = from_long_octahedral(packed);
+            assert!((0..4).all(|k| ours[k].abs_diff(theirs[0][k]) <= 2), "{packed:?}: {ours:?}, theirs {theirs:?}");
+        }
     }
 }

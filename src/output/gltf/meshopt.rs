@@ -1,13 +1,13 @@
 //! Buffer views that `EXT_meshopt_compression` packs: their description, and how to unpack them.
 
 use bytemuck::allocation::pod_collect_to_vec;
-use bytemuck::cast_slice_mut;
+use bytemuck::{cast, cast_slice_mut};
 use gltf::json::{Value, buffer, extensions};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, json};
 
 use crate::output::gltf::check_json::Decoded;
-use crate::output::gltf::encoding::{from_exponential, from_octahedral};
+use crate::output::gltf::encoding::{from_exponential, from_long_octahedral, from_octahedral};
 use crate::output::gltf::schema::MESHOPT;
 
 /// Bytes of a tile in memory for every byte of its file, at most: the vertex codec unpacks one byte to up to 64, and 2-byte positions
@@ -97,6 +97,10 @@ impl PackedView {
             (Some(PackedFilter::Octahedral), 4) => {
                 let normals = cast_slice_mut::<u8, [i8; 4]>(&mut unpacked);
                 normals.iter_mut().for_each(|normal| *normal = from_octahedral(*normal));
+            }
+            (Some(PackedFilter::Octahedral), 8) => {
+                let normals = cast_slice_mut::<u8, [u8; 8]>(&mut unpacked);
+                normals.iter_mut().for_each(|normal| *normal = cast(from_long_octahedral(cast(*normal))));
             }
             (Some(PackedFilter::Exponential), stride) if stride % 4 == 0 => {
                 let numbers = cast_slice_mut::<u8, [u8; 4]>(&mut unpacked);
