@@ -15,9 +15,9 @@ use std::collections::BTreeSet;
 const FREE: u32 = u32::MAX;
 
 /// A mesh after the rounds, or before them.
-struct Flipped<'a> {
-    records: &'a [u32],
-    sites: &'a [Site],
+pub(crate) struct Flipped<'a> {
+    pub(crate) records: &'a [u32],
+    pub(crate) sites: &'a [Site],
 }
 
 impl Flipped<'_> {
@@ -63,7 +63,7 @@ impl Flipped<'_> {
     }
 
     /// Asserts that half-edges and their twins belong together.
-    fn assert_linked(&self, name: &str) {
+    pub(crate) fn assert_linked(&self, name: &str) {
         for h in self.half_edges() {
             let g = self.twin(h);
             assert_eq!(self.twin(g), h, "{name}: half-edge {h}");

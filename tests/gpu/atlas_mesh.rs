@@ -1,0 +1,331 @@
+//! Steps G4 to G6 in an atlas and what goes back: shader against twin, number by number, and whether the meshes are whole.
+
+use super::clouds::{Cloud, clouds, hard_clouds, real_cloud};
+use super::flips::Flipped;
+use super::placed::PlacedAtlas;
+use super::random::Random;
+use super::rig::Rig;
+use gdt_batch::geometry::Site;
+use gdt_batch::gpu::buffer_id::BufferId;
+use gdt_batch::gpu::leaf_flags::{LONG_EDGE, TOO_MANY_TRIANGLES};
+use gdt_batch::gpu::mesh_steps::FLIP_ROUNDS;
+use gdt_batch::gpu::returned::{ReturnedAtlas, ReturnedLayout};
+use gdt_batch::gpu::steps::{GpuCommand, Recording, WorkgroupCount};
+use gdt_batch::gpu::twins::atlas::{MeshOnDevice, count, find_vertices, give_back, make_triangles};
+use gdt_batch::gpu::twins::c4_flip::{FlipState, flip_round};
+use gdt_batch::voronoi::texture_request::TextureResolution;
+use std::collections::BTreeSet;
+
+const FREE: u32 = u32::MAX;
+
+/// Runs what `record` records; asserts that buffer `id` has the `expected` numbers then.
+fn assert_same(rig: &mut Rig, name: &str, recording: &mut Recording, results: &[(BufferId, &[u32])]) {
+    rig.run(recording);
+    recording.commands.clear();
+    for &(id, expected) in results {
+        let numbers = rig.numbers(id, expected.len() as u64);
+        let differing = (0..expected.len()).find(|&i| numbers[i] != expected[i]);
+        assert_eq!(differing.map(|i| (i, numbers[i], expected[i])), None, "{name}: {id:?}");
+    }
+}
+
+/// What the twins make of an atlas.
+struct Twins {
+    records: Vec<u32>,
+    flipped: FlipState,
+    flags: Vec<u32>,
+    returned: Vec<u32>,
+}
+
+/// Runs all steps on the device and as twins, and compares all numbers.
+fn compare(rig: &mut Rig, name: &str, placed: &PlacedAtlas) -> Twins {
+    let (atlas, mut recording) = (&placed.atlas, placed.upload());
+    // What was there before must not matter.
+    for (id, numbers) in [(BufferId::Records, 8 * atlas.records), (BufferId::BlockStarts, 2 * atlas.blocks + 2)] {
+        recording.commands.push(GpuCommand::Reserve(id, 4 * u64::from(numbers)));
+        recording.commands.push(GpuCommand::Upload(id, vec![0x5555_5555; numbers as usize]));
+    }
+    let (rows, counts) = find_vertices(placed.diagram());
+    recording.atlas_vertices(atlas);
+    assert_same(rig, name, &mut recording, &[(BufferId::CornerRows, &rows), (BufferId::BlockStarts, &counts)]);
+    let starts = count(&counts);
+    recording.atlas_count(atlas);
+    assert_same(rig, name, &mut recording, &[(BufferId::BlockStarts, &starts)]);
+    let mut flags = vec![0; atlas.leaves.len()];
+    let records = make_triangles(placed.diagram(), &mut flags);
+    recording.atlas_triangles(atlas);
+    assert_same(rig, name, &mut recording, &[(BufferId::Records, &records), (BufferId::Flags, &flags)]);
+    let mut flipped = FlipState::new(records.clone());
+    (1..=FLIP_ROUNDS).for_each(|round| flip_round(&mut flipped, &placed.sites, round));
+    recording.flip(atlas.records);
+    let results = [(BufferId::Records, flipped.records.as_slice()), (BufferId::Marks, &flipped.marks)];
+    assert_same(rig, name, &mut recording, &results);
+    let mesh = MeshOnDevice {
+        records: &flipped.records,
+        marks: &flipped.marks,
+        missing: &placed.missing,
+        starts: &starts,
+        flags: &flags,
+    };
+    let returned = give_back(atlas, mesh);
+    recording.give_back(atlas);
+    assert_same(rig, name, &mut recording, &[(BufferId::Returned, &returned)]);
+    Twins { records, flipped, flags, returned }
+}
+
+/// Asserts that the records of every leaf close a sphere over its placed sites, before the flips and after, and come back as they are.
+fn assert_whole(name: &str, placed: &PlacedAtlas, twins: &Twins) {
+    for records in [&twins.records, &twins.flipped.records] {
+        Flipped { records, sites: &placed.sites }.assert_linked(name);
+    }
+    let returned = ReturnedAtlas::new(&placed.atlas, &twins.returned).expect("all numbers came back");
+    for (i, leaf) in placed.atlas.leaves.iter().enumerate() {
+        let back = returned.leaf(i).expect("the leaf came back");
+        assert_eq!(back.flags, 0, "{name}, leaf {i}");
+        let is_missing = |site: usize| back.missing[site / 32] >> (site % 32) & 1 != 0;
+        let missing = (0..leaf.sites as usize).filter(|&site| is_missing(site)).count();
+        assert_eq!(missing, placed.missing_of[i], "{name}, leaf {i}");
+        let on_sphere = leaf.sites as usize - missing + 1;
+        assert_eq!(back.records.len() / 8, 2 * on_sphere - 4, "{name}, leaf {i}");
+        let mut used = BTreeSet::<u32>::new();
+        for (t, record) in back.records.chunks_exact(8).enumerate() {
+            used.extend(&record[..3]);
+            assert!(record[3] == 0 && record[7] == 0);
+            for i in 0..3 {
+                let twin = record[4 + i] as usize;
+                assert_eq!(back.records[twin + 4] as usize, 8 * t + i, "{name}: triangle {t}");
+            }
+        }
+        let expected = (0..=leaf.sites).filter(|&site| site == leaf.sites || !is_missing(site as usize));
+        assert!(used.into_iter().eq(expected), "{name}, leaf {i}: other sites have triangles");
+        assert_eq!(back.block_starts.len() as u32, leaf.blocks_x() * leaf.blocks_y());
+        assert!(back.block_starts.is_sorted() && back.block_starts[0] == 0);
+        assert_starts_are_near(placed, i, &twins.records, back.block_starts);
+    }
+}
+
+/// Asserts that the first triangle of a block, as step G6 makes it, has a site not far from the block.
+fn assert_starts_are_near(placed: &PlacedAtlas, leaf: usize, records: &[u32], starts: &[u32]) {
+    let leaf = &placed.atlas.leaves[leaf];
+    for (block, pair) in starts.windows(2).enumerate().filter(|(_, pair)| pair[0] < pair[1]) {
+        let [x, y] = [block as u32 % leaf.blocks_x(), block as u32 / leaf.blocks_x()].map(|i| 32 * i);
+        let first = 8 * (leaf.first_record + pair[0]) as usize;
+        let pixels = records[first..first + 3]
+            .iter()
+            .filter_map(|&v| (v != leaf.first_site + leaf.sites).then(|| leaf.pixel(placed.sites[v as usize])));
+        let distance = pixels.map(|[px, py]| px.abs_diff(x).max(py.abs_diff(y))).min().expect("a finite corner");
+        assert!(distance < leaf.width.max(leaf.height).min(200), "block {block}: {distance}");
+    }
+}
+
+/// Leaves of few sites, thin leaves and lattices whose textures just fill their blocks, or just do not.
+fn small_leaves() -> Vec<Vec<Site>> {
+    let mut random = Random(17);
+    let far = gdt_batch::geometry::lattice::REACH;
+    let mut leaves = vec![
+        vec![[0, 0], [5, 5], [9, 0]],
+        vec![[3, 3], [4, 3], [3, 4]],
+        vec![[-far, -far], [far, far], [-far, far]],
+        vec![[7, 0], [8, 0], [9, 0]],
+        vec![[7, 0], [7, 1], [7, 2]],
+        (0..100).map(|i| [i * i, 0]).collect(),
+        (0..100).map(|i| [1000, i * 3]).collect(),
+        (0..200).map(|i| [i * 5, i * 5]).collect(),
+        (0..200).map(|i| [i * 7, 900 - i * 3]).collect(),
+        (0..500).map(|i| [i, random.below(2) as i32]).collect(),
+    ];
+    for side in [30, 31, 32, 33, 63, 64, 65] {
+        leaves.push((0..side * side).map(|i| [i % side, i / side]).collect());
+        leaves.push((0..side).map(|i| [i, (i * 7) % 10]).collect());
+    }
+    for count in [3, 4, 5, 8, 31, 32, 33, 100, 1000] {
+        let sites: BTreeSet<Site> = (0..count)
+            .map(|_| [random.below(1 << 20) as i32 + far - (1 << 21), random.below(1 << 18) as i32 - far])
+            .collect();
+        leaves.push(sites.into_iter().collect());
+    }
+    leaves
+}
+
+#[test]
+fn small_and_thin_leaves_are_the_same_bit_for_bit() {
+    let Some(mut rig) = Rig::new() else { return };
+    for pixels_per_site in [1.0, 5.0, 16.0] {
+        let mut placed = PlacedAtlas::default();
+        small_leaves().iter().for_each(|sites| placed.add(sites, pixels_per_site));
+        let twins = compare(&mut rig, "small leaves", &placed);
+        assert_whole("small leaves", &placed, &twins);
+    }
+}
+
+#[test]
+fn large_leaves_are_the_same_bit_for_bit() {
+    let Some(mut rig) = Rig::new() else { return };
+    let clouds: Vec<Cloud> = clouds().into_iter().chain(hard_clouds()).collect();
+    for pixels_per_site in [5.0, 8.0] {
+        let mut placed = PlacedAtlas::default();
+        clouds.iter().for_each(|cloud| placed.add(&cloud.sites, pixels_per_site));
+        let twins = compare(&mut rig, "large leaves", &placed);
+        assert_whole("large leaves", &placed, &twins);
+    }
+}
+
+/// A leaf that goes wrong is flagged, and the leaves beside it are as if they were alone.
+#[test]
+fn a_bad_leaf_is_flagged_and_harms_no_other() {
+    let Some(mut rig) = Rig::new() else { return };
+    let sites: Vec<Vec<Site>> = clouds().into_iter().map(|cloud| cloud.sites[..2000].to_vec()).collect();
+    let three = [[0, 0], [500, 900], [1000, 0]];
+    let mut placed = PlacedAtlas::default();
+    placed.add(&sites[0], 5.0);
+    placed.add_with(&three, TextureResolution::Side(300));
+    placed.add(&sites[1], 5.0);
+    placed.add(&sites[2], 5.0);
+    placed.add(&sites[3], 8.0);
+    // Leaf 3 is all noise.
+    let noisy = placed.atlas.leaves[3];
+    let pixels: Vec<u32> = sites[2].iter().map(|&site| noisy.pixel(site)).map(|[x, y]| y << 16 | x).collect();
+    let mut random = Random(5);
+    for y in 0..noisy.height {
+        for x in 0..noisy.width {
+            placed.labels[noisy.at(x, y) as usize] = pixels[random.below(pixels.len() as u32) as usize];
+        }
+    }
+    let twins = compare(&mut rig, "bad leaves", &placed);
+    assert_eq!(twins.flags, [0, LONG_EDGE, 0, TOO_MANY_TRIANGLES, 0]);
+    let returned = ReturnedAtlas::new(&placed.atlas, &twins.returned).expect("all numbers came back");
+    assert!(returned.leaf(3).expect("it came back").records.is_empty());
+    let long = returned.leaf(1).expect("it came back");
+    assert_eq!(long.records.len(), 4 * 8);
+    assert!(long.records.contains(&FREE), "no edge was too long");
+    for (leaf, cloud, pixels_per_site) in [(0, 0, 5.0), (2, 1, 5.0), (4, 3, 8.0)] {
+        let mut alone = PlacedAtlas::default();
+        alone.add(&sites[cloud], pixels_per_site);
+        let expected = make_triangles(alone.diagram(), &mut [0]);
+        assert!(relative(&placed, &twins.records, leaf) == relative(&alone, &expected, 0), "leaf {leaf}");
+    }
+}
+
+/// Returns the records of a leaf as if it were alone.
+fn relative(placed: &PlacedAtlas, records: &[u32], leaf: usize) -> Vec<u32> {
+    let leaf = &placed.atlas.leaves[leaf];
+    let own = &records[8 * leaf.first_record as usize..][..8 * leaf.records() as usize];
+    let base = |i: usize| [leaf.first_site, 8 * leaf.first_record][i / 4 % 2];
+    let shifted = |(i, &number): (usize, &u32)| if number == FREE || i % 4 == 3 { number } else { number - base(i) };
+    own.iter().enumerate().map(shifted).collect()
+}
+
+/// Two leaves of one place, far from another: what the rounds of flips do to one has nothing to do with the others.
+#[test]
+fn flips_stay_within_their_leaf() {
+    let far = gdt_batch::geometry::lattice::REACH;
+    let [cloud, ..] = &clouds()[..] else { panic!("there are clouds") };
+    let near: Vec<Site> = cloud.sites[..3000].to_vec();
+    let moved = |by: i32| near.iter().map(|&[x, y]| [x - by, y + by - (1 << 21)]).collect::<Vec<_>>();
+    let mut placed = PlacedAtlas::default();
+    for sites in [&near, &near, &moved(far), &moved(-far + (1 << 21)), &near] {
+        placed.add(sites, 5.0);
+    }
+    let mut state = FlipState::new(make_triangles(placed.diagram(), &mut [0; 5]));
+    (1..=FLIP_ROUNDS).for_each(|round| flip_round(&mut state, &placed.sites, round));
+    let mut meshes = BTreeSet::new();
+    for leaf in 0..5 {
+        let records = relative(&placed, &state.records, leaf);
+        let corners = records.chunks_exact(8).filter(|record| record[0] != FREE).map(|record| {
+            let [a, b, c] = [record[0], record[1], record[2]];
+            [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().expect("three of them")
+        });
+        meshes.insert(corners.collect::<BTreeSet<_>>());
+        assert!(records.chunks_exact(8).flat_map(|record| &record[..3]).all(|&v| v == FREE || v <= 3000));
+    }
+    assert_eq!(meshes.len(), 1, "leaves of the same sites have other meshes");
+}
+
+/// What the device leaves of a real cloud is rare, and all that is said to move is within the limits of the paper's pipeline.
+#[test]
+fn real_terrain_has_few_exceptions() {
+    let (Some(mut rig), Some(cloud)) = (Rig::new(), real_cloud()) else { return };
+    for (pixels_per_site, most) in [(5.0, 0.02), (8.0, 0.007), (16.0, 0.002)] {
+        let mut placed = PlacedAtlas::default();
+        let middle = cloud.sites.len() / 2;
+        [&cloud.sites[..middle], &cloud.sites[middle..]].map(|sites| placed.add(sites, pixels_per_site));
+        let twins = compare(&mut rig, cloud.name, &placed);
+        assert_whole(cloud.name, &placed, &twins);
+        let returned = ReturnedAtlas::new(&placed.atlas, &twins.returned).expect("all numbers came back");
+        let leaves: Vec<_> = (0..2).map(|leaf| returned.leaf(leaf).expect("it came back")).collect();
+        let bits = |words: &[u32]| words.iter().map(|word| word.count_ones()).sum::<u32>();
+        let missing: u32 = leaves.iter().map(|leaf| bits(leaf.missing)).sum();
+        let unfinished: u32 = leaves.iter().map(|leaf| bits(leaf.unfinished)).sum();
+        let share = |count: u32| f64::from(count) / cloud.sites.len() as f64;
+        eprintln!(
+            "{pixels_per_site} pixels a site: missing {:.3} %, unfinished {:.3} % of the sites",
+            100.0 * share(missing),
+            100.0 * share(unfinished)
+        );
+        assert!(share(missing + unfinished) <= most);
+    }
+}
+
+/// The rounds of flips read all triangles once. What they do after that is little.
+#[test]
+fn the_rounds_move_few_bytes_for_a_site() {
+    let Some(cloud) = real_cloud() else { return };
+    for pixels_per_site in [8.0, 16.0] {
+        let mut placed = PlacedAtlas::default();
+        placed.add(&cloud.sites, pixels_per_site);
+        let triangles = placed.atlas.records;
+        let mut state = FlipState::new(make_triangles(placed.diagram(), &mut [0]));
+        let (mut dirty, mut flips) = (0, 0);
+        for round in 1..=FLIP_ROUNDS {
+            let marks = &state.marks[state.sections().dirty(round)];
+            dirty += if round == 1 { 0 } else { marks.iter().map(|word| word.count_ones()).sum::<u32>() };
+            flip_round(&mut state, &placed.sites, round);
+            let is_flipped = |record: &&[u32]| record[3] >> 2 == round;
+            flips += state.records.chunks_exact(8).filter(is_flipped).count() as u32 / 2;
+        }
+        let mut recording = Recording::default();
+        recording.flip(triangles);
+        // A dirty triangle takes its record, the corners of three neighbours and six sites. A flip takes two records, to read and to
+        // write, and the notes and links of four neighbours.
+        let moved = recording.traffic() + 128 * u64::from(dirty) + 192 * u64::from(flips);
+        let each = |count: u64| count as f64 / cloud.sites.len() as f64;
+        eprintln!(
+            "{pixels_per_site} pixels a site: {:.2} dirty triangles and {:.2} flips a site; {:.0} bytes declared, {:.0} in all",
+            each(u64::from(dirty)),
+            each(u64::from(flips)),
+            each(recording.traffic()),
+            each(moved)
+        );
+        assert!(each(moved) <= 350.0);
+    }
+}
+
+/// Returns what steps G4 to G6 and the return record for `placed`.
+fn recorded(placed: &PlacedAtlas) -> Recording {
+    let mut recording = Recording::default();
+    recording.atlas_vertices(&placed.atlas);
+    recording.atlas_count(&placed.atlas);
+    recording.atlas_triangles(&placed.atlas);
+    recording.give_back(&placed.atlas);
+    recording
+}
+
+#[test]
+fn the_steps_are_few_fixed_dispatches_with_little_traffic() {
+    let sites: Vec<Site> = clouds().swap_remove(0).sites;
+    for (pixels_per_site, most) in [(8.0, 380.0), (16.0, 500.0)] {
+        let mut placed = PlacedAtlas::default();
+        placed.add(&sites, pixels_per_site);
+        let recording = recorded(&placed);
+        assert_eq!(recording.dispatches(), 7);
+        let is_indirect = |c: &GpuCommand| matches!(c, GpuCommand::Run(_, _, WorkgroupCount::Indirect(_), _));
+        assert!(!recording.commands.iter().any(is_indirect));
+        assert!(recording.commands.iter().all(|c| !matches!(c, GpuCommand::Run(_, _, _, 0))), "all are counted");
+        let traffic = recording.traffic() as f64 / sites.len() as f64;
+        let back = 4.0 * ReturnedLayout::of(&placed.atlas).numbers() as f64 / sites.len() as f64;
+        eprintln!("{pixels_per_site} pixels a site: {traffic:.0} bytes of traffic a site, {back:.2} bytes come back");
+        assert!(traffic <= most, "{traffic}");
+        // A site goes up with eight bytes.
+        assert!(back + 8.0 <= 75.0, "{back}");
+    }
+}
