@@ -30,8 +30,9 @@ struct Params {
 
 // A record without a triangle, a half-edge without a twin.
 const FREE = 0xffffffffu;
-// The longest Voronoi edge that is followed, in corners.
-const MAX_STEPS = 64u;
+// The longest Voronoi edge that is followed, in corners. Most have fewer than 20, but those in voids and between the hull and the rim of
+// the texture may be as long as the texture.
+const MAX_STEPS = 4096u;
 // Why a leaf is flagged.
 const TOO_MANY_TRIANGLES = 4u;
 const LONG_EDGE = 8u;

@@ -7,7 +7,7 @@ use crate::gpu::twins::atlas::corners::{AtlasDiagram, Corner, EAST, LeafDiagram,
 /// A record without a triangle, a half-edge without a twin.
 const FREE: u32 = u32::MAX;
 /// The longest Voronoi edge that is followed, in corners.
-const MAX_STEPS: usize = 64;
+const MAX_STEPS: usize = 4096;
 
 /// Returns the records of all leaves. Adds to the flags of each leaf.
 pub fn make_triangles(diagram: AtlasDiagram<'_>, flags: &mut [u32]) -> Vec<u32> {
