@@ -167,12 +167,14 @@ fn write(place: Place, triangle: u32, number: u32) {
     for (var i = 0u; i < 3u; i++) {
         let arm = i + u32(i >= missing);
         let colour = colours[arm];
-        corners[i] = vertex(place.leaf, colour);
-        if arm == cut {
-            twins[i] = partner;
-        } else {
-            twins[i] = walk(place, x, y, arm, colours[(arm + 1u) & 3u], colour);
+        var twin = partner;
+        if arm != cut {
+            twin = walk(place, x, y, arm, colours[(arm + 1u) & 3u], colour);
         }
+        // Writing to element i would put the vectors into memory.
+        let is_own = vec4u(0u, 1u, 2u, 3u) == vec4u(i);
+        corners = select(corners, vec4u(vertex(place.leaf, colour)), is_own);
+        twins = select(twins, vec4u(twin), is_own);
     }
     records[2u * number] = corners;
     records[2u * number + 1u] = twins;

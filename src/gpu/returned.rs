@@ -98,3 +98,52 @@ impl<'a> ReturnedAtlas<'a> {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::voronoi::texture_request::TextureRequest;
+
+    #[test]
+    fn parts_of_leaves_do_not_overlap() {
+        let mut atlas = Atlas::default();
+        for count in [3, 31, 32, 33, 62, 64, 100] {
+            let sites: Vec<_> = (0..count).map(|i| [i % 10 * 7, i / 10 * 7 + i % 3]).collect();
+            assert!(atlas.add(&sites, &TextureRequest::default(), 1 << 20));
+        }
+        // Every number tells where it is.
+        let mut numbers: Vec<u32> = (0..ReturnedLayout::of(&atlas).numbers() as u32).collect();
+        let leaves = ReturnedLayout::of(&atlas).leaves;
+        leaves.step_by(2).for_each(|at| (numbers[at], numbers[at + 1]) = (4, 0));
+        let returned = ReturnedAtlas::new(&atlas, &numbers).unwrap();
+        let mut last = [0; 4];
+        for (i, leaf) in atlas.leaves.iter().enumerate() {
+            let back = returned.leaf(i).unwrap();
+            assert_eq!((back.records.len(), back.unfinished.len()), (32, 1));
+            assert_eq!(back.missing.len(), (leaf.sites as usize).div_ceil(32));
+            assert_eq!(back.records[0], 8 * leaf.first_record);
+            for (part, last) in [back.records, back.unfinished, back.missing, back.block_starts].iter().zip(&mut last) {
+                assert!(i == 0 || part[0] > *last);
+                *last = part[part.len() - 1];
+            }
+        }
+        assert_eq!(returned.leaf(atlas.leaves.len()), None);
+    }
+
+    #[test]
+    fn nonsense_is_no_leaf() {
+        let mut atlas = Atlas::default();
+        assert!(atlas.add(&[[0, 0], [5, 5], [9, 0]], &TextureRequest::default(), 1 << 20));
+        let layout = ReturnedLayout::of(&atlas);
+        let mut numbers = vec![0; layout.numbers()];
+        assert!(ReturnedAtlas::new(&atlas, &numbers[1..]).is_none());
+        let leaf =
+            |numbers: &[u32]| ReturnedAtlas::new(&atlas, numbers).unwrap().leaf(0).map(|leaf| leaf.records.len());
+        numbers[layout.leaves.start] = 64;
+        assert_eq!(leaf(&numbers), Some(512));
+        numbers[layout.leaves.start] = 65;
+        assert_eq!(leaf(&numbers), None);
+        numbers[layout.leaves.start + 1] = TOO_MANY_TRIANGLES;
+        assert_eq!(leaf(&numbers), Some(0));
+    }
+}

@@ -149,6 +149,33 @@ fn small_leaves() -> Vec<Vec<Site>> {
     leaves
 }
 
+/// Sites of a texture one pixel high.
+const THREE: [Site; 3] = [[0, 0], [1 << 20, 1], [1 << 21, 0]];
+
+/// Adds leaves whose pixels have any colours, so that there are corners of every shape.
+fn add_patchworks(placed: &mut PlacedAtlas) {
+    let mut random = Random(23);
+    for _ in 0..30 {
+        placed.add_with(&[[0, 0], [4, 0], [0, 4], [4, 4]], TextureResolution::Side(5));
+        let leaf = placed.atlas.leaves[placed.atlas.leaves.len() - 1];
+        for (x, y) in (0..25).map(|i| (i % 5, i / 5)) {
+            placed.labels[leaf.at(x, y) as usize] = 4 * random.below(2) << 16 | 4 * random.below(2);
+        }
+    }
+}
+
+#[test]
+fn every_shape_of_corner_is_linked() {
+    let Some(mut rig) = Rig::new() else { return };
+    let mut placed = PlacedAtlas::default();
+    add_patchworks(&mut placed);
+    let twins = compare(&mut rig, "patchworks", &placed);
+    assert!(twins.flags.iter().all(|&flags| flags == 0));
+    for records in [&twins.records, &twins.flipped.records] {
+        Flipped { records, sites: &placed.sites }.assert_linked("patchworks");
+    }
+}
+
 #[test]
 fn small_and_thin_leaves_are_the_same_bit_for_bit() {
     let Some(mut rig) = Rig::new() else { return };
@@ -177,10 +204,9 @@ fn large_leaves_are_the_same_bit_for_bit() {
 fn a_bad_leaf_is_flagged_and_harms_no_other() {
     let Some(mut rig) = Rig::new() else { return };
     let sites: Vec<Vec<Site>> = clouds().into_iter().map(|cloud| cloud.sites[..2000].to_vec()).collect();
-    let three = [[0, 0], [1 << 20, 1], [1 << 21, 0]];
     let mut placed = PlacedAtlas::default();
     placed.add(&sites[0], 5.0);
-    placed.add_with(&three, TextureResolution::Side(16_000));
+    placed.add_with(&THREE, TextureResolution::Side(16_000));
     placed.add(&sites[1], 5.0);
     placed.add(&sites[2], 5.0);
     placed.add(&sites[3], 8.0);
@@ -217,7 +243,66 @@ fn relative(placed: &PlacedAtlas, records: &[u32], leaf: usize) -> Vec<u32> {
     own.iter().enumerate().map(shifted).collect()
 }
 
-/// Two leaves of one place, far from another: what the rounds of flips do to one has nothing to do with the others.
+/// Each line of the shaders that a rare shape depends on is spoilt in turn: the small leaves show it.
+#[test]
+fn the_small_leaves_find_every_error_in_the_shaders() {
+    let Some(mut rig) = Rig::new() else { return };
+    let mut placed = PlacedAtlas::default();
+    small_leaves().iter().for_each(|sites| placed.add(sites, 2.0));
+    add_patchworks(&mut placed);
+    // More than 1024 blocks.
+    (0..3).for_each(|_| placed.add_with(&THREE, TextureResolution::Side(16_000)));
+    let twins = compare(&mut rig, "small leaves", &placed);
+    let expected = twins.returned;
+    let mut alive = Vec::new();
+    for (right, wrong) in [
+        ("x + i % TILE_SIDE - 1u", "x + i % TILE_SIDE"),
+        ("x >= leaf.width ||", "x > leaf.width ||"),
+        ("|| y >= leaf.height", "|| y > leaf.height"),
+        ("|| colours.y == colours.w", ""),
+        ("orientation(a, c, d) > 0", "true"),
+        ("!in_circle(a, b, c, d)", "in_circle(a, b, c, d)"),
+        ("i < group;", "i <= group;"),
+        ("arm - u32(missing < arm)", "arm - u32(missing > arm)"),
+        ("vec4u(0u, 1u, 9u, 10u)", "vec4u(0u, 8u, 9u, 2u)"),
+        ("ahead_right != left || is_across", "ahead_right != left || !is_across"),
+        ("ahead_left != right || !is_across", "ahead_left != right || is_across"),
+        ("(arm + 1u) & 3u, ahead_left == left", "(arm + 3u) & 3u, ahead_left == left"),
+        ("8u * number - 6u", "8u * number - 7u"),
+        ("8u * number + 10u", "8u * number + 9u"),
+        ("cut = (missing + 3u) & 3u", "cut = (missing + 1u) & 3u"),
+        ("(lane & 1u) != 0u", "(lane & 2u) != 0u"),
+        ("if at % 32u != 0u", "if at % 32u == 0u"),
+        ("32u - min(leaf.sites - first, 32u)", "0u"),
+        ("| marks[3u * bit_params.record_words + i]", ""),
+        ("starts[i] - before", "starts[i]"),
+    ] {
+        let (mut recording, mut found) = (placed.upload(), 0);
+        recording.atlas_vertices(&placed.atlas);
+        recording.atlas_count(&placed.atlas);
+        recording.atlas_triangles(&placed.atlas);
+        recording.flip(placed.atlas.records);
+        recording.give_back(&placed.atlas);
+        for command in &mut recording.commands {
+            if let GpuCommand::Run(program, ..) = command
+                && program.file.starts_with("atlas/")
+                && program.source.contains(right)
+            {
+                found += 1;
+                program.source = program.source.replace(right, wrong).leak();
+            }
+        }
+        assert!(found > 0, "{right}");
+        rig.run(&recording);
+        let returned = rig.numbers(BufferId::Returned, expected.len() as u64);
+        let differing = returned.iter().zip(&expected).filter(|(a, b)| a != b).count();
+        eprintln!("{right}: {differing}");
+        alive.extend((differing == 0).then_some(right));
+    }
+    assert!(alive.is_empty(), "nothing shows these errors: {alive:?}");
+}
+
+/// Leaves of the same sites, near and far: what the rounds of flips do to one has nothing to do with the others.
 #[test]
 fn flips_stay_within_their_leaf() {
     let far = gdt_batch::geometry::lattice::REACH;
@@ -243,11 +328,11 @@ fn flips_stay_within_their_leaf() {
     assert_eq!(meshes.len(), 1, "leaves of the same sites have other meshes");
 }
 
-/// What the device leaves of a real cloud is rare, and all that is said to move is within the limits of the paper's pipeline.
+/// What the device leaves of a real cloud is rare.
 #[test]
 fn real_terrain_has_few_exceptions() {
     let (Some(mut rig), Some(cloud)) = (Rig::new(), real_cloud()) else { return };
-    for (pixels_per_site, most) in [(5.0, 0.02), (8.0, 0.007), (16.0, 0.002)] {
+    for (pixels_per_site, most) in [(5.0, 0.006), (8.0, 0.002), (16.0, 0.001)] {
         let mut placed = PlacedAtlas::default();
         let middle = cloud.sites.len() / 2;
         [&cloud.sites[..middle], &cloud.sites[middle..]].iter().for_each(|sites| placed.add(sites, pixels_per_site));
@@ -315,7 +400,7 @@ fn recorded(placed: &PlacedAtlas) -> Recording {
 #[test]
 fn the_steps_are_few_fixed_dispatches_with_little_traffic() {
     let sites: Vec<Site> = clouds().swap_remove(0).sites;
-    for (pixels_per_site, most) in [(8.0, 380.0), (16.0, 500.0)] {
+    for (pixels_per_site, most) in [(8.0, 320.0), (16.0, 420.0)] {
         let mut placed = PlacedAtlas::default();
         placed.add(&sites, pixels_per_site);
         let recording = recorded(&placed);

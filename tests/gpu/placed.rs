@@ -62,7 +62,8 @@ impl PlacedAtlas {
         self.sites.extend(sites);
         self.sites.push([AT_INFINITY, 0]);
         self.missing.resize(self.sites.len().div_ceil(32), 0);
-        self.labels.resize(self.atlas.pixels as usize, twins::NONE);
+        // Labels outside the textures must not matter.
+        self.labels.resize(self.atlas.pixels as usize, 0);
         self.texture.resize(self.atlas.pixels as usize, 0);
 
         let taken = place(&leaf, sites);
