@@ -114,7 +114,8 @@ fn assert_starts_are_near(placed: &PlacedAtlas, leaf: usize, records: &[u32], st
         let first = 8 * (leaf.first_record + pair[0]) as usize;
         let pixels = records[first..first + 3]
             .iter()
-            .filter_map(|&v| (v != leaf.first_site + leaf.sites).then(|| leaf.pixel(placed.sites[v as usize])));
+            .filter(|&&v| v != leaf.first_site + leaf.sites)
+            .map(|&v| leaf.pixel(placed.sites[v as usize]));
         let distance = pixels.map(|[px, py]| px.abs_diff(x).max(py.abs_diff(y))).min().expect("a finite corner");
         assert!(distance < leaf.width.max(leaf.height).min(200), "block {block}: {distance}");
     }
@@ -159,7 +160,7 @@ fn add_patchworks(placed: &mut PlacedAtlas) {
         placed.add_with(&[[0, 0], [4, 0], [0, 4], [4, 4]], TextureResolution::Side(5));
         let leaf = placed.atlas.leaves[placed.atlas.leaves.len() - 1];
         for (x, y) in (0..25).map(|i| (i % 5, i / 5)) {
-            placed.labels[leaf.at(x, y) as usize] = 4 * random.below(2) << 16 | 4 * random.below(2);
+            placed.labels[leaf.at(x, y) as usize] = ((4 * random.below(2)) << 16) | (4 * random.below(2));
         }
     }
 }
