@@ -240,7 +240,7 @@ fn the_rounds_are_fixed_grids_that_every_adapter_accepts() {
     let mut recording = Recording::default();
     recording.flip(1 << 26);
     let grids = recording.commands.iter().filter_map(|command| match command {
-        GpuCommand::Run(_, _, workgroups) => Some(workgroups),
+        GpuCommand::Run(_, _, workgroups, _) => Some(workgroups),
         _ => None,
     });
     let grids: Vec<_> = grids.collect();
