@@ -128,7 +128,7 @@ const BAND: u32 = 32;
 /// after the last round.
 pub const ISLAND_ROUNDS: usize = 8;
 /// The largest number of workgroups in one dimension.
-const MAX_WORKGROUPS: u32 = 65_535;
+pub(super) const MAX_WORKGROUPS: u32 = 65_535;
 /// The most pixels that one dispatch of step G2 works on. A longer dispatch might be taken for a hang.
 const MAX_PIXELS_PER_DISPATCH: u64 = 1 << 24;
 
