@@ -59,6 +59,7 @@ fn small_clouds() -> Vec<Cloud> {
     let far = [[-REACH, -REACH], [REACH, REACH], [-REACH, REACH], [REACH, 0], [0, 0], [1, 0], [1, 1]];
     let crowded = (0..3000).map(|_| [random.below(40) as i32, random.below(4000) as i32]);
     let crowded: BTreeSet<Site> = crowded.chain([[1 << 20, 0]]).collect();
+    let uniform: BTreeSet<Site> = (0..2000).map(|_| [0; 2].map(|_: i32| random.below(3000) as i32)).collect();
     vec![
         Cloud { name: "three sites", sites: vec![[0, 0], [5, 5], [9, 0]] },
         Cloud { name: "three neighbours", sites: vec![[3, 3], [4, 3], [3, 4]] },
@@ -66,7 +67,8 @@ fn small_clouds() -> Vec<Cloud> {
         Cloud { name: "one column", sites: (0..700).map(|y| [-7, y * y]).collect() },
         Cloud { name: "all pixels", sites: (0..63 * 64).map(|i| [i % 63, i / 63]).collect() },
         Cloud { name: "very far apart", sites: far.to_vec() },
-        Cloud { name: "crowded", sites: crowded.into_iter().collect() },
+        Cloud { name: "crowded", sites: crowded.into_iter().rev().collect() },
+        Cloud { name: "numbered from the east", sites: uniform.into_iter().rev().collect() },
         Cloud { name: "three more", sites: vec![[-9, -9], [-9, 9], [9, 9]] },
     ]
 }
@@ -185,42 +187,144 @@ fn the_device_s_rule_for_losers_is_as_good_as_the_cpu_s() {
     }
 }
 
-/// The islands of a worse diagram: whole patches of labels lie where they do not belong.
+/// An atlas whose labels have patches of up to `side` rows and columns that lie where they do not belong, except in the first leaf.
+struct Patched {
+    filled: Filled,
+    labels: Vec<u32>,
+}
+
+impl Patched {
+    fn new(patches: u32, side: u32) -> Patched {
+        let mut random = Random(7);
+        let mut uniform = || (0..2000).map(|_| [0; 2].map(|_: i32| random.below(100_000) as i32)).collect();
+        let clouds: [BTreeSet<Site>; 4] = [uniform(), uniform(), uniform(), uniform()];
+        let clouds = clouds.map(|sites| Cloud { name: "uniform", sites: sites.into_iter().collect() });
+        let filled = Filled::new(&clouds, 10.0);
+        let written = twins::atlas::write_sites(&filled.atlas, &filled.sites);
+        let clean = twins::atlas::voronoi(&filled.atlas, &written.texture, VoronoiMethod::Exact);
+        let mut labels = clean.clone();
+        for _ in 0..patches {
+            let leaf = &filled.atlas.leaves[1 + random.below(3) as usize];
+            let [from, x] = [0; 2].map(|_: u32| random.below(leaf.width));
+            let [from_row, row] = [0; 2].map(|_: u32| random.below(leaf.height));
+            let (from, at) = (leaf.at(from, from_row) as usize, leaf.at(x, row) as usize);
+            let [length, rows] =
+                [leaf.width - x, leaf.height - row].map(|most| (1 + random.below(side)).min(most) as usize);
+            for at in (0..rows).map(|i| at + i * leaf.stride as usize) {
+                labels[at..at + length].fill(clean[from]);
+            }
+        }
+        Patched { filled, labels }
+    }
+
+    fn recording(&self) -> Recording {
+        let mut recording = Recording::default();
+        recording.upload_atlas(&self.filled.atlas, &self.filled.sites);
+        recording.commands.push(GpuCommand::Reserve(BufferId::Labels, 4 * self.labels.len() as u64));
+        recording.commands.push(GpuCommand::Upload(BufferId::Labels, self.labels.clone()));
+        recording.remove_atlas_islands(&self.filled.atlas);
+        recording
+    }
+}
+
 #[test]
 fn islands_anywhere_are_removed_as_by_the_twin() {
     let Some(mut rig) = Rig::new() else { return };
-    let mut random = Random(7);
-    let uniform = |side: u32, random: &mut Random| {
-        let sites: BTreeSet<Site> = (0..2000).map(|_| [random.below(side) as i32, random.below(side) as i32]).collect();
-        Cloud { name: "uniform", sites: sites.into_iter().collect() }
-    };
-    let clouds: Vec<Cloud> = (0..4).map(|_| uniform(100_000, &mut random)).collect();
-    let Filled { atlas, sites } = Filled::new(&clouds, 10.0);
-    let written = twins::atlas::write_sites(&atlas, &sites);
-    let clean = twins::atlas::voronoi(&atlas, &written.texture, VoronoiMethod::Exact);
-    for patches in [1, 40, 400, 20_000] {
-        // The first leaf stays as it is.
-        let mut labels = clean.clone();
-        for _ in 0..patches {
-            let leaf = &atlas.leaves[1 + random.below(3) as usize];
-            let [from, x, y] = [leaf.width, leaf.width, leaf.height].map(|side| random.below(side));
-            let colour = clean[leaf.at(from, y) as usize];
-            let at = leaf.at(x, random.below(leaf.height)) as usize;
-            let length = (1 + random.below(4)).min(leaf.width - x) as usize;
-            labels[at..at + length].fill(colour);
-        }
-        let mut recording = Recording::default();
-        recording.upload_atlas(&atlas, &sites);
-        recording.commands.push(GpuCommand::Reserve(BufferId::Labels, 4 * labels.len() as u64));
-        recording.commands.push(GpuCommand::Upload(BufferId::Labels, labels.clone()));
-        recording.remove_atlas_islands(&atlas);
-        rig.run(&recording);
-        let before = labels.clone();
-        let flags = twins::atlas::remove_islands(&atlas, &mut labels);
-        assert!(labels != before && flags[0] == 0);
-        assert_eq!(flags.contains(&ISLANDS_LEFT), patches >= 400, "{patches} patches: {flags:?}");
+    for (patches, side, are_left) in [(1, 1, false), (400, 1, false), (6, 4, true), (400, 4, true), (20_000, 4, true)] {
+        let patched = Patched::new(patches, side);
+        rig.run(&patched.recording());
+        let mut labels = patched.labels.clone();
+        let flags = twins::atlas::remove_islands(&patched.filled.atlas, &mut labels);
+        assert!(labels != patched.labels && flags[0] == 0);
+        assert_eq!(flags.contains(&ISLANDS_LEFT), are_left, "{patches} patches: {flags:?}");
         assert_same("islands", &rig.numbers(BufferId::Labels, labels.len() as u64), &labels);
         assert_same("flags", &rig.numbers(BufferId::Flags, flags.len() as u64), &flags);
+    }
+}
+
+/// Puts `wrong` in the place of `right` in the shaders that have it.
+fn spoil(recording: &mut Recording, right: &str, wrong: &str) {
+    let mut spoilt = 0;
+    for command in &mut recording.commands {
+        if let GpuCommand::Run(program, ..) = command {
+            spoilt += program.source.matches(right).count();
+            program.source = program.source.replace(right, wrong).leak();
+        }
+    }
+    assert!(spoilt > 0, "{right}");
+}
+
+/// Lines of the shaders that only few leaves depend on are spoilt in turn: the leaves show it.
+#[test]
+fn the_leaves_find_every_error_in_g1_and_g2() {
+    let Some(mut rig) = Rig::new() else { return };
+    let mut clouds = small_clouds();
+    clouds.extend(super::clouds::clouds().into_iter().filter(|cloud| ["coarse", "gaussian"].contains(&cloud.name)));
+    let Filled { atlas, sites } = Filled::new(&clouds, 5.0);
+    let written = twins::atlas::write_sites(&atlas, &sites);
+    for (method, right, wrong) in [
+        (VoronoiMethod::Exact, "&& sites[i].x != AT_INFINITY", ""),
+        (VoronoiMethod::Exact, ".first_site <= site", ".first_site < site"),
+        (VoronoiMethod::Exact, "2u * steps.x + 1u", "2u * steps.x"),
+        (VoronoiMethod::Exact, " + (middle >> 16u)", ""),
+        (VoronoiMethod::Exact, " + (hl & 0xffffu)", ""),
+        (VoronoiMethod::Exact, "has_lost && own.has_east", "has_lost"),
+        (VoronoiMethod::Exact, "!has_place && own.has_west", "!has_place"),
+        (VoronoiMethod::Exact, "return p.x < q.x;", "return a < b;"),
+        (VoronoiMethod::Exact, "p.y < q.y || (p.y == q.y && a < b)", "a < b"),
+        (VoronoiMethod::Exact, "(east >> 30u) == 1u", "false"),
+        (VoronoiMethod::Exact, "!has_western(own)", "true"),
+        (VoronoiMethod::Exact, "rows << (4u * local.y)", "rows << (3u * local.y)"),
+        (VoronoiMethod::Exact, "BLOCK_SIDE + firstLeadingBit(word)", "BLOCK_SIDE + firstTrailingBit(word)"),
+        (VoronoiMethod::Exact, "BLOCK_SIDE + firstTrailingBit(word)", "BLOCK_SIDE + firstLeadingBit(word)"),
+        (VoronoiMethod::Exact, "y - s <= n - y", "y - s < n - y"),
+        (VoronoiMethod::Exact, "d <= best", "d < best"),
+        (VoronoiMethod::Exact, "= FRAME;", "= 0u;"),
+        (VoronoiMethod::Jfa, "(d == e && is_before(a, b))", "d == e"),
+        (VoronoiMethod::Jfa, "p.x < i32(leaves[leaf].width)", "p.x < i32(leaves[leaf].stride)"),
+        (VoronoiMethod::Jfa, "all(p >= vec2i(0))", "p.y >= 0"),
+    ] {
+        let mut recording = Recording::default();
+        recording.upload_atlas(&atlas, &sites);
+        recording.write_atlas_sites(&atlas);
+        recording.atlas_voronoi(&atlas, method);
+        spoil(&mut recording, right, wrong);
+        rig.run(&recording);
+        let labels = twins::atlas::voronoi(&atlas, &written.texture, method);
+        let differs = rig.numbers(BufferId::Texture, written.texture.len() as u64) != written.texture
+            || rig.numbers(BufferId::Missing, written.missing.len() as u64) != written.missing
+            || rig.numbers(BufferId::Labels, labels.len() as u64) != labels;
+        assert!(differs, "{right}");
+    }
+}
+
+#[test]
+fn the_patches_find_every_error_in_g3() {
+    let Some(mut rig) = Rig::new() else { return };
+    let patched = Patched::new(3000, 4);
+    let mut labels = patched.labels.clone();
+    let flags = twins::atlas::remove_islands(&patched.filled.atlas, &mut labels);
+    for (right, wrong) in [
+        ("word | (word << 1u)", "word"),
+        (" | (word >> 1u)", ""),
+        (" | west", ""),
+        (" | east;", ";"),
+        ("-1, row < 0", "0, row < 0"),
+        ("select(0, 1, row > 31)", "0"),
+        ("widened(block, row - 1) | ", ""),
+        ("if towards.y != 0 &&", "if"),
+        ("d == best && is_before(other, colour)", "d == best"),
+        ("left != 0u && at < COLOURS", "left != 0u"),
+        ("count += countOneBits(atomicLoad(&found[i]))", "count += 0u"),
+        ("at += counts[j]", "at += 0u"),
+        ("atomicOr(&flags[leaf], ISLANDS_LEFT)", "atomicOr(&flags[0], ISLANDS_LEFT)"),
+    ] {
+        let mut recording = patched.recording();
+        spoil(&mut recording, right, wrong);
+        rig.run(&recording);
+        let differs = rig.numbers(BufferId::Labels, labels.len() as u64) != labels
+            || rig.numbers(BufferId::Flags, flags.len() as u64) != flags;
+        assert!(differs, "{right}");
     }
 }
 
