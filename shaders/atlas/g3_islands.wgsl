@@ -96,42 +96,36 @@ fn new_colour(leaf: u32, p: vec2i) -> u32 {
     return other_colour(leaf, p, label);
 }
 
-// Looks at a pixel of a block, if it is in `near`. Returns its new colour if it is an island, or NONE.
+// Returns the new colour of a pixel of a block if it is an island, or NONE.
 fn examine(block: u32, x: u32, row: u32) -> u32 {
-    if ((near[row] >> x) & 1u) == 0u {
-        return NONE;
-    }
-    let colour = new_colour(blocks[block].leaf, vec2i(corner_of(block) + vec2u(x, row)));
-    if colour != NONE {
-        atomicOr(&found[row], 1u << x);
-    }
-    return colour;
+    return new_colour(blocks[block].leaf, vec2i(corner_of(block) + vec2u(x, row)));
 }
 
-// Lists the new colour of an island.
-fn list(block: u32, x: u32, row: u32, colour: u32) {
-    if colour != NONE {
-        let at = number_in_block(x, row);
-        if at < COLOURS {
-            colours_out[block * COLOURS + at] = colour;
-        }
-    }
+fn has_bit(word: u32, x: u32) -> bool {
+    return ((word >> x) & 1u) != 0u;
 }
 
 // Finds the islands of a block among the pixels in `near`. One workgroup per block, four rows per invocation.
 fn find(block: u32, local: vec3u) {
-    let row = 4u * local.y;
-    let a = examine(block, local.x, row);
-    let b = examine(block, local.x, row + 1u);
-    let c = examine(block, local.x, row + 2u);
-    let d = examine(block, local.x, row + 3u);
+    let x = local.x;
+    let first = 4u * local.y;
+    for (var row = first; row < first + 4u; row++) {
+        if has_bit(near[row], x) && examine(block, x, row) != NONE {
+            atomicOr(&found[row], 1u << x);
+        }
+    }
     workgroupBarrier();
-    list(block, local.x, row, a);
-    list(block, local.x, row + 1u, b);
-    list(block, local.x, row + 2u, c);
-    list(block, local.x, row + 3u, d);
+    // Islands are rare, so their colours are found again rather than kept.
+    for (var row = first; row < first + 4u; row++) {
+        if has_bit(atomicLoad(&found[row]), x) {
+            let at = number_in_block(x, row);
+            if at < COLOURS {
+                colours_out[block * COLOURS + at] = examine(block, x, row);
+            }
+        }
+    }
     if local.y == 0u {
-        islands_out[block * BLOCK_SIDE + local.x] = atomicLoad(&found[local.x]);
+        islands_out[block * BLOCK_SIDE + x] = atomicLoad(&found[x]);
     }
 }
 
@@ -204,12 +198,9 @@ fn find_left(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) 
         return;
     }
     look_near(block, local);
-    let leaf = blocks[block].leaf;
     for (var row = local.y; row < BLOCK_SIDE; row += 8u) {
-        if ((near[row] >> local.x) & 1u) != 0u {
-            if new_colour(leaf, vec2i(corner_of(block) + vec2u(local.x, row))) != NONE {
-                atomicOr(&flags[leaf], ISLANDS_LEFT);
-            }
+        if has_bit(near[row], local.x) && examine(block, local.x, row) != NONE {
+            atomicOr(&flags[blocks[block].leaf], ISLANDS_LEFT);
         }
     }
 }
