@@ -47,6 +47,8 @@ pub enum BufferId {
     Blocks,
     /// For each leaf of an atlas, why it must go to the CPU; 0 if it need not.
     Flags,
+    /// A bit for each vertex of an atlas: the site has lost its pixel to another.
+    Losers,
     /// A bit for each vertex of an atlas: the site has no pixel.
     Missing,
     /// The corners of an atlas, four numbers for each 32 in a row; see `shaders/atlas/g4_vertices.wgsl`.

@@ -5,7 +5,7 @@
 //! discrete Voronoi diagrams of leaves on a thread of its own. Room `voronoi` turns a diagram into a mesh and proves that mesh.
 
 pub mod atlas;
-mod atlas_steps;
+pub mod atlas_steps;
 pub mod benefit;
 pub mod buffer_id;
 pub mod buffers;

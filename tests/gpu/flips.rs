@@ -127,6 +127,16 @@ fn compare_rounds(rig: &mut Rig, name: &str, mesh: &LinkedMesh) -> (FlipState, O
     (twin, last)
 }
 
+/// Returns the number of inverted triangles of a mesh before all rounds of flips, the number after them, and the number of edges that
+/// are stuck then.
+pub(crate) fn stuck_after_flips(mesh: &LinkedMesh) -> [usize; 3] {
+    let mut state = FlipState::new(mesh.records.clone());
+    (1..=FLIP_ROUNDS).for_each(|round| flip_round(&mut state, &mesh.sites, round));
+    let before = Flipped { records: &mesh.records, sites: &mesh.sites };
+    let after = Flipped { records: &state.records, sites: &mesh.sites };
+    [before.inverted().len(), after.inverted().len(), after.wrong_edges().1.len()]
+}
+
 /// Compares the rounds with the twin, asserts that the mesh is whole and that what is left is marked. Returns the number of rounds that
 /// were needed, or `None` if more were needed than there are.
 fn check(rig: &mut Rig, cloud: &Cloud, pixels_per_site: f64) -> Option<u32> {

@@ -56,10 +56,17 @@ fn place(sites: &[Site], pixels_per_site: f64) -> Placed {
             taken.extend([([y, x - 1], west), ([y, x], east)]);
         }
     }
-    let mut rows: Vec<_> = taken.into_iter().collect();
-    rows.sort_unstable();
-    let pixels = rows.iter().map(|&([y, x], _)| y << 16 | x).collect();
-    Placed { size: TextureSize { width, height }, sites: rows.into_iter().map(|(_, site)| site).collect(), pixels }
+    Placed::new(TextureSize { width, height }, taken)
+}
+
+impl Placed {
+    /// Takes the site of each pixel [y, x] that has one.
+    fn new(size: TextureSize, taken: impl IntoIterator<Item = ([u32; 2], Site)>) -> Placed {
+        let mut rows: Vec<_> = taken.into_iter().collect();
+        rows.sort_unstable();
+        let pixels = rows.iter().map(|&([y, x], _)| y << 16 | x).collect();
+        Placed { size, sites: rows.into_iter().map(|(_, site)| site).collect(), pixels }
+    }
 }
 
 /// The colours of the pixels, and which triangles each corner makes.
@@ -145,14 +152,22 @@ impl Diagram {
 impl LinkedMesh {
     /// Makes the mesh of the discrete Voronoi diagram of `sites` in a texture with about `pixels_per_site`.
     pub(crate) fn new(sites: &[Site], pixels_per_site: f64) -> LinkedMesh {
-        let placed = place(sites, pixels_per_site);
+        LinkedMesh::of(place(sites, pixels_per_site), sites.len())
+    }
+
+    /// Makes the mesh of a texture in which somebody has written `count` sites; `taken` has those that are not missing, by [y, x].
+    pub(crate) fn of_texture(size: TextureSize, taken: Vec<([u32; 2], Site)>, count: usize) -> LinkedMesh {
+        LinkedMesh::of(Placed::new(size, taken), count)
+    }
+
+    fn of(placed: Placed, count: usize) -> LinkedMesh {
         let size = placed.size;
         let texture = twins::write_sites(size, &placed.pixels);
         let mut labels = twins::voronoi_exact(size, &texture);
         twins::remove_islands(size, &mut labels);
         let colour = |label: u32| !texture[((label >> 16) * size.width + (label & 0xffff)) as usize];
         let colours = labels.into_iter().map(colour).collect();
-        let missing = sites.len() - placed.sites.len();
+        let missing = count - placed.sites.len();
         let sites = [placed.sites.as_slice(), &[[AT_INFINITY, 0]]].concat();
         let mut diagram = Diagram { size, sites, colours, first: Vec::new() };
         let mut records: Vec<u32> = Vec::new();
