@@ -6,9 +6,11 @@ use super::placed::PlacedAtlas;
 use super::random::Random;
 use super::rig::Rig;
 use gdt_batch::geometry::Site;
+use gdt_batch::gpu::atlas::Atlas;
 use gdt_batch::gpu::buffer_id::BufferId;
 use gdt_batch::gpu::leaf_flags::{LONG_EDGE, TOO_MANY_TRIANGLES};
 use gdt_batch::gpu::mesh_steps::FLIP_ROUNDS;
+use gdt_batch::gpu::options::VoronoiMethod;
 use gdt_batch::gpu::returned::{ReturnedAtlas, ReturnedLayout};
 use gdt_batch::gpu::steps::{GpuCommand, Recording, WorkgroupCount};
 use gdt_batch::gpu::twins::atlas::{MeshOnDevice, count, find_vertices, give_back, make_triangles};
@@ -51,7 +53,7 @@ fn compare(rig: &mut Rig, name: &str, placed: &PlacedAtlas) -> Twins {
     let starts = count(&counts);
     recording.atlas_count(atlas);
     assert_same(rig, name, &mut recording, &[(BufferId::BlockStarts, &starts)]);
-    let mut flags = vec![0; atlas.leaves.len()];
+    let mut flags = placed.flags.clone();
     let records = make_triangles(placed.diagram(), &mut flags);
     recording.atlas_triangles(atlas);
     assert_same(rig, name, &mut recording, &[(BufferId::Records, &records), (BufferId::Flags, &flags)]);
@@ -85,8 +87,9 @@ fn assert_whole(name: &str, placed: &PlacedAtlas, twins: &Twins) {
         let back = returned.leaf(i).expect("the leaf came back");
         assert_eq!(back.flags, 0, "{name}, leaf {i}");
         let is_missing = |site: usize| back.missing[site / 32] >> (site % 32) & 1 != 0;
+        let has_bit = |at: usize| placed.missing[at / 32] >> (at % 32) & 1 != 0;
+        assert!((0..leaf.sites as usize).all(|site| is_missing(site) == has_bit(leaf.first_site as usize + site)));
         let missing = (0..leaf.sites as usize).filter(|&site| is_missing(site)).count();
-        assert_eq!(missing, placed.missing_of[i], "{name}, leaf {i}");
         let on_sphere = leaf.sites as usize - missing + 1;
         assert_eq!(back.records.len() / 8, 2 * on_sphere - 4, "{name}, leaf {i}");
         let mut used = BTreeSet::<u32>::new();
@@ -155,10 +158,11 @@ const THREE: [Site; 3] = [[0, 0], [1 << 20, 1], [1 << 21, 0]];
 
 /// Adds leaves whose pixels have any colours, so that there are corners of every shape.
 fn add_patchworks(placed: &mut PlacedAtlas) {
+    let first = placed.atlas.leaves.len();
+    (0..30).for_each(|_| placed.add(&[[0, 0], [4, 0], [0, 4], [4, 4]], TextureResolution::Side(5)));
+    placed.place();
     let mut random = Random(23);
-    for _ in 0..30 {
-        placed.add_with(&[[0, 0], [4, 0], [0, 4], [4, 4]], TextureResolution::Side(5));
-        let leaf = placed.atlas.leaves[placed.atlas.leaves.len() - 1];
+    for leaf in &placed.atlas.leaves[first..] {
         for (x, y) in (0..25).map(|i| (i % 5, i / 5)) {
             placed.labels[leaf.at(x, y) as usize] = ((4 * random.below(2)) << 16) | (4 * random.below(2));
         }
@@ -181,8 +185,8 @@ fn every_shape_of_corner_is_linked() {
 fn small_and_thin_leaves_are_the_same_bit_for_bit() {
     let Some(mut rig) = Rig::new() else { return };
     for pixels_per_site in [1.0, 5.0, 16.0] {
-        let mut placed = PlacedAtlas::default();
-        small_leaves().iter().for_each(|sites| placed.add(sites, pixels_per_site));
+        let leaves = small_leaves();
+        let placed = PlacedAtlas::new(leaves.iter().map(Vec::as_slice), pixels_per_site);
         let twins = compare(&mut rig, "small leaves", &placed);
         assert_whole("small leaves", &placed, &twins);
     }
@@ -193,8 +197,7 @@ fn large_leaves_are_the_same_bit_for_bit() {
     let Some(mut rig) = Rig::new() else { return };
     let clouds: Vec<Cloud> = clouds().into_iter().chain(hard_clouds()).collect();
     for pixels_per_site in [5.0, 8.0] {
-        let mut placed = PlacedAtlas::default();
-        clouds.iter().for_each(|cloud| placed.add(&cloud.sites, pixels_per_site));
+        let placed = PlacedAtlas::new(clouds.iter().map(|cloud| cloud.sites.as_slice()), pixels_per_site);
         let twins = compare(&mut rig, "large leaves", &placed);
         assert_whole("large leaves", &placed, &twins);
     }
@@ -206,11 +209,13 @@ fn a_bad_leaf_is_flagged_and_harms_no_other() {
     let Some(mut rig) = Rig::new() else { return };
     let sites: Vec<Vec<Site>> = clouds().into_iter().map(|cloud| cloud.sites[..2000].to_vec()).collect();
     let mut placed = PlacedAtlas::default();
-    placed.add(&sites[0], 5.0);
-    placed.add_with(&THREE, TextureResolution::Side(16_000));
-    placed.add(&sites[1], 5.0);
-    placed.add(&sites[2], 5.0);
-    placed.add(&sites[3], 8.0);
+    let pixels = TextureResolution::PixelsPerSite;
+    placed.add(&sites[0], pixels(5.0));
+    placed.add(&THREE, TextureResolution::Side(16_000));
+    placed.add(&sites[1], pixels(5.0));
+    placed.add(&sites[2], pixels(5.0));
+    placed.add(&sites[3], pixels(8.0));
+    placed.place();
     // Leaf 3 is all noise.
     let noisy = placed.atlas.leaves[3];
     let pixels: Vec<u32> = sites[2].iter().map(|&site| noisy.pixel(site)).map(|[x, y]| y << 16 | x).collect();
@@ -228,8 +233,7 @@ fn a_bad_leaf_is_flagged_and_harms_no_other() {
     assert_eq!(long.records.len(), 4 * 8);
     assert!(long.records.contains(&FREE), "no edge was too long");
     for (leaf, cloud, pixels_per_site) in [(0, 0, 5.0), (2, 1, 5.0), (4, 3, 8.0)] {
-        let mut alone = PlacedAtlas::default();
-        alone.add(&sites[cloud], pixels_per_site);
+        let alone = PlacedAtlas::new([sites[cloud].as_slice()], pixels_per_site);
         let expected = make_triangles(alone.diagram(), &mut [0]);
         assert!(relative(&placed, &twins.records, leaf) == relative(&alone, &expected, 0), "leaf {leaf}");
     }
@@ -248,11 +252,11 @@ fn relative(placed: &PlacedAtlas, records: &[u32], leaf: usize) -> Vec<u32> {
 #[test]
 fn the_small_leaves_find_every_error_in_the_shaders() {
     let Some(mut rig) = Rig::new() else { return };
-    let mut placed = PlacedAtlas::default();
-    small_leaves().iter().for_each(|sites| placed.add(sites, 2.0));
-    add_patchworks(&mut placed);
+    let leaves = small_leaves();
+    let mut placed = PlacedAtlas::new(leaves.iter().map(Vec::as_slice), 2.0);
     // More than 1024 blocks.
-    (0..3).for_each(|_| placed.add_with(&THREE, TextureResolution::Side(16_000)));
+    (0..3).for_each(|_| placed.add(&THREE, TextureResolution::Side(16_000)));
+    add_patchworks(&mut placed);
     let twins = compare(&mut rig, "small leaves", &placed);
     let expected = twins.returned;
     let mut alive = Vec::new();
@@ -279,11 +283,7 @@ fn the_small_leaves_find_every_error_in_the_shaders() {
         ("starts[i] - before", "starts[i]"),
     ] {
         let (mut recording, mut found) = (placed.upload(), 0);
-        recording.atlas_vertices(&placed.atlas);
-        recording.atlas_count(&placed.atlas);
-        recording.atlas_triangles(&placed.atlas);
-        recording.flip(placed.atlas.records);
-        recording.give_back(&placed.atlas);
+        record_mesh(&mut recording, &placed.atlas);
         for command in &mut recording.commands {
             if let GpuCommand::Run(program, ..) = command
                 && program.file.starts_with("atlas/")
@@ -310,10 +310,8 @@ fn flips_stay_within_their_leaf() {
     let cloud = clouds().into_iter().find(|cloud| cloud.name == "coarse").expect("there is such a cloud");
     let near: Vec<Site> = cloud.sites[..3000].to_vec();
     let moved = |by: i32| near.iter().map(|&[x, y]| [x - by, y + by - (1 << 21)]).collect::<Vec<_>>();
-    let mut placed = PlacedAtlas::default();
-    for sites in [&near, &near, &moved(far), &moved(-far + (1 << 21)), &near] {
-        placed.add(sites, 5.0);
-    }
+    let leaves = [near.clone(), near.clone(), moved(far), moved(-far + (1 << 21)), near.clone()];
+    let placed = PlacedAtlas::new(leaves.iter().map(Vec::as_slice), 5.0);
     let mut state = FlipState::new(make_triangles(placed.diagram(), &mut [0; 5]));
     (1..=FLIP_ROUNDS).for_each(|round| flip_round(&mut state, &placed.sites, round));
     let mut meshes = BTreeSet::new();
@@ -334,9 +332,8 @@ fn flips_stay_within_their_leaf() {
 fn real_terrain_has_few_exceptions() {
     let (Some(mut rig), Some(cloud)) = (Rig::new(), real_cloud()) else { return };
     for (pixels_per_site, most) in [(5.0, 0.006), (8.0, 0.002), (16.0, 0.001)] {
-        let mut placed = PlacedAtlas::default();
-        let middle = cloud.sites.len() / 2;
-        [&cloud.sites[..middle], &cloud.sites[middle..]].iter().for_each(|sites| placed.add(sites, pixels_per_site));
+        let (west, east) = cloud.sites.split_at(cloud.sites.len() / 2);
+        let placed = PlacedAtlas::new([west, east], pixels_per_site);
         let twins = compare(&mut rig, cloud.name, &placed);
         assert_whole(cloud.name, &placed, &twins);
         let returned = ReturnedAtlas::new(&placed.atlas, &twins.returned).expect("all numbers came back");
@@ -359,8 +356,7 @@ fn real_terrain_has_few_exceptions() {
 fn the_rounds_move_few_bytes_for_a_site() {
     let Some(cloud) = real_cloud() else { return };
     for pixels_per_site in [8.0, 16.0] {
-        let mut placed = PlacedAtlas::default();
-        placed.add(&cloud.sites, pixels_per_site);
+        let placed = PlacedAtlas::new([cloud.sites.as_slice()], pixels_per_site);
         let triangles = placed.atlas.records;
         let mut state = FlipState::new(make_triangles(placed.diagram(), &mut [0]));
         let (mut dirty, mut flips) = (0, 0);
@@ -388,32 +384,69 @@ fn the_rounds_move_few_bytes_for_a_site() {
     }
 }
 
-/// Returns what steps G4 to G6 and the return record for `placed`.
+/// Records all steps on an atlas.
 fn recorded(placed: &PlacedAtlas) -> Recording {
     let mut recording = Recording::default();
-    recording.atlas_vertices(&placed.atlas);
-    recording.atlas_count(&placed.atlas);
-    recording.atlas_triangles(&placed.atlas);
-    recording.give_back(&placed.atlas);
+    recording.upload_atlas(&placed.atlas, &placed.sites);
+    recording.write_atlas_sites(&placed.atlas);
+    recording.atlas_voronoi(&placed.atlas, VoronoiMethod::Exact);
+    recording.remove_atlas_islands(&placed.atlas);
+    record_mesh(&mut recording, &placed.atlas);
     recording
 }
 
+/// Records the steps from G4 on.
+fn record_mesh(recording: &mut Recording, atlas: &Atlas) {
+    recording.atlas_vertices(atlas);
+    recording.atlas_count(atlas);
+    recording.atlas_triangles(atlas);
+    recording.flip(atlas.records);
+    recording.give_back(atlas);
+}
+
 #[test]
-fn the_steps_are_few_fixed_dispatches_with_little_traffic() {
+fn one_submission_from_sites_to_meshes_gives_what_the_twins_give() {
+    let Some(mut rig) = Rig::new() else { return };
+    let clouds = clouds();
+    let small = small_leaves();
+    let leaves = clouds.iter().map(|cloud| cloud.sites.as_slice()).chain(small.iter().map(Vec::as_slice));
+    let placed = PlacedAtlas::new(leaves, 8.0);
+    let expected = compare(&mut rig, "all leaves", &placed).returned;
+    rig.run(&recorded(&placed));
+    assert!(rig.numbers(BufferId::Returned, expected.len() as u64) == expected);
+}
+
+#[test]
+fn all_steps_are_few_fixed_dispatches_with_little_traffic() {
     let sites: Vec<Site> = clouds().swap_remove(0).sites;
-    for (pixels_per_site, most) in [(8.0, 320.0), (16.0, 420.0)] {
-        let mut placed = PlacedAtlas::default();
-        placed.add(&sites, pixels_per_site);
-        let recording = recorded(&placed);
-        assert_eq!(recording.dispatches(), 7);
+    for (pixels_per_site, most, most_in_all) in [(8.0, 320.0, 1100.0), (16.0, 420.0, 1300.0)] {
+        let placed = PlacedAtlas::new([sites.as_slice()], pixels_per_site);
+        let mut recording = recorded(&placed);
+        assert!(recording.dispatches() <= 80);
         let is_indirect = |c: &GpuCommand| matches!(c, GpuCommand::Run(_, _, WorkgroupCount::Indirect(_), _));
         assert!(!recording.commands.iter().any(is_indirect));
         assert!(recording.commands.iter().all(|c| !matches!(c, GpuCommand::Run(_, _, _, 0))), "all are counted");
-        let traffic = recording.traffic() as f64 / sites.len() as f64;
-        let back = 4.0 * ReturnedLayout::of(&placed.atlas).numbers() as f64 / sites.len() as f64;
-        eprintln!("{pixels_per_site} pixels a site: {traffic:.0} bytes of traffic a site, {back:.2} bytes come back");
-        assert!(traffic <= most, "{traffic}");
-        // A site goes up with eight bytes.
-        assert!(back + 8.0 <= 75.0, "{back}");
+        let each = |bytes: u64| bytes as f64 / sites.len() as f64;
+        let (all, dispatches) = (each(recording.traffic()), recording.dispatches());
+        // Up go the sites and the tables.
+        let uploads = recording.commands.iter().map(|command| match command {
+            GpuCommand::Upload(_, numbers) => 4 * numbers.len() as u64,
+            _ => 0,
+        });
+        let up = each(uploads.sum());
+        recording.commands.clear();
+        recording.flip(placed.atlas.records);
+        let flips = each(recording.traffic());
+        recording.commands.clear();
+        record_mesh(&mut recording, &placed.atlas);
+        let own = each(recording.traffic()) - flips;
+        let back = each(4 * ReturnedLayout::of(&placed.atlas).numbers() as u64);
+        eprintln!(
+            "{pixels_per_site} pixels a site: {dispatches} dispatches, {all:.0} bytes of traffic a site, {flips:.0} by flips, {own:.0} by \
+             G4 to G6 and the return; {up:.2} bytes go up, {back:.2} come back"
+        );
+        // The rounds of flips may take 350 bytes; what they declare is less.
+        assert!(all - flips + 350.0 <= most_in_all && own <= most);
+        assert!(up + back <= 75.0);
     }
 }
