@@ -1,6 +1,7 @@
 //! The shaders against their plain Rust twins, number by number, on any adapter. Software Vulkan is sufficient.
 
 mod atlas;
+mod atlas_costs;
 mod atlas_mesh;
 mod clouds;
 #[path = "../common/mod.rs"]
