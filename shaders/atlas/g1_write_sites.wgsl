@@ -11,7 +11,8 @@
 //
 // All ask with atomicMax, so the order of the invocations does not matter. A claim has the lower 30 bits of the complement of the site's
 // number. The upper two bits are 3 for a winner, and for every site that has its place at last, 1 for a loser that comes from the west,
-// and 0 for one that comes from the east. So winners stay, and those from the west come before those from the east.
+// and 0 for one that comes from the east. So winners stay, and those from the west come before those from the east. There are less than
+// 2^30 vertices: no adapter binds a buffer of so many sites.
 
 struct Params {
     vertices: u32,
@@ -213,6 +214,8 @@ fn settle(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_in
         }
     }
     gather(local, is_missing);
+    // All have read the word that one of them writes now.
+    storageBarrier();
     if (i & 31u) == 0u && i < params.vertices {
         missing[i / 32u] = atomicLoad(&gathered[local / 32u]);
     }
