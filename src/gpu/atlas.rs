@@ -91,7 +91,7 @@ impl AtlasLeaf {
 
 /// Returns the pixel that is `steps` lattice steps from the first one.
 fn along(steps: u32, factor: u32) -> u32 {
-    (u64::from(2 * steps + 1) * u64::from(factor) >> (FACTOR_BITS + 1)) as u32
+    ((u64::from(2 * steps + 1) * u64::from(factor)) >> (FACTOR_BITS + 1)) as u32
 }
 
 /// Which leaves are in the atlas, and where.
@@ -152,7 +152,8 @@ impl Atlas {
         let mut table = Vec::with_capacity(2 * self.blocks as usize);
         for (i, leaf) in self.leaves.iter().enumerate() {
             for y in 0..leaf.blocks_y() {
-                table.extend((0..leaf.blocks_x()).flat_map(|x| [i as u32, (y * BLOCK_SIDE) << 16 | x * BLOCK_SIDE]));
+                table
+                    .extend((0..leaf.blocks_x()).flat_map(|x| [i as u32, ((y * BLOCK_SIDE) << 16) | (x * BLOCK_SIDE)]));
             }
         }
         table

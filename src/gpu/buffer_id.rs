@@ -41,6 +41,22 @@ pub enum BufferId {
     Marks,
     /// The answers of the exact predicates, one for each four sites.
     Decisions,
+    /// The table of leaves of an atlas; see `atlas`.
+    Leaves,
+    /// The table of blocks of an atlas; see `atlas`.
+    Blocks,
+    /// For each leaf of an atlas, why it must go to the CPU; 0 if it need not.
+    Flags,
+    /// A bit for each vertex of an atlas: the site has lost its pixel to another.
+    Losers,
+    /// A bit for each vertex of an atlas: the site has no pixel.
+    Missing,
+    /// The corners of an atlas, four numbers for each 32 in a row; see `shaders/atlas/g4_vertices.wgsl`.
+    CornerRows,
+    /// The numbers of triangles in the blocks of an atlas, then their prefix sums.
+    BlockStarts,
+    /// What comes back from an atlas; see `returned`.
+    Returned,
     /// The copy of a result that the CPU reads.
     Staging,
 }

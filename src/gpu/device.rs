@@ -115,7 +115,7 @@ pub fn max_pixels(limits: &Limits) -> u64 {
 /// Returns what `limits` lack to run the shaders, or `None` if they are sufficient.
 pub fn shortage(limits: &Limits) -> Option<&'static str> {
     let needs = [
-        (limits.max_storage_buffers_per_shader_stage >= 5, "five storage buffers in a shader"),
+        (limits.max_storage_buffers_per_shader_stage >= 8, "eight storage buffers in a shader"),
         (limits.max_compute_invocations_per_workgroup >= 256, "workgroups of 256 invocations"),
         (limits.max_compute_workgroups_per_dimension >= 65_535, "65535 workgroups in a dimension"),
         (max_pixels(limits) >= 1 << 20, "buffers of 4 MiB"),
@@ -270,7 +270,7 @@ mod tests {
     fn requested_limits_never_exceed_those_of_the_adapter() {
         let weak = Limits { max_storage_buffers_per_shader_stage: 4, ..Limits::default() };
         assert!(wanted_limits(&weak).check_limits(&weak));
-        assert_eq!(shortage(&wanted_limits(&weak)), Some("five storage buffers in a shader"));
+        assert_eq!(shortage(&wanted_limits(&weak)), Some("eight storage buffers in a shader"));
         let large = Limits { max_storage_buffer_binding_size: 1 << 31, max_buffer_size: 1 << 40, ..Limits::default() };
         assert!(wanted_limits(&large).check_limits(&large));
         assert_eq!(max_pixels(&wanted_limits(&large)), 1 << 28);

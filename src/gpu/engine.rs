@@ -208,7 +208,7 @@ impl GpuEngine {
                 GpuCommand::Copy(from, to, bytes) => {
                     encoder.copy_buffer_to_buffer(buffers.get(*from)?, 0, buffers.get(*to)?, 0, *bytes);
                 }
-                GpuCommand::Run(program, _, count) => {
+                GpuCommand::Run(program, _, count, _) => {
                     let marks = marks.and_then(|marks| marks.get(runs as usize)).copied().unwrap_or_default();
                     self.encode(&mut encoder, buffers, program, *count, runs * BufferSet::STRIDE, marks)?;
                     runs += 1;
@@ -273,7 +273,7 @@ const PARAM_BYTES: u64 = 32;
 fn params(recording: &Recording) -> Vec<u8> {
     let mut bytes = Vec::new();
     for command in &recording.commands {
-        if let GpuCommand::Run(_, params, _) = command {
+        if let GpuCommand::Run(_, params, ..) = command {
             bytes.extend_from_slice(bytemuck::cast_slice(params));
             bytes.resize(bytes.len().next_multiple_of(BufferSet::STRIDE as usize), 0);
         }

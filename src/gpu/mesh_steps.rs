@@ -61,8 +61,15 @@ impl Recording {
         }
         let (workgroups, invocations) = line(triangles);
         let words = FlipMarks::of(triangles as usize).words as u32;
-        for program in [CLAIM, COMMIT, RELINK] {
-            self.run(program, [triangles, round, words, invocations, 0], workgroups);
+        for (program, bytes) in [CLAIM, COMMIT, RELINK].into_iter().zip(flip_traffic(triangles, words, round)) {
+            self.run_with_traffic(program, [triangles, round, words, invocations, 0], workgroups, bytes);
         }
     }
+}
+
+/// Returns the bytes that the three dispatches of a round stream: all records, the sites (half as many) and the claims in round 1, marks
+/// in the others. What the dirty triangles of later rounds and the flips take depends on the mesh, and is not counted.
+fn flip_traffic(triangles: u32, words: u32, round: u32) -> [u64; 3] {
+    let (all, marks) = (u64::from(triangles), 4 * u64::from(words));
+    if round == 1 { [36 * all + marks, 4 * all, 4 * all] } else { [2 * marks, marks, marks] }
 }

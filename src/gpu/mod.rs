@@ -5,6 +5,7 @@
 //! discrete Voronoi diagrams of leaves on a thread of its own. Room `voronoi` turns a diagram into a mesh and proves that mesh.
 
 pub mod atlas;
+pub mod atlas_steps;
 pub mod benefit;
 pub mod buffer_id;
 pub mod buffers;
@@ -17,9 +18,11 @@ pub mod executor;
 mod fake_engine;
 pub mod flip_marks;
 mod gpu_thread;
+pub mod leaf_flags;
 pub mod mesh_steps;
 pub mod options;
 mod prefix_sums;
+pub mod returned;
 pub mod selftest;
 pub mod steps;
 pub mod texture_size;

@@ -25,8 +25,8 @@ macro_rules! program {
         ShaderProgram {
             file: $file,
             source: concat!(
-                $(include_str!(concat!("../../shaders/", $used, ".wgsl")),)*
-                include_str!(concat!("../../shaders/", $file, ".wgsl"))
+                $(include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/shaders/", $used, ".wgsl")),)*
+                include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/shaders/", $file, ".wgsl"))
             ),
             entry: $entry,
             bindings: $bindings,
@@ -117,8 +117,9 @@ pub enum GpuCommand {
     Clear(BufferId, u64),
     /// Copy this many bytes from one buffer to another.
     Copy(BufferId, BufferId, u64),
-    /// Run a program.
-    Run(ShaderProgram, [u32; 5], WorkgroupCount),
+    /// Run a program. The last number is how many bytes of the device's memory it reads and writes at the least; 0 if nobody has
+    /// counted them.
+    Run(ShaderProgram, [u32; 5], WorkgroupCount, u64),
 }
 
 /// Rows in a band of the exact transform.
@@ -127,7 +128,7 @@ const BAND: u32 = 32;
 /// after the last round.
 pub const ISLAND_ROUNDS: usize = 8;
 /// The largest number of workgroups in one dimension.
-const MAX_WORKGROUPS: u32 = 65_535;
+pub(super) const MAX_WORKGROUPS: u32 = 65_535;
 /// The most pixels that one dispatch of step G2 works on. A longer dispatch might be taken for a hang.
 const MAX_PIXELS_PER_DISPATCH: u64 = 1 << 24;
 
@@ -181,7 +182,34 @@ impl Recording {
     }
 
     pub(super) fn run(&mut self, program: ShaderProgram, params: [u32; 5], workgroups: WorkgroupCount) {
-        self.commands.push(GpuCommand::Run(program, params, workgroups));
+        self.run_with_traffic(program, params, workgroups, 0);
+    }
+
+    /// Runs a program that reads and writes at least `bytes` bytes of the device's memory: each array that it streams, once.
+    pub(super) fn run_with_traffic(
+        &mut self,
+        program: ShaderProgram,
+        params: [u32; 5],
+        workgroups: WorkgroupCount,
+        bytes: u64,
+    ) {
+        self.commands.push(GpuCommand::Run(program, params, workgroups, bytes));
+    }
+
+    /// Returns how many bytes of the device's memory the commands read and write at the least, as far as they are counted.
+    pub fn traffic(&self) -> u64 {
+        let bytes = self.commands.iter().map(|command| match command {
+            GpuCommand::Run(_, _, _, bytes) | GpuCommand::Clear(_, bytes) => *bytes,
+            GpuCommand::Copy(_, _, bytes) => 2 * bytes,
+            GpuCommand::Upload(_, numbers) => 4 * numbers.len() as u64,
+            GpuCommand::Step(_) | GpuCommand::Reserve(..) => 0,
+        });
+        bytes.sum()
+    }
+
+    /// Returns the number of dispatches.
+    pub fn dispatches(&self) -> usize {
+        self.commands.iter().filter(|command| matches!(command, GpuCommand::Run(..))).count()
     }
 
     /// Step G1: writes the sites, each given by its pixel (y << 16 | x), into the texture.
@@ -319,7 +347,7 @@ mod tests {
         recording.count(size);
         recording.make_triangles(size, 1 << 27);
         let fixed = recording.commands.iter().filter_map(|command| match command {
-            GpuCommand::Run(_, _, WorkgroupCount::Fixed(groups)) => Some(*groups),
+            GpuCommand::Run(_, _, WorkgroupCount::Fixed(groups), _) => Some(*groups),
             _ => None,
         });
         assert!(fixed.flatten().all(|groups| (1..=MAX_WORKGROUPS).contains(&groups)));

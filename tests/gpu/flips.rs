@@ -15,9 +15,9 @@ use std::collections::BTreeSet;
 const FREE: u32 = u32::MAX;
 
 /// A mesh after the rounds, or before them.
-struct Flipped<'a> {
-    records: &'a [u32],
-    sites: &'a [Site],
+pub(crate) struct Flipped<'a> {
+    pub(crate) records: &'a [u32],
+    pub(crate) sites: &'a [Site],
 }
 
 impl Flipped<'_> {
@@ -63,7 +63,7 @@ impl Flipped<'_> {
     }
 
     /// Asserts that half-edges and their twins belong together.
-    fn assert_linked(&self, name: &str) {
+    pub(crate) fn assert_linked(&self, name: &str) {
         for h in self.half_edges() {
             let g = self.twin(h);
             assert_eq!(self.twin(g), h, "{name}: half-edge {h}");
@@ -125,6 +125,16 @@ fn compare_rounds(rig: &mut Rig, name: &str, mesh: &LinkedMesh) -> (FlipState, O
         last = last.or(is_done.then_some(round));
     }
     (twin, last)
+}
+
+/// Returns the number of inverted triangles of a mesh before all rounds of flips, the number after them, and the number of edges that
+/// are stuck then.
+pub(crate) fn stuck_after_flips(mesh: &LinkedMesh) -> [usize; 3] {
+    let mut state = FlipState::new(mesh.records.clone());
+    (1..=FLIP_ROUNDS).for_each(|round| flip_round(&mut state, &mesh.sites, round));
+    let before = Flipped { records: &mesh.records, sites: &mesh.sites };
+    let after = Flipped { records: &state.records, sites: &mesh.sites };
+    [before.inverted().len(), after.inverted().len(), after.wrong_edges().1.len()]
 }
 
 /// Compares the rounds with the twin, asserts that the mesh is whole and that what is left is marked. Returns the number of rounds that
@@ -240,7 +250,7 @@ fn the_rounds_are_fixed_grids_that_every_adapter_accepts() {
     let mut recording = Recording::default();
     recording.flip(1 << 26);
     let grids = recording.commands.iter().filter_map(|command| match command {
-        GpuCommand::Run(_, _, workgroups) => Some(workgroups),
+        GpuCommand::Run(_, _, workgroups, _) => Some(workgroups),
         _ => None,
     });
     let grids: Vec<_> = grids.collect();

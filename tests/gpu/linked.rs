@@ -1,8 +1,10 @@
 //! Linked meshes as step G6 makes them, before any flip, for the tests of flips.
 
 use gdt_batch::geometry::Site;
-use gdt_batch::geometry::predicates::{in_circle, orient2d};
+use gdt_batch::gpu::atlas::{Atlas, AtlasLeaf, BLOCK_SIDE};
+use gdt_batch::gpu::options::VoronoiMethod;
 use gdt_batch::gpu::texture_size::TextureSize;
+use gdt_batch::gpu::twins::atlas::{AtlasDiagram, make_triangles};
 use gdt_batch::gpu::twins::{self, c4_flip::AT_INFINITY};
 use std::collections::HashMap;
 
@@ -13,13 +15,6 @@ pub(crate) struct LinkedMesh {
     /// How many sites found no pixel.
     pub(crate) missing: usize,
 }
-
-/// The directions of the four arms of a corner, counterclockwise.
-const STEPS: [[i32; 2]; 4] = [[0, -1], [1, 0], [0, 1], [-1, 0]];
-const SOUTH: usize = 0;
-const EAST: usize = 1;
-const NORTH: usize = 2;
-const WEST: usize = 3;
 
 /// The sites of a texture: which site has which pixel.
 struct Placed {
@@ -56,136 +51,60 @@ fn place(sites: &[Site], pixels_per_site: f64) -> Placed {
             taken.extend([([y, x - 1], west), ([y, x], east)]);
         }
     }
-    let mut rows: Vec<_> = taken.into_iter().collect();
-    rows.sort_unstable();
-    let pixels = rows.iter().map(|&([y, x], _)| y << 16 | x).collect();
-    Placed { size: TextureSize { width, height }, sites: rows.into_iter().map(|(_, site)| site).collect(), pixels }
+    Placed::new(TextureSize { width, height }, taken)
 }
 
-/// The colours of the pixels, and which triangles each corner makes.
-struct Diagram {
-    size: TextureSize,
-    sites: Vec<Site>,
-    colours: Vec<u32>,
-    /// The number of the first triangle of each corner.
-    first: Vec<u32>,
-}
-
-impl Diagram {
-    fn colour(&self, x: i32, y: i32) -> u32 {
-        let inside = (0..self.size.width as i32).contains(&x) && (0..self.size.height as i32).contains(&y);
-        if inside { self.colours[(y * self.size.width as i32 + x) as usize] } else { self.sites.len() as u32 - 1 }
-    }
-
-    /// Returns the colours around a corner: southwest, southeast, northeast, northwest.
-    fn around(&self, [x, y]: [i32; 2]) -> [u32; 4] {
-        [self.colour(x - 1, y - 1), self.colour(x, y - 1), self.colour(x, y), self.colour(x - 1, y)]
-    }
-
-    /// Returns whether the corner has an arm to the south, east, north, west.
-    fn arms(&self, corner: [i32; 2]) -> [bool; 4] {
-        let [sw, se, ne, nw] = self.around(corner);
-        [sw != se, se != ne, ne != nw, nw != sw]
-    }
-
-    fn corners(&self) -> impl Iterator<Item = [i32; 2]> + use<> {
-        let TextureSize { width, height } = self.size;
-        (0..=height as i32).flat_map(move |y| (0..=width as i32).map(move |x| [x, y]))
-    }
-
-    fn first(&self, [x, y]: [i32; 2]) -> u32 {
-        self.first[(y * (self.size.width as i32 + 1) + x) as usize]
-    }
-
-    /// Returns whether the corner's square is cut from the southwest to the northeast.
-    fn is_cut_northeast(&self, corner: [i32; 2]) -> bool {
-        let [a, b, c, d] = self.around(corner).map(|v| self.sites[v as usize]);
-        orient2d(a, b, c) > 0 && orient2d(a, c, d) > 0 && !in_circle(a, b, c, d)
-    }
-
-    /// Returns the triangles of a corner.
-    fn triangles(&self, corner: [i32; 2]) -> Vec<[u32; 3]> {
-        let [sw, se, ne, nw] = self.around(corner);
-        let [south, _, north, west] = self.arms(corner);
-        match self.arms(corner).iter().filter(|&&arm| arm).count() {
-            3 => vec![[sw, if south { se } else { ne }, if north && west { nw } else { ne }]],
-            4 if sw == ne || se == nw => vec![],
-            4 if self.is_cut_northeast(corner) => vec![[sw, se, ne], [sw, ne, nw]],
-            4 => vec![[sw, se, nw], [se, ne, nw]],
-            _ => vec![],
-        }
-    }
-
-    /// Returns the half-edge that crosses the `arm` of a corner, or the arm with which it is connected if the corner has no triangle.
-    fn across(&self, corner: [i32; 2], arm: usize) -> Result<u32, usize> {
-        let ([sw, se, ne, nw], arms) = (self.around(corner), self.arms(corner));
-        let t = 8 * self.first(corner);
-        match arms.iter().filter(|&&arm| arm).count() {
-            2 => Err((0..4).find(|&other| other != arm && arms[other]).expect("a second arm")),
-            3 => Ok(t + [0, arms[SOUTH] as u32, 2 - arms[WEST] as u32, 2][arm]),
-            _ if sw == ne => Err([EAST, SOUTH, WEST, NORTH][arm]),
-            _ if se == nw => Err([WEST, NORTH, EAST, SOUTH][arm]),
-            _ if self.is_cut_northeast(corner) => Ok(t + [0, 1, 9, 10][arm]),
-            _ => Ok(t + [0, 8, 9, 2][arm]),
-        }
-    }
-
-    /// Follows the Voronoi edge that leaves `corner` along `arm`; returns the half-edge at its other end.
-    fn walk(&self, mut corner: [i32; 2], mut arm: usize) -> u32 {
-        loop {
-            corner = [corner[0] + STEPS[arm][0], corner[1] + STEPS[arm][1]];
-            match self.across(corner, (arm + 2) % 4) {
-                Ok(half_edge) => return half_edge,
-                Err(next) => arm = next,
-            }
-        }
+impl Placed {
+    /// Takes the site of each pixel [y, x] that has one.
+    fn new(size: TextureSize, taken: impl IntoIterator<Item = ([u32; 2], Site)>) -> Placed {
+        let mut rows: Vec<_> = taken.into_iter().collect();
+        rows.sort_unstable();
+        let pixels = rows.iter().map(|&([y, x], _)| y << 16 | x).collect();
+        Placed { size, sites: rows.into_iter().map(|(_, site)| site).collect(), pixels }
     }
 }
 
 impl LinkedMesh {
     /// Makes the mesh of the discrete Voronoi diagram of `sites` in a texture with about `pixels_per_site`.
     pub(crate) fn new(sites: &[Site], pixels_per_site: f64) -> LinkedMesh {
-        let placed = place(sites, pixels_per_site);
-        let size = placed.size;
-        let texture = twins::write_sites(size, &placed.pixels);
-        let mut labels = twins::voronoi_exact(size, &texture);
-        twins::remove_islands(size, &mut labels);
-        let colour = |label: u32| !texture[((label >> 16) * size.width + (label & 0xffff)) as usize];
-        let colours = labels.into_iter().map(colour).collect();
-        let missing = sites.len() - placed.sites.len();
-        let sites = [placed.sites.as_slice(), &[[AT_INFINITY, 0]]].concat();
-        let mut diagram = Diagram { size, sites, colours, first: Vec::new() };
-        let mut records: Vec<u32> = Vec::new();
-        for corner in diagram.corners() {
-            diagram.first.push(records.len() as u32 / 8);
-            for [a, b, c] in diagram.triangles(corner) {
-                records.extend([a, b, c, 0, u32::MAX, u32::MAX, u32::MAX, 0]);
-            }
-        }
-        for corner in diagram.corners() {
-            diagram.link(corner, &mut records);
-        }
-        LinkedMesh { records, sites: diagram.sites, missing }
+        LinkedMesh::of(place(sites, pixels_per_site), sites.len())
     }
-}
 
-impl Diagram {
-    /// Links the triangles of a corner to their neighbours.
-    fn link(&self, corner: [i32; 2], records: &mut [u32]) {
-        let count = self.triangles(corner).len();
-        if count == 0 {
-            return;
+    /// Makes the mesh of a texture in which somebody has written `count` sites; `taken` has those that are not missing, by [y, x].
+    pub(crate) fn of_texture(size: TextureSize, taken: Vec<([u32; 2], Site)>, count: usize) -> LinkedMesh {
+        LinkedMesh::of(Placed::new(size, taken), count)
+    }
+
+    fn of(placed: Placed, count: usize) -> LinkedMesh {
+        let TextureSize { width, height } = placed.size;
+        let sites = placed.sites.len() as u32;
+        let leaf = AtlasLeaf {
+            base: 0,
+            stride: (width / BLOCK_SIDE + 1) * BLOCK_SIDE,
+            width,
+            height,
+            first_site: 0,
+            sites,
+            first_record: 0,
+            first_block: 0,
+            low: [0, 0],
+            factor: 1,
+        };
+        let blocks = leaf.blocks_x() * leaf.blocks_y();
+        let pixels = blocks * BLOCK_SIDE * BLOCK_SIDE;
+        let atlas = Atlas { leaves: vec![leaf], pixels, vertices: sites + 1, records: leaf.records(), blocks };
+        let mut texture = vec![0; pixels as usize];
+        for (&pixel, i) in placed.pixels.iter().zip(0..) {
+            texture[leaf.at(pixel & 0xffff, pixel >> 16) as usize] = !i;
         }
-        for arm in (0..4).filter(|&arm| self.arms(corner)[arm]) {
-            if let Ok(half_edge) = self.across(corner, arm) {
-                records[half_edge as usize + 4] = self.walk(corner, arm);
-            }
-        }
-        if count == 2 {
-            let t = 8 * self.first(corner);
-            let (a, b) = if self.is_cut_northeast(corner) { (t + 2, t + 8) } else { (t + 1, t + 10) };
-            records[a as usize + 4] = b;
-            records[b as usize + 4] = a;
-        }
+        let mut labels = twins::atlas::voronoi(&atlas, &texture, VoronoiMethod::Exact);
+        twins::atlas::remove_islands(&atlas, &mut labels);
+        let missing = count - placed.sites.len();
+        let sites = [placed.sites.as_slice(), &[[AT_INFINITY, 0]]].concat();
+        let diagram = AtlasDiagram { atlas: &atlas, labels: &labels, texture: &texture, sites: &sites };
+        let mut records = make_triangles(diagram, &mut [0]);
+        let used = records.chunks_exact(8).take_while(|record| record[0] != u32::MAX).count();
+        records.truncate(8 * used);
+        LinkedMesh { records, sites, missing }
     }
 }

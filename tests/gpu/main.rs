@@ -1,5 +1,8 @@
 //! The shaders against their plain Rust twins, number by number, on any adapter. Software Vulkan is sufficient.
 
+mod atlas;
+mod atlas_costs;
+mod atlas_mesh;
 mod clouds;
 #[path = "../common/mod.rs"]
 mod common;
@@ -7,6 +10,7 @@ mod faults;
 mod flips;
 mod leaves;
 mod linked;
+mod placed;
 mod predicates;
 mod random;
 mod rig;

@@ -18,7 +18,7 @@ pub fn remove_islands(size: TextureSize, labels: &mut [u32]) {
 }
 
 /// Returns the pixels that have lost touch with their site, each with its new label.
-fn find(size: TextureSize, labels: &[u32]) -> Vec<(usize, u32)> {
+pub(super) fn find(size: TextureSize, labels: &[u32]) -> Vec<(usize, u32)> {
     let mut islands = Vec::new();
     for y in 0..size.height {
         for x in 0..size.width {

@@ -1,6 +1,7 @@
 //! The steps as plain loops, one file for each shader. Read them side by side with the shaders: their numbers are compared with
 //! those of the shaders one by one. They are written to be plain, not fast. Room `voronoi` has the steps that the CPU runs in jobs.
 
+pub mod atlas;
 pub mod c4_flip;
 mod g1_write_sites;
 mod g2_voronoi_exact;
