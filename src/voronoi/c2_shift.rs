@@ -10,6 +10,8 @@ use crate::voronoi::rejection::Rejection;
 
 /// If a triangle is still inverted after this many rounds of repair, the leaf is rejected.
 const ROUNDS: usize = 6;
+/// The work on holes that is allowed per site. To fill a hole takes at most the cube of the number of its sides.
+const WORK_PER_SITE: usize = 1 << 14;
 
 /// What the shift leaves to repair.
 #[derive(Default)]
@@ -21,10 +23,13 @@ pub(super) struct ShiftRepair {
     /// Vertices that were removed, each with a half-edge nearby.
     pub(super) removed: Vec<(VertexIndex, ClosedEdge)>,
     tester: EdgeTester,
+    work_left: usize,
 }
 
 impl ShiftRepair {
-    pub(super) fn clear(&mut self) {
+    /// Clears what another leaf has left; this one has `sites` sites.
+    pub(super) fn reset(&mut self, sites: usize) {
+        self.work_left = WORK_PER_SITE * (sites + 64);
         self.inverted.clear();
         self.suspects.clear();
         self.removed.clear();
@@ -144,6 +149,8 @@ impl ShiftRepair {
 
     fn remove_fan(&mut self, mesh: &mut ClosedMesh, sites: &[Site], h: ClosedEdge, even_if_inverted: bool) -> bool {
         let Some(ring) = mesh.one_ring(h) else { return false };
+        let Some(left) = self.work_left.checked_sub(ring.vertices.len().pow(3)) else { return false };
+        self.work_left = left;
         let Some(fill) = ring.fill(sites, mesh.infinity(), even_if_inverted) else { return false };
         let first = self.suspects.len();
         mesh.fill_hole(&ring, &fill, |h| self.suspects.push(h));
@@ -177,9 +184,14 @@ impl OneRing {
             let n = sides.len();
             let triple = |i: usize| [sides[i], sides[(i + 1) % n], sides[(i + 2) % n]];
             let ear = (0..n).find(|&i| self.is_ear(sites, infinity, &sides, triple(i)));
+            // A triangle with one vertex twice could become its own neighbour, which no later step expects.
+            let is_triangle = |i: usize| {
+                let [a, b, c] = triple(i).map(|side| self.vertices[side]);
+                a != b && b != c && c != a
+            };
             let last_resort = || match at_infinity {
-                0 => even_if_inverted.then_some(0),
-                _ => (0..n).find(|&i| self.vertices[triple(i)[2]] == infinity),
+                0 => (0..n).filter(|_| even_if_inverted).find(|&i| is_triangle(i)),
+                _ => (0..n).find(|&i| self.vertices[triple(i)[2]] == infinity && is_triangle(i)),
             };
             let i = ear.or_else(last_resort)?;
             ears.push(triple(i));

@@ -38,6 +38,19 @@ impl ClosedMesh {
         self.infinity = infinity;
     }
 
+    /// Clears the mesh, and returns room for the records of a mesh without slots that was made elsewhere: `length` numbers. Vertex
+    /// `infinity` is the ghost.
+    pub(super) fn start_with(&mut self, length: usize, infinity: VertexIndex) -> &mut [u32] {
+        self.reset(0, length / 16, infinity);
+        self.end = length;
+        &mut self.records[..length]
+    }
+
+    /// Lists the record of `h`, which holds no triangle, as free.
+    pub(super) fn note_free(&mut self, h: ClosedEdge) {
+        self.free.push(h);
+    }
+
     /// Returns the half-edge that stands for slot `i`. It has a twin, but no origin.
     #[inline(always)]
     pub(super) const fn slot(i: usize) -> ClosedEdge {

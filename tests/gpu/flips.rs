@@ -206,7 +206,7 @@ fn scattered(mesh: &LinkedMesh, random: &mut Random) -> LinkedMesh {
             *twin = 8 * places[*twin as usize / 8] as u32 + *twin % 8;
         }
     }
-    LinkedMesh { records, sites: mesh.sites.clone(), missing: mesh.missing }
+    LinkedMesh { records, sites: mesh.sites.clone(), block_starts: mesh.block_starts.clone(), ..*mesh }
 }
 
 /// Where no triangle is inverted, the rounds end in the one canonical triangulation, whatever the order of the records.

@@ -6,12 +6,44 @@ use gdt_batch::gpu::texture_size::TextureSize;
 use gdt_batch::gpu::twins::{self, c4_flip::AT_INFINITY};
 use std::collections::HashMap;
 
-/// A closed mesh: eight numbers for each triangle, and the site of every vertex. The last vertex is at infinity.
+/// Pixels along a side of a block.
+const BLOCK_SIDE: u32 = 32;
+
+/// A closed mesh: eight numbers for each triangle, and the site of every vertex. The last vertex is at infinity. The triangles of a block
+/// of pixels follow each other.
 pub(crate) struct LinkedMesh {
     pub(crate) records: Vec<u32>,
     pub(crate) sites: Vec<Site>,
     /// How many sites found no pixel.
     pub(crate) missing: usize,
+    /// The first record of each block.
+    pub(crate) block_starts: Vec<u32>,
+    pub(crate) grid: PixelGrid,
+}
+
+/// Which pixel a site belongs to.
+#[derive(Clone, Copy)]
+pub(crate) struct PixelGrid {
+    low: Site,
+    scale: f64,
+    size: TextureSize,
+}
+
+impl PixelGrid {
+    fn pixel(&self, site: Site) -> [u32; 2] {
+        [0, 1].map(|k| ((f64::from(site[k]) - f64::from(self.low[k])) * self.scale) as u32)
+    }
+
+    /// Returns the number of blocks in a row, and of rows. They have room for one more row and column of pixels.
+    fn blocks(&self) -> [u32; 2] {
+        [self.size.width, self.size.height].map(|pixels| pixels / BLOCK_SIDE + 1)
+    }
+
+    /// Returns the number of the block that a site belongs to.
+    pub(crate) fn block(&self, site: Site) -> u32 {
+        let [x, y] = self.pixel(site).map(|c| c / BLOCK_SIDE);
+        y * self.blocks()[0] + x
+    }
 }
 
 /// The directions of the four arms of a corner, counterclockwise.
@@ -23,7 +55,7 @@ const WEST: usize = 3;
 
 /// The sites of a texture: which site has which pixel.
 struct Placed {
-    size: TextureSize,
+    grid: PixelGrid,
     sites: Vec<Site>,
     pixels: Vec<u32>,
 }
@@ -37,7 +69,8 @@ fn place(sites: &[Site], pixels_per_site: f64) -> Placed {
     let extent = [0, 1].map(|k| f64::from(most[k]) - f64::from(least[k]) + 1.0);
     let scale = (sites.len() as f64 * pixels_per_site / (extent[0] * extent[1])).sqrt();
     let [width, height] = extent.map(|length| (length * scale).ceil().max(1.0) as u32);
-    let pixel = |site: Site| [0, 1].map(|k| ((f64::from(site[k]) - f64::from(least[k])) * scale) as u32);
+    let grid = PixelGrid { low: least, scale, size: TextureSize { width, height } };
+    let pixel = |site: Site| grid.pixel(site);
     let mut taken = HashMap::new();
     let mut losers = Vec::new();
     for &site in sites {
@@ -59,7 +92,7 @@ fn place(sites: &[Site], pixels_per_site: f64) -> Placed {
     let mut rows: Vec<_> = taken.into_iter().collect();
     rows.sort_unstable();
     let pixels = rows.iter().map(|&([y, x], _)| y << 16 | x).collect();
-    Placed { size: TextureSize { width, height }, sites: rows.into_iter().map(|(_, site)| site).collect(), pixels }
+    Placed { grid, sites: rows.into_iter().map(|(_, site)| site).collect(), pixels }
 }
 
 /// The colours of the pixels, and which triangles each corner makes.
@@ -88,13 +121,18 @@ impl Diagram {
         [sw != se, se != ne, ne != nw, nw != sw]
     }
 
-    fn corners(&self) -> impl Iterator<Item = [i32; 2]> + use<> {
+    fn corners_of_block(&self, [left, bottom]: [u32; 2]) -> impl Iterator<Item = [i32; 2]> + use<> {
         let TextureSize { width, height } = self.size;
-        (0..=height as i32).flat_map(move |y| (0..=width as i32).map(move |x| [x, y]))
+        let ys = bottom..(bottom + BLOCK_SIDE).min(height + 1);
+        ys.flat_map(move |y| (left..(left + BLOCK_SIDE).min(width + 1)).map(move |x| [x as i32, y as i32]))
     }
 
-    fn first(&self, [x, y]: [i32; 2]) -> u32 {
-        self.first[(y * (self.size.width as i32 + 1) + x) as usize]
+    fn at(&self, [x, y]: [i32; 2]) -> usize {
+        (y * (self.size.width as i32 + 1) + x) as usize
+    }
+
+    fn first(&self, corner: [i32; 2]) -> u32 {
+        self.first[self.at(corner)]
     }
 
     /// Returns whether the corner's square is cut from the southwest to the northeast.
@@ -146,7 +184,7 @@ impl LinkedMesh {
     /// Makes the mesh of the discrete Voronoi diagram of `sites` in a texture with about `pixels_per_site`.
     pub(crate) fn new(sites: &[Site], pixels_per_site: f64) -> LinkedMesh {
         let placed = place(sites, pixels_per_site);
-        let size = placed.size;
+        let (grid, size) = (placed.grid, placed.grid.size);
         let texture = twins::write_sites(size, &placed.pixels);
         let mut labels = twins::voronoi_exact(size, &texture);
         twins::remove_islands(size, &mut labels);
@@ -154,18 +192,25 @@ impl LinkedMesh {
         let colours = labels.into_iter().map(colour).collect();
         let missing = sites.len() - placed.sites.len();
         let sites = [placed.sites.as_slice(), &[[AT_INFINITY, 0]]].concat();
-        let mut diagram = Diagram { size, sites, colours, first: Vec::new() };
-        let mut records: Vec<u32> = Vec::new();
-        for corner in diagram.corners() {
-            diagram.first.push(records.len() as u32 / 8);
-            for [a, b, c] in diagram.triangles(corner) {
-                records.extend([a, b, c, 0, u32::MAX, u32::MAX, u32::MAX, 0]);
+        let corners = (size.width as usize + 1) * (size.height as usize + 1);
+        let mut diagram = Diagram { size, sites, colours, first: vec![0; corners] };
+        let (mut records, mut block_starts): (Vec<u32>, _) = (Vec::new(), Vec::new());
+        let [blocks_x, blocks_y] = grid.blocks();
+        let blocks = (0..blocks_y).flat_map(|y| (0..blocks_x).map(move |x| [x, y].map(|c| c * BLOCK_SIDE)));
+        for block in blocks.clone() {
+            block_starts.push(records.len() as u32 / 8);
+            for corner in diagram.corners_of_block(block) {
+                let at = diagram.at(corner);
+                diagram.first[at] = records.len() as u32 / 8;
+                for [a, b, c] in diagram.triangles(corner) {
+                    records.extend([a, b, c, 0, u32::MAX, u32::MAX, u32::MAX, 0]);
+                }
             }
         }
-        for corner in diagram.corners() {
+        for corner in blocks.flat_map(|block| diagram.corners_of_block(block)) {
             diagram.link(corner, &mut records);
         }
-        LinkedMesh { records, sites: diagram.sites, missing }
+        LinkedMesh { records, sites: diagram.sites, missing, block_starts, grid }
     }
 }
 

@@ -3,8 +3,10 @@
 mod clouds;
 #[path = "../common/mod.rs"]
 mod common;
+mod device_mesh;
 mod faults;
 mod flips;
+mod instant;
 mod leaves;
 mod linked;
 mod predicates;
