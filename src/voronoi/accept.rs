@@ -90,13 +90,16 @@ impl AcceptanceCheck {
         let n = sites.len();
         let used = &mut self.used[..n];
         let mut inverted = false;
-        for (record, triangle) in block.chunks_exact(8).zip(triangles) {
+        let fetched = &mut self.tester.corners;
+        for ((record, triangle), fetched) in block.as_chunks::<8>().0.iter().zip(triangles).zip(fetched) {
             let corners = [record[0], record[1], record[2]];
             if corners[0].max(corners[1]).max(corners[2]) >= n as u32 {
                 return Err(Rejection::NotAccepted("a corner is no site"));
             }
             let [a, b, c] = [corners[0] as usize, corners[1] as usize, corners[2] as usize];
-            inverted |= orient2d(sites[a], sites[b], sites[c]) <= 0;
+            let [p, q, r] = [sites[a], sites[b], sites[c]];
+            *fetched = [p, q, r];
+            inverted |= orient2d(p, q, r) <= 0;
             (used[a], used[b], used[c]) = (true, true, true);
             *triangle = [position(a), position(b), position(c)];
         }
@@ -108,7 +111,7 @@ impl AcceptanceCheck {
 
     /// Numbers the twins as in a half-edge mesh, and notes the hull for point 3.
     fn write_twins(&mut self, block: &[u32], front: u32, twins: &mut [HalfEdgeIndex]) {
-        for (record, twins) in block.chunks_exact(8).zip(twins.chunks_exact_mut(3)) {
+        for (record, twins) in block.as_chunks::<8>().0.iter().zip(twins.as_chunks_mut::<3>().0) {
             for i in 0..3 {
                 let g = record[4 + i];
                 twins[i] = HalfEdgeIndex((g.wrapping_sub(front) >> 3).wrapping_mul(3).wrapping_add(g & 7));

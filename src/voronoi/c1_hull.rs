@@ -14,9 +14,9 @@ const NEIGHBOURS: usize = 6;
 const MAX_ROUNDS: usize = 12;
 /// In the first rounds, vertices are removed only where that leaves a clean hole.
 const CLEAN_ROUNDS: usize = 4;
-/// Looking for a vertex walks around the hull. If all walks together take more steps for each site than this, the leaf is rejected: on
-/// narrow curves nearly all sites are on the hull, and most of them are removed.
-const STEPS_PER_SITE: usize = 64 + 2 * MAX_ROUNDS;
+/// If all walks around the hull, and what fills pockets, take more steps for each site than this, the leaf is rejected. Each vertex that is
+/// removed takes a walk: on narrow curves nearly all sites are on the hull, and most of them are removed.
+const STEPS_PER_SITE: usize = 64 + 3 * MAX_ROUNDS;
 /// So many records are looked at in the time of a step.
 const RECORDS_PER_STEP: usize = 16;
 
@@ -26,7 +26,7 @@ pub(super) fn complete_hull(mesh: &mut ClosedMesh, sites: &[Site], shift: &mut S
     let mut walker = HullWalker { near: mesh.front(), steps_left: STEPS_PER_SITE * sites.len() };
     for round in 0..MAX_ROUNDS {
         let rays = walker.rays(mesh)?;
-        let blocked = fill_pockets(mesh, sites, rays, shift);
+        let blocked = fill_pockets(mesh, sites, rays, shift, &mut walker)?;
         let hull = HullLoop::new(mesh, &walker.rays(mesh)?);
         if blocked.is_empty() && hull.turns_once(sites) {
             return Ok(());
@@ -52,7 +52,8 @@ fn fill_pockets(
     sites: &[Site],
     mut rays: Vec<ClosedEdge>,
     shift: &mut ShiftRepair,
-) -> Vec<VertexIndex> {
+    walker: &mut HullWalker,
+) -> Result<Vec<VertexIndex>, Rejection> {
     let mut blocked = Vec::new();
     while let Some(h) = rays.pop() {
         // A flip moves half-edges, so one in the list need no longer start at infinity.
@@ -63,12 +64,13 @@ fn fill_pockets(
             blocked.push(mesh.destination(h));
             continue;
         }
+        walker.spend(1)?;
         let g = mesh.twin(h);
         mesh.flip(h);
         shift.suspects.extend([g, g.previous()]);
         rays.extend([h, mesh.twin(h.previous())]);
     }
-    blocked
+    Ok(blocked)
 }
 
 /// Walks around the hull.
@@ -102,8 +104,7 @@ impl HullWalker {
             self.near = triangles.find(|&t| mesh.is_ghost(t)).ok_or(Rejection::NotAccepted("no hull"))?;
             self.spend(self.near.get() / 8 / RECORDS_PER_STEP)?;
         }
-        let mut sides = self.near.triangle().sides().into_iter();
-        sides.find(|&h| mesh.origin(h) == mesh.infinity()).ok_or(Rejection::NotAccepted("no hull"))
+        mesh.ray(self.near).ok_or(Rejection::NotAccepted("no hull"))
     }
 
     /// Returns the half-edge that starts at `vertex` and runs along the hull, if the vertex is on the hull.

@@ -58,9 +58,6 @@ fn insert(
     if let Some(side) = place.on {
         let h = sides[side.corner()];
         let g = mesh.twin(h);
-        if mesh.apex(g) == vertex {
-            return Err(Rejection::NotAccepted("two sites in one place"));
-        }
         mesh.flip(h);
         flips.suspects.extend([h, h.previous(), g, g.previous()]);
     }

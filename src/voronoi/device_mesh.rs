@@ -1,13 +1,9 @@
 //! The mesh that a device has made of a leaf: steps G1 to G6, C2's test and most flips of C4. This takes the place of those steps, and
 //! what the device has left goes through the others.
 //!
-//! The device need not be trusted. Here every number is checked that the steps use as an index. After that the records are a closed
-//! surface in the sense of `closed_mesh`:
-//! - each half-edge has another one as its twin, which has it as its twin, and both have the same two ends;
-//! - the corners of a triangle are three different vertices.
-//!
-//! The steps keep that up whatever the sites are, so they never look at a record without a triangle. Where their work depends on what the
-//! device has made, it is counted and bounded. `accept` proves the result.
+//! The device need not be trusted. Here every number is checked that the steps use as an index: a corner must be a vertex, a twin a
+//! half-edge. The steps write nothing else either, so no index is ever out of bounds. The links between the triangles are left to `accept`,
+//! which proves the result. If they are wrong, the steps make nonsense, in a time that is bounded: walks, flips and repairs are counted.
 
 use crate::geometry::Site;
 use crate::geometry::lattice::REACH;
@@ -17,11 +13,14 @@ use crate::voronoi::closed_mesh::ClosedMesh;
 use crate::voronoi::g1_write_sites::MAX_MISSING;
 use crate::voronoi::index::{ClosedEdge, VertexIndex};
 use crate::voronoi::rejection::Rejection;
+use multiversion::multiversion;
 
 /// If more triangles than one for so many sites are inverted, the leaf is rejected: C2 would take too long.
 const SITES_PER_INVERTED: usize = 8;
 /// Small leaves may have as many inverted triangles.
 const FEW: usize = 64;
+/// So many records are copied at a time.
+const PART: usize = 256;
 
 /// What a device returns for a leaf. Sites have the numbers of their positions in the input. The vertex at infinity comes after them.
 #[derive(Clone, Copy)]
@@ -75,21 +74,20 @@ impl<'a> DeviceMesh<'a> {
         if !rest.is_empty() || records.len() > 4 * n {
             return Err(wrong);
         }
-        let infinity = VertexIndex(n as u32);
-        let room = mesh.start_with(8 * records.len(), infinity);
-        let mut is_whole = true;
-        let mut free = Vec::new();
-        for (t, (record, copy)) in (0..).step_by(8).map(ClosedEdge).zip(records.iter().zip(room.as_chunks_mut().0)) {
-            *copy = *record;
-            if record[0] == VertexIndex::NONE.0 {
-                is_whole &= !has_twin(records.as_flattened(), t, record);
-                free.push(t);
-            } else {
-                is_whole &= fits(records.as_flattened(), t, record, infinity);
+        let limits = Limits { infinity: n as u32, end: 8 * records.len() as u32 };
+        let room = mesh.start_with(8 * records.len(), VertexIndex(n as u32)).as_chunks_mut().0;
+        let parts = records.chunks(PART).zip(room.chunks_mut(PART));
+        let strange = parts.map(|(records, room)| !copy(records, room, limits)).collect::<Vec<bool>>();
+        for (part, _) in strange.into_iter().enumerate().filter(|&(_, is_strange)| is_strange) {
+            for (t, record) in (0..).step_by(8).map(ClosedEdge).zip(records).skip(part * PART).take(PART) {
+                match record[0] == VertexIndex::NONE.0 {
+                    true => mesh.release(t),
+                    false if copy(&[*record], &mut [[0; 8]], limits) => (),
+                    false => return Err(wrong),
+                }
             }
         }
-        free.into_iter().for_each(|t| mesh.note_free(t));
-        if is_whole { Ok(()) } else { Err(wrong) }
+        Ok(())
     }
 
     /// Lists the inverted triangles, and the edges that may not be Delaunay.
@@ -125,25 +123,30 @@ impl<'a> DeviceMesh<'a> {
     }
 }
 
-/// Returns whether the triangle `t` of a mesh with `records` has three corners, and twins that fit.
-#[inline(always)]
-fn fits(records: &[u32], t: ClosedEdge, record: &[u32; 8], infinity: VertexIndex) -> bool {
-    let [a, b, c, _, twins @ .., _] = *record;
-    let mut fits = (a.max(b).max(c) <= infinity.0) & (a != b) & (b != c) & (c != a);
-    for (i, (g, end)) in (0..).zip(twins.into_iter().zip([b, c, a])) {
-        // A corner of the neighbour, or the unused number, would be taken for a twin otherwise.
-        let there = records.get(g as usize).is_some_and(|&origin| origin == end);
-        let back = records.get(g as usize + 4).is_some_and(|&twin| twin == t.0 + i);
-        fits &= there & back & (g & 7 < 3);
-    }
-    fits
+/// What the numbers of a record may be.
+#[derive(Clone, Copy)]
+struct Limits {
+    /// The greatest number of a vertex.
+    infinity: u32,
+    /// The number after the last half-edge.
+    end: u32,
 }
 
-/// Returns whether some half-edge takes one of the record `t`, which holds no triangle, for its twin, and the other way round.
-#[cold]
-fn has_twin(records: &[u32], t: ClosedEdge, record: &[u32; 8]) -> bool {
-    let links = t.sides().into_iter().zip(&record[4..7]);
-    links.into_iter().any(|(h, &g)| records.get(g as usize).is_some() && records.get(g as usize + 4) == Some(&h.0))
+/// Copies records; returns whether their corners are vertices and their twins half-edges.
+#[multiversion(targets("x86_64+avx2"), attrs(inline(never)))]
+fn copy(records: &[[u32; 8]], room: &mut [[u32; 8]], limits: Limits) -> bool {
+    let (v, h) = (limits.infinity, limits.end - 1);
+    // The unused numbers may be anything.
+    let greatest = [v, v, v, u32::MAX, h, h, h, u32::MAX];
+    let corner = [0, 0, 0, 0, 7, 7, 7, 0];
+    let mut strange = [false; 8];
+    for (record, room) in records.iter().zip(room) {
+        *room = *record;
+        for i in 0..8 {
+            strange[i] |= (record[i].max(greatest[i]) != greatest[i]) | (record[i] & corner[i] > 2);
+        }
+    }
+    strange == [false; 8]
 }
 
 /// Returns the numbers of the bits that are set.
