@@ -300,18 +300,22 @@ impl ClosedMesh {
     /// Removes the ghosts around the hull and the free records, and marks the hull.
     pub(super) fn compact(&mut self) {
         let mut holes = std::mem::take(&mut self.free);
+        let mut outsides = Vec::new();
         if let Some(first) = self.triangles().find(|&t| self.is_ghost(t)).and_then(|t| self.ray(t)) {
             let mut ray = first;
             for _ in self.triangles() {
-                let outside = self.twin(ray.next());
-                if self.corners(outside).is_some_and(|c| !c.contains(&self.infinity)) {
-                    self.set_twin(outside, ClosedEdge::OUTSIDE);
-                }
+                outsides.push(self.twin(ray.next()));
                 holes.push(ray.triangle());
                 ray = self.twin(ray.previous());
                 if ray == first {
                     break;
                 }
+            }
+        }
+        // Nothing is marked before the walk has ended, because marks lead nowhere.
+        for outside in outsides {
+            if self.corners(outside).is_some_and(|c| !c.contains(&self.infinity)) {
+                self.set_twin(outside, ClosedEdge::OUTSIDE);
             }
         }
         self.close_gaps(&mut holes);

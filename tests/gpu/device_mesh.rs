@@ -302,11 +302,12 @@ fn a_device_that_goes_wrong_never_makes_a_wrong_mesh() {
     let mut random = Random(0x5eed);
     let mut buffers = PipelineBuffers::default();
     let (mut accepted, mut rejected) = (0, 0);
-    for (count, pixels_per_site) in [(4, 16.0), (12, 8.0), (60, 3.0), (400, 12.0), (1500, 6.0)] {
+    let cases = [(4, 16.0, 200), (12, 8.0, 200), (60, 3.0, 200), (400, 12.0, 50), (1500, 6.0, 20)];
+    for (count, pixels_per_site, rounds) in cases {
         for sites in [uniform(&mut random, count), heaps(&mut random, count)] {
             let (expected, answer) = (on_cpu(&sites), Answer::new(&sites, pixels_per_site));
             for (name, fault) in FAULTS {
-                for _ in 0..40 {
+                for _ in 0..rounds {
                     let mut wrong = answer.clone();
                     fault(&mut wrong, &mut random);
                     match wrong.complete(&sites, &mut buffers) {
