@@ -16,7 +16,7 @@ const MAX_ROUNDS: usize = 12;
 const CLEAN_ROUNDS: usize = 4;
 /// If all walks around the hull, and what fills pockets, take more steps for each site than this, the leaf is rejected. Each vertex that is
 /// removed takes a walk: on narrow curves nearly all sites are on the hull, and most of them are removed.
-const STEPS_PER_SITE: usize = 64 + 3 * MAX_ROUNDS;
+const STEPS_PER_SITE: usize = 70;
 /// So many records are looked at in the time of a step.
 const RECORDS_PER_STEP: usize = 16;
 
