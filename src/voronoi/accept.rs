@@ -42,15 +42,14 @@ pub(super) struct AcceptanceCheck {
 
 impl AcceptanceCheck {
     /// Checks the compacted triangles of `closed` over `sites` and writes them to `mesh`. The corners of `mesh` are positions in the
-    /// input, which `order` lists by vertex.
+    /// input, which `order` lists by vertex unless they are the vertices' numbers.
     pub(super) fn accept(
         &mut self,
         closed: &ClosedMesh,
         sites: &[Site],
-        order: &[SiteIndex],
+        order: Option<&[SiteIndex]>,
         mesh: &mut HalfEdgeMesh,
     ) -> Result<(), Rejection> {
-        let sites = &sites[..order.len()];
         let (n, front, records) = (sites.len(), closed.front().get(), closed.records());
         let triangles = (records.len() - front) / 8;
         self.used.clear();
@@ -62,7 +61,11 @@ impl AcceptanceCheck {
         for start in (front..records.len()).step_by(EdgeTester::BLOCK) {
             let end = records.len().min(start + EdgeTester::BLOCK);
             let first = (start - front) / 8;
-            self.write_triangles(&records[start..end], sites, order, &mut mesh.triangles[first..])?;
+            let (block, triangles) = (&records[start..end], &mut mesh.triangles[first..]);
+            match order.map(|order| &order[..n]) {
+                Some(order) => self.write_triangles(block, sites, |v| order[v], triangles)?,
+                None => self.write_triangles(block, sites, SiteIndex::new, triangles)?,
+            }
             self.write_twins(&records[start..end], front as u32, &mut mesh.twins[3 * first..]);
             links += self.check_edges(closed, sites, start, end)?;
         }
@@ -76,25 +79,29 @@ impl AcceptanceCheck {
     }
 
     /// Checks point 1, and notes the corners for point 4.
+    #[inline(always)]
     fn write_triangles(
         &mut self,
         block: &[u32],
         sites: &[Site],
-        order: &[SiteIndex],
+        position: impl Fn(usize) -> SiteIndex,
         triangles: &mut [[SiteIndex; 3]],
     ) -> Result<(), Rejection> {
         let n = sites.len();
-        let (order, used) = (&order[..n], &mut self.used[..n]);
+        let used = &mut self.used[..n];
         let mut inverted = false;
-        for (record, triangle) in block.chunks_exact(8).zip(triangles) {
+        let fetched = &mut self.tester.corners;
+        for ((record, triangle), fetched) in block.as_chunks::<8>().0.iter().zip(triangles).zip(fetched) {
             let corners = [record[0], record[1], record[2]];
             if corners[0].max(corners[1]).max(corners[2]) >= n as u32 {
                 return Err(Rejection::NotAccepted("a corner is no site"));
             }
             let [a, b, c] = [corners[0] as usize, corners[1] as usize, corners[2] as usize];
-            inverted |= orient2d(sites[a], sites[b], sites[c]) <= 0;
+            let [p, q, r] = [sites[a], sites[b], sites[c]];
+            *fetched = [p, q, r];
+            inverted |= orient2d(p, q, r) <= 0;
             (used[a], used[b], used[c]) = (true, true, true);
-            *triangle = [order[a], order[b], order[c]];
+            *triangle = [position(a), position(b), position(c)];
         }
         match inverted {
             true => Err(Rejection::NotAccepted("a triangle is not counterclockwise")),
@@ -104,7 +111,7 @@ impl AcceptanceCheck {
 
     /// Numbers the twins as in a half-edge mesh, and notes the hull for point 3.
     fn write_twins(&mut self, block: &[u32], front: u32, twins: &mut [HalfEdgeIndex]) {
-        for (record, twins) in block.chunks_exact(8).zip(twins.chunks_exact_mut(3)) {
+        for (record, twins) in block.as_chunks::<8>().0.iter().zip(twins.as_chunks_mut::<3>().0) {
             for i in 0..3 {
                 let g = record[4 + i];
                 twins[i] = HalfEdgeIndex((g.wrapping_sub(front) >> 3).wrapping_mul(3).wrapping_add(g & 7));

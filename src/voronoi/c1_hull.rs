@@ -14,25 +14,28 @@ const NEIGHBOURS: usize = 6;
 const MAX_ROUNDS: usize = 12;
 /// In the first rounds, vertices are removed only where that leaves a clean hole.
 const CLEAN_ROUNDS: usize = 4;
-/// Looking for a vertex walks around the hull. If all walks together take more steps for each site than this, the leaf is rejected: on
-/// narrow curves nearly all sites are on the hull, and most of them are removed.
-const STEPS_PER_SITE: usize = 64;
+/// If all walks around the hull, and what fills pockets, take more steps for each site than this, the leaf is rejected. Each vertex that is
+/// removed takes a walk: on narrow curves nearly all sites are on the hull, and most of them are removed.
+const STEPS_PER_SITE: usize = 70;
+/// So many records are looked at in the time of a step.
+const RECORDS_PER_STEP: usize = 16;
 
 /// Makes the hull convex. `shift` records what changes and which vertices are removed: where thin regions reach the frame, vertices
 /// that belong inside may be on the hull.
 pub(super) fn complete_hull(mesh: &mut ClosedMesh, sites: &[Site], shift: &mut ShiftRepair) -> Result<(), Rejection> {
-    let mut steps = STEPS_PER_SITE * sites.len();
+    let mut walker = HullWalker { near: mesh.front(), steps_left: STEPS_PER_SITE * sites.len() };
     for round in 0..MAX_ROUNDS {
-        let rays = rays(mesh)?;
-        let blocked = fill_pockets(mesh, sites, rays, shift);
-        let hull = HullLoop::new(mesh)?;
+        let rays = walker.rays(mesh)?;
+        let blocked = fill_pockets(mesh, sites, rays, shift, &mut walker)?;
+        let hull = HullLoop::new(mesh, &walker.rays(mesh)?);
         if blocked.is_empty() && hull.turns_once(sites) {
             return Ok(());
         }
         let before = shift.removed.len();
         for vertex in hull.sharp_corners(sites, round >= 2).chain(blocked) {
-            let walked = remove(mesh, sites, vertex, shift, round >= CLEAN_ROUNDS);
-            steps = steps.checked_sub(walked).ok_or(Rejection::NotAccepted("too many vertices must leave the hull"))?;
+            if let Some(h) = walker.outgoing(mesh, vertex)? {
+                shift.remove(mesh, sites, h, round >= CLEAN_ROUNDS);
+            }
         }
         shift.repair(mesh, sites)?;
         if shift.removed.len() == before && round > CLEAN_ROUNDS {
@@ -49,7 +52,8 @@ fn fill_pockets(
     sites: &[Site],
     mut rays: Vec<ClosedEdge>,
     shift: &mut ShiftRepair,
-) -> Vec<VertexIndex> {
+    walker: &mut HullWalker,
+) -> Result<Vec<VertexIndex>, Rejection> {
     let mut blocked = Vec::new();
     while let Some(h) = rays.pop() {
         // A flip moves half-edges, so one in the list need no longer start at infinity.
@@ -60,35 +64,71 @@ fn fill_pockets(
             blocked.push(mesh.destination(h));
             continue;
         }
+        walker.spend(1)?;
         let g = mesh.twin(h);
         mesh.flip(h);
         shift.suspects.extend([g, g.previous()]);
         rays.extend([h, mesh.twin(h.previous())]);
     }
-    blocked
+    Ok(blocked)
 }
 
-/// Removes `vertex` if it is still on the hull. Returns the number of vertices of the hull.
-fn remove(
-    mesh: &mut ClosedMesh,
-    sites: &[Site],
-    vertex: VertexIndex,
-    shift: &mut ShiftRepair,
-    even_if_inverted: bool,
-) -> usize {
-    let rays = rays(mesh).unwrap_or_default();
-    if let Some(&h) = rays.iter().find(|&&h| mesh.destination(h) == vertex) {
-        shift.remove(mesh, sites, h.next(), even_if_inverted);
+/// Walks around the hull.
+struct HullWalker {
+    /// A half-edge of a triangle that may be a ghost still.
+    near: ClosedEdge,
+    /// The steps that are left to all walks.
+    steps_left: usize,
+}
+
+impl HullWalker {
+    /// Returns all half-edges that start at infinity, clockwise around the hull.
+    fn rays(&mut self, mesh: &ClosedMesh) -> Result<Vec<ClosedEdge>, Rejection> {
+        let first = self.first_ray(mesh)?;
+        let mut rays = vec![first];
+        loop {
+            let ray = mesh.twin(rays[rays.len() - 1].previous());
+            self.spend(1)?;
+            if ray == first {
+                // The other side of the hull is safe from what the caller does at the first ray.
+                self.near = rays[rays.len() / 2];
+                return Ok(rays);
+            }
+            rays.push(ray);
+        }
     }
-    rays.len()
+
+    fn first_ray(&mut self, mesh: &ClosedMesh) -> Result<ClosedEdge, Rejection> {
+        if !mesh.is_ghost(self.near) {
+            let mut triangles = mesh.triangles();
+            self.near = triangles.find(|&t| mesh.is_ghost(t)).ok_or(Rejection::NotAccepted("no hull"))?;
+            self.spend(self.near.get() / 8 / RECORDS_PER_STEP)?;
+        }
+        mesh.ray(self.near).ok_or(Rejection::NotAccepted("no hull"))
+    }
+
+    /// Returns the half-edge that starts at `vertex` and runs along the hull, if the vertex is on the hull.
+    fn outgoing(&mut self, mesh: &ClosedMesh, vertex: VertexIndex) -> Result<Option<ClosedEdge>, Rejection> {
+        let rays = self.rays(mesh)?;
+        let found = rays.iter().position(|&h| mesh.destination(h) == vertex);
+        // The triangles of the vertex may go.
+        self.near = rays[(found.unwrap_or(0) + rays.len() / 2) % rays.len()];
+        Ok(found.map(|at| rays[at].next()))
+    }
+
+    fn spend(&mut self, steps: usize) -> Result<(), Rejection> {
+        let left = self.steps_left.checked_sub(steps);
+        self.steps_left = left.ok_or(Rejection::NotAccepted("too many vertices must leave the hull"))?;
+        Ok(())
+    }
 }
 
 /// The vertices of the hull, counterclockwise.
 struct HullLoop(Vec<VertexIndex>);
 
 impl HullLoop {
-    fn new(mesh: &ClosedMesh) -> Result<HullLoop, Rejection> {
-        Ok(HullLoop(rays(mesh)?.iter().rev().map(|&h| mesh.destination(h)).collect()))
+    fn new(mesh: &ClosedMesh, rays: &[ClosedEdge]) -> HullLoop {
+        HullLoop(rays.iter().rev().map(|&h| mesh.destination(h)).collect())
     }
 
     /// Returns every vertex together with the one before it and the one after it.
@@ -112,25 +152,6 @@ impl HullLoop {
         };
         let range = if with_neighbours { 0..3 } else { 1..2 };
         self.corners().filter(is_sharp).flat_map(move |corner| range.clone().map(move |i| corner[i]))
-    }
-}
-
-/// Returns all half-edges that start at infinity, clockwise around the hull.
-fn rays(mesh: &ClosedMesh) -> Result<Vec<ClosedEdge>, Rejection> {
-    let infinity = mesh.infinity();
-    let ghost = mesh.triangles().find(|&t| mesh.is_ghost(t)).ok_or(Rejection::NotAccepted("no hull"))?;
-    let first = ghost.sides().into_iter().find(|&h| mesh.origin(h) == infinity).unwrap_or(ghost);
-    let mut rays = vec![first];
-    let mut ray = first;
-    loop {
-        ray = mesh.twin(ray.previous());
-        if ray == first {
-            return Ok(rays);
-        }
-        if rays.len() > mesh.len() {
-            return Err(Rejection::NotAccepted("the hull has no end"));
-        }
-        rays.push(ray);
     }
 }
 

@@ -10,6 +10,10 @@ use crate::voronoi::rejection::Rejection;
 
 /// If a triangle is still inverted after this many rounds of repair, the leaf is rejected.
 const ROUNDS: usize = 6;
+/// The work that is allowed per site, in units of about a nanosecond.
+const WORK_PER_SITE: usize = 1 << 12;
+/// The work on a triangle, or on a hole with few sides.
+const WORK: usize = 1 << 9;
 
 /// What the shift leaves to repair.
 #[derive(Default)]
@@ -21,10 +25,13 @@ pub(super) struct ShiftRepair {
     /// Vertices that were removed, each with a half-edge nearby.
     pub(super) removed: Vec<(VertexIndex, ClosedEdge)>,
     tester: EdgeTester,
+    work_left: usize,
 }
 
 impl ShiftRepair {
-    pub(super) fn clear(&mut self) {
+    /// Clears what another leaf has left; this one has `sites` sites.
+    pub(super) fn reset(&mut self, sites: usize) {
+        self.work_left = WORK_PER_SITE * (sites + 64);
         self.inverted.clear();
         self.suspects.clear();
         self.removed.clear();
@@ -44,8 +51,14 @@ impl ShiftRepair {
         let mut start = start;
         while start + EdgeTester::BLOCK <= records.len() || (all && start < records.len()) {
             let end = records.len().min(start + EdgeTester::BLOCK);
-            for t in (start as u32..end as u32).step_by(8).map(ClosedEdge) {
-                if is_inverted(mesh, sites, t) {
+            let infinity = mesh.infinity().0;
+            let triangles = (start as u32..).step_by(8).map(ClosedEdge).zip(records[start..end].as_chunks::<8>().0);
+            for ((t, record), fetched) in triangles.zip(&mut self.tester.corners) {
+                let [a, b, c, ..] = *record;
+                *fetched = [a, b, c].map(|v| sites[v as usize]);
+                let [p, q, r] = *fetched;
+                // The scan leaves no record free.
+                if orient2d(p, q, r) <= 0 && a.max(b).max(c) != infinity {
                     self.inverted.push(t);
                 }
             }
@@ -59,6 +72,9 @@ impl ShiftRepair {
     pub(super) fn repair(&mut self, mesh: &mut ClosedMesh, sites: &[Site]) -> Result<(), Rejection> {
         for round in 0..ROUNDS {
             for t in std::mem::take(&mut self.inverted) {
+                if !self.spend(WORK) {
+                    return Err(Rejection::NotAccepted("too many triangles are inverted"));
+                }
                 if is_inverted(mesh, sites, t) && !self.repair_triangle(mesh, sites, t, round > 0) {
                     self.inverted.push(t);
                 }
@@ -68,6 +84,13 @@ impl ShiftRepair {
             }
         }
         Err(Rejection::NotAccepted("an inverted triangle stayed"))
+    }
+
+    /// Counts work, which is bounded; returns whether it may be done.
+    fn spend(&mut self, work: usize) -> bool {
+        let left = self.work_left.checked_sub(work);
+        self.work_left = left.unwrap_or(0);
+        left.is_some()
     }
 
     fn repair_triangle(
@@ -144,6 +167,9 @@ impl ShiftRepair {
 
     fn remove_fan(&mut self, mesh: &mut ClosedMesh, sites: &[Site], h: ClosedEdge, even_if_inverted: bool) -> bool {
         let Some(ring) = mesh.one_ring(h) else { return false };
+        if !self.spend(WORK + 8 * ring.vertices.len().pow(2)) {
+            return false;
+        }
         let Some(fill) = ring.fill(sites, mesh.infinity(), even_if_inverted) else { return false };
         let first = self.suspects.len();
         mesh.fill_hole(&ring, &fill, |h| self.suspects.push(h));

@@ -5,8 +5,6 @@ use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
 use crate::voronoi::c4_flip::FlipQueue;
 use crate::voronoi::closed_mesh::ClosedMesh;
-use crate::voronoi::g1_write_sites::SiteTexture;
-use crate::voronoi::g6_triangles::TextureScan;
 use crate::voronoi::index::{ClosedEdge, VertexIndex};
 use crate::voronoi::rejection::Rejection;
 
@@ -16,23 +14,32 @@ struct InsertionPoint {
     on: Option<ClosedEdge>,
 }
 
-/// Inserts the sites that were `removed` from the mesh and those that are missing in `texture`.
+/// A site that is not in the mesh yet.
+pub(super) struct MissingSite {
+    pub(super) vertex: VertexIndex,
+    /// The number of the part of the texture that the site belongs to. Parts with numbers that follow each other are neighbours.
+    pub(super) place: u32,
+}
+
+/// Inserts the sites that were `removed` from the mesh and those that are `missing`. `start_near` returns a half-edge near a place, which
+/// need not exist any more.
 pub(super) fn insert_all(
     mesh: &mut ClosedMesh,
-    texture: &SiteTexture,
-    scan: &TextureScan,
+    sites: &[Site],
     removed: &[(VertexIndex, ClosedEdge)],
+    missing: impl Iterator<Item = MissingSite>,
+    start_near: impl Fn(u32) -> ClosedEdge,
     flips: &mut FlipQueue,
 ) -> Result<(), Rejection> {
     for &(vertex, near) in removed {
-        insert(mesh, &texture.sites, vertex, near, flips)?;
+        insert(mesh, sites, vertex, near, flips)?;
     }
-    let (mut last_pixel, mut last) = (u32::MAX, ClosedEdge::default());
-    for (vertex, &pixel) in (texture.placed as u32..).map(VertexIndex).zip(&texture.missing) {
-        // If the last site was in this pixel or the one before it, it is nearer than the triangle that the scan made here.
-        let near = if pixel.wrapping_sub(last_pixel) < 2 { last } else { scan.start_near(pixel) };
-        last = insert(mesh, &texture.sites, vertex, near, flips)?;
-        last_pixel = pixel;
+    let (mut last_place, mut last) = (u32::MAX, ClosedEdge::default());
+    for MissingSite { vertex, place } in missing {
+        // If the last site was in this place or the one before it, it is nearer than the triangle that was made here.
+        let near = if place.wrapping_sub(last_place) < 2 { last } else { start_near(place) };
+        last = insert(mesh, sites, vertex, near, flips)?;
+        last_place = place;
     }
     Ok(())
 }
@@ -65,7 +72,7 @@ fn locate(
     near: ClosedEdge,
     flips: &mut FlipQueue,
 ) -> Result<InsertionPoint, Rejection> {
-    let mut h = start(mesh, near)?;
+    let mut h = start(mesh, near, flips)?;
     loop {
         flips.step()?;
         let edges = [h, h.next(), h.previous()];
@@ -88,7 +95,7 @@ fn locate(
 }
 
 /// Returns a half-edge of a finite triangle: that of `near`, its neighbour if `near` is a ghost, or one that comes soon after it.
-fn start(mesh: &ClosedMesh, near: ClosedEdge) -> Result<ClosedEdge, Rejection> {
+fn start(mesh: &ClosedMesh, near: ClosedEdge, flips: &mut FlipQueue) -> Result<ClosedEdge, Rejection> {
     let is_finite = |h: ClosedEdge| mesh.corners(h).is_some_and(|c| !c.contains(&mesh.infinity()));
     let first = near.triangle().max(mesh.front());
     if first < mesh.end() && !mesh.is_free(first) {
@@ -97,6 +104,11 @@ fn start(mesh: &ClosedMesh, near: ClosedEdge) -> Result<ClosedEdge, Rejection> {
             return Ok(h.triangle());
         }
     }
-    let after = (first.0..mesh.end().0).step_by(8).map(ClosedEdge);
-    after.chain(mesh.triangles()).find(|&h| is_finite(h)).ok_or(Rejection::NotAccepted("no triangle"))
+    for h in (first.0..mesh.end().0).step_by(8).map(ClosedEdge).chain(mesh.triangles()) {
+        flips.step()?;
+        if is_finite(h) {
+            return Ok(h);
+        }
+    }
+    Err(Rejection::NotAccepted("no triangle"))
 }

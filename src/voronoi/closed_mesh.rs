@@ -2,14 +2,19 @@
 //! infinity. Every half-edge has a twin, so flips, insertions and removals need no special cases.
 //!
 //! A triangle is a record of eight numbers: three corners (counterclockwise) and an unused number, three twins and an unused
-//! number. So a corner and a twin are one load each. The first records are *slots*, which stand for the open ends of Voronoi edges
-//! while the texture is scanned (see `g6_triangles`).
+//! number. So a corner and a twin are one load each. A record without a triangle is *free*: its corners are at infinity, so that every
+//! corner is a vertex. The first records are *slots*, which stand for the open ends of Voronoi edges while the texture is scanned (see
+//! `g6_triangles`).
+//!
+//! Nothing is written as a corner or twin but what was one before. So no index is ever out of bounds, even where the links of a mesh that
+//! was made elsewhere are wrong.
 
 use crate::geometry::Site;
 use crate::geometry::predicates::{in_circle, orient2d};
 use crate::voronoi::index::{ClosedEdge, VertexIndex};
 
-const FREE: u32 = VertexIndex::NONE.0;
+/// A corner in room that no triangle has used, in a slot, or in a record that [`ClosedMesh::compact`] takes away.
+const NO_CORNER: u32 = VertexIndex::NONE.0;
 
 /// A closed triangulated surface over sites; see the module.
 #[derive(Default)]
@@ -31,11 +36,25 @@ impl ClosedMesh {
         self.end = 8 * self.slots;
         let room = self.end + 8 * (2 * sites + sites / 8 + 64);
         if self.records.len() < room {
-            self.records.resize(room, FREE);
+            self.records.resize(room, NO_CORNER);
         }
-        self.records[..self.end].fill(FREE);
+        self.records[..self.end].fill(NO_CORNER);
         self.free.clear();
         self.infinity = infinity;
+    }
+
+    /// Clears the mesh, and returns room for the records of a mesh without slots that was made elsewhere: `length` numbers. Vertex
+    /// `infinity` is the ghost.
+    pub(super) fn start_with(&mut self, length: usize, infinity: VertexIndex) -> &mut [u32] {
+        self.reset(0, length / 16, infinity);
+        self.end = length;
+        &mut self.records[..length]
+    }
+
+    /// Takes away the triangle of `h`.
+    pub(super) fn release(&mut self, h: ClosedEdge) {
+        self.set_corners(h, [self.infinity; 3]);
+        self.free.push(h.triangle());
     }
 
     /// Returns the half-edge that stands for slot `i`. It has a twin, but no origin.
@@ -113,12 +132,17 @@ impl ClosedMesh {
     #[inline(always)]
     pub(super) fn corners(&self, h: ClosedEdge) -> Option<[VertexIndex; 3]> {
         let corners = h.triangle().sides().map(|side| self.origin(side));
-        (corners[0] != VertexIndex::NONE).then_some(corners)
+        (!self.are_free(corners)).then_some(corners)
+    }
+
+    #[inline(always)]
+    fn are_free(&self, [a, b, _]: [VertexIndex; 3]) -> bool {
+        (a == self.infinity) & (b == self.infinity)
     }
 
     #[inline(always)]
     pub(super) fn is_free(&self, h: ClosedEdge) -> bool {
-        self.origin(h.triangle()) == VertexIndex::NONE
+        self.are_free(h.triangle().sides().map(|side| self.origin(side)))
     }
 
     #[inline(always)]
@@ -132,7 +156,7 @@ impl ClosedMesh {
     pub(super) fn push(&mut self, [a, b, c]: [VertexIndex; 3]) -> ClosedEdge {
         let h = self.end;
         if h + 8 > self.records.len() {
-            self.records.resize(2 * h + 8, FREE);
+            self.records.resize(2 * h + 8, NO_CORNER);
         }
         let record = &mut self.records[h..h + 8];
         (record[0], record[1], record[2]) = (a.0, b.0, c.0);
@@ -149,11 +173,6 @@ impl ClosedMesh {
             }
             None => self.push(corners),
         }
-    }
-
-    fn release(&mut self, h: ClosedEdge) {
-        self.set_corners(h, [VertexIndex::NONE; 3]);
-        self.free.push(h.triangle());
     }
 
     /// Returns whether the vertex at infinity is a corner of the triangle of `h`.
@@ -278,18 +297,25 @@ impl ClosedMesh {
         }
     }
 
-    /// Removes the ghosts and the free records, and marks the hull.
+    /// Removes the ghosts around the hull and the free records, and marks the hull.
     pub(super) fn compact(&mut self) {
-        let infinity = self.infinity;
         let mut holes = std::mem::take(&mut self.free);
-        for h in self.triangles() {
-            let Some(corners) = self.corners(h) else { continue };
-            if let Some(i) = corners.iter().position(|&c| c == infinity) {
-                let outside = self.twin(h.side(i as u32).next());
-                if self.corners(outside).is_some_and(|c| !c.contains(&infinity)) {
-                    self.set_twin(outside, ClosedEdge::OUTSIDE);
+        let mut outsides = Vec::new();
+        if let Some(first) = self.triangles().find(|&t| self.is_ghost(t)).and_then(|t| self.ray(t)) {
+            let mut ray = first;
+            for _ in self.triangles() {
+                outsides.push(self.twin(ray.next()));
+                holes.push(ray.triangle());
+                ray = self.twin(ray.previous());
+                if ray == first {
+                    break;
                 }
-                holes.push(h);
+            }
+        }
+        // Nothing is marked before the walk has ended, because marks lead nowhere.
+        for outside in outsides {
+            if self.corners(outside).is_some_and(|c| !c.contains(&self.infinity)) {
+                self.set_twin(outside, ClosedEdge::OUTSIDE);
             }
         }
         self.close_gaps(&mut holes);
@@ -297,14 +323,19 @@ impl ClosedMesh {
         self.free.clear();
     }
 
+    /// Returns the half-edge of the ghost `t` that starts at infinity.
+    pub(super) fn ray(&self, t: ClosedEdge) -> Option<ClosedEdge> {
+        t.triangle().sides().into_iter().find(|&h| self.origin(h) == self.infinity)
+    }
+
     /// Moves triangles from the end into the records `holes`, until none of them is left in between.
     fn close_gaps(&mut self, holes: &mut [ClosedEdge]) {
         for &hole in holes.iter() {
-            self.records[hole.get()] = FREE;
+            self.records[hole.get()] = NO_CORNER;
         }
         holes.sort_unstable();
         for &hole in holes.iter() {
-            while self.end > 8 * self.slots && self.records[self.end - 8] == FREE {
+            while self.end > 8 * self.slots && self.records[self.end - 8] == NO_CORNER {
                 self.end -= 8;
             }
             if hole.get() >= self.end {

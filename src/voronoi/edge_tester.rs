@@ -10,6 +10,8 @@ use crate::voronoi::index::ClosedEdge;
 /// Tests a block of triangles at a time.
 #[derive(Default)]
 pub(super) struct EdgeTester {
+    /// The sites of the corners of the block's triangles. The caller fetches them, and may need them too.
+    pub(super) corners: [[Site; 3]; EdgeTester::ROOM],
     batch: InCircleBatch,
 }
 
@@ -25,10 +27,12 @@ pub(super) struct LinkCheck {
 impl EdgeTester {
     /// The length, in numbers, of the records of as many triangles as one batch tests. Each triangle has at most three edges.
     pub(super) const BLOCK: usize = InCircleBatch::LANES / 3 * 8;
+    /// Room for the triangles of a block: a power of two, so that no index needs a check.
+    const ROOM: usize = (InCircleBatch::LANES / 3).next_power_of_two();
 
     /// Appends to `failing` the edges of the triangles in records `start..end`, at most [`EdgeTester::BLOCK`], that fail the
-    /// in-circle test or may fail it. An edge belongs to the later of its triangles. The result for edges to infinity is arbitrary.
-    /// With `CHECK`, the links are checked too.
+    /// in-circle test or may fail it. The sites of their corners must be in `corners`. An edge belongs to the later of its triangles. The
+    /// result for edges to infinity is arbitrary. With `CHECK`, the links are checked too.
     #[inline(always)]
     pub(super) fn test<const CHECK: bool>(
         &mut self,
@@ -49,9 +53,7 @@ impl EdgeTester {
             }
         }
         for (lane, &h) in edges[..links.count].iter().enumerate() {
-            let t = h.triangle().get();
-            let record = &records[t..t + 8];
-            let g = ClosedEdge(record[4 + h.corner()]);
+            let g = ClosedEdge(records[h.get() + 4]);
             if CHECK && g.0 & 7 > 2 {
                 links.broken = true;
                 continue;
@@ -66,8 +68,8 @@ impl EdgeTester {
                     continue;
                 }
             }
-            let at = |v: u32| sites[v as usize];
-            self.batch.set(lane, at(record[0]), at(record[1]), at(record[2]), at(opposite));
+            let [a, b, c] = self.corners[(h.get() - start) / 8 % EdgeTester::ROOM];
+            self.batch.set(lane, a, b, c, sites[opposite as usize]);
         }
         let doubtful = self.batch.inside_or_in_doubt(links.count);
         // Branch-free: about one edge in seven fails, and which one is unpredictable.

@@ -6,13 +6,14 @@
 use crate::geometry::lattice::REACH;
 use crate::geometry::{Bounds, Site};
 use crate::mesh::index::SiteIndex;
+use crate::voronoi::c3_insert::MissingSite;
 use crate::voronoi::counts::PipelineCounts;
 use crate::voronoi::index::VertexIndex;
 use crate::voronoi::rejection::Rejection;
 use crate::voronoi::texture_request::{TextureRequest, pixels_along};
 
 /// The largest fraction of missing sites with which the pipeline is still worthwhile.
-const MAX_MISSING: f64 = 0.4;
+pub(super) const MAX_MISSING: f64 = 0.4;
 
 /// A pixel of the row at hand that has no site.
 const EMPTY: SiteIndex = SiteIndex(u32::MAX);
@@ -35,7 +36,7 @@ pub(super) struct SiteTexture {
     /// The number of sites in the texture.
     pub(super) placed: usize,
     /// The pixel (y << 16 | x) to which each missing site belongs.
-    pub(super) missing: Vec<u32>,
+    missing: Vec<u32>,
     /// The pixel (y << 16 | x) of every site of the input.
     pixels: Vec<u32>,
     /// The missing sites, in the order of `missing`.
@@ -92,6 +93,12 @@ impl SiteTexture {
         [self.width, self.height] = extent.map(|side| pixels_along(side, scale));
         self.words = self.width.div_ceil(64);
         Ok((bounds.min, scale))
+    }
+
+    /// Returns the missing sites, each with its pixel (y << 16 | x).
+    pub(super) fn missing(&self) -> impl Iterator<Item = MissingSite> {
+        let vertices = (self.placed as u32..).map(VertexIndex);
+        vertices.zip(&self.missing).map(|(vertex, &place)| MissingSite { vertex, place })
     }
 
     /// Returns the pixel (y << 16 | x) of every site in the texture, by vertex.

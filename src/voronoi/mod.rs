@@ -15,6 +15,9 @@
 //! | C3 | `c3_insert` | inserts the sites that are missing or were removed, flipping edges along the way |
 //! | | `accept` | proves the result |
 //!
+//! [`from_device`] goes on from a mesh that a device has made: `device_mesh` takes the place of G1 to G6. `completion` has the steps from
+//! C2 on, which are the same for both.
+//!
 //! Any step may go wrong on unlucky input. Because `accept` proves the result, an error costs time and never correctness. All
 //! steps work on one mesh, of `closed_mesh`; `edge_tester` tests many of its edges at once.
 
@@ -24,7 +27,9 @@ mod c2_shift;
 mod c3_insert;
 mod c4_flip;
 mod closed_mesh;
+mod completion;
 pub mod counts;
+pub mod device_mesh;
 pub mod diagram_backend;
 mod edge_tester;
 mod g1_write_sites;
@@ -45,7 +50,9 @@ use crate::voronoi::accept::AcceptanceCheck;
 use crate::voronoi::c2_shift::ShiftRepair;
 use crate::voronoi::c4_flip::FlipQueue;
 use crate::voronoi::closed_mesh::ClosedMesh;
+use crate::voronoi::completion::Completion;
 use crate::voronoi::counts::{PipelineCounts, StepTimer};
+use crate::voronoi::device_mesh::{DeviceMesh, copy_sites};
 use crate::voronoi::diagram_backend::{DiagramBackend, DiagramReply};
 use crate::voronoi::g1_write_sites::SiteTexture;
 use crate::voronoi::g2_voronoi::LabelRows;
@@ -67,6 +74,8 @@ pub struct PipelineBuffers {
     flips: FlipQueue,
     acceptance: AcceptanceCheck,
     mesh: HalfEdgeMesh,
+    /// The sites of a leaf whose mesh a device has made, with one more entry for the vertex at infinity.
+    sites: Vec<Site>,
 }
 
 impl PipelineBuffers {
@@ -100,10 +109,11 @@ pub fn triangulate_with(
     buffers: &mut PipelineBuffers,
 ) -> Result<(HalfEdgeMesh, PipelineCounts), Rejection> {
     check_size(sites)?;
-    let PipelineBuffers { request, texture, labels, scan, closed, islands, shift, flips, acceptance, mesh } = buffers;
+    let PipelineBuffers { request, texture, labels, scan, closed, islands, shift, flips, acceptance, mesh, .. } =
+        buffers;
     let mut counts = PipelineCounts { sites: sites.len() as u64, ..PipelineCounts::default() };
     let mut timer = StepTimer::start();
-    shift.clear();
+    shift.reset(sites.len());
     flips.reset(sites.len());
 
     discretise(sites, backend, request, texture, labels, &mut counts)?;
@@ -111,25 +121,41 @@ pub fn triangulate_with(
     scan.run(texture, labels, closed, shift, flips)?;
     counts.inverted = shift.inverted.len() as u64;
     timer.finish(&mut counts, 1);
-    let at = &texture.sites;
-    islands.remove(closed, at, texture.placed, shift, &mut counts)?;
+    islands.remove(closed, &texture.sites, texture.placed, shift, &mut counts)?;
     timer.finish(&mut counts, 2);
-    // C2 comes before C1, so that the hull is completed only once, at its true place.
-    shift.repair(closed, at)?;
-    timer.finish(&mut counts, 3);
-    c1_hull::complete_hull(closed, at, shift)?;
-    counts.removed = shift.removed.len() as u64;
-    timer.finish(&mut counts, 4);
-    // C4 comes before C3, so that sites are inserted into a Delaunay mesh, in which walks are short and sure to end.
-    std::mem::swap(&mut flips.suspects, &mut shift.suspects);
-    flips.run(closed, at)?;
-    timer.finish(&mut counts, 5);
-    c3_insert::insert_all(closed, texture, scan, &shift.removed, flips)?;
-    counts.flips = flips.done;
-    timer.finish(&mut counts, 6);
-    closed.compact();
-    acceptance.accept(closed, at, &texture.order, mesh)?;
-    timer.finish(&mut counts, 7);
+
+    let mut completion = Completion { closed, sites: &texture.sites, shift, flips, counts, timer };
+    completion.repair()?;
+    completion.insert(texture.missing(), |pixel| scan.start_near(pixel))?;
+    let counts = completion.prove(Some(&texture.order), acceptance, mesh)?;
+    Ok((std::mem::take(mesh), counts))
+}
+
+/// As [`triangulate`], from the mesh that a device has made. The device need not be trusted: its mesh may be anything.
+///
+/// # Errors
+/// [`Rejection`] if the device's mesh does not suit. [`triangulate`] may succeed nonetheless.
+pub fn from_device(
+    sites: &[Site],
+    made: &DeviceMesh,
+    buffers: &mut PipelineBuffers,
+) -> Result<(HalfEdgeMesh, PipelineCounts), Rejection> {
+    check_size(sites)?;
+    let PipelineBuffers { closed, shift, flips, acceptance, mesh, sites: vertices, .. } = buffers;
+    let mut counts = PipelineCounts { on_gpu: 1, sites: sites.len() as u64, ..PipelineCounts::default() };
+    let mut timer = StepTimer::start();
+    shift.reset(sites.len());
+    flips.reset(sites.len());
+
+    copy_sites(sites, vertices)?;
+    counts.missing = made.load(vertices, closed, shift)? as u64;
+    counts.inverted = shift.inverted.len() as u64;
+    timer.finish(&mut counts, 1);
+
+    let mut completion = Completion { closed, sites: vertices, shift, flips, counts, timer };
+    completion.repair()?;
+    completion.insert(made.missing(sites), |block| made.start_near(block))?;
+    let counts = completion.prove(None, acceptance, mesh)?;
     Ok((std::mem::take(mesh), counts))
 }
 

@@ -6,8 +6,10 @@ mod atlas_mesh;
 mod clouds;
 #[path = "../common/mod.rs"]
 mod common;
+mod device_mesh;
 mod faults;
 mod flips;
+mod instant;
 mod leaves;
 mod linked;
 mod placed;

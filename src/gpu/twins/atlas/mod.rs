@@ -18,8 +18,27 @@ pub use g5_count::count;
 pub use g6_triangles::make_triangles;
 pub use give_back::{MeshOnDevice, give_back};
 
-use crate::gpu::atlas::AtlasLeaf;
+use crate::geometry::Site;
+use crate::gpu::atlas::{Atlas, AtlasLeaf};
+use crate::gpu::mesh_steps::FLIP_ROUNDS;
+use crate::gpu::options::VoronoiMethod;
 use crate::gpu::texture_size::TextureSize;
+use crate::gpu::twins::c4_flip::{FlipState, flip_round};
+
+/// Does all steps on the leaves of `atlas`, and returns what comes back to the CPU; see [`crate::gpu::returned`]. `sites` has those of all
+/// leaves, each followed by one at infinity.
+pub fn mesh(atlas: &Atlas, sites: &[Site], method: VoronoiMethod) -> Vec<u32> {
+    let written = write_sites(atlas, sites);
+    let mut labels = voronoi(atlas, &written.texture, method);
+    let mut flags = remove_islands(atlas, &mut labels);
+    let diagram = AtlasDiagram { atlas, labels: &labels, texture: &written.texture, sites };
+    let (_, counts) = find_vertices(diagram);
+    let starts = count(&counts);
+    let mut flipped = FlipState::new(make_triangles(diagram, &mut flags));
+    (1..=FLIP_ROUNDS).for_each(|round| flip_round(&mut flipped, sites, round));
+    let (records, marks) = (&flipped.records, &flipped.marks);
+    give_back(atlas, MeshOnDevice { records, marks, missing: &written.missing, starts: &starts, flags: &flags })
+}
 
 /// Returns the size of a leaf without its frame.
 fn size_of(leaf: &AtlasLeaf) -> TextureSize {
