@@ -4,6 +4,7 @@
 //! that every corner of the texture belongs to a block. Pixel (x, y) of a leaf is number `base + y * stride + x` of the buffer. What
 //! lies outside the width and height has the colour of the frame, "infinity", so no colour bleeds from leaf to leaf.
 
+use crate::geometry::lattice::REACH;
 use crate::geometry::{Bounds, Site};
 use crate::voronoi::texture_request::TextureRequest;
 
@@ -111,9 +112,11 @@ pub struct Atlas {
 
 impl Atlas {
     /// Adds a leaf of `sites`, in a texture as `request` says. Returns false, and changes nothing, if there are fewer than three sites,
-    /// or if the atlas would have more than `max_pixels` pixels. The sites must be within the lattice's reach.
+    /// if one is beyond the lattice's reach, or if the atlas would have more than `max_pixels` pixels.
     pub fn add(&mut self, sites: &[Site], request: &TextureRequest, max_pixels: u32) -> bool {
-        let Some(bounds) = Bounds::of_points(sites.iter().copied()).filter(|_| sites.len() >= 3) else { return false };
+        let is_within_reach = |b: &Bounds<2>| b.min.iter().chain(&b.max).all(|c| (-REACH..=REACH).contains(c));
+        let bounds = Bounds::of_points(sites.iter().copied()).filter(is_within_reach);
+        let Some(bounds) = bounds.filter(|_| sites.len() >= 3) else { return false };
         let steps = [0, 1].map(|axis| bounds.extent(axis) as u32);
         let scale = request.scale(steps.map(|steps| f64::from(steps) + 1.0), sites.len());
         let factor = ((scale * f64::from(1u32 << FACTOR_BITS)) as u32).max(1);
@@ -140,6 +143,16 @@ impl Atlas {
         self.blocks += leaf.blocks_x() * leaf.blocks_y();
         self.leaves.push(leaf);
         true
+    }
+
+    /// Takes the last leaf out again.
+    pub fn remove_last(&mut self) {
+        if let Some(leaf) = self.leaves.pop() {
+            self.pixels = leaf.base;
+            self.vertices = leaf.first_site;
+            self.records = leaf.first_record;
+            self.blocks = leaf.first_block;
+        }
     }
 
     /// Returns the table of leaves: [`LEAF_NUMBERS`] numbers for each, in the order of the fields that `struct Leaf` of the shaders has.
@@ -193,9 +206,14 @@ mod tests {
     #[test]
     fn a_full_atlas_takes_no_leaf() {
         let mut atlas = Atlas::default();
+        assert!(atlas.add(&[[0, 0], [5, 5], [9, 0]], &request(), 1024));
         let before = atlas.clone();
-        assert!(!atlas.add(&[[0, 0], [5, 5], [9, 0]], &request(), 1023));
+        assert!(!atlas.add(&[[0, 0], [5, 5], [9, 0]], &request(), 2047));
         assert!(!atlas.add(&[[0, 0], [5, 5]], &request(), 1 << 24));
+        assert!(!atlas.add(&[[0, 0], [5, 5], [REACH + 1, 0]], &request(), 1 << 24));
+        assert_eq!(atlas, before);
+        assert!(atlas.add(&[[0, 0], [5, 5], [9, 0]], &request(), 2048));
+        atlas.remove_last();
         assert_eq!(atlas, before);
     }
 
@@ -208,7 +226,7 @@ mod tests {
 
     #[test]
     fn sites_as_far_apart_as_can_be_fit() {
-        let reach = crate::geometry::lattice::REACH;
+        let reach = REACH;
         let mut atlas = Atlas::default();
         let corners = [[-reach, -reach], [reach, reach], [-reach, reach], [reach, 0]];
         assert!(atlas.add(&corners, &request(), 1 << 24));

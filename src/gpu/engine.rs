@@ -124,13 +124,29 @@ impl GpuEngine {
         buffers: &BufferSet,
         readback: PendingReadback,
     ) -> Result<(Vec<u32>, StepNanoseconds), GpuError> {
+        self.finish_with(buffers, readback, <[u32]>::to_vec)
+    }
+
+    /// As [`GpuEngine::finish`], but `take` reads the numbers where the device has written them, so that nothing is copied twice.
+    ///
+    /// # Errors
+    /// As [`GpuEngine::finish`].
+    pub fn finish_with<T>(
+        &self,
+        buffers: &BufferSet,
+        readback: PendingReadback,
+        take: impl FnOnce(&[u32]) -> T,
+    ) -> Result<(T, StepNanoseconds), GpuError> {
         self.device.wait(readback.submission)?;
         if !readback.mapped.load(Ordering::Acquire) {
             return Err(GpuError::Lost("a buffer could not be read back".into()));
         }
         let staging = buffers.get(BufferId::Staging)?;
         let mapped = |range| staging.slice(range).get_mapped_range().map_err(|e| GpuError::Lost(e.to_string()));
-        let numbers = bytemuck::pod_collect_to_vec(&mapped(0..readback.bytes)?);
+        let taken = {
+            let bytes = mapped(0..readback.bytes)?;
+            take(bytemuck::try_cast_slice(&bytes).map_err(|e| GpuError::Lost(e.to_string()))?)
+        };
         let mut times = StepNanoseconds::default();
         if let Some(timestamps) = buffers.timestamps.as_ref().filter(|_| !readback.timed.is_empty()) {
             let first = readback.bytes.next_multiple_of(8);
@@ -138,7 +154,7 @@ impl GpuEngine {
             times = timestamps.nanoseconds(&stamps, &readback.timed);
         }
         self.device.guard(|| staging.unmap())?;
-        Ok((numbers, times))
+        Ok((taken, times))
     }
 
     /// Returns the first `count` numbers of buffer `id`, after everything that was started is done.

@@ -3,7 +3,7 @@
 use crate::geometry::Site;
 use crate::gpu::buffer_id::BufferId::{Claims, Decisions, Marks, Records, Sites};
 use crate::gpu::flip_marks::FlipMarks;
-use crate::gpu::steps::{GpuCommand, Recording, ShaderProgram, line, program};
+use crate::gpu::steps::{GpuCommand, GpuStep, Recording, ShaderProgram, line, program};
 
 const DECIDE: ShaderProgram = program!("decide", uses "predicates", "decide", &[(1, Sites), (2, Decisions)]);
 const CLAIM: ShaderProgram =
@@ -47,6 +47,7 @@ impl Recording {
 
     /// Forgets all claims and marks, as is needed before the first round.
     pub fn start_flips(&mut self, triangles: u32) {
+        self.commands.push(GpuCommand::Step(GpuStep::Flips));
         let marks = FlipMarks::of(triangles as usize).numbers() as u64;
         for (id, numbers) in [(Claims, u64::from(triangles)), (Marks, marks)] {
             self.reserve(id, numbers);

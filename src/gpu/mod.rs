@@ -16,9 +16,11 @@ pub mod error;
 pub mod executor;
 #[cfg(feature = "fault-injection")]
 mod fake_engine;
+pub mod filled_atlas;
 pub mod flip_marks;
 mod gpu_thread;
 pub mod leaf_flags;
+pub mod mesh_engine;
 pub mod mesh_steps;
 pub mod options;
 mod prefix_sums;

@@ -78,17 +78,23 @@ pub enum GpuStep {
     Count,
     /// G6.
     Triangles,
+    /// C2 and most of C4.
+    Flips,
+    /// The gathering of what the CPU reads.
+    GiveBack,
 }
 
 impl GpuStep {
     /// All steps in order.
-    pub const ALL: [GpuStep; 6] = [
+    pub const ALL: [GpuStep; 8] = [
         GpuStep::WriteSites,
         GpuStep::Voronoi,
         GpuStep::Islands,
         GpuStep::Vertices,
         GpuStep::Count,
         GpuStep::Triangles,
+        GpuStep::Flips,
+        GpuStep::GiveBack,
     ];
 
     /// Returns the name that reports use.
@@ -100,6 +106,8 @@ impl GpuStep {
             GpuStep::Vertices => "G4 vertices",
             GpuStep::Count => "G5 count",
             GpuStep::Triangles => "G6 triangles",
+            GpuStep::Flips => "C2, C4 flips",
+            GpuStep::GiveBack => "return",
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::atlas_mesh::{assert_whole, compare};
 use super::clouds::{clouds, real_cloud};
-use super::placed::{PlacedAtlas, record_mesh, recorded};
+use super::placed::{PlacedAtlas, recorded};
 use super::rig::Rig;
 use gdt_batch::geometry::Site;
 use gdt_batch::gpu::mesh_steps::FLIP_ROUNDS;
@@ -90,7 +90,7 @@ fn all_steps_are_few_fixed_dispatches_with_little_traffic() {
         recording.flip(placed.atlas.records);
         let flips = each(recording.traffic());
         recording.commands.clear();
-        record_mesh(&mut recording, &placed.atlas);
+        recording.atlas_mesh(&placed.atlas);
         let own = each(recording.traffic()) - flips;
         let back = each(4 * ReturnedLayout::of(&placed.atlas).numbers() as u64);
         eprintln!(

@@ -2,7 +2,7 @@
 
 use super::clouds::{Cloud, clouds, hard_clouds};
 use super::flips::Flipped;
-use super::placed::{PlacedAtlas, record_mesh, recorded};
+use super::placed::{PlacedAtlas, recorded};
 use super::random::Random;
 use super::rig::Rig;
 use gdt_batch::geometry::Site;
@@ -281,7 +281,7 @@ fn the_small_leaves_find_every_error_in_the_shaders() {
         ("starts[i] - before", "starts[i]"),
     ] {
         let (mut recording, mut found) = (placed.upload(), 0);
-        record_mesh(&mut recording, &placed.atlas);
+        recording.atlas_mesh(&placed.atlas);
         for command in &mut recording.commands {
             if let GpuCommand::Run(program, ..) = command
                 && program.file.starts_with("atlas/")

@@ -7,6 +7,7 @@ mod clouds;
 #[path = "../common/mod.rs"]
 mod common;
 mod device_mesh;
+mod engine;
 mod faults;
 mod flips;
 mod instant;

@@ -75,20 +75,5 @@ impl PlacedAtlas {
 
 /// Records all steps on an atlas.
 pub(crate) fn recorded(placed: &PlacedAtlas) -> Recording {
-    let mut recording = Recording::default();
-    recording.upload_atlas(&placed.atlas, &placed.sites);
-    recording.write_atlas_sites(&placed.atlas);
-    recording.atlas_voronoi(&placed.atlas, VoronoiMethod::Exact);
-    recording.remove_atlas_islands(&placed.atlas);
-    record_mesh(&mut recording, &placed.atlas);
-    recording
-}
-
-/// Records the steps from G4 on.
-pub(crate) fn record_mesh(recording: &mut Recording, atlas: &Atlas) {
-    recording.atlas_vertices(atlas);
-    recording.atlas_count(atlas);
-    recording.atlas_triangles(atlas);
-    recording.flip(atlas.records);
-    recording.give_back(atlas);
+    Recording::mesh(&placed.atlas, &placed.sites, VoronoiMethod::Exact)
 }

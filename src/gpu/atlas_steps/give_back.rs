@@ -6,7 +6,7 @@ use crate::gpu::buffer_id::BufferId::{BlockStarts, Blocks, Flags, Leaves, Marks,
 use crate::gpu::flip_marks::FlipMarks;
 use crate::gpu::mesh_steps::FLIP_ROUNDS;
 use crate::gpu::returned::ReturnedLayout;
-use crate::gpu::steps::{Recording, ShaderProgram, line, program};
+use crate::gpu::steps::{GpuCommand, GpuStep, Recording, ShaderProgram, line, program};
 
 const GIVE_RECORDS: ShaderProgram =
     program!("atlas/give_back", uses "atlas/leaf", "give_records", &[(1, Leaves), (2, Records), (3, Returned)]);
@@ -26,6 +26,7 @@ impl Recording {
     pub fn give_back(&mut self, atlas: &Atlas) {
         let layout = ReturnedLayout::of(atlas);
         let leaves = atlas.leaves.len() as u32;
+        self.commands.push(GpuCommand::Step(GpuStep::GiveBack));
         self.reserve(Returned, layout.numbers() as u64);
         let (workgroups, row) = grid(2 * atlas.records / HALVES);
         let params = [2 * atlas.records, leaves, row, 0, 0];

@@ -15,6 +15,7 @@ pub use g3_islands::{ATLAS_ISLAND_ROUNDS, ISLANDS_LEFT};
 use crate::geometry::Site;
 use crate::gpu::atlas::Atlas;
 use crate::gpu::buffer_id::BufferId::{Blocks, Flags, Leaves, Sites};
+use crate::gpu::options::VoronoiMethod;
 use crate::gpu::steps::{GpuCommand, MAX_WORKGROUPS, Recording, WorkgroupCount};
 
 /// Bytes of an entry of the table of blocks.
@@ -27,6 +28,26 @@ const ROWS: u64 = 32;
 const ROW_BYTES: u64 = 16 * ROWS;
 
 impl Recording {
+    /// Records all steps on an atlas, from its sites to what the CPU reads. After the sites of each leaf, `sites` has one at infinity.
+    pub fn mesh(atlas: &Atlas, sites: &[Site], voronoi: VoronoiMethod) -> Recording {
+        let mut recording = Recording::default();
+        recording.upload_atlas(atlas, sites);
+        recording.write_atlas_sites(atlas);
+        recording.atlas_voronoi(atlas, voronoi);
+        recording.remove_atlas_islands(atlas);
+        recording.atlas_mesh(atlas);
+        recording
+    }
+
+    /// Records the steps from G4 on.
+    pub fn atlas_mesh(&mut self, atlas: &Atlas) {
+        self.atlas_vertices(atlas);
+        self.atlas_count(atlas);
+        self.atlas_triangles(atlas);
+        self.flip(atlas.records);
+        self.give_back(atlas);
+    }
+
     /// Uploads an atlas. After the sites of each leaf, `sites` has one at infinity. No leaf is flagged.
     pub fn upload_atlas(&mut self, atlas: &Atlas, sites: &[Site]) {
         let tables = [(Leaves, atlas.leaf_table()), (Blocks, atlas.block_table())];

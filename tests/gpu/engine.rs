@@ -1,0 +1,106 @@
+//! The engine that jobs use: several atlases in flight, each in one submission from its sites to its meshes.
+
+use super::clouds::{clouds, real_cloud};
+use super::random::Random;
+use super::rig::Rig;
+use gdt_batch::geometry::Site;
+use gdt_batch::gpu::device::AdapterRequest;
+use gdt_batch::gpu::filled_atlas::{AtlasLimits, FilledAtlas};
+use gdt_batch::gpu::mesh_engine::{GpuMeshEngine, MAX_IN_FLIGHT, MeshEngine};
+use gdt_batch::gpu::options::VoronoiMethod;
+use gdt_batch::gpu::returned::ReturnedAtlas;
+use gdt_batch::gpu::steps::{GpuCommand, GpuStep, Recording, WorkgroupCount};
+use gdt_batch::gpu::twins;
+use gdt_batch::voronoi::texture_request::TextureResolution;
+
+/// Returns an atlas of these leaves, in textures of so many pixels a site.
+fn filled<'a>(leaves: impl IntoIterator<Item = &'a [Site]>, pixels_per_site: f64, limits: AtlasLimits) -> FilledAtlas {
+    let mut filled = FilledAtlas::default();
+    for leaf in leaves {
+        assert!(filled.add(leaf, TextureResolution::PixelsPerSite(pixels_per_site), limits), "the atlas is full");
+    }
+    filled
+}
+
+fn uniform(random: &mut Random, count: usize) -> Vec<Site> {
+    let mut sites: Vec<Site> = (0..count).map(|_| [0; 2].map(|_: i32| random.below(1 << 20) as i32)).collect();
+    sites.sort_unstable();
+    sites.dedup();
+    sites
+}
+
+#[test]
+fn three_atlases_in_flight_are_those_of_the_twins() {
+    if Rig::new().is_none() {
+        return;
+    }
+    for method in [VoronoiMethod::Exact, VoronoiMethod::Jfa] {
+        let mut engine = GpuMeshEngine::open(AdapterRequest::new(None, true), method).expect("the adapter opens");
+        let limits = AtlasLimits::of(&engine.device().limits);
+        let mut random = Random(3);
+        let leaves: Vec<Vec<Site>> =
+            [3, 40, 900, 4000, 70, 2000].map(|count| uniform(&mut random, count)).into_iter().collect();
+        let atlases = [&leaves[..1], &leaves[1..4], &leaves[4..]];
+        // Slots are used again, for larger and for smaller atlases.
+        for turn in 0..2 {
+            let atlases: Vec<_> = (0..MAX_IN_FLIGHT)
+                .map(|slot| filled(atlases[(slot + turn) % 3].iter().map(Vec::as_slice), 16.0, limits))
+                .collect();
+            let started = atlases.iter().enumerate().map(|(slot, atlas)| engine.start(slot, atlas));
+            let pending: Vec<_> = started.collect::<Result<_, _>>().expect("the steps run");
+            for (slot, (atlas, pending)) in atlases.iter().zip(pending).enumerate() {
+                let mut returned = Vec::new();
+                let times = engine.finish(slot, pending, &mut |numbers| returned = numbers.to_vec());
+                assert!(returned == twins::atlas::mesh(&atlas.atlas, &atlas.sites, method), "{method:?}, slot {slot}");
+                let times = times.expect("they come back");
+                assert!(times.iter().all(|&time| time == 0) || times[GpuStep::Flips as usize] > 0, "{times:?}");
+            }
+        }
+    }
+}
+
+/// What an atlas may cost, all steps together.
+#[test]
+fn an_atlas_is_few_dispatches_and_few_bytes() {
+    let limits = AtlasLimits { pixels: 1 << 24, bytes: 1 << 27 };
+    let cloud = &clouds().swap_remove(0).sites;
+    for (pixels_per_site, most) in [(8.0, 1100.0), (16.0, 1300.0)] {
+        let atlas = filled(cloud.chunks(10_000), pixels_per_site, limits);
+        let recording = Recording::mesh(&atlas.atlas, &atlas.sites, VoronoiMethod::Exact);
+        let is_indirect = |c: &GpuCommand| matches!(c, GpuCommand::Run(_, _, WorkgroupCount::Indirect(_), _));
+        assert!(!recording.commands.iter().any(is_indirect));
+        let up = recording.commands.iter().map(|command| match command {
+            GpuCommand::Upload(_, numbers) => 4 * numbers.len() as u64,
+            _ => 0,
+        });
+        let each = |bytes: u64| bytes as f64 / cloud.len() as f64;
+        let (dispatches, over_the_bus) = (recording.dispatches(), each(up.sum::<u64>() + atlas.bytes_back()));
+        let traffic = each(recording.traffic());
+        println!(
+            "{pixels_per_site} pixels a site: {dispatches} dispatches, {over_the_bus:.1} bytes a site over the bus, {traffic:.0} in all"
+        );
+        assert!(dispatches <= 80 && over_the_bus <= 75.0 && traffic <= most);
+    }
+}
+
+/// What the device leaves of real terrain.
+#[test]
+fn the_engine_leaves_little_of_real_terrain() {
+    let (Some(_), Some(cloud)) = (Rig::new(), real_cloud()) else { return };
+    let request = AdapterRequest::new(None, true);
+    let mut engine = GpuMeshEngine::open(request, VoronoiMethod::Auto).expect("the adapter opens");
+    let atlas = filled(cloud.sites.chunks(10_000), 16.0, AtlasLimits::of(&engine.device().limits));
+    let pending = engine.start(0, &atlas).expect("the steps run");
+    let mut returned = Vec::new();
+    engine.finish(0, pending, &mut |numbers| returned = numbers.to_vec()).expect("they come back");
+    let returned = ReturnedAtlas::new(&atlas.atlas, &returned).expect("all numbers came back");
+    let mut exceptions = 0;
+    for leaf in 0..atlas.atlas.leaves.len() {
+        let leaf = returned.leaf(leaf).expect("it came back");
+        assert_eq!(leaf.flags, 0);
+        exceptions += leaf.missing.iter().chain(leaf.unfinished).map(|word| word.count_ones()).sum::<u32>();
+    }
+    let share = f64::from(exceptions) / cloud.sites.len() as f64;
+    println!("exceptions: {:.3} % of the sites", 100.0 * share);
+    assert!(share <= 0.002);
+}
