@@ -9,8 +9,8 @@
 //! - 10: the steps on a million sites with textures of 512 to 4096 pixels a side.
 //!
 //! All methods take turns on the same sites. After a round to warm up, the tables show medians of ROUNDS (5) rounds. Each step has a
-//! median of its own, so steps need not add up to the total. "Shaders" are G1 to G6 on the GPU, by its own timestamps. "GPU and CPU"
-//! is what a job with `backend = "gpu"` does: G1 to G3 on the GPU, the rest on the CPU. "Plain loops" are the shaders' twins, which
+//! median of its own, so steps need not add up to the total. "Shaders" are G1 to G6 and the flips on the GPU, by its own timestamps.
+//! "GPU and CPU" is what a job with `backend = "gpu"` does with one leaf: what the device leaves, and the proof, is the CPU's part. "Plain loops" are the shaders' twins, which
 //! are written to be read, and are timed once. `WGPU_ADAPTER_NAME` names an adapter. If there is no hardware GPU, a software renderer
 //! is used, and the tables say so.
 
@@ -24,13 +24,18 @@ use gdt_batch::gpu::device::{self, AdapterRequest, Device};
 use gdt_batch::gpu::engine::GpuEngine;
 use gdt_batch::gpu::error::GpuError;
 use gdt_batch::gpu::executor::{Executor, GpuUse};
+use gdt_batch::gpu::filled_atlas::{AtlasLimits, FilledAtlas, MAX_PIXELS};
+use gdt_batch::gpu::mesh_steps::FLIP_ROUNDS;
 use gdt_batch::gpu::options::{GpuOptions, TextureSide, VoronoiMethod};
 use gdt_batch::gpu::steps::{GpuStep, Recording};
-use gdt_batch::gpu::texture_size::TextureSize;
-use gdt_batch::gpu::twins;
+use gdt_batch::gpu::timestamps::StepNanoseconds;
+use gdt_batch::gpu::twins::atlas::{
+    AtlasDiagram, MeshOnDevice, WrittenSites, count, find_vertices, give_back, make_triangles, remove_islands, voronoi,
+    write_sites,
+};
+use gdt_batch::gpu::twins::c4_flip::{FlipState, flip_round};
 use gdt_batch::mesh::half_edge::HalfEdgeMesh;
 use gdt_batch::voronoi::counts::{PipelineCounts, STEP_NAMES};
-use gdt_batch::voronoi::diagram_backend::{DiagramBackend, DiagramReply};
 use gdt_batch::voronoi::rejection::Rejection;
 use gdt_batch::voronoi::texture_request::{TextureRequest, TextureResolution};
 use gdt_batch::voronoi::{PipelineBuffers, triangulate, triangulate_with};
@@ -39,7 +44,6 @@ use spade::{DelaunayTriangulation, Point2, Triangulation};
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::hint::black_box;
-use std::sync::Mutex;
 use std::time::Instant;
 
 /// Sides of the textures, as in the paper.
@@ -212,41 +216,32 @@ fn library<'a>(name: &str, mut f: impl FnMut() + 'a) -> Method<'a> {
 
 /// Times the shaders' twins, once each.
 fn plain_loops(sites: &[Site], side: u32) -> Outcome {
-    let (size, pixels) = placed(sites, side)?;
-    let (texture, g1) = timed(|| twins::write_sites(size, &pixels));
-    let (_, jfa) = timed(|| black_box(twins::voronoi_jfa(size, &texture)));
-    let (mut labels, g2) = timed(|| twins::voronoi_exact(size, &texture));
-    let ((), g3) = timed(|| twins::remove_islands(size, &mut labels));
-    let (corners, g4) = timed(|| twins::find_vertices(size, &labels));
-    let (_, g5) = timed(|| black_box(twins::count(size, &corners)));
-    let (_, g6) = timed(|| black_box(twins::make_triangles(size, &labels, &texture)));
-    let mut steps: Vec<_> = GpuStep::ALL.map(GpuStep::name).into_iter().zip([g1, g2, g3, g4, g5, g6]).collect();
+    let FilledAtlas { atlas, sites } = filled(sites, side)?;
+    let (WrittenSites { texture, missing }, g1) = timed(|| write_sites(&atlas, &sites));
+    let (_, jfa) = timed(|| black_box(voronoi(&atlas, &texture, VoronoiMethod::Jfa)));
+    let (mut labels, g2) = timed(|| voronoi(&atlas, &texture, VoronoiMethod::Exact));
+    let (mut flags, g3) = timed(|| remove_islands(&atlas, &mut labels));
+    let diagram = AtlasDiagram { atlas: &atlas, labels: &labels, texture: &texture, sites: &sites };
+    let ((_, counts), g4) = timed(|| find_vertices(diagram));
+    let (starts, g5) = timed(|| count(&counts));
+    let (records, g6) = timed(|| make_triangles(diagram, &mut flags));
+    let mut state = FlipState::new(records);
+    let (_, flips) = timed(|| (1..=FLIP_ROUNDS).for_each(|round| flip_round(&mut state, &sites, round)));
+    let (records, marks) = (&state.records, &state.marks);
+    let mesh = MeshOnDevice { records, marks, missing: &missing, starts: &starts, flags: &flags };
+    let (_, back) = timed(|| black_box(give_back(&atlas, mesh)));
+    let times = [g1, g2, g3, g4, g5, g6, flips, back];
+    let mut steps: Vec<_> = GpuStep::ALL.map(GpuStep::name).into_iter().zip(times).collect();
     steps.insert(2, ("or G2 by 1+JFA", jfa));
     Ok(Run { steps, ..Run::default() })
 }
 
-/// A backend that computes no diagrams, but keeps the last request.
-struct Listener(u32, Mutex<Option<(TextureSize, Vec<u32>)>>);
-
-impl DiagramBackend for Listener {
-    fn texture_request(&self) -> TextureRequest {
-        TextureRequest { resolution: TextureResolution::Side(self.0), ..TextureRequest::default() }
-    }
-
-    fn diagram(&self, width: u32, height: u32, pixels: Vec<u32>) -> DiagramReply {
-        if let Ok(mut heard) = self.1.lock() {
-            *heard = Some((TextureSize { width, height }, pixels));
-        }
-        DiagramReply::Unavailable
-    }
-}
-
-/// Returns the size of the texture of `sites`, and the pixel of each site that has one.
-fn placed(sites: &[Site], side: u32) -> Result<(TextureSize, Vec<u32>), String> {
-    let listener = Listener(side, Mutex::new(None));
-    let done = triangulate_with(sites, Some(&listener), &mut PipelineBuffers::default());
-    let heard = listener.1.into_inner().ok().flatten();
-    heard.ok_or_else(|| done.err().map_or("no texture was made".into(), |why| why.to_string()))
+/// Returns an atlas of one leaf, in a texture of `side`.
+fn filled(sites: &[Site], side: u32) -> Result<FilledAtlas, String> {
+    let mut filled = FilledAtlas::default();
+    let limits = AtlasLimits { pixels: MAX_PIXELS, bytes: u64::MAX };
+    let fits = filled.add(sites, TextureResolution::Side(side), limits);
+    fits.then_some(filled).ok_or_else(|| "the texture is too large".into())
 }
 
 // Methods on the GPU.
@@ -275,20 +270,11 @@ impl Gpu {
         })
     }
 
-    /// Times steps G1 to G6 by the GPU's own timestamps.
-    fn run(
-        &mut self,
-        size: TextureSize,
-        pixels: &[u32],
-        voronoi: VoronoiMethod,
-    ) -> Result<[f64; GpuStep::ALL.len()], GpuError> {
-        // A site has at most two triangles; leave some room for what the texture gets wrong.
-        let room = 2 * pixels.len() + pixels.len() / 4 + 64;
-        let mut recording = Recording::labels(size, pixels.to_vec(), voronoi);
-        recording.commands.extend(Recording::triangles(size, room as u32).commands);
-        let readback = self.engine.start_and_fetch(&mut self.buffers, &recording, BufferId::Triangles, 12)?;
-        let (_, times) = self.engine.finish(&self.buffers, readback)?;
-        Ok(times.map(|time| time as f64 / 1e6))
+    /// Times all steps by the GPU's own timestamps.
+    fn run(&mut self, filled: &FilledAtlas, voronoi: VoronoiMethod) -> Result<StepNanoseconds, GpuError> {
+        let recording = Recording::mesh(&filled.atlas, &filled.sites, voronoi);
+        let readback = self.engine.start_and_fetch(&mut self.buffers, &recording, BufferId::Returned, 32)?;
+        Ok(self.engine.finish(&self.buffers, readback)?.1)
     }
 }
 
@@ -299,15 +285,16 @@ fn on_gpu_alone_and_helped<'a>(gpu: &'a RefCell<Gpu>, sites: &'a [Site], side: u
 }
 
 fn by_shaders<'a>(gpu: &'a RefCell<Gpu>, sites: &[Site], side: u32, voronoi: VoronoiMethod) -> Method<'a> {
-    let placed = placed(sites, side);
+    let filled = filled(sites, side);
     let transform = if voronoi == VoronoiMethod::Jfa { "1+JFA" } else { "exact" };
     let name = format!("{}, shaders, {transform}", gpu.borrow().kind);
     let run = move || {
-        let (size, pixels) = placed.as_ref().map_err(String::clone)?;
-        let times = gpu.borrow_mut().run(*size, pixels, voronoi).map_err(|error| error.to_string())?;
-        if times.iter().all(|&time| time == 0.0) {
+        let filled = filled.as_ref().map_err(String::clone)?;
+        let times = gpu.borrow_mut().run(filled, voronoi).map_err(|error| error.to_string())?;
+        if times.iter().all(|&time| time == 0) {
             return Err("the adapter has no timestamps".into());
         }
+        let times = times.map(|nanoseconds| nanoseconds as f64 / 1e6);
         Ok(Run { steps: GpuStep::ALL.map(GpuStep::name).into_iter().zip(times).collect(), ..Run::default() })
     };
     Method { name, side: Some(side), run: Box::new(run) }
@@ -319,14 +306,14 @@ fn on_gpu_and_cpu<'a>(kind: &str, sites: &'a [Site], side: u32) -> Option<Method
     let executor = Executor::start(&options, GpuUse::Required, u64::MAX).ok()?;
     let mut buffers = PipelineBuffers::default();
     let run = move || {
-        let mut run = pipeline(&mut buffers, |buffers| triangulate_with(sites, Some(&executor), buffers))?;
+        let mut run = pipeline(&mut buffers, |buffers| triangulate_with(sites, &executor.mesh(sites), buffers))?;
         if run.counts.on_gpu == 0 {
-            return Err("the GPU did not compute the diagram".into());
+            return Err("the GPU's mesh was of no use".into());
         }
-        // Put the steps in the order in which they happen, and name them after what is left on the CPU.
+        // Put the steps in the order in which they happen, and name the one that takes over the device's mesh.
         run.steps.rotate_right(1);
-        run.steps.swap(0, 1);
-        (run.steps[1].0, run.steps[2].0) = ("upload, G1 to G3, read back", "G4-G6 triangles, most flips");
+        run.steps.retain(|(step, _)| !["G1 write sites", "G3 islands"].contains(step));
+        (run.steps[0].0, run.steps[1].0) = ("upload, G1 to G6, flips, read back", "check, take over");
         Ok(run)
     };
     Some(Method { name: format!("{kind} and CPU"), side: Some(side), run: Box::new(run) })

@@ -62,6 +62,12 @@ impl AtlasLeaf {
         self.height / BLOCK_SIDE + 1
     }
 
+    /// Returns the number of the block, counted from the leaf's first one, to which a site belongs.
+    pub fn block_of(&self, site: Site) -> u32 {
+        let [x, y] = self.pixel(site).map(|c| c / BLOCK_SIDE);
+        y * self.blocks_x() + x
+    }
+
     /// Returns the number of a pixel.
     pub fn at(&self, x: u32, y: u32) -> u32 {
         self.base + y * self.stride + x

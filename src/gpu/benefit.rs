@@ -1,5 +1,6 @@
 //! Whether a GPU that a job may use, but need not, makes its leaves cheaper: the processor time a site with its help, and without.
 
+use crate::voronoi::mesh_reply::MeshReply;
 use serde::{Deserialize, Serialize};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -45,6 +46,10 @@ struct Measured {
     asked: u64,
     /// Leaves for which help has been asked, and nothing came that could be used.
     in_vain: u64,
+    /// Those of them that the GPU gave up itself.
+    flagged: u64,
+    /// Those of them whose mesh did not suit.
+    rejected: u64,
     given_up: Option<String>,
 }
 
@@ -84,6 +89,12 @@ pub struct GpuFigures {
     pub alone: u64,
     /// Leaves that workers did after it had been asked in vain.
     pub in_vain: u64,
+    /// Those of them that it gave up itself.
+    #[serde(default)]
+    pub flagged: u64,
+    /// Those of them whose mesh did not suit.
+    #[serde(default)]
+    pub rejected: u64,
     /// Nanoseconds of processor time a site with its help, among the last leaves; 0 if there were none.
     pub ns_per_site_helped: f64,
     /// As above, without its help.
@@ -119,10 +130,12 @@ impl GpuBenefit {
         }
     }
 
-    /// Notes that help was asked for a leaf, and nothing came that could be used.
-    pub(crate) fn note_in_vain(&self) {
+    /// Notes that help was asked for a leaf, and that `reply` could not be used.
+    pub(crate) fn note_in_vain(&self, reply: &MeshReply) {
         let mut measured = self.measured();
         measured.in_vain += 1;
+        measured.flagged += u64::from(matches!(reply, MeshReply::Flagged));
+        measured.rejected += u64::from(matches!(reply, MeshReply::Made(_)));
         if !self.is_required && measured.in_vain >= TRIAL.max(measured.helped.leaves) {
             measured.give_up("most of what it was asked for was late or wrong");
         }
@@ -147,6 +160,8 @@ impl GpuBenefit {
             helped: measured.helped.leaves,
             alone: measured.alone.leaves,
             in_vain: measured.in_vain,
+            flagged: measured.flagged,
+            rejected: measured.rejected,
             ns_per_site_helped: per_site(measured.helped),
             ns_per_site_alone: per_site(measured.alone),
             given_up: measured.given_up.clone(),
@@ -207,9 +222,12 @@ mod tests {
         let helped = benefit.figures().helped;
         for asked in 1..=helped {
             assert!(benefit.is_worth_asking(), "{asked}");
-            benefit.note_in_vain();
+            let reply = if asked.is_multiple_of(3) { MeshReply::Flagged } else { MeshReply::Unavailable };
+            benefit.note_in_vain(&reply);
         }
         assert!(!benefit.is_worth_asking());
+        let GpuFigures { in_vain, flagged, rejected, .. } = benefit.figures();
+        assert_eq!([in_vain, flagged, rejected], [helped, helped / 3, 0]);
     }
 
     #[test]

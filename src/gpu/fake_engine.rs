@@ -1,8 +1,10 @@
-//! An engine for tests that is no GPU: it computes diagrams on its own thread, and answers late, or never. `GDT_GPU=slow:n` is n
-//! milliseconds late for every leaf, and `GDT_GPU=silent` never answers.
+//! An engine for tests that is no GPU: it makes meshes on its own thread with the shaders' twins, and answers late, or never.
+//! `GDT_GPU=slow:n` is n milliseconds late for every atlas, and `GDT_GPU=silent` never answers.
 
-use crate::gpu::diagram_engine::{DiagramEngine, TextureSites};
 use crate::gpu::error::GpuError;
+use crate::gpu::filled_atlas::FilledAtlas;
+use crate::gpu::mesh_engine::MeshEngine;
+use crate::gpu::options::VoronoiMethod;
 use crate::gpu::timestamps::StepNanoseconds;
 use crate::gpu::twins;
 use std::time::Duration;
@@ -30,24 +32,27 @@ impl FakeEngine {
     }
 }
 
-impl DiagramEngine for FakeEngine {
-    type Pending = TextureSites;
+impl MeshEngine for FakeEngine {
+    type Pending = FilledAtlas;
 
-    fn start(&mut self, _: usize, sites: &TextureSites) -> Result<TextureSites, GpuError> {
-        Ok(sites.clone())
+    fn start(&mut self, _: usize, filled: &FilledAtlas) -> Result<FilledAtlas, GpuError> {
+        Ok(filled.clone())
     }
 
-    fn finish(&mut self, _: usize, sites: TextureSites) -> Result<(Vec<u32>, StepNanoseconds), GpuError> {
+    fn finish(
+        &mut self,
+        _: usize,
+        filled: FilledAtlas,
+        take: &mut dyn FnMut(&[u32]),
+    ) -> Result<StepNanoseconds, GpuError> {
         let Some(delay) = self.delay else {
             loop {
                 std::thread::park();
             }
         };
         std::thread::sleep(delay);
-        let texture = twins::write_sites(sites.size, &sites.pixels);
-        let mut labels = twins::voronoi_exact(sites.size, &texture);
-        twins::remove_islands(sites.size, &mut labels);
-        Ok((labels, StepNanoseconds::default()))
+        take(&twins::atlas::mesh(&filled.atlas, &filled.sites, VoronoiMethod::Exact));
+        Ok(StepNanoseconds::default())
     }
 
     fn free(&mut self, _: usize) {}

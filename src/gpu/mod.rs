@@ -1,8 +1,8 @@
 //! Steps G1 to G6 on a GPU, with wgpu: Vulkan, Metal or DX12.
 //!
 //! `shaders/` has one WGSL file per step, and [`twins`] has a plain loop for each that gives the same numbers bit for bit.
-//! [`steps`] records which dispatches a step consists of, [`engine`] runs recordings on a device, and [`executor`] makes the
-//! discrete Voronoi diagrams of leaves on a thread of its own. Room `voronoi` turns a diagram into a mesh and proves that mesh.
+//! [`steps`] and [`atlas_steps`] record which dispatches a step consists of, [`engine`] runs recordings on a device, and [`executor`] gets
+//! the meshes of leaves from a thread of its own, many leaves at a time. Room `voronoi` completes these meshes and proves them.
 
 pub mod atlas;
 pub mod atlas_steps;
@@ -10,7 +10,6 @@ pub mod benefit;
 pub mod buffer_id;
 pub mod buffers;
 pub mod device;
-mod diagram_engine;
 pub mod engine;
 pub mod error;
 pub mod executor;

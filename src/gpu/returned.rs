@@ -2,6 +2,7 @@
 
 use crate::gpu::atlas::Atlas;
 use crate::gpu::leaf_flags::TOO_MANY_TRIANGLES;
+use crate::voronoi::mesh_reply::{MadeMesh, MeshReply};
 use std::ops::Range;
 
 /// Where everything lies among the numbers that come back.
@@ -97,6 +98,23 @@ impl<'a> ReturnedAtlas<'a> {
             blocks_x: place.blocks_x(),
         })
     }
+
+    /// Returns the answer for leaf number `leaf`: a copy of its part.
+    pub fn reply(&self, leaf: usize) -> MeshReply {
+        let (Some(&place), Some(back)) = (self.atlas.leaves.get(leaf), self.leaf(leaf)) else {
+            return MeshReply::Flagged;
+        };
+        match back.flags {
+            0 => MeshReply::Made(MadeMesh {
+                records: back.records.to_vec(),
+                missing: back.missing.to_vec(),
+                unfinished: back.unfinished.to_vec(),
+                block_starts: back.block_starts.to_vec(),
+                block_of: Box::new(move |site| place.block_of(site)),
+            }),
+            _ => MeshReply::Flagged,
+        }
+    }
 }
 
 #[cfg(test)]
@@ -145,5 +163,12 @@ mod tests {
         assert_eq!(leaf(&numbers), None);
         numbers[layout.leaves.start + 1] = TOO_MANY_TRIANGLES;
         assert_eq!(leaf(&numbers), Some(0));
+        let is_made = |numbers: &[u32]| {
+            let reply = ReturnedAtlas::new(&atlas, numbers).unwrap().reply(0);
+            matches!(reply, MeshReply::Made(made) if made.records.len() == 8)
+        };
+        assert!(!is_made(&numbers));
+        (numbers[layout.leaves.start], numbers[layout.leaves.start + 1]) = (1, 0);
+        assert!(is_made(&numbers));
     }
 }

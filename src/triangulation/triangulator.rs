@@ -10,7 +10,7 @@ use crate::threads::{own_cpu_seconds, unless_interrupted};
 use crate::triangulation::options::{Backend, TriangulationOptions};
 use crate::triangulation::{divide_and_conquer, reference};
 use crate::voronoi::counts::PipelineCounts;
-use crate::voronoi::diagram_backend::DiagramBackend;
+use crate::voronoi::mesh_reply::MeshReply;
 use crate::voronoi::rejection::Rejection;
 use crate::voronoi::{self, PipelineBuffers};
 use crate::{Error, Result};
@@ -48,7 +48,6 @@ impl AddAssign for TriangulationCounts {
 
 thread_local! {
     /// The pipeline's buffers that are not in use. They are kept from leaf to leaf, so that each thread faults in their pages only once.
-    /// While one leaf waits for a GPU, the thread may do another, which then has buffers of its own.
     static BUFFERS: RefCell<Vec<PipelineBuffers>> = RefCell::default();
 }
 
@@ -65,8 +64,8 @@ pub struct Triangulator {
     gpu: Option<Executor>,
 }
 
-/// Bytes that the CPU needs per pixel of a GPU's texture: the label, where the site is listed, and a share of a buffer.
-const BYTES_PER_PIXEL: u64 = 12;
+/// The share of the memory that the CPU's side of a GPU may take.
+const SHARE_FOR_GPU: u64 = 4;
 /// "auto" uses no GPU if the whole job has less memory than this, because drivers would take too large a share of it.
 const MIN_MEMORY: u64 = 1 << 30;
 
@@ -76,19 +75,19 @@ impl Triangulator {
         Triangulator { pipeline: config.backend != Backend::Reference, gpu: None }
     }
 
-    /// Returns the triangulator that the configuration asks for, for leaves on `threads` threads at once within `memory` bytes.
+    /// Returns the triangulator that the configuration asks for, for a job that has `memory` bytes.
     ///
     /// # Errors
     /// [`Error::Config`] if the configuration requires a GPU and none is suitable. If it only allows a GPU, the triangulator works
     /// without one.
-    pub fn new(config: &TriangulationOptions, gpu: &GpuOptions, memory: u64, threads: usize) -> Result<Triangulator> {
+    pub fn new(config: &TriangulationOptions, gpu: &GpuOptions, memory: u64) -> Result<Triangulator> {
         let pipeline = config.backend != Backend::Reference;
         let gpu_use = match config.backend {
             Backend::Gpu => GpuUse::Required,
             Backend::Auto if memory >= MIN_MEMORY && Executor::is_likely() => GpuUse::Optional,
             _ => return Ok(Triangulator { pipeline, gpu: None }),
         };
-        match Executor::start(gpu, gpu_use, memory / 4 / threads as u64 / BYTES_PER_PIXEL) {
+        match Executor::start(gpu, gpu_use, memory / SHARE_FOR_GPU) {
             Ok(gpu) => Ok(Triangulator { pipeline, gpu: Some(gpu) }),
             Err(_) if gpu_use == GpuUse::Optional => Ok(Triangulator { pipeline, gpu: None }),
             Err(why) => Err(Error::Config(format!(
@@ -135,17 +134,19 @@ impl Triangulator {
 
     fn by_pipeline(&self, sites: &[Site]) -> std::result::Result<(HalfEdgeMesh, PipelineCounts), Rejection> {
         let Some(gpu) = &self.gpu else { return with_buffers(|buffers| voronoi::triangulate(sites, buffers)) };
-        let asked = gpu.is_worth_asking();
+        let asked = gpu.is_worth_asking(sites.len());
         let begun = own_cpu_seconds();
-        let helper = asked.then_some(gpu as &dyn DiagramBackend);
-        let done = with_buffers(|buffers| voronoi::triangulate_with(sites, helper, buffers))?;
-        let is_helped = done.1.on_gpu > 0;
-        // A leaf that has asked in vain has cost more than one alone.
+        // A leaf that waits has no buffers yet: meanwhile its thread may do many others.
+        let reply = if asked { gpu.mesh(sites) } else { MeshReply::Unavailable };
+        let done = with_buffers(|buffers| voronoi::triangulate_with(sites, &reply, buffers));
+        let is_helped = done.as_ref().is_ok_and(|(_, counts)| counts.on_gpu > 0);
         match asked && !is_helped {
-            true => gpu.benefit.note_in_vain(),
-            false => gpu.benefit.note(is_helped, sites.len(), own_cpu_seconds() - begun),
+            // It has cost more than a leaf alone.
+            true => gpu.benefit.note_in_vain(&reply),
+            false if done.is_ok() => gpu.benefit.note(is_helped, sites.len(), own_cpu_seconds() - begun),
+            false => {}
         }
-        Ok(done)
+        done
     }
 }
 

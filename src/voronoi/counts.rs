@@ -17,7 +17,7 @@ pub const STEP_NAMES: [&str; 8] = [
 /// What the steps count: sites, triangles or edges.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct PipelineCounts {
-    /// Leaves whose Voronoi diagram a GPU computed.
+    /// Leaves whose mesh a GPU has made.
     pub on_gpu: u64,
     /// Sites given.
     pub sites: u64,

@@ -101,27 +101,6 @@ impl SiteTexture {
         vertices.zip(&self.missing).map(|(vertex, &place)| MissingSite { vertex, place })
     }
 
-    /// Returns the pixel (y << 16 | x) of every site in the texture, by vertex.
-    pub(super) fn placed_pixels(&self) -> Vec<u32> {
-        let mut pixels = Vec::with_capacity(self.placed);
-        for (at, &word) in self.occupied.iter().enumerate() {
-            let (y, x) = (at / self.words, 64 * (at % self.words));
-            let mut bits = word;
-            while bits != 0 {
-                pixels.push((y << 16 | (x + bits.trailing_zeros() as usize)) as u32);
-                bits &= bits - 1;
-            }
-        }
-        pixels
-    }
-
-    /// Returns whether `label` (y << 16 | x) is a pixel of the texture that has a site.
-    #[inline(always)]
-    pub(super) fn has_site(&self, label: u32) -> bool {
-        let (x, y) = ((label & 0xffff) as usize, (label >> 16) as usize);
-        x < self.width && y < self.height && self.occupied[y * self.words + x / 64] >> (x % 64) & 1 != 0
-    }
-
     /// Fills `rows` and `row_ends`.
     fn sort_by_row(&mut self, sites: &[Site], (low, scale): (Site, f64)) {
         self.row_ends.clear();

@@ -35,8 +35,6 @@ pub(super) struct LabelRows {
     columns: Vec<i16>,
     keys: Vec<i16>,
     envelope: Vec<Parabola>,
-    /// The labels of all pixels, if a backend has computed them.
-    given: Option<Vec<u32>>,
 }
 
 /// A site seen from a row. It is the nearest from pixel `from` on, until the next parabola starts.
@@ -51,7 +49,6 @@ struct Parabola {
 impl LabelRows {
     /// Prepares for the rows of `texture`.
     pub(super) fn start(&mut self, texture: &SiteTexture) {
-        self.given = None;
         self.stride = texture.words * 64;
         self.south.clear();
         self.south.resize(self.stride, LONG);
@@ -61,16 +58,6 @@ impl LabelRows {
         self.columns.resize(self.stride + 2 * (REACH + 1), FAR);
         self.keys.resize(self.stride, FAR);
         self.measure_north(texture);
-    }
-
-    /// Takes the labels of all pixels of `texture`, row by row, from a backend that need not be trusted; returns whether they can be
-    /// used.
-    pub(super) fn take(&mut self, texture: &SiteTexture, labels: Vec<u32>) -> bool {
-        // Most neighbours have the same label, which is looked up only once.
-        let mut runs = labels.chunk_by(|a, b| a == b);
-        let whole = labels.len() == texture.width * texture.height && runs.all(|run| texture.has_site(run[0]));
-        self.given = whole.then_some(labels);
-        whole
     }
 
     fn measure_north(&mut self, texture: &SiteTexture) {
@@ -84,10 +71,6 @@ impl LabelRows {
 
     /// Writes the labels of row `y` to `labels[1..=width]`. Callers must ask for the rows in order.
     pub(super) fn row(&mut self, texture: &SiteTexture, y: usize, labels: &mut [u32]) {
-        if let Some(given) = &self.given {
-            labels[1..=texture.width].copy_from_slice(&given[y * texture.width..][..texture.width]);
-            return;
-        }
         let occupied = &texture.occupied[y * texture.words..][..texture.words];
         grow(&mut self.south, occupied);
         for_each_bit(occupied, |x| self.south_row[x] = y as u32 + 1);

@@ -30,13 +30,13 @@ mod closed_mesh;
 mod completion;
 pub mod counts;
 pub mod device_mesh;
-pub mod diagram_backend;
 mod edge_tester;
 mod g1_write_sites;
 mod g2_voronoi;
 mod g3_islands;
 mod g6_triangles;
 mod index;
+pub mod mesh_reply;
 pub mod rejection;
 #[cfg(test)]
 pub(crate) mod test_cases;
@@ -53,11 +53,11 @@ use crate::voronoi::closed_mesh::ClosedMesh;
 use crate::voronoi::completion::Completion;
 use crate::voronoi::counts::{PipelineCounts, StepTimer};
 use crate::voronoi::device_mesh::{DeviceMesh, copy_sites};
-use crate::voronoi::diagram_backend::{DiagramBackend, DiagramReply};
 use crate::voronoi::g1_write_sites::SiteTexture;
 use crate::voronoi::g2_voronoi::LabelRows;
 use crate::voronoi::g3_islands::IslandSearch;
 use crate::voronoi::g6_triangles::TextureScan;
+use crate::voronoi::mesh_reply::MeshReply;
 use crate::voronoi::rejection::Rejection;
 use crate::voronoi::texture_request::TextureRequest;
 
@@ -96,18 +96,6 @@ impl PipelineBuffers {
 /// # Errors
 /// [`Rejection`] if the pipeline does not suit the sites. It never returns a wrong mesh.
 pub fn triangulate(sites: &[Site], buffers: &mut PipelineBuffers) -> Result<(HalfEdgeMesh, PipelineCounts), Rejection> {
-    triangulate_with(sites, None, buffers)
-}
-
-/// As [`triangulate`], but `backend` computes the Voronoi diagram if it can. The backend need not be trusted.
-///
-/// # Errors
-/// As [`triangulate`].
-pub fn triangulate_with(
-    sites: &[Site],
-    backend: Option<&dyn DiagramBackend>,
-    buffers: &mut PipelineBuffers,
-) -> Result<(HalfEdgeMesh, PipelineCounts), Rejection> {
     check_size(sites)?;
     let PipelineBuffers { request, texture, labels, scan, closed, islands, shift, flips, acceptance, mesh, .. } =
         buffers;
@@ -116,7 +104,9 @@ pub fn triangulate_with(
     shift.reset(sites.len());
     flips.reset(sites.len());
 
-    discretise(sites, backend, request, texture, labels, &mut counts)?;
+    texture.write(sites, request, &mut counts)?;
+    // The scan computes each row of labels when it needs it.
+    labels.start(texture);
     timer.finish(&mut counts, 0);
     scan.run(texture, labels, closed, shift, flips)?;
     counts.inverted = shift.inverted.len() as u64;
@@ -129,6 +119,23 @@ pub fn triangulate_with(
     completion.insert(texture.missing(), |pixel| scan.start_near(pixel))?;
     let counts = completion.prove(Some(&texture.order), acceptance, mesh)?;
     Ok((std::mem::take(mesh), counts))
+}
+
+/// As [`triangulate`], but from a device's mesh if `reply` has one that suits.
+///
+/// # Errors
+/// As [`triangulate`].
+pub fn triangulate_with(
+    sites: &[Site],
+    reply: &MeshReply,
+    buffers: &mut PipelineBuffers,
+) -> Result<(HalfEdgeMesh, PipelineCounts), Rejection> {
+    if let MeshReply::Made(made) = reply
+        && let Ok(done) = from_device(sites, &made.lend(), buffers)
+    {
+        return Ok(done);
+    }
+    triangulate(sites, buffers)
 }
 
 /// As [`triangulate`], from the mesh that a device has made. The device need not be trusted: its mesh may be anything.
@@ -157,38 +164,6 @@ pub fn from_device(
     completion.insert(made.missing(sites), |block| made.start_near(block))?;
     let counts = completion.prove(None, acceptance, mesh)?;
     Ok((std::mem::take(mesh), counts))
-}
-
-/// Does steps G1 and G2. Without a backend, G2 is only prepared: the scan computes each row when it needs it.
-fn discretise(
-    sites: &[Site],
-    backend: Option<&dyn DiagramBackend>,
-    request: &TextureRequest,
-    texture: &mut SiteTexture,
-    labels: &mut LabelRows,
-    counts: &mut PipelineCounts,
-) -> Result<(), Rejection> {
-    if let Some(backend) = backend {
-        let before = *counts;
-        loop {
-            texture.write(sites, &backend.texture_request(), counts)?;
-            match backend.diagram(texture.width as u32, texture.height as u32, texture.placed_pixels()) {
-                DiagramReply::Labels(given) => {
-                    if labels.take(texture, given) {
-                        counts.on_gpu = 1;
-                        return Ok(());
-                    }
-                    break;
-                }
-                DiagramReply::TooLarge => *counts = before,
-                DiagramReply::Unavailable => break,
-            }
-        }
-        *counts = before;
-    }
-    texture.write(sites, request, counts)?;
-    labels.start(texture);
-    Ok(())
 }
 
 fn check_size(sites: &[Site]) -> Result<(), Rejection> {

@@ -1,7 +1,7 @@
 //! A device that answers at once: its meshes are made in advance, with the twins of the shaders.
 
 use gdt_batch::geometry::Site;
-use gdt_batch::gpu::atlas::{Atlas, AtlasLeaf, BLOCK_SIDE};
+use gdt_batch::gpu::atlas::{Atlas, AtlasLeaf};
 use gdt_batch::gpu::options::VoronoiMethod;
 use gdt_batch::gpu::returned::ReturnedAtlas;
 use gdt_batch::gpu::twins::atlas;
@@ -54,10 +54,7 @@ impl Answer {
         if self.flags != 0 {
             return Err(Rejection::NotAccepted("the device has flagged the leaf"));
         }
-        let block_of = |site| {
-            let [x, y] = self.leaf.pixel(site).map(|c| c / BLOCK_SIDE);
-            y * self.leaf.blocks_x() + x
-        };
+        let block_of = |site| self.leaf.block_of(site);
         let made = DeviceMesh {
             records: &self.records,
             missing: &self.missing,

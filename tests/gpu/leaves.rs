@@ -3,14 +3,16 @@
 use super::random::Random;
 use super::rig::Rig;
 use gdt_batch::geometry::Site;
+use gdt_batch::gpu::filled_atlas::{AtlasLimits, FilledAtlas};
 use gdt_batch::gpu::options::{GpuOptions, TextureSide, VoronoiMethod};
+use gdt_batch::gpu::returned::ReturnedAtlas;
+use gdt_batch::gpu::twins;
 use gdt_batch::job::{self, progress::stage::ProgressOutput};
 use gdt_batch::triangulation::options::{Backend, TriangulationOptions};
 use gdt_batch::triangulation::{TriangulationCounts, Triangulator};
 use gdt_batch::verify::verify;
-use gdt_batch::voronoi::diagram_backend::{DiagramBackend, DiagramReply};
-use gdt_batch::voronoi::rejection::Rejection;
-use gdt_batch::voronoi::texture_request::{TextureRequest, TextureResolution};
+use gdt_batch::voronoi::mesh_reply::{MadeMesh, MeshReply};
+use gdt_batch::voronoi::texture_request::TextureResolution;
 use gdt_batch::voronoi::{self, PipelineBuffers};
 use std::collections::BTreeSet;
 
@@ -21,7 +23,7 @@ fn settings(backend: Backend) -> TriangulationOptions {
 }
 
 fn solve(config: &TriangulationOptions, gpu: &GpuOptions, sites: &[Site]) -> (BTreeSet<[u32; 3]>, TriangulationCounts) {
-    let (mesh, outcome) = Triangulator::new(config, gpu, MEMORY, 2).unwrap().triangulate(sites).unwrap();
+    let (mesh, outcome) = Triangulator::new(config, gpu, MEMORY).unwrap().triangulate(sites).unwrap();
     let turned = mesh.corners().iter().map(|&[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().unwrap());
     (turned.collect(), outcome)
 }
@@ -74,58 +76,57 @@ fn a_leaf_has_the_same_triangles_with_every_backend() {
     }
 }
 
-/// A backend whose diagrams are wrong.
-struct Liar(fn(u32, u32, &[u32]) -> Vec<u32>);
+/// Returns the answer of a device for `sites`.
+fn reply(sites: &[Site]) -> MeshReply {
+    let mut filled = FilledAtlas::default();
+    let limits = AtlasLimits { pixels: 1 << 24, bytes: 1 << 27 };
+    assert!(filled.add(sites, TextureResolution::PixelsPerSite(16.0), limits));
+    let numbers = twins::atlas::mesh(&filled.atlas, &filled.sites, VoronoiMethod::Exact);
+    ReturnedAtlas::new(&filled.atlas, &numbers).expect("all numbers came back").reply(0)
+}
 
-impl DiagramBackend for Liar {
-    fn texture_request(&self) -> TextureRequest {
-        TextureRequest { resolution: TextureResolution::PixelsPerSite(5.0), max_side: 16_384, max_pixels: 1 << 28 }
-    }
-
-    fn diagram(&self, width: u32, height: u32, pixels: Vec<u32>) -> DiagramReply {
-        DiagramReply::Labels((self.0)(width, height, &pixels))
+/// Returns the answer of a device, once `spoil` has spoilt the mesh.
+fn spoilt(sites: &[Site], spoil: impl FnOnce(&mut MadeMesh)) -> MeshReply {
+    match reply(sites) {
+        MeshReply::Made(mut made) => {
+            spoil(&mut made);
+            MeshReply::Made(made)
+        }
+        other => other,
     }
 }
 
+/// A leaf is done without the device if its answer is of no use.
 #[test]
-fn a_wrong_diagram_never_makes_a_wrong_mesh() {
+fn a_wrong_answer_never_makes_a_wrong_mesh() {
     let (_, sites) = inputs().swap_remove(0);
     let (expected, _) = solve(&settings(Backend::Reference), &GpuOptions::default(), &sites);
-    // The flag says whether every label is a pixel with a site, so that only the mesh shows the lie.
-    let liars: [(&str, bool, Liar); 6] = [
-        ("too few labels", false, Liar(|_, _, pixels| pixels.to_vec())),
-        ("none at all", false, Liar(|_, _, _| Vec::new())),
-        ("no site there", false, Liar(|w, h, _| vec![u32::MAX; (w * h) as usize])),
-        ("one label", true, Liar(|w, h, pixels| vec![pixels[pixels.len() / 2]; (w * h) as usize])),
-        ("in order", true, Liar(|w, h, pixels| pixels.iter().copied().cycle().take((w * h) as usize).collect())),
-        (
-            "noise",
-            true,
-            Liar(|w, h, pixels| {
-                let mut random = Random(5);
-                (0..w * h).map(|_| pixels[random.below(pixels.len() as u32) as usize]).collect()
-            }),
-        ),
+    let replies = [
+        ("as it is", 1, reply(&sites)),
+        ("flagged", 0, MeshReply::Flagged),
+        ("none", 0, MeshReply::Unavailable),
+        ("no record", 0, spoilt(&sites, |made| made.records.clear())),
+        ("zeros", 0, spoilt(&sites, |made| made.records.fill(0))),
+        ("reversed", 0, spoilt(&sites, |made| made.records.reverse())),
+        ("of other sites", 0, reply(&inputs()[1].1)),
+        ("no block known", 1, spoilt(&sites, |made| made.block_of = Box::new(|_| u32::MAX))),
     ];
-    for (name, plausible, liar) in liars {
-        match voronoi::triangulate_with(&sites, Some(&liar), &mut PipelineBuffers::default()) {
-            Ok((mesh, counts)) => {
-                let turn = |&[a, b, c]: &[u32; 3]| [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().unwrap();
-                assert!(mesh.corners().iter().map(turn).collect::<BTreeSet<_>>() == expected, "{name}");
-                assert_eq!(counts.on_gpu, plausible as u64, "{name}");
-            }
-            Err(why) => assert!(plausible && matches!(why, Rejection::NotAccepted(_)), "{name}: {why}"),
-        }
+    for (name, on_gpu, reply) in replies {
+        let done = voronoi::triangulate_with(&sites, &reply, &mut PipelineBuffers::default());
+        let (mesh, counts) = done.unwrap_or_else(|why| panic!("{name}: {why}"));
+        let turn = |&[a, b, c]: &[u32; 3]| [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().unwrap();
+        assert!(mesh.corners().iter().map(turn).collect::<BTreeSet<_>>() == expected, "{name}");
+        assert_eq!(counts.on_gpu, on_gpu, "{name}");
     }
 }
 
 #[test]
 fn a_gpu_that_does_not_exist_is_an_error_if_required_and_none_otherwise() {
     let nameless = GpuOptions { adapter: Some("no GPU has this name".into()), ..GpuOptions::default() };
-    let error = Triangulator::new(&settings(Backend::Gpu), &nameless, MEMORY, 1).err().expect("there is no such GPU");
+    let error = Triangulator::new(&settings(Backend::Gpu), &nameless, MEMORY).err().expect("there is no such GPU");
     assert_eq!(error.exit_code(), 2);
     assert!(error.to_string().contains("no GPU has this name"), "{error}");
-    assert!(Triangulator::new(&settings(Backend::Auto), &nameless, MEMORY, 1).unwrap().gpu().is_none());
+    assert!(Triangulator::new(&settings(Backend::Auto), &nameless, MEMORY).unwrap().gpu().is_none());
 }
 
 #[test]

@@ -54,7 +54,7 @@ fn run_steps(job: &Job, options: &JobOptions) -> (Store, Partition) {
     let store = Store::create(directory.store()).unwrap();
     let points = PointFiles::open(&directory.point_files().unwrap()).unwrap();
     let cpu = TriangulationOptions { backend: Backend::Cpu, ..TriangulationOptions::default() };
-    let triangulator = Triangulator::new(&cpu, &gdt_batch::gpu::options::GpuOptions::default(), 1 << 28, 1).unwrap();
+    let triangulator = Triangulator::new(&cpu, &gdt_batch::gpu::options::GpuOptions::default(), 1 << 28).unwrap();
     let tree = &partition.tree;
     for tile in tree.tiles().rev() {
         triangulate_leaf(&plan, &partition, &points, &store, &triangulator, tile).unwrap();

@@ -96,7 +96,7 @@ pub(crate) fn run_until_it_fits(
     // Before the inputs, so that a job that must have a GPU fails at once if there is none.
     let memory = options.limits.memory.0;
     let triangulator = match work {
-        EarlierWork::Interrupted => Triangulator::new(&options.triangulation, &options.gpu, memory, options.threads())?,
+        EarlierWork::Interrupted => Triangulator::new(&options.triangulation, &options.gpu, memory)?,
         // All is triangulated, and this machine may have no GPU.
         EarlierWork::ByTasks => Triangulator::without_gpu(&options.triangulation),
     };

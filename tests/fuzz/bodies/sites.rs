@@ -17,7 +17,7 @@ const MAX_SITES: usize = 1500;
 pub(crate) fn sites(bytes: &[u8]) {
     let sites = sites_of(bytes);
     let wanted = TriangulationOptions { backend: Backend::Cpu, ..TriangulationOptions::default() };
-    let triangulator = Triangulator::new(&wanted, &gdt_batch::gpu::options::GpuOptions::default(), 1 << 28, 1)
+    let triangulator = Triangulator::new(&wanted, &gdt_batch::gpu::options::GpuOptions::default(), 1 << 28)
         .expect("the CPU is always there");
     let (mesh, _) = triangulator.triangulate(&sites).expect("a mesh of distinct sites");
     judge::judge(&sites, &mesh);

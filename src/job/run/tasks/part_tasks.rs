@@ -103,7 +103,7 @@ impl PartTask<'_> {
         let options = &self.job.plan.options;
         let threads = rayon::current_num_threads();
         let triangulator = match self.phase {
-            Phase::Mesh => Triangulator::new(&options.triangulation, &options.gpu, options.limits.memory.0, threads)?,
+            Phase::Mesh => Triangulator::new(&options.triangulation, &options.gpu, options.limits.memory.0)?,
             _ => Triangulator::without_gpu(&options.triangulation),
         };
         let job = &PartsJob {
