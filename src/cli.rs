@@ -155,9 +155,9 @@ pub enum CliCommand {
         /// Part of the name of the GPU to test. Default: the GPU that backend = "gpu" takes.
         #[arg(long)]
         adapter: Option<String>,
-        /// The side of the largest texture to time, in pixels.
+        /// The most leaves in an atlas to time; 0 times nothing.
         #[arg(long)]
-        side: Option<u32>,
+        leaves: Option<usize>,
     },
     /// Write a made-up sample terrain as LAS or LAZ.
     Sample {

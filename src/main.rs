@@ -69,7 +69,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
             print_result(&job::status(&config::load(config)?, *tasks)?, print).map(|()| ExitCode::SUCCESS)
         }
         (Some(CliCommand::Info { files }), _) => show_info(files, print),
-        (Some(CliCommand::Gpu { adapter, side }), _) => test_gpu(adapter.as_deref(), *side, print),
+        (Some(CliCommand::Gpu { adapter, leaves }), _) => test_gpu(adapter.as_deref(), *leaves, print),
         (Some(CliCommand::Sample { file, points, seed, overwrite }), _) => {
             interrupt::listen()?;
             sample::write(file, *points, *seed, *overwrite).map(|()| ExitCode::SUCCESS)
@@ -198,8 +198,8 @@ fn verify_output(directory: &Path, memory: u64, inputs: &[PathBuf], print: Print
     Ok(ExitCode::from(verdict.verdict.exit_code()))
 }
 
-fn test_gpu(adapter: Option<&str>, side: Option<u32>, print: PrintOptions) -> Result<ExitCode> {
-    let test = selftest::run(adapter, side)?;
+fn test_gpu(adapter: Option<&str>, leaves: Option<usize>, print: PrintOptions) -> Result<ExitCode> {
+    let test = selftest::run(adapter, leaves)?;
     print_result(&test, print)?;
     if test.holds() {
         return Ok(ExitCode::SUCCESS);

@@ -7,8 +7,6 @@ use wgpu::BufferUsages;
 pub enum BufferId {
     /// The parameters of all dispatches, one block of bytes each.
     Params,
-    /// The pixel (y << 16 | x) of every site.
-    Pixels,
     /// The complement of the number of the site in a pixel, or 0.
     Texture,
     /// Which of the 32 rows of a band have a site: one number per column and band.
@@ -21,16 +19,6 @@ pub enum BufferId {
     Labels,
     /// The other copy of the labels, between which jump flooding alternates.
     Flood,
-    /// The number of pixels that are islands, then the pixel and the new label of each.
-    Islands,
-    /// Workgroup counts of the next dispatches of step G3.
-    Workgroups,
-    /// Voronoi vertices: two words for 32 corners.
-    Vertices,
-    /// Numbers of triangles: all levels of the prefix sums.
-    Counts,
-    /// Triples of site numbers.
-    Triangles,
     /// Two coordinates for each site; the x of the vertex at infinity is the least of all.
     Sites,
     /// The mesh: eight numbers for each triangle, three corners, a note, three twins, a partner.
@@ -70,7 +58,6 @@ impl BufferId {
         match self {
             BufferId::Params => BufferUsages::UNIFORM | BufferUsages::COPY_DST,
             BufferId::Staging => BufferUsages::MAP_READ | BufferUsages::COPY_DST,
-            BufferId::Workgroups => BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::INDIRECT,
             _ => BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC,
         }
     }

@@ -108,7 +108,7 @@ pub fn wanted_limits(adapter: &Limits) -> Limits {
 }
 
 /// Returns the number of pixels of the largest texture that `limits` allow.
-pub fn max_pixels(limits: &Limits) -> u64 {
+fn max_pixels(limits: &Limits) -> u64 {
     (limits.max_buffer_size.min(limits.max_storage_buffer_binding_size) / 4).min(u64::from(MAX_SIDE).pow(2))
 }
 

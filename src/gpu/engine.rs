@@ -4,7 +4,7 @@ use crate::gpu::buffer_id::BufferId;
 use crate::gpu::buffers::BufferSet;
 use crate::gpu::device::Device;
 use crate::gpu::error::GpuError;
-use crate::gpu::steps::{GpuCommand, GpuStep, Recording, ShaderProgram, WorkgroupCount};
+use crate::gpu::steps::{GpuCommand, GpuStep, Recording, ShaderProgram};
 use crate::gpu::timestamps::{DispatchMarks, GpuTimestamps, STAMP_BYTES, StepNanoseconds, marks};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -228,10 +228,7 @@ impl GpuEngine {
                     let marks = marks.and_then(|marks| marks.get(runs as usize)).copied().unwrap_or_default();
                     self.encode(&mut encoder, buffers, program, *count, runs * BufferSet::STRIDE, marks)?;
                     runs += 1;
-                    workgroups += match count {
-                        WorkgroupCount::Fixed([x, y]) => u64::from(*x) * u64::from(*y),
-                        WorkgroupCount::Indirect(_) => 0,
-                    };
+                    workgroups += u64::from(count[0]) * u64::from(count[1]);
                     if workgroups > WORKGROUPS_PER_SUBMISSION {
                         workgroups = 0;
                         queue.submit([std::mem::replace(&mut encoder, self.encoder()).finish()]);
@@ -253,7 +250,7 @@ impl GpuEngine {
         encoder: &mut CommandEncoder,
         buffers: &BufferSet,
         program: &ShaderProgram,
-        workgroups: WorkgroupCount,
+        workgroups: [u32; 2],
         params: u64,
         marks: DispatchMarks,
     ) -> Result<(), GpuError> {
@@ -272,12 +269,7 @@ impl GpuEngine {
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes });
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, &bind_group, &[]);
-        match workgroups {
-            WorkgroupCount::Fixed([x, y]) => pass.dispatch_workgroups(x, y, 1),
-            WorkgroupCount::Indirect(first) => {
-                pass.dispatch_workgroups_indirect(buffers.get(BufferId::Workgroups)?, 4 * first);
-            }
-        }
+        pass.dispatch_workgroups(workgroups[0], workgroups[1], 1);
         Ok(())
     }
 }

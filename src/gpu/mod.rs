@@ -22,7 +22,6 @@ pub mod leaf_flags;
 pub mod mesh_engine;
 pub mod mesh_steps;
 pub mod options;
-mod prefix_sums;
 pub mod returned;
 pub mod selftest;
 pub mod steps;

@@ -1,8 +1,5 @@
 //! The size of a texture, and what follows from it.
 
-/// Corners in a segment. One invocation of steps G4 and G6 works on one segment.
-const SEGMENT: u32 = 32;
-
 /// The width and height of a texture in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TextureSize {
@@ -16,21 +13,6 @@ impl TextureSize {
     /// Returns the number of pixels.
     pub fn pixels(self) -> u64 {
         u64::from(self.width) * u64::from(self.height)
-    }
-
-    /// Returns the number of segments in a row of corners.
-    pub(super) fn segments(self) -> u32 {
-        (self.width - 1).div_ceil(SEGMENT)
-    }
-
-    /// Returns the number of segments in all rows of corners.
-    pub fn all_segments(self) -> u32 {
-        self.segments() * (self.height - 1)
-    }
-
-    /// Returns how many islands the list of step G3 has room for: an eighth of the pixels.
-    pub fn max_islands(self) -> u32 {
-        (self.pixels() / 8) as u32
     }
 
     /// Returns the steps of 1+JFA: 1, then half the side (as a power of two), a quarter, and so on down to 1.

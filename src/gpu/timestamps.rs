@@ -111,19 +111,21 @@ pub(super) fn marks(recording: &Recording) -> (Vec<DispatchMarks>, Vec<GpuStep>)
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gpu::atlas::Atlas;
     use crate::gpu::options::VoronoiMethod;
-    use crate::gpu::texture_size::TextureSize;
+    use crate::voronoi::texture_request::TextureRequest;
 
     #[test]
     fn every_step_begins_and_ends_once() {
-        let size = TextureSize { width: 700, height: 500 };
-        let recording = Recording::labels(size, vec![0, 5, 9], VoronoiMethod::Jfa);
+        let (mut atlas, sites) = (Atlas::default(), [[0, 0], [9, 0], [0, 9], [i32::MIN, 0]]);
+        assert!(atlas.add(&sites[..3], &TextureRequest::default(), 1 << 20));
+        let recording = Recording::mesh(&atlas, &sites, VoronoiMethod::Jfa);
         let (marks, steps) = marks(&recording);
-        assert_eq!(steps, [GpuStep::WriteSites, GpuStep::Voronoi, GpuStep::Islands]);
+        assert_eq!(steps, GpuStep::ALL);
         let begins: Vec<u32> = marks.iter().filter_map(|m| m.begin).collect();
         let ends: Vec<u32> = marks.iter().filter_map(|m| m.end).collect();
-        assert_eq!((begins, ends), (vec![0, 2, 4], vec![1, 3, 5]));
-        assert_eq!(marks[0], DispatchMarks { begin: Some(0), end: Some(1) });
-        assert_eq!(marks.last().unwrap().end, Some(5));
+        let stamps = 0..STAMPS;
+        assert!(begins.into_iter().eq(stamps.clone().step_by(2)) && ends.into_iter().eq(stamps.skip(1).step_by(2)));
+        assert_eq!((marks[0].begin, marks.last().unwrap().end), (Some(0), Some(STAMPS - 1)));
     }
 }

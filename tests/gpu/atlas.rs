@@ -10,7 +10,7 @@ use gdt_batch::gpu::atlas::{Atlas, AtlasLeaf};
 use gdt_batch::gpu::atlas_steps::ISLANDS_LEFT;
 use gdt_batch::gpu::buffer_id::BufferId;
 use gdt_batch::gpu::options::VoronoiMethod;
-use gdt_batch::gpu::steps::{GpuCommand, Recording, WorkgroupCount};
+use gdt_batch::gpu::steps::{GpuCommand, Recording};
 use gdt_batch::gpu::texture_size::TextureSize;
 use gdt_batch::gpu::twins::{self, atlas::WrittenSites, c4_flip::AT_INFINITY};
 use gdt_batch::voronoi::texture_request::{TextureRequest, TextureResolution};
@@ -331,7 +331,7 @@ fn the_patches_find_every_error_in_g3() {
 }
 
 #[test]
-fn few_dispatches_move_few_bytes_and_none_is_indirect() {
+fn few_dispatches_move_few_bytes() {
     let sites: Vec<Site> = (0..50_000).map(|i| [i % 250 * 97 + i % 7, i / 250 * 89 + i % 5]).collect();
     let clouds: Vec<Cloud> = (0..6).map(|_| Cloud { name: "lattice", sites: sites.clone() }).collect();
     for (pixels_per_site, most) in [(8.0, 220.0), (16.0, 390.0)] {
@@ -341,8 +341,6 @@ fn few_dispatches_move_few_bytes_and_none_is_indirect() {
         recording.write_atlas_sites(&filled.atlas);
         recording.atlas_voronoi(&filled.atlas, VoronoiMethod::Exact);
         recording.remove_atlas_islands(&filled.atlas);
-        let is_indirect = |c: &GpuCommand| matches!(c, GpuCommand::Run(_, _, WorkgroupCount::Indirect(_), _));
-        assert!(!recording.commands.iter().any(is_indirect));
         assert!(recording.commands.iter().all(|c| !matches!(c, GpuCommand::Run(_, _, _, 0))), "all are counted");
         let bytes = recording.traffic() as f64 / (6 * sites.len()) as f64;
         let pixels = f64::from(filled.atlas.pixels) / (6 * sites.len()) as f64;

@@ -5,9 +5,9 @@ use gdt_batch::gpu::buffers::BufferSet;
 use gdt_batch::gpu::device::{self, AdapterRequest, Device};
 use gdt_batch::gpu::engine::GpuEngine;
 use gdt_batch::gpu::error::GpuError;
+use gdt_batch::gpu::filled_atlas::FilledAtlas;
 use gdt_batch::gpu::selftest::{StepComparison, compare};
 use gdt_batch::gpu::steps::Recording;
-use gdt_batch::gpu::texture_size::TextureSize;
 
 pub(crate) struct Rig {
     engine: GpuEngine,
@@ -32,14 +32,9 @@ impl Rig {
         }
     }
 
-    /// Returns the number of pixels of the largest texture.
-    pub(crate) fn max_pixels(&self) -> u64 {
-        device::max_pixels(&self.engine.device().limits)
-    }
-
     /// Compares every step with its twin.
-    pub(crate) fn compare(&mut self, size: TextureSize, pixels: &[u32]) -> Vec<StepComparison> {
-        compare(&mut self.engine, &mut self.buffers, size, pixels).expect("the steps run")
+    pub(crate) fn compare(&mut self, filled: &FilledAtlas) -> Vec<StepComparison> {
+        compare(&mut self.engine, &mut self.buffers, filled).expect("the steps run")
     }
 
     /// Loses the device, as a driver's reset would.

@@ -1,46 +1,34 @@
-//! Every step against its twin, on textures that are random, dense, sparse, tiny, one row, one column, full or empty.
+//! The twins compute what they should, and the self-test compares every step with its twin.
 
-use super::random::{Random, cases};
+use super::clouds::clouds;
+use super::random::Random;
 use super::rig::Rig;
-use gdt_batch::gpu::buffer_id::BufferId;
-use gdt_batch::gpu::device;
-use gdt_batch::gpu::steps::{GpuCommand, Recording};
+use gdt_batch::gpu::filled_atlas::{AtlasLimits, FilledAtlas};
 use gdt_batch::gpu::texture_size::TextureSize;
 use gdt_batch::gpu::twins;
+use gdt_batch::voronoi::texture_request::TextureResolution;
 
 #[test]
-fn every_step_is_the_same_bit_for_bit() {
+fn the_self_test_compares_every_step() {
     let Some(mut rig) = Rig::new() else { return };
-    for (name, size, pixels) in cases() {
-        let comparisons = rig.compare(size, &pixels);
-        let differing: Vec<_> = comparisons.iter().filter(|c| c.differing > 0).collect();
-        assert!(differing.is_empty(), "{name}: {differing:?}");
-        let steps: Vec<_> = comparisons.iter().map(|c| c.step).collect();
-        assert_eq!(steps, ["G1", "G2 jfa", "G3", "G2 exact", "G4", "G5", "G6"]);
-        assert_eq!(comparisons[0].numbers, size.pixels());
+    let mut filled = FilledAtlas::default();
+    let limits = AtlasLimits { pixels: 1 << 24, bytes: 1 << 27 };
+    for cloud in clouds().iter().take(3) {
+        assert!(filled.add(&cloud.sites[..4000], TextureResolution::PixelsPerSite(8.0), limits));
     }
+    let comparisons = rig.compare(&filled);
+    assert!(comparisons.iter().all(|c| c.differing == 0 && c.numbers > 0), "{comparisons:?}");
+    let steps: Vec<_> = comparisons.iter().map(|c| c.step).collect();
+    assert_eq!(steps, ["G1", "G2 jfa", "G3 jfa", "G2 exact", "G3 exact", "G4", "G5", "G6", "C2, C4", "return"]);
 }
 
-/// Tests the longest rows and columns, and the whole square if the adapter can bind it, which no software renderer can. It takes
-/// minutes on software, so it needs GDT_TEST_LARGE=1.
-#[test]
-fn the_largest_texture_is_the_same_bit_for_bit() {
-    if std::env::var_os("GDT_TEST_LARGE").is_none() {
-        return eprintln!("not tested: textures of 16384 pixels a side; set GDT_TEST_LARGE=1");
+/// Returns the texture of sites at these pixels.
+fn written(size: TextureSize, pixels: &[u32]) -> Vec<u32> {
+    let mut texture = vec![0; size.pixels() as usize];
+    for (site, pixel) in (0u32..).zip(pixels) {
+        texture[((pixel >> 16) * size.width + (pixel & 0xffff)) as usize] = !site;
     }
-    let Some(mut rig) = Rig::new() else { return };
-    let side = device::MAX_SIDE;
-    let across = (rig.max_pixels() / u64::from(side)).min(u64::from(side)) as u32;
-    for (width, height) in [(side, across), (across, side)] {
-        let size = TextureSize { width, height };
-        // The triangles of more sites would not fit a buffer of a software renderer.
-        for count in [40, size.pixels() as usize / 16] {
-            let pixels = Random(11).pixels(size, count);
-            let differing: Vec<_> = rig.compare(size, &pixels).into_iter().filter(|c| c.differing > 0).collect();
-            assert!(differing.is_empty(), "{width} x {height}, {count} sites: {differing:?}");
-            eprintln!("{width} x {height}, {count} sites: every step the same");
-        }
-    }
+    texture
 }
 
 /// The twin of the exact transform agrees with the definition, and jump flooding almost does.
@@ -50,7 +38,7 @@ fn the_twins_compute_nearest_sites() {
     for (width, height, count) in [(1, 1, 1), (40, 30, 7), (40, 30, 300), (3, 200, 9), (120, 2, 30), (64, 64, 1)] {
         let size = TextureSize { width, height };
         let pixels = random.pixels(size, count);
-        let texture = twins::write_sites(size, &pixels);
+        let texture = written(size, &pixels);
         let nearest = |x: u32, y: u32| {
             let key = |p: u32| ((p & 0xffff).abs_diff(x).pow(2) + (p >> 16).abs_diff(y).pow(2), p & 0xffff, p >> 16);
             pixels.iter().copied().min_by_key(|&p| key(p)).unwrap()
@@ -60,34 +48,5 @@ fn the_twins_compute_nearest_sites() {
         assert_eq!(twins::voronoi_exact(size, &texture), expected);
         let wrong = twins::voronoi_jfa(size, &texture).iter().zip(&expected).filter(|(a, b)| a != b).count();
         assert!(50 * wrong <= expected.len(), "1+JFA misses {wrong} of {} pixels", expected.len());
-    }
-}
-
-/// The islands of a worse diagram: whole patches of labels lie where they do not belong.
-#[test]
-fn islands_anywhere_are_removed_as_by_the_twin() {
-    let Some(mut rig) = Rig::new() else { return };
-    let size = TextureSize { width: 200, height: 150 };
-    let mut random = Random(7);
-    let pixels = random.pixels(size, 900);
-    let texture = twins::write_sites(size, &pixels);
-    let clean = twins::voronoi_exact(size, &texture);
-    for patches in [1, 40, 400, 20_000] {
-        let mut labels = clean.clone();
-        for _ in 0..patches {
-            let at = random.below(labels.len() as u32) as usize;
-            let from = random.below(labels.len() as u32) as usize;
-            let length = (1 + random.below(4) as usize).min(labels.len() - at);
-            labels[at..at + length].fill(clean[from]);
-        }
-        let mut recording = Recording::default();
-        recording.commands.push(GpuCommand::Reserve(BufferId::Labels, 4 * size.pixels()));
-        recording.commands.push(GpuCommand::Upload(BufferId::Labels, labels.clone()));
-        recording.remove_islands(size);
-        rig.run(&recording);
-        let before = labels.clone();
-        twins::remove_islands(size, &mut labels);
-        assert_eq!(labels == before, patches == 20_000, "a texture full of islands is left alone, others are not");
-        assert!(rig.numbers(BufferId::Labels, size.pixels()) == labels, "{patches} patches");
     }
 }

@@ -191,7 +191,7 @@ fn a_job_of_parts_whose_results_are_lost_while_it_is_interrupted_starts_over() {
 #[test]
 fn a_job_on_a_gpu_goes_on_where_it_was_killed() {
     let setup = Setup::tiles_of(3_500).threads(2).backend("gpu");
-    let there = std::process::Command::new(env!("CARGO_BIN_EXE_gdt-batch")).arg("gpu").arg("--side").arg("64").output();
+    let there = std::process::Command::new(env!("CARGO_BIN_EXE_gdt-batch")).args(["gpu", "--leaves", "0"]).output();
     if !there.is_ok_and(|output| output.status.success()) {
         assert!(std::env::var_os("GDT_TEST_ALL").is_none(), "no GPU, not even a software renderer");
         eprintln!("skipped: there is no GPU here; the software renderer of Debian's mesa-vulkan-drivers is enough");

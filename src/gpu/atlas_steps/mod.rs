@@ -16,7 +16,7 @@ use crate::geometry::Site;
 use crate::gpu::atlas::Atlas;
 use crate::gpu::buffer_id::BufferId::{Blocks, Flags, Leaves, Sites};
 use crate::gpu::options::VoronoiMethod;
-use crate::gpu::steps::{GpuCommand, MAX_WORKGROUPS, Recording, WorkgroupCount};
+use crate::gpu::steps::{GpuCommand, MAX_WORKGROUPS, Recording};
 
 /// Bytes of an entry of the table of blocks.
 const BLOCK_BYTES: u64 = 8;
@@ -61,9 +61,9 @@ impl Recording {
 }
 
 /// Returns the dispatch of this many workgroups, and how many of them a row has.
-fn grid(workgroups: u32) -> (WorkgroupCount, u32) {
+fn grid(workgroups: u32) -> ([u32; 2], u32) {
     let across = workgroups.min(MAX_WORKGROUPS);
-    (WorkgroupCount::Fixed([across, workgroups.div_ceil(across.max(1))]), across)
+    ([across, workgroups.div_ceil(across.max(1))], across)
 }
 
 /// Returns the bytes of a number for every pixel.

@@ -5,11 +5,13 @@ use crate::gpu::buffer_id::BufferId;
 use crate::gpu::buffers::BufferSet;
 use crate::gpu::engine::GpuEngine;
 use crate::gpu::error::GpuError;
+use crate::gpu::filled_atlas::FilledAtlas;
+use crate::gpu::mesh_steps::FLIP_ROUNDS;
 use crate::gpu::options::VoronoiMethod;
-use crate::gpu::prefix_sums::position_of_total;
 use crate::gpu::steps::Recording;
-use crate::gpu::texture_size::TextureSize;
-use crate::gpu::twins;
+use crate::gpu::twins::atlas::{self, AtlasDiagram, MeshOnDevice};
+use crate::gpu::twins::c4_flip::{FlipState, flip_round};
+use crate::gpu::twins::predicates::decide;
 use serde::Serialize;
 
 /// How often the exact predicates are compared.
@@ -37,41 +39,82 @@ impl StepComparison {
     }
 }
 
-/// Runs all steps on the engine and as twins, for sites at `pixels` (each y << 16 | x) in a texture of `size`.
+/// Runs steps on the engine, one after the other, and compares what they leave.
+struct Comparer<'a> {
+    engine: &'a mut GpuEngine,
+    buffers: &'a mut BufferSet,
+    comparisons: Vec<StepComparison>,
+}
+
+impl Comparer<'_> {
+    /// Runs a step, and compares buffers with the numbers of its twin.
+    fn compare(
+        &mut self,
+        step: &'static str,
+        record: impl FnOnce(&mut Recording),
+        expected: &[(BufferId, &[u32])],
+    ) -> Result<(), GpuError> {
+        let mut recording = Recording::default();
+        record(&mut recording);
+        self.engine.start(self.buffers, &recording)?;
+        let (mut shader, mut twin) = (Vec::new(), Vec::new());
+        for &(id, numbers) in expected {
+            shader.extend(self.engine.numbers(self.buffers, id, numbers.len() as u64)?);
+            twin.extend_from_slice(numbers);
+        }
+        self.comparisons.push(StepComparison::new(step, &shader, &twin));
+        Ok(())
+    }
+}
+
+/// Runs all steps on the leaves of an atlas, on the engine and as twins.
 ///
 /// # Errors
 /// [`GpuError`] of the device.
 pub fn compare(
     engine: &mut GpuEngine,
     buffers: &mut BufferSet,
-    size: TextureSize,
-    pixels: &[u32],
+    filled: &FilledAtlas,
 ) -> Result<Vec<StepComparison>, GpuError> {
-    let mut comparisons = Vec::new();
-    let texture = twins::write_sites(size, pixels);
-    let mut jfa = twins::voronoi_jfa(size, &texture);
-    let labels = |voronoi| {
-        let mut recording = Recording::default();
-        recording.write_sites(size, pixels.to_vec());
-        recording.voronoi(size, voronoi);
-        recording
+    use BufferId::{BlockStarts, CornerRows, Flags, Labels, Marks, Missing, Records, Returned, Texture};
+    let FilledAtlas { atlas, sites } = filled;
+    let mut comparer = Comparer { engine, buffers, comparisons: Vec::new() };
+    let written = atlas::write_sites(atlas, sites);
+    let write = |r: &mut Recording| {
+        r.upload_atlas(atlas, sites);
+        r.write_atlas_sites(atlas);
     };
-    engine.start(buffers, &labels(VoronoiMethod::Jfa))?;
-    comparisons.push(StepComparison::new("G1", &engine.numbers(buffers, BufferId::Texture, size.pixels())?, &texture));
-    comparisons.push(StepComparison::new("G2 jfa", &engine.numbers(buffers, BufferId::Labels, size.pixels())?, &jfa));
+    comparer.compare("G1", write, &[(Texture, &written.texture), (Missing, &written.missing)])?;
 
-    twins::remove_islands(size, &mut jfa);
-    let mut islands = Recording::default();
-    islands.remove_islands(size);
-    engine.start(buffers, &islands)?;
-    comparisons.push(StepComparison::new("G3", &engine.numbers(buffers, BufferId::Labels, size.pixels())?, &jfa));
+    let (mut labels, mut flags) = (Vec::new(), Vec::new());
+    for (method, g2, g3) in [(VoronoiMethod::Jfa, "G2 jfa", "G3 jfa"), (VoronoiMethod::Exact, "G2 exact", "G3 exact")] {
+        labels = atlas::voronoi(atlas, &written.texture, method);
+        let find = |r: &mut Recording| {
+            // No leaf is flagged at first.
+            r.upload_atlas(atlas, sites);
+            r.atlas_voronoi(atlas, method);
+        };
+        comparer.compare(g2, find, &[(Labels, &labels)])?;
+        flags = atlas::remove_islands(atlas, &mut labels);
+        comparer.compare(g3, |r| r.remove_atlas_islands(atlas), &[(Labels, &labels), (Flags, &flags)])?;
+    }
 
-    let exact = twins::voronoi_exact(size, &texture);
-    engine.start(buffers, &labels(VoronoiMethod::Exact))?;
-    let labels = engine.numbers(buffers, BufferId::Labels, size.pixels())?;
-    comparisons.push(StepComparison::new("G2 exact", &labels, &exact));
-    comparisons.extend(compare_triangles(engine, buffers, size, &exact, &texture)?);
-    Ok(comparisons)
+    let diagram = AtlasDiagram { atlas, labels: &labels, texture: &written.texture, sites };
+    let (rows, counts) = atlas::find_vertices(diagram);
+    comparer.compare("G4", |r| r.atlas_vertices(atlas), &[(CornerRows, &rows), (BlockStarts, &counts)])?;
+    let starts = atlas::count(&counts);
+    comparer.compare("G5", |r| r.atlas_count(atlas), &[(BlockStarts, &starts)])?;
+    let records = atlas::make_triangles(diagram, &mut flags);
+    comparer.compare("G6", |r| r.atlas_triangles(atlas), &[(Records, &records), (Flags, &flags)])?;
+
+    let mut flipped = FlipState::new(records);
+    (1..=FLIP_ROUNDS).for_each(|round| flip_round(&mut flipped, sites, round));
+    let FlipState { records, marks, .. } = &flipped;
+    comparer.compare("C2, C4", |r| r.flip(atlas.records), &[(Records, records), (Marks, marks)])?;
+    let mesh = MeshOnDevice { records, marks, missing: &written.missing, starts: &starts, flags: &flags };
+    let returned = atlas::give_back(atlas, mesh);
+    comparer.compare("return", |r| r.give_back(atlas), &[(Returned, &returned)])?;
+    Ok(comparer.comparisons)
 }
 
 /// Compares the exact predicates on sites near each other, many of them on one circle or line, and far apart.
@@ -84,7 +127,7 @@ pub(super) fn compare_predicates(engine: &mut GpuEngine, buffers: &mut BufferSet
     recording.decide(&quads);
     engine.start(buffers, &recording)?;
     let decisions = engine.numbers(buffers, BufferId::Decisions, u64::from(PREDICATE_QUADS))?;
-    Ok(StepComparison::new("predicates", &decisions, &twins::predicates::decide(&quads)))
+    Ok(StepComparison::new("predicates", &decisions, &decide(&quads)))
 }
 
 /// Returns quad number `i`. Every other one has coordinates from 0 to 7, the others up to 2^28.
@@ -94,48 +137,4 @@ fn quad(i: u32) -> [Site; 4] {
         ((8 * i + k).wrapping_mul(0x9e37_79b1).rotate_left(15).wrapping_mul(0x85eb_ca77) >> (32 - bits)) as i32
     };
     [0, 2, 4, 6].map(|k| [coordinate(k), coordinate(k + 1)])
-}
-
-/// Compares steps G4 to G6, which start from the labels in the engine's buffers.
-fn compare_triangles(
-    engine: &mut GpuEngine,
-    buffers: &mut BufferSet,
-    size: TextureSize,
-    labels: &[u32],
-    texture: &[u32],
-) -> Result<[StepComparison; 3], GpuError> {
-    let corners = twins::find_vertices(size, labels);
-    let (mut before, all) = twins::count(size, &corners);
-    let triangles = twins::make_triangles(size, labels, texture);
-
-    let mut recording = Recording::default();
-    recording.find_vertices(size);
-    engine.start(buffers, &recording)?;
-    let vertices = engine.numbers(buffers, BufferId::Vertices, 2 * u64::from(size.all_segments()))?;
-    let found = StepComparison::new("G4", &unpack(size, &vertices), &corners);
-
-    let mut recording = Recording::default();
-    recording.count(size);
-    recording.make_triangles(size, all);
-    engine.start(buffers, &recording)?;
-    let mut counts = engine.numbers(buffers, BufferId::Counts, u64::from(position_of_total(size)) + 1)?;
-    let shader_all = counts.last().copied().unwrap_or_default();
-    counts.truncate(before.len());
-    counts.push(shader_all);
-    before.push(all);
-    let counted = StepComparison::new("G5", &counts, &before);
-    let made = engine.numbers(buffers, BufferId::Triangles, 3 * u64::from(all))?;
-    Ok([found, counted, StepComparison::new("G6", &made, triangles.as_flattened())])
-}
-
-/// Returns the number of triangles of every corner, from the two words of every segment.
-fn unpack(size: TextureSize, vertices: &[u32]) -> Vec<u32> {
-    let corners = size.width as usize - 1;
-    let segments = corners.div_ceil(32);
-    let bit = |word: u32, x: usize| word >> (x % 32) & 1;
-    let corner = |y: usize, x: usize| {
-        let at = 2 * (y * segments + x / 32);
-        bit(vertices[at], x) + bit(vertices[at + 1], x)
-    };
-    (0..size.height as usize - 1).flat_map(|y| (0..corners).map(move |x| (y, x))).map(|(y, x)| corner(y, x)).collect()
 }

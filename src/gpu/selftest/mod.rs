@@ -6,23 +6,29 @@ mod flips;
 mod timing;
 
 pub use compare::{StepComparison, compare};
-pub use timing::{TextureTiming, TimedStep};
+pub use timing::{AtlasTiming, TimedStep};
 
+use crate::geometry::Site;
 use crate::gpu::buffers::BufferSet;
 use crate::gpu::device::{self, ADAPTER_VARIABLE, AdapterRequest, Device};
 use crate::gpu::engine::GpuEngine;
 use crate::gpu::error::GpuError;
-use crate::gpu::texture_size::TextureSize;
+use crate::gpu::filled_atlas::{AtlasLimits, FilledAtlas};
+use crate::voronoi::texture_request::TextureResolution;
 use crate::{Error, Result};
 use serde::Serialize;
 use std::fmt;
 
-/// The sides of the textures that are timed.
-const SIDES: [u32; 5] = [1024, 2048, 4096, 8192, 16_384];
-/// The largest side that is timed on a software renderer. Larger textures take minutes.
-const SOFTWARE_SIDE: u32 = 4096;
-/// Pixels per site, as in the textures of leaves.
-const PIXELS_PER_SITE: u64 = 5;
+/// The numbers of leaves of the atlases that are timed.
+const LEAVES: [usize; 4] = [1, 4, 12, 24];
+/// The most leaves that are timed on a software renderer. More take minutes.
+const SOFTWARE_LEAVES: usize = 4;
+/// Sites in each of them, about as many as in a leaf of a job.
+const SITES_PER_LEAF: u64 = 35_000;
+/// The leaves whose steps are compared with the twins.
+const COMPARED: [u64; 4] = [40_000, 30, 3, 5000];
+/// Pixels a site in the textures.
+const PIXELS_PER_SITE: TextureResolution = TextureResolution::PixelsPerSite(16.0);
 
 /// What the self-test shows of an adapter.
 #[derive(Clone, Debug, Serialize)]
@@ -41,8 +47,8 @@ pub struct AdapterSummary {
     pub buffer: u64,
     /// Bytes of the largest buffer that a shader can bind.
     pub binding: u64,
-    /// Pixels of the largest texture.
-    pub pixels: u64,
+    /// Pixels of the largest atlas.
+    pub pixels: u32,
     /// What the adapter lacks to run the shaders.
     pub lacks: Option<&'static str>,
 }
@@ -60,9 +66,9 @@ pub struct SelfTest {
     pub comparisons: Vec<StepComparison>,
     /// Bytes per second that a copy within the adapter's memory reads and writes.
     pub copy_bandwidth: f64,
-    /// The times of the steps, by texture size.
-    pub timings: Vec<TextureTiming>,
-    /// Why larger textures were not timed.
+    /// The times of the steps, by the number of leaves.
+    pub timings: Vec<AtlasTiming>,
+    /// Why larger atlases were not timed.
     pub stopped: Option<String>,
 }
 
@@ -74,11 +80,11 @@ impl SelfTest {
 }
 
 /// Lists the adapters, and tests the one called `name`, or if that is `None`, the one that `backend = "gpu"` would use. Times the
-/// steps on textures of up to `side` pixels a side.
+/// steps on atlases of up to `leaves` leaves.
 ///
 /// # Errors
 /// [`Error::Config`] if there is no such adapter or it fails.
-pub fn run(name: Option<&str>, side: Option<u32>) -> Result<SelfTest> {
+pub fn run(name: Option<&str>, leaves: Option<usize>) -> Result<SelfTest> {
     let adapters = device::adapters();
     let infos: Vec<_> = adapters.iter().map(wgpu::Adapter::get_info).collect();
     let choose = |allow_software| device::choose(&infos, &AdapterRequest::new(name, allow_software));
@@ -97,8 +103,8 @@ pub fn run(name: Option<&str>, side: Option<u32>) -> Result<SelfTest> {
         stopped: None,
     };
     let chosen = gpu.map_err(Error::Config)?;
-    let max_side = side.unwrap_or(if test.adapters[chosen].software { SOFTWARE_SIDE } else { SIDES[SIDES.len() - 1] });
-    let tested = Device::open(&adapters[chosen]).and_then(|device| fill(&mut test, device, max_side));
+    let most = leaves.unwrap_or(if test.adapters[chosen].software { SOFTWARE_LEAVES } else { usize::MAX });
+    let tested = Device::open(&adapters[chosen]).and_then(|device| fill(&mut test, device, most));
     tested.map_err(|error| Error::Config(format!("{}: {error}", infos[chosen].name)))?;
     Ok(test)
 }
@@ -113,33 +119,29 @@ fn describe(adapter: &wgpu::Adapter) -> AdapterSummary {
         name: info.name,
         buffer: limits.max_buffer_size,
         binding: limits.max_storage_buffer_binding_size,
-        pixels: device::max_pixels(&limits),
+        pixels: AtlasLimits::of(&limits).pixels,
         lacks: device::shortage(&limits),
     }
 }
 
-/// Compares and times the steps on `device`.
-fn fill(test: &mut SelfTest, device: Device, max_side: u32) -> std::result::Result<(), GpuError> {
-    let max_pixels = device::max_pixels(&device.limits);
+/// Compares the steps on `device`, and times them on atlases of up to `most` leaves.
+fn fill(test: &mut SelfTest, device: Device, most: usize) -> std::result::Result<(), GpuError> {
+    let limits = AtlasLimits::of(&device.limits);
     let (mut engine, mut buffers) = (GpuEngine::new(device), BufferSet::default());
-    for (width, height, sites) in [(1000, 700, 140_000), (600, 500, 30)] {
-        let size = TextureSize { width, height };
-        test.comparisons.extend(compare(&mut engine, &mut buffers, size, &scatter(size, sites))?);
-    }
+    let compared = scattered(COMPARED, limits).ok_or(GpuError::OutOfMemory)?;
+    test.comparisons.extend(compare(&mut engine, &mut buffers, &compared)?);
     test.comparisons.push(compare::compare_predicates(&mut engine, &mut buffers)?);
     test.comparisons.extend(flips::compare_flips(&mut engine, &mut buffers)?);
     test.copy_bandwidth = timing::copy_bandwidth(&mut engine, &mut buffers)?;
-    for side in SIDES.into_iter().filter(|&side| side <= max_side) {
-        let size = TextureSize { width: side, height: side };
-        if size.pixels() > max_pixels {
-            test.stopped = Some(format!("this adapter does not support a texture of {side} x {side}"));
+    for leaves in LEAVES.into_iter().filter(|&leaves| leaves <= most) {
+        let Some(filled) = scattered(std::iter::repeat_n(SITES_PER_LEAF, leaves), limits) else {
+            test.stopped = Some(format!("an atlas of {leaves} leaves is too large for this adapter"));
             break;
-        }
-        let sites = scatter(size, size.pixels() / PIXELS_PER_SITE);
-        match timing::time_steps(&mut engine, &mut buffers, side, sites, test.copy_bandwidth) {
+        };
+        match timing::time_steps(&mut engine, &mut buffers, &filled, test.copy_bandwidth) {
             Ok(timing) => test.timings.push(timing),
             Err(GpuError::OutOfMemory) => {
-                test.stopped = Some(format!("a texture of {side} x {side} does not fit the adapter's memory"));
+                test.stopped = Some(format!("an atlas of {leaves} leaves does not fit the adapter's memory"));
                 break;
             }
             Err(error) => return Err(error),
@@ -148,16 +150,27 @@ fn fill(test: &mut SelfTest, device: Device, max_side: u32) -> std::result::Resu
     Ok(())
 }
 
-/// Returns pixels (y << 16 | x) that look random and are the same on every machine (splitmix64).
-fn scatter(size: TextureSize, sites: u64) -> Vec<u32> {
+/// Returns an atlas of leaves with so many sites each, which look random and are the same on every machine (splitmix64); `None` if they do
+/// not fit.
+fn scattered(leaves: impl IntoIterator<Item = u64>, limits: AtlasLimits) -> Option<FilledAtlas> {
     let mixed = |i: u64| {
         let mut v = i.wrapping_mul(0x9e37_79b9_7f4a_7c15);
         v = (v ^ (v >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         v = (v ^ (v >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         v ^ (v >> 31)
     };
-    let below = |bits: u64, end: u32| (((bits & 0xffff_ffff) * u64::from(end)) >> 32) as u32;
-    (1..=sites).map(|i| below(mixed(i), size.height) << 16 | below(mixed(i) >> 32, size.width)).collect()
+    // Coordinates have 24 bits.
+    let site = |i: u64| [(mixed(i) & 0xff_ffff) as i32, (mixed(i) >> 40) as i32];
+    let mut filled = FilledAtlas::default();
+    leaves
+        .into_iter()
+        .all(|count| {
+            let mut sites: Vec<Site> = (1..=count).map(site).collect();
+            sites.sort_unstable_by_key(|&[x, y]| (y, x));
+            sites.dedup();
+            filled.add(&sites, PIXELS_PER_SITE, limits)
+        })
+        .then_some(filled)
 }
 
 impl fmt::Display for SelfTest {
@@ -184,14 +197,15 @@ impl fmt::Display for SelfTest {
             self.copy_bandwidth / 1e9
         )?;
         for timing in &self.timings {
-            writeln!(f, "\n{0} x {0}, {1} sites, {2} triangles", timing.side, timing.sites, timing.triangles)?;
-            writeln!(f, "{:<16} {:>10} {:>10} {:>8} {:>10}", "step", "ms", "floor ms", "times", "MB")?;
+            let AtlasTiming { leaves, sites, pixels, .. } = timing;
+            writeln!(f, "\n{leaves} leaves, {sites} sites, {pixels} pixels")?;
+            writeln!(f, "{:<20} {:>10} {:>10} {:>8} {:>10}", "step", "ms", "floor ms", "times", "MB")?;
             for step in &timing.steps {
                 let TimedStep { step, milliseconds, bytes, floor } = step;
                 let floor_text = floor.map_or("-".into(), |floor| format!("{floor:.3}"));
                 let times = floor.map_or("-".into(), |floor| format!("{:.1}", milliseconds / floor));
                 let megabytes = *bytes as f64 / 1e6;
-                writeln!(f, "{step:<16} {milliseconds:>10.3} {floor_text:>10} {times:>8} {megabytes:>10.1}")?;
+                writeln!(f, "{step:<20} {milliseconds:>10.3} {floor_text:>10} {times:>8} {megabytes:>10.1}")?;
             }
         }
         self.stopped.iter().try_for_each(|why| writeln!(f, "\n{why}"))
@@ -202,10 +216,9 @@ impl fmt::Display for AdapterSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let AdapterSummary { name, kind, backend, driver, .. } = self;
         writeln!(f, "{name} ({kind}, {backend}; {driver})")?;
-        let side = (self.pixels as f64).sqrt();
         write!(
             f,
-            "  buffers of {} MiB, {} MiB in a shader: textures of up to {} pixels, for example {side:.0} x {side:.0}",
+            "  buffers of {} MiB, {} MiB in a shader: atlases of up to {} pixels",
             self.buffer >> 20,
             self.binding >> 20,
             self.pixels

@@ -1,4 +1,4 @@
-//! Step G2, exact: the twin of `shaders/g2_voronoi_exact.wgsl`.
+//! Step G2 on one leaf, exact, for the twin of `shaders/atlas/g2_voronoi_exact.wgsl`.
 
 use crate::gpu::texture_size::TextureSize;
 use crate::gpu::twins::label::{NONE, key, own};

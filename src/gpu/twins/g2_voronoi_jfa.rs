@@ -1,4 +1,4 @@
-//! Step G2, 1+JFA: the twin of `shaders/g2_voronoi_jfa.wgsl`.
+//! Step G2 on one leaf, 1+JFA, for the twin of `shaders/atlas/g2_voronoi_jfa.wgsl`.
 
 use crate::gpu::texture_size::TextureSize;
 use crate::gpu::twins::label::{NONE, key, own};
