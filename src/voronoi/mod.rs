@@ -1,22 +1,32 @@
 //! The canonical Delaunay triangulation of a leaf by way of its discrete Voronoi diagram: the ten steps of Rong, Tan, Cao and
 //! Stephanus 2008, "Computing Two-dimensional Delaunay Triangulation Using Graphics Hardware", here on one CPU thread.
 //!
-//! [`triangulate`] calls the steps in order. Each step has a file of its name:
+//! [`triangulate`] does all steps on one thread, in this order. Each step has a file of its name. [`triangulate_with`] goes on from a mesh
+//! that a device has made of the leaf; the device's shaders are in `shaders/`, those of G1 to G6 in `shaders/atlas/`.
 //!
-//! | step | file | what it does here |
-//! |---|---|---|
-//! | G1 | `g1_write_sites` | writes the sites into a texture; a site that loses its pixel moves to a neighbouring one or is missing |
-//! | G2 | `g2_voronoi` | labels each pixel with its nearest site, one row at a time |
-//! | G4-G6 | `g6_triangles` | makes linked triangles where colours meet; while the row is in the cache, C2's tests and C4's flips |
-//! | G3 | `g3_islands` | removes the triangles that pieces of torn regions have made |
-//! | C2 | `c2_shift` | repairs triangles that are inverted at the sites' true places |
-//! | C1 | `c1_hull` | makes the hull convex |
-//! | C4 | `c4_flip` | makes the flips that were not possible earlier |
-//! | C3 | `c3_insert` | inserts the sites that are missing or were removed, flipping edges along the way |
-//! | | `accept` | proves the result |
+//! | step | on this thread | on a device | then on this thread |
+//! |---|---|---|---|
+//! | G1 | `g1_write_sites`: writes the sites into a texture; losers move or are missing | `g1_write_sites` | |
+//! | G2 | `g2_voronoi`: labels each pixel with its nearest site, one row at a time | `g2_voronoi_exact`, or `g2_voronoi_jfa` | |
+//! | G3 | `g3_islands`, after G6: removes the triangles that pieces of torn regions have made | `g3_islands`: gives the pieces other colours | |
+//! | G4-G6 | `g6_triangles`: makes linked triangles where colours meet, with C2's tests and C4's flips while the row is in the cache | `g4_vertices`, `g5_count`, `g6_triangles` | `device_mesh`: checks all numbers |
+//! | C2 | `c2_shift`: repairs triangles that are inverted at the sites' true places | `c4_flip`: flips them away where that is possible | `c2_shift`: what is left |
+//! | C1 | `c1_hull`: makes the hull convex | | `c1_hull` |
+//! | C4 | `c4_flip`: makes the flips that were not possible earlier | `c4_flip`: twelve rounds of flips | `c4_flip`: what is left |
+//! | C3 | `c3_insert`: inserts the sites that are missing or were removed, flipping edges along the way | | `c3_insert` |
+//! | | `accept`: proves the result | | `accept` |
 //!
-//! [`from_device`] goes on from a mesh that a device has made: `device_mesh` takes the place of G1 to G6. `completion` has the steps from
-//! C2 on, which are the same for both.
+//! `completion` has the steps from C2 on, which are the same for both ways. They differ from the paper in some ways:
+//!
+//! - G1: a site that loses its pixel moves to a free neighbour, where the paper leaves it out. So C3, which is slow, has less to do.
+//! - G2: the diagram is exact, where the paper floods by jumps and gets some pixels wrong. Two passes also cost less than a dozen.
+//! - G4-G6: triangles are linked when they are made, and ghost triangles beyond the hull close the mesh. So no step needs a search for
+//!   neighbours, and the hull is no special case.
+//! - C2: the paper shifts one site after the other and treats each kind of inversion in a way of its own. Here all sites shift at once, and
+//!   one mechanism repairs whatever is inverted: flips, or else a corner is taken out and comes back in C3. It is sound on any input.
+//! - C1 comes after C2, because the hull at the true places is needed only once. C4 comes before C3, because walks in a Delaunay mesh are
+//!   short and sure to end.
+//! - All tests are exact, ties included, and `accept` proves the mesh.
 //!
 //! Any step may go wrong on unlucky input. Because `accept` proves the result, an error costs time and never correctness. All
 //! steps work on one mesh, of `closed_mesh`; `edge_tester` tests many of its edges at once.
