@@ -61,6 +61,9 @@ pub(crate) const BUDGETS: &[Budget] = &[
     budget("g6_triangles emit", 208, 16, 925),
 ];
 
+/// What must be 0 under every version of Mesa.
+pub(crate) const NEVER: [&str; 3] = ["Spilled SGPRs", "Spilled VGPRs", "Scratch size"];
+
 /// A program's statistics, to be compared with its budget.
 pub(crate) struct Verdict<'a> {
     /// `None` if the budgets are for another version of Mesa.
@@ -71,7 +74,7 @@ pub(crate) struct Verdict<'a> {
 impl Verdict<'_> {
     /// Returns what is above the budget.
     pub(crate) fn complaints(&self) -> impl Iterator<Item = String> {
-        let never = ["Spilled SGPRs", "Spilled VGPRs", "Scratch size"].map(|name| (name, 0));
+        let never = NEVER.map(|name| (name, 0));
         let budgeted = self.budget.map(|budget| {
             [
                 ("Instructions", budget.instructions),
@@ -88,7 +91,8 @@ impl Verdict<'_> {
     fn complaint(&self, name: &str, before: u64) -> Option<String> {
         let most = before + before / 10;
         match self.statistics.get(name) {
-            None => Some(format!("the driver does not tell {name}")),
+            // Another version of Mesa may have other names.
+            None => self.budget.map(|_| format!("the driver does not tell {name}")),
             Some(now) if now > most => Some(format!("{name} rose from {before} to {now}; at most {most} are allowed")),
             Some(_) => None,
         }
@@ -99,7 +103,7 @@ impl Verdict<'_> {
 fn what_rises_is_named() {
     let tells = |numbers: [u64; 6], budget: Option<&Budget>| -> Vec<String> {
         let names = ["Spilled SGPRs", "Spilled VGPRs", "Scratch size", "Instructions", "VGPRs", "Inverse Throughput"];
-        let statistics = Statistics(names.into_iter().map(String::from).zip(numbers).collect());
+        let statistics = names.into_iter().zip(numbers).collect();
         Verdict { budget, statistics: &statistics }.complaints().collect()
     };
     let small = budget("small", 100, 24, 50);
@@ -121,5 +125,6 @@ fn what_rises_is_named() {
             "Scratch size rose from 0 to 512; at most 0 are allowed"
         ]
     );
-    assert_eq!(Verdict { budget: None, statistics: &Statistics::default() }.complaints().count(), 3);
+    let untold = |budget| Verdict { budget, statistics: &Statistics::default() }.complaints().count();
+    assert_eq!([untold(None), untold(Some(&small))], [0, 6]);
 }

@@ -105,7 +105,8 @@ impl NullDevice {
             // SAFETY: The format says which of the values it is.
             (text(statistic.name_as_c_str()), unsafe { statistic.value.u64 })
         });
-        Ok(Statistics(numbers.collect()))
+        let numbers: Vec<_> = numbers.collect();
+        Ok(numbers.iter().map(|(name, number)| (name.as_str(), *number)).collect())
     }
 }
 

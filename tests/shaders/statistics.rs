@@ -2,19 +2,20 @@
 
 use std::collections::BTreeMap;
 
-/// The driver's numbers, by its names for them.
+/// The driver's numbers, by its names for them in lower case. Versions of Mesa differ in the case.
 #[derive(Default)]
-pub(crate) struct Statistics(pub(crate) BTreeMap<String, u64>);
+pub(crate) struct Statistics(BTreeMap<String, u64>);
 
 /// The driver's names of what the table shows, with the table's.
-const COLUMNS: [(&str, &str); 9] = [
+const COLUMNS: [(&str, &str); 10] = [
     ("Instructions", "instructions"),
     ("VGPRs", "VGPRs"),
     ("SGPRs", "SGPRs"),
-    ("Spilled VGPRs", "spilled"),
+    ("Spilled VGPRs", "spilled VGPRs"),
+    ("Spilled SGPRs", "spilled SGPRs"),
     ("Scratch size", "scratch"),
     ("Subgroups per SIMD", "subgroups"),
-    ("Inverse Throughput", "throughput^-1"),
+    ("Inverse Throughput", "1/throughput"),
     ("LDS size", "LDS"),
     ("Code size", "code"),
 ];
@@ -28,13 +29,19 @@ impl Statistics {
     /// Returns the row of the table for a program.
     pub(crate) fn row(&self, program: &str) -> String {
         COLUMNS.iter().fold(format!("{program:<36}"), |row, (name, _)| {
-            let number = self.0.get(*name).map_or("?".into(), u64::to_string);
+            let number = self.get(name).map_or("?".into(), |number| number.to_string());
             row + &format!(" {number:>13}")
         })
     }
 
     /// Returns a number, or `None` if the driver does not tell it.
     pub(crate) fn get(&self, name: &str) -> Option<u64> {
-        self.0.get(name).copied()
+        self.0.get(&name.to_lowercase()).copied()
+    }
+}
+
+impl<'a> FromIterator<(&'a str, u64)> for Statistics {
+    fn from_iter<I: IntoIterator<Item = (&'a str, u64)>>(numbers: I) -> Statistics {
+        Statistics(numbers.into_iter().map(|(name, number)| (name.to_lowercase(), number)).collect())
     }
 }
