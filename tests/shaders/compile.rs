@@ -7,7 +7,7 @@ use naga::valid::{Capabilities, GlobalUse, ModuleInfo, ValidationFlags, Validato
 use naga::{AddressSpace, Module};
 
 /// What decides how wgpu compiles for a device.
-#[derive(Clone, Copy)]
+#[derive(Debug)]
 pub(crate) struct Abilities {
     /// The device checks the bounds of buffers itself.
     pub(crate) checks_buffers: bool,

@@ -61,7 +61,7 @@ fn check_budgets() {
         }
     };
     let is_same = device.driver == MESA;
-    println!("{} with {}\n{}", device.name, device.driver, Statistics::header());
+    println!("{} with {}, {:?}\n{}", device.name, device.driver, device.abilities, Statistics::header());
     let (mut broken, mut untold) = (Vec::new(), BTreeSet::new());
     for program in programs() {
         let compiled = compile(&program, &device.abilities);

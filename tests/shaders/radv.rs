@@ -25,7 +25,7 @@ pub(crate) struct NullDevice {
 
 impl Drop for NullDevice {
     fn drop(&mut self) {
-        // SAFETY: Nothing that was made from the device and the instance is left, and nobody can use them after this.
+        // SAFETY: Whatever was made from the device has borrowed it, so it is gone. Nobody can use the two after this.
         unsafe {
             self.device.destroy_device(None);
             self.instance.destroy_instance(None);
@@ -62,38 +62,37 @@ impl NullDevice {
 
     /// Returns what the driver says about a program.
     pub(crate) fn statistics(&self, program: &ShaderProgram, compiled: &Compiled) -> Result<Statistics, String> {
+        let made = self.pipeline(program, compiled).map_err(|error| format!("the driver refuses it: {error}"))?;
+        self.read(made.pipeline)
+    }
+
+    fn pipeline(&self, program: &ShaderProgram, compiled: &Compiled) -> Result<Made<'_>, vk::Result> {
+        let mut made = Made::new(&self.device);
         let bindings: Vec<_> =
             compiled.bindings.iter().map(|&(binding, is_uniform)| layout(binding, is_uniform)).collect();
-        let entry = CString::new(program.entry).map_err(|error| error.to_string())?;
         let set_info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
+        // SAFETY: The structure and what it points to live during the call.
+        made.set = unsafe { self.device.create_descriptor_set_layout(&set_info, None) }?;
+        let sets = [made.set];
+        let layout_info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets);
+        // SAFETY: As above.
+        made.layout = unsafe { self.device.create_pipeline_layout(&layout_info, None) }?;
         let module_info = vk::ShaderModuleCreateInfo::default().code(&compiled.words);
-        // SAFETY: The structures and what they point to live during the calls; the SPIR-V comes from naga, which writes only what is
-        // valid; the layouts have the bindings that the shader uses; all is destroyed here, in the reverse order. If a call fails,
-        // what was made before is lost, and the test fails.
-        unsafe {
-            let set = self.device.create_descriptor_set_layout(&set_info, None).map_err(|e| e.to_string())?;
-            let layout_info = vk::PipelineLayoutCreateInfo::default().set_layouts(std::slice::from_ref(&set));
-            let layout = self.device.create_pipeline_layout(&layout_info, None).map_err(|e| e.to_string())?;
-            let module = self.device.create_shader_module(&module_info, None).map_err(|e| e.to_string())?;
-            let stage = vk::PipelineShaderStageCreateInfo::default()
-                .stage(vk::ShaderStageFlags::COMPUTE)
-                .module(module)
-                .name(&entry);
-            let pipeline_info = vk::ComputePipelineCreateInfo::default()
-                .stage(stage)
-                .layout(layout)
-                .flags(vk::PipelineCreateFlags::CAPTURE_STATISTICS_KHR);
-            let pipelines = self
-                .device
-                .create_compute_pipelines(vk::PipelineCache::null(), &[pipeline_info], None)
-                .map_err(|(_, error)| error.to_string())?;
-            let statistics = self.read(pipelines[0]);
-            self.device.destroy_pipeline(pipelines[0], None);
-            self.device.destroy_shader_module(module, None);
-            self.device.destroy_pipeline_layout(layout, None);
-            self.device.destroy_descriptor_set_layout(set, None);
-            statistics
-        }
+        // SAFETY: As above; the SPIR-V comes from naga, which writes only what is valid.
+        made.module = unsafe { self.device.create_shader_module(&module_info, None) }?;
+        let entry = CString::new(program.entry).expect("a function's name has no zero");
+        let stage = vk::PipelineShaderStageCreateInfo::default()
+            .stage(vk::ShaderStageFlags::COMPUTE)
+            .module(made.module)
+            .name(&entry);
+        let info = vk::ComputePipelineCreateInfo::default()
+            .stage(stage)
+            .layout(made.layout)
+            .flags(vk::PipelineCreateFlags::CAPTURE_STATISTICS_KHR);
+        // SAFETY: As above; the module has the function, and the layout has all bindings that it uses.
+        let pipelines = unsafe { self.device.create_compute_pipelines(vk::PipelineCache::null(), &[info], None) };
+        made.pipeline = pipelines.map_err(|(_, error)| error)?[0];
+        Ok(made)
     }
 
     fn read(&self, pipeline: vk::Pipeline) -> Result<Statistics, String> {
@@ -107,6 +106,34 @@ impl NullDevice {
         });
         let numbers: Vec<_> = numbers.collect();
         Ok(numbers.iter().map(|(name, number)| (name.as_str(), *number)).collect())
+    }
+}
+
+/// A pipeline and what it was made from. Null is what was not made yet.
+struct Made<'a> {
+    device: &'a ash::Device,
+    set: vk::DescriptorSetLayout,
+    layout: vk::PipelineLayout,
+    module: vk::ShaderModule,
+    pipeline: vk::Pipeline,
+}
+
+impl Made<'_> {
+    fn new(device: &ash::Device) -> Made<'_> {
+        let (set, layout) = (vk::DescriptorSetLayout::null(), vk::PipelineLayout::null());
+        Made { device, set, layout, module: vk::ShaderModule::null(), pipeline: vk::Pipeline::null() }
+    }
+}
+
+impl Drop for Made<'_> {
+    fn drop(&mut self) {
+        // SAFETY: All were made from this device and nobody else has them. To destroy null does nothing.
+        unsafe {
+            self.device.destroy_pipeline(self.pipeline, None);
+            self.device.destroy_shader_module(self.module, None);
+            self.device.destroy_pipeline_layout(self.layout, None);
+            self.device.destroy_descriptor_set_layout(self.set, None);
+        }
     }
 }
 
