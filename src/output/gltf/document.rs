@@ -18,8 +18,8 @@ use crate::output::color::LinearRgb;
 use crate::output::compression::Compression;
 use crate::output::frame::Frame;
 use crate::output::gltf::encoding::{
-    EXPONENTIAL_REACH, color_bytes, exponential, needs_long_normals, normal_bytes, normal_long_octahedral,
-    normal_octahedral, normal_shorts,
+    EXPONENTIAL_REACH, color_bytes, exponential, long_octahedron, needs_long_normals, normal_bytes,
+    normal_long_octahedral, normal_octahedral, normal_shorts,
 };
 use crate::output::gltf::meshopt::{PackedFilter, PackedMode, PackedView, fallback_buffer};
 use crate::output::gltf::parts::SplitPart;
@@ -123,19 +123,21 @@ impl<'a> DocumentBuilder<'a> {
         }
         let anisotropy = self.frame.anisotropy();
         let is_packed = self.compression == Compression::Meshopt;
-        let bytes = ElementType::normalized(ComponentType::I8, Type::Vec3);
-        let shorts = ElementType::normalized(ComponentType::I16, Type::Vec3);
-        match (needs_long_normals(anisotropy), is_packed) {
-            (false, false) => self.add_attribute(normals, order, |n| normal_bytes(up(n), anisotropy), bytes),
-            (true, false) => self.add_attribute(normals, order, |n| normal_shorts(up(n), anisotropy), shorts),
-            (false, true) => {
-                let element = bytes.filtered(PackedFilter::Octahedral);
-                self.add_attribute(normals, order, |n| normal_octahedral(up(n), anisotropy), element)
+        if !needs_long_normals(anisotropy) {
+            let element = ElementType::normalized(ComponentType::I8, Type::Vec3);
+            if !is_packed {
+                return self.add_attribute(normals, order, |n| normal_bytes(up(n), anisotropy), element);
             }
-            (true, true) => {
-                let element = shorts.filtered(PackedFilter::Octahedral);
-                self.add_attribute(normals, order, |n| normal_long_octahedral(up(n), anisotropy), element)
+            let convert = |n| normal_octahedral(up(n), anisotropy);
+            return self.add_attribute(normals, order, convert, element.filtered(PackedFilter::Octahedral));
+        }
+        let element = ElementType::normalized(ComponentType::I16, Type::Vec3);
+        match long_octahedron(anisotropy).filter(|_| is_packed) {
+            Some(one) => {
+                let convert = |n| normal_long_octahedral(up(n), anisotropy, one);
+                self.add_attribute(normals, order, convert, element.filtered(PackedFilter::Octahedral))
             }
+            None => self.add_attribute(normals, order, |n| normal_shorts(up(n), anisotropy), element),
         }
     }
 

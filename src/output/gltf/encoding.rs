@@ -38,14 +38,19 @@ pub(crate) fn normal_octahedral(normal: [f32; 3], anisotropy: f32) -> [i8; 4] {
     [u as i8, v as i8, 127, 0]
 }
 
-/// Does what [`normal_octahedral`] does, in signed 16 bits, of which as many are used as make the normals as accurate as 8 bits do
-/// without `anisotropy`.
-#[inline(always)]
-pub(crate) fn normal_long_octahedral(normal: [f32; 3], anisotropy: f32) -> [i16; 4] {
+/// Returns how far the corners of the octahedron are from its middle, so that normals that are stretched by `anisotropy` are as accurate
+/// as 8 bits make others: one less than a power of two, as the filter wants it. Returns `None` if 16 bits are too few.
+pub(crate) fn long_octahedron(anisotropy: f32) -> Option<i16> {
     let stretch = anisotropy.max(1.0 / anisotropy);
-    let one = (128.0 * stretch).min(32768.0).ceil() - 1.0;
-    let [u, v] = on_octahedron(normal, anisotropy, one);
-    [u as i16, v as i16, one as i16, 0]
+    let is_enough = stretch <= 512.0;
+    is_enough.then(|| (((64.0 * stretch) as u32).next_power_of_two() - 1) as i16)
+}
+
+/// Does what [`normal_octahedral`] does, in signed 16 bits, on an octahedron of [`long_octahedron`].
+#[inline(always)]
+pub(crate) fn normal_long_octahedral(normal: [f32; 3], anisotropy: f32, one: i16) -> [i16; 4] {
+    let [u, v] = on_octahedron(normal, anisotropy, f32::from(one));
+    [u as i16, v as i16, one, 0]
 }
 
 /// Returns the place of a normal, with its y stretched, on the octahedron whose corners are this far, `one`, from its middle.
@@ -144,10 +149,18 @@ mod tests {
         for (anisotropy, most) in [(1.0 / 256.0, 0.5), (0.125, 0.1), (8.0, 0.1), (256.0, 0.5)] {
             assert!(needs_long_normals(anisotropy));
             assert!(worst(&|n| error(n, normal_shorts(n, anisotropy), anisotropy)) < most);
-            assert!(
-                worst(&|n| error(n, from_long_octahedral(normal_long_octahedral(n, anisotropy)), anisotropy)) < 1.25
-            );
         }
+    }
+
+    #[test]
+    fn stretched_normals_are_as_accurate_as_others_or_have_no_octahedron() {
+        for anisotropy in [1.0 / 512.0, 0.01, 0.125, 5.0, 8.0, 64.0, 256.0, 512.0] {
+            let one = long_octahedron(anisotropy).unwrap();
+            let packed = |n| from_long_octahedral(normal_long_octahedral(n, anisotropy, one));
+            let worst = normals().map(|n| error(n, packed(n), anisotropy)).fold(0.0, f32::max);
+            assert!(worst < 1.25, "{anisotropy}: {worst}");
+        }
+        assert_eq!([0.0009, 513.0, f32::NAN].map(long_octahedron), [None; 3]);
     }
 
     #[test]
@@ -177,7 +190,9 @@ mod tests {
         }
         assert_eq!(from_octahedral([0, 0, 0, 0]), [0, 0, 127, 0]);
         for (normal, anisotropy) in normals().flat_map(|normal| [(normal, 0.1), (normal, 8.0), (normal, 300.0)]) {
-            let packed = normal_long_octahedral(normal, anisotropy);
+            let one = long_octahedron(anisotropy).unwrap();
+            assert!((one as u16 + 1).is_power_of_two());
+            let packed = normal_long_octahedral(normal, anisotropy, one);
             let mut theirs = [packed];
             meshopt::decode_filter_oct(&mut theirs);
             let ours = from_long_octahedral(packed);
