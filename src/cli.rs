@@ -150,7 +150,7 @@ pub enum CliCommand {
         #[arg(required = true)]
         files: Vec<PathBuf>,
     },
-    /// List the GPUs of this machine, test each step of the pipeline on one of them, and time it.
+    /// List the GPUs of this machine, test each step of the pipeline on one of them, and say how much faster it makes a job.
     Gpu {
         /// Part of the name of the GPU to test. Default: the GPU that backend = "gpu" takes.
         #[arg(long)]

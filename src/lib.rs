@@ -12,6 +12,7 @@ pub mod error;
 mod fault;
 pub mod geometry;
 pub mod gpu;
+pub mod gpu_trial;
 pub mod input;
 pub mod interrupt;
 pub mod job;

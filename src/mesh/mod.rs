@@ -6,3 +6,4 @@ pub mod flip;
 pub mod half_edge;
 pub mod index;
 pub mod region;
+pub mod triangle_order;

@@ -35,6 +35,13 @@ pub struct TriangulationCounts {
     pub counts: PipelineCounts,
 }
 
+impl TriangulationCounts {
+    /// Returns the number of all leaves.
+    pub fn leaves(&self) -> u64 {
+        self.pipeline + self.reference + self.small + self.crowded + self.not_accepted
+    }
+}
+
 impl AddAssign for TriangulationCounts {
     fn add_assign(&mut self, other: TriangulationCounts) {
         self.pipeline += other.pipeline;

@@ -159,38 +159,81 @@ fn a_gpu_that_does_not_exist_is_an_error_if_required_and_none_otherwise() {
 }
 
 #[test]
-fn a_job_has_the_same_digest_on_every_backend() {
+fn a_job_writes_the_same_bytes_on_every_backend() {
     if Rig::new().is_none() {
         return;
     }
-    let folder = tempfile::tempdir().unwrap();
-    let cloud = folder.path().join("cloud.las");
-    gdt_batch::sample::write(&cloud, 60_000, 3, false).unwrap();
-    let mut digests = BTreeSet::new();
-    for (i, lines) in [
-        "backend = \"reference\"",
+    let jobs = SampleJobs::new();
+    for compression in ["meshopt", "none"] {
+        let files =
+            ["reference", "cpu", "gpu"].map(|backend| jobs.run(&format!("backend = \"{backend}\""), compression).0);
+        assert!(files.iter().all(|list| *list == files[0]), "{compression}: {files:?}");
+    }
+}
+
+#[test]
+fn a_job_has_the_same_digest_with_every_tiling_and_texture() {
+    if Rig::new().is_none() {
+        return;
+    }
+    let jobs = SampleJobs::new();
+    let digests: BTreeSet<String> = [
         "backend = \"cpu\"",
-        "backend = \"gpu\"",
         "backend = \"gpu\"\nmax_points_per_tile = 7000\n[gpu]\nvoronoi = \"jfa\"",
         "backend = \"gpu\"\nmax_points_per_tile = 20000\n[gpu]\ntexture = 700",
     ]
     .iter()
-    .enumerate()
-    {
-        let path = folder.path().join("job.toml");
+    .map(|lines| jobs.run(lines, "auto").1)
+    .collect();
+    assert_eq!(digests.len(), 1, "{digests:?}");
+}
+
+/// Jobs on one sample terrain.
+struct SampleJobs(tempfile::TempDir);
+
+impl SampleJobs {
+    fn new() -> SampleJobs {
+        let folder = tempfile::tempdir().unwrap();
+        gdt_batch::sample::write(&folder.path().join("cloud.las"), 60_000, 3, false).unwrap();
+        SampleJobs(folder)
+    }
+
+    /// Runs a job; returns the checksum of all its results, and the digest of its mesh.
+    fn run(&self, triangulation: &str, compression: &str) -> (String, String) {
+        let (path, out) = (self.0.path().join("job.toml"), self.0.path().join("out"));
         let text = format!(
-            "[input]\nfiles = [\"cloud.las\"]\n[triangulation]\n{lines}\n[output]\ndirectory = \"out{i}\"\n[limits]\nthreads = 2\n"
+            "[input]\nfiles = [\"cloud.las\"]\n[triangulation]\n{triangulation}\n\
+             [output]\ndirectory = \"out\"\ncompression = \"{compression}\"\n[limits]\nthreads = 2\n"
         );
         std::fs::write(&path, text).unwrap();
         let config = gdt_batch::config::load(&path).unwrap();
         let report = job::run(&config, ProgressOutput::detect(true)).unwrap();
         let outcome = report.leaves.outcome;
         if config.triangulation.backend == Backend::Gpu {
-            assert!(outcome.counts.on_gpu > 0 && outcome.counts.on_gpu == outcome.pipeline, "{lines}: {outcome:?}");
+            assert!(
+                outcome.counts.on_gpu > 0 && outcome.counts.on_gpu == outcome.pipeline,
+                "{triangulation}: {outcome:?}"
+            );
         }
-        let verdict = verify(&config.output.directory, MEMORY).unwrap();
-        assert_eq!(verdict.failures, Vec::<String>::new(), "{lines}");
-        digests.insert(verdict.digest.to_string());
+        let verdict = verify(&out, MEMORY).unwrap();
+        assert_eq!(verdict.failures, Vec::<String>::new(), "{triangulation}");
+        std::fs::remove_dir_all(out).unwrap();
+        (report.file_list.to_string(), verdict.digest.to_string())
     }
-    assert_eq!(digests.len(), 1, "{digests:?}");
+}
+
+#[test]
+fn the_command_says_how_much_faster_a_job_is() {
+    if Rig::new().is_none() {
+        return;
+    }
+    let output =
+        std::process::Command::new(env!("CARGO_BIN_EXE_gdt-batch")).args(["gpu", "--leaves", "1", "--json"]).output();
+    let output = output.unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let check: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(check["comparisons"].as_array().unwrap().len() >= 10, "{check}");
+    let trial = &check["trial"];
+    assert_eq!((trial["same"].as_bool(), &trial["on_gpu"]), (Some(true), &trial["leaves"]), "{trial}");
+    assert!(["seconds_with", "seconds_without"].iter().all(|key| trial[key].as_f64().unwrap() > 0.0), "{trial}");
 }

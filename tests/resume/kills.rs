@@ -197,7 +197,9 @@ fn a_job_on_a_gpu_goes_on_where_it_was_killed() {
         eprintln!("skipped: there is no GPU here; the software renderer of Debian's mesa-vulkan-drivers is enough");
         return;
     }
-    let rig = small_job(&setup);
+    let rig = Rig::new(&scattered::uniform(20_000, 100_000, 5), &setup).committing_every(0);
+    let counts = &rig.completes("without a kill")["leaves"]["outcome"]["counts"];
+    assert!(counts["on_gpu"].as_u64().unwrap() >= 6, "{counts}");
     let kills = ["commit", "torn"].iter().map(|place| kill_at_each(&rig, place, 6)).sum::<u64>();
     assert!(kills >= 8, "only {kills} kills");
     kill_at_random(&rig, 3, kills_wanted(8));

@@ -309,6 +309,7 @@ fn lasting(text: &[u8]) -> Value {
         "bytes_temporary",
         "slowest_part",
         "job_fingerprint",
+        "gpu_figures",
         "checksum",
     ];
     for name in changing {

@@ -77,6 +77,11 @@ impl SelfTest {
     pub fn holds(&self) -> bool {
         self.comparisons.iter().all(|comparison| comparison.differing == 0)
     }
+
+    /// Returns whether the adapter that was tested is a software renderer.
+    pub fn is_software(&self) -> bool {
+        self.adapters.iter().any(|adapter| adapter.software && self.gpu.as_ref().is_ok_and(|gpu| *gpu == adapter.name))
+    }
 }
 
 /// Lists the adapters, and tests the one called `name`, or if that is `None`, the one that `backend = "gpu"` would use. Times the

@@ -1,7 +1,5 @@
 //! Builds the glTF document of a tile, and the bytes that it describes.
 
-use std::borrow::Cow;
-
 use bytemuck::{Pod, cast_slice};
 use gltf::json::accessor::{Accessor, ComponentType, GenericComponentType, Type};
 use gltf::json::buffer::{Buffer, Stride, Target, View};
@@ -14,6 +12,7 @@ use multiversion::multiversion;
 use serde_json::json;
 
 use crate::geometry::Bounds;
+use crate::mesh::triangle_order::ascending;
 use crate::output::color::LinearRgb;
 use crate::output::compression::Compression;
 use crate::output::frame::Frame;
@@ -54,11 +53,12 @@ impl<'a> DocumentBuilder<'a> {
     /// Appends a node, its mesh and the data of both.
     pub(crate) fn add_part(&mut self, part: &SplitPart) -> Result<()> {
         let tile = &*part.tile;
+        // Either order depends on the mesh alone, so a tile is the same with every backend.
         let (triangles, order) = match self.compression {
-            Compression::None => (Cow::Borrowed(&tile.triangles), None),
+            Compression::None => (ascending(tile.positions.len(), &tile.triangles), None),
             _ => {
                 let (triangles, order) = order_vertices(tile.positions.len(), &tile.triangles);
-                (Cow::Owned(triangles), Some(order))
+                (triangles, Some(order))
             }
         };
         let order = order.as_deref();

@@ -3,7 +3,7 @@
 //! Vertices are numbered when a triangle first uses them. For each vertex in that order, the triangles around it that are not in the
 //! list yet are appended as fans, counterclockwise. This unrolls the mesh in rings: every triangle shares an edge with the one before,
 //! and its third corner is a new vertex or the next one of the ring before. The index codec writes both cases without further bytes.
-//! All of it is done in whole numbers, so the bytes do not depend on the machine.
+//! All of it is done in whole numbers, so the bytes do not depend on the machine, nor on the order in which triangles were found.
 
 use crate::mesh::adjacency::VertexAdjacency;
 
@@ -49,14 +49,15 @@ struct VertexOrder {
 
 impl VertexOrder {
     /// Appends the triangles between vertex `v` and the edges in `left`, one fan after the other, each from a triangle that follows on
-    /// no other one; empties `left`.
+    /// no other one; empties `left`. Fans begin in the order of the vertices, so the order of the mesh does not matter.
     fn append_fans(&mut self, v: u32, left: &mut Vec<[u32; 2]>) {
         if left.len() > SEARCHED {
             return self.append_many_fans(v, left);
         }
         while !left.is_empty() {
             let is_start = |edge: &[u32; 2]| left.iter().all(|other| other[1] != edge[0]);
-            let mut at = left.iter().position(is_start).or(Some(0));
+            let starts = (0..left.len()).filter(|&i| is_start(&left[i]));
+            let mut at = starts.min_by_key(|&i| left[i]).or_else(|| (0..left.len()).min_by_key(|&i| left[i]));
             while let Some(i) = at {
                 let [from, to] = left.swap_remove(i);
                 self.append([v, from, to]);
@@ -134,6 +135,22 @@ mod tests {
         assert_eq!(order.last(), Some(&400));
         let back = ordered.iter().map(|t| t.map(|v| order[v as usize])).collect();
         assert_eq!(canonical(back), canonical(triangles));
+    }
+
+    #[test]
+    fn the_order_of_the_mesh_does_not_matter() {
+        let mut triangles = lattice(20);
+        // A hub, and two pieces that meet in a vertex.
+        triangles.extend((400..500).map(|v| [399, v, v + 1]));
+        triangles.extend([[20, 501, 502], [20, 503, 504]]);
+        let expected = order_vertices(505, &triangles);
+        for step in [1, 7, 111, 400] {
+            let turned = |(i, t): (usize, &[u32; 3])| [t[i % 3], t[(i + 1) % 3], t[(i + 2) % 3]];
+            let count = triangles.len();
+            let mut shuffled: Vec<_> = triangles.iter().enumerate().map(turned).collect();
+            (0..count).for_each(|i| shuffled.swap(i, (i * 31 + step) % count));
+            assert!(order_vertices(505, &shuffled) == expected, "{step}");
+        }
     }
 
     #[test]
