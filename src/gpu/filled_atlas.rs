@@ -8,9 +8,9 @@ use crate::gpu::timestamps::STAMP_BYTES;
 use crate::gpu::twins::c4_flip::AT_INFINITY;
 use crate::voronoi::texture_request::{TextureRequest, TextureResolution};
 
-/// The most pixels of an atlas: room for a texture of 4096 x 4096 with its frame. All steps together move about 80 bytes a pixel, so a GPU
-/// that moves 25 GB/s takes about 60 ms, in several submissions. On such an atlas the dispatches themselves cost next to nothing.
-pub const MAX_PIXELS: u32 = 17 << 20;
+/// The most pixels of an atlas, which are those of two million sites. All steps together move about 80 bytes a pixel, so a GPU that moves
+/// 25 GB/s takes about 0.1 seconds, in several submissions. On such an atlas the dispatches themselves cost next to nothing.
+pub const MAX_PIXELS: u32 = 1 << 25;
 
 /// How large an atlas may be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,7 +101,7 @@ mod tests {
         let limits = |binding| wgpu::Limits { max_storage_buffer_binding_size: binding, ..wgpu::Limits::default() };
         let AtlasLimits { pixels, bytes } = AtlasLimits::of(&limits(1 << 20));
         assert!(bytes + STAMP_BYTES < 1 << 20 && 4 * u64::from(pixels) <= bytes && pixels > 1 << 17);
-        assert_eq!(AtlasLimits::of(&limits(1 << 27)).pixels, MAX_PIXELS);
+        assert_eq!(AtlasLimits::of(&limits(1 << 28)).pixels, MAX_PIXELS);
     }
 
     #[test]

@@ -102,3 +102,19 @@ fn the_engine_leaves_little_of_real_terrain() {
     println!("exceptions: {:.3} % of the sites", 100.0 * share);
     assert!(share <= 0.002);
 }
+
+/// This takes minutes on a software GPU, so it runs only with GDT_TEST_LARGE=1.
+#[test]
+fn the_largest_atlas_is_that_of_the_twins() {
+    let Some(mut rig) = Rig::new() else { return };
+    if std::env::var_os("GDT_TEST_LARGE").is_none() {
+        return eprintln!("not tested: the largest atlas; set GDT_TEST_LARGE=1");
+    }
+    let mut random = Random(11);
+    let mut atlas = FilledAtlas::default();
+    while atlas.add(&uniform(&mut random, 35_000), TextureResolution::PixelsPerSite(16.0), rig.limits()) {}
+    assert!(atlas.sites.len() > 1_800_000 || rig.limits().pixels < 1 << 25, "{}", atlas.sites.len());
+    for comparison in rig.compare(&atlas) {
+        assert_eq!(comparison.differing, 0, "{comparison:?}");
+    }
+}

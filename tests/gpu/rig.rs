@@ -5,7 +5,7 @@ use gdt_batch::gpu::buffers::BufferSet;
 use gdt_batch::gpu::device::{self, AdapterRequest, Device};
 use gdt_batch::gpu::engine::GpuEngine;
 use gdt_batch::gpu::error::GpuError;
-use gdt_batch::gpu::filled_atlas::FilledAtlas;
+use gdt_batch::gpu::filled_atlas::{AtlasLimits, FilledAtlas};
 use gdt_batch::gpu::selftest::{StepComparison, compare};
 use gdt_batch::gpu::steps::Recording;
 
@@ -30,6 +30,11 @@ impl Rig {
                 None
             }
         }
+    }
+
+    /// Returns how large an atlas may be.
+    pub(crate) fn limits(&self) -> AtlasLimits {
+        AtlasLimits::of(&self.engine.device().limits)
     }
 
     /// Compares every step with its twin.
