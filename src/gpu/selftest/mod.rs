@@ -196,6 +196,7 @@ impl fmt::Display for SelfTest {
             };
             writeln!(f, "{:<10} {:>9} numbers {verdict}", c.step, c.numbers)?;
         }
+        writeln!(f, "the CPU does C1 and C3, what is left of C2 and C4, and proves every mesh")?;
         writeln!(
             f,
             "\ncopies read and write {:.1} GB/s; the floor is the time that a step's bytes take at this speed",
