@@ -1,10 +1,11 @@
 //! A short job on a made-up terrain, with a GPU and without it: whether the results are the same, and how much time the GPU saves.
 
 use crate::gpu::selftest::{self, SelfTest};
+use crate::job::options::RunOptions;
 use crate::job::progress::number_text::grouped;
 use crate::job::progress::stage::ProgressOutput;
 use crate::job::report::job_report::Report;
-use crate::{Error, Result, config, job, sample};
+use crate::{Error, Result, config, interrupt, job, sample};
 use serde::Serialize;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -41,8 +42,10 @@ pub struct GpuCheck {
     /// The steps one by one.
     #[serde(flatten)]
     pub test: SelfTest,
-    /// Whole jobs; `None` if nothing was to be timed, or a step is wrong.
+    /// Whole jobs; `None` if nothing was to be timed, a step is wrong, or a job failed.
     pub trial: Option<GpuTrial>,
+    /// Why a job failed.
+    pub failure: Option<String>,
 }
 
 impl GpuCheck {
@@ -55,17 +58,23 @@ impl GpuCheck {
 /// Tests the steps on the GPU called `name` as [`selftest::run`] does, and then whole jobs. With `leaves` = 0 nothing is timed.
 ///
 /// # Errors
-/// Those of [`selftest::run`], and those of [`crate::job::run`]: the jobs write to the system's directory for temporary files.
+/// Those of [`selftest::run`], and [`Error::Interrupted`].
 pub fn run(name: Option<&str>, leaves: Option<usize>) -> Result<GpuCheck> {
     let test = selftest::run(name, leaves)?;
     let trial = match &test.gpu {
-        Ok(adapter) if test.holds() && leaves != Some(0) => Some(compare_jobs(adapter, test.is_software())?),
+        Ok(adapter) if test.holds() && leaves != Some(0) => Some(compare_jobs(adapter, test.is_software())),
         _ => None,
     };
-    Ok(GpuCheck { test, trial })
+    Ok(match trial.transpose() {
+        Ok(trial) => GpuCheck { test, trial, failure: None },
+        Err(Error::Interrupted) => return Err(Error::Interrupted),
+        Err(error) => GpuCheck { test, trial: None, failure: Some(error.to_string()) },
+    })
 }
 
 fn compare_jobs(adapter: &str, is_software: bool) -> Result<GpuTrial> {
+    // Until here a signal ends the process at once.
+    interrupt::listen()?;
     let points = if is_software { SOFTWARE_POINTS } else { POINTS };
     let place = tempfile::tempdir().map_err(Error::io("create a directory in", std::env::temp_dir()))?;
     sample::write(&place.path().join("terrain.laz"), points, 1, false)?;
@@ -102,7 +111,7 @@ fn write_config(place: &Path, backend: &str, adapter: &str) -> Result<PathBuf> {
 /// Runs a job, and removes its results.
 fn run_job(config: &Path) -> Result<Report> {
     let options = config::load(config)?;
-    let report = job::run(&options, ProgressOutput::Quiet)?;
+    let report = job::run(&options, RunOptions { force: true, ..ProgressOutput::Quiet.into() })?;
     let results = &options.output.directory;
     std::fs::remove_dir_all(results).map_err(Error::io("remove", results))?;
     Ok(report)
@@ -122,6 +131,8 @@ impl GpuTrial {
         let times = self.seconds_without / self.seconds_with;
         if !self.same {
             "the jobs with and without this GPU wrote different bytes: this is an error of gdt-batch".into()
+        } else if self.on_gpu == 0 {
+            "this GPU made none of the leaves, so it is of no use here".into()
         } else if (1.0 - NOISE..=1.0 + NOISE).contains(&times) {
             "on this machine a job takes about as long with this GPU as without it".into()
         } else if times > 1.0 {
@@ -137,7 +148,8 @@ impl fmt::Display for GpuTrial {
         let GpuTrial { points, seconds_without, seconds_with, leaves, on_gpu, .. } = self;
         writeln!(
             f,
-            "a job of {} points: {seconds_without:.2} s without the GPU, {seconds_with:.2} s with it, which made {on_gpu} of {leaves} leaves",
+            "a job of {} points: {seconds_without:.2} s without the GPU, {seconds_with:.2} s with it once it is open; it made {on_gpu} of \
+             {leaves} leaves",
             grouped(*points)
         )?;
         writeln!(f, "{}", self.verdict())
@@ -147,7 +159,11 @@ impl fmt::Display for GpuTrial {
 impl fmt::Display for GpuCheck {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.test)?;
-        self.trial.iter().try_for_each(|trial| write!(f, "\n{trial}"))
+        self.trial.iter().try_for_each(|trial| write!(f, "\n{trial}"))?;
+        let place = std::env::temp_dir();
+        let hint =
+            |why: &String| format!("no job could be timed in {} (TMPDIR names another folder): {why}", place.display());
+        self.failure.iter().try_for_each(|why| writeln!(f, "\n{}", hint(why)))
     }
 }
 
@@ -163,5 +179,6 @@ mod tests {
         assert!(verdict(6.0, true).ends_with("about 2.0 times slower with this GPU"));
         assert!(verdict(2.95, true).contains("about as long"));
         assert!(verdict(2.0, false).contains("different bytes"));
+        assert!(GpuTrial { on_gpu: 0, ..trial.clone() }.verdict().contains("none of the leaves"));
     }
 }

@@ -87,7 +87,7 @@ pub struct GpuFigures {
     pub helped: u64,
     /// Leaves that workers did alone.
     pub alone: u64,
-    /// Leaves that workers did after it had been asked in vain.
+    /// Leaves that workers did because no mesh came that could be used: it was late, gone, or does not suit so large a leaf.
     pub in_vain: u64,
     /// Those of them that it gave up itself.
     #[serde(default)]

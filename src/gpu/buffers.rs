@@ -1,4 +1,4 @@
-//! Sets of GPU buffers. Every leaf in flight has a set of its own. Sets are reused, and their buffers only ever grow.
+//! Sets of GPU buffers. Every atlas in flight has a set of its own. Sets are reused, and their buffers only ever grow.
 
 use crate::gpu::buffer_id::BufferId;
 use crate::gpu::device::Device;

@@ -11,9 +11,9 @@ use crate::gpu::steps::GpuStep;
 use crate::voronoi::mesh_reply::MeshReply;
 use crate::voronoi::texture_request::TextureResolution;
 use std::collections::VecDeque;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender};
+use std::sync::{Arc, OnceLock};
 
 /// If an atlas with no more pixels than this does not fit, none will.
 const MIN_PIXELS: u32 = 1 << 16;
@@ -28,8 +28,12 @@ pub(super) struct GpuState {
     pub(super) unanswered: AtomicUsize,
     /// How many workers in a row have stopped waiting.
     pub(super) abandoned: AtomicUsize,
+    /// Whether any leaf has had an answer.
+    pub(super) has_answered: AtomicBool,
     /// Whether the GPU can no longer be used.
     pub(super) is_gone: AtomicBool,
+    /// Why the device can no longer be used.
+    pub(super) failure: OnceLock<String>,
     /// Nanoseconds per step on the GPU.
     pub(super) times: [AtomicU64; GpuStep::ALL.len()],
 }
@@ -42,7 +46,9 @@ impl GpuState {
             waiting: AtomicU64::new(0),
             unanswered: AtomicUsize::new(0),
             abandoned: AtomicUsize::new(0),
+            has_answered: AtomicBool::new(false),
             is_gone: AtomicBool::new(false),
+            failure: OnceLock::new(),
             times: Default::default(),
         }
     }
@@ -172,6 +178,7 @@ impl<E: MeshEngine> GpuThread<E> {
 
     fn answer(&self, request: &MeshRequest, reply: MeshReply) {
         self.state.abandoned.store(0, Ordering::Release);
+        self.state.has_answered.store(true, Ordering::Release);
         self.state.unanswered.fetch_sub(1, Ordering::AcqRel);
         // If sending fails, the worker no longer waits and needs no answer.
         let _ = request.reply.send(reply);
@@ -202,7 +209,9 @@ impl<E: MeshEngine> GpuThread<E> {
         }
         self.put_back(requests);
         let may_reopen = matches!(error, GpuError::Lost(_)) && !std::mem::replace(&mut self.has_reopened, true);
-        if !may_reopen || self.engine.reopen().is_err() {
+        let failure = if may_reopen { self.engine.reopen().err() } else { Some(error.clone()) };
+        if let Some(failure) = failure {
+            self.state.failure.get_or_init(|| failure.to_string());
             self.state.is_gone.store(true, Ordering::Release);
         }
     }

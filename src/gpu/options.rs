@@ -34,9 +34,9 @@ pub enum TextureSide {
     /// Chosen by the number of sites, within what the adapter supports.
     #[default]
     Auto,
-    /// The largest that the adapter supports.
+    /// The largest that fits: at most 16,384 pixels, and what [`crate::gpu::filled_atlas::AtlasLimits`] allow.
     Max,
-    /// This many pixels.
+    /// This many pixels; more than 16,384 are 16,384.
     Side(u32),
 }
 

@@ -13,7 +13,7 @@ const STAMPS: u32 = 2 * GpuStep::ALL.len() as u32;
 /// Bytes of all timestamps.
 pub(super) const STAMP_BYTES: u64 = 8 * STAMPS as u64;
 
-/// The timestamps of one leaf in flight.
+/// The timestamps of one atlas in flight.
 pub(super) struct GpuTimestamps {
     stamps: QuerySet,
     resolved: wgpu::Buffer,

@@ -110,7 +110,7 @@ impl Triangulator {
 
     /// Returns what the GPU did so far; `None` without one.
     pub fn gpu_figures(&self) -> Option<GpuFigures> {
-        self.gpu.as_ref().map(|gpu| gpu.benefit.figures())
+        self.gpu.as_ref().map(Executor::figures)
     }
 
     /// Returns the seconds that every step has taken on the GPU itself; nothing if the GPU has no timestamps.
@@ -147,10 +147,11 @@ impl Triangulator {
         let reply = if asked { gpu.mesh(sites) } else { MeshReply::Unavailable };
         let done = with_buffers(|buffers| voronoi::triangulate_with(sites, &reply, buffers));
         let is_helped = done.as_ref().is_ok_and(|(_, counts)| counts.on_gpu > 0);
-        match asked && !is_helped {
+        match done.is_ok() {
             // It has cost more than a leaf alone.
-            true => gpu.benefit.note_in_vain(&reply),
-            false if done.is_ok() => gpu.benefit.note(is_helped, sites.len(), own_cpu_seconds() - begun),
+            true if asked && !is_helped => gpu.benefit.note_in_vain(&reply),
+            true => gpu.benefit.note(is_helped, sites.len(), own_cpu_seconds() - begun),
+            // The leaf does not suit the pipeline, with a GPU or without.
             false => {}
         }
         done

@@ -5,7 +5,7 @@ use super::random::Random;
 use super::rig::Rig;
 use gdt_batch::geometry::Site;
 use gdt_batch::gpu::device::AdapterRequest;
-use gdt_batch::gpu::filled_atlas::{AtlasLimits, FilledAtlas};
+use gdt_batch::gpu::filled_atlas::{AtlasLimits, FilledAtlas, MAX_PIXELS};
 use gdt_batch::gpu::mesh_engine::{GpuMeshEngine, MAX_IN_FLIGHT, MeshEngine};
 use gdt_batch::gpu::options::VoronoiMethod;
 use gdt_batch::gpu::returned::ReturnedAtlas;
@@ -113,7 +113,8 @@ fn the_largest_atlas_is_that_of_the_twins() {
     let mut random = Random(11);
     let mut atlas = FilledAtlas::default();
     while atlas.add(&uniform(&mut random, 35_000), TextureResolution::PixelsPerSite(16.0), rig.limits()) {}
-    assert!(atlas.sites.len() > 1_800_000 || rig.limits().pixels < 1 << 25, "{}", atlas.sites.len());
+    // Mesa's software renderer has just less than MAX_PIXELS.
+    assert!(atlas.sites.len() > 1_800_000 || rig.limits().pixels < MAX_PIXELS / 2, "{}", atlas.sites.len());
     for comparison in rig.compare(&atlas) {
         assert_eq!(comparison.differing, 0, "{comparison:?}");
     }

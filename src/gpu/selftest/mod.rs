@@ -197,11 +197,11 @@ impl fmt::Display for SelfTest {
             writeln!(f, "{:<10} {:>9} numbers {verdict}", c.step, c.numbers)?;
         }
         writeln!(f, "the CPU does C1 and C3, what is left of C2 and C4, and proves every mesh")?;
-        writeln!(
-            f,
-            "\ncopies read and write {:.1} GB/s; the floor is the time that a step's bytes take at this speed",
-            self.copy_bandwidth / 1e9
-        )?;
+        if !self.timings.is_empty() {
+            let bandwidth = self.copy_bandwidth / 1e9;
+            let floor = "the floor is the time that a step's bytes take at this speed";
+            writeln!(f, "\ncopies read and write {bandwidth:.1} GB/s; {floor}")?;
+        }
         for timing in &self.timings {
             let AtlasTiming { leaves, sites, pixels, .. } = timing;
             writeln!(f, "\n{leaves} leaves, {sites} sites, {pixels} pixels")?;

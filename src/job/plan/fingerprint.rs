@@ -7,7 +7,6 @@ use crate::job::plan::inputs::input_paths;
 use crate::job::plan::lattice_choice::LatticeCoarsening;
 use crate::output::checksums::Checksum;
 use crate::output::options::ColorChoice;
-use crate::triangulation::options::Backend;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -145,10 +144,8 @@ impl Fingerprint {
     pub(crate) fn of_options(options: &JobOptions) -> Result<Checksum> {
         let Fingerprint { program, mesh, style, memory, .. } =
             Fingerprint::of_files(options, InputIdentities::default())?;
-        // The mesh is the same, but not the order of its triangles.
-        let is_reference = options.triangulation.backend == Backend::Reference;
         let [mesh, style] = [&mesh, &style].map(|values| values.iter().collect::<BTreeMap<_, _>>());
-        let text = serde_json::to_vec(&(program, mesh, style, memory, is_reference));
+        let text = serde_json::to_vec(&(program, mesh, style, memory));
         Ok(Checksum::of(&text.map_err(|e| Error::Broken(format!("the options: {e}")))?))
     }
 

@@ -71,13 +71,18 @@ impl fmt::Display for Report {
             row("  with the help of a GPU", format!("{} ({gpu})", grouped(self.leaves.outcome.counts.on_gpu)))?;
         }
         if let Some(figures) = &self.gpu_figures {
-            let GpuFigures { helped, flagged, rejected, ns_per_site_helped, ns_per_site_alone, given_up, .. } = figures;
+            let GpuFigures {
+                helped, in_vain, flagged, rejected, ns_per_site_helped, ns_per_site_alone, given_up, ..
+            } = figures;
             if *helped > 0 {
                 let per_site = format!("{ns_per_site_helped:.0} with it, {ns_per_site_alone:.0} without");
                 row("  processor ns a site", per_site)?;
             }
-            if flagged + rejected > 0 {
-                row("  done again", format!("{flagged} that the GPU gave up, {rejected} whose mesh did not suit"))?;
+            if *in_vain > 0 {
+                let unanswered = in_vain.saturating_sub(flagged + rejected);
+                let kinds =
+                    format!("{unanswered} without an answer, {flagged} given up by it, {rejected} did not suit");
+                row("  asked of the GPU in vain", format!("{in_vain}: {kinds}"))?;
             }
             if let Some(why) = given_up {
                 row("  the GPU was given up", why.clone())?;
