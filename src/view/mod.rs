@@ -1,5 +1,6 @@
 //! `gdt-batch view`: serves an output directory to a browser on this machine, together with the page that shows it.
 
+mod body;
 pub mod browser;
 mod content;
 mod response;

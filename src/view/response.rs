@@ -8,33 +8,40 @@ use std::time::UNIX_EPOCH;
 use flate2::Compression;
 use flate2::read::GzEncoder;
 use http_range_header::{RangeUnsatisfiableError, parse_range_header};
-use tiny_http::{Header, Method, Request, Response, ResponseBox, StatusCode};
+use hyper::header::{HeaderName, HeaderValue};
+use hyper::{Method, StatusCode, Version};
 
+use crate::view::body::Pieces;
 use crate::view::content::{content_type, is_worth_packing};
 use crate::view::site::{Site, Target};
 
-/// Returns the answer to `request`.
-pub(super) fn response(site: &Site, request: &Request) -> ResponseBox {
+/// A request. Its body does not matter.
+type Request = hyper::Request<hyper::body::Incoming>;
+
+type Response = hyper::Response<Pieces>;
+
+/// Returns the answer to `request`. `stays_here` tells whether the client is on this machine.
+pub(super) fn response(site: &Site, request: &Request, stays_here: bool) -> Response {
     if !site.answers_to(header(request, "Host")) {
         return text(403, "this server answers to localhost only; gdt-batch view --address changes that\n");
     }
-    if !matches!(request.method(), Method::Get | Method::Head) {
+    if !matches!(*request.method(), Method::GET | Method::HEAD) {
         return with(text(405, "only GET and HEAD are answered\n"), "Allow", "GET, HEAD");
     }
-    match site.target(request.url()) {
+    match site.target(request.uri().path()) {
         Target::Page => page(site, request),
-        Target::File(path, file) => file_response(request, &path, file)
+        Target::File(path, file) => file_response(request, &path, file, stays_here)
             .unwrap_or_else(|error| text(500, &format!("the file cannot be read: {error}\n"))),
         Target::Nothing => text(404, "there is no such file\n"),
     }
 }
 
 /// Returns an answer with a text.
-pub(super) fn text(status: u16, text: &str) -> ResponseBox {
+fn text(status: u16, text: &str) -> Response {
     plain(Cursor::new(text.to_owned()), text.len() as u64, status, "text/plain; charset=utf-8")
 }
 
-fn page(site: &Site, request: &Request) -> ResponseBox {
+fn page(site: &Site, request: &Request) -> Response {
     let (page, kind) = (site.page.clone(), "text/html; charset=utf-8");
     if takes_gzip(request) {
         return packed(Cursor::new(page), kind);
@@ -43,7 +50,7 @@ fn page(site: &Site, request: &Request) -> ResponseBox {
     plain(Cursor::new(page), length, 200, kind)
 }
 
-fn file_response(request: &Request, path: &Path, mut file: File) -> std::io::Result<ResponseBox> {
+fn file_response(request: &Request, path: &Path, mut file: File, stays_here: bool) -> std::io::Result<Response> {
     let data = file.metadata()?;
     let (length, tag, kind) = (data.len(), tag(&data), content_type(path));
     if header(request, "If-None-Match").is_some_and(|known| known.contains(&tag)) {
@@ -59,9 +66,7 @@ fn file_response(request: &Request, path: &Path, mut file: File) -> std::io::Res
             with(part, "Content-Range", &format!("bytes {start}-{end}/{length}"))
         }
         Wanted::Nowhere => with(text(416, "the file is shorter\n"), "Content-Range", &format!("bytes */{length}")),
-        Wanted::All if takes_gzip(request) && is_worth_packing(path, &mut file, stays_here(request))? => {
-            packed(file, kind)
-        }
+        Wanted::All if takes_gzip(request) && is_worth_packing(path, &mut file, stays_here)? => packed(file, kind),
         Wanted::All => plain(file, length, 200, kind),
     };
     Ok(with(with(answer, "ETag", &tag), "Accept-Ranges", "bytes"))
@@ -94,44 +99,39 @@ fn tag(data: &Metadata) -> String {
     format!("\"{:x}-{:x}\"", time.as_nanos(), data.len())
 }
 
-fn plain(content: impl Read + Send + 'static, length: u64, status: u16, kind: &str) -> ResponseBox {
-    // A file may grow while it is sent.
-    let content = content.take(length);
-    let response = Response::new(StatusCode(status), headers(kind), content, usize::try_from(length).ok(), None);
-    // Browsers show how far a download is if they know its length.
-    response.with_chunked_threshold(usize::MAX).boxed()
+fn plain(content: impl Read + Send + 'static, length: u64, status: u16, kind: &str) -> Response {
+    with_headers(Pieces::new(content, Some(length)), StatusCode::from_u16(status).unwrap_or_default(), kind)
 }
 
-fn packed(content: impl Read + Send + 'static, kind: &str) -> ResponseBox {
+fn packed(content: impl Read + Send + 'static, kind: &str) -> Response {
     let content = GzEncoder::new(content, Compression::fast());
-    let response = Response::new(StatusCode(200), headers(kind), content, None, None).boxed();
-    with(response, "Content-Encoding", "gzip")
+    with(with_headers(Pieces::new(content, None), StatusCode::OK, kind), "Content-Encoding", "gzip")
 }
 
-/// Returns the headers of every answer. A job may replace its results, so browsers must ask each time whether a file has changed.
-fn headers(kind: &str) -> Vec<Header> {
-    let fixed = [
+/// Returns an answer with the headers of every answer. A job may replace its results, so browsers must ask each time whether a file has
+/// changed.
+fn with_headers(body: Pieces, status: StatusCode, kind: &str) -> Response {
+    let mut response = Response::new(body);
+    *response.status_mut() = status;
+    let headers = [
         ("Cache-Control", "no-cache"),
         ("Vary", "Accept-Encoding"),
         ("X-Content-Type-Options", "nosniff"),
         ("Cross-Origin-Resource-Policy", "same-origin"),
+        ("Content-Type", kind),
     ];
-    fixed.into_iter().chain([("Content-Type", kind)]).filter_map(|(name, value)| make_header(name, value)).collect()
+    headers.into_iter().fold(response, |response, (name, value)| with(response, name, value))
 }
 
-fn make_header(name: &str, value: &str) -> Option<Header> {
-    Header::from_bytes(name, value).ok()
-}
-
-fn with(response: ResponseBox, name: &str, value: &str) -> ResponseBox {
-    match make_header(name, value) {
-        Some(header) => response.with_header(header),
-        None => response,
+fn with(mut response: Response, name: &str, value: &str) -> Response {
+    if let (Ok(name), Ok(value)) = (HeaderName::try_from(name), HeaderValue::try_from(value)) {
+        response.headers_mut().insert(name, value);
     }
+    response
 }
 
-fn header<'a>(request: &'a Request, name: &'static str) -> Option<&'a str> {
-    request.headers().iter().find(|header| header.field.equiv(name)).map(|header| header.value.as_str())
+fn header<'a>(request: &'a Request, name: &str) -> Option<&'a str> {
+    request.headers().get(name)?.to_str().ok()
 }
 
 /// Tells whether the browser unpacks gzip. Version 1.0 of HTTP cannot send what has no known length.
@@ -142,9 +142,5 @@ fn takes_gzip(request: &Request) -> bool {
             name.trim() == "gzip" && !matches!(quality.trim(), "q=0" | "q=0.0" | "q=0.00" | "q=0.000")
         })
     };
-    *request.http_version() >= (1, 1) && header(request, "Accept-Encoding").is_some_and(offers)
-}
-
-fn stays_here(request: &Request) -> bool {
-    request.remote_addr().is_some_and(|address| address.ip().is_loopback())
+    request.version() >= Version::HTTP_11 && header(request, "Accept-Encoding").is_some_and(offers)
 }

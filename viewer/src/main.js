@@ -157,10 +157,7 @@ class Viewer {
     const { triangles } = this.renderer.info.render;
     byId('shown').textContent = `${count(triangles)} triangles are drawn`;
     byId('attribution').textContent = [...terrain.attributions].join(' · ');
-    if (this.mode === 'levels' && this.levelsTold !== terrain.levels.size) {
-      this.levelsTold = terrain.levels.size;
-      this.legend();
-    }
+    if (this.mode === 'levels') this.legend();
     const isEmpty = this.dressing.meshes.size === 0;
     if (isEmpty && terrain.failures && !terrain.isLoading) say('failed', 'The tiles cannot be loaded. Is the folder complete?');
     else if (terrain.isLoading || !this.heights) say('loading', 'Loading tiles…');
@@ -196,7 +193,7 @@ class Viewer {
     if (walks) {
       this.back = this.camera.position.clone();
       const hit = this.hitInMiddle();
-      this.walk.start(hit ? hit.point : this.picker.hitBelow(new Vector3())?.point ?? this.orbit.target);
+      this.walk.start(this.picker.lowestAround(hit ? hit.point : new Vector3(), 20));
     } else if (this.walk.isOn) {
       this.walk.stop();
       const here = this.camera.position.clone();

@@ -8,10 +8,8 @@ export class OneFileTerrain {
     Object.assign(this, { url, loader, dressing, progress });
     this.object = new Group();
     this.attributions = new Set();
-    this.levels = new Set();
     this.failures = 0;
     this.isLoading = false;
-    this.isOnGlobe = false;
   }
 
   // Loads the file and puts the middle of the terrain at the origin.
@@ -25,6 +23,10 @@ export class OneFileTerrain {
     this.object.position.copy(sphere.center).negate();
     this.object.add(gltf.scene);
     this.object.updateMatrixWorld(true);
+  }
+
+  get shownLevels() {
+    return { coarser: [], hasExact: true };
   }
 
   set detail(_) {}

@@ -1,5 +1,5 @@
 // Looking at the terrain from outside: the camera turns around a place on it.
-import { MOUSE, TOUCH, Spherical, Vector3 } from 'three';
+import { MathUtils, MOUSE, TOUCH, Spherical, Vector3 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 
 const TURN = 0.06;
@@ -32,8 +32,9 @@ export class Orbit {
   // Shows the whole of a terrain around the origin, from the south and above.
   showAll(radius) {
     this.controls.maxDistance = 12 * radius;
-    const narrow = Math.min(1, this.camera.aspect);
-    this.look(new Vector3(), new Vector3(0, 0.75, 0.8).multiplyScalar((1.75 * radius) / narrow));
+    const upright = Math.tan(MathUtils.degToRad(this.camera.fov / 2));
+    const narrowest = Math.atan(upright * Math.min(1, this.camera.aspect));
+    this.look(new Vector3(), new Vector3(0, 0.68, 0.73).setLength((0.88 * radius) / Math.sin(narrowest)));
   }
 
   // Looks at `target` from `offset` beside it.

@@ -121,7 +121,7 @@ export class Panel {
     if (!this.viewer.ruler.isOn || !byId('report').hidden || !byId('view').hidden) this.open(this.tabs[1]);
     this.coordinates = found.text.join(', ');
     byId('point-hint').textContent = this.viewer.terrain.georeference.crs ?? 'The source names no coordinate reference system.';
-    byId('point-facts').replaceChildren(...rows(pointFacts(found, isFinal)));
+    byId('point-facts').replaceChildren(...rows(pointFacts(found, this.viewer.terrain.georeference, isFinal)));
     byId('point-facts').dataset.final = String(isFinal);
     [...byId('point-facts').querySelectorAll('dd')].slice(0, 3).forEach((value) => value.classList.add('coordinate'));
     byId('copy').hidden = false;
@@ -133,7 +133,7 @@ export class Panel {
 
   showReport(report) {
     byId('report-body').replaceChildren(...describeReport(report));
-    byId('detail-field').hidden = this.viewer.terrain.levels.size === 0 && !this.viewer.terrain.tiles;
+    byId('detail-field').hidden = !this.viewer.terrain.tiles;
     if (report?.warnings?.length) this.tabs[2].textContent = `Report (${report.warnings.length})`;
   }
 }

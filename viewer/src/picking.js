@@ -46,6 +46,14 @@ export class Picker {
     return this.cast();
   }
 
+  // Returns the lowest of some places around one: rather the ground than the top of a tree.
+  lowestAround(middle, metres) {
+    const steps = [-1, -0.5, 0, 0.5, 1];
+    const around = steps.flatMap((x) => steps.map((z) => this.hitBelow({ x: middle.x + x * metres, z: middle.z + z * metres })));
+    const places = around.filter(Boolean).map(({ point }) => point);
+    return places.reduce((lowest, place) => (place.y < lowest.y ? place : lowest), places[0] ?? middle);
+  }
+
   above(x, z) {
     return new Vector3(x, 8 * this.terrain.radius, z);
   }

@@ -9,6 +9,16 @@ const CACHE_BYTES = 700e6;
 // Places farther from the origin than this are on the globe: other tilesets have their origin inside the terrain.
 const LEAST_EARTH_RADIUS = 6.2e6;
 
+// Beside a page at the root of a server, the renderer asks for two slashes. Stores of files take them for another name.
+const SINGLE_SLASHES = {
+  name: 'SINGLE_SLASHES',
+  preprocessURL(text) {
+    const url = new URL(text, document.baseURI);
+    url.pathname = url.pathname.replace(/\/{2,}/g, '/');
+    return url.href;
+  },
+};
+
 // Returns the frame at a place of a tileset that is Z up: its origin there, x east, y up, z south.
 function localFrame(place) {
   const eastNorthUp = new Matrix4().makeTranslation(place);
@@ -27,11 +37,11 @@ export class TilesetTerrain {
     this.tiles.manager.addHandler(/\.glb$/i, loader);
     this.tiles.setCamera(camera);
     Object.assign(this.tiles.lruCache, { maxBytesSize: CACHE_BYTES, minBytesSize: 0.7 * CACHE_BYTES });
+    this.tiles.registerPlugin(SINGLE_SLASHES);
     this.exactPlaces = new LoadRegionPlugin();
     this.tiles.registerPlugin(this.exactPlaces);
     this.object = this.tiles.group;
     this.attributions = new Set();
-    this.levels = new Set();
     this.failures = 0;
     this.tiles.addEventListener('load-model', ({ scene, tile }) => this.add(scene, tile));
     this.tiles.addEventListener('dispose-model', ({ scene }) => dressing.remove(scene));
@@ -53,29 +63,28 @@ export class TilesetTerrain {
     const { asset } = this.tiles.rootTileset;
     this.georeference = new Georeference(asset.extras);
     if (asset.copyright) this.attributions.add(asset.copyright);
-    const sphere = this.tiles.getBoundingSphere(new Sphere()) && this.boundingSphere();
-    this.radius = sphere.radius;
-    const frame = localFrame(sphere.center);
-    this.isOnGlobe = sphere.center.length() > LEAST_EARTH_RADIUS;
-    frame.invert().decompose(this.object.position, this.object.quaternion, this.object.scale);
-    this.object.updateMatrixWorld(true);
-  }
-
-  boundingSphere() {
     const sphere = new Sphere();
     this.tiles.getBoundingSphere(sphere);
-    return sphere;
+    this.radius = sphere.radius;
+    localFrame(sphere.center).invert().decompose(this.object.position, this.object.quaternion, this.object.scale);
+    this.object.updateMatrixWorld(true);
   }
 
   add(scene, tile) {
     const isExact = tile.children.length === 0;
     const level = tile.internal.depthFromRenderedParent;
-    if (!isExact) this.levels.add(level);
     const color = isExact ? EXACT_COLOR : LEVEL_COLORS[(level - 1) % LEVEL_COLORS.length];
     const facts = { uri: tile.content.uri.replace(/^(\.\.\/)+/, ''), isExact, level, error: tile.geometricError };
     const { copyright } = tile.engineData.metadata?.asset ?? {};
     if (copyright) this.attributions.add(copyright);
     this.dressing.add(scene, color, facts);
+  }
+
+  // The levels of the coarser tiles on the screen, and whether there are exact ones.
+  get shownLevels() {
+    const shown = [...this.tiles.visibleTiles].filter((tile) => tile.internal.hasRenderableContent);
+    const coarser = shown.filter((tile) => tile.children.length > 0).map((tile) => tile.internal.depthFromRenderedParent);
+    return { coarser: [...new Set(coarser)].sort((a, b) => a - b), hasExact: shown.some((tile) => tile.children.length === 0) };
   }
 
   set detail(pixels) {
@@ -104,9 +113,5 @@ export class TilesetTerrain {
     const [tile] = this.tiles.activeTiles;
     const transform = tile?.engineData.scene?.matrixWorld ?? this.object.matrixWorld;
     return new Vector3(...scenePosition).applyMatrix4(transform);
-  }
-
-  dispose() {
-    this.tiles.dispose();
   }
 }

@@ -3,6 +3,7 @@ use flate2::read::GzDecoder;
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpStream};
 use std::path::Path;
+use std::thread;
 use tempfile::TempDir;
 
 /// A folder with files, served on a port of its own until the test process ends.
@@ -54,7 +55,7 @@ impl Rig {
         let end = memchr::memmem::find(&bytes, b"\r\n\r\n").unwrap();
         let head = String::from_utf8(bytes[..end].to_vec()).unwrap();
         let status = head.split(' ').nth(1).unwrap().parse().unwrap();
-        let is_chunked = head.contains("Transfer-Encoding: chunked");
+        let is_chunked = head.to_ascii_lowercase().contains("transfer-encoding: chunked");
         let body = bytes[end + 4..].to_vec();
         Answer { status, head, body: if is_chunked { unchunked(&body) } else { body } }
     }
@@ -233,6 +234,23 @@ fn clients_that_never_send_or_never_read_hold_up_nobody() {
     });
     drop((silent, slow, half));
     assert_eq!(rig.get("/report.json").status, 200);
+}
+
+#[test]
+fn connections_that_stay_open_keep_no_new_one_waiting() {
+    let rig = Rig::new();
+    let mut open = Vec::new();
+    for _ in 0..100 {
+        let mut stream = TcpStream::connect(rig.address).unwrap();
+        stream.write_all(b"HEAD /report.json HTTP/1.1\r\nHost: localhost\r\n\r\n").unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
+        open.push(stream);
+    }
+    for mut stream in open.iter() {
+        let mut start = [0; 12];
+        stream.read_exact(&mut start).unwrap();
+        assert_eq!(&start, b"HTTP/1.1 200");
+    }
 }
 
 #[test]
