@@ -2,8 +2,8 @@
 import { Raycaster, Vector2, Vector3 } from 'three';
 
 const DOWN = new Vector3(0, -1, 0);
-// How many frames without loading may pass before what is shown counts as the finest there is.
-const QUIET_FRAMES = 3;
+// How long nothing may load before what is shown counts as the finest there is. Between two levels, a few frames load nothing.
+const QUIET_MS = 2000;
 
 // Returns what a hit on a mesh tells: the place on the triangle, its nearest vertex, and the tile.
 export function describeHit({ object, face, point }, georeference) {
@@ -71,14 +71,14 @@ export class Picker {
   async follow(place, show) {
     const own = ++this.number;
     this.terrain.refineAlong({ origin: this.above(place.x, place.z), direction: DOWN });
-    for (let quiet = 0; own === this.number;) {
+    for (let busy = performance.now(); own === this.number;) {
       const hit = this.hitBelow(place);
       const found = hit && this.describe(hit);
-      const isFinal = Boolean(found?.isExact) || quiet >= QUIET_FRAMES;
+      const isFinal = Boolean(found?.isExact) || performance.now() - busy > QUIET_MS;
       show(found, isFinal);
       if (isFinal) return;
       await this.nextFrame();
-      quiet = this.terrain.isLoading ? 0 : quiet + 1;
+      if (this.terrain.isLoading) busy = performance.now();
     }
   }
 
