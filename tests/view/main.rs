@@ -22,10 +22,11 @@ struct Terrain {
     folder: TempDir,
 }
 
-/// Returns point number `i`, `j` of a hilly grid in hundredths of a unit, so that no rounding is in the way.
+/// Returns point number `i`, `j` of a rough grid in hundredths of a unit, so that no rounding is in the way. It is so flat that no point hides
+/// another one.
 fn point(i: i64, j: i64) -> [i64; 3] {
     let shift = |k: i64| (k * 7919).rem_euclid(131) - 65;
-    [50_000_000 + 300 * i + shift(i * 31 + j), 480_000_000 + 300 * j + shift(j * 17 - i), 10_000 + 21 * ((i * j) % 37)]
+    [50_000_000 + 300 * i + shift(i * 31 + j), 480_000_000 + 300 * j + shift(j * 17 - i), 10_000 + (i * j) % 37]
 }
 
 fn text(hundredths: i64) -> String {
