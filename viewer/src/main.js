@@ -19,6 +19,10 @@ const page = document.documentElement;
 // The greatest error on the screen in pixels, for each position of the slider.
 const DETAIL_PIXELS = [64, 32, 16, 8, 4];
 const CLICK_PIXELS = 6;
+// More triangles make a computer without a graphics card of its own slow: the tiles become coarser then, step by step.
+const MOST_TRIANGLES = 5e6;
+const COARSER = 1.25;
+const COARSER_MS = 250;
 
 // Tells people, and programs that watch the page, how far it is: loading, shown or failed.
 function say(state, text) {
@@ -84,7 +88,7 @@ class Viewer {
     await terrain.open();
     this.terrain = terrain;
     this.scene.add(terrain.object);
-    terrain.detail = DETAIL_PIXELS[2];
+    this.detail = DETAIL_PIXELS[2];
     this.picker = new Picker(terrain, camera, () => this.nextFrame());
     this.ruler = new Ruler(this.scene, terrain, changed);
     this.orbit.showAll(terrain.radius);
@@ -120,6 +124,7 @@ class Viewer {
     this.terrain.update();
     if (!this.heights && !this.terrain.isLoading && this.dressing.meshes.size) this.setHeights();
     this.renderer.render(this.scene, this.camera);
+    this.limit(this.renderer.info.render.triangles, now);
     this.tell();
     this.waiting.splice(0).forEach((resolve) => resolve());
     if (isOnTheWay || this.terrain.isLoading || !this.heights) this.changed();
@@ -141,6 +146,27 @@ class Viewer {
     this.legend();
   }
 
+  // Sets the greatest error on the screen in pixels.
+  set detail(pixels) {
+    Object.assign(this, { pixels, coarser: 1, limitedAt: 0 });
+    this.terrain.detail = pixels;
+    this.changed();
+  }
+
+  // Makes tiles coarser while there are too many triangles, and finer again once a moved camera sees few.
+  limit(triangles, now) {
+    const place = this.camera.position.lengthSq() + this.camera.position.x;
+    const isMoved = place !== this.limitPlace;
+    this.limitPlace = place;
+    const before = this.coarser;
+    if (triangles > MOST_TRIANGLES && now - this.limitedAt > COARSER_MS) this.coarser *= COARSER;
+    else if (isMoved && triangles < MOST_TRIANGLES / 4) this.coarser = Math.max(1, this.coarser / COARSER);
+    if (this.coarser === before) return;
+    this.limitedAt = now;
+    this.terrain.detail = this.pixels * this.coarser;
+    this.changed();
+  }
+
   set colors(mode) {
     this.mode = mode;
     this.surface.shared.mode.value = MODES.indexOf(mode);
@@ -155,7 +181,7 @@ class Viewer {
   tell() {
     const { terrain } = this;
     const { triangles } = this.renderer.info.render;
-    byId('shown').textContent = `${count(triangles)} triangles are drawn`;
+    byId('shown').textContent = `${count(triangles)} triangles are drawn${this.coarser > 1 ? ', and no finer ones, to stay fast' : ''}`;
     byId('attribution').textContent = [...terrain.attributions].join(' · ');
     if (this.mode === 'levels') this.legend();
     const isEmpty = this.dressing.meshes.size === 0;

@@ -54,7 +54,7 @@ export class Panel {
     onChange('modes', ({ value }) => { viewer.colors = value; });
     onChange('shaded', ({ checked }) => { viewer.surface.shared.shaded.value = checked; viewer.changed(); });
     onChange('edges', ({ checked }) => { viewer.dressing.edges = checked; viewer.changed(); });
-    byId('detail').addEventListener('input', ({ target }) => { viewer.terrain.detail = detailPixels[target.value]; viewer.changed(); });
+    byId('detail').addEventListener('input', ({ target }) => { viewer.detail = detailPixels[target.value]; });
     for (const input of document.getElementsByName('move')) input.addEventListener('change', () => this.move(input.value));
     byId('whole').addEventListener('click', () => this.showWhole());
   }
