@@ -3,6 +3,7 @@
 use crate::job::phase::{MOST_TASKS, Phase, Task};
 use crate::submit::Engine;
 use clap::{Args, Parser, Subcommand};
+use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
 
 /// What `--help` shows after the options.
@@ -11,6 +12,7 @@ Examples:
   gdt-batch sample terrain.laz          write a sample terrain to try things on
   gdt-batch configs/quickstart.toml     run a job
   gdt-batch check job.toml              what would the job read, how large is it, does it fit?
+  gdt-batch view out                    look at the terrain in a browser
   gdt-batch verify out                  prove that the tiles in out are the exact Delaunay triangulation
   gdt-batch verify out --input *.laz    and that its vertices are the points of these files
 
@@ -85,6 +87,22 @@ pub enum CliCommand {
         /// The files that the job has read: prove that the vertices are their points, heights included.
         #[arg(long, num_args = 1.., value_name = "FILE")]
         input: Vec<PathBuf>,
+    },
+    /// Show the results in a browser: serve them, and open a page with the terrain.
+    ///
+    /// Only browsers on this machine can reach the page, unless --address says otherwise. Ctrl-C ends it.
+    View {
+        /// The output directory of a job.
+        directory: PathBuf,
+        /// The port to listen on. Default: one that is free.
+        #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
+        port: u16,
+        /// Do not open a browser.
+        #[arg(long)]
+        no_open: bool,
+        /// The address of this machine to listen on. With 0.0.0.0, every machine that reaches this one can read the files.
+        #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
+        address: IpAddr,
     },
     /// Do one task of one phase of a large job, as schedulers of clusters start it.
     ///

@@ -63,6 +63,9 @@ pub enum Error {
     /// The scheduler of a cluster refused something, or has something to do first (exit code 1).
     #[error("{0}")]
     Engine(String),
+    /// The port to listen on is taken (exit code 1).
+    #[error("{0}")]
+    Port(String),
     /// The process was asked to stop (exit code 1).
     #[error("interrupted")]
     Interrupted,
@@ -170,6 +173,7 @@ impl Error {
             | Error::TooEarly(_)
             | Error::Memory(_)
             | Error::Engine(_)
+            | Error::Port(_)
             | Error::Interrupted => 1,
             Error::Resumable { why, .. } => why.exit_code(),
             Error::Tasks { code, .. } => *code,

@@ -25,6 +25,7 @@ pub mod submit;
 pub mod threads;
 pub mod triangulation;
 pub mod verify;
+pub mod view;
 pub mod voronoi;
 mod warnings;
 

@@ -19,6 +19,7 @@ use gdt_batch::submit::request::Request;
 use gdt_batch::submit::{Engine, kubernetes, slurm};
 use gdt_batch::threads::{self, on_threads};
 use gdt_batch::verify::Conclusion;
+use gdt_batch::view::{View, browser};
 use gdt_batch::{Error, Result, config, input, interrupt, sample, say, shortage, verify};
 use serde::Serialize;
 use std::fmt::Display;
@@ -46,6 +47,10 @@ fn run(cli: Cli) -> Result<ExitCode> {
         }
         (Some(CliCommand::Check { config }), _) => check_job(config, print),
         (Some(CliCommand::Verify { directory, memory, input }), _) => verify_output(directory, *memory, input, print),
+        (Some(CliCommand::View { directory, port, no_open, address }), _) => {
+            let view = View::open(directory, *address, *port)?;
+            view_output(&view, !no_open, print)
+        }
         (Some(CliCommand::Work { config, phase, task, tasks, threads, force, submission }), _) => {
             let task = match task {
                 Some(task) => *task,
@@ -196,6 +201,16 @@ fn verify_output(directory: &Path, memory: u64, inputs: &[PathBuf], print: Print
     let first = verdict.failures.first().or(verdict.unproved.as_ref()).map_or("", String::as_str);
     say(&format!("error: {}: {}: {first}", directory.display(), verdict.sentence()));
     Ok(ExitCode::from(verdict.verdict.exit_code()))
+}
+
+/// Serves a terrain until Ctrl-C. That is how it is meant to end, so the exit code is 0 then.
+fn view_output(view: &View, opens: bool, print: PrintOptions) -> Result<ExitCode> {
+    interrupt::listen()?;
+    print_result(view, print)?;
+    if let Some(Err(why)) = opens.then(|| browser::open(&view.url)) {
+        say(&format!("no browser was opened ({why}): open {} yourself", view.url));
+    }
+    view.run().map(|()| ExitCode::SUCCESS)
 }
 
 fn test_gpu(adapter: Option<&str>, leaves: Option<usize>, print: PrintOptions) -> Result<ExitCode> {

@@ -112,6 +112,11 @@ impl OutputFiles {
         self.directory.join("preview.png")
     }
 
+    /// Returns the page that shows the terrain in a browser.
+    pub fn page(&self) -> PathBuf {
+        self.directory.join("index.html")
+    }
+
     /// Returns the folder of what a job keeps for itself until it is finished.
     pub fn job(&self) -> PathBuf {
         self.directory.join("job")

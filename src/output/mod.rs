@@ -11,6 +11,7 @@ pub mod gltf;
 pub mod lod;
 pub mod normals;
 pub mod options;
+pub mod page;
 pub mod preview;
 pub mod tile;
 pub mod tiles3d;

@@ -1,7 +1,9 @@
 //! The options of `[output]`.
 
 use crate::output::compression::{Compression, CompressionChoice};
-use serde::{Deserialize, Serialize};
+use crate::output::page::{NOT_BUILT_IN, is_built_in};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
 use std::path::PathBuf;
 
 /// `[output]`: where the results go, and what they are.
@@ -34,6 +36,9 @@ pub struct OutputOptions {
     /// The longest edge of a triangle that is not left out.
     #[serde(default)]
     pub max_edge: MaxEdge,
+    /// Whether a page that shows the terrain is written beside it.
+    #[serde(default, deserialize_with = "page")]
+    pub page: bool,
 }
 
 impl OutputOptions {
@@ -45,6 +50,15 @@ impl OutputOptions {
             (CompressionChoice::None, _) => Compression::None,
         }
     }
+}
+
+/// Reads `page`, which only some builds of the program can write.
+fn page<'de, D: Deserializer<'de>>(value: D) -> Result<bool, D::Error> {
+    let wanted = bool::deserialize(value)?;
+    if wanted && !is_built_in() {
+        return Err(D::Error::custom(NOT_BUILT_IN));
+    }
+    Ok(wanted)
 }
 
 fn yes() -> bool {

@@ -14,20 +14,25 @@ struct Rule {
 /// The rooms of a job's steps, in order. Each imports only from those before it.
 const STEPS: [&str; 6] = ["job/plan", "job/partition", "job/mesh", "job/tiles", "job/levels", "job/publish"];
 
-const RULES: [Rule; 7] = [
+const RULES: [Rule; 8] = [
     Rule {
         rooms: &["geometry", "mesh", "voronoi", "gpu", "triangulation", "input", "output"],
-        never: &["config", "job", "submit", "verify", "cli"],
+        never: &["config", "job", "submit", "verify", "view", "cli"],
         why: "a library room knows no job",
     },
     Rule {
         rooms: &["verify"],
-        never: &["config", "job", "submit", "cli"],
+        never: &["config", "job", "submit", "view", "cli"],
         why: "the proof shares nothing with the job",
     },
     Rule {
+        rooms: &["view"],
+        never: &["config", "job", "submit", "verify", "cli"],
+        why: "the server knows files, no job",
+    },
+    Rule {
         rooms: &["job"],
-        never: &["config", "submit", "verify", "cli"],
+        never: &["config", "submit", "verify", "view", "cli"],
         why: "a job does not know where its options come from, nor who starts its tasks",
     },
     Rule {

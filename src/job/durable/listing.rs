@@ -2,6 +2,7 @@
 
 use crate::job::durable::atomic_file::partial_path;
 use crate::output::file_names::{MOST_FOLDERS_DEEP, OutputFiles, belongs_into, is_number};
+use crate::output::page::is_page;
 use crate::{Error, Result, disk};
 use std::path::{Path, PathBuf};
 
@@ -34,6 +35,11 @@ impl Leftovers {
             output.georeference(),
             output.preview(),
         ];
+        // People give their own pages this name too.
+        let page = output.page();
+        if !exists(&page)? || is_page(&page).map_err(Error::io("read", &page))? {
+            files.push(page);
+        }
         let partials: Vec<PathBuf> = files.iter().map(|path| partial_path(path)).collect();
         files.extend(partials);
         let mut left = Leftovers { files, ..Leftovers::default() };
@@ -105,6 +111,18 @@ mod tests {
     use super::*;
     use std::collections::BTreeSet;
     use std::fs;
+
+    #[test]
+    fn a_page_of_somebody_else_is_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let output = OutputFiles::new(folder.path());
+        let is_listed = || Leftovers::of(&output).unwrap().files.contains(&output.page());
+        assert!(is_listed());
+        fs::write(output.page(), "<!doctype html>\n<title>My survey</title>").unwrap();
+        assert!(!is_listed());
+        fs::write(output.page(), "<!doctype html>\n<html lang=\"en\" data-terrain=\"tileset.json\">").unwrap();
+        assert!(is_listed());
+    }
 
     #[test]
     fn only_what_a_job_may_have_written_is_found() {

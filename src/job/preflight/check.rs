@@ -75,7 +75,7 @@ pub struct Preflight {
 pub fn check(options: &JobOptions) -> Result<Preflight> {
     let directory = JobDirectory::new(&options.output.directory);
     check_nothing_in_the_way(&directory)?;
-    check_results_are_ours(&directory)?;
+    check_results_are_ours(&directory, options.output.page)?;
     let plan = make_plan(options, LatticeCoarsening::default())?;
     let threads = workers(options, plan.records)?;
     if has_filter(&plan) {

@@ -8,6 +8,7 @@ use crate::job::partition::tree::Tree;
 use crate::job::records::{StepOutput, StepRecord, Store};
 use crate::output::frame::Frame;
 use crate::output::gltf::one_file::write_terrain;
+use crate::output::page::page_for;
 use crate::output::preview::canvas::{Canvas, PreviewPixel};
 use crate::output::preview::picture::Picture;
 use crate::output::tiles3d::tileset::{TilesetNode, write_tilesets};
@@ -22,12 +23,15 @@ pub struct SideFiles<'a> {
     pub tileset: Option<(&'a Frame, TilesetNode)>,
     /// Whether there is to be a `terrain.glb`. It is made from the tiles, which must have their names.
     pub one_file: bool,
+    /// Whether there is to be a page that shows the terrain.
+    pub page: bool,
 }
 
 /// Writes the files beside the tiles and returns the number of their bytes.
 ///
 /// # Errors
-/// [`crate::Error::Io`] on the output or the store, [`crate::Error::Broken`] if they are not what earlier steps wrote.
+/// [`crate::Error::Io`] on the output or the store, [`crate::Error::Broken`] if they are not what earlier steps wrote,
+/// [`crate::Error::Config`] if there is to be a page and it is not built in.
 pub fn write_side_files(
     directory: &JobDirectory,
     content: &SideFiles,
@@ -41,6 +45,11 @@ pub fn write_side_files(
     ];
     if let Some((frame, root)) = &content.tileset {
         files.extend(pending_tilesets(directory, frame, root)?);
+    }
+    if content.page {
+        let opened = if content.tileset.is_some() { output.tileset() } else { output.terrain() };
+        let name = opened.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        files.push(write_pending(&output.page(), page_for(&name)?.as_bytes())?);
     }
     if content.one_file {
         let written = |path: PathBuf| Ok(disk::exists(&path).map_err(Error::io("read", &path))?.then_some(path));

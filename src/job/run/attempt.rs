@@ -196,7 +196,7 @@ fn attempt(
     if !run.force && job.work == EarlierWork::Interrupted {
         on_threads(threads, || require_room(&plan, threads))?;
     }
-    check_results_are_ours(directory)?;
+    check_results_are_ours(directory, options.output.page)?;
     let mut earlier = earlier;
     let lock_of_job = match lock {
         Some(lock) => lock,

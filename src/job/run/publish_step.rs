@@ -126,6 +126,7 @@ pub(crate) fn publish(
         georeference: georeference.to_json(placement.as_ref())?,
         tileset: text,
         one_file: fits && output.format != OutputFormat::Tiles3d,
+        page: output.page,
     };
     if content.one_file {
         // terrain.glb is made from the tiles, which must have their names.

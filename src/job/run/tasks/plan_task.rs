@@ -30,7 +30,7 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> Result<Option<Strin
     if is_planned(directory, &fingerprint, run.submission)? {
         return Ok(Some("the job is planned already".into()));
     }
-    check_results_are_ours(directory)?;
+    check_results_are_ours(directory, options.output.page)?;
     let _lock = directory.lock()?;
     let earlier = read_earlier(directory, run)?;
     let coarsening = coarsening_of(directory, earlier.as_ref(), &fingerprint)?;

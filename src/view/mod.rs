@@ -1,0 +1,160 @@
+//! `gdt-batch view`: serves an output directory to a browser on this machine, together with the page that shows it.
+
+mod body;
+pub mod browser;
+mod content;
+mod response;
+mod server;
+mod site;
+
+use std::fmt;
+use std::net::{IpAddr, SocketAddr, TcpListener};
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use crate::output::file_names::OutputFiles;
+use crate::output::page::page_for;
+use crate::view::server::Server;
+use crate::view::site::Site;
+use crate::{Error, Result};
+
+/// A terrain that waits for browsers: `Display` is for people, `Serialize` for programs.
+#[derive(Serialize)]
+pub struct View {
+    /// The output directory.
+    pub directory: PathBuf,
+    /// The address of the page.
+    pub url: String,
+    /// Whether other machines can reach it.
+    pub is_public: bool,
+    #[serde(skip)]
+    server: Server,
+}
+
+impl View {
+    /// Opens `port` of `address` for the terrain in `directory`. Port 0 is any that is free.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if no job has written to the directory, the page is not built in, or the address is not one of this machine.
+    /// [`Error::Unfinished`] if the job is not done. [`Error::Port`] if another program has the port.
+    pub fn open(directory: &Path, address: IpAddr, port: u16) -> Result<View> {
+        let terrain = terrain_in(directory)?;
+        let root = directory.canonicalize().map_err(Error::io("read", directory))?;
+        let wanted = SocketAddr::new(address, port);
+        let listener = TcpListener::bind(wanted).map_err(|error| not_listening(wanted, &error))?;
+        let bound = listener.local_addr().map_err(Error::io("listen on", wanted.to_string()))?;
+        let site = Site { root, page: page_for(terrain)?, address };
+        // An address such as 0.0.0.0 stands for all of this machine.
+        let shown = if address.is_unspecified() { "localhost".into() } else { SocketAddr::new(address, 0).ip_text() };
+        Ok(View {
+            directory: directory.into(),
+            url: format!("http://{shown}:{}/", bound.port()),
+            is_public: !address.is_loopback(),
+            server: Server::new(listener, site)?,
+        })
+    }
+
+    /// Answers browsers until the process is asked to stop.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the system closes the port.
+    pub fn run(&self) -> Result<()> {
+        self.server.run()
+    }
+}
+
+impl fmt::Display for View {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{} is shown at {}", self.directory.display(), self.url)?;
+        if self.is_public {
+            writeln!(f, "every machine that reaches this one can read all files of the folder")?;
+        }
+        write!(f, "Ctrl-C ends it")
+    }
+}
+
+/// How an address stands in a URL.
+trait IpText {
+    fn ip_text(&self) -> String;
+}
+
+impl IpText for SocketAddr {
+    fn ip_text(&self) -> String {
+        match self.ip() {
+            IpAddr::V4(ip) => ip.to_string(),
+            IpAddr::V6(ip) => format!("[{ip}]"),
+        }
+    }
+}
+
+/// Returns the name of the file in `directory` that the page opens.
+fn terrain_in(directory: &Path) -> Result<&'static str> {
+    let files = OutputFiles::new(directory);
+    if files.tileset().is_file() {
+        return Ok("tileset.json");
+    }
+    if files.terrain().is_file() {
+        return Ok("terrain.glb");
+    }
+    if files.journal().is_file() {
+        return Err(Error::Unfinished { directory: directory.into() });
+    }
+    Err(Error::Config(format!(
+        "{} has neither tileset.json nor terrain.glb: name the [output] directory of a job that is done",
+        directory.display()
+    )))
+}
+
+fn not_listening(address: SocketAddr, error: &std::io::Error) -> Error {
+    use std::io::ErrorKind::{AddrInUse, PermissionDenied};
+    let port = address.port();
+    match error.kind() {
+        AddrInUse => Error::Port(format!("another program has port {port}: give another one with --port, or none")),
+        PermissionDenied => Error::Config(format!("port {port} is for the system only: give --port 1024 or more")),
+        _ => Error::Config(format!("cannot listen on {address}: {error}; give an --address of this machine")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::net::Ipv4Addr;
+
+    const HERE: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
+
+    fn error(directory: &Path, port: u16) -> Error {
+        View::open(directory, HERE, port).map(|view| view.url).unwrap_err()
+    }
+
+    #[test]
+    fn a_folder_that_is_no_output_is_refused_with_what_it_needs() {
+        let folder = tempfile::tempdir().unwrap();
+        let refused = error(folder.path(), 0);
+        assert_eq!(refused.exit_code(), 2);
+        assert!(refused.to_string().contains("tileset.json"), "{refused}");
+        assert_eq!(error(&folder.path().join("nowhere"), 0).exit_code(), 2);
+        std::fs::create_dir(folder.path().join("job")).unwrap();
+        std::fs::write(folder.path().join("job/journal"), "").unwrap();
+        assert!(matches!(error(folder.path(), 0), Error::Unfinished { .. }));
+    }
+
+    #[test]
+    fn a_port_of_another_program_is_an_error_that_says_what_to_do() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("terrain.glb"), "").unwrap();
+        let other = TcpListener::bind((HERE, 0)).unwrap();
+        let refused = error(folder.path(), other.local_addr().unwrap().port());
+        assert_eq!(refused.exit_code(), 1);
+        assert!(refused.to_string().contains("--port"), "{refused}");
+    }
+
+    #[test]
+    fn tiles_are_preferred_to_one_file() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("terrain.glb"), "").unwrap();
+        assert_eq!(terrain_in(folder.path()).unwrap(), "terrain.glb");
+        std::fs::write(folder.path().join("tileset.json"), "").unwrap();
+        assert_eq!(terrain_in(folder.path()).unwrap(), "tileset.json");
+    }
+}

@@ -1,0 +1,268 @@
+use super::*;
+use flate2::read::GzDecoder;
+use std::io::{Read, Write};
+use std::net::{Ipv4Addr, SocketAddr, TcpStream};
+use std::path::Path;
+use std::thread;
+use tempfile::TempDir;
+
+/// A folder with files, served on a port of its own until the test process ends.
+struct Rig {
+    folder: TempDir,
+    address: SocketAddr,
+}
+
+struct Answer {
+    status: u16,
+    head: String,
+    body: Vec<u8>,
+}
+
+impl Answer {
+    fn header(&self, name: &str) -> Option<&str> {
+        let line = self.head.lines().filter_map(|line| line.split_once(": "));
+        line.filter(|(found, _)| found.eq_ignore_ascii_case(name)).map(|(_, value)| value).next()
+    }
+}
+
+impl Rig {
+    fn new() -> Rig {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path().canonicalize().unwrap().join("out");
+        std::fs::create_dir_all(root.join("tiles")).unwrap();
+        std::fs::write(root.join("tiles/000000.glb"), tile()).unwrap();
+        std::fs::write(root.join("report.json"), json()).unwrap();
+        std::fs::write(folder.path().join("secret.json"), "secret").unwrap();
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+        let address = listener.local_addr().unwrap();
+        let site = Site { root, page: "<p>the page".into(), address: address.ip() };
+        let server = Server::new(listener, site).unwrap();
+        thread::spawn(move || server.run());
+        Rig { folder, address }
+    }
+
+    fn out(&self) -> std::path::PathBuf {
+        self.folder.path().join("out")
+    }
+
+    /// Sends a request with these lines after the first, and returns the answer.
+    fn ask(&self, first: &str, headers: &str) -> Answer {
+        let mut stream = TcpStream::connect(self.address).unwrap();
+        let host = if headers.contains("Host:") { "" } else { "Host: localhost\r\n" };
+        write!(stream, "{first} HTTP/1.1\r\n{host}{headers}Connection: close\r\n\r\n").unwrap();
+        let mut bytes = Vec::new();
+        stream.read_to_end(&mut bytes).unwrap();
+        let end = memchr::memmem::find(&bytes, b"\r\n\r\n").unwrap();
+        let head = String::from_utf8(bytes[..end].to_vec()).unwrap();
+        let status = head.split(' ').nth(1).unwrap().parse().unwrap();
+        let is_chunked = head.to_ascii_lowercase().contains("transfer-encoding: chunked");
+        let body = bytes[end + 4..].to_vec();
+        Answer { status, head, body: if is_chunked { unchunked(&body) } else { body } }
+    }
+
+    fn get(&self, path: &str) -> Answer {
+        self.ask(&format!("GET {path}"), "")
+    }
+}
+
+fn tile() -> Vec<u8> {
+    (0..100_000u32).flat_map(|i| (i % 251).to_le_bytes()).collect()
+}
+
+fn json() -> String {
+    "{\"warnings\": []}\n".repeat(5_000)
+}
+
+fn unchunked(mut bytes: &[u8]) -> Vec<u8> {
+    let mut whole = Vec::new();
+    while let Some(end) = memchr::memmem::find(bytes, b"\r\n") {
+        let size = usize::from_str_radix(std::str::from_utf8(&bytes[..end]).unwrap(), 16).unwrap();
+        whole.extend_from_slice(&bytes[end + 2..end + 2 + size]);
+        bytes = &bytes[end + 4 + size..];
+    }
+    whole
+}
+
+#[test]
+fn files_come_whole_and_with_their_types() {
+    let rig = Rig::new();
+    let found = rig.get("/tiles/000000.glb");
+    assert_eq!((found.status, found.header("Content-Type")), (200, Some("model/gltf-binary")));
+    assert_eq!(found.header("Content-Length"), Some("400000"));
+    assert!(found.body == tile());
+    assert_eq!(rig.get("/report.json").header("Content-Type"), Some("application/json"));
+    for page in ["/", "/index.html", "/?x=1"] {
+        let page = rig.get(page);
+        assert_eq!(page.body, b"<p>the page");
+        assert!(page.header("Content-Type").unwrap().starts_with("text/html"));
+    }
+}
+
+#[test]
+fn ranges_give_the_bytes_that_were_asked_for() {
+    let rig = Rig::new();
+    let tile = tile();
+    let last = tile.len() - 1;
+    let cases = [
+        ("0-0", 0, 0),
+        ("100-299", 100, 299),
+        ("399990-", 399_990, last),
+        ("-7", last - 6, last),
+        ("399999-500000", last, last),
+        ("-9999999", 0, last),
+    ];
+    for (range, from, to) in cases {
+        let part = rig.ask("GET /tiles/000000.glb", &format!("Range: bytes={range}\r\nAccept-Encoding: gzip\r\n"));
+        assert_eq!(part.status, 206, "{range}");
+        assert_eq!(part.header("Content-Range").unwrap(), format!("bytes {from}-{to}/400000"));
+        assert!(part.body == tile[from..=to], "{range}");
+    }
+    for beyond in ["400000-", "500000-500001", "-0"] {
+        let refused = rig.ask("GET /tiles/000000.glb", &format!("Range: bytes={beyond}\r\n"));
+        assert_eq!((refused.status, refused.header("Content-Range")), (416, Some("bytes */400000")), "{beyond}");
+    }
+    // What is no range, or several, may be answered with everything.
+    for other in ["bytes=5-2", "lines=1-2", "bytes=0-1,5-6", "bytes=x"] {
+        let whole = rig.ask("GET /tiles/000000.glb", &format!("Range: {other}\r\n"));
+        assert_eq!((whole.status, whole.body.len()), (200, 400_000), "{other}");
+    }
+    let changed = rig.ask("GET /tiles/000000.glb", "Range: bytes=0-1\r\nIf-Range: \"another\"\r\n");
+    assert_eq!((changed.status, changed.body.len()), (200, 400_000));
+}
+
+#[test]
+fn texts_are_packed_for_browsers_that_unpack_them() {
+    let rig = Rig::new();
+    let packed = rig.ask("GET /report.json", "Accept-Encoding: br, gzip;q=0.5\r\n");
+    assert_eq!(packed.header("Content-Encoding"), Some("gzip"));
+    assert!(packed.body.len() < 2_000);
+    let mut text = String::new();
+    GzDecoder::new(packed.body.as_slice()).read_to_string(&mut text).unwrap();
+    assert_eq!(text, json());
+    for refused in ["", "Accept-Encoding: br\r\n", "Accept-Encoding: gzip;q=0\r\n"] {
+        let plain = rig.ask("GET /report.json", refused);
+        assert_eq!((plain.header("Content-Encoding"), plain.body == json().as_bytes()), (None, true), "{refused}");
+    }
+}
+
+#[test]
+fn browsers_need_not_fetch_twice_what_has_not_changed() {
+    let rig = Rig::new();
+    let tag = rig.get("/report.json").header("ETag").unwrap().to_owned();
+    let same = rig.ask("GET /report.json", &format!("If-None-Match: {tag}\r\n"));
+    assert_eq!((same.status, same.body.len()), (304, 0));
+    std::fs::write(rig.out().join("report.json"), "{}").unwrap();
+    let new = rig.ask("GET /report.json", &format!("If-None-Match: {tag}\r\n"));
+    assert_eq!((new.status, new.body), (200, b"{}".to_vec()));
+}
+
+#[test]
+fn head_gives_the_headers_without_the_file() {
+    let rig = Rig::new();
+    let head = rig.ask("HEAD /tiles/000000.glb", "");
+    assert_eq!((head.status, head.header("Content-Length"), head.body.len()), (200, Some("400000"), 0));
+    assert_eq!(rig.ask("HEAD /nothing", "").status, 404);
+}
+
+#[test]
+fn nothing_outside_the_folder_is_served() {
+    let rig = Rig::new();
+    let paths = [
+        "/../secret.json",
+        "/tiles/../../secret.json",
+        "/%2e%2e/secret.json",
+        "/..%2fsecret.json",
+        "/%2e%2e%2fsecret.json",
+        "/..%5csecret.json",
+        "/tiles/%00",
+        "/tiles",
+        "/tiles/",
+        "/nothing.json",
+    ];
+    for path in paths {
+        let answer = rig.get(path);
+        assert_eq!(answer.status, 404, "{path}");
+        assert!(!answer.body.ends_with(b"secret"), "{path}");
+    }
+    assert_eq!(rig.get("//tiles//000000.glb").status, 200);
+}
+
+#[cfg(unix)]
+#[test]
+fn links_may_not_lead_out_of_the_folder_and_pipes_are_not_opened() {
+    use std::os::unix::fs::symlink;
+    let rig = Rig::new();
+    symlink(rig.folder.path().join("secret.json"), rig.out().join("link.json")).unwrap();
+    symlink(rig.folder.path(), rig.out().join("up")).unwrap();
+    symlink(Path::new("report.json"), rig.out().join("inside.json")).unwrap();
+    let made = std::process::Command::new("mkfifo").arg(rig.out().join("pipe.json")).status().unwrap();
+    assert!(made.success());
+    for path in ["/link.json", "/up/secret.json", "/pipe.json"] {
+        assert_eq!(rig.get(path).status, 404, "{path}");
+    }
+    assert_eq!(rig.get("/inside.json").status, 200);
+}
+
+#[test]
+fn other_methods_and_other_hosts_are_refused() {
+    let rig = Rig::new();
+    for method in ["POST", "PUT", "DELETE", "OPTIONS"] {
+        let refused = rig.ask(&format!("{method} /report.json"), "");
+        assert_eq!((refused.status, refused.header("Allow")), (405, Some("GET, HEAD")), "{method}");
+    }
+    assert!(rig.out().join("report.json").exists());
+    assert_eq!(rig.ask("GET /report.json", "Host: evil.example\r\n").status, 403);
+    assert_eq!(rig.ask("GET /report.json", "Host: 127.0.0.1:9\r\n").status, 200);
+}
+
+#[test]
+fn clients_that_never_send_or_never_read_hold_up_nobody() {
+    let rig = Rig::new();
+    let silent: Vec<TcpStream> = (0..50).map(|_| TcpStream::connect(rig.address).unwrap()).collect();
+    let mut slow = Vec::new();
+    for _ in 0..50 {
+        let mut stream = TcpStream::connect(rig.address).unwrap();
+        stream.write_all(b"GET /tiles/000000.glb HTTP/1.1\r\nHost: localhost\r\n\r\n").unwrap();
+        slow.push(stream);
+    }
+    let mut half = TcpStream::connect(rig.address).unwrap();
+    half.write_all(b"GET /report.json HTT").unwrap();
+    thread::scope(|scope| {
+        for _ in 0..64 {
+            scope.spawn(|| assert!(rig.get("/tiles/000000.glb").body == tile()));
+        }
+    });
+    drop((silent, slow, half));
+    assert_eq!(rig.get("/report.json").status, 200);
+}
+
+#[test]
+fn connections_that_stay_open_keep_no_new_one_waiting() {
+    let rig = Rig::new();
+    let mut open = Vec::new();
+    for _ in 0..100 {
+        let mut stream = TcpStream::connect(rig.address).unwrap();
+        stream.write_all(b"HEAD /report.json HTTP/1.1\r\nHost: localhost\r\n\r\n").unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
+        open.push(stream);
+    }
+    for mut stream in open.iter() {
+        let mut start = [0; 12];
+        stream.read_exact(&mut start).unwrap();
+        assert_eq!(&start, b"HTTP/1.1 200");
+    }
+}
+
+#[test]
+fn nonsense_does_not_end_the_server() {
+    let rig = Rig::new();
+    for nonsense in
+        [&b"\r\n\r\n"[..], b"GET\r\n\r\n", b"\x16\x03\x01\x02\x00", b"GET / HTTP/9.9\r\n\r\n", &[0xff; 70_000]]
+    {
+        let mut stream = TcpStream::connect(rig.address).unwrap();
+        let _ = stream.write_all(nonsense);
+        let _ = stream.shutdown(std::net::Shutdown::Write);
+        let _ = stream.read_to_end(&mut Vec::new());
+    }
+    assert_eq!(rig.get("/report.json").status, 200);
+}

@@ -1,0 +1,117 @@
+//! From the target of a request to a file below the output directory, and who may ask.
+
+use std::fs::File;
+use std::net::IpAddr;
+use std::path::{Path, PathBuf};
+
+use percent_encoding::percent_decode_str;
+
+/// What is served.
+pub(super) struct Site {
+    /// The output directory, without links.
+    pub(super) root: PathBuf,
+    /// The page that shows it.
+    pub(super) page: String,
+    /// The address that the server listens on.
+    pub(super) address: IpAddr,
+}
+
+/// What a request is for.
+pub(super) enum Target {
+    Page,
+    File(PathBuf, File),
+    Nothing,
+}
+
+impl Site {
+    /// Returns what the request target `url` names.
+    pub(super) fn target(&self, url: &str) -> Target {
+        let Some(names) = names_in(url) else { return Target::Nothing };
+        if names.is_empty() || names == ["index.html"] {
+            return Target::Page;
+        }
+        self.file(&names).map_or(Target::Nothing, |(path, file)| Target::File(path, file))
+    }
+
+    /// Opens the file with these names below the output directory. A link must not lead out of it, and opening a pipe would wait.
+    fn file(&self, names: &[String]) -> Option<(PathBuf, File)> {
+        let path = self.root.join(names.iter().collect::<PathBuf>()).canonicalize().ok()?;
+        if !path.starts_with(&self.root) || !path.is_file() {
+            return None;
+        }
+        let file = File::open(&path).ok()?;
+        Some((path, file))
+    }
+
+    /// Tells whether a request to `host` may be answered. A server for this machine alone answers only to the names of this machine:
+    /// otherwise any page on the web could give its own name this address, and read the files.
+    pub(super) fn answers_to(&self, host: Option<&str>) -> bool {
+        if !self.address.is_loopback() {
+            return true;
+        }
+        let Some(host) = host else { return false };
+        let name = match host.rsplit_once(':') {
+            // The port may be another one, if it is forwarded from another machine.
+            Some((name, port)) if port.bytes().all(|byte| byte.is_ascii_digit()) && !name.ends_with(':') => name,
+            _ => host,
+        };
+        let address = name.trim_start_matches('[').trim_end_matches(']').parse::<IpAddr>();
+        name.eq_ignore_ascii_case("localhost") || address.is_ok_and(|address| address.is_loopback())
+    }
+}
+
+/// Returns the names in the path of a request target, or `None` if one of them could lead elsewhere. Two slashes count as one.
+fn names_in(url: &str) -> Option<Vec<String>> {
+    let path = url.split(['?', '#']).next()?.strip_prefix('/')?;
+    path.split('/').filter(|name| !name.is_empty()).map(name_of).collect()
+}
+
+fn name_of(encoded: &str) -> Option<String> {
+    let name = percent_decode_str(encoded).decode_utf8().ok()?;
+    // A colon would name another disk of Windows, or a stream beside a file.
+    let is_plain = name != "." && name != ".." && !name.contains(['/', '\\', ':', '\0']);
+    // As the last check, what the system itself takes for a plain name.
+    let mut parts = Path::new(name.as_ref()).components();
+    let is_one = matches!(parts.next(), Some(std::path::Component::Normal(_))) && parts.next().is_none();
+    (is_plain && is_one).then(|| name.into_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_has_plain_names_only() {
+        assert_eq!(names_in("/tiles/000%30.glb?x=/../y").unwrap(), ["tiles", "0000.glb"]);
+        assert_eq!(names_in("//tiles//a%20b").unwrap(), ["tiles", "a b"]);
+        for bad in
+            ["/..", "/a/../b", "/%2e%2e/x", "/.%2E/x", "/a%2f..%2fb", "/%5c..", "/C%3a", "/a%00", "/%ff", "/./a", "x"]
+        {
+            assert_eq!(names_in(bad), None, "{bad}");
+        }
+        assert_eq!(names_in("http://other/x"), None);
+    }
+
+    #[test]
+    fn a_server_for_this_machine_answers_to_its_own_names_only() {
+        let site =
+            |address: &str| Site { root: PathBuf::new(), page: String::new(), address: address.parse().unwrap() };
+        let own = site("127.0.0.1");
+        for host in ["localhost", "LOCALHOST:8080", "127.0.0.1", "127.0.0.1:1", "[::1]:99", "[::1]"] {
+            assert!(own.answers_to(Some(host)), "{host}");
+        }
+        for host in [
+            "evil.example",
+            "evil.example:8080",
+            "localhost.evil.example",
+            "127.0.0.1.evil.example",
+            "192.0.2.1",
+            "",
+            ":1",
+        ] {
+            assert!(!own.answers_to(Some(host)), "{host}");
+        }
+        assert!(!own.answers_to(None));
+        assert!(site("0.0.0.0").answers_to(Some("workstation:8080")));
+    }
+}

@@ -1,0 +1,247 @@
+//! `gdt-batch view` and its page, as a user meets them: a job writes the terrain and the page, the program serves it, and a headless
+//! Chromium opens it, clicks, and reads what the page says.
+
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_gdt-batch");
+const SHOWN: &str = "document.documentElement.dataset.state === 'shown'";
+const FOUND: &str = "document.getElementById('point-facts').dataset.final === 'true' && \
+                     document.getElementById('point-facts').children.length > 0";
+/// The middle of the picture beside the panel, in a window of 1280 x 800 pixels.
+const MIDDLE: [u32; 2] = [475, 400];
+/// Red points, side by side along each axis.
+const SIDE: i64 = 70;
+
+/// What a job with these points wrote.
+struct Terrain {
+    folder: TempDir,
+}
+
+/// Returns point number `i`, `j` of a rough grid in hundredths of a unit, so that no rounding is in the way. It is so flat that no point hides
+/// another one.
+fn point(i: i64, j: i64) -> [i64; 3] {
+    let shift = |k: i64| (k * 7919).rem_euclid(131) - 65;
+    [50_000_000 + 300 * i + shift(i * 31 + j), 480_000_000 + 300 * j + shift(j * 17 - i), 10_000 + (i * j) % 37]
+}
+
+fn text(hundredths: i64) -> String {
+    format!("{}.{:02}", hundredths / 100, hundredths % 100)
+}
+
+impl Terrain {
+    /// Runs a job with these options.
+    fn new(input: &str, output: &str) -> Terrain {
+        let folder = tempfile::tempdir().unwrap();
+        let mut cloud = String::from("x,y,z,red,green,blue\n");
+        for [x, y, z] in (0..SIDE * SIDE).map(|n| point(n / SIDE, n % SIDE)) {
+            cloud += &format!("{},{},{},230,40,30\n", text(x), text(y), text(z));
+        }
+        std::fs::write(folder.path().join("cloud.csv"), cloud).unwrap();
+        let config = format!(
+            "[input]\nfiles = [\"cloud.csv\"]\n{input}\n[triangulation]\nmax_points_per_tile = 600\n\
+             [output]\ndirectory = \"out\"\npage = true\nmax_points_per_level_tile = 600\n{output}\n"
+        );
+        std::fs::write(folder.path().join("job.toml"), config).unwrap();
+        let terrain = Terrain { folder };
+        terrain.succeeds(&["job.toml", "--quiet"]);
+        terrain.succeeds(&["verify", "out", "--quiet"]);
+        terrain
+    }
+
+    #[track_caller]
+    fn succeeds(&self, arguments: &[&str]) {
+        let output = Command::new(PROGRAM).args(arguments).current_dir(self.folder.path()).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    }
+
+    fn out(&self) -> PathBuf {
+        self.folder.path().join("out")
+    }
+
+    /// Opens the page and does the steps. Returns what they gave.
+    #[track_caller]
+    fn seen(&self, chromium: &Path, steps: &Value) -> Value {
+        let server = Server::start(&self.out());
+        let path = self.folder.path().join("steps.json");
+        std::fs::write(&path, steps.to_string()).unwrap();
+        let driver = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/npm/page.mjs");
+        let output = Command::new("node").arg(driver).arg(&server.url).arg(chromium).arg(path).output();
+        let output = output.expect("node runs");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let seen: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(seen["complaints"], json!([]), "the console has errors");
+        let requests = seen["requests"].as_array().unwrap();
+        let is_elsewhere = |url: &&Value| {
+            !["data:", "blob:", &server.url].iter().any(|start| url.as_str().unwrap().starts_with(start))
+        };
+        assert!(!requests.is_empty());
+        assert_eq!(requests.iter().find(is_elsewhere), None, "the page asks another host");
+        seen
+    }
+
+    fn picture(&self) -> PathBuf {
+        self.folder.path().join("shot.png")
+    }
+}
+
+/// A running `gdt-batch view`.
+struct Server {
+    program: Child,
+    url: String,
+}
+
+impl Server {
+    fn start(out: &Path) -> Server {
+        let mut program = Command::new(PROGRAM)
+            .args(["view", "--no-open"])
+            .arg(out)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let mut line = String::new();
+        BufReader::new(program.stdout.take().unwrap()).read_line(&mut line).unwrap();
+        let url = line.split_whitespace().last().unwrap().to_owned();
+        assert!(url.starts_with("http://127.0.0.1:"), "{line}");
+        Server { program, url }
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        let _ = self.program.kill();
+        let _ = self.program.wait();
+    }
+}
+
+/// Returns the path of Chromium, or `None` if there is none. Under tests/run that is a failure.
+fn chromium() -> Option<PathBuf> {
+    let found = ["/usr/bin/chromium", "/usr/bin/chromium-browser"].map(PathBuf::from).into_iter().find(|p| p.exists());
+    if found.is_none() {
+        assert!(std::env::var_os("GDT_TEST_ALL").is_none(), "no Chromium");
+        eprintln!("not tested: no Chromium");
+    }
+    found
+}
+
+/// The steps of a user who goes near a point and clicks it, with a picture of the whole before.
+fn steps_to(terrain: &Terrain, [x, y, _]: [i64; 3]) -> Value {
+    let go = format!(
+        "document.getElementById('tab-point').click(); document.getElementById('go-to').value = '{}, {}'; \
+         document.querySelector('#go button').click()",
+        text(x),
+        text(y)
+    );
+    let facts = "document.getElementById('point-facts')";
+    json!([
+        {"size": [1280, 800], "dark": false},
+        {"wait": SHOWN},
+        {"shot": terrain.picture()},
+        {"run": go},
+        {"wait": format!("{FOUND} && {SHOWN}")},
+        {"run": format!("{facts}.replaceChildren()")},
+        {"click": MIDDLE},
+        {"wait": FOUND},
+        {"run": format!("[...{facts}.children].map((child) => child.textContent)")},
+    ])
+}
+
+/// Returns the value that the page gives for a term in the last of `values`.
+fn fact<'a>(seen: &'a Value, term: &str) -> &'a str {
+    let facts = seen["values"].as_array().unwrap().last().unwrap().as_array().unwrap();
+    let at = facts.iter().position(|fact| fact == term).unwrap_or_else(|| panic!("no {term} in {facts:?}"));
+    facts[at + 1].as_str().unwrap()
+}
+
+/// Returns the share of the pixels of a picture that are red, as the points are.
+fn red_share(path: &Path) -> f64 {
+    let decoder = png::Decoder::new(BufReader::new(std::fs::File::open(path).unwrap()));
+    let mut reader = decoder.read_info().unwrap();
+    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut bytes).unwrap();
+    let samples = info.color_type.samples();
+    let pixels = bytes[..info.buffer_size()].chunks(samples);
+    let red = pixels.clone().filter(|pixel| pixel[0] > 90 && pixel[0] / 2 > pixel[1].max(pixel[2])).count();
+    red as f64 / pixels.count() as f64
+}
+
+/// Asserts that the page draws the terrain, and that a click tells the coordinates of the source.
+#[track_caller]
+fn tells_the_source(terrain: &Terrain, chromium: &Path) {
+    for (i, j) in [(20, 33), (51, 8)] {
+        let wanted = point(i, j);
+        let seen = terrain.seen(chromium, &steps_to(terrain, wanted));
+        let share = red_share(&terrain.picture());
+        assert!(share > 0.1, "{share} of the picture is terrain");
+        let exact = wanted.map(text).join(", ");
+        assert!(fact(&seen, "nearest point").starts_with(&format!("{exact} (")), "{exact}: {seen}");
+        // The place itself is as near as pixels are.
+        for (term, value) in ["x (m)", "y (m)"].into_iter().zip(wanted) {
+            let told: f64 = fact(&seen, term).parse().unwrap();
+            assert!((told - value as f64 / 100.0).abs() < 0.3, "{term} {told}");
+        }
+    }
+}
+
+#[test]
+fn a_click_on_the_globe_tells_the_coordinates_of_the_source() {
+    let Some(chromium) = chromium() else { return };
+    let terrain = Terrain::new("crs = \"EPSG:26910\"", "format = \"3dtiles\"");
+    let tileset: Value = serde_json::from_slice(&std::fs::read(terrain.out().join("tileset.json")).unwrap()).unwrap();
+    assert!(tileset["root"]["transform"].is_array(), "it is on the globe, and has levels");
+    tells_the_source(&terrain, &chromium);
+}
+
+#[test]
+fn one_file_without_a_reference_system_is_shown_too() {
+    let Some(chromium) = chromium() else { return };
+    let terrain = Terrain::new("", "format = \"glb\"");
+    assert!(!terrain.out().join("tileset.json").exists());
+    tells_the_source(&terrain, &chromium);
+}
+
+#[test]
+fn every_way_to_look_draws_something_else() {
+    let Some(chromium) = chromium() else { return };
+    let terrain = Terrain::new("", "format = \"3dtiles\"");
+    let mut steps = vec![json!({"size": [390, 844], "dark": true}), json!({"wait": SHOWN})];
+    let ways = ["[value=points]", "[value=height]", "[value=slope]", "[value=levels]", "#edges", "[value=walk]"];
+    let shot = |number: usize| terrain.folder.path().join(format!("{number}.png"));
+    for (number, way) in ways.iter().enumerate() {
+        steps.push(json!({"run": format!("document.querySelector('{way}').click()")}));
+        steps.push(json!({"run": "new Promise((resolve) => setTimeout(resolve, 400))"}));
+        steps.push(json!({"wait": SHOWN, "shot": shot(number)}));
+    }
+    terrain.seen(&chromium, &Value::Array(steps));
+    let pictures: Vec<Vec<u8>> = (0..ways.len()).map(|number| std::fs::read(shot(number)).unwrap()).collect();
+    for (number, picture) in pictures.iter().enumerate() {
+        assert!(!pictures[..number].contains(picture), "{} changes nothing", ways[number]);
+    }
+}
+
+#[test]
+fn the_page_beside_the_tiles_opens_what_the_job_wrote() {
+    let terrain = Terrain::new("", "format = \"glb\"");
+    let page = std::fs::read_to_string(terrain.out().join("index.html")).unwrap();
+    assert!(page.contains("data-terrain=\"terrain.glb\""));
+    let sums = std::fs::read_to_string(terrain.out().join("XXH128SUMS")).unwrap();
+    assert!(sums.contains("  index.html\n"));
+    // A job without a page takes away the page of the job before.
+    let config = terrain.folder.path().join("job.toml");
+    let without = std::fs::read_to_string(&config).unwrap().replace("page = true\n", "");
+    std::fs::write(&config, &without).unwrap();
+    terrain.succeeds(&["job.toml", "--quiet"]);
+    assert!(!terrain.out().join("index.html").exists());
+    // But not that of somebody else, and it does not write over it.
+    std::fs::write(terrain.out().join("index.html"), "<title>My survey</title>").unwrap();
+    terrain.succeeds(&["job.toml", "--quiet"]);
+    std::fs::write(&config, without.replace("[output]", "[output]\npage = true")).unwrap();
+    let refused = Command::new(PROGRAM).arg(&config).output().unwrap();
+    assert_eq!(refused.status.code(), Some(2), "{}", String::from_utf8_lossy(&refused.stderr));
+    assert_eq!(std::fs::read_to_string(terrain.out().join("index.html")).unwrap(), "<title>My survey</title>");
+}

@@ -1,0 +1,68 @@
+// The way between positions in a glTF scene and the coordinates of the source, as `scenes[0].extras` of every GLB says it.
+
+// Returns a number as a whole number of units of its last decimal place, exactly as it is written.
+function decimal(number) {
+  const [digits, exponent = '0'] = String(number).toLowerCase().split('e');
+  const [whole, fraction = ''] = digits.split('.');
+  const places = fraction.length - Number(exponent);
+  const units = BigInt(whole + fraction);
+  return places >= 0 ? { units, places } : { units: units * 10n ** BigInt(-places), places: 0 };
+}
+
+// Returns `units` of the decimal place number `places` as text.
+function decimalText(units, places) {
+  const digits = String(units < 0n ? -units : units).padStart(places + 1, '0');
+  const at = digits.length - places;
+  return `${units < 0n ? '-' : ''}${digits.slice(0, at)}${places ? `.${digits.slice(at)}` : ''}`;
+}
+
+// Returns offset + step * count without rounding, as text.
+export function latticeText(offset, step, count) {
+  const [from, by] = [decimal(offset), decimal(step)];
+  const places = Math.max(from.places, by.places);
+  const scaled = ({ units, places: own }) => units * 10n ** BigInt(places - own);
+  return decimalText(scaled(from) + scaled(by) * BigInt(count), places);
+}
+
+export class Georeference {
+  // `extras` are those of a GLB or of `asset` in tileset.json.
+  constructor(extras) {
+    this.offset = extras.offset;
+    this.steps = [extras.resolution, extras.resolution, extras.resolution_z];
+    this.metres = [extras.metres_per_unit, extras.metres_per_unit, extras.metres_per_unit_z];
+    this.crs = /"([^"]*)"/.exec(extras.crs ?? '')?.[1] ?? null;
+  }
+
+  // Returns the source coordinates of a scene position in metres.
+  source([gx, gy, gz]) {
+    return [gx, -gz, gy].map((metres, axis) => this.offset[axis] + metres / this.metres[axis]);
+  }
+
+  // Returns the scene position in metres of source coordinates.
+  scene(source) {
+    const [x, y, z] = source.map((value, axis) => (value - this.offset[axis]) * this.metres[axis]);
+    return [x, z, -y];
+  }
+
+  // Returns the source coordinates of a vertex as texts, exactly: its scene position leads to whole steps of the lattice.
+  exactSource([gx, gy, gz]) {
+    return [gx, -gz, gy].map((metres, axis) => {
+      const count = Math.round(metres / (this.steps[axis] * this.metres[axis]));
+      return latticeText(this.offset[axis], this.steps[axis], count);
+    });
+  }
+
+  // Returns source coordinates as texts with the decimals of the lattice.
+  roundedSource(source) {
+    return source.map((value, axis) => value.toFixed(this.places(axis)));
+  }
+
+  places(axis) {
+    return Math.min(Math.max(decimal(this.steps[axis]).places, decimal(this.offset[axis]).places), 9);
+  }
+
+  // Returns metres in x, y and z between two places in the source.
+  metresBetween(from, to) {
+    return to.map((value, axis) => (value - from[axis]) * this.metres[axis]);
+  }
+}

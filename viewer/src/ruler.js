@@ -1,0 +1,73 @@
+// The ruler: a line over the places that were clicked, and its lengths, from the coordinates of the source.
+import { BufferGeometry, Float32BufferAttribute, Line, LineBasicMaterial } from 'three';
+import { byId, element, length, unitName } from './dom.js';
+
+export class Ruler {
+  constructor(scene, terrain, changed) {
+    Object.assign(this, { terrain, changed, isOn: false, places: [] });
+    this.line = new Line(new BufferGeometry(), new LineBasicMaterial({ color: '#ff2d95', depthTest: false, transparent: true }));
+    this.line.frustumCulled = false;
+    this.line.renderOrder = 2;
+    scene.add(this.line);
+  }
+
+  start() {
+    this.isOn = true;
+    this.clear();
+  }
+
+  stop() {
+    this.isOn = false;
+    this.clear();
+  }
+
+  clear() {
+    this.places = [];
+    this.draw();
+  }
+
+  undo() {
+    this.places.pop();
+    this.draw();
+  }
+
+  // Adds a place, or corrects the one that was added last.
+  add(found, isCorrection) {
+    if (isCorrection) this.places.pop();
+    this.places.push({ source: found.source, world: found.world });
+    this.draw();
+  }
+
+  draw() {
+    const corners = this.places.flatMap(({ world }) => world.toArray());
+    this.line.geometry.dispose();
+    this.line.geometry = new BufferGeometry().setAttribute('position', new Float32BufferAttribute(corners, 3));
+    this.write();
+    this.changed();
+  }
+
+  write() {
+    const ways = this.places.slice(1).map(({ source }, i) => this.way(this.places[i].source, source));
+    const sum = (of) => ways.reduce((total, way) => total + of(way), 0);
+    const text = this.text.bind(this);
+    const lines = ways.map((way) => [text(way.flat), text(way.up), text(way.direct), `${way.degrees.toFixed(1)}°`]);
+    if (ways.length > 1) lines.push([text(sum((way) => way.flat)), text(sum((way) => way.up)), text(sum((way) => way.direct)), 'sum']);
+    byId('ruler-rows').replaceChildren(...lines.map((cells) => element('tr', {}, ...cells.map((cell) => element('td', { textContent: cell })))));
+    byId('ruler-table').hidden = ways.length === 0;
+    const hints = ['Click the first place.', 'Click the second place.'];
+    byId('ruler-hint').textContent = hints[this.places.length] ?? 'Click on for a longer line.';
+  }
+
+  way(from, to) {
+    const [east, north, up] = this.terrain.georeference.metresBetween(from, to);
+    const flat = Math.hypot(east, north);
+    return { flat, up, direct: Math.hypot(flat, up), degrees: (Math.atan2(up, flat) * 180) / Math.PI };
+  }
+
+  // Returns a length in metres, and in the unit of the source where that is another one.
+  text(metres) {
+    const [own] = this.terrain.georeference.metres;
+    const name = unitName(own);
+    return own === 1 || !name ? length(metres) : `${length(metres)} (${(metres / own).toFixed(1)} ${name})`;
+  }
+}

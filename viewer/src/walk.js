@@ -1,0 +1,99 @@
+// Walking on the terrain: the eye stays at a person's height above it.
+import { Vector3 } from 'three';
+
+const EYE_METRES = 1.7;
+const METRES_PER_SECOND = 4;
+const FASTER = 6;
+const TURN_PER_SECOND = 1.4;
+const TURN_PER_PIXEL = 0.004;
+const STEEPEST_LOOK = 1.4;
+// The terrain may jump, from the ground onto a tree; the eye follows within about this time.
+const RISE_SECONDS = 0.15;
+
+// What keys do: steps ahead and to the right, turns to the right and up.
+const KEYS = {
+  w: [1, 0, 0, 0], s: [-1, 0, 0, 0], a: [0, -1, 0, 0], d: [0, 1, 0, 0],
+  ArrowUp: [1, 0, 0, 0], ArrowDown: [-1, 0, 0, 0], ArrowLeft: [0, 0, -1, 0], ArrowRight: [0, 0, 1, 0],
+  PageUp: [0, 0, 0, 1], PageDown: [0, 0, 0, -1],
+};
+
+export class Walk {
+  // `groundBelow` returns the height of the terrain at a place, or null beside it.
+  constructor(camera, canvas, groundBelow, changed) {
+    Object.assign(this, { camera, groundBelow, changed, isOn: false, heading: 0, tilt: 0, isFast: false });
+    this.pressed = new Map();
+    let last = null;
+    canvas.addEventListener('pointerdown', (event) => { last = event; });
+    canvas.addEventListener('pointermove', (event) => {
+      if (!this.isOn || !last || !event.buttons) return;
+      this.look((last.clientX - event.clientX) * TURN_PER_PIXEL, (event.clientY - last.clientY) * TURN_PER_PIXEL);
+      last = event;
+    });
+    window.addEventListener('blur', () => this.pressed.clear());
+  }
+
+  // Begins at `place` and looks the way that the camera looks.
+  start(place) {
+    const ahead = this.camera.getWorldDirection(new Vector3());
+    this.heading = Math.atan2(ahead.x, -ahead.z);
+    this.tilt = 0;
+    this.isOn = true;
+    this.camera.position.copy(place);
+    this.stand(1);
+    this.changed();
+  }
+
+  stop() {
+    this.isOn = false;
+    this.pressed.clear();
+  }
+
+  // Returns whether the key means something here.
+  key({ key, shiftKey, type }) {
+    const name = key.length === 1 ? key.toLowerCase() : key;
+    this.isFast = shiftKey;
+    if (!KEYS[name]) return false;
+    this.press(name, type === 'keydown');
+    return true;
+  }
+
+  press(name, isDown) {
+    if (isDown) this.pressed.set(name, KEYS[name]);
+    else this.pressed.delete(name);
+    this.changed();
+  }
+
+  get isMoving() {
+    return this.isOn && this.pressed.size > 0;
+  }
+
+  look(right, up) {
+    this.heading += right;
+    this.tilt = Math.min(Math.max(this.tilt + up, -STEEPEST_LOOK), STEEPEST_LOOK);
+    this.changed();
+  }
+
+  // Goes on for some seconds. Returns whether the eye is still on its way.
+  update(seconds) {
+    const [ahead, right, turn, up] = [0, 1, 2, 3].map((i) => [...this.pressed.values()].reduce((sum, way) => sum + way[i], 0));
+    const [sin, cos] = [Math.sin(this.heading), Math.cos(this.heading)];
+    const metres = seconds * METRES_PER_SECOND * (this.isFast ? FASTER : 1);
+    this.camera.position.x += (ahead * sin + right * cos) * metres;
+    this.camera.position.z += (right * sin - ahead * cos) * metres;
+    this.look(turn * TURN_PER_SECOND * seconds, up * TURN_PER_SECOND * seconds);
+    const rest = this.stand(Math.min(1, seconds / RISE_SECONDS));
+    const flat = Math.cos(this.tilt);
+    const { position } = this.camera;
+    this.camera.lookAt(position.x + Math.sin(this.heading) * flat, position.y + Math.sin(this.tilt), position.z - Math.cos(this.heading) * flat);
+    return this.isMoving || rest > 0.01;
+  }
+
+  // Comes closer to the height of the eye by this share of the way. Returns the metres that are left.
+  stand(share) {
+    const ground = this.groundBelow(this.camera.position);
+    if (ground === null) return 0;
+    const way = ground + EYE_METRES - this.camera.position.y;
+    this.camera.position.y += way * share;
+    return Math.abs(way * (1 - share));
+  }
+}
