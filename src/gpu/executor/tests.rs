@@ -182,6 +182,7 @@ fn leaves(executor: &Executor, xs: std::ops::Range<i32>, tell: &(dyn Fn() + Sync
 #[test]
 fn a_job_that_needs_no_gpu_asks_only_while_there_is_room() {
     let (executor, go, _) = waiting_executor(GpuUse::Optional, Room { max_waiting: 5, ..ROOM });
+    executor.state.has_answered.store(true, Ordering::Release);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     assert!(executor.has_room(5) && !executor.has_room(6));
     let nested = || {
