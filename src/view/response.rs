@@ -52,9 +52,10 @@ fn page(site: &Site, request: &Request) -> Response {
 
 fn file_response(request: &Request, path: &Path, mut file: File, stays_here: bool) -> std::io::Result<Response> {
     let data = file.metadata()?;
-    let (length, tag, kind) = (data.len(), tag(&data), content_type(path));
-    if header(request, "If-None-Match").is_some_and(|known| known.contains(&tag)) {
-        return Ok(with(plain(Cursor::new(""), 0, 304, kind), "ETag", &tag));
+    let (length, [tag, packed_tag], kind) = (data.len(), tags(&data), content_type(path));
+    let is_known = |tag: &&String| header(request, "If-None-Match").is_some_and(|known| known.contains(tag.as_str()));
+    if let Some(tag) = [&tag, &packed_tag].into_iter().find(is_known) {
+        return Ok(with(plain(Cursor::new(""), 0, 304, kind), "ETag", tag));
     }
     // A part of a file that has changed would not fit to the others.
     let is_same = header(request, "If-Range").is_none_or(|known| known == tag);
@@ -66,7 +67,9 @@ fn file_response(request: &Request, path: &Path, mut file: File, stays_here: boo
             with(part, "Content-Range", &format!("bytes {start}-{end}/{length}"))
         }
         Wanted::Nowhere => with(text(416, "the file is shorter\n"), "Content-Range", &format!("bytes */{length}")),
-        Wanted::All if takes_gzip(request) && is_worth_packing(path, &mut file, stays_here)? => packed(file, kind),
+        Wanted::All if takes_gzip(request) && is_worth_packing(path, &mut file, stays_here)? => {
+            return Ok(with(packed(file, kind), "ETag", &packed_tag));
+        }
         Wanted::All => plain(file, length, 200, kind),
     };
     Ok(with(with(answer, "ETag", &tag), "Accept-Ranges", "bytes"))
@@ -93,10 +96,10 @@ fn wanted(range: &str, length: u64) -> Wanted {
     }
 }
 
-/// Returns a text that changes with the file.
-fn tag(data: &Metadata) -> String {
+/// Returns texts that change with the file: for its own bytes, and for those that are packed.
+fn tags(data: &Metadata) -> [String; 2] {
     let time = data.modified().ok().and_then(|time| time.duration_since(UNIX_EPOCH).ok()).unwrap_or_default();
-    format!("\"{:x}-{:x}\"", time.as_nanos(), data.len())
+    ["", "-gzip"].map(|form| format!("\"{:x}-{:x}{form}\"", time.as_nanos(), data.len()))
 }
 
 fn plain(content: impl Read + Send + 'static, length: u64, status: u16, kind: &str) -> Response {

@@ -179,7 +179,7 @@ fn tells_the_source(terrain: &Terrain, chromium: &Path) {
         let share = red_share(&terrain.picture());
         assert!(share > 0.1, "{share} of the picture is terrain");
         let exact = wanted.map(text).join(", ");
-        assert!(fact(&seen, "nearest point").starts_with(&format!("{exact} (")), "{exact}: {seen}");
+        assert!(fact(&seen, "nearest corner").starts_with(&format!("{exact} (")), "{exact}: {seen}");
         // The place itself is as near as pixels are.
         for (term, value) in ["x (m)", "y (m)"].into_iter().zip(wanted) {
             let told: f64 = fact(&seen, term).parse().unwrap();

@@ -46,7 +46,7 @@ export function pointFacts(found, georeference, isFinal) {
     [term('x', flat), found.text[0]],
     [term('y', flat), found.text[1]],
     [term('z', up), found.text[2]],
-    ['nearest point', found.isExact ? `${found.vertex.join(', ')} (${length(found.vertexMetres)} away)` : null],
+    ['nearest corner', found.isExact ? `${found.vertex.join(', ')} (${length(found.vertexMetres)} away)` : null],
     ['tile', found.uri],
     ['level', isFinal ? level : `${level}; loading the exact tile…`],
   ];

@@ -192,13 +192,13 @@ class Viewer {
 
   // Marks a place, and follows it until the exact tile tells its coordinates.
   async pick(place, panel) {
-    let isFirst = true;
+    let end = null;
     await this.picker.follow(place, (found, isFinal) => {
       if (!found) return;
       this.mark.position.copy(found.world);
       this.mark.visible = true;
-      if (this.ruler.isOn) this.ruler.add(found, !isFirst);
-      isFirst = false;
+      if (end) this.ruler.correct(end, found);
+      else if (this.ruler.isOn) end = this.ruler.add(found);
       panel.showPoint(found, isFinal);
       this.changed();
     });
@@ -280,8 +280,9 @@ try {
   const viewer = new Viewer();
   const panel = new Panel(viewer, DETAIL_PIXELS);
   const [report] = await Promise.all([reportOf(), terrainFile().then((file) => viewer.open(file))]);
-  panel.showReport(report);
   listen(viewer, panel);
+  panel.enable();
+  panel.showReport(report);
 } catch (error) {
   say('failed', explain(error));
 }

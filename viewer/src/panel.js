@@ -131,8 +131,17 @@ export class Panel {
     byId('point-hint').textContent = 'There is no terrain there. Click the terrain.';
   }
 
+  // Before the terrain is there, nothing can be set.
+  enable() {
+    for (const fields of document.querySelectorAll('fieldset')) fields.disabled = false;
+  }
+
   showReport(report) {
-    byId('report-body').replaceChildren(...describeReport(report));
+    try {
+      byId('report-body').replaceChildren(...describeReport(report));
+    } catch {
+      byId('report-body').textContent = 'The report.json beside the terrain is not one of this version of gdt-batch.';
+    }
     byId('detail-field').hidden = !this.viewer.terrain.tiles;
     if (report?.warnings?.length) this.tabs[2].textContent = `Report (${report.warnings.length})`;
   }

@@ -31,10 +31,18 @@ export class Ruler {
     this.draw();
   }
 
-  // Adds a place, or corrects the one that was added last.
-  add(found, isCorrection) {
-    if (isCorrection) this.places.pop();
-    this.places.push({ source: found.source, world: found.world });
+  // Adds a place; returns it, so that it can be corrected.
+  add({ source, world }) {
+    const place = { source, world };
+    this.places.push(place);
+    this.draw();
+    return place;
+  }
+
+  // Corrects a place, unless it was removed meanwhile.
+  correct(place, { source, world }) {
+    if (!this.places.includes(place)) return;
+    Object.assign(place, { source, world });
     this.draw();
   }
 

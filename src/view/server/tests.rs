@@ -134,8 +134,14 @@ fn ranges_give_the_bytes_that_were_asked_for() {
 fn texts_are_packed_for_browsers_that_unpack_them() {
     let rig = Rig::new();
     let packed = rig.ask("GET /report.json", "Accept-Encoding: br, gzip;q=0.5\r\n");
-    assert_eq!(packed.header("Content-Encoding"), Some("gzip"));
+    assert_eq!((packed.header("Content-Encoding"), packed.header("Accept-Ranges")), (Some("gzip"), None));
     assert!(packed.body.len() < 2_000);
+    // A part of the packed bytes would not fit to the others.
+    let tags = [&packed, &rig.get("/report.json")].map(|answer| answer.header("ETag").unwrap().to_owned());
+    assert_ne!(tags[0], tags[1]);
+    for tag in tags {
+        assert_eq!(rig.ask("GET /report.json", &format!("If-None-Match: {tag}\r\n")).status, 304, "{tag}");
+    }
     let mut text = String::new();
     GzDecoder::new(packed.body.as_slice()).read_to_string(&mut text).unwrap();
     assert_eq!(text, json());
