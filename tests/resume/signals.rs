@@ -7,7 +7,7 @@ use crate::scattered;
 
 /// Returns a job of many steps that each wait for the disk, long enough for signals to arrive while it runs.
 fn long_job(threads: usize) -> Rig {
-    Rig::new(&scattered::gaussian(120_000), &Setup::tiles_of(500).threads(threads)).committing_every(0)
+    Rig::new(&scattered::gaussian(60_000), &Setup::tiles_of(500).threads(threads)).committing_every(0)
 }
 
 #[test]
@@ -15,7 +15,7 @@ fn a_job_stopped_by_sigterm_ctrl_c_or_a_hangup_goes_on_where_it_stopped() {
     for (signal, threads) in [("TERM", 1), ("INT", 2), ("HUP", 2)] {
         let rig = long_job(threads);
         // Among the leaves, the border normals and the tiles.
-        for steps in [100, 400, 600] {
+        for steps in [50, 200, 300] {
             let mut run = Run::start(&mut rig.command());
             run.wait_until(|| rig.steps() > steps);
             run.signal(signal);
