@@ -1,6 +1,6 @@
 //! Point clouds in: what a file holds, and its points on the lattice, chunk by chunk.
 //!
-//! [`open`] looks at one file and returns a [`Source`]. Its chunks are decoded independently, on any thread. Every record passes
+//! [`open()`] looks at one file and returns a [`Source`]. Its chunks are decoded independently, on any thread. Every record passes
 //! the filter, which applies the [`PointRules`], and [`PointCounts`] says what happened to the records.
 //!
 //! A new file format is a room of its own beside `las` and `text`, and a variant of `PointData` in `source.rs`.

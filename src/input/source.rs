@@ -101,10 +101,10 @@ pub fn open(path: &Path, text: &TextOptions) -> Result<Source> {
     open_chosen(path, text, &RowChoice::all())
 }
 
-/// As [`open`], for a job that wants only the rows of `choice`: the others have no say about the axes and the grid of a text.
+/// As [`open()`], for a job that wants only the rows of `choice`: the others have no say about the axes and the grid of a text.
 ///
 /// # Errors
-/// As [`open`].
+/// As [`open()`].
 pub fn open_chosen(path: &Path, text: &TextOptions, choice: &RowChoice) -> Result<Source> {
     let file = RandomAccessFile::open(path)?;
     let mut start = [0; 256];
