@@ -10,9 +10,9 @@
 //!
 //! All methods take turns on the same sites. After a round to warm up, the tables show medians of ROUNDS (5) rounds. Each step has a
 //! median of its own, so steps need not add up to the total. "Shaders" are G1 to G6 and the flips on the GPU, by its own timestamps.
-//! "GPU and CPU" is what a job with `backend = "gpu"` does with one leaf: what the device leaves, and the proof, is the CPU's part. "Plain loops" are the shaders' twins, which
-//! are written to be read, and are timed once. `WGPU_ADAPTER_NAME` names an adapter. If there is no hardware GPU, a software renderer
-//! is used, and the tables say so.
+//! "GPU and CPU" is what a job with `backend = "gpu"` does with one leaf: what the device leaves, and the proof, is the CPU's part. "Plain
+//! loops" are the shaders' twins, which are written to be read, and are timed once. `WGPU_ADAPTER_NAME` names an adapter. If there is no
+//! hardware GPU, a software renderer is used, and the tables say so.
 
 mod points;
 

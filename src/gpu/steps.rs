@@ -94,13 +94,14 @@ pub enum GpuCommand {
     Clear(BufferId, u64),
     /// Copy this many bytes from one buffer to another.
     Copy(BufferId, BufferId, u64),
-    /// Run a program with its parameters, on so many workgroups in x and y. The last number is how many bytes of the device's memory it reads and writes at the least; 0 if nobody has
-    /// counted them.
+    /// Run a program with its parameters, on so many workgroups in x and y. The last number is how many bytes of the device's memory it
+    /// reads and writes at the least; 0 if nobody has counted them.
     Run(ShaderProgram, [u32; 5], [u32; 2], u64),
 }
 
 /// The largest number of workgroups in one dimension.
 pub(super) const MAX_WORKGROUPS: u32 = 65_535;
+
 /// Returns the workgroups of 64 that cover `count` invocations, and how many invocations a row of those workgroups has.
 pub(super) fn line(count: u32) -> ([u32; 2], u32) {
     let groups = count.div_ceil(64);
