@@ -27,7 +27,7 @@ use gdt_batch::gpu::executor::{Executor, GpuUse};
 use gdt_batch::gpu::filled_atlas::{AtlasLimits, FilledAtlas, MAX_PIXELS};
 use gdt_batch::gpu::mesh_steps::FLIP_ROUNDS;
 use gdt_batch::gpu::options::{GpuOptions, TextureSide, VoronoiMethod};
-use gdt_batch::gpu::steps::{GpuStep, Recording};
+use gdt_batch::gpu::recording::{GpuStep, Recording};
 use gdt_batch::gpu::timestamps::StepNanoseconds;
 use gdt_batch::gpu::twins::atlas::{
     AtlasDiagram, MeshOnDevice, WrittenSites, count, find_vertices, give_back, make_triangles, remove_islands, voronoi,

@@ -206,6 +206,12 @@ impl Device {
         polled.map(|_| ()).map_err(|e| GpuError::Lost(e.to_string()))
     }
 
+    /// Lets the device report what is done by now.
+    pub(super) fn look(&self) {
+        // An error comes up where somebody waits.
+        let _ = self.device.poll(wgpu::PollType::Poll);
+    }
+
     /// Checks that the device still works.
     ///
     /// # Errors

@@ -1,25 +1,23 @@
 //! Runs recordings on a device.
 
 use crate::gpu::buffer_id::BufferId;
-use crate::gpu::buffers::BufferSet;
+use crate::gpu::buffers::{BindGroupKey, BufferSet};
 use crate::gpu::device::Device;
 use crate::gpu::error::GpuError;
-use crate::gpu::steps::{GpuCommand, GpuStep, Recording, ShaderProgram};
-use crate::gpu::timestamps::{DispatchMarks, GpuTimestamps, STAMP_BYTES, StepNanoseconds, marks};
+use crate::gpu::passes::{Dispatch, Part, Pass, parts};
+use crate::gpu::recording::{GpuCommand, GpuStep, ProgramKey, Recording, ShaderProgram};
+use crate::gpu::staging::{LentNumbers, StagingPool};
+use crate::gpu::timestamps::{GpuTimestamps, STAMP_BYTES, StepNanoseconds};
+use crate::gpu::upload::{UploadBuffer, room_for};
+use crate::voronoi::mesh_reply::SharedNumbers;
 use std::collections::HashMap;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use wgpu::{BindGroupEntry, BindingResource, BufferBinding, CommandEncoder, ComputePipeline, MapMode};
-
-/// Uploads are cut into chunks of this many bytes, which drivers accept faster than one large upload.
-const UPLOAD_CHUNK: usize = 32 << 20;
-/// After this many workgroups, the commands so far are submitted to the GPU.
-const WORKGROUPS_PER_SUBMISSION: u64 = 1 << 18;
+use std::sync::{Arc, OnceLock};
+use wgpu::{BindGroupEntry, BindingResource, BufferBinding, BufferView, CommandEncoder, ComputePipeline, MapMode};
 
 /// A device with its compiled shaders.
 pub struct GpuEngine {
     device: Device,
-    pipelines: HashMap<ShaderProgram, ComputePipeline>,
+    pipelines: HashMap<ProgramKey, ComputePipeline>,
 }
 
 /// A recording that is running, and whose result will be read back.
@@ -28,7 +26,8 @@ pub struct PendingReadback {
     bytes: u64,
     /// The steps whose timestamps are read back too.
     timed: Vec<GpuStep>,
-    mapped: Arc<AtomicBool>,
+    /// Whether the result can be read, once that is known.
+    mapped: Arc<OnceLock<bool>>,
 }
 
 impl GpuEngine {
@@ -48,7 +47,7 @@ impl GpuEngine {
     /// [`GpuError`] if the device refuses. The caller need not wait for anything then.
     pub fn start(&mut self, buffers: &mut BufferSet, recording: &Recording) -> Result<wgpu::SubmissionIndex, GpuError> {
         self.prepare(buffers, recording)?;
-        self.device.guard(|| self.submit_all(buffers, recording, None))?
+        Ok(self.device.guard(|| self.submit_all(buffers, recording))??.0)
     }
 
     /// Starts `recording`, then the readback of the first `bytes` bytes of buffer `id` and of the steps' times.
@@ -67,8 +66,7 @@ impl GpuEngine {
         if buffers.timestamps.is_none() {
             buffers.timestamps = GpuTimestamps::new(&self.device)?;
         }
-        let (marks, steps) = marks(recording);
-        self.device.guard(|| self.submit_all(buffers, recording, Some(&marks)))??;
+        let (_, steps) = self.device.guard(|| self.submit_all(buffers, recording))??;
         let timed = if buffers.timestamps.is_some() { steps } else { Vec::new() };
         self.fetch_timed(buffers, id, 0, bytes, timed)
     }
@@ -99,7 +97,7 @@ impl GpuEngine {
         let (from, staging) = (buffers.get(id)?, buffers.get(BufferId::Staging)?);
         let stamps = bytes.next_multiple_of(8);
         let all = if timed.is_empty() { bytes } else { stamps + STAMP_BYTES };
-        let mapped = Arc::<AtomicBool>::default();
+        let mapped = Arc::<OnceLock<bool>>::default();
         let on_mapped = mapped.clone();
         let submission = self.device.guard(|| {
             let mut encoder = self.encoder();
@@ -108,11 +106,19 @@ impl GpuEngine {
                 timestamps.resolve(&mut encoder, &timed, staging, stamps);
             }
             let submission = self.device.queue.submit([encoder.finish()]);
-            let done = move |result: Result<(), _>| on_mapped.store(result.is_ok(), Ordering::Release);
+            let done = move |result: Result<(), _>| {
+                on_mapped.get_or_init(|| result.is_ok());
+            };
             staging.slice(..all).map_async(MapMode::Read, done);
             submission
         })?;
         Ok(PendingReadback { submission, bytes, timed, mapped })
+    }
+
+    /// Returns whether `readback` need not be waited for any more.
+    pub(super) fn is_finished(&self, readback: &PendingReadback) -> bool {
+        self.device.look();
+        readback.mapped.get().is_some()
     }
 
     /// Waits for `readback`; returns the numbers, and the times of the steps that were timed.
@@ -124,37 +130,41 @@ impl GpuEngine {
         buffers: &BufferSet,
         readback: PendingReadback,
     ) -> Result<(Vec<u32>, StepNanoseconds), GpuError> {
-        self.finish_with(buffers, readback, <[u32]>::to_vec)
+        self.arrive(&readback)?;
+        let staging = buffers.get(BufferId::Staging)?;
+        let times = step_times(buffers, staging, &readback)?;
+        let numbers = bytemuck::pod_collect_to_vec(&mapped(staging, 0..readback.bytes)?);
+        self.device.guard(|| staging.unmap())?;
+        Ok((numbers, times))
     }
 
-    /// As [`GpuEngine::finish`], but `take` reads the numbers where the device has written them, so that nothing is copied twice.
+    /// As [`GpuEngine::finish`], but the numbers stay where the device has written them, if `pool` may lend the buffer.
     ///
     /// # Errors
     /// As [`GpuEngine::finish`].
-    pub fn finish_with<T>(
+    pub(super) fn finish_shared(
         &self,
-        buffers: &BufferSet,
+        buffers: &mut BufferSet,
         readback: PendingReadback,
-        take: impl FnOnce(&[u32]) -> T,
-    ) -> Result<(T, StepNanoseconds), GpuError> {
-        self.device.wait(readback.submission)?;
-        if !readback.mapped.load(Ordering::Acquire) {
-            return Err(GpuError::Lost("a buffer could not be read back".into()));
+        pool: &Arc<StagingPool>,
+    ) -> Result<(SharedNumbers, StepNanoseconds), GpuError> {
+        if !pool.may_lend(buffers.get(BufferId::Staging)?) {
+            let (numbers, times) = self.finish(buffers, readback)?;
+            return Ok((Arc::new(numbers), times));
         }
-        let staging = buffers.get(BufferId::Staging)?;
-        let mapped = |range| staging.slice(range).get_mapped_range().map_err(|e| GpuError::Lost(e.to_string()));
-        let taken = {
-            let bytes = mapped(0..readback.bytes)?;
-            take(bytemuck::try_cast_slice(&bytes).map_err(|e| GpuError::Lost(e.to_string()))?)
-        };
-        let mut times = StepNanoseconds::default();
-        if let Some(timestamps) = buffers.timestamps.as_ref().filter(|_| !readback.timed.is_empty()) {
-            let first = readback.bytes.next_multiple_of(8);
-            let stamps: Vec<u64> = bytemuck::pod_collect_to_vec(&mapped(first..first + STAMP_BYTES)?);
-            times = timestamps.nanoseconds(&stamps, &readback.timed);
+        self.arrive(&readback)?;
+        let times = step_times(buffers, buffers.get(BufferId::Staging)?, &readback)?;
+        let view = mapped(buffers.get(BufferId::Staging)?, 0..readback.bytes)?;
+        let staging = buffers.take(BufferId::Staging).ok_or_else(|| GpuError::Lost("a buffer is missing".into()))?;
+        Ok((Arc::new(LentNumbers::new(view, staging, pool.clone())), times))
+    }
+
+    fn arrive(&self, readback: &PendingReadback) -> Result<(), GpuError> {
+        self.device.wait(readback.submission.clone())?;
+        match readback.mapped.get() {
+            Some(true) => Ok(()),
+            _ => Err(GpuError::Lost("a buffer could not be read back".into())),
         }
-        self.device.guard(|| staging.unmap())?;
-        Ok((taken, times))
     }
 
     /// Returns the first `count` numbers of buffer `id`, after everything that was started is done.
@@ -191,9 +201,9 @@ impl GpuEngine {
                 GpuCommand::Reserve(id, bytes) => buffers.reserve(&self.device, *id, *bytes)?,
                 GpuCommand::Run(program, ..) => {
                     runs += 1;
-                    if !self.pipelines.contains_key(program) {
+                    if !self.pipelines.contains_key(&program.key()) {
                         let pipeline = self.device.guard(|| compile(&self.device, program))?;
-                        self.pipelines.insert(*program, pipeline);
+                        self.pipelines.insert(program.key(), pipeline);
                     }
                 }
                 GpuCommand::Step(..) | GpuCommand::Upload(..) | GpuCommand::Clear(..) | GpuCommand::Copy(..) => {}
@@ -206,72 +216,116 @@ impl GpuEngine {
         self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
     }
 
+    /// Submits all commands; returns the last submission, and the steps that have dispatches.
     fn submit_all(
         &self,
-        buffers: &BufferSet,
+        buffers: &mut BufferSet,
         recording: &Recording,
-        marks: Option<&[DispatchMarks]>,
-    ) -> Result<wgpu::SubmissionIndex, GpuError> {
+    ) -> Result<(wgpu::SubmissionIndex, Vec<GpuStep>), GpuError> {
         let queue = &self.device.queue;
-        queue.write_buffer(buffers.get(BufferId::Params)?, 0, &params(recording));
+        let (parts, steps) = parts(recording);
+        let (uploaded, starts) = self.upload(buffers, recording)?;
+        let mut starts = starts.into_iter();
+        let mut copy_up = |encoder: &mut CommandEncoder, to: &wgpu::Buffer, bytes: usize| {
+            let start = starts.next().unwrap_or_default();
+            encoder.copy_buffer_to_buffer(&uploaded, start, to, 0, bytes as u64);
+        };
         let mut encoder = self.encoder();
-        let (mut runs, mut workgroups) = (0, 0);
-        for command in &recording.commands {
-            match command {
-                GpuCommand::Reserve(..) | GpuCommand::Step(..) => {}
-                GpuCommand::Upload(id, numbers) => self.upload(buffers.get(*id)?, numbers),
-                GpuCommand::Clear(id, bytes) => encoder.clear_buffer(buffers.get(*id)?, 0, Some(*bytes)),
-                GpuCommand::Copy(from, to, bytes) => {
-                    encoder.copy_buffer_to_buffer(buffers.get(*from)?, 0, buffers.get(*to)?, 0, *bytes);
-                }
-                GpuCommand::Run(program, _, count, _) => {
-                    let marks = marks.and_then(|marks| marks.get(runs as usize)).copied().unwrap_or_default();
-                    self.encode(&mut encoder, buffers, program, *count, runs * BufferSet::STRIDE, marks)?;
-                    runs += 1;
-                    workgroups += u64::from(count[0]) * u64::from(count[1]);
-                    if workgroups > WORKGROUPS_PER_SUBMISSION {
-                        workgroups = 0;
+        copy_up(&mut encoder, buffers.get(BufferId::Params)?, BufferSet::STRIDE as usize * recording.dispatches());
+        for part in parts {
+            match part {
+                Part::Pass(pass) => {
+                    self.encode(&mut encoder, buffers, &pass)?;
+                    if pass.ends_submission {
                         queue.submit([std::mem::replace(&mut encoder, self.encoder()).finish()]);
                     }
                 }
+                Part::Other(GpuCommand::Upload(id, numbers)) => {
+                    copy_up(&mut encoder, buffers.get(*id)?, size_of_val(&numbers[..]));
+                }
+                Part::Other(GpuCommand::Clear(id, bytes)) => encoder.clear_buffer(buffers.get(*id)?, 0, Some(*bytes)),
+                Part::Other(GpuCommand::Copy(from, to, bytes)) => {
+                    encoder.copy_buffer_to_buffer(buffers.get(*from)?, 0, buffers.get(*to)?, 0, *bytes);
+                }
+                Part::Other(GpuCommand::Reserve(..) | GpuCommand::Step(..) | GpuCommand::Run(..)) => {}
             }
         }
-        Ok(queue.submit([encoder.finish()]))
+        let submission = queue.submit([encoder.finish()]);
+        buffers.upload.iter().for_each(UploadBuffer::map_again);
+        Ok((submission, steps))
     }
 
-    fn upload(&self, buffer: &wgpu::Buffer, numbers: &[u32]) {
-        for (i, chunk) in bytemuck::cast_slice::<u32, u8>(numbers).chunks(UPLOAD_CHUNK).enumerate() {
-            self.device.queue.write_buffer(buffer, (i * UPLOAD_CHUNK) as u64, chunk);
+    /// Writes the parameters of all dispatches, then what is uploaded, into the buffer that goes up; returns it, and where each part begins.
+    fn upload(&self, buffers: &mut BufferSet, recording: &Recording) -> Result<(wgpu::Buffer, Vec<u64>), GpuError> {
+        let params = params(recording);
+        let uploads = recording.commands.iter().filter_map(|command| match command {
+            GpuCommand::Upload(_, numbers) => Some(bytemuck::cast_slice(numbers)),
+            _ => None,
+        });
+        let parts: Vec<&[u8]> = std::iter::once(&params[..]).chain(uploads).collect();
+        let upload = UploadBuffer::with_room(buffers.upload.take(), &self.device, room_for(&parts))?;
+        buffers.upload.insert(upload).write(&parts)
+    }
+
+    fn encode(&self, encoder: &mut CommandEncoder, buffers: &mut BufferSet, pass: &Pass) -> Result<(), GpuError> {
+        for dispatch in &pass.dispatches {
+            self.prepare_bind_group(buffers, dispatch)?;
         }
+        let timestamp_writes = buffers.timestamps.as_ref().and_then(|timestamps| timestamps.writes(pass.marks));
+        let mut encoded = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes });
+        for dispatch in &pass.dispatches {
+            encoded.set_pipeline(self.pipeline(&dispatch.program)?);
+            encoded.set_bind_group(0, buffers.bind_groups.get(&bind_group_key(dispatch)), &[]);
+            encoded.dispatch_workgroups(dispatch.workgroups[0], dispatch.workgroups[1], 1);
+        }
+        Ok(())
     }
 
-    fn encode(
-        &self,
-        encoder: &mut CommandEncoder,
-        buffers: &BufferSet,
-        program: &ShaderProgram,
-        workgroups: [u32; 2],
-        params: u64,
-        marks: DispatchMarks,
-    ) -> Result<(), GpuError> {
-        let pipeline = self.pipelines.get(program).ok_or_else(|| GpuError::Refused("a shader is missing".into()))?;
-        let size = wgpu::BufferSize::new(PARAM_BYTES);
-        let uniform = BufferBinding { buffer: buffers.get(BufferId::Params)?, offset: params, size };
+    /// Makes sure that `buffers` has the bind group of `dispatch`.
+    fn prepare_bind_group(&self, buffers: &mut BufferSet, dispatch: &Dispatch) -> Result<(), GpuError> {
+        let (key, program) = (bind_group_key(dispatch), &dispatch.program);
+        if buffers.bind_groups.contains_key(&key) {
+            return Ok(());
+        }
+        let (size, offset) = (wgpu::BufferSize::new(PARAM_BYTES), dispatch.number * BufferSet::STRIDE);
+        let uniform = BufferBinding { buffer: buffers.get(BufferId::Params)?, offset, size };
         let mut entries = vec![BindGroupEntry { binding: 0, resource: BindingResource::Buffer(uniform) }];
         for &(binding, id) in program.bindings {
             entries.push(BindGroupEntry { binding, resource: buffers.get(id)?.as_entire_binding() });
         }
-        let device = &self.device.device;
-        let layout = pipeline.get_bind_group_layout(0);
-        let bind_group =
-            device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &layout, entries: &entries });
-        let timestamp_writes = buffers.timestamps.as_ref().and_then(|timestamps| timestamps.writes(marks));
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes });
-        pass.set_pipeline(pipeline);
-        pass.set_bind_group(0, &bind_group, &[]);
-        pass.dispatch_workgroups(workgroups[0], workgroups[1], 1);
+        let layout = self.pipeline(program)?.get_bind_group_layout(0);
+        let descriptor = wgpu::BindGroupDescriptor { label: None, layout: &layout, entries: &entries };
+        let bind_group = self.device.device.create_bind_group(&descriptor);
+        buffers.bind_groups.insert(key, bind_group);
         Ok(())
     }
+
+    fn pipeline(&self, program: &ShaderProgram) -> Result<&ComputePipeline, GpuError> {
+        self.pipelines.get(&program.key()).ok_or_else(|| GpuError::Refused("a shader is missing".into()))
+    }
+}
+
+fn bind_group_key(dispatch: &Dispatch) -> BindGroupKey {
+    (dispatch.program.key(), dispatch.program.bindings, dispatch.number)
+}
+
+/// Returns the bytes of a staging buffer that is mapped.
+fn mapped(staging: &wgpu::Buffer, range: std::ops::Range<u64>) -> Result<BufferView, GpuError> {
+    staging.slice(range).get_mapped_range().map_err(|error| GpuError::Lost(error.to_string()))
+}
+
+/// Returns the times of the steps of `readback`, which has arrived in `staging`.
+fn step_times(
+    buffers: &BufferSet,
+    staging: &wgpu::Buffer,
+    readback: &PendingReadback,
+) -> Result<StepNanoseconds, GpuError> {
+    let Some(timestamps) = buffers.timestamps.as_ref().filter(|_| !readback.timed.is_empty()) else {
+        return Ok(StepNanoseconds::default());
+    };
+    let first = readback.bytes.next_multiple_of(8);
+    let stamps: Vec<u64> = bytemuck::pod_collect_to_vec(&mapped(staging, first..first + STAMP_BYTES)?);
+    Ok(timestamps.nanoseconds(&stamps, &readback.timed))
 }
 
 /// Bytes of the parameters of a dispatch.

@@ -1,6 +1,6 @@
-//! Leaves on a GPU. One thread owns the device; workers send it the sites of their leaves and wait for the meshes. All leaves that wait
-//! share an atlas, as many as fit. If more wait, up to three atlases are in flight at once: while the GPU works on one, another is read
-//! back.
+//! Leaves on a GPU. One thread opens the device and owns it; workers send it the sites of their leaves and wait for the meshes. All leaves
+//! that wait share an atlas, as many as fit. If many wait, up to three atlases are in flight at once: while the GPU works on one, another is
+//! gathered, and a third is read back.
 //!
 //! Every failure costs time and nothing else. After an atlas that is too large, the next ones have half the size. A lost device is
 //! opened again once. If that does not help, every worker does its own leaves.
@@ -11,13 +11,14 @@
 use crate::geometry::Site;
 use crate::gpu::benefit::{GpuBenefit, GpuFigures};
 use crate::gpu::device::{self, AdapterRequest, MAX_SIDE};
+use crate::gpu::error::GpuError;
 #[cfg(feature = "fault-injection")]
 use crate::gpu::fake_engine::{self, FakeEngine};
 use crate::gpu::filled_atlas::{AtlasLimits, MAX_PIXELS};
 use crate::gpu::gpu_thread::{Filling, GpuState, GpuThread, MeshRequest};
 use crate::gpu::mesh_engine::{GpuMeshEngine, MeshEngine};
 use crate::gpu::options::{GpuOptions, TextureSide};
-use crate::gpu::steps::GpuStep;
+use crate::gpu::recording::GpuStep;
 use crate::interrupt;
 use crate::threads::do_other_work;
 use crate::voronoi::mesh_reply::MeshReply;
@@ -46,9 +47,11 @@ const FEWEST_SITES: usize = 100;
 const FEWEST_PIXELS_PER_SITE: u64 = 4;
 /// Bytes for each site of a leaf that waits: its point, its position twice, and the device's answer.
 const BYTES_PER_WAITING_SITE: u64 = 130;
-/// Bytes for each byte that comes back from an atlas: each slot has a buffer into which the device copies them, and what goes up takes
-/// about a quarter as much.
-const BYTES_PER_BYTE_BACK: u64 = 4;
+/// So many atlases as large as may be can wait to be read, besides those in flight. Smaller ones may be more.
+const LENT_ATLASES: u64 = 2;
+/// Bytes for each byte that comes back from an atlas: three slots have a buffer each into which the device copies them, up to a quarter too
+/// large, and two more are lent to workers. What goes up takes about a quarter as much, in buffers that are up to twice too large.
+const BYTES_PER_BYTE_BACK: u64 = 8;
 /// While so many leaves of a thread wait, it takes on other work; then no more, because its stack ends somewhere.
 const MOST_NESTED: usize = 8;
 
@@ -74,10 +77,17 @@ pub struct Executor {
     max_waiting: u64,
     gpu_use: GpuUse,
     thread: Option<JoinHandle<()>>,
-    /// The adapter's name.
-    pub adapter: String,
     /// What it has brought so far.
     pub(crate) benefit: GpuBenefit,
+}
+
+/// An engine that is open.
+struct Opened<E> {
+    engine: E,
+    /// The adapter's name.
+    adapter: String,
+    room: Room,
+    filling: Filling,
 }
 
 /// What the executor has room for.
@@ -90,8 +100,8 @@ struct Room {
 }
 
 impl Executor {
-    /// Opens an adapter as `options` say and starts its thread. The CPU's side may take `memory` bytes: half for the atlases in flight,
-    /// half for the leaves that wait.
+    /// Starts a thread that opens an adapter as `options` say. Waits for that only if the job needs the GPU. The CPU's side may take `memory`
+    /// bytes: half for the atlases in flight, half for the leaves that wait.
     ///
     /// # Errors
     /// A sentence that says why no GPU can be used.
@@ -102,35 +112,63 @@ impl Executor {
             TextureSide::Side(side) => TextureResolution::Side(side),
         };
         let max_bytes = memory / 2 / BYTES_PER_BYTE_BACK;
+        let filling = Filling { resolution, max_bytes };
         let room = Room { max_pixels: MAX_PIXELS, max_waiting: memory / 2 / BYTES_PER_WAITING_SITE };
         #[cfg(feature = "fault-injection")]
         if let Some(engine) = FakeEngine::from_environment() {
-            return Executor::on(engine, "no GPU".into(), Filling { resolution, max_bytes }, room, gpu_use);
+            let open = move || Ok(Opened { engine, adapter: "no GPU".into(), room, filling });
+            return Executor::on(open, room, gpu_use);
         }
         let request = AdapterRequest::new(options.adapter.as_deref(), gpu_use == GpuUse::Required);
-        let engine = GpuMeshEngine::open(request, options.voronoi).map_err(|error| error.to_string())?;
-        let device = engine.device();
-        let (adapter, limits) = (device.info.name.clone(), AtlasLimits::of(&device.limits));
-        let filling = Filling { resolution, max_bytes: max_bytes.min(limits.bytes) };
-        Executor::on(engine, adapter, filling, Room { max_pixels: limits.pixels, ..room }, gpu_use)
+        let voronoi = options.voronoi;
+        let open = move || {
+            let mut engine = GpuMeshEngine::open(request, voronoi, LENT_ATLASES * max_bytes)?;
+            engine.warm_up()?;
+            let device = engine.device();
+            let (adapter, limits) = (device.info.name.clone(), AtlasLimits::of(&device.limits));
+            let filling = Filling { max_bytes: max_bytes.min(limits.bytes), ..filling };
+            Ok(Opened { engine, adapter, room: Room { max_pixels: limits.pixels, ..room }, filling })
+        };
+        Executor::on(open, room, gpu_use)
     }
 
     fn on<E: MeshEngine + 'static>(
-        engine: E,
-        adapter: String,
-        filling: Filling,
+        open: impl FnOnce() -> Result<Opened<E>, GpuError> + Send + 'static,
         room: Room,
         gpu_use: GpuUse,
     ) -> Result<Executor, String> {
         let state = Arc::new(GpuState::new(room.max_pixels));
         let (sender, receiver) = channel();
+        let (tell, told) = sync_channel(1);
         let of_thread = state.clone();
-        let run = move || GpuThread::new(engine, of_thread, filling).run(&receiver);
+        let run = move || {
+            // Nobody listens if the job can do without the GPU.
+            match open() {
+                Ok(Opened { engine, adapter, room, filling }) => {
+                    of_thread.max_pixels.store(room.max_pixels, Ordering::Release);
+                    of_thread.adapter.get_or_init(|| adapter);
+                    let _ = tell.send(Ok(()));
+                    GpuThread::new(engine, of_thread, filling).run(&receiver);
+                }
+                Err(error) => {
+                    of_thread.is_gone.store(true, Ordering::Release);
+                    let _ = tell.send(Err(error.to_string()));
+                }
+            }
+        };
         let thread = std::thread::Builder::new().name("gpu".into()).spawn(run);
         let thread = Some(thread.map_err(|e| format!("the GPU's thread does not start: {e}"))?);
+        if gpu_use == GpuUse::Required {
+            told.recv().unwrap_or_else(|_| Err("the GPU's thread has ended".into()))?;
+        }
         let benefit = GpuBenefit::new(gpu_use == GpuUse::Required);
         let (requests, max_waiting) = (Mutex::new(Some(sender)), room.max_waiting);
-        Ok(Executor { requests, state, max_waiting, gpu_use, thread, adapter, benefit })
+        Ok(Executor { requests, state, max_waiting, gpu_use, thread, benefit })
+    }
+
+    /// Returns the adapter's name, once it is open.
+    pub fn adapter(&self) -> Option<&str> {
+        self.state.adapter.get().map(String::as_str)
     }
 
     /// Tells whether an adapter is likely to be found. This is so cheap that every job may ask.
@@ -159,6 +197,7 @@ impl Executor {
     /// Tells whether to ask for the mesh of the next leaf, which has `sites` sites.
     pub(crate) fn is_worth_asking(&self, sites: usize) -> bool {
         sites >= FEWEST_SITES
+            && self.adapter().is_some()
             && (self.gpu_use == GpuUse::Required || self.has_room(sites as u64))
             && self.benefit.is_worth_asking()
     }
@@ -191,7 +230,7 @@ impl Executor {
         let (reply, answer) = sync_channel(1);
         let requests = self.requests.lock().unwrap_or_else(PoisonError::into_inner).clone()?;
         self.state.unanswered.fetch_add(1, Ordering::AcqRel);
-        if requests.send(MeshRequest { sites: sites.to_vec(), reply }).is_err() {
+        if requests.send(MeshRequest { sites: sites.to_vec(), start: Instant::now(), reply }).is_err() {
             self.state.unanswered.fetch_sub(1, Ordering::AcqRel);
             return None;
         }
@@ -225,7 +264,10 @@ impl Executor {
                 Err(TryRecvError::Empty) => {}
             }
             let begun = Instant::now();
-            match answer.recv_timeout(NAP) {
+            self.state.idle.fetch_add(1, Ordering::AcqRel);
+            let late = answer.recv_timeout(NAP);
+            self.state.idle.fetch_sub(1, Ordering::AcqRel);
+            match late {
                 Ok(reply) => return Some(reply),
                 Err(RecvTimeoutError::Disconnected) => return Some(MeshReply::Unavailable),
                 Err(RecvTimeoutError::Timeout) => idle = idle.saturating_add(begun.elapsed()),

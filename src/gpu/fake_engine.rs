@@ -11,9 +11,11 @@ use crate::gpu::returned::ReturnedLayout;
 use crate::gpu::timestamps::StepNanoseconds;
 use crate::mesh::half_edge::HalfEdgeMesh;
 use crate::mesh::index::HalfEdgeIndex;
+use crate::voronoi::mesh_reply::SharedNumbers;
 use crate::voronoi::{PipelineBuffers, triangulate};
 use std::collections::BTreeMap;
-use std::time::Duration;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 /// See the module.
 pub(super) struct FakeEngine {
@@ -39,26 +41,29 @@ impl FakeEngine {
 }
 
 impl MeshEngine for FakeEngine {
-    type Pending = FilledAtlas;
+    /// The atlas, and when it started.
+    type Pending = (FilledAtlas, Instant);
 
-    fn start(&mut self, _: usize, filled: &FilledAtlas) -> Result<FilledAtlas, GpuError> {
-        Ok(filled.clone())
+    fn start(&mut self, _: usize, filled: &FilledAtlas) -> Result<Self::Pending, GpuError> {
+        Ok((filled.clone(), Instant::now()))
+    }
+
+    fn is_finished(&mut self, (_, start): &Self::Pending) -> bool {
+        self.delay.is_some_and(|delay| start.elapsed() >= delay)
     }
 
     fn finish(
         &mut self,
         _: usize,
-        filled: FilledAtlas,
-        take: &mut dyn FnMut(&[u32]),
-    ) -> Result<StepNanoseconds, GpuError> {
+        (filled, start): Self::Pending,
+    ) -> Result<(SharedNumbers, StepNanoseconds), GpuError> {
         let Some(delay) = self.delay else {
             loop {
                 std::thread::park();
             }
         };
-        std::thread::sleep(delay);
-        take(&numbers_back(&filled));
-        Ok(StepNanoseconds::default())
+        std::thread::sleep(delay.saturating_sub(start.elapsed()));
+        Ok((Arc::new(numbers_back(&filled)), StepNanoseconds::default()))
     }
 
     fn free(&mut self, _: usize) {}

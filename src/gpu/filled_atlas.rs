@@ -64,6 +64,12 @@ impl FilledAtlas {
         true
     }
 
+    /// Removes all leaves.
+    pub(super) fn clear(&mut self) {
+        self.atlas = Atlas::default();
+        self.sites.clear();
+    }
+
     /// Returns how many bytes come back from the device.
     pub fn bytes_back(&self) -> u64 {
         4 * ReturnedLayout::of(&self.atlas).numbers() as u64

@@ -6,26 +6,44 @@ use crate::gpu::atlas::Atlas;
 use crate::gpu::error::GpuError;
 use crate::gpu::filled_atlas::{AtlasLimits, FilledAtlas};
 use crate::gpu::mesh_engine::{MAX_IN_FLIGHT, MeshEngine};
-use crate::gpu::returned::ReturnedAtlas;
-use crate::gpu::steps::GpuStep;
+use crate::gpu::recording::GpuStep;
+use crate::gpu::returned::replies;
 use crate::voronoi::mesh_reply::MeshReply;
 use crate::voronoi::texture_request::TextureResolution;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, AtomicUsize, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
 use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
 
 /// If an atlas with no more pixels than this does not fit, none will.
 const MIN_PIXELS: u32 = 1 << 16;
+/// An atlas starts once leaves of so many sites wait: with fewer, its dispatches cost more than its work.
+const ENOUGH_SITES: usize = 100_000;
+/// Or once a leaf has waited for so long, or a worker has nothing else to do.
+const SHORT: Duration = Duration::from_millis(5);
+/// An atlas takes no more leaves once it has so many sites: a large GPU is as fast with them as with ten times as many, which would only come
+/// back later, in buffers that take long to create.
+const MANY_SITES: usize = 250_000;
+/// The thread looks after an atlas, or after leaves that wait, whenever this share of the time since the start has passed.
+const LOOKS: u32 = 16;
+/// But it rests at least, and at most, for these times.
+const RESTS: [Duration; 2] = [Duration::from_micros(20), Duration::from_millis(1)];
+/// An atlas in flight for longer is waited for, until the device counts as lost.
+const LONG: Duration = Duration::from_secs(5);
 
 /// What the workers and the GPU's thread share.
 pub(super) struct GpuState {
+    /// The adapter's name, once the device is open.
+    pub(super) adapter: OnceLock<String>,
     /// The most pixels that an atlas may have.
     pub(super) max_pixels: AtomicU32,
     /// The number of sites of the leaves that wait for their mesh.
     pub(super) waiting: AtomicU64,
     /// The number of requests without an answer, whether or not a worker still waits for it.
     pub(super) unanswered: AtomicUsize,
+    /// How many workers have nothing else to do than to wait for their mesh.
+    pub(super) idle: AtomicUsize,
     /// How many workers in a row have stopped waiting.
     pub(super) abandoned: AtomicUsize,
     /// Whether any leaf has had an answer.
@@ -42,9 +60,11 @@ impl GpuState {
     /// Returns the state of a GPU that has done nothing yet, with room for `max_pixels` pixels.
     pub(super) fn new(max_pixels: u32) -> GpuState {
         GpuState {
+            adapter: OnceLock::new(),
             max_pixels: AtomicU32::new(max_pixels),
             waiting: AtomicU64::new(0),
             unanswered: AtomicUsize::new(0),
+            idle: AtomicUsize::new(0),
             abandoned: AtomicUsize::new(0),
             has_answered: AtomicBool::new(false),
             is_gone: AtomicBool::new(false),
@@ -57,6 +77,8 @@ impl GpuState {
 /// A worker's request for the mesh of a leaf.
 pub(super) struct MeshRequest {
     pub(super) sites: Vec<Site>,
+    /// When the worker asked.
+    pub(super) start: Instant,
     pub(super) reply: SyncSender<MeshReply>,
 }
 
@@ -79,6 +101,8 @@ pub(super) struct GpuThread<E: MeshEngine> {
     /// The oldest atlas is first.
     in_flight: VecDeque<AtlasInFlight<E::Pending>>,
     free_slots: Vec<usize>,
+    /// The memory of an atlas that has gone up.
+    unused: FilledAtlas,
     has_reopened: bool,
 }
 
@@ -88,36 +112,65 @@ struct AtlasInFlight<P> {
     atlas: Atlas,
     slot: usize,
     pending: P,
+    start: Instant,
 }
 
 impl<E: MeshEngine> GpuThread<E> {
     pub(super) fn new(engine: E, state: Arc<GpuState>, filling: Filling) -> GpuThread<E> {
         let free_slots = (0..MAX_IN_FLIGHT).collect();
         let (waiting, in_flight) = (VecDeque::new(), VecDeque::new());
-        GpuThread { engine, state, filling, waiting, in_flight, free_slots, has_reopened: false }
+        let unused = FilledAtlas::default();
+        GpuThread { engine, state, filling, waiting, in_flight, free_slots, unused, has_reopened: false }
     }
 
     /// Serves `requests` until all senders are gone.
     pub(super) fn run(&mut self, requests: &Receiver<MeshRequest>) {
-        loop {
-            if self.in_flight.is_empty() && self.waiting.is_empty() {
-                let Ok(request) = requests.recv() else { return };
-                self.waiting.push_back(request);
-            }
-            // While this thread was busy, more leaves may have come: they share the next atlas.
+        while self.await_work(requests) {
             self.waiting.extend(requests.try_iter());
-            match self.free_slots.pop() {
-                Some(slot) if !self.waiting.is_empty() => self.launch(slot),
-                slot => {
-                    self.free_slots.extend(slot);
-                    self.land();
-                }
+            if self.may_launch() {
+                self.launch();
+            } else if self.has_landed() {
+                self.land();
             }
         }
     }
 
+    /// Waits for a leaf, or if atlases are in flight, for a short time. Returns whether there is anything to do, now or later.
+    fn await_work(&mut self, requests: &Receiver<MeshRequest>) -> bool {
+        if self.may_launch() || self.has_landed() {
+            return true;
+        }
+        let oldest = self.in_flight.front().map(|atlas| atlas.start);
+        let request = match oldest.or(self.waiting.front().map(|request| request.start)) {
+            None => requests.recv().map_err(|_| RecvTimeoutError::Disconnected),
+            Some(start) => requests.recv_timeout((start.elapsed() / LOOKS).clamp(RESTS[0], RESTS[1])),
+        };
+        match request {
+            Ok(request) => self.waiting.push_back(request),
+            Err(RecvTimeoutError::Timeout) => {}
+            // Nobody waits for what is in flight.
+            Err(RecvTimeoutError::Disconnected) => return false,
+        }
+        true
+    }
+
+    /// Returns whether the leaves that wait may start.
+    fn may_launch(&self) -> bool {
+        let Some(oldest) = self.waiting.front().filter(|_| !self.free_slots.is_empty()) else { return false };
+        let is_enough = || self.waiting.iter().map(|request| request.sites.len()).sum::<usize>() >= ENOUGH_SITES;
+        let is_awaited = || self.state.idle.load(Ordering::Acquire) > 0 || oldest.start.elapsed() > SHORT;
+        is_enough() || self.in_flight.is_empty() && is_awaited()
+    }
+
+    /// Returns whether the oldest atlas has come back, or will be waited for.
+    fn has_landed(&mut self) -> bool {
+        let Some(oldest) = self.in_flight.front() else { return false };
+        oldest.start.elapsed() > LONG || self.engine.is_finished(&oldest.pending)
+    }
+
     /// Starts an atlas of the leaves that wait.
-    fn launch(&mut self, slot: usize) {
+    fn launch(&mut self) {
+        let Some(slot) = self.free_slots.pop() else { return };
         if self.state.is_gone.load(Ordering::Acquire) {
             self.free_slots.push(slot);
             return std::mem::take(&mut self.waiting).iter().for_each(|request| self.refuse(request));
@@ -128,7 +181,9 @@ impl<E: MeshEngine> GpuThread<E> {
         }
         match self.engine.start(slot, &filled) {
             Ok(pending) => {
-                self.in_flight.push_back(AtlasInFlight { requests, atlas: filled.atlas, slot, pending });
+                let (atlas, start) = (filled.atlas.clone(), Instant::now());
+                self.unused = filled;
+                self.in_flight.push_back(AtlasInFlight { requests, atlas, slot, pending, start });
             }
             Err(GpuError::OutOfMemory) => {
                 self.engine.free(slot);
@@ -142,18 +197,23 @@ impl<E: MeshEngine> GpuThread<E> {
         }
     }
 
-    /// Fills an atlas with leaves that wait, the oldest first. A leaf that does not fit alone gets no mesh.
+    /// Fills an atlas with leaves that wait. The newest come first: a worker that does other work while it waits can use only the answer to
+    /// its last request, and until it has used that, what has come back for earlier ones keeps its memory. A leaf that does not fit alone
+    /// gets no mesh.
     fn gather(&mut self) -> (FilledAtlas, Vec<MeshRequest>) {
-        let (mut filled, mut requests) = (FilledAtlas::default(), Vec::new());
+        let (mut filled, mut requests) = (std::mem::take(&mut self.unused), Vec::new());
+        filled.clear();
         let Filling { resolution, max_bytes } = self.filling;
         let limits = AtlasLimits { pixels: self.state.max_pixels.load(Ordering::Acquire), bytes: max_bytes };
-        while let Some(request) = self.waiting.pop_front() {
+        while filled.sites.len() < MANY_SITES
+            && let Some(request) = self.waiting.pop_back()
+        {
             if filled.add(&request.sites, resolution, limits) {
                 requests.push(request);
             } else if requests.is_empty() {
                 self.refuse(&request);
             } else {
-                self.waiting.push_front(request);
+                self.waiting.push_back(request);
                 break;
             }
         }
@@ -161,15 +221,15 @@ impl<E: MeshEngine> GpuThread<E> {
     }
 
     fn land(&mut self) {
-        let Some(AtlasInFlight { requests, atlas, slot, pending }) = self.in_flight.pop_front() else { return };
-        let mut replies = Vec::new();
-        let done = self.engine.finish(slot, pending, &mut |numbers| replies = replies_of(&atlas, numbers));
+        let Some(AtlasInFlight { requests, atlas, slot, pending, .. }) = self.in_flight.pop_front() else { return };
+        let done = self.engine.finish(slot, pending);
         self.free_slots.push(slot);
         match done {
-            Ok(times) => {
+            Ok((numbers, times)) => {
                 for (sum, time) in self.state.times.iter().zip(times) {
                     sum.fetch_add(time, Ordering::Relaxed);
                 }
+                let replies = replies(&atlas, &numbers);
                 requests.iter().zip(replies).for_each(|(request, reply)| self.answer(request, reply));
             }
             Err(error) => self.recover(requests, &error),
@@ -198,7 +258,7 @@ impl<E: MeshEngine> GpuThread<E> {
     }
 
     fn put_back(&mut self, requests: Vec<MeshRequest>) {
-        requests.into_iter().rev().for_each(|request| self.waiting.push_front(request));
+        self.waiting.extend(requests.into_iter().rev());
     }
 
     /// After the atlas of `requests` failed with `error`: opens the device again and repeats all leaves in flight, or gives the GPU up.
@@ -215,11 +275,4 @@ impl<E: MeshEngine> GpuThread<E> {
             self.state.is_gone.store(true, Ordering::Release);
         }
     }
-}
-
-/// Returns the answer for every leaf of `atlas`, of which `numbers` came back.
-fn replies_of(atlas: &Atlas, numbers: &[u32]) -> Vec<MeshReply> {
-    let returned = ReturnedAtlas::new(atlas, numbers);
-    let reply = |leaf| returned.map_or(MeshReply::Flagged, |returned| returned.reply(leaf));
-    (0..atlas.leaves.len()).map(reply).collect()
 }

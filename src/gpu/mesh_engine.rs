@@ -5,10 +5,14 @@ use crate::gpu::buffers::BufferSet;
 use crate::gpu::device::{self, AdapterRequest, Device};
 use crate::gpu::engine::{GpuEngine, PendingReadback};
 use crate::gpu::error::GpuError;
-use crate::gpu::filled_atlas::FilledAtlas;
+use crate::gpu::filled_atlas::{AtlasLimits, FilledAtlas};
 use crate::gpu::options::VoronoiMethod;
-use crate::gpu::steps::Recording;
+use crate::gpu::recording::Recording;
+use crate::gpu::staging::StagingPool;
 use crate::gpu::timestamps::StepNanoseconds;
+use crate::voronoi::mesh_reply::SharedNumbers;
+use crate::voronoi::texture_request::TextureResolution;
+use std::sync::Arc;
 
 /// The most atlases that are in flight at once, which is the number of slots of an engine.
 pub const MAX_IN_FLIGHT: usize = 3;
@@ -24,16 +28,14 @@ pub trait MeshEngine: Send {
     /// [`GpuError`] if the device refuses.
     fn start(&mut self, slot: usize, filled: &FilledAtlas) -> Result<Self::Pending, GpuError>;
 
-    /// Waits for an atlas, and shows `take` the numbers that have come back; returns the times of the steps.
+    /// Returns whether [`MeshEngine::finish`] need not wait for this atlas, as far as the engine can tell.
+    fn is_finished(&mut self, pending: &Self::Pending) -> bool;
+
+    /// Waits for an atlas; returns the numbers that have come back, and the times of the steps.
     ///
     /// # Errors
-    /// [`GpuError`] if they never arrive. Then `take` was not called.
-    fn finish(
-        &mut self,
-        slot: usize,
-        pending: Self::Pending,
-        take: &mut dyn FnMut(&[u32]),
-    ) -> Result<StepNanoseconds, GpuError>;
+    /// [`GpuError`] if they never arrive.
+    fn finish(&mut self, slot: usize, pending: Self::Pending) -> Result<(SharedNumbers, StepNanoseconds), GpuError>;
 
     /// Frees the buffers of `slot`.
     fn free(&mut self, slot: usize);
@@ -51,15 +53,32 @@ pub struct GpuMeshEngine {
     voronoi: VoronoiMethod,
     engine: GpuEngine,
     slots: [BufferSet; MAX_IN_FLIGHT],
+    staging: Arc<StagingPool>,
 }
 
 impl GpuMeshEngine {
-    /// Opens the adapter that `request` describes.
+    /// Opens the adapter that `request` describes. What comes back may stay in buffers of `most_lent` bytes besides those of the slots,
+    /// while others read it.
     ///
     /// # Errors
     /// [`GpuError`] if there is none, or it does not open.
-    pub fn open(request: AdapterRequest, voronoi: VoronoiMethod) -> Result<GpuMeshEngine, GpuError> {
-        Ok(GpuMeshEngine { engine: open(&request)?, request, voronoi, slots: Default::default() })
+    pub fn open(request: AdapterRequest, voronoi: VoronoiMethod, most_lent: u64) -> Result<GpuMeshEngine, GpuError> {
+        let (slots, staging) = (Default::default(), Arc::new(StagingPool::new(most_lent)));
+        Ok(GpuMeshEngine { engine: open(&request)?, request, voronoi, slots, staging })
+    }
+
+    /// Makes the mesh of one triangle, so that all shaders are compiled.
+    ///
+    /// # Errors
+    /// [`GpuError`] of the device.
+    pub fn warm_up(&mut self) -> Result<(), GpuError> {
+        let mut filled = FilledAtlas::default();
+        let limits = AtlasLimits::of(&self.device().limits);
+        if filled.add(&[[0, 0], [9, 0], [0, 9]], TextureResolution::PixelsPerSite(16.0), limits) {
+            let pending = self.start(0, &filled)?;
+            self.finish(0, pending)?;
+        }
+        Ok(())
     }
 
     /// Returns the device.
@@ -80,16 +99,17 @@ impl MeshEngine for GpuMeshEngine {
 
     fn start(&mut self, slot: usize, filled: &FilledAtlas) -> Result<PendingReadback, GpuError> {
         let recording = Recording::mesh(&filled.atlas, &filled.sites, self.voronoi);
-        self.engine.start_and_fetch(&mut self.slots[slot], &recording, BufferId::Returned, filled.bytes_back())
+        let (buffers, bytes) = (&mut self.slots[slot], filled.bytes_back());
+        buffers.fill_gap(BufferId::Staging, || self.staging.take_spare(bytes));
+        self.engine.start_and_fetch(buffers, &recording, BufferId::Returned, bytes)
     }
 
-    fn finish(
-        &mut self,
-        slot: usize,
-        pending: PendingReadback,
-        take: &mut dyn FnMut(&[u32]),
-    ) -> Result<StepNanoseconds, GpuError> {
-        Ok(self.engine.finish_with(&self.slots[slot], pending, take)?.1)
+    fn is_finished(&mut self, pending: &PendingReadback) -> bool {
+        self.engine.is_finished(pending)
+    }
+
+    fn finish(&mut self, slot: usize, pending: PendingReadback) -> Result<(SharedNumbers, StepNanoseconds), GpuError> {
+        self.engine.finish_shared(&mut self.slots[slot], pending, &self.staging)
     }
 
     fn free(&mut self, slot: usize) {
@@ -98,6 +118,7 @@ impl MeshEngine for GpuMeshEngine {
 
     fn reopen(&mut self) -> Result<(), GpuError> {
         self.slots = Default::default();
+        self.staging = Arc::new(self.staging.successor());
         self.engine = open(&self.request)?;
         Ok(())
     }

@@ -3,7 +3,7 @@
 use crate::geometry::Site;
 use crate::gpu::buffer_id::BufferId::{Claims, Decisions, Marks, Records, Sites};
 use crate::gpu::flip_marks::FlipMarks;
-use crate::gpu::steps::{GpuCommand, GpuStep, Recording, ShaderProgram, line, program};
+use crate::gpu::recording::{GpuCommand, GpuStep, Recording, ShaderProgram, line, program};
 
 const DECIDE: ShaderProgram = program!("decide", uses "predicates", "decide", &[(1, Sites), (2, Decisions)]);
 const CLAIM: ShaderProgram =

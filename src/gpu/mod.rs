@@ -1,11 +1,10 @@
 //! Steps G1 to G6 on a GPU, with wgpu: Vulkan, Metal or DX12.
 //!
 //! `shaders/` has one WGSL file per step, and [`twins`] has a plain loop for each that gives the same numbers bit for bit.
-//! [`steps`] and [`atlas_steps`] record which dispatches a step consists of, [`engine`] runs recordings on a device, and [`executor`] gets
+//! [`steps`] records which dispatches a step consists of, [`engine`] runs such a [`recording`] on a device, and [`executor`] gets
 //! the meshes of leaves from a thread of its own, many leaves at a time. Room `voronoi` completes these meshes and proves them.
 
 pub mod atlas;
-pub mod atlas_steps;
 pub mod benefit;
 pub mod buffer_id;
 pub mod buffers;
@@ -22,9 +21,13 @@ pub mod leaf_flags;
 pub mod mesh_engine;
 pub mod mesh_steps;
 pub mod options;
+mod passes;
+pub mod recording;
 pub mod returned;
 pub mod selftest;
+mod staging;
 pub mod steps;
 pub mod texture_size;
 pub mod timestamps;
 pub mod twins;
+mod upload;

@@ -1,8 +1,8 @@
 //! What comes back from an atlas, and how the CPU finds the part of each leaf in it.
 
-use crate::gpu::atlas::Atlas;
+use crate::gpu::atlas::{Atlas, AtlasLeaf};
 use crate::gpu::leaf_flags::TOO_MANY_TRIANGLES;
-use crate::voronoi::mesh_reply::{MadeMesh, MeshReply};
+use crate::voronoi::mesh_reply::{MadeMesh, MeshReply, SharedNumbers};
 use std::ops::Range;
 
 /// Where everything lies among the numbers that come back.
@@ -76,12 +76,27 @@ impl<'a> ReturnedAtlas<'a> {
 
     /// Returns leaf number `leaf`, or `None` if the device tells nonsense about it.
     pub fn leaf(&self, leaf: usize) -> Option<ReturnedLeaf<'a>> {
+        let place = self.place(leaf)?;
+        let part = |range: &Range<usize>| self.numbers.get(range.clone());
+        Some(ReturnedLeaf {
+            flags: place.flags,
+            records: part(&place.records)?,
+            unfinished: part(&place.unfinished)?,
+            missing: part(&place.missing)?,
+            block_starts: part(&place.block_starts)?,
+            blocks_x: place.blocks_x,
+        })
+    }
+
+    /// Returns where leaf number `leaf` lies, or `None` if the device tells nonsense about it.
+    fn place(&self, leaf: usize) -> Option<PlaceOfLeaf> {
         let layout = ReturnedLayout::of(self.atlas);
         let place = self.atlas.leaves.get(leaf)?;
         let part = |section: &Range<usize>, first: usize, length: usize| {
-            self.numbers.get(section.start + first..section.start + first + length)
+            let range = section.start + first..section.start + first + length;
+            (range.end <= section.end).then_some(range)
         };
-        let &[triangles, flags] = part(&layout.leaves, 2 * leaf, 2)? else { return None };
+        let &[triangles, flags] = self.numbers.get(part(&layout.leaves, 2 * leaf, 2)?)? else { return None };
         let count = if flags & TOO_MANY_TRIANGLES == 0 { triangles as usize } else { 0 };
         if count > place.records() as usize {
             return None;
@@ -89,7 +104,7 @@ impl<'a> ReturnedAtlas<'a> {
         let first_record = place.first_record as usize;
         let blocks = (place.blocks_x() * place.blocks_y()) as usize;
         let missing = part(&layout.missing, first_word(place.first_site, leaf), (place.sites as usize).div_ceil(32))?;
-        Some(ReturnedLeaf {
+        Some(PlaceOfLeaf {
             flags,
             records: part(&layout.records, 8 * first_record, 8 * count)?,
             unfinished: part(&layout.unfinished, first_record / 32, count.div_ceil(32))?,
@@ -98,29 +113,39 @@ impl<'a> ReturnedAtlas<'a> {
             blocks_x: place.blocks_x(),
         })
     }
+}
 
-    /// Returns the answer for leaf number `leaf`: a copy of its part.
-    pub fn reply(&self, leaf: usize) -> MeshReply {
-        let (Some(&place), Some(back)) = (self.atlas.leaves.get(leaf), self.leaf(leaf)) else {
-            return MeshReply::Flagged;
-        };
-        match back.flags {
-            0 => MeshReply::Made(MadeMesh {
-                records: back.records.to_vec(),
-                missing: back.missing.to_vec(),
-                unfinished: back.unfinished.to_vec(),
-                block_starts: back.block_starts.to_vec(),
-                block_of: Box::new(move |site| place.block_of(site)),
-            }),
-            _ => MeshReply::Flagged,
-        }
-    }
+/// What the device says of a leaf, and where its parts lie among the numbers that came back.
+struct PlaceOfLeaf {
+    flags: u32,
+    records: Range<usize>,
+    unfinished: Range<usize>,
+    missing: Range<usize>,
+    block_starts: Range<usize>,
+    blocks_x: u32,
+}
+
+/// Returns the answer for every leaf of `atlas`, of which `numbers` came back.
+pub fn replies(atlas: &Atlas, numbers: &SharedNumbers) -> Vec<MeshReply> {
+    let returned = ReturnedAtlas::new(atlas, (**numbers).as_ref());
+    let reply = |(i, leaf): (usize, &AtlasLeaf)| match returned.and_then(|returned| returned.place(i)) {
+        Some(place) if place.flags == 0 => made(place, *leaf, numbers),
+        _ => MeshReply::Flagged,
+    };
+    atlas.leaves.iter().enumerate().map(reply).collect()
+}
+
+fn made(place: PlaceOfLeaf, leaf: AtlasLeaf, numbers: &SharedNumbers) -> MeshReply {
+    let PlaceOfLeaf { records, unfinished, missing, block_starts, .. } = place;
+    let block_of = Box::new(move |site| leaf.block_of(site));
+    MeshReply::Made(MadeMesh { numbers: numbers.clone(), records, missing, unfinished, block_starts, block_of })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::voronoi::texture_request::TextureRequest;
+    use std::sync::Arc;
 
     #[test]
     fn parts_of_leaves_do_not_overlap() {
@@ -164,8 +189,8 @@ mod tests {
         numbers[layout.leaves.start + 1] = TOO_MANY_TRIANGLES;
         assert_eq!(leaf(&numbers), Some(0));
         let is_made = |numbers: &[u32]| {
-            let reply = ReturnedAtlas::new(&atlas, numbers).unwrap().reply(0);
-            matches!(reply, MeshReply::Made(made) if made.records.len() == 8)
+            let shared: SharedNumbers = Arc::new(numbers.to_vec());
+            matches!(&replies(&atlas, &shared)[..], [MeshReply::Made(made)] if made.records.len() == 8)
         };
         assert!(!is_made(&numbers));
         (numbers[layout.leaves.start], numbers[layout.leaves.start + 1]) = (1, 0);

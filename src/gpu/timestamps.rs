@@ -1,15 +1,15 @@
-//! The time that each step takes on the GPU itself: timestamps at its first and last dispatch, on adapters that have them.
+//! The time that each step takes on the GPU itself: timestamps where its first pass begins and its last one ends, on adapters that have them.
 
 use crate::gpu::device::Device;
 use crate::gpu::error::GpuError;
-use crate::gpu::steps::{GpuCommand, GpuStep, Recording};
+use crate::gpu::recording::GpuStep;
 use wgpu::{BufferUsages, CommandEncoder, ComputePassTimestampWrites, Features, QuerySet, QueryType};
 
 /// The nanoseconds that each [`GpuStep`] took, in the order of the steps; 0 for steps that did not run.
 pub type StepNanoseconds = [u64; GpuStep::ALL.len()];
 
 /// Two timestamps per step.
-const STAMPS: u32 = 2 * GpuStep::ALL.len() as u32;
+pub(super) const STAMPS: u32 = 2 * GpuStep::ALL.len() as u32;
 /// Bytes of all timestamps.
 pub(super) const STAMP_BYTES: u64 = 8 * STAMPS as u64;
 
@@ -41,9 +41,9 @@ impl GpuTimestamps {
         })
     }
 
-    /// Returns the timestamps that a dispatch with these `marks` writes.
-    pub(super) fn writes(&self, marks: DispatchMarks) -> Option<ComputePassTimestampWrites<'_>> {
-        let DispatchMarks { begin, end } = marks;
+    /// Returns the timestamps that a pass with these `marks` writes.
+    pub(super) fn writes(&self, marks: PassMarks) -> Option<ComputePassTimestampWrites<'_>> {
+        let PassMarks { begin, end } = marks;
         let write = || ComputePassTimestampWrites {
             query_set: &self.stamps,
             beginning_of_pass_write_index: begin,
@@ -73,59 +73,21 @@ impl GpuTimestamps {
     }
 }
 
-/// The indices of the timestamps that a dispatch writes.
+/// The indices of the timestamps that a pass writes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct DispatchMarks {
-    begin: Option<u32>,
-    end: Option<u32>,
+pub(super) struct PassMarks {
+    pub(super) begin: Option<u32>,
+    pub(super) end: Option<u32>,
 }
 
-/// Returns the marks of every dispatch of `recording`, and the steps that have dispatches.
-pub(super) fn marks(recording: &Recording) -> (Vec<DispatchMarks>, Vec<GpuStep>) {
-    let (mut marks, mut steps): (Vec<DispatchMarks>, Vec<GpuStep>) = (Vec::new(), Vec::new());
-    let mut current = None;
-    let end = |marks: &mut Vec<DispatchMarks>, step: GpuStep| {
-        if let Some(last) = marks.last_mut() {
-            last.end = Some(2 * step as u32 + 1);
-        }
-    };
-    for command in &recording.commands {
-        match command {
-            GpuCommand::Step(step) => current = Some(*step),
-            GpuCommand::Run(..) => {
-                let before = steps.last().copied();
-                let begins = current.filter(|&step| before != Some(step));
-                if let Some(step) = begins {
-                    before.into_iter().for_each(|before| end(&mut marks, before));
-                    steps.push(step);
-                }
-                marks.push(DispatchMarks { begin: begins.map(|step| 2 * step as u32), end: None });
-            }
-            _ => {}
-        }
+impl PassMarks {
+    /// Marks the pass as the first one of `step`.
+    pub(super) fn begin(&mut self, step: GpuStep) {
+        self.begin = Some(2 * step as u32);
     }
-    steps.last().copied().into_iter().for_each(|last| end(&mut marks, last));
-    (marks, steps)
-}
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::gpu::atlas::Atlas;
-    use crate::gpu::options::VoronoiMethod;
-    use crate::voronoi::texture_request::TextureRequest;
-
-    #[test]
-    fn every_step_begins_and_ends_once() {
-        let (mut atlas, sites) = (Atlas::default(), [[0, 0], [9, 0], [0, 9], [i32::MIN, 0]]);
-        assert!(atlas.add(&sites[..3], &TextureRequest::default(), 1 << 20));
-        let recording = Recording::mesh(&atlas, &sites, VoronoiMethod::Jfa);
-        let (marks, steps) = marks(&recording);
-        assert_eq!(steps, GpuStep::ALL);
-        let begins: Vec<u32> = marks.iter().filter_map(|m| m.begin).collect();
-        let ends: Vec<u32> = marks.iter().filter_map(|m| m.end).collect();
-        let stamps = 0..STAMPS;
-        assert!(begins.into_iter().eq(stamps.clone().step_by(2)) && ends.into_iter().eq(stamps.skip(1).step_by(2)));
-        assert_eq!((marks[0].begin, marks.last().unwrap().end), (Some(0), Some(STAMPS - 1)));
+    /// Marks the pass as the last one of `step`.
+    pub(super) fn end(&mut self, step: GpuStep) {
+        self.end = Some(2 * step as u32 + 1);
     }
 }

@@ -103,14 +103,14 @@ impl Triangulator {
         }
     }
 
-    /// Returns the name of the GPU that helps.
+    /// Returns the name of the GPU that helps, once it is open.
     pub fn gpu(&self) -> Option<&str> {
-        self.gpu.as_ref().map(|gpu| gpu.adapter.as_str())
+        self.gpu.as_ref().and_then(Executor::adapter)
     }
 
     /// Returns what the GPU did so far; `None` without one.
     pub fn gpu_figures(&self) -> Option<GpuFigures> {
-        self.gpu.as_ref().map(Executor::figures)
+        self.gpu.as_ref().filter(|gpu| gpu.adapter().is_some()).map(Executor::figures)
     }
 
     /// Returns the seconds that every step has taken on the GPU itself; nothing if the GPU has no timestamps.

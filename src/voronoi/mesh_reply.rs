@@ -2,29 +2,38 @@
 
 use crate::geometry::Site;
 use crate::voronoi::device_mesh::DeviceMesh;
+use std::ops::Range;
+use std::sync::Arc;
 
-/// The mesh that a device has made of a leaf; see [`DeviceMesh`].
+/// Numbers that came back from a device. The leaves of an atlas share them.
+pub type SharedNumbers = Arc<dyn AsRef<[u32]> + Send + Sync>;
+
+/// The mesh that a device has made of a leaf: where its parts lie among the numbers that came back; see [`DeviceMesh`].
 pub struct MadeMesh {
+    /// What came back, with that of other leaves.
+    pub numbers: SharedNumbers,
     /// Eight numbers for each triangle.
-    pub records: Vec<u32>,
+    pub records: Range<usize>,
     /// A bit for each site that is not in the mesh.
-    pub missing: Vec<u32>,
+    pub missing: Range<usize>,
     /// A bit for each record that the device has not finished.
-    pub unfinished: Vec<u32>,
+    pub unfinished: Range<usize>,
     /// The first record of each block of pixels.
-    pub block_starts: Vec<u32>,
+    pub block_starts: Range<usize>,
     /// Returns the number of the block that a site belongs to.
     pub block_of: Box<dyn Fn(Site) -> u32 + Send>,
 }
 
 impl MadeMesh {
-    /// Returns the mesh as the steps on the CPU read it.
+    /// Returns the mesh as the steps on the CPU read it. A part that did not come back is empty.
     pub(super) fn lend(&self) -> DeviceMesh<'_> {
+        let numbers = (*self.numbers).as_ref();
+        let part = |range: &Range<usize>| numbers.get(range.clone()).unwrap_or_default();
         DeviceMesh {
-            records: &self.records,
-            missing: &self.missing,
-            unfinished: &self.unfinished,
-            block_starts: &self.block_starts,
+            records: part(&self.records),
+            missing: part(&self.missing),
+            unfinished: part(&self.unfinished),
+            block_starts: part(&self.block_starts),
             block_of: &self.block_of,
         }
     }

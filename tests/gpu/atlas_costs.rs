@@ -6,8 +6,8 @@ use super::placed::{PlacedAtlas, recorded};
 use super::rig::Rig;
 use gdt_batch::geometry::Site;
 use gdt_batch::gpu::mesh_steps::FLIP_ROUNDS;
+use gdt_batch::gpu::recording::{GpuCommand, Recording};
 use gdt_batch::gpu::returned::{ReturnedAtlas, ReturnedLayout};
-use gdt_batch::gpu::steps::{GpuCommand, Recording};
 use gdt_batch::gpu::twins::atlas::make_triangles;
 use gdt_batch::gpu::twins::c4_flip::{FlipState, flip_round};
 

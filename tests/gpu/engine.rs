@@ -8,10 +8,13 @@ use gdt_batch::gpu::device::AdapterRequest;
 use gdt_batch::gpu::filled_atlas::{AtlasLimits, FilledAtlas, MAX_PIXELS};
 use gdt_batch::gpu::mesh_engine::{GpuMeshEngine, MAX_IN_FLIGHT, MeshEngine};
 use gdt_batch::gpu::options::VoronoiMethod;
+use gdt_batch::gpu::recording::{GpuCommand, GpuStep, Recording};
 use gdt_batch::gpu::returned::ReturnedAtlas;
-use gdt_batch::gpu::steps::{GpuCommand, GpuStep, Recording};
 use gdt_batch::gpu::twins;
 use gdt_batch::voronoi::texture_request::TextureResolution;
+
+/// What comes back may stay in buffers of so many bytes: enough for some atlases of these tests, but not for all.
+const LENT: u64 = 1 << 20;
 
 /// Returns an atlas of these leaves, in textures of so many pixels a site.
 fn filled<'a>(leaves: impl IntoIterator<Item = &'a [Site]>, pixels_per_site: f64, limits: AtlasLimits) -> FilledAtlas {
@@ -35,7 +38,7 @@ fn three_atlases_in_flight_are_those_of_the_twins() {
         return;
     }
     for method in [VoronoiMethod::Exact, VoronoiMethod::Jfa] {
-        let mut engine = GpuMeshEngine::open(AdapterRequest::new(None, true), method).expect("the adapter opens");
+        let mut engine = GpuMeshEngine::open(AdapterRequest::new(None, true), method, LENT).expect("the adapter opens");
         let limits = AtlasLimits::of(&engine.device().limits);
         let mut random = Random(3);
         let leaves: Vec<Vec<Site>> =
@@ -49,10 +52,9 @@ fn three_atlases_in_flight_are_those_of_the_twins() {
             let started = atlases.iter().enumerate().map(|(slot, atlas)| engine.start(slot, atlas));
             let pending: Vec<_> = started.collect::<Result<_, _>>().expect("the steps run");
             for (slot, (atlas, pending)) in atlases.iter().zip(pending).enumerate() {
-                let mut returned = Vec::new();
-                let times = engine.finish(slot, pending, &mut |numbers| returned = numbers.to_vec());
-                assert!(returned == twins::atlas::mesh(&atlas.atlas, &atlas.sites, method), "{method:?}, slot {slot}");
-                let times = times.expect("they come back");
+                let (returned, times) = engine.finish(slot, pending).expect("they come back");
+                let expected = twins::atlas::mesh(&atlas.atlas, &atlas.sites, method);
+                assert!((*returned).as_ref() == expected, "{method:?}, slot {slot}");
                 assert!(times.iter().all(|&time| time == 0) || times[GpuStep::Flips as usize] > 0, "{times:?}");
             }
         }
@@ -86,12 +88,11 @@ fn an_atlas_is_few_dispatches_and_few_bytes() {
 fn the_engine_leaves_little_of_real_terrain() {
     let (Some(_), Some(cloud)) = (Rig::new(), real_cloud()) else { return };
     let request = AdapterRequest::new(None, true);
-    let mut engine = GpuMeshEngine::open(request, VoronoiMethod::Auto).expect("the adapter opens");
+    let mut engine = GpuMeshEngine::open(request, VoronoiMethod::Auto, LENT).expect("the adapter opens");
     let atlas = filled(cloud.sites.chunks(10_000), 16.0, AtlasLimits::of(&engine.device().limits));
     let pending = engine.start(0, &atlas).expect("the steps run");
-    let mut returned = Vec::new();
-    engine.finish(0, pending, &mut |numbers| returned = numbers.to_vec()).expect("they come back");
-    let returned = ReturnedAtlas::new(&atlas.atlas, &returned).expect("all numbers came back");
+    let (returned, _) = engine.finish(0, pending).expect("they come back");
+    let returned = ReturnedAtlas::new(&atlas.atlas, (*returned).as_ref()).expect("all numbers came back");
     let mut exceptions = 0;
     for leaf in 0..atlas.atlas.leaves.len() {
         let leaf = returned.leaf(leaf).expect("it came back");

@@ -5,7 +5,7 @@ use super::rig::Rig;
 use gdt_batch::geometry::Site;
 use gdt_batch::gpu::buffer_id::BufferId;
 use gdt_batch::gpu::error::GpuError;
-use gdt_batch::gpu::steps::{GpuCommand, Recording};
+use gdt_batch::gpu::recording::{GpuCommand, Recording};
 
 /// An atlas of one triangle.
 fn small() -> PlacedAtlas {

@@ -8,7 +8,7 @@ use gdt_batch::geometry::Site;
 use gdt_batch::geometry::predicates::{in_circle, orient2d};
 use gdt_batch::gpu::buffer_id::BufferId;
 use gdt_batch::gpu::mesh_steps::FLIP_ROUNDS;
-use gdt_batch::gpu::steps::{GpuCommand, Recording};
+use gdt_batch::gpu::recording::{GpuCommand, Recording};
 use gdt_batch::gpu::twins::c4_flip::{AT_INFINITY, FlipState, flip_round};
 use std::collections::BTreeSet;
 

@@ -6,17 +6,18 @@ use super::rig::Rig;
 use gdt_batch::geometry::Site;
 use gdt_batch::gpu::filled_atlas::{AtlasLimits, FilledAtlas};
 use gdt_batch::gpu::options::{GpuOptions, TextureSide, VoronoiMethod};
-use gdt_batch::gpu::returned::ReturnedAtlas;
+use gdt_batch::gpu::returned::replies;
 use gdt_batch::gpu::twins;
 use gdt_batch::job::{self, progress::stage::ProgressOutput};
 use gdt_batch::mesh::half_edge::HalfEdgeMesh;
 use gdt_batch::triangulation::options::{Backend, TriangulationOptions};
 use gdt_batch::triangulation::{TriangulationCounts, Triangulator, canonical};
 use gdt_batch::verify::verify;
-use gdt_batch::voronoi::mesh_reply::{MadeMesh, MeshReply};
+use gdt_batch::voronoi::mesh_reply::{MadeMesh, MeshReply, SharedNumbers};
 use gdt_batch::voronoi::texture_request::TextureResolution;
 use gdt_batch::voronoi::{self, PipelineBuffers};
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 const MEMORY: u64 = 1 << 30;
 
@@ -112,7 +113,8 @@ fn reply(sites: &[Site]) -> MeshReply {
     let limits = AtlasLimits { pixels: 1 << 24, bytes: 1 << 27 };
     assert!(filled.add(sites, TextureResolution::PixelsPerSite(16.0), limits));
     let numbers = twins::atlas::mesh(&filled.atlas, &filled.sites, VoronoiMethod::Exact);
-    ReturnedAtlas::new(&filled.atlas, &numbers).expect("all numbers came back").reply(0)
+    let numbers: SharedNumbers = Arc::new(numbers);
+    replies(&filled.atlas, &numbers).remove(0)
 }
 
 /// Returns the answer of a device, once `spoil` has spoilt the mesh.
@@ -126,6 +128,15 @@ fn spoilt(sites: &[Site], spoil: impl FnOnce(&mut MadeMesh)) -> MeshReply {
     }
 }
 
+/// Returns the answer of a device, once `spoil` has spoilt the records of the triangles.
+fn spoilt_records(sites: &[Site], spoil: impl FnOnce(&mut [u32])) -> MeshReply {
+    spoilt(sites, |made| {
+        let mut numbers = (*made.numbers).as_ref().to_vec();
+        spoil(&mut numbers[made.records.clone()]);
+        made.numbers = Arc::new(numbers);
+    })
+}
+
 /// A leaf is done without the device if its answer is of no use.
 #[test]
 fn a_wrong_answer_never_makes_a_wrong_mesh() {
@@ -135,9 +146,10 @@ fn a_wrong_answer_never_makes_a_wrong_mesh() {
         ("as it is", 1, reply(&sites)),
         ("flagged", 0, MeshReply::Flagged),
         ("none", 0, MeshReply::Unavailable),
-        ("no record", 0, spoilt(&sites, |made| made.records.clear())),
-        ("zeros", 0, spoilt(&sites, |made| made.records.fill(0))),
-        ("reversed", 0, spoilt(&sites, |made| made.records.reverse())),
+        ("no record", 0, spoilt(&sites, |made| made.records = 0..0)),
+        ("fewer numbers than records", 0, spoilt(&sites, |made| made.numbers = Arc::new(vec![0; 8]))),
+        ("zeros", 0, spoilt_records(&sites, |records| records.fill(0))),
+        ("reversed", 0, spoilt_records(&sites, |records| records.reverse())),
         ("of other sites", 0, reply(&inputs()[1].1)),
         ("no block known", 1, spoilt(&sites, |made| made.block_of = Box::new(|_| u32::MAX))),
     ];

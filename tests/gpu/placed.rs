@@ -4,7 +4,7 @@ use gdt_batch::geometry::Site;
 use gdt_batch::gpu::atlas::Atlas;
 use gdt_batch::gpu::buffer_id::BufferId;
 use gdt_batch::gpu::options::VoronoiMethod;
-use gdt_batch::gpu::steps::{GpuCommand, Recording};
+use gdt_batch::gpu::recording::{GpuCommand, Recording};
 use gdt_batch::gpu::twins::atlas::AtlasDiagram;
 use gdt_batch::gpu::twins::{self, c4_flip::AT_INFINITY};
 use gdt_batch::voronoi::texture_request::{TextureRequest, TextureResolution};

@@ -6,7 +6,7 @@ use gdt_batch::geometry::Site;
 use gdt_batch::geometry::lattice::REACH;
 use gdt_batch::geometry::predicates::{in_circle, in_circle_determinant, orient2d};
 use gdt_batch::gpu::buffer_id::BufferId;
-use gdt_batch::gpu::steps::{GpuCommand, Recording};
+use gdt_batch::gpu::recording::{GpuCommand, Recording};
 use gdt_batch::gpu::twins::predicates::decide;
 
 const QUADS: usize = 1_000_000;

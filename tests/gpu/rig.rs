@@ -6,8 +6,8 @@ use gdt_batch::gpu::device::{self, AdapterRequest, Device};
 use gdt_batch::gpu::engine::GpuEngine;
 use gdt_batch::gpu::error::GpuError;
 use gdt_batch::gpu::filled_atlas::{AtlasLimits, FilledAtlas};
+use gdt_batch::gpu::recording::Recording;
 use gdt_batch::gpu::selftest::{StepComparison, compare};
-use gdt_batch::gpu::steps::Recording;
 
 pub(crate) struct Rig {
     engine: GpuEngine,

@@ -3,7 +3,7 @@
 use gdt_batch::geometry::Site;
 use gdt_batch::gpu::atlas::Atlas;
 use gdt_batch::gpu::options::VoronoiMethod;
-use gdt_batch::gpu::steps::{GpuCommand, Recording, ShaderProgram};
+use gdt_batch::gpu::recording::{GpuCommand, Recording, ShaderProgram};
 use gdt_batch::voronoi::texture_request::{TextureRequest, TextureResolution};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

@@ -1,8 +1,8 @@
 use super::*;
-use crate::gpu::error::GpuError;
 use crate::gpu::filled_atlas::FilledAtlas;
 use crate::gpu::returned::ReturnedLayout;
 use crate::gpu::timestamps::StepNanoseconds;
+use crate::voronoi::mesh_reply::SharedNumbers;
 use std::collections::VecDeque;
 use std::sync::atomic::AtomicUsize;
 
@@ -25,7 +25,7 @@ fn leaf(x: i32) -> [Site; 3] {
 /// Returns the x by which the leaf of an answer is known.
 fn known_by(reply: &MeshReply) -> Option<u32> {
     match reply {
-        MeshReply::Made(made) => made.records.first().copied(),
+        MeshReply::Made(made) => (*made.numbers).as_ref().get(made.records.start).copied(),
         MeshReply::Flagged | MeshReply::Unavailable => None,
     }
 }
@@ -48,14 +48,13 @@ impl MeshEngine for ScriptedEngine {
         self.starts.pop_front().unwrap_or(Ok(())).map(|()| numbers_back(filled))
     }
 
-    fn finish(
-        &mut self,
-        _: usize,
-        pending: Vec<u32>,
-        take: &mut dyn FnMut(&[u32]),
-    ) -> Result<StepNanoseconds, GpuError> {
-        self.finishes.pop_front().unwrap_or(Ok(())).map(|()| take(&pending))?;
-        Ok(StepNanoseconds::default())
+    fn is_finished(&mut self, _: &Vec<u32>) -> bool {
+        true
+    }
+
+    fn finish(&mut self, _: usize, pending: Vec<u32>) -> Result<(SharedNumbers, StepNanoseconds), GpuError> {
+        self.finishes.pop_front().unwrap_or(Ok(()))?;
+        Ok((Arc::new(pending), StepNanoseconds::default()))
     }
 
     fn free(&mut self, _: usize) {}
@@ -77,8 +76,18 @@ fn executor(
     let reopens = Arc::<AtomicUsize>::default();
     let (starts, finishes) = (starts.into_iter().collect(), finishes.into_iter().collect());
     let engine = ScriptedEngine { starts, finishes, reopens: reopens.clone() };
-    let executor = Executor::on(engine, "test".into(), FINE, ROOM, GpuUse::Required).unwrap();
-    (executor, reopens)
+    (open(engine, ROOM, GpuUse::Required), reopens)
+}
+
+/// Returns an executor whose engine is open.
+fn open<E: MeshEngine + 'static>(engine: E, room: Room, gpu_use: GpuUse) -> Executor {
+    let executor =
+        Executor::on(move || Ok(Opened { engine, adapter: "test".into(), room, filling: FINE }), room, gpu_use);
+    let executor = executor.unwrap();
+    while executor.adapter().is_none() {
+        std::thread::yield_now();
+    }
+    executor
 }
 
 fn lost() -> Result<(), GpuError> {
@@ -116,16 +125,14 @@ impl MeshEngine for WaitingEngine {
         Ok(numbers_back(filled))
     }
 
-    fn finish(
-        &mut self,
-        _: usize,
-        pending: Vec<u32>,
-        take: &mut dyn FnMut(&[u32]),
-    ) -> Result<StepNanoseconds, GpuError> {
+    fn is_finished(&mut self, _: &Vec<u32>) -> bool {
+        true
+    }
+
+    fn finish(&mut self, _: usize, pending: Vec<u32>) -> Result<(SharedNumbers, StepNanoseconds), GpuError> {
         let _ = self.leaves.send(0);
         let _ = self.go.recv();
-        take(&pending);
-        Ok(StepNanoseconds::default())
+        Ok((Arc::new(pending), StepNanoseconds::default()))
     }
 
     fn free(&mut self, _: usize) {}
@@ -138,7 +145,7 @@ impl MeshEngine for WaitingEngine {
 fn waiting_executor(gpu_use: GpuUse, room: Room) -> (Executor, Sender<()>, Receiver<usize>) {
     let ((go, gone), (leaves, atlases)) = (channel(), channel());
     let engine = WaitingEngine { go: gone, leaves };
-    (Executor::on(engine, "test".into(), FINE, room, gpu_use).unwrap(), go, atlases)
+    (open(engine, room, gpu_use), go, atlases)
 }
 
 /// The mesh comes only after the other work, which only this thread can do.

@@ -8,7 +8,7 @@ use crate::gpu::error::GpuError;
 use crate::gpu::filled_atlas::FilledAtlas;
 use crate::gpu::mesh_steps::FLIP_ROUNDS;
 use crate::gpu::options::VoronoiMethod;
-use crate::gpu::steps::Recording;
+use crate::gpu::recording::Recording;
 use crate::gpu::twins::atlas::{self, AtlasDiagram, MeshOnDevice};
 use crate::gpu::twins::c4_flip::{FlipState, flip_round};
 use crate::gpu::twins::predicates::decide;

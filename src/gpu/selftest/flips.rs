@@ -6,8 +6,8 @@ use crate::gpu::buffers::BufferSet;
 use crate::gpu::engine::GpuEngine;
 use crate::gpu::error::GpuError;
 use crate::gpu::mesh_steps::FLIP_ROUNDS;
+use crate::gpu::recording::Recording;
 use crate::gpu::selftest::compare::StepComparison;
-use crate::gpu::steps::Recording;
 use crate::gpu::twins::c4_flip::{AT_INFINITY, FlipState, flip_round};
 use std::collections::HashMap;
 

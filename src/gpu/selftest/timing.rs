@@ -6,7 +6,7 @@ use crate::gpu::engine::GpuEngine;
 use crate::gpu::error::GpuError;
 use crate::gpu::filled_atlas::FilledAtlas;
 use crate::gpu::options::VoronoiMethod;
-use crate::gpu::steps::{GpuCommand, GpuStep, Recording};
+use crate::gpu::recording::{GpuCommand, GpuStep, Recording};
 use crate::gpu::timestamps::StepNanoseconds;
 use serde::Serialize;
 use std::time::Instant;

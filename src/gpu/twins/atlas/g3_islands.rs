@@ -1,7 +1,8 @@
 //! Step G3 on an atlas: the twin of `shaders/atlas/g3_islands.wgsl`. It looks at all pixels in every round, which gives the same.
 
 use crate::gpu::atlas::{Atlas, AtlasLeaf, BLOCK_SIDE};
-use crate::gpu::atlas_steps::{ATLAS_ISLAND_ROUNDS, ISLANDS_LEFT, ISLANDS_PER_BLOCK};
+use crate::gpu::leaf_flags::ISLANDS_LEFT;
+use crate::gpu::steps::{ATLAS_ISLAND_ROUNDS, ISLANDS_PER_BLOCK};
 use crate::gpu::twins::atlas::{pixels_of, size_of};
 use crate::gpu::twins::g3_islands::find;
 

@@ -1,9 +1,9 @@
 //! Step G6 in an atlas.
 
 use crate::gpu::atlas::Atlas;
-use crate::gpu::atlas_steps::{ROW_BYTES, bytes, grid, table_bytes};
 use crate::gpu::buffer_id::BufferId::{BlockStarts, Blocks, CornerRows, Flags, Labels, Leaves, Records, Texture};
-use crate::gpu::steps::{GpuCommand, GpuStep, Recording, ShaderProgram, program};
+use crate::gpu::recording::{GpuCommand, GpuStep, Recording, ShaderProgram, program};
+use crate::gpu::steps::{ROW_BYTES, bytes, grid, table_bytes};
 
 const MAKE: ShaderProgram = program!(
     "atlas/g6_triangles", uses "atlas/leaf", uses "atlas/tile", "make",

@@ -1,9 +1,9 @@
 //! Step G4 in an atlas.
 
 use crate::gpu::atlas::Atlas;
-use crate::gpu::atlas_steps::{ROW_BYTES, ROWS, bytes, grid, table_bytes};
 use crate::gpu::buffer_id::BufferId::{BlockStarts, Blocks, CornerRows, Labels, Leaves, Sites, Texture};
-use crate::gpu::steps::{GpuCommand, GpuStep, Recording, ShaderProgram, program};
+use crate::gpu::recording::{GpuCommand, GpuStep, Recording, ShaderProgram, program};
+use crate::gpu::steps::{ROW_BYTES, ROWS, bytes, grid, table_bytes};
 
 const FIND: ShaderProgram = program!(
     "atlas/g4_vertices", uses "predicates", uses "atlas/leaf", uses "atlas/tile", "find",

@@ -1,16 +1,14 @@
 //! Step G3 on an atlas.
 
 use crate::gpu::atlas::{Atlas, BLOCK_SIDE};
-use crate::gpu::atlas_steps::{BLOCK_BYTES, WORDS_BYTES, grid, pixel_bytes};
 use crate::gpu::buffer_id::BufferId::{self, Blocks, Flags, Labels, Leaves, North, South, Words};
-use crate::gpu::steps::{GpuCommand, GpuStep, Recording, ShaderProgram, program};
+use crate::gpu::recording::{GpuCommand, GpuStep, Recording, ShaderProgram, program};
+use crate::gpu::steps::{BLOCK_BYTES, WORDS_BYTES, grid, pixel_bytes};
 
 /// How often step G3 looks for islands and removes them. A leaf that has some left then goes to the CPU.
 pub const ATLAS_ISLAND_ROUNDS: u32 = 4;
 /// How many islands of a block a round removes: the first ones, row by row.
 pub(in crate::gpu) const ISLANDS_PER_BLOCK: usize = 32;
-/// The flag of a leaf that has islands left.
-pub const ISLANDS_LEFT: u32 = 1;
 
 /// The bits of the islands take turns in two buffers.
 const BITS: [BufferId; 2] = [Words, South];

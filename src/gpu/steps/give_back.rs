@@ -1,12 +1,12 @@
 //! What goes back to the CPU.
 
 use crate::gpu::atlas::Atlas;
-use crate::gpu::atlas_steps::{bytes, grid, table_bytes};
 use crate::gpu::buffer_id::BufferId::{BlockStarts, Blocks, Flags, Leaves, Marks, Missing, Records, Returned};
 use crate::gpu::flip_marks::FlipMarks;
 use crate::gpu::mesh_steps::FLIP_ROUNDS;
+use crate::gpu::recording::{GpuCommand, GpuStep, Recording, ShaderProgram, line, program};
 use crate::gpu::returned::ReturnedLayout;
-use crate::gpu::steps::{GpuCommand, GpuStep, Recording, ShaderProgram, line, program};
+use crate::gpu::steps::{bytes, grid, table_bytes};
 
 const GIVE_RECORDS: ShaderProgram =
     program!("atlas/give_back", uses "atlas/leaf", "give_records", &[(1, Leaves), (2, Records), (3, Returned)]);

@@ -1,4 +1,4 @@
-//! The steps of the paper on an atlas, as lists of dispatches like those of `steps`. No dispatch is indirect. Each declares the bytes that
+//! The steps of the paper on an atlas, as lists of dispatches. No dispatch is indirect. Each declares the bytes that
 //! it moves at the least.
 
 mod g1_write_sites;
@@ -9,14 +9,14 @@ mod g5_count;
 mod g6_triangles;
 mod give_back;
 
+pub use g3_islands::ATLAS_ISLAND_ROUNDS;
 pub(super) use g3_islands::ISLANDS_PER_BLOCK;
-pub use g3_islands::{ATLAS_ISLAND_ROUNDS, ISLANDS_LEFT};
 
 use crate::geometry::Site;
 use crate::gpu::atlas::Atlas;
 use crate::gpu::buffer_id::BufferId::{Blocks, Flags, Leaves, Sites};
 use crate::gpu::options::VoronoiMethod;
-use crate::gpu::steps::{GpuCommand, MAX_WORKGROUPS, Recording};
+use crate::gpu::recording::{GpuCommand, MAX_WORKGROUPS, Recording};
 
 /// Bytes of an entry of the table of blocks.
 const BLOCK_BYTES: u64 = 8;

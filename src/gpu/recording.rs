@@ -16,6 +16,16 @@ pub struct ShaderProgram {
     pub bindings: &'static [(u32, BufferId)],
 }
 
+/// What tells a program from all others: its file and its function.
+pub(super) type ProgramKey = (&'static str, &'static str);
+
+impl ShaderProgram {
+    /// Returns the program's key.
+    pub(super) fn key(&self) -> ProgramKey {
+        (self.file, self.entry)
+    }
+}
+
 /// Names an entry point of a shader: its file, the files that it uses if any, the function, the bindings of buffers.
 macro_rules! program {
     ($file:literal, $(uses $used:literal,)* $entry:literal, $bindings:expr) => {

@@ -1,9 +1,9 @@
 //! Step G5 in an atlas.
 
 use crate::gpu::atlas::Atlas;
-use crate::gpu::atlas_steps::{bytes, grid};
 use crate::gpu::buffer_id::BufferId::BlockStarts;
-use crate::gpu::steps::{GpuCommand, GpuStep, Recording, ShaderProgram, program};
+use crate::gpu::recording::{GpuCommand, GpuStep, Recording, ShaderProgram, program};
+use crate::gpu::steps::{bytes, grid};
 
 const SUM: ShaderProgram = program!("atlas/g5_count", "sum", &[(1, BlockStarts)]);
 const SPREAD: ShaderProgram = program!("atlas/g5_count", "spread", &[(1, BlockStarts)]);

@@ -1,10 +1,10 @@
 //! Step G2 on an atlas.
 
 use crate::gpu::atlas::{Atlas, AtlasLeaf, BLOCK_SIDE};
-use crate::gpu::atlas_steps::{BLOCK_BYTES, WORDS_BYTES, grid, pixel_bytes};
 use crate::gpu::buffer_id::BufferId::{Blocks, Flood, Labels, Leaves, North, South, Texture, Words};
 use crate::gpu::options::VoronoiMethod;
-use crate::gpu::steps::{GpuCommand, GpuStep, Recording, ShaderProgram, line, program};
+use crate::gpu::recording::{GpuCommand, GpuStep, Recording, ShaderProgram, line, program};
+use crate::gpu::steps::{BLOCK_BYTES, WORDS_BYTES, grid, pixel_bytes};
 use crate::gpu::texture_size::TextureSize;
 
 const COLUMNS: ShaderProgram = program!(

@@ -1,9 +1,9 @@
 //! Step G1 on an atlas.
 
 use crate::gpu::atlas::Atlas;
-use crate::gpu::atlas_steps::pixel_bytes;
 use crate::gpu::buffer_id::BufferId::{Leaves, Losers, Missing, Sites, Texture};
-use crate::gpu::steps::{GpuCommand, GpuStep, Recording, ShaderProgram, line, program};
+use crate::gpu::recording::{GpuCommand, GpuStep, Recording, ShaderProgram, line, program};
+use crate::gpu::steps::pixel_bytes;
 
 const WRITE: ShaderProgram =
     program!("atlas/g1_write_sites", uses "atlas/leaf", "write", &[(1, Leaves), (2, Sites), (3, Texture)]);
