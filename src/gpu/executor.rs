@@ -15,8 +15,8 @@ use crate::gpu::error::GpuError;
 #[cfg(feature = "fault-injection")]
 use crate::gpu::fake_engine::{self, FakeEngine};
 use crate::gpu::filled_atlas::{AtlasLimits, MAX_PIXELS};
-use crate::gpu::gpu_thread::{Filling, GpuState, GpuThread, MeshRequest};
-use crate::gpu::mesh_engine::{GpuMeshEngine, MeshEngine};
+use crate::gpu::gpu_thread::{Filling, GpuState, GpuThread, MANY_SITES, MeshRequest};
+use crate::gpu::mesh_engine::{GpuMeshEngine, MAX_IN_FLIGHT, MeshEngine};
 use crate::gpu::options::{GpuOptions, TextureSide};
 use crate::gpu::recording::GpuStep;
 use crate::interrupt;
@@ -47,11 +47,12 @@ const FEWEST_SITES: usize = 100;
 const FEWEST_PIXELS_PER_SITE: u64 = 4;
 /// Bytes for each site of a leaf that waits: its point, its position twice, and the device's answer.
 const BYTES_PER_WAITING_SITE: u64 = 130;
-/// So many atlases as large as may be can wait to be read, besides those in flight. Smaller ones may be more.
-const LENT_ATLASES: u64 = 2;
 /// Bytes for each byte that comes back from an atlas: three slots have a buffer each into which the device copies them, up to a quarter too
-/// large, and two more are lent to workers. What goes up takes about a quarter as much, in buffers that are up to twice too large.
-const BYTES_PER_BYTE_BACK: u64 = 8;
+/// large. What goes up takes about a quarter as much, in buffers that are up to twice too large.
+const BYTES_PER_BYTE_BACK: u64 = 6;
+/// While leaves of so many sites wait, a job that can do without the GPU asks for no more: the GPU has enough to do, and workers do leaves
+/// themselves.
+const BUSY: u64 = MAX_IN_FLIGHT as u64 * MANY_SITES as u64;
 /// While so many leaves of a thread wait, it takes on other work; then no more, because its stack ends somewhere.
 const MOST_NESTED: usize = 8;
 
@@ -122,7 +123,8 @@ impl Executor {
         let request = AdapterRequest::new(options.adapter.as_deref(), gpu_use == GpuUse::Required);
         let voronoi = options.voronoi;
         let open = move || {
-            let mut engine = GpuMeshEngine::open(request, voronoi, LENT_ATLASES * max_bytes)?;
+            // What has come back belongs to leaves that wait.
+            let mut engine = GpuMeshEngine::open(request, voronoi, memory / 2)?;
             engine.warm_up()?;
             let device = engine.device();
             let (adapter, limits) = (device.info.name.clone(), AtlasLimits::of(&device.limits));
@@ -207,7 +209,7 @@ impl Executor {
         let waiting = self.state.waiting.load(Ordering::Acquire);
         // As long as nothing is known of the device, only one leaf of a thread waits for it.
         let most = if self.state.has_answered.load(Ordering::Acquire) { MOST_NESTED } else { 1 };
-        waiting.saturating_add(sites) <= self.max_waiting && NESTED.get() < most
+        waiting.saturating_add(sites) <= self.max_waiting && waiting <= BUSY && NESTED.get() < most
     }
 
     /// Sends `sites` to the device, and waits for their mesh. Does other work of the job meanwhile.

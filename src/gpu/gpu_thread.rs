@@ -24,7 +24,7 @@ const ENOUGH_SITES: usize = 100_000;
 const SHORT: Duration = Duration::from_millis(5);
 /// An atlas takes no more leaves once it has so many sites: a large GPU is as fast with them as with ten times as many, which would only come
 /// back later, in buffers that take long to create.
-const MANY_SITES: usize = 250_000;
+pub(super) const MANY_SITES: usize = 250_000;
 /// The thread looks after an atlas, or after leaves that wait, whenever this share of the time since the start has passed.
 const LOOKS: u32 = 16;
 /// But it rests at least, and at most, for these times.

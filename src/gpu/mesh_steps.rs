@@ -1,11 +1,12 @@
-//! What needs exact predicates, as lists of dispatches like those of `steps`.
+//! What needs exact predicates, as lists of dispatches like those of `steps`; and a copy, to measure by.
 
 use crate::geometry::Site;
-use crate::gpu::buffer_id::BufferId::{Claims, Decisions, Marks, Records, Sites};
+use crate::gpu::buffer_id::BufferId::{Claims, Decisions, Flood, Labels, Marks, Records, Sites};
 use crate::gpu::flip_marks::FlipMarks;
 use crate::gpu::recording::{GpuCommand, GpuStep, Recording, ShaderProgram, line, program};
 
 const DECIDE: ShaderProgram = program!("decide", uses "predicates", "decide", &[(1, Sites), (2, Decisions)]);
+const COPY: ShaderProgram = program!("copy", "copy", &[(1, Labels), (2, Flood)]);
 const CLAIM: ShaderProgram =
     program!("c4_flip", uses "predicates", "claim", &[(1, Records), (2, Sites), (3, Claims), (4, Marks)]);
 const COMMIT: ShaderProgram =
@@ -29,6 +30,14 @@ impl Recording {
         if count > 0 {
             self.run(DECIDE, [count, invocations, 0, 0, 0], workgroups);
         }
+    }
+
+    /// Copies `bytes` bytes from the buffer of labels to that of the flood. They must be a multiple of 16.
+    pub fn copy_labels(&mut self, bytes: u64) {
+        let count = (bytes / 16) as u32;
+        let (workgroups, invocations) = line(count);
+        [Labels, Flood].into_iter().for_each(|id| self.reserve(id, bytes / 4));
+        self.run_with_traffic(COPY, [count, invocations, 0, 0, 0], workgroups, 2 * bytes);
     }
 
     /// Uploads a mesh: eight numbers for each triangle, and the site of every vertex.

@@ -16,13 +16,13 @@ pub struct ShaderProgram {
     pub bindings: &'static [(u32, BufferId)],
 }
 
-/// What tells a program from all others: its file and its function.
-pub(super) type ProgramKey = (&'static str, &'static str);
+/// What tells a program from all others: where its text is in memory, and its function. Comparing the texts themselves would take longer.
+pub(super) type ProgramKey = (usize, &'static str);
 
 impl ShaderProgram {
     /// Returns the program's key.
     pub(super) fn key(&self) -> ProgramKey {
-        (self.file, self.entry)
+        (self.source.as_ptr() as usize, self.entry)
     }
 }
 

@@ -31,6 +31,7 @@ fn recorded(voronoi: VoronoiMethod) -> Recording {
     assert!(atlas.add(&sites, &TextureRequest { resolution, max_side: 16_384, max_pixels: 1 << 24 }, 1 << 25));
     let mut recording = Recording::mesh(&atlas, &sites, voronoi);
     recording.decide(&[[[0, 0]; 4]]);
+    recording.copy_labels(16);
     recording
 }
 

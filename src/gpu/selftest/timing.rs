@@ -6,7 +6,7 @@ use crate::gpu::engine::GpuEngine;
 use crate::gpu::error::GpuError;
 use crate::gpu::filled_atlas::FilledAtlas;
 use crate::gpu::options::VoronoiMethod;
-use crate::gpu::recording::{GpuCommand, GpuStep, Recording};
+use crate::gpu::recording::{GpuStep, Recording};
 use crate::gpu::timestamps::StepNanoseconds;
 use serde::Serialize;
 use std::time::Instant;
@@ -16,7 +16,7 @@ const RUNS: usize = 3;
 /// How many bytes are copied to measure the bandwidth of memory.
 const COPY_BYTES: u64 = 64 << 20;
 /// How often a run copies them, so that the time to submit work does not count.
-const COPIES: usize = 20;
+const COPIES: u64 = 20;
 
 /// The time of one step.
 #[derive(Clone, Debug, Serialize)]
@@ -44,15 +44,13 @@ pub struct AtlasTiming {
     pub steps: Vec<TimedStep>,
 }
 
-/// Returns the bytes per second, read and written together, of a copy within the GPU's memory.
+/// Returns the bytes per second, read and written together, of a shader that copies within the GPU's memory.
 ///
 /// # Errors
 /// [`GpuError`] of the device.
 pub(super) fn copy_bandwidth(engine: &mut GpuEngine, buffers: &mut BufferSet) -> Result<f64, GpuError> {
     let mut recording = Recording::default();
-    recording.commands.extend([BufferId::Labels, BufferId::Flood].map(|id| GpuCommand::Reserve(id, COPY_BYTES)));
-    let copy = GpuCommand::Copy(BufferId::Labels, BufferId::Flood, COPY_BYTES);
-    recording.commands.extend(std::iter::repeat_n(copy, COPIES));
+    (0..COPIES).for_each(|_| recording.copy_labels(COPY_BYTES));
     let mut run = || {
         let start = Instant::now();
         let submission = engine.start(buffers, &recording)?;
@@ -62,7 +60,7 @@ pub(super) fn copy_bandwidth(engine: &mut GpuEngine, buffers: &mut BufferSet) ->
     // The first run creates the buffers.
     run()?;
     let seconds = median([run()?, run()?, run()?]);
-    Ok((2 * COPIES as u64 * COPY_BYTES) as f64 / seconds)
+    Ok((2 * COPIES * COPY_BYTES) as f64 / seconds)
 }
 
 /// Times all steps on an atlas; `bandwidth` is that of copies.
