@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::file::range::FileRange;
-use crate::input::las::catch_panic::{Panicked, catch_panic};
+use crate::catch_panic::{Panicked, catch_panic};
 use crate::input::las::chunk_table::{self, LazChunk};
 use crate::input::las::compression::LazCompression;
 use crate::input::las::header::LasHeader;

@@ -25,6 +25,8 @@ pub struct SideFiles<'a> {
     pub one_file: bool,
     /// Whether there is to be a page that shows the terrain.
     pub page: bool,
+    /// Whose the data are, if the user says.
+    pub copyright: Option<&'a str>,
 }
 
 /// Writes the files beside the tiles and returns the number of their bytes.
@@ -44,7 +46,7 @@ pub fn write_side_files(
         write_pending(&output.preview(), &draw_preview(canvas, tiles)?)?,
     ];
     if let Some((frame, root)) = &content.tileset {
-        files.extend(pending_tilesets(directory, frame, root)?);
+        files.extend(pending_tilesets(directory, frame, root, content.copyright)?);
     }
     if content.page {
         let opened = if content.tileset.is_some() { output.tileset() } else { output.terrain() };
@@ -58,7 +60,7 @@ pub fn write_side_files(
             paths.extend(written(output.tile(tile.number()))?);
             Ok(())
         })?;
-        write_terrain(&partial_path(&output.terrain()), &paths)?;
+        write_terrain(&partial_path(&output.terrain()), &paths, content.copyright)?;
         files.push(find_pending(&output.terrain())?);
     }
     let bytes = files.iter().map(|file| file.bytes).sum();
@@ -66,9 +68,14 @@ pub fn write_side_files(
 }
 
 /// Writes `tileset.json` and the external tilesets.
-fn pending_tilesets(directory: &JobDirectory, frame: &Frame, root: &TilesetNode) -> Result<Vec<PendingFile>> {
+fn pending_tilesets(
+    directory: &JobDirectory,
+    frame: &Frame,
+    root: &TilesetNode,
+    copyright: Option<&str>,
+) -> Result<Vec<PendingFile>> {
     let (output, mut files) = (directory.output(), Vec::new());
-    write_tilesets(frame, root, |number, text| {
+    write_tilesets(frame, root, copyright, |number, text| {
         let path = number.map_or_else(|| output.tileset(), |number| output.external_tileset(number));
         create_folder_of(&path)?;
         files.push(write_pending(&path, text.as_bytes())?);

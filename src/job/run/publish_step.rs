@@ -127,6 +127,7 @@ pub(crate) fn publish(
         tileset: text,
         one_file: fits && output.format != OutputFormat::Tiles3d,
         page: output.page,
+        copyright: output.copyright(),
     };
     if content.one_file {
         // terrain.glb is made from the tiles, which must have their names.
