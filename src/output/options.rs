@@ -1,6 +1,7 @@
 //! The options of `[output]`.
 
 use crate::output::compression::{Compression, CompressionChoice};
+use crate::output::geoid::option::HeightOffset;
 use crate::output::page::{NOT_BUILT_IN, is_built_in};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -27,9 +28,9 @@ pub struct OutputOptions {
     /// The most sites in a coarser tile.
     #[serde(default, alias = "level_sites")]
     pub max_points_per_level_tile: MaxPointsPerLevelTile,
-    /// Metres to add to heights so that they count from the ellipsoid, where 3D Tiles are placed on the globe.
-    #[serde(default)]
-    pub height_offset: f64,
+    /// What to add to heights so that they count from the ellipsoid, where 3D Tiles are placed on the globe.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub height_offset: Option<HeightOffset>,
     /// How tiles are packed.
     #[serde(default)]
     pub compression: CompressionChoice,

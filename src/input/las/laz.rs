@@ -9,9 +9,9 @@ use laz::record::RecordDecompressor;
 use laz::{DecompressionSelection, LazVlr};
 use serde::{Deserialize, Serialize};
 
+use crate::catch_panic::{Panicked, catch_panic};
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::file::range::FileRange;
-use crate::catch_panic::{Panicked, catch_panic};
 use crate::input::las::chunk_table::{self, LazChunk};
 use crate::input::las::compression::LazCompression;
 use crate::input::las::header::LasHeader;

@@ -10,6 +10,8 @@ use crate::output::frame::Frame;
 use crate::output::gltf::one_file::write_terrain;
 use crate::output::page::page_for;
 use crate::output::preview::canvas::{Canvas, PreviewPixel};
+use crate::output::preview::layout::world_file;
+use crate::output::preview::panel::Legend;
 use crate::output::preview::picture::Picture;
 use crate::output::tiles3d::tileset::{TilesetNode, write_tilesets};
 use crate::{Error, Result, disk};
@@ -27,6 +29,8 @@ pub struct SideFiles<'a> {
     pub page: bool,
     /// Whose the data are, if the user says.
     pub copyright: Option<&'a str>,
+    /// Whether colours stand for heights in the preview.
+    pub has_ramp: bool,
 }
 
 /// Writes the files beside the tiles and returns the number of their bytes.
@@ -43,7 +47,8 @@ pub fn write_side_files(
     let output = directory.output();
     let mut files = vec![
         write_pending(&output.georeference(), content.georeference.as_bytes())?,
-        write_pending(&output.preview(), &draw_preview(canvas, tiles)?)?,
+        write_pending(&output.preview(), &draw_preview(canvas, content.has_ramp, tiles)?)?,
+        write_pending(&output.preview_world(), world_file(canvas).as_bytes())?,
     ];
     if let Some((frame, root)) = &content.tileset {
         files.extend(pending_tilesets(directory, frame, root, content.copyright)?);
@@ -108,11 +113,11 @@ impl EachTile for StoredTiles<'_> {
 }
 
 /// Returns the preview as PNG.
-fn draw_preview(canvas: &Canvas, tiles: &dyn EachTile) -> Result<Vec<u8>> {
+fn draw_preview(canvas: &Canvas, has_ramp: bool, tiles: &dyn EachTile) -> Result<Vec<u8>> {
     let mut picture = Picture::new(canvas);
     tiles.visit(&mut |store, tile| {
-        picture.add(tile.0, &ColumnReader::open(store, StepRecord::Pixels(tile))?.column::<PreviewPixel>()?);
+        picture.add(&ColumnReader::open(store, StepRecord::Pixels(tile))?.column::<PreviewPixel>()?);
         Ok(())
     })?;
-    picture.png()
+    picture.png(&Legend::new(canvas, has_ramp))
 }

@@ -80,6 +80,35 @@ impl Canvas {
         [self.width, self.height]
     }
 
+    /// Returns the way from the lattice to the source.
+    pub fn frame(&self) -> &Frame {
+        &self.frame
+    }
+
+    /// Returns what the ramp of heights spans.
+    pub fn heights(&self) -> HeightRange {
+        self.heights
+    }
+
+    /// Returns the side of a pixel in source units.
+    pub fn pixel_size(&self) -> f64 {
+        self.steps(self.pitch) * self.frame.extras().resolution
+    }
+
+    /// Returns the source's x and y in the middle of the pixel in the north-western corner.
+    pub fn first_pixel(&self) -> [f64; 2] {
+        let (extras, corner) =
+            (self.frame.extras(), self.frame.world([self.corner[0] as i32, self.corner[1] as i32, 0]));
+        let inside = self.steps(self.center) * extras.resolution;
+        let [east, north] = [corner[0], -corner[2]].map(|metres| metres / extras.metres_per_unit);
+        [extras.offset[0] + east + inside, extras.offset[1] + north - inside]
+    }
+
+    /// Returns subdivisions as lattice steps.
+    fn steps(&self, subdivisions: i64) -> f64 {
+        subdivisions as f64 / (1u64 << self.shift) as f64
+    }
+
     /// Returns the pixels whose centres the triangles of `tile` cover.
     ///
     /// # Errors
