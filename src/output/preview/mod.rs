@@ -4,4 +4,5 @@ pub mod canvas;
 pub mod layout;
 pub mod panel;
 pub mod picture;
+mod sliver;
 mod strokes;
