@@ -13,6 +13,7 @@ pub(super) const LEAST_WIDTH: usize = 480;
 /// The colours of the strip and of what is drawn on it, in sRGB.
 const PAPER: [u8; 3] = [250, 250, 247];
 const INK: [u8; 3] = [48, 50, 54];
+const FRAME: [u8; 3] = [168, 168, 166];
 
 /// From the sides of the strip to what is drawn on it.
 const MARGIN: f32 = 20.0;
@@ -89,6 +90,10 @@ impl Legend {
             // From one height to the other, a thin line.
             false => INK,
         };
+        if self.has_ramp {
+            // The last colours are nearly those of the paper.
+            strip.fill([left as usize - 1, BAR_TOP - 1], [RAMP + 2, BAR_HEIGHT + 2], |_| FRAME);
+        }
         let (top, height) = if self.has_ramp { (BAR_TOP, BAR_HEIGHT) } else { (BAR_TOP + BAR_HEIGHT / 2, 2) };
         strip.fill([left as usize, top], [RAMP, height], color);
         if !self.has_ramp {
