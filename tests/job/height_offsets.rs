@@ -153,3 +153,18 @@ fn heights_that_may_count_from_the_sea_are_warned_of_once_they_are_on_the_globe(
     let nowhere = write(folder.path(), "nowhere.las", &[]);
     assert!(!warnings(&Job::on(&[&nowhere]).report()).contains("height_offset"));
 }
+
+/// A grid counts by what it holds, wherever it lies.
+#[test]
+fn another_grid_makes_another_job_and_another_place_does_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = cloud(folder.path(), &square(10, 500.0, [0.0; 2]));
+    let identity = |name: &str, height: f64| {
+        let job = Job::on(&[&cloud]).with("output", &format!("height_offset = \"{name}\""));
+        write_grid(&job.folder().join(name), |_, _| height);
+        job.report()["options_fingerprint"].to_string()
+    };
+    let first = identity("a.gtx", 12.0);
+    assert_eq!(first, identity("b.gtx", 12.0));
+    assert_ne!(first, identity("a.gtx", 13.0));
+}
