@@ -128,7 +128,7 @@ fn as_proj_packs_it(heights: &[f32]) -> Vec<u8> {
 fn written(name: &str, bytes: &[u8]) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
-    std::fs::write(&path, bytes).unwrap();
+    crate::disk::create(&path).unwrap().write_all(bytes).unwrap();
     (folder, path)
 }
 
