@@ -12,6 +12,7 @@ Examples:
   gdt-batch sample terrain.laz          write a sample terrain to try things on
   gdt-batch configs/quickstart.toml     run a job
   gdt-batch check job.toml              what would the job read, how large is it, does it fit?
+  gdt-batch info --histogram a.laz      what does a cloud hold, class by class?
   gdt-batch view out                    look at the terrain in a browser
   gdt-batch verify out                  prove that the tiles in out are the exact Delaunay triangulation
   gdt-batch verify out --input *.laz    and that its vertices are the points of these files
@@ -167,6 +168,9 @@ pub enum CliCommand {
         /// Point clouds: LAS, LAZ, COPC or text.
         #[arg(required = true)]
         files: Vec<PathBuf>,
+        /// Read all points too, and count those of each class and of each return.
+        #[arg(long)]
+        histogram: bool,
     },
     /// List the GPUs of this machine, test each step of the pipeline on one of them, and say how much faster it makes a job.
     Gpu {

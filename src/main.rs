@@ -5,6 +5,8 @@
 use clap::Parser;
 use gdt_batch::cli::{Cli, CliCommand, PrintOptions};
 use gdt_batch::gpu_trial;
+use gdt_batch::input::histogram::Histogram;
+use gdt_batch::input::info::{SourceDescription, describe};
 use gdt_batch::job;
 use gdt_batch::job::options::{JobOptions, RunOptions, Threads};
 use gdt_batch::job::phase::{Phase, PhaseTasks, Task};
@@ -73,7 +75,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
         (Some(CliCommand::Status { config, tasks }), _) => {
             print_result(&job::status(&config::load(config)?, *tasks)?, print).map(|()| ExitCode::SUCCESS)
         }
-        (Some(CliCommand::Info { files }), _) => show_info(files, print),
+        (Some(CliCommand::Info { files, histogram }), _) => show_info(files, *histogram, print),
         (Some(CliCommand::Gpu { adapter, leaves }), _) => test_gpu(adapter.as_deref(), *leaves, print),
         (Some(CliCommand::Sample { file, points, seed, overwrite }), _) => {
             interrupt::listen()?;
@@ -223,11 +225,15 @@ fn test_gpu(adapter: Option<&str>, leaves: Option<usize>, print: PrintOptions) -
     Ok(ExitCode::from(4))
 }
 
-fn show_info(files: &[PathBuf], print: PrintOptions) -> Result<ExitCode> {
+fn show_info(files: &[PathBuf], histogram: bool, print: PrintOptions) -> Result<ExitCode> {
     none_is_missing(files)?;
     for file in files {
-        let source = on_threads(threads::available(), || input::open(file, &input::TextOptions::default()))?;
-        print_result(&input::info::describe(&source), print)?;
+        let described = on_threads(threads::available(), || {
+            let source = input::open(file, &input::TextOptions::default())?;
+            let histogram = histogram.then(|| Histogram::of(&source)).transpose()?;
+            Ok(SourceDescription { histogram, ..describe(&source) })
+        })?;
+        print_result(&described, print)?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -13,10 +13,6 @@ use crate::{Error, Result, Warnings};
 use serde::Deserialize;
 use std::path::Path;
 
-/// The greatest `height_offset` in metres. No datum is that far from the ellipsoid, and f64 would lose the digits that let tiles
-/// meet.
-const MAX_HEIGHT_OFFSET: f64 = 100_000.0;
-
 /// A configuration file as it was written.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -97,6 +93,11 @@ fn resolve_paths(options: &mut JobOptions, base: &Path) -> std::result::Result<(
         let Anchored { base, path } = anchor("[output] directory", directory, base)?;
         options.output.directory = base.join(path);
     }
+    if let Some(grid) = options.output.height_offset.as_mut().and_then(|offset| offset.grid_mut()) {
+        let name = grid.to_string_lossy().into_owned();
+        let Anchored { base, path } = anchor("[output] height_offset", &name, base)?;
+        *grid = base.join(path);
+    }
     for file in &mut options.input.files {
         let Anchored { base, path } = anchor("[input] files", file, base)?;
         if !Path::new(path).is_absolute() {
@@ -119,11 +120,6 @@ fn parse(text: &str) -> std::result::Result<JobOptions, String> {
     }
     if file.output.directory.as_os_str().is_empty() {
         return Err("[output] directory is empty".into());
-    }
-    if file.output.height_offset.is_nan() || file.output.height_offset.abs() > MAX_HEIGHT_OFFSET {
-        return Err(format!(
-            "[output] height_offset must be a number of metres from -{MAX_HEIGHT_OFFSET} to {MAX_HEIGHT_OFFSET}"
-        ));
     }
     let TriangulationTable { backend, max_points_per_tile, max_points_per_part, voronoi, adapter, texture } =
         file.triangulation;

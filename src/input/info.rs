@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::Warnings;
 use crate::input::crs::system::Crs;
+use crate::input::histogram::Histogram;
 use crate::input::points::axis::AXIS_NAMES;
 use crate::input::source::{FileFormat, Source};
 
@@ -45,6 +46,9 @@ pub struct SourceDescription {
     pub crs: Crs,
     /// The length of one unit of x and y in metres.
     pub metres_per_unit: Option<f64>,
+    /// How many points of each kind there are, if that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub histogram: Option<Histogram>,
     /// What is unusual about the file.
     pub warnings: Warnings,
 }
@@ -71,6 +75,7 @@ pub fn describe(source: &Source) -> SourceDescription {
         chunks: source.chunks(),
         crs: source.crs.clone(),
         metres_per_unit: source.crs.metres_per_unit(),
+        histogram: None,
         warnings,
     }
 }
@@ -117,6 +122,9 @@ impl fmt::Display for SourceDescription {
         }
         writeln!(f, "  crs      {}", self.crs.label())?;
         writeln!(f, "  unit     {} in x and y, {} in z", self.crs.horizontal.name(), self.vertical())?;
+        if let Some(histogram) = &self.histogram {
+            write!(f, "{histogram}")?;
+        }
         for warning in self.warnings.iter() {
             writeln!(f, "  warning  {warning}")?;
         }

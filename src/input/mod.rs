@@ -7,6 +7,7 @@
 
 mod crs;
 mod file;
+pub mod histogram;
 pub mod info;
 mod las;
 pub mod options;

@@ -20,6 +20,7 @@ use crate::input::points::counts::PointCounts;
 use crate::input::points::filter::PointFilter;
 use crate::input::points::point::Point;
 use crate::input::points::raw_bounds::RawBounds;
+use crate::input::points::record_sink::RecordSink;
 use crate::input::points::rules::PointRules;
 use crate::input::text::options::TextOptions;
 use crate::input::text::outliers::Outliers;
@@ -303,13 +304,21 @@ impl Source {
         rules: &PointRules,
         sink: &mut dyn FnMut(&[Point]) -> Result<()>,
     ) -> Result<PointCounts> {
-        let file = RandomAccessFile::reopen(&self.path, self.size)?;
         let mut filter = PointFilter::new(&self.path, &self.axes, rules, sink);
-        match &self.points {
-            PointData::Las(points) => points.decode(&file, chunk, records, rules, &mut filter)?,
-            PointData::Laz(points) => points.decode(&file, chunk, records, rules, &mut filter)?,
-            PointData::Text(table) => table.decode(&file, chunk, records, &mut filter)?,
-        }
+        self.read_chunk(chunk, records, rules.rgb, &mut filter)?;
         filter.finish()
+    }
+
+    /// Sends no more than the first `records` records of a chunk to `sink`, and of text about as many.
+    ///
+    /// # Errors
+    /// As [`Source::decode`].
+    pub(crate) fn read_chunk(&self, chunk: usize, records: u64, rgb: bool, sink: &mut impl RecordSink) -> Result<()> {
+        let file = RandomAccessFile::reopen(&self.path, self.size)?;
+        match &self.points {
+            PointData::Las(points) => points.decode(&file, chunk, records, rgb, sink),
+            PointData::Laz(points) => points.decode(&file, chunk, records, rgb, sink),
+            PointData::Text(table) => table.decode(&file, chunk, records, sink),
+        }
     }
 }

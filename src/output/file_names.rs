@@ -112,6 +112,11 @@ impl OutputFiles {
         self.directory.join("preview.png")
     }
 
+    /// Returns the file that says where the picture is on the map.
+    pub fn preview_world(&self) -> PathBuf {
+        self.directory.join("preview.pgw")
+    }
+
     /// Returns the page that shows the terrain in a browser.
     pub fn page(&self) -> PathBuf {
         self.directory.join("index.html")

@@ -7,6 +7,7 @@ pub mod color;
 pub mod compression;
 pub mod file_names;
 pub mod frame;
+pub mod geoid;
 pub mod gltf;
 pub mod lod;
 pub mod normals;

@@ -1,6 +1,7 @@
 //! The options of `[output]`.
 
 use crate::output::compression::{Compression, CompressionChoice};
+use crate::output::geoid::option::HeightOffset;
 use crate::output::page::{NOT_BUILT_IN, is_built_in};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -27,21 +28,29 @@ pub struct OutputOptions {
     /// The most sites in a coarser tile.
     #[serde(default, alias = "level_sites")]
     pub max_points_per_level_tile: MaxPointsPerLevelTile,
-    /// Metres to add to heights so that they count from the ellipsoid, where 3D Tiles are placed on the globe.
-    #[serde(default)]
-    pub height_offset: f64,
+    /// What to add to heights so that they count from the ellipsoid, where 3D Tiles are placed on the globe.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub height_offset: Option<HeightOffset>,
     /// How tiles are packed.
     #[serde(default)]
     pub compression: CompressionChoice,
     /// The longest edge of a triangle that is not left out.
     #[serde(default)]
     pub max_edge: MaxEdge,
+    /// Whose the data are: viewers show it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub copyright: Option<Copyright>,
     /// Whether a page that shows the terrain is written beside it.
     #[serde(default, deserialize_with = "page")]
     pub page: bool,
 }
 
 impl OutputOptions {
+    /// Returns whose the data are, if the user says.
+    pub fn copyright(&self) -> Option<&str> {
+        self.copyright.as_ref().map(|copyright| copyright.0.as_str())
+    }
+
     /// Returns how tiles are packed.
     pub fn packing(&self) -> Compression {
         match (self.compression, self.format) {
@@ -49,6 +58,35 @@ impl OutputOptions {
             (CompressionChoice::Auto, _) | (CompressionChoice::Quantized, _) => Compression::Quantized,
             (CompressionChoice::None, _) => Compression::None,
         }
+    }
+}
+
+/// The longest [`Copyright`] in characters. Every file has it.
+const LONGEST_COPYRIGHT: usize = 500;
+
+/// Whose the data are: one line of text.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Copyright(String);
+
+impl TryFrom<String> for Copyright {
+    type Error = String;
+
+    fn try_from(text: String) -> std::result::Result<Copyright, String> {
+        let is_line = !text.trim().is_empty() && !text.chars().any(char::is_control);
+        match is_line && text.chars().count() <= LONGEST_COPYRIGHT {
+            true => Ok(Copyright(text)),
+            false => Err(format!(
+                "copyright is one line of 1 to {LONGEST_COPYRIGHT} characters, without tabs and other control characters, such as \
+                 \"(c) 2024 City of Example, CC BY 4.0\""
+            )),
+        }
+    }
+}
+
+impl From<Copyright> for String {
+    fn from(copyright: Copyright) -> String {
+        copyright.0
     }
 }
 

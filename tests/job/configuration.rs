@@ -46,6 +46,8 @@ fn the_full_configuration_shows_every_option_with_its_default() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/full.toml");
     let mut full = gdt_batch::config::load(&path).unwrap();
     (full.input.classes, full.input.bounds) = (None, None);
+    // What they show is no default either.
+    assert!(full.output.height_offset.take().is_some() && full.output.copyright.take().is_some());
     let folder = folder_with_cloud();
     let least = folder.path().join("job.toml");
     fs::write(&least, LEAST).unwrap();

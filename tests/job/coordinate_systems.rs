@@ -69,6 +69,11 @@ fn with_heights(system: &str, datum: &str, unit: &str) -> String {
     format!(r#"COMPD_CS["c",{plane},VERT_CS["{system}",VERT_DATUM["{datum}",2005],UNIT[{unit}],AXIS["Up",UP]]]"#)
 }
 
+/// Returns a job on heights of which the user says that they are ellipsoidal.
+pub(crate) fn ellipsoidal<P: AsRef<Path>>(files: &[P]) -> Job {
+    Job::on(files).with("output", "height_offset = 0.0")
+}
+
 pub(crate) fn warnings(report: &Value) -> String {
     report["warnings"].to_string()
 }
@@ -111,7 +116,7 @@ fn texts_without_codes_whose_datums_differ_are_refused_unless_the_user_says_whic
         job.verified();
     }
     let coded = write(folder.path(), "coded.las", &[code(26915)]);
-    assert_eq!(warnings(&Job::on(&[&new, &coded]).report()), "[]");
+    assert_eq!(warnings(&ellipsoidal(&[&new, &coded]).report()), "[]");
     Job::on(&[&old, &coded]).run().refused(2, &["the datum (", "NAD83"]);
 }
 
@@ -125,8 +130,7 @@ fn user_defined_keys_are_compared_with_codes() {
         [("nad83.las", 4269), ("nad27.las", 4267)].map(|(name, datum)| write(folder.path(), name, &[defined(datum)]));
     let [utm15, utm16] =
         [("15.las", 26915), ("16.las", 26916)].map(|(name, utm)| write(folder.path(), name, &[code(utm)]));
-    let job = Job::on(&[&nad83, &utm15]);
-    assert_eq!(warnings(&job.report()), "[]");
+    assert_eq!(warnings(&ellipsoidal(&[&nad83, &utm15]).report()), "[]");
     Job::on(&[&nad27, &utm15]).run().refused(2, &["nad27.las", "15.las", "the datum (", "NAD27", "NAD83"]);
     Job::on(&[&nad83, &utm16]).run().refused(2, &["nad83.las", "16.las", "longitude of the origin (", "-93", "-87"]);
 }
@@ -267,12 +271,10 @@ fn nad83_2011_by_parameters_is_placed_on_the_globe() {
     let folder = tempfile::tempdir().unwrap();
     let file = write(folder.path(), "new.las", &[text(&esri("NAD_1983_2011", GRS80))]);
     let coded = write(folder.path(), "coded.las", &[code(6344)]);
-    let report = Job::on(&[&file, &coded]).report();
-    assert_eq!(warnings(&report), "[]");
-    let alone = Job::on(&[&file]);
-    assert!(!warnings(&alone.report()).contains("globe"));
+    assert_eq!(warnings(&ellipsoidal(&[&file, &coded]).report()), "[]");
+    assert_eq!(warnings(&ellipsoidal(&[&file]).report()), "[]");
     let Some(shared) = shared() else { return };
-    let real = Job::on(&[shared.join("data/file_with_both_wkt_and_geotiff_vlrs.las")]).report();
+    let real = ellipsoidal(&[shared.join("data/file_with_both_wkt_and_geotiff_vlrs.las")]).report();
     assert!(!warnings(&real).contains("globe"), "{real}");
 }
 
@@ -284,7 +286,7 @@ fn a_text_is_placed_on_the_globe_by_the_crs_that_the_user_names() {
         (0..100).map(|i| format!("{},{},{}\n", 500_000 + i % 10 * 7, 4_000_000 + i / 10 * 9, i % 3)).collect();
     fs::write(&path, rows).unwrap();
     assert!(warnings(&Job::on(&[&path]).report()).contains("globe"));
-    let report = Job::on(&[&path]).with("input", "crs = \"EPSG:26915+6360\"").report();
+    let report = ellipsoidal(&[&path]).with("input", "crs = \"EPSG:26915+6360\"").report();
     let said = warnings(&report);
     assert!(!said.contains("globe") && !said.contains("unit of its coordinates"), "{said}");
     assert!(said.contains("heights are in another unit"), "{said}");

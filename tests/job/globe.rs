@@ -14,7 +14,7 @@ use crate::tileset::{Tile, applied, error, height, keeps_the_rules, numbers, til
 const MIDDLE: [f64; 3] = [500_000.0, 4_000_000.0, 0.0];
 
 /// Returns a LAS file in UTM zone 33 north. The points are in steps of 1 cm from [`MIDDLE`].
-fn utm(points: &[[i32; 3]]) -> Vec<u8> {
+pub(crate) fn utm(points: &[[i32; 3]]) -> Vec<u8> {
     let keys: [u16; 12] = [1, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, 32633];
     let mut bytes = vec![0; 227];
     let mut put = |at: usize, value: &[u8]| bytes[at..at + value.len()].copy_from_slice(value);
@@ -44,7 +44,7 @@ fn utm(points: &[[i32; 3]]) -> Vec<u8> {
 
 /// Returns `side` times `side` points in a square. Its sides are `half` metres from `centre` and have points on them. Heights are
 /// below 200 m.
-fn square(side: i32, half: f64, centre: [f64; 2]) -> Vec<[i32; 3]> {
+pub(crate) fn square(side: i32, half: f64, centre: [f64; 2]) -> Vec<[i32; 3]> {
     let mut random = Random(7);
     let mut along = |i: i32, centre: f64| {
         let share = ((i as f64 + random.unit() * 1.5 - 0.75) / (side - 1) as f64).clamp(0.0, 1.0);
@@ -55,25 +55,25 @@ fn square(side: i32, half: f64, centre: [f64; 2]) -> Vec<[i32; 3]> {
     places.into_iter().map(|[x, y]| [x, y, random.below(20_000) as i32]).collect()
 }
 
-fn georeference(job: &Job, name: &str) -> Value {
+pub(crate) fn georeference(job: &Job, name: &str) -> Value {
     let text = std::fs::read(job.out().join("georeference.json")).unwrap();
     serde_json::from_slice::<Value>(&text).unwrap()[name].take()
 }
 
 /// Computes earth-centred positions of source coordinates, not as the program does: with PROJ's own geocentric coordinates.
-struct Truth {
+pub(crate) struct Truth {
     utm: Proj,
     geocentric: Proj,
 }
 
 impl Truth {
-    fn new() -> Truth {
+    pub(crate) fn new() -> Truth {
         let proj = |text: &str| Proj::from_proj_string(text).unwrap();
         Truth { utm: proj("+proj=utm +zone=33 +datum=WGS84"), geocentric: proj("+proj=geocent +datum=WGS84") }
     }
 
     /// Returns the position of a place of the scene. The scene's origin is at `offset` in the source.
-    fn place(&self, offset: [f64; 3], place: [f64; 3]) -> [f64; 3] {
+    pub(crate) fn place(&self, offset: [f64; 3], place: [f64; 3]) -> [f64; 3] {
         let [x, y, z] = [0, 1, 2].map(|k| offset[k] + place[k]);
         let mut point = (x, y, z);
         transform(&self.utm, &self.geocentric, &mut point).unwrap();
@@ -81,7 +81,7 @@ impl Truth {
     }
 }
 
-fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+pub(crate) fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
 }
 
@@ -109,7 +109,7 @@ pub(crate) fn wide_in_many_tiles() -> (Job, Vec<Tile>) {
     job(&square(200, 50_000.0, [0.0; 2]), 24)
 }
 
-fn is_exact(tile: &Tile) -> bool {
+pub(crate) fn is_exact(tile: &Tile) -> bool {
     tile.json["children"].is_null()
 }
 

@@ -39,7 +39,7 @@ fn threads_and_repetition_change_no_byte() {
     let expected = files(&one.out());
     let is_tile = |name: &&String| name.starts_with("tiles/") || name.starts_with("levels/");
     let names: Vec<&String> = expected.keys().filter(|name| !is_tile(name)).collect();
-    assert_eq!(names, ["XXH128SUMS", "georeference.json", "preview.png", "terrain.glb", "tileset.json"]);
+    assert_eq!(names, ["XXH128SUMS", "georeference.json", "preview.pgw", "preview.png", "terrain.glb", "tileset.json"]);
     assert!(expected.keys().filter(|name| name.starts_with("levels/")).count() > 4);
     let differ = |found: BTreeMap<String, Vec<u8>>| {
         assert!(found.keys().eq(expected.keys()));

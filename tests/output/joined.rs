@@ -14,7 +14,7 @@ fn the_scene_has_the_parts_of_all_tiles() {
     write_tiles(directory.path(), &frame, &tiles);
     let paths: Vec<_> = (0..tiles.len()).map(|i| directory.path().join(format!("tiles/{i:05}.glb"))).collect();
     let out = directory.path().join("terrain.glb");
-    write_terrain(&out, &paths).unwrap();
+    write_terrain(&out, &paths, None).unwrap();
     let joined = read_tile(&out).unwrap();
     assert_eq!(joined.parts.len(), tiles.len());
     assert_eq!(&joined.extras, frame.extras());
@@ -34,7 +34,7 @@ fn packed_tiles_are_unpacked_in_the_scene() {
     write_tiles_as(Compression::Meshopt, directory.path(), &frame, &tiles);
     let paths: Vec<_> = (0..tiles.len()).map(|i| directory.path().join(format!("tiles/{i:05}.glb"))).collect();
     let out = directory.path().join("terrain.glb");
-    write_terrain(&out, &paths).unwrap();
+    write_terrain(&out, &paths, None).unwrap();
     let bytes = std::fs::read(&out).unwrap();
     let json = String::from_utf8_lossy(&bytes[..20_000]);
     assert!(json.contains("KHR_mesh_quantization") && !json.contains("EXT_meshopt_compression"));
@@ -51,7 +51,7 @@ fn a_damaged_tile_is_named() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("bad.glb");
     std::fs::write(&path, b"glTF but not really one").unwrap();
-    let error = write_terrain(&directory.path().join("terrain.glb"), &[path]).unwrap_err();
+    let error = write_terrain(&directory.path().join("terrain.glb"), &[path], None).unwrap_err();
     assert!(error.to_string().contains("bad.glb"), "{error}");
     assert!(!directory.path().join("terrain.glb").exists());
 }

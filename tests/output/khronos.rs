@@ -14,7 +14,7 @@ fn the_khronos_validator_accepts_plain_tiles() {
     let tiles = cut_by_place(&mesh, 3);
     write_tiles(directory.path(), &frame, &tiles);
     let paths: Vec<_> = (0..tiles.len()).map(|i| directory.path().join(format!("tiles/{i:05}.glb"))).collect();
-    write_terrain(&directory.path().join("terrain.glb"), &paths).unwrap();
+    write_terrain(&directory.path().join("terrain.glb"), &paths, None).unwrap();
     let bare = Tile { normals: None, colors: None, ..mesh };
     write_tiles(&directory.path().join("bare"), &frame, &[bare]);
     let points = grid(300, 300, 10);
@@ -37,7 +37,7 @@ fn the_khronos_validator_accepts_packed_tiles() {
         let folder = directory.path().join(format!("{compression:?}"));
         write_tiles_as(compression, &folder, &frame, &tiles);
         let paths: Vec<_> = (0..tiles.len()).map(|i| folder.join(format!("tiles/{i:05}.glb"))).collect();
-        write_terrain(&folder.join("terrain.glb"), &paths).unwrap();
+        write_terrain(&folder.join("terrain.glb"), &paths, None).unwrap();
         let bare = Tile { normals: None, colors: None, ..mesh.clone() };
         write_tiles_as(compression, &folder.join("bare"), &frame, &[bare]);
         write_tiles_as(compression, &folder.join("parts"), &frame, &[terrain(&frame, &grid(90, 90, 2_000))]);

@@ -154,6 +154,6 @@ pub(crate) fn write_tiles_as(compression: Compression, directory: &Path, frame: 
 /// Returns the bytes of the GLB file of `tile`.
 pub(crate) fn encode_tile(frame: &Frame, tile: &Tile, compression: Compression) -> gdt_batch::Result<Vec<u8>> {
     let mut glb = GlbEncoder::default();
-    glb.encode(frame, tile, compression)?;
+    glb.encode(frame, tile, compression, None)?;
     Ok(glb.pieces().concat())
 }

@@ -5,8 +5,12 @@ use gdt_batch::output::Tile;
 use gdt_batch::output::color::HeightRange;
 use gdt_batch::output::frame::Frame;
 use gdt_batch::output::preview::canvas::{Canvas, LONGER_SIDE, PreviewPixel};
+use gdt_batch::output::preview::layout::world_file;
+use gdt_batch::output::preview::panel::Legend;
 use gdt_batch::output::preview::picture::Picture;
 use proptest::prelude::*;
+
+use std::collections::BTreeSet;
 
 use crate::model::{cloud, cut, grid, terrain, utm};
 use crate::random::Random;
@@ -64,20 +68,95 @@ fn a_fan_of_slivers_covers_the_pixels_of_its_outline_once() {
     }
 }
 
-#[test]
-fn the_picture_is_a_png_of_its_size() {
-    let frame = utm();
-    let mesh = terrain(&frame, &cloud(31, 300, 50_000));
-    let canvas = canvas_of(&frame, &mesh);
-    let mut picture = Picture::new(&canvas);
-    picture.add(0, &canvas.draw(&mesh).unwrap());
-    let png = picture.png().unwrap();
-    let mut reader = png::Decoder::new(std::io::Cursor::new(&png)).read_info().unwrap();
+/// Returns the width and the rows of a preview.
+fn decoded(png: &[u8]) -> (usize, Vec<[u8; 4]>) {
+    let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
     let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
     reader.next_frame(&mut pixels).unwrap();
-    assert_eq!([reader.info().width, reader.info().height], canvas.size());
-    let seen = pixels.chunks_exact(4).filter(|pixel| pixel[3] == 255).count();
-    assert_eq!(seen, canvas.draw(&mesh).unwrap().len());
+    (
+        reader.info().width as usize,
+        pixels.chunks_exact(4).map(|pixel| [pixel[0], pixel[1], pixel[2], pixel[3]]).collect(),
+    )
+}
+
+/// The height of the strip with the legend.
+const STRIP: usize = 64;
+
+#[test]
+fn the_picture_is_the_terrain_with_a_legend_below() {
+    let frame = utm();
+    // As wide as high, wide, and so narrow that the legend is wider.
+    for (columns, rows) in [(30, 30), (90, 3), (3, 90)] {
+        let mesh = terrain(&frame, &grid(columns, rows, 500));
+        let canvas = canvas_of(&frame, &mesh);
+        let mut picture = Picture::new(&canvas);
+        picture.add(&canvas.draw(&mesh).unwrap());
+        let (width, pixels) = decoded(&picture.png(&Legend::new(&canvas, true)).unwrap());
+        let [own, height] = canvas.size().map(|side| side as usize);
+        assert_eq!((width, pixels.len() / width), (own.max(480), height + STRIP));
+        let (above, strip) = pixels.split_at(width * height);
+        let seen = above.iter().filter(|pixel| pixel[3] == 255).count();
+        assert_eq!(seen, canvas.draw(&mesh).unwrap().len());
+        assert!(strip.iter().all(|pixel| pixel[3] == 255));
+        // Paper, ink, and the colours of the ramp.
+        let kinds: BTreeSet<&[u8; 4]> = strip.iter().collect();
+        assert!(kinds.len() > 100, "{}", kinds.len());
+        let (_, plain) = decoded(&picture.png(&Legend::new(&canvas, false)).unwrap());
+        let is_gray = |pixel: &&[u8; 4]| pixel[0].abs_diff(pixel[2]) < 16;
+        assert!(plain[width * height..].iter().all(|pixel| is_gray(&pixel)));
+        assert!(strip.iter().filter(is_gray).count() < strip.len() - 1000);
+    }
+}
+
+#[test]
+fn the_world_file_puts_the_picture_where_the_terrain_is() {
+    let frame = utm();
+    for (columns, rows) in [(40, 40), (90, 3), (3, 90)] {
+        let mesh = terrain(&frame, &grid(columns, rows, 500));
+        let canvas = canvas_of(&frame, &mesh);
+        let mut picture = Picture::new(&canvas);
+        picture.add(&canvas.draw(&mesh).unwrap());
+        let (width, pixels) = decoded(&picture.png(&Legend::new(&canvas, true)).unwrap());
+        let lines: Vec<f64> = world_file(&canvas).lines().map(|line| line.parse().unwrap()).collect();
+        let [across, 0.0, 0.0, down, west, north] = lines[..] else { panic!("{lines:?}") };
+        assert!(across > 0.0 && down == -across);
+        let height = pixels.len() / width - STRIP;
+        let covered = |i: &usize| pixels[*i][3] == 255;
+        let seen: Vec<[usize; 2]> = (0..width * height).filter(covered).map(|i| [i % width, i / width]).collect();
+        let bounds = mesh.bounds().unwrap();
+        let extras = frame.extras();
+        let source = |corner: [i32; 3]| {
+            let [x, _, z] = frame.world(corner);
+            [extras.offset[0] + x / extras.metres_per_unit, extras.offset[1] - z / extras.metres_per_unit]
+        };
+        let (low, high) = (source(bounds.min), source(bounds.max));
+        let least = [0, 1].map(|k| seen.iter().map(|place| place[k]).min().unwrap() as f64);
+        let most = [0, 1].map(|k| seen.iter().map(|place| place[k]).max().unwrap() as f64);
+        // The terrain reaches from the middle of the outermost pixels by half a pixel, or up to one where the last has its middle outside.
+        for (found, wanted) in [
+            (west + (least[0] - 0.5) * across, low[0]),
+            (west + (most[0] + 0.5) * across, high[0]),
+            (north + (least[1] - 0.5) * down, high[1]),
+            (north + (most[1] + 0.5) * down, low[1]),
+        ] {
+            assert!((found - wanted).abs() <= across, "{found} {wanted} {across}");
+        }
+        assert!((west + (least[0] - 0.5) * across - low[0]).abs() < 1e-3 * across);
+    }
+}
+
+#[test]
+fn tiles_have_no_borders_in_the_picture() {
+    let frame = utm();
+    let mesh = terrain(&frame, &grid(40, 40, 500));
+    let canvas = canvas_of(&frame, &mesh);
+    let drawn = |tiles: &[Tile]| {
+        let mut picture = Picture::new(&canvas);
+        tiles.iter().for_each(|tile| picture.add(&canvas.draw(tile).unwrap()));
+        picture.png(&Legend::new(&canvas, true)).unwrap()
+    };
+    let mut random = Random(5);
+    assert!(drawn(&cut(&mesh, 4, |_| random.below(4) as usize)) == drawn(std::slice::from_ref(&mesh)));
 }
 
 #[test]
@@ -88,13 +167,10 @@ fn a_slope_towards_the_light_is_brighter() {
     let mesh = Tile { colors: Some(vec![[30_000; 3]; points.len()]), ..terrain(&frame, &points) };
     let canvas = canvas_of(&frame, &mesh);
     let mut picture = Picture::new(&canvas);
-    picture.add(0, &canvas.draw(&mesh).unwrap());
-    let png = picture.png().unwrap();
-    let mut reader = png::Decoder::new(std::io::Cursor::new(&png)).read_info().unwrap();
-    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
-    reader.next_frame(&mut pixels).unwrap();
+    picture.add(&canvas.draw(&mesh).unwrap());
+    let (width, pixels) = decoded(&picture.png(&Legend::new(&canvas, true)).unwrap());
     let side = canvas.size()[0] as usize;
-    let at = |x: usize, y: usize| pixels[4 * (y * side + x)];
+    let at = |x: usize, y: usize| pixels[y * width + x][0];
     let (to_the_light, away) = (at(side / 4, side / 2), at(side * 3 / 4, side / 2));
     assert!(to_the_light > away + 40, "{to_the_light} {away}");
 }

@@ -10,6 +10,9 @@ use crate::input::crs::unit::Unit;
 use crate::input::crs::vertical::VerticalSystem;
 use crate::input::crs::wkt::{PROJECTED, comparable_name, find};
 
+/// The name that version 2 of the text gives to an axis of heights above the ellipsoid.
+const ELLIPSOIDAL_AXIS: &str = "axis[\"ellipsoidal height";
+
 /// What a file says about its coordinate reference system.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Crs {
@@ -134,6 +137,13 @@ impl Crs {
     /// Returns the name of the vertical system, if the file gives one.
     pub fn vertical_name(&self) -> Option<String> {
         self.vertical_system.as_ref()?.name.clone()
+    }
+
+    /// Returns whether something says that heights count from the ellipsoid: the system of heights, or a third axis of the system of places.
+    pub fn has_ellipsoidal_heights(&self) -> bool {
+        let third_axis =
+            || self.wkt.as_deref().is_some_and(|text| text.to_ascii_lowercase().contains(ELLIPSOIDAL_AXIS));
+        self.vertical_system.as_ref().map_or_else(third_axis, VerticalSystem::is_ellipsoidal)
     }
 
     /// Returns a short name for messages.

@@ -24,6 +24,18 @@ const VARIED: [(&[&str], u32); 15] = [
     (&["cgvd2013", "canadiangeodeticverticaldatumof2013"], 1127),
 ];
 
+/// What stands for heights above an ellipsoid in the place of a system of heights: the codes of GeoTIFF 1.0 (section 6.3.4.1), and that
+/// of WGS 84 with heights, which some writers put there.
+const ELLIPSOIDS: [u32; 34] = {
+    let mut codes = [4979; 34];
+    let mut i = 1;
+    while i < codes.len() {
+        codes[i] = 5000 + i as u32;
+        i += 1;
+    }
+    codes
+};
+
 /// What a file says of the system that its heights count in.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct VerticalSystem {
@@ -36,6 +48,9 @@ pub struct VerticalSystem {
     /// Whether z counts downwards, if its text says so or the contrary.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub downward: Option<bool>,
+    /// Whether its text says that heights count from an ellipsoid.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub ellipsoidal: bool,
 }
 
 impl VerticalSystem {
@@ -48,6 +63,7 @@ impl VerticalSystem {
             name: text(node),
             datum: datum.and_then(text),
             downward: downward(node),
+            ellipsoidal: datum.is_some_and(is_ellipsoid),
         };
         (system != VerticalSystem::default()).then_some(system)
     }
@@ -98,6 +114,14 @@ impl VerticalSystem {
             .or_else(|| self.name.as_deref().map(|name| comparable_name(name).contains("depth")))
     }
 
+    /// Returns whether it says that heights count from an ellipsoid, not from a geoid or the sea.
+    pub(crate) fn is_ellipsoidal(&self) -> bool {
+        let names = [&self.name, &self.datum].into_iter().flatten();
+        self.ellipsoidal
+            || self.epsg.is_some_and(|code| ELLIPSOIDS.contains(&code))
+            || names.into_iter().any(|name| comparable_name(name).contains("ellipsoid"))
+    }
+
     /// Returns its code if that is all that is known.
     fn unknown_code(&self) -> Option<u32> {
         let is_known =
@@ -115,6 +139,11 @@ fn downward(node: &WktNode) -> Option<bool> {
         if is("down") { Some(true) } else { is("up").then_some(false) }
     });
     of_axis.or_else(|| parameters().find(is_direction)?.number(1).map(|direction| direction < 0.0))
+}
+
+/// Returns whether the datum of heights is an ellipsoid: ESRI writes that of the horizontal system, version 1 of the text has the type 2002.
+fn is_ellipsoid(datum: &WktNode) -> bool {
+    datum.child(&["SPHEROID", "ELLIPSOID"]).is_some() || datum.number(1) == Some(2002.0)
 }
 
 fn known_name(name: &str) -> Option<String> {
@@ -169,6 +198,21 @@ mod tests {
         let unknown = coded(31_000).difference(&named("LN02 height")).unwrap();
         assert!(unknown.contains("EPSG:31000 is not in the list of known codes of heights"), "{unknown}");
         assert!(coded(5703).difference(&coded(6357)).unwrap().contains("depths"));
+    }
+
+    #[test]
+    fn heights_above_an_ellipsoid_are_known_by_their_code_name_or_datum() {
+        let of = |text: &str| VerticalSystem::of(&WktNode::parse_all(text).unwrap()[0]).unwrap().is_ellipsoidal();
+        let esri =
+            |datum: &str| format!(r#"VERTCS["WGS_1984",{datum},PARAMETER["Vertical_Shift",0.0],UNIT["Meter",1.0]]"#);
+        assert!(of(&esri(r#"DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137.0,298.257223563]]"#)));
+        assert!(!of(&esri(r#"VDATUM["EGM96_Geoid"]"#)));
+        let typed = |kind: u32| format!(r#"VERT_CS["GRS 80",VERT_DATUM["unknown",{kind}],UNIT["metre",1]]"#);
+        assert!(of(&typed(2002)) && !of(&typed(2005)));
+        assert!(of(r#"VERT_CS["NAD83(2011) Ellipsoidal Height",UNIT["metre",1]]"#));
+        let coded = |code| VerticalSystem { epsg: Some(code), ..VerticalSystem::default() }.is_ellipsoidal();
+        assert!(coded(5030) && coded(5001) && coded(5033) && coded(4979));
+        assert!(!coded(5703) && !coded(5000) && !coded(5034) && !VerticalSystem::default().is_ellipsoidal());
     }
 
     #[test]

@@ -5,9 +5,9 @@ use std::ops::Range;
 use laz::laszip::ChunkTable;
 use serde::{Deserialize, Serialize};
 
+use crate::catch_panic::{Panicked, catch_panic};
 use crate::input::file::bytes::{uint32, uint64};
 use crate::input::file::random_access::RandomAccessFile;
-use crate::input::las::catch_panic::{Panicked, catch_panic};
 use crate::input::las::compression::{ChunkHead, LazCompression};
 use crate::input::las::header::LasHeader;
 use crate::{Error, Result, Warnings};

@@ -45,6 +45,7 @@ impl RecordLayout {
             Some(at) if with_rgb => [at, at + 2, at + 4].map(|at| uint16(bytes, at)),
             _ => [0; 3],
         };
-        PointRecord { raw, rgb, class, withheld, rounded: [false; 2] }
+        let return_number = bytes[14] & if self.extended { 15 } else { 7 };
+        PointRecord { raw, rgb, class, withheld, return_number, rounded: [false; 2] }
     }
 }

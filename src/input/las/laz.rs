@@ -9,17 +9,16 @@ use laz::record::RecordDecompressor;
 use laz::{DecompressionSelection, LazVlr};
 use serde::{Deserialize, Serialize};
 
+use crate::catch_panic::{Panicked, catch_panic};
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::file::range::FileRange;
-use crate::input::las::catch_panic::{Panicked, catch_panic};
 use crate::input::las::chunk_table::{self, LazChunk};
 use crate::input::las::compression::LazCompression;
 use crate::input::las::header::LasHeader;
 use crate::input::las::layout::RecordLayout;
 use crate::input::las::uncompressed::push_records;
 use crate::input::las::vlr::Vlr;
-use crate::input::points::filter::PointFilter;
-use crate::input::points::rules::PointRules;
+use crate::input::points::record_sink::RecordSink;
 use crate::{Error, Result, Warnings};
 
 /// The least number of records of a chunk of the source, as long as there are enough. Smaller LAZ chunks (COPC has them) go
@@ -95,14 +94,14 @@ impl CompressedPoints {
         self.chunks.len().max((self.missing > 0) as usize)
     }
 
-    /// Sends the first `records` records of chunk `chunk` of the source through `filter`.
+    /// Sends the first `records` records of chunk `chunk` of the source through `filter`, with their colours if `rgb` says so.
     pub(crate) fn decode(
         &self,
         file: &RandomAccessFile,
         chunk: usize,
         records: u64,
-        rules: &PointRules,
-        filter: &mut PointFilter,
+        rgb: bool,
+        filter: &mut impl RecordSink,
     ) -> Result<()> {
         let mut left = records;
         for laz_chunk in self.chunks.get(chunk).into_iter().flatten() {
@@ -111,8 +110,7 @@ impl CompressedPoints {
             }
             let wanted = laz_chunk.count.min(left);
             left -= wanted;
-            let mut decoder =
-                ChunkDecoder { points: self, file, chunk: laz_chunk, rules, wanted, next: laz_chunk.first };
+            let mut decoder = ChunkDecoder { points: self, file, chunk: laz_chunk, rgb, wanted, next: laz_chunk.first };
             match decoder.decode(filter) {
                 Ok(()) => {}
                 Err(ChunkError::Stopped(error)) => return Err(error),
@@ -154,7 +152,8 @@ struct ChunkDecoder<'a> {
     points: &'a CompressedPoints,
     file: &'a RandomAccessFile,
     chunk: &'a LazChunk,
-    rules: &'a PointRules,
+    /// Whether colours are wanted.
+    rgb: bool,
     /// The number of records to decode, from the first.
     wanted: u64,
     /// The number of the next record in the file.
@@ -163,7 +162,7 @@ struct ChunkDecoder<'a> {
 
 impl ChunkDecoder<'_> {
     /// Decodes the wanted records as far as possible; `self.next` then says how far.
-    fn decode(&mut self, filter: &mut PointFilter) -> std::result::Result<(), ChunkError> {
+    fn decode(&mut self, filter: &mut impl RecordSink) -> std::result::Result<(), ChunkError> {
         let held = self.records_held()?.min(self.wanted);
         let end = self.chunk.first + held;
         let mut range = self.file.range(self.chunk.bytes.clone())?;
@@ -175,7 +174,7 @@ impl ChunkDecoder<'_> {
     }
 
     /// Counts the wanted records from `self.next` on as malformed.
-    fn count_lost(&self, damage: &ChunkError, filter: &mut PointFilter) {
+    fn count_lost(&self, damage: &ChunkError, filter: &mut impl RecordSink) {
         let LazChunk { number, first, .. } = self.chunk;
         let (at, left) = (self.next, first + self.wanted - self.next);
         filter.malformed(left, || {
@@ -204,7 +203,7 @@ impl ChunkDecoder<'_> {
         &mut self,
         range: FileRange,
         stop: u64,
-        filter: &mut PointFilter,
+        filter: &mut impl RecordSink,
     ) -> std::result::Result<FileRange, ChunkError> {
         let selection = self.selection();
         let mut decoder = catch_panic(|| self.points.compression.decoder(range, selection))??;
@@ -214,7 +213,7 @@ impl ChunkDecoder<'_> {
             let wanted = ((block.len() / length) as u64).min(stop - self.next) as usize * length;
             let mut done = 0;
             let outcome = catch_panic(|| decode_block(decoder.as_mut(), &mut block[..wanted], length, &mut done));
-            push_records(&self.points.layout, &block[..done], self.next, self.rules, filter)?;
+            push_records(&self.points.layout, &block[..done], self.next, self.rgb, filter)?;
             self.next += (done / length) as u64;
             outcome?.map_err(|error| match error.kind() {
                 io::ErrorKind::UnexpectedEof => ChunkError::CutShort,
@@ -227,7 +226,7 @@ impl ChunkDecoder<'_> {
     /// Returns the fields to decompress.
     fn selection(&self) -> DecompressionSelection {
         let needed = DecompressionSelection::base().decompress_z().decompress_classification().decompress_flags();
-        if self.rules.rgb && self.points.layout.has_rgb() { needed.decompress_rgb() } else { needed }
+        if self.rgb && self.points.layout.has_rgb() { needed.decompress_rgb() } else { needed }
     }
 }
 

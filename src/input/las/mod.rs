@@ -1,6 +1,5 @@
 //! LAS and LAZ files: headers, variable length records, and their points, compressed or not.
 
-pub(crate) mod catch_panic;
 pub(crate) mod chunk_table;
 pub(crate) mod compression;
 pub(crate) mod crs_records;

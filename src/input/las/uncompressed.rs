@@ -8,8 +8,7 @@ use crate::Result;
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::las::header::LasHeader;
 use crate::input::las::layout::RecordLayout;
-use crate::input::points::filter::PointFilter;
-use crate::input::points::rules::PointRules;
+use crate::input::points::record_sink::RecordSink;
 
 /// The number of records of a chunk.
 const CHUNK: u64 = 50_000;
@@ -44,14 +43,14 @@ impl UncompressedPoints {
         (self.whole.div_ceil(CHUNK) as usize).max((self.missing > 0) as usize)
     }
 
-    /// Sends the first `records` records of `chunk` through `filter`.
+    /// Sends the first `records` records of `chunk` through `filter`, with their colours if `rgb` says so.
     pub(crate) fn decode(
         &self,
         file: &RandomAccessFile,
         chunk: usize,
         records: u64,
-        rules: &PointRules,
-        filter: &mut PointFilter,
+        rgb: bool,
+        filter: &mut impl RecordSink,
     ) -> Result<()> {
         let length = self.layout.length;
         let Range { start: mut number, end: end_of_chunk } = self.records_of(chunk);
@@ -61,7 +60,7 @@ impl UncompressedPoints {
             let count = ((block.len() / length) as u64).min(end - number);
             let bytes = &mut block[..count as usize * length];
             file.read_exact_at(bytes, self.points_at + number * length as u64)?;
-            push_records(&self.layout, bytes, number, rules, filter)?;
+            push_records(&self.layout, bytes, number, rgb, filter)?;
             number += count;
         }
         if end == end_of_chunk && chunk + 1 == self.chunk_count() && self.missing > 0 {
@@ -88,11 +87,11 @@ pub(crate) fn push_records(
     layout: &RecordLayout,
     bytes: &[u8],
     number: u64,
-    rules: &PointRules,
-    filter: &mut PointFilter,
+    rgb: bool,
+    filter: &mut impl RecordSink,
 ) -> Result<()> {
     for (number, bytes) in (number..).zip(bytes.chunks_exact(layout.length)) {
-        filter.push(number, &layout.record(bytes, rules.rgb), || format!("point {number}"))?;
+        filter.push(number, &layout.record(bytes, rgb), || format!("point {number}"))?;
     }
     Ok(())
 }

@@ -8,6 +8,7 @@ use crate::input::points::axis::{AXIS_NAMES, Axis};
 use crate::input::points::counts::PointCounts;
 use crate::input::points::point::Point;
 use crate::input::points::record::PointRecord;
+use crate::input::points::record_sink::RecordSink;
 use crate::input::points::rules::PointRules;
 
 /// The most points handed to the sink at once: 384 KiB of them, which stays in the second-level cache.
@@ -35,9 +36,46 @@ impl<'a> PointFilter<'a> {
         PointFilter { path, axes, rules, sink, points: Vec::with_capacity(SLICE), counts: PointCounts::default() }
     }
 
-    /// Filters record `number` of the source (from 0). `place` names it for a message ("point 12", "line 13").
     #[inline]
-    pub(crate) fn push(&mut self, number: u64, record: &PointRecord, place: impl Fn() -> String) -> Result<()> {
+    fn keep(&mut self, point: Point) -> Result<()> {
+        self.counts.kept += 1;
+        self.counts.max_rgb = self.counts.max_rgb.max(point.rgb[0].max(point.rgb[1]).max(point.rgb[2]));
+        self.points.push(point);
+        if self.points.len() == SLICE { self.flush() } else { Ok(()) }
+    }
+
+    /// Hands on the last points and returns the counts.
+    pub(crate) fn finish(mut self) -> Result<PointCounts> {
+        self.flush()?;
+        let PointCounts { withheld, other_class, out_of_bounds, malformed, kept, .. } = self.counts;
+        self.counts.read = withheld + other_class + out_of_bounds + malformed + kept;
+        Ok(self.counts)
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        if !self.points.is_empty() {
+            (self.sink)(&self.points)?;
+            self.points.clear();
+        }
+        Ok(())
+    }
+
+    /// Returns the first coordinate that is outside the lattice's reach, and the name of its axis.
+    #[cold]
+    fn out_of_reach(&self, record: &PointRecord, mapped: &Mapped) -> (String, &'static str) {
+        let is_out = |axis: usize| mapped[axis].is_none_or(|(v, _)| axis < 2 && !in_reach(v));
+        let axis = (0..3).find(|&axis| is_out(axis)).unwrap_or(2);
+        let value = match record.raw[axis] {
+            BEYOND => format!("more than 10^18 steps of {}", self.axes[axis].scale),
+            raw => self.axes[axis].value(raw).to_string(),
+        };
+        (value, AXIS_NAMES[axis])
+    }
+}
+
+impl RecordSink for PointFilter<'_> {
+    #[inline]
+    fn push(&mut self, number: u64, record: &PointRecord, place: impl Fn() -> String) -> Result<()> {
         if record.withheld {
             self.counts.withheld += 1;
             return Ok(());
@@ -73,9 +111,8 @@ impl<'a> PointFilter<'a> {
         }
     }
 
-    /// Counts a record of this class that lies outside the job's bounds, though its lattice point may not.
     #[inline]
-    pub(crate) fn push_out_of_bounds(&mut self, class: u8) {
+    fn push_out_of_bounds(&mut self, class: u8) {
         let count = if self.rules.classes[class as usize] {
             &mut self.counts.out_of_bounds
         } else {
@@ -84,10 +121,8 @@ impl<'a> PointFilter<'a> {
         *count += 1;
     }
 
-    /// Counts a record within the job's bounds that lies too far from all others as malformed, unless the job does not want its class.
-    /// `what` describes it.
     #[cold]
-    pub(crate) fn push_outlier(&mut self, class: u8, what: impl FnOnce() -> String) {
+    fn push_outlier(&mut self, class: u8, what: impl FnOnce() -> String) {
         if self.rules.classes[class as usize] {
             self.malformed(1, what);
         } else {
@@ -95,46 +130,9 @@ impl<'a> PointFilter<'a> {
         }
     }
 
-    #[inline]
-    fn keep(&mut self, point: Point) -> Result<()> {
-        self.counts.kept += 1;
-        self.counts.max_rgb = self.counts.max_rgb.max(point.rgb[0].max(point.rgb[1]).max(point.rgb[2]));
-        self.points.push(point);
-        if self.points.len() == SLICE { self.flush() } else { Ok(()) }
-    }
-
-    /// Counts `count` records that cannot be used; `what` says why.
-    pub(crate) fn malformed(&mut self, count: u64, what: impl FnOnce() -> String) {
+    fn malformed(&mut self, count: u64, what: impl FnOnce() -> String) {
         let path = self.path;
         self.counts.add_malformed(count, || format!("{}: {}", path.display(), what()));
-    }
-
-    /// Hands on the last points and returns the counts.
-    pub(crate) fn finish(mut self) -> Result<PointCounts> {
-        self.flush()?;
-        let PointCounts { withheld, other_class, out_of_bounds, malformed, kept, .. } = self.counts;
-        self.counts.read = withheld + other_class + out_of_bounds + malformed + kept;
-        Ok(self.counts)
-    }
-
-    fn flush(&mut self) -> Result<()> {
-        if !self.points.is_empty() {
-            (self.sink)(&self.points)?;
-            self.points.clear();
-        }
-        Ok(())
-    }
-
-    /// Returns the first coordinate that is outside the lattice's reach, and the name of its axis.
-    #[cold]
-    fn out_of_reach(&self, record: &PointRecord, mapped: &Mapped) -> (String, &'static str) {
-        let is_out = |axis: usize| mapped[axis].is_none_or(|(v, _)| axis < 2 && !in_reach(v));
-        let axis = (0..3).find(|&axis| is_out(axis)).unwrap_or(2);
-        let value = match record.raw[axis] {
-            BEYOND => format!("more than 10^18 steps of {}", self.axes[axis].scale),
-            raw => self.axes[axis].value(raw).to_string(),
-        };
-        (value, AXIS_NAMES[axis])
     }
 }
 

@@ -6,4 +6,5 @@ pub(crate) mod filter;
 pub(crate) mod point;
 pub(crate) mod raw_bounds;
 pub(crate) mod record;
+pub(crate) mod record_sink;
 pub(crate) mod rules;

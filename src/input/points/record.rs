@@ -7,6 +7,8 @@ pub(crate) struct PointRecord {
     pub(crate) rgb: [u16; 3],
     pub(crate) class: u8,
     pub(crate) withheld: bool,
+    /// Which return of its pulse it is, from 1; 0 where the file does not say.
+    pub(crate) return_number: u8,
     /// Whether the reader rounded x or y, and whether it rounded z, to get `raw`.
     pub(crate) rounded: [bool; 2],
 }

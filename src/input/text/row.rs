@@ -189,7 +189,7 @@ impl<'a> RowReader<'a> {
             raw[axis] = value;
             rounded[axis / 2] |= inexact;
         }
-        PointRecord { raw, rgb: self.rgb, class: self.class, withheld: false, rounded }
+        PointRecord { raw, rgb: self.rgb, class: self.class, withheld: false, return_number: 0, rounded }
     }
 }
 

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::input::crs::unit::Unit;
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::points::axis::{AXIS_NAMES, Axis};
-use crate::input::points::filter::PointFilter;
+use crate::input::points::record_sink::RecordSink;
 use crate::input::text::columns::Columns;
 use crate::input::text::cut_off::{self, Ending};
 use crate::input::text::degrees;
@@ -309,7 +309,7 @@ impl TextTable {
         file: &RandomAccessFile,
         chunk: usize,
         records: u64,
-        filter: &mut PointFilter,
+        filter: &mut impl RecordSink,
     ) -> Result<()> {
         let ChunkStart { mut row, line: first_line } = self.chunks[chunk];
         let WantedRows { bounds, ref decimals, .. } = *self.held();

@@ -75,7 +75,9 @@ pub fn find_pending(path: &Path) -> Result<PendingFile> {
 
 /// Returns the name under which the file at `path` waits until it is whole.
 pub fn partial_path(path: &Path) -> PathBuf {
-    path.with_extension("partial")
+    // A world file has the name of its picture but for the ending.
+    let is_world_file = path.extension().is_some_and(|ending| ending == "pgw");
+    path.with_extension(if is_world_file { "pgw.partial" } else { "partial" })
 }
 
 /// How many threads wait for the disk at the same time.

@@ -34,6 +34,7 @@ impl Leftovers {
             output.tileset(),
             output.georeference(),
             output.preview(),
+            output.preview_world(),
         ];
         // People give their own pages this name too.
         let page = output.page();

@@ -6,7 +6,9 @@ use crate::job::plan::input_identity::{InputIdentities, RenamedInputs};
 use crate::job::plan::inputs::input_paths;
 use crate::job::plan::lattice_choice::LatticeCoarsening;
 use crate::output::checksums::Checksum;
-use crate::output::options::ColorChoice;
+use crate::output::geoid::errors::not_opened;
+use crate::output::geoid::option::HeightOffset;
+use crate::output::options::{ColorChoice, OutputOptions};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -47,7 +49,7 @@ pub struct JobIdentity {
 
 /// Version of the records in the store, of the plan, of the names of results, and of which nodes merge. It changes with every change of these, so that no
 /// run misreads what another version left.
-pub(crate) const LAYOUT: u32 = 14;
+pub(crate) const LAYOUT: u32 = 15;
 
 /// What the results of a job depend on.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -97,7 +99,7 @@ impl Fingerprint {
         Ok(Fingerprint {
             program: format!("gdt-batch {}, layout {LAYOUT}, {order}", env!("CARGO_PKG_VERSION")),
             mesh,
-            style: named_values(&options.output, "output", &["directory"])?,
+            style: style_of(&options.output)?,
             memory: options.limits.memory.0,
             files,
         })
@@ -192,6 +194,16 @@ impl Fingerprint {
     pub(crate) fn with_names_of(&self, earlier: &Fingerprint) -> Fingerprint {
         Fingerprint { files: earlier.files.clone(), ..self.clone() }
     }
+}
+
+/// Returns the options that only the style of the tiles depends on. A geoid grid counts by its content: it may lie elsewhere now.
+fn style_of(output: &OutputOptions) -> Result<Map<String, Value>> {
+    let mut style = named_values(output, "output", &["directory"])?;
+    if let Some(grid) = output.height_offset.as_ref().and_then(HeightOffset::grid) {
+        let content = Checksum::of_file(grid).map_err(|e| not_opened(grid, e))?.1;
+        style.insert("[output] height_offset".into(), format!("a grid with the checksum {content}").into());
+    }
+    Ok(style)
 }
 
 /// Returns the options of a table by the names that the user knows.

@@ -12,6 +12,7 @@ use crate::job::plan::make_plan::make_plan;
 use crate::job::preflight::estimate::{self, DiskEstimate};
 use crate::job::preflight::kept_points::{KeptPoints, has_filter};
 use crate::job::progress::number_text::{grouped, mebibytes};
+use crate::job::publish::height_offset_check::check_height_offset;
 use crate::job::publish::one_file_limits::MAX_TRIANGLES_IN_ONE_FILE;
 use crate::job::report::skipped_inputs::write_skipped;
 use crate::{Error, Result, Warnings, address_space};
@@ -77,6 +78,7 @@ pub fn check(options: &JobOptions) -> Result<Preflight> {
     check_nothing_in_the_way(&directory)?;
     check_results_are_ours(&directory, options.output.page)?;
     let plan = make_plan(options, LatticeCoarsening::default())?;
+    check_height_offset(&plan)?;
     let threads = workers(options, plan.records)?;
     if has_filter(&plan) {
         closer_look(&plan, threads)

@@ -3,7 +3,8 @@
 use crate::geometry::Bounds;
 use crate::input::Crs;
 use crate::output::frame::Frame;
-use crate::output::tiles3d::globe::{Globe, transform_point};
+use crate::output::geoid::Geoid;
+use crate::output::tiles3d::globe::{Globe, NotPlaced, transform_point};
 use crate::output::tiles3d::tileset::{TilesetNode, bounds_in_metres};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -28,42 +29,26 @@ pub struct Placement {
     pub distortion_m: f64,
     /// What the heights count from, if the inputs say. The tileset takes them as heights above the ellipsoid anyway.
     pub vertical_datum: Option<String>,
-    /// Metres added to heights.
+    /// Metres added to heights in the middle of the terrain.
     pub height_offset: f64,
-}
-
-/// Why a terrain cannot be placed on the globe.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct NotPlaced(String);
-
-impl From<String> for NotPlaced {
-    fn from(why: String) -> NotPlaced {
-        NotPlaced(why)
-    }
+    /// The model of the geoid that says what is added to heights; `None` if it is the same everywhere.
+    pub geoid: Option<String>,
 }
 
 /// The way from the scene to the globe.
-struct Ground<'a> {
+pub(super) struct Ground<'a> {
     frame: &'a Frame,
     globe: Globe,
-    /// The height of the scene's origin above the ellipsoid in metres.
+    /// The height of the scene's origin above the geoid in metres.
     base: f64,
 }
 
-/// Places `root`, and each tile below if need be. `height_offset` is added to heights, in metres.
+/// Places `root`, and each tile below if need be. Heights count from `geoid`.
 ///
 /// # Errors
 /// [`NotPlaced`] says why the terrain cannot be placed; then nothing is.
-pub fn place(crs: &Crs, frame: &Frame, height_offset: f64, root: &mut TilesetNode) -> Result<Placement, NotPlaced> {
-    let definition = crs.proj4_definition().ok_or_else(|| match &crs.name {
-        Some(name) => format!("{name} has no definition that leads to longitude and latitude"),
-        None => "no input names its coordinate system".to_string(),
-    });
-    let extras = frame.extras();
-    let definition = with_unit(&definition.map_err(NotPlaced)?, extras.metres_per_unit);
-    let globe = Globe::new(&definition, extras.metres_per_unit)?;
-    let ground = Ground { frame, globe, base: extras.offset[2] * extras.metres_per_unit_z + height_offset };
+pub fn place(crs: &Crs, frame: &Frame, geoid: Geoid, root: &mut TilesetNode) -> Result<Placement, NotPlaced> {
+    let (ground, definition) = Ground::new(crs, frame, geoid)?;
     let transform = ground.tangent(root.middle)?;
     let mut distortion_m = ground.distortion(&transform, root.bounds)?;
     let per_tile = distortion_m > ONE_TRANSFORM && !root.children.is_empty();
@@ -74,7 +59,16 @@ pub fn place(crs: &Crs, frame: &Frame, height_offset: f64, root: &mut TilesetNod
         *root = placed;
     }
     root.transform = Some(transform);
-    Ok(Placement { definition, transform, per_tile, distortion_m, vertical_datum: crs.vertical_name(), height_offset })
+    let (height_offset, geoid) = (ground.height_offset(root.middle)?, ground.globe.geoid_model().map(str::to_owned));
+    Ok(Placement {
+        definition,
+        transform,
+        per_tile,
+        distortion_m,
+        vertical_datum: crs.vertical_name(),
+        height_offset,
+        geoid,
+    })
 }
 
 /// Returns the system of `definition` with coordinates in units of `metres`. A file may say another unit than the code that it names.
@@ -95,7 +89,26 @@ fn with_unit(definition: &str, metres: f64) -> String {
     format!("{} +to_meter={metres}", others.join(" "))
 }
 
-impl Ground<'_> {
+impl<'a> Ground<'a> {
+    /// Returns the way to the globe, and the definition of the system that it begins in.
+    pub(super) fn new(crs: &Crs, frame: &'a Frame, geoid: Geoid) -> Result<(Ground<'a>, String), NotPlaced> {
+        let definition = crs.proj4_definition().ok_or_else(|| match &crs.name {
+            Some(name) => format!("{name} has no definition that leads to longitude and latitude"),
+            None => "no input names its coordinate system".to_string(),
+        })?;
+        let extras = frame.extras();
+        let definition = with_unit(&definition, extras.metres_per_unit);
+        let globe = Globe::new(&definition, extras.metres_per_unit, geoid)?;
+        Ok((Ground { frame, globe, base: extras.offset[2] * extras.metres_per_unit_z }, definition))
+    }
+
+    /// Returns the metres that are added to heights at a lattice point.
+    pub(super) fn height_offset(&self, [x, y]: [i32; 2]) -> Result<f64, NotPlaced> {
+        let [[east, north, _], _] = bounds_in_metres(self.frame, Bounds::of_point([x, y, 0]));
+        let [source_x, source_y] = self.source([east, north]);
+        self.globe.height_offset(source_x, source_y)
+    }
+
     /// Gives every tile from `node` down a transform of its own, and returns the greatest distortion of the exact ones.
     ///
     /// A place is then not quite where it is in the exact tile below, by at most the distortion of both tiles. A viewer that shows
@@ -144,7 +157,11 @@ impl Ground<'_> {
             let [x, y] = [0, 1].map(|k| low[k] + (high[k] - low[k]) * share[k]);
             let z = if i < PLACES * PLACES { low[2] } else { high[2] };
             let [source_x, source_y] = self.source([x, y]);
-            let belongs = self.globe.place(source_x, source_y, self.base + z)?;
+            let belongs = match self.globe.place(source_x, source_y, self.base + z) {
+                // The corners of a box may lie beyond the geoid's grid although no point does.
+                Err(NotPlaced::Height(_)) => continue,
+                place => place?,
+            };
             let found = transform_point(transform, [x, y, z]);
             greatest = greatest.max((0..3).map(|k| (found[k] - belongs[k]).powi(2)).sum::<f64>().sqrt());
         }
@@ -168,4 +185,18 @@ pub fn placement_warning(placement: &Result<Placement, NotPlaced>) -> Option<Str
              [output] max_edge"
         )
     })
+}
+
+/// Returns what the user should know about the heights of a terrain on the globe, where no option says what to add to them.
+pub fn heights_warning(crs: &Crs) -> Option<String> {
+    let from = match &crs.vertical_system {
+        _ if crs.has_ellipsoidal_heights() => return None,
+        Some(system) => format!("count from {}", system.label()),
+        None => "may count from the sea: no input says from what".to_string(),
+    };
+    Some(format!(
+        "the heights {from}, and tileset.json is placed on the globe as if they counted from the ellipsoid, which may be tens of metres off; \
+         set [output] height_offset to \"egm96\" (a geoid of the whole earth), to the path of a geoid grid (.gtx or .tif), or to a number of \
+         metres; 0.0 leaves the heights as they are"
+    ))
 }

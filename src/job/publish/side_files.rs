@@ -10,6 +10,8 @@ use crate::output::frame::Frame;
 use crate::output::gltf::one_file::write_terrain;
 use crate::output::page::page_for;
 use crate::output::preview::canvas::{Canvas, PreviewPixel};
+use crate::output::preview::layout::world_file;
+use crate::output::preview::panel::Legend;
 use crate::output::preview::picture::Picture;
 use crate::output::tiles3d::tileset::{TilesetNode, write_tilesets};
 use crate::{Error, Result, disk};
@@ -25,6 +27,10 @@ pub struct SideFiles<'a> {
     pub one_file: bool,
     /// Whether there is to be a page that shows the terrain.
     pub page: bool,
+    /// Whose the data are, if the user says.
+    pub copyright: Option<&'a str>,
+    /// Whether colours stand for heights in the preview.
+    pub has_ramp: bool,
 }
 
 /// Writes the files beside the tiles and returns the number of their bytes.
@@ -41,10 +47,11 @@ pub fn write_side_files(
     let output = directory.output();
     let mut files = vec![
         write_pending(&output.georeference(), content.georeference.as_bytes())?,
-        write_pending(&output.preview(), &draw_preview(canvas, tiles)?)?,
+        write_pending(&output.preview(), &draw_preview(canvas, content.has_ramp, tiles)?)?,
+        write_pending(&output.preview_world(), world_file(canvas).as_bytes())?,
     ];
     if let Some((frame, root)) = &content.tileset {
-        files.extend(pending_tilesets(directory, frame, root)?);
+        files.extend(pending_tilesets(directory, frame, root, content.copyright)?);
     }
     if content.page {
         let opened = if content.tileset.is_some() { output.tileset() } else { output.terrain() };
@@ -58,7 +65,7 @@ pub fn write_side_files(
             paths.extend(written(output.tile(tile.number()))?);
             Ok(())
         })?;
-        write_terrain(&partial_path(&output.terrain()), &paths)?;
+        write_terrain(&partial_path(&output.terrain()), &paths, content.copyright)?;
         files.push(find_pending(&output.terrain())?);
     }
     let bytes = files.iter().map(|file| file.bytes).sum();
@@ -66,9 +73,14 @@ pub fn write_side_files(
 }
 
 /// Writes `tileset.json` and the external tilesets.
-fn pending_tilesets(directory: &JobDirectory, frame: &Frame, root: &TilesetNode) -> Result<Vec<PendingFile>> {
+fn pending_tilesets(
+    directory: &JobDirectory,
+    frame: &Frame,
+    root: &TilesetNode,
+    copyright: Option<&str>,
+) -> Result<Vec<PendingFile>> {
     let (output, mut files) = (directory.output(), Vec::new());
-    write_tilesets(frame, root, |number, text| {
+    write_tilesets(frame, root, copyright, |number, text| {
         let path = number.map_or_else(|| output.tileset(), |number| output.external_tileset(number));
         create_folder_of(&path)?;
         files.push(write_pending(&path, text.as_bytes())?);
@@ -101,11 +113,11 @@ impl EachTile for StoredTiles<'_> {
 }
 
 /// Returns the preview as PNG.
-fn draw_preview(canvas: &Canvas, tiles: &dyn EachTile) -> Result<Vec<u8>> {
+fn draw_preview(canvas: &Canvas, has_ramp: bool, tiles: &dyn EachTile) -> Result<Vec<u8>> {
     let mut picture = Picture::new(canvas);
     tiles.visit(&mut |store, tile| {
-        picture.add(tile.0, &ColumnReader::open(store, StepRecord::Pixels(tile))?.column::<PreviewPixel>()?);
+        picture.add(&ColumnReader::open(store, StepRecord::Pixels(tile))?.column::<PreviewPixel>()?);
         Ok(())
     })?;
-    picture.png()
+    picture.png(&Legend::new(canvas, has_ramp))
 }

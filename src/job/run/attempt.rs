@@ -15,6 +15,7 @@ use crate::job::plan::make_plan::make_plan;
 use crate::job::preflight::check::require_room;
 use crate::job::progress::clock::JobClock;
 use crate::job::progress::stage::{JobProgress, ProgressOutput};
+use crate::job::publish::height_offset_check::check_height_offset;
 use crate::job::report::job_report::Report;
 use crate::job::run::alone::Alone;
 use crate::job::run::damage::damaged_by_tasks;
@@ -188,6 +189,7 @@ fn attempt(
         Some(plan) => plan,
         None => on_threads(workers(options, 0)?, || make_plan(options, coarsening))?,
     };
+    check_height_offset(&plan)?;
     stage.advance(1);
     let planned = stage.finish();
     let progress = &JobProgress::new(run.progress, clock, stage_costs(&plan));

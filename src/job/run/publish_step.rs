@@ -8,7 +8,7 @@ use crate::job::levels::make_level::LevelStats;
 use crate::job::mesh::leaf::LeafStats;
 use crate::job::plan::job_plan::Plan;
 use crate::job::publish::one_file_limits::{fits_one_file, too_large_for_one_file};
-use crate::job::publish::placement::{place, placement_warning};
+use crate::job::publish::placement::{heights_warning, place, placement_warning};
 use crate::job::publish::side_files::{EachTile, SideFiles, write_side_files};
 use crate::job::records::{JobStep, StepOutput};
 use crate::job::report::job_report::{Report, ReportParts, SlowestPart};
@@ -17,9 +17,12 @@ use crate::job::run::run_context::RunContext;
 use crate::job::run::tile_queue::TileLook;
 use crate::job::tiles::write_tile::TileStats;
 use crate::output::checksums::list_text;
+use crate::output::color::Coloring;
+use crate::output::geoid::Geoid;
 use crate::output::options::OutputFormat;
 use crate::output::tiles3d::division::divide;
 use crate::output::tiles3d::georeference::Georeference;
+use crate::output::tiles3d::globe::NotPlaced;
 use crate::output::tiles3d::tileset::TilesetNode;
 use crate::threads::run_concurrently;
 use crate::{Error, Result, Warnings};
@@ -112,8 +115,15 @@ pub(crate) fn publish(
     let output = &plan.options.output;
     let (mut warnings, mut text, mut placement, mut stats) = (Warnings::default(), None, None, LevelStats::default());
     if let Some(TilesetContent { mut root, levels }) = tileset {
-        let placed = place(&plan.crs, &look.style.frame, output.height_offset, &mut root);
+        let geoid = Geoid::open(output.height_offset.as_ref())?;
+        let placed = match place(&plan.crs, &look.style.frame, geoid, &mut root) {
+            Err(NotPlaced::Height(error)) => return Err(error),
+            placed => placed,
+        };
         warnings.extend(placement_warning(&placed));
+        if placed.is_ok() && output.height_offset.is_none() {
+            warnings.extend(heights_warning(&plan.crs));
+        }
         warnings.extend(left_out_warning(plan, &levels));
         divide(&mut root);
         text = Some((&look.style.frame, root));
@@ -127,6 +137,8 @@ pub(crate) fn publish(
         tileset: text,
         one_file: fits && output.format != OutputFormat::Tiles3d,
         page: output.page,
+        copyright: output.copyright(),
+        has_ramp: matches!(look.style.coloring, None | Some(Coloring::Elevation(_))),
     };
     if content.one_file {
         // terrain.glb is made from the tiles, which must have their names.

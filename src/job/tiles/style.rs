@@ -21,6 +21,8 @@ pub struct TileStyle {
     pub compression: Compression,
     /// Which triangles are left out.
     pub max_edge: MaxEdgeRule,
+    /// Whose the data are, if the user says.
+    pub copyright: Option<String>,
 }
 
 impl TileStyle {
@@ -40,6 +42,7 @@ impl TileStyle {
             Compression::None => plan.frame.clone().refined(bounds),
             _ => plan.frame.clone().packed(),
         };
-        TileStyle { frame, coloring, normals: output.normals, compression, max_edge }
+        let copyright = output.copyright().map(str::to_owned);
+        TileStyle { frame, coloring, normals: output.normals, compression, max_edge, copyright }
     }
 }

@@ -96,7 +96,7 @@ thread_local! {
 pub fn write_glb(path: &Path, content: &Tile, style: &TileStyle) -> Result<PendingFile> {
     create_folder_of(path)?;
     GLB.with_borrow_mut(|glb| {
-        glb.encode(&style.frame, content, style.compression)?;
+        glb.encode(&style.frame, content, style.compression, style.copyright.as_deref())?;
         write_pending_pieces(path, &glb.pieces())
     })
 }

@@ -247,13 +247,13 @@ impl<'a> DocumentBuilder<'a> {
     }
 
     /// Returns the JSON text and the binary chunk.
-    pub(crate) fn finish(mut self) -> Result<(Vec<u8>, Vec<u8>)> {
+    pub(crate) fn finish(mut self, copyright: Option<&str>) -> Result<(Vec<u8>, Vec<u8>)> {
         let extras = serde_json::value::to_raw_value(self.frame.extras())
             .map_err(|e| Error::Broken(format!("the georeference of a tile cannot be written: {e}")))?;
         let nodes = (0..self.root.nodes.len() as u32).map(Index::new).collect();
         let scene = self.root.push(Scene { nodes, extras: Some(extras), extensions: None, name: None });
         self.root.scene = Some(scene);
-        self.root.asset = asset();
+        self.root.asset = asset(copyright);
         if !self.root.nodes.is_empty() {
             self.add_buffers();
         }
@@ -304,9 +304,9 @@ impl ElementType {
     }
 }
 
-/// Returns the version of glTF and the name of this program.
-pub(crate) fn asset() -> Asset {
-    Asset { generator: Some(GENERATOR.into()), ..Asset::default() }
+/// Returns the version of glTF, the name of this program, and whose the data are.
+pub(crate) fn asset(copyright: Option<&str>) -> Asset {
+    Asset { generator: Some(GENERATOR.into()), copyright: copyright.map(str::to_owned), ..Asset::default() }
 }
 
 /// Returns a buffer of `length` bytes.

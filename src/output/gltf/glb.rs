@@ -16,12 +16,18 @@ pub struct GlbEncoder {
 }
 
 impl GlbEncoder {
-    /// Encodes the file of `tile`. The same tile gives the same bytes. Unless `compression` is none, `frame` should be
-    /// [`Frame::packed`].
+    /// Encodes the file of `tile`, whose rights `copyright` tells. The same tile gives the same bytes. Unless `compression` is none,
+    /// `frame` should be [`Frame::packed`].
     ///
     /// # Errors
     /// [`crate::Error::Config`] if a triangle is too long to be exact in f32 ([`Frame::longest_triangle`]) or the file would pass 4 GiB.
-    pub fn encode(&mut self, frame: &Frame, tile: &Tile, compression: Compression) -> Result<()> {
+    pub fn encode(
+        &mut self,
+        frame: &Frame,
+        tile: &Tile,
+        compression: Compression,
+        copyright: Option<&str>,
+    ) -> Result<()> {
         let parts = match compression {
             Compression::None => split(frame, tile)?,
             _ => split_short(frame, tile)?,
@@ -31,7 +37,7 @@ impl GlbEncoder {
             document.add_part(part)?;
         }
         self.head.clear();
-        let (json, binary) = document.finish()?;
+        let (json, binary) = document.finish(copyright)?;
         write_head(json, binary.len() as u64, &mut self.head)?;
         self.binary = binary;
         Ok(())

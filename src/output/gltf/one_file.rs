@@ -19,12 +19,12 @@ use crate::output::gltf::stored_view::StoredView;
 use crate::{Error, Result, disk, interrupt};
 
 /// Writes to `out` one GLB file with all tiles (GLB files of one job, at least one) as nodes of one scene, in this order.
-/// One tile is held in memory at a time, and the descriptions of all.
+/// One tile is held in memory at a time, and the descriptions of all. `copyright` tells whose the data are.
 ///
 /// # Errors
 /// [`Error::Config`] if the file would pass the 4 GiB that a GLB file can have, [`Error::Input`] if a tile is damaged,
 /// [`Error::Io`] if a file cannot be read or written.
-pub fn write_terrain(out: &Path, tiles: &[PathBuf]) -> Result<()> {
+pub fn write_terrain(out: &Path, tiles: &[PathBuf], copyright: Option<&str>) -> Result<()> {
     let mut joined = JoinedDocument::default();
     for path in tiles {
         let file = GlbFile::open(path)?;
@@ -32,7 +32,7 @@ pub fn write_terrain(out: &Path, tiles: &[PathBuf]) -> Result<()> {
     }
     let length = joined.length;
     let mut head = Vec::new();
-    write_head(joined.finish()?, length, &mut head)?;
+    write_head(joined.finish(copyright)?, length, &mut head)?;
     let file = disk::create(out).map_err(Error::io("create", out))?;
     let mut file = BufWriter::with_capacity(1 << 20, WriteFrom { file: &file, at: 0 });
     file.write_all(&head).map_err(Error::io("write", out))?;
@@ -131,12 +131,12 @@ impl JoinedDocument {
     }
 
     /// Returns the JSON text.
-    fn finish(mut self) -> Result<Vec<u8>> {
+    fn finish(mut self, copyright: Option<&str>) -> Result<Vec<u8>> {
         let nodes = (0..self.root.nodes.len() as u32).map(Index::new).collect();
         let extras = self.scene.and_then(|scene| scene.extras);
         let scene = self.root.push(Scene { nodes, extras, extensions: None, name: None });
         self.root.scene = Some(scene);
-        self.root.asset = asset();
+        self.root.asset = asset(copyright);
         self.root.push(buffer(self.length));
         if self.quantized {
             self.root.extensions_used = vec![QUANTIZATION.into()];

@@ -9,6 +9,7 @@ use crate::geometry::Bounds;
 use crate::output::color::{HeightRange, height_color, to_srgb};
 use crate::output::frame::Frame;
 use crate::output::normals::{cross, unit_normal};
+use crate::output::preview::sliver::{SLIVER_ROWS, Sliver};
 use crate::output::tile::Tile;
 use crate::{Result, interrupt};
 
@@ -80,6 +81,35 @@ impl Canvas {
         [self.width, self.height]
     }
 
+    /// Returns the way from the lattice to the source.
+    pub fn frame(&self) -> &Frame {
+        &self.frame
+    }
+
+    /// Returns what the ramp of heights spans.
+    pub fn heights(&self) -> HeightRange {
+        self.heights
+    }
+
+    /// Returns the side of a pixel in source units.
+    pub fn pixel_size(&self) -> f64 {
+        self.steps(self.pitch) * self.frame.extras().resolution
+    }
+
+    /// Returns the source's x and y in the middle of the pixel in the north-western corner.
+    pub fn first_pixel(&self) -> [f64; 2] {
+        let (extras, corner) =
+            (self.frame.extras(), self.frame.world([self.corner[0] as i32, self.corner[1] as i32, 0]));
+        let inside = self.steps(self.center) * extras.resolution;
+        let [east, north] = [corner[0], -corner[2]].map(|metres| metres / extras.metres_per_unit);
+        [extras.offset[0] + east + inside, extras.offset[1] + north - inside]
+    }
+
+    /// Returns subdivisions as lattice steps.
+    fn steps(&self, subdivisions: i64) -> f64 {
+        subdivisions as f64 / (1u64 << self.shift) as f64
+    }
+
     /// Returns the pixels whose centres the triangles of `tile` cover.
     ///
     /// # Errors
@@ -147,7 +177,8 @@ impl<'a> DrawnTriangle<'a> {
     }
 
     fn draw(&self, columns: [i64; 2], rows: [i64; 2], pixels: &mut Vec<PreviewPixel>) {
-        let sliver = (rows[1] - rows[0] >= SLIVER_ROWS).then(|| Sliver::new(self));
+        let sliver =
+            (rows[1] - rows[0] >= SLIVER_ROWS).then(|| Sliver::new(self.places, self.canvas.center, self.canvas.pitch));
         for row in rows[0]..rows[1] {
             if sliver.as_ref().is_some_and(|sliver| sliver.misses(row)) {
                 continue;
@@ -189,68 +220,6 @@ impl<'a> DrawnTriangle<'a> {
             (value, step)
         });
         (edges, range)
-    }
-}
-
-/// The borders of a high triangle in floating point. Most rows of a sliver lie between two centres, and this finds most of those rows
-/// without a division. The exact edge functions decide the others.
-struct Sliver {
-    /// The rows of the three corners, from above.
-    rows: [f64; 3],
-    /// From the first corner to the last.
-    long: Border,
-    /// From the first corner to the second, and from there to the last.
-    short: [Border; 2],
-}
-
-/// Triangles over fewer rows are drawn without a look at their borders.
-const SLIVER_ROWS: i64 = 16;
-
-/// A line by its column in row 0 and the columns that it moves in a row.
-#[derive(Clone, Copy)]
-struct Border {
-    column: f64,
-    slope: f64,
-}
-
-impl Border {
-    fn between(a: [f64; 2], b: [f64; 2]) -> Border {
-        let slope = if b[0] > a[0] { (b[1] - a[1]) / (b[0] - a[0]) } else { 0.0 };
-        Border { column: a[1] - slope * a[0], slope }
-    }
-
-    fn at(self, row: f64) -> f64 {
-        self.column + self.slope * row
-    }
-}
-
-impl Sliver {
-    fn new(triangle: &DrawnTriangle) -> Sliver {
-        let canvas = triangle.canvas;
-        let mut corners = triangle.places.map(|p| [1, 0].map(|k| (p[k] - canvas.center) as f64 / canvas.pitch as f64));
-        corners.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
-        let [a, b, c] = corners;
-        Sliver {
-            rows: corners.map(|corner| corner[0]),
-            long: Border::between(a, c),
-            short: [Border::between(a, b), Border::between(b, c)],
-        }
-    }
-
-    /// Tells whether the triangle surely covers no centre in `row`.
-    fn misses(&self, row: i64) -> bool {
-        let row = row as f64;
-        let [first, second, last] = self.rows;
-        // Within a row of a corner a border may be so flat that rounding moves it far.
-        if row < first + 1.0 || (row - second).abs() < 1.0 || row > last - 1.0 {
-            return false;
-        }
-        let (a, b) = (self.long.at(row), self.short[usize::from(row > second)].at(row));
-        // Far more than rounding can move a border that is at least a row high. Borders lie within the corners' columns, so two more are
-        // positive, and are rounded down without a call.
-        let spare = 1e-4;
-        let column_below = |at: f64| (at + 2.0) as i64;
-        column_below(a.min(b) - spare) == column_below(a.max(b) + spare)
     }
 }
 

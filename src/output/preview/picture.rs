@@ -1,6 +1,8 @@
 //! Puts the pixels of all tiles together, shades them and writes the PNG.
 
 use crate::output::preview::canvas::{Canvas, PreviewPixel};
+use crate::output::preview::layout::Layout;
+use crate::output::preview::panel::Legend;
 use crate::{Error, Result};
 use rayon::prelude::*;
 
@@ -22,52 +24,43 @@ const AMBIENT: f32 = 0.35;
 /// The brightness that direct light adds on flat ground.
 const DIRECT: f32 = 0.65;
 
-/// The brightness of a tile's border.
-const BORDER: f32 = 0.6;
-
-/// Borders are not drawn if tiles have fewer pixels than this on average: the picture would be full of them.
-const LEAST_TILE: usize = 150;
-
-/// The entry of [`Picture::owner`] for a pixel without a triangle.
-const NO_TILE: u32 = 0;
-
 /// The picture of a terrain. It is transparent where there is no triangle.
 pub struct Picture {
-    width: usize,
+    size: [usize; 2],
     pixels: Vec<PreviewPixel>,
-    /// For every pixel the number of its tile plus 1, or [`NO_TILE`].
-    owner: Vec<u32>,
-    tiles: usize,
+    /// Whether a pixel has a triangle.
+    covered: Vec<bool>,
 }
 
 impl Picture {
-    /// Returns an empty picture, which takes 16 bytes a pixel.
+    /// Returns an empty picture, which takes 13 bytes a pixel.
     pub fn new(canvas: &Canvas) -> Picture {
-        let [width, height] = canvas.size().map(|v| v as usize);
+        let size = canvas.size().map(|v| v as usize);
         let empty: PreviewPixel = bytemuck::Zeroable::zeroed();
-        Picture { width, pixels: vec![empty; width * height], owner: vec![NO_TILE; width * height], tiles: 0 }
+        Picture { size, pixels: vec![empty; size[0] * size[1]], covered: vec![false; size[0] * size[1]] }
     }
 
-    /// Adds the pixels that [`Canvas::draw`] returned for tile number `tile`.
-    pub fn add(&mut self, tile: u32, pixels: &[PreviewPixel]) {
-        self.tiles += 1;
+    /// Adds the pixels that [`Canvas::draw`] returned for a tile.
+    pub fn add(&mut self, pixels: &[PreviewPixel]) {
         for pixel in pixels {
-            if let Some(owner) = self.owner.get_mut(pixel.pixel as usize) {
-                *owner = tile.saturating_add(1);
+            if let Some(covered) = self.covered.get_mut(pixel.pixel as usize) {
+                *covered = true;
                 self.pixels[pixel.pixel as usize] = *pixel;
             }
         }
     }
 
-    /// Returns the picture as a PNG file.
+    /// Returns the picture with the strip of its legend below as a PNG file.
     ///
     /// # Errors
     /// [`Error::Broken`] if the encoder refuses it.
-    pub fn png(&self) -> Result<Vec<u8>> {
-        let pixels = self.shaded();
+    pub fn png(&self, legend: &Legend) -> Result<Vec<u8>> {
+        let layout = Layout::of(self.size);
+        let [width, height] = layout.size.map(|v| v as u32);
+        let mut pixels = layout.framed(&self.shaded());
+        pixels.extend(legend.draw(layout.size[0]));
         let mut bytes = Vec::new();
-        let height = self.pixels.len() / self.width;
-        let mut encoder = png::Encoder::new(&mut bytes, self.width as u32, height as u32);
+        let mut encoder = png::Encoder::new(&mut bytes, width, height);
         encoder.set_color(png::ColorType::Rgba);
         encoder.set_depth(png::BitDepth::Eight);
         // This takes a tenth of the time and a fifth more bytes.
@@ -80,31 +73,22 @@ impl Picture {
 
     fn shaded(&self) -> Vec<[u8; 4]> {
         let exaggeration = self.exaggeration();
-        let covered = self.owner.iter().filter(|&&owner| owner != NO_TILE).count();
-        let borders = covered >= LEAST_TILE * self.tiles;
         let shade = |i: usize| {
-            if self.owner[i] == NO_TILE {
+            if !self.covered[i] {
                 return [0; 4];
             }
-            let border = if borders && self.is_border(i) { BORDER } else { 1.0 };
-            let light = brightness(self.pixels[i], exaggeration) * border;
+            let light = brightness(self.pixels[i], exaggeration);
             let [r, g, b] = self.pixels[i].color.map(|v| (v as f32 * light).min(255.0) as u8);
             [r, g, b, 255]
         };
-        (0..self.pixels.len()).into_par_iter().with_min_len(self.width).map(shade).collect()
-    }
-
-    /// Tells whether the next pixel to the right or below belongs to another tile.
-    fn is_border(&self, i: usize) -> bool {
-        let differs = |j: usize| self.owner.get(j).is_some_and(|&owner| owner != NO_TILE && owner != self.owner[i]);
-        (!(i + 1).is_multiple_of(self.width) && differs(i + 1)) || differs(i + self.width)
+        (0..self.pixels.len()).into_par_iter().with_min_len(self.size[0]).map(shade).collect()
     }
 
     /// Returns the factor that brings the slope at [`STEEP_SHARE`] of the terrain to [`TARGET_SLOPE`].
     fn exaggeration(&self) -> f32 {
         // Classes of slope by exponent and three binary digits, finer than the eye.
         let mut histogram = [0u64; 2048];
-        let pixels = self.pixels.iter().zip(&self.owner).filter(|&(_, &owner)| owner != NO_TILE);
+        let pixels = self.pixels.iter().zip(&self.covered).filter(|&(_, &covered)| covered);
         for (pixel, _) in pixels {
             let [x, y, z] = normal(*pixel);
             let steepness = (x * x + y * y).sqrt() / z;

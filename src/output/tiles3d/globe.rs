@@ -3,6 +3,8 @@
 //! The sines of this file and of `proj4rs` come from the machine's mathematics library, so the last digits of a transform may differ
 //! between machines.
 
+use crate::Error;
+use crate::output::geoid::Geoid;
 use glam::{DAffine3, DMat4};
 use proj4rs::Proj;
 use proj4rs::transform::transform;
@@ -13,34 +15,54 @@ const SEMI_MAJOR: f64 = 6_378_137.0;
 /// The square of the eccentricity of the WGS 84 ellipsoid.
 const ECCENTRICITY_2: f64 = 0.006_694_379_990_141_317;
 
+/// Why a terrain, or a place of it, is not on the globe.
+#[derive(Debug, thiserror::Error)]
+pub enum NotPlaced {
+    /// Its coordinate system does not lead there.
+    #[error("{0}")]
+    System(String),
+    /// What to add to heights there is not known: the job cannot do what its configuration says.
+    #[error("{0}")]
+    Height(Error),
+}
+
+impl From<String> for NotPlaced {
+    fn from(why: String) -> NotPlaced {
+        NotPlaced::System(why)
+    }
+}
+
 /// The map from a projected system to the ellipsoid.
 pub struct Globe {
     from: Proj,
     to: Proj,
     /// Metres in a unit of x and y.
     metres_per_unit: f64,
+    /// What is added to heights.
+    geoid: Geoid,
 }
 
 impl Globe {
-    /// Returns the map from the system that `definition` describes in the form of PROJ.4.
+    /// Returns the map from the system that `definition` describes in the form of PROJ.4. Its heights count from `geoid`.
     ///
     /// # Errors
     /// A sentence that says why there is no such map.
-    pub fn new(definition: &str, metres_per_unit: f64) -> Result<Globe, String> {
+    pub fn new(definition: &str, metres_per_unit: f64, geoid: Geoid) -> Result<Globe, String> {
         let parse = |text: &str| Proj::from_proj_string(text).map_err(|e| format!("{text}: {e}"));
         let from = parse(definition)?;
         if from.is_latlong() || from.is_geocent() {
             return Err("it is not a projected system".into());
         }
-        Ok(Globe { from, to: parse("+proj=longlat +datum=WGS84 +no_defs")?, metres_per_unit })
+        Ok(Globe { from, to: parse("+proj=longlat +datum=WGS84 +no_defs")?, metres_per_unit, geoid })
     }
 
-    /// Returns the earth-centred x, y, z in metres of the place at `x`, `y` (source units), `height` metres above the ellipsoid.
+    /// Returns the earth-centred x, y, z in metres of the place at `x`, `y` (source units), `height` metres above the geoid.
     ///
     /// # Errors
-    /// A sentence if the place is outside the range of the projection.
-    pub fn place(&self, x: f64, y: f64, height: f64) -> Result<[f64; 3], String> {
+    /// [`NotPlaced::System`] if the place is outside the range of the projection, [`NotPlaced::Height`] if it is outside the geoid's.
+    pub fn place(&self, x: f64, y: f64, height: f64) -> Result<[f64; 3], NotPlaced> {
         let [longitude, latitude] = self.geographic(x, y)?;
+        let height = height + self.height_of_geoid([longitude, latitude])?;
         let (sin, cos) = latitude.sin_cos();
         let normal = SEMI_MAJOR / (1.0 - ECCENTRICITY_2 * sin * sin).sqrt();
         let around = (normal + height) * cos;
@@ -50,11 +72,31 @@ impl Globe {
     /// Returns the longitude and latitude of a place (source units) in radians.
     ///
     /// # Errors
-    /// As [`Globe::place`].
+    /// A sentence if the place is outside the range of the projection.
     pub fn geographic(&self, x: f64, y: f64) -> Result<[f64; 2], String> {
         let mut point = (x, y, 0.0);
         transform(&self.from, &self.to, &mut point).map_err(|e| e.to_string())?;
         if point.0.is_finite() && point.1.is_finite() { Ok([point.0, point.1]) } else { Err("out of range".into()) }
+    }
+
+    /// Returns the metres to add to heights at a place (source units).
+    ///
+    /// # Errors
+    /// As [`Globe::place`].
+    pub fn height_offset(&self, x: f64, y: f64) -> Result<f64, NotPlaced> {
+        self.height_of_geoid(self.geographic(x, y)?)
+    }
+
+    /// Returns what [`Globe::height_offset`] does, by longitude and latitude in radians.
+    fn height_of_geoid(&self, place: [f64; 2]) -> Result<f64, NotPlaced> {
+        // By multiplication alone, not by a function of the machine.
+        let [longitude, latitude] = place.map(|radians| radians * (180.0 / std::f64::consts::PI));
+        self.geoid.at(longitude, latitude).map_err(NotPlaced::Height)
+    }
+
+    /// Returns the name of the geoid's model; `None` for a number of metres.
+    pub fn geoid_model(&self) -> Option<&str> {
+        self.geoid.model()
     }
 
     /// Returns the linear map from metres east, north and up of (`x`, `y`, `height`) to earth-centred metres that is exact to first
@@ -62,11 +104,11 @@ impl Globe {
     ///
     /// # Errors
     /// As [`Globe::place`].
-    pub fn tangent(&self, x: f64, y: f64, height: f64) -> Result<[f64; 16], String> {
+    pub fn tangent(&self, x: f64, y: f64, height: f64) -> Result<[f64; 16], NotPlaced> {
         let origin = self.place(x, y, height)?;
         /// Metres. Differences over this distance lose little to rounding and little to the curvature.
         const STEP: f64 = 10.0;
-        let along = |dx: f64, dy: f64| -> Result<[f64; 3], String> {
+        let along = |dx: f64, dy: f64| -> Result<[f64; 3], NotPlaced> {
             let (dx, dy) = (dx * STEP / self.metres_per_unit, dy * STEP / self.metres_per_unit);
             let (ahead, behind) = (self.place(x + dx, y + dy, height)?, self.place(x - dx, y - dy, height)?);
             Ok([0, 1, 2].map(|k| (ahead[k] - behind[k]) / (2.0 * STEP)))

@@ -51,16 +51,17 @@ impl TilesetNode {
 type MetreBounds = [[f64; 3]; 2];
 
 /// Calls `write` with the number and the text of every file of the tileset below `root`: first the external tilesets, those below
-/// others first, then with `None` the main file. Only the texts of files that refer to each other are in memory at one time.
+/// others first, then with `None` the main file. `copyright` tells whose the data are. Only the texts of files that refer to each other are in memory at one time.
 ///
 /// # Errors
 /// The first error of `write`.
 pub fn write_tilesets<E>(
     frame: &Frame,
     root: &TilesetNode,
+    copyright: Option<&str>,
     mut write: impl FnMut(Option<usize>, &str) -> Result<(), E>,
 ) -> Result<(), E> {
-    let mut writer = TilesetWriter { frame, write: &mut write };
+    let mut writer = TilesetWriter { frame, copyright, write: &mut write };
     let (tile, _) = writer.tile(root, None, &tileset_uri(None))?;
     writer.file(None, root, tile)
 }
@@ -70,6 +71,7 @@ type WriteFile<'a, E> = &'a mut dyn FnMut(Option<usize>, &str) -> Result<(), E>;
 
 struct TilesetWriter<'a, E> {
     frame: &'a Frame,
+    copyright: Option<&'a str>,
     write: WriteFile<'a, E>,
 }
 
@@ -78,6 +80,10 @@ impl<E> TilesetWriter<'_, E> {
     fn file(&mut self, number: Option<usize>, node: &TilesetNode, mut tile: Value) -> Result<(), E> {
         tile["refine"] = "REPLACE".into();
         let mut asset = json!({"version": "1.1", "generator": GENERATOR});
+        // The name that glTF has for it: 3D Tiles have none, and viewers look for this one.
+        if let Some(copyright) = self.copyright {
+            asset["copyright"] = copyright.into();
+        }
         if number.is_none() {
             asset["extras"] = json!(self.frame.extras());
         }
@@ -192,7 +198,7 @@ mod tests {
             texts.insert(tileset_uri(number), serde_json::from_str(text).unwrap());
             Ok::<(), Infallible>(())
         };
-        write_tilesets(frame, root, keep).unwrap();
+        write_tilesets(frame, root, None, keep).unwrap();
         texts
     }
 

@@ -1,0 +1,155 @@
+//! How many points of each class and of each return a point cloud holds: for people, and as JSON.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::Result;
+use crate::input::points::record::PointRecord;
+use crate::input::points::record_sink::RecordSink;
+use crate::input::source::{FileFormat, Source};
+
+/// The names of the standard classes 0 to 22 (LAS 1.4 R15, table 17).
+const CLASSES: [&str; 23] = [
+    "never classified",
+    "unclassified",
+    "ground",
+    "low vegetation",
+    "medium vegetation",
+    "high vegetation",
+    "building",
+    "low noise",
+    "model key point",
+    "water",
+    "rail",
+    "road surface",
+    "overlap",
+    "wire guard",
+    "wire conductor",
+    "transmission tower",
+    "wire connector",
+    "bridge deck",
+    "high noise",
+    "overhead structure",
+    "ignored ground",
+    "snow",
+    "temporal exclusion",
+];
+
+/// The number of points of each kind. Points flagged as withheld count with the others.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Histogram {
+    /// Points by classification; empty if the file has none.
+    pub classes: BTreeMap<u8, u64>,
+    /// Points by the number of the return; empty if the file does not say. No return has the number 0: such points are not as they
+    /// should be.
+    pub returns: BTreeMap<u8, u64>,
+    /// Points that are flagged as withheld.
+    pub withheld: u64,
+    /// Records that cannot be read.
+    pub malformed: u64,
+}
+
+impl Histogram {
+    /// Counts all points of `source`, on the threads of the current rayon pool.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`] or [`crate::Error::Input`] if the file cannot be read or has changed since it was opened.
+    pub fn of(source: &Source) -> Result<Histogram> {
+        let count = |chunk| {
+            let mut counts = RecordCounts::default();
+            source.read_chunk(chunk, u64::MAX, false, &mut counts).map(|()| counts)
+        };
+        let none = RecordCounts::default;
+        let counts = (0..source.chunks()).into_par_iter().map(count).try_reduce(none, |a, b| Ok(a.with(&b)))?;
+        let returns = if source.format == FileFormat::Text { &[] } else { &counts.returns[..] };
+        Ok(Histogram {
+            classes: present(if source.has_class { &counts.classes } else { &[] }),
+            returns: present(returns),
+            withheld: counts.withheld,
+            malformed: counts.malformed,
+        })
+    }
+}
+
+/// Returns the counts that are not 0, each with its number.
+fn present(counts: &[u64]) -> BTreeMap<u8, u64> {
+    (0..=u8::MAX).zip(counts).filter(|(_, count)| **count > 0).map(|(number, count)| (number, *count)).collect()
+}
+
+impl fmt::Display for Histogram {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let class_name = |class: u8| CLASSES.get(class as usize).copied().unwrap_or("");
+        write_counts(f, "class", &self.classes, class_name)?;
+        write_counts(f, "return", &self.returns, |number| if number == 0 { "no return has this number" } else { "" })?;
+        for (name, count) in [("withheld", self.withheld), ("malformed", self.malformed)] {
+            if count > 0 {
+                writeln!(f, "  {name:<8} {count}")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Writes a line for each count: its number, the points, their share, and a name.
+fn write_counts(
+    f: &mut fmt::Formatter,
+    kind: &str,
+    counts: &BTreeMap<u8, u64>,
+    name: impl Fn(u8) -> &'static str,
+) -> fmt::Result {
+    let all = counts.values().sum::<u64>().max(1);
+    for (number, count) in counts {
+        let share = *count as f64 * 100.0 / all as f64;
+        let line = format!("  {kind:<8} {number:>3} {count:>14} {share:>5.1} %  {}", name(*number));
+        writeln!(f, "{}", line.trim_end())?;
+    }
+    Ok(())
+}
+
+/// Counts records.
+struct RecordCounts {
+    classes: [u64; 256],
+    returns: [u64; 16],
+    withheld: u64,
+    malformed: u64,
+}
+
+impl Default for RecordCounts {
+    fn default() -> RecordCounts {
+        RecordCounts { classes: [0; 256], returns: [0; 16], withheld: 0, malformed: 0 }
+    }
+}
+
+impl RecordCounts {
+    fn with(mut self, other: &RecordCounts) -> RecordCounts {
+        self.classes.iter_mut().zip(&other.classes).for_each(|(count, other)| *count += other);
+        self.returns.iter_mut().zip(&other.returns).for_each(|(count, other)| *count += other);
+        self.withheld += other.withheld;
+        self.malformed += other.malformed;
+        self
+    }
+}
+
+impl RecordSink for RecordCounts {
+    fn push(&mut self, _: u64, record: &PointRecord, _: impl Fn() -> String) -> Result<()> {
+        self.classes[record.class as usize] += 1;
+        self.returns[(record.return_number & 15) as usize] += 1;
+        self.withheld += u64::from(record.withheld);
+        Ok(())
+    }
+
+    fn push_out_of_bounds(&mut self, class: u8) {
+        self.classes[class as usize] += 1;
+    }
+
+    fn push_outlier(&mut self, class: u8, _: impl FnOnce() -> String) {
+        self.classes[class as usize] += 1;
+    }
+
+    fn malformed(&mut self, count: u64, _: impl FnOnce() -> String) {
+        self.malformed += count;
+    }
+}
