@@ -66,13 +66,17 @@ pub struct LevelRoom<'a> {
 pub type TopOf<'a> = &'a (dyn Fn(PartIndex) -> Result<Child> + Sync);
 
 /// Spacings of a level in its error.
-const SPACINGS: f64 = 5.25;
+const SPACINGS: f64 = 4.4;
 
-/// Returns the error in metres by which viewers choose a level: a multiple of the distance between its vertices, because nothing smaller
-/// than that is left in it, and the height by which its triangles miss the surface. With the greatest distance instead, every tree would
-/// make all levels equally bad, and viewers would load the exact tiles.
-fn seen_error(simple: &Simplified) -> f64 {
-    SPACINGS * simple.spacing + simple.typical_error
+/// The greatest part of a tile's width that its error is. A tile of a few vertices is worth showing from afar all the same.
+const PART_OF_WIDTH: f64 = 0.25;
+
+/// Returns the error in metres by which viewers choose the level of a tile within `bounds`: a multiple of the distance between its
+/// vertices, because nothing smaller than that is left in it, and the height by which its triangles miss the surface. With the greatest
+/// distance instead, every tree would make all levels equally bad, and viewers would load the exact tiles.
+fn seen_error(simple: &Simplified, frame: &Frame, bounds: Bounds<3>) -> f64 {
+    let width = bounds.extent(0).max(bounds.extent(1)) as f64 * frame.resolution_metres()[0];
+    (SPACINGS * simple.spacing + simple.typical_error).min(PART_OF_WIDTH * width)
 }
 
 /// Makes coarser tile `index` of the hierarchy, whose children must exist. Stores what `tileset.json` says of it and of the exact
@@ -97,11 +101,7 @@ pub fn make_level(room: &LevelRoom, index: usize) -> Result<StepOutput<LevelStat
                 // No distance is greater than the range of heights: both meshes lie within it.
                 let greatest = of_children(|own| own.greatest_error) + simple.greatest_error;
                 own.greatest_error = greatest.min(height_range(&room.style.frame, bounds));
-                own.error = seen_error(&simple).max(of_children(|own| own.error));
-                eprintln!(
-                    "LOD h{} s{:.3} t{:.3} e{:.2} g{:.2}",
-                    coarse.height, simple.spacing, simple.typical_error, own.error, own.greatest_error
-                );
+                own.error = seen_error(&simple, &room.style.frame, bounds).max(of_children(|own| own.error));
                 own.vertices = simple.tile.positions.len() as u32;
                 let path = room.directory.output().level(room.part.node_number(coarse.node));
                 let written = write_glb(&path, &simple.tile, room.style)?;

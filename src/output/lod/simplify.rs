@@ -44,7 +44,7 @@ pub struct Simplified {
 /// Vertices that stay inside for each triangle that is wanted, at least, however many vertices the boundary has.
 const LEAST_INSIDE: f64 = 1.0 / 16.0;
 
-/// The second pass looks at one of this many vertices.
+/// One of this many vertices is looked at for the place of the grid, and in the second pass.
 const LOOKED_AT: usize = 8;
 
 /// The share of the inner vertices that the first pass chooses.
@@ -69,7 +69,7 @@ pub fn simplify(frame: &Frame, tile: &Tile, triangles: usize) -> Result<Simplifi
         return Ok(Simplified { tile, greatest_error: 0.0, typical_error: 0.0, spacing: 0.0 });
     }
     let [xy, up] = frame.resolution_metres();
-    let surface = smoothed(tile, &boundary.on);
+    let surface = smoothed(tile, &boundary.on, LOOKED_AT);
     let mut moved = tile.positions.clone();
     let mut kept = boundary.on.clone();
     let by_grid = (wanted as f64 * BY_GRID) as usize;
@@ -143,12 +143,16 @@ fn keep_by_grid(positions: &[[i32; 3]], cells: usize, kept: &mut [bool], moved: 
     let Some(bounds) = most_of(positions) else { return 0.0 };
     let area = [0, 1].map(|axis| (bounds.extent(axis) + 1) as f64).iter().product::<f64>();
     let side = (area / cells.max(1) as f64).sqrt();
-    let grid = SquareGrid::new(bounds, side, cells.max(1) as f64);
-    let heights = seen_heights(positions, &grid);
+    if cells == 0 {
+        return side;
+    }
+    let grid = SquareGrid::new(bounds, side, cells as f64);
+    let cell_of: Vec<u32> = positions.iter().map(|p| grid.cell(p[0], p[1]) as u32).collect();
+    let heights = seen_heights(positions, &cell_of, grid.cells());
     let mut nearest = vec![(u32::MAX, u32::MAX); grid.cells()];
-    for (v, p) in (0..).zip(positions) {
-        let at = grid.cell(p[0], p[1]);
-        nearest[at] = nearest[at].min((p[2].abs_diff(heights[at]), v));
+    for (v, (p, &cell)) in (0..).zip(positions.iter().zip(&cell_of)) {
+        let nearest = &mut nearest[cell as usize];
+        *nearest = (*nearest).min((p[2].abs_diff(heights[cell as usize]), v));
     }
     for (height, (_, v)) in heights.into_iter().zip(nearest).filter(|(_, (_, v))| *v != u32::MAX) {
         if !std::mem::replace(&mut kept[v as usize], true) {
@@ -158,11 +162,11 @@ fn keep_by_grid(positions: &[[i32; 3]], cells: usize, kept: &mut [bool], moved: 
     side
 }
 
-/// Returns the box of `positions` in the plane, without the outermost on each side.
+/// Returns the box in the plane of those of `positions` that are looked at, without the outermost on each side.
 fn most_of(positions: &[[i32; 3]]) -> Option<Bounds<2>> {
-    let beyond = positions.len() / BEYOND_GRID;
+    let beyond = positions.len() / LOOKED_AT / BEYOND_GRID;
     let ends = |axis: usize| {
-        let mut values: Vec<i32> = positions.iter().map(|p| p[axis]).collect();
+        let mut values: Vec<i32> = positions.iter().step_by(LOOKED_AT).map(|p| p[axis]).collect();
         let last = values.len().checked_sub(beyond + 1)?;
         let low = *values.select_nth_unstable(beyond).1;
         Some([low, *values.select_nth_unstable(last).1])

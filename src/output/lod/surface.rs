@@ -5,35 +5,42 @@
 //! and y stay those of a site, because the triangulation needs that. It also keeps the site's normal and colour: means of them would
 //! be smoother, and so brighter, than the terrain looks from afar.
 
-use crate::geometry::square_grid::SquareGrid;
 use crate::output::tile::Tile;
 
-/// Returns the positions of `tile` where each vertex has the mean of its own height, twice, and the heights at the other ends of its
-/// edges. The vertices that are `fixed` keep theirs.
-pub(crate) fn smoothed(tile: &Tile, fixed: &[bool]) -> Vec<[i32; 3]> {
+/// Returns the positions of `tile` where one of every `every` vertices has the mean of its own height, twice, and the heights at the
+/// other ends of its edges. The vertices that are `fixed` keep theirs, like all others.
+pub(crate) fn smoothed(tile: &Tile, fixed: &[bool], every: usize) -> Vec<[i32; 3]> {
     // Every edge inside counts in both of its triangles, so a vertex that counts twice itself must count four times here.
-    let mut means: Vec<Mean> = tile.positions.iter().map(|p| Mean { sum: 4 * p[2] as i64, count: 4 }).collect();
+    let own = |p: &[i32; 3]| Mean { sum: 4 * p[2] as i64, count: 4 };
+    let mut means: Vec<Mean> = tile.positions.iter().step_by(every).map(own).collect();
+    let height = |v: u32| tile.positions[v as usize][2] as i64;
     for &[a, b, c] in &tile.triangles {
-        let [at_a, at_b, at_c] = [a, b, c].map(|v| tile.positions[v as usize][2] as i64);
-        for (v, others) in [(a, at_b + at_c), (b, at_c + at_a), (c, at_a + at_b)] {
-            means[v as usize].add(others, 2);
+        for (v, to, from) in [(a, b, c), (b, c, a), (c, a, b)] {
+            if (v as usize).is_multiple_of(every) {
+                means[v as usize / every].add(height(to) + height(from), 2);
+            }
         }
     }
-    let height = |v: usize, own: i32| if fixed[v] { own } else { means[v].rounded() };
-    tile.positions.iter().enumerate().map(|(v, &[x, y, z])| [x, y, height(v, z)]).collect()
+    let mut smoothed = tile.positions.clone();
+    for ((p, fixed), mean) in smoothed.iter_mut().zip(fixed).step_by(every).zip(means) {
+        if !fixed {
+            p[2] = mean.rounded();
+        }
+    }
+    smoothed
 }
 
-/// Returns for each cell of `grid` the height of the surface that is seen there: the mean height of those of `positions` in it that
-/// are not below the mean of all. Over a crown that is its top, and over bare ground the ground. It is 0 where the cell has none.
-pub(crate) fn seen_heights(positions: &[[i32; 3]], grid: &SquareGrid) -> Vec<i32> {
-    let mut all = vec![Mean::default(); grid.cells()];
-    positions.iter().for_each(|p| all[grid.cell(p[0], p[1])].add(p[2].into(), 1));
+/// Returns the height of the surface that is seen in each of so many `cells`: the mean height of those of `positions` in it that are not
+/// below the mean of all. Over a crown that is its top, and over bare ground the ground. It is 0 where the cell has none. The cell of
+/// each position is in `cell_of`.
+pub(crate) fn seen_heights(positions: &[[i32; 3]], cell_of: &[u32], cells: usize) -> Vec<i32> {
+    let mut all = vec![Mean::default(); cells];
+    positions.iter().zip(cell_of).for_each(|(p, &cell)| all[cell as usize].add(p[2].into(), 1));
     let means: Vec<i32> = all.iter().map(|mean| mean.rounded()).collect();
-    let mut upper = vec![Mean::default(); grid.cells()];
-    for p in positions {
-        let cell = grid.cell(p[0], p[1]);
-        if p[2] >= means[cell] {
-            upper[cell].add(p[2].into(), 1);
+    let mut upper = vec![Mean::default(); cells];
+    for (p, &cell) in positions.iter().zip(cell_of) {
+        if p[2] >= means[cell as usize] {
+            upper[cell as usize].add(p[2].into(), 1);
         }
     }
     // Rounding up may leave nothing above the mean.
@@ -63,18 +70,16 @@ impl Mean {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Bounds;
 
     #[test]
     fn a_crown_is_seen_from_above_and_ground_stays_ground() {
-        let crown = [0, 100, 0, 104, 1, 96].into_iter().zip(0..).map(|(z, x)| [x, 0, z]);
-        let ground = [7, 7, 8, 7].into_iter().zip(10..).map(|(z, x)| [x, 0, z]);
-        let positions: Vec<[i32; 3]> = crown.chain(ground).collect();
-        let grid = SquareGrid::new(Bounds { min: [0, 0], max: [19, 0] }, 10.0, 100.0);
-        assert_eq!(seen_heights(&positions, &grid), [100, 7]);
+        let crown = [0, 100, 0, 104, 1, 96].map(|z| ([0, 0, z], 1));
+        let ground = [7, 7, 8, 7].map(|z| ([0, 0, z], 0));
+        let (positions, cells): (Vec<_>, Vec<_>) = crown.into_iter().chain(ground).unzip();
+        assert_eq!(seen_heights(&positions, &cells, 3), [7, 100, 0]);
         // Seven and a half is rounded to eight.
-        assert_eq!(seen_heights(&[[0, 0, 7], [1, 0, 8]], &grid), [8, 0]);
-        assert_eq!(seen_heights(&[[0, 0, -3], [1, 0, -3]], &grid), [-3, 0]);
+        assert_eq!(seen_heights(&[[0, 0, 7], [1, 0, 8]], &[0, 0], 1), [8]);
+        assert_eq!(seen_heights(&[[0, 0, -3], [1, 0, -3]], &[0, 0], 1), [-3]);
     }
 
     #[test]
@@ -83,8 +88,9 @@ mod tests {
         let wheel: Vec<[u32; 3]> = (0..4).map(|i| [4, i, (i + 1) % 4]).collect();
         let positions = corners.into_iter().chain([[4, 4, 60]]).collect();
         let tile = Tile { positions, triangles: wheel, ..Tile::default() };
-        let heights = |fixed: [bool; 5]| smoothed(&tile, &fixed).iter().map(|p| p[2]).collect::<Vec<_>>();
-        assert_eq!(heights([true, true, true, true, false]), [0, 0, 0, 0, 20]);
-        assert_eq!(heights([true; 5])[4], 60);
+        let heights = |fixed: [bool; 5], every| smoothed(&tile, &fixed, every).iter().map(|p| p[2]).collect::<Vec<_>>();
+        let hub = [true, true, true, true, false];
+        assert_eq!([heights(hub, 1), heights(hub, 2), heights(hub, 4)], [[0, 0, 0, 0, 20]; 3]);
+        assert_eq!([heights(hub, 3)[4], heights([true; 5], 1)[4]], [60; 2]);
     }
 }
