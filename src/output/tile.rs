@@ -25,10 +25,15 @@ impl Tile {
     }
 
     /// Returns the tile of these triangles between vertices of this tile.
-    pub(crate) fn subset(&self, mut triangles: Vec<[u32; 3]>) -> Tile {
+    pub(crate) fn subset(&self, triangles: Vec<[u32; 3]>) -> Tile {
+        self.subset_at(&self.positions, triangles)
+    }
+
+    /// Returns the tile of these triangles between vertices of this tile, each at its place in `positions`.
+    pub(crate) fn subset_at(&self, positions: &[[i32; 3]], mut triangles: Vec<[u32; 3]>) -> Tile {
         let vertices = renumber(&mut triangles);
         Tile {
-            positions: pick(&self.positions, &vertices),
+            positions: pick(positions, &vertices),
             normals: self.normals.as_ref().map(|all| pick(all, &vertices)),
             colors: self.colors.as_ref().map(|all| pick(all, &vertices)),
             triangles,

@@ -66,6 +66,32 @@ fn levels_keep_the_rules_the_exact_borders_and_their_errors() {
     }
 }
 
+/// A forest: every other return is from a crown. The greatest error is that of trees at every depth.
+#[test]
+fn errors_halve_from_depth_to_depth_also_in_a_forest() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut random = Random(4);
+    let forest: clouds::Cloud = hills(60_000, 2)
+        .into_iter()
+        .map(|[x, y, z]| [x, y, z / 10 + if random.unit() < 0.5 { 2_000 } else { 0 }])
+        .collect();
+    let job = small(&clouds::write(folder.path(), "forest.csv", &forest));
+    job.report();
+    let tiles = tiles(&job);
+    let coarser = || tiles.iter().filter(|tile| !tile.json["children"].is_null());
+    let means: Vec<[f64; 2]> = (0..3)
+        .map(|depth| {
+            let of_depth: Vec<_> = coarser().filter(|tile| tile.above.len() == depth).collect();
+            let mean =
+                |of: fn(&Value) -> f64| of_depth.iter().map(|tile| of(&tile.json)).sum::<f64>() / of_depth.len() as f64;
+            [mean(error), mean(greatest_error)]
+        })
+        .collect();
+    for pair in means.windows(2) {
+        assert!(pair[0][0] > 1.5 * pair[1][0] && pair[0][1] < 1.5 * pair[1][1], "{means:?}");
+    }
+}
+
 /// Asserts that coarser tiles have the outline of their leaves. So neighbours of any levels meet without a crack.
 pub(crate) fn borders_are_the_exact_ones(job: &Job, tiles: &[Tile]) {
     for tile in tiles.iter().filter(|tile| !tile.json["children"].is_null()) {
@@ -76,13 +102,18 @@ pub(crate) fn borders_are_the_exact_ones(job: &Job, tiles: &[Tile]) {
     }
 }
 
-/// Asserts that no coarser tile is off by more than its geometric error, at random places of the exact mesh.
+/// Returns the greatest vertical distance to the exact mesh that a tile admits.
+pub(crate) fn greatest_error(tile: &Value) -> f64 {
+    tile["extras"]["maxError"].as_f64().unwrap()
+}
+
+/// Asserts that no coarser tile is off by more than it admits, at random places of the exact mesh: ten thousand for each depth.
 pub(crate) fn errors_are_true(job: &Job, tiles: &[Tile], name: &str) {
     let meshes: Vec<_> = tiles.iter().map(|tile| triangles(job, tile)).collect();
     let mut random = Random(9);
-    let (mut looked, mut greatest) = (0, 0.0f64);
+    let (mut looked, mut greatest) = (vec![0; tiles.iter().map(|tile| tile.above.len()).max().unwrap()], 0.0f64);
     let leaves: Vec<usize> = (0..tiles.len()).filter(|&i| tiles[i].json["children"].is_null()).collect();
-    for _ in 0..1500 {
+    for _ in 0..12_000 {
         let leaf = leaves[random.below(leaves.len() as u64) as usize];
         let t = meshes[leaf][random.below(meshes[leaf].len() as u64) as usize];
         let (u, v) = (random.unit(), random.unit());
@@ -92,12 +123,14 @@ pub(crate) fn errors_are_true(job: &Job, tiles: &[Tile], name: &str) {
             // Rounding may put a place on an edge outside both triangles.
             let Some(coarse) = meshes[above].iter().find_map(|t| height(t, [x, y])) else { continue };
             let off = (coarse - z).abs();
-            assert!(off <= error(&tiles[above].json) + 1e-6, "{name}: {off} at {x}, {y}");
-            greatest = greatest.max(off / error(&tiles[above].json));
-            looked += 1;
+            let promised = greatest_error(&tiles[above].json);
+            assert!(off <= promised + 1e-6, "{name}: {off} at {x}, {y}");
+            greatest = greatest.max(off / promised);
+            looked[tiles[above].above.len()] += 1;
         }
     }
-    assert!(looked > 3000 && greatest > 0.05, "{name}: {looked} places, {greatest} of the error");
+    assert!(looked.iter().take(3).all(|&looked| looked > 10_000), "{name}: {looked:?} places by depth");
+    assert!(greatest > 0.05, "{name}: {greatest} of the error");
 }
 
 #[test]

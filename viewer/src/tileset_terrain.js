@@ -74,7 +74,8 @@ export class TilesetTerrain {
     const isExact = tile.children.length === 0;
     const level = tile.internal.depthFromRenderedParent;
     const color = isExact ? EXACT_COLOR : LEVEL_COLORS[(level - 1) % LEVEL_COLORS.length];
-    const facts = { uri: tile.content.uri.replace(/^(\.\.\/)+/, ''), isExact, level, error: tile.geometricError };
+    const error = tile.extras?.maxError ?? 0;
+    const facts = { uri: tile.content.uri.replace(/^(\.\.\/)+/, ''), isExact, level, error };
     const { copyright } = tile.engineData.metadata?.asset ?? {};
     if (copyright) this.attributions.add(copyright);
     this.dressing.add(scene, color, facts);

@@ -1,5 +1,5 @@
 //! Which nodes of the tree viewers see as tiles of `tileset.json`: all leaves, and the inner nodes that become coarser tiles. A level
-//! has a quarter of the sites of the one below, so all levels together cost about a third of the leaves.
+//! has about a fifth of the sites of the one below, so all levels together cost about a quarter of the leaves.
 
 use crate::job::index::{NodeIndex, PartIndex, TileIndex};
 use crate::job::partition::tree::{NodeKind, Tree};
@@ -57,9 +57,10 @@ impl LevelSizes {
         LevelSizes { sites: sites.min(memory / (5 * BYTES_PER_LEVEL_VERTEX)).max(1), memory }
     }
 
-    /// Returns about how many triangles a tile gets whose children together have `triangles`.
+    /// Returns about how many triangles a tile gets whose children together have `triangles`. Vertices along the borders come on top
+    /// of them, so it is less than a quarter.
     pub fn target(self, triangles: usize) -> usize {
-        (triangles / 4).min((2 * self.sites as usize).max(triangles / 16)).max(1)
+        (triangles / 16 * 3).min((2 * self.sites as usize).max(triangles / 16)).max(1)
     }
 }
 

@@ -65,6 +65,20 @@ pub struct LevelRoom<'a> {
 /// Returns the topmost tile of a part.
 pub type TopOf<'a> = &'a (dyn Fn(PartIndex) -> Result<Child> + Sync);
 
+/// Spacings of a level in its error.
+const SPACINGS: f64 = 4.4;
+
+/// The greatest part of a tile's width that its error is. A tile of a few vertices is worth showing from afar all the same.
+const PART_OF_WIDTH: f64 = 0.5;
+
+/// Returns the error in metres by which viewers choose the level of a tile within `bounds`: a multiple of the distance between its
+/// vertices, because nothing smaller than that is left in it, and the height by which its triangles miss the surface. With the greatest
+/// distance instead, every tree would make all levels equally bad, and viewers would load the exact tiles.
+fn seen_error(simple: &Simplified, frame: &Frame, bounds: Bounds<3>) -> f64 {
+    let width = bounds.extent(0).max(bounds.extent(1)) as f64 * frame.resolution_metres()[0];
+    (SPACINGS * simple.spacing + simple.typical_error).min(PART_OF_WIDTH * width)
+}
+
 /// Makes coarser tile `index` of the hierarchy, whose children must exist. Stores what `tileset.json` says of it and of the exact
 /// tiles among its children. It has no mesh if its children have too many vertices for the memory, or if one of them has none for
 /// that reason.
@@ -82,14 +96,18 @@ pub fn make_level(room: &LevelRoom, index: usize) -> Result<StepOutput<LevelStat
             None => stats.left_out = 1,
             Some(_) => {
                 let simple = simplified(room, coarse.node, &children)?;
-                // No error is greater than the range of heights: both meshes lie within it.
-                let below = children.iter().map(|child| child.own.error).fold(0.0, f64::max);
-                own.error = (below + simple.error).min(height_range(&room.style.frame, bounds));
+                let of_children =
+                    |error: fn(&TileSummary) -> f64| children.iter().map(|c| error(&c.own)).fold(0.0, f64::max);
+                // No distance is greater than the range of heights: both meshes lie within it.
+                let greatest = of_children(|own| own.greatest_error) + simple.greatest_error;
+                own.greatest_error = greatest.min(height_range(&room.style.frame, bounds));
+                own.error = seen_error(&simple, &room.style.frame, bounds).max(of_children(|own| own.error));
                 own.vertices = simple.tile.positions.len() as u32;
                 let path = room.directory.output().level(room.part.node_number(coarse.node));
                 let written = write_glb(&path, &simple.tile, room.style)?;
                 let triangles = simple.tile.triangles.len() as u64;
-                stats = LevelStats { files: 1, triangles, bytes: written.bytes, error_m: own.error, left_out: 0 };
+                stats =
+                    LevelStats { files: 1, triangles, bytes: written.bytes, error_m: own.greatest_error, left_out: 0 };
                 files.push(written);
             }
         }

@@ -122,12 +122,14 @@ impl<'a> Ground<'a> {
         }
         // A hundred thousand tiles take a thread a minute. The first error is that of the first child, whatever thread is faster.
         let laid: Vec<Result<f64, NotPlaced>> = node.children.par_iter_mut().map(|child| self.lay(child)).collect();
-        let (mut exact, mut below) = (0.0f64, 0.0f64);
+        let (mut exact, mut below, mut greatest_below) = (0.0f64, 0.0f64, 0.0f64);
         for (child, distortion) in node.children.iter().zip(laid) {
             exact = exact.max(distortion?);
             below = below.max(child.error);
+            greatest_below = greatest_below.max(child.greatest_error);
         }
         node.error = below.max(node.error + own + exact);
+        node.greatest_error = greatest_below.max(node.greatest_error + own + exact);
         Ok(exact)
     }
 

@@ -59,8 +59,8 @@ impl TilesOfTree<'_> {
 /// Returns the node of one tile without its children, or `None` if the tile has no triangle.
 fn node(tile: &TileSummary, cell: &Cell, uri: String) -> Option<TilesetNode> {
     let (uri, bounds) = ((tile.vertices > 0).then_some(uri), tile.bounds()?);
-    let (error, middle) = (tile.error, middle(cell, bounds));
-    Some(TilesetNode { uri, bounds, middle, error, transform: None, file: None, children: Vec::new() })
+    let (error, greatest_error, middle) = (tile.error, tile.greatest_error, middle(cell, bounds));
+    Some(TilesetNode { uri, bounds, middle, error, greatest_error, transform: None, file: None, children: Vec::new() })
 }
 
 /// Returns the middle of the part of `bounds` in the tile's cell, or of all of it if no part is. A triangle along the hull can be as

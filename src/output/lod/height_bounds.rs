@@ -31,6 +31,12 @@ fn cells_in(columns: [usize; 2], rows: [usize; 2]) -> usize {
     (columns[1] - columns[0] + 1) * (rows[1] - rows[0] + 1)
 }
 
+/// Returns the least and the greatest height of a triangle.
+fn heights(corners: &[[i32; 3]; 3]) -> [i32; 2] {
+    let [a, b, c] = corners.map(|p| p[2]);
+    [a.min(b).min(c), a.max(b).max(c)]
+}
+
 fn union(a: [i32; 2], b: [i32; 2]) -> [i32; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
 }
@@ -48,7 +54,8 @@ impl<'a> HeightBounds<'a> {
 
     /// Adds the heights of a triangle to every cell that holds a point of it.
     fn add(&mut self, triangle: &[u32; 3]) {
-        let (corners, range) = self.corners(triangle);
+        let corners = triangle.map(|v| self.positions[v as usize]);
+        let range = heights(&corners);
         let [columns, rows] = self.cells.around(&corners);
         if cells_in(columns, rows) > MOST_CELLS {
             self.everywhere = union(self.everywhere, range);
@@ -61,16 +68,10 @@ impl<'a> HeightBounds<'a> {
         }
     }
 
-    fn corners(&self, triangle: &[u32; 3]) -> ([[i32; 3]; 3], [i32; 2]) {
-        let corners = triangle.map(|v| self.positions[v as usize]);
-        let [a, b, c] = corners.map(|p| p[2]);
-        (corners, [a.min(b).min(c), a.max(b).max(c)])
-    }
-
-    /// Returns a number of z steps: no point of the triangle is further above or below the terrain.
-    pub(crate) fn error_bound(&self, triangle: &[u32; 3]) -> u64 {
-        let (corners, [low, high]) = self.corners(triangle);
-        let [columns, rows] = self.cells.around(&corners);
+    /// Returns a number of z steps: no point of the triangle with these corners is further above or below the terrain.
+    pub(crate) fn error_bound(&self, corners: &[[i32; 3]; 3]) -> u64 {
+        let [low, high] = heights(corners);
+        let [columns, rows] = self.cells.around(corners);
         let mut terrain = self.everywhere;
         if cells_in(columns, rows) > MOST_CELLS_COMPARED {
             terrain = self.all;

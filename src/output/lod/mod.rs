@@ -5,5 +5,6 @@ mod cell_grid;
 mod height_bounds;
 pub mod join;
 pub mod simplify;
+mod surface;
 mod vertex_cells;
 pub mod vertical_error;

@@ -5,10 +5,11 @@
 //! terrains that meet along a part of their boundaries still meet there when either or both of them are simplified, the triangles
 //! cover the same ground once, as before, and the program's own pipeline makes them.
 //!
-//! Inside, the vertices that stay are chosen in two passes. First, one vertex of every cell of a grid stays: the one whose height is
-//! nearest to the mean of the cell. Then the triangulation of these is compared with the terrain: where a triangle is furthest from
+//! Inside, the vertices that stay are chosen in two passes. First, one vertex of every cell of a grid stays: the one that is nearest to
+//! the height of the surface seen in the cell, which it takes. Then the triangulation of these is compared with the terrain: where a triangle is furthest from
 //! it, the vertex with the greatest distance stays too (Garland and Heckbert 1995, "Fast polygonal approximation of terrains and
-//! height fields", here with all vertices of a pass inserted at once).
+//! height fields", here with all vertices of a pass inserted at once), with the mean height of its neighbours: see `surface.rs`. Vertices
+//! on the boundary keep their own heights, or terrains would not meet.
 
 #[cfg(test)]
 mod tests;
@@ -19,6 +20,7 @@ use crate::mesh::index::SiteIndex;
 use crate::mesh::region::covered;
 use crate::output::frame::Frame;
 use crate::output::lod::boundary::on_boundary;
+use crate::output::lod::surface::{seen_heights, smoothed};
 use crate::output::lod::vertex_cells::{VertexCells, plane};
 use crate::output::lod::vertical_error::vertical_error;
 use crate::output::tile::Tile;
@@ -29,20 +31,28 @@ use std::collections::HashSet;
 /// A simplified terrain.
 #[derive(Debug)]
 pub struct Simplified {
-    /// Its vertices are some of the original's, in their order.
+    /// Its vertices are some of the original's, in their order. Those inside may have other heights.
     pub tile: Tile,
     /// The greatest vertical distance to the original in metres.
-    pub error: f64,
+    pub greatest_error: f64,
+    /// The vertical distance in metres by which a triangle misses the surface at worst, on average over the triangles.
+    pub typical_error: f64,
+    /// The distance in metres between vertices inside.
+    pub spacing: f64,
 }
 
 /// Vertices that stay inside for each triangle that is wanted, at least, however many vertices the boundary has.
 const LEAST_INSIDE: f64 = 1.0 / 16.0;
 
-/// The second pass looks at one of this many vertices.
+/// One of this many vertices is looked at for the place of the grid, and in the second pass.
 const LOOKED_AT: usize = 8;
 
 /// The share of the inner vertices that the first pass chooses.
-const BY_GRID: f64 = 0.6;
+const BY_GRID: f64 = 0.9;
+
+/// The part of the vertices that the grid need not reach on each side. Those are the ends of long triangles along the hull, or few
+/// enough for the outermost cells.
+const BEYOND_GRID: usize = 200;
 
 /// Simplifies `tile`, a part of a Delaunay triangulation, to about `triangles` triangles. The result has more if the boundary has too
 /// many edges.
@@ -55,19 +65,34 @@ pub fn simplify(frame: &Frame, tile: &Tile, triangles: usize) -> Result<Simplifi
     let least = (triangles as f64 * LEAST_INSIDE) as usize;
     let wanted = (triangles / 2).saturating_sub(boundary.vertices / 2).max(least).min(inside);
     if wanted >= inside {
-        return Ok(Simplified { tile: tile.subset(tile.triangles.clone()), error: 0.0 });
+        let tile = tile.subset(tile.triangles.clone());
+        return Ok(Simplified { tile, greatest_error: 0.0, typical_error: 0.0, spacing: 0.0 });
     }
+    let [xy, up] = frame.resolution_metres();
+    let surface = smoothed(tile, &boundary.on, LOOKED_AT);
+    let mut moved = tile.positions.clone();
     let mut kept = boundary.on.clone();
     let by_grid = (wanted as f64 * BY_GRID) as usize;
-    keep_by_grid(tile, by_grid, &mut kept);
+    let side = keep_by_grid(&tile.positions, by_grid, &mut kept, &mut moved);
     let mut coarse = boundary.fill(tile, &kept)?;
     let rest = (boundary.vertices + wanted).saturating_sub(kept.iter().filter(|&&kept| kept).count());
-    if keep_furthest(tile, &coarse, rest, &mut kept) > 0 {
+    let furthest = Furthest::find(&surface, &moved, &coarse);
+    let more = furthest.first(rest, &kept);
+    if !more.is_empty() {
+        for v in more.into_iter().map(|v| v as usize) {
+            kept[v] = true;
+            moved[v] = surface[v];
+        }
         coarse = boundary.fill(tile, &kept)?;
     }
     interrupt::check()?;
-    let error = vertical_error(&tile.positions, &tile.triangles, &coarse) * frame.resolution_metres()[1];
-    Ok(Simplified { tile: tile.subset(coarse), error })
+    let greatest = vertical_error(&tile.positions, &tile.triangles, &moved, &coarse);
+    Ok(Simplified {
+        tile: tile.subset_at(&moved, coarse),
+        greatest_error: greatest * up,
+        typical_error: furthest.mean * up,
+        spacing: side * xy,
+    })
 }
 
 /// The edges around a terrain.
@@ -112,36 +137,65 @@ impl Boundary {
     }
 }
 
-/// Keeps one vertex in each cell of a grid with about `cells` cells: the one whose height is nearest to the mean height of the cell.
-fn keep_by_grid(tile: &Tile, cells: usize, kept: &mut [bool]) {
-    let Some(bounds) = Bounds::of_points(tile.positions.iter().map(|&p| plane(p))).filter(|_| cells > 0) else {
-        return;
-    };
+/// Keeps one vertex of `positions` in each cell of a grid with about `cells` cells: the one nearest to the height that is seen in the
+/// cell. Unless it was `kept` already, it gets that height in `moved`. Returns the side of a cell in lattice steps.
+fn keep_by_grid(positions: &[[i32; 3]], cells: usize, kept: &mut [bool], moved: &mut [[i32; 3]]) -> f64 {
+    let Some(bounds) = most_of(positions) else { return 0.0 };
     let area = [0, 1].map(|axis| (bounds.extent(axis) + 1) as f64).iter().product::<f64>();
-    let grid = SquareGrid::new(bounds, (area / cells as f64).sqrt(), cells as f64);
-    let mut sums = vec![(0i64, 0i64); grid.cells()];
-    for p in &tile.positions {
-        let sum = &mut sums[grid.cell(p[0], p[1])];
-        *sum = (sum.0 + p[2] as i64, sum.1 + 1);
+    let side = (area / cells.max(1) as f64).sqrt();
+    if cells == 0 {
+        return side;
     }
-    let mut nearest = vec![(i64::MAX, u32::MAX); grid.cells()];
-    for (v, p) in (0..).zip(&tile.positions) {
-        let at = grid.cell(p[0], p[1]);
-        let (sum, count) = sums[at];
-        nearest[at] = nearest[at].min(((p[2] as i64 - sum / count).abs(), v));
+    let grid = SquareGrid::new(bounds, side, cells as f64);
+    let cell_of: Vec<u32> = positions.iter().map(|p| grid.cell(p[0], p[1]) as u32).collect();
+    let heights = seen_heights(positions, &cell_of, grid.cells());
+    let mut nearest = vec![(u32::MAX, u32::MAX); grid.cells()];
+    for (v, (p, &cell)) in (0..).zip(positions.iter().zip(&cell_of)) {
+        let nearest = &mut nearest[cell as usize];
+        *nearest = (*nearest).min((p[2].abs_diff(heights[cell as usize]), v));
     }
-    nearest.iter().filter(|(_, v)| *v != u32::MAX).for_each(|&(_, v)| kept[v as usize] = true);
+    for (height, (_, v)) in heights.into_iter().zip(nearest).filter(|(_, (_, v))| *v != u32::MAX) {
+        if !std::mem::replace(&mut kept[v as usize], true) {
+            moved[v as usize][2] = height;
+        }
+    }
+    side
 }
 
-/// Compares the triangles of `coarse` with the terrain and keeps the vertices with the greatest distances: one a triangle, `count` in
-/// all at most. Returns the number of vertices kept.
-fn keep_furthest(tile: &Tile, coarse: &[[u32; 3]], count: usize, kept: &mut [bool]) -> usize {
-    let mut furthest: Vec<(u64, u32)> = VertexCells::new(&tile.positions, LOOKED_AT).furthest(coarse).collect();
-    if furthest.len() > count {
+/// Returns the box in the plane of those of `positions` that are looked at, without the outermost on each side.
+fn most_of(positions: &[[i32; 3]]) -> Option<Bounds<2>> {
+    let beyond = positions.len() / LOOKED_AT / BEYOND_GRID;
+    let ends = |axis: usize| {
+        let mut values: Vec<i32> = positions.iter().step_by(LOOKED_AT).map(|p| p[axis]).collect();
+        let last = values.len().checked_sub(beyond + 1)?;
+        let low = *values.select_nth_unstable(beyond).1;
+        Some([low, *values.select_nth_unstable(last).1])
+    };
+    let [x, y] = [ends(0)?, ends(1)?];
+    Some(Bounds { min: [x[0], y[0]], max: [x[1], y[1]] })
+}
+
+/// For each triangle of a terrain the vertex of the surface with the greatest vertical distance from it.
+struct Furthest {
+    /// Bits of the distance and the number of the vertex, greatest first.
+    vertices: Vec<(u64, u32)>,
+    /// The mean distance in steps of z, over all triangles.
+    mean: f64,
+}
+
+impl Furthest {
+    /// Compares the triangles `coarse` between the positions `moved` with `surface`.
+    fn find(surface: &[[i32; 3]], moved: &[[i32; 3]], coarse: &[[u32; 3]]) -> Furthest {
+        let cells = VertexCells::new(surface, LOOKED_AT);
+        let mut vertices: Vec<(u64, u32)> = cells.furthest(moved, coarse).collect();
+        let sum: f64 = vertices.iter().map(|&(distance, _)| f64::from_bits(distance)).sum();
         // Distances are not negative, so their bits are in the same order.
-        furthest.sort_unstable_by(|a, b| b.cmp(a));
-        furthest.truncate(count);
+        vertices.sort_unstable_by(|a, b| b.cmp(a));
+        Furthest { vertices, mean: sum / coarse.len().max(1) as f64 }
     }
-    furthest.iter().for_each(|&(_, v)| kept[v as usize] = true);
-    furthest.len()
+
+    /// Returns the first `count` that are not `kept` already.
+    fn first(&self, count: usize, kept: &[bool]) -> Vec<u32> {
+        self.vertices.iter().map(|&(_, v)| v).filter(|&v| !kept[v as usize]).take(count).collect()
+    }
 }

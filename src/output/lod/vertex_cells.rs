@@ -8,8 +8,7 @@ use crate::output::lod::cell_grid::CellGrid;
 const VERTICES_PER_TRIANGLE: u64 = 2048;
 
 /// The vertices, sorted by cell.
-pub(crate) struct VertexCells<'a> {
-    positions: &'a [[i32; 3]],
+pub(crate) struct VertexCells {
     cells: CellGrid,
     /// The vertices of cell c are `sorted[starts[c]..starts[c + 1]]`.
     starts: Vec<u32>,
@@ -18,9 +17,9 @@ pub(crate) struct VertexCells<'a> {
     numbers: Vec<u32>,
 }
 
-impl<'a> VertexCells<'a> {
+impl VertexCells {
     /// Sorts one of every `every` vertices.
-    pub(crate) fn new(positions: &'a [[i32; 3]], every: usize) -> VertexCells<'a> {
+    pub(crate) fn new(positions: &[[i32; 3]], every: usize) -> VertexCells {
         let cells = CellGrid::new(positions, positions.len() / every + 1);
         let cell_of: Vec<u32> = positions.iter().step_by(every).map(|p| cells.of(p)).collect();
         let mut starts = vec![0; cells.count() + 1];
@@ -38,16 +37,17 @@ impl<'a> VertexCells<'a> {
             *at -= 1;
             (sorted[*at as usize], numbers[*at as usize]) = (positions[v], v as u32);
         }
-        VertexCells { positions, cells, starts, sorted, numbers }
+        VertexCells { cells, starts, sorted, numbers }
     }
 
-    /// Returns for every triangle of `coarse` the vertex with the greatest vertical distance from it, as the bits of that distance
-    /// and the number of the vertex. Triangles that meet all their vertices are left out.
+    /// Returns for every triangle of `coarse`, whose corners are `positions`, the vertex with the greatest vertical distance from it, as
+    /// the bits of that distance and the number of the vertex. Triangles that meet all their vertices are left out.
     ///
     /// Stops looking where that would take far longer than usual: where nearly all vertices lie in one cell.
-    pub(crate) fn furthest(&self, coarse: &[[u32; 3]]) -> impl Iterator<Item = (u64, u32)> {
+    pub(crate) fn furthest(&self, positions: &[[i32; 3]], coarse: &[[u32; 3]]) -> impl Iterator<Item = (u64, u32)> {
         let mut steps = Self::steps_for(coarse.len());
-        let found = coarse.iter().map_while(move |triangle| self.furthest_inside(triangle, &mut steps));
+        let corners = |triangle: &[u32; 3]| triangle.map(|v| positions[v as usize]);
+        let found = coarse.iter().map_while(move |triangle| self.furthest_inside(&corners(triangle), &mut steps));
         found.filter(|(distance, _)| *distance > 0.0).map(|(distance, v)| (distance.to_bits(), v))
     }
 
@@ -56,19 +56,18 @@ impl<'a> VertexCells<'a> {
         VERTICES_PER_TRIANGLE * (triangles as u64 + 1000)
     }
 
-    /// Returns the greatest vertical distance between a triangle and a vertex over or under it, and the number of that vertex. `None`
+    /// Returns the greatest vertical distance between a triangle with these corners and a vertex over or under it, and the number of that vertex. `None`
     /// if that means to look at more than `steps` vertices.
-    pub(crate) fn furthest_inside(&self, triangle: &[u32; 3], steps: &mut u64) -> Option<(f64, u32)> {
-        let corners = triangle.map(|v| self.positions[v as usize]);
+    pub(crate) fn furthest_inside(&self, corners: &[[i32; 3]; 3], steps: &mut u64) -> Option<(f64, u32)> {
         let ys = corners.map(|p| p[1]);
         let (first, last) = (ys[0].min(ys[1]).min(ys[2]), ys[0].max(ys[1]).max(ys[2]));
         let mut greatest = (0.0f64, 0);
         for row in self.cells.row(first as f64)..=self.cells.row(last as f64) {
-            let [west, east] = self.cells.span(&corners, row);
+            let [west, east] = self.cells.span(corners, row);
             let [start, end] = [self.cells.at(row, west), self.cells.at(row, east) + 1].map(|cell| self.starts[cell]);
             *steps = steps.checked_sub(u64::from(end.saturating_sub(start)))?;
             for at in start as usize..end as usize {
-                let distance = vertical_distance(&corners, self.sorted[at]);
+                let distance = vertical_distance(corners, self.sorted[at]);
                 if distance > greatest.0 {
                     greatest = (distance, self.numbers[at]);
                 }

@@ -1,7 +1,7 @@
 //! The vertical distance between a simplified terrain and the one that it was made of: the greatest value over all of the ground, not
 //! a sample.
 //!
-//! Both terrains are linear over every triangle. So their difference is linear over every piece that the two sets of edges together
+//! The simplified terrain has some vertices of the other, but their heights may differ. Both terrains are linear over every triangle. So their difference is linear over every piece that the two sets of edges together
 //! cut the ground into, and it is greatest at a corner of such a piece. A corner is a vertex of the fine mesh (the vertices of the
 //! coarse mesh are among them), or a place where a fine and a coarse edge cross. `FineMesh` finds the crossings by walking along a
 //! coarse edge through the fine mesh, and `VertexCells` finds the fine vertices in a coarse triangle. `HeightBounds` bounds the
@@ -21,12 +21,13 @@ const TRIANGLES_PER_STEP: u64 = 8;
 /// The number of triangles that are measured in the order of their bounds.
 const SORTED: usize = 256;
 
-/// Returns the greatest vertical distance in steps of z between the terrains `fine` and `coarse`, triangles between the same
-/// `positions` (lattice x, y, z). It is never too small. Both terrains must cover the same ground once, with counterclockwise
-/// triangles.
-pub fn vertical_error(positions: &[[i32; 3]], fine: &[[u32; 3]], coarse: &[[u32; 3]]) -> f64 {
+/// Returns the greatest vertical distance in steps of z between two terrains. It is never too small. The triangles `fine` are between
+/// `positions` (lattice x, y, z), and the triangles `coarse` between `moved`: the same x and y, with other heights within the same
+/// range. Both terrains must cover the same ground once, with counterclockwise triangles.
+pub fn vertical_error(positions: &[[i32; 3]], fine: &[[u32; 3]], moved: &[[i32; 3]], coarse: &[[u32; 3]]) -> f64 {
     let heights = HeightBounds::new(positions, fine);
-    let mut bounds: Vec<(u64, u32)> = coarse.iter().map(|triangle| heights.error_bound(triangle)).zip(0..).collect();
+    let corners = |triangle: &[u32; 3]| triangle.map(|v| moved[v as usize]);
+    let mut bounds: Vec<(u64, u32)> = coarse.iter().map(|t| heights.error_bound(&corners(t))).zip(0..).collect();
     // Triangles that may have the greatest error come first, so that most of the others can be skipped.
     let sorted = SORTED.min(bounds.len());
     if sorted < bounds.len() {
@@ -40,8 +41,8 @@ pub fn vertical_error(positions: &[[i32; 3]], fine: &[[u32; 3]], coarse: &[[u32;
     for (bound, triangle) in bounds {
         if bound as f64 > greatest {
             let triangle = &coarse[triangle as usize];
-            let at_crossings = mesh.error_at_crossings(triangle, &mut steps);
-            let at_vertices = vertices.furthest_inside(triangle, &mut vertex_steps);
+            let at_crossings = mesh.error_at_crossings(triangle, moved, &mut steps);
+            let at_vertices = vertices.furthest_inside(&corners(triangle), &mut vertex_steps);
             let (Some(at_crossings), Some((at_vertices, _))) = (at_crossings, at_vertices) else {
                 return height_range(positions);
             };
@@ -53,7 +54,7 @@ pub fn vertical_error(positions: &[[i32; 3]], fine: &[[u32; 3]], coarse: &[[u32;
     if greatest > 0.0 { greatest + lost } else { 0.0 }
 }
 
-/// Returns the difference between the greatest and the least height. No two terrains over the same vertices are further apart.
+/// Returns the difference between the greatest and the least height. No two terrains within this range are further apart.
 fn height_range(positions: &[[i32; 3]]) -> f64 {
     let (low, high) = positions.iter().fold((i32::MAX, i32::MIN), |(l, h), p| (l.min(p[2]), h.max(p[2])));
     if low > high { 0.0 } else { high as f64 - low as f64 }
@@ -90,18 +91,18 @@ impl<'a> FineMesh<'a> {
 
     /// Returns the greatest distance where an edge of a coarse triangle crosses an edge of this mesh. `None` if that takes more than
     /// `steps`, or if the edge leaves the mesh.
-    fn error_at_crossings(&self, &[a, b, c]: &[u32; 3], steps: &mut u64) -> Option<f64> {
+    fn error_at_crossings(&self, &[a, b, c]: &[u32; 3], moved: &[[i32; 3]], steps: &mut u64) -> Option<f64> {
         let mut greatest = 0.0f64;
         // The other triangle at an edge has it in the other direction; the boundary is the same in both meshes.
         for (from, to) in [(a, b), (b, c), (c, a)].into_iter().filter(|(from, to)| from < to) {
-            greatest = greatest.max(self.error_along(from, to, steps)?);
+            greatest = greatest.max(self.error_along(from, to, moved, steps)?);
         }
         Some(greatest)
     }
 
-    /// Returns the greatest distance along one coarse edge.
-    fn error_along(&self, from: u32, to: u32, steps: &mut u64) -> Option<f64> {
-        let edge = CoarseEdge { from: self.positions[from as usize], to: self.positions[to as usize] };
+    /// Returns the greatest distance along one coarse edge, between its ends.
+    fn error_along(&self, from: u32, to: u32, moved: &[[i32; 3]], steps: &mut u64) -> Option<f64> {
+        let edge = CoarseEdge { from: moved[from as usize], to: moved[to as usize] };
         let mut greatest = 0.0f64;
         let mut at = WalkPosition::Vertex(from);
         loop {
@@ -117,7 +118,10 @@ impl<'a> FineMesh<'a> {
                     self.leave_edge(right, left, next, &edge)
                 }
             };
-            if let WalkPosition::Vertex(v) = at {
+            // The ends are among the vertices in the triangle.
+            if let WalkPosition::Vertex(v) = at
+                && v != to
+            {
                 greatest = greatest.max(edge.distance_to_vertex(self.positions[v as usize]));
             }
         }
@@ -216,6 +220,7 @@ mod tests {
             mut positions in prop::collection::vec((0..3_000, 0..3_000, 0..20i32), 400..3_000),
             peaks in prop::collection::vec((0..400usize, 20..5_000), 0..6),
             every in 3..9usize,
+            lifts in prop::collection::vec(-30..30i32, 0..40),
         ) {
             peaks.iter().for_each(|&(at, height)| positions[at].2 = height);
             let mut positions: Vec<[i32; 3]> = positions.into_iter().map(|(x, y, z)| [x, y, z]).collect();
@@ -230,11 +235,19 @@ mod tests {
             let coarse = triangulation(&positions, &kept).triangles;
             let coarse: Vec<[u32; 3]> = coarse.iter().map(|t| t.map(|v| kept[v.get()])).collect();
 
+            let (low, high) = positions.iter().fold((i32::MAX, i32::MIN), |(l, h), p| (l.min(p[2]), h.max(p[2])));
+            let mut moved = positions.clone();
+            for (p, lift) in moved.iter_mut().step_by(7).zip(&lifts) {
+                p[2] = (p[2] + lift).clamp(low, high);
+            }
             let (mesh, vertices) = (FineMesh::new(&positions, fine.corners()), VertexCells::new(&positions, 1));
             let (mut steps, mut vertex_steps) = (u64::MAX, u64::MAX);
-            let furthest = coarse.iter().map(|t| mesh.error_at_crossings(t, &mut steps).unwrap().max(vertices.furthest_inside(t, &mut vertex_steps).unwrap().0));
+            let furthest = coarse.iter().map(|t| {
+                let at_crossings = mesh.error_at_crossings(t, &moved, &mut steps).unwrap();
+                at_crossings.max(vertices.furthest_inside(&t.map(|v| moved[v as usize]), &mut vertex_steps).unwrap().0)
+            });
             let furthest = furthest.fold(0.0, f64::max);
-            let found = vertical_error(&positions, fine.corners(), &coarse);
+            let found = vertical_error(&positions, fine.corners(), &moved, &coarse);
             prop_assert!(found == 0.0 && furthest == 0.0 || found == furthest + 1e-9, "{} and {}", found, furthest);
         }
     }

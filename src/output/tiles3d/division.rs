@@ -75,6 +75,7 @@ mod tests {
             bounds: Bounds { min: [-at; 3], max: [at; 3] },
             middle: [at; 2],
             error: 0.0,
+            greatest_error: 0.0,
             transform: None,
             file: None,
             children,

@@ -26,8 +26,10 @@ pub struct TilesetNode {
     pub bounds: Bounds<3>,
     /// The lattice x, y of the place where its transform is exact.
     pub middle: [i32; 2],
-    /// The greatest distance to the exact mesh in metres: along the vertical, plus the difference between transforms.
+    /// The error that viewers choose levels by, in metres.
     pub error: f64,
+    /// The greatest distance to the exact mesh in metres: along the vertical, plus the difference between transforms.
+    pub greatest_error: f64,
     /// The map from the scene to the globe, if there is one: from metres x, y, z to earth-centred ones, column by column. A tile
     /// without a transform takes its parent's.
     pub transform: Option<[f64; 16]>,
@@ -43,7 +45,8 @@ impl TilesetNode {
         let bounds = children.iter().map(|child| child.bounds).reduce(Bounds::union)?;
         let error = children.iter().map(|child| child.error).fold(0.0, f64::max);
         let middle = children.first()?.middle;
-        Some(TilesetNode { uri: None, bounds, middle, error, transform: None, file: Some(0), children })
+        let greatest_error = children.iter().map(|child| child.greatest_error).fold(0.0, f64::max);
+        Some(TilesetNode { uri: None, bounds, middle, error, greatest_error, transform: None, file: Some(0), children })
     }
 }
 
@@ -122,6 +125,9 @@ impl<E> TilesetWriter<'_, E> {
         let mut tile = tile_json(volume, self.error(node), node.uri.as_ref().map(|uri| relative_uri(from, uri)));
         if !children.is_empty() {
             tile["children"] = children.into();
+            if node.uri.is_some() {
+                tile["extras"] = json!({"maxError": node.greatest_error});
+            }
         }
         let Some(own) = own else { return Ok((tile, volume)) };
         let transform = above.map_or(*own, |above| relative_transform(above, own));
@@ -212,6 +218,7 @@ mod tests {
             bounds: Bounds { min, max },
             middle: [0; 2],
             error: 0.0,
+            greatest_error: 0.0,
             transform: None,
             file: None,
             children,
@@ -290,6 +297,7 @@ mod tests {
                     bounds: children.iter().map(|child| child.bounds).fold(own, Bounds::union),
                     middle: [*count; 2],
                     error: height as f64,
+                    greatest_error: 2.0 * height as f64,
                     transform: placed.then(|| moved(f64::from(*count) * 0.01)),
                     file: None,
                     children,
