@@ -59,7 +59,7 @@ pub struct Cli {
 /// What to print. These options may stand anywhere on the command line.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct PrintOptions {
-    /// Print only errors, and a line if input files were left out.
+    /// Print only errors, a line if input files were left out, and the URL of view.
     #[arg(long, short, global = true)]
     pub quiet: bool,
     /// Print the result as JSON on standard output.
@@ -92,19 +92,7 @@ pub enum CliCommand {
     /// Show the results in a browser: serve them, and open a page with the terrain.
     ///
     /// Only browsers on this machine can reach the page, unless --address says otherwise. Ctrl-C ends it.
-    View {
-        /// The output directory of a job.
-        directory: PathBuf,
-        /// The port to listen on. Default: one that is free.
-        #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
-        port: u16,
-        /// Do not open a browser.
-        #[arg(long)]
-        no_open: bool,
-        /// The address of this machine to listen on. With 0.0.0.0, every machine that reaches this one can read the files.
-        #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
-        address: IpAddr,
-    },
+    View(ViewOptions),
     /// Do one task of one phase of a large job, as schedulers of clusters start it.
     ///
     /// All tasks of all phases, on any machines that share the output directory, do the job together. The results have the same bytes
@@ -195,6 +183,33 @@ pub enum CliCommand {
         #[arg(long)]
         overwrite: bool,
     },
+}
+
+/// What to show, and to whom.
+#[derive(Args, Debug)]
+pub struct ViewOptions {
+    /// The output directory of a job.
+    pub directory: PathBuf,
+    /// The port to listen on. Default: one that is free.
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
+    pub port: u16,
+    /// Do not open a browser.
+    #[arg(long)]
+    pub no_open: bool,
+    /// The address of this machine to listen on. With 0.0.0.0, every machine that reaches this one can read the files.
+    #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
+    pub address: IpAddr,
+    /// A name that browsers know this machine by, if it is not its host name, such as that of a proxy. May be given several times.
+    #[arg(long, value_name = "NAME", value_parser = host_name)]
+    pub host: Vec<String>,
+}
+
+fn host_name(text: &str) -> Result<String, String> {
+    let is_name = |byte: u8| byte.is_ascii_alphanumeric() || b"-._".contains(&byte);
+    if text.is_empty() || !text.bytes().all(is_name) {
+        return Err("give the name alone, such as maps.example.org, without http:// and without a port".into());
+    }
+    Ok(text.into())
 }
 
 fn memory(text: &str) -> Result<u64, String> {

@@ -26,6 +26,7 @@ pub mod submit;
 pub mod threads;
 pub mod triangulation;
 pub mod verify;
+#[cfg(feature = "viewer")]
 pub mod view;
 pub mod voronoi;
 mod warnings;

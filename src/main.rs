@@ -3,7 +3,7 @@
 #![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
 
 use clap::Parser;
-use gdt_batch::cli::{Cli, CliCommand, PrintOptions};
+use gdt_batch::cli::{Cli, CliCommand, PrintOptions, ViewOptions};
 use gdt_batch::gpu_trial;
 use gdt_batch::input::histogram::Histogram;
 use gdt_batch::input::info::{SourceDescription, describe};
@@ -21,7 +21,6 @@ use gdt_batch::submit::request::Request;
 use gdt_batch::submit::{Engine, kubernetes, slurm};
 use gdt_batch::threads::{self, on_threads};
 use gdt_batch::verify::Conclusion;
-use gdt_batch::view::{View, browser};
 use gdt_batch::{Error, Result, config, input, interrupt, sample, say, shortage, verify};
 use serde::Serialize;
 use std::fmt::Display;
@@ -49,10 +48,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
         }
         (Some(CliCommand::Check { config }), _) => check_job(config, print),
         (Some(CliCommand::Verify { directory, memory, input }), _) => verify_output(directory, *memory, input, print),
-        (Some(CliCommand::View { directory, port, no_open, address }), _) => {
-            let view = View::open(directory, *address, *port)?;
-            view_output(&view, !no_open, print)
-        }
+        (Some(CliCommand::View(options)), _) => view_output(options, print),
         (Some(CliCommand::Work { config, phase, task, tasks, threads, force, submission }), _) => {
             let task = match task {
                 Some(task) => *task,
@@ -206,13 +202,27 @@ fn verify_output(directory: &Path, memory: u64, inputs: &[PathBuf], print: Print
 }
 
 /// Serves a terrain until Ctrl-C. That is how it is meant to end, so the exit code is 0 then.
-fn view_output(view: &View, opens: bool, print: PrintOptions) -> Result<ExitCode> {
+#[cfg(feature = "viewer")]
+fn view_output(options: &ViewOptions, print: PrintOptions) -> Result<ExitCode> {
+    use gdt_batch::view::{View, browser};
+    let wanted = std::net::SocketAddr::new(options.address, options.port);
+    let view = View::open(&options.directory, wanted, &options.host)?;
     interrupt::listen()?;
-    print_result(view, print)?;
-    if let Some(Err(why)) = opens.then(|| browser::open(&view.url)) {
+    if print.quiet && !print.json {
+        // Without the URL nobody could use the command: that a browser was started does not mean that it shows.
+        print_text(&view.url)?;
+    } else {
+        print_result(&view, print)?;
+    }
+    if let Some(Err(why)) = (!options.no_open).then(|| browser::open(&view.url)) {
         say(&format!("no browser was opened ({why}): open {} yourself", view.url));
     }
     view.run().map(|()| ExitCode::SUCCESS)
+}
+
+#[cfg(not(feature = "viewer"))]
+fn view_output(_: &ViewOptions, _: PrintOptions) -> Result<ExitCode> {
+    Err(Error::Config(gdt_batch::output::page::NOT_BUILT_IN.into()))
 }
 
 fn test_gpu(adapter: Option<&str>, leaves: Option<usize>, print: PrintOptions) -> Result<ExitCode> {

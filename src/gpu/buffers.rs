@@ -94,7 +94,10 @@ mod tests {
     fn a_buffer_is_at_most_a_quarter_too_large() {
         for bytes in (0..2000).chain([1 << 30, (1 << 30) + 1, (1 << 31) - 1]) {
             let size = rounded(bytes);
-            assert!(size >= bytes && size % 4 == 0 && (bytes < 64 || 2 * size <= 3 * bytes), "{bytes}: {size}");
+            assert!(
+                size >= bytes && size.is_multiple_of(4) && (bytes < 64 || 2 * size <= 3 * bytes),
+                "{bytes}: {size}"
+            );
         }
     }
 }

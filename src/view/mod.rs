@@ -3,6 +3,8 @@
 mod body;
 pub mod browser;
 mod content;
+mod hosts;
+mod impatient_stream;
 mod response;
 mod server;
 mod site;
@@ -15,6 +17,7 @@ use serde::Serialize;
 
 use crate::output::file_names::OutputFiles;
 use crate::output::page::page_for;
+use crate::view::hosts::Hosts;
 use crate::view::server::Server;
 use crate::view::site::Site;
 use crate::{Error, Result};
@@ -33,24 +36,24 @@ pub struct View {
 }
 
 impl View {
-    /// Opens `port` of `address` for the terrain in `directory`. Port 0 is any that is free.
+    /// Opens the port of `wanted` for the terrain in `directory`. Port 0 is any that is free. Browsers may know this machine by the
+    /// names `hosts` too.
     ///
     /// # Errors
     /// [`Error::Config`] if no job has written to the directory, the page is not built in, or the address is not one of this machine.
     /// [`Error::Unfinished`] if the job is not done. [`Error::Port`] if another program has the port.
-    pub fn open(directory: &Path, address: IpAddr, port: u16) -> Result<View> {
+    pub fn open(directory: &Path, wanted: SocketAddr, hosts: &[String]) -> Result<View> {
         let terrain = terrain_in(directory)?;
         let root = directory.canonicalize().map_err(Error::io("read", directory))?;
-        let wanted = SocketAddr::new(address, port);
         let listener = TcpListener::bind(wanted).map_err(|error| not_listening(wanted, &error))?;
         let bound = listener.local_addr().map_err(Error::io("listen on", wanted.to_string()))?;
-        let site = Site { root, page: page_for(terrain)?, address };
+        let site = Site { root, page: page_for(terrain)?, hosts: Hosts::new(hosts) };
         // An address such as 0.0.0.0 stands for all of this machine.
-        let shown = if address.is_unspecified() { "localhost".into() } else { SocketAddr::new(address, 0).ip_text() };
+        let shown = if wanted.ip().is_unspecified() { "localhost".into() } else { ip_text(wanted.ip()) };
         Ok(View {
             directory: directory.into(),
             url: format!("http://{shown}:{}/", bound.port()),
-            is_public: !address.is_loopback(),
+            is_public: !wanted.ip().is_loopback(),
             server: Server::new(listener, site)?,
         })
     }
@@ -74,17 +77,11 @@ impl fmt::Display for View {
     }
 }
 
-/// How an address stands in a URL.
-trait IpText {
-    fn ip_text(&self) -> String;
-}
-
-impl IpText for SocketAddr {
-    fn ip_text(&self) -> String {
-        match self.ip() {
-            IpAddr::V4(ip) => ip.to_string(),
-            IpAddr::V6(ip) => format!("[{ip}]"),
-        }
+/// Returns an address as it stands in a URL.
+fn ip_text(address: IpAddr) -> String {
+    match address {
+        IpAddr::V4(ip) => ip.to_string(),
+        IpAddr::V6(ip) => format!("[{ip}]"),
     }
 }
 
@@ -124,7 +121,7 @@ mod tests {
     const HERE: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
 
     fn error(directory: &Path, port: u16) -> Error {
-        View::open(directory, HERE, port).map(|view| view.url).unwrap_err()
+        View::open(directory, SocketAddr::new(HERE, port), &[]).map(|view| view.url).unwrap_err()
     }
 
     #[test]

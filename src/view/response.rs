@@ -22,8 +22,8 @@ type Response = hyper::Response<Pieces>;
 
 /// Returns the answer to `request`. `stays_here` tells whether the client is on this machine.
 pub(super) fn response(site: &Site, request: &Request, stays_here: bool) -> Response {
-    if !site.answers_to(header(request, "Host")) {
-        return text(403, "this server answers to localhost only; gdt-batch view --address changes that\n");
+    if !site.hosts.answer_to(header(request, "Host")) {
+        return unknown_host(site);
     }
     if !matches!(*request.method(), Method::GET | Method::HEAD) {
         return with(text(405, "only GET and HEAD are answered\n"), "Allow", "GET, HEAD");
@@ -34,6 +34,14 @@ pub(super) fn response(site: &Site, request: &Request, stays_here: bool) -> Resp
             .unwrap_or_else(|error| text(500, &format!("the file cannot be read: {error}\n"))),
         Target::Nothing => text(404, "there is no such file\n"),
     }
+}
+
+fn unknown_host(site: &Site) -> Response {
+    let known = &site.hosts;
+    text(
+        403,
+        &format!("this server answers to {known}; gdt-batch view --host NAME adds the name in the browser's address\n"),
+    )
 }
 
 /// Returns an answer with a text.
@@ -59,7 +67,9 @@ fn file_response(request: &Request, path: &Path, mut file: File, stays_here: boo
     }
     // A part of a file that has changed would not fit to the others.
     let is_same = header(request, "If-Range").is_none_or(|known| known == tag);
-    let range = header(request, "Range").filter(|_| is_same).map_or(Wanted::All, |range| wanted(range, length));
+    // Ranges mean something for GET only (RFC 9110, section 14.2).
+    let takes_parts = is_same && *request.method() == Method::GET;
+    let range = header(request, "Range").filter(|_| takes_parts).map_or(Wanted::All, |range| wanted(range, length));
     let answer = match range {
         Wanted::Part(start, end) => {
             file.seek(SeekFrom::Start(start))?;

@@ -8,11 +8,11 @@ use std::time::Duration;
 use hyper::server::conn::http1;
 use hyper::service::service_fn;
 use hyper_util::rt::{TokioIo, TokioTimer};
-use tokio::net::TcpStream;
 use tokio::runtime::{Builder, Runtime};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::{sleep, timeout};
 
+use crate::view::impatient_stream::ImpatientStream;
 use crate::view::response::response;
 use crate::view::site::Site;
 use crate::{Error, Result, interrupt};
@@ -22,6 +22,9 @@ const PATIENCE: Duration = Duration::from_millis(200);
 
 /// How long a client may take to say what it wants.
 const SILENCE: Duration = Duration::from_secs(20);
+
+/// How long a client may take nothing of an answer.
+const STILLNESS: Duration = Duration::from_secs(30);
 
 /// The most connections at one time. A browser has six; others wait.
 const MOST_CONNECTIONS: usize = 256;
@@ -34,6 +37,7 @@ pub(super) struct Server {
     listener: TcpListener,
     site: Arc<Site>,
     runtime: Runtime,
+    stillness: Duration,
 }
 
 impl Server {
@@ -41,7 +45,7 @@ impl Server {
         listener.set_nonblocking(true).map_err(Error::io("listen for", &site.root))?;
         let runtime = Builder::new_multi_thread().worker_threads(THREADS).enable_io().enable_time().build();
         let runtime = runtime.map_err(Error::io("start the threads that serve", &site.root))?;
-        Ok(Server { listener, site: Arc::new(site), runtime })
+        Ok(Server { listener, site: Arc::new(site), runtime, stillness: STILLNESS })
     }
 
     /// Answers requests until the process is asked to stop.
@@ -54,6 +58,7 @@ impl Server {
                 let Ok(Ok(permit)) = timeout(PATIENCE, Arc::clone(&free).acquire_owned()).await else { continue };
                 match timeout(PATIENCE, listener.accept()).await {
                     Ok(Ok((stream, client))) => {
+                        let stream = ImpatientStream::new(stream, self.stillness);
                         tokio::spawn(converse(stream, client, Arc::clone(&self.site), permit));
                     }
                     // The client is gone again, or the process has too many files open: that passes.
@@ -67,7 +72,7 @@ impl Server {
 }
 
 /// Answers the requests that come over one connection.
-async fn converse(stream: TcpStream, client: SocketAddr, site: Arc<Site>, permit: OwnedSemaphorePermit) {
+async fn converse(stream: ImpatientStream, client: SocketAddr, site: Arc<Site>, permit: OwnedSemaphorePermit) {
     let answer = service_fn(|request| {
         let response = response(&site, &request, client.ip().is_loopback());
         async { Ok::<_, Infallible>(response) }

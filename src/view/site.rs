@@ -1,10 +1,11 @@
-//! From the target of a request to a file below the output directory, and who may ask.
+//! From the target of a request to a file below the output directory.
 
 use std::fs::File;
-use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 
 use percent_encoding::percent_decode_str;
+
+use crate::view::hosts::Hosts;
 
 /// What is served.
 pub(super) struct Site {
@@ -12,8 +13,8 @@ pub(super) struct Site {
     pub(super) root: PathBuf,
     /// The page that shows it.
     pub(super) page: String,
-    /// The address that the server listens on.
-    pub(super) address: IpAddr,
+    /// Whom it is for.
+    pub(super) hosts: Hosts,
 }
 
 /// What a request is for.
@@ -41,22 +42,6 @@ impl Site {
         }
         let file = File::open(&path).ok()?;
         Some((path, file))
-    }
-
-    /// Tells whether a request to `host` may be answered. A server for this machine alone answers only to the names of this machine:
-    /// otherwise any page on the web could give its own name this address, and read the files.
-    pub(super) fn answers_to(&self, host: Option<&str>) -> bool {
-        if !self.address.is_loopback() {
-            return true;
-        }
-        let Some(host) = host else { return false };
-        let name = match host.rsplit_once(':') {
-            // The port may be another one, if it is forwarded from another machine.
-            Some((name, port)) if port.bytes().all(|byte| byte.is_ascii_digit()) && !name.ends_with(':') => name,
-            _ => host,
-        };
-        let address = name.trim_start_matches('[').trim_end_matches(']').parse::<IpAddr>();
-        name.eq_ignore_ascii_case("localhost") || address.is_ok_and(|address| address.is_loopback())
     }
 }
 
@@ -90,28 +75,5 @@ mod tests {
             assert_eq!(names_in(bad), None, "{bad}");
         }
         assert_eq!(names_in("http://other/x"), None);
-    }
-
-    #[test]
-    fn a_server_for_this_machine_answers_to_its_own_names_only() {
-        let site =
-            |address: &str| Site { root: PathBuf::new(), page: String::new(), address: address.parse().unwrap() };
-        let own = site("127.0.0.1");
-        for host in ["localhost", "LOCALHOST:8080", "127.0.0.1", "127.0.0.1:1", "[::1]:99", "[::1]"] {
-            assert!(own.answers_to(Some(host)), "{host}");
-        }
-        for host in [
-            "evil.example",
-            "evil.example:8080",
-            "localhost.evil.example",
-            "127.0.0.1.evil.example",
-            "192.0.2.1",
-            "",
-            ":1",
-        ] {
-            assert!(!own.answers_to(Some(host)), "{host}");
-        }
-        assert!(!own.answers_to(None));
-        assert!(site("0.0.0.0").answers_to(Some("workstation:8080")));
     }
 }

@@ -2,7 +2,8 @@
 // console said, and which addresses the page asked for. A step is one of
 //   {"size": [width, height], "dark": bool}   the window
 //   {"wait": "expression"}                    until it is true
-//   {"click": [x, y]}, {"key": "Enter"}       in pixels of the window; to the element with the focus
+//   {"click": [x, y]}, {"double": [x, y]}     in pixels of the window
+//   {"key": "Enter"}                          to the element with the focus
 //   {"run": "expression"}                     gives its value
 //   {"shot": "file.png"}                      a picture of the window
 // Chromium is driven through a pipe, so that nothing but it is needed.
@@ -78,9 +79,9 @@ async function resize(tell, [width, height], dark) {
   await tell('Emulation.setEmulatedMedia', { features: [{ name: 'prefers-color-scheme', value: dark ? 'dark' : 'light' }] });
 }
 
-async function click(tell, [x, y]) {
+async function click(tell, [x, y], clickCount = 1) {
   for (const type of ['mousePressed', 'mouseReleased']) {
-    await tell('Input.dispatchMouseEvent', { type, x, y, button: 'left', clickCount: 1 });
+    await tell('Input.dispatchMouseEvent', { type, x, y, button: 'left', clickCount });
   }
 }
 
@@ -99,6 +100,7 @@ async function take(tell, step, values) {
   if (step.open) await tell('Page.navigate', { url });
   if (step.wait) await waitFor(tell, step.wait);
   if (step.click) await click(tell, step.click);
+  for (const number of step.double ? [1, 2] : []) await click(tell, step.double, number);
   if (step.key) await press(tell, step.key);
   if (step.run) values.push(await evaluate(tell, step.run) ?? null);
   if (step.shot) await shoot(tell, step.shot);

@@ -98,7 +98,7 @@ struct Server {
 impl Server {
     fn start(out: &Path) -> Server {
         let mut program = Command::new(PROGRAM)
-            .args(["view", "--no-open"])
+            .args(["view", "--no-open", "--quiet"])
             .arg(out)
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
@@ -106,7 +106,8 @@ impl Server {
             .unwrap();
         let mut line = String::new();
         BufReader::new(program.stdout.take().unwrap()).read_line(&mut line).unwrap();
-        let url = line.split_whitespace().last().unwrap().to_owned();
+        // With --quiet, the URL is all that is said.
+        let url = line.trim_end().to_owned();
         assert!(url.starts_with("http://127.0.0.1:"), "{line}");
         Server { program, url }
     }
@@ -203,6 +204,80 @@ fn one_file_without_a_reference_system_is_shown_too() {
     let terrain = Terrain::new("", "format = \"glb\"");
     assert!(!terrain.out().join("tileset.json").exists());
     tells_the_source(&terrain, &chromium);
+}
+
+/// The steps of a user who does not wait between the places of the ruler, and makes a double click.
+fn ruler_steps() -> Value {
+    let set_up = "document.querySelector('[value=height]').click(); document.getElementById('tab-point').click(); \
+                  document.getElementById('ruler').click()";
+    let cells = "[...document.querySelectorAll('#ruler-rows td')].map((cell) => cell.textContent)";
+    json!([
+        {"size": [1280, 800], "dark": true},
+        {"wait": SHOWN},
+        {"run": set_up},
+        {"click": [400, 400]},
+        {"double": MIDDLE},
+        {"wait": format!("{FOUND} && {SHOWN}")},
+        {"run": cells},
+    ])
+}
+
+#[test]
+fn a_double_click_is_one_place_of_the_ruler_and_heights_have_their_own_unit() {
+    let Some(chromium) = chromium() else { return };
+    // Feet in the plane, metres upward.
+    let terrain = Terrain::new("crs = \"EPSG:2992+5703\"", "format = \"3dtiles\"");
+    let seen = terrain.seen(&chromium, &ruler_steps());
+    let cells: Vec<String> = serde_json::from_value(seen["values"][1].clone()).unwrap();
+    let [flat, up, direct, slope] = cells.as_slice() else { panic!("two places make one line: {cells:?}") };
+    assert!(flat.ends_with(" ft)") && !up.contains('(') && !direct.contains('(') && slope.ends_with('°'), "{cells:?}");
+}
+
+#[test]
+fn a_tileset_of_another_program_is_told_apart() {
+    let Some(chromium) = chromium() else { return };
+    let terrain = Terrain::new("", "format = \"3dtiles\"");
+    let path = terrain.out().join("tileset.json");
+    let mut tileset: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    tileset["asset"].as_object_mut().unwrap().remove("extras");
+    std::fs::write(&path, tileset.to_string()).unwrap();
+    let steps = json!([
+        {"size": [800, 600], "dark": false},
+        {"wait": "document.documentElement.dataset.state === 'failed'"},
+        {"run": "document.getElementById('message').textContent"},
+    ]);
+    let said = terrain.seen(&chromium, &steps)["values"][0].as_str().unwrap().to_owned();
+    assert!(said.contains("tileset.json does not say where it lies") && !said.contains("undefined"), "{said}");
+}
+
+/// A key that is released while Ctrl is down, or while another window has the keys, is not taken as held.
+#[test]
+fn walking_ends_with_the_key_whatever_else_is_pressed() {
+    let Some(chromium) = chromium() else { return };
+    let terrain = Terrain::new("", "format = \"glb\"");
+    let key = |kind: &str, more: &str| {
+        format!(
+            "document.getElementById('terrain').dispatchEvent(new KeyboardEvent('{kind}', {{key: 'ArrowLeft', code: 'ArrowLeft'{more}}}))"
+        )
+    };
+    let wait = |ms: u32| json!({"run": format!("new Promise((resolve) => setTimeout(resolve, {ms}))")});
+    let shot = |name: &str| terrain.folder.path().join(name);
+    let mut steps = vec![json!({"size": [500, 400], "dark": false}), json!({"wait": SHOWN})];
+    steps.push(json!({"run": "document.querySelector('[value=walk]').click()"}));
+    let releases = [key("keyup", ", ctrlKey: true"), "window.dispatchEvent(new Event('blur'))".into()];
+    for (number, release) in releases.into_iter().enumerate() {
+        steps.extend([wait(600), json!({"shot": shot(&format!("{number}-still.png"))})]);
+        steps.extend([json!({"run": key("keydown", "")}), wait(300), json!({"run": release}), wait(600)]);
+        steps.extend([json!({"shot": shot(&format!("{number}-turned.png"))}), wait(400)]);
+        steps.push(json!({"shot": shot(&format!("{number}-after.png"))}));
+    }
+    terrain.seen(&chromium, &Value::Array(steps));
+    for number in 0..2 {
+        let [still, turned, after] =
+            ["still", "turned", "after"].map(|name| std::fs::read(shot(&format!("{number}-{name}.png"))).unwrap());
+        assert!(still != turned, "the key does something");
+        assert!(turned == after, "it goes on after release {number}");
+    }
 }
 
 #[test]

@@ -25,8 +25,12 @@ export function latticeText(offset, step, count) {
 }
 
 export class Georeference {
-  // `extras` are those of a GLB or of `asset` in tileset.json.
-  constructor(extras) {
+  // `extras` are those of a GLB or of `asset` in tileset.json; `file` is the name of that file.
+  constructor(extras, file) {
+    const { offset, resolution, resolution_z: up } = extras ?? {};
+    if (!Array.isArray(offset) || !(resolution > 0) || !(up > 0)) {
+      throw new Error(`${file} does not say where it lies in the source (extras), as every terrain of gdt-batch does.`);
+    }
     this.offset = extras.offset;
     this.steps = [extras.resolution, extras.resolution, extras.resolution_z];
     this.metres = [extras.metres_per_unit, extras.metres_per_unit, extras.metres_per_unit_z];

@@ -190,18 +190,22 @@ class Viewer {
     else say('shown', terrain.failures ? `${terrain.failures} tiles cannot be loaded.` : '');
   }
 
-  // Marks a place, and follows it until the exact tile tells its coordinates.
+  // Marks a place, and follows it until the exact tile tells its coordinates. A place of the ruler is followed also after the next click.
   async pick(place, panel) {
+    const number = this.picks = (this.picks ?? 0) + 1;
+    const isForRuler = this.ruler.isOn;
+    const isLatest = () => number === this.picks;
     let end = null;
     await this.picker.follow(place, (found, isFinal) => {
       if (!found) return;
+      if (end) this.ruler.correct(end, found);
+      else if (isForRuler) end = this.ruler.add(found);
+      if (!isLatest()) return;
       this.mark.position.copy(found.world);
       this.mark.visible = true;
-      if (end) this.ruler.correct(end, found);
-      else if (this.ruler.isOn) end = this.ruler.add(found);
       panel.showPoint(found, isFinal);
       this.changed();
-    });
+    }, () => isLatest() || this.ruler.has(end));
   }
 
   hitAtPixel(clientX, clientY) {
@@ -232,10 +236,11 @@ function listen(viewer, panel) {
   let down = null;
   new ResizeObserver(() => viewer.fit()).observe(canvas);
   canvas.addEventListener('pointerdown', (event) => { down = event; });
-  canvas.addEventListener('pointerup', (event) => {
+  canvas.addEventListener('click', (event) => {
     const moved = down ? Math.hypot(event.clientX - down.clientX, event.clientY - down.clientY) : Infinity;
     down = null;
-    if (moved > CLICK_PIXELS || event.button !== 0) return;
+    // The second click of a double click is no place of its own.
+    if (moved > CLICK_PIXELS || event.detail > 1) return;
     const hit = viewer.hitAtPixel(event.clientX, event.clientY);
     if (hit) viewer.pick(hit.point, panel);
     else panel.showNothing();
@@ -245,6 +250,10 @@ function listen(viewer, panel) {
     if (hit && !viewer.walk.isOn) viewer.orbit.goTo(hit.point);
   });
   const key = (event) => {
+    if (viewer.walk.isOn && viewer.walk.key(event)) {
+      event.preventDefault();
+      return;
+    }
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     if (event.type === 'keydown' && (event.key === 'Enter' || event.key === ' ')) {
       const hit = viewer.hitInMiddle();
@@ -253,16 +262,16 @@ function listen(viewer, panel) {
       return;
     }
     if (event.type === 'keydown' && event.key === 'Home') panel.showWhole();
-    else if (viewer.walk.isOn ? viewer.walk.key(event) : event.type === 'keydown' && viewer.orbit.key(event)) event.preventDefault();
+    else if (!viewer.walk.isOn && event.type === 'keydown' && viewer.orbit.key(event)) event.preventDefault();
   };
   canvas.addEventListener('keydown', key);
   canvas.addEventListener('keyup', key);
-  canvas.addEventListener('blur', () => viewer.walk.pressed.clear());
+  canvas.addEventListener('blur', () => viewer.walk.release());
   canvas.addEventListener('contextmenu', (event) => event.preventDefault());
   for (const button of byId('pad').querySelectorAll('button')) {
     const press = (isDown) => (event) => {
       event.preventDefault();
-      viewer.walk.press(button.dataset.key, isDown);
+      viewer.walk.pressButton(button.dataset.key, isDown);
     };
     button.addEventListener('pointerdown', press(true));
     for (const end of ['pointerup', 'pointerleave', 'pointercancel']) button.addEventListener(end, press(false));

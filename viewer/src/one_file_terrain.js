@@ -15,7 +15,7 @@ export class OneFileTerrain {
   // Loads the file and puts the middle of the terrain at the origin.
   async open() {
     const gltf = await this.loader.loadAsync(this.url, ({ loaded, total }) => this.progress(loaded, total));
-    this.georeference = new Georeference(gltf.scene.userData);
+    this.georeference = new Georeference(gltf.scene.userData, this.url.split('/').pop());
     if (gltf.asset.copyright) this.attributions.add(gltf.asset.copyright);
     const sphere = new Box3().setFromObject(gltf.scene).getBoundingSphere(new Sphere());
     this.radius = sphere.radius;
@@ -33,7 +33,9 @@ export class OneFileTerrain {
 
   update() {}
 
-  refineAlong() {}
+  refineAlong() {
+    return () => {};
+  }
 
   place(scenePosition) {
     return new Vector3(...scenePosition).applyMatrix4(this.object.matrixWorld);

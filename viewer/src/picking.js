@@ -31,7 +31,7 @@ export class Picker {
     Object.assign(this, { terrain, camera, nextFrame });
     this.raycaster = new Raycaster();
     this.raycaster.firstHitOnly = true;
-    this.number = 0;
+    this.release = () => {};
   }
 
   // Returns the first hit of the ray through a pixel, given from -1 to 1 to the right and up; null if it misses the terrain.
@@ -67,19 +67,20 @@ export class Picker {
     return describeHit(hit, this.terrain.georeference);
   }
 
-  // Calls `show` with what is at `place`, and again with what the exact tile says, once that is loaded. The last call has `isFinal`.
-  async follow(place, show) {
-    const own = ++this.number;
-    this.terrain.refineAlong({ origin: this.above(place.x, place.z), direction: DOWN });
-    for (let busy = performance.now(); own === this.number;) {
+  // Calls `show` with what is at `place`, and again with what the exact tile says, once that is loaded. The last call has `isFinal`. Ends
+  // early when `isWanted` no longer holds. The exact tile stays until another place is final.
+  async follow(place, show, isWanted) {
+    const release = this.terrain.refineAlong({ origin: this.above(place.x, place.z), direction: DOWN });
+    for (let busy = performance.now(), isFinal = false; !isFinal && isWanted();) {
       const hit = this.hitBelow(place);
       const found = hit && this.describe(hit);
-      const isFinal = Boolean(found?.isExact) || performance.now() - busy > QUIET_MS;
+      isFinal = Boolean(found?.isExact) || performance.now() - busy > QUIET_MS;
       show(found, isFinal);
-      if (isFinal) return;
-      await this.nextFrame();
+      if (!isFinal) await this.nextFrame();
       if (this.terrain.isLoading) busy = performance.now();
     }
+    this.release();
+    this.release = release;
   }
 
   // Returns the place in the frame of the terrain above source coordinates x and y. Each tile may have a transform of its own, so that a

@@ -2,6 +2,12 @@
 import { BufferGeometry, Float32BufferAttribute, Line, LineBasicMaterial } from 'three';
 import { byId, element, length, unitName } from './dom.js';
 
+// Returns a length in metres, and in a unit of so many metres where that is another one.
+function lengthText(metres, unit) {
+  const name = unitName(unit);
+  return unit === 1 || !name ? length(metres) : `${length(metres)} (${(metres / unit).toFixed(1)} ${name})`;
+}
+
 export class Ruler {
   constructor(scene, terrain, changed) {
     Object.assign(this, { terrain, changed, isOn: false, places: [] });
@@ -39,9 +45,13 @@ export class Ruler {
     return place;
   }
 
+  has(place) {
+    return this.places.includes(place);
+  }
+
   // Corrects a place, unless it was removed meanwhile.
   correct(place, { source, world }) {
-    if (!this.places.includes(place)) return;
+    if (!this.has(place)) return;
     Object.assign(place, { source, world });
     this.draw();
   }
@@ -57,9 +67,12 @@ export class Ruler {
   write() {
     const ways = this.places.slice(1).map(({ source }, i) => this.way(this.places[i].source, source));
     const sum = (of) => ways.reduce((total, way) => total + of(way), 0);
-    const text = this.text.bind(this);
-    const lines = ways.map((way) => [text(way.flat), text(way.up), text(way.direct), `${way.degrees.toFixed(1)}°`]);
-    if (ways.length > 1) lines.push([text(sum((way) => way.flat)), text(sum((way) => way.up)), text(sum((way) => way.direct)), 'sum']);
+    const [inPlane, , upward] = this.terrain.georeference.metres;
+    // A length in space has no unit of the source if its heights have another one.
+    const inSpace = inPlane === upward ? inPlane : 1;
+    const texts = (of) => [lengthText(of('flat'), inPlane), lengthText(of('up'), upward), lengthText(of('direct'), inSpace)];
+    const lines = ways.map((way) => [...texts((name) => way[name]), `${way.degrees.toFixed(1)}°`]);
+    if (ways.length > 1) lines.push([...texts((name) => sum((way) => way[name])), 'sum']);
     byId('ruler-rows').replaceChildren(...lines.map((cells) => element('tr', {}, ...cells.map((cell) => element('td', { textContent: cell })))));
     byId('ruler-table').hidden = ways.length === 0;
     const hints = ['Click the first place.', 'Click the second place.'];
@@ -70,12 +83,5 @@ export class Ruler {
     const [east, north, up] = this.terrain.georeference.metresBetween(from, to);
     const flat = Math.hypot(east, north);
     return { flat, up, direct: Math.hypot(flat, up), degrees: (Math.atan2(up, flat) * 180) / Math.PI };
-  }
-
-  // Returns a length in metres, and in the unit of the source where that is another one.
-  text(metres) {
-    const [own] = this.terrain.georeference.metres;
-    const name = unitName(own);
-    return own === 1 || !name ? length(metres) : `${length(metres)} (${(metres / own).toFixed(1)} ${name})`;
   }
 }

@@ -61,7 +61,7 @@ export class TilesetTerrain {
       this.tiles.update();
     });
     const { asset } = this.tiles.rootTileset;
-    this.georeference = new Georeference(asset.extras);
+    this.georeference = new Georeference(asset?.extras, 'tileset.json');
     if (asset.copyright) this.attributions.add(asset.copyright);
     const sphere = new Sphere();
     this.tiles.getBoundingSphere(sphere);
@@ -101,12 +101,13 @@ export class TilesetTerrain {
     return this.tiles.isLoading || this.tiles.loadProgress < 1;
   }
 
-  // Loads the exact tiles that a ray in the frame of the terrain passes, until the next call.
+  // Loads the exact tiles that a ray in the frame of the terrain passes, and keeps them until the function is called that this returns.
   refineAlong(ray) {
-    this.exactPlaces.clearRegions();
     const inTileset = new Ray().copy(ray).applyMatrix4(new Matrix4().copy(this.object.matrixWorld).invert());
-    this.exactPlaces.addRegion(new RayRegion({ ray: inTileset, errorTarget: 0 }));
+    const region = new RayRegion({ ray: inTileset, errorTarget: 0 });
+    this.exactPlaces.addRegion(region);
     this.changed();
+    return () => this.exactPlaces.removeRegion(region);
   }
 
   // Returns the place of a glTF scene position in the frame of the terrain, by the transform of the tile that is shown there or above it.

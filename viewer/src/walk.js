@@ -29,7 +29,9 @@ export class Walk {
       this.look((last.clientX - event.clientX) * TURN_PER_PIXEL, (event.clientY - last.clientY) * TURN_PER_PIXEL);
       last = event;
     });
-    window.addEventListener('blur', () => this.pressed.clear());
+    // What is released while another window has the keys is never told.
+    window.addEventListener('blur', () => this.release());
+    document.addEventListener('visibilitychange', () => this.release());
   }
 
   // Begins at `place` and looks the way that the camera looks.
@@ -45,22 +47,41 @@ export class Walk {
 
   stop() {
     this.isOn = false;
+    this.release();
+  }
+
+  // Takes all keys as released.
+  release() {
     this.pressed.clear();
+    this.isFast = false;
   }
 
-  // Returns whether the key means something here.
-  key({ key, shiftKey, type }) {
-    const name = key.length === 1 ? key.toLowerCase() : key;
+  // Returns whether the key means something here. With a modifier, keys belong to the browser, and some systems do not tell then when one
+  // is released.
+  key({ key, code, shiftKey, ctrlKey, metaKey, altKey, type }) {
     this.isFast = shiftKey;
-    if (!KEYS[name]) return false;
-    this.press(name, type === 'keydown');
-    return true;
+    if (ctrlKey || metaKey || altKey) {
+      this.release();
+      return false;
+    }
+    const name = key.length === 1 ? key.toLowerCase() : key;
+    // Another name may come when it is released, if a modifier has changed meanwhile.
+    if (type === 'keyup') return this.press(code || name, null);
+    return Boolean(KEYS[name]) && this.press(code || name, KEYS[name]);
   }
 
-  press(name, isDown) {
-    if (isDown) this.pressed.set(name, KEYS[name]);
-    else this.pressed.delete(name);
+  // Begins to go some way, or no longer goes it if there is none. Returns whether anything changed.
+  press(id, way) {
+    const was = this.pressed.get(id);
+    if (way) this.pressed.set(id, way);
+    else this.pressed.delete(id);
     this.changed();
+    return Boolean(way ?? was);
+  }
+
+  // The same for a button that stands for a key.
+  pressButton(name, isDown) {
+    return this.press(`button ${name}`, isDown ? KEYS[name] : null);
   }
 
   get isMoving() {

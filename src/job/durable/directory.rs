@@ -1,7 +1,7 @@
 //! The job directory, which holds everything that a job needs to go on, and the results beside it.
 
 use crate::job::durable::atomic_file::{create_folder, remove_file};
-use crate::job::durable::listing::{Leftovers, entries, is_folder};
+use crate::job::durable::listing::{Leftovers, entries, is_folder, is_page_of_others};
 use crate::job::durable::lock::{Lock, lock_file};
 use crate::job::durable::replacement::Replacement;
 use crate::job::index::PartIndex;
@@ -252,6 +252,14 @@ impl JobDirectory {
         replacement.map_or(Ok(()), |replacement| replacement.carry_out())
     }
 
+    /// Tells whether somebody else's page is where that of the job is to be.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be read.
+    pub fn has_page_of_others(&self) -> Result<bool> {
+        is_page_of_others(&self.results)
+    }
+
     /// Returns the paths of all results of an earlier job that may exist.
     pub(crate) fn earlier_results(&self) -> Vec<PathBuf> {
         Leftovers::of(&self.results).unwrap_or_default().files
@@ -350,6 +358,25 @@ mod tests {
                 assert!(gone.iter().all(|folder| !output.path().join(folder).exists()), "cut off after {done}");
             }
         }
+    }
+
+    #[test]
+    fn a_page_that_somebody_put_there_during_the_job_stays() {
+        let output = tempfile::tempdir().unwrap();
+        let directory = JobDirectory::new(output.path());
+        let _lock = directory.create().unwrap();
+        fs::create_dir_all(directory.output().directory()).unwrap();
+        fs::write(directory.output().page(), "<html data-terrain=\"tileset.json\">").unwrap();
+        fs::write(directory.output().report(), "{}").unwrap();
+        fs::write(directory.results().page(), "theirs").unwrap();
+        let names = names(&["index.html", "report.json"]);
+        let error = directory.replace_results(&names).unwrap_err();
+        assert_eq!(error.exit_code(), 2);
+        assert!(error.to_string().contains("move it away"), "{error}");
+        assert_eq!(fs::read(directory.results().page()).unwrap(), b"theirs");
+        fs::remove_file(directory.results().page()).unwrap();
+        directory.replace_results(&names).unwrap();
+        assert!(fs::read_to_string(directory.results().page()).unwrap().contains("data-terrain"));
     }
 
     #[test]

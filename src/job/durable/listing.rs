@@ -37,9 +37,8 @@ impl Leftovers {
             output.preview_world(),
         ];
         // People give their own pages this name too.
-        let page = output.page();
-        if !exists(&page)? || is_page(&page).map_err(Error::io("read", &page))? {
-            files.push(page);
+        if !is_page_of_others(output)? {
+            files.push(output.page());
         }
         let partials: Vec<PathBuf> = files.iter().map(|path| partial_path(path)).collect();
         files.extend(partials);
@@ -85,6 +84,29 @@ impl Leftovers {
 fn may_be_in(below: &[String], number: &str) -> bool {
     (below.is_empty() && number.len() >= NUMBER_LENGTH)
         || number.parse().is_ok_and(|number| belongs_into(below, number))
+}
+
+/// Tells whether somebody else's page is where that of a job is to be.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be read.
+pub(crate) fn is_page_of_others(results: &OutputFiles) -> Result<bool> {
+    let page = results.page();
+    Ok(exists(&page)? && !is_page(&page).map_err(Error::io("read", &page))?)
+}
+
+/// Checks that nobody else's page is where that of a job is to be.
+///
+/// # Errors
+/// [`Error::Config`] if one is.
+pub(crate) fn check_page_is_ours(results: &OutputFiles) -> Result<()> {
+    if !is_page_of_others(results)? {
+        return Ok(());
+    }
+    Err(Error::Config(format!(
+        "{} exists, and no job wrote it: move it away, or set [output] page = false",
+        results.page().display()
+    )))
 }
 
 /// Returns the paths of everything in `folder`; nothing if there is no such folder.

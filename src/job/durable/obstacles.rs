@@ -2,10 +2,9 @@
 
 use crate::job::durable::atomic_file::partial_path;
 use crate::job::durable::directory::JobDirectory;
-use crate::job::durable::listing::{Leftovers, exists, is_folder};
+use crate::job::durable::listing::{Leftovers, check_page_is_ours, exists, is_folder};
 use crate::job::durable::lock::lock_file;
 use crate::output::checksums::read_file;
-use crate::output::page::is_page;
 use crate::{Error, Result, disk};
 use serde_json::Value;
 use std::io::ErrorKind;
@@ -49,12 +48,8 @@ pub(crate) fn check_nothing_in_the_way(directory: &JobDirectory) -> Result<()> {
 /// # Errors
 /// [`Error::Config`] if such files exist and nothing says that a job wrote them.
 pub(crate) fn check_results_are_ours(directory: &JobDirectory, page: bool) -> Result<()> {
-    let found = directory.results().page();
-    if page && exists(&found)? && !is_page(&found).map_err(Error::io("read", &found))? {
-        return Err(Error::Config(format!(
-            "{} exists, and no job wrote it: move it away, or set [output] page = false",
-            found.display()
-        )));
+    if page {
+        check_page_is_ours(directory.results())?;
     }
     let report = directory.results().report();
     let report = match read_file(&report) {

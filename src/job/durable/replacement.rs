@@ -6,7 +6,7 @@
 
 use crate::disk::OpenFolder;
 use crate::job::durable::atomic_file::{create_folder, remove_file, sync_folder};
-use crate::job::durable::listing::{Leftovers, exists, is_partial};
+use crate::job::durable::listing::{Leftovers, check_page_is_ours, exists, is_partial};
 use crate::output::file_names::OutputFiles;
 use crate::{Error, Result, disk, fault};
 use std::collections::HashSet;
@@ -34,8 +34,8 @@ impl Replacement {
     /// are in `waiting`, and some may be in their places already. Returns `None` if all are.
     ///
     /// # Errors
-    /// [`Error::Io`] if a file is in neither place, or the system does not tell; if a folder cannot be made or opened. No result has
-    /// been touched then.
+    /// [`Error::Io`] if a file is in neither place, or the system does not tell; if a folder cannot be made or opened. [`Error::Config`]
+    /// if somebody else's page is in the place of the job's. No result has been touched then.
     pub(crate) fn prepare(
         results: &OutputFiles,
         waiting: &OutputFiles,
@@ -45,6 +45,10 @@ impl Replacement {
         if !exists(&new_report)? && exists(&report)? {
             // It goes last.
             return Ok(None);
+        }
+        if names.iter().any(|name| results.directory().join(name) == results.page()) {
+            // Somebody may have put it there since the job wrote its own. The lists of results name that one by now.
+            check_page_is_ours(results)?;
         }
         let mut found = Vec::new();
         for name in names {

@@ -132,11 +132,16 @@ pub(crate) fn publish(
     let georeference = Georeference::new(&plan.frame, &plan.lattice, bounds, &plan.unit, plan.crs.epsg);
     let tiles = &written.stats;
     let fits = fits_one_file(tiles);
+    let page_of_others = output.page && run.directory.has_page_of_others()?;
+    if page_of_others {
+        let page = run.directory.results().page();
+        warnings.push(format!("the page is not written: {} came during the job, and no job wrote it", page.display()));
+    }
     let content = SideFiles {
         georeference: georeference.to_json(placement.as_ref())?,
         tileset: text,
         one_file: fits && output.format != OutputFormat::Tiles3d,
-        page: output.page,
+        page: output.page && !page_of_others,
         copyright: output.copyright(),
         has_ramp: matches!(look.style.coloring, None | Some(Coloring::Elevation(_))),
     };

@@ -1,4 +1,5 @@
 use super::*;
+use crate::view::hosts::Hosts;
 use flate2::read::GzDecoder;
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpStream};
@@ -27,6 +28,11 @@ impl Answer {
 
 impl Rig {
     fn new() -> Rig {
+        Rig::with_stillness(STILLNESS)
+    }
+
+    /// Clients may take nothing of an answer for so long.
+    fn with_stillness(stillness: Duration) -> Rig {
         let folder = tempfile::tempdir().unwrap();
         let root = folder.path().canonicalize().unwrap().join("out");
         std::fs::create_dir_all(root.join("tiles")).unwrap();
@@ -35,8 +41,8 @@ impl Rig {
         std::fs::write(folder.path().join("secret.json"), "secret").unwrap();
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
         let address = listener.local_addr().unwrap();
-        let site = Site { root, page: "<p>the page".into(), address: address.ip() };
-        let server = Server::new(listener, site).unwrap();
+        let site = Site { root, page: "<p>the page".into(), hosts: Hosts::new(&["maps.example".into()]) };
+        let server = Server { stillness, ..Server::new(listener, site).unwrap() };
         thread::spawn(move || server.run());
         Rig { folder, address }
     }
@@ -168,6 +174,11 @@ fn head_gives_the_headers_without_the_file() {
     let head = rig.ask("HEAD /tiles/000000.glb", "");
     assert_eq!((head.status, head.header("Content-Length"), head.body.len()), (200, Some("400000"), 0));
     assert_eq!(rig.ask("HEAD /nothing", "").status, 404);
+    for range in ["0-9", "500000-", "-7"] {
+        let whole = rig.ask("HEAD /tiles/000000.glb", &format!("Range: bytes={range}\r\n"));
+        assert_eq!((whole.status, whole.header("Content-Length")), (200, Some("400000")), "{range}");
+        assert_eq!(whole.header("Content-Range"), None, "{range}");
+    }
 }
 
 #[test]
@@ -217,8 +228,13 @@ fn other_methods_and_other_hosts_are_refused() {
         assert_eq!((refused.status, refused.header("Allow")), (405, Some("GET, HEAD")), "{method}");
     }
     assert!(rig.out().join("report.json").exists());
-    assert_eq!(rig.ask("GET /report.json", "Host: evil.example\r\n").status, 403);
-    assert_eq!(rig.ask("GET /report.json", "Host: 127.0.0.1:9\r\n").status, 200);
+    let refused = rig.ask("GET /report.json", "Host: evil.example\r\n");
+    assert_eq!(refused.status, 403);
+    let why = String::from_utf8(refused.body).unwrap();
+    assert!(why.contains("--host NAME") && why.contains("localhost, IP addresses, "), "{why}");
+    for own in ["127.0.0.1:9", "192.0.2.7:8080", "maps.example"] {
+        assert_eq!(rig.ask("GET /report.json", &format!("Host: {own}\r\n")).status, 200, "{own}");
+    }
 }
 
 #[test]
@@ -240,6 +256,41 @@ fn clients_that_never_send_or_never_read_hold_up_nobody() {
     });
     drop((silent, slow, half));
     assert_eq!(rig.get("/report.json").status, 200);
+}
+
+/// Returns a connection that asks for a file that is larger than what systems keep of an answer on its way.
+fn asks_for_much(rig: &Rig) -> TcpStream {
+    let mut stream = TcpStream::connect(rig.address).unwrap();
+    stream.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
+    stream.write_all(b"GET /large.glb HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n").unwrap();
+    stream
+}
+
+const LARGE: u64 = 32 << 20;
+
+#[test]
+fn clients_that_never_read_lose_their_places() {
+    let rig = Rig::with_stillness(Duration::from_millis(300));
+    std::fs::File::create(rig.out().join("large.glb")).unwrap().set_len(LARGE).unwrap();
+    let still: Vec<TcpStream> = (0..MOST_CONNECTIONS).map(|_| asks_for_much(&rig)).collect();
+    assert_eq!(rig.get("/report.json").status, 200);
+    // What the system still had on its way comes, but not the file.
+    let mut taken = Vec::new();
+    let _ = (&still[0]).read_to_end(&mut taken);
+    assert!((taken.len() as u64) < LARGE, "{}", taken.len());
+}
+
+#[test]
+fn clients_that_read_slowly_get_all() {
+    let rig = Rig::with_stillness(Duration::from_secs(3));
+    std::fs::File::create(rig.out().join("large.glb")).unwrap().set_len(LARGE).unwrap();
+    let (mut stream, mut piece, mut total) = (asks_for_much(&rig), vec![0; 1 << 20], 0);
+    // This takes longer than a client may take nothing.
+    while let count @ 1.. = stream.read(&mut piece).unwrap() {
+        total += count as u64;
+        thread::sleep(Duration::from_millis(100));
+    }
+    assert!(total > LARGE, "{total}");
 }
 
 #[test]
