@@ -4,7 +4,6 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use gdt_batch::output::tiles3d::globe::relative_transform;
 use serde_json::{Value, json};
 
 use crate::clouds;
@@ -13,7 +12,7 @@ use crate::globe::{wide, wide_in_many_tiles};
 use crate::levels::hills;
 use crate::program::{Job, number};
 use crate::random::Random;
-use crate::tileset::{Tile, applied, extent, files_below, keeps_the_rules, tiles, triangles};
+use crate::tileset::{Tile, extent, files_below, keeps_the_rules, tiles, triangles};
 use crate::validator::validate;
 
 /// Returns the path of Chromium, or `None` if it or an npm package is missing. Under tests/run that is a failure.
@@ -52,15 +51,14 @@ fn seen(job: &Job, chromium: &Path, page: &str, places: &[[f64; 3]]) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// Returns the middles of a dozen triangles of the finest mesh, in the frame of the root.
+/// Returns the middles of a dozen triangles of the finest mesh.
 fn middles(job: &Job, tiles: &[Tile]) -> Vec<[f64; 3]> {
     let mut random = Random(4);
     let middle = |_| {
         let leaf = tiles[0].leaves[random.below(tiles[0].leaves.len() as u64) as usize];
         let mesh = triangles(job, &tiles[leaf]);
         let t = mesh[random.below(mesh.len() as u64) as usize];
-        let middle = [0, 1, 2].map(|k| (t[0][k] + t[1][k] + t[2][k]) / 3.0);
-        applied(&relative_transform(&tiles[0].placed, &tiles[leaf].placed), middle)
+        [0, 1, 2].map(|k| (t[0][k] + t[1][k] + t[2][k]) / 3.0)
     };
     (0..12).map(middle).collect()
 }
@@ -145,7 +143,7 @@ fn a_browser_shows_a_wide_area_on_the_globe() {
     seen_on_the_globe(&job, &report, &tiles, &chromium);
 }
 
-/// Both viewers open a tileset of external tilesets, whose transforms lead from file to file.
+/// Both viewers open a tileset of external tilesets, which the transform of the main one places.
 #[test]
 fn browsers_show_a_tileset_of_external_tilesets() {
     let Some(chromium) = chromium() else { return };

@@ -119,7 +119,7 @@ pub(crate) fn publish(
         text = Some((&look.style.frame, root));
         (placement, stats) = (placed.ok(), levels);
     }
-    let georeference = Georeference::new(&plan.frame, &plan.lattice, bounds, &plan.unit, plan.crs.epsg);
+    let georeference = Georeference::new(&look.style.frame, &plan.lattice, bounds, &plan.unit, plan.crs.epsg);
     let tiles = &written.stats;
     let fits = fits_one_file(tiles);
     let content = SideFiles {

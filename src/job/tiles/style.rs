@@ -2,6 +2,7 @@
 
 use crate::geometry::Bounds;
 use crate::job::plan::job_plan::Plan;
+use crate::job::tiles::curve::curvature_of;
 use crate::job::tiles::max_edge::MaxEdgeRule;
 use crate::output::Compression;
 use crate::output::color::{Coloring, HeightRange};
@@ -36,9 +37,13 @@ impl TileStyle {
             ColorChoice::Auto | ColorChoice::Rgb => Some(Coloring::Rgb { eight_bit: max_rgb <= 255 }),
         };
         let compression = output.packing();
+        let frame = match curvature_of(plan, bounds) {
+            Some(curvature) => plan.frame.clone().curved(curvature),
+            None => plan.frame.clone(),
+        };
         let frame = match compression {
-            Compression::None => plan.frame.clone().refined(bounds),
-            _ => plan.frame.clone().packed(),
+            Compression::None => frame.refined(bounds),
+            _ => frame.packed(),
         };
         TileStyle { frame, coloring, normals: output.normals, compression, max_edge }
     }

@@ -3,7 +3,7 @@
 //! The sines of this file and of `proj4rs` come from the machine's mathematics library, so the last digits of a transform may differ
 //! between machines.
 
-use glam::{DAffine3, DMat4};
+use glam::{DAffine3, DMat4, DVec3};
 use proj4rs::Proj;
 use proj4rs::transform::transform;
 
@@ -88,13 +88,11 @@ pub fn transform_point(transform: &[f64; 16], place: [f64; 3]) -> [f64; 3] {
     affine(transform).transform_point3(place.into()).into()
 }
 
-/// Returns the transform that, followed by `outer`, leads to the same place as `inner`. `outer` must have an inverse.
-pub fn relative_transform(outer: &[f64; 16], inner: &[f64; 16]) -> [f64; 16] {
-    let (outer, inner) = (affine(outer), affine(inner));
-    let back = outer.matrix3.inverse();
+/// Returns the place of the tileset that `transform`, which must have an inverse, maps to `place` in metres.
+pub fn relative_place(transform: &[f64; 16], place: [f64; 3]) -> [f64; 3] {
+    let transform = affine(transform);
     // Earth-centred places are far longer than their difference, so it is taken first.
-    let translation = back * (inner.translation - outer.translation);
-    DMat4::from(DAffine3 { matrix3: back * inner.matrix3, translation }).to_cols_array()
+    (transform.matrix3.inverse() * (DVec3::from(place) - transform.translation)).into()
 }
 
 fn affine(transform: &[f64; 16]) -> DAffine3 {

@@ -12,7 +12,12 @@ use crate::geometry::Bounds;
 use crate::output::file_names::{relative_uri, tileset_uri};
 use crate::output::frame::Frame;
 use crate::output::gltf::schema::GENERATOR;
-use crate::output::tiles3d::globe::{relative_transform, transform_point};
+
+/// Cells along a side of a tile at whose corners its bent box is measured.
+const BULGE_CELLS: i64 = 8;
+
+/// A length in metres that is below the radius of the earth.
+const EARTH: f64 = 6e6;
 
 /// Half the least extent of a bounding volume in metres. Viewers divide by it.
 const LEAST_HALF: f64 = 0.005;
@@ -24,14 +29,14 @@ pub struct TilesetNode {
     pub uri: Option<String>,
     /// The box of the exact mesh below.
     pub bounds: Bounds<3>,
-    /// The lattice x, y of the place where its transform is exact.
+    /// The lattice x, y of the middle of its own ground.
     pub middle: [i32; 2],
     /// The error that viewers choose levels by, in metres.
     pub error: f64,
-    /// The greatest distance to the exact mesh in metres: along the vertical, plus the difference between transforms.
+    /// The greatest vertical distance to the exact mesh in metres.
     pub greatest_error: f64,
-    /// The map from the scene to the globe, if there is one: from metres x, y, z to earth-centred ones, column by column. A tile
-    /// without a transform takes its parent's.
+    /// The map from the scene to the globe, if there is one: from metres x, y, z to earth-centred ones, column by column. Only the root
+    /// has it, for all.
     pub transform: Option<[f64; 16]>,
     /// The number of the external tileset that begins with this tile; `None` if the tile is in the file of the one above.
     pub file: Option<usize>,
@@ -64,7 +69,7 @@ pub fn write_tilesets<E>(
     mut write: impl FnMut(Option<usize>, &str) -> Result<(), E>,
 ) -> Result<(), E> {
     let mut writer = TilesetWriter { frame, write: &mut write };
-    let (tile, _) = writer.tile(root, None, &tileset_uri(None))?;
+    let (tile, _) = writer.tile(root, &tileset_uri(None))?;
     writer.file(None, root, tile)
 }
 
@@ -91,28 +96,22 @@ impl<E> TilesetWriter<'_, E> {
         (self.write)(number, &text)
     }
 
-    /// Returns what the file `from` says of a tile below one that `above` places on the globe, and the space that its bounding volume
-    /// takes in the parent's frame. The volume holds those of its children.
-    fn tile(&mut self, node: &TilesetNode, above: Option<&[f64; 16]>, from: &str) -> Result<(Value, MetreBounds), E> {
-        let Some(number) = node.file else { return self.tile_here(node, above, from) };
+    /// Returns what the file `from` says of a tile, and the space that its bounding volume takes in the scene. The volume holds those of
+    /// its children.
+    fn tile(&mut self, node: &TilesetNode, from: &str) -> Result<(Value, MetreBounds), E> {
+        let Some(number) = node.file else { return self.tile_here(node, from) };
         let own_file = tileset_uri(Some(number));
-        let (root, volume) = self.tile_here(node, above, &own_file)?;
+        let (root, volume) = self.tile_here(node, &own_file)?;
         self.file(Some(number), node, root)?;
         Ok((tile_json(volume, self.error(node), Some(relative_uri(from, &own_file))), volume))
     }
 
     /// As [`TilesetWriter::tile`], in the file `from` whatever file the tile has.
-    fn tile_here(
-        &mut self,
-        node: &TilesetNode,
-        above: Option<&[f64; 16]>,
-        from: &str,
-    ) -> Result<(Value, MetreBounds), E> {
-        let own = node.transform.as_ref();
+    fn tile_here(&mut self, node: &TilesetNode, from: &str) -> Result<(Value, MetreBounds), E> {
         let mut volume = thickened(bounds_in_metres(self.frame, node.bounds));
         let mut children = Vec::with_capacity(node.children.len());
         for child in &node.children {
-            let (child, of_child) = self.tile(child, own.or(above), from)?;
+            let (child, of_child) = self.tile(child, from)?;
             children.push(child);
             volume = union(volume, of_child);
         }
@@ -123,10 +122,10 @@ impl<E> TilesetWriter<'_, E> {
                 tile["extras"] = json!({"maxError": node.greatest_error});
             }
         }
-        let Some(own) = own else { return Ok((tile, volume)) };
-        let transform = above.map_or(*own, |above| relative_transform(above, own));
-        tile["transform"] = transform.to_vec().into();
-        Ok((tile, image(&transform, volume)))
+        if let Some(transform) = &node.transform {
+            tile["transform"] = transform.to_vec().into();
+        }
+        Ok((tile, volume))
     }
 
     /// Returns the error of showing a tile in place of those below.
@@ -145,12 +144,6 @@ fn tile_json(volume: MetreBounds, error: f64, uri: Option<String>) -> Value {
     tile
 }
 
-/// Returns the box around a transformed box. It is that of the transformed corners, because the map is affine.
-fn image(transform: &[f64; 16], extent: MetreBounds) -> MetreBounds {
-    let corner = |i: usize| transform_point(transform, [0, 1, 2].map(|k| extent[i >> k & 1][k]));
-    (0..8).map(|i| [corner(i); 2]).reduce(union).unwrap_or(extent)
-}
-
 /// Widens a box to at least twice [`LEAST_HALF`] along every axis.
 fn thickened([low, high]: MetreBounds) -> MetreBounds {
     let lacking = [0, 1, 2].map(|k| (LEAST_HALF - (high[k] - low[k]) / 2.0).max(0.0));
@@ -163,10 +156,24 @@ fn union(a: MetreBounds, b: MetreBounds) -> MetreBounds {
 
 /// Returns the least and greatest x, y, z of `bounds` in metres of the tileset.
 pub fn bounds_in_metres(frame: &Frame, bounds: Bounds<3>) -> [[f64; 3]; 2] {
-    [bounds.min, bounds.max].map(|corner| {
+    let place = |corner| {
         let [x, up, z] = frame.world(corner);
         [x, 0.0 - z, up]
-    })
+    };
+    if frame.extras().curvature.is_none() {
+        return [bounds.min, bounds.max].map(place);
+    }
+    // Between the places looked at, a bent box bulges by their distance squared over the size of the earth.
+    let side = [0, 1].map(|k| bounds.extent(k) as f64 * frame.resolution_metres()[0] / BULGE_CELLS as f64);
+    let bulge =
+        (side[0] * side[0] + side[1] * side[1]) / EARTH + frame.resolution_metres().into_iter().fold(0.0, f64::max);
+    let along = |k: usize, n: i64, cells: i64| (bounds.min[k] as i64 + bounds.extent(k) * n / cells) as i32;
+    let line = BULGE_CELLS + 1;
+    let corners = (0..line * line * 2).map(|i| {
+        [along(0, i % line, BULGE_CELLS), along(1, i / line % line, BULGE_CELLS), along(2, i / line / line, 1)]
+    });
+    let around = corners.map(|corner| [place(corner); 2]).reduce(union).unwrap_or([[0.0; 3]; 2]);
+    [around[0].map(|v| v - bulge), around[1].map(|v| v + bulge)]
 }
 
 /// Returns the centre and the half axes of a box.
@@ -189,6 +196,7 @@ fn diagonal(frame: &Frame, node: &TilesetNode) -> f64 {
 mod tests {
     use super::*;
     use crate::geometry::lattice::{Lattice, shortest_decimal};
+    use crate::output::tiles3d::globe::transform_point;
     use std::collections::BTreeMap;
     use std::convert::Infallible;
 
@@ -281,9 +289,9 @@ mod tests {
         for placed in [false, true] {
             let mut count = 0;
             // A pyramid of tiles with four children each.
-            fn pyramid(height: usize, count: &mut i32, placed: bool) -> TilesetNode {
+            fn pyramid(height: usize, count: &mut i32) -> TilesetNode {
                 let children: Vec<_> =
-                    (0..if height > 0 { 4 } else { 0 }).map(|_| pyramid(height - 1, count, placed)).collect();
+                    (0..if height > 0 { 4 } else { 0 }).map(|_| pyramid(height - 1, count)).collect();
                 *count += 1;
                 let own = Bounds { min: [*count, -*count, 0], max: [*count + 90, 50 - *count, *count % 9] };
                 TilesetNode {
@@ -292,12 +300,12 @@ mod tests {
                     middle: [*count; 2],
                     error: height as f64,
                     greatest_error: 2.0 * height as f64,
-                    transform: placed.then(|| moved(f64::from(*count) * 0.01)),
+                    transform: None,
                     file: None,
                     children,
                 }
             }
-            let whole = pyramid(6, &mut count, placed);
+            let whole = TilesetNode { transform: placed.then(|| moved(0.5)), ..pyramid(6, &mut count) };
             let mut divided = whole.clone();
             let files = crate::output::tiles3d::division::divide(&mut divided);
             let (whole, divided) = (texts(&frame, &whole), texts(&frame, &divided));
