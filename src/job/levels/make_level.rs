@@ -69,7 +69,7 @@ pub type TopOf<'a> = &'a (dyn Fn(PartIndex) -> Result<Child> + Sync);
 const SPACINGS: f64 = 4.4;
 
 /// The greatest part of a tile's width that its error is. A tile of a few vertices is worth showing from afar all the same.
-const PART_OF_WIDTH: f64 = 0.25;
+const PART_OF_WIDTH: f64 = 0.5;
 
 /// Returns the error in metres by which viewers choose the level of a tile within `bounds`: a multiple of the distance between its
 /// vertices, because nothing smaller than that is left in it, and the height by which its triangles miss the surface. With the greatest
