@@ -229,6 +229,42 @@ pub struct Frontier {
     pub sites: Vec<BorderVertex>,
     /// The directed edges around the final ground, as positions in `sites`.
     pub boundary: Vec<[u32; 2]>,
+    /// Edges of the boundary over which a way to the hull comes in that goes out again, each with the edge where it does.
+    pub passes: Vec<[u32; 2]>,
+    /// What tiles ask about edges of the boundary.
+    pub questions: Vec<FlowQuestion>,
+}
+
+/// A tile asks whether the way that leaves over an edge of a node's boundary leads out of the hull.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Pod, Zeroable)]
+pub struct FlowQuestion {
+    /// The tile.
+    pub tile: TileIndex,
+    /// The edge of the boundary, as its position there.
+    pub exit: u32,
+    /// The edge of the tile from which the way comes, counterclockwise in the triangle before it.
+    pub edge: [Site; 2],
+}
+
+/// An edge of a triangle that touches a tile, from which the way leads out of the hull.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Pod, Zeroable)]
+pub struct TrimmedEdge {
+    /// The tile.
+    pub tile: TileIndex,
+    /// The edge, counterclockwise in the triangle before it.
+    pub edge: [Site; 2],
+}
+
+/// Returns the tiles that own some of `sites`, which are sorted by tile, or ask some of `questions`, ascending.
+pub fn tiles_of(sites: &[BorderVertex], questions: &[FlowQuestion]) -> Vec<TileIndex> {
+    let mut tiles: Vec<TileIndex> = sites.iter().map(|vertex| vertex.tile).collect();
+    tiles.dedup();
+    tiles.extend(questions.iter().map(|question| question.tile));
+    tiles.sort_unstable();
+    tiles.dedup();
+    tiles
 }
 
 impl Frontier {
@@ -237,7 +273,8 @@ impl Frontier {
     /// # Errors
     /// [`Error::Io`].
     pub fn save(&self, store: &Store, node: NodeIndex) -> Result<RecordRef> {
-        ColumnWriter::default().push(&self.sites).push(&self.boundary).write(store, StepRecord::Frontier(node))
+        let ground = ColumnWriter::default().push(&self.sites).push(&self.boundary);
+        ground.push(&self.passes).push(&self.questions).write(store, StepRecord::Frontier(node))
     }
 
     /// Reads the record of `node`.
@@ -246,7 +283,8 @@ impl Frontier {
     /// [`Error::Io`], or [`Error::Broken`] if there is none.
     pub fn load(store: &Store, node: NodeIndex) -> Result<Frontier> {
         let mut columns = ColumnReader::open(store, StepRecord::Frontier(node))?;
-        Ok(Frontier { sites: columns.column_vec()?, boundary: columns.column_vec()? })
+        let (sites, boundary) = (columns.column_vec()?, columns.column_vec()?);
+        Ok(Frontier { sites, boundary, passes: columns.column_vec()?, questions: columns.column_vec()? })
     }
 
     /// Returns the number of sites of the frontier of `node`, without reading the rest of its record.
@@ -257,11 +295,9 @@ impl Frontier {
         Ok(ColumnReader::open(store, StepRecord::Frontier(node))?.column::<BorderVertex>()?.len() as u64)
     }
 
-    /// Returns the tiles that own sites of it, ascending.
+    /// Returns the tiles that own sites of it or ask something, ascending.
     pub fn tiles(&self) -> Vec<TileIndex> {
-        let mut tiles: Vec<TileIndex> = self.sites.iter().map(|vertex| vertex.tile).collect();
-        tiles.dedup();
-        tiles
+        tiles_of(&self.sites, &self.questions)
     }
 }
 
@@ -271,11 +307,30 @@ pub struct Seam {
     /// Tile, first triangle and number of triangles, by ascending tile.
     index: Vec<[u32; 3]>,
     triangles: Vec<SeamTriangle>,
+    /// The edges from which ways lead out of the hull, sorted.
+    trimmed: Vec<TrimmedEdge>,
+}
+
+/// The part of seams that touches a tile.
+#[derive(Clone, Debug, Default)]
+pub struct SeamOfTile {
+    /// The triangles that touch it.
+    pub triangles: Vec<SeamTriangle>,
+    /// The edges of triangles of it, and of these, from which ways lead out of the hull.
+    pub trimmed: Vec<[Site; 2]>,
+}
+
+impl SeamOfTile {
+    /// Adds what another seam has.
+    pub fn add(&mut self, other: SeamOfTile) {
+        self.triangles.extend(other.triangles);
+        self.trimmed.extend(other.trimmed);
+    }
 }
 
 impl Seam {
-    /// Sorts `triangles` by the tiles that they touch.
-    pub fn new(triangles: &[SeamTriangle]) -> Seam {
+    /// Sorts `triangles` by the tiles that they touch. The node answers that ways from `trimmed`, which are sorted, lead out of the hull.
+    pub fn new(triangles: &[SeamTriangle], trimmed: Vec<TrimmedEdge>) -> Seam {
         let mut touching: Vec<(TileIndex, u32)> = Vec::with_capacity(triangles.len() * 2);
         for (at, triangle) in (0..).zip(triangles) {
             let mut tiles = triangle.map(|corner| corner.tile);
@@ -283,7 +338,7 @@ impl Seam {
             touching.extend((0..3).filter(|&i| i == 0 || tiles[i] != tiles[i - 1]).map(|i| (tiles[i], at)));
         }
         touching.sort_unstable_by_key(|&(tile, at)| (tile, triangles[at as usize]));
-        let mut seam = Seam { index: Vec::new(), triangles: Vec::with_capacity(touching.len()) };
+        let mut seam = Seam { index: Vec::new(), triangles: Vec::with_capacity(touching.len()), trimmed };
         for (tile, at) in touching {
             match seam.index.last_mut() {
                 Some([last, _, count]) if *last == tile.0 => *count += 1,
@@ -299,20 +354,26 @@ impl Seam {
     /// # Errors
     /// [`Error::Io`].
     pub fn save(&self, store: &Store, node: NodeIndex) -> Result<RecordRef> {
-        ColumnWriter::default().push(&self.index).push(&self.triangles).write(store, StepRecord::Seam(node))
+        let columns = ColumnWriter::default().push(&self.index).push(&self.trimmed).push(&self.triangles);
+        columns.write(store, StepRecord::Seam(node))
     }
 
-    /// Reads from the record of `node` the triangles that touch `tile`.
+    /// Reads from the record of `node` what touches `tile`.
     ///
     /// # Errors
     /// [`Error::Io`], or [`Error::Broken`] if there is no record.
-    pub fn touching(store: &Store, node: NodeIndex, tile: TileIndex) -> Result<Vec<SeamTriangle>> {
+    pub fn touching(store: &Store, node: NodeIndex, tile: TileIndex) -> Result<SeamOfTile> {
         let mut columns = ColumnReader::open(store, StepRecord::Seam(node))?;
         let index = columns.column::<[u32; 3]>()?;
-        match index.binary_search_by_key(&tile.0, |entry| entry[0]) {
-            Ok(at) => Ok(columns.column_part(index[at][1] as usize, index[at][2] as usize)?.to_vec()),
-            Err(_) => Ok(Vec::new()),
-        }
+        let all = columns.column::<TrimmedEdge>()?;
+        let from = all.partition_point(|trimmed| trimmed.tile < tile);
+        let trimmed = all[from..].iter().take_while(|trimmed| trimmed.tile == tile).map(|trimmed| trimmed.edge);
+        let trimmed = trimmed.collect();
+        let triangles = match index.binary_search_by_key(&tile.0, |entry| entry[0]) {
+            Ok(at) => columns.column_part(index[at][1] as usize, index[at][2] as usize)?.to_vec(),
+            Err(_) => Vec::new(),
+        };
+        Ok(SeamOfTile { triangles, trimmed })
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::job::index::TileIndex;
 use crate::job::records::{BorderVertex, FinishedBorder, Leaf, SeamTriangle};
+use crate::job::tiles::hull_slivers::HullSlivers;
 use crate::job::tiles::style::TileStyle;
 use crate::mesh::index::SiteIndex;
 use crate::output::Tile;
@@ -22,8 +23,14 @@ pub(crate) struct TileContent {
 
 impl TileContent {
     /// Returns the content that the tile's leaf contributes.
-    pub(crate) fn of_leaf(mut leaf: Leaf, border: &FinishedBorder, style: &TileStyle) -> TileContent {
-        let cut = style.max_edge.take(&leaf.positions, &mut leaf.triangles);
+    pub(crate) fn of_leaf(
+        mut leaf: Leaf,
+        border: &FinishedBorder,
+        slivers: &HullSlivers,
+        style: &TileStyle,
+    ) -> TileContent {
+        let mut cut = slivers.take(&leaf.positions, &mut leaf.triangles);
+        cut.extend(style.max_edge.take(&leaf.positions, &mut leaf.triangles));
         let mut normals = NormalSums::new(&leaf.positions, &leaf.triangles).unit_normals(&style.frame);
         for vertex in &border.0 {
             normals[vertex.site.get()] = vertex.normal;
@@ -42,6 +49,7 @@ impl TileContent {
         border_of: BorderOf,
         tile: TileIndex,
         seam: impl Iterator<Item = SeamTriangle>,
+        slivers: &HullSlivers,
         style: &TileStyle,
     ) -> Result<u64> {
         let mut neighbours = NeighbourBorders { border_of, borders: HashMap::new() };
@@ -60,7 +68,8 @@ impl TileContent {
                     }
                 };
             }
-            let is_cut = style.max_edge.leaves_out(triangle.map(|corner| corner.position));
+            let is_long = style.max_edge.leaves_out(triangle.map(|corner| corner.position));
+            let is_cut = is_long || slivers.has(&triangle);
             if is_cut { &mut self.cut } else { &mut self.triangles }.push(corners);
         }
         Ok((self.triangles.len() - before) as u64)

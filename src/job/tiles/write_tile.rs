@@ -6,7 +6,8 @@ use crate::job::durable::atomic_file::{PendingFile, create_folder_of, write_pend
 use crate::job::durable::columns::ColumnWriter;
 use crate::job::durable::directory::JobDirectory;
 use crate::job::index::TileIndex;
-use crate::job::records::{FinishedBorder, Leaf, SeamTriangle, StepOutput, StepRecord, Store, TileSummary, owner};
+use crate::job::records::{FinishedBorder, Leaf, SeamOfTile, StepOutput, StepRecord, Store, TileSummary, owner};
+use crate::job::tiles::hull_slivers::HullSlivers;
 use crate::job::tiles::style::TileStyle;
 use crate::job::tiles::tile_content::{BorderOf, TileContent};
 use crate::output::Tile;
@@ -53,14 +54,15 @@ pub fn write_tile(
     style: &TileStyle,
     canvas: &Canvas,
     tile: TileIndex,
-    seam: &[SeamTriangle],
+    seam: &SeamOfTile,
     border_of: BorderOf,
 ) -> Result<StepOutput<TileStats>> {
     let leaf = Leaf::load(store, tile)?;
     let border = FinishedBorder::load(store, tile)?;
-    let mut content = TileContent::of_leaf(leaf, &border, style);
-    let own = seam.iter().copied().filter(|triangle| owner(triangle) == tile);
-    let seam_triangles = content.add_seam(border_of, tile, own, style)?;
+    let slivers = HullSlivers::new(style.hull, &seam.trimmed);
+    let mut content = TileContent::of_leaf(leaf, &border, &slivers, style);
+    let own = seam.triangles.iter().copied().filter(|triangle| owner(triangle) == tile);
+    let seam_triangles = content.add_seam(border_of, tile, own, &slivers, style)?;
     let left_out = content.left_out();
     let kept = content.into_tile(style);
     let mut stats = TileStats {
