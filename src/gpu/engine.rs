@@ -4,12 +4,12 @@ use crate::gpu::buffer_id::BufferId;
 use crate::gpu::buffers::{BindGroupKey, BufferSet};
 use crate::gpu::device::Device;
 use crate::gpu::error::GpuError;
+use crate::gpu::mesh_engine::Landed;
 use crate::gpu::passes::{Dispatch, Part, Pass, parts};
 use crate::gpu::recording::{GpuCommand, GpuStep, ProgramKey, Recording, ShaderProgram};
 use crate::gpu::staging::{LentNumbers, StagingPool};
 use crate::gpu::timestamps::{GpuTimestamps, STAMP_BYTES, StepNanoseconds};
 use crate::gpu::upload::{UploadBuffer, room_for};
-use crate::voronoi::mesh_reply::SharedNumbers;
 use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 use wgpu::{BindGroupEntry, BindingResource, BufferBinding, BufferView, CommandEncoder, ComputePipeline, MapMode};
@@ -138,7 +138,7 @@ impl GpuEngine {
         Ok((numbers, times))
     }
 
-    /// As [`GpuEngine::finish`], but the numbers stay where the device has written them, if `pool` may lend the buffer.
+    /// As [`GpuEngine::finish`], but the numbers stay where the device has written them, in a buffer that `pool` lends.
     ///
     /// # Errors
     /// As [`GpuEngine::finish`].
@@ -147,16 +147,13 @@ impl GpuEngine {
         buffers: &mut BufferSet,
         readback: PendingReadback,
         pool: &Arc<StagingPool>,
-    ) -> Result<(SharedNumbers, StepNanoseconds), GpuError> {
-        if !pool.may_lend(buffers.get(BufferId::Staging)?) {
-            let (numbers, times) = self.finish(buffers, readback)?;
-            return Ok((Arc::new(numbers), times));
-        }
+    ) -> Result<Landed, GpuError> {
         self.arrive(&readback)?;
         let times = step_times(buffers, buffers.get(BufferId::Staging)?, &readback)?;
         let view = mapped(buffers.get(BufferId::Staging)?, 0..readback.bytes)?;
         let staging = buffers.take(BufferId::Staging).ok_or_else(|| GpuError::Lost("a buffer is missing".into()))?;
-        Ok((Arc::new(LentNumbers::new(view, staging, pool.clone())), times))
+        let may_stay = pool.lend(&staging);
+        Ok(Landed { numbers: Arc::new(LentNumbers::new(view, staging, pool.clone())), may_stay, times })
     }
 
     fn arrive(&self, readback: &PendingReadback) -> Result<(), GpuError> {

@@ -45,12 +45,14 @@ const PIXELS_PER_SITE: f64 = 16.0;
 const FEWEST_SITES: usize = 100;
 /// With fewer pixels for each site, so many sites would share one that the device is of no use.
 const FEWEST_PIXELS_PER_SITE: u64 = 4;
-/// Bytes for each site of a leaf that waits: its point, its position twice, and the device's answer.
-const BYTES_PER_WAITING_SITE: u64 = 130;
+/// Bytes for each site of a leaf that waits: its point, and its position twice.
+const BYTES_PER_WAITING_SITE: u64 = 50;
+/// Bytes of a software renderer's buffers for each pixel, in all slots. They are the memory of this process.
+const SOFTWARE_BYTES_PER_PIXEL: u64 = 180;
 /// Bytes for each byte that comes back from an atlas: three slots have a buffer each into which the device copies them, up to a quarter too
 /// large. What goes up takes about a quarter as much, in buffers that are up to twice too large.
 const BYTES_PER_BYTE_BACK: u64 = 6;
-/// While leaves of so many sites wait, a job that can do without the GPU asks for no more: the GPU has enough to do, and workers do leaves
+/// While leaves of so many sites have no answer, a job that can do without the GPU asks for no more: the GPU has enough to do, and workers do leaves
 /// themselves.
 const BUSY: u64 = MAX_IN_FLIGHT as u64 * MANY_SITES as u64;
 /// While so many leaves of a thread wait, it takes on other work; then no more, because its stack ends somewhere.
@@ -102,7 +104,7 @@ struct Room {
 
 impl Executor {
     /// Starts a thread that opens an adapter as `options` say. Waits for that only if the job needs the GPU. The CPU's side may take `memory`
-    /// bytes: half for the atlases in flight, half for the leaves that wait.
+    /// bytes: a third each for the atlases in flight, for what has come back and is not read yet, and for the leaves that wait.
     ///
     /// # Errors
     /// A sentence that says why no GPU can be used.
@@ -112,9 +114,9 @@ impl Executor {
             TextureSide::Max => TextureResolution::Side(MAX_SIDE),
             TextureSide::Side(side) => TextureResolution::Side(side),
         };
-        let max_bytes = memory / 2 / BYTES_PER_BYTE_BACK;
+        let max_bytes = memory / 3 / BYTES_PER_BYTE_BACK;
         let filling = Filling { resolution, max_bytes };
-        let room = Room { max_pixels: MAX_PIXELS, max_waiting: memory / 2 / BYTES_PER_WAITING_SITE };
+        let room = Room { max_pixels: MAX_PIXELS, max_waiting: memory / 3 / BYTES_PER_WAITING_SITE };
         #[cfg(feature = "fault-injection")]
         if let Some(engine) = FakeEngine::from_environment() {
             let open = move || Ok(Opened { engine, adapter: "no GPU".into(), room, filling });
@@ -123,13 +125,16 @@ impl Executor {
         let request = AdapterRequest::new(options.adapter.as_deref(), gpu_use == GpuUse::Required);
         let voronoi = options.voronoi;
         let open = move || {
-            // What has come back belongs to leaves that wait.
-            let mut engine = GpuMeshEngine::open(request, voronoi, memory / 2)?;
+            let mut engine = GpuMeshEngine::open(request, voronoi, memory / 3)?;
             engine.warm_up()?;
             let device = engine.device();
             let (adapter, limits) = (device.info.name.clone(), AtlasLimits::of(&device.limits));
             let filling = Filling { max_bytes: max_bytes.min(limits.bytes), ..filling };
-            Ok(Opened { engine, adapter, room: Room { max_pixels: limits.pixels, ..room }, filling })
+            let max_pixels = match device::is_software(&device.info) {
+                true => limits.pixels.min(u32::try_from(memory / SOFTWARE_BYTES_PER_PIXEL).unwrap_or(u32::MAX)),
+                false => limits.pixels,
+            };
+            Ok(Opened { engine, adapter, room: Room { max_pixels, ..room }, filling })
         };
         Executor::on(open, room, gpu_use)
     }
@@ -209,7 +214,8 @@ impl Executor {
         let waiting = self.state.waiting.load(Ordering::Acquire);
         // As long as nothing is known of the device, only one leaf of a thread waits for it.
         let most = if self.state.has_answered.load(Ordering::Acquire) { MOST_NESTED } else { 1 };
-        waiting.saturating_add(sites) <= self.max_waiting && waiting <= BUSY && NESTED.get() < most
+        let is_busy = self.state.unanswered_sites.load(Ordering::Acquire) > BUSY;
+        waiting.saturating_add(sites) <= self.max_waiting && !is_busy && NESTED.get() < most
     }
 
     /// Sends `sites` to the device, and waits for their mesh. Does other work of the job meanwhile.
@@ -232,8 +238,10 @@ impl Executor {
         let (reply, answer) = sync_channel(1);
         let requests = self.requests.lock().unwrap_or_else(PoisonError::into_inner).clone()?;
         self.state.unanswered.fetch_add(1, Ordering::AcqRel);
+        self.state.unanswered_sites.fetch_add(sites.len() as u64, Ordering::AcqRel);
         if requests.send(MeshRequest { sites: sites.to_vec(), start: Instant::now(), reply }).is_err() {
             self.state.unanswered.fetch_sub(1, Ordering::AcqRel);
+            self.state.unanswered_sites.fetch_sub(sites.len() as u64, Ordering::AcqRel);
             return None;
         }
         let reply = self.wait_for(&answer, patience);
@@ -272,7 +280,8 @@ impl Executor {
             match late {
                 Ok(reply) => return Some(reply),
                 Err(RecvTimeoutError::Disconnected) => return Some(MeshReply::Unavailable),
-                Err(RecvTimeoutError::Timeout) => idle = idle.saturating_add(begun.elapsed()),
+                // A process that was stopped for a while was not idle.
+                Err(RecvTimeoutError::Timeout) => idle = idle.saturating_add(begun.elapsed().min(10 * NAP)),
             }
             let is_given_up = self.gpu_use == GpuUse::Optional && self.state.is_gone.load(Ordering::Acquire);
             if is_given_up || patience.is_some_and(|patience| idle > patience) || interrupt::check().is_err() {

@@ -6,12 +6,11 @@ use crate::geometry::Site;
 use crate::gpu::error::GpuError;
 use crate::gpu::filled_atlas::FilledAtlas;
 use crate::gpu::leaf_flags::TOO_MANY_TRIANGLES;
-use crate::gpu::mesh_engine::MeshEngine;
+use crate::gpu::mesh_engine::{Landed, MeshEngine};
 use crate::gpu::returned::ReturnedLayout;
 use crate::gpu::timestamps::StepNanoseconds;
 use crate::mesh::half_edge::HalfEdgeMesh;
 use crate::mesh::index::HalfEdgeIndex;
-use crate::voronoi::mesh_reply::SharedNumbers;
 use crate::voronoi::{PipelineBuffers, triangulate};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -52,18 +51,14 @@ impl MeshEngine for FakeEngine {
         self.delay.is_some_and(|delay| start.elapsed() >= delay)
     }
 
-    fn finish(
-        &mut self,
-        _: usize,
-        (filled, start): Self::Pending,
-    ) -> Result<(SharedNumbers, StepNanoseconds), GpuError> {
+    fn finish(&mut self, _: usize, (filled, start): Self::Pending) -> Result<Landed, GpuError> {
         let Some(delay) = self.delay else {
             loop {
                 std::thread::park();
             }
         };
         std::thread::sleep(delay.saturating_sub(start.elapsed()));
-        Ok((Arc::new(numbers_back(&filled)), StepNanoseconds::default()))
+        Ok(Landed { numbers: Arc::new(numbers_back(&filled)), may_stay: true, times: StepNanoseconds::default() })
     }
 
     fn free(&mut self, _: usize) {}

@@ -5,7 +5,7 @@ use crate::geometry::Site;
 use crate::gpu::atlas::Atlas;
 use crate::gpu::error::GpuError;
 use crate::gpu::filled_atlas::{AtlasLimits, FilledAtlas};
-use crate::gpu::mesh_engine::{MAX_IN_FLIGHT, MeshEngine};
+use crate::gpu::mesh_engine::{Landed, MAX_IN_FLIGHT, MeshEngine};
 use crate::gpu::recording::GpuStep;
 use crate::gpu::returned::replies;
 use crate::voronoi::mesh_reply::MeshReply;
@@ -22,6 +22,8 @@ const MIN_PIXELS: u32 = 1 << 16;
 const ENOUGH_SITES: usize = 100_000;
 /// Or once a leaf has waited for so long, or a worker has nothing else to do.
 const SHORT: Duration = Duration::from_millis(5);
+/// A leaf that has waited for so long comes first.
+const TOO_LONG: Duration = Duration::from_millis(200);
 /// An atlas takes no more leaves once it has so many sites: a large GPU is as fast with them as with ten times as many, which would only come
 /// back later, in buffers that take long to create.
 pub(super) const MANY_SITES: usize = 250_000;
@@ -42,6 +44,8 @@ pub(super) struct GpuState {
     pub(super) waiting: AtomicU64,
     /// The number of requests without an answer, whether or not a worker still waits for it.
     pub(super) unanswered: AtomicUsize,
+    /// The number of their sites.
+    pub(super) unanswered_sites: AtomicU64,
     /// How many workers have nothing else to do than to wait for their mesh.
     pub(super) idle: AtomicUsize,
     /// How many workers in a row have stopped waiting.
@@ -64,6 +68,7 @@ impl GpuState {
             max_pixels: AtomicU32::new(max_pixels),
             waiting: AtomicU64::new(0),
             unanswered: AtomicUsize::new(0),
+            unanswered_sites: AtomicU64::new(0),
             idle: AtomicUsize::new(0),
             abandoned: AtomicUsize::new(0),
             has_answered: AtomicBool::new(false),
@@ -206,7 +211,7 @@ impl<E: MeshEngine> GpuThread<E> {
         let Filling { resolution, max_bytes } = self.filling;
         let limits = AtlasLimits { pixels: self.state.max_pixels.load(Ordering::Acquire), bytes: max_bytes };
         while filled.sites.len() < MANY_SITES
-            && let Some(request) = self.waiting.pop_back()
+            && let Some(request) = self.next()
         {
             if filled.add(&request.sites, resolution, limits) {
                 requests.push(request);
@@ -220,16 +225,24 @@ impl<E: MeshEngine> GpuThread<E> {
         (filled, requests)
     }
 
+    /// Takes the newest leaf that waits, or the oldest one if that has waited for long: nobody waits for ever.
+    fn next(&mut self) -> Option<MeshRequest> {
+        match self.waiting.front()?.start.elapsed() > TOO_LONG {
+            true => self.waiting.pop_front(),
+            false => self.waiting.pop_back(),
+        }
+    }
+
     fn land(&mut self) {
         let Some(AtlasInFlight { requests, atlas, slot, pending, .. }) = self.in_flight.pop_front() else { return };
         let done = self.engine.finish(slot, pending);
         self.free_slots.push(slot);
         match done {
-            Ok((numbers, times)) => {
+            Ok(Landed { numbers, may_stay, times }) => {
                 for (sum, time) in self.state.times.iter().zip(times) {
                     sum.fetch_add(time, Ordering::Relaxed);
                 }
-                let replies = replies(&atlas, &numbers);
+                let replies = replies(&atlas, &numbers, may_stay);
                 requests.iter().zip(replies).for_each(|(request, reply)| self.answer(request, reply));
             }
             Err(error) => self.recover(requests, &error),
@@ -237,11 +250,13 @@ impl<E: MeshEngine> GpuThread<E> {
     }
 
     fn answer(&self, request: &MeshRequest, reply: MeshReply) {
-        self.state.abandoned.store(0, Ordering::Release);
         self.state.has_answered.store(true, Ordering::Release);
         self.state.unanswered.fetch_sub(1, Ordering::AcqRel);
+        self.state.unanswered_sites.fetch_sub(request.sites.len() as u64, Ordering::AcqRel);
         // If sending fails, the worker no longer waits and needs no answer.
-        let _ = request.reply.send(reply);
+        if request.reply.send(reply).is_ok() {
+            self.state.abandoned.store(0, Ordering::Release);
+        }
     }
 
     fn refuse(&self, request: &MeshRequest) {

@@ -17,6 +17,16 @@ use std::sync::Arc;
 /// The most atlases that are in flight at once, which is the number of slots of an engine.
 pub const MAX_IN_FLIGHT: usize = 3;
 
+/// What has come back of an atlas.
+pub struct Landed {
+    /// The numbers.
+    pub numbers: SharedNumbers,
+    /// Whether leaves may keep the numbers of all until they are read. If not, each must copy its own at once.
+    pub may_stay: bool,
+    /// The times of the steps.
+    pub times: StepNanoseconds,
+}
+
 /// What the GPU's thread needs from a GPU. Tests use an engine that fails on purpose.
 pub trait MeshEngine: Send {
     /// An atlas that is being worked on.
@@ -31,11 +41,11 @@ pub trait MeshEngine: Send {
     /// Returns whether [`MeshEngine::finish`] need not wait for this atlas, as far as the engine can tell.
     fn is_finished(&mut self, pending: &Self::Pending) -> bool;
 
-    /// Waits for an atlas; returns the numbers that have come back, and the times of the steps.
+    /// Waits for an atlas; returns what has come back.
     ///
     /// # Errors
     /// [`GpuError`] if they never arrive.
-    fn finish(&mut self, slot: usize, pending: Self::Pending) -> Result<(SharedNumbers, StepNanoseconds), GpuError>;
+    fn finish(&mut self, slot: usize, pending: Self::Pending) -> Result<Landed, GpuError>;
 
     /// Frees the buffers of `slot`.
     fn free(&mut self, slot: usize);
@@ -108,12 +118,13 @@ impl MeshEngine for GpuMeshEngine {
         self.engine.is_finished(pending)
     }
 
-    fn finish(&mut self, slot: usize, pending: PendingReadback) -> Result<(SharedNumbers, StepNanoseconds), GpuError> {
+    fn finish(&mut self, slot: usize, pending: PendingReadback) -> Result<Landed, GpuError> {
         self.engine.finish_shared(&mut self.slots[slot], pending, &self.staging)
     }
 
     fn free(&mut self, slot: usize) {
         self.slots[slot].clear();
+        self.staging.free_spares();
     }
 
     fn reopen(&mut self) -> Result<(), GpuError> {

@@ -125,20 +125,24 @@ struct PlaceOfLeaf {
     blocks_x: u32,
 }
 
-/// Returns the answer for every leaf of `atlas`, of which `numbers` came back.
-pub fn replies(atlas: &Atlas, numbers: &SharedNumbers) -> Vec<MeshReply> {
+/// Returns the answer for every leaf of `atlas`, of which `numbers` came back. They share the numbers if those `may_stay`; else each has a
+/// copy of its own.
+pub fn replies(atlas: &Atlas, numbers: &SharedNumbers, may_stay: bool) -> Vec<MeshReply> {
     let returned = ReturnedAtlas::new(atlas, (**numbers).as_ref());
     let reply = |(i, leaf): (usize, &AtlasLeaf)| match returned.and_then(|returned| returned.place(i)) {
-        Some(place) if place.flags == 0 => made(place, *leaf, numbers),
+        Some(place) if place.flags == 0 => {
+            let made = made(place, *leaf, numbers);
+            MeshReply::Made(if may_stay { made } else { made.alone() })
+        }
         _ => MeshReply::Flagged,
     };
     atlas.leaves.iter().enumerate().map(reply).collect()
 }
 
-fn made(place: PlaceOfLeaf, leaf: AtlasLeaf, numbers: &SharedNumbers) -> MeshReply {
+fn made(place: PlaceOfLeaf, leaf: AtlasLeaf, numbers: &SharedNumbers) -> MadeMesh {
     let PlaceOfLeaf { records, unfinished, missing, block_starts, .. } = place;
     let block_of = Box::new(move |site| leaf.block_of(site));
-    MeshReply::Made(MadeMesh { numbers: numbers.clone(), records, missing, unfinished, block_starts, block_of })
+    MadeMesh { numbers: numbers.clone(), records, missing, unfinished, block_starts, block_of }
 }
 
 #[cfg(test)]
@@ -190,7 +194,10 @@ mod tests {
         assert_eq!(leaf(&numbers), Some(0));
         let is_made = |numbers: &[u32]| {
             let shared: SharedNumbers = Arc::new(numbers.to_vec());
-            matches!(&replies(&atlas, &shared)[..], [MeshReply::Made(made)] if made.records.len() == 8)
+            [true, false].into_iter().all(|may_stay| {
+                let replies = replies(&atlas, &shared, may_stay);
+                matches!(&replies[..], [MeshReply::Made(made)] if made.records.len() == 8)
+            })
         };
         assert!(!is_made(&numbers));
         (numbers[layout.leaves.start], numbers[layout.leaves.start + 1]) = (1, 0);

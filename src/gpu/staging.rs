@@ -10,7 +10,7 @@ pub(super) struct StagingPool {
     spare: Mutex<Vec<Buffer>>,
     /// The bytes of all buffers of the pool, lent or not.
     bytes: AtomicU64,
-    /// The most bytes that they may have. Beyond that, what comes back is copied.
+    /// The most bytes that they may have. Beyond that, each leaf is copied.
     most: u64,
 }
 
@@ -25,13 +25,23 @@ impl StagingPool {
         StagingPool::new(self.most)
     }
 
-    /// Returns whether `buffer` may be lent. If so, it is counted from now on.
-    pub(super) fn may_lend(&self, buffer: &Buffer) -> bool {
-        let size = buffer.size();
-        let with_it = |bytes: u64| Some(bytes.saturating_add(size)).filter(|&sum| sum <= self.most);
+    /// Counts `buffer`, which is lent from now on. Returns whether it may stay with those who read it: beyond the limit, they must copy
+    /// what they need at once.
+    pub(super) fn lend(&self, buffer: &Buffer) -> bool {
+        let mut bytes = self.bytes.fetch_add(buffer.size(), Ordering::AcqRel) + buffer.size();
         // Buffers that nobody reads make room.
-        size <= self.most && self.bytes.fetch_update(Ordering::AcqRel, Ordering::Acquire, with_it).is_ok()
-            || self.take_spare(0).is_some() && self.may_lend(buffer)
+        while bytes > self.most
+            && buffer.size() <= self.most
+            && let Some(spare) = self.take_spare(0)
+        {
+            bytes -= spare.size();
+        }
+        bytes <= self.most
+    }
+
+    /// Frees the buffers that nobody reads.
+    pub(super) fn free_spares(&self) {
+        while self.take_spare(0).is_some() {}
     }
 
     /// Takes a buffer that has come back out of the pool: the smallest one of at least `bytes` bytes, else the largest one.
@@ -57,7 +67,7 @@ pub(super) struct LentNumbers {
 }
 
 impl LentNumbers {
-    /// Lends `view`, which is all that is mapped of `buffer`, which `pool` may lend.
+    /// Lends `view`, which is all that is mapped of `buffer`, which `pool` has counted.
     pub(super) fn new(view: BufferView, buffer: Buffer, pool: Arc<StagingPool>) -> LentNumbers {
         LentNumbers { view: Some(view), buffer, pool }
     }

@@ -25,6 +25,19 @@ pub struct MadeMesh {
 }
 
 impl MadeMesh {
+    /// Returns the mesh with a copy of its own numbers, so that those of other leaves need not stay.
+    pub(crate) fn alone(self) -> MadeMesh {
+        let all = (*self.numbers).as_ref();
+        let mut own = Vec::new();
+        let ranges = [&self.records, &self.missing, &self.unfinished, &self.block_starts].map(|range| {
+            let start = own.len();
+            own.extend_from_slice(all.get(range.clone()).unwrap_or_default());
+            start..own.len()
+        });
+        let [records, missing, unfinished, block_starts] = ranges;
+        MadeMesh { numbers: Arc::new(own), records, missing, unfinished, block_starts, block_of: self.block_of }
+    }
+
     /// Returns the mesh as the steps on the CPU read it. A part that did not come back is empty.
     pub(super) fn lend(&self) -> DeviceMesh<'_> {
         let numbers = (*self.numbers).as_ref();

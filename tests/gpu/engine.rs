@@ -6,7 +6,7 @@ use super::rig::Rig;
 use gdt_batch::geometry::Site;
 use gdt_batch::gpu::device::AdapterRequest;
 use gdt_batch::gpu::filled_atlas::{AtlasLimits, FilledAtlas, MAX_PIXELS};
-use gdt_batch::gpu::mesh_engine::{GpuMeshEngine, MAX_IN_FLIGHT, MeshEngine};
+use gdt_batch::gpu::mesh_engine::{GpuMeshEngine, Landed, MAX_IN_FLIGHT, MeshEngine};
 use gdt_batch::gpu::options::VoronoiMethod;
 use gdt_batch::gpu::recording::{GpuCommand, GpuStep, Recording};
 use gdt_batch::gpu::returned::ReturnedAtlas;
@@ -52,7 +52,7 @@ fn three_atlases_in_flight_are_those_of_the_twins() {
             let started = atlases.iter().enumerate().map(|(slot, atlas)| engine.start(slot, atlas));
             let pending: Vec<_> = started.collect::<Result<_, _>>().expect("the steps run");
             for (slot, (atlas, pending)) in atlases.iter().zip(pending).enumerate() {
-                let (returned, times) = engine.finish(slot, pending).expect("they come back");
+                let Landed { numbers: returned, times, .. } = engine.finish(slot, pending).expect("they come back");
                 let expected = twins::atlas::mesh(&atlas.atlas, &atlas.sites, method);
                 assert!((*returned).as_ref() == expected, "{method:?}, slot {slot}");
                 assert!(times.iter().all(|&time| time == 0) || times[GpuStep::Flips as usize] > 0, "{times:?}");
@@ -91,7 +91,7 @@ fn the_engine_leaves_little_of_real_terrain() {
     let mut engine = GpuMeshEngine::open(request, VoronoiMethod::Auto, LENT).expect("the adapter opens");
     let atlas = filled(cloud.sites.chunks(10_000), 16.0, AtlasLimits::of(&engine.device().limits));
     let pending = engine.start(0, &atlas).expect("the steps run");
-    let (returned, _) = engine.finish(0, pending).expect("they come back");
+    let returned = engine.finish(0, pending).expect("they come back").numbers;
     let returned = ReturnedAtlas::new(&atlas.atlas, (*returned).as_ref()).expect("all numbers came back");
     let mut exceptions = 0;
     for leaf in 0..atlas.atlas.leaves.len() {

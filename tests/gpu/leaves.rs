@@ -114,7 +114,7 @@ fn reply(sites: &[Site]) -> MeshReply {
     assert!(filled.add(sites, TextureResolution::PixelsPerSite(16.0), limits));
     let numbers = twins::atlas::mesh(&filled.atlas, &filled.sites, VoronoiMethod::Exact);
     let numbers: SharedNumbers = Arc::new(numbers);
-    replies(&filled.atlas, &numbers).remove(0)
+    replies(&filled.atlas, &numbers, true).remove(0)
 }
 
 /// Returns the answer of a device, once `spoil` has spoilt the mesh.

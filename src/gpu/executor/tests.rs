@@ -1,8 +1,8 @@
 use super::*;
 use crate::gpu::filled_atlas::FilledAtlas;
+use crate::gpu::mesh_engine::Landed;
 use crate::gpu::returned::ReturnedLayout;
 use crate::gpu::timestamps::StepNanoseconds;
-use crate::voronoi::mesh_reply::SharedNumbers;
 use std::collections::VecDeque;
 use std::sync::atomic::AtomicUsize;
 
@@ -52,9 +52,9 @@ impl MeshEngine for ScriptedEngine {
         true
     }
 
-    fn finish(&mut self, _: usize, pending: Vec<u32>) -> Result<(SharedNumbers, StepNanoseconds), GpuError> {
+    fn finish(&mut self, _: usize, pending: Vec<u32>) -> Result<Landed, GpuError> {
         self.finishes.pop_front().unwrap_or(Ok(()))?;
-        Ok((Arc::new(pending), StepNanoseconds::default()))
+        Ok(Landed { numbers: Arc::new(pending), may_stay: false, times: StepNanoseconds::default() })
     }
 
     fn free(&mut self, _: usize) {}
@@ -129,10 +129,10 @@ impl MeshEngine for WaitingEngine {
         true
     }
 
-    fn finish(&mut self, _: usize, pending: Vec<u32>) -> Result<(SharedNumbers, StepNanoseconds), GpuError> {
+    fn finish(&mut self, _: usize, pending: Vec<u32>) -> Result<Landed, GpuError> {
         let _ = self.leaves.send(0);
         let _ = self.go.recv();
-        Ok((Arc::new(pending), StepNanoseconds::default()))
+        Ok(Landed { numbers: Arc::new(pending), may_stay: false, times: StepNanoseconds::default() })
     }
 
     fn free(&mut self, _: usize) {}

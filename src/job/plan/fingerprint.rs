@@ -8,6 +8,7 @@ use crate::job::plan::lattice_choice::LatticeCoarsening;
 use crate::output::checksums::Checksum;
 use crate::output::geoid::errors::not_opened;
 use crate::output::geoid::option::HeightOffset;
+use crate::output::geoid::require_file;
 use crate::output::options::{ColorChoice, OutputOptions};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -200,6 +201,7 @@ impl Fingerprint {
 fn style_of(output: &OutputOptions) -> Result<Map<String, Value>> {
     let mut style = named_values(output, "output", &["directory"])?;
     if let Some(grid) = output.height_offset.as_ref().and_then(HeightOffset::grid) {
+        require_file(grid)?;
         let content = Checksum::of_file(grid).map_err(|e| not_opened(grid, e))?.1;
         style.insert("[output] height_offset".into(), format!("a grid with the checksum {content}").into());
     }

@@ -4,6 +4,7 @@ use crate::geometry::Bounds;
 use crate::input::Crs;
 use crate::output::frame::Frame;
 use crate::output::geoid::Geoid;
+use crate::output::geoid::option::HeightOffset;
 use crate::output::tiles3d::globe::{Globe, NotPlaced, transform_point};
 use crate::output::tiles3d::tileset::{TilesetNode, bounds_in_metres};
 use rayon::prelude::*;
@@ -34,6 +35,10 @@ pub struct Placement {
     /// The model of the geoid that says what is added to heights; `None` if it is the same everywhere.
     pub geoid: Option<String>,
 }
+
+/// The warning about a geoid that is added to heights which need none.
+const ADDED_TWICE: &str = "the inputs say that heights count from the ellipsoid, and [output] height_offset adds the height of a geoid to them; \
+     leave it out, unless the inputs are wrong";
 
 /// The way from the scene to the globe.
 pub(super) struct Ground<'a> {
@@ -189,10 +194,13 @@ pub fn placement_warning(placement: &Result<Placement, NotPlaced>) -> Option<Str
     })
 }
 
-/// Returns what the user should know about the heights of a terrain on the globe, where no option says what to add to them.
-pub fn heights_warning(crs: &Crs) -> Option<String> {
+/// Returns what the user should know about the heights of a terrain on the globe, to which `offset` is added.
+pub fn heights_warning(crs: &Crs, offset: Option<&HeightOffset>) -> Option<String> {
     let from = match &crs.vertical_system {
-        _ if crs.has_ellipsoidal_heights() => return None,
+        _ if crs.has_ellipsoidal_heights() => {
+            return offset.filter(|offset| offset.is_model()).map(|_| ADDED_TWICE.into());
+        }
+        _ if offset.is_some() => return None,
         Some(system) => format!("count from {}", system.label()),
         None => "may count from the sea: no input says from what".to_string(),
     };

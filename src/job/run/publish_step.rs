@@ -121,8 +121,8 @@ pub(crate) fn publish(
             placed => placed,
         };
         warnings.extend(placement_warning(&placed));
-        if placed.is_ok() && output.height_offset.is_none() {
-            warnings.extend(heights_warning(&plan.crs));
+        if placed.is_ok() {
+            warnings.extend(heights_warning(&plan.crs, output.height_offset.as_ref()));
         }
         warnings.extend(left_out_warning(plan, &levels));
         divide(&mut root);

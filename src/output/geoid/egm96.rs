@@ -4,10 +4,10 @@
 //! One height takes most of a millisecond, so the model is evaluated at nodes only. Between them it is bilinear, which is at most 4 cm
 //! off; the model itself is good to about half a metre.
 
-use crate::Error;
 use crate::output::geoid::block_cache::BlockCache;
 use crate::output::geoid::errors::refused;
 use crate::output::geoid::node_grid::{NodeGrid, NodeValues, Nodes};
+use crate::{Error, interrupt};
 use ::egm96::egm96_compute_altitude_offset;
 
 /// Nodes in a degree of longitude and of latitude.
@@ -35,6 +35,8 @@ impl Egm96 {
 impl NodeValues for Egm96 {
     fn value(&self, column: u64, row: u64) -> Result<Option<f64>, Error> {
         let number = row * 360 * NODES_PER_DEGREE + column;
+        // Near the poles there are many nodes, and each takes most of a millisecond.
+        interrupt::check()?;
         self.0.get(number, || Ok(height(column, row))).map(Some)
     }
 }

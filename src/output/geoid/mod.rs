@@ -75,12 +75,20 @@ impl Geoid {
     }
 }
 
+/// Refuses what is no file. Opening a pipe would wait until another process writes to it.
+///
+/// # Errors
+/// [`Error::Config`], or [`Error::Io`] if the system cannot tell.
+pub(crate) fn require_file(path: &Path) -> Result<(), Error> {
+    match path.metadata().map_err(|e| not_opened(path, e))?.is_file() {
+        true => Ok(()),
+        false => Err(bad_file(path, "it is no file; name a geoid grid (.gtx or .tif)")),
+    }
+}
+
 /// Opens a file as what its first bytes say that it is.
 fn open_grid(path: &Path) -> Result<Nodes, Error> {
-    // Opening a pipe would wait until another process writes to it.
-    if !path.metadata().map_err(|e| not_opened(path, e))?.is_file() {
-        return Err(bad_file(path, "it is no file; name a geoid grid (.gtx or .tif)"));
-    }
+    require_file(path)?;
     let file = File::open(path).map_err(|e| not_opened(path, e))?;
     if geotiff::is_tiff(&file).map_err(Error::io("read", path))? {
         let (grid, values) = GeoTiff::open(path, file)?;

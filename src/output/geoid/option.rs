@@ -19,6 +19,11 @@ pub enum HeightOffset {
 }
 
 impl HeightOffset {
+    /// Returns whether it is the model of a geoid, and not a number.
+    pub fn is_model(&self) -> bool {
+        !matches!(self, HeightOffset::Metres(_))
+    }
+
     /// Returns the path of the grid.
     pub fn grid(&self) -> Option<&Path> {
         if let HeightOffset::Grid(path) = self { Some(path) } else { None }

@@ -61,8 +61,12 @@ impl Globe {
     /// # Errors
     /// [`NotPlaced::System`] if the place is outside the range of the projection, [`NotPlaced::Height`] if it is outside the geoid's.
     pub fn place(&self, x: f64, y: f64, height: f64) -> Result<[f64; 3], NotPlaced> {
+        let offset = self.height_of_geoid(self.geographic(x, y)?)?;
+        self.place_above_ellipsoid(x, y, height + offset)
+    }
+
+    fn place_above_ellipsoid(&self, x: f64, y: f64, height: f64) -> Result<[f64; 3], NotPlaced> {
         let [longitude, latitude] = self.geographic(x, y)?;
-        let height = height + self.height_of_geoid([longitude, latitude])?;
         let (sin, cos) = latitude.sin_cos();
         let normal = SEMI_MAJOR / (1.0 - ECCENTRICITY_2 * sin * sin).sqrt();
         let around = (normal + height) * cos;
@@ -105,12 +109,17 @@ impl Globe {
     /// # Errors
     /// As [`Globe::place`].
     pub fn tangent(&self, x: f64, y: f64, height: f64) -> Result<[f64; 16], NotPlaced> {
-        let origin = self.place(x, y, height)?;
+        let (origin, offset) = (self.place(x, y, height)?, self.height_offset(x, y)?);
         /// Metres. Differences over this distance lose little to rounding and little to the curvature.
         const STEP: f64 = 10.0;
         let along = |dx: f64, dy: f64| -> Result<[f64; 3], NotPlaced> {
             let (dx, dy) = (dx * STEP / self.metres_per_unit, dy * STEP / self.metres_per_unit);
-            let (ahead, behind) = (self.place(x + dx, y + dy, height)?, self.place(x - dx, y - dy, height)?);
+            // Beside the middle of a tile, the geoid's grid may end. The tile does not tilt with it then.
+            let beside = |sign: f64| match self.place(x + sign * dx, y + sign * dy, height) {
+                Err(NotPlaced::Height(_)) => self.place_above_ellipsoid(x + sign * dx, y + sign * dy, height + offset),
+                place => place,
+            };
+            let (ahead, behind) = (beside(1.0)?, beside(-1.0)?);
             Ok([0, 1, 2].map(|k| (ahead[k] - behind[k]) / (2.0 * STEP)))
         };
         let up = self.place(x, y, height + 1.0)?;
