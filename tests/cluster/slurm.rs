@@ -143,8 +143,11 @@ fn disturb(rig: &Rig, slurm: &Slurm) -> Option<BTreeSet<u64>> {
 
     let queued_again = queue_again(rig, slurm)?;
     let workers = catch(rig, slurm, "mesh", 2)?;
-    let says = rig.log("read", queued_again.task);
-    assert!(says.contains("DUE TO JOB REQUEUE") && says.trim_end().ends_with(" s"), "{says}");
+    // Slurm may write down what a task says only after it has told that the task is done.
+    slurm.wait_until("the log of the task that was queued again", |_| {
+        let says = rig.log("read", queued_again.task);
+        says.contains("DUE TO JOB REQUEUE") && says.trim_end().ends_with(" s")
+    });
     // As long as something is queued, nothing is sent twice.
     let mut again = slurm.with_conf(rig.program());
     let again = again.args(["submit", "out.toml", "--engine", "slurm"]).output().unwrap();
