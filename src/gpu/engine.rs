@@ -4,7 +4,7 @@ use crate::gpu::buffer_id::BufferId;
 use crate::gpu::buffers::{BindGroupKey, BufferSet};
 use crate::gpu::device::Device;
 use crate::gpu::error::GpuError;
-use crate::gpu::mesh_engine::Landed;
+use crate::gpu::landed::Landed;
 use crate::gpu::passes::{Dispatch, Part, Pass, parts};
 use crate::gpu::recording::{GpuCommand, GpuStep, ProgramKey, Recording, ShaderProgram};
 use crate::gpu::staging::{LentNumbers, StagingPool};

@@ -5,8 +5,9 @@
 use crate::geometry::Site;
 use crate::gpu::error::GpuError;
 use crate::gpu::filled_atlas::FilledAtlas;
+use crate::gpu::landed::Landed;
 use crate::gpu::leaf_flags::TOO_MANY_TRIANGLES;
-use crate::gpu::mesh_engine::{Landed, MeshEngine};
+use crate::gpu::mesh_engine::MeshEngine;
 use crate::gpu::returned::ReturnedLayout;
 use crate::gpu::timestamps::StepNanoseconds;
 use crate::mesh::half_edge::HalfEdgeMesh;

@@ -6,26 +6,15 @@ use crate::gpu::device::{self, AdapterRequest, Device};
 use crate::gpu::engine::{GpuEngine, PendingReadback};
 use crate::gpu::error::GpuError;
 use crate::gpu::filled_atlas::{AtlasLimits, FilledAtlas};
+use crate::gpu::landed::Landed;
 use crate::gpu::options::VoronoiMethod;
 use crate::gpu::recording::Recording;
 use crate::gpu::staging::StagingPool;
-use crate::gpu::timestamps::StepNanoseconds;
-use crate::voronoi::mesh_reply::SharedNumbers;
 use crate::voronoi::texture_request::TextureResolution;
 use std::sync::Arc;
 
 /// The most atlases that are in flight at once, which is the number of slots of an engine.
 pub const MAX_IN_FLIGHT: usize = 3;
-
-/// What has come back of an atlas.
-pub struct Landed {
-    /// The numbers.
-    pub numbers: SharedNumbers,
-    /// Whether leaves may keep the numbers of all until they are read. If not, each must copy its own at once.
-    pub may_stay: bool,
-    /// The times of the steps.
-    pub times: StepNanoseconds,
-}
 
 /// What the GPU's thread needs from a GPU. Tests use an engine that fails on purpose.
 pub trait MeshEngine: Send {

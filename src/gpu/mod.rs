@@ -17,6 +17,7 @@ mod fake_engine;
 pub mod filled_atlas;
 pub mod flip_marks;
 mod gpu_thread;
+pub mod landed;
 pub mod leaf_flags;
 pub mod mesh_engine;
 pub mod mesh_steps;

@@ -1,6 +1,6 @@
 use super::*;
 use crate::gpu::filled_atlas::FilledAtlas;
-use crate::gpu::mesh_engine::Landed;
+use crate::gpu::landed::Landed;
 use crate::gpu::returned::ReturnedLayout;
 use crate::gpu::timestamps::StepNanoseconds;
 use std::collections::VecDeque;
