@@ -45,7 +45,7 @@ pub(crate) const BUDGETS: &[Budget] = &[
     budget("c4_flip claim", 1397, 56, 2129),
     budget("c4_flip commit", 119, 8, 187),
     budget("c4_flip relink", 326, 16, 398),
-    budget("copy copy", 1, 1, 1),
+    budget("copy copy", 21, 8, 42),
     budget("decide decide", 1026, 64, 990),
 ];
 
