@@ -8,7 +8,8 @@ use crate::gpu::timestamps::GpuTimestamps;
 use crate::gpu::upload::UploadBuffer;
 use std::collections::HashMap;
 
-/// What tells a bind group from all others: its program, the buffers that are bound, and the number of the dispatch, which has parameters of its own.
+/// What tells a bind group from all others: its program, the buffers that are bound, and the number of the dispatch, which has parameters
+/// of its own.
 pub(super) type BindGroupKey = (ProgramKey, &'static [(u32, BufferId)], u64);
 
 /// One buffer of each kind, created when it is first needed.
@@ -83,7 +84,7 @@ impl BufferSet {
 /// Returns a size for a buffer that must hold `bytes` bytes: up to a quarter more, so that it need not grow for every atlas that is a
 /// little larger.
 fn rounded(bytes: u64) -> u64 {
-    bytes.max(16).next_multiple_of((bytes.max(16).next_power_of_two() / 4).max(4))
+    bytes.max(16).next_multiple_of((bytes.max(16).next_power_of_two() / 8).max(4))
 }
 
 #[cfg(test)]
@@ -95,7 +96,7 @@ mod tests {
         for bytes in (0..2000).chain([1 << 30, (1 << 30) + 1, (1 << 31) - 1]) {
             let size = rounded(bytes);
             assert!(
-                size >= bytes && size.is_multiple_of(4) && (bytes < 64 || 2 * size <= 3 * bytes),
+                size >= bytes && size.is_multiple_of(4) && (bytes < 64 || 4 * size <= 5 * bytes),
                 "{bytes}: {size}"
             );
         }

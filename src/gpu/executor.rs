@@ -52,8 +52,8 @@ const SOFTWARE_BYTES_PER_PIXEL: u64 = 180;
 /// Bytes for each byte that comes back from an atlas: three slots have a buffer each into which the device copies them, up to a quarter too
 /// large. What goes up takes about a quarter as much, in buffers that are up to twice too large.
 const BYTES_PER_BYTE_BACK: u64 = 6;
-/// While leaves of so many sites have no answer, a job that can do without the GPU asks for no more: the GPU has enough to do, and workers do leaves
-/// themselves.
+/// While leaves of so many sites have no answer, a job that can do without the GPU asks for no more: the GPU has enough to do, and workers
+/// do leaves themselves.
 const BUSY: u64 = MAX_IN_FLIGHT as u64 * MANY_SITES as u64;
 /// While so many leaves of a thread wait, it takes on other work; then no more, because its stack ends somewhere.
 const MOST_NESTED: usize = 8;
