@@ -203,7 +203,7 @@ impl GpuEngine {
                         self.pipelines.insert(program.key(), pipeline);
                     }
                 }
-                GpuCommand::Step(..) | GpuCommand::Upload(..) | GpuCommand::Clear(..) | GpuCommand::Copy(..) => {}
+                GpuCommand::Step(..) | GpuCommand::Upload(..) | GpuCommand::Clear(..) => {}
             }
         }
         buffers.reserve(&self.device, BufferId::Params, (runs * BufferSet::STRIDE).max(BufferSet::STRIDE))
@@ -241,9 +241,6 @@ impl GpuEngine {
                     copy_up(&mut encoder, buffers.get(*id)?, size_of_val(&numbers[..]));
                 }
                 Part::Other(GpuCommand::Clear(id, bytes)) => encoder.clear_buffer(buffers.get(*id)?, 0, Some(*bytes)),
-                Part::Other(GpuCommand::Copy(from, to, bytes)) => {
-                    encoder.copy_buffer_to_buffer(buffers.get(*from)?, 0, buffers.get(*to)?, 0, *bytes);
-                }
                 Part::Other(GpuCommand::Reserve(..) | GpuCommand::Step(..) | GpuCommand::Run(..)) => {}
             }
         }

@@ -31,7 +31,7 @@ pub(super) struct Pass {
 #[derive(Debug)]
 pub(super) enum Part<'a> {
     Pass(Pass),
-    /// An upload, a copy, or a buffer to clear, between passes.
+    /// An upload, or a buffer to clear, between passes.
     Other(&'a GpuCommand),
 }
 
@@ -49,7 +49,7 @@ pub(super) fn parts(recording: &Recording) -> (Vec<Part<'_>>, Vec<GpuStep>) {
     for command in &recording.commands {
         let ends_pass = match command {
             GpuCommand::Step(next) => step.replace(*next) != Some(*next),
-            GpuCommand::Clear(..) | GpuCommand::Copy(..) | GpuCommand::Upload(..) => true,
+            GpuCommand::Clear(..) | GpuCommand::Upload(..) => true,
             GpuCommand::Reserve(..) | GpuCommand::Run(..) => false,
         };
         if ends_pass {
@@ -66,7 +66,7 @@ pub(super) fn parts(recording: &Recording) -> (Vec<Part<'_>>, Vec<GpuStep>) {
                     end(&mut pass, &mut parts);
                 }
             }
-            GpuCommand::Clear(..) | GpuCommand::Copy(..) | GpuCommand::Upload(..) => parts.push(Part::Other(command)),
+            GpuCommand::Clear(..) | GpuCommand::Upload(..) => parts.push(Part::Other(command)),
             GpuCommand::Step(_) | GpuCommand::Reserve(..) => {}
         }
     }

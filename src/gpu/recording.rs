@@ -102,8 +102,6 @@ pub enum GpuCommand {
     Upload(BufferId, Vec<u32>),
     /// Set this many bytes of a buffer to zero.
     Clear(BufferId, u64),
-    /// Copy this many bytes from one buffer to another.
-    Copy(BufferId, BufferId, u64),
     /// Run a program with its parameters, on so many workgroups in x and y. The last number is how many bytes of the device's memory it
     /// reads and writes at the least; 0 if nobody has counted them.
     Run(ShaderProgram, [u32; 5], [u32; 2], u64),
@@ -150,7 +148,6 @@ impl Recording {
     pub fn traffic(&self) -> u64 {
         let bytes = self.commands.iter().map(|command| match command {
             GpuCommand::Run(_, _, _, bytes) | GpuCommand::Clear(_, bytes) => *bytes,
-            GpuCommand::Copy(_, _, bytes) => 2 * bytes,
             GpuCommand::Upload(_, numbers) => 4 * numbers.len() as u64,
             GpuCommand::Step(_) | GpuCommand::Reserve(..) => 0,
         });
