@@ -13,7 +13,8 @@
 // 2. `commit`: an edge that has kept both its claims will be flipped. Both triangles note that.
 // 3. `relink`: for each such edge one invocation writes both records. Where a neighbour is flipped too, its note tells where its half-edge
 //    is afterwards; otherwise its link back is written here.
-// No two invocations write to one place, except for claims and marks, whose order does not matter. So the result is always the same.
+// No two invocations write to one place, except for claims and marks, whose order does not matter. So an atlas has always the same result.
+// In another place of an atlas a leaf has other keys. Other edges are flipped first, and other few are left to the CPU.
 //
 // In round 1 all triangles are dirty. Later it is those that were changed or wanted a flip in the round before. Keys grow from round to
 // round, so nothing is cleared between rounds.

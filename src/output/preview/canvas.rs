@@ -179,6 +179,8 @@ impl<'a> DrawnTriangle<'a> {
     fn draw(&self, columns: [i64; 2], rows: [i64; 2], pixels: &mut Vec<PreviewPixel>) {
         let sliver =
             (rows[1] - rows[0] >= SLIVER_ROWS).then(|| Sliver::new(self.places, self.canvas.center, self.canvas.pitch));
+        // Many triangles cover no pixel. Where points are few, one covers thousands.
+        let mut shading = None;
         for row in rows[0]..rows[1] {
             if sliver.as_ref().is_some_and(|sliver| sliver.misses(row)) {
                 continue;
@@ -186,19 +188,10 @@ impl<'a> DrawnTriangle<'a> {
             let (edges, [first, last]) = self.covered(columns, row);
             for column in first..last {
                 let weights = edges.map(|(value, step)| value.wrapping_add((column - columns[0]).wrapping_mul(step)));
-                pixels.push(self.pixel(row as u32 * self.canvas.width + column as u32, weights));
+                let shading = shading.get_or_insert_with(|| Shading::new(self));
+                pixels.push(shading.pixel(row as u32 * self.canvas.width + column as u32, weights));
             }
         }
-    }
-
-    fn pixel(&self, pixel: u32, mut weights: [i64; 3]) -> PreviewPixel {
-        // Start at the corner least in (x, y), so that interpolation does not depend on the order in which a file has the corners.
-        let mut corners = self.corners;
-        let turn = (0..3).min_by_key(|&k| self.tile.positions[corners[k] as usize]).unwrap_or(0);
-        corners.rotate_left(turn);
-        weights.rotate_left(turn);
-        let point = ShadedPoint { canvas: self.canvas, tile: self.tile, corners, weights };
-        PreviewPixel { pixel, slope: point.slope(), color: point.color(), unused: 0 }
     }
 
     /// Returns for the edge opposite every corner its function at the first column and its step per column, and the columns of `row`
@@ -223,45 +216,59 @@ impl<'a> DrawnTriangle<'a> {
     }
 }
 
-/// A point of a triangle, given by the areas opposite its corners.
-struct ShadedPoint<'a> {
-    canvas: &'a Canvas,
-    tile: &'a Tile,
-    corners: [u32; 3],
-    weights: [i64; 3],
+/// What the pixels of a triangle are computed from.
+struct Shading {
+    /// Where the corner is that is least in (x, y). Interpolation starts there, so that it does not depend on the order in which a file
+    /// has the corners.
+    turn: usize,
+    normals: Normals,
+    /// The linear colours of the corners.
+    colors: [[f64; 3]; 3],
 }
 
-impl ShadedPoint<'_> {
-    fn slope(&self) -> [i16; 2] {
-        let normal = match &self.tile.normals {
-            Some(normals) => self.interpolate(|v| normals[v].map(f64::from)),
+enum Normals {
+    Corners([[f64; 3]; 3]),
+    Triangle([f64; 3]),
+}
+
+impl Shading {
+    fn new(triangle: &DrawnTriangle) -> Shading {
+        let (canvas, tile, mut corners) = (triangle.canvas, triangle.tile, triangle.corners.map(|v| v as usize));
+        let turn = (0..3).min_by_key(|&k| tile.positions[corners[k]]).unwrap_or(0);
+        corners.rotate_left(turn);
+        let normals = match &tile.normals {
+            Some(normals) => Normals::Corners(corners.map(|v| normals[v].map(f64::from))),
             None => {
-                let [a, c, b] = self.corners.map(|v| self.tile.positions[v as usize]);
-                unit_normal(cross(a, b, c), &self.canvas.frame).map(f64::from)
+                let [a, c, b] = corners.map(|v| tile.positions[v]);
+                Normals::Triangle(unit_normal(cross(a, b, c), &canvas.frame).map(f64::from))
             }
         };
-        let length = normal.iter().map(|v| v * v).sum::<f64>().sqrt();
-        [0, 1].map(|k| (normal[k] / length * 32767.0) as i16)
-    }
-
-    fn color(&self) -> [u8; 3] {
-        let linear = self.interpolate(|v| match &self.tile.colors {
+        let colors = corners.map(|v| match &tile.colors {
             Some(colors) => colors[v].map(f64::from),
-            None => height_color(self.tile.positions[v][2], self.canvas.heights).map(f64::from),
+            None => height_color(tile.positions[v][2], canvas.heights).map(f64::from),
         });
-        linear.map(|v| to_srgb((v + 0.5) as u16))
+        Shading { turn, normals, colors }
     }
 
-    /// Returns the mean of the corners' values, weighted by the areas.
-    fn interpolate(&self, value: impl Fn(usize) -> [f64; 3]) -> [f64; 3] {
-        let weights = self.weights.map(|w| w as f64);
-        let total: f64 = weights.iter().sum();
-        // Not with `map`, which would become a call for every pixel here.
-        let [a, b, c] = self.corners;
-        let [a, b, c] = [value(a as usize), value(b as usize), value(c as usize)];
-        let mean = |k: usize| (a[k] * weights[0] + b[k] * weights[1] + c[k] * weights[2]) / total;
-        [mean(0), mean(1), mean(2)]
+    /// Returns the pixel of this number. `weights` are the areas opposite the corners.
+    fn pixel(&self, pixel: u32, mut weights: [i64; 3]) -> PreviewPixel {
+        weights.rotate_left(self.turn);
+        let weights = weights.map(|w| w as f64);
+        let normal = match &self.normals {
+            Normals::Corners(normals) => mean(normals, weights),
+            Normals::Triangle(normal) => *normal,
+        };
+        let length = normal.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let slope = [0, 1].map(|k| (normal[k] / length * 32767.0) as i16);
+        let color = mean(&self.colors, weights).map(|v| to_srgb((v + 0.5) as u16));
+        PreviewPixel { pixel, slope, color, unused: 0 }
     }
+}
+
+/// Returns the mean of the corners' values, weighted by the areas.
+fn mean([a, b, c]: &[[f64; 3]; 3], weights: [f64; 3]) -> [f64; 3] {
+    let total: f64 = weights.iter().sum();
+    [0, 1, 2].map(|k| (a[k] * weights[0] + b[k] * weights[1] + c[k] * weights[2]) / total)
 }
 
 /// Narrows `range` to the columns where `value + step * (column - first)` is at least `least`.
