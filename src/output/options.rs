@@ -1,5 +1,6 @@
 //! The options of `[output]`.
 
+use crate::output::attributes::AttributeChoice;
 use crate::output::compression::{Compression, CompressionChoice};
 use crate::output::geoid::option::HeightOffset;
 use crate::output::page::{NOT_BUILT_IN, is_built_in};
@@ -16,6 +17,9 @@ pub struct OutputOptions {
     /// Where vertex colours come from.
     #[serde(default)]
     pub color: ColorChoice,
+    /// What vertices carry of their points, for viewers to style and to pick by.
+    #[serde(default, skip_serializing_if = "AttributeChoice::is_none")]
+    pub attributes: AttributeChoice,
     /// Whether vertices have normals.
     #[serde(default = "yes")]
     pub normals: bool,
@@ -132,6 +136,13 @@ pub enum ColorChoice {
     Class,
     /// No colours.
     None,
+}
+
+impl ColorChoice {
+    /// Returns whether these may be the points' own colours.
+    pub fn may_be_own(self) -> bool {
+        matches!(self, ColorChoice::Auto | ColorChoice::Rgb)
+    }
 }
 
 /// How long an edge of a triangle may be in the plane. Triangles with a longer edge are left out.

@@ -1,5 +1,5 @@
 // The page of cesium.html: shows the tileset in its place on the globe, coarse and fine, and sends the server what it shows.
-const { Cartesian3, Cartographic, Cesium3DTileset, CesiumWidget, Color, DirectionalLight, HeadingPitchRange, Math: Angles, Matrix4, Ray } = window.Cesium;
+const { Cartesian2, Cartesian3, Cartographic, Cesium3DTileset, CesiumWidget, Color, CustomShader, DirectionalLight, HeadingPitchRange, LightingModel, Math: Angles, Matrix4, Ray } = window.Cesium;
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
 function emptyScene() {
@@ -45,7 +45,36 @@ function facts(scene, tileset, shown, places) {
   return { triangles, meshes: shown.size, heights: places.map((place) => heightOver(scene, tileset, place)) };
 }
 
-async function show(places) {
+// What the console says of the tileset.
+const complaints = [];
+for (const kind of ['error', 'warn']) {
+  const say = console[kind];
+  console[kind] = (...words) => { complaints.push(words.join(' ')); say.apply(console, words); };
+}
+
+// Returns the class that CesiumJS picks at each of `pixels`, and how bright the picture is there when a shader shows the intensities.
+async function attributesAt(scene, tileset, pixels) {
+  const positions = pixels.map(([x, y]) => new Cartesian2(x, y));
+  const { id, classes } = scene.pickMetadataSchema(positions[0]) ?? {};
+  const picked = positions.map((position) => scene.pickMetadata(position, id, 'point', 'classification') ?? null);
+  tileset.customShader = new CustomShader({
+    lightingModel: LightingModel.UNLIT,
+    fragmentShaderText: `void fragmentMain(FragmentInput fsInput, inout czm_modelMaterial material) {
+      material.diffuse = vec3(float(fsInput.metadata.intensity) / 65535.0);
+    }`,
+  });
+  for (let frame = 0; frame < 20; frame += 1) {
+    scene.render();
+    await pause(20);
+  }
+  const picture = Object.assign(document.createElement('canvas'), { width: scene.canvas.width, height: scene.canvas.height });
+  const pen = picture.getContext('2d');
+  pen.drawImage(scene.canvas, 0, 0);
+  const shown = pixels.map(([x, y]) => pen.getImageData(x, y, 1, 1).data[0]);
+  return { properties: Object.keys(classes?.point?.properties ?? {}), picked, shown };
+}
+
+async function show({ places, pixels }) {
   const scene = emptyScene();
   const tileset = await Cesium3DTileset.fromUrl('/out/tileset.json', {
     foveatedScreenSpaceError: false, cullRequestsWhileMoving: false, cacheBytes: 2 ** 32, enablePick: true,
@@ -71,13 +100,14 @@ async function show(places) {
   }
   const { longitude, latitude, height } = Cartographic.fromCartesian(tileset.boundingSphere.center);
   const centre = [Angles.toDegrees(longitude), Angles.toDegrees(latitude), height];
-  return { ...seen, centre, picture: scene.canvas.toDataURL('image/png') };
+  const picture = scene.canvas.toDataURL('image/png');
+  const attributes = pixels && await attributesAt(scene, tileset, pixels);
+  return { ...seen, centre, picture, attributes, complaints };
 }
 
 let result;
 try {
-  const { places } = await (await fetch('/request.json')).json();
-  result = await show(places);
+  result = await show(await (await fetch('/request.json')).json());
 } catch (error) {
   result = { error: String(error.stack ?? error) };
 }
