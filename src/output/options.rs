@@ -77,15 +77,23 @@ impl TryFrom<String> for Copyright {
     type Error = String;
 
     fn try_from(text: String) -> std::result::Result<Copyright, String> {
-        let is_line = !text.trim().is_empty() && !text.chars().any(char::is_control);
+        let is_line = !text.trim().is_empty() && !text.chars().any(is_no_text);
         match is_line && text.chars().count() <= LONGEST_COPYRIGHT {
             true => Ok(Copyright(text)),
             false => Err(format!(
-                "copyright is one line of 1 to {LONGEST_COPYRIGHT} characters, without tabs and other control characters, such as \
+                "copyright is one line of 1 to {LONGEST_COPYRIGHT} characters, without tabs and other characters that break \
+                 or turn a line, such as \
                  \"(c) 2024 City of Example, CC BY 4.0\""
             )),
         }
     }
+}
+
+/// Tells whether a character is none of a line of text: a control character, a separator of lines or paragraphs, or one that turns round the
+/// direction of what follows, also in the line that a viewer puts it into.
+fn is_no_text(character: char) -> bool {
+    let turns = matches!(character, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    character.is_control() || turns || matches!(character, '\u{2028}' | '\u{2029}')
 }
 
 impl From<Copyright> for String {

@@ -226,7 +226,7 @@ fn of_text(lines: &str, settings: &str) -> (BTreeMap<[i64; 2], Look>, String) {
     let folder = tempfile::tempdir().unwrap();
     let cloud = written(folder.path(), "cloud.csv", lines.as_bytes());
     let job = Job::on(&[cloud]).with("output", &format!("{BOTH}\ncompression = \"none\"")).with("input.csv", settings);
-    let said = job.run().succeeded().err;
+    let said = job.run().succeeded().out;
     job.verified();
     let tile = read_tile(&job.out().join("tiles/000000.glb")).unwrap();
     let source = SourceGrid::new(&tile.extras).unwrap();
@@ -262,7 +262,10 @@ fn texts_have_them_in_columns() {
 /// Returns the JSON of a GLB, and whether both of its chunks end at multiples of eight bytes.
 fn document(glb: &[u8]) -> (Value, bool) {
     let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
-    (serde_json::from_slice(&glb[20..20 + length]).unwrap(), (20 + length) % 8 == 0 && glb.len() % 8 == 0)
+    (
+        serde_json::from_slice(&glb[20..20 + length]).unwrap(),
+        (20 + length).is_multiple_of(8) && glb.len().is_multiple_of(8),
+    )
 }
 
 /// The validator does not know the extension, so what it asks for is compared here.

@@ -3,6 +3,8 @@
 //! Exact integer edge functions decide which pixels a triangle covers, and no pixel centre has the x or y of a vertex. So every pixel
 //! centre inside the hull belongs to exactly one triangle, whatever the tiles, their order or the number of threads.
 
+use std::collections::BTreeMap;
+
 use bytemuck::{Pod, Zeroable};
 
 use crate::geometry::Bounds;
@@ -52,7 +54,8 @@ pub struct PreviewPixel {
     pub slope: [i16; 2],
     /// The sRGB colour.
     pub color: [u8; 3],
-    unused: u8,
+    /// 1 for the look of a vertex, in a pixel whose centre no triangle may cover.
+    pub(super) dot: u8,
 }
 
 impl Canvas {
@@ -136,6 +139,28 @@ impl Canvas {
         Ok(pixels)
     }
 
+    /// Returns the pixels in which vertices of `tile` lie, each with the look of one of them, if the tile is so narrow that it has hardly
+    /// `drawn` a pixel.
+    pub fn dots(&self, tile: &Tile, drawn: usize) -> Vec<PreviewPixel> {
+        let pixels = |bounds: Bounds<3>, axis: usize| (bounds.extent(axis) << self.shift) / self.pitch;
+        let longer = tile.bounds().map_or(0, |bounds| pixels(bounds, 0).max(pixels(bounds, 1)));
+        if drawn as i64 * NARROW > longer {
+            return Vec::new();
+        }
+        let mut vertices = BTreeMap::new();
+        for (v, &position) in (0..).zip(&tile.positions) {
+            let [column, row] = self.place(position).map(|place| place / self.pitch);
+            let column = column.min(i64::from(self.width) - 1) as u32;
+            let row = row.min(i64::from(self.height) - 1) as u32;
+            vertices.entry(row * self.width + column).or_insert(v);
+        }
+        let dot = |(pixel, v)| {
+            let point = ShadedPoint { canvas: self, tile, corners: [v; 3], weights: [1, 0, 0] };
+            PreviewPixel { pixel, slope: point.dot_slope(), color: point.color(), dot: 1 }
+        };
+        vertices.into_iter().map(dot).collect()
+    }
+
     /// Returns how far a point is right of and below the corner, in subdivisions: even numbers.
     fn place(&self, point: [i32; 3]) -> [i64; 2] {
         [(point[0] as i64 - self.corner[0]) << self.shift, (self.corner[1] - point[1] as i64) << self.shift]
@@ -156,6 +181,9 @@ impl Canvas {
         index * self.pitch + self.center
     }
 }
+
+/// A tile is narrow if it is at least so many times as long in pixels as it covers pixels.
+const NARROW: i64 = 4;
 
 /// A million slivers as long as the terrain take seconds, so after this many the process asks whether it should stop.
 const TRIANGLES_BETWEEN_CHECKS: u32 = 1 << 12;
@@ -198,7 +226,7 @@ impl<'a> DrawnTriangle<'a> {
         corners.rotate_left(turn);
         weights.rotate_left(turn);
         let point = ShadedPoint { canvas: self.canvas, tile: self.tile, corners, weights };
-        PreviewPixel { pixel, slope: point.slope(), color: point.color(), unused: 0 }
+        PreviewPixel { pixel, slope: point.slope(), color: point.color(), dot: 0 }
     }
 
     /// Returns for the edge opposite every corner its function at the first column and its step per column, and the columns of `row`
@@ -232,6 +260,11 @@ struct ShadedPoint<'a> {
 }
 
 impl ShadedPoint<'_> {
+    /// Returns the slope at a vertex: flat without normals, because a vertex alone has no triangle.
+    fn dot_slope(&self) -> [i16; 2] {
+        if self.tile.normals.is_some() { self.slope() } else { [0; 2] }
+    }
+
     fn slope(&self) -> [i16; 2] {
         let normal = match &self.tile.normals {
             Some(normals) => self.interpolate(|v| normals[v].map(f64::from)),
