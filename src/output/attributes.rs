@@ -1,4 +1,4 @@
-//! What vertices may carry of the points that they stand for, for viewers to style and to pick by.
+//! What vertices may carry of the points that they stand for, for viewers to style by.
 
 use serde::{Deserialize, Serialize};
 

@@ -17,7 +17,7 @@ pub struct OutputOptions {
     /// Where vertex colours come from.
     #[serde(default)]
     pub color: ColorChoice,
-    /// What vertices carry of their points, for viewers to style and to pick by.
+    /// What vertices carry of their points, for viewers to style by.
     #[serde(default, skip_serializing_if = "AttributeChoice::is_none")]
     pub attributes: AttributeChoice,
     /// Whether vertices have normals.

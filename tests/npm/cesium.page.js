@@ -52,15 +52,14 @@ for (const kind of ['error', 'warn']) {
   console[kind] = (...words) => { complaints.push(words.join(' ')); say.apply(console, words); };
 }
 
-// Returns the class that CesiumJS picks at each of `pixels`, and how bright the picture is there when a shader shows the intensities.
+// Returns what the schema of the tile at the first of `pixels` says that vertices carry, and red and green of the picture at each of them
+// when a shader shows the intensity as red and the class as green.
 async function attributesAt(scene, tileset, pixels) {
-  const positions = pixels.map(([x, y]) => new Cartesian2(x, y));
-  const { id, classes } = scene.pickMetadataSchema(positions[0]) ?? {};
-  const picked = positions.map((position) => scene.pickMetadata(position, id, 'point', 'classification') ?? null);
+  const schema = scene.pickMetadataSchema(new Cartesian2(...pixels[0]));
   tileset.customShader = new CustomShader({
     lightingModel: LightingModel.UNLIT,
     fragmentShaderText: `void fragmentMain(FragmentInput fsInput, inout czm_modelMaterial material) {
-      material.diffuse = vec3(float(fsInput.metadata.intensity) / 65535.0);
+      material.diffuse = vec3(float(fsInput.metadata.intensity) / 65535.0, float(fsInput.metadata.classification) / 10.0, 0.0);
     }`,
   });
   for (let frame = 0; frame < 20; frame += 1) {
@@ -70,8 +69,8 @@ async function attributesAt(scene, tileset, pixels) {
   const picture = Object.assign(document.createElement('canvas'), { width: scene.canvas.width, height: scene.canvas.height });
   const pen = picture.getContext('2d');
   pen.drawImage(scene.canvas, 0, 0);
-  const shown = pixels.map(([x, y]) => pen.getImageData(x, y, 1, 1).data[0]);
-  return { properties: Object.keys(classes?.point?.properties ?? {}), picked, shown };
+  const shown = pixels.map(([x, y]) => [...pen.getImageData(x, y, 1, 1).data.slice(0, 2)]);
+  return { schema: schema?.id, properties: Object.keys(schema?.classes.point?.properties ?? {}), shown };
 }
 
 async function show({ places, pixels }) {

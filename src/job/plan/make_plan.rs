@@ -12,8 +12,8 @@ use crate::job::plan::inputs::{check_missing_records, open_all, unreadable_names
 use crate::job::plan::job_plan::{Claims, Plan, PlannedInput, SkippedInput};
 use crate::job::plan::lattice_choice::{LatticeCoarsening, LatticeWish, choose_lattice, fineness};
 use crate::job::plan::text_inputs::{
-    check_malformed_rows, farthest_row, leave_out_outliers, missing_attributes, refuse_degrees, refuse_missing_classes,
-    row_choice, wanted_fields,
+    check_malformed_rows, farthest_row, leave_out_outliers, refuse_degrees, refuse_missing_classes, row_choice,
+    wanted_fields,
 };
 use crate::output::color::HeightRange;
 use crate::output::frame::Frame;
@@ -100,7 +100,6 @@ fn try_plan(
     check_missing_records(sources, &options.input)?;
     refuse_degrees(sources, &options.input)?;
     refuse_missing_classes(sources, &options.input)?;
-    warnings.extend(missing_attributes(sources, options));
     let crs = common_crs(sources, &options.input.crs, options.input.unit, &mut warnings)?;
     let (unit, metres) = horizontal_unit(sources, options.input.unit, &options.input.crs, &crs, &mut warnings)?;
     let metres_z = crs.vertical.unwrap_or(metres);

@@ -33,27 +33,6 @@ pub(crate) fn wanted_fields(options: &JobOptions) -> OptionalFields {
     OptionalFields { rgb: output.color.may_be_own(), intensity: output.attributes.intensity }
 }
 
-/// Returns a warning for each attribute that vertices are to have and a text has no column of.
-pub(crate) fn missing_attributes(sources: &[Source], options: &JobOptions) -> impl Iterator<Item = String> {
-    let wanted = options.output.attributes;
-    let lacking = |is_wanted: bool, has: fn(&Source) -> bool| sources.iter().filter(move |s| is_wanted && !has(s));
-    let classes = lacking(wanted.classification, |source| source.has_class);
-    let intensities = lacking(wanted.intensity, |source| source.has_intensity);
-    let classes = missing_column(classes, "classes", "class 0, \"never classified\"");
-    classes.into_iter().chain(missing_column(intensities, "intensities", "intensity 0"))
-}
-
-fn missing_column<'a>(mut sources: impl Iterator<Item = &'a Source>, name: &str, instead: &str) -> Option<String> {
-    let first = sources.next()?.path.display();
-    let others = match sources.count() {
-        0 => String::new(),
-        count => format!(", as have {count} others"),
-    };
-    Some(format!(
-        "{first} has no column of {name}{others}: its vertices have {instead}; if it has one, name it with `columns` under [input.csv]"
-    ))
-}
-
 /// Fails if the columns of a text are longitude and latitude, unless the user says that they are not.
 ///
 /// # Errors

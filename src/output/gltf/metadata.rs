@@ -1,5 +1,5 @@
 //! The attributes of points as `EXT_structural_metadata` describes them: the schema in every file, and which vertex attributes hold
-//! them. Viewers then know what the numbers mean, and can style and pick by them.
+//! them. Viewers then know what the numbers mean, and can style by them.
 
 use gltf::json::mesh::Semantic;
 use gltf::json::{Value, extensions};

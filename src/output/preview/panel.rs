@@ -153,9 +153,9 @@ fn text_width(text: &str) -> f32 {
 /// Returns the height of digits at which two labels fit `room` side by side, and how wide they are together then: no less than the ramp, over
 /// whose ends they stand.
 fn side_by_side(labels: [&str; 2], room: f32) -> (f32, f32) {
-    let wanted = text_width(labels[0]) + GAP + text_width(labels[1]);
-    let share = (room / wanted).min(1.0);
-    (DIGIT * share, (wanted * share).max(RAMP as f32))
+    let wanted = text_width(labels[0]) + text_width(labels[1]);
+    let share = ((room - GAP) / wanted).min(1.0);
+    (DIGIT * share, (wanted * share + GAP).max(RAMP as f32))
 }
 
 /// The strip while it is drawn.
