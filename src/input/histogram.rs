@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::Result;
+use crate::input::points::optional_fields::OptionalFields;
 use crate::input::points::record::PointRecord;
 use crate::input::points::record_sink::RecordSink;
 use crate::input::source::{FileFormat, Source};
@@ -60,7 +61,7 @@ impl Histogram {
     pub fn of(source: &Source) -> Result<Histogram> {
         let count = |chunk| {
             let mut counts = RecordCounts::default();
-            source.read_chunk(chunk, u64::MAX, false, &mut counts).map(|()| counts)
+            source.read_chunk(chunk, u64::MAX, OptionalFields::default(), &mut counts).map(|()| counts)
         };
         let none = RecordCounts::default;
         let counts = (0..source.chunks()).into_par_iter().map(count).try_reduce(none, |a, b| Ok(a.with(&b)))?;

@@ -24,6 +24,7 @@ pub use crs::vertical::VerticalSystem;
 pub use file::random_access::not_a_file;
 pub use points::axis::Axis;
 pub use points::counts::PointCounts;
+pub use points::optional_fields::OptionalFields;
 pub use points::point::Point;
 pub use points::raw_bounds::RawBounds;
 pub use points::rules::PointRules;

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::geometry::lattice::shortest_decimal;
 use crate::input::crs::choice::CrsChoice;
+use crate::input::points::optional_fields::OptionalFields;
 use crate::input::text::options::TextOptions;
 use crate::input::text::row_choice::RowChoice;
 
@@ -59,13 +60,13 @@ impl InputOptions {
         }
     }
 
-    /// Returns which rows of a text the job wants, with or without their `colors`.
-    pub fn row_choice(&self, colors: bool) -> RowChoice {
+    /// Returns which rows of a text the job wants, and which `fields` of them.
+    pub fn row_choice(&self, fields: OptionalFields) -> RowChoice {
         RowChoice {
             bounds: self.bounds.map(|bounds| bounds.0),
             classes: self.kept_classes(),
             strict_classes: self.classes.is_some(),
-            colors,
+            fields,
         }
     }
 }

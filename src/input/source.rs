@@ -18,6 +18,7 @@ use crate::input::other_formats::refuse_other_formats;
 use crate::input::points::axis::Axis;
 use crate::input::points::counts::PointCounts;
 use crate::input::points::filter::PointFilter;
+use crate::input::points::optional_fields::OptionalFields;
 use crate::input::points::point::Point;
 use crate::input::points::raw_bounds::RawBounds;
 use crate::input::points::record_sink::RecordSink;
@@ -74,6 +75,8 @@ pub struct Source {
     pub has_rgb: bool,
     /// Whether points have a classification.
     pub has_class: bool,
+    /// Whether points have an intensity. A text in which none is wanted has none.
+    pub has_intensity: bool,
     /// The coordinate reference system.
     pub crs: Crs,
     /// The number of points by return, from the first on, as a LAS header claims it; empty for text.
@@ -150,6 +153,7 @@ fn open_las(file: &RandomAccessFile) -> Result<Source> {
         grid: [header.axes[0].scale, header.axes[1].scale],
         has_rgb: RecordLayout::new(header.format, header.record_length).has_rgb(),
         has_class: true,
+        has_intensity: true,
         crs,
         by_return: header.by_return,
         warnings,
@@ -174,6 +178,7 @@ fn open_text(file: &RandomAccessFile, options: &TextOptions, choice: &RowChoice)
         grid: table.grid(),
         has_rgb: table.has_rgb(),
         has_class: table.has_class(),
+        has_intensity: table.has_intensity(),
         crs: Crs { horizontal: table.unit, vertical: table.unit_z, ..Crs::default() },
         by_return: Vec::new(),
         warnings,
@@ -305,7 +310,7 @@ impl Source {
         sink: &mut dyn FnMut(&[Point]) -> Result<()>,
     ) -> Result<PointCounts> {
         let mut filter = PointFilter::new(&self.path, &self.axes, rules, sink);
-        self.read_chunk(chunk, records, rules.rgb, &mut filter)?;
+        self.read_chunk(chunk, records, rules.fields, &mut filter)?;
         filter.finish()
     }
 
@@ -313,11 +318,17 @@ impl Source {
     ///
     /// # Errors
     /// As [`Source::decode`].
-    pub(crate) fn read_chunk(&self, chunk: usize, records: u64, rgb: bool, sink: &mut impl RecordSink) -> Result<()> {
+    pub(crate) fn read_chunk(
+        &self,
+        chunk: usize,
+        records: u64,
+        fields: OptionalFields,
+        sink: &mut impl RecordSink,
+    ) -> Result<()> {
         let file = RandomAccessFile::reopen(&self.path, self.size)?;
         match &self.points {
-            PointData::Las(points) => points.decode(&file, chunk, records, rgb, sink),
-            PointData::Laz(points) => points.decode(&file, chunk, records, rgb, sink),
+            PointData::Las(points) => points.decode(&file, chunk, records, fields, sink),
+            PointData::Laz(points) => points.decode(&file, chunk, records, fields, sink),
             PointData::Text(table) => table.decode(&file, chunk, records, sink),
         }
     }

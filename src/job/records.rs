@@ -141,6 +141,8 @@ pub struct Leaf {
     pub rgb: Vec<[u16; 3]>,
     /// Their classes.
     pub class: Vec<u8>,
+    /// Their intensities; empty if all are 0.
+    pub intensity: Vec<u16>,
     /// The final triangles as numbers of sites, counterclockwise.
     pub triangles: Vec<[u32; 3]>,
 }
@@ -162,6 +164,9 @@ impl Leaf {
         pack(points, |point| point.corner().map(|value| value as u32), &mut positions);
         pack(points, |point| point.rgb.map(u32::from), &mut attributes);
         pack(points, |point| [point.class as u32], &mut attributes);
+        if points.iter().any(|point| point.intensity != 0) {
+            pack(points, |point| [point.intensity as u32], &mut attributes);
+        }
         let columns = ColumnWriter::default().push(&count).push(&positions).push(&attributes);
         // Packing triangles would take more time than it saves, but corners take two bytes where that is enough.
         if has_short_corners(points.len()) {
@@ -182,15 +187,20 @@ impl Leaf {
         let (count, positions) = Leaf::read_positions(&mut columns, tile)?;
         let attributes = columns.column::<u8>()?;
         let (mut rgb, mut class) = (Vec::with_capacity(count), Vec::with_capacity(count));
-        unpack(&attributes, count, |rgb| rgb.map(|value| value as u16), &mut rgb)
+        let rest = unpack(&attributes, count, |rgb| rgb.map(|value| value as u16), &mut rgb)
             .and_then(|rest| unpack(rest, count, |[class]| class as u8, &mut class))
             .ok_or_else(|| Leaf::damaged(tile))?;
+        let mut intensity = Vec::new();
+        if !rest.is_empty() {
+            let rest = unpack(rest, count, |[intensity]| intensity as u16, &mut intensity);
+            rest.filter(|rest| rest.is_empty()).ok_or_else(|| Leaf::damaged(tile))?;
+        }
         let triangles = if has_short_corners(count) {
             columns.column::<[u16; 3]>()?.iter().map(|t| t.map(u32::from)).collect()
         } else {
             columns.column_vec()?
         };
-        Ok(Leaf { positions, rgb, class, triangles })
+        Ok(Leaf { positions, rgb, class, intensity, triangles })
     }
 
     fn read_positions(columns: &mut ColumnReader<StepRecord>, tile: TileIndex) -> Result<(usize, Vec<[i32; 3]>)> {
@@ -325,6 +335,8 @@ pub struct PartialNormals {
     pub rgb: Vec<[u16; 3]>,
     /// Classes.
     pub class: Vec<u8>,
+    /// Intensities; empty if all are 0.
+    pub intensity: Vec<u16>,
 }
 
 impl PartialNormals {
@@ -334,7 +346,7 @@ impl PartialNormals {
     /// [`Error::Io`].
     pub fn save(&self, store: &Store, tile: TileIndex) -> Result<RecordRef> {
         let columns = ColumnWriter::default().push(&self.sums).push(&self.rgb).push(&self.class);
-        columns.write(store, StepRecord::PartialNormals(tile))
+        push_unless_empty(columns, &self.intensity).write(store, StepRecord::PartialNormals(tile))
     }
 
     /// Reads the record of `tile`.
@@ -343,8 +355,19 @@ impl PartialNormals {
     /// [`Error::Io`], or [`Error::Broken`] if there is none.
     pub fn load(store: &Store, tile: TileIndex) -> Result<PartialNormals> {
         let mut columns = ColumnReader::open(store, StepRecord::PartialNormals(tile))?;
-        Ok(PartialNormals { sums: columns.column_vec()?, rgb: columns.column_vec()?, class: columns.column_vec()? })
+        let (sums, rgb, class) = (columns.column_vec()?, columns.column_vec()?, columns.column_vec()?);
+        Ok(PartialNormals { sums, rgb, class, intensity: last_column(&mut columns)? })
     }
+}
+
+/// Adds a last column, which few jobs have.
+fn push_unless_empty<'a, T: Pod>(columns: ColumnWriter<'a>, last: &'a [T]) -> ColumnWriter<'a> {
+    if last.is_empty() { columns } else { columns.push(last) }
+}
+
+/// Reads the column that [`push_unless_empty`] has written.
+fn last_column<T: Pod>(columns: &mut ColumnReader<StepRecord>) -> Result<Vec<T>> {
+    if columns.is_at_end() { Ok(Vec::new()) } else { columns.column_vec() }
 }
 
 /// A finished vertex on the border of a tile, with what the neighbouring tiles write of it.
@@ -363,7 +386,12 @@ pub struct BorderAttributes {
 
 /// The finished frontier of one leaf, by ascending site.
 #[derive(Clone, Debug)]
-pub struct FinishedBorder(pub Vec<BorderAttributes>);
+pub struct FinishedBorder {
+    /// Its vertices.
+    pub vertices: Vec<BorderAttributes>,
+    /// The intensity of each; empty if all are 0.
+    pub intensity: Vec<u16>,
+}
 
 impl FinishedBorder {
     /// Writes the record of `tile`.
@@ -371,7 +399,8 @@ impl FinishedBorder {
     /// # Errors
     /// [`Error::Io`].
     pub fn save(&self, store: &Store, tile: TileIndex) -> Result<RecordRef> {
-        ColumnWriter::default().push(&self.0).write(store, StepRecord::FinishedBorder(tile))
+        let columns = ColumnWriter::default().push(&self.vertices);
+        push_unless_empty(columns, &self.intensity).write(store, StepRecord::FinishedBorder(tile))
     }
 
     /// Reads the record of `tile`.
@@ -380,12 +409,13 @@ impl FinishedBorder {
     /// [`Error::Io`], or [`Error::Broken`] if there is none.
     pub fn load(store: &Store, tile: TileIndex) -> Result<FinishedBorder> {
         let mut columns = ColumnReader::open(store, StepRecord::FinishedBorder(tile))?;
-        Ok(FinishedBorder(columns.column_vec()?))
+        Ok(FinishedBorder { vertices: columns.column_vec()?, intensity: last_column(&mut columns)? })
     }
 
-    /// Returns the vertex of `site`.
-    pub fn find(&self, site: SiteIndex) -> Option<&BorderAttributes> {
-        self.0.binary_search_by_key(&site, |vertex| vertex.site).ok().map(|at| &self.0[at])
+    /// Returns the vertex of `site` and its intensity.
+    pub fn find(&self, site: SiteIndex) -> Option<(&BorderAttributes, u16)> {
+        let at = self.vertices.binary_search_by_key(&site, |vertex| vertex.site).ok()?;
+        Some((&self.vertices[at], self.intensity.get(at).copied().unwrap_or(0)))
     }
 }
 

@@ -1,5 +1,6 @@
 //! The options of `[output]`.
 
+use crate::output::attributes::AttributeChoice;
 use crate::output::compression::{Compression, CompressionChoice};
 use crate::output::geoid::option::HeightOffset;
 use crate::output::page::{NOT_BUILT_IN, is_built_in};
@@ -16,6 +17,9 @@ pub struct OutputOptions {
     /// Where vertex colours come from.
     #[serde(default)]
     pub color: ColorChoice,
+    /// What vertices carry of their points, for viewers to style by.
+    #[serde(default, skip_serializing_if = "AttributeChoice::is_none")]
+    pub attributes: AttributeChoice,
     /// Whether vertices have normals.
     #[serde(default = "yes")]
     pub normals: bool,
@@ -73,15 +77,23 @@ impl TryFrom<String> for Copyright {
     type Error = String;
 
     fn try_from(text: String) -> std::result::Result<Copyright, String> {
-        let is_line = !text.trim().is_empty() && !text.chars().any(char::is_control);
+        let is_line = !text.trim().is_empty() && !text.chars().any(is_no_text);
         match is_line && text.chars().count() <= LONGEST_COPYRIGHT {
             true => Ok(Copyright(text)),
             false => Err(format!(
-                "copyright is one line of 1 to {LONGEST_COPYRIGHT} characters, without tabs and other control characters, such as \
+                "copyright is one line of 1 to {LONGEST_COPYRIGHT} characters, without tabs and other characters that break \
+                 or turn a line, such as \
                  \"(c) 2024 City of Example, CC BY 4.0\""
             )),
         }
     }
+}
+
+/// Tells whether a character is none of a line of text: a control character, a separator of lines or paragraphs, or one that turns round the
+/// direction of what follows, also in the line that a viewer puts it into.
+fn is_no_text(character: char) -> bool {
+    let turns = matches!(character, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    character.is_control() || turns || matches!(character, '\u{2028}' | '\u{2029}')
 }
 
 impl From<Copyright> for String {
@@ -132,6 +144,13 @@ pub enum ColorChoice {
     Class,
     /// No colours.
     None,
+}
+
+impl ColorChoice {
+    /// Returns whether these may be the points' own colours.
+    pub fn may_be_own(self) -> bool {
+        matches!(self, ColorChoice::Auto | ColorChoice::Rgb)
+    }
 }
 
 /// How long an edge of a triangle may be in the plane. Triangles with a longer edge are left out.

@@ -1,6 +1,7 @@
 //! The content of one tile, in lattice steps and source axes.
 
 use crate::geometry::Bounds;
+use crate::output::attributes::PointAttributes;
 use multiversion::multiversion;
 
 /// A piece of the terrain: vertices on the job's lattice and the triangles between them. Every vertex is the corner of at
@@ -13,6 +14,8 @@ pub struct Tile {
     pub normals: Option<Vec<[f32; 3]>>,
     /// The linear red, green and blue of the vertices, 65535 for full intensity.
     pub colors: Option<Vec<[u16; 3]>>,
+    /// What the vertices carry of their points.
+    pub attributes: PointAttributes,
     /// The corners as indices of vertices, counterclockwise seen from above.
     pub triangles: Vec<[u32; 3]>,
 }
@@ -36,6 +39,7 @@ impl Tile {
             positions: pick(positions, &vertices),
             normals: self.normals.as_ref().map(|all| pick(all, &vertices)),
             colors: self.colors.as_ref().map(|all| pick(all, &vertices)),
+            attributes: self.attributes.pick(&vertices),
             triangles,
         }
     }

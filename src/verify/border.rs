@@ -45,12 +45,12 @@ pub(super) struct BorderSite {
     pub(super) tile: u32,
     /// Its lattice integer in z.
     pub(super) height: i32,
-    /// 1 in the files of `cut/`, which have neither normals nor colours.
+    /// 1 in the files of `cut/`, which have neither normals nor colours nor attributes of points.
     pub(super) unshaded: u32,
     pub(super) unused: u32,
     /// Hash of the position in the scene.
     pub(super) position: u64,
-    /// Hash of normal and colour.
+    /// Hash of normal, colour and what the vertex carries of its point.
     pub(super) shading: u64,
 }
 

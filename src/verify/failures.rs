@@ -25,7 +25,9 @@ impl Failure {
             Failure::NotDelaunay => "edges not Delaunay",
             Failure::Unused => "vertices without a triangle",
             Failure::PlaceDiffers => "sites at different places in different tiles",
-            Failure::ShadingDiffers => "sites with different normals or colours in different tiles",
+            Failure::ShadingDiffers => {
+                "sites with different normals, colours, classes or intensities in different tiles"
+            }
         }
     }
 }

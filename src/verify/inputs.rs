@@ -12,7 +12,7 @@ use crate::geometry::Site;
 use crate::geometry::lattice::{AxisMap, Lattice, shortest_decimal};
 use crate::input::options::Duplicates;
 use crate::input::samples::{FileSamples, fingerprint_of};
-use crate::input::{Point, PointRules, RowChoice, Source, TextOptions, TextReading, open_chosen};
+use crate::input::{OptionalFields, Point, PointRules, RowChoice, Source, TextOptions, TextReading, open_chosen};
 use crate::output::frame::Extras;
 use crate::verify::keyed_records::{KeyedRecord, KeyedRecords};
 use crate::verify::report::ReportedFacts;
@@ -89,8 +89,8 @@ impl<'a> Inputs<'a> {
     pub(super) fn open(files: &'a [PathBuf], facts: &'a ReportedFacts, extras: &Extras) -> Result<Inputs<'a>> {
         let reading = facts.texts.unwrap_or(TextReading { colors: true, ..TextReading::default() });
         let (text, choice) = match &facts.input {
-            Some(input) => (input.csv.clone(), input.row_choice(reading.colors)),
-            None => (TextOptions::default(), RowChoice { colors: reading.colors, ..RowChoice::all() }),
+            Some(input) => (input.csv.clone(), input.row_choice(reading.fields())),
+            None => (TextOptions::default(), RowChoice { fields: reading.fields(), ..RowChoice::all() }),
         };
         // As the job opened it: what it did not want has no say about the digits of a text.
         let open_again = |file: &PathBuf| {
@@ -150,7 +150,7 @@ impl<'a> Inputs<'a> {
             classes: input.map_or([true; 256], |input| input.kept_classes()),
             bounds: input.and_then(|input| input.bounds).and_then(|bounds| source.raw_bounds(bounds.0)),
             first_order,
-            rgb: false,
+            fields: OptionalFields::default(),
         })
     }
 

@@ -4,6 +4,7 @@ use bytemuck::cast_slice;
 use xxhash_rust::xxh3::xxh3_64;
 
 use crate::geometry::Site;
+use crate::output::attributes::PointAttributes;
 use crate::output::gltf::read::TilePart;
 use crate::verify::border::{BorderEdge, BorderSite, MeshBorder};
 use crate::verify::exact::{EdgeState, double_area, edge_state, side};
@@ -125,9 +126,15 @@ impl MeshCheck<'_> {
         let position = xxh3_64(cast_slice(&self.mesh.world(v).map(f64::to_bits)));
         let normal = self.mesh.normals.as_ref().map_or([0; 3], |normals| normals[v].map(f32::to_bits));
         let color = self.mesh.colors.as_ref().map_or([0; 4], |colors| colors[v]);
-        let mut shading = [0; 20];
+        let PointAttributes { classification, intensity } = &self.mesh.attributes;
+        let point = [
+            classification.as_ref().map_or(0, |classes| u16::from(classes[v])),
+            intensity.as_ref().map_or(0, |intensities| intensities[v]),
+        ];
+        let mut shading = [0; 24];
         shading[..12].copy_from_slice(cast_slice(&normal));
-        shading[12..].copy_from_slice(cast_slice(&color));
+        shading[12..20].copy_from_slice(cast_slice(&color));
+        shading[20..].copy_from_slice(cast_slice(&point));
         let (site, height) = (self.sites[v], self.points[v][2]);
         BorderSite { site, position, shading: xxh3_64(&shading), tile: self.tile, height, unshaded: 0, unused: 0 }
     }

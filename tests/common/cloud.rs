@@ -4,7 +4,7 @@ use std::path::Path;
 
 use gdt_batch::Result;
 use gdt_batch::geometry::lattice::{AxisMap, Lattice, REACH};
-use gdt_batch::input::{Point, PointCounts, PointRules, Source, TextOptions, open};
+use gdt_batch::input::{OptionalFields, Point, PointCounts, PointRules, Source, TextOptions, open};
 use rust_decimal::Decimal;
 use rust_decimal::prelude::ToPrimitive;
 
@@ -35,7 +35,13 @@ pub(crate) fn rules(source: &Source, lattice: &Lattice) -> PointRules {
         let own = source.axes[axis];
         AxisMap::new(own.offset, own.scale, lattice.offset[axis], lattice.step(axis)).unwrap()
     };
-    PointRules { maps: [map(0), map(1), map(2)], classes: [true; 256], bounds: None, first_order: 0, rgb: true }
+    PointRules {
+        maps: [map(0), map(1), map(2)],
+        classes: [true; 256],
+        bounds: None,
+        first_order: 0,
+        fields: OptionalFields::RGB,
+    }
 }
 
 /// Decodes all chunks in order and checks that the counts agree with the points.
@@ -86,7 +92,7 @@ pub(crate) fn survives(extension: &str, bytes: &[u8]) {
     };
     let map = AxisMap::new(Decimal::ZERO, Decimal::ONE, Decimal::ZERO, Decimal::ONE).unwrap();
     let maps = [0, 1, 2].map(|i| axis(i).unwrap_or(map));
-    let rules = PointRules { maps, classes: [true; 256], bounds: None, first_order: 0, rgb: true };
+    let rules = PointRules { maps, classes: [true; 256], bounds: None, first_order: 0, fields: OptionalFields::RGB };
     for chunk in 0..source.chunks().min(64) {
         let _ = source.decode(chunk, &rules, &mut |_| Ok(()));
     }

@@ -2,13 +2,13 @@
 
 use gdt_batch::Error;
 use gdt_batch::geometry::lattice::{Lattice, REACH};
-use gdt_batch::input::{Point, RawBounds, TextOptions, open};
+use gdt_batch::input::{OptionalFields, Point, RawBounds, TextOptions, open};
 
 use crate::cloud::{decode, file, lattice, rules};
 use crate::las_file::LasFile;
 
 #[test]
-fn class_bounds_order_and_color_rules_hold() {
+fn class_bounds_order_color_and_intensity_rules_hold() {
     let path = file(".las", &LasFile::new(2, 2, 0, 1000).las());
     let source = open(&path, &TextOptions::default()).unwrap();
     let lattice = lattice(&source);
@@ -18,12 +18,16 @@ fn class_bounds_order_and_color_rules_hold() {
     let corners = [world(0, -1000) - 0.004, world(1, -2000) - 0.004, world(0, 3000) + 0.004, world(1, 4000) + 0.004];
     rules.classes = std::array::from_fn(|class| class == 5 || class == 6);
     rules.bounds = source.raw_bounds(corners);
-    (rules.first_order, rules.rgb) = (1 << 36, false);
+    (rules.first_order, rules.fields) = (1 << 36, OptionalFields { rgb: false, intensity: true });
     let (some, counts) = decode(&source, &rules).unwrap();
     let inside = |p: &Point| (-1000..=3000).contains(&p.position[0]) && (-2000..=4000).contains(&p.position[1]);
     let wanted = all.iter().filter(|p| (p.class == 5 || p.class == 6) && inside(p));
-    let wanted: Vec<Point> =
-        wanted.map(|p| Point::new(p.position, p.z, [0; 3], p.class, p.order() + (1 << 36))).collect();
+    let as_wanted = |p: &Point| {
+        let intensity = (p.order() * 7 % 3000) as u16;
+        Point::new(p.position, p.z, [0; 3], p.class, p.order() + (1 << 36)).with_intensity(intensity)
+    };
+    let wanted: Vec<Point> = wanted.map(as_wanted).collect();
+    assert!(all.iter().all(|p| p.intensity == 0));
     assert_eq!(some, wanted);
     assert!(counts.withheld > 0 && counts.other_class > 0 && counts.out_of_bounds > 0, "{counts:?}");
 }

@@ -53,7 +53,10 @@ fn a_copyright_is_one_line_of_text() {
     let folder = tempfile::tempdir().unwrap();
     let cloud = clouds::write(folder.path(), "cloud.csv", &clouds::grid(4, 4));
     let long = format!("{:?}", "x".repeat(501));
-    for wrong in ["\"\"", "\"  \"", "\"two\\nlines\"", "\"bell \\u0007\"", "7", &long] {
+    let breaking =
+        ["\"two\\nlines\"", "\"bell \\u0007\"", "\"two\\u2028lines\"", "\"two\\u2029lines\"", "\"a\\u0085b\""];
+    let turning = ["\"(c) \\u202Eytic\"", "\"\\u202Aa\"", "\"\\u2067a\\u2069\""];
+    for wrong in ["\"\"", "\"  \"", "7", &long].into_iter().chain(breaking).chain(turning) {
         let job = Job::on(&[&cloud]).with("output", &format!("copyright = {wrong}"));
         job.run().refused(2, &["line", "copyright"]);
     }

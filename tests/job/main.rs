@@ -15,6 +15,7 @@ mod clouds;
 mod program;
 mod tileset;
 
+mod attributes;
 mod bad_files;
 mod broken;
 mod choices;

@@ -32,15 +32,24 @@ fn chromium() -> Option<PathBuf> {
 /// Writes a file that asks for the heights at `places`, and returns its path.
 fn request(job: &Job, places: &[[f64; 3]]) -> PathBuf {
     let places: Vec<[f64; 2]> = places.iter().map(|p| [p[0], p[1]]).collect();
-    let request = job.folder().join("request.json");
-    std::fs::write(&request, json!({"places": places}).to_string()).unwrap();
-    request
+    asked(job, &json!({"places": places}))
+}
+
+fn asked(job: &Job, request: &Value) -> PathBuf {
+    let path = job.folder().join("request.json");
+    std::fs::write(&path, request.to_string()).unwrap();
+    path
 }
 
 /// Opens the output of the job in a page of tests/npm. Returns what the page shows, with the heights at `places`.
 #[track_caller]
 fn seen(job: &Job, chromium: &Path, page: &str, places: &[[f64; 3]]) -> Value {
-    let request = request(job, places);
+    answered(job, chromium, page, &request(job, places))
+}
+
+/// Opens the output of the job in a page of tests/npm. Returns what the page answers to the request in a file.
+#[track_caller]
+fn answered(job: &Job, chromium: &Path, page: &str, request: &Path) -> Value {
     let screenshot = job.folder().join("screenshot.png");
     let view = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/npm/view.mjs");
     let output =
@@ -159,6 +168,42 @@ fn browsers_show_a_tileset_of_external_tilesets() {
     is_coarsest(&seen["coarse"], &job, &tiles);
     let heights = seen["fine"]["heights"].as_array().unwrap();
     assert!(heights.len() == places.len() && heights.iter().all(Value::is_number), "{heights:?}");
+}
+
+/// The west of the area is ground that reflects little, the east is bright water. CesiumJS finds both properties, and shades by them.
+#[test]
+fn cesium_styles_by_class_and_intensity() {
+    let Some(chromium) = chromium() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = String::from("x,y,z,class,intensity\n");
+    for [x, y, z] in hills(8_000, 3) {
+        let look = if x < 10_000 { "2,6554" } else { "9,52429" };
+        text += &format!("{},{},{},{look}\n", 500_000 + x / 10, 4_900_000 + y / 10, z / 10);
+    }
+    let cloud = folder.path().join("cloud.csv");
+    std::fs::write(&cloud, text).unwrap();
+    for compression in ["none", "meshopt"] {
+        let output = format!(
+            "attributes = [\"classification\", \"intensity\"]\ncompression = \"{compression}\"\nmax_points_per_level_tile = 1000\n\
+             format = \"3dtiles\""
+        );
+        let job = Job::on(&[&cloud]).tiles_of(1_000).with("output", &output).with("input", "crs = \"EPSG:32610\"");
+        job.report();
+        job.verified();
+        let request = asked(&job, &json!({"places": [], "pixels": [[300, 300], [500, 300]]}));
+        let seen = answered(&job, &chromium, "cesium", &request);
+        assert_eq!(seen["complaints"], json!([]), "{compression}");
+        let found = &seen["attributes"];
+        assert_eq!(
+            (&found["schema"], &found["properties"]),
+            (&json!("gdt_batch"), &json!(["classification", "intensity"]))
+        );
+        let shown: Vec<[i64; 2]> = serde_json::from_value(found["shown"].clone()).unwrap();
+        // Linear 0.1 and 0.8 of the greatest intensity, and a tenth of the classes, as sRGB shows them.
+        for (shown, wanted) in shown.as_flattened().iter().zip([89, 124, 231, 243]) {
+            assert!((shown - wanted).abs() <= 2, "{compression}: {shown} for {wanted}");
+        }
+    }
 }
 
 #[track_caller]

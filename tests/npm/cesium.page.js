@@ -1,5 +1,5 @@
 // The page of cesium.html: shows the tileset in its place on the globe, coarse and fine, and sends the server what it shows.
-const { Cartesian3, Cartographic, Cesium3DTileset, CesiumWidget, Color, DirectionalLight, HeadingPitchRange, Math: Angles, Matrix4, Ray } = window.Cesium;
+const { Cartesian2, Cartesian3, Cartographic, Cesium3DTileset, CesiumWidget, Color, CustomShader, DirectionalLight, HeadingPitchRange, LightingModel, Math: Angles, Matrix4, Ray } = window.Cesium;
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
 function emptyScene() {
@@ -45,7 +45,35 @@ function facts(scene, tileset, shown, places) {
   return { triangles, meshes: shown.size, heights: places.map((place) => heightOver(scene, tileset, place)) };
 }
 
-async function show(places) {
+// What the console says of the tileset.
+const complaints = [];
+for (const kind of ['error', 'warn']) {
+  const say = console[kind];
+  console[kind] = (...words) => { complaints.push(words.join(' ')); say.apply(console, words); };
+}
+
+// Returns what the schema of the tile at the first of `pixels` says that vertices carry, and red and green of the picture at each of them
+// when a shader shows the intensity as red and the class as green.
+async function attributesAt(scene, tileset, pixels) {
+  const schema = scene.pickMetadataSchema(new Cartesian2(...pixels[0]));
+  tileset.customShader = new CustomShader({
+    lightingModel: LightingModel.UNLIT,
+    fragmentShaderText: `void fragmentMain(FragmentInput fsInput, inout czm_modelMaterial material) {
+      material.diffuse = vec3(float(fsInput.metadata.intensity) / 65535.0, float(fsInput.metadata.classification) / 10.0, 0.0);
+    }`,
+  });
+  for (let frame = 0; frame < 20; frame += 1) {
+    scene.render();
+    await pause(20);
+  }
+  const picture = Object.assign(document.createElement('canvas'), { width: scene.canvas.width, height: scene.canvas.height });
+  const pen = picture.getContext('2d');
+  pen.drawImage(scene.canvas, 0, 0);
+  const shown = pixels.map(([x, y]) => [...pen.getImageData(x, y, 1, 1).data.slice(0, 2)]);
+  return { schema: schema?.id, properties: Object.keys(schema?.classes.point?.properties ?? {}), shown };
+}
+
+async function show({ places, pixels }) {
   const scene = emptyScene();
   const tileset = await Cesium3DTileset.fromUrl('/out/tileset.json', {
     foveatedScreenSpaceError: false, cullRequestsWhileMoving: false, cacheBytes: 2 ** 32, enablePick: true,
@@ -71,13 +99,14 @@ async function show(places) {
   }
   const { longitude, latitude, height } = Cartographic.fromCartesian(tileset.boundingSphere.center);
   const centre = [Angles.toDegrees(longitude), Angles.toDegrees(latitude), height];
-  return { ...seen, centre, picture: scene.canvas.toDataURL('image/png') };
+  const picture = scene.canvas.toDataURL('image/png');
+  const attributes = pixels && await attributesAt(scene, tileset, pixels);
+  return { ...seen, centre, picture, attributes, complaints };
 }
 
 let result;
 try {
-  const { places } = await (await fetch('/request.json')).json();
-  result = await show(places);
+  result = await show(await (await fetch('/request.json')).json());
 } catch (error) {
   result = { error: String(error.stack ?? error) };
 }

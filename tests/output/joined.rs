@@ -4,13 +4,13 @@ use gdt_batch::output::Compression;
 use gdt_batch::output::gltf::one_file::write_terrain;
 use gdt_batch::output::gltf::read::read_tile;
 
-use crate::model::{cloud, cut_by_place, terrain, utm, write_tiles, write_tiles_as};
+use crate::model::{attributed, cloud, cut_by_place, terrain, utm, write_tiles, write_tiles_as};
 
 #[test]
 fn the_scene_has_the_parts_of_all_tiles() {
     let frame = utm();
     let directory = tempfile::tempdir().unwrap();
-    let tiles = cut_by_place(&terrain(&frame, &cloud(21, 600, 500_000)), 3);
+    let tiles = cut_by_place(&attributed(terrain(&frame, &cloud(21, 600, 500_000))), 3);
     write_tiles(directory.path(), &frame, &tiles);
     let paths: Vec<_> = (0..tiles.len()).map(|i| directory.path().join(format!("tiles/{i:05}.glb"))).collect();
     let out = directory.path().join("terrain.glb");
@@ -22,6 +22,7 @@ fn the_scene_has_the_parts_of_all_tiles() {
         let tile = &read_tile(path).unwrap().parts[0];
         assert_eq!((part.translation, &part.positions), (tile.translation, &tile.positions));
         assert_eq!((&part.normals, &part.colors, &part.triangles), (&tile.normals, &tile.colors, &tile.triangles));
+        assert!(part.attributes == tile.attributes && part.attributes.intensity.is_some());
     }
     let names: Vec<_> = std::fs::read_dir(directory.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
     assert_eq!(names.len(), 2, "nothing but tiles and terrain.glb: {names:?}");
@@ -30,7 +31,7 @@ fn the_scene_has_the_parts_of_all_tiles() {
 #[test]
 fn packed_tiles_are_unpacked_in_the_scene() {
     let (frame, directory) = (utm(), tempfile::tempdir().unwrap());
-    let tiles = cut_by_place(&terrain(&frame, &cloud(22, 2_000, 20_000)), 2);
+    let tiles = cut_by_place(&attributed(terrain(&frame, &cloud(22, 2_000, 20_000))), 2);
     write_tiles_as(Compression::Meshopt, directory.path(), &frame, &tiles);
     let paths: Vec<_> = (0..tiles.len()).map(|i| directory.path().join(format!("tiles/{i:05}.glb"))).collect();
     let out = directory.path().join("terrain.glb");
@@ -43,6 +44,7 @@ fn packed_tiles_are_unpacked_in_the_scene() {
         let tile = &read_tile(path).unwrap().parts[0];
         assert_eq!((part.translation, part.scale, &part.positions), (tile.translation, tile.scale, &tile.positions));
         assert_eq!((&part.normals, &part.colors, &part.triangles), (&tile.normals, &tile.colors, &tile.triangles));
+        assert!(part.attributes == tile.attributes && part.attributes.intensity.is_some());
     }
 }
 

@@ -4,7 +4,7 @@ use gdt_batch::output::frame::Frame;
 use gdt_batch::output::gltf::one_file::write_terrain;
 use gdt_batch::output::{Compression, Tile};
 
-use crate::model::{cloud, cut_by_place, grid, lattice, terrain, utm, write_tiles, write_tiles_as};
+use crate::model::{attributed, cloud, cut_by_place, grid, lattice, terrain, utm, write_tiles, write_tiles_as};
 use crate::validator::validate;
 
 #[test]
@@ -23,7 +23,9 @@ fn the_khronos_validator_accepts_plain_tiles() {
     let fine = Frame::new(&lattice([0.0; 3], 1e-6, 0.001), 1.0, 1.0, None).unwrap();
     write_tiles(&directory.path().join("parts"), &fine, &[terrain(&fine, &grid(40, 25, 1_000_000))]);
     write_tiles(&directory.path().join("long"), &frame, &[long]);
-    validate(directory.path(), tiles.len() + 4);
+    let of_points = cut_by_place(&attributed(terrain(&utm(), &cloud(43, 3_000, 200_000))), 2);
+    write_tiles(&directory.path().join("attributes"), &frame, &of_points);
+    validate(directory.path(), tiles.len() + 8);
 }
 
 #[test]
@@ -40,7 +42,8 @@ fn the_khronos_validator_accepts_packed_tiles() {
         write_terrain(&folder.join("terrain.glb"), &paths, None).unwrap();
         let bare = Tile { normals: None, colors: None, ..mesh.clone() };
         write_tiles_as(compression, &folder.join("bare"), &frame, &[bare]);
+        write_tiles_as(compression, &folder.join("attributes"), &frame, &[attributed(mesh.clone())]);
         write_tiles_as(compression, &folder.join("parts"), &frame, &[terrain(&frame, &grid(90, 90, 2_000))]);
     }
-    validate(directory.path(), 2 * (tiles.len() + 3));
+    validate(directory.path(), 2 * (tiles.len() + 4));
 }

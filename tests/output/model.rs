@@ -6,6 +6,7 @@ use std::path::Path;
 use gdt_batch::geometry::Bounds;
 use gdt_batch::geometry::lattice::{Lattice, shortest_decimal};
 use gdt_batch::geometry::predicates::{in_circle, orient2d};
+use gdt_batch::output::attributes::PointAttributes;
 use gdt_batch::output::frame::Frame;
 use gdt_batch::output::gltf::glb::GlbEncoder;
 use gdt_batch::output::normals::NormalSums;
@@ -92,13 +93,28 @@ pub(crate) fn terrain(frame: &Frame, points: &[[i32; 3]]) -> Tile {
         positions: points.to_vec(),
         normals: Some(NormalSums::new(points, &triangles).unit_normals(frame)),
         colors: Some(points.iter().map(color).collect()),
+        attributes: PointAttributes::default(),
         triangles,
     }
 }
 
+/// Returns the mesh with a class and an intensity for every vertex, different for neighbours.
+pub(crate) fn attributed(mesh: Tile) -> Tile {
+    let attributes = PointAttributes {
+        classification: Some(mesh.positions.iter().map(|p| (p[0] ^ p[1]) as u8).collect()),
+        intensity: Some(mesh.positions.iter().map(|p| (p[0] * 7 + p[1] * 13) as u16).collect()),
+    };
+    Tile { attributes, ..mesh }
+}
+
 /// Cuts a mesh into tiles: triangle number `i` goes to tile `which(i)`.
 pub(crate) fn cut(mesh: &Tile, tiles: usize, mut which: impl FnMut(usize) -> usize) -> Vec<Tile> {
-    let mut cut = vec![Tile { normals: Some(vec![]), colors: Some(vec![]), ..Tile::default() }; tiles];
+    let PointAttributes { classification, intensity } = &mesh.attributes;
+    let attributes = PointAttributes {
+        classification: classification.as_ref().map(|_| vec![]),
+        intensity: intensity.as_ref().map(|_| vec![]),
+    };
+    let mut cut = vec![Tile { normals: Some(vec![]), colors: Some(vec![]), attributes, ..Tile::default() }; tiles];
     let mut numbers = vec![HashMap::new(); tiles];
     for (i, triangle) in mesh.triangles.iter().enumerate() {
         let which = which(i);
@@ -108,6 +124,12 @@ pub(crate) fn cut(mesh: &Tile, tiles: usize, mut which: impl FnMut(usize) -> usi
                 tile.positions.push(mesh.positions[v as usize]);
                 tile.normals.as_mut().unwrap().push(mesh.normals.as_ref().unwrap()[v as usize]);
                 tile.colors.as_mut().unwrap().push(mesh.colors.as_ref().unwrap()[v as usize]);
+                if let (Some(all), Some(theirs)) = (&mut tile.attributes.classification, classification) {
+                    all.push(theirs[v as usize]);
+                }
+                if let (Some(all), Some(theirs)) = (&mut tile.attributes.intensity, intensity) {
+                    all.push(theirs[v as usize]);
+                }
                 tile.positions.len() as u32 - 1
             })
         };

@@ -159,6 +159,51 @@ fn tiles_have_no_borders_in_the_picture() {
     assert!(drawn(&cut(&mesh, 4, |_| random.below(4) as usize)) == drawn(std::slice::from_ref(&mesh)));
 }
 
+/// Triangles along a road, a slope and a wall cover hardly a centre of a pixel.
+#[test]
+fn a_very_narrow_terrain_is_seen() {
+    let frame = utm();
+    let lines: [fn(i32) -> [i32; 3]; 3] =
+        [|k| [40 * k, k * k % 3, k % 50], |k| [40 * k, 17 * k + k * k % 3, 0], |k| [k % 2, -40 * k, 7 * k]];
+    for line in lines {
+        let points: Vec<[i32; 3]> = (0..6_000).map(line).collect();
+        let strip: Vec<[u32; 3]> = (0..5_998).map(|v| [v, v + 1, v + 2]).collect();
+        let triangles = strip.into_iter().map(|t| {
+            let [p, q, r] = t.map(|v| [points[v as usize][0], points[v as usize][1]]);
+            if orient2d(p, q, r) < 0 { [t[1], t[0], t[2]] } else { t }
+        });
+        let mesh = Tile { triangles: triangles.collect(), positions: points.clone(), ..Tile::default() };
+        let canvas = canvas_of(&frame, &mesh);
+        let drawn = |tiles: &[Tile]| {
+            let mut picture = Picture::new(&canvas);
+            for tile in tiles {
+                let pixels = canvas.draw(tile).unwrap();
+                picture.add(&canvas.dots(tile, pixels.len()));
+                picture.add(&pixels);
+            }
+            picture.png(&Legend::new(&canvas, true)).unwrap()
+        };
+        let (width, pixels) = decoded(&drawn(std::slice::from_ref(&mesh)));
+        let seen = pixels[..pixels.len() - STRIP * width].iter().filter(|pixel| pixel[3] == 255).count();
+        assert!(seen >= 1000, "{seen} pixels");
+    }
+    // Elsewhere dots change nothing.
+    let mesh = terrain(&frame, &grid(40, 40, 500));
+    let canvas = canvas_of(&frame, &mesh);
+    let pixels = canvas.draw(&mesh).unwrap();
+    assert_eq!(canvas.dots(&mesh, pixels.len()), []);
+    let corner = Tile::of(&mesh.positions, mesh.triangles[..1].to_vec());
+    let dots = canvas.dots(&corner, 0);
+    assert!(!dots.is_empty());
+    let with = |dots: &[PreviewPixel]| {
+        let mut picture = Picture::new(&canvas);
+        picture.add(&pixels);
+        picture.add(dots);
+        picture.png(&Legend::new(&canvas, true)).unwrap()
+    };
+    assert!(with(&dots) == with(&[]));
+}
+
 #[test]
 fn a_slope_towards_the_light_is_brighter() {
     let frame = utm();

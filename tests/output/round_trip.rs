@@ -5,13 +5,14 @@ use std::collections::HashMap;
 use gdt_batch::Error;
 use gdt_batch::geometry::Bounds;
 use gdt_batch::mesh::triangle_order::ascending;
+use gdt_batch::output::attributes::PointAttributes;
 use gdt_batch::output::frame::Frame;
 use gdt_batch::output::gltf::read::{TileFile, TilePart, read_tile};
 use gdt_batch::output::{Compression, Tile};
 use gdt_batch::verify::SourceGrid;
 use proptest::prelude::*;
 
-use crate::model::{COMPRESSIONS, cloud, cut, encode_tile, framed, grid, lattice, terrain, utm};
+use crate::model::{COMPRESSIONS, attributed, cloud, cut, encode_tile, framed, grid, lattice, terrain, utm};
 use crate::random::Random;
 
 fn written(frame: &Frame, tile: &Tile) -> Vec<u8> {
@@ -71,7 +72,7 @@ fn meant(tile: &Tile) -> Vec<[[i32; 3]; 3]> {
 
 #[test]
 fn packed_tiles_hold_the_same_vertices_and_triangles() {
-    let tile = terrain(&utm(), &cloud(1, 5_000, 20_000));
+    let tile = attributed(terrain(&utm(), &cloud(1, 5_000, 20_000)));
     for compression in [Compression::Quantized, Compression::Meshopt] {
         let file = there_and_back_as(compression, &utm(), &tile);
         let [part] = &file.parts[..] else { panic!("{} parts", file.parts.len()) };
@@ -84,6 +85,10 @@ fn packed_tiles_hold_the_same_vertices_and_triangles() {
             assert!(cosine > 0.99, "{point:?}: {cosine}");
             let color = tile.colors.as_ref().unwrap()[old];
             assert!((0..3).all(|k| color[k].abs_diff(colors[v][k]) <= 129) && colors[v][3] == 65535);
+            let look = |all: &PointAttributes, v: usize| {
+                (all.classification.as_ref().unwrap()[v], all.intensity.as_ref().unwrap()[v])
+            };
+            assert_eq!(look(&part.attributes, v), look(&tile.attributes, old));
         }
     }
 }
@@ -156,9 +161,10 @@ fn wide_packed_tiles_are_nearly_as_small() {
 #[test]
 fn a_tile_comes_back_whole() {
     let frame = utm();
-    let tile = terrain(&frame, &cloud(1, 500, 30_000));
+    let tile = attributed(terrain(&frame, &cloud(1, 500, 30_000)));
     let file = there_and_back(&frame, &tile);
     assert_eq!(file.parts.len(), 1);
+    assert_eq!(file.parts[0].attributes, tile.attributes);
     assert_eq!(integers(&file), tile.positions);
     assert_eq!(file.parts[0].triangles, ascending(tile.positions.len(), &tile.triangles));
     let normals = file.parts[0].normals.as_ref().unwrap();

@@ -151,12 +151,31 @@ fn a_different_height_normal_or_colour_in_one_tile_is_found() {
         let v = shared_vertex(tiles);
         tiles[4].normals.as_mut().unwrap()[v] = [0.6, 0.0, 0.8];
     };
-    says(&failures(normal), &["1 sites with different normals or colours"]);
+    says(&failures(normal), &["1 sites with different normals, colours"]);
     let color = |tiles: &mut Vec<Tile>| {
         let v = shared_vertex(tiles);
         tiles[4].colors.as_mut().unwrap()[v][1] ^= 1 << 15;
     };
-    says(&failures(color), &["1 sites with different normals or colours"]);
+    says(&failures(color), &["1 sites with different normals, colours"]);
+    let carrying = |tiles: &mut Vec<Tile>| {
+        for tile in tiles.iter_mut() {
+            tile.attributes.classification = Some(vec![2; tile.positions.len()]);
+            tile.attributes.intensity = Some(vec![300; tile.positions.len()]);
+        }
+    };
+    assert_eq!(failures(carrying), "");
+    let class = |tiles: &mut Vec<Tile>| {
+        carrying(tiles);
+        let v = shared_vertex(tiles);
+        tiles[4].attributes.classification.as_mut().unwrap()[v] = 3;
+    };
+    says(&failures(class), &["1 sites with different normals, colours, classes"]);
+    let intensity = |tiles: &mut Vec<Tile>| {
+        carrying(tiles);
+        let v = shared_vertex(tiles);
+        tiles[4].attributes.intensity.as_mut().unwrap()[v] = 300 + 256;
+    };
+    says(&failures(intensity), &["1 sites with different normals, colours, classes or intensities"]);
 }
 
 #[test]

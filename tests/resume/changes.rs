@@ -46,9 +46,10 @@ fn another_style_keeps_the_mesh() {
     let styles = [
         ("[output] color", Setup { output: base().output.replace(elevation, "color = \"none\""), ..base() }),
         ("[output] normals", base().output("normals = false")),
+        ("[output] attributes", base().output("attributes = [\"classification\"]")),
     ];
     // One kill is among the leaves, the other among the tiles.
-    for ((key, setup), count) in styles.iter().zip([12, 45]) {
+    for ((key, setup), count) in styles.iter().zip([12, 45, 45]) {
         let (said, resumed) = change_to(&mut rig, count, setup);
         assert!(said.contains(key) && said.contains("written again"), "{said}");
         assert!(resumed >= 12 && resumed < count.max(13), "{resumed} steps");
@@ -63,6 +64,8 @@ fn an_option_of_the_mesh_starts_over_and_is_named() {
         ("[input] bounds", Setup { input: base().input + "\nbounds = [-20000, -20000, 20000, 20000]", ..base() }),
         ("[input] duplicates", Setup { input: base().input + "\nduplicates = \"highest\"", ..base() }),
         ("[output] color", Setup { output: base().output.replace("elevation", "auto"), ..base() }),
+        // Intensities are read only if they are wanted.
+        ("[output] attributes", base().output("attributes = [\"intensity\"]")),
     ] {
         let (said, resumed) = change_to(&mut rig, 12, &setup);
         assert!(said.contains(key) && said.contains("starting over") && resumed == 0, "{key}, {resumed}: {said}");

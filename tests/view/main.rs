@@ -14,6 +14,8 @@ const FOUND: &str = "document.getElementById('point-facts').dataset.final === 't
                      document.getElementById('point-facts').children.length > 0";
 /// The middle of the picture beside the panel, in a window of 1280 x 800 pixels.
 const MIDDLE: [u32; 2] = [475, 400];
+/// What makes vertices carry class and intensity.
+const ATTRIBUTES: &str = "attributes = [\"classification\", \"intensity\"]";
 /// Red points, side by side along each axis.
 const SIDE: i64 = 70;
 
@@ -29,6 +31,11 @@ fn point(i: i64, j: i64) -> [i64; 3] {
     [50_000_000 + 300 * i + shift(i * 31 + j), 480_000_000 + 300 * j + shift(j * 17 - i), 10_000 + (i * j) % 37]
 }
 
+/// Returns the class and the intensity of that point.
+fn look(i: i64, j: i64) -> [i64; 2] {
+    [2 + (i + j) % 4, (i * 900 + j) % 65_536]
+}
+
 fn text(hundredths: i64) -> String {
     format!("{}.{:02}", hundredths / 100, hundredths % 100)
 }
@@ -37,9 +44,10 @@ impl Terrain {
     /// Runs a job with these options.
     fn new(input: &str, output: &str) -> Terrain {
         let folder = tempfile::tempdir().unwrap();
-        let mut cloud = String::from("x,y,z,red,green,blue\n");
-        for [x, y, z] in (0..SIDE * SIDE).map(|n| point(n / SIDE, n % SIDE)) {
-            cloud += &format!("{},{},{},230,40,30\n", text(x), text(y), text(z));
+        let mut cloud = String::from("x,y,z,red,green,blue,class,intensity\n");
+        for (i, j) in (0..SIDE * SIDE).map(|n| (n / SIDE, n % SIDE)) {
+            let ([x, y, z], [class, intensity]) = (point(i, j), look(i, j));
+            cloud += &format!("{},{},{},230,40,30,{class},{intensity}\n", text(x), text(y), text(z));
         }
         std::fs::write(folder.path().join("cloud.csv"), cloud).unwrap();
         let config = format!(
@@ -181,6 +189,9 @@ fn tells_the_source(terrain: &Terrain, chromium: &Path) {
         assert!(share > 0.1, "{share} of the picture is terrain");
         let exact = wanted.map(text).join(", ");
         assert!(fact(&seen, "nearest corner").starts_with(&format!("{exact} (")), "{exact}: {seen}");
+        let [class, intensity] = look(i, j).map(|value| value.to_string());
+        assert_eq!(fact(&seen, "class of that corner"), class);
+        assert_eq!(fact(&seen, "intensity of that corner"), intensity);
         // The place itself is as near as pixels are.
         for (term, value) in ["x (m)", "y (m)"].into_iter().zip(wanted) {
             let told: f64 = fact(&seen, term).parse().unwrap();
@@ -192,7 +203,7 @@ fn tells_the_source(terrain: &Terrain, chromium: &Path) {
 #[test]
 fn a_click_on_the_globe_tells_the_coordinates_of_the_source() {
     let Some(chromium) = chromium() else { return };
-    let terrain = Terrain::new("crs = \"EPSG:26910\"", "format = \"3dtiles\"");
+    let terrain = Terrain::new("crs = \"EPSG:26910\"", &format!("format = \"3dtiles\"\n{ATTRIBUTES}"));
     let tileset: Value = serde_json::from_slice(&std::fs::read(terrain.out().join("tileset.json")).unwrap()).unwrap();
     assert!(tileset["root"]["transform"].is_array(), "it is on the globe, and has levels");
     tells_the_source(&terrain, &chromium);
@@ -201,7 +212,7 @@ fn a_click_on_the_globe_tells_the_coordinates_of_the_source() {
 #[test]
 fn one_file_without_a_reference_system_is_shown_too() {
     let Some(chromium) = chromium() else { return };
-    let terrain = Terrain::new("", "format = \"glb\"");
+    let terrain = Terrain::new("", &format!("format = \"glb\"\n{ATTRIBUTES}"));
     assert!(!terrain.out().join("tileset.json").exists());
     tells_the_source(&terrain, &chromium);
 }

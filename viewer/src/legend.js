@@ -47,6 +47,8 @@ export function pointFacts(found, georeference, isFinal) {
     [term('y', flat), found.text[1]],
     [term('z', up), found.text[2]],
     ['nearest corner', found.isExact ? `${found.vertex.join(', ')} (${length(found.vertexMetres)} away)` : null],
+    ['class of that corner', found.isExact ? found.classification : null],
+    ['intensity of that corner', found.isExact ? found.intensity : null],
     ['tile', found.uri],
     ['level', isFinal ? level : `${level}; loading the exact tile…`],
   ];

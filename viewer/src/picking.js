@@ -5,14 +5,14 @@ const DOWN = new Vector3(0, -1, 0);
 // How long nothing may load before what is shown counts as the finest there is. Between two levels, a few frames load nothing.
 const QUIET_MS = 2000;
 
-// Returns what a hit on a mesh tells: the place on the triangle, its nearest vertex, and the tile.
+// Returns what a hit on a mesh tells: the place on the triangle, its nearest vertex with class and intensity if it carries them, and the tile.
 export function describeHit({ object, face, point }, georeference) {
   const { toScene, facts } = object.userData;
-  const { position } = object.geometry.attributes;
+  const { position, _classification: classes, _intensity: intensities } = object.geometry.attributes;
   const inScene = (vertex) => vertex.applyMatrix4(toScene).toArray();
   const place = inScene(object.worldToLocal(point.clone()));
-  const corners = [face.a, face.b, face.c].map((index) => inScene(new Vector3().fromBufferAttribute(position, index)));
-  const distance = (corner) => Math.hypot(...corner.map((value, axis) => value - place[axis]));
+  const corners = [face.a, face.b, face.c].map((index) => ({ index, at: inScene(new Vector3().fromBufferAttribute(position, index)) }));
+  const distance = ({ at }) => Math.hypot(...at.map((value, axis) => value - place[axis]));
   const nearest = corners.reduce((best, corner) => (distance(corner) < distance(best) ? corner : best));
   const source = georeference.source(place);
   return {
@@ -20,9 +20,11 @@ export function describeHit({ object, face, point }, georeference) {
     world: point.clone(),
     source,
     text: georeference.roundedSource(source),
-    vertex: georeference.exactSource(nearest),
-    vertexWorld: new Vector3(...nearest).applyMatrix4(toScene.clone().invert()).applyMatrix4(object.matrixWorld),
+    vertex: georeference.exactSource(nearest.at),
+    vertexWorld: new Vector3(...nearest.at).applyMatrix4(toScene.clone().invert()).applyMatrix4(object.matrixWorld),
     vertexMetres: distance(nearest),
+    classification: classes?.getX(nearest.index),
+    intensity: intensities?.getX(nearest.index),
   };
 }
 

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::input::file::bytes::{int32, uint16};
+use crate::input::points::optional_fields::OptionalFields;
 use crate::input::points::record::PointRecord;
 
 /// The least record length of each point format, in bytes (LAS 1.4 R15, section 2.6).
@@ -37,15 +38,16 @@ impl RecordLayout {
 
     /// Reads a record of at least `self.length` bytes.
     #[inline]
-    pub(crate) fn record(&self, bytes: &[u8], with_rgb: bool) -> PointRecord {
+    pub(crate) fn record(&self, bytes: &[u8], fields: OptionalFields) -> PointRecord {
         let raw = [0, 4, 8].map(|at| int32(bytes, at) as i64);
         let (class, withheld) =
             if self.extended { (bytes[16], bytes[15] & 4 != 0) } else { (bytes[15] & 31, bytes[15] & 128 != 0) };
         let rgb = match self.rgb {
-            Some(at) if with_rgb => [at, at + 2, at + 4].map(|at| uint16(bytes, at)),
+            Some(at) if fields.rgb => [at, at + 2, at + 4].map(|at| uint16(bytes, at)),
             _ => [0; 3],
         };
+        let intensity = if fields.intensity { uint16(bytes, 12) } else { 0 };
         let return_number = bytes[14] & if self.extended { 15 } else { 7 };
-        PointRecord { raw, rgb, class, withheld, return_number, rounded: [false; 2] }
+        PointRecord { raw, rgb, intensity, class, withheld, return_number, rounded: [false; 2] }
     }
 }

@@ -18,6 +18,7 @@ use crate::input::las::header::LasHeader;
 use crate::input::las::layout::RecordLayout;
 use crate::input::las::uncompressed::push_records;
 use crate::input::las::vlr::Vlr;
+use crate::input::points::optional_fields::OptionalFields;
 use crate::input::points::record_sink::RecordSink;
 use crate::{Error, Result, Warnings};
 
@@ -94,13 +95,13 @@ impl CompressedPoints {
         self.chunks.len().max((self.missing > 0) as usize)
     }
 
-    /// Sends the first `records` records of chunk `chunk` of the source through `filter`, with their colours if `rgb` says so.
+    /// Sends the first `records` records of chunk `chunk` of the source through `filter`, with these `fields`.
     pub(crate) fn decode(
         &self,
         file: &RandomAccessFile,
         chunk: usize,
         records: u64,
-        rgb: bool,
+        fields: OptionalFields,
         filter: &mut impl RecordSink,
     ) -> Result<()> {
         let mut left = records;
@@ -110,7 +111,8 @@ impl CompressedPoints {
             }
             let wanted = laz_chunk.count.min(left);
             left -= wanted;
-            let mut decoder = ChunkDecoder { points: self, file, chunk: laz_chunk, rgb, wanted, next: laz_chunk.first };
+            let mut decoder =
+                ChunkDecoder { points: self, file, chunk: laz_chunk, fields, wanted, next: laz_chunk.first };
             match decoder.decode(filter) {
                 Ok(()) => {}
                 Err(ChunkError::Stopped(error)) => return Err(error),
@@ -152,8 +154,8 @@ struct ChunkDecoder<'a> {
     points: &'a CompressedPoints,
     file: &'a RandomAccessFile,
     chunk: &'a LazChunk,
-    /// Whether colours are wanted.
-    rgb: bool,
+    /// What is wanted besides place and class.
+    fields: OptionalFields,
     /// The number of records to decode, from the first.
     wanted: u64,
     /// The number of the next record in the file.
@@ -213,7 +215,7 @@ impl ChunkDecoder<'_> {
             let wanted = ((block.len() / length) as u64).min(stop - self.next) as usize * length;
             let mut done = 0;
             let outcome = catch_panic(|| decode_block(decoder.as_mut(), &mut block[..wanted], length, &mut done));
-            push_records(&self.points.layout, &block[..done], self.next, self.rgb, filter)?;
+            push_records(&self.points.layout, &block[..done], self.next, self.fields, filter)?;
             self.next += (done / length) as u64;
             outcome?.map_err(|error| match error.kind() {
                 io::ErrorKind::UnexpectedEof => ChunkError::CutShort,
@@ -226,7 +228,8 @@ impl ChunkDecoder<'_> {
     /// Returns the fields to decompress.
     fn selection(&self) -> DecompressionSelection {
         let needed = DecompressionSelection::base().decompress_z().decompress_classification().decompress_flags();
-        if self.rgb && self.points.layout.has_rgb() { needed.decompress_rgb() } else { needed }
+        let needed = if self.fields.intensity { needed.decompress_intensity() } else { needed };
+        if self.fields.rgb && self.points.layout.has_rgb() { needed.decompress_rgb() } else { needed }
     }
 }
 

@@ -8,6 +8,7 @@ use crate::Result;
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::las::header::LasHeader;
 use crate::input::las::layout::RecordLayout;
+use crate::input::points::optional_fields::OptionalFields;
 use crate::input::points::record_sink::RecordSink;
 
 /// The number of records of a chunk.
@@ -43,13 +44,13 @@ impl UncompressedPoints {
         (self.whole.div_ceil(CHUNK) as usize).max((self.missing > 0) as usize)
     }
 
-    /// Sends the first `records` records of `chunk` through `filter`, with their colours if `rgb` says so.
+    /// Sends the first `records` records of `chunk` through `filter`, with these `fields`.
     pub(crate) fn decode(
         &self,
         file: &RandomAccessFile,
         chunk: usize,
         records: u64,
-        rgb: bool,
+        fields: OptionalFields,
         filter: &mut impl RecordSink,
     ) -> Result<()> {
         let length = self.layout.length;
@@ -60,7 +61,7 @@ impl UncompressedPoints {
             let count = ((block.len() / length) as u64).min(end - number);
             let bytes = &mut block[..count as usize * length];
             file.read_exact_at(bytes, self.points_at + number * length as u64)?;
-            push_records(&self.layout, bytes, number, rgb, filter)?;
+            push_records(&self.layout, bytes, number, fields, filter)?;
             number += count;
         }
         if end == end_of_chunk && chunk + 1 == self.chunk_count() && self.missing > 0 {
@@ -87,11 +88,11 @@ pub(crate) fn push_records(
     layout: &RecordLayout,
     bytes: &[u8],
     number: u64,
-    rgb: bool,
+    fields: OptionalFields,
     filter: &mut impl RecordSink,
 ) -> Result<()> {
     for (number, bytes) in (number..).zip(bytes.chunks_exact(layout.length)) {
-        filter.push(number, &layout.record(bytes, rgb), || format!("point {number}"))?;
+        filter.push(number, &layout.record(bytes, fields), || format!("point {number}"))?;
     }
     Ok(())
 }

@@ -11,7 +11,7 @@ use crate::input::points::record::PointRecord;
 use crate::input::points::record_sink::RecordSink;
 use crate::input::points::rules::PointRules;
 
-/// The most points handed to the sink at once: 384 KiB of them, which stays in the second-level cache.
+/// The most points handed to the sink at once: 448 KiB of them, which stays in the second-level cache.
 const SLICE: usize = 1 << 14;
 
 /// Takes the points of a source, in record order.
@@ -95,7 +95,8 @@ impl RecordSink for PointFilter<'_> {
             [Some((x, round_x)), Some((y, round_y)), Some((z, round_z))] if in_reach(x) && in_reach(y) => {
                 self.counts.rounded_xy += (round_x | round_y | record.rounded[0]) as u64;
                 self.counts.rounded_z += (round_z | record.rounded[1]) as u64;
-                self.keep(Point::new([x, y], z, record.rgb, record.class, self.rules.first_order + number))
+                let point = Point::new([x, y], z, record.rgb, record.class, self.rules.first_order + number);
+                self.keep(point.with_intensity(record.intensity))
             }
             _ => {
                 let (value, name) = self.out_of_reach(record, &mapped);

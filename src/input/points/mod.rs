@@ -3,6 +3,7 @@
 pub(crate) mod axis;
 pub(crate) mod counts;
 pub(crate) mod filter;
+pub(crate) mod optional_fields;
 pub(crate) mod point;
 pub(crate) mod raw_bounds;
 pub(crate) mod record;

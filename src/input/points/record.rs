@@ -5,6 +5,8 @@
 pub(crate) struct PointRecord {
     pub(crate) raw: [i64; 3],
     pub(crate) rgb: [u16; 3],
+    /// The strength of the return; 0 where it is not wanted, or the file does not say.
+    pub(crate) intensity: u16,
     pub(crate) class: u8,
     pub(crate) withheld: bool,
     /// Which return of its pulse it is, from 1; 0 where the file does not say.

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::lattice::AxisMap;
+use crate::input::points::optional_fields::OptionalFields;
 use crate::input::points::raw_bounds::RawBounds;
 
 /// What decoding a source needs to know of the job.
@@ -17,8 +18,8 @@ pub struct PointRules {
     pub bounds: Option<RawBounds>,
     /// The number in the whole job of the source's first record.
     pub first_order: u64,
-    /// Whether the job wants the points' colours. If not, colours are 0 and layered LAZ decodes faster.
-    pub rgb: bool,
+    /// What the job wants of the points besides place and class.
+    pub fields: OptionalFields,
 }
 
 /// Classes are written as the list of the codes that are kept.

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::input::points::optional_fields::OptionalFields;
 use crate::input::text::comment_names::{names_in_comments, texts_of};
 use crate::input::text::decimal_comma::{self, CommaUse, Names};
 use crate::input::text::decimal_sign::{self, DecimalSign};
@@ -15,7 +16,7 @@ use crate::input::text::lines::is_skipped;
 use crate::input::text::names::{NamedColumns, named_columns, truncate};
 use crate::input::text::number::Number;
 use crate::input::text::numbered::are_numbered;
-use crate::input::text::optional_columns::{drop_unreadable_colors, unreadable_class};
+use crate::input::text::optional_columns::{drop_unreadable_colors, unreadable_class, unreadable_intensity};
 use crate::input::text::options::TextOptions;
 use crate::input::text::role::ColumnRole;
 use crate::input::text::row_choice::RowChoice;
@@ -56,6 +57,8 @@ pub(crate) struct Columns {
     pub(crate) strict_classes: bool,
     /// Whether colours are numbers from 0 to 1. Only all rows together show it.
     pub(crate) unit_colors: bool,
+    /// Whether intensities are, likewise.
+    pub(crate) unit_intensity: bool,
     /// Lines that begin with one of these are skipped.
     comments: Vec<String>,
 }
@@ -73,7 +76,7 @@ pub(crate) struct DetectedColumns {
 
 impl Columns {
     /// Finds out how the text in `path` is laid out; `lines` are its first lines. `choice` tells which rows are wanted, and
-    /// whether with their colours.
+    /// what of them.
     pub(crate) fn detect(
         path: &Path,
         lines: &[&[u8]],
@@ -145,7 +148,7 @@ impl Columns {
                     .map_or(Ok(named), |what| Err(bad(what)))?
             }
         };
-        let mut roles = used_roles(found.as_ref(), choice.colors);
+        let mut roles = used_roles(found.as_ref(), choice.fields);
         let delimiter = row_delimiter(&candidates, &roles, data);
         if options.columns.as_ref().is_none_or(|names| data.iter().any(|row| delimiter.has_more_than(names.len(), row)))
         {
@@ -164,10 +167,13 @@ impl Columns {
         warnings.extend(unknown_units(found.as_ref()));
         let named = found.as_ref().filter(|_| options.columns.is_none()).map(|found| found.count);
         warnings.extend(drop_unreadable_colors(delimiter, &mut roles, data));
+        warnings.extend(unreadable_intensity(delimiter, &roles, data));
         truncate(&mut roles);
         let strict_classes = choice.strict_classes;
         warnings.extend(unreadable_class(delimiter, &roles, data).filter(|_| !strict_classes));
-        let columns = Columns { delimiter, roles, named, decimal_comma, strict_classes, unit_colors: false, comments };
+        let (unit_colors, unit_intensity) = (false, false);
+        let columns =
+            Columns { delimiter, roles, named, decimal_comma, strict_classes, unit_colors, unit_intensity, comments };
         Ok(DetectedColumns { columns, header_lines, degrees: found.is_some_and(|found| found.degrees), units })
     }
 
@@ -194,13 +200,15 @@ fn named_by_user(names: &[String]) -> Result<NamedColumns> {
 }
 
 /// Returns what the columns hold that are used. Without names, the first three are x, y and z.
-fn used_roles(found: Option<&NamedColumns>, colors: bool) -> Vec<ColumnRole> {
+fn used_roles(found: Option<&NamedColumns>, fields: OptionalFields) -> Vec<ColumnRole> {
     let mut roles = found.map_or(COORDINATES.to_vec(), |found| found.roles.clone());
-    if !colors {
-        let is_color = |role: &&mut ColumnRole| matches!(role, ColumnRole::Color(_));
-        roles.iter_mut().filter(is_color).for_each(|role| *role = ColumnRole::Skipped);
-        truncate(&mut roles);
-    }
+    let is_unwanted = |role: &&mut ColumnRole| match role {
+        ColumnRole::Color(_) => !fields.rgb,
+        ColumnRole::Intensity => !fields.intensity,
+        _ => false,
+    };
+    roles.iter_mut().filter(is_unwanted).for_each(|role| *role = ColumnRole::Skipped);
+    truncate(&mut roles);
     roles
 }
 

@@ -7,7 +7,7 @@ use crate::input::text::units::{TextUnit, letters};
 pub(crate) type Names = (&'static [&'static str], ColumnRole);
 
 /// Names without case, blanks, points, hyphens and underscores, and without a unit in brackets.
-pub(crate) const NAMES: [Names; 7] = [
+pub(crate) const NAMES: [Names; 8] = [
     (
         &[
             "x",
@@ -87,6 +87,7 @@ pub(crate) const NAMES: [Names; 7] = [
     (&["g", "green"], ColumnRole::Color(1)),
     (&["b", "blue"], ColumnRole::Color(2)),
     (&["class", "classification"], ColumnRole::Class),
+    (&["intensity"], ColumnRole::Intensity),
 ];
 
 /// The names of longitude and latitude.

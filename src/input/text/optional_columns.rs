@@ -1,13 +1,13 @@
-//! Columns of colours and classes: what they hold, and what of them cannot be read. A point is a point without them.
+//! Columns of colours, classes and intensities: what they hold, and what of them cannot be read. A point is a point without them.
 
 use crate::input::text::delimiter::Delimiter;
 use crate::input::text::lines::shown;
 use crate::input::text::number::Number;
 use crate::input::text::role::ColumnRole;
 
-/// Returns the colour that `number` stands for; `None` if no colour is that dark or bright.
+/// Returns the colour or the intensity that `number` stands for; `None` if there is none that is so dark or bright.
 #[inline]
-pub(crate) fn color_of(number: Number, is_unit: bool) -> Option<u16> {
+pub(crate) fn brightness_of(number: Number, is_unit: bool) -> Option<u16> {
     if is_unit {
         return Some((number.value().clamp(0.0, 1.0) * u16::MAX as f64).round() as u16);
     }
@@ -26,7 +26,7 @@ pub(crate) fn class_of(number: Number) -> Option<u8> {
 pub(crate) fn drop_unreadable_colors(delimiter: Delimiter, roles: &mut [ColumnRole], rows: &[&[u8]]) -> Option<String> {
     let is_color = |role: &ColumnRole| matches!(role, ColumnRole::Color(_));
     let bad = |row: &&&[u8]| {
-        let color = |field: &[u8]| Number::parse(field).and_then(|number| color_of(number, false));
+        let color = |field: &[u8]| Number::parse(field).and_then(|number| brightness_of(number, false));
         unreadable(delimiter, roles, row, is_color, |field| color(field).is_some())
     };
     let found: Vec<String> = rows.iter().filter_map(|row| bad(&row)).collect();
@@ -50,6 +50,15 @@ pub(crate) fn unreadable_class(delimiter: Delimiter, roles: &[ColumnRole], rows:
     ))
 }
 
+/// Returns a warning if one of these rows has an intensity that cannot be read.
+pub(crate) fn unreadable_intensity(delimiter: Delimiter, roles: &[ColumnRole], rows: &[&[u8]]) -> Option<String> {
+    let is_intensity = |role: &ColumnRole| *role == ColumnRole::Intensity;
+    let intensity = |field: &[u8]| Number::parse(field).and_then(|number| brightness_of(number, false));
+    let is_readable = |field: &[u8]| intensity(field).is_some();
+    let example = rows.iter().find_map(|row| unreadable(delimiter, roles, row, is_intensity, is_readable))?;
+    Some(format!("some intensities are no numbers from 0 to 65535, such as {example}: they are read as 0"))
+}
+
 /// Returns the first column of `row` with a wanted role that holds something which cannot be read, for a message.
 fn unreadable(
     delimiter: Delimiter,
@@ -66,60 +75,60 @@ fn unreadable(
     columns.find(|(field, _)| !field.is_empty() && !is_readable(field)).map(|(field, _)| shown(field))
 }
 
-/// The colours of rows: from 0 to 1, or whole numbers. A whole text has one scale, and its first rows may be black.
+/// The colours or the intensities of rows: from 0 to 1, or whole numbers. A whole text has one scale, and its first rows may be black.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct ColorScale {
-    /// The number of rows whose colours are from 0 to 1, one of them with decimals.
+pub(crate) struct BrightnessScale {
+    /// The number of rows whose values are from 0 to 1, one of them with decimals.
     from_0_to_1: u64,
-    /// The number of rows with a colour that is not.
+    /// The number of rows with a value that is not.
     others: u64,
 }
 
-/// The colours of one row.
+/// The colours or the intensity of one row.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct RowColors {
+pub(crate) struct RowBrightness {
     is_beyond: bool,
     has_decimals: bool,
 }
 
-impl RowColors {
+impl RowBrightness {
     #[inline]
-    pub(crate) fn see(&mut self, color: &Number) {
-        if color.decimals == 0 {
-            self.is_beyond |= !(0..=1).contains(&color.mantissa);
+    pub(crate) fn see(&mut self, value: &Number) {
+        if value.decimals == 0 {
+            self.is_beyond |= !(0..=1).contains(&value.mantissa);
         } else {
-            let value = color.value();
+            let value = value.value();
             self.is_beyond |= !(0.0..=1.0).contains(&value);
             self.has_decimals |= value.fract() != 0.0;
         }
     }
 }
 
-impl ColorScale {
+impl BrightnessScale {
     #[inline]
-    pub(crate) fn see(&mut self, row: RowColors) {
+    pub(crate) fn see(&mut self, row: RowBrightness) {
         self.from_0_to_1 += (row.has_decimals && !row.is_beyond) as u64;
         self.others += row.is_beyond as u64;
     }
 
-    pub(crate) fn add(&mut self, other: &ColorScale) {
+    pub(crate) fn add(&mut self, other: &BrightnessScale) {
         self.from_0_to_1 += other.from_0_to_1;
         self.others += other.others;
     }
 
-    /// Returns whether most rows say that colours are from 0 to 1.
+    /// Returns whether most rows say that the values are from 0 to 1.
     pub(crate) fn are_from_0_to_1(&self) -> bool {
         self.from_0_to_1 > self.others
     }
 
-    /// Returns a warning if more rows than a few mistakes say otherwise.
-    pub(crate) fn warning(&self) -> Option<String> {
+    /// Returns a warning about the values of this name, in the plural, if more rows than a few mistakes say otherwise.
+    pub(crate) fn warning(&self, name: &str) -> Option<String> {
         const FEW: u64 = 1000;
         let (low, high) = (self.from_0_to_1, self.others);
         let taken = if self.are_from_0_to_1() { "as numbers from 0 to 1" } else { "as whole numbers" };
         (low.min(high) * FEW > low.max(high)).then(|| {
             format!(
-                "its colours are from 0 to 1 in {low} rows, with decimals, and greater or less in {high}: all of them are taken {taken}"
+                "its {name} are from 0 to 1 in {low} rows, with decimals, and greater or less in {high}: all of them are taken {taken}"
             )
         })
     }

@@ -10,8 +10,8 @@ pub struct TextOptions {
     pub delimiter: Option<char>,
     /// Whether the first line names the columns.
     pub header: Option<bool>,
-    /// The names of the columns from left to right, which replace the names of a header. The columns x, y, z are used, and r, g, b
-    /// and class if they are there; all others are skipped.
+    /// The names of the columns from left to right, which replace the names of a header. The columns x, y, z are used, and r, g, b,
+    /// class and intensity if they are there and wanted; all others are skipped.
     pub columns: Option<Vec<String>>,
     /// Lines that begin with this text are skipped. The default is `#` or `//`; an empty text skips no line.
     pub comment: Option<String>,

@@ -11,6 +11,8 @@ pub(crate) enum ColumnRole {
     Color(usize),
     /// The classification.
     Class,
+    /// The strength of the return.
+    Intensity,
     /// Nothing of use.
     Skipped,
 }

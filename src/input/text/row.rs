@@ -8,7 +8,7 @@ use crate::input::text::decimal_sign::{swapped, swapped_in_quotes};
 use crate::input::text::delimiter::Delimiter;
 use crate::input::text::lines::shown;
 use crate::input::text::number::Number;
-use crate::input::text::optional_columns::{RowColors, class_of, color_of};
+use crate::input::text::optional_columns::{RowBrightness, brightness_of, class_of};
 use crate::input::text::role::ColumnRole;
 
 /// Why a line cannot be used. Columns count from 0.
@@ -30,6 +30,7 @@ impl RowError {
                 ColumnRole::Coordinate(axis) => AXIS_NAMES[axis],
                 ColumnRole::Color(channel) => ["red", "green", "blue"][channel],
                 ColumnRole::Class => "class",
+                ColumnRole::Intensity => "intensity",
                 ColumnRole::Skipped => return format!("column {}", column + 1),
             };
             format!("column {} ({name})", column + 1)
@@ -84,8 +85,11 @@ pub(crate) struct RowReader<'a> {
     pub(crate) numbers: [Number; 3],
     rgb: [u16; 3],
     /// What the colours of the last row show.
-    pub(crate) colors: RowColors,
+    pub(crate) colors: RowBrightness,
     class: u8,
+    intensity: u16,
+    /// What the intensity of the last row shows.
+    pub(crate) brightness: RowBrightness,
     /// The last row with points before decimals, if the text has commas there.
     pointed: Vec<u8>,
 }
@@ -93,8 +97,9 @@ pub(crate) struct RowReader<'a> {
 impl<'a> RowReader<'a> {
     /// Returns a reader of rows with these columns.
     pub(crate) fn new(columns: &'a Columns) -> RowReader<'a> {
-        let (numbers, colors) = ([Number::default(); 3], RowColors::default());
-        RowReader { columns, numbers, rgb: [0; 3], colors, class: 0, pointed: Vec::new() }
+        let (numbers, none) = ([Number::default(); 3], RowBrightness::default());
+        let (colors, brightness) = (none, none);
+        RowReader { columns, numbers, rgb: [0; 3], colors, class: 0, intensity: 0, brightness, pointed: Vec::new() }
     }
 
     /// Reads the columns of `line` that are used.
@@ -121,7 +126,8 @@ impl<'a> RowReader<'a> {
     fn read_with_points(&mut self, line: &[u8]) -> Result<(), RowError> {
         let delimiter = self.columns.delimiter;
         let mut rest = Some(line);
-        self.colors = RowColors::default();
+        self.colors = RowBrightness::default();
+        self.brightness = RowBrightness::default();
         for (column, &role) in self.columns.roles.iter().enumerate() {
             let line = rest.ok_or(RowError::Missing { column })?;
             if role == ColumnRole::Skipped {
@@ -139,11 +145,15 @@ impl<'a> RowReader<'a> {
                 // A colour that is none is black, and no reason to lose the point.
                 ColumnRole::Color(channel) => {
                     self.colors.see(&number);
-                    self.rgb[channel] = color_of(number, self.columns.unit_colors).unwrap_or(0);
+                    self.rgb[channel] = brightness_of(number, self.columns.unit_colors).unwrap_or(0);
                 }
                 ColumnRole::Class => {
                     let class = class_of(number).or((!self.columns.strict_classes).then_some(0));
                     self.class = class.ok_or(unexpected("a whole number from 0 to 255"))?;
+                }
+                ColumnRole::Intensity => {
+                    self.brightness.see(&number);
+                    self.intensity = brightness_of(number, self.columns.unit_intensity).unwrap_or(0);
                 }
                 ColumnRole::Skipped => {}
             }
@@ -154,14 +164,14 @@ impl<'a> RowReader<'a> {
         }
     }
 
-    /// Returns 0 for a colour or a class that is not there or cannot be read, and the rest of the line after it.
+    /// Returns 0 for a colour, a class or an intensity that is not there or cannot be read, and the rest of the line after it.
     #[cold]
     fn nothing<'b>(&self, line: &'b [u8], role: ColumnRole) -> Option<(Number, Option<&'b [u8]>)> {
         let (field, rest) = self.columns.delimiter.split(line);
         let is_optional = match role {
             ColumnRole::Coordinate(_) => false,
             ColumnRole::Class => field.is_empty() || !self.columns.strict_classes,
-            ColumnRole::Color(_) | ColumnRole::Skipped => true,
+            ColumnRole::Color(_) | ColumnRole::Intensity | ColumnRole::Skipped => true,
         };
         is_optional.then_some((Number::default(), rest))
     }
@@ -189,7 +199,8 @@ impl<'a> RowReader<'a> {
             raw[axis] = value;
             rounded[axis / 2] |= inexact;
         }
-        PointRecord { raw, rgb: self.rgb, class: self.class, withheld: false, return_number: 0, rounded }
+        let RowReader { rgb, intensity, class, .. } = *self;
+        PointRecord { raw, rgb, intensity, class, withheld: false, return_number: 0, rounded }
     }
 }
 

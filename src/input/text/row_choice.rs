@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::input::points::optional_fields::OptionalFields;
 use crate::input::text::number::Number;
 
 /// How a job has read its texts, as far as the options of `[input]` do not say it. Whoever reads them in the same way finds the same
@@ -10,10 +11,24 @@ use crate::input::text::number::Number;
 pub struct TextReading {
     /// Whether colours were read. If they were, a row without them is malformed.
     pub colors: bool,
+    /// Whether intensities were read, likewise.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub intensity: bool,
     /// Whether rows were left out that lie far from all others.
     pub outliers_left_out: bool,
     /// Whether they were left out of a file too in which such rows are not rare: of a few rows one, or as many as are rare in all files.
     pub even_among_few: bool,
+}
+
+impl TextReading {
+    /// Returns what was read besides place and class.
+    pub fn fields(&self) -> OptionalFields {
+        OptionalFields { rgb: self.colors, intensity: self.intensity }
+    }
+}
+
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 /// Which rows of a text a job wants.
@@ -25,14 +40,14 @@ pub struct RowChoice {
     pub classes: [bool; 256],
     /// Whether the user has said which classes. If not, a class that cannot be read counts as 0.
     pub strict_classes: bool,
-    /// Whether colours are read if the text has them.
-    pub colors: bool,
+    /// What is read besides place and class if the text has it.
+    pub fields: OptionalFields,
 }
 
 impl RowChoice {
     /// Returns the choice of all rows, with their colours.
     pub fn all() -> RowChoice {
-        RowChoice { bounds: None, classes: [true; 256], strict_classes: false, colors: true }
+        RowChoice { bounds: None, classes: [true; 256], strict_classes: false, fields: OptionalFields::RGB }
     }
 
     /// Returns whether every row is wanted.

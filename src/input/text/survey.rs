@@ -9,7 +9,7 @@ use crate::input::text::granularity::Granularity;
 use crate::input::text::lines::{TextLine, for_each_line};
 use crate::input::text::noise;
 use crate::input::text::number::Number;
-use crate::input::text::optional_columns::ColorScale;
+use crate::input::text::optional_columns::BrightnessScale;
 use crate::input::text::row::RowReader;
 use crate::input::text::row_box::RowBox;
 use crate::input::text::row_choice::RowChoice;
@@ -29,7 +29,9 @@ pub(crate) struct Survey {
     /// What the rows hold that the job wants.
     pub(crate) wanted: Findings,
     /// The colours of all rows.
-    pub(crate) colors: ColorScale,
+    pub(crate) colors: BrightnessScale,
+    /// The intensities of all rows.
+    pub(crate) intensities: BrightnessScale,
     /// The number of rows that the job wants, but that lie outside the box in which it looks.
     pub(crate) outliers: u64,
     /// Their box.
@@ -160,7 +162,8 @@ impl Survey {
             rows: 0,
             malformed: 0,
             wanted: Findings::none(),
-            colors: ColorScale::default(),
+            colors: BrightnessScale::default(),
+            intensities: BrightnessScale::default(),
             outliers: 0,
             outlier_box: none,
             others: none,
@@ -183,6 +186,7 @@ impl Survey {
                 TextLine::Whole(line) if columns.skips(line) => return Ok(()),
                 TextLine::Whole(line) if reader.read(line).is_ok() => {
                     survey.colors.see(reader.colors);
+                    survey.intensities.see(reader.brightness);
                     if is_all || wanted.has(&reader) {
                         survey.wanted.see(&reader.numbers);
                     } else {
@@ -208,6 +212,7 @@ impl Survey {
         self.malformed += other.malformed;
         self.wanted.add(&other.wanted);
         self.colors.add(&other.colors);
+        self.intensities.add(&other.intensities);
         self.outliers += other.outliers;
         self.outlier_box.add(&other.outlier_box);
         self.others.add(&other.others);

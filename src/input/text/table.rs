@@ -140,7 +140,9 @@ impl TextTable {
         }
         refuse_tiny(file, &all.wanted)?;
         columns.unit_colors = all.colors.are_from_0_to_1();
-        warnings.extend(all.colors.warning());
+        warnings.extend(all.colors.warning("colours"));
+        columns.unit_intensity = all.intensities.are_from_0_to_1();
+        warnings.extend(all.intensities.warning("intensities"));
         let noisy_chunk = surveys.iter().position(|survey| survey.wanted.noisy > 0);
         let noisy = noisy_chunk.map(|chunk| chunk_range(&rows, chunk as u64));
         warnings.extend(noise_warning(file, &columns, &all.wanted, rows.start, noisy)?);
@@ -291,6 +293,11 @@ impl TextTable {
     /// Returns whether rows have red, green and blue.
     pub(crate) fn has_rgb(&self) -> bool {
         self.columns.have(ColumnRole::Color(0))
+    }
+
+    /// Returns whether rows have an intensity that is wanted.
+    pub(crate) fn has_intensity(&self) -> bool {
+        self.columns.have(ColumnRole::Intensity)
     }
 
     /// Returns whether rows have a classification.

@@ -75,6 +75,11 @@ impl<'a, K: RecordKey> ColumnReader<'a, K> {
         Ok(column)
     }
 
+    /// Returns whether the record has no more columns.
+    pub fn is_at_end(&self) -> bool {
+        self.rest.length == 0
+    }
+
     /// Goes on to the column after the next.
     ///
     /// # Errors

@@ -91,6 +91,11 @@ fn partial_normals(mesh: &HalfEdgeMesh, found: &FinalTriangles, points: &[Point]
         sums: found.half_edges.iter().map(|&start| final_normals_around(mesh, found, points, start)).collect(),
         rgb: sites().map(|point| point.rgb).collect(),
         class: sites().map(|point| point.class).collect(),
+        intensity: if sites().any(|point| point.intensity != 0) {
+            sites().map(|point| point.intensity).collect()
+        } else {
+            Vec::new()
+        },
     }
 }
 

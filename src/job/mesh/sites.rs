@@ -45,10 +45,15 @@ fn keep_one(points: &mut Vec<Point>, rule: Duplicates) -> u64 {
 /// the order of the files does not matter.
 fn preferred(a: &Point, b: &Point, rule: Duplicates) -> bool {
     match rule {
-        Duplicates::Lowest => (a.z, a.class, a.rgb) < (b.z, b.class, b.rgb),
-        Duplicates::Highest => (Reverse(a.z), a.class, a.rgb) < (Reverse(b.z), b.class, b.rgb),
+        Duplicates::Lowest => (a.z, look(a)) < (b.z, look(b)),
+        Duplicates::Highest => (Reverse(a.z), look(a)) < (Reverse(b.z), look(b)),
         Duplicates::First => a.order() < b.order(),
     }
+}
+
+/// Returns what tiles may show of a point besides its place. The intensity comes last: whether it is read does not change the others.
+fn look(point: &Point) -> (u8, [u16; 3], u16) {
+    (point.class, point.rgb, point.intensity)
 }
 
 /// Sorts by y, then x: neighbours in the plane become neighbours in memory, and the pipeline works row by row.

@@ -129,6 +129,10 @@ impl PointFile {
     pub fn append(&self, run: &mut PointRun, points: &[Point], is_last: bool) -> Result<PointBlock> {
         let mut packed = Vec::with_capacity(size_of_val(points) / 2);
         pack(points, Point::columns, &mut packed);
+        // Few jobs read intensities, so they have a column of their own, which other files do not have.
+        if points.iter().any(|point| point.intensity != 0) {
+            pack(points, |point| [point.intensity as u32], &mut packed);
+        }
         let bytes = packed.len() as u64;
         if run.0.end - run.0.start < bytes {
             let length = if is_last { bytes.next_multiple_of(PAGE) } else { bytes.next_multiple_of(RUN) };
@@ -166,9 +170,17 @@ impl PointFile {
     /// # Errors
     /// [`Error::Io`] if they cannot be read.
     pub fn read(&self, block: PointBlock, points: &mut Vec<Point>) -> Result<()> {
-        let packed = self.packed(block)?;
-        let rest = unpack(&packed, block.points as usize, Point::of_columns, points);
+        let (packed, count, first) = (self.packed(block)?, block.points as usize, points.len());
         let damaged = || Error::io("read", &self.path)(io::Error::new(ErrorKind::InvalidData, "a block is damaged"));
+        let rest = unpack(&packed, count, Point::of_columns, points).ok_or_else(damaged)?;
+        if rest.is_empty() {
+            return Ok(());
+        }
+        let mut intensities = Vec::with_capacity(count);
+        let rest = unpack(rest, count, |[intensity]| intensity as u16, &mut intensities);
+        for (point, intensity) in points[first..].iter_mut().zip(intensities) {
+            point.intensity = intensity;
+        }
         if rest.is_some_and(<[u8]>::is_empty) { Ok(()) } else { Err(damaged()) }
     }
 
@@ -247,7 +259,7 @@ mod tests {
             Point::new([most, least], i32::MAX, [u16::MAX, 0, 257], u8::MAX, (1 << 40) - 1),
             Point::new([least, most], i32::MIN, [0, u16::MAX, 256], 0, 0),
             Point::new([0, -1], 0, [1, 2, 3], 2, u32::MAX as u64),
-            Point::new([1, 0], -1, [0; 3], 1, u32::MAX as u64 + 1),
+            Point::new([1, 0], -1, [0; 3], 1, u32::MAX as u64 + 1).with_intensity(u16::MAX),
         ];
         let mut run = PointRun::default();
         let mut blocks = Vec::new();
@@ -279,6 +291,23 @@ mod tests {
         };
         let block = file.append(&mut PointRun::default(), &points(4096, point), false).unwrap();
         assert!(block.bytes < 4096 * 10, "{} bytes", block.bytes);
+    }
+
+    #[test]
+    fn intensities_take_room_only_where_there_are_some() {
+        let (_folder, file) = file();
+        let bytes = |of: fn(u32) -> u16| {
+            let points = points(512, |i| Point::new([i as i32, 7], 3, [0; 3], 2, i as u64).with_intensity(of(i)));
+            let block = file.append(&mut PointRun::default(), &points, true).unwrap();
+            let mut read = Vec::new();
+            file.read(block, &mut read).unwrap();
+            assert_eq!(read, points);
+            block.bytes
+        };
+        let none = bytes(|_| 0);
+        // A column of two groups, each with a head of 6 bytes; the differences take 8 bits in one and no bit in the other.
+        assert_eq!(bytes(|i| i.min(255) as u16), none + 2 * 6 + 256);
+        assert_eq!(bytes(|_| u16::MAX), none + 2 * 6);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use crate::geometry::Bounds;
 use crate::geometry::lattice::AxisMap;
 use crate::input::options::InputOptions;
-use crate::input::{Axis, FileFormat, PointRules, Source};
+use crate::input::{Axis, FileFormat, OptionalFields, PointRules, Source};
 use crate::output::frame::Frame;
 use crate::{Result, interrupt};
 use rayon::prelude::*;
@@ -115,7 +115,13 @@ fn measure(source: &Source, classes: &[bool; 256], chunks: Range<usize>) -> Resu
     let [Some(x), Some(y), Some(z)] = source.axes.each_ref().map(map) else {
         return Ok(Some([source.min, source.max]));
     };
-    let rules = PointRules { maps: [x, y, z], classes: *classes, bounds: None, first_order: 0, rgb: false };
+    let rules = PointRules {
+        maps: [x, y, z],
+        classes: *classes,
+        bounds: None,
+        first_order: 0,
+        fields: OptionalFields::default(),
+    };
     let union = |a: Option<Bounds<3>>, b| a.into_iter().chain(b).reduce(Bounds::union);
     let measure_chunk = |chunk| {
         interrupt::check()?;

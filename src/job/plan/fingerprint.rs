@@ -9,7 +9,7 @@ use crate::output::checksums::Checksum;
 use crate::output::geoid::errors::not_opened;
 use crate::output::geoid::option::HeightOffset;
 use crate::output::geoid::require_file;
-use crate::output::options::{ColorChoice, OutputOptions};
+use crate::output::options::OutputOptions;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -50,7 +50,7 @@ pub struct JobIdentity {
 
 /// Version of the records in the store, of the plan, of the names of results, and of which nodes merge. It changes with every change of these, so that no
 /// run misreads what another version left.
-pub(crate) const LAYOUT: u32 = 16;
+pub(crate) const LAYOUT: u32 = 17;
 
 /// What the results of a job depend on.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -95,8 +95,9 @@ impl Fingerprint {
         let mut mesh = named_values(&options.input, "input", &["files"])?;
         mesh.extend(named_values(&options.triangulation, "triangulation", &["backend"])?);
         // The points' own colours are read only if they are wanted.
-        let own = matches!(options.output.color, ColorChoice::Auto | ColorChoice::Rgb);
-        mesh.insert("[output] color".into(), own.into());
+        mesh.insert("[output] color".into(), options.output.color.may_be_own().into());
+        // So are intensities. Classes are always read.
+        mesh.insert("[output] attributes".into(), options.output.attributes.intensity.into());
         Ok(Fingerprint {
             program: format!("gdt-batch {}, layout {LAYOUT}, {order}", env!("CARGO_PKG_VERSION")),
             mesh,

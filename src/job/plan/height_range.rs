@@ -3,7 +3,7 @@
 //! One point of noise, or a header with a wrong greatest height, must not give all of a terrain one colour. So a sample of the points
 //! decides. It is the same for a job of one part and of several, whose tiles are coloured before the last point is read.
 
-use crate::input::{PointRules, Source};
+use crate::input::{OptionalFields, PointRules, Source};
 use crate::output::color::HeightRange;
 use crate::{Result, interrupt};
 use rayon::prelude::*;
@@ -94,7 +94,7 @@ fn may_reach(source: &Source, bounds: Option<[f64; 4]>) -> bool {
 
 /// Returns the heights of the points that the job keeps among the first `records` records of a chunk, and the number of these records.
 fn first_heights(source: &Source, rules: &PointRules, chunk: usize, records: u64) -> Result<(Vec<i32>, u64)> {
-    let rules = PointRules { rgb: false, ..rules.clone() };
+    let rules = PointRules { fields: OptionalFields::default(), ..rules.clone() };
     let mut heights = Vec::new();
     let counts = source.decode_start(chunk, records, &rules, &mut |points| {
         heights.extend(points.iter().map(|point| point.z));

@@ -9,6 +9,7 @@ use crate::job::durable::atomic_file::{PendingFile, write_pending};
 use crate::job::options::JobOptions;
 use crate::job::plan::input_identity::RenamedInputs;
 use crate::job::plan::lattice_choice::LatticeCoarsening;
+use crate::job::plan::missing_attributes::missing_attributes;
 use crate::output::color::HeightRange;
 use crate::output::frame::Frame;
 use crate::{Error, Result, Warnings};
@@ -113,6 +114,8 @@ impl Plan {
     pub fn all_warnings(&self) -> Warnings {
         let mut warnings = self.options.warnings.clone();
         warnings.extend(self.warnings.clone());
+        let sources = self.inputs.iter().map(|input| &input.source);
+        warnings.extend(missing_attributes(sources, self.options.output.attributes));
         warnings
     }
 

@@ -13,7 +13,7 @@ use crate::job::plan::job_plan::{Claims, Plan, PlannedInput, SkippedInput};
 use crate::job::plan::lattice_choice::{LatticeCoarsening, LatticeWish, choose_lattice, fineness};
 use crate::job::plan::text_inputs::{
     check_malformed_rows, farthest_row, leave_out_outliers, refuse_degrees, refuse_missing_classes, row_choice,
-    wants_colors,
+    wanted_fields,
 };
 use crate::output::color::HeightRange;
 use crate::output::frame::Frame;
@@ -175,7 +175,7 @@ fn claims(
     };
     let first_colors = |(source, rules): (&Source, &PointRules)| match source.chunks() {
         0 => Ok(0),
-        _ if !rules.rgb || !source.has_rgb => Ok(0),
+        _ if !rules.fields.rgb || !source.has_rgb => Ok(0),
         _ => source.decode(0, rules, &mut |_| Ok(())).map(|counts| counts.max_rgb),
     };
     let max_rgb = sources.par_iter().zip(rules).map(first_colors).try_reduce(|| 0, |a, b| Ok(a.max(b)))?;
@@ -237,14 +237,14 @@ fn lattice_extent(lattice: &Lattice, extent: &Extent, clip: Option<Bounds<2>>) -
 }
 
 fn point_rules(sources: &[Source], options: &JobOptions, lattice: &Lattice) -> Result<Vec<PointRules>> {
-    let rgb = wants_colors(options);
+    let fields = wanted_fields(options);
     let classes = options.input.kept_classes();
     let mut first_order = 0;
     let mut rules = Vec::with_capacity(sources.len());
     for source in sources {
         let maps = [axis_map(source, 0, lattice)?, axis_map(source, 1, lattice)?, axis_map(source, 2, lattice)?];
         let bounds = options.input.bounds.and_then(|bounds| source.raw_bounds(bounds.0));
-        rules.push(PointRules { maps, classes, bounds, first_order, rgb });
+        rules.push(PointRules { maps, classes, bounds, first_order, fields });
         first_order += source.records;
     }
     Ok(rules)

@@ -12,5 +12,6 @@ pub mod inputs;
 pub mod job_plan;
 pub mod lattice_choice;
 pub mod make_plan;
+mod missing_attributes;
 pub mod no_points;
 pub(crate) mod text_inputs;

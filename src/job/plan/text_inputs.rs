@@ -1,32 +1,36 @@
 //! What the plan knows of texts, which are read once before it is made: rows that nobody wants, mistakes, degrees.
 
 use crate::input::options::{InputOptions, OnBadFile, UnitChoice};
-use crate::input::{CrsChoice, FileFormat, Outliers, PointCounts, PointRules, RowChoice, Source, TextReading, Unit};
+use crate::input::{
+    CrsChoice, FileFormat, OptionalFields, Outliers, PointCounts, PointRules, RowChoice, Source, TextReading, Unit,
+};
 use crate::job::options::JobOptions;
 use crate::job::plan::extent::Extent;
 use crate::job::plan::job_plan::Plan;
-use crate::output::options::ColorChoice;
 use crate::{Error, Result, interrupt};
 use rayon::prelude::*;
 
 /// Returns which rows of a text the job wants.
 pub(crate) fn row_choice(options: &JobOptions) -> RowChoice {
-    options.input.row_choice(wants_colors(options))
+    options.input.row_choice(wanted_fields(options))
 }
 
 /// Returns how the texts of a plan are read.
 pub(crate) fn text_reading(plan: &Plan) -> TextReading {
     let sources = || plan.inputs.iter().map(|input| &input.source);
+    let OptionalFields { rgb, intensity } = wanted_fields(&plan.options);
     TextReading {
-        colors: wants_colors(&plan.options),
+        colors: rgb,
+        intensity,
         outliers_left_out: sources().any(|source| source.outliers() > 0),
         even_among_few: sources().any(Source::has_frequent_outliers),
     }
 }
 
-/// Returns whether the job wants the points' own colours.
-pub(crate) fn wants_colors(options: &JobOptions) -> bool {
-    matches!(options.output.color, ColorChoice::Auto | ColorChoice::Rgb)
+/// Returns what the job wants of points besides place and class.
+pub(crate) fn wanted_fields(options: &JobOptions) -> OptionalFields {
+    let output = &options.output;
+    OptionalFields { rgb: output.color.may_be_own(), intensity: output.attributes.intensity }
 }
 
 /// Fails if the columns of a text are longitude and latitude, unless the user says that they are not.

@@ -9,7 +9,8 @@ use crate::job::plan::budget::{BYTES_PER_LEAF_SITE, read_buffer_memory};
 use crate::job::plan::job_plan::Plan;
 use crate::job::preflight::kept_points::KeptPoints;
 use crate::output::Compression;
-use crate::output::options::MaxEdge;
+use crate::output::attributes::AttributeChoice;
+use crate::output::options::{MaxEdge, OutputOptions};
 use crate::output::preview::canvas::{LONGER_SIDE, PreviewPixel};
 use std::path::PathBuf;
 
@@ -26,13 +27,17 @@ const PIXELS: u64 = LONGER_SIDE * LONGER_SIDE;
 /// Bytes that a process takes before it has done anything.
 const PROCESS_MEMORY: u64 = 64 << 20;
 
-/// Returns the bytes of results for a site: position, normal, colour and two triangles with 16-bit corners.
-fn result_per_site(compression: Compression) -> u64 {
+/// Bytes that an intensity takes, packed as the values of points are.
+const PACKED_INTENSITY: u64 = 2;
+
+/// Returns the bytes of results for a site: position, normal, colour, these attributes and two triangles with 16-bit corners.
+fn result_per_site(compression: Compression, attributes: AttributeChoice) -> u64 {
+    let count = u64::from(attributes.classification) + u64::from(attributes.intensity);
     match compression {
-        Compression::None => 12 + 12 + 8 + 2 * 6,
-        Compression::Quantized => 8 + 4 + 4 + 2 * 6,
+        Compression::None => 12 + 12 + 8 + 2 * 6 + count * 4,
+        Compression::Quantized => 8 + 4 + 4 + 2 * 6 + count * 4,
         // What it takes for dense clouds, and half as much again for others.
-        Compression::Meshopt => 15,
+        Compression::Meshopt => 15 + count * 2,
     }
 }
 
@@ -54,10 +59,11 @@ impl DiskEstimate {
     pub(crate) fn of(plan: &Plan, kept: KeptPoints, max_one_file: u64) -> DiskEstimate {
         let (points, tiles) = (kept.0, tiles(plan, kept));
         let options = &plan.options;
-        let (point_file, leaves) = (points * BYTES_PER_POINT, points * STORE_PER_SITE);
+        let intensity = if options.output.attributes.intensity { PACKED_INTENSITY } else { 0 };
+        let (point_file, leaves) = (points * (BYTES_PER_POINT + intensity), points * (STORE_PER_SITE + intensity));
         let border = border_bytes(points, options.triangulation.max_points_per_tile.0, tiles);
         let store = leaves + border;
-        let results = result_bytes(points, tiles, options.output.packing(), max_one_file);
+        let results = result_bytes(points, tiles, &options.output, max_one_file);
         if plan.is_one_part() && options.limits.keep_steps.keeps(points) {
             // The points may go before the results come.
             return DiskEstimate {
@@ -103,11 +109,12 @@ fn border_bytes(points: u64, per_tile: u64, tiles: u64) -> u64 {
     border_sites * STORE_PER_BORDER_SITE + PIXELS * size_of::<PreviewPixel>() as u64
 }
 
-fn result_bytes(points: u64, tiles: u64, compression: Compression, max_one_file: u64) -> u64 {
-    let in_tiles = points * result_per_site(compression) + tiles * RESULT_PER_TILE;
+fn result_bytes(points: u64, tiles: u64, output: &OutputOptions, max_one_file: u64) -> u64 {
+    let (compression, attributes) = (output.packing(), output.attributes);
+    let in_tiles = points * result_per_site(compression, attributes) + tiles * RESULT_PER_TILE;
     // terrain.glb is never packed with meshopt.
     let unpacked = if compression == Compression::None { Compression::None } else { Compression::Quantized };
-    let in_one_file = if 2 * points <= max_one_file { points * result_per_site(unpacked) } else { 0 };
+    let in_one_file = if 2 * points <= max_one_file { points * result_per_site(unpacked, attributes) } else { 0 };
     // Levels add about a third.
     in_tiles + in_one_file + in_tiles / 2 + 4 * PIXELS
 }

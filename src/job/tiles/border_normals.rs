@@ -38,7 +38,7 @@ pub fn finished_border(
     seam: &[SeamTriangle],
 ) -> Result<FinishedBorder> {
     let frontier = Frontier::load(store, tree.leaf(tile))?;
-    let PartialNormals { mut sums, rgb, class } = PartialNormals::load(store, tile)?;
+    let PartialNormals { mut sums, rgb, class, intensity } = PartialNormals::load(store, tile)?;
     if !style.max_edge.keeps_all() {
         sums = sums_of_kept(store, tile, &frontier, style)?;
     }
@@ -58,7 +58,7 @@ pub fn finished_border(
         rgb: rgb[at],
         class: class[at] as u16,
     };
-    Ok(FinishedBorder(frontier.sites.iter().enumerate().map(finish).collect()))
+    Ok(FinishedBorder { vertices: frontier.sites.iter().enumerate().map(finish).collect(), intensity })
 }
 
 /// Returns the other tiles at corners of the triangles that `tile` owns.

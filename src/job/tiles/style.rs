@@ -4,9 +4,10 @@ use crate::geometry::Bounds;
 use crate::job::plan::job_plan::Plan;
 use crate::job::tiles::max_edge::MaxEdgeRule;
 use crate::output::Compression;
+use crate::output::attributes::AttributeChoice;
 use crate::output::color::{Coloring, HeightRange};
 use crate::output::frame::Frame;
-use crate::output::options::ColorChoice;
+use crate::output::options::{ColorChoice, OutputOptions};
 
 /// How tiles look.
 #[derive(Debug)]
@@ -15,6 +16,8 @@ pub struct TileStyle {
     pub frame: Frame,
     /// Where colours come from; `None` for no colours.
     pub coloring: Option<Coloring>,
+    /// What vertices carry of their points.
+    pub attributes: AttributeChoice,
     /// Whether vertices carry normals.
     pub normals: bool,
     /// How tiles are packed.
@@ -43,6 +46,7 @@ impl TileStyle {
             _ => plan.frame.clone().packed(),
         };
         let copyright = output.copyright().map(str::to_owned);
-        TileStyle { frame, coloring, normals: output.normals, compression, max_edge, copyright }
+        let OutputOptions { attributes, normals, .. } = *output;
+        TileStyle { frame, coloring, attributes, normals, compression, max_edge, copyright }
     }
 }

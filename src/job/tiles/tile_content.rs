@@ -5,6 +5,7 @@ use crate::job::records::{BorderVertex, FinishedBorder, Leaf, SeamTriangle};
 use crate::job::tiles::style::TileStyle;
 use crate::mesh::index::SiteIndex;
 use crate::output::Tile;
+use crate::output::attributes::PointAttributes;
 use crate::output::normals::NormalSums;
 use crate::{Error, Result};
 use std::collections::HashMap;
@@ -15,6 +16,7 @@ pub(crate) struct TileContent {
     positions: Vec<[i32; 3]>,
     normals: Vec<[f32; 3]>,
     colors: Vec<[u16; 3]>,
+    attributes: PointAttributes,
     triangles: Vec<[u32; 3]>,
     /// Triangles that are left out.
     cut: Vec<[u32; 3]>,
@@ -25,14 +27,23 @@ impl TileContent {
     pub(crate) fn of_leaf(mut leaf: Leaf, border: &FinishedBorder, style: &TileStyle) -> TileContent {
         let cut = style.max_edge.take(&leaf.positions, &mut leaf.triangles);
         let mut normals = NormalSums::new(&leaf.positions, &leaf.triangles).unit_normals(&style.frame);
-        for vertex in &border.0 {
+        for vertex in &border.vertices {
             normals[vertex.site.get()] = vertex.normal;
         }
         let colors = match &style.coloring {
             Some(coloring) => coloring.colors(&leaf.positions, &leaf.rgb, &leaf.class),
             None => Vec::new(),
         };
-        TileContent { positions: leaf.positions, normals, colors, triangles: leaf.triangles, cut }
+        let Leaf { positions, class, mut intensity, triangles, .. } = leaf;
+        let attributes = PointAttributes {
+            classification: style.attributes.classification.then_some(class),
+            intensity: style.attributes.intensity.then(|| {
+                // A record has none if all are 0.
+                intensity.resize(positions.len(), 0);
+                intensity
+            }),
+        };
+        TileContent { positions, normals, colors, attributes, triangles, cut }
     }
 
     /// Adds the triangles of the seam that `tile` owns, with the vertices that belong to neighbours. Returns the number of triangles
@@ -72,7 +83,7 @@ impl TileContent {
         neighbours: &mut NeighbourBorders,
         style: &TileStyle,
     ) -> Result<u32> {
-        let vertex = neighbours.of(border.tile)?.find(border.site).ok_or_else(|| {
+        let (vertex, intensity) = neighbours.of(border.tile)?.find(border.site).ok_or_else(|| {
             Error::Broken(format!(
                 "a seam uses site {} of tile {}, whose border does not have it",
                 border.site.0, border.tile
@@ -83,6 +94,7 @@ impl TileContent {
         if let Some(coloring) = &style.coloring {
             self.colors.push(coloring.color(border.position[2], vertex.rgb, vertex.class as u8));
         }
+        self.attributes.push(vertex.class as u8, intensity);
         Ok(self.positions.len() as u32 - 1)
     }
 
@@ -102,6 +114,7 @@ impl TileContent {
             positions: self.positions,
             normals: style.normals.then_some(self.normals),
             colors: style.coloring.map(|_| self.colors),
+            attributes: self.attributes,
             triangles: self.triangles,
         }
     }
@@ -113,6 +126,8 @@ impl TileContent {
         keep(&mut self.positions, used);
         keep(&mut self.normals, used);
         keep(&mut self.colors, used);
+        self.attributes.classification.iter_mut().for_each(|classes| keep(classes, used));
+        self.attributes.intensity.iter_mut().for_each(|intensities| keep(intensities, used));
     }
 }
 

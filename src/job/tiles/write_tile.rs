@@ -69,7 +69,9 @@ pub fn write_tile(
         cut_triangles: left_out.triangles.len() as u64,
         ..TileStats::default()
     };
-    let pixels = ColumnWriter::default().push(&canvas.draw(&kept)?).write(store, StepRecord::Pixels(tile))?;
+    let mut pixels = canvas.draw(&kept)?;
+    pixels.extend(canvas.dots(&kept, pixels.len()));
+    let pixels = ColumnWriter::default().push(&pixels).write(store, StepRecord::Pixels(tile))?;
     let vertices = if kept.triangles.is_empty() { 0 } else { kept.positions.len() };
     let summary = TileSummary::new(kept.bounds(), vertices).save(store, tile)?;
     let mut files = Vec::new();

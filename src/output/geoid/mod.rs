@@ -54,10 +54,16 @@ impl Geoid {
     pub fn at(&self, longitude: f64, latitude: f64) -> Result<f64, Error> {
         let Source::Model { name, grid, values } = &self.0 else { return Ok(self.metres()) };
         grid.interpolate(longitude, latitude, &**values)?.ok_or_else(|| {
+            let (why, remedy) = match grid.covers(longitude, latitude) {
+                true => (
+                    ": it covers the place, but a node beside it has NaN, the value for no height, or more than a kilometre".into(),
+                    "repair the grid, or take another one",
+                ),
+                false => (grid.extent(), "take a grid that covers the terrain"),
+            };
             refused(&format!(
-                "{name} has no height at longitude {longitude:.5}, latitude {latitude:.5}, where the terrain is{}; take a grid that \
-                 covers the terrain, \"egm96\" or a number of metres",
-                grid.extent()
+                "{name} has no height at longitude {longitude:.5}, latitude {latitude:.5}, where the terrain is{why}; {remedy}, \
+                 \"egm96\" or a number of metres"
             ))
         })
     }

@@ -75,6 +75,11 @@ impl NodeGrid {
         Ok(Some(sum))
     }
 
+    /// Tells whether a place is between nodes.
+    pub(super) fn covers(&self, longitude: f64, latitude: f64) -> bool {
+        self.cell(longitude, latitude).is_some()
+    }
+
     /// Returns the south-western node of the cell around a place, and how far from there the place is in steps.
     fn cell(&self, longitude: f64, latitude: f64) -> Option<([u64; 2], [f64; 2])> {
         if !longitude.is_finite() || !latitude.is_finite() {

@@ -16,6 +16,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 use serde_json::{Map, Number, Value, json};
 
+use crate::output::gltf::metadata;
+
 /// A decoded value, or a sentence that says what is wrong with the file.
 pub(crate) type Decoded<T> = Result<T, String>;
 
@@ -62,7 +64,8 @@ impl RawDocument<'_> {
         self.nodes.iter().map(|text| named("node", text, node(text.get())))
     }
 
-    /// Returns all meshes. Their primitives have positions and indices, and may have normals, colours and a material.
+    /// Returns all meshes. Their primitives have positions and indices, and may have normals, colours, attributes of points and
+    /// a material.
     pub(crate) fn meshes(&self) -> impl Iterator<Item = Decoded<Mesh>> {
         self.meshes.iter().map(|text| named("mesh", text, mesh(text.get())))
     }
@@ -158,16 +161,29 @@ fn check_primitive(primitive: &Primitive) -> Decoded<()> {
         indices: Some(_),
         material: _,
         mode: Checked::Valid(Mode::Triangles),
-        extensions: None,
+        extensions,
         extras: None,
         targets: None,
     } = primitive
     else {
         return Err("a primitive has no indices, or more than triangles and a material".into());
     };
-    let is_known = |semantic: &Checked<Semantic>| {
-        matches!(semantic, Checked::Valid(Semantic::Positions | Semantic::Normals | Semantic::Colors(0)))
+    let of_points = [metadata::classification(), metadata::intensity()];
+    let is_of_point = |semantic: &Semantic| of_points.contains(semantic);
+    let is_known = |semantic: &Checked<Semantic>| match semantic {
+        Checked::Valid(Semantic::Positions | Semantic::Normals | Semantic::Colors(0)) => true,
+        Checked::Valid(other) => is_of_point(other),
+        Checked::Invalid => false,
     };
+    let describes_points = match extensions {
+        None => false,
+        Some(said) if said.others == metadata::of_primitive().others => true,
+        Some(_) => return Err("the extensions of a primitive are not of this program".into()),
+    };
+    let has_of_points = of_points.iter().any(|semantic| attributes.contains_key(&Checked::Valid(semantic.clone())));
+    if describes_points != has_of_points {
+        return Err("the attributes of points are not described, or are not there".into());
+    }
     match attributes.keys().find(|semantic| !is_known(semantic)) {
         Some(semantic) => Err(format!("unknown attribute {}", semantic.to_string())),
         None if !attributes.contains_key(&Checked::Valid(Semantic::Positions)) => Err("there are no positions".into()),
@@ -358,6 +374,15 @@ mod tests {
         refused(primitive(r#""attributes":{"POSITION":0,"POSITION":1},"indices":1"#), "said twice");
         refused(primitive(r#""attributes":{"POSITION":0,"COLOR_00":1},"indices":1"#), "COLOR_00");
         refused(primitive(r#""attributes":{"POSITION":0,"TEXCOORD_0":1},"indices":1"#), "TEXCOORD_0");
+        refused(primitive(r#""attributes":{"POSITION":0,"_NAME":1},"indices":1"#), "_NAME");
+        let described = |attribute: &str, numbers: &str| {
+            let said = format!(r#""extensions":{{"EXT_structural_metadata":{{"propertyAttributes":[{numbers}]}}}}"#);
+            primitive(&format!(r#""attributes":{{"POSITION":0,"{attribute}":1}},"indices":1,{said}"#))
+        };
+        described("_INTENSITY", "0").unwrap();
+        refused(described("_INTENSITY", "1"), "not of this program");
+        refused(described("NORMAL", "0"), "not described, or are not there");
+        refused(primitive(r#""attributes":{"POSITION":0,"_INTENSITY":1},"indices":1"#), "not described");
         refused(primitive(r#""attributes":{"NORMAL":0},"indices":1"#), "no positions");
         refused(primitive(r#""attributes":{"POSITION":0}"#), "no indices");
         refused(primitive(r#""attributes":{"POSITION":0},"indices":1,"mode":1"#), "more than triangles");

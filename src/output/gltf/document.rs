@@ -5,7 +5,7 @@ use gltf::json::accessor::{Accessor, ComponentType, GenericComponentType, Type};
 use gltf::json::buffer::{Buffer, Stride, Target, View};
 use gltf::json::mesh::{Mesh, Primitive, Semantic};
 use gltf::json::scene::{Node, Scene};
-use gltf::json::validation::Checked::Valid;
+use gltf::json::validation::Checked::{self, Valid};
 use gltf::json::validation::USize64;
 use gltf::json::{Asset, Index, Root};
 use multiversion::multiversion;
@@ -13,14 +13,17 @@ use serde_json::json;
 
 use crate::geometry::Bounds;
 use crate::mesh::triangle_order::ascending;
+use crate::output::attributes::{AttributeChoice, PointAttributes};
 use crate::output::color::LinearRgb;
 use crate::output::compression::Compression;
 use crate::output::frame::Frame;
+use crate::output::gltf::element_type::ElementType;
 use crate::output::gltf::encoding::{
     EXPONENTIAL_REACH, color_bytes, exponential, long_octahedron, needs_long_normals, normal_bytes,
     normal_long_octahedral, normal_octahedral, normal_shorts,
 };
 use crate::output::gltf::meshopt::{PackedFilter, PackedMode, PackedView, fallback_buffer};
+use crate::output::gltf::metadata::{self, METADATA};
 use crate::output::gltf::parts::SplitPart;
 use crate::output::gltf::schema::{GENERATOR, MESHOPT, QUANTIZATION, to_text};
 use crate::output::gltf::vertex_order::order_vertices;
@@ -31,12 +34,17 @@ const STORED: u32 = 0;
 /// The buffer of the unpacked data, which no file holds.
 const UNPACKED: u32 = 1;
 
+/// What a vertex attribute is, and the accessor that has its values.
+type VertexAttribute = (Checked<Semantic>, Index<Accessor>);
+
 /// A document and its binary chunk while they are put together.
 pub(crate) struct DocumentBuilder<'a> {
     frame: &'a Frame,
     compression: Compression,
     root: Root,
     colored: bool,
+    /// What vertices carry of their points.
+    attributes: AttributeChoice,
     /// The binary chunk; its length is a multiple of 4.
     binary: Vec<u8>,
     /// The length of the buffer of the unpacked data in bytes, a multiple of 4.
@@ -47,7 +55,8 @@ impl<'a> DocumentBuilder<'a> {
     /// Returns a builder without parts. It takes over the memory of `binary`, not its content.
     pub(crate) fn new(frame: &'a Frame, compression: Compression, mut binary: Vec<u8>) -> DocumentBuilder<'a> {
         binary.clear();
-        DocumentBuilder { frame, compression, root: Root::default(), colored: false, binary, unpacked: 0 }
+        let attributes = AttributeChoice::default();
+        DocumentBuilder { frame, compression, root: Root::default(), colored: false, attributes, binary, unpacked: 0 }
     }
 
     /// Appends a node, its mesh and the data of both.
@@ -70,11 +79,13 @@ impl<'a> DocumentBuilder<'a> {
             attributes.push((Valid(Semantic::Colors(0)), self.add_colors(colors, order)?));
             self.colored = true;
         }
+        self.attributes = tile.attributes.choice();
+        attributes.extend(self.add_point_attributes(&tile.attributes, order)?);
         let primitive = Primitive {
             attributes: attributes.into_iter().collect(),
             indices: Some(self.add_triangles(&triangles, tile.positions.len())?),
             material: Some(Index::new(0)),
-            extensions: None,
+            extensions: (!self.attributes.is_none()).then(metadata::of_primitive),
             extras: None,
             mode: Default::default(),
             targets: None,
@@ -149,6 +160,22 @@ impl<'a> DocumentBuilder<'a> {
         self.add_attribute(colors, order, color_bytes, ElementType::normalized(ComponentType::U8, Type::Vec4))
     }
 
+    /// Appends what the vertices carry of their points. Each element takes four bytes: glTF wants vertex attributes aligned to them.
+    fn add_point_attributes(&mut self, all: &PointAttributes, order: Option<&[u32]>) -> Result<Vec<VertexAttribute>> {
+        let mut added = Vec::new();
+        if let Some(classes) = &all.classification {
+            let element = ElementType::new(ComponentType::U8, Type::Scalar);
+            let accessor = self.add_attribute(classes, order, |class| [class, 0, 0, 0], element)?;
+            added.push((Valid(metadata::classification()), accessor));
+        }
+        if let Some(intensities) = &all.intensity {
+            let element = ElementType::new(ComponentType::U16, Type::Scalar);
+            let accessor = self.add_attribute(intensities, order, |intensity| [intensity, 0], element)?;
+            added.push((Valid(metadata::intensity()), accessor));
+        }
+        Ok(added)
+    }
+
     /// Appends an accessor and a buffer view of the vertices' `values`, converted, in this `order` of vertices if there is one.
     fn add_attribute<T: Copy, B: Pod>(
         &mut self,
@@ -171,7 +198,8 @@ impl<'a> DocumentBuilder<'a> {
             }
         };
         view.target = Some(Valid(Target::ArrayBuffer));
-        view.byte_stride = (self.compression != Compression::None).then_some(Stride(size_of::<B>()));
+        let is_padded = size_of::<B>() != element.size();
+        view.byte_stride = (is_padded || self.compression != Compression::None).then_some(Stride(size_of::<B>()));
         Ok(self.add_accessor(view, count, element))
     }
 
@@ -257,10 +285,18 @@ impl<'a> DocumentBuilder<'a> {
         if !self.root.nodes.is_empty() {
             self.add_buffers();
         }
-        Ok((to_text(&self.root, self.colored)?, self.binary))
+        let mut text = to_text(&self.root, self.colored)?;
+        if self.root.extensions.is_some() {
+            metadata::align_text(&mut text);
+        }
+        Ok((text, self.binary))
     }
 
     fn add_buffers(&mut self) {
+        self.root.extensions = metadata::of_document(self.attributes);
+        if self.root.extensions.is_some() {
+            self.binary.resize(self.binary.len().next_multiple_of(metadata::ALIGNMENT), 0);
+        }
         self.root.push(buffer(self.binary.len() as u64));
         let extensions: &[&str] = match self.compression {
             Compression::None => &[],
@@ -270,37 +306,12 @@ impl<'a> DocumentBuilder<'a> {
                 &[QUANTIZATION, MESHOPT]
             }
         };
-        self.root.extensions_used = extensions.iter().map(|name| name.to_string()).collect();
-        self.root.extensions_required = self.root.extensions_used.clone();
-    }
-}
-
-/// What the elements of an accessor are.
-#[derive(Clone, Copy)]
-struct ElementType {
-    component: ComponentType,
-    shape: Type,
-    normalized: bool,
-    /// The least and the greatest element, component by component.
-    bounds: Option<[[f32; 3]; 2]>,
-    filter: Option<PackedFilter>,
-}
-
-impl ElementType {
-    fn new(component: ComponentType, shape: Type) -> ElementType {
-        ElementType { component, shape, normalized: false, bounds: None, filter: None }
-    }
-
-    fn normalized(component: ComponentType, shape: Type) -> ElementType {
-        ElementType { normalized: true, ..ElementType::new(component, shape) }
-    }
-
-    fn position(bounds: [[f32; 3]; 2]) -> ElementType {
-        ElementType { bounds: Some(bounds), ..ElementType::new(ComponentType::F32, Type::Vec3) }
-    }
-
-    fn filtered(self, filter: PackedFilter) -> ElementType {
-        ElementType { filter: Some(filter), ..self }
+        self.root.extensions_required = extensions.iter().map(|name| name.to_string()).collect();
+        self.root.extensions_used = self.root.extensions_required.clone();
+        if self.root.extensions.is_some() {
+            // Viewers that do not know it show the terrain all the same.
+            self.root.extensions_used.push(METADATA.into());
+        }
     }
 }
 

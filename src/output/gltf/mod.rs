@@ -3,9 +3,11 @@
 pub(crate) mod check_json;
 pub(crate) mod container;
 pub(crate) mod document;
+pub(crate) mod element_type;
 pub mod encoding;
 pub mod glb;
 pub(crate) mod meshopt;
+pub(crate) mod metadata;
 pub mod one_file;
 pub(crate) mod parts;
 pub mod read;

@@ -11,9 +11,11 @@ use gltf::json::validation::{Checked::Valid, USize64};
 use gltf::json::{Index, Root};
 
 use crate::disk::WriteFrom;
+use crate::output::attributes::AttributeChoice;
 use crate::output::gltf::check_json::{Decoded, RawDocument};
 use crate::output::gltf::container::{GlbFile, write_head};
 use crate::output::gltf::document::{asset, buffer};
+use crate::output::gltf::metadata::{self, METADATA};
 use crate::output::gltf::schema::{QUANTIZATION, to_text};
 use crate::output::gltf::stored_view::StoredView;
 use crate::{Error, Result, disk, interrupt};
@@ -31,8 +33,9 @@ pub fn write_terrain(out: &Path, tiles: &[PathBuf], copyright: Option<&str>) -> 
         joined.add(path, &file.document(path)?).map_err(|what| not_a_tile(path, what))?;
     }
     let length = joined.length;
+    let (text, padding) = joined.finish(copyright)?;
     let mut head = Vec::new();
-    write_head(joined.finish(copyright)?, length, &mut head)?;
+    write_head(text, length + padding.len() as u64, &mut head)?;
     let file = disk::create(out).map_err(Error::io("create", out))?;
     let mut file = BufWriter::with_capacity(1 << 20, WriteFrom { file: &file, at: 0 });
     file.write_all(&head).map_err(Error::io("write", out))?;
@@ -44,7 +47,7 @@ pub fn write_terrain(out: &Path, tiles: &[PathBuf], copyright: Option<&str>) -> 
     if written != length {
         return Err(Error::input(out, "the tiles changed while they were joined"));
     }
-    file.flush().map_err(Error::io("write", out))
+    file.write_all(padding).and_then(|()| file.flush()).map_err(Error::io("write", out))
 }
 
 fn not_a_tile(path: &Path, what: String) -> Error {
@@ -79,6 +82,7 @@ struct JoinedDocument {
     scene: Option<Scene>,
     colored: bool,
     quantized: bool,
+    attributes: AttributeChoice,
     /// Bytes of the binary chunk.
     length: u64,
 }
@@ -104,7 +108,10 @@ impl JoinedDocument {
             for primitive in &mut mesh.primitives {
                 primitive.indices.as_mut().map_or(Ok(()), |indices| accessor_numbers.shift(indices))?;
                 primitive.attributes.values_mut().try_for_each(|accessor| accessor_numbers.shift(accessor))?;
-                self.colored |= primitive.attributes.contains_key(&Valid(Semantic::Colors(0)));
+                let has = |semantic| primitive.attributes.contains_key(&Valid(semantic));
+                self.colored |= has(Semantic::Colors(0));
+                let (classification, intensity) = (has(metadata::classification()), has(metadata::intensity()));
+                self.attributes = self.attributes.or(AttributeChoice { classification, intensity });
             }
             self.root.push(mesh);
         }
@@ -130,19 +137,30 @@ impl JoinedDocument {
         Ok(View { buffer: Index::new(0), byte_offset, byte_length, extensions: None, ..view })
     }
 
-    /// Returns the JSON text.
-    fn finish(mut self, copyright: Option<&str>) -> Result<Vec<u8>> {
+    /// Returns the JSON text, and what follows the data in the binary chunk.
+    fn finish(mut self, copyright: Option<&str>) -> Result<(Vec<u8>, &'static [u8])> {
         let nodes = (0..self.root.nodes.len() as u32).map(Index::new).collect();
         let extras = self.scene.and_then(|scene| scene.extras);
         let scene = self.root.push(Scene { nodes, extras, extensions: None, name: None });
         self.root.scene = Some(scene);
         self.root.asset = asset(copyright);
-        self.root.push(buffer(self.length));
+        self.root.extensions = metadata::of_document(self.attributes);
+        // All data are multiples of four bytes.
+        let is_short = self.root.extensions.is_some() && !self.length.is_multiple_of(metadata::ALIGNMENT as u64);
+        let padding: &[u8] = if is_short { &[0; 4] } else { &[] };
+        self.root.push(buffer(self.length + padding.len() as u64));
         if self.quantized {
             self.root.extensions_used = vec![QUANTIZATION.into()];
             self.root.extensions_required = self.root.extensions_used.clone();
         }
-        to_text(&self.root, self.colored)
+        if self.root.extensions.is_some() {
+            self.root.extensions_used.push(METADATA.into());
+        }
+        let mut text = to_text(&self.root, self.colored)?;
+        if self.root.extensions.is_some() {
+            metadata::align_text(&mut text);
+        }
+        Ok((text, padding))
     }
 }
 

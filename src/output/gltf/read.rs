@@ -12,10 +12,12 @@ use gltf::json::mesh::{Primitive, Semantic};
 use gltf::json::scene::{Node, Scene};
 use gltf::json::validation::Checked::Valid;
 
+use crate::output::attributes::PointAttributes;
 use crate::output::frame::Extras;
 use crate::output::gltf::check_json::{Decoded, RawDocument};
 use crate::output::gltf::container::GlbFile;
 use crate::output::gltf::meshopt::MOST_EXPANSION;
+use crate::output::gltf::metadata;
 use crate::output::gltf::stored_view::StoredView;
 use crate::{Error, Result};
 
@@ -41,6 +43,8 @@ pub struct TilePart {
     pub normals: Option<Vec<[f32; 3]>>,
     /// The colours, as many as positions: linear red, green, blue and alpha, 65535 for 1.
     pub colors: Option<Vec<[u16; 4]>>,
+    /// What the vertices carry of their points, as many as positions.
+    pub attributes: PointAttributes,
     /// The triangles as indices of positions, within range.
     pub triangles: Vec<[u32; 3]>,
 }
@@ -114,6 +118,8 @@ struct Surface {
     positions: usize,
     normals: Option<usize>,
     colors: Option<usize>,
+    classification: Option<usize>,
+    intensity: Option<usize>,
     indices: usize,
 }
 
@@ -170,6 +176,8 @@ impl Surface {
             positions: attribute(Semantic::Positions).ok_or("a primitive has no positions")?,
             normals: attribute(Semantic::Normals),
             colors: attribute(Semantic::Colors(0)),
+            classification: attribute(metadata::classification()),
+            intensity: attribute(metadata::intensity()),
             indices: primitive.indices.ok_or("a primitive has no indices")?.value(),
         })
     }
@@ -223,8 +231,12 @@ impl Decoder<'_> {
         let colors = surface.colors.map(|c| self.colors(c)).transpose()?;
         normals.as_ref().map_or(Ok(()), |n| same_count(n.len(), "normals"))?;
         colors.as_ref().map_or(Ok(()), |c| same_count(c.len(), "colours"))?;
+        let attributes = self.attributes(&surface)?;
+        attributes.classification.as_ref().map_or(Ok(()), |c| same_count(c.len(), "classes"))?;
+        attributes.intensity.as_ref().map_or(Ok(()), |i| same_count(i.len(), "intensities"))?;
         let triangles = self.triangles(surface.indices, positions.len())?;
-        Ok(TilePart { translation: node.translation, scale: node.scale, positions, normals, colors, triangles })
+        let PlacedMesh { translation, scale, .. } = *node;
+        Ok(TilePart { translation, scale, positions, normals, colors, attributes, triangles })
     }
 
     fn positions(&mut self, accessor: usize) -> Decoded<Vec<[f32; 3]>> {
@@ -253,6 +265,19 @@ impl Decoder<'_> {
         }
         let bytes: Vec<[u8; 4]> = self.elements(accessor, ComponentType::U8, Type::Vec4)?;
         Ok(bytes.into_iter().map(|c| c.map(|v| u16::from(v) * 257)).collect())
+    }
+
+    fn attributes(&mut self, surface: &Surface) -> Decoded<PointAttributes> {
+        let mut attributes = PointAttributes::default();
+        if let Some(accessor) = surface.classification {
+            let padded: Vec<[u8; 4]> = self.elements(accessor, ComponentType::U8, Type::Scalar)?;
+            attributes.classification = Some(padded.into_iter().map(|[class, ..]| class).collect());
+        }
+        if let Some(accessor) = surface.intensity {
+            let padded: Vec<[u16; 2]> = self.elements(accessor, ComponentType::U16, Type::Scalar)?;
+            attributes.intensity = Some(padded.into_iter().map(|[intensity, _]| intensity).collect());
+        }
+        Ok(attributes)
     }
 
     fn component(&self, accessor: usize) -> Decoded<ComponentType> {
@@ -292,7 +317,8 @@ impl Decoder<'_> {
             ));
         }
         let view = item(&self.document.views, elements.view, "buffer view")?;
-        if view.stride.is_some_and(|stride| stride != size_of::<T>()) {
+        // Elements without a stride follow each other without padding.
+        if view.stride.unwrap_or(component.size() * shape.multiplicity()) != size_of::<T>() {
             return Err(format!("accessor {accessor} is not {} bytes an element", size_of::<T>()));
         }
         let bytes = self.bytes(&view.stored)?;

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
+use crate::output::attributes::{AttributeChoice, PointAttributes};
 use crate::output::frame::Frame;
 use crate::output::gltf::read::{TileFile, TilePart};
 use crate::output::lod::boundary::on_boundary;
@@ -17,8 +18,8 @@ pub struct VertexOffLattice([f64; 3]);
 type VertexAt = HashMap<[i32; 2], u32, BuildHasherDefault<SiteHasher>>;
 
 /// Joins all of `files`, tiles of the job of `frame`, into one mesh. A vertex that several of them share becomes one vertex, with the
-/// normal and colour of the first. Vertices are in the order of the files. The mesh has normals if all files have them, and likewise
-/// colours.
+/// normal, the colour and the attributes of the first. Vertices are in the order of the files. The mesh has normals if all files have
+/// them, and likewise colours and attributes.
 ///
 /// # Errors
 /// [`VertexOffLattice`] if a vertex is not on the lattice.
@@ -27,6 +28,10 @@ pub fn join(frame: &Frame, files: &[TileFile]) -> Result<Tile, VertexOffLattice>
     let mut joined = Tile {
         normals: parts().all(|part| part.normals.is_some()).then(Vec::new),
         colors: parts().all(|part| part.colors.is_some()).then(Vec::new),
+        attributes: PointAttributes::empty(AttributeChoice {
+            classification: parts().all(|part| part.attributes.classification.is_some()),
+            intensity: parts().all(|part| part.attributes.intensity.is_some()),
+        }),
         ..Tile::default()
     };
     let mut vertex_at = VertexAt::default();
@@ -62,6 +67,7 @@ fn number(
             let [red, green, blue, _] = theirs[v];
             colors.push([red, green, blue]);
         }
+        joined.attributes.push_from(&part.attributes, v);
     }
     Ok(number)
 }

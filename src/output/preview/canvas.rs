@@ -3,6 +3,8 @@
 //! Exact integer edge functions decide which pixels a triangle covers, and no pixel centre has the x or y of a vertex. So every pixel
 //! centre inside the hull belongs to exactly one triangle, whatever the tiles, their order or the number of threads.
 
+use std::collections::BTreeMap;
+
 use bytemuck::{Pod, Zeroable};
 
 use crate::geometry::Bounds;
@@ -52,7 +54,8 @@ pub struct PreviewPixel {
     pub slope: [i16; 2],
     /// The sRGB colour.
     pub color: [u8; 3],
-    unused: u8,
+    /// 1 for the look of a vertex, in a pixel whose centre no triangle may cover.
+    pub(super) dot: u8,
 }
 
 impl Canvas {
@@ -136,6 +139,30 @@ impl Canvas {
         Ok(pixels)
     }
 
+    /// Returns the pixels in which vertices of `tile` lie, each with the look of one of them, if the tile is so narrow that it has hardly
+    /// `drawn` a pixel.
+    pub fn dots(&self, tile: &Tile, drawn: usize) -> Vec<PreviewPixel> {
+        let pixels = |bounds: Bounds<3>, axis: usize| (bounds.extent(axis) << self.shift) / self.pitch;
+        let longer = tile.bounds().map_or(0, |bounds| pixels(bounds, 0).max(pixels(bounds, 1)));
+        if drawn as i64 * NARROW > longer {
+            return Vec::new();
+        }
+        let mut vertices = BTreeMap::new();
+        for (v, &position) in (0..).zip(&tile.positions) {
+            let [column, row] = self.place(position).map(|place| place / self.pitch);
+            let column = column.min(i64::from(self.width) - 1) as u32;
+            let row = row.min(i64::from(self.height) - 1) as u32;
+            vertices.entry(row * self.width + column).or_insert(v);
+        }
+        let dot = |(pixel, v)| {
+            let seen = Shading::new(self, tile, [v; 3]).pixel(pixel, [1, 0, 0]);
+            // Without normals it is flat, because a vertex alone has no triangle.
+            let slope = if tile.normals.is_some() { seen.slope } else { [0; 2] };
+            PreviewPixel { slope, dot: 1, ..seen }
+        };
+        vertices.into_iter().map(dot).collect()
+    }
+
     /// Returns how far a point is right of and below the corner, in subdivisions: even numbers.
     fn place(&self, point: [i32; 3]) -> [i64; 2] {
         [(point[0] as i64 - self.corner[0]) << self.shift, (self.corner[1] - point[1] as i64) << self.shift]
@@ -156,6 +183,9 @@ impl Canvas {
         index * self.pitch + self.center
     }
 }
+
+/// A tile is narrow if it is at least so many times as long in pixels as it covers pixels.
+const NARROW: i64 = 4;
 
 /// A million slivers as long as the terrain take seconds, so after this many the process asks whether it should stop.
 const TRIANGLES_BETWEEN_CHECKS: u32 = 1 << 12;
@@ -188,7 +218,7 @@ impl<'a> DrawnTriangle<'a> {
             let (edges, [first, last]) = self.covered(columns, row);
             for column in first..last {
                 let weights = edges.map(|(value, step)| value.wrapping_add((column - columns[0]).wrapping_mul(step)));
-                let shading = shading.get_or_insert_with(|| Shading::new(self));
+                let shading = shading.get_or_insert_with(|| Shading::new(self.canvas, self.tile, self.corners));
                 pixels.push(shading.pixel(row as u32 * self.canvas.width + column as u32, weights));
             }
         }
@@ -232,8 +262,8 @@ enum Normals {
 }
 
 impl Shading {
-    fn new(triangle: &DrawnTriangle) -> Shading {
-        let (canvas, tile, mut corners) = (triangle.canvas, triangle.tile, triangle.corners.map(|v| v as usize));
+    fn new(canvas: &Canvas, tile: &Tile, corners: [u32; 3]) -> Shading {
+        let mut corners = corners.map(|v| v as usize);
         let turn = (0..3).min_by_key(|&k| tile.positions[corners[k]]).unwrap_or(0);
         corners.rotate_left(turn);
         let normals = match &tile.normals {
@@ -261,7 +291,7 @@ impl Shading {
         let length = normal.iter().map(|v| v * v).sum::<f64>().sqrt();
         let slope = [0, 1].map(|k| (normal[k] / length * 32767.0) as i16);
         let color = mean(&self.colors, weights).map(|v| to_srgb((v + 0.5) as u16));
-        PreviewPixel { pixel, slope, color, unused: 0 }
+        PreviewPixel { pixel, slope, color, dot: 0 }
     }
 }
 

@@ -18,7 +18,10 @@ const FRAME: [u8; 3] = [168, 168, 166];
 /// From the sides of the strip to what is drawn on it.
 const MARGIN: f32 = 20.0;
 
-/// The height of a digit in pixels, and half the breadth of its strokes.
+/// The least distance between two labels, and between a label and the scale bar.
+const GAP: f32 = 12.0;
+
+/// The height of a digit in pixels unless long numbers make them smaller, and half the breadth of its strokes.
 const DIGIT: f32 = 10.0;
 const HALF_STROKE: f32 = 0.75;
 
@@ -81,9 +84,10 @@ impl Legend {
     /// Draws the ramp, which ends at column `right`, with the heights of its ends above; without colours by height only the heights.
     fn draw_heights(&self, strip: &mut Strip, right: f32) {
         let [low, high] = &self.heights;
-        strip.text(right - text_width(high), high);
         let left = right - RAMP as f32;
-        strip.text(left, low);
+        let (digit, width) = side_by_side([low.as_str(), high.as_str()], right - (MARGIN + LONGEST_BAR as f32 + GAP));
+        strip.text_at([right - text_width(high) * digit / DIGIT, BASELINE - digit], digit, high);
+        strip.text_at([right - width, BASELINE - digit], digit, low);
         let range = HeightRange { low: 0, high: RAMP as i32 - 1 };
         let color = |column: usize| match self.has_ramp {
             true => height_color(column as i32, range).map(to_srgb),
@@ -146,6 +150,14 @@ fn text_width(text: &str) -> f32 {
     width(text) * DIGIT / 6.0
 }
 
+/// Returns the height of digits at which two labels fit `room` side by side, and how wide they are together then: no less than the ramp, over
+/// whose ends they stand.
+fn side_by_side(labels: [&str; 2], room: f32) -> (f32, f32) {
+    let wanted = text_width(labels[0]) + text_width(labels[1]);
+    let share = ((room - GAP) / wanted).min(1.0);
+    (DIGIT * share, (wanted * share + GAP).max(RAMP as f32))
+}
+
 /// The strip while it is drawn.
 struct Strip {
     columns: usize,
@@ -164,11 +176,12 @@ impl Strip {
 
     /// Writes a text from column `left` on, above the bars.
     fn text(&mut self, left: f32, text: &str) {
-        self.text_at([left, BASELINE - DIGIT], text);
+        self.text_at([left, BASELINE - DIGIT], DIGIT, text);
     }
 
-    fn text_at(&mut self, [left, top]: [f32; 2], text: &str) {
-        let scale = DIGIT / 6.0;
+    /// Writes a text whose digits have the height `digit`.
+    fn text_at(&mut self, [left, top]: [f32; 2], digit: f32, text: &str) {
+        let scale = digit / 6.0;
         let mut at = left;
         for character in text.chars() {
             let glyph = glyph(character);
@@ -196,7 +209,7 @@ impl Strip {
             self.line([middle + side, wing], [middle, wing - 5.0], 0.6);
         }
         self.line(tip, [middle, wing - 5.0], 0.6);
-        self.text_at([middle - text_width("N") / 2.0, 40.0], "N");
+        self.text_at([middle - text_width("N") / 2.0, 40.0], DIGIT, "N");
     }
 
     /// Draws a line with round ends, with smooth borders: a pixel gets as much ink as its middle is near.
@@ -257,6 +270,31 @@ mod tests {
             assert!(!glyph(character).strokes.is_empty(), "{character}");
         }
         assert!(text_width("100 km") > text_width("100 m") && text_width("1") > 0.0);
+    }
+
+    /// Returns the widest run of columns without ink between the first label of the heights and the last, in pixels.
+    fn widest_gap(heights: [&str; 2]) -> usize {
+        let heights = heights.map(str::to_owned);
+        let legend = Legend { bar: (100.0, "1 m".into()), heights, has_ramp: false };
+        let pixels = legend.draw(LEAST_WIDTH);
+        let inked = |column: &usize| (0..BAR_TOP - 4).any(|row| pixels[row * LEAST_WIDTH + column][..3] != PAPER);
+        // The arrow is right of the labels.
+        let columns: Vec<usize> = (130..LEAST_WIDTH - 70).filter(inked).collect();
+        assert!(columns[0] >= MARGIN as usize + LONGEST_BAR as usize, "{columns:?}");
+        columns.windows(2).map(|two| two[1] - two[0] - 1).max().unwrap()
+    }
+
+    #[test]
+    fn labels_of_heights_do_not_touch_each_other() {
+        for heights in [
+            ["12", "345 m"],
+            ["1234567.125", "1234567.250 m"],
+            ["-1234567.125", "-1234567.000 ft"],
+            ["123456789012.125", "123456789012.250 m"],
+            ["-12345678901234567890", "12345678901234567890 ft"],
+        ] {
+            assert!(widest_gap(heights) >= 7, "{heights:?}: {} pixels", widest_gap(heights));
+        }
     }
 
     #[test]

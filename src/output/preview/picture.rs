@@ -1,10 +1,11 @@
 //! Puts the pixels of all tiles together, shades them and writes the PNG.
 
-use crate::output::preview::canvas::{Canvas, PreviewPixel};
+use crate::output::preview::canvas::{Canvas, LONGER_SIDE, PreviewPixel};
 use crate::output::preview::layout::Layout;
 use crate::output::preview::panel::Legend;
 use crate::{Error, Result};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// The slope (rise over run) at [`STEEP_SHARE`] of the terrain after exaggeration: enough to see hills and valleys.
 const TARGET_SLOPE: f32 = 0.6;
@@ -30,6 +31,10 @@ pub struct Picture {
     pixels: Vec<PreviewPixel>,
     /// Whether a pixel has a triangle.
     covered: Vec<bool>,
+    /// The number of those that have.
+    count: u64,
+    /// Pixels with a vertex.
+    dots: BTreeMap<usize, PreviewPixel>,
 }
 
 impl Picture {
@@ -37,17 +42,44 @@ impl Picture {
     pub fn new(canvas: &Canvas) -> Picture {
         let size = canvas.size().map(|v| v as usize);
         let empty: PreviewPixel = bytemuck::Zeroable::zeroed();
-        Picture { size, pixels: vec![empty; size[0] * size[1]], covered: vec![false; size[0] * size[1]] }
+        Picture {
+            size,
+            pixels: vec![empty; size[0] * size[1]],
+            covered: vec![false; size[0] * size[1]],
+            count: 0,
+            dots: BTreeMap::new(),
+        }
     }
 
-    /// Adds the pixels that [`Canvas::draw`] returned for a tile.
+    /// Adds the pixels that [`Canvas::draw`] and [`Canvas::dots`] returned for a tile.
     pub fn add(&mut self, pixels: &[PreviewPixel]) {
         for pixel in pixels {
-            if let Some(covered) = self.covered.get_mut(pixel.pixel as usize) {
-                *covered = true;
-                self.pixels[pixel.pixel as usize] = *pixel;
+            let at = pixel.pixel as usize;
+            match self.covered.get_mut(at) {
+                None => {}
+                // Of several dots in one pixel the same stays whatever the order of the tiles is.
+                Some(_) if pixel.dot > 0 => {
+                    let look = |pixel: &PreviewPixel| (pixel.color, pixel.slope);
+                    let kept = self.dots.entry(at).or_insert(*pixel);
+                    if look(pixel) > look(kept) {
+                        *kept = *pixel;
+                    }
+                }
+                Some(covered) => {
+                    self.count += u64::from(!*covered);
+                    *covered = true;
+                    self.pixels[at] = *pixel;
+                }
             }
         }
+    }
+
+    /// Returns what is seen in a pixel. A terrain so narrow that it would hardly be seen shows its vertices too.
+    fn seen(&self, at: usize) -> Option<PreviewPixel> {
+        if self.covered[at] {
+            return Some(self.pixels[at]);
+        }
+        self.dots.get(&at).copied().filter(|_| self.count < LONGER_SIDE)
     }
 
     /// Returns the picture with the strip of its legend below as a PNG file.
@@ -74,11 +106,9 @@ impl Picture {
     fn shaded(&self) -> Vec<[u8; 4]> {
         let exaggeration = self.exaggeration();
         let shade = |i: usize| {
-            if !self.covered[i] {
-                return [0; 4];
-            }
-            let light = brightness(self.pixels[i], exaggeration);
-            let [r, g, b] = self.pixels[i].color.map(|v| (v as f32 * light).min(255.0) as u8);
+            let Some(pixel) = self.seen(i) else { return [0; 4] };
+            let light = brightness(pixel, exaggeration);
+            let [r, g, b] = pixel.color.map(|v| (v as f32 * light).min(255.0) as u8);
             [r, g, b, 255]
         };
         (0..self.pixels.len()).into_par_iter().with_min_len(self.size[0]).map(shade).collect()
@@ -88,9 +118,8 @@ impl Picture {
     fn exaggeration(&self) -> f32 {
         // Classes of slope by exponent and three binary digits, finer than the eye.
         let mut histogram = [0u64; 2048];
-        let pixels = self.pixels.iter().zip(&self.covered).filter(|&(_, &covered)| covered);
-        for (pixel, _) in pixels {
-            let [x, y, z] = normal(*pixel);
+        for pixel in (0..self.pixels.len()).filter_map(|at| self.seen(at)) {
+            let [x, y, z] = normal(pixel);
             let steepness = (x * x + y * y).sqrt() / z;
             histogram[(steepness.to_bits() >> 20) as usize & 2047] += 1;
         }

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::LazyLock;
 
 use gdt_batch::geometry::lattice::{AxisMap, REACH};
-use gdt_batch::input::{Point, PointCounts, PointRules, Source, TextOptions, open};
+use gdt_batch::input::{OptionalFields, Point, PointCounts, PointRules, Source, TextOptions, open};
 use gdt_batch::job::options::JobOptions;
 use gdt_batch::{Error, Result};
 
@@ -95,7 +95,7 @@ fn rules(source: &Source) -> Option<PointRules> {
         classes: [true; 256],
         bounds: None,
         first_order: 5,
-        rgb: true,
+        fields: OptionalFields { rgb: true, intensity: true },
     })
 }
 
