@@ -5,6 +5,7 @@
 pub mod checksums;
 pub mod color;
 pub mod compression;
+pub mod curvature;
 pub mod file_names;
 pub mod frame;
 pub mod geoid;

@@ -24,6 +24,29 @@ export function latticeText(offset, step, count) {
   return decimalText(scaled(from) + scaled(by) * BigInt(count), places);
 }
 
+// The displacement, in metres east, north and up, by which the scene of a wide terrain follows the curve of the earth.
+class Curvature {
+  constructor({ centre, half, degree, coefficients }) {
+    Object.assign(this, { centre, half, degree, coefficients });
+  }
+
+  // `place` is a lattice place, whole or not.
+  displacement(place) {
+    const [u, v, w] = place.map((value, axis) => Math.min(Math.max((value - this.centre[axis]) / this.half[axis], -1), 1));
+    const sum = [0, 0, 0];
+    let term = 0;
+    for (let i = 0; i <= this.degree; i += 1) {
+      for (let j = 0; j <= this.degree - i; j += 1, term += 1) {
+        const power = u ** i * v ** j / 1024;
+        for (let axis = 0; axis < 3; axis += 1) {
+          sum[axis] += (this.coefficients[term][axis] + w * this.coefficients[term][3 + axis]) * power;
+        }
+      }
+    }
+    return sum;
+  }
+}
+
 export class Georeference {
   // `extras` are those of a GLB or of `asset` in tileset.json; `file` is the name of that file.
   constructor(extras, file) {
@@ -34,23 +57,40 @@ export class Georeference {
     this.offset = extras.offset;
     this.steps = [extras.resolution, extras.resolution, extras.resolution_z];
     this.metres = [extras.metres_per_unit, extras.metres_per_unit, extras.metres_per_unit_z];
+    this.curvature = extras.curvature ? new Curvature(extras.curvature) : null;
     this.crs = /"([^"]*)"/.exec(extras.crs ?? '')?.[1] ?? null;
   }
 
+  // Returns the metres east, north and up on the plane of the source for a scene position, which may follow the curve of the earth.
+  flat([gx, gy, gz]) {
+    const moved = [gx, -gz, gy];
+    if (!this.curvature) return moved;
+    // The displacement changes so slowly that each round brings many more digits.
+    let flat = moved;
+    for (let round = 0; round < 12; round += 1) {
+      const displacement = this.curvature.displacement(flat.map((metres, axis) => metres / (this.steps[axis] * this.metres[axis])));
+      flat = moved.map((metres, axis) => metres - displacement[axis]);
+    }
+    return flat;
+  }
+
   // Returns the source coordinates of a scene position in metres.
-  source([gx, gy, gz]) {
-    return [gx, -gz, gy].map((metres, axis) => this.offset[axis] + metres / this.metres[axis]);
+  source(position) {
+    return this.flat(position).map((metres, axis) => this.offset[axis] + metres / this.metres[axis]);
   }
 
   // Returns the scene position in metres of source coordinates.
   scene(source) {
-    const [x, y, z] = source.map((value, axis) => (value - this.offset[axis]) * this.metres[axis]);
+    const flat = source.map((value, axis) => (value - this.offset[axis]) * this.metres[axis]);
+    const place = flat.map((metres, axis) => metres / (this.steps[axis] * this.metres[axis]));
+    const displacement = this.curvature?.displacement(place) ?? [0, 0, 0];
+    const [x, y, z] = flat.map((metres, axis) => metres + displacement[axis]);
     return [x, z, -y];
   }
 
   // Returns the source coordinates of a vertex as texts, exactly: its scene position leads to whole steps of the lattice.
-  exactSource([gx, gy, gz]) {
-    return [gx, -gz, gy].map((metres, axis) => {
+  exactSource(position) {
+    return this.flat(position).map((metres, axis) => {
       const count = Math.round(metres / (this.steps[axis] * this.metres[axis]));
       return latticeText(this.offset[axis], this.steps[axis], count);
     });

@@ -129,7 +129,7 @@ pub(crate) fn publish(
         text = Some((&look.style.frame, root));
         (placement, stats) = (placed.ok(), levels);
     }
-    let georeference = Georeference::new(&plan.frame, &plan.lattice, bounds, &plan.unit, plan.crs.epsg);
+    let georeference = Georeference::new(&look.style.frame, &plan.lattice, bounds, &plan.unit, plan.crs.epsg);
     let tiles = &written.stats;
     let fits = fits_one_file(tiles);
     let page_of_others = output.page && run.directory.has_page_of_others()?;
@@ -140,7 +140,8 @@ pub(crate) fn publish(
     let content = SideFiles {
         georeference: georeference.to_json(placement.as_ref())?,
         tileset: text,
-        one_file: fits && output.format != OutputFormat::Tiles3d,
+        // Viewers of one file know no globe, and its meshes are those of the tiles.
+        one_file: fits && output.format != OutputFormat::Tiles3d && plan.curvature.is_none(),
         page: output.page && !page_of_others,
         copyright: output.copyright(),
         has_ramp: matches!(look.style.coloring, None | Some(Coloring::Elevation(_))),

@@ -38,9 +38,13 @@ impl TileStyle {
             ColorChoice::Auto | ColorChoice::Rgb => Some(Coloring::Rgb { eight_bit: max_rgb <= 255 }),
         };
         let compression = output.packing();
+        let frame = match &plan.curvature {
+            Some(curvature) => plan.frame.clone().curved(curvature.clone()),
+            None => plan.frame.clone(),
+        };
         let frame = match compression {
-            Compression::None => plan.frame.clone().refined(bounds),
-            _ => plan.frame.clone().packed(),
+            Compression::None => frame.refined(bounds),
+            _ => frame.packed(),
         };
         let copyright = output.copyright().map(str::to_owned);
         TileStyle { frame, coloring, normals: output.normals, compression, max_edge, copyright }

@@ -1,0 +1,45 @@
+//! Whether the scene of a job follows the curve of the earth, and how.
+
+use crate::Result;
+use crate::geometry::Bounds;
+use crate::job::plan::globe_definition::globe_definition;
+use crate::job::plan::job_plan::Plan;
+use crate::output::compression::Compression;
+use crate::output::curvature::Curvature;
+use crate::output::geoid::Geoid;
+use crate::output::options::OutputFormat;
+use crate::output::tiles3d::curve_fit::{Bent, fit_curvature};
+use crate::output::tiles3d::globe::NotPlaced;
+use crate::output::tiles3d::ground::Ground;
+
+/// The greatest distortion in metres with which one transform places all tiles of a scene that is not bent, or along the vertical alone.
+/// Datums that differ from the globe's by as much are accepted too.
+pub const ONE_TRANSFORM: f64 = 1.0;
+
+/// Returns the curvature of the scene of a job whose points are within `bounds`. `None` if the scene is a plane: the terrain is small,
+/// nothing says where on the globe it lies, or the user wants one file, whose viewers know no globe.
+///
+/// # Errors
+/// [`crate::Error::Config`] if the geoid has no height anywhere, or its file is damaged; [`crate::Error::Io`] if it cannot be read.
+pub fn curvature_of(plan: &Plan, bounds: Bounds<3>) -> Result<Option<Curvature>> {
+    let output = &plan.options.output;
+    let extras = plan.frame.extras();
+    let definition = globe_definition(&plan.crs, extras.metres_per_unit);
+    let (true, Ok(definition)) = (output.format != OutputFormat::Glb, definition) else { return Ok(None) };
+    let geoid = Geoid::open(output.height_offset.as_ref())?;
+    let found = Ground::new(extras, &definition, geoid).and_then(|ground| {
+        let distortion = ground.distortion(&ground.tangent(ground.seen_from(bounds)?)?, bounds)?;
+        let bent = match output.packing() {
+            Compression::Meshopt => Bent::All,
+            // Programs that read these take x and y as they are.
+            Compression::None | Compression::Quantized => Bent::Up,
+        };
+        (distortion > ONE_TRANSFORM).then(|| fit_curvature(&ground, bounds, bent)).transpose()
+    });
+    match found {
+        // The step that publishes says why a terrain has no place on the globe.
+        Err(NotPlaced::System(_)) => Ok(None),
+        Err(NotPlaced::Height(error)) => Err(error),
+        Ok(curvature) => Ok(curvature),
+    }
+}
