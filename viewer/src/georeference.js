@@ -34,16 +34,18 @@ class Curvature {
   displacement(place) {
     const [u, v, w] = place.map((value, axis) => Math.min(Math.max((value - this.centre[axis]) / this.half[axis], -1), 1));
     const sum = [0, 0, 0];
-    let term = 0;
-    for (let i = 0; i <= this.degree; i += 1) {
-      for (let j = 0; j <= this.degree - i; j += 1, term += 1) {
-        const power = u ** i * v ** j / 1024;
-        for (let axis = 0; axis < 3; axis += 1) {
-          sum[axis] += (this.coefficients[term][axis] + w * this.coefficients[term][3 + axis]) * power;
-        }
+    // From the last term back, as one multiplies polynomials out.
+    let term = this.coefficients.length;
+    for (let i = this.degree; i >= 0; i -= 1) {
+      const row = [0, 0, 0];
+      for (let j = this.degree - i; j >= 0; j -= 1) {
+        term -= 1;
+        const c = this.coefficients[term];
+        for (let axis = 0; axis < 3; axis += 1) row[axis] = row[axis] * v + c[axis] + w * c[3 + axis];
       }
+      for (let axis = 0; axis < 3; axis += 1) sum[axis] = sum[axis] * u + row[axis];
     }
-    return sum;
+    return sum.map((units) => units / 1024);
   }
 }
 
@@ -61,6 +63,12 @@ export class Georeference {
     this.crs = /"([^"]*)"/.exec(extras.crs ?? '')?.[1] ?? null;
   }
 
+  // Returns by how many metres east, north and up the scene moves a place of the plane, also in metres.
+  displacement(flat) {
+    if (!this.curvature) return [0, 0, 0];
+    return this.curvature.displacement(flat.map((metres, axis) => metres / (this.steps[axis] * this.metres[axis])));
+  }
+
   // Returns the metres east, north and up on the plane of the source for a scene position, which may follow the curve of the earth.
   flat([gx, gy, gz]) {
     const moved = [gx, -gz, gy];
@@ -68,10 +76,15 @@ export class Georeference {
     // The displacement changes so slowly that each round brings many more digits.
     let flat = moved;
     for (let round = 0; round < 12; round += 1) {
-      const displacement = this.curvature.displacement(flat.map((metres, axis) => metres / (this.steps[axis] * this.metres[axis])));
+      const displacement = this.displacement(flat);
       flat = moved.map((metres, axis) => metres - displacement[axis]);
     }
     return flat;
+  }
+
+  // Returns nearly how far above its place on the plane a scene position lies, in metres: good enough for colours.
+  lift([gx, gy, gz]) {
+    return this.displacement([gx, -gz, gy])[2];
   }
 
   // Returns the source coordinates of a scene position in metres.
@@ -82,8 +95,7 @@ export class Georeference {
   // Returns the scene position in metres of source coordinates.
   scene(source) {
     const flat = source.map((value, axis) => (value - this.offset[axis]) * this.metres[axis]);
-    const place = flat.map((metres, axis) => metres / (this.steps[axis] * this.metres[axis]));
-    const displacement = this.curvature?.displacement(place) ?? [0, 0, 0];
+    const displacement = this.displacement(flat);
     const [x, y, z] = flat.map((metres, axis) => metres + displacement[axis]);
     return [x, z, -y];
   }

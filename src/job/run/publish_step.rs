@@ -7,7 +7,7 @@ use crate::job::durable::journal::PublishedFile;
 use crate::job::levels::make_level::LevelStats;
 use crate::job::mesh::leaf::LeafStats;
 use crate::job::plan::job_plan::Plan;
-use crate::job::publish::one_file_limits::{fits_one_file, too_large_for_one_file};
+use crate::job::publish::one_file_limits::{BENT_IS_NO_ONE_FILE, fits_one_file, too_large_for_one_file};
 use crate::job::publish::placement::{heights_warning, place, placement_warning};
 use crate::job::publish::side_files::{EachTile, SideFiles, write_side_files};
 use crate::job::records::{JobStep, StepOutput};
@@ -140,7 +140,6 @@ pub(crate) fn publish(
     let content = SideFiles {
         georeference: georeference.to_json(placement.as_ref())?,
         tileset: text,
-        // Viewers of one file know no globe, and its meshes are those of the tiles.
         one_file: fits && output.format != OutputFormat::Tiles3d && plan.curvature.is_none(),
         page: output.page && !page_of_others,
         copyright: output.copyright(),
@@ -155,6 +154,9 @@ pub(crate) fn publish(
     let bytes = run_concurrently(|| run.journal.commit(), || run.journal.step(JobStep::Publish, write))?;
     if !fits && output.format == OutputFormat::Glb {
         warnings.push(too_large_for_one_file(tiles));
+    }
+    if fits && output.format == OutputFormat::Auto && plan.curvature.is_some() {
+        warnings.push(BENT_IS_NO_ONE_FILE.into());
     }
     stage.advance(1);
     run.add_stage(stage.finish());
