@@ -16,16 +16,25 @@ use crate::output::tiles3d::ground::Ground;
 /// Datums that differ from the globe's by as much are accepted too.
 pub const ONE_TRANSFORM: f64 = 1.0;
 
+/// Tells whether the scene of a job may be bent, if the terrain is wide.
+pub fn may_be_bent(plan: &Plan) -> bool {
+    bendable(plan).is_some()
+}
+
+/// Returns the projected system of a scene that may be bent.
+fn bendable(plan: &Plan) -> Option<String> {
+    let definition = globe_definition(&plan.crs, plan.frame.extras().metres_per_unit).ok();
+    definition.filter(|_| plan.options.output.format != OutputFormat::Glb)
+}
+
 /// Returns the curvature of the scene of a job whose points are within `bounds`. `None` if the scene is a plane: the terrain is small,
 /// nothing says where on the globe it lies, or the user wants one file, whose viewers know no globe.
 ///
 /// # Errors
 /// [`crate::Error::Config`] if the geoid has no height anywhere, or its file is damaged; [`crate::Error::Io`] if it cannot be read.
 pub fn curvature_of(plan: &Plan, bounds: Bounds<3>) -> Result<Option<Curvature>> {
-    let output = &plan.options.output;
-    let extras = plan.frame.extras();
-    let definition = globe_definition(&plan.crs, extras.metres_per_unit);
-    let (true, Ok(definition)) = (output.format != OutputFormat::Glb, definition) else { return Ok(None) };
+    let Some(definition) = bendable(plan) else { return Ok(None) };
+    let (output, extras) = (&plan.options.output, plan.frame.extras());
     let geoid = Geoid::open(output.height_offset.as_ref())?;
     let found = Ground::new(extras, &definition, geoid).and_then(|ground| {
         let distortion = ground.distortion(&ground.tangent(ground.seen_from(bounds)?)?, bounds)?;
