@@ -11,7 +11,7 @@ use crate::program::Job;
 use crate::random::Random;
 use crate::tileset::{Tile, applied, height, keeps_the_rules, numbers, tiles, triangles};
 use gdt_batch::output::frame::Extras;
-use gdt_batch::output::gltf::read::{read_extras, read_tile};
+use gdt_batch::output::gltf::read::{TilePart, read_extras, read_tile};
 use gdt_batch::verify::SourceGrid;
 
 /// Source coordinates of the middle of the area.
@@ -193,7 +193,7 @@ fn x_and_y_stay_on_the_lattice_where_programs_read_them() {
         assert_eq!((&globe["curved"], &globe["per_tile"]), (&Value::Bool(true), &Value::Bool(false)), "{compression}");
         let promise = globe["distortion_m"].as_f64().unwrap();
         let [off, lowest] = off_and_lowest(&job, &tiles);
-        assert!(off <= promise + 0.01 && promise < 0.1 && lowest < -10.0, "{compression}: {off}, {promise}, {lowest}");
+        assert!(off <= promise + 0.01 && promise < 0.5 && lowest < -10.0, "{compression}: {off}, {promise}, {lowest}");
         let source = Source::of(&job);
         let Extras { offset, resolution, metres_per_unit, .. } = source.extras;
         for tile in &tiles {
@@ -217,7 +217,8 @@ pub(crate) fn gaps(job: &Job, tiles: &[Tile]) -> (f64, usize, usize) {
     for tile in tiles {
         // Vertices inside a coarser tile stand for the surface around them, and no other tile shown at the same time has them.
         let on_border: HashSet<[u64; 3]> = outline(&triangles(job, tile)).into_iter().flatten().collect();
-        for (at, place) in source.corners(job, tile).into_iter().filter(|(_, place)| on_border.contains(&bits(*place))) {
+        for (at, place) in source.corners(job, tile).into_iter().filter(|(_, place)| on_border.contains(&bits(*place)))
+        {
             let places = known.entry([at[0], at[1]].map(f64::to_bits)).or_default();
             let here = (applied(&tile.placed, place), tile.above.len());
             if !places.contains(&here) {
@@ -235,7 +236,9 @@ pub(crate) fn gaps(job: &Job, tiles: &[Tile]) -> (f64, usize, usize) {
 /// Any two tiles that a viewer may show side by side have the vertices on their common border at the same place, whatever their depths.
 #[test]
 fn tiles_of_any_depths_meet_on_the_globe() {
-    for (compression, half) in [("meshopt", 50_000.0), ("meshopt", 12_000.0), ("none", 12_000.0), ("quantized", 12_000.0)] {
+    for (compression, half) in
+        [("meshopt", 50_000.0), ("meshopt", 12_000.0), ("none", 12_000.0), ("quantized", 12_000.0)]
+    {
         let (job, tiles) = job_packed(&square(200, half, [0.0; 2]), 500, compression);
         let (gap, shared, depths) = gaps(&job, &tiles);
         assert!(shared > 2_000 && depths >= 4, "{compression}: {shared} vertices at several depths, at most {depths}");
@@ -246,15 +249,19 @@ fn tiles_of_any_depths_meet_on_the_globe() {
 /// Where x and y stay on the lattice and the terrain is very wide, tiles have transforms of their own. They differ sideways alone.
 #[test]
 fn plain_tiles_of_a_very_wide_area_are_placed_one_by_one() {
-    let (job, tiles) = job_packed(&square(200, 50_000.0, [0.0; 2]), 500, "none");
+    let (job, tiles) = job_packed(&square(200, 100_000.0, [0.0; 2]), 500, "none");
     assert!(tiles.iter().all(|tile| numbers::<16>(&tile.json["transform"]).is_some()));
     let globe = georeference(&job, "globe");
     assert_eq!((&globe["curved"], &globe["per_tile"]), (&Value::Bool(true), &Value::Bool(true)));
     let promise = globe["distortion_m"].as_f64().unwrap();
-    let ([off, lowest], (gap, ..)) = (off_and_lowest(&job, &tiles), gaps(&job, &tiles));
-    eprintln!("off {off} m, promised {promise} m, gaps of {gap} m");
-    assert!(off <= promise + 0.01 && promise < 0.1 && lowest < -300.0, "{off}, {promise}, {lowest}");
-    assert!(gap > 0.0 && gap < 2.0, "{gap}");
+    let [off, lowest] = off_and_lowest(&job, &tiles);
+    assert!(off <= promise + 0.01 && promise < 0.7 && lowest < -1000.0, "{off}, {promise}, {lowest}");
+    // A tile of the whole area is as far off as one transform for all would be.
+    let (gap, ..) = gaps(&job, &tiles);
+    let exact: Vec<Tile> = tiles.into_iter().filter(is_exact).collect();
+    let (gap_of_exact, ..) = gaps(&job, &exact);
+    eprintln!("off {off} m, promised {promise} m, gaps of {gap} m, between exact tiles of {gap_of_exact} m");
+    assert!(gap_of_exact > 0.0 && gap_of_exact < 2.0 * promise && gap < 30.0, "{gap}, {gap_of_exact}");
 }
 
 /// Coarser tiles are bent as the exact ones are: their error is that of heights alone.
@@ -289,26 +296,49 @@ fn long_triangles_do_not_move_the_ground() {
     assert!(off < 0.03 && lowest < -60.0, "{off} m, {lowest} m");
 }
 
-/// One file is for viewers that know no globe: its scene is the plane of the source, and a bent scene is not joined to one file.
+/// One file is for viewers that know no globe: its scene is the plane of the source, also where the tiles are bent.
 #[test]
 fn one_file_stays_flat() {
     let folder = tempfile::tempdir().unwrap();
     let (wide, small) = (folder.path().join("wide.las"), folder.path().join("small.las"));
     std::fs::write(&wide, utm(&square(40, 12_000.0, [0.0; 2]))).unwrap();
     std::fs::write(&small, utm(&square(40, 1_000.0, [0.0; 2]))).unwrap();
-    for (cloud, format, is_curved, is_one_file) in [
-        (&wide, "glb", false, true),
-        (&wide, "auto", true, false),
-        (&wide, "3dtiles", true, false),
-        (&small, "auto", false, true),
+    let mut flat = Vec::new();
+    for (cloud, format, compression, is_curved) in [
+        (&wide, "glb", "quantized", false),
+        (&wide, "auto", "quantized", true),
+        (&wide, "auto", "meshopt", true),
+        (&wide, "auto", "none", true),
+        (&wide, "3dtiles", "quantized", true),
+        (&small, "auto", "quantized", false),
     ] {
-        let job = Job::on(&[cloud]).with("output", &format!("format = \"{format}\""));
+        let look = format!("format = \"{format}\"\ncompression = \"{compression}\"");
+        let job = Job::on(&[cloud]).with("output", &look).tiles_of(500);
         job.report();
         job.verified();
         assert_eq!(Source::of(&job).extras.curvature.is_some(), is_curved, "{format}");
         assert_eq!(georeference(&job, "curvature").is_object(), is_curved, "{format}");
-        assert_eq!(job.out().join("terrain.glb").exists(), is_one_file, "{format}");
+        let terrain = job.out().join("terrain.glb");
+        assert_eq!(terrain.exists(), format != "3dtiles");
+        if terrain.exists() && cloud == &wide {
+            let file = read_tile(&terrain).unwrap();
+            assert!(file.extras.curvature.is_none(), "{format}, {compression}");
+            let grid = SourceGrid::new(&file.extras).unwrap();
+            let point = |part: &TilePart, v: u32| {
+                let world = part.world(v as usize);
+                if part.scale == [1.0; 3] { grid.integers(world) } else { grid.integers_on(world, part.scale) }
+            };
+            let triangles =
+                |part: &TilePart| part.triangles.iter().map(|t| t.map(|v| point(part, v).unwrap())).collect();
+            let mut all: Vec<[[i32; 3]; 3]> =
+                file.parts.iter().flat_map(|part| -> Vec<_> { triangles(part) }).collect();
+            all.iter_mut().for_each(|corners| corners.sort_unstable());
+            all.sort_unstable();
+            flat.push(all);
+        }
     }
+    // One mesh on the lattice, the heights included.
+    assert!(flat[0].len() > 3_000 && flat.iter().all(|mesh| *mesh == flat[0]));
 }
 
 /// A file may say another unit than the code that it names, and a user may say it of a text.

@@ -81,7 +81,8 @@ fn off(job: &Job, geoid: impl Fn(f64, f64) -> f64) -> f64 {
             let mut there = (at[0], at[1], 0.0);
             transform(&utm, &degrees, &mut there).unwrap();
             let height = geoid(there.0.to_degrees(), there.1.to_degrees());
-            off = off.max(distance(applied(&tile.placed, place), truth.place([0.0; 3], [at[0], at[1], at[2] + height])));
+            off =
+                off.max(distance(applied(&tile.placed, place), truth.place([0.0; 3], [at[0], at[1], at[2] + height])));
         }
     }
     off
@@ -114,7 +115,7 @@ fn tiles_follow_the_slope_of_the_geoid() {
         let globe = georeference(&sloping, "globe");
         assert_eq!(globe["curved"], is_curved, "{half} m, {compression}");
         let (off, promise) = (off(&sloping, geoid), globe["distortion_m"].as_f64().unwrap());
-        assert!(off <= promise + 0.015 && promise < 0.3, "{half} m, {compression}: {off} m off, promised {promise}");
+        assert!(off <= promise + 0.015 && promise < 0.7, "{half} m, {compression}: {off} m off, promised {promise}");
     }
 }
 
@@ -134,7 +135,8 @@ fn a_grid_may_lack_the_corners_of_a_wide_area() {
         let share = east.hypot(north) / 20_000.0;
         20.0 + 5.0 * (1.0 - share * share / 2.0)
     };
-    for compression in ["meshopt", "quantized"] {
+    // Sideways, heights of 200 m are 0.3 m apart at the ends.
+    for (compression, near) in [("meshopt", 0.1), ("quantized", 0.5)] {
         let look = format!("format = \"3dtiles\"\ncompression = \"{compression}\"\nheight_offset = \"round.gtx\"");
         let job = Job::on(&[&cloud]).tiles_of(300).with("output", &look);
         write_grid_of(&job.folder().join("round.gtx"), 101, 0.01, |longitude, latitude| {
@@ -146,7 +148,7 @@ fn a_grid_may_lack_the_corners_of_a_wide_area() {
         let (off, globe) = (off(&job, height), georeference(&job, "globe"));
         let promise = globe["distortion_m"].as_f64().unwrap();
         eprintln!("{compression}: {off} m off, promised {promise} m");
-        assert!(globe["curved"] == true && off < 0.35, "{compression}: {off} m off, promised {promise}");
+        assert!(globe["curved"] == true && off < near, "{compression}: {off} m off, promised {promise}");
         assert_eq!(gaps(&job, &tiles(&job)).0, 0.0, "{compression}");
     }
 }

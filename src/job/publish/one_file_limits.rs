@@ -8,11 +8,6 @@ pub const MAX_TRIANGLES_IN_ONE_FILE: u64 = 20_000_000;
 /// Each tile is a node with a mesh of its own: with more of them their description would fill the memory.
 const MAX_TILES_IN_ONE_FILE: u64 = 4096;
 
-/// The warning where the tiles follow the curve of the earth. Viewers of one file know no globe, and the meshes of that file are those of
-/// the tiles.
-pub const BENT_IS_NO_ONE_FILE: &str = "terrain.glb is not written: the tiles of so wide a terrain follow the curve of the earth, and viewers of \
-     one file know no globe; set [output] format to \"glb\" for one flat file, or to \"3dtiles\" for the tiles";
-
 /// Tells whether `terrain.glb` can hold all tiles.
 pub fn fits_one_file(written: &TileStats) -> bool {
     written.triangles <= MAX_TRIANGLES_IN_ONE_FILE && written.files <= MAX_TILES_IN_ONE_FILE

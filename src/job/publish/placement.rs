@@ -2,7 +2,7 @@
 
 use crate::input::Crs;
 use crate::job::plan::globe_definition::globe_definition;
-use crate::job::tiles::curve::ONE_TRANSFORM;
+use crate::job::tiles::curve::{ONE_TRANSFORM, ONE_TRANSFORM_SIDEWAYS};
 use crate::output::curvature::Curvature;
 use crate::output::frame::Frame;
 use crate::output::geoid::Geoid;
@@ -50,9 +50,13 @@ pub fn place(crs: &Crs, frame: &Frame, geoid: Geoid, root: &mut TilesetNode) -> 
     let middle = ground.seen_from(curvature.map_or(root.bounds, Curvature::bounds))?;
     let transform = ground.tangent(middle)?;
     let mut distortion_m = ground.distortion(&transform, root.bounds)?;
-    // What follows the earth along all axes needs no other transform.
-    let may_divide = curvature.is_none_or(Curvature::is_vertical) && !root.children.is_empty();
-    let per_tile = distortion_m > ONE_TRANSFORM && may_divide;
+    let most = match curvature {
+        None => ONE_TRANSFORM,
+        Some(curvature) if curvature.is_vertical() => ONE_TRANSFORM_SIDEWAYS,
+        // What follows the earth along all axes needs no other transform.
+        Some(_) => f64::INFINITY,
+    };
+    let per_tile = distortion_m > most && !root.children.is_empty();
     if per_tile {
         // A copy, because no tile is placed if one cannot be.
         let mut placed = root.clone();
@@ -107,17 +111,17 @@ pub fn placement_warning(placement: &Result<Placement, NotPlaced>) -> Option<Str
         Ok(placement) => placement,
     };
     let off = placement.distortion_m;
-    (off > ONE_TRANSFORM).then(|| {
-        let flat = match (placement.per_tile, placement.curved) {
-            (true, _) => "each tile",
-            (false, false) => "the only tile",
-            (false, true) => return format!("tileset.json follows the curved earth only to within {off:.1} m: the terrain is too wide"),
-        };
-        format!(
-            "in tileset.json {flat} lies flat on the tangent plane at its middle, up to {off:.1} m off the curved earth; smaller tiles \
+    (off > ONE_TRANSFORM).then(|| match (placement.per_tile, placement.curved) {
+        (false, true) => format!(
+            "tileset.json puts places up to {off:.1} m beside where they belong on the earth; [output] compression = \"meshopt\" bends tiles \
+             along all axes, and [input] bounds gives a smaller terrain"
+        ),
+        (per_tile, _) => format!(
+            "in tileset.json {} lies flat on the tangent plane at its middle, up to {off:.1} m off the curved earth; smaller tiles \
              follow it more closely: lower [triangulation] max_points_per_tile, and leave out long triangles along the hull with \
-             [output] max_edge"
-        )
+             [output] max_edge",
+            if per_tile { "each tile" } else { "the only tile" }
+        ),
     })
 }
 

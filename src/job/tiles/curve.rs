@@ -12,9 +12,13 @@ use crate::output::tiles3d::curve_fit::{Bent, fit_curvature};
 use crate::output::tiles3d::globe::NotPlaced;
 use crate::output::tiles3d::ground::Ground;
 
-/// The greatest distortion in metres with which one transform places all tiles of a scene that is not bent, or along the vertical alone.
-/// Datums that differ from the globe's by as much are accepted too.
+/// The greatest distortion in metres with which one transform places all tiles of a scene that is not bent. Datums that differ from the
+/// globe's by as much are accepted too.
 pub const ONE_TRANSFORM: f64 = 1.0;
+
+/// The same for a scene that is bent upwards alone. All that is left is sideways: at the ends of 24 km in the Alps, or at the edge of a UTM
+/// zone, some metres. With one transform tiles meet exactly, which is worth more than these.
+pub const ONE_TRANSFORM_SIDEWAYS: f64 = 5.0;
 
 /// Tells whether the scene of a job may be bent, if the terrain is wide.
 pub fn may_be_bent(plan: &Plan) -> bool {

@@ -25,6 +25,14 @@ pub struct TileStyle {
     pub copyright: Option<String>,
 }
 
+/// Returns the frame with the steps of tiles that are packed like this and lie within `bounds`.
+fn with_steps(frame: Frame, compression: Compression, bounds: Bounds<3>) -> Frame {
+    match compression {
+        Compression::None => frame.refined(bounds),
+        Compression::Meshopt | Compression::Quantized => frame.packed(),
+    }
+}
+
 impl TileStyle {
     /// Returns the style of the tiles of a job whose points are within `bounds`, and whose greatest colour is `max_rgb`. A ramp of colours
     /// spans `heights`.
@@ -42,11 +50,12 @@ impl TileStyle {
             Some(curvature) => plan.frame.clone().curved(curvature.clone()),
             None => plan.frame.clone(),
         };
-        let frame = match compression {
-            Compression::None => frame.refined(bounds),
-            _ => frame.packed(),
-        };
+        let frame = with_steps(frame, compression, bounds);
         let copyright = output.copyright().map(str::to_owned);
         TileStyle { frame, coloring, normals: output.normals, compression, max_edge, copyright }
+    }
+    /// Returns the frame of these tiles in a scene that is not bent. The points of the job are within `bounds`.
+    pub fn flat_frame(&self, plan: &Plan, bounds: Bounds<3>) -> Frame {
+        with_steps(plan.frame.clone(), self.compression, bounds)
     }
 }

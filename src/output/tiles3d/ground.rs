@@ -54,7 +54,8 @@ impl<'a> Ground<'a> {
         let mut others: Vec<usize> = (0..PLACES * PLACES).collect();
         others.sort_by_key(|&i| off(i).map(|steps| steps * steps).iter().sum::<i64>());
         let point = |i: usize| {
-            let [x, y] = [0, 1].map(|k| i64::from(bounds.min[k]) + bounds.extent(k) * (off(i)[k] + middle_place) / (2 * middle_place));
+            let [x, y] = [0, 1]
+                .map(|k| i64::from(bounds.min[k]) + bounds.extent(k) * (off(i)[k] + middle_place) / (2 * middle_place));
             [x as i32, y as i32, middle[2]]
         };
         others.into_iter().find_map(|i| known(point(i)).ok()).ok_or(why)
