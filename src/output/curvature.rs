@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 const UNIT: f64 = 1.0 / 1024.0;
 
 /// The greatest degree.
-pub(crate) const MOST_DEGREE: usize = 8;
+pub(crate) const MOST_DEGREE: usize = 12;
 
 /// Rounds of looking for the flat place. Each divides the error by the steepness of the displacement, which is far below one.
 const ROUNDS: usize = 40;

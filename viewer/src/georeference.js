@@ -27,25 +27,31 @@ export function latticeText(offset, step, count) {
 // The displacement, in metres east, north and up, by which the scene of a wide terrain follows the curve of the earth.
 class Curvature {
   constructor({ centre, half, degree, coefficients }) {
-    Object.assign(this, { centre, half, degree, coefficients });
+    Object.assign(this, { centre, half, degree, terms: Float64Array.from(coefficients.flat()) });
   }
 
-  // `place` is a lattice place, whole or not.
-  displacement(place) {
-    const [u, v, w] = place.map((value, axis) => Math.min(Math.max((value - this.centre[axis]) / this.half[axis], -1), 1));
-    const sum = [0, 0, 0];
+  // Returns the displacement along one axis at a lattice place, whole or not. Pages ask for that of every vertex.
+  along(axis, place) {
+    const { degree, terms } = this;
+    const u = this.share(0, place);
+    const v = this.share(1, place);
+    const w = this.share(2, place);
+    let sum = 0;
     // From the last term back, as one multiplies polynomials out.
-    let term = this.coefficients.length;
-    for (let i = this.degree; i >= 0; i -= 1) {
-      const row = [0, 0, 0];
-      for (let j = this.degree - i; j >= 0; j -= 1) {
-        term -= 1;
-        const c = this.coefficients[term];
-        for (let axis = 0; axis < 3; axis += 1) row[axis] = row[axis] * v + c[axis] + w * c[3 + axis];
+    let at = terms.length + axis;
+    for (let i = degree; i >= 0; i -= 1) {
+      let row = 0;
+      for (let j = degree - i; j >= 0; j -= 1) {
+        at -= 6;
+        row = row * v + terms[at] + w * terms[at + 3];
       }
-      for (let axis = 0; axis < 3; axis += 1) sum[axis] = sum[axis] * u + row[axis];
+      sum = sum * u + row;
     }
-    return sum.map((units) => units / 1024);
+    return sum / 1024;
+  }
+
+  share(axis, place) {
+    return Math.min(Math.max((place[axis] - this.centre[axis]) / this.half[axis], -1), 1);
   }
 }
 
@@ -63,10 +69,16 @@ export class Georeference {
     this.crs = /"([^"]*)"/.exec(extras.crs ?? '')?.[1] ?? null;
   }
 
+  // Returns the lattice place, whole or not, of metres east, north and up.
+  lattice(flat) {
+    return flat.map((metres, axis) => metres / (this.steps[axis] * this.metres[axis]));
+  }
+
   // Returns by how many metres east, north and up the scene moves a place of the plane, also in metres.
   displacement(flat) {
     if (!this.curvature) return [0, 0, 0];
-    return this.curvature.displacement(flat.map((metres, axis) => metres / (this.steps[axis] * this.metres[axis])));
+    const place = this.lattice(flat);
+    return [0, 1, 2].map((axis) => this.curvature.along(axis, place));
   }
 
   // Returns the metres east, north and up on the plane of the source for a scene position, which may follow the curve of the earth.
@@ -84,7 +96,7 @@ export class Georeference {
 
   // Returns nearly how far above its place on the plane a scene position lies, in metres: good enough for colours.
   lift([gx, gy, gz]) {
-    return this.displacement([gx, -gz, gy])[2];
+    return this.curvature ? this.curvature.along(2, this.lattice([gx, -gz, gy])) : 0;
   }
 
   // Returns the source coordinates of a scene position in metres.

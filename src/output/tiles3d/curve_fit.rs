@@ -13,7 +13,7 @@ const NEAR_ENOUGH: f64 = 0.005;
 const LEAST_DEGREE: usize = 4;
 
 /// Places along a side at which a polynomial is compared with the earth.
-const COMPARED: usize = 11;
+const COMPARED: usize = 15;
 
 /// A higher degree must lower the distance from the earth at least to this part of it.
 const WORTH_A_DEGREE: f64 = 0.7;
