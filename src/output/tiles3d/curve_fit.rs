@@ -46,18 +46,20 @@ pub fn fit_curvature(ground: &Ground, bounds: Bounds<3>, bent: Bent) -> Result<C
         let moved = ground.displacement(&transform, none.place(share), middle)?;
         Ok(if bent == Bent::Up { [0.0, 0.0, moved[2]] } else { moved })
     };
+    // Where the geoid has no height there is no point either.
+    let is_known = |share| ground.is_known(none.place(share));
+    let off = |curvature: &Curvature| off(curvature, &displacement, &is_known);
     let mut best = fit(interpolated(LEAST_DEGREE, &displacement)?, LEAST_DEGREE)?;
-    let mut far = off(&best, &displacement)?;
+    let mut far = off(&best)?;
     for degree in (LEAST_DEGREE + 2..=MOST_DEGREE).step_by(2) {
         if far < NEAR_ENOUGH {
             break;
         }
         let next = fit(interpolated(degree, &displacement)?, degree)?;
-        let next_far = off(&next, &displacement)?;
-        if next_far > far * WORTH_A_DEGREE {
-            break;
+        let next_far = off(&next)?;
+        if next_far < far * WORTH_A_DEGREE {
+            (best, far) = (next, next_far);
         }
-        (best, far) = (next, next_far);
     }
     Ok(best)
 }
@@ -65,13 +67,20 @@ pub fn fit_curvature(ground: &Ground, bounds: Bounds<3>, bent: Bent) -> Result<C
 /// A displacement in metres at a place of the box, each coordinate from -1 to 1.
 type DisplacementAt<'a> = &'a dyn Fn([f64; 3]) -> Result<[f64; 3], NotPlaced>;
 
-/// Returns the greatest distance in metres between a curvature and what it stands for.
-fn off(curvature: &Curvature, displacement: DisplacementAt) -> Result<f64, NotPlaced> {
+/// Returns the greatest distance in metres between a curvature and what it stands for, at the places that count.
+fn off(
+    curvature: &Curvature,
+    displacement: DisplacementAt,
+    counts: &dyn Fn([f64; 3]) -> bool,
+) -> Result<f64, NotPlaced> {
     let mut greatest = 0.0f64;
     for i in 0..COMPARED * COMPARED * 2 {
         let along = |number: usize| 2.0 * number as f64 / (COMPARED - 1) as f64 - 1.0;
         let share =
             [along(i % COMPARED), along(i / COMPARED % COMPARED), if i < COMPARED * COMPARED { -1.0 } else { 1.0 }];
+        if !counts(share) {
+            continue;
+        }
         let (found, wanted) = (curvature.displacement(curvature.place(share)), displacement(share)?);
         greatest = (0..3).map(|k| (found[k] - wanted[k]).abs()).fold(greatest, f64::max);
     }

@@ -125,6 +125,11 @@ impl<'a> Ground<'a> {
         Ok([0, 1, 2].map(|k| found[k] - flat[k]))
     }
 
+    /// Tells whether it is known what to add to heights at a lattice place.
+    pub fn is_known(&self, place: [f64; 3]) -> bool {
+        self.offset_at(self.metres(place)).is_ok()
+    }
+
     /// Returns the greatest distance in metres between where `transform` puts a place of the scene within `bounds` and where it belongs.
     ///
     /// # Errors
