@@ -48,6 +48,11 @@ impl<const N: usize> Bounds<N> {
     pub fn extent(&self, axis: usize) -> i64 {
         self.max[axis] as i64 - self.min[axis] as i64
     }
+
+    /// Returns the point in the middle, rounded down.
+    pub fn middle(&self) -> [i32; N] {
+        std::array::from_fn(|axis| ((self.min[axis] as i64 + self.max[axis] as i64) >> 1) as i32)
+    }
 }
 
 /// Written as `[min, max]`.
@@ -80,7 +85,8 @@ mod tests {
         assert_eq!((bounds.extent(0), bounds.extent(1)), (3, 6));
         assert_eq!(bounds.union(Bounds::of_point([-7, 0])).min, [-7, -1]);
         let widest = Bounds { min: [i32::MIN], max: [i32::MAX] };
-        assert_eq!(widest.extent(0), u32::MAX as i64);
+        assert_eq!((widest.extent(0), widest.middle()), (u32::MAX as i64, [-1]));
+        assert_eq!(bounds.middle(), [1, 2]);
     }
 
     #[test]

@@ -36,6 +36,7 @@ use crate::job::report::job_report::Report;
 use crate::job::report::job_status::JobStatus;
 use crate::job::report::task_outcome::TaskOutcome;
 use crate::job::run::attempt::{EarlierWork, run_until_it_fits};
+use crate::job::run::curve_step::with_curvature;
 use crate::job::run::levels_step::{hierarchy_of, make_levels};
 use crate::job::run::mesh_and_tiles::mesh_and_tiles;
 use crate::job::run::publish_step::{
@@ -101,13 +102,14 @@ pub fn status(options: &JobOptions, tasks: Option<u32>) -> Result<JobStatus> {
 /// The walk through the steps after the plan.
 fn walk(run: &RunContext, plan: Plan, earlier: Option<Partition>) -> Result<Report> {
     if !plan.is_one_part() {
-        return parts::walk(run, &plan);
+        return parts::walk(run, plan);
     }
     // Step 2, partition/: the points by tile, and the tree.
     let (plan, partition) = read_step::read(run, plan, earlier)?;
     let summary = &partition.summary;
     let bounds = summary.bounds.ok_or_else(|| no_point_is_left(&plan, &summary.counts))?;
     PrecisionLimit::of(&plan.frame).check_heights(bounds)?;
+    let plan = with_curvature(run, plan, bounds)?;
     // Steps 3 and 4, mesh/: leaves and merges. Steps 5 and 6, tiles/: border normals and tiles, each as soon as it is finished.
     let mesh = mesh_and_tiles(run, &plan, &partition, bounds)?;
     let tiles = &mesh.tiles;

@@ -28,12 +28,14 @@ pub type JournalEntry = journal::JournalEntry<JobStep, StepRecord>;
 /// A step of a job, for one tile or one tree node where it runs once for each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum JobStep {
-    /// Plans a job of several parts.
+    /// Plans a job of several parts, and finds out how its scene follows the curve of the earth.
     Plan,
     /// Reads the points of a part and cuts it into tiles.
     Partition,
     /// Reads the inputs that a part is the first to need.
     Read(PartIndex),
+    /// Finds out how the scene of a job of one part follows the curve of the earth.
+    Curve,
     /// Triangulates a tile.
     Leaf(TileIndex),
     /// Merges what the nodes below a node left pending.

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::geometry::Bounds;
 use crate::geometry::lattice::Lattice;
+use crate::output::curvature::Curvature;
 use crate::{Error, Result};
 
 /// An f32 holds every whole number of steps up to this.
@@ -33,6 +34,15 @@ const FINE_STEP: f64 = 1.0 / 4096.0;
 /// rounding back finds it.
 const PACKED_RATIO: f64 = 0.98;
 
+/// A rounded place of a plain bent scene leads back to within this many lattice steps of its lattice point.
+const MOST_OFF_PLAIN: f64 = 0.255;
+
+/// The same for packed tiles.
+const MOST_OFF_PACKED: f64 = 0.497;
+
+/// More often than this no step is halved: a vertical and a horizontal one, each to a 256th.
+const STEPS_HALVED: usize = 16;
+
 /// Steps that a 16-bit position reaches from its origin.
 const SHORT_REACH: f64 = 65535.0;
 
@@ -45,7 +55,7 @@ const RESOLUTION_BOUNDS: std::ops::Range<f64> = 1e-12..1e12;
 
 /// The numbers that lead from a glTF scene back to the source, as written to `scenes[0].extras`:
 /// x = `offset[0]` + gx / `metres_per_unit`, y = `offset[1]` - gz / `metres_per_unit`,
-/// z = `offset[2]` + gy / `metres_per_unit_z`.
+/// z = `offset[2]` + gy / `metres_per_unit_z`, unless there is a `curvature`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Extras {
     /// The source coordinates x, y, z of the scene's origin.
@@ -60,6 +70,9 @@ pub struct Extras {
     pub metres_per_unit_z: f64,
     /// The coordinate reference system as WKT.
     pub crs: Option<String>,
+    /// How the scene follows the curve of the earth. With it, a vertex lies this much beside its place of the formula above.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub curvature: Option<Curvature>,
 }
 
 /// The map from lattice integers to glTF metres. It is the same in every tile of a job.
@@ -116,6 +129,11 @@ impl AxisScale {
         AxisScale { step, ratio: resolution / step }
     }
 
+    /// Returns the map with half the step.
+    fn halved(self) -> AxisScale {
+        AxisScale { step: self.step / 2.0, ratio: self.ratio * 2.0 }
+    }
+
     /// Returns lattice integer `i` in glTF steps, a whole number below 2^39.
     #[inline(always)]
     fn steps(&self, i: i32) -> f64 {
@@ -156,6 +174,7 @@ impl Frame {
             metres_per_unit,
             metres_per_unit_z,
             crs,
+            curvature: None,
         };
         let horizontal = AxisScale::new(extras.resolution * metres_per_unit, "x and y")?;
         let vertical = AxisScale::new(extras.resolution_z * metres_per_unit_z, "z")?;
@@ -165,15 +184,53 @@ impl Frame {
     /// Returns the frame with finer steps, so that positions are truer. They are as fine as a triangle across a job within `bounds`
     /// allows. All tiles of a job need the same frame.
     pub fn refined(self, bounds: Bounds<3>) -> Frame {
-        let horizontal = self.horizontal.refined(bounds.extent(0).max(bounds.extent(1)));
-        Frame { horizontal, vertical: self.vertical.refined(bounds.extent(2)), ..self }
+        let [xy, up] = self.resolution_metres();
+        // A bent scene is a little larger.
+        let moved = self.curvature().map_or([0.0; 3], Curvature::greatest);
+        let extent = |k: usize, step: f64| bounds.extent(k) + (2.0 * moved[k] / step).ceil() as i64;
+        let horizontal = self.horizontal.refined(extent(0, xy).max(extent(1, xy)));
+        let vertical = self.vertical.refined(extent(2, up));
+        Frame { horizontal, vertical, ..self }.invertible(MOST_OFF_PLAIN)
     }
 
     /// Returns the frame with the coarsest steps from which rounding finds the lattice, so that positions take 16 bits. All tiles of
     /// a job need the same frame.
     pub fn packed(self) -> Frame {
         let [xy, up] = self.resolution_metres();
-        Frame { horizontal: AxisScale::packed(xy), vertical: AxisScale::packed(up), ..self }
+        Frame { horizontal: AxisScale::packed(xy), vertical: AxisScale::packed(up), ..self }.invertible(MOST_OFF_PACKED)
+    }
+
+    /// Returns the frame of a scene that follows the curve of the earth. It must be refined or packed afterwards.
+    pub fn curved(mut self, curvature: Curvature) -> Frame {
+        self.extras.curvature = Some(curvature);
+        self
+    }
+
+    /// Returns how the scene follows the curve of the earth.
+    pub(crate) fn curvature(&self) -> Option<&Curvature> {
+        self.extras.curvature.as_ref()
+    }
+
+    /// Returns the frame with steps so fine that a place that was rounded to them leads back to a lattice place at most so many lattice
+    /// steps off, `most`. Where a scene is bent, rounding along one axis is felt a little along the others.
+    fn invertible(mut self, most: f64) -> Frame {
+        let Some(curvature) = self.curvature() else { return self };
+        let [xy, up] = self.resolution_metres();
+        let steep = curvature.steepness([xy, xy, up]);
+        for _ in 0..STEPS_HALVED {
+            let half = [self.horizontal.step, self.horizontal.step, self.vertical.step].map(|step| step / 2.0);
+            // To first order; a tenth covers the rest and what lies between the places that were looked at.
+            let off = |k: usize| half[k] + 1.1 * (0..3).map(|b| steep[k][b] * half[b]).sum::<f64>();
+            let (across, along) = (off(0).max(off(1)) / xy, off(2) / up);
+            if across > most {
+                self.horizontal = self.horizontal.halved();
+            } else if along > most {
+                self.vertical = self.vertical.halved();
+            } else {
+                break;
+            }
+        }
+        self
     }
 
     /// Returns the numbers that are written for readers.
@@ -201,9 +258,34 @@ impl Frame {
     /// Returns the glTF coordinates (x, y up, z) of a lattice point in steps, which are whole numbers.
     #[inline(always)]
     pub(crate) fn steps(&self, point: [i32; 3]) -> [f64; 3] {
+        if let Some(curvature) = &self.extras.curvature {
+            return self.curved_steps(curvature, point);
+        }
         let [x, y, z] = point;
         // 0.0 - y has no negative zero.
         [self.horizontal.steps(x), self.vertical.steps(z), 0.0 - self.horizontal.steps(y)]
+    }
+
+    #[inline(never)]
+    fn curved_steps(&self, curvature: &Curvature, point: [i32; 3]) -> [f64; 3] {
+        let place = point.map(f64::from);
+        let moved = curvature.displacement(place);
+        let along = |k: usize, axis: AxisScale| nearest(place[k] * axis.ratio + moved[k] / axis.step);
+        [along(0, self.horizontal), along(2, self.vertical), 0.0 - along(1, self.horizontal)]
+    }
+
+    /// Returns the least and the greatest glTF coordinates in steps of `points`.
+    pub(crate) fn extent(&self, points: &[[i32; 3]]) -> [[f64; 3]; 2] {
+        let none = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+        points.iter().map(|&p| self.steps(p)).fold(none, |[low, high], point| {
+            [[0, 1, 2].map(|k| low[k].min(point[k])), [0, 1, 2].map(|k| high[k].max(point[k]))]
+        })
+    }
+
+    /// Returns the least and the greatest glTF coordinates in steps of `points`, which are within `bounds`.
+    pub(crate) fn extent_within(&self, points: &[[i32; 3]], bounds: Bounds<3>) -> [[f64; 3]; 2] {
+        // On the plane the map is monotonic.
+        if self.curvature().is_some() { self.extent(points) } else { self.extent(&[bounds.min, bounds.max]) }
     }
 
     /// Returns the glTF coordinates in metres of a lattice point relative to an origin in steps. They are exact within [`PART_REACH`]
@@ -240,7 +322,13 @@ impl Frame {
     /// Returns the lattice point at a glTF world position in metres, or `None` if [`Frame::world`] gives no point that position.
     pub fn integers(&self, world: [f64; 3]) -> Option<[i32; 3]> {
         let [xy, up] = self.resolution_metres();
-        let point = [world[0] / xy, -world[2] / xy, world[1] / up].map(f64::round);
+        let moved = [world[0], -world[2], world[1]];
+        let steps = [xy, xy, up];
+        let flat = match self.curvature() {
+            Some(curvature) => curvature.flat(moved, steps),
+            None => [0, 1, 2].map(|k| moved[k] / steps[k]),
+        };
+        let point = flat.map(f64::round);
         let is_there = point.iter().all(|v| v.abs() <= i32::MAX as f64);
         let point = point.map(|v| v as i32);
         (is_there && self.world(point) == world).then_some(point)

@@ -6,6 +6,7 @@ pub mod attributes;
 pub mod checksums;
 pub mod color;
 pub mod compression;
+pub mod curvature;
 pub mod file_names;
 pub mod frame;
 pub mod geoid;

@@ -4,6 +4,7 @@ use rust_decimal::Decimal;
 
 use crate::geometry::Site;
 use crate::geometry::lattice::{REACH, shortest_decimal};
+use crate::output::curvature::Curvature;
 use crate::output::frame::Extras;
 
 /// Whole numbers below this are exact as f64.
@@ -16,7 +17,7 @@ const EXACT_POWER: u32 = 22;
 const PLAIN_TOLERANCE: f64 = 0.26;
 
 /// A quantized position lies on coarser steps, so it may be farther off, but its lattice point is still the nearest one.
-const QUANTIZED_TOLERANCE: f64 = 0.495;
+const QUANTIZED_TOLERANCE: f64 = 0.499;
 
 /// Why the extras of a scene describe no lattice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -37,6 +38,8 @@ pub struct SourceGrid {
     /// Metres in a lattice step: for x and y, for z.
     resolution: [f64; 2],
     axes: [DecimalAxis; 3],
+    /// How far a vertex lies beside its place on the plane.
+    curvature: Option<Curvature>,
 }
 
 impl SourceGrid {
@@ -56,7 +59,7 @@ impl SourceGrid {
         if !per_metre.iter().all(|v| v.is_finite() && *v > 0.0) {
             return Err(SourceGridError::NotPositive);
         }
-        Ok(SourceGrid { per_metre, resolution, axes: [x, y, z] })
+        Ok(SourceGrid { per_metre, resolution, axes: [x, y, z], curvature: extras.curvature.clone() })
     }
 
     /// Returns the lattice integers x, y, z of a scene position in metres, or `None` if it is not on the lattice.
@@ -72,7 +75,11 @@ impl SourceGrid {
         let point = self.integers_within(world, QUANTIZED_TOLERANCE)?;
         let [x, y, z] = [point[0], point[2], point[1]].map(f64::from);
         let [xy, up] = self.resolution;
-        let exact = [x * (xy / steps[0]), y * (up / steps[1]), 0.0 - z * (xy / steps[2])];
+        let mut exact = [x * (xy / steps[0]), y * (up / steps[1]), 0.0 - z * (xy / steps[2])];
+        if let Some(curvature) = &self.curvature {
+            let [east, north, up] = curvature.displacement(point.map(f64::from));
+            exact = [exact[0] + east / steps[0], exact[1] + up / steps[1], exact[2] - north / steps[2]];
+        }
         let is_nearest = (0..3).all(|k| nearest(exact[k]) * steps[k] == world[k]);
         is_nearest.then_some(point)
     }
@@ -80,7 +87,13 @@ impl SourceGrid {
     #[inline(always)]
     fn integers_within(&self, world: [f64; 3], tolerance: f64) -> Option<[i32; 3]> {
         let [xy, up] = self.per_metre;
-        let exact = [world[0] * xy, -world[2] * xy, world[1] * up];
+        let exact = match &self.curvature {
+            None => [world[0] * xy, -world[2] * xy, world[1] * up],
+            Some(curvature) => {
+                let [xy, up] = self.resolution;
+                curvature.flat([world[0], -world[2], world[1]], [xy, xy, up])
+            }
+        };
         let rounded = exact.map(nearest);
         let near = (0..3).all(|k| (exact[k] - rounded[k]).abs() <= tolerance);
         let within = rounded[0].abs().max(rounded[1].abs()) <= REACH as f64
@@ -173,6 +186,7 @@ mod tests {
             metres_per_unit: 1.0,
             metres_per_unit_z: 1.0,
             crs: None,
+            curvature: None,
         };
         let source = SourceGrid::new(&extras).unwrap();
         assert_eq!(source.integers([0.012, 0.0041, -0.0502]), Some([1, 5, 4]));
@@ -190,6 +204,7 @@ mod tests {
             metres_per_unit: 1.0,
             metres_per_unit_z: 1.0,
             crs: None,
+            curvature: None,
         };
         let source = SourceGrid::new(&extras).unwrap();
         let step = 1.0 / 128.0;

@@ -7,17 +7,24 @@ use proj4rs::Proj;
 use proj4rs::transform::transform;
 
 use crate::coordinate_systems::{code, keys, warnings, write};
-use crate::globe::{Truth, distance, georeference, is_exact, square, utm};
+use crate::globe::{Source, Truth, distance, gaps, georeference, is_exact, square, utm};
 use crate::program::Job;
-use crate::tileset::{applied, numbers, tiles, triangles};
+use crate::tileset::{applied, keeps_the_rules, numbers, tiles};
+
+/// Writes a geoid grid of `count` times `count` nodes around longitude 15, latitude 36, in steps of `step` degrees. A height that is no
+/// number means that there is none.
+fn write_grid_of(path: &Path, count: i32, step: f64, height: impl Fn(f64, f64) -> f64) {
+    let corner = [36.0, 15.0].map(|middle: f64| middle - f64::from(count - 1) / 2.0 * step);
+    let head = [corner[0], corner[1], step, step].into_iter().flat_map(f64::to_be_bytes);
+    let size = [count; 2].into_iter().flat_map(i32::to_be_bytes);
+    let at = |i: i32| height(corner[1] + f64::from(i % count) * step, corner[0] + f64::from(i / count) * step) as f32;
+    let heights = (0..count * count).flat_map(|i| if at(i).is_nan() { -88.8888 } else { at(i) }.to_be_bytes());
+    fs::write(path, head.chain(size).chain(heights).collect::<Vec<u8>>()).unwrap();
+}
 
 /// Writes a geoid grid from longitude 13 to 17 and latitude 34 to 38, in steps of half a degree.
 fn write_grid(path: &Path, height: impl Fn(f64, f64) -> f64) {
-    let head = [34.0f64, 13.0, 0.5, 0.5].into_iter().flat_map(f64::to_be_bytes);
-    let size = [9i32, 9].into_iter().flat_map(i32::to_be_bytes);
-    let at = |i: usize| height(13.0 + (i % 9) as f64 * 0.5, 34.0 + (i / 9) as f64 * 0.5) as f32;
-    let heights = (0..81).flat_map(|i| at(i).to_be_bytes());
-    fs::write(path, head.chain(size).chain(heights).collect::<Vec<u8>>()).unwrap();
+    write_grid_of(path, 9, 0.5, height);
 }
 
 fn cloud(folder: &Path, points: &[[i32; 3]]) -> PathBuf {
@@ -62,42 +69,88 @@ fn a_terrain_is_raised_by_the_number_the_model_or_the_grid() {
     }
 }
 
-/// The earth is curved and the geoid slopes: every tile is where both have it.
+/// Returns the greatest distance between where a job puts a vertex of an exact tile and where it belongs, if `geoid` says what its height
+/// counts from, by longitude and latitude.
+fn off(job: &Job, geoid: impl Fn(f64, f64) -> f64) -> f64 {
+    let proj = |text: &str| Proj::from_proj_string(text).unwrap();
+    let (utm, degrees) = (proj("+proj=utm +zone=33 +datum=WGS84"), proj("+proj=longlat +datum=WGS84"));
+    let (truth, source) = (Truth::new(), Source::of(job));
+    let mut off = 0.0f64;
+    for tile in tiles(job).iter().filter(|tile| is_exact(tile)) {
+        for (at, place) in source.corners(job, tile) {
+            let mut there = (at[0], at[1], 0.0);
+            transform(&utm, &degrees, &mut there).unwrap();
+            let height = geoid(there.0.to_degrees(), there.1.to_degrees());
+            off =
+                off.max(distance(applied(&tile.placed, place), truth.place([0.0; 3], [at[0], at[1], at[2] + height])));
+        }
+    }
+    off
+}
+
+/// The earth is curved and the geoid slopes: every vertex is where both have it, and another geoid is the same mesh.
 #[test]
 fn tiles_follow_the_slope_of_the_geoid() {
     let folder = tempfile::tempdir().unwrap();
-    let cloud = cloud(folder.path(), &square(60, 20_000.0, [0.0; 2]));
-    // Linear, so that it is known between the nodes; eleven metres over the area.
+    // Linear, so that it is known between the nodes; nine metres over the area.
     let geoid = |longitude: f64, latitude: f64| 30.0 + 10.0 * (longitude - 15.0) - 20.0 * (latitude - 36.0);
-    let job = |offset: &str| {
-        let job =
-            Job::on(&[&cloud]).tiles_of(300).with("output", &format!("format = \"3dtiles\"\nheight_offset = {offset}"));
-        write_grid(&job.folder().join("slope.gtx"), geoid);
+    // A small area is flat and has one transform; plain tiles of a wide one are bent along the vertical, packed ones along all axes.
+    for (half, compression, is_curved) in
+        [(2_000.0, "meshopt", false), (20_000.0, "meshopt", true), (20_000.0, "none", true)]
+    {
+        let cloud = cloud(folder.path(), &square(60, half, [0.0; 2]));
+        let job = |offset: &str| {
+            let look = format!("format = \"3dtiles\"\ncompression = \"{compression}\"\nheight_offset = {offset}");
+            let job = Job::on(&[&cloud]).tiles_of(300).with("output", &look);
+            write_grid(&job.folder().join("slope.gtx"), geoid);
+            let digest = job.report()["vertex_digest"].clone();
+            job.verified();
+            let tiles = tiles(&job);
+            keeps_the_rules(&job, &tiles);
+            assert_eq!(gaps(&job, &tiles).0, 0.0, "{half} m, {compression}");
+            (job, digest)
+        };
+        let ((sloping, digest), (_flat, other)) = (job("\"slope.gtx\""), job("0.0"));
+        assert!(digest.is_string() && digest == other, "{digest} {other}");
+        let globe = georeference(&sloping, "globe");
+        assert_eq!(globe["curved"], is_curved, "{half} m, {compression}");
+        let (off, promise) = (off(&sloping, geoid), globe["distortion_m"].as_f64().unwrap());
+        assert!(off <= promise + 0.015 && promise < 0.7, "{half} m, {compression}: {off} m off, promised {promise}");
+    }
+}
+
+/// The box of a round area has corners where it has no points, and this grid no heights.
+#[test]
+fn a_grid_may_lack_the_corners_of_a_wide_area() {
+    let folder = tempfile::tempdir().unwrap();
+    let round: Vec<[i32; 3]> = square(90, 20_000.0, [0.0; 2])
+        .into_iter()
+        .filter(|[x, y, _]| f64::from(*x).hypot(f64::from(*y)) < 2_000_000.0)
+        .collect();
+    let cloud = cloud(folder.path(), &round);
+    let away = |longitude: f64, latitude: f64| [(longitude - 15.0) * 90_000.0, (latitude - 36.1447) * 111_000.0];
+    // A hill of the geoid, five metres high and 40 km wide.
+    let height = |longitude: f64, latitude: f64| {
+        let [east, north] = away(longitude, latitude);
+        let share = east.hypot(north) / 20_000.0;
+        20.0 + 5.0 * (1.0 - share * share / 2.0)
+    };
+    // Sideways, heights of 200 m are 0.3 m apart at the ends.
+    for (compression, near) in [("meshopt", 0.1), ("quantized", 0.5)] {
+        let look = format!("format = \"3dtiles\"\ncompression = \"{compression}\"\nheight_offset = \"round.gtx\"");
+        let job = Job::on(&[&cloud]).tiles_of(300).with("output", &look);
+        write_grid_of(&job.folder().join("round.gtx"), 101, 0.01, |longitude, latitude| {
+            let [east, north] = away(longitude, latitude);
+            if east.hypot(north) > 24_000.0 { f64::NAN } else { height(longitude, latitude) }
+        });
         job.report();
         job.verified();
-        job
-    };
-    let (sloping, flat) = (job("\"slope.gtx\""), job("0.0"));
-    let promise = georeference(&sloping, "globe")["distortion_m"].as_f64().unwrap();
-    let offset: [f64; 3] = numbers(&georeference(&sloping, "offset")).unwrap();
-    let truth = Truth::new();
-    let proj = |text: &str| Proj::from_proj_string(text).unwrap();
-    let (utm, degrees) = (proj("+proj=utm +zone=33 +datum=WGS84"), proj("+proj=longlat +datum=WGS84"));
-    let (mut off, mut wrong, mut low, mut high) = (0.0f64, 0.0f64, f64::MAX, f64::MIN);
-    for (tile, without) in tiles(&sloping).iter().zip(tiles(&flat)).filter(|(tile, _)| is_exact(tile)) {
-        for place in triangles(&sloping, tile).into_iter().flatten() {
-            let mut at = (offset[0] + place[0], offset[1] + place[1], 0.0);
-            transform(&utm, &degrees, &mut at).unwrap();
-            let height = geoid(at.0.to_degrees(), at.1.to_degrees());
-            (low, high) = (low.min(height), high.max(height));
-            let found = applied(&tile.placed, place);
-            off = off.max(distance(found, truth.place(offset, [place[0], place[1], place[2] + height])));
-            wrong = wrong.max((distance(found, applied(&without.placed, place)) - height).abs());
-        }
+        let (off, globe) = (off(&job, height), georeference(&job, "globe"));
+        let promise = globe["distortion_m"].as_f64().unwrap();
+        eprintln!("{compression}: {off} m off, promised {promise} m");
+        assert!(globe["curved"] == true && off < near, "{compression}: {off} m off, promised {promise}");
+        assert_eq!(gaps(&job, &tiles(&job)).0, 0.0, "{compression}");
     }
-    assert!(high - low > 8.0, "{low} {high}");
-    // Besides the curve of the earth, which flat tiles do not follow, nothing is off.
-    assert!(off <= promise + 0.01 && wrong < 0.02, "{off} m off, promised {promise}; {wrong} m by the geoid");
 }
 
 #[test]

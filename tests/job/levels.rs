@@ -11,12 +11,12 @@ use crate::program::{Job, number};
 use crate::random::Random;
 use crate::tileset::{Tile, error, height, keeps_the_rules, tiles, triangles};
 
-fn bits(point: [f64; 3]) -> [u64; 3] {
+pub(crate) fn bits(point: [f64; 3]) -> [u64; 3] {
     point.map(|v| (v + 0.0).to_bits())
 }
 
 /// Returns the directed edges that have a triangle on one side only.
-fn outline(triangles: &[[[f64; 3]; 3]]) -> BTreeSet<[[u64; 3]; 2]> {
+pub(crate) fn outline(triangles: &[[[f64; 3]; 3]]) -> BTreeSet<[[u64; 3]; 2]> {
     let mut edges = BTreeSet::new();
     for t in triangles {
         for i in 0..3 {

@@ -1,10 +1,12 @@
 //! Jobs that tasks do: any number of them leave the bytes that one process leaves, and what they cannot do by parts, `publish` does.
 
 use crate::clouds::Cloud;
+use crate::globe::{Source, gaps, square};
 use crate::las_file::LasFile;
 use crate::levels::hills;
 use crate::parts::{in_files, in_parts};
 use crate::program::{Job, Said, gdt_batch, number};
+use crate::tileset::tiles;
 use gdt_batch::output::checksums::seal;
 use serde_json::{Value, json};
 use std::fs;
@@ -89,6 +91,30 @@ fn any_number_of_tasks_leaves_the_bytes_of_one_process() {
         }
         one.verified();
     }
+}
+
+/// How the scene of a wide terrain is bent comes from a machine's mathematics library. So tasks take it from the plan.
+#[test]
+fn tasks_bend_the_scene_as_one_process_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut files, points) = (Vec::new(), square(140, 12_000.0, [0.0; 2]));
+    for (number, quarter) in points.chunks(points.len() / 4).enumerate() {
+        let line = |[x, y, z]: &[i32; 3]| {
+            let [x, y, z] = [x, y, z].map(|v| f64::from(*v) / 100.0);
+            format!("{:.2},{:.2},{z:.2}\n", 5e5 + x, 4e6 + y)
+        };
+        files.push(folder.path().join(format!("{number}.csv")));
+        fs::write(&files[number], quarter.iter().map(line).collect::<String>()).unwrap();
+    }
+    let wide = |job: Job| job.with("input", "crs = \"EPSG:32633\"").with("output", "format = \"3dtiles\"");
+    let (one, many) = (wide(in_parts(&files, 2_500)), wide(in_parts(&files, 2_500)));
+    let report = one.report();
+    assert!(number(&report["parts"]) > 3, "{}", report["parts"]);
+    local(&many, 3).succeeded();
+    assert_eq!(bytes(&many), bytes(&one));
+    assert!(Source::of(&many).extras.curvature.is_some());
+    assert_eq!(gaps(&many, &tiles(&many)).0, 0.0);
+    assert_eq!(wide(Job::on(&files).tiles_of(500)).digest(), many.digest());
 }
 
 /// A user need not know how many parts there will be.

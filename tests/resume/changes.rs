@@ -56,6 +56,29 @@ fn another_style_keeps_the_mesh() {
     }
 }
 
+/// The scene of a wide terrain follows the curve of the earth and the geoid. What an interrupted run found of it stays, unless the style is
+/// another.
+#[test]
+fn another_geoid_keeps_the_mesh_and_bends_the_tiles_again() {
+    let wide = |offset: &str| Setup {
+        input: "files = [\"cloud.csv\"]\ncrs = \"EPSG:32633\"".into(),
+        ..Setup::tiles_of(2_000).output("format = \"3dtiles\"").output(&format!("height_offset = {offset}"))
+    };
+    let mut rig = Rig::new(&scattered::uniform(20_000, 50_000, 5), &wide("0.0")).committing_every(0);
+    for (offset, is_same) in [("0.0", true), ("\"egm96\"", false)] {
+        rig.forget();
+        rig.configure(&wide("0.0"));
+        assert!(rig.run_to("committed", 45).was_killed());
+        rig.expect(&wide(offset));
+        let said = rig.run().succeeded().err;
+        let resumed = rig.is_complete(&said)["resumed"].as_u64().unwrap();
+        assert_eq!(said.contains("height_offset") && said.contains("written again"), !is_same, "{said}");
+        assert!(resumed >= if is_same { 45 } else { 12 }, "{resumed} steps");
+        let georeference = fs::read_to_string(rig.folder.path().join("out/georeference.json")).unwrap();
+        assert!(georeference.contains("\"curved\": true"), "{georeference}");
+    }
+}
+
 #[test]
 fn an_option_of_the_mesh_starts_over_and_is_named() {
     let mut rig = rig();

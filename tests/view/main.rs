@@ -36,6 +36,15 @@ fn look(i: i64, j: i64) -> [i64; 2] {
     [2 + (i + j) % 4, (i * 900 + j) % 65_536]
 }
 
+/// Returns point number `i`, `j` of a grid in hundredths of a unit.
+type PointAt<'a> = &'a dyn Fn(i64, i64) -> [i64; 3];
+
+/// As [`point`], 21 km wide.
+fn far_point(i: i64, j: i64) -> [i64; 3] {
+    let [x, y, z] = point(i, j);
+    [50_000_000 + 100 * (x - 50_000_000), 480_000_000 + 100 * (y - 480_000_000), z]
+}
+
 fn text(hundredths: i64) -> String {
     format!("{}.{:02}", hundredths / 100, hundredths % 100)
 }
@@ -43,6 +52,11 @@ fn text(hundredths: i64) -> String {
 impl Terrain {
     /// Runs a job with these options.
     fn new(input: &str, output: &str) -> Terrain {
+        Terrain::of(&point, input, output)
+    }
+
+    /// Runs a job on the points of a grid with these options.
+    fn of(point: PointAt, input: &str, output: &str) -> Terrain {
         let folder = tempfile::tempdir().unwrap();
         let mut cloud = String::from("x,y,z,red,green,blue,class,intensity\n");
         for (i, j) in (0..SIDE * SIDE).map(|n| (n / SIDE, n % SIDE)) {
@@ -181,7 +195,7 @@ fn red_share(path: &Path) -> f64 {
 
 /// Asserts that the page draws the terrain, and that a click tells the coordinates of the source.
 #[track_caller]
-fn tells_the_source(terrain: &Terrain, chromium: &Path) {
+fn tells_the_source(terrain: &Terrain, point: PointAt, chromium: &Path) {
     for (i, j) in [(20, 33), (51, 8)] {
         let wanted = point(i, j);
         let seen = terrain.seen(chromium, &steps_to(terrain, wanted));
@@ -206,7 +220,17 @@ fn a_click_on_the_globe_tells_the_coordinates_of_the_source() {
     let terrain = Terrain::new("crs = \"EPSG:26910\"", &format!("format = \"3dtiles\"\n{ATTRIBUTES}"));
     let tileset: Value = serde_json::from_slice(&std::fs::read(terrain.out().join("tileset.json")).unwrap()).unwrap();
     assert!(tileset["root"]["transform"].is_array(), "it is on the globe, and has levels");
-    tells_the_source(&terrain, &chromium);
+    tells_the_source(&terrain, &point, &chromium);
+}
+
+/// The scene of a wide terrain follows the curve of the earth: the places clicked lie some metres below the plane of the source.
+#[test]
+fn a_click_on_a_curved_scene_tells_the_coordinates_of_the_source() {
+    let Some(chromium) = chromium() else { return };
+    let terrain = Terrain::of(&far_point, "crs = \"EPSG:26910\"", &format!("format = \"3dtiles\"\n{ATTRIBUTES}"));
+    let tileset: Value = serde_json::from_slice(&std::fs::read(terrain.out().join("tileset.json")).unwrap()).unwrap();
+    assert!(tileset["asset"]["extras"]["curvature"].is_object());
+    tells_the_source(&terrain, &far_point, &chromium);
 }
 
 #[test]
@@ -214,7 +238,7 @@ fn one_file_without_a_reference_system_is_shown_too() {
     let Some(chromium) = chromium() else { return };
     let terrain = Terrain::new("", &format!("format = \"glb\"\n{ATTRIBUTES}"));
     assert!(!terrain.out().join("tileset.json").exists());
-    tells_the_source(&terrain, &chromium);
+    tells_the_source(&terrain, &point, &chromium);
 }
 
 /// The steps of a user who does not wait between the places of the ruler, and makes a double click.

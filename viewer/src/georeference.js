@@ -24,6 +24,37 @@ export function latticeText(offset, step, count) {
   return decimalText(scaled(from) + scaled(by) * BigInt(count), places);
 }
 
+// The displacement, in metres east, north and up, by which the scene of a wide terrain follows the curve of the earth.
+class Curvature {
+  constructor({ centre, half, degree, coefficients }) {
+    Object.assign(this, { centre, half, degree, terms: Float64Array.from(coefficients.flat()) });
+  }
+
+  // Returns the displacement along one axis at a lattice place, whole or not. Pages ask for that of every vertex.
+  along(axis, place) {
+    const { degree, terms } = this;
+    const u = this.share(0, place);
+    const v = this.share(1, place);
+    const w = this.share(2, place);
+    let sum = 0;
+    // From the last term back, as one multiplies polynomials out.
+    let at = terms.length + axis;
+    for (let i = degree; i >= 0; i -= 1) {
+      let row = 0;
+      for (let j = degree - i; j >= 0; j -= 1) {
+        at -= 6;
+        row = row * v + terms[at] + w * terms[at + 3];
+      }
+      sum = sum * u + row;
+    }
+    return sum / 1024;
+  }
+
+  share(axis, place) {
+    return Math.min(Math.max((place[axis] - this.centre[axis]) / this.half[axis], -1), 1);
+  }
+}
+
 export class Georeference {
   // `extras` are those of a GLB or of `asset` in tileset.json; `file` is the name of that file.
   constructor(extras, file) {
@@ -34,23 +65,56 @@ export class Georeference {
     this.offset = extras.offset;
     this.steps = [extras.resolution, extras.resolution, extras.resolution_z];
     this.metres = [extras.metres_per_unit, extras.metres_per_unit, extras.metres_per_unit_z];
+    this.curvature = extras.curvature ? new Curvature(extras.curvature) : null;
     this.crs = /"([^"]*)"/.exec(extras.crs ?? '')?.[1] ?? null;
   }
 
+  // Returns the lattice place, whole or not, of metres east, north and up.
+  lattice(flat) {
+    return flat.map((metres, axis) => metres / (this.steps[axis] * this.metres[axis]));
+  }
+
+  // Returns by how many metres east, north and up the scene moves a place of the plane, also in metres.
+  displacement(flat) {
+    if (!this.curvature) return [0, 0, 0];
+    const place = this.lattice(flat);
+    return [0, 1, 2].map((axis) => this.curvature.along(axis, place));
+  }
+
+  // Returns the metres east, north and up on the plane of the source for a scene position, which may follow the curve of the earth.
+  flat([gx, gy, gz]) {
+    const moved = [gx, -gz, gy];
+    if (!this.curvature) return moved;
+    // The displacement changes so slowly that each round brings many more digits.
+    let flat = moved;
+    for (let round = 0; round < 12; round += 1) {
+      const displacement = this.displacement(flat);
+      flat = moved.map((metres, axis) => metres - displacement[axis]);
+    }
+    return flat;
+  }
+
+  // Returns nearly how far above its place on the plane a scene position lies, in metres: good enough for colours.
+  lift([gx, gy, gz]) {
+    return this.curvature ? this.curvature.along(2, this.lattice([gx, -gz, gy])) : 0;
+  }
+
   // Returns the source coordinates of a scene position in metres.
-  source([gx, gy, gz]) {
-    return [gx, -gz, gy].map((metres, axis) => this.offset[axis] + metres / this.metres[axis]);
+  source(position) {
+    return this.flat(position).map((metres, axis) => this.offset[axis] + metres / this.metres[axis]);
   }
 
   // Returns the scene position in metres of source coordinates.
   scene(source) {
-    const [x, y, z] = source.map((value, axis) => (value - this.offset[axis]) * this.metres[axis]);
+    const flat = source.map((value, axis) => (value - this.offset[axis]) * this.metres[axis]);
+    const displacement = this.displacement(flat);
+    const [x, y, z] = flat.map((metres, axis) => metres + displacement[axis]);
     return [x, z, -y];
   }
 
   // Returns the source coordinates of a vertex as texts, exactly: its scene position leads to whole steps of the lattice.
-  exactSource([gx, gy, gz]) {
-    return [gx, -gz, gy].map((metres, axis) => {
+  exactSource(position) {
+    return this.flat(position).map((metres, axis) => {
       const count = Math.round(metres / (this.steps[axis] * this.metres[axis]));
       return latticeText(this.offset[axis], this.steps[axis], count);
     });

@@ -19,7 +19,7 @@ export class OneFileTerrain {
     if (gltf.asset.copyright) this.attributions.add(gltf.asset.copyright);
     const sphere = new Box3().setFromObject(gltf.scene).getBoundingSphere(new Sphere());
     this.radius = sphere.radius;
-    this.dressing.add(gltf.scene, EXACT_COLOR, { uri: this.url.split('/').pop(), isExact: true, level: 1, error: 0 });
+    this.dressing.add(gltf.scene, EXACT_COLOR, { uri: this.url.split('/').pop(), isExact: true, level: 1, error: 0 }, this.georeference);
     this.object.position.copy(sphere.center).negate();
     this.object.add(gltf.scene);
     this.object.updateMatrixWorld(true);

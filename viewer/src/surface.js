@@ -1,5 +1,5 @@
 // How the terrain looks: one shader for all ways of colouring it. Colours and lights are reckoned in the frame of the glTF scene, whose
-// y is the height in the source, wherever on the globe a tile lies.
+// y is the height in the source, wherever on the globe a tile lies. Where a scene follows the curve of the earth, `lift` is taken off.
 import { Color, DoubleSide, Matrix3, Matrix4, ShaderMaterial } from 'three';
 
 export const MODES = ['points', 'height', 'slope', 'levels'];
@@ -22,8 +22,14 @@ varying vec3 place;
 varying vec3 upright;
 varying vec3 pointColor;
 uniform vec3 plainColor;
+#ifdef IS_BENT
+  attribute float lift;
+#endif
 void main() {
   height = (toScene * vec4(position, 1.0)).y;
+  #ifdef IS_BENT
+    height -= lift;
+  #endif
   place = mat3(toScene) * position;
   #ifdef HAS_NORMALS
     upright = toSceneNormal * normal;
@@ -97,7 +103,7 @@ export class Surface {
 
   // Returns the material of a mesh. `toScene` leads from its own frame to that of its glTF scene.
   material(mesh, toScene, levelColor) {
-    const { normal, color } = mesh.geometry.attributes;
+    const { normal, color, lift } = mesh.geometry.attributes;
     return new ShaderMaterial({
       uniforms: {
         ...this.shared,
@@ -106,7 +112,7 @@ export class Surface {
         plainColor: { value: mesh.material.color.clone() },
         levelColor: { value: new Color(levelColor) },
       },
-      defines: normal ? { HAS_NORMALS: '' } : {},
+      defines: { ...(normal && { HAS_NORMALS: '' }), ...(lift && { IS_BENT: '' }) },
       vertexShader: VERTEX,
       fragmentShader: FRAGMENT,
       vertexColors: Boolean(color),

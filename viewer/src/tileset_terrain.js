@@ -78,7 +78,7 @@ export class TilesetTerrain {
     const facts = { uri: tile.content.uri.replace(/^(\.\.\/)+/, ''), isExact, level, error };
     const { copyright } = tile.engineData.metadata?.asset ?? {};
     if (copyright) this.attributions.add(copyright);
-    this.dressing.add(scene, color, facts);
+    this.dressing.add(scene, color, facts, this.georeference);
   }
 
   // The levels of the coarser tiles on the screen, and whether there are exact ones.

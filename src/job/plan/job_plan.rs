@@ -11,6 +11,7 @@ use crate::job::plan::input_identity::RenamedInputs;
 use crate::job::plan::lattice_choice::LatticeCoarsening;
 use crate::job::plan::missing_attributes::missing_attributes;
 use crate::output::color::HeightRange;
+use crate::output::curvature::Curvature;
 use crate::output::frame::Frame;
 use crate::{Error, Result, Warnings};
 use serde::{Deserialize, Serialize};
@@ -18,7 +19,7 @@ use std::path::{Path, PathBuf};
 
 /// What a job reads and where it puts it. The plan holds everything that later steps need besides what earlier steps stored: no step
 /// reads a header again. What steps compute from it is the same on every machine, except the transforms onto the globe, which the
-/// step that publishes computes once.
+/// step that publishes computes once, and the curvature, which is computed once too.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Plan {
     /// What the user wants.
@@ -44,8 +45,12 @@ pub struct Plan {
     pub crs: Crs,
     /// The name of the unit of x and y.
     pub unit: String,
-    /// The way from the lattice to glTF.
+    /// The way from the lattice to glTF, of a scene that is not bent.
     pub frame: Frame,
+    /// How the scene follows the curve of the earth. It is found once and kept, because it comes from a machine's mathematics library: in a
+    /// job of several parts before the plan is written down, in others once the points are read.
+    #[serde(default)]
+    pub curvature: Option<Curvature>,
     /// What the user should know about the inputs. [`Plan::all_warnings`] adds what there is to know about the options.
     pub warnings: Warnings,
 }

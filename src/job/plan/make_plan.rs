@@ -142,6 +142,7 @@ fn try_plan(
         crs,
         unit: unit.into(),
         frame,
+        curvature: None,
         warnings,
     };
     Ok((plan, rules.into_iter().zip(claimed).collect()))

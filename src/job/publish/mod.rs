@@ -1,5 +1,6 @@
 //! Step 8: writes what is beside the tiles.
 
+pub mod flat_tile;
 pub mod height_offset_check;
 pub mod one_file_limits;
 pub mod placement;

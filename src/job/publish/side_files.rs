@@ -5,9 +5,10 @@ use crate::job::durable::columns::ColumnReader;
 use crate::job::durable::directory::JobDirectory;
 use crate::job::index::TileIndex;
 use crate::job::partition::tree::Tree;
+use crate::job::publish::flat_tile::FlatScene;
 use crate::job::records::{StepOutput, StepRecord, Store};
 use crate::output::frame::Frame;
-use crate::output::gltf::one_file::write_terrain;
+use crate::output::gltf::one_file::{write_remade_terrain, write_terrain};
 use crate::output::page::page_for;
 use crate::output::preview::canvas::{Canvas, PreviewPixel};
 use crate::output::preview::layout::world_file;
@@ -25,6 +26,8 @@ pub struct SideFiles<'a> {
     pub tileset: Option<(&'a Frame, TilesetNode)>,
     /// Whether there is to be a `terrain.glb`. It is made from the tiles, which must have their names.
     pub one_file: bool,
+    /// How the tiles become flat for it, if they are bent.
+    pub flat: Option<FlatScene<'a>>,
     /// Whether there is to be a page that shows the terrain.
     pub page: bool,
     /// Whose the data are, if the user says.
@@ -65,7 +68,11 @@ pub fn write_side_files(
             paths.extend(written(output.tile(tile.number()))?);
             Ok(())
         })?;
-        write_terrain(&partial_path(&output.terrain()), &paths, content.copyright)?;
+        let terrain = partial_path(&output.terrain());
+        match &content.flat {
+            None => write_terrain(&terrain, &paths, content.copyright)?,
+            Some(flat) => write_remade_terrain(&terrain, &paths, &|path| flat.tile(path), content.copyright)?,
+        }
         files.push(find_pending(&output.terrain())?);
     }
     let bytes = files.iter().map(|file| file.bytes).sum();

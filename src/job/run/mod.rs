@@ -2,6 +2,7 @@
 
 pub(crate) mod alone;
 pub(crate) mod attempt;
+pub(crate) mod curve_step;
 pub(crate) mod damage;
 pub(crate) mod finished;
 pub(crate) mod freeing;

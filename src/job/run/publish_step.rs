@@ -7,6 +7,7 @@ use crate::job::durable::journal::PublishedFile;
 use crate::job::levels::make_level::LevelStats;
 use crate::job::mesh::leaf::LeafStats;
 use crate::job::plan::job_plan::Plan;
+use crate::job::publish::flat_tile::FlatScene;
 use crate::job::publish::one_file_limits::{fits_one_file, too_large_for_one_file};
 use crate::job::publish::placement::{heights_warning, place, placement_warning};
 use crate::job::publish::side_files::{EachTile, SideFiles, write_side_files};
@@ -15,6 +16,7 @@ use crate::job::report::job_report::{Report, ReportParts, SlowestPart};
 use crate::job::run::levels_step::left_out_warning;
 use crate::job::run::run_context::RunContext;
 use crate::job::run::tile_queue::TileLook;
+use crate::job::tiles::style::TileStyle;
 use crate::job::tiles::write_tile::TileStats;
 use crate::output::checksums::list_text;
 use crate::output::color::Coloring;
@@ -99,6 +101,12 @@ pub(crate) struct Published {
     pub(crate) warnings: Warnings,
 }
 
+/// Returns how the tiles of a scene that is bent become flat.
+fn flat_scene<'a>(plan: &Plan, style: &'a TileStyle, bounds: Bounds<3>) -> Option<FlatScene<'a>> {
+    let (flat, compression) = (style.flat_frame(plan, bounds), style.compression);
+    plan.curvature.is_some().then_some(FlatScene { bent: &style.frame, flat, compression })
+}
+
 /// Writes what is beside the tiles. `levels` is there if viewers get 3D Tiles.
 ///
 /// # Errors
@@ -129,7 +137,7 @@ pub(crate) fn publish(
         text = Some((&look.style.frame, root));
         (placement, stats) = (placed.ok(), levels);
     }
-    let georeference = Georeference::new(&plan.frame, &plan.lattice, bounds, &plan.unit, plan.crs.epsg);
+    let georeference = Georeference::new(&look.style.frame, &plan.lattice, bounds, &plan.unit, plan.crs.epsg);
     let tiles = &written.stats;
     let fits = fits_one_file(tiles);
     let page_of_others = output.page && run.directory.has_page_of_others()?;
@@ -141,6 +149,7 @@ pub(crate) fn publish(
         georeference: georeference.to_json(placement.as_ref())?,
         tileset: text,
         one_file: fits && output.format != OutputFormat::Tiles3d,
+        flat: flat_scene(plan, &look.style, bounds),
         page: output.page && !page_of_others,
         copyright: output.copyright(),
         has_ramp: matches!(look.style.coloring, None | Some(Coloring::Elevation(_))),

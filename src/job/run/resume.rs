@@ -364,7 +364,9 @@ impl ResumeReview {
             JobStep::Leaf(tile) => self.leaf_stays(tile),
             JobStep::Merge(node) => self.merge_stays(node),
             JobStep::BorderNormals(tile) => self.border_stays(tile),
-            JobStep::Partition | JobStep::WriteTile(_) | JobStep::Level(_) => self.whole.contains(&step),
+            JobStep::Partition | JobStep::Curve | JobStep::WriteTile(_) | JobStep::Level(_) => {
+                self.whole.contains(&step)
+            }
             JobStep::Publish => self.all_written && self.whole.contains(&step),
             // A run with all its results whole does not come here. Any other writes a new report, and the journal must name only one.
             JobStep::Report => false,

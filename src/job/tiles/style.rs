@@ -28,6 +28,14 @@ pub struct TileStyle {
     pub copyright: Option<String>,
 }
 
+/// Returns the frame with the steps of tiles that are packed like this and lie within `bounds`.
+fn with_steps(frame: Frame, compression: Compression, bounds: Bounds<3>) -> Frame {
+    match compression {
+        Compression::None => frame.refined(bounds),
+        Compression::Meshopt | Compression::Quantized => frame.packed(),
+    }
+}
+
 impl TileStyle {
     /// Returns the style of the tiles of a job whose points are within `bounds`, and whose greatest colour is `max_rgb`. A ramp of colours
     /// spans `heights`.
@@ -41,12 +49,17 @@ impl TileStyle {
             ColorChoice::Auto | ColorChoice::Rgb => Some(Coloring::Rgb { eight_bit: max_rgb <= 255 }),
         };
         let compression = output.packing();
-        let frame = match compression {
-            Compression::None => plan.frame.clone().refined(bounds),
-            _ => plan.frame.clone().packed(),
+        let frame = match &plan.curvature {
+            Some(curvature) => plan.frame.clone().curved(curvature.clone()),
+            None => plan.frame.clone(),
         };
+        let frame = with_steps(frame, compression, bounds);
         let copyright = output.copyright().map(str::to_owned);
         let OutputOptions { attributes, normals, .. } = *output;
         TileStyle { frame, coloring, attributes, normals, compression, max_edge, copyright }
+    }
+    /// Returns the frame of these tiles in a scene that is not bent. The points of the job are within `bounds`.
+    pub fn flat_frame(&self, plan: &Plan, bounds: Bounds<3>) -> Frame {
+        with_steps(plan.frame.clone(), self.compression, bounds)
     }
 }

@@ -1,7 +1,7 @@
 //! The outer form of a GLB file: a header and two chunks, one of JSON and one of binary data.
 
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
+use std::io::{Cursor, Read, Seek, SeekFrom};
 use std::path::Path;
 
 use serde::Deserialize;
@@ -13,9 +13,14 @@ const VERSION: u32 = 2;
 const JSON_CHUNK: u32 = u32::from_le_bytes(*b"JSON");
 const BIN_CHUNK: u32 = u32::from_le_bytes(*b"BIN\0");
 
+/// What a GLB file is read from: a file, or memory.
+trait Bytes: Read + Seek + Send {}
+
+impl<T: Read + Seek + Send> Bytes for T {}
+
 /// An open GLB file: its JSON chunk, and where its binary chunk is.
 pub(crate) struct GlbFile {
-    file: File,
+    file: Box<dyn Bytes>,
     json: Vec<u8>,
     binary_start: u64,
     /// Bytes in the binary chunk.
@@ -29,13 +34,24 @@ impl GlbFile {
         if !path.metadata().map_err(Error::io("open", path))?.is_file() {
             return Err(Error::input(path, "is not a regular file"));
         }
-        let mut file = fault::read("read-result").and_then(|()| File::open(path)).map_err(Error::io("open", path))?;
+        let file = fault::read("read-result").and_then(|()| File::open(path)).map_err(Error::io("open", path))?;
         let size = file.metadata().map_err(Error::io("read", path))?.len();
+        GlbFile::of(path, Box::new(file), size)
+    }
+
+    /// Takes `bytes` as the file that is called `path`.
+    pub(crate) fn in_memory(path: &Path, bytes: Vec<u8>) -> Result<GlbFile> {
+        let size = bytes.len() as u64;
+        GlbFile::of(path, Box::new(Cursor::new(bytes)), size)
+    }
+
+    fn of(path: &Path, mut file: Box<dyn Bytes>, size: u64) -> Result<GlbFile> {
         let damaged = |what: &str| Error::input(path, format!("not a whole GLB file: {what}"));
         if size < 20 {
             return Err(damaged("shorter than its header"));
         }
-        let [magic, version, total, json_length, json_kind] = read_words(&mut file).map_err(Error::io("read", path))?;
+        let [magic, version, total, json_length, json_kind] =
+            read_words(&mut *file).map_err(Error::io("read", path))?;
         if magic != MAGIC || version != VERSION || json_kind != JSON_CHUNK {
             return Err(damaged("it does not start as glTF 2.0"));
         }
@@ -50,7 +66,7 @@ impl GlbFile {
         file.read_exact(&mut json).map_err(Error::io("read", path))?;
         let mut container = GlbFile { file, json, binary_start: json_end + 8, binary_length: 0 };
         if json_end + 8 <= size {
-            let [length, kind] = read_words(&mut container.file).map_err(Error::io("read", path))?;
+            let [length, kind] = read_words(&mut *container.file).map_err(Error::io("read", path))?;
             if kind != BIN_CHUNK || container.binary_start + length as u64 != size {
                 return Err(damaged("its second chunk is not binary data up to the end"));
             }
@@ -80,7 +96,7 @@ impl GlbFile {
     }
 }
 
-fn read_words<const N: usize>(file: &mut File) -> std::io::Result<[u32; N]> {
+fn read_words<const N: usize>(file: &mut dyn Bytes) -> std::io::Result<[u32; N]> {
     let mut words = [[0u8; 4]; N];
     file.read_exact(words.as_flattened_mut())?;
     Ok(words.map(u32::from_le_bytes))

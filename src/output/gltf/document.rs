@@ -101,18 +101,18 @@ impl<'a> DocumentBuilder<'a> {
 
     fn add_positions(&mut self, part: &SplitPart, order: Option<&[u32]>) -> Result<Index<Accessor>> {
         let positions = &part.tile.positions;
-        let Bounds { min, max } = part.tile.bounds().unwrap_or(Bounds::of_point([0; 3]));
-        // The map from the lattice is monotonic, and it turns y round.
-        let [low, high] = [[min[0], max[1], min[2]], [max[0], min[1], max[2]]];
         let (frame, origin) = (self.frame, part.origin);
+        let bounds = part.tile.bounds().unwrap_or(Bounds::of_point([0; 3]));
+        let extent = frame.extent_within(positions, bounds).map(|end| [0, 1, 2].map(|k| end[k] - origin[k]));
         if self.compression == Compression::None {
             let local = |p| frame.local(p, origin);
-            return self.add_attribute(positions, order, local, ElementType::position([local(low), local(high)]));
+            let ends = extent.map(|end| frame.metres(end).map(|v| v as f32));
+            return self.add_attribute(positions, order, local, ElementType::position(ends));
         }
         let steps = |p| frame.local_steps(p, origin);
-        let element = ElementType::position([low, high].map(|p| steps(p).map(|v| v as f32)));
+        let element = ElementType::position(extent.map(|end| end.map(|v| v as f32)));
         if !part.short {
-            let is_near = [low, high].map(steps).as_flattened().iter().all(|v| v.abs() < EXPONENTIAL_REACH);
+            let is_near = extent.as_flattened().iter().all(|v| v.abs() < EXPONENTIAL_REACH);
             if self.compression == Compression::Meshopt && is_near {
                 let convert = |p| steps(p).map(exponential);
                 return self.add_attribute(positions, order, convert, element.filtered(PackedFilter::Exponential));

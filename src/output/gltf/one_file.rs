@@ -27,9 +27,30 @@ use crate::{Error, Result, disk, interrupt};
 /// [`Error::Config`] if the file would pass the 4 GiB that a GLB file can have, [`Error::Input`] if a tile is damaged,
 /// [`Error::Io`] if a file cannot be read or written.
 pub fn write_terrain(out: &Path, tiles: &[PathBuf], copyright: Option<&str>) -> Result<()> {
+    write(out, tiles, &GlbFile::open, copyright)
+}
+
+/// As [`write_terrain`], with the bytes that `remake` returns for each tile in the place of its file. They must be the same each time.
+///
+/// # Errors
+/// As [`write_terrain`], and those of `remake`.
+pub fn write_remade_terrain(
+    out: &Path,
+    tiles: &[PathBuf],
+    remake: &dyn Fn(&Path) -> Result<Vec<u8>>,
+    copyright: Option<&str>,
+) -> Result<()> {
+    write(out, tiles, &|path| GlbFile::in_memory(path, remake(path)?), copyright)
+}
+
+/// Opens the tile at a path.
+type OpenTile<'a> = &'a dyn Fn(&Path) -> Result<GlbFile>;
+
+fn write(out: &Path, tiles: &[PathBuf], open: OpenTile, copyright: Option<&str>) -> Result<()> {
     let mut joined = JoinedDocument::default();
     for path in tiles {
-        let file = GlbFile::open(path)?;
+        interrupt::check()?;
+        let file = open(path)?;
         joined.add(path, &file.document(path)?).map_err(|what| not_a_tile(path, what))?;
     }
     let length = joined.length;
@@ -42,7 +63,7 @@ pub fn write_terrain(out: &Path, tiles: &[PathBuf], copyright: Option<&str>) -> 
     let mut written = 0;
     for path in tiles {
         interrupt::check()?;
-        written += copy_views(path, &mut file)?;
+        written += copy_views(path, open(path)?, &mut file)?;
     }
     if written != length {
         return Err(Error::input(out, "the tiles changed while they were joined"));
@@ -54,9 +75,8 @@ fn not_a_tile(path: &Path, what: String) -> Error {
     Error::input(path, format!("not a tile of this program: {what}"))
 }
 
-/// Writes the unpacked data of the tile at `path`, and returns the number of bytes written.
-fn copy_views(path: &Path, file: &mut impl Write) -> Result<u64> {
-    let mut tile = GlbFile::open(path)?;
+/// Writes the unpacked data of `tile`, which is at `path`, and returns the number of bytes written.
+fn copy_views(path: &Path, mut tile: GlbFile, file: &mut impl Write) -> Result<u64> {
     let views = stored_views(&tile.document(path)?).map_err(|what| not_a_tile(path, what))?;
     let binary = tile.binary(path)?;
     let mut written = 0;

@@ -29,7 +29,7 @@ pub(crate) struct SplitPart<'a> {
 /// [`Error::Config`] if a single triangle is too long.
 pub(crate) fn split<'a>(frame: &Frame, tile: &'a Tile) -> Result<Vec<SplitPart<'a>>> {
     let Some(bounds) = tile.bounds() else { return Ok(Vec::new()) };
-    if let Some(origin) = common_origin(frame, &[bounds.min, bounds.max], FINE_GRID) {
+    if let Some(origin) = common_origin(frame.extent_within(&tile.positions, bounds), FINE_GRID) {
         return Ok(vec![SplitPart { origin, short: false, tile: Cow::Borrowed(tile) }]);
     }
     split_triangles(frame, tile, &tile.triangles)
@@ -40,8 +40,9 @@ fn split_triangles(frame: &Frame, tile: &Tile, triangles: &[[u32; 3]]) -> Result
     let mut groups = BTreeMap::<[i64; 3], Vec<[u32; 3]>>::new();
     for &triangle in triangles {
         let corners = triangle.map(|v| tile.positions[v as usize]);
-        let origin = common_origin(frame, &corners, COARSE_GRID)
-            .or_else(|| common_origin(frame, &corners, FINE_GRID))
+        let extent = frame.extent(&corners);
+        let origin = common_origin(extent, COARSE_GRID)
+            .or_else(|| common_origin(extent, FINE_GRID))
             .ok_or_else(|| too_long(frame, corners))?;
         groups.entry(origin.map(|v| v as i64)).or_default().push(triangle);
     }
@@ -59,31 +60,22 @@ fn split_triangles(frame: &Frame, tile: &Tile, triangles: &[[u32; 3]]) -> Result
 /// As [`split`].
 pub(crate) fn split_short<'a>(frame: &Frame, tile: &'a Tile) -> Result<Vec<SplitPart<'a>>> {
     let Some(bounds) = tile.bounds() else { return Ok(Vec::new()) };
-    let [low, high] = extent(frame, &[bounds.min, bounds.max]);
+    let [low, high] = frame.extent_within(&tile.positions, bounds);
     match short_origin(low, high) {
         Some(origin) => Ok(vec![SplitPart { origin, short: true, tile: Cow::Borrowed(tile) }]),
         None => split(frame, tile),
     }
 }
 
-/// Returns the origin on `grid` next to the middle of `points`, if all of them are within reach of it.
-fn common_origin(frame: &Frame, points: &[[i32; 3]], grid: i64) -> Option<[f64; 3]> {
-    let [low, high] = extent(frame, points);
+/// Returns the origin on `grid` next to the middle between `low` and `high`, in steps, if both are within reach of it.
+fn common_origin([low, high]: [[f64; 3]; 2], grid: i64) -> Option<[f64; 3]> {
     let origin = origin_between(low, high, grid);
     let reach = (PART_REACH + FINE_GRID / 2) as f64;
     (0..3).all(|k| high[k] - origin[k] <= reach && origin[k] - low[k] <= reach).then_some(origin)
 }
 
-/// Returns the least and greatest glTF coordinates of `points` in steps.
-fn extent(frame: &Frame, points: &[[i32; 3]]) -> [[f64; 3]; 2] {
-    let none = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    points.iter().map(|&p| frame.steps(p)).fold(none, |[low, high], point| {
-        [[0, 1, 2].map(|k| low[k].min(point[k])), [0, 1, 2].map(|k| high[k].max(point[k]))]
-    })
-}
-
 fn too_long(frame: &Frame, corners: [[i32; 3]; 3]) -> Error {
-    let [low, high] = extent(frame, &corners);
+    let [low, high] = frame.extent(&corners);
     let (length, limit) = (frame.metres([0, 1, 2].map(|k| high[k] - low[k])), frame.longest_triangle());
     let factor = [length[0] / limit[0], length[2] / limit[0], length[1] / limit[1]].into_iter().fold(1.0, f64::max);
     let extras = frame.extras();

@@ -38,7 +38,8 @@ impl Georeference {
             epsg,
             bounds: [bounds.min, bounds.max].map(|corner| [0, 1, 2].map(|axis| lattice.world(axis, corner[axis]))),
             rule: "With (gx, gy, gz) a position in metres after the node transforms: x = offset[0] + gx / \
-                   metres_per_unit, y = offset[1] - gz / metres_per_unit, z = offset[2] + gy / metres_per_unit_z.",
+                   metres_per_unit, y = offset[1] - gz / metres_per_unit, z = offset[2] + gy / metres_per_unit_z. If there is a \
+                   curvature, subtract its displacement first.",
         }
     }
 

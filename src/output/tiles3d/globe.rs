@@ -5,7 +5,7 @@
 
 use crate::Error;
 use crate::output::geoid::Geoid;
-use glam::{DAffine3, DMat4};
+use glam::{DAffine3, DMat3, DMat4, DVec3};
 use proj4rs::Proj;
 use proj4rs::transform::transform;
 
@@ -65,7 +65,11 @@ impl Globe {
         self.place_above_ellipsoid(x, y, height + offset)
     }
 
-    fn place_above_ellipsoid(&self, x: f64, y: f64, height: f64) -> Result<[f64; 3], NotPlaced> {
+    /// Returns the earth-centred place at `x`, `y` (source units), `height` metres above the ellipsoid.
+    ///
+    /// # Errors
+    /// [`NotPlaced::System`] if the place is outside the range of the projection.
+    pub fn place_above_ellipsoid(&self, x: f64, y: f64, height: f64) -> Result<[f64; 3], NotPlaced> {
         let [longitude, latitude] = self.geographic(x, y)?;
         let (sin, cos) = latitude.sin_cos();
         let normal = SEMI_MAJOR / (1.0 - ECCENTRICITY_2 * sin * sin).sqrt();
@@ -139,6 +143,13 @@ pub fn transform_point(transform: &[f64; 16], place: [f64; 3]) -> [f64; 3] {
     affine(transform).transform_point3(place.into()).into()
 }
 
+/// Returns `transform` behind the linear map with these columns.
+pub(super) fn after_linear(transform: &[f64; 16], columns: [[f64; 3]; 3]) -> [f64; 16] {
+    let mut transform = affine(transform);
+    transform.matrix3 *= DMat3::from_cols_array_2d(&columns);
+    DMat4::from(transform).to_cols_array()
+}
+
 /// Returns the transform that, followed by `outer`, leads to the same place as `inner`. `outer` must have an inverse.
 pub fn relative_transform(outer: &[f64; 16], inner: &[f64; 16]) -> [f64; 16] {
     let (outer, inner) = (affine(outer), affine(inner));
@@ -146,6 +157,13 @@ pub fn relative_transform(outer: &[f64; 16], inner: &[f64; 16]) -> [f64; 16] {
     // Earth-centred places are far longer than their difference, so it is taken first.
     let translation = back * (inner.translation - outer.translation);
     DMat4::from(DAffine3 { matrix3: back * inner.matrix3, translation }).to_cols_array()
+}
+
+/// Returns the place of the tileset that `transform`, which must have an inverse, maps to `place` in metres.
+pub fn relative_place(transform: &[f64; 16], place: [f64; 3]) -> [f64; 3] {
+    let transform = affine(transform);
+    // Earth-centred places are far longer than their difference, so it is taken first.
+    (transform.matrix3.inverse() * (DVec3::from(place) - transform.translation)).into()
 }
 
 fn affine(transform: &[f64; 16]) -> DAffine3 {

@@ -14,6 +14,12 @@ use crate::output::frame::Frame;
 use crate::output::gltf::schema::GENERATOR;
 use crate::output::tiles3d::globe::{relative_transform, transform_point};
 
+/// Cells along a side of a tile at whose corners its bent box is measured.
+const BULGE_CELLS: i64 = 8;
+
+/// A length in metres that is below the radius of the earth.
+const EARTH: f64 = 6e6;
+
 /// Half the least extent of a bounding volume in metres. Viewers divide by it.
 const LEAST_HALF: f64 = 0.005;
 
@@ -169,10 +175,24 @@ fn union(a: MetreBounds, b: MetreBounds) -> MetreBounds {
 
 /// Returns the least and greatest x, y, z of `bounds` in metres of the tileset.
 pub fn bounds_in_metres(frame: &Frame, bounds: Bounds<3>) -> [[f64; 3]; 2] {
-    [bounds.min, bounds.max].map(|corner| {
+    let place = |corner| {
         let [x, up, z] = frame.world(corner);
         [x, 0.0 - z, up]
-    })
+    };
+    if frame.extras().curvature.is_none() {
+        return [bounds.min, bounds.max].map(place);
+    }
+    // Between the places looked at, a bent box bulges by their distance squared over the size of the earth.
+    let side = [0, 1].map(|k| bounds.extent(k) as f64 * frame.resolution_metres()[0] / BULGE_CELLS as f64);
+    let bulge =
+        (side[0] * side[0] + side[1] * side[1]) / EARTH + frame.resolution_metres().into_iter().fold(0.0, f64::max);
+    let along = |k: usize, n: i64, cells: i64| (bounds.min[k] as i64 + bounds.extent(k) * n / cells) as i32;
+    let line = BULGE_CELLS + 1;
+    let corners = (0..line * line * 2).map(|i| {
+        [along(0, i % line, BULGE_CELLS), along(1, i / line % line, BULGE_CELLS), along(2, i / line / line, 1)]
+    });
+    let around = corners.map(|corner| [place(corner); 2]).reduce(union).unwrap_or([[0.0; 3]; 2]);
+    [around[0].map(|v| v - bulge), around[1].map(|v| v + bulge)]
 }
 
 /// Returns the centre and the half axes of a box.

@@ -40,6 +40,7 @@ use crate::job::run::parts::read_phase::{read_for, sum_up};
 use crate::job::run::parts::tile_phase::{ForeignBorders, finish_part};
 use crate::job::run::publish_step::wants_tileset;
 use crate::job::run::run_context::RunContext;
+use crate::job::tiles::curve::curvature_of;
 use crate::{Error, Result};
 use std::collections::HashMap;
 
@@ -48,7 +49,7 @@ use std::collections::HashMap;
 /// # Errors
 /// Those of the steps; [`Error::NeedsOnePart`] if what is read contradicts the headers; [`Error::DamagedSteps`] if what an interrupted run
 /// left proves damaged.
-pub(crate) fn walk(run: &RunContext, plan: &Plan) -> Result<Report> {
+pub(crate) fn walk(run: &RunContext, plan: Plan) -> Result<Report> {
     // What was freed cannot be done again, so a missing result may show only when another step needs it.
     let goes_on = run.resumed > 0 || run.is_by_tasks;
     do_phases(run, plan).map_err(|error| match error {
@@ -57,10 +58,10 @@ pub(crate) fn walk(run: &RunContext, plan: &Plan) -> Result<Report> {
     })
 }
 
-fn do_phases(run: &RunContext, plan: &Plan) -> Result<Report> {
+fn do_phases(run: &RunContext, plan: Plan) -> Result<Report> {
+    let plan = &write_plan(run.journal, run.directory, plan)?;
     let parts = &Parts::of(plan);
     let job = &PartsJob::of_run(run, plan, parts);
-    write_plan(run.journal, run.directory, plan)?;
     // Steps 2 to 6 for each part, as far as it needs no later one.
     let stores = &PartStores::new(job.directory, job.job_id);
     let (meshed, bounds, mut before) = read_and_mesh(job, stores)?;
@@ -83,15 +84,19 @@ fn do_phases(run: &RunContext, plan: &Plan) -> Result<Report> {
     publish_parts(run, job, stores, &joined)
 }
 
-/// Writes the plan down, unless that is done.
+/// Returns the plan with the curvature of the scene, and writes it down, unless that is done.
 ///
 /// # Errors
-/// [`Error::Io`] if it cannot be written.
-pub(crate) fn write_plan(journal: &Journal, directory: &JobDirectory, plan: &Plan) -> Result<()> {
-    journal.step(JobStep::Plan, || {
+/// [`Error::Io`] if it cannot be written, and those of [`curvature_of`].
+pub(crate) fn write_plan(journal: &Journal, directory: &JobDirectory, mut plan: Plan) -> Result<Plan> {
+    if let (false, Some(claims)) = (journal.has(JobStep::Plan), plan.claims) {
+        plan.curvature = curvature_of(&plan, claims.bounds)?;
+    }
+    plan.curvature = journal.step(JobStep::Plan, || {
         let files = vec![plan.write(&directory.plan())?];
-        Ok(StepOutput { files, ..StepOutput::new((), Vec::new()) })
-    })
+        Ok(StepOutput { files, ..StepOutput::new(plan.curvature.clone(), Vec::new()) })
+    })?;
+    Ok(plan)
 }
 
 /// Reads and meshes all parts, or those that an interrupted run left. Returns them, the box of all points, and what writing tiles of each

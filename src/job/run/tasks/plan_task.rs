@@ -55,7 +55,7 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> Result<Option<Strin
     Alone::forget(directory)?;
     on_threads(threads, || {
         let start = start_parts(directory, &header, earlier, run.progress)?;
-        write_plan(&start.journal, directory, &plan)?;
+        write_plan(&start.journal, directory, plan)?;
         start.journal.commit()?;
         start.journal.close();
         Ok(None)

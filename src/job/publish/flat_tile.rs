@@ -1,0 +1,36 @@
+//! Tiles for `terrain.glb` where the tiles themselves follow the curve of the earth: viewers of one file know no globe.
+
+use crate::output::Compression;
+use crate::output::frame::Frame;
+use crate::output::gltf::glb::GlbEncoder;
+use crate::output::gltf::read::read_tile;
+use crate::output::lod::join::join;
+use crate::{Error, Result};
+use std::path::Path;
+
+/// The way from the scene of the tiles to one that is the plane of the source.
+pub struct FlatScene<'a> {
+    /// The frame of the tiles.
+    pub bent: &'a Frame,
+    /// The frame of the flat scene.
+    pub flat: Frame,
+    /// How the tiles are packed.
+    pub compression: Compression,
+}
+
+impl FlatScene<'_> {
+    /// Returns the tile at `path` as a GLB file of the flat scene. It is not packed with meshopt.
+    ///
+    /// # Errors
+    /// [`Error::Io`] or [`Error::Input`] if the tile cannot be read or is damaged, [`Error::Config`] if a triangle is too long for f32.
+    pub fn tile(&self, path: &Path) -> Result<Vec<u8>> {
+        let tile = join(self.bent, &[read_tile(path)?]).map_err(|what| Error::input(path, what.to_string()))?;
+        let compression = match self.compression {
+            Compression::Meshopt => Compression::Quantized,
+            plain => plain,
+        };
+        let mut glb = GlbEncoder::default();
+        glb.encode(&self.flat, &tile, compression, None)?;
+        Ok(glb.pieces().concat())
+    }
+}

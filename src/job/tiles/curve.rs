@@ -1,0 +1,58 @@
+//! Whether the scene of a job follows the curve of the earth, and how.
+
+use crate::Result;
+use crate::geometry::Bounds;
+use crate::job::plan::globe_definition::globe_definition;
+use crate::job::plan::job_plan::Plan;
+use crate::output::compression::Compression;
+use crate::output::curvature::Curvature;
+use crate::output::geoid::Geoid;
+use crate::output::options::OutputFormat;
+use crate::output::tiles3d::curve_fit::{Bent, fit_curvature};
+use crate::output::tiles3d::globe::NotPlaced;
+use crate::output::tiles3d::ground::Ground;
+
+/// The greatest distortion in metres with which one transform places all tiles of a scene that is not bent. Datums that differ from the
+/// globe's by as much are accepted too.
+pub const ONE_TRANSFORM: f64 = 1.0;
+
+/// The same for a scene that is bent upwards alone. All that is left is sideways: at the ends of 24 km in the Alps, or at the edge of a UTM
+/// zone, some metres. With one transform tiles meet exactly, which is worth more than these.
+pub const ONE_TRANSFORM_SIDEWAYS: f64 = 5.0;
+
+/// Tells whether the scene of a job may be bent, if the terrain is wide.
+pub fn may_be_bent(plan: &Plan) -> bool {
+    bendable(plan).is_some()
+}
+
+/// Returns the projected system of a scene that may be bent.
+fn bendable(plan: &Plan) -> Option<String> {
+    let definition = globe_definition(&plan.crs, plan.frame.extras().metres_per_unit).ok();
+    definition.filter(|_| plan.options.output.format != OutputFormat::Glb)
+}
+
+/// Returns the curvature of the scene of a job whose points are within `bounds`. `None` if the scene is a plane: the terrain is small,
+/// nothing says where on the globe it lies, or the user wants one file, whose viewers know no globe.
+///
+/// # Errors
+/// [`crate::Error::Config`] if the geoid has no height anywhere, or its file is damaged; [`crate::Error::Io`] if it cannot be read.
+pub fn curvature_of(plan: &Plan, bounds: Bounds<3>) -> Result<Option<Curvature>> {
+    let Some(definition) = bendable(plan) else { return Ok(None) };
+    let (output, extras) = (&plan.options.output, plan.frame.extras());
+    let geoid = Geoid::open(output.height_offset.as_ref())?;
+    let found = Ground::new(extras, &definition, geoid).and_then(|ground| {
+        let distortion = ground.distortion(&ground.tangent(ground.seen_from(bounds)?)?, bounds)?;
+        let bent = match output.packing() {
+            Compression::Meshopt => Bent::All,
+            // Programs that read these take x and y as they are.
+            Compression::None | Compression::Quantized => Bent::Up,
+        };
+        (distortion > ONE_TRANSFORM).then(|| fit_curvature(&ground, bounds, bent)).transpose()
+    });
+    match found {
+        // The step that publishes says why a terrain has no place on the globe.
+        Err(NotPlaced::System(_)) => Ok(None),
+        Err(NotPlaced::Height(error)) => Err(error),
+        Ok(curvature) => Ok(curvature),
+    }
+}
