@@ -1,12 +1,13 @@
 //! How the tiles of a job look. All tiles have one style, so that they fit together.
 
 use crate::geometry::Bounds;
+use crate::job::mesh::hull_rule::HullRule;
 use crate::job::plan::job_plan::Plan;
 use crate::job::tiles::max_edge::MaxEdgeRule;
 use crate::output::Compression;
 use crate::output::color::{Coloring, HeightRange};
 use crate::output::frame::Frame;
-use crate::output::options::ColorChoice;
+use crate::output::options::{ColorChoice, Hull};
 
 /// How tiles look.
 #[derive(Debug)]
@@ -21,6 +22,8 @@ pub struct TileStyle {
     pub compression: Compression,
     /// Which triangles are left out.
     pub max_edge: MaxEdgeRule,
+    /// Which triangles are slivers along the hull, which are left out too; `None` if they stay.
+    pub hull: Option<HullRule>,
     /// Whose the data are, if the user says.
     pub copyright: Option<String>,
 }
@@ -42,7 +45,8 @@ impl TileStyle {
             Compression::None => plan.frame.clone().refined(bounds),
             _ => plan.frame.clone().packed(),
         };
+        let hull = (output.hull == Hull::Trimmed).then(|| HullRule::of(plan));
         let copyright = output.copyright().map(str::to_owned);
-        TileStyle { frame, coloring, normals: output.normals, compression, max_edge, copyright }
+        TileStyle { frame, coloring, normals: output.normals, compression, max_edge, hull, copyright }
     }
 }
