@@ -46,9 +46,10 @@ fn another_style_keeps_the_mesh() {
     let styles = [
         ("[output] color", Setup { output: base().output.replace(elevation, "color = \"none\""), ..base() }),
         ("[output] normals", base().output("normals = false")),
+        ("[output] hull", base().output("hull = \"whole\"")),
     ];
     // One kill is among the leaves, the other among the tiles.
-    for ((key, setup), count) in styles.iter().zip([12, 45]) {
+    for ((key, setup), count) in styles.iter().zip([12, 45, 45]) {
         let (said, resumed) = change_to(&mut rig, count, setup);
         assert!(said.contains(key) && said.contains("written again"), "{said}");
         assert!(resumed >= 12 && resumed < count.max(13), "{resumed} steps");

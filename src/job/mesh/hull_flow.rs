@@ -62,6 +62,13 @@ enum End {
     Boundary(u32),
 }
 
+/// What comes after an edge of a way.
+enum Step {
+    /// Another edge.
+    On(HalfEdgeIndex),
+    Ends(End),
+}
+
 /// Follows ways over the ground of a node.
 struct Ways<'a> {
     node: &'a NodeMesh<'a>,
@@ -71,6 +78,8 @@ struct Ways<'a> {
     below: Vec<Option<HalfEdgeIndex>>,
     /// Where a way that comes in over an edge of a boundary below goes out.
     passes: HashMap<HalfEdgeIndex, HalfEdgeIndex>,
+    /// Where ways lead that were followed before: many lead over one edge.
+    known: HashMap<HalfEdgeIndex, End>,
 }
 
 /// Follows the ways in a leaf, which is `tile`.
@@ -78,7 +87,7 @@ struct Ways<'a> {
 /// # Errors
 /// [`Error::Broken`] if the mesh is not Delaunay.
 pub(crate) fn flows_of_leaf(node: &NodeMesh, tile: TileIndex) -> Result<NodeFlows> {
-    let ways = Ways::new(node, &FlowsBelow::default());
+    let mut ways = Ways::new(node, &FlowsBelow::default());
     let mut flows = NodeFlows { passes: ways.passes_up()?, ..NodeFlows::default() };
     // A way that leaves the tile does so at its boundary, so only triangles there need be asked for.
     let mut last: Vec<HalfEdgeIndex> = match node.is_root {
@@ -102,7 +111,7 @@ pub(crate) fn flows_of_merge(
     below: &FlowsBelow,
     tiles_of: impl Fn([SiteIndex; 3]) -> [TileIndex; 3],
 ) -> Result<NodeFlows> {
-    let ways = Ways::new(node, below);
+    let mut ways = Ways::new(node, below);
     let mut flows = NodeFlows { passes: ways.passes_up()?, ..NodeFlows::default() };
     for question in &below.questions {
         let h = ways.below.get(question.exit as usize).copied().flatten().ok_or_else(contradiction)?;
@@ -184,25 +193,40 @@ impl<'a> Ways<'a> {
         let found = find_edges(node, &below.boundary);
         let pass = |&[from, to]: &[u32; 2]| Some(((*found.get(from as usize)?)?, (*found.get(to as usize)?)?));
         let passes = below.passes.iter().filter_map(pass).collect();
-        Ways { node, boundary, below: found, passes }
+        Ways { node, boundary, below: found, passes, known: HashMap::new() }
     }
 
     /// Returns where the way leads that leaves over `h`.
-    fn outward(&self, mut h: HalfEdgeIndex) -> Result<End> {
-        loop {
-            let twin = self.node.mesh.twin(h);
-            let is_out = |twin: HalfEdgeIndex| self.node.found.states[twin.triangle()] == TriangleState::Pending;
-            if twin == HalfEdgeIndex::HULL || is_out(twin) {
-                return match self.node.is_root {
-                    true => Ok(End::Outside),
-                    false => self.boundary.get(&h).map(|&at| End::Boundary(at)).ok_or_else(contradiction),
-                };
+    fn outward(&mut self, h: HalfEdgeIndex) -> Result<End> {
+        let (mut way, mut last) = (Vec::new(), h);
+        let end = loop {
+            if let Some(&end) = self.known.get(&last) {
+                break end;
             }
-            let Some(next) = self.through(twin) else { return Ok(End::Stays) };
-            if self.length(next) <= self.length(h) {
-                return Err(contradiction());
+            way.push(last);
+            match self.step(last)? {
+                Step::On(next) => last = next,
+                Step::Ends(end) => break end,
             }
-            h = next;
+        };
+        self.known.extend(way.into_iter().map(|h| (h, end)));
+        Ok(end)
+    }
+
+    /// Goes over `h`, out of one triangle and out of the next.
+    fn step(&self, h: HalfEdgeIndex) -> Result<Step> {
+        let twin = self.node.mesh.twin(h);
+        let is_out = |twin: HalfEdgeIndex| self.node.found.states[twin.triangle()] == TriangleState::Pending;
+        if twin == HalfEdgeIndex::HULL || is_out(twin) {
+            return match self.node.is_root {
+                true => Ok(Step::Ends(End::Outside)),
+                false => self.boundary.get(&h).map(|&at| Step::Ends(End::Boundary(at))).ok_or_else(contradiction),
+            };
+        }
+        let Some(next) = self.through(twin) else { return Ok(Step::Ends(End::Stays)) };
+        match self.length(next) > self.length(h) {
+            true => Ok(Step::On(next)),
+            false => Err(contradiction()),
         }
     }
 
@@ -216,9 +240,10 @@ impl<'a> Ways<'a> {
     }
 
     /// Returns where ways go out again that come in over the node's boundary.
-    fn passes_up(&self) -> Result<Vec<[u32; 2]>> {
+    fn passes_up(&mut self) -> Result<Vec<[u32; 2]>> {
         let mut passes = Vec::new();
-        for (&h, &at) in &self.boundary {
+        let boundary: Vec<(HalfEdgeIndex, u32)> = self.boundary.iter().map(|(&h, &at)| (h, at)).collect();
+        for (h, at) in boundary {
             let Some(next) = self.through(h).filter(|&next| next != h) else { continue };
             if let End::Boundary(to) = self.outward(next)? {
                 passes.push([at, to]);

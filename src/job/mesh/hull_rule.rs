@@ -62,6 +62,9 @@ fn dot(o: Site, a: Site, b: Site) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::index::HalfEdgeIndex;
+    use crate::triangulation::divide_and_conquer;
+    use proptest::prelude::*;
 
     #[test]
     fn only_obtuse_triangles_with_a_long_edge_flow() {
@@ -72,5 +75,29 @@ mod tests {
         assert_eq!(rule.flow([[0, 0], [40, 0], [20, 20]]), None, "a right angle");
         let reach = 1 << 29;
         assert_eq!(rule.flow([[-reach, -reach], [reach, reach], [0, -1]]), Some(0), "the greatest extent");
+    }
+
+    proptest! {
+        /// Even where many sites lie on one circle, so that there are several triangulations.
+        #[test]
+        fn edges_grow_along_a_way(sites in prop::collection::btree_set(prop::array::uniform2(-30i32..30), 3..120)) {
+            let sites: Vec<Site> = sites.into_iter().collect();
+            let mesh = divide_and_conquer::triangulate(&sites).unwrap();
+            let rule = HullRule::of_spacing(0);
+            let flow = |t: usize| {
+                let from = rule.flow(mesh.triangles[t].map(|v| sites[v.get()]))?;
+                Some(HalfEdgeIndex::of_triangle(t)[from])
+            };
+            let length = |h: HalfEdgeIndex| {
+                let [a, b] = [mesh.origin(h), mesh.destination(h)].map(|v| sites[v.get()]);
+                dot(a, b, b)
+            };
+            for h in (0..mesh.triangles.len()).filter_map(flow) {
+                let twin = mesh.twin(h);
+                if twin != HalfEdgeIndex::HULL && let Some(next) = flow(twin.triangle()) {
+                    prop_assert!(length(next) > length(h));
+                }
+            }
+        }
     }
 }
