@@ -83,7 +83,7 @@ impl Frontier {
     /// [`crate::Error::Io`].
     pub fn save(&self, store: &Store, node: NodeIndex) -> Result<RecordRef> {
         let counted = ColumnWriter::default().push(&self.sites).push(&self.questions);
-        let ground = counted.push(&self.boundary).push(&self.passes).push(&[self.triangles]);
+        let ground = counted.push(&self.boundary).push(&self.passes).push(std::slice::from_ref(&self.triangles));
         ground.write(store, StepRecord::Frontier(node))
     }
 
@@ -174,7 +174,7 @@ impl Seam {
     /// # Errors
     /// [`crate::Error::Io`].
     pub fn save(&self, store: &Store, node: NodeIndex) -> Result<RecordRef> {
-        let columns = ColumnWriter::default().push(&[self.hull]).push(&self.index);
+        let columns = ColumnWriter::default().push(std::slice::from_ref(&self.hull)).push(&self.index);
         columns.push(&self.trimmed).push(&self.triangles).write(store, StepRecord::Seam(node))
     }
 
