@@ -9,6 +9,7 @@ pub mod durable;
 pub mod index;
 pub mod levels;
 pub(crate) mod machine;
+pub mod merge_records;
 pub mod mesh;
 pub mod options;
 pub mod partition;
@@ -22,8 +23,9 @@ pub mod report;
 pub mod run;
 pub mod tiles;
 
-use crate::job::index::PartIndex;
+use crate::job::index::{NodeIndex, PartIndex};
 use crate::job::levels::make_level::Child;
+use crate::job::merge_records::Seam;
 use crate::job::mesh::precision_limit::PrecisionLimit;
 use crate::job::options::{JobOptions, RunOptions};
 use crate::job::partition::result::Partition;
@@ -133,7 +135,8 @@ fn walk(run: &RunContext, plan: Plan, earlier: Option<Partition>) -> Result<Repo
                 TilesetContent::new(root, levels.stats)
             });
             let (tileset, all) = (tileset.transpose()?, StoredTiles { store: run.store, tree });
-            let files = WrittenFiles { stats: tiles.stats, tiles: &all };
+            let files =
+                WrittenFiles { stats: tiles.stats, hull: Seam::hull_count(run.store, NodeIndex::ROOT)?, tiles: &all };
             let published = publish(run, &plan, bounds, &files, look, tileset)?;
             let figures = MeshFigures {
                 points: summary.counts.clone(),

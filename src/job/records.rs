@@ -67,11 +67,11 @@ impl StepKey for JobStep {}
 pub enum StepRecord {
     /// [`Leaf`]
     Leaf(TileIndex),
-    /// [`Frontier`]
+    /// [`Frontier`](crate::job::merge_records::Frontier)
     Frontier(NodeIndex),
     /// [`PartialNormals`]
     PartialNormals(TileIndex),
-    /// [`Seam`]
+    /// [`Seam`](crate::job::merge_records::Seam)
     Seam(NodeIndex),
     /// [`FinishedBorder`]
     FinishedBorder(TileIndex),
@@ -234,101 +234,7 @@ fn has_short_corners(sites: usize) -> bool {
     sites <= 1 << 16
 }
 
-/// What a node passes to the merge node above it.
-#[derive(Debug, Default)]
-pub struct Frontier {
-    /// The sites that the merge above still needs, ascending.
-    pub sites: Vec<BorderVertex>,
-    /// The directed edges around the final ground, as positions in `sites`.
-    pub boundary: Vec<[u32; 2]>,
-}
-
-impl Frontier {
-    /// Writes the record of `node`.
-    ///
-    /// # Errors
-    /// [`Error::Io`].
-    pub fn save(&self, store: &Store, node: NodeIndex) -> Result<RecordRef> {
-        ColumnWriter::default().push(&self.sites).push(&self.boundary).write(store, StepRecord::Frontier(node))
-    }
-
-    /// Reads the record of `node`.
-    ///
-    /// # Errors
-    /// [`Error::Io`], or [`Error::Broken`] if there is none.
-    pub fn load(store: &Store, node: NodeIndex) -> Result<Frontier> {
-        let mut columns = ColumnReader::open(store, StepRecord::Frontier(node))?;
-        Ok(Frontier { sites: columns.column_vec()?, boundary: columns.column_vec()? })
-    }
-
-    /// Returns the number of sites of the frontier of `node`, without reading the rest of its record.
-    ///
-    /// # Errors
-    /// As [`Frontier::load`].
-    pub fn count(store: &Store, node: NodeIndex) -> Result<u64> {
-        Ok(ColumnReader::open(store, StepRecord::Frontier(node))?.column::<BorderVertex>()?.len() as u64)
-    }
-
-    /// Returns the tiles that own sites of it, ascending.
-    pub fn tiles(&self) -> Vec<TileIndex> {
-        let mut tiles: Vec<TileIndex> = self.sites.iter().map(|vertex| vertex.tile).collect();
-        tiles.dedup();
-        tiles
-    }
-}
-
-/// The triangles that a merge node makes final, sorted by tile. A triangle is listed once for each tile that owns a corner of it.
-#[derive(Debug, Default)]
-pub struct Seam {
-    /// Tile, first triangle and number of triangles, by ascending tile.
-    index: Vec<[u32; 3]>,
-    triangles: Vec<SeamTriangle>,
-}
-
-impl Seam {
-    /// Sorts `triangles` by the tiles that they touch.
-    pub fn new(triangles: &[SeamTriangle]) -> Seam {
-        let mut touching: Vec<(TileIndex, u32)> = Vec::with_capacity(triangles.len() * 2);
-        for (at, triangle) in (0..).zip(triangles) {
-            let mut tiles = triangle.map(|corner| corner.tile);
-            tiles.sort_unstable();
-            touching.extend((0..3).filter(|&i| i == 0 || tiles[i] != tiles[i - 1]).map(|i| (tiles[i], at)));
-        }
-        touching.sort_unstable_by_key(|&(tile, at)| (tile, triangles[at as usize]));
-        let mut seam = Seam { index: Vec::new(), triangles: Vec::with_capacity(touching.len()) };
-        for (tile, at) in touching {
-            match seam.index.last_mut() {
-                Some([last, _, count]) if *last == tile.0 => *count += 1,
-                _ => seam.index.push([tile.0, seam.triangles.len() as u32, 1]),
-            }
-            seam.triangles.push(triangles[at as usize]);
-        }
-        seam
-    }
-
-    /// Writes the record of `node`.
-    ///
-    /// # Errors
-    /// [`Error::Io`].
-    pub fn save(&self, store: &Store, node: NodeIndex) -> Result<RecordRef> {
-        ColumnWriter::default().push(&self.index).push(&self.triangles).write(store, StepRecord::Seam(node))
-    }
-
-    /// Reads from the record of `node` the triangles that touch `tile`.
-    ///
-    /// # Errors
-    /// [`Error::Io`], or [`Error::Broken`] if there is no record.
-    pub fn touching(store: &Store, node: NodeIndex, tile: TileIndex) -> Result<Vec<SeamTriangle>> {
-        let mut columns = ColumnReader::open(store, StepRecord::Seam(node))?;
-        let index = columns.column::<[u32; 3]>()?;
-        match index.binary_search_by_key(&tile.0, |entry| entry[0]) {
-            Ok(at) => Ok(columns.column_part(index[at][1] as usize, index[at][2] as usize)?.to_vec()),
-            Err(_) => Ok(Vec::new()),
-        }
-    }
-}
-
-/// What a leaf knows of its frontier before the seams are known; each column is in the order of [`Frontier::sites`].
+/// What a leaf knows of its frontier before the seams are known; each column is in the order of the sites of its frontier.
 #[derive(Debug, Default)]
 pub struct PartialNormals {
     /// The sum of the normals of the leaf's final triangles around each site.

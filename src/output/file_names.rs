@@ -57,7 +57,7 @@ impl OutputFiles {
         self.directory.join(level_uri(node))
     }
 
-    /// Returns the folder of the triangles that `[output] max_edge` left out of the tiles.
+    /// Returns the folder of the triangles that `[output] hull` or `max_edge` left out of the tiles.
     pub fn cut(&self) -> PathBuf {
         self.directory.join(CUT)
     }

@@ -41,6 +41,9 @@ pub struct OutputOptions {
     /// The longest edge of a triangle that is not left out.
     #[serde(default)]
     pub max_edge: MaxEdge,
+    /// Whether slivers along the hull are left out.
+    #[serde(default)]
+    pub hull: Hull,
     /// Whose the data are: viewers show it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub copyright: Option<Copyright>,
@@ -151,6 +154,18 @@ impl ColorChoice {
     pub fn may_be_own(self) -> bool {
         matches!(self, ColorChoice::Auto | ColorChoice::Rgb)
     }
+}
+
+/// What becomes of the slivers along the hull: flat triangles with an edge much longer than the spacing of the points, between the points
+/// at the edge of the terrain and the convex hull around them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Hull {
+    /// They are left out.
+    #[default]
+    Trimmed,
+    /// They stay, and the terrain reaches to the convex hull.
+    Whole,
 }
 
 /// How long an edge of a triangle may be in the plane. Triangles with a longer edge are left out.

@@ -39,7 +39,7 @@
 //!
 //! # Triangles that are left out
 //!
-//! The triangles that `[output] max_edge` leaves out of the terrain are in `cut/`. All checks are made on the triangles in `tiles/`
+//! The triangles that `[output] hull` and `max_edge` leave out of the terrain are in `cut/`. All checks are made on the triangles in `tiles/`
 //! and `cut/` together, except that normals and colours are not compared with `cut/`, which has none. If the report or
 //! the list of files shows that some of `cut/` is gone, only checks 1, 4 and the first sentence of 2 are made, and check 3 between
 //! the triangles that are there; the verdict says so.

@@ -23,7 +23,7 @@ pub struct Verdict {
     pub sites: u64,
     /// Triangles in `tiles/` and in `cut/`.
     pub triangles: u64,
-    /// The triangles in `cut/`, which `max_edge` left out of the terrain.
+    /// The triangles in `cut/`, which `hull` or `max_edge` left out of the terrain.
     pub cut: u64,
     /// Edges with a triangle on one side only.
     pub hull_edges: u64,
@@ -222,11 +222,11 @@ fn what_is_gone_of_cut(facts: &ReportedFacts, written: &WrittenFiles, found: u64
     if let (Some(first), true) = (written.cut_gone.first(), found > 0) {
         let count = written.cut_gone.len();
         return Some(format!(
-            "{count} files of cut/, which holds what max_edge left out, are gone, the first of them {first}"
+            "{count} files of cut/, which holds what hull and max_edge left out, are gone, the first of them {first}"
         ));
     }
     let all = facts.cut_triangles.filter(|&count| count > 0 && found == 0);
-    let gone = "triangles were left out (max_edge), and the folder cut/ that should hold them is gone";
+    let gone = "triangles were left out (hull, max_edge), and the folder cut/ that should hold them is gone";
     all.map(|all| format!("{all} {gone}")).or_else(|| (!written.cut_gone.is_empty()).then(|| gone.to_owned()))
 }
 

@@ -4,8 +4,9 @@ use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
 use crate::random::Random;
+use crate::scattered::rounded;
+pub(crate) use crate::scattered::with_heights;
 pub(crate) use crate::scattered::{Cloud, clusters, gaussian, uniform, write};
-use crate::scattered::{rounded, with_heights};
 
 /// A square lattice: the corners of every cell are cocircular.
 pub(crate) fn grid(columns: i64, rows: i64) -> Cloud {

@@ -30,6 +30,7 @@ mod hard_shapes;
 mod height_offsets;
 mod heights;
 mod histogram;
+mod hull;
 mod khronos;
 mod levels;
 mod limits;

@@ -5,6 +5,7 @@ use gdt_batch::geometry::Site;
 use gdt_batch::job::durable::atomic_file::publish;
 use gdt_batch::job::durable::directory::JobDirectory;
 use gdt_batch::job::index::NodeIndex;
+use gdt_batch::job::merge_records::Seam;
 use gdt_batch::job::mesh::leaf::triangulate_leaf;
 use gdt_batch::job::mesh::merge::merge_frontiers;
 use gdt_batch::job::options::JobOptions;
@@ -15,7 +16,7 @@ use gdt_batch::job::plan::job_plan::Plan;
 use gdt_batch::job::plan::lattice_choice::LatticeCoarsening;
 use gdt_batch::job::plan::make_plan::make_plan;
 use gdt_batch::job::progress::stage::ProgressOutput;
-use gdt_batch::job::records::{Leaf, Seam, Store};
+use gdt_batch::job::records::{Leaf, Store};
 use gdt_batch::triangulation::options::{Backend, TriangulationOptions};
 use gdt_batch::triangulation::{Triangulator, reference};
 
@@ -77,7 +78,7 @@ fn collect(store: &Store, partition: &Partition) -> (Vec<Site>, Vec<Triangle>) {
         for node in partition.tree.merges_above(partition.tree.leaf(tile)) {
             let seam = Seam::touching(store, node, tile).unwrap();
             // A seam triangle is listed with every tile that it touches: count it with the first.
-            let mine = seam.iter().filter(|t| t.iter().all(|corner| corner.tile >= tile));
+            let mine = seam.triangles.iter().filter(|t| t.iter().all(|corner| corner.tile >= tile));
             triangles.extend(mine.map(|t| canonical(t.map(|corner| corner.plane()))));
         }
     }

@@ -47,6 +47,7 @@ fn another_style_keeps_the_mesh() {
         ("[output] color", Setup { output: base().output.replace(elevation, "color = \"none\""), ..base() }),
         ("[output] normals", base().output("normals = false")),
         ("[output] attributes", base().output("attributes = [\"classification\"]")),
+        ("[output] hull", base().output("hull = \"whole\"")),
     ];
     // One kill is among the leaves, the other among the tiles.
     for ((key, setup), count) in styles.iter().zip([12, 45, 45]) {

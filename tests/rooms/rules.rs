@@ -37,11 +37,20 @@ const RULES: [Rule; 8] = [
     },
     Rule {
         rooms: &["job/durable", "job/progress"],
-        never: &["job/records", "job/plan", "job/partition", "job/mesh", "job/tiles", "job/levels", "job/publish"],
+        never: &[
+            "job/records",
+            "job/merge_records",
+            "job/plan",
+            "job/partition",
+            "job/mesh",
+            "job/tiles",
+            "job/levels",
+            "job/publish",
+        ],
         why: "durable and progress know no step",
     },
     Rule {
-        rooms: &["job/durable", "job/progress", "job/records", "job/options", "job/index"],
+        rooms: &["job/durable", "job/progress", "job/records", "job/merge_records", "job/options", "job/index"],
         never: &["job/run", "job/preflight", "job/report", "job/mod"],
         why: "what all steps share does not know the rooms that use it",
     },

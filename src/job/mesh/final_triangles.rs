@@ -31,6 +31,8 @@ pub struct FinalTriangles {
     pub half_edges: Vec<Option<HalfEdgeIndex>>,
     /// The directed edges with final ground on their left and none on their right, as positions in `frontier`.
     pub boundary: Vec<[u32; 2]>,
+    /// Their half-edges.
+    pub boundary_edges: Vec<HalfEdgeIndex>,
 }
 
 /// Finds the final triangles of a node. `cell` is `None` at the root, where every triangle that covers new ground is final.
@@ -47,7 +49,13 @@ pub fn find_final(
 ) -> FinalTriangles {
     let state = |triangle| if covered(triangle) { TriangleState::Covered } else { TriangleState::Final };
     let states = (0..mesh.triangles.len()).map(state).collect();
-    let mut found = FinalTriangles { states, frontier: Vec::new(), half_edges: Vec::new(), boundary: Vec::new() };
+    let mut found = FinalTriangles {
+        states,
+        frontier: Vec::new(),
+        half_edges: Vec::new(),
+        boundary: Vec::new(),
+        boundary_edges: Vec::new(),
+    };
     if let Some(cell) = cell {
         let hull: Vec<HalfEdgeIndex> = mesh.hull().collect();
         let pending = found.mark_pending(mesh, sites, cell, &hull);
@@ -109,7 +117,8 @@ impl FinalTriangles {
         let inner = seen.filter(|&h| h != HalfEdgeIndex::HULL && !is_pending(h));
         let outer = hull.iter().copied().filter(|&h| !is_pending(h));
         let ends = |h: HalfEdgeIndex| [mesh.origin(h), mesh.destination(h)].map(|v| position[v.get()]);
-        self.boundary = inner.chain(outer).map(ends).collect();
+        self.boundary_edges = inner.chain(outer).collect();
+        self.boundary = self.boundary_edges.iter().map(|&h| ends(h)).collect();
     }
 }
 

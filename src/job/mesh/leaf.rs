@@ -4,13 +4,16 @@ use crate::Result;
 use crate::geometry::{Site, VertexDigest};
 use crate::input::Point;
 use crate::job::index::TileIndex;
+use crate::job::merge_records::{Frontier, HullCount, Seam};
 use crate::job::mesh::final_triangles::{FinalTriangles, TriangleState, find_final};
+use crate::job::mesh::hull_flow::{NodeFlows, NodeMesh, flows_of_leaf};
+use crate::job::mesh::hull_rule::HullRule;
 use crate::job::mesh::precision_limit::PrecisionLimit;
 use crate::job::mesh::sites::load_sites;
 use crate::job::partition::point_file::PointFiles;
 use crate::job::partition::result::Partition;
 use crate::job::plan::job_plan::Plan;
-use crate::job::records::{BorderVertex, Frontier, Leaf, PartialNormals, StepOutput, Store};
+use crate::job::records::{BorderVertex, Leaf, PartialNormals, StepOutput, Store};
 use crate::mesh::half_edge::HalfEdgeMesh;
 use crate::mesh::index::{HalfEdgeIndex, SiteIndex};
 use crate::output::normals::{self, NormalSum};
@@ -68,8 +71,16 @@ pub fn triangulate_leaf(
     let triangles = mesh.corners().iter().zip(&found.states).filter(is_final).map(|(triangle, _)| *triangle);
     let (leaf, triangles) = Leaf::save(store, tile, &points, triangles)?;
     let vertex = |&site: &SiteIndex| BorderVertex { tile, site, position: points[site.get()].corner() };
-    let frontier = Frontier { sites: found.frontier.iter().map(vertex).collect(), boundary: found.boundary };
-    let records = vec![normals.save(store, tile)?, leaf, frontier.save(store, node)?];
+    let is_root = cell.is_none();
+    let node_mesh = NodeMesh { mesh: &mesh, sites: &sites, found: &found, rule: HullRule::of(plan), is_root };
+    let NodeFlows { passes, questions, trimmed, slivers } = flows_of_leaf(&node_mesh, tile)?;
+    let border = found.frontier.iter().map(vertex).collect();
+    let frontier = Frontier { sites: border, boundary: found.boundary, passes, questions, triangles };
+    let mut records = vec![normals.save(store, tile)?, leaf, frontier.save(store, node)?];
+    if is_root {
+        // No merge answers what this tile asks.
+        records.push(Seam::new(&[], trimmed, HullCount { slivers, triangles }).save(store, node)?);
+    }
     triangulation::recycle(mesh);
     let vertices = VertexDigest::of(points.iter().map(Point::corner));
     Ok(StepOutput::new(LeafStats { sites: sites.len() as u64, duplicates, triangles, vertices, outcome }, records))

@@ -3,12 +3,15 @@
 
 use crate::geometry::Site;
 use crate::job::index::{NodeIndex, TileIndex};
+use crate::job::merge_records::{FlowQuestion, Frontier, HullCount, Seam, tiles_of};
 use crate::job::mesh::final_triangles::{TriangleState, find_final};
+use crate::job::mesh::hull_flow::{FlowsBelow, NodeMesh, flows_of_merge};
+use crate::job::mesh::hull_rule::HullRule;
 use crate::job::mesh::precision_limit::PrecisionLimit;
 use crate::job::partition::tree::Cell;
 use crate::job::plan::budget::BYTES_PER_MERGED_SITE;
 use crate::job::plan::job_plan::Plan;
-use crate::job::records::{BorderVertex, Frontier, Seam, SeamTriangle, StepOutput, Store};
+use crate::job::records::{BorderVertex, SeamTriangle, StepOutput, Store};
 use crate::mesh::region::covered;
 use crate::triangulation::divide_and_conquer;
 use crate::{Error, Result, interrupt};
@@ -28,45 +31,58 @@ pub fn merge_frontiers(
     node: NodeIndex,
 ) -> Result<StepOutput<Vec<TileIndex>>> {
     check_memory(below.iter().map(|&(store, child)| Frontier::count(store, child)).sum::<Result<u64>>()?, memory)?;
-    let union = join(below)?;
-    let sites: Vec<Site> = union.sites.iter().map(BorderVertex::plane).collect();
+    let (union, flows_below) = join(below)?;
+    let sites: Vec<Site> = union.iter().map(BorderVertex::plane).collect();
     let mesh = divide_and_conquer::triangulate(&sites)?;
     interrupt::check()?;
-    let covered = covered(&mesh, bytemuck::cast_slice(&union.boundary))?;
+    let covered = covered(&mesh, bytemuck::cast_slice(&flows_below.boundary))?;
     interrupt::check()?;
     let cell = cell.with_border();
     let found = find_final(&mesh, &sites, cell.as_ref(), |triangle| covered[triangle]);
     interrupt::check()?;
+    let node_mesh =
+        NodeMesh { mesh: &mesh, sites: &sites, found: &found, rule: HullRule::of(plan), is_root: cell.is_none() };
+    let flows = flows_of_merge(&node_mesh, &flows_below, |corners| corners.map(|v| union[v.get()].tile))?;
     let seam: Vec<SeamTriangle> = mesh
         .triangles
         .iter()
         .zip(&found.states)
         .filter(|(_, state)| **state == TriangleState::Final)
-        .map(|(corners, _)| corners.map(|v| union.sites[v.get()]))
+        .map(|(corners, _)| corners.map(|v| union[v.get()]))
         .collect();
     // The seam takes as much memory as the mesh.
     drop((mesh, sites, covered));
     let limit = PrecisionLimit::of(&plan.frame);
     seam.iter().try_for_each(|corners| limit.check(corners.map(|corner| corner.plane())))?;
-    let frontier = found.frontier.iter().map(|&site| union.sites[site.get()]).collect();
-    let frontier = Frontier { sites: frontier, boundary: found.boundary };
+    let hull = HullCount { slivers: flows.slivers, triangles: flows_below.triangles + seam.len() as u64 };
+    let frontier = Frontier {
+        sites: found.frontier.iter().map(|&site| union[site.get()]).collect(),
+        boundary: found.boundary,
+        passes: flows.passes,
+        questions: flows.questions,
+        triangles: hull.triangles,
+    };
     interrupt::check()?;
-    let records = vec![Seam::new(&seam).save(store, node)?, frontier.save(store, node)?];
+    let records = vec![Seam::new(&seam, flows.trimmed, hull).save(store, node)?, frontier.save(store, node)?];
     let above = frontier.tiles();
-    let finished = union.tiles().into_iter().filter(|tile| above.binary_search(tile).is_err());
+    let tiles_below = tiles_of(&union, &flows_below.questions);
+    let finished = tiles_below.into_iter().filter(|tile| above.binary_search(tile).is_err());
     Ok(StepOutput::new(finished.collect(), records))
 }
 
-/// Joins frontiers into one.
-fn join(frontiers: &[(&Store, NodeIndex)]) -> Result<Frontier> {
-    let mut union = Frontier::default();
+/// Joins frontiers into one. Their boundaries, and what they say of ways to the hull, come apart from their sites.
+fn join(frontiers: &[(&Store, NodeIndex)]) -> Result<(Vec<BorderVertex>, FlowsBelow)> {
+    let (mut all, mut flows) = (Vec::new(), FlowsBelow::default());
     for &(store, node) in frontiers {
-        let Frontier { sites, boundary } = Frontier::load(store, node)?;
-        let offset = union.sites.len() as u32;
-        union.sites.extend(sites);
-        union.boundary.extend(boundary.iter().map(|edge| edge.map(|v| v + offset)));
+        let Frontier { sites, boundary, passes, questions, triangles } = Frontier::load(store, node)?;
+        let (vertex, edge) = (all.len() as u32, flows.boundary.len() as u32);
+        all.extend(sites);
+        flows.boundary.extend(boundary.iter().map(|ends| ends.map(|v| v + vertex)));
+        flows.passes.extend(passes.iter().map(|pass| pass.map(|at| at + edge)));
+        flows.questions.extend(questions.iter().map(|asked| FlowQuestion { exit: asked.exit + edge, ..*asked }));
+        flows.triangles += triangles;
     }
-    Ok(union)
+    Ok((all, flows))
 }
 
 fn check_memory(sites: u64, memory: u64) -> Result<()> {

@@ -8,6 +8,7 @@ use crate::input::options::InputOptions;
 use crate::input::{PointCounts, TextReading};
 use crate::job::levels::make_level::LevelStats;
 use crate::job::machine;
+use crate::job::mesh::hull_rule::HullRule;
 use crate::job::mesh::leaf::LeafStats;
 use crate::job::plan::fingerprint::JobIdentity;
 use crate::job::plan::job_plan::{Plan, SkippedInput};
@@ -19,6 +20,7 @@ use crate::job::tiles::write_tile::TileStats;
 use crate::output::checksums::{Checksum, seal};
 use crate::voronoi::counts::STEP_NAMES;
 use crate::{Error, Result};
+use rust_decimal::prelude::ToPrimitive;
 use serde::{Deserialize, Serialize};
 
 /// The report of a finished job.
@@ -30,9 +32,15 @@ pub struct Report {
     pub sites: u64,
     /// Triangles in all tiles.
     pub triangles: u64,
-    /// Triangles that `max_edge` left out. They are in `cut`.
+    /// Triangles that `hull` or `max_edge` left out. They are in `cut`.
     #[serde(default)]
     pub cut_triangles: u64,
+    /// Those of them that `hull` left out: slivers along the hull.
+    #[serde(default)]
+    pub hull_triangles: u64,
+    /// Slivers have an edge longer than this, in source units; `None` if `hull` leaves nothing out.
+    #[serde(default)]
+    pub hull_length: Option<f64>,
     /// GLB files in `tiles`.
     pub tiles: u64,
     /// The coarser tiles in `levels`.
@@ -200,6 +208,11 @@ pub struct ReportParts {
     pub file_list: Checksum,
 }
 
+/// Returns the length of the edges that slivers have at least, in source units.
+fn hull_length(plan: &Plan) -> f64 {
+    HullRule::of(plan).length() * plan.lattice.resolution.to_f64().unwrap_or(f64::NAN)
+}
+
 impl Report {
     /// Puts the report together.
     pub fn new(plan: &Plan, parts: ReportParts) -> Report {
@@ -220,6 +233,8 @@ impl Report {
             sites: parts.leaves.sites,
             triangles: parts.tiles.triangles,
             cut_triangles: parts.tiles.cut_triangles,
+            hull_triangles: parts.tiles.slivers,
+            hull_length: (parts.tiles.slivers > 0).then(|| hull_length(plan)),
             tiles: parts.tiles.files,
             levels: parts.levels,
             seam_share: parts.tiles.seam_triangles as f64 / parts.tiles.triangles.max(1) as f64,

@@ -41,8 +41,12 @@ impl fmt::Display for Report {
         row("sites", grouped(self.sites))?;
         row("triangles", grouped(self.triangles))?;
         row("  crossing tile borders", format!("{:.3} %", self.seam_share * 100.0))?;
-        if self.cut_triangles > 0 {
-            row("  left out (max_edge)", grouped(self.cut_triangles))?;
+        if let Some(length) = self.hull_length {
+            let slivers = grouped(self.hull_triangles);
+            row("  left out (hull)", format!("{slivers}, with an edge longer than {length:.3} {}", self.unit))?;
+        }
+        if self.cut_triangles > self.hull_triangles {
+            row("  left out (max_edge)", grouped(self.cut_triangles - self.hull_triangles))?;
         }
         row("tiles", grouped(self.tiles))?;
         if self.levels.files > 0 {

@@ -5,8 +5,10 @@ use crate::input::PointCounts;
 use crate::job::durable::atomic_file::{PendingFile, write_pending};
 use crate::job::durable::journal::PublishedFile;
 use crate::job::levels::make_level::LevelStats;
+use crate::job::merge_records::HullCount;
 use crate::job::mesh::leaf::LeafStats;
 use crate::job::plan::job_plan::Plan;
+use crate::job::progress::number_text::grouped;
 use crate::job::publish::flat_tile::FlatScene;
 use crate::job::publish::one_file_limits::{fits_one_file, too_large_for_one_file};
 use crate::job::publish::placement::{heights_warning, place, placement_warning};
@@ -21,7 +23,7 @@ use crate::job::tiles::write_tile::TileStats;
 use crate::output::checksums::list_text;
 use crate::output::color::Coloring;
 use crate::output::geoid::Geoid;
-use crate::output::options::OutputFormat;
+use crate::output::options::{Hull, OutputFormat};
 use crate::output::tiles3d::division::divide;
 use crate::output::tiles3d::georeference::Georeference;
 use crate::output::tiles3d::globe::NotPlaced;
@@ -38,6 +40,8 @@ pub(crate) fn wants_tileset(plan: &Plan, written: &TileStats) -> bool {
 /// The tiles that are written.
 pub(crate) struct WrittenFiles<'a> {
     pub(crate) stats: TileStats,
+    /// How many slivers along the hull the whole mesh has.
+    pub(crate) hull: HullCount,
     pub(crate) tiles: &'a dyn EachTile,
 }
 
@@ -82,9 +86,14 @@ pub(crate) fn some_triangles(written: &TileStats, plan: &Plan) -> Result<()> {
         return Ok(());
     }
     if written.cut_triangles > 0 {
+        let slivers = match written.slivers {
+            0 => String::new(),
+            slivers => format!(" besides {slivers} slivers along the hull"),
+        };
+        // The rule for the hull never leaves out more than half of the mesh.
+        let by_length = written.cut_triangles - written.slivers;
         return Err(Error::Config(format!(
-            "[output] max_edge leaves out all {} triangles: give a greater one",
-            written.cut_triangles
+            "[output] max_edge leaves out all {by_length} triangles{slivers}: give a greater one"
         )));
     }
     Err(Error::NoTerrain(format!(
@@ -105,6 +114,19 @@ pub(crate) struct Published {
 fn flat_scene<'a>(plan: &Plan, style: &'a TileStyle, bounds: Bounds<3>) -> Option<FlatScene<'a>> {
     let (flat, compression) = (style.flat_frame(plan, bounds), style.compression);
     plan.curvature.is_some().then_some(FlatScene { bent: &style.frame, flat, compression })
+}
+
+/// Says that the slivers along the hull stay although the user wants them left out.
+fn hull_warning(plan: &Plan, hull: HullCount) -> Option<String> {
+    let HullCount { slivers, triangles } = hull;
+    (plan.options.output.hull == Hull::Trimmed && hull.is_most()).then(|| {
+        format!(
+            "nothing is left out along the hull: {} of {} triangles are slivers there, as if the points lay on a curve; \
+             [output] hull = \"whole\" says the same without this warning",
+            grouped(slivers),
+            grouped(triangles)
+        )
+    })
 }
 
 /// Writes what is beside the tiles. `levels` is there if viewers get 3D Tiles.
@@ -137,6 +159,7 @@ pub(crate) fn publish(
         text = Some((&look.style.frame, root));
         (placement, stats) = (placed.ok(), levels);
     }
+    warnings.extend(hull_warning(plan, written.hull));
     let georeference = Georeference::new(&look.style.frame, &plan.lattice, bounds, &plan.unit, plan.crs.epsg);
     let tiles = &written.stats;
     let fits = fits_one_file(tiles);

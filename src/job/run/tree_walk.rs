@@ -1,6 +1,7 @@
 //! Running steps 3 and 4 in the order of the tree: children before their parent, in parallel where there are threads.
 
 use crate::job::index::{NodeIndex, TileIndex};
+use crate::job::merge_records::Frontier;
 use crate::job::mesh::leaf::{LeafStats, triangulate_leaf};
 use crate::job::mesh::merge::merge_frontiers;
 use crate::job::partition::point_file::PointFiles;
@@ -10,7 +11,7 @@ use crate::job::plan::budget::merge_memory;
 use crate::job::plan::job_plan::Plan;
 use crate::job::progress::activity::Activity;
 use crate::job::progress::stage::Stage;
-use crate::job::records::{Frontier, JobStep, StepOutput};
+use crate::job::records::{JobStep, StepOutput};
 use crate::job::run::freeing::Freeing;
 use crate::job::run::run_context::RunContext;
 use crate::job::run::stage_costs::triangulated_share;

@@ -2,11 +2,12 @@
 //! shares a vertex writes the same normal. Triangles that are left out of the terrain do not count.
 
 use crate::job::index::TileIndex;
+use crate::job::merge_records::{Frontier, SeamOfTile};
 use crate::job::partition::tree::Tree;
 use crate::job::records::{
-    BorderAttributes, BorderVertex, FinishedBorder, Frontier, Leaf, PartialNormals, SeamTriangle, StepOutput, Store,
-    owner,
+    BorderAttributes, BorderVertex, FinishedBorder, Leaf, PartialNormals, SeamTriangle, StepOutput, Store, owner,
 };
+use crate::job::tiles::hull_slivers::HullSlivers;
 use crate::job::tiles::style::TileStyle;
 use crate::output::normals::{self, NormalSum, NormalSums};
 use crate::{Error, Result};
@@ -20,10 +21,10 @@ pub fn finish_border_normals(
     tree: &Tree,
     style: &TileStyle,
     tile: TileIndex,
-    seam: &[SeamTriangle],
+    seam: &SeamOfTile,
 ) -> Result<StepOutput<Vec<TileIndex>>> {
     let border = finished_border(store, tree, style, tile, seam)?;
-    Ok(StepOutput::new(neighbours(seam, tile), vec![border.save(store, tile)?]))
+    Ok(StepOutput::new(neighbours(&seam.triangles, tile), vec![border.save(store, tile)?]))
 }
 
 /// Returns the finished frontier of `tile`, whose seam is `seam`.
@@ -35,15 +36,16 @@ pub fn finished_border(
     tree: &Tree,
     style: &TileStyle,
     tile: TileIndex,
-    seam: &[SeamTriangle],
+    seam: &SeamOfTile,
 ) -> Result<FinishedBorder> {
     let frontier = Frontier::load(store, tree.leaf(tile))?;
     let PartialNormals { mut sums, rgb, class, intensity } = PartialNormals::load(store, tile)?;
-    if !style.max_edge.keeps_all() {
-        sums = sums_of_kept(store, tile, &frontier, style)?;
+    let slivers = HullSlivers::new(style.hull, &seam.trimmed);
+    if !style.max_edge.keeps_all() || !slivers.is_empty() {
+        sums = sums_of_kept(store, tile, &frontier, &slivers, style)?;
     }
-    let is_kept = |t: &SeamTriangle| !style.max_edge.leaves_out(t.map(|corner| corner.position));
-    for &[a, b, c] in seam.iter().filter(|triangle| is_kept(triangle)) {
+    let is_kept = |t: &SeamTriangle| !style.max_edge.leaves_out(t.map(|corner| corner.position)) && !slivers.has(t);
+    for &[a, b, c] in seam.triangles.iter().filter(|triangle| is_kept(triangle)) {
         let normal = normals::cross(a.position, b.position, c.position);
         for corner in [a, b, c].iter().filter(|corner| corner.tile == tile) {
             let at = frontier.sites.binary_search_by_key(&corner.site, |vertex| vertex.site);
@@ -72,8 +74,15 @@ fn neighbours(seam: &[SeamTriangle], tile: TileIndex) -> Vec<TileIndex> {
 }
 
 /// Returns the sums of normals over those of the leaf's triangles that are kept.
-fn sums_of_kept(store: &Store, tile: TileIndex, frontier: &Frontier, style: &TileStyle) -> Result<Vec<NormalSum>> {
+fn sums_of_kept(
+    store: &Store,
+    tile: TileIndex,
+    frontier: &Frontier,
+    slivers: &HullSlivers,
+    style: &TileStyle,
+) -> Result<Vec<NormalSum>> {
     let Leaf { positions, mut triangles, .. } = Leaf::load(store, tile)?;
+    slivers.take(&positions, &mut triangles);
     style.max_edge.take(&positions, &mut triangles);
     let sums = NormalSums::new(&positions, &triangles);
     Ok(frontier.sites.iter().map(|vertex| sums.get(vertex.site.get())).collect())

@@ -3,6 +3,7 @@
 pub mod border_normals;
 pub mod curve;
 pub mod dependencies;
+pub mod hull_slivers;
 pub mod max_edge;
 pub mod seam;
 pub mod style;

@@ -1,13 +1,14 @@
 //! How the tiles of a job look. All tiles have one style, so that they fit together.
 
 use crate::geometry::Bounds;
+use crate::job::mesh::hull_rule::HullRule;
 use crate::job::plan::job_plan::Plan;
 use crate::job::tiles::max_edge::MaxEdgeRule;
 use crate::output::Compression;
 use crate::output::attributes::AttributeChoice;
 use crate::output::color::{Coloring, HeightRange};
 use crate::output::frame::Frame;
-use crate::output::options::{ColorChoice, OutputOptions};
+use crate::output::options::{ColorChoice, Hull, OutputOptions};
 
 /// How tiles look.
 #[derive(Debug)]
@@ -24,6 +25,8 @@ pub struct TileStyle {
     pub compression: Compression,
     /// Which triangles are left out.
     pub max_edge: MaxEdgeRule,
+    /// Which triangles are slivers along the hull, which are left out too; `None` if they stay.
+    pub hull: Option<HullRule>,
     /// Whose the data are, if the user says.
     pub copyright: Option<String>,
 }
@@ -54,10 +57,12 @@ impl TileStyle {
             None => plan.frame.clone(),
         };
         let frame = with_steps(frame, compression, bounds);
+        let hull = (output.hull == Hull::Trimmed).then(|| HullRule::of(plan));
         let copyright = output.copyright().map(str::to_owned);
         let OutputOptions { attributes, normals, .. } = *output;
-        TileStyle { frame, coloring, attributes, normals, compression, max_edge, copyright }
+        TileStyle { frame, coloring, attributes, normals, compression, max_edge, hull, copyright }
     }
+
     /// Returns the frame of these tiles in a scene that is not bent. The points of the job are within `bounds`.
     pub fn flat_frame(&self, plan: &Plan, bounds: Bounds<3>) -> Frame {
         with_steps(plan.frame.clone(), self.compression, bounds)

@@ -2,6 +2,7 @@
 
 use crate::job::index::TileIndex;
 use crate::job::records::{BorderVertex, FinishedBorder, Leaf, SeamTriangle};
+use crate::job::tiles::hull_slivers::HullSlivers;
 use crate::job::tiles::style::TileStyle;
 use crate::mesh::index::SiteIndex;
 use crate::output::Tile;
@@ -20,12 +21,21 @@ pub(crate) struct TileContent {
     triangles: Vec<[u32; 3]>,
     /// Triangles that are left out.
     cut: Vec<[u32; 3]>,
+    /// How many of them are slivers along the hull.
+    pub(crate) slivers: u64,
 }
 
 impl TileContent {
     /// Returns the content that the tile's leaf contributes.
-    pub(crate) fn of_leaf(mut leaf: Leaf, border: &FinishedBorder, style: &TileStyle) -> TileContent {
-        let cut = style.max_edge.take(&leaf.positions, &mut leaf.triangles);
+    pub(crate) fn of_leaf(
+        mut leaf: Leaf,
+        border: &FinishedBorder,
+        slivers: &HullSlivers,
+        style: &TileStyle,
+    ) -> TileContent {
+        let mut cut = slivers.take(&leaf.positions, &mut leaf.triangles);
+        let slivers = cut.len() as u64;
+        cut.extend(style.max_edge.take(&leaf.positions, &mut leaf.triangles));
         let mut normals = NormalSums::new(&leaf.positions, &leaf.triangles).unit_normals(&style.frame);
         for vertex in &border.vertices {
             normals[vertex.site.get()] = vertex.normal;
@@ -43,7 +53,7 @@ impl TileContent {
                 intensity
             }),
         };
-        TileContent { positions, normals, colors, attributes, triangles, cut }
+        TileContent { positions, normals, colors, attributes, triangles, cut, slivers }
     }
 
     /// Adds the triangles of the seam that `tile` owns, with the vertices that belong to neighbours. Returns the number of triangles
@@ -53,6 +63,7 @@ impl TileContent {
         border_of: BorderOf,
         tile: TileIndex,
         seam: impl Iterator<Item = SeamTriangle>,
+        slivers: &HullSlivers,
         style: &TileStyle,
     ) -> Result<u64> {
         let mut neighbours = NeighbourBorders { border_of, borders: HashMap::new() };
@@ -71,7 +82,9 @@ impl TileContent {
                     }
                 };
             }
-            let is_cut = style.max_edge.leaves_out(triangle.map(|corner| corner.position));
+            let is_sliver = slivers.has(&triangle);
+            let is_cut = is_sliver || style.max_edge.leaves_out(triangle.map(|corner| corner.position));
+            self.slivers += u64::from(is_sliver);
             if is_cut { &mut self.cut } else { &mut self.triangles }.push(corners);
         }
         Ok((self.triangles.len() - before) as u64)

@@ -6,7 +6,9 @@ use crate::job::durable::atomic_file::{PendingFile, create_folder_of, write_pend
 use crate::job::durable::columns::ColumnWriter;
 use crate::job::durable::directory::JobDirectory;
 use crate::job::index::TileIndex;
-use crate::job::records::{FinishedBorder, Leaf, SeamTriangle, StepOutput, StepRecord, Store, TileSummary, owner};
+use crate::job::merge_records::SeamOfTile;
+use crate::job::records::{FinishedBorder, Leaf, StepOutput, StepRecord, Store, TileSummary, owner};
+use crate::job::tiles::hull_slivers::HullSlivers;
 use crate::job::tiles::style::TileStyle;
 use crate::job::tiles::tile_content::{BorderOf, TileContent};
 use crate::output::Tile;
@@ -28,6 +30,8 @@ pub struct TileStats {
     pub seam_triangles: u64,
     /// Triangles that are left out.
     pub cut_triangles: u64,
+    /// Those of them that are slivers along the hull.
+    pub slivers: u64,
     /// Bytes of the GLB files, including those of triangles that are left out.
     pub bytes: u64,
 }
@@ -38,6 +42,7 @@ impl AddAssign for TileStats {
         self.triangles += other.triangles;
         self.seam_triangles += other.seam_triangles;
         self.cut_triangles += other.cut_triangles;
+        self.slivers += other.slivers;
         self.bytes += other.bytes;
     }
 }
@@ -53,20 +58,22 @@ pub fn write_tile(
     style: &TileStyle,
     canvas: &Canvas,
     tile: TileIndex,
-    seam: &[SeamTriangle],
+    seam: &SeamOfTile,
     border_of: BorderOf,
 ) -> Result<StepOutput<TileStats>> {
     let leaf = Leaf::load(store, tile)?;
     let border = FinishedBorder::load(store, tile)?;
-    let mut content = TileContent::of_leaf(leaf, &border, style);
-    let own = seam.iter().copied().filter(|triangle| owner(triangle) == tile);
-    let seam_triangles = content.add_seam(border_of, tile, own, style)?;
-    let left_out = content.left_out();
+    let slivers = HullSlivers::new(style.hull, &seam.trimmed);
+    let mut content = TileContent::of_leaf(leaf, &border, &slivers, style);
+    let own = seam.triangles.iter().copied().filter(|triangle| owner(triangle) == tile);
+    let seam_triangles = content.add_seam(border_of, tile, own, &slivers, style)?;
+    let (left_out, slivers) = (content.left_out(), content.slivers);
     let kept = content.into_tile(style);
     let mut stats = TileStats {
         triangles: kept.triangles.len() as u64,
         seam_triangles,
         cut_triangles: left_out.triangles.len() as u64,
+        slivers,
         ..TileStats::default()
     };
     let mut pixels = canvas.draw(&kept)?;

@@ -3,11 +3,12 @@
 use crate::Result;
 use crate::job::durable::directory::JobDirectory;
 use crate::job::index::{NodeIndex, PartIndex, TileIndex};
+use crate::job::merge_records::{Seam, SeamOfTile};
 use crate::job::mesh::merge::merge_frontiers;
 use crate::job::partition::tree::{NodeKind, Tree};
 use crate::job::plan::budget::merge_memory;
 use crate::job::progress::stats::StageStats;
-use crate::job::records::{JobStep, JournalEntry, Seam, SeamTriangle, StepRecord, Store};
+use crate::job::records::{JobStep, JournalEntry, StepRecord, Store};
 use crate::job::run::part_entries::{PartHeader, entries_of, is_whole, open_store, records_of};
 use crate::job::run::parts::done::Done;
 use crate::job::run::parts::look::{SitesOfParts, count_sites, final_look};
@@ -172,26 +173,20 @@ impl JoinedParts {
         Ok(JoinedParts { look, store, directory, header, stages: Vec::new(), peak_memory: None })
     }
 
-    /// Returns all triangles of seams that touch `tile` of the part with `store` and `tree`.
+    /// Returns what all seams have of `tile` of the part with `store` and `tree`.
     ///
     /// # Errors
     /// [`crate::Error::Io`] or [`crate::Error::Broken`] on a store.
-    pub(crate) fn seam_of(
-        &self,
-        job: &PartsJob,
-        store: &Store,
-        tree: &Tree,
-        tile: TileIndex,
-    ) -> Result<Vec<SeamTriangle>> {
+    pub(crate) fn seam_of(&self, job: &PartsJob, store: &Store, tree: &Tree, tile: TileIndex) -> Result<SeamOfTile> {
         let above = &job.parts.tree;
-        let mut seam = Vec::new();
+        let mut seam = SeamOfTile::default();
         for node in tree.merges_above(tree.leaf(tile)) {
-            seam.extend(Seam::touching(store, node, tile)?);
+            seam.add(Seam::touching(store, node, tile)?);
         }
         // A tile that is finished before all parts are merged has no seam above.
         let is_merged = |node: &NodeIndex| self.store.has(StepRecord::Seam(*node));
         for node in above.merges_above(job.parts.node(tile.part())).take_while(is_merged) {
-            seam.extend(Seam::touching(&self.store, node, tile)?);
+            seam.add(Seam::touching(&self.store, node, tile)?);
         }
         Ok(seam)
     }

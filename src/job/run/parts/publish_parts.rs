@@ -1,8 +1,9 @@
 //! The coarser tiles above the parts of a job, and what is beside the tiles.
 
-use crate::job::index::{PartIndex, TileIndex};
+use crate::job::index::{NodeIndex, PartIndex, TileIndex};
 use crate::job::levels::hierarchy::Hierarchy;
 use crate::job::levels::make_level::{Child, LevelStats};
+use crate::job::merge_records::Seam;
 use crate::job::mesh::leaf::LeafStats;
 use crate::job::publish::side_files::{EachTile, StoredTiles};
 use crate::job::publish::tileset_tree::TilesOfTree;
@@ -45,7 +46,8 @@ pub(crate) fn publish_parts(
     add_stages(run, joined, &parts);
     let tileset = wants_tileset(plan, &figures.tiles).then(|| levels_and_root(run, job, stores, joined, &figures));
     let all = TilesOfParts { job, stores };
-    let written = WrittenFiles { stats: figures.tiles, tiles: &all };
+    let written =
+        WrittenFiles { stats: figures.tiles, hull: Seam::hull_count(&joined.store, NodeIndex::ROOT)?, tiles: &all };
     let published = publish(run, plan, bounds, &written, &joined.look, tileset.transpose()?)?;
     let figures = MeshFigures {
         points: summary.counts,

@@ -3,10 +3,11 @@
 use crate::Result;
 use crate::job::durable::directory::JobDirectory;
 use crate::job::index::{PartIndex, TileIndex};
+use crate::job::merge_records::SeamOfTile;
 use crate::job::partition::result::Partition;
 use crate::job::progress::stage::Stage;
 use crate::job::progress::stats::StageStats;
-use crate::job::records::{FinishedBorder, JobStep, SeamTriangle, Store};
+use crate::job::records::{FinishedBorder, JobStep, Store};
 use crate::job::run::part_entries::entries_of;
 use crate::job::run::parts::done::Done;
 use crate::job::run::parts::join::JoinedParts;
@@ -85,7 +86,7 @@ impl<'a> BorderSession<'a> {
         &self.open.partition
     }
 
-    fn seam(&self, tile: TileIndex) -> Result<Vec<SeamTriangle>> {
+    fn seam(&self, tile: TileIndex) -> Result<SeamOfTile> {
         let ForeignBorders { job, joined, .. } = *self.borders;
         joined.seam_of(job, self.store(), &self.partition().tree, tile)
     }

@@ -1,0 +1,103 @@
+//! Which way a triangle flows: the rule by which slivers along the hull are left out of what viewers see.
+//!
+//! An obtuse triangle flows over its longest edge, towards its circumcentre, if that edge is much longer than the spacing of the points.
+//! A triangle is **trimmed** if the way from triangle to triangle leads out of the hull. Any other way ends at a triangle that does not
+//! flow, as in a river or a void: what is around it stays. This is the flow of Edelsbrunner, Facello and Liang, "On the definition and
+//! the construction of pockets in macromolecules" (1998).
+//!
+//! The edges along a way grow strictly, so it ends. Else the triangles on both sides of an edge would be obtuse over it, and the sum of
+//! the two angles above a half turn, which no Delaunay triangulation has. The way depends on the triangles alone.
+
+use crate::geometry::Site;
+use crate::job::plan::job_plan::Plan;
+
+/// An edge is long from this many times the mean spacing of all points on.
+const SPACINGS: u128 = 10;
+
+/// The rule of a job.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HullRule {
+    /// The square of the longest edge that no triangle flows over, in square lattice steps.
+    limit: u64,
+}
+
+impl HullRule {
+    /// Returns the rule of a job. It follows from what headers tell, so every step knows it, whatever the parts and tiles.
+    pub fn of(plan: &Plan) -> HullRule {
+        let [width, height] = [0, 1].map(|axis| (plan.extent.extent(axis) + 1) as u128);
+        HullRule::of_spacing(width * height / plan.records.max(1) as u128)
+    }
+
+    /// Returns the rule where a point has this area to itself in the mean, in square lattice steps.
+    fn of_spacing(area: u128) -> HullRule {
+        HullRule { limit: u64::try_from(SPACINGS * SPACINGS * area).unwrap_or(u64::MAX) }
+    }
+
+    /// Returns the longest edge that no triangle flows over, in lattice steps.
+    pub fn length(&self) -> f64 {
+        (self.limit as f64).sqrt()
+    }
+
+    /// Tells whether a triangle may flow over the edge from `a` to `b`.
+    #[inline]
+    pub fn is_long(&self, a: Site, b: Site) -> bool {
+        dot(a, b, b) as u64 > self.limit
+    }
+
+    /// Returns the corner at which the edge begins that the triangle flows over.
+    #[inline]
+    pub fn flow(&self, corners: [Site; 3]) -> Option<usize> {
+        let is_obtuse = |&apex: &usize| dot(corners[apex], corners[(apex + 1) % 3], corners[(apex + 2) % 3]) < 0;
+        let from = ((0..3).find(is_obtuse)? + 1) % 3;
+        self.is_long(corners[from], corners[(from + 1) % 3]).then_some(from)
+    }
+}
+
+/// Returns the dot product of the vectors from `o` to `a` and to `b`, which is below 2^62.
+#[inline]
+fn dot(o: Site, a: Site, b: Site) -> i64 {
+    (0..2).map(|k| (a[k] as i64 - o[k] as i64) * (b[k] as i64 - o[k] as i64)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::index::HalfEdgeIndex;
+    use crate::triangulation::divide_and_conquer;
+    use proptest::prelude::*;
+
+    #[test]
+    fn only_obtuse_triangles_with_a_long_edge_flow() {
+        let rule = HullRule::of_spacing(1);
+        assert_eq!(rule.flow([[0, 0], [11, 0], [5, 1]]), Some(0));
+        assert_eq!(rule.flow([[5, 1], [0, 0], [11, 0]]), Some(1));
+        assert_eq!(rule.flow([[0, 0], [10, 0], [5, 1]]), None, "not long");
+        assert_eq!(rule.flow([[0, 0], [40, 0], [20, 20]]), None, "a right angle");
+        let reach = 1 << 29;
+        assert_eq!(rule.flow([[-reach, -reach], [reach, reach], [0, -1]]), Some(0), "the greatest extent");
+    }
+
+    proptest! {
+        /// Even where many sites lie on one circle, so that there are several triangulations.
+        #[test]
+        fn edges_grow_along_a_way(sites in prop::collection::btree_set(prop::array::uniform2(-30i32..30), 3..120)) {
+            let sites: Vec<Site> = sites.into_iter().collect();
+            let mesh = divide_and_conquer::triangulate(&sites).unwrap();
+            let rule = HullRule::of_spacing(0);
+            let flow = |t: usize| {
+                let from = rule.flow(mesh.triangles[t].map(|v| sites[v.get()]))?;
+                Some(HalfEdgeIndex::of_triangle(t)[from])
+            };
+            let length = |h: HalfEdgeIndex| {
+                let [a, b] = [mesh.origin(h), mesh.destination(h)].map(|v| sites[v.get()]);
+                dot(a, b, b)
+            };
+            for h in (0..mesh.triangles.len()).filter_map(flow) {
+                let twin = mesh.twin(h);
+                if twin != HalfEdgeIndex::HULL && let Some(next) = flow(twin.triangle()) {
+                    prop_assert!(length(next) > length(h));
+                }
+            }
+        }
+    }
+}
