@@ -3,6 +3,7 @@
 //! [`frame::Frame`] says where a lattice point lies in a glTF scene. All code that writes or reads positions asks it.
 
 pub mod attributes;
+pub(crate) mod axis_scale;
 pub mod checksums;
 pub mod color;
 pub mod compression;

@@ -165,7 +165,9 @@ fn a_curve_keeps_all_triangles_and_a_warning_says_so() {
     let file = clouds::write(folder.path(), "cloud.csv", &cloud);
     let warns = |job: Job| job.report()["warnings"].to_string().contains("nothing is left out along the hull");
     assert!(
-        warns(Job::on(&[&file])) && warns(Job::on(&[&file]).tiles_of(300)) && warns(in_parts(&[file.clone()], 900))
+        warns(Job::on(&[&file]))
+            && warns(Job::on(&[&file]).tiles_of(300))
+            && warns(in_parts(std::slice::from_ref(&file), 900))
     );
     assert!(!warns(Job::on(&[&file]).with("output", "hull = \"whole\"")));
 }

@@ -42,7 +42,9 @@ type PointAt<'a> = &'a dyn Fn(i64, i64) -> [i64; 3];
 /// As [`point`], 21 km wide.
 fn far_point(i: i64, j: i64) -> [i64; 3] {
     let [x, y, z] = point(i, j);
-    [50_000_000 + 100 * (x - 50_000_000), 480_000_000 + 100 * (y - 480_000_000), z]
+    // Not on whole metres, so that coordinates have their two decimals.
+    let odd = 1 + (31 * i + 17 * j) % 97;
+    [50_000_000 + 100 * (x - 50_000_000) + odd, 480_000_000 + 100 * (y - 480_000_000) + odd, z]
 }
 
 fn text(hundredths: i64) -> String {

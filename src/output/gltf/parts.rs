@@ -4,7 +4,8 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use crate::geometry::lattice::shortest_decimal;
-use crate::output::frame::{FINE_GRID, Frame, PART_REACH, origin_between, short_origin};
+use crate::output::axis_scale::PART_REACH;
+use crate::output::frame::{FINE_GRID, Frame, origin_between, short_origin};
 use crate::output::tile::Tile;
 use crate::{Error, Result};
 use rust_decimal::Decimal;
