@@ -18,17 +18,18 @@ type Triangle = [[i64; 2]; 3];
 
 /// The side of the square of the bay.
 const SIDE: i64 = 100_000;
-const BAY: [i64; 2] = [88_000, 88_000];
-const LAKE: [i64; 2] = [30_000, 30_000];
-const RIVER: [i64; 2] = [25_000, 70_000];
+const BAY: [i64; 2] = [50_000, 90_000];
+const LAKE: [i64; 2] = [70_000, 30_000];
+const RIVER: [i64; 2] = [25_000, 35_000];
 
-/// Random points around a round lake and a river that opens into the outside in the west. In the north-east there are none.
+/// Random points around a round lake and a river that opens into the outside in the west. In the north is a bay.
 fn bay(count: usize) -> Cloud {
     let mut random = Random(11);
     let is_land = |[x, y]: [i64; 2]| {
         let is_lake = (x - LAKE[0]).pow(2) + (y - LAKE[1]).pow(2) < 12_000i64.pow(2);
-        let is_river = x < 50_000 && (y - RIVER[1]).abs() < 8_000;
-        !is_lake && !is_river && (x < 60_000 || y < 60_000)
+        let is_river = x < 45_000 && (y - RIVER[1]).abs() < 8_000;
+        let is_bay = (x - 50_000).pow(2) + (y - 110_000).pow(2) < 45_000i64.pow(2);
+        !is_lake && !is_river && !is_bay
     };
     let places = std::iter::repeat_with(|| [random.below(SIDE as u64) as i64, random.below(SIDE as u64) as i64]);
     clouds::with_heights(places.filter(|place| is_land(*place)).take(count))
@@ -36,7 +37,7 @@ fn bay(count: usize) -> Cloud {
 
 /// Points on a steep parabola: every triangle is a sliver.
 fn parabola() -> Cloud {
-    clouds::with_heights((0..6_000).map(|i| [i, i * i]))
+    clouds::with_heights((0..6_000).map(|i| [i, i * i / 10]))
 }
 
 /// Returns where the coordinates of the tiles begin.
