@@ -29,7 +29,8 @@ fn proved(job: &Job) -> (Value, String) {
     let [shown, cut, hull] = ["triangles", "cut_triangles", "hull_triangles"].map(|name| number(&report[name]));
     assert_eq!([number(&verdict["triangles"]), number(&verdict["cut"])], [shown + cut, hull]);
     let across = number(&verdict["edges_across_tiles"]);
-    assert_eq!(across > 0, number(&report["tiles"]) > 1, "{verdict}");
+    // What is left out is in a file of its own.
+    assert_eq!(across > 0, number(&report["tiles"]) > 1 || number(&report["cut_triangles"]) > 0, "{verdict}");
     let written: Value = serde_json::from_slice(&std::fs::read(job.out().join("report.json")).unwrap()).unwrap();
     assert_eq!(written, report, "report.json is what --json prints");
     (report, verdict["digest"].as_str().unwrap().to_owned())
