@@ -13,6 +13,7 @@ use crate::Result;
 use crate::geometry::Bounds;
 use crate::geometry::lattice::Lattice;
 use crate::output::axis_scale::{AxisScale, TRANSLATION_STEPS, nearest};
+use crate::output::compression::Compression;
 use crate::output::curvature::Curvature;
 
 /// A rounded place of a plain bent scene leads back to within this many lattice steps of its lattice point.
@@ -21,8 +22,12 @@ const MOST_OFF_PLAIN: f64 = 0.255;
 /// The same for packed tiles.
 const MOST_OFF_PACKED: f64 = 0.497;
 
-/// More often than this no step is halved: a vertical and a horizontal one, each to a 256th.
-const STEPS_HALVED: usize = 16;
+/// More often than this no step is halved.
+const STEPS_HALVED: usize = 8;
+
+/// How much a bent scene may change sideways and upwards from place to place, in metres for a metre, so that its places are surely found again.
+/// On the earth that is an area of about 1000 km.
+const STEEPEST: f64 = 0.1;
 
 /// Steps that a 16-bit position reaches from its origin.
 const SHORT_REACH: f64 = 65535.0;
@@ -120,19 +125,44 @@ impl Frame {
         let [xy, up] = self.resolution_metres();
         let steep = curvature.steepness([xy, xy, up]);
         for _ in 0..STEPS_HALVED {
-            let half = [self.horizontal.step, self.horizontal.step, self.vertical.step].map(|step| step / 2.0);
-            // To first order; a tenth covers the rest and what lies between the places that were looked at.
-            let off = |k: usize| half[k] + 1.1 * (0..3).map(|b| steep[k][b] * half[b]).sum::<f64>();
-            let (across, along) = (off(0).max(off(1)) / xy, off(2) / up);
-            if across > most {
-                self.horizontal = self.horizontal.halved();
-            } else if along > most {
-                self.vertical = self.vertical.halved();
-            } else {
-                break;
+            let [across, along] = self.off(&steep);
+            let worst = (0..3).max_by(|&j, &k| (across[j] + along[j]).total_cmp(&(across[k] + along[k])));
+            // The axis whose steps are to blame need not be the one along which a place is off.
+            match [across, along].into_iter().any(|off| off.iter().sum::<f64>() > most).then_some(worst).flatten() {
+                None => break,
+                Some(2) => self.vertical = self.vertical.halved(),
+                Some(_) => self.horizontal = self.horizontal.halved(),
             }
         }
         self
+    }
+
+    /// Returns by how many lattice steps a place is off at most when it was rounded and led back, sideways and upwards: what rounding along each
+    /// axis contributes. `steep` is the steepness of the curvature.
+    fn off(&self, steep: &[[f64; 3]; 3]) -> [[f64; 3]; 2] {
+        let [xy, up] = self.resolution_metres();
+        let half = [self.horizontal.step, self.horizontal.step, self.vertical.step].map(|step| step / 2.0);
+        // To first order; a tenth covers the rest and what lies between the places that were looked at.
+        let part = |k: usize, b: usize| half[b] * (f64::from(u8::from(k == b)) + 1.1 * steep[k][b]);
+        let sideways = [0, 1].map(|k| [0, 1, 2].map(|b| part(k, b) / xy));
+        let larger = sideways[0].iter().sum::<f64>() < sideways[1].iter().sum::<f64>();
+        [sideways[usize::from(larger)], [0, 1, 2].map(|b| part(2, b) / up)]
+    }
+
+    /// Tells whether the places of a bent scene can be found again, and whether its steps hold every triangle within `bounds` that the frame
+    /// `flat` of the job holds. If not, the scene must stay a plane.
+    pub fn can_be_bent(&self, flat: &Frame, bounds: Bounds<3>, packing: Compression) -> bool {
+        let Some(curvature) = self.curvature() else { return true };
+        let [xy, up] = self.resolution_metres();
+        let steep = curvature.steepness([xy, xy, up]);
+        let most = if packing == Compression::None { MOST_OFF_PLAIN } else { MOST_OFF_PACKED };
+        let leads_back = self.off(&steep).into_iter().all(|off| off.iter().sum::<f64>() <= most)
+            && steep.iter().all(|row| row.iter().sum::<f64>() <= STEEPEST);
+        let (moved, longest, needed) = (curvature.greatest(), self.longest_triangle(), flat.longest_triangle());
+        let holds = |k: usize, step: f64, axis: usize| {
+            longest[axis] >= needed[axis].min(bounds.extent(k) as f64 * step + 2.0 * moved[k])
+        };
+        leads_back && holds(0, xy, 0) && holds(1, xy, 0) && holds(2, up, 1)
     }
 
     /// Returns the numbers that are written for readers.

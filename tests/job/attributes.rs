@@ -278,7 +278,8 @@ fn the_files_are_valid_and_describe_them() {
         let job = job_on(&cloud, compression);
         job.report();
         validate(&job.out(), 20);
-        for path in glbs(&job.out()) {
+        // What is left out of the tiles is for `verify` alone.
+        for path in glbs(&job.out()).into_iter().filter(|path| !path.starts_with(job.out().join("cut"))) {
             let (found, is_aligned) = document(&fs::read(&path).unwrap());
             let metadata = &found["extensions"]["EXT_structural_metadata"];
             let properties = &metadata["schema"]["classes"]["point"]["properties"];

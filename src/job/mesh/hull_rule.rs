@@ -24,13 +24,14 @@ pub struct HullRule {
 impl HullRule {
     /// Returns the rule of a job. It follows from what headers tell, so every step knows it, whatever the parts and tiles.
     pub fn of(plan: &Plan) -> HullRule {
-        let [width, height] = [0, 1].map(|axis| (plan.extent.extent(axis) + 1) as u128);
-        HullRule::of_spacing(width * height / plan.records.max(1) as u128)
+        HullRule::of_points(plan.records, plan.claimed_area)
     }
 
-    /// Returns the rule where a point has this area to itself in the mean, in square lattice steps.
-    fn of_spacing(area: u128) -> HullRule {
-        HullRule { limit: u64::try_from(SPACINGS * SPACINGS * area).unwrap_or(u64::MAX) }
+    /// Returns the rule where so many points share an `area` in square lattice steps. No two of them that stay are nearer than a step.
+    fn of_points(points: u64, area: u64) -> HullRule {
+        let points = points.max(1);
+        let limit = SPACINGS * SPACINGS * u128::from(area.max(points)) / u128::from(points);
+        HullRule { limit: u64::try_from(limit).unwrap_or(u64::MAX) }
     }
 
     /// Returns the longest edge that no triangle flows over, in lattice steps.
@@ -68,7 +69,7 @@ mod tests {
 
     #[test]
     fn only_obtuse_triangles_with_a_long_edge_flow() {
-        let rule = HullRule::of_spacing(1);
+        let rule = HullRule::of_points(1, 1);
         assert_eq!(rule.flow([[0, 0], [11, 0], [5, 1]]), Some(0));
         assert_eq!(rule.flow([[5, 1], [0, 0], [11, 0]]), Some(1));
         assert_eq!(rule.flow([[0, 0], [10, 0], [5, 1]]), None, "not long");
@@ -83,7 +84,7 @@ mod tests {
         fn edges_grow_along_a_way(sites in prop::collection::btree_set(prop::array::uniform2(-30i32..30), 3..120)) {
             let sites: Vec<Site> = sites.into_iter().collect();
             let mesh = divide_and_conquer::triangulate(&sites).unwrap();
-            let rule = HullRule::of_spacing(0);
+            let rule = HullRule { limit: 0 };
             let flow = |t: usize| {
                 let from = rule.flow(mesh.triangles[t].map(|v| sites[v.get()]))?;
                 Some(HalfEdgeIndex::of_triangle(t)[from])

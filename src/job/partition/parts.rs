@@ -52,6 +52,12 @@ impl Parts {
         Parts { grid, tree, spans, part_of, reach, new_inputs, expected }
     }
 
+    /// Returns the plan of a job that is one part if nothing can be cut: many small inputs may share one area.
+    pub fn cut_or_whole(plan: Plan) -> Plan {
+        let is_cut = !plan.is_one_part() && Parts::of(&plan).all().len() > 1;
+        Plan { claims: plan.claims.filter(|_| is_cut), ..plan }
+    }
+
     /// Returns all parts in the order in which they are done.
     pub fn all(&self) -> impl ExactSizeIterator<Item = PartIndex> + Clone {
         (0..self.spans.len()).map(PartIndex::new)

@@ -45,6 +45,8 @@ pub struct Plan {
     pub crs: Crs,
     /// The name of the unit of x and y.
     pub unit: String,
+    /// The area that the headers of all records claim, in square lattice steps, whatever part of it the user wants.
+    pub claimed_area: u64,
     /// The way from the lattice to glTF, of a scene that is not bent.
     pub frame: Frame,
     /// How the scene follows the curve of the earth. It is found once and kept, because it comes from a machine's mathematics library: in a

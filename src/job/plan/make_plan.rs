@@ -47,7 +47,10 @@ pub fn replan_without(plan: Plan, bad: &[SkippedInput]) -> Result<Plan> {
     let sources = plan.inputs.into_iter().map(|input| input.source).filter(|source| !is_bad(source));
     let is_new = |bad: &&SkippedInput| !plan.skipped.contains(bad);
     let skipped = plan.skipped.iter().chain(bad.iter().filter(is_new)).cloned();
-    plan_sources(sources.collect(), skipped.collect(), &plan.options, plan.coarsening)
+    let is_whole = plan.claims.is_none();
+    let again = plan_sources(sources.collect(), skipped.collect(), &plan.options, plan.coarsening)?;
+    // What was not cut into parts is not cut now.
+    Ok(Plan { claims: again.claims.filter(|_| !is_whole), ..again })
 }
 
 /// Plans a job of `sources`. If bad files are to be left out, this leaves out those that no plan can use.
@@ -122,7 +125,7 @@ fn try_plan(
     let clip = options.input.bounds.map(|b| lattice_clip(&lattice, b.0));
     let rules = point_rules(sources, options, &lattice)?;
     check_malformed_rows(sources, &rules, options)?;
-    let clipped = lattice_extent(&lattice, &extent, clip);
+    let (clipped, claimed_area) = (lattice_extent(&lattice, &extent, clip), claimed_area(&lattice, &extent));
     let claimed = extent.boxes.iter().map(|claim| claimed_box(&lattice, claim, clipped)).collect::<Vec<_>>();
     let has_parts = !coarsening.one_part && records > options.triangulation.max_points_per_part.0 / 2 * 3;
     let claims = has_parts.then(|| claims(sources, &rules, &lattice, &extent, clipped)).transpose()?;
@@ -141,6 +144,7 @@ fn try_plan(
         heights,
         crs,
         unit: unit.into(),
+        claimed_area,
         frame,
         curvature: None,
         warnings,
@@ -220,6 +224,18 @@ fn lattice_clip(lattice: &Lattice, bounds: [f64; 4]) -> Bounds<2> {
         steps.unwrap_or(far).clamp(-(REACH as i64), REACH as i64) as i32
     });
     Bounds { min: [xmin, ymin], max: [xmax, ymax] }
+}
+
+/// Returns the area that the sources claim in square lattice steps: that of all their boxes, or of the box around them if that is less.
+fn claimed_area(lattice: &Lattice, extent: &Extent) -> u64 {
+    let step = lattice.resolution.to_f64().unwrap_or(1.0);
+    let area =
+        |min: &[f64], max: &[f64]| [0, 1].map(|k| ((max[k] - min[k]) / step).round() + 1.0).iter().product::<f64>();
+    let around = area(&extent.min, &extent.max) as u64;
+    // Whole numbers: their sum is the same in any order.
+    let boxes = extent.boxes.iter().map(|claim| claim.map(|[min, max]| area(&min, &max) as u64));
+    let sum = boxes.reduce(|a, b| Some(a?.saturating_add(b?))).flatten();
+    sum.map_or(around, |sum| sum.min(around))
 }
 
 fn lattice_extent(lattice: &Lattice, extent: &Extent, clip: Option<Bounds<2>>) -> Bounds<2> {

@@ -5,6 +5,7 @@ use crate::job::durable::directory::JobDirectory;
 use crate::job::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours};
 use crate::job::machine;
 use crate::job::options::JobOptions;
+use crate::job::partition::parts::Parts;
 use crate::job::plan::budget::workers;
 use crate::job::plan::job_plan::{Plan, SkippedInput};
 use crate::job::plan::lattice_choice::LatticeCoarsening;
@@ -77,7 +78,7 @@ pub fn check(options: &JobOptions) -> Result<Preflight> {
     let directory = JobDirectory::new(&options.output.directory);
     check_nothing_in_the_way(&directory)?;
     check_results_are_ours(&directory, options.output.page)?;
-    let plan = make_plan(options, LatticeCoarsening::default())?;
+    let plan = Parts::cut_or_whole(make_plan(options, LatticeCoarsening::default())?);
     check_height_offset(&plan)?;
     let threads = workers(options, plan.records)?;
     if has_filter(&plan) {

@@ -6,6 +6,7 @@ use crate::job::durable::directory::JobDirectory;
 use crate::job::durable::lock::Lock;
 use crate::job::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours};
 use crate::job::options::{JobOptions, RunOptions};
+use crate::job::partition::parts::Parts;
 use crate::job::partition::result::Partition;
 use crate::job::plan::budget::workers;
 use crate::job::plan::fingerprint::{Fingerprint, JobHeader};
@@ -187,7 +188,7 @@ fn attempt(
     let stage = JobProgress::new(run.progress, clock, Vec::new()).stage("plan", 1, "job");
     let plan = match earlier.as_ref().and_then(|earlier| earlier.plan(directory, &header, options)) {
         Some(plan) => plan,
-        None => on_threads(workers(options, 0)?, || make_plan(options, coarsening))?,
+        None => on_threads(workers(options, 0)?, || make_plan(options, coarsening).map(Parts::cut_or_whole))?,
     };
     check_height_offset(&plan)?;
     stage.advance(1);

@@ -4,6 +4,7 @@ use crate::Result;
 use crate::geometry::Bounds;
 use crate::job::plan::globe_definition::globe_definition;
 use crate::job::plan::job_plan::Plan;
+use crate::job::tiles::style::bent_frame;
 use crate::output::compression::Compression;
 use crate::output::curvature::Curvature;
 use crate::output::geoid::Geoid;
@@ -53,6 +54,9 @@ pub fn curvature_of(plan: &Plan, bounds: Bounds<3>) -> Result<Option<Curvature>>
         // The step that publishes says why a terrain has no place on the globe.
         Err(NotPlaced::System(_)) => Ok(None),
         Err(NotPlaced::Height(error)) => Err(error),
-        Ok(curvature) => Ok(curvature),
+        Ok(curvature) => Ok(curvature.filter(|curvature| {
+            // Half a continent, or a map such as Mercator's that is nowhere to scale, stays flat, with a transform for each tile.
+            bent_frame(plan, curvature.clone(), bounds).can_be_bent(&plan.frame, bounds, output.packing())
+        })),
     }
 }

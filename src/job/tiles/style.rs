@@ -7,6 +7,7 @@ use crate::job::tiles::max_edge::MaxEdgeRule;
 use crate::output::Compression;
 use crate::output::attributes::AttributeChoice;
 use crate::output::color::{Coloring, HeightRange};
+use crate::output::curvature::Curvature;
 use crate::output::frame::Frame;
 use crate::output::options::{ColorChoice, Hull, OutputOptions};
 
@@ -39,6 +40,11 @@ fn with_steps(frame: Frame, compression: Compression, bounds: Bounds<3>) -> Fram
     }
 }
 
+/// Returns the frame of the tiles of a job whose scene follows the curve of the earth, and whose points are within `bounds`.
+pub(crate) fn bent_frame(plan: &Plan, curvature: Curvature, bounds: Bounds<3>) -> Frame {
+    with_steps(plan.frame.clone().curved(curvature), plan.options.output.packing(), bounds)
+}
+
 impl TileStyle {
     /// Returns the style of the tiles of a job whose points are within `bounds`, and whose greatest colour is `max_rgb`. A ramp of colours
     /// spans `heights`.
@@ -53,10 +59,9 @@ impl TileStyle {
         };
         let compression = output.packing();
         let frame = match &plan.curvature {
-            Some(curvature) => plan.frame.clone().curved(curvature.clone()),
-            None => plan.frame.clone(),
+            Some(curvature) => bent_frame(plan, curvature.clone(), bounds),
+            None => with_steps(plan.frame.clone(), compression, bounds),
         };
-        let frame = with_steps(frame, compression, bounds);
         let hull = (output.hull == Hull::Trimmed).then(|| HullRule::of(plan));
         let copyright = output.copyright().map(str::to_owned);
         let OutputOptions { attributes, normals, .. } = *output;

@@ -3,6 +3,7 @@
 use crate::job::durable::directory::JobDirectory;
 use crate::job::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours};
 use crate::job::options::{JobOptions, RunOptions};
+use crate::job::partition::parts::Parts;
 use crate::job::plan::budget::workers;
 use crate::job::plan::fingerprint::{Fingerprint, JobHeader};
 use crate::job::plan::make_plan::make_plan;
@@ -40,7 +41,7 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> Result<Option<Strin
     let known = earlier.as_ref().and_then(|earlier| earlier.plan(directory, &header, options));
     let plan = match known {
         Some(plan) => plan,
-        None => on_threads(workers(options, 0)?, || make_plan(options, coarsening))?,
+        None => on_threads(workers(options, 0)?, || make_plan(options, coarsening).map(Parts::cut_or_whole))?,
     };
     check_height_offset(&plan)?;
     note_skipped(&plan.skipped, &JobProgress::new(run.progress, JobClock::start(), Vec::new()));
