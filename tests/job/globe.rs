@@ -378,3 +378,34 @@ fn a_small_area_has_one_transform() {
     assert_eq!((&globe["curved"], &globe["per_tile"]), (&Value::Bool(false), &Value::Bool(false)));
     assert!(Source::of(&job).extras.curvature.is_none());
 }
+
+/// Steps of x and y may be a thousand times as long as those of z, or a thousandth. Those are made finer that are in the way.
+#[test]
+fn steps_of_other_lengths_upwards_are_no_reason_to_fail() {
+    for (resolution, resolution_z) in [("1", "0.001"), ("0.01", "10")] {
+        let folder = tempfile::tempdir().unwrap();
+        let cloud = folder.path().join("cloud.las");
+        std::fs::write(&cloud, utm(&square(60, 12_000.0, [0.0; 2]))).unwrap();
+        let steps = format!("resolution = {resolution}\nresolution_z = {resolution_z}");
+        for compression in ["meshopt", "none"] {
+            let look = format!("format = \"3dtiles\"\ncompression = \"{compression}\"");
+            let job = Job::on(&[&cloud]).tiles_of(500).with("input", &steps).with("output", &look);
+            job.report();
+            job.verified();
+            assert_eq!(georeference(&job, "curved"), Value::Bool(true), "{resolution}, {resolution_z}, {compression}");
+        }
+    }
+}
+
+/// No polynomial follows the whole earth: such a scene stays flat, and the job ends well.
+#[test]
+fn what_is_too_wide_to_be_bent_stays_flat() {
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = folder.path().join("cloud.las");
+    let mut points = square(30, 5_000.0, [0.0; 2]);
+    points.push([40_000_000, 100_000_000, 0]);
+    std::fs::write(&cloud, utm(&points)).unwrap();
+    let job = Job::on(&[&cloud]).tiles_of(500).with("output", "format = \"3dtiles\"\nhull = \"whole\"");
+    job.report();
+    job.verified();
+}

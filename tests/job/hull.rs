@@ -73,7 +73,7 @@ fn slivers(mesh: &[Triangle], cloud: &Cloud) -> Vec<Triangle> {
         let values = || cloud.iter().map(|point| point[axis]);
         (values().max().unwrap() - values().min().unwrap() + 1) as i128
     };
-    let limit = 100 * (range(0) * range(1) / cloud.len() as i128);
+    let limit = 100 * range(0) * range(1) / cloud.len() as i128;
     let at: BTreeMap<[[i64; 2]; 2], &Triangle> =
         mesh.iter().flat_map(|t| (0..3).map(move |i| ([t[i], t[(i + 1) % 3]], t))).collect();
     let square = |[a, b]: [[i64; 2]; 2]| (a[0] - b[0]).pow(2) as i128 + (a[1] - b[1]).pow(2) as i128;
@@ -129,6 +129,48 @@ fn leaves_out_the_slivers(cloud: &Cloud, side: i64) -> usize {
         assert_eq!(number(&report["triangles"]), mesh.len() as u64 - count);
     }
     expected.len()
+}
+
+/// The spacing is that of all points, so a look at a small area first shows what the whole job will show.
+#[test]
+fn the_length_does_not_depend_on_the_bounds() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = clouds::write(folder.path(), "cloud.csv", &clouds::uniform(20_000, 100_000, 3));
+    let [whole, part] = [Job::on(&[&file]), Job::on(&[&file]).with("input", "bounds = [40000, 40000, 60000, 60000]")];
+    let [whole, part] = [whole, part].map(|job| job.with("input", "resolution = 1").report());
+    let [length, length_of_part] = [&whole, &part].map(|report| report["hull_length"].as_f64().unwrap());
+    assert!((length - 10.0 * (1e10f64 / 2e4).sqrt()).abs() < 1.0, "{length}");
+    assert_eq!(length_of_part, length);
+    assert!(number(&part["hull_triangles"]) * 100 < number(&part["triangles"]), "{part}");
+}
+
+/// Places that coincide on a coarse lattice are no closer to each other than its step.
+#[test]
+fn more_points_than_places_leave_out_no_small_triangles() {
+    let folder = tempfile::tempdir().unwrap();
+    let disc = (0..60i64)
+        .flat_map(|x| (0..60i64).map(move |y| [x, y]))
+        .filter(|[x, y]| (x - 30).pow(2) + (y - 30).pow(2) < 800);
+    let cloud = clouds::with_heights(disc.flat_map(|place| [place; 3]));
+    let file = clouds::write(folder.path(), "cloud.csv", &cloud);
+    let report = Job::on(&[&file]).with("input", "resolution = 1").report();
+    assert_eq!((number(&report["hull_triangles"]), number(&report["sites"]) * 3), (0, cloud.len() as u64));
+}
+
+/// Where nothing can be cut into parts, the job is one part.
+#[test]
+fn many_small_files_of_one_area_are_one_part() {
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = clouds::uniform(2_000, 100_000, 5);
+    let write = |(i, points): (usize, &[[i64; 3]])| clouds::write(folder.path(), &format!("{i}.csv"), points);
+    let files: Vec<PathBuf> = cloud.chunks(20).enumerate().map(write).collect();
+    let job = Job::on(&files).tiles_of(20).with("triangulation", "max_points_per_part = 500");
+    job.report();
+    job.verified();
+    let file = clouds::write(folder.path(), "cloud.txt", &cloud[..200]);
+    let job = Job::on(&[&file]).tiles_of(200_000).with("triangulation", "max_points_per_part = 100");
+    assert_eq!(number(&job.report()["parts"]), 1);
+    job.verified();
 }
 
 #[test]

@@ -45,7 +45,7 @@ pub struct Plan {
     pub crs: Crs,
     /// The name of the unit of x and y.
     pub unit: String,
-    /// The area that the headers of all records claim, in square lattice steps, whatever part of it the user wants.
+    /// The area of the box around all records in square lattice steps, as headers claim it, whatever part of it the user wants.
     pub claimed_area: u64,
     /// The way from the lattice to glTF, of a scene that is not bent.
     pub frame: Frame,

@@ -226,16 +226,11 @@ fn lattice_clip(lattice: &Lattice, bounds: [f64; 4]) -> Bounds<2> {
     Bounds { min: [xmin, ymin], max: [xmax, ymax] }
 }
 
-/// Returns the area that the sources claim in square lattice steps: that of all their boxes, or of the box around them if that is less.
+/// Returns the area of the box around all sources in square lattice steps.
 fn claimed_area(lattice: &Lattice, extent: &Extent) -> u64 {
     let step = lattice.resolution.to_f64().unwrap_or(1.0);
-    let area =
-        |min: &[f64], max: &[f64]| [0, 1].map(|k| ((max[k] - min[k]) / step).round() + 1.0).iter().product::<f64>();
-    let around = area(&extent.min, &extent.max) as u64;
-    // Whole numbers: their sum is the same in any order.
-    let boxes = extent.boxes.iter().map(|claim| claim.map(|[min, max]| area(&min, &max) as u64));
-    let sum = boxes.reduce(|a, b| Some(a?.saturating_add(b?))).flatten();
-    sum.map_or(around, |sum| sum.min(around))
+    let side = |axis: usize| ((extent.max[axis] - extent.min[axis]) / step).round() + 1.0;
+    (side(0) * side(1)) as u64
 }
 
 fn lattice_extent(lattice: &Lattice, extent: &Extent, clip: Option<Bounds<2>>) -> Bounds<2> {
