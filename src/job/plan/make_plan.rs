@@ -3,7 +3,7 @@
 use crate::geometry::Bounds;
 use crate::geometry::lattice::{AxisMap, Lattice, REACH, shortest_decimal};
 use crate::input::options::OnBadFile;
-use crate::input::{Axis, PointRules, Source};
+use crate::input::{Axis, FileFormat, PointRules, Source};
 use crate::job::options::JobOptions;
 use crate::job::plan::common_crs::{common_crs, horizontal_unit};
 use crate::job::plan::extent::{Extent, SourceBox, to_float};
@@ -125,7 +125,8 @@ fn try_plan(
     let clip = options.input.bounds.map(|b| lattice_clip(&lattice, b.0));
     let rules = point_rules(sources, options, &lattice)?;
     check_malformed_rows(sources, &rules, options)?;
-    let (clipped, claimed_area) = (lattice_extent(&lattice, &extent, clip), claimed_area(&lattice, &extent));
+    let (clipped, claimed_area) =
+        (lattice_extent(&lattice, &extent, clip), claimed_area(&lattice, sources, &extent, clip.is_some()));
     let claimed = extent.boxes.iter().map(|claim| claimed_box(&lattice, claim, clipped)).collect::<Vec<_>>();
     let has_parts = !coarsening.one_part && records > options.triangulation.max_points_per_part.0 / 2 * 3;
     let claims = has_parts.then(|| claims(sources, &rules, &lattice, &extent, clipped)).transpose()?;
@@ -226,10 +227,20 @@ fn lattice_clip(lattice: &Lattice, bounds: [f64; 4]) -> Bounds<2> {
     Bounds { min: [xmin, ymin], max: [xmax, ymax] }
 }
 
-/// Returns the area of the box around all sources in square lattice steps.
-fn claimed_area(lattice: &Lattice, extent: &Extent) -> u64 {
+/// Returns the area of the box around all records of the sources in square lattice steps, also of those outside the bounds that the user wants.
+fn claimed_area(lattice: &Lattice, sources: &[Source], extent: &Extent, has_bounds: bool) -> u64 {
     let step = lattice.resolution.to_f64().unwrap_or(1.0);
-    let side = |axis: usize| ((extent.max[axis] - extent.min[axis]) / step).round() + 1.0;
+    // The box of a text is that of the wanted rows, but its numbers are known of all.
+    let of_all = |(source, claim): (&Source, &Option<SourceBox>)| match source.format {
+        FileFormat::Text if has_bounds && source.records > 0 => Some([source.min, source.max]),
+        _ => *claim,
+    };
+    let boxes: Vec<SourceBox> = sources.iter().zip(&extent.boxes).filter_map(of_all).collect();
+    let side = |axis: usize| {
+        let low = boxes.iter().map(|[min, _]| min[axis]).fold(f64::INFINITY, f64::min);
+        let high = boxes.iter().map(|[_, max]| max[axis]).fold(f64::NEG_INFINITY, f64::max);
+        ((high - low).max(0.0) / step).round() + 1.0
+    };
     (side(0) * side(1)) as u64
 }
 
