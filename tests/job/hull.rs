@@ -161,14 +161,10 @@ fn more_points_than_places_leave_out_no_small_triangles() {
 #[test]
 fn many_small_files_of_one_area_are_one_part() {
     let folder = tempfile::tempdir().unwrap();
-    let cloud = clouds::uniform(2_000, 100_000, 5);
+    let cloud = clouds::uniform(12_000, 100_000, 5);
     let write = |(i, points): (usize, &[[i64; 3]])| clouds::write(folder.path(), &format!("{i}.csv"), points);
     let files: Vec<PathBuf> = cloud.chunks(20).enumerate().map(write).collect();
-    let job = Job::on(&files).tiles_of(20).with("triangulation", "max_points_per_part = 500");
-    job.report();
-    job.verified();
-    let file = clouds::write(folder.path(), "cloud.txt", &cloud[..200]);
-    let job = Job::on(&[&file]).tiles_of(200_000).with("triangulation", "max_points_per_part = 100");
+    let job = Job::on(&files).tiles_of(200).with("triangulation", "max_points_per_part = 2000");
     assert_eq!(number(&job.report()["parts"]), 1);
     job.verified();
 }
