@@ -100,7 +100,7 @@ impl Frontier {
     }
 
     /// Returns how many sites' worth of memory it takes to merge the frontier of `node`: its sites, and a site for every
-    /// [`QUESTIONS_PER_SITE`] questions. Does not read the rest of its record.
+    /// few questions. Does not read the rest of its record.
     ///
     /// # Errors
     /// As [`Frontier::load`].
