@@ -25,8 +25,8 @@ const MOST_OFF_PACKED: f64 = 0.497;
 /// More often than this no step is halved.
 const STEPS_HALVED: usize = 8;
 
-/// How much a bent scene may change sideways and upwards from place to place, in metres for a metre, so that its places are surely found again.
-/// On the earth that is an area of about 1000 km.
+/// By how many metres in a metre a displacement may change at most, so that the places of a bent scene are surely found again. On the
+/// earth that is an area about 1000 km wide.
 const STEEPEST: f64 = 0.1;
 
 /// Steps that a 16-bit position reaches from its origin.
@@ -125,28 +125,25 @@ impl Frame {
         let [xy, up] = self.resolution_metres();
         let steep = curvature.steepness([xy, xy, up]);
         for _ in 0..STEPS_HALVED {
-            let [across, along] = self.off(&steep);
-            let worst = (0..3).max_by(|&j, &k| (across[j] + along[j]).total_cmp(&(across[k] + along[k])));
-            // The axis whose steps are to blame need not be the one along which a place is off.
-            match [across, along].into_iter().any(|off| off.iter().sum::<f64>() > most).then_some(worst).flatten() {
-                None => break,
-                Some(2) => self.vertical = self.vertical.halved(),
-                Some(_) => self.horizontal = self.horizontal.halved(),
-            }
+            let Some(parts) = self.off(&steep).into_iter().find(|parts| parts.iter().sum::<f64>() > most) else {
+                break;
+            };
+            // The steps to blame need not be those of the axis along which the place is off.
+            let is_vertical = parts[2] > parts[0].max(parts[1]);
+            let scale = if is_vertical { &mut self.vertical } else { &mut self.horizontal };
+            *scale = scale.halved();
         }
         self
     }
 
-    /// Returns by how many lattice steps a place is off at most when it was rounded and led back, sideways and upwards: what rounding along each
-    /// axis contributes. `steep` is the steepness of the curvature.
-    fn off(&self, steep: &[[f64; 3]; 3]) -> [[f64; 3]; 2] {
+    /// Returns by how many lattice steps a place is off along each axis, at most, when it was rounded and led back: for each the parts that
+    /// rounding along x, y and z has in it. `steep` is the steepness of the curvature.
+    fn off(&self, steep: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
         let [xy, up] = self.resolution_metres();
         let half = [self.horizontal.step, self.horizontal.step, self.vertical.step].map(|step| step / 2.0);
         // To first order; a tenth covers the rest and what lies between the places that were looked at.
         let part = |k: usize, b: usize| half[b] * (f64::from(u8::from(k == b)) + 1.1 * steep[k][b]);
-        let sideways = [0, 1].map(|k| [0, 1, 2].map(|b| part(k, b) / xy));
-        let larger = sideways[0].iter().sum::<f64>() < sideways[1].iter().sum::<f64>();
-        [sideways[usize::from(larger)], [0, 1, 2].map(|b| part(2, b) / up)]
+        [(0, xy), (1, xy), (2, up)].map(|(k, step)| [0, 1, 2].map(|b| part(k, b) / step))
     }
 
     /// Tells whether the places of a bent scene can be found again, and whether its steps hold every triangle within `bounds` that the frame

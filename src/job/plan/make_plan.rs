@@ -227,7 +227,7 @@ fn lattice_clip(lattice: &Lattice, bounds: [f64; 4]) -> Bounds<2> {
     Bounds { min: [xmin, ymin], max: [xmax, ymax] }
 }
 
-/// Returns the area of the box around all records of the sources in square lattice steps, also of those outside the bounds that the user wants.
+/// Returns the area of the box around all records in square lattice steps, whatever part of it the user wants.
 fn claimed_area(lattice: &Lattice, sources: &[Source], extent: &Extent, has_bounds: bool) -> u64 {
     let step = lattice.resolution.to_f64().unwrap_or(1.0);
     // The box of a text is that of the wanted rows, but its numbers are known of all.

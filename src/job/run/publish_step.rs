@@ -121,7 +121,7 @@ fn hull_warning(plan: &Plan, hull: HullCount) -> Option<String> {
     let HullCount { slivers, triangles } = hull;
     (plan.options.output.hull == Hull::Trimmed && hull.is_most()).then(|| {
         format!(
-            "nothing is left out along the hull: {} of {} triangles are slivers there, because the points lie along a curve or are few and far apart; \
+            "nothing is left out along the hull: {} of {} triangles are slivers there; the points lie along a curve, or are few; \
              [output] hull = \"whole\" says the same without this warning",
             grouped(slivers),
             grouped(triangles)
