@@ -180,11 +180,16 @@ impl Executor {
 
     /// Tells whether an adapter is likely to be found. This is so cheap that every job may ask.
     pub fn is_likely() -> bool {
+        device::hardware_is_likely()
+    }
+
+    /// Tells whether a test wants an engine that is no GPU.
+    pub fn is_wanted_by_test() -> bool {
         #[cfg(feature = "fault-injection")]
         if fake_engine::is_wanted() {
             return true;
         }
-        device::hardware_is_likely()
+        false
     }
 
     /// Returns the seconds that every step has taken on the GPU itself so far; nothing if the adapter has no timestamps.

@@ -23,16 +23,18 @@ pub fn covered(mesh: &HalfEdgeMesh, boundary: &[[SiteIndex; 2]]) -> Result<Vec<b
         )));
     }
     let mut covered = vec![false; mesh.triangles.len()];
-    let starts = mesh.half_edges().filter(|h| is_boundary[h.get()]);
-    let mut pending: Vec<usize> = starts.map(HalfEdgeIndex::triangle).collect();
-    while let Some(triangle) = pending.pop() {
-        if std::mem::replace(&mut covered[triangle], true) {
-            continue;
+    let mut pending = Vec::new();
+    let mut reach = |triangle: usize, pending: &mut Vec<usize>| {
+        if !std::mem::replace(&mut covered[triangle], true) {
+            pending.push(triangle);
         }
+    };
+    mesh.half_edges().filter(|h| is_boundary[h.get()]).for_each(|h| reach(h.triangle(), &mut pending));
+    while let Some(triangle) = pending.pop() {
         for h in HalfEdgeIndex::of_triangle(triangle) {
             let twin = mesh.twin(h);
             if !is_boundary[h.get()] && twin != HalfEdgeIndex::HULL {
-                pending.push(twin.triangle());
+                reach(twin.triangle(), &mut pending);
             }
         }
     }

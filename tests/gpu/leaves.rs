@@ -167,7 +167,9 @@ fn a_gpu_that_does_not_exist_is_an_error_if_required_and_none_otherwise() {
     let error = Triangulator::new(&settings(Backend::Gpu), &nameless, MEMORY).err().expect("there is no such GPU");
     assert_eq!(error.exit_code(), 2);
     assert!(error.to_string().contains("no GPU has this name"), "{error}");
-    assert!(Triangulator::new(&settings(Backend::Auto), &nameless, MEMORY).unwrap().gpu().is_none());
+    let optional = Triangulator::new(&settings(Backend::Auto), &nameless, MEMORY).unwrap();
+    optional.prepare(u64::MAX, 1);
+    assert!(optional.gpu().is_none());
 }
 
 #[test]

@@ -221,6 +221,7 @@ fn attempt(
         on_threads(threads, || remove_job(directory))?;
         return Ok(report);
     }
+    job.triangulator.prepare(plan.records, threads);
     on_threads(threads, || {
         let start = match plan.is_one_part() {
             true => resume::start(directory, &header, earlier, options.output.max_edge, run.progress)?,

@@ -9,7 +9,8 @@ use crate::job::records::{
 };
 use crate::job::tiles::hull_slivers::HullSlivers;
 use crate::job::tiles::style::TileStyle;
-use crate::output::normals::{self, NormalSum, NormalSums};
+use crate::mesh::index::SiteIndex;
+use crate::output::normals::{self, NormalSum};
 use crate::{Error, Result};
 
 /// Stores the finished frontier of `tile`, whose seam is `seam`. Returns the other tiles that have corners of the tile's own triangles.
@@ -42,7 +43,7 @@ pub fn finished_border(
     let PartialNormals { mut sums, rgb, class, intensity } = PartialNormals::load(store, tile)?;
     let slivers = HullSlivers::new(style.hull, &seam.trimmed);
     if !style.max_edge.keeps_all() || !slivers.is_empty() {
-        sums = sums_of_kept(store, tile, &frontier, &slivers, style)?;
+        take_left_out(store, tile, &frontier, &slivers, style, &mut sums)?;
     }
     let is_kept = |t: &SeamTriangle| !style.max_edge.leaves_out(t.map(|corner| corner.position)) && !slivers.has(t);
     for &[a, b, c] in seam.triangles.iter().filter(|triangle| is_kept(triangle)) {
@@ -73,17 +74,26 @@ fn neighbours(seam: &[SeamTriangle], tile: TileIndex) -> Vec<TileIndex> {
     neighbours
 }
 
-/// Returns the sums of normals over those of the leaf's triangles that are kept.
-fn sums_of_kept(
+/// Takes the normals of those of the leaf's triangles that are left out from the `sums` at its frontier.
+fn take_left_out(
     store: &Store,
     tile: TileIndex,
     frontier: &Frontier,
     slivers: &HullSlivers,
     style: &TileStyle,
-) -> Result<Vec<NormalSum>> {
+    sums: &mut [NormalSum],
+) -> Result<()> {
     let Leaf { positions, mut triangles, .. } = Leaf::load(store, tile)?;
-    slivers.take(&positions, &mut triangles);
-    style.max_edge.take(&positions, &mut triangles);
-    let sums = NormalSums::new(&positions, &triangles);
-    Ok(frontier.sites.iter().map(|vertex| sums.get(vertex.site.get())).collect())
+    let mut left_out = slivers.take(&positions, &mut triangles);
+    left_out.extend(style.max_edge.take(&positions, &mut triangles));
+    for triangle in left_out {
+        let [a, b, c] = triangle.map(|v| positions[v as usize]);
+        let normal = normals::cross(a, b, c);
+        for v in triangle.map(SiteIndex) {
+            if let Ok(at) = frontier.sites.binary_search_by_key(&v, |vertex| vertex.site) {
+                sums[at] = normals::add(sums[at], normal.map(|v| -v));
+            }
+        }
+    }
+    Ok(())
 }

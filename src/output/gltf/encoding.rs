@@ -22,12 +22,20 @@ pub(crate) fn normal_shorts(normal: [f32; 3], anisotropy: f32) -> [i16; 4] {
     [x, y, z, 0]
 }
 
+/// Returns the nearest whole number, of two the one further from 0. Takes fewer steps than `f32::round`, which is a call on most processors.
+#[inline(always)]
+fn rounded(v: f32) -> f32 {
+    let towards_zero = v as i32 as f32;
+    let is_half_off = (v - towards_zero).abs() >= 0.5;
+    towards_zero + if is_half_off { 1.0f32.copysign(v) } else { 0.0 }
+}
+
 /// Returns the normal with its y stretched, as whole numbers of about this `length`.
 #[inline(always)]
 fn stretched([x, y, z]: [f32; 3], anisotropy: f32, length: f32) -> [f32; 3] {
     let y = y * anisotropy;
     let scale = length / (x * x + y * y + z * z).sqrt();
-    [x, y, z].map(|v| (v * scale).round())
+    [x, y, z].map(|v| rounded(v * scale))
 }
 
 /// Returns the normal as two signed bytes on the octahedron, 127 for 1, in the form of the octahedral filter of
@@ -61,7 +69,7 @@ fn on_octahedron([x, y, z]: [f32; 3], anisotropy: f32, one: f32) -> [f32; 2] {
     let (u, v) = (x * scale, y * scale);
     let (u, v) =
         if z >= 0.0 { (u, v) } else { (1.0f32.copysign(u) * (1.0 - v.abs()), 1.0f32.copysign(v) * (1.0 - u.abs())) };
-    [u, v].map(|v| (v * one).round())
+    [u, v].map(|v| rounded(v * one))
 }
 
 /// Returns the normal in signed bytes from the form of [`normal_octahedral`], as the filter does.
@@ -88,7 +96,7 @@ fn off_octahedron([u, v, one]: [f32; 3], length: f32) -> [f32; 3] {
     let fold = (-z).max(0.0);
     let (x, y) = (u - fold.copysign(u), v - fold.copysign(v));
     let scale = length / (x * x + y * y + z * z).sqrt();
-    [x, y, z].map(|v| (v * scale).round())
+    [x, y, z].map(|v| rounded(v * scale))
 }
 
 /// Whole numbers below this, and above its negative, have a form by [`exponential`].

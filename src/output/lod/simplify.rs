@@ -108,9 +108,11 @@ struct Boundary {
 impl Boundary {
     fn of(tile: &Tile) -> Boundary {
         let on = on_boundary(tile.positions.len(), &tile.triangles);
+        // Few triangles have two corners there, and those are quickly told.
+        let touches = |corners: &&[u32; 3]| corners.iter().filter(|&&v| on[v as usize]).count() >= 2;
         let between = |&[a, b]: &[u32; 2]| on[a as usize] && on[b as usize];
-        let sides = tile.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).filter(between);
-        let sides: Vec<[u32; 2]> = sides.collect();
+        let touching = tile.triangles.iter().filter(touches);
+        let sides: Vec<[u32; 2]> = touching.flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).filter(between).collect();
         let known: HashSet<[u32; 2]> = sides.iter().copied().collect();
         let edges = sides.into_iter().filter(|&[a, b]| !known.contains(&[b, a])).collect();
         let vertices = on.iter().filter(|&&on| on).count();

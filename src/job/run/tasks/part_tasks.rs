@@ -106,6 +106,7 @@ impl PartTask<'_> {
             Phase::Mesh => Triangulator::new(&options.triangulation, &options.gpu, options.limits.memory.0)?,
             _ => Triangulator::without_gpu(&options.triangulation),
         };
+        triangulator.prepare(mine.iter().map(|&part| self.job.parts.expected_points(part)).sum(), threads);
         let job = &PartsJob {
             plan: &self.job.plan,
             parts: &self.job.parts,
