@@ -85,7 +85,7 @@ const SHARE_FOR_GPU: u64 = 4;
 /// "auto" uses no GPU if the whole job has less memory than this, because drivers would take too large a share of it.
 const MIN_MEMORY: u64 = 1 << 30;
 /// "auto" opens no GPU if a thread has fewer points to do: opening one takes some tenths of a second of processor time. With an H100, jobs of
-/// 1.3 and 2.7 million points a thread took 1.0 to 1.1 of the time without, and those of 5.3 million 0.93.
+/// 1.3 and 2.7 million points a thread took 1.0 to 1.1 of the time without, and those of 5.3 million 0.86 to 0.93 (BENCHMARKS.md).
 const MIN_POINTS_PER_THREAD: u64 = 3_000_000;
 
 impl Triangulator {
