@@ -25,6 +25,11 @@ const ELLIPSOIDAL: &str = "ellipsoidal height";
 /// [`Error::Config`] if a source does not say what it is in, or there is no way to the system.
 pub fn transform_sources(sources: &mut [Source], options: &InputOptions, warnings: &mut Warnings) -> Result<()> {
     sources.iter_mut().for_each(Source::forget_transform);
+    if options.missing_crs.is_some() && options.crs != CrsChoice::Auto {
+        return Err(Error::Config(
+            "[input] missing_crs is for files that name no CRS, and crs says what all files are in: leave one of them out".into(),
+        ));
+    }
     let Some(target) = &options.to_crs else {
         if options.missing_crs.is_some() {
             for source in sources.iter_mut() {

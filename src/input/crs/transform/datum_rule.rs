@@ -22,22 +22,21 @@ impl DatumRule {
     }
 }
 
-/// The shifts that national datums need, by the beginning of the comparable name of the datum: the files that PROJ has for them.
-const GRIDS: [(&str, &str); 14] = [
-    ("nad27", "NADCON or NTv2: us_noaa_conus.tif, ca_nrc_ntv2_0.tif"),
-    ("nad83harn", "NADCON5: us_noaa_nadcon5_nad83_1986_nad83_harn_conus.tif and the like"),
-    ("nad832011", "NADCON5: us_noaa_nadcon5_nad83_2007_nad83_2011_conus.tif and the like"),
-    ("nad83", "NADCON5: us_noaa_nadcon5_nad83_1986_nad83_harn_conus.tif and the like"),
-    ("osgb", "OSTN15: uk_os_OSTN15_NTv2_OSGBtoETRS.tif"),
-    ("dhdn", "BETA2007: de_adv_BETA2007.tif"),
-    ("ntf", "fr_ign_gr3df97a.tif"),
-    ("agd", "au_icsm_A66_National_13_09_01.tif, au_icsm_National_84_02_07_01.tif"),
-    ("gda94", "au_icsm_GDA94_GDA2020_conformal.tif"),
-    ("nzgd49", "nz_linz_nzgd2kgrid0005.tif"),
-    ("ch1903", "CHENyx06: ch_swisstopo_CHENyx06a.tif"),
-    ("tokyo", "TKY2JGD: jp_gsi_tky2jgd.tif"),
-    ("jgd2000", "jp_gsi_touhokutaiheiyouoki2011.tif"),
-    ("ed50", "for Spain es_ign_SPED2ETV2.tif"),
+/// The shifts that need a grid, by the beginnings of the comparable names of the two datums: the files that PROJ has for them. An empty name
+/// is any other datum.
+const GRIDS: [(&str, &str, &str); 12] = [
+    ("nad27", "", "NADCON or NTv2: us_noaa_conus.tif, ca_nrc_ntv2_0.tif"),
+    ("nad83", "nad83", "NADCON5: us_noaa_nadcon5_nad83_1986_nad83_harn_conus.tif and the like"),
+    ("osgb", "", "OSTN15: uk_os_OSTN15_NTv2_OSGBtoETRS.tif"),
+    ("dhdn", "", "BETA2007: de_adv_BETA2007.tif"),
+    ("ntf", "", "fr_ign_gr3df97a.tif"),
+    ("agd", "", "au_icsm_A66_National_13_09_01.tif, au_icsm_National_84_02_07_01.tif"),
+    ("gda94", "gda2020", "au_icsm_GDA94_GDA2020_conformal.tif"),
+    ("nzgd49", "", "nz_linz_nzgd2kgrid0005.tif"),
+    ("ch1903", "", "CHENyx06: ch_swisstopo_CHENyx06a.tif"),
+    ("tokyo", "", "TKY2JGD: jp_gsi_tky2jgd.tif"),
+    ("jgd2000", "jgd2011", "jp_gsi_touhokutaiheiyouoki2011.tif"),
+    ("ed50", "", "for Spain es_ign_SPED2ETV2.tif"),
 ];
 
 /// How one datum stands to another.
@@ -60,9 +59,10 @@ pub(crate) fn datum_way(from: &Datum, to: &Datum, rule: DatumRule) -> DatumWay {
     if are_close && rule == DatumRule::Close {
         return DatumWay::TakenAlike(names);
     }
-    let shift = GRIDS.iter().find(|(start, _)| [from, to].iter().any(|datum| datum.is_named_like(start)));
-    let what = match shift {
-        Some((_, grid)) => format!("a shift that needs a grid ({grid})"),
+    let fits = |datum: &Datum, start: &str| start.is_empty() || datum.is_named_like(start);
+    let is_between = |a: &str, b: &str| (fits(from, a) && fits(to, b)) || (fits(from, b) && fits(to, a));
+    let what = match GRIDS.iter().find(|(a, b, _)| is_between(a, b)) {
+        Some((_, _, grid)) => format!("a shift that needs a grid ({grid})"),
         None => "a shift".to_string(),
     };
     let remedy = if are_close {
