@@ -24,12 +24,14 @@ use crate::input::points::raw_bounds::RawBounds;
 use crate::input::points::record_sink::RecordSink;
 use crate::input::points::rules::PointRules;
 use crate::input::points::transformed_sink::TransformedSink;
-use crate::input::source_transform::{OwnCoordinates, SourceTransform};
+use crate::input::source_transform::SourceTransform;
 use crate::input::text::options::TextOptions;
 use crate::input::text::outliers::Outliers;
 use crate::input::text::row_choice::RowChoice;
 use crate::input::text::table::TextTable;
 use crate::{Error, Result, Warnings};
+
+mod transformed;
 
 /// How a file holds its points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -201,46 +203,6 @@ impl Source {
         match &self.transform {
             None => table.wanted_box(),
             Some(transform) => transform.around(table.wanted_box()?),
-        }
-    }
-
-    /// Has the points transformed on their way out: from now on the source looks like a file in the other system.
-    pub(crate) fn set_transform(&mut self, transform: SourceTransform, crs: Crs) {
-        self.axes = transform.axes();
-        self.grid = transform.grid(&self.axes);
-        // A header's box without any place in the other system is no box.
-        [self.min, self.max] = transform.around([self.min, self.max]).unwrap_or_default();
-        self.crs = crs;
-        self.transform = Some(Box::new(transform));
-    }
-
-    /// Undoes [`Source::set_transform`].
-    pub fn forget_transform(&mut self) {
-        if let Some(transform) = self.transform.take() {
-            let OwnCoordinates { axes, grid, min, max, crs } = transform.own;
-            (self.axes, self.grid, self.min, self.max, self.crs) = (axes, grid, min, max, crs);
-        }
-    }
-
-    /// Returns the way of the points into another system, if they go one.
-    pub(crate) fn transform(&self) -> Option<&SourceTransform> {
-        self.transform.as_deref()
-    }
-
-    /// Returns what the file itself says of its coordinates, for a transform of them.
-    pub(crate) fn own_coordinates(&self) -> OwnCoordinates {
-        OwnCoordinates { axes: self.axes, grid: self.grid, min: self.min, max: self.max, crs: self.crs.clone() }
-    }
-
-    /// Takes over the axes that a text has with or without its outliers.
-    fn set_axes_of_text(&mut self, axes: [Axis; 3], grid: [Decimal; 2]) {
-        match &mut self.transform {
-            Some(transform) => {
-                (transform.own.axes, transform.own.grid) = (axes, grid);
-                self.axes = transform.axes();
-                self.grid = transform.grid(&self.axes);
-            }
-            None => (self.axes, self.grid) = (axes, grid),
         }
     }
 

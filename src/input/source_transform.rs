@@ -135,3 +135,35 @@ fn rectangle(way: &CrsTransform, [min, max]: [[f64; 2]; 2]) -> Option<[[f64; 2];
     let [low, high] = found?;
     Some([[low[0] - pads[0], low[1] - pads[1]], [high[0] + pads[0], high[1] + pads[1]]])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::crs::from_wkt::from_epsg;
+
+    #[test]
+    fn a_box_holds_all_places_of_the_box_that_it_comes_from() {
+        for (from, to, min, max) in [
+            (4326, 32633, [12.0, 50.0], [13.0, 51.0]),
+            (4326, 32633, [5.0, -1.0], [25.0, 60.0]),
+            (32632, 32633, [500_000.0, 5_500_000.0], [501_000.0, 5_501_000.0]),
+            (4326, 3413, [-100.0, 70.0], [20.0, 90.0]),
+            (3413, 4326, [-1e6, -1e6], [1e6, -1e5]),
+        ] {
+            let [from, to] = [from, to].map(|code| from_epsg(code).unwrap());
+            let way = CrsTransform::between(&from, &to, DatumRule::Strict).unwrap();
+            let [low, high] = rectangle(&way, [min, max]).unwrap();
+            for i in 0..101 * 101 {
+                let share = [i % 101, i / 101].map(|i| f64::from(i) / 100.0);
+                let place = way.apply([0, 1].map(|axis| min[axis] + (max[axis] - min[axis]) * share[axis])).unwrap();
+                assert!((0..2).all(|axis| low[axis] <= place[axis] && place[axis] <= high[axis]), "{place:?} {low:?} {high:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn steps_are_a_hundredth_or_a_thousandth() {
+        let steps = [1.0, 0.01, 0.011, 0.0033, 1e-9].map(|own| new_step(own).to_string());
+        assert_eq!(steps, ["0.01", "0.01", "0.01", "0.001", "0.001"]);
+    }
+}

@@ -1,6 +1,6 @@
 //! The coordinate reference systems that a user names for something else than all inputs as they are.
 
-use crate::input::crs::choice::CrsChoice;
+use crate::input::crs::choice::named;
 use crate::input::crs::system::Crs;
 use serde::{Deserialize, Serialize};
 
@@ -18,13 +18,11 @@ impl TryFrom<String> for NamedCrs {
     type Error = String;
 
     fn try_from(text: String) -> Result<NamedCrs, String> {
-        match CrsChoice::try_from(text) {
-            Ok(CrsChoice::Given { text, crs }) => Ok(NamedCrs { text, crs }),
-            Ok(other) => Err(format!(
-                "a CRS is an EPSG code such as \"EPSG:26915\" or \"EPSG:26915+5703\", or well-known text, not {:?}",
-                String::from(other)
+        match named(text.trim())? {
+            Some(crs) => Ok(NamedCrs { text, crs: Box::new(crs) }),
+            None => Err(format!(
+                "a CRS is an EPSG code such as \"EPSG:26915\" or \"EPSG:26915+5703\", or well-known text, not {text:?}"
             )),
-            Err(why) => Err(why),
         }
     }
 }
@@ -52,7 +50,7 @@ impl TryFrom<String> for TargetCrs {
         if text.trim().eq_ignore_ascii_case("utm") {
             return Ok(TargetCrs::Utm);
         }
-        NamedCrs::try_from(text).map(TargetCrs::Named).map_err(|why| format!("to_crs is \"utm\" or a CRS: {why}"))
+        NamedCrs::try_from(text).map(TargetCrs::Named).map_err(|why| format!("to_crs may be \"utm\" or a CRS: {why}"))
     }
 }
 
