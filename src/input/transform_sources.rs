@@ -48,14 +48,16 @@ pub fn transform_sources(sources: &mut [Source], options: &InputOptions, warning
     require_map(&to)?;
     to.vertical_system = common_heights(sources, &said, &to)?;
     to.vertical = Some(common_unit_of_heights(&said, &to));
+    let mut alike = Vec::new();
     for (source, from) in sources.iter_mut().zip(said) {
-        transform(source, from, &to, options, warnings)?;
+        alike.extend(transform(source, from, &to, options)?);
     }
+    warn_of_datums(&alike, sources.len(), warnings);
     Ok(())
 }
 
-/// Has the points of one source transformed, if they are not in `to` already.
-fn transform(source: &mut Source, from: Crs, to: &Crs, options: &InputOptions, warnings: &mut Warnings) -> Result<()> {
+/// Has the points of one source transformed, if they are not in `to` already. Returns a sentence if two datums are taken for one.
+fn transform(source: &mut Source, from: Crs, to: &Crs, options: &InputOptions) -> Result<Option<String>> {
     let plane = |crs: &Crs| Crs { vertical: None, vertical_system: None, ..crs.clone() };
     let is_moved = !plane(&from).same_as(&plane(to)) || from.horizontal != to.horizontal;
     let (own, wanted) = (metres_of_heights(&from), metres_of_heights(to));
@@ -64,14 +66,18 @@ fn transform(source: &mut Source, from: Crs, to: &Crs, options: &InputOptions, w
     let own = source.own_coordinates();
     let transform = SourceTransform { own, from, to: to.clone(), datums: options.datums, is_moved, heights, steps };
     let way = transform.way().map_err(|why| Error::Config(format!("{}: {why}", source.path.display())))?;
-    if let Some(names) = way.as_ref().and_then(CrsTransform::datums_taken_alike) {
-        warnings.push(format!(
-            "{}: [input] datums = \"close\" takes {names} for one datum; they may be a metre or two apart",
-            source.path.display()
-        ));
-    }
+    let alike = way.as_ref().and_then(CrsTransform::datums_taken_alike);
+    let alike = alike.map(|names| format!("{}: [input] datums = \"close\" takes {names} for one", source.path.display()));
     source.set_transform(transform, to.clone());
-    Ok(())
+    Ok(alike)
+}
+
+/// Warns about datums that are taken for one, by a sentence for each such source.
+fn warn_of_datums(alike: &[String], count: usize, warnings: &mut Warnings) {
+    if let Some(first) = alike.first() {
+        let of = if count == 1 { String::new() } else { format!("{} of {count} inputs, such as ", alike.len()) };
+        warnings.push(format!("{of}{first} datum; they may be a metre or two apart"));
+    }
 }
 
 /// Returns what a source is in, as the user and the file say.
@@ -185,9 +191,10 @@ fn zone_of_middle(sources: &[Source], said: &[Crs], options: &InputOptions) -> R
             "[input] to_crs = \"utm\": no header says where the points lie; name the zone, such as \"EPSG:32615\"".into(),
         )
     })?;
-    let mut codes = HashSet::new();
-    let mut zone = None;
-    for crs in said {
+    let mut known = HashSet::new();
+    let distinct = said.iter().filter(|crs| known.insert(format!("{crs:?}")));
+    let (mut codes, mut zone) = (HashSet::new(), None);
+    for crs in distinct {
         let found = utm_zone(crs, middle, options.datums);
         let found = found.map_err(|why| Error::Config(format!("[input] to_crs = \"utm\": {why}")))?;
         codes.insert(found.epsg);
