@@ -156,7 +156,10 @@ mod tests {
             for i in 0..101 * 101 {
                 let share = [i % 101, i / 101].map(|i| f64::from(i) / 100.0);
                 let place = way.apply([0, 1].map(|axis| min[axis] + (max[axis] - min[axis]) * share[axis])).unwrap();
-                assert!((0..2).all(|axis| low[axis] <= place[axis] && place[axis] <= high[axis]), "{place:?} {low:?} {high:?}");
+                assert!(
+                    (0..2).all(|axis| low[axis] <= place[axis] && place[axis] <= high[axis]),
+                    "{place:?} {low:?} {high:?}"
+                );
             }
         }
     }

@@ -67,7 +67,8 @@ fn transform(source: &mut Source, from: Crs, to: &Crs, options: &InputOptions) -
     let transform = SourceTransform { own, from, to: to.clone(), datums: options.datums, is_moved, heights, steps };
     let way = transform.way().map_err(|why| Error::Config(format!("{}: {why}", source.path.display())))?;
     let alike = way.as_ref().and_then(CrsTransform::datums_taken_alike);
-    let alike = alike.map(|names| format!("{}: [input] datums = \"close\" takes {names} for one", source.path.display()));
+    let alike =
+        alike.map(|names| format!("{}: [input] datums = \"close\" takes {names} for one", source.path.display()));
     source.set_transform(transform, to.clone());
     Ok(alike)
 }
@@ -188,7 +189,8 @@ fn zone_of_middle(sources: &[Source], said: &[Crs], options: &InputOptions) -> R
     }
     let middle = middle(&mut places).ok_or_else(|| {
         Error::Config(
-            "[input] to_crs = \"utm\": no header says where the points lie; name the zone, such as \"EPSG:32615\"".into(),
+            "[input] to_crs = \"utm\": no header says where the points lie; name the zone, such as \"EPSG:32615\""
+                .into(),
         )
     })?;
     let mut known = HashSet::new();

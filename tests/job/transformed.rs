@@ -127,14 +127,18 @@ fn two_zones_and_degrees_give_one_mesh() {
     // It is the mesh of one survey in one zone, but for what was rounded: nothing is left between the three.
     let all: Vec<[f64; 3]> = (0..3).flat_map(places).collect();
     let way = CrsTransform::between(&crs("EPSG:4269"), &crs("EPSG:26915"), DatumRule::Strict).unwrap();
-    let rows: String = all.iter().map(|&[x, y, z]| {
-        let [x, y] = way.apply([x, y]).unwrap();
-        format!("{x:.3},{y:.3},{z:.2}\n")
-    }).collect();
+    let rows: String = all
+        .iter()
+        .map(|&[x, y, z]| {
+            let [x, y] = way.apply([x, y]).unwrap();
+            format!("{x:.3},{y:.3},{z:.2}\n")
+        })
+        .collect();
     let one = folder.path().join("one.csv");
     fs::write(&one, rows).unwrap();
     let one = Job::on(&[one]).with("input", "crs = \"EPSG:26915\"").report();
-    let (apart, triangles) = (number(&one["triangles"]).abs_diff(number(&report["triangles"])), number(&one["triangles"]));
+    let (apart, triangles) =
+        (number(&one["triangles"]).abs_diff(number(&report["triangles"])), number(&one["triangles"]));
     assert!(apart * 100 < triangles, "{apart} of {triangles}");
     // The zone of the middle, and what it would do.
     let said = job("utm").run_with(&["check"]).succeeded().out;
@@ -154,7 +158,9 @@ fn a_crs_for_files_without_one_and_for_those_with_a_false_one() {
     let right = las(folder.path(), &survey, "right.las", &[code(26916)], 0.01);
     let job = |file: &Path, crs: &str| Job::on(&[file]).with("input", &format!("to_crs = \"EPSG:26915\"\n{crs}"));
     let expected = job(&right, "").digest();
-    for (file, line) in [(&plain, "crs = \"EPSG:26916\""), (&plain, "missing_crs = \"EPSG:26916\""), (&wrong, "crs = \"EPSG:26916\"")] {
+    for (file, line) in
+        [(&plain, "crs = \"EPSG:26916\""), (&plain, "missing_crs = \"EPSG:26916\""), (&wrong, "crs = \"EPSG:26916\"")]
+    {
         let job = job(file, line);
         let report = job.report();
         assert_eq!(job.verified()["digest"].as_str().unwrap(), expected, "{line}");
@@ -178,7 +184,9 @@ fn shifts_of_datums_and_heights_are_refused_by_name() {
     let old = las(folder.path(), &survey, "old.las", &[code(26715)], 0.01);
     let new = las(folder.path(), &survey, "new.las", &[code(26915)], 0.01);
     let to = |file: &Path, line: &str| Job::on(&[file]).with("input", line);
-    to(&old, "to_crs = \"EPSG:26915\"\ndatums = \"close\"").run().refused(2, &["old.las", "NAD27", "us_noaa_conus.tif", "does not do"]);
+    to(&old, "to_crs = \"EPSG:26915\"\ndatums = \"close\"")
+        .run()
+        .refused(2, &["old.las", "NAD27", "us_noaa_conus.tif", "does not do"]);
     to(&new, "to_crs = \"EPSG:32615\"").run().refused(2, &["NAD83", "WGS 84", "datums = \"close\""]);
     let close = to(&new, "to_crs = \"EPSG:32615\"\ndatums = \"close\"").report();
     assert!(warnings(&close).contains("takes NAD83 and WGS 84 for one datum"), "{close}");
@@ -206,7 +214,8 @@ fn points_beyond_the_area_of_a_projection_are_counted() {
     let few = job("max_malformed_fraction = 0.01").report();
     assert_eq!((number(&few["points"]["malformed"]), number(&few["points"]["kept"])), (1, rows.len() as u64 - 1));
     // Bounds are in the system of the job.
-    let [x, y] = CrsTransform::between(&crs("EPSG:4269"), &crs("EPSG:26915"), DatumRule::Strict).unwrap().apply(MIDDLE).unwrap();
+    let [x, y] =
+        CrsTransform::between(&crs("EPSG:4269"), &crs("EPSG:26915"), DatumRule::Strict).unwrap().apply(MIDDLE).unwrap();
     let bounds = format!("bounds = [{}, {}, {x}, {y}]", x - 25.0, y - 25.0);
     let within = job(&bounds).report();
     let (kept, out) = (number(&within["points"]["kept"]), number(&within["points"]["out_of_bounds"]));
@@ -218,7 +227,8 @@ fn feet_and_metres_become_one_unit() {
     let folder = tempfile::tempdir().unwrap();
     let all: Vec<[f64; 3]> = places(0);
     let way = CrsTransform::between(&crs("EPSG:4269"), &crs("EPSG:26915"), DatumRule::Strict).unwrap();
-    let metres: Vec<[f64; 3]> = all.iter().map(|&[x, y, z]| way.apply([x, y]).map(|[x, y]| [x, y, z]).unwrap()).collect();
+    let metres: Vec<[f64; 3]> =
+        all.iter().map(|&[x, y, z]| way.apply([x, y]).map(|[x, y]| [x, y, z]).unwrap()).collect();
     let feet: Vec<[f64; 3]> = metres.iter().map(|place| place.map(|value| value * 3937.0 / 1200.0)).collect();
     let metres = las_of(folder.path(), &metres, "metres.las", &[code(26915)], 0.01);
     let plane = keys(&[[1024, 0, 1, 1], [3072, 0, 1, 26915], [3076, 0, 1, 9003], [4099, 0, 1, 9003]]);

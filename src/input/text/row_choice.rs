@@ -49,8 +49,13 @@ pub struct RowChoice {
 impl RowChoice {
     /// Returns the choice of all rows, with their colours.
     pub fn all() -> RowChoice {
-        RowChoice { bounds: None,
-            is_transformed: false, classes: [true; 256], strict_classes: false, fields: OptionalFields::RGB }
+        RowChoice {
+            bounds: None,
+            is_transformed: false,
+            classes: [true; 256],
+            strict_classes: false,
+            fields: OptionalFields::RGB,
+        }
     }
 
     /// Returns whether every row is wanted.

@@ -86,7 +86,8 @@ impl Coordinates {
         if matches!(crs.kind, CrsKind::Geocentric | CrsKind::Local) {
             return Err(format!("{label} is neither a map nor longitude and latitude"));
         }
-        let form = crs.form().ok_or_else(|| format!("{label} does not say its projection in a way that can be read"))?;
+        let form =
+            crs.form().ok_or_else(|| format!("{label} does not say its projection in a way that can be read"))?;
         let datum = form.datum().ok_or_else(|| format!("{label} does not say its datum"))?.clone();
         let Some(projection) = form.projection() else {
             let unit = crs.wkt.as_deref().and_then(|text| find(text, &GEOGRAPHIC));

@@ -6,6 +6,9 @@ use crate::input::crs::transform::ellipsoid::{Ellipsoid, sin_cos};
 /// The farthest from the central meridian that is projected, in radii of the earth on the map: 45 degrees of arc.
 const FARTHEST: f64 = 0.8814;
 
+/// The farthest along the central meridian from the equator, in radians of the map: 45 degrees of arc beyond a pole.
+const NORTHMOST: f64 = 0.75 * std::f64::consts::PI;
+
 /// The polynomials in n of the coefficients from the sphere to the map, from the least power of n that they have.
 const FORWARD: [&[f64]; 6] = [
     &[1.0 / 2.0, -2.0 / 3.0, 5.0 / 16.0, 41.0 / 180.0, -127.0 / 288.0, 7891.0 / 37800.0],
@@ -59,18 +62,18 @@ impl TransverseMercator {
     pub(crate) fn forward(&self, [longitude, latitude]: [f64; 2]) -> Option<[f64; 2]> {
         let conformal = self.ellipsoid.conformal(libm::tan(latitude));
         let [sin, cos] = sin_cos(longitude);
-        let east = libm::asinh(sin / libm::hypot(conformal, cos));
-        if east.abs() > FARTHEST {
+        let sphere = [libm::atan2(conformal, cos), libm::asinh(sin / libm::hypot(conformal, cos))];
+        if sphere[1].abs() > FARTHEST || sphere[0].abs() > NORTHMOST {
             return None;
         }
-        let [north, east] = add_series(&self.forward, [libm::atan2(conformal, cos), east]);
+        let [north, east] = add_series(&self.forward, sphere);
         Some([self.radius * east, self.radius * (north - self.origin)])
     }
 
     /// Returns the longitude from the central meridian and the latitude of a place on the map.
     pub(crate) fn inverse(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
         let map = [y / self.radius + self.origin, x / self.radius];
-        if map[1].abs() > FARTHEST * 1.01 || map[0].abs() > std::f64::consts::PI {
+        if map[1].abs() > FARTHEST * 1.01 || map[0].abs() > NORTHMOST * 1.01 {
             return None;
         }
         let [north, east] = add_series(&self.back, map);

@@ -26,7 +26,10 @@ pub(crate) fn utm_zone(crs: &Crs, place: [f64; 2], rule: DatumRule) -> Result<Cr
     let alike = || of_wgs84.clone().filter(|zone| matches!(way(zone), Some(DatumWay::TakenAlike(_))));
     same.or_else(alike).ok_or_else(|| {
         let other = of_wgs84.as_ref().map_or("none".into(), Crs::label);
-        format!("there is no code for UTM zone {zone}{side} on the datum of {}: name a CRS (on WGS 84 it is {other})", crs.label())
+        format!(
+            "there is no code for UTM zone {zone}{side} on the datum of {}: name a CRS (on WGS 84 it is {other})",
+            crs.label()
+        )
     })
 }
 
