@@ -111,7 +111,7 @@ impl Coordinates {
             None => own,
         };
         let is_place = longitude.abs() <= FARTHEST_LONGITUDE && latitude.abs() <= 90.000_000_1 * DEGREE;
-        is_place.then(|| [longitude + self.meridian, latitude])
+        is_place.then_some([longitude + self.meridian, latitude])
     }
 
     fn at(&self, [longitude, latitude]: [f64; 2]) -> Option<[f64; 2]> {

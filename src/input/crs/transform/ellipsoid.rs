@@ -38,7 +38,7 @@ impl Ellipsoid {
     }
 
     /// Returns the tangent of the latitude to that of a conformal latitude.
-    pub(crate) fn from_conformal(&self, conformal: f64) -> f64 {
+    pub(crate) fn tangent_of_conformal(&self, conformal: f64) -> f64 {
         /// Beyond this tangent, the ratio of the two is that at the pole.
         const POLE: f64 = 1e8;
         let rest = 1.0 - self.e2;
@@ -65,8 +65,8 @@ impl Ellipsoid {
     }
 
     /// Returns the latitude in radians to an isometric latitude.
-    pub(crate) fn from_isometric(&self, isometric: f64) -> f64 {
-        libm::atan(self.from_conformal(libm::sinh(isometric)))
+    pub(crate) fn latitude_of_isometric(&self, isometric: f64) -> f64 {
+        libm::atan(self.tangent_of_conformal(libm::sinh(isometric)))
     }
 
     /// Returns what the area between the equator and a latitude with this sine grows by: q in the formulas of equal area.
@@ -76,7 +76,7 @@ impl Ellipsoid {
     }
 
     /// Returns the latitude in radians at which [`Ellipsoid::authalic`] is `q`; `None` if it is nowhere so great.
-    pub(crate) fn from_authalic(&self, q: f64) -> Option<f64> {
+    pub(crate) fn latitude_of_authalic(&self, q: f64) -> Option<f64> {
         let share = q / self.authalic(1.0);
         if share.abs() > 1.0 + 1e-12 || share.is_nan() {
             return None;
@@ -111,13 +111,13 @@ mod tests {
         for ellipsoid in shapes.map(|axes| Ellipsoid::of(axes).unwrap()) {
             for step in -899..=899 {
                 let latitude = f64::from(step) * 0.1 * std::f64::consts::PI / 180.0;
-                let again = ellipsoid.from_isometric(ellipsoid.isometric(latitude));
+                let again = ellipsoid.latitude_of_isometric(ellipsoid.isometric(latitude));
                 assert!((again - latitude).abs() < 1e-15, "{step}: {again} {latitude}");
-                let again = ellipsoid.from_authalic(ellipsoid.authalic(libm::sin(latitude))).unwrap();
+                let again = ellipsoid.latitude_of_authalic(ellipsoid.authalic(libm::sin(latitude))).unwrap();
                 // Near a pole, the area hardly changes with the latitude.
                 assert!((again - latitude).abs() * libm::cos(latitude) < 4e-16, "{step}: {again} {latitude}");
             }
-            assert_eq!(ellipsoid.from_authalic(2.1), None);
+            assert_eq!(ellipsoid.latitude_of_authalic(2.1), None);
         }
         assert_eq!(Ellipsoid::of([6.0, 7.0]), None);
     }

@@ -43,7 +43,7 @@ impl Albers {
         let sign = if self.turn < 0.0 { -1.0 } else { 1.0 };
         let (east, south) = (sign * x, sign * (self.origin - y));
         let distance = libm::hypot(east, south) * self.turn / self.ellipsoid.a;
-        let latitude = self.ellipsoid.from_authalic((self.whole - distance * distance) / self.turn)?;
+        let latitude = self.ellipsoid.latitude_of_authalic((self.whole - distance * distance) / self.turn)?;
         let longitude = libm::atan2(east, south) / self.turn;
         (longitude.abs() <= std::f64::consts::PI).then_some([longitude, latitude])
     }
@@ -101,7 +101,7 @@ impl LambertAzimuthal {
         let (ahead, shrink) = (1.0 - square / 2.0, (1.0 - square / 4.0).sqrt());
         let (east, north, [sin_0, cos_0]) = (u * shrink, v * shrink, self.origin);
         let sin = ahead * sin_0 + north * cos_0;
-        let latitude = self.ellipsoid.from_authalic(sin * self.pole)?;
+        let latitude = self.ellipsoid.latitude_of_authalic(sin * self.pole)?;
         Some([libm::atan2(east, ahead * cos_0 - north * sin_0), latitude])
     }
 }

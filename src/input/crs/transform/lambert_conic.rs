@@ -51,6 +51,6 @@ impl LambertConic {
         let isometric = self.first[0] - libm::log(distance / self.first[1]) / self.turn;
         let longitude = libm::atan2(east, south) / self.turn;
         // The map has a gap behind the cone.
-        (longitude.abs() <= std::f64::consts::PI).then(|| [longitude, self.ellipsoid.from_isometric(isometric)])
+        (longitude.abs() <= std::f64::consts::PI).then(|| [longitude, self.ellipsoid.latitude_of_isometric(isometric)])
     }
 }

@@ -98,7 +98,7 @@ impl MapProjection {
         };
         let [longitude, latitude] = place?;
         let is_place = longitude.is_finite() && latitude.abs() <= POLE;
-        is_place.then(|| [longitude + self.meridian, latitude])
+        is_place.then_some([longitude + self.meridian, latitude])
     }
 }
 
@@ -151,7 +151,7 @@ fn is_idle(name: &str, value: f64) -> bool {
 fn turned(longitude: f64) -> f64 {
     match longitude {
         east if east > PI && east <= 3.0 * PI => east - 2.0 * PI,
-        west if west < -PI && west >= -3.0 * PI => west + 2.0 * PI,
+        west if (-3.0 * PI..-PI).contains(&west) => west + 2.0 * PI,
         other => other,
     }
 }

@@ -31,7 +31,7 @@ impl Mercator {
     }
 
     pub(crate) fn inverse(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
-        let place = [x / self.radius, self.ellipsoid.from_isometric(y / self.radius)];
+        let place = [x / self.radius, self.ellipsoid.latitude_of_isometric(y / self.radius)];
         (place[1].abs() <= NORTHMOST + 1e-9).then_some(place)
     }
 }

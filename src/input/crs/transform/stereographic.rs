@@ -42,7 +42,7 @@ impl PolarStereographic {
         if distance == 0.0 {
             return Some([0.0, self.side * std::f64::consts::FRAC_PI_2]);
         }
-        let latitude = self.ellipsoid.from_isometric(-libm::log(distance / self.radius));
+        let latitude = self.ellipsoid.latitude_of_isometric(-libm::log(distance / self.radius));
         Some([libm::atan2(x, -self.side * y), self.side * latitude])
     }
 }
@@ -71,7 +71,7 @@ impl ObliqueStereographic {
         let shift = libm::atanh(on_sphere) - stretch * ellipsoid.isometric(latitude);
         let origin = [on_sphere, ((1.0 - on_sphere) * (1.0 + on_sphere)).sqrt()];
         let is_place = cos > 1e-6 && shift.is_finite();
-        is_place.then(|| ObliqueStereographic { ellipsoid, stretch, shift, origin, diameter: 2.0 * radius * scale })
+        is_place.then_some(ObliqueStereographic { ellipsoid, stretch, shift, origin, diameter: 2.0 * radius * scale })
     }
 
     pub(crate) fn forward(&self, [longitude, latitude]: [f64; 2]) -> Option<[f64; 2]> {
@@ -81,7 +81,7 @@ impl ObliqueStereographic {
         let facing = sin * sin_0 + cos * cos_0 * ahead;
         let scale = self.diameter / (1.0 + facing);
         // The half of the earth around the origin.
-        (facing >= 0.0).then(|| [scale * cos * east, scale * (sin * cos_0 - cos * sin_0 * ahead)])
+        (facing >= 0.0).then_some([scale * cos * east, scale * (sin * cos_0 - cos * sin_0 * ahead)])
     }
 
     pub(crate) fn inverse(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
@@ -97,6 +97,6 @@ impl ObliqueStereographic {
         let (sin, outward) = (ahead * sin_0 + north * cos_0, ahead * cos_0 - north * sin_0);
         let isometric = (libm::asinh(sin / libm::hypot(east, outward)) - self.shift) / self.stretch;
         let longitude = libm::atan2(east, outward) / self.stretch;
-        Some([longitude, self.ellipsoid.from_isometric(isometric)])
+        Some([longitude, self.ellipsoid.latitude_of_isometric(isometric)])
     }
 }

@@ -78,7 +78,7 @@ impl TransverseMercator {
         }
         let [north, east] = add_series(&self.back, map);
         let (sinh, [sin, cos]) = (libm::sinh(east), sin_cos(north));
-        let tangent = self.ellipsoid.from_conformal(sin / libm::hypot(sinh, cos));
+        let tangent = self.ellipsoid.tangent_of_conformal(sin / libm::hypot(sinh, cos));
         Some([libm::atan2(sinh, cos), libm::atan(tangent)])
     }
 }
