@@ -5,6 +5,20 @@
 /// The most rounds of Newton's method. It needs three or four; near a pole the last digits may go to and fro.
 const ROUNDS: usize = 12;
 
+/// The series from the conformal latitude to the geographic one is as good as floating point up to this third flattening. That of the
+/// earth is 0.0017.
+const FLAT_ENOUGH: f64 = 0.002;
+
+/// The polynomials in n of the coefficients of that series, from the least power of n that they have.
+const FROM_CONFORMAL: [&[f64]; 6] = [
+    &[2.0, -2.0 / 3.0, -2.0, 116.0 / 45.0, 26.0 / 45.0, -2854.0 / 675.0],
+    &[7.0 / 3.0, -8.0 / 5.0, -227.0 / 45.0, 2704.0 / 315.0, 2323.0 / 945.0],
+    &[56.0 / 15.0, -136.0 / 35.0, -1262.0 / 105.0, 73814.0 / 2835.0],
+    &[4279.0 / 630.0, -332.0 / 35.0, -399572.0 / 14175.0],
+    &[4174.0 / 315.0, -144838.0 / 6237.0],
+    &[601676.0 / 22275.0],
+];
+
 /// An ellipsoid of revolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Ellipsoid {
@@ -16,13 +30,21 @@ pub(crate) struct Ellipsoid {
     pub(crate) e2: f64,
     /// The third flattening: (a - b) / (a + b).
     pub(crate) n: f64,
+    /// The coefficients of the series from the conformal latitude.
+    from_conformal: [f64; 6],
 }
 
 impl Ellipsoid {
     /// Returns the ellipsoid with these half axes; `None` if the second is not the lesser one.
     pub(crate) fn of([a, b]: [f64; 2]) -> Option<Ellipsoid> {
-        let e2 = (a - b) * (a + b) / (a * a);
-        (b > 0.0 && a >= b && a.is_finite()).then(|| Ellipsoid { a, e: e2.sqrt(), e2, n: (a - b) / (a + b) })
+        let (e2, n) = ((a - b) * (a + b) / (a * a), (a - b) / (a + b));
+        let from_conformal = coefficients(&FROM_CONFORMAL, n);
+        (b > 0.0 && a >= b && a.is_finite()).then(|| Ellipsoid { a, e: e2.sqrt(), e2, n, from_conformal })
+    }
+
+    /// Returns the sphere with the greater half axis.
+    pub(crate) fn sphere(&self) -> Ellipsoid {
+        Ellipsoid { a: self.a, e: 0.0, e2: 0.0, n: 0.0, from_conformal: [0.0; 6] }
     }
 
     /// Returns the radius of the parallel at a latitude with this sine and cosine, over the greater half axis.
@@ -32,13 +54,28 @@ impl Ellipsoid {
 
     /// Returns the tangent of the conformal latitude to that of a latitude.
     pub(crate) fn conformal(&self, tangent: f64) -> f64 {
-        let secant = libm::hypot(1.0, tangent);
+        let secant = secant(tangent);
         let shift = libm::sinh(self.e * libm::atanh(self.e * tangent / secant));
-        libm::hypot(1.0, shift) * tangent - shift * secant
+        (1.0 + shift * shift).sqrt() * tangent - shift * secant
     }
 
-    /// Returns the tangent of the latitude to that of a conformal latitude.
-    pub(crate) fn tangent_of_conformal(&self, conformal: f64) -> f64 {
+    /// Returns the latitude in radians to the tangent of a conformal latitude.
+    pub(crate) fn latitude_of_conformal(&self, conformal: f64) -> f64 {
+        if self.n > FLAT_ENOUGH {
+            return libm::atan(self.tangent_of_conformal(conformal));
+        }
+        // The sine and the cosine of twice the angle. Near a pole the square is beyond all numbers that count.
+        let square = conformal * conformal;
+        let (sin, cos) = (2.0 * conformal / (1.0 + square), 2.0 / (1.0 + square) - 1.0);
+        let (mut one, mut two) = (0.0, 0.0);
+        for c in self.from_conformal.iter().rev() {
+            (two, one) = (one, 2.0 * cos * one - two + c);
+        }
+        libm::atan(conformal) + sin * one
+    }
+
+    /// Returns the tangent of the latitude to that of a conformal latitude, by Newton's method.
+    fn tangent_of_conformal(&self, conformal: f64) -> f64 {
         /// Beyond this tangent, the ratio of the two is that at the pole.
         const POLE: f64 = 1e8;
         let rest = 1.0 - self.e2;
@@ -49,7 +86,7 @@ impl Ellipsoid {
         let mut tangent = if conformal.abs() > 70.0 { conformal * at_pole } else { conformal / rest };
         for _ in 0..ROUNDS {
             let found = self.conformal(tangent);
-            let slope = rest * libm::hypot(1.0, tangent) * libm::hypot(1.0, found) / (1.0 + rest * tangent * tangent);
+            let slope = rest * secant(tangent) * secant(found) / (1.0 + rest * tangent * tangent);
             let step = (conformal - found) / slope;
             tangent += step;
             if step.abs() <= 1e-16 * tangent.abs().max(1.0) {
@@ -66,7 +103,7 @@ impl Ellipsoid {
 
     /// Returns the latitude in radians to an isometric latitude.
     pub(crate) fn latitude_of_isometric(&self, isometric: f64) -> f64 {
-        libm::atan(self.tangent_of_conformal(libm::sinh(isometric)))
+        self.latitude_of_conformal(libm::sinh(isometric))
     }
 
     /// Returns what the area between the equator and a latitude with this sine grows by: q in the formulas of equal area.
@@ -96,6 +133,20 @@ impl Ellipsoid {
     }
 }
 
+/// Returns the secant of an angle by its tangent.
+pub(crate) fn secant(tangent: f64) -> f64 {
+    (1.0 + tangent * tangent).sqrt()
+}
+
+/// Returns the values of polynomials in n, of which the first begins with n, the second with its square, and so on.
+pub(crate) fn coefficients(polynomials: &[&[f64]; 6], n: f64) -> [f64; 6] {
+    let mut power = 1.0;
+    polynomials.map(|polynomial| {
+        power *= n;
+        power * polynomial.iter().rev().fold(0.0, |sum, c| sum * n + c)
+    })
+}
+
 /// Returns the sine and the cosine of an angle in radians.
 pub(crate) fn sin_cos(angle: f64) -> [f64; 2] {
     [libm::sin(angle), libm::cos(angle)]
@@ -120,5 +171,19 @@ mod tests {
             assert_eq!(ellipsoid.latitude_of_authalic(2.1), None);
         }
         assert_eq!(Ellipsoid::of([6.0, 7.0]), None);
+    }
+
+    #[test]
+    fn the_series_gives_what_newtons_method_gives() {
+        let earth = Ellipsoid::of([6_378_249.145, 6_356_514.87]).unwrap();
+        for step in -8999..=8999 {
+            let conformal = libm::tan(f64::from(step) * 0.01 * std::f64::consts::PI / 180.0);
+            let (series, newton) = (earth.latitude_of_conformal(conformal), earth.tangent_of_conformal(conformal));
+            assert!((series - libm::atan(newton)).abs() < 1e-15, "{step}: {series} {}", libm::atan(newton));
+        }
+        // An ellipsoid far from the earth's.
+        let flat = Ellipsoid::of([7.0, 6.0]).unwrap();
+        let again = flat.latitude_of_conformal(flat.conformal(libm::tan(0.7)));
+        assert!((again - 0.7).abs() < 1e-15, "{again}");
     }
 }

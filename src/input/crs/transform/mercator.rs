@@ -21,8 +21,7 @@ impl Mercator {
 
     /// Returns the projection that takes latitudes on the ellipsoid for those on a sphere.
     pub(crate) fn web(ellipsoid: Ellipsoid) -> Mercator {
-        let sphere = Ellipsoid { e: 0.0, e2: 0.0, n: 0.0, ..ellipsoid };
-        Mercator { ellipsoid: sphere, radius: ellipsoid.a }
+        Mercator { ellipsoid: ellipsoid.sphere(), radius: ellipsoid.a }
     }
 
     pub(crate) fn forward(&self, [longitude, latitude]: [f64; 2]) -> Option<[f64; 2]> {

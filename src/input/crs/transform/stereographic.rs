@@ -1,6 +1,6 @@
 //! Stereographic projections: around a pole, and around any place by way of the conformal sphere.
 
-use crate::input::crs::transform::ellipsoid::{Ellipsoid, sin_cos};
+use crate::input::crs::transform::ellipsoid::{Ellipsoid, secant, sin_cos};
 
 /// A polar stereographic projection without false origin.
 #[derive(Clone, Debug)]
@@ -76,7 +76,7 @@ impl ObliqueStereographic {
 
     pub(crate) fn forward(&self, [longitude, latitude]: [f64; 2]) -> Option<[f64; 2]> {
         let tangent = libm::sinh(self.stretch * self.ellipsoid.isometric(latitude) + self.shift);
-        let cos = 1.0 / libm::hypot(1.0, tangent);
+        let cos = 1.0 / secant(tangent);
         let (sin, [east, ahead], [sin_0, cos_0]) = (tangent * cos, sin_cos(self.stretch * longitude), self.origin);
         let facing = sin * sin_0 + cos * cos_0 * ahead;
         let scale = self.diameter / (1.0 + facing);

@@ -1,7 +1,7 @@
 //! The transverse Mercator projection by Krueger's series to the sixth order (Karney, "Transverse Mercator with an accuracy of a few
 //! nanometers", 2011): nanometres up to some thousand kilometres from the central meridian.
 
-use crate::input::crs::transform::ellipsoid::{Ellipsoid, sin_cos};
+use crate::input::crs::transform::ellipsoid::{Ellipsoid, coefficients, secant, sin_cos};
 
 /// The farthest from the central meridian that is projected, in radii of the earth on the map: 45 degrees of arc.
 const FARTHEST: f64 = 0.8814;
@@ -62,7 +62,7 @@ impl TransverseMercator {
     pub(crate) fn forward(&self, [longitude, latitude]: [f64; 2]) -> Option<[f64; 2]> {
         let conformal = self.ellipsoid.conformal(libm::tan(latitude));
         let [sin, cos] = sin_cos(longitude);
-        let sphere = [libm::atan2(conformal, cos), libm::asinh(sin / libm::hypot(conformal, cos))];
+        let sphere = [libm::atan2(conformal, cos), libm::asinh(sin / (conformal * conformal + cos * cos).sqrt())];
         if sphere[1].abs() > FARTHEST || sphere[0].abs() > NORTHMOST {
             return None;
         }
@@ -78,23 +78,15 @@ impl TransverseMercator {
         }
         let [north, east] = add_series(&self.back, map);
         let (sinh, [sin, cos]) = (libm::sinh(east), sin_cos(north));
-        let tangent = self.ellipsoid.tangent_of_conformal(sin / libm::hypot(sinh, cos));
-        Some([libm::atan2(sinh, cos), libm::atan(tangent)])
+        let conformal = sin / (sinh * sinh + cos * cos).sqrt();
+        Some([libm::atan2(sinh, cos), self.ellipsoid.latitude_of_conformal(conformal)])
     }
-}
-
-fn coefficients(polynomials: &[&[f64]; 6], n: f64) -> [f64; 6] {
-    let mut power = 1.0;
-    polynomials.map(|polynomial| {
-        power *= n;
-        power * polynomial.iter().rev().fold(0.0, |sum, c| sum * n + c)
-    })
 }
 
 /// Returns `[u, v]` with the series c[k] sin(2 (k + 1) (u + iv)) added, by Clenshaw's rule.
 fn add_series(c: &[f64; 6], [u, v]: [f64; 2]) -> [f64; 2] {
     let ([sin, cos], sinh) = (sin_cos(2.0 * u), libm::sinh(2.0 * v));
-    let cosh = libm::hypot(1.0, sinh);
+    let cosh = secant(sinh);
     // Twice the complex cosine of 2 (u + iv).
     let (re, im) = (2.0 * cos * cosh, -2.0 * sin * sinh);
     let (mut one, mut two) = ([0.0; 2], [0.0; 2]);
