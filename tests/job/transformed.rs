@@ -104,12 +104,15 @@ fn three_surveys(folder: &Path) -> [PathBuf; 3] {
     [zone(26915, 0), zone(26916, 1), survey(folder, "degrees.csv", "EPSG:4269", 2, 9)]
 }
 
+fn in_zone_15(files: &[PathBuf]) -> Job {
+    Job::on(files).with("input", "missing_crs = \"EPSG:4269\"\nto_crs = \"EPSG:26915\"")
+}
+
 #[test]
 fn two_zones_and_degrees_give_one_mesh() {
     let folder = tempfile::tempdir().unwrap();
     let files = three_surveys(folder.path());
-    let job = |to: &str| Job::on(&files).with("input", &format!("missing_crs = \"EPSG:4269\"\nto_crs = \"{to}\""));
-    let whole = job("EPSG:26915");
+    let whole = in_zone_15(&files);
     let report = whole.report();
     assert_eq!((number(&report["sites"]), report["crs"].as_str()), (1600, Some("NAD83 / UTM zone 15N")));
     let found = report["transformations"].as_array().unwrap();
@@ -117,36 +120,58 @@ fn two_zones_and_degrees_give_one_mesh() {
     assert_eq!(from, ["NAD83 / UTM zone 16N (EPSG:26916)", "NAD83 (EPSG:4269)"], "{report}");
     assert!(found.iter().all(|way| way["to"] == "NAD83 / UTM zone 15N (EPSG:26915)" && way["step"] == "0.001"));
     let digest = whole.verified()["digest"].as_str().unwrap().to_owned();
-    for other in [job("EPSG:26915").tiles_of(100), job("EPSG:26915").tiles_of(333).threads(1)] {
-        assert_eq!(other.digest(), digest);
-    }
+    assert_eq!(in_zone_15(&files).tiles_of(100).threads(1).digest(), digest);
+    // Tasks read the transforms back from the plan.
+    let parts = in_zone_15(&files).tiles_of(100).with("triangulation", "max_points_per_part = 400");
+    let config = parts.config();
+    let arguments = ["submit", config.to_str().unwrap(), "--engine", "local", "--tasks", "2"];
+    gdt_batch(parts.folder(), &arguments).succeeded();
+    assert_eq!(parts.verified()["digest"].as_str().unwrap(), digest);
     // The inputs prove the vertices, transformed in the same way.
     let mut arguments = vec!["verify", "out", "--input"];
     arguments.extend(files.iter().map(|file| file.to_str().unwrap()));
     gdt_batch(whole.folder(), &arguments).succeeded();
-    // It is the mesh of one survey in one zone, but for what was rounded: nothing is left between the three.
-    let all: Vec<[f64; 3]> = (0..3).flat_map(places).collect();
+    fs::remove_file(&files[2]).unwrap();
+    survey(folder.path(), "degrees.csv", "EPSG:4269", 1, 9);
+    assert_eq!(gdt_batch(whole.folder(), &arguments).code, 4);
+}
+
+#[test]
+fn the_mesh_of_several_systems_is_that_of_one_survey() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = in_zone_15(&three_surveys(folder.path())).report();
     let way = CrsTransform::between(&crs("EPSG:4269"), &crs("EPSG:26915"), DatumRule::Strict).unwrap();
-    let rows: String = all
-        .iter()
-        .map(|&[x, y, z]| {
-            let [x, y] = way.apply([x, y]).unwrap();
-            format!("{x:.3},{y:.3},{z:.2}\n")
-        })
-        .collect();
+    let rows = (0..3).flat_map(places).map(|[x, y, z]| {
+        let [x, y] = way.apply([x, y]).unwrap();
+        format!("{x:.3},{y:.3},{z:.2}\n")
+    });
     let one = folder.path().join("one.csv");
-    fs::write(&one, rows).unwrap();
+    fs::write(&one, rows.collect::<String>()).unwrap();
     let one = Job::on(&[one]).with("input", "crs = \"EPSG:26915\"").report();
-    let (apart, triangles) =
-        (number(&one["triangles"]).abs_diff(number(&report["triangles"])), number(&one["triangles"]));
-    assert!(apart * 100 < triangles, "{apart} of {triangles}");
-    // The zone of the middle, and what it would do.
-    let said = job("utm").run_with(&["check"]).succeeded().out;
-    assert!(said.contains("transformed") && said.contains("UTM zone 1"), "{said}");
-    // Without a target, the error says what to do.
+    // What was rounded decides a few edges, and the hull.
+    let [own, other] = [&report, &one].map(|report| number(&report["triangles"]));
+    assert!(own.abs_diff(other) * 100 < other, "{own} {other}");
+}
+
+#[test]
+fn what_is_not_said_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = three_surveys(folder.path());
+    let zone = Job::on(&files).with("input", "missing_crs = \"EPSG:4269\"\nto_crs = \"utm\"");
+    let said = zone.run_with(&["check"]).succeeded().out;
+    assert!(said.contains("transformed") && said.contains("NAD83 / UTM zone 1"), "{said}");
+    let said = gdt_batch(folder.path(), &["info", "degrees.csv"]).succeeded().out;
+    assert!(said.contains("to_crs"), "{said}");
     Job::on(&files[..2]).run().refused(2, &["26915.las", "26916.las", "to_crs"]);
     Job::on(&files).with("input", "to_crs = \"EPSG:26915\"").run().refused(2, &["degrees.csv", "missing_crs"]);
     Job::on(&files[2..]).run().refused(2, &["degrees.csv", "to_crs"]);
+    for (line, words) in [
+        ("to_crs = \"zone 15\"", ["to_crs may be", "zone 15"]),
+        ("to_crs = \"EPSG:1\"", ["to_crs may be", "EPSG:1 is not in the list"]),
+        ("crs = \"EPSG:26915\"\nmissing_crs = \"EPSG:4269\"", ["missing_crs", "leave one of them out"]),
+    ] {
+        Job::on(&files).with("input", line).run().refused(2, &words);
+    }
 }
 
 #[test]
