@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::Warnings;
 use crate::input::crs::system::Crs;
+use crate::input::crs::unit::Unit;
 use crate::input::histogram::Histogram;
 use crate::input::points::axis::AXIS_NAMES;
 use crate::input::source::{FileFormat, Source};
@@ -122,6 +123,9 @@ impl fmt::Display for SourceDescription {
         }
         writeln!(f, "  crs      {}", self.crs.label())?;
         writeln!(f, "  unit     {} in x and y, {} in z", self.crs.horizontal.name(), self.vertical())?;
+        if self.crs.horizontal == Unit::Degree {
+            writeln!(f, "  a job    needs [input] to_crs = \"utm\" or \"EPSG:...\", which transforms degrees")?;
+        }
         if let Some(histogram) = &self.histogram {
             write!(f, "{histogram}")?;
         }

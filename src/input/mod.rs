@@ -15,10 +15,16 @@ mod other_formats;
 mod points;
 pub mod samples;
 mod source;
+mod source_transform;
 mod text;
+pub mod transform_sources;
+pub mod transformation;
 
 pub use crs::choice::CrsChoice;
 pub use crs::system::{ComparableCrs, Crs, CrsKind};
+pub use crs::target::{NamedCrs, TargetCrs};
+pub use crs::transform::between::CrsTransform;
+pub use crs::transform::datum_rule::DatumRule;
 pub use crs::unit::Unit;
 pub use crs::vertical::VerticalSystem;
 pub use file::random_access::not_a_file;

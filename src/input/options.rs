@@ -5,6 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::geometry::lattice::shortest_decimal;
 use crate::input::crs::choice::CrsChoice;
+use crate::input::crs::target::{NamedCrs, TargetCrs};
+use crate::input::crs::transform::datum_rule::DatumRule;
 use crate::input::points::optional_fields::OptionalFields;
 use crate::input::text::options::TextOptions;
 use crate::input::text::row_choice::RowChoice;
@@ -18,7 +20,7 @@ pub struct InputOptions {
     /// Keep only these classes. The default is all classes but noise (7, 18).
     #[serde(default)]
     pub classes: Option<Vec<u8>>,
-    /// Keep only the points within this rectangle.
+    /// Keep only the points within this rectangle, in the system of the job: with `to_crs`, in that.
     #[serde(default)]
     pub bounds: Option<SourceBounds>,
     /// Which of several points with the same x and y the job keeps.
@@ -27,6 +29,15 @@ pub struct InputOptions {
     /// The coordinate reference system of all files.
     #[serde(default)]
     pub crs: CrsChoice,
+    /// The coordinate reference system of the files that name none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub missing_crs: Option<NamedCrs>,
+    /// The coordinate reference system that all points are transformed into. Without it, none are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub to_crs: Option<TargetCrs>,
+    /// Which datums are one when points are transformed.
+    #[serde(default, skip_serializing_if = "DatumRule::is_default")]
+    pub datums: DatumRule,
     /// The unit of x and y.
     #[serde(default)]
     pub unit: UnitChoice,
@@ -63,7 +74,9 @@ impl InputOptions {
     /// Returns which rows of a text the job wants, and which `fields` of them.
     pub fn row_choice(&self, fields: OptionalFields) -> RowChoice {
         RowChoice {
-            bounds: self.bounds.map(|bounds| bounds.0),
+            // Bounds are in the system of the job, which the rows of a text may have to be transformed into.
+            bounds: self.bounds.filter(|_| self.to_crs.is_none()).map(|bounds| bounds.0),
+            is_transformed: self.to_crs.is_some(),
             classes: self.kept_classes(),
             strict_classes: self.classes.is_some(),
             fields,

@@ -23,11 +23,15 @@ use crate::input::points::point::Point;
 use crate::input::points::raw_bounds::RawBounds;
 use crate::input::points::record_sink::RecordSink;
 use crate::input::points::rules::PointRules;
+use crate::input::points::transformed_sink::TransformedSink;
+use crate::input::source_transform::SourceTransform;
 use crate::input::text::options::TextOptions;
 use crate::input::text::outliers::Outliers;
 use crate::input::text::row_choice::RowChoice;
 use crate::input::text::table::TextTable;
-use crate::{Result, Warnings};
+use crate::{Error, Result, Warnings};
+
+mod transformed;
 
 /// How a file holds its points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -83,6 +87,9 @@ pub struct Source {
     pub by_return: Vec<u64>,
     /// What the user should know about the file.
     pub warnings: Warnings,
+    /// The way of its points into another system; `axes`, `grid`, `min`, `max` and `crs` then are those after it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    transform: Option<Box<SourceTransform>>,
     points: PointData,
 }
 
@@ -157,6 +164,7 @@ fn open_las(file: &RandomAccessFile) -> Result<Source> {
         crs,
         by_return: header.by_return,
         warnings,
+        transform: None,
         points,
     })
 }
@@ -182,6 +190,7 @@ fn open_text(file: &RandomAccessFile, options: &TextOptions, choice: &RowChoice)
         crs: Crs { horizontal: table.unit, vertical: table.unit_z, ..Crs::default() },
         by_return: Vec::new(),
         warnings,
+        transform: None,
         points: PointData::Text(Box::new(table)),
     })
 }
@@ -190,9 +199,10 @@ impl Source {
     /// Returns the box of the points that the job wants, its least and its greatest x, y, z, if that is known without decoding: for
     /// text. Rows that are left out as outliers are not in it.
     pub fn wanted_box(&self) -> Option<[[f64; 3]; 2]> {
-        match &self.points {
-            PointData::Text(table) => table.wanted_box(),
-            _ => None,
+        let PointData::Text(table) = &self.points else { return None };
+        match &self.transform {
+            None => table.wanted_box(),
+            Some(transform) => transform.around(table.wanted_box()?),
         }
     }
 
@@ -221,7 +231,8 @@ impl Source {
         let PointData::Text(table) = &mut self.points else { return Ok(Outliers::default()) };
         let file = RandomAccessFile::reopen(&self.path, self.size)?;
         let found = table.leave_out_outliers(&file, choice)?;
-        (self.axes, self.grid) = (table.axes(), table.grid());
+        let (axes, grid) = (table.axes(), table.grid());
+        self.set_axes_of_text(axes, grid);
         Ok(found)
     }
 
@@ -245,9 +256,10 @@ impl Source {
     }
 
     /// Returns the raw integers within these bounds in x and y: least x and y, greatest x and y, borders included. `None` for text, which
-    /// compares the numbers that it holds.
+    /// compares the numbers that it holds, unless the job transforms them.
     pub fn raw_bounds(&self, bounds: [f64; 4]) -> Option<RawBounds> {
-        (self.format != FileFormat::Text).then(|| RawBounds::of(&self.axes, bounds))
+        let compares_itself = self.format == FileFormat::Text && self.transform.is_none();
+        (!compares_itself).then(|| RawBounds::of(&self.axes, bounds))
     }
 
     /// Returns the number of rows that [`Source::leave_out_outliers`] leaves out.
@@ -267,7 +279,8 @@ impl Source {
     pub fn keep_outliers(&mut self) {
         if let PointData::Text(table) = &mut self.points {
             table.keep_outliers();
-            (self.axes, self.grid) = (table.axes(), table.grid());
+            let (axes, grid) = (table.axes(), table.grid());
+            self.set_axes_of_text(axes, grid);
         }
     }
 
@@ -319,6 +332,19 @@ impl Source {
     /// # Errors
     /// As [`Source::decode`].
     pub(crate) fn read_chunk(
+        &self,
+        chunk: usize,
+        records: u64,
+        fields: OptionalFields,
+        sink: &mut impl RecordSink,
+    ) -> Result<()> {
+        let Some(transform) = &self.transform else { return self.read_own_chunk(chunk, records, fields, sink) };
+        let of_records = transform.of_records(&self.axes).map_err(|why| Error::input(&self.path, why))?;
+        self.read_own_chunk(chunk, records, fields, &mut TransformedSink::new(&of_records, sink))
+    }
+
+    /// As [`Source::read_chunk`], in the coordinates of the file.
+    fn read_own_chunk(
         &self,
         chunk: usize,
         records: u64,

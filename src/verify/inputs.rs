@@ -12,12 +12,13 @@ use crate::geometry::Site;
 use crate::geometry::lattice::{AxisMap, Lattice, shortest_decimal};
 use crate::input::options::Duplicates;
 use crate::input::samples::{FileSamples, fingerprint_of};
+use crate::input::transform_sources::transform_sources;
 use crate::input::{OptionalFields, Point, PointRules, RowChoice, Source, TextOptions, TextReading, open_chosen};
 use crate::output::frame::Extras;
 use crate::verify::keyed_records::{KeyedRecord, KeyedRecords};
 use crate::verify::report::ReportedFacts;
 use crate::verify::source_grid::SourceGrid;
-use crate::{Error, Result, interrupt};
+use crate::{Error, Result, Warnings, interrupt};
 
 /// The number of the source of a vertex. Inputs have the numbers above it.
 const VERTEX: u32 = 0;
@@ -108,7 +109,10 @@ impl<'a> Inputs<'a> {
             facts.skipped.iter().any(|skipped| same(&skipped.file))
         };
         let used = files.iter().filter(|file| !is_skipped(file));
-        let sources = used.map(open_again).collect::<Result<_>>()?;
+        let mut sources = used.map(open_again).collect::<Result<Vec<Source>>>()?;
+        if let Some(input) = &facts.input {
+            transform_sources(&mut sources, input, &mut Warnings::default())?;
+        }
         Ok(Inputs { facts, lattice: lattice_of(facts, extras)?, sources, files })
     }
 

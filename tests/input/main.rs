@@ -13,6 +13,7 @@ mod formats;
 mod headers;
 mod layouts;
 mod meanings;
+mod projections;
 mod real;
 mod rules;
 mod starts;

@@ -14,6 +14,7 @@ mod validator;
 mod clouds;
 mod program;
 mod tileset;
+mod transformed;
 
 mod attributes;
 mod bad_files;

@@ -33,7 +33,7 @@ impl TryFrom<String> for CrsChoice {
             "auto" => Ok(CrsChoice::Auto),
             "first" => Ok(CrsChoice::First),
             "none" => Ok(CrsChoice::None),
-            named => match of_codes(named)?.or_else(|| parse(named)) {
+            name => match named(name)? {
                 Some(crs) => Ok(CrsChoice::Given { crs: Box::new(crs), text }),
                 None => Err(format!(
                     "crs is \"auto\", \"first\", \"none\", an EPSG code such as \"EPSG:26915\" or \"EPSG:26915+5703\", or \
@@ -53,6 +53,11 @@ impl From<CrsChoice> for String {
             CrsChoice::Given { text, .. } => text,
         }
     }
+}
+
+/// Returns the system of codes or of well-known text; `None` if the text is of another kind.
+pub(crate) fn named(text: &str) -> Result<Option<Crs>, String> {
+    Ok(of_codes(text)?.or_else(|| parse(text)))
 }
 
 /// Returns the system of `EPSG:n` or `EPSG:n+m`; `None` if the text is of another kind.

@@ -68,6 +68,16 @@ impl Datum {
         self.label.as_deref()
     }
 
+    /// Returns its prime meridian in degrees east of Greenwich.
+    pub(crate) fn meridian(&self) -> f64 {
+        self.meridian
+    }
+
+    /// Returns whether one of its comparable names begins so.
+    pub(crate) fn is_named_like(&self, start: &str) -> bool {
+        self.names().any(|name| name.starts_with(start))
+    }
+
     /// Returns its half axes in metres.
     pub(crate) fn ellipsoid(&self) -> Option<[f64; 2]> {
         self.ellipsoid
@@ -88,6 +98,11 @@ impl Datum {
         if (self.meridian - other.meridian).abs() > MERIDIAN_TOLERANCE {
             return Some(format!("the prime meridian ({}, {} degrees)", self.meridian, other.meridian));
         }
+        self.difference_in_frame(other)
+    }
+
+    /// As [`Datum::difference`], wherever longitudes begin.
+    pub(crate) fn difference_in_frame(&self, other: &Datum) -> Option<String> {
         if self.has_other_name(other) {
             let named = |datum: &Datum| datum.label.clone().unwrap_or_else(|| "unnamed".into());
             let names = [self, other].map(named);

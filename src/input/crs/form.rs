@@ -36,6 +36,16 @@ impl CrsForm {
         self.datum.as_ref()?.name()
     }
 
+    /// Returns the datum, if the text gives one.
+    pub(crate) fn datum(&self) -> Option<&Datum> {
+        self.datum.as_ref()
+    }
+
+    /// Returns the projection; `None` for a system of longitude and latitude.
+    pub(crate) fn projection(&self) -> Option<&Projection> {
+        self.projection.as_ref()
+    }
+
     /// Returns the false easting and northing in metres; `None` for a system without a projection.
     pub(crate) fn false_origin(&self) -> Option<[f64; 2]> {
         Some(self.projection.as_ref()?.false_origin())

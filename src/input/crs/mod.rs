@@ -17,6 +17,8 @@ pub(crate) mod plausible;
 pub(crate) mod proj4;
 pub(crate) mod projection;
 pub(crate) mod system;
+pub(crate) mod target;
+pub(crate) mod transform;
 pub(crate) mod unit;
 pub(crate) mod vertical;
 pub(crate) mod wkt;

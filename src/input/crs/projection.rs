@@ -138,7 +138,7 @@ const PARALLELS: [(&str, &[&str]); 5] = [
 ];
 
 /// The Mercator projection of web maps: of the ellipsoid's coordinates, but by the formulas of the sphere.
-const WEB_MERCATOR: &str = "webmerc";
+pub(crate) const WEB_MERCATOR: &str = "webmerc";
 
 /// What must agree for two systems to be the same: to within a centimetre. Writers round parameters by less, and two systems that
 /// are in use differ by more.
@@ -257,9 +257,39 @@ impl Projection {
         Some(format!("+proj={}{}", self.method, words.collect::<String>()))
     }
 
+    /// Returns the name of the method in PROJ.4, or one of that kind.
+    pub(crate) fn method(&self) -> &str {
+        &self.method
+    }
+
+    /// Returns the name of the method in the text.
+    pub(crate) fn label(&self) -> &str {
+        &self.label
+    }
+
+    /// Returns whether the name of the method in the text says that it is around a pole.
+    pub(crate) fn is_named_polar(&self) -> bool {
+        comparable_name(&self.label).contains("pol")
+    }
+
+    /// Returns whether x grows to the west.
+    pub(crate) fn is_westward(&self) -> bool {
+        self.westward == Some(true)
+    }
+
+    /// Returns the names of the parameters that are not left out.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &String> {
+        self.parameters.keys()
+    }
+
+    /// Returns the value of a parameter, in degrees or metres.
+    pub(crate) fn value(&self, name: &str) -> f64 {
+        self.parameters.get(name).copied().unwrap_or(default(name))
+    }
+
     /// Returns the false easting and northing in metres.
     pub(crate) fn false_origin(&self) -> [f64; 2] {
-        ["x_0", "y_0"].map(|name| self.parameters.get(name).copied().unwrap_or(0.0))
+        ["x_0", "y_0"].map(|name| self.value(name))
     }
 
     /// Says in what the two differ: what a sentence can name, as it is here and as it is in `other`.
@@ -273,7 +303,7 @@ impl Projection {
         let mut names: Vec<&String> = self.parameters.keys().chain(other.parameters.keys()).collect();
         names.sort_unstable();
         names.dedup();
-        let value = |of: &Projection, name: &str| of.parameters.get(name).copied().unwrap_or(default(name));
+        let value = |of: &Projection, name: &str| of.value(name);
         let differs = |name: &&&String| distance(name, value(self, name), value(other, name)) > tolerance(name);
         let first = names.iter().find(differs)?;
         Some(format!("the {} ({}, {})", long_name(first), value(self, first), value(other, first)))
@@ -360,8 +390,9 @@ fn distance(name: &str, own: f64, other: f64) -> f64 {
 
 /// Returns the scale at the equator of a Mercator projection that is true to scale at the parallel.
 fn scale_at(parallel: f64, ellipsoid: Option<[f64; 2]>) -> f64 {
-    let eccentricity = ellipsoid.map_or(0.0, |[greater, lesser]| 1.0 - (lesser / greater).powi(2));
-    let (sine, cosine) = parallel.to_radians().sin_cos();
+    let eccentricity = ellipsoid.map_or(0.0, |[greater, lesser]| 1.0 - (lesser / greater) * (lesser / greater));
+    let parallel = parallel * (std::f64::consts::PI / 180.0);
+    let (sine, cosine) = (libm::sin(parallel), libm::cos(parallel));
     cosine / (1.0 - eccentricity * sine * sine).sqrt()
 }
 

@@ -124,7 +124,11 @@ impl RecordSink for PointFilter<'_> {
 
     #[cold]
     fn push_outlier(&mut self, class: u8, what: impl FnOnce() -> String) {
-        if self.rules.classes[class as usize] {
+        // A text leaves rows beyond the bounds out by itself. What has no place in another system is not within bounds there.
+        let is_out_of_bounds = self.rules.bounds.is_some();
+        if is_out_of_bounds {
+            self.push_out_of_bounds(class);
+        } else if self.rules.classes[class as usize] {
             self.malformed(1, what);
         } else {
             self.counts.other_class += 1;

@@ -9,3 +9,4 @@ pub(crate) mod raw_bounds;
 pub(crate) mod record;
 pub(crate) mod record_sink;
 pub(crate) mod rules;
+pub(crate) mod transformed_sink;

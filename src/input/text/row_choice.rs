@@ -36,6 +36,8 @@ fn is_false(value: &bool) -> bool {
 pub struct RowChoice {
     /// Only rows within this rectangle: least x and y, greatest x and y.
     pub bounds: Option<[f64; 4]>,
+    /// Whether the job transforms coordinates, so that degrees are nothing to warn about.
+    pub is_transformed: bool,
     /// Only rows of these classes.
     pub classes: [bool; 256],
     /// Whether the user has said which classes. If not, a class that cannot be read counts as 0.
@@ -47,7 +49,13 @@ pub struct RowChoice {
 impl RowChoice {
     /// Returns the choice of all rows, with their colours.
     pub fn all() -> RowChoice {
-        RowChoice { bounds: None, classes: [true; 256], strict_classes: false, fields: OptionalFields::RGB }
+        RowChoice {
+            bounds: None,
+            is_transformed: false,
+            classes: [true; 256],
+            strict_classes: false,
+            fields: OptionalFields::RGB,
+        }
     }
 
     /// Returns whether every row is wanted.

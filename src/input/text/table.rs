@@ -169,7 +169,7 @@ impl TextTable {
             bounds: choice.bounds,
         };
         let (is_open, rows) = (units.horizontal == Unit::Unknown, table.wanted.bounds);
-        if let (true, false, Some(rows)) = (is_open, named_degrees, rows) {
+        if let (true, false, Some(rows)) = (is_open && !choice.is_transformed, named_degrees, rows) {
             warnings.extend(degrees::warning(&rows, &table.wanted.decimals));
         }
         if named_degrees && is_open && bounds.is_some() {

@@ -197,8 +197,8 @@ fn two_systems(own: &Said, other: &Said, differences: &[String]) -> Error {
              that of the first file with a CRS, or of the first file if none has one"
         }
         false => {
-            "One job takes one CRS: transform one of them first, or run two jobs. If a record is wrong, say with [input] crs what all files \
-             are in, such as \"EPSG:26915\", or \"first\" for what the first file says"
+            "One job takes one CRS: [input] to_crs = \"utm\" or \"EPSG:...\" transforms all points into one, or run two jobs. If a record is \
+             wrong, say with [input] crs what all files are in, such as \"EPSG:26915\", or \"first\" for what the first file says"
         }
     };
     let (own, other, differences) = (is_in(own), is_in(other), differences.join(" and "));
@@ -349,8 +349,8 @@ pub fn horizontal_unit(
             Ok((key_of(Unit::Metre), 1.0))
         }
         _ => Err(Error::Config(format!(
-            "{}the coordinates are in degrees ({}), and a Delaunay triangulation in degrees is distorted. {TRANSFORM}; \
-             {what_to_do}, or set [input] unit = \"metre\"",
+            "{}the coordinates are in degrees ({}), and a Delaunay triangulation in degrees is distorted: [input] to_crs = \"utm\" or \
+             \"EPSG:...\" transforms them; {what_to_do}, or set [input] unit = \"metre\"",
             named(&|crs| crs.horizontal == Unit::Degree),
             crs.name.as_deref().unwrap_or("geographic CRS"),
         ))),

@@ -2,8 +2,9 @@
 
 use crate::geometry::Bounds;
 use crate::geometry::lattice::{AxisMap, Lattice, REACH, shortest_decimal};
-use crate::input::options::OnBadFile;
-use crate::input::{Axis, FileFormat, PointRules, Source};
+use crate::input::options::{OnBadFile, UnitChoice};
+use crate::input::transform_sources::transform_sources;
+use crate::input::{Axis, CrsChoice, FileFormat, PointRules, Source};
 use crate::job::options::JobOptions;
 use crate::job::plan::common_crs::{common_crs, horizontal_unit};
 use crate::job::plan::extent::{Extent, SourceBox, to_float};
@@ -101,10 +102,12 @@ fn try_plan(
         return Err(Error::Config(format!("{records} records are more than one job can hold (2^40)")));
     }
     check_missing_records(sources, &options.input)?;
+    transform_sources(sources, &options.input, &mut warnings)?;
     refuse_degrees(sources, &options.input)?;
     refuse_missing_classes(sources, &options.input)?;
-    let crs = common_crs(sources, &options.input.crs, options.input.unit, &mut warnings)?;
-    let (unit, metres) = horizontal_unit(sources, options.input.unit, &options.input.crs, &crs, &mut warnings)?;
+    let (choice, unit) = said_of_sources(options);
+    let crs = common_crs(sources, choice, unit, &mut warnings)?;
+    let (unit, metres) = horizontal_unit(sources, unit, choice, &crs, &mut warnings)?;
     let metres_z = crs.vertical.unwrap_or(metres);
     let wish = LatticeWish {
         metres: [metres, metres_z],
@@ -151,6 +154,14 @@ fn try_plan(
         warnings,
     };
     Ok((plan, rules.into_iter().zip(claimed).collect()))
+}
+
+/// Returns what the user says of the coordinates of the sources. Of those that are transformed, the target says all.
+fn said_of_sources(options: &JobOptions) -> (&CrsChoice, UnitChoice) {
+    match options.input.to_crs {
+        Some(_) => (&CrsChoice::Auto, UnitChoice::Auto),
+        None => (&options.input.crs, options.input.unit),
+    }
 }
 
 /// Returns the lattice box of a source that claims the box `claim`, within `extent`. A source that claims nothing may have points

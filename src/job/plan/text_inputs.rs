@@ -43,7 +43,7 @@ pub(crate) fn refuse_degrees(sources: &[Source], options: &InputOptions) -> Resu
     match sources.iter().find(is_in_degrees) {
         Some(source) if is_open => Err(Error::Config(format!(
             "{}: its columns are named as degrees (x from {} to {}, y from {} to {}{}), and a Delaunay triangulation in \
-             degrees is distorted: transform the points to a projected CRS first, for example with `cs2cs` or `pdal translate`; if \
+             degrees is distorted: [input] to_crs = \"utm\" with missing_crs = \"EPSG:4326\" transforms them, if that is what they are in; if \
              they are no degrees, set [input] unit, for example to \"metre\", or [input] crs",
             source.path.display(),
             source.min[0],

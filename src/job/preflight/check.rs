@@ -1,6 +1,7 @@
 //! The result of the preflight, for people and for machines.
 
 use crate::input::Source;
+use crate::input::transformation::{Transformation, transformations};
 use crate::job::durable::directory::JobDirectory;
 use crate::job::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours};
 use crate::job::machine;
@@ -40,6 +41,9 @@ pub struct Preflight {
     pub unit: String,
     /// Name of the CRS.
     pub crs: Option<String>,
+    /// What the job would transform, from what into what.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub transformations: Vec<Transformation>,
     /// Worker threads.
     pub threads: usize,
     /// About how many bytes of memory the job needs.
@@ -125,6 +129,7 @@ impl Preflight {
             size: [0, 1].map(|axis| plan.extent.extent(axis) as f64 * resolution),
             unit: plan.unit.clone(),
             crs: plan.crs.name.clone(),
+            transformations: transformations(plan.inputs.iter().map(|input| &input.source)),
             threads,
             memory: estimate::memory(plan, kept, threads),
             memory_limit: options.limits.memory.0,
@@ -199,6 +204,9 @@ impl fmt::Display for Preflight {
         row("area", format!("{:.1} x {:.1} {}", self.size[0], self.size[1], self.unit))?;
         row("lattice step", format!("{} (z {})", self.resolution[0], self.resolution[1]))?;
         row("crs", self.crs.clone().unwrap_or_else(|| "none".into()))?;
+        for transformation in &self.transformations {
+            row("transformed", transformation.to_string())?;
+        }
         row("backend", format!("{} on {} threads", self.backend, self.threads))?;
         let free = |bytes: Option<u64>| bytes.map_or("unknown".into(), mebibytes);
         let (memory, limit) = (mebibytes(self.memory), mebibytes(self.memory_limit));

@@ -5,6 +5,7 @@ use crate::geometry::VertexDigest;
 use crate::geometry::lattice::Lattice;
 use crate::gpu::benefit::GpuFigures;
 use crate::input::options::InputOptions;
+use crate::input::transformation::{Transformation, transformations};
 use crate::input::{PointCounts, TextReading};
 use crate::job::levels::make_level::LevelStats;
 use crate::job::machine;
@@ -76,6 +77,9 @@ pub struct Report {
     pub unit: String,
     /// Name of the CRS.
     pub crs: Option<String>,
+    /// What was transformed, from what into what, and how exactly.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub transformations: Vec<Transformation>,
     /// Bytes of all results.
     pub bytes_written: u64,
     /// The most bytes that temporary files took.
@@ -251,6 +255,7 @@ impl Report {
             lattice: plan.lattice.clone(),
             unit: plan.unit.clone(),
             crs: plan.crs.name.clone(),
+            transformations: transformations(plan.inputs.iter().map(|input| &input.source)),
             bytes_written: parts.tiles.bytes + parts.levels.bytes + parts.other_bytes,
             bytes_temporary: parts.temporary,
             peak_memory: machine::peak_memory().max(parts.peak_memory),

@@ -96,6 +96,9 @@ impl fmt::Display for Report {
             let slowest = format!("the slowest, {part}, took {seconds:.1} s for {} points", grouped(points));
             row("parts", format!("{}; {slowest}", grouped(self.parts)))?;
         }
+        for transformation in &self.transformations {
+            row("transformed", transformation.to_string())?;
+        }
         row("lattice step", format!("{} (z {}) {}", self.lattice.resolution, self.lattice.resolution_z, self.unit))?;
         row("written", precise_mebibytes(self.bytes_written))?;
         row("temporary files", precise_mebibytes(self.bytes_temporary))?;

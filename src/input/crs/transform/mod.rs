@@ -1,0 +1,15 @@
+//! The way of a place from one coordinate reference system into another: from a map to longitude and latitude, and from there to
+//! another map. The same bits come out on every machine.
+
+pub(crate) mod between;
+pub(crate) mod datum_rule;
+mod ellipsoid;
+mod equal_area;
+mod lambert_conic;
+mod map_projection;
+mod mercator;
+mod stereographic;
+#[cfg(test)]
+mod tests;
+mod transverse_mercator;
+pub(crate) mod utm;

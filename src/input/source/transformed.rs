@@ -1,0 +1,49 @@
+//! A source that looks like a file in another coordinate reference system.
+
+use crate::input::crs::system::Crs;
+use crate::input::points::axis::Axis;
+use crate::input::source::Source;
+use crate::input::source_transform::{OwnCoordinates, SourceTransform};
+use rust_decimal::Decimal;
+
+impl Source {
+    /// Has the points transformed on their way out: from now on the source looks like a file in the other system.
+    pub(crate) fn set_transform(&mut self, transform: SourceTransform, crs: Crs) {
+        self.axes = transform.axes();
+        self.grid = transform.grid(&self.axes);
+        // A header's box without any place in the other system is no box.
+        [self.min, self.max] = transform.around([self.min, self.max]).unwrap_or_default();
+        self.crs = crs;
+        self.transform = Some(Box::new(transform));
+    }
+
+    /// Undoes [`Source::set_transform`].
+    pub fn forget_transform(&mut self) {
+        if let Some(transform) = self.transform.take() {
+            let OwnCoordinates { axes, grid, min, max, crs } = transform.own;
+            (self.axes, self.grid, self.min, self.max, self.crs) = (axes, grid, min, max, crs);
+        }
+    }
+
+    /// Returns the way of the points into another system, if they go one.
+    pub(crate) fn transform(&self) -> Option<&SourceTransform> {
+        self.transform.as_deref()
+    }
+
+    /// Returns what the file itself says of its coordinates, for a transform of them.
+    pub(crate) fn own_coordinates(&self) -> OwnCoordinates {
+        OwnCoordinates { axes: self.axes, grid: self.grid, min: self.min, max: self.max, crs: self.crs.clone() }
+    }
+
+    /// Takes over the axes that a text has with or without its outliers.
+    pub(super) fn set_axes_of_text(&mut self, axes: [Axis; 3], grid: [Decimal; 2]) {
+        match &mut self.transform {
+            Some(transform) => {
+                (transform.own.axes, transform.own.grid) = (axes, grid);
+                self.axes = transform.axes();
+                self.grid = transform.grid(&self.axes);
+            }
+            None => (self.axes, self.grid) = (axes, grid),
+        }
+    }
+}
