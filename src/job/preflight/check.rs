@@ -14,6 +14,7 @@ use crate::job::preflight::estimate::{self, DiskEstimate};
 use crate::job::preflight::kept_points::{KeptPoints, has_filter};
 use crate::job::progress::number_text::{grouped, mebibytes};
 use crate::job::publish::height_offset_check::check_height_offset;
+use crate::job::publish::raster::check::check_raster;
 use crate::job::publish::one_file_limits::MAX_TRIANGLES_IN_ONE_FILE;
 use crate::job::report::skipped_inputs::write_skipped;
 use crate::{Error, Result, Warnings, address_space};
@@ -80,6 +81,7 @@ pub fn check(options: &JobOptions) -> Result<Preflight> {
     check_results_are_ours(&directory, options.output.page)?;
     let plan = Parts::cut_or_whole(make_plan(options, LatticeCoarsening::default())?);
     check_height_offset(&plan)?;
+    check_raster(&plan)?;
     let threads = workers(options, plan.records)?;
     if has_filter(&plan) {
         closer_look(&plan, threads)
