@@ -130,7 +130,11 @@ fn cells_have_the_heights_of_the_triangles_in_any_tiling() {
     let files = in_files(folder.path(), &clouds::clusters(6_000), 100_000);
     for (options, side, more) in [
         ("resolution = 1500.0", 1500.0, "format = \"glb\""),
-        ("resolution = 750, compression = \"none\", nodata = \"nan\"", 750.0, "max_edge = 9000.0\ncompression = \"meshopt\""),
+        (
+            "resolution = 750, compression = \"none\", nodata = \"nan\"",
+            750.0,
+            "max_edge = 9000.0\ncompression = \"meshopt\"",
+        ),
         ("resolution = 256, nodata = 0", 256.0, "hull = \"whole\"\ncompression = \"none\""),
     ] {
         let run = |job: Job| {
@@ -167,7 +171,10 @@ fn points_at_the_centres_are_the_cells() {
     }
     assert!(warnings(&report).contains("1 cells of terrain.tif have the height -300"), "{}", warnings(&report));
     // Centres on edges and on vertices belong to no tile more than to another.
-    let other = with_raster(Job::on(&[&cloud]).tiles_of(24).with("output", "hull = \"whole\""), "resolution = 2, nodata = -300");
+    let other = with_raster(
+        Job::on(&[&cloud]).tiles_of(24).with("output", "hull = \"whole\""),
+        "resolution = 2, nodata = -300",
+    );
     other.report();
     assert!(bytes(&other) == bytes(&job));
 }
@@ -257,7 +264,8 @@ fn the_raster_is_a_result_like_others() {
     assert!(verdict.code == 4 && verdict.out.contains("terrain.tif"), "{verdict:?}");
     // A job that wants none removes that of the job before.
     let text = fs::read_to_string(job.config()).unwrap();
-    let without: String = text.lines().filter(|line| !line.starts_with("raster")).map(|line| format!("{line}\n")).collect();
+    let without: String =
+        text.lines().filter(|line| !line.starts_with("raster")).map(|line| format!("{line}\n")).collect();
     fs::write(job.folder().join("job.toml"), without).unwrap();
     gdt_batch(job.folder(), &["job.toml"]).succeeded();
     assert!(!path.exists());

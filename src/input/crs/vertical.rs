@@ -77,7 +77,9 @@ impl VerticalSystem {
     /// Returns the code of the system, for heights in a unit of so many metres: its own, or else that of the system with its datum, its
     /// direction and this unit. `None` if no code, or name, of it is known.
     pub(crate) fn system_code(&self, metres: f64) -> Option<u32> {
-        let fits = |code: &HeightCode| (code.metres - metres).abs() < 1e-8 && self.is_depth().unwrap_or(false) == code.is_depth;
+        let fits = |code: &HeightCode| {
+            (code.metres - metres).abs() < 1e-8 && self.is_depth().unwrap_or(false) == code.is_depth
+        };
         if let Some(code) = self.epsg.filter(|code| heights().get(code).is_some_and(fits)) {
             return Some(code);
         }

@@ -2,21 +2,21 @@
 
 /// What the coordinates of a raster are in, as far as keys can say it.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct RasterSystem {
+pub(crate) struct RasterSystem {
     /// The EPSG code of the projected system, if it is known and means what the coordinates are in.
-    pub code: Option<u16>,
+    pub(crate) code: Option<u16>,
     /// Its well-known text, where there is no such code.
-    pub text: Option<String>,
+    pub(crate) text: Option<String>,
     /// Its name.
-    pub name: Option<String>,
+    pub(crate) name: Option<String>,
     /// The metres of a unit of x and y.
-    pub metres: Option<f64>,
+    pub(crate) metres: Option<f64>,
     /// The EPSG code of the system of heights.
-    pub vertical_code: Option<u16>,
+    pub(crate) vertical_code: Option<u16>,
     /// Its name.
-    pub vertical_name: Option<String>,
+    pub(crate) vertical_name: Option<String>,
     /// The metres of a unit of height.
-    pub vertical_metres: Option<f64>,
+    pub(crate) vertical_metres: Option<f64>,
 }
 
 /// The three tags of the keys.
@@ -57,7 +57,7 @@ const UNITS: [(u16, f64); 3] = [(9001, 1.0), (9002, 0.3048), (9003, 1200.0 / 393
 
 impl RasterSystem {
     /// Returns whether the keys say where the coordinates are.
-    pub fn is_placed(&self) -> bool {
+    pub(crate) fn is_placed(&self) -> bool {
         self.code.is_some() || self.written_text().is_some()
     }
 
@@ -165,10 +165,35 @@ mod tests {
         let system = RasterSystem { text, metres: Some(0.201168), ..RasterSystem::default() };
         let keys = system.keys();
         assert_eq!(keys.texts, "ESRI PE String = PROJCS[\"Grid ? ?\"]|");
-        assert_eq!(keys.directory[4..], [
-            1024, 0, 1, USER_DEFINED, 1025, 0, 1, 1, 3072, 0, 1, USER_DEFINED, 3073, TEXTS, 37, 0, 3076, 0, 1, USER_DEFINED, 3077,
-            DOUBLES, 1, 0
-        ]);
+        assert_eq!(
+            keys.directory[4..],
+            [
+                1024,
+                0,
+                1,
+                USER_DEFINED,
+                1025,
+                0,
+                1,
+                1,
+                3072,
+                0,
+                1,
+                USER_DEFINED,
+                3073,
+                TEXTS,
+                36,
+                0,
+                3076,
+                0,
+                1,
+                USER_DEFINED,
+                3077,
+                DOUBLES,
+                1,
+                0
+            ]
+        );
         assert_eq!(keys.doubles, [0.201168]);
         let long = RasterSystem { text: Some("x".repeat(3000)), ..RasterSystem::default() };
         assert!(system.is_placed() && !long.is_placed() && !RasterSystem::default().is_placed());

@@ -154,7 +154,8 @@ mod tests {
         for compression in ["deflate", "none"] {
             let options = options(compression);
             let (block, coarse) = (packed(&cells, options.compression), packed(&cells[..], options.compression));
-            let about = RasterHead { options, corner: [100.0, 250.0], cell_size: 2.5, system: &system, copyright: None };
+            let about =
+                RasterHead { options, corner: [100.0, 250.0], cell_size: 2.5, system: &system, copyright: None };
             let lengths = vec![block.len() as u32; 2];
             let images = [
                 RasterImage { size: [600, 512], lengths },
@@ -176,7 +177,8 @@ mod tests {
     #[test]
     fn a_file_of_more_than_four_gigabytes_has_longer_offsets() {
         let system = RasterSystem::default();
-        let about = RasterHead { options: options("none"), corner: [0.0; 2], cell_size: 2.5, system: &system, copyright: None };
+        let about =
+            RasterHead { options: options("none"), corner: [0.0; 2], cell_size: 2.5, system: &system, copyright: None };
         let image = |blocks: usize| RasterImage { size: [512, 512 * blocks as u32], lengths: vec![1 << 20; blocks] };
         let magic = |blocks: usize| head(&about, &[image(blocks)])[..4].to_vec();
         // With leaders and trailers, 4095 blocks of a mebibyte take a little less than 2^32 bytes, and their offsets fit.

@@ -58,6 +58,7 @@ pub(crate) struct Beside {
     pub(crate) past: u32,
 }
 
+#[expect(clippy::arithmetic_side_effects, reason = "T is i64 or i128")]
 impl<T: WholeNumber> Subunits<T> {
     /// Returns which of `cells` columns (axis 0) or rows (axis 1) are beside `coordinate`.
     #[inline(always)]
@@ -265,6 +266,109 @@ impl Subunits<i128> {
             pitch: self.pitch as i64,
             origin: self.origin.map(|origin| origin as i64),
             longest: most as i64,
+        }
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn decimal(text: &str) -> Decimal {
+        Decimal::from_str_exact(text).unwrap()
+    }
+
+    fn lattice(x: &str, y: &str, step: &str) -> Lattice {
+        Lattice::new([decimal(x), decimal(y), Decimal::ZERO], decimal(step), decimal("0.01")).unwrap()
+    }
+
+    impl RasterGrid {
+        /// Returns the grid with 128-bit numbers alone.
+        pub(in crate::output::raster) fn without_narrow(mut self) -> RasterGrid {
+            self.narrow = None;
+            self
+        }
+    }
+
+    #[test]
+    fn edges_are_at_multiples_of_the_resolution() {
+        let lattice = lattice("100.25", "-7", "0.01");
+        // x from 100.25 to 102, y from -8 to -6.5.
+        let bounds = Bounds { min: [0, -100], max: [175, 50] };
+        let grid = RasterGrid::new(&lattice, decimal("0.5"), bounds).unwrap();
+        assert_eq!((grid.corner(), grid.size(), grid.cell_size()), ([100.0, -6.5], [4, 3], 0.5));
+        let grid = RasterGrid::new(&lattice, decimal("1000"), bounds).unwrap();
+        assert_eq!((grid.corner(), grid.size()), ([0.0, 0.0], [1, 1]));
+        // A terrain that is a line on an edge.
+        let grid = RasterGrid::new(&lattice, decimal("0.25"), Bounds { min: [0, 0], max: [0, 0] }).unwrap();
+        assert_eq!((grid.corner(), grid.size()), ([100.25, -7.0], [1, 1]));
+    }
+
+    #[test]
+    fn a_coordinate_knows_the_centres_beside_it() {
+        // Centres at 0.25, 0.75 and so on; lattice places are quarters.
+        let grid =
+            RasterGrid::new(&lattice("0", "0", "0.25"), decimal("0.5"), Bounds { min: [0, 0], max: [8, 8] }).unwrap();
+        let beside = |place| {
+            let Beside { from, past } = grid.narrow().unwrap().beside(0, place, 4);
+            (from, past)
+        };
+        assert_eq!([-9, 0, 1, 2, 3, 8, 99].map(beside), [(0, 0), (0, 0), (0, 1), (1, 1), (1, 2), (4, 4), (4, 4)]);
+        assert_eq!(grid.cells_within(Bounds { min: [1, 4], max: [2, 7] }), [[0, 1], [0, 2]]);
+    }
+
+    #[test]
+    fn a_raster_that_is_too_fine_says_what_would_do() {
+        let bounds = Bounds { min: [0, 0], max: [1_000_000, 1_000_000] };
+        let grid = |cell: &str| RasterGrid::new(&lattice("0", "0", "1"), decimal(cell), bounds);
+        let said = grid("0.5").unwrap_err();
+        assert!(
+            said.starts_with("makes 2000000 x 2000000 cells, 16000 GB") && said.contains("set 2.0 or more"),
+            "{said}"
+        );
+        assert!(grid("2.0").is_ok());
+        assert_eq!([0.00123, 0.99, 9.91, 38.1, 381.4].map(two_digits), ["0.0013", "0.99", "10.0", "39", "390"]);
+        let long = grid("2.0000000000000000000000001").unwrap_err();
+        assert!(long.contains("too many digits"), "{long}");
+    }
+
+    #[test]
+    fn the_last_overview_fits_a_block() {
+        let grid =
+            RasterGrid::new(&lattice("0", "0", "1"), decimal("1"), Bounds { min: [0, 0], max: [1500, 513] }).unwrap();
+        assert_eq!(grid.levels(), [[1500, 513], [750, 257], [375, 129]]);
+        assert_eq!(blocks([1500, 513]), [3, 2]);
+    }
+
+    proptest! {
+        #[test]
+        fn centres_are_where_decimals_say(
+            offset in -1_000_000_000i64..1_000_000_000,
+            step in 1i64..5_000,
+            cell in 1i64..5_000_000,
+            place in -30_000i32..30_000,
+        ) {
+            let lattice = Lattice::new([Decimal::new(offset, 4); 3], Decimal::new(step, 4), Decimal::ONE).unwrap();
+            let bounds = Bounds { min: [-30_000; 2], max: [30_000; 2] };
+            let Ok(grid) = RasterGrid::new(&lattice, Decimal::new(cell, 5), bounds) else { return Ok(()) };
+            let [columns, rows] = grid.size();
+            // In units of 5 decimals: the coordinate, and the first centres, which are half a cell inside.
+            let world = |place: i32| i128::from(offset) * 20 + i128::from(step) * i128::from(place) * 20;
+            let west = (grid.corner()[0] * 1e5).round() as i128;
+            let north = (grid.corner()[1] * 1e5).round() as i128;
+            let centre = |column: u32| 2 * west + (2 * i128::from(column) + 1) * i128::from(cell);
+            for subunits in [grid.narrow().map(|s| s.beside(0, place, columns)), Some(grid.wide().beside(0, place, columns))] {
+                let Beside { from, past } = subunits.unwrap();
+                prop_assert!(from == columns || centre(from) >= world(place));
+                prop_assert!(from == 0 || centre(from - 1) < world(place));
+                prop_assert!(past == columns || centre(past) > world(place));
+                prop_assert!(past == 0 || centre(past - 1) <= world(place));
+            }
+            let Beside { from, .. } = grid.wide().beside(1, -place, rows);
+            let centre = |row: u32| 2 * north - (2 * i128::from(row) + 1) * i128::from(cell);
+            prop_assert!(from == rows || centre(from) <= world(place));
+            prop_assert!(from == 0 || centre(from - 1) > world(place));
         }
     }
 }

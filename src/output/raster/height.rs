@@ -24,6 +24,7 @@ pub(crate) struct HeightTriangle<'a, T> {
     area: T,
 }
 
+#[expect(clippy::arithmetic_side_effects, reason = "T is i64 or i128")]
 impl<'a, T: WholeNumber> HeightTriangle<'a, T> {
     /// Returns the triangle with these corners, in any order.
     pub(crate) fn new(subunits: &'a Subunits<T>, mut corners: Corners) -> HeightTriangle<'a, T> {
@@ -85,6 +86,7 @@ impl<'a, T: WholeNumber> HeightTriangle<'a, T> {
 }
 
 /// Returns the way from one corner to another in the plane, in steps of the lattice.
+#[expect(clippy::arithmetic_side_effects, reason = "T is i64 or i128")]
 fn difference<T: WholeNumber>(from: [i32; 3], to: [i32; 3]) -> [T; 2] {
     [0, 1].map(|axis| T::from(to[axis]) - T::from(from[axis]))
 }

@@ -1,7 +1,7 @@
 //! `terrain.tif`: the terrain as a raster of heights, a Cloud-Optimized GeoTIFF.
 //!
 //! A cell has the height of the terrain at its centre. [`grid::RasterGrid`] says where the centres are, in whole numbers, so which triangle
-//! holds a centre is decided exactly. The height follows from that triangle's corners alone ([`height`](height::Corners)), or, on an
+//! holds a centre is decided exactly. The height follows from that triangle's corners alone (`height.rs`), or, on an
 //! edge or a vertex, from the ends of the edge or the vertex alone. So all triangles that meet there give the same bits, and a cell does not
 //! depend on the tiles, their order or the threads.
 

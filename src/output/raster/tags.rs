@@ -60,7 +60,9 @@ impl TagValues {
             }
             TagValues::Short(values) => (3, values.len() as u64, values.iter().flat_map(|v| v.to_le_bytes()).collect()),
             TagValues::Long(values) => (4, values.len() as u64, values.iter().flat_map(|v| v.to_le_bytes()).collect()),
-            TagValues::Double(values) => (12, values.len() as u64, values.iter().flat_map(|v| v.to_le_bytes()).collect()),
+            TagValues::Double(values) => {
+                (12, values.len() as u64, values.iter().flat_map(|v| v.to_le_bytes()).collect())
+            }
             TagValues::Offsets(values) => {
                 let mut bytes = Vec::with_capacity(values.len() * kind.offset_bytes());
                 values.iter().for_each(|value| kind.push(*value, &mut bytes));

@@ -127,6 +127,7 @@ impl<'a> Window<'a> {
         }
     }
 
+    #[expect(clippy::arithmetic_side_effects, reason = "T is i64 or i128")]
     fn fill<T: WholeNumber>(&self, triangle: &HeightTriangle<T>, columns: [u32; 2], rows: [u32; 2]) {
         let steps = triangle.steps_along_row();
         for row in rows[0]..rows[1] {
@@ -152,15 +153,10 @@ impl<'a> Window<'a> {
     fn cell(&self, column: u32, row: u32) -> &AtomicU32 {
         &self.cells[(row - self.first[1]) as usize * self.side + (column - self.first[0]) as usize]
     }
-
-    /// Returns a block by its column and row among those of the window, with `nodata` where there is no height, and how many heights of it
-    /// are just that number. Returns `None` if it has no height.
-    pub(crate) fn block(&self, block: [usize; 2], nodata: f32) -> Option<(Vec<f32>, u64)> {
-        filled(self.side, block, nodata, |number| self.height(number))
-    }
 }
 
-/// As [`Window::block`], of an image with a side of so many pixels.
+/// Returns a block of an image with a side of so many pixels, by its column and row among the blocks: with `nodata` where there is no height,
+/// and how many heights of it are just that number. Returns `None` if it has no height. `pixel` is the image, with NaN where there is none.
 pub(crate) fn filled(
     side: usize,
     [column, row]: [usize; 2],
@@ -182,6 +178,7 @@ pub(crate) fn filled(
 }
 
 /// Returns the columns of a row in which no weight is negative. `first` are those of the first column.
+#[expect(clippy::arithmetic_side_effects, reason = "T is i64 or i128")]
 fn inside<T: WholeNumber>(first: [T; 3], steps: [T; 3], columns: [u32; 2]) -> [u32; 2] {
     let zero = T::from(0i32);
     let [mut from, mut to] = [0, columns[1] - columns[0]];
@@ -197,4 +194,94 @@ fn inside<T: WholeNumber>(first: [T; 3], steps: [T; 3], columns: [u32; 2]) -> [u
         }
     }
     [columns[0] + from, columns[0] + to.max(from)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Bounds;
+    use crate::geometry::lattice::Lattice;
+    use proptest::prelude::*;
+    use rust_decimal::Decimal;
+
+    const SCALE: HeightScale = HeightScale { offset: 0.0, step: 1.0 };
+
+    fn grid(cell: Decimal) -> RasterGrid {
+        let lattice = Lattice::new([Decimal::ZERO; 3], Decimal::ONE, Decimal::ONE).unwrap();
+        RasterGrid::new(&lattice, cell, Bounds { min: [0; 2], max: [40; 2] }).unwrap()
+    }
+
+    fn drawn(grid: &RasterGrid, positions: &[[i32; 3]], triangles: &[[u32; 3]]) -> Vec<u32> {
+        let window = Window::new(grid, SCALE, 64);
+        window.draw(&LatticeMesh { positions: positions.to_vec(), triangles: triangles.to_vec() }).unwrap();
+        (0..64 * 64).map(|number| window.height(number).to_bits()).collect()
+    }
+
+    fn count(cells: &[u32]) -> usize {
+        cells.iter().filter(|cell| !f32::from_bits(**cell).is_nan()).count()
+    }
+
+    proptest! {
+        /// Centres are at odd places, so that many lie on edges and vertices.
+        #[test]
+        fn neither_the_order_of_corners_nor_the_width_of_numbers_counts(
+            corners in prop::array::uniform3(prop::array::uniform3(0i32..=40)),
+            turned in Just([0u32, 1, 2]).prop_shuffle(),
+        ) {
+            let area = |[a, b, c]: [[i32; 3]; 3]| (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
+            prop_assume!(area(corners) != 0);
+            let grid = grid(Decimal::TWO);
+            let cells = drawn(&grid, &corners, &[[0, 1, 2]]);
+            prop_assert_eq!(&drawn(&grid, &corners, &[turned.try_into().unwrap()]), &cells);
+            prop_assert_eq!(&drawn(&grid.clone().without_narrow(), &corners, &[[0, 1, 2]]), &cells);
+            let inside = |column: usize, row: usize| {
+                let [x, y] = [2 * column as i32 + 1, 39 - 2 * row as i32];
+                let center = [x, y, 0];
+                let [a, b, c] = corners;
+                let areas = [[center, b, c], [a, center, c], [a, b, center]].map(|t| area(t) * area(corners).signum());
+                areas.iter().all(|area| *area >= 0)
+            };
+            let expected = (0..20).flat_map(|row| (0..20).map(move |column| (column, row))).filter(|(c, r)| inside(*c, *r));
+            prop_assert_eq!(count(&cells), expected.clone().count());
+            for (column, row) in expected {
+                prop_assert!(!f32::from_bits(cells[row * 64 + column]).is_nan());
+            }
+        }
+
+        /// Triangles around a vertex agree on the bits of the cells on their edges, whichever is drawn last.
+        #[test]
+        fn neighbours_agree_on_their_border(
+            middle in prop::array::uniform3(15i32..=25),
+            arms in prop::collection::vec((1i32..=14, 0i32..=14, 0i32..=40), 4),
+        ) {
+            // Each arm leads into another quarter.
+            let mut positions = vec![middle];
+            for (quarter, (long, short, z)) in arms.into_iter().enumerate() {
+                let short = short % long;
+                let [x, y] = [[long, short], [-short, long], [-long, -short], [short, -long]][quarter];
+                positions.push([middle[0] + x, middle[1] + y, z]);
+            }
+            let grid = grid(Decimal::TWO);
+            let mut triangles = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]];
+            let cells = drawn(&grid, &positions, &triangles);
+            for _ in 0..3 {
+                triangles.rotate_left(1);
+                prop_assert_eq!(&drawn(&grid, &positions, &triangles), &cells);
+            }
+        }
+    }
+
+    #[test]
+    fn a_window_has_its_part_of_the_raster() {
+        let grid = grid(Decimal::ONE);
+        let mesh = LatticeMesh { positions: vec![[0, 0, 0], [40, 0, 40], [0, 40, 0]], triangles: vec![[0, 1, 2]] };
+        let mut window = Window::new(&grid, SCALE, 16);
+        window.move_to([16, 16]);
+        window.draw(&mesh).unwrap();
+        // The cell in column 18 and row 22, and one beyond the long edge.
+        assert_eq!(window.height(6 * 16 + 2), 18.5);
+        assert!(window.height(15).is_nan());
+        window.move_to([0, 0]);
+        assert!((0..256).all(|number| window.height(number).is_nan()));
+    }
 }

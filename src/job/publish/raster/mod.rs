@@ -9,7 +9,7 @@
 //! tile again takes less time than packing its cells.
 
 pub mod check;
-pub mod system;
+pub(crate) mod system;
 pub(crate) mod tile_meshes;
 pub(crate) mod waiting_blocks;
 pub mod write_raster;

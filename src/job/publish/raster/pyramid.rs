@@ -89,7 +89,13 @@ impl Pyramid<'_> {
     }
 
     /// Adds the blocks of the window `at`, whose image at `level` has a side of so many pixels.
-    fn add_blocks(&self, level: usize, at: [usize; 2], side: usize, pixel: &(dyn Fn(usize) -> f32 + Sync)) -> Result<()> {
+    fn add_blocks(
+        &self,
+        level: usize,
+        at: [usize; 2],
+        side: usize,
+        pixel: &(dyn Fn(usize) -> f32 + Sync),
+    ) -> Result<()> {
         let along = side / BLOCK;
         let all = blocks(self.levels[level]);
         (0..along * along).into_par_iter().with_max_len(1).try_for_each(|number| {

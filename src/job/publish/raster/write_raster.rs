@@ -104,7 +104,8 @@ impl<'a> RasterWork<'a> {
             system: &system,
             copyright: self.plan.options.output.copyright(),
         };
-        let file = blocks.write(&head(&about, &blocks.images(&levels)), &directory.output().raster())?;
+        let head = head(&about, &blocks.images(&levels));
+        let file = blocks.write(&head, &directory.output().raster())?;
         let stats =
             RasterStats { size: self.grid.size(), bytes: file.bytes, same_as_nodata: same_as_nodata.into_inner() };
         Ok(StepOutput { files: vec![file], ..StepOutput::new(stats, Vec::new()) })
