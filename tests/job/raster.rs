@@ -146,10 +146,15 @@ fn cells_have_the_heights_of_the_triangles_in_any_tiling() {
         let first = run(Job::on(&files).tiles_of(400).threads(1));
         let covered = has_the_heights_of_the_triangles(&first, side);
         let all = raster(&first).images[0].cells.len();
-        assert!(covered > all / 3 && covered < all, "{covered} of {all}");
+        assert!(covered > 1_000 && covered < all, "{covered} of {all}");
         for other in [run(Job::on(&files).tiles_of(2_000).threads(2)), run(in_parts(&files, 1_500))] {
             assert!(bytes(&other) == bytes(&first), "{options}");
             other.verified();
+        }
+        if side == 1500.0 {
+            let by_tasks = with_raster(in_parts(&files, 1_500), options).with("output", more);
+            by_tasks.run_with(&["submit", "--engine", "local", "--tasks", "2"]).succeeded();
+            assert!(bytes(&by_tasks) == bytes(&first), "by tasks");
         }
     }
 }
@@ -181,8 +186,9 @@ fn points_at_the_centres_are_the_cells() {
 
 #[test]
 fn overviews_are_means_of_the_heights_below() {
+    let strip: Cloud = hills(20_000, 3).into_iter().filter(|point| point[1] < 1_000).collect();
     let folder = tempfile::tempdir().unwrap();
-    let cloud = clouds::write(folder.path(), "cloud.csv", &hills(5_000, 3));
+    let cloud = clouds::write(folder.path(), "cloud.csv", &strip);
     let job = |threads: usize, memory: &str| {
         let job = with_raster(Job::on(&[&cloud]).tiles_of(1_000), "resolution = 9.0").threads(threads);
         let job = job.with("limits", &format!("memory = \"{memory}\""));

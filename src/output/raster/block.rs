@@ -4,17 +4,35 @@
 
 use crate::output::raster::BLOCK;
 use crate::output::raster::options::RasterCompression;
-use miniz_oxide::deflate::compress_to_vec_zlib;
+use miniz_oxide::deflate::core::{
+    CompressionStrategy, CompressorOxide, TDEFLFlush, compress_to_output, create_comp_flags_from_zip_params,
+};
 
-/// Higher levels take far more time and save little: the last bits of heights are as good as random.
-const LEVEL: u8 = 4;
+/// Any level from 1 on gives the same bytes with the strategy below.
+const LEVEL: i32 = 6;
+
+/// A header and a checksum around the data, as TIFF wants it.
+const WITH_HEADER: i32 = 15;
 
 /// Returns the bytes of a block of [`BLOCK`] rows and columns in a file.
 pub(crate) fn packed(cells: &[f32], compression: RasterCompression) -> Vec<u8> {
     match compression {
-        RasterCompression::Deflate => compress_to_vec_zlib(&predicted(cells), LEVEL),
+        RasterCompression::Deflate => deflated(&predicted(cells)),
         RasterCompression::None => cells.iter().flat_map(|cell| cell.to_le_bytes()).collect(),
     }
+}
+
+/// Returns the bytes, packed. The coder looks for runs of one byte and for nothing else that repeats: the last bits of heights are as good as
+/// random. That takes half the time of its fourth level and gives as many bytes, within a hundredth.
+fn deflated(bytes: &[u8]) -> Vec<u8> {
+    let flags = create_comp_flags_from_zip_params(LEVEL, WITH_HEADER, CompressionStrategy::RLE as i32);
+    let (mut coder, mut packed) = (CompressorOxide::new(flags), Vec::with_capacity(bytes.len()));
+    // It fails only if its output is refused.
+    compress_to_output(&mut coder, bytes, TDEFLFlush::Finish, |output| {
+        packed.extend_from_slice(output);
+        true
+    });
+    packed
 }
 
 /// Returns the bytes of every row by their place in their number, the first those with the sign, and each byte as the difference to the one
