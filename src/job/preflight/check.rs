@@ -33,6 +33,9 @@ pub struct Preflight {
     pub kept: u64,
     /// About how many tiles.
     pub tiles: u64,
+    /// About how many columns and rows of the raster, if there is to be one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub raster: Option<[u32; 2]>,
     /// Steps of the lattice in x and y, and in z.
     pub resolution: [String; 2],
     /// Width and height in source units.
@@ -123,6 +126,8 @@ impl Preflight {
             records: plan.records,
             kept: kept.0,
             tiles: estimate::tiles(plan, kept),
+            // No job begins with a raster that cannot be made.
+            raster: check_raster(plan).ok().flatten().map(|grid| grid.size()),
             resolution: [plan.lattice.resolution.to_string(), plan.lattice.resolution_z.to_string()],
             size: [0, 1].map(|axis| plan.extent.extent(axis) as f64 * resolution),
             unit: plan.unit.clone(),
@@ -198,6 +203,9 @@ impl fmt::Display for Preflight {
             row("points kept", format!("about {} or fewer", grouped(self.kept)))?;
         }
         row("tiles", format!("about {}", grouped(self.tiles)))?;
+        if let Some([columns, rows]) = self.raster {
+            row("raster", format!("about {} x {} cells", grouped(columns.into()), grouped(rows.into())))?;
+        }
         row("area", format!("{:.1} x {:.1} {}", self.size[0], self.size[1], self.unit))?;
         row("lattice step", format!("{} (z {})", self.resolution[0], self.resolution[1]))?;
         row("crs", self.crs.clone().unwrap_or_else(|| "none".into()))?;

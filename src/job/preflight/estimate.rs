@@ -9,6 +9,7 @@ use crate::job::plan::budget::{BYTES_PER_LEAF_SITE, read_buffer_memory};
 use crate::job::plan::job_plan::Plan;
 use crate::job::preflight::kept_points::KeptPoints;
 use crate::job::publish::raster::check::check_raster;
+use crate::job::publish::raster::write_raster::raster_memory;
 use crate::output::Compression;
 use crate::output::attributes::AttributeChoice;
 use crate::output::options::{MaxEdge, OutputOptions};
@@ -143,7 +144,7 @@ pub(crate) fn memory(plan: &Plan, kept: KeptPoints, threads: usize) -> u64 {
     let leaves = per_tile.min(points) * BYTES_PER_LEAF_SITE * threads as u64;
     let levels = level_memory(options, points, threads);
     let buffers = buffer_bytes(points, per_tile, read_buffer_memory(options));
-    PROCESS_MEMORY + leaves.max(levels).max(buffers)
+    PROCESS_MEMORY + leaves.max(levels).max(buffers).max(raster_memory(plan, threads))
 }
 
 fn level_memory(options: &JobOptions, points: u64, threads: usize) -> u64 {

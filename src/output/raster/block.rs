@@ -8,7 +8,7 @@ use miniz_oxide::deflate::core::{
     CompressionStrategy, CompressorOxide, TDEFLFlush, compress_to_output, create_comp_flags_from_zip_params,
 };
 
-/// Any level from 1 on gives the same bytes with the strategy below.
+/// With the strategy below it only says that a run may begin a byte later if it is longer then.
 const LEVEL: i32 = 6;
 
 /// A header and a checksum around the data, as TIFF wants it.

@@ -5,7 +5,7 @@ use crate::job::durable::directory::JobDirectory;
 use crate::job::index::TileIndex;
 use crate::job::plan::budget::working_memory;
 use crate::job::plan::job_plan::Plan;
-use crate::job::publish::raster::check::grid_over;
+use crate::job::publish::raster::check::{check_raster, grid_over};
 use crate::job::publish::raster::pyramid::{Pyramid, TileCells};
 use crate::job::publish::raster::system::{system_of, system_warning};
 use crate::job::publish::raster::tile_meshes::{boxes, lattice_mesh};
@@ -130,9 +130,22 @@ impl<'a> RasterWork<'a> {
     }
 }
 
+/// Returns about how many bytes of memory drawing the raster of a job takes on so many threads, besides the tiles that are read.
+pub(crate) fn raster_memory(plan: &Plan, threads: usize) -> u64 {
+    // A block, its bytes by their places, and as it is packed.
+    const BLOCK_COPIES: usize = 3;
+    // No job begins with a raster that cannot be made.
+    let Ok(Some(grid)) = check_raster(plan) else { return 0 };
+    let level = window_level(working_memory(&plan.options)).min(grid.levels().len() - 1);
+    window_bytes(level) + (threads * BLOCK_COPIES * BLOCK * BLOCK * size_of::<f32>()) as u64
+}
+
+/// Returns the bytes of a window with the cells of a block of this level, and of its overviews, which take a third of it together.
+fn window_bytes(level: usize) -> u64 {
+    ((BLOCK as u64) << level).pow(2) * size_of::<f32>() as u64 / 3 * 4
+}
+
 /// Returns the level of which one block has the cells of a window, for a job with so much memory for work.
 fn window_level(memory: u64) -> usize {
-    // The overviews of a window take a third of it together.
-    let bytes = |level: usize| ((BLOCK as u64) << level).pow(2) * size_of::<f32>() as u64 * 4 / 3;
-    (0..=HIGHEST_WINDOW).rev().find(|level| bytes(*level) <= memory / WINDOW_SHARE).unwrap_or(0)
+    (0..=HIGHEST_WINDOW).rev().find(|level| window_bytes(*level) <= memory / WINDOW_SHARE).unwrap_or(0)
 }
