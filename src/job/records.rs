@@ -54,7 +54,9 @@ pub enum JobStep {
     Level(NodeIndex),
     /// Makes all coarser tiles of a part.
     Levels,
-    /// Writes what is beside the tiles, except the report.
+    /// Writes the raster of heights.
+    Raster,
+    /// Writes what is beside the tiles, except the raster and the report.
     Publish,
     /// Writes the report: the job is complete.
     Report,

@@ -117,6 +117,11 @@ impl OutputFiles {
         self.directory.join("preview.pgw")
     }
 
+    /// Returns the raster of heights.
+    pub fn raster(&self) -> PathBuf {
+        self.directory.join("terrain.tif")
+    }
+
     /// Returns the page that shows the terrain in a browser.
     pub fn page(&self) -> PathBuf {
         self.directory.join("index.html")

@@ -257,7 +257,7 @@ impl Frame {
             Some(curvature) => curvature.flat(moved, steps),
             None => [0, 1, 2].map(|k| moved[k] / steps[k]),
         };
-        let point = flat.map(f64::round);
+        let point = flat.map(nearest);
         let is_there = point.iter().all(|v| v.abs() <= i32::MAX as f64);
         let point = point.map(|v| v as i32);
         (is_there && self.world(point) == world).then_some(point)

@@ -1,4 +1,4 @@
-//! Writes the terrain: glTF tiles, one scene of all tiles, 3D Tiles, the georeference and a picture.
+//! Writes the terrain: glTF tiles, one scene of all tiles, 3D Tiles, the georeference, a raster of heights and a picture.
 //!
 //! [`frame::Frame`] says where a lattice point lies in a glTF scene. All code that writes or reads positions asks it.
 
@@ -17,6 +17,7 @@ pub mod normals;
 pub mod options;
 pub mod page;
 pub mod preview;
+pub mod raster;
 pub mod tile;
 pub mod tiles3d;
 

@@ -4,6 +4,7 @@ use crate::output::attributes::AttributeChoice;
 use crate::output::compression::{Compression, CompressionChoice};
 use crate::output::geoid::option::HeightOffset;
 use crate::output::page::{NOT_BUILT_IN, is_built_in};
+use crate::output::raster::options::RasterOptions;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::path::PathBuf;
@@ -50,6 +51,9 @@ pub struct OutputOptions {
     /// Whether a page that shows the terrain is written beside it.
     #[serde(default, deserialize_with = "page")]
     pub page: bool,
+    /// The raster of heights, if there is to be one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub raster: Option<RasterOptions>,
 }
 
 impl OutputOptions {

@@ -40,6 +40,7 @@ mod messages;
 mod overlap;
 mod parts;
 mod preflight;
+mod raster;
 mod real;
 mod same_mesh;
 mod shortage;

@@ -23,6 +23,7 @@ mod lock;
 mod many_tiles;
 mod places;
 mod power;
+mod raster;
 mod read_errors;
 mod signals;
 mod tasks;

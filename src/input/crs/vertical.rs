@@ -1,6 +1,6 @@
 //! The system that heights count in.
 
-use crate::input::crs::codes::{height_datum, heights};
+use crate::input::crs::codes::{HeightCode, height_datum, heights};
 use crate::input::crs::unit::Unit;
 use crate::input::crs::wkt::{WktNode, comparable_name};
 use serde::{Deserialize, Serialize};
@@ -72,6 +72,20 @@ impl VerticalSystem {
     pub(crate) fn metres_of_code(&self) -> Option<f64> {
         // By way of the unit, two ways to round a foot are one.
         Unit::from_metres(heights().get(&self.epsg?).map(|code| code.metres)).metres_per_unit()
+    }
+
+    /// Returns the code of the system, for heights in a unit of so many metres: its own, or else that of the system with its datum, its
+    /// direction and this unit. `None` if no code, or name, of it is known.
+    pub(crate) fn system_code(&self, metres: f64) -> Option<u32> {
+        let fits = |code: &HeightCode| {
+            (code.metres - metres).abs() < 1e-8 && self.is_depth().unwrap_or(false) == code.is_depth
+        };
+        if let Some(code) = self.epsg.filter(|code| heights().get(code).is_some_and(fits)) {
+            return Some(code);
+        }
+        let datum = self.keys().iter().find_map(|key| key.parse::<u32>().ok())?;
+        let of_datum = heights().iter().filter(|(_, code)| code.datum == datum && fits(code));
+        of_datum.map(|(code, _)| *code).min()
     }
 
     /// Returns the name for messages.

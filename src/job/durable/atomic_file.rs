@@ -75,9 +75,12 @@ pub fn find_pending(path: &Path) -> Result<PendingFile> {
 
 /// Returns the name under which the file at `path` waits until it is whole.
 pub fn partial_path(path: &Path) -> PathBuf {
-    // A world file has the name of its picture but for the ending.
-    let is_world_file = path.extension().is_some_and(|ending| ending == "pgw");
-    path.with_extension(if is_world_file { "pgw.partial" } else { "partial" })
+    // A world file has the name of its picture but for the ending, and the raster that of the scene of all tiles.
+    path.with_extension(match path.extension() {
+        Some(ending) if ending == "pgw" => "pgw.partial",
+        Some(ending) if ending == "tif" => "tif.partial",
+        _ => "partial",
+    })
 }
 
 /// How many threads wait for the disk at the same time.

@@ -96,6 +96,11 @@ impl JobDirectory {
         self.job.join("plan.json")
     }
 
+    /// Returns the path of the file in which the blocks of the raster wait.
+    pub fn raster_blocks(&self) -> PathBuf {
+        self.job.join("raster.blocks")
+    }
+
     /// Returns the path of the journal of finished steps.
     pub fn journal(&self) -> PathBuf {
         self.job.join("journal")

@@ -35,6 +35,7 @@ impl Leftovers {
             output.georeference(),
             output.preview(),
             output.preview_world(),
+            output.raster(),
         ];
         // People give their own pages this name too.
         if !is_page_of_others(output)? {

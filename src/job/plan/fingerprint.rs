@@ -67,6 +67,9 @@ pub struct Fingerprint {
     pub memory: u64,
 }
 
+/// The name of the raster's options among those of the style. No tile depends on them.
+const RASTER: &str = "[output] raster";
+
 /// What to do about a job that is no longer what tasks planned.
 pub(crate) const PLAN_AGAIN: &str = "run the phase plan again, or let gdt-batch submit do it";
 
@@ -75,6 +78,8 @@ pub(crate) const PLAN_AGAIN: &str = "run the phase plan again, or let gdt-batch 
 pub enum JobChange {
     /// In nothing that matters.
     Nothing,
+    /// In the raster alone, which is made from the finished tiles: the text says in what.
+    Raster(String),
     /// In the style of its tiles: the text says in what.
     Style(String),
     /// In its mesh: the text says in what.
@@ -124,7 +129,7 @@ impl Fingerprint {
         match without_times(self).since(&without_times(planned)) {
             JobChange::Nothing if self.memory == planned.memory => None,
             JobChange::Nothing => Some("[limits] memory".into()),
-            JobChange::Style(what) | JobChange::Mesh(what) => Some(what),
+            JobChange::Raster(what) | JobChange::Style(what) | JobChange::Mesh(what) => Some(what),
         }
     }
 
@@ -182,6 +187,7 @@ impl Fingerprint {
         let style = changed_values(&earlier.style, &self.style);
         match (mesh.is_empty(), style.is_empty()) {
             (false, _) => JobChange::Mesh(first_few(mesh)),
+            (true, false) if style.iter().all(|name| name == RASTER) => JobChange::Raster(first_few(style)),
             (true, false) => JobChange::Style(first_few(style)),
             (true, true) => JobChange::Nothing,
         }

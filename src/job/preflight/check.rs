@@ -16,6 +16,7 @@ use crate::job::preflight::kept_points::{KeptPoints, has_filter};
 use crate::job::progress::number_text::{grouped, mebibytes};
 use crate::job::publish::height_offset_check::check_height_offset;
 use crate::job::publish::one_file_limits::MAX_TRIANGLES_IN_ONE_FILE;
+use crate::job::publish::raster::check::check_raster;
 use crate::job::report::skipped_inputs::write_skipped;
 use crate::{Error, Result, Warnings, address_space};
 use serde::Serialize;
@@ -33,6 +34,9 @@ pub struct Preflight {
     pub kept: u64,
     /// About how many tiles.
     pub tiles: u64,
+    /// About how many columns and rows of the raster, if there is to be one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub raster: Option<[u32; 2]>,
     /// Steps of the lattice in x and y, and in z.
     pub resolution: [String; 2],
     /// Width and height in source units.
@@ -84,6 +88,7 @@ pub fn check(options: &JobOptions) -> Result<Preflight> {
     check_results_are_ours(&directory, options.output.page)?;
     let plan = Parts::cut_or_whole(make_plan(options, LatticeCoarsening::default())?);
     check_height_offset(&plan)?;
+    check_raster(&plan)?;
     let threads = workers(options, plan.records)?;
     if has_filter(&plan) {
         closer_look(&plan, threads)
@@ -125,6 +130,8 @@ impl Preflight {
             records: plan.records,
             kept: kept.0,
             tiles: estimate::tiles(plan, kept),
+            // No job begins with a raster that cannot be made.
+            raster: check_raster(plan).ok().flatten().map(|grid| grid.size()),
             resolution: [plan.lattice.resolution.to_string(), plan.lattice.resolution_z.to_string()],
             size: [0, 1].map(|axis| plan.extent.extent(axis) as f64 * resolution),
             unit: plan.unit.clone(),
@@ -201,6 +208,9 @@ impl fmt::Display for Preflight {
             row("points kept", format!("about {} or fewer", grouped(self.kept)))?;
         }
         row("tiles", format!("about {}", grouped(self.tiles)))?;
+        if let Some([columns, rows]) = self.raster {
+            row("raster", format!("about {} x {} cells", grouped(columns.into()), grouped(rows.into())))?;
+        }
         row("area", format!("{:.1} x {:.1} {}", self.size[0], self.size[1], self.unit))?;
         row("lattice step", format!("{} (z {})", self.resolution[0], self.resolution[1]))?;
         row("crs", self.crs.clone().unwrap_or_else(|| "none".into()))?;

@@ -8,10 +8,13 @@ use crate::job::partition::tree_builder::buffer_bytes;
 use crate::job::plan::budget::{BYTES_PER_LEAF_SITE, read_buffer_memory};
 use crate::job::plan::job_plan::Plan;
 use crate::job::preflight::kept_points::KeptPoints;
+use crate::job::publish::raster::check::check_raster;
+use crate::job::publish::raster::write_raster::raster_memory;
 use crate::output::Compression;
 use crate::output::attributes::AttributeChoice;
 use crate::output::options::{MaxEdge, OutputOptions};
 use crate::output::preview::canvas::{LONGER_SIDE, PreviewPixel};
+use crate::output::raster::options::RasterCompression;
 use std::path::PathBuf;
 
 /// Bytes that the packed point file takes for a point; 9 to 10 where points are dense.
@@ -63,20 +66,22 @@ impl DiskEstimate {
         let (point_file, leaves) = (points * (BYTES_PER_POINT + intensity), points * (STORE_PER_SITE + intensity));
         let border = border_bytes(points, options.triangulation.max_points_per_tile.0, tiles);
         let store = leaves + border;
-        let results = result_bytes(points, tiles, &options.output, max_one_file);
+        let raster = raster_bytes(plan);
+        let results = result_bytes(points, tiles, &options.output, max_one_file) + raster;
         if plan.is_one_part() && options.limits.keep_steps.keeps(points) {
             // The points may go before the results come.
             return DiskEstimate {
-                temporary: point_file + store,
+                temporary: point_file.max(raster) + store,
                 store,
                 results,
-                least: store + point_file.max(results),
+                least: store + point_file.max(results + raster),
             };
         }
         // Points go while the store grows, and leaves while the results grow.
         let most =
             if options.output.max_edge == MaxEdge::Auto { store } else { border + waiting_leaves(plan, leaves, tiles) };
-        DiskEstimate { temporary: point_file.max(most), store, results, least: point_file.max(most + results) }
+        let temporary = point_file.max(most + raster);
+        DiskEstimate { temporary, store, results, least: point_file.max(most + results + raster) }
     }
 }
 
@@ -119,6 +124,19 @@ fn result_bytes(points: u64, tiles: u64, output: &OutputOptions, max_one_file: u
     in_tiles + in_one_file + in_tiles / 2 + 4 * PIXELS
 }
 
+/// Returns the bytes of the raster. While it is put together, its blocks take as many once more.
+fn raster_bytes(plan: &Plan) -> u64 {
+    // No job begins with a raster that cannot be made.
+    let Ok(Some(grid)) = check_raster(plan) else { return 0 };
+    let a_cell = match plan.options.output.raster.map(|raster| raster.compression) {
+        Some(RasterCompression::None) => size_of::<f32>() as u64,
+        // Of rough terrain; smooth one takes less.
+        _ => 3,
+    };
+    // Overviews take a third more.
+    grid.cells() * a_cell / 3 * 4
+}
+
 /// Returns about how many bytes of memory the job of `plan` takes on `threads` threads.
 pub(crate) fn memory(plan: &Plan, kept: KeptPoints, threads: usize) -> u64 {
     let (options, points) = (&plan.options, kept.0);
@@ -126,7 +144,7 @@ pub(crate) fn memory(plan: &Plan, kept: KeptPoints, threads: usize) -> u64 {
     let leaves = per_tile.min(points) * BYTES_PER_LEAF_SITE * threads as u64;
     let levels = level_memory(options, points, threads);
     let buffers = buffer_bytes(points, per_tile, read_buffer_memory(options));
-    PROCESS_MEMORY + leaves.max(levels).max(buffers)
+    PROCESS_MEMORY + leaves.max(levels).max(buffers).max(raster_memory(plan, threads))
 }
 
 fn level_memory(options: &JobOptions, points: u64, threads: usize) -> u64 {

@@ -17,6 +17,7 @@ use crate::job::plan::text_inputs::text_reading;
 use crate::job::progress::clock::JobClock;
 use crate::job::progress::number_text::grouped;
 use crate::job::progress::stats::StageStats;
+use crate::job::publish::raster::write_raster::RasterStats;
 use crate::job::tiles::write_tile::TileStats;
 use crate::output::checksums::{Checksum, seal};
 use crate::voronoi::counts::STEP_NAMES;
@@ -46,6 +47,9 @@ pub struct Report {
     pub tiles: u64,
     /// The coarser tiles in `levels`.
     pub levels: LevelStats,
+    /// The raster of heights.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub raster: Option<RasterStats>,
     /// The share of the triangles that cross a border between tiles.
     pub seam_share: f64,
     /// Points that were dropped because another has the same x and y.
@@ -180,6 +184,8 @@ pub struct ReportParts {
     pub tiles: TileStats,
     /// The sum over all coarser tiles.
     pub levels: LevelStats,
+    /// The raster.
+    pub raster: Option<RasterStats>,
     /// The number of parts.
     pub parts: u64,
     /// The part that took the longest.
@@ -241,6 +247,7 @@ impl Report {
             hull_length: (parts.tiles.slivers > 0).then(|| hull_length(plan)),
             tiles: parts.tiles.files,
             levels: parts.levels,
+            raster: parts.raster,
             seam_share: parts.tiles.seam_triangles as f64 / parts.tiles.triangles.max(1) as f64,
             duplicates: parts.leaves.duplicates,
             files: plan.inputs.len(),

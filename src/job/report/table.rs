@@ -53,6 +53,10 @@ impl fmt::Display for Report {
             let levels = &self.levels;
             row("coarser tiles", format!("{}, at most {:.2} m off", grouped(levels.files), levels.error_m))?;
         }
+        if let Some(raster) = &self.raster {
+            let [columns, rows] = raster.size.map(|side| grouped(side.into()));
+            row("raster", format!("{columns} x {rows} cells, {}", precise_mebibytes(raster.bytes)))?;
+        }
         let TriangulationCounts { pipeline, reference, small, crowded, not_accepted, counts } = &self.leaves.outcome;
         let divided = small + crowded + not_accepted;
         row(

@@ -17,6 +17,7 @@ use crate::job::preflight::check::require_room;
 use crate::job::progress::clock::JobClock;
 use crate::job::progress::stage::{JobProgress, ProgressOutput};
 use crate::job::publish::height_offset_check::check_height_offset;
+use crate::job::publish::raster::check::check_raster;
 use crate::job::report::job_report::Report;
 use crate::job::run::alone::Alone;
 use crate::job::run::damage::damaged_by_tasks;
@@ -191,6 +192,7 @@ fn attempt(
         None => on_threads(workers(options, 0)?, || make_plan(options, coarsening).map(Parts::cut_or_whole))?,
     };
     check_height_offset(&plan)?;
+    check_raster(&plan)?;
     stage.advance(1);
     let planned = stage.finish();
     let progress = &JobProgress::new(run.progress, clock, stage_costs(&plan));

@@ -11,6 +11,7 @@ pub(crate) mod mesh_and_tiles;
 pub(crate) mod part_entries;
 pub(crate) mod parts;
 pub(crate) mod publish_step;
+mod raster_step;
 pub(crate) mod read_step;
 pub(crate) mod resume;
 pub(crate) mod resume_parts;

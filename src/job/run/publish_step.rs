@@ -12,10 +12,12 @@ use crate::job::progress::number_text::grouped;
 use crate::job::publish::flat_tile::FlatScene;
 use crate::job::publish::one_file_limits::{fits_one_file, too_large_for_one_file};
 use crate::job::publish::placement::{heights_warning, place, placement_warning};
+use crate::job::publish::raster::write_raster::RasterStats;
 use crate::job::publish::side_files::{EachTile, SideFiles, write_side_files};
 use crate::job::records::{JobStep, StepOutput};
 use crate::job::report::job_report::{Report, ReportParts, SlowestPart};
 use crate::job::run::levels_step::left_out_warning;
+use crate::job::run::raster_step::write_raster;
 use crate::job::run::run_context::RunContext;
 use crate::job::run::tile_queue::TileLook;
 use crate::job::tiles::style::TileStyle;
@@ -107,6 +109,7 @@ pub(crate) struct Published {
     /// Bytes of the results besides the tiles.
     pub(crate) bytes: u64,
     pub(crate) levels: LevelStats,
+    pub(crate) raster: Option<RasterStats>,
     pub(crate) warnings: Warnings,
 }
 
@@ -141,6 +144,7 @@ pub(crate) fn publish(
     look: &TileLook,
     tileset: Option<TilesetContent>,
 ) -> Result<Published> {
+    let raster = write_raster(run, plan, &look.style.frame, written.tiles)?;
     let stage = run.progress.stage("publish", 1, "job");
     let output = &plan.options.output;
     let (mut warnings, mut text, mut placement, mut stats) = (Warnings::default(), None, None, LevelStats::default());
@@ -160,6 +164,10 @@ pub(crate) fn publish(
         (placement, stats) = (placed.ok(), levels);
     }
     warnings.extend(hull_warning(plan, written.hull));
+    let raster = raster.map(|raster| {
+        warnings.extend(raster.warnings);
+        raster.stats
+    });
     let georeference = Georeference::new(&look.style.frame, &plan.lattice, bounds, &plan.unit, plan.crs.epsg);
     let tiles = &written.stats;
     let fits = fits_one_file(tiles);
@@ -189,7 +197,8 @@ pub(crate) fn publish(
     }
     stage.advance(1);
     run.add_stage(stage.finish());
-    Ok(Published { bytes, levels: stats, warnings })
+    let bytes = bytes + raster.map_or(0, |raster| raster.bytes);
+    Ok(Published { bytes, levels: stats, raster, warnings })
 }
 
 /// Writes the report, which completes the job.
@@ -213,6 +222,7 @@ pub(crate) fn write_report(run: &RunContext, plan: &Plan, mesh: MeshFigures, pub
         gpu_steps: run.triangulator.gpu_steps(),
         tiles,
         levels: published.levels,
+        raster: published.raster,
         warnings: published.warnings,
         other_bytes: published.bytes + list.bytes,
         temporary,

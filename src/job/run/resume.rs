@@ -243,6 +243,10 @@ fn review(
     let change = header.fingerprint.since(&old.fingerprint);
     match &change {
         JobChange::Nothing => {}
+        JobChange::Raster(what) => {
+            progress.note(&format!("changed since the interrupted run: {what}; the tiles stay"));
+            entries.retain(|entry| !matches!(entry.step, JobStep::Raster | JobStep::Publish | JobStep::Report));
+        }
         JobChange::Style(what) => {
             progress.note(&format!("changed since the interrupted run: {what}; the tiles are written again"));
             let is_mesh = |step| matches!(step, JobStep::Partition | JobStep::Leaf(_) | JobStep::Merge(_));
@@ -367,7 +371,7 @@ impl ResumeReview {
             JobStep::Partition | JobStep::Curve | JobStep::WriteTile(_) | JobStep::Level(_) => {
                 self.whole.contains(&step)
             }
-            JobStep::Publish => self.all_written && self.whole.contains(&step),
+            JobStep::Raster | JobStep::Publish => self.all_written && self.whole.contains(&step),
             // A run with all its results whole does not come here. Any other writes a new report, and the journal must name only one.
             JobStep::Report => false,
             // A job of one part has none of these. What a part has read stays anyway, and one that has the others is not looked at.

@@ -64,6 +64,9 @@ fn same_job_of_parts(
     let old = old.filter(|old| old.coarsening == header.coarsening && old.id != 0)?;
     match header.fingerprint.since(&old.fingerprint) {
         JobChange::Nothing => {}
+        JobChange::Raster(what) => {
+            progress.note(&format!("changed since the interrupted run: {what}; the tiles stay"));
+        }
         JobChange::Style(what) | JobChange::Mesh(what) => {
             progress.note(&format!("changed since the interrupted run: {what}; starting over"));
             return None;

@@ -2,11 +2,15 @@
 
 use crate::input::FileFormat;
 use crate::job::plan::job_plan::Plan;
+use crate::job::publish::raster::check::check_raster;
 
 /// Nanoseconds of one processor for each point, measured on autzen.laz (see BENCHMARKS.md). Only their ratios matter.
 const MESH: f64 = 740.0;
 const LEVELS: f64 = 900.0;
 const PUBLISH: f64 = 8.0;
+
+/// The same for each cell of a raster.
+const RASTER: f64 = 250.0;
 
 fn cost_of_reading(format: FileFormat) -> f64 {
     match format {
@@ -21,7 +25,15 @@ pub(crate) fn stage_costs(plan: &Plan) -> Vec<(&'static str, f64)> {
     let sources = plan.inputs.iter().map(|input| &input.source);
     let reading = sources.map(|source| source.records as f64 * cost_of_reading(source.format)).sum();
     let points = plan.records as f64;
-    vec![("read", reading), ("mesh", points * MESH), ("levels", points * LEVELS), ("publish", points * PUBLISH)]
+    // No job begins with a raster that cannot be made.
+    let cells = check_raster(plan).ok().flatten().map_or(0.0, |grid| grid.cells() as f64);
+    vec![
+        ("read", reading),
+        ("mesh", points * MESH),
+        ("levels", points * LEVELS),
+        ("raster", cells * RASTER),
+        ("publish", points * PUBLISH),
+    ]
 }
 
 /// Returns how much of the stage "mesh" is done for a tile of `points` points that is triangulated but not written.

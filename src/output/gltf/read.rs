@@ -60,8 +60,17 @@ impl TilePart {
 
 /// Reads the GLB file at `path`.
 pub fn read_tile(path: &Path) -> Result<TileFile> {
+    read(path, |document| document)
+}
+
+/// Reads the GLB file at `path`, but for normals, colours and what vertices carry of their points.
+pub fn read_surface(path: &Path) -> Result<TileFile> {
+    read(path, TileDocument::bare)
+}
+
+fn read(path: &Path, wanted: impl FnOnce(TileDocument) -> TileDocument) -> Result<TileFile> {
     let mut file = GlbFile::open(path)?;
-    let document = read_document(path, &file)?;
+    let document = wanted(read_document(path, &file)?);
     let binary = file.binary(path)?;
     let mut decoder = Decoder { document: &document, binary: &binary, used: 0 };
     decoder.tile().map_err(|what| Error::input(path, format!("not a tile of this program: {what}")))
@@ -150,6 +159,22 @@ impl TileDocument {
             elements: document.accessors().map(|accessor| Elements::new(&accessor?)).collect::<Decoded<_>>()?,
             views: document.buffer_views().map(|view| StrideView::new(&view?)).collect::<Decoded<_>>()?,
         })
+    }
+}
+
+impl TileDocument {
+    /// Returns the document with positions and triangles alone.
+    fn bare(mut self) -> TileDocument {
+        let bare = |&Surface { positions, indices, .. }: &Surface| Surface {
+            positions,
+            normals: None,
+            colors: None,
+            classification: None,
+            intensity: None,
+            indices,
+        };
+        self.meshes.iter_mut().flatten().for_each(|surface| *surface = bare(surface));
+        self
     }
 }
 

@@ -11,6 +11,7 @@ use crate::job::preflight::check::require_room;
 use crate::job::progress::clock::JobClock;
 use crate::job::progress::stage::JobProgress;
 use crate::job::publish::height_offset_check::check_height_offset;
+use crate::job::publish::raster::check::check_raster;
 use crate::job::run::alone::Alone;
 use crate::job::run::attempt::{coarsening_of, read_earlier};
 use crate::job::run::finished::known_submission;
@@ -44,6 +45,7 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> Result<Option<Strin
         None => on_threads(workers(options, 0)?, || make_plan(options, coarsening).map(Parts::cut_or_whole))?,
     };
     check_height_offset(&plan)?;
+    check_raster(&plan)?;
     note_skipped(&plan.skipped, &JobProgress::new(run.progress, JobClock::start(), Vec::new()));
     let threads = workers(options, plan.records)?;
     if !run.force {

@@ -1,0 +1,151 @@
+//! Writing `terrain.tif`.
+
+use crate::geometry::Bounds;
+use crate::job::durable::directory::JobDirectory;
+use crate::job::index::TileIndex;
+use crate::job::plan::budget::working_memory;
+use crate::job::plan::job_plan::Plan;
+use crate::job::publish::raster::check::{check_raster, grid_over};
+use crate::job::publish::raster::pyramid::{Pyramid, TileCells};
+use crate::job::publish::raster::system::{system_of, system_warning};
+use crate::job::publish::raster::tile_meshes::{boxes, lattice_mesh};
+use crate::job::publish::raster::waiting_blocks::WaitingBlocks;
+use crate::job::publish::side_files::EachTile;
+use crate::job::records::StepOutput;
+use crate::output::frame::Frame;
+use crate::output::raster::BLOCK;
+use crate::output::raster::block::packed;
+use crate::output::raster::geotiff::{RasterHead, head};
+use crate::output::raster::grid::{RasterGrid, blocks};
+use crate::output::raster::options::RasterOptions;
+use crate::output::raster::window::{HeightScale, Window};
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::sync::atomic::AtomicU64;
+
+/// The most levels that are drawn in one window, whose side is 512 times two to the power of this.
+const HIGHEST_WINDOW: usize = 3;
+
+/// A window, with its overviews, may take this part of the memory for work.
+const WINDOW_SHARE: u64 = 4;
+
+/// What came of a raster.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct RasterStats {
+    /// Columns and rows.
+    pub size: [u32; 2],
+    /// Bytes of the file.
+    pub bytes: u64,
+    /// Cells whose height is just the number for none.
+    pub same_as_nodata: u64,
+}
+
+/// A raster that is to be written.
+pub struct RasterWork<'a> {
+    plan: &'a Plan,
+    options: RasterOptions,
+    frame: &'a Frame,
+    grid: RasterGrid,
+    tiles: Vec<TileCells>,
+}
+
+impl<'a> RasterWork<'a> {
+    /// Looks at what is to be done for the raster of a job whose tiles have the scene of `frame`; `None` if the user wants none.
+    ///
+    /// # Errors
+    /// [`Error::Io`] or [`Error::Broken`] on a store, [`Error::Config`] if there are too many cells.
+    pub fn of(plan: &'a Plan, frame: &'a Frame, tiles: &dyn EachTile) -> Result<Option<RasterWork<'a>>> {
+        let Some(options) = plan.options.output.raster else { return Ok(None) };
+        let boxes = boxes(tiles)?;
+        let all = boxes.iter().map(|tile| tile.bounds).reduce(Bounds::union);
+        let all = all.ok_or_else(|| Error::Broken("there is no tile to make a raster of".into()))?;
+        let grid = grid_over(plan, &options, all)?;
+        let tiles = boxes.iter().filter_map(|tile| {
+            let [columns, rows] = grid.cells_within(tile.bounds);
+            (columns[0] < columns[1] && rows[0] < rows[1]).then_some(TileCells { tile: tile.tile, columns, rows })
+        });
+        Ok(Some(RasterWork { plan, options, frame, tiles: tiles.collect(), grid }))
+    }
+
+    /// Returns the number of blocks of the raster itself.
+    pub fn blocks(&self) -> u64 {
+        blocks(self.grid.size()).into_iter().map(|count| count as u64).product()
+    }
+
+    /// Writes the raster from the tiles, which must have their names. Calls `done` for each block that has a height.
+    ///
+    /// # Errors
+    /// [`Error::Io`] or [`Error::Input`] on a file, [`Error::Interrupted`].
+    pub fn write(&self, directory: &JobDirectory, done: &(dyn Fn() + Sync)) -> Result<StepOutput<RasterStats>> {
+        let levels = self.grid.levels();
+        let waiting = WaitingBlocks::create(&directory.raster_blocks(), &levels)?;
+        let window_level = window_level(working_memory(&self.plan.options)).min(levels.len() - 1);
+        let read = |tile: TileIndex| lattice_mesh(&directory.output().tile(tile.number()), self.frame);
+        let pyramid = Pyramid {
+            options: self.options,
+            levels,
+            window_level,
+            read: &read,
+            blocks: &waiting,
+            done,
+            same_as_nodata: AtomicU64::new(0),
+        };
+        let mut window = Window::new(&self.grid, self.heights(), BLOCK << window_level);
+        pyramid.draw(&mut window, &self.tiles)?;
+        drop(window);
+        let Pyramid { levels, same_as_nodata, .. } = pyramid;
+        let nodata = self.options.nodata.number();
+        let blocks = waiting.finish(packed(&vec![nodata; BLOCK * BLOCK], self.options.compression));
+        let system = system_of(self.plan);
+        let about = RasterHead {
+            options: self.options,
+            corner: self.grid.corner(),
+            cell_size: self.grid.cell_size(),
+            system: &system,
+            copyright: self.plan.options.output.copyright(),
+        };
+        let head = head(&about, &blocks.images(&levels));
+        let file = blocks.write(&head, &directory.output().raster())?;
+        let stats =
+            RasterStats { size: self.grid.size(), bytes: file.bytes, same_as_nodata: same_as_nodata.into_inner() };
+        Ok(StepOutput { files: vec![file], ..StepOutput::new(stats, Vec::new()) })
+    }
+
+    fn heights(&self) -> HeightScale {
+        let extras = self.frame.extras();
+        HeightScale { offset: extras.offset[2], step: extras.resolution_z }
+    }
+
+    /// Returns what the user should know of the raster.
+    pub fn warnings(&self, stats: &RasterStats) -> Vec<String> {
+        let same = (stats.same_as_nodata > 0).then(|| {
+            format!(
+                "{} cells of terrain.tif have the height {}, which stands for none there: set another [output.raster] nodata",
+                stats.same_as_nodata,
+                self.options.nodata.number()
+            )
+        });
+        let system = system_warning(&self.plan.crs, &system_of(self.plan));
+        same.into_iter().chain(system).collect()
+    }
+}
+
+/// Returns about how many bytes of memory drawing the raster of a job takes on so many threads, besides the tiles that are read.
+pub(crate) fn raster_memory(plan: &Plan, threads: usize) -> u64 {
+    // A block, its bytes by their places, and as it is packed.
+    const BLOCK_COPIES: usize = 3;
+    // No job begins with a raster that cannot be made.
+    let Ok(Some(grid)) = check_raster(plan) else { return 0 };
+    let level = window_level(working_memory(&plan.options)).min(grid.levels().len() - 1);
+    window_bytes(level) + (threads * BLOCK_COPIES * BLOCK * BLOCK * size_of::<f32>()) as u64
+}
+
+/// Returns the bytes of a window with the cells of a block of this level, and of its overviews, which take a third of it together.
+fn window_bytes(level: usize) -> u64 {
+    ((BLOCK as u64) << level).pow(2) * size_of::<f32>() as u64 / 3 * 4
+}
+
+/// Returns the level of which one block has the cells of a window, for a job with so much memory for work.
+fn window_level(memory: u64) -> usize {
+    (0..=HIGHEST_WINDOW).rev().find(|level| window_bytes(*level) <= memory / WINDOW_SHARE).unwrap_or(0)
+}

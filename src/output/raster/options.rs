@@ -1,0 +1,124 @@
+//! The options of `[output.raster]`.
+
+use crate::geometry::lattice::shortest_decimal;
+use rust_decimal::Decimal;
+use serde::{Deserialize, Serialize};
+
+/// `[output.raster]`: the terrain as a raster of heights.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RasterOptions {
+    /// The side of a cell.
+    pub resolution: CellSize,
+    /// How the file is packed.
+    #[serde(default)]
+    pub compression: RasterCompression,
+    /// What cells without a height hold.
+    #[serde(default)]
+    pub nodata: Nodata,
+}
+
+/// The side of a cell in source units: a positive decimal.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "toml::Value", into = "toml::Value")]
+pub struct CellSize {
+    exact: Decimal,
+    /// The number that the user wrote.
+    written: f64,
+}
+
+impl CellSize {
+    /// Returns the exact decimal.
+    pub fn exact(self) -> Decimal {
+        self.exact
+    }
+
+    /// Returns the nearest number.
+    pub fn number(self) -> f64 {
+        self.written
+    }
+}
+
+impl TryFrom<toml::Value> for CellSize {
+    type Error = String;
+
+    fn try_from(value: toml::Value) -> Result<CellSize, String> {
+        let written = match value {
+            toml::Value::Integer(i) => i as f64,
+            toml::Value::Float(f) => f,
+            _ => 0.0,
+        };
+        let exact = shortest_decimal(written).filter(|exact| *exact > Decimal::ZERO);
+        let exact = exact.ok_or("resolution is the side of a cell in source units, a positive number such as 0.5")?;
+        Ok(CellSize { exact, written })
+    }
+}
+
+impl From<CellSize> for toml::Value {
+    fn from(size: CellSize) -> toml::Value {
+        toml::Value::Float(size.written)
+    }
+}
+
+/// How the blocks of the file are packed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RasterCompression {
+    /// DEFLATE after the predictor for floating-point numbers, without loss.
+    #[default]
+    Deflate,
+    /// Plain numbers.
+    None,
+}
+
+/// What cells without a height hold.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "toml::Value", into = "toml::Value")]
+pub struct Nodata(f32);
+
+impl Default for Nodata {
+    /// Programs that know no NaN know this number, and no terrain is there.
+    fn default() -> Nodata {
+        Nodata(-9999.0)
+    }
+}
+
+impl Nodata {
+    /// Returns the number.
+    pub fn number(self) -> f32 {
+        self.0
+    }
+
+    /// Returns the number as GDAL writes it into a file.
+    pub(crate) fn text(self) -> String {
+        if self.0.is_nan() { "nan".into() } else { f64::from(self.0).to_string() }
+    }
+}
+
+impl TryFrom<toml::Value> for Nodata {
+    type Error = String;
+
+    fn try_from(value: toml::Value) -> Result<Nodata, String> {
+        let number = match value {
+            toml::Value::Integer(i) => i as f32,
+            toml::Value::Float(f) if f.is_nan() => f32::NAN,
+            toml::Value::Float(f) => f as f32,
+            toml::Value::String(text) if text == "nan" => f32::NAN,
+            _ => f32::INFINITY,
+        };
+        match number.is_infinite() {
+            true => Err("nodata is a number that single precision can hold, such as -9999, or \"nan\"".into()),
+            false => Ok(Nodata(number)),
+        }
+    }
+}
+
+impl From<Nodata> for toml::Value {
+    fn from(nodata: Nodata) -> toml::Value {
+        match nodata.0.is_nan() {
+            // JSON, in which plans are written, has no such number.
+            true => toml::Value::String("nan".into()),
+            false => toml::Value::Float(f64::from(nodata.0)),
+        }
+    }
+}

@@ -1,0 +1,297 @@
+//! `[output.raster]`: every cell has the height of the triangle at its centre, whatever the tiles, threads and parts.
+
+use std::fs::{self, File};
+use std::io::BufReader;
+
+use gdt_batch::output::gltf::read::read_tile;
+use serde_json::Value;
+use tiff::decoder::{Decoder, DecodingResult};
+use tiff::tags::Tag;
+
+use crate::clouds::{self, Cloud};
+use crate::coordinate_systems::{keys, warnings, write};
+use crate::levels::hills;
+use crate::parts::{in_files, in_parts};
+use crate::program::{Job, gdt_batch, number};
+use crate::tileset::files_below;
+
+/// An image of a raster.
+#[derive(Debug)]
+struct Image {
+    width: usize,
+    height: usize,
+    cells: Vec<f32>,
+}
+
+/// A raster as another reader sees it: the raster itself, then its overviews.
+struct Raster {
+    images: Vec<Image>,
+    /// The x of the western and the y of the northern edge.
+    corner: [f64; 2],
+    nodata: String,
+    keys: Vec<u32>,
+}
+
+fn bytes(job: &Job) -> Vec<u8> {
+    fs::read(job.out().join("terrain.tif")).unwrap()
+}
+
+fn raster(job: &Job) -> Raster {
+    let mut decoder = Decoder::new(BufReader::new(File::open(job.out().join("terrain.tif")).unwrap())).unwrap();
+    let place = decoder.get_tag_f64_vec(Tag::Unknown(33922)).unwrap();
+    let mut raster = Raster {
+        images: Vec::new(),
+        corner: [place[3], place[4]],
+        nodata: decoder.get_tag_ascii_string(Tag::Unknown(42113)).unwrap(),
+        keys: decoder.get_tag_u32_vec(Tag::Unknown(34735)).unwrap(),
+    };
+    loop {
+        let (width, height) = decoder.dimensions().unwrap();
+        let DecodingResult::F32(cells) = decoder.read_image().unwrap() else { panic!("not of single precision") };
+        let [width, height] = [width, height].map(|side| side as usize);
+        raster.images.push(Image { width, height, cells });
+        if !decoder.more_images() {
+            return raster;
+        }
+        decoder.next_image().unwrap();
+    }
+}
+
+/// Returns the triangles of all tiles, in the source's coordinates.
+fn triangles(job: &Job) -> Vec<[[f64; 3]; 3]> {
+    let text = fs::read(job.out().join("georeference.json")).unwrap();
+    let georeference: Value = serde_json::from_slice(&text).unwrap();
+    let offset = [0, 1, 2].map(|axis| georeference["offset"][axis].as_f64().unwrap());
+    let mut found = Vec::new();
+    for path in files_below(&job.out().join("tiles")) {
+        for part in read_tile(&path).unwrap().parts {
+            // The clouds have whole coordinates.
+            let corner = |v: u32| {
+                let [x, up, z] = part.world(v as usize);
+                [x + offset[0], offset[1] - z, offset[2] + up].map(f64::round)
+            };
+            found.extend(part.triangles.iter().map(|t| t.map(corner)));
+        }
+    }
+    found
+}
+
+/// Asserts that the raster of a job with cells of `side` has in every cell what the triangle at its centre says, and nothing where there is none.
+/// Returns how many cells have a height.
+#[track_caller]
+fn has_the_heights_of_the_triangles(job: &Job, side: f64) -> usize {
+    let raster = raster(job);
+    let Image { width, height, cells } = &raster.images[0];
+    assert_eq!(raster.corner.map(|edge| (edge / side).fract()), [0.0; 2], "aligned to multiples of the resolution");
+    let mut expected: Vec<Option<f64>> = vec![None; width * height];
+    for [a, b, c] in triangles(job) {
+        let span = |axis: usize| {
+            let values = [a[axis], b[axis], c[axis]];
+            values.into_iter().fold([f64::MAX, f64::MIN], |[low, high], v| [low.min(v), high.max(v)])
+        };
+        let [[west, east], [south, north]] = [span(0), span(1)];
+        let first = |from: f64, to: f64| ((from - to) / side - 1.0).max(0.0) as usize;
+        let (columns, rows) = (first(west, raster.corner[0]), first(raster.corner[1], north));
+        let past = |from: f64, to: f64, most: usize| (((to - from) / side) as usize + 2).min(most);
+        for row in rows..past(south, raster.corner[1], *height) {
+            for column in columns..past(raster.corner[0], east, *width) {
+                let x = raster.corner[0] + (column as f64 + 0.5) * side;
+                let y = raster.corner[1] - (row as f64 + 0.5) * side;
+                // Twice the areas; exact, because all numbers are short.
+                let area = |p: [f64; 3], q: [f64; 3]| (q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0]);
+                let weights = [area(b, c), area(c, a), area(a, b)];
+                if weights.iter().all(|weight| *weight >= 0.0) {
+                    let sum: f64 = weights.iter().sum();
+                    let z = (weights[0] * a[2] + weights[1] * b[2] + weights[2] * c[2]) / sum;
+                    expected[row * width + column] = Some(z);
+                }
+            }
+        }
+    }
+    let nodata: f32 = raster.nodata.parse().unwrap();
+    for (number, (found, expected)) in cells.iter().zip(&expected).enumerate() {
+        match expected {
+            // The last bits of the double may differ, and so the rounding to single precision.
+            Some(z) => assert!((f64::from(*found) - z).abs() <= z.abs() * 1.2e-7, "cell {number}: {found}, {z}"),
+            None => assert_eq!(found.to_bits(), nodata.to_bits(), "cell {number} has no triangle"),
+        }
+    }
+    expected.iter().flatten().count()
+}
+
+/// Returns a job on small tiles with a raster of these options.
+fn with_raster(job: Job, options: &str) -> Job {
+    job.with("output", &format!("raster = {{ {options} }}"))
+}
+
+#[test]
+fn cells_have_the_heights_of_the_triangles_in_any_tiling() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = in_files(folder.path(), &clouds::clusters(6_000), 100_000);
+    for (options, side, more) in [
+        ("resolution = 1500.0", 1500.0, "format = \"glb\""),
+        (
+            "resolution = 750, compression = \"none\", nodata = \"nan\"",
+            750.0,
+            "max_edge = 9000.0\ncompression = \"meshopt\"",
+        ),
+        ("resolution = 256, nodata = 0", 256.0, "hull = \"whole\"\ncompression = \"none\""),
+    ] {
+        let run = |job: Job| {
+            let job = with_raster(job, options).with("output", more);
+            let report = job.report();
+            assert!(number(&report["raster"]["bytes"]) > 0);
+            job
+        };
+        let first = run(Job::on(&files).tiles_of(400).threads(1));
+        let covered = has_the_heights_of_the_triangles(&first, side);
+        let all = raster(&first).images[0].cells.len();
+        assert!(covered > 1_000 && covered < all, "{covered} of {all}");
+        for other in [run(Job::on(&files).tiles_of(2_000).threads(2)), run(in_parts(&files, 1_500))] {
+            assert!(bytes(&other) == bytes(&first), "{options}");
+            other.verified();
+        }
+        if side == 1500.0 {
+            let by_tasks = with_raster(in_parts(&files, 1_500), options).with("output", more);
+            by_tasks.run_with(&["submit", "--engine", "local", "--tasks", "2"]).succeeded();
+            assert!(bytes(&by_tasks) == bytes(&first), "by tasks");
+        }
+    }
+}
+
+#[test]
+fn points_at_the_centres_are_the_cells() {
+    let folder = tempfile::tempdir().unwrap();
+    let points: Cloud = (0..30 * 20).map(|i| [i % 30 * 2 - 7, i / 30 * 2 + 41, (i * 7919) % 997 - 300]).collect();
+    let cloud = clouds::write(folder.path(), "cloud.csv", &points);
+    let job = with_raster(Job::on(&[&cloud]).with("output", "hull = \"whole\""), "resolution = 2, nodata = -300");
+    let report = job.report();
+    let raster = raster(&job);
+    // Of the first row: that of the northernmost points.
+    assert_eq!((raster.corner, raster.nodata.as_str()), ([-8.0, 80.0], "-300"));
+    let Image { width, height, cells } = &raster.images[0];
+    assert_eq!((*width, *height, raster.images.len()), (30, 20, 1));
+    for (i, [_, _, z]) in points.iter().enumerate() {
+        assert_eq!(cells[(19 - i / 30) * 30 + i % 30], *z as f32);
+    }
+    assert!(warnings(&report).contains("1 cells of terrain.tif have the height -300"), "{}", warnings(&report));
+    // Centres on edges and on vertices belong to no tile more than to another.
+    let other = with_raster(
+        Job::on(&[&cloud]).tiles_of(24).with("output", "hull = \"whole\""),
+        "resolution = 2, nodata = -300",
+    );
+    other.report();
+    assert!(bytes(&other) == bytes(&job));
+}
+
+#[test]
+fn overviews_are_means_of_the_heights_below() {
+    let strip: Cloud = hills(20_000, 3).into_iter().filter(|point| point[1] < 1_000).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = clouds::write(folder.path(), "cloud.csv", &strip);
+    let job = |threads: usize, memory: &str| {
+        let job = with_raster(Job::on(&[&cloud]).tiles_of(1_000), "resolution = 9.0").threads(threads);
+        let job = job.with("limits", &format!("memory = \"{memory}\""));
+        job.report();
+        job
+    };
+    // With little memory a window is smaller.
+    let (job, small) = (job(2, "1 GiB"), job(1, "128 MiB"));
+    assert!(bytes(&job) == bytes(&small));
+    let images = raster(&job).images;
+    assert!(images.len() > 3 && images[0].width > 2048, "{} x {}", images[0].width, images[0].height);
+    for pair in images.windows(2) {
+        let (fine, coarse) = (&pair[0], &pair[1]);
+        assert_eq!([coarse.width, coarse.height], [fine.width, fine.height].map(|side| side.div_ceil(2)));
+        for (number, mean) in coarse.cells.iter().enumerate() {
+            let (column, row) = (number % coarse.width * 2, number / coarse.width * 2);
+            let below = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(east, south)| (column + east, row + south));
+            let inside = below.iter().filter(|(column, row)| *column < fine.width && *row < fine.height);
+            let heights = inside.map(|(column, row)| fine.cells[row * fine.width + column]).filter(|z| *z != -9999.0);
+            let (sum, count) = heights.fold((0.0, 0.0), |(sum, count), z| (sum + f64::from(z), count + 1.0));
+            assert_eq!(*mean, if count > 0.0 { (sum / count) as f32 } else { -9999.0 });
+        }
+    }
+    let last = images.last().unwrap();
+    assert!(last.width <= 512 && last.height <= 512);
+}
+
+#[test]
+fn a_raster_has_any_size_that_a_file_can_have() {
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = clouds::write(folder.path(), "cloud.csv", &clouds::uniform(500, 2_000, 5));
+    // One cell with its centre in the terrain, and one with its centre far away.
+    for (side, is_inside) in [(2_000.0, true), (1e9, false)] {
+        let job = with_raster(Job::on(&[&cloud]), &format!("resolution = {side:?}"));
+        job.report();
+        assert_eq!(has_the_heights_of_the_triangles(&job, side), usize::from(is_inside));
+        let image = &raster(&job).images[0];
+        assert_eq!((image.width, image.height), (1, 1));
+    }
+    let job = with_raster(Job::on(&[&cloud]), "resolution = 0.0001");
+    for arguments in [&["check"][..], &[]] {
+        let said = job.run_with(arguments);
+        said.refused(2, &["resolution = 0.0001 makes 19", "GB", "at most 2^38 cells", "set 0.0039 or more"]);
+    }
+    assert!(!job.out().exists());
+    let job = with_raster(Job::on(&[&cloud]), "resolution = 1e-25");
+    job.run().refused(2, &["resolution = 0.0000000000000000000000001 makes"]);
+}
+
+#[test]
+fn a_system_and_its_heights_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    // NAD83(2011) / Minnesota and heights in US survey feet, which have the code of their datum alone.
+    let named = keys(&[[1024, 0, 1, 1], [3072, 0, 1, 26915], [4096, 0, 1, 5103], [4099, 0, 1, 9003]]);
+    let cloud = write(folder.path(), "cloud.las", &[named]);
+    let job = with_raster(Job::on(&[&cloud]), "resolution = 10");
+    job.report();
+    let keys = raster(&job).keys;
+    let value = |key: u32| keys[4..].chunks(4).find(|entry| entry[0] == key).map(|entry| entry[3]);
+    assert_eq!(keys[..3], [1, 1, 1]);
+    let expected = [(1024, 1), (1025, 1), (3072, 26915), (3076, 9001), (4096, 6360), (4099, 9003)];
+    for (key, number) in expected {
+        assert_eq!(value(key), Some(number), "{key}: {keys:?}");
+    }
+}
+
+#[test]
+fn the_raster_is_a_result_like_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = clouds::write(folder.path(), "cloud.csv", &clouds::uniform(2_000, 2_000, 9));
+    let job = with_raster(Job::on(&[&cloud]), "resolution = 5.0");
+    job.report();
+    job.verified();
+    let path = job.out().join("terrain.tif");
+    let mut changed = bytes(&job);
+    *changed.last_mut().unwrap() ^= 1;
+    fs::write(&path, changed).unwrap();
+    let verdict = gdt_batch(job.folder(), &["verify", "out"]);
+    assert!(verdict.code == 4 && verdict.out.contains("terrain.tif"), "{verdict:?}");
+    // A job that wants none removes that of the job before.
+    let text = fs::read_to_string(job.config()).unwrap();
+    let without: String =
+        text.lines().filter(|line| !line.starts_with("raster")).map(|line| format!("{line}\n")).collect();
+    fs::write(job.folder().join("job.toml"), without).unwrap();
+    gdt_batch(job.folder(), &["job.toml"]).succeeded();
+    assert!(!path.exists());
+}
+
+#[test]
+fn wrong_options_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = clouds::write(folder.path(), "cloud.csv", &clouds::uniform(500, 2_000, 5));
+    for (options, words) in [
+        ("compression = \"none\"", ["line 5", "resolution"]),
+        ("resolution = 0", ["line 5", "positive"]),
+        ("resolution = -1.5", ["line 5", "positive"]),
+        ("resolution = \"1\"", ["line 5", "positive"]),
+        ("resolution = nan", ["line 5", "positive"]),
+        ("resolution = 1, nodata = inf", ["line 5", "nodata"]),
+        ("resolution = 1, nodata = 1e40", ["line 5", "nodata"]),
+        ("resolution = 1, compression = \"lzw\"", ["line 5", "lzw"]),
+        ("resolution = 1, size = 3", ["line 5", "size"]),
+    ] {
+        with_raster(Job::on(&[&cloud]), options).run().refused(2, &words);
+    }
+}

@@ -1,0 +1,55 @@
+//! A job that is stopped while it writes its raster, or goes on with another one.
+
+use crate::rig::{Rig, Setup};
+use crate::scattered;
+
+fn with_raster(options: &str) -> Setup {
+    Setup::tiles_of(3_000).output(&format!("raster = {{ {options} }}"))
+}
+
+fn rig() -> Rig {
+    Rig::new(&scattered::uniform(10_000, 20_000, 5), &with_raster("resolution = 15.0")).committing_every(0)
+}
+
+#[test]
+fn a_raster_that_was_stopped_anywhere_ends_with_the_same_bytes() {
+    let rig = rig();
+    // While a window is drawn, and while the blocks are put together.
+    for (place, count) in [("window", 1), ("window", 8), ("waiting_blocks", 1), ("waiting_blocks", 5)] {
+        rig.forget();
+        let what = format!("signal-{place}");
+        rig.run_to(&what, count).stopped(&["error: interrupted"]);
+        rig.has_nothing_half_written(&what);
+        assert!(rig.completes(&what)["resumed"].as_u64() > Some(10));
+    }
+    // The last commits are those of the raster, of what is beside the tiles, and of the report.
+    rig.forget();
+    let mut kills = 0;
+    while rig.run_to("commit", 3 + kills % 2).was_killed() {
+        rig.has_nothing_half_written("a kill before a commit");
+        kills += 1;
+    }
+    assert!(kills > 4, "{kills} kills");
+    rig.is_complete("kills before commits");
+}
+
+#[test]
+fn another_raster_keeps_the_tiles() {
+    let mut rig = rig();
+    for options in ["resolution = 30.0", "resolution = 15.0, nodata = 0"] {
+        rig.forget();
+        rig.configure(&with_raster("resolution = 15.0"));
+        rig.run_to("signal-waiting_blocks", 2).stopped(&["error: interrupted"]);
+        rig.expect(&with_raster(options));
+        let said = rig.run().succeeded().err;
+        assert!(said.contains("[output] raster; the tiles stay"), "{said}");
+        assert!(rig.is_complete(options)["resumed"].as_u64() > Some(10));
+    }
+    // No raster at all: that of the interrupted run goes.
+    rig.forget();
+    rig.configure(&with_raster("resolution = 15.0"));
+    assert!(rig.run_to("replacing", 1).was_killed());
+    rig.completes("all results were whole");
+    rig.expect(&Setup::tiles_of(3_000));
+    rig.completes("without a raster");
+}
