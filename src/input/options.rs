@@ -95,14 +95,14 @@ impl InputOptions {
         self.chooses_classes() || self.kept_returns() != KeptReturns::All
     }
 
-    /// Returns what contradicts `surface`, if something does. `classes` may take some of the classes of the ground, and `returns` some of its
-    /// returns.
+    /// Returns what contradicts `surface`, if something does. `classes` may take some of the classes of the ground, and `returns` some
+    /// of its returns.
     pub fn contradiction(&self) -> Option<String> {
         let is_other = |class: &&u8| self.surface.classes().is_some_and(|ground| !ground.contains(class));
         if let Some(class) = self.classes.iter().flatten().find(is_other) {
             return Some(format!(
-                "surface = \"ground\" keeps ground and water (classes 2, 8, 9 and 20), and class {class} in classes is neither: leave out one \
-                 of both keys"
+                "surface = \"ground\" keeps ground and water (classes 2, 8, 9 and 20), and class {class} in classes is neither: leave out \
+                 one of both keys"
             ));
         }
         let returns = self.surface.returns();

@@ -16,8 +16,8 @@ pub fn no_ground(options: &InputOptions, counts: &PointCounts) -> Option<String>
         return None;
     }
     Some(format!(
-        "surface = \"ground\" takes classes 2, 8, 9 and 20, and the points have {}: find the ground first, for example with `{CLASSIFY}`, or \
-         choose what is there with `classes`",
+        "surface = \"ground\" takes classes 2, 8, 9 and 20, and the points have {}: find the ground first, for example with \
+         `{CLASSIFY}`, or choose what is there with `classes`",
         listed(counts)
     ))
 }

@@ -13,7 +13,7 @@ use crate::program::{Job, gdt_batch, number};
 const SMALL: &str = "bounds = [500050.0, 4000060.0, 500450.0, 4000460.0]";
 
 fn made() -> CopcFile {
-    CopcFile::new(&LasFile::new(4, 7, 0, 30_000), 5)
+    CopcFile::new(&LasFile::new(4, 7, 0, 20_000), 4)
 }
 
 /// Proves the results of a job and that its vertices are the points of `file`, of which everything is read. Returns the digest.
@@ -32,7 +32,7 @@ fn the_mesh_is_that_of_the_whole_file_with_the_same_bounds() {
     let bytes = made().bytes();
     fs::write(&copc, &bytes).unwrap();
     fs::write(&laz, without_octree(&bytes)).unwrap();
-    for surface in ["all", "ground"] {
+    for surface in ["ground", "all"] {
         let job = |file| Job::on(&[file]).with("input", SMALL).with("input", &format!("surface = \"{surface}\""));
         let (with, without) = (job(&copc), job(&laz));
         let (mut counts, mut all) = (with.report(), without.report());
@@ -40,12 +40,12 @@ fn the_mesh_is_that_of_the_whole_file_with_the_same_bounds() {
         assert_eq!(counts["vertex_digest"], all["vertex_digest"]);
         let [counts, all] = [&mut counts, &mut all].map(|report| report["points"].as_object_mut().unwrap());
         let not_decoded = number(&counts["not_decoded"]);
-        assert!(not_decoded > 24_000 && number(&all["not_decoded"]) == 0, "{not_decoded}");
+        assert!(not_decoded > 16_000 && number(&all["not_decoded"]) == 0, "{not_decoded}");
         counts["not_decoded"] = 0.into();
         assert_eq!(counts, all);
     }
     let check = Job::on(&[&copc]).with("input", SMALL).run_with(&["check", "--json"]).succeeded().json();
-    assert!(number(&check["kept"]) < 6_000, "the octree tells: {check}");
+    assert!(number(&check["kept"]) < 4_000, "the octree tells: {check}");
 }
 
 #[test]
@@ -54,11 +54,11 @@ fn a_wrong_octree_leads_to_the_whole_file_and_a_warning() {
     let [copc, laz] = ["a.copc.laz", "b.laz"].map(|name| folder.path().join(name));
     let mut made = made();
     let node = |range: std::ops::Range<i32>| {
-        let is_there = |key: &&[i32; 4]| key[0] == 4 && key[1..3].iter().all(|number| range.contains(number)) && made.nodes[*key].len() > 3;
+        let is_there = |key: &&[i32; 4]| key[0] == 3 && key[1..3].iter().all(|number| range.contains(number)) && made.nodes[*key].len() > 3;
         *made.nodes.keys().find(is_there).unwrap()
     };
     // A quarter of the cloud has one of two nodes whose last points have changed places.
-    let (near, far) = (node(3..6), node(10..13));
+    let (near, far) = (node(1..3), node(5..7));
     let [a, b] = [near, far].map(|key| made.nodes.get_mut(&key).unwrap().pop().unwrap());
     made.nodes.get_mut(&near).unwrap().push(b);
     made.nodes.get_mut(&far).unwrap().push(a);
@@ -75,7 +75,7 @@ fn a_wrong_octree_leads_to_the_whole_file_and_a_warning() {
     assert!(warnings.iter().any(|warning| is_said(warning.as_str().unwrap())), "{warnings:?}");
     assert_eq!((number(&report["points"]["not_decoded"]), &report["points"]["kept"]), (0, &all["points"]["kept"]));
     // A node too few is found out before anything is decoded.
-    fs::write(&copc, made.bytes_with(|entries| drop(entries.pop()))).unwrap();
+    fs::write(&copc, made.bytes_with(|entries| entries.truncate(entries.len() - 1))).unwrap();
     let report = with.run().succeeded();
     assert!(report.out.contains("its octree (COPC) has no node for 1 of the chunks"), "{}", report.out);
     assert_eq!(with.verified()["digest"], without.verified()["digest"]);
@@ -89,7 +89,7 @@ fn parts_read_only_the_nodes_that_meet_the_bounds() {
     fs::write(&copc, &bytes).unwrap();
     fs::write(&laz, without_octree(&bytes)).unwrap();
     let job = |file| {
-        let bounds = "bounds = [499400.0, 3999400.0, 500600.0, 4000600.0]";
+        let bounds = "bounds = [499400.0, 3999400.0, 500450.0, 4000450.0]";
         Job::on(&[file]).with("input", bounds).tiles_of(300).with("triangulation", "max_points_per_part = 3000")
     };
     let (with, without) = (job(&copc), job(&laz));

@@ -105,7 +105,8 @@ fn header_box(source: &Source, options: &InputOptions) -> Result<Option<SourceBo
 /// The number of raw steps in a step of the measurement: every raw integer then lies within reach of the lattice.
 const MEASURE: i64 = 16;
 
-/// Returns the box of the points of `chunks` that have a class and a return that the job wants, to within [`MEASURE`] raw steps; `None` without a point.
+/// Returns the box of the points of `chunks` that have a class and a return that the job wants, to within [`MEASURE`] raw steps; `None`
+/// without a point.
 fn measure(source: &Source, options: &InputOptions, chunks: Range<usize>) -> Result<Option<SourceBox>> {
     if source.format == FileFormat::Text {
         return Ok(source.wanted_box());

@@ -100,8 +100,8 @@ pub(crate) fn refuse_missing_returns(sources: &[Source], options: &InputOptions)
     };
     match sources.iter().find(|source| source.format == FileFormat::Text && !source.has_returns) {
         Some(source) => Err(Error::Config(format!(
-            "[input] surface or returns choose some returns, but {} does not say which return its points are: that takes {columns}; name the \
-             columns with `columns` under [input.csv], leave the file out, or keep all returns",
+            "[input] surface or returns choose some returns, but {} does not say which return its points are: that takes {columns}; \
+             name the columns with `columns` under [input.csv], leave the file out, or keep all returns",
             source.path.display()
         ))),
         None => Ok(()),
