@@ -241,7 +241,7 @@ fn show_info(files: &[PathBuf], histogram: bool, print: PrintOptions) -> Result<
         let described = on_threads(threads::available(), || {
             let source = input::open(file, &input::TextOptions::default())?;
             let histogram = histogram.then(|| Histogram::of(&source)).transpose()?;
-            Ok(SourceDescription { histogram, ..describe(&source) })
+            SourceDescription { histogram, ..describe(&source) }.with_surface(&source)
         })?;
         print_result(&described, print)?;
     }

@@ -118,6 +118,9 @@ fn parse(text: &str) -> std::result::Result<JobOptions, String> {
             "[input] classes is empty, so no point would be left; leave the key out to keep all but noise".into()
         );
     }
+    if let Some(what) = file.input.contradiction() {
+        return Err(format!("[input] {what}"));
+    }
     if file.output.directory.as_os_str().is_empty() {
         return Err("[output] directory is empty".into());
     }
@@ -194,6 +197,37 @@ mod tests {
         let kept = options.input.kept_classes();
         assert!(kept[2] && !kept[7] && !kept[18]);
         assert!(options.warnings.is_empty());
+    }
+
+    #[test]
+    fn surfaces_are_choices_of_classes_and_returns() {
+        let with = |lines: &str| parse(&LEAST.replace("[output]", &format!("{lines}\n[output]")));
+        let kept = |lines: &str| {
+            let input = with(lines).unwrap().input;
+            let classes = (0..=255u8).filter(|&class| input.kept_classes()[class as usize]);
+            (classes.collect::<Vec<u8>>(), toml::Value::from(input.kept_returns()).to_string())
+        };
+        let (all, ground) = (kept("").0, vec![2, 8, 9, 20]);
+        let with_returns = |classes: &[u8], returns: &str| (classes.to_vec(), returns.to_string());
+        assert_eq!(all.len(), 254);
+        assert_eq!(kept("surface = \"all\"\nreturns = \"all\""), with_returns(&all, "\"all\""));
+        assert_eq!(kept("surface = \"ground\""), with_returns(&ground, "\"all\""));
+        assert_eq!(kept("surface = \"first\""), with_returns(&all, "\"first\""));
+        assert_eq!(kept("returns = [2, 3]"), with_returns(&all, "[2, 3]"));
+        // Those that agree with a surface take some of its points.
+        assert_eq!(kept("surface = \"ground\"\nclasses = [2]"), with_returns(&[2], "\"all\""));
+        assert_eq!(kept("surface = \"ground\"\nreturns = \"last\""), with_returns(&ground, "\"last\""));
+        assert_eq!(kept("surface = \"first\"\nreturns = [1]\nclasses = [6]"), with_returns(&[6], "\"first\""));
+        for (lines, words) in [
+            ("surface = \"ground\"\nclasses = [2, 6]", "class 6 in classes is neither"),
+            ("surface = \"first\"\nreturns = \"last\"", "leave out one"),
+            ("surface = \"last\"\nreturns = [1]", "leave out one"),
+            ("surface = \"roofs\"", "line 3"),
+            ("returns = [0]", "a list of numbers from 1 to 15"),
+        ] {
+            let what = with(lines).unwrap_err();
+            assert!(what.contains(words), "{lines}: {what}");
+        }
     }
 
     #[test]

@@ -7,37 +7,13 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::Result;
-use crate::input::points::optional_fields::OptionalFields;
+use crate::input::points::chunk_request::ChunkRequest;
+use crate::input::points::classes;
 use crate::input::points::record::PointRecord;
 use crate::input::points::record_sink::RecordSink;
+use crate::input::points::returns::PulseReturn;
 use crate::input::source::{FileFormat, Source};
-
-/// The names of the standard classes 0 to 22 (LAS 1.4 R15, table 17).
-const CLASSES: [&str; 23] = [
-    "never classified",
-    "unclassified",
-    "ground",
-    "low vegetation",
-    "medium vegetation",
-    "high vegetation",
-    "building",
-    "low noise",
-    "model key point",
-    "water",
-    "rail",
-    "road surface",
-    "overlap",
-    "wire guard",
-    "wire conductor",
-    "transmission tower",
-    "wire connector",
-    "bridge deck",
-    "high noise",
-    "overhead structure",
-    "ignored ground",
-    "snow",
-    "temporal exclusion",
-];
+use crate::input::surface::SurfaceShares;
 
 /// The number of points of each kind. Points flagged as withheld count with the others.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
@@ -54,6 +30,13 @@ pub struct Histogram {
 }
 
 impl Histogram {
+    /// Returns the shares that tell what a mesh of all points but noise is. Of a file without classes they are of no point.
+    pub fn shares(&self) -> SurfaceShares {
+        let mut shares = SurfaceShares::default();
+        self.classes.iter().for_each(|(&class, &count)| shares.add(class, count));
+        shares
+    }
+
     /// Counts all points of `source`, on the threads of the current rayon pool.
     ///
     /// # Errors
@@ -61,7 +44,7 @@ impl Histogram {
     pub fn of(source: &Source) -> Result<Histogram> {
         let count = |chunk| {
             let mut counts = RecordCounts::default();
-            source.read_chunk(chunk, u64::MAX, OptionalFields::default(), &mut counts).map(|()| counts)
+            source.read_chunk(chunk, ChunkRequest::all(), &mut counts).map(|()| counts)
         };
         let none = RecordCounts::default;
         let counts = (0..source.chunks()).into_par_iter().map(count).try_reduce(none, |a, b| Ok(a.with(&b)))?;
@@ -82,8 +65,7 @@ fn present(counts: &[u64]) -> BTreeMap<u8, u64> {
 
 impl fmt::Display for Histogram {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let class_name = |class: u8| CLASSES.get(class as usize).copied().unwrap_or("");
-        write_counts(f, "class", &self.classes, class_name)?;
+        write_counts(f, "class", &self.classes, classes::name)?;
         write_counts(f, "return", &self.returns, |number| if number == 0 { "no return has this number" } else { "" })?;
         for (name, count) in [("withheld", self.withheld), ("malformed", self.malformed)] {
             if count > 0 {
@@ -137,7 +119,7 @@ impl RecordCounts {
 impl RecordSink for RecordCounts {
     fn push(&mut self, _: u64, record: &PointRecord, _: impl Fn() -> String) -> Result<()> {
         self.classes[record.class as usize] += 1;
-        self.returns[(record.return_number & 15) as usize] += 1;
+        self.returns[(record.pulse_return.number & 15) as usize] += 1;
         self.withheld += u64::from(record.withheld);
         Ok(())
     }
@@ -146,11 +128,17 @@ impl RecordSink for RecordCounts {
         self.classes[class as usize] += 1;
     }
 
-    fn push_outlier(&mut self, class: u8, _: impl FnOnce() -> String) {
+    fn push_outlier(&mut self, class: u8, _: PulseReturn, _: impl FnOnce() -> String) {
         self.classes[class as usize] += 1;
     }
 
     fn malformed(&mut self, count: u64, _: impl FnOnce() -> String) {
         self.malformed += count;
     }
+
+    /// All records are decoded.
+    fn not_decoded(&mut self, _: u64) {}
+
+    /// Only bounds make an index count.
+    fn misplaced(&mut self, _: u64) {}
 }

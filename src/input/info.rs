@@ -4,12 +4,13 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::Warnings;
 use crate::input::crs::system::Crs;
 use crate::input::crs::unit::Unit;
 use crate::input::histogram::Histogram;
 use crate::input::points::axis::AXIS_NAMES;
 use crate::input::source::{FileFormat, Source};
+use crate::input::surface::{Surface, SurfaceShares};
+use crate::{Result, Warnings};
 
 /// The output of `gdt-batch info`: `Display` is for people, `Serialize` for programs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -50,6 +51,10 @@ pub struct SourceDescription {
     /// How many points of each kind there are, if that was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub histogram: Option<Histogram>,
+    /// What a mesh of all points but noise will be, by their classes.
+    pub surface: Option<String>,
+    /// The points that tell it: all of them if there is a histogram, else a sample.
+    pub surface_sample: Option<SurfaceShares>,
     /// What is unusual about the file.
     pub warnings: Warnings,
 }
@@ -77,11 +82,28 @@ pub fn describe(source: &Source) -> SourceDescription {
         crs: source.crs.clone(),
         metres_per_unit: source.crs.metres_per_unit(),
         histogram: None,
+        surface: None,
+        surface_sample: None,
         warnings,
     }
 }
 
 impl SourceDescription {
+    /// Adds what a mesh of the points will be: by the histogram if there is one, or by a sample of `source`.
+    ///
+    /// # Errors
+    /// Those of [`SurfaceShares::sampled`].
+    pub fn with_surface(mut self, source: &Source) -> Result<SourceDescription> {
+        if let Some(histogram) = &self.histogram {
+            self.surface_sample = Some(histogram.shares());
+            self.surface = histogram.shares().sentence(Surface::All);
+        } else {
+            self.surface_sample = SurfaceShares::sampled(source)?;
+            self.surface = self.surface_sample.and_then(|shares| shares.estimate(Surface::All));
+        }
+        Ok(self)
+    }
+
     fn kind(&self) -> String {
         let name = match self.format {
             FileFormat::Las => "LAS",
@@ -125,6 +147,9 @@ impl fmt::Display for SourceDescription {
         writeln!(f, "  unit     {} in x and y, {} in z", self.crs.horizontal.name(), self.vertical())?;
         if self.crs.horizontal == Unit::Degree {
             writeln!(f, "  a job    needs [input] to_crs = \"utm\" or \"EPSG:...\", which transforms degrees")?;
+        }
+        if let Some(surface) = &self.surface {
+            writeln!(f, "  surface  {surface}")?;
         }
         if let Some(histogram) = &self.histogram {
             write!(f, "{histogram}")?;

@@ -6,6 +6,7 @@
 //! A new file format is a room of its own beside `las` and `text`, and a variant of `PointData` in `source.rs`.
 
 mod crs;
+mod decoded_chunks;
 mod file;
 pub mod histogram;
 pub mod info;
@@ -16,6 +17,8 @@ mod points;
 pub mod samples;
 mod source;
 mod source_transform;
+pub mod surface;
+pub mod surface_doubts;
 mod text;
 pub mod transform_sources;
 pub mod transformation;
@@ -27,12 +30,14 @@ pub use crs::transform::between::CrsTransform;
 pub use crs::transform::datum_rule::DatumRule;
 pub use crs::unit::Unit;
 pub use crs::vertical::VerticalSystem;
+pub use decoded_chunks::DecodedChunks;
 pub use file::random_access::not_a_file;
 pub use points::axis::Axis;
 pub use points::counts::PointCounts;
 pub use points::optional_fields::OptionalFields;
 pub use points::point::Point;
 pub use points::raw_bounds::RawBounds;
+pub use points::returns::KeptReturns;
 pub use points::rules::PointRules;
 pub use source::{FileFormat, Source, open, open_chosen};
 pub use text::options::TextOptions;

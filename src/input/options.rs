@@ -7,7 +7,10 @@ use crate::geometry::lattice::shortest_decimal;
 use crate::input::crs::choice::CrsChoice;
 use crate::input::crs::target::{NamedCrs, TargetCrs};
 use crate::input::crs::transform::datum_rule::DatumRule;
+use crate::input::points::classes::is_noise;
 use crate::input::points::optional_fields::OptionalFields;
+use crate::input::points::returns::KeptReturns;
+use crate::input::surface::Surface;
 use crate::input::text::options::TextOptions;
 use crate::input::text::row_choice::RowChoice;
 
@@ -17,6 +20,12 @@ use crate::input::text::row_choice::RowChoice;
 pub struct InputOptions {
     /// Paths or globs, relative to the configuration file.
     pub files: Vec<String>,
+    /// Which surface the job makes: a choice of classes or returns.
+    #[serde(default)]
+    pub surface: Surface,
+    /// Keep only these returns of each pulse.
+    #[serde(default)]
+    pub returns: KeptReturns,
     /// Keep only these classes. The default is all classes but noise (7, 18).
     #[serde(default)]
     pub classes: Option<Vec<u8>>,
@@ -67,8 +76,49 @@ impl InputOptions {
                 classes.iter().for_each(|&class| kept[class as usize] = true);
                 kept
             }
-            None => std::array::from_fn(|class| class != 7 && class != 18),
+            None => match self.surface.classes() {
+                Some(classes) => std::array::from_fn(|class| classes.contains(&(class as u8))),
+                None => std::array::from_fn(|class| !is_noise(class as u8)),
+            },
         }
+    }
+
+    /// Returns whether the options choose classes, so that it matters if a text has none.
+    pub fn chooses_classes(&self) -> bool {
+        self.classes.is_some() || self.surface.classes().is_some()
+    }
+
+    /// Returns which returns the job keeps.
+    pub fn kept_returns(&self) -> KeptReturns {
+        match self.surface.returns() {
+            KeptReturns::All => self.returns,
+            returns => returns,
+        }
+    }
+
+    /// Returns whether the options leave out points of some place, class or return. Noise does not count.
+    pub fn has_filter(&self) -> bool {
+        self.bounds.is_some() || self.chooses_kinds()
+    }
+
+    /// Returns whether the options leave out points of some class or return. Noise does not count.
+    pub fn chooses_kinds(&self) -> bool {
+        self.chooses_classes() || self.kept_returns() != KeptReturns::All
+    }
+
+    /// Returns what contradicts `surface`, if something does. `classes` may take some of the classes of the ground, and `returns` some
+    /// of its returns.
+    pub fn contradiction(&self) -> Option<String> {
+        let is_other = |class: &&u8| self.surface.classes().is_some_and(|ground| !ground.contains(class));
+        if let Some(class) = self.classes.iter().flatten().find(is_other) {
+            return Some(format!(
+                "surface = \"ground\" keeps ground and water (classes 2, 8, 9 and 20), and class {class} in classes is neither: leave out \
+                 one of both keys"
+            ));
+        }
+        let returns = self.surface.returns();
+        let is_open = [returns, self.returns].contains(&KeptReturns::All) || returns.is_same(self.returns);
+        (!is_open).then(|| "surface and returns choose different returns: leave out one of both keys".into())
     }
 
     /// Returns which rows of a text the job wants, and which `fields` of them.
@@ -78,7 +128,9 @@ impl InputOptions {
             bounds: self.bounds.filter(|_| self.to_crs.is_none()).map(|bounds| bounds.0),
             is_transformed: self.to_crs.is_some(),
             classes: self.kept_classes(),
-            strict_classes: self.classes.is_some(),
+            strict_classes: self.chooses_classes(),
+            returns: self.kept_returns(),
+            use_index: true,
             fields,
         }
     }

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::input::crs::plausible::plausible;
 use crate::input::crs::system::Crs;
+use crate::input::decoded_chunks::DecodedChunks;
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::las::crs_records;
 use crate::input::las::header::LasHeader;
@@ -16,9 +17,9 @@ use crate::input::las::uncompressed::UncompressedPoints;
 use crate::input::las::vlr;
 use crate::input::other_formats::refuse_other_formats;
 use crate::input::points::axis::Axis;
+use crate::input::points::chunk_request::ChunkRequest;
 use crate::input::points::counts::PointCounts;
 use crate::input::points::filter::PointFilter;
-use crate::input::points::optional_fields::OptionalFields;
 use crate::input::points::point::Point;
 use crate::input::points::raw_bounds::RawBounds;
 use crate::input::points::record_sink::RecordSink;
@@ -79,6 +80,8 @@ pub struct Source {
     pub has_rgb: bool,
     /// Whether points have a classification.
     pub has_class: bool,
+    /// Whether points say which return of its pulse they are. A text in which that is not wanted does not.
+    pub has_returns: bool,
     /// Whether points have an intensity. A text in which none is wanted has none.
     pub has_intensity: bool,
     /// The coordinate reference system.
@@ -123,20 +126,20 @@ pub fn open_chosen(path: &Path, text: &TextOptions, choice: &RowChoice) -> Resul
     file.read_exact_at(&mut start[..held], 0)?;
     let start = &start[..held];
     if start.starts_with(b"LASF") {
-        return open_las(&file);
+        return open_las(&file, choice.bounds.is_some() && choice.use_index);
     }
     refuse_other_formats(path, start)?;
     open_text(&file, text, choice)
 }
 
-fn open_las(file: &RandomAccessFile) -> Result<Source> {
+fn open_las(file: &RandomAccessFile, with_index: bool) -> Result<Source> {
     let mut warnings = Warnings::default();
     let header = LasHeader::read(file, &mut warnings)?;
     let vlrs = vlr::list(file, &header, &mut warnings)?;
     let crs = crs_records::read(file, &vlrs, &mut warnings)?;
     let crs = plausible(crs, header.min, header.max, &mut warnings);
     let (missing, points) = if header.compressed {
-        let points = CompressedPoints::read(file, &header, &vlrs, &mut warnings)?;
+        let points = CompressedPoints::read(file, &header, &vlrs, with_index, &mut warnings)?;
         (points.missing, PointData::Laz(points))
     } else {
         let points = UncompressedPoints::new(&header, file.size());
@@ -160,6 +163,7 @@ fn open_las(file: &RandomAccessFile) -> Result<Source> {
         grid: [header.axes[0].scale, header.axes[1].scale],
         has_rgb: RecordLayout::new(header.format, header.record_length).has_rgb(),
         has_class: true,
+        has_returns: true,
         has_intensity: true,
         crs,
         by_return: header.by_return,
@@ -186,6 +190,7 @@ fn open_text(file: &RandomAccessFile, options: &TextOptions, choice: &RowChoice)
         grid: table.grid(),
         has_rgb: table.has_rgb(),
         has_class: table.has_class(),
+        has_returns: table.has_returns(choice.returns),
         has_intensity: table.has_intensity(),
         crs: Crs { horizontal: table.unit, vertical: table.unit_z, ..Crs::default() },
         by_return: Vec::new(),
@@ -311,7 +316,7 @@ impl Source {
         self.decode_start(chunk, u64::MAX, rules, sink)
     }
 
-    /// As [`Source::decode`], but takes no more than the first `records` records of the chunk, and of text about as many.
+    /// As [`Source::decode`], but takes no more than the first `records` records that are decoded of the chunk, and of text about as many.
     ///
     /// # Errors
     /// As [`Source::decode`].
@@ -322,40 +327,73 @@ impl Source {
         rules: &PointRules,
         sink: &mut dyn FnMut(&[Point]) -> Result<()>,
     ) -> Result<PointCounts> {
-        let mut filter = PointFilter::new(&self.path, &self.axes, rules, sink);
-        self.read_chunk(chunk, records, rules.fields, &mut filter)?;
-        filter.finish()
+        let bounds = rules.bounds.as_ref();
+        self.filter(chunk, ChunkRequest { records, fields: rules.fields, bounds, left_out: false }, rules, sink)
     }
 
-    /// Sends no more than the first `records` records of a chunk to `sink`, and of text about as many.
+    /// Decodes exactly those records of a chunk that [`Source::decode`] leaves out because of the index of the file: if it is wrong, they
+    /// may lie within the bounds.
     ///
     /// # Errors
     /// As [`Source::decode`].
-    pub(crate) fn read_chunk(
+    pub fn decode_left_out(
         &self,
         chunk: usize,
-        records: u64,
-        fields: OptionalFields,
-        sink: &mut impl RecordSink,
-    ) -> Result<()> {
-        let Some(transform) = &self.transform else { return self.read_own_chunk(chunk, records, fields, sink) };
+        rules: &PointRules,
+        sink: &mut dyn FnMut(&[Point]) -> Result<()>,
+    ) -> Result<PointCounts> {
+        let (fields, bounds) = (rules.fields, rules.bounds.as_ref());
+        self.filter(chunk, ChunkRequest { records: u64::MAX, fields, bounds, left_out: true }, rules, sink)
+    }
+
+    fn filter(
+        &self,
+        chunk: usize,
+        request: ChunkRequest,
+        rules: &PointRules,
+        sink: &mut dyn FnMut(&[Point]) -> Result<()>,
+    ) -> Result<PointCounts> {
+        let mut filter = PointFilter::new(&self.path, &self.axes, rules, sink);
+        self.read_chunk(chunk, request, &mut filter)?;
+        filter.finish()
+    }
+
+    /// Returns the chunks of which something is decoded for these bounds, and the number of records that are decoded, missing ones aside.
+    /// Without an index that is all.
+    pub fn decoded_chunks(&self, bounds: Option<&RawBounds>) -> DecodedChunks {
+        let bounds = self.own_bounds(bounds);
+        match &self.points {
+            PointData::Laz(points) if bounds.is_some() && points.has_index() => {
+                DecodedChunks::listed((0..points.chunk_count()).map(|chunk| points.decoded_records(chunk, bounds)))
+            }
+            _ => DecodedChunks::all(self.chunks(), self.records - self.missing),
+        }
+    }
+
+    /// Sends what is wanted of a chunk to `sink`; of a text about as many records.
+    ///
+    /// # Errors
+    /// As [`Source::decode`].
+    pub(crate) fn read_chunk(&self, chunk: usize, request: ChunkRequest, sink: &mut impl RecordSink) -> Result<()> {
+        let Some(transform) = &self.transform else { return self.read_own_chunk(chunk, request, sink) };
         let of_records = transform.of_records(&self.axes).map_err(|why| Error::input(&self.path, why))?;
-        self.read_own_chunk(chunk, records, fields, &mut TransformedSink::new(&of_records, sink))
+        let request = ChunkRequest { bounds: self.own_bounds(request.bounds), ..request };
+        self.read_own_chunk(chunk, request, &mut TransformedSink::new(&of_records, sink))
+    }
+
+    /// Returns the bounds for an index of the file: none if they are in another system than the file.
+    fn own_bounds<'a>(&self, bounds: Option<&'a RawBounds>) -> Option<&'a RawBounds> {
+        bounds.filter(|_| self.transform.as_ref().is_none_or(|transform| !transform.is_moved))
     }
 
     /// As [`Source::read_chunk`], in the coordinates of the file.
-    fn read_own_chunk(
-        &self,
-        chunk: usize,
-        records: u64,
-        fields: OptionalFields,
-        sink: &mut impl RecordSink,
-    ) -> Result<()> {
+    fn read_own_chunk(&self, chunk: usize, request: ChunkRequest, sink: &mut impl RecordSink) -> Result<()> {
         let file = RandomAccessFile::reopen(&self.path, self.size)?;
         match &self.points {
-            PointData::Las(points) => points.decode(&file, chunk, records, fields, sink),
-            PointData::Laz(points) => points.decode(&file, chunk, records, fields, sink),
-            PointData::Text(table) => table.decode(&file, chunk, records, sink),
+            PointData::Las(points) => points.decode(&file, chunk, request, sink),
+            PointData::Laz(points) => points.decode(&file, chunk, request, sink),
+            PointData::Text(_) if request.left_out => Ok(()),
+            PointData::Text(table) => table.decode(&file, chunk, request.records, sink),
         }
     }
 }

@@ -13,7 +13,9 @@ use crate::geometry::lattice::{AxisMap, Lattice, shortest_decimal};
 use crate::input::options::Duplicates;
 use crate::input::samples::{FileSamples, fingerprint_of};
 use crate::input::transform_sources::transform_sources;
-use crate::input::{OptionalFields, Point, PointRules, RowChoice, Source, TextOptions, TextReading, open_chosen};
+use crate::input::{
+    KeptReturns, OptionalFields, Point, PointRules, RowChoice, Source, TextOptions, TextReading, open_chosen,
+};
 use crate::output::frame::Extras;
 use crate::verify::keyed_records::{KeyedRecord, KeyedRecords};
 use crate::verify::report::ReportedFacts;
@@ -93,6 +95,8 @@ impl<'a> Inputs<'a> {
             Some(input) => (input.csv.clone(), input.row_choice(reading.fields())),
             None => (TextOptions::default(), RowChoice { fields: reading.fields(), ..RowChoice::all() }),
         };
+        // The proof trusts no index of a file.
+        let choice = RowChoice { use_index: false, ..choice };
         // As the job opened it: what it did not want has no say about the digits of a text.
         let open_again = |file: &PathBuf| {
             let mut source = open_chosen(file, &text, &choice)?;
@@ -152,6 +156,7 @@ impl<'a> Inputs<'a> {
         Ok(PointRules {
             maps: [map(0)?, map(1)?, map(2)?],
             classes: input.map_or([true; 256], |input| input.kept_classes()),
+            returns: input.map_or(KeptReturns::All, |input| input.kept_returns()),
             bounds: input.and_then(|input| input.bounds).and_then(|bounds| source.raw_bounds(bounds.0)),
             first_order,
             fields: OptionalFields::default(),

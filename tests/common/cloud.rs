@@ -4,7 +4,7 @@ use std::path::Path;
 
 use gdt_batch::Result;
 use gdt_batch::geometry::lattice::{AxisMap, Lattice, REACH};
-use gdt_batch::input::{OptionalFields, Point, PointCounts, PointRules, Source, TextOptions, open};
+use gdt_batch::input::{KeptReturns, OptionalFields, Point, PointCounts, PointRules, Source, TextOptions, open};
 use rust_decimal::Decimal;
 use rust_decimal::prelude::ToPrimitive;
 
@@ -38,6 +38,7 @@ pub(crate) fn rules(source: &Source, lattice: &Lattice) -> PointRules {
     PointRules {
         maps: [map(0), map(1), map(2)],
         classes: [true; 256],
+        returns: KeptReturns::All,
         bounds: None,
         first_order: 0,
         fields: OptionalFields::RGB,
@@ -54,7 +55,7 @@ pub(crate) fn decode(source: &Source, rules: &PointRules) -> Result<(Vec<Point>,
             Ok(())
         })?;
     }
-    let dropped = counts.withheld + counts.other_class + counts.out_of_bounds + counts.malformed;
+    let dropped = counts.withheld + counts.other_class + counts.other_return + counts.out_of_bounds + counts.malformed;
     assert_eq!(counts.read, dropped + counts.kept);
     assert_eq!(counts.kept, points.len() as u64);
     assert_eq!(counts.read, source.records);
@@ -92,7 +93,14 @@ pub(crate) fn survives(extension: &str, bytes: &[u8]) {
     };
     let map = AxisMap::new(Decimal::ZERO, Decimal::ONE, Decimal::ZERO, Decimal::ONE).unwrap();
     let maps = [0, 1, 2].map(|i| axis(i).unwrap_or(map));
-    let rules = PointRules { maps, classes: [true; 256], bounds: None, first_order: 0, fields: OptionalFields::RGB };
+    let rules = PointRules {
+        maps,
+        classes: [true; 256],
+        returns: KeptReturns::All,
+        bounds: None,
+        first_order: 0,
+        fields: OptionalFields::RGB,
+    };
     for chunk in 0..source.chunks().min(64) {
         let _ = source.decode(chunk, &rules, &mut |_| Ok(()));
     }

@@ -1,7 +1,7 @@
 //! Headers with wrong, odd and extreme fields.
 
 use gdt_batch::geometry::lattice::AxisMap;
-use gdt_batch::input::{OptionalFields, PointRules, TextOptions, open};
+use gdt_batch::input::{KeptReturns, OptionalFields, PointRules, TextOptions, open};
 
 use crate::cloud::{decode, file, read_bytes};
 use crate::las_file::LasFile;
@@ -98,7 +98,8 @@ fn extreme_scales_and_offsets_are_decoded_exactly_or_refused() {
             let own = source.axes[0];
             let map = AxisMap::new(own.offset, own.scale, own.offset, own.scale).unwrap();
             let (maps, classes) = ([map; 3], [true; 256]);
-            let rules = PointRules { maps, classes, bounds: None, first_order: 0, fields: OptionalFields::default() };
+            let (returns, fields) = (KeptReturns::All, OptionalFields::default());
+            let rules = PointRules { maps, classes, returns, bounds: None, first_order: 0, fields };
             let (points, counts) = decode(&source, &rules).unwrap();
             // The first two records lie outside the reach of the lattice, and the fourth is withheld.
             assert_eq!((points.len(), counts.malformed), (7, 2), "{scale:e} and {offset:e}");

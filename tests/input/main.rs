@@ -5,9 +5,12 @@
 mod cloud;
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../common/copc_file.rs"]
+mod copc_file;
 #[path = "../common/las_file.rs"]
 mod las_file;
 
+mod copc;
 mod damaged;
 mod formats;
 mod headers;

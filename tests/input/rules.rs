@@ -15,19 +15,23 @@ fn class_bounds_order_color_and_intensity_rules_hold() {
     let mut rules = rules(&source, &lattice);
     let (all, _) = decode(&source, &rules).unwrap();
     let world = |axis: usize, steps: i32| lattice.world(axis, steps);
-    let corners = [world(0, -1000) - 0.004, world(1, -2000) - 0.004, world(0, 3000) + 0.004, world(1, 4000) + 0.004];
+    // The middle of the spiral.
+    let [x, y] = [50_000_000, 400_000_000];
+    let (low, high) = ([world(0, x - 1000), world(1, y - 2000)], [world(0, x + 3000), world(1, y + 4000)]);
+    let corners = [low[0] - 0.004, low[1] - 0.004, high[0] + 0.004, high[1] + 0.004];
     rules.classes = std::array::from_fn(|class| class == 5 || class == 6);
     rules.bounds = source.raw_bounds(corners);
     (rules.first_order, rules.fields) = (1 << 36, OptionalFields { rgb: false, intensity: true });
     let (some, counts) = decode(&source, &rules).unwrap();
-    let inside = |p: &Point| (-1000..=3000).contains(&p.position[0]) && (-2000..=4000).contains(&p.position[1]);
+    let inside =
+        |p: &Point| (-1000..=3000).contains(&(p.position[0] - x)) && (-2000..=4000).contains(&(p.position[1] - y));
     let wanted = all.iter().filter(|p| (p.class == 5 || p.class == 6) && inside(p));
     let as_wanted = |p: &Point| {
         let intensity = (p.order() * 7 % 3000) as u16;
         Point::new(p.position, p.z, [0; 3], p.class, p.order() + (1 << 36)).with_intensity(intensity)
     };
     let wanted: Vec<Point> = wanted.map(as_wanted).collect();
-    assert!(all.iter().all(|p| p.intensity == 0));
+    assert!(all.iter().all(|p| p.intensity == 0) && !wanted.is_empty());
     assert_eq!(some, wanted);
     assert!(counts.withheld > 0 && counts.other_class > 0 && counts.out_of_bounds > 0, "{counts:?}");
 }

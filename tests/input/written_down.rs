@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use gdt_batch::input::{PointRules, RawBounds, Source, TextOptions, open};
+use gdt_batch::input::{KeptReturns, PointRules, RawBounds, Source, TextOptions, open};
 use rayon::prelude::*;
 
 use crate::cloud::{decode, file, lattice, rules};
@@ -15,6 +15,7 @@ fn assert_survives_json(path: &Path, options: &TextOptions) -> Source {
     let source = open(path, options).unwrap();
     let mut rules = rules(&source, &lattice(&source));
     rules.classes = std::array::from_fn(|class| class % 3 != 1);
+    rules.returns = KeptReturns::Numbers(0b10110);
     rules.bounds = Some(RawBounds { min: [-100_000, -90_000], max: [100_000, i64::MAX] });
     rules.first_order = (1 << 40) - 1 - source.records;
     let text = serde_json::to_string(&(&source, &rules)).unwrap();

@@ -2,6 +2,8 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../common/copc_file.rs"]
+mod copc_file;
 #[path = "../common/las_file.rs"]
 mod las_file;
 #[path = "../common/random.rs"]
@@ -22,6 +24,7 @@ mod broken;
 mod choices;
 mod configuration;
 mod coordinate_systems;
+mod copc;
 mod copyright;
 mod cutting;
 mod decimals;
@@ -46,6 +49,7 @@ mod same_mesh;
 mod shortage;
 mod slow_gpus;
 mod steps;
+mod surface;
 mod tampering;
 mod tasks;
 mod texts;

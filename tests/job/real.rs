@@ -19,7 +19,7 @@ fn proved(job: &Job) -> (Value, String) {
     let verdict = job.verified();
     let points = &report["points"];
     let sum = |names: &[&str]| names.iter().map(|name| number(&points[name])).sum::<u64>();
-    let fates = ["withheld", "other_class", "out_of_bounds", "malformed", "kept"];
+    let fates = ["withheld", "other_class", "other_return", "out_of_bounds", "malformed", "kept"];
     assert_eq!(number(&points["read"]), sum(&fates), "{points}");
     assert_eq!(number(&points["kept"]), number(&report["sites"]) + number(&report["duplicates"]));
     for name in ["sites", "tiles"] {

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::input::file::bytes::{int32, uint16};
 use crate::input::points::optional_fields::OptionalFields;
 use crate::input::points::record::PointRecord;
+use crate::input::points::returns::PulseReturn;
 
 /// The least record length of each point format, in bytes (LAS 1.4 R15, section 2.6).
 pub(crate) const LEAST_LENGTHS: [u16; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
@@ -47,7 +48,9 @@ impl RecordLayout {
             _ => [0; 3],
         };
         let intensity = if fields.intensity { uint16(bytes, 12) } else { 0 };
-        let return_number = bytes[14] & if self.extended { 15 } else { 7 };
-        PointRecord { raw, rgb, intensity, class, withheld, return_number, rounded: [false; 2] }
+        let (number, of) =
+            if self.extended { (bytes[14] & 15, bytes[14] >> 4) } else { (bytes[14] & 7, bytes[14] >> 3 & 7) };
+        let pulse_return = PulseReturn { number, of };
+        PointRecord { raw, rgb, intensity, class, withheld, pulse_return, rounded: [false; 2] }
     }
 }

@@ -14,11 +14,14 @@ use crate::input::file::random_access::RandomAccessFile;
 use crate::input::file::range::FileRange;
 use crate::input::las::chunk_table::{self, LazChunk};
 use crate::input::las::compression::LazCompression;
+use crate::input::las::copc::{CopcIndex, place};
 use crate::input::las::header::LasHeader;
 use crate::input::las::layout::RecordLayout;
 use crate::input::las::uncompressed::push_records;
 use crate::input::las::vlr::Vlr;
+use crate::input::points::chunk_request::ChunkRequest;
 use crate::input::points::optional_fields::OptionalFields;
+use crate::input::points::raw_bounds::RawBounds;
 use crate::input::points::record_sink::RecordSink;
 use crate::{Error, Result, Warnings};
 
@@ -40,6 +43,9 @@ pub(crate) struct CompressedPoints {
     /// The chunks of the source, each a run of LAZ chunks. Usually that is one LAZ chunk, since writers put 50,000 records into
     /// each.
     chunks: Vec<Vec<LazChunk>>,
+    /// Where the points of each LAZ chunk lie, if that was asked for and the file tells.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    index: Option<CopcIndex>,
     /// The number of records that the header promises and no chunk holds.
     pub(crate) missing: u64,
 }
@@ -65,11 +71,12 @@ enum ChunkError {
 }
 
 impl CompressedPoints {
-    /// Finds the chunks of `file`.
+    /// Finds the chunks of `file`, and where their points lie if `with_index`.
     pub(crate) fn read(
         file: &RandomAccessFile,
         header: &LasHeader,
         vlrs: &[Vlr],
+        with_index: bool,
         warnings: &mut Warnings,
     ) -> Result<CompressedPoints> {
         let Some(vlr) = vlrs.iter().find(|vlr| vlr.is(LazVlr::USER_ID, LazVlr::RECORD_ID)) else {
@@ -80,8 +87,12 @@ impl CompressedPoints {
             .map_err(|error| Error::input(file.path(), error.to_string()))?;
         let laz_chunks = chunk_table::find(file, header, &compression, warnings)?;
         let missing = header.records - laz_chunks.iter().map(|chunk| chunk.count).sum::<u64>();
+        let index = match with_index {
+            true => CopcIndex::read(file, header, vlrs, &laz_chunks, warnings)?,
+            false => None,
+        };
         let layout = RecordLayout::new(header.format, header.record_length);
-        Ok(CompressedPoints { layout, compression, chunks: group(laz_chunks), missing })
+        Ok(CompressedPoints { layout, compression, chunks: group(laz_chunks), index, missing })
     }
 
     /// Returns the number of records, including the missing ones.
@@ -95,31 +106,57 @@ impl CompressedPoints {
         self.chunks.len().max((self.missing > 0) as usize)
     }
 
-    /// Sends the first `records` records of chunk `chunk` of the source through `filter`, with these `fields`.
+    /// Returns whether it is known where the points of each LAZ chunk lie.
+    pub(crate) fn has_index(&self) -> bool {
+        self.index.is_some()
+    }
+
+    /// Returns the number of records of chunk `chunk` of the source that are decoded for these bounds.
+    pub(crate) fn decoded_records(&self, chunk: usize, bounds: Option<&RawBounds>) -> u64 {
+        let laz_chunks = self.chunks.get(chunk).into_iter().flatten();
+        laz_chunks.filter(|laz_chunk| self.may_reach(laz_chunk, bounds)).map(|laz_chunk| laz_chunk.count).sum()
+    }
+
+    /// Returns what the points of a LAZ chunk lie within, if the index tells and bounds make it matter.
+    fn cell(&self, laz_chunk: &LazChunk, bounds: Option<&RawBounds>) -> Option<RawBounds> {
+        self.index.as_ref().filter(|_| bounds.is_some())?.cell(laz_chunk)
+    }
+
+    fn may_reach(&self, laz_chunk: &LazChunk, bounds: Option<&RawBounds>) -> bool {
+        let cell = self.cell(laz_chunk, bounds);
+        cell.zip(bounds).is_none_or(|(cell, bounds)| cell.meet(bounds))
+    }
+
+    /// Sends the wanted records of chunk `chunk` of the source through `filter`.
     pub(crate) fn decode(
         &self,
         file: &RandomAccessFile,
         chunk: usize,
-        records: u64,
-        fields: OptionalFields,
+        request: ChunkRequest,
         filter: &mut impl RecordSink,
     ) -> Result<()> {
-        let mut left = records;
+        let mut left = request.records;
         for laz_chunk in self.chunks.get(chunk).into_iter().flatten() {
             if left == 0 {
                 return Ok(());
             }
+            let may_reach = self.may_reach(laz_chunk, request.bounds);
+            if may_reach == request.left_out {
+                filter.not_decoded(if may_reach { 0 } else { laz_chunk.count });
+                continue;
+            }
             let wanted = laz_chunk.count.min(left);
             left -= wanted;
-            let mut decoder =
-                ChunkDecoder { points: self, file, chunk: laz_chunk, fields, wanted, next: laz_chunk.first };
+            let cell = self.cell(laz_chunk, request.bounds).filter(|_| may_reach);
+            let (fields, next) = (request.fields, laz_chunk.first);
+            let mut decoder = ChunkDecoder { points: self, file, chunk: laz_chunk, fields, cell, wanted, next };
             match decoder.decode(filter) {
                 Ok(()) => {}
                 Err(ChunkError::Stopped(error)) => return Err(error),
                 Err(damage) => decoder.count_lost(&damage, filter),
             }
         }
-        if left > 0 && chunk + 1 == self.chunk_count() && self.missing > 0 {
+        if left > 0 && !request.left_out && chunk + 1 == self.chunk_count() && self.missing > 0 {
             let (all, missing) = (self.records(), self.missing);
             filter.malformed(missing, || {
                 format!(
@@ -156,6 +193,8 @@ struct ChunkDecoder<'a> {
     chunk: &'a LazChunk,
     /// What is wanted besides place and class.
     fields: OptionalFields,
+    /// Where its points lie, if an index says so and that matters.
+    cell: Option<RawBounds>,
     /// The number of records to decode, from the first.
     wanted: u64,
     /// The number of the next record in the file.
@@ -215,6 +254,10 @@ impl ChunkDecoder<'_> {
             let wanted = ((block.len() / length) as u64).min(stop - self.next) as usize * length;
             let mut done = 0;
             let outcome = catch_panic(|| decode_block(decoder.as_mut(), &mut block[..wanted], length, &mut done));
+            if let Some(cell) = &self.cell {
+                let records = block[..done].chunks_exact(length);
+                filter.misplaced(records.filter(|record| !cell.hold(&place(record))).count() as u64);
+            }
             push_records(&self.points.layout, &block[..done], self.next, self.fields, filter)?;
             self.next += (done / length) as u64;
             outcome?.map_err(|error| match error.kind() {

@@ -2,6 +2,7 @@
 
 pub(crate) mod chunk_table;
 pub(crate) mod compression;
+pub(crate) mod copc;
 pub(crate) mod crs_records;
 pub(crate) mod header;
 pub(crate) mod layout;

@@ -8,6 +8,7 @@ use crate::Result;
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::las::header::LasHeader;
 use crate::input::las::layout::RecordLayout;
+use crate::input::points::chunk_request::ChunkRequest;
 use crate::input::points::optional_fields::OptionalFields;
 use crate::input::points::record_sink::RecordSink;
 
@@ -44,24 +45,26 @@ impl UncompressedPoints {
         (self.whole.div_ceil(CHUNK) as usize).max((self.missing > 0) as usize)
     }
 
-    /// Sends the first `records` records of `chunk` through `filter`, with these `fields`.
+    /// Sends the wanted records of `chunk` through `filter`. There is no index that could leave any out.
     pub(crate) fn decode(
         &self,
         file: &RandomAccessFile,
         chunk: usize,
-        records: u64,
-        fields: OptionalFields,
+        request: ChunkRequest,
         filter: &mut impl RecordSink,
     ) -> Result<()> {
+        if request.left_out {
+            return Ok(());
+        }
         let length = self.layout.length;
         let Range { start: mut number, end: end_of_chunk } = self.records_of(chunk);
-        let end = end_of_chunk.min(number.saturating_add(records));
+        let end = end_of_chunk.min(number.saturating_add(request.records));
         let mut block = vec![0; (BLOCK / length).clamp(1, (end - number).max(1) as usize) * length];
         while number < end {
             let count = ((block.len() / length) as u64).min(end - number);
             let bytes = &mut block[..count as usize * length];
             file.read_exact_at(bytes, self.points_at + number * length as u64)?;
-            push_records(&self.layout, bytes, number, fields, filter)?;
+            push_records(&self.layout, bytes, number, request.fields, filter)?;
             number += count;
         }
         if end == end_of_chunk && chunk + 1 == self.chunk_count() && self.missing > 0 {

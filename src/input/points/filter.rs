@@ -1,14 +1,17 @@
 //! The filter: applies the rules to one record at a time, maps its coordinates to the lattice, counts it, and hands points on.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::Result;
 use crate::geometry::lattice::{BEYOND, REACH};
 use crate::input::points::axis::{AXIS_NAMES, Axis};
+use crate::input::points::classes::{is_ground, is_unclassified};
 use crate::input::points::counts::PointCounts;
 use crate::input::points::point::Point;
 use crate::input::points::record::PointRecord;
 use crate::input::points::record_sink::RecordSink;
+use crate::input::points::returns::{KeptReturns, PulseReturn};
 use crate::input::points::rules::PointRules;
 
 /// The most points handed to the sink at once: 448 KiB of them, which stays in the second-level cache.
@@ -28,17 +31,22 @@ pub(crate) struct PointFilter<'a> {
     sink: Sink<'a>,
     points: Vec<Point>,
     counts: PointCounts,
+    /// Records within the bounds and not withheld, by class.
+    classes: [u64; 256],
 }
 
 impl<'a> PointFilter<'a> {
     /// Returns a filter for records of the file at `path` with these `axes`; points that pass `rules` go to `sink`.
     pub(crate) fn new(path: &'a Path, axes: &'a [Axis; 3], rules: &'a PointRules, sink: Sink<'a>) -> PointFilter<'a> {
-        PointFilter { path, axes, rules, sink, points: Vec::with_capacity(SLICE), counts: PointCounts::default() }
+        let (points, counts) = (Vec::with_capacity(SLICE), PointCounts::default());
+        PointFilter { path, axes, rules, sink, points, counts, classes: [0; 256] }
     }
 
     #[inline]
     fn keep(&mut self, point: Point) -> Result<()> {
         self.counts.kept += 1;
+        self.counts.ground += u64::from(is_ground(point.class));
+        self.counts.unclassified += u64::from(is_unclassified(point.class));
         self.counts.max_rgb = self.counts.max_rgb.max(point.rgb[0].max(point.rgb[1]).max(point.rgb[2]));
         self.points.push(point);
         if self.points.len() == SLICE { self.flush() } else { Ok(()) }
@@ -47,9 +55,23 @@ impl<'a> PointFilter<'a> {
     /// Hands on the last points and returns the counts.
     pub(crate) fn finish(mut self) -> Result<PointCounts> {
         self.flush()?;
-        let PointCounts { withheld, other_class, out_of_bounds, malformed, kept, .. } = self.counts;
-        self.counts.read = withheld + other_class + out_of_bounds + malformed + kept;
+        let PointCounts { withheld, other_class, other_return, out_of_bounds, malformed, kept, .. } = self.counts;
+        self.counts.read = withheld + other_class + other_return + out_of_bounds + malformed + kept;
+        let classes: BTreeMap<u8, u64> = (0..=u8::MAX).zip(self.classes).filter(|(_, count)| *count > 0).collect();
+        self.counts.classes = classes;
         Ok(self.counts)
+    }
+
+    /// Returns whether the job keeps a return, and counts it if it does not, or if the record does not say clearly which it is.
+    #[inline]
+    fn keeps_return(&mut self, pulse_return: PulseReturn) -> bool {
+        if self.rules.returns == KeptReturns::All {
+            return true;
+        }
+        self.counts.unclear_returns += u64::from(!pulse_return.is_clear());
+        let is_kept = self.rules.returns.has(pulse_return);
+        self.counts.other_return += u64::from(!is_kept);
+        is_kept
     }
 
     fn flush(&mut self) -> Result<()> {
@@ -76,16 +98,20 @@ impl<'a> PointFilter<'a> {
 impl RecordSink for PointFilter<'_> {
     #[inline]
     fn push(&mut self, number: u64, record: &PointRecord, place: impl Fn() -> String) -> Result<()> {
+        if self.rules.bounds.as_ref().is_some_and(|bounds| !bounds.hold(&record.raw)) {
+            self.counts.out_of_bounds += 1;
+            return Ok(());
+        }
         if record.withheld {
             self.counts.withheld += 1;
             return Ok(());
         }
+        self.classes[record.class as usize] += 1;
         if !self.rules.classes[record.class as usize] {
             self.counts.other_class += 1;
             return Ok(());
         }
-        if self.rules.bounds.as_ref().is_some_and(|bounds| !bounds.hold(&record.raw)) {
-            self.counts.out_of_bounds += 1;
+        if !self.keeps_return(record.pulse_return) {
             return Ok(());
         }
         // One by one: `array::map` compiles to a call for every record here.
@@ -113,31 +139,35 @@ impl RecordSink for PointFilter<'_> {
     }
 
     #[inline]
-    fn push_out_of_bounds(&mut self, class: u8) {
-        let count = if self.rules.classes[class as usize] {
-            &mut self.counts.out_of_bounds
-        } else {
-            &mut self.counts.other_class
-        };
-        *count += 1;
+    fn push_out_of_bounds(&mut self, _: u8) {
+        self.counts.out_of_bounds += 1;
     }
 
     #[cold]
-    fn push_outlier(&mut self, class: u8, what: impl FnOnce() -> String) {
+    fn push_outlier(&mut self, class: u8, pulse_return: PulseReturn, what: impl FnOnce() -> String) {
         // A text leaves rows beyond the bounds out by itself. What has no place in another system is not within bounds there.
         let is_out_of_bounds = self.rules.bounds.is_some();
         if is_out_of_bounds {
             self.push_out_of_bounds(class);
-        } else if self.rules.classes[class as usize] {
-            self.malformed(1, what);
-        } else {
+        } else if !self.rules.classes[class as usize] {
             self.counts.other_class += 1;
+        } else if self.keeps_return(pulse_return) {
+            self.malformed(1, what);
         }
     }
 
     fn malformed(&mut self, count: u64, what: impl FnOnce() -> String) {
         let path = self.path;
         self.counts.add_malformed(count, || format!("{}: {}", path.display(), what()));
+    }
+
+    fn not_decoded(&mut self, count: u64) {
+        self.counts.out_of_bounds += count;
+        self.counts.not_decoded += count;
+    }
+
+    fn misplaced(&mut self, count: u64) {
+        self.counts.misplaced += count;
     }
 }
 

@@ -1,6 +1,8 @@
 //! The way of one record from any source to a point on the lattice: its raw integers, the rules, the filter, the counts.
 
 pub(crate) mod axis;
+pub(crate) mod chunk_request;
+pub(crate) mod classes;
 pub(crate) mod counts;
 pub(crate) mod filter;
 pub(crate) mod optional_fields;
@@ -8,5 +10,6 @@ pub(crate) mod point;
 pub(crate) mod raw_bounds;
 pub(crate) mod record;
 pub(crate) mod record_sink;
+pub(crate) mod returns;
 pub(crate) mod rules;
 pub(crate) mod transformed_sink;

@@ -32,6 +32,11 @@ impl RawBounds {
         }
     }
 
+    /// Returns whether a record may lie within both bounds.
+    pub(crate) fn meet(&self, other: &RawBounds) -> bool {
+        (0..2).all(|axis| self.min[axis].max(other.min[axis]) <= self.max[axis].min(other.max[axis]))
+    }
+
     /// Returns whether a record with these raw integers lies within the bounds.
     #[inline]
     pub(crate) fn hold(&self, raw: &[i64; 3]) -> bool {
@@ -51,6 +56,9 @@ mod tests {
         let axis = Axis { offset: Decimal::new(5, 1), scale: Decimal::new(1, 2) };
         let bounds = RawBounds::of(&[axis; 3], [0.994, -1e300, 1.006, 2.5]);
         assert_eq!(bounds, RawBounds { min: [50, i64::MIN], max: [50, 200] });
+        let beside = |x: i64| RawBounds { min: [x, 190], max: [x + 9, i64::MAX] };
+        assert_eq!([40, 41, 50, 51].map(|x| bounds.meet(&beside(x))), [false, true, true, false]);
+        assert!(!RawBounds { min: [51, 0], max: [50, 9] }.meet(&RawBounds { min: [0; 2], max: [99; 2] }));
         assert!(bounds.hold(&[50, 200, 0]) && !bounds.hold(&[51, 0, 0]) && !bounds.hold(&[50, 201, 0]));
     }
 }

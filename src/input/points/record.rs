@@ -1,5 +1,7 @@
 //! One record of a source.
 
+use crate::input::points::returns::PulseReturn;
+
 /// What a record says before the rules are applied to it. `raw` counts steps of the source's axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct PointRecord {
@@ -9,8 +11,8 @@ pub(crate) struct PointRecord {
     pub(crate) intensity: u16,
     pub(crate) class: u8,
     pub(crate) withheld: bool,
-    /// Which return of its pulse it is, from 1; 0 where the file does not say.
-    pub(crate) return_number: u8,
+    /// Which return of its pulse it is.
+    pub(crate) pulse_return: PulseReturn,
     /// Whether the reader rounded x or y, and whether it rounded z, to get `raw`.
     pub(crate) rounded: [bool; 2],
 }

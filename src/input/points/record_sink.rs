@@ -2,6 +2,7 @@
 
 use crate::Result;
 use crate::input::points::record::PointRecord;
+use crate::input::points::returns::PulseReturn;
 
 /// Takes records, in their order. Every record of a source comes once, or is counted by [`RecordSink::malformed`].
 pub(crate) trait RecordSink {
@@ -11,9 +12,15 @@ pub(crate) trait RecordSink {
     /// Takes a record of this class that lies outside the job's bounds, though its lattice point may not.
     fn push_out_of_bounds(&mut self, class: u8);
 
-    /// Takes a record within the job's bounds that lies too far from all others. `what` describes it.
-    fn push_outlier(&mut self, class: u8, what: impl FnOnce() -> String);
+    /// Takes a record of this class and return within the job's bounds that lies too far from all others. `what` describes it.
+    fn push_outlier(&mut self, class: u8, pulse_return: PulseReturn, what: impl FnOnce() -> String);
 
     /// Takes notice of `count` records that cannot be used; `what` says why.
     fn malformed(&mut self, count: u64, what: impl FnOnce() -> String);
+
+    /// Takes notice of `count` records that are not decoded, because the index of the source says that they lie out of bounds.
+    fn not_decoded(&mut self, count: u64);
+
+    /// Takes notice of `count` records that lie elsewhere than the index of the source says. They come by [`RecordSink::push`] too.
+    fn misplaced(&mut self, count: u64);
 }

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::geometry::lattice::AxisMap;
 use crate::input::points::optional_fields::OptionalFields;
 use crate::input::points::raw_bounds::RawBounds;
+use crate::input::points::returns::KeptReturns;
 
 /// What decoding a source needs to know of the job.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -14,6 +15,9 @@ pub struct PointRules {
     /// Whether the job keeps points of each classification code.
     #[serde(with = "class_list")]
     pub classes: [bool; 256],
+    /// Which returns of its pulses the job keeps.
+    #[serde(default)]
+    pub returns: KeptReturns,
     /// Keep only points with raw integers within these bounds in x and y.
     pub bounds: Option<RawBounds>,
     /// The number in the whole job of the source's first record.

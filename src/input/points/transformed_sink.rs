@@ -6,6 +6,7 @@ use crate::input::crs::transform::between::CrsTransform;
 use crate::input::points::axis::Axis;
 use crate::input::points::record::PointRecord;
 use crate::input::points::record_sink::RecordSink;
+use crate::input::points::returns::PulseReturn;
 use rust_decimal::prelude::ToPrimitive;
 
 /// What is done with the raw integers of every record.
@@ -104,7 +105,7 @@ impl<S: RecordSink> RecordSink for TransformedSink<'_, S> {
                 None if record.withheld => {}
                 None => {
                     let what = self.no_place(&record.raw, &place());
-                    self.inner.push_outlier(record.class, || what);
+                    self.inner.push_outlier(record.class, record.pulse_return, || what);
                     return Ok(());
                 }
             }
@@ -116,11 +117,19 @@ impl<S: RecordSink> RecordSink for TransformedSink<'_, S> {
         self.inner.push_out_of_bounds(class);
     }
 
-    fn push_outlier(&mut self, class: u8, what: impl FnOnce() -> String) {
-        self.inner.push_outlier(class, what);
+    fn push_outlier(&mut self, class: u8, pulse_return: PulseReturn, what: impl FnOnce() -> String) {
+        self.inner.push_outlier(class, pulse_return, what);
     }
 
     fn malformed(&mut self, count: u64, what: impl FnOnce() -> String) {
         self.inner.malformed(count, what);
+    }
+
+    fn not_decoded(&mut self, count: u64) {
+        self.inner.not_decoded(count);
+    }
+
+    fn misplaced(&mut self, count: u64) {
+        self.inner.misplaced(count);
     }
 }

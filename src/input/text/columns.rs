@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::input::points::optional_fields::OptionalFields;
+use crate::input::points::returns::KeptReturns;
 use crate::input::text::comment_names::{names_in_comments, texts_of};
 use crate::input::text::decimal_comma::{self, CommaUse, Names};
 use crate::input::text::decimal_sign::{self, DecimalSign};
@@ -148,7 +148,7 @@ impl Columns {
                     .map_or(Ok(named), |what| Err(bad(what)))?
             }
         };
-        let mut roles = used_roles(found.as_ref(), choice.fields);
+        let mut roles = used_roles(found.as_ref(), choice);
         let delimiter = row_delimiter(&candidates, &roles, data);
         if options.columns.as_ref().is_none_or(|names| data.iter().any(|row| delimiter.has_more_than(names.len(), row)))
         {
@@ -200,11 +200,14 @@ fn named_by_user(names: &[String]) -> Result<NamedColumns> {
 }
 
 /// Returns what the columns hold that are used. Without names, the first three are x, y and z.
-fn used_roles(found: Option<&NamedColumns>, fields: OptionalFields) -> Vec<ColumnRole> {
+fn used_roles(found: Option<&NamedColumns>, choice: &RowChoice) -> Vec<ColumnRole> {
     let mut roles = found.map_or(COORDINATES.to_vec(), |found| found.roles.clone());
     let is_unwanted = |role: &&mut ColumnRole| match role {
-        ColumnRole::Color(_) => !fields.rgb,
-        ColumnRole::Intensity => !fields.intensity,
+        ColumnRole::Color(_) => !choice.fields.rgb,
+        ColumnRole::Intensity => !choice.fields.intensity,
+        ColumnRole::ReturnNumber => choice.returns == KeptReturns::All,
+        // Only the last return takes both numbers to know.
+        ColumnRole::Returns => choice.returns != KeptReturns::Last,
         _ => false,
     };
     roles.iter_mut().filter(is_unwanted).for_each(|role| *role = ColumnRole::Skipped);

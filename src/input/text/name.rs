@@ -7,7 +7,7 @@ use crate::input::text::units::{TextUnit, letters};
 pub(crate) type Names = (&'static [&'static str], ColumnRole);
 
 /// Names without case, blanks, points, hyphens and underscores, and without a unit in brackets.
-pub(crate) const NAMES: [Names; 8] = [
+pub(crate) const NAMES: [Names; 10] = [
     (
         &[
             "x",
@@ -88,6 +88,8 @@ pub(crate) const NAMES: [Names; 8] = [
     (&["b", "blue"], ColumnRole::Color(2)),
     (&["class", "classification"], ColumnRole::Class),
     (&["intensity"], ColumnRole::Intensity),
+    (&["returnnumber", "returnnum", "returnno", "return"], ColumnRole::ReturnNumber),
+    (&["numberofreturns", "numreturns", "nreturns", "returns"], ColumnRole::Returns),
 ];
 
 /// The names of longitude and latitude.

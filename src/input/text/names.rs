@@ -95,8 +95,8 @@ pub(crate) fn named_columns<'a>(
         match (names.iter().filter(|name| same(name)).count(), role) {
             (0, ColumnRole::Coordinate(_)) => return Err(NamesError::Missing(known[0])),
             (0, _) => continue,
-            // Most jobs read no intensity. Two of them are no reason to refuse the file, and the first is taken.
-            (1, _) | (_, ColumnRole::Intensity) => {}
+            // Most jobs read none of these. Two of them are no reason to refuse the file, and the first is taken.
+            (1, _) | (_, ColumnRole::Intensity | ColumnRole::ReturnNumber | ColumnRole::Returns) => {}
             (count, _) => return Err(NamesError::Repeated { count, name: known[0] }),
         }
         let place = names.iter().position(same);

@@ -13,6 +13,10 @@ pub(crate) enum ColumnRole {
     Class,
     /// The strength of the return.
     Intensity,
+    /// Which return of its pulse it is.
+    ReturnNumber,
+    /// How many returns the pulse had.
+    Returns,
     /// Nothing of use.
     Skipped,
 }

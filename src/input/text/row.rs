@@ -3,6 +3,7 @@
 use crate::geometry::lattice::BEYOND;
 use crate::input::points::axis::AXIS_NAMES;
 use crate::input::points::record::PointRecord;
+use crate::input::points::returns::PulseReturn;
 use crate::input::text::columns::Columns;
 use crate::input::text::decimal_sign::{swapped, swapped_in_quotes};
 use crate::input::text::delimiter::Delimiter;
@@ -10,6 +11,9 @@ use crate::input::text::lines::shown;
 use crate::input::text::number::Number;
 use crate::input::text::optional_columns::{RowBrightness, brightness_of, class_of};
 use crate::input::text::role::ColumnRole;
+
+/// What classes and returns are.
+const WHOLE_NUMBER: &str = "a whole number from 0 to 255";
 
 /// Why a line cannot be used. Columns count from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,6 +35,8 @@ impl RowError {
                 ColumnRole::Color(channel) => ["red", "green", "blue"][channel],
                 ColumnRole::Class => "class",
                 ColumnRole::Intensity => "intensity",
+                ColumnRole::ReturnNumber => "return number",
+                ColumnRole::Returns => "number of returns",
                 ColumnRole::Skipped => return format!("column {}", column + 1),
             };
             format!("column {} ({name})", column + 1)
@@ -87,6 +93,7 @@ pub(crate) struct RowReader<'a> {
     /// What the colours of the last row show.
     pub(crate) colors: RowBrightness,
     class: u8,
+    pulse_return: PulseReturn,
     intensity: u16,
     /// What the intensity of the last row shows.
     pub(crate) brightness: RowBrightness,
@@ -97,9 +104,18 @@ pub(crate) struct RowReader<'a> {
 impl<'a> RowReader<'a> {
     /// Returns a reader of rows with these columns.
     pub(crate) fn new(columns: &'a Columns) -> RowReader<'a> {
-        let (numbers, none) = ([Number::default(); 3], RowBrightness::default());
-        let (colors, brightness) = (none, none);
-        RowReader { columns, numbers, rgb: [0; 3], colors, class: 0, intensity: 0, brightness, pointed: Vec::new() }
+        let none = RowBrightness::default();
+        RowReader {
+            columns,
+            numbers: [Number::default(); 3],
+            rgb: [0; 3],
+            colors: none,
+            class: 0,
+            pulse_return: PulseReturn::default(),
+            intensity: 0,
+            brightness: none,
+            pointed: Vec::new(),
+        }
     }
 
     /// Reads the columns of `line` that are used.
@@ -149,7 +165,13 @@ impl<'a> RowReader<'a> {
                 }
                 ColumnRole::Class => {
                     let class = class_of(number).or((!self.columns.strict_classes).then_some(0));
-                    self.class = class.ok_or(unexpected("a whole number from 0 to 255"))?;
+                    self.class = class.ok_or(unexpected(WHOLE_NUMBER))?;
+                }
+                ColumnRole::ReturnNumber => {
+                    self.pulse_return.number = class_of(number).ok_or(unexpected(WHOLE_NUMBER))?;
+                }
+                ColumnRole::Returns => {
+                    self.pulse_return.of = class_of(number).ok_or(unexpected(WHOLE_NUMBER))?;
                 }
                 ColumnRole::Intensity => {
                     self.brightness.see(&number);
@@ -164,13 +186,14 @@ impl<'a> RowReader<'a> {
         }
     }
 
-    /// Returns 0 for a colour, a class or an intensity that is not there or cannot be read, and the rest of the line after it.
+    /// Returns 0 for a colour, a class, an intensity or a return that is not there or need not be read, and the rest of the line after it.
     #[cold]
     fn nothing<'b>(&self, line: &'b [u8], role: ColumnRole) -> Option<(Number, Option<&'b [u8]>)> {
         let (field, rest) = self.columns.delimiter.split(line);
         let is_optional = match role {
             ColumnRole::Coordinate(_) => false,
             ColumnRole::Class => field.is_empty() || !self.columns.strict_classes,
+            ColumnRole::ReturnNumber | ColumnRole::Returns => field.is_empty(),
             ColumnRole::Color(_) | ColumnRole::Intensity | ColumnRole::Skipped => true,
         };
         is_optional.then_some((Number::default(), rest))
@@ -189,6 +212,11 @@ impl<'a> RowReader<'a> {
         self.class
     }
 
+    /// Returns the return of the last row.
+    pub(crate) fn pulse_return(&self) -> PulseReturn {
+        self.pulse_return
+    }
+
     /// Returns the last row in steps of `10^-decimals` on each axis.
     #[inline]
     pub(crate) fn record(&self, decimals: &[u8; 3]) -> PointRecord {
@@ -199,8 +227,8 @@ impl<'a> RowReader<'a> {
             raw[axis] = value;
             rounded[axis / 2] |= inexact;
         }
-        let RowReader { rgb, intensity, class, .. } = *self;
-        PointRecord { raw, rgb, intensity, class, withheld: false, return_number: 0, rounded }
+        let RowReader { rgb, intensity, class, pulse_return, .. } = *self;
+        PointRecord { raw, rgb, intensity, class, withheld: false, pulse_return, rounded }
     }
 }
 

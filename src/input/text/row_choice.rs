@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::input::points::optional_fields::OptionalFields;
+use crate::input::points::returns::{KeptReturns, PulseReturn};
 use crate::input::text::number::Number;
 
 /// How a job has read its texts, as far as the options of `[input]` do not say it. Whoever reads them in the same way finds the same
@@ -42,6 +43,10 @@ pub struct RowChoice {
     pub classes: [bool; 256],
     /// Whether the user has said which classes. If not, a class that cannot be read counts as 0.
     pub strict_classes: bool,
+    /// Only rows of these returns.
+    pub returns: KeptReturns,
+    /// Whether the index of a file of another format may tell what lies out of bounds. Without it, everything is decoded.
+    pub use_index: bool,
     /// What is read besides place and class if the text has it.
     pub fields: OptionalFields,
 }
@@ -54,18 +59,21 @@ impl RowChoice {
             is_transformed: false,
             classes: [true; 256],
             strict_classes: false,
+            returns: KeptReturns::All,
+            use_index: true,
             fields: OptionalFields::RGB,
         }
     }
 
     /// Returns whether every row is wanted.
     pub(crate) fn is_all(&self) -> bool {
-        self.bounds.is_none() && self.classes.iter().all(|&wanted| wanted)
+        self.bounds.is_none() && self.returns == KeptReturns::All && self.classes.iter().all(|&wanted| wanted)
     }
 
-    /// Returns whether the row with these x, y, z and this class is wanted.
-    pub(crate) fn wants(&self, numbers: &[Number; 3], class: u8) -> bool {
-        self.classes[class as usize] && self.bounds.is_none_or(|bounds| is_within(bounds, numbers))
+    /// Returns whether the row with these x, y, z, this class and this return is wanted.
+    pub(crate) fn wants(&self, numbers: &[Number; 3], class: u8, pulse_return: PulseReturn) -> bool {
+        let is_kept = self.classes[class as usize] && self.returns.has(pulse_return);
+        is_kept && self.bounds.is_none_or(|bounds| is_within(bounds, numbers))
     }
 }
 

@@ -190,7 +190,7 @@ impl Survey {
                     if is_all || wanted.has(&reader) {
                         survey.wanted.see(&reader.numbers);
                     } else {
-                        if wanted.choice.wants(&reader.numbers, reader.class()) {
+                        if wanted.choice.wants(&reader.numbers, reader.class(), reader.pulse_return()) {
                             survey.outliers += 1;
                             survey.outlier_box.see(&reader.numbers);
                         }
@@ -229,7 +229,7 @@ impl Survey {
 impl Wanted<'_> {
     /// Returns whether the last row of `reader` is wanted.
     pub(crate) fn has(&self, reader: &RowReader) -> bool {
-        self.choice.wants(&reader.numbers, reader.class())
+        self.choice.wants(&reader.numbers, reader.class(), reader.pulse_return())
             && self.within.is_none_or(|within| within.holds(&reader.numbers))
     }
 }

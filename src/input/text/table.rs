@@ -10,6 +10,7 @@ use crate::input::crs::unit::Unit;
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::points::axis::{AXIS_NAMES, Axis};
 use crate::input::points::record_sink::RecordSink;
+use crate::input::points::returns::KeptReturns;
 use crate::input::text::columns::Columns;
 use crate::input::text::cut_off::{self, Ending};
 use crate::input::text::degrees;
@@ -300,6 +301,12 @@ impl TextTable {
         self.columns.have(ColumnRole::Intensity)
     }
 
+    /// Returns whether rows say their return, as far as these returns take it to know.
+    pub(crate) fn has_returns(&self, wanted: KeptReturns) -> bool {
+        let has_count = wanted != KeptReturns::Last || self.columns.have(ColumnRole::Returns);
+        has_count && self.columns.have(ColumnRole::ReturnNumber)
+    }
+
     /// Returns whether rows have a classification.
     pub(crate) fn has_class(&self) -> bool {
         self.columns.have(ColumnRole::Class)
@@ -334,7 +341,7 @@ impl TextTable {
                 TextLine::Whole(line) => match (reader.read(line), &within) {
                     (Ok(()), _) if is_outside(&reader) => filter.push_out_of_bounds(reader.class()),
                     (Ok(()), Some(within)) if !within.holds(&reader.numbers) => {
-                        filter.push_outlier(reader.class(), || {
+                        filter.push_outlier(reader.class(), reader.pulse_return(), || {
                             let what = if explained { String::new() } else { far_from(within) };
                             explained = true;
                             format!("line {}: {} lies far from all other rows{what}", number(), shown(line))

@@ -122,8 +122,9 @@ fn expected_points(grid: &Grid, inputs: &[PlannedInput]) -> GridSums {
     for input in inputs {
         let area = |bounds: Bounds<2>| [0, 1].map(|axis| bounds.extent(axis) as u128 + 1).iter().product::<u128>();
         let whole = area(input.claimed);
+        let records = u128::from(input.decoded_records());
         for (bucket, shared) in grid.shared_with(input.claimed) {
-            points[bucket] += (u128::from(input.source.records) * area(shared) / whole) as u64;
+            points[bucket] += (records * area(shared) / whole) as u64;
         }
     }
     GridSums::new(*grid, points.into_iter())

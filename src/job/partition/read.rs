@@ -1,6 +1,8 @@
 //! Reading the points: every input is decoded once, and its points go to the buckets of a grid, from which the tree is grown.
 
-use crate::input::options::OnBadFile;
+use crate::input::options::{InputOptions, OnBadFile};
+use crate::input::surface_doubts::no_ground;
+use crate::input::{Point, PointCounts};
 use crate::job::durable::directory::JobDirectory;
 use crate::job::index::PartIndex;
 use crate::job::partition::bucket_sorter::BucketSorter;
@@ -11,7 +13,7 @@ use crate::job::partition::result::{Partition, PointSummary};
 use crate::job::partition::tree::Cell;
 use crate::job::partition::tree_builder::{TreeBuilder, wanted_buckets};
 use crate::job::plan::budget::read_buffer_memory;
-use crate::job::plan::job_plan::{Plan, SkippedInput};
+use crate::job::plan::job_plan::{Plan, PlannedInput, SkippedInput};
 use crate::job::plan::text_inputs::{allowed_malformed, stop_at, too_many_malformed};
 use crate::job::progress::stage::Stage;
 use crate::{Result, interrupt};
@@ -66,10 +68,24 @@ pub(crate) fn judge(plan: &Plan, by_input: ByInput) -> JudgedInputs {
             judged.skipped.push(SkippedInput { file: input.source.path.clone(), why });
             judged.orders.push(input.rules.first_order..input.rules.first_order + records);
         } else {
-            judged.summary += summary;
+            judged.summary += with_notes(input, options, summary);
         }
     }
     judged
+}
+
+/// Adds what the user should know about an input that only reading it shows.
+fn with_notes(input: &PlannedInput, options: &InputOptions, mut summary: PointSummary) -> PointSummary {
+    let counts = &mut summary.counts;
+    let path = input.source.path.display();
+    if counts.misplaced > 0 {
+        counts.notes.push(format!(
+            "{path}: {} points lie elsewhere than its octree (COPC) says, so all of its points were read to find those within bounds",
+            counts.misplaced
+        ));
+    }
+    counts.notes.extend(no_ground(options, counts).map(|what| format!("{path}: no point is left of it: {what}")));
+    summary
 }
 
 /// What each input held, in the order of the inputs. Inputs without chunks are not listed.
@@ -90,6 +106,7 @@ impl ByInput {
 }
 
 /// Decodes all chunks of these inputs in parallel and hands the points to the buckets of the grid. `malformed` records were found before.
+/// What the index of an input leaves out is decoded too if the index proves wrong.
 pub(crate) fn decode(
     plan: &Plan,
     inputs: impl Iterator<Item = usize>,
@@ -98,24 +115,68 @@ pub(crate) fn decode(
     buckets: &Buckets,
     stage: &Stage,
 ) -> Result<ByInput> {
-    let chunks_of = |index: usize| (0..plan.inputs[index].source.chunks()).map(move |chunk| (index, chunk));
-    let chunks: Vec<(usize, usize)> = inputs.flat_map(chunks_of).collect();
-    let options = &plan.options.input;
-    let allowed = allowed_malformed(options.max_malformed_fraction.0, plan.records);
-    let malformed = AtomicU64::new(malformed);
-    let decode_chunk = |&(index, chunk): &(usize, usize)| -> Result<ByInput> {
-        interrupt::check()?;
-        let input = &plan.inputs[index];
-        let mut sorter = BucketSorter::new(grid, buckets);
-        let counts = input.source.decode(chunk, &input.rules, &mut |points| sorter.add(points))?;
+    let pass = Pass { plan, grid, buckets, malformed: AtomicU64::new(malformed) };
+    let mut by_input = pass.over(inputs, |input, chunk, sink| {
+        let counts = input.source.decode(chunk, &input.rules, sink)?;
         stage.advance(counts.read);
-        let so_far = malformed.fetch_add(counts.malformed, Ordering::Relaxed) + counts.malformed;
-        // Only a chunk with malformed records of its own reports that there are too many: another may be sound.
-        if options.on_bad_file == OnBadFile::Stop && counts.malformed > 0 && so_far > allowed {
-            return Err(stop_at(&input.source, &counts, so_far, plan.records));
+        Ok(counts)
+    })?;
+    let is_wrong = |counts: &PointCounts| counts.misplaced > 0 && counts.not_decoded > 0;
+    let wrong: Vec<usize> = by_input.0.iter().filter(|(_, s)| is_wrong(&s.counts)).map(|(index, _)| *index).collect();
+    let rest =
+        pass.over(wrong.into_iter(), |input, chunk, sink| input.source.decode_left_out(chunk, &input.rules, sink))?;
+    for (index, more) in rest.0 {
+        if let Some((_, summary)) = by_input.0.iter_mut().find(|(known, _)| *known == index) {
+            summary.counts.take_back_not_decoded();
+            *summary += more;
         }
-        Ok(ByInput(vec![(index, PointSummary { counts, bounds: sorter.bounds() })]))
-    };
-    // The reduction keeps the order of the chunks.
-    chunks.par_iter().with_max_len(1).map(decode_chunk).try_reduce(ByInput::default, |a, b| Ok(a.append(b)))
+    }
+    Ok(by_input)
+}
+
+/// One way over inputs, chunk by chunk.
+struct Pass<'a> {
+    plan: &'a Plan,
+    grid: &'a Grid,
+    buckets: &'a Buckets<'a>,
+    /// The malformed records so far.
+    malformed: AtomicU64,
+}
+
+/// Takes points of an input.
+type PointSink<'a> = &'a mut dyn FnMut(&[Point]) -> Result<()>;
+
+impl Pass<'_> {
+    /// Decodes all chunks of these inputs with `decode`, in parallel.
+    fn over(
+        &self,
+        inputs: impl Iterator<Item = usize>,
+        decode: impl Fn(&PlannedInput, usize, PointSink) -> Result<PointCounts> + Sync,
+    ) -> Result<ByInput> {
+        let chunks_of = |index: usize| (0..self.plan.inputs[index].source.chunks()).map(move |chunk| (index, chunk));
+        let chunks: Vec<(usize, usize)> = inputs.flat_map(chunks_of).collect();
+        let decode_chunk = |&(index, chunk): &(usize, usize)| -> Result<ByInput> {
+            interrupt::check()?;
+            let input = &self.plan.inputs[index];
+            let mut sorter = BucketSorter::new(self.grid, self.buckets);
+            let counts = decode(input, chunk, &mut |points| sorter.add(points))?;
+            self.check_malformed(input, &counts)?;
+            Ok(ByInput(vec![(index, PointSummary { counts, bounds: sorter.bounds() })]))
+        };
+        // The reduction keeps the order of the chunks.
+        chunks.par_iter().with_max_len(1).map(decode_chunk).try_reduce(ByInput::default, |a, b| Ok(a.append(b)))
+    }
+
+    /// Fails if there are too many malformed records. Only a chunk with some of its own reports that: another may be sound.
+    fn check_malformed(&self, input: &PlannedInput, counts: &PointCounts) -> Result<()> {
+        let (plan, options) = (self.plan, &self.plan.options.input);
+        let so_far = self.malformed.fetch_add(counts.malformed, Ordering::Relaxed) + counts.malformed;
+        let allowed = allowed_malformed(options.max_malformed_fraction.0, plan.records);
+        match options.on_bad_file {
+            OnBadFile::Stop if counts.malformed > 0 && so_far > allowed => {
+                Err(stop_at(&input.source, counts, so_far, plan.records))
+            }
+            _ => Ok(()),
+        }
+    }
 }

@@ -58,7 +58,8 @@ impl Partition {
     /// Calls the inputs what they are called by now.
     pub(crate) fn rename_inputs(&mut self, renamed: &RenamedInputs) {
         self.skipped.iter_mut().for_each(|skipped| skipped.rename(renamed));
-        self.summary.counts.examples.iter_mut().for_each(|example| renamed.rename_in(example));
+        let counts = &mut self.summary.counts;
+        counts.examples.iter_mut().chain(&mut counts.notes).for_each(|text| renamed.rename_in(text));
     }
 
     /// Writes its record.

@@ -30,13 +30,12 @@ pub(crate) type SourceBox = [[f64; 3]; 2];
 impl Extent {
     /// Returns the box of `sources`: what their headers say, unless the points show that a header is wrong.
     pub(crate) fn of(sources: &[Source], options: &InputOptions, metres: f64) -> Result<Extent> {
-        let classes = options.kept_classes();
-        let boxes = sources.par_iter().map(|s| header_box(s, &classes)).collect::<Result<Vec<_>>>()?;
+        let boxes = sources.par_iter().map(|s| header_box(s, options)).collect::<Result<Vec<_>>>()?;
         let extent = Extent::around(boxes, options);
         if !extent.is_suspicious(sources, metres) {
             return Ok(extent);
         }
-        let boxes = sources.par_iter().map(|s| measure(s, &classes, 0..s.chunks())).collect::<Result<Vec<_>>>()?;
+        let boxes = sources.par_iter().map(|s| measure(s, options, 0..s.chunks())).collect::<Result<Vec<_>>>()?;
         Ok(Extent::around(boxes, options))
     }
 
@@ -84,7 +83,7 @@ impl Extent {
 }
 
 /// Returns the box of a source by its header, or by its points if the first of them show that the header is wrong.
-fn header_box(source: &Source, classes: &[bool; 256]) -> Result<Option<SourceBox>> {
+fn header_box(source: &Source, options: &InputOptions) -> Result<Option<SourceBox>> {
     // Every row of a text has been looked at.
     if source.format == FileFormat::Text {
         return Ok(source.wanted_box());
@@ -95,9 +94,9 @@ fn header_box(source: &Source, classes: &[bool; 256]) -> Result<Option<SourceBox
     }
     // The measurement is coarse: allow for two of its steps.
     let slack = |axis: usize| 2.0 * MEASURE as f64 * to_float(source.axes[axis].scale);
-    match measure(source, classes, 0..1)? {
+    match measure(source, options, 0..1)? {
         Some([min, max]) if (0..3).any(|k| min[k] < header[0][k] - slack(k) || max[k] > header[1][k] + slack(k)) => {
-            measure(source, classes, 0..source.chunks())
+            measure(source, options, 0..source.chunks())
         }
         _ => Ok(Some(header)),
     }
@@ -106,8 +105,9 @@ fn header_box(source: &Source, classes: &[bool; 256]) -> Result<Option<SourceBox
 /// The number of raw steps in a step of the measurement: every raw integer then lies within reach of the lattice.
 const MEASURE: i64 = 16;
 
-/// Returns the box of the points of `chunks` that have one of `classes`, to within [`MEASURE`] raw steps; `None` without a point.
-fn measure(source: &Source, classes: &[bool; 256], chunks: Range<usize>) -> Result<Option<SourceBox>> {
+/// Returns the box of the points of `chunks` that have a class and a return that the job wants, to within [`MEASURE`] raw steps; `None`
+/// without a point.
+fn measure(source: &Source, options: &InputOptions, chunks: Range<usize>) -> Result<Option<SourceBox>> {
     if source.format == FileFormat::Text {
         return Ok(source.wanted_box());
     }
@@ -117,7 +117,8 @@ fn measure(source: &Source, classes: &[bool; 256], chunks: Range<usize>) -> Resu
     };
     let rules = PointRules {
         maps: [x, y, z],
-        classes: *classes,
+        classes: options.kept_classes(),
+        returns: options.kept_returns(),
         bounds: None,
         first_order: 0,
         fields: OptionalFields::default(),

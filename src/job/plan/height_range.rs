@@ -1,9 +1,9 @@
-//! The heights that a ramp of colours spans.
+//! The heights that a ramp of colours spans, and what else a first look at the points tells.
 //!
 //! One point of noise, or a header with a wrong greatest height, must not give all of a terrain one colour. So a sample of the points
 //! decides. It is the same for a job of one part and of several, whose tiles are coloured before the last point is read.
 
-use crate::input::{OptionalFields, PointRules, Source};
+use crate::input::{DecodedChunks, OptionalFields, PointCounts, PointRules, Source};
 use crate::output::color::HeightRange;
 use crate::{Result, interrupt};
 use rayon::prelude::*;
@@ -30,6 +30,8 @@ pub(crate) struct HeightSample {
     seen: u64,
     /// The number of all records.
     records: u64,
+    /// What became of the records at which it looked.
+    pub(crate) counts: PointCounts,
 }
 
 impl HeightSample {
@@ -39,12 +41,14 @@ impl HeightSample {
     /// # Errors
     /// Those of [`Source::decode`]: if a chunk counted as empty because the disk failed once, the next run would have other colours.
     pub(crate) fn take(sources: &[Source], rules: &[PointRules], bounds: Option<[f64; 4]>) -> Result<HeightSample> {
-        let inputs: Vec<_> = sources.iter().zip(rules).filter(|(source, _)| may_reach(source, bounds)).collect();
-        let records = inputs.iter().map(|(source, _)| source.records - source.missing).sum();
+        let inputs = sources.iter().zip(rules).filter(|(source, _)| may_reach(source, bounds));
+        let inputs: Vec<(&Source, &PointRules, DecodedChunks)> =
+            inputs.map(|(source, rules)| (source, rules, source.decoded_chunks(rules.bounds.as_ref()))).collect();
+        let records = inputs.iter().map(|(.., chunks)| chunks.records).sum();
         // The number of all chunks up to and including those of each source.
         let mut chunks = 0;
-        let up_to = |(source, _): &(&Source, _)| {
-            chunks += source.chunks();
+        let up_to = |(.., decoded): &(_, _, DecodedChunks)| {
+            chunks += decoded.len();
             chunks
         };
         let ends: Vec<usize> = inputs.iter().map(up_to).collect();
@@ -53,14 +57,18 @@ impl HeightSample {
             interrupt::check()?;
             let chunk = (2 * place + 1) * chunks / (2 * places);
             let at = ends.partition_point(|&end| end <= chunk);
-            let (source, rules) = inputs[at];
-            first_heights(source, rules, chunk + source.chunks() - ends[at], RECORDS / places as u64)
+            let (source, rules, decoded) = &inputs[at];
+            let chunk = decoded.chunk(chunk + decoded.len() - ends[at]);
+            first_heights(source, rules, chunk, RECORDS / places as u64)
         };
         let found = (0..places).into_par_iter().map(look).collect::<Result<Vec<_>>>()?;
-        let seen = found.iter().map(|(_, seen)| seen).sum();
-        let mut heights: Vec<i32> = found.into_iter().flat_map(|(heights, _)| heights).collect();
+        let (mut heights, mut counts) = (Vec::new(), PointCounts::default());
+        for (more, its_counts) in found {
+            heights.extend(more);
+            counts += its_counts;
+        }
         heights.sort_unstable();
-        Ok(HeightSample { heights, places, seen, records })
+        Ok(HeightSample { heights, places, seen: counts.read - counts.not_decoded, records, counts })
     }
 
     /// Returns the heights that colours span, without what may be noise; `None` if the sample has too few points to tell. Where the
@@ -92,15 +100,15 @@ fn may_reach(source: &Source, bounds: Option<[f64; 4]>) -> bool {
     min[0] <= xmax && min[1] <= ymax && max[0] >= xmin && max[1] >= ymin
 }
 
-/// Returns the heights of the points that the job keeps among the first `records` records of a chunk, and the number of these records.
-fn first_heights(source: &Source, rules: &PointRules, chunk: usize, records: u64) -> Result<(Vec<i32>, u64)> {
+/// Returns the heights of the points that the job keeps among the first `records` records of a chunk, and what became of these records.
+fn first_heights(source: &Source, rules: &PointRules, chunk: usize, records: u64) -> Result<(Vec<i32>, PointCounts)> {
     let rules = PointRules { fields: OptionalFields::default(), ..rules.clone() };
     let mut heights = Vec::new();
     let counts = source.decode_start(chunk, records, &rules, &mut |points| {
         heights.extend(points.iter().map(|point| point.z));
         Ok(())
     })?;
-    Ok((heights, counts.read))
+    Ok((heights, counts))
 }
 
 #[cfg(test)]
@@ -111,7 +119,8 @@ mod tests {
 
     /// A sample in `places` chunks of heights from 0 that saw every record that passed, of `records`.
     fn sample(count: i32, places: usize, records: u64) -> HeightSample {
-        HeightSample { heights: (0..count).collect(), places, seen: count as u64, records }
+        let counts = PointCounts::default();
+        HeightSample { heights: (0..count).collect(), places, seen: count as u64, records, counts }
     }
 
     fn range(low: i32, high: i32) -> Option<HeightRange> {
@@ -151,7 +160,7 @@ mod tests {
         }
         let mut heights = [i32::MIN, i32::MAX].repeat(400);
         heights.sort_unstable();
-        let steep = HeightSample { heights, places: 1, seen: 800, records: 1 << 40 };
+        let steep = HeightSample { heights, places: 1, seen: 800, ..sample(0, 1, 1 << 40) };
         assert_eq!(steep.range_within(WIDE), range(i32::MIN, i32::MAX));
     }
 }

@@ -2,9 +2,7 @@
 
 use crate::geometry::Bounds;
 use crate::geometry::lattice::Lattice;
-use crate::input::Crs;
-use crate::input::PointRules;
-use crate::input::Source;
+use crate::input::{Crs, PointCounts, PointRules, Source};
 use crate::job::durable::atomic_file::{PendingFile, write_pending};
 use crate::job::options::JobOptions;
 use crate::job::plan::input_identity::RenamedInputs;
@@ -41,6 +39,8 @@ pub struct Plan {
     /// The heights that a ramp of colours spans, by a sample of the points. `None` if they are too few to tell: then the box of the points,
     /// or what is claimed of it, decides.
     pub heights: Option<HeightRange>,
+    /// What became of the records of a sample, the one that `heights` is from.
+    pub sample: PointCounts,
     /// The CRS of the job.
     pub crs: Crs,
     /// The name of the unit of x and y.
@@ -66,6 +66,18 @@ pub struct PlannedInput {
     pub rules: PointRules,
     /// The lattice box of its points, as far as its header tells.
     pub claimed: Bounds<2>,
+}
+
+impl PlannedInput {
+    /// Returns the number of records that are decoded. An index may tell that others are out of bounds.
+    pub fn decoded_records(&self) -> u64 {
+        decoded_records(&self.source, &self.rules)
+    }
+}
+
+/// Returns the number of records that are decoded of a source.
+pub(crate) fn decoded_records(source: &Source, rules: &PointRules) -> u64 {
+    source.decoded_chunks(rules.bounds.as_ref()).records
 }
 
 /// What headers and the first chunks of the inputs say of all points. All tiles have one style, so it cannot wait for the last point. If

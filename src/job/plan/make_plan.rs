@@ -4,17 +4,17 @@ use crate::geometry::Bounds;
 use crate::geometry::lattice::{AxisMap, Lattice, REACH, shortest_decimal};
 use crate::input::options::{OnBadFile, UnitChoice};
 use crate::input::transform_sources::transform_sources;
-use crate::input::{Axis, CrsChoice, FileFormat, PointRules, Source};
+use crate::input::{Axis, CrsChoice, FileFormat, PointCounts, PointRules, Source};
 use crate::job::options::JobOptions;
 use crate::job::plan::common_crs::{common_crs, horizontal_unit};
 use crate::job::plan::extent::{Extent, SourceBox, to_float};
 use crate::job::plan::height_range::HeightSample;
 use crate::job::plan::inputs::{check_missing_records, open_all, unreadable_names};
-use crate::job::plan::job_plan::{Claims, Plan, PlannedInput, SkippedInput};
+use crate::job::plan::job_plan::{Claims, Plan, PlannedInput, SkippedInput, decoded_records};
 use crate::job::plan::lattice_choice::{LatticeCoarsening, LatticeWish, choose_lattice, fineness};
 use crate::job::plan::text_inputs::{
-    check_malformed_rows, farthest_row, leave_out_outliers, refuse_degrees, refuse_missing_classes, row_choice,
-    wanted_fields,
+    check_malformed_rows, farthest_row, leave_out_outliers, refuse_degrees, refuse_missing_classes,
+    refuse_missing_returns, row_choice, wanted_fields,
 };
 use crate::output::color::HeightRange;
 use crate::output::frame::Frame;
@@ -105,6 +105,7 @@ fn try_plan(
     transform_sources(sources, &options.input, &mut warnings)?;
     refuse_degrees(sources, &options.input)?;
     refuse_missing_classes(sources, &options.input)?;
+    refuse_missing_returns(sources, &options.input)?;
     let (choice, unit) = said_of_sources(options);
     let crs = common_crs(sources, choice, unit, &mut warnings)?;
     let (unit, metres) = horizontal_unit(sources, unit, choice, &crs, &mut warnings)?;
@@ -131,7 +132,8 @@ fn try_plan(
     let (clipped, claimed_area) =
         (lattice_extent(&lattice, &extent, clip), claimed_area(&lattice, sources, &extent, clip.is_some()));
     let claimed = extent.boxes.iter().map(|claim| claimed_box(&lattice, claim, clipped)).collect::<Vec<_>>();
-    let has_parts = !coarsening.one_part && records > options.triangulation.max_points_per_part.0 / 2 * 3;
+    let decoded: u64 = sources.iter().zip(&rules).map(|(source, rules)| decoded_records(source, rules)).sum();
+    let has_parts = !coarsening.one_part && decoded > options.triangulation.max_points_per_part.0 / 2 * 3;
     let claims = has_parts.then(|| claims(sources, &rules, &lattice, &extent, clipped)).transpose()?;
     let [low, high] = claimed_heights(&lattice, &extent).map(|z| z.round() as i32);
     let sample = HeightSample::take(sources, &rules, options.input.bounds.map(|bounds| bounds.0))?;
@@ -146,6 +148,7 @@ fn try_plan(
         extent: clipped,
         lattice,
         heights,
+        sample: PointCounts { examples: Vec::new(), ..sample.counts },
         crs,
         unit: unit.into(),
         claimed_area,
@@ -190,10 +193,12 @@ fn claims(
         min: [clipped.min[0].saturating_sub(1), clipped.min[1].saturating_sub(1), low],
         max: [clipped.max[0].saturating_add(1), clipped.max[1].saturating_add(1), high],
     };
-    let first_colors = |(source, rules): (&Source, &PointRules)| match source.chunks() {
-        0 => Ok(0),
-        _ if !rules.fields.rgb || !source.has_rgb => Ok(0),
-        _ => source.decode(0, rules, &mut |_| Ok(())).map(|counts| counts.max_rgb),
+    let first_colors = |(source, rules): (&Source, &PointRules)| {
+        let chunks = source.decoded_chunks(rules.bounds.as_ref());
+        if chunks.is_empty() || !rules.fields.rgb || !source.has_rgb {
+            return Ok(0);
+        }
+        source.decode(chunks.chunk(0), rules, &mut |_| Ok(())).map(|counts| counts.max_rgb)
     };
     let max_rgb = sources.par_iter().zip(rules).map(first_colors).try_reduce(|| 0, |a, b| Ok(a.max(b)))?;
     Ok(Claims { bounds, max_rgb })
@@ -272,13 +277,13 @@ fn lattice_extent(lattice: &Lattice, extent: &Extent, clip: Option<Bounds<2>>) -
 
 fn point_rules(sources: &[Source], options: &JobOptions, lattice: &Lattice) -> Result<Vec<PointRules>> {
     let fields = wanted_fields(options);
-    let classes = options.input.kept_classes();
+    let (classes, returns) = (options.input.kept_classes(), options.input.kept_returns());
     let mut first_order = 0;
     let mut rules = Vec::with_capacity(sources.len());
     for source in sources {
         let maps = [axis_map(source, 0, lattice)?, axis_map(source, 1, lattice)?, axis_map(source, 2, lattice)?];
         let bounds = options.input.bounds.and_then(|bounds| source.raw_bounds(bounds.0));
-        rules.push(PointRules { maps, classes, bounds, first_order, fields });
+        rules.push(PointRules { maps, classes, returns, bounds, first_order, fields });
         first_order += source.records;
     }
     Ok(rules)

@@ -1,6 +1,7 @@
 //! The message for a job of which no point is left: it says what became of the points, and where they lie if not within the bounds.
 
 use crate::Error;
+use crate::input::surface_doubts::no_ground;
 use crate::input::{FileFormat, PointCounts};
 use crate::job::plan::job_plan::Plan;
 
@@ -10,11 +11,19 @@ type Rectangle = [f64; 4];
 /// Returns the error for a job of which no point is left.
 pub fn no_point_is_left(plan: &Plan, counts: &PointCounts) -> Error {
     let remedy = match plan.options.input.bounds.zip(box_of_inputs(plan)) {
-        Some((bounds, inputs)) if counts.out_of_bounds > 0 => compare(bounds.0, inputs, are_from_headers(plan)),
-        _ => "check [input] classes and bounds".into(),
+        Some((bounds, inputs)) if counts.out_of_bounds > 0 && counts.classes.is_empty() => {
+            compare(bounds.0, inputs, are_from_headers(plan))
+        }
+        _ => no_ground(&plan.options.input, counts)
+            .unwrap_or("check [input] surface, returns, classes and bounds".into()),
+    };
+    let other_returns = match counts.other_return {
+        0 => String::new(),
+        count => format!(", {count} of other returns"),
     };
     Error::NoTerrain(format!(
-        "no point is left to triangulate: of {} read, {} are malformed, {} withheld, {} of other classes, {} out of bounds; {remedy}",
+        "no point is left to triangulate: of {} read, {} are malformed, {} withheld, {} of other classes{other_returns}, {} out of bounds; \
+         {remedy}",
         counts.read, counts.malformed, counts.withheld, counts.other_class, counts.out_of_bounds
     ))
 }

@@ -2,7 +2,8 @@
 
 use crate::input::options::{InputOptions, OnBadFile, UnitChoice};
 use crate::input::{
-    CrsChoice, FileFormat, OptionalFields, Outliers, PointCounts, PointRules, RowChoice, Source, TextReading, Unit,
+    CrsChoice, FileFormat, KeptReturns, OptionalFields, Outliers, PointCounts, PointRules, RowChoice, Source,
+    TextReading, Unit,
 };
 use crate::job::options::JobOptions;
 use crate::job::plan::extent::Extent;
@@ -68,12 +69,39 @@ fn is_exchanged(source: &Source) -> bool {
 /// [`Error::Config`] names the first such file.
 pub(crate) fn refuse_missing_classes(sources: &[Source], options: &InputOptions) -> Result<()> {
     // A point without a class counts as one of class 0.
-    let Some(classes) = options.classes.as_ref().filter(|classes| !classes.contains(&0)) else { return Ok(()) };
+    if !options.chooses_classes() || options.kept_classes()[0] {
+        return Ok(());
+    }
     let lacks_classes = |source: &&Source| source.format == FileFormat::Text && !source.has_class;
+    let wanted = match &options.classes {
+        Some(classes) => format!("classes = {classes:?}"),
+        None => "surface = \"ground\"".into(),
+    };
     match sources.iter().find(lacks_classes) {
         Some(source) => Err(Error::Config(format!(
-            "[input] classes = {classes:?}, but {} has no column of classes, so that none of its points would be left: add 0 to the classes to \
-             keep points without a class, name the column with `columns` under [input.csv], or leave the file out",
+            "[input] {wanted}, but {} has no column of classes, so that none of its points would be left: let `classes` have 0 in \
+             it to keep points without a class, name the column with `columns` under [input.csv], or leave the file out",
+            source.path.display()
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// Fails if the user asks for returns, and a text does not say which return its points are.
+///
+/// # Errors
+/// [`Error::Config`] names the first such file.
+pub(crate) fn refuse_missing_returns(sources: &[Source], options: &InputOptions) -> Result<()> {
+    let returns = options.kept_returns();
+    let columns = match returns {
+        KeptReturns::All => return Ok(()),
+        KeptReturns::Last => "return_number and number_of_returns",
+        KeptReturns::First | KeptReturns::Numbers(_) => "return_number",
+    };
+    match sources.iter().find(|source| source.format == FileFormat::Text && !source.has_returns) {
+        Some(source) => Err(Error::Config(format!(
+            "[input] surface or returns choose some returns, but {} does not say which return its points are: that takes {columns}; \
+             name the columns with `columns` under [input.csv], leave the file out, or keep all returns",
             source.path.display()
         ))),
         None => Ok(()),

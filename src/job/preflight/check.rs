@@ -1,6 +1,8 @@
 //! The result of the preflight, for people and for machines.
 
 use crate::input::Source;
+use crate::input::surface::SurfaceShares;
+use crate::input::surface_doubts::{no_ground, unclear_returns};
 use crate::input::transformation::{Transformation, transformations};
 use crate::job::durable::directory::JobDirectory;
 use crate::job::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours};
@@ -72,6 +74,10 @@ pub struct Preflight {
     pub output: PathBuf,
     /// The backend that triangulates.
     pub backend: String,
+    /// What the mesh will be, by the classes of a sample of the points.
+    pub surface: Option<String>,
+    /// The points of this sample that the job keeps.
+    pub surface_sample: SurfaceShares,
     /// What the user should know.
     pub warnings: Warnings,
     /// The inputs that would be left out because they are bad. More may prove bad when they are read.
@@ -123,6 +129,11 @@ impl Preflight {
     fn of(plan: &Plan, threads: usize, kept: KeptPoints) -> Preflight {
         let options = &plan.options;
         let resolution = plan.frame.extras().resolution;
+        let surface_sample = SurfaceShares::of_kept(&plan.sample);
+        let mut warnings = plan.all_warnings();
+        let of_sample = |warning: String| format!("in a sample of the points: {warning}");
+        warnings.extend(no_ground(&options.input, &plan.sample).map(of_sample));
+        warnings.extend(unclear_returns(&options.input, &plan.sample).map(of_sample));
         let disk = DiskEstimate::of(plan, kept, MAX_TRIANGLES_IN_ONE_FILE);
         let describe = |source: &Source| (source.path.clone(), format!("{:?}", source.format), source.records);
         Preflight {
@@ -148,7 +159,9 @@ impl Preflight {
             disk_earlier: estimate::earlier_bytes(plan),
             output: options.output.directory.clone(),
             backend: format!("{:?}", options.triangulation.backend).to_lowercase(),
-            warnings: plan.all_warnings(),
+            surface: surface_sample.estimate(options.input.surface),
+            surface_sample,
+            warnings,
             skipped: plan.skipped.clone(),
         }
     }
@@ -206,6 +219,9 @@ impl fmt::Display for Preflight {
         row("points", grouped(self.records))?;
         if self.kept < self.records {
             row("points kept", format!("about {} or fewer", grouped(self.kept)))?;
+        }
+        if let Some(surface) = &self.surface {
+            row("surface", surface.clone())?;
         }
         row("tiles", format!("about {}", grouped(self.tiles)))?;
         if let Some([columns, rows]) = self.raster {

@@ -1,6 +1,6 @@
 //! How many points a job keeps at most, before they are read: by the boxes in the headers, and by a sample of chunks.
 
-use crate::input::{PointCounts, Source};
+use crate::input::DecodedChunks;
 use crate::job::plan::job_plan::{Plan, PlannedInput};
 use crate::{Error, Result, interrupt};
 use rayon::prelude::*;
@@ -14,7 +14,7 @@ const MOST_SAMPLED: usize = 16;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct KeptPoints(pub(crate) u64);
 
-/// What `bounds` and `classes` leave of an input, as far as its header tells.
+/// What `bounds` and choices of classes and returns leave of an input, as far as its header tells.
 enum Share {
     Nothing,
     Everything,
@@ -25,7 +25,7 @@ impl KeptPoints {
     /// Returns all points of the inputs whose boxes `bounds` meet.
     pub(crate) fn by_headers(plan: &Plan) -> KeptPoints {
         let inputs = plan.inputs.iter().filter(|input| !matches!(share(plan, input), Share::Nothing));
-        KeptPoints(inputs.map(|input| records(&input.source)).sum())
+        KeptPoints(inputs.map(PlannedInput::decoded_records).sum())
     }
 
     /// Returns what a sample of chunks shows. It grows until the least and the most that are likely are clear to `is_clear`, or until
@@ -35,17 +35,19 @@ impl KeptPoints {
     /// [`Error::Interrupted`].
     pub(crate) fn by_sample(plan: &Plan, is_clear: impl Fn(KeptPoints, KeptPoints) -> bool) -> Result<KeptPoints> {
         let mut certain = 0;
-        let mut partly = Vec::new();
+        let mut partly: Vec<(&PlannedInput, DecodedChunks)> = Vec::new();
         for input in &plan.inputs {
             match share(plan, input) {
                 Share::Nothing => {}
-                Share::Everything => certain += records(&input.source),
-                Share::Some => partly.push(input),
+                Share::Everything => certain += input.decoded_records(),
+                Share::Some => partly.push((input, input.source.decoded_chunks(input.rules.bounds.as_ref()))),
             }
         }
-        let chunks: Vec<(&PlannedInput, usize)> =
-            partly.iter().flat_map(|input| (0..input.source.chunks()).map(|chunk| (*input, chunk))).collect();
-        let doubtful: u64 = partly.iter().map(|input| records(&input.source)).sum();
+        let mut chunks: Vec<(&PlannedInput, usize)> = Vec::new();
+        for (input, decoded) in &partly {
+            chunks.extend((0..decoded.len()).map(|index| (*input, decoded.chunk(index))));
+        }
+        let doubtful: u64 = partly.iter().map(|(_, decoded)| decoded.records).sum();
         let enough = (chunks.len() / MOST_SAMPLED).max(4 * FIRST_SAMPLE).min(chunks.len());
         let mut size = FIRST_SAMPLE.min(enough);
         loop {
@@ -61,16 +63,11 @@ impl KeptPoints {
 
 /// Tells whether the options leave out so much that a sample may matter. Noise does not.
 pub(crate) fn has_filter(plan: &Plan) -> bool {
-    plan.options.input.bounds.is_some() || plan.options.input.classes.is_some()
-}
-
-/// Returns the number of records of a source, except those known to be missing.
-fn records(source: &Source) -> u64 {
-    source.records - source.missing
+    plan.options.input.has_filter()
 }
 
 fn share(plan: &Plan, input: &PlannedInput) -> Share {
-    let everything = if plan.options.input.classes.is_none() { Share::Everything } else { Share::Some };
+    let everything = if plan.options.input.chooses_kinds() { Share::Some } else { Share::Everything };
     let Some(bounds) = plan.options.input.bounds else { return everything };
     let [low, high] = [[bounds.0[0], bounds.0[1]], [bounds.0[2], bounds.0[3]]];
     // A header that gives no box says nothing.
@@ -106,8 +103,7 @@ fn kept_share(chunks: &[(&PlannedInput, usize)], size: usize) -> Result<[f64; 2]
 fn share_of_chunk(input: &PlannedInput, chunk: usize) -> Result<f64> {
     interrupt::check()?;
     match input.source.decode(chunk, &input.rules, &mut |_| Ok(())) {
-        Ok(PointCounts { read: 0, .. }) => Ok(0.0),
-        Ok(counts) => Ok(counts.kept as f64 / counts.read as f64),
+        Ok(counts) => Ok(counts.kept as f64 / (counts.read - counts.not_decoded).max(1) as f64),
         Err(Error::Interrupted) => Err(Error::Interrupted),
         // Reading the points says what is wrong.
         Err(_) => Ok(1.0),

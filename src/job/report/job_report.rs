@@ -5,6 +5,8 @@ use crate::geometry::VertexDigest;
 use crate::geometry::lattice::Lattice;
 use crate::gpu::benefit::GpuFigures;
 use crate::input::options::InputOptions;
+use crate::input::surface::SurfaceShares;
+use crate::input::surface_doubts::unclear_returns;
 use crate::input::transformation::{Transformation, transformations};
 use crate::input::{PointCounts, TextReading};
 use crate::job::levels::make_level::LevelStats;
@@ -60,6 +62,9 @@ pub struct Report {
     pub skipped: Vec<SkippedInput>,
     /// Numbers of records by what became of them.
     pub points: PointCounts,
+    /// What the mesh is, by the classes of the points that were kept: bare earth, or what else is in it.
+    #[serde(default)]
+    pub surface: Option<String>,
     /// How the leaves were triangulated.
     pub leaves: LeafStats,
     /// The GPU that helped; `None` without one.
@@ -218,6 +223,9 @@ pub struct ReportParts {
     pub file_list: Checksum,
 }
 
+/// More notes than this, one for each of thousands of files, would hide other warnings.
+const MAX_NOTES: usize = 50;
+
 /// Returns the length of the edges that slivers have at least, in source units.
 fn hull_length(plan: &Plan) -> f64 {
     HullRule::of(plan).length() * plan.lattice.resolution.to_f64().unwrap_or(f64::NAN)
@@ -225,8 +233,10 @@ fn hull_length(plan: &Plan) -> f64 {
 
 impl Report {
     /// Puts the report together.
-    pub fn new(plan: &Plan, parts: ReportParts) -> Report {
-        let mut warnings = plan.all_warnings();
+    pub fn new(plan: &Plan, mut parts: ReportParts) -> Report {
+        let (mut warnings, mut notes) = (plan.all_warnings(), Warnings::default());
+        notes.extend(std::mem::take(&mut parts.points.notes));
+        notes.shorten(MAX_NOTES);
         let rounded = |count: u64, what: &str, step| {
             format!("{} points were rounded in {what} to steps of {step}", grouped(count))
         };
@@ -236,6 +246,8 @@ impl Report {
         if parts.points.rounded_z > 0 {
             warnings.push(rounded(parts.points.rounded_z, "z", plan.lattice.resolution_z));
         }
+        warnings.extend(unclear_returns(&plan.options.input, &parts.points));
+        warnings.extend(notes);
         warnings.extend(parts.points.examples.iter().cloned());
         warnings.extend(parts.warnings);
         Report {
@@ -252,6 +264,7 @@ impl Report {
             duplicates: parts.leaves.duplicates,
             files: plan.inputs.len(),
             skipped: plan.skipped.clone(),
+            surface: SurfaceShares::of_kept(&parts.points).sentence(plan.options.input.surface),
             points: parts.points,
             leaves: parts.leaves,
             gpu: parts.gpu,

@@ -35,10 +35,19 @@ impl fmt::Display for Report {
         row("points read", grouped(self.points.read))?;
         row("  withheld", grouped(self.points.withheld))?;
         row("  of other classes", grouped(self.points.other_class))?;
+        if self.points.other_return > 0 {
+            row("  of other returns", grouped(self.points.other_return))?;
+        }
         row("  out of bounds", grouped(self.points.out_of_bounds))?;
+        if self.points.not_decoded > 0 {
+            row("    by the octree, not decoded", grouped(self.points.not_decoded))?;
+        }
         row("  malformed", grouped(self.points.malformed))?;
         row("  duplicates in x, y", grouped(self.duplicates))?;
         row("sites", grouped(self.sites))?;
+        if let Some(surface) = &self.surface {
+            row("surface", surface.clone())?;
+        }
         row("triangles", grouped(self.triangles))?;
         row("  crossing tile borders", format!("{:.3} %", self.seam_share * 100.0))?;
         if let Some(length) = self.hull_length {

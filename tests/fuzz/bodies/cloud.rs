@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::LazyLock;
 
 use gdt_batch::geometry::lattice::{AxisMap, REACH};
-use gdt_batch::input::{OptionalFields, Point, PointCounts, PointRules, Source, TextOptions, open};
+use gdt_batch::input::{KeptReturns, OptionalFields, Point, PointCounts, PointRules, Source, TextOptions, open};
 use gdt_batch::job::options::JobOptions;
 use gdt_batch::{Error, Result};
 
@@ -93,6 +93,7 @@ fn rules(source: &Source) -> Option<PointRules> {
     Some(PointRules {
         maps: [map(0)?, map(1)?, map(2)?],
         classes: [true; 256],
+        returns: KeptReturns::All,
         bounds: None,
         first_order: 5,
         fields: OptionalFields { rgb: true, intensity: true },
@@ -132,7 +133,12 @@ fn decode(source: &Source, chunk: usize, rules: &PointRules, decoded: &mut u64) 
 fn check(counts: &PointCounts) {
     assert_eq!(
         counts.read,
-        counts.withheld + counts.other_class + counts.out_of_bounds + counts.malformed + counts.kept
+        counts.withheld
+            + counts.other_class
+            + counts.other_return
+            + counts.out_of_bounds
+            + counts.malformed
+            + counts.kept
     );
     assert_eq!(counts.malformed > 0, !counts.examples.is_empty());
 }
