@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
+use crate::breaklines::FeatureKind;
 use crate::input::lines::attribute::WantedAttributes;
 use crate::input::lines::feature::{LineFeature, LineShape, RawGeometry};
-use crate::input::lines::options::{BreaklineOptions, LineKind};
+use crate::input::lines::options::{LineHeights, LineOptions, kind_of_name};
 use crate::{Error, Result, Warnings};
 
 /// Coordinates beyond this, and what Shapefiles write for "no data", are no places on the earth.
@@ -13,7 +14,7 @@ const BEYOND_THE_EARTH: f64 = 1e30;
 /// Takes the features of a file in their order.
 pub(super) struct FeatureCollector<'a> {
     path: &'a Path,
-    options: &'a BreaklineOptions,
+    options: &'a LineOptions,
     features: Vec<LineFeature>,
     without_geometry: LeftOut,
     too_short: LeftOut,
@@ -24,11 +25,11 @@ pub(super) struct FeatureCollector<'a> {
 #[derive(Default)]
 struct LeftOut {
     count: u64,
-    first: i64,
+    first: u64,
 }
 
 impl LeftOut {
-    fn note(&mut self, number: i64) {
+    fn note(&mut self, number: u64) {
         if self.count == 0 {
             self.first = number;
         }
@@ -41,7 +42,7 @@ impl LeftOut {
 }
 
 impl<'a> FeatureCollector<'a> {
-    pub(super) fn new(path: &'a Path, options: &'a BreaklineOptions) -> FeatureCollector<'a> {
+    pub(super) fn new(path: &'a Path, options: &'a LineOptions) -> FeatureCollector<'a> {
         FeatureCollector {
             path,
             options,
@@ -56,7 +57,7 @@ impl<'a> FeatureCollector<'a> {
     ///
     /// # Errors
     /// `Input` names the feature if its kind is not known, a vertex is no place, or it has no heights.
-    pub(super) fn add(&mut self, number: i64, geometry: RawGeometry, attributes: &WantedAttributes) -> Result<()> {
+    pub(super) fn add(&mut self, number: u64, geometry: RawGeometry, attributes: &WantedAttributes) -> Result<()> {
         let Some(kind) = self.kind(number, attributes)? else {
             self.of_other_kinds.note(number);
             return Ok(());
@@ -85,17 +86,17 @@ impl<'a> FeatureCollector<'a> {
     }
 
     /// Returns an error about feature `number`.
-    pub(super) fn refuse(&self, number: i64, what: impl AsRef<str>) -> Error {
+    pub(super) fn refuse(&self, number: u64, what: impl AsRef<str>) -> Error {
         Error::input(self.path, format!("feature {number} {}", what.as_ref()))
     }
 
-    fn kind(&self, number: i64, attributes: &WantedAttributes) -> Result<Option<LineKind>> {
-        let Some(name) = &self.options.kind_field else { return Ok(Some(self.options.kind.unwrap_or_default())) };
+    fn kind(&self, number: u64, attributes: &WantedAttributes) -> Result<Option<FeatureKind>> {
+        let Some(name) = &self.options.kind_field else { return Ok(Some(self.options.kind.unwrap_or(FeatureKind::Line))) };
         let value = attributes.kind.text();
         if let Some(kinds) = &self.options.kinds {
             return Ok(value.and_then(|value| kinds.get(&value).copied()));
         }
-        let kind = value.as_deref().and_then(LineKind::of_name);
+        let kind = value.as_deref().and_then(kind_of_name);
         kind.map(Some).ok_or_else(|| {
             let value = value.map_or("nothing".into(), |value| format!("{value:?}"));
             let what = format!("has {value} in {name:?}, not line, river or lake: say with kinds what the values mean");
@@ -103,7 +104,7 @@ impl<'a> FeatureCollector<'a> {
         })
     }
 
-    fn add_geometry(&mut self, number: i64, kind: LineKind, height: Option<f64>, geometry: RawGeometry) -> Result<()> {
+    fn add_geometry(&mut self, number: u64, kind: FeatureKind, height: Option<f64>, geometry: RawGeometry) -> Result<()> {
         match geometry {
             RawGeometry::Empty => Ok(()),
             RawGeometry::Other(what) => {
@@ -117,15 +118,15 @@ impl<'a> FeatureCollector<'a> {
         }
     }
 
-    fn add_line(&mut self, number: i64, kind: LineKind, height: Option<f64>, line: Vec<[f64; 3]>) -> Result<()> {
+    fn add_line(&mut self, number: u64, kind: FeatureKind, height: Option<f64>, line: Vec<[f64; 3]>) -> Result<()> {
         let line = self.checked(number, height, line)?;
         if line.len() < 2 {
             self.too_short.note(number);
             return Ok(());
         }
         let shape = match (kind, is_closed(&line)) {
-            (LineKind::Lake, true) => return self.add_area(number, kind, height, vec![line]),
-            (LineKind::Lake, false) => {
+            (FeatureKind::Lake, true) => return self.add_area(number, kind, height, vec![line]),
+            (FeatureKind::Lake, false) => {
                 return Err(self.refuse(
                     number,
                     "is a line with two ends, but a lake is an area: close it, make it a polygon, or give it another kind",
@@ -137,7 +138,7 @@ impl<'a> FeatureCollector<'a> {
         Ok(())
     }
 
-    fn add_area(&mut self, number: i64, kind: LineKind, height: Option<f64>, rings: Vec<Vec<[f64; 3]>>) -> Result<()> {
+    fn add_area(&mut self, number: u64, kind: FeatureKind, height: Option<f64>, rings: Vec<Vec<[f64; 3]>>) -> Result<()> {
         let mut kept = Vec::with_capacity(rings.len());
         for (index, ring) in rings.into_iter().enumerate() {
             let mut ring = self.checked(number, height, ring)?;
@@ -161,23 +162,27 @@ impl<'a> FeatureCollector<'a> {
     }
 
     /// Returns the vertices with their heights, without those that repeat the one before.
-    fn checked(&self, number: i64, height: Option<f64>, mut line: Vec<[f64; 3]>) -> Result<Vec<[f64; 3]>> {
+    fn checked(&self, number: u64, height: Option<f64>, mut line: Vec<[f64; 3]>) -> Result<Vec<[f64; 3]>> {
         for (index, vertex) in line.iter_mut().enumerate() {
             let is_place = |value: f64| value.abs() < BEYOND_THE_EARTH;
             if !is_place(vertex[0]) || !is_place(vertex[1]) {
                 let what = format!("has the vertex ({}, {}), its number {}, which is no place", vertex[0], vertex[1], index + 1);
                 return Err(self.refuse(number, what));
             }
-            vertex[2] = height.unwrap_or(vertex[2]);
-            if !is_place(vertex[2]) {
+            vertex[2] = match self.options.heights {
+                LineHeights::File => height.unwrap_or(vertex[2]),
+                LineHeights::Points => f64::NAN,
+            };
+            if self.options.heights == LineHeights::File && !is_place(vertex[2]) {
                 return Err(self.refuse(
                     number,
                     "has no heights: a breakline takes x, y and z. Give it heights (in QGIS: \"Drape\" with an elevation model), or name \
-                     an attribute that has them with height_field",
+                     an attribute that has them with height_field, or set heights = \"points\" to take them from the points around",
                 ));
             }
         }
-        line.dedup();
+        // NaN is no height, and all that have none are the same.
+        line.dedup_by(|next, before| next.map(f64::to_bits) == before.map(f64::to_bits));
         Ok(line)
     }
 }
@@ -192,7 +197,7 @@ mod tests {
     use super::*;
     use crate::input::lines::attribute::Attribute;
 
-    fn options(rest: &str) -> BreaklineOptions {
+    fn options(rest: &str) -> LineOptions {
         toml::from_str(&format!("files = [\"a\"]\n{rest}")).unwrap()
     }
 
@@ -258,12 +263,12 @@ mod tests {
     fn attributes_say_kind_and_height() {
         let with = |kind: &str, height: Attribute| WantedAttributes { kind: Attribute::Text(kind.into()), height };
         let (features, _) = collect("kind_field = \"T\"", line(1.0), with(" River ", Attribute::Missing)).unwrap();
-        assert_eq!(features[0].kind, LineKind::River);
+        assert_eq!(features[0].kind, FeatureKind::River);
         let error = collect("kind_field = \"T\"", line(1.0), with("creek", Attribute::Missing)).unwrap_err().to_string();
         assert!(error.contains("\"creek\"") && error.contains("kinds"), "{error}");
         let table = "kind_field = \"T\"\nkinds = { \"46006\" = \"river\" }";
         let number = WantedAttributes { kind: Attribute::Number(46006.0), height: Attribute::Missing };
-        assert_eq!(collect(table, line(1.0), number).unwrap().0[0].kind, LineKind::River);
+        assert_eq!(collect(table, line(1.0), number).unwrap().0[0].kind, FeatureKind::River);
         let (features, warnings) = collect(table, line(1.0), with("7", Attribute::Missing)).unwrap();
         assert!(features.is_empty() && warnings.iter().any(|warning| warning.contains("kind_field")));
         let (features, _) =

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use crate::Warnings;
+use crate::breaklines::FeatureKind;
 use crate::input::crs::system::Crs;
-use crate::input::lines::options::LineKind;
 
 /// What a file of lines holds.
 #[derive(Clone, Debug)]
@@ -19,14 +19,14 @@ pub struct LineFile {
     pub warnings: Warnings,
 }
 
-/// A line or an area. Coordinates are finite.
+/// A line or an area. Its coordinates are finite; a height is NaN where it is to come from the points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LineFeature {
     /// Its number in the file: the record of a Shapefile and the feature of GeoJSON, both from 1 on, or the key in a GeoPackage. The parts
     /// of a feature with several share it.
-    pub number: i64,
+    pub number: u64,
     /// What it is.
-    pub kind: LineKind,
+    pub kind: FeatureKind,
     /// Where it is.
     pub shape: LineShape,
 }

@@ -12,7 +12,7 @@ use crate::input::crs::system::Crs;
 use crate::input::lines::attribute::{Attribute, WantedAttributes, no_attribute};
 use crate::input::lines::collector::FeatureCollector;
 use crate::input::lines::feature::RawGeometry;
-use crate::input::lines::options::BreaklineOptions;
+use crate::input::lines::options::LineOptions;
 use crate::{Error, Result, interrupt};
 
 /// The system of GeoJSON that says none.
@@ -56,7 +56,7 @@ enum Geometry {
 pub(super) fn read(
     path: &Path,
     bytes: &[u8],
-    options: &BreaklineOptions,
+    options: &LineOptions,
     collector: &mut FeatureCollector,
 ) -> Result<Crs> {
     let broken = |error: serde_json::Error| Error::input(path, format!("is no GeoJSON that can be read: {error}"));
@@ -91,9 +91,9 @@ pub(super) fn read(
 
 fn add(
     path: &Path,
-    number: i64,
+    number: u64,
     feature: Feature,
-    options: &BreaklineOptions,
+    options: &LineOptions,
     collector: &mut FeatureCollector,
 ) -> Result<()> {
     let properties = feature.properties.unwrap_or_default();
@@ -155,10 +155,10 @@ fn named_crs(value: &Value) -> Option<Crs> {
 mod tests {
     use super::*;
     use crate::input::lines::feature::{LineFeature, LineShape};
-    use crate::input::lines::options::LineKind;
+    use crate::breaklines::FeatureKind;
 
     fn read_text(text: &str, rest: &str) -> Result<(Crs, Vec<LineFeature>)> {
-        let options: BreaklineOptions = toml::from_str(&format!("files = [\"a\"]\n{rest}")).unwrap();
+        let options: LineOptions = toml::from_str(&format!("files = [\"a\"]\n{rest}")).unwrap();
         let mut collector = FeatureCollector::new(Path::new("a.geojson"), &options);
         let crs = read(Path::new("a.geojson"), text.as_bytes(), &options, &mut collector)?;
         Ok((crs, collector.finish().0))
@@ -176,7 +176,7 @@ mod tests {
             assert_eq!(features[0].shape, LineShape::Line(vec![[0.0, 0.0, 1.0], [2.0, 0.0, 1.5]]));
         }
         let (_, features) = read_text(&all, "kind_field = \"T\"\nheight_field = \"Z\"").unwrap();
-        assert_eq!((features[1].number, features[1].kind), (2, LineKind::River));
+        assert_eq!((features[1].number, features[1].kind), (2, FeatureKind::River));
         assert_eq!(features[1].shape.outlines()[0][0][2], 4.0);
         let error = read_text(&all, "kind_field = \"KIND\"").unwrap_err().to_string();
         assert!(error.contains("feature 1") && error.contains("it has T, Z"), "{error}");

@@ -10,7 +10,7 @@ use crate::input::crs::system::Crs;
 use crate::input::lines::attribute::{Attribute, WantedAttributes, no_attribute};
 use crate::input::lines::collector::FeatureCollector;
 use crate::input::lines::feature::RawGeometry;
-use crate::input::lines::options::BreaklineOptions;
+use crate::input::lines::options::LineOptions;
 use crate::input::lines::wkb;
 use crate::{Error, Result, interrupt};
 
@@ -29,7 +29,7 @@ struct Layer {
 ///
 /// # Errors
 /// `Input` if the file is damaged, has no such layer, or lacks attributes that the options name.
-pub(super) fn read(path: &Path, options: &BreaklineOptions, collector: &mut FeatureCollector) -> Result<Crs> {
+pub(super) fn read(path: &Path, options: &LineOptions, collector: &mut FeatureCollector) -> Result<Crs> {
     refuse_open_journal(path)?;
     let broken = |error: rusqlite::Error| Error::input(path, format!("is no GeoPackage that can be read: {error}"));
     let file = open(path).map_err(broken)?;
@@ -88,7 +88,7 @@ fn refuse_open_journal(path: &Path) -> Result<()> {
 }
 
 /// Finds the layer that the options name, or the only one.
-fn find_layer(path: &Path, file: &Connection, options: &BreaklineOptions) -> Result<Layer> {
+fn find_layer(path: &Path, file: &Connection, options: &LineOptions) -> Result<Layer> {
     let broken = |error: rusqlite::Error| Error::input(path, format!("is no GeoPackage that can be read: {error}"));
     // A view may compute what it likes, so only tables count.
     let query = "SELECT g.table_name, g.column_name, g.srs_id FROM gpkg_geometry_columns g JOIN sqlite_master m \
@@ -123,7 +123,7 @@ impl Layer {
 /// Adds a row: its key, geometry, kind and height. The outer result is SQLite's.
 fn add(row: &Row, collector: &mut FeatureCollector) -> rusqlite::Result<Result<()>> {
     let number = match row.get_ref(0)? {
-        ValueRef::Integer(number) => number,
+        ValueRef::Integer(number) => number.unsigned_abs(),
         _ => 0,
     };
     let geometry = match row.get_ref(1)? {

@@ -16,4 +16,4 @@ mod shapefile;
 mod wkb;
 
 pub use feature::{LineFeature, LineFile, LineShape};
-pub use open::{is_side_file, read_lines};
+pub use open::{files_of_lines, is_side_file, read_lines};

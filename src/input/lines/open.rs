@@ -1,11 +1,11 @@
 //! Finding out which format a file of lines has, and reading it.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::lines::collector::FeatureCollector;
 use crate::input::lines::feature::LineFile;
-use crate::input::lines::options::BreaklineOptions;
+use crate::input::lines::options::LineOptions;
 use crate::input::lines::{geojson, geopackage, shapefile};
 use crate::{Error, Result, Warnings};
 
@@ -22,11 +22,17 @@ pub fn is_side_file(path: &Path) -> bool {
     ending.is_some_and(|ending| SIDE_FILES.contains(&ending.as_str()))
 }
 
+/// Returns the files in which the lines of the file at `path` are: a Shapefile has several.
+pub fn files_of_lines(path: &Path) -> Vec<PathBuf> {
+    let is_shapefile = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("shp"));
+    if is_shapefile { shapefile::all_files(path) } else { vec![path.to_path_buf()] }
+}
+
 /// Reads the file at `path`, which the options name.
 ///
 /// # Errors
 /// `Input` if it is no file of lines, is damaged, or a feature cannot be used; `Io` if it cannot be read.
-pub fn read_lines(path: &Path, options: &BreaklineOptions) -> Result<LineFile> {
+pub fn read_lines(path: &Path, options: &LineOptions) -> Result<LineFile> {
     let file = RandomAccessFile::open(path)?;
     let bytes = |file: &RandomAccessFile| file.bytes(0..file.size());
     let mut start = [0; 16];

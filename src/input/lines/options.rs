@@ -4,27 +4,31 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::breaklines::FeatureKind;
 use crate::input::crs::choice::CrsChoice;
 use crate::input::crs::system::Crs;
 
 /// `[[breaklines]]`: files of lines that become edges of the mesh.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct BreaklineOptions {
+pub struct LineOptions {
     /// Paths or globs, relative to the configuration file.
     pub files: Vec<String>,
     /// What all features are. Without this and `kind_field` they are lines.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub kind: Option<LineKind>,
+    pub kind: Option<FeatureKind>,
     /// The attribute that says what a feature is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub kind_field: Option<String>,
     /// What the values of `kind_field` mean. Features with other values are left out. Without it, the values are names of kinds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub kinds: Option<BTreeMap<String, LineKind>>,
+    pub kinds: Option<BTreeMap<String, FeatureKind>>,
     /// About how long an edge along a line is.
     #[serde(default)]
     pub spacing: LineSpacing,
+    /// Where heights come from.
+    #[serde(default)]
+    pub heights: LineHeights,
     /// The attribute with the height of a feature, which takes the place of the heights of its vertices.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub height_field: Option<String>,
@@ -36,11 +40,14 @@ pub struct BreaklineOptions {
     pub crs: LineCrs,
 }
 
-impl BreaklineOptions {
+impl LineOptions {
     /// Returns a sentence about options that contradict each other, or that say nothing.
     pub fn contradiction(&self) -> Option<&'static str> {
         if self.files.is_empty() {
             return Some("[[breaklines]] files is empty: name at least one Shapefile, GeoPackage or GeoJSON file");
+        }
+        if self.heights == LineHeights::Points && self.height_field.is_some() {
+            return Some("[[breaklines]] heights = \"points\" and height_field are both set: keep one of them");
         }
         match (&self.kind, &self.kind_field, &self.kinds) {
             (Some(_), Some(_), _) => Some("[[breaklines]] kind and kind_field are both set: keep one of them"),
@@ -50,32 +57,13 @@ impl BreaklineOptions {
     }
 }
 
-/// What a line is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum LineKind {
-    /// A line on the ground, such as a ridge or the edge of a road.
-    #[default]
-    Line,
-    /// Flowing water: its heights should fall.
-    River,
-    /// Standing water: an area with one height.
-    Lake,
-}
-
-impl LineKind {
-    /// Returns the kind of this name, in small or capital letters.
-    pub(crate) fn of_name(name: &str) -> Option<LineKind> {
-        [LineKind::Line, LineKind::River, LineKind::Lake].into_iter().find(|kind| kind.name() == name.to_lowercase())
-    }
-
-    /// Returns the name of the kind.
-    pub fn name(self) -> &'static str {
-        match self {
-            LineKind::Line => "line",
-            LineKind::River => "river",
-            LineKind::Lake => "lake",
-        }
+/// Returns the kind of this name, in small or capital letters.
+pub(crate) fn kind_of_name(name: &str) -> Option<FeatureKind> {
+    match name.to_lowercase().as_str() {
+        "line" => Some(FeatureKind::Line),
+        "river" => Some(FeatureKind::River),
+        "lake" => Some(FeatureKind::Lake),
+        _ => None,
     }
 }
 
@@ -112,6 +100,17 @@ impl From<LineSpacing> for toml::Value {
             LineSpacing::Length(length) => toml::Value::Float(length),
         }
     }
+}
+
+/// Where the heights of lines come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LineHeights {
+    /// From the files.
+    #[default]
+    File,
+    /// From the points of the cloud around, whatever the files say.
+    Points,
 }
 
 /// The coordinate reference system of files of lines.
@@ -168,7 +167,7 @@ impl From<LineCrs> for String {
 mod tests {
     use super::*;
 
-    fn options(rest: &str) -> Result<BreaklineOptions, String> {
+    fn options(rest: &str) -> Result<LineOptions, String> {
         toml::from_str(&format!("files = [\"a.shp\"]\n{rest}")).map_err(|error| error.to_string())
     }
 
@@ -183,7 +182,7 @@ mod tests {
             let read = options(text).unwrap();
             assert_eq!(read.contradiction(), None);
             let written = serde_json::to_string(&read).unwrap();
-            assert_eq!(serde_json::from_str::<BreaklineOptions>(&written).unwrap(), read, "{written}");
+            assert_eq!(serde_json::from_str::<LineOptions>(&written).unwrap(), read, "{written}");
         }
     }
 
@@ -202,7 +201,7 @@ mod tests {
         }
         assert!(options("kind = \"line\"\nkind_field = \"T\"").unwrap().contradiction().is_some());
         assert!(options("kinds = { a = \"lake\" }").unwrap().contradiction().is_some());
-        assert!(toml::from_str::<BreaklineOptions>("files = []").unwrap().contradiction().is_some());
-        assert_eq!(LineKind::of_name("RIVER"), Some(LineKind::River));
+        assert!(toml::from_str::<LineOptions>("files = []").unwrap().contradiction().is_some());
+        assert_eq!(kind_of_name("RIVER"), Some(FeatureKind::River));
     }
 }

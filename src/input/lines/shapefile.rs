@@ -12,7 +12,7 @@ use crate::input::lines::attribute::WantedAttributes;
 use crate::input::lines::collector::FeatureCollector;
 use crate::input::lines::dbf::DbfTable;
 use crate::input::lines::feature::RawGeometry;
-use crate::input::lines::options::BreaklineOptions;
+use crate::input::lines::options::LineOptions;
 use crate::input::lines::polygons::areas_of;
 use crate::{Error, Result, Warnings, interrupt};
 
@@ -30,13 +30,13 @@ const BEFORE_PARTS: usize = 44;
 pub(super) fn read(
     path: &Path,
     bytes: &[u8],
-    options: &BreaklineOptions,
+    options: &LineOptions,
     collector: &mut FeatureCollector,
     warnings: &mut Warnings,
 ) -> Result<Crs> {
     let table = attributes(path, options)?;
     let mut rest = records(path, bytes)?;
-    let mut number = 0;
+    let mut number = 0u64;
     while !rest.is_empty() {
         interrupt::check()?;
         number += 1;
@@ -48,7 +48,7 @@ pub(super) fn read(
         let geometry = geometry(content).map_err(refused)?;
         let wanted = match &table {
             None => WantedAttributes::NONE,
-            Some(table) => table.record(number as u64 - 1).ok_or_else(|| {
+            Some(table) => table.record(number - 1).ok_or_else(|| {
                 collector.refuse(number, "has no record in the .dbf, which is cut off or belongs to another file")
             })?,
         };
@@ -112,7 +112,7 @@ fn parts(record: &[u8], has_z: bool) -> Option<Vec<Vec<[f64; 3]>>> {
     starts.iter().zip(ends).map(|ends| Some(range(ends)?.map(vertex).collect())).collect()
 }
 
-fn attributes(path: &Path, options: &BreaklineOptions) -> Result<Option<DbfTable>> {
+fn attributes(path: &Path, options: &LineOptions) -> Result<Option<DbfTable>> {
     if options.kind_field.is_none() && options.height_field.is_none() {
         return Ok(None);
     }
@@ -136,6 +136,11 @@ fn crs(path: &Path, warnings: &mut Warnings) -> Result<Crs> {
     parse(text.trim_start_matches('\u{feff}').trim()).ok_or_else(|| {
         Error::input(&prj, "is no well-known text of a CRS: say with crs in [[breaklines]] what the lines are in")
     })
+}
+
+/// Returns the files that are read with the `.shp` at `path`: itself, its attributes, its CRS.
+pub(super) fn all_files(path: &Path) -> Vec<PathBuf> {
+    [path.to_path_buf()].into_iter().chain(["dbf", "prj"].iter().filter_map(|ending| beside(path, ending))).collect()
 }
 
 /// Returns the file with this ending beside the `.shp`, in small letters or capitals.
@@ -197,7 +202,7 @@ mod tests {
     }
 
     fn read_bytes(bytes: &[u8]) -> Result<Vec<LineFeature>> {
-        let options: BreaklineOptions = toml::from_str("files = [\"a\"]").unwrap();
+        let options: LineOptions = toml::from_str("files = [\"a\"]").unwrap();
         let path = Path::new("/nowhere/a.shp");
         let (mut collector, mut warnings) = (FeatureCollector::new(path, &options), Warnings::default());
         read(path, bytes, &options, &mut collector, &mut warnings)?;
@@ -211,7 +216,7 @@ mod tests {
     fn lines_and_areas_are_read() {
         let ring = [[0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [1.0, 1.0, 1.0], [0.0, 0.0, 1.0]];
         let features = read_bytes(&file(&[record(13, &[&LINE, &LINE[1..]]), record(0, &[]), record(15, &[&ring])])).unwrap();
-        let numbers: Vec<i64> = features.iter().map(|feature| feature.number).collect();
+        let numbers: Vec<u64> = features.iter().map(|feature| feature.number).collect();
         assert_eq!(numbers, [1, 1, 3]);
         assert_eq!(features[1].shape, LineShape::Line(LINE[1..].to_vec()));
         assert_eq!(features[2].shape, LineShape::Area(vec![ring[..3].to_vec()]));
