@@ -48,6 +48,12 @@ impl Findings {
     pub const MOST: usize = 20;
 }
 
+/// Sorts cases, the worst first, and keeps the first ones.
+pub(crate) fn worst<T: Ord + Copy, K: Ord>(cases: &mut Vec<T>, key: impl Fn(&T) -> K) {
+    cases.sort_unstable_by_key(|case| (key(case), *case));
+    cases.truncate(Findings::MOST);
+}
+
 /// A place where two features, or two parts of one, have different heights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Disagreement {

@@ -14,16 +14,33 @@
 //! [`Breaklines::sites`] are added to the points that stay. Sites of lines without heights first get one from the points around:
 //! [`NearestHeights`].
 
+mod box_tree;
+mod clean;
+mod cut;
+mod drop_index;
+mod edge_table;
 mod error;
+mod exact;
 mod feature;
 mod findings;
+mod heights;
+mod lakes;
 mod nearest_heights;
+mod net;
+mod node;
 mod options;
+mod owners;
+mod refine;
 mod result;
+mod site;
+mod site_table;
+#[cfg(test)]
+mod tests;
 
 pub use error::BreaklineError;
 pub use feature::{Feature, FeatureId, FeatureKind, Vertex};
 pub use findings::{Disagreement, Findings, Rise, Uneven};
-pub use nearest_heights::NearestHeights;
+pub use nearest_heights::{NearestHeights, NearestPoint};
 pub use options::BreaklineOptions;
-pub use result::{BreaklineSite, Breaklines};
+pub use result::Breaklines;
+pub use site::BreaklineSite;

@@ -1,30 +1,24 @@
 //! Breaklines that are cut into edges.
 
+use crate::breaklines::clean::segments_of;
+use crate::breaklines::drop_index::DropIndex;
 use crate::breaklines::error::BreaklineError;
-use crate::breaklines::feature::{Feature, FeatureId, FeatureKind, Vertex};
+use crate::breaklines::feature::Feature;
 use crate::breaklines::findings::Findings;
+use crate::breaklines::heights::sites_with_heights;
+use crate::breaklines::lakes::Fraction;
+use crate::breaklines::net::{Net, net_of};
 use crate::breaklines::options::BreaklineOptions;
+use crate::breaklines::site::BreaklineSite;
 use crate::geometry::Site;
-use serde::{Deserialize, Serialize};
-
-/// A site of a breakline.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct BreaklineSite {
-    /// Where it is.
-    pub place: Site,
-    /// Its height, or `None` on a line without heights.
-    pub z: Option<i32>,
-    /// The kind whose height it has: of several, the first in the order of precedence.
-    pub kind: FeatureKind,
-    /// The feature whose height it has.
-    pub id: FeatureId,
-}
 
 /// Breaklines that are cut into edges of the triangulation.
 #[derive(Clone, Debug)]
 pub struct Breaklines {
     sites: Vec<BreaklineSite>,
     subsegments: Vec<[u32; 2]>,
+    index: DropIndex,
+    options: BreaklineOptions,
 }
 
 impl Breaklines {
@@ -33,21 +27,22 @@ impl Breaklines {
     /// # Errors
     /// See [`BreaklineError`].
     pub fn build(features: &[Feature], options: &BreaklineOptions) -> Result<(Breaklines, Findings), BreaklineError> {
-        let _ = options;
-        let mut sites: Vec<BreaklineSite> = features.iter().flat_map(sites_of).collect();
-        sites.sort_unstable_by_key(|site| (site.place[1], site.place[0], site.kind, site.z, site.id));
-        sites.dedup_by_key(|site| site.place);
-        let mut breaklines = Breaklines { sites, subsegments: Vec::new() };
-        for path in features.iter().flat_map(|feature| &feature.paths) {
-            let index = |v: &Vertex| breaklines.position(v.place).unwrap_or_default() as u32;
-            let pairs: Vec<[u32; 2]> = path.windows(2).map(|pair| [index(&pair[0]), index(&pair[1])]).collect();
-            breaklines.subsegments.extend(pairs);
-        }
-        breaklines.subsegments.sort_unstable();
-        breaklines.subsegments.dedup();
-        let (sites, subsegments) = (breaklines.sites.len() as u64, breaklines.subsegments.len() as u64);
-        let findings = Findings { features: features.len() as u64, sites, subsegments, ..Findings::default() };
-        Ok((breaklines, findings))
+        let mut findings = Findings::default();
+        let (segments, lakes) = segments_of(features, options, &mut findings)?;
+        let net = net_of(&segments, lakes, options, &mut findings)?;
+        let sites = sites_with_heights(&net, &segments, options, &mut findings);
+        let subsegments = subsegments_of(&net, &sites);
+        findings.sites = sites.len() as u64;
+        findings.subsegments = subsegments.len() as u64;
+        findings.sites_without_height = sites.iter().filter(|site| site.z.is_none()).count() as u64;
+        let places = subsegments.iter().map(|ends| ends.map(|end| sites[end as usize].place));
+        let index = DropIndex::new(places, net.lakes, options.spacing);
+        Ok((Breaklines { sites, subsegments, index, options: *options }, findings))
+    }
+
+    /// Returns the options that the lines were cut with.
+    pub fn options(&self) -> &BreaklineOptions {
+        &self.options
     }
 
     /// Returns the sites, unique in x and y, sorted by y, then x.
@@ -75,28 +70,29 @@ impl Breaklines {
     /// the sites of the breaklines too. The place must lie within `lattice::REACH` of zero.
     #[inline]
     pub fn drops(&self, place: Site) -> bool {
-        let in_disc = |[a, b]: &[u32; 2]| {
-            let [a, b] = [a, b].map(|&i| self.sites[i as usize].place);
-            let along = |axis: usize| i64::from(a[axis] - place[axis]) * i64::from(b[axis] - place[axis]);
-            along(0) + along(1) <= 0
-        };
-        self.subsegments.iter().any(in_disc)
+        self.index.drops(place)
     }
 
     /// Returns whether the triangle lies inside a lake, on its flat water. The triangle must be one of the mesh.
     pub fn is_water(&self, triangle: [Site; 3]) -> bool {
-        let _ = triangle;
-        false
+        self.index.is_water(Fraction::middle_of(&triangle))
     }
 
     /// Gives the sites that have no height those of `heights`, which has one for each of them, in their order.
-    pub(crate) fn set_missing_heights(&mut self, heights: impl IntoIterator<Item = i32>) {
+    pub(crate) fn set_missing_heights(&mut self, heights: impl IntoIterator<Item = Option<i32>>) {
         let missing = self.sites.iter_mut().filter(|site| site.z.is_none());
-        missing.zip(heights).for_each(|(site, z)| site.z = Some(z));
+        missing.zip(heights).for_each(|(site, z)| site.z = z);
     }
 }
 
-fn sites_of(feature: &Feature) -> impl Iterator<Item = BreaklineSite> {
-    let site = |v: &Vertex| BreaklineSite { place: v.place, z: v.z, kind: feature.kind, id: feature.id };
-    feature.paths.iter().flatten().map(site)
+/// Returns the subsegments as positions in `sites`, sorted.
+fn subsegments_of(net: &Net, sites: &[BreaklineSite]) -> Vec<[u32; 2]> {
+    let position = |place: Site| sites.partition_point(|site| (site.place[1], site.place[0]) < (place[1], place[0])) as u32;
+    let pair = |edge| {
+        let [a, b] = net.edges.places(&net.sites, edge).map(position);
+        [a.min(b), a.max(b)]
+    };
+    let mut subsegments: Vec<[u32; 2]> = net.edges.alive().map(pair).collect();
+    subsegments.sort_unstable();
+    subsegments
 }
