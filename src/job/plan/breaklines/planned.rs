@@ -1,7 +1,9 @@
 //! The breaklines of a plan.
 
-use crate::breaklines::{BreaklineError, BreaklineOptions, BreaklineSite, Breaklines, Feature, Findings, NearestHeights};
-use crate::geometry::Bounds;
+use crate::breaklines::{
+    BreaklineError, BreaklineOptions, BreaklineSite, Breaklines, Feature, FeatureId, Findings, NearestHeights, NearestPoint,
+};
+use crate::geometry::{Bounds, Site};
 use crate::geometry::lattice::Lattice;
 use crate::input::lines::LineFile;
 use crate::input::{PointRules, Source};
@@ -37,8 +39,8 @@ pub struct PlannedBreaklines {
     pub bounds: Option<Bounds<3>>,
     features: Vec<Feature>,
     options: BreaklineOptions,
-    /// The heights of lines that have none.
-    nearest: NearestHeights,
+    /// The points that gave heights to the sites of lines that have none.
+    nearest: Vec<Option<NearestPoint>>,
     #[serde(skip)]
     built: OnceLock<Arc<Breaklines>>,
 }
@@ -81,19 +83,19 @@ impl PlannedBreaklines {
         let built = Breaklines::build(&features, &options);
         let (mut built, findings) = built.map_err(|error| refuse(error, &files.files, cloud.lattice))?;
         let nearest = nearest_heights(&built, cloud)?;
-        let is_settled = nearest.settle(&mut built);
-        let planned = PlannedBreaklines {
+        nearest.settle(&mut built);
+        refuse_sites_without_height(&built, &files.files, cloud.lattice)?;
+        warnings.extend(sentences(&files.files, cloud.lattice, &findings, features_outside));
+        Ok(Some(PlannedBreaklines {
             files: files.files.iter().map(|file| file.path.clone()).collect(),
             findings,
             features_outside,
             bounds: Bounds::of_points(built.sites().iter().map(corner)),
             features,
             options,
-            nearest,
+            nearest: nearest.found().to_vec(),
             built: OnceLock::from(Arc::new(built)),
-        };
-        warnings.extend(sentences(&planned, cloud.lattice, is_settled));
-        Ok(Some(planned))
+        }))
     }
 
     /// Returns the breaklines.
@@ -106,7 +108,9 @@ impl PlannedBreaklines {
         }
         let built = Breaklines::build(&self.features, &self.options);
         let (mut built, _) = built.map_err(|error| Error::Broken(format!("the breaklines of the plan: {error}")))?;
-        self.nearest.settle(&mut built);
+        let mut nearest = NearestHeights::new(&built);
+        nearest.join(&self.nearest);
+        nearest.settle(&mut built);
         Ok(self.built.get_or_init(|| Arc::new(built)).clone())
     }
 }
@@ -134,7 +138,7 @@ fn nearest_heights(built: &Breaklines, cloud: &CloudOfPlan) -> Result<NearestHei
         Ok(nearest)
     };
     let join = |mut a: NearestHeights, b: NearestHeights| {
-        a.join(&b);
+        a.join(b.found());
         Ok(a)
     };
     // A collection for each thread and no more: they may be large.
@@ -145,13 +149,10 @@ fn nearest_heights(built: &Breaklines, cloud: &CloudOfPlan) -> Result<NearestHei
 
 /// Returns the error about features that cannot be breaklines.
 fn refuse(error: BreaklineError, files: &[LineFile], lattice: &Lattice) -> Error {
-    let at = |place: [i32; 2]| format!("({}, {})", lattice.world(0, place[0]), lattice.world(1, place[1]));
-    let of = |id: crate::breaklines::FeatureId, what: String| match files.get(id.file as usize) {
-        Some(file) => Error::input(&file.path, format!("feature {} {what}", id.feature)),
-        None => Error::Broken(format!("there is no file of lines {}", id.file)),
-    };
+    let at = |place| place_text(lattice, place);
     match error {
-        BreaklineError::Wall { id, place, heights: [low, high] } => of(
+        BreaklineError::Wall { id, place, heights: [low, high] } => about(
+            files,
             id,
             format!(
                 "is a wall: it has the heights {} and {} at {}, and a terrain has one height at a place; move one of its vertices, or leave \
@@ -161,10 +162,37 @@ fn refuse(error: BreaklineError, files: &[LineFile], lattice: &Lattice) -> Error
                 at(place)
             ),
         ),
-        BreaklineError::OutOfReach { id, place } => of(id, format!("has a vertex at {}, which no lattice reaches", at(place))),
+        BreaklineError::OutOfReach { id, place } => about(files, id, format!("has a vertex at {}, which no lattice reaches", at(place))),
         BreaklineError::TooMany { most } => Error::Config(format!(
             "the breaklines need more than {most} vertices, which do not fit the memory: set a greater spacing in [[breaklines]], raise \
              [limits] memory, or cut out the lines of the area"
         )),
     }
+}
+
+/// Checks that every site has a height.
+fn refuse_sites_without_height(built: &Breaklines, files: &[LineFile], lattice: &Lattice) -> Result<()> {
+    match built.sites().iter().find(|site| site.z.is_none()) {
+        None => Ok(()),
+        Some(BreaklineSite { place, id, .. }) => Err(about(
+            files,
+            *id,
+            format!(
+                "has no heights, and no point of the cloud is near it, for example at {}: give it heights, or leave it out",
+                place_text(lattice, *place)
+            ),
+        )),
+    }
+}
+
+/// Returns an error about a feature.
+fn about(files: &[LineFile], id: FeatureId, what: String) -> Error {
+    match files.get(id.file as usize) {
+        Some(file) => Error::input(&file.path, format!("feature {} {what}", id.feature)),
+        None => Error::Broken(format!("there is no file of lines {}", id.file)),
+    }
+}
+
+fn place_text(lattice: &Lattice, place: Site) -> String {
+    format!("({}, {})", lattice.world(0, place[0]), lattice.world(1, place[1]))
 }

@@ -1,23 +1,18 @@
 //! What a user should know about breaklines.
 
-use crate::breaklines::{Disagreement, FeatureId, Rise, Uneven};
+use crate::breaklines::{Disagreement, FeatureId, Findings, Rise, Uneven};
 use crate::geometry::Site;
 use crate::geometry::lattice::Lattice;
-use crate::job::plan::breaklines::planned::PlannedBreaklines;
+use crate::input::lines::LineFile;
 
-/// Returns the warnings about `planned`. `is_settled` tells whether every line without heights has got some.
-pub(super) fn sentences(planned: &PlannedBreaklines, lattice: &Lattice, is_settled: bool) -> Vec<String> {
-    let names = Names { planned, lattice };
-    let findings = &planned.findings;
+/// Returns the warnings about what cutting the lines of `files` has shown. `outside` features lie outside the box of the points.
+pub(super) fn sentences(files: &[LineFile], lattice: &Lattice, findings: &Findings, outside: u64) -> Vec<String> {
+    let names = Names { files, lattice, findings };
     let mut found = Vec::new();
     if findings.subsegments == 0 {
         found.push(format!(
-            "[[breaklines]]: no line lies in the box of the points, so there are no breaklines: {} features lie outside; look at their CRS",
-            planned.features_outside
+            "[[breaklines]]: no line lies in the box of the points, so there are no breaklines: {outside} features lie outside; look at their CRS"
         ));
-    }
-    if !is_settled {
-        found.push("[[breaklines]]: lines without heights have no point near, and get the height 0 of the lattice there".into());
     }
     found.extend(findings.worst_disagreements.first().map(|worst| names.disagreement(worst)));
     found.extend(findings.worst_rises.first().map(|worst| names.rise(worst)));
@@ -29,8 +24,9 @@ pub(super) fn sentences(planned: &PlannedBreaklines, lattice: &Lattice, is_settl
 }
 
 struct Names<'a> {
-    planned: &'a PlannedBreaklines,
+    files: &'a [LineFile],
     lattice: &'a Lattice,
+    findings: &'a Findings,
 }
 
 impl Names<'_> {
@@ -38,7 +34,7 @@ impl Names<'_> {
         format!(
             "[[breaklines]]: heights disagree at {} places where lines meet; the worst is {}: {} has the height {}, which is taken (a lake \
              before a river before a line), and {} has {}",
-            self.planned.findings.disagreements,
+            self.findings.disagreements,
             self.at(place),
             self.feature(kept.0),
             self.height(kept.1),
@@ -50,7 +46,7 @@ impl Names<'_> {
     fn rise(&self, &Rise { id, place, steps }: &Rise) -> String {
         format!(
             "[[breaklines]]: {} rivers rise on their way down; the worst is {}, by {} at {}; its heights are kept as they are",
-            self.planned.findings.rising_rivers,
+            self.findings.rising_rivers,
             self.feature(id),
             self.difference(i64::from(steps)),
             self.at(place)
@@ -61,7 +57,7 @@ impl Names<'_> {
         format!(
             "[[breaklines]]: {} lakes are not flat; the worst is {}, which is {} higher at {} than its lowest height, {}; that is the height \
              of all of it",
-            self.planned.findings.uneven_lakes,
+            self.findings.uneven_lakes,
             self.feature(id),
             self.difference(i64::from(highest) - i64::from(lowest)),
             self.at(place),
@@ -70,7 +66,7 @@ impl Names<'_> {
     }
 
     fn feature(&self, id: FeatureId) -> String {
-        let file = self.planned.files.get(id.file as usize).map(|path| path.display().to_string()).unwrap_or_default();
+        let file = self.files.get(id.file as usize).map(|file| file.path.display().to_string()).unwrap_or_default();
         format!("feature {} of {file}", id.feature)
     }
 
