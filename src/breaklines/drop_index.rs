@@ -116,7 +116,8 @@ impl Marks {
                 if *cell == Cell::Land {
                     let at = [corner(0, column), corner(1, row)];
                     let is_water = || lakes.hold(Fraction::middle_of(&[at]), |_| true);
-                    *cell = if before == Cell::Mixed { if is_water() { Cell::Water } else { Cell::Land } } else { before };
+                    *cell =
+                        if before == Cell::Mixed { if is_water() { Cell::Water } else { Cell::Land } } else { before };
                 }
                 before = *cell;
             }

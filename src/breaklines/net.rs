@@ -100,7 +100,8 @@ fn choose(
         let places = ends.map(|end| sites.place(end));
         let outside = within.is_some_and(|within| !places.iter().all(|&place| holds(&within, place)));
         let inside = || {
-            let own: Vec<u32> = pieces.owners.of(*owners).iter().map(|(owner, _)| segments[*owner as usize].lake).collect();
+            let own: Vec<u32> =
+                pieces.owners.of(*owners).iter().map(|(owner, _)| segments[*owner as usize].lake).collect();
             insides.hold(Fraction::middle_of(&places), |lake| !own.contains(&lake))
         };
         if outside {

@@ -29,7 +29,13 @@ use std::collections::HashSet;
 /// # Errors
 /// [`BreaklineError::TooMany`].
 pub(crate) fn refine(sites: &mut SiteTable, edges: &mut EdgeTable, most: usize) -> Result<(), BreaklineError> {
-    let mut refinement = Refinement { sites, edges, used: HashSet::new(), points: GrowingTree::default(), discs: GrowingTree::default() };
+    let mut refinement = Refinement {
+        sites,
+        edges,
+        used: HashSet::new(),
+        points: GrowingTree::default(),
+        discs: GrowingTree::default(),
+    };
     let mut fresh: Vec<u32> = refinement.edges.alive().collect();
     while !fresh.is_empty() {
         fresh = refinement.round(fresh);
@@ -84,7 +90,8 @@ impl Refinement<'_> {
         self.used.extend(&new_sites);
         let points = new_sites.iter().map(|&site| (Bounds::of_point(self.sites.place(site)), site)).collect();
         self.points.add(points, |_| true);
-        let mut found: Vec<(u32, Witness)> = new_sites.par_iter().flat_map_iter(|&site| self.edges_around(site)).collect();
+        let mut found: Vec<(u32, Witness)> =
+            new_sites.par_iter().flat_map_iter(|&site| self.edges_around(site)).collect();
         found.par_extend(fresh.par_iter().filter_map(|&edge| Some((edge, self.site_inside(edge)?))));
         let discs = fresh.iter().map(|&edge| (self.disc_box(edge), edge)).collect();
         let alive = |edge: u32| self.edges.edges[edge as usize].alive;

@@ -87,7 +87,8 @@ impl Breaklines {
 
 /// Returns the subsegments as positions in `sites`, sorted.
 fn subsegments_of(net: &Net, sites: &[BreaklineSite]) -> Vec<[u32; 2]> {
-    let position = |place: Site| sites.partition_point(|site| (site.place[1], site.place[0]) < (place[1], place[0])) as u32;
+    let position =
+        |place: Site| sites.partition_point(|site| (site.place[1], site.place[0]) < (place[1], place[0])) as u32;
     let pair = |edge| {
         let [a, b] = net.edges.places(&net.sites, edge).map(position);
         [a.min(b), a.max(b)]

@@ -60,7 +60,9 @@ impl InputOptions {
                 classes.iter().for_each(|&class| kept[class as usize] = true);
                 kept
             }
-            None => std::array::from_fn(|class| class != 7 && class != 18 && !(class == 20 && self.without_ignored_ground)),
+            None => {
+                std::array::from_fn(|class| class != 7 && class != 18 && !(class == 20 && self.without_ignored_ground))
+            }
         }
     }
 

@@ -61,7 +61,13 @@ mod tests {
             assert_eq!(ends_of(line.trim_end(), &lattice), Some(expected), "{line}");
             assert!(line.ends_with(",river\n"));
         }
-        for wrong in ["", HEADER, "1,2,3,4,5,6", "635000.1,0,0,635000.0001,0,0,line", "635000.0001,-0.7,0,635000.0001,-0.7,0,line,1"] {
+        for wrong in [
+            "",
+            HEADER,
+            "1,2,3,4,5,6",
+            "635000.1,0,0,635000.0001,0,0,line",
+            "635000.0001,-0.7,0,635000.0001,-0.7,0,line,1",
+        ] {
             assert_eq!(ends_of(wrong, &lattice), None, "{wrong}");
         }
         assert!(ends_of("635000.0001,-0.7,0,635000.2501,-0.7,0.001,line", &lattice).is_some());

@@ -48,7 +48,9 @@ impl BreaklineEdges {
         let taken = bytes.saturating_mul(BYTES_PER_BYTE);
         if taken > memory {
             let wanted = taken.saturating_mul(4) >> 20;
-            return Err(Error::Memory(format!("the edges along breaklines take more than there is: set --memory \"{wanted} MiB\"")));
+            return Err(Error::Memory(format!(
+                "the edges along breaklines take more than there is: set --memory \"{wanted} MiB\""
+            )));
         }
         let mut found = BreaklineEdges::default();
         for (number, line) in (1..).zip(BufReader::new(file).split(b'\n')) {
@@ -144,7 +146,11 @@ pub(super) struct CheckedBreaklines {
 impl CheckedBreaklines {
     /// Returns what is left to say once all tiles are checked.
     pub(super) fn of(edges: &BreaklineEdges, grid: &SourceGrid) -> CheckedBreaklines {
-        CheckedBreaklines { edges: edges.edges.len() as u64, failure: edges.failure.clone(), missing: edges.missing(grid) }
+        CheckedBreaklines {
+            edges: edges.edges.len() as u64,
+            failure: edges.failure.clone(),
+            missing: edges.missing(grid),
+        }
     }
 }
 

@@ -157,7 +157,10 @@ pub fn verify_against(directory: &Path, memory: u64, inputs: &[PathBuf]) -> Resu
     let borders = run.borders.into_inner().unwrap_or_else(PoisonError::into_inner);
     let matches = borders.match_all(&grid, &files)?;
     let lines = lines_read.as_ref().map(|lines| CheckedBreaklines::of(lines, &grid));
-    let proof = inputs.zip(run.places).map(|(inputs, places)| inputs.compare(places, lines_read.as_ref(), &grid)).transpose()?;
+    let proof = inputs
+        .zip(run.places)
+        .map(|(inputs, places)| inputs.compare(places, lines_read.as_ref(), &grid))
+        .transpose()?;
     Ok(Verdict::new(CheckedMesh { files: &files, findings, matches, lines }, &report, &written, proof))
 }
 

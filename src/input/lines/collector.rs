@@ -37,7 +37,8 @@ impl LeftOut {
     }
 
     fn warning(&self, why: &str) -> Option<String> {
-        (self.count > 0).then(|| format!("{} features {why} and are left out, the first is feature {}", self.count, self.first))
+        (self.count > 0)
+            .then(|| format!("{} features {why} and are left out, the first is feature {}", self.count, self.first))
     }
 }
 
@@ -65,7 +66,12 @@ impl<'a> FeatureCollector<'a> {
         let height = match &self.options.height_field {
             None => None,
             Some(name) => Some(attributes.height.number().ok_or_else(|| {
-                self.refuse(number, format!("has no number in {name:?}, which height_field names: give it one, or leave the feature out"))
+                self.refuse(
+                    number,
+                    format!(
+                        "has no number in {name:?}, which height_field names: give it one, or leave the feature out"
+                    ),
+                )
             })?),
         };
         let before = self.features.len();
@@ -80,7 +86,9 @@ impl<'a> FeatureCollector<'a> {
     pub(super) fn finish(self) -> (Vec<LineFeature>, Warnings) {
         let mut warnings = Warnings::default();
         warnings.extend(self.without_geometry.warning("have no geometry"));
-        warnings.extend(self.too_short.warning("have a line or an outline without two different vertices (an area: three)"));
+        warnings.extend(
+            self.too_short.warning("have a line or an outline without two different vertices (an area: three)"),
+        );
         warnings.extend(self.of_other_kinds.warning("have a value of kind_field that kinds does not list"));
         (self.features, warnings)
     }
@@ -91,7 +99,9 @@ impl<'a> FeatureCollector<'a> {
     }
 
     fn kind(&self, number: u64, attributes: &WantedAttributes) -> Result<Option<FeatureKind>> {
-        let Some(name) = &self.options.kind_field else { return Ok(Some(self.options.kind.unwrap_or(FeatureKind::Line))) };
+        let Some(name) = &self.options.kind_field else {
+            return Ok(Some(self.options.kind.unwrap_or(FeatureKind::Line)));
+        };
         let value = attributes.kind.text();
         if let Some(kinds) = &self.options.kinds {
             return Ok(value.and_then(|value| kinds.get(&value).copied()));
@@ -104,17 +114,28 @@ impl<'a> FeatureCollector<'a> {
         })
     }
 
-    fn add_geometry(&mut self, number: u64, kind: FeatureKind, height: Option<f64>, geometry: RawGeometry) -> Result<()> {
+    fn add_geometry(
+        &mut self,
+        number: u64,
+        kind: FeatureKind,
+        height: Option<f64>,
+        geometry: RawGeometry,
+    ) -> Result<()> {
         match geometry {
             RawGeometry::Empty => Ok(()),
-            RawGeometry::Other(what) => {
-                Err(self.refuse(number, format!("is {what}: breaklines are lines or areas; leave it out, or make a line of it")))
-            }
+            RawGeometry::Other(what) => Err(self.refuse(
+                number,
+                format!("is {what}: breaklines are lines or areas; leave it out, or make a line of it"),
+            )),
             RawGeometry::Several(all) => {
                 all.into_iter().try_for_each(|geometry| self.add_geometry(number, kind, height, geometry))
             }
-            RawGeometry::Lines(lines) => lines.into_iter().try_for_each(|line| self.add_line(number, kind, height, line)),
-            RawGeometry::Areas(areas) => areas.into_iter().try_for_each(|area| self.add_area(number, kind, height, area)),
+            RawGeometry::Lines(lines) => {
+                lines.into_iter().try_for_each(|line| self.add_line(number, kind, height, line))
+            }
+            RawGeometry::Areas(areas) => {
+                areas.into_iter().try_for_each(|area| self.add_area(number, kind, height, area))
+            }
         }
     }
 
@@ -138,7 +159,13 @@ impl<'a> FeatureCollector<'a> {
         Ok(())
     }
 
-    fn add_area(&mut self, number: u64, kind: FeatureKind, height: Option<f64>, rings: Vec<Vec<[f64; 3]>>) -> Result<()> {
+    fn add_area(
+        &mut self,
+        number: u64,
+        kind: FeatureKind,
+        height: Option<f64>,
+        rings: Vec<Vec<[f64; 3]>>,
+    ) -> Result<()> {
         let mut kept = Vec::with_capacity(rings.len());
         for (index, ring) in rings.into_iter().enumerate() {
             let mut ring = self.checked(number, height, ring)?;
@@ -166,7 +193,12 @@ impl<'a> FeatureCollector<'a> {
         for (index, vertex) in line.iter_mut().enumerate() {
             let is_place = |value: f64| value.abs() < BEYOND_THE_EARTH;
             if !is_place(vertex[0]) || !is_place(vertex[1]) {
-                let what = format!("has the vertex ({}, {}), its number {}, which is no place", vertex[0], vertex[1], index + 1);
+                let what = format!(
+                    "has the vertex ({}, {}), its number {}, which is no place",
+                    vertex[0],
+                    vertex[1],
+                    index + 1
+                );
                 return Err(self.refuse(number, what));
             }
             vertex[2] = match self.options.heights {
@@ -201,7 +233,11 @@ mod tests {
         toml::from_str(&format!("files = [\"a\"]\n{rest}")).unwrap()
     }
 
-    fn collect(rest: &str, geometry: RawGeometry, attributes: WantedAttributes) -> Result<(Vec<LineFeature>, Warnings)> {
+    fn collect(
+        rest: &str,
+        geometry: RawGeometry,
+        attributes: WantedAttributes,
+    ) -> Result<(Vec<LineFeature>, Warnings)> {
         let options = options(rest);
         let mut collector = FeatureCollector::new(Path::new("a.shp"), &options);
         collector.add(7, geometry, &attributes)?;
@@ -264,7 +300,8 @@ mod tests {
         let with = |kind: &str, height: Attribute| WantedAttributes { kind: Attribute::Text(kind.into()), height };
         let (features, _) = collect("kind_field = \"T\"", line(1.0), with(" River ", Attribute::Missing)).unwrap();
         assert_eq!(features[0].kind, FeatureKind::River);
-        let error = collect("kind_field = \"T\"", line(1.0), with("creek", Attribute::Missing)).unwrap_err().to_string();
+        let error =
+            collect("kind_field = \"T\"", line(1.0), with("creek", Attribute::Missing)).unwrap_err().to_string();
         assert!(error.contains("\"creek\"") && error.contains("kinds"), "{error}");
         let table = "kind_field = \"T\"\nkinds = { \"46006\" = \"river\" }";
         let number = WantedAttributes { kind: Attribute::Number(46006.0), height: Attribute::Missing };

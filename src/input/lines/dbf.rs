@@ -99,7 +99,12 @@ fn layout(bytes: &[u8]) -> Option<(usize, usize, Vec<DbfField>)> {
     for field in described.chunks_exact(FIELD).take_while(|field| field[0] != b'\r') {
         let name = field[..11].split(|&byte| byte == 0).next().unwrap_or_default();
         let width = usize::from(field[16]);
-        fields.push(DbfField { name: String::from_utf8_lossy(name).trim().to_string(), type_letter: field[11], at, width });
+        fields.push(DbfField {
+            name: String::from_utf8_lossy(name).trim().to_string(),
+            type_letter: field[11],
+            at,
+            width,
+        });
         at += width;
     }
     (at <= record).then_some((start, record, fields))

@@ -53,12 +53,7 @@ enum Geometry {
 ///
 /// # Errors
 /// `Input` if it is no GeoJSON, and those of the collector.
-pub(super) fn read(
-    path: &Path,
-    bytes: &[u8],
-    options: &LineOptions,
-    collector: &mut FeatureCollector,
-) -> Result<Crs> {
+pub(super) fn read(path: &Path, bytes: &[u8], options: &LineOptions, collector: &mut FeatureCollector) -> Result<Crs> {
     let broken = |error: serde_json::Error| Error::input(path, format!("is no GeoJSON that can be read: {error}"));
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let document: Document = serde_json::from_slice(text).map_err(broken)?;
@@ -66,7 +61,9 @@ pub(super) fn read(
         None => from_epsg(WGS_84).unwrap_or_default(),
         Some(Value::Null) => Crs::default(),
         Some(value) => named_crs(value).ok_or_else(|| {
-            let what = format!("its member crs says {value}, which is not known: say with crs in [[breaklines]] what the lines are in");
+            let what = format!(
+                "its member crs says {value}, which is not known: say with crs in [[breaklines]] what the lines are in"
+            );
             Error::input(path, what)
         })?,
     };
@@ -100,9 +97,7 @@ fn add(
     let value = |name: &Option<String>| match name.as_ref().map(|name| (name, properties.get(name))) {
         None => Ok(Attribute::Missing),
         Some((_, Some(Value::String(text)))) => Ok(Attribute::Text(text.clone())),
-        Some((_, Some(Value::Number(number)))) => {
-            Ok(number.as_f64().map_or(Attribute::Missing, Attribute::Number))
-        }
+        Some((_, Some(Value::Number(number)))) => Ok(number.as_f64().map_or(Attribute::Missing, Attribute::Number)),
         Some((_, Some(Value::Null))) => Ok(Attribute::Missing),
         Some((_, Some(other))) => Ok(Attribute::Text(other.to_string())),
         // Where most have the attribute, a misspelt name must not look like features without a value.
@@ -154,8 +149,8 @@ fn named_crs(value: &Value) -> Option<Crs> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::input::lines::feature::{LineFeature, LineShape};
     use crate::breaklines::FeatureKind;
+    use crate::input::lines::feature::{LineFeature, LineShape};
 
     fn read_text(text: &str, rest: &str) -> Result<(Crs, Vec<LineFeature>)> {
         let options: LineOptions = toml::from_str(&format!("files = [\"a\"]\n{rest}")).unwrap();
@@ -198,7 +193,8 @@ mod tests {
     #[test]
     fn the_earlier_member_says_another_system() {
         let with = |crs: &str| {
-            read_text(&format!(r#"{{"type": "FeatureCollection", "crs": {crs}, "features": []}}"#), "").map(|read| read.0)
+            read_text(&format!(r#"{{"type": "FeatureCollection", "crs": {crs}, "features": []}}"#), "")
+                .map(|read| read.0)
         };
         let named = |name: &str| with(&format!(r#"{{"type": "name", "properties": {{"name": "{name}"}}}}"#));
         assert_eq!(named("urn:ogc:def:crs:EPSG::25832").unwrap().epsg, Some(25832));
@@ -214,7 +210,10 @@ mod tests {
             ("{\"type\": \"FeatureCollection\", \"features\": [", "is no GeoJSON"),
             ("{}", "missing field"),
             (r#"{"type": "Topology"}"#, "Topology"),
-            (r#"{"type": "FeatureCollection", "features": [{"type": "Feature", "geometry": {"type": "Circle"}}]}"#, "feature 1"),
+            (
+                r#"{"type": "FeatureCollection", "features": [{"type": "Feature", "geometry": {"type": "Circle"}}]}"#,
+                "feature 1",
+            ),
             (r#"{"type": "LineString", "coordinates": [[0, null, 1]]}"#, "null"),
             (r#"{"type": "LineString", "coordinates": [[0], [1]]}"#, "no place"),
             (r#"{"type": "LineString", "coordinates": [[0, 0], [1, 1]]}"#, "no heights"),

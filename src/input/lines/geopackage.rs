@@ -36,7 +36,8 @@ pub(super) fn read(path: &Path, options: &LineOptions, collector: &mut FeatureCo
     let layer = find_layer(path, &file, options)?;
     for name in options.kind_field.iter().chain(&options.height_field) {
         if layer.column(name).is_none() {
-            let there: Vec<String> = layer.columns.iter().filter(|column| **column != layer.geometry).cloned().collect();
+            let there: Vec<String> =
+                layer.columns.iter().filter(|column| **column != layer.geometry).cloned().collect();
             return Err(Error::input(path, no_attribute(name, &there)));
         }
     }
@@ -82,7 +83,10 @@ fn refuse_open_journal(path: &Path) -> Result<()> {
     journal.push("-wal");
     let is_there = Path::new(&journal).metadata().is_ok_and(|meta| meta.len() > 0);
     match is_there {
-        true => Err(Error::input(path, "is open in another program, or was not closed (a file -wal is beside it): close it there first")),
+        true => Err(Error::input(
+            path,
+            "is open in another program, or was not closed (a file -wal is beside it): close it there first",
+        )),
         false => Ok(()),
     }
 }
@@ -169,12 +173,14 @@ fn crs(path: &Path, file: &Connection, srs: i64) -> Result<Crs> {
     if srs <= 0 {
         return Ok(Crs::default());
     }
-    let query =
-        "SELECT organization, organization_coordsys_id, definition FROM gpkg_spatial_ref_sys WHERE srs_id = ?1";
+    let query = "SELECT organization, organization_coordsys_id, definition FROM gpkg_spatial_ref_sys WHERE srs_id = ?1";
     let row = |row: &Row| Ok((row.get::<_, String>(0)?, row.get::<_, i64>(1)?, row.get::<_, Option<String>>(2)?));
     let found = file.query_row(query, [srs], row).optional().map_err(broken)?;
     let Some((organization, code, text)) = found else {
-        return Err(Error::input(path, format!("its CRS {srs} is not in its table of CRSs: say with crs in [[breaklines]] what it is")));
+        return Err(Error::input(
+            path,
+            format!("its CRS {srs} is not in its table of CRSs: say with crs in [[breaklines]] what it is"),
+        ));
     };
     let code = u32::try_from(code).ok().filter(|_| organization.eq_ignore_ascii_case("EPSG"));
     let of_text = || text.as_deref().and_then(parse).map(|crs| Crs { epsg: crs.epsg.or(code), ..crs });

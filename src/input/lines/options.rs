@@ -51,7 +51,9 @@ impl LineOptions {
         }
         match (&self.kind, &self.kind_field, &self.kinds) {
             (Some(_), Some(_), _) => Some("[[breaklines]] kind and kind_field are both set: keep one of them"),
-            (_, None, Some(_)) => Some("[[breaklines]] kinds says what the values of kind_field mean: set kind_field too"),
+            (_, None, Some(_)) => {
+                Some("[[breaklines]] kinds says what the values of kind_field mean: set kind_field too")
+            }
             _ => None,
         }
     }

@@ -12,7 +12,8 @@ pub(super) fn areas_of(rings: Vec<Ring>) -> Vec<Vec<Ring>> {
     for island in islands {
         // In the smallest area around it: an island may have a lake that has an island.
         let size = |area: &&mut Vec<Ring>| double_area(&area[0]).abs();
-        let around = areas.iter_mut().filter(|area| holds(&area[0], &island)).min_by(|a, b| size(a).total_cmp(&size(b)));
+        let around =
+            areas.iter_mut().filter(|area| holds(&area[0], &island)).min_by(|a, b| size(a).total_cmp(&size(b)));
         match around {
             Some(area) => area.push(island),
             // A ring in no area is an area that runs the wrong way.

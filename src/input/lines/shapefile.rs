@@ -128,7 +128,9 @@ fn attributes(path: &Path, options: &LineOptions) -> Result<Option<DbfTable>> {
 
 fn crs(path: &Path, warnings: &mut Warnings) -> Result<Crs> {
     let Some(prj) = beside(path, "prj") else {
-        warnings.push("there is no .prj file beside it, so it says no CRS: its lines are taken to be in that of the points".into());
+        warnings.push(
+            "there is no .prj file beside it, so it says no CRS: its lines are taken to be in that of the points",
+        );
         return Ok(Crs::default());
     };
     let text = std::fs::read(&prj).map_err(Error::io("read", &prj))?;
@@ -145,7 +147,10 @@ pub(super) fn all_files(path: &Path) -> Vec<PathBuf> {
 
 /// Returns the file with this ending beside the `.shp`, in small letters or capitals.
 fn beside(path: &Path, ending: &str) -> Option<PathBuf> {
-    [ending.to_string(), ending.to_uppercase()].iter().map(|ending| path.with_extension(ending)).find(|path| path.is_file())
+    [ending.to_string(), ending.to_uppercase()]
+        .iter()
+        .map(|ending| path.with_extension(ending))
+        .find(|path| path.is_file())
 }
 
 /// The first four bytes as a whole number. Callers have checked that they are there.
@@ -215,7 +220,8 @@ mod tests {
     #[test]
     fn lines_and_areas_are_read() {
         let ring = [[0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [1.0, 1.0, 1.0], [0.0, 0.0, 1.0]];
-        let features = read_bytes(&file(&[record(13, &[&LINE, &LINE[1..]]), record(0, &[]), record(15, &[&ring])])).unwrap();
+        let features =
+            read_bytes(&file(&[record(13, &[&LINE, &LINE[1..]]), record(0, &[]), record(15, &[&ring])])).unwrap();
         let numbers: Vec<u64> = features.iter().map(|feature| feature.number).collect();
         assert_eq!(numbers, [1, 1, 3]);
         assert_eq!(features[1].shape, LineShape::Line(LINE[1..].to_vec()));
@@ -232,7 +238,9 @@ mod tests {
         let mut short = sound.clone();
         short[24..28].copy_from_slice(&(sound.len() as u32 / 2 - 4).to_be_bytes());
         assert!(read_bytes(&short).unwrap_err().to_string().contains("record 2"));
-        for (at, value, word) in [(100 + 8, 77u32, "type 77"), (108 + 36, u32::MAX, "damaged"), (108 + 40, 1 << 31, "damaged")] {
+        for (at, value, word) in
+            [(100 + 8, 77u32, "type 77"), (108 + 36, u32::MAX, "damaged"), (108 + 40, 1 << 31, "damaged")]
+        {
             let mut damaged = sound.clone();
             damaged[at..at + 4].copy_from_slice(&value.to_le_bytes());
             let error = read_bytes(&damaged).unwrap_err().to_string();

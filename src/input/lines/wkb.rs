@@ -53,7 +53,9 @@ impl<'a> WkbReader<'a> {
                 let members = (0..count).map(|_| self.geometry(depth + 1)).collect::<Result<Vec<_>, _>>()?;
                 Ok(RawGeometry::Several(members))
             }
-            8..=10 | 13 | 14 => Err("has curves: make lines of them, for example with `ogr2ogr -nlt CONVERT_TO_LINEAR`".into()),
+            8..=10 | 13 | 14 => {
+                Err("has curves: make lines of them, for example with `ogr2ogr -nlt CONVERT_TO_LINEAR`".into())
+            }
             15..=17 => Ok(RawGeometry::Other("a surface")),
             kind => Err(format!("has a geometry of the type {kind}, which is not known")),
         }

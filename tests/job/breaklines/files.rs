@@ -77,7 +77,8 @@ pub(super) fn geopackage(folder: &Path, name: &str, features: &Features) -> Path
     .unwrap();
     for (kind, lines) in &features.all {
         let blob = blob(features.are_areas, lines);
-        file.execute("INSERT INTO waters (geom, kind, level) VALUES (?1, ?2, ?3)", params![blob, kind, features.level]).unwrap();
+        file.execute("INSERT INTO waters (geom, kind, level) VALUES (?1, ?2, ?3)", params![blob, kind, features.level])
+            .unwrap();
     }
     file.close().unwrap();
     path

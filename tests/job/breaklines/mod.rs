@@ -43,7 +43,10 @@ fn every_edge_is_in_the_mesh_and_lakes_are_flat() {
     let dropped = number(&report["points"]["at_breaklines"]);
     assert!(dropped > 300);
     assert_eq!(number(&report["points"]["kept"]) + dropped, number(&report["points"]["read"]));
-    assert_eq!(number(&report["sites"]), number(&report["points"]["kept"]) - number(&report["duplicates"]) + mesh.ends.len() as u64);
+    assert_eq!(
+        number(&report["sites"]),
+        number(&report["points"]["kept"]) - number(&report["duplicates"]) + mesh.ends.len() as u64
+    );
     let verdict = job.verified();
     assert_eq!(verdict["breaklines"], lines["subsegments"]);
     let against = gdt_batch(job.folder(), &["verify", "out", "--json", "--input", survey.cloud.to_str().unwrap()]);
@@ -78,7 +81,8 @@ fn what_is_wrong_with_heights_is_said() {
 fn lines_without_heights_take_them_from_an_attribute_or_the_points() {
     let survey = Survey::new(2_000);
     let flat = |z: f64| vec![vec![[60.0, 60.0, z], [90.0, 60.0, z], [90.0, 90.0, z], [60.0, 90.0, z]]];
-    let lake = geopackage(survey.folder(), "flat.gpkg", &Features::areas(&[("lake", flat(f64::NAN))]).with_level(12.25));
+    let lake =
+        geopackage(survey.folder(), "flat.gpkg", &Features::areas(&[("lake", flat(f64::NAN))]).with_level(12.25));
     let heights = |rest: &str| {
         let job = survey.job_with(&[&lake], &format!("kind = \"lake\"\n{rest}"));
         job.report();
@@ -91,8 +95,14 @@ fn lines_without_heights_take_them_from_an_attribute_or_the_points() {
     };
     assert_eq!(heights("height_field = \"level\""), [1_225]);
     let from_points = heights("heights = \"points\"");
-    assert!(from_points.len() == 1 && survey.points().iter().any(|point| point[2] == from_points[0]), "{from_points:?}");
-    survey.job_with(&[&lake], "kind = \"lake\"").run().refused(3, &["flat.gpkg: feature 1 has no heights", "height_field"]);
+    assert!(
+        from_points.len() == 1 && survey.points().iter().any(|point| point[2] == from_points[0]),
+        "{from_points:?}"
+    );
+    survey
+        .job_with(&[&lake], "kind = \"lake\"")
+        .run()
+        .refused(3, &["flat.gpkg: feature 1 has no heights", "height_field"]);
 }
 
 /// A lake has no points inside, so its triangles are long.
@@ -125,7 +135,8 @@ fn bounds_and_lines_that_leave_the_cloud_are_cut() {
     let long = vec![[-500.0, 55.0, 30.0], [700.0, 65.0, 10.0]];
     let far = vec![[9_000.0, 9_000.0, 1.0], [9_100.0, 9_000.0, 1.0]];
     let lines = shapefile(survey.folder(), "long", &Features::lines(&[("line", long), ("line", far)]));
-    let job = survey.job_with(&[&lines], "kind = \"line\"").with("input", "bounds = [500040, 4000020, 500120, 4000110]");
+    let job =
+        survey.job_with(&[&lines], "kind = \"line\"").with("input", "bounds = [500040, 4000020, 500120, 4000110]");
     let report = job.report();
     assert_eq!(number(&report["breaklines"]["features_outside"]), 1);
     let mesh = Mesh::of(&job);
@@ -134,7 +145,8 @@ fn bounds_and_lines_that_leave_the_cloud_are_cut() {
         assert!((4_000..=12_000).contains(&p[0]) && (2_000..=11_000).contains(&p[1]), "{p:?}");
     }
     job.verified();
-    let nothing = shapefile(survey.folder(), "far", &Features::lines(&[("line", vec![[5e3, 5e3, 1.0], [6e3, 5e3, 1.0]])]));
+    let nothing =
+        shapefile(survey.folder(), "far", &Features::lines(&[("line", vec![[5e3, 5e3, 1.0], [6e3, 5e3, 1.0]])]));
     let said = survey.job_with(&[nothing], "").run().succeeded();
     assert!(said.out.contains("no line lies in the box of the points"), "{}", said.out);
 }

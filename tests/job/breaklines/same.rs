@@ -53,7 +53,8 @@ fn threads_tasks_and_an_interruption_leave_the_same_bytes() {
 fn other_lines_make_another_job() {
     let survey = Survey::new(1_000);
     let lines = survey.lines();
-    let stopped = survey.job_with(&lines, "kind_field = \"kind\"").tiles_of(200).variable("GDT_FAULT", "signal-merge:3");
+    let stopped =
+        survey.job_with(&lines, "kind_field = \"kind\"").tiles_of(200).variable("GDT_FAULT", "signal-merge:3");
     stopped.run().refused(1, &["interrupted"]);
     // The attributes of the Shapefile say something else now.
     let table = lines[2].with_extension("dbf");

@@ -20,7 +20,8 @@ pub(super) const ORIGIN: [f64; 2] = [500_000.0, 4_000_000.0];
 const SIDE: u64 = 16_000;
 
 /// The outlines of the lake and of its island, in centimetres. The island is cut out of the water.
-pub(super) const LAKE: [[i64; 2]; 5] = [[9_000, 8_000], [13_500, 8_500], [14_000, 12_000], [11_000, 13_500], [8_500, 11_500]];
+pub(super) const LAKE: [[i64; 2]; 5] =
+    [[9_000, 8_000], [13_500, 8_500], [14_000, 12_000], [11_000, 13_500], [8_500, 11_500]];
 pub(super) const ISLAND: [[i64; 2]; 4] = [[10_500, 10_000], [12_000, 10_100], [11_900, 11_200], [10_600, 11_000]];
 
 /// Points in random places on a slope. Ten are marked as ignored ground.
@@ -33,7 +34,8 @@ pub(super) struct Survey {
 impl Survey {
     pub(super) fn new(count: usize) -> Survey {
         let (folder, mut random) = (tempfile::tempdir().unwrap(), Random(5));
-        let (mut text, mut points, mut places) = (String::from("x,y,z,classification\n"), HashSet::new(), BTreeSet::new());
+        let (mut text, mut points, mut places) =
+            (String::from("x,y,z,classification\n"), HashSet::new(), BTreeSet::new());
         while places.len() < count {
             let [x, y] = [0, 1].map(|_| random.below(SIDE + 1) as i64);
             if !places.insert([x, y]) {
@@ -61,7 +63,8 @@ impl Survey {
 
     /// Writes the river and returns its file.
     pub(super) fn river(&self) -> PathBuf {
-        let course = vec![[0.0, 140.0, 16.0], [40.0, 120.0, 15.0], [55.0, 70.0, 13.0], [100.0, 40.0, 11.0], [160.0, 30.0, 9.0]];
+        let course =
+            vec![[0.0, 140.0, 16.0], [40.0, 120.0, 15.0], [55.0, 70.0, 13.0], [100.0, 40.0, 11.0], [160.0, 30.0, 9.0]];
         geojson(self.folder(), "river.geojson", &Features::lines(&[("river", course)]))
     }
 
@@ -70,11 +73,7 @@ impl Survey {
         let ring = |ring: &[[i64; 2]]| ring.iter().map(|[x, y]| [*x as f64 / 100.0, *y as f64 / 100.0, 10.0]).collect();
         let lake = Features::areas(&[("lake", vec![ring(&LAKE), ring(&ISLAND)])]);
         let lines = Features::lines(&[("line", cross(0)), ("line", cross(1)), ("line", cross(2))]);
-        vec![
-            self.river(),
-            geopackage(self.folder(), "lake.gpkg", &lake),
-            shapefile(self.folder(), "lines", &lines),
-        ]
+        vec![self.river(), geopackage(self.folder(), "lake.gpkg", &lake), shapefile(self.folder(), "lines", &lines)]
     }
 
     /// Returns a job with all lines.

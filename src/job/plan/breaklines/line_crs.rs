@@ -25,7 +25,8 @@ pub(super) fn bring_to_points(file: &mut LineFile, choice: &LineCrs, points: &Cr
         return Err(other_system(file, own, points, &differences.join(" and ")));
     }
     if !own.is_named() && points.is_named() && file.warnings.is_empty() {
-        file.warnings.push(format!("it says no CRS: its lines are taken to be in that of the points, {}", points.label()));
+        file.warnings
+            .push(format!("it says no CRS: its lines are taken to be in that of the points, {}", points.label()));
     }
     Ok(())
 }

@@ -51,7 +51,10 @@ fn refuse_geodatabase(pattern: &str) -> Result<()> {
     match is_one {
         true => Err(Error::input(
             path,
-            format!("is an Esri file geodatabase: convert it first, for example with `ogr2ogr lines.gpkg {}`", path.display()),
+            format!(
+                "is an Esri file geodatabase: convert it first, for example with `ogr2ogr lines.gpkg {}`",
+                path.display()
+            ),
         )),
         false => Ok(()),
     }

@@ -46,7 +46,8 @@ impl LatticeMap {
     fn may_meet(&self, feature: &LineFeature, within: Bounds<2>) -> bool {
         let is_apart = |axis: usize| {
             let vertices = || feature.shape.outlines().iter().flatten().map(|vertex| self.steps(vertex[axis], axis));
-            vertices().all(|at| at < f64::from(within.min[axis])) || vertices().all(|at| at > f64::from(within.max[axis]))
+            vertices().all(|at| at < f64::from(within.min[axis]))
+                || vertices().all(|at| at > f64::from(within.max[axis]))
         };
         !is_apart(0) && !is_apart(1)
     }
@@ -123,10 +124,14 @@ mod tests {
 
     #[test]
     fn vertices_meet_the_lattice_and_features_outside_are_counted() {
-        let line = |x: i32| LineShape::Line(vec![vertex(x, 5, 123), vertex(x + 7, 900, -4), [635_001.0, 635_000.0, f64::NAN]]);
+        let line =
+            |x: i32| LineShape::Line(vec![vertex(x, 5, 123), vertex(x + 7, 900, -4), [635_001.0, 635_000.0, f64::NAN]]);
         let (found, outside) = features(FeatureKind::Line, line(3)).unwrap();
         let at = |x, y, z| Vertex { place: [x, y], z };
-        assert_eq!((found[0].paths[0].clone(), outside), (vec![at(3, 5, Some(123)), at(10, 900, Some(-4)), at(100, 0, None)], 0));
+        assert_eq!(
+            (found[0].paths[0].clone(), outside),
+            (vec![at(3, 5, Some(123)), at(10, 900, Some(-4)), at(100, 0, None)], 0)
+        );
         assert_eq!(found[0].id, FeatureId { file: 0, feature: 5 });
         let beside = LineShape::Line(vec![vertex(-9, -9, 0), vertex(-1, 2000, 0)]);
         assert_eq!(features(FeatureKind::Line, beside).unwrap(), (Vec::new(), 1));

@@ -1,10 +1,11 @@
 //! The breaklines of a plan.
 
 use crate::breaklines::{
-    BreaklineError, BreaklineOptions, BreaklineSite, Breaklines, Feature, FeatureId, Findings, NearestHeights, NearestPoint,
+    BreaklineError, BreaklineOptions, BreaklineSite, Breaklines, Feature, FeatureId, Findings, NearestHeights,
+    NearestPoint,
 };
-use crate::geometry::{Bounds, Site};
 use crate::geometry::lattice::Lattice;
+use crate::geometry::{Bounds, Site};
 use crate::input::lines::LineFile;
 use crate::input::{PointRules, Source};
 use crate::job::options::JobOptions;
@@ -162,7 +163,9 @@ fn refuse(error: BreaklineError, files: &[LineFile], lattice: &Lattice) -> Error
                 at(place)
             ),
         ),
-        BreaklineError::OutOfReach { id, place } => about(files, id, format!("has a vertex at {}, which no lattice reaches", at(place))),
+        BreaklineError::OutOfReach { id, place } => {
+            about(files, id, format!("has a vertex at {}, which no lattice reaches", at(place)))
+        }
         BreaklineError::TooMany { most } => Error::Config(format!(
             "the breaklines need more than {most} vertices, which do not fit the memory: set a greater spacing in [[breaklines]], raise \
              [limits] memory, or cut out the lines of the area"

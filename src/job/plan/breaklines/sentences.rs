@@ -18,7 +18,10 @@ pub(super) fn sentences(files: &[LineFile], lattice: &Lattice, findings: &Findin
     found.extend(findings.worst_rises.first().map(|worst| names.rise(worst)));
     found.extend(findings.worst_uneven.first().map(|worst| names.uneven(worst)));
     if findings.empty_paths > 0 {
-        found.push(format!("[[breaklines]]: {} lines without two different vertices are left out", findings.empty_paths));
+        found.push(format!(
+            "[[breaklines]]: {} lines without two different vertices are left out",
+            findings.empty_paths
+        ));
     }
     found
 }

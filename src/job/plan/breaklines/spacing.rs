@@ -13,13 +13,7 @@ const LONGEST: u32 = 1 << 24;
 ///
 /// # Errors
 /// [`Error::Config`] if two entries say different lengths: lines of both may meet.
-pub(super) fn spacing(
-    all: &[LineOptions],
-    lattice: &Lattice,
-    extent: &Extent,
-    area: u64,
-    records: u64,
-) -> Result<u32> {
+pub(super) fn spacing(all: &[LineOptions], lattice: &Lattice, extent: &Extent, area: u64, records: u64) -> Result<u32> {
     let lengths = all.iter().filter_map(|options| match options.spacing {
         LineSpacing::Auto => None,
         LineSpacing::Length(length) => Some(length),
