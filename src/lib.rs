@@ -5,6 +5,7 @@
 #![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
 
 mod address_space;
+pub mod breaklines;
 mod catch_panic;
 pub mod cli;
 pub mod config;

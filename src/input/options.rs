@@ -7,7 +7,7 @@ use crate::geometry::lattice::shortest_decimal;
 use crate::input::crs::choice::CrsChoice;
 use crate::input::crs::target::{NamedCrs, TargetCrs};
 use crate::input::crs::transform::datum_rule::DatumRule;
-use crate::input::points::classes::is_noise;
+use crate::input::points::classes::{IGNORED_GROUND, is_noise};
 use crate::input::points::optional_fields::OptionalFields;
 use crate::input::points::returns::KeptReturns;
 use crate::input::surface::Surface;
@@ -26,9 +26,13 @@ pub struct InputOptions {
     /// Keep only these returns of each pulse.
     #[serde(default)]
     pub returns: KeptReturns,
-    /// Keep only these classes. The default is all classes but noise (7, 18).
+    /// Keep only these classes. The default is all classes but noise (7, 18), and with breaklines also without ignored ground (20).
     #[serde(default)]
     pub classes: Option<Vec<u8>>,
+    /// Whether the default leaves out class 20 too: points near breaklines, which these stand for. That follows from `[[breaklines]]`, and
+    /// what a user writes here does not count.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub without_ignored_ground: bool,
     /// Keep only the points within this rectangle, in the system of the job: with `to_crs`, in that.
     #[serde(default)]
     pub bounds: Option<SourceBounds>,
@@ -76,10 +80,11 @@ impl InputOptions {
                 classes.iter().for_each(|&class| kept[class as usize] = true);
                 kept
             }
-            None => match self.surface.classes() {
-                Some(classes) => std::array::from_fn(|class| classes.contains(&(class as u8))),
-                None => std::array::from_fn(|class| !is_noise(class as u8)),
-            },
+            None => std::array::from_fn(|class| {
+                let class = class as u8;
+                let is_kept = self.surface.classes().map_or(!is_noise(class), |classes| classes.contains(&class));
+                is_kept && !(class == IGNORED_GROUND && self.without_ignored_ground)
+            }),
         }
     }
 

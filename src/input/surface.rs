@@ -65,7 +65,12 @@ pub struct SurfaceShares {
 impl SurfaceShares {
     /// Returns the shares of the points that a job keeps.
     pub fn of_kept(counts: &PointCounts) -> SurfaceShares {
-        SurfaceShares { points: counts.kept, ground: counts.ground, unclassified: counts.unclassified }
+        // Breaklines take the place of points that were wanted.
+        SurfaceShares {
+            points: counts.kept + counts.at_breaklines,
+            ground: counts.ground,
+            unclassified: counts.unclassified,
+        }
     }
 
     /// Looks at some of the points of `source`; `None` if it holds none there.

@@ -20,6 +20,7 @@ mod transformed;
 
 mod attributes;
 mod bad_files;
+mod breaklines;
 mod broken;
 mod choices;
 mod configuration;

@@ -14,9 +14,14 @@ struct Rule {
 /// The rooms of a job's steps, in order. Each imports only from those before it.
 const STEPS: [&str; 6] = ["job/plan", "job/partition", "job/mesh", "job/tiles", "job/levels", "job/publish"];
 
-const RULES: [Rule; 8] = [
+const RULES: [Rule; 9] = [
     Rule {
-        rooms: &["geometry", "mesh", "voronoi", "gpu", "triangulation", "input", "output"],
+        rooms: &["breaklines"],
+        never: &["input", "output", "gpu", "voronoi", "triangulation", "mesh"],
+        why: "breaklines are lattice integers, not files",
+    },
+    Rule {
+        rooms: &["breaklines", "geometry", "mesh", "voronoi", "gpu", "triangulation", "input", "output"],
         never: &["config", "job", "submit", "verify", "view", "cli"],
         why: "a library room knows no job",
     },

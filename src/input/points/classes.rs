@@ -29,7 +29,10 @@ const NAMES: [&str; 23] = [
 
 /// The classes of bare earth: ground and water; model key points, which older files take out of the ground; and ground that was set
 /// aside because it is close to a breakline.
-pub(crate) const GROUND: [u8; 4] = [2, 8, 9, 20];
+pub(crate) const GROUND: [u8; 4] = [2, 8, 9, IGNORED_GROUND];
+
+/// The class of ground that was set aside because it is close to a breakline.
+pub(crate) const IGNORED_GROUND: u8 = 20;
 
 /// Returns the name of a class, or nothing.
 pub(crate) fn name(class: u8) -> &'static str {

@@ -1,10 +1,12 @@
 //! Reading the points: every input is decoded once, and its points go to the buckets of a grid, from which the tree is grown.
 
+use crate::breaklines::Breaklines;
 use crate::input::options::{InputOptions, OnBadFile};
 use crate::input::surface_doubts::no_ground;
 use crate::input::{Point, PointCounts};
 use crate::job::durable::directory::JobDirectory;
 use crate::job::index::PartIndex;
+use crate::job::partition::breakline_points::{BreaklineFilter, add_line_sites};
 use crate::job::partition::bucket_sorter::BucketSorter;
 use crate::job::partition::buckets::Buckets;
 use crate::job::partition::grid::Grid;
@@ -34,8 +36,13 @@ pub fn read_points(plan: &Plan, directory: &JobDirectory, stage: &Stage) -> Resu
     let grid = Grid::over(plan.extent, wanted_buckets(plan.records, max_points_per_tile));
     let buckets = Buckets::new(file, grid.buckets(), memory);
     let by_input = decode(plan, 0..plan.inputs.len(), 0, &grid, &buckets, stage)?;
+    let JudgedInputs { mut summary, skipped, orders } = judge(plan, by_input);
+    // Lines alone are no terrain.
+    if let Some(points) = summary.bounds {
+        add_line_sites(plan, summary.counts.max_rgb, &grid, &buckets, |_| true)?;
+        summary.bounds = Some(plan.with_lines(points));
+    }
     let mut buckets = buckets.finish()?;
-    let JudgedInputs { summary, skipped, orders } = judge(plan, by_input);
     if !orders.is_empty() {
         buckets.par_iter_mut().try_for_each(|bucket| bucket.remove_records(&files, &orders))?;
     }
@@ -115,7 +122,8 @@ pub(crate) fn decode(
     buckets: &Buckets,
     stage: &Stage,
 ) -> Result<ByInput> {
-    let pass = Pass { plan, grid, buckets, malformed: AtomicU64::new(malformed) };
+    let lines = plan.built_breaklines()?;
+    let pass = Pass { plan, grid, buckets, lines: lines.as_deref(), malformed: AtomicU64::new(malformed) };
     let mut by_input = pass.over(inputs, |input, chunk, sink| {
         let counts = input.source.decode(chunk, &input.rules, sink)?;
         stage.advance(counts.read);
@@ -139,6 +147,8 @@ struct Pass<'a> {
     plan: &'a Plan,
     grid: &'a Grid,
     buckets: &'a Buckets<'a>,
+    /// What drops points at breaklines.
+    lines: Option<&'a Breaklines>,
     /// The malformed records so far.
     malformed: AtomicU64,
 }
@@ -159,7 +169,9 @@ impl Pass<'_> {
             interrupt::check()?;
             let input = &self.plan.inputs[index];
             let mut sorter = BucketSorter::new(self.grid, self.buckets);
-            let counts = decode(input, chunk, &mut |points| sorter.add(points))?;
+            let mut filter = BreaklineFilter::new(self.lines);
+            let mut counts = decode(input, chunk, &mut |points| sorter.add(filter.without_dropped(points)))?;
+            counts.drop_at_breaklines(filter.dropped());
             self.check_malformed(input, &counts)?;
             Ok(ByInput(vec![(index, PointSummary { counts, bounds: sorter.bounds() })]))
         };

@@ -21,8 +21,12 @@ pub fn no_point_is_left(plan: &Plan, counts: &PointCounts) -> Error {
         0 => String::new(),
         count => format!(", {count} of other returns"),
     };
+    let at_breaklines = match counts.at_breaklines {
+        0 => String::new(),
+        dropped => format!(", {dropped} at breaklines or in lakes"),
+    };
     Error::NoTerrain(format!(
-        "no point is left to triangulate: of {} read, {} are malformed, {} withheld, {} of other classes{other_returns}, {} out of bounds; \
+        "no point is left to triangulate: of {} read, {} are malformed, {} withheld, {} of other classes{other_returns}, {} out of bounds{at_breaklines}; \
          {remedy}",
         counts.read, counts.malformed, counts.withheld, counts.other_class, counts.out_of_bounds
     ))

@@ -39,6 +39,8 @@ pub struct Preflight {
     /// About how many columns and rows of the raster, if there is to be one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub raster: Option<[u32; 2]>,
+    /// Edges along breaklines; `None` without any.
+    pub breaklines: Option<u64>,
     /// Steps of the lattice in x and y, and in z.
     pub resolution: [String; 2],
     /// Width and height in source units.
@@ -143,6 +145,7 @@ impl Preflight {
             tiles: estimate::tiles(plan, kept),
             // No job begins with a raster that cannot be made.
             raster: check_raster(plan).ok().flatten().map(|grid| grid.size()),
+            breaklines: plan.breaklines.as_ref().map(|lines| lines.findings.subsegments),
             resolution: [plan.lattice.resolution.to_string(), plan.lattice.resolution_z.to_string()],
             size: [0, 1].map(|axis| plan.extent.extent(axis) as f64 * resolution),
             unit: plan.unit.clone(),
@@ -222,6 +225,9 @@ impl fmt::Display for Preflight {
         }
         if let Some(surface) = &self.surface {
             row("surface", surface.clone())?;
+        }
+        if let Some(edges) = self.breaklines {
+            row("breaklines", format!("{} edges", grouped(edges)))?;
         }
         row("tiles", format!("about {}", grouped(self.tiles)))?;
         if let Some([columns, rows]) = self.raster {

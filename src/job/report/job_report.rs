@@ -20,6 +20,7 @@ use crate::job::progress::clock::JobClock;
 use crate::job::progress::number_text::grouped;
 use crate::job::progress::stats::StageStats;
 use crate::job::publish::raster::write_raster::RasterStats;
+use crate::job::report::breakline_report::BreaklineReport;
 use crate::job::tiles::write_tile::TileStats;
 use crate::output::checksums::{Checksum, seal};
 use crate::voronoi::counts::STEP_NAMES;
@@ -65,6 +66,9 @@ pub struct Report {
     /// What the mesh is, by the classes of the points that were kept: bare earth, or what else is in it.
     #[serde(default)]
     pub surface: Option<String>,
+    /// What came of the breaklines; `None` without any.
+    #[serde(default)]
+    pub breaklines: Option<BreaklineReport>,
     /// How the leaves were triangulated.
     pub leaves: LeafStats,
     /// The GPU that helped; `None` without one.
@@ -266,6 +270,7 @@ impl Report {
             skipped: plan.skipped.clone(),
             surface: SurfaceShares::of_kept(&parts.points).sentence(plan.options.input.surface),
             points: parts.points,
+            breaklines: plan.breaklines.as_ref().map(BreaklineReport::of),
             leaves: parts.leaves,
             gpu: parts.gpu,
             gpu_figures: parts.gpu_figures,

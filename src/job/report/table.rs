@@ -2,6 +2,7 @@
 
 use crate::gpu::benefit::GpuFigures;
 use crate::job::progress::number_text::{grouped, precise_mebibytes};
+use crate::job::report::breakline_report::BreaklineReport;
 use crate::job::report::job_report::{Report, SlowestPart, StepSeconds};
 use crate::job::report::skipped_inputs::write_skipped;
 use crate::triangulation::TriangulationCounts;
@@ -44,6 +45,14 @@ impl fmt::Display for Report {
         }
         row("  malformed", grouped(self.points.malformed))?;
         row("  duplicates in x, y", grouped(self.duplicates))?;
+        if let Some(BreaklineReport { findings, .. }) = &self.breaklines {
+            row("  at breaklines or in lakes", grouped(self.points.at_breaklines))?;
+            let of = format!("of {} segments of {} features", grouped(findings.segments), grouped(findings.features));
+            row("edges along breaklines", format!("{}, {of}", grouped(findings.subsegments)))?;
+            row("  places where heights disagree", grouped(findings.disagreements))?;
+            row("  rivers that rise", grouped(findings.rising_rivers))?;
+            row("  lakes that are not flat", grouped(findings.uneven_lakes))?;
+        }
         row("sites", grouped(self.sites))?;
         if let Some(surface) = &self.surface {
             row("surface", surface.clone())?;

@@ -45,7 +45,7 @@ pub fn finished_border(
     if !style.max_edge.keeps_all() || !slivers.is_empty() {
         take_left_out(store, tile, &frontier, &slivers, style, &mut sums)?;
     }
-    let is_kept = |t: &SeamTriangle| !style.max_edge.leaves_out(t.map(|corner| corner.position)) && !slivers.has(t);
+    let is_kept = |t: &SeamTriangle| !style.leaves_out(t.map(|corner| corner.position)) && !slivers.has(t);
     for &[a, b, c] in seam.triangles.iter().filter(|triangle| is_kept(triangle)) {
         let normal = normals::cross(a.position, b.position, c.position);
         for corner in [a, b, c].iter().filter(|corner| corner.tile == tile) {
@@ -85,7 +85,7 @@ fn take_left_out(
 ) -> Result<()> {
     let Leaf { positions, mut triangles, .. } = Leaf::load(store, tile)?;
     let mut left_out = slivers.take(&positions, &mut triangles);
-    left_out.extend(style.max_edge.take(&positions, &mut triangles));
+    left_out.extend(style.take_long(&positions, &mut triangles));
     for triangle in left_out {
         let [a, b, c] = triangle.map(|v| positions[v as usize]);
         let normal = normals::cross(a, b, c);

@@ -1,0 +1,183 @@
+//! From features to segments: vertices are checked, repeated ones left out, heights that are missing here and there filled in.
+
+use crate::breaklines::error::BreaklineError;
+use crate::breaklines::exact::{distance2, round};
+use crate::breaklines::feature::{Feature, FeatureId, FeatureKind, Vertex};
+use crate::breaklines::findings::{Findings, Rise, Uneven, worst};
+use crate::breaklines::options::BreaklineOptions;
+use crate::geometry::Site;
+use crate::geometry::lattice::REACH;
+use std::cmp::Reverse;
+
+/// A segment of a feature, between two different places.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Segment {
+    /// The ends, the lesser one first.
+    pub(crate) ends: [Site; 2],
+    /// The kind of its feature.
+    pub(crate) kind: FeatureKind,
+    /// The heights of the ends, if the file has them.
+    pub(crate) z: [Option<i32>; 2],
+    /// Its feature.
+    pub(crate) id: FeatureId,
+    /// The number of its lake, which is `u32::MAX` for lines.
+    pub(crate) lake: u32,
+}
+
+/// Returns the segments of all features, sorted, and the number of lakes.
+///
+/// # Errors
+/// [`BreaklineError::Wall`] and [`BreaklineError::OutOfReach`].
+pub(crate) fn segments_of(
+    features: &[Feature],
+    options: &BreaklineOptions,
+    findings: &mut Findings,
+) -> Result<(Vec<Segment>, u32), BreaklineError> {
+    let mut ordered: Vec<&Feature> = features.iter().collect();
+    ordered.sort_unstable_by_key(|feature| (feature.id, feature.kind));
+    let mut cleaner = Cleaner { options, findings, segments: Vec::new(), lakes: 0 };
+    for feature in ordered {
+        check_reach(feature)?;
+        match feature.kind {
+            FeatureKind::Lake => cleaner.lake(feature),
+            FeatureKind::River | FeatureKind::Line => cleaner.lines(feature)?,
+        }
+    }
+    let Cleaner { mut segments, lakes, .. } = cleaner;
+    segments.sort_unstable();
+    findings.features = features.len() as u64;
+    findings.segments = segments.len() as u64;
+    worst(&mut findings.worst_rises, |rise| Reverse(rise.steps));
+    worst(&mut findings.worst_uneven, |lake| Reverse(lake.highest.abs_diff(lake.lowest)));
+    Ok((segments, lakes))
+}
+
+fn check_reach(feature: &Feature) -> Result<(), BreaklineError> {
+    let is_out = |v: &&Vertex| v.place.iter().any(|value| !(-REACH..=REACH).contains(value));
+    let out = feature.paths.iter().flatten().filter(is_out).map(|v| v.place).min();
+    out.map_or(Ok(()), |place| Err(BreaklineError::OutOfReach { id: feature.id, place }))
+}
+
+struct Cleaner<'a> {
+    options: &'a BreaklineOptions,
+    findings: &'a mut Findings,
+    segments: Vec<Segment>,
+    lakes: u32,
+}
+
+impl Cleaner<'_> {
+    /// Adds the rings of a lake. All have the lowest height: water does not stand above its shore.
+    fn lake(&mut self, feature: &Feature) {
+        let by_height = |v: &&Vertex| (v.z, v.place);
+        let vertices = || feature.paths.iter().flatten().filter(|v| v.z.is_some());
+        let height = vertices().min_by_key(by_height).and_then(|v| v.z);
+        if let Some((lowest, (highest, place))) = height.zip(vertices().max_by_key(by_height).and_then(high)) {
+            if highest.abs_diff(lowest) > self.options.height_tolerance {
+                self.findings.uneven_lakes += 1;
+                self.findings.worst_uneven.push(Uneven { id: feature.id, lowest, highest, place });
+            }
+        }
+        for path in &feature.paths {
+            let mut ring: Vec<Vertex> = path.iter().map(|v| Vertex { place: v.place, z: height }).collect();
+            ring.dedup();
+            self.findings.repeated_vertices += (path.len() - ring.len()) as u64;
+            ring.extend(ring.first().copied().filter(|first| Some(first) != ring.last()));
+            // A closed ring repeats its first vertex, so three different ones make four.
+            if ring.len() < 4 { self.findings.empty_paths += 1 } else { self.add(feature, &ring) }
+        }
+        self.lakes += 1;
+    }
+
+    fn lines(&mut self, feature: &Feature) -> Result<(), BreaklineError> {
+        let mut rise: Option<Rise> = None;
+        for path in &feature.paths {
+            self.check_walls(feature.id, path)?;
+            let mut line = path.clone();
+            line.dedup_by(|next, kept| {
+                let repeats = next.place == kept.place;
+                kept.z = if repeats { kept.z.into_iter().chain(next.z).min() } else { kept.z };
+                repeats
+            });
+            self.findings.repeated_vertices += (path.len() - line.len()) as u64;
+            if line.len() < 2 {
+                self.findings.empty_paths += 1;
+                continue;
+            }
+            fill_heights(&mut line);
+            rise = rise.into_iter().chain(rise_of(feature.id, &line)).max_by_key(|r| (r.steps, Reverse(r.place)));
+            self.add(feature, &line);
+        }
+        let is_river = feature.kind == FeatureKind::River;
+        if let Some(rise) = rise.filter(|rise| is_river && rise.steps > self.options.height_tolerance) {
+            self.findings.rising_rivers += 1;
+            self.findings.worst_rises.push(rise);
+        }
+        Ok(())
+    }
+
+    /// Refuses a line that has two heights at one place. A closed line may end at another height than it starts: that is found
+    /// where heights disagree.
+    fn check_walls(&self, id: FeatureId, path: &[Vertex]) -> Result<(), BreaklineError> {
+        let closed = path.len() > 2 && path.first().map(|v| v.place) == path.last().map(|v| v.place);
+        let open = &path[usize::from(closed)..];
+        let mut known: Vec<(Site, i32)> = open.iter().filter_map(|v| Some((v.place, v.z?))).collect();
+        known.sort_unstable();
+        let groups = known.chunk_by(|one, other| one.0 == other.0);
+        let heights = |group: &[(Site, i32)]| Some((group.first()?.0, [group.first()?.1, group.last()?.1]));
+        let is_wall = |(_, [low, high]): &(Site, [i32; 2])| high.abs_diff(*low) > self.options.height_tolerance;
+        let wall = groups.filter_map(heights).find(is_wall);
+        wall.map_or(Ok(()), |(place, heights)| Err(BreaklineError::Wall { id, place, heights }))
+    }
+
+    /// Adds the segments of a path whose neighbouring vertices differ.
+    fn add(&mut self, feature: &Feature, path: &[Vertex]) {
+        let lake = if feature.kind == FeatureKind::Lake { self.lakes } else { u32::MAX };
+        for pair in path.windows(2) {
+            let [a, b] = if pair[0].place < pair[1].place { [pair[0], pair[1]] } else { [pair[1], pair[0]] };
+            let (kind, id) = (feature.kind, feature.id);
+            self.segments.push(Segment { ends: [a.place, b.place], z: [a.z, b.z], kind, id, lake });
+        }
+    }
+}
+
+fn high(vertex: &Vertex) -> Option<(i32, Site)> {
+    Some((vertex.z?, vertex.place))
+}
+
+/// Gives vertices without a height one that lies on the line between the nearest vertices before and after that have one, or that of the
+/// nearest one at an end. A line without any height stays without.
+fn fill_heights(line: &mut [Vertex]) {
+    let known: Vec<(usize, i32)> = line.iter().enumerate().filter_map(|(i, v)| Some((i, v.z?))).collect();
+    if let (Some(&(first, low)), Some(&(last, high))) = (known.first(), known.last()) {
+        line[..first].iter_mut().for_each(|v| v.z = Some(low));
+        line[last..].iter_mut().for_each(|v| v.z = Some(high));
+    }
+    for pair in known.windows(2) {
+        fill_between(line, pair[0], pair[1]);
+    }
+}
+
+fn fill_between(line: &mut [Vertex], (from, low): (usize, i32), (to, high): (usize, i32)) {
+    let length = |pair: &[Vertex]| i128::from((distance2(pair[0].place, pair[1].place) as u64).isqrt().max(1));
+    let whole: i128 = line[from..=to].windows(2).map(length).sum();
+    let mut way = 0;
+    for i in from + 1..to {
+        way += length(&line[i - 1..=i]);
+        let step = round((i128::from(high) - i128::from(low)) * way, whole);
+        line[i].z = Some((i128::from(low) + step) as i32);
+    }
+}
+
+/// Returns where the line rises most above a place that comes before, on the way from its higher end to its lower one.
+fn rise_of(id: FeatureId, line: &[Vertex]) -> Option<Rise> {
+    let known: Vec<(i32, Site)> = line.iter().filter_map(high).collect();
+    let falls = known.first()?.0 >= known.last()?.0;
+    let way: Box<dyn Iterator<Item = &(i32, Site)>> =
+        if falls { Box::new(known.iter()) } else { Box::new(known.iter().rev()) };
+    let mut lowest = i32::MAX;
+    let rises = way.map(|&(z, place)| {
+        lowest = lowest.min(z);
+        Rise { id, place, steps: z.abs_diff(lowest) }
+    });
+    rises.filter(|rise| rise.steps > 0).max_by_key(|rise| (rise.steps, Reverse(rise.place)))
+}

@@ -1,0 +1,32 @@
+//! How breaklines are cut.
+
+use crate::geometry::Bounds;
+use serde::{Deserialize, Serialize};
+
+/// How breaklines are cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct BreaklineOptions {
+    /// The wanted length of subsegments in lattice steps: about the distance between neighbouring points. At least 1.
+    pub spacing: u32,
+    /// Sites of lines that are not farther apart than this number of lattice steps become one site. At least 1.
+    pub floor: u32,
+    /// Two heights at one place disagree if they differ by more than this number of steps in z. The same holds for lakes that are not flat
+    /// and rivers that rise.
+    pub height_tolerance: u32,
+    /// Only what lies in this box becomes a subsegment: the extent of the cloud. `None` keeps all.
+    pub within: Option<Bounds<2>>,
+    /// With more sites than this, [`crate::breaklines::Breaklines::build`] gives up, so that memory stays bounded.
+    pub most_sites: usize,
+}
+
+impl BreaklineOptions {
+    /// Returns the options for subsegments of `spacing` lattice steps in the box `within`.
+    ///
+    /// The floor is a fiftieth of the spacing, between 2 and 5 steps. It exceeds what rounding to the lattice moves a line, and is less than
+    /// the distance between lines that somebody drew on purpose.
+    pub fn new(spacing: u32, within: Option<Bounds<2>>) -> BreaklineOptions {
+        let spacing = spacing.max(1);
+        let floor = (spacing / 50).clamp(2, 5);
+        BreaklineOptions { spacing, floor, height_tolerance: 1, within, most_sites: 100_000_000 }
+    }
+}
