@@ -5,6 +5,7 @@ use crate::job::options::RunOptions;
 use crate::job::progress::number_text::grouped;
 use crate::job::progress::stage::ProgressOutput;
 use crate::job::report::job_report::Report;
+use crate::triangulation::MIN_POINTS_PER_THREAD;
 use crate::{Error, Result, config, interrupt, job, sample};
 use serde::Serialize;
 use std::fmt;
@@ -152,7 +153,12 @@ impl fmt::Display for GpuTrial {
              {leaves} leaves",
             grouped(*points)
         )?;
-        writeln!(f, "{}", self.verdict())
+        writeln!(f, "{}", self.verdict())?;
+        writeln!(
+            f,
+            "with backend = \"auto\" a job opens a GPU if each of its threads has {} points to do or more",
+            grouped(MIN_POINTS_PER_THREAD)
+        )
     }
 }
 

@@ -26,7 +26,7 @@ const MOST_OFF_PACKED: f64 = 0.497;
 const STEPS_HALVED: usize = 8;
 
 /// By how many metres in a metre a displacement may change at most, so that the places of a bent scene are surely found again. On the
-/// earth that is an area about 1000 km wide.
+/// earth that is a square about 900 km wide.
 const STEEPEST: f64 = 0.1;
 
 /// Steps that a 16-bit position reaches from its origin.
@@ -154,7 +154,7 @@ impl Frame {
         let steep = curvature.steepness([xy, xy, up]);
         let most = if packing == Compression::None { MOST_OFF_PLAIN } else { MOST_OFF_PACKED };
         let leads_back = self.off(&steep).into_iter().all(|off| off.iter().sum::<f64>() <= most)
-            && steep.iter().all(|row| row.iter().sum::<f64>() <= STEEPEST);
+            && steep.iter().flatten().map(|part| part * part).sum::<f64>() <= STEEPEST * STEEPEST;
         let (moved, longest, needed) = (curvature.greatest(), self.longest_triangle(), flat.longest_triangle());
         let holds = |k: usize, step: f64, axis: usize| {
             longest[axis] >= needed[axis].min(bounds.extent(k) as f64 * step + 2.0 * moved[k])

@@ -7,4 +7,5 @@ pub mod reference;
 mod tests;
 mod triangulator;
 
+pub(crate) use triangulator::MIN_POINTS_PER_THREAD;
 pub use triangulator::{TriangulationCounts, Triangulator, canonical, recycle};

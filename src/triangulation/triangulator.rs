@@ -72,6 +72,8 @@ pub struct Triangulator {
     gpu: OnceLock<Executor>,
     /// What a GPU gets that is opened once the job proves large enough.
     optional: Option<OptionalGpu>,
+    /// Why a GPU that seems to be there was not opened.
+    not_opened: OnceLock<String>,
 }
 
 /// See [`Triangulator::optional`].
@@ -85,13 +87,15 @@ const SHARE_FOR_GPU: u64 = 4;
 /// "auto" uses no GPU if the whole job has less memory than this, because drivers would take too large a share of it.
 const MIN_MEMORY: u64 = 1 << 30;
 /// "auto" opens no GPU if a thread has fewer points to do: opening one takes some tenths of a second of processor time. With an H100, jobs of
-/// 1.3 and 2.7 million points a thread took 1.0 to 1.1 of the time without, and those of 5.3 million 0.86 to 0.93 (BENCHMARKS.md).
-const MIN_POINTS_PER_THREAD: u64 = 3_000_000;
+/// 1.3 million points a thread took 1.01 and 1.12 of the time without, of 2.7 million 0.94 and 1.00, of 5.3 million 0.86 and 0.93
+/// (BENCHMARKS.md).
+pub(crate) const MIN_POINTS_PER_THREAD: u64 = 3_000_000;
 
 impl Triangulator {
     /// Returns the triangulator that the configuration asks for, but for a GPU.
     pub fn without_gpu(config: &TriangulationOptions) -> Triangulator {
-        Triangulator { pipeline: config.backend != Backend::Reference, gpu: OnceLock::new(), optional: None }
+        let pipeline = config.backend != Backend::Reference;
+        Triangulator { pipeline, gpu: OnceLock::new(), optional: None, not_opened: OnceLock::new() }
     }
 
     /// Returns the triangulator that the configuration asks for, for a job that has `memory` bytes. A GPU that the job must have is opened
@@ -124,9 +128,17 @@ impl Triangulator {
     pub fn prepare(&self, points: u64, threads: usize) {
         let Some(OptionalGpu { options, memory }) = &self.optional else { return };
         let is_large = points / threads.max(1) as u64 >= MIN_POINTS_PER_THREAD;
-        let is_wanted = Executor::is_wanted_by_test() || (is_large && Executor::is_likely());
-        if is_wanted
-            && self.gpu.get().is_none()
+        if !Executor::is_wanted_by_test() && !Executor::is_likely() {
+            return;
+        }
+        if !is_large && !Executor::is_wanted_by_test() {
+            self.not_opened.get_or_init(|| {
+                format!(
+                    "it was not opened, because that takes longer than it saves where a thread has fewer than {} million points to do",
+                    MIN_POINTS_PER_THREAD / 1_000_000
+                )
+            });
+        } else if self.gpu.get().is_none()
             && let Ok(gpu) = Executor::start(options, GpuUse::Optional, *memory)
         {
             self.gpu.get_or_init(|| gpu);
@@ -138,9 +150,13 @@ impl Triangulator {
         self.gpu.get().and_then(Executor::adapter)
     }
 
-    /// Returns what the GPU did so far; `None` without one.
+    /// Returns what the GPU did so far, or why it was not opened; `None` without one.
     pub fn gpu_figures(&self) -> Option<GpuFigures> {
-        self.gpu.get().filter(|gpu| gpu.adapter().is_some()).map(Executor::figures)
+        let not_opened = || {
+            let given_up = Some(self.not_opened.get()?.clone());
+            Some(GpuFigures { given_up, ..GpuFigures::default() })
+        };
+        self.gpu.get().filter(|gpu| gpu.adapter().is_some()).map(Executor::figures).or_else(not_opened)
     }
 
     /// Returns the seconds that every step has taken on the GPU itself; nothing if the GPU has no timestamps.

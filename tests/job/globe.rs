@@ -95,12 +95,15 @@ fn job(points: &[[i32; 3]], tiles_of: u64) -> (Job, Vec<Tile>) {
 }
 
 fn job_packed(points: &[[i32; 3]], tiles_of: u64, compression: &str) -> (Job, Vec<Tile>) {
+    let levels = format!("max_points_per_level_tile = {}\nformat = \"3dtiles\"", tiles_of.max(100));
+    job_with(points, tiles_of, &format!("{levels}\ncompression = \"{compression}\""))
+}
+
+fn job_with(points: &[[i32; 3]], tiles_of: u64, look: &str) -> (Job, Vec<Tile>) {
     let folder = tempfile::tempdir().unwrap();
     let cloud = folder.path().join("cloud.las");
     std::fs::write(&cloud, utm(points)).unwrap();
-    let levels = format!("max_points_per_level_tile = {}\nformat = \"3dtiles\"", tiles_of.max(100));
-    let look = format!("{levels}\ncompression = \"{compression}\"");
-    let job = Job::on(&[&cloud]).tiles_of(tiles_of).with("output", &look);
+    let job = Job::on(&[&cloud]).tiles_of(tiles_of).with("output", look);
     job.report();
     job.verified();
     let tiles = tiles(&job);
@@ -243,6 +246,19 @@ fn tiles_of_any_depths_meet_on_the_globe() {
         let (gap, shared, depths) = gaps(&job, &tiles);
         assert!(shared > 2_000 && depths >= 4, "{compression}: {shared} vertices at several depths, at most {depths}");
         assert_eq!(gap, 0.0, "{compression}, {half} m");
+    }
+}
+
+/// A user who names neither a format nor a packing gets tiles that meet, and a terrain of one file beside them.
+#[test]
+fn tiles_of_a_wide_area_meet_without_any_option() {
+    for half in [12_000.0, 50_000.0] {
+        let (job, tiles) = job_with(&square(100, half, [0.0; 2]), 500, "max_points_per_level_tile = 500");
+        let (gap, shared, _) = gaps(&job, &tiles);
+        assert!(shared > 500, "{shared} vertices at borders");
+        assert_eq!(gap, 0.0, "{half} m");
+        assert_eq!(georeference(&job, "globe")["per_tile"], false);
+        assert!(job.out().join("terrain.glb").exists());
     }
 }
 

@@ -126,8 +126,9 @@ pub(crate) fn leave_out_outliers(sources: &mut [Source], options: &JobOptions, e
     Ok(sources.iter().any(|source| source.outliers() > 0))
 }
 
-/// Returns a warning about the row that lies farthest from the middle of its file, if it makes the lattice coarse: if it lies half as far
-/// out as the job is wide, or farther. Files that lie far apart do so without such a row.
+/// Returns a warning about the row that lies farthest from the middle of its file, if it makes the lattice coarse: if it lies
+/// three quarters as far out as the job is wide, or farther: the outermost row of an even area lies half as far out. Files that lie far apart do so
+/// without such a row.
 ///
 /// # Errors
 /// [`Error::Io`] if a file cannot be read.
@@ -139,7 +140,7 @@ pub(crate) fn farthest_row(sources: &[Source], options: &JobOptions, extent: &Ex
         farthest = row.into_iter().chain(farthest).max_by(|a, b| a.0.total_cmp(&b.0));
     }
     let size = extent.size(0).max(extent.size(1)).max(extent.size(2));
-    Ok(farthest.filter(|(distance, _)| 2.0 * distance >= size).map(|(_, row)| {
+    Ok(farthest.filter(|(distance, _)| 4.0 * distance >= 3.0 * size).map(|(_, row)| {
         format!("the row farthest from the others is {row}; if it is a mistake, remove it or leave it out with [input] bounds")
     }))
 }

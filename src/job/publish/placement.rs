@@ -111,18 +111,26 @@ pub fn placement_warning(placement: &Result<Placement, NotPlaced>) -> Option<Str
         Ok(placement) => placement,
     };
     let off = placement.distortion_m;
-    (off > ONE_TRANSFORM).then(|| match (placement.per_tile, placement.curved) {
-        (false, true) => format!(
+    match (placement.per_tile, placement.curved) {
+        (true, true) => Some(
+            "in tileset.json each tile has a transform of its own, because the terrain is too wide for one: neighbours do not quite meet, by \
+             some metres where it is hundreds of kilometres wide; [output] compression = \"meshopt\" bends tiles along all axes, so that \
+             they meet exactly"
+                .into(),
+        ),
+        _ if off <= ONE_TRANSFORM => None,
+        (false, true) => Some(format!(
             "tileset.json puts places up to {off:.1} m beside where they belong on the earth; [output] compression = \"meshopt\" bends tiles \
              along all axes, and [input] bounds gives a smaller terrain"
-        ),
-        (per_tile, _) => format!(
-            "in tileset.json {} lies flat on the tangent plane at its middle, up to {off:.1} m off the curved earth; smaller tiles \
+        )),
+        (per_tile, false) => Some(format!(
+            "in tileset.json {} lies flat on the tangent plane at its middle, up to {off:.1} m off the curved earth{}; smaller tiles \
              follow it more closely: lower [triangulation] max_points_per_tile, and leave out long triangles along the hull with \
              [output] max_edge",
-            if per_tile { "each tile" } else { "the only tile" }
-        ),
-    })
+            if per_tile { "each tile" } else { "the only tile" },
+            if per_tile { ", and neighbours do not quite meet" } else { "" }
+        )),
+    }
 }
 
 /// Returns what the user should know about the heights of a terrain on the globe, to which `offset` is added.

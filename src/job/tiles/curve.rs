@@ -1,14 +1,13 @@
 //! Whether the scene of a job follows the curve of the earth, and how.
 
-use crate::Result;
 use crate::geometry::Bounds;
 use crate::job::plan::globe_definition::globe_definition;
 use crate::job::plan::job_plan::Plan;
-use crate::job::tiles::style::bent_frame;
-use crate::output::compression::Compression;
+use crate::job::tiles::style::{bent_frame, packing};
+use crate::output::compression::{Compression, CompressionChoice};
 use crate::output::curvature::Curvature;
 use crate::output::geoid::Geoid;
-use crate::output::options::OutputFormat;
+use crate::output::options::{OutputFormat, OutputOptions};
 use crate::output::tiles3d::curve_fit::{Bent, fit_curvature};
 use crate::output::tiles3d::globe::NotPlaced;
 use crate::output::tiles3d::ground::Ground;
@@ -37,18 +36,13 @@ fn bendable(plan: &Plan) -> Option<String> {
 ///
 /// # Errors
 /// [`crate::Error::Config`] if the geoid has no height anywhere, or its file is damaged; [`crate::Error::Io`] if it cannot be read.
-pub fn curvature_of(plan: &Plan, bounds: Bounds<3>) -> Result<Option<Curvature>> {
+pub fn curvature_of(plan: &Plan, bounds: Bounds<3>) -> crate::Result<Option<Curvature>> {
     let Some(definition) = bendable(plan) else { return Ok(None) };
     let (output, extras) = (&plan.options.output, plan.frame.extras());
     let geoid = Geoid::open(output.height_offset.as_ref())?;
     let found = Ground::new(extras, &definition, geoid).and_then(|ground| {
         let distortion = ground.distortion(&ground.tangent(ground.seen_from(bounds)?)?, bounds)?;
-        let bent = match output.packing() {
-            Compression::Meshopt => Bent::All,
-            // Programs that read these take x and y as they are.
-            Compression::None | Compression::Quantized => Bent::Up,
-        };
-        (distortion > ONE_TRANSFORM).then(|| fit_curvature(&ground, bounds, bent)).transpose()
+        (distortion > ONE_TRANSFORM).then(|| bent_for(&ground, bounds, output)).transpose()
     });
     match found {
         // The step that publishes says why a terrain has no place on the globe.
@@ -56,7 +50,24 @@ pub fn curvature_of(plan: &Plan, bounds: Bounds<3>) -> Result<Option<Curvature>>
         Err(NotPlaced::Height(error)) => Err(error),
         Ok(curvature) => Ok(curvature.filter(|curvature| {
             // Half a continent, or a map such as Mercator's that is nowhere to scale, stays flat, with a transform for each tile.
-            bent_frame(plan, curvature.clone(), bounds).can_be_bent(&plan.frame, bounds, output.packing())
+            let packing = packing(output, Some(curvature));
+            bent_frame(plan, curvature.clone(), bounds).can_be_bent(&plan.frame, bounds, packing)
         })),
     }
+}
+
+/// Returns the curvature that suits tiles with these options. Packed with meshopt, they may be bent along all axes. Programs that read other
+/// tiles take x and y as they are, so those are bent upwards alone; but without a wish of the user only as far as one transform places
+/// them, because tiles that do not meet are worse.
+fn bent_for(ground: &Ground, bounds: Bounds<3>, output: &OutputOptions) -> Result<Curvature, NotPlaced> {
+    let is_packed = output.packing() == Compression::Meshopt;
+    if is_packed || output.compression == CompressionChoice::Auto {
+        let all = fit_curvature(ground, bounds, Bent::All)?;
+        let [x, y, _] = all.greatest();
+        // A tenth covers what lies between the places that were looked at.
+        if is_packed || 1.1 * x.hypot(y) > ONE_TRANSFORM_SIDEWAYS {
+            return Ok(all);
+        }
+    }
+    fit_curvature(ground, bounds, Bent::Up)
 }

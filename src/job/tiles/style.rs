@@ -9,6 +9,7 @@ use crate::job::tiles::max_edge::MaxEdgeRule;
 use crate::output::Compression;
 use crate::output::attributes::AttributeChoice;
 use crate::output::color::{Coloring, HeightRange};
+use crate::output::compression::CompressionChoice;
 use crate::output::curvature::Curvature;
 use crate::output::frame::Frame;
 use crate::output::options::{ColorChoice, Hull, OutputOptions};
@@ -45,9 +46,19 @@ fn with_steps(frame: Frame, compression: Compression, bounds: Bounds<3>) -> Fram
     }
 }
 
+/// Returns how the tiles of a job are packed whose scene is bent like this.
+pub(crate) fn packing(output: &OutputOptions, curvature: Option<&Curvature>) -> Compression {
+    match (output.compression, curvature) {
+        // Only viewers of 3D Tiles see such a scene, and they know meshopt. What reads quantized tiles takes x and y as they are.
+        (CompressionChoice::Auto, Some(bent)) if !bent.is_vertical() => Compression::Meshopt,
+        _ => output.packing(),
+    }
+}
+
 /// Returns the frame of the tiles of a job whose scene follows the curve of the earth, and whose points are within `bounds`.
 pub(crate) fn bent_frame(plan: &Plan, curvature: Curvature, bounds: Bounds<3>) -> Frame {
-    with_steps(plan.frame.clone().curved(curvature), plan.options.output.packing(), bounds)
+    let packing = packing(&plan.options.output, Some(&curvature));
+    with_steps(plan.frame.clone().curved(curvature), packing, bounds)
 }
 
 impl TileStyle {
@@ -71,7 +82,7 @@ impl TileStyle {
             ColorChoice::Auto | ColorChoice::Rgb if max_rgb == 0 => Some(Coloring::Elevation(heights)),
             ColorChoice::Auto | ColorChoice::Rgb => Some(Coloring::Rgb { eight_bit: max_rgb <= 255 }),
         };
-        let compression = output.packing();
+        let compression = packing(output, plan.curvature.as_ref());
         let frame = match &plan.curvature {
             Some(curvature) => bent_frame(plan, curvature.clone(), bounds),
             None => with_steps(plan.frame.clone(), compression, bounds),
