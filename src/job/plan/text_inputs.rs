@@ -44,8 +44,8 @@ pub(crate) fn refuse_degrees(sources: &[Source], options: &InputOptions) -> Resu
     match sources.iter().find(is_in_degrees) {
         Some(source) if is_open => Err(Error::Config(format!(
             "{}: its columns are named as degrees (x from {} to {}, y from {} to {}{}), and a Delaunay triangulation in \
-             degrees is distorted: [input] to_crs = \"utm\" with missing_crs = \"EPSG:4326\" transforms them, if that is what they are in; if \
-             they are no degrees, set [input] unit, for example to \"metre\", or [input] crs",
+             degrees is distorted: [input] to_crs = \"utm\" with missing_crs = \"EPSG:4326\", if that is what they are in, transforms them to a \
+             projected CRS; if they are no degrees, set [input] unit, for example to \"metre\", or [input] crs",
             source.path.display(),
             source.min[0],
             source.max[0],

@@ -2,6 +2,8 @@
 //! another map. The same bits come out on every machine.
 
 pub(crate) mod between;
+#[cfg(test)]
+mod bit_tests;
 pub(crate) mod datum_rule;
 mod ellipsoid;
 mod equal_area;

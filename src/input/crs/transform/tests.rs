@@ -144,3 +144,40 @@ fn projections_that_are_not_computed_are_refused_by_name() {
     let refused = CrsTransform::between(&oblique, &epsg(4326), DatumRule::Strict).unwrap_err();
     assert!(refused.contains("Stereographic"), "{refused}");
 }
+
+#[test]
+fn no_parameter_and_no_place_leads_to_infinity() {
+    const METHODS: [&str; 9] = [
+        "Transverse_Mercator",
+        "Lambert_Conformal_Conic_1SP",
+        "Lambert_Conformal_Conic_2SP",
+        "Mercator_1SP",
+        "Mercator_2SP",
+        "Albers_Conic_Equal_Area",
+        "Lambert_Azimuthal_Equal_Area",
+        "Polar_Stereographic",
+        "Oblique_Stereographic",
+    ];
+    const ODD: [f64; 9] = [0.0, 45.0, 90.0, -90.0, 1e-300, 1e300, -1e300, 1e6, 359.999];
+    let earth = epsg(4326);
+    let mut made = 0;
+    for (method, odd) in METHODS.iter().flat_map(|method| ODD.map(|odd| (method, odd))) {
+        for (latitude, scale) in [(odd, 1.0), (40.0, odd)] {
+            let text = format!(
+                r#"PROJCS["odd",GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0],
+                UNIT["degree",0.0174532925199433]],PROJECTION["{method}"],PARAMETER["latitude_of_origin",{latitude}],
+                PARAMETER["central_meridian",{odd}],PARAMETER["standard_parallel_1",{latitude}],
+                PARAMETER["standard_parallel_2",{odd}],PARAMETER["scale_factor",{scale}],PARAMETER["false_easting",{odd}],
+                PARAMETER["false_northing",0],UNIT["metre",1]]"#
+            );
+            let Ok(there) = CrsTransform::between(&earth, &parse(&text).unwrap(), DatumRule::Strict) else { continue };
+            let back = CrsTransform::between(&parse(&text).unwrap(), &earth, DatumRule::Strict).unwrap();
+            made += 1;
+            for place in ODD.iter().flat_map(|x| ODD.map(|y| [*x, y])) {
+                let found = [there.apply(place), back.apply(place), back.apply(place.map(|value| value * 1e4))];
+                assert!(found.iter().flatten().flatten().all(|value| value.is_finite()), "{text} {place:?} {found:?}");
+            }
+        }
+    }
+    assert!(made > 40, "{made}");
+}
