@@ -4,11 +4,11 @@ use crate::rig::{Rig, Setup};
 use crate::scattered;
 
 fn with_raster(options: &str) -> Setup {
-    Setup::tiles_of(3_000).output(&format!("raster = {{ {options} }}"))
+    Setup::tiles_of(1_500).output(&format!("raster = {{ {options} }}"))
 }
 
 fn rig() -> Rig {
-    Rig::new(&scattered::uniform(10_000, 20_000, 5), &with_raster("resolution = 15.0")).committing_every(0)
+    Rig::new(&scattered::uniform(5_000, 20_000, 5), &with_raster("resolution = 15.0")).committing_every(0)
 }
 
 #[test]
@@ -47,9 +47,9 @@ fn another_raster_keeps_the_tiles() {
     }
     // No raster at all: that of the interrupted run goes.
     rig.forget();
-    rig.configure(&with_raster("resolution = 15.0"));
+    rig.expect(&with_raster("resolution = 15.0"));
     assert!(rig.run_to("replacing", 1).was_killed());
     rig.completes("all results were whole");
-    rig.expect(&Setup::tiles_of(3_000));
+    rig.expect(&Setup::tiles_of(1_500));
     rig.completes("without a raster");
 }
