@@ -162,7 +162,9 @@ fn points_that_lie_elsewhere_than_the_octree_says_are_noticed() {
     let mut made = made();
     // The nodes of the lowest level are 8 by 8.
     let node = |range: std::ops::Range<i32>| {
-        let is_there = |key: &&[i32; 4]| key[0] == 3 && range.contains(&key[1]) && range.contains(&key[2]) && made.nodes[*key].len() > 3;
+        let is_there = |key: &&[i32; 4]| {
+            key[0] == 3 && range.contains(&key[1]) && range.contains(&key[2]) && made.nodes[*key].len() > 3
+        };
         *made.nodes.keys().find(is_there).unwrap()
     };
     let (first, last) = (node(1..3), node(5..7));

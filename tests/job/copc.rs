@@ -54,7 +54,9 @@ fn a_wrong_octree_leads_to_the_whole_file_and_a_warning() {
     let [copc, laz] = ["a.copc.laz", "b.laz"].map(|name| folder.path().join(name));
     let mut made = made();
     let node = |range: std::ops::Range<i32>| {
-        let is_there = |key: &&[i32; 4]| key[0] == 3 && key[1..3].iter().all(|number| range.contains(number)) && made.nodes[*key].len() > 3;
+        let is_there = |key: &&[i32; 4]| {
+            key[0] == 3 && key[1..3].iter().all(|number| range.contains(number)) && made.nodes[*key].len() > 3
+        };
         *made.nodes.keys().find(is_there).unwrap()
     };
     // A quarter of the cloud has one of two nodes whose last points have changed places.

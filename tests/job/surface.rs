@@ -89,7 +89,8 @@ fn each_surface_keeps_its_classes_and_returns_in_every_format() {
             assert_eq!(same(name)[0], same(name)[1], "{lines} {name}");
         }
         assert_eq!(las["points"]["classes"], csv["points"]["classes"]);
-        let unclear = las["warnings"].as_array().unwrap().iter().any(|w| w.as_str().unwrap().contains("do not say clearly"));
+        let unclear =
+            las["warnings"].as_array().unwrap().iter().any(|w| w.as_str().unwrap().contains("do not say clearly"));
         assert_eq!(unclear, lines.contains("return") || lines.contains("first") || lines.contains("last"), "{lines}");
     }
 }
@@ -104,7 +105,8 @@ fn what_the_mesh_is_stands_in_the_report_in_check_and_in_info() {
     let [las, ..] = files(folder.path(), &cloud(class));
     let job = |surface: &str| Job::on(&[&las]).with("input", &format!("surface = \"{surface}\""));
     // Nine of ten are no noise, and five of them are ground.
-    let all = "56 % ground: the mesh of all points has vegetation and buildings in it; surface = \"ground\" makes bare earth";
+    let all =
+        "56 % ground: the mesh of all points has vegetation and buildings in it; surface = \"ground\" makes bare earth";
     let report = job("all").report();
     assert_eq!(said(&report), all);
     assert!(job("all").run().succeeded().out.contains(all));
@@ -120,7 +122,10 @@ fn what_the_mesh_is_stands_in_the_report_in_check_and_in_info() {
     assert!((1500..2200).contains(&kept), "half of the points: {kept}");
     for (option, about) in [("--json", "about "), ("--histogram", "")] {
         let info = gdt_batch(folder.path(), &["info", option, "a.las"]).succeeded().out;
-        assert!(info.contains(&format!("{about}{all}").replace('"', if about.is_empty() { "\"" } else { "\\\"" })), "{info}");
+        assert!(
+            info.contains(&format!("{about}{all}").replace('"', if about.is_empty() { "\"" } else { "\\\"" })),
+            "{info}"
+        );
     }
 }
 
@@ -129,7 +134,11 @@ fn a_cloud_without_ground_is_refused_with_what_it_has_and_what_to_do() {
     let folder = tempfile::tempdir().unwrap();
     let unclassified = |i: usize| if i.is_multiple_of(4) { 5 } else { 1 };
     let [las, _, csv] = files(folder.path(), &cloud(unclassified));
-    let words = ["no point is left", "class 1 (unclassified, 75 %), class 5 (high vegetation, 25 %)", "pdal translate in.laz out.laz smrf"];
+    let words = [
+        "no point is left",
+        "class 1 (unclassified, 75 %), class 5 (high vegetation, 25 %)",
+        "pdal translate in.laz out.laz smrf",
+    ];
     for file in [&las, &csv] {
         let job = Job::on(&[file]).with("input", "surface = \"ground\"");
         job.run().refused(3, &words);
@@ -143,7 +152,10 @@ fn a_cloud_without_ground_is_refused_with_what_it_has_and_what_to_do() {
     fs::write(&good, cloud(class).las()).unwrap();
     let report = Job::on(&[&las, &good]).with("input", "surface = \"ground\"").report();
     let warnings = report["warnings"].to_string();
-    assert!(warnings.contains("a.las: no point is left of it: surface") && !warnings.contains("good.las: no"), "{warnings}");
+    assert!(
+        warnings.contains("a.las: no point is left of it: surface") && !warnings.contains("good.las: no"),
+        "{warnings}"
+    );
 }
 
 #[test]
@@ -163,7 +175,8 @@ fn a_text_that_lacks_the_columns_of_a_surface_is_refused() {
     run(&numbers, "surface = \"first\"").succeeded();
     run(&numbers, "surface = \"last\"").refused(2, &["number_of_returns"]);
     run(&rows("x,y,z,return,number of returns", ",1,1"), "surface = \"last\"").succeeded();
-    run(&rows("x,y,z,return,returns", ",one,1"), "surface = \"last\"").refused(3, &["column 4 (return number)", "not a number"]);
+    run(&rows("x,y,z,return,returns", ",one,1"), "surface = \"last\"")
+        .refused(3, &["column 4 (return number)", "not a number"]);
     // Nobody asks for them.
     run(&rows("x,y,z,return,returns", ",one,1"), "surface = \"all\"").succeeded();
 }
