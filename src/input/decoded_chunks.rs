@@ -33,6 +33,11 @@ impl DecodedChunks {
         self.count == 0
     }
 
+    /// Returns whether an index tells which chunks there are.
+    pub fn are_listed(&self) -> bool {
+        self.listed.is_some()
+    }
+
     /// Returns the number in the source of the one with this `index` below [`DecodedChunks::len`].
     pub fn chunk(&self, index: usize) -> usize {
         self.listed.as_ref().map_or(index, |listed| listed[index])

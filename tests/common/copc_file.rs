@@ -46,7 +46,7 @@ impl CopcFile {
         for (i, record) in records.enumerate() {
             let share = (i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40;
             // Each level has four times the points of that above it.
-            let level = (0..levels - 1).rev().find(|level| share % 4u64.pow((levels - level) as u32) != 0);
+            let level = (0..levels - 1).rev().find(|level| !share.is_multiple_of(4u64.pow((levels - level) as u32)));
             let level = level.map_or(0, |level| level + 1);
             let number = |axis: usize| {
                 let from = raw(record, axis) as i64 + half as i64;

@@ -16,6 +16,9 @@ fn made() -> CopcFile {
     CopcFile::new(&LasFile::new(4, 7, 0, 20_000), 4)
 }
 
+/// What makes an octree wrong.
+type Edit<'a> = &'a dyn Fn(&mut Vec<Entry>);
+
 /// A hundredth of the cloud's area.
 const SMALL: [f64; 4] = [500_050.0, 4_000_060.0, 500_450.0, 4_000_460.0];
 
@@ -102,7 +105,7 @@ fn without_bounds_the_octree_is_not_even_read() {
 #[test]
 fn a_wrong_octree_is_left_aside_with_a_warning() {
     let made = CopcFile::new(&LasFile::new(4, 7, 0, 2000), 3);
-    let edits: [(&dyn Fn(&mut Vec<Entry>), &str); 10] = [
+    let edits: [(Edit, &str); 10] = [
         (&|entries| entries.truncate(entries.len() - 1), "has no node for 1 of the chunks"),
         (&|entries| entries.clear(), "has no node for"),
         (&|entries| entries.push(entries[3]), "twice"),

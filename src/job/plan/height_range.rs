@@ -14,6 +14,9 @@ const MOST_CHUNKS: usize = 128;
 /// The records at which the sample looks, in all chunks together: half a percent of the reading of ten million.
 const RECORDS: u64 = 1 << 16;
 
+/// Where an index lists the chunks within bounds, they are few, and the sample would read much of them. A share of them is enough.
+const SHARE_OF_LISTED: usize = 4;
+
 /// Fewer points tell too little, unless they are all that there are.
 const LEAST_POINTS: usize = 256;
 
@@ -52,14 +55,16 @@ impl HeightSample {
             chunks
         };
         let ends: Vec<usize> = inputs.iter().map(up_to).collect();
-        let places = chunks.min(MOST_CHUNKS);
+        let most = chunks.min(MOST_CHUNKS);
+        let are_listed = inputs.iter().any(|(.., decoded)| decoded.are_listed());
+        let places = if are_listed { most.div_ceil(SHARE_OF_LISTED) } else { most };
         let look = |place: usize| {
             interrupt::check()?;
             let chunk = (2 * place + 1) * chunks / (2 * places);
             let at = ends.partition_point(|&end| end <= chunk);
             let (source, rules, decoded) = &inputs[at];
             let chunk = decoded.chunk(chunk + decoded.len() - ends[at]);
-            first_heights(source, rules, chunk, RECORDS / places as u64)
+            first_heights(source, rules, chunk, RECORDS / most as u64)
         };
         let found = (0..places).into_par_iter().map(look).collect::<Result<Vec<_>>>()?;
         let (mut heights, mut counts) = (Vec::new(), PointCounts::default());
