@@ -96,7 +96,7 @@ impl Marks {
     fn mark(&mut self, bounds: &Bounds<2>) {
         let rows = (self.cells.len() / self.columns) as i64;
         let lines = |axis: usize, count: i64| {
-            let line = |value: i32| ((i64::from(value) - i64::from(self.extent.min[axis])).div_euclid(self.side));
+            let line = |value: i32| (i64::from(value) - i64::from(self.extent.min[axis])).div_euclid(self.side);
             line(bounds.min[axis]).clamp(0, count - 1) as usize..=line(bounds.max[axis]).clamp(0, count - 1) as usize
         };
         let (columns, rows) = (lines(0, self.columns as i64), lines(1, rows));
@@ -116,7 +116,8 @@ impl Marks {
                 if *cell == Cell::Land {
                     let at = [corner(0, column), corner(1, row)];
                     let is_water = || lakes.hold(Fraction::middle_of(&[at]), |_| true);
-                    *cell = if before == Cell::Mixed { if is_water() { Cell::Water } else { Cell::Land } } else { before };
+                    *cell =
+                        if before == Cell::Mixed { if is_water() { Cell::Water } else { Cell::Land } } else { before };
                 }
                 before = *cell;
             }

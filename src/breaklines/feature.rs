@@ -25,7 +25,7 @@ pub struct FeatureId {
 }
 
 /// A vertex of a feature.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct Vertex {
     /// Where it is, within `lattice::REACH` of zero.
     pub place: Site,
@@ -34,7 +34,7 @@ pub struct Vertex {
 }
 
 /// A line, several lines, or a polygon.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Feature {
     /// What it is.
     pub kind: FeatureKind,

@@ -61,10 +61,7 @@ impl Lakes {
 
     /// Returns whether the point is inside a lake that passes `wanted`. On a shore either may be true.
     pub(crate) fn hold(&self, point: Fraction, wanted: impl Fn(u32) -> bool) -> bool {
-        self.boxes.any(
-            |bounds| point.can_meet(bounds),
-            |lake| wanted(lake) && self.is_inside(point, lake),
-        )
+        self.boxes.any(|bounds| point.can_meet(bounds), |lake| wanted(lake) && self.is_inside(point, lake))
     }
 
     fn is_inside(&self, point: Fraction, lake: u32) -> bool {

@@ -67,7 +67,8 @@ impl NearestHeights {
     /// point that is not above it. Sites of lines without a point near get the height of the next site on their line that has one, the lower
     /// of two. Returns whether each site has a height then: lines far from all points have none.
     pub fn settle(&self, breaklines: &mut Breaklines) -> bool {
-        let missing: Vec<usize> = (0..breaklines.sites().len()).filter(|&i| breaklines.sites()[i].z.is_none()).collect();
+        let missing: Vec<usize> =
+            (0..breaklines.sites().len()).filter(|&i| breaklines.sites()[i].z.is_none()).collect();
         let mut heights: Vec<Option<i32>> = breaklines.sites().iter().map(|site| site.z).collect();
         missing.iter().zip(&self.nearest).for_each(|(&i, found)| heights[i] = found.map(|(_, z)| z));
         level_lakes(breaklines, &missing, &mut heights);
