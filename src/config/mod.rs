@@ -5,6 +5,7 @@ mod paths;
 
 use crate::config::paths::{Anchored, anchor};
 use crate::gpu::options::{GpuOptions, TextureSide, VoronoiMethod};
+use crate::input::lines::options::LineOptions;
 use crate::input::options::InputOptions;
 use crate::job::options::{JobOptions, Limits};
 use crate::output::options::OutputOptions;
@@ -18,6 +19,8 @@ use std::path::Path;
 #[serde(deny_unknown_fields)]
 struct ConfigFile {
     input: InputOptions,
+    #[serde(default)]
+    breaklines: Vec<LineOptions>,
     #[serde(default)]
     triangulation: TriangulationTable,
     #[serde(default)]
@@ -98,8 +101,10 @@ fn resolve_paths(options: &mut JobOptions, base: &Path) -> std::result::Result<(
         let Anchored { base, path } = anchor("[output] height_offset", &name, base)?;
         *grid = base.join(path);
     }
-    for file in &mut options.input.files {
-        let Anchored { base, path } = anchor("[input] files", file, base)?;
+    let of_points = options.input.files.iter_mut().map(|file| ("[input] files", file));
+    let of_lines = options.breaklines.iter_mut().flat_map(|lines| &mut lines.files);
+    for (key, file) in of_points.chain(of_lines.map(|file| ("[[breaklines]] files", file))) {
+        let Anchored { base, path } = anchor(key, file, base)?;
         if !Path::new(path).is_absolute() {
             *file = format!("{}{path}", glob_prefix(&base));
         }
@@ -109,7 +114,7 @@ fn resolve_paths(options: &mut JobOptions, base: &Path) -> std::result::Result<(
 
 /// Reads and checks the text of a configuration. The error shows the line.
 fn parse(text: &str) -> std::result::Result<JobOptions, String> {
-    let file: ConfigFile = toml::from_str(text).map_err(|e| e.to_string())?;
+    let mut file: ConfigFile = toml::from_str(text).map_err(|e| e.to_string())?;
     if file.input.files.is_empty() {
         return Err("[input] files is empty: name at least one point cloud".into());
     }
@@ -118,6 +123,11 @@ fn parse(text: &str) -> std::result::Result<JobOptions, String> {
             "[input] classes is empty, so no point would be left; leave the key out to keep all but noise".into()
         );
     }
+    if let Some(contradiction) = file.breaklines.iter().find_map(LineOptions::contradiction) {
+        return Err(contradiction.into());
+    }
+    // Points near breaklines that somebody has found and marked.
+    file.input.without_ignored_ground = !file.breaklines.is_empty();
     if file.output.directory.as_os_str().is_empty() {
         return Err("[output] directory is empty".into());
     }
@@ -130,6 +140,7 @@ fn parse(text: &str) -> std::result::Result<JobOptions, String> {
     };
     Ok(JobOptions {
         input: file.input,
+        breaklines: file.breaklines,
         triangulation: TriangulationOptions { backend, max_points_per_tile, max_points_per_part },
         gpu,
         output: file.output,

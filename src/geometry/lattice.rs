@@ -43,6 +43,19 @@ impl Lattice {
         self.exact_world(axis, i).and_then(|exact| exact.to_f64()).unwrap_or(f64::NAN)
     }
 
+    /// Returns the world coordinate of lattice integer `i` on `axis` as a decimal text without rounding; empty on a lattice that
+    /// [`Lattice::new`] refuses.
+    pub fn world_text(&self, axis: usize, i: i32) -> String {
+        self.exact_world(axis, i).map(|exact| exact.normalize().to_string()).unwrap_or_default()
+    }
+
+    /// Returns the lattice integer of a world coordinate that is written as [`Lattice::world_text`] does; `None` if it is none of the lattice.
+    pub fn integer_of_text(&self, axis: usize, text: &str) -> Option<i32> {
+        let world = Decimal::from_str_exact(text).ok()?;
+        let steps = world.checked_sub(self.offset[axis])?.checked_div(self.step(axis))?;
+        steps.is_integer().then(|| steps.to_i32()).flatten()
+    }
+
     fn exact_world(&self, axis: usize, i: i32) -> Option<Decimal> {
         self.step(axis).checked_mul(Decimal::from(i))?.checked_add(self.offset[axis])
     }

@@ -10,6 +10,7 @@ mod file;
 pub mod histogram;
 pub mod info;
 mod las;
+pub mod lines;
 pub mod options;
 mod other_formats;
 mod points;

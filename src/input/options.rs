@@ -15,9 +15,13 @@ use crate::input::text::row_choice::RowChoice;
 pub struct InputOptions {
     /// Paths or globs, relative to the configuration file.
     pub files: Vec<String>,
-    /// Keep only these classes. The default is all classes but noise (7, 18).
+    /// Keep only these classes. The default is all classes but noise (7, 18), and with breaklines also without ignored ground (20).
     #[serde(default)]
     pub classes: Option<Vec<u8>>,
+    /// Whether the default leaves out class 20 too: points near breaklines, which these stand for. That follows from `[[breaklines]]`, and
+    /// what a user writes here does not count.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub without_ignored_ground: bool,
     /// Keep only the points within this rectangle.
     #[serde(default)]
     pub bounds: Option<SourceBounds>,
@@ -56,7 +60,9 @@ impl InputOptions {
                 classes.iter().for_each(|&class| kept[class as usize] = true);
                 kept
             }
-            None => std::array::from_fn(|class| class != 7 && class != 18),
+            None => {
+                std::array::from_fn(|class| class != 7 && class != 18 && !(class == 20 && self.without_ignored_ground))
+            }
         }
     }
 

@@ -2,6 +2,7 @@
 
 use crate::Warnings;
 use crate::gpu::options::GpuOptions;
+use crate::input::lines::options::LineOptions;
 use crate::input::options::InputOptions;
 use crate::job::progress::stage::ProgressOutput;
 use crate::output::options::OutputOptions;
@@ -14,6 +15,9 @@ use serde::{Deserialize, Serialize};
 pub struct JobOptions {
     /// What to read.
     pub input: InputOptions,
+    /// Which lines become edges of the mesh.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub breaklines: Vec<LineOptions>,
     /// How to triangulate.
     pub triangulation: TriangulationOptions,
     /// How to use a GPU.

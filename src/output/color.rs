@@ -61,9 +61,14 @@ impl Coloring {
             Coloring::Rgb { eight_bit: true } => rgb.map(|v| TO_LINEAR[v.min(255) as usize * 257]),
             Coloring::Rgb { eight_bit: false } => rgb.map(|v| TO_LINEAR[v as usize]),
             Coloring::Elevation(range) => height_color(z, range),
-            Coloring::Class => CLASS_COLORS.get(class as usize).unwrap_or(&OTHER_CLASS).map(decode_byte),
+            Coloring::Class => class_color(class).map(decode_byte),
         }
     }
+}
+
+/// Returns the sRGB colour of an ASPRS classification.
+pub fn class_color(class: u8) -> [u8; 3] {
+    *CLASS_COLORS.get(class as usize).unwrap_or(&OTHER_CLASS)
 }
 
 /// Returns the colour of height `z` on the ramp over `range`.

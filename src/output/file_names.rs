@@ -97,6 +97,11 @@ impl OutputFiles {
         self.directory.join("georeference.json")
     }
 
+    /// Returns the edges along breaklines.
+    pub fn breaklines(&self) -> PathBuf {
+        self.directory.join("breaklines.csv")
+    }
+
     /// Returns the report for machines.
     pub fn report(&self) -> PathBuf {
         self.directory.join("report.json")

@@ -4,6 +4,7 @@
 
 pub mod attributes;
 pub(crate) mod axis_scale;
+pub mod breakline_list;
 pub mod checksums;
 pub mod color;
 pub mod compression;

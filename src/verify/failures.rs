@@ -13,6 +13,8 @@ pub(super) enum Failure {
     Unused,
     PlaceDiffers,
     ShadingDiffers,
+    NotAtHeightOfLine,
+    InDisc,
 }
 
 impl Failure {
@@ -25,6 +27,8 @@ impl Failure {
             Failure::NotDelaunay => "edges not Delaunay",
             Failure::Unused => "vertices without a triangle",
             Failure::PlaceDiffers => "sites at different places in different tiles",
+            Failure::NotAtHeightOfLine => "vertices at another height than their breakline",
+            Failure::InDisc => "vertices in the closed disc of an edge along a breakline",
             Failure::ShadingDiffers => {
                 "sites with different normals, colours, classes or intensities in different tiles"
             }

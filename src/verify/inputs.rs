@@ -14,6 +14,7 @@ use crate::input::options::Duplicates;
 use crate::input::samples::{FileSamples, fingerprint_of};
 use crate::input::{OptionalFields, Point, PointRules, RowChoice, Source, TextOptions, TextReading, open_chosen};
 use crate::output::frame::Extras;
+use crate::verify::breaklines::BreaklineEdges;
 use crate::verify::keyed_records::{KeyedRecord, KeyedRecords};
 use crate::verify::report::ReportedFacts;
 use crate::verify::source_grid::SourceGrid;
@@ -21,6 +22,9 @@ use crate::{Error, Result, interrupt};
 
 /// The number of the source of a vertex. Inputs have the numbers above it.
 const VERTEX: u32 = 0;
+
+/// The number of the source of an end of an edge along a breakline: above those of all inputs.
+const LINE: u32 = u32::MAX;
 
 /// A vertex of the mesh, or a point of an input.
 #[repr(C)]
@@ -52,6 +56,11 @@ impl Places {
     pub(super) fn add_vertices(&self, vertices: &[[i32; 3]]) -> Result<()> {
         let place = |&[x, y, height]: &[i32; 3]| Place { site: [x, y], source: VERTEX, height, order: 0 };
         self.add(vertices.iter().map(place).collect())
+    }
+
+    fn add_lines(&self, lines: &BreaklineEdges) -> Result<()> {
+        let place = |[x, y, height]: [i32; 3]| Place { site: [x, y], source: LINE, height, order: 0 };
+        self.add(lines.sites().map(place).collect())
     }
 
     fn add_points(&self, source: u32, points: &[Point]) -> Result<()> {
@@ -112,11 +121,17 @@ impl<'a> Inputs<'a> {
         Ok(Inputs { facts, lattice: lattice_of(facts, extras)?, sources, files })
     }
 
-    /// Compares the vertices in `places` with the points of the inputs.
+    /// Compares the vertices in `places` with the points of the inputs, and with the ends of the edges along breaklines.
     ///
     /// # Errors
     /// [`Error::Io`] or [`Error::Input`] if an input cannot be read, [`Error::Io`] on temporary files.
-    pub(super) fn compare(&self, places: Places, grid: &SourceGrid) -> Result<InputProof> {
+    pub(super) fn compare(
+        &self,
+        places: Places,
+        lines: Option<&BreaklineEdges>,
+        grid: &SourceGrid,
+    ) -> Result<InputProof> {
+        lines.map_or(Ok(()), |lines| places.add_lines(lines))?;
         let mut first_order = 0;
         for (number, source) in (VERTEX + 1..).zip(&self.sources) {
             let rules = self.rules(source, first_order)?;
@@ -127,7 +142,9 @@ impl<'a> Inputs<'a> {
             first_order += source.records;
         }
         let duplicates = self.facts.input.as_ref().map(|input| input.duplicates);
-        let mut differences = Differences { inputs: self, duplicates, grid, points: 0, kinds: Default::default() };
+        let has_lines = lines.is_some();
+        let mut differences =
+            Differences { inputs: self, duplicates, grid, points: 0, dropped: 0, has_lines, kinds: Default::default() };
         let records = places.0.into_inner().unwrap_or_else(PoisonError::into_inner);
         records.for_each_bucket(|bucket| {
             bucket.par_sort_unstable();
@@ -156,6 +173,13 @@ impl<'a> Inputs<'a> {
 
     fn proof(&self, differences: Differences) -> Result<InputProof> {
         let (points, mut failures) = (differences.points, differences.sentences());
+        let dropped = self.facts.points.map_or(0, |points| points.at_breaklines);
+        if differences.dropped != dropped && self.facts.input.is_some() {
+            failures.push(format!(
+                "{} points of the inputs are no vertices, where report.json says that {dropped} were dropped at breaklines",
+                differences.dropped
+            ));
+        }
         if !failures.is_empty() {
             let samples = self.files.iter().map(|file| FileSamples::of(file)).collect::<Result<_>>()?;
             let fingerprint = fingerprint_of(samples);
@@ -176,7 +200,10 @@ impl<'a> Inputs<'a> {
 }
 
 /// Returns the lattice of the tiles, with all its digits if the report says them.
-fn lattice_of(facts: &ReportedFacts, extras: &Extras) -> Result<Lattice> {
+///
+/// # Errors
+/// [`Error::Config`] if no lattice has the numbers of the tiles.
+pub(super) fn lattice_of(facts: &ReportedFacts, extras: &Extras) -> Result<Lattice> {
     if let Some(lattice) = facts.lattice.as_ref().filter(|_| facts.lattice_failure(extras).is_none()) {
         return Ok(lattice.clone());
     }
@@ -199,6 +226,9 @@ struct Differences<'a> {
     duplicates: Option<Duplicates>,
     grid: &'a SourceGrid,
     points: u64,
+    /// The points that are no vertices, of a job with breaklines: these may have dropped them.
+    dropped: u64,
+    has_lines: bool,
     kinds: [Difference; 3],
 }
 
@@ -218,9 +248,16 @@ impl Differences<'_> {
     /// Adds all vertices and points of one place. Vertices come first.
     fn add(&mut self, group: &[Place]) {
         let (vertices, points) = group.split_at(group.partition_point(|place| place.source == VERTEX));
+        let (points, lines) = points.split_at(points.partition_point(|place| place.source != LINE));
         self.points += points.len() as u64;
+        if !lines.is_empty() {
+            // A vertex of a line takes the place of points. Its height has been compared with the list.
+            self.dropped += points.len() as u64;
+            return;
+        }
         match (vertices.first(), self.point_that_stays(points)) {
             (Some(&vertex), None) => self.note(NO_POINT, [vertex, vertex]),
+            (None, Some(_)) if self.has_lines => self.dropped += points.len() as u64,
             // Without a rule the job may not have wanted this point.
             (None, Some(point)) if self.duplicates.is_some() => self.note(NO_VERTEX, [point, point]),
             (Some(_), Some(point)) => {

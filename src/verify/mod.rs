@@ -44,6 +44,13 @@
 //! the list of files shows that some of `cut/` is gone, only checks 1, 4 and the first sentence of 2 are made, and check 3 between
 //! the triangles that are there; the verdict says so.
 //!
+//! # Breaklines
+//!
+//! If there is a `breaklines.csv`, each of its edges must be an edge of a triangle, with the heights that the list says at both ends, and
+//! the third corners of its triangles must lie outside the closed disc that has the edge as its diameter. As the mesh is Delaunay, no other
+//! vertex lies in that disc either. The number of edges is compared with the report. Which points of the inputs lay in a disc or
+//! in a lake, and were dropped, is not proved one by one: [`verify_against`] compares their number with the report.
+//!
 //! # What the job wrote
 //!
 //! All of this also holds for a terrain that was changed consistently: one vertex raised, say, or all tiles moved. So every file is
@@ -53,6 +60,7 @@
 
 mod border;
 mod border_matching;
+mod breaklines;
 mod digest;
 mod exact;
 mod failures;
@@ -82,9 +90,10 @@ pub use verdict::{Conclusion, Verdict};
 use crate::output::file_names::OutputFiles;
 use crate::output::gltf::read::{TileFile, read_tile};
 use crate::verify::border_matching::Borders;
+use crate::verify::breaklines::{BreaklineEdges, CheckedBreaklines};
 use crate::verify::failures::Failure;
 use crate::verify::findings::Findings;
-use crate::verify::inputs::{Inputs, Places};
+use crate::verify::inputs::{Inputs, Places, lattice_of};
 use crate::verify::mesh_check::check_mesh;
 use crate::verify::report::ReadReport;
 use crate::verify::tile_files::TileFiles;
@@ -132,7 +141,10 @@ pub fn verify_against(directory: &Path, memory: u64, inputs: &[PathBuf]) -> Resu
         [] => None,
         inputs => Some(Inputs::open(inputs, &report.facts, &files.extras)?),
     };
+    let lattice = lattice_of(&report.facts, &files.extras)?;
+    let lines_read = BreaklineEdges::read(directory, &lattice, memory / 4)?;
     let run = Verification {
+        lines: lines_read.as_ref(),
         borders: Mutex::new(Borders::new(directory, memory / 4)),
         places: inputs.is_some().then(|| Places::new(directory, memory / 4)),
         files: &files,
@@ -144,8 +156,12 @@ pub fn verify_against(directory: &Path, memory: u64, inputs: &[PathBuf]) -> Resu
         (0..lanes).into_par_iter().map(|_| run.check_files()).try_reduce(Findings::default, |a, b| Ok(a.merge(b)))?;
     let borders = run.borders.into_inner().unwrap_or_else(PoisonError::into_inner);
     let matches = borders.match_all(&grid, &files)?;
-    let proof = inputs.zip(run.places).map(|(inputs, places)| inputs.compare(places, &grid)).transpose()?;
-    Ok(Verdict::new(CheckedMesh { files: &files, findings, matches }, &report, &written, proof))
+    let lines = lines_read.as_ref().map(|lines| CheckedBreaklines::of(lines, &grid));
+    let proof = inputs
+        .zip(run.places)
+        .map(|(inputs, places)| inputs.compare(places, lines_read.as_ref(), &grid))
+        .transpose()?;
+    Ok(Verdict::new(CheckedMesh { files: &files, findings, matches, lines }, &report, &written, proof))
 }
 
 /// Refuses results among which some may be of one job and some of another: a job has a journal until all its results are in place,
@@ -163,6 +179,8 @@ fn refuse_unfinished(directory: &Path) -> Result<()> {
 struct Verification<'a> {
     files: &'a TileFiles,
     grid: &'a SourceGrid,
+    /// The edges along breaklines; `None` if the job had none.
+    lines: Option<&'a BreaklineEdges>,
     borders: Mutex<Borders>,
     /// The vertices of all tiles, if they are to be compared with the inputs.
     places: Option<Places>,
@@ -196,6 +214,9 @@ impl Verification<'_> {
         }
         for mesh in &tile.parts {
             let (mut border, vertices) = check_mesh(mesh, number as u32, self.grid, findings);
+            if let Some(lines) = self.lines.filter(|_| !vertices.is_empty()) {
+                lines.check(&vertices, &mesh.triangles, number as u32, self.grid, findings);
+            }
             if let Some(places) = &self.places {
                 places.add_vertices(&vertices)?;
             }

@@ -21,6 +21,10 @@ pub(super) struct ReportedFacts {
     pub(super) triangles: Option<u64>,
     /// The triangles that were left out.
     pub(super) cut_triangles: Option<u64>,
+    /// The edges along breaklines; `None` if the job had none.
+    pub(super) breaklines: Option<ReportedBreaklines>,
+    /// What became of the points of the inputs.
+    pub(super) points: Option<ReportedPoints>,
     pub(super) lattice: Option<Lattice>,
     /// What the job wanted of its inputs.
     pub(super) input: Option<InputOptions>,
@@ -34,6 +38,20 @@ pub(super) struct ReportedFacts {
     /// The checksum of the list of files.
     pub(super) file_list: Option<Checksum>,
     checksum: Option<Checksum>,
+}
+
+/// What a report says of breaklines.
+#[derive(Clone, Copy, Debug, Deserialize)]
+pub(super) struct ReportedBreaklines {
+    pub(super) subsegments: u64,
+}
+
+/// What a report says of points.
+#[derive(Clone, Copy, Debug, Deserialize)]
+pub(super) struct ReportedPoints {
+    /// Those that were dropped at breaklines.
+    #[serde(default)]
+    pub(super) at_breaklines: u64,
 }
 
 /// An input that was left out.

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::geometry::{Site, VertexDigest};
 use crate::verify::border_matching::BorderMatches;
+use crate::verify::breaklines::CheckedBreaklines;
 use crate::verify::exact::cross;
 use crate::verify::findings::Findings;
 use crate::verify::hull::check_boundary;
@@ -31,6 +32,8 @@ pub struct Verdict {
     pub edges_across_tiles: u64,
     /// Edges whose two triangles have all four corners on one circle.
     pub ties: u64,
+    /// Edges along breaklines, if the job had any.
+    pub breaklines: Option<u64>,
     /// 32 hexadecimal digits that depend on the triangles of the mesh, not on the tiles: see [`Digest`](crate::verify::Digest).
     pub digest: String,
     /// The digest of the vertices, heights included: see [`VertexDigest`].
@@ -79,6 +82,8 @@ pub(super) struct CheckedMesh<'a> {
     pub(super) files: &'a TileFiles,
     pub(super) findings: Findings,
     pub(super) matches: BorderMatches,
+    /// `None` if there is no list of edges along breaklines.
+    pub(super) lines: Option<CheckedBreaklines>,
 }
 
 impl Verdict {
@@ -89,7 +94,7 @@ impl Verdict {
         written: &WrittenFiles,
         inputs: Option<InputProof>,
     ) -> Verdict {
-        let CheckedMesh { files, mut findings, matches } = mesh;
+        let CheckedMesh { files, mut findings, matches, lines } = mesh;
         let facts = &report.facts;
         let vertices = findings.vertices.join(matches.vertices);
         let mut verdict = Verdict {
@@ -119,6 +124,7 @@ impl Verdict {
             verdict.check_count("triangles left out", verdict.cut, facts.cut_triangles);
             verdict.check_vertices(vertices, facts.vertex_digest);
         }
+        verdict.add_breaklines(lines, facts, gone.is_some());
         verdict.check_count("triangles", verdict.triangles - verdict.cut, facts.triangles);
         verdict.failures.extend(facts.lattice_failure(&files.extras));
         // Without cut/ its sites are missing too, which says nothing about the inputs.
@@ -140,6 +146,24 @@ impl Verdict {
         } else {
             self.failures.extend(failures);
             unproved.into_iter().for_each(|what| self.doubt(what));
+        }
+    }
+
+    fn add_breaklines(&mut self, lines: Option<CheckedBreaklines>, facts: &ReportedFacts, is_cut_gone: bool) {
+        let reported = facts.breaklines.map(|lines| lines.subsegments);
+        let Some(CheckedBreaklines { edges, failure, missing }) = lines else {
+            if let Some(reported) = reported {
+                self.doubt(format!("breaklines.csv is gone, which lists {reported} edges that the mesh should have"));
+            }
+            return;
+        };
+        self.breaklines = Some(edges);
+        self.failures.extend(failure);
+        self.check_count("edges along breaklines", edges, reported);
+        match missing {
+            // They may be among what is gone.
+            Some(missing) if is_cut_gone => self.doubt(missing),
+            missing => self.failures.extend(missing),
         }
     }
 
@@ -245,6 +269,9 @@ impl fmt::Display for Verdict {
         }
         if self.cut > 0 {
             writeln!(f, "{:<20}{:>34}", "triangles left out", self.cut)?;
+        }
+        if let Some(edges) = self.breaklines {
+            writeln!(f, "{:<20}{:>34}", "along breaklines", edges)?;
         }
         writeln!(f, "{:<20}{:>34}", "digest", self.digest)?;
         writeln!(f, "{:<20}{:>34}", "digest of vertices", self.vertex_digest)?;

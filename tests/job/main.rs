@@ -17,6 +17,7 @@ mod tileset;
 
 mod attributes;
 mod bad_files;
+mod breaklines;
 mod broken;
 mod choices;
 mod configuration;

@@ -136,6 +136,11 @@ impl Job {
         self
     }
 
+    /// Lets the program run without the variables that were set.
+    pub(crate) fn calm(&mut self) {
+        self.environment.clear();
+    }
+
     pub(crate) fn folder(&self) -> &Path {
         self.folder.path()
     }

@@ -33,6 +33,7 @@ impl Leftovers {
             output.terrain(),
             output.tileset(),
             output.georeference(),
+            output.breaklines(),
             output.preview(),
             output.preview_world(),
         ];

@@ -1,5 +1,6 @@
 //! Step 2: reads the points of all inputs once, and cuts the plane into tiles of about equally many.
 
+pub(crate) mod breakline_points;
 pub(crate) mod bucket_sorter;
 pub mod buckets;
 pub mod grid;

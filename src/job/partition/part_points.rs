@@ -9,6 +9,7 @@ use crate::job::durable::atomic_file::create_folder;
 use crate::job::durable::columns::{ColumnReader, ColumnWriter};
 use crate::job::durable::directory::JobDirectory;
 use crate::job::index::PartIndex;
+use crate::job::partition::breakline_points::add_line_sites;
 use crate::job::partition::buckets::{Bucket, Buckets};
 use crate::job::partition::parts::Parts;
 use crate::job::partition::point_file::{PointBlock, PointFile, PointFiles};
@@ -201,6 +202,13 @@ impl<'a> PointsOfPart<'a> {
             let bucket = &mut buckets[index as usize];
             bucket.points += u64::from(block.points);
             bucket.blocks.push(block);
+        }
+        let max_rgb = plan.claims.map_or(0, |claims| claims.max_rgb);
+        let sites = Buckets::new(files.growing()?, parts.grid.buckets(), read_buffer_memory(&plan.options));
+        add_line_sites(plan, max_rgb, &parts.grid, &sites, |bucket| parts.part_of(bucket) == part)?;
+        for (bucket, sites) in buckets.iter_mut().zip(sites.finish()?) {
+            bucket.points += sites.points;
+            bucket.blocks.extend(sites.blocks);
         }
         let mut summary = PointSummary::default();
         summary.counts.kept = buckets.iter().map(|bucket| bucket.points).sum();

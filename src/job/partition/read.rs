@@ -3,6 +3,7 @@
 use crate::input::options::OnBadFile;
 use crate::job::durable::directory::JobDirectory;
 use crate::job::index::PartIndex;
+use crate::job::partition::breakline_points::{BreaklineFilter, add_line_sites};
 use crate::job::partition::bucket_sorter::BucketSorter;
 use crate::job::partition::buckets::Buckets;
 use crate::job::partition::grid::Grid;
@@ -32,8 +33,13 @@ pub fn read_points(plan: &Plan, directory: &JobDirectory, stage: &Stage) -> Resu
     let grid = Grid::over(plan.extent, wanted_buckets(plan.records, max_points_per_tile));
     let buckets = Buckets::new(file, grid.buckets(), memory);
     let by_input = decode(plan, 0..plan.inputs.len(), 0, &grid, &buckets, stage)?;
+    let JudgedInputs { mut summary, skipped, orders } = judge(plan, by_input);
+    // Lines alone are no terrain.
+    if let Some(points) = summary.bounds {
+        add_line_sites(plan, summary.counts.max_rgb, &grid, &buckets, |_| true)?;
+        summary.bounds = Some(plan.with_lines(points));
+    }
     let mut buckets = buckets.finish()?;
-    let JudgedInputs { summary, skipped, orders } = judge(plan, by_input);
     if !orders.is_empty() {
         buckets.par_iter_mut().try_for_each(|bucket| bucket.remove_records(&files, &orders))?;
     }
@@ -103,11 +109,15 @@ pub(crate) fn decode(
     let options = &plan.options.input;
     let allowed = allowed_malformed(options.max_malformed_fraction.0, plan.records);
     let malformed = AtomicU64::new(malformed);
+    let lines = plan.built_breaklines()?;
     let decode_chunk = |&(index, chunk): &(usize, usize)| -> Result<ByInput> {
         interrupt::check()?;
         let input = &plan.inputs[index];
         let mut sorter = BucketSorter::new(grid, buckets);
-        let counts = input.source.decode(chunk, &input.rules, &mut |points| sorter.add(points))?;
+        let mut filter = BreaklineFilter::new(lines.as_deref());
+        let mut counts =
+            input.source.decode(chunk, &input.rules, &mut |points| sorter.add(filter.without_dropped(points)))?;
+        counts.drop_at_breaklines(filter.dropped());
         stage.advance(counts.read);
         let so_far = malformed.fetch_add(counts.malformed, Ordering::Relaxed) + counts.malformed;
         // Only a chunk with malformed records of its own reports that there are too many: another may be sound.

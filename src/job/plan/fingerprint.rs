@@ -1,7 +1,9 @@
 //! What identifies a job: whether a run may go on from what an earlier one left.
 
+use crate::input::lines::files_of_lines;
 use crate::input::samples::fingerprint_of;
 use crate::job::options::JobOptions;
+use crate::job::plan::breaklines::line_files::line_paths;
 use crate::job::plan::input_identity::{InputIdentities, RenamedInputs};
 use crate::job::plan::inputs::input_paths;
 use crate::job::plan::lattice_choice::LatticeCoarsening;
@@ -50,7 +52,7 @@ pub struct JobIdentity {
 
 /// Version of the records in the store, of the plan, of the names of results, and of which nodes merge. It changes with every change of these, so that no
 /// run misreads what another version left.
-pub(crate) const LAYOUT: u32 = 17;
+pub(crate) const LAYOUT: u32 = 18;
 
 /// What the results of a job depend on.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -63,6 +65,9 @@ pub struct Fingerprint {
     style: Map<String, Value>,
     /// The inputs.
     files: InputIdentities,
+    /// The files of lines, with those that belong to them.
+    #[serde(default)]
+    lines: InputIdentities,
     /// The memory limit in bytes. Only the number of levels depends on it.
     pub memory: u64,
 }
@@ -87,13 +92,19 @@ impl Fingerprint {
     /// # Errors
     /// [`Error::Config`] if there are no inputs, [`Error::Io`] if one cannot be read.
     pub fn of(options: &JobOptions) -> Result<Fingerprint> {
-        Fingerprint::of_files(options, InputIdentities::of(&input_paths(&options.input)?)?)
+        let files = InputIdentities::of(&input_paths(&options.input)?)?;
+        let lines: Vec<PathBuf> =
+            line_paths(&options.breaklines)?.iter().flat_map(|(_, path)| files_of_lines(path)).collect();
+        Fingerprint::of_files(options, files, InputIdentities::of(&lines)?)
     }
 
-    fn of_files(options: &JobOptions, files: InputIdentities) -> Result<Fingerprint> {
+    fn of_files(options: &JobOptions, files: InputIdentities, lines: InputIdentities) -> Result<Fingerprint> {
         let order = if cfg!(target_endian = "little") { "little-endian" } else { "big-endian" };
         let mut mesh = named_values(&options.input, "input", &["files"])?;
         mesh.extend(named_values(&options.triangulation, "triangulation", &["backend"])?);
+        for (number, lines) in (1..).zip(&options.breaklines) {
+            mesh.extend(named_values(lines, &format!("breaklines {number}"), &["files"])?);
+        }
         // The points' own colours are read only if they are wanted.
         mesh.insert("[output] color".into(), options.output.color.may_be_own().into());
         // So are intensities. Classes are always read.
@@ -104,6 +115,7 @@ impl Fingerprint {
             style: style_of(&options.output)?,
             memory: options.limits.memory.0,
             files,
+            lines,
         })
     }
 
@@ -112,15 +124,19 @@ impl Fingerprint {
     /// # Errors
     /// [`Error::Broken`] if the options cannot be written down.
     pub(crate) fn changed_options(&self, options: &JobOptions) -> Result<Option<String>> {
-        let now = Fingerprint::of_files(options, InputIdentities::default())?;
-        let same_files = Fingerprint { files: InputIdentities::default(), ..self.clone() };
+        let now = Fingerprint::of_files(options, InputIdentities::default(), InputIdentities::default())?;
+        let (files, lines) = (InputIdentities::default(), InputIdentities::default());
+        let same_files = Fingerprint { files, lines, ..self.clone() };
         Ok(now.since_planned(&same_files))
     }
 
     /// Returns what has changed since a job was planned with the fingerprint `planned`, maybe on another machine, to which files may seem to
     /// have other times.
     pub(crate) fn since_planned(&self, planned: &Fingerprint) -> Option<String> {
-        let without_times = |this: &Fingerprint| Fingerprint { files: this.files.without_times(), ..this.clone() };
+        let without_times = |this: &Fingerprint| {
+            let (files, lines) = (this.files.without_times(), this.lines.without_times());
+            Fingerprint { files, lines, ..this.clone() }
+        };
         match without_times(self).since(&without_times(planned)) {
             JobChange::Nothing if self.memory == planned.memory => None,
             JobChange::Nothing => Some("[limits] memory".into()),
@@ -147,7 +163,7 @@ impl Fingerprint {
     /// [`Error::Broken`] if the options cannot be written down.
     pub(crate) fn of_options(options: &JobOptions) -> Result<Checksum> {
         let Fingerprint { program, mesh, style, memory, .. } =
-            Fingerprint::of_files(options, InputIdentities::default())?;
+            Fingerprint::of_files(options, InputIdentities::default(), InputIdentities::default())?;
         let [mesh, style] = [&mesh, &style].map(|values| values.iter().collect::<BTreeMap<_, _>>());
         let text = serde_json::to_vec(&(program, mesh, style, memory));
         Ok(Checksum::of(&text.map_err(|e| Error::Broken(format!("the options: {e}")))?))
@@ -155,7 +171,7 @@ impl Fingerprint {
 
     /// Returns what tells a job from others that lead to other bytes. `options` is what [`Fingerprint::of_options`] says of its options.
     pub(crate) fn of_job(&self, options: Checksum) -> Checksum {
-        Checksum::of(format!("{options} {}", self.files.text()).as_bytes())
+        Checksum::of(format!("{options} {}{}", self.files.text(), self.lines.text()).as_bytes())
     }
 
     /// Returns what tells the job with these `options` from others.
@@ -179,6 +195,7 @@ impl Fingerprint {
         }
         let mut mesh = changed_values(&earlier.mesh, &self.mesh);
         mesh.extend(self.files.since(&earlier.files));
+        mesh.extend(self.lines.since(&earlier.lines));
         let style = changed_values(&earlier.style, &self.style);
         match (mesh.is_empty(), style.is_empty()) {
             (false, _) => JobChange::Mesh(first_few(mesh)),
@@ -194,7 +211,7 @@ impl Fingerprint {
 
     /// Returns this fingerprint with the inputs called as in `earlier`: what an earlier run wrote calls them so.
     pub(crate) fn with_names_of(&self, earlier: &Fingerprint) -> Fingerprint {
-        Fingerprint { files: earlier.files.clone(), ..self.clone() }
+        Fingerprint { files: earlier.files.clone(), lines: earlier.lines.clone(), ..self.clone() }
     }
 }
 

@@ -9,6 +9,9 @@ use rayon::prelude::*;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
+/// What messages call the option.
+const FILES: &str = "[input] files";
+
 /// Returns the files that the options name, in their order, each once: two paths that lead to the same file count as one.
 ///
 /// # Errors
@@ -16,18 +19,21 @@ use std::path::{Path, PathBuf};
 pub fn input_paths(options: &InputOptions) -> Result<Vec<PathBuf>> {
     let (mut paths, mut known) = (Vec::new(), HashSet::new());
     for pattern in &options.files {
-        let found = files_of(pattern)?;
+        let found = files_of(pattern, FILES)?;
         if found.is_empty() {
-            return Err(Error::Config(format!("[input] files: {}", nothing_at(pattern))));
+            return Err(Error::Config(format!("{FILES}: {}", nothing_at(pattern))));
         }
         paths.extend(found.into_iter().filter(|path| known.insert(place(path))));
     }
     Ok(paths)
 }
 
-/// Returns the files that match a pattern. A pattern without a match may be a file's name that only looks like a pattern.
-fn files_of(pattern: &str) -> Result<Vec<PathBuf>> {
-    let found = glob::glob(pattern).map_err(|e| Error::Config(format!("[input] files: {pattern}: {e}")))?;
+/// Returns the files that match a pattern of the `option`. A pattern without a match may be a file's name that only looks like a pattern.
+///
+/// # Errors
+/// [`Error::Config`] if it is no pattern or matches what is no file, [`Error::Io`] if a folder cannot be read.
+pub(crate) fn files_of(pattern: &str, option: &str) -> Result<Vec<PathBuf>> {
+    let found = glob::glob(pattern).map_err(|e| Error::Config(format!("{option}: {pattern}: {e}")))?;
     let mut files = Vec::new();
     for path in found {
         files.push(path.map_err(|e| Error::io("read", e.path().to_path_buf())(e.into()))?);
@@ -37,7 +43,7 @@ fn files_of(pattern: &str) -> Result<Vec<PathBuf>> {
         files.push(pattern.into());
     }
     match files.iter().find_map(|path| not_a_file(path)) {
-        Some(what) => Err(Error::Config(format!("[input] files: {what}"))),
+        Some(what) => Err(Error::Config(format!("{option}: {what}"))),
         None => Ok(files),
     }
 }

@@ -1,5 +1,6 @@
 //! The plan of a job.
 
+use crate::breaklines::Breaklines;
 use crate::geometry::Bounds;
 use crate::geometry::lattice::Lattice;
 use crate::input::Crs;
@@ -7,6 +8,7 @@ use crate::input::PointRules;
 use crate::input::Source;
 use crate::job::durable::atomic_file::{PendingFile, write_pending};
 use crate::job::options::JobOptions;
+use crate::job::plan::breaklines::PlannedBreaklines;
 use crate::job::plan::input_identity::RenamedInputs;
 use crate::job::plan::lattice_choice::LatticeCoarsening;
 use crate::job::plan::missing_attributes::missing_attributes;
@@ -16,6 +18,7 @@ use crate::output::frame::Frame;
 use crate::{Error, Result, Warnings};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// What a job reads and where it puts it. The plan holds everything that later steps need besides what earlier steps stored: no step
 /// reads a header again. What steps compute from it is the same on every machine, except the transforms onto the globe, which the
@@ -53,6 +56,9 @@ pub struct Plan {
     /// job of several parts before the plan is written down, in others once the points are read.
     #[serde(default)]
     pub curvature: Option<Curvature>,
+    /// The breaklines; `None` without any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub breaklines: Option<PlannedBreaklines>,
     /// What the user should know about the inputs. [`Plan::all_warnings`] adds what there is to know about the options.
     pub warnings: Warnings,
 }
@@ -79,6 +85,11 @@ pub struct Claims {
 }
 
 impl Claims {
+    /// Returns the claims with the sites of lines within `bounds`.
+    pub(crate) fn with_lines(self, bounds: Option<Bounds<3>>) -> Claims {
+        Claims { bounds: bounds.map_or(self.bounds, |bounds| bounds.union(self.bounds)), ..self }
+    }
+
     /// Tells whether points within `bounds`, of which `max_rgb` is the greatest colour, contradict the claims.
     pub fn are_broken_by(&self, bounds: Bounds<3>, max_rgb: u16) -> bool {
         self.bounds.union(bounds) != self.bounds || range_of_colors(max_rgb) > range_of_colors(self.max_rgb)
@@ -115,6 +126,20 @@ impl Plan {
     /// Tells whether the job is one part.
     pub fn is_one_part(&self) -> bool {
         self.claims.is_none()
+    }
+
+    /// Returns the breaklines; `None` without any.
+    ///
+    /// # Errors
+    /// Those of [`PlannedBreaklines::built`].
+    pub fn built_breaklines(&self) -> Result<Option<Arc<Breaklines>>> {
+        self.breaklines.as_ref().map(PlannedBreaklines::built).transpose()
+    }
+
+    /// Returns the box of all that the mesh has, of which the kept points have `points`.
+    pub fn with_lines(&self, points: Bounds<3>) -> Bounds<3> {
+        let lines = self.breaklines.as_ref().and_then(|lines| lines.bounds);
+        lines.map_or(points, |lines| lines.union(points))
     }
 
     /// Returns what the user should know about the options and the inputs.

@@ -5,6 +5,8 @@ use crate::geometry::lattice::{AxisMap, Lattice, REACH, shortest_decimal};
 use crate::input::options::OnBadFile;
 use crate::input::{Axis, FileFormat, PointRules, Source};
 use crate::job::options::JobOptions;
+use crate::job::plan::breaklines::line_files::LineFiles;
+use crate::job::plan::breaklines::{CloudOfPlan, PlannedBreaklines};
 use crate::job::plan::common_crs::{common_crs, horizontal_unit};
 use crate::job::plan::extent::{Extent, SourceBox, to_float};
 use crate::job::plan::height_range::HeightSample;
@@ -111,7 +113,9 @@ fn try_plan(
         steps: [options.input.resolution.step(), options.input.resolution_z.step()],
         coarsening,
     };
-    let extent = extent_without_outliers(sources, options, &wish)?;
+    let lines = LineFiles::read(options, &crs, &mut warnings)?;
+    let mut extent = extent_without_outliers(sources, options, &wish)?;
+    lines.extend_heights(&mut extent);
     let lattice = choose_lattice(sources, &extent, &wish, &mut warnings)?;
     if fineness(sources, &extent, &wish).is_coarse() {
         warnings.extend(farthest_row(sources, options, &extent)?);
@@ -127,9 +131,13 @@ fn try_plan(
     check_malformed_rows(sources, &rules, options)?;
     let (clipped, claimed_area) =
         (lattice_extent(&lattice, &extent, clip), claimed_area(&lattice, sources, &extent, clip.is_some()));
+    let cloud = CloudOfPlan { sources, rules: &rules, lattice: &lattice, extent: &extent, clipped, area: claimed_area };
+    let breaklines = PlannedBreaklines::of(&lines, options, &cloud, &mut warnings)?;
     let claimed = extent.boxes.iter().map(|claim| claimed_box(&lattice, claim, clipped)).collect::<Vec<_>>();
     let has_parts = !coarsening.one_part && records > options.triangulation.max_points_per_part.0 / 2 * 3;
     let claims = has_parts.then(|| claims(sources, &rules, &lattice, &extent, clipped)).transpose()?;
+    let lines_at = breaklines.as_ref().and_then(|lines| lines.bounds);
+    let claims = claims.map(|claims| claims.with_lines(lines_at));
     let [low, high] = claimed_heights(&lattice, &extent).map(|z| z.round() as i32);
     let sample = HeightSample::take(sources, &rules, options.input.bounds.map(|bounds| bounds.0))?;
     let heights = sample.range_within(HeightRange { low, high });
@@ -148,6 +156,7 @@ fn try_plan(
         claimed_area,
         frame,
         curvature: None,
+        breaklines,
         warnings,
     };
     Ok((plan, rules.into_iter().zip(claimed).collect()))

@@ -1,6 +1,7 @@
 //! Step 1: the plan says what a job is. It is made from the options, the inputs' headers and samples of their points. It can be
 //! written down and read back, so that every later step is a function of the plan, an index and the store.
 
+pub mod breaklines;
 pub mod budget;
 pub mod common_crs;
 pub(crate) mod distinct_crs;

@@ -13,8 +13,12 @@ pub fn no_point_is_left(plan: &Plan, counts: &PointCounts) -> Error {
         Some((bounds, inputs)) if counts.out_of_bounds > 0 => compare(bounds.0, inputs, are_from_headers(plan)),
         _ => "check [input] classes and bounds".into(),
     };
+    let at_breaklines = match counts.at_breaklines {
+        0 => String::new(),
+        dropped => format!(", {dropped} at breaklines or in lakes"),
+    };
     Error::NoTerrain(format!(
-        "no point is left to triangulate: of {} read, {} are malformed, {} withheld, {} of other classes, {} out of bounds; {remedy}",
+        "no point is left to triangulate: of {} read, {} are malformed, {} withheld, {} of other classes, {} out of bounds{at_breaklines}; {remedy}",
         counts.read, counts.malformed, counts.withheld, counts.other_class, counts.out_of_bounds
     ))
 }

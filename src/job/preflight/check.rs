@@ -32,6 +32,8 @@ pub struct Preflight {
     pub kept: u64,
     /// About how many tiles.
     pub tiles: u64,
+    /// Edges along breaklines; `None` without any.
+    pub breaklines: Option<u64>,
     /// Steps of the lattice in x and y, and in z.
     pub resolution: [String; 2],
     /// Width and height in source units.
@@ -121,6 +123,7 @@ impl Preflight {
             records: plan.records,
             kept: kept.0,
             tiles: estimate::tiles(plan, kept),
+            breaklines: plan.breaklines.as_ref().map(|lines| lines.findings.subsegments),
             resolution: [plan.lattice.resolution.to_string(), plan.lattice.resolution_z.to_string()],
             size: [0, 1].map(|axis| plan.extent.extent(axis) as f64 * resolution),
             unit: plan.unit.clone(),
@@ -194,6 +197,9 @@ impl fmt::Display for Preflight {
         row("points", grouped(self.records))?;
         if self.kept < self.records {
             row("points kept", format!("about {} or fewer", grouped(self.kept)))?;
+        }
+        if let Some(edges) = self.breaklines {
+            row("breaklines", format!("{} edges", grouped(edges)))?;
         }
         row("tiles", format!("about {}", grouped(self.tiles)))?;
         row("area", format!("{:.1} x {:.1} {}", self.size[0], self.size[1], self.unit))?;

@@ -1,12 +1,17 @@
 //! Writing the files beside the tiles: the georeference, the preview, the tilesets and `terrain.glb`.
 
-use crate::job::durable::atomic_file::{PendingFile, create_folder_of, find_pending, partial_path, write_pending};
+use crate::breaklines::Breaklines;
+use crate::geometry::lattice::Lattice;
+use crate::job::durable::atomic_file::{
+    PendingFile, create_folder_of, find_pending, partial_path, write_pending, write_pending_lines,
+};
 use crate::job::durable::columns::ColumnReader;
 use crate::job::durable::directory::JobDirectory;
 use crate::job::index::TileIndex;
 use crate::job::partition::tree::Tree;
 use crate::job::publish::flat_tile::FlatScene;
 use crate::job::records::{StepOutput, StepRecord, Store};
+use crate::output::breakline_list::lines_of;
 use crate::output::frame::Frame;
 use crate::output::gltf::one_file::{write_remade_terrain, write_terrain};
 use crate::output::page::page_for;
@@ -34,6 +39,8 @@ pub struct SideFiles<'a> {
     pub copyright: Option<&'a str>,
     /// Whether colours stand for heights in the preview.
     pub has_ramp: bool,
+    /// The edges along breaklines, if there are any, and their lattice.
+    pub breaklines: Option<(&'a Breaklines, &'a Lattice)>,
 }
 
 /// Writes the files beside the tiles and returns the number of their bytes.
@@ -55,6 +62,10 @@ pub fn write_side_files(
     ];
     if let Some((frame, root)) = &content.tileset {
         files.extend(pending_tilesets(directory, frame, root, content.copyright)?);
+    }
+    if let Some((breaklines, lattice)) = content.breaklines {
+        write_pending_lines(&output.breaklines(), lines_of(breaklines, lattice).map(Ok))?;
+        files.push(find_pending(&output.breaklines())?);
     }
     if content.page {
         let opened = if content.tileset.is_some() { output.tileset() } else { output.terrain() };

@@ -16,6 +16,7 @@ use crate::job::plan::text_inputs::text_reading;
 use crate::job::progress::clock::JobClock;
 use crate::job::progress::number_text::grouped;
 use crate::job::progress::stats::StageStats;
+use crate::job::report::breakline_report::BreaklineReport;
 use crate::job::tiles::write_tile::TileStats;
 use crate::output::checksums::{Checksum, seal};
 use crate::voronoi::counts::STEP_NAMES;
@@ -55,6 +56,9 @@ pub struct Report {
     pub skipped: Vec<SkippedInput>,
     /// Numbers of records by what became of them.
     pub points: PointCounts,
+    /// What came of the breaklines; `None` without any.
+    #[serde(default)]
+    pub breaklines: Option<BreaklineReport>,
     /// How the leaves were triangulated.
     pub leaves: LeafStats,
     /// The GPU that helped; `None` without one.
@@ -242,6 +246,7 @@ impl Report {
             files: plan.inputs.len(),
             skipped: plan.skipped.clone(),
             points: parts.points,
+            breaklines: plan.breaklines.as_ref().map(BreaklineReport::of),
             leaves: parts.leaves,
             gpu: parts.gpu,
             gpu_figures: parts.gpu_figures,

@@ -1,5 +1,6 @@
 //! The report of a finished job, for people and for machines.
 
+pub mod breakline_report;
 pub mod job_report;
 pub mod job_status;
 pub mod skipped_inputs;

@@ -2,6 +2,7 @@
 
 use crate::gpu::benefit::GpuFigures;
 use crate::job::progress::number_text::{grouped, precise_mebibytes};
+use crate::job::report::breakline_report::BreaklineReport;
 use crate::job::report::job_report::{Report, SlowestPart, StepSeconds};
 use crate::job::report::skipped_inputs::write_skipped;
 use crate::triangulation::TriangulationCounts;
@@ -38,6 +39,14 @@ impl fmt::Display for Report {
         row("  out of bounds", grouped(self.points.out_of_bounds))?;
         row("  malformed", grouped(self.points.malformed))?;
         row("  duplicates in x, y", grouped(self.duplicates))?;
+        if let Some(BreaklineReport { findings, .. }) = &self.breaklines {
+            row("  at breaklines or in lakes", grouped(self.points.at_breaklines))?;
+            let of = format!("of {} segments of {} features", grouped(findings.segments), grouped(findings.features));
+            row("edges along breaklines", format!("{}, {of}", grouped(findings.subsegments)))?;
+            row("  places where heights disagree", grouped(findings.disagreements))?;
+            row("  rivers that rise", grouped(findings.rising_rivers))?;
+            row("  lakes that are not flat", grouped(findings.uneven_lakes))?;
+        }
         row("sites", grouped(self.sites))?;
         row("triangles", grouped(self.triangles))?;
         row("  crossing tile borders", format!("{:.3} %", self.seam_share * 100.0))?;

@@ -54,7 +54,7 @@ pub(crate) fn mesh_and_tiles(
 ) -> Result<MeshInTiles> {
     let look = |sites| {
         let max_edge = max_edge_rule(run, plan, partition, bounds, sites)?;
-        Ok(Arc::new(TileLook::new(plan, partition.summary.counts.max_rgb, bounds, max_edge)))
+        TileLook::new(plan, partition.summary.counts.max_rgb, bounds, max_edge).map(Arc::new)
     };
     let writing = match may_write_at_once(plan, KeptPoints(partition.summary.counts.kept), frees(plan, partition)) {
         // The number of sites matters only to a rule for which the tiles have to wait.
@@ -84,7 +84,8 @@ fn do_steps(
     writing: Writing,
     freeing: &Freeing,
 ) -> Result<MeshInTiles> {
-    let stage = run.progress.stage("mesh", partition.summary.counts.kept, "points");
+    let points = partition.tree.tiles().map(|tile| partition.points(tile)).sum();
+    let stage = run.progress.stage("mesh", points, "points");
     let activity = run.progress.activity("triangulate", "points");
     let queue = TileQueue::new(run, partition, &stage, freeing);
     let points = open_points(run, partition)?;

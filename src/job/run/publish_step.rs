@@ -168,6 +168,7 @@ pub(crate) fn publish(
         let page = run.directory.results().page();
         warnings.push(format!("the page is not written: {} came during the job, and no job wrote it", page.display()));
     }
+    let lines = plan.built_breaklines()?;
     let content = SideFiles {
         georeference: georeference.to_json(placement.as_ref())?,
         tileset: text,
@@ -176,6 +177,7 @@ pub(crate) fn publish(
         page: output.page && !page_of_others,
         copyright: output.copyright(),
         has_ramp: matches!(look.style.coloring, None | Some(Coloring::Elevation(_))),
+        breaklines: lines.as_deref().map(|lines| (lines, &plan.lattice)),
     };
     if content.one_file {
         // terrain.glb is made from the tiles, which must have their names.

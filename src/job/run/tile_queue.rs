@@ -71,11 +71,14 @@ pub(crate) struct WrittenTiles {
 
 impl TileLook {
     /// Returns the look of a job whose points are within `bounds`, and whose greatest colour is `max_rgb`.
-    pub(crate) fn new(plan: &Plan, max_rgb: u16, bounds: Bounds<3>, max_edge: MaxEdgeRule) -> TileLook {
+    ///
+    /// # Errors
+    /// Those of [`TileStyle::new`].
+    pub(crate) fn new(plan: &Plan, max_rgb: u16, bounds: Bounds<3>, max_edge: MaxEdgeRule) -> Result<TileLook> {
         let heights = plan.heights.unwrap_or(HeightRange::of(bounds));
-        let style = TileStyle::new(plan, max_rgb, bounds, heights, max_edge);
+        let style = TileStyle::new(plan, max_rgb, bounds, heights, max_edge)?;
         let canvas = Canvas::new(&style.frame, bounds, heights);
-        TileLook { style, canvas }
+        Ok(TileLook { style, canvas })
     }
 }
 

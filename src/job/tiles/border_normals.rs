@@ -44,7 +44,7 @@ pub fn finished_border(
     if !style.max_edge.keeps_all() || !slivers.is_empty() {
         sums = sums_of_kept(store, tile, &frontier, &slivers, style)?;
     }
-    let is_kept = |t: &SeamTriangle| !style.max_edge.leaves_out(t.map(|corner| corner.position)) && !slivers.has(t);
+    let is_kept = |t: &SeamTriangle| !style.leaves_out(t.map(|corner| corner.position)) && !slivers.has(t);
     for &[a, b, c] in seam.triangles.iter().filter(|triangle| is_kept(triangle)) {
         let normal = normals::cross(a.position, b.position, c.position);
         for corner in [a, b, c].iter().filter(|corner| corner.tile == tile) {
@@ -83,7 +83,7 @@ fn sums_of_kept(
 ) -> Result<Vec<NormalSum>> {
     let Leaf { positions, mut triangles, .. } = Leaf::load(store, tile)?;
     slivers.take(&positions, &mut triangles);
-    style.max_edge.take(&positions, &mut triangles);
+    style.take_long(&positions, &mut triangles);
     let sums = NormalSums::new(&positions, &triangles);
     Ok(frontier.sites.iter().map(|vertex| sums.get(vertex.site.get())).collect())
 }

@@ -91,16 +91,6 @@ impl MaxEdgeRule {
             MaxEdgeRule::Spacing(spacing) => spacing.exceeds(longest_square(corners), corners),
         }
     }
-
-    /// Removes the triangles that are left out from `triangles` and returns them. Both stay in order.
-    pub fn take(&self, positions: &[[i32; 3]], triangles: &mut Vec<[u32; 3]>) -> Vec<[u32; 3]> {
-        if self.keeps_all() {
-            return Vec::new();
-        }
-        let (out, kept) = triangles.iter().partition(|t| self.leaves_out(t.map(|v| positions[v as usize])));
-        *triangles = kept;
-        out
-    }
 }
 
 /// Returns the square of the longest edge in the plane, which is below 2^62.

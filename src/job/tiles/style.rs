@@ -1,5 +1,7 @@
 //! How the tiles of a job look. All tiles have one style, so that they fit together.
 
+use crate::Result;
+use crate::breaklines::Breaklines;
 use crate::geometry::Bounds;
 use crate::job::mesh::hull_rule::HullRule;
 use crate::job::plan::job_plan::Plan;
@@ -10,6 +12,7 @@ use crate::output::color::{Coloring, HeightRange};
 use crate::output::curvature::Curvature;
 use crate::output::frame::Frame;
 use crate::output::options::{ColorChoice, Hull, OutputOptions};
+use std::sync::Arc;
 
 /// How tiles look.
 #[derive(Debug)]
@@ -24,8 +27,10 @@ pub struct TileStyle {
     pub normals: bool,
     /// How tiles are packed.
     pub compression: Compression,
-    /// Which triangles are left out.
+    /// Which triangles are left out, unless they are flat water.
     pub max_edge: MaxEdgeRule,
+    /// Knows the flat water, where a triangle may be left out; `None` if there is none.
+    pub water: Option<Arc<Breaklines>>,
     /// Which triangles are slivers along the hull, which are left out too; `None` if they stay.
     pub hull: Option<HullRule>,
     /// Whose the data are, if the user says.
@@ -48,7 +53,16 @@ pub(crate) fn bent_frame(plan: &Plan, curvature: Curvature, bounds: Bounds<3>) -
 impl TileStyle {
     /// Returns the style of the tiles of a job whose points are within `bounds`, and whose greatest colour is `max_rgb`. A ramp of colours
     /// spans `heights`.
-    pub fn new(plan: &Plan, max_rgb: u16, bounds: Bounds<3>, heights: HeightRange, max_edge: MaxEdgeRule) -> TileStyle {
+    ///
+    /// # Errors
+    /// Those of [`Plan::built_breaklines`].
+    pub fn new(
+        plan: &Plan,
+        max_rgb: u16,
+        bounds: Bounds<3>,
+        heights: HeightRange,
+        max_edge: MaxEdgeRule,
+    ) -> Result<TileStyle> {
         let output = &plan.options.output;
         let coloring = match output.color {
             ColorChoice::None => None,
@@ -65,7 +79,25 @@ impl TileStyle {
         let hull = (output.hull == Hull::Trimmed).then(|| HullRule::of(plan));
         let copyright = output.copyright().map(str::to_owned);
         let OutputOptions { attributes, normals, .. } = *output;
-        TileStyle { frame, coloring, attributes, normals, compression, max_edge, hull, copyright }
+        let water = if max_edge.keeps_all() { None } else { plan.built_breaklines()? };
+        Ok(TileStyle { frame, coloring, attributes, normals, compression, max_edge, water, hull, copyright })
+    }
+
+    /// Tells whether the triangle with these corners is left out because it is long. A lake has no points, so its triangles are long.
+    #[inline]
+    pub fn leaves_out(&self, corners: [[i32; 3]; 3]) -> bool {
+        let is_water = |lines: &Arc<Breaklines>| lines.is_water(corners.map(|[x, y, _]| [x, y]));
+        self.max_edge.leaves_out(corners) && !self.water.as_ref().is_some_and(is_water)
+    }
+
+    /// Removes the triangles that are left out because they are long from `triangles` and returns them. Both stay in order.
+    pub fn take_long(&self, positions: &[[i32; 3]], triangles: &mut Vec<[u32; 3]>) -> Vec<[u32; 3]> {
+        if self.max_edge.keeps_all() {
+            return Vec::new();
+        }
+        let (out, kept) = triangles.iter().partition(|t| self.leaves_out(t.map(|v| positions[v as usize])));
+        *triangles = kept;
+        out
     }
 
     /// Returns the frame of these tiles in a scene that is not bent. The points of the job are within `bounds`.

@@ -35,7 +35,7 @@ impl TileContent {
     ) -> TileContent {
         let mut cut = slivers.take(&leaf.positions, &mut leaf.triangles);
         let slivers = cut.len() as u64;
-        cut.extend(style.max_edge.take(&leaf.positions, &mut leaf.triangles));
+        cut.extend(style.take_long(&leaf.positions, &mut leaf.triangles));
         let mut normals = NormalSums::new(&leaf.positions, &leaf.triangles).unit_normals(&style.frame);
         for vertex in &border.vertices {
             normals[vertex.site.get()] = vertex.normal;
@@ -83,7 +83,7 @@ impl TileContent {
                 };
             }
             let is_sliver = slivers.has(&triangle);
-            let is_cut = is_sliver || style.max_edge.leaves_out(triangle.map(|corner| corner.position));
+            let is_cut = is_sliver || style.leaves_out(triangle.map(|corner| corner.position));
             self.slivers += u64::from(is_sliver);
             if is_cut { &mut self.cut } else { &mut self.triangles }.push(corners);
         }

@@ -78,7 +78,7 @@ pub(crate) fn final_look(job: &PartsJob, all: SitesOfParts, store: &Store) -> Re
 
 fn look(job: &PartsJob, rule: MaxEdgeRule) -> Result<TileLook> {
     let Claims { bounds, max_rgb } = claims(job)?;
-    Ok(TileLook::new(job.plan, max_rgb, bounds, rule))
+    TileLook::new(job.plan, max_rgb, bounds, rule)
 }
 
 fn bounds(job: &PartsJob) -> Result<Bounds<3>> {

@@ -81,7 +81,8 @@ pub(crate) fn sum_up<'a>(
     check_malformed(job.plan, read.clone())?;
     let mut summary = PointSummary::default();
     read.for_each(|inputs| summary += inputs.summary.clone());
-    let bounds = summary.bounds.ok_or_else(|| no_point_is_left(job.plan, &summary.counts))?;
+    let points = summary.bounds.ok_or_else(|| no_point_is_left(job.plan, &summary.counts))?;
+    let bounds = job.plan.with_lines(points);
     PrecisionLimit::of(&job.plan.frame).check_heights(bounds)?;
     Ok((summary, bounds))
 }

@@ -1,0 +1,317 @@
+//! Collecting the features of a file: one set of rules for kinds, heights and broken geometry, whatever the format.
+
+use std::path::Path;
+
+use crate::breaklines::FeatureKind;
+use crate::input::lines::attribute::WantedAttributes;
+use crate::input::lines::feature::{LineFeature, LineShape, RawGeometry};
+use crate::input::lines::options::{LineHeights, LineOptions, kind_of_name};
+use crate::{Error, Result, Warnings};
+
+/// Coordinates beyond this, and what Shapefiles write for "no data", are no places on the earth.
+const BEYOND_THE_EARTH: f64 = 1e30;
+
+/// Takes the features of a file in their order.
+pub(super) struct FeatureCollector<'a> {
+    path: &'a Path,
+    options: &'a LineOptions,
+    features: Vec<LineFeature>,
+    without_geometry: LeftOut,
+    too_short: LeftOut,
+    of_other_kinds: LeftOut,
+}
+
+/// How many features are left out for one reason, and the first of them.
+#[derive(Default)]
+struct LeftOut {
+    count: u64,
+    first: u64,
+}
+
+impl LeftOut {
+    fn note(&mut self, number: u64) {
+        if self.count == 0 {
+            self.first = number;
+        }
+        self.count += 1;
+    }
+
+    fn warning(&self, why: &str) -> Option<String> {
+        (self.count > 0)
+            .then(|| format!("{} features {why} and are left out, the first is feature {}", self.count, self.first))
+    }
+}
+
+impl<'a> FeatureCollector<'a> {
+    pub(super) fn new(path: &'a Path, options: &'a LineOptions) -> FeatureCollector<'a> {
+        FeatureCollector {
+            path,
+            options,
+            features: Vec::new(),
+            without_geometry: LeftOut::default(),
+            too_short: LeftOut::default(),
+            of_other_kinds: LeftOut::default(),
+        }
+    }
+
+    /// Adds feature `number`.
+    ///
+    /// # Errors
+    /// `Input` names the feature if its kind is not known, a vertex is no place, or it has no heights.
+    pub(super) fn add(&mut self, number: u64, geometry: RawGeometry, attributes: &WantedAttributes) -> Result<()> {
+        let Some(kind) = self.kind(number, attributes)? else {
+            self.of_other_kinds.note(number);
+            return Ok(());
+        };
+        let height = match &self.options.height_field {
+            None => None,
+            Some(name) => Some(attributes.height.number().ok_or_else(|| {
+                self.refuse(
+                    number,
+                    format!(
+                        "has no number in {name:?}, which height_field names: give it one, or leave the feature out"
+                    ),
+                )
+            })?),
+        };
+        let before = self.features.len();
+        self.add_geometry(number, kind, height, geometry)?;
+        if self.features.len() == before && self.too_short.first != number {
+            self.without_geometry.note(number);
+        }
+        Ok(())
+    }
+
+    /// Returns the features, and what there is to say about those that are left out.
+    pub(super) fn finish(self) -> (Vec<LineFeature>, Warnings) {
+        let mut warnings = Warnings::default();
+        warnings.extend(self.without_geometry.warning("have no geometry"));
+        warnings.extend(
+            self.too_short.warning("have a line or an outline without two different vertices (an area: three)"),
+        );
+        warnings.extend(self.of_other_kinds.warning("have a value of kind_field that kinds does not list"));
+        (self.features, warnings)
+    }
+
+    /// Returns an error about feature `number`.
+    pub(super) fn refuse(&self, number: u64, what: impl AsRef<str>) -> Error {
+        Error::input(self.path, format!("feature {number} {}", what.as_ref()))
+    }
+
+    fn kind(&self, number: u64, attributes: &WantedAttributes) -> Result<Option<FeatureKind>> {
+        let Some(name) = &self.options.kind_field else {
+            return Ok(Some(self.options.kind.unwrap_or(FeatureKind::Line)));
+        };
+        let value = attributes.kind.text();
+        if let Some(kinds) = &self.options.kinds {
+            return Ok(value.and_then(|value| kinds.get(&value).copied()));
+        }
+        let kind = value.as_deref().and_then(kind_of_name);
+        kind.map(Some).ok_or_else(|| {
+            let value = value.map_or("nothing".into(), |value| format!("{value:?}"));
+            let what = format!("has {value} in {name:?}, not line, river or lake: say with kinds what the values mean");
+            self.refuse(number, what)
+        })
+    }
+
+    fn add_geometry(
+        &mut self,
+        number: u64,
+        kind: FeatureKind,
+        height: Option<f64>,
+        geometry: RawGeometry,
+    ) -> Result<()> {
+        match geometry {
+            RawGeometry::Empty => Ok(()),
+            RawGeometry::Other(what) => Err(self.refuse(
+                number,
+                format!("is {what}: breaklines are lines or areas; leave it out, or make a line of it"),
+            )),
+            RawGeometry::Several(all) => {
+                all.into_iter().try_for_each(|geometry| self.add_geometry(number, kind, height, geometry))
+            }
+            RawGeometry::Lines(lines) => {
+                lines.into_iter().try_for_each(|line| self.add_line(number, kind, height, line))
+            }
+            RawGeometry::Areas(areas) => {
+                areas.into_iter().try_for_each(|area| self.add_area(number, kind, height, area))
+            }
+        }
+    }
+
+    fn add_line(&mut self, number: u64, kind: FeatureKind, height: Option<f64>, line: Vec<[f64; 3]>) -> Result<()> {
+        let line = self.checked(number, height, line)?;
+        if line.len() < 2 {
+            self.too_short.note(number);
+            return Ok(());
+        }
+        let shape = match (kind, is_closed(&line)) {
+            (FeatureKind::Lake, true) => return self.add_area(number, kind, height, vec![line]),
+            (FeatureKind::Lake, false) => {
+                return Err(self.refuse(
+                    number,
+                    "is a line with two ends, but a lake is an area: close it, make it a polygon, or give it another kind",
+                ));
+            }
+            _ => LineShape::Line(line),
+        };
+        self.features.push(LineFeature { number, kind, shape });
+        Ok(())
+    }
+
+    fn add_area(
+        &mut self,
+        number: u64,
+        kind: FeatureKind,
+        height: Option<f64>,
+        rings: Vec<Vec<[f64; 3]>>,
+    ) -> Result<()> {
+        let mut kept = Vec::with_capacity(rings.len());
+        for (index, ring) in rings.into_iter().enumerate() {
+            let mut ring = self.checked(number, height, ring)?;
+            while ring.len() > 1 && is_closed(&ring) {
+                ring.pop();
+            }
+            if ring.len() >= 3 {
+                kept.push(ring);
+                continue;
+            }
+            self.too_short.note(number);
+            if index == 0 {
+                // Islands without their lake are nothing.
+                return Ok(());
+            }
+        }
+        if !kept.is_empty() {
+            self.features.push(LineFeature { number, kind, shape: LineShape::Area(kept) });
+        }
+        Ok(())
+    }
+
+    /// Returns the vertices with their heights, without those that repeat the one before.
+    fn checked(&self, number: u64, height: Option<f64>, mut line: Vec<[f64; 3]>) -> Result<Vec<[f64; 3]>> {
+        for (index, vertex) in line.iter_mut().enumerate() {
+            let is_place = |value: f64| value.abs() < BEYOND_THE_EARTH;
+            if !is_place(vertex[0]) || !is_place(vertex[1]) {
+                let what = format!(
+                    "has the vertex ({}, {}), its number {}, which is no place",
+                    vertex[0],
+                    vertex[1],
+                    index + 1
+                );
+                return Err(self.refuse(number, what));
+            }
+            vertex[2] = match self.options.heights {
+                LineHeights::File => height.unwrap_or(vertex[2]),
+                LineHeights::Points => f64::NAN,
+            };
+            if self.options.heights == LineHeights::File && !is_place(vertex[2]) {
+                return Err(self.refuse(
+                    number,
+                    "has no heights: a breakline takes x, y and z. Give it heights (in QGIS: \"Drape\" with an elevation model), or name \
+                     an attribute that has them with height_field, or set heights = \"points\" to take them from the points around",
+                ));
+            }
+        }
+        // NaN is no height, and all that have none are the same.
+        line.dedup_by(|next, before| next.map(f64::to_bits) == before.map(f64::to_bits));
+        Ok(line)
+    }
+}
+
+/// Tells whether a line ends where it begins.
+fn is_closed(line: &[[f64; 3]]) -> bool {
+    line.len() > 2 && line.first().zip(line.last()).is_some_and(|(first, last)| first[..2] == last[..2])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::lines::attribute::Attribute;
+
+    fn options(rest: &str) -> LineOptions {
+        toml::from_str(&format!("files = [\"a\"]\n{rest}")).unwrap()
+    }
+
+    fn collect(
+        rest: &str,
+        geometry: RawGeometry,
+        attributes: WantedAttributes,
+    ) -> Result<(Vec<LineFeature>, Warnings)> {
+        let options = options(rest);
+        let mut collector = FeatureCollector::new(Path::new("a.shp"), &options);
+        collector.add(7, geometry, &attributes)?;
+        Ok(collector.finish())
+    }
+
+    fn line(z: f64) -> RawGeometry {
+        RawGeometry::Lines(vec![vec![[0.0, 0.0, z], [0.0, 0.0, z], [1.0, 2.0, z]]])
+    }
+
+    fn square() -> Vec<[f64; 3]> {
+        vec![[0.0, 0.0, 1.0], [4.0, 0.0, 1.0], [4.0, 4.0, 1.0], [0.0, 4.0, 1.0], [0.0, 0.0, 1.0]]
+    }
+
+    #[test]
+    fn closed_lines_are_lakes_and_open_ones_are_not() {
+        let none = WantedAttributes::NONE;
+        let (features, _) = collect("kind = \"lake\"", RawGeometry::Lines(vec![square()]), none.clone()).unwrap();
+        assert_eq!(features[0].shape, LineShape::Area(vec![square()[..4].to_vec()]));
+        let error = collect("kind = \"lake\"", line(1.0), none.clone()).unwrap_err().to_string();
+        assert!(error.starts_with("a.shp: feature 7 is a line with two ends"), "{error}");
+        let (features, warnings) = collect("", line(1.0), none).unwrap();
+        assert_eq!(features[0].shape, LineShape::Line(vec![[0.0, 0.0, 1.0], [1.0, 2.0, 1.0]]));
+        assert!(warnings.is_empty());
+    }
+
+    #[test]
+    fn what_is_too_little_is_left_out_and_counted() {
+        for geometry in [RawGeometry::Empty, RawGeometry::Lines(Vec::new()), RawGeometry::Several(Vec::new())] {
+            let (features, warnings) = collect("", geometry, WantedAttributes::NONE).unwrap();
+            let all: Vec<&str> = warnings.iter().collect();
+            assert!(features.is_empty() && all.len() == 1 && all[0].contains("no geometry"), "{all:?}");
+        }
+        for geometry in [
+            RawGeometry::Lines(vec![vec![[1.0, 1.0, 1.0]]]),
+            RawGeometry::Lines(vec![vec![[1.0, 1.0, 1.0]; 5]]),
+            RawGeometry::Areas(vec![vec![square()[..2].to_vec(), square()]]),
+        ] {
+            let (features, warnings) = collect("", geometry, WantedAttributes::NONE).unwrap();
+            let all: Vec<&str> = warnings.iter().collect();
+            assert!(features.is_empty() && all.len() == 1 && all[0].contains("two different"), "{all:?}");
+        }
+    }
+
+    #[test]
+    fn vertices_that_are_no_places_name_the_feature() {
+        for (geometry, word) in [
+            (line(f64::NAN), "height_field"),
+            (line(-1e39), "height_field"),
+            (RawGeometry::Lines(vec![vec![[0.0, f64::NAN, 1.0], [1.0, 1.0, 1.0]]]), "its number 1"),
+            (RawGeometry::Other("a point"), "is a point"),
+        ] {
+            let error = collect("", geometry, WantedAttributes::NONE).unwrap_err().to_string();
+            assert!(error.starts_with("a.shp: feature 7 ") && error.contains(word), "{error}");
+        }
+    }
+
+    #[test]
+    fn attributes_say_kind_and_height() {
+        let with = |kind: &str, height: Attribute| WantedAttributes { kind: Attribute::Text(kind.into()), height };
+        let (features, _) = collect("kind_field = \"T\"", line(1.0), with(" River ", Attribute::Missing)).unwrap();
+        assert_eq!(features[0].kind, FeatureKind::River);
+        let error =
+            collect("kind_field = \"T\"", line(1.0), with("creek", Attribute::Missing)).unwrap_err().to_string();
+        assert!(error.contains("\"creek\"") && error.contains("kinds"), "{error}");
+        let table = "kind_field = \"T\"\nkinds = { \"46006\" = \"river\" }";
+        let number = WantedAttributes { kind: Attribute::Number(46006.0), height: Attribute::Missing };
+        assert_eq!(collect(table, line(1.0), number).unwrap().0[0].kind, FeatureKind::River);
+        let (features, warnings) = collect(table, line(1.0), with("7", Attribute::Missing)).unwrap();
+        assert!(features.is_empty() && warnings.iter().any(|warning| warning.contains("kind_field")));
+        let (features, _) =
+            collect("height_field = \"Z\"", line(f64::NAN), with("", Attribute::Text(" 2.5".into()))).unwrap();
+        assert_eq!(features[0].shape.outlines()[0][1], [1.0, 2.0, 2.5]);
+        let error = collect("height_field = \"Z\"", line(1.0), with("", Attribute::Missing)).unwrap_err().to_string();
+        assert!(error.contains("\"Z\""), "{error}");
+    }
+}

@@ -1,0 +1,227 @@
+//! Reading GeoJSON (RFC 7946). Coordinates are longitude and latitude on WGS 84, unless the member `crs` of the earlier version says
+//! otherwise, as GIS programs still write it.
+
+use std::path::Path;
+
+use serde::Deserialize;
+use serde_json::value::RawValue;
+use serde_json::{Map, Value};
+
+use crate::input::crs::from_wkt::from_epsg;
+use crate::input::crs::system::Crs;
+use crate::input::lines::attribute::{Attribute, WantedAttributes, no_attribute};
+use crate::input::lines::collector::FeatureCollector;
+use crate::input::lines::feature::RawGeometry;
+use crate::input::lines::options::LineOptions;
+use crate::{Error, Result, interrupt};
+
+/// The system of GeoJSON that says none.
+const WGS_84: u32 = 4326;
+
+/// The members of a document that matter here.
+#[derive(Deserialize)]
+struct Document<'a> {
+    #[serde(rename = "type")]
+    kind: String,
+    #[serde(default)]
+    crs: Option<Value>,
+    #[serde(borrow, default)]
+    features: Option<Vec<&'a RawValue>>,
+}
+
+#[derive(Deserialize)]
+struct Feature {
+    geometry: Option<Geometry>,
+    properties: Option<Map<String, Value>>,
+}
+
+type Position = Vec<f64>;
+
+#[derive(Deserialize)]
+#[serde(tag = "type")]
+enum Geometry {
+    Point {},
+    MultiPoint {},
+    LineString { coordinates: Vec<Position> },
+    MultiLineString { coordinates: Vec<Vec<Position>> },
+    Polygon { coordinates: Vec<Vec<Position>> },
+    MultiPolygon { coordinates: Vec<Vec<Vec<Position>>> },
+    GeometryCollection { geometries: Vec<Geometry> },
+}
+
+/// Hands the features of the document `bytes` to `collector`. Returns the coordinate reference system that it says.
+///
+/// # Errors
+/// `Input` if it is no GeoJSON, and those of the collector.
+pub(super) fn read(path: &Path, bytes: &[u8], options: &LineOptions, collector: &mut FeatureCollector) -> Result<Crs> {
+    let broken = |error: serde_json::Error| Error::input(path, format!("is no GeoJSON that can be read: {error}"));
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let document: Document = serde_json::from_slice(text).map_err(broken)?;
+    let crs = match &document.crs {
+        None => from_epsg(WGS_84).unwrap_or_default(),
+        Some(Value::Null) => Crs::default(),
+        Some(value) => named_crs(value).ok_or_else(|| {
+            let what = format!(
+                "its member crs says {value}, which is not known: say with crs in [[breaklines]] what the lines are in"
+            );
+            Error::input(path, what)
+        })?,
+    };
+    match document.kind.as_str() {
+        "FeatureCollection" => {
+            for (number, feature) in (1..).zip(document.features.unwrap_or_default()) {
+                interrupt::check()?;
+                let feature = serde_json::from_str(feature.get());
+                let refused = |error: serde_json::Error| collector.refuse(number, format!("cannot be read: {error}"));
+                let feature = feature.map_err(refused)?;
+                add(path, number, feature, options, collector)?;
+            }
+        }
+        "Feature" => add(path, 1, serde_json::from_slice(text).map_err(broken)?, options, collector)?,
+        _ => {
+            let geometry = serde_json::from_slice(text).map_err(broken)?;
+            add(path, 1, Feature { geometry: Some(geometry), properties: None }, options, collector)?;
+        }
+    }
+    Ok(crs)
+}
+
+fn add(
+    path: &Path,
+    number: u64,
+    feature: Feature,
+    options: &LineOptions,
+    collector: &mut FeatureCollector,
+) -> Result<()> {
+    let properties = feature.properties.unwrap_or_default();
+    let value = |name: &Option<String>| match name.as_ref().map(|name| (name, properties.get(name))) {
+        None => Ok(Attribute::Missing),
+        Some((_, Some(Value::String(text)))) => Ok(Attribute::Text(text.clone())),
+        Some((_, Some(Value::Number(number)))) => Ok(number.as_f64().map_or(Attribute::Missing, Attribute::Number)),
+        Some((_, Some(Value::Null))) => Ok(Attribute::Missing),
+        Some((_, Some(other))) => Ok(Attribute::Text(other.to_string())),
+        // Where most have the attribute, a misspelt name must not look like features without a value.
+        Some((name, None)) => {
+            let there: Vec<String> = properties.keys().cloned().collect();
+            Err(Error::input(path, format!("feature {number}: it {}", no_attribute(name, &there))))
+        }
+    };
+    let wanted = WantedAttributes { kind: value(&options.kind_field)?, height: value(&options.height_field)? };
+    collector.add(number, feature.geometry.map_or(RawGeometry::Empty, raw), &wanted)
+}
+
+fn raw(geometry: Geometry) -> RawGeometry {
+    match geometry {
+        Geometry::Point {} | Geometry::MultiPoint {} => RawGeometry::Other("a point"),
+        Geometry::LineString { coordinates } => RawGeometry::Lines(vec![line(coordinates)]),
+        Geometry::MultiLineString { coordinates } => RawGeometry::Lines(lines(coordinates)),
+        Geometry::Polygon { coordinates } => RawGeometry::Areas(vec![lines(coordinates)]),
+        Geometry::MultiPolygon { coordinates } => RawGeometry::Areas(coordinates.into_iter().map(lines).collect()),
+        Geometry::GeometryCollection { geometries } => RawGeometry::Several(geometries.into_iter().map(raw).collect()),
+    }
+}
+
+fn lines(lines: Vec<Vec<Position>>) -> Vec<Vec<[f64; 3]>> {
+    lines.into_iter().map(line).collect()
+}
+
+/// A position may lack its height, or have more numbers, which say nothing here.
+fn line(positions: Vec<Position>) -> Vec<[f64; 3]> {
+    let number = |position: &Position, axis: usize| position.get(axis).copied().unwrap_or(f64::NAN);
+    positions.iter().map(|position| [0, 1, 2].map(|axis| number(position, axis))).collect()
+}
+
+/// Returns the system of the member `crs`, as in `{"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::25832"}}`.
+fn named_crs(value: &Value) -> Option<Crs> {
+    let name = value.get("properties")?.get("name")?.as_str()?;
+    let last = name.rsplit([':', '/']).next()?;
+    match last {
+        "CRS84" | "CRS84h" => from_epsg(WGS_84),
+        code if name.to_ascii_uppercase().contains("EPSG") => {
+            let code = code.parse().ok()?;
+            // A code that is not in the list is still a code: two files with the same one agree.
+            Some(from_epsg(code).unwrap_or(Crs { epsg: Some(code), ..Crs::default() }))
+        }
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::breaklines::FeatureKind;
+    use crate::input::lines::feature::{LineFeature, LineShape};
+
+    fn read_text(text: &str, rest: &str) -> Result<(Crs, Vec<LineFeature>)> {
+        let options: LineOptions = toml::from_str(&format!("files = [\"a\"]\n{rest}")).unwrap();
+        let mut collector = FeatureCollector::new(Path::new("a.geojson"), &options);
+        let crs = read(Path::new("a.geojson"), text.as_bytes(), &options, &mut collector)?;
+        Ok((crs, collector.finish().0))
+    }
+
+    const LINE: &str = r#"{"type": "LineString", "coordinates": [[0, 0, 1], [2, 0, 1.5, 9]]}"#;
+
+    #[test]
+    fn documents_features_and_geometries_are_read() {
+        let feature = format!(r#"{{"type": "Feature", "properties": {{"T": "river", "Z": 4}}, "geometry": {LINE}}}"#);
+        let all = format!(r#"{{"type": "FeatureCollection", "features": [{feature}, {feature}]}}"#);
+        for (text, count) in [(LINE, 1), (feature.as_str(), 1), (all.as_str(), 2)] {
+            let (crs, features) = read_text(text, "").unwrap();
+            assert_eq!((crs.epsg, features.len()), (Some(4326), count), "{text}");
+            assert_eq!(features[0].shape, LineShape::Line(vec![[0.0, 0.0, 1.0], [2.0, 0.0, 1.5]]));
+        }
+        let (_, features) = read_text(&all, "kind_field = \"T\"\nheight_field = \"Z\"").unwrap();
+        assert_eq!((features[1].number, features[1].kind), (2, FeatureKind::River));
+        assert_eq!(features[1].shape.outlines()[0][0][2], 4.0);
+        let error = read_text(&all, "kind_field = \"KIND\"").unwrap_err().to_string();
+        assert!(error.contains("feature 1") && error.contains("it has T, Z"), "{error}");
+    }
+
+    #[test]
+    fn areas_and_collections_are_read() {
+        let ring = |x: u32| format!("[[{x},0,1],[{},0,1],[{x},1,1],[{x},0,1]]", x + 1);
+        let polygon = format!(r#"{{"type": "Polygon", "coordinates": [{}, {}]}}"#, ring(0), ring(5));
+        let areas = format!(r#"{{"type": "MultiPolygon", "coordinates": [[{}], [{}]]}}"#, ring(0), ring(5));
+        let both = format!(r#"{{"type": "GeometryCollection", "geometries": [{polygon}, {areas}]}}"#);
+        let (_, features) = read_text(&both, "kind = \"lake\"").unwrap();
+        let rings: Vec<usize> = features.iter().map(|feature| feature.shape.outlines().len()).collect();
+        assert_eq!(rings, [2, 1, 1]);
+        let point = r#"{"type": "Point", "coordinates": [1, 2, 3]}"#;
+        assert!(read_text(point, "").unwrap_err().to_string().contains("is a point"));
+    }
+
+    #[test]
+    fn the_earlier_member_says_another_system() {
+        let with = |crs: &str| {
+            read_text(&format!(r#"{{"type": "FeatureCollection", "crs": {crs}, "features": []}}"#), "")
+                .map(|read| read.0)
+        };
+        let named = |name: &str| with(&format!(r#"{{"type": "name", "properties": {{"name": "{name}"}}}}"#));
+        assert_eq!(named("urn:ogc:def:crs:EPSG::25832").unwrap().epsg, Some(25832));
+        assert_eq!(named("EPSG:99999").unwrap().epsg, Some(99999));
+        assert_eq!(named("urn:ogc:def:crs:OGC:1.3:CRS84").unwrap().epsg, Some(4326));
+        assert_eq!(with("null").unwrap(), Crs::default());
+        assert!(named("my grid").unwrap_err().to_string().contains("my grid"));
+    }
+
+    #[test]
+    fn what_is_broken_is_named() {
+        for (text, word) in [
+            ("{\"type\": \"FeatureCollection\", \"features\": [", "is no GeoJSON"),
+            ("{}", "missing field"),
+            (r#"{"type": "Topology"}"#, "Topology"),
+            (
+                r#"{"type": "FeatureCollection", "features": [{"type": "Feature", "geometry": {"type": "Circle"}}]}"#,
+                "feature 1",
+            ),
+            (r#"{"type": "LineString", "coordinates": [[0, null, 1]]}"#, "null"),
+            (r#"{"type": "LineString", "coordinates": [[0], [1]]}"#, "no place"),
+            (r#"{"type": "LineString", "coordinates": [[0, 0], [1, 1]]}"#, "no heights"),
+        ] {
+            let error = read_text(text, "").unwrap_err().to_string();
+            assert!(error.contains(word), "{text}: {error}");
+        }
+        assert!(read_text(r#"{"type": "FeatureCollection"}"#, "").unwrap().1.is_empty());
+        assert!(read_text(r#"{"type": "Feature", "geometry": null, "properties": null}"#, "").unwrap().1.is_empty());
+    }
+}

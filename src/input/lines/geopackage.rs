@@ -1,0 +1,194 @@
+//! Reading GeoPackages: tables of an SQLite database.
+
+use std::path::Path;
+
+use rusqlite::types::ValueRef;
+use rusqlite::{Connection, OpenFlags, OptionalExtension, Row};
+
+use crate::input::crs::from_wkt::{from_epsg, parse};
+use crate::input::crs::system::Crs;
+use crate::input::lines::attribute::{Attribute, WantedAttributes, no_attribute};
+use crate::input::lines::collector::FeatureCollector;
+use crate::input::lines::feature::RawGeometry;
+use crate::input::lines::options::LineOptions;
+use crate::input::lines::wkb;
+use crate::{Error, Result, interrupt};
+
+/// A table of features.
+struct Layer {
+    table: String,
+    geometry: String,
+    srs: i64,
+    /// All its columns.
+    columns: Vec<String>,
+    /// The column that numbers its features.
+    key: String,
+}
+
+/// Hands the features of the file at `path` to `collector`. Returns the coordinate reference system of its layer.
+///
+/// # Errors
+/// `Input` if the file is damaged, has no such layer, or lacks attributes that the options name.
+pub(super) fn read(path: &Path, options: &LineOptions, collector: &mut FeatureCollector) -> Result<Crs> {
+    refuse_open_journal(path)?;
+    let broken = |error: rusqlite::Error| Error::input(path, format!("is no GeoPackage that can be read: {error}"));
+    let file = open(path).map_err(broken)?;
+    let layer = find_layer(path, &file, options)?;
+    for name in options.kind_field.iter().chain(&options.height_field) {
+        if layer.column(name).is_none() {
+            let there: Vec<String> =
+                layer.columns.iter().filter(|column| **column != layer.geometry).cloned().collect();
+            return Err(Error::input(path, no_attribute(name, &there)));
+        }
+    }
+    let wanted = |name: &Option<String>| match name.as_ref().and_then(|name| layer.column(name)) {
+        Some(column) => quoted(column),
+        None => "NULL".into(),
+    };
+    let query = format!(
+        "SELECT {key}, {}, {}, {} FROM {} ORDER BY {key}",
+        quoted(&layer.geometry),
+        wanted(&options.kind_field),
+        wanted(&options.height_field),
+        quoted(&layer.table),
+        key = quoted(&layer.key)
+    );
+    let mut statement = file.prepare(&query).map_err(broken)?;
+    let mut rows = statement.query([]).map_err(broken)?;
+    while let Some(row) = rows.next().map_err(broken)? {
+        interrupt::check()?;
+        add(row, collector).map_err(broken)??;
+    }
+    crs(path, &file, layer.srs)
+}
+
+/// Opens the file for reading. `immutable` keeps SQLite from making files beside it, which may not be allowed.
+fn open(path: &Path) -> rusqlite::Result<Connection> {
+    let escaped: String = path.to_string_lossy().chars().map(escape).collect();
+    let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+    Connection::open_with_flags(format!("file:{escaped}?immutable=1"), flags)
+}
+
+/// Writes a character as a URI takes it.
+fn escape(character: char) -> String {
+    match character {
+        '%' | '?' | '#' => format!("%{:02X}", u32::from(character)),
+        _ => character.into(),
+    }
+}
+
+/// What another program has written, and not yet put into the file, must not be missed.
+fn refuse_open_journal(path: &Path) -> Result<()> {
+    let mut journal = path.as_os_str().to_owned();
+    journal.push("-wal");
+    let is_there = Path::new(&journal).metadata().is_ok_and(|meta| meta.len() > 0);
+    match is_there {
+        true => Err(Error::input(
+            path,
+            "is open in another program, or was not closed (a file -wal is beside it): close it there first",
+        )),
+        false => Ok(()),
+    }
+}
+
+/// Finds the layer that the options name, or the only one.
+fn find_layer(path: &Path, file: &Connection, options: &LineOptions) -> Result<Layer> {
+    let broken = |error: rusqlite::Error| Error::input(path, format!("is no GeoPackage that can be read: {error}"));
+    // A view may compute what it likes, so only tables count.
+    let query = "SELECT g.table_name, g.column_name, g.srs_id FROM gpkg_geometry_columns g JOIN sqlite_master m \
+                 ON m.type = 'table' AND lower(m.name) = lower(g.table_name) ORDER BY g.table_name";
+    let mut statement = file.prepare(query).map_err(broken)?;
+    let found = statement.query_map([], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?))).map_err(broken)?;
+    let layers: Vec<(String, String, i64)> = found.collect::<rusqlite::Result<_>>().map_err(broken)?;
+    let names = layers.iter().map(|(table, ..)| format!("{table:?}")).collect::<Vec<_>>().join(", ");
+    let is_wanted = |table: &str| options.layer.as_ref().is_none_or(|name| name.eq_ignore_ascii_case(table));
+    let mut wanted = layers.iter().filter(|(table, ..)| is_wanted(table));
+    let (table, geometry, srs) = match (wanted.next(), wanted.next(), &options.layer) {
+        (Some(layer), None, _) => layer.clone(),
+        (None, _, Some(name)) => return Err(Error::input(path, format!("has no layer {name:?}: it has {names}"))),
+        (None, _, None) => return Err(Error::input(path, "is a database without a layer of features")),
+        (Some(_), Some(_), _) => {
+            return Err(Error::input(path, format!("has several layers: name one of them with layer: {names}")));
+        }
+    };
+    let mut statement = file.prepare("SELECT name, pk FROM pragma_table_info(?1)").map_err(broken)?;
+    let found = statement.query_map([&table], |row| Ok((row.get(0)?, row.get(1)?))).map_err(broken)?;
+    let columns: Vec<(String, i64)> = found.collect::<rusqlite::Result<_>>().map_err(broken)?;
+    let key = columns.iter().find(|(_, key)| *key == 1).map_or("rowid".into(), |(name, _)| name.clone());
+    Ok(Layer { table, geometry, srs, columns: columns.into_iter().map(|(name, _)| name).collect(), key })
+}
+
+impl Layer {
+    fn column(&self, name: &str) -> Option<&str> {
+        self.columns.iter().find(|column| column.eq_ignore_ascii_case(name)).map(String::as_str)
+    }
+}
+
+/// Adds a row: its key, geometry, kind and height. The outer result is SQLite's.
+fn add(row: &Row, collector: &mut FeatureCollector) -> rusqlite::Result<Result<()>> {
+    let number = match row.get_ref(0)? {
+        ValueRef::Integer(number) => number.unsigned_abs(),
+        _ => 0,
+    };
+    let geometry = match row.get_ref(1)? {
+        ValueRef::Null => Ok(RawGeometry::Empty),
+        ValueRef::Blob(bytes) => geometry(bytes),
+        _ => Err("has a geometry that is none: it is no blob".into()),
+    };
+    let wanted = WantedAttributes { kind: attribute(row.get_ref(2)?), height: attribute(row.get_ref(3)?) };
+    let geometry = geometry.map_err(|what: String| collector.refuse(number, what));
+    Ok(geometry.and_then(|geometry| collector.add(number, geometry, &wanted)))
+}
+
+fn attribute(value: ValueRef) -> Attribute {
+    match value {
+        ValueRef::Integer(number) => Attribute::Number(number as f64),
+        ValueRef::Real(number) => Attribute::Number(number),
+        ValueRef::Text(text) => Attribute::Text(String::from_utf8_lossy(text).into_owned()),
+        ValueRef::Null | ValueRef::Blob(_) => Attribute::Missing,
+    }
+}
+
+/// Returns the geometry in a blob: a header with a box, whose form is in its flags, and then well-known binary.
+fn geometry(blob: &[u8]) -> std::result::Result<RawGeometry, String> {
+    let damaged = || "has a geometry that is damaged: it does not begin as one".to_string();
+    let Some(([b'G', b'P', _, flags], rest)) = blob.split_at_checked(4) else { return Err(damaged()) };
+    let box_bytes = match flags >> 1 & 7 {
+        0 => 0,
+        1 => 32,
+        2 | 3 => 48,
+        4 => 64,
+        _ => return Err(damaged()),
+    };
+    match flags >> 4 & 1 {
+        1 => Ok(RawGeometry::Empty),
+        // Before the box is the number of the CRS.
+        _ => wkb::read(rest.get(4 + box_bytes..).ok_or_else(damaged)?),
+    }
+}
+
+fn crs(path: &Path, file: &Connection, srs: i64) -> Result<Crs> {
+    let broken = |error: rusqlite::Error| Error::input(path, format!("its table of CRSs cannot be read: {error}"));
+    // Negative numbers and 0 say that the CRS is not known.
+    if srs <= 0 {
+        return Ok(Crs::default());
+    }
+    let query = "SELECT organization, organization_coordsys_id, definition FROM gpkg_spatial_ref_sys WHERE srs_id = ?1";
+    let row = |row: &Row| Ok((row.get::<_, String>(0)?, row.get::<_, i64>(1)?, row.get::<_, Option<String>>(2)?));
+    let found = file.query_row(query, [srs], row).optional().map_err(broken)?;
+    let Some((organization, code, text)) = found else {
+        return Err(Error::input(
+            path,
+            format!("its CRS {srs} is not in its table of CRSs: say with crs in [[breaklines]] what it is"),
+        ));
+    };
+    let code = u32::try_from(code).ok().filter(|_| organization.eq_ignore_ascii_case("EPSG"));
+    let of_text = || text.as_deref().and_then(parse).map(|crs| Crs { epsg: crs.epsg.or(code), ..crs });
+    let crs = code.and_then(from_epsg).or_else(of_text);
+    Ok(crs.unwrap_or(Crs { epsg: code, name: text.filter(|text| text != "undefined"), ..Crs::default() }))
+}
+
+/// Returns a name as SQL takes it.
+fn quoted(name: &str) -> String {
+    format!("\"{}\"", name.replace('"', "\"\""))
+}

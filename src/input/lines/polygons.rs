@@ -1,0 +1,92 @@
+//! The outlines of a Shapefile's polygon are one list of rings. This finds which of them are islands, and of which area.
+
+type Ring = Vec<[f64; 3]>;
+
+/// Returns the areas that `rings` make: the outline of each, and then those of its islands. Outlines run clockwise and islands do not. If no
+/// ring runs clockwise, the file has them the other way round.
+pub(super) fn areas_of(rings: Vec<Ring>) -> Vec<Vec<Ring>> {
+    let is_turned = !rings.iter().any(|ring| double_area(ring) < 0.0);
+    let is_outline = |ring: &Ring| (double_area(ring) < 0.0) != is_turned;
+    let (outlines, islands): (Vec<Ring>, Vec<Ring>) = rings.into_iter().partition(is_outline);
+    let mut areas: Vec<Vec<Ring>> = outlines.into_iter().map(|outline| vec![outline]).collect();
+    for island in islands {
+        // In the smallest area around it: an island may have a lake that has an island.
+        let size = |area: &&mut Vec<Ring>| double_area(&area[0]).abs();
+        let around =
+            areas.iter_mut().filter(|area| holds(&area[0], &island)).min_by(|a, b| size(a).total_cmp(&size(b)));
+        match around {
+            Some(area) => area.push(island),
+            // A ring in no area is an area that runs the wrong way.
+            None => areas.push(vec![island]),
+        }
+    }
+    areas
+}
+
+/// Twice the area, above 0 if the ring runs counterclockwise. It counts from the first vertex, so that far from zero no digits are lost.
+fn double_area(ring: &Ring) -> f64 {
+    let Some(first) = ring.first() else { return 0.0 };
+    let from_first = |vertex: &[f64; 3]| [vertex[0] - first[0], vertex[1] - first[1]];
+    let pairs = ring.windows(2).map(|pair| (from_first(&pair[0]), from_first(&pair[1])));
+    pairs.map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum()
+}
+
+/// Tells whether most of the vertices of `island` are within `outline`: they may touch it.
+fn holds(outline: &Ring, island: &Ring) -> bool {
+    const VERTICES: usize = 3;
+    let looked_at = island.iter().step_by((island.len() / VERTICES).max(1)).take(VERTICES);
+    let (mut within, mut all) = (0, 0);
+    for vertex in looked_at {
+        within += usize::from(is_within(outline, vertex));
+        all += 1;
+    }
+    2 * within > all
+}
+
+fn is_within(outline: &Ring, &[x, y, _]: &[f64; 3]) -> bool {
+    let crosses = |pair: &&[[f64; 3]]| {
+        let ([ax, ay, _], [bx, by, _]) = (pair[0], pair[1]);
+        (ay > y) != (by > y) && x < ax + (y - ay) / (by - ay) * (bx - ax)
+    };
+    outline.windows(2).filter(crosses).count() % 2 == 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A square, clockwise.
+    fn square(at: f64, side: f64) -> Ring {
+        let corners = [[at, at], [at, at + side], [at + side, at + side], [at + side, at], [at, at]];
+        corners.map(|[x, y]| [x + 6e5, y + 5e6, 1.0]).to_vec()
+    }
+
+    fn turned(ring: Ring) -> Ring {
+        ring.into_iter().rev().collect()
+    }
+
+    #[test]
+    fn islands_belong_to_the_smallest_area_around_them() {
+        let rings = vec![
+            turned(square(3.0, 4.0)),
+            square(0.0, 10.0),
+            square(4.0, 2.0),
+            turned(square(4.5, 1.0)),
+            square(20.0, 1.0),
+        ];
+        let areas = areas_of(rings.clone());
+        assert_eq!(areas.len(), 3);
+        assert_eq!(areas[0], [rings[1].clone(), rings[0].clone()]);
+        assert_eq!(areas[1], [rings[2].clone(), rings[3].clone()]);
+        assert_eq!(areas[2], [rings[4].clone()]);
+    }
+
+    #[test]
+    fn rings_that_all_run_the_wrong_way_are_areas() {
+        assert_eq!(areas_of(vec![turned(square(0.0, 1.0)), turned(square(5.0, 1.0))]).len(), 2);
+        // An island in no area.
+        assert_eq!(areas_of(vec![square(0.0, 1.0), turned(square(5.0, 1.0))]).len(), 2);
+        assert_eq!(areas_of(Vec::new()).len(), 0);
+        assert_eq!(areas_of(vec![Vec::new()]).len(), 1);
+    }
+}

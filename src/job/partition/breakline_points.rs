@@ -1,0 +1,83 @@
+//! What breaklines do to the points: those that lie at a line or in a lake are dropped, and the sites of the lines come in their place.
+
+use crate::Result;
+use crate::breaklines::{BreaklineSite, Breaklines, FeatureKind};
+use crate::input::Point;
+use crate::job::partition::bucket_sorter::BucketSorter;
+use crate::job::partition::buckets::Buckets;
+use crate::job::partition::grid::Grid;
+use crate::job::plan::job_plan::Plan;
+use crate::output::color::class_color;
+
+/// Sites go to the buckets so many at a time.
+const SLICE: usize = 1 << 12;
+
+/// Leaves out the points that make room for breaklines. One thread filters a chunk with it.
+pub(crate) struct BreaklineFilter<'a> {
+    lines: Option<&'a Breaklines>,
+    kept: Vec<Point>,
+    dropped: u64,
+}
+
+impl<'a> BreaklineFilter<'a> {
+    pub(crate) fn new(lines: Option<&'a Breaklines>) -> BreaklineFilter<'a> {
+        BreaklineFilter { lines, kept: Vec::new(), dropped: 0 }
+    }
+
+    /// Returns the points that stay, in their order.
+    pub(crate) fn without_dropped<'b>(&'b mut self, points: &'b [Point]) -> &'b [Point] {
+        let Some(lines) = self.lines else { return points };
+        self.kept.clear();
+        self.kept.extend(points.iter().filter(|point| !lines.drops(point.position)));
+        self.dropped += (points.len() - self.kept.len()) as u64;
+        &self.kept
+    }
+
+    /// Returns how many points were left out.
+    pub(crate) fn dropped(&self) -> u64 {
+        self.dropped
+    }
+}
+
+/// Adds the sites of lines to the buckets that `is_wanted`. The greatest colour of the points is `max_rgb`.
+///
+/// # Errors
+/// Those of the buckets, and of [`Plan::built_breaklines`].
+pub(crate) fn add_line_sites(
+    plan: &Plan,
+    max_rgb: u16,
+    grid: &Grid,
+    buckets: &Buckets,
+    is_wanted: impl Fn(usize) -> bool,
+) -> Result<()> {
+    let Some(lines) = plan.built_breaklines()? else { return Ok(()) };
+    // Points have the numbers below.
+    let sites = (plan.records..).zip(lines.sites()).filter(|(_, site)| is_wanted(grid.bucket(site.place) as usize));
+    let (mut sorter, mut slice) = (BucketSorter::new(grid, buckets), Vec::with_capacity(SLICE));
+    for (order, site) in sites {
+        slice.push(point_of(site, order, max_rgb));
+        if slice.len() == SLICE {
+            sorter.add(&slice)?;
+            slice.clear();
+        }
+    }
+    sorter.add(&slice)
+}
+
+/// Returns a site as a point. A line has no class and no colour of its own: banks and shores are water, other lines are ground, and where
+/// points have colours, these have the colour of their class.
+fn point_of(site: &BreaklineSite, order: u64, max_rgb: u16) -> Point {
+    const GROUND: u8 = 2;
+    const WATER: u8 = 9;
+    let class = match site.kind {
+        FeatureKind::Lake | FeatureKind::River => WATER,
+        FeatureKind::Line => GROUND,
+    };
+    let rgb = match max_rgb {
+        0 => [0; 3],
+        1..=255 => class_color(class).map(u16::from),
+        // 255 becomes 65535.
+        _ => class_color(class).map(|value| u16::from(value) * 257),
+    };
+    Point::new(site.place, site.z.unwrap_or_default(), rgb, class, order)
+}

@@ -1,0 +1,82 @@
+//! Files of lines that cannot be used: the message names the file and the feature, and says what to do.
+
+use std::fs;
+use std::path::Path;
+
+use super::files::{Features, geojson, geopackage, shapefile};
+use super::terrain::{Survey, cross};
+use rusqlite::Connection;
+
+#[test]
+fn broken_files_are_named() {
+    let survey = Survey::new(300);
+    let folder = survey.folder();
+    let refused = |file: &Path, rest: &str, code: i32, words: &[&str]| {
+        let name = file.file_name().unwrap().to_str().unwrap();
+        let said = survey.job_with(&[file], rest).run_with(&["--quiet"]);
+        said.refused(code, &[&[name], words].concat());
+    };
+    let lines = || Features::lines(&[("line", cross(0)), ("line", cross(1))]);
+    let shp = shapefile(folder, "a", &lines());
+    let bytes = fs::read(&shp).unwrap();
+    fs::write(&shp, &bytes[..bytes.len() - 10]).unwrap();
+    refused(&shp, "", 3, &["is cut off"]);
+    let mut broken = bytes.clone();
+    broken[160..168].copy_from_slice(&f64::NAN.to_le_bytes());
+    fs::write(&shp, &broken).unwrap();
+    refused(&shp, "", 3, &["feature 1 has the vertex", "which is no place"]);
+    fs::write(&shp, &bytes).unwrap();
+    fs::remove_file(shp.with_extension("dbf")).unwrap();
+    refused(&shp, "kind_field = \"kind\"", 3, &["its attributes are missing"]);
+    let shp = shapefile(folder, "b", &lines());
+    refused(&shp, "kind_field = \"type\"", 3, &["no attribute \"type\"", "it has kind"]);
+    let wall = vec![[10.0, 10.0, 1.0], [20.0, 10.0, 1.0], [20.0, 10.0, 9.0], [30.0, 10.0, 9.0]];
+    let walls = geojson(folder, "wall.geojson", &Features::lines(&[("line", wall)]));
+    refused(&walls, "", 3, &["feature 1 is a wall", "1 and 9 at (500020, 4000010)"]);
+    let gpkg = geopackage(folder, "c.gpkg", &lines());
+    refused(&gpkg, "layer = \"roads\"", 3, &["has no layer \"roads\"", "\"waters\""]);
+    refused(&gpkg, "height_field = \"level\"", 3, &["feature 1 has no number in \"level\""]);
+    let file = Connection::open(&gpkg).unwrap();
+    file.execute("UPDATE waters SET geom = x'47500001' WHERE fid = 2", []).unwrap();
+    file.close().unwrap();
+    refused(&gpkg, "", 3, &["feature 2 has a geometry that is damaged"]);
+    let page = folder.join("page.html");
+    fs::write(&page, "<html>").unwrap();
+    refused(&page, "", 3, &["ogr2ogr lines.gpkg"]);
+}
+
+#[test]
+fn geodatabases_and_other_systems_are_refused() {
+    let survey = Survey::new(300);
+    let base = survey.folder().join("roads.gdb");
+    fs::create_dir(&base).unwrap();
+    survey.job_with(&[&base], "").run().refused(3, &["roads.gdb", "ogr2ogr lines.gpkg"]);
+    survey.job_with(&["nothing.shp"], "").run().refused(2, &["[[breaklines]] files", "nothing.shp"]);
+    let shp = shapefile(survey.folder(), "other", &Features::lines(&[("line", cross(0))]));
+    fs::write(shp.with_extension("prj"), super::files::UTM_33.replace("15.0", "21.0")).unwrap();
+    survey.job_with(&[&shp], "").run().refused(2, &["other.shp is in", "-t_srs EPSG:32633", "crs = \"points\""]);
+    survey.job_with(&[&shp], "crs = \"points\"").report();
+    let degrees = survey.folder().join("degrees.geojson");
+    fs::write(&degrees, r#"{"type": "LineString", "coordinates": [[15, 36.1, 1], [15.001, 36.1, 2]]}"#).unwrap();
+    survey.job_with(&[&degrees], "").run().refused(2, &["degrees.geojson is in WGS 84", "kind of coordinates"]);
+    fs::remove_file(shp.with_extension("prj")).unwrap();
+    let said = survey.job_with(&[&shp], "").run().succeeded();
+    assert!(said.out.contains("no .prj file"), "{}", said.out);
+    let said = survey.job_with(&[&shp], "").run_with(&["check"]);
+    assert!(said.out.contains("edges") || said.code == 2, "{said:?}");
+}
+
+#[test]
+fn options_that_contradict_each_other_are_refused() {
+    let survey = Survey::new(300);
+    let river = survey.river();
+    for (rest, words) in [
+        ("kind = \"river\"\nkind_field = \"kind\"", ["kind and kind_field", "keep one"]),
+        ("kind = \"creek\"", ["river", "lake"]),
+        ("spacing = -1", ["positive", "auto"]),
+        ("crs = \"first\"", ["points", "EPSG"]),
+    ] {
+        survey.job_with(&[&river], rest).run().refused(2, &words);
+    }
+    survey.job_with::<&str>(&[], "").run().refused(2, &["[[breaklines]] files is empty"]);
+}
