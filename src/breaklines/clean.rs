@@ -71,12 +71,12 @@ impl Cleaner<'_> {
         let by_height = |v: &&Vertex| (v.z, v.place);
         let vertices = || feature.paths.iter().flatten().filter(|v| v.z.is_some());
         let height = vertices().min_by_key(by_height).and_then(|v| v.z);
-        if let Some((lowest, (place, highest))) = height.zip(vertices().max_by_key(by_height).and_then(known_height)) {
-            if highest.abs_diff(lowest) > self.options.height_tolerance {
-                self.findings.uneven_lakes += 1;
-                self.findings.worst_uneven.push(Uneven { id: feature.id, lowest, highest, place });
-            }
-        }
+        let highest = vertices().max_by_key(by_height).and_then(known_height);
+        let range = height.zip(highest).map(|(lowest, (place, highest))| Uneven { id: feature.id, lowest, highest, place });
+        let is_uneven = |range: &Uneven| range.highest.abs_diff(range.lowest) > self.options.height_tolerance;
+        let uneven = range.filter(is_uneven);
+        self.findings.uneven_lakes += u64::from(uneven.is_some());
+        self.findings.worst_uneven.extend(uneven);
         for path in &feature.paths {
             let mut ring: Vec<Vertex> = path.iter().map(|v| Vertex { place: v.place, z: height }).collect();
             ring.dedup();

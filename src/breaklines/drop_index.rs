@@ -77,6 +77,12 @@ impl DropIndex {
             }
     }
 
+    /// Returns whether a disc or a shore may be near `place`. It is near every site of a line.
+    pub(crate) fn is_near_line(&self, place: Site) -> bool {
+        let is_inside = self.bounds.is_some_and(|bounds| holds(&bounds, place));
+        is_inside && self.cells[self.grid.cell(place[0], place[1])] != LAND
+    }
+
     fn drops_in(&self, cell: &MixedCell, place: Site) -> bool {
         let is_in_disc = if cell.count <= MOST_LISTED {
             let discs = &self.listed[cell.first as usize..(cell.first + cell.count) as usize];

