@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use serde::Deserialize;
+use serde::{Deserialize, Deserializer};
 use serde_json::value::RawValue;
 use serde_json::{Map, Value};
 
@@ -23,7 +23,8 @@ const WGS_84: u32 = 4326;
 struct Document<'a> {
     #[serde(rename = "type")]
     kind: String,
-    #[serde(default)]
+    /// The value null says that the CRS is not known; without the member it is.
+    #[serde(default, deserialize_with = "with_null")]
     crs: Option<Value>,
     #[serde(borrow, default)]
     features: Option<Vec<&'a RawValue>>,
@@ -47,6 +48,10 @@ enum Geometry {
     Polygon { coordinates: Vec<Vec<Position>> },
     MultiPolygon { coordinates: Vec<Vec<Vec<Position>>> },
     GeometryCollection { geometries: Vec<Geometry> },
+}
+
+fn with_null<'de, D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Option<Value>, D::Error> {
+    Value::deserialize(deserializer).map(Some)
 }
 
 /// Hands the features of the document `bytes` to `collector`. Returns the coordinate reference system that it says.

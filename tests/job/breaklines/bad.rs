@@ -22,7 +22,7 @@ fn broken_files_are_named() {
     fs::write(&shp, &bytes[..bytes.len() - 10]).unwrap();
     refused(&shp, "", 3, &["is cut off"]);
     let mut broken = bytes.clone();
-    broken[160..168].copy_from_slice(&f64::NAN.to_le_bytes());
+    broken[156..164].copy_from_slice(&f64::NAN.to_le_bytes());
     fs::write(&shp, &broken).unwrap();
     refused(&shp, "", 3, &["feature 1 has the vertex", "which is no place"]);
     fs::write(&shp, &bytes).unwrap();
