@@ -43,11 +43,22 @@ type Position = Vec<f64>;
 enum Geometry {
     Point {},
     MultiPoint {},
-    LineString { coordinates: Vec<Position> },
-    MultiLineString { coordinates: Vec<Vec<Position>> },
-    Polygon { coordinates: Vec<Vec<Position>> },
-    MultiPolygon { coordinates: Vec<Vec<Vec<Position>>> },
-    GeometryCollection { geometries: Vec<Geometry> },
+    LineString {
+        coordinates: Vec<Position>,
+    },
+    MultiLineString {
+        coordinates: Vec<Vec<Position>>,
+    },
+    Polygon {
+        coordinates: Vec<Vec<Position>>,
+    },
+    MultiPolygon {
+        coordinates: Vec<Vec<Vec<Position>>>,
+    },
+    #[serde(rename = "GeometryCollection")]
+    Several {
+        geometries: Vec<Geometry>,
+    },
 }
 
 fn with_null<'de, D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Option<Value>, D::Error> {
@@ -122,7 +133,7 @@ fn raw(geometry: Geometry) -> RawGeometry {
         Geometry::MultiLineString { coordinates } => RawGeometry::Lines(lines(coordinates)),
         Geometry::Polygon { coordinates } => RawGeometry::Areas(vec![lines(coordinates)]),
         Geometry::MultiPolygon { coordinates } => RawGeometry::Areas(coordinates.into_iter().map(lines).collect()),
-        Geometry::GeometryCollection { geometries } => RawGeometry::Several(geometries.into_iter().map(raw).collect()),
+        Geometry::Several { geometries } => RawGeometry::Several(geometries.into_iter().map(raw).collect()),
     }
 }
 
