@@ -21,6 +21,7 @@ mod drop_index;
 mod edge_table;
 mod error;
 mod exact;
+mod fast_hash;
 mod feature;
 mod findings;
 mod heights;
