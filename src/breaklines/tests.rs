@@ -200,6 +200,17 @@ fn check(features: &[Feature], options: &BreaklineOptions, random: &mut Random) 
         mesh.half_edges().map(|h| [mesh.origin(h), mesh.destination(h)].map(|v| sites[v.get()])).collect();
     let is_edge = |[a, b]: &[Site; 2]| edges.contains(&[*a, *b]) || edges.contains(&[*b, *a]);
     assert!(edges.is_empty() || pairs.iter().all(is_edge), "a subsegment is no edge");
+    // Flat water has no other corners, except where the box cuts it, or other lakes at the size of the floor.
+    let lakes = features.iter().filter(|feature| feature.kind == FeatureKind::Lake).count();
+    let is_lake = |p: Site| lines.position(p).is_some_and(|i| lines.sites()[i].kind == FeatureKind::Lake);
+    for corners in mesh
+        .triangles
+        .iter()
+        .map(|t| t.map(|v| sites[v.get()]))
+        .filter(|t| options.within.is_none() && lakes == 1 && lines.is_water(*t))
+    {
+        assert!(corners.into_iter().all(is_lake), "{corners:?} is not all water");
+    }
     check_order(features, options, &lines, random);
     Some(pairs.len())
 }
