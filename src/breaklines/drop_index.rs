@@ -100,7 +100,8 @@ impl DropIndex {
     }
 }
 
-/// Puts into every cell its kind or its number in the list of mixed cells, which is returned. Before, cells have the numbers of their discs.
+/// Puts into every cell its kind or its number in the list of mixed cells, which is returned. Before, cells have the numbers of their
+/// discs.
 fn number_mixed(cells: &mut [u32], water: &[Water]) -> Vec<MixedCell> {
     let (mut mixed, mut first) = (Vec::new(), 0);
     for (cell, water) in cells.iter_mut().zip(water) {
@@ -169,8 +170,8 @@ impl Layout {
         }
     }
 
-    /// Returns for every cell what is known about its water. No shore runs through an unmarked cell, so its corner stands for all of it, and
-    /// for the unmarked cell next to it.
+    /// Returns for every cell what is known about its water. No shore runs through an unmarked cell, so its corner stands for all of it,
+    /// and for the unmarked cell next to it.
     fn water(&self, lakes: &Lakes) -> Vec<Water> {
         let mut water = vec![Water::Outside; self.grid.cells()];
         if lakes.is_empty() {

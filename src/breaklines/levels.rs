@@ -1,7 +1,7 @@
 //! Coarser lines, for terrains that are seen from afar.
 //!
-//! A line between two places where lines meet or end keeps every second of its sites at level 1, every fourth at level 2, and so on. What is
-//! left of it is an edge again if no vertex lies in the closed disc of its longer pieces.
+//! A line between two places where lines meet or end keeps every second of its sites at level 1, every fourth at level 2, and so on. What
+//! is left of it is an edge again if no vertex lies in the closed disc of its longer pieces.
 
 use crate::breaklines::box_tree::BoxTree;
 use crate::breaklines::exact::{disc_box, in_disc, meet};

@@ -83,8 +83,8 @@ fn pieces_of(whole: &EdgeTable, paths: &[Vec<u32>], sites: &SiteTable) -> EdgeTa
     pieces
 }
 
-/// Leaves out pieces outside the box of the options, and pieces inside lakes. Returns the others, and the shores among those left out. These
-/// are not moved any more. So where the shores of two lakes cross, a point less than a step outside both may count as inside.
+/// Leaves out pieces outside the box of the options, and pieces inside lakes. Returns the others, and the shores among those left out.
+/// These are not moved any more. So where the shores of two lakes cross, a point less than a step outside both may count as inside.
 fn choose(
     segments: &[Segment],
     lakes: u32,

@@ -1,14 +1,14 @@
 //! Splits edges until no site lies in the closed disc of any edge but its own ends.
 //!
 //! # Why it ends
-//! An edge is only ever replaced by two edges over a lattice point in its closed disc, other than its ends. Both are shorter, since a
-//! point in the closed disc sees the ends at a right angle or more. Squared lengths are whole numbers, so this cannot go on for ever. It ends
+//! An edge is only ever replaced by two edges over a lattice point in its closed disc, other than its ends. Both are shorter, since a point
+//! in the closed disc sees the ends at a right angle or more. Squared lengths are whole numbers, so this cannot go on for ever. It ends
 //! soon because of the floor: new sites keep that distance from all others, and an edge shorter than twice the floor goes over the site in
 //! its disc, which makes no new one.
 //!
 //! # Why it finds crossings too
-//! Where two edges cross, their four ends are the corners of a convex quadrilateral. One of its angles is a right angle or more, so that end
-//! lies in the closed disc of the other edge.
+//! Where two edges cross, their four ends are the corners of a convex quadrilateral. One of its angles is a right angle or more, so that
+//! end lies in the closed disc of the other edge.
 //!
 //! # Why it is the same for any order of the features
 //! Each round looks at the edges and sites of the round before, and handles edges in the order of their numbers, which were given by

@@ -70,8 +70,8 @@ impl Breaklines {
         pair.is_some_and(|(a, b)| self.subsegments.binary_search(&[a.min(b) as u32, a.max(b) as u32]).is_ok())
     }
 
-    /// Returns whether a point of the cloud at `place` is dropped: it lies in the closed disc of a subsegment or inside a lake. That holds for
-    /// the sites of the breaklines too. The place must lie within `lattice::REACH` of zero.
+    /// Returns whether a point of the cloud at `place` is dropped: it lies in the closed disc of a subsegment or inside a lake. That holds
+    /// for the sites of the breaklines too. The place must lie within `lattice::REACH` of zero.
     #[inline]
     pub fn drops(&self, place: Site) -> bool {
         self.index.drops(place)
@@ -226,7 +226,10 @@ mod tests {
     fn too_many_sites_are_refused() {
         let line = feature(FeatureKind::Line, 0, &[[0, 0, 3], [100_000, 777, 3]]);
         let options = BreaklineOptions { most_sites: 500, ..BreaklineOptions::new(100, None) };
-        assert_eq!(Breaklines::build(&[line.clone()], &options).unwrap_err(), BreaklineError::TooMany { most: 500 });
+        assert_eq!(
+            Breaklines::build(std::slice::from_ref(&line), &options).unwrap_err(),
+            BreaklineError::TooMany { most: 500 }
+        );
         assert!(Breaklines::build(&[line], &BreaklineOptions { most_sites: 2000, ..options }).is_ok());
     }
 

@@ -35,7 +35,8 @@ fn arrangement(kind: &str, random: &mut Random) -> (Vec<Feature>, BreaklineOptio
     }
     let turn = random.below(8);
     let count = 1 + random.below(7);
-    let (mut paths, mut lakes): (Vec<(FeatureKind, Vec<Site>)>, Vec<Vec<Site>>) = Default::default();
+    let mut paths: Vec<(FeatureKind, Vec<Site>)> = Vec::new();
+    let mut lakes: Vec<Vec<Site>> = Vec::new();
     for i in 0..count {
         let kinds = [FeatureKind::Line, FeatureKind::River, FeatureKind::Line];
         let mut line = |path: Vec<Site>, random: &mut Random| paths.push((kinds[random.below(3) as usize], path));

@@ -12,9 +12,9 @@ pub(crate) struct KeptLines {
 }
 
 impl KeptLines {
-    /// Chooses from the inner vertices of a terrain at `positions`, which are not `on` its boundary, at most `most` vertices of lines. Lines
-    /// with too many keep every second, fourth, and so on, as long as the pieces are not longer than `longest` lattice steps. Lines that are
-    /// still too dense then leave no trace: there is no room for their shape.
+    /// Chooses from the inner vertices of a terrain at `positions`, which are not `on` its boundary, at most `most` vertices of lines.
+    /// Lines with too many keep every second, fourth, and so on, as long as the pieces are not longer than `longest` lattice steps. Lines
+    /// that are still too dense then leave no trace: there is no room for their shape.
     pub(crate) fn choose(
         lines: Option<&Breaklines>,
         positions: &[[i32; 3]],

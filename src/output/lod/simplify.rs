@@ -5,11 +5,12 @@
 //! terrains that meet along a part of their boundaries still meet there when either or both of them are simplified, the triangles
 //! cover the same ground once, as before, and the program's own pipeline makes them.
 //!
-//! Inside, the vertices that stay are chosen in two passes. First, one vertex of every cell of a grid stays: the one that is nearest to
-//! the height of the surface seen in the cell, which it takes. Then the triangulation of these is compared with the terrain: where a triangle is furthest from
-//! it, the vertex with the greatest distance stays too (Garland and Heckbert 1995, "Fast polygonal approximation of terrains and
-//! height fields", here with all vertices of a pass inserted at once), with the mean height of its neighbours: see `surface.rs`. Vertices
-//! on the boundary keep their own heights, or terrains would not meet. So do vertices of breaklines: see `kept_lines.rs`.
+//! Inside, the vertices that stay are chosen in two passes. First, one vertex of every cell of a grid stays: the one that is nearest to the
+//! height of the surface seen in the cell, which it takes. Then the triangulation of these is compared with the terrain: where a triangle
+//! is furthest from it, the vertex with the greatest distance stays too (Garland and Heckbert 1995, "Fast polygonal approximation of
+//! terrains and height fields", here with all vertices of a pass inserted at once), with the mean height of its neighbours: see
+//! `surface.rs`. Vertices on the boundary keep their own heights, or terrains would not meet. So do vertices of breaklines: see
+//! `kept_lines.rs`.
 
 #[cfg(test)]
 mod tests;
