@@ -50,8 +50,8 @@ impl<T: Copy> BoxTree<T> {
         self.items
     }
 
-    /// Calls `found` with every item whose box passes `wanted`, until it returns true. Returns whether it did. `wanted` must pass a box if it
-    /// passes a smaller one inside it.
+    /// Calls `found` with every item whose box passes `wanted`, until it returns true. Returns whether it did. `wanted` must pass a box if
+    /// it passes a smaller one inside it.
     #[inline]
     pub(crate) fn any(&self, wanted: impl Fn(&Bounds<2>) -> bool, mut found: impl FnMut(T) -> bool) -> bool {
         let top = self.levels.len();

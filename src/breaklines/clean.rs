@@ -71,12 +71,13 @@ impl Cleaner<'_> {
         let by_height = |v: &&Vertex| (v.z, v.place);
         let vertices = || feature.paths.iter().flatten().filter(|v| v.z.is_some());
         let height = vertices().min_by_key(by_height).and_then(|v| v.z);
-        if let Some((lowest, (highest, place))) = height.zip(vertices().max_by_key(by_height).and_then(high)) {
-            if highest.abs_diff(lowest) > self.options.height_tolerance {
-                self.findings.uneven_lakes += 1;
-                self.findings.worst_uneven.push(Uneven { id: feature.id, lowest, highest, place });
-            }
-        }
+        let highest = vertices().max_by_key(by_height).and_then(known_height);
+        let range =
+            height.zip(highest).map(|(lowest, (place, highest))| Uneven { id: feature.id, lowest, highest, place });
+        let is_uneven = |range: &Uneven| range.highest.abs_diff(range.lowest) > self.options.height_tolerance;
+        let uneven = range.filter(is_uneven);
+        self.findings.uneven_lakes += u64::from(uneven.is_some());
+        self.findings.worst_uneven.extend(uneven);
         for path in &feature.paths {
             let mut ring: Vec<Vertex> = path.iter().map(|v| Vertex { place: v.place, z: height }).collect();
             ring.dedup();
@@ -91,13 +92,13 @@ impl Cleaner<'_> {
     fn lines(&mut self, feature: &Feature) -> Result<(), BreaklineError> {
         let mut rise: Option<Rise> = None;
         for path in &feature.paths {
-            self.check_walls(feature.id, path)?;
             let mut line = path.clone();
             line.dedup_by(|next, kept| {
                 let repeats = next.place == kept.place;
                 kept.z = if repeats { kept.z.into_iter().chain(next.z).min() } else { kept.z };
                 repeats
             });
+            self.check_walls(feature.id, path, &line)?;
             self.findings.repeated_vertices += (path.len() - line.len()) as u64;
             if line.len() < 2 {
                 self.findings.empty_paths += 1;
@@ -115,17 +116,20 @@ impl Cleaner<'_> {
         Ok(())
     }
 
-    /// Refuses a line that has two heights at one place. A closed line may end at another height than it starts: that is found
-    /// where heights disagree.
-    fn check_walls(&self, id: FeatureId, path: &[Vertex]) -> Result<(), BreaklineError> {
-        let closed = path.len() > 2 && path.first().map(|v| v.place) == path.last().map(|v| v.place);
-        let open = &path[usize::from(closed)..];
-        let mut known: Vec<(Site, i32)> = open.iter().filter_map(|v| Some((v.place, v.z?))).collect();
+    /// Refuses a line that has two heights at one place. `line` is the path without repeated vertices. A closed line may end at another
+    /// height than it starts: that is found where heights disagree.
+    fn check_walls(&self, id: FeatureId, path: &[Vertex], line: &[Vertex]) -> Result<(), BreaklineError> {
+        let closed = line.len() > 2 && line.first().map(|v| v.place) == line.last().map(|v| v.place);
+        let mut known: Vec<(Site, i32)> = line[usize::from(closed)..].iter().filter_map(known_height).collect();
         known.sort_unstable();
-        let groups = known.chunk_by(|one, other| one.0 == other.0);
-        let heights = |group: &[(Site, i32)]| Some((group.first()?.0, [group.first()?.1, group.last()?.1]));
+        let apart = known.chunk_by(|one, other| one.0 == other.0).map(<[_]>::to_vec);
+        let together = path.chunk_by(|one, other| one.place == other.place);
+        let together =
+            together.filter(|same| same.len() > 1).map(|same| same.iter().filter_map(known_height).collect());
+        let heights =
+            |same: Vec<(Site, i32)>| Some((same.iter().min()?.0, [same.iter().min()?.1, same.iter().max()?.1]));
         let is_wall = |(_, [low, high]): &(Site, [i32; 2])| high.abs_diff(*low) > self.options.height_tolerance;
-        let wall = groups.filter_map(heights).find(is_wall);
+        let wall = apart.chain(together).filter_map(heights).filter(is_wall).min();
         wall.map_or(Ok(()), |(place, heights)| Err(BreaklineError::Wall { id, place, heights }))
     }
 
@@ -140,8 +144,8 @@ impl Cleaner<'_> {
     }
 }
 
-fn high(vertex: &Vertex) -> Option<(i32, Site)> {
-    Some((vertex.z?, vertex.place))
+fn known_height(vertex: &Vertex) -> Option<(Site, i32)> {
+    Some((vertex.place, vertex.z?))
 }
 
 /// Gives vertices without a height one that lies on the line between the nearest vertices before and after that have one, or that of the
@@ -170,12 +174,12 @@ fn fill_between(line: &mut [Vertex], (from, low): (usize, i32), (to, high): (usi
 
 /// Returns where the line rises most above a place that comes before, on the way from its higher end to its lower one.
 fn rise_of(id: FeatureId, line: &[Vertex]) -> Option<Rise> {
-    let known: Vec<(i32, Site)> = line.iter().filter_map(high).collect();
-    let falls = known.first()?.0 >= known.last()?.0;
-    let way: Box<dyn Iterator<Item = &(i32, Site)>> =
+    let known: Vec<(Site, i32)> = line.iter().filter_map(known_height).collect();
+    let falls = known.first()?.1 >= known.last()?.1;
+    let way: Box<dyn Iterator<Item = &(Site, i32)>> =
         if falls { Box::new(known.iter()) } else { Box::new(known.iter().rev()) };
     let mut lowest = i32::MAX;
-    let rises = way.map(|&(z, place)| {
+    let rises = way.map(|&(place, z)| {
         lowest = lowest.min(z);
         Rise { id, place, steps: z.abs_diff(lowest) }
     });

@@ -3,9 +3,9 @@
 use crate::breaklines::exact::{at_radius, distance2};
 use crate::geometry::Site;
 
-/// Returns where the piece ab is cut, from `a` to `b`. Cuts lie at multiples of the spacing from the nearer end: pieces that share an end are
-/// cut at the same distances from it. Then no cut of one lies in the disc of another, whatever the angle, since the disc over a ring around
-/// the shared end touches the circles of the ring only where it starts and ends.
+/// Returns where the piece ab is cut, from `a` to `b`. Cuts lie at multiples of the spacing from the nearer end: pieces that share an end
+/// are cut at the same distances from it. Then no cut of one lies in the disc of another, whatever the angle, since the disc over a ring
+/// around the shared end touches the circles of the ring only where it starts and ends.
 pub(crate) fn cuts(a: Site, b: Site, spacing: u32) -> impl Iterator<Item = Site> {
     let (length, spacing) = ((distance2(a, b) as u64).isqrt() as i64, i64::from(spacing));
     // What is left in the middle is half the spacing at least, and less than five halves.

@@ -1,9 +1,9 @@
 //! Edges between sites, each with the segments that it is a part of.
 
+use crate::breaklines::fast_hash::FastMap;
 use crate::breaklines::owners::Owners;
 use crate::breaklines::site_table::SiteTable;
 use crate::geometry::Site;
-use std::collections::HashMap;
 
 /// An edge between two sites.
 #[derive(Clone, Copy, Debug)]
@@ -21,13 +21,13 @@ pub(crate) struct Edge {
 pub(crate) struct EdgeTable {
     pub(crate) edges: Vec<Edge>,
     pub(crate) owners: Owners,
-    between: HashMap<[u32; 2], u32>,
+    between: FastMap<[u32; 2], u32>,
 }
 
 impl EdgeTable {
     /// Returns a table without edges. `owners` are its sets of segments.
     pub(crate) fn new(owners: Owners) -> EdgeTable {
-        EdgeTable { edges: Vec::new(), owners, between: HashMap::new() }
+        EdgeTable { edges: Vec::new(), owners, between: FastMap::default() }
     }
 
     /// Returns the edge between two sites, in any order.

@@ -3,9 +3,9 @@
 //!
 //! # Why every subsegment is an edge
 //! An edge ab is in every Delaunay triangulation of a set of sites if the closed disc that has ab as its diameter holds no other site. So
-//! lines are cut until no site of a line lies in the closed disc of a subsegment, its two ends excepted, and points of the cloud that lie in
-//! one are dropped. No constrained triangulation is needed, and the mesh stays the Delaunay triangulation of its sites. A point p lies in the
-//! closed disc of ab if (a - p) . (b - p) <= 0, which whole numbers decide.
+//! lines are cut until no site of a line lies in the closed disc of a subsegment, its two ends excepted, and points of the cloud that lie
+//! in one are dropped. No constrained triangulation is needed, and the mesh stays the Delaunay triangulation of its sites. A point p lies
+//! in the closed disc of ab if (a - p) . (b - p) <= 0, which whole numbers decide.
 //!
 //! What is dropped depends on the lines alone, not on the other points, so tiles, parts, threads and machines agree.
 //!
@@ -21,10 +21,12 @@ mod drop_index;
 mod edge_table;
 mod error;
 mod exact;
+mod fast_hash;
 mod feature;
 mod findings;
 mod heights;
 mod lakes;
+mod levels;
 mod nearest_heights;
 mod net;
 mod node;

@@ -64,8 +64,8 @@ impl NearestHeights {
     }
 
     /// Gives the sites of `breaklines` without a height that of the nearest point. A lake gets one height: half of its sites have a nearest
-    /// point that is not above it. Sites of lines without a point near get the height of the next site on their line that has one, the lower
-    /// of two. Returns whether each site has a height then: lines far from all points have none.
+    /// point that is not above it. Sites of lines without a point near get the height of the next site on their line that has one, the
+    /// lower of two. Returns whether each site has a height then: lines far from all points have none.
     pub fn settle(&self, breaklines: &mut Breaklines) -> bool {
         let missing: Vec<usize> =
             (0..breaklines.sites().len()).filter(|&i| breaklines.sites()[i].z.is_none()).collect();

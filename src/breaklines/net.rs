@@ -84,6 +84,7 @@ fn pieces_of(whole: &EdgeTable, paths: &[Vec<u32>], sites: &SiteTable) -> EdgeTa
 }
 
 /// Leaves out pieces outside the box of the options, and pieces inside lakes. Returns the others, and the shores among those left out.
+/// These are not moved any more. So where the shores of two lakes cross, a point less than a step outside both may count as inside.
 fn choose(
     segments: &[Segment],
     lakes: u32,
@@ -100,9 +101,8 @@ fn choose(
         let places = ends.map(|end| sites.place(end));
         let outside = within.is_some_and(|within| !places.iter().all(|&place| holds(&within, place)));
         let inside = || {
-            let own: Vec<u32> =
-                pieces.owners.of(*owners).iter().map(|(owner, _)| segments[*owner as usize].lake).collect();
-            insides.hold(Fraction::middle_of(&places), |lake| !own.contains(&lake))
+            let is_own = |lake: u32| pieces.owners.of(*owners).any(|(owner, _)| segments[owner as usize].lake == lake);
+            insides.hold(Fraction::middle_of(&places), |lake| !is_own(lake))
         };
         if outside {
             findings.pieces_outside += 1;
@@ -131,7 +131,7 @@ fn shores_of<'a>(
 
 /// Returns the lakes whose shore goes over an edge with these owners an odd number of times.
 fn lakes_of(segments: &[Segment], edges: &EdgeTable, owners: u32) -> Vec<u32> {
-    let owners = edges.owners.of(owners).into_iter().filter(|(_, is_odd)| *is_odd);
+    let owners = edges.owners.of(owners).filter(|(_, is_odd)| *is_odd);
     let mut lakes: Vec<u32> = owners.map(|(owner, _)| segments[owner as usize].lake).collect();
     lakes.retain(|&lake| lake != u32::MAX);
     lakes.sort_unstable();

@@ -29,7 +29,7 @@ impl Noding<'_> {
     ///
     /// # Errors
     /// [`BreaklineError::TooMany`].
-    pub(crate) fn paths(mut self) -> Result<Vec<Vec<u32>>, BreaklineError> {
+    pub(crate) fn paths(self) -> Result<Vec<Vec<u32>>, BreaklineError> {
         let boxes = self.boxes()?;
         let tree = BoxTree::new(boxes.clone());
         let mut cuts = self.crossings(&boxes, &tree)?;

@@ -22,11 +22,12 @@ pub struct BreaklineOptions {
 impl BreaklineOptions {
     /// Returns the options for subsegments of `spacing` lattice steps in the box `within`.
     ///
-    /// The floor is a fiftieth of the spacing, between 2 and 5 steps. It exceeds what rounding to the lattice moves a line, and is less than
-    /// the distance between lines that somebody drew on purpose.
+    /// The floor is a fiftieth of the spacing, between 2 and 5 steps. It exceeds what rounding to the lattice moves a line, and is less
+    /// than the distance between lines that somebody drew on purpose. On a lattice much finer than the spacing it is a thousandth of the
+    /// spacing: lines that are nearly the same would be cut into too many pieces.
     pub fn new(spacing: u32, within: Option<Bounds<2>>) -> BreaklineOptions {
         let spacing = spacing.max(1);
-        let floor = (spacing / 50).clamp(2, 5);
+        let floor = (spacing / 50).clamp(2, 5).max(spacing / 1000);
         BreaklineOptions { spacing, floor, height_tolerance: 1, within, most_sites: 100_000_000 }
     }
 }

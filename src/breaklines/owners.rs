@@ -22,17 +22,16 @@ impl Owners {
     }
 
     /// Returns the segments of a set, sorted.
-    pub(crate) fn of(&self, set: u32) -> Vec<Owner> {
-        match set.checked_sub(self.singles) {
-            Some(set) => self.sets[set as usize].clone(),
-            None => vec![(set, true)],
-        }
+    pub(crate) fn of(&self, set: u32) -> impl Iterator<Item = Owner> + '_ {
+        let larger = set.checked_sub(self.singles);
+        let single = larger.is_none().then_some((set, true));
+        let larger = larger.map_or(&[][..], |larger| &self.sets[larger as usize][..]);
+        single.into_iter().chain(larger.iter().copied())
     }
 
     /// Returns the set of an edge that both ways go over.
     pub(crate) fn join(&mut self, one: u32, other: u32) -> u32 {
-        let mut all = self.of(one);
-        all.extend(self.of(other));
+        let mut all: Vec<Owner> = self.of(one).chain(self.of(other)).collect();
         all.sort_unstable();
         let joined: Vec<Owner> = all
             .chunk_by(|a, b| a.0 == b.0)

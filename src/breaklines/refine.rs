@@ -1,14 +1,14 @@
 //! Splits edges until no site lies in the closed disc of any edge but its own ends.
 //!
 //! # Why it ends
-//! An edge is only ever replaced by two edges over a lattice point in its closed disc, other than its ends. Both are shorter, since a
-//! point in the closed disc sees the ends at a right angle or more. Squared lengths are whole numbers, so this cannot go on for ever. It ends
+//! An edge is only ever replaced by two edges over a lattice point in its closed disc, other than its ends. Both are shorter, since a point
+//! in the closed disc sees the ends at a right angle or more. Squared lengths are whole numbers, so this cannot go on for ever. It ends
 //! soon because of the floor: new sites keep that distance from all others, and an edge shorter than twice the floor goes over the site in
 //! its disc, which makes no new one.
 //!
 //! # Why it finds crossings too
-//! Where two edges cross, their four ends are the corners of a convex quadrilateral. One of its angles is a right angle or more, so that end
-//! lies in the closed disc of the other edge.
+//! Where two edges cross, their four ends are the corners of a convex quadrilateral. One of its angles is a right angle or more, so that
+//! end lies in the closed disc of the other edge.
 //!
 //! # Why it is the same for any order of the features
 //! Each round looks at the edges and sites of the round before, and handles edges in the order of their numbers, which were given by
@@ -21,7 +21,6 @@ use crate::breaklines::exact::{at_radius, disc_box, distance2, foot, in_disc, is
 use crate::breaklines::site_table::SiteTable;
 use crate::geometry::{Bounds, Site};
 use rayon::prelude::*;
-use std::collections::HashSet;
 
 /// Splits the edges of `edges` until no site lies in the closed disc of any but its own ends. Only ends of edges count as sites. `most` is
 /// the greatest number of sites.
@@ -29,13 +28,8 @@ use std::collections::HashSet;
 /// # Errors
 /// [`BreaklineError::TooMany`].
 pub(crate) fn refine(sites: &mut SiteTable, edges: &mut EdgeTable, most: usize) -> Result<(), BreaklineError> {
-    let mut refinement = Refinement {
-        sites,
-        edges,
-        used: HashSet::new(),
-        points: GrowingTree::default(),
-        discs: GrowingTree::default(),
-    };
+    let mut refinement =
+        Refinement { sites, edges, used: Vec::new(), points: GrowingTree::default(), discs: GrowingTree::default() };
     let mut fresh: Vec<u32> = refinement.edges.alive().collect();
     while !fresh.is_empty() {
         fresh = refinement.round(fresh);
@@ -72,8 +66,8 @@ enum Relation {
 struct Refinement<'a> {
     sites: &'a mut SiteTable,
     edges: &'a mut EdgeTable,
-    /// The sites that are ends of edges.
-    used: HashSet<u32>,
+    /// Whether a site is an end of an edge.
+    used: Vec<bool>,
     /// The same, by place.
     points: GrowingTree<u32>,
     /// The edges, by disc.
@@ -84,10 +78,9 @@ impl Refinement<'_> {
     /// Compares the new edges with all sites, and the new sites with all edges, and splits each edge that is found once. Returns the edges
     /// that are new then.
     fn round(&mut self, fresh: Vec<u32>) -> Vec<u32> {
-        let ends: HashSet<u32> = fresh.iter().flat_map(|&edge| self.edges.edges[edge as usize].ends).collect();
-        let mut new_sites: Vec<u32> = ends.difference(&self.used).copied().collect();
-        new_sites.sort_unstable();
-        self.used.extend(&new_sites);
+        let mut new_sites: Vec<u32> = fresh.iter().flat_map(|&edge| self.edges.edges[edge as usize].ends).collect();
+        self.used.resize(self.sites.len(), false);
+        new_sites.retain(|&site| !std::mem::replace(&mut self.used[site as usize], true));
         let points = new_sites.iter().map(|&site| (Bounds::of_point(self.sites.place(site)), site)).collect();
         self.points.add(points, |_| true);
         let mut found: Vec<(u32, Witness)> =

@@ -7,10 +7,12 @@ use crate::breaklines::feature::Feature;
 use crate::breaklines::findings::Findings;
 use crate::breaklines::heights::sites_with_heights;
 use crate::breaklines::lakes::Fraction;
+use crate::breaklines::levels::LineLevels;
 use crate::breaklines::net::{Net, net_of};
 use crate::breaklines::options::BreaklineOptions;
 use crate::breaklines::site::BreaklineSite;
 use crate::geometry::Site;
+use std::sync::OnceLock;
 
 /// Breaklines that are cut into edges of the triangulation.
 #[derive(Clone, Debug)]
@@ -19,6 +21,8 @@ pub struct Breaklines {
     subsegments: Vec<[u32; 2]>,
     index: DropIndex,
     options: BreaklineOptions,
+    /// Made when a coarser tile first asks for it.
+    levels: OnceLock<LineLevels>,
 }
 
 impl Breaklines {
@@ -37,7 +41,7 @@ impl Breaklines {
         findings.sites_without_height = sites.iter().filter(|site| site.z.is_none()).count() as u64;
         let places = subsegments.iter().map(|ends| ends.map(|end| sites[end as usize].place));
         let index = DropIndex::new(places, net.lakes, options.spacing);
-        Ok((Breaklines { sites, subsegments, index, options: *options }, findings))
+        Ok((Breaklines { sites, subsegments, index, options: *options, levels: OnceLock::new() }, findings))
     }
 
     /// Returns the options that the lines were cut with.
@@ -66,8 +70,8 @@ impl Breaklines {
         pair.is_some_and(|(a, b)| self.subsegments.binary_search(&[a.min(b) as u32, a.max(b) as u32]).is_ok())
     }
 
-    /// Returns whether a point of the cloud at `place` is dropped: it lies in the closed disc of a subsegment or inside a lake. That holds for
-    /// the sites of the breaklines too. The place must lie within `lattice::REACH` of zero.
+    /// Returns whether a point of the cloud at `place` is dropped: it lies in the closed disc of a subsegment or inside a lake. That holds
+    /// for the sites of the breaklines too. The place must lie within `lattice::REACH` of zero.
     #[inline]
     pub fn drops(&self, place: Site) -> bool {
         self.index.drops(place)
@@ -76,6 +80,25 @@ impl Breaklines {
     /// Returns whether the triangle lies inside a lake, on its flat water. The triangle must be one of the mesh.
     pub fn is_water(&self, triangle: [Site; 3]) -> bool {
         self.index.is_water(Fraction::middle_of(&triangle))
+    }
+
+    /// Returns the highest level of coarser lines that still has the site at `place`; `None` if no line has a site there. At level n a line
+    /// keeps every 2^n-th of its sites, and those where lines meet or end.
+    pub fn rank(&self, place: Site) -> Option<u8> {
+        self.index.is_near_line(place).then(|| self.position(place)).flatten().map(|site| self.levels().rank(site))
+    }
+
+    /// Returns whether a vertex at `place` could keep lines of this level from being edges: it lies in a closed disc of theirs, and is
+    /// none of their sites.
+    pub fn bars(&self, place: Site, level: u8) -> bool {
+        self.levels().bar(place, level)
+    }
+
+    fn levels(&self) -> &LineLevels {
+        self.levels.get_or_init(|| {
+            let places: Vec<Site> = self.sites.iter().map(|site| site.place).collect();
+            LineLevels::new(&places, &self.subsegments)
+        })
     }
 
     /// Gives the sites that have no height those of `heights`, which has one for each of them, in their order.
@@ -96,4 +119,185 @@ fn subsegments_of(net: &Net, sites: &[BreaklineSite]) -> Vec<[u32; 2]> {
     let mut subsegments: Vec<[u32; 2]> = net.edges.alive().map(pair).collect();
     subsegments.sort_unstable();
     subsegments
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::breaklines::feature::{FeatureId, FeatureKind, Vertex};
+    use crate::breaklines::findings::{Disagreement, Rise, Uneven};
+    use crate::breaklines::nearest_heights::NearestHeights;
+    use crate::geometry::Bounds;
+
+    fn id(feature: u64) -> FeatureId {
+        FeatureId { file: 7, feature }
+    }
+
+    fn feature(kind: FeatureKind, number: u64, path: &[[i32; 3]]) -> Feature {
+        let vertex = |&[x, y, z]: &[i32; 3]| Vertex { place: [x, y], z: Some(z) };
+        Feature { kind, id: id(number), paths: vec![path.iter().map(vertex).collect()] }
+    }
+
+    fn build(features: &[Feature], spacing: u32) -> (Breaklines, Findings) {
+        Breaklines::build(features, &BreaklineOptions::new(spacing, None)).unwrap()
+    }
+
+    fn at(lines: &Breaklines, place: Site) -> Option<(i32, FeatureKind)> {
+        let site = lines.sites()[lines.position(place)?];
+        Some((site.z?, site.kind))
+    }
+
+    const POND: [[i32; 3]; 4] = [[0, 0, 50], [1000, 0, 50], [1000, 1000, 50], [0, 1000, 50]];
+
+    #[test]
+    fn heights_are_linear_between_vertices() {
+        let (lines, _) = build(&[feature(FeatureKind::Line, 0, &[[0, 0, 0], [1000, 0, 101], [1000, 300, 101]])], 100);
+        let heights: Vec<_> = (0..=10).map(|i| at(&lines, [100 * i, 0]).unwrap().0).collect();
+        assert_eq!(heights, [0, 10, 20, 30, 40, 51, 61, 71, 81, 91, 101]);
+        assert!(lines.is_subsegment([100, 0], [200, 0]) && !lines.is_subsegment([100, 0], [300, 0]));
+        assert!(lines.drops([150, 50]) && !lines.drops([150, 51]) && !lines.drops([-1, 0]));
+    }
+
+    #[test]
+    fn where_lines_meet_the_lake_comes_before_the_river_and_the_river_before_the_line() {
+        let river = feature(FeatureKind::River, 1, &[[-3000, 500, 200], [-500, 500, 60], [500, 500, 40]]);
+        let line = feature(FeatureKind::Line, 2, &[[-2000, 0, 10], [-2000, 1000, 10]]);
+        let (lines, found) = build(&[line, river, feature(FeatureKind::Lake, 3, &POND)], 250);
+        assert_eq!(at(&lines, [0, 500]), Some((50, FeatureKind::Lake)));
+        assert_eq!(at(&lines, [-2000, 500]), Some((144, FeatureKind::River)));
+        assert_eq!((found.crossings, found.pieces_in_lakes, found.disagreements), (2, 1, 1));
+        let worst = Disagreement { place: [-2000, 500], kept: (id(1), 144), other: (id(2), 10) };
+        assert_eq!(found.worst_disagreements, [worst]);
+        assert!(lines.sites().iter().all(|site| site.place[0] <= 0 || site.z == Some(50)), "nothing inside the lake");
+    }
+
+    #[test]
+    fn water_is_dropped_and_islands_stay() {
+        let mut pond = feature(FeatureKind::Lake, 0, &POND);
+        pond.paths
+            .push([[300, 300], [700, 300], [700, 700], [300, 700]].map(|place| Vertex { place, z: None }).to_vec());
+        let path = feature(FeatureKind::Line, 1, &[[400, 500, 70], [600, 500, 70]]);
+        let (lines, found) = build(&[pond, path], 100);
+        assert!(
+            lines.drops([150, 150]) && lines.drops([850, 500]) && !lines.drops([500, 400]) && !lines.drops([-90, -90])
+        );
+        assert!(
+            lines.is_water([[0, 0], [300, 0], [100, 100]]) && !lines.is_water([[310, 310], [350, 310], [310, 350]])
+        );
+        assert_eq!((found.pieces_in_lakes, found.uneven_lakes), (0, 0));
+        assert_eq!(at(&lines, [400, 500]), Some((70, FeatureKind::Line)));
+        assert_eq!(at(&lines, [300, 300]), Some((50, FeatureKind::Lake)));
+    }
+
+    #[test]
+    fn lakes_that_are_not_flat_and_rivers_that_rise_are_found() {
+        let mut pond = POND;
+        pond[2][2] = 58;
+        let river = [[0, 5000, 90], [100, 5000, 80], [200, 5000, 85], [300, 5000, 87], [400, 5000, 20]];
+        let falls = [[0, 6000, 1], [100, 6000, 2], [200, 6000, 2], [300, 6000, 9]];
+        let features = [
+            feature(FeatureKind::Lake, 0, &pond),
+            feature(FeatureKind::River, 1, &river),
+            feature(FeatureKind::River, 2, &falls),
+        ];
+        let (lines, found) = build(&features, 100);
+        assert_eq!(found.worst_uneven, [Uneven { id: id(0), lowest: 50, highest: 58, place: [1000, 1000] }]);
+        assert_eq!(found.worst_rises, [Rise { id: id(1), place: [300, 5000], steps: 7 }]);
+        assert_eq!((found.uneven_lakes, found.rising_rivers), (1, 1));
+        assert_eq!(at(&lines, [1000, 1000]), Some((50, FeatureKind::Lake)), "the lowest height is that of the lake");
+    }
+
+    #[test]
+    fn walls_are_refused_and_repeated_vertices_are_not() {
+        let wall = feature(FeatureKind::Line, 5, &[[0, 0, 3], [10, 0, 3], [10, 0, 9], [0, 0, 9]]);
+        let error = Breaklines::build(&[wall], &BreaklineOptions::new(10, None)).unwrap_err();
+        assert_eq!(error, BreaklineError::Wall { id: id(5), place: [10, 0], heights: [3, 9] });
+        let cured =
+            feature(FeatureKind::Line, 5, &[[0, 0, 3], [0, 0, 3], [100, 0, 4], [100, 0, 3], [0, 100, 8], [0, 0, 6]]);
+        let (_, found) = build(&[cured, feature(FeatureKind::Line, 6, &[[9, 9, 9], [9, 9, 9]])], 100);
+        assert_eq!((found.repeated_vertices, found.empty_paths, found.segments), (3, 1, 3));
+        assert_eq!(found.worst_disagreements[0].kept, (id(5), 3), "a closed line that ends higher than it starts");
+        let far = feature(FeatureKind::Line, 1, &[[0, 0, 0], [i32::MIN, 0, 0]]);
+        let error = Breaklines::build(&[far], &BreaklineOptions::new(10, None)).unwrap_err();
+        assert_eq!(error, BreaklineError::OutOfReach { id: id(1), place: [i32::MIN, 0] });
+    }
+
+    #[test]
+    fn too_many_sites_are_refused() {
+        let line = feature(FeatureKind::Line, 0, &[[0, 0, 3], [100_000, 777, 3]]);
+        let options = BreaklineOptions { most_sites: 500, ..BreaklineOptions::new(100, None) };
+        assert_eq!(
+            Breaklines::build(std::slice::from_ref(&line), &options).unwrap_err(),
+            BreaklineError::TooMany { most: 500 }
+        );
+        assert!(Breaklines::build(&[line], &BreaklineOptions { most_sites: 2000, ..options }).is_ok());
+    }
+
+    #[test]
+    fn hundreds_of_lines_meet_at_one_place() {
+        // From the middle to all lattice points of a square's border, and beyond.
+        let border = (-30..30).flat_map(|i| [[i, -30], [30, i], [-i, 30], [-30, -i]]);
+        let line = |(i, [x, y]): (u64, [i32; 2])| {
+            feature(FeatureKind::Line, i, &[[0, 0, 0], [x * 60, y * 60, 9], [x * 99 + y, y * 99, 9]])
+        };
+        let features: Vec<Feature> = (0..).zip(border).map(line).collect();
+        let (lines, _) = build(&features, 1000);
+        let place = |i: u32| lines.sites()[i as usize].place;
+        let touches = |&[a, b]: &[u32; 2]| {
+            let ends = [place(a), place(b)];
+            let others = (0..lines.sites().len() as u32).filter(|&p| p != a && p != b);
+            others.map(place).any(|p| crate::breaklines::exact::in_disc(ends[0], ends[1], p))
+        };
+        assert!(!lines.subsegments().iter().any(touches));
+        assert!((480..40_000).contains(&lines.subsegments().len()), "{}", lines.subsegments().len());
+    }
+
+    #[test]
+    fn only_what_is_in_the_box_is_cut() {
+        let line = feature(FeatureKind::Line, 0, &[[-1_000_000, 0, 0], [1_000_000, 10, 0]]);
+        let far = feature(FeatureKind::Line, 1, &[[-1_000_000, 5000, 0], [1_000_000, 5000, 0]]);
+        let within = Bounds { min: [-500, -300], max: [500, 300] };
+        let pond = feature(FeatureKind::Lake, 2, &[[100, -9000, 5], [9000, -9000, 5], [9000, 9000, 5], [100, 9000, 5]]);
+        let (lines, found) = Breaklines::build(&[line, far, pond], &BreaklineOptions::new(100, Some(within))).unwrap();
+        let [min, max] = [0, 1].map(|end| {
+            lines
+                .sites()
+                .iter()
+                .map(|s| s.place[0])
+                .fold(if end == 0 { 9 } else { -9 }, |a, b| if end == 0 { a.min(b) } else { a.max(b) })
+        });
+        assert!((-500..-400).contains(&min) && max == 100, "{min} {max}");
+        assert!(found.pieces_outside > 3 && lines.drops([300, 200]) && !lines.drops([-300, 200]));
+    }
+
+    #[test]
+    fn lines_without_heights_take_them_from_the_points_around() {
+        let without = |mut feature: Feature| {
+            feature.paths.iter_mut().flatten().for_each(|v| v.z = None);
+            feature
+        };
+        let pond = without(feature(FeatureKind::Lake, 0, &POND));
+        let path = without(feature(FeatureKind::Line, 1, &[[-5000, 500, 0], [-2000, 500, 0]]));
+        let partly = Vertex { place: [-2000, 2000], z: None };
+        let mut road = feature(FeatureKind::Line, 2, &[[-5000, 2000, 10], [0, 2000, 60]]);
+        road.paths[0].insert(1, partly);
+        let (mut lines, found) = build(&[pond, path, road], 250);
+        assert_eq!(at(&lines, [-2000, 2000]), Some((40, FeatureKind::Line)), "between vertices that have one");
+        let mut nearest = NearestHeights::new(&lines);
+        let mut others = nearest.clone();
+        assert!(!nearest.settle(&mut lines.clone()), "no point yet");
+        for i in -60..20 {
+            nearest.offer([100 * i, 480], 100 + i);
+            others.offer([100 * i, 490], 200 + i);
+        }
+        nearest.join(others.found());
+        assert!(nearest.settle(&mut lines) && found.sites_without_height > 20);
+        assert_eq!(at(&lines, [-5000, 500]), Some((150, FeatureKind::Line)));
+        let water: std::collections::BTreeSet<_> =
+            lines.sites().iter().filter(|s| s.kind == FeatureKind::Lake).map(|s| s.z).collect();
+        assert_eq!(water.len(), 1, "one height for the lake: {water:?}");
+        let far = without(feature(FeatureKind::Line, 3, &[[0, 90_000, 0], [9, 99_000, 0]]));
+        let (mut lines, _) = build(&[far], 250);
+        assert!(!NearestHeights::new(&lines).settle(&mut lines) && lines.sites()[0].z.is_none());
+    }
 }

@@ -1,8 +1,8 @@
 //! The places of sites, no two of them within the floor.
 
 use crate::breaklines::exact::distance2;
+use crate::breaklines::fast_hash::FastMap;
 use crate::geometry::Site;
-use std::collections::HashMap;
 
 /// The places of sites. Any two are farther apart than the floor, so their number is bounded by the length of lines, and so is that of
 /// all steps that make new ones.
@@ -14,7 +14,7 @@ pub(crate) struct SiteTable {
     side: i32,
     /// How many cells the floor reaches.
     reach: i32,
-    cells: HashMap<[i32; 2], u32>,
+    cells: FastMap<[i32; 2], u32>,
 }
 
 impl SiteTable {
@@ -23,7 +23,13 @@ impl SiteTable {
         // Places of one cell are at most (side - 1) * sqrt(2) apart, which is not more than the floor.
         let floor = floor.clamp(1, 1 << 20);
         let side = (u64::from(floor) * u64::from(floor) / 2).isqrt() as i32 + 1;
-        SiteTable { places: Vec::new(), floor, side, reach: (floor as i32 + side - 1) / side, cells: HashMap::new() }
+        SiteTable {
+            places: Vec::new(),
+            floor,
+            side,
+            reach: (floor as i32 + side - 1) / side,
+            cells: FastMap::default(),
+        }
     }
 
     /// Returns the floor.

@@ -34,11 +34,15 @@ pub(super) struct BreaklineEdges {
 }
 
 impl BreaklineEdges {
-    /// Reads the list in the output `directory` of a job, on its lattice; `None` if there is none.
+    /// Reads the list in the output `directory` of a job, which lies on its `lattice`; `None` if there is none.
     ///
     /// # Errors
-    /// [`Error::Memory`] if `memory` bytes do not hold it, [`Error::Io`] if it cannot be read.
-    pub(super) fn read(directory: &Path, lattice: &Lattice, memory: u64) -> Result<Option<BreaklineEdges>> {
+    /// [`Error::Memory`] if `memory` bytes do not hold it, [`Error::Io`] if it cannot be read, and those of `lattice`.
+    pub(super) fn read(
+        directory: &Path,
+        lattice: impl FnOnce() -> Result<Lattice>,
+        memory: u64,
+    ) -> Result<Option<BreaklineEdges>> {
         let path = OutputFiles::new(directory).breaklines();
         let file = match File::open(&path) {
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
@@ -52,6 +56,7 @@ impl BreaklineEdges {
                 "the edges along breaklines take more than there is: set --memory \"{wanted} MiB\""
             )));
         }
+        let lattice = &lattice()?;
         let mut found = BreaklineEdges::default();
         for (number, line) in (1..).zip(BufReader::new(file).split(b'\n')) {
             let line = line.map_err(Error::io("read", &path))?;
@@ -181,7 +186,7 @@ mod tests {
     fn check(list: &str, points: &[[i32; 3]]) -> Vec<String> {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(OutputFiles::new(folder.path()).breaklines(), format!("{HEADER}\n{list}")).unwrap();
-        let edges = BreaklineEdges::read(folder.path(), &lattice(), 1 << 20).unwrap().unwrap();
+        let edges = BreaklineEdges::read(folder.path(), || Ok(lattice()), 1 << 20).unwrap().unwrap();
         let mut findings = Findings::default();
         edges.check(points, &[[0, 1, 2], [2, 1, 3]], 0, &grid(), &mut findings);
         let mut found = findings.failures.sentences(|_| "a tile".into());
@@ -219,6 +224,6 @@ mod tests {
     #[test]
     fn a_directory_without_a_list_has_no_edges() {
         let folder = tempfile::tempdir().unwrap();
-        assert!(BreaklineEdges::read(folder.path(), &lattice(), 1).unwrap().is_none());
+        assert!(BreaklineEdges::read(folder.path(), || Ok(lattice()), 1).unwrap().is_none());
     }
 }

@@ -141,10 +141,10 @@ pub fn verify_against(directory: &Path, memory: u64, inputs: &[PathBuf]) -> Resu
         [] => None,
         inputs => Some(Inputs::open(inputs, &report.facts, &files.extras)?),
     };
-    let lattice = lattice_of(&report.facts, &files.extras)?;
-    let lines_read = BreaklineEdges::read(directory, &lattice, memory / 4)?;
+    let lattice = || lattice_of(&report.facts, &files.extras);
+    let lines = BreaklineEdges::read(directory, lattice, memory / 4)?;
     let run = Verification {
-        lines: lines_read.as_ref(),
+        lines: lines.as_ref(),
         borders: Mutex::new(Borders::new(directory, memory / 4)),
         places: inputs.is_some().then(|| Places::new(directory, memory / 4)),
         files: &files,
@@ -156,12 +156,10 @@ pub fn verify_against(directory: &Path, memory: u64, inputs: &[PathBuf]) -> Resu
         (0..lanes).into_par_iter().map(|_| run.check_files()).try_reduce(Findings::default, |a, b| Ok(a.merge(b)))?;
     let borders = run.borders.into_inner().unwrap_or_else(PoisonError::into_inner);
     let matches = borders.match_all(&grid, &files)?;
-    let lines = lines_read.as_ref().map(|lines| CheckedBreaklines::of(lines, &grid));
-    let proof = inputs
-        .zip(run.places)
-        .map(|(inputs, places)| inputs.compare(places, lines_read.as_ref(), &grid))
-        .transpose()?;
-    Ok(Verdict::new(CheckedMesh { files: &files, findings, matches, lines }, &report, &written, proof))
+    let checked_lines = lines.as_ref().map(|lines| CheckedBreaklines::of(lines, &grid));
+    let proof =
+        inputs.zip(run.places).map(|(inputs, places)| inputs.compare(places, lines.as_ref(), &grid)).transpose()?;
+    Ok(Verdict::new(CheckedMesh { files: &files, findings, matches, lines: checked_lines }, &report, &written, proof))
 }
 
 /// Refuses results among which some may be of one job and some of another: a job has a journal until all its results are in place,

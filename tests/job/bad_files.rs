@@ -18,18 +18,18 @@ use crate::las_file::{LasFile, points_at};
 use crate::program::{Job, Said, number};
 
 /// Writes `bytes` to a file called `name`.
-fn write(folder: &Path, name: &str, bytes: &[u8]) -> PathBuf {
+pub(crate) fn write(folder: &Path, name: &str, bytes: &[u8]) -> PathBuf {
     let path = folder.join(name);
     fs::write(&path, bytes).unwrap();
     path
 }
 
-fn good(folder: &Path) -> PathBuf {
+pub(crate) fn good(folder: &Path) -> PathBuf {
     write(folder, "good.laz", &LasFile::new(4, 7, 0, 3000).laz(&[500], false))
 }
 
 /// Returns a layered LAZ of 900 points in steps of `scale`. Its second chunk, 300 points, is damaged.
-fn damaged(scale: f64) -> Vec<u8> {
+pub(crate) fn damaged(scale: f64) -> Vec<u8> {
     let file = LasFile::new(4, 7, 0, 900);
     let mut bytes = file.laz(&[300], false);
     let mut at = points_at(&bytes) + 8;

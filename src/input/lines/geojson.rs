@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use serde::Deserialize;
+use serde::{Deserialize, Deserializer};
 use serde_json::value::RawValue;
 use serde_json::{Map, Value};
 
@@ -23,7 +23,8 @@ const WGS_84: u32 = 4326;
 struct Document<'a> {
     #[serde(rename = "type")]
     kind: String,
-    #[serde(default)]
+    /// The value null says that the CRS is not known; without the member it is.
+    #[serde(default, deserialize_with = "with_null")]
     crs: Option<Value>,
     #[serde(borrow, default)]
     features: Option<Vec<&'a RawValue>>,
@@ -42,11 +43,26 @@ type Position = Vec<f64>;
 enum Geometry {
     Point {},
     MultiPoint {},
-    LineString { coordinates: Vec<Position> },
-    MultiLineString { coordinates: Vec<Vec<Position>> },
-    Polygon { coordinates: Vec<Vec<Position>> },
-    MultiPolygon { coordinates: Vec<Vec<Vec<Position>>> },
-    GeometryCollection { geometries: Vec<Geometry> },
+    LineString {
+        coordinates: Vec<Position>,
+    },
+    MultiLineString {
+        coordinates: Vec<Vec<Position>>,
+    },
+    Polygon {
+        coordinates: Vec<Vec<Position>>,
+    },
+    MultiPolygon {
+        coordinates: Vec<Vec<Vec<Position>>>,
+    },
+    #[serde(rename = "GeometryCollection")]
+    Several {
+        geometries: Vec<Geometry>,
+    },
+}
+
+fn with_null<'de, D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Option<Value>, D::Error> {
+    Value::deserialize(deserializer).map(Some)
 }
 
 /// Hands the features of the document `bytes` to `collector`. Returns the coordinate reference system that it says.
@@ -117,7 +133,7 @@ fn raw(geometry: Geometry) -> RawGeometry {
         Geometry::MultiLineString { coordinates } => RawGeometry::Lines(lines(coordinates)),
         Geometry::Polygon { coordinates } => RawGeometry::Areas(vec![lines(coordinates)]),
         Geometry::MultiPolygon { coordinates } => RawGeometry::Areas(coordinates.into_iter().map(lines).collect()),
-        Geometry::GeometryCollection { geometries } => RawGeometry::Several(geometries.into_iter().map(raw).collect()),
+        Geometry::Several { geometries } => RawGeometry::Several(geometries.into_iter().map(raw).collect()),
     }
 }
 

@@ -192,3 +192,77 @@ fn crs(path: &Path, file: &Connection, srs: i64) -> Result<Crs> {
 fn quoted(name: &str) -> String {
     format!("\"{}\"", name.replace('"', "\"\""))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::lines::feature::{LineFeature, LineShape};
+
+    /// Writes a file with the layers `a` and, if wanted, `b`, each with one line, and returns its bytes.
+    fn package(has_two: bool) -> Vec<u8> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.gpkg");
+        let file = Connection::open(&path).unwrap();
+        file.execute_batch(
+            "CREATE TABLE gpkg_spatial_ref_sys (srs_id INTEGER PRIMARY KEY, organization TEXT, organization_coordsys_id INTEGER, definition TEXT);
+             CREATE TABLE gpkg_geometry_columns (table_name TEXT, column_name TEXT, srs_id INTEGER);
+             INSERT INTO gpkg_spatial_ref_sys VALUES (7, 'EPSG', 25832, 'undefined');",
+        )
+        .unwrap();
+        let numbers = [1.0f64, 2.0, 3.0, 4.0, 5.0, 6.0].map(f64::to_le_bytes).concat();
+        let line = [&[1][..], &1002u32.to_le_bytes(), &2u32.to_le_bytes(), &numbers].concat();
+        // A box in x and y, which is skipped.
+        let blob = [&b"GP\0\x03\0\0\0\0"[..], &[9; 32], &line].concat();
+        for table in ["a", "b"].iter().take(1 + usize::from(has_two)) {
+            file.execute_batch(&format!(
+                "CREATE TABLE \"{table}\" (id INTEGER PRIMARY KEY, shape BLOB, sort TEXT);
+                 INSERT INTO gpkg_geometry_columns VALUES ('{table}', 'shape', 7);
+                 INSERT INTO \"{table}\" (id, sort) VALUES (3, 'line');"
+            ))
+            .unwrap();
+            file.execute(&format!("INSERT INTO \"{table}\" VALUES (8, ?1, 'river')"), [&blob]).unwrap();
+        }
+        file.close().unwrap();
+        std::fs::read(path).unwrap()
+    }
+
+    fn read_bytes(bytes: &[u8], rest: &str) -> Result<(Crs, Vec<LineFeature>)> {
+        let folder = tempfile::tempdir().unwrap();
+        // SQLite takes the path as a URI.
+        let path = folder.path().join("a #1?%20.gpkg");
+        std::fs::write(&path, bytes).unwrap();
+        let options: LineOptions = toml::from_str(&format!("files = [\"a\"]\n{rest}")).unwrap();
+        let mut collector = FeatureCollector::new(&path, &options);
+        let crs = read(&path, &options, &mut collector)?;
+        let folder = std::fs::read_dir(folder.path()).unwrap();
+        assert_eq!(folder.count(), 1, "nothing is left beside the file");
+        Ok((crs, collector.finish().0))
+    }
+
+    #[test]
+    fn a_layer_is_read_with_its_system() {
+        let (crs, features) = read_bytes(&package(false), "kind_field = \"SORT\"").unwrap();
+        assert_eq!((crs.epsg, features.len(), features[0].number), (Some(25832), 1, 8));
+        assert_eq!(features[0].shape, LineShape::Line(vec![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]));
+        let two = package(true);
+        assert!(read_bytes(&two, "").unwrap_err().to_string().contains("\"a\", \"b\""));
+        assert_eq!(read_bytes(&two, "layer = \"B\"").unwrap().1.len(), 1);
+        let error = read_bytes(&two, "layer = \"a\"\nheight_field = \"z\"").unwrap_err().to_string();
+        assert!(error.contains("it has id, sort"), "{error}");
+    }
+
+    #[test]
+    fn a_damaged_file_is_named() {
+        let sound = package(true);
+        let cut = (16..sound.len()).step_by(1777).map(|length| read_bytes(&sound[..length], "layer = \"b\""));
+        // The last pages may be empty.
+        let errors: Vec<Error> = cut.filter_map(Result::err).collect();
+        assert!(errors.len() > 5 && errors.iter().all(|error| error.exit_code() == 3), "{errors:?}");
+        for at in (100..sound.len()).step_by(631) {
+            let mut damaged = sound.clone();
+            damaged[at..(at + 40).min(sound.len())].fill(0xa5);
+            // It may not matter, but nothing panics.
+            let _ = read_bytes(&damaged, "layer = \"b\"\nkind_field = \"sort\"");
+        }
+    }
+}

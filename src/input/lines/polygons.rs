@@ -2,13 +2,17 @@
 
 type Ring = Vec<[f64; 3]>;
 
-/// Returns the areas that `rings` make: the outline of each, and then those of its islands. Outlines run clockwise and islands do not. If no
-/// ring runs clockwise, the file has them the other way round.
+/// Returns the areas that `rings` make: the outline of each, and then those of its islands. Outlines run clockwise and islands do not. If
+/// no ring runs clockwise, the file has them the other way round.
 pub(super) fn areas_of(rings: Vec<Ring>) -> Vec<Vec<Ring>> {
     let is_turned = !rings.iter().any(|ring| double_area(ring) < 0.0);
     let is_outline = |ring: &Ring| (double_area(ring) < 0.0) != is_turned;
     let (outlines, islands): (Vec<Ring>, Vec<Ring>) = rings.into_iter().partition(is_outline);
     let mut areas: Vec<Vec<Ring>> = outlines.into_iter().map(|outline| vec![outline]).collect();
+    if let [area] = areas.as_mut_slice() {
+        area.extend(islands);
+        return areas;
+    }
     for island in islands {
         // In the smallest area around it: an island may have a lake that has an island.
         let size = |area: &&mut Vec<Ring>| double_area(&area[0]).abs();
@@ -84,8 +88,9 @@ mod tests {
     #[test]
     fn rings_that_all_run_the_wrong_way_are_areas() {
         assert_eq!(areas_of(vec![turned(square(0.0, 1.0)), turned(square(5.0, 1.0))]).len(), 2);
-        // An island in no area.
-        assert_eq!(areas_of(vec![square(0.0, 1.0), turned(square(5.0, 1.0))]).len(), 2);
+        // An island in no area. Of a single one, all are islands.
+        assert_eq!(areas_of(vec![square(0.0, 1.0), square(9.0, 1.0), turned(square(5.0, 1.0))]).len(), 3);
+        assert_eq!(areas_of(vec![square(0.0, 9.0), turned(square(5.0, 1.0))]).len(), 1);
         assert_eq!(areas_of(Vec::new()).len(), 0);
         assert_eq!(areas_of(vec![Vec::new()]).len(), 1);
     }

@@ -108,7 +108,7 @@ fn parts(record: &[u8], has_z: bool) -> Option<Vec<Vec<[f64; 3]>>> {
     };
     let starts: Vec<usize> = starts.chunks_exact(4).map(|start| little(start) as usize).collect();
     let ends = starts.iter().skip(1).copied().chain([vertices]);
-    let range = |(&start, end): (&usize, usize)| (start <= end && end <= vertices).then(|| start..end);
+    let range = |(&start, end): (&usize, usize)| (start <= end && end <= vertices).then_some(start..end);
     starts.iter().zip(ends).map(|ends| Some(range(ends)?.map(vertex).collect())).collect()
 }
 

@@ -140,7 +140,7 @@ fn simplified(room: &LevelRoom, node: NodeIndex, children: &[Child]) -> Result<S
     let meshes = meshes.collect::<Result<Vec<_>>>()?;
     let joined = join(&room.style.frame, &meshes).map_err(|what| contradiction(node, &what))?;
     drop(meshes);
-    simplify(&room.style.frame, &joined, room.sizes.target(joined.triangles.len()))
+    simplify(&room.style.frame, &joined, room.sizes.target(joined.triangles.len()), room.style.lines.as_deref())
 }
 
 /// Returns the range of heights in metres.

@@ -7,6 +7,8 @@
 //!
 //! The edges along a way grow strictly, so it ends. Else the triangles on both sides of an edge would be obtuse over it, and the sum of
 //! the two angles above a half turn, which no Delaunay triangulation has. The way depends on the triangles alone.
+//!
+//! No way crosses a piece of a breakline: its closed disc is empty, so no triangle is obtuse over it. So a lake with a closed shore stays.
 
 use crate::geometry::Site;
 use crate::job::plan::job_plan::Plan;

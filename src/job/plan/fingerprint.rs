@@ -212,7 +212,7 @@ impl Fingerprint {
 
     /// Returns what the inputs are called by now, where nothing else about them has changed since `earlier`.
     pub(crate) fn renamed_inputs(&self, earlier: &Fingerprint) -> RenamedInputs {
-        self.files.renamed_since(&earlier.files)
+        self.files.renamed_since(&earlier.files).and(self.lines.renamed_since(&earlier.lines))
     }
 
     /// Returns this fingerprint with the inputs called as in `earlier`: what an earlier run wrote calls them so.

@@ -130,6 +130,12 @@ impl InputIdentity {
 pub struct RenamedInputs(BTreeMap<PathBuf, PathBuf>);
 
 impl RenamedInputs {
+    /// Returns these and the others.
+    pub(crate) fn and(mut self, others: RenamedInputs) -> RenamedInputs {
+        self.0.extend(others.0);
+        self
+    }
+
     /// Changes the path of an input to the present one.
     pub(crate) fn rename(&self, path: &mut PathBuf) {
         if let Some(new) = self.0.get(path) {

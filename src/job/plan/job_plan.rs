@@ -148,6 +148,12 @@ impl Plan {
         self.breaklines.as_ref().map(PlannedBreaklines::built).transpose()
     }
 
+    /// Tells whether a point that both plans read comes to the same place, or is dropped, in both.
+    pub(crate) fn reads_like(&self, other: &Plan) -> bool {
+        let [own, others] = [self, other].map(|plan| plan.breaklines.as_ref().map(PlannedBreaklines::cut_from));
+        self.lattice == other.lattice && own == others
+    }
+
     /// Returns the box of all that the mesh has, of which the kept points have `points`.
     pub fn with_lines(&self, points: Bounds<3>) -> Bounds<3> {
         let lines = self.breaklines.as_ref().and_then(|lines| lines.bounds);
@@ -167,6 +173,7 @@ impl Plan {
     pub(crate) fn rename_inputs(&mut self, renamed: &RenamedInputs) {
         self.inputs.iter_mut().for_each(|input| renamed.rename(&mut input.source.path));
         self.skipped.iter_mut().for_each(|skipped| skipped.rename(renamed));
+        self.breaklines.iter_mut().flat_map(|lines| &mut lines.files).for_each(|file| renamed.rename(file));
         self.warnings.iter_mut().for_each(|warning| renamed.rename_in(warning));
     }
 

@@ -11,8 +11,8 @@ use crate::job::run::run_context::RunContext;
 
 /// Reads the points, unless an earlier run did.
 ///
-/// An input that proves bad only now is left out as if nobody had named it: if the job would have another lattice without it,
-/// everything is read again. So the plan may change.
+/// An input that proves bad only now is left out as if nobody had named it: if the job would have another lattice or other breaklines
+/// without it, everything is read again. So the plan may change.
 ///
 /// # Errors
 /// Those of [`read_points`] and [`replan_without`].
@@ -24,12 +24,14 @@ pub(crate) fn read(run: &RunContext, mut plan: Plan, earlier: Option<Partition>)
         let stage = run.progress.stage("read", plan.records, "points");
         let mut partition = read_points(&plan, run.directory, &stage)?;
         let stats = stage.finish();
-        let lattice = plan.lattice.clone();
+        let mut is_read = true;
         if !partition.skipped.is_empty() {
             note_skipped(&partition.skipped, run.progress);
-            plan = replan_without(plan, &partition.skipped)?;
+            let again = replan_without(plan.clone(), &partition.skipped)?;
+            is_read = again.reads_like(&plan);
+            plan = again;
         }
-        if plan.lattice == lattice {
+        if is_read {
             run.add_stage(stats);
             partition.skipped.clone_from(&plan.skipped);
             let files = vec![plan.write(&run.directory.plan())?];

@@ -30,8 +30,8 @@ pub struct TileStyle {
     pub compression: Compression,
     /// Which triangles are left out, unless they are flat water.
     pub max_edge: MaxEdgeRule,
-    /// Knows the flat water, where a triangle may be left out; `None` if there is none.
-    pub water: Option<Arc<Breaklines>>,
+    /// The breaklines, which stay in coarser tiles, and whose flat water is never left out; `None` without any.
+    pub lines: Option<Arc<Breaklines>>,
     /// Which triangles are slivers along the hull, which are left out too; `None` if they stay.
     pub hull: Option<HullRule>,
     /// Whose the data are, if the user says.
@@ -90,15 +90,15 @@ impl TileStyle {
         let hull = (output.hull == Hull::Trimmed).then(|| HullRule::of(plan));
         let copyright = output.copyright().map(str::to_owned);
         let OutputOptions { attributes, normals, .. } = *output;
-        let water = if max_edge.keeps_all() { None } else { plan.built_breaklines()? };
-        Ok(TileStyle { frame, coloring, attributes, normals, compression, max_edge, water, hull, copyright })
+        let lines = plan.built_breaklines()?;
+        Ok(TileStyle { frame, coloring, attributes, normals, compression, max_edge, lines, hull, copyright })
     }
 
     /// Tells whether the triangle with these corners is left out because it is long. A lake has no points, so its triangles are long.
     #[inline]
     pub fn leaves_out(&self, corners: [[i32; 3]; 3]) -> bool {
         let is_water = |lines: &Arc<Breaklines>| lines.is_water(corners.map(|[x, y, _]| [x, y]));
-        self.max_edge.leaves_out(corners) && !self.water.as_ref().is_some_and(is_water)
+        self.max_edge.leaves_out(corners) && !self.lines.as_ref().is_some_and(is_water)
     }
 
     /// Removes the triangles that are left out because they are long from `triangles` and returns them. Both stay in order.

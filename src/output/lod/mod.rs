@@ -4,6 +4,7 @@ mod boundary;
 mod cell_grid;
 mod height_bounds;
 pub mod join;
+mod kept_lines;
 pub mod simplify;
 mod surface;
 mod vertex_cells;

@@ -5,21 +5,24 @@
 //! terrains that meet along a part of their boundaries still meet there when either or both of them are simplified, the triangles
 //! cover the same ground once, as before, and the program's own pipeline makes them.
 //!
-//! Inside, the vertices that stay are chosen in two passes. First, one vertex of every cell of a grid stays: the one that is nearest to
-//! the height of the surface seen in the cell, which it takes. Then the triangulation of these is compared with the terrain: where a triangle is furthest from
-//! it, the vertex with the greatest distance stays too (Garland and Heckbert 1995, "Fast polygonal approximation of terrains and
-//! height fields", here with all vertices of a pass inserted at once), with the mean height of its neighbours: see `surface.rs`. Vertices
-//! on the boundary keep their own heights, or terrains would not meet.
+//! Inside, the vertices that stay are chosen in two passes. First, one vertex of every cell of a grid stays: the one that is nearest to the
+//! height of the surface seen in the cell, which it takes. Then the triangulation of these is compared with the terrain: where a triangle
+//! is furthest from it, the vertex with the greatest distance stays too (Garland and Heckbert 1995, "Fast polygonal approximation of
+//! terrains and height fields", here with all vertices of a pass inserted at once), with the mean height of its neighbours: see
+//! `surface.rs`. Vertices on the boundary keep their own heights, or terrains would not meet. So do vertices of breaklines: see
+//! `kept_lines.rs`.
 
 #[cfg(test)]
 mod tests;
 
+use crate::breaklines::Breaklines;
 use crate::geometry::square_grid::SquareGrid;
 use crate::geometry::{Bounds, Site};
 use crate::mesh::index::SiteIndex;
 use crate::mesh::region::covered;
 use crate::output::frame::Frame;
 use crate::output::lod::boundary::on_boundary;
+use crate::output::lod::kept_lines::KeptLines;
 use crate::output::lod::surface::{seen_heights, smoothed};
 use crate::output::lod::vertex_cells::{VertexCells, plane};
 use crate::output::lod::vertical_error::vertical_error;
@@ -50,16 +53,19 @@ const LOOKED_AT: usize = 8;
 /// The share of the inner vertices that the first pass chooses.
 const BY_GRID: f64 = 0.9;
 
+/// Pieces of lines are at most this many times longer than vertices are apart. Longer ones would take too much room.
+const PIECES_TO_SPACING: f64 = 2.0;
+
 /// The part of the vertices that the grid need not reach on each side. Those are the ends of long triangles along the hull, or few
 /// enough for the outermost cells.
 const BEYOND_GRID: usize = 200;
 
 /// Simplifies `tile`, a part of a Delaunay triangulation, to about `triangles` triangles. The result has more if the boundary has too
-/// many edges.
+/// many edges. Up to half of the vertices inside are those of breaklines, if there are `lines`.
 ///
 /// # Errors
 /// [`Error::Broken`] if the boundary is not that of a part of a Delaunay triangulation, [`Error::Interrupted`].
-pub fn simplify(frame: &Frame, tile: &Tile, triangles: usize) -> Result<Simplified> {
+pub fn simplify(frame: &Frame, tile: &Tile, triangles: usize, lines: Option<&Breaklines>) -> Result<Simplified> {
     let boundary = Boundary::of(tile);
     let inside = tile.positions.len() - boundary.vertices;
     let least = (triangles as f64 * LEAST_INSIDE) as usize;
@@ -72,12 +78,15 @@ pub fn simplify(frame: &Frame, tile: &Tile, triangles: usize) -> Result<Simplifi
     let surface = smoothed(tile, &boundary.on, LOOKED_AT);
     let mut moved = tile.positions.clone();
     let mut kept = boundary.on.clone();
-    let by_grid = (wanted as f64 * BY_GRID) as usize;
-    let side = keep_by_grid(&tile.positions, by_grid, &mut kept, &mut moved);
+    let longest = PIECES_TO_SPACING * spacing_of(&tile.positions, wanted);
+    let kept_lines = KeptLines::choose(lines, &tile.positions, &boundary.on, wanted / 2, longest);
+    kept_lines.vertices.iter().for_each(|&v| kept[v] = true);
+    let by_grid = ((wanted - kept_lines.vertices.len()) as f64 * BY_GRID) as usize;
+    let side = keep_by_grid(&tile.positions, by_grid, &kept_lines, &mut kept, &mut moved);
     let mut coarse = boundary.fill(tile, &kept)?;
     let rest = (boundary.vertices + wanted).saturating_sub(kept.iter().filter(|&&kept| kept).count());
     let furthest = Furthest::find(&surface, &moved, &coarse);
-    let more = furthest.first(rest, &kept);
+    let more = furthest.first(rest, |v| !kept[v] && kept_lines.allows(v));
     if !more.is_empty() {
         for v in more.into_iter().map(|v| v as usize) {
             kept[v] = true;
@@ -141,10 +150,15 @@ impl Boundary {
 
 /// Keeps one vertex of `positions` in each cell of a grid with about `cells` cells: the one nearest to the height that is seen in the
 /// cell. Unless it was `kept` already, it gets that height in `moved`. Returns the side of a cell in lattice steps.
-fn keep_by_grid(positions: &[[i32; 3]], cells: usize, kept: &mut [bool], moved: &mut [[i32; 3]]) -> f64 {
+fn keep_by_grid(
+    positions: &[[i32; 3]],
+    cells: usize,
+    lines: &KeptLines,
+    kept: &mut [bool],
+    moved: &mut [[i32; 3]],
+) -> f64 {
     let Some(bounds) = most_of(positions) else { return 0.0 };
-    let area = [0, 1].map(|axis| (bounds.extent(axis) + 1) as f64).iter().product::<f64>();
-    let side = (area / cells.max(1) as f64).sqrt();
+    let side = side_of(bounds, cells);
     if cells == 0 {
         return side;
     }
@@ -152,7 +166,8 @@ fn keep_by_grid(positions: &[[i32; 3]], cells: usize, kept: &mut [bool], moved: 
     let cell_of: Vec<u32> = positions.iter().map(|p| grid.cell(p[0], p[1]) as u32).collect();
     let heights = seen_heights(positions, &cell_of, grid.cells());
     let mut nearest = vec![(u32::MAX, u32::MAX); grid.cells()];
-    for (v, (p, &cell)) in (0..).zip(positions.iter().zip(&cell_of)) {
+    let vertices = (0..).zip(positions.iter().zip(&cell_of));
+    for (v, (p, &cell)) in vertices.filter(|(v, _)| lines.allows(*v as usize)) {
         let nearest = &mut nearest[cell as usize];
         *nearest = (*nearest).min((p[2].abs_diff(heights[cell as usize]), v));
     }
@@ -162,6 +177,17 @@ fn keep_by_grid(positions: &[[i32; 3]], cells: usize, kept: &mut [bool], moved: 
         }
     }
     side
+}
+
+/// Returns the side of square cells of which `cells` have the area of the box.
+fn side_of(bounds: Bounds<2>, cells: usize) -> f64 {
+    let area = [0, 1].map(|axis| (bounds.extent(axis) + 1) as f64).iter().product::<f64>();
+    (area / cells.max(1) as f64).sqrt()
+}
+
+/// Returns about how far apart `count` vertices among `positions` are, in lattice steps.
+fn spacing_of(positions: &[[i32; 3]], count: usize) -> f64 {
+    most_of(positions).map_or(0.0, |bounds| side_of(bounds, count))
 }
 
 /// Returns the box in the plane of those of `positions` that are looked at, without the outermost on each side.
@@ -196,8 +222,8 @@ impl Furthest {
         Furthest { vertices, mean: sum / coarse.len().max(1) as f64 }
     }
 
-    /// Returns the first `count` that are not `kept` already.
-    fn first(&self, count: usize, kept: &[bool]) -> Vec<u32> {
-        self.vertices.iter().map(|&(_, v)| v).filter(|&v| !kept[v as usize]).take(count).collect()
+    /// Returns the first `count` that are wanted.
+    fn first(&self, count: usize, is_wanted: impl Fn(usize) -> bool) -> Vec<u32> {
+        self.vertices.iter().map(|&(_, v)| v).filter(|&v| is_wanted(v as usize)).take(count).collect()
     }
 }

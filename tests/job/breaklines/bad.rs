@@ -1,10 +1,12 @@
 //! Files of lines that cannot be used: the message names the file and the feature, and says what to do.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::files::{Features, geojson, geopackage, shapefile};
-use super::terrain::{Survey, cross};
+use super::terrain::{Mesh, Survey, cross};
+use crate::bad_files::{damaged, good, write};
+use crate::program::Job;
 use rusqlite::Connection;
 
 #[test]
@@ -22,7 +24,7 @@ fn broken_files_are_named() {
     fs::write(&shp, &bytes[..bytes.len() - 10]).unwrap();
     refused(&shp, "", 3, &["is cut off"]);
     let mut broken = bytes.clone();
-    broken[160..168].copy_from_slice(&f64::NAN.to_le_bytes());
+    broken[156..164].copy_from_slice(&f64::NAN.to_le_bytes());
     fs::write(&shp, &broken).unwrap();
     refused(&shp, "", 3, &["feature 1 has the vertex", "which is no place"]);
     fs::write(&shp, &bytes).unwrap();
@@ -79,4 +81,24 @@ fn options_that_contradict_each_other_are_refused() {
         survey.job_with(&[&river], rest).run().refused(2, &words);
     }
     survey.job_with::<&str>(&[], "").run().refused(2, &["[[breaklines]] files is empty"]);
+}
+
+/// How far points are apart on average counts for how lines are cut, but only with those of files that are used.
+#[test]
+fn a_cloud_that_proves_bad_has_no_say_in_how_lines_are_cut() {
+    let folder = tempfile::tempdir().unwrap();
+    let clouds = [good(folder.path()), write(folder.path(), "damaged.laz", &damaged(0.01))];
+    let line = vec![[-60.0, -50.0, 1.0], [70.0, 40.0, 2.0]];
+    let lines = geojson(folder.path(), "line.geojson", &Features::lines(&[("line", line)]));
+    let edges = |clouds: &[PathBuf]| {
+        let job = Job::on(clouds).with("input", "on_bad_file = \"skip\"");
+        let job = job.with("[breaklines]", &format!("files = [{lines:?}]"));
+        let report = job.report();
+        job.verified();
+        (Mesh::listed(&job), report["skipped"].as_array().unwrap().len())
+    };
+    let (both, one) = (edges(&clouds), edges(&clouds[..1]));
+    assert_eq!((both.1, one.1), (1, 0));
+    assert!(one.0.len() > 3);
+    assert_eq!(both.0, one.0);
 }

@@ -36,8 +36,8 @@ fn other_system(file: &LineFile, own: &Crs, points: &Crs, differences: &str) -> 
     let target = points.epsg.map_or("the points' CRS".into(), |code| format!("EPSG:{code}"));
     let points = if points.is_named() { points.label() } else { "a plane without a CRS".into() };
     Error::Config(format!(
-        "{path} is in {}, but the points are in {points}. They differ in {differences}. Transform the lines first, for example with `ogr2ogr \
-         -t_srs {target} lines.gpkg {path}`; if what the file says is wrong, say crs = \"points\" in [[breaklines]]",
+        "{path} is in {}, but the points are in {points}. They differ in {differences}. Transform the lines first, for example with \
+         `ogr2ogr -t_srs {target} lines.gpkg {path}`; if what the file says is wrong, say crs = \"points\" in [[breaklines]]",
         own.label()
     ))
 }

@@ -6,7 +6,7 @@ use crate::input::lines::{LineFile, is_side_file, read_lines};
 use crate::job::options::JobOptions;
 use crate::job::plan::breaklines::line_crs::bring_to_points;
 use crate::job::plan::extent::Extent;
-use crate::job::plan::inputs::files_of;
+use crate::job::plan::named_files::files_of;
 use crate::{Error, Result, Warnings};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};

@@ -38,12 +38,18 @@ pub struct PlannedBreaklines {
     pub features_outside: u64,
     /// The box of all sites; `None` without a site.
     pub bounds: Option<Bounds<3>>,
+    cut_from: CutFrom,
+    #[serde(skip)]
+    built: OnceLock<Arc<Breaklines>>,
+}
+
+/// What breaklines are cut from. The same gives the same sites.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct CutFrom {
     features: Vec<Feature>,
     options: BreaklineOptions,
     /// The points that gave heights to the sites of lines that have none.
     nearest: Vec<Option<NearestPoint>>,
-    #[serde(skip)]
-    built: OnceLock<Arc<Breaklines>>,
 }
 
 /// The inputs of a job, as far as breaklines depend on them.
@@ -92,11 +98,14 @@ impl PlannedBreaklines {
             findings,
             features_outside,
             bounds: Bounds::of_points(built.sites().iter().map(corner)),
-            features,
-            options,
-            nearest: nearest.found().to_vec(),
+            cut_from: CutFrom { features, options, nearest: nearest.found().to_vec() },
             built: OnceLock::from(Arc::new(built)),
         }))
+    }
+
+    /// Returns what they are cut from.
+    pub(crate) fn cut_from(&self) -> &CutFrom {
+        &self.cut_from
     }
 
     /// Returns the breaklines.
@@ -107,10 +116,11 @@ impl PlannedBreaklines {
         if let Some(built) = self.built.get() {
             return Ok(built.clone());
         }
-        let built = Breaklines::build(&self.features, &self.options);
+        let CutFrom { features, options, nearest: found } = &self.cut_from;
+        let built = Breaklines::build(features, options);
         let (mut built, _) = built.map_err(|error| Error::Broken(format!("the breaklines of the plan: {error}")))?;
         let mut nearest = NearestHeights::new(&built);
-        nearest.join(&self.nearest);
+        nearest.join(found);
         nearest.settle(&mut built);
         Ok(self.built.get_or_init(|| Arc::new(built)).clone())
     }
@@ -156,8 +166,8 @@ fn refuse(error: BreaklineError, files: &[LineFile], lattice: &Lattice) -> Error
             files,
             id,
             format!(
-                "is a wall: it has the heights {} and {} at {}, and a terrain has one height at a place; move one of its vertices, or leave \
-                 the feature out",
+                "is a wall: it has the heights {} and {} at {}, and a terrain has one height at a place; move one of its vertices, or \
+                 leave the feature out",
                 lattice.world(2, low),
                 lattice.world(2, high),
                 at(place)

@@ -11,7 +11,8 @@ pub(super) fn sentences(files: &[LineFile], lattice: &Lattice, findings: &Findin
     let mut found = Vec::new();
     if findings.subsegments == 0 {
         found.push(format!(
-            "[[breaklines]]: no line lies in the box of the points, so there are no breaklines: {outside} features lie outside; look at their CRS"
+            "[[breaklines]]: no line lies in the box of the points, so there are no breaklines: {outside} features lie outside; look \
+             at their CRS"
         ));
     }
     found.extend(findings.worst_disagreements.first().map(|worst| names.disagreement(worst)));
@@ -58,8 +59,8 @@ impl Names<'_> {
 
     fn uneven(&self, &Uneven { id, lowest, highest, place }: &Uneven) -> String {
         format!(
-            "[[breaklines]]: {} lakes are not flat; the worst is {}, which is {} higher at {} than its lowest height, {}; that is the height \
-             of all of it",
+            "[[breaklines]]: {} lakes are not flat; the worst is {}, which is {} higher at {} than its lowest height, {}; that is the \
+             height of all of it",
             self.findings.uneven_lakes,
             self.feature(id),
             self.difference(i64::from(highest) - i64::from(lowest)),

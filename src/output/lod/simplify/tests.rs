@@ -2,6 +2,7 @@
 
 use proptest::prelude::*;
 
+use crate::breaklines::{BreaklineOptions, Breaklines, Feature, FeatureId, FeatureKind, Vertex};
 use crate::geometry::lattice::{Lattice, shortest_decimal};
 use crate::geometry::predicates::orient2d;
 use crate::output::frame::Frame;
@@ -47,7 +48,7 @@ fn height(tile: &Tile, place: [f64; 2]) -> Option<f64> {
 #[test]
 fn a_plane_keeps_its_boundary_and_has_no_error() {
     let plane = terrain((0..400).map(|i| [i % 20 * 10, i / 20 * 10, i % 20 * 3 + i / 20 * 7]).collect());
-    let simple = simplify(&frame(), &plane, 1).unwrap();
+    let simple = simplify(&frame(), &plane, 1, None).unwrap();
     assert!(simple.greatest_error < 1e-8, "{}", simple.greatest_error);
     assert_eq!(area(&simple.tile), area(&plane));
     // The 76 vertices of the boundary, and the triangles between them.
@@ -57,8 +58,42 @@ fn a_plane_keeps_its_boundary_and_has_no_error() {
 #[test]
 fn a_tile_without_inner_vertices_stays_as_it_is() {
     let fan = terrain(vec![[0, 0, 5], [9, 0, 5], [0, 9, 1]]);
-    let simple = simplify(&frame(), &fan, 1).unwrap();
+    let simple = simplify(&frame(), &fan, 1, None).unwrap();
     assert_eq!((simple.tile, simple.greatest_error), (fan, 0.0));
+}
+
+/// A field of points every 10 steps with a line through it, as a job makes it: near the line points are dropped.
+fn field_with_line() -> (Tile, Breaklines) {
+    let vertex = |place| Vertex { place, z: Some(500) };
+    let path = vec![vertex([95, 333]), vertex([640, 407]), vertex([1105, 790])];
+    let id = FeatureId { file: 0, feature: 0 };
+    let feature = Feature { kind: FeatureKind::Line, id, paths: vec![path] };
+    let (lines, _) = Breaklines::build(&[feature], &BreaklineOptions::new(10, None)).unwrap();
+    let points = (0..120 * 120).map(|i| [i % 120 * 10 + i % 7, i / 120 * 10 + i % 5, i % 11]);
+    let sites = lines.sites().iter().map(|site| [site.place[0], site.place[1], 500]);
+    (terrain(points.filter(|p| !lines.drops([p[0], p[1]])).chain(sites).collect()), lines)
+}
+
+/// Returns the vertices at height 500, and whether the ones that follow each other along the line are joined by edges.
+fn line_in(tile: &Tile) -> (usize, bool) {
+    let mut line: Vec<u32> = (0..).zip(&tile.positions).filter(|(_, p)| p[2] == 500).map(|(v, _)| v).collect();
+    line.sort_unstable_by_key(|&v| tile.positions[v as usize][0]);
+    let joined = |pair: &[u32]| tile.triangles.iter().any(|t| pair.iter().all(|v| t.contains(v)));
+    (line.len(), line.windows(2).all(joined))
+}
+
+#[test]
+fn breaklines_keep_their_vertices_and_stay_edges() {
+    let (tile, lines) = field_with_line();
+    let all = lines.sites().len();
+    assert_eq!(line_in(&tile), (all, true));
+    let simple = |share: usize| simplify(&frame(), &tile, tile.triangles.len() / share, Some(&lines)).unwrap().tile;
+    assert_eq!(line_in(&simple(5)), (all, true), "there is room for all");
+    let (some, joined) = line_in(&simple(200));
+    assert!(joined && (all / 12..all / 2).contains(&some), "{some} of {all}");
+    assert_eq!(area(&simple(200)), area(&tile));
+    let (without, _) = line_in(&simplify(&frame(), &tile, tile.triangles.len() / 5, None).unwrap().tile);
+    assert!(without < all / 2, "{without}: this test would prove nothing");
 }
 
 proptest! {
@@ -70,7 +105,7 @@ proptest! {
     ) {
         let tile = terrain(points);
         prop_assume!(!tile.triangles.is_empty());
-        let simple = simplify(&frame(), &tile, tile.triangles.len() / share).unwrap();
+        let simple = simplify(&frame(), &tile, tile.triangles.len() / share, None).unwrap();
         prop_assert_eq!(area(&simple.tile), area(&tile));
         prop_assert!(simple.tile.triangles.len() <= tile.triangles.len());
         let mut greatest = 0.0f64;
