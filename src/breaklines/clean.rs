@@ -72,7 +72,8 @@ impl Cleaner<'_> {
         let vertices = || feature.paths.iter().flatten().filter(|v| v.z.is_some());
         let height = vertices().min_by_key(by_height).and_then(|v| v.z);
         let highest = vertices().max_by_key(by_height).and_then(known_height);
-        let range = height.zip(highest).map(|(lowest, (place, highest))| Uneven { id: feature.id, lowest, highest, place });
+        let range =
+            height.zip(highest).map(|(lowest, (place, highest))| Uneven { id: feature.id, lowest, highest, place });
         let is_uneven = |range: &Uneven| range.highest.abs_diff(range.lowest) > self.options.height_tolerance;
         let uneven = range.filter(is_uneven);
         self.findings.uneven_lakes += u64::from(uneven.is_some());
