@@ -170,7 +170,7 @@ mod tests {
             assert_eq!((read[1], read[511], read[512], read[600]), (0.25, 127.75, 0.0, 128.0), "{compression}");
             decoder.next_image().unwrap();
             assert_eq!(decoder.dimensions().unwrap(), (300, 256));
-            assert!(decoder.more_images() == false);
+            assert!(!decoder.more_images());
         }
     }
 

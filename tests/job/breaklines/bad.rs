@@ -56,12 +56,18 @@ fn geodatabases_and_other_systems_are_refused() {
     survey.job_with(&[&base], "").run().refused(3, &["roads.gdb", "ogr2ogr lines.gpkg"]);
     survey.job_with(&["nothing.shp"], "").run().refused(2, &["[[breaklines]] files", "nothing.shp"]);
     let shp = shapefile(survey.folder(), "other", &Features::lines(&[("line", cross(0))]));
-    fs::write(shp.with_extension("prj"), super::files::UTM_33.replace("15.0", "21.0")).unwrap();
+    let old = super::files::UTM_33.replace("D_WGS_1984", "D_European_1950").replace("WGS_1984\",63", "International_1924\",63");
+    fs::write(shp.with_extension("prj"), old).unwrap();
     survey.job_with(&[&shp], "").run().refused(2, &["other.shp is in", "-t_srs EPSG:32633", "crs = \"points\""]);
     survey.job_with(&[&shp], "crs = \"points\"").report();
     let degrees = survey.folder().join("degrees.geojson");
-    fs::write(&degrees, r#"{"type": "LineString", "coordinates": [[15, 36.1, 1], [15.001, 36.1, 2]]}"#).unwrap();
-    survey.job_with(&[&degrees], "").run().refused(2, &["degrees.geojson is in WGS 84", "kind of coordinates"]);
+    // From 20 m, 20 m to 120 m, 150 m.
+    let way = "[[10.511435295546, 0.000180387560773, 14], [10.512331194766, 0.001352908377543, 14]]";
+    fs::write(&degrees, format!("{{\"type\": \"LineString\", \"coordinates\": {way}}}")).unwrap();
+    let report = survey.job_with(&[&degrees], "").report();
+    assert!(report["warnings"].to_string().contains("transformed from WGS 84"), "{report}");
+    let edges = report["breaklines"]["subsegments"].as_u64();
+    assert!(edges.is_some_and(|edges| edges > 10), "{}", report["breaklines"]);
     fs::remove_file(shp.with_extension("prj")).unwrap();
     let said = survey.job_with(&[&shp], "").run().succeeded();
     assert!(said.out.contains("no .prj file"), "{}", said.out);

@@ -67,17 +67,18 @@ pub(crate) struct LineFiles {
 }
 
 impl LineFiles {
-    /// Reads all files that the options name, which must be in the system `crs` of the points.
+    /// Reads all files that the options name, and transforms their lines into the system `crs` of the points.
     ///
     /// # Errors
-    /// [`Error::Config`] if one is in another system, or they are too large; [`Error::Input`] if one is bad; [`Error::Io`] if one cannot be
+    /// [`Error::Config`] if there is no way from its system to that of the points, or they are too large; [`Error::Input`] if one is bad; [`Error::Io`] if one cannot be
     /// read.
     pub(crate) fn read(options: &JobOptions, crs: &Crs, warnings: &mut Warnings) -> Result<LineFiles> {
         let paths = line_paths(&options.breaklines)?;
         check_size(&paths, options.limits.memory.0)?;
+        let datums = options.input.datums;
         let read = |(options, path): &(&LineOptions, PathBuf)| {
             let mut file = read_lines(path, options)?;
-            bring_to_points(&mut file, &options.crs, crs)?;
+            bring_to_points(&mut file, &options.crs, crs, datums)?;
             Ok(file)
         };
         let read: Vec<Result<LineFile>> = paths.par_iter().map(read).collect();
