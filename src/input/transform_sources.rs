@@ -97,7 +97,8 @@ fn said_crs(source: &Source, all: &[Source], options: &InputOptions) -> Result<C
     if !named.is_named() {
         return Err(Error::Config(format!(
             "{}: it names no CRS, and [input] to_crs needs to know what its coordinates are in: say with [input] missing_crs what the \
-             files without a CRS are in, such as \"EPSG:4326\" for longitude and latitude of WGS 84, or with [input] crs what all files are in",
+             files without a CRS are in, such as \"EPSG:4326\" for longitude and latitude of WGS 84, or with [input] crs what all \
+             files are in",
             source.path.display()
         )));
     }
