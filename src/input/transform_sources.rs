@@ -89,15 +89,16 @@ fn said_crs(source: &Source, all: &[Source], options: &InputOptions) -> Result<C
         CrsChoice::Given { crs, .. } => (**crs).clone(),
         CrsChoice::None => {
             return Err(Error::Config(
-                "[input] crs = \"none\" says that coordinates are a plane, and to_crs needs to know where they are: leave one of them out"
+                "[input] crs = \"none\" says that coordinates are a plane, and to_crs needs to know where they are: leave one out"
                     .into(),
             ));
         }
     };
     if !named.is_named() {
         return Err(Error::Config(format!(
-            "{}: it names no CRS, and [input] to_crs needs to know what its coordinates are in: say with [input] missing_crs what the files \
-             without a CRS are in, such as \"EPSG:4326\" for longitude and latitude of WGS 84, or with [input] crs what all files are in",
+            "{}: it names no CRS, and [input] to_crs needs to know what its coordinates are in: say with [input] missing_crs what the \
+             files without a CRS are in, such as \"EPSG:4326\" for longitude and latitude of WGS 84, or with [input] crs what all \
+             files are in",
             source.path.display()
         )));
     }
@@ -147,9 +148,9 @@ fn common_heights(sources: &[Source], said: &[Crs], to: &Crs) -> Result<Option<V
             Some((other, known)) => {
                 if let Some(difference) = own.difference(known) {
                     return Err(Error::Config(format!(
-                        "{path} and {other} differ in {difference}: the way from one to the other needs the grid of a geoid. [input] to_crs \
-                         transforms x and y and the unit of heights, not their datum, and does not leave that out: transform the heights \
-                         with `pdal translate` first, or run two jobs"
+                        "{path} and {other} differ in {difference}: the way from one to the other needs the grid of a geoid. [input] \
+                         to_crs transforms x and y and the unit of heights, not their datum, and does not leave that out: transform the \
+                         heights with `pdal translate` first, or run two jobs"
                     )));
                 }
             }

@@ -73,21 +73,21 @@ impl<'a, S: RecordSink> TransformedSink<'a, S> {
         let found = [self.to[0].raw(x), self.to[1].raw(y)];
         found.iter().all(|raw| *raw != BEYOND).then_some(found)
     }
+}
 
-    /// Says that a record has no place in the other system.
-    #[cold]
-    fn no_place(&self, raw: &[i64; 3], place: &str) -> String {
-        let value = |axis: usize| match raw[axis] {
-            BEYOND => "beyond all numbers".to_string(),
-            raw => self.transform.axes[0][axis].value(raw).to_string(),
-        };
-        format!(
-            "{place}: x = {}, y = {} lies outside the area of {}; leave such points out with bounds, or name another to_crs",
-            value(0),
-            value(1),
-            self.transform.target
-        )
-    }
+/// Says that the record with these raw integers has no place in the other system.
+#[cold]
+fn no_place(transform: &RecordTransform, raw: &[i64; 3], place: &str) -> String {
+    let value = |axis: usize| match raw[axis] {
+        BEYOND => "beyond all numbers".to_string(),
+        raw => transform.axes[0][axis].value(raw).to_string(),
+    };
+    format!(
+        "{place}: x = {}, y = {} lies outside the area of {}; leave such points out with bounds, or name another to_crs",
+        value(0),
+        value(1),
+        transform.target
+    )
 }
 
 impl<S: RecordSink> RecordSink for TransformedSink<'_, S> {
@@ -104,8 +104,8 @@ impl<S: RecordSink> RecordSink for TransformedSink<'_, S> {
                 // Whether it counts as withheld, its place does not decide.
                 None if record.withheld => {}
                 None => {
-                    let what = self.no_place(&record.raw, &place());
-                    self.inner.push_outlier(record.class, record.pulse_return, || what);
+                    let transform = self.transform;
+                    self.inner.push_outlier(record.class, record.pulse_return, || no_place(transform, &record.raw, &place()));
                     return Ok(());
                 }
             }

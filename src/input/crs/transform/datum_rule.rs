@@ -22,8 +22,8 @@ impl DatumRule {
     }
 }
 
-/// The shifts that need a grid, by the beginnings of the comparable names of the two datums: the files that PROJ has for them. An empty name
-/// is any other datum.
+/// The shifts that need a grid, by the beginnings of the comparable names of the two datums: the files that PROJ has for them. An empty
+/// name is any other datum.
 const GRIDS: [(&str, &str, &str); 12] = [
     ("nad27", "", "NADCON or NTv2: us_noaa_conus.tif, ca_nrc_ntv2_0.tif"),
     ("nad83", "nad83", "NADCON5: us_noaa_nadcon5_nad83_1986_nad83_harn_conus.tif and the like"),
