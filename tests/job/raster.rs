@@ -76,8 +76,8 @@ fn triangles(job: &Job) -> Vec<[[f64; 3]; 3]> {
     found
 }
 
-/// Asserts that the raster of a job with cells of `side` has in every cell what the triangle at its centre says, and nothing where there is none.
-/// Returns how many cells have a height.
+/// Asserts that the raster of a job with cells of `side` has in every cell what the triangle at its centre says, and nothing where there is
+/// none. Returns how many cells have a height.
 #[track_caller]
 fn has_the_heights_of_the_triangles(job: &Job, side: f64) -> usize {
     let raster = raster(job);

@@ -15,7 +15,7 @@ fn rig() -> Rig {
 fn a_raster_that_was_stopped_anywhere_ends_with_the_same_bytes() {
     let rig = rig();
     // While a window is drawn, and while the blocks are put together.
-    for (place, count) in [("window", 1), ("window", 8), ("waiting_blocks", 1), ("waiting_blocks", 5)] {
+    for (place, count) in [("window", 1), ("window", 4), ("waiting_blocks", 1), ("waiting_blocks", 5)] {
         rig.forget();
         let what = format!("signal-{place}");
         rig.run_to(&what, count).stopped(&["error: interrupted"]);

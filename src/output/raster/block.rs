@@ -1,6 +1,7 @@
 //! Packing a block: the predictor for floating-point numbers (Adobe, "TIFF Technical Note 3"), then DEFLATE.
 //!
-//! The coder is `miniz_oxide` itself, not `flate2`, whose coder other crates of a build can exchange: the bytes of a file must not depend on that.
+//! The coder is `miniz_oxide` itself, not `flate2`, whose coder other crates of a build can exchange: the bytes of a file must not depend
+//! on that.
 
 use crate::output::raster::BLOCK;
 use crate::output::raster::options::RasterCompression;
@@ -22,8 +23,8 @@ pub(crate) fn packed(cells: &[f32], compression: RasterCompression) -> Vec<u8> {
     }
 }
 
-/// Returns the bytes, packed. The coder looks for runs of one byte and for nothing else that repeats: the last bits of heights are as good as
-/// random. That takes half the time of its fourth level and gives as many bytes, within a hundredth.
+/// Returns the bytes, packed. The coder looks for runs of one byte and for nothing else that repeats: the last bits of heights are as good
+/// as random. That takes half the time of its fourth level and gives as many bytes, within a hundredth.
 fn deflated(bytes: &[u8]) -> Vec<u8> {
     let flags = create_comp_flags_from_zip_params(LEVEL, WITH_HEADER, CompressionStrategy::RLE as i32);
     let (mut coder, mut packed) = (CompressorOxide::new(flags), Vec::with_capacity(bytes.len()));

@@ -1,8 +1,8 @@
 //! The head of a Cloud-Optimized GeoTIFF: everything that stands before the blocks.
 //!
-//! The crate `tiff` writes strips, and every directory behind its image. Such a file takes directories first, for the raster and then for its
-//! overviews, and the blocks of the coarsest image before those of finer ones, all of which it cannot do. So this file lays out the container;
-//! its tests read it back with that crate.
+//! The crate `tiff` writes strips, and every directory behind its image. Such a file takes directories first, for the raster and then for
+//! its overviews, and the blocks of the coarsest image before those of finer ones, all of which that crate cannot do. So this file lays out
+//! the container; its tests read it back with the crate.
 
 use crate::output::raster::BLOCK;
 use crate::output::raster::geokeys::{DOUBLES, RasterSystem, TEXTS};
@@ -40,8 +40,8 @@ pub(crate) struct RasterImage {
     pub(crate) lengths: Vec<u32>,
 }
 
-/// Returns the bytes of the file in front of the blocks of `images`, of which the first is the raster and others are half as fine as the one before.
-/// The blocks follow, those of the last image first.
+/// Returns the bytes of the file in front of the blocks of `images`, of which the first is the raster and others are half as fine as the
+/// one before. The blocks follow, those of the last image first.
 pub(crate) fn head(head: &RasterHead, images: &[RasterImage]) -> Vec<u8> {
     let blocks: u64 = images.iter().flat_map(|image| &image.lengths).map(|length| stored(*length)).sum();
     let classic = placed(head, images, TiffKind::Classic);

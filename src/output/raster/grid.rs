@@ -1,7 +1,7 @@
 //! Where the cells of a raster are.
 //!
-//! Cells are aligned: their edges are at whole multiples of the resolution in the CRS of the job, so that rasters of neighbouring areas, and of
-//! other programs, share them. Columns count from the west and rows from the north, so along both axes of the grid, which are x and -y.
+//! Cells are aligned: their edges are at whole multiples of the resolution in the CRS of the job, so that rasters of neighbouring areas,
+//! and of other programs, share them. Columns count from the west and rows from the north, so along both axes of the grid, which are x and -y.
 //!
 //! A lattice step and a cell are decimals. Their greatest common divisor is the **subunit** (of half a cell, so that a centre is a whole
 //! number too): a lattice step has `step` subunits, a cell `pitch`, and the first centre is `origin` subunits from the lattice's zero.

@@ -2,8 +2,8 @@
 //!
 //! A cell has the height of the terrain at its centre. [`grid::RasterGrid`] says where the centres are, in whole numbers, so which triangle
 //! holds a centre is decided exactly. The height follows from that triangle's corners alone (`height.rs`), or, on an
-//! edge or a vertex, from the ends of the edge or the vertex alone. So all triangles that meet there give the same bits, and a cell does not
-//! depend on the tiles, their order or the threads.
+//! edge or a vertex, from the ends of the edge or the vertex alone. So all triangles that meet there give the same bits, and a cell does
+//! not depend on the tiles, their order or the threads.
 
 pub(crate) mod block;
 pub(crate) mod geokeys;

@@ -155,8 +155,9 @@ impl<'a> Window<'a> {
     }
 }
 
-/// Returns a block of an image with a side of so many pixels, by its column and row among the blocks: with `nodata` where there is no height,
-/// and how many heights of it are just that number. Returns `None` if it has no height. `pixel` is the image, with NaN where there is none.
+/// Returns a block of an image with a side of so many pixels, by its column and row among the blocks: with `nodata` where there is no
+/// height, and how many heights of it are just that number. Returns `None` if it has no height.
+/// `pixel` is the image, with NaN where there is none.
 pub(crate) fn filled(
     side: usize,
     [column, row]: [usize; 2],
