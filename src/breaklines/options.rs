@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 pub struct BreaklineOptions {
     /// The wanted length of subsegments in lattice steps: about the distance between neighbouring points. At least 1.
     pub spacing: u32,
-    /// Sites of lines that are not farther apart than this number of lattice steps become one site. At least 1.
+    /// Sites of lines that are not farther apart than this number of lattice steps become one site, and a line goes over a site that is in
+    /// its way and as near. At least 1. A line may move by twice as much, and by half a step for each time that a piece of it is halved.
     pub floor: u32,
     /// Two heights at one place disagree if they differ by more than this number of steps in z. The same holds for lakes that are not flat
     /// and rivers that rise.
