@@ -105,7 +105,8 @@ impl<S: RecordSink> RecordSink for TransformedSink<'_, S> {
                 None if record.withheld => {}
                 None => {
                     let transform = self.transform;
-                    self.inner.push_outlier(record.class, record.pulse_return, || no_place(transform, &record.raw, &place()));
+                    self.inner
+                        .push_outlier(record.class, record.pulse_return, || no_place(transform, &record.raw, &place()));
                     return Ok(());
                 }
             }
