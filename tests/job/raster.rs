@@ -43,7 +43,7 @@ fn raster(job: &Job) -> Raster {
         images: Vec::new(),
         corner: [place[3], place[4]],
         nodata: decoder.get_tag_ascii_string(Tag::Unknown(42113)).unwrap(),
-        keys: decoder.get_tag_u32_vec(Tag::Unknown(34735)).unwrap(),
+        keys: decoder.get_tag_u32_vec(Tag::Unknown(34735)).unwrap_or_default(),
     };
     loop {
         let (width, height) = decoder.dimensions().unwrap();

@@ -66,7 +66,7 @@ impl RasterSystem {
         (text.len() <= LONGEST_TEXT).then_some(text)
     }
 
-    /// Returns the keys.
+    /// Returns the keys; none if nothing is known.
     pub(crate) fn keys(&self) -> KeyTags {
         let mut keys = KeyTags { directory: vec![1, 1, 1, 0], ..KeyTags::default() };
         let text = self.written_text().filter(|_| self.code.is_none());
@@ -84,7 +84,12 @@ impl RasterSystem {
         }
         self.unit(&mut keys);
         self.vertical(&mut keys);
-        keys.directory[3] = (keys.directory.len() / 4 - 1) as u16;
+        let count = keys.directory.len() / 4 - 1;
+        if count == 1 {
+            // That a cell is an area goes without saying, and with this alone GDAL would show a system without a name.
+            return KeyTags::default();
+        }
+        keys.directory[3] = count as u16;
         keys
     }
 
@@ -197,6 +202,6 @@ mod tests {
         assert_eq!(keys.doubles, [0.201168]);
         let long = RasterSystem { text: Some("x".repeat(3000)), ..RasterSystem::default() };
         assert!(system.is_placed() && !long.is_placed() && !RasterSystem::default().is_placed());
-        assert_eq!(RasterSystem::default().keys().directory, [1, 1, 1, 1, 1025, 0, 1, 1]);
+        assert_eq!(RasterSystem::default().keys(), KeyTags::default());
     }
 }

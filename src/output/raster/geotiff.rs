@@ -117,7 +117,7 @@ fn tags(head: &RasterHead, image: &RasterImage, offsets: &[u64], is_overview: bo
         let (side, [west, north], keys) = (head.cell_size, head.corner, head.system.keys());
         tags.push((33550, Double(vec![side, side, 0.0])));
         tags.push((33922, Double(vec![0.0, 0.0, 0.0, west, north, 0.0])));
-        tags.push((34735, Short(keys.directory)));
+        tags.extend((!keys.directory.is_empty()).then_some((34735, Short(keys.directory))));
         tags.extend((!keys.doubles.is_empty()).then_some((DOUBLES, Double(keys.doubles))));
         tags.extend((!keys.texts.is_empty()).then_some((TEXTS, Text(keys.texts))));
     }
