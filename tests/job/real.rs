@@ -106,7 +106,7 @@ fn a_single_point_is_refused() {
 #[test]
 fn degrees_are_refused_with_advice() {
     let Some(data) = data() else { return };
-    Job::on(&[data.join("autzen-dd.las")]).run().refused(2, &["degrees", "projected CRS", "unit"]);
+    Job::on(&[data.join("autzen-dd.las")]).run().refused(2, &["degrees", "to_crs = \"utm\"", "unit"]);
 }
 
 #[test]

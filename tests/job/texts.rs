@@ -162,7 +162,7 @@ fn units_of_the_names_are_the_units_of_the_mesh() {
 #[test]
 fn classes_without_a_column_of_them_are_refused() {
     let texts = Texts::one(&plain(50));
-    texts.job().with("input", "classes = [2]").run().refused(2, &["0.txt", "no column of classes", "add 0"]);
+    texts.job().with("input", "classes = [2]").run().refused(2, &["0.txt", "no column of classes", "have 0 in it"]);
     assert_eq!(number(&texts.job().with("input", "classes = [0, 2]").report()["points"]["kept"]), 50);
     let rows: String = plain(50).lines().map(|row| format!("{row} Ground\n")).collect();
     let texts = Texts::one(&format!("x y z class\n{rows}"));
