@@ -17,7 +17,7 @@ impl Source {
         self.transform = Some(Box::new(transform));
     }
 
-    /// Undoes [`Source::set_transform`].
+    /// Has the points come in the coordinates of the file again.
     pub fn forget_transform(&mut self) {
         if let Some(transform) = self.transform.take() {
             let OwnCoordinates { axes, grid, min, max, crs } = transform.own;
