@@ -61,8 +61,8 @@ fn geodatabases_and_other_systems_are_refused() {
     survey.job_with(&[&shp], "").run().refused(2, &["other.shp is in", "-t_srs EPSG:32633", "crs = \"points\""]);
     survey.job_with(&[&shp], "crs = \"points\"").report();
     let degrees = survey.folder().join("degrees.geojson");
-    // From 20 m, 20 m to 120 m, 150 m.
-    let way = "[[10.511435295546, 0.000180387560773, 14], [10.512331194766, 0.001352908377543, 14]]";
+    // From 20 m, 20 m to 120 m, 150 m beside the origin of the cloud.
+    let way = "[[15.00022231495, 36.14489841313, 14], [15.001333909542, 36.146070450144, 14]]";
     fs::write(&degrees, format!("{{\"type\": \"LineString\", \"coordinates\": {way}}}")).unwrap();
     let report = survey.job_with(&[&degrees], "").report();
     assert!(report["warnings"].to_string().contains("transformed from WGS 84"), "{report}");
