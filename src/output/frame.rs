@@ -26,7 +26,7 @@ const MOST_OFF_PACKED: f64 = 0.497;
 const STEPS_HALVED: usize = 8;
 
 /// By how many metres in a metre a displacement may change at most, so that the places of a bent scene are surely found again. On the
-/// earth that is a square about 900 km wide.
+/// earth that is a square about 640 km wide.
 const STEEPEST: f64 = 0.1;
 
 /// Steps that a 16-bit position reaches from its origin.

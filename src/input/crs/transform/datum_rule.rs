@@ -72,6 +72,6 @@ pub(crate) fn datum_way(from: &Datum, to: &Datum, rule: DatumRule) -> DatumWay {
     };
     DatumWay::Shift(format!(
         "they differ in {difference}: the way from one to the other is {what}, which this program does not do and does not leave out. \
-         Transform the points with `pdal translate` and its filter `reprojection` first{remedy}"
+         Other programs do that, for points `pdal translate` with its filter `reprojection`{remedy}"
     ))
 }

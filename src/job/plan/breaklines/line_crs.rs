@@ -38,9 +38,7 @@ fn transform(file: &mut LineFile, own: &Crs, points: &Crs, datums: DatumRule) ->
     if let Some(difference) = heights.and_then(|(own, others)| own.difference(others)) {
         return Err(refuse(&format!("they differ in {difference}, and the way between such heights needs a geoid")));
     }
-    // After the reason comes how to transform points.
-    let reason = |why: String| refuse(why.split(". ").next().unwrap_or_default());
-    let way = CrsTransform::between(own, points, datums).map_err(reason)?;
+    let way = CrsTransform::between(own, points, datums).map_err(|why| refuse(&why))?;
     let factor = metres_of_heights(own) / metres_of_heights(points);
     let target = points.label();
     for feature in &mut file.features {
