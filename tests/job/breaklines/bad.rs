@@ -56,7 +56,8 @@ fn geodatabases_and_other_systems_are_refused() {
     survey.job_with(&[&base], "").run().refused(3, &["roads.gdb", "ogr2ogr lines.gpkg"]);
     survey.job_with(&["nothing.shp"], "").run().refused(2, &["[[breaklines]] files", "nothing.shp"]);
     let shp = shapefile(survey.folder(), "other", &Features::lines(&[("line", cross(0))]));
-    let old = super::files::UTM_33.replace("D_WGS_1984", "D_European_1950").replace("GCS_WGS_1984", "GCS_European_1950");
+    let old =
+        super::files::UTM_33.replace("D_WGS_1984", "D_European_1950").replace("GCS_WGS_1984", "GCS_European_1950");
     fs::write(shp.with_extension("prj"), old).unwrap();
     survey.job_with(&[&shp], "").run().refused(2, &["other.shp is in", "-t_srs EPSG:32633", "crs = \"points\""]);
     survey.job_with(&[&shp], "crs = \"points\"").report();
