@@ -14,22 +14,27 @@ const KEYS: u16 = 34735;
 const CLARKE: &str = r#""Clarke_1866",6378206.4,294.9786982"#;
 const GRS80: &str = r#""GRS_1980",6378137.0,298.257222101"#;
 
-/// Writes a sound LAS file with these records of coordinate systems.
-pub(crate) fn write(folder: &Path, name: &str, records: &[(u16, Vec<u8>)]) -> PathBuf {
-    let plain = LasFile::new(2, 0, 0, 200).las();
-    let (header, points) = plain.split_at(227);
-    let mut bytes = header.to_vec();
+/// Adds records of coordinate systems to the header of a LAS file, whose points come next.
+pub(crate) fn add_records(header: &mut Vec<u8>, records: &[(u16, Vec<u8>)]) {
     for (id, data) in records {
         let mut record = [0; 54];
         record[2..17].copy_from_slice(b"LASF_Projection");
         record[18..20].copy_from_slice(&id.to_le_bytes());
         record[20..22].copy_from_slice(&(data.len() as u16).to_le_bytes());
-        bytes.extend(record);
-        bytes.extend(data);
+        header.extend(record);
+        header.extend(data);
     }
-    let points_at = bytes.len() as u32;
-    bytes[96..100].copy_from_slice(&points_at.to_le_bytes());
-    bytes[100..104].copy_from_slice(&(records.len() as u32).to_le_bytes());
+    let points_at = header.len() as u32;
+    header[96..100].copy_from_slice(&points_at.to_le_bytes());
+    header[100..104].copy_from_slice(&(records.len() as u32).to_le_bytes());
+}
+
+/// Writes a sound LAS file with these records of coordinate systems.
+pub(crate) fn write(folder: &Path, name: &str, records: &[(u16, Vec<u8>)]) -> PathBuf {
+    let plain = LasFile::new(2, 0, 0, 200).las();
+    let (header, points) = plain.split_at(227);
+    let mut bytes = header.to_vec();
+    add_records(&mut bytes, records);
     // The box: greatest and least of x, y and z.
     for (at, value) in [502_000.0f64, 498_000.0, 4_002_000.0, 3_998_000.0, 1.0, -1.0].into_iter().enumerate() {
         bytes[179 + 8 * at..][..8].copy_from_slice(&value.to_le_bytes());

@@ -1,7 +1,7 @@
 //! Jobs on COPC files: bounds read only a part of the file, and the mesh is that of the whole file.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
@@ -25,13 +25,19 @@ fn digest_with_input(job: &Job, file: &Path) -> Value {
     verdict["digest"].clone()
 }
 
+/// Writes the cloud as COPC, and the same points as LAZ.
+fn with_and_without_octree(folder: &Path) -> [PathBuf; 2] {
+    let files = ["a.copc.laz", "b.laz"].map(|name| folder.join(name));
+    let bytes = made().bytes();
+    fs::write(&files[0], &bytes).unwrap();
+    fs::write(&files[1], without_octree(&bytes)).unwrap();
+    files
+}
+
 #[test]
 fn the_mesh_is_that_of_the_whole_file_with_the_same_bounds() {
     let folder = tempfile::tempdir().unwrap();
-    let [copc, laz] = ["a.copc.laz", "b.laz"].map(|name| folder.path().join(name));
-    let bytes = made().bytes();
-    fs::write(&copc, &bytes).unwrap();
-    fs::write(&laz, without_octree(&bytes)).unwrap();
+    let [copc, laz] = with_and_without_octree(folder.path());
     for surface in ["ground", "all"] {
         let job = |file| Job::on(&[file]).with("input", SMALL).with("input", &format!("surface = \"{surface}\""));
         let (with, without) = (job(&copc), job(&laz));
@@ -86,10 +92,7 @@ fn a_wrong_octree_leads_to_the_whole_file_and_a_warning() {
 #[test]
 fn parts_read_only_the_nodes_that_meet_the_bounds() {
     let folder = tempfile::tempdir().unwrap();
-    let [copc, laz] = ["a.copc.laz", "b.laz"].map(|name| folder.path().join(name));
-    let bytes = made().bytes();
-    fs::write(&copc, &bytes).unwrap();
-    fs::write(&laz, without_octree(&bytes)).unwrap();
+    let [copc, laz] = with_and_without_octree(folder.path());
     let job = |file| {
         let bounds = "bounds = [499400.0, 3999400.0, 500450.0, 4000450.0]";
         Job::on(&[file]).with("input", bounds).tiles_of(300).with("triangulation", "max_points_per_part = 3000")

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use gdt_batch::input::{Crs, CrsTransform, DatumRule, NamedCrs};
 
-use crate::coordinate_systems::{code, keys, text, warnings};
+use crate::coordinate_systems::{add_records, code, keys, text, warnings};
 use crate::program::{Job, gdt_batch, number};
 
 /// Both lie between two zones of UTM.
@@ -63,17 +63,7 @@ fn las_of(folder: &Path, rows: &[[f64; 3]], name: &str, records: &[(u16, Vec<u8>
     bytes[..4].copy_from_slice(b"LASF");
     (bytes[24], bytes[25]) = (1, 2);
     bytes[94..96].copy_from_slice(&227u16.to_le_bytes());
-    for (id, data) in records {
-        let mut record = [0; 54];
-        record[2..17].copy_from_slice(b"LASF_Projection");
-        record[18..20].copy_from_slice(&id.to_le_bytes());
-        record[20..22].copy_from_slice(&(data.len() as u16).to_le_bytes());
-        bytes.extend(record);
-        bytes.extend(data);
-    }
-    let at = bytes.len() as u32;
-    bytes[96..100].copy_from_slice(&at.to_le_bytes());
-    bytes[100..104].copy_from_slice(&(records.len() as u32).to_le_bytes());
+    add_records(&mut bytes, records);
     bytes[105..107].copy_from_slice(&20u16.to_le_bytes());
     bytes[107..111].copy_from_slice(&(rows.len() as u32).to_le_bytes());
     let least = [0, 1, 2].map(|axis| rows.iter().map(|row| row[axis]).fold(f64::INFINITY, f64::min));
