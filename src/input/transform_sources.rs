@@ -60,7 +60,7 @@ pub fn transform_sources(sources: &mut [Source], options: &InputOptions, warning
 fn transform(source: &mut Source, from: Crs, to: &Crs, options: &InputOptions) -> Result<Option<String>> {
     let plane = |crs: &Crs| Crs { vertical: None, vertical_system: None, ..crs.clone() };
     let is_moved = !plane(&from).same_as(&plane(to)) || from.horizontal != to.horizontal;
-    let (own, wanted) = (metres_of_heights(&from), metres_of_heights(to));
+    let (own, wanted) = (from.metres_per_unit_of_height(), to.metres_per_unit_of_height());
     let heights = (own != wanted).then_some(own / wanted);
     let steps = [options.resolution.step(), options.resolution_z.step()];
     let own = source.own_coordinates();
@@ -125,15 +125,10 @@ fn said_or_missing(source: &Source, options: &InputOptions) -> Crs {
     }
 }
 
-/// Returns the length of the unit of heights in metres: what is said, or else that of the plane, or the metre.
-fn metres_of_heights(crs: &Crs) -> f64 {
-    crs.vertical.or(crs.metres_per_unit()).unwrap_or(1.0)
-}
-
 /// Returns the unit of heights of the job: that of the system that the user names, or that of all sources, or that of the plane.
 fn common_unit_of_heights(said: &[Crs], to: &Crs) -> f64 {
-    let first = said.first().map(metres_of_heights);
-    let common = first.filter(|first| said.iter().all(|crs| metres_of_heights(crs) == *first));
+    let first = said.first().map(Crs::metres_per_unit_of_height);
+    let common = first.filter(|first| said.iter().all(|crs| crs.metres_per_unit_of_height() == *first));
     to.vertical.or(common).or(to.metres_per_unit()).unwrap_or(1.0)
 }
 

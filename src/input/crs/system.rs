@@ -70,6 +70,11 @@ impl Crs {
         self.horizontal.metres_per_unit()
     }
 
+    /// Returns the length of the unit of heights in metres: what is said, or else that of the plane, or the metre.
+    pub(crate) fn metres_per_unit_of_height(&self) -> f64 {
+        self.vertical.or(self.metres_per_unit()).unwrap_or(1.0)
+    }
+
     /// Returns whether it says where the coordinates are. One that knows only a unit does not.
     pub fn is_named(&self) -> bool {
         self.epsg.is_some() || self.name.is_some() || self.wkt.is_some() || !self.unread_keys.is_empty()

@@ -5,7 +5,7 @@ use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use crate::input::file::range::{FileRange, SHRUNK};
+use crate::input::file::range::{FileRange, READ_AHEAD, SHRUNK};
 use crate::positional_io::read_exact_at;
 use crate::{Error, Result, fault};
 
@@ -69,8 +69,13 @@ impl RandomAccessFile {
 
     /// Returns a buffered reader of the bytes of `range`.
     pub(crate) fn range(&self, range: Range<u64>) -> Result<FileRange> {
+        self.range_with(range, READ_AHEAD)
+    }
+
+    /// As [`RandomAccessFile::range`], for a caller who knows what he skips: at most `read_ahead` bytes of that are read.
+    pub(crate) fn range_with(&self, range: Range<u64>, read_ahead: usize) -> Result<FileRange> {
         let file = self.file.try_clone().map_err(Error::io("read", &self.path))?;
-        Ok(FileRange::new(file, range))
+        Ok(FileRange::new(file, range, read_ahead))
     }
 }
 

@@ -10,12 +10,14 @@ use crate::positional_io::read_at;
 /// The message for a file that ends before the size it had when it was opened.
 pub(crate) const SHRUNK: &str = "it became shorter while it was read; run again when it is complete";
 
-/// The number of bytes that a [`FileRange`] reads at once.
-const BUFFER: usize = 1 << 16;
+/// The number of bytes that a [`FileRange`] usually reads at once.
+pub(crate) const READ_AHEAD: usize = 1 << 16;
 
-/// A buffered reader of a range of a file. It ends where the range ends, and does not read the bytes that a caller skips.
+/// A buffered reader of a range of a file. It ends where the range ends, and reads at most `read_ahead` of the bytes that a caller skips.
 pub(crate) struct FileRange {
     file: File,
+    /// The number of bytes to read at once.
+    read_ahead: usize,
     /// The position in the file of the first byte after the buffer.
     next: u64,
     end: u64,
@@ -26,8 +28,8 @@ pub(crate) struct FileRange {
 
 impl FileRange {
     /// Returns a reader of the bytes of `range` in `file`.
-    pub(crate) fn new(file: File, range: Range<u64>) -> FileRange {
-        FileRange { file, next: range.start, end: range.end, buffer: Vec::new(), at: 0 }
+    pub(crate) fn new(file: File, range: Range<u64>, read_ahead: usize) -> FileRange {
+        FileRange { file, read_ahead, next: range.start, end: range.end, buffer: Vec::new(), at: 0 }
     }
 
     /// Reads into `out` past the buffer, at most to the end of the range. Fails if the file ends before the range does.
@@ -49,7 +51,7 @@ impl FileRange {
     fn refill(&mut self) -> io::Result<()> {
         let mut buffer = std::mem::take(&mut self.buffer);
         self.at = 0;
-        buffer.resize(BUFFER, 0);
+        buffer.resize(self.read_ahead, 0);
         let count = self.read_direct(&mut buffer)?;
         buffer.truncate(count);
         self.buffer = buffer;
@@ -60,7 +62,7 @@ impl FileRange {
 impl Read for FileRange {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         if self.at == self.buffer.len() {
-            if out.len() >= BUFFER {
+            if out.len() >= self.read_ahead {
                 self.buffer.clear();
                 self.at = 0;
                 return self.read_direct(out);

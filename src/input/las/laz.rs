@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::catch_panic::{Panicked, catch_panic};
 use crate::input::file::random_access::RandomAccessFile;
-use crate::input::file::range::FileRange;
+use crate::input::file::range::{FileRange, READ_AHEAD};
 use crate::input::las::chunk_table::{self, LazChunk};
 use crate::input::las::compression::LazCompression;
 use crate::input::las::copc::{CopcIndex, place};
@@ -31,6 +31,9 @@ const LEAST_RECORDS: u64 = 50_000;
 
 /// The number of decoded bytes held at once, unless a single record is longer.
 const BLOCK: usize = 1 << 17;
+
+/// The number of bytes to read ahead in a layered chunk. Layers are read as a whole, and those that are not wanted are skipped.
+const LAYER_READ_AHEAD: usize = 1 << 9;
 
 /// The most bytes of a layered chunk that is decoded: its layers must be in memory together.
 const LARGEST_CHUNK: u64 = 1 << 26;
@@ -206,7 +209,8 @@ impl ChunkDecoder<'_> {
     fn decode(&mut self, filter: &mut impl RecordSink) -> std::result::Result<(), ChunkError> {
         let held = self.records_held()?.min(self.wanted);
         let end = self.chunk.first + held;
-        let mut range = self.file.range(self.chunk.bytes.clone())?;
+        let read_ahead = if self.points.compression.layers.is_some() { LAYER_READ_AHEAD } else { READ_AHEAD };
+        let mut range = self.file.range_with(self.chunk.bytes.clone(), read_ahead)?;
         while self.next < end {
             let stop = self.chunk.restart.map_or(end, |records| self.next.saturating_add(records).min(end));
             range = self.decode_run(range, stop, filter)?;

@@ -39,7 +39,7 @@ fn transform(file: &mut LineFile, own: &Crs, points: &Crs, datums: DatumRule) ->
         return Err(refuse(&format!("they differ in {difference}, and the way between such heights needs a geoid")));
     }
     let way = CrsTransform::between(own, points, datums).map_err(|why| refuse(&why))?;
-    let factor = metres_of_heights(own) / metres_of_heights(points);
+    let factor = own.metres_per_unit_of_height() / points.metres_per_unit_of_height();
     let target = points.label();
     for feature in &mut file.features {
         let number = feature.number;
@@ -56,11 +56,6 @@ fn transform(file: &mut LineFile, own: &Crs, points: &Crs, datums: DatumRule) ->
     }
     file.warnings.push(format!("its lines are transformed from {} to {target}", own.label()));
     Ok(())
-}
-
-/// Returns the length of the unit of heights in metres: what is said, or else that of the plane, or the metre.
-fn metres_of_heights(crs: &Crs) -> f64 {
-    crs.vertical.or(crs.metres_per_unit()).unwrap_or(1.0)
 }
 
 fn other_system(file: &LineFile, own: &Crs, points: &Crs, why: &str) -> Error {
