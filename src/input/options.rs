@@ -135,7 +135,7 @@ impl InputOptions {
             classes: self.kept_classes(),
             strict_classes: self.chooses_classes(),
             returns: self.kept_returns(),
-            use_index: true,
+            use_index: self.bounds.is_some(),
             fields,
         }
     }
@@ -186,6 +186,9 @@ pub enum InvalidValue {
     /// Not a rectangle.
     #[error("bounds are [xmin, ymin, xmax, ymax] with xmin < xmax and ymin < ymax, not {0:?}")]
     Bounds([f64; 4]),
+    /// Another number of numbers.
+    #[error("bounds are four numbers, [xmin, ymin, xmax, ymax], without heights, and not {0}")]
+    BoundsCount(usize),
     /// Not a step.
     #[error("resolution is \"auto\" or a positive number of source units, such as 0.01")]
     Resolution,
@@ -196,13 +199,14 @@ pub enum InvalidValue {
 
 /// A rectangle [xmin, ymin, xmax, ymax] in source units, borders included.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "[f64; 4]")]
+#[serde(try_from = "Vec<f64>")]
 pub struct SourceBounds(pub [f64; 4]);
 
-impl TryFrom<[f64; 4]> for SourceBounds {
+impl TryFrom<Vec<f64>> for SourceBounds {
     type Error = InvalidValue;
 
-    fn try_from(b: [f64; 4]) -> Result<SourceBounds, InvalidValue> {
+    fn try_from(numbers: Vec<f64>) -> Result<SourceBounds, InvalidValue> {
+        let b: [f64; 4] = numbers.try_into().map_err(|numbers: Vec<f64>| InvalidValue::BoundsCount(numbers.len()))?;
         if b.iter().any(|v| !v.is_finite()) || b[0] >= b[2] || b[1] >= b[3] {
             return Err(InvalidValue::Bounds(b));
         }

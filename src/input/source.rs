@@ -126,7 +126,7 @@ pub fn open_chosen(path: &Path, text: &TextOptions, choice: &RowChoice) -> Resul
     file.read_exact_at(&mut start[..held], 0)?;
     let start = &start[..held];
     if start.starts_with(b"LASF") {
-        return open_las(&file, choice.bounds.is_some() && choice.use_index);
+        return open_las(&file, choice.use_index);
     }
     refuse_other_formats(path, start)?;
     open_text(&file, text, choice)
@@ -379,6 +379,11 @@ impl Source {
         let of_records = transform.of_records(&self.axes).map_err(|why| Error::input(&self.path, why))?;
         let request = ChunkRequest { bounds: self.own_bounds(request.bounds), ..request };
         self.read_own_chunk(chunk, request, &mut TransformedSink::new(&of_records, sink))
+    }
+
+    /// Returns whether an index of the file tells where its points lie.
+    pub(crate) fn has_index(&self) -> bool {
+        matches!(&self.points, PointData::Laz(points) if points.has_index())
     }
 
     /// Returns the bounds for an index of the file: none if they are in another system than the file.

@@ -11,7 +11,9 @@ const LEVELS: &str = "levels";
 const CUT: &str = "cut";
 const TILESETS: &str = "tilesets";
 const GLB: &str = "glb";
+const RASTER: &str = "raster";
 const JSON: &str = "json";
+const TIF: &str = "tif";
 const CHECKSUMS: &str = "XXH128SUMS";
 
 /// A folder holds at most this many numbered files, and as many folders for each power of this that numbers reach.
@@ -78,8 +80,9 @@ impl OutputFiles {
     }
 
     /// Returns the folders that hold numbered files, each with the ending of their names.
-    pub fn numbered_folders(&self) -> [(PathBuf, &'static str); 4] {
-        [(self.tiles(), GLB), (self.levels(), GLB), (self.cut(), GLB), (self.tilesets(), JSON)]
+    pub fn numbered_folders(&self) -> [(PathBuf, &'static str); 5] {
+        let rasters = (self.directory.join(RASTER), TIF);
+        [(self.tiles(), GLB), (self.levels(), GLB), (self.cut(), GLB), (self.tilesets(), JSON), rasters]
     }
 
     /// Returns the list of all tiles as 3D Tiles, or of the coarsest ones if there are external tilesets.
@@ -127,6 +130,16 @@ impl OutputFiles {
         self.directory.join("terrain.tif")
     }
 
+    /// Returns file number `number` of a raster in several files.
+    pub fn raster_file(&self, number: usize) -> PathBuf {
+        self.directory.join(raster_uri(number))
+    }
+
+    /// Returns the list of the files of such a raster, which programs open as one.
+    pub fn raster_list(&self) -> PathBuf {
+        self.directory.join("terrain.vrt")
+    }
+
     /// Returns the page that shows the terrain in a browser.
     pub fn page(&self) -> PathBuf {
         self.directory.join("index.html")
@@ -151,6 +164,11 @@ pub fn tile_uri(tile: usize) -> String {
 /// Returns the path of the coarser tile at tree node `node` from the output directory.
 pub fn level_uri(node: usize) -> String {
     numbered(LEVELS, node, GLB)
+}
+
+/// Returns the path of file number `number` of a raster in several files from the output directory.
+pub fn raster_uri(number: usize) -> String {
+    numbered(RASTER, number, TIF)
 }
 
 /// Returns the path of an external tileset from the output directory, or that of the main tileset.

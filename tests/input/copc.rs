@@ -112,7 +112,7 @@ fn a_wrong_octree_is_left_aside_with_a_warning() {
         (&|entries| entries[2].points += 1, "the table of chunks has not"),
         (&|entries| entries[2].bytes -= 1, "the table of chunks has not"),
         (&|entries| entries[2].at += 1, "the table of chunks has not"),
-        (&|entries| entries[4].key = [3, 8, 0, 0], "3-8-0, which lies in no octree"),
+        (&|entries| entries[4].key = [3, 8, 0, 0], "[3, 8, 0, 0] (level, x, y, z), which lies in no octree"),
         (&|entries| entries[4].key = [31, 0, 0, 0], "lies in no octree"),
         (&|entries| entries[1].points = -1, "is none"),
         (&|entries| entries.iter_mut().for_each(|entry| entry.key.swap(1, 2)), "where it does not lie"),

@@ -73,6 +73,11 @@ fn wrong_configurations_are_refused_with_the_line_number() {
         ("files", "fils", &["line 2", "fils"][..]),
         ("[\"cloud.csv\"]", "3", &["line 2", "sequence"]),
         ("[output]", "bounds = [9, 0, 1, 1]\n[output]", &["line 3", "xmin"]),
+        (
+            "[output]",
+            "bounds = [0, 0, 5, 9, 9, 9]\n[output]",
+            &["line 3", "four numbers", "without heights, and not 6"],
+        ),
         ("[output]", "classes = [300]\n[output]", &["line 3", "300"]),
         ("[output]", "duplicates = \"last\"\n[output]", &["line 3", "last", "lowest"]),
         ("[output]", "resolution = -1\n[output]", &["line 3", "resolution"]),

@@ -216,6 +216,67 @@ fn overviews_are_means_of_the_heights_below() {
     assert!(last.width <= 512 && last.height <= 512);
 }
 
+/// Returns what the attributes of a line of a list say, as numbers.
+fn attributes<const N: usize>(line: &str, names: [&str; N]) -> [usize; N] {
+    names.map(|name| {
+        let (_, after) = line.split_once(&format!("{name}=\"")).unwrap();
+        after.split('"').next().unwrap().parse().unwrap()
+    })
+}
+
+#[test]
+fn a_grid_of_files_has_the_cells_of_the_one_file() {
+    // A ring, so that there are files without any tile.
+    let ring: Cloud = hills(20_000, 3);
+    let far = |point: &[i64; 3]| [point[0] - 10_000, point[1] - 10_000].iter().any(|way| way.abs() > 6_000);
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = clouds::write(folder.path(), "cloud.csv", &ring.into_iter().filter(far).collect());
+    let job = |options: &str| {
+        let job = with_raster(Job::on(&[&cloud]).tiles_of(500), &format!("resolution = 9.0{options}"));
+        job.with("output", "max_edge = 900.0")
+    };
+    let whole = job("");
+    whole.report();
+    let image = &raster(&whole).images[0];
+    let parts = job(", cells_per_file = 512");
+    let report = parts.report();
+    let list = fs::read_to_string(parts.out().join("terrain.vrt")).unwrap();
+    let lines =
+        |name: &str| list.lines().filter(move |line| line.contains(name)).map(str::to_owned).collect::<Vec<_>>();
+    let [width, height] = attributes(&lines("<VRTDataset")[0], ["rasterXSize", "rasterYSize"]);
+    assert_eq!((width, height), (image.width, image.height));
+    let mut cells = vec![-9999.0; width * height];
+    let (names, places) = (lines("<SourceFilename"), lines("<DstRect"));
+    for (name, place) in names.iter().zip(&places) {
+        let uri = name.split(['>', '<']).nth(2).unwrap();
+        let [left, top, columns, rows] = attributes(place, ["xOff", "yOff", "xSize", "ySize"]);
+        let mut decoder = Decoder::new(BufReader::new(File::open(parts.out().join(uri)).unwrap())).unwrap();
+        assert_eq!(decoder.dimensions().unwrap(), (columns as u32, rows as u32));
+        let corner = decoder.get_tag_f64_vec(Tag::Unknown(33922)).unwrap();
+        let expected = [raster(&whole).corner[0] + 9.0 * left as f64, raster(&whole).corner[1] - 9.0 * top as f64];
+        assert_eq!(corner[3..5], expected);
+        let DecodingResult::F32(own) = decoder.read_image().unwrap() else { panic!("not of single precision") };
+        for (row, own) in own.chunks(columns).enumerate() {
+            cells[(top + row) * width + left..][..columns].copy_from_slice(own);
+        }
+    }
+    assert!(cells == image.cells);
+    let [files, heights] = ["files", "heights"].map(|key| number(&report["raster"][key]));
+    let with_height = image.cells.iter().filter(|z| **z != -9999.0).count();
+    assert_eq!((files as usize, heights as usize), (names.len(), with_height));
+    assert!((4..25).contains(&names.len()), "{names:?}");
+    parts.verified();
+    // Parts have the same files, and what another job does not write it removes.
+    let by_parts = in_parts(&in_files(folder.path(), &hills(2_000, 3), 1_000), 1_000);
+    let by_parts = with_raster(by_parts, "resolution = 30.0, cells_per_file = 512");
+    by_parts.report();
+    let text = fs::read_to_string(by_parts.config()).unwrap();
+    fs::write(by_parts.config(), text.replace(", cells_per_file = 512", "")).unwrap();
+    gdt_batch(by_parts.folder(), &["job.toml"]).succeeded();
+    assert!(by_parts.out().join("terrain.tif").exists());
+    assert!(!by_parts.out().join("terrain.vrt").exists() && !by_parts.out().join("raster").exists());
+}
+
 #[test]
 fn a_raster_has_any_size_that_a_file_can_have() {
     let folder = tempfile::tempdir().unwrap();
@@ -223,8 +284,9 @@ fn a_raster_has_any_size_that_a_file_can_have() {
     // One cell with its centre in the terrain, and one with its centre far away.
     for (side, is_inside) in [(2_000.0, true), (1e9, false)] {
         let job = with_raster(Job::on(&[&cloud]), &format!("resolution = {side:?}"));
-        job.report();
+        let report = job.report();
         assert_eq!(has_the_heights_of_the_triangles(&job, side), usize::from(is_inside));
+        assert_eq!(warnings(&report).contains("no centre of a cell lies within the terrain"), !is_inside);
         let image = &raster(&job).images[0];
         assert_eq!((image.width, image.height), (1, 1));
     }
@@ -253,6 +315,13 @@ fn a_system_and_its_heights_are_named() {
     for (key, number) in expected {
         assert_eq!(value(key), Some(number), "{key}: {keys:?}");
     }
+    // A code that says heights too is the code of its plane and that of its heights: a reader would take it for no plane.
+    let cloud = write(folder.path(), "plain.las", &[]);
+    let job = with_raster(Job::on(&[&cloud]).with("input", "crs = \"EPSG:7405\""), "resolution = 10");
+    job.report();
+    let keys = raster(&job).keys;
+    let value = |key: u32| keys[4..].chunks(4).find(|entry| entry[0] == key).map(|entry| entry[3]);
+    assert_eq!([3072, 4096].map(value), [Some(27700), Some(5701)], "{keys:?}");
 }
 
 #[test]
@@ -289,6 +358,8 @@ fn wrong_options_are_refused() {
         ("resolution = nan", ["line 5", "positive"]),
         ("resolution = 1, nodata = inf", ["line 5", "nodata"]),
         ("resolution = 1, nodata = 1e40", ["line 5", "nodata"]),
+        ("resolution = 1, nodata = 1e-50", ["line 5", "nodata"]),
+        ("resolution = 1, cells_per_file = 100", ["line 5", "from 512 to 524288"]),
         ("resolution = 1, compression = \"lzw\"", ["line 5", "lzw"]),
         ("resolution = 1, size = 3", ["line 5", "size"]),
     ] {

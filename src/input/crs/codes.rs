@@ -97,6 +97,19 @@ mod tests {
     }
 
     #[test]
+    fn the_code_of_a_compound_system_is_that_of_its_plane() {
+        let is_compound = |code: &u32| text_of_code(*code).is_some_and(|text| text.starts_with("COMPD_CS"));
+        let compound: Vec<u32> = (1..=u32::from(u16::MAX)).filter(is_compound).collect();
+        assert!(compound.len() > 100);
+        for code in compound {
+            let (whole, plane) = (from_epsg(code).unwrap(), from_epsg(code).unwrap().epsg.unwrap());
+            let text = text_of_code(plane).unwrap();
+            assert!(text.starts_with("PROJCS") || text.starts_with("GEOGCS"), "EPSG:{code} has the plane EPSG:{plane}");
+            assert!(whole.vertical_system.is_some() && whole.difference_to_code().is_none(), "EPSG:{code}");
+        }
+    }
+
+    #[test]
     fn codes_of_systems_and_heights_are_known_by_the_tables() {
         // SIRGAS-Chile 2010 / UTM zone 18S is younger than the list of the crate.
         assert!(text_of_code(8950).unwrap().contains("SIRGAS-Chile 2010"));

@@ -4,12 +4,24 @@ use crate::input::crs::codes::text_of_code;
 use crate::input::crs::system::{Crs, CrsKind};
 use crate::input::crs::unit::Unit;
 use crate::input::crs::vertical::VerticalSystem;
-use crate::input::crs::wkt::{GEOGRAPHIC, LOCAL, PROJECTED, VERTICAL, WktNode, length, parts, unbound, units};
+use crate::input::crs::wkt::{
+    GEOGRAPHIC, LOCAL, PROJECTED, VERTICAL, WktNode, is_compound, length, parts, unbound, units,
+};
 
 /// Returns the system of an EPSG code; `None` for a code that is not in the list of known ones.
 pub(crate) fn from_epsg(code: u32) -> Option<Crs> {
     let crs = parse(text_of_code(code)?)?;
-    Some(Crs { epsg: Some(code), ..crs })
+    // Of a compound system, the code of its plane: that of the whole says heights too, and readers of codes take it for no plane.
+    let plane = crs.wkt.as_deref().is_some_and(is_compound).then_some(crs.epsg).flatten();
+    Some(Crs { epsg: plane.or(Some(code)), ..crs })
+}
+
+/// Returns the code of the plane of the compound system that `roots` are, if only the whole has one.
+fn code_of_plane(roots: &[WktNode]) -> Option<u32> {
+    let [whole] = roots else { return None };
+    let known = WktNode::parse_all(text_of_code(whole.epsg()?)?)?;
+    let parts = known.iter().flat_map(parts).map(unbound);
+    parts.into_iter().find(|part| PROJECTED.contains(&part.keyword.as_str()))?.epsg()
 }
 
 /// Returns the system that `text` describes; `None` if it is not the well-known text of a coordinate reference system.
@@ -24,7 +36,7 @@ pub(crate) fn parse(text: &str) -> Option<Crs> {
     let unit_of_height = vertical.and_then(|vertical| units(vertical).0).or(third).and_then(length);
     Some(Crs {
         wkt: Some(text.trim_end_matches(['\0', ' ', '\n', '\r', '\t']).to_string()),
-        epsg: horizontal.epsg(),
+        epsg: horizontal.epsg().or_else(|| code_of_plane(&roots)),
         kind,
         horizontal: unit.map_or(Unit::Unknown, |unit| match kind {
             CrsKind::Geographic => angle(unit),

@@ -155,6 +155,11 @@ pub(crate) fn find(text: &str, keywords: &[&str]) -> Option<WktNode> {
     parts.find(|part| keywords.contains(&part.keyword.as_str())).cloned()
 }
 
+/// Returns whether `text` describes a system of a plane and one of heights together.
+pub(crate) fn is_compound(text: &str) -> bool {
+    COMPOUND.iter().any(|keyword| text.trim_start().starts_with(keyword))
+}
+
 /// Returns the parts of a compound system, or the system itself.
 pub(crate) fn parts(node: &WktNode) -> Vec<&WktNode> {
     if COMPOUND.contains(&node.keyword.as_str()) { node.children().collect() } else { vec![node] }

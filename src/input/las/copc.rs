@@ -53,8 +53,8 @@ enum IndexError {
     Page { at: u64, size: u64 },
     #[error("has more entries than {0} chunks can have, or leads in a circle")]
     TooManyEntries(usize),
-    #[error("has the node {0}, which lies in no octree")]
-    Node(Node),
+    #[error("has the node {0:?} (level, x, y, z), which lies in no octree")]
+    Node([i32; 4]),
     #[error("has {points} points in {bytes} bytes at byte {at} for the node {node}, and the table of chunks has not")]
     NoChunk { node: Node, at: u64, bytes: i64, points: i64 },
     #[error("has the chunk at byte {0} twice")]
@@ -232,9 +232,8 @@ fn nodes_of_chunks(file: &RandomAccessFile, root: Range<u64>, chunks: &[LazChunk
 
 /// Returns the place of the node of an entry.
 fn node(entry: &[u8]) -> Found<Node> {
-    let [level, x, y, z] = [0, 4, 8, 12].map(|at| int32(entry, at));
+    let key @ [level, x, y, z] = [0, 4, 8, 12].map(|at| int32(entry, at));
     let is_within = |number: i32| number >= 0 && (number as u64) < 1 << level;
-    let node = Node(level as u32, x as u32, y as u32);
     let is_node = (0..=MOST_LEVELS as i32).contains(&level) && is_within(x) && is_within(y) && is_within(z);
-    if is_node { Ok(node) } else { Err(IndexError::Node(node)) }
+    if is_node { Ok(Node(level as u32, x as u32, y as u32)) } else { Err(IndexError::Node(key)) }
 }

@@ -45,7 +45,7 @@ pub struct RowChoice {
     pub strict_classes: bool,
     /// Only rows of these returns.
     pub returns: KeptReturns,
-    /// Whether the index of a file of another format may tell what lies out of bounds. Without it, everything is decoded.
+    /// Whether the index of a file of another format may tell what lies out of the bounds of the job. Without it, everything is decoded.
     pub use_index: bool,
     /// What is read besides place and class if the text has it.
     pub fields: OptionalFields,
@@ -60,7 +60,7 @@ impl RowChoice {
             classes: [true; 256],
             strict_classes: false,
             returns: KeptReturns::All,
-            use_index: true,
+            use_index: false,
             fields: OptionalFields::RGB,
         }
     }

@@ -37,6 +37,7 @@ impl Leftovers {
             output.preview(),
             output.preview_world(),
             output.raster(),
+            output.raster_list(),
         ];
         // People give their own pages this name too.
         if !is_page_of_others(output)? {

@@ -35,7 +35,8 @@ impl Extent {
         if !extent.is_suspicious(sources, metres) {
             return Ok(extent);
         }
-        let boxes = sources.par_iter().map(|s| measure(s, options, 0..s.chunks())).collect::<Result<Vec<_>>>()?;
+        let boxes =
+            sources.par_iter().map(|s| measure(s, options, 0..s.chunks(), u64::MAX)).collect::<Result<Vec<_>>>()?;
         Ok(Extent::around(boxes, options))
     }
 
@@ -94,9 +95,10 @@ fn header_box(source: &Source, options: &InputOptions) -> Result<Option<SourceBo
     }
     // The measurement is coarse: allow for two of its steps.
     let slack = |axis: usize| 2.0 * MEASURE as f64 * to_float(source.axes[axis].scale);
-    match measure(source, options, 0..1)? {
+    let records = if source.has_index() { SAMPLED_RECORDS } else { u64::MAX };
+    match measure(source, options, 0..1, records)? {
         Some([min, max]) if (0..3).any(|k| min[k] < header[0][k] - slack(k) || max[k] > header[1][k] + slack(k)) => {
-            measure(source, options, 0..source.chunks())
+            measure(source, options, 0..source.chunks(), u64::MAX)
         }
         _ => Ok(Some(header)),
     }
@@ -105,9 +107,13 @@ fn header_box(source: &Source, options: &InputOptions) -> Result<Option<SourceBo
 /// The number of raw steps in a step of the measurement: every raw integer then lies within reach of the lattice.
 const MEASURE: i64 = 16;
 
-/// Returns the box of the points of `chunks` that have a class and a return that the job wants, to within [`MEASURE`] raw steps; `None`
-/// without a point.
-fn measure(source: &Source, options: &InputOptions, chunks: Range<usize>) -> Result<Option<SourceBox>> {
+/// The records by which the header of a file with an index is judged. They lie all over the area, because they are those of the index's
+/// root, and more of them would be read whatever the bounds.
+const SAMPLED_RECORDS: u64 = 4096;
+
+/// Returns the box of the points that have a class and a return that the job wants, among the first `records` records of each of `chunks`,
+/// to within [`MEASURE`] raw steps; `None` without a point.
+fn measure(source: &Source, options: &InputOptions, chunks: Range<usize>, records: u64) -> Result<Option<SourceBox>> {
     if source.format == FileFormat::Text {
         return Ok(source.wanted_box());
     }
@@ -127,7 +133,7 @@ fn measure(source: &Source, options: &InputOptions, chunks: Range<usize>) -> Res
     let measure_chunk = |chunk| {
         interrupt::check()?;
         let mut found = None;
-        source.decode(chunk, &rules, &mut |points| {
+        source.decode_start(chunk, records, &rules, &mut |points| {
             let bounds = Bounds::of_points(points.iter().map(|p| [p.position[0], p.position[1], p.z]));
             found = union(found, bounds);
             Ok(())

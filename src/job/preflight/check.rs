@@ -18,7 +18,7 @@ use crate::job::preflight::kept_points::{KeptPoints, has_filter};
 use crate::job::progress::number_text::{grouped, mebibytes};
 use crate::job::publish::height_offset_check::check_height_offset;
 use crate::job::publish::one_file_limits::MAX_TRIANGLES_IN_ONE_FILE;
-use crate::job::publish::raster::check::check_raster;
+use crate::job::publish::raster::check::{check_raster, planned_raster};
 use crate::job::report::skipped_inputs::write_skipped;
 use crate::{Error, Result, Warnings, address_space};
 use serde::Serialize;
@@ -143,8 +143,7 @@ impl Preflight {
             records: plan.records,
             kept: kept.0,
             tiles: estimate::tiles(plan, kept),
-            // No job begins with a raster that cannot be made.
-            raster: check_raster(plan).ok().flatten().map(|grid| grid.size()),
+            raster: planned_raster(plan).map(|grid| grid.size()),
             breaklines: plan.breaklines.as_ref().map(|lines| lines.findings.subsegments),
             resolution: [plan.lattice.resolution.to_string(), plan.lattice.resolution_z.to_string()],
             size: [0, 1].map(|axis| plan.extent.extent(axis) as f64 * resolution),

@@ -8,7 +8,7 @@ use crate::job::partition::tree_builder::buffer_bytes;
 use crate::job::plan::budget::{BYTES_PER_LEAF_SITE, read_buffer_memory};
 use crate::job::plan::job_plan::Plan;
 use crate::job::preflight::kept_points::KeptPoints;
-use crate::job::publish::raster::check::check_raster;
+use crate::job::publish::raster::check::planned_raster;
 use crate::job::publish::raster::write_raster::raster_memory;
 use crate::output::Compression;
 use crate::output::attributes::AttributeChoice;
@@ -126,15 +126,13 @@ fn result_bytes(points: u64, tiles: u64, output: &OutputOptions, max_one_file: u
 
 /// Returns the bytes of the raster. While it is put together, its blocks take as many once more.
 fn raster_bytes(plan: &Plan) -> u64 {
-    // No job begins with a raster that cannot be made.
-    let Ok(Some(grid)) = check_raster(plan) else { return 0 };
-    let a_cell = match plan.options.output.raster.map(|raster| raster.compression) {
-        Some(RasterCompression::None) => size_of::<f32>() as u64,
-        // Of rough terrain; smooth one takes less.
-        _ => 3,
-    };
-    // Overviews take a third more.
-    grid.cells() * a_cell / 3 * 4
+    let Some(grid) = planned_raster(plan) else { return 0 };
+    let stored = grid.stored_cells();
+    match plan.options.output.raster.map(|raster| raster.compression) {
+        Some(RasterCompression::None) => stored * size_of::<f32>() as u64,
+        // Three bytes for a cell of rough terrain, and a third more for overviews. Cells without a height take a thousandth.
+        _ => grid.cells() * 4 + stored / 200,
+    }
 }
 
 /// Returns about how many bytes of memory the job of `plan` takes on `threads` threads.

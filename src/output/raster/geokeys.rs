@@ -61,6 +61,15 @@ impl RasterSystem {
         self.code.is_some() || self.written_text().is_some()
     }
 
+    /// Returns the system as programs take it from users: its codes, or its text.
+    pub(crate) fn definition(&self) -> Option<String> {
+        let code = self.code.map(|code| match self.vertical_code {
+            Some(heights) => format!("EPSG:{code}+{heights}"),
+            None => format!("EPSG:{code}"),
+        });
+        code.or_else(|| self.text.clone())
+    }
+
     fn written_text(&self) -> Option<String> {
         let text = format!("{TEXT_PREFIX}{}", self.text.as_ref()?);
         (text.len() <= LONGEST_TEXT).then_some(text)
@@ -111,7 +120,10 @@ impl RasterSystem {
         if let Some(name) = &self.vertical_name {
             keys.text(VERTICAL_CITATION, name);
         }
-        if let Some(code) = self.vertical_metres.and_then(unit_code) {
+        // A unit alone would make an unknown system of heights. It is worth that only if nobody would expect it.
+        let is_named = self.vertical_code.is_some() || self.vertical_name.is_some();
+        let unit = self.vertical_metres.filter(|metres| is_named || self.metres.is_some_and(|plane| plane != *metres));
+        if let Some(code) = unit.and_then(unit_code) {
             keys.number(VERTICAL_UNITS, code);
         }
     }

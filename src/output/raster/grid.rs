@@ -16,8 +16,35 @@ use rust_decimal::prelude::ToPrimitive;
 /// The most columns or rows that GDAL opens.
 const MOST_ALONG: i128 = i32::MAX as i128;
 
-/// The most cells of a raster: a terabyte before it is compressed.
-const MOST_CELLS: i128 = 1 << 38;
+/// How many cells a raster may have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CellLimit {
+    /// As many as one file has: a terabyte before it is compressed.
+    OneFile,
+    /// As many as a grid of files with this side has.
+    Files(u32),
+}
+
+/// The most files of a grid of files.
+const MOST_FILES: i128 = 1 << 16;
+
+impl CellLimit {
+    fn cells(self) -> i128 {
+        match self {
+            CellLimit::OneFile => 1 << 38,
+            CellLimit::Files(side) => MOST_FILES * i128::from(side).pow(2),
+        }
+    }
+}
+
+impl std::fmt::Display for CellLimit {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(match self {
+            CellLimit::OneFile => "one file has at most 2^38 cells (1100 GB; cells_per_file makes several files)",
+            CellLimit::Files(_) => "there are at most 65536 files of cells_per_file x cells_per_file cells",
+        })
+    }
+}
 
 /// Lengths in subunits are below 2 to the power of this: then products with a length in lattice steps, and sums of two, fit an `i128`.
 const WIDE_BITS: u32 = 90;
@@ -82,7 +109,12 @@ impl RasterGrid {
     ///
     /// # Errors
     /// A sentence that begins with a verb, if there are too many cells, or numbers have too many digits.
-    pub fn new(lattice: &Lattice, resolution: Decimal, bounds: Bounds<2>) -> Result<RasterGrid, String> {
+    pub fn new(
+        lattice: &Lattice,
+        resolution: Decimal,
+        bounds: Bounds<2>,
+        limit: CellLimit,
+    ) -> Result<RasterGrid, String> {
         let numbers = Integers::of(lattice, resolution).ok_or_else(too_many_digits)?;
         let [low, high] = [0, 1].map(|axis| match axis {
             0 => [bounds.min[0], bounds.max[0]],
@@ -94,13 +126,34 @@ impl RasterGrid {
             let [from, to] = numbers.cells(axis, least, most).ok_or_else(too_many_digits)?;
             (first[axis], sides[axis]) = (from, to - from + 1);
         }
-        let size = fitting(sides, resolution)?;
+        let size = fitting(sides, resolution, limit)?;
         let wide = numbers.subunits(first).ok_or_else(too_many_digits)?;
-        let fits = |bits: u32| wide.lengths(size).is_some_and(|lengths| lengths.iter().all(|v| v.abs() < 1 << bits));
-        if !fits(WIDE_BITS) {
+        if !wide.fits(size, WIDE_BITS) {
             return Err(too_many_digits());
         }
-        Ok(RasterGrid { resolution, first, size, narrow: fits(NARROW_BITS).then(|| wide.narrow()), wide })
+        Ok(RasterGrid { resolution, first, size, narrow: wide.narrow_for(size), wide })
+    }
+
+    /// Returns the grid of some of these columns and rows, each given as the first and the one after the last.
+    pub(crate) fn part(&self, [columns, rows]: [[u32; 2]; 2]) -> RasterGrid {
+        let begin = [columns[0], rows[0]].map(i128::from);
+        let size = [columns[1] - columns[0], rows[1] - rows[0]];
+        let first = [0, 1].map(|axis| self.first[axis] + begin[axis]);
+        let origin = [0, 1].map(|axis| self.wide.origin[axis] + self.wide.pitch * begin[axis]);
+        let wide = Subunits { origin, ..self.wide };
+        RasterGrid { resolution: self.resolution, first, size, narrow: wide.narrow_for(size), wide }
+    }
+
+    /// Returns the parts of the raster, row by row, if it is cut at whole multiples of `side` cells: the same for neighbouring rasters.
+    pub(crate) fn files(&self, side: u32) -> Vec<[[u32; 2]; 2]> {
+        let side = u64::from(side);
+        let cuts = |axis: usize| {
+            let (before, end) = (self.first[axis].rem_euclid(i128::from(side)) as u64, u64::from(self.size[axis]));
+            let next = move |at: &u64| Some((at + before) / side * side + side - before);
+            let starts = std::iter::successors(Some(0), next).take_while(move |at| *at < end);
+            starts.map(move |at| [at, next(&at).map_or(end, |past| past.min(end))].map(|cell| cell as u32))
+        };
+        cuts(1).flat_map(|rows| cuts(0).map(move |columns| [columns, rows])).collect()
     }
 
     /// Returns the numbers of columns and rows.
@@ -137,6 +190,12 @@ impl RasterGrid {
         [cells(0, west, east), cells(1, -north, -south)]
     }
 
+    /// Returns the number of cells that the file holds with its overviews: blocks are whole, however few of their cells are needed.
+    pub(crate) fn stored_cells(&self) -> u64 {
+        let stored = |size: &[u32; 2]| blocks(*size).into_iter().map(|count| (count * BLOCK) as u64).product::<u64>();
+        self.levels().iter().map(stored).sum()
+    }
+
     pub(crate) fn wide(&self) -> &Subunits<i128> {
         &self.wide
     }
@@ -166,22 +225,23 @@ fn nearest(exact: Decimal) -> f64 {
 }
 
 fn too_many_digits() -> String {
-    "has too many digits to meet the lattice of the points exactly: give one with fewer".into()
+    "has too many digits to meet the lattice of the points exactly: give a number with fewer, and no greater than the terrain".into()
 }
 
 /// Returns the sides if there are not too many cells.
-fn fitting(sides: [i128; 2], resolution: Decimal) -> Result<[u32; 2], String> {
+fn fitting(sides: [i128; 2], resolution: Decimal, limit: CellLimit) -> Result<[u32; 2], String> {
     let [columns, rows] = sides;
-    let fits = columns <= MOST_ALONG && rows <= MOST_ALONG && columns.saturating_mul(rows) <= MOST_CELLS;
+    let most = limit.cells();
+    let fits = columns <= MOST_ALONG && rows <= MOST_ALONG && columns.saturating_mul(rows) <= most;
     if fits {
         return Ok(sides.map(|side| side as u32));
     }
     let [width, height] = sides.map(|side| side as f64);
-    let share = (width * height / MOST_CELLS as f64).sqrt().max(width.max(height) / MOST_ALONG as f64);
+    let share = (width * height / most as f64).sqrt().max(width.max(height) / MOST_ALONG as f64);
     let gigabytes = width * height * 4.0 / 1e9;
     Err(format!(
-        "makes {columns} x {rows} cells, {gigabytes:.0} GB before compression, and one raster has at most 2^38 cells (1100 GB), \
-         2^31 - 1 along a side: set {} or more, or narrower [input] bounds",
+        "makes {columns} x {rows} cells, {gigabytes:.0} GB before compression, and {limit}, 2^31 - 1 along a side: set {} or more, or \
+         narrower [input] bounds",
         two_digits(resolution.to_f64().unwrap_or(1.0) * share)
     ))
 }
@@ -258,9 +318,19 @@ impl Subunits<i128> {
         Some(lengths)
     }
 
+    /// Returns whether all lengths of a raster of this size are below two to the power of `bits`.
+    fn fits(&self, size: [u32; 2], bits: u32) -> bool {
+        self.lengths(size).is_some_and(|lengths| lengths.iter().all(|length| length.abs() < 1 << bits))
+    }
+
+    fn narrow_for(&self, size: [u32; 2]) -> Option<Subunits<i64>> {
+        self.fits(size, NARROW_BITS).then(|| self.narrow())
+    }
+
     fn narrow(&self) -> Subunits<i64> {
-        // Twice the square of the extent, in subunits by lattice steps, bounds what is computed.
-        let most = (i128::from(i64::MAX) / 4 / self.step).isqrt();
+        // Twice the square of the extent, in subunits by lattice steps, bounds what is computed, and so does the extent times a cell.
+        let quarter = i128::from(i64::MAX) / 4;
+        let most = (quarter / self.step).isqrt().min(quarter / self.pitch);
         Subunits {
             step: self.step as i64,
             pitch: self.pitch as i64,
@@ -296,20 +366,26 @@ pub(super) mod tests {
         let lattice = lattice("100.25", "-7", "0.01");
         // x from 100.25 to 102, y from -8 to -6.5.
         let bounds = Bounds { min: [0, -100], max: [175, 50] };
-        let grid = RasterGrid::new(&lattice, decimal("0.5"), bounds).unwrap();
+        let grid = RasterGrid::new(&lattice, decimal("0.5"), bounds, CellLimit::OneFile).unwrap();
         assert_eq!((grid.corner(), grid.size(), grid.cell_size()), ([100.0, -6.5], [4, 3], 0.5));
-        let grid = RasterGrid::new(&lattice, decimal("1000"), bounds).unwrap();
+        let grid = RasterGrid::new(&lattice, decimal("1000"), bounds, CellLimit::OneFile).unwrap();
         assert_eq!((grid.corner(), grid.size()), ([0.0, 0.0], [1, 1]));
         // A terrain that is a line on an edge.
-        let grid = RasterGrid::new(&lattice, decimal("0.25"), Bounds { min: [0, 0], max: [0, 0] }).unwrap();
+        let grid = RasterGrid::new(&lattice, decimal("0.25"), Bounds { min: [0, 0], max: [0, 0] }, CellLimit::OneFile)
+            .unwrap();
         assert_eq!((grid.corner(), grid.size()), ([100.25, -7.0], [1, 1]));
     }
 
     #[test]
     fn a_coordinate_knows_the_centres_beside_it() {
         // Centres at 0.25, 0.75 and so on; lattice places are quarters.
-        let grid =
-            RasterGrid::new(&lattice("0", "0", "0.25"), decimal("0.5"), Bounds { min: [0, 0], max: [8, 8] }).unwrap();
+        let grid = RasterGrid::new(
+            &lattice("0", "0", "0.25"),
+            decimal("0.5"),
+            Bounds { min: [0, 0], max: [8, 8] },
+            CellLimit::OneFile,
+        )
+        .unwrap();
         let beside = |place| {
             let Beside { from, past } = grid.narrow().unwrap().beside(0, place, 4);
             (from, past)
@@ -321,7 +397,7 @@ pub(super) mod tests {
     #[test]
     fn a_raster_that_is_too_fine_says_what_would_do() {
         let bounds = Bounds { min: [0, 0], max: [1_000_000, 1_000_000] };
-        let grid = |cell: &str| RasterGrid::new(&lattice("0", "0", "1"), decimal(cell), bounds);
+        let grid = |cell: &str| RasterGrid::new(&lattice("0", "0", "1"), decimal(cell), bounds, CellLimit::OneFile);
         let said = grid("0.5").unwrap_err();
         assert!(
             said.starts_with("makes 2000000 x 2000000 cells, 16000 GB") && said.contains("set 2.0 or more"),
@@ -335,10 +411,39 @@ pub(super) mod tests {
 
     #[test]
     fn the_last_overview_fits_a_block() {
-        let grid =
-            RasterGrid::new(&lattice("0", "0", "1"), decimal("1"), Bounds { min: [0, 0], max: [1500, 513] }).unwrap();
+        let grid = RasterGrid::new(
+            &lattice("0", "0", "1"),
+            decimal("1"),
+            Bounds { min: [0, 0], max: [1500, 513] },
+            CellLimit::OneFile,
+        )
+        .unwrap();
         assert_eq!(grid.levels(), [[1500, 513], [750, 257], [375, 129]]);
         assert_eq!(blocks([1500, 513]), [3, 2]);
+    }
+
+    #[test]
+    fn files_are_cut_at_whole_multiples_and_hold_every_cell_once() {
+        let bounds = Bounds { min: [-700, -1300], max: [900, 20] };
+        let grid = RasterGrid::new(&lattice("0", "0", "1"), decimal("1"), bounds, CellLimit::Files(512)).unwrap();
+        let files = grid.files(512);
+        let mut cells = 0;
+        for &[columns, rows] in &files {
+            let part = grid.part([columns, rows]);
+            cells += part.cells();
+            let [west, north] = part.corner().map(|edge| edge as i64);
+            assert!(columns[0] == 0 || west % 512 == 0, "{west}");
+            assert!(rows[0] == 0 || north % 512 == 0, "{north}");
+            let [middle, its] = [grid.wide().center(0, columns[0] + 3), part.wide().center(0, 3)];
+            assert_eq!(middle, its);
+            assert_eq!(grid.wide().center(1, rows[0] + 3), part.wide().center(1, 3));
+        }
+        // Columns from -700 to 900 are cut at -512, 0 and 512; rows from 20 down to -1300 at 0, -512 and -1024.
+        assert_eq!((files.len(), cells), (16, grid.cells()));
+        assert_eq!(
+            grid.files(1 << 19),
+            [[[0, 700], [0, 20]], [[700, 1600], [0, 20]], [[0, 700], [20, 1320]], [[700, 1600], [20, 1320]]]
+        );
     }
 
     proptest! {
@@ -351,7 +456,7 @@ pub(super) mod tests {
         ) {
             let lattice = Lattice::new([Decimal::new(offset, 4); 3], Decimal::new(step, 4), Decimal::ONE).unwrap();
             let bounds = Bounds { min: [-30_000; 2], max: [30_000; 2] };
-            let Ok(grid) = RasterGrid::new(&lattice, Decimal::new(cell, 5), bounds) else { return Ok(()) };
+            let Ok(grid) = RasterGrid::new(&lattice, Decimal::new(cell, 5), bounds, CellLimit::OneFile) else { return Ok(()) };
             let [columns, rows] = grid.size();
             // In units of 5 decimals: the coordinate, and the first centres, which are half a cell inside.
             let world = |place: i32| i128::from(offset) * 20 + i128::from(step) * i128::from(place) * 20;

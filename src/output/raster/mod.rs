@@ -6,6 +6,7 @@
 //! not depend on the tiles, their order or the threads.
 
 pub(crate) mod block;
+pub(crate) mod file_list;
 pub(crate) mod geokeys;
 pub(crate) mod geotiff;
 pub mod grid;

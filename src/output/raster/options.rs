@@ -1,6 +1,7 @@
 //! The options of `[output.raster]`.
 
 use crate::geometry::lattice::shortest_decimal;
+use crate::output::raster::BLOCK;
 use rust_decimal::Decimal;
 use serde::{Deserialize, Serialize};
 
@@ -16,6 +17,40 @@ pub struct RasterOptions {
     /// What cells without a height hold.
     #[serde(default)]
     pub nodata: Nodata,
+    /// The side of a file in cells, for a grid of files instead of one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cells_per_file: Option<FileSide>,
+}
+
+/// The side of a file of a grid of files in cells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "u32", into = "u32")]
+pub struct FileSide(u32);
+
+impl FileSide {
+    /// Returns the number of cells.
+    pub fn cells(self) -> u32 {
+        self.0
+    }
+}
+
+impl TryFrom<u32> for FileSide {
+    type Error = String;
+
+    fn try_from(cells: u32) -> Result<FileSide, String> {
+        let fits = (BLOCK as u32..=1 << 19).contains(&cells);
+        fits.then_some(FileSide(cells)).ok_or_else(|| {
+            format!(
+                "cells_per_file is the side of a file in cells, from {BLOCK} to 524288, such as 8192, and not {cells}"
+            )
+        })
+    }
+}
+
+impl From<FileSide> for u32 {
+    fn from(side: FileSide) -> u32 {
+        side.0
+    }
 }
 
 /// The side of a cell in source units: a positive decimal.
@@ -102,6 +137,8 @@ impl TryFrom<toml::Value> for Nodata {
         let number = match value {
             toml::Value::Integer(i) => i as f32,
             toml::Value::Float(f) if f.is_nan() => f32::NAN,
+            // A number that is too small for single precision would become 0, which is a height.
+            toml::Value::Float(f) if f != 0.0 && f as f32 == 0.0 => f32::INFINITY,
             toml::Value::Float(f) => f as f32,
             toml::Value::String(text) if text == "nan" => f32::NAN,
             _ => f32::INFINITY,

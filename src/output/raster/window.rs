@@ -155,27 +155,36 @@ impl<'a> Window<'a> {
     }
 }
 
-/// Returns a block of an image with a side of so many pixels, by its column and row among the blocks: with `nodata` where there is no
-/// height, and how many heights of it are just that number. Returns `None` if it has no height.
+/// A block of an image.
+pub(crate) struct FilledBlock {
+    /// Its cells row by row, with the number for none where there is no height.
+    pub(crate) cells: Vec<f32>,
+    /// How many of them have a height.
+    pub(crate) heights: u64,
+    /// How many of these are just the number for none.
+    pub(crate) same_as_nodata: u64,
+}
+
+/// Returns a block of an image with a side of so many pixels, by its column and row among the blocks. Returns `None` if it has no height.
 /// `pixel` is the image, with NaN where there is none.
 pub(crate) fn filled(
     side: usize,
     [column, row]: [usize; 2],
     nodata: f32,
     pixel: impl Fn(usize) -> f32,
-) -> Option<(Vec<f32>, u64)> {
+) -> Option<FilledBlock> {
     let first = row * BLOCK * side + column * BLOCK;
-    let (mut cells, mut count, mut same) = (Vec::with_capacity(BLOCK * BLOCK), 0u64, 0);
+    let mut block = FilledBlock { cells: Vec::with_capacity(BLOCK * BLOCK), heights: 0, same_as_nodata: 0 };
     for row in 0..BLOCK {
         for column in 0..BLOCK {
             let height = pixel(first + row * side + column);
             let is_height = !height.is_nan();
-            count += u64::from(is_height);
-            same += u64::from(height == nodata);
-            cells.push(if is_height { height } else { nodata });
+            block.heights += u64::from(is_height);
+            block.same_as_nodata += u64::from(height == nodata);
+            block.cells.push(if is_height { height } else { nodata });
         }
     }
-    (count > 0).then_some((cells, same))
+    (block.heights > 0).then_some(block)
 }
 
 /// Returns the columns of a row in which no weight is negative. `first` are those of the first column.
@@ -202,6 +211,7 @@ mod tests {
     use super::*;
     use crate::geometry::Bounds;
     use crate::geometry::lattice::Lattice;
+    use crate::output::raster::grid::CellLimit;
     use proptest::prelude::*;
     use rust_decimal::Decimal;
 
@@ -209,7 +219,7 @@ mod tests {
 
     fn grid(cell: Decimal) -> RasterGrid {
         let lattice = Lattice::new([Decimal::ZERO; 3], Decimal::ONE, Decimal::ONE).unwrap();
-        RasterGrid::new(&lattice, cell, Bounds { min: [0; 2], max: [40; 2] }).unwrap()
+        RasterGrid::new(&lattice, cell, Bounds { min: [0; 2], max: [40; 2] }, CellLimit::OneFile).unwrap()
     }
 
     fn drawn(grid: &RasterGrid, positions: &[[i32; 3]], triangles: &[[u32; 3]]) -> Vec<u32> {

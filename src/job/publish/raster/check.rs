@@ -3,7 +3,7 @@
 
 use crate::geometry::Bounds;
 use crate::job::plan::job_plan::Plan;
-use crate::output::raster::grid::RasterGrid;
+use crate::output::raster::grid::{CellLimit, RasterGrid};
 use crate::output::raster::options::RasterOptions;
 use crate::{Error, Result};
 
@@ -13,15 +13,21 @@ use crate::{Error, Result};
 /// [`Error::Config`] if they are too many, or the resolution does not meet the lattice.
 pub(crate) fn grid_over(plan: &Plan, options: &RasterOptions, bounds: Bounds<2>) -> Result<RasterGrid> {
     let resolution = options.resolution;
-    RasterGrid::new(&plan.lattice, resolution.exact(), bounds)
+    let limit = options.cells_per_file.map_or(CellLimit::OneFile, |side| CellLimit::Files(side.cells()));
+    RasterGrid::new(&plan.lattice, resolution.exact(), bounds, limit)
         .map_err(|what| Error::Config(format!("[output.raster] resolution = {} {what}", resolution.number())))
 }
 
-/// Checks that `[output.raster]` asks for a raster that one file can hold, as far as the headers of the inputs tell. Returns its cells.
+/// Checks that `[output.raster]` asks for a raster that can be written, as far as the headers of the inputs tell. Returns its cells.
 ///
 /// # Errors
 /// [`Error::Config`] if it does not.
 pub fn check_raster(plan: &Plan) -> Result<Option<RasterGrid>> {
     let Some(options) = &plan.options.output.raster else { return Ok(None) };
     grid_over(plan, options, plan.extent).map(Some)
+}
+
+/// Returns the cells of the raster of a job that [`check_raster`] has let pass, as far as the headers tell.
+pub(crate) fn planned_raster(plan: &Plan) -> Option<RasterGrid> {
+    check_raster(plan).ok().flatten()
 }

@@ -8,7 +8,7 @@ use crate::output::raster::block::packed;
 use crate::output::raster::grid::blocks;
 use crate::output::raster::options::RasterOptions;
 use crate::output::raster::overview::halved;
-use crate::output::raster::window::{LatticeMesh, Window, filled};
+use crate::output::raster::window::{FilledBlock, LatticeMesh, Window, filled};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -31,7 +31,9 @@ pub(super) struct Pyramid<'a> {
     pub(super) blocks: &'a WaitingBlocks,
     /// Is told of each block of the raster itself that has a height.
     pub(super) done: &'a (dyn Fn() + Sync),
-    /// Cells whose height is just the number for none.
+    /// Cells with a height.
+    pub(super) heights: AtomicU64,
+    /// Those of them whose height is just the number for none.
     pub(super) same_as_nodata: AtomicU64,
 }
 
@@ -108,13 +110,14 @@ impl Pyramid<'_> {
         })
     }
 
-    /// Adds a block, and how many of its heights are just the number for none. A block without a height is not added.
-    fn add(&self, level: usize, at: [usize; 2], block: Option<(Vec<f32>, u64)>) -> Result<()> {
-        let Some((cells, same)) = block else { return Ok(()) };
+    /// Adds a block and counts its heights. A block without a height is not added.
+    fn add(&self, level: usize, at: [usize; 2], block: Option<FilledBlock>) -> Result<()> {
+        let Some(FilledBlock { cells, heights, same_as_nodata }) = block else { return Ok(()) };
         let [columns, _] = blocks(self.levels[level]);
         self.blocks.add(level, at[1] * columns + at[0], &packed(&cells, self.options.compression))?;
         if level == 0 {
-            self.same_as_nodata.fetch_add(same, Ordering::Relaxed);
+            self.heights.fetch_add(heights, Ordering::Relaxed);
+            self.same_as_nodata.fetch_add(same_as_nodata, Ordering::Relaxed);
             (self.done)();
         }
         Ok(())

@@ -1,26 +1,30 @@
 //! Writing `terrain.tif`.
 
 use crate::geometry::Bounds;
+use crate::job::durable::atomic_file::{PendingFile, create_folder_of, write_pending};
 use crate::job::durable::directory::JobDirectory;
 use crate::job::index::TileIndex;
 use crate::job::plan::budget::working_memory;
 use crate::job::plan::job_plan::Plan;
-use crate::job::publish::raster::check::{check_raster, grid_over};
+use crate::job::publish::raster::check::{grid_over, planned_raster};
 use crate::job::publish::raster::pyramid::{Pyramid, TileCells};
 use crate::job::publish::raster::system::{system_of, system_warning};
 use crate::job::publish::raster::tile_meshes::{boxes, lattice_mesh};
 use crate::job::publish::raster::waiting_blocks::WaitingBlocks;
 use crate::job::publish::side_files::EachTile;
 use crate::job::records::StepOutput;
+use crate::output::file_names::raster_uri;
 use crate::output::frame::Frame;
 use crate::output::raster::BLOCK;
 use crate::output::raster::block::packed;
+use crate::output::raster::file_list::{ListedFile, RasterList};
 use crate::output::raster::geotiff::{RasterHead, head};
 use crate::output::raster::grid::{RasterGrid, blocks};
 use crate::output::raster::options::RasterOptions;
 use crate::output::raster::window::{HeightScale, Window};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
+use std::ops::AddAssign;
 use std::sync::atomic::AtomicU64;
 
 /// The most levels that are drawn in one window, whose side is 512 times two to the power of this.
@@ -30,14 +34,35 @@ const HIGHEST_WINDOW: usize = 3;
 const WINDOW_SHARE: u64 = 4;
 
 /// What came of a raster.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct RasterStats {
     /// Columns and rows.
     pub size: [u32; 2],
-    /// Bytes of the file.
+    /// The number of GeoTIFF files.
+    pub files: u64,
+    /// Bytes of these files, and of the list of them if there are several.
     pub bytes: u64,
-    /// Cells whose height is just the number for none.
+    /// Cells with a height.
+    pub heights: u64,
+    /// Those of them whose height is just the number for none.
     pub same_as_nodata: u64,
+}
+
+impl AddAssign for RasterStats {
+    fn add_assign(&mut self, other: RasterStats) {
+        self.files += other.files;
+        self.heights += other.heights;
+        self.same_as_nodata += other.same_as_nodata;
+    }
+}
+
+/// A file of a raster.
+struct RasterPart {
+    /// Its path from the output directory, in a grid of files.
+    uri: Option<String>,
+    /// The columns and the rows of the raster that it has, each as the first and the one after the last.
+    cells: [[u32; 2]; 2],
+    grid: RasterGrid,
 }
 
 /// A raster that is to be written.
@@ -69,7 +94,19 @@ impl<'a> RasterWork<'a> {
 
     /// Returns the number of blocks of the raster itself.
     pub fn blocks(&self) -> u64 {
-        blocks(self.grid.size()).into_iter().map(|count| count as u64).product()
+        let of_part =
+            |part: &RasterPart| blocks(part.grid.size()).into_iter().map(|count| count as u64).product::<u64>();
+        self.parts().iter().map(of_part).sum()
+    }
+
+    /// Returns the files of the raster.
+    fn parts(&self) -> Vec<RasterPart> {
+        let [columns, rows] = self.grid.size();
+        let Some(side) = self.options.cells_per_file else {
+            return vec![RasterPart { uri: None, cells: [[0, columns], [0, rows]], grid: self.grid.clone() }];
+        };
+        let parts = (0..).zip(self.grid.files(side.cells()));
+        parts.map(|(n, cells)| RasterPart { uri: Some(raster_uri(n)), cells, grid: self.grid.part(cells) }).collect()
     }
 
     /// Writes the raster from the tiles, which must have their names. Calls `done` for each block that has a height.
@@ -77,7 +114,48 @@ impl<'a> RasterWork<'a> {
     /// # Errors
     /// [`Error::Io`] or [`Error::Input`] on a file, [`Error::Interrupted`].
     pub fn write(&self, directory: &JobDirectory, done: &(dyn Fn() + Sync)) -> Result<StepOutput<RasterStats>> {
-        let levels = self.grid.levels();
+        let mut stats = RasterStats { size: self.grid.size(), ..RasterStats::default() };
+        let (mut files, mut listed) = (Vec::new(), Vec::new());
+        for part in self.parts() {
+            let tiles = self.tiles_of(&part);
+            // A grid of files has none where there is no tile.
+            if tiles.is_empty() && part.uri.is_some() {
+                continue;
+            }
+            let (file, figures) = self.write_part(directory, &part, &tiles, done)?;
+            stats += figures;
+            files.push(file);
+            listed.extend(part.uri.map(|uri| ListedFile { uri, cells: part.cells }));
+        }
+        if self.options.cells_per_file.is_some() {
+            files.push(self.write_list(directory, listed)?);
+        }
+        stats.bytes = files.iter().map(|file| file.bytes).sum();
+        Ok(StepOutput { files, ..StepOutput::new(stats, Vec::new()) })
+    }
+
+    /// Returns the tiles that may cover cells of a file, with the cells counted from its own first.
+    fn tiles_of(&self, part: &RasterPart) -> Vec<TileCells> {
+        let within = |own: [u32; 2], cells: [u32; 2]| {
+            let [from, to] = [own[0].max(cells[0]), own[1].min(cells[1])];
+            (from < to).then(|| [from - cells[0], to - cells[0]])
+        };
+        let tiles = self.tiles.iter().filter_map(|tile| {
+            let (columns, rows) = (within(tile.columns, part.cells[0])?, within(tile.rows, part.cells[1])?);
+            Some(TileCells { tile: tile.tile, columns, rows })
+        });
+        tiles.collect()
+    }
+
+    /// Writes one file of the raster.
+    fn write_part(
+        &self,
+        directory: &JobDirectory,
+        part: &RasterPart,
+        tiles: &[TileCells],
+        done: &(dyn Fn() + Sync),
+    ) -> Result<(PendingFile, RasterStats)> {
+        let levels = part.grid.levels();
         let waiting = WaitingBlocks::create(&directory.raster_blocks(), &levels)?;
         let window_level = window_level(working_memory(&self.plan.options)).min(levels.len() - 1);
         let read = |tile: TileIndex| lattice_mesh(&directory.output().tile(tile.number()), self.frame);
@@ -88,27 +166,43 @@ impl<'a> RasterWork<'a> {
             read: &read,
             blocks: &waiting,
             done,
+            heights: AtomicU64::new(0),
             same_as_nodata: AtomicU64::new(0),
         };
-        let mut window = Window::new(&self.grid, self.heights(), BLOCK << window_level);
-        pyramid.draw(&mut window, &self.tiles)?;
+        let mut window = Window::new(&part.grid, self.heights(), BLOCK << window_level);
+        pyramid.draw(&mut window, tiles)?;
         drop(window);
-        let Pyramid { levels, same_as_nodata, .. } = pyramid;
+        let Pyramid { levels, heights, same_as_nodata, .. } = pyramid;
         let nodata = self.options.nodata.number();
         let blocks = waiting.finish(packed(&vec![nodata; BLOCK * BLOCK], self.options.compression));
         let system = system_of(self.plan);
         let about = RasterHead {
             options: self.options,
-            corner: self.grid.corner(),
-            cell_size: self.grid.cell_size(),
+            corner: part.grid.corner(),
+            cell_size: part.grid.cell_size(),
             system: &system,
             copyright: self.plan.options.output.copyright(),
         };
         let head = head(&about, &blocks.images(&levels));
-        let file = blocks.write(&head, &directory.output().raster())?;
-        let stats =
-            RasterStats { size: self.grid.size(), bytes: file.bytes, same_as_nodata: same_as_nodata.into_inner() };
-        Ok(StepOutput { files: vec![file], ..StepOutput::new(stats, Vec::new()) })
+        let output = directory.output();
+        let path = part.uri.as_ref().map_or_else(|| output.raster(), |uri| output.directory().join(uri));
+        create_folder_of(&path)?;
+        let file = blocks.write(&head, &path)?;
+        let (heights, same_as_nodata) = (heights.into_inner(), same_as_nodata.into_inner());
+        Ok((file, RasterStats { files: 1, heights, same_as_nodata, ..RasterStats::default() }))
+    }
+
+    /// Writes the list by which programs open all files as one raster.
+    fn write_list(&self, directory: &JobDirectory, files: Vec<ListedFile>) -> Result<PendingFile> {
+        let list = RasterList {
+            size: self.grid.size(),
+            corner: self.grid.corner(),
+            cell_size: self.grid.cell_size(),
+            nodata: self.options.nodata,
+            system: &system_of(self.plan),
+            files,
+        };
+        write_pending(&directory.output().raster_list(), list.to_string().as_bytes())
     }
 
     fn heights(&self) -> HeightScale {
@@ -125,8 +219,12 @@ impl<'a> RasterWork<'a> {
                 self.options.nodata.number()
             )
         });
+        let empty = (stats.heights == 0).then(|| {
+            "terrain.tif has no height, because no centre of a cell lies within the terrain: set a finer [output.raster] resolution"
+                .to_string()
+        });
         let system = system_warning(&self.plan.crs, &system_of(self.plan));
-        same.into_iter().chain(system).collect()
+        same.into_iter().chain(empty).chain(system).collect()
     }
 }
 
@@ -134,8 +232,7 @@ impl<'a> RasterWork<'a> {
 pub(crate) fn raster_memory(plan: &Plan, threads: usize) -> u64 {
     // A block, its bytes by their places, and as it is packed.
     const BLOCK_COPIES: usize = 3;
-    // No job begins with a raster that cannot be made.
-    let Ok(Some(grid)) = check_raster(plan) else { return 0 };
+    let Some(grid) = planned_raster(plan) else { return 0 };
     let level = window_level(working_memory(&plan.options)).min(grid.levels().len() - 1);
     window_bytes(level) + (threads * BLOCK_COPIES * BLOCK * BLOCK * size_of::<f32>()) as u64
 }
