@@ -124,7 +124,8 @@ class ShadowMap:
     def __init__(self, places, triangles, toward):
         self.axes = frame(toward)
         seen = places @ self.axes.T
-        self.low, high = seen[:, :2].min(axis=0), seen[:, :2].max(axis=0)
+        used = seen[np.unique(triangles), :2]
+        self.low, high = used.min(axis=0), used.max(axis=0)
         self.scale = SHADOW_PIXELS / (high - self.low).max()
         size = tuple(int(n) + 1 for n in (high - self.low) * self.scale)
         pixels = (seen[:, :2] - self.low) * self.scale
@@ -147,7 +148,7 @@ class Light:
     diffuse: bool  # whether it is one of many that together fall alike on level ground, so that its cosine counts already
 
 
-def lights(azimuth, elevation, sky=40, suns=9):
+def lights(azimuth, elevation, sky=28, suns=6):
     """Returns a soft sun, and a sky that is brighter above. Together they light level ground with about 1."""
     rng = np.random.default_rng(1)
     for _ in range(suns):
@@ -271,4 +272,5 @@ def to_image(picture, times):
 
 
 def label(image, place, text, size=22, fill=(35, 40, 45)):
-    ImageDraw.Draw(image).text(place, text, fill=fill, font=ImageFont.load_default(size))
+    """Writes into a picture, with a white rim."""
+    ImageDraw.Draw(image).text(place, text, fill=fill, font=ImageFont.load_default(size), stroke_width=3, stroke_fill="white")

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Writes the river valley of the gallery: a sparse cloud, and the lines that a surveyor would draw over it.
+"""Writes the river valley of the gallery: a sparse cloud, the lines that a surveyor would draw over it, and a corridor along the river.
 
-    python3 valley.py        makes data/valley.csv and data/valley.geojson
+    python3 valley.py        makes data/valley.csv, data/valley.geojson and data/corridor.csv
 
 It needs nothing but Python. The same files come out every time.
 """
@@ -79,8 +79,8 @@ def hills(x, y):
     """Returns the sides of the valley: a low terrace in the south, hills with gullies in the north."""
     terrace = 2.6 * smooth(0.0, 9.0, 34.0 + 9.0 * math.sin(x / 61.0 + 1.2) - y)
     rise = max(0.0, y - 256.0 - 5.0 * math.sin(x / 37.0)) / 44.0
-    gullies = 1.0 + 0.3 * math.sin(x / 13.0 + 0.8 * math.sin(x / 31.0)) + 0.18 * math.sin(x / 6.0 + y / 14.0)
-    return terrace + 21.0 * rise**1.25 * gullies
+    gullies = 1.0 + 0.2 * math.sin(x / 13.0 + 0.8 * math.sin(x / 31.0)) + 0.06 * math.sin(x / 6.0 + y / 14.0)
+    return terrace + 17.0 * rise**1.2 * gullies
 
 
 def levee(x, y):
@@ -126,10 +126,10 @@ def survey(rng):
                 yield x, y, (river_level(x) if wet[0] else LAKE_LEVEL) + 0.12 * noise, 9
 
 
-def write_cloud(path):
+def write_cloud(path, points):
     with open(path, "w", encoding="ascii", newline="\n") as file:
         file.write("x,y,z,classification\n")
-        for x, y, z, kind in survey(random.Random(18)):
+        for x, y, z, kind in points:
             file.write(f"{EAST + x:.2f},{NORTH + y:.2f},{z:.2f},{kind}\n")
 
 
@@ -185,7 +185,9 @@ def write_lines(path):
 def main():
     folder = Path(__file__).parent / "data"
     folder.mkdir(exist_ok=True)
-    write_cloud(folder / "valley.csv")
+    points = list(survey(random.Random(18)))
+    write_cloud(folder / "valley.csv", points)
+    write_cloud(folder / "corridor.csv", [p for p in points if abs(p[1] - river_middle(p[0])) < 42.0 * math.hypot(1.0, river_slope(p[0]))])
     write_lines(folder / "valley.geojson")
 
 
