@@ -97,7 +97,7 @@ def make_valley():
     for name, text in (("valley-points", "the points alone"), ("valley-breaklines", "with [[breaklines]]")):
         mesh = run(name)
         scene, casters = block(mesh, land_colors(mesh), 1.5, 8.0)
-        image = picture(scene, casters, camera((4.0, -8.0, 0.0), 205.0, 36.0, 1500.0, 20.6, 1100, 500))
+        image = picture(scene, casters, camera((4.0, -10.0, 0.0), 205.0, 36.0, 1500.0, 21.6, 1100, 540))
         draw.label(image, (24, 18), text, 26)
         images.append(image)
     save(joined(images, False), "valley")
@@ -138,7 +138,7 @@ def make_surfaces():
     for name, text in (("autzen-first", 'surface = "first"'), ("autzen-ground", 'surface = "ground"')):
         mesh = run(name)
         scene, casters = block(mesh, (1.25 * mesh.colors)[mesh.triangles], 1.0, 6.0, 0.5)
-        image = picture(scene, casters, camera((0.0, -4.0, 6.0), 196.0, 38.0, 1400.0, 15.2, 1100, 500))
+        image = picture(scene, casters, camera((0.0, -6.0, 6.0), 196.0, 38.0, 1400.0, 16.3, 1100, 480))
         draw.label(image, (24, 18), text, 26)
         images.append(image)
     save(joined(images, False), "surfaces")
