@@ -25,7 +25,7 @@ fn variable(name: &str) -> String {
 }
 
 /// Returns the version with what the program is built from, as in `0.1.0 (c6555ec 2026-11-23; features: viewer)`.
-fn long_version(version: &str, commit: Option<String>, mut features: Vec<String>) -> String {
+pub(crate) fn long_version(version: &str, commit: Option<String>, mut features: Vec<String>) -> String {
     features.sort();
     let features = if features.is_empty() { "none".into() } else { features.join(", ") };
     let features = features.to_lowercase().replace('_', "-");
@@ -34,7 +34,7 @@ fn long_version(version: &str, commit: Option<String>, mut features: Vec<String>
 }
 
 /// Returns the commit of the folder `root` and its date.
-fn commit(root: &Path) -> Option<String> {
+pub(crate) fn commit(root: &Path) -> Option<String> {
     let of_checkout = || {
         let text = git(root, &["show", "--no-patch", "--format=%H %cs", "HEAD"])?;
         // Signatures may stand before it.
@@ -45,7 +45,7 @@ fn commit(root: &Path) -> Option<String> {
 }
 
 /// Returns the commit that `cargo package` has noted, unless files had changed since.
-fn packaged_commit(note: &str) -> Option<String> {
+pub(crate) fn packaged_commit(note: &str) -> Option<String> {
     let (_, rest) = note.split_once("\"sha1\"")?;
     let hash = rest.split('"').nth(1)?;
     let is_hash = hash.len() >= DIGITS && hash.bytes().all(|byte| byte.is_ascii_hexdigit());
@@ -53,7 +53,7 @@ fn packaged_commit(note: &str) -> Option<String> {
 }
 
 /// Returns the files that change with the commit. Cargo runs this script again only if one of them does, not for every change of a source.
-fn files_of_commit(root: &Path) -> Vec<PathBuf> {
+pub(crate) fn files_of_commit(root: &Path) -> Vec<PathBuf> {
     let path = |name: &str| git(root, &["rev-parse", "--git-path", name]).map(|path| root.join(path));
     // Every step of HEAD has a line in its log. A clone may keep none; then HEAD, and what it leads to, tell.
     let branch = git(root, &["symbolic-ref", "--quiet", "HEAD"]);

@@ -144,7 +144,7 @@ mod tests {
     #[test]
     fn completions_of_every_shell_have_all_commands_and_options() {
         let (commands, options) = names();
-        assert!(commands.len() >= 13 && options.len() > 30, "{commands:?} {options:?}");
+        assert!(commands.len() >= 12 && options.len() > 30, "{commands:?} {options:?}");
         for shell in Shell::value_variants() {
             let script = completions(*shell);
             let found = |name: &String| script.contains(name.trim_start_matches('-'));

@@ -102,8 +102,8 @@ fn fraction(bad: u64, all: u64) -> f64 {
     let steps = (bad as f64 / all.max(1) as f64 / STEP).ceil();
     let allows = |steps: &f64| (steps * STEP * all as f64) as u64 >= bad;
     let steps = if allows(&steps) { steps } else { steps + 1.0 };
-    // Rounded to what the digits say.
-    ((steps * STEP / STEP).round() * STEP).min(1.0)
+    // The number that these digits stand for.
+    format!("{:.4}", (steps * STEP).min(1.0)).parse().unwrap_or(1.0)
 }
 
 #[cfg(test)]

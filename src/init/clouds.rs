@@ -3,7 +3,7 @@
 use crate::init::config_folder::{ConfigFolder, named};
 use crate::input::{self, TextOptions};
 use crate::{Error, Result};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
 /// The endings of the names of LAS and LAZ files.
@@ -54,7 +54,7 @@ impl NamedClouds {
         for file in &files {
             groups.entry(kind_of(file)).or_default().push(file.clone());
         }
-        let mut by_pattern = Vec::new();
+        let mut by_pattern = HashSet::new();
         for ((folder, ending), mut group) in groups {
             group.sort();
             group.dedup();
@@ -68,7 +68,7 @@ impl NamedClouds {
                 by_pattern.extend(group);
             }
         }
-        for file in files.iter().filter(|file| !by_pattern.contains(file)) {
+        for file in files.iter().filter(|file| !by_pattern.contains(*file)) {
             self.patterns.push(config.name(file)?);
         }
         Ok(())
@@ -83,11 +83,8 @@ impl NamedClouds {
         };
         let (laser, texts) = (of(&LASER), of(&TEXT));
         if let Some(first) = texts.first().filter(|_| !laser.is_empty()) {
-            self.notes.push(format!(
-                "{} of {} are left out, because there are LAS or LAZ files: name them to read them too",
-                some(texts.len(), "text", first),
-                named(folder).display()
-            ));
+            let (texts, them) = some(texts.len(), first);
+            self.notes.push(format!("{texts} left out beside LAS and LAZ: name {them} to read {them} too"));
         }
         let clouds = if laser.is_empty() { self.point_clouds(texts) } else { laser };
         if clouds.is_empty() {
@@ -157,10 +154,11 @@ fn files_in(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-fn some(count: usize, what: &str, first: &Path) -> String {
+/// Says that some texts are, and what to call them.
+fn some(count: usize, first: &Path) -> (String, &'static str) {
     match count {
-        1 => format!("1 {what} ({})", first.display()),
-        _ => format!("{count} {what}s ({}, ...)", first.display()),
+        1 => (format!("{} is", first.display()), "it"),
+        _ => (format!("{count} texts, such as {}, are", first.display()), "them"),
     }
 }
 
@@ -216,12 +214,23 @@ mod tests {
         fs::write(root.join("b/readme.txt"), "What these files are.\n").unwrap();
         let (found, notes) = clouds(&root, &["a"]);
         assert_eq!(found, ["a/3.LAZ", "a/4.las", "a/*.laz"]);
-        assert!(notes.len() == 1 && notes[0].contains("1 text") && notes[0].contains("5.csv"), "{notes:?}");
+        assert!(notes.len() == 1 && notes[0].contains("5.csv is left out beside LAS and LAZ"), "{notes:?}");
         let (found, notes) = clouds(&root, &["b"]);
         assert_eq!(found, ["b/*.xyz"]);
         assert!(notes.len() == 1 && notes[0].contains("readme.txt"), "{notes:?}");
         let (found, _) = clouds(&root, &["c"]);
         assert!(found[0].contains("has no point clouds") && found[0].contains("c/d, which has some"), "{found:?}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_file_whose_name_is_no_text_is_left_out_of_a_folder() {
+        use std::os::unix::ffi::OsStrExt;
+        let root = tempfile::tempdir().unwrap();
+        let root = root.path().canonicalize().unwrap();
+        write(&root, &["a/1.laz"]);
+        fs::write(root.join("a").join(std::ffi::OsStr::from_bytes(b"\xff.laz")), "").unwrap();
+        assert_eq!(clouds(&root, &["a"]).0, ["a/1.laz"]);
     }
 
     #[test]

@@ -1,10 +1,10 @@
 //! The text of a configuration: what was found, what is needed, and what may be changed.
 
 use crate::init::draft::{Draft, NeededLine, quoted};
-use crate::init::findings::{Findings, rectangle};
+use crate::init::findings::{Findings, rectangle, unit_of_heights};
 use crate::init::needs::Runnable;
 use crate::init::page::Page;
-use crate::input::{Source, Unit};
+use crate::input::{Crs, Source, Unit};
 use crate::job::preflight::check::Preflight;
 use crate::output::page::is_built_in;
 
@@ -34,7 +34,7 @@ pub(crate) fn text_of(runnable: &Runnable, name: Option<&str>, notes: &[String])
     page.set("[limits]");
     page.say(&findings.room);
     if let Some(misfit) = misfit {
-        page.say(&format!("It does not fit: {misfit}."));
+        page.say(&format!("It does not fit this machine: {misfit}."));
     }
     page.need(draft.lines_of("limits"));
     page.offer("memory = \"4 GiB\"", "the most memory that the job may take; this is the default");
@@ -46,11 +46,11 @@ pub(crate) fn text_of(runnable: &Runnable, name: Option<&str>, notes: &[String])
 }
 
 fn head(page: &mut Page, name: Option<&str>) {
-    let run = match name {
-        Some(name) => format!(" Run it with `gdt-batch {name}`; `gdt-batch check {name}` says what it would do."),
-        None => String::new(),
-    };
-    page.say(&format!("A job for gdt-batch, written by `gdt-batch init`.{run}"));
+    page.say("A job for gdt-batch, written by `gdt-batch init`.");
+    if let Some(name) = name {
+        page.show(&format!("gdt-batch check {name}"), "says what it would do");
+        page.show(&format!("gdt-batch {name}"), "runs it");
+    }
     page.say("A line with # and no blank after it is an option that is off: remove the # to use it.");
     page.say("configs/full.toml in the sources of gdt-batch explains all options.");
 }
@@ -89,7 +89,7 @@ fn about_coordinates(page: &mut Page, findings: &Findings, draft: &Draft, is_nam
     page.blank();
     page.say(&findings.crs);
     let what = if is_named { "if that is wrong: what all files are in" } else { "what all files are in" };
-    if !draft.sets("crs") {
+    if !draft.sets("crs") && !draft.sets("missing_crs") {
         page.offer("crs = \"EPSG:26915\"", what);
     }
     if !draft.sets("to_crs") && is_named {
@@ -125,7 +125,7 @@ fn about_output(page: &mut Page, draft: &Draft, preflight: &Preflight) {
     page.offer("compression = \"none\"", "plain glTF, larger: QGIS needs it");
     page.offer("max_edge = \"auto\"", "leaves long triangles out, as over water; or a length such as 30.0");
     page.offer(&raster, "also writes the heights as terrain.tif, with cells of this side");
-    page.offer("height_offset = \"egm96\"", "if heights count from the sea: places the terrain on the globe");
+    page.offer("height_offset = \"egm96\"", "if heights count from the sea: then they are right on the globe");
     page.offer("copyright = \"(c) whose data\"", "goes into every file, and viewers show it");
     if is_built_in() {
         page.offer("page = true", "also writes a page that shows the terrain in a browser");
@@ -158,7 +158,10 @@ pub(crate) fn summary_of(line: &NeededLine) -> String {
     format!("{} = {}: {}", line.key, line.value, line.why)
 }
 
-/// Returns the name of the unit of x and y, for a summary.
-pub(crate) fn unit_of(preflight: &Preflight, horizontal: Unit) -> String {
-    if horizontal == Unit::Unknown { format!("{} (no file says it)", preflight.unit) } else { horizontal.name() }
+/// Returns what the summary says of the units of the system `crs` of a job.
+pub(crate) fn units_of(preflight: &Preflight, crs: &Crs) -> String {
+    match crs.horizontal {
+        Unit::Unknown => format!("{} (no file says it)", preflight.unit),
+        unit => format!("{} in x and y, {} in z", unit.name(), unit_of_heights(crs)),
+    }
 }

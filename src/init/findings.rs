@@ -10,6 +10,9 @@ use crate::job::progress::number_text::{grouped, mebibytes};
 /// The most systems that a sentence names.
 const MOST_NAMED: usize = 3;
 
+/// A map of a zone is badly distorted over areas that are wider, in metres.
+const WIDE: f64 = 1e6;
+
 /// What was found.
 pub(crate) struct Findings {
     /// How many files and points there are, and where they lie.
@@ -34,7 +37,7 @@ impl Findings {
         let sources: Vec<&Source> = plan.inputs.iter().map(|input| &input.source).collect();
         let unit_is_unknown = plan.crs.horizontal == Unit::Unknown && !draft.sets("unit");
         Findings {
-            points: points(&sources, preflight),
+            points: points(draft, &sources, preflight, plan),
             unit: unit(&sources, plan, unit_is_unknown),
             unit_is_unknown,
             crs: crs(draft, &sources, plan),
@@ -48,7 +51,7 @@ impl Findings {
     }
 }
 
-fn points(sources: &[&Source], preflight: &Preflight) -> Vec<String> {
+fn points(draft: &Draft, sources: &[&Source], preflight: &Preflight, plan: &Plan) -> Vec<String> {
     let files = if sources.len() == 1 { "1 file".into() } else { format!("{} files", grouped(sources.len() as u64)) };
     let mut formats: Vec<String> = sources.iter().map(|source| format(source)).collect();
     formats.sort();
@@ -59,6 +62,12 @@ fn points(sources: &[&Source], preflight: &Preflight) -> Vec<String> {
         let along = |axis: usize| format!("{:.2} to {:.2}", min[axis], max[axis]);
         let [width, height] = [0, 1].map(|axis| max[axis] - min[axis]);
         said.push(format!("Area: x {}, y {}: {width:.1} x {height:.1} {unit}.", along(0), along(1)));
+        if draft.sets("to_crs") && width.max(height) * plan.crs.metres_per_unit().unwrap_or(1.0) > WIDE {
+            said.push(
+                "Note: that is wide for one map, which is distorted at its ends: better run a job for each region."
+                    .into(),
+            );
+        }
     }
     said
 }
@@ -84,7 +93,7 @@ fn unit(sources: &[&Source], plan: &Plan, is_unknown: bool) -> String {
     if is_unknown {
         return "Unit: no file says it, so metres are taken. If the coordinates are in feet, say so here:".into();
     }
-    let z = plan.crs.vertical.map_or(plan.crs.horizontal.name(), |metres| Unit::from_metres(Some(metres)).name());
+    let z = unit_of_heights(&plan.crs);
     let by = match sources.iter().any(|source| source.own_crs().is_named()) || plan.crs.is_named() {
         true => "as the coordinate reference system says",
         false => "as the names of columns say",
@@ -92,8 +101,16 @@ fn unit(sources: &[&Source], plan: &Plan, is_unknown: bool) -> String {
     format!("Unit: {} in x and y, {z} in z, {by}.", plan.crs.horizontal.name())
 }
 
+/// Returns the name of the unit of z: that of x and y, if nothing else is said.
+pub(crate) fn unit_of_heights(crs: &Crs) -> String {
+    crs.vertical.map_or(crs.horizontal.name(), |metres| Unit::from_metres(Some(metres)).name())
+}
+
 fn crs(draft: &Draft, sources: &[&Source], plan: &Plan) -> String {
     let named: Vec<&&Source> = sources.iter().filter(|source| source.own_crs().is_named()).collect();
+    if draft.sets("crs") {
+        return "CRS: none, because the coordinates are not what the files say.".into();
+    }
     if draft.sets("to_crs") {
         return format!("CRS: {}. {}", plan.crs.label(), transformed(sources));
     }
@@ -143,13 +160,14 @@ fn classes(sources: &[&Source], plan: &Plan) -> String {
 fn room(preflight: &Preflight) -> String {
     let free = |bytes: Option<u64>| bytes.map_or("unknown".into(), mebibytes);
     format!(
-        "It takes about {} of memory ({} are free on this machine), and about {} of disk while it runs ({} are free). Results: about {} in \
-         about {} tiles.",
+        "The job takes about {} of memory ({} are free on this machine), and about {} of disk while it runs ({} are free). The results: \
+         about {} in about {} tile{}.",
         mebibytes(preflight.memory),
         free(preflight.memory_free),
         mebibytes(preflight.disk),
         free(preflight.disk_free),
         mebibytes(preflight.results),
-        grouped(preflight.tiles)
+        grouped(preflight.tiles),
+        if preflight.tiles == 1 { "" } else { "s" }
     )
 }

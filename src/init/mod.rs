@@ -14,7 +14,7 @@ mod systems;
 
 use crate::init::clouds::NamedClouds;
 use crate::init::config_folder::ConfigFolder;
-use crate::init::configuration::{summary_of, text_of, unit_of};
+use crate::init::configuration::{summary_of, text_of, units_of};
 use crate::init::draft::{Draft, options_of};
 use crate::init::needs::runnable;
 use crate::job::durable::directory::JobDirectory;
@@ -28,6 +28,9 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 pub use crate::init::draft::NeededLine;
+
+#[cfg(test)]
+mod tests;
 
 /// What stands for standard output.
 const STANDARD_OUTPUT: &str = "-";
@@ -45,7 +48,7 @@ pub struct NewConfiguration {
     pub needed: Vec<NeededLine>,
     /// About files that are left out.
     pub notes: Vec<String>,
-    /// The unit of x and y.
+    /// The units of coordinates.
     pub unit: String,
     /// What `check` says of the job.
     pub check: Preflight,
@@ -79,7 +82,7 @@ pub fn init(clouds: &[PathBuf], file: &Path, replace: bool) -> Result<NewConfigu
         file: file.map(Path::to_path_buf),
         needed: found.draft.needed,
         notes,
-        unit: unit_of(&found.preflight, found.plan.crs.horizontal),
+        unit: units_of(&found.preflight, &found.plan.crs),
         check: found.preflight,
         text,
         misfit: found.misfit,
@@ -152,7 +155,7 @@ impl fmt::Display for NewConfiguration {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Preflight { files, records, crs, surface, memory, disk, warnings, .. } = &self.check;
         let mut row = |name: &str, value: String| writeln!(f, "{name:<9} {value}");
-        row("clouds", format!("{} with {} points", grouped(files.len() as u64), grouped(*records)))?;
+        row("files", format!("{} with {} points", grouped(files.len() as u64), grouped(*records)))?;
         row("unit", self.unit.clone())?;
         row("crs", crs.clone().unwrap_or_else(|| "none".into()))?;
         if let Some(surface) = surface {

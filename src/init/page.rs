@@ -27,6 +27,12 @@ impl Page {
         self.line(&line);
     }
 
+    /// Writes a command as a comment, and what it does.
+    pub(crate) fn show(&mut self, command: &str, what: &str) {
+        let command = format!("#   {}", harmless(command));
+        self.line(&format!("{command:<COLUMN$} {what}"));
+    }
+
     /// Writes an option that does not count until its # is removed, and what it does.
     pub(crate) fn offer(&mut self, option: &str, what: &str) {
         let option = format!("#{option}");

@@ -10,6 +10,9 @@ use std::collections::BTreeSet;
 /// The most systems that a sentence names.
 const MOST_NAMED: usize = 4;
 
+/// Why datums are taken for one.
+const WHY_CLOSE: &str = "The datums of the files differ by a metre or two. They are taken for one.";
+
 /// Ways to run a draft that is refused as it is. Each is tried in turn.
 pub(crate) struct Ways {
     draft: Draft,
@@ -49,11 +52,10 @@ impl Ways {
         Some(self.draft.with(self.lines(way)))
     }
 
-    /// Returns the draft for coordinates of which some are no place on earth, though all files say that they are degrees; `None` if they can
-    /// be degrees.
+    /// Returns the draft for coordinates of which some are no place on earth, though all files say that they are degrees; `None` if they
+    /// can be degrees.
     pub(crate) fn after_stray_points(&mut self) -> Option<Draft> {
         self.waiting = Vec::new().into_iter();
-        let farthest = |source: &Source, axis: usize| source.min[axis].abs().max(source.max[axis].abs());
         let is_nowhere = |source: &Source| farthest(source, 0) > 360.0 || farthest(source, 1) > 90.0;
         let all_say_degrees = self.sources.iter().all(|source| source.crs.horizontal == Unit::Degree);
         let is_plane = all_say_degrees && self.sources.iter().any(is_nowhere);
@@ -64,7 +66,7 @@ impl Ways {
         match way {
             Way::Utm { close } => {
                 let utm = NeededLine::of_input("to_crs", "utm", &self.why_utm());
-                let close = close.then(|| NeededLine::of_input("datums", "close", &self.why_close()));
+                let close = close.then(|| NeededLine::of_input("datums", "close", WHY_CLOSE));
                 [Some(utm), self.missing_crs(), close].into_iter().flatten().collect()
             }
             Way::Plane => vec![NeededLine::of_input("crs", "none", &self.why_plane())],
@@ -92,20 +94,13 @@ impl Ways {
         )
     }
 
-    fn why_close(&self) -> String {
-        format!("The datums differ by a metre or two ({}); they are taken for one.", self.systems().join("; "))
-    }
-
     fn why_plane(&self) -> String {
-        let least = |axis: usize| self.sources.iter().map(|s| s.min[axis]).fold(f64::INFINITY, f64::min);
-        let most = |axis: usize| self.sources.iter().map(|s| s.max[axis]).fold(f64::NEG_INFINITY, f64::max);
+        let farthest = |axis: usize| self.sources.iter().map(|source| farthest(source, axis)).fold(0.0, f64::max);
         format!(
-            "The files say that their coordinates are degrees, but x from {} to {} and y from {} to {} has some that no place on earth \
-             has: they are taken as a plane.",
-            least(0),
-            most(0),
-            least(1),
-            most(1)
+            "The files say that their coordinates are degrees, but x goes to {:.2} and y to {:.2}, and no place on earth is there: they \
+             are taken as a plane.",
+            farthest(0),
+            farthest(1)
         )
     }
 
@@ -129,4 +124,9 @@ impl Ways {
         };
         self.sources.iter().map(|source| name(&source.crs)).collect::<BTreeSet<String>>().into_iter().collect()
     }
+}
+
+/// Returns how far x or y of a source goes from zero.
+fn farthest(source: &Source, axis: usize) -> f64 {
+    source.min[axis].abs().max(source.max[axis].abs())
 }
