@@ -2,6 +2,8 @@
 //!
 //! The commit is that of the checkout that this file is in, or the one that cargo notes in a package. Without either there is none. Its
 //! date is that of the commit, so the same commit gives the same program.
+//!
+//! Builds for tests, with the feature `fault-injection`, have no commit: otherwise every commit would compile everything anew.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -12,11 +14,13 @@ const DIGITS: usize = 7;
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
     let root = PathBuf::from(variable("CARGO_MANIFEST_DIR"));
-    for file in files_of_commit(&root) {
+    let is_for_tests = std::env::var_os("CARGO_FEATURE_FAULT_INJECTION").is_some();
+    let (files, commit) = if is_for_tests { (Vec::new(), None) } else { (files_of_commit(&root), commit(&root)) };
+    for file in files {
         println!("cargo::rerun-if-changed={}", file.display());
     }
     let features = std::env::vars().filter_map(|(name, _)| Some(name.strip_prefix("CARGO_FEATURE_")?.to_string()));
-    let version = long_version(&variable("CARGO_PKG_VERSION"), commit(&root), features.collect());
+    let version = long_version(&variable("CARGO_PKG_VERSION"), commit, features.collect());
     println!("cargo::rustc-env=GDT_LONG_VERSION={version}");
 }
 

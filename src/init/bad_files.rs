@@ -3,6 +3,7 @@
 use crate::init::draft::{Draft, NeededLine};
 use crate::input::{self, Source};
 use crate::job::plan::inputs::input_paths;
+use crate::job::plan::text_inputs::allowed_malformed;
 use crate::{Error, Result};
 use rayon::prelude::*;
 
@@ -99,17 +100,16 @@ pub(crate) fn line_for_damage(draft: &Draft, damage: &Damage) -> Option<NeededLi
 
 /// Returns the least fraction of few digits that allows `bad` of `all` records.
 fn fraction(bad: u64, all: u64) -> f64 {
-    let steps = (bad as f64 / all.max(1) as f64 / STEP).ceil();
-    let allows = |steps: &f64| (steps * STEP * all as f64) as u64 >= bad;
-    let steps = if allows(&steps) { steps } else { steps + 1.0 };
     // The number that these digits stand for.
-    format!("{:.4}", (steps * STEP).min(1.0)).parse().unwrap_or(1.0)
+    let written = |steps: f64| format!("{:.4}", (steps * STEP).min(1.0)).parse().unwrap_or(1.0);
+    let steps = (bad as f64 / all.max(1) as f64 / STEP).ceil();
+    let least = written(steps);
+    if allowed_malformed(least, all) >= bad { least } else { written(steps + 1.0) }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::job::plan::text_inputs::allowed_malformed;
 
     #[test]
     fn a_fraction_allows_what_is_bad_and_little_more() {

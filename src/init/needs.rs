@@ -88,10 +88,10 @@ fn trial(draft: &Draft) -> Result<Trial> {
             plan.records
         )));
     }
-    if sample.malformed > 0 || inputs.iter().any(|input| input.source.has_lost_chunk_table()) {
-        if let Some(damage) = damage(&plan)? {
-            return Ok(Trial::Damaged(damage));
-        }
+    let is_doubtful = sample.malformed > 0 || inputs.iter().any(|input| input.source.has_lost_chunk_table());
+    let damage = if is_doubtful { damage(&plan)? } else { None };
+    if let Some(damage) = damage {
+        return Ok(Trial::Damaged(damage));
     }
     Ok(Trial::Runs(Box::new((preflight, plan))))
 }

@@ -34,7 +34,15 @@ const UNKNOWN: Expected =
     Expected { files: &[], metres: [1.0, 1.0], unit: NO_UNIT, crs: None, surface: NO_CLASSES, needed: &[] };
 
 /// LAS, LAZ, COPC, texts, feet, degrees, pixels that say they are degrees, two systems, and damaged files.
-const CLOUDS: [Expected; 20] = [
+const CLOUDS: [Expected; 21] = [
+    Expected {
+        files: &["autzen_trim.las"],
+        metres: [FOOT, FOOT],
+        unit: "foot in x and y, foot in z",
+        crs: Some("NAD_1983_HARN_Lambert_Conformal_Conic"),
+        surface: "23 % ground",
+        ..UNKNOWN
+    },
     Expected { files: &["100-points.las"], surface: "27 % ground", ..UNKNOWN },
     Expected { files: &["1.2-with-color.las"], surface: STADIUM, ..UNKNOWN },
     Expected {
@@ -124,6 +132,12 @@ fn text(value: &Value) -> &str {
     value.as_str().unwrap_or_else(|| panic!("{value} is no text"))
 }
 
+/// Returns the per cent of a sentence about the surface; 0 if it has none.
+fn share_of_ground(sentence: &str) -> f64 {
+    let number = sentence.split(" % ground").next().filter(|number| *number != sentence);
+    number.map_or(0.0, |number| number.trim_start_matches("about ").parse().unwrap())
+}
+
 #[test]
 fn configurations_of_real_clouds_run_as_they_are_and_say_what_they_are() {
     let Some(data) = shared().map(|folder| folder.join("data")) else { return };
@@ -160,7 +174,9 @@ fn configurations_of_real_clouds_run_as_they_are_and_say_what_they_are() {
             surface.contains(expected.surface) && flat.contains(&format!("# Surface: {surface}")),
             "{surface} {what}"
         );
-        assert!(text(&report["surface"]["sentence"]).contains(expected.surface), "{} {what}", report["surface"]);
+        // A sample is as good as this.
+        let [sampled, all] = [surface, text(&report["surface"])].map(share_of_ground);
+        assert!((sampled - all).abs() <= 2.0, "{} {what}", report["surface"]);
         assert_eq!(
             configuration.contains("#surface = \"ground\""),
             expected.surface.contains("ground") && !expected.surface.starts_with("100")
