@@ -18,7 +18,8 @@ const MANUAL: &str = "User Commands";
 pub fn completions(shell: Shell) -> String {
     let mut script = Vec::new();
     clap_complete::generate(shell, &mut Cli::command(), PROGRAM, &mut script);
-    String::from_utf8_lossy(&script).into_owned()
+    // clap_complete 4.6 has two names for one function of bash if the program's name has a hyphen, so that options were not completed.
+    String::from_utf8_lossy(&script).replace("gdt__subcmd__batch", "gdt__batch")
 }
 
 /// Returns the man page of all commands, or of the one of this name, in roff.
