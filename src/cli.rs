@@ -2,7 +2,8 @@
 
 use crate::job::phase::{MOST_TASKS, Phase, Task};
 use crate::submit::Engine;
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueHint};
+use clap_complete::Shell;
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
 
@@ -10,7 +11,8 @@ use std::path::PathBuf;
 const AFTER_HELP: &str = "\
 Examples:
   gdt-batch sample terrain.laz          write a sample terrain to try things on
-  gdt-batch configs/quickstart.toml     run a job
+  gdt-batch init *.laz                  write job.toml, a configuration for these clouds
+  gdt-batch job.toml                    run the job
   gdt-batch check job.toml              what would the job read, how large is it, does it fit?
   gdt-batch info --histogram a.laz      what does a cloud hold, class by class?
   gdt-batch view out                    look at the terrain in a browser
@@ -22,7 +24,7 @@ The shortest configuration:
   files = [\"clouds/*.laz\"]
   [output]
   directory = \"out\"
-configs/full.toml explains all options.
+`gdt-batch init` writes one with more options in it; configs/full.toml explains all.
 
 After an interruption, run the same command again: the job continues where it stopped.
 
@@ -33,9 +35,12 @@ Exit codes:
   3  bad input; for verify: nothing is wrong, but not everything can be proved
   4  a guarantee does not hold (verify failed, or an internal check)";
 
+/// What `--version` shows: also the commit, if it is known, and the features that are built in. build.rs makes it.
+const LONG_VERSION: &str = env!("GDT_LONG_VERSION");
+
 /// Turns point clouds of any size into one exact Delaunay terrain, written as glTF tiles.
 #[derive(Parser, Debug)]
-#[command(name = "gdt-batch", version, after_help = AFTER_HELP, arg_required_else_help = true)]
+#[command(name = "gdt-batch", version, long_version = LONG_VERSION, after_help = AFTER_HELP, arg_required_else_help = true)]
 pub struct Cli {
     /// The command; without one, gdt-batch runs the job of a configuration file.
     #[command(subcommand)]
@@ -70,6 +75,20 @@ pub struct PrintOptions {
 /// The commands other than running a job.
 #[derive(Subcommand, Debug)]
 pub enum CliCommand {
+    /// Write a configuration for point clouds: what they hold, what a job needs to read them, and what may be changed.
+    ///
+    /// Reads headers and a sample of the points, and all of a text. Sets what the job needs, such as to_crs for degrees, and says why in
+    /// a comment. If no configuration makes a job of the clouds, the message and the exit code are those of `check`.
+    Init {
+        /// Point clouds, folders, or patterns such as "clouds/*.laz". Default: the point clouds in the current folder.
+        files: Vec<PathBuf>,
+        /// The configuration to write; - for standard output.
+        #[arg(long, short, value_name = "FILE", default_value = "job.toml")]
+        output: PathBuf,
+        /// Replace the configuration if it is there.
+        #[arg(long)]
+        force: bool,
+    },
     /// Show what a job would do and whether it fits; write nothing.
     Check {
         /// The configuration of the job.
@@ -81,6 +100,7 @@ pub enum CliCommand {
     /// the proof needs is missing. 4: something is wrong.
     Verify {
         /// The output directory of a job.
+        #[arg(value_hint = ValueHint::DirPath)]
         directory: PathBuf,
         /// The memory that verify may use, such as "4 GiB".
         #[arg(long, default_value = "4 GiB", value_parser = memory)]
@@ -183,12 +203,27 @@ pub enum CliCommand {
         #[arg(long)]
         overwrite: bool,
     },
+    /// Print the script that lets a shell complete commands and options.
+    ///
+    /// For bash: gdt-batch completions bash > ~/.local/share/bash-completion/completions/gdt-batch
+    Completions {
+        /// The shell.
+        shell: Shell,
+    },
+    /// Print the man page in roff.
+    ///
+    /// To read it: gdt-batch man | man -l -
+    Man {
+        /// A command, for a page about it alone. Default: one page about all commands.
+        command: Option<String>,
+    },
 }
 
 /// What to show, and to whom.
 #[derive(Args, Debug)]
 pub struct ViewOptions {
     /// The output directory of a job.
+    #[arg(value_hint = ValueHint::DirPath)]
     pub directory: PathBuf,
     /// The port to listen on. Default: one that is free.
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]

@@ -21,7 +21,7 @@ use gdt_batch::submit::request::Request;
 use gdt_batch::submit::{Engine, kubernetes, slurm};
 use gdt_batch::threads::{self, on_threads};
 use gdt_batch::verify::Conclusion;
-use gdt_batch::{Error, Result, config, input, interrupt, sample, say, shortage, verify};
+use gdt_batch::{Error, Result, config, init, input, interrupt, manual, sample, say, shortage, verify};
 use serde::Serialize;
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
@@ -46,6 +46,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
             let config = config.display();
             Err(Error::Config(format!("{config} and a command: name the configuration after the command, or alone")))
         }
+        (Some(CliCommand::Init { files, output, force }), _) => write_configuration(files, output, *force, print),
         (Some(CliCommand::Check { config }), _) => check_job(config, print),
         (Some(CliCommand::Verify { directory, memory, input }), _) => verify_output(directory, *memory, input, print),
         (Some(CliCommand::View(options)), _) => view_output(options, print),
@@ -76,6 +77,12 @@ fn run(cli: Cli) -> Result<ExitCode> {
         (Some(CliCommand::Sample { file, points, seed, overwrite }), _) => {
             interrupt::listen()?;
             sample::write(file, *points, *seed, *overwrite).map(|()| ExitCode::SUCCESS)
+        }
+        (Some(CliCommand::Completions { shell }), _) => {
+            print_text(&manual::completions(*shell)).map(|()| ExitCode::SUCCESS)
+        }
+        (Some(CliCommand::Man { command }), _) => {
+            print_text(&manual::man(command.as_deref())?).map(|()| ExitCode::SUCCESS)
         }
         (None, Some(config)) => run_job(config, &cli),
         (None, None) => Err(Error::Config("name a configuration file; --help shows how".into())),
@@ -176,6 +183,23 @@ fn submit(engine: Engine, request: &Request, added: &[String], print: PrintOptio
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Writes a configuration for point clouds. If the job does not fit this machine, the error says so once it is written.
+fn write_configuration(clouds: &[PathBuf], file: &Path, force: bool, print: PrintOptions) -> Result<ExitCode> {
+    let is_printed = file == Path::new("-");
+    if is_printed && print.json {
+        return Err(Error::Config(
+            "--output - prints the configuration, and --json something else: leave out one".into(),
+        ));
+    }
+    let made = on_threads(threads::available(), || init::init(clouds, file, force))?;
+    if is_printed {
+        print_text(&made.text)?;
+    } else {
+        print_result(&made, print)?;
+    }
+    made.misfit.map_or(Ok(ExitCode::SUCCESS), Err)
 }
 
 fn check_job(path: &Path, print: PrintOptions) -> Result<ExitCode> {

@@ -1,8 +1,13 @@
-//! The program that users install has no faults on purpose built in: see CONTRIBUTING.md.
+//! The program that users install says what it is built from, and has no faults on purpose built in: see CONTRIBUTING.md.
 #![cfg(not(feature = "fault-injection"))]
 
 use std::fs;
+use std::path::Path;
 use std::process::Command;
+
+#[path = "../build.rs"]
+#[expect(dead_code, reason = "cargo runs it")]
+mod build_script;
 
 /// Each of these ends a run of a build that has the feature: at its first commit, when results take their places, when it cleans
 /// up, or with a read error.
@@ -41,5 +46,37 @@ fn no_environment_variable_kills_the_installed_program() {
         let output = program.env("GDT_TRACE", "trace").output().unwrap();
         assert!(output.status.success(), "{fault}: {output:?}");
         assert!(!folder.path().join("trace").exists(), "changes of files are written down");
+    }
+}
+
+#[test]
+fn the_version_says_the_commit_and_no_result_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let output =
+            Command::new(env!("CARGO_BIN_EXE_gdt-batch")).args(arguments).current_dir(folder.path()).output().unwrap();
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let Some(commit) = build_script::commit(Path::new(env!("CARGO_MANIFEST_DIR"))) else {
+        eprintln!("not tested: this is no checkout, or git is not installed");
+        return;
+    };
+    let version = run(&["--version"]);
+    assert!(version.contains(&format!("({commit}; features: ")), "{version} is not of {commit}");
+    fs::write(folder.path().join("cloud.csv"), "0,0,1\n9,0,2\n9,9,3\n0,9,4\n4,5,6\n").unwrap();
+    run(&["init", "--quiet"]);
+    run(&["job.toml", "--quiet"]);
+    let hash = &commit[..7];
+    for file in [
+        "job.toml",
+        "out/report.json",
+        "out/tileset.json",
+        "out/terrain.glb",
+        "out/georeference.json",
+        "out/preview.png",
+    ] {
+        let bytes = fs::read(folder.path().join(file)).unwrap();
+        assert!(!String::from_utf8_lossy(&bytes).contains(hash), "{file} names the commit");
     }
 }

@@ -90,6 +90,16 @@ pub fn load(path: &Path) -> Result<JobOptions> {
     Ok(options)
 }
 
+/// As [`load`], for the text of a configuration in the directory `base`.
+///
+/// # Errors
+/// As [`load`].
+pub fn of_text(text: &str, base: &Path) -> Result<JobOptions> {
+    let mut options = parse(text).map_err(Error::Config)?;
+    resolve_paths(&mut options, base).map_err(Error::Config)?;
+    Ok(options)
+}
+
 /// Makes the paths count from the working directory instead of `base`, the directory of the configuration.
 fn resolve_paths(options: &mut JobOptions, base: &Path) -> std::result::Result<(), String> {
     if let Some(directory) = options.output.directory.to_str() {

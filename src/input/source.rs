@@ -32,6 +32,7 @@ use crate::input::text::row_choice::RowChoice;
 use crate::input::text::table::TextTable;
 use crate::{Error, Result, Warnings};
 
+mod crs_origin;
 mod transformed;
 
 /// How a file holds its points.
@@ -287,6 +288,11 @@ impl Source {
             let (axes, grid) = (table.axes(), table.grid());
             self.set_axes_of_text(axes, grid);
         }
+    }
+
+    /// Returns whether the file has lost what says where its compressed points are, so that only decoding shows how many there are.
+    pub fn has_lost_chunk_table(&self) -> bool {
+        matches!(&self.points, PointData::Laz(points) if points.has_lost_table())
     }
 
     /// Returns the number of chunks: the parts of the source that can be decoded independently. Where the format allows, a chunk

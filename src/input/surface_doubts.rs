@@ -41,7 +41,7 @@ pub fn unclear_returns(options: &InputOptions, counts: &PointCounts) -> Option<S
 }
 
 /// Returns the classes of points, those of most points first.
-fn listed(counts: &PointCounts) -> String {
+pub(crate) fn listed(counts: &PointCounts) -> String {
     let all: u64 = counts.classes.values().sum();
     let mut by_count: Vec<(u8, u64)> = counts.classes.iter().map(|(&class, &count)| (class, count)).collect();
     by_count.sort_by_key(|&(class, count)| (std::cmp::Reverse(count), class));

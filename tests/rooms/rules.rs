@@ -14,7 +14,7 @@ struct Rule {
 /// The rooms of a job's steps, in order. Each imports only from those before it.
 const STEPS: [&str; 6] = ["job/plan", "job/partition", "job/mesh", "job/tiles", "job/levels", "job/publish"];
 
-const RULES: [Rule; 9] = [
+const RULES: [Rule; 10] = [
     Rule {
         rooms: &["breaklines"],
         never: &["input", "output", "gpu", "voronoi", "triangulation", "mesh"],
@@ -22,22 +22,27 @@ const RULES: [Rule; 9] = [
     },
     Rule {
         rooms: &["breaklines", "geometry", "mesh", "voronoi", "gpu", "triangulation", "input", "output"],
-        never: &["config", "job", "submit", "verify", "view", "cli"],
+        never: &["config", "job", "init", "submit", "verify", "view", "cli"],
         why: "a library room knows no job",
     },
     Rule {
         rooms: &["verify"],
-        never: &["config", "job", "submit", "view", "cli"],
+        never: &["config", "job", "init", "submit", "view", "cli"],
         why: "the proof shares nothing with the job",
     },
     Rule {
         rooms: &["view"],
-        never: &["config", "job", "submit", "verify", "cli"],
+        never: &["config", "job", "init", "submit", "verify", "cli"],
         why: "the server knows files, no job",
     },
     Rule {
+        rooms: &["init"],
+        never: &["submit", "verify", "view", "cli", "job/run", "job/mod"],
+        why: "init looks at a job, and runs none",
+    },
+    Rule {
         rooms: &["job"],
-        never: &["config", "submit", "verify", "view", "cli"],
+        never: &["config", "init", "submit", "verify", "view", "cli"],
         why: "a job does not know where its options come from, nor who starts its tasks",
     },
     Rule {

@@ -36,6 +36,11 @@ pub(crate) fn from_records(
     Ok(text.or(keys).unwrap_or_default())
 }
 
+/// Returns whether the bytes of a record are well-known text that says what the system is.
+pub(crate) fn is_readable(text: &[u8]) -> bool {
+    from_wkt::parse(&String::from_utf8_lossy(text)).is_some()
+}
+
 fn from_texts(texts: impl Iterator<Item = Result<Vec<u8>>>, warnings: &mut Warnings) -> Result<Option<Crs>> {
     for bytes in texts {
         let bytes = bytes?;

@@ -1,6 +1,6 @@
 //! The records of a LAS file that describe its coordinate reference system.
 
-use crate::input::crs::from_records::from_records;
+use crate::input::crs::from_records::{from_records, is_readable};
 use crate::input::crs::geokeys::{DIRECTORY, DOUBLES, GeoKeys, TEXTS};
 use crate::input::crs::system::Crs;
 use crate::input::file::random_access::RandomAccessFile;
@@ -15,13 +15,21 @@ const TEXT_RECORDS: [(&str, u16); 2] = [(PROJECTION, 2112), ("liblas", 2112)];
 
 /// Returns the system that the records of `file` describe.
 pub(crate) fn read(file: &RandomAccessFile, vlrs: &[Vlr], warnings: &mut Warnings) -> Result<Crs> {
-    let texts = TEXT_RECORDS.iter().flat_map(|(user, id)| vlrs.iter().filter(|vlr| vlr.is(user, *id)));
     let keys = GeoKeys {
         directory: record(file, vlrs, DIRECTORY)?,
         doubles: record(file, vlrs, DOUBLES)?,
         texts: record(file, vlrs, TEXTS)?,
     };
-    from_records(texts.map(|vlr| vlr.read(file)), &keys, warnings)
+    from_records(texts(vlrs).map(|vlr| vlr.read(file)), &keys, warnings)
+}
+
+/// Returns whether the system comes from a record of well-known text, which counts more than GeoTIFF keys.
+pub(crate) fn has_readable_text(file: &RandomAccessFile, vlrs: &[Vlr]) -> Result<bool> {
+    texts(vlrs).map(|vlr| vlr.read(file)).try_fold(false, |found, bytes| Ok(found || is_readable(&bytes?)))
+}
+
+fn texts(vlrs: &[Vlr]) -> impl Iterator<Item = &Vlr> {
+    TEXT_RECORDS.iter().flat_map(|(user, id)| vlrs.iter().filter(|vlr| vlr.is(user, *id)))
 }
 
 fn record(file: &RandomAccessFile, vlrs: &[Vlr], id: u16) -> Result<Vec<u8>> {

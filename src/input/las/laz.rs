@@ -104,6 +104,11 @@ impl CompressedPoints {
         last.map_or(0, |last| last.first + last.count) + self.missing
     }
 
+    /// Returns whether the chunk table is lost, and the chunks do not say themselves how many records they have.
+    pub(crate) fn has_lost_table(&self) -> bool {
+        self.chunks.iter().flatten().any(|chunk| chunk.restart.is_some())
+    }
+
     /// Returns the number of chunks of the source. There is at least one if records are missing, so that decoding counts them.
     pub(crate) fn chunk_count(&self) -> usize {
         self.chunks.len().max((self.missing > 0) as usize)

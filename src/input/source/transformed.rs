@@ -30,6 +30,11 @@ impl Source {
         self.transform.as_deref()
     }
 
+    /// Returns the system that the file itself says its coordinates are in.
+    pub fn own_crs(&self) -> &Crs {
+        self.transform.as_ref().map_or(&self.crs, |transform| &transform.own.crs)
+    }
+
     /// Returns what the file itself says of its coordinates, for a transform of them.
     pub(crate) fn own_coordinates(&self) -> OwnCoordinates {
         OwnCoordinates { axes: self.axes, grid: self.grid, min: self.min, max: self.max, crs: self.crs.clone() }

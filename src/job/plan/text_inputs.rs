@@ -195,7 +195,10 @@ pub(crate) fn check_malformed_rows(sources: &[Source], rules: &[PointRules], opt
 }
 
 /// Decodes a source for its counts.
-fn count(source: &Source, rules: &PointRules) -> Result<PointCounts> {
+///
+/// # Errors
+/// Those of [`Source::decode`], and [`Error::Interrupted`].
+pub(crate) fn count(source: &Source, rules: &PointRules) -> Result<PointCounts> {
     let count_chunk = |chunk| {
         interrupt::check()?;
         source.decode(chunk, rules, &mut |_| Ok(()))

@@ -91,6 +91,14 @@ pub struct Preflight {
 /// # Errors
 /// Every error that would stop the job before its first point; see [`make_plan`].
 pub fn check(options: &JobOptions) -> Result<Preflight> {
+    look(options).map(|(preflight, _)| preflight)
+}
+
+/// As [`check`]. Also returns the plan of the job.
+///
+/// # Errors
+/// As [`check`].
+pub fn look(options: &JobOptions) -> Result<(Preflight, Plan)> {
     let directory = JobDirectory::new(&options.output.directory);
     check_nothing_in_the_way(&directory)?;
     check_results_are_ours(&directory, options.output.page)?;
@@ -98,11 +106,12 @@ pub fn check(options: &JobOptions) -> Result<Preflight> {
     check_height_offset(&plan)?;
     check_raster(&plan)?;
     let threads = workers(options, plan.records)?;
-    if has_filter(&plan) {
-        closer_look(&plan, threads)
+    let preflight = if has_filter(&plan) {
+        closer_look(&plan, threads)?
     } else {
-        Ok(Preflight::of(&plan, threads, KeptPoints::by_headers(&plan)))
-    }
+        Preflight::of(&plan, threads, KeptPoints::by_headers(&plan))
+    };
+    Ok((preflight, plan))
 }
 
 /// Checks that the machine has what the job of `plan` needs. Reads a sample of the points, on the threads of the current rayon pool,

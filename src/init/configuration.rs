@@ -1,0 +1,167 @@
+//! The text of a configuration: what was found, what is needed, and what may be changed.
+
+use crate::init::draft::{Draft, NeededLine, quoted};
+use crate::init::findings::{Findings, rectangle, unit_of_heights};
+use crate::init::needs::Runnable;
+use crate::init::page::Page;
+use crate::input::{Crs, Source, Unit};
+use crate::job::preflight::check::Preflight;
+use crate::output::page::is_built_in;
+
+/// Returns the text of the configuration. `name` is that of its file, if it has one; `notes` are about files that are left out.
+pub(crate) fn text_of(runnable: &Runnable, name: Option<&str>, notes: &[String]) -> String {
+    let Runnable { draft, preflight, plan, misfit } = runnable;
+    let sources: Vec<&Source> = plan.inputs.iter().map(|input| &input.source).collect();
+    let findings = Findings::of(draft, preflight, plan);
+    let mut page = Page::default();
+    head(&mut page, name);
+    page.blank();
+    page.set("[input]");
+    findings.points.iter().for_each(|sentence| page.say(sentence));
+    notes.iter().for_each(|note| page.say(&format!("Note: {note}.")));
+    page.set(&files(&draft.files));
+    page.need(draft.lines_of("input"));
+    let warnings: Vec<&str> = preflight.warnings.iter().collect();
+    if !warnings.is_empty() {
+        page.blank();
+        warnings.iter().for_each(|warning| page.say(&format!("Warning: {warning}.")));
+    }
+    about_surface(&mut page, &findings, preflight, &sources);
+    about_coordinates(&mut page, &findings, draft, plan.crs.is_named());
+    about_area(&mut page, &sources);
+    about_output(&mut page, draft, preflight);
+    page.blank();
+    page.set("[limits]");
+    page.say(&findings.room);
+    if let Some(misfit) = misfit {
+        page.say(&format!("It does not fit this machine: {misfit}."));
+    }
+    page.need(draft.lines_of("limits"));
+    page.offer("memory = \"4 GiB\"", "the most memory that the job may take; this is the default");
+    if !draft.sets("threads") {
+        page.offer(&format!("threads = {}", preflight.threads), "fewer leave room for other work");
+    }
+    about_breaklines(&mut page);
+    page.into_text()
+}
+
+fn head(page: &mut Page, name: Option<&str>) {
+    page.say("A job for gdt-batch, written by `gdt-batch init`.");
+    if let Some(name) = name {
+        page.show(&format!("gdt-batch check {name}"), "says what it would do");
+        page.show(&format!("gdt-batch {name}"), "runs it");
+    }
+    page.say("A line with # and no blank after it is an option that is off: remove the # to use it.");
+    page.say("configs/full.toml in the sources of gdt-batch explains all options.");
+}
+
+fn files(patterns: &[String]) -> String {
+    match patterns {
+        [one] => format!("files = [{}]", quoted(one)),
+        many => {
+            let lines: String = many.iter().map(|pattern| format!("  {},\n", quoted(pattern))).collect();
+            format!("files = [\n{lines}]")
+        }
+    }
+}
+
+fn about_surface(page: &mut Page, findings: &Findings, preflight: &Preflight, sources: &[&Source]) {
+    let shares = preflight.surface_sample;
+    page.blank();
+    page.say(&findings.classes);
+    page.say(&findings.surface);
+    if shares.ground > 0 && shares.ground < shares.points {
+        page.offer("surface = \"ground\"", "bare earth: only points on the ground and on water");
+    }
+    if sources.iter().any(|source| source.by_return.iter().skip(1).any(|count| *count > 0)) {
+        page.offer("surface = \"first\"", "roofs and tree tops: only first returns");
+    }
+}
+
+fn about_coordinates(page: &mut Page, findings: &Findings, draft: &Draft, is_named: bool) {
+    page.blank();
+    page.say(&findings.unit);
+    // What is transformed takes its unit from its system.
+    if !draft.sets("to_crs") {
+        let unit = if findings.unit_is_unknown { "us-foot" } else { "metre" };
+        page.offer(&format!("unit = \"{unit}\""), "or \"metre\", \"foot\", \"us-foot\": whatever the files say");
+    }
+    page.blank();
+    page.say(&findings.crs);
+    let what = if is_named { "if that is wrong: what all files are in" } else { "what all files are in" };
+    if !draft.sets("crs") && !draft.sets("missing_crs") {
+        page.offer("crs = \"EPSG:26915\"", what);
+    }
+    if !draft.sets("to_crs") && is_named {
+        page.offer("to_crs = \"utm\"", "or a code: transforms all points into another CRS");
+    }
+}
+
+/// Offers the middle of the area, to try things on.
+fn about_area(page: &mut Page, sources: &[&Source]) {
+    let Some([min, max]) = rectangle(sources) else { return };
+    let within = |axis: usize, share: f64| min[axis] + (max[axis] - min[axis]) * share;
+    let sides = [within(0, 0.25), within(1, 0.25), within(0, 0.75), within(1, 0.75)];
+    let least = (sides[2] - sides[0]).min(sides[3] - sides[1]);
+    let decimals = if least > 100.0 { 1 } else { 4 };
+    if least > 0.001 {
+        let [xmin, ymin, xmax, ymax] = sides.map(|side| format!("{side:.decimals$}"));
+        page.blank();
+        page.offer(&format!("bounds = [{xmin}, {ymin}, {xmax}, {ymax}]"), "a quarter of the area, in its middle");
+    }
+}
+
+fn about_output(page: &mut Page, draft: &Draft, preflight: &Preflight) {
+    page.blank();
+    page.set("[output]");
+    if preflight.disk_earlier > 0 {
+        page.say("This folder has the results of an earlier job. They stay until those of this job are whole.");
+    }
+    page.set(&format!("directory = {}", quoted(&draft.directory)));
+    page.need(draft.lines_of("output"));
+    let cell = cell(preflight);
+    let raster = format!("raster = {{ resolution = {cell} }}");
+    page.offer("format = \"glb\"", "one file, as for Blender; \"3dtiles\" writes tiles for the web alone");
+    page.offer("compression = \"none\"", "plain glTF, larger: QGIS needs it");
+    page.offer("max_edge = \"auto\"", "leaves long triangles out, as over water; or a length such as 30.0");
+    page.offer(&raster, "also writes the heights as terrain.tif, with cells of this side");
+    page.offer("height_offset = \"egm96\"", "if heights count from the sea: then they are right on the globe");
+    page.offer("copyright = \"(c) whose data\"", "goes into every file, and viewers show it");
+    if is_built_in() {
+        page.offer("page = true", "also writes a page that shows the terrain in a browser");
+    }
+}
+
+fn about_breaklines(page: &mut Page) {
+    page.blank();
+    page.say("Lines that become edges of the mesh, and lakes that become flat. The three lines go together.");
+    page.set("#[[breaklines]]");
+    page.offer("files = [\"lines.gpkg\"]", "Shapefiles, GeoPackages or GeoJSON");
+    page.offer("kind = \"line\"", "or \"river\", \"lake\"");
+}
+
+/// Returns a round side of cells, about as wide as the points are apart, and at least a lattice step.
+fn cell(preflight: &Preflight) -> f64 {
+    let [width, height] = preflight.size;
+    let apart = (width * height / preflight.kept.max(1) as f64).sqrt();
+    if !apart.is_finite() || apart < 0.001 {
+        return 1.0;
+    }
+    let power = 10f64.powi(apart.log10().floor() as i32);
+    let step = [1.0, 2.0, 5.0, 10.0].into_iter().find(|step| step * power >= apart).unwrap_or(10.0);
+    // A decimal of few digits.
+    format!("{:.3}", step * power).parse().unwrap_or(1.0)
+}
+
+/// Returns what the summary says of lines that are needed.
+pub(crate) fn summary_of(line: &NeededLine) -> String {
+    format!("{} = {}: {}", line.key, line.value, line.why)
+}
+
+/// Returns what the summary says of the units of the system `crs` of a job.
+pub(crate) fn units_of(preflight: &Preflight, crs: &Crs) -> String {
+    match crs.horizontal {
+        Unit::Unknown => format!("{} (no file says it)", preflight.unit),
+        unit => format!("{} in x and y, {} in z", unit.name(), unit_of_heights(crs)),
+    }
+}

@@ -1,0 +1,175 @@
+//! `gdt-batch init`: a configuration for point clouds that runs as it is, with what was found in comments.
+//!
+//! The clouds are looked at as `check` does. If a job of them would be refused, `needs.rs` tries what the message of the refusal names.
+
+mod bad_files;
+mod clouds;
+mod config_folder;
+mod configuration;
+mod draft;
+mod findings;
+mod needs;
+mod page;
+mod systems;
+
+use crate::init::clouds::NamedClouds;
+use crate::init::config_folder::ConfigFolder;
+use crate::init::configuration::{summary_of, text_of, units_of};
+use crate::init::draft::{Draft, options_of};
+use crate::init::needs::runnable;
+use crate::job::durable::directory::JobDirectory;
+use crate::job::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours};
+use crate::job::preflight::check::Preflight;
+use crate::job::progress::number_text::{grouped, mebibytes};
+use crate::{Error, Result};
+use serde::Serialize;
+use std::fmt;
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+pub use crate::init::draft::NeededLine;
+
+#[cfg(test)]
+mod tests;
+
+/// What stands for standard output.
+const STANDARD_OUTPUT: &str = "-";
+
+/// The first name of the output directory, and how many others are tried if something is in its way.
+const DIRECTORY: &str = "out";
+const MOST_DIRECTORIES: usize = 100;
+
+/// A configuration that was made.
+#[derive(Debug, Serialize)]
+pub struct NewConfiguration {
+    /// Its file; `None` if it is for standard output.
+    pub file: Option<PathBuf>,
+    /// The lines that the clouds need, or the machine.
+    pub needed: Vec<NeededLine>,
+    /// About files that are left out.
+    pub notes: Vec<String>,
+    /// The units of coordinates.
+    pub unit: String,
+    /// What `check` says of the job.
+    pub check: Preflight,
+    /// Its text.
+    #[serde(skip)]
+    pub text: String,
+    /// Why this machine has no room for the job, if it has none.
+    #[serde(skip)]
+    pub misfit: Option<Error>,
+}
+
+/// Makes a configuration for the clouds that `clouds` name, and writes it to `file`, unless that is `-`.
+///
+/// # Errors
+/// [`Error::Config`] if the file is there and may not be replaced, or there are no clouds; that of `check` if no configuration makes a job
+/// of them; [`Error::Io`] if it cannot be written.
+pub fn init(clouds: &[PathBuf], file: &Path, replace: bool) -> Result<NewConfiguration> {
+    let file = Some(file).filter(|file| *file != Path::new(STANDARD_OUTPUT));
+    if let Some(file) = file {
+        check_may_be_written(file, replace)?;
+    }
+    let folder = ConfigFolder::of(file.unwrap_or(Path::new("job.toml")))?;
+    let NamedClouds { patterns, notes } = NamedClouds::of(clouds, &folder)?;
+    let found = runnable(Draft::new(patterns, free_directory(&folder.path, file)?, &folder))?;
+    let text = text_of(&found, file.map(|file| file.display().to_string()).as_deref(), &notes);
+    options_of(&text, &folder.path)?;
+    if let Some(file) = file {
+        write(file, &text, replace)?;
+    }
+    Ok(NewConfiguration {
+        file: file.map(Path::to_path_buf),
+        needed: found.draft.needed,
+        notes,
+        unit: units_of(&found.preflight, &found.plan.crs),
+        check: found.preflight,
+        text,
+        misfit: found.misfit,
+    })
+}
+
+fn check_may_be_written(file: &Path, replace: bool) -> Result<()> {
+    let Ok(data) = file.metadata() else { return Ok(()) };
+    if !data.is_file() {
+        return Err(Error::Config(format!(
+            "{} is there and is no regular file: give another name, or - for standard output",
+            file.display()
+        )));
+    }
+    if replace { Ok(()) } else { Err(exists_already(file)) }
+}
+
+fn exists_already(file: &Path) -> Error {
+    Error::Config(format!(
+        "{} exists already: give another name with --output, or add --force to replace it",
+        file.display()
+    ))
+}
+
+/// Returns an output directory in which nothing is in the way of a job, except the results of an earlier one. A configuration that is not
+/// called job.toml has one of its own, so that two of them can stand in one folder.
+fn free_directory(folder: &Path, file: Option<&Path>) -> Result<String> {
+    let stem = file.and_then(Path::file_stem).and_then(|stem| stem.to_str()).unwrap_or("job");
+    let first = if stem == "job" { DIRECTORY.to_string() } else { format!("{DIRECTORY}-{stem}") };
+    let is_free = |name: &String| {
+        let directory = JobDirectory::new(&folder.join(name));
+        check_nothing_in_the_way(&directory).and_then(|()| check_results_are_ours(&directory, true))
+    };
+    let names = (2..=MOST_DIRECTORIES).map(|number| format!("{first}-{number}"));
+    let free = std::iter::once(first.clone()).chain(names).find(|name| is_free(name).is_ok());
+    match free {
+        Some(name) => Ok(name),
+        None => is_free(&first).map(|()| first),
+    }
+}
+
+/// Writes the file whole or not at all.
+fn write(file: &Path, text: &str, replace: bool) -> Result<()> {
+    let failed = |error: std::io::Error| match error.kind() {
+        ErrorKind::AlreadyExists => exists_already(file),
+        _ => Error::io("write", file)(error),
+    };
+    let folder = config_folder::named(file.parent().unwrap_or(Path::new("")));
+    let mut new = builder().tempfile_in(folder).map_err(failed)?;
+    new.write_all(text.as_bytes()).map_err(failed)?;
+    let placed = if replace { new.persist(file) } else { new.persist_noclobber(file) };
+    placed.map(drop).map_err(|error| failed(error.error))
+}
+
+/// Returns what makes files with the permissions that others of the user have.
+#[cfg(unix)]
+fn builder() -> tempfile::Builder<'static, 'static> {
+    use std::os::unix::fs::PermissionsExt;
+    let mut builder = tempfile::Builder::new();
+    builder.permissions(std::fs::Permissions::from_mode(0o666));
+    builder
+}
+
+#[cfg(not(unix))]
+fn builder() -> tempfile::Builder<'static, 'static> {
+    tempfile::Builder::new()
+}
+
+impl fmt::Display for NewConfiguration {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Preflight { files, records, crs, surface, memory, disk, warnings, .. } = &self.check;
+        let mut row = |name: &str, value: String| writeln!(f, "{name:<9} {value}");
+        row("files", format!("{} with {} points", grouped(files.len() as u64), grouped(*records)))?;
+        row("unit", self.unit.clone())?;
+        row("crs", crs.clone().unwrap_or_else(|| "none".into()))?;
+        if let Some(surface) = surface {
+            row("surface", surface.clone())?;
+        }
+        row("takes", format!("about {} of memory, {} of disk", mebibytes(*memory), mebibytes(*disk)))?;
+        self.needed.iter().try_for_each(|line| row("set", summary_of(line)))?;
+        self.notes.iter().try_for_each(|note| row("note", note.clone()))?;
+        for warning in warnings.iter() {
+            writeln!(f, "warning: {warning}")?;
+        }
+        match &self.file {
+            Some(file) => writeln!(f, "written to {0}; run it: gdt-batch {0}", file.display()),
+            None => Ok(()),
+        }
+    }
+}

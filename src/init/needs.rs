@@ -1,0 +1,143 @@
+//! What the clouds need so that a job of them runs. Each way is one that the program's own messages name, and each is tried as `check`
+//! would try it.
+
+use crate::init::bad_files::{Damage, line_for_damage, lines_for_bad_files};
+use crate::init::draft::{Draft, NeededLine};
+use crate::init::systems::Ways;
+use crate::input::Source;
+use crate::job::plan::job_plan::{Plan, PlannedInput};
+use crate::job::plan::no_points::no_point_is_left;
+use crate::job::plan::text_inputs::{allowed_malformed, count, stop_at};
+use crate::job::preflight::check::{Preflight, look};
+use crate::{Error, Result};
+use rayon::prelude::*;
+use std::io::ErrorKind;
+
+/// The least number of points that make a triangle.
+const CORNERS: u64 = 3;
+
+/// A configuration that runs, and what `check` says of it.
+pub(crate) struct Runnable {
+    pub(crate) draft: Draft,
+    pub(crate) preflight: Preflight,
+    pub(crate) plan: Plan,
+    /// Why this machine has no room for the job, if it has none.
+    pub(crate) misfit: Option<Error>,
+}
+
+/// What a try of a draft shows.
+enum Trial {
+    Runs(Box<(Preflight, Plan)>),
+    /// More records cannot be read than the draft allows.
+    Damaged(Damage),
+}
+
+/// Returns `draft` with the lines that it needs to run.
+///
+/// # Errors
+/// That of `check`, if nothing lets it run.
+pub(crate) fn runnable(draft: Draft) -> Result<Runnable> {
+    let (mut now, mut ways, mut refused): (Draft, Option<Ways>, Option<Error>) = (draft, None, None);
+    loop {
+        let (error, next) = match trial(&now) {
+            Ok(Trial::Runs(found)) => return fitted(now, *found),
+            Ok(Trial::Damaged(damage)) => {
+                let next = match &mut ways {
+                    Some(ways) => ways.after_stray_points(),
+                    None => line_for_damage(&now, &damage).map(|line| now.with([line])),
+                };
+                match next {
+                    Some(draft) => now = draft,
+                    None => return Err(damage.error),
+                }
+                continue;
+            }
+            Err(error @ Error::Input { .. }) => {
+                let next = lines_for_bad_files(&now)?.map(|lines| now.with(lines));
+                (error, next)
+            }
+            Err(error @ Error::Config(_)) => {
+                let ways = match &mut ways {
+                    Some(ways) => ways,
+                    None => ways.insert(Ways::of(&now)?),
+                };
+                let next = ways.next();
+                (error, next)
+            }
+            Err(error) => (error, None),
+        };
+        // The first reason is that of the clouds as they are; later ones are about ways that nobody asked for.
+        let first = refused.get_or_insert(error);
+        match next {
+            Some(draft) => now = draft,
+            None => return Err(std::mem::replace(first, Error::Interrupted)),
+        }
+    }
+}
+
+/// Tries a draft as `check` does. Where a sample shows records that cannot be read, counts all of them.
+fn trial(draft: &Draft) -> Result<Trial> {
+    let (preflight, plan) = look(&draft.options()?)?;
+    let (sample, inputs) = (&plan.sample, &plan.inputs);
+    if sample.read >= plan.records && sample.kept == 0 {
+        return Err(no_point_is_left(&plan, sample));
+    }
+    if plan.records < CORNERS {
+        return Err(Error::NoTerrain(format!(
+            "there is no terrain in {} points: a triangle takes three different places in x and y that are not on one line",
+            plan.records
+        )));
+    }
+    let is_doubtful = sample.malformed > 0 || inputs.iter().any(|input| input.source.has_lost_chunk_table());
+    let damage = if is_doubtful { damage(&plan)? } else { None };
+    if let Some(damage) = damage {
+        return Ok(Trial::Damaged(damage));
+    }
+    Ok(Trial::Runs(Box::new((preflight, plan))))
+}
+
+/// Reads all points, and returns how many records are damaged if they are more than the options allow.
+fn damage(plan: &Plan) -> Result<Option<Damage>> {
+    let count = |input: &PlannedInput| count(&input.source, &input.rules);
+    let counts = plan.inputs.par_iter().map(count).collect::<Result<Vec<_>>>()?;
+    let malformed = counts.iter().map(|counts| counts.malformed).sum();
+    if malformed <= allowed_malformed(plan.options.input.max_malformed_fraction.0, plan.records) {
+        return Ok(None);
+    }
+    let worst = plan.inputs.iter().zip(&counts).max_by_key(|(_, counts)| counts.malformed);
+    Ok(worst.map(|(input, counts)| {
+        let source: &Source = &input.source;
+        Damage { malformed, records: plan.records, error: stop_at(source, counts, malformed, plan.records) }
+    }))
+}
+
+/// Returns the draft with what lets the job fit this machine, if something does.
+fn fitted(draft: Draft, (preflight, plan): (Preflight, Plan)) -> Result<Runnable> {
+    let Err(misfit) = preflight.passes() else { return Ok(Runnable { draft, preflight, plan, misfit: None }) };
+    for line in lines_for_room(&misfit, preflight.threads) {
+        let smaller = draft.with([line]);
+        let (preflight, plan) = look(&smaller.options()?)?;
+        if preflight.passes().is_ok() {
+            return Ok(Runnable { draft: smaller, preflight, plan, misfit: None });
+        }
+    }
+    Ok(Runnable { draft, preflight, plan, misfit: Some(misfit) })
+}
+
+/// Returns lines of which one may let a job fit, the mildest first.
+fn lines_for_room(misfit: &Error, threads: usize) -> Vec<NeededLine> {
+    match misfit {
+        Error::Memory(_) => {
+            let why = "With more threads the job takes more memory than this machine has free.";
+            let fewer = std::iter::successors(Some(threads / 2), |threads| Some(threads / 2));
+            let fewer = fewer.take_while(|threads| *threads > 0);
+            fewer.map(|threads| NeededLine::of_limits("threads", threads as i64, why)).collect()
+        }
+        Error::Io { source, .. } if source.kind() == ErrorKind::StorageFull => {
+            let why = "With all finished steps the job takes more disk than is free. Without them an interrupted job cannot go on with \
+                       another style.";
+            vec![NeededLine::of_limits("keep_steps", false, why)]
+        }
+        _ => Vec::new(),
+    }
+}

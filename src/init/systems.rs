@@ -1,0 +1,132 @@
+//! What lets a job run though its clouds are in degrees or in different coordinate reference systems.
+
+use crate::init::draft::{Draft, NeededLine};
+use crate::input::{self, Crs, Source, Unit};
+use crate::job::plan::inputs::input_paths;
+use crate::{Error, Result};
+use rayon::prelude::*;
+use std::collections::BTreeSet;
+
+/// The most systems that a sentence names.
+const MOST_NAMED: usize = 4;
+
+/// Why datums are taken for one.
+const WHY_CLOSE: &str = "The datums of the files differ by a metre or two. They are taken for one.";
+
+/// Ways to run a draft that is refused as it is. Each is tried in turn.
+pub(crate) struct Ways {
+    draft: Draft,
+    sources: Vec<Source>,
+    waiting: std::vec::IntoIter<Way>,
+}
+
+/// A way to bring all points onto one plane.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Way {
+    /// Into a UTM zone; with `close`, datums that are a metre or two apart count as one.
+    Utm { close: bool },
+    /// The coordinates are none that the records of the files can mean.
+    Plane,
+}
+
+impl Ways {
+    /// Returns the ways for `draft`. Opens its files, of which each is a point cloud.
+    ///
+    /// # Errors
+    /// Those of opening them.
+    pub(crate) fn of(draft: &Draft) -> Result<Ways> {
+        let options = draft.options()?;
+        let open = |path: &std::path::PathBuf| match input::open(path, &options.input.csv) {
+            // What is left out has no say.
+            Err(Error::Input { .. }) if draft.sets("on_bad_file") => Ok(None),
+            opened => opened.map(Some),
+        };
+        let sources = input_paths(&options.input)?.par_iter().map(open).collect::<Result<Vec<_>>>()?;
+        let ways = vec![Way::Utm { close: false }, Way::Utm { close: true }];
+        Ok(Ways { draft: draft.clone(), sources: sources.into_iter().flatten().collect(), waiting: ways.into_iter() })
+    }
+
+    /// Returns the draft for the next way.
+    pub(crate) fn next(&mut self) -> Option<Draft> {
+        let way = self.waiting.next()?;
+        Some(self.draft.with(self.lines(way)))
+    }
+
+    /// Returns the draft for coordinates of which some are no place on earth, though all files say that they are degrees; `None` if they
+    /// can be degrees.
+    pub(crate) fn after_stray_points(&mut self) -> Option<Draft> {
+        self.waiting = Vec::new().into_iter();
+        let is_nowhere = |source: &Source| farthest(source, 0) > 360.0 || farthest(source, 1) > 90.0;
+        let all_say_degrees = self.sources.iter().all(|source| source.crs.horizontal == Unit::Degree);
+        let is_plane = all_say_degrees && self.sources.iter().any(is_nowhere);
+        is_plane.then(|| self.draft.with(self.lines(Way::Plane)))
+    }
+
+    fn lines(&self, way: Way) -> Vec<NeededLine> {
+        match way {
+            Way::Utm { close } => {
+                let utm = NeededLine::of_input("to_crs", "utm", &self.why_utm());
+                let close = close.then(|| NeededLine::of_input("datums", "close", WHY_CLOSE));
+                [Some(utm), self.missing_crs(), close].into_iter().flatten().collect()
+            }
+            Way::Plane => vec![NeededLine::of_input("crs", "none", &self.why_plane())],
+        }
+    }
+
+    fn why_utm(&self) -> String {
+        let mut systems = self.systems();
+        let in_degrees = self.sources.iter().filter(|source| source.crs.horizontal == Unit::Degree).count();
+        let more = systems.len().saturating_sub(MOST_NAMED);
+        systems.truncate(MOST_NAMED);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        let reason = match (in_degrees, systems.len()) {
+            (0, _) => format!("The files are in different systems: {}{more}.", systems.join("; ")),
+            (_, 0 | 1) => {
+                "The coordinates are longitude and latitude, in which triangles would be distorted.".to_string()
+            }
+            _ => format!(
+                "Some files are in degrees, in which triangles would be distorted: {}{more}.",
+                systems.join("; ")
+            ),
+        };
+        format!(
+            "{reason} So all points are transformed into the UTM zone of their middle. Any projected CRS may stand here."
+        )
+    }
+
+    fn why_plane(&self) -> String {
+        let farthest = |axis: usize| self.sources.iter().map(|source| farthest(source, axis)).fold(0.0, f64::max);
+        format!(
+            "The files say that their coordinates are degrees, but x goes to {:.2} and y to {:.2}, and no place on earth is there: they \
+             are taken as a plane.",
+            farthest(0),
+            farthest(1)
+        )
+    }
+
+    /// Returns the line for texts whose columns are longitude and latitude of no named system, if all files that name none are such.
+    fn missing_crs(&self) -> Option<NeededLine> {
+        let mut nameless = self.sources.iter().filter(|source| !source.crs.is_named());
+        let first = nameless.next()?;
+        let are_degrees = first.crs.horizontal == Unit::Degree && nameless.all(|s| s.crs.horizontal == Unit::Degree);
+        let why = format!(
+            "The columns of {} are longitude and latitude, and nothing says of which system: WGS 84 is taken. Change it if they are of \
+             another one.",
+            first.path.display()
+        );
+        are_degrees.then(|| NeededLine::of_input("missing_crs", "EPSG:4326", &why))
+    }
+
+    /// Returns the names of all systems.
+    fn systems(&self) -> Vec<String> {
+        let name = |crs: &Crs| {
+            if crs.is_named() { crs.label() } else { format!("one without a name, in {}", crs.horizontal.name()) }
+        };
+        self.sources.iter().map(|source| name(&source.crs)).collect::<BTreeSet<String>>().into_iter().collect()
+    }
+}
+
+/// Returns how far x or y of a source goes from zero.
+fn farthest(source: &Source, axis: usize) -> f64 {
+    source.min[axis].abs().max(source.max[axis].abs())
+}
