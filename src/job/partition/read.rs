@@ -3,7 +3,7 @@
 use crate::breaklines::Breaklines;
 use crate::input::options::{InputOptions, OnBadFile};
 use crate::input::surface_doubts::no_ground;
-use crate::input::{Point, PointCounts};
+use crate::input::{Point, PointCounts, set_network_memory};
 use crate::job::durable::directory::JobDirectory;
 use crate::job::index::PartIndex;
 use crate::job::partition::breakline_points::{BreaklineFilter, add_line_sites};
@@ -14,7 +14,7 @@ use crate::job::partition::point_file::{PointFile, PointFiles};
 use crate::job::partition::result::{Partition, PointSummary};
 use crate::job::partition::tree::Cell;
 use crate::job::partition::tree_builder::{TreeBuilder, wanted_buckets};
-use crate::job::plan::budget::read_buffer_memory;
+use crate::job::plan::budget::{network_memory, read_buffer_memory};
 use crate::job::plan::job_plan::{Plan, PlannedInput, SkippedInput};
 use crate::job::plan::text_inputs::{allowed_malformed, stop_at, too_many_malformed};
 use crate::job::progress::stage::Stage;
@@ -123,6 +123,7 @@ pub(crate) fn decode(
     stage: &Stage,
 ) -> Result<ByInput> {
     let lines = plan.built_breaklines()?;
+    set_network_memory(network_memory(&plan.options));
     let pass = Pass { plan, grid, buckets, lines: lines.as_deref(), malformed: AtomicU64::new(malformed) };
     let mut by_input = pass.over(inputs, |input, chunk, sink| {
         let counts = input.source.decode(chunk, &input.rules, sink)?;
