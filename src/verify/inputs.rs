@@ -120,7 +120,8 @@ impl<'a> Inputs<'a> {
         let is_skipped = |file: &Path| {
             let place = |path: &Path| path.canonicalize().ok();
             // Files of other machines have no place here.
-            let same = |skipped: &Path| skipped == file || place(skipped).is_some_and(|known| place(file) == Some(known));
+            let same =
+                |skipped: &Path| skipped == file || place(skipped).is_some_and(|known| place(file) == Some(known));
             facts.skipped.iter().any(|skipped| same(&skipped.file))
         };
         let used = files.iter().filter(|file| !is_skipped(file));

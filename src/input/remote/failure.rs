@@ -66,13 +66,15 @@ impl Failure {
             Io(error) if error.kind() == ErrorKind::ConnectionRefused => {
                 (FailureKind::Unreachable, format!("the server {host} refuses connections"))
             }
-            // So the TLS library calls what is wrong with a certificate.
-            Io(error) if error.kind() == ErrorKind::InvalidData => (FailureKind::Refused, not_trusted(host, &error)),
+            // So the TLS library calls what it does not like.
+            Io(error) if error.kind() == ErrorKind::InvalidData => {
+                (FailureKind::Refused, no_tls(host, &error.to_string()))
+            }
             Io(error) if error.kind() == ErrorKind::NetworkUnreachable => (
                 FailureKind::Unreachable,
                 format!("the server {host} cannot be reached: {error}; look after the network"),
             ),
-            Rustls(error) => (FailureKind::Refused, not_trusted(host, &error)),
+            Rustls(error) => (FailureKind::Refused, no_tls(host, &error.to_string())),
             Io(error) => (FailureKind::Passing, format!("the connection failed: {error}")),
             ConnectProxyFailed(_) => (FailureKind::Unreachable, "the proxy did not make the connection".into()),
             TooManyRedirects => (FailureKind::Refused, "the server redirects without an end".into()),
@@ -102,8 +104,14 @@ impl Failure {
     }
 }
 
-fn not_trusted(host: &str, error: &dyn std::fmt::Display) -> String {
-    format!(
-        "the certificate of {host} is not trusted ({error}): the authorities of this system are; SSL_CERT_FILE names a file with others"
-    )
+/// Says why there is no safe connection.
+fn no_tls(host: &str, error: &str) -> String {
+    if error.contains("certificate") {
+        format!(
+            "the certificate of {host} is not trusted ({error}): the authorities of this system are; SSL_CERT_FILE names a file with \
+             others"
+        )
+    } else {
+        format!("no https with {host} ({error}): correct the URL if that is a server of http://")
+    }
 }

@@ -58,7 +58,7 @@ pub(crate) fn persist<T>(
         in_vain += 1;
         let is_hopeless = failure.kind == FailureKind::Unreachable && !was_reached && in_vain >= MOST_UNREACHABLE;
         let wanted = failure.pause.unwrap_or(pause).max(pause).min(LONGEST_PAUSE);
-        let is_too_late = quiet_since.elapsed() + wanted > patience.give_up;
+        let is_too_late = quiet_since.elapsed().saturating_add(wanted) > patience.give_up;
         if !failure.may_pass() {
             return Err(failure);
         }
@@ -68,7 +68,7 @@ pub(crate) fn persist<T>(
             return Err(Failure { what, ..failure });
         }
         std::thread::sleep(wanted);
-        pause *= 2;
+        pause = pause.saturating_mul(2);
     }
 }
 
