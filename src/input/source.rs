@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 
 use rust_decimal::Decimal;
 use serde::{Deserialize, Serialize};
-use xxhash_rust::xxh3::xxh3_64;
 
 use crate::input::crs::plausible::plausible;
 use crate::input::crs::system::Crs;
@@ -387,12 +386,12 @@ impl Source {
     }
 
     /// Returns the bounds for an index of the file: none if they are in another system than the file.
-    fn own_bounds<'a>(&self, bounds: Option<&'a RawBounds>) -> Option<&'a RawBounds> {
+    pub(crate) fn own_bounds<'a>(&self, bounds: Option<&'a RawBounds>) -> Option<&'a RawBounds> {
         bounds.filter(|_| self.transform.as_ref().is_none_or(|transform| !transform.is_moved))
     }
 
     /// Returns the bytes that all of a chunk is decoded from, in their order.
-    fn bytes_of(&self, chunk: usize, request: &ChunkRequest) -> Vec<Range<u64>> {
+    pub(crate) fn bytes_of(&self, chunk: usize, request: &ChunkRequest) -> Vec<Range<u64>> {
         match &self.points {
             PointData::Laz(points) => points.bytes_of(chunk, request),
             _ if request.left_out => Vec::new(),
@@ -405,11 +404,6 @@ impl Source {
     fn read_own_chunk(&self, chunk: usize, request: ChunkRequest, sink: &mut impl RecordSink) -> Result<()> {
         let file = RandomAccessFile::reopen(&self.path, self.size)?;
         if file.is_remote() && request.records == u64::MAX {
-            let is_indexed = matches!(&self.points, PointData::Laz(points) if points.has_index());
-            let key = format!("{:?} {} {is_indexed}", request.bounds, request.left_out);
-            file.expect(xxh3_64(key.as_bytes()), || {
-                (0..self.chunks()).map(|chunk| self.bytes_of(chunk, &request)).collect()
-            });
             file.hold(self.bytes_of(chunk, &request).into_iter())?;
         }
         match &self.points {

@@ -146,6 +146,7 @@ impl<'a> Inputs<'a> {
         let mut first_order = 0;
         for (number, source) in (VERTEX + 1..).zip(&self.sources) {
             let rules = self.rules(source, first_order)?;
+            let _ahead = source.read_ahead(rules.bounds.as_ref(), false)?;
             (0..source.chunks()).into_par_iter().try_for_each(|chunk| {
                 interrupt::check()?;
                 source.decode(chunk, &rules, &mut |points| places.add_points(number, points)).map(drop)

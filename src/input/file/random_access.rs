@@ -80,11 +80,11 @@ impl RandomAccessFile {
         }
     }
 
-    /// Says that the runs of ranges that `runs` returns will each be held with [`RandomAccessFile::hold`], about in this order: a file of
-    /// another machine then comes ahead of time. `key` tells them from others.
-    pub(crate) fn expect(&self, key: u64, runs: impl FnOnce() -> Vec<Vec<Range<u64>>>) {
+    /// Says that these runs of ranges will each be held with [`RandomAccessFile::hold`], about in this order, and no others: of a file of
+    /// another machine they then come ahead of time.
+    pub(crate) fn expect(&self, runs: impl Iterator<Item = Vec<Range<u64>>>) {
         if let Content::Remote(file) = &self.content {
-            file.expect(key, || runs().into_iter().flat_map(|ranges| to_hold(ranges.into_iter())).collect());
+            file.expect(runs.flat_map(|ranges| to_hold(ranges.into_iter())).collect());
         }
     }
 

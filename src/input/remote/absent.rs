@@ -33,7 +33,7 @@ impl HeldFile {
         match *self {}
     }
 
-    pub(crate) fn expect(&self, _: u64, _: impl FnOnce() -> Vec<Range<u64>>) {
+    pub(crate) fn expect(&self, _: Vec<Range<u64>>) {
         match *self {}
     }
 

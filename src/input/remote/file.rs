@@ -31,8 +31,8 @@ pub(crate) struct RemoteFile {
     hash: u64,
     /// Its beginning, until somebody takes it.
     beginning: Mutex<Option<Arc<Window>>>,
-    /// What will be read, and the key of [`RemoteFile::expect`].
-    plan: Mutex<(Option<u64>, ReadPlan)>,
+    /// What will be read.
+    plan: Mutex<ReadPlan>,
 }
 
 impl RemoteFile {
@@ -67,7 +67,7 @@ impl RemoteFile {
             return Ok(file.clone());
         }
         let beginning = Mutex::new((held_bytes() <= BEGINNINGS).then_some(window));
-        let plan = Mutex::new((None, ReadPlan::new(Vec::new())));
+        let plan = Mutex::new(ReadPlan::new(Vec::new()));
         let file = Arc::new(RemoteFile { name: name.to_path_buf(), address, version, hash, beginning, plan });
         known.insert(name.into(), file.clone());
         Ok(file)
@@ -93,13 +93,9 @@ impl RemoteFile {
         self.beginning.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
-    /// Says that `ranges` will be fetched, each once and about in this order. `key` tells them from others; with that of the last call
-    /// nothing changes.
-    pub(crate) fn expect(&self, key: u64, ranges: impl FnOnce() -> Vec<Range<u64>>) {
-        let mut plan = self.plan.lock().unwrap_or_else(PoisonError::into_inner);
-        if plan.0 != Some(key) {
-            *plan = (Some(key), ReadPlan::new(ranges()));
-        }
+    /// Says that these ranges will be fetched, each once and about in this order, and no others.
+    pub(crate) fn expect(&self, ranges: Vec<Range<u64>>) {
+        *self.plan.lock().unwrap_or_else(PoisonError::into_inner) = ReadPlan::new(ranges);
     }
 
     /// Begins to fetch a range, which lies in the file. One that is expected comes with those after it.
@@ -109,7 +105,7 @@ impl RemoteFile {
             Pending::begin(range, move || Ok(transfer(&file.address, wanted.clone(), Some(&file.version))?.bytes))
         };
         let mut plan = self.plan.lock().unwrap_or_else(PoisonError::into_inner);
-        plan.1.take(&range, &begin).unwrap_or_else(|| begin(range))
+        plan.take(&range, &begin).unwrap_or_else(|| begin(range))
     }
 
     /// Waits for what [`RemoteFile::fetch`] has begun for `range`.

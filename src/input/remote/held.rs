@@ -55,8 +55,8 @@ impl HeldFile {
     }
 
     /// Says that `ranges` will be held or read, as [`RemoteFile::expect`] does.
-    pub(crate) fn expect(&self, key: u64, ranges: impl FnOnce() -> Vec<Range<u64>>) {
-        self.file.expect(key, ranges);
+    pub(crate) fn expect(&self, ranges: Vec<Range<u64>>) {
+        self.file.expect(ranges);
     }
 
     /// Fetches these ranges, all at the same time, and holds them.
