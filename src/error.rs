@@ -183,10 +183,11 @@ impl Error {
         }
     }
 
-    /// Returns a function for `map_err`: it makes an [`Error::Io`] about doing `action` ("read", "write" ...) to `path`.
+    /// Returns a function for `map_err`: it makes an [`Error::Io`] about doing `action` ("read", "write" ...) to `path`. An error of this
+    /// crate that came through a trait of the standard library stays what it is.
     pub fn io(action: &'static str, path: impl AsRef<Path>) -> impl FnOnce(std::io::Error) -> Error {
         let path = path.as_ref().to_path_buf();
-        move |source| Error::Io { action, path, source }
+        move |source| source.downcast().unwrap_or_else(|source| Error::Io { action, path, source })
     }
 
     /// Returns an [`Error::Input`]: the file at `path` cannot be used because of `what`.

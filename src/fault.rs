@@ -29,6 +29,8 @@ pub(crate) fn read(name: &str) -> io::Result<()> {
 /// "Input/output error".
 const EIO: i32 = 5;
 
+#[cfg(feature = "remote")]
+pub(crate) use injection::network_patience;
 pub(crate) use injection::{commit_interval, is_due, is_signalled, mark, processors, traced};
 
 #[cfg(feature = "fault-injection")]
@@ -77,6 +79,12 @@ mod injection {
     /// Returns the least time between two commits of the journal if a test sets it (`GDT_COMMIT_MS`).
     pub(crate) fn commit_interval() -> Option<Duration> {
         std::env::var("GDT_COMMIT_MS").ok()?.parse().ok().map(Duration::from_millis)
+    }
+
+    /// Returns how long servers may be silent if a test sets it (`GDT_PATIENCE_MS`).
+    #[cfg(feature = "remote")]
+    pub(crate) fn network_patience() -> Option<Duration> {
+        std::env::var("GDT_PATIENCE_MS").ok()?.parse().ok().map(Duration::from_millis)
     }
 
     /// Returns the number of processors if a test sets it (`GDT_PROCESSORS`).
@@ -135,6 +143,12 @@ mod injection {
 
     #[inline(always)]
     pub(crate) fn commit_interval() -> Option<Duration> {
+        None
+    }
+
+    #[cfg(feature = "remote")]
+    #[inline(always)]
+    pub(crate) fn network_patience() -> Option<Duration> {
         None
     }
 

@@ -211,7 +211,7 @@ fn check_job(path: &Path, print: PrintOptions) -> Result<ExitCode> {
 
 /// Verifies the output of a job. With `--quiet` too, an error says what is wrong or cannot be proved.
 fn verify_output(directory: &Path, memory: u64, inputs: &[PathBuf], print: PrintOptions) -> Result<ExitCode> {
-    none_is_missing(inputs)?;
+    let inputs = &named(inputs)?;
     let verdict = on_threads(threads::available(), || verify::verify_against(directory, memory, inputs))?;
     let printed = print_result(&verdict, print);
     if verdict.verdict == Conclusion::Proved {
@@ -260,8 +260,7 @@ fn test_gpu(adapter: Option<&str>, leaves: Option<usize>, print: PrintOptions) -
 }
 
 fn show_info(files: &[PathBuf], histogram: bool, print: PrintOptions) -> Result<ExitCode> {
-    none_is_missing(files)?;
-    for file in files {
+    for file in &named(files)? {
         let described = on_threads(threads::available(), || {
             let source = input::open(file, &input::TextOptions::default())?;
             let histogram = histogram.then(|| Histogram::of(&source)).transpose()?;
@@ -272,12 +271,16 @@ fn show_info(files: &[PathBuf], histogram: bool, print: PrintOptions) -> Result<
     Ok(ExitCode::SUCCESS)
 }
 
-fn none_is_missing(files: &[PathBuf]) -> Result<()> {
-    let is_missing = |file: &&PathBuf| file.symlink_metadata().is_err_and(|e| e.kind() == ErrorKind::NotFound);
-    match files.iter().find(is_missing) {
-        Some(missing) => Err(Error::Config(format!("there is no file {}: correct its name", missing.display()))),
-        None => Ok(()),
-    }
+/// Returns the files that a command line names: those of this machine, which must be there, and those that its URLs mean.
+fn named(files: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    let of_one = |file: &PathBuf| match file.to_str() {
+        Some(url) if input::is_url(url) => input::remote_files(url),
+        _ if file.symlink_metadata().is_err_and(|e| e.kind() == ErrorKind::NotFound) => {
+            Err(Error::Config(format!("there is no file {}: correct its name", file.display())))
+        }
+        _ => Ok(vec![file.clone()]),
+    };
+    Ok(files.iter().map(of_one).collect::<Result<Vec<_>>>()?.concat())
 }
 
 /// Prints a result for people or as JSON.

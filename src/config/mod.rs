@@ -6,7 +6,7 @@ mod paths;
 use crate::config::paths::{Anchored, anchor};
 use crate::gpu::options::{GpuOptions, TextureSide, VoronoiMethod};
 use crate::input::lines::options::LineOptions;
-use crate::input::options::InputOptions;
+use crate::input::options::{InputOptions, is_url};
 use crate::job::options::{JobOptions, Limits};
 use crate::output::options::OutputOptions;
 use crate::triangulation::options::{Backend, MaxPointsPerPart, MaxPointsPerTile, TriangulationOptions};
@@ -100,18 +100,24 @@ pub fn of_text(text: &str, base: &Path) -> Result<JobOptions> {
     Ok(options)
 }
 
-/// Makes the paths count from the working directory instead of `base`, the directory of the configuration.
+/// Makes the paths count from the working directory instead of `base`, the directory of the configuration. URLs stay, without what nobody
+/// may see.
 fn resolve_paths(options: &mut JobOptions, base: &Path) -> std::result::Result<(), String> {
     if let Some(directory) = options.output.directory.to_str() {
         let Anchored { base, path } = anchor("[output] directory", directory, base)?;
         options.output.directory = base.join(path);
     }
+    options.input.hide_queries().map_err(|what| format!("[input] files: {what}"))?;
     if let Some(grid) = options.output.height_offset.as_mut().and_then(|offset| offset.grid_mut()) {
         let name = grid.to_string_lossy().into_owned();
+        refuse_url("[output] height_offset", &name)?;
         let Anchored { base, path } = anchor("[output] height_offset", &name, base)?;
         *grid = base.join(path);
     }
-    let of_points = options.input.files.iter_mut().map(|file| ("[input] files", file));
+    // A shell's signs mean other things in a URL.
+    let of_points = options.input.files.iter_mut().filter(|file| !is_url(file)).map(|file| ("[input] files", file));
+    let line_files = || options.breaklines.iter().flat_map(|lines| &lines.files);
+    line_files().try_for_each(|file| refuse_url("[[breaklines]] files", file))?;
     let of_lines = options.breaklines.iter_mut().flat_map(|lines| &mut lines.files);
     for (key, file) in of_points.chain(of_lines.map(|file| ("[[breaklines]] files", file))) {
         let Anchored { base, path } = anchor(key, file, base)?;
@@ -120,6 +126,18 @@ fn resolve_paths(options: &mut JobOptions, base: &Path) -> std::result::Result<(
         }
     }
     Ok(())
+}
+
+/// Refuses a URL where only a file of this machine can be read.
+fn refuse_url(option: &str, name: &str) -> std::result::Result<(), String> {
+    match is_url(name) {
+        // Its query may be a secret.
+        true => {
+            let place = name.split('?').next().unwrap_or_default();
+            Err(format!("{option}: {place}: only point clouds are read by URL; download this file and name the copy"))
+        }
+        false => Ok(()),
+    }
 }
 
 /// Reads and checks the text of a configuration. The error shows the line.

@@ -47,6 +47,7 @@ impl Histogram {
             source.read_chunk(chunk, ChunkRequest::all(), &mut counts).map(|()| counts)
         };
         let none = RecordCounts::default;
+        let _ahead = source.read_ahead(None, false)?;
         let counts = (0..source.chunks()).into_par_iter().map(count).try_reduce(none, |a, b| Ok(a.with(&b)))?;
         let returns = if source.format == FileFormat::Text { &[] } else { &counts.returns[..] };
         Ok(Histogram {

@@ -10,15 +10,18 @@ use crate::input::crs::transform::datum_rule::DatumRule;
 use crate::input::points::classes::{IGNORED_GROUND, is_noise};
 use crate::input::points::optional_fields::OptionalFields;
 use crate::input::points::returns::KeptReturns;
+use crate::input::remote::name::public_name;
 use crate::input::surface::Surface;
 use crate::input::text::options::TextOptions;
 use crate::input::text::row_choice::RowChoice;
+
+pub use crate::input::remote::name::is_url;
 
 /// `[input]`: which points a job reads.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InputOptions {
-    /// Paths or globs, relative to the configuration file.
+    /// Paths or globs, relative to the configuration file, or URLs, with dots in place of their queries.
     pub files: Vec<String>,
     /// Which surface the job makes: a choice of classes or returns.
     #[serde(default)]
@@ -72,6 +75,17 @@ pub struct InputOptions {
 }
 
 impl InputOptions {
+    /// Puts public names in place of URLs, so that no query can be written down.
+    ///
+    /// # Errors
+    /// A sentence about a URL that cannot be read.
+    pub fn hide_queries(&mut self) -> Result<(), String> {
+        for file in self.files.iter_mut().filter(|file| is_url(file)) {
+            *file = public_name(file)?;
+        }
+        Ok(())
+    }
+
     /// Returns which of the 256 classification codes the job keeps.
     pub fn kept_classes(&self) -> [bool; 256] {
         match &self.classes {

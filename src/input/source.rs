@@ -1,5 +1,6 @@
 //! A point cloud file that has been opened: what it says, and how to decode its points chunk by chunk.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use rust_decimal::Decimal;
@@ -54,7 +55,7 @@ pub enum FileFormat {
 /// none of its floating-point numbers is infinite or NaN. Its path must be UTF-8 for that.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Source {
-    /// The file.
+    /// The file, or the public name of one of another machine.
     pub path: PathBuf,
     /// Its size in bytes when it was opened. Decoding fails if the size changes later.
     pub size: u64,
@@ -126,11 +127,14 @@ pub fn open_chosen(path: &Path, text: &TextOptions, choice: &RowChoice) -> Resul
     let held = file.size().min(start.len() as u64) as usize;
     file.read_exact_at(&mut start[..held], 0)?;
     let start = &start[..held];
-    if start.starts_with(b"LASF") {
-        return open_las(&file, choice.use_index);
-    }
-    refuse_other_formats(path, start)?;
-    open_text(&file, text, choice)
+    let mut source = if start.starts_with(b"LASF") {
+        open_las(&file, choice.use_index)?
+    } else {
+        refuse_other_formats(path, start)?;
+        open_text(&file, text, choice)?
+    };
+    source.warnings.extend(file.doubt().map(str::to_string));
+    Ok(source)
 }
 
 fn open_las(file: &RandomAccessFile, with_index: bool) -> Result<Source> {
@@ -393,13 +397,26 @@ impl Source {
     }
 
     /// Returns the bounds for an index of the file: none if they are in another system than the file.
-    fn own_bounds<'a>(&self, bounds: Option<&'a RawBounds>) -> Option<&'a RawBounds> {
+    pub(crate) fn own_bounds<'a>(&self, bounds: Option<&'a RawBounds>) -> Option<&'a RawBounds> {
         bounds.filter(|_| self.transform.as_ref().is_none_or(|transform| !transform.is_moved))
+    }
+
+    /// Returns the bytes that all of a chunk is decoded from, in their order.
+    pub(crate) fn bytes_of(&self, chunk: usize, request: &ChunkRequest) -> Vec<Range<u64>> {
+        match &self.points {
+            PointData::Laz(points) => points.bytes_of(chunk, request),
+            _ if request.left_out => Vec::new(),
+            PointData::Las(points) => vec![points.bytes_of(chunk)],
+            PointData::Text(table) => vec![table.bytes_of(chunk, self.size)],
+        }
     }
 
     /// As [`Source::read_chunk`], in the coordinates of the file.
     fn read_own_chunk(&self, chunk: usize, request: ChunkRequest, sink: &mut impl RecordSink) -> Result<()> {
         let file = RandomAccessFile::reopen(&self.path, self.size)?;
+        if file.is_remote() && request.records == u64::MAX {
+            file.hold(self.bytes_of(chunk, &request).into_iter())?;
+        }
         match &self.points {
             PointData::Las(points) => points.decode(&file, chunk, request, sink),
             PointData::Laz(points) => points.decode(&file, chunk, request, sink),

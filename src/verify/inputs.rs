@@ -118,7 +118,10 @@ impl<'a> Inputs<'a> {
             Ok(source)
         };
         let is_skipped = |file: &Path| {
-            let same = |skipped: &Path| skipped == file || skipped.canonicalize().ok() == file.canonicalize().ok();
+            let place = |path: &Path| path.canonicalize().ok();
+            // Files of other machines have no place here.
+            let same =
+                |skipped: &Path| skipped == file || place(skipped).is_some_and(|known| place(file) == Some(known));
             facts.skipped.iter().any(|skipped| same(&skipped.file))
         };
         let used = files.iter().filter(|file| !is_skipped(file));
@@ -143,6 +146,7 @@ impl<'a> Inputs<'a> {
         let mut first_order = 0;
         for (number, source) in (VERTEX + 1..).zip(&self.sources) {
             let rules = self.rules(source, first_order)?;
+            let _ahead = source.read_ahead(rules.bounds.as_ref(), false)?;
             (0..source.chunks()).into_par_iter().try_for_each(|chunk| {
                 interrupt::check()?;
                 source.decode(chunk, &rules, &mut |points| places.add_points(number, points)).map(drop)

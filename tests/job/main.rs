@@ -12,6 +12,9 @@ mod random;
 mod scattered;
 #[path = "../common/validator.rs"]
 mod validator;
+#[cfg(feature = "remote")]
+#[path = "../common/web_server.rs"]
+mod web_server;
 
 mod clouds;
 mod program;
@@ -48,6 +51,8 @@ mod parts;
 mod preflight;
 mod raster;
 mod real;
+#[cfg(feature = "remote")]
+mod remote;
 mod same_mesh;
 mod shortage;
 mod slow_gpus;

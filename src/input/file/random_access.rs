@@ -1,31 +1,47 @@
-//! A file that any thread may read at any position.
+//! A file that any thread may read at any position, of this machine or of another one.
 
 use std::fs::File;
 use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use crate::input::file::range::{FileRange, READ_AHEAD, SHRUNK};
+use crate::input::file::range::{FileRange, READ_AHEAD, RangeSource, SHRUNK};
+use crate::input::remote::name::is_remote;
+use crate::input::remote::{HeldFile, to_hold};
 use crate::positional_io::read_exact_at;
 use crate::{Error, Result, fault};
 
 /// A file that is open for reading and whose size is known.
 pub(crate) struct RandomAccessFile {
-    file: File,
+    content: Content,
     path: PathBuf,
     size: u64,
 }
 
+/// Where the bytes are.
+enum Content {
+    Local(File),
+    Remote(HeldFile),
+}
+
 impl RandomAccessFile {
-    /// Opens `path`, which must be a regular file.
+    /// Opens `path`, which must be a regular file, or a file of another machine.
     pub(crate) fn open(path: &Path) -> Result<RandomAccessFile> {
+        if is_remote(path) {
+            let file = HeldFile::open(path)?;
+            return Ok(RandomAccessFile {
+                path: path.to_path_buf(),
+                size: file.size(),
+                content: Content::Remote(file),
+            });
+        }
         // Ask before opening: opening a pipe would wait until another process writes to it.
         if !path.metadata().map_err(Error::io("read", path))?.is_file() {
             return Err(Error::input(path, kind_text(path)));
         }
         let file = File::open(path).map_err(Error::io("read", path))?;
         let size = file.metadata().map_err(Error::io("read", path))?.len();
-        Ok(RandomAccessFile { file, path: path.to_path_buf(), size })
+        Ok(RandomAccessFile { content: Content::Local(file), path: path.to_path_buf(), size })
     }
 
     /// Opens `path` again. Fails if the file no longer has `size` bytes.
@@ -51,9 +67,41 @@ impl RandomAccessFile {
         &self.path
     }
 
+    /// Returns whether every read that nobody has prepared takes the time of a request.
+    pub(crate) fn is_remote(&self) -> bool {
+        matches!(self.content, Content::Remote(_))
+    }
+
+    /// Returns what the user should know about the file besides what it holds.
+    pub(crate) fn doubt(&self) -> Option<&'static str> {
+        match &self.content {
+            Content::Local(_) => None,
+            Content::Remote(file) => file.doubt(),
+        }
+    }
+
+    /// Says that these runs of ranges will each be held with [`RandomAccessFile::hold`], about in this order, and no others: of a file of
+    /// another machine they then come ahead of time.
+    pub(crate) fn expect(&self, runs: impl Iterator<Item = Vec<Range<u64>>>) {
+        if let Content::Remote(file) = &self.content {
+            file.expect(runs.flat_map(|ranges| to_hold(ranges.into_iter())).collect());
+        }
+    }
+
+    /// Brings the bytes of these ranges, which are in their order, into memory until the file is closed, if it is of another machine.
+    pub(crate) fn hold(&self, ranges: impl Iterator<Item = Range<u64>>) -> Result<()> {
+        match &self.content {
+            Content::Local(_) => Ok(()),
+            Content::Remote(file) => file.hold(&to_hold(ranges)),
+        }
+    }
+
     /// Fills `buffer` with the bytes from position `offset` on.
     pub(crate) fn read_exact_at(&self, buffer: &mut [u8], offset: u64) -> Result<()> {
-        let outcome = fault::read("read-input").and_then(|()| read_exact_at(&self.file, buffer, offset));
+        let outcome = fault::read("read-input").and_then(|()| match &self.content {
+            Content::Local(file) => read_exact_at(file, buffer, offset),
+            Content::Remote(file) => file.read_exact_at(buffer, offset).map_err(io::Error::other),
+        });
         outcome.map_err(|error| match error.kind() {
             io::ErrorKind::UnexpectedEof => Error::io("read", &self.path)(io::Error::other(SHRUNK)),
             _ => Error::io("read", &self.path)(error),
@@ -74,8 +122,11 @@ impl RandomAccessFile {
 
     /// As [`RandomAccessFile::range`], for a caller who knows what he skips: at most `read_ahead` bytes of that are read.
     pub(crate) fn range_with(&self, range: Range<u64>, read_ahead: usize) -> Result<FileRange> {
-        let file = self.file.try_clone().map_err(Error::io("read", &self.path))?;
-        Ok(FileRange::new(file, range, read_ahead))
+        let source = match &self.content {
+            Content::Local(file) => RangeSource::Local(file.try_clone().map_err(Error::io("read", &self.path))?),
+            Content::Remote(file) => RangeSource::Remote(file.stream(range.clone())),
+        };
+        Ok(FileRange::new(source, range, read_ahead))
     }
 }
 

@@ -5,6 +5,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::ops::Range;
 
 use crate::fault;
+use crate::input::remote::RemoteStream;
 use crate::positional_io::read_at;
 
 /// The message for a file that ends before the size it had when it was opened.
@@ -13,9 +14,24 @@ pub(crate) const SHRUNK: &str = "it became shorter while it was read; run again 
 /// The number of bytes that a [`FileRange`] usually reads at once.
 pub(crate) const READ_AHEAD: usize = 1 << 16;
 
+/// Where the bytes of a range come from.
+pub(crate) enum RangeSource {
+    Local(File),
+    Remote(RemoteStream),
+}
+
+impl RangeSource {
+    fn read_at(&mut self, out: &mut [u8], at: u64) -> io::Result<usize> {
+        match self {
+            RangeSource::Local(file) => read_at(file, out, at),
+            RangeSource::Remote(stream) => stream.read_at(out, at),
+        }
+    }
+}
+
 /// A buffered reader of a range of a file. It ends where the range ends, and reads at most `read_ahead` of the bytes that a caller skips.
 pub(crate) struct FileRange {
-    file: File,
+    source: RangeSource,
     /// The number of bytes to read at once.
     read_ahead: usize,
     /// The position in the file of the first byte after the buffer.
@@ -27,9 +43,9 @@ pub(crate) struct FileRange {
 }
 
 impl FileRange {
-    /// Returns a reader of the bytes of `range` in `file`.
-    pub(crate) fn new(file: File, range: Range<u64>, read_ahead: usize) -> FileRange {
-        FileRange { file, read_ahead, next: range.start, end: range.end, buffer: Vec::new(), at: 0 }
+    /// Returns a reader of the bytes of `range` of a file.
+    pub(crate) fn new(source: RangeSource, range: Range<u64>, read_ahead: usize) -> FileRange {
+        FileRange { source, read_ahead, next: range.start, end: range.end, buffer: Vec::new(), at: 0 }
     }
 
     /// Reads into `out` past the buffer, at most to the end of the range. Fails if the file ends before the range does.
@@ -39,7 +55,7 @@ impl FileRange {
             return Ok(0);
         }
         fault::read("read-input")?;
-        match read_at(&self.file, &mut out[..size], self.next)? {
+        match self.source.read_at(&mut out[..size], self.next)? {
             0 => Err(io::Error::other(SHRUNK)),
             count => {
                 self.next += count as u64;

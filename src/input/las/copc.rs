@@ -22,6 +22,9 @@ use crate::{Error, Result, Warnings};
 const USER: &str = "copc";
 const INFO: u16 = 1;
 
+/// The number of the record that usually holds all pages.
+const PAGES: u16 = 1000;
+
 /// The bytes of that record up to the position and the size of the first page.
 const INFO_BYTES: usize = 56;
 
@@ -36,6 +39,9 @@ const MOST_ENTRIES: u64 = 2 * MOST_LEVELS as u64;
 
 /// The chunks of which the first point is looked at.
 const CHECKED_CHUNKS: usize = 1000;
+
+/// As many of a file of another machine, where each takes a request.
+const CHECKED_REMOTE_CHUNKS: usize = 16;
 
 /// Writers compute nodes in floating point, before or after they round coordinates. A node is taken for so many raw steps wider on
 /// every side, and for a small part of its width.
@@ -113,6 +119,7 @@ impl CopcIndex {
         warnings: &mut Warnings,
     ) -> Result<Option<CopcIndex>> {
         let Some(record) = vlrs.iter().find(|vlr| vlr.is(USER, INFO)) else { return Ok(None) };
+        file.hold(vlrs.iter().filter(|vlr| vlr.is(USER, PAGES)).map(Vlr::bytes))?;
         match CopcIndex::checked(file, header, &record.read(file)?, chunks) {
             Ok(index) => Ok(Some(index)),
             Err(IndexError::Unreadable(error)) => Err(error),
@@ -159,9 +166,12 @@ impl CopcIndex {
 
     /// Looks at the first point of chunks at equal distances. A chunk begins with it, and it is not compressed.
     fn check_first_points(&self, file: &RandomAccessFile, chunks: &[LazChunk]) -> Found<()> {
-        for chunk in chunks.iter().step_by(chunks.len().div_ceil(CHECKED_CHUNKS).max(1)) {
-            let at = chunk.bytes.start;
-            let bytes = file.bytes(at..(at + 8).min(chunk.bytes.end))?;
+        let most = if file.is_remote() { CHECKED_REMOTE_CHUNKS } else { CHECKED_CHUNKS };
+        let place_of = |chunk: &LazChunk| chunk.bytes.start..(chunk.bytes.start + 8).min(chunk.bytes.end);
+        let step = chunks.len().div_ceil(most).max(1);
+        file.hold(chunks.iter().step_by(step).map(place_of))?;
+        for chunk in chunks.iter().step_by(step) {
+            let bytes = file.bytes(place_of(chunk))?;
             let is_inside = bytes.len() == 8 && self.cell(chunk).is_some_and(|cell| cell.hold(&place(&bytes)));
             if !is_inside {
                 return Err(IndexError::Misplaced { point: chunk.first, node: self.nodes[chunk.number] });

@@ -4,6 +4,7 @@
 //! crate. They may panic on hostile data, so every call is wrapped in [`catch_panic`].
 
 use std::io;
+use std::ops::Range;
 
 use laz::record::RecordDecompressor;
 use laz::{DecompressionSelection, LazVlr};
@@ -125,6 +126,13 @@ impl CompressedPoints {
         laz_chunks.filter(|laz_chunk| self.may_reach(laz_chunk, bounds)).map(|laz_chunk| laz_chunk.count).sum()
     }
 
+    /// Returns the bytes of the LAZ chunks that are decoded of chunk `chunk` of the source for this request.
+    pub(crate) fn bytes_of(&self, chunk: usize, request: &ChunkRequest) -> Vec<Range<u64>> {
+        let laz_chunks = self.chunks.get(chunk).into_iter().flatten();
+        let decoded = laz_chunks.filter(|laz_chunk| self.may_reach(laz_chunk, request.bounds) != request.left_out);
+        decoded.map(|laz_chunk| laz_chunk.bytes.clone()).collect()
+    }
+
     /// Returns what the points of a LAZ chunk lie within, if the index tells and bounds make it matter.
     fn cell(&self, laz_chunk: &LazChunk, bounds: Option<&RawBounds>) -> Option<RawBounds> {
         self.index.as_ref().filter(|_| bounds.is_some())?.cell(laz_chunk)
@@ -212,6 +220,10 @@ struct ChunkDecoder<'a> {
 impl ChunkDecoder<'_> {
     /// Decodes the wanted records as far as possible; `self.next` then says how far.
     fn decode(&mut self, filter: &mut impl RecordSink) -> std::result::Result<(), ChunkError> {
+        if self.points.compression.layers.is_some() {
+            // All layers are needed for the first record.
+            self.file.hold(std::iter::once(self.chunk.bytes.clone()))?;
+        }
         let held = self.records_held()?.min(self.wanted);
         let end = self.chunk.first + held;
         let read_ahead = if self.points.compression.layers.is_some() { LAYER_READ_AHEAD } else { READ_AHEAD };

@@ -45,6 +45,13 @@ impl UncompressedPoints {
         (self.whole.div_ceil(CHUNK) as usize).max((self.missing > 0) as usize)
     }
 
+    /// Returns the bytes of a chunk.
+    pub(crate) fn bytes_of(&self, chunk: usize) -> Range<u64> {
+        let Range { start, end } = self.records_of(chunk);
+        let at = |number: u64| self.points_at + number * self.layout.length as u64;
+        at(start)..at(end)
+    }
+
     /// Sends the wanted records of `chunk` through `filter`. There is no index that could leave any out.
     pub(crate) fn decode(
         &self,

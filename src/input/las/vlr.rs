@@ -33,6 +33,11 @@ impl Vlr {
         self.id == id && self.user == user
     }
 
+    /// Returns where the record's data are in the file.
+    pub(crate) fn bytes(&self) -> Range<u64> {
+        self.data.clone()
+    }
+
     /// Reads the record's data. The data of a record that is longer than 1 MiB counts as empty.
     pub(crate) fn read(&self, file: &RandomAccessFile) -> Result<Vec<u8>> {
         if self.data.end - self.data.start > LONGEST { Ok(Vec::new()) } else { file.bytes(self.data.clone()) }

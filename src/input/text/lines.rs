@@ -28,8 +28,7 @@ pub(crate) fn for_each_line(
     mut each: impl FnMut(u64, TextLine) -> Result<()>,
 ) -> Result<u64> {
     let begins_line = range.start == first;
-    let from = range.start - !begins_line as u64;
-    let to = (range.end + LONGEST as u64).min(file.size());
+    let Range { start: from, end: to } = bytes_around(first, &range, file.size());
     let text = file.bytes(from..to)?;
     let end = (range.end - from) as usize;
     let mut at = if begins_line { 0 } else { memchr(b'\n', &text).map_or(end, |feed| feed + 1) };
@@ -48,6 +47,11 @@ pub(crate) fn for_each_line(
         at += length + 1;
     }
     Ok(count)
+}
+
+/// Returns the bytes that [`for_each_line`] reads of a file of `size` bytes.
+pub(crate) fn bytes_around(first: u64, range: &Range<u64>, size: u64) -> Range<u64> {
+    range.start - (range.start != first) as u64..(range.end + LONGEST as u64).min(size)
 }
 
 /// Returns the line without the carriage return at its end.

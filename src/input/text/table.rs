@@ -16,7 +16,7 @@ use crate::input::text::cut_off::{self, Ending};
 use crate::input::text::degrees;
 use crate::input::text::granularity::Granularity;
 use crate::input::text::layout::{Layout, detect};
-use crate::input::text::lines::{LONGEST, TextLine, for_each_line, shown};
+use crate::input::text::lines::{LONGEST, TextLine, bytes_around, for_each_line, shown};
 use crate::input::text::noise_warning::noise_warning;
 use crate::input::text::number::{MOST_DECIMALS, POWERS};
 use crate::input::text::options::TextOptions;
@@ -317,6 +317,11 @@ impl TextTable {
         self.chunks.len()
     }
 
+    /// Returns the bytes that a chunk is decoded from, of a file of `size` bytes.
+    pub(crate) fn bytes_of(&self, chunk: usize, size: u64) -> Range<u64> {
+        bytes_around(self.rows.start, &chunk_range(&self.rows, chunk as u64), size)
+    }
+
     /// Sends about the first `records` rows of `chunk` through `filter`.
     pub(crate) fn decode(
         &self,
@@ -408,7 +413,10 @@ fn survey(file: &RandomAccessFile, columns: &Columns, rows: &Range<u64>, wanted:
         interrupt::check()?;
         Survey::of_range(file, columns, rows.start, chunk_range(rows, index), wanted)
     };
-    (0..count).into_par_iter().map(survey).collect()
+    file.expect((0..count).map(|index| vec![bytes_around(rows.start, &chunk_range(rows, index), file.size())]));
+    let surveys = (0..count).into_par_iter().map(survey).collect();
+    file.expect(std::iter::empty());
+    surveys
 }
 
 fn chunk_range(rows: &Range<u64>, index: u64) -> Range<u64> {

@@ -3,7 +3,7 @@
 use crate::breaklines::Breaklines;
 use crate::input::options::{InputOptions, OnBadFile};
 use crate::input::surface_doubts::no_ground;
-use crate::input::{Point, PointCounts};
+use crate::input::{Point, PointCounts, set_network_memory};
 use crate::job::durable::directory::JobDirectory;
 use crate::job::index::PartIndex;
 use crate::job::partition::breakline_points::{BreaklineFilter, add_line_sites};
@@ -14,7 +14,7 @@ use crate::job::partition::point_file::{PointFile, PointFiles};
 use crate::job::partition::result::{Partition, PointSummary};
 use crate::job::partition::tree::Cell;
 use crate::job::partition::tree_builder::{TreeBuilder, wanted_buckets};
-use crate::job::plan::budget::read_buffer_memory;
+use crate::job::plan::budget::{network_memory, read_buffer_memory};
 use crate::job::plan::job_plan::{Plan, PlannedInput, SkippedInput};
 use crate::job::plan::text_inputs::{allowed_malformed, stop_at, too_many_malformed};
 use crate::job::progress::stage::Stage;
@@ -123,16 +123,17 @@ pub(crate) fn decode(
     stage: &Stage,
 ) -> Result<ByInput> {
     let lines = plan.built_breaklines()?;
+    set_network_memory(network_memory(&plan.options));
     let pass = Pass { plan, grid, buckets, lines: lines.as_deref(), malformed: AtomicU64::new(malformed) };
-    let mut by_input = pass.over(inputs, |input, chunk, sink| {
+    let mut by_input = pass.over(inputs, false, |input, chunk, sink| {
         let counts = input.source.decode(chunk, &input.rules, sink)?;
         stage.advance(counts.read);
         Ok(counts)
     })?;
     let is_wrong = |counts: &PointCounts| counts.misplaced > 0 && counts.not_decoded > 0;
     let wrong: Vec<usize> = by_input.0.iter().filter(|(_, s)| is_wrong(&s.counts)).map(|(index, _)| *index).collect();
-    let rest =
-        pass.over(wrong.into_iter(), |input, chunk, sink| input.source.decode_left_out(chunk, &input.rules, sink))?;
+    let rest = pass
+        .over(wrong.into_iter(), true, |input, chunk, sink| input.source.decode_left_out(chunk, &input.rules, sink))?;
     for (index, more) in rest.0 {
         if let Some((_, summary)) = by_input.0.iter_mut().find(|(known, _)| *known == index) {
             summary.counts.take_back_not_decoded();
@@ -157,14 +158,21 @@ struct Pass<'a> {
 type PointSink<'a> = &'a mut dyn FnMut(&[Point]) -> Result<()>;
 
 impl Pass<'_> {
-    /// Decodes all chunks of these inputs with `decode`, in parallel.
+    /// Decodes all chunks of these inputs with `decode`, in parallel: what bounds leave in, or what an index leaves out.
     fn over(
         &self,
         inputs: impl Iterator<Item = usize>,
+        left_out: bool,
         decode: impl Fn(&PlannedInput, usize, PointSink) -> Result<PointCounts> + Sync,
     ) -> Result<ByInput> {
+        let inputs: Vec<usize> = inputs.collect();
+        let read_ahead = |index: &usize| {
+            let PlannedInput { source, rules, .. } = &self.plan.inputs[*index];
+            source.read_ahead(rules.bounds.as_ref(), left_out)
+        };
+        let _ahead = inputs.iter().map(read_ahead).collect::<Result<Vec<_>>>()?;
         let chunks_of = |index: usize| (0..self.plan.inputs[index].source.chunks()).map(move |chunk| (index, chunk));
-        let chunks: Vec<(usize, usize)> = inputs.flat_map(chunks_of).collect();
+        let chunks: Vec<(usize, usize)> = inputs.into_iter().flat_map(chunks_of).collect();
         let decode_chunk = |&(index, chunk): &(usize, usize)| -> Result<ByInput> {
             interrupt::check()?;
             let input = &self.plan.inputs[index];

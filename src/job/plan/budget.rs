@@ -76,6 +76,13 @@ pub fn read_buffer_memory(options: &JobOptions) -> u64 {
     options.limits.memory.0 / 6
 }
 
+/// Returns the bytes of inputs of other machines that may be in memory before they are needed.
+pub fn network_memory(options: &JobOptions) -> u64 {
+    // So many take no longer for any connection.
+    const ENOUGH: u64 = 256 << 20;
+    (options.limits.memory.0 / 16).min(ENOUGH)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

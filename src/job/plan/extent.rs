@@ -140,6 +140,7 @@ fn measure(source: &Source, options: &InputOptions, chunks: Range<usize>, record
         })?;
         Ok(found)
     };
+    let _ahead = if chunks.len() == source.chunks() { Some(source.read_ahead(None, false)?) } else { None };
     let found = chunks.into_par_iter().map(measure_chunk).try_reduce(|| None, |a, b| Ok(union(a, b)))?;
     let value = |axis: usize, steps: i32| source.axes[axis].value(steps as i64 * MEASURE);
     let corner = |corner: [i32; 3]| [0, 1, 2].map(|axis| value(axis, corner[axis]));

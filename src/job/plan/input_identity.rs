@@ -1,5 +1,6 @@
 //! What identifies an input: whether a file is the one that an earlier run read, whatever it is called by now.
 
+use crate::input::is_url;
 use crate::input::samples::FileSamples;
 use crate::{Error, Result};
 use rayon::prelude::*;
@@ -160,9 +161,13 @@ impl RenamedInputs {
 
 impl ContentIdentity {
     fn of(path: &Path) -> Result<ContentIdentity> {
+        let samples = FileSamples::of(path)?;
+        if path.to_str().is_some_and(is_url) {
+            return Ok(ContentIdentity { samples, modified: 0 });
+        }
         let data = path.metadata().map_err(Error::io("read", path))?;
         let modified = data.modified().ok().and_then(|time| time.duration_since(SystemTime::UNIX_EPOCH).ok());
-        Ok(ContentIdentity { samples: FileSamples::of(path)?, modified: modified.map_or(0, |age| age.as_secs()) })
+        Ok(ContentIdentity { samples, modified: modified.map_or(0, |age| age.as_secs()) })
     }
 }
 

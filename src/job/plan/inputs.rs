@@ -1,7 +1,7 @@
 //! The input files: which ones the options name, and what their headers say.
 
 use crate::input::options::{InputOptions, OnBadFile};
-use crate::input::{RowChoice, Source, open_chosen};
+use crate::input::{RowChoice, Source, is_url, open_chosen, remote_files};
 use crate::job::plan::input_identity::place;
 use crate::job::plan::job_plan::SkippedInput;
 use crate::job::plan::named_files::files_of;
@@ -20,11 +20,12 @@ const FILES: &str = "[input] files";
 pub fn input_paths(options: &InputOptions) -> Result<Vec<PathBuf>> {
     let (mut paths, mut known) = (Vec::new(), HashSet::new());
     for pattern in &options.files {
-        let found = files_of(pattern, FILES)?;
+        let found = if is_url(pattern) { remote_files(pattern)? } else { files_of(pattern, FILES)? };
         if found.is_empty() {
             return Err(Error::Config(format!("{FILES}: {}", nothing_at(pattern))));
         }
-        paths.extend(found.into_iter().filter(|path| known.insert(place(path))));
+        // Paths with a double slash are one path, and URLs are two.
+        paths.extend(found.into_iter().filter(|path| known.insert(place(path).into_os_string())));
     }
     Ok(paths)
 }

@@ -207,6 +207,7 @@ pub(crate) fn count(source: &Source, rules: &PointRules) -> Result<PointCounts> 
         a += b;
         a
     };
+    let _ahead = source.read_ahead(rules.bounds.as_ref(), false)?;
     // The reduction keeps the order of the chunks.
     (0..source.chunks()).into_par_iter().map(count_chunk).try_reduce(PointCounts::default, |a, b| Ok(add(a, b)))
 }

@@ -1,12 +1,13 @@
 //! Estimates of the disk and the memory that a job needs.
 
+use crate::input::is_url;
 use crate::job::durable::directory::JobDirectory;
 use crate::job::levels::hierarchy::{BYTES_PER_LEVEL_VERTEX, LevelSizes};
 use crate::job::machine;
 use crate::job::options::JobOptions;
 use crate::job::partition::tree_builder::buffer_bytes;
-use crate::job::plan::budget::{BYTES_PER_LEAF_SITE, read_buffer_memory};
-use crate::job::plan::job_plan::Plan;
+use crate::job::plan::budget::{BYTES_PER_LEAF_SITE, network_memory, read_buffer_memory};
+use crate::job::plan::job_plan::{Plan, PlannedInput};
 use crate::job::preflight::kept_points::KeptPoints;
 use crate::job::publish::raster::check::planned_raster;
 use crate::job::publish::raster::write_raster::raster_memory;
@@ -142,6 +143,8 @@ pub(crate) fn memory(plan: &Plan, kept: KeptPoints, threads: usize) -> u64 {
     let leaves = per_tile.min(points) * BYTES_PER_LEAF_SITE * threads as u64;
     let levels = level_memory(options, points, threads);
     let buffers = buffer_bytes(points, per_tile, read_buffer_memory(options));
+    let is_remote = |input: &PlannedInput| input.source.path.to_str().is_some_and(is_url);
+    let buffers = if plan.inputs.iter().any(is_remote) { buffers + network_memory(options) } else { buffers };
     PROCESS_MEMORY + leaves.max(levels).max(buffers).max(raster_memory(plan, threads))
 }
 

@@ -8,7 +8,7 @@ use crate::input::options::InputOptions;
 use crate::input::surface::SurfaceShares;
 use crate::input::surface_doubts::unclear_returns;
 use crate::input::transformation::{Transformation, transformations};
-use crate::input::{PointCounts, TextReading};
+use crate::input::{NetworkTraffic, PointCounts, TextReading};
 use crate::job::levels::make_level::LevelStats;
 use crate::job::machine;
 use crate::job::mesh::hull_rule::HullRule;
@@ -93,6 +93,9 @@ pub struct Report {
     /// What was transformed, from what into what, and how exactly.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub transformations: Vec<Transformation>,
+    /// What the process that wrote the report has asked of other machines; `None` without inputs by URL.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub network: Option<NetworkTraffic>,
     /// Bytes of all results.
     pub bytes_written: u64,
     /// The most bytes that temporary files took.
@@ -281,6 +284,7 @@ impl Report {
             unit: plan.unit.clone(),
             crs: plan.crs.name.clone(),
             transformations: transformations(plan.inputs.iter().map(|input| &input.source)),
+            network: Some(NetworkTraffic::so_far()).filter(|traffic| traffic.requests > 0),
             bytes_written: parts.tiles.bytes + parts.levels.bytes + parts.other_bytes,
             bytes_temporary: parts.temporary,
             peak_memory: machine::peak_memory().max(parts.peak_memory),

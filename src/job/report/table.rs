@@ -1,6 +1,7 @@
 //! The report as a table for people.
 
 use crate::gpu::benefit::GpuFigures;
+use crate::input::NetworkTraffic;
 use crate::job::progress::number_text::{grouped, precise_mebibytes};
 use crate::job::report::breakline_report::BreaklineReport;
 use crate::job::report::job_report::{Report, SlowestPart, StepSeconds};
@@ -52,6 +53,9 @@ impl fmt::Display for Report {
             row("  places where heights disagree", grouped(findings.disagreements))?;
             row("  rivers that rise", grouped(findings.rising_rivers))?;
             row("  lakes that are not flat", grouped(findings.uneven_lakes))?;
+        }
+        if let Some(NetworkTraffic { requests, bytes }) = self.network {
+            row("from other machines", format!("{} in {} requests", precise_mebibytes(bytes), grouped(requests)))?;
         }
         row("sites", grouped(self.sites))?;
         if let Some(surface) = &self.surface {

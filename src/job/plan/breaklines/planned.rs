@@ -138,6 +138,8 @@ fn nearest_heights(built: &Breaklines, cloud: &CloudOfPlan) -> Result<NearestHei
         return Ok(none);
     }
     let inputs = cloud.sources.iter().zip(cloud.rules);
+    let read_ahead = |(source, rules): (&Source, &PointRules)| source.read_ahead(rules.bounds.as_ref(), false);
+    let _ahead = inputs.clone().map(read_ahead).collect::<Result<Vec<_>>>()?;
     let chunks: Vec<_> =
         inputs.flat_map(|(source, rules)| (0..source.chunks()).map(move |chunk| (source, rules, chunk))).collect();
     let look = |mut nearest: NearestHeights, &(source, rules, chunk): &(&Source, &PointRules, usize)| {

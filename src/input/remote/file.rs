@@ -1,0 +1,119 @@
+//! A file of another machine: what is known of it, and its bytes.
+
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::input::remote::client::Address;
+use crate::input::remote::read_plan::ReadPlan;
+use crate::input::remote::transfer::{Transferred, Version, transfer};
+use crate::input::remote::window::{Pending, Window, held_bytes};
+use crate::{Error, Result};
+
+/// The bytes that the first request asks for: the headers of most files.
+const FIRST: u64 = 1 << 15;
+
+/// The bytes that the beginnings of files may take until the files are opened.
+const BEGINNINGS: u64 = 32 << 20;
+
+/// The files that this process has met.
+static KNOWN: Mutex<BTreeMap<OsString, Arc<RemoteFile>>> = Mutex::new(BTreeMap::new());
+
+/// A file of another machine. All of a process share what is known of it.
+pub(crate) struct RemoteFile {
+    /// Its public name.
+    name: PathBuf,
+    address: Address,
+    version: Version,
+    /// Tells its content from others.
+    hash: u64,
+    /// Its beginning, until somebody takes it.
+    beginning: Mutex<Option<Arc<Window>>>,
+    /// What will be read.
+    plan: Mutex<ReadPlan>,
+}
+
+impl RemoteFile {
+    /// Returns the file with this public name. Asks the server only if this process has not.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if there is none or the server cannot hand out parts, [`Error::Io`] if it is not handed out.
+    pub(crate) fn open(name: &Path) -> Result<Arc<RemoteFile>> {
+        let known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner).get(name.as_os_str()).cloned();
+        known.map_or_else(|| RemoteFile::look(name), Ok)
+    }
+
+    /// As [`RemoteFile::open`], but asks the server what it has now.
+    ///
+    /// # Errors
+    /// As [`RemoteFile::open`].
+    pub(crate) fn look(name: &Path) -> Result<Arc<RemoteFile>> {
+        let address = Address::of(&name.to_string_lossy())?;
+        let found = Arc::new(Mutex::new(None));
+        let (there, asked) = (found.clone(), address.clone());
+        let fetch = move || {
+            let Transferred { bytes, version } = transfer(&asked, 0..FIRST, None)?;
+            *there.lock().unwrap_or_else(PoisonError::into_inner) = Some(version);
+            Ok(bytes)
+        };
+        let window = Pending::begin(0..FIRST, fetch).wait()?.map_err(|failure| failure.into_error(name, ""))?;
+        let version = found.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let version = version.ok_or_else(|| Error::Broken(format!("{}: nothing is known of it", name.display())))?;
+        let hash = version.hash(&window.bytes);
+        let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(file) = known.get(name.as_os_str()).filter(|file| (&file.version, file.hash) == (&version, hash)) {
+            return Ok(file.clone());
+        }
+        let beginning = Mutex::new((held_bytes() <= BEGINNINGS).then_some(window));
+        let plan = Mutex::new(ReadPlan::new(Vec::new()));
+        let file = Arc::new(RemoteFile { name: name.to_path_buf(), address, version, hash, beginning, plan });
+        known.insert(name.into(), file.clone());
+        Ok(file)
+    }
+
+    /// Returns its size in bytes.
+    pub(crate) fn size(&self) -> u64 {
+        self.version.size
+    }
+
+    /// Returns a number that tells its content from others.
+    pub(crate) fn hash(&self) -> u64 {
+        self.hash
+    }
+
+    /// Returns whether the server tells contents of one size apart.
+    pub(crate) fn is_sure(&self) -> bool {
+        self.version.is_sure()
+    }
+
+    /// Hands out the beginning of the file, if it is there.
+    pub(crate) fn take_beginning(&self) -> Option<Arc<Window>> {
+        self.beginning.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+
+    /// Says that these ranges will be fetched, each once and about in this order, and no others.
+    pub(crate) fn expect(&self, ranges: Vec<Range<u64>>) {
+        *self.plan.lock().unwrap_or_else(PoisonError::into_inner) = ReadPlan::new(ranges);
+    }
+
+    /// Begins to fetch a range, which lies in the file. One that is expected comes with those after it.
+    pub(crate) fn fetch(self: &Arc<Self>, range: Range<u64>) -> Pending {
+        let begin = |range: Range<u64>| {
+            let (file, wanted) = (self.clone(), range.clone());
+            Pending::begin(range, move || Ok(transfer(&file.address, wanted.clone(), Some(&file.version))?.bytes))
+        };
+        let mut plan = self.plan.lock().unwrap_or_else(PoisonError::into_inner);
+        plan.take(&range, &begin).unwrap_or_else(|| begin(range))
+    }
+
+    /// Waits for what [`RemoteFile::fetch`] has begun for `range`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the server does not hand it out, [`Error::Interrupted`] if the process is to stop.
+    pub(crate) fn wait(&self, pending: &Pending, range: &Range<u64>) -> Result<Arc<Window>> {
+        let place = format!("bytes {} to {}: ", range.start, range.end.saturating_sub(1));
+        pending.wait()?.map_err(|failure| failure.into_read_error(&self.name, &place))
+    }
+}

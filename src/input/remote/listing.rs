@@ -1,0 +1,144 @@
+//! The objects of a bucket that a pattern means.
+
+use std::collections::BTreeSet;
+use std::io::Read;
+
+use glob::{MatchOptions, Pattern};
+
+use crate::input::remote::client::{Address, Headers, refusal};
+use crate::input::remote::failure::{Failure, FailureKind};
+use crate::input::remote::patience::{Patience, persist};
+use crate::input::remote::signature::encoded;
+use crate::input::remote::window::Pending;
+use crate::{Error, Result};
+
+/// As on the command line: a star does not reach beyond a slash.
+const RULES: MatchOptions =
+    MatchOptions { case_sensitive: true, require_literal_separator: true, require_literal_leading_dot: false };
+
+/// The characters that make a key a pattern.
+const SPECIAL: [char; 3] = ['*', '?', '['];
+
+/// The longest answer that is read; a thousand keys of the greatest length are shorter.
+const LONGEST: u64 = 1 << 24;
+
+/// Objects may appear while the list is read, but no list goes on for ever.
+const MOST_PAGES: usize = 100_000;
+
+/// One answer of S3: a thousand keys at most.
+struct Page {
+    keys: Vec<String>,
+    /// Where the next page begins.
+    next: Option<String>,
+}
+
+/// Returns the public names of the files that a public name means, in the order of their keys: several if it is a pattern in a bucket,
+/// otherwise itself.
+///
+/// # Errors
+/// [`Error::Config`] if it is no pattern or there is no such bucket, [`Error::Io`] if it cannot be listed.
+pub(crate) fn files_at(name: &str) -> Result<Vec<String>> {
+    let object = name.strip_prefix("s3://").and_then(|rest| rest.split_once('/'));
+    let Some((bucket, key)) = object.filter(|(_, key)| key.contains(SPECIAL)) else { return Ok(vec![name.into()]) };
+    let pattern = Pattern::new(key).map_err(|error| Error::Config(format!("{name}: {error}")))?;
+    let literal = &key[..key.find(SPECIAL).unwrap_or(key.len())];
+    // Without a pattern in a folder's name, one folder is enough.
+    let is_in_one_folder = !key[literal.len()..].contains('/');
+    let mut found = BTreeSet::new();
+    let mut next = None;
+    for _ in 0..MOST_PAGES {
+        let address = Address::List { bucket: bucket.into(), query: query(literal, is_in_one_folder, next.as_deref()) };
+        let page = page(address, name)?;
+        found.extend(page.keys.into_iter().filter(|key| !key.ends_with('/') && pattern.matches_with(key, RULES)));
+        next = page.next;
+        if next.is_none() {
+            break;
+        }
+    }
+    Ok(found.into_iter().map(|key| format!("s3://{bucket}/{key}")).collect())
+}
+
+/// Returns the query for a page, with its parameters in the order that signatures want.
+fn query(prefix: &str, is_in_one_folder: bool, next: Option<&str>) -> String {
+    let parameters = [
+        ("continuation-token", next),
+        ("delimiter", is_in_one_folder.then_some("/")),
+        ("list-type", Some("2")),
+        ("prefix", Some(prefix)),
+    ];
+    let text = |(name, value): (&str, Option<&str>)| value.map(|value| format!("{name}={}", encoded(value, "")));
+    parameters.into_iter().filter_map(text).collect::<Vec<_>>().join("&")
+}
+
+fn page(address: Address, name: &str) -> Result<Page> {
+    let fetch = move || {
+        persist(Patience::standard(), false, || {
+            let answer = address.ask(&Headers::new()).map_err(|failure| (0, failure))?;
+            if answer.status() != 200 {
+                return Err((0, refusal(answer, &address)));
+            }
+            let mut text = Vec::new();
+            let read = answer.into_body().into_reader().take(LONGEST).read_to_end(&mut text);
+            let broken = |error| (0, Failure::new(FailureKind::Passing, format!("the list broke off: {error}")));
+            read.map(|_| text).map_err(broken)
+        })
+    };
+    let outcome = Pending::begin(0..0, fetch).wait()?;
+    let text = outcome.map_err(|failure| failure.into_error(name.as_ref(), "the list of the bucket: "))?;
+    let text = String::from_utf8_lossy(&text.bytes);
+    parse(&text).ok_or_else(|| {
+        Error::Config(format!("{name}: the server does not list buckets as S3 does: name each object by itself"))
+    })
+}
+
+fn parse(text: &str) -> Option<Page> {
+    let document = roxmltree::Document::parse(text).ok()?;
+    let root = document.root_element();
+    if root.tag_name().name() != "ListBucketResult" {
+        return None;
+    }
+    let value = |node: roxmltree::Node, name: &str| {
+        let child = node.children().find(|child| child.tag_name().name() == name);
+        child.and_then(|child| child.text()).map(str::to_string)
+    };
+    let objects = root.children().filter(|node| node.tag_name().name() == "Contents");
+    let keys = objects.filter_map(|node| value(node, "Key")).collect();
+    let is_cut = value(root, "IsTruncated").is_some_and(|cut| cut == "true");
+    Some(Page { keys, next: value(root, "NextContinuationToken").filter(|_| is_cut) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_has_keys_and_leads_to_the_next() {
+        let page = parse(
+            "<?xml version=\"1.0\"?><ListBucketResult xmlns=\"http://s3.amazonaws.com/doc/2006-03-01/\"><Name>b</Name>\
+             <IsTruncated>true</IsTruncated><Contents><Key>a/&amp; b.laz</Key><Size>1</Size></Contents>\
+             <Contents><Key>a/c.laz</Key></Contents><CommonPrefixes><Prefix>a/d/</Prefix></CommonPrefixes>\
+             <NextContinuationToken>1ue/=</NextContinuationToken></ListBucketResult>",
+        );
+        let page = page.unwrap();
+        assert_eq!(page.keys, ["a/& b.laz", "a/c.laz"]);
+        assert_eq!(page.next.as_deref(), Some("1ue/="));
+        assert!(parse("<html></html>").is_none() && parse("no list").is_none());
+    }
+
+    #[test]
+    fn a_query_is_in_the_order_of_its_names() {
+        assert_eq!(
+            query("a b/", true, Some("1/=")),
+            "continuation-token=1%2F%3D&delimiter=%2F&list-type=2&prefix=a%20b%2F"
+        );
+        assert_eq!(query("", false, None), "list-type=2&prefix=");
+    }
+
+    #[test]
+    fn what_is_no_pattern_is_not_listed() {
+        for name in ["s3://bucket/a/b.laz", "https://host/a.laz?...", "http://host/[a].laz"] {
+            assert_eq!(files_at(name).unwrap(), [name]);
+        }
+        assert_eq!(files_at("s3://bucket/[.laz").unwrap_err().exit_code(), 2);
+    }
+}
