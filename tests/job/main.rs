@@ -47,6 +47,7 @@ mod preflight;
 mod raster;
 mod real;
 mod same_mesh;
+mod schemas;
 mod shortage;
 mod slow_gpus;
 mod steps;
