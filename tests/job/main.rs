@@ -54,6 +54,7 @@ mod real;
 #[cfg(feature = "remote")]
 mod remote;
 mod same_mesh;
+mod schemas;
 mod shortage;
 mod slow_gpus;
 mod steps;

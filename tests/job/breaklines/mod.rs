@@ -6,7 +6,7 @@ mod files;
 mod same;
 mod terrain;
 
-use crate::program::{gdt_batch, number};
+use crate::program::{Job, gdt_batch, number};
 use files::{Features, geojson, geopackage, shapefile};
 use terrain::{ISLAND, LAKE, Mesh, Survey, cross, inside};
 
@@ -54,8 +54,8 @@ fn every_edge_is_in_the_mesh_and_lakes_are_flat() {
     assert_eq!(against.succeeded().json()["verdict"], "proved");
 }
 
-#[test]
-fn what_is_wrong_with_heights_is_said() {
+/// Returns a job whose river rises, whose lake is not flat, and whose lines cross at different heights, and its survey.
+pub(crate) fn with_doubtful_heights() -> (Survey, Job) {
     let survey = Survey::new(2_000);
     let rising = vec![[10.0, 10.0, 5.0], [60.0, 10.0, 4.0], [110.0, 10.0, 4.5], [160.0, 10.0, 3.0]];
     let uneven = vec![[20.0, 60.0, 9.0], [40.0, 60.0, 9.0], [40.0, 80.0, 9.3], [20.0, 80.0, 9.0]];
@@ -64,6 +64,12 @@ fn what_is_wrong_with_heights_is_said() {
     let crossing = Features::lines(&[("line", cross(0)), ("line", cross(1))]);
     let lines = shapefile(survey.folder(), "crossing", &crossing);
     let job = survey.job_with(&[rivers, lakes, lines], "kind_field = \"kind\"");
+    (survey, job)
+}
+
+#[test]
+fn what_is_wrong_with_heights_is_said() {
+    let (_survey, job) = with_doubtful_heights();
     let said = job.run().succeeded();
     for words in [
         "1 rivers rise on their way down; the worst is feature 1 of",

@@ -25,7 +25,7 @@ pub(super) const LAKE: [[i64; 2]; 5] =
 pub(super) const ISLAND: [[i64; 2]; 4] = [[10_500, 10_000], [12_000, 10_100], [11_900, 11_200], [10_600, 11_000]];
 
 /// Points in random places on a slope. Ten are marked as ignored ground.
-pub(super) struct Survey {
+pub(crate) struct Survey {
     folder: TempDir,
     pub(super) cloud: PathBuf,
     points: HashSet<[i64; 3]>,
