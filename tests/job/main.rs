@@ -39,6 +39,7 @@ mod hull;
 mod khronos;
 mod levels;
 mod limits;
+mod manual;
 mod many_tiles;
 mod messages;
 mod overlap;
