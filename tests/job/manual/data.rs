@@ -21,8 +21,9 @@ pub(super) fn prepare(folder: &Path, job: &Table) {
     for name in texts(&input["files"]) {
         cloud(folder, &name, input.as_table().unwrap());
     }
+    let crs = input.get("crs").and_then(Value::as_str).and_then(|crs| crs.strip_prefix("EPSG:"));
     for lines in job.get("breaklines").and_then(Value::as_array).into_iter().flatten() {
-        texts(&lines["files"]).iter().for_each(|name| write_lines(folder, name, lines.as_table().unwrap()));
+        texts(&lines["files"]).iter().for_each(|name| write_lines(folder, name, lines.as_table().unwrap(), crs));
     }
 }
 
@@ -74,8 +75,9 @@ fn text(columns: Option<Vec<String>>) -> String {
     rows
 }
 
-/// Makes a file of lines with all values of `kind_field` that the configuration lists.
-fn write_lines(folder: &Path, name: &str, options: &Table) {
+/// Makes a file of lines with all values of `kind_field` that the configuration lists. GeoJSON is in the CRS that the points are said to
+/// be in.
+fn write_lines(folder: &Path, name: &str, options: &Table, crs: Option<&str>) {
     let name = name.replace('*', "a");
     let path = folder.join(&name);
     fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -93,9 +95,12 @@ fn write_lines(folder: &Path, name: &str, options: &Table) {
     };
     let features = features.with_attribute(attribute);
     match path.extension().and_then(|extension| extension.to_str()) {
-        Some("shp") => shapefile(folder, name.strip_suffix(".shp").unwrap(), &features),
-        Some("gpkg") => geopackage(folder, &name, &features),
-        Some("geojson") => geojson(folder, &name, &features),
+        Some("shp") => drop(shapefile(folder, name.strip_suffix(".shp").unwrap(), &features)),
+        Some("gpkg") => drop(geopackage(folder, &name, &features)),
+        Some("geojson") => {
+            let text = fs::read_to_string(geojson(folder, &name, &features)).unwrap();
+            fs::write(path, text.replace("32633", crs.unwrap_or("32633"))).unwrap();
+        }
         _ => panic!("no test makes lines such as {name}"),
     };
 }

@@ -29,8 +29,7 @@ pub(super) fn root() -> &'static Path {
 pub(super) fn pages() -> Vec<Page> {
     let mut paths = vec![PathBuf::from("README.md")];
     find(Path::new("docs"), &mut paths);
-    let page = |path: PathBuf| Page { text: std::fs::read_to_string(root().join(&path)).unwrap(), path };
-    paths.into_iter().map(page).collect()
+    paths.into_iter().map(Page::read).collect()
 }
 
 fn find(folder: &Path, found: &mut Vec<PathBuf>) {
@@ -47,6 +46,11 @@ fn find(folder: &Path, found: &mut Vec<PathBuf>) {
 }
 
 impl Page {
+    /// Reads a page by its path from the folder of the repository.
+    pub(super) fn read(path: PathBuf) -> Page {
+        Page { text: std::fs::read_to_string(root().join(&path)).unwrap(), path }
+    }
+
     /// Returns all fenced blocks, in order.
     pub(super) fn blocks(&self) -> Vec<Block> {
         let mut blocks: Vec<Block> = Vec::new();

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io::{BufRead, BufReader};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 use tempfile::TempDir;
@@ -19,12 +19,13 @@ const USUAL: &str = "[input]\nfiles = [\"clouds/*.laz\"]\n[output]\ndirectory = 
 const SHOWN: [&str; 5] = ["text", "json", "js", "python", "dockerfile"];
 
 /// Programs of others that no test of the manual runs, and why.
-const ELSEWHERE: [(&str, &str); 6] = [
+const ELSEWHERE: [(&str, &str); 7] = [
     ("npm", "tests/run installs and builds what the page takes"),
     ("cargo", "it builds the program, which has happened before any test"),
     ("tests/run", "it runs this test"),
     ("pdal", "it is a program of others, and not installed for tests"),
-    ("python3", "it serves a folder until somebody stops it"),
+    ("python3", "it serves a folder until somebody stops it, or draws pictures"),
+    ("curl", "it needs a network"),
     ("xxhsum", "the tests of `tampering` run it"),
 ];
 
@@ -68,17 +69,6 @@ fn commands(block: &Block) -> Vec<Vec<String>> {
     commands
 }
 
-/// Returns the programs of others that commands call.
-pub(super) fn programs_elsewhere(episodes: &[Episode]) -> Vec<&str> {
-    let commands = episodes.iter().flat_map(|episode| &episode.commands);
-    commands.filter(|(words, _)| own(words).is_none()).map(|(words, _)| words[0].as_str()).collect()
-}
-
-/// Returns the programs in [`ELSEWHERE`].
-pub(super) fn listed() -> Vec<&'static str> {
-    ELSEWHERE.iter().map(|(program, _)| *program).collect()
-}
-
 /// Returns the arguments of this program, also if cargo starts it.
 fn own(words: &[String]) -> Option<Vec<String>> {
     let by_cargo = ["cargo", "run", "--release", "--"];
@@ -94,14 +84,18 @@ fn own(words: &[String]) -> Option<Vec<String>> {
 impl Episode {
     /// Runs everything in a new folder.
     pub(super) fn run(&self) {
-        let place = Place::new(self.configuration.as_ref());
-        if self.configuration.is_some() {
+        let mut place = Place::new(self.configuration.as_ref());
+        if self.configuration.is_some() && !place.is_remote() {
             place.run_job();
         }
         for (words, at) in &self.commands {
-            match own(words) {
-                Some(arguments) => place.run(&arguments, at),
-                None => assert!(listed().contains(&words[0].as_str()), "{at}: decide what {} is, in ELSEWHERE", words[0]),
+            match (own(words), words[0].as_str()) {
+                (Some(arguments), _) => place.run(&arguments, at),
+                (None, "cd") => place.base = root().join(&words[1]),
+                (None, other) => {
+                    let is_known = ELSEWHERE.iter().any(|(program, _)| *program == other);
+                    assert!(is_known, "{at}: decide whether a test runs {other}: ELSEWHERE in tests/job/manual/run.rs");
+                }
             }
         }
     }
@@ -112,6 +106,8 @@ struct Place {
     folder: TempDir,
     job: Table,
     at: String,
+    /// The folder of the repository that the commands believe to be in.
+    base: PathBuf,
 }
 
 impl Place {
@@ -124,8 +120,19 @@ impl Place {
         // A whole configuration is run to the letter.
         let written = if job == shown { text.to_owned() } else { toml::to_string(&job).unwrap() };
         fs::write(folder.path().join("job.toml"), written).unwrap();
-        data::prepare(folder.path(), &job);
-        Place { folder, job, at }
+        let place = Place { folder, job, at, base: root().to_owned() };
+        if place.is_remote() {
+            // There is no network in tests: such a configuration is only read.
+            gdt_batch::config::load(&place.folder.path().join("job.toml")).unwrap();
+        } else {
+            data::prepare(place.folder.path(), &place.job);
+        }
+        place
+    }
+
+    /// Tells whether the configuration names files of the network.
+    fn is_remote(&self) -> bool {
+        self.job["input"]["files"].to_string().contains("://")
     }
 
     #[track_caller]
@@ -156,9 +163,11 @@ impl Place {
     fn expanded(&self, word: &str, command: &str) -> Vec<String> {
         let path = self.folder.path().join(word);
         let is_cloud = [".las", ".laz", ".csv", ".xyz"].iter().any(|extension| word.ends_with(extension));
-        if word.starts_with("configs/") {
-            fs::create_dir_all(path.parent().unwrap()).unwrap();
-            fs::copy(root().join(word), &path).unwrap();
+        if word.ends_with(".toml") && !path.exists() && self.base.join(word).is_file() {
+            let folder = path.parent().unwrap();
+            fs::create_dir_all(folder).unwrap();
+            fs::copy(self.base.join(word), &path).unwrap();
+            data::prepare(folder, &fs::read_to_string(&path).unwrap().parse().unwrap());
         } else if is_cloud && command != "sample" {
             data::cloud(self.folder.path(), word, self.job["input"].as_table().unwrap());
         }
@@ -203,9 +212,4 @@ fn completed(mut job: Table) -> Table {
         job["output"].as_table_mut().unwrap().insert("page".into(), false.into());
     }
     job
-}
-
-/// Returns whether `path` is there, from the folder of the repository.
-pub(super) fn is_there(path: &Path) -> bool {
-    root().join(path).exists()
 }
