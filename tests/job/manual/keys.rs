@@ -8,16 +8,8 @@ use toml::{Table, Value};
 const LEAST: &str = "[input]\nfiles = [\"a.laz\"]\n[output]\ndirectory = \"out\"\n";
 
 /// The tables of a configuration.
-pub(super) const TABLES: [&str; 8] = [
-    "[input]",
-    "[input.csv]",
-    "[[breaklines]]",
-    "[triangulation]",
-    "[gpu]",
-    "[output]",
-    "[output.raster]",
-    "[limits]",
-];
+pub(super) const TABLES: [&str; 8] =
+    ["[input]", "[input.csv]", "[[breaklines]]", "[triangulation]", "[gpu]", "[output]", "[output.raster]", "[limits]"];
 
 /// Old names, which the manual need not explain, and one that a job sets for itself.
 const UNSAID: [(&str, &str); 7] = [
@@ -39,8 +31,16 @@ pub(super) fn known() -> BTreeSet<Key> {
     for table in TABLES {
         let said = load(table, "no_such_key", Value::Integer(1)).unwrap_err();
         let (_, list) = said.split_once("expected one of").unwrap_or_else(|| panic!("{said}"));
-        keys.extend(super::markdown::code(list).into_iter().map(|key| (table.to_owned(), key)));
+        // Some keys are tables, which have keys of their own.
+        let is_key = |key: &String| !TABLES.contains(&format!("{}.{key}]", table.trim_end_matches(']')).as_str());
+        keys.extend(super::markdown::code(list).into_iter().filter(is_key).map(|key| (table.to_owned(), key)));
     }
+    keys
+}
+
+/// Returns the keys that the manual has to explain.
+pub(super) fn to_explain() -> BTreeSet<Key> {
+    let mut keys = known();
     for (table, key) in UNSAID {
         assert!(keys.remove(&(table.into(), key.into())), "{table} {key} is gone: UNSAID need not have it");
     }
@@ -54,7 +54,7 @@ pub(super) fn load(table: &str, key: &str, value: Value) -> Result<(), String> {
     let mut place = Table::new();
     match table {
         "[[breaklines]]" => drop(place.insert("files".into(), vec!["a.gpkg"].into())),
-        "[output.raster]" => drop(place.insert("resolution".into(), 1.0.into())),
+        "[output.raster]" => drop(place.insert("resolution".into(), Value::Float(1.0))),
         _ if names.len() == 1 => {
             place = whole.get(names[0]).and_then(Value::as_table).cloned().unwrap_or_default();
         }

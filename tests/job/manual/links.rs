@@ -33,8 +33,9 @@ fn complaint(page: &Page, link: &str) -> Option<&'static str> {
     if !root().join(&path).exists() {
         return Some("there is no such file");
     }
-    let is_heading = |anchor: &str| Page::read(path).anchors().iter().any(|known| known == anchor);
-    anchor.filter(|anchor| !is_heading(anchor)).map(|_| "there is no such heading")
+    let anchor = anchor?;
+    let is_there = Page::read(path).anchors().iter().any(|known| known == anchor);
+    (!is_there).then_some("there is no such heading")
 }
 
 /// Returns the path without `..`.

@@ -45,7 +45,9 @@ pub(super) fn episodes(page: &Page) -> Vec<Episode> {
                 let found = commands(&block).into_iter().map(|command| (command, block.place.clone()));
                 episodes.last_mut().unwrap().commands.extend(found);
             }
-            other => assert!(SHOWN.contains(&other), "{}: say what {other:?} is, in tests/job/manual/run.rs", block.place),
+            other => {
+                assert!(SHOWN.contains(&other), "{}: say what {other:?} is, in tests/job/manual/run.rs", block.place)
+            }
         }
     }
     episodes
@@ -62,7 +64,11 @@ fn commands(block: &Block) -> Vec<Vec<String>> {
     for line in lines {
         let line = line.split(" #").next().unwrap();
         for command in line.split("&&").filter(|command| !command.trim().is_empty() && !command.starts_with('#')) {
-            assert!(!command.contains(['"', '\'', '|', '>', '$', ';']), "{}: too much of a shell: {command}", block.place);
+            assert!(
+                !command.contains(['"', '\'', '|', '>', '$', ';']),
+                "{}: too much of a shell: {command}",
+                block.place
+            );
             commands.push(command.split_whitespace().map(String::from).collect());
         }
     }
@@ -112,7 +118,7 @@ struct Place {
 
 impl Place {
     fn new(block: Option<&Block>) -> Place {
-        let text = block.map_or(USUAL, |block| &block.text);
+        let text = block.map_or(USUAL, |block| block.text.as_str());
         let at = block.map_or(String::from("the usual configuration"), |block| block.place.clone());
         let shown: Table = text.parse().unwrap_or_else(|error| panic!("{at}: {error}"));
         let job = completed(shown.clone());
@@ -145,7 +151,7 @@ impl Place {
     fn run(&self, arguments: &[String], at: &str) {
         let mut words: Vec<String> = arguments.iter().flat_map(|word| self.expanded(word, &arguments[0])).collect();
         let insert = |words: &mut Vec<String>, added: &[&str]| {
-            words.splice(1..1, added.iter().map(|word| (*word).to_owned()));
+            drop(words.splice(1..1, added.iter().map(|word| (*word).to_owned())));
         };
         match words[0].as_str() {
             "view" => return self.view(&words, at),
