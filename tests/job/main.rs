@@ -44,6 +44,7 @@ mod init;
 mod khronos;
 mod levels;
 mod limits;
+mod manual;
 mod many_tiles;
 mod messages;
 mod overlap;

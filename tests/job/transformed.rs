@@ -31,7 +31,7 @@ fn places(share: usize) -> Vec<[f64; 3]> {
 }
 
 /// Writes the places as a text in this system, with so many decimals.
-fn survey(folder: &Path, name: &str, system: &str, share: usize, decimals: usize) -> PathBuf {
+pub(crate) fn survey(folder: &Path, name: &str, system: &str, share: usize, decimals: usize) -> PathBuf {
     let way = CrsTransform::between(&crs("EPSG:4269"), &crs(system), DatumRule::Strict).unwrap();
     let mut rows = String::from(if system == "EPSG:4269" { "lat,lon,z\n" } else { "x,y,z\n" });
     for [longitude, latitude, z] in places(share) {
@@ -45,7 +45,7 @@ fn survey(folder: &Path, name: &str, system: &str, share: usize, decimals: usize
 }
 
 /// Makes a LAS file with these records of systems out of a text in that system.
-fn las(folder: &Path, survey: &Path, name: &str, records: &[(u16, Vec<u8>)], scale: f64) -> PathBuf {
+pub(crate) fn las(folder: &Path, survey: &Path, name: &str, records: &[(u16, Vec<u8>)], scale: f64) -> PathBuf {
     let rows: Vec<[f64; 3]> = fs::read_to_string(survey)
         .unwrap()
         .lines()

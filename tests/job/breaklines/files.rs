@@ -10,31 +10,37 @@ use serde_json::{Value, json};
 use super::terrain::ORIGIN;
 
 /// What the `.prj` of a Shapefile says.
-pub(super) const UTM_33: &str = r#"PROJCS["WGS_1984_UTM_Zone_33N",GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137.0,298.257223563]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",500000.0],PARAMETER["False_Northing",0.0],PARAMETER["Central_Meridian",15.0],PARAMETER["Scale_Factor",0.9996],PARAMETER["Latitude_Of_Origin",0.0],UNIT["Meter",1.0]]"#;
+pub(crate) const UTM_33: &str = r#"PROJCS["WGS_1984_UTM_Zone_33N",GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137.0,298.257223563]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",500000.0],PARAMETER["False_Northing",0.0],PARAMETER["Central_Meridian",15.0],PARAMETER["Scale_Factor",0.9996],PARAMETER["Latitude_Of_Origin",0.0],UNIT["Meter",1.0]]"#;
 
 type Line = Vec<[f64; 3]>;
 
-/// Features of one kind of geometry, each with its attribute `kind`, and one `level` for all.
-pub(super) struct Features {
+/// Features of one kind of geometry, each with an attribute, mostly `kind`, and one `level` for all.
+pub(crate) struct Features {
     are_areas: bool,
+    attribute: String,
     all: Vec<(String, Vec<Line>)>,
     level: Option<f64>,
 }
 
 impl Features {
-    pub(super) fn lines(lines: &[(&str, Line)]) -> Features {
+    pub(crate) fn lines(lines: &[(&str, Line)]) -> Features {
         let all = lines.iter().map(|(kind, line)| (kind.to_string(), vec![moved(line)])).collect();
-        Features { are_areas: false, all, level: None }
+        Features { are_areas: false, attribute: "kind".into(), all, level: None }
     }
 
     /// Areas: the rings of each are not closed.
-    pub(super) fn areas(areas: &[(&str, Vec<Line>)]) -> Features {
+    pub(crate) fn areas(areas: &[(&str, Vec<Line>)]) -> Features {
         let closed = |ring: &Line| [moved(ring), vec![moved(ring)[0]]].concat();
         let area = |(kind, rings): &(&str, Vec<Line>)| (kind.to_string(), rings.iter().map(closed).collect());
-        Features { are_areas: true, all: areas.iter().map(area).collect(), level: None }
+        Features { are_areas: true, attribute: "kind".into(), all: areas.iter().map(area).collect(), level: None }
     }
 
-    pub(super) fn with_level(self, level: f64) -> Features {
+    /// Gives the attribute another name.
+    pub(crate) fn with_attribute(self, name: &str) -> Features {
+        Features { attribute: name.into(), ..self }
+    }
+
+    pub(crate) fn with_level(self, level: f64) -> Features {
         Features { level: Some(level), ..self }
     }
 }
@@ -44,13 +50,14 @@ fn moved(line: &Line) -> Line {
 }
 
 /// Writes GeoJSON with the member `crs`, as GIS programs do.
-pub(super) fn geojson(folder: &Path, name: &str, features: &Features) -> PathBuf {
+pub(crate) fn geojson(folder: &Path, name: &str, features: &Features) -> PathBuf {
     let feature = |(kind, lines): &(String, Vec<Line>)| {
         let geometry = match features.are_areas {
             true => json!({"type": "Polygon", "coordinates": lines}),
             false => json!({"type": "LineString", "coordinates": lines[0]}),
         };
-        json!({"type": "Feature", "properties": {"kind": kind, "level": features.level}, "geometry": geometry})
+        let properties = json!({features.attribute.as_str(): kind, "level": features.level});
+        json!({"type": "Feature", "properties": properties, "geometry": geometry})
     };
     let all: Vec<Value> = features.all.iter().map(feature).collect();
     let crs = json!({"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::32633"}});
@@ -60,7 +67,7 @@ pub(super) fn geojson(folder: &Path, name: &str, features: &Features) -> PathBuf
 }
 
 /// Writes a GeoPackage with one layer. Vertices with NaN for a height make it one without heights.
-pub(super) fn geopackage(folder: &Path, name: &str, features: &Features) -> PathBuf {
+pub(crate) fn geopackage(folder: &Path, name: &str, features: &Features) -> PathBuf {
     let path = folder.join(name);
     let _ = fs::remove_file(&path);
     let file = Connection::open(&path).unwrap();
@@ -75,10 +82,12 @@ pub(super) fn geopackage(folder: &Path, name: &str, features: &Features) -> Path
          CREATE TABLE waters (fid INTEGER PRIMARY KEY, geom BLOB, kind TEXT, level REAL);",
     )
     .unwrap();
+    if features.attribute != "kind" {
+        file.execute(&format!("ALTER TABLE waters RENAME COLUMN kind TO {}", features.attribute), []).unwrap();
+    }
     for (kind, lines) in &features.all {
         let blob = blob(features.are_areas, lines);
-        file.execute("INSERT INTO waters (geom, kind, level) VALUES (?1, ?2, ?3)", params![blob, kind, features.level])
-            .unwrap();
+        file.execute("INSERT INTO waters VALUES (NULL, ?1, ?2, ?3)", params![blob, kind, features.level]).unwrap();
     }
     file.close().unwrap();
     path
@@ -103,7 +112,7 @@ fn blob(is_area: bool, lines: &[Line]) -> Vec<u8> {
 }
 
 /// Writes a Shapefile with heights, its attributes and its CRS. Returns the path of the `.shp`.
-pub(super) fn shapefile(folder: &Path, name: &str, features: &Features) -> PathBuf {
+pub(crate) fn shapefile(folder: &Path, name: &str, features: &Features) -> PathBuf {
     let mut bytes = vec![0; 100];
     bytes[..4].copy_from_slice(&9994u32.to_be_bytes());
     for (number, (_, lines)) in (1u32..).zip(&features.all) {
@@ -137,19 +146,19 @@ fn record(kind: i32, lines: &[Line]) -> Vec<u8> {
     bytes
 }
 
-/// A dBASE table with the column `kind`.
+/// A dBASE table with the attribute as its column.
 fn table(features: &Features) -> Vec<u8> {
     let mut bytes = vec![3, 0, 0, 0];
     bytes.extend((features.all.len() as u32).to_le_bytes());
-    bytes.extend([65u8, 0, 9, 0]);
+    bytes.extend([65u8, 0, 17, 0]);
     bytes.resize(32, 0);
     let mut field = [0; 32];
-    field[..4].copy_from_slice(b"kind");
-    (field[11], field[16]) = (b'C', 8);
+    field[..features.attribute.len()].copy_from_slice(features.attribute.as_bytes());
+    (field[11], field[16]) = (b'C', 16);
     bytes.extend(field);
     bytes.push(b'\r');
     let mut text = String::new();
-    features.all.iter().for_each(|(kind, _)| write!(text, " {kind:<8}").unwrap());
+    features.all.iter().for_each(|(kind, _)| write!(text, " {kind:<16}").unwrap());
     bytes.extend(text.bytes());
     bytes
 }

@@ -2,7 +2,7 @@
 //! done.
 
 mod bad;
-mod files;
+pub(crate) mod files;
 mod same;
 mod terrain;
 
