@@ -1,5 +1,6 @@
 //! Coordinate reference systems as GeoTIFF keys.
 
+use crate::input::crs::codes::text_of_code;
 use crate::input::crs::from_wkt::{self, from_epsg};
 use crate::input::crs::geokeys::{GeoKeys, USER_DEFINED};
 use crate::input::crs::geotiff_esri as esri;
@@ -37,14 +38,38 @@ pub(crate) fn doubts(keys: &GeoKeys) -> Vec<String> {
     let height = height.map(|code| {
         format!("GeoTIFF key {VERTICAL_UNITS}, the unit of heights, has the code {code}, which is not known")
     });
-    let is_unknown = parse(keys).is_some_and(|crs| crs.form().is_none());
+    let known = parse(keys);
+    let is_unknown = known.as_ref().is_some_and(|crs| crs.form().is_none());
+    let is_geographic = known.is_some_and(|crs| crs.kind == CrsKind::Geographic);
+    let of_code = || keys.code(GEOGRAPHIC_TYPE).and_then(|code| text_of_code(code.into()));
     let problem = match projected(keys) {
         Some(USER_DEFINED) => geotiff_text::problem(keys),
-        code => code.map(|code| format!("EPSG:{code} is not in the list of known codes")),
+        None if is_geographic => geotiff_text::problem_of_angles(keys, of_code()).or_else(|| {
+            let code = keys.code(GEOGRAPHIC_TYPE).filter(|code| *code != USER_DEFINED);
+            Some(code.map_or_else(|| "the GeoTIFF keys do not say its datum".into(), not_in_list))
+        }),
+        code => code.map(not_in_list),
     };
     let projection = problem.filter(|_| is_unknown);
     let projection = projection.map(|what| format!("nobody can tell where its coordinates are: {what}"));
-    unit.into_iter().chain(height).chain(projection).collect()
+    unit.into_iter().chain(height).chain(projection).chain(other_unit(keys)).collect()
+}
+
+/// Says that a key gives another unit of x and y than the code of the system has.
+fn other_unit(keys: &GeoKeys) -> Option<String> {
+    let code = projected(keys).filter(|code| *code != USER_DEFINED)?;
+    let (own, of_code) = (Unit::from_metres(linear_unit(keys)), from_epsg(code.into())?.horizontal);
+    (own != Unit::Unknown && own != of_code).then(|| {
+        format!(
+            "GeoTIFF key {LINEAR_UNITS}, the unit of x and y, says {}, and EPSG:{code} has them in {}: that of the key is used",
+            own.name(),
+            of_code.name()
+        )
+    })
+}
+
+fn not_in_list(code: u16) -> String {
+    format!("EPSG:{code} is not in the list of known codes")
 }
 
 /// Returns the code of the projected system. Some writers leave it out where other keys define the projection.
@@ -75,12 +100,17 @@ pub(crate) fn parse(keys: &GeoKeys) -> Option<Crs> {
     let name = CITATIONS.iter().filter_map(|key| keys.text(*key)).find_map(|text| esri::title(&text));
     let unit = linear_unit(keys);
     let of_code = epsg.and_then(from_epsg);
+    if let Some(crs) = in_other_angles(keys, &of_code, name.clone()) {
+        return Some(crs);
+    }
     let is_defined = projected == Some(USER_DEFINED);
     let defined = || from_wkt::parse(&geotiff_text::projected(keys, name.as_deref(), unit?)?);
     // ESRI's programs write their text into a citation.
     let written = || CITATIONS.iter().filter_map(|key| keys.text(*key)).find_map(|text| esri::system(&text));
     let written = || written().filter(|crs| projected.is_some() == (crs.kind == CrsKind::Projected));
-    let known = of_code.or_else(written).or_else(|| defined().filter(|_| is_defined)).unwrap_or_default();
+    let geographic = || from_wkt::parse(&geotiff_text::geographic(keys)?).filter(|_| is_geographic(keys));
+    let known = of_code.or_else(written).or_else(|| defined().filter(|_| is_defined)).or_else(geographic);
+    let known = known.unwrap_or_default();
     let kind = kind(model, projected.is_some(), epsg.is_some(), known.kind);
     let horizontal = match unit {
         _ if kind == CrsKind::Geographic => Unit::Degree,
@@ -109,6 +139,27 @@ pub(crate) fn parse(keys: &GeoKeys) -> Option<Crs> {
         crs.unread_keys = geotiff_text::definition(keys);
     }
     (crs != Crs::default()).then_some(crs)
+}
+
+/// Returns whether the keys say that places are longitudes and latitudes.
+fn is_geographic(keys: &GeoKeys) -> bool {
+    keys.code(MODEL_TYPE) == Some(2)
+}
+
+/// Returns a system of longitude and latitude in radians, grads or another angle than the text of its code has. Nothing here reads such
+/// coordinates, so it has no text and no code by which they would count as degrees.
+fn in_other_angles(keys: &GeoKeys, of_code: &Option<Crs>, name: Option<String>) -> Option<Crs> {
+    let known = of_code.as_ref();
+    let is_geographic = known.map_or(is_geographic(keys), |crs| crs.kind == CrsKind::Geographic);
+    let text = known.and_then(|crs| crs.wkt.as_deref());
+    geotiff_text::problem_of_angles(keys, text).filter(|_| is_geographic)?;
+    Some(Crs {
+        kind: CrsKind::Geographic,
+        horizontal: Unit::Degree,
+        name: known.and_then(|crs| crs.name.clone()).or(name),
+        unread_keys: geotiff_text::definition(keys),
+        ..Crs::default()
+    })
 }
 
 /// Returns the kind that the keys say, or else that of the code.
@@ -151,6 +202,10 @@ mod tests {
             .unwrap();
         assert_eq!((crs.horizontal, crs.vertical), (Unit::UsFoot, Some(Unit::US_FOOT)));
         assert_eq!(crs.wkt, None);
+        let told =
+            |unit: u16| doubts(&records(&[[1024, 0, 1, 1], [3072, 0, 1, 32104], [3076, 0, 1, unit]], &[])).concat();
+        assert!(told(9003).contains("says US survey foot, and EPSG:32104 has them in metre"), "{}", told(9003));
+        assert_eq!(told(9001), "");
     }
 
     #[test]
@@ -243,6 +298,64 @@ mod tests {
         }
         for entry in [[3076, 0, 1, 9999], [3076, 0, 1, USER_DEFINED]] {
             assert!(doubts(3076, Some(entry)).contains("the unit of x and y"));
+        }
+    }
+
+    #[test]
+    fn longitudes_in_another_angle_than_their_code_has_are_not_read() {
+        for (code, unit) in [(4326, 9101), (4326, 9105), (4326, 9107), (4807, 9102), (32767, 9101)] {
+            let keys = records(&[[1024, 0, 1, 2], [2048, 0, 1, code], [2054, 0, 1, unit], [2056, 0, 1, 7030]], &[]);
+            let crs = parse(&keys).unwrap();
+            assert!(
+                crs.form().is_none() && crs.is_named() && crs.kind == CrsKind::Geographic,
+                "{code} {unit}: {crs:?}"
+            );
+            assert!(
+                doubts(&keys)[0]
+                    .contains(&format!("key 2054, the unit of longitude and latitude, has the code {unit}"))
+            );
+        }
+        for (code, unit) in [(4326, 9102), (4326, 9122), (4807, 9105)] {
+            let keys = records(&[[1024, 0, 1, 2], [2048, 0, 1, code], [2054, 0, 1, unit]], &[]);
+            assert!(parse(&keys).unwrap().form().is_some() && doubts(&keys).is_empty(), "{code} {unit}");
+        }
+    }
+
+    #[test]
+    fn longitude_and_latitude_may_be_defined_by_keys() {
+        let keys =
+            [[1024, 0, 1, 2], [2048, 0, 1, USER_DEFINED], [2049, TEXTS, 6, 0], [2054, 0, 1, 9102], [2056, 0, 1, 7030]];
+        let mut keys = records(&keys, &[]);
+        keys.texts = b"WGS 84|".to_vec();
+        assert_eq!(parse(&keys).unwrap().differences(&from_epsg(4326).unwrap()), [""; 0]);
+        assert!(doubts(&keys).is_empty());
+        // Without an ellipsoid, nobody can tell.
+        let keys = records(&[[1024, 0, 1, 2], [2048, 0, 1, USER_DEFINED]], &[]);
+        assert!(doubts(&keys)[0].contains("do not say its datum"));
+    }
+
+    #[test]
+    fn mercators_projection_may_be_true_to_scale_at_a_parallel() {
+        let method = [[3074, 0, 1, USER_DEFINED], [3075, 0, 1, 7], [3080, DOUBLES, 1, 0], [3078, DOUBLES, 1, 1]];
+        let parallel = user_defined(&method, &[51.0, 42.0]);
+        // Pulkovo 1942 / Caspian Sea Mercator has the same parallel.
+        let known = from_epsg(3388).unwrap();
+        assert!(parallel.differences(&known).iter().all(|what| !what.contains("scale")), "{parallel:?}");
+        let both = [&method[..], &[[3092, DOUBLES, 1, 2]]].concat();
+        let one = user_defined(&both, &[51.0, 42.0, 1.0]);
+        assert!(one.form().is_some() && one.differences(&parallel).is_empty());
+        assert!(user_defined(&both, &[51.0, 42.0, 0.5]).form().is_none());
+        assert!(user_defined(&[method[0], method[1], method[2]], &[51.0]).differences(&parallel)[0].contains("scale"));
+    }
+
+    #[test]
+    fn a_name_that_says_nothing_names_no_system() {
+        for name in ["unknown", "unnamed", "Undefined", "My grid"] {
+            let keys =
+                [[1024, 0, 1, 1], [1026, TEXTS, name.len() as u16, 0], [3072, 0, 1, USER_DEFINED], [3076, 0, 1, 9001]];
+            let mut keys = records(&keys, &[]);
+            keys.texts = name.as_bytes().to_vec();
+            assert_eq!(parse(&keys).unwrap().is_named(), name == "My grid", "{name}");
         }
     }
 

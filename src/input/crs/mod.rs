@@ -16,6 +16,7 @@ pub(crate) mod geotiff_text;
 pub(crate) mod plausible;
 pub(crate) mod proj4;
 pub(crate) mod projection;
+pub(crate) mod projection_names;
 pub(crate) mod system;
 pub(crate) mod target;
 pub(crate) mod transform;

@@ -1,6 +1,6 @@
 //! Published values of projections (EPSG Guidance Note 7-2), and the way there and back.
 
-use super::between::CrsTransform;
+use super::between::{CrsTransform, DatumNote};
 use super::datum_rule::DatumRule;
 use crate::input::crs::from_wkt::{from_epsg, parse};
 use crate::input::crs::system::Crs;
@@ -127,8 +127,8 @@ fn shifts_are_refused_by_name() {
     let strict = between(26915, 32615, DatumRule::Strict).unwrap_err();
     assert!(strict.contains("datums = \"close\""), "{strict}");
     let close = between(26915, 32615, DatumRule::Close).unwrap();
-    assert_eq!(close.datums_taken_alike(), Some("NAD83 and WGS 84"));
-    assert_eq!(between(26915, 26916, DatumRule::Strict).unwrap().datums_taken_alike(), None);
+    assert_eq!(close.datums(), &DatumNote::TakenAlike("NAD83 and WGS 84".into()));
+    assert_eq!(between(26915, 26916, DatumRule::Strict).unwrap().datums(), &DatumNote::Same);
 }
 
 #[test]
