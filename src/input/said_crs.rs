@@ -81,15 +81,18 @@ fn refuse_map_of_degrees(source: &Source, named: &Crs, options: &InputOptions) -
 
 /// Returns what is wrong with the record of a system in the file, as a part of a sentence; nothing if nothing is.
 fn found_in(source: &Source) -> String {
-    let of_system: Vec<String> =
-        source.warnings.iter().filter(|warning| warning.contains("coordinate system")).map(|w| w.to_string()).collect();
+    const WORDS: [&str; 2] = ["coordinate system", "variable length records"];
+    let is_meant = |warning: &str| WORDS.iter().any(|word| warning.contains(word));
+    let all = source.warnings.iter().map(|warning| warning.to_string());
+    let of_system: Vec<String> = all.filter(|warning| is_meant(warning)).collect();
     if of_system.is_empty() { String::new() } else { format!(" that can be read ({})", of_system.join("; ")) }
 }
 
 /// Returns the error for a source that cannot be transformed, for the reason `why`.
 pub(crate) fn no_way(source: &Source, why: &str) -> Error {
     let found = found_in(source);
-    let found = if found.is_empty() { found } else { format!(". The file has no CRS{found}") };
+    let is_said = found.is_empty() || found.contains(why);
+    let found = if is_said { String::new() } else { format!(". The file has no CRS{found}") };
     Error::Config(format!(
         "{}: {why}{found}. Other programs transform more: `pdal translate in.laz out.laz reprojection \
          --filters.reprojection.out_srs=EPSG:...` does that first. If what the file says is wrong, [input] crs says what all files are in",

@@ -44,7 +44,7 @@ pub fn transform_sources(sources: &mut [Source], options: &InputOptions, warning
     let said = sources.iter().map(|source| said_crs(source, sources, options)).collect::<Result<Vec<Crs>>>()?;
     refuse_impossible_latitudes(sources, &said)?;
     warn_of_overruled(sources, &said, options, warnings);
-    warn_of_lengths(sources, &said, warnings);
+    warn_of_lengths(sources, &said, options, warnings);
     warn_of_heights(sources, &said, warnings);
     warn_of_coarse_degrees(sources, &said, warnings);
     let mut to = match target {

@@ -40,7 +40,11 @@ pub(crate) fn warn_of_overruled(sources: &[Source], said: &[Crs], options: &Inpu
 }
 
 /// Warns about texts whose columns say a length, though the user says that they are longitude and latitude.
-pub(crate) fn warn_of_lengths(sources: &[Source], said: &[Crs], warnings: &mut Warnings) {
+pub(crate) fn warn_of_lengths(sources: &[Source], said: &[Crs], options: &InputOptions, warnings: &mut Warnings) {
+    // What differs from `crs` has been said.
+    if options.crs != CrsChoice::Auto {
+        return;
+    }
     let is_other = |source: &Source, crs: &Crs| {
         crs.kind == CrsKind::Geographic && !source.crs.is_named() && source.crs.metres_per_unit().is_some()
     };
@@ -137,12 +141,13 @@ pub(crate) fn is_around_the_earth(source: &Source, crs: &Crs) -> bool {
     source.records > 1 && crs.kind == CrsKind::Geographic && own.max[0] - own.min[0] > 180.0
 }
 
-/// Warns about a map whose metres are not those of the ground, as in the Mercator projection of web maps.
+/// Warns about a map whose metres are nowhere those of the ground, as in the Mercator projection of web maps far from the equator. One stray
+/// row makes a box wide, but the others lie in it too.
 pub(crate) fn warn_of_scale(sources: &[Source], to: &Crs, warnings: &mut Warnings) {
-    let Some(middle) = sources.iter().filter(|source| source.records > 0).find_map(middle) else { return };
-    let Some(ground) = ground_of_metre(to, middle).filter(|ground| (ground - 1.0).abs() > TRUE_TO_SCALE) else {
-        return;
-    };
+    let places: Vec<[f64; 2]> = sources.iter().filter(|source| source.records > 0).flat_map(places).collect();
+    let scales: Vec<f64> = places.iter().filter_map(|place| ground_of_metre(to, *place)).collect();
+    let is_true = |ground: &f64| (ground - 1.0).abs() <= TRUE_TO_SCALE;
+    let Some(ground) = scales.get(scales.len() / 2).filter(|_| !scales.iter().any(is_true)) else { return };
     warnings.push(format!(
         "[input] to_crs ({}) is not true to scale here: a metre of it is about {ground:.2} m on the ground, so lengths and slopes of the \
          mesh are wrong by that (name another CRS, such as \"utm\")",
@@ -150,15 +155,14 @@ pub(crate) fn warn_of_scale(sources: &[Source], to: &Crs, warnings: &mut Warning
     ));
 }
 
-/// Returns the middle of the box of a source. That of a box around the earth says nothing.
-fn middle(source: &Source) -> Option<[f64; 2]> {
+/// Returns the middle of the box of a source, its corners and the middles of its sides. Those of a box around the earth say nothing.
+fn places(source: &Source) -> Vec<[f64; 2]> {
     let is_wide =
         |own: &OwnCoordinates, from: &Crs| from.kind == CrsKind::Geographic && own.max[0] - own.min[0] > 180.0;
-    if source.transform().is_some_and(|transform| is_wide(&transform.own, &transform.from)) {
-        return None;
-    }
-    let [min, max] = source.claimed_rectangle()?;
-    Some([0, 1].map(|axis| min[axis] + (max[axis] - min[axis]) / 2.0))
+    let is_around = source.transform().is_some_and(|transform| is_wide(&transform.own, &transform.from));
+    let Some([min, max]) = source.claimed_rectangle().filter(|_| !is_around) else { return Vec::new() };
+    let at = |i: usize, axis: usize| min[axis] + (max[axis] - min[axis]) * 0.5 * i as f64;
+    (0..9).map(|i| [at(i % 3, 0), at(i / 3, 1)]).collect()
 }
 
 /// Returns how long a metre of a map is on the ground, about, from south to north at a place.

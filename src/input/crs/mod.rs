@@ -12,6 +12,8 @@ pub(crate) mod from_wkt;
 pub(crate) mod geokeys;
 pub(crate) mod geotiff;
 pub(crate) mod geotiff_esri;
+#[cfg(test)]
+mod geotiff_tests;
 pub(crate) mod geotiff_text;
 pub(crate) mod plausible;
 pub(crate) mod proj4;

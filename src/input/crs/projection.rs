@@ -108,15 +108,26 @@ impl Projection {
 
     /// Returns the projection in the words of PROJ.4, without ellipsoid and unit; `None` if these parameters are not all that it needs.
     pub(crate) fn proj4(&self) -> Option<String> {
-        const METHODS: [&str; 4] = ["tmerc", "lcc", "aea", "laea"];
+        const METHODS: [&str; 7] = ["tmerc", "lcc", "aea", "laea", "merc", "sterea", "stere"];
         const NAMES: [&str; 7] = ["lon_0", "lat_0", "lat_1", "lat_2", "k_0", "x_0", "y_0"];
         let known = METHODS.contains(&self.method.as_str())
             && self.parameters.keys().all(|name| NAMES.contains(&name.as_str()));
-        if !known || self.has_other_axes() {
+        let (latitude, scale) = (self.value("lat_0"), self.value("k_0"));
+        let is_odd = match self.method.as_str() {
+            // Variants with another origin differ in where they count from.
+            "merc" => latitude != 0.0,
+            "stere" => latitude.abs() != 90.0 && scale != 1.0,
+            _ => false,
+        };
+        if !known || is_odd || self.has_other_axes() {
             return None;
         }
-        let words = self.parameters.iter().map(|(name, value)| format!(" +{name}={value}"));
-        Some(format!("+proj={}{}", self.method, words.collect::<String>()))
+        let word = |(name, value): (&String, &f64)| match (self.method.as_str(), name.as_str()) {
+            ("stere", "lat_0") => pole_of(*value, self.is_named_polar()),
+            _ => Some(format!(" +{name}={value}")),
+        };
+        let words = self.parameters.iter().map(word).collect::<Option<String>>()?;
+        Some(format!("+proj={}{words}", self.method))
     }
 
     /// Returns the name of the method in PROJ.4, or one of that kind.
@@ -276,6 +287,16 @@ fn esris_axes(turn: [f64; 3]) -> Option<bool> {
 
 fn default(name: &str) -> f64 {
     if is_scale(name) { 1.0 } else { 0.0 }
+}
+
+/// Returns the words for the origin of a polar stereographic projection: the pole itself, or the one next to the parallel that is true to
+/// scale; `None` if it is around another place.
+fn pole_of(latitude: f64, is_named_polar: bool) -> Option<String> {
+    if latitude.abs() == 90.0 {
+        return Some(format!(" +lat_0={latitude}"));
+    }
+    let pole = if latitude < 0.0 { -90 } else { 90 };
+    (is_named_polar && latitude != 0.0).then(|| format!(" +lat_0={pole} +lat_ts={latitude}"))
 }
 
 /// Returns how far two values of a parameter are apart. A whole turn is nothing.

@@ -17,7 +17,9 @@ pub(super) fn bring_to_points(file: &mut LineFile, choice: &LineCrs, points: &Cr
     };
     // Points in degrees are refused, so degrees are never the system of the points, even where these say none.
     let is_in_degrees = own.kind == CrsKind::Geographic && points.kind != CrsKind::Geographic;
-    if is_in_degrees || !own.differences(points).is_empty() {
+    // A text that nobody can read is not a missing one.
+    let is_unread = |crs: &Crs| crs.wkt.is_some() && !crs.is_named();
+    if is_in_degrees || is_unread(&own) || is_unread(points) || !own.differences(points).is_empty() {
         return transform(file, &own, points, datums);
     }
     if !own.is_named() || !points.is_named() {
@@ -180,6 +182,7 @@ mod tests {
             r#"PROJCS["My grid",GEOGCS["NAD83",DATUM["North_American_Datum_1983",
             SPHEROID["GRS 1980",6378137,298.257222101]]],UNIT["metre",1]]"#,
         );
+        let unnamed = system(&projected_somehow.wkt.clone().unwrap().replace("My grid", "unnamed"));
         let ([x, y, z], said) = bring_vertex(SOUTH, &degrees, "auto", &zone_15).unwrap();
         // The central meridian of the zone.
         assert!((x - 500_000.0).abs() < 1e-6 && (4_870_000.0..4_880_000.0).contains(&y) && z == 100.0, "{x} {y} {z}");
@@ -192,6 +195,8 @@ mod tests {
             (&wgs84, &zone_15, "datums"),
             // Nothing says that these differ, and nothing that they are the same.
             (&projected_somehow, &zone_15, "does not say its projection"),
+            (&unnamed, &zone_15, "does not say its projection"),
+            (&zone_15, &unnamed, "do not say where they are"),
             (&degrees, &Crs::default(), "do not say where they are"),
         ] {
             let error = bring(own, "auto", points).unwrap_err();
