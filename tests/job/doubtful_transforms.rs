@@ -24,12 +24,15 @@ fn what_nobody_can_tell_is_not_taken_for_the_system_of_the_job() {
         ("user.las", user.clone(), ["names no CRS", "missing_crs"]),
         ("json.las", json, ["not well-known text that can be read", "missing_crs"]),
         ("mygrid.las", mygrid, ["My grid does not say its projection", "[input] crs says"]),
-        ("radians.las", radians, ["key 2054, the unit of longitude and latitude", "[input] crs says"]),
         ("unknown.las", code(40_000), ["EPSG:40000 is not in the list of known codes", "[input] crs says"]),
     ] {
         let job = Job::on(&[las(name, record)]).with("input", "to_crs = \"EPSG:26915\"");
         job.run().refused(2, &[&[name], &words[..]].concat());
     }
+    let turned: Vec<[f64; 3]> = places(0).into_iter().map(|[x, y, z]| [x.to_radians(), y.to_radians(), z]).collect();
+    let radians = las_of(folder.path(), &turned, "radians.las", &[radians], 1e-9);
+    let words = ["radians.las", "key 2054, the unit of longitude and latitude", "[input] crs says"];
+    Job::on(&[radians]).with("input", "to_crs = \"EPSG:26915\"").run().refused(2, &words);
     // What is missing may be said.
     let expected = Job::on(&[las("good.las", code(26916))]).with("input", "to_crs = \"EPSG:26915\"").digest();
     for record in [unnamed, user] {
