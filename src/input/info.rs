@@ -9,7 +9,7 @@ use crate::input::crs::unit::Unit;
 use crate::input::histogram::Histogram;
 use crate::input::points::axis::AXIS_NAMES;
 use crate::input::source::{FileFormat, Source};
-use crate::input::surface::{Surface, SurfaceShares};
+use crate::input::surface::{MeshOf, Surface, SurfaceShares};
 use crate::{Result, Warnings};
 
 /// The output of `gdt-batch info`: `Display` is for people, `Serialize` for programs.
@@ -96,10 +96,10 @@ impl SourceDescription {
     pub fn with_surface(mut self, source: &Source) -> Result<SourceDescription> {
         if let Some(histogram) = &self.histogram {
             self.surface_sample = Some(histogram.shares());
-            self.surface = histogram.shares().sentence(Surface::All);
+            self.surface = histogram.shares().sentence(MeshOf::Surface(Surface::All));
         } else {
             self.surface_sample = SurfaceShares::sampled(source)?;
-            self.surface = self.surface_sample.and_then(|shares| shares.estimate(Surface::All));
+            self.surface = self.surface_sample.and_then(|shares| shares.estimate(MeshOf::Surface(Surface::All)));
         }
         Ok(self)
     }

@@ -11,7 +11,7 @@ use crate::input::points::classes::{IGNORED_GROUND, is_noise};
 use crate::input::points::optional_fields::OptionalFields;
 use crate::input::points::returns::KeptReturns;
 use crate::input::remote::name::public_name;
-use crate::input::surface::Surface;
+use crate::input::surface::{MeshOf, Surface};
 use crate::input::text::options::TextOptions;
 use crate::input::text::row_choice::RowChoice;
 
@@ -112,6 +112,16 @@ impl InputOptions {
         match self.surface.returns() {
             KeptReturns::All => self.returns,
             returns => returns,
+        }
+    }
+
+    /// Returns which points the mesh is made of, for a sentence about it.
+    pub fn mesh_of(&self) -> MeshOf {
+        match (&self.classes, self.kept_returns(), self.surface) {
+            (None, KeptReturns::All, surface) => MeshOf::Surface(surface),
+            (None, KeptReturns::First, Surface::All | Surface::First) => MeshOf::Surface(Surface::First),
+            (None, KeptReturns::Last, Surface::All | Surface::Last) => MeshOf::Surface(Surface::Last),
+            _ => MeshOf::Chosen,
         }
     }
 
@@ -288,6 +298,22 @@ impl TryFrom<f64> for Fraction {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_mesh_is_that_of_a_surface_or_of_what_is_listed() {
+        for (text, mesh) in [
+            ("", MeshOf::Surface(Surface::All)),
+            ("surface = \"ground\"", MeshOf::Surface(Surface::Ground)),
+            ("returns = \"last\"", MeshOf::Surface(Surface::Last)),
+            ("surface = \"first\"", MeshOf::Surface(Surface::First)),
+            ("classes = [6]", MeshOf::Chosen),
+            ("surface = \"first\"\nclasses = [2]", MeshOf::Chosen),
+            ("returns = [2]", MeshOf::Chosen),
+        ] {
+            let options: InputOptions = toml::from_str(&format!("files = [\"a\"]\n{text}")).unwrap();
+            assert_eq!(options.mesh_of(), mesh, "{text}");
+        }
+    }
 
     #[test]
     fn options_are_read_back_as_they_were_written() {

@@ -238,9 +238,10 @@ impl Source {
     /// # Errors
     /// `Io` if the file cannot be read.
     pub fn leave_out_outliers(&mut self, choice: &RowChoice) -> Result<Outliers> {
+        let steps = self.steps_of_height();
         let PointData::Text(table) = &mut self.points else { return Ok(Outliers::default()) };
         let file = RandomAccessFile::reopen(&self.path, self.size)?;
-        let found = table.leave_out_outliers(&file, choice)?;
+        let found = table.leave_out_outliers(&file, choice, steps)?;
         let (axes, grid) = (table.axes(), table.grid());
         self.set_axes_of_text(axes, grid);
         Ok(found)
@@ -262,7 +263,9 @@ impl Source {
         let PointData::Text(table) = &self.points else { return Ok(None) };
         let file = RandomAccessFile::reopen(&self.path, self.size)?;
         let place = |line: u64, text: &str| format!("{}: line {line}: {text}", self.path.display());
-        Ok(table.farthest_row(&file, choice)?.map(|row| (row.distance, place(row.line, &row.text))))
+        Ok(table
+            .farthest_row(&file, choice, self.steps_of_height())?
+            .map(|row| (row.distance, place(row.line, &row.text))))
     }
 
     /// Returns the raw integers within these bounds in x and y: least x and y, greatest x and y, borders included. `None` for text, which

@@ -63,6 +63,12 @@ impl SourceTransform {
         Ok(RecordTransform { way, axes, heights: self.heights, target })
     }
 
+    /// Returns how many units of the file's heights one unit of its x and y is long, about: of lengths one, as where nothing is transformed.
+    pub(crate) fn steps_of_height(&self) -> f64 {
+        let is_length = self.from.metres_per_unit().is_some();
+        if is_length { 1.0 } else { METRES_OF_A_DEGREE / self.from.metres_per_unit_of_height() }
+    }
+
     /// Returns the axes of the points in the other system.
     pub(crate) fn axes(&self) -> [Axis; 3] {
         let [x, y, z] = self.own.axes;
@@ -76,11 +82,12 @@ impl SourceTransform {
         if self.is_moved { [axes[0].scale, axes[1].scale] } else { self.own.grid }
     }
 
-    /// Returns the axis of values of `own` that are multiplied by about `factor`; `own` itself without one.
+    /// Returns the axis of values of `own` that are multiplied by about `factor`; `own` itself without one. A coarser step that the user
+    /// wants is that of the lattice: bounds hold before coordinates are rounded to it.
     fn axis(&self, own: Axis, factor: Option<f64>, wanted: Option<Decimal>) -> Axis {
         let Some(factor) = factor else { return own };
-        let scale = wanted.unwrap_or_else(|| new_step(own.scale.to_f64().unwrap_or(1.0) * factor));
-        Axis { offset: Decimal::ZERO, scale }
+        let step = new_step(own.scale.to_f64().unwrap_or(1.0) * factor);
+        Axis { offset: Decimal::ZERO, scale: wanted.map_or(step, |wanted| wanted.min(step)) }
     }
 
     /// Returns the metres of the other system's unit.

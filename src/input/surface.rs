@@ -11,8 +11,9 @@ use crate::input::points::record_sink::RecordSink;
 use crate::input::points::returns::{KeptReturns, PulseReturn};
 use crate::input::source::Source;
 
-/// The command that finds the ground in a cloud.
-pub const CLASSIFY: &str = "pdal translate in.laz out.laz smrf";
+/// The command that finds the ground in a cloud whose unit is the metre. Without its last word, the steps of the coordinates become a
+/// hundredth.
+pub const CLASSIFY: &str = "pdal translate in.laz out.laz smrf --writers.las.forward=all";
 
 /// The chunks in which a sample of a source looks.
 const SAMPLED_CHUNKS: usize = 16;
@@ -51,6 +52,15 @@ impl Surface {
     }
 }
 
+/// Which points a mesh is made of, as far as a sentence tells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MeshOf {
+    /// Those of a surface.
+    Surface(Surface),
+    /// Those of classes or returns that the user has listed.
+    Chosen,
+}
+
 /// How many points there are of the kinds that tell what their mesh will be.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SurfaceShares {
@@ -65,12 +75,7 @@ pub struct SurfaceShares {
 impl SurfaceShares {
     /// Returns the shares of the points that a job keeps.
     pub fn of_kept(counts: &PointCounts) -> SurfaceShares {
-        // Breaklines take the place of points that were wanted.
-        SurfaceShares {
-            points: counts.kept + counts.at_breaklines,
-            ground: counts.ground,
-            unclassified: counts.unclassified,
-        }
+        SurfaceShares { points: counts.kept, ground: counts.ground, unclassified: counts.unclassified }
     }
 
     /// Looks at some of the points of `source`; `None` if it holds none there.
@@ -88,6 +93,13 @@ impl SurfaceShares {
         Ok((shares.points > 0).then_some(shares))
     }
 
+    /// Adds a point of this class that the job wants, noise or not.
+    pub(crate) fn add_wanted(&mut self, class: u8) {
+        self.points += 1;
+        self.ground += u64::from(is_ground(class));
+        self.unclassified += u64::from(is_unclassified(class));
+    }
+
     /// Adds `count` points of this class.
     pub fn add(&mut self, class: u8, count: u64) {
         if !is_noise(class) {
@@ -97,8 +109,8 @@ impl SurfaceShares {
         }
     }
 
-    /// Says what a mesh of these points is, if `surface` was asked for; `None` without points.
-    pub fn sentence(&self, surface: Surface) -> Option<String> {
+    /// Says what a mesh of these points is, which are those of `mesh`; `None` without points.
+    pub fn sentence(&self, mesh: MeshOf) -> Option<String> {
         let SurfaceShares { points, ground, unclassified } = *self;
         if points == 0 {
             return None;
@@ -112,18 +124,21 @@ impl SurfaceShares {
                  `{CLASSIFY}` finds the ground"
             ));
         }
-        let mesh = match surface {
-            Surface::All | Surface::Ground => "the mesh of all points has vegetation and buildings in it",
-            Surface::First => "the mesh of first returns has roofs and tree tops in it",
-            Surface::Last => "the mesh of last returns has buildings and dense vegetation in it",
+        let what = match mesh {
+            MeshOf::Surface(Surface::All | Surface::Ground) => {
+                "the mesh of all points has vegetation and buildings in it"
+            }
+            MeshOf::Surface(Surface::First) => "the mesh of first returns has roofs and tree tops in it",
+            MeshOf::Surface(Surface::Last) => "the mesh of last returns has buildings and dense vegetation in it",
+            MeshOf::Chosen => "the mesh is that of the classes and returns that [input] chooses",
         };
-        let remedy = if ground > 0 { "; surface = \"ground\" makes bare earth" } else { "" };
-        Some(format!("{} ground: {mesh}{remedy}", percent(ground, points)))
+        let remedy = if ground > 0 && mesh != MeshOf::Chosen { "; surface = \"ground\" makes bare earth" } else { "" };
+        Some(format!("{} ground: {what}{remedy}", percent(ground, points)))
     }
 
     /// As [`SurfaceShares::sentence`], for the points of a sample.
-    pub fn estimate(&self, surface: Surface) -> Option<String> {
-        let sentence = self.sentence(surface)?;
+    pub fn estimate(&self, mesh: MeshOf) -> Option<String> {
+        let sentence = self.sentence(mesh)?;
         let is_share = sentence.starts_with(|c: char| c.is_ascii_digit());
         Some(if is_share { format!("about {sentence}") } else { sentence })
     }
@@ -176,7 +191,8 @@ mod tests {
 
     #[test]
     fn sentences_say_what_the_mesh_is() {
-        let say = |classes: &[(u8, u64)], surface| shares(classes).sentence(surface).unwrap_or_default();
+        let say =
+            |classes: &[(u8, u64)], surface| shares(classes).sentence(MeshOf::Surface(surface)).unwrap_or_default();
         assert_eq!(
             say(&[(2, 60), (9, 2), (5, 38), (7, 1000)], Surface::All),
             "62 % ground: the mesh of all points has vegetation and buildings in it; surface = \"ground\" makes bare earth"
@@ -188,6 +204,9 @@ mod tests {
         let none = say(&[(5, 3), (1, 4)], Surface::All);
         assert!(none.starts_with("0 % ground") && !none.contains("bare earth"), "{none}");
         assert_eq!(say(&[(7, 5)], Surface::All), "");
+        let chosen = shares(&[(2, 1), (40, 1)]).sentence(MeshOf::Chosen).unwrap();
+        assert_eq!(chosen, "50 % ground: the mesh is that of the classes and returns that [input] chooses");
+        assert!(shares(&[(2, 1)]).sentence(MeshOf::Chosen).unwrap().contains("bare earth"));
     }
 
     #[test]

@@ -22,18 +22,28 @@ pub fn no_ground(options: &InputOptions, counts: &PointCounts) -> Option<String>
     ))
 }
 
+/// Returns what to do about a text without a column of classes, if the job wants the ground.
+pub(crate) fn no_column_of_classes() -> String {
+    format!(
+        "surface = \"ground\" takes classes 2, 8, 9 and 20, and the file has no column of classes: find the ground first, for example with \
+         `{CLASSIFY}`, name the column with `columns` under [input.csv], or leave `surface` out to make the mesh of all points"
+    )
+}
+
 /// Returns a warning about records that do not say clearly which return they are.
 pub fn unclear_returns(options: &InputOptions, counts: &PointCounts) -> Option<String> {
-    let kept = match options.kept_returns() {
+    let rule = match options.kept_returns() {
         KeptReturns::All => return None,
         KeptReturns::First => "one without a number counts as the first",
         KeptReturns::Last => "one counts as the last if its number is not less than that of the returns",
         KeptReturns::Numbers(_) => "one without a number counts as number 1",
     };
-    let all: u64 = counts.classes.values().sum();
+    // Points of other classes are not looked at.
+    let kept = options.kept_classes();
+    let all: u64 = counts.classes.iter().filter(|&(&class, _)| kept[class as usize]).map(|(_, count)| count).sum();
     (counts.unclear_returns > 0).then(|| {
         format!(
-            "{} of the points ({} of {all}) do not say clearly which return of how many they are: {kept}",
+            "{} of the points ({} of {all}) do not say clearly which return of how many they are: {rule}",
             percent(counts.unclear_returns, all),
             counts.unclear_returns
         )
@@ -76,7 +86,7 @@ mod tests {
             what.contains("have class 1 (unclassified, 95 %), class 5 (high vegetation, 4 %), class 70 (1 %): find"),
             "{what}"
         );
-        assert!(what.contains("pdal translate in.laz out.laz smrf"), "{what}");
+        assert!(what.contains(CLASSIFY), "{what}");
         let many: Vec<(u8, u64)> = (30..60).map(|class| (class, 1)).collect();
         assert!(no_ground(&ground, &counts(&many, 0)).unwrap().contains("class 37 (3 %), 22 more: find"));
         assert_eq!(no_ground(&ground, &counts(&[(1, 95), (20, 1)], 0)), None);
@@ -99,6 +109,9 @@ mod tests {
             let warning = unclear_returns(&options(text), &counts).unwrap();
             assert!(warning.contains(words), "{warning}");
         }
+        // Points of other classes have no say.
+        let of_class = unclear_returns(&options("surface = \"first\"\nclasses = [2]"), &counts).unwrap();
+        assert!(of_class.starts_with("100 % of the points (50 of 50)"), "{of_class}");
         let clear = PointCounts { unclear_returns: 0, ..counts };
         assert_eq!(unclear_returns(&options("surface = \"first\""), &clear), None);
     }

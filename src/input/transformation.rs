@@ -1,5 +1,6 @@
 //! What a job transforms, for its report.
 
+use crate::input::crs::transform::between::{CrsTransform, DatumNote};
 use crate::input::source::Source;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -46,13 +47,17 @@ fn transformation(source: &Source) -> Option<Transformation> {
     if way.is_none() && transform.heights.is_none() {
         return None;
     }
-    let alike = way.as_ref().and_then(|way| way.datums_taken_alike());
+    let datums = match way.as_ref().map(CrsTransform::datums) {
+        Some(DatumNote::TakenAlike(names)) => format!("{names}, taken for one: up to a metre or two apart"),
+        Some(DatumNote::Assumed(names)) => format!("{names}, assumed to be one: they are not both named"),
+        Some(DatumNote::Same) | None => "the same".into(),
+    };
     Some(Transformation {
         inputs: 1,
         from: transform.from.label(),
         to: transform.to.label(),
         way: way.as_ref().map_or("x and y stay".into(), |way| way.way()),
-        datums: alike.map_or("the same".into(), |names| format!("{names}, taken for one: up to a metre or two apart")),
+        datums,
         heights: transform.heights.map_or("the same".into(), |factor| format!("times {factor}, on the same datum")),
         step: source.axes[0].scale.to_string(),
         formulas_m: if way.is_some() { FORMULAS } else { 0.0 },

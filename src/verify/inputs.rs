@@ -107,16 +107,7 @@ impl<'a> Inputs<'a> {
         // The proof trusts no index of a file.
         let choice = RowChoice { use_index: false, ..choice };
         // As the job opened it: what it did not want has no say about the digits of a text.
-        let open_again = |file: &PathBuf| {
-            let mut source = open_chosen(file, &text, &choice)?;
-            if reading.outliers_left_out {
-                source.leave_out_outliers(&choice)?;
-                if source.has_frequent_outliers() && !reading.even_among_few {
-                    source.keep_outliers();
-                }
-            }
-            Ok(source)
-        };
+        let open_again = |file: &PathBuf| open_chosen(file, &text, &choice);
         let is_skipped = |file: &Path| {
             let place = |path: &Path| path.canonicalize().ok();
             // Files of other machines have no place here.
@@ -128,6 +119,13 @@ impl<'a> Inputs<'a> {
         let mut sources = used.map(open_again).collect::<Result<Vec<Source>>>()?;
         if let Some(input) = &facts.input {
             transform_sources(&mut sources, input, &mut Warnings::default())?;
+        }
+        // As the job did it: after the transform, which says how far degrees reach.
+        for source in sources.iter_mut().filter(|_| reading.outliers_left_out) {
+            source.leave_out_outliers(&choice)?;
+            if source.has_frequent_outliers() && !reading.even_among_few {
+                source.keep_outliers();
+            }
         }
         Ok(Inputs { facts, lattice: lattice_of(facts, extras)?, sources, files })
     }

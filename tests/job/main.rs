@@ -34,6 +34,7 @@ mod copyright;
 mod cutting;
 mod decimals;
 mod doubtful_systems;
+mod doubtful_transforms;
 mod globe;
 mod hard_shapes;
 mod height_offsets;

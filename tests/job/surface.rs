@@ -137,7 +137,7 @@ fn a_cloud_without_ground_is_refused_with_what_it_has_and_what_to_do() {
     let words = [
         "no point is left",
         "class 1 (unclassified, 75 %), class 5 (high vegetation, 25 %)",
-        "pdal translate in.laz out.laz smrf",
+        "pdal translate in.laz out.laz smrf --writers.las.forward=all",
     ];
     for file in [&las, &csv] {
         let job = Job::on(&[file]).with("input", "surface = \"ground\"");
@@ -150,7 +150,10 @@ fn a_cloud_without_ground_is_refused_with_what_it_has_and_what_to_do() {
     // Among files with ground, one without is named.
     let good = folder.path().join("good.las");
     fs::write(&good, cloud(class).las()).unwrap();
-    let report = Job::on(&[&las, &good]).with("input", "surface = \"ground\"").report();
+    let mixed = Job::on(&[&las, &good]).with("input", "surface = \"ground\"");
+    let check = mixed.run_with(&["check"]).succeeded().out;
+    assert!(check.contains("a.las: no point is left of it: surface"), "{check}");
+    let report = mixed.report();
     let warnings = report["warnings"].to_string();
     assert!(
         warnings.contains("a.las: no point is left of it: surface") && !warnings.contains("good.las: no"),
@@ -168,7 +171,11 @@ fn a_text_that_lacks_the_columns_of_a_surface_is_refused() {
         Job::on(&[&path]).with("input", surface).run()
     };
     let plain = rows("x,y,z", "");
-    run(&plain, "surface = \"ground\"").refused(2, &["surface = \"ground\"", "no column of classes", "a.csv"]);
+    run(&plain, "surface = \"ground\"").refused(
+        3,
+        &["a.csv", "surface = \"ground\"", "no column of classes", "pdal translate", "leave `surface` out"],
+    );
+    run(&plain, "classes = [2]").refused(2, &["classes = [2]", "no column of classes", "a.csv", "have 0 in it"]);
     run(&plain, "surface = \"first\"").refused(2, &["return_number", "a.csv"]);
     run(&plain, "returns = [2]").refused(2, &["return_number"]);
     let numbers = rows("x,y,z,return_number", ",1");

@@ -16,8 +16,13 @@ fn crs(code: &str) -> Crs {
     *NamedCrs::try_from(code.to_string()).unwrap().crs
 }
 
+/// Returns the way from one system to another.
+pub(crate) fn way(from: &str, to: &str) -> CrsTransform {
+    CrsTransform::between(&crs(from), &crs(to), DatumRule::Strict).unwrap()
+}
+
 /// Returns places around the middle with heights, as if a survey had measured them: `share` of three.
-fn places(share: usize) -> Vec<[f64; 3]> {
+pub(crate) fn places(share: usize) -> Vec<[f64; 3]> {
     let place = |i: usize| {
         let (column, row) = ((i % 40) as f64, (i / 40) as f64);
         let wobble = ((i * 7919) % 101) as f64 / 101.0;
@@ -32,7 +37,7 @@ fn places(share: usize) -> Vec<[f64; 3]> {
 
 /// Writes the places as a text in this system, with so many decimals.
 pub(crate) fn survey(folder: &Path, name: &str, system: &str, share: usize, decimals: usize) -> PathBuf {
-    let way = CrsTransform::between(&crs("EPSG:4269"), &crs(system), DatumRule::Strict).unwrap();
+    let way = way("EPSG:4269", system);
     let mut rows = String::from(if system == "EPSG:4269" { "lat,lon,z\n" } else { "x,y,z\n" });
     for [longitude, latitude, z] in places(share) {
         let [x, y] = way.apply([longitude, latitude]).unwrap();
@@ -58,7 +63,7 @@ pub(crate) fn las(folder: &Path, survey: &Path, name: &str, records: &[(u16, Vec
     las_of(folder, &rows, name, records, scale)
 }
 
-fn las_of(folder: &Path, rows: &[[f64; 3]], name: &str, records: &[(u16, Vec<u8>)], scale: f64) -> PathBuf {
+pub(crate) fn las_of(folder: &Path, rows: &[[f64; 3]], name: &str, records: &[(u16, Vec<u8>)], scale: f64) -> PathBuf {
     let mut bytes = vec![0u8; 227];
     bytes[..4].copy_from_slice(b"LASF");
     (bytes[24], bytes[25]) = (1, 2);
@@ -130,7 +135,7 @@ fn two_zones_and_degrees_give_one_mesh() {
 fn the_mesh_of_several_systems_is_that_of_one_survey() {
     let folder = tempfile::tempdir().unwrap();
     let report = in_zone_15(&three_surveys(folder.path())).report();
-    let way = CrsTransform::between(&crs("EPSG:4269"), &crs("EPSG:26915"), DatumRule::Strict).unwrap();
+    let way = way("EPSG:4269", "EPSG:26915");
     let rows = (0..3).flat_map(places).map(|[x, y, z]| {
         let [x, y] = way.apply([x, y]).unwrap();
         format!("{x:.3},{y:.3},{z:.2}\n")
@@ -229,8 +234,7 @@ fn points_beyond_the_area_of_a_projection_are_counted() {
     let few = job("max_malformed_fraction = 0.01").report();
     assert_eq!((number(&few["points"]["malformed"]), number(&few["points"]["kept"])), (1, rows.len() as u64 - 1));
     // Bounds are in the system of the job.
-    let [x, y] =
-        CrsTransform::between(&crs("EPSG:4269"), &crs("EPSG:26915"), DatumRule::Strict).unwrap().apply(MIDDLE).unwrap();
+    let [x, y] = way("EPSG:4269", "EPSG:26915").apply(MIDDLE).unwrap();
     let bounds = format!("bounds = [{}, {}, {x}, {y}]", x - 25.0, y - 25.0);
     let within = job(&bounds).report();
     let (kept, out) = (number(&within["points"]["kept"]), number(&within["points"]["out_of_bounds"]));
@@ -241,7 +245,7 @@ fn points_beyond_the_area_of_a_projection_are_counted() {
 fn feet_and_metres_become_one_unit() {
     let folder = tempfile::tempdir().unwrap();
     let all: Vec<[f64; 3]> = places(0);
-    let way = CrsTransform::between(&crs("EPSG:4269"), &crs("EPSG:26915"), DatumRule::Strict).unwrap();
+    let way = way("EPSG:4269", "EPSG:26915");
     let metres: Vec<[f64; 3]> =
         all.iter().map(|&[x, y, z]| way.apply([x, y]).map(|[x, y]| [x, y, z]).unwrap()).collect();
     let feet: Vec<[f64; 3]> = metres.iter().map(|place| place.map(|value| value * 3937.0 / 1200.0)).collect();

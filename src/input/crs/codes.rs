@@ -4,6 +4,10 @@
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
+/// Systems whose map has the formulas of a sphere, though their datum has an ellipsoid (EPSG method 1027). Version 1 of the text cannot say
+/// that: what it says is kilometres beside them.
+pub(crate) const SPHERICAL_ON_ELLIPSOID: [u32; 3] = [3973, 3974, 9311];
+
 /// A code and well-known text on each line.
 const SYSTEMS: &str = include_str!("codes/systems.tsv");
 
@@ -29,15 +33,23 @@ pub(crate) fn text_of_code(code: u32) -> Option<&'static str> {
 
 /// Returns the well-known text of the geographic system whose datum has this code; of several, that with the least code.
 pub(crate) fn text_of_datum(datum: u32) -> Option<&'static str> {
-    // The datum's code stands behind its ellipsoid.
-    let authority = format!(r#",AUTHORITY["EPSG","{datum}"]],PRIMEM["#);
-    let mut texts = (1..=u32::from(u16::MAX)).filter_map(text_of_code);
-    texts.find(|text| text.starts_with("GEOGCS[") && text.contains(&authority))
+    static DATUMS: OnceLock<HashMap<u32, &'static str>> = OnceLock::new();
+    let known = DATUMS.get_or_init(|| {
+        let texts = (1..=u32::from(u16::MAX)).rev().filter_map(text_of_code);
+        texts.filter_map(|text| Some((datum_of_text(text)?, text))).collect()
+    });
+    known.get(&datum).copied()
+}
+
+/// Returns the code of the datum of a geographic system. It stands behind the ellipsoid.
+fn datum_of_text(text: &str) -> Option<u32> {
+    let (datum, _) = text.strip_prefix("GEOGCS[")?.split_once(r#""]],PRIMEM["#)?;
+    datum.rsplit_once(r#",AUTHORITY["EPSG",""#)?.1.parse().ok()
 }
 
 /// Returns the definition for PROJ.4 of an EPSG code; `None` for a code of which only the text is known.
 pub(crate) fn proj4_of_code(code: u32) -> Option<&'static str> {
-    if systems().contains_key(&code) {
+    if systems().contains_key(&code) || SPHERICAL_ON_ELLIPSOID.contains(&code) {
         return None;
     }
     Some(crs_definitions::from_code(u16::try_from(code).ok()?)?.proj4)
@@ -107,6 +119,15 @@ mod tests {
             assert!(text.starts_with("PROJCS") || text.starts_with("GEOGCS"), "EPSG:{code} has the plane EPSG:{plane}");
             assert!(whole.vertical_system.is_some() && whole.difference_to_code().is_none(), "EPSG:{code}");
         }
+    }
+
+    #[test]
+    fn the_code_of_a_datum_gives_its_first_system() {
+        for (datum, name) in [(6326, "GEOGCS[\"WGS 84\""), (6269, "GEOGCS[\"NAD83\""), (1116, "GEOGCS[\"NAD83(2011)\"")]
+        {
+            assert!(text_of_datum(datum).unwrap().starts_with(name), "{datum}: {:?}", text_of_datum(datum));
+        }
+        assert_eq!(text_of_datum(1), None);
     }
 
     #[test]

@@ -13,8 +13,38 @@ const MERIDIAN_TOLERANCE: f64 = 1e-6;
 const SHIFT_TOLERANCES: [f64; 7] = [0.02, 0.02, 0.02, 5e-4, 5e-4, 5e-4, 3e-3];
 
 /// The datums that agree with WGS 84 to a metre or two, by the beginning of their comparable names.
-const CLOSE_TO_WGS84: [&str; 11] =
-    ["wgs84", "nad83", "etrs89", "rgf93", "gda94", "gda2020", "jgd2000", "jgd2011", "itrf", "sweref99", "nzgd2000"];
+const CLOSE_TO_WGS84: [&str; 16] = [
+    "wgs84",
+    "nad83",
+    "etrs89",
+    "rgf93",
+    "gda94",
+    "gda2020",
+    "jgd2000",
+    "jgd2011",
+    "itrf",
+    "sweref99",
+    "nzgd2000",
+    "sirgas2000",
+    "cgcs2000",
+    "kgd2002",
+    "hartebeesthoek94",
+    "regven",
+];
+
+/// Those of them that do not agree with each other: in 2011 an earthquake moved the north of Japan by up to five metres.
+const APART: (&str, &str) = ("jgd2000", "jgd2011");
+
+/// How sure it is that two things are one. That nothing says they differ is not enough.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Sameness {
+    /// They are known to be the same.
+    Known,
+    /// Nothing says that they differ, and at least one of them does not say what it is.
+    Assumed,
+    /// They differ, or cannot be compared. The text says in what.
+    Refuted(String),
+}
 
 /// A datum.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,6 +93,13 @@ impl Datum {
         self.names().any(|name| CLOSE_TO_WGS84.iter().any(|close| name.starts_with(close)))
     }
 
+    /// Returns whether the two agree to a metre or two, because each agrees with WGS 84.
+    pub(crate) fn is_close_to(&self, other: &Datum) -> bool {
+        let is_apart = |own: &Datum, others: &Datum| own.is_named_like(APART.0) && others.is_named_like(APART.1);
+        let all_close = self.is_close_to_wgs84() && other.is_close_to_wgs84();
+        all_close && !is_apart(self, other) && !is_apart(other, self)
+    }
+
     /// Returns its name; `None` if its ellipsoid is all that is known.
     pub(crate) fn name(&self) -> Option<&str> {
         self.label.as_deref()
@@ -92,8 +129,25 @@ impl Datum {
         self.system.iter().chain(&self.datum)
     }
 
-    /// Says in what the two differ. Names that differ are a difference: no parameter tells NAD83 from WGS 84. A datum without a name
-    /// is known by its ellipsoid and its way to WGS 84 only.
+    /// Returns how sure it is that the two are one, wherever longitudes begin. A datum without a name may be any that has its ellipsoid,
+    /// unless one of the two has a way to WGS 84 that the other one lacks.
+    pub(crate) fn sameness(&self, other: &Datum) -> Sameness {
+        let is_nameless = |datum: &Datum| datum.names().next().is_none();
+        let lacks_name = is_nameless(self) || is_nameless(other);
+        if let Some(difference) = self.difference_in_frame(other) {
+            return Sameness::Refuted(difference);
+        }
+        if lacks_name && let Some(difference) = self.difference_in_lone_shift(other) {
+            return Sameness::Refuted(difference);
+        }
+        let has_both_shifts = self.shift.is_some() && other.shift.is_some();
+        let has_both_shapes = self.ellipsoid.is_some() && other.ellipsoid.is_some();
+        let are_told_by_shift = is_nameless(self) && is_nameless(other) && has_both_shifts && has_both_shapes;
+        if lacks_name && !are_told_by_shift { Sameness::Assumed } else { Sameness::Known }
+    }
+
+    /// Says in what the two differ; nothing if nothing says it. Names that differ are a difference: no parameter tells NAD83 from WGS 84. A
+    /// datum without a name is known by its ellipsoid and its way to WGS 84 only.
     pub(crate) fn difference(&self, other: &Datum) -> Option<String> {
         if (self.meridian - other.meridian).abs() > MERIDIAN_TOLERANCE {
             return Some(format!("the prime meridian ({}, {} degrees)", self.meridian, other.meridian));
@@ -125,6 +179,13 @@ impl Datum {
         let nameless = self.names().chain(other.names()).next().is_none();
         let differs = (0..7).any(|k| (own[k] - others[k]).abs() > SHIFT_TOLERANCES[k]);
         (nameless && differs).then(|| format!("the shift of the datum to WGS 84 ({own:?}, {others:?})"))
+    }
+
+    /// Says whether the ways to WGS 84 differ where at least one of the datums has no name. One that says no way has none.
+    fn difference_in_lone_shift(&self, other: &Datum) -> Option<String> {
+        let [own, others] = [self, other].map(|datum| datum.shift.unwrap_or_default());
+        let differs = (0..7).any(|k| (own[k] - others[k]).abs() > SHIFT_TOLERANCES[k]);
+        differs.then(|| format!("the shift of the datum to WGS 84 ({own:?}, {others:?})"))
     }
 
     fn has_other_name(&self, other: &Datum) -> bool {
@@ -199,6 +260,46 @@ mod tests {
         assert_eq!(nameless(first).difference(&nameless("")), None);
         // A datum that has a name has many ways.
         assert_eq!(named("ED50", "ED50", first).difference(&named("ED50", "ED50", second)), None);
+    }
+
+    #[test]
+    fn a_datum_without_a_name_is_assumed_to_be_another_one_only_if_no_shift_speaks_against_it() {
+        let nameless = |shift: &str| named("unknown", "Unknown based on International 1924 ellipsoid", shift);
+        let ed50 = |shift: &str| named("ED50", "European_Datum_1950", shift);
+        let (first, other, zero) = (",TOWGS84[-87,-98,-121]", ",TOWGS84[-199.87,74.79,246.62]", ",TOWGS84[0,0,0]");
+        assert_eq!(ed50(first).sameness(&ed50(other)), Sameness::Known);
+        assert_eq!(nameless(first).sameness(&nameless(first)), Sameness::Known);
+        for (own, others) in [("", ""), ("", zero), (first, first)] {
+            assert_eq!(nameless(own).sameness(&ed50(others)), Sameness::Assumed, "{own} {others}");
+            assert_eq!(ed50(others).sameness(&nameless(own)), Sameness::Assumed, "{own} {others}");
+        }
+        for (own, others) in [(first, ""), ("", first), (first, zero), (first, other)] {
+            let found = nameless(own).sameness(&ed50(others));
+            assert!(matches!(&found, Sameness::Refuted(what) if what.contains("shift")), "{own} {others} {found:?}");
+        }
+        // Without a transformation, what a file does not say agrees with anything.
+        assert_eq!(nameless(first).difference(&ed50("")), None);
+    }
+
+    #[test]
+    fn datums_that_agree_with_wgs84_agree_with_each_other_but_for_an_earthquake() {
+        let close = |own: &str, other: &str| named(own, own, "").is_close_to(&named(other, other, ""));
+        for name in [
+            "SIRGAS 2000",
+            "D_China_2000",
+            "CGCS2000",
+            "Korea 2000",
+            "Hartebeesthoek94",
+            "D_Hartebeesthoek_1994",
+            "REGVEN",
+            "China Geodetic Coordinate System 2000",
+            "JGD2011",
+            "JGD2000",
+        ] {
+            assert!(close(name, "WGS 84"), "{name}");
+        }
+        assert!(!close("JGD2000", "JGD2011") && !close("JGD2011", "JGD2000"));
+        assert!(!close("SIRGAS 1995", "WGS 84"));
     }
 
     #[test]

@@ -34,7 +34,7 @@ const NO_NAMES: [&str; 5] = ["unknown", "unnamed", "notspecified", "undefined", 
 
 /// Names that share nothing with those of the EPSG dataset, mostly ESRI's, and the names there; also names that the dataset has given up.
 /// They are in order.
-const ALIASES: [(&str, &str); 56] = [
+const ALIASES: [(&str, &str); 58] = [
     ("anna165", "cocosislands65"),
     ("astro52", "marcusisland52"),
     ("australian66", "agd66"),
@@ -49,6 +49,8 @@ const ALIASES: [(&str, &str); 56] = [
     ("camparea", "campareaastro"),
     ("canton66", "phoenixislands66"),
     ("chathamisland71", "chathamislands71"),
+    ("china2000", "cgcs2000"),
+    ("chinageodeticcoordinatesystem2000", "cgcs2000"),
     ("corregoalegre", "corregoalegre7072"),
     ("dealulpiscului33", "dealulpiscului30"),
     ("dos714", "astrodos71"),

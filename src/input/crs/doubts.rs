@@ -20,7 +20,10 @@ impl Crs {
         let vertical = unit(&VERTICAL).map(|what| format!("its unit of heights is {what}"));
         // A code says all that the text lacks.
         let system = if self.form().is_none() { find(text, &PROJECTED) } else { None };
-        let projection = system.and_then(|system| Projection::read(&system)?.err());
+        let projection = system.and_then(|system| match Projection::read(&system) {
+            None => Some("it names no projection".into()),
+            Some(read) => read.err(),
+        });
         let projection = projection.map(|what| format!("nobody can tell where its coordinates are: {what}"));
         let code = self.difference_to_code().map(|what| {
             let code = self.epsg.unwrap_or_default();

@@ -1,7 +1,7 @@
 //! The form in which systems are compared: what decides where a place has its coordinates, and no name of the system.
 
 use crate::input::crs::codes::text_of_code;
-use crate::input::crs::datum::Datum;
+use crate::input::crs::datum::{Datum, Sameness};
 use crate::input::crs::projection::Projection;
 use crate::input::crs::wkt::{BASE, GEOGRAPHIC, PROJECTED, bound_shift, find};
 
@@ -55,6 +55,18 @@ impl CrsForm {
     pub(crate) fn differences(&self, other: &CrsForm) -> Vec<String> {
         let datum = self.datum.as_ref().zip(other.datum.as_ref()).and_then(|(own, others)| own.difference(others));
         datum.into_iter().chain(self.difference_in_projection(other)).collect()
+    }
+
+    /// Returns how sure it is that the two have their places in common, where [`CrsForm::differences`] finds nothing. A text without a
+    /// datum may have any.
+    pub(crate) fn sameness(&self, other: &CrsForm) -> Sameness {
+        if self.projection.is_some() != other.projection.is_some() {
+            return Sameness::Refuted("the kind of coordinates".into());
+        }
+        match (&self.datum, &other.datum) {
+            (Some(own), Some(others)) => own.sameness(others),
+            _ => Sameness::Assumed,
+        }
     }
 
     /// As [`CrsForm::differences`] of two systems with the same code. The dataset renames its datums, so that names do not count.

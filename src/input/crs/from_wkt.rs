@@ -4,9 +4,7 @@ use crate::input::crs::codes::text_of_code;
 use crate::input::crs::system::{Crs, CrsKind};
 use crate::input::crs::unit::Unit;
 use crate::input::crs::vertical::VerticalSystem;
-use crate::input::crs::wkt::{
-    GEOGRAPHIC, LOCAL, PROJECTED, VERTICAL, WktNode, is_compound, length, parts, unbound, units,
-};
+use crate::input::crs::wkt::{GEOGRAPHIC, LOCAL, PROJECTED, VERTICAL, WktNode, is_compound, length, parts, units};
 
 /// Returns the system of an EPSG code; `None` for a code that is not in the list of known ones.
 pub(crate) fn from_epsg(code: u32) -> Option<Crs> {
@@ -20,14 +18,14 @@ pub(crate) fn from_epsg(code: u32) -> Option<Crs> {
 fn code_of_plane(roots: &[WktNode]) -> Option<u32> {
     let [whole] = roots else { return None };
     let known = WktNode::parse_all(text_of_code(whole.epsg()?)?)?;
-    let parts = known.iter().flat_map(parts).map(unbound);
-    parts.into_iter().find(|part| PROJECTED.contains(&part.keyword.as_str()))?.epsg()
+    let mut parts = known.iter().flat_map(parts);
+    parts.find(|part| PROJECTED.contains(&part.keyword.as_str()))?.epsg()
 }
 
 /// Returns the system that `text` describes; `None` if it is not the well-known text of a coordinate reference system.
 pub(crate) fn parse(text: &str) -> Option<Crs> {
     let roots = WktNode::parse_all(text)?;
-    let parts: Vec<&WktNode> = roots.iter().flat_map(parts).map(unbound).collect();
+    let parts: Vec<&WktNode> = roots.iter().flat_map(parts).collect();
     let find = |keywords: &[&str]| parts.iter().find(|part| keywords.contains(&part.keyword.as_str())).copied();
     let horizontal = find(&PROJECTED).or_else(|| find(&GEOGRAPHIC)).or_else(|| find(&LOCAL))?;
     let kind = kind(horizontal);
@@ -38,11 +36,13 @@ pub(crate) fn parse(text: &str) -> Option<Crs> {
         wkt: Some(text.trim_end_matches(['\0', ' ', '\n', '\r', '\t']).to_string()),
         epsg: horizontal.epsg().or_else(|| code_of_plane(&roots)),
         kind,
-        horizontal: unit.map_or(Unit::Unknown, |unit| match kind {
-            CrsKind::Geographic => angle(unit),
-            _ => Unit::from_metres(length(unit)),
-        }),
-        vertical: unit_of_height,
+        horizontal: match (kind, unit) {
+            // A text may leave out the degree.
+            (CrsKind::Geographic, unit) => unit.map_or(Unit::Degree, angle),
+            (_, unit) => Unit::from_metres(unit.and_then(length)),
+        },
+        // Writers round a foot in several ways, which are one.
+        vertical: Unit::from_metres(unit_of_height).metres_per_unit(),
         vertical_system: vertical.and_then(VerticalSystem::of),
         name: horizontal.text(0).map(str::to_string).filter(|name| !name.is_empty()),
         unread_keys: Vec::new(),
@@ -93,6 +93,49 @@ mod tests {
         assert_eq!(parse(r#"GEOGCS["WGS 84",UNIT["degree",0.0174532925199433]]"#).unwrap().horizontal, Unit::Degree);
         let bound = r#"BOUNDCRS[SOURCECRS[PROJCRS["P",LENGTHUNIT["metre",1]]],TARGETCRS[GEOGCRS["W"]]]"#;
         assert_eq!(parse(bound).unwrap().horizontal, Unit::Metre);
+    }
+
+    #[test]
+    fn a_geographic_system_without_a_unit_is_in_degrees_and_feet_are_the_same_however_rounded() {
+        let bare =
+            r#"GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0]]"#;
+        assert_eq!(parse(bare).unwrap().horizontal, Unit::Degree);
+        let feet = |size: &str| {
+            let text =
+                format!(r#"COMPD_CS["c",{bare},VERT_CS["v",VERT_DATUM["d",2005],UNIT["US survey foot",{size}]]]"#);
+            parse(&text).unwrap().vertical
+        };
+        for size in ["0.304800609601219", "0.3048006096012192", "0.3048006096"] {
+            assert_eq!(feet(size), Some(Unit::US_FOOT), "{size}");
+        }
+        assert_eq!((feet("0.3048"), feet("0.5")), (Some(0.3048), Some(0.5)));
+    }
+
+    #[test]
+    fn a_compound_system_may_be_bound_as_a_whole_or_in_parts() {
+        let datum = r#"DATUM["unknown",ELLIPSOID["e",6378388,297]]"#;
+        let base = format!(
+            r#"GEOGCRS["g",{datum},CS[ellipsoidal,2],AXIS["lat",north],AXIS["lon",east],ANGLEUNIT["degree",0.0174532925199433]]"#
+        );
+        let height = r#"VERTCRS["h",VDATUM["v"],CS[vertical,1],AXIS["up",up],LENGTHUNIT["metre",1]]"#;
+        let bound = |source: &str| {
+            format!(
+                r#"BOUNDCRS[SOURCECRS[{source}],TARGETCRS[GEOGCRS["WGS 84"]],ABRIDGEDTRANSFORMATION["t",METHOD["Geocentric translations"],
+                PARAMETER["x",-87],PARAMETER["y",-98],PARAMETER["z",-121]]]"#
+            )
+        };
+        let whole = bound(&format!(r#"COMPOUNDCRS["c",{base},{height}]"#));
+        let parts = format!(r#"COMPOUNDCRS["c",{},{height}]"#, bound(&base));
+        for text in [whole, parts] {
+            let crs = parse(&text).unwrap();
+            assert_eq!(
+                (crs.name.as_deref(), crs.kind, crs.vertical),
+                (Some("g"), CrsKind::Geographic, Some(1.0)),
+                "{text}"
+            );
+            let shift = crate::input::crs::wkt::bound_shift(&text);
+            assert_eq!(shift.map(|shift| shift[0]), Some(-87.0), "{text}");
+        }
     }
 
     #[test]

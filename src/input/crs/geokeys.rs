@@ -56,9 +56,14 @@ impl GeoKeys {
         self.entry(key).filter(|(record, ..)| *record == 0).map(|(_, _, value)| value).filter(|value| *value != 0)
     }
 
+    /// Returns whether `key` is there.
+    pub(crate) fn has(&self, key: u16) -> bool {
+        self.entry(key).is_some()
+    }
+
     /// Returns whether `key` is there, but has no finite floating-point value.
     pub(crate) fn lacks_double(&self, key: u16) -> bool {
-        self.entry(key).is_some() && self.double(key).is_none()
+        self.has(key) && self.double(key).is_none()
     }
 
     /// Returns the finite floating-point value of `key`.

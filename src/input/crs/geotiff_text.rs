@@ -5,7 +5,7 @@ use crate::input::crs::codes::{text_of_code, text_of_datum};
 use crate::input::crs::geokeys::{GeoKeys, USER_DEFINED};
 use crate::input::crs::geotiff_esri as esri;
 use crate::input::crs::projection::Projection;
-use crate::input::crs::wkt::{PROJECTED, WktNode, degrees, find};
+use crate::input::crs::wkt::{GEOGRAPHIC, PROJECTED, WktNode, degrees, find};
 use std::ops::RangeInclusive;
 
 const GEOGRAPHIC_TYPE: u16 = 2048;
@@ -45,8 +45,11 @@ const SCALE: Parameter = (&[3092, 3093], "scale_factor");
 const EASTING: Parameter = (&[3082, 3086, 3090], "false_easting");
 const NORTHING: Parameter = (&[3083, 3087, 3091], "false_northing");
 
+/// A method: its number in GeoTIFF, its name in well-known text, and its parameters.
+type Method = (u16, &'static str, &'static [Parameter]);
+
 /// The methods by their numbers in GeoTIFF. No parameter of them has a name that is not here.
-const METHODS: [(u16, &str, &[Parameter]); 7] = [
+const METHODS: [Method; 7] = [
     (1, "Transverse_Mercator", &[LATITUDE, LONGITUDE, SCALE, EASTING, NORTHING]),
     (7, "Mercator_1SP", &[LATITUDE, LONGITUDE, SCALE, EASTING, NORTHING]),
     (8, "Lambert_Conformal_Conic_2SP", &[FIRST, SECOND, LATITUDE, LONGITUDE, EASTING, NORTHING]),
@@ -55,6 +58,9 @@ const METHODS: [(u16, &str, &[Parameter]); 7] = [
     (11, "Albers_Conic_Equal_Area", &[FIRST, SECOND, LATITUDE, LONGITUDE, EASTING, NORTHING]),
     (16, "Oblique_Stereographic", &[LATITUDE, LONGITUDE, SCALE, EASTING, NORTHING]),
 ];
+
+/// The variant of Mercator's projection that is true to scale at a parallel. Both variants have one number.
+const MERCATOR_2SP: Method = (7, "Mercator_2SP", &[FIRST, LATITUDE, LONGITUDE, SCALE, EASTING, NORTHING]);
 
 /// Returns the text of the system that the keys define, with x and y in a unit of so many `metres`; `None` if they do not say all of
 /// it.
@@ -128,8 +134,11 @@ fn written_out(keys: &GeoKeys, unit: f64) -> Option<String> {
     Some(text)
 }
 
-fn method(keys: &GeoKeys) -> Option<&'static (u16, &'static str, &'static [Parameter])> {
+fn method(keys: &GeoKeys) -> Option<&'static Method> {
     let method = keys.code(METHOD)?;
+    if method == MERCATOR_2SP.0 && FIRST.0.iter().any(|key| keys.has(*key)) {
+        return Some(&MERCATOR_2SP);
+    }
     METHODS.iter().find(|(number, ..)| *number == method)
 }
 
@@ -158,6 +167,21 @@ pub(crate) fn problem(keys: &GeoKeys) -> Option<String> {
     }
     let system = find(&format!(r#"PROJCS["",{}]"#, written_out(keys, 1.0)?), &PROJECTED)?;
     Projection::read(&system)?.err()
+}
+
+/// Returns the text of the system of longitude and latitude that the keys define, with its angles in degrees; `None` if they do not say all
+/// of it, or have another unit.
+pub(crate) fn geographic(keys: &GeoKeys) -> Option<String> {
+    base(keys).filter(|_| angle(keys) == Some(1.0))
+}
+
+/// Says what keeps longitude and latitude from being known, if the keys give them in another unit than the text of their code does.
+pub(crate) fn problem_of_angles(keys: &GeoKeys, of_code: Option<&str>) -> Option<String> {
+    let code = keys.code(ANGULAR_UNIT)?;
+    let known = of_code.and_then(|text| find(text, &GEOGRAPHIC));
+    let wanted = known.map_or(1.0, |system| degrees(system.unit()));
+    let is_same = angle(keys).is_some_and(|angle| (angle - wanted).abs() < 1e-9);
+    (!is_same).then(|| format!("GeoTIFF key {ANGULAR_UNIT}, the unit of longitude and latitude, has the code {code}, which is not the degree"))
 }
 
 /// Returns the geographic system: that of the code, that of the datum's code, or one with the ellipsoid that the keys give.

@@ -12,10 +12,13 @@ pub(crate) mod from_wkt;
 pub(crate) mod geokeys;
 pub(crate) mod geotiff;
 pub(crate) mod geotiff_esri;
+#[cfg(test)]
+mod geotiff_tests;
 pub(crate) mod geotiff_text;
 pub(crate) mod plausible;
 pub(crate) mod proj4;
 pub(crate) mod projection;
+pub(crate) mod projection_names;
 pub(crate) mod system;
 pub(crate) mod target;
 pub(crate) mod transform;

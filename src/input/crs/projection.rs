@@ -1,144 +1,11 @@
 //! Map projections in one comparable form, whatever text describes them: the method by its name in PROJ.4, angles in degrees, lengths
 //! in metres.
 
+use crate::input::crs::codes::SPHERICAL_ON_ELLIPSOID;
 use crate::input::crs::datum::Datum;
+use crate::input::crs::projection_names::{ORIGINS, PARALLELS, WEB_MERCATOR, method, parameter};
 use crate::input::crs::wkt::{BASE, WktNode, comparable_name, degrees};
 use std::collections::BTreeMap;
-
-/// The parameters of projections: the name in well-known text, as `comparable_name` spells it, and the name in PROJ.4.
-const PARAMETERS: [(&str, &str); 45] = [
-    ("centralmeridian", "lon_0"),
-    ("longitudeofcenter", "lon_0"),
-    ("longitudeoforigin", "lon_0"),
-    ("longitudeofnaturalorigin", "lon_0"),
-    ("longitudeoffalseorigin", "lon_0"),
-    ("longitudeofprojectioncentre", "lon_0"),
-    ("longitudeofprojectioncenter", "lon_0"),
-    ("straightverticallongitudefrompole", "lon_0"),
-    ("latitudeoforigin", "lat_0"),
-    ("latitudeofcenter", "lat_0"),
-    ("latitudeofnaturalorigin", "lat_0"),
-    ("latitudeoffalseorigin", "lat_0"),
-    ("latitudeofprojectioncentre", "lat_0"),
-    ("latitudeofprojectioncenter", "lat_0"),
-    ("standardparallel1", "lat_1"),
-    ("latitudeof1ststandardparallel", "lat_1"),
-    ("latitudeofstandardparallel", "lat_1"),
-    ("standardparallel2", "lat_2"),
-    ("latitudeof2ndstandardparallel", "lat_2"),
-    ("scalefactor", "k_0"),
-    ("scalefactoratnaturalorigin", "k_0"),
-    ("scalefactoratprojectioncentre", "k_0"),
-    ("scalefactoronpseudostandardparallel", "k_0"),
-    ("scalefactoroninitialline", "k_0"),
-    ("scalefactorontheinitialline", "k_0"),
-    ("falseeasting", "x_0"),
-    ("eastingatfalseorigin", "x_0"),
-    ("eastingatprojectioncentre", "x_0"),
-    ("falsenorthing", "y_0"),
-    ("northingatfalseorigin", "y_0"),
-    ("northingatprojectioncentre", "y_0"),
-    ("azimuth", "alpha"),
-    ("azimuthofinitialline", "alpha"),
-    ("azimuthattheprojectioncentre", "alpha"),
-    ("azimuthatprojectioncentre", "alpha"),
-    ("colatitudeofconeaxis", "alpha"),
-    ("rectifiedgridangle", "gamma"),
-    ("anglefromrectifiedtoskewgrid", "gamma"),
-    ("xyplanerotation", "gamma"),
-    ("pseudostandardparallel1", "lat_pseudo"),
-    ("latitudeofpseudostandardparallel", "lat_pseudo"),
-    ("height", "h_0"),
-    ("projectionplaneoriginheight", "h_0"),
-    ("xscale", "x_scale"),
-    ("yscale", "y_scale"),
-];
-
-/// The methods of projections: the name in well-known text and the name in PROJ.4, or one of that kind.
-const METHODS: [(&str, &str); 52] = [
-    ("transversemercator", "tmerc"),
-    ("transversemercator3d", "tmerc"),
-    ("gausskruger", "tmerc"),
-    ("lambertconformalconic2sp", "lcc"),
-    ("lambertconicconformal2sp", "lcc"),
-    ("lambertconformalconic2spbelgium", "lcc belgium"),
-    ("lambertconicconformal2spbelgium", "lcc belgium"),
-    ("lambertconformalconic1sp", "lcc"),
-    ("lambertconicconformal1sp", "lcc"),
-    ("lambertconformalconic", "lcc"),
-    ("albersconicequalarea", "aea"),
-    ("albersequalarea", "aea"),
-    ("albers", "aea"),
-    ("lambertazimuthalequalarea", "laea"),
-    ("obliquestereographic", "sterea"),
-    ("doublestereographic", "sterea"),
-    ("polarstereographic", "stere"),
-    ("polarstereographicvarianta", "stere"),
-    ("polarstereographicvariantb", "stere"),
-    ("stereographicnorthpole", "stere"),
-    ("stereographicsouthpole", "stere"),
-    ("stereographic", "stere"),
-    ("mercator", "merc"),
-    ("mercator1sp", "merc"),
-    ("mercator2sp", "merc"),
-    ("mercatorvarianta", "merc"),
-    ("mercatorvariantb", "merc"),
-    ("mercatorauxiliarysphere", WEB_MERCATOR),
-    ("popularvisualisationpseudomercator", WEB_MERCATOR),
-    ("transversemercatorsouthorientated", "tmerc south"),
-    ("cassinisoldner", "cass"),
-    ("cassini", "cass"),
-    ("krovak", "krovak"),
-    ("krovaknorthorientated", "krovak"),
-    ("polyconic", "poly"),
-    ("americanpolyconic", "poly"),
-    ("hotineobliquemercatorvarianta", "omerc origin"),
-    ("hotineobliquemercator", "omerc origin"),
-    ("hotineobliquemercatorazimuthnaturalorigin", "omerc origin"),
-    ("rectifiedskeworthomorphicnaturalorigin", "omerc origin"),
-    ("hotineobliquemercatorazimuthcenter", "omerc centre"),
-    ("hotineobliquemercatorvariantb", "omerc centre"),
-    ("obliquemercator", "omerc centre"),
-    ("rectifiedskeworthomorphiccenter", "omerc centre"),
-    ("localorthographic", "ortho"),
-    ("local", "ortho"),
-    ("colombiaurban", "col_urban"),
-    ("igacplanocartesiano", "col_urban"),
-    ("equirectangular", "eqc"),
-    ("equidistantcylindrical", "eqc"),
-    ("cylindricalequalarea", "cea"),
-    ("lambertcylindricalequalarea", "cea"),
-];
-
-/// The parameters without which nobody knows where a method has its origin. One of the names in each inner list is enough. False eastings and northings are 0 and scales are 1 where a text leaves them out, as the standard says.
-const ORIGINS: [(&str, &[&[&str]]); 14] = [
-    ("tmerc", &[&["lon_0"], &["lat_0"]]),
-    ("tmerc south", &[&["lon_0"], &["lat_0"]]),
-    ("lcc", &[&["lon_0"], &["lat_0"]]),
-    ("aea", &[&["lon_0"], &["lat_0"], &["lat_1"]]),
-    ("laea", &[&["lon_0"], &["lat_0"]]),
-    ("sterea", &[&["lon_0"], &["lat_0"]]),
-    ("stere", &[&["lon_0"], &["lat_0", "lat_1"]]),
-    ("merc", &[&["lon_0"]]),
-    (WEB_MERCATOR, &[&["lon_0"]]),
-    ("cass", &[&["lon_0"], &["lat_0"]]),
-    ("poly", &[&["lon_0"], &["lat_0"]]),
-    ("krovak", &[&["lon_0"], &["lat_0"]]),
-    ("omerc origin", &[&["lon_0"], &["lat_0"], &["alpha"]]),
-    ("omerc centre", &[&["lon_0"], &["lat_0"], &["alpha"]]),
-];
-
-/// The parameters that methods need whose names say that they have them.
-const PARALLELS: [(&str, &[&str]); 5] = [
-    ("lambertconformalconic2sp", &["lat_1", "lat_2"]),
-    ("lambertconicconformal2sp", &["lat_1", "lat_2"]),
-    ("mercator2sp", &["lat_1"]),
-    ("mercatorvariantb", &["lat_1"]),
-    ("polarstereographicvariantb", &["lat_1"]),
-];
-
-/// The Mercator projection of web maps: of the ellipsoid's coordinates, but by the formulas of the sphere.
-pub(crate) const WEB_MERCATOR: &str = "webmerc";
 
 /// What must agree for two systems to be the same: to within a centimetre. Writers round parameters by less, and two systems that
 /// are in use differ by more.
@@ -147,18 +14,6 @@ const LENGTH_TOLERANCE: f64 = 0.01;
 const ANGLE_TOLERANCE: f64 = 1e-7;
 /// A centimetre at a thousand kilometres from the origin.
 const SCALE_TOLERANCE: f64 = 1e-8;
-
-/// Returns the PROJ.4 name of a method of well-known text.
-fn method(name: &str) -> Option<&'static str> {
-    let name = comparable_name(name);
-    METHODS.iter().find(|(long, _)| *long == name).map(|(_, short)| *short)
-}
-
-/// Returns the PROJ.4 name of a parameter of well-known text.
-fn parameter(name: &str) -> Option<&'static str> {
-    let name = comparable_name(name);
-    PARAMETERS.iter().find(|(long, _)| *long == name).map(|(_, short)| *short)
-}
 
 /// A projection. Parameters that have their default are left out.
 #[derive(Clone, Debug, PartialEq)]
@@ -170,6 +25,8 @@ pub(crate) struct Projection {
     parameters: BTreeMap<String, f64>,
     /// Whether x grows to the west; `None` if the text does not say.
     westward: Option<bool>,
+    /// Whether y grows to the south; likewise.
+    southward: Option<bool>,
 }
 
 impl Projection {
@@ -184,15 +41,20 @@ impl Projection {
         let conversion = system.child(&["CONVERSION", "DERIVINGCONVERSION"]).unwrap_or(system);
         let name = conversion.child(&["PROJECTION", "METHOD"])?.text(0)?;
         let comparable = comparable_name(name);
-        let method = if is_web_mercator(system) { WEB_MERCATOR } else { method(name).unwrap_or(&comparable) };
+        let method = match method(name).unwrap_or(&comparable) {
+            "merc" if is_web_mercator(system) => WEB_MERCATOR,
+            "laea" if system.epsg().is_some_and(|code| SPHERICAL_ON_ELLIPSOID.contains(&code)) => "laea spherical",
+            method => method,
+        };
         let parameters =
             parameters(system, conversion).and_then(|parameters| match missing(name, method, &parameters) {
                 Some(missing) => Err(format!("it does not give {missing}")),
-                None => Ok(parameters),
+                None => contradiction(method, &parameters, system).map_or(Ok(parameters), Err),
             });
         Some(parameters.map(|parameters| {
             let (method, label) = (method.to_string(), name.to_string());
-            let mut projection = Projection { method, label, parameters, westward: westward(system) };
+            let [westward, southward] = directions(system);
+            let mut projection = Projection { method, label, parameters, westward, southward };
             projection.normalise(system);
             projection
         }))
@@ -217,10 +79,8 @@ impl Projection {
                 }
             }
             "merc" => {
-                if let Some(parallel) = parameters.remove("lat_1") {
-                    let base = system.child(&BASE).and_then(Datum::of);
-                    let scale = scale_at(parallel, base.and_then(|base| base.ellipsoid()));
-                    parameters.entry("k_0".into()).or_insert(scale);
+                if let Some(parallel) = parameters.remove("lat_1").filter(|parallel| *parallel != 0.0) {
+                    parameters.insert("k_0".into(), scale_of(parallel, system));
                 }
             }
             "omerc origin" | "omerc centre" => {
@@ -239,22 +99,35 @@ impl Projection {
                     |name: &str| ["lat_0", "lon_0", "k_0", "x_0", "y_0"].contains(&name) || TURN.contains(&name);
                 parameters.retain(|name, _| is_own(name) && !is_said(name));
             }
-            WEB_MERCATOR => parameters.retain(|name, _| ["lon_0", "x_0", "y_0"].contains(&name.as_str())),
+            // Writers name parameters of Mercator's other variants, which say nothing as long as they have their defaults.
+            WEB_MERCATOR => parameters
+                .retain(|name, value| ["lon_0", "x_0", "y_0"].contains(&name.as_str()) || *value != default(name)),
             _ => {}
         }
     }
 
     /// Returns the projection in the words of PROJ.4, without ellipsoid and unit; `None` if these parameters are not all that it needs.
     pub(crate) fn proj4(&self) -> Option<String> {
-        const METHODS: [&str; 4] = ["tmerc", "lcc", "aea", "laea"];
+        const METHODS: [&str; 7] = ["tmerc", "lcc", "aea", "laea", "merc", "sterea", "stere"];
         const NAMES: [&str; 7] = ["lon_0", "lat_0", "lat_1", "lat_2", "k_0", "x_0", "y_0"];
         let known = METHODS.contains(&self.method.as_str())
             && self.parameters.keys().all(|name| NAMES.contains(&name.as_str()));
-        if !known || self.westward == Some(true) {
+        let (latitude, scale) = (self.value("lat_0"), self.value("k_0"));
+        let is_odd = match self.method.as_str() {
+            // Variants with another origin differ in where they count from.
+            "merc" => latitude != 0.0,
+            "stere" => latitude.abs() != 90.0 && scale != 1.0,
+            _ => false,
+        };
+        if !known || is_odd || self.has_other_axes() {
             return None;
         }
-        let words = self.parameters.iter().map(|(name, value)| format!(" +{name}={value}"));
-        Some(format!("+proj={}{}", self.method, words.collect::<String>()))
+        let word = |(name, value): (&String, &f64)| match (self.method.as_str(), name.as_str()) {
+            ("stere", "lat_0") => pole_of(*value, self.is_named_polar()),
+            _ => Some(format!(" +{name}={value}")),
+        };
+        let words = self.parameters.iter().map(word).collect::<Option<String>>()?;
+        Some(format!("+proj={}{words}", self.method))
     }
 
     /// Returns the name of the method in PROJ.4, or one of that kind.
@@ -272,9 +145,9 @@ impl Projection {
         comparable_name(&self.label).contains("pol")
     }
 
-    /// Returns whether x grows to the west.
-    pub(crate) fn is_westward(&self) -> bool {
-        self.westward == Some(true)
+    /// Returns whether x grows to the west, or y to the south.
+    pub(crate) fn has_other_axes(&self) -> bool {
+        self.westward == Some(true) || self.southward == Some(true)
     }
 
     /// Returns the names of the parameters that are not left out.
@@ -297,7 +170,8 @@ impl Projection {
         if self.method != other.method {
             return Some(format!("the projection ({}, {})", self.label, other.label));
         }
-        if matches!((self.westward, other.westward), (Some(own), Some(others)) if own != others) {
+        let differs = |own: Option<bool>, others: Option<bool>| own.is_some() && others.is_some() && own != others;
+        if differs(self.westward, other.westward) || differs(self.southward, other.southward) {
             return Some("the direction of the axes".into());
         }
         let mut names: Vec<&String> = self.parameters.keys().chain(other.parameters.keys()).collect();
@@ -358,17 +232,50 @@ fn missing(name: &str, method: &str, parameters: &BTreeMap<String, f64>) -> Opti
     Some(format!("the {}", long_name(lost)))
 }
 
-/// Version 1 of the text has no name for this method. Writers add its definition for PROJ.4.
-fn is_web_mercator(system: &WktNode) -> bool {
-    let extension = system.child(&["EXTENSION"]).and_then(|extension| extension.text(1));
-    extension.is_some_and(|text| text.contains("+proj=merc") && text.contains("+b=6378137"))
+/// Says which two parameters contradict each other, if two do.
+fn contradiction(method: &str, parameters: &BTreeMap<String, f64>, system: &WktNode) -> Option<String> {
+    if let Some(words) = extension(system).filter(|_| method == "merc" && is_spherical_extension(system)) {
+        return Some(format!("its extension ({words}) is a projection that is not known here"));
+    }
+    let (parallel, scale) = (parameters.get("lat_1")?, parameters.get("k_0")?);
+    // Some writers give a scale of 1 beside the parallel, which says the scale.
+    let is_idle = *parallel == 0.0 || *scale == 1.0;
+    let agree = || (scale_of(*parallel, system) - scale).abs() <= SCALE_TOLERANCE;
+    (method == "merc" && !is_idle && !agree())
+        .then(|| format!("its standard parallel {parallel} and its scale factor {scale} contradict each other"))
 }
 
-fn westward(system: &WktNode) -> Option<bool> {
+/// Returns the definition for PROJ.4 that some writers add to a text of version 1.
+fn extension(system: &WktNode) -> Option<&str> {
+    system.child(&["EXTENSION"]).and_then(|extension| extension.text(1))
+}
+
+/// Returns whether the definition that a writer has added is a Mercator projection by the formulas of the earth's sphere.
+fn is_spherical_extension(system: &WktNode) -> bool {
+    extension(system).is_some_and(|text| text.contains("+proj=merc") && text.contains("+b=6378137"))
+}
+
+/// Version 1 of the text has no name for this method. Writers add its definition for PROJ.4.
+fn is_web_mercator(system: &WktNode) -> bool {
+    let word = |name: &str| {
+        let words = extension(system).unwrap_or_default().split_whitespace();
+        words.filter_map(|word| word.strip_prefix('+')?.split_once('=')).find(|(known, _)| *known == name)
+    };
+    let is = |name: &str, wanted: f64| word(name).is_none_or(|(_, value)| value.parse() == Ok(wanted));
+    let is_true_to_scale = is("k", 1.0) && is("k_0", 1.0) && is("lat_ts", 0.0);
+    is_spherical_extension(system) && is("a", 6_378_137.0) && is("b", 6_378_137.0) && is_true_to_scale
+}
+
+/// Returns whether x grows to the west, and whether y grows to the south; `None` where the text does not say. Around a pole, both axes
+/// may go the same way, each along another meridian: that says neither.
+fn directions(system: &WktNode) -> [Option<bool>; 2] {
     let axes = system.children().filter(|child| child.keyword == "AXIS");
-    let directions: Vec<String> = axes.filter_map(|axis| axis.text(1)).map(str::to_ascii_lowercase).collect();
-    let has = |direction: &str| directions.iter().any(|known| known == direction);
-    (has("east") || has("west")).then(|| has("west"))
+    let words: Vec<String> = axes.filter_map(|axis| axis.text(1)).map(str::to_ascii_lowercase).collect();
+    let has = |direction: &str| words.iter().any(|known| known == direction);
+    if !has("east") && !has("west") {
+        return [None, None];
+    }
+    [Some(has("west")), (has("north") || has("south")).then(|| has("south"))]
 }
 
 /// Returns whether x grows to the west by the scales and the turn of the axes in ESRI's texts of Krovak's projection; `None` if they are
@@ -382,10 +289,25 @@ fn default(name: &str) -> f64 {
     if is_scale(name) { 1.0 } else { 0.0 }
 }
 
+/// Returns the words for the origin of a polar stereographic projection: the pole itself, or the one next to the parallel that is true to
+/// scale; `None` if it is around another place.
+fn pole_of(latitude: f64, is_named_polar: bool) -> Option<String> {
+    if latitude.abs() == 90.0 {
+        return Some(format!(" +lat_0={latitude}"));
+    }
+    let pole = if latitude < 0.0 { -90 } else { 90 };
+    (is_named_polar && latitude != 0.0).then(|| format!(" +lat_0={pole} +lat_ts={latitude}"))
+}
+
 /// Returns how far two values of a parameter are apart. A whole turn is nothing.
 fn distance(name: &str, own: f64, other: f64) -> f64 {
     let apart = (own - other).abs();
     if is_length(name) || is_scale(name) { apart } else { (apart % 360.0).min(360.0 - apart % 360.0) }
+}
+
+/// Returns the scale at the equator of a Mercator projection that is true to scale at the parallel, on the ellipsoid of `system`.
+fn scale_of(parallel: f64, system: &WktNode) -> f64 {
+    scale_at(parallel, system.child(&BASE).and_then(Datum::of).and_then(|base| base.ellipsoid()))
 }
 
 /// Returns the scale at the equator of a Mercator projection that is true to scale at the parallel.

@@ -3,15 +3,19 @@
 use serde::{Deserialize, Serialize};
 
 use crate::input::crs::codes::text_of_code;
+use crate::input::crs::datum::Sameness;
 use crate::input::crs::form::CrsForm;
 use crate::input::crs::proj4;
 use crate::input::crs::projection::projection_values;
-use crate::input::crs::unit::Unit;
+use crate::input::crs::unit::{Unit, same_length};
 use crate::input::crs::vertical::VerticalSystem;
 use crate::input::crs::wkt::{PROJECTED, comparable_name, find};
 
 /// The name that version 2 of the text gives to an axis of heights above the ellipsoid.
 const ELLIPSOIDAL_AXIS: &str = "axis[\"ellipsoidal height";
+
+/// What stands for a name where the writer knew none, as `comparable_name` spells it.
+const NO_NAMES: [&str; 6] = ["", "unknown", "unnamed", "undefined", "userdefined", "none"];
 
 /// What a file says about its coordinate reference system.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -53,7 +57,7 @@ pub enum CrsKind {
 }
 
 impl CrsKind {
-    fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             CrsKind::Projected => "projected",
             CrsKind::Geographic => "longitude and latitude",
@@ -75,14 +79,22 @@ impl Crs {
         self.vertical.or(self.metres_per_unit()).unwrap_or(1.0)
     }
 
-    /// Returns whether it says where the coordinates are. One that knows only a unit does not.
+    /// Returns whether it says where the coordinates are. One that knows only a unit does not, nor does a name such as "unknown".
     pub fn is_named(&self) -> bool {
-        self.epsg.is_some() || self.name.is_some() || self.wkt.is_some() || !self.unread_keys.is_empty()
+        self.epsg.is_some() || !self.unread_keys.is_empty() || self.own_name().is_some() || self.form().is_some()
     }
 
-    /// Returns whether nothing says that the two systems differ.
-    pub fn same_as(&self, other: &Crs) -> bool {
+    /// Returns whether nothing says that the two systems differ. That does not mean that they are the same: see [`Crs::sameness`].
+    #[cfg(test)]
+    pub(crate) fn same_as(&self, other: &Crs) -> bool {
         self.differences(other).is_empty()
+    }
+
+    /// Returns how sure it is that x and y mean the same place in both.
+    pub(crate) fn sameness(&self, other: &Crs) -> Sameness {
+        let plane = |crs: &Crs| Crs { vertical: None, vertical_system: None, ..crs.clone() };
+        let [own, others] = [self, other].map(plane);
+        ComparableCrs::of(&own).sameness(&ComparableCrs::of(&others))
     }
 
     /// Returns in what the two systems differ, or in what they cannot be compared, in words that a sentence can name. What one file
@@ -94,13 +106,31 @@ impl Crs {
         ComparableCrs::of(self).differences(&ComparableCrs::of(other))
     }
 
+    /// Returns the names of the datums of two systems, for a sentence.
+    pub(crate) fn names_of_datums(&self, other: &Crs) -> String {
+        let name = |crs: &Crs| crs.form().and_then(|form| form.datum_name().map(str::to_string));
+        let [own, others] = [self, other].map(|crs| name(crs).unwrap_or_else(|| "an unnamed datum".into()));
+        format!("{own} and {others}")
+    }
+
+    /// Says why a system has no form by which it could be compared or computed.
+    pub(crate) fn why_without_form(&self) -> String {
+        match (self.epsg, self.kind) {
+            (Some(code), _) if text_of_code(code).is_none() => format!("EPSG:{code} is not in the list of known codes"),
+            (_, CrsKind::Geographic) => {
+                format!("{} does not say its datum or its unit of angles in a way that can be read", self.label())
+            }
+            _ => format!("{} does not say its projection in a way that can be read", self.label()),
+        }
+    }
+
     fn differences_besides_place(&self, other: &Crs) -> Vec<String> {
         let mut found = Vec::new();
         if !same_unit(self.horizontal, other.horizontal) {
             found.push(format!("the unit of x and y ({}, {})", self.horizontal.name(), other.horizontal.name()));
         }
         if let (Some(own), Some(others)) = (self.vertical, other.vertical)
-            && !close(own, others)
+            && !same_length(own, others)
         {
             let name = |metres| Unit::from_metres(Some(metres)).name();
             found.push(format!("the unit of height ({}, {})", name(own), name(others)));
@@ -116,9 +146,13 @@ impl Crs {
         text.or_else(|| CrsForm::of_code(self.epsg?))
     }
 
+    /// Returns its comparable name, if that is the name of something.
+    fn own_name(&self) -> Option<String> {
+        self.name.as_deref().map(comparable_name).filter(|name| !NO_NAMES.contains(&name.as_str()))
+    }
+
     fn comparable_name(&self) -> Option<String> {
-        let name =
-            self.name.as_deref().map(comparable_name).filter(|name| !["unknown", "unnamed"].contains(&name.as_str()));
+        let name = self.own_name();
         let keys = || (!self.unread_keys.is_empty()).then(|| self.unread_keys.concat());
         name.or_else(|| self.epsg.map(|code| format!("epsg{code}"))).or_else(keys)
     }
@@ -209,6 +243,26 @@ impl<'a> ComparableCrs<'a> {
         found
     }
 
+    /// Returns how sure it is that x, y and the units are the same in both. Of a system without a comparable form, only an equal
+    /// code, an equal name or equal keys tell that.
+    fn sameness(&self, other: &ComparableCrs) -> Sameness {
+        let differences = self.differences(other);
+        if !differences.is_empty() {
+            return Sameness::Refuted(differences.join(" and "));
+        }
+        let (own, others) = (self.crs, other.crs);
+        if own.epsg.is_some() && own.epsg == others.epsg {
+            return Sameness::Known;
+        }
+        let same_name = own.own_name().is_some() && own.own_name() == others.own_name();
+        match (&self.form, &other.form) {
+            (Some(own), Some(others)) => own.sameness(others),
+            (None, None) if !own.unread().is_empty() && own.unread() == others.unread() => Sameness::Known,
+            _ if same_name => Sameness::Known,
+            (form, _) => Sameness::Refuted(if form.is_none() { own } else { others }.why_without_form()),
+        }
+    }
+
     fn differences_in_place(&self, other: &ComparableCrs) -> Vec<String> {
         let same_code = self.crs.epsg.is_some() && self.crs.epsg == other.crs.epsg;
         match (&self.form, &other.form) {
@@ -223,10 +277,7 @@ impl<'a> ComparableCrs<'a> {
     fn doubt(&self, other: &ComparableCrs) -> Option<String> {
         let (own, others) = (self.crs, other.crs);
         let unclear = if self.form.is_none() { own } else { others };
-        let reason = match unclear.epsg {
-            Some(code) if text_of_code(code).is_none() => format!("EPSG:{code} is not in the list of known codes"),
-            _ => format!("{} does not say its projection in a way that can be read", unclear.label()),
-        };
+        let reason = unclear.why_without_form();
         if let (Some(code), Some(other_code)) = (own.epsg, others.epsg) {
             return Some(format!("the code (EPSG:{code}, EPSG:{other_code}), and {reason}"));
         }
@@ -253,13 +304,9 @@ impl<'a> ComparableCrs<'a> {
 fn same_unit(own: Unit, others: Unit) -> bool {
     match (own, others) {
         (Unit::Unknown, _) | (_, Unit::Unknown) => true,
-        (Unit::Other(own), Unit::Other(others)) => close(own, others),
+        (Unit::Other(own), Unit::Other(others)) => same_length(own, others),
         (own, others) => own == others,
     }
-}
-
-fn close(own: f64, others: f64) -> bool {
-    (own - others).abs() <= 1e-8 * own.abs().max(others.abs()).max(1e-3)
 }
 
 #[cfg(test)]

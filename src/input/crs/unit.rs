@@ -64,6 +64,11 @@ impl Unit {
     }
 }
 
+/// Returns whether two lengths of units in metres are the same, however their writers rounded them.
+pub(crate) fn same_length(own: f64, other: f64) -> bool {
+    (own - other).abs() <= 1e-8 * own.abs().max(other.abs()).max(1e-3)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -96,6 +96,11 @@ impl VerticalSystem {
 
     /// Says in what the datums differ, or in what they cannot be compared; a system that says nothing agrees with all.
     pub(crate) fn difference(&self, other: &VerticalSystem) -> Option<String> {
+        self.difference_in_datum(other).or_else(|| self.difference_in_direction(other))
+    }
+
+    /// As [`VerticalSystem::difference`], of the datums alone.
+    pub(crate) fn difference_in_datum(&self, other: &VerticalSystem) -> Option<String> {
         let (own, others) = (self.keys(), other.keys());
         let (label, other_label) = (self.label(), other.label());
         if !own.is_empty() && !others.is_empty() && !own.iter().any(|key| others.contains(key)) {
@@ -105,6 +110,12 @@ impl VerticalSystem {
             });
             return Some(format!("the datum of heights ({label}, {other_label}{doubt})"));
         }
+        None
+    }
+
+    /// As [`VerticalSystem::difference`], of the directions alone.
+    pub(crate) fn difference_in_direction(&self, other: &VerticalSystem) -> Option<String> {
+        let (label, other_label) = (self.label(), other.label());
         let differs = matches!((self.is_depth(), other.is_depth()), (Some(own), Some(others)) if own != others);
         differs.then(|| format!("the direction of heights, one of which are depths ({label}, {other_label})"))
     }

@@ -151,7 +151,7 @@ const UNITS: [&str; 3] = ["UNIT", "LENGTHUNIT", "ANGLEUNIT"];
 /// Returns the first part of the system in `text` that has one of these keywords.
 pub(crate) fn find(text: &str, keywords: &[&str]) -> Option<WktNode> {
     let roots = WktNode::parse_all(text)?;
-    let mut parts = roots.iter().flat_map(parts).map(unbound);
+    let mut parts = roots.iter().flat_map(parts);
     parts.find(|part| keywords.contains(&part.keyword.as_str())).cloned()
 }
 
@@ -160,13 +160,15 @@ pub(crate) fn is_compound(text: &str) -> bool {
     COMPOUND.iter().any(|keyword| text.trim_start().starts_with(keyword))
 }
 
-/// Returns the parts of a compound system, or the system itself.
+/// Returns the parts of a compound system, or the system itself. Of bound systems these are the source systems, whether the whole is bound or
+/// its parts are.
 pub(crate) fn parts(node: &WktNode) -> Vec<&WktNode> {
-    if COMPOUND.contains(&node.keyword.as_str()) { node.children().collect() } else { vec![node] }
+    let node = unbound(node);
+    if COMPOUND.contains(&node.keyword.as_str()) { node.children().map(unbound).collect() } else { vec![node] }
 }
 
 /// Returns the source system of a bound system, or the system itself.
-pub(crate) fn unbound(node: &WktNode) -> &WktNode {
+fn unbound(node: &WktNode) -> &WktNode {
     if node.keyword != "BOUNDCRS" {
         return node;
     }
@@ -176,7 +178,8 @@ pub(crate) fn unbound(node: &WktNode) -> &WktNode {
 /// Returns the seven parameters of the way to WGS 84 of the first bound system in `text`, if it gives them.
 pub(crate) fn bound_shift(text: &str) -> Option<[f64; 7]> {
     let roots = WktNode::parse_all(text)?;
-    let bound = roots.iter().flat_map(parts).find(|part| part.keyword == "BOUNDCRS")?;
+    let is_bound = |node: &&WktNode| node.keyword == "BOUNDCRS";
+    let bound = roots.iter().flat_map(|root| std::iter::once(root).chain(root.children())).find(is_bound)?;
     let transformation = bound.child(&["ABRIDGEDTRANSFORMATION"])?;
     let method = transformation.child(&["METHOD"]).and_then(|method| method.text(0)).map(comparable_name);
     // The one method turns the points, the other one the axes.

@@ -64,9 +64,12 @@ pub struct PointCounts {
 }
 
 impl PointCounts {
-    /// Counts `count` points that were handed on as dropped at breaklines.
-    pub(crate) fn drop_at_breaklines(&mut self, count: u64) {
+    /// Counts points that were handed on as dropped at breaklines: how many, and how many of them on the ground and without a class that
+    /// says something.
+    pub(crate) fn drop_at_breaklines(&mut self, [count, ground, unclassified]: [u64; 3]) {
         self.kept -= count;
+        self.ground -= ground;
+        self.unclassified -= unclassified;
         self.at_breaklines += count;
     }
 

@@ -35,6 +35,11 @@ impl Source {
         self.transform.as_ref().map_or(&self.crs, |transform| &transform.own.crs)
     }
 
+    /// Returns how many units of the file's heights one unit of its x and y is long: of degrees many, and else one.
+    pub(super) fn steps_of_height(&self) -> f64 {
+        self.transform.as_ref().map_or(1.0, |transform| transform.steps_of_height())
+    }
+
     /// Returns what the file itself says of its coordinates, for a transform of them.
     pub(crate) fn own_coordinates(&self) -> OwnCoordinates {
         OwnCoordinates { axes: self.axes, grid: self.grid, min: self.min, max: self.max, crs: self.crs.clone() }

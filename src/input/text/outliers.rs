@@ -65,21 +65,23 @@ pub(crate) struct Middle {
 }
 
 impl Middle {
-    /// Returns how far a row lies from the centre, on the axis on which it is farthest.
-    pub(crate) fn distance_to(&self, numbers: &[Number; 3]) -> f64 {
+    /// Returns how far a row lies from the centre, on the axis on which it is farthest, in the unit of z. One of x and y has so many `steps`
+    /// of z.
+    pub(crate) fn distance_to(&self, numbers: &[Number; 3], steps: f64) -> f64 {
         let distance = |axis: usize| (numbers[axis].value() - self.centre[axis]).abs();
-        distance(0).max(distance(1)).max(distance(2))
+        (distance(0).max(distance(1)) * steps).max(distance(2))
     }
 }
 
-/// Returns the box outside which a row is an outlier, given the box of the [middle] of the rows; `None` if that is a point.
-pub(crate) fn plausible_box(middle: &RowBox) -> Option<RowBox> {
+/// Returns the box outside which a row is an outlier, given the box of the [middle] of the rows; `None` if that is a point. One of x and y is
+/// as long as so many `steps` of z: 1 for lengths, and for degrees their length on the ground.
+pub(crate) fn plausible_box(middle: &RowBox, steps: f64) -> Option<RowBox> {
     // A strip or a plane is narrow on one axis, which says nothing about how far its rows may lie apart there.
     let size = |axis: usize| middle.max[axis] - middle.min[axis];
-    let widest = size(0).max(size(1)).max(size(2));
-    let margin = FAR * widest;
-    (margin > 0.0)
-        .then(|| RowBox { min: middle.min.map(|low| low - margin), max: middle.max.map(|high| high + margin) })
+    let widest = (size(0).max(size(1)) * steps).max(size(2));
+    let margins = [FAR * widest / steps, FAR * widest / steps, FAR * widest];
+    let beside = |corner: [f64; 3], side: f64| std::array::from_fn(|axis| corner[axis] + side * margins[axis]);
+    (widest > 0.0).then(|| RowBox { min: beside(middle.min, -1.0), max: beside(middle.max, 1.0) })
 }
 
 /// Returns where most rows lie, by a sample of the wanted rows in these chunks, given as byte ranges; `None` if

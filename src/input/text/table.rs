@@ -204,10 +204,15 @@ impl TextTable {
     }
 
     /// Finds the rows that lie so far from all others that they are mistakes, if they are few, and leaves them out: decoding counts them
-    /// as malformed. Returns how many there are.
-    pub(crate) fn leave_out_outliers(&mut self, file: &RandomAccessFile, choice: &RowChoice) -> Result<Outliers> {
+    /// as malformed. Returns how many there are. One of x and y is as long as so many `steps` of z.
+    pub(crate) fn leave_out_outliers(
+        &mut self,
+        file: &RandomAccessFile,
+        choice: &RowChoice,
+        steps: f64,
+    ) -> Result<Outliers> {
         let Some(bounds) = self.wanted.bounds else { return Ok(Outliers::default()) };
-        let plausible = self.middle(file, choice)?.and_then(|middle| plausible_box(&middle.bounds));
+        let plausible = self.middle(file, choice)?.and_then(|middle| plausible_box(&middle.bounds, steps));
         let Some(within) = plausible.filter(|plausible| !plausible.holds_box(&bounds)) else {
             return Ok(Outliers::default());
         };
@@ -232,8 +237,13 @@ impl TextTable {
     }
 
     /// Returns the wanted row that lies farthest from the middle of all, and the line on which it stands; `None` if there are too few rows
-    /// to tell.
-    pub(crate) fn farthest_row(&self, file: &RandomAccessFile, choice: &RowChoice) -> Result<Option<FarRow>> {
+    /// to tell. One of x and y is as long as so many `steps` of z.
+    pub(crate) fn farthest_row(
+        &self,
+        file: &RandomAccessFile,
+        choice: &RowChoice,
+        steps: f64,
+    ) -> Result<Option<FarRow>> {
         let Some(middle) = self.middle(file, choice)? else { return Ok(None) };
         let mut farthest: Option<FarRow> = None;
         for (chunk, start) in self.chunks.iter().enumerate() {
@@ -246,7 +256,7 @@ impl TextTable {
                     && reader.read(line).is_ok()
                     && wanted.has(&reader)
                 {
-                    let distance = middle.distance_to(&reader.numbers);
+                    let distance = middle.distance_to(&reader.numbers, steps);
                     if farthest.as_ref().is_none_or(|known| distance > known.distance) {
                         farthest = Some(FarRow { distance, line: start.line + index, text: shown(line) });
                     }

@@ -3,6 +3,7 @@
 use crate::Result;
 use crate::breaklines::{BreaklineSite, Breaklines, FeatureKind};
 use crate::input::Point;
+use crate::input::surface::SurfaceShares;
 use crate::job::partition::bucket_sorter::BucketSorter;
 use crate::job::partition::buckets::Buckets;
 use crate::job::partition::grid::Grid;
@@ -16,25 +17,30 @@ const SLICE: usize = 1 << 12;
 pub(crate) struct BreaklineFilter<'a> {
     lines: Option<&'a Breaklines>,
     kept: Vec<Point>,
-    dropped: u64,
+    dropped: SurfaceShares,
 }
 
 impl<'a> BreaklineFilter<'a> {
     pub(crate) fn new(lines: Option<&'a Breaklines>) -> BreaklineFilter<'a> {
-        BreaklineFilter { lines, kept: Vec::new(), dropped: 0 }
+        BreaklineFilter { lines, kept: Vec::new(), dropped: SurfaceShares::default() }
     }
 
     /// Returns the points that stay, in their order.
     pub(crate) fn without_dropped<'b>(&'b mut self, points: &'b [Point]) -> &'b [Point] {
         let Some(lines) = self.lines else { return points };
         self.kept.clear();
-        self.kept.extend(points.iter().filter(|point| !lines.drops(point.position)));
-        self.dropped += (points.len() - self.kept.len()) as u64;
+        for point in points {
+            if lines.drops(point.position) {
+                self.dropped.add_wanted(point.class);
+            } else {
+                self.kept.push(*point);
+            }
+        }
         &self.kept
     }
 
-    /// Returns how many points were left out.
-    pub(crate) fn dropped(&self) -> u64 {
+    /// Returns how many points were left out, of which kinds.
+    pub(crate) fn dropped(&self) -> SurfaceShares {
         self.dropped
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::breaklines::Breaklines;
 use crate::input::options::{InputOptions, OnBadFile};
+use crate::input::surface::SurfaceShares;
 use crate::input::surface_doubts::no_ground;
 use crate::input::{Point, PointCounts, set_network_memory};
 use crate::job::durable::directory::JobDirectory;
@@ -179,7 +180,8 @@ impl Pass<'_> {
             let mut sorter = BucketSorter::new(self.grid, self.buckets);
             let mut filter = BreaklineFilter::new(self.lines);
             let mut counts = decode(input, chunk, &mut |points| sorter.add(filter.without_dropped(points)))?;
-            counts.drop_at_breaklines(filter.dropped());
+            let SurfaceShares { points, ground, unclassified } = filter.dropped();
+            counts.drop_at_breaklines([points, ground, unclassified]);
             self.check_malformed(input, &counts)?;
             Ok(ByInput(vec![(index, PointSummary { counts, bounds: sorter.bounds() })]))
         };

@@ -7,6 +7,8 @@ use crate::input::{DecodedChunks, OptionalFields, PointCounts, PointRules, Sourc
 use crate::output::color::HeightRange;
 use crate::{Result, interrupt};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 /// The most chunks of the inputs in which the sample looks.
 const MOST_CHUNKS: usize = 128;
@@ -35,6 +37,8 @@ pub(crate) struct HeightSample {
     records: u64,
     /// What became of the records at which it looked.
     pub(crate) counts: PointCounts,
+    /// The same of each file at which it looked.
+    pub(crate) by_file: BTreeMap<PathBuf, PointCounts>,
 }
 
 impl HeightSample {
@@ -64,16 +68,17 @@ impl HeightSample {
             let at = ends.partition_point(|&end| end <= chunk);
             let (source, rules, decoded) = &inputs[at];
             let chunk = decoded.chunk(chunk + decoded.len() - ends[at]);
-            first_heights(source, rules, chunk, RECORDS / most as u64)
+            first_heights(source, rules, chunk, RECORDS / most as u64).map(|found| (&source.path, found))
         };
         let found = (0..places).into_par_iter().map(look).collect::<Result<Vec<_>>>()?;
-        let (mut heights, mut counts) = (Vec::new(), PointCounts::default());
-        for (more, its_counts) in found {
+        let (mut heights, mut counts, mut by_file) = (Vec::new(), PointCounts::default(), BTreeMap::new());
+        for (path, (more, its_counts)) in found {
             heights.extend(more);
-            counts += its_counts;
+            counts += its_counts.clone();
+            *by_file.entry(path.clone()).or_insert_with(PointCounts::default) += its_counts;
         }
         heights.sort_unstable();
-        Ok(HeightSample { heights, places, seen: counts.read - counts.not_decoded, records, counts })
+        Ok(HeightSample { heights, places, seen: counts.read - counts.not_decoded, records, counts, by_file })
     }
 
     /// Returns the heights that colours span, without what may be noise; `None` if the sample has too few points to tell. Where the
@@ -125,7 +130,8 @@ mod tests {
     /// A sample in `places` chunks of heights from 0 that saw every record that passed, of `records`.
     fn sample(count: i32, places: usize, records: u64) -> HeightSample {
         let counts = PointCounts::default();
-        HeightSample { heights: (0..count).collect(), places, seen: count as u64, records, counts }
+        let by_file = BTreeMap::new();
+        HeightSample { heights: (0..count).collect(), places, seen: count as u64, records, counts, by_file }
     }
 
     fn range(low: i32, high: i32) -> Option<HeightRange> {

@@ -3,6 +3,7 @@
 use crate::geometry::Bounds;
 use crate::geometry::lattice::{AxisMap, Lattice, REACH, shortest_decimal};
 use crate::input::options::{OnBadFile, UnitChoice};
+use crate::input::surface_doubts::no_ground;
 use crate::input::transform_sources::transform_sources;
 use crate::input::{Axis, CrsChoice, FileFormat, PointCounts, PointRules, Source};
 use crate::job::options::JobOptions;
@@ -156,7 +157,11 @@ fn try_plan(
         extent: clipped,
         lattice,
         heights,
-        sample: PointCounts { examples: Vec::new(), ..sample.counts },
+        sample: PointCounts {
+            examples: Vec::new(),
+            notes: files_without_ground(&sample, options).into_iter().collect(),
+            ..sample.counts
+        },
         crs,
         unit: unit.into(),
         claimed_area,
@@ -211,6 +216,18 @@ fn claims(
     };
     let max_rgb = sources.par_iter().zip(rules).map(first_colors).try_reduce(|| 0, |a, b| Ok(a.max(b)))?;
     Ok(Claims { bounds, max_rgb })
+}
+
+/// Returns a sentence about the files whose sample has no ground, if the job wants only that, and others have some.
+fn files_without_ground(sample: &HeightSample, options: &JobOptions) -> Option<String> {
+    let lacks_ground = |counts: &PointCounts| no_ground(&options.input, counts);
+    let mut without = sample.by_file.iter().filter_map(|(path, counts)| Some((path, lacks_ground(counts)?)));
+    let (path, what) = without.next().filter(|_| lacks_ground(&sample.counts).is_none())?;
+    let others = match without.count() {
+        0 => String::new(),
+        count => format!(" (and so for {count} other files)"),
+    };
+    Some(format!("{}: no point is left of it{others}: {what}", path.display()))
 }
 
 /// Returns the least and the greatest height that the sources claim, in steps of the lattice.

@@ -1,8 +1,10 @@
 //! What the plan knows of texts, which are read once before it is made: rows that nobody wants, mistakes, degrees.
 
 use crate::input::options::{InputOptions, OnBadFile, UnitChoice};
+use crate::input::surface::Surface;
+use crate::input::surface_doubts::no_column_of_classes;
 use crate::input::{
-    CrsChoice, FileFormat, KeptReturns, OptionalFields, Outliers, PointCounts, PointRules, RowChoice, Source,
+    CrsChoice, CrsKind, FileFormat, KeptReturns, OptionalFields, Outliers, PointCounts, PointRules, RowChoice, Source,
     TextReading, Unit,
 };
 use crate::job::options::JobOptions;
@@ -40,12 +42,15 @@ pub(crate) fn wanted_fields(options: &JobOptions) -> OptionalFields {
 /// [`Error::Config`] names the first such file.
 pub(crate) fn refuse_degrees(sources: &[Source], options: &InputOptions) -> Result<()> {
     let is_in_degrees = |s: &&Source| s.format == FileFormat::Text && s.crs.horizontal == Unit::Degree;
-    let is_open = options.unit == UnitChoice::Auto && matches!(options.crs, CrsChoice::Auto | CrsChoice::First);
+    // A map has no degrees, whatever the user calls it. What is said of longitude and latitude is refused elsewhere.
+    let is_map = |choice: &CrsChoice| matches!(choice, CrsChoice::Given { crs, .. } if crs.kind == CrsKind::Projected);
+    let is_silent = matches!(options.crs, CrsChoice::Auto | CrsChoice::First);
+    let is_open = options.unit == UnitChoice::Auto && (is_silent || is_map(&options.crs));
     match sources.iter().find(is_in_degrees) {
         Some(source) if is_open => Err(Error::Config(format!(
             "{}: its columns are named as degrees (x from {} to {}, y from {} to {}{}), and a Delaunay triangulation in \
              degrees is distorted: [input] to_crs = \"utm\" with missing_crs = \"EPSG:4326\", if that is what they are in, transforms them to a \
-             projected CRS; if they are no degrees, set [input] unit, for example to \"metre\", or [input] crs",
+             projected CRS; if they are no degrees, set [input] unit, for example to \"metre\"",
             source.path.display(),
             source.min[0],
             source.max[0],
@@ -66,24 +71,25 @@ fn is_exchanged(source: &Source) -> bool {
 /// Fails if the user asks for classes, and a text has none: all of its points would be left out.
 ///
 /// # Errors
-/// [`Error::Config`] names the first such file.
+/// [`Error::Config`] names the first such file, and [`Error::NoTerrain`] if it is the ground that the user asks for.
 pub(crate) fn refuse_missing_classes(sources: &[Source], options: &InputOptions) -> Result<()> {
     // A point without a class counts as one of class 0.
     if !options.chooses_classes() || options.kept_classes()[0] {
         return Ok(());
     }
     let lacks_classes = |source: &&Source| source.format == FileFormat::Text && !source.has_class;
-    let wanted = match &options.classes {
-        Some(classes) => format!("classes = {classes:?}"),
-        None => "surface = \"ground\"".into(),
-    };
-    match sources.iter().find(lacks_classes) {
-        Some(source) => Err(Error::Config(format!(
-            "[input] {wanted}, but {} has no column of classes, so that none of its points would be left: let `classes` have 0 in \
+    match (sources.iter().find(lacks_classes), &options.classes) {
+        // As for a LAS file without ground.
+        (Some(source), _) if options.surface == Surface::Ground => {
+            Err(Error::NoTerrain(format!("{}: {}", source.path.display(), no_column_of_classes())))
+        }
+        (Some(source), classes) => Err(Error::Config(format!(
+            "[input] classes = {:?}, but {} has no column of classes, so that none of its points would be left: let `classes` have 0 in \
              it to keep points without a class, name the column with `columns` under [input.csv], or leave the file out",
+            classes.as_deref().unwrap_or_default(),
             source.path.display()
         ))),
-        None => Ok(()),
+        (None, _) => Ok(()),
     }
 }
 

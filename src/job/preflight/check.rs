@@ -144,6 +144,7 @@ impl Preflight {
         let mut warnings = plan.all_warnings();
         let of_sample = |warning: String| format!("in a sample of the points: {warning}");
         warnings.extend(no_ground(&options.input, &plan.sample).map(of_sample));
+        warnings.extend(plan.sample.notes.iter().cloned().map(of_sample));
         warnings.extend(unclear_returns(&options.input, &plan.sample).map(of_sample));
         let disk = DiskEstimate::of(plan, kept, MAX_TRIANGLES_IN_ONE_FILE);
         let describe = |source: &Source| (source.path.clone(), format!("{:?}", source.format), source.records);
@@ -170,7 +171,7 @@ impl Preflight {
             disk_earlier: estimate::earlier_bytes(plan),
             output: options.output.directory.clone(),
             backend: format!("{:?}", options.triangulation.backend).to_lowercase(),
-            surface: surface_sample.estimate(options.input.surface),
+            surface: surface_sample.estimate(options.input.mesh_of()),
             surface_sample,
             warnings,
             skipped: plan.skipped.clone(),

@@ -271,7 +271,7 @@ impl Report {
             duplicates: parts.leaves.duplicates,
             files: plan.inputs.len(),
             skipped: plan.skipped.clone(),
-            surface: SurfaceShares::of_kept(&parts.points).sentence(plan.options.input.surface),
+            surface: SurfaceShares::of_kept(&parts.points).sentence(plan.options.input.mesh_of()),
             points: parts.points,
             breaklines: plan.breaklines.as_ref().map(BreaklineReport::of),
             leaves: parts.leaves,

@@ -32,6 +32,17 @@ impl From<String> for NotPlaced {
     }
 }
 
+/// Says why a definition cannot be used. A datum such as NAD27 leads to WGS 84 by a grid alone.
+fn why_not_read(definition: &str, error: &str) -> String {
+    if error.to_ascii_lowercase().contains("grid") {
+        return format!(
+            "the way from the datum of {definition} to WGS 84 needs a grid, which this program does not have (transform the points to \
+             a datum such as NAD83 first)"
+        );
+    }
+    format!("{definition}: {error}")
+}
+
 /// The map from a projected system to the ellipsoid.
 pub struct Globe {
     from: Proj,
@@ -48,7 +59,7 @@ impl Globe {
     /// # Errors
     /// A sentence that says why there is no such map.
     pub fn new(definition: &str, metres_per_unit: f64, geoid: Geoid) -> Result<Globe, String> {
-        let parse = |text: &str| Proj::from_proj_string(text).map_err(|e| format!("{text}: {e}"));
+        let parse = |text: &str| Proj::from_proj_string(text).map_err(|e| why_not_read(text, &e.to_string()));
         let from = parse(definition)?;
         if from.is_latlong() || from.is_geocent() {
             return Err("it is not a projected system".into());
@@ -168,4 +179,16 @@ pub fn relative_place(transform: &[f64; 16], place: [f64; 3]) -> [f64; 3] {
 
 fn affine(transform: &[f64; 16]) -> DAffine3 {
     DAffine3::from_mat4(DMat4::from_cols_array(transform))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_datum_that_needs_a_grid_is_named() {
+        let geoid = Geoid::open(None).unwrap();
+        let why = Globe::new("+proj=utm +zone=15 +datum=NAD27 +units=m +no_defs", 1.0, geoid).err().unwrap();
+        assert!(why.contains("needs a grid") && why.contains("NAD27") && why.contains("NAD83"), "{why}");
+    }
 }

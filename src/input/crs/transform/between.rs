@@ -17,7 +17,19 @@ const FARTHEST_LONGITUDE: f64 = 540.0 * DEGREE;
 pub struct CrsTransform {
     from: Coordinates,
     to: Coordinates,
-    alike: Option<String>,
+    datums: DatumNote,
+}
+
+/// What was done about the datums.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) enum DatumNote {
+    /// They are one.
+    #[default]
+    Same,
+    /// One of these two has no name, and is assumed to be the other one.
+    Assumed(String),
+    /// These two are taken for one.
+    TakenAlike(String),
 }
 
 /// What the x and y of a system mean.
@@ -39,12 +51,13 @@ impl CrsTransform {
     /// them for one.
     pub fn between(from: &Crs, to: &Crs, rule: DatumRule) -> Result<CrsTransform, String> {
         let ((from_datum, source), (to_datum, target)) = (Coordinates::of(from)?, Coordinates::of(to)?);
-        let alike = match datum_way(&from_datum, &to_datum, rule) {
-            DatumWay::Same => None,
-            DatumWay::TakenAlike(names) => Some(names),
+        let datums = match datum_way(&from_datum, &to_datum, rule) {
+            DatumWay::Same => DatumNote::Same,
+            DatumWay::Assumed(names) => DatumNote::Assumed(names),
+            DatumWay::TakenAlike(names) => DatumNote::TakenAlike(names),
             DatumWay::Shift(why) => return Err(format!("from {} to {}, {why}", from.label(), to.label())),
         };
-        Ok(CrsTransform { from: source, to: target, alike })
+        Ok(CrsTransform { from: source, to: target, datums })
     }
 
     /// Returns the way from `crs` to longitude and latitude on its own datum, in degrees east of Greenwich and north.
@@ -53,7 +66,7 @@ impl CrsTransform {
     /// As [`CrsTransform::between`].
     pub(crate) fn to_degrees(crs: &Crs) -> Result<CrsTransform, String> {
         let to = Coordinates { projection: None, unit: DEGREE, meridian: 0.0 };
-        Ok(CrsTransform { from: Coordinates::of(crs)?.1, to, alike: None })
+        Ok(CrsTransform { from: Coordinates::of(crs)?.1, to, datums: DatumNote::Same })
     }
 
     /// Returns x and y in the other system; `None` if one of them has no such place. Neither is ever infinite or NaN.
@@ -73,9 +86,9 @@ impl CrsTransform {
         }
     }
 
-    /// Returns the names of the two datums that are taken for one, if they are two.
-    pub fn datums_taken_alike(&self) -> Option<&str> {
-        self.alike.as_deref()
+    /// Returns what is done about the datums.
+    pub(crate) fn datums(&self) -> &DatumNote {
+        &self.datums
     }
 }
 
@@ -84,10 +97,9 @@ impl Coordinates {
     fn of(crs: &Crs) -> Result<(Datum, Coordinates), String> {
         let label = crs.label();
         if matches!(crs.kind, CrsKind::Geocentric | CrsKind::Local) {
-            return Err(format!("{label} is neither a map nor longitude and latitude"));
+            return Err(format!("{label} is {}, neither a map nor longitude and latitude", crs.kind.name()));
         }
-        let form =
-            crs.form().ok_or_else(|| format!("{label} does not say its projection in a way that can be read"))?;
+        let form = crs.form().ok_or_else(|| crs.why_without_form())?;
         let datum = form.datum().ok_or_else(|| format!("{label} does not say its datum"))?.clone();
         let Some(projection) = form.projection() else {
             let unit = crs.wkt.as_deref().and_then(|text| find(text, &GEOGRAPHIC));

@@ -1,6 +1,6 @@
 //! Which datums a job takes for one.
 
-use crate::input::crs::datum::Datum;
+use crate::input::crs::datum::{Datum, Sameness};
 use serde::{Deserialize, Serialize};
 
 /// `[input] datums`: whether datums that nearly agree are one.
@@ -36,7 +36,7 @@ const GRIDS: [(&str, &str, &str); 12] = [
     ("ch1903", "", "CHENyx06: ch_swisstopo_CHENyx06a.tif"),
     ("tokyo", "", "TKY2JGD: jp_gsi_tky2jgd.tif"),
     ("jgd2000", "jgd2011", "jp_gsi_touhokutaiheiyouoki2011.tif"),
-    ("ed50", "", "for Spain es_ign_SPED2ETV2.tif"),
+    ("ed50", "", "that of the country, such as es_ign_SPED2ETV2.tif of Spain"),
 ];
 
 /// How one datum stands to another.
@@ -44,6 +44,8 @@ const GRIDS: [(&str, &str, &str); 12] = [
 pub(crate) enum DatumWay {
     /// They are one.
     Same,
+    /// Nothing says that they are two, but one of them has no name.
+    Assumed(String),
     /// They differ by a metre or two, which the user does not mind.
     TakenAlike(String),
     /// One needs a shift to the other. The text says which.
@@ -52,10 +54,14 @@ pub(crate) enum DatumWay {
 
 /// Returns how `from` stands to `to`.
 pub(crate) fn datum_way(from: &Datum, to: &Datum, rule: DatumRule) -> DatumWay {
-    let Some(difference) = from.difference_in_frame(to) else { return DatumWay::Same };
-    let are_close = from.is_close_to_wgs84() && to.is_close_to_wgs84();
     let name = |datum: &Datum| datum.name().unwrap_or("an unnamed datum").to_string();
     let names = format!("{} and {}", name(from), name(to));
+    let difference = match from.sameness(to) {
+        Sameness::Known => return DatumWay::Same,
+        Sameness::Assumed => return DatumWay::Assumed(names),
+        Sameness::Refuted(difference) => difference,
+    };
+    let are_close = from.is_close_to(to);
     if are_close && rule == DatumRule::Close {
         return DatumWay::TakenAlike(names);
     }
@@ -66,12 +72,12 @@ pub(crate) fn datum_way(from: &Datum, to: &Datum, rule: DatumRule) -> DatumWay {
         None => "a shift".to_string(),
     };
     let remedy = if are_close {
-        "; or, as these two agree to a metre or two, [input] datums = \"close\" takes them for one"
+        ". As these two agree to a metre or two, [input] datums = \"close\" takes them for one"
     } else {
         ""
     };
     DatumWay::Shift(format!(
-        "they differ in {difference}: the way from one to the other is {what}, which this program does not do and does not leave out. \
-         Other programs do that, for points `pdal translate` with its filter `reprojection`{remedy}"
+        "they differ in {difference}: the way from one to the other is {what}, which this program does not do and does not leave \
+         out{remedy}"
     ))
 }

@@ -1,6 +1,7 @@
 //! A map projection with its false origin, from the parameters that a text gives.
 
-use crate::input::crs::projection::{Projection, WEB_MERCATOR};
+use crate::input::crs::projection::Projection;
+use crate::input::crs::projection_names::WEB_MERCATOR;
 use crate::input::crs::transform::ellipsoid::Ellipsoid;
 use crate::input::crs::transform::equal_area::{Albers, LambertAzimuthal};
 use crate::input::crs::transform::lambert_conic::LambertConic;
@@ -52,8 +53,14 @@ impl MapProjection {
         if let Some(odd) = projection.names().find(is_odd) {
             return Err(format!("the parameter {odd} of its projection ({label}) is not known here"));
         }
-        if projection.is_westward() {
-            return Err("its x grows to the west".into());
+        if projection.has_other_axes() {
+            return Err("its x grows to the west, or its y to the south".into());
+        }
+        if has_two_scales(projection) {
+            return Err(format!(
+                "it gives two standard parallels and the scale factor {} beside them, and programs do not agree what that means",
+                projection.value("k_0")
+            ));
         }
         let method = method(projection, ellipsoid).ok_or_else(|| format!("its projection is {label}"))?;
         let meridian = projection.value("lon_0") * DEGREE;
@@ -140,6 +147,12 @@ fn is_known(method: &str, name: &str) -> bool {
     let parallels = ["lcc", "aea"].contains(&method) && ["lat_1", "lat_2"].contains(&name);
     let scale = name == "k_0" && !["aea", "laea", WEB_MERCATOR].contains(&method);
     parallels || scale || ["lon_0", "lat_0", "x_0", "y_0"].contains(&name)
+}
+
+/// Returns whether a cone has two parallels that are true to scale, and a scale as well.
+fn has_two_scales(projection: &Projection) -> bool {
+    let [first, second, scale] = ["lat_1", "lat_2", "k_0"].map(|name| projection.value(name));
+    projection.method() == "lcc" && first != second && scale != 1.0
 }
 
 /// Returns whether a parameter changes nothing.

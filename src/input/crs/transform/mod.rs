@@ -10,6 +10,8 @@ mod equal_area;
 mod lambert_conic;
 mod map_projection;
 mod mercator;
+#[cfg(test)]
+mod refusal_tests;
 mod stereographic;
 #[cfg(test)]
 mod tests;

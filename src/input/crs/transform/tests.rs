@@ -1,6 +1,6 @@
 //! Published values of projections (EPSG Guidance Note 7-2), and the way there and back.
 
-use super::between::CrsTransform;
+use super::between::{CrsTransform, DatumNote};
 use super::datum_rule::DatumRule;
 use crate::input::crs::from_wkt::{from_epsg, parse};
 use crate::input::crs::system::Crs;
@@ -103,6 +103,28 @@ fn units_meridians_and_whole_turns_count() {
 }
 
 #[test]
+fn the_words_for_proj4_mean_the_same_place() {
+    use proj4rs::{Proj, transform::transform};
+    let degrees = Proj::from_proj_string("+proj=longlat +datum=WGS84 +no_defs").unwrap();
+    for (code, place) in [
+        (32615, [-93.1, 45.0]),
+        (3395, [12.0, 48.0]),
+        (3413, [-50.0, 72.0]),
+        (3031, [120.0, -75.0]),
+        (32661, [44.0, 83.0]),
+        (3994, [-170.0, -40.0]),
+    ] {
+        let map = Crs { epsg: None, ..epsg(code) };
+        let own = Proj::from_proj_string(&map.proj4_definition().unwrap()).unwrap();
+        let [x, y] = way(&epsg(4326), &map).apply(place).unwrap();
+        let mut found = (x, y, 0.0);
+        transform(&own, &degrees, &mut found).unwrap();
+        let off = (found.0.to_degrees() - place[0]).abs().max((found.1.to_degrees() - place[1]).abs());
+        assert!(off < 1e-8, "EPSG:{code}: {found:?} {place:?}");
+    }
+}
+
+#[test]
 fn what_a_projection_does_not_show_is_no_place() {
     let utm = way(&epsg(4326), &epsg(32615));
     for place in [[-33.0, 10.0], [87.0, 0.0], [-93.0, 90.5], [600.0, 0.0], [f64::NAN, 0.0], [f64::INFINITY, 0.0]] {
@@ -127,8 +149,8 @@ fn shifts_are_refused_by_name() {
     let strict = between(26915, 32615, DatumRule::Strict).unwrap_err();
     assert!(strict.contains("datums = \"close\""), "{strict}");
     let close = between(26915, 32615, DatumRule::Close).unwrap();
-    assert_eq!(close.datums_taken_alike(), Some("NAD83 and WGS 84"));
-    assert_eq!(between(26915, 26916, DatumRule::Strict).unwrap().datums_taken_alike(), None);
+    assert_eq!(close.datums(), &DatumNote::TakenAlike("NAD83 and WGS 84".into()));
+    assert_eq!(between(26915, 26916, DatumRule::Strict).unwrap().datums(), &DatumNote::Same);
 }
 
 #[test]

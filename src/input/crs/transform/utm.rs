@@ -6,7 +6,7 @@ use crate::input::crs::system::Crs;
 use crate::input::crs::transform::datum_rule::{DatumRule, DatumWay, datum_way};
 
 /// Returns the UTM zone of a place in degrees on the datum of `crs`, in metres: of several with a code, that with the least. Australia's
-/// are called MGA zones.
+/// are called MGA zones. A datum without a name is assumed to be WGS 84, if nothing says otherwise.
 ///
 /// # Errors
 /// A sentence if the datum has no such zone, and `rule` does not take it for WGS 84.
@@ -23,7 +23,8 @@ pub(crate) fn utm_zone(crs: &Crs, place: [f64; 2], rule: DatumRule) -> Result<Cr
     let way = |zone: &Crs| Some(datum_way(&datum, zone.form()?.datum()?, rule));
     let same = zones.find(|zone| way(zone) == Some(DatumWay::Same));
     let of_wgs84 = wgs84_zone(place);
-    let alike = || of_wgs84.clone().filter(|zone| matches!(way(zone), Some(DatumWay::TakenAlike(_))));
+    let alike =
+        || of_wgs84.clone().filter(|zone| matches!(way(zone), Some(DatumWay::TakenAlike(_) | DatumWay::Assumed(_))));
     same.or_else(alike).ok_or_else(|| {
         let other = of_wgs84.as_ref().map_or("none".into(), Crs::label);
         format!(

@@ -2,7 +2,7 @@
 
 use crate::input::lines::LineFile;
 use crate::input::lines::options::LineCrs;
-use crate::input::{Crs, CrsKind, CrsTransform, DatumRule};
+use crate::input::{Crs, CrsKind, CrsTransform, DatumNote, DatumRule, Sameness};
 use crate::{Error, Result};
 
 /// Brings the features of `file` into the system of the `points`. `datums` says which datums are one.
@@ -17,15 +17,40 @@ pub(super) fn bring_to_points(file: &mut LineFile, choice: &LineCrs, points: &Cr
     };
     // Points in degrees are refused, so degrees are never the system of the points, even where these say none.
     let is_in_degrees = own.kind == CrsKind::Geographic && points.kind != CrsKind::Geographic;
-    let differences = own.differences(points);
-    if is_in_degrees || !differences.is_empty() {
+    // A text that nobody can read is not a missing one.
+    let is_unread = |crs: &Crs| crs.wkt.is_some() && !crs.is_named();
+    if is_in_degrees || is_unread(&own) || is_unread(points) || !own.differences(points).is_empty() {
         return transform(file, &own, points, datums);
     }
-    if !own.is_named() && points.is_named() && file.warnings.is_empty() {
+    if !own.is_named() || !points.is_named() {
+        warn_of_missing(file, &own, points);
+        return Ok(());
+    }
+    match own.sameness(points) {
+        Sameness::Known => {}
+        Sameness::Assumed => {
+            let names = own.names_of_datums(points);
+            file.warnings.push(assumed(&names));
+        }
+        Sameness::Refuted(_) => return transform(file, &own, points, datums),
+    }
+    Ok(())
+}
+
+/// Warns if the lines or the points name no CRS, and the others do.
+fn warn_of_missing(file: &mut LineFile, own: &Crs, points: &Crs) {
+    if points.is_named() && file.warnings.is_empty() {
         file.warnings
             .push(format!("it says no CRS: its lines are taken to be in that of the points, {}", points.label()));
     }
-    Ok(())
+    if own.is_named() {
+        file.warnings
+            .push(format!("the points name no CRS: they are taken to be in that of the lines, {}", own.label()));
+    }
+}
+
+fn assumed(names: &str) -> String {
+    format!("not both datums are named: {names} are assumed to be one; two datums may be hundreds of metres apart")
 }
 
 /// Transforms the features of `file`, which are in the system `own`, into that of the points.
@@ -55,6 +80,13 @@ fn transform(file: &mut LineFile, own: &Crs, points: &Crs, datums: DatumRule) ->
         }
     }
     file.warnings.push(format!("its lines are transformed from {} to {target}", own.label()));
+    match way.datums() {
+        DatumNote::Same => {}
+        DatumNote::Assumed(names) => file.warnings.push(assumed(names)),
+        DatumNote::TakenAlike(names) => file
+            .warnings
+            .push(format!("[input] datums = \"close\" takes {names} for one datum; they may be a metre or two apart")),
+    }
     Ok(())
 }
 
@@ -114,8 +146,43 @@ mod tests {
     }
 
     #[test]
+    fn datums_that_are_taken_for_one_or_assumed_to_be_are_named() {
+        let [zone_15, wgs84] = ["EPSG:26915", "EPSG:4326"].map(system);
+        let lines = |crs: &Crs, rule: DatumRule| {
+            let shape = LineShape::Line(vec![SOUTH; 2]);
+            let features = vec![LineFeature { number: 1, kind: FeatureKind::Line, shape }];
+            let mut file =
+                LineFile { path: "a.gpkg".into(), crs: crs.clone(), features, warnings: Warnings::default() };
+            bring_to_points(&mut file, &LineCrs::Auto, &zone_15, rule).unwrap();
+            file.warnings.iter().map(|warning| warning.to_string()).collect::<Vec<_>>().concat()
+        };
+        let alike = lines(&wgs84, DatumRule::Close);
+        assert!(alike.contains("takes WGS 84 and NAD83 for one datum"), "{alike}");
+        let nameless = system(
+            &zone_15
+                .wkt
+                .clone()
+                .unwrap()
+                .replace("NAD83\"", "unknown\"")
+                .replace("North_American_Datum_1983", "unknown")
+                .replace("26915", "0")
+                .replace("4269", "0")
+                .replace("6269", "0"),
+        );
+        let said = lines(&nameless, DatumRule::Strict);
+        assert!(said.contains("an unnamed datum and NAD83 are assumed to be one"), "{said}");
+        let there = zone_15.clone();
+        assert_eq!(lines(&there, DatumRule::Strict), "");
+    }
+
+    #[test]
     fn lines_in_another_system_are_transformed_or_refused() {
         let [zone_15, degrees, old, wgs84] = ["EPSG:26915", "EPSG:4269", "EPSG:26715", "EPSG:4326"].map(system);
+        let projected_somehow = system(
+            r#"PROJCS["My grid",GEOGCS["NAD83",DATUM["North_American_Datum_1983",
+            SPHEROID["GRS 1980",6378137,298.257222101]]],UNIT["metre",1]]"#,
+        );
+        let unnamed = system(&projected_somehow.wkt.clone().unwrap().replace("My grid", "unnamed"));
         let ([x, y, z], said) = bring_vertex(SOUTH, &degrees, "auto", &zone_15).unwrap();
         // The central meridian of the zone.
         assert!((x - 500_000.0).abs() < 1e-6 && (4_870_000.0..4_880_000.0).contains(&y) && z == 100.0, "{x} {y} {z}");
@@ -126,6 +193,10 @@ mod tests {
         for (own, points, word) in [
             (&old, &zone_15, "us_noaa_conus.tif"),
             (&wgs84, &zone_15, "datums"),
+            // Nothing says that these differ, and nothing that they are the same.
+            (&projected_somehow, &zone_15, "does not say its projection"),
+            (&unnamed, &zone_15, "does not say its projection"),
+            (&zone_15, &unnamed, "do not say where they are"),
             (&degrees, &Crs::default(), "do not say where they are"),
         ] {
             let error = bring(own, "auto", points).unwrap_err();
