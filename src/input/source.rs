@@ -404,11 +404,11 @@ impl Source {
         bounds.filter(|_| self.transform.as_ref().is_none_or(|transform| !transform.is_moved))
     }
 
-    /// Returns the bytes that all of a chunk is decoded from, in their order.
+    /// Returns the bytes of a chunk that are best read at once for this request, in their order.
     pub(crate) fn bytes_of(&self, chunk: usize, request: &ChunkRequest) -> Vec<Range<u64>> {
         match &self.points {
             PointData::Laz(points) => points.bytes_of(chunk, request),
-            _ if request.left_out => Vec::new(),
+            _ if request.left_out || request.records < u64::MAX => Vec::new(),
             PointData::Las(points) => vec![points.bytes_of(chunk)],
             PointData::Text(table) => vec![table.bytes_of(chunk, self.size)],
         }
@@ -417,7 +417,7 @@ impl Source {
     /// As [`Source::read_chunk`], in the coordinates of the file.
     fn read_own_chunk(&self, chunk: usize, request: ChunkRequest, sink: &mut impl RecordSink) -> Result<()> {
         let file = RandomAccessFile::reopen(&self.path, self.size)?;
-        if file.is_remote() && request.records == u64::MAX {
+        if file.is_remote() {
             file.hold(self.bytes_of(chunk, &request).into_iter())?;
         }
         match &self.points {

@@ -15,7 +15,27 @@ use crate::web_server::{Answer, WebServer};
 const PATIENCE: &str = "2000";
 
 /// A hundredth of the area of the cloud.
-const HUNDREDTH: &str = "bounds = [499700.0, 3999700.0, 500000.0, 4000000.0]";
+const HUNDREDTH: &str = "bounds = [500600.0, 4000600.0, 500840.0, 4000840.0]";
+
+/// Writes the box of the points of `file` into the header of `bytes`, as real files have it: without one a job measures all points first.
+fn with_box(mut bytes: Vec<u8>, file: &LasFile) -> Vec<u8> {
+    let records = || file.records.chunks_exact(file.length() as usize);
+    for (axis, offset) in [500_000.0, 4_000_000.0, 0.0].into_iter().enumerate() {
+        let raw = |record: &[u8]| i32::from_le_bytes(record[4 * axis..4 * axis + 4].try_into().unwrap());
+        let ends = [records().map(raw).max().unwrap(), records().map(raw).min().unwrap()];
+        for (end, raw) in ends.into_iter().enumerate() {
+            let at = 179 + 16 * axis + 8 * end;
+            bytes[at..at + 8].copy_from_slice(&(offset + raw as f64 * 0.01).to_le_bytes());
+        }
+    }
+    bytes
+}
+
+/// Returns rows of points from x = `x` on.
+fn rows(x: usize) -> Vec<u8> {
+    let row = |i: usize| format!("{}.{},{}.5,{}\n", x + i % 90, i % 7, i / 90, i % 13);
+    (0..9_000).map(row).collect::<String>().into_bytes()
+}
 
 fn cloud() -> LasFile {
     LasFile::new(4, 7, 0, 9_000)
@@ -23,13 +43,12 @@ fn cloud() -> LasFile {
 
 /// Returns a file of each kind.
 fn files() -> Vec<(&'static str, Vec<u8>)> {
-    let text: String = (0..9_000).map(|i| format!("{}.{},{}.5,{}\n", i % 90, i % 7, i / 90, i % 13)).collect();
     vec![
-        ("/a/cloud.las", cloud().las()),
-        ("/a/layered.laz", cloud().laz(&[1000], false)),
+        ("/a/cloud.las", with_box(cloud().las(), &cloud())),
+        ("/a/layered.laz", with_box(cloud().laz(&[1000], false), &cloud())),
         ("/a/pointwise.laz", LasFile::new(2, 3, 0, 9_000).laz(&[1000], false)),
-        ("/a/cloud.copc.laz", CopcFile::new(&cloud(), 4).bytes()),
-        ("/a/rows.csv", text.into_bytes()),
+        ("/a/cloud.copc.laz", with_box(CopcFile::new(&cloud(), 4).bytes(), &cloud())),
+        ("/a/rows.csv", rows(0)),
     ]
 }
 
@@ -72,13 +91,11 @@ fn results_are_those_of_local_files() {
 
 #[test]
 fn a_job_of_several_parts_and_files_has_the_same_results() {
-    let (server, folder) = (WebServer::of(&files()), tempfile::tempdir().unwrap());
-    let names = ["/a/cloud.las", "/a/layered.laz"];
-    let local = names.map(|name| folder.path().join(&name[3..]));
-    names.iter().zip(&local).for_each(|(name, path)| {
-        let files = files();
-        fs::write(path, &files.iter().find(|file| file.0 == *name).unwrap().1).unwrap();
-    });
+    let files = [("/a.csv", rows(0)), ("/b.csv", rows(90))];
+    let (server, folder) = (WebServer::of(&files), tempfile::tempdir().unwrap());
+    let names = ["/a.csv", "/b.csv"];
+    let local = names.map(|name| folder.path().join(&name[1..]));
+    files.iter().zip(&local).for_each(|((_, bytes), path)| fs::write(path, bytes).unwrap());
     let parts = |job: Job| job.tiles_of(1000).with("triangulation", "max_points_per_part = 4000").report();
     let (expected, report) = (parts(Job::on(&local)), parts(Job::on(&names.map(|name| server.url(name)))));
     assert!(number(&report["parts"]) > 1);
@@ -87,13 +104,13 @@ fn a_job_of_several_parts_and_files_has_the_same_results() {
 
 #[test]
 fn bounds_of_a_hundredth_take_a_small_share_of_a_copc_file() {
-    let mut large = LasFile::new(4, 7, 800, 12_000);
+    let mut large = LasFile::new(4, 7, 400, 12_000);
     // What cannot be compressed makes the file large.
     let (length, mut random) = (large.length() as usize, Random(1));
     for record in large.records.chunks_exact_mut(length) {
         record[36..].iter_mut().for_each(|byte| *byte = random.below(256) as u8);
     }
-    let bytes = CopcFile::new(&large, 6).bytes();
+    let bytes = with_box(CopcFile::new(&large, 6).bytes(), &large);
     let server = WebServer::of(&[("/large.copc.laz", bytes.clone())]);
     let bounded = |name: &str| Job::on(&[name]).with("input", HUNDREDTH).report();
     let report = bounded(&server.url("/large.copc.laz"));

@@ -126,11 +126,18 @@ impl CompressedPoints {
         laz_chunks.filter(|laz_chunk| self.may_reach(laz_chunk, bounds)).map(|laz_chunk| laz_chunk.count).sum()
     }
 
-    /// Returns the bytes of the LAZ chunks that are decoded of chunk `chunk` of the source for this request.
+    /// Returns the bytes of the LAZ chunks that this request needs whole of chunk `chunk` of the source. Of pointwise ones only all records
+    /// do.
     pub(crate) fn bytes_of(&self, chunk: usize, request: &ChunkRequest) -> Vec<Range<u64>> {
         let laz_chunks = self.chunks.get(chunk).into_iter().flatten();
         let decoded = laz_chunks.filter(|laz_chunk| self.may_reach(laz_chunk, request.bounds) != request.left_out);
-        decoded.map(|laz_chunk| laz_chunk.bytes.clone()).collect()
+        let mut left = request.records;
+        let mut is_needed = |laz_chunk: &&LazChunk| {
+            let before = left;
+            left = before.saturating_sub(laz_chunk.count);
+            before >= laz_chunk.count || before > 0 && self.compression.layers.is_some()
+        };
+        decoded.filter(|laz_chunk| is_needed(laz_chunk)).map(|laz_chunk| laz_chunk.bytes.clone()).collect()
     }
 
     /// Returns what the points of a LAZ chunk lie within, if the index tells and bounds make it matter.
@@ -220,10 +227,6 @@ struct ChunkDecoder<'a> {
 impl ChunkDecoder<'_> {
     /// Decodes the wanted records as far as possible; `self.next` then says how far.
     fn decode(&mut self, filter: &mut impl RecordSink) -> std::result::Result<(), ChunkError> {
-        if self.points.compression.layers.is_some() {
-            // All layers are needed for the first record.
-            self.file.hold(std::iter::once(self.chunk.bytes.clone()))?;
-        }
         let held = self.records_held()?.min(self.wanted);
         let end = self.chunk.first + held;
         let read_ahead = if self.points.compression.layers.is_some() { LAYER_READ_AHEAD } else { READ_AHEAD };

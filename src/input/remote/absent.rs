@@ -77,3 +77,19 @@ pub(crate) fn to_hold(ranges: impl Iterator<Item = Range<u64>>) -> Vec<Range<u64
 }
 
 pub(crate) fn set_space(_: u64) {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_refusal_says_how_to_get_the_feature() {
+        let Err(error) = HeldFile::open(Path::new("https://host/a.laz")) else { panic!("a file is there") };
+        assert_eq!(error.exit_code(), 2);
+        assert!(
+            error.to_string().contains("https://host/a.laz: this program was built without inputs by URL"),
+            "{error}"
+        );
+        assert_eq!(files_at("s3://bucket/*.laz").unwrap_err().exit_code(), 2);
+    }
+}

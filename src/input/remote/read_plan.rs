@@ -8,8 +8,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::input::remote::window::{Pending, held_bytes};
 
-/// Ranges with no more bytes between them are fetched in one request: on most connections a request takes as long as these bytes.
-pub(crate) const GAP: u64 = 1 << 17;
+/// Ranges with no more bytes between them are fetched in one request: on most connections a request takes as long as these bytes. All gaps
+/// of a request together have at most half as many bytes as what is wanted of it: many small ranges must not become the whole file.
+const GAP: u64 = 1 << 17;
 
 /// The bytes of a window, unless a single range is longer.
 const WINDOW: u64 = 1 << 22;
@@ -76,35 +77,54 @@ impl ReadPlan {
 
     /// Begins to fetch range `first` and wanted ones after it, as many as a window holds.
     fn begin_window(&mut self, first: usize, begin: &dyn Fn(Range<u64>) -> Pending) {
-        let Range { start, mut end } = self.ranges[first];
+        let mut run = Run::of(self.ranges[first].clone());
         let mut last = first;
         let most = if has_space() { WINDOW } else { 0 };
         for (at, range) in self.ranges.iter().enumerate().skip(first + 1) {
-            let is_near = range.start <= end.saturating_add(GAP) && range.end.max(end) - start <= most;
-            if !is_near || !matches!(self.states[at], State::Wanted) {
+            if !matches!(self.states[at], State::Wanted) || !run.add(range, most) {
                 break;
             }
-            (last, end) = (at, end.max(range.end));
+            last = at;
         }
-        let window = begin(start..end);
+        let window = begin(run.range);
         self.states[first..=last].fill_with(|| State::Coming(window.clone()));
+    }
+}
+
+/// Ranges that one request brings.
+struct Run {
+    range: Range<u64>,
+    /// The bytes between them.
+    gaps: u64,
+}
+
+impl Run {
+    fn of(range: Range<u64>) -> Run {
+        Run { range, gaps: 0 }
+    }
+
+    /// Adds a range behind the others if it is near them and all together have at most `most` bytes. Returns whether it did.
+    fn add(&mut self, range: &Range<u64>, most: u64) -> bool {
+        let gap = range.start.saturating_sub(self.range.end);
+        let (end, gaps) = (self.range.end.max(range.end), self.gaps + gap);
+        let length = end - self.range.start;
+        let is_near = gap <= GAP && gaps <= (length - gaps) / 2 && length <= most;
+        if is_near {
+            (self.range.end, self.gaps) = (end, gaps);
+        }
+        is_near
     }
 }
 
 /// Joins ranges with few bytes between them. They are in the order of their beginnings.
 pub(crate) fn joined(ranges: impl IntoIterator<Item = Range<u64>>, most: u64) -> Vec<Range<u64>> {
-    let mut joined: Vec<Range<u64>> = Vec::new();
+    let mut joined: Vec<Run> = Vec::new();
     for range in ranges {
-        match joined.last_mut() {
-            Some(last)
-                if range.start <= last.end.saturating_add(GAP) && range.end.max(last.end) - last.start <= most =>
-            {
-                last.end = last.end.max(range.end);
-            }
-            _ => joined.push(range),
+        if !joined.last_mut().is_some_and(|last| last.add(&range, most)) {
+            joined.push(Run::of(range));
         }
     }
-    joined
+    joined.into_iter().map(|run| run.range).collect()
 }
 
 #[cfg(test)]
@@ -155,13 +175,15 @@ mod tests {
 
     #[test]
     fn far_ranges_are_fetched_apart_and_others_are_unknown() {
-        let mut plan = ReadPlan::new(ranges(3, 100, 100 + GAP));
-        assert_eq!(fetched(&mut plan, &[0]), [0..2 * GAP + 300]);
-        let mut plan = ReadPlan::new(ranges(3, 100, 101 + GAP));
-        assert_eq!(fetched(&mut plan, &[0]), [0..100, 101 + GAP..201 + GAP]);
+        const LONG: u64 = 4 * GAP;
+        let mut plan = ReadPlan::new(ranges(3, LONG, LONG + GAP));
+        assert_eq!(fetched(&mut plan, &[0]), [0..3 * LONG + 2 * GAP]);
+        let mut plan = ReadPlan::new(ranges(3, LONG, LONG + GAP + 1));
+        assert_eq!(fetched(&mut plan, &[0]), [0..LONG, LONG + GAP + 1..2 * LONG + GAP + 1]);
         let never = |range| Pending::begin(range, || Ok(Vec::new()));
         assert!(plan.take(&(0..99), &never).is_none());
-        assert_eq!(joined(ranges(3, 100, 101 + GAP), u64::MAX).len(), 3);
-        assert_eq!(joined(ranges(3, 100, 100 + GAP), 1000 + GAP), [0..200 + GAP, 200 + 2 * GAP..300 + 2 * GAP]);
+        assert_eq!(joined(ranges(3, 100, 201), u64::MAX).len(), 3, "gaps are no more than half of what is wanted");
+        assert_eq!(joined(ranges(3, 100, 140), u64::MAX), [0..380]);
+        assert_eq!(joined(ranges(3, 100, 140), 300), [0..240, 280..380]);
     }
 }

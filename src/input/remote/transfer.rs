@@ -100,18 +100,21 @@ impl Transfer<'_> {
         let answer = self.address.ask(&headers)?;
         match answer.status().as_u16() {
             206 => self.take(answer, first),
+            200 if self.version.is_none() && answer.body().content_length() == Some(0) => {
+                self.version = Some(Version::of(answer.headers(), 0));
+                Ok(())
+            }
             200 => Err(Failure::new(
                 FailureKind::Unsuitable,
                 "the server does not send parts of files (it ignores the header Range): download the file and name the copy",
             )),
             412 => Err(changed("the server says 412 Precondition Failed")),
-            416 => match (&self.version, size_after(answer.headers())) {
-                (None, Some(0)) => {
-                    self.version = Some(Version::of(answer.headers(), 0));
-                    Ok(())
-                }
-                _ => Err(changed("the server says 416 Range Not Satisfiable")),
-            },
+            // Nobody has a part of an empty file.
+            416 if self.version.is_none() && size_after(answer.headers()).unwrap_or(0) == 0 => {
+                self.version = Some(Version::of(answer.headers(), 0));
+                Ok(())
+            }
+            416 => Err(changed("the server says 416 Range Not Satisfiable")),
             _ => Err(refusal(answer, self.address)),
         }
     }

@@ -13,7 +13,7 @@ use crate::{Result, interrupt};
 const LOOK: Duration = Duration::from_millis(50);
 
 /// The stack of a thread that fetches.
-const STACK: usize = 1 << 19;
+const STACK: usize = 1 << 20;
 
 /// The bytes of all windows that are held or under way.
 static HELD: AtomicU64 = AtomicU64::new(0);
