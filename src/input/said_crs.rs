@@ -67,8 +67,8 @@ fn refuse_map_of_degrees(source: &Source, named: &Crs, options: &InputOptions) -
         return Ok(());
     }
     Err(Error::Config(format!(
-        "{}: its columns are named as degrees (x from {} to {}, y from {} to {}), but {} is a map, whose coordinates are lengths: name what the \
-         degrees are in, such as missing_crs = \"EPSG:4326\" for longitude and latitude of WGS 84, together with to_crs; if they are no \
+        "{}: its columns are named as degrees (x from {} to {}, y from {} to {}), but {} is a map, whose coordinates are \
+         lengths: name what the degrees are in, such as missing_crs = \"EPSG:4326\" for longitude and latitude of WGS 84, together with to_crs; if they are no \
          degrees, set [input] unit, for example to \"metre\"",
         source.path.display(),
         source.min[0],

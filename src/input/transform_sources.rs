@@ -94,8 +94,8 @@ fn refuse_impossible_latitudes(sources: &[Source], said: &[Crs]) -> Result<()> {
     let mut all = sources.iter().zip(said);
     match all.find(|(source, crs)| is_impossible(source, crs)) {
         Some((source, crs)) => Err(Error::Config(format!(
-            "{}: y is from {} to {}, and no latitude of {} is beyond 90 degrees: if x and y are exchanged, name the columns `lat` and `lon`, \
-             or say with `columns` under [input.csv] which is which; if they are no degrees, name another CRS",
+            "{}: y is from {} to {}, and no latitude of {} is beyond 90 degrees: if x and y are exchanged, name the columns `lat` and \
+             `lon`, or say with `columns` under [input.csv] which is which; if they are no degrees, name another CRS",
             source.path.display(),
             source.min[1],
             source.max[1],

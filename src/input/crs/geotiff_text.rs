@@ -181,7 +181,9 @@ pub(crate) fn problem_of_angles(keys: &GeoKeys, of_code: Option<&str>) -> Option
     let known = of_code.and_then(|text| find(text, &GEOGRAPHIC));
     let wanted = known.map_or(1.0, |system| degrees(system.unit()));
     let is_same = angle(keys).is_some_and(|angle| (angle - wanted).abs() < 1e-9);
-    (!is_same).then(|| format!("GeoTIFF key {ANGULAR_UNIT}, the unit of longitude and latitude, has the code {code}, which is not the degree"))
+    (!is_same).then(|| {
+        format!("GeoTIFF key {ANGULAR_UNIT}, the unit of longitude and latitude, has the code {code}, not that of its system")
+    })
 }
 
 /// Returns the geographic system: that of the code, that of the datum's code, or one with the ellipsoid that the keys give.

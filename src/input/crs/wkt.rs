@@ -160,8 +160,8 @@ pub(crate) fn is_compound(text: &str) -> bool {
     COMPOUND.iter().any(|keyword| text.trim_start().starts_with(keyword))
 }
 
-/// Returns the parts of a compound system, or the system itself. Of bound systems these are the source systems, whether the whole is bound or
-/// its parts are.
+/// Returns the parts of a compound system, or the system itself. Of bound systems these are the source systems, whether the whole is
+/// bound or its parts are.
 pub(crate) fn parts(node: &WktNode) -> Vec<&WktNode> {
     let node = unbound(node);
     if COMPOUND.contains(&node.keyword.as_str()) { node.children().map(unbound).collect() } else { vec![node] }
