@@ -184,7 +184,9 @@ fn sides_at_lakes(features: &[Feature], options: &BreaklineOptions) -> Vec<[Site
 /// other lakes or at their shores. `pairs` are the subsegments, and `moved` is how far lines may move.
 fn check_cover(features: &[Feature], options: &BreaklineOptions, pairs: &[[Site; 2]], moved: f64) {
     let near = |p: Site, segments: &[[Site; 2]]| segments.iter().any(|s| distance(*s, p) <= moved + 1.0);
-    let holds = |p: Site| options.within.is_none_or(|within| exact::holds(&within, p));
+    // Samples are rounded, so those on the border may lie outside.
+    let inside = |within: Bounds<2>| Bounds { min: within.min.map(|v| v + 1), max: within.max.map(|v| v - 1) };
+    let holds = |p: Site| options.within.is_none_or(|within| exact::holds(&inside(within), p));
     for (i, feature) in features.iter().enumerate() {
         let others: Vec<Feature> = features[..i].iter().chain(&features[i + 1..]).cloned().collect();
         let lakes: Vec<Feature> = others.into_iter().filter(|other| other.kind == FeatureKind::Lake).collect();
