@@ -1,12 +1,15 @@
-//! From features to segments: vertices are checked, repeated ones left out, heights that are missing here and there filled in.
+//! From features to segments: vertices are checked, repeated ones left out, heights that are missing here and there filled in, and what lies
+//! outside the box of the job is cut off.
 
+use crate::breaklines::clip::{clipped, clipped_shore};
 use crate::breaklines::error::BreaklineError;
-use crate::breaklines::exact::{distance2, round};
+use crate::breaklines::exact::{distance2, holds, round};
 use crate::breaklines::feature::{Feature, FeatureId, FeatureKind, Vertex};
 use crate::breaklines::findings::{Findings, Rise, Uneven, worst};
 use crate::breaklines::options::BreaklineOptions;
 use crate::geometry::Site;
 use crate::geometry::lattice::REACH;
+use crate::interrupt;
 use std::cmp::Reverse;
 
 /// A segment of a feature, between two different places.
@@ -16,7 +19,9 @@ pub(crate) struct Segment {
     pub(crate) ends: [Site; 2],
     /// The kind of its feature.
     pub(crate) kind: FeatureKind,
-    /// The heights of the ends, if the file has them.
+    /// The ends before it was cut off at the box.
+    pub(crate) whole: [Site; 2],
+    /// The heights of those, if the file has them.
     pub(crate) z: [Option<i32>; 2],
     /// Its feature.
     pub(crate) id: FeatureId,
@@ -34,9 +39,11 @@ pub(crate) fn segments_of(
     findings: &mut Findings,
 ) -> Result<(Vec<Segment>, u32), BreaklineError> {
     let mut ordered: Vec<&Feature> = features.iter().collect();
-    ordered.sort_unstable_by_key(|feature| (feature.id, feature.kind));
+    // The parts of a feature share its id.
+    ordered.sort_unstable_by(|a, b| (a.id, a.kind, &a.paths).cmp(&(b.id, b.kind, &b.paths)));
     let mut cleaner = Cleaner { options, findings, segments: Vec::new(), lakes: 0 };
     for feature in ordered {
+        interrupt::check()?;
         check_reach(feature)?;
         match feature.kind {
             FeatureKind::Lake => cleaner.lake(feature),
@@ -45,6 +52,8 @@ pub(crate) fn segments_of(
     }
     let Cleaner { mut segments, lakes, .. } = cleaner;
     segments.sort_unstable();
+    // Of lines that are the same, the first says all. Of lakes, it counts how often a shore goes over a segment.
+    segments.dedup_by(|next, first| next.lake == u32::MAX && Segment { id: first.id, ..*next } == *first);
     findings.features = features.len() as u64;
     findings.segments = segments.len() as u64;
     worst(&mut findings.worst_rises, |rise| Reverse(rise.steps));
@@ -78,15 +87,29 @@ impl Cleaner<'_> {
         let uneven = range.filter(is_uneven);
         self.findings.uneven_lakes += u64::from(uneven.is_some());
         self.findings.worst_uneven.extend(uneven);
+        let mut rings: Vec<[Site; 2]> = Vec::new();
         for path in &feature.paths {
-            let mut ring: Vec<Vertex> = path.iter().map(|v| Vertex { place: v.place, z: height }).collect();
+            let mut ring: Vec<Site> = path.iter().map(|v| v.place).collect();
             ring.dedup();
             self.findings.repeated_vertices += (path.len() - ring.len()) as u64;
             ring.extend(ring.first().copied().filter(|first| Some(first) != ring.last()));
             // A closed ring repeats its first vertex, so three different ones make four.
-            if ring.len() < 4 { self.findings.empty_paths += 1 } else { self.add(feature, &ring) }
+            if ring.len() < 4 { self.findings.empty_paths += 1 } else { rings.extend(ring.windows(2).map(in_order)) }
         }
+        self.shore(feature, height, rings);
         self.lakes += 1;
+    }
+
+    /// Adds the shore that a lake with these rings has in the box.
+    fn shore(&mut self, feature: &Feature, height: Option<i32>, rings: Vec<[Site; 2]>) {
+        let (shore, border) = match self.options.within {
+            Some(within) => clipped_shore(&rings, within),
+            None => (rings, Vec::new()),
+        };
+        self.findings.lakes_at_border += u64::from(!border.is_empty());
+        let Feature { kind, id, .. } = *feature;
+        let segment = |ends| Segment { ends, kind, whole: ends, z: [height; 2], id, lake: self.lakes };
+        self.segments.extend(shore.into_iter().chain(border).map(segment));
     }
 
     fn lines(&mut self, feature: &Feature) -> Result<(), BreaklineError> {
@@ -98,7 +121,7 @@ impl Cleaner<'_> {
                 kept.z = if repeats { kept.z.into_iter().chain(next.z).min() } else { kept.z };
                 repeats
             });
-            self.check_walls(feature.id, path, &line)?;
+            self.check_walls(feature.id, path)?;
             self.findings.repeated_vertices += (path.len() - line.len()) as u64;
             if line.len() < 2 {
                 self.findings.empty_paths += 1;
@@ -109,6 +132,8 @@ impl Cleaner<'_> {
             self.add(feature, &line);
         }
         let is_river = feature.kind == FeatureKind::River;
+        let has_no_height = feature.paths.iter().flatten().all(|v| v.z.is_none());
+        self.findings.rivers_without_heights += u64::from(is_river && has_no_height);
         if let Some(rise) = rise.filter(|rise| is_river && rise.steps > self.options.height_tolerance) {
             self.findings.rising_rivers += 1;
             self.findings.worst_rises.push(rise);
@@ -116,32 +141,39 @@ impl Cleaner<'_> {
         Ok(())
     }
 
-    /// Refuses a line that has two heights at one place. `line` is the path without repeated vertices. A closed line may end at another
-    /// height than it starts: that is found where heights disagree.
-    fn check_walls(&self, id: FeatureId, path: &[Vertex], line: &[Vertex]) -> Result<(), BreaklineError> {
-        let closed = line.len() > 2 && line.first().map(|v| v.place) == line.last().map(|v| v.place);
-        let mut known: Vec<(Site, i32)> = line[usize::from(closed)..].iter().filter_map(known_height).collect();
-        known.sort_unstable();
-        let apart = known.chunk_by(|one, other| one.0 == other.0).map(<[_]>::to_vec);
-        let together = path.chunk_by(|one, other| one.place == other.place);
-        let together =
-            together.filter(|same| same.len() > 1).map(|same| same.iter().filter_map(known_height).collect());
-        let heights =
-            |same: Vec<(Site, i32)>| Some((same.iter().min()?.0, [same.iter().min()?.1, same.iter().max()?.1]));
+    /// Refuses a line that goes straight up at a vertex in the box. One that comes back to a place at another height is found where heights
+    /// disagree.
+    fn check_walls(&self, id: FeatureId, path: &[Vertex]) -> Result<(), BreaklineError> {
+        let is_in_box = |place: Site| self.options.within.is_none_or(|within| holds(&within, place));
+        let together = path.chunk_by(|one, other| one.place == other.place).filter(|same| is_in_box(same[0].place));
+        let heights = |same: &[Vertex]| {
+            let known = || same.iter().filter_map(|vertex| vertex.z);
+            Some((same[0].place, [known().min()?, known().max()?]))
+        };
         let is_wall = |(_, [low, high]): &(Site, [i32; 2])| high.abs_diff(*low) > self.options.height_tolerance;
-        let wall = apart.chain(together).filter_map(heights).filter(is_wall).min();
+        let wall = together.filter_map(heights).filter(is_wall).min();
         wall.map_or(Ok(()), |(place, heights)| Err(BreaklineError::Wall { id, place, heights }))
     }
 
-    /// Adds the segments of a path whose neighbouring vertices differ.
+    /// Adds what lies in the box of the segments of a path whose neighbouring vertices differ.
     fn add(&mut self, feature: &Feature, path: &[Vertex]) {
-        let lake = if feature.kind == FeatureKind::Lake { self.lakes } else { u32::MAX };
         for pair in path.windows(2) {
             let [a, b] = if pair[0].place < pair[1].place { [pair[0], pair[1]] } else { [pair[1], pair[0]] };
-            let (kind, id) = (feature.kind, feature.id);
-            self.segments.push(Segment { ends: [a.place, b.place], z: [a.z, b.z], kind, id, lake });
+            let whole = [a.place, b.place];
+            let in_box = self.options.within.map_or(Some(whole), |within| clipped(whole, within));
+            let ends = in_box.filter(|[a, b]| a != b);
+            let cut_off = ends.map_or(1, |ends| u64::from(ends[0] != whole[0]) + u64::from(ends[1] != whole[1]));
+            self.findings.pieces_outside += cut_off;
+            let Feature { kind, id, .. } = *feature;
+            let segment = |ends| Segment { ends, kind, whole, z: [a.z, b.z], id, lake: u32::MAX };
+            self.segments.extend(ends.map(segment));
         }
     }
+}
+
+/// Returns the segment between neighbouring vertices, the lesser first.
+fn in_order(pair: &[Site]) -> [Site; 2] {
+    [pair[0].min(pair[1]), pair[0].max(pair[1])]
 }
 
 fn known_height(vertex: &Vertex) -> Option<(Site, i32)> {

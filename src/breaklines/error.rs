@@ -24,10 +24,20 @@ pub enum BreaklineError {
         /// The place in lattice coordinates.
         place: Site,
     },
+    /// The process was asked to stop.
+    #[error("interrupted")]
+    Interrupted,
     /// The lines would need more sites than the options allow.
     #[error("the breaklines need more than {most} vertices")]
     TooMany {
         /// The most sites that are allowed.
         most: usize,
     },
+}
+
+/// For [`crate::interrupt::check`], which has no other error.
+impl From<crate::Error> for BreaklineError {
+    fn from(_: crate::Error) -> BreaklineError {
+        BreaklineError::Interrupted
+    }
 }

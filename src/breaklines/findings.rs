@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 pub struct Findings {
     /// Features that were given.
     pub features: u64,
-    /// Segments between two different vertices of a feature.
+    /// Segments between two different vertices of a feature, as far as they lie in the box of the options. Of lines that are the same, one
+    /// counts. Where the box cuts a lake, its border there counts too.
     pub segments: u64,
     /// Subsegments, each of which is an edge of the mesh.
     pub subsegments: u64,
@@ -23,12 +24,25 @@ pub struct Findings {
     pub empty_paths: u64,
     /// Vertices that a neighbour within the floor took the place of.
     pub snapped_vertices: u64,
-    /// Places where segments cross, other than at a vertex.
+    /// Places where segments cross, other than at a vertex. Many may cross at one.
     pub crossings: u64,
-    /// Pieces of lines that lie inside a lake, and were left out.
+    /// Pieces of lines and of shores that lie inside another lake, and were left out.
     pub pieces_in_lakes: u64,
-    /// Pieces outside the box of the options, which were left out.
+    /// The features that lost most to a lake, without rivers, which are drawn through lakes as a matter of course.
+    #[serde(default)]
+    pub worst_in_lakes: Vec<InLake>,
+    /// Pieces of lines outside the box of the options, which were cut off.
     pub pieces_outside: u64,
+    /// Lakes that the box of the options cuts. They go as far as its border, which is their shore there.
+    #[serde(default)]
+    pub lakes_at_border: u64,
+    /// Rivers that take their heights from the points around. Whether they rise is not looked at.
+    #[serde(default)]
+    pub rivers_without_heights: u64,
+    /// Places where features meet of which one has heights and another takes them from the points around. Whether these disagree is not looked
+    /// at.
+    #[serde(default)]
+    pub places_not_compared: u64,
     /// Places where heights disagree.
     pub disagreements: u64,
     /// The worst of them.
@@ -63,6 +77,19 @@ pub struct Disagreement {
     pub kept: (FeatureId, i32),
     /// The feature whose height differs most from it, and that height.
     pub other: (FeatureId, i32),
+}
+
+/// A feature with a part inside a lake.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct InLake {
+    /// The feature.
+    pub id: FeatureId,
+    /// The lake; of several, the first.
+    pub lake: FeatureId,
+    /// About how many lattice steps of the feature lie inside lakes.
+    pub length: u64,
+    /// The middle of a piece of it inside the lake.
+    pub place: Site,
 }
 
 /// A river that rises.

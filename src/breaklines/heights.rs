@@ -1,13 +1,17 @@
 //! Heights of sites, from the segments that go over them.
 
 use crate::breaklines::clean::Segment;
+use crate::breaklines::edge_table::Edge;
+use crate::breaklines::error::BreaklineError;
 use crate::breaklines::exact::{distance2, dot, round};
+use crate::breaklines::fast_hash::FastMap;
 use crate::breaklines::feature::{FeatureId, FeatureKind};
 use crate::breaklines::findings::{Disagreement, Findings, worst};
 use crate::breaklines::net::Net;
 use crate::breaklines::options::BreaklineOptions;
 use crate::breaklines::site::BreaklineSite;
 use crate::geometry::Site;
+use crate::interrupt;
 use std::cmp::Reverse;
 
 /// The height that a segment gives a site. Of several the least holds: the lake before the river before the line, a height before none,
@@ -19,57 +23,86 @@ struct Candidate {
     has_none: bool,
     z: i32,
     id: FeatureId,
+    lake: u32,
     /// How much the height may be wrong because the site does not lie on the segment, by the segment's slope.
     slack: u32,
 }
 
 /// Returns the sites of the subsegments with their heights, sorted by y, then x, and notes where heights disagree.
+///
+/// # Errors
+/// [`BreaklineError::Interrupted`].
 pub(crate) fn sites_with_heights(
     net: &Net,
     segments: &[Segment],
     options: &BreaklineOptions,
     findings: &mut Findings,
-) -> Vec<BreaklineSite> {
-    let mut candidates = candidates(net, segments, options.floor);
-    candidates.sort_unstable();
-    candidates.dedup();
-    let mut sites = Vec::new();
-    for group in candidates.chunk_by(|one, other| one.site == other.site) {
-        let Some(first) = group.first() else { continue };
-        let place = net.sites.place(first.site);
-        sites.push(BreaklineSite { place, z: (!first.has_none).then_some(first.z), kind: first.kind, id: first.id });
-        if let Some(other) = disagreeing(group, options.height_tolerance) {
-            findings.disagreements += 1;
-            findings.worst_disagreements.push(Disagreement { place, kept: (first.id, first.z), other });
-            if findings.worst_disagreements.len() > 100 * Findings::MOST {
-                worst(&mut findings.worst_disagreements, by_difference);
-            }
+) -> Result<Vec<BreaklineSite>, BreaklineError> {
+    // Hundreds of segments may go over a site, so candidates are looked at twice, and not kept.
+    let mut first: Vec<Option<Candidate>> = vec![None; net.sites.len()];
+    for_each_candidate(net, segments, options.floor, |candidate| {
+        let known = &mut first[candidate.site as usize];
+        *known = known.iter().copied().chain([candidate]).min();
+    })?;
+    let mut others: FastMap<u32, Candidate> = FastMap::default();
+    let mut not_compared: FastMap<u32, ()> = FastMap::default();
+    for_each_candidate(net, segments, options.floor, |candidate| {
+        let Some(first) = first[candidate.site as usize] else { return };
+        if first.has_none != candidate.has_none {
+            not_compared.insert(candidate.site, ());
+        } else if disagrees(&first, &candidate, options.height_tolerance) {
+            let worst = others.entry(candidate.site).or_insert(candidate);
+            let by = |other: &Candidate| (other.z.abs_diff(first.z), Reverse(other.id), other.z);
+            *worst = if by(worst) < by(&candidate) { candidate } else { *worst };
         }
-    }
+    })?;
+    findings.places_not_compared = not_compared.len() as u64;
+    findings.disagreements = others.len() as u64;
+    let found = others.into_iter().filter_map(|(site, other)| {
+        let (place, kept) = (net.sites.place(site), first[site as usize]?);
+        Some(Disagreement { place, kept: (kept.id, kept.z), other: (other.id, other.z) })
+    });
+    findings.worst_disagreements = found.collect();
     worst(&mut findings.worst_disagreements, by_difference);
+    let site = |first: Candidate| BreaklineSite {
+        place: net.sites.place(first.site),
+        z: (!first.has_none).then_some(first.z),
+        kind: first.kind,
+        id: first.id,
+        lake: Some(first.lake).filter(|_| first.kind == FeatureKind::Lake),
+    };
+    let mut sites: Vec<BreaklineSite> = first.iter().flatten().copied().map(site).collect();
     sites.sort_unstable_by_key(|site| (site.place[1], site.place[0]));
-    sites
+    Ok(sites)
 }
 
 fn by_difference(found: &Disagreement) -> Reverse<u32> {
     Reverse(found.kept.1.abs_diff(found.other.1))
 }
 
-/// Returns what every segment says about the sites of its subsegments.
-fn candidates(net: &Net, segments: &[Segment], floor: u32) -> Vec<Candidate> {
-    let mut candidates = Vec::new();
-    for edge in net.edges.alive() {
-        let edge = net.edges.edges[edge as usize];
-        for (owner, _) in net.edges.owners.of(edge.owners) {
-            let segment = &segments[owner as usize];
-            candidates.extend(edge.ends.map(|site| candidate(site, net.sites.place(site), segment, floor)));
+/// Calls `found` with what every segment says about the sites of its subsegments.
+fn for_each_candidate(
+    net: &Net,
+    segments: &[Segment],
+    floor: u32,
+    mut found: impl FnMut(Candidate),
+) -> Result<(), BreaklineError> {
+    // Taking a set apart takes longer than looking at its segments, so edges with the same one are looked at together.
+    let mut edges: Vec<Edge> = net.edges.alive().map(|edge| net.edges.edges[edge as usize]).collect();
+    edges.sort_unstable_by_key(|edge| (edge.owners, edge.ends));
+    for same in edges.chunk_by(|one, other| one.owners == other.owners) {
+        interrupt::check()?;
+        let owners = net.edges.owners.of(same[0].owners);
+        for site in same.iter().flat_map(|edge| edge.ends) {
+            let place = net.sites.place(site);
+            owners.iter().for_each(|(owner, _)| found(candidate(site, place, &segments[*owner as usize], floor)));
         }
     }
-    candidates
+    Ok(())
 }
 
 fn candidate(site: u32, place: Site, segment: &Segment, floor: u32) -> Candidate {
-    let Segment { kind, id, ends, z, .. } = *segment;
+    let Segment { kind, id, whole: ends, z, lake, .. } = *segment;
     let height = |[from, to]: [i32; 2]| {
         let rise = i128::from(to) - i128::from(from);
         let length2 = distance2(ends[0], ends[1]);
@@ -82,18 +115,14 @@ fn candidate(site: u32, place: Site, segment: &Segment, floor: u32) -> Candidate
     match z {
         [Some(from), Some(to)] => {
             let (z, slack) = height([from, to]);
-            Candidate { site, kind, has_none: false, z, id, slack }
+            Candidate { site, kind, has_none: false, z, id, lake, slack }
         }
-        _ => Candidate { site, kind, has_none: true, z: 0, id, slack: 0 },
+        _ => Candidate { site, kind, has_none: true, z: 0, id, lake, slack: 0 },
     }
 }
 
-/// Returns the feature whose height differs most from the one that holds, if it differs by more than the tolerance and what the
-/// slopes explain.
-fn disagreeing(group: &[Candidate], tolerance: u32) -> Option<(FeatureId, i32)> {
-    let first = group.first().filter(|first| !first.has_none)?;
-    let allowed = |other: &Candidate| u64::from(tolerance) + u64::from(first.slack) + u64::from(other.slack);
-    let others = group.iter().filter(|other| !other.has_none && u64::from(other.z.abs_diff(first.z)) > allowed(other));
-    let most = others.max_by_key(|other| (other.z.abs_diff(first.z), Reverse(other.id)))?;
-    Some((most.id, most.z))
+/// Returns whether the heights differ by more than the tolerance and what the slopes explain.
+fn disagrees(first: &Candidate, other: &Candidate, tolerance: u32) -> bool {
+    let allowed = u64::from(tolerance) + u64::from(first.slack) + u64::from(other.slack);
+    !first.has_none && u64::from(other.z.abs_diff(first.z)) > allowed
 }

@@ -64,6 +64,22 @@ impl Lakes {
         self.boxes.any(|bounds| point.can_meet(bounds), |lake| wanted(lake) && self.is_inside(point, lake))
     }
 
+    /// Returns the first lake that the point is inside and that passes `wanted`.
+    pub(crate) fn first_around(&self, point: Fraction, wanted: impl Fn(u32) -> bool) -> Option<u32> {
+        let mut first: Option<u32> = None;
+        self.boxes.any(
+            |bounds| point.can_meet(bounds),
+            |lake| {
+                let is_earlier = first.is_none_or(|first| lake < first);
+                if is_earlier && wanted(lake) && self.is_inside(point, lake) {
+                    first = Some(lake);
+                }
+                false
+            },
+        );
+        first
+    }
+
     fn is_inside(&self, point: Fraction, lake: u32) -> bool {
         let mut inside = false;
         self.shores[lake as usize].any(

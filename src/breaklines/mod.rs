@@ -7,6 +7,11 @@
 //! in one are dropped. No constrained triangulation is needed, and the mesh stays the Delaunay triangulation of its sites. A point p lies
 //! in the closed disc of ab if (a - p) . (b - p) <= 0, which whole numbers decide.
 //!
+//! # Where they end
+//! Everything is cut to the box of the points before anything else, and all sites lie in it; `clip.rs` says why. A lake that goes on beyond the
+//! box gets a shore along its border. So the lake is closed, and all of it that is in the box is inside or on its shore: its points are dropped,
+//! since those on the shore lie in closed discs.
+//!
 //! What is dropped depends on the lines alone, not on the other points, so tiles, parts, threads and machines agree.
 //!
 //! # How it is used
@@ -16,8 +21,10 @@
 
 mod box_tree;
 mod clean;
+mod clip;
 mod cut;
 mod drop_index;
+mod drowned;
 mod edge_table;
 mod error;
 mod exact;
@@ -41,7 +48,7 @@ mod tests;
 
 pub use error::BreaklineError;
 pub use feature::{Feature, FeatureId, FeatureKind, Vertex};
-pub use findings::{Disagreement, Findings, Rise, Uneven};
+pub use findings::{Disagreement, Findings, InLake, Rise, Uneven};
 pub use nearest_heights::{NearestHeights, NearestPoint};
 pub use options::BreaklineOptions;
 pub use result::Breaklines;

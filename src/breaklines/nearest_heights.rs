@@ -2,10 +2,11 @@
 
 use crate::breaklines::box_tree::BoxTree;
 use crate::breaklines::exact::{distance2, grown, meet};
-use crate::breaklines::feature::{FeatureId, FeatureKind};
+use crate::breaklines::feature::FeatureKind;
 use crate::breaklines::result::Breaklines;
 use crate::geometry::{Bounds, Site};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// The nearest point that was found for a site: the square of its distance, and its height. The nearer one is less.
 pub type NearestPoint = (u64, i32);
@@ -14,11 +15,18 @@ pub type NearestPoint = (u64, i32);
 /// lowest counts, so neither the order of points nor the cut into chunks matters: threads collect for themselves, and join.
 #[derive(Clone, Debug)]
 pub struct NearestHeights {
+    /// All collections for the same breaklines share it.
+    wanted: Arc<Wanted>,
+    nearest: Vec<Option<NearestPoint>>,
+}
+
+/// The sites that need a height.
+#[derive(Debug)]
+struct Wanted {
     places: Vec<Site>,
     /// The squares around the places in which points count.
     squares: BoxTree<u32>,
     bounds: Option<Bounds<2>>,
-    nearest: Vec<Option<NearestPoint>>,
 }
 
 impl NearestHeights {
@@ -29,20 +37,22 @@ impl NearestHeights {
         let reach = breaklines.options().spacing.saturating_mul(2).min(1 << 30);
         let squares: Vec<_> = places.iter().map(|&place| grown(Bounds::of_point(place), reach)).zip(0..).collect();
         let bounds = squares.iter().map(|(square, _)| *square).reduce(Bounds::union);
-        NearestHeights { nearest: vec![None; places.len()], squares: BoxTree::new(squares), bounds, places }
+        let nearest = vec![None; places.len()];
+        NearestHeights { nearest, wanted: Arc::new(Wanted { squares: BoxTree::new(squares), bounds, places }) }
     }
 
     /// Returns whether no site needs a height.
     pub fn is_empty(&self) -> bool {
-        self.places.is_empty()
+        self.wanted.places.is_empty()
     }
 
     /// Takes a point of the cloud into account. Points that breaklines drop count too.
     #[inline]
     pub fn offer(&mut self, place: Site, z: i32) {
         let point = Bounds::of_point(place);
-        if self.bounds.is_some_and(|bounds| meet(&bounds, &point)) {
-            let NearestHeights { places, squares, nearest, .. } = self;
+        let NearestHeights { wanted, nearest } = self;
+        let Wanted { places, squares, bounds } = &**wanted;
+        if bounds.is_some_and(|bounds| meet(&bounds, &point)) {
             squares.meeting(&point, |site| {
                 let found = (distance2(places[site as usize], place) as u64, z);
                 let known = &mut nearest[site as usize];
@@ -80,9 +90,11 @@ impl NearestHeights {
 
 /// Gives all sites of a lake the same height.
 fn level_lakes(breaklines: &Breaklines, missing: &[usize], heights: &mut [Option<i32>]) {
-    let mut lakes: BTreeMap<FeatureId, Vec<usize>> = BTreeMap::new();
-    for &i in missing.iter().filter(|&&i| breaklines.sites()[i].kind == FeatureKind::Lake) {
-        lakes.entry(breaklines.sites()[i].id).or_default().push(i);
+    // By lake and not by feature: one feature may be many ponds.
+    let mut lakes: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+    for &i in missing {
+        let Some(lake) = breaklines.sites()[i].lake else { continue };
+        lakes.entry(lake).or_default().push(i);
     }
     for sites in lakes.values() {
         let mut found: Vec<i32> = sites.iter().filter_map(|&i| heights[i]).collect();

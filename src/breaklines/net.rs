@@ -2,18 +2,23 @@
 
 use crate::breaklines::clean::Segment;
 use crate::breaklines::cut::cuts;
+use crate::breaklines::drowned::Drowned;
 use crate::breaklines::edge_table::{Edge, EdgeTable};
 use crate::breaklines::error::BreaklineError;
-use crate::breaklines::exact::{grown, holds, in_disc};
+use crate::breaklines::exact::in_disc;
 use crate::breaklines::feature::FeatureKind;
 use crate::breaklines::findings::Findings;
 use crate::breaklines::lakes::{Fraction, Lakes};
-use crate::breaklines::node::{Noding, inner_box};
+use crate::breaklines::node::Noding;
 use crate::breaklines::options::BreaklineOptions;
-use crate::breaklines::owners::Owners;
+use crate::breaklines::owners::{Owner, Owners};
 use crate::breaklines::refine::refine;
 use crate::breaklines::site_table::SiteTable;
 use crate::geometry::Site;
+use crate::interrupt;
+
+/// Between so many steps it is checked whether the process should stop.
+const SOME: usize = 1 << 12;
 
 /// The subsegments of all lines.
 #[derive(Debug)]
@@ -27,7 +32,7 @@ pub(crate) struct Net {
 /// Makes subsegments of `segments`, which are sorted, with `lakes` lakes.
 ///
 /// # Errors
-/// [`BreaklineError::TooMany`].
+/// [`BreaklineError::TooMany`] and [`BreaklineError::Interrupted`].
 pub(crate) fn net_of(
     segments: &[Segment],
     lakes: u32,
@@ -35,14 +40,14 @@ pub(crate) fn net_of(
     findings: &mut Findings,
 ) -> Result<Net, BreaklineError> {
     let mut sites = snapped_vertices(segments, options, findings);
-    let whole = joined_segments(segments, &mut sites);
+    let whole = joined_segments(segments, &mut sites, options)?;
     let paths = Noding { sites: &mut sites, edges: &whole, options, findings }.paths()?;
-    let pieces = pieces_of(&whole, &paths, &sites);
-    let (kept, left_out) = choose(segments, lakes, pieces, &sites, options, findings);
+    let pieces = pieces_of(whole, &paths, &sites, options)?;
+    let (kept, left_out) = choose(segments, lakes, pieces, &sites, findings)?;
     let mut edges = cut(kept, &mut sites, options)?;
     refine(&mut sites, &mut edges, options.most_sites)?;
-    let shores = shores_of(segments, &edges, &sites).chain(left_out);
-    let lakes = Lakes::new(lakes, shores.collect::<Vec<_>>());
+    let shores = shores_of(segments, &edges, &sites).into_iter().chain(left_out);
+    let lakes = Lakes::new(lakes, shores);
     Ok(Net { sites, edges, lakes })
 }
 
@@ -61,7 +66,11 @@ fn snapped_vertices(segments: &[Segment], options: &BreaklineOptions, findings: 
 }
 
 /// Returns one edge for all segments between the same sites.
-fn joined_segments(segments: &[Segment], sites: &mut SiteTable) -> EdgeTable {
+fn joined_segments(
+    segments: &[Segment],
+    sites: &mut SiteTable,
+    options: &BreaklineOptions,
+) -> Result<EdgeTable, BreaklineError> {
     let mut edges = EdgeTable::new(Owners::new(segments.len()));
     for (segment, owner) in segments.iter().zip(0..) {
         let [a, b] = segment.ends.map(|end| sites.nearest_or_new(end));
@@ -69,70 +78,101 @@ fn joined_segments(segments: &[Segment], sites: &mut SiteTable) -> EdgeTable {
             edges.add(sites, [a, b], owner);
         }
     }
-    edges
+    check_count(&edges, options)?;
+    Ok(edges)
+}
+
+/// Refuses more edges, or sets of segments that lie on one another, than sites are allowed.
+fn check_count(edges: &EdgeTable, options: &BreaklineOptions) -> Result<(), BreaklineError> {
+    interrupt::check()?;
+    // Where all lines are drawn twice or more, each site has an edge or two, and each edge has a set.
+    let most = options.most_sites.saturating_mul(3);
+    let is_much = edges.edges.len() > most || edges.owners.len() > most;
+    if is_much { Err(BreaklineError::TooMany { most: options.most_sites }) } else { Ok(()) }
 }
 
 /// Returns the pieces between the sites on the ways of edges.
-fn pieces_of(whole: &EdgeTable, paths: &[Vec<u32>], sites: &SiteTable) -> EdgeTable {
-    let mut pieces = EdgeTable::new(whole.owners.clone());
-    for (edge, path) in whole.edges.iter().zip(paths) {
+fn pieces_of(
+    whole: EdgeTable,
+    paths: &[Vec<u32>],
+    sites: &SiteTable,
+    options: &BreaklineOptions,
+) -> Result<EdgeTable, BreaklineError> {
+    let mut pieces = EdgeTable::new(whole.owners);
+    for (number, (edge, path)) in whole.edges.iter().zip(paths).enumerate() {
         for pair in path.windows(2).filter(|pair| pair[0] != pair[1]) {
             pieces.add(sites, [pair[0], pair[1]], edge.owners);
         }
+        if number % SOME == 0 {
+            check_count(&pieces, options)?;
+        }
     }
-    pieces
+    Ok(pieces)
 }
 
-/// Leaves out pieces outside the box of the options, and pieces inside lakes. Returns the others, and the shores among those left out.
-/// These are not moved any more. So where the shores of two lakes cross, a point less than a step outside both may count as inside.
+/// Leaves out pieces inside lakes. Returns the others, and the shores among those left out. These are not moved any more. So where the
+/// shores of two lakes cross, a point less than a step outside both may count as inside.
 fn choose(
     segments: &[Segment],
     lakes: u32,
     pieces: EdgeTable,
     sites: &SiteTable,
-    options: &BreaklineOptions,
     findings: &mut Findings,
-) -> (EdgeTable, Vec<(u32, [Site; 2])>) {
-    let within = options.within.map(|within| grown(inner_box(within, options.floor), options.floor));
-    let insides = Lakes::new(lakes, shores_of(segments, &pieces, sites).collect::<Vec<_>>());
-    let mut kept = EdgeTable::new(pieces.owners.clone());
-    let mut left_out = Vec::new();
-    for Edge { ends, owners, .. } in &pieces.edges {
-        let places = ends.map(|end| sites.place(end));
-        let outside = within.is_some_and(|within| !places.iter().all(|&place| holds(&within, place)));
-        let inside = || {
-            let is_own = |lake: u32| pieces.owners.of(*owners).any(|(owner, _)| segments[owner as usize].lake == lake);
-            insides.hold(Fraction::middle_of(&places), |lake| !is_own(lake))
-        };
-        if outside {
-            findings.pieces_outside += 1;
-        } else if inside() {
-            findings.pieces_in_lakes += 1;
-        } else {
-            kept.add(sites, *ends, *owners);
-            continue;
-        }
-        left_out.extend(lakes_of(segments, &pieces, *owners).into_iter().map(|lake| (lake, places)));
+) -> Result<(EdgeTable, Vec<(u32, [Site; 2])>), BreaklineError> {
+    if lakes == 0 {
+        return Ok((pieces, Vec::new()));
     }
-    (kept, left_out)
+    let insides = Lakes::new(lakes, shores_of(segments, &pieces, sites));
+    let (mut is_kept, mut left_out, mut drowned) = (Vec::new(), Vec::new(), Drowned::default());
+    for (number, Edge { ends, owners, .. }) in pieces.edges.iter().enumerate() {
+        if number % SOME == 0 {
+            interrupt::check()?;
+        }
+        let places = ends.map(|end| sites.place(end));
+        let middle = Fraction::middle_of(&places);
+        // Most pieces are far from all lakes.
+        let around = insides.hold(middle, |_| true).then(|| pieces.owners.of(*owners)).and_then(|owners| {
+            let is_own = |lake: u32| owners.iter().any(|(owner, _)| segments[*owner as usize].lake == lake);
+            Some((insides.first_around(middle, |lake| !is_own(lake))?, owners))
+        });
+        is_kept.push(around.is_none());
+        if let Some((lake, owners)) = around {
+            findings.pieces_in_lakes += 1;
+            let owned = owners.iter().map(|(owner, _)| &segments[*owner as usize]);
+            // Rivers are drawn through lakes as a matter of course.
+            let lost = owned.filter(|segment| segment.kind != FeatureKind::River).map(|segment| segment.id);
+            drowned.add(lost, lake, places);
+            left_out.extend(lakes_among(segments, &owners).into_iter().map(|lake| (lake, places)));
+        }
+    }
+    findings.worst_in_lakes = drowned.worst(segments);
+    let mut kept = EdgeTable::new(pieces.owners);
+    for (Edge { ends, owners, .. }, _) in pieces.edges.iter().zip(is_kept).filter(|(_, is_kept)| *is_kept) {
+        kept.add(sites, *ends, *owners);
+    }
+    Ok((kept, left_out))
 }
 
 /// Returns the shores of lakes among edges.
-fn shores_of<'a>(
-    segments: &'a [Segment],
-    edges: &'a EdgeTable,
-    sites: &'a SiteTable,
-) -> impl Iterator<Item = (u32, [Site; 2])> + 'a {
-    edges.alive().flat_map(move |edge| {
-        let lakes = lakes_of(segments, edges, edges.edges[edge as usize].owners);
-        lakes.into_iter().map(move |lake| (lake, edges.places(sites, edge)))
-    })
+fn shores_of(segments: &[Segment], edges: &EdgeTable, sites: &SiteTable) -> Vec<(u32, [Site; 2])> {
+    let mut shores = Vec::new();
+    // Pieces of the same segments follow one another.
+    let mut last = (u32::MAX, Vec::new());
+    for edge in edges.alive() {
+        let owners = edges.edges[edge as usize].owners;
+        if owners != last.0 {
+            last = (owners, lakes_among(segments, &edges.owners.of(owners)));
+        }
+        let places = edges.places(sites, edge);
+        shores.extend(last.1.iter().map(|lake| (*lake, places)));
+    }
+    shores
 }
 
 /// Returns the lakes whose shore goes over an edge with these owners an odd number of times.
-fn lakes_of(segments: &[Segment], edges: &EdgeTable, owners: u32) -> Vec<u32> {
-    let owners = edges.owners.of(owners).filter(|(_, is_odd)| *is_odd);
-    let mut lakes: Vec<u32> = owners.map(|(owner, _)| segments[owner as usize].lake).collect();
+fn lakes_among(segments: &[Segment], owners: &[Owner]) -> Vec<u32> {
+    let odd = owners.iter().filter(|(_, is_odd)| *is_odd);
+    let mut lakes: Vec<u32> = odd.map(|(owner, _)| segments[*owner as usize].lake).collect();
     lakes.retain(|&lake| lake != u32::MAX);
     lakes.sort_unstable();
     lakes.chunk_by(|a, b| a == b).filter(|same| same.len() % 2 == 1).map(|same| same[0]).collect()
@@ -140,8 +180,11 @@ fn lakes_of(segments: &[Segment], edges: &EdgeTable, owners: u32) -> Vec<u32> {
 
 /// Cuts pieces to the spacing.
 fn cut(pieces: EdgeTable, sites: &mut SiteTable, options: &BreaklineOptions) -> Result<EdgeTable, BreaklineError> {
-    let mut edges = EdgeTable::new(pieces.owners.clone());
-    for Edge { ends, owners, .. } in &pieces.edges {
+    let mut edges = EdgeTable::new(pieces.owners);
+    for (number, Edge { ends, owners, .. }) in pieces.edges.iter().enumerate() {
+        if number % SOME == 0 {
+            check_count(&edges, options)?;
+        }
         let [a, b] = ends.map(|end| sites.place(end));
         let mut last = ends[0];
         for place in cuts(a, b, options.spacing) {

@@ -14,7 +14,7 @@ pub struct BreaklineOptions {
     /// Two heights at one place disagree if they differ by more than this number of steps in z. The same holds for lakes that are not flat
     /// and rivers that rise.
     pub height_tolerance: u32,
-    /// Only what lies in this box becomes a subsegment: the extent of the cloud. `None` keeps all.
+    /// Only what lies in this box becomes a subsegment, its border included: the extent of the cloud. `None` keeps all.
     pub within: Option<Bounds<2>>,
     /// With more sites than this, [`crate::breaklines::Breaklines::build`] gives up, so that memory stays bounded.
     pub most_sites: usize,

@@ -20,18 +20,20 @@ use crate::breaklines::error::BreaklineError;
 use crate::breaklines::exact::{at_radius, disc_box, distance2, foot, in_disc, is_near, middle};
 use crate::breaklines::site_table::SiteTable;
 use crate::geometry::{Bounds, Site};
+use crate::interrupt;
 use rayon::prelude::*;
 
 /// Splits the edges of `edges` until no site lies in the closed disc of any but its own ends. Only ends of edges count as sites. `most` is
 /// the greatest number of sites.
 ///
 /// # Errors
-/// [`BreaklineError::TooMany`].
+/// [`BreaklineError::TooMany`] and [`BreaklineError::Interrupted`].
 pub(crate) fn refine(sites: &mut SiteTable, edges: &mut EdgeTable, most: usize) -> Result<(), BreaklineError> {
     let mut refinement =
         Refinement { sites, edges, used: Vec::new(), points: GrowingTree::default(), discs: GrowingTree::default() };
     let mut fresh: Vec<u32> = refinement.edges.alive().collect();
     while !fresh.is_empty() {
+        interrupt::check()?;
         fresh = refinement.round(fresh);
         if refinement.sites.len() > most {
             return Err(BreaklineError::TooMany { most });

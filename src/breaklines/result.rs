@@ -34,7 +34,7 @@ impl Breaklines {
         let mut findings = Findings::default();
         let (segments, lakes) = segments_of(features, options, &mut findings)?;
         let net = net_of(&segments, lakes, options, &mut findings)?;
-        let sites = sites_with_heights(&net, &segments, options, &mut findings);
+        let sites = sites_with_heights(&net, &segments, options, &mut findings)?;
         let subsegments = subsegments_of(&net, &sites);
         findings.sites = sites.len() as u64;
         findings.subsegments = subsegments.len() as u64;
@@ -266,8 +266,128 @@ mod tests {
                 .map(|s| s.place[0])
                 .fold(if end == 0 { 9 } else { -9 }, |a, b| if end == 0 { a.min(b) } else { a.max(b) })
         });
-        assert!((-500..-400).contains(&min) && max == 100, "{min} {max}");
-        assert!(found.pieces_outside > 3 && lines.drops([300, 200]) && !lines.drops([-300, 200]));
+        assert_eq!((min, max, found.pieces_outside, found.lakes_at_border), (-500, 500, 3, 1));
+        assert!(lines.drops([300, 200]) && !lines.drops([-300, 200]));
+        let [line, far, pond] = [at(&lines, [-500, 5]), at(&lines, [-500, 300]), at(&lines, [500, -300])];
+        assert_eq!((line, far, pond), (Some((0, FeatureKind::Line)), None, Some((5, FeatureKind::Lake))));
+    }
+
+    /// Neighbouring tiles cut lakes at their common border, and each has its part.
+    #[test]
+    fn lakes_reach_the_border_of_the_box_and_are_flat() {
+        let within = Bounds { min: [0, 0], max: [1000, 1000] };
+        let options = BreaklineOptions::new(100, Some(within));
+        for (ring, inside) in [
+            ([[500, -200], [1500, -200], [1500, 1200], [500, 1200]], [[1000, 0], [1000, 1000], [501, 999]]),
+            ([[700, 700], [1500, 700], [1500, 1200], [700, 1200]], [[1000, 1000], [999, 701], [800, 1000]]),
+            ([[0, 0], [1000, 0], [1000, 1000], [0, 1000]], [[1000, 1000], [0, 0], [500, 500]]),
+            ([[-1, -1], [5000, -1], [5000, 1001], [-1, 1001]], [[1000, 1000], [0, 0], [500, 500]]),
+            ([[0, 0], [1000, 0], [500, 500], [0, 0]], [[10, 1], [990, 1], [500, 490]]),
+        ] {
+            let lake = feature(FeatureKind::Lake, 0, &ring.map(|[x, y]| [x, y, 50]));
+            let (lines, _) = Breaklines::build(&[lake], &options).unwrap();
+            assert!(inside.iter().all(|place| lines.drops(*place)), "{ring:?}");
+            assert!(lines.sites().iter().all(|site| site.z == Some(50)) && lines.sites().len() > 8, "{ring:?}");
+            let ends = lines.subsegments().iter().flatten().copied();
+            let mut ends: Vec<u32> = ends.collect();
+            ends.sort_unstable();
+            assert!(ends.chunk_by(|a, b| a == b).all(|same| same.len() == 2), "{ring:?} is not closed");
+        }
+        let beside = feature(FeatureKind::Lake, 0, &[[1000, 0, 5], [2000, 0, 5], [2000, 1000, 5], [1000, 1000, 5]]);
+        let (lines, found) = Breaklines::build(&[beside], &options).unwrap();
+        assert_eq!((lines.sites().len(), found.lakes_at_border), (0, 0));
+    }
+
+    #[test]
+    fn lines_through_corners_of_the_box_and_along_its_border_stay() {
+        let within = Bounds { min: [0, 0], max: [1000, 1000] };
+        for path in [
+            [[0, 0, 1], [1000, 1000, 1]],
+            [[-500, -500, 1], [1500, 1500, 1]],
+            [[0, 0, 1], [500, 500, 1]],
+            [[-9, 1009, 1], [1009, -9, 1]],
+            [[0, 1000, 1], [1000, 1000, 1]],
+            [[0, 3, 1], [1000, 3, 1]],
+        ] {
+            let line = feature(FeatureKind::Line, 0, &path);
+            let (lines, found) = Breaklines::build(&[line], &BreaklineOptions::new(100, Some(within))).unwrap();
+            assert!((7..=14).contains(&found.subsegments), "{path:?}: {found:?}");
+            assert!(lines.sites().len() as u64 == found.subsegments + 1);
+        }
+    }
+
+    #[test]
+    fn lines_that_are_the_same_are_cut_once() {
+        let line = |number: u64| feature(FeatureKind::Line, number, &[[0, 0, 0], [1000, 10, 101], [1000, 300, 101]]);
+        let many: Vec<Feature> = (0..500).map(line).collect();
+        let ((one, _), (all, found)) = (build(&many[..1], 10), build(&many, 10));
+        assert_eq!((one.sites(), one.subsegments()), (all.sites(), all.subsegments()));
+        assert_eq!((found.segments, found.disagreements), (2, 0));
+        // Where heights differ, the lowest is taken at every site.
+        let higher = |number: u64| {
+            let z = (number * 7 % 300) as i32;
+            feature(FeatureKind::Line, number, &[[0, 0, 300 - z], [1000, 0, z]])
+        };
+        let (lines, found) = build(&(0..300).map(higher).collect::<Vec<_>>(), 10);
+        assert_eq!((at(&lines, [0, 0]).unwrap().0, at(&lines, [1000, 0]).unwrap().0), (1, 0));
+        assert!(found.disagreements > 90 && found.worst_disagreements[0].place == [0, 0], "{found:?}");
+    }
+
+    /// All pairs cross, but at one place.
+    #[test]
+    fn lines_that_cross_at_one_place_need_few_sites() {
+        // From one side of a square to the other.
+        let border = (-75..75).flat_map(|i| [[i, 75], [75, i]]);
+        let line =
+            |(i, [x, y]): (u64, [i32; 2])| feature(FeatureKind::Line, i, &[[-6 * x, -6 * y, 0], [6 * x, 6 * y, 0]]);
+        let features: Vec<Feature> = (0..).zip(border).map(line).collect();
+        let options = BreaklineOptions { most_sites: 40_000, ..BreaklineOptions::new(1000, None) };
+        let (_, found) = Breaklines::build(&features, &options).unwrap();
+        assert!(found.crossings == 1 && found.sites < 40_000, "{found:?}");
+    }
+
+    #[test]
+    fn walls_count_in_the_box_and_where_a_line_goes_straight_up() {
+        let within = Bounds { min: [0, -50], max: [100, 50] };
+        let options = BreaklineOptions::new(10, Some(within));
+        let wall = feature(FeatureKind::Line, 5, &[[0, 0, 3], [900, 0, 3], [900, 0, 9]]);
+        assert!(Breaklines::build(&[wall], &options).is_ok());
+        let spiral = feature(FeatureKind::Line, 5, &[[0, 0, 1], [50, 0, 2], [80, 40, 30], [20, 40, 60], [50, 0, 90]]);
+        let (lines, found) = Breaklines::build(&[spiral], &options).unwrap();
+        assert_eq!((at(&lines, [50, 0]), found.disagreements), (Some((2, FeatureKind::Line)), 1));
+    }
+
+    #[test]
+    fn what_lies_in_a_lake_is_found() {
+        let dam = feature(FeatureKind::Line, 1, &[[-500, 500, 80], [1500, 500, 80]]);
+        let pond = feature(FeatureKind::Lake, 2, &[[100, 100, 70], [200, 100, 70], [200, 200, 70], [100, 200, 70]]);
+        let (_, found) = build(&[dam, pond, feature(FeatureKind::Lake, 3, &POND)], 100);
+        let cases: Vec<_> = found.worst_in_lakes.iter().map(|case| (case.id, case.lake, case.length)).collect();
+        assert_eq!(cases, [(id(1), id(3), 1000), (id(2), id(3), 400)]);
+    }
+
+    #[test]
+    fn every_pond_of_a_feature_has_its_own_height() {
+        let pond = |x: i32| {
+            let mut pond = feature(FeatureKind::Lake, 0, &POND.map(|[a, b, z]| [a + x, b, z]));
+            pond.paths[0].iter_mut().for_each(|v| v.z = None);
+            pond
+        };
+        let (mut lines, _) = build(&[pond(0), pond(5000)], 250);
+        let mut nearest = NearestHeights::new(&lines);
+        (-10..80).for_each(|i| nearest.offer([100 * i, -10], if i < 30 { 7 } else { 90 }));
+        assert!(nearest.settle(&mut lines));
+        assert_eq!((at(&lines, [0, 0]).unwrap().0, at(&lines, [6000, 1000]).unwrap().0), (7, 90));
+    }
+
+    #[test]
+    fn what_is_not_compared_is_counted() {
+        let mut pond = feature(FeatureKind::Lake, 0, &POND);
+        pond.paths[0].iter_mut().for_each(|v| v.z = None);
+        let mut river = feature(FeatureKind::River, 1, &[[3000, 0, 0], [4000, 0, 0]]);
+        river.paths[0].iter_mut().for_each(|v| v.z = None);
+        let (_, found) = build(&[pond, river, feature(FeatureKind::Line, 2, &[[-500, 500, 9], [500, 500, 9]])], 100);
+        assert_eq!((found.places_not_compared, found.rivers_without_heights), (1, 1));
     }
 
     #[test]

@@ -15,4 +15,6 @@ pub struct BreaklineSite {
     pub kind: FeatureKind,
     /// The feature whose height it has.
     pub id: FeatureId,
+    /// The number of the lake whose height it has; `None` if it is that of a line. A feature may have several lakes.
+    pub lake: Option<u32>,
 }

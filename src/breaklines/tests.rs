@@ -30,7 +30,7 @@ fn arrangement(kind: &str, random: &mut Random) -> (Vec<Feature>, BreaklineOptio
     let spacing = (1 + random.below(most) / 2 + most / 60) as u32;
     let floor = 1 + random.below(5) as u32;
     let mut options = BreaklineOptions { floor, most_sites: 4000, ..BreaklineOptions::new(spacing, None) };
-    if random.below(8) == 0 {
+    if random.below(4) == 0 {
         options.within = Some(Bounds { min: [side / 4; 2], max: [side - side / 5; 2] });
     }
     let turn = random.below(8);
@@ -94,7 +94,16 @@ fn arrangement(kind: &str, random: &mut Random) -> (Vec<Feature>, BreaklineOptio
             path.into_iter().map(|p| vertex(turned(p), (kind == FeatureKind::Lake).then_some(i as i32))).collect(),
         ],
     };
-    (paths.into_iter().enumerate().map(feature).collect(), options)
+    let mut features: Vec<Feature> = paths.into_iter().enumerate().map(feature).collect();
+    if let Some(Bounds { min, max }) = options.within.filter(|_| random.below(2) == 0) {
+        // Through two corners of the box, or as far as these.
+        let off = random.below(2) * (1 + random.below(side));
+        let ends = [[min[0] - off, min[1] - off], [max[0] + off, max[1] + off]];
+        let id = FeatureId { file: 0, feature: features.len() as u64 };
+        let path = ends.map(|end| vertex(end, None)).to_vec();
+        features.push(Feature { kind: FeatureKind::Line, id, paths: vec![path] });
+    }
+    (features, options)
 }
 
 fn place(side: i32, random: &mut Random) -> Site {
@@ -163,6 +172,40 @@ fn in_lake(features: &[Feature], p: Site) -> bool {
     features.iter().any(inside)
 }
 
+/// Returns the sides of the box where lakes may reach it.
+fn sides_at_lakes(features: &[Feature], options: &BreaklineOptions) -> Vec<[Site; 2]> {
+    let Some(Bounds { min, max }) = options.within else { return Vec::new() };
+    let corners = [min, [max[0], min[1]], max, [min[0], max[1]]];
+    let has_lake = features.iter().any(|feature| feature.kind == FeatureKind::Lake);
+    (0..4).filter(|_| has_lake).map(|i| [corners[i], corners[(i + 1) % 4]]).collect()
+}
+
+/// Checks that subsegments cover what lies in the box of all segments longer than what snaps may make a point of, but for what lies in
+/// other lakes or at their shores. `pairs` are the subsegments, and `moved` is how far lines may move.
+fn check_cover(features: &[Feature], options: &BreaklineOptions, pairs: &[[Site; 2]], moved: f64) {
+    let near = |p: Site, segments: &[[Site; 2]]| segments.iter().any(|s| distance(*s, p) <= moved + 1.0);
+    // Samples are rounded, so those on the border may lie outside.
+    let inside = |within: Bounds<2>| Bounds { min: within.min.map(|v| v + 1), max: within.max.map(|v| v - 1) };
+    let holds = |p: Site| options.within.is_none_or(|within| exact::holds(&inside(within), p));
+    for (i, feature) in features.iter().enumerate() {
+        let others: Vec<Feature> = features[..i].iter().chain(&features[i + 1..]).cloned().collect();
+        let lakes: Vec<Feature> = others.into_iter().filter(|other| other.kind == FeatureKind::Lake).collect();
+        let shores = segments(&lakes, |_| true);
+        for [a, b] in segments(std::slice::from_ref(feature), |_| true) {
+            let samples: Vec<Site> = (0..=24).map(|k| exact::between(a, b, k, 24)).filter(|p| holds(*p)).collect();
+            let length = samples.first().zip(samples.last()).map_or(0, |(a, b)| distance2(*a, *b));
+            let least = 2 * i64::from(options.floor) + 3;
+            if length <= least * least {
+                continue;
+            }
+            for p in samples {
+                let is_away = !in_lake(&lakes, p) && !near(p, &shores);
+                assert!(!is_away || near(p, pairs), "{p:?} of {a:?} {b:?} has no edge");
+            }
+        }
+    }
+}
+
 /// Checks everything that is promised about the breaklines of `features`.
 fn check(features: &[Feature], options: &BreaklineOptions, random: &mut Random) -> Option<usize> {
     let (lines, findings) = match Breaklines::build(features, options) {
@@ -177,14 +220,18 @@ fn check(features: &[Feature], options: &BreaklineOptions, random: &mut Random) 
         let wrong = places.iter().find(|&&p| p != a && p != b && in_disc(a, b, p));
         assert_eq!(wrong, None, "in the disc of {a:?} {b:?}");
     }
-    let all = segments(features, |_| true);
+    let all: Vec<[Site; 2]> =
+        segments(features, |_| true).into_iter().chain(sides_at_lakes(features, options)).collect();
     let near = |p: Site, segments: &[[Site; 2]]| segments.iter().map(|s| distance(*s, p)).fold(f64::INFINITY, f64::min);
     // Two snaps, and half a step for each time that a piece is halved and rounded.
     let moved = 2.0 * f64::from(options.floor) + 2.0 + 0.5 * f64::from(options.spacing).log2();
     assert!(places.iter().all(|&p| near(p, &all) <= moved), "a line has moved");
     assert!(options.within.is_none_or(|within| places.iter().all(|&p| exact::holds(&within, p))));
 
-    let points = cloud(&places, random);
+    check_cover(features, options, &pairs, moved);
+
+    let mut points = cloud(&places, random);
+    points.retain(|&p| options.within.is_none_or(|within| exact::holds(&within, p)));
     let shores = segments(features, |kind| kind == FeatureKind::Lake);
     for &p in &points {
         let by_disc = pairs.iter().any(|&[a, b]| in_disc(a, b, p));
@@ -202,14 +249,10 @@ fn check(features: &[Feature], options: &BreaklineOptions, random: &mut Random) 
         mesh.half_edges().map(|h| [mesh.origin(h), mesh.destination(h)].map(|v| sites[v.get()])).collect();
     let is_edge = |[a, b]: &[Site; 2]| edges.contains(&[*a, *b]) || edges.contains(&[*b, *a]);
     assert!(edges.is_empty() || pairs.iter().all(is_edge), "a subsegment is no edge");
-    // Flat water has no other corners, except where the box cuts it, or other lakes at the size of the floor.
+    // Flat water has no other corners, except where other lakes are as near as the floor.
     let lakes = features.iter().filter(|feature| feature.kind == FeatureKind::Lake).count();
     let is_lake = |p: Site| lines.position(p).is_some_and(|i| lines.sites()[i].kind == FeatureKind::Lake);
-    for corners in mesh
-        .triangles
-        .iter()
-        .map(|t| t.map(|v| sites[v.get()]))
-        .filter(|t| options.within.is_none() && lakes == 1 && lines.is_water(*t))
+    for corners in mesh.triangles.iter().map(|t| t.map(|v| sites[v.get()])).filter(|t| lakes == 1 && lines.is_water(*t))
     {
         assert!(corners.into_iter().all(is_lake), "{corners:?} is not all water");
     }

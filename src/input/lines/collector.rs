@@ -18,7 +18,10 @@ pub(super) struct FeatureCollector<'a> {
     features: Vec<LineFeature>,
     without_geometry: LeftOut,
     too_short: LeftOut,
+    without_parts: LeftOut,
     of_other_kinds: LeftOut,
+    /// Whether a part of the feature at hand was too short.
+    has_short_part: bool,
 }
 
 /// How many features are left out for one reason, and the first of them.
@@ -37,8 +40,7 @@ impl LeftOut {
     }
 
     fn warning(&self, why: &str) -> Option<String> {
-        (self.count > 0)
-            .then(|| format!("{} features {why} and are left out, the first is feature {}", self.count, self.first))
+        (self.count > 0).then(|| format!("{} features {why}, the first is feature {}", self.count, self.first))
     }
 }
 
@@ -50,6 +52,8 @@ impl<'a> FeatureCollector<'a> {
             features: Vec::new(),
             without_geometry: LeftOut::default(),
             too_short: LeftOut::default(),
+            without_parts: LeftOut::default(),
+            has_short_part: false,
             of_other_kinds: LeftOut::default(),
         }
     }
@@ -76,8 +80,11 @@ impl<'a> FeatureCollector<'a> {
         };
         let before = self.features.len();
         self.add_geometry(number, kind, height, geometry)?;
-        if self.features.len() == before && self.too_short.first != number {
-            self.without_geometry.note(number);
+        match (std::mem::take(&mut self.has_short_part), self.features.len() > before) {
+            (true, true) => self.without_parts.note(number),
+            (true, false) => self.too_short.note(number),
+            (false, false) => self.without_geometry.note(number),
+            (false, true) => {}
         }
         Ok(())
     }
@@ -85,11 +92,16 @@ impl<'a> FeatureCollector<'a> {
     /// Returns the features, and what there is to say about those that are left out.
     pub(super) fn finish(self) -> (Vec<LineFeature>, Warnings) {
         let mut warnings = Warnings::default();
-        warnings.extend(self.without_geometry.warning("have no geometry"));
+        warnings.extend(self.without_geometry.warning("have no geometry and are left out"));
         warnings.extend(
-            self.too_short.warning("have a line or an outline without two different vertices (an area: three)"),
+            self.too_short.warning("have no two different vertices (an area: three in its outline) and are left out"),
         );
-        warnings.extend(self.of_other_kinds.warning("have a value of kind_field that kinds does not list"));
+        warnings.extend(self.without_parts.warning(
+            "have a part without two different vertices (an area: an outline without three), which is left out",
+        ));
+        warnings.extend(
+            self.of_other_kinds.warning("have a value of kind_field that kinds does not list and are left out"),
+        );
         (self.features, warnings)
     }
 
@@ -142,7 +154,7 @@ impl<'a> FeatureCollector<'a> {
     fn add_line(&mut self, number: u64, kind: FeatureKind, height: Option<f64>, line: Vec<[f64; 3]>) -> Result<()> {
         let line = self.checked(number, height, line)?;
         if line.len() < 2 {
-            self.too_short.note(number);
+            self.has_short_part = true;
             return Ok(());
         }
         let shape = match (kind, is_closed(&line)) {
@@ -176,7 +188,7 @@ impl<'a> FeatureCollector<'a> {
                 kept.push(ring);
                 continue;
             }
-            self.too_short.note(number);
+            self.has_short_part = true;
             if index == 0 {
                 // Islands without their lake are nothing.
                 return Ok(());
@@ -194,7 +206,7 @@ impl<'a> FeatureCollector<'a> {
             let is_place = |value: f64| value.abs() < BEYOND_THE_EARTH;
             if !is_place(vertex[0]) || !is_place(vertex[1]) {
                 let what = format!(
-                    "has the vertex ({}, {}), its number {}, which is no place",
+                    "has the vertex ({:?}, {:?}), its number {}, which is no place",
                     vertex[0],
                     vertex[1],
                     index + 1
@@ -279,6 +291,24 @@ mod tests {
             let (features, warnings) = collect("", geometry, WantedAttributes::NONE).unwrap();
             let all: Vec<&str> = warnings.iter().collect();
             assert!(features.is_empty() && all.len() == 1 && all[0].contains("two different"), "{all:?}");
+        }
+    }
+
+    #[test]
+    fn features_are_counted_once_whatever_their_parts() {
+        let options = options("");
+        let mut collector = FeatureCollector::new(Path::new("a.shp"), &options);
+        let short = || vec![[1.0, 1.0, 1.0]];
+        collector.add(1, RawGeometry::Lines(vec![short(), short()]), &WantedAttributes::NONE).unwrap();
+        collector.add(2, RawGeometry::Lines(vec![short()]), &WantedAttributes::NONE).unwrap();
+        collector.add(3, RawGeometry::Empty, &WantedAttributes::NONE).unwrap();
+        collector.add(4, RawGeometry::Lines(vec![short(), square(), short()]), &WantedAttributes::NONE).unwrap();
+        let (features, warnings) = collector.finish();
+        let all: Vec<&str> = warnings.iter().collect();
+        assert_eq!((features.len(), all.len()), (1, 3));
+        let starts = [("1 features have no geometry", 3), ("2 features have no two", 1), ("1 features have a part", 4)];
+        for ((start, first), text) in starts.into_iter().zip(all) {
+            assert!(text.starts_with(start) && text.ends_with(&format!("feature {first}")), "{text}");
         }
     }
 

@@ -1,8 +1,11 @@
-//! Reading attributes from the `.dbf` of a Shapefile: a table of texts of fixed widths.
+//! Reading attributes from the `.dbf` of a Shapefile: a table of texts of fixed widths, record by record.
 
-use std::path::Path;
+use std::fs::File;
+use std::io::{BufReader, ErrorKind, Read};
+use std::path::{Path, PathBuf};
 
 use crate::input::lines::attribute::{Attribute, WantedAttributes, no_attribute};
+use crate::input::lines::encoding::Encoding;
 use crate::{Error, Result};
 
 /// Bytes of the header before the fields, and of a field's description.
@@ -11,10 +14,11 @@ const FIELD: usize = 32;
 
 /// The table, and the columns that the options name.
 pub(super) struct DbfTable {
-    bytes: Vec<u8>,
-    /// Where records begin, and their bytes.
-    start: usize,
-    record: usize,
+    path: PathBuf,
+    file: BufReader<File>,
+    /// The record that was read last.
+    record: Vec<u8>,
+    encoding: Encoding,
     kind: Option<DbfField>,
     height: Option<DbfField>,
 }
@@ -31,14 +35,23 @@ struct DbfField {
 }
 
 impl DbfTable {
-    /// Reads the file at `path`, for the attributes of these names.
+    /// Opens the file at `path`, for the attributes of these names. Its texts are in this encoding.
     ///
     /// # Errors
     /// `Io` if it cannot be read, `Input` if it is no such table or lacks one of the attributes.
-    pub(super) fn read(path: &Path, kind: Option<&str>, height: Option<&str>) -> Result<DbfTable> {
-        let bytes = std::fs::read(path).map_err(Error::io("read", path))?;
+    pub(super) fn open(path: &Path, encoding: Encoding, kind: Option<&str>, height: Option<&str>) -> Result<DbfTable> {
+        let failed = |error| Error::io("read", path)(error);
+        let mut file = BufReader::new(File::open(path).map_err(failed)?);
+        let mut header = vec![0; HEADER];
+        let held = read_up_to(&mut file, &mut header).map_err(failed)?;
+        header.truncate(held);
+        // The header says its length.
+        let start = header.get(8..10).map_or(0, |word| usize::from(word[0]) | usize::from(word[1]) << 8);
+        header.resize(start.max(held), 0);
+        let held = held + read_up_to(&mut file, &mut header[held..]).map_err(failed)?;
+        header.truncate(held);
         let damaged = || Error::input(path, "is damaged or no dBASE table: copy all files of the Shapefile again");
-        let (start, record, fields) = layout(&bytes).ok_or_else(damaged)?;
+        let (record, fields) = layout(&header, start).ok_or_else(damaged)?;
         let find = |name: Option<&str>| match name {
             None => Ok(None),
             Some(name) => match fields.iter().find(|field| field.name.eq_ignore_ascii_case(name)) {
@@ -50,22 +63,44 @@ impl DbfTable {
             },
         };
         let (kind, height) = (find(kind)?, find(height)?);
-        Ok(DbfTable { bytes, start, record, kind, height })
+        Ok(DbfTable { path: path.to_path_buf(), file, record: vec![0; record], encoding, kind, height })
     }
 
-    /// Returns the wanted attributes of record `index`, from 0 on; `None` if it is not there.
-    pub(super) fn record(&self, index: u64) -> Option<WantedAttributes> {
-        let at = usize::try_from(index).ok()?.checked_mul(self.record)?.checked_add(self.start)?;
-        let record = self.bytes.get(at..at.checked_add(self.record)?)?;
-        let value = |field: &Option<DbfField>| field.as_ref().map_or(Attribute::Missing, |field| field.value(record));
-        Some(WantedAttributes { kind: value(&self.kind), height: value(&self.height) })
+    /// Returns the wanted attributes of the next record, or what is wrong with it, without its subject.
+    ///
+    /// # Errors
+    /// `Io` if the file cannot be read.
+    pub(super) fn next_record(&mut self) -> Result<std::result::Result<WantedAttributes, String>> {
+        let held = read_up_to(&mut self.file, &mut self.record).map_err(Error::io("read", &self.path))?;
+        if held < self.record.len() {
+            return Ok(Err("has no record in the .dbf, which is cut off or belongs to another file".into()));
+        }
+        let value = |field: &Option<DbfField>| {
+            field.as_ref().map_or(Ok(Attribute::Missing), |field| field.value(&self.record, &self.encoding))
+        };
+        let wanted = || Ok(WantedAttributes { kind: value(&self.kind)?, height: value(&self.height)? });
+        Ok(wanted())
     }
 }
 
+/// Fills `bytes` as far as the file goes. Returns how many there are.
+fn read_up_to(file: &mut impl Read, bytes: &mut [u8]) -> std::io::Result<usize> {
+    let mut held = 0;
+    while held < bytes.len() {
+        match file.read(&mut bytes[held..]) {
+            Ok(0) => break,
+            Ok(count) => held += count,
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(held)
+}
+
 impl DbfField {
-    fn value(&self, record: &[u8]) -> Attribute {
+    fn value(&self, record: &[u8], encoding: &Encoding) -> std::result::Result<Attribute, String> {
         let bytes = &record[self.at..self.at + self.width];
-        match (self.type_letter, bytes) {
+        Ok(match (self.type_letter, bytes) {
             (b'I', &[a, b, c, d]) => Attribute::Number(f64::from(i32::from_le_bytes([a, b, c, d]))),
             (b'O', bytes) if bytes.len() == 8 => {
                 let mut eight = [0; 8];
@@ -73,7 +108,7 @@ impl DbfField {
                 Attribute::Number(f64::from_le_bytes(eight))
             }
             _ => {
-                let text = String::from_utf8_lossy(bytes);
+                let text = encoding.text(bytes)?;
                 let text = text.trim_matches(['\0', ' ']);
                 // Numbers that do not fit, or are not there, are stars or blanks.
                 let is_missing = text.is_empty() || text.bytes().all(|byte| byte == b'*');
@@ -84,14 +119,15 @@ impl DbfField {
                     _ => Attribute::Text(text.to_string()),
                 }
             }
-        }
+        })
     }
 }
 
-/// Returns where records begin, their bytes, and the columns; `None` if the table is damaged.
-fn layout(bytes: &[u8]) -> Option<(usize, usize, Vec<DbfField>)> {
+/// Returns the bytes of a record and the columns of the header `bytes`, after which records begin at `start`; `None` if the table is
+/// damaged.
+fn layout(bytes: &[u8], start: usize) -> Option<(usize, Vec<DbfField>)> {
     let word = |at: usize| Some(usize::from(*bytes.get(at)?) | usize::from(*bytes.get(at + 1)?) << 8);
-    let (start, record) = (word(8)?, word(10)?);
+    let record = word(10)?;
     let described = bytes.get(HEADER..start)?;
     let mut fields = Vec::new();
     // The first byte of a record says whether it is deleted.
@@ -107,7 +143,7 @@ fn layout(bytes: &[u8]) -> Option<(usize, usize, Vec<DbfField>)> {
         });
         at += width;
     }
-    (at <= record).then_some((start, record, fields))
+    (at <= record).then_some((record, fields))
 }
 
 #[cfg(test)]
@@ -136,16 +172,16 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.dbf");
         std::fs::write(&path, bytes).unwrap();
-        DbfTable::read(&path, Some(kind), Some(height))
+        DbfTable::open(&path, Encoding::of(None), Some(kind), Some(height))
     }
 
     #[test]
     fn texts_and_numbers_are_read() {
-        let dbf = read(&table(&[("river", "12.5"), ("", "*****")]), "kind", "Z").unwrap();
+        let mut dbf = read(&table(&[("river", "12.5"), ("", "*****")]), "kind", "Z").unwrap();
         let first = WantedAttributes { kind: Attribute::Text("river".into()), height: Attribute::Number(12.5) };
-        assert_eq!(dbf.record(0), Some(first));
-        assert_eq!(dbf.record(1), Some(WantedAttributes::NONE));
-        assert_eq!((dbf.record(2), dbf.record(u64::MAX)), (None, None));
+        assert_eq!(dbf.next_record().unwrap(), Ok(first));
+        assert_eq!(dbf.next_record().unwrap(), Ok(WantedAttributes::NONE));
+        assert!(dbf.next_record().unwrap().unwrap_err().contains("no record"));
         let error = read(&table(&[]), "KIND", "HEIGHT").err().unwrap().to_string();
         assert!(error.contains("\"HEIGHT\"") && error.contains("it has KIND, Z"), "{error}");
     }
@@ -159,6 +195,15 @@ mod tests {
         let mut wide = sound.clone();
         wide[HEADER + 16] = 255;
         assert!(read(&wide, "KIND", "Z").err().unwrap().to_string().contains("damaged"));
-        assert_eq!(read(&sound[..sound.len() - 1], "KIND", "Z").unwrap().record(0), None);
+        assert!(read(&sound[..sound.len() - 1], "KIND", "Z").unwrap().next_record().unwrap().is_err());
+    }
+
+    #[test]
+    fn texts_that_are_no_utf_8_are_read() {
+        let mut latin = table(&[("B..sch", "1")]);
+        let at = latin.len() - 18 + 1;
+        latin[at..at + 2].copy_from_slice(&[0xf6, 0x80]);
+        let wanted = read(&latin, "KIND", "Z").unwrap().next_record().unwrap().unwrap();
+        assert_eq!(wanted.kind, Attribute::Text("Bö€sch".into()));
     }
 }

@@ -22,8 +22,8 @@ pub struct LineFile {
 /// A line or an area. Its coordinates are finite; a height is NaN where it is to come from the points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LineFeature {
-    /// Its number in the file: the record of a Shapefile and the feature of GeoJSON, both from 1 on, or the key in a GeoPackage. The parts
-    /// of a feature with several share it.
+    /// Its number in the file: the record of a Shapefile and the feature of GeoJSON, both from 1 on, or the key in a GeoPackage (the
+    /// place of the row where keys are no numbers). The parts of a feature with several share it.
     pub number: u64,
     /// What it is.
     pub kind: FeatureKind,

@@ -4,65 +4,47 @@
 use std::path::Path;
 
 use serde::{Deserialize, Deserializer};
+use serde_json::Value;
 use serde_json::value::RawValue;
-use serde_json::{Map, Value};
 
 use crate::input::crs::from_wkt::from_epsg;
 use crate::input::crs::system::Crs;
 use crate::input::lines::attribute::{Attribute, WantedAttributes, no_attribute};
 use crate::input::lines::collector::FeatureCollector;
 use crate::input::lines::feature::RawGeometry;
+use crate::input::lines::geojson_geometry::geometry;
+use crate::input::lines::geojson_properties::properties;
 use crate::input::lines::options::LineOptions;
 use crate::{Error, Result, interrupt};
 
 /// The system of GeoJSON that says none.
 const WGS_84: u32 = 4326;
 
-/// The members of a document that matter here.
+/// A longer value of the member `crs` says nothing.
+const LONGEST_CRS: usize = 1 << 16;
+
+/// The members of a document that matter here. All but the type are kept as texts: whole trees of values would take many times the memory.
 #[derive(Deserialize)]
 struct Document<'a> {
     #[serde(rename = "type")]
     kind: String,
     /// The value null says that the CRS is not known; without the member it is.
-    #[serde(default, deserialize_with = "with_null")]
-    crs: Option<Value>,
+    #[serde(borrow, default, deserialize_with = "with_null")]
+    crs: Option<&'a RawValue>,
     #[serde(borrow, default)]
     features: Option<Vec<&'a RawValue>>,
 }
 
 #[derive(Deserialize)]
-struct Feature {
-    geometry: Option<Geometry>,
-    properties: Option<Map<String, Value>>,
+struct Feature<'a> {
+    #[serde(borrow)]
+    geometry: Option<&'a RawValue>,
+    #[serde(borrow)]
+    properties: Option<&'a RawValue>,
 }
 
-type Position = Vec<f64>;
-
-#[derive(Deserialize)]
-#[serde(tag = "type")]
-enum Geometry {
-    Point {},
-    MultiPoint {},
-    LineString {
-        coordinates: Vec<Position>,
-    },
-    MultiLineString {
-        coordinates: Vec<Vec<Position>>,
-    },
-    Polygon {
-        coordinates: Vec<Vec<Position>>,
-    },
-    MultiPolygon {
-        coordinates: Vec<Vec<Vec<Position>>>,
-    },
-    #[serde(rename = "GeometryCollection")]
-    Several {
-        geometries: Vec<Geometry>,
-    },
-}
-
-fn with_null<'de, D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Option<Value>, D::Error> {
-    Value::deserialize(deserializer).map(Some)
+fn with_null<'de, D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Option<&'de RawValue>, D::Error> {
+    <&RawValue>::deserialize(deserializer).map(Some)
 }
 
 /// Hands the features of the document `bytes` to `collector`. Returns the coordinate reference system that it says.
@@ -73,23 +55,13 @@ pub(super) fn read(path: &Path, bytes: &[u8], options: &LineOptions, collector: 
     let broken = |error: serde_json::Error| Error::input(path, format!("is no GeoJSON that can be read: {error}"));
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let document: Document = serde_json::from_slice(text).map_err(broken)?;
-    let crs = match &document.crs {
-        None => from_epsg(WGS_84).unwrap_or_default(),
-        Some(Value::Null) => Crs::default(),
-        Some(value) => named_crs(value).ok_or_else(|| {
-            let what = format!(
-                "its member crs says {value}, which is not known: say with crs in [[breaklines]] what the lines are in"
-            );
-            Error::input(path, what)
-        })?,
-    };
+    let crs = if options.crs.is_read() { document_crs(path, document.crs)? } else { Crs::default() };
     match document.kind.as_str() {
         "FeatureCollection" => {
             for (number, feature) in (1..).zip(document.features.unwrap_or_default()) {
                 interrupt::check()?;
-                let feature = serde_json::from_str(feature.get());
                 let refused = |error: serde_json::Error| collector.refuse(number, format!("cannot be read: {error}"));
-                let feature = feature.map_err(refused)?;
+                let feature = serde_json::from_str(feature.get()).map_err(refused)?;
                 add(path, number, feature, options, collector)?;
             }
         }
@@ -102,6 +74,21 @@ pub(super) fn read(path: &Path, bytes: &[u8], options: &LineOptions, collector: 
     Ok(crs)
 }
 
+fn document_crs(path: &Path, member: Option<&RawValue>) -> Result<Crs> {
+    let Some(text) = member.map(RawValue::get) else { return Ok(from_epsg(WGS_84).unwrap_or_default()) };
+    if text == "null" {
+        return Ok(Crs::default());
+    }
+    let value = Some(text).filter(|text| text.len() <= LONGEST_CRS).and_then(|text| serde_json::from_str(text).ok());
+    value.as_ref().and_then(named_crs).ok_or_else(|| {
+        let start: String = text.chars().take(200).collect();
+        let what = format!(
+            "its member crs says {start}, which is not known: say with crs in [[breaklines]] what the lines are in"
+        );
+        Error::input(path, what)
+    })
+}
+
 fn add(
     path: &Path,
     number: u64,
@@ -109,42 +96,28 @@ fn add(
     options: &LineOptions,
     collector: &mut FeatureCollector,
 ) -> Result<()> {
-    let properties = feature.properties.unwrap_or_default();
-    let value = |name: &Option<String>| match name.as_ref().map(|name| (name, properties.get(name))) {
-        None => Ok(Attribute::Missing),
-        Some((_, Some(Value::String(text)))) => Ok(Attribute::Text(text.clone())),
-        Some((_, Some(Value::Number(number)))) => Ok(number.as_f64().map_or(Attribute::Missing, Attribute::Number)),
-        Some((_, Some(Value::Null))) => Ok(Attribute::Missing),
-        Some((_, Some(other))) => Ok(Attribute::Text(other.to_string())),
-        // Where most have the attribute, a misspelt name must not look like features without a value.
-        Some((name, None)) => {
-            let there: Vec<String> = properties.keys().cloned().collect();
-            Err(Error::input(path, format!("feature {number}: it {}", no_attribute(name, &there))))
+    let unreadable = |error: serde_json::Error| Error::input(path, format!("feature {number} cannot be read: {error}"));
+    let wanted = [options.kind_field.as_deref(), options.height_field.as_deref()];
+    let wanted = match wanted {
+        [None, None] => WantedAttributes::NONE,
+        _ => {
+            let text = feature.properties.unwrap_or(RawValue::NULL);
+            let found = properties(text, wanted).map_err(unreadable)?;
+            // Where most have the attribute, a misspelt name must not look like features without a value.
+            let missing = wanted.iter().zip(&found.values).find_map(|(name, value)| name.filter(|_| value.is_none()));
+            if let Some(name) = missing {
+                let what = no_attribute(name, &found.names);
+                return Err(Error::input(path, format!("feature {number}: it {what}")));
+            }
+            let [kind, height] = found.values.map(|value| value.unwrap_or(Attribute::Missing));
+            WantedAttributes { kind, height }
         }
     };
-    let wanted = WantedAttributes { kind: value(&options.kind_field)?, height: value(&options.height_field)? };
-    collector.add(number, feature.geometry.map_or(RawGeometry::Empty, raw), &wanted)
-}
-
-fn raw(geometry: Geometry) -> RawGeometry {
-    match geometry {
-        Geometry::Point {} | Geometry::MultiPoint {} => RawGeometry::Other("a point"),
-        Geometry::LineString { coordinates } => RawGeometry::Lines(vec![line(coordinates)]),
-        Geometry::MultiLineString { coordinates } => RawGeometry::Lines(lines(coordinates)),
-        Geometry::Polygon { coordinates } => RawGeometry::Areas(vec![lines(coordinates)]),
-        Geometry::MultiPolygon { coordinates } => RawGeometry::Areas(coordinates.into_iter().map(lines).collect()),
-        Geometry::Several { geometries } => RawGeometry::Several(geometries.into_iter().map(raw).collect()),
-    }
-}
-
-fn lines(lines: Vec<Vec<Position>>) -> Vec<Vec<[f64; 3]>> {
-    lines.into_iter().map(line).collect()
-}
-
-/// A position may lack its height, or have more numbers, which say nothing here.
-fn line(positions: Vec<Position>) -> Vec<[f64; 3]> {
-    let number = |position: &Position, axis: usize| position.get(axis).copied().unwrap_or(f64::NAN);
-    positions.iter().map(|position| [0, 1, 2].map(|axis| number(position, axis))).collect()
+    let shape = match feature.geometry {
+        None => RawGeometry::Empty,
+        Some(text) => geometry(text).map_err(unreadable)?,
+    };
+    collector.add(number, shape, &wanted)
 }
 
 /// Returns the system of the member `crs`, as in `{"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::25832"}}`.
@@ -218,6 +191,10 @@ mod tests {
         assert_eq!(named("urn:ogc:def:crs:OGC:1.3:CRS84").unwrap().epsg, Some(4326));
         assert_eq!(with("null").unwrap(), Crs::default());
         assert!(named("my grid").unwrap_err().to_string().contains("my grid"));
+        for choice in ["points", "EPSG:25832"] {
+            let text = r#"{"type": "FeatureCollection", "crs": {"type": "my grid"}, "features": []}"#;
+            assert_eq!(read_text(text, &format!("crs = {choice:?}")).unwrap().0, Crs::default(), "{choice}");
+        }
     }
 
     #[test]

@@ -1,6 +1,8 @@
 //! Reading GeoPackages: tables of an SQLite database.
 
-use std::path::Path;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
 
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, OpenFlags, OptionalExtension, Row};
@@ -46,11 +48,12 @@ pub(super) fn read(path: &Path, options: &LineOptions, collector: &mut FeatureCo
         None => "NULL".into(),
     };
     let query = format!(
-        "SELECT {key}, {}, {}, {} FROM {} ORDER BY {key}",
+        "SELECT {number}, {}, {}, {} FROM {} ORDER BY {key}",
         quoted(&layer.geometry),
         wanted(&options.kind_field),
         wanted(&options.height_field),
         quoted(&layer.table),
+        number = number_of(&file, &layer).map_err(broken)?,
         key = quoted(&layer.key)
     );
     let mut statement = file.prepare(&query).map_err(broken)?;
@@ -59,7 +62,16 @@ pub(super) fn read(path: &Path, options: &LineOptions, collector: &mut FeatureCo
         interrupt::check()?;
         add(row, collector).map_err(broken)??;
     }
-    crs(path, &file, layer.srs)
+    if options.crs.is_read() { crs(path, &file, layer.srs) } else { Ok(Crs::default()) }
+}
+
+/// Returns what numbers the rows of the layer: its key, or, where this is not always a whole number above 0, the place of the row in their
+/// order by key.
+fn number_of(file: &Connection, layer: &Layer) -> rusqlite::Result<String> {
+    let [key, table] = [&layer.key, &layer.table].map(|name| quoted(name));
+    let query = format!("SELECT EXISTS (SELECT 1 FROM {table} WHERE typeof({key}) <> 'integer' OR {key} < 0)");
+    let is_odd: bool = file.query_row(&query, [], |row| row.get(0))?;
+    Ok(if is_odd { format!("row_number() OVER (ORDER BY {key})") } else { key })
 }
 
 /// Opens the file for reading. `immutable` keeps SQLite from making files beside it, which may not be allowed.
@@ -77,18 +89,26 @@ fn escape(character: char) -> String {
     }
 }
 
-/// What another program has written, and not yet put into the file, must not be missed.
+/// What another program has written, and not yet put into the file, must not be missed; and what it has begun to write must not be read.
 fn refuse_open_journal(path: &Path) -> Result<()> {
-    let mut journal = path.as_os_str().to_owned();
-    journal.push("-wal");
-    let is_there = Path::new(&journal).metadata().is_ok_and(|meta| meta.len() > 0);
-    match is_there {
-        true => Err(Error::input(
-            path,
-            "is open in another program, or was not closed (a file -wal is beside it): close it there first",
-        )),
-        false => Ok(()),
-    }
+    let beside = |ending: &str| {
+        let mut name = path.as_os_str().to_owned();
+        name.push(ending);
+        PathBuf::from(name)
+    };
+    let has_log = beside("-wal").metadata().is_ok_and(|meta| meta.len() > 0);
+    // One that is not needed any more begins with zeros, or is empty.
+    let mut start = [0; 1];
+    let has_journal = File::open(beside("-journal")).is_ok_and(|mut file| file.read_exact(&mut start).is_ok());
+    let ending = match (has_log, has_journal && start != [0]) {
+        (true, _) => "-wal",
+        (_, true) => "-journal",
+        _ => return Ok(()),
+    };
+    let what = format!(
+        "is open in another program, or was not closed (a file {ending} is beside it): close it there first, or open and close it once in QGIS"
+    );
+    Err(Error::input(path, what))
 }
 
 /// Finds the layer that the options name, or the only one.
@@ -126,10 +146,7 @@ impl Layer {
 
 /// Adds a row: its key, geometry, kind and height. The outer result is SQLite's.
 fn add(row: &Row, collector: &mut FeatureCollector) -> rusqlite::Result<Result<()>> {
-    let number = match row.get_ref(0)? {
-        ValueRef::Integer(number) => number.unsigned_abs(),
-        _ => 0,
-    };
+    let number = u64::try_from(row.get::<_, i64>(0)?).unwrap_or(0);
     let geometry = match row.get_ref(1)? {
         ValueRef::Null => Ok(RawGeometry::Empty),
         ValueRef::Blob(bytes) => geometry(bytes),
@@ -249,6 +266,45 @@ mod tests {
         assert_eq!(read_bytes(&two, "layer = \"B\"").unwrap().1.len(), 1);
         let error = read_bytes(&two, "layer = \"a\"\nheight_field = \"z\"").unwrap_err().to_string();
         assert!(error.contains("it has id, sort"), "{error}");
+    }
+
+    #[test]
+    fn rows_whose_keys_are_no_numbers_are_numbered() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.gpkg");
+        std::fs::write(&path, package(false)).unwrap();
+        let numbers = |sql: &str| {
+            let file = Connection::open(&path).unwrap();
+            file.execute_batch(sql).unwrap();
+            file.close().unwrap();
+            let (_, features) = read_bytes(&std::fs::read(&path).unwrap(), "").unwrap();
+            features.iter().map(|feature| feature.number).collect::<Vec<_>>()
+        };
+        assert_eq!(numbers("INSERT INTO a SELECT 2, shape, sort FROM a WHERE id = 8"), [2, 8]);
+        // The row without a geometry is the third.
+        assert_eq!(numbers("INSERT INTO a SELECT -2, shape, sort FROM a WHERE id = 8"), [1, 2, 4]);
+        let texts = "CREATE TABLE t (id TEXT PRIMARY KEY, shape BLOB, sort TEXT);
+                     INSERT INTO t SELECT 'key ' || id, shape, sort FROM a;
+                     DROP TABLE a; ALTER TABLE t RENAME TO a;";
+        assert_eq!(numbers(texts), [1, 2, 4]);
+    }
+
+    #[test]
+    fn a_journal_beside_the_file_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.gpkg");
+        for (ending, bytes, is_open) in [
+            ("-journal", &[0xd9u8, 0xd5][..], true),
+            ("-journal", &[0; 9], false),
+            ("-wal", &[1], true),
+            ("-wal", &[], false),
+        ] {
+            let beside = folder.path().join(format!("a.gpkg{ending}"));
+            std::fs::write(&beside, bytes).unwrap();
+            let found = refuse_open_journal(&path);
+            assert_eq!(found.is_err_and(|error| error.to_string().contains(ending)), is_open, "{ending} {bytes:?}");
+            std::fs::remove_file(beside).unwrap();
+        }
     }
 
     #[test]

@@ -6,8 +6,11 @@
 mod attribute;
 mod collector;
 mod dbf;
+mod encoding;
 mod feature;
 mod geojson;
+mod geojson_geometry;
+mod geojson_properties;
 mod geopackage;
 mod open;
 pub mod options;

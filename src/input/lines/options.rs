@@ -115,6 +115,13 @@ pub enum LineHeights {
     Points,
 }
 
+impl LineCrs {
+    /// Returns whether it counts what a file says. If not, what it says may be wrong, and is not read.
+    pub(super) fn is_read(&self) -> bool {
+        *self == LineCrs::Auto
+    }
+}
+
 /// The coordinate reference system of files of lines.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]

@@ -4,6 +4,8 @@
 //! A reader of our own checks every count against the length of the record, so a damaged file cannot make it ask for more memory than
 //! the file has.
 
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use crate::input::crs::from_wkt::parse;
@@ -11,6 +13,7 @@ use crate::input::crs::system::Crs;
 use crate::input::lines::attribute::WantedAttributes;
 use crate::input::lines::collector::FeatureCollector;
 use crate::input::lines::dbf::DbfTable;
+use crate::input::lines::encoding::Encoding;
 use crate::input::lines::feature::RawGeometry;
 use crate::input::lines::options::LineOptions;
 use crate::input::lines::polygons::areas_of;
@@ -19,6 +22,9 @@ use crate::{Error, Result, Warnings, interrupt};
 /// Bytes of the file header, and of the header of a record.
 const HEADER: usize = 100;
 const RECORD_HEADER: usize = 8;
+
+/// No more bytes of a `.prj` are read: well-known text has a few hundred.
+const LONGEST_PRJ: u64 = 1 << 20;
 
 /// Bytes of a record before its parts: the type, the box, and two counts.
 const BEFORE_PARTS: usize = 44;
@@ -34,7 +40,7 @@ pub(super) fn read(
     collector: &mut FeatureCollector,
     warnings: &mut Warnings,
 ) -> Result<Crs> {
-    let table = attributes(path, options)?;
+    let mut table = attributes(path, options)?;
     let mut rest = records(path, bytes)?;
     let mut number = 0u64;
     while !rest.is_empty() {
@@ -44,18 +50,18 @@ pub(super) fn read(
             let what = format!("is cut off in record {number}: copy it again, all its files together");
             return Err(Error::input(path, what));
         };
-        let refused = |what: String| collector.refuse(number, what);
-        let geometry = geometry(content).map_err(refused)?;
-        let wanted = match &table {
+        let geometry = match content_of(content).map_err(|what: String| collector.refuse(number, what))? {
+            Content::Geometry(geometry) => geometry,
+            Content::Rings(rings) => RawGeometry::Areas(areas_of(rings)?),
+        };
+        let wanted = match &mut table {
             None => WantedAttributes::NONE,
-            Some(table) => table.record(number - 1).ok_or_else(|| {
-                collector.refuse(number, "has no record in the .dbf, which is cut off or belongs to another file")
-            })?,
+            Some(table) => table.next_record()?.map_err(|what| collector.refuse(number, what))?,
         };
         collector.add(number, geometry, &wanted)?;
         rest = after;
     }
-    crs(path, warnings)
+    if options.crs.is_read() { crs(path, warnings) } else { Ok(Crs::default()) }
 }
 
 /// Returns the bytes of all records, as far as the header says.
@@ -78,17 +84,24 @@ fn first_record(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
     rest.split_at_checked(2 * big(&header[4..]) as usize)
 }
 
-fn geometry(record: &[u8]) -> std::result::Result<RawGeometry, String> {
+/// What a record holds. Which rings belong together is still to be found.
+enum Content {
+    Geometry(RawGeometry),
+    Rings(Vec<Vec<[f64; 3]>>),
+}
+
+fn content_of(record: &[u8]) -> std::result::Result<Content, String> {
     let damaged = || "has a damaged record".to_string();
     let (kind, _) = record.split_at_checked(4).ok_or_else(damaged)?;
-    match little(kind) {
-        0 => Ok(RawGeometry::Empty),
-        kind @ (3 | 13 | 23) => Ok(RawGeometry::Lines(parts(record, kind == 13).ok_or_else(damaged)?)),
-        kind @ (5 | 15 | 25) => Ok(RawGeometry::Areas(areas_of(parts(record, kind == 15).ok_or_else(damaged)?))),
-        1 | 8 | 11 | 18 | 21 | 28 => Ok(RawGeometry::Other("a point")),
-        31 => Ok(RawGeometry::Other("a surface (MultiPatch)")),
-        kind => Err(format!("has a geometry of the type {kind}, which is not known")),
-    }
+    let geometry = match little(kind) {
+        0 => RawGeometry::Empty,
+        kind @ (3 | 13 | 23) => RawGeometry::Lines(parts(record, kind == 13).ok_or_else(damaged)?),
+        kind @ (5 | 15 | 25) => return parts(record, kind == 15).map(Content::Rings).ok_or_else(damaged),
+        1 | 8 | 11 | 18 | 21 | 28 => RawGeometry::Other("a point"),
+        31 => RawGeometry::Other("a surface (MultiPatch)"),
+        kind => return Err(format!("has a geometry of the type {kind}, which is not known")),
+    };
+    Ok(Content::Geometry(geometry))
 }
 
 /// Returns the parts of a record of lines or areas; `None` if its counts do not fit its length.
@@ -117,7 +130,10 @@ fn attributes(path: &Path, options: &LineOptions) -> Result<Option<DbfTable>> {
         return Ok(None);
     }
     match beside(path, "dbf") {
-        Some(dbf) => DbfTable::read(&dbf, options.kind_field.as_deref(), options.height_field.as_deref()).map(Some),
+        Some(dbf) => {
+            let encoding = Encoding::of(beside(path, "cpg").as_deref());
+            DbfTable::open(&dbf, encoding, options.kind_field.as_deref(), options.height_field.as_deref()).map(Some)
+        }
         None => Err(Error::input(
             path,
             "its attributes are missing, the .dbf file beside it: copy all files of the Shapefile, or leave out kind_field and \
@@ -133,16 +149,21 @@ fn crs(path: &Path, warnings: &mut Warnings) -> Result<Crs> {
         );
         return Ok(Crs::default());
     };
-    let text = std::fs::read(&prj).map_err(Error::io("read", &prj))?;
+    let mut text = Vec::new();
+    let file = File::open(&prj).map_err(Error::io("read", &prj))?;
+    file.take(LONGEST_PRJ).read_to_end(&mut text).map_err(Error::io("read", &prj))?;
     let text = String::from_utf8_lossy(&text);
     parse(text.trim_start_matches('\u{feff}').trim()).ok_or_else(|| {
         Error::input(&prj, "is no well-known text of a CRS: say with crs in [[breaklines]] what the lines are in")
     })
 }
 
-/// Returns the files that are read with the `.shp` at `path`: itself, its attributes, its CRS.
+/// Returns the files that are read with the `.shp` at `path`: itself, its attributes, its CRS, and how its texts are written.
 pub(super) fn all_files(path: &Path) -> Vec<PathBuf> {
-    [path.to_path_buf()].into_iter().chain(["dbf", "prj"].iter().filter_map(|ending| beside(path, ending))).collect()
+    [path.to_path_buf()]
+        .into_iter()
+        .chain(["dbf", "prj", "cpg"].iter().filter_map(|ending| beside(path, ending)))
+        .collect()
 }
 
 /// Returns the file with this ending beside the `.shp`, in small letters or capitals.

@@ -120,7 +120,7 @@ fn try_plan(
     };
     let lines = LineFiles::read(options, &crs, &mut warnings)?;
     let mut extent = extent_without_outliers(sources, options, &wish)?;
-    lines.extend_heights(&mut extent);
+    lines.extend_heights(&mut extent)?;
     let lattice = choose_lattice(sources, &extent, &wish, &mut warnings)?;
     if fineness(sources, &extent, &wish).is_coarse() {
         warnings.extend(farthest_row(sources, options, &extent)?);

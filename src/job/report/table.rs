@@ -50,8 +50,13 @@ impl fmt::Display for Report {
             row("  at breaklines or in lakes", grouped(self.points.at_breaklines))?;
             let of = format!("of {} segments of {} features", grouped(findings.segments), grouped(findings.features));
             row("edges along breaklines", format!("{}, {of}", grouped(findings.subsegments)))?;
-            row("  places where heights disagree", grouped(findings.disagreements))?;
-            row("  rivers that rise", grouped(findings.rising_rivers))?;
+            let of_known = |found: u64, unknown: u64| match unknown {
+                0 => grouped(found),
+                _ => format!("{}, {} not looked at", grouped(found), grouped(unknown)),
+            };
+            let disagreements = of_known(findings.disagreements, findings.places_not_compared);
+            row("  places where heights disagree", disagreements)?;
+            row("  rivers that rise", of_known(findings.rising_rivers, findings.rivers_without_heights))?;
             row("  lakes that are not flat", grouped(findings.uneven_lakes))?;
         }
         if let Some(NetworkTraffic { requests, bytes }) = self.network {

@@ -44,8 +44,10 @@ fn warn_of_missing(file: &mut LineFile, own: &Crs, points: &Crs) {
             .push(format!("it says no CRS: its lines are taken to be in that of the points, {}", points.label()));
     }
     if own.is_named() {
-        file.warnings
-            .push(format!("the points name no CRS: they are taken to be in that of the lines, {}", own.label()));
+        file.warnings.push(format!(
+            "its lines are in {}, and the points say no CRS: they are taken to be in the same",
+            own.label()
+        ));
     }
 }
 
@@ -92,11 +94,14 @@ fn transform(file: &mut LineFile, own: &Crs, points: &Crs, datums: DatumRule) ->
 
 fn other_system(file: &LineFile, own: &Crs, points: &Crs, why: &str) -> Error {
     let path = file.path.display();
-    let target = points.epsg.map_or("the points' CRS".into(), |code| format!("EPSG:{code}"));
+    let how = match points.epsg {
+        Some(code) => format!("for example with `ogr2ogr -t_srs EPSG:{code} lines.gpkg {path}`"),
+        None => "for example in QGIS".into(),
+    };
     let points = if points.is_named() { points.label() } else { "a plane without a CRS".into() };
     Error::Config(format!(
-        "{path} is in {}, but the points are in {points}: {why}. Transform the lines first, for example with `ogr2ogr -t_srs {target} \
-         lines.gpkg {path}`; if what the file says is wrong, say crs = \"points\" in [[breaklines]]",
+        "{path} is in {}, but the points are in {points}: {why}. Transform the lines first, {how}; if what the file says is wrong, say what \
+         it is with crs in [[breaklines]], such as crs = \"points\" for the CRS of the points",
         own.label()
     ))
 }
@@ -139,6 +144,8 @@ mod tests {
         assert!(bring(&Crs::default(), "auto", &Crs::default()).unwrap().is_empty());
         let taken = bring(&Crs::default(), "auto", &zone_15).unwrap();
         assert!(taken.iter().any(|warning| warning.contains("says no CRS")));
+        let without = bring(&zone_15, "auto", &Crs::default()).unwrap();
+        assert!(without.iter().any(|warning| warning.contains("the points say no CRS")));
         for points in [&zone_15, &Crs::default()] {
             assert!(bring(&degrees, "points", points).unwrap().is_empty());
         }
@@ -201,7 +208,7 @@ mod tests {
         ] {
             let error = bring(own, "auto", points).unwrap_err();
             assert_eq!(error.exit_code(), 2);
-            assert!(error.to_string().contains(word) && error.to_string().contains("ogr2ogr"), "{error}");
+            assert!(error.to_string().contains(word) && error.to_string().contains("crs = \"points\""), "{error}");
         }
         let beyond = bring_vertex([87.0, 0.0, 1.0], &degrees, "auto", &zone_15).unwrap_err();
         assert!(beyond.exit_code() == 3 && beyond.to_string().contains("feature 1"), "{beyond}");

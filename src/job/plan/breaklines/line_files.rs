@@ -1,8 +1,9 @@
 //! The files of lines: which ones the options name, and what they hold.
 
+use crate::breaklines::FeatureKind;
 use crate::input::Crs;
 use crate::input::lines::options::{LineHeights, LineOptions};
-use crate::input::lines::{LineFile, is_side_file, read_lines};
+use crate::input::lines::{LineFeature, LineFile, is_side_file, read_lines};
 use crate::job::options::JobOptions;
 use crate::job::plan::breaklines::line_crs::bring_to_points;
 use crate::job::plan::extent::Extent;
@@ -13,6 +14,9 @@ use std::path::{Path, PathBuf};
 
 /// What messages call the option.
 const FILES: &str = "[[breaklines]] files";
+
+/// Heights of lines and points differ by less than this many units, on the earth and in the sea.
+const FAR_AWAY: f64 = 100_000.0;
 
 /// Lines are held in memory whole, with all that is made of them. Their files may take this share of the limit.
 const SHARE_OF_MEMORY: u64 = 8;
@@ -70,8 +74,8 @@ impl LineFiles {
     /// Reads all files that the options name, and transforms their lines into the system `crs` of the points.
     ///
     /// # Errors
-    /// [`Error::Config`] if there is no way from its system to that of the points, or they are too large; [`Error::Input`] if one is bad; [`Error::Io`] if one cannot be
-    /// read.
+    /// [`Error::Config`] if there is no way from its system to that of the points, or they are too large; [`Error::Input`] if one is bad;
+    /// [`Error::Io`] if one cannot be read.
     pub(crate) fn read(options: &JobOptions, crs: &Crs, warnings: &mut Warnings) -> Result<LineFiles> {
         let paths = line_paths(&options.breaklines)?;
         check_size(&paths, options.limits.memory.0)?;
@@ -99,27 +103,63 @@ impl LineFiles {
     }
 
     /// Extends the heights of `extent` to those of the lines above and below it.
-    pub(crate) fn extend_heights(&self, extent: &mut Extent) {
-        let (min, max) = (extent.min, extent.max);
-        let apart = |a: &[f64; 3], b: &[f64; 3]| {
-            (0..2).any(|axis| a[axis].max(b[axis]) < min[axis] || a[axis].min(b[axis]) > max[axis])
-        };
-        for outline in self.files.iter().flat_map(|file| &file.features).flat_map(|feature| feature.shape.outlines()) {
-            // An outline goes on from its last vertex to its first. That of a line does not, but then both count anyway.
-            let next = outline.iter().cycle().skip(1);
-            for (a, b) in outline.iter().zip(next).filter(|(a, b)| !apart(a, b)) {
-                for z in [a[2], b[2]].into_iter().filter(|z| z.is_finite()) {
+    ///
+    /// # Errors
+    /// [`Error::Input`] if a height is far from all points: the lattice would be made for it, and too coarse for all others.
+    pub(crate) fn extend_heights(&self, extent: &mut Extent) -> Result<()> {
+        let points = [extent.min[2] - FAR_AWAY, extent.max[2] + FAR_AWAY];
+        for file in &self.files {
+            for feature in &file.features {
+                for vertex in vertices_that_count(feature, extent) {
+                    let z = vertex[2];
+                    if z < points[0] || z > points[1] {
+                        return Err(too_far_away(file, feature, vertex));
+                    }
                     extent.min[2] = extent.min[2].min(z);
                     extent.max[2] = extent.max[2].max(z);
                 }
             }
         }
+        Ok(())
     }
+}
+
+/// Returns the vertices whose heights come into the mesh: the ends of segments that may meet the box, and the lowest one of a lake.
+fn vertices_that_count(feature: &LineFeature, extent: &Extent) -> Vec<[f64; 3]> {
+    let outlines = feature.shape.outlines();
+    let is_apart = |vertices: &[[f64; 3]]| {
+        (0..2).any(|axis| {
+            vertices.iter().all(|vertex| vertex[axis] < extent.min[axis])
+                || vertices.iter().all(|vertex| vertex[axis] > extent.max[axis])
+        })
+    };
+    let mut found = Vec::new();
+    for outline in outlines.iter().filter(|outline| !is_apart(outline)) {
+        if feature.kind == FeatureKind::Lake {
+            found.extend(outlines.iter().flatten().copied().min_by(|a, b| a[2].total_cmp(&b[2])));
+            break;
+        }
+        // An outline goes on from its last vertex to its first. That of a line does not, but then both count anyway.
+        let next = outline.iter().cycle().skip(1);
+        found.extend(outline.iter().zip(next).filter(|(a, b)| !is_apart(&[**a, **b])).flat_map(|(a, b)| [*a, *b]));
+    }
+    found.retain(|vertex| vertex[2].is_finite());
+    found
+}
+
+fn too_far_away(file: &LineFile, feature: &LineFeature, [x, y, z]: [f64; 3]) -> Error {
+    let what = format!(
+        "feature {} has the height {z:?} at ({x}, {y}), more than {FAR_AWAY} above or below all points: correct it, leave the feature out, or \
+         take its heights from the points around with heights = \"points\" in [[breaklines]]",
+        feature.number
+    );
+    Error::input(&file.path, what)
 }
 
 fn check_size(paths: &[(&LineOptions, PathBuf)], memory: u64) -> Result<()> {
     let mut bytes = 0u64;
     for (_, path) in paths {
+        // The attributes of a Shapefile are read record by record.
         bytes += path.metadata().map_err(Error::io("read", path))?.len();
     }
     if bytes <= memory / SHARE_OF_MEMORY {
@@ -142,4 +182,33 @@ fn all_at_zero(file: &LineFile) -> Option<String> {
             file.path.display()
         )
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::lines::LineShape;
+
+    fn extended(kind: FeatureKind, heights: [f64; 4]) -> Result<[f64; 2]> {
+        let corners = [[-50.0, -50.0], [60.0, -50.0], [60.0, 70.0], [-50.0, 70.0]];
+        let ring = corners.iter().zip(heights).map(|([x, y], z)| [*x, *y, z]).collect();
+        let shape = if kind == FeatureKind::Lake { LineShape::Area(vec![ring]) } else { LineShape::Line(ring) };
+        let features = vec![LineFeature { number: 4, kind, shape }];
+        let file = LineFile { path: "a.shp".into(), crs: Crs::default(), features, warnings: Warnings::default() };
+        let mut extent = Extent { min: [0.0; 3], max: [10.0, 10.0, 20.0], boxes: Vec::new() };
+        LineFiles { files: vec![file] }.extend_heights(&mut extent)?;
+        Ok([extent.min[2], extent.max[2]])
+    }
+
+    #[test]
+    fn heights_of_lines_count_where_they_come_into_the_mesh() {
+        // No segment comes near the box, but it lies in the lake.
+        assert_eq!(extended(FeatureKind::Lake, [-7.0, 90.0, 1e12, 8.0]).unwrap(), [-7.0, 20.0]);
+        assert_eq!(extended(FeatureKind::Line, [-7.0, 90.0, 1e12, 8.0]).unwrap(), [0.0, 20.0]);
+        for wrong in [-1e12, 1e7] {
+            let error = extended(FeatureKind::Lake, [wrong; 4]).unwrap_err();
+            let text = error.to_string();
+            assert!(error.exit_code() == 3 && text.contains("a.shp: feature 4 has the height"), "{text}");
+        }
+    }
 }

@@ -92,7 +92,7 @@ impl PlannedBreaklines {
         let nearest = nearest_heights(&built, cloud)?;
         nearest.settle(&mut built);
         refuse_sites_without_height(&built, &files.files, cloud.lattice)?;
-        warnings.extend(sentences(&files.files, cloud.lattice, &findings, features_outside));
+        warnings.extend(sentences(&files.files, cloud.lattice, &options, &findings, features_outside));
         Ok(Some(PlannedBreaklines {
             files: files.files.iter().map(|file| file.path.clone()).collect(),
             findings,
@@ -118,7 +118,10 @@ impl PlannedBreaklines {
         }
         let CutFrom { features, options, nearest: found } = &self.cut_from;
         let built = Breaklines::build(features, options);
-        let (mut built, _) = built.map_err(|error| Error::Broken(format!("the breaklines of the plan: {error}")))?;
+        let (mut built, _) = built.map_err(|error| match error {
+            BreaklineError::Interrupted => Error::Interrupted,
+            error => Error::Broken(format!("the breaklines of the plan: {error}")),
+        })?;
         let mut nearest = NearestHeights::new(&built);
         nearest.join(found);
         nearest.settle(&mut built);
@@ -164,6 +167,7 @@ fn nearest_heights(built: &Breaklines, cloud: &CloudOfPlan) -> Result<NearestHei
 fn refuse(error: BreaklineError, files: &[LineFile], lattice: &Lattice) -> Error {
     let at = |place| place_text(lattice, place);
     match error {
+        BreaklineError::Interrupted => Error::Interrupted,
         BreaklineError::Wall { id, place, heights: [low, high] } => about(
             files,
             id,

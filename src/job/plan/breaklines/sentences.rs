@@ -1,27 +1,45 @@
 //! What a user should know about breaklines.
 
-use crate::breaklines::{Disagreement, FeatureId, Findings, Rise, Uneven};
+use crate::breaklines::{BreaklineOptions, Disagreement, FeatureId, Findings, InLake, Rise, Uneven};
 use crate::geometry::Site;
 use crate::geometry::lattice::Lattice;
 use crate::input::lines::LineFile;
 
-/// Returns the warnings about what cutting the lines of `files` has shown. `outside` features lie outside the box of the points.
-pub(super) fn sentences(files: &[LineFile], lattice: &Lattice, findings: &Findings, outside: u64) -> Vec<String> {
+/// Returns the warnings about what cutting the lines of `files` with these `options` has shown. `outside` features lie outside the box of the
+/// points.
+pub(super) fn sentences(
+    files: &[LineFile],
+    lattice: &Lattice,
+    options: &BreaklineOptions,
+    findings: &Findings,
+    outside: u64,
+) -> Vec<String> {
     let names = Names { files, lattice, findings };
     let mut found = Vec::new();
     if findings.subsegments == 0 {
-        found.push(format!(
-            "[[breaklines]]: no line lies in the box of the points, so there are no breaklines: {outside} features lie outside; look \
-             at their CRS"
-        ));
+        found.push(names.nothing(options, outside));
     }
+    found.extend(findings.worst_in_lakes.first().map(|worst| names.in_lake(worst)));
     found.extend(findings.worst_disagreements.first().map(|worst| names.disagreement(worst)));
     found.extend(findings.worst_rises.first().map(|worst| names.rise(worst)));
     found.extend(findings.worst_uneven.first().map(|worst| names.uneven(worst)));
     if findings.empty_paths > 0 {
         found.push(format!(
-            "[[breaklines]]: {} lines without two different vertices are left out",
+            "[[breaklines]]: {} parts of features, lines shorter than a step of the lattice or outlines without three places on it, are left out",
             findings.empty_paths
+        ));
+    }
+    if findings.rivers_without_heights > 0 {
+        found.push(format!(
+            "[[breaklines]]: {} rivers take their heights from the points around; whether they rise is not looked at",
+            findings.rivers_without_heights
+        ));
+    }
+    if findings.places_not_compared > 0 {
+        found.push(format!(
+            "[[breaklines]]: at {} places a line with heights meets one that takes them from the points around; whether these disagree is not \
+             looked at",
+            findings.places_not_compared
         ));
     }
     found
@@ -34,10 +52,39 @@ struct Names<'a> {
 }
 
 impl Names<'_> {
+    /// Says why there are no breaklines.
+    fn nothing(&self, options: &BreaklineOptions, outside: u64) -> String {
+        let features: u64 = self.files.iter().map(|file| file.features.len() as u64).sum();
+        let why = if features == 0 {
+            "the files have no feature that is used".into()
+        } else if self.findings.segments == 0 {
+            format!(
+                "none of {features} features reaches into the box of the points ({outside} are far from it): look at their CRS"
+            )
+        } else {
+            let floor = self.length(options.floor.into());
+            format!(
+                "what lies in the box of the points is shorter than {floor}, and lines that are so near to each other become one: set a smaller spacing"
+            )
+        };
+        format!("[[breaklines]]: there are no breaklines: {why}")
+    }
+
+    fn in_lake(&self, &InLake { id, lake, length, place }: &InLake) -> String {
+        format!(
+            "[[breaklines]]: parts of lines or shores lie inside a lake, which is flat, and are left out; the worst is {}: about {} of it lie in \
+             {}, for example at {}; where it is to stay, cut it out of the lake as an island",
+            self.feature(id),
+            self.length(length),
+            self.feature(lake),
+            self.at(place)
+        )
+    }
+
     fn disagreement(&self, &Disagreement { place, kept, other }: &Disagreement) -> String {
         format!(
-            "[[breaklines]]: heights disagree at {} places where lines meet; the worst is {}: {} has the height {}, which is taken (a lake \
-             before a river before a line), and {} has {}",
+            "[[breaklines]]: heights disagree at {} places where lines meet; the worst is {}: {} has the height {}, which is taken (that \
+             of a lake before a river before a line, and the lowest of the same kind), and {} has {}",
             self.findings.disagreements,
             self.at(place),
             self.feature(kept.0),
@@ -80,6 +127,12 @@ impl Names<'_> {
 
     fn height(&self, z: i32) -> f64 {
         self.lattice.world(2, z)
+    }
+
+    /// A length in the plane in source units.
+    fn length(&self, steps: u64) -> String {
+        let exact = i64::try_from(steps).ok().and_then(|steps| self.lattice.resolution.checked_mul(steps.into()));
+        exact.map_or_else(|| format!("{steps} steps"), |exact| exact.normalize().to_string())
     }
 
     /// A difference of heights in source units. A whole number of decimal steps shows no trace of binary.
