@@ -338,9 +338,8 @@ mod tests {
     fn lines_that_cross_at_one_place_need_few_sites() {
         // From one side of a square to the other.
         let border = (-75..75).flat_map(|i| [[i, 75], [75, i]]);
-        let line = |(i, [x, y]): (u64, [i32; 2])| {
-            feature(FeatureKind::Line, i, &[[-6 * x, -6 * y, 0], [6 * x, 6 * y, 0]])
-        };
+        let line =
+            |(i, [x, y]): (u64, [i32; 2])| feature(FeatureKind::Line, i, &[[-6 * x, -6 * y, 0], [6 * x, 6 * y, 0]]);
         let features: Vec<Feature> = (0..).zip(border).map(line).collect();
         let options = BreaklineOptions { most_sites: 40_000, ..BreaklineOptions::new(1000, None) };
         let (_, found) = Breaklines::build(&features, &options).unwrap();
