@@ -14,6 +14,11 @@ pub fn no_point_is_left(plan: &Plan, counts: &PointCounts) -> Error {
         Some((bounds, inputs)) if counts.out_of_bounds > 0 && counts.classes.is_empty() => {
             compare(bounds.0, inputs, are_from_headers(plan))
         }
+        _ if counts.at_breaklines > 0 => {
+            "all that [input] leaves lie in lakes or at lines of [[breaklines]]: leave this area out, or correct \
+                                          the lakes"
+                .into()
+        }
         _ => no_ground(&plan.options.input, counts)
             .unwrap_or("check [input] surface, returns, classes and bounds".into()),
     };
