@@ -35,6 +35,9 @@ impl Fraction {
     }
 }
 
+/// The number of a lake, and an edge of its shore.
+pub(crate) type Shore = (u32, [Site; 2]);
+
 /// The shores of lakes. A point is inside a lake if a ray from it crosses the lake's shore an odd number of times.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Lakes {
@@ -44,7 +47,7 @@ pub(crate) struct Lakes {
 
 impl Lakes {
     /// Returns `count` lakes with these shores, which are closed: at every place an even number of a lake's segments end.
-    pub(crate) fn new(count: u32, shores: impl IntoIterator<Item = (u32, [Site; 2])>) -> Lakes {
+    pub(crate) fn new(count: u32, shores: impl IntoIterator<Item = Shore>) -> Lakes {
         let mut of_lake: Vec<Vec<(Bounds<2>, [Site; 2])>> = vec![Vec::new(); count as usize];
         for (lake, [a, b]) in shores {
             of_lake[lake as usize].push((segment_box(a, b), [a, b]));

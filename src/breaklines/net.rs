@@ -8,7 +8,7 @@ use crate::breaklines::error::BreaklineError;
 use crate::breaklines::exact::in_disc;
 use crate::breaklines::feature::FeatureKind;
 use crate::breaklines::findings::Findings;
-use crate::breaklines::lakes::{Fraction, Lakes};
+use crate::breaklines::lakes::{Fraction, Lakes, Shore};
 use crate::breaklines::node::Noding;
 use crate::breaklines::options::BreaklineOptions;
 use crate::breaklines::owners::{Owner, Owners};
@@ -118,7 +118,7 @@ fn choose(
     pieces: EdgeTable,
     sites: &SiteTable,
     findings: &mut Findings,
-) -> Result<(EdgeTable, Vec<(u32, [Site; 2])>), BreaklineError> {
+) -> Result<(EdgeTable, Vec<Shore>), BreaklineError> {
     if lakes == 0 {
         return Ok((pieces, Vec::new()));
     }
@@ -154,7 +154,7 @@ fn choose(
 }
 
 /// Returns the shores of lakes among edges.
-fn shores_of(segments: &[Segment], edges: &EdgeTable, sites: &SiteTable) -> Vec<(u32, [Site; 2])> {
+fn shores_of(segments: &[Segment], edges: &EdgeTable, sites: &SiteTable) -> Vec<Shore> {
     let mut shores = Vec::new();
     // Pieces of the same segments follow one another.
     let mut last = (u32::MAX, Vec::new());

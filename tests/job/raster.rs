@@ -230,7 +230,7 @@ fn a_grid_of_files_has_the_cells_of_the_one_file() {
     let ring: Cloud = hills(20_000, 3);
     let far = |point: &[i64; 3]| [point[0] - 10_000, point[1] - 10_000].iter().any(|way| way.abs() > 6_000);
     let folder = tempfile::tempdir().unwrap();
-    let cloud = clouds::write(folder.path(), "cloud.csv", &ring.into_iter().filter(far).collect());
+    let cloud = clouds::write(folder.path(), "cloud.csv", &ring.into_iter().filter(far).collect::<Cloud>());
     let job = |options: &str| {
         let job = with_raster(Job::on(&[&cloud]).tiles_of(500), &format!("resolution = 9.0{options}"));
         job.with("output", "max_edge = 900.0")

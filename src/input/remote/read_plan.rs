@@ -151,6 +151,10 @@ mod tests {
         (0..count).map(|i| i * step..i * step + length).collect()
     }
 
+    fn only(range: Range<u64>) -> Vec<Range<u64>> {
+        std::iter::once(range).collect()
+    }
+
     #[test]
     fn a_file_is_fetched_once_in_windows() {
         const MIB: u64 = 1 << 20;
@@ -158,7 +162,7 @@ mod tests {
         // The first window, and the next one at once.
         assert_eq!(fetched(&mut plan, &[0]), [0..4 * MIB, 4 * MIB..8 * MIB]);
         assert_eq!(fetched(&mut plan, &[1, 2, 3]), []);
-        assert_eq!(fetched(&mut plan, &[4]), [8 * MIB..10 * MIB]);
+        assert_eq!(fetched(&mut plan, &[4]), only(8 * MIB..10 * MIB));
         assert_eq!(fetched(&mut plan, &[5, 6, 7, 8, 9]), []);
         // Once more from the beginning.
         assert_eq!(fetched(&mut plan, &[0])[0], 0..4 * MIB);
@@ -177,13 +181,13 @@ mod tests {
     fn far_ranges_are_fetched_apart_and_others_are_unknown() {
         const LONG: u64 = 4 * GAP;
         let mut plan = ReadPlan::new(ranges(3, LONG, LONG + GAP));
-        assert_eq!(fetched(&mut plan, &[0]), [0..3 * LONG + 2 * GAP]);
+        assert_eq!(fetched(&mut plan, &[0]), only(0..3 * LONG + 2 * GAP));
         let mut plan = ReadPlan::new(ranges(3, LONG, LONG + GAP + 1));
         assert_eq!(fetched(&mut plan, &[0]), [0..LONG, LONG + GAP + 1..2 * LONG + GAP + 1]);
         let never = |range| Pending::begin(range, || Ok(Vec::new()));
         assert!(plan.take(&(0..99), &never).is_none());
         assert_eq!(joined(ranges(3, 100, 201), u64::MAX).len(), 3, "gaps are no more than half of what is wanted");
-        assert_eq!(joined(ranges(3, 100, 140), u64::MAX), [0..380]);
+        assert_eq!(joined(ranges(3, 100, 140), u64::MAX), only(0..380));
         assert_eq!(joined(ranges(3, 100, 140), 300), [0..240, 280..380]);
     }
 }

@@ -92,7 +92,7 @@ mod tests {
             token: None,
         };
         let request = UnsignedRequest { host: "examplebucket.s3.amazonaws.com", path, query, headers };
-        let signed = request.sign(&who, "us-east-1", UNIX_EPOCH + THEN);
+        let signed = request.sign(&who, "us-east-1", UNIX_EPOCH.checked_add(THEN).unwrap());
         let (_, value) = signed.into_iter().find(|(name, _)| *name == "authorization").unwrap();
         value.rsplit_once('=').unwrap().1.into()
     }
