@@ -20,6 +20,9 @@ use crate::interrupt;
 /// Between so many steps it is checked whether the process should stop.
 const SOME: usize = 1 << 12;
 
+/// A segment of the shore of a lake, with the number of the lake.
+type Shore = (u32, [Site; 2]);
+
 /// The subsegments of all lines.
 #[derive(Debug)]
 pub(crate) struct Net {
@@ -118,7 +121,7 @@ fn choose(
     pieces: EdgeTable,
     sites: &SiteTable,
     findings: &mut Findings,
-) -> Result<(EdgeTable, Vec<(u32, [Site; 2])>), BreaklineError> {
+) -> Result<(EdgeTable, Vec<Shore>), BreaklineError> {
     if lakes == 0 {
         return Ok((pieces, Vec::new()));
     }
@@ -154,7 +157,7 @@ fn choose(
 }
 
 /// Returns the shores of lakes among edges.
-fn shores_of(segments: &[Segment], edges: &EdgeTable, sites: &SiteTable) -> Vec<(u32, [Site; 2])> {
+fn shores_of(segments: &[Segment], edges: &EdgeTable, sites: &SiteTable) -> Vec<Shore> {
     let mut shores = Vec::new();
     // Pieces of the same segments follow one another.
     let mut last = (u32::MAX, Vec::new());
