@@ -6,7 +6,7 @@ mod paths;
 use crate::config::paths::{Anchored, anchor};
 use crate::gpu::options::{GpuOptions, TextureSide, VoronoiMethod};
 use crate::input::lines::options::LineOptions;
-use crate::input::options::{InputOptions, is_url};
+use crate::input::options::{InputOptions, is_by_url};
 use crate::job::options::{JobOptions, Limits};
 use crate::output::options::OutputOptions;
 use crate::triangulation::options::{Backend, MaxPointsPerPart, MaxPointsPerTile, TriangulationOptions};
@@ -115,7 +115,7 @@ fn resolve_paths(options: &mut JobOptions, base: &Path) -> std::result::Result<(
         *grid = base.join(path);
     }
     // A shell's signs mean other things in a URL.
-    let of_points = options.input.files.iter_mut().filter(|file| !is_url(file)).map(|file| ("[input] files", file));
+    let of_points = options.input.files.iter_mut().filter(|file| !is_by_url(file)).map(|file| ("[input] files", file));
     let line_files = || options.breaklines.iter().flat_map(|lines| &lines.files);
     line_files().try_for_each(|file| refuse_url("[[breaklines]] files", file))?;
     let of_lines = options.breaklines.iter_mut().flat_map(|lines| &mut lines.files);
@@ -130,7 +130,7 @@ fn resolve_paths(options: &mut JobOptions, base: &Path) -> std::result::Result<(
 
 /// Refuses a URL where only a file of this machine can be read.
 fn refuse_url(option: &str, name: &str) -> std::result::Result<(), String> {
-    match is_url(name) {
+    match is_by_url(name) {
         // Its query may be a secret.
         true => {
             let place = name.split('?').next().unwrap_or_default();

@@ -10,12 +10,15 @@ use crate::input::crs::transform::datum_rule::DatumRule;
 use crate::input::points::classes::{IGNORED_GROUND, is_noise};
 use crate::input::points::optional_fields::OptionalFields;
 use crate::input::points::returns::KeptReturns;
-use crate::input::remote::name::public_name;
+use crate::input::remote::name::{is_url, public_name};
 use crate::input::surface::{MeshOf, Surface};
 use crate::input::text::options::TextOptions;
 use crate::input::text::row_choice::RowChoice;
 
-pub use crate::input::remote::name::is_url;
+/// Tells whether a name in the options is a URL and no path.
+pub fn is_by_url(name: &str) -> bool {
+    is_url(name)
+}
 
 /// `[input]`: which points a job reads.
 #[derive(Clone, Debug, Serialize, Deserialize)]
