@@ -20,9 +20,6 @@ use crate::interrupt;
 /// Between so many steps it is checked whether the process should stop.
 const SOME: usize = 1 << 12;
 
-/// A segment of the shore of a lake, with the number of the lake.
-type Shore = (u32, [Site; 2]);
-
 /// The subsegments of all lines.
 #[derive(Debug)]
 pub(crate) struct Net {
