@@ -116,6 +116,7 @@ impl RandomAccessFile {
     }
 
     /// Returns a buffered reader of the bytes of `range`.
+    #[cfg_attr(not(feature = "remote"), allow(unreachable_code, reason = "then no file is of another machine"))]
     pub(crate) fn range(&self, range: Range<u64>) -> Result<FileRange> {
         let source = match &self.content {
             Content::Local(file) => RangeSource::Local(file.try_clone().map_err(Error::io("read", &self.path))?),
