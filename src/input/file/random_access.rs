@@ -116,6 +116,7 @@ impl RandomAccessFile {
     }
 
     /// Returns a buffered reader of the bytes of `range`.
+    #[cfg_attr(not(feature = "remote"), allow(unreachable_code, reason = "then no file is of another machine"))]
     pub(crate) fn range(&self, range: Range<u64>) -> Result<FileRange> {
         self.range_with(range, READ_AHEAD)
     }
