@@ -20,6 +20,8 @@ fn main() {
         println!("cargo::rerun-if-changed={}", file.display());
     }
     let features = std::env::vars().filter_map(|(name, _)| Some(name.strip_prefix("CARGO_FEATURE_")?.to_string()));
+    // The set of those that are on by default says nothing that they do not say themselves.
+    let features = features.filter(|name| name != "DEFAULT");
     let version = long_version(&variable("CARGO_PKG_VERSION"), commit, features.collect());
     println!("cargo::rustc-env=GDT_LONG_VERSION={version}");
 }

@@ -18,6 +18,8 @@ pub(crate) struct Ways {
     draft: Draft,
     sources: Vec<Source>,
     waiting: std::vec::IntoIter<Way>,
+    /// Whether the plane has not been tried yet.
+    may_be_plane: bool,
 }
 
 /// A way to bring all points onto one plane.
@@ -43,23 +45,26 @@ impl Ways {
         };
         let sources = input_paths(&options.input)?.par_iter().map(open).collect::<Result<Vec<_>>>()?;
         let ways = vec![Way::Utm { close: false }, Way::Utm { close: true }];
-        Ok(Ways { draft: draft.clone(), sources: sources.into_iter().flatten().collect(), waiting: ways.into_iter() })
+        let sources = sources.into_iter().flatten().collect();
+        Ok(Ways { draft: draft.clone(), sources, waiting: ways.into_iter(), may_be_plane: true })
     }
 
     /// Returns the draft for the next way.
     pub(crate) fn next(&mut self) -> Option<Draft> {
-        let way = self.waiting.next()?;
-        Some(self.draft.with(self.lines(way)))
+        match self.waiting.next() {
+            Some(way) => Some(self.draft.with(self.lines(way))),
+            None => self.after_stray_points(),
+        }
     }
 
     /// Returns the draft for coordinates of which some are no place on earth, though all files say that they are degrees; `None` if they
-    /// can be degrees.
+    /// can be degrees, or if that was tried before.
     pub(crate) fn after_stray_points(&mut self) -> Option<Draft> {
         self.waiting = Vec::new().into_iter();
         let is_nowhere = |source: &Source| farthest(source, 0) > 360.0 || farthest(source, 1) > 90.0;
         let all_say_degrees = self.sources.iter().all(|source| source.crs.horizontal == Unit::Degree);
         let is_plane = all_say_degrees && self.sources.iter().any(is_nowhere);
-        is_plane.then(|| self.draft.with(self.lines(Way::Plane)))
+        (is_plane && std::mem::take(&mut self.may_be_plane)).then(|| self.draft.with(self.lines(Way::Plane)))
     }
 
     fn lines(&self, way: Way) -> Vec<NeededLine> {

@@ -34,7 +34,11 @@ fn the_short_version_is_that_of_the_package_and_the_long_one_says_what_is_built_
     let short = format!("gdt-batch {}", env!("CARGO_PKG_VERSION"));
     assert_eq!(run(&["-V"]).trim(), short);
     let long = run(&["--version"]);
-    let features = [(cfg!(feature = "fault-injection"), "fault-injection"), (cfg!(feature = "viewer"), "viewer")];
+    let features = [
+        (cfg!(feature = "fault-injection"), "fault-injection"),
+        (cfg!(feature = "remote"), "remote"),
+        (cfg!(feature = "viewer"), "viewer"),
+    ];
     let built_in: Vec<&str> = features.iter().filter(|(is, _)| *is).map(|(_, name)| *name).collect();
     let built_in = if built_in.is_empty() { "none".to_string() } else { built_in.join(", ") };
     assert!(

@@ -13,6 +13,7 @@ use crate::las_file::LasFile;
 use crate::levels::hills;
 use crate::parts::{in_files, in_parts};
 use crate::program::{Job, Said, gdt_batch};
+use crate::web_server::WebServer;
 
 /// The documents that are to be compared, each in a file that is called after its schema.
 struct Documents {
@@ -99,8 +100,11 @@ fn add_jobs_of_one_part(documents: &Documents) {
     documents.run(&job);
     documents.verify(&job, &[&square], "proved");
     add_what_is_missing_or_wrong(documents, &job);
-    let las = write(folder.path(), "returns.las", &LasFile::new(4, 7, 0, 500).las());
-    documents.run(&Job::on(&[las]).with("input", "returns = [1, 2]\nclasses = [1, 2, 3]\nresolution = 0.01"));
+    let server = WebServer::of(&[("/returns.las", LasFile::new(4, 7, 0, 500).las())]);
+    documents.run(
+        &Job::on(&[server.url("/returns.las")])
+            .with("input", "returns = [1, 2]\nclasses = [1, 2, 3]\nresolution = 0.01"),
+    );
 }
 
 fn add_what_is_missing_or_wrong(documents: &Documents, job: &Job) {

@@ -59,7 +59,10 @@ pub(crate) fn with_doubtful_heights() -> (Survey, Job) {
     let survey = Survey::new(2_000);
     let rising = vec![[10.0, 10.0, 5.0], [60.0, 10.0, 4.0], [110.0, 10.0, 4.5], [160.0, 10.0, 3.0]];
     let uneven = vec![[20.0, 60.0, 9.0], [40.0, 60.0, 9.0], [40.0, 80.0, 9.3], [20.0, 80.0, 9.0]];
-    let rivers = geojson(survey.folder(), "rises.geojson", &Features::lines(&[("river", rising)]));
+    // A line that nobody will see: it lies in the lake.
+    let drowned = vec![[25.0, 65.0, 8.0], [35.0, 72.0, 8.0]];
+    let features = Features::lines(&[("river", rising), ("line", drowned)]);
+    let rivers = geojson(survey.folder(), "rises.geojson", &features);
     let lakes = geojson(survey.folder(), "uneven.geojson", &Features::areas(&[("lake", vec![uneven])]));
     let crossing = Features::lines(&[("line", cross(0)), ("line", cross(1))]);
     let lines = shapefile(survey.folder(), "crossing", &crossing);

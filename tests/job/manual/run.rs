@@ -157,6 +157,8 @@ impl Place {
             "view" => return self.view(&words, at),
             "verify" if !self.folder.path().join(&words[1]).exists() => self.run_job(),
             "sample" if !words.iter().any(|word| word == "--points") => insert(&mut words, &["--points", "1000"]),
+            // It writes the configuration that is there already.
+            "init" => _ = fs::remove_file(self.folder.path().join("job.toml")),
             // Nothing is sent to an engine that is not there.
             "submit" => insert(&mut words, &["--dry-run"]),
             _ => {}
