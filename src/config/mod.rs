@@ -140,9 +140,27 @@ fn refuse_url(option: &str, name: &str) -> std::result::Result<(), String> {
     }
 }
 
+/// Returns a message without what may be a secret: the queries of the URLs in the line that it shows.
+fn without_queries(message: &str) -> String {
+    let ends_url = |c: char| c.is_whitespace() || "\"'`,]".contains(c);
+    let mut out = String::with_capacity(message.len());
+    let mut rest = message;
+    while let Some(at) = rest.find("://") {
+        let (before, url) = rest.split_at(at);
+        let end = url.find(ends_url).unwrap_or(url.len());
+        out += before;
+        match url[..end].split_once('?') {
+            Some((place, _)) => out = out + place + "?...",
+            None => out += &url[..end],
+        }
+        rest = &url[end..];
+    }
+    out + rest
+}
+
 /// Reads and checks the text of a configuration. The error shows the line.
 fn parse(text: &str) -> std::result::Result<JobOptions, String> {
-    let mut file: ConfigFile = toml::from_str(text).map_err(|e| e.to_string())?;
+    let mut file: ConfigFile = toml::from_str(text).map_err(|e| without_queries(&e.to_string()))?;
     if file.input.files.is_empty() {
         return Err("[input] files is empty: name at least one point cloud".into());
     }
@@ -225,6 +243,13 @@ mod tests {
 
     fn error(text: &str) -> String {
         parse(text).unwrap_err()
+    }
+
+    #[test]
+    fn a_message_about_the_text_hides_queries() {
+        let error = parse("[input]\nfiles = \"https://host/a.laz?X-Amz-Signature=SECRET\"\n").unwrap_err();
+        assert!(error.contains("https://host/a.laz?...") && !error.contains("SECRET"), "{error}");
+        assert_eq!(without_queries("a \"s3://b/c?d=e\", b?c"), "a \"s3://b/c?...\", b?c");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Which point clouds the arguments of `init` mean, and what the configuration calls them.
 
 use crate::init::config_folder::{ConfigFolder, named};
-use crate::input::{self, TextOptions};
+use crate::input::{self, TextOptions, is_url};
 use crate::{Error, Result};
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -36,6 +36,13 @@ impl NamedClouds {
         }
         let mut files = Vec::new();
         for argument in arguments {
+            if let Some(url) = argument.to_str().filter(|name| is_url(name)) {
+                // Its query may be a secret.
+                let place = url.split('?').next().unwrap_or_default();
+                return Err(Error::Config(format!(
+                    "{place}: init looks at files of this machine only; write URLs into [input] files yourself"
+                )));
+            }
             if argument.is_dir() {
                 clouds.add_folder(argument, config)?;
             } else if argument.symlink_metadata().is_ok() {

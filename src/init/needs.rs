@@ -42,9 +42,10 @@ pub(crate) fn runnable(draft: Draft) -> Result<Runnable> {
         let (error, next) = match trial(&now) {
             Ok(Trial::Runs(found)) => return fitted(now, *found),
             Ok(Trial::Damaged(damage)) => {
+                let allowed = || line_for_damage(&now, &damage).map(|line| now.with([line]));
                 let next = match &mut ways {
-                    Some(ways) => ways.after_stray_points(),
-                    None => line_for_damage(&now, &damage).map(|line| now.with([line])),
+                    Some(ways) => ways.after_stray_points().or_else(allowed),
+                    None => allowed(),
                 };
                 match next {
                     Some(draft) => now = draft,

@@ -1,7 +1,7 @@
 //! What lets a job run though its clouds are in degrees or in different coordinate reference systems.
 
 use crate::init::draft::{Draft, NeededLine};
-use crate::input::{self, Crs, Source, Unit};
+use crate::input::{self, Crs, FileFormat, Source, Unit};
 use crate::job::plan::inputs::input_paths;
 use crate::{Error, Result};
 use rayon::prelude::*;
@@ -61,7 +61,11 @@ impl Ways {
     /// can be degrees, or if that was tried before.
     pub(crate) fn after_stray_points(&mut self) -> Option<Draft> {
         self.waiting = Vec::new().into_iter();
-        let is_nowhere = |source: &Source| farthest(source, 0) > 360.0 || farthest(source, 1) > 90.0;
+        // The columns of a text may be exchanged, or a row of it may be a mistake. So may x and y of another file.
+        let is_nowhere = |source: &Source| {
+            let [x, y] = [0, 1].map(|axis| farthest(source, axis));
+            source.format != FileFormat::Text && (x > 360.0 || y > 90.0) && (x > 90.0 || y > 180.0)
+        };
         let all_say_degrees = self.sources.iter().all(|source| source.crs.horizontal == Unit::Degree);
         let is_plane = all_say_degrees && self.sources.iter().any(is_nowhere);
         (is_plane && std::mem::take(&mut self.may_be_plane)).then(|| self.draft.with(self.lines(Way::Plane)))

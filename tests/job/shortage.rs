@@ -9,7 +9,7 @@ use crate::program::{Job, gdt_batch, gdt_batch_within_kib};
 #[track_caller]
 fn refused_until_it_fits(folder: &Path, arguments: &[&str], before: impl Fn()) -> usize {
     // With less, the system cannot even map the program.
-    let (mut refused, mut fitted, mut kibibytes) = (0, 0, 30_000);
+    let (mut refused, mut fitted, mut kibibytes) = (0, 0, 34_000);
     while fitted < 3 {
         before();
         let said = gdt_batch_within_kib(kibibytes, folder, arguments);

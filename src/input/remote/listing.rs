@@ -43,7 +43,7 @@ pub(crate) fn files_at(name: &str) -> Result<Vec<String>> {
     let pattern = Pattern::new(key).map_err(|error| Error::Config(format!("{name}: {error}")))?;
     let literal = &key[..key.find(SPECIAL).unwrap_or(key.len())];
     // Without a pattern in a folder's name, one folder is enough.
-    let is_in_one_folder = !key[literal.len()..].contains('/');
+    let is_in_one_folder = !key[literal.len()..].contains('/') && !key.contains("**");
     let mut found = BTreeSet::new();
     let mut next = None;
     for _ in 0..MOST_PAGES {
@@ -54,6 +54,11 @@ pub(crate) fn files_at(name: &str) -> Result<Vec<String>> {
         if next.is_none() {
             break;
         }
+    }
+    if next.is_some() {
+        return Err(Error::Config(format!(
+            "{name}: the bucket has too many objects there: name a folder, or fewer files"
+        )));
     }
     Ok(found.into_iter().map(|key| format!("s3://{bucket}/{key}")).collect())
 }
@@ -104,7 +109,12 @@ fn parse(text: &str) -> Option<Page> {
     let objects = root.children().filter(|node| node.tag_name().name() == "Contents");
     let keys = objects.filter_map(|node| value(node, "Key")).collect();
     let is_cut = value(root, "IsTruncated").is_some_and(|cut| cut == "true");
-    Some(Page { keys, next: value(root, "NextContinuationToken").filter(|_| is_cut) })
+    let next = value(root, "NextContinuationToken");
+    // A server that knows only the first version of the list has no such token, and would give the first page alone.
+    if is_cut && next.is_none() {
+        return None;
+    }
+    Some(Page { keys, next: next.filter(|_| is_cut) })
 }
 
 #[cfg(test)]
@@ -122,6 +132,9 @@ mod tests {
         let page = page.unwrap();
         assert_eq!(page.keys, ["a/& b.laz", "a/c.laz"]);
         assert_eq!(page.next.as_deref(), Some("1ue/="));
+        let cut =
+            "<ListBucketResult><IsTruncated>true</IsTruncated><Contents><Key>a</Key></Contents></ListBucketResult>";
+        assert!(parse(cut).is_none(), "the rest of the list is lost");
         assert!(parse("<html></html>").is_none() && parse("no list").is_none());
     }
 

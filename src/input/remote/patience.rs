@@ -23,7 +23,7 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(20);
 const MOST_UNREACHABLE: u32 = 3;
 
 /// So many bytes of an answer that broke off are progress.
-const PROGRESS: usize = 1 << 16;
+const PROGRESS: usize = 1 << 12;
 
 impl Patience {
     /// Returns that of the program.

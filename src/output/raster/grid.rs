@@ -233,6 +233,13 @@ fn fitting(sides: [i128; 2], resolution: Decimal, limit: CellLimit) -> Result<[u
     let [columns, rows] = sides;
     let most = limit.cells();
     let fits = columns <= MOST_ALONG && rows <= MOST_ALONG && columns.saturating_mul(rows) <= most;
+    // A narrow raster has files that are hardly filled.
+    if let CellLimit::Files(side) = limit
+        && fits
+        && (columns / i128::from(side) + 2) * (rows / i128::from(side) + 2) > MOST_FILES
+    {
+        return Err(format!("makes {columns} x {rows} cells, and {limit}: set greater cells_per_file or resolution"));
+    }
     if fits {
         return Ok(sides.map(|side| side as u32));
     }
@@ -420,6 +427,14 @@ pub(super) mod tests {
         .unwrap();
         assert_eq!(grid.levels(), [[1500, 513], [750, 257], [375, 129]]);
         assert_eq!(blocks([1500, 513]), [3, 2]);
+    }
+
+    #[test]
+    fn a_narrow_grid_has_no_more_files_than_a_wide_one() {
+        let corridor = Bounds { min: [0, 0], max: [40_000_000, 400] };
+        let grid = |side| RasterGrid::new(&lattice("0", "0", "1"), decimal("1"), corridor, CellLimit::Files(side));
+        assert!(grid(512).unwrap_err().contains("at most 65536 files"));
+        assert!(grid(1024).is_ok());
     }
 
     #[test]

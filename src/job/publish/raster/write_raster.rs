@@ -212,16 +212,18 @@ impl<'a> RasterWork<'a> {
 
     /// Returns what the user should know of the raster.
     pub fn warnings(&self, stats: &RasterStats) -> Vec<String> {
+        let file = if self.options.cells_per_file.is_some() { "terrain.vrt" } else { "terrain.tif" };
         let same = (stats.same_as_nodata > 0).then(|| {
             format!(
-                "{} cells of terrain.tif have the height {}, which stands for none there: set another [output.raster] nodata",
+                "{} cells of {file} have the height {}, which stands for none there: set another [output.raster] nodata",
                 stats.same_as_nodata,
                 self.options.nodata.number()
             )
         });
         let empty = (stats.heights == 0).then(|| {
-            "terrain.tif has no height, because no centre of a cell lies within the terrain: set a finer [output.raster] resolution"
-                .to_string()
+            format!(
+                "{file} has no height, because no centre of a cell lies within the terrain: set a finer [output.raster] resolution"
+            )
         });
         let system = system_warning(&self.plan.crs, &system_of(self.plan));
         same.into_iter().chain(empty).chain(system).collect()
