@@ -434,7 +434,7 @@ pub(super) mod tests {
         let corridor = Bounds { min: [0, 0], max: [40_000_000, 400] };
         let grid = |side| RasterGrid::new(&lattice("0", "0", "1"), decimal("1"), corridor, CellLimit::Files(side));
         assert!(grid(512).unwrap_err().contains("at most 65536 files"));
-        assert!(grid(1024).is_ok());
+        assert!(grid(2048).is_ok());
     }
 
     #[test]
