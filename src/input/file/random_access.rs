@@ -116,12 +116,12 @@ impl RandomAccessFile {
     }
 
     /// Returns a buffered reader of the bytes of `range`.
-    #[cfg_attr(not(feature = "remote"), allow(unreachable_code, reason = "then no file is of another machine"))]
     pub(crate) fn range(&self, range: Range<u64>) -> Result<FileRange> {
         self.range_with(range, READ_AHEAD)
     }
 
     /// As [`RandomAccessFile::range`], for a caller who knows what he skips: at most `read_ahead` bytes of that are read.
+    #[cfg_attr(not(feature = "remote"), allow(unreachable_code, reason = "then no file is of another machine"))]
     pub(crate) fn range_with(&self, range: Range<u64>, read_ahead: usize) -> Result<FileRange> {
         let source = match &self.content {
             Content::Local(file) => RangeSource::Local(file.try_clone().map_err(Error::io("read", &self.path))?),
