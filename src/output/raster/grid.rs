@@ -360,6 +360,10 @@ pub(super) mod tests {
         Lattice::new([decimal(x), decimal(y), Decimal::ZERO], decimal(step), decimal("0.01")).unwrap()
     }
 
+    fn in_one_file(lattice: &Lattice, cell: &str, bounds: Bounds<2>) -> Result<RasterGrid, String> {
+        RasterGrid::new(lattice, decimal(cell), bounds, CellLimit::OneFile)
+    }
+
     impl RasterGrid {
         /// Returns the grid with 128-bit numbers alone.
         pub(in crate::output::raster) fn without_narrow(mut self) -> RasterGrid {
@@ -373,26 +377,19 @@ pub(super) mod tests {
         let lattice = lattice("100.25", "-7", "0.01");
         // x from 100.25 to 102, y from -8 to -6.5.
         let bounds = Bounds { min: [0, -100], max: [175, 50] };
-        let grid = RasterGrid::new(&lattice, decimal("0.5"), bounds, CellLimit::OneFile).unwrap();
+        let grid = in_one_file(&lattice, "0.5", bounds).unwrap();
         assert_eq!((grid.corner(), grid.size(), grid.cell_size()), ([100.0, -6.5], [4, 3], 0.5));
-        let grid = RasterGrid::new(&lattice, decimal("1000"), bounds, CellLimit::OneFile).unwrap();
+        let grid = in_one_file(&lattice, "1000", bounds).unwrap();
         assert_eq!((grid.corner(), grid.size()), ([0.0, 0.0], [1, 1]));
         // A terrain that is a line on an edge.
-        let grid = RasterGrid::new(&lattice, decimal("0.25"), Bounds { min: [0, 0], max: [0, 0] }, CellLimit::OneFile)
-            .unwrap();
+        let grid = in_one_file(&lattice, "0.25", Bounds { min: [0, 0], max: [0, 0] }).unwrap();
         assert_eq!((grid.corner(), grid.size()), ([100.25, -7.0], [1, 1]));
     }
 
     #[test]
     fn a_coordinate_knows_the_centres_beside_it() {
         // Centres at 0.25, 0.75 and so on; lattice places are quarters.
-        let grid = RasterGrid::new(
-            &lattice("0", "0", "0.25"),
-            decimal("0.5"),
-            Bounds { min: [0, 0], max: [8, 8] },
-            CellLimit::OneFile,
-        )
-        .unwrap();
+        let grid = in_one_file(&lattice("0", "0", "0.25"), "0.5", Bounds { min: [0, 0], max: [8, 8] }).unwrap();
         let beside = |place| {
             let Beside { from, past } = grid.narrow().unwrap().beside(0, place, 4);
             (from, past)
@@ -404,7 +401,7 @@ pub(super) mod tests {
     #[test]
     fn a_raster_that_is_too_fine_says_what_would_do() {
         let bounds = Bounds { min: [0, 0], max: [1_000_000, 1_000_000] };
-        let grid = |cell: &str| RasterGrid::new(&lattice("0", "0", "1"), decimal(cell), bounds, CellLimit::OneFile);
+        let grid = |cell: &str| in_one_file(&lattice("0", "0", "1"), cell, bounds);
         let said = grid("0.5").unwrap_err();
         assert!(
             said.starts_with("makes 2000000 x 2000000 cells, 16000 GB") && said.contains("set 2.0 or more"),
@@ -418,13 +415,7 @@ pub(super) mod tests {
 
     #[test]
     fn the_last_overview_fits_a_block() {
-        let grid = RasterGrid::new(
-            &lattice("0", "0", "1"),
-            decimal("1"),
-            Bounds { min: [0, 0], max: [1500, 513] },
-            CellLimit::OneFile,
-        )
-        .unwrap();
+        let grid = in_one_file(&lattice("0", "0", "1"), "1", Bounds { min: [0, 0], max: [1500, 513] }).unwrap();
         assert_eq!(grid.levels(), [[1500, 513], [750, 257], [375, 129]]);
         assert_eq!(blocks([1500, 513]), [3, 2]);
     }

@@ -6,7 +6,7 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::input::remote::window::{Pending, held_bytes};
+use crate::input::remote::network::window::{Pending, held_bytes};
 
 /// Ranges with no more bytes between them are fetched in one request: on most connections a request takes as long as these bytes. All gaps
 /// of a request together have at most half as many bytes as what is wanted of it: many small ranges must not become the whole file.

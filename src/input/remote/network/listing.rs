@@ -5,11 +5,11 @@ use std::io::Read;
 
 use glob::{MatchOptions, Pattern};
 
-use crate::input::remote::client::{Address, Headers, refusal};
-use crate::input::remote::failure::{Failure, FailureKind};
-use crate::input::remote::patience::{Patience, persist};
-use crate::input::remote::signature::encoded;
-use crate::input::remote::window::Pending;
+use crate::input::remote::network::client::{Address, Headers, refusal};
+use crate::input::remote::network::failure::{Failure, FailureKind};
+use crate::input::remote::network::patience::{Patience, persist};
+use crate::input::remote::network::signature::encoded;
+use crate::input::remote::network::window::Pending;
 use crate::{Error, Result};
 
 /// As on the command line: a star does not reach beyond a slash.

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use crate::fault;
-use crate::input::remote::failure::{Failure, FailureKind};
+use crate::input::remote::network::failure::{Failure, FailureKind};
 
 /// How long a server may take.
 #[derive(Clone, Copy, Debug)]

@@ -6,9 +6,9 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::Result;
-use crate::input::remote::file::RemoteFile;
-use crate::input::remote::read_plan::joined;
-use crate::input::remote::window::{Pending, Window};
+use crate::input::remote::network::file::RemoteFile;
+use crate::input::remote::network::read_plan::joined;
+use crate::input::remote::network::window::{Pending, Window};
 
 /// A read of fewer bytes fetches so many, because the next one is likely to be near.
 const BLOCK: u64 = 1 << 16;

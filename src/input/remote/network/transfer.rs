@@ -7,9 +7,9 @@ use ureq::Body;
 use ureq::http::{HeaderMap, Response, header};
 use xxhash_rust::xxh3::xxh3_64;
 
-use crate::input::remote::client::{Address, Headers, refusal};
-use crate::input::remote::failure::{Failure, FailureKind};
-use crate::input::remote::patience::{Patience, persist};
+use crate::input::remote::network::client::{Address, Headers, refusal};
+use crate::input::remote::network::failure::{Failure, FailureKind};
+use crate::input::remote::network::patience::{Patience, persist};
 use crate::input::remote::traffic::count_bytes;
 
 /// The bytes that are taken from a connection at once.

@@ -6,10 +6,10 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::input::remote::client::Address;
-use crate::input::remote::read_plan::ReadPlan;
-use crate::input::remote::transfer::{Transferred, Version, transfer};
-use crate::input::remote::window::{Pending, Window, held_bytes};
+use crate::input::remote::network::client::Address;
+use crate::input::remote::network::read_plan::ReadPlan;
+use crate::input::remote::network::transfer::{Transferred, Version, transfer};
+use crate::input::remote::network::window::{Pending, Window, held_bytes};
 use crate::{Error, Result};
 
 /// The bytes that the first request asks for: the headers of most files.
@@ -33,6 +33,14 @@ pub(crate) struct RemoteFile {
     beginning: Mutex<Option<Arc<Window>>>,
     /// What will be read.
     plan: Mutex<ReadPlan>,
+}
+
+/// Returns the size of a file and a number that tells its content from others. Asks the server what it has now.
+///
+/// # Errors
+/// As [`RemoteFile::look`].
+pub(crate) fn identity(name: &Path) -> Result<(u64, u64)> {
+    RemoteFile::look(name).map(|file| (file.size(), file.hash()))
 }
 
 impl RemoteFile {

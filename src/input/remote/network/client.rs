@@ -8,11 +8,11 @@ use ureq::tls::{Certificate, RootCerts, TlsConfig};
 use ureq::{Agent, Body};
 
 use crate::Result;
-use crate::input::remote::failure::{Failure, FailureKind};
 use crate::input::remote::name::address;
-use crate::input::remote::patience::Patience;
-use crate::input::remote::s3::S3Settings;
-use crate::input::remote::signature::{UnsignedRequest, encoded};
+use crate::input::remote::network::failure::{Failure, FailureKind};
+use crate::input::remote::network::patience::Patience;
+use crate::input::remote::network::s3::S3Settings;
+use crate::input::remote::network::signature::{UnsignedRequest, encoded};
 use crate::input::remote::traffic::count_request;
 
 /// Headers of a request, by names in lower case.

@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use crate::input::remote::signature::Credentials;
+use crate::input::remote::network::signature::Credentials;
 use crate::{Error, Result};
 
 /// What the environment says about S3.

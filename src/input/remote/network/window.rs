@@ -6,7 +6,7 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
 use crate::catch_panic::catch_panic;
-use crate::input::remote::failure::{Failure, FailureKind};
+use crate::input::remote::network::failure::{Failure, FailureKind};
 use crate::{Result, interrupt};
 
 /// How often somebody who waits asks whether the process should stop.
