@@ -28,7 +28,7 @@ fn arrangement(kind: &str, random: &mut Random) -> (Vec<Feature>, BreaklineOptio
     let side = [12, 60, 400, 3000, 40_000][random.below(5) as usize];
     let most = if kind == "huge" { REACH } else { side };
     let spacing = (1 + random.below(most) / 2 + most / 60) as u32;
-    let floor = 1 + random.below(5) as u32;
+    let floor = 2 + random.below(4) as u32;
     let mut options = BreaklineOptions { floor, most_sites: 4000, ..BreaklineOptions::new(spacing, None) };
     if random.below(4) == 0 {
         options.within = Some(Bounds { min: [side / 4; 2], max: [side - side / 5; 2] });
@@ -160,6 +160,25 @@ fn distance([a, b]: [Site; 2], p: Site) -> f64 {
     off[0].hypot(off[1])
 }
 
+/// Returns how far a line in a bundle of so many may move: two snaps, one more for each other line, and half a step for each time that a
+/// piece is halved and rounded.
+fn moved_by(lines: usize, options: &BreaklineOptions) -> f64 {
+    (1 + lines) as f64 * f64::from(options.floor) + 2.0 + 0.5 * f64::from(options.spacing).log2()
+}
+
+/// Returns how far a line may move at `p`, where it may run in a bundle of lines.
+fn moved_at(p: Site, segments: &[[Site; 2]], options: &BreaklineOptions) -> f64 {
+    let mut lines = 1;
+    loop {
+        let moved = moved_by(lines, options);
+        let beside = segments.iter().filter(|s| distance(**s, p) <= moved).count();
+        if beside <= lines {
+            return moved;
+        }
+        lines = beside;
+    }
+}
+
 /// Tells by the definition whether `p` is in a lake.
 fn in_lake(features: &[Feature], p: Site) -> bool {
     let crosses = |[a, b]: &[Site; 2]| {
@@ -180,10 +199,22 @@ fn sides_at_lakes(features: &[Feature], options: &BreaklineOptions) -> Vec<[Site
     (0..4).filter(|_| has_lake).map(|i| [corners[i], corners[(i + 1) % 4]]).collect()
 }
 
+/// Returns the features without the rings that have fewer than three places.
+fn without_thin_rings(features: &[Feature]) -> Vec<Feature> {
+    let is_thin = |path: &Vec<Vertex>| path.iter().map(|v| v.place).collect::<BTreeSet<_>>().len() < 3;
+    let keeps = |feature: &Feature, path: &Vec<Vertex>| feature.kind != FeatureKind::Lake || !is_thin(path);
+    let kept = |feature: &Feature| feature.paths.iter().filter(|path| keeps(feature, path)).cloned().collect();
+    features.iter().map(|feature| Feature { paths: kept(feature), ..feature.clone() }).collect()
+}
+
 /// Checks that subsegments cover what lies in the box of all segments longer than what snaps may make a point of, but for what lies in
-/// other lakes or at their shores. `pairs` are the subsegments, and `moved` is how far lines may move.
-fn check_cover(features: &[Feature], options: &BreaklineOptions, pairs: &[[Site; 2]], moved: f64) {
-    let near = |p: Site, segments: &[[Site; 2]]| segments.iter().any(|s| distance(*s, p) <= moved + 1.0);
+/// other lakes or at their shores. `pairs` are the subsegments.
+fn check_cover(features: &[Feature], options: &BreaklineOptions, pairs: &[[Site; 2]]) {
+    let all = segments(features, |_| true);
+    let near = |p: Site, segments: &[[Site; 2]]| {
+        let reach = moved_at(p, &all, options) + 1.0;
+        segments.iter().any(|s| distance(*s, p) <= reach)
+    };
     // Samples are rounded, so those on the border may lie outside.
     let inside = |within: Bounds<2>| Bounds { min: within.min.map(|v| v + 1), max: within.max.map(|v| v - 1) };
     let holds = |p: Site| options.within.is_none_or(|within| exact::holds(&inside(within), p));
@@ -223,16 +254,22 @@ fn check(features: &[Feature], options: &BreaklineOptions, random: &mut Random) 
     let all: Vec<[Site; 2]> =
         segments(features, |_| true).into_iter().chain(sides_at_lakes(features, options)).collect();
     let near = |p: Site, segments: &[[Site; 2]]| segments.iter().map(|s| distance(*s, p)).fold(f64::INFINITY, f64::min);
-    // Two snaps, and half a step for each time that a piece is halved and rounded.
-    let moved = 2.0 * f64::from(options.floor) + 2.0 + 0.5 * f64::from(options.spacing).log2();
+    let moved = moved_by(1, options);
     assert!(places.iter().all(|&p| near(p, &all) <= moved), "a line has moved");
     assert!(options.within.is_none_or(|within| places.iter().all(|&p| exact::holds(&within, p))));
 
-    check_cover(features, options, &pairs, moved);
+    let rings = without_thin_rings(features);
+    let paths = |features: &[Feature]| features.iter().map(|feature| feature.paths.len() as u64).sum::<u64>();
+    assert!(findings.empty_paths >= paths(features) - paths(&rings), "a ring is left out without a word");
+    check_cover(&rings, options, &pairs);
 
     let mut points = cloud(&places, random);
     points.retain(|&p| options.within.is_none_or(|within| exact::holds(&within, p)));
-    let shores = segments(features, |kind| kind == FeatureKind::Lake);
+    // What a lake needs of the box's border may move as any shore does.
+    let shores: Vec<[Site; 2]> = segments(features, |kind| kind == FeatureKind::Lake)
+        .into_iter()
+        .chain(sides_at_lakes(features, options))
+        .collect();
     for &p in &points {
         let by_disc = pairs.iter().any(|&[a, b]| in_disc(a, b, p));
         assert!(!by_disc || lines.drops(p), "{p:?} is in a disc");

@@ -418,7 +418,9 @@ impl Source {
     fn read_own_chunk(&self, chunk: usize, request: ChunkRequest, sink: &mut impl RecordSink) -> Result<()> {
         let file = RandomAccessFile::reopen(&self.path, self.size)?;
         if file.is_remote() {
-            file.hold(self.bytes_of(chunk, &request).into_iter())?;
+            // What an index lists within bounds is read later, all of it, when a sample looks at its beginning.
+            let records = if self.has_index() && request.bounds.is_some() { u64::MAX } else { request.records };
+            file.hold(self.bytes_of(chunk, &ChunkRequest { records, ..request }).into_iter())?;
         }
         match &self.points {
             PointData::Las(points) => points.decode(&file, chunk, request, sink),

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
+use std::ops::Range;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -18,6 +19,15 @@ pub(crate) struct Request {
     pub(crate) headers: BTreeMap<String, String>,
     /// The bytes of files that were sent.
     pub(crate) sent: usize,
+}
+
+impl Request {
+    /// Returns the bytes that it asks for.
+    pub(crate) fn range(&self) -> Range<usize> {
+        let range = self.headers.get("range").and_then(|range| range.strip_prefix("bytes="));
+        let (first, last) = range.and_then(|range| range.split_once('-')).expect("only parts are asked for");
+        first.parse().unwrap()..last.parse::<usize>().unwrap() + 1
+    }
 }
 
 /// What the server does with a request.
@@ -150,14 +160,12 @@ fn made(shared: &Shared, request: &Request, answer: Answer) -> (String, Vec<u8>)
         (_, None) => (head("404 Not Found", "", &[]), Vec::new()),
         (Answer::Whole, Some(file)) => (head("200 OK", "", file), file.clone()),
         (answer, Some(file)) => {
-            let range = request.headers.get("range").and_then(|range| range.strip_prefix("bytes="));
-            let (first, last) = range.and_then(|range| range.split_once('-')).expect("only parts are asked for");
-            let (first, last): (usize, usize) = (first.parse().unwrap(), last.parse().unwrap());
+            let Range { start: first, end } = request.range();
             if first >= file.len() {
                 let place = format!("Content-Range: bytes */{}\r\n", file.len());
                 return (head("416 Range Not Satisfiable", &place, &[]), Vec::new());
             }
-            let part = file[first..(last + 1).min(file.len())].to_vec();
+            let part = file[first..end.min(file.len())].to_vec();
             let tag = if let Answer::Tagged(tag) = answer { tag } else { "first" };
             let tag = if matches!(answer, Answer::Untagged) { String::new() } else { format!("ETag: \"{tag}\"\r\n") };
             let place = format!("Content-Range: bytes {first}-{}/{}\r\n{tag}", first + part.len() - 1, file.len());

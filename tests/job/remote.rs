@@ -1,6 +1,7 @@
 //! Inputs of other machines: the results are those of local files, few requests bring only what is needed, and what may pass is waited for.
 
 use std::fs;
+use std::ops::Range;
 use std::path::Path;
 
 use serde_json::Value;
@@ -9,7 +10,7 @@ use crate::copc_file::CopcFile;
 use crate::las_file::LasFile;
 use crate::program::{Job, Said, gdt_batch, number};
 use crate::random::Random;
-use crate::web_server::{Answer, WebServer};
+use crate::web_server::{Answer, Request, WebServer};
 
 /// What a program with the feature `fault-injection` waits for a server, in milliseconds.
 const PATIENCE: &str = "2000";
@@ -104,7 +105,7 @@ fn a_job_of_several_parts_and_files_has_the_same_results() {
 
 #[test]
 fn bounds_of_a_hundredth_take_a_small_share_of_a_copc_file() {
-    let mut large = LasFile::new(4, 7, 400, 12_000);
+    let mut large = LasFile::new(4, 7, 60, 60_000);
     // What cannot be compressed makes the file large.
     let (length, mut random) = (large.length() as usize, Random(1));
     for record in large.records.chunks_exact_mut(length) {
@@ -115,8 +116,16 @@ fn bounds_of_a_hundredth_take_a_small_share_of_a_copc_file() {
     let bounded = |name: &str| Job::on(&[name]).with("input", HUNDREDTH).report();
     let report = bounded(&server.url("/large.copc.laz"));
     let (requests, sent) = (server.requests().len(), server.sent());
-    // A job looks at the first 50,000 points, whatever its bounds, to see whether the header is right. Here they are all.
-    assert!(sent < bytes.len() + bytes.len() / 20, "{sent} of {}", bytes.len());
+    // A job looks at 4096 points of the root and below, whatever its bounds, to see whether the header is right.
+    assert!(sent < bytes.len() / 5, "{sent} of {}", bytes.len());
+    // Points within the bounds that samples have looked at do not come again. The octree is behind the points.
+    let end_of_points = u64::from_le_bytes(bytes[235..243].try_into().unwrap()) as usize;
+    let mut ranges: Vec<Range<usize>> = server.requests().iter().map(Request::range).collect();
+    ranges.retain(|range| range.end <= end_of_points);
+    ranges.sort_by_key(|range| (range.start, range.end));
+    let twice: usize = ranges.windows(2).map(|pair| pair[0].end.min(pair[1].end).saturating_sub(pair[1].start)).sum();
+    // The beginning of the file comes with the header, and again with the root.
+    assert!(twice < 1 << 15, "{twice} of {sent}: {ranges:?}");
     assert!(requests < 60, "{requests}");
     let folder = tempfile::tempdir().unwrap();
     let local = folder.path().join("large.copc.laz");

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::input::remote::network::client::Address;
-use crate::input::remote::network::read_plan::ReadPlan;
+use crate::input::remote::network::read_plan::{ReadPlan, may_keep};
 use crate::input::remote::network::transfer::{Transferred, Version, transfer};
 use crate::input::remote::network::window::{Pending, Window, held_bytes};
 use crate::{Error, Result};
@@ -33,6 +33,8 @@ pub(crate) struct RemoteFile {
     beginning: Mutex<Option<Arc<Window>>>,
     /// What will be read.
     plan: Mutex<ReadPlan>,
+    /// What was fetched to be held before the plan was made: samples of chunks that the plan wants too.
+    kept: Mutex<Vec<(Range<u64>, Pending)>>,
 }
 
 /// Returns the size of a file and a number that tells its content from others. Asks the server what it has now.
@@ -76,7 +78,8 @@ impl RemoteFile {
         }
         let beginning = Mutex::new((held_bytes() <= BEGINNINGS).then_some(window));
         let plan = Mutex::new(ReadPlan::new(Vec::new()));
-        let file = Arc::new(RemoteFile { name: name.to_path_buf(), address, version, hash, beginning, plan });
+        let kept = Mutex::default();
+        let file = Arc::new(RemoteFile { name: name.to_path_buf(), address, version, hash, beginning, plan, kept });
         known.insert(name.into(), file.clone());
         Ok(file)
     }
@@ -101,19 +104,51 @@ impl RemoteFile {
         self.beginning.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
-    /// Says that these ranges will be fetched, each once and about in this order, and no others.
-    pub(crate) fn expect(&self, ranges: Vec<Range<u64>>) {
+    /// Says that these ranges will be fetched, each once and about in this order, and no others. What is kept of them does not come again.
+    /// Without ranges, nothing is kept any more.
+    pub(crate) fn expect(&self, mut ranges: Vec<Range<u64>>) {
+        if ranges.is_empty() {
+            self.kept().clear();
+        }
+        ranges.retain(|range| self.kept_for(range).is_none());
         *self.plan.lock().unwrap_or_else(PoisonError::into_inner) = ReadPlan::new(ranges);
     }
 
     /// Begins to fetch a range, which lies in the file. One that is expected comes with those after it.
     pub(crate) fn fetch(self: &Arc<Self>, range: Range<u64>) -> Pending {
-        let begin = |range: Range<u64>| {
-            let (file, wanted) = (self.clone(), range.clone());
-            Pending::begin(range, move || Ok(transfer(&file.address, wanted.clone(), Some(&file.version))?.bytes))
-        };
+        self.planned(&range).or_else(|| self.kept_for(&range)).unwrap_or_else(|| self.begin(range))
+    }
+
+    /// As [`RemoteFile::fetch`], but keeps the bytes for those who read the file later, if nobody has planned that yet.
+    pub(crate) fn fetch_to_keep(self: &Arc<Self>, range: Range<u64>) -> Pending {
+        if let Some(pending) = self.planned(&range).or_else(|| self.kept_for(&range)) {
+            return pending;
+        }
+        let keeps = may_keep(range.end - range.start);
+        let pending = self.begin(range.clone());
+        if keeps {
+            self.kept().push((range, pending.clone()));
+        }
+        pending
+    }
+
+    fn planned(self: &Arc<Self>, range: &Range<u64>) -> Option<Pending> {
         let mut plan = self.plan.lock().unwrap_or_else(PoisonError::into_inner);
-        plan.take(&range, &begin).unwrap_or_else(|| begin(range))
+        plan.take(range, &|range| self.begin(range))
+    }
+
+    fn begin(self: &Arc<Self>, range: Range<u64>) -> Pending {
+        let (file, wanted) = (self.clone(), range.clone());
+        Pending::begin(range, move || Ok(transfer(&file.address, wanted.clone(), Some(&file.version))?.bytes))
+    }
+
+    fn kept(&self) -> MutexGuard<'_, Vec<(Range<u64>, Pending)>> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn kept_for(&self, range: &Range<u64>) -> Option<Pending> {
+        let has = |kept: &Range<u64>| kept.start <= range.start && range.end <= kept.end;
+        self.kept().iter().find(|(kept, _)| has(kept)).map(|(_, pending)| pending.clone())
     }
 
     /// Waits for what [`RemoteFile::fetch`] has begun for `range`.
@@ -122,6 +157,9 @@ impl RemoteFile {
     /// [`Error::Io`] if the server does not hand it out, [`Error::Interrupted`] if the process is to stop.
     pub(crate) fn wait(&self, pending: &Pending, range: &Range<u64>) -> Result<Arc<Window>> {
         let place = format!("bytes {} to {}: ", range.start, range.end.saturating_sub(1));
-        pending.wait()?.map_err(|failure| failure.into_read_error(&self.name, &place))
+        pending.wait()?.map_err(|failure| {
+            self.kept().clear();
+            failure.into_read_error(&self.name, &place)
+        })
     }
 }

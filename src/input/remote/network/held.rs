@@ -65,7 +65,7 @@ impl HeldFile {
     /// [`crate::Error::Io`] if the server does not hand them out, [`crate::Error::Interrupted`] if the process is to stop.
     pub(crate) fn hold(&self, ranges: &[Range<u64>]) -> Result<()> {
         let missing = ranges.iter().filter(|range| !self.has(range)).cloned();
-        let pending: Vec<_> = missing.map(|range| (self.file.fetch(range.clone()), range)).collect();
+        let pending: Vec<_> = missing.map(|range| (self.file.fetch_to_keep(range.clone()), range)).collect();
         for (pending, range) in pending {
             let window = self.file.wait(&pending, &range)?;
             self.held.lock().unwrap_or_else(PoisonError::into_inner).push(window);

@@ -27,6 +27,11 @@ fn has_space() -> bool {
     held_bytes() + WINDOW <= SPACE.load(Ordering::Relaxed)
 }
 
+/// Returns whether so many bytes more may be kept until they are read once more. Half of the space is for reading ahead.
+pub(crate) fn may_keep(bytes: u64) -> bool {
+    held_bytes() + bytes <= SPACE.load(Ordering::Relaxed) / 2
+}
+
 /// The ranges that will be read.
 pub(crate) struct ReadPlan {
     /// In the order of their beginnings.
