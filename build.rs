@@ -30,7 +30,7 @@ fn variable(name: &str) -> String {
     std::env::var(name).unwrap_or_default()
 }
 
-/// Returns the version with what the program is built from, as in `0.1.0 (c6555ec 2026-11-23; features: viewer)`.
+/// Returns the version with what the program is built from, as in `0.2.0 (c6555ec 2026-11-23; features: viewer)`.
 pub(crate) fn long_version(version: &str, commit: Option<String>, mut features: Vec<String>) -> String {
     features.sort();
     let features = if features.is_empty() { "none".into() } else { features.join(", ") };
