@@ -139,7 +139,7 @@ fn noise([x, y]: [f64; 2], seed: u64) -> f64 {
     let (u, v) = (x - column, y - row);
     let corner = |i: f64, j: f64| {
         let angle = hash((column + i) as u64 ^ ((row + j) as u64) << 32, seed) as f64 / u64::MAX as f64 * TAU;
-        angle.cos() * (u - i) + angle.sin() * (v - j)
+        libm::cos(angle) * (u - i) + libm::sin(angle) * (v - j)
     };
     let fade = |t: f64| t * t * t * (t * (t * 6.0 - 15.0) + 10.0);
     let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;

@@ -36,6 +36,7 @@ pub use crs::target::{NamedCrs, TargetCrs};
 pub use crs::transform::between::CrsTransform;
 pub(crate) use crs::transform::between::DatumNote;
 pub use crs::transform::datum_rule::DatumRule;
+pub use crs::transform::to_globe::GlobeWay;
 pub use crs::unit::Unit;
 pub use crs::vertical::VerticalSystem;
 pub use decoded_chunks::DecodedChunks;

@@ -7,7 +7,7 @@ pub mod common_crs;
 pub(crate) mod distinct_crs;
 pub mod extent;
 pub mod fingerprint;
-pub(crate) mod globe_definition;
+pub(crate) mod globe_system;
 pub(crate) mod height_range;
 pub mod input_identity;
 pub mod inputs;

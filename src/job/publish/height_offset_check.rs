@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::geometry::Bounds;
-use crate::job::plan::globe_definition::globe_definition;
+use crate::job::plan::globe_system::globe_system;
 use crate::job::plan::job_plan::Plan;
 use crate::output::geoid::Geoid;
 use crate::output::tiles3d::globe::NotPlaced;
@@ -20,11 +20,11 @@ pub fn check_height_offset(plan: &Plan) -> Result<()> {
     }
     // That the terrain is not placed at all is a warning, when it is written.
     let extras = plan.frame.extras();
-    let Ok(definition) = globe_definition(&plan.crs, extras.metres_per_unit) else { return Ok(()) };
+    let Ok(system) = globe_system(&plan.crs, extras.metres_per_unit) else { return Ok(()) };
     let Bounds { min: [west, south], max: [east, north] } = plan.extent;
     let area = Bounds { min: [west, south, 0], max: [east, north, 0] };
     // A grid may lack heights at sea, so one place is enough.
-    match Ground::new(extras, &definition, geoid).and_then(|ground| ground.seen_from(area)) {
+    match Ground::new(extras, system, geoid).and_then(|ground| ground.seen_from(area)) {
         Err(NotPlaced::Height(error)) => Err(error),
         _ => Ok(()),
     }

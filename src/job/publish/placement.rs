@@ -1,7 +1,7 @@
 //! Placing the terrain on the globe: the transforms of `tileset.json`, and how far off they are because the earth is curved.
 
 use crate::input::Crs;
-use crate::job::plan::globe_definition::globe_definition;
+use crate::job::plan::globe_system::globe_system;
 use crate::job::tiles::curve::{ONE_TRANSFORM, ONE_TRANSFORM_SIDEWAYS};
 use crate::output::curvature::Curvature;
 use crate::output::frame::Frame;
@@ -44,8 +44,9 @@ const ADDED_TWICE: &str = "the inputs say that heights count from the ellipsoid,
 /// [`NotPlaced`] says why the terrain cannot be placed; then nothing is.
 pub fn place(crs: &Crs, frame: &Frame, geoid: Geoid, root: &mut TilesetNode) -> Result<Placement, NotPlaced> {
     let extras = frame.extras();
-    let definition = globe_definition(crs, extras.metres_per_unit)?;
-    let ground = Ground::new(extras, &definition, geoid)?;
+    let system = globe_system(crs, extras.metres_per_unit)?;
+    let definition = system.definition.clone();
+    let ground = Ground::new(extras, system, geoid)?;
     let curvature = extras.curvature.as_ref();
     let middle = ground.seen_from(curvature.map_or(root.bounds, Curvature::bounds))?;
     let transform = ground.tangent(middle)?;

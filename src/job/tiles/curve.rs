@@ -1,7 +1,7 @@
 //! Whether the scene of a job follows the curve of the earth, and how.
 
 use crate::geometry::Bounds;
-use crate::job::plan::globe_definition::globe_definition;
+use crate::job::plan::globe_system::globe_system;
 use crate::job::plan::job_plan::Plan;
 use crate::job::tiles::style::{bent_frame, packing};
 use crate::output::compression::{Compression, CompressionChoice};
@@ -9,7 +9,7 @@ use crate::output::curvature::Curvature;
 use crate::output::geoid::Geoid;
 use crate::output::options::{OutputFormat, OutputOptions};
 use crate::output::tiles3d::curve_fit::{Bent, fit_curvature};
-use crate::output::tiles3d::globe::NotPlaced;
+use crate::output::tiles3d::globe::{GlobeSystem, NotPlaced};
 use crate::output::tiles3d::ground::Ground;
 
 /// The greatest distortion in metres with which one transform places all tiles of a scene that is not bent. Datums that differ from the
@@ -26,9 +26,9 @@ pub fn may_be_bent(plan: &Plan) -> bool {
 }
 
 /// Returns the projected system of a scene that may be bent.
-fn bendable(plan: &Plan) -> Option<String> {
-    let definition = globe_definition(&plan.crs, plan.frame.extras().metres_per_unit).ok();
-    definition.filter(|_| plan.options.output.format != OutputFormat::Glb)
+fn bendable(plan: &Plan) -> Option<GlobeSystem> {
+    let system = globe_system(&plan.crs, plan.frame.extras().metres_per_unit).ok();
+    system.filter(|_| plan.options.output.format != OutputFormat::Glb)
 }
 
 /// Returns the curvature of the scene of a job whose points are within `bounds`. `None` if the scene is a plane: the terrain is small,
@@ -37,10 +37,10 @@ fn bendable(plan: &Plan) -> Option<String> {
 /// # Errors
 /// [`crate::Error::Config`] if the geoid has no height anywhere, or its file is damaged; [`crate::Error::Io`] if it cannot be read.
 pub fn curvature_of(plan: &Plan, bounds: Bounds<3>) -> crate::Result<Option<Curvature>> {
-    let Some(definition) = bendable(plan) else { return Ok(None) };
+    let Some(system) = bendable(plan) else { return Ok(None) };
     let (output, extras) = (&plan.options.output, plan.frame.extras());
     let geoid = Geoid::open(output.height_offset.as_ref())?;
-    let found = Ground::new(extras, &definition, geoid).and_then(|ground| {
+    let found = Ground::new(extras, system, geoid).and_then(|ground| {
         let distortion = ground.distortion(&ground.tangent(ground.seen_from(bounds)?)?, bounds)?;
         (distortion > ONE_TRANSFORM).then(|| bent_for(&ground, bounds, output)).transpose()
     });
@@ -65,7 +65,7 @@ fn bent_for(ground: &Ground, bounds: Bounds<3>, output: &OutputOptions) -> Resul
         let all = fit_curvature(ground, bounds, Bent::All)?;
         let [x, y, _] = all.greatest();
         // A tenth covers what lies between the places that were looked at.
-        if is_packed || 1.1 * x.hypot(y) > ONE_TRANSFORM_SIDEWAYS {
+        if is_packed || 1.1 * libm::hypot(x, y) > ONE_TRANSFORM_SIDEWAYS {
             return Ok(all);
         }
     }

@@ -1,7 +1,7 @@
 //! Places a terrain in a projected coordinate system on the WGS 84 ellipsoid.
 //!
-//! The sines of this file and of `proj4rs` come from the machine's mathematics library, so the last digits of a transform may differ
-//! between machines.
+//! The sines are those of the crate `libm`, which gives the same bits on every machine. Where the program does not compute a projection
+//! itself, the crate `proj4rs` does, with the machine's mathematics library: then the last digits of a transform may differ between machines.
 
 use crate::Error;
 use crate::output::geoid::Geoid;
@@ -43,10 +43,22 @@ fn why_not_read(definition: &str, error: &str) -> String {
     format!("{definition}: {error}")
 }
 
+/// Computes longitude and latitude in radians on WGS 84 of x and y; `None` outside the range of the projection.
+pub type Geographic = Box<dyn Fn([f64; 2]) -> Option<[f64; 2]> + Send + Sync>;
+
+/// The system of a terrain, and its way to the globe.
+pub struct GlobeSystem {
+    /// In the form of PROJ.4.
+    pub definition: String,
+    /// The same, computed with the same bits on every machine. `None` leaves it to the crate `proj4rs`.
+    pub computed: Option<Geographic>,
+}
+
 /// The map from a projected system to the ellipsoid.
 pub struct Globe {
     from: Proj,
     to: Proj,
+    computed: Option<Geographic>,
     /// Metres in a unit of x and y.
     metres_per_unit: f64,
     /// What is added to heights.
@@ -54,17 +66,18 @@ pub struct Globe {
 }
 
 impl Globe {
-    /// Returns the map from the system that `definition` describes in the form of PROJ.4. Its heights count from `geoid`.
+    /// Returns the map from a system. Its heights count from `geoid`.
     ///
     /// # Errors
     /// A sentence that says why there is no such map.
-    pub fn new(definition: &str, metres_per_unit: f64, geoid: Geoid) -> Result<Globe, String> {
+    pub fn new(system: GlobeSystem, metres_per_unit: f64, geoid: Geoid) -> Result<Globe, String> {
         let parse = |text: &str| Proj::from_proj_string(text).map_err(|e| why_not_read(text, &e.to_string()));
-        let from = parse(definition)?;
+        let from = parse(&system.definition)?;
         if from.is_latlong() || from.is_geocent() {
             return Err("it is not a projected system".into());
         }
-        Ok(Globe { from, to: parse("+proj=longlat +datum=WGS84 +no_defs")?, metres_per_unit, geoid })
+        let to = parse("+proj=longlat +datum=WGS84 +no_defs")?;
+        Ok(Globe { from, to, computed: system.computed, metres_per_unit, geoid })
     }
 
     /// Returns the earth-centred x, y, z in metres of the place at `x`, `y` (source units), `height` metres above the geoid.
@@ -82,10 +95,11 @@ impl Globe {
     /// [`NotPlaced::System`] if the place is outside the range of the projection.
     pub fn place_above_ellipsoid(&self, x: f64, y: f64, height: f64) -> Result<[f64; 3], NotPlaced> {
         let [longitude, latitude] = self.geographic(x, y)?;
-        let (sin, cos) = latitude.sin_cos();
+        let (sin, cos) = libm::sincos(latitude);
         let normal = SEMI_MAJOR / (1.0 - ECCENTRICITY_2 * sin * sin).sqrt();
         let around = (normal + height) * cos;
-        Ok([around * longitude.cos(), around * longitude.sin(), (normal * (1.0 - ECCENTRICITY_2) + height) * sin])
+        let (east, north) = libm::sincos(longitude);
+        Ok([around * north, around * east, (normal * (1.0 - ECCENTRICITY_2) + height) * sin])
     }
 
     /// Returns the longitude and latitude of a place (source units) in radians.
@@ -93,6 +107,9 @@ impl Globe {
     /// # Errors
     /// A sentence if the place is outside the range of the projection.
     pub fn geographic(&self, x: f64, y: f64) -> Result<[f64; 2], String> {
+        if let Some(computed) = &self.computed {
+            return computed([x, y]).ok_or_else(|| "out of range".into());
+        }
         let mut point = (x, y, 0.0);
         transform(&self.from, &self.to, &mut point).map_err(|e| e.to_string())?;
         if point.0.is_finite() && point.1.is_finite() { Ok([point.0, point.1]) } else { Err("out of range".into()) }
@@ -188,7 +205,8 @@ mod tests {
     #[test]
     fn a_datum_that_needs_a_grid_is_named() {
         let geoid = Geoid::open(None).unwrap();
-        let why = Globe::new("+proj=utm +zone=15 +datum=NAD27 +units=m +no_defs", 1.0, geoid).err().unwrap();
+        let definition = "+proj=utm +zone=15 +datum=NAD27 +units=m +no_defs".into();
+        let why = Globe::new(GlobeSystem { definition, computed: None }, 1.0, geoid).err().unwrap();
         assert!(why.contains("needs a grid") && why.contains("NAD27") && why.contains("NAD83"), "{why}");
     }
 }

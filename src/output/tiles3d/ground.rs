@@ -3,7 +3,7 @@
 use crate::geometry::Bounds;
 use crate::output::frame::Extras;
 use crate::output::geoid::Geoid;
-use crate::output::tiles3d::globe::{Globe, NotPlaced, after_linear, relative_place, transform_point};
+use crate::output::tiles3d::globe::{Globe, GlobeSystem, NotPlaced, after_linear, relative_place, transform_point};
 
 /// The number of places along each side at which the distortion is measured. Both ends are among them: there it is greatest.
 const PLACES: usize = 9;
@@ -23,12 +23,12 @@ pub struct Ground<'a> {
 }
 
 impl<'a> Ground<'a> {
-    /// Returns the ground of a scene in the system of `definition`, in the form of PROJ.4. Heights count from `geoid`.
+    /// Returns the ground of a scene in a system. Heights count from `geoid`.
     ///
     /// # Errors
     /// [`NotPlaced::System`] if the system does not lead to the globe.
-    pub fn new(extras: &'a Extras, definition: &str, geoid: Geoid) -> Result<Ground<'a>, NotPlaced> {
-        let globe = Globe::new(definition, extras.metres_per_unit, geoid)?;
+    pub fn new(extras: &'a Extras, system: GlobeSystem, geoid: Geoid) -> Result<Ground<'a>, NotPlaced> {
+        let globe = Globe::new(system, extras.metres_per_unit, geoid)?;
         Ok(Ground { extras, globe, base: extras.offset[2] * extras.metres_per_unit_z })
     }
 

@@ -15,5 +15,6 @@ mod refusal_tests;
 mod stereographic;
 #[cfg(test)]
 mod tests;
+pub(crate) mod to_globe;
 mod transverse_mercator;
 pub(crate) mod utm;

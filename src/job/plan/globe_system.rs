@@ -1,17 +1,20 @@
 //! The projected system of a job, from which its terrain can be placed on the globe.
 
-use crate::input::Crs;
+use crate::input::{Crs, GlobeWay};
+use crate::output::tiles3d::globe::{Geographic, GlobeSystem};
 
-/// Returns the system of `crs` as a PROJ.4 string, with coordinates in units of `metres`.
+/// Returns the system of `crs`, with coordinates in units of `metres`, and its way to the globe.
 ///
 /// # Errors
 /// A sentence if it leads to no longitude and latitude.
-pub(crate) fn globe_definition(crs: &Crs, metres: f64) -> Result<String, String> {
+pub(crate) fn globe_system(crs: &Crs, metres: f64) -> Result<GlobeSystem, String> {
     let definition = crs.proj4_definition().ok_or_else(|| match &crs.name {
         Some(name) => format!("{name} has no definition that leads to longitude and latitude"),
         None => "no input names its coordinate system".to_string(),
     })?;
-    Ok(with_unit(&definition, metres))
+    let way = GlobeWay::of(crs, &definition, metres);
+    let computed = way.map(|way| -> Geographic { Box::new(move |place| way.geographic(place)) });
+    Ok(GlobeSystem { definition: with_unit(&definition, metres), computed })
 }
 
 /// Returns the system of `definition` with coordinates in units of `metres`. A file may say another unit than the code that it names.

@@ -1,0 +1,201 @@
+//! The way of places on a map to the longitude and latitude of WGS 84, where the globes of viewers lie.
+//!
+//! A datum that is some metres off comes with a shift, from the definition of the system in the form of PROJ.4. All shifts of this program
+//! are seven numbers (EPSG method 9606, position vector): earth-centred coordinates are moved, turned and scaled.
+
+use crate::input::crs::system::Crs;
+use crate::input::crs::transform::between::CrsTransform;
+use crate::input::crs::transform::ellipsoid::{Ellipsoid, sin_cos};
+use crate::input::crs::transform::map_projection::DEGREE;
+use std::f64::consts::PI;
+
+/// The half axes of the ellipsoid of WGS 84 in metres.
+const WGS84: [f64; 2] = [6_378_137.0, 6_356_752.314_245_179];
+
+/// The squares of eccentricities that differ by less are those of one ellipsoid, as for PROJ: that of WGS 84 and GRS 80.
+const SAME_SHAPE: f64 = 5e-11;
+
+/// Radians of a second of arc.
+const SECOND: f64 = DEGREE / 3600.0;
+
+/// Each round finds two digits more of the latitude.
+const ROUNDS: usize = 9;
+
+/// The shifts to WGS 84 of datums that PROJ has names for: metres, seconds of arc, millionths.
+const NAMED: [(&str, [f64; 7]); 9] = [
+    ("WGS84", [0.0; 7]),
+    ("NAD83", [0.0; 7]),
+    ("GGRS87", [-199.87, 74.79, 246.62, 0.0, 0.0, 0.0, 0.0]),
+    ("potsdam", [598.1, 73.7, 418.2, 0.202, 0.045, -2.455, 6.7]),
+    ("carthage", [-263.0, 6.0, 431.0, 0.0, 0.0, 0.0, 0.0]),
+    ("hermannskogel", [577.326, 90.129, 463.919, 5.137, 1.474, 5.297, 2.4232]),
+    ("ire65", [482.53, -130.596, 564.557, -1.042, -0.214, -0.631, 8.15]),
+    ("nzgd49", [59.47, -5.04, 187.44, 0.47, -0.1, 1.024, -4.5993]),
+    ("OSGB36", [446.448, -125.157, 542.06, 0.1502, 0.247, 0.8421, -20.4894]),
+];
+
+/// The way to the longitude and latitude of WGS 84. The same bits come out on every machine.
+#[derive(Clone, Debug)]
+pub struct GlobeWay {
+    to_degrees: CrsTransform,
+    /// Units of the system in a unit of x and y.
+    scale: f64,
+    /// Nothing where longitude and latitude are those of WGS 84 already.
+    shift: Option<Shift>,
+}
+
+impl GlobeWay {
+    /// Returns the way from `crs`, whose `definition` in the form of PROJ.4 says what its datum is to WGS 84. Coordinates are in units of
+    /// `metres`. Returns `None` if this program does not compute it.
+    pub fn of(crs: &Crs, definition: &str, metres: f64) -> Option<GlobeWay> {
+        let to_degrees = CrsTransform::to_degrees(crs).ok()?;
+        let form = crs.form()?;
+        form.projection()?;
+        let ellipsoid = Ellipsoid::of(form.datum()?.ellipsoid()?)?;
+        Some(GlobeWay { to_degrees, scale: metres / crs.metres_per_unit()?, shift: Shift::of(definition, ellipsoid)? })
+    }
+
+    /// Returns longitude and latitude in radians; `None` if the map has no such place.
+    pub fn geographic(&self, place: [f64; 2]) -> Option<[f64; 2]> {
+        let place = self.to_degrees.apply(place.map(|value| value * self.scale))?.map(|degrees| degrees * DEGREE);
+        let [longitude, latitude] = self.shift.as_ref().map_or(place, |shift| shift.apply(place));
+        let turns = if longitude > PI {
+            -2.0 * PI
+        } else if longitude < -PI {
+            2.0 * PI
+        } else {
+            0.0
+        };
+        Some([longitude + turns, latitude])
+    }
+}
+
+/// A shift of earth-centred coordinates to those of WGS 84.
+#[derive(Clone, Debug)]
+struct Shift {
+    from: Ellipsoid,
+    to: Ellipsoid,
+    metres: [f64; 3],
+    /// Radians.
+    turns: [f64; 3],
+    scale: f64,
+}
+
+impl Shift {
+    /// Returns the shift that a definition names, `Some(None)` if it names none; `None` if it is not known here.
+    fn of(definition: &str, from: Ellipsoid) -> Option<Option<Shift>> {
+        let value =
+            |key: &str| definition.split_whitespace().find_map(|word| word.strip_prefix(key)?.strip_prefix('='));
+        let numbers = match (value("+nadgrids"), value("+towgs84"), value("+datum")) {
+            (Some("@null"), ..) | (None, None, None) => return Some(None),
+            (Some(_), ..) => return None,
+            (None, Some(list), _) => seven(list)?,
+            (None, None, Some(name)) => NAMED.iter().find(|(known, _)| *known == name)?.1,
+        };
+        let to = Ellipsoid::of(WGS84)?;
+        if numbers == [0.0; 7] && from.a == to.a && (from.e2 - to.e2).abs() < SAME_SHAPE {
+            return Some(None);
+        }
+        let [x, y, z, turn_x, turn_y, turn_z, millionths] = numbers;
+        let turns = [turn_x, turn_y, turn_z].map(|seconds| seconds * SECOND);
+        Some(Some(Shift { from, to, metres: [x, y, z], turns, scale: 1.0 + millionths / 1e6 }))
+    }
+
+    fn apply(&self, [longitude, latitude]: [f64; 2]) -> [f64; 2] {
+        let ([sin, cos], [east, north]) = (sin_cos(latitude), sin_cos(longitude));
+        let normal = self.from.a / (1.0 - self.from.e2 * sin * sin).sqrt();
+        let [x, y, z] = [normal * cos * north, normal * cos * east, normal * (1.0 - self.from.e2) * sin];
+        let [turn_x, turn_y, turn_z] = self.turns;
+        let turned = [x - turn_z * y + turn_y * z, turn_z * x + y - turn_x * z, z - turn_y * x + turn_x * y];
+        let [x, y, z] = [0, 1, 2].map(|k| self.metres[k] + self.scale * turned[k]);
+        [libm::atan2(y, x), self.latitude((x * x + y * y).sqrt(), z)]
+    }
+
+    /// Returns the latitude of a place by its distances from the axis and from the plane of the equator.
+    fn latitude(&self, across: f64, up: f64) -> f64 {
+        let Ellipsoid { a, e2, .. } = self.to;
+        let first = libm::atan2(up, across * (1.0 - e2));
+        (0..ROUNDS).fold(first, |latitude, _| {
+            let sin = libm::sin(latitude);
+            libm::atan2(up + e2 * sin * a / (1.0 - e2 * sin * sin).sqrt(), across)
+        })
+    }
+}
+
+/// Returns three or seven numbers as seven.
+fn seven(list: &str) -> Option<[f64; 7]> {
+    let given = list.split(',').map(|number| number.trim().parse().ok()).collect::<Option<Vec<f64>>>()?;
+    let mut numbers = [0.0; 7];
+    match given.len() {
+        3 | 7 => numbers[..given.len()].copy_from_slice(&given),
+        _ => return None,
+    }
+    Some(numbers)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::crs::from_wkt::from_epsg;
+    use proj4rs::{Proj, transform::transform};
+
+    fn way(code: u32) -> (GlobeWay, String) {
+        let crs = from_epsg(code).unwrap();
+        let (definition, metres) = (crs.proj4_definition().unwrap(), crs.metres_per_unit().unwrap());
+        (GlobeWay::of(&crs, &definition, metres).unwrap_or_else(|| panic!("EPSG:{code}: {definition}")), definition)
+    }
+
+    #[test]
+    fn places_are_those_of_another_library() {
+        // With a shift of seven numbers, of three, of none, with one by name, on a sphere, and in feet.
+        for (code, at) in [
+            (27700, [530_000.0, 180_000.0]),
+            (31467, [3_500_000.0, 5_500_000.0]),
+            (31256, [0.0, 340_000.0]),
+            (28992, [155_000.0, 463_000.0]),
+            (2039, [219_529.0, 626_907.0]),
+            (2277, [2_300_000.0, 10_000_000.0]),
+            (2154, [700_000.0, 6_600_000.0]),
+            (3035, [4_321_000.0, 3_210_000.0]),
+            (3857, [1_500_000.0, 6_000_000.0]),
+            (32733, [500_000.0, 6_200_000.0]),
+            (3413, [100_000.0, -1_500_000.0]),
+            (2100, [500_000.0, 4_200_000.0]),
+            (27200, [2_500_000.0, 6_000_000.0]),
+        ] {
+            let (way, definition) = way(code);
+            let [from, to] =
+                [definition.as_str(), "+proj=longlat +datum=WGS84"].map(|d| Proj::from_proj_string(d).unwrap());
+            for i in 0..100 {
+                let place = [at[0] + f64::from(i % 10) * 997.0, at[1] - f64::from(i / 10) * 1013.0];
+                let mut theirs = (place[0], place[1], 0.0);
+                transform(&from, &to, &mut theirs).unwrap();
+                let [longitude, latitude] = way.geographic(place).unwrap();
+                let off = (longitude - theirs.0).abs().max((latitude - theirs.1).abs());
+                // A hundredth of a millimetre.
+                assert!(off < 1.5e-12, "EPSG:{code} {place:?}: {off} radians");
+            }
+        }
+    }
+
+    #[test]
+    fn the_bits_are_those_of_every_machine() {
+        let bits = [(27700, [530_000.0, 180_000.0]), (2277, [2_300_000.0, 10_000_000.0])]
+            .map(|(code, place)| way(code).0.geographic(place).unwrap().map(f64::to_bits));
+        let expected = [
+            [13_790_684_007_957_377_804, 4_606_271_919_018_445_997],
+            [13_833_936_471_851_274_948, 4_602_907_052_258_766_745],
+        ];
+        assert_eq!(bits, expected);
+    }
+
+    #[test]
+    fn what_is_not_computed_is_left_to_others() {
+        let krovak = from_epsg(5514).unwrap();
+        assert!(GlobeWay::of(&krovak, "+proj=krovak +towgs84=0,0,0", 1.0).is_none());
+        let british = from_epsg(27700).unwrap();
+        assert!(GlobeWay::of(&british, "+proj=tmerc +nadgrids=OSTN15.gsb", 1.0).is_none());
+        assert!(GlobeWay::of(&british, "+proj=tmerc +towgs84=1,2", 1.0).is_none());
+        assert!(GlobeWay::of(&from_epsg(4326).unwrap(), "+proj=longlat", 1.0).is_none());
+    }
+}
