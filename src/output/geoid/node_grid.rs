@@ -65,14 +65,15 @@ impl NodeGrid {
         let next = self.around.map_or(column + 1, |around| (column + 1) % around);
         let weights = [(1.0 - east) * (1.0 - north), east * (1.0 - north), (1.0 - east) * north, east * north];
         let nodes = [(column, row), (next, row), (column, row + 1), (next, row + 1)];
-        let mut sum = 0.0;
+        // Counted from one node, so that rounding leaves what is the same at all nodes.
+        let (mut first, mut above) = (None, 0.0);
         for (weight, (column, row)) in weights.into_iter().zip(nodes) {
             if weight > 0.0 {
                 let Some(value) = values.value(column, row)? else { return Ok(None) };
-                sum += weight * value;
+                above += weight * (value - *first.get_or_insert(value));
             }
         }
-        Ok(Some(sum))
+        Ok(first.map(|first| first + above))
     }
 
     /// Tells whether a place is between nodes.
