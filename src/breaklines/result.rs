@@ -82,6 +82,13 @@ impl Breaklines {
         self.index.is_water(Fraction::middle_of(&triangle))
     }
 
+    /// Returns whether all corners of the triangle are sites of rivers or lakes: where no point lies between the banks of a river, its
+    /// water is made of such triangles.
+    pub fn is_between_shores(&self, triangle: [Site; 3]) -> bool {
+        let is_shore = |site: usize| self.sites[site].kind != FeatureKind::Line;
+        triangle.into_iter().all(|place| self.position(place).is_some_and(is_shore))
+    }
+
     /// Returns the highest level of coarser lines that still has the site at `place`; `None` if no line has a site there. At level n a line
     /// keeps every 2^n-th of its sites, and those where lines meet or end.
     pub fn rank(&self, place: Site) -> Option<u8> {
@@ -187,6 +194,17 @@ mod tests {
         assert_eq!((found.pieces_in_lakes, found.uneven_lakes), (0, 0));
         assert_eq!(at(&lines, [400, 500]), Some((70, FeatureKind::Line)));
         assert_eq!(at(&lines, [300, 300]), Some((50, FeatureKind::Lake)));
+    }
+
+    #[test]
+    fn triangles_between_banks_have_no_other_corners() {
+        let bank = |kind, number, y| feature(kind, number, &[[0, y, 10], [300, y, 10]]);
+        let banks =
+            [bank(FeatureKind::River, 0, 0), bank(FeatureKind::River, 1, 900), bank(FeatureKind::Line, 2, 1800)];
+        let (lines, _) = build(&banks, 100);
+        assert!(lines.is_between_shores([[0, 0], [100, 0], [100, 900]]));
+        assert!(!lines.is_between_shores([[0, 900], [100, 900], [100, 1800]]), "one corner is on a line");
+        assert!(!lines.is_between_shores([[0, 0], [100, 0], [50, 450]]), "one corner is a point");
     }
 
     #[test]

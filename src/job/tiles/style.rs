@@ -94,10 +94,12 @@ impl TileStyle {
         Ok(TileStyle { frame, coloring, attributes, normals, compression, max_edge, lines, hull, copyright })
     }
 
-    /// Tells whether the triangle with these corners is left out because it is long. A lake has no points, so its triangles are long.
+    /// Tells whether the triangle with these corners is left out because it is long. A lake has no points, and a river often has none, so
+    /// the triangles of their water are long.
     #[inline]
     pub fn leaves_out(&self, corners: [[i32; 3]; 3]) -> bool {
-        let is_water = |lines: &Arc<Breaklines>| lines.is_water(corners.map(|[x, y, _]| [x, y]));
+        let places = corners.map(|[x, y, _]| [x, y]);
+        let is_water = |lines: &Arc<Breaklines>| lines.is_water(places) || lines.is_between_shores(places);
         self.max_edge.leaves_out(corners) && !self.lines.as_ref().is_some_and(is_water)
     }
 

@@ -128,6 +128,26 @@ fn max_edge_spares_flat_water() {
     assert!(with[0] - with[1] <= without[0] - without[1], "{with:?} {without:?}");
 }
 
+/// Two banks with nothing between them.
+#[test]
+fn max_edge_spares_the_water_between_the_banks_of_a_river() {
+    let survey = Survey::new(100);
+    let banks = [41.0, 79.0].map(|y| ("river", vec![[0.0, y, 10.0], [120.0, y, 9.0]]));
+    let lines = geojson(survey.folder(), "banks.geojson", &Features::lines(&banks));
+    let cloud = survey.folder().join("banks.csv");
+    let rows = (0..=40).flat_map(|x| (0..=40).map(move |y| (3 * x, 3 * y)));
+    let dry =
+        rows.filter(|(_, y)| !(40..80).contains(y)).map(|(x, y)| format!("{},{},12\n", 500_000 + x, 4_000_000 + y));
+    std::fs::write(&cloud, format!("x,y,z\n{}", dry.collect::<String>())).unwrap();
+    let cut = |job: Job| {
+        let report = job.with("output", "max_edge = 9.0").report();
+        number(&report["cut_triangles"]) - number(&report["hull_triangles"])
+    };
+    let job = || Job::on(&[&cloud]).with("input", "crs = \"EPSG:32633\"");
+    assert!(cut(job()) > 40);
+    assert_eq!(cut(job().with("[breaklines]", &format!("files = [{lines:?}]\nkind = \"river\""))), 0);
+}
+
 /// Class 20 marks ground that is to be ignored near breaklines, and nowhere else.
 #[test]
 fn ignored_ground_is_left_out_where_there_are_breaklines() {
