@@ -3,7 +3,7 @@
 use crate::breaklines::clean::segments_of;
 use crate::breaklines::drop_index::DropIndex;
 use crate::breaklines::error::BreaklineError;
-use crate::breaklines::feature::Feature;
+use crate::breaklines::feature::{Feature, FeatureKind};
 use crate::breaklines::findings::Findings;
 use crate::breaklines::heights::sites_with_heights;
 use crate::breaklines::lakes::Fraction;
@@ -131,7 +131,7 @@ fn subsegments_of(net: &Net, sites: &[BreaklineSite]) -> Vec<[u32; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::breaklines::feature::{FeatureId, FeatureKind, Vertex};
+    use crate::breaklines::feature::{FeatureId, Vertex};
     use crate::breaklines::findings::{Disagreement, Rise, Uneven};
     use crate::breaklines::nearest_heights::NearestHeights;
     use crate::geometry::Bounds;
