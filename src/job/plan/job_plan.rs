@@ -19,8 +19,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// What a job reads and where it puts it. The plan holds everything that later steps need besides what earlier steps stored: no step
-/// reads a header again. What steps compute from it is the same on every machine, except the transforms onto the globe, which the
-/// step that publishes computes once, and the curvature, which is computed once too.
+/// reads a header again. What steps compute from it is the same on every machine, except the transforms onto the globe and the curvature
+/// where the program does not compute the projection itself. Each is computed once.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Plan {
     /// What the user wants.
@@ -52,8 +52,8 @@ pub struct Plan {
     pub claimed_area: u64,
     /// The way from the lattice to glTF, of a scene that is not bent.
     pub frame: Frame,
-    /// How the scene follows the curve of the earth. It is found once and kept, because it comes from a machine's mathematics library: in a
-    /// job of several parts before the plan is written down, in others once the points are read.
+    /// How the scene follows the curve of the earth. It is found once and kept, because not all projections have the same bits on every
+    /// machine: in a job of several parts before the plan is written down, in others once the points are read.
     #[serde(default)]
     pub curvature: Option<Curvature>,
     /// The breaklines; `None` without any.

@@ -5,10 +5,11 @@ use crate::geometry::lattice::{AxisMap, Lattice, REACH, shortest_decimal};
 use crate::input::options::{OnBadFile, UnitChoice};
 use crate::input::surface_doubts::no_ground;
 use crate::input::transform_sources::transform_sources;
-use crate::input::{Axis, CrsChoice, FileFormat, PointCounts, PointRules, Source};
+use crate::input::{Axis, CrsChoice, FileFormat, PointCounts, PointRules, Source, set_network_memory};
 use crate::job::options::JobOptions;
 use crate::job::plan::breaklines::line_files::LineFiles;
 use crate::job::plan::breaklines::{CloudOfPlan, PlannedBreaklines};
+use crate::job::plan::budget::network_memory;
 use crate::job::plan::common_crs::{common_crs, horizontal_unit};
 use crate::job::plan::extent::{Extent, SourceBox, to_float};
 use crate::job::plan::height_range::HeightSample;
@@ -37,6 +38,7 @@ const MAX_WARNINGS: usize = 50;
 /// [`Error::Config`] if there are no inputs or they do not fit together; [`Error::Input`] if one is bad and must not be left
 /// out; [`Error::NoTerrain`] if none is left; [`Error::Io`] if one cannot be read.
 pub fn make_plan(options: &JobOptions, coarsening: LatticeCoarsening) -> Result<Plan> {
+    set_network_memory(network_memory(options));
     let (sources, skipped) = open_all(&options.input, &row_choice(options))?;
     plan_sources(sources, skipped, options, coarsening)
 }

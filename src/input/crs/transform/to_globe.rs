@@ -51,7 +51,12 @@ impl GlobeWay {
         let to_degrees = CrsTransform::to_degrees(crs).ok()?;
         let form = crs.form()?;
         form.projection()?;
-        let ellipsoid = Ellipsoid::of(form.datum()?.ellipsoid()?)?;
+        let datum = form.datum()?;
+        // Texts do not agree in what unit they give another meridian than that of Greenwich.
+        if datum.meridian() != 0.0 || definition.contains("+pm=") {
+            return None;
+        }
+        let ellipsoid = Ellipsoid::of(datum.ellipsoid()?)?;
         Some(GlobeWay { to_degrees, scale: metres / crs.metres_per_unit()?, shift: Shift::of(definition, ellipsoid)? })
     }
 
@@ -196,5 +201,9 @@ mod tests {
         assert!(GlobeWay::of(&british, "+proj=tmerc +nadgrids=OSTN15.gsb", 1.0).is_none());
         assert!(GlobeWay::of(&british, "+proj=tmerc +towgs84=1,2", 1.0).is_none());
         assert!(GlobeWay::of(&from_epsg(4326).unwrap(), "+proj=longlat", 1.0).is_none());
+        // A map that counts from Paris.
+        let french = from_epsg(27572).unwrap();
+        assert!(GlobeWay::of(&french, &french.proj4_definition().unwrap(), 1.0).is_none());
+        assert!(GlobeWay::of(&british, &french.proj4_definition().unwrap(), 1.0).is_none());
     }
 }

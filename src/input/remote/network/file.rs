@@ -34,7 +34,27 @@ pub(crate) struct RemoteFile {
     /// What will be read.
     plan: Mutex<ReadPlan>,
     /// What was fetched to be held before the plan was made: samples of chunks that the plan wants too.
-    kept: Mutex<Vec<(Range<u64>, Pending)>>,
+    kept: Mutex<Kept>,
+}
+
+/// What is kept of a file for those who read it later.
+#[derive(Default)]
+struct Kept {
+    windows: Vec<(Range<u64>, Pending)>,
+    /// Whether it is being read: then nothing more is kept, and what is handed out is given up.
+    is_read: bool,
+}
+
+impl Kept {
+    fn holding(&self, range: &Range<u64>) -> Option<usize> {
+        self.windows.iter().position(|(kept, _)| kept.start <= range.start && range.end <= kept.end)
+    }
+
+    fn hand_out(&mut self, range: &Range<u64>) -> Option<Pending> {
+        let at = self.holding(range)?;
+        let is_last = self.is_read && self.windows[at].0 == *range;
+        Some(if is_last { self.windows.swap_remove(at).1 } else { self.windows[at].1.clone() })
+    }
 }
 
 /// Returns the size of a file and a number that tells its content from others. Asks the server what it has now.
@@ -107,27 +127,31 @@ impl RemoteFile {
     /// Says that these ranges will be fetched, each once and about in this order, and no others. What is kept of them does not come again.
     /// Without ranges, nothing is kept any more.
     pub(crate) fn expect(&self, mut ranges: Vec<Range<u64>>) {
+        let mut kept = self.kept();
+        kept.is_read = !ranges.is_empty();
         if ranges.is_empty() {
-            self.kept().clear();
+            kept.windows.clear();
         }
-        ranges.retain(|range| self.kept_for(range).is_none());
+        ranges.retain(|range| kept.holding(range).is_none());
+        drop(kept);
         *self.plan.lock().unwrap_or_else(PoisonError::into_inner) = ReadPlan::new(ranges);
     }
 
     /// Begins to fetch a range, which lies in the file. One that is expected comes with those after it.
     pub(crate) fn fetch(self: &Arc<Self>, range: Range<u64>) -> Pending {
-        self.planned(&range).or_else(|| self.kept_for(&range)).unwrap_or_else(|| self.begin(range))
+        self.planned(&range).or_else(|| self.kept().hand_out(&range)).unwrap_or_else(|| self.begin(range))
     }
 
     /// As [`RemoteFile::fetch`], but keeps the bytes for those who read the file later, if nobody has planned that yet.
     pub(crate) fn fetch_to_keep(self: &Arc<Self>, range: Range<u64>) -> Pending {
-        if let Some(pending) = self.planned(&range).or_else(|| self.kept_for(&range)) {
+        if let Some(pending) = self.planned(&range).or_else(|| self.kept().hand_out(&range)) {
             return pending;
         }
         let keeps = may_keep(range.end - range.start);
         let pending = self.begin(range.clone());
-        if keeps {
-            self.kept().push((range, pending.clone()));
+        let mut kept = self.kept();
+        if keeps && !kept.is_read {
+            kept.windows.push((range, pending.clone()));
         }
         pending
     }
@@ -142,13 +166,8 @@ impl RemoteFile {
         Pending::begin(range, move || Ok(transfer(&file.address, wanted.clone(), Some(&file.version))?.bytes))
     }
 
-    fn kept(&self) -> MutexGuard<'_, Vec<(Range<u64>, Pending)>> {
+    fn kept(&self) -> MutexGuard<'_, Kept> {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn kept_for(&self, range: &Range<u64>) -> Option<Pending> {
-        let has = |kept: &Range<u64>| kept.start <= range.start && range.end <= kept.end;
-        self.kept().iter().find(|(kept, _)| has(kept)).map(|(_, pending)| pending.clone())
     }
 
     /// Waits for what [`RemoteFile::fetch`] has begun for `range`.
@@ -158,7 +177,7 @@ impl RemoteFile {
     pub(crate) fn wait(&self, pending: &Pending, range: &Range<u64>) -> Result<Arc<Window>> {
         let place = format!("bytes {} to {}: ", range.start, range.end.saturating_sub(1));
         pending.wait()?.map_err(|failure| {
-            self.kept().clear();
+            self.kept().windows.clear();
             failure.into_read_error(&self.name, &place)
         })
     }
