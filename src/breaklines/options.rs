@@ -9,9 +9,9 @@ pub struct BreaklineOptions {
     /// The wanted length of subsegments in lattice steps: about the distance between neighbouring points. At least 1.
     pub spacing: u32,
     /// Sites of lines that are not farther apart than this number of lattice steps become one site, and a line goes over a site that is in
-    /// its way and as near. A line may move by twice as much, by once more for each other line that runs as near beside it, and by half a step
-    /// for each time that a piece of it is halved. At least 2: with 1, two lines that meet at an acute angle were seen to become one over
-    /// hundreds of steps, each going over the other's rounded sites.
+    /// its way and as near. A line may move by twice as much, by once more for each other line that runs as near beside it, and by half a
+    /// step for each time that a piece of it is halved. At least 2: with 1, two lines that meet at an acute angle were seen to become one
+    /// over hundreds of steps, each going over the other's rounded sites.
     pub floor: u32,
     /// Two heights at one place disagree if they differ by more than this number of steps in z. The same holds for lakes that are not flat
     /// and rivers that rise.

@@ -50,7 +50,7 @@ pub type Geographic = Box<dyn Fn([f64; 2]) -> Option<[f64; 2]> + Send + Sync>;
 pub struct GlobeSystem {
     /// In the form of PROJ.4.
     pub definition: String,
-    /// The same, computed with the same bits on every machine. `None` leaves it to the crate `proj4rs`.
+    /// Its way to longitude and latitude, with the same bits on every machine. `None` leaves that to the crate `proj4rs`.
     pub computed: Option<Geographic>,
 }
 

@@ -46,10 +46,12 @@ struct Kept {
 }
 
 impl Kept {
+    /// Returns the number of the window that has all of a range.
     fn holding(&self, range: &Range<u64>) -> Option<usize> {
         self.windows.iter().position(|(kept, _)| kept.start <= range.start && range.end <= kept.end)
     }
 
+    /// Hands out the window that has all of a range, if there is one.
     fn hand_out(&mut self, range: &Range<u64>) -> Option<Pending> {
         let at = self.holding(range)?;
         let is_last = self.is_read && self.windows[at].0 == *range;
