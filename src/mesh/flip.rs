@@ -37,7 +37,7 @@ pub fn fails(mesh: &HalfEdgeMesh, sites: &[Site], h: HalfEdgeIndex) -> bool {
 
 /// Replaces the diagonal `h` of its two triangles by the other diagonal. If `g` is the twin of `h`, the two half-edges of the new
 /// diagonal are then `h.next()` and `g.next()`, and `h`, `h.previous()`, `g`, `g.previous()` lie on the outline of the quadrilateral.
-fn flip(mesh: &mut HalfEdgeMesh, h: HalfEdgeIndex) {
+pub(crate) fn flip(mesh: &mut HalfEdgeMesh, h: HalfEdgeIndex) {
     let g = mesh.twin(h);
     let (r, s) = (mesh.apex(h), mesh.apex(g));
     let (h_next, g_next) = (h.next(), g.next());
@@ -45,18 +45,11 @@ fn flip(mesh: &mut HalfEdgeMesh, h: HalfEdgeIndex) {
     // The triangle of h, p q r, becomes p s r. The triangle of g, q p s, becomes q r s.
     set_origin(mesh, h_next, s);
     set_origin(mesh, g_next, r);
-    link(mesh, h, outer_g);
-    link(mesh, g, outer_h);
-    link(mesh, h_next, g_next);
+    mesh.link(h, outer_g);
+    mesh.link(g, outer_h);
+    mesh.link(h_next, g_next);
 }
 
 fn set_origin(mesh: &mut HalfEdgeMesh, h: HalfEdgeIndex, site: SiteIndex) {
     mesh.triangles[h.triangle()][h.corner()] = site;
-}
-
-fn link(mesh: &mut HalfEdgeMesh, h: HalfEdgeIndex, twin: HalfEdgeIndex) {
-    mesh.twins[h.get()] = twin;
-    if twin != HalfEdgeIndex::HULL {
-        mesh.twins[twin.get()] = h;
-    }
 }

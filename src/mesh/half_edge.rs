@@ -52,6 +52,15 @@ impl HalfEdgeMesh {
         self.origin(h.previous())
     }
 
+    /// Makes `h` and `twin` each other's twins. If `twin` is [`HalfEdgeIndex::HULL`], `h` lies on the hull.
+    #[inline(always)]
+    pub(crate) fn link(&mut self, h: HalfEdgeIndex, twin: HalfEdgeIndex) {
+        self.twins[h.get()] = twin;
+        if twin != HalfEdgeIndex::HULL {
+            self.twins[twin.get()] = h;
+        }
+    }
+
     /// Returns the positions of the triangles around the origin of `h`, counterclockwise. If the origin lies on the hull, `h` must
     /// lie on the hull too.
     pub fn around(&self, h: HalfEdgeIndex) -> impl Iterator<Item = usize> {

@@ -5,5 +5,6 @@ pub mod adjacency;
 pub mod flip;
 pub mod half_edge;
 pub mod index;
+pub mod insert;
 pub mod region;
 pub mod triangle_order;

@@ -253,19 +253,51 @@ impl Frame {
         let [xy, up] = self.resolution_metres();
         let moved = [world[0], -world[2], world[1]];
         let steps = [xy, xy, up];
-        let flat = match self.curvature() {
-            Some(curvature) => curvature.flat(moved, steps),
-            None => [0, 1, 2].map(|k| moved[k] / steps[k]),
-        };
-        let point = flat.map(nearest);
+        self.checked(
+            world,
+            match self.curvature() {
+                Some(curvature) => curvature.flat(moved, steps),
+                None => [0, 1, 2].map(|k| moved[k] / steps[k]),
+            },
+        )
+    }
+
+    /// Returns the lattice point nearest to `place` if its world position is `world`.
+    #[inline(always)]
+    fn checked(&self, world: [f64; 3], place: [f64; 3]) -> Option<[i32; 3]> {
+        let point = place.map(nearest);
         let is_there = point.iter().all(|v| v.abs() <= i32::MAX as f64);
         let point = point.map(|v| v as i32);
         (is_there && self.world(point) == world).then_some(point)
     }
 
+    /// Returns the way back from many world positions.
+    pub(crate) fn inverse(&self) -> InverseFrame<'_> {
+        let [xy, up] = self.resolution_metres();
+        InverseFrame { frame: self, per_metre: self.curvature().is_none().then_some([1.0 / xy, 1.0 / xy, 1.0 / up]) }
+    }
+
     /// Returns steps as metres.
     pub(crate) fn metres(&self, steps: [f64; 3]) -> [f64; 3] {
         [steps[0] * self.horizontal.step, steps[1] * self.vertical.step, steps[2] * self.horizontal.step]
+    }
+}
+
+/// The map from glTF metres to lattice integers.
+pub(crate) struct InverseFrame<'a> {
+    frame: &'a Frame,
+    /// Lattice steps in a metre along x, y and z, unless the scene is bent.
+    per_metre: Option<[f64; 3]>,
+}
+
+impl InverseFrame<'_> {
+    /// Does what [`Frame::integers`] does, more quickly.
+    #[inline(always)]
+    pub(crate) fn integers(&self, world: [f64; 3]) -> Option<[i32; 3]> {
+        let [east, up, south] = world;
+        // The point is checked, so it does not matter that this is not quite a division.
+        let near = self.per_metre.map(|[x, y, z]| [east * x, -south * y, up * z]);
+        near.and_then(|place| self.frame.checked(world, place)).or_else(|| self.frame.integers(world))
     }
 }
 

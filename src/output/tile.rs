@@ -22,25 +22,24 @@ pub struct Tile {
 
 impl Tile {
     /// Returns the tile of these triangles between some of `positions`, without normals and colours. Vertices keep their order.
-    pub fn of(positions: &[[i32; 3]], mut triangles: Vec<[u32; 3]>) -> Tile {
+    pub fn of(positions: &[[i32; 3]], triangles: Vec<[u32; 3]>) -> Tile {
+        Tile::with_vertices(positions, triangles).0
+    }
+
+    /// Does what [`Tile::of`] does, and returns the old number of every vertex.
+    pub(crate) fn with_vertices(positions: &[[i32; 3]], mut triangles: Vec<[u32; 3]>) -> (Tile, Vec<u32>) {
         let vertices = renumber(&mut triangles);
-        Tile { positions: pick(positions, &vertices), triangles, ..Tile::default() }
+        (Tile { positions: pick(positions, &vertices), triangles, ..Tile::default() }, vertices)
     }
 
     /// Returns the tile of these triangles between vertices of this tile.
     pub(crate) fn subset(&self, triangles: Vec<[u32; 3]>) -> Tile {
-        self.subset_at(&self.positions, triangles)
-    }
-
-    /// Returns the tile of these triangles between vertices of this tile, each at its place in `positions`.
-    pub(crate) fn subset_at(&self, positions: &[[i32; 3]], mut triangles: Vec<[u32; 3]>) -> Tile {
-        let vertices = renumber(&mut triangles);
+        let (tile, vertices) = Tile::with_vertices(&self.positions, triangles);
         Tile {
-            positions: pick(positions, &vertices),
             normals: self.normals.as_ref().map(|all| pick(all, &vertices)),
             colors: self.colors.as_ref().map(|all| pick(all, &vertices)),
             attributes: self.attributes.pick(&vertices),
-            triangles,
+            ..tile
         }
     }
 

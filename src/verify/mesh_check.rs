@@ -124,7 +124,7 @@ impl MeshCheck<'_> {
     /// Returns the bits of a vertex that have to be the same in every mesh.
     fn border_site(&self, v: usize) -> BorderSite {
         let position = xxh3_64(cast_slice(&self.mesh.world(v).map(f64::to_bits)));
-        let normal = self.mesh.normals.as_ref().map_or([0; 3], |normals| normals[v].map(f32::to_bits));
+        let normal = self.mesh.normals.as_ref().map_or([0; 3], |normals| normals.get(v).map(f32::to_bits));
         let color = self.mesh.colors.as_ref().map_or([0; 4], |colors| colors[v]);
         let PointAttributes { classification, intensity } = &self.mesh.attributes;
         let point = [

@@ -12,6 +12,7 @@ use crate::output::frame::Frame;
 use crate::output::gltf::read::{TileFile, read_tile};
 use crate::output::lod::join::join;
 use crate::output::lod::simplify::{Simplified, simplify};
+use crate::output::tile::Tile;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
@@ -95,17 +96,17 @@ pub fn make_level(room: &LevelRoom, index: usize) -> Result<StepOutput<LevelStat
         match memory_for(&children).filter(|bytes| *bytes <= room.sizes.memory) {
             None => stats.left_out = 1,
             Some(_) => {
-                let simple = simplified(room, coarse.node, &children)?;
+                let (tile, simple) = simplified(room, coarse.node, &children)?;
                 let of_children =
                     |error: fn(&TileSummary) -> f64| children.iter().map(|c| error(&c.own)).fold(0.0, f64::max);
                 // No distance is greater than the range of heights: both meshes lie within it.
                 let greatest = of_children(|own| own.greatest_error) + simple.greatest_error;
                 own.greatest_error = greatest.min(height_range(&room.style.frame, bounds));
                 own.error = seen_error(&simple, &room.style.frame, bounds).max(of_children(|own| own.error));
-                own.vertices = simple.tile.positions.len() as u32;
+                own.vertices = tile.positions.len() as u32;
                 let path = room.directory.output().level(room.part.node_number(coarse.node));
-                let written = write_glb(&path, &simple.tile, room.style)?;
-                let triangles = simple.tile.triangles.len() as u64;
+                let written = write_glb(&path, &tile, room.style)?;
+                let triangles = tile.triangles.len() as u64;
                 stats =
                     LevelStats { files: 1, triangles, bytes: written.bytes, error_m: own.greatest_error, left_out: 0 };
                 files.push(written);
@@ -134,13 +135,16 @@ fn memory_for(children: &[Child]) -> Option<u64> {
     whole.then(|| vertices.saturating_mul(BYTES_PER_LEVEL_VERTEX))
 }
 
-/// Joins and simplifies the meshes of `children`, the tiles below `node`.
-fn simplified(room: &LevelRoom, node: NodeIndex, children: &[Child]) -> Result<Simplified> {
+/// Joins and simplifies the meshes of `children`, the tiles below `node`. Returns the coarser tile and what is known of it.
+fn simplified(room: &LevelRoom, node: NodeIndex, children: &[Child]) -> Result<(Tile, Simplified)> {
     let meshes = children.iter().filter(|child| child.own.vertices > 0).map(|child| read_own(&child.path));
     let meshes = meshes.collect::<Result<Vec<_>>>()?;
-    let joined = join(&room.style.frame, &meshes).map_err(|what| contradiction(node, &what))?;
-    drop(meshes);
-    simplify(&room.style.frame, &joined, room.sizes.target(joined.triangles.len()), room.style.lines.as_deref())
+    let joined = join(&room.style.frame, meshes).map_err(|what| contradiction(node, &what))?;
+    let terrain = joined.terrain();
+    let target = room.sizes.target(terrain.triangles.len());
+    let mut simple = simplify(&room.style.frame, &terrain, target, room.style.lines.as_deref())?;
+    let triangles = std::mem::take(&mut simple.triangles);
+    Ok((joined.tile(&simple.positions, triangles), simple))
 }
 
 /// Returns the range of heights in metres.

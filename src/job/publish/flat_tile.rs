@@ -24,7 +24,8 @@ impl FlatScene<'_> {
     /// # Errors
     /// [`Error::Io`] or [`Error::Input`] if the tile cannot be read or is damaged, [`Error::Config`] if a triangle is too long for f32.
     pub fn tile(&self, path: &Path) -> Result<Vec<u8>> {
-        let tile = join(self.bent, &[read_tile(path)?]).map_err(|what| Error::input(path, what.to_string()))?;
+        let joined = join(self.bent, vec![read_tile(path)?]);
+        let tile = joined.map_err(|what| Error::input(path, what.to_string()))?.into_tile();
         let compression = match self.compression {
             Compression::Meshopt => Compression::Quantized,
             plain => plain,

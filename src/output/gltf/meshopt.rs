@@ -68,8 +68,8 @@ impl PackedView {
         self.count.checked_mul(self.byte_stride)
     }
 
-    /// Unpacks the view's bytes. The result is a sentence if `packed` is not what the view says.
-    pub(crate) fn unpack(&self, packed: &[u8]) -> Decoded<Vec<u8>> {
+    /// Unpacks the view's bytes, but for the filter. The result is a sentence if `packed` is not what the view says.
+    pub(crate) fn unpack_unfiltered(&self, packed: &[u8]) -> Decoded<Vec<u8>> {
         let length = self.unpacked_length().unwrap_or(u64::MAX);
         let plausible = match self.mode {
             PackedMode::Attributes => length / MOST_VERTEX_RATIO <= packed.len() as u64,
@@ -91,7 +91,12 @@ impl PackedView {
             }
             (_, stride) => return Err(format!("packed elements of {stride} bytes")),
         };
-        let mut unpacked = unpacked.ok_or("packed data are damaged")?;
+        unpacked.ok_or_else(|| "packed data are damaged".into())
+    }
+
+    /// Unpacks the view's bytes. The result is a sentence if `packed` is not what the view says.
+    pub(crate) fn unpack(&self, packed: &[u8]) -> Decoded<Vec<u8>> {
+        let mut unpacked = self.unpack_unfiltered(packed)?;
         match (self.filter, self.byte_stride) {
             (None, _) => {}
             (Some(PackedFilter::Octahedral), 4) => {

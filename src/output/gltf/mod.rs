@@ -12,5 +12,6 @@ pub mod one_file;
 pub(crate) mod parts;
 pub mod read;
 pub(crate) mod schema;
+pub mod stored_normals;
 pub(crate) mod stored_view;
 pub(crate) mod vertex_order;

@@ -16,8 +16,9 @@ use crate::output::attributes::PointAttributes;
 use crate::output::frame::Extras;
 use crate::output::gltf::check_json::{Decoded, RawDocument};
 use crate::output::gltf::container::GlbFile;
-use crate::output::gltf::meshopt::MOST_EXPANSION;
+use crate::output::gltf::meshopt::{MOST_EXPANSION, PackedFilter};
 use crate::output::gltf::metadata;
+use crate::output::gltf::stored_normals::StoredNormals;
 use crate::output::gltf::stored_view::StoredView;
 use crate::{Error, Result};
 
@@ -39,8 +40,8 @@ pub struct TilePart {
     pub scale: [f64; 3],
     /// The positions (x, y up, z) from the translation, in units of the scale. They are finite.
     pub positions: Vec<[f32; 3]>,
-    /// The normals, as many as positions. A viewer divides them by the scale and makes them unit vectors.
-    pub normals: Option<Vec<[f32; 3]>>,
+    /// The normals, as many as positions.
+    pub normals: Option<StoredNormals>,
     /// The colours, as many as positions: linear red, green, blue and alpha, 65535 for 1.
     pub colors: Option<Vec<[u16; 4]>>,
     /// What the vertices carry of their points, as many as positions.
@@ -224,14 +225,14 @@ impl StrideView {
     }
 }
 
-struct Decoder<'a> {
-    document: &'a TileDocument,
-    binary: &'a [u8],
+struct Decoder<'b> {
+    document: &'b TileDocument,
+    binary: &'b [u8],
     /// Bytes decoded so far. A limit keeps data that are used again and again from growing without bound.
     used: usize,
 }
 
-impl Decoder<'_> {
+impl<'b> Decoder<'b> {
     fn tile(&mut self) -> Decoded<TileFile> {
         let scene = item(&self.document.scenes, self.document.scene, "scene")?;
         let parts = scene.nodes.iter().map(|&node| self.part(node)).collect::<Decoded<_>>()?;
@@ -254,7 +255,7 @@ impl Decoder<'_> {
         };
         let normals = surface.normals.map(|n| self.normals(n)).transpose()?;
         let colors = surface.colors.map(|c| self.colors(c)).transpose()?;
-        normals.as_ref().map_or(Ok(()), |n| same_count(n.len(), "normals"))?;
+        normals.as_ref().map_or(Ok(()), |n| same_count(n.count(), "normals"))?;
         colors.as_ref().map_or(Ok(()), |c| same_count(c.len(), "colours"))?;
         let attributes = self.attributes(&surface)?;
         attributes.classification.as_ref().map_or(Ok(()), |c| same_count(c.len(), "classes"))?;
@@ -272,16 +273,21 @@ impl Decoder<'_> {
         Ok(short.into_iter().map(|[x, y, z, _]| [x, y, z].map(f32::from)).collect())
     }
 
-    fn normals(&mut self, accessor: usize) -> Decoded<Vec<[f32; 3]>> {
-        if self.component(accessor)? == ComponentType::F32 {
-            return self.elements(accessor, ComponentType::F32, Type::Vec3);
-        }
-        if self.component(accessor)? == ComponentType::I16 {
-            let shorts: Vec<[i16; 4]> = self.elements(accessor, ComponentType::I16, Type::Vec3)?;
-            return Ok(shorts.into_iter().map(|[x, y, z, _]| [x, y, z].map(|v| f32::from(v) / 32767.0)).collect());
-        }
-        let bytes: Vec<[i8; 4]> = self.elements(accessor, ComponentType::I8, Type::Vec3)?;
-        Ok(bytes.into_iter().map(|[x, y, z, _]| [x, y, z].map(|v| f32::from(v) / 127.0)).collect())
+    fn normals(&mut self, accessor: usize) -> Decoded<StoredNormals> {
+        let element = item(&self.document.elements, accessor, "accessor")?;
+        let filter = item(&self.document.views, element.view, "buffer view")?.stored.filter();
+        let (bytes, shorts) = (ComponentType::I8, ComponentType::I16);
+        Ok(match (element.component, filter) {
+            (ComponentType::I8, Some(PackedFilter::Octahedral)) => {
+                StoredNormals::OctahedralBytes(self.unfiltered(accessor, bytes, Type::Vec3)?)
+            }
+            (ComponentType::I16, Some(PackedFilter::Octahedral)) => {
+                StoredNormals::OctahedralShorts(self.unfiltered(accessor, shorts, Type::Vec3)?)
+            }
+            (ComponentType::I8, _) => StoredNormals::Bytes(self.elements(accessor, bytes, Type::Vec3)?),
+            (ComponentType::I16, _) => StoredNormals::Shorts(self.elements(accessor, shorts, Type::Vec3)?),
+            _ => StoredNormals::Single(self.elements(accessor, ComponentType::F32, Type::Vec3)?),
+        })
     }
 
     fn colors(&mut self, accessor: usize) -> Decoded<Vec<[u16; 4]>> {
@@ -334,6 +340,26 @@ impl Decoder<'_> {
         component: ComponentType,
         shape: Type,
     ) -> Decoded<Vec<T>> {
+        self.unpacked(accessor, component, shape, |view, stored| view.unpack(stored))
+    }
+
+    /// Returns the elements of an accessor of this type, tightly packed, as they are before the filter.
+    fn unfiltered<T: AnyBitPattern + NoUninit>(
+        &mut self,
+        accessor: usize,
+        component: ComponentType,
+        shape: Type,
+    ) -> Decoded<Vec<T>> {
+        self.unpacked(accessor, component, shape, |view, stored| view.unpack_unfiltered(stored))
+    }
+
+    fn unpacked<T: AnyBitPattern + NoUninit>(
+        &mut self,
+        accessor: usize,
+        component: ComponentType,
+        shape: Type,
+        unpack: impl for<'s> Fn(&StoredView, &'s [u8]) -> Decoded<Cow<'s, [u8]>>,
+    ) -> Decoded<Vec<T>> {
         let elements = item(&self.document.elements, accessor, "accessor")?;
         if elements.component != component || elements.shape != shape {
             return Err(format!(
@@ -346,20 +372,20 @@ impl Decoder<'_> {
         if view.stride.unwrap_or(component.size() * shape.multiplicity()) != size_of::<T>() {
             return Err(format!("accessor {accessor} is not {} bytes an element", size_of::<T>()));
         }
-        let bytes = self.bytes(&view.stored)?;
+        let bytes = unpack(&view.stored, self.stored(&view.stored)?)?;
         let length = elements.count.checked_mul(size_of::<T>() as u64).and_then(|length| usize::try_from(length).ok());
         let bytes = length.and_then(|length| bytes.get(..length));
         Ok(pod_collect_to_vec(bytes.ok_or_else(|| format!("accessor {accessor} goes past the end of the data"))?))
     }
 
-    /// Returns what a view shows.
-    fn bytes(&mut self, view: &StoredView) -> Decoded<Cow<'_, [u8]>> {
+    /// Returns the bytes of a view in the file.
+    fn stored(&mut self, view: &StoredView) -> Decoded<&'b [u8]> {
         let stored = view.stored(self.binary)?;
         self.used += stored.len();
         if self.used > self.binary.len() {
             return Err("the same data are used more than once".into());
         }
-        view.unpack(stored)
+        Ok(stored)
     }
 }
 

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use gltf::json::buffer::View;
 
 use crate::output::gltf::check_json::Decoded;
-use crate::output::gltf::meshopt::PackedView;
+use crate::output::gltf::meshopt::{PackedFilter, PackedView};
 
 /// The data of a buffer view in the binary chunk, packed or not.
 #[derive(Clone, Copy, Debug)]
@@ -40,6 +40,19 @@ impl StoredView {
             Some(packed) => packed.unpack(stored).map(Cow::Owned),
             None => Ok(Cow::Borrowed(stored)),
         }
+    }
+
+    /// Returns what the view shows, from its `stored` bytes, before the filter.
+    pub(crate) fn unpack_unfiltered<'a>(&self, stored: &'a [u8]) -> Decoded<Cow<'a, [u8]>> {
+        match &self.packed {
+            Some(packed) => packed.unpack_unfiltered(stored).map(Cow::Owned),
+            None => Ok(Cow::Borrowed(stored)),
+        }
+    }
+
+    /// Returns the filter that follows unpacking.
+    pub(crate) fn filter(&self) -> Option<PackedFilter> {
+        self.packed.and_then(|packed| packed.filter)
     }
 
     /// Returns the number of bytes that the view shows.

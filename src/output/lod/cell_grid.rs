@@ -43,6 +43,11 @@ impl CellGrid {
         self.at(self.row(p[1] as f64), self.column(p[0] as f64)) as u32
     }
 
+    /// Returns the column and the row of the cell around a point.
+    pub(crate) fn place(&self, p: &[i32; 3]) -> [u32; 2] {
+        [self.column(p[0] as f64), self.row(p[1] as f64)].map(|at| at as u32)
+    }
+
     /// Returns the column at `x`, or the outermost one on that side.
     pub(crate) fn column(&self, x: f64) -> usize {
         (((x - self.low[0]) * self.scale[0]) as usize).min(self.columns - 1)
@@ -51,15 +56,6 @@ impl CellGrid {
     /// Returns the row at `y`, or the outermost one on that side.
     pub(crate) fn row(&self, y: f64) -> usize {
         (((y - self.low[1]) * self.scale[1]) as usize).min(self.rows - 1)
-    }
-
-    /// Returns the first and last column and the first and last row of the cells that a triangle's box touches.
-    pub(crate) fn around(&self, corners: &[[i32; 3]; 3]) -> [[usize; 2]; 2] {
-        let ends = |k: usize| {
-            let [a, b, c] = corners.map(|p| p[k]);
-            [a.min(b).min(c), a.max(b).max(c)].map(f64::from)
-        };
-        [ends(0).map(|x| self.column(x)), ends(1).map(|y| self.row(y))]
     }
 
     /// Returns the first and the last column that the triangle touches in `row`. Rounding may add one column at either end.

@@ -1,4 +1,7 @@
-//! The least and greatest height of a terrain in each cell of a grid. They bound how far a simplified triangle can be from the terrain.
+//! The least and greatest height of a terrain in each cell of a grid. They bound how far a simplified triangle can be from the terrain, and
+//! the cells tell which triangles of the terrain are near it.
+
+use std::ops::RangeInclusive;
 
 use crate::output::lod::cell_grid::CellGrid;
 
@@ -12,9 +15,10 @@ const MOST_CELLS: usize = 64;
 const MOST_CELLS_COMPARED: usize = 1 << 12;
 
 /// The heights of a terrain, cell by cell.
-pub(crate) struct HeightBounds<'a> {
-    positions: &'a [[i32; 3]],
+pub(crate) struct HeightBounds {
     cells: CellGrid,
+    /// The column and the row of the cell of each vertex.
+    places: Vec<[u32; 2]>,
     /// The least and the greatest height in each cell.
     ranges: Vec<[i32; 2]>,
     /// The least and the greatest height of triangles that are in more than [`MOST_CELLS`].
@@ -26,63 +30,114 @@ pub(crate) struct HeightBounds<'a> {
 /// The range that holds no height.
 const NONE: [i32; 2] = [i32::MAX, i32::MIN];
 
-/// Returns the number of cells between the first and the last column and row.
-fn cells_in(columns: [usize; 2], rows: [usize; 2]) -> usize {
-    (columns[1] - columns[0] + 1) * (rows[1] - rows[0] + 1)
+/// The cells that a triangle's box touches.
+#[derive(Clone, Copy)]
+struct CellBox {
+    /// The first and the last column.
+    columns: [u32; 2],
+    /// The first and the last row.
+    rows: [u32; 2],
+}
+
+impl CellBox {
+    #[inline(always)]
+    fn around([a, b, c]: [[u32; 2]; 3]) -> CellBox {
+        let ends = |k: usize| [a[k].min(b[k]).min(c[k]), a[k].max(b[k]).max(c[k])];
+        CellBox { columns: ends(0), rows: ends(1) }
+    }
+
+    #[inline(always)]
+    fn cells(&self) -> usize {
+        let count = |ends: [u32; 2]| (ends[1] - ends[0]) as usize + 1;
+        count(self.columns) * count(self.rows)
+    }
+
+    /// Returns the cells of `grid` in each row of the box.
+    #[inline(always)]
+    fn runs<'a>(&self, grid: &'a CellGrid) -> impl Iterator<Item = RangeInclusive<usize>> + use<'a> {
+        let [west, east] = self.columns.map(|column| column as usize);
+        (self.rows[0]..=self.rows[1]).map(move |row| grid.at(row as usize, west)..=grid.at(row as usize, east))
+    }
 }
 
 /// Returns the least and the greatest height of a triangle.
+#[inline(always)]
 fn heights(corners: &[[i32; 3]; 3]) -> [i32; 2] {
     let [a, b, c] = corners.map(|p| p[2]);
     [a.min(b).min(c), a.max(b).max(c)]
 }
 
+#[inline(always)]
 fn union(a: [i32; 2], b: [i32; 2]) -> [i32; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
 }
 
-impl<'a> HeightBounds<'a> {
+impl HeightBounds {
     /// Returns the heights of the terrain with the triangles `fine`, whose corners are `positions` (lattice x, y, z).
-    pub(crate) fn new(positions: &'a [[i32; 3]], fine: &[[u32; 3]]) -> HeightBounds<'a> {
+    pub(crate) fn new(positions: &[[i32; 3]], fine: &[[u32; 3]]) -> HeightBounds {
         let cells = CellGrid::new(positions, positions.len() / VERTICES_PER_CELL + 1);
+        let places = positions.iter().map(|p| cells.place(p)).collect();
         let ranges = vec![NONE; cells.count()];
-        let mut bounds = HeightBounds { positions, cells, ranges, everywhere: NONE, all: NONE };
-        fine.iter().for_each(|triangle| bounds.add(triangle));
+        let mut bounds = HeightBounds { cells, places, ranges, everywhere: NONE, all: NONE };
+        fine.iter().for_each(|triangle| bounds.add(triangle, heights(&triangle.map(|v| positions[v as usize]))));
         bounds.all = bounds.ranges.iter().copied().fold(bounds.everywhere, union);
         bounds
     }
 
-    /// Adds the heights of a triangle to every cell that holds a point of it.
-    fn add(&mut self, triangle: &[u32; 3]) {
-        let corners = triangle.map(|v| self.positions[v as usize]);
-        let range = heights(&corners);
-        let [columns, rows] = self.cells.around(&corners);
-        if cells_in(columns, rows) > MOST_CELLS {
+    /// Returns the cells around a triangle between the vertices.
+    #[inline(always)]
+    fn around(&self, triangle: &[u32; 3]) -> CellBox {
+        CellBox::around(triangle.map(|v| self.places[v as usize]))
+    }
+
+    /// Adds the `range` of heights of a triangle to every cell that holds a point of it.
+    #[inline(always)]
+    fn add(&mut self, triangle: &[u32; 3], range: [i32; 2]) {
+        let around = self.around(triangle);
+        if around.cells() > MOST_CELLS {
             self.everywhere = union(self.everywhere, range);
             return;
         }
-        for row in rows[0]..=rows[1] {
-            for known in &mut self.ranges[self.cells.at(row, columns[0])..=self.cells.at(row, columns[1])] {
-                *known = union(*known, range);
-            }
+        for run in around.runs(&self.cells) {
+            self.ranges[run].iter_mut().for_each(|known| *known = union(*known, range));
         }
     }
 
-    /// Returns a number of z steps: no point of the triangle with these corners is further above or below the terrain.
-    pub(crate) fn error_bound(&self, corners: &[[i32; 3]; 3]) -> u64 {
+    /// Returns a number of z steps: no point of this triangle between the vertices is further above or below the terrain, if its corners have
+    /// these heights.
+    pub(crate) fn error_bound(&self, triangle: &[u32; 3], corners: &[[i32; 3]; 3]) -> u64 {
         let [low, high] = heights(corners);
-        let [columns, rows] = self.cells.around(corners);
+        let around = self.around(triangle);
         let mut terrain = self.everywhere;
-        if cells_in(columns, rows) > MOST_CELLS_COMPARED {
+        if around.cells() > MOST_CELLS_COMPARED {
             terrain = self.all;
         } else {
-            for row in rows[0]..=rows[1] {
-                let ranges = &self.ranges[self.cells.at(row, columns[0])..=self.cells.at(row, columns[1])];
-                terrain = ranges.iter().copied().fold(terrain, union);
+            for run in around.runs(&self.cells) {
+                terrain = self.ranges[run].iter().copied().fold(terrain, union);
             }
         }
         let above = high as i64 - terrain[0] as i64;
         let below = terrain[1] as i64 - low as i64;
         above.max(below).max(0) as u64
+    }
+
+    /// Returns what of the terrain is near some triangles between its vertices: the numbers of all vertices and those of its triangles `fine`
+    /// that have a point in a cell around one of them.
+    pub(crate) fn near(
+        &self,
+        fine: &[[u32; 3]],
+        triangles: impl Iterator<Item = [u32; 3]>,
+    ) -> (Vec<u32>, Vec<[u32; 3]>) {
+        let mut is_near = vec![false; self.cells.count()];
+        for triangle in triangles {
+            self.around(&triangle).runs(&self.cells).for_each(|run| is_near[run].fill(true));
+        }
+        let touches = |triangle: &&[u32; 3]| {
+            let around = self.around(triangle);
+            around.cells() > MOST_CELLS || around.runs(&self.cells).any(|run| is_near[run].contains(&true))
+        };
+        let near = |place: &[u32; 2]| is_near[self.cells.at(place[1] as usize, place[0] as usize)];
+        let vertices = (0..).zip(&self.places).filter(|(_, place)| near(place)).map(|(v, _)| v).collect();
+        (vertices, fine.iter().filter(touches).copied().collect())
     }
 }

@@ -7,6 +7,7 @@ use crate::output::attributes::{AttributeChoice, PointAttributes};
 use crate::output::frame::Frame;
 use crate::output::gltf::read::{TileFile, TilePart};
 use crate::output::lod::boundary::on_boundary;
+use crate::output::lod::simplify::Terrain;
 use crate::output::tile::Tile;
 
 /// A vertex is at this scene position in metres, where the job's lattice has no point.
@@ -17,59 +18,111 @@ pub struct VertexOffLattice([f64; 3]);
 /// The number of the vertex at a site.
 type VertexAt = HashMap<[i32; 2], u32, BuildHasherDefault<SiteHasher>>;
 
+/// The mesh of several tiles. What vertices carry besides their positions stays with the tiles until it is asked for: coarser tiles
+/// keep few of the vertices.
+pub struct Joined {
+    /// The lattice integers x, y, z of every vertex.
+    positions: Vec<[i32; 3]>,
+    /// The corners as indices of vertices, counterclockwise seen from above.
+    triangles: Vec<[u32; 3]>,
+    /// Whether a vertex is on the boundary of a mesh of the tiles. Only such vertices can be on the boundary of the whole.
+    on_border: Vec<bool>,
+    /// Which of the `parts` has a vertex, and its number there.
+    origins: Vec<[u32; 2]>,
+    /// The meshes of the tiles, without positions and triangles.
+    parts: Vec<TilePart>,
+}
+
 /// Joins all of `files`, tiles of the job of `frame`, into one mesh. A vertex that several of them share becomes one vertex, with the
-/// normal, the colour and the attributes of the first. Vertices are in the order of the files. The mesh has normals if all files have
-/// them, and likewise colours and attributes.
+/// normal, the colour and the attributes of the first. Vertices are in the order of the files.
 ///
 /// # Errors
 /// [`VertexOffLattice`] if a vertex is not on the lattice.
-pub fn join(frame: &Frame, files: &[TileFile]) -> Result<Tile, VertexOffLattice> {
-    let parts = || files.iter().flat_map(|file| &file.parts);
-    let mut joined = Tile {
-        normals: parts().all(|part| part.normals.is_some()).then(Vec::new),
-        colors: parts().all(|part| part.colors.is_some()).then(Vec::new),
-        attributes: PointAttributes::empty(AttributeChoice {
-            classification: parts().all(|part| part.attributes.classification.is_some()),
-            intensity: parts().all(|part| part.attributes.intensity.is_some()),
-        }),
-        ..Tile::default()
+pub fn join(frame: &Frame, files: Vec<TileFile>) -> Result<Joined, VertexOffLattice> {
+    let mut parts: Vec<TilePart> = files.into_iter().flat_map(|file| file.parts).collect();
+    let vertices = parts.iter().map(|part| part.positions.len()).sum();
+    let mut joined = Joined {
+        positions: Vec::with_capacity(vertices),
+        triangles: Vec::with_capacity(parts.iter().map(|part| part.triangles.len()).sum()),
+        on_border: Vec::with_capacity(vertices),
+        origins: Vec::with_capacity(vertices),
+        parts: Vec::new(),
     };
     let mut vertex_at = VertexAt::default();
-    for part in parts() {
+    for (part, number) in parts.iter_mut().zip(0..) {
+        let points = lattice_points(frame, part)?;
+        part.positions = Vec::new();
+        let triangles = std::mem::take(&mut part.triangles);
         // Only vertices on a boundary can be in another part too.
-        let shared = on_boundary(part.positions.len(), &part.triangles);
-        let numbers: Vec<u32> = (0..part.positions.len())
-            .map(|v| number(frame, part, v, shared[v].then_some(&mut vertex_at), &mut joined))
-            .collect::<Result<_, _>>()?;
-        joined.triangles.extend(part.triangles.iter().map(|t| t.map(|v| numbers[v as usize])));
+        let on_border = on_boundary(points.len(), &triangles);
+        let numbers = joined.append(number, &points, &on_border, &mut vertex_at);
+        joined.triangles.extend(triangles.iter().map(|t| t.map(|v| numbers[v as usize])));
     }
+    joined.parts = parts;
     Ok(joined)
 }
 
-/// Returns the number in `joined` of vertex `v` of `part`. The vertex is appended unless `shared` knows its site.
-fn number(
-    frame: &Frame,
-    part: &TilePart,
-    v: usize,
-    shared: Option<&mut VertexAt>,
-    joined: &mut Tile,
-) -> Result<u32, VertexOffLattice> {
-    let world = part.world(v);
-    let point = frame.integers(world).ok_or(VertexOffLattice(world))?;
-    let next = joined.positions.len() as u32;
-    let number = shared.map_or(next, |vertex_at| *vertex_at.entry([point[0], point[1]]).or_insert(next));
-    if number == next {
-        joined.positions.push(point);
-        if let (Some(normals), Some(theirs)) = (&mut joined.normals, &part.normals) {
-            normals.push(unscaled_normal(theirs[v], part.scale));
+/// Returns the lattice points of the vertices of `part`.
+fn lattice_points(frame: &Frame, part: &TilePart) -> Result<Vec<[i32; 3]>, VertexOffLattice> {
+    let inverse = frame.inverse();
+    let point = |v| {
+        let world = part.world(v);
+        inverse.integers(world).ok_or(VertexOffLattice(world))
+    };
+    (0..part.positions.len()).map(point).collect()
+}
+
+impl Joined {
+    /// Appends the vertices of part `part` at these lattice points, but for those that are there already. Returns the number of each.
+    fn append(&mut self, part: u32, points: &[[i32; 3]], on_border: &[bool], vertex_at: &mut VertexAt) -> Vec<u32> {
+        let mut numbers = Vec::with_capacity(points.len());
+        for ((v, point), &on_border) in (0..).zip(points).zip(on_border) {
+            let next = self.positions.len() as u32;
+            let number = if on_border { *vertex_at.entry([point[0], point[1]]).or_insert(next) } else { next };
+            numbers.push(number);
+            if number == next {
+                self.positions.push(*point);
+                self.on_border.push(on_border);
+                self.origins.push([part, v]);
+            }
         }
-        if let (Some(colors), Some(theirs)) = (&mut joined.colors, &part.colors) {
-            let [red, green, blue, _] = theirs[v];
-            colors.push([red, green, blue]);
-        }
-        joined.attributes.push_from(&part.attributes, v);
+        numbers
     }
-    Ok(number)
+
+    /// Returns the whole mesh, to be simplified.
+    pub fn terrain(&self) -> Terrain<'_> {
+        Terrain { positions: &self.positions, triangles: &self.triangles, may_be_on_boundary: Some(&self.on_border) }
+    }
+
+    /// Returns the tile of these triangles between the vertices, each at its place in `positions`. It has normals if all tiles have them,
+    /// and likewise colours and attributes.
+    pub fn tile(&self, positions: &[[i32; 3]], triangles: Vec<[u32; 3]>) -> Tile {
+        let (tile, vertices) = Tile::with_vertices(positions, triangles);
+        let origins = || vertices.iter().map(|&v| self.origins[v as usize].map(|at| at as usize));
+        let all_have = |has: fn(&TilePart) -> bool| self.parts.iter().all(has);
+        let normal = |[part, v]: [usize; 2]| {
+            let part = &self.parts[part];
+            part.normals.as_ref().map(|normals| unscaled_normal(normals.get(v), part.scale))
+        };
+        let color = |[part, v]: [usize; 2]| self.parts[part].colors.as_ref().map(|colors| colors[v]);
+        let mut attributes = PointAttributes::empty(AttributeChoice {
+            classification: all_have(|part| part.attributes.classification.is_some()),
+            intensity: all_have(|part| part.attributes.intensity.is_some()),
+        });
+        origins().for_each(|[part, v]| attributes.push_from(&self.parts[part].attributes, v));
+        Tile {
+            normals: origins().map(normal).collect(),
+            colors: origins().map(|at| color(at).map(|[red, green, blue, _]| [red, green, blue])).collect(),
+            attributes,
+            ..tile
+        }
+    }
+
+    /// Returns the whole mesh as a tile.
+    pub fn into_tile(mut self) -> Tile {
+        let triangles = std::mem::take(&mut self.triangles);
+        self.tile(&self.positions, triangles)
+    }
 }
 
 /// Returns the unit normal (x east, y north, z up) for the normal of a mesh that its node stretches by `scale`.

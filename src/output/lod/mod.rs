@@ -2,6 +2,8 @@
 
 mod boundary;
 mod cell_grid;
+mod filling;
+mod furthest;
 mod height_bounds;
 pub mod join;
 mod kept_lines;

@@ -8,7 +8,7 @@
 //! Inside, the vertices that stay are chosen in two passes. First, one vertex of every cell of a grid stays: the one that is nearest to the
 //! height of the surface seen in the cell, which it takes. Then the triangulation of these is compared with the terrain: where a triangle
 //! is furthest from it, the vertex with the greatest distance stays too (Garland and Heckbert 1995, "Fast polygonal approximation of
-//! terrains and height fields", here with all vertices of a pass inserted at once), with the mean height of its neighbours: see
+//! terrains and height fields", here with all vertices of a pass at once), with the mean height of its neighbours: see
 //! `surface.rs`. Vertices on the boundary keep their own heights, or terrains would not meet. So do vertices of breaklines: see
 //! `kept_lines.rs`.
 
@@ -16,26 +16,34 @@
 mod tests;
 
 use crate::breaklines::Breaklines;
+use crate::geometry::Bounds;
 use crate::geometry::square_grid::SquareGrid;
-use crate::geometry::{Bounds, Site};
-use crate::mesh::index::SiteIndex;
-use crate::mesh::region::covered;
 use crate::output::frame::Frame;
-use crate::output::lod::boundary::on_boundary;
+use crate::output::lod::boundary::{on_boundary, on_boundary_among};
+use crate::output::lod::filling::Filling;
+use crate::output::lod::furthest::{Furthest, steps_for};
 use crate::output::lod::kept_lines::KeptLines;
 use crate::output::lod::surface::{seen_heights, smoothed};
-use crate::output::lod::vertex_cells::{VertexCells, plane};
 use crate::output::lod::vertical_error::vertical_error;
-use crate::output::tile::Tile;
-use crate::triangulation::{self, canonical};
-use crate::{Error, Result, interrupt};
-use std::collections::HashSet;
+use crate::{Result, interrupt};
+
+/// A terrain to be simplified: a part of a Delaunay triangulation.
+pub struct Terrain<'a> {
+    /// The lattice integers x, y, z of every vertex. Each is the corner of a triangle.
+    pub positions: &'a [[i32; 3]],
+    /// The triangles, counterclockwise seen from above. They cover their ground once.
+    pub triangles: &'a [[u32; 3]],
+    /// Whether a vertex may be on the boundary, if that is known.
+    pub may_be_on_boundary: Option<&'a [bool]>,
+}
 
 /// A simplified terrain.
 #[derive(Debug)]
 pub struct Simplified {
-    /// Its vertices are some of the original's, in their order. Those inside may have other heights.
-    pub tile: Tile,
+    /// The positions of the vertices of the original, those that are not used any more among them. Those inside may have other heights.
+    pub positions: Vec<[i32; 3]>,
+    /// Triangles between some of the vertices.
+    pub triangles: Vec<[u32; 3]>,
     /// The greatest vertical distance to the original in metres.
     pub greatest_error: f64,
     /// The vertical distance in metres by which a triangle misses the surface at worst, on average over the triangles.
@@ -60,46 +68,50 @@ const PIECES_TO_SPACING: f64 = 2.0;
 /// enough for the outermost cells.
 const BEYOND_GRID: usize = 200;
 
-/// Simplifies `tile`, a part of a Delaunay triangulation, to about `triangles` triangles. The result has more if the boundary has too
+/// Simplifies `terrain` to about `triangles` triangles. The result has more if the boundary has too
 /// many edges. Up to half of the vertices inside are those of breaklines, if there are `lines`.
 ///
 /// # Errors
-/// [`Error::Broken`] if the boundary is not that of a part of a Delaunay triangulation, [`Error::Interrupted`].
-pub fn simplify(frame: &Frame, tile: &Tile, triangles: usize, lines: Option<&Breaklines>) -> Result<Simplified> {
-    let boundary = Boundary::of(tile);
-    let inside = tile.positions.len() - boundary.vertices;
+/// [`crate::Error::Broken`] if the boundary is not that of a part of a Delaunay triangulation, [`crate::Error::Interrupted`].
+pub fn simplify(frame: &Frame, terrain: &Terrain, triangles: usize, lines: Option<&Breaklines>) -> Result<Simplified> {
+    let boundary = Boundary::of(terrain);
+    let positions = terrain.positions;
+    let inside = positions.len() - boundary.vertices;
     let least = (triangles as f64 * LEAST_INSIDE) as usize;
     let wanted = (triangles / 2).saturating_sub(boundary.vertices / 2).max(least).min(inside);
     if wanted >= inside {
-        let tile = tile.subset(tile.triangles.clone());
-        return Ok(Simplified { tile, greatest_error: 0.0, typical_error: 0.0, spacing: 0.0 });
+        let (positions, triangles) = (positions.to_vec(), terrain.triangles.to_vec());
+        return Ok(Simplified { positions, triangles, greatest_error: 0.0, typical_error: 0.0, spacing: 0.0 });
     }
     let [xy, up] = frame.resolution_metres();
-    let surface = smoothed(tile, &boundary.on, LOOKED_AT);
-    let mut moved = tile.positions.clone();
+    let surface = smoothed(positions, terrain.triangles, &boundary.on, LOOKED_AT);
+    let mut moved = positions.to_vec();
     let mut kept = boundary.on.clone();
-    let longest = PIECES_TO_SPACING * spacing_of(&tile.positions, wanted);
-    let kept_lines = KeptLines::choose(lines, &tile.positions, &boundary.on, wanted / 2, longest);
+    let bounds = most_of(positions).unwrap_or(Bounds::of_point([0; 2]));
+    let longest = PIECES_TO_SPACING * side_of(bounds, wanted);
+    let kept_lines = KeptLines::choose(lines, positions, &boundary.on, wanted / 2, longest);
     kept_lines.vertices.iter().for_each(|&v| kept[v] = true);
     let by_grid = ((wanted - kept_lines.vertices.len()) as f64 * BY_GRID) as usize;
-    let side = keep_by_grid(&tile.positions, by_grid, &kept_lines, &mut kept, &mut moved);
-    let mut coarse = boundary.fill(tile, &kept)?;
-    let rest = (boundary.vertices + wanted).saturating_sub(kept.iter().filter(|&&kept| kept).count());
-    let furthest = Furthest::find(&surface, &moved, &coarse);
-    let more = furthest.first(rest, |v| !kept[v] && kept_lines.allows(v));
-    if !more.is_empty() {
-        for v in more.into_iter().map(|v| v as usize) {
-            kept[v] = true;
-            moved[v] = surface[v];
-        }
-        coarse = boundary.fill(tile, &kept)?;
-    }
+    let side = keep_by_grid(positions, bounds, by_grid, &kept_lines, &mut kept, &mut moved);
     interrupt::check()?;
-    let greatest = vertical_error(&tile.positions, &tile.triangles, &moved, &coarse);
+    let mut filling = Filling::new(positions, &kept, &boundary.edges)?;
+    let rest = (boundary.vertices + wanted).saturating_sub(kept.iter().filter(|&&kept| kept).count());
+    let furthest = Furthest::find(&surface, &moved, &filling, LOOKED_AT);
+    let typical_error = furthest.mean * up;
+    let mut steps = steps_for(rest);
+    for far in furthest.first(rest, |v| !kept[v] && kept_lines.allows(v)) {
+        if filling.insert(far.vertex, far.triangle as usize, &mut steps) {
+            moved[far.vertex as usize] = surface[far.vertex as usize];
+        }
+    }
+    let coarse = filling.into_triangles();
+    interrupt::check()?;
+    let greatest = vertical_error(positions, terrain.triangles, &moved, &coarse);
     Ok(Simplified {
-        tile: tile.subset_at(&moved, coarse),
+        positions: moved,
+        triangles: coarse,
         greatest_error: greatest * up,
-        typical_error: furthest.mean * up,
+        typical_error,
         spacing: side * xy,
     })
 }
@@ -115,49 +127,35 @@ struct Boundary {
 }
 
 impl Boundary {
-    fn of(tile: &Tile) -> Boundary {
-        let on = on_boundary(tile.positions.len(), &tile.triangles);
+    fn of(terrain: &Terrain) -> Boundary {
+        let (vertices, triangles) = (terrain.positions.len(), terrain.triangles);
+        let on = match terrain.may_be_on_boundary {
+            Some(may_be) => on_boundary_among(may_be, triangles),
+            None => on_boundary(vertices, triangles),
+        };
         // Few triangles have two corners there, and those are quickly told.
         let touches = |corners: &&[u32; 3]| corners.iter().filter(|&&v| on[v as usize]).count() >= 2;
         let between = |&[a, b]: &[u32; 2]| on[a as usize] && on[b as usize];
-        let touching = tile.triangles.iter().filter(touches);
+        let touching = triangles.iter().filter(touches);
         let sides: Vec<[u32; 2]> = touching.flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).filter(between).collect();
-        let known: HashSet<[u32; 2]> = sides.iter().copied().collect();
-        let edges = sides.into_iter().filter(|&[a, b]| !known.contains(&[b, a])).collect();
+        let mut known = sides.clone();
+        known.sort_unstable();
+        let edges = sides.into_iter().filter(|&[a, b]| known.binary_search(&[b, a]).is_err()).collect();
         let vertices = on.iter().filter(|&&on| on).count();
         Boundary { edges, on, vertices }
     }
-
-    /// Returns the triangulation of the vertices that are `kept`, within the boundary.
-    fn fill(&self, tile: &Tile, kept: &[bool]) -> Result<Vec<[u32; 3]>> {
-        let vertices: Vec<u32> = (0..).zip(kept).filter(|(_, kept)| **kept).map(|(v, _)| v).collect();
-        let mut number = vec![SiteIndex(u32::MAX); kept.len()];
-        vertices.iter().zip(0..).for_each(|(&v, n)| number[v as usize] = SiteIndex(n));
-        let sites: Vec<Site> = vertices.iter().map(|&v| plane(tile.positions[v as usize])).collect();
-        interrupt::check()?;
-        let mesh = canonical(&sites)?;
-        let edges: Vec<_> = self.edges.iter().map(|edge| edge.map(|v| number[v as usize])).collect();
-        let covered = covered(&mesh, &edges)?;
-        let inside = mesh.triangles.iter().zip(covered).filter(|(_, covered)| *covered);
-        let triangles: Vec<_> = inside.map(|(t, _)| t.map(|v| vertices[v.get()])).collect();
-        triangulation::recycle(mesh);
-        if triangles.is_empty() {
-            return Err(Error::Broken("a terrain without triangles cannot be simplified".into()));
-        }
-        Ok(triangles)
-    }
 }
 
-/// Keeps one vertex of `positions` in each cell of a grid with about `cells` cells: the one nearest to the height that is seen in the
+/// Keeps one vertex of `positions` in each cell of a grid with about `cells` cells within `bounds`: the one nearest to the height that is seen in the
 /// cell. Unless it was `kept` already, it gets that height in `moved`. Returns the side of a cell in lattice steps.
 fn keep_by_grid(
     positions: &[[i32; 3]],
+    bounds: Bounds<2>,
     cells: usize,
     lines: &KeptLines,
     kept: &mut [bool],
     moved: &mut [[i32; 3]],
 ) -> f64 {
-    let Some(bounds) = most_of(positions) else { return 0.0 };
     let side = side_of(bounds, cells);
     if cells == 0 {
         return side;
@@ -185,11 +183,6 @@ fn side_of(bounds: Bounds<2>, cells: usize) -> f64 {
     (area / cells.max(1) as f64).sqrt()
 }
 
-/// Returns about how far apart `count` vertices among `positions` are, in lattice steps.
-fn spacing_of(positions: &[[i32; 3]], count: usize) -> f64 {
-    most_of(positions).map_or(0.0, |bounds| side_of(bounds, count))
-}
-
 /// Returns the box in the plane of those of `positions` that are looked at, without the outermost on each side.
 fn most_of(positions: &[[i32; 3]]) -> Option<Bounds<2>> {
     let beyond = positions.len() / LOOKED_AT / BEYOND_GRID;
@@ -201,29 +194,4 @@ fn most_of(positions: &[[i32; 3]]) -> Option<Bounds<2>> {
     };
     let [x, y] = [ends(0)?, ends(1)?];
     Some(Bounds { min: [x[0], y[0]], max: [x[1], y[1]] })
-}
-
-/// For each triangle of a terrain the vertex of the surface with the greatest vertical distance from it.
-struct Furthest {
-    /// Bits of the distance and the number of the vertex, greatest first.
-    vertices: Vec<(u64, u32)>,
-    /// The mean distance in steps of z, over all triangles.
-    mean: f64,
-}
-
-impl Furthest {
-    /// Compares the triangles `coarse` between the positions `moved` with `surface`.
-    fn find(surface: &[[i32; 3]], moved: &[[i32; 3]], coarse: &[[u32; 3]]) -> Furthest {
-        let cells = VertexCells::new(surface, LOOKED_AT);
-        let mut vertices: Vec<(u64, u32)> = cells.furthest(moved, coarse).collect();
-        let sum: f64 = vertices.iter().map(|&(distance, _)| f64::from_bits(distance)).sum();
-        // Distances are not negative, so their bits are in the same order.
-        vertices.sort_unstable_by(|a, b| b.cmp(a));
-        Furthest { vertices, mean: sum / coarse.len().max(1) as f64 }
-    }
-
-    /// Returns the first `count` that are wanted.
-    fn first(&self, count: usize, is_wanted: impl Fn(usize) -> bool) -> Vec<u32> {
-        self.vertices.iter().map(|&(_, v)| v).filter(|&v| is_wanted(v as usize)).take(count).collect()
-    }
 }

@@ -5,23 +5,21 @@
 //! and y stay those of a site, because the triangulation needs that. It also keeps the site's normal and colour: means of them would
 //! be smoother, and so brighter, than the terrain looks from afar.
 
-use crate::output::tile::Tile;
-
-/// Returns the positions of `tile` where one of every `every` vertices has the mean of its own height, twice, and the heights at the
+/// Returns the `positions` of the vertices of `triangles` where one of every `every` vertices has the mean of its own height, twice, and the heights at the
 /// other ends of its edges. The vertices that are `fixed` keep theirs, like all others.
-pub(crate) fn smoothed(tile: &Tile, fixed: &[bool], every: usize) -> Vec<[i32; 3]> {
+pub(crate) fn smoothed(positions: &[[i32; 3]], triangles: &[[u32; 3]], fixed: &[bool], every: usize) -> Vec<[i32; 3]> {
     // Every edge inside counts in both of its triangles, so a vertex that counts twice itself must count four times here.
     let own = |p: &[i32; 3]| Mean { sum: 4 * p[2] as i64, count: 4 };
-    let mut means: Vec<Mean> = tile.positions.iter().step_by(every).map(own).collect();
-    let height = |v: u32| tile.positions[v as usize][2] as i64;
-    for &[a, b, c] in &tile.triangles {
+    let mut means: Vec<Mean> = positions.iter().step_by(every).map(own).collect();
+    let height = |v: u32| positions[v as usize][2] as i64;
+    for &[a, b, c] in triangles {
         for (v, to, from) in [(a, b, c), (b, c, a), (c, a, b)] {
             if (v as usize).is_multiple_of(every) {
                 means[v as usize / every].add(height(to) + height(from), 2);
             }
         }
     }
-    let mut smoothed = tile.positions.clone();
+    let mut smoothed = positions.to_vec();
     for ((p, fixed), mean) in smoothed.iter_mut().zip(fixed).step_by(every).zip(means) {
         if !fixed {
             p[2] = mean.rounded();
@@ -86,9 +84,10 @@ mod tests {
     fn a_spike_sinks_and_a_fixed_vertex_stays() {
         let corners = [[0, 0, 0], [9, 0, 0], [9, 9, 0], [0, 9, 0]];
         let wheel: Vec<[u32; 3]> = (0..4).map(|i| [4, i, (i + 1) % 4]).collect();
-        let positions = corners.into_iter().chain([[4, 4, 60]]).collect();
-        let tile = Tile { positions, triangles: wheel, ..Tile::default() };
-        let heights = |fixed: [bool; 5], every| smoothed(&tile, &fixed, every).iter().map(|p| p[2]).collect::<Vec<_>>();
+        let positions: Vec<_> = corners.into_iter().chain([[4, 4, 60]]).collect();
+        let heights = |fixed: [bool; 5], every| {
+            smoothed(&positions, &wheel, &fixed, every).iter().map(|p| p[2]).collect::<Vec<_>>()
+        };
         let hub = [true, true, true, true, false];
         assert_eq!([heights(hub, 1), heights(hub, 2), heights(hub, 4)], [[0, 0, 0, 0, 20]; 3]);
         assert_eq!([heights(hub, 3)[4], heights([true; 5], 1)[4]], [60; 2]);

@@ -13,15 +13,14 @@ pub(crate) struct VertexCells {
     /// The vertices of cell c are `sorted[starts[c]..starts[c + 1]]`.
     starts: Vec<u32>,
     sorted: Vec<[i32; 3]>,
-    /// The numbers of the sorted vertices.
-    numbers: Vec<u32>,
 }
 
 impl VertexCells {
-    /// Sorts one of every `every` vertices.
-    pub(crate) fn new(positions: &[[i32; 3]], every: usize) -> VertexCells {
-        let cells = CellGrid::new(positions, positions.len() / every + 1);
-        let cell_of: Vec<u32> = positions.iter().step_by(every).map(|p| cells.of(p)).collect();
+    /// Sorts these `vertices`, numbers of `positions`.
+    pub(crate) fn new(positions: &[[i32; 3]], vertices: &[u32]) -> VertexCells {
+        let positions: Vec<[i32; 3]> = vertices.iter().map(|&v| positions[v as usize]).collect();
+        let cells = CellGrid::new(&positions, positions.len() + 1);
+        let cell_of: Vec<u32> = positions.iter().map(|p| cells.of(p)).collect();
         let mut starts = vec![0; cells.count() + 1];
         cell_of.iter().for_each(|&cell| starts[cell as usize] += 1);
         let mut end = 0;
@@ -30,25 +29,12 @@ impl VertexCells {
             *start = end;
         }
         let mut sorted = vec![[0; 3]; cell_of.len()];
-        let mut numbers = vec![0; cell_of.len()];
-        for (i, &cell) in cell_of.iter().enumerate().rev() {
-            let v = i * every;
+        for (p, &cell) in positions.iter().zip(&cell_of).rev() {
             let at = &mut starts[cell as usize];
             *at -= 1;
-            (sorted[*at as usize], numbers[*at as usize]) = (positions[v], v as u32);
+            sorted[*at as usize] = *p;
         }
-        VertexCells { cells, starts, sorted, numbers }
-    }
-
-    /// Returns for every triangle of `coarse`, whose corners are `positions`, the vertex with the greatest vertical distance from it, as
-    /// the bits of that distance and the number of the vertex. Triangles that meet all their vertices are left out.
-    ///
-    /// Stops looking where that would take far longer than usual: where nearly all vertices lie in one cell.
-    pub(crate) fn furthest(&self, positions: &[[i32; 3]], coarse: &[[u32; 3]]) -> impl Iterator<Item = (u64, u32)> {
-        let mut steps = Self::steps_for(coarse.len());
-        let corners = |triangle: &[u32; 3]| triangle.map(|v| positions[v as usize]);
-        let found = coarse.iter().map_while(move |triangle| self.furthest_inside(&corners(triangle), &mut steps));
-        found.filter(|(distance, _)| *distance > 0.0).map(|(distance, v)| (distance.to_bits(), v))
+        VertexCells { cells, starts, sorted }
     }
 
     /// Returns the number of vertices that may be looked at for this number of triangles. Terrains need far fewer.
@@ -56,21 +42,18 @@ impl VertexCells {
         VERTICES_PER_TRIANGLE * (triangles as u64 + 1000)
     }
 
-    /// Returns the greatest vertical distance between a triangle with these corners and a vertex over or under it, and the number of that vertex. `None`
-    /// if that means to look at more than `steps` vertices.
-    pub(crate) fn furthest_inside(&self, corners: &[[i32; 3]; 3], steps: &mut u64) -> Option<(f64, u32)> {
+    /// Returns the greatest vertical distance between a triangle with these corners and a vertex over or under it. `None` if that means to look
+    /// at more than `steps` vertices.
+    pub(crate) fn furthest_inside(&self, corners: &[[i32; 3]; 3], steps: &mut u64) -> Option<f64> {
         let ys = corners.map(|p| p[1]);
         let (first, last) = (ys[0].min(ys[1]).min(ys[2]), ys[0].max(ys[1]).max(ys[2]));
-        let mut greatest = (0.0f64, 0);
+        let mut greatest = 0.0f64;
         for row in self.cells.row(first as f64)..=self.cells.row(last as f64) {
             let [west, east] = self.cells.span(corners, row);
             let [start, end] = [self.cells.at(row, west), self.cells.at(row, east) + 1].map(|cell| self.starts[cell]);
             *steps = steps.checked_sub(u64::from(end.saturating_sub(start)))?;
-            for at in start as usize..end as usize {
-                let distance = vertical_distance(corners, self.sorted[at]);
-                if distance > greatest.0 {
-                    greatest = (distance, self.numbers[at]);
-                }
+            for &vertex in &self.sorted[start as usize..end as usize] {
+                greatest = greatest.max(vertical_distance(corners, vertex));
             }
         }
         Some(greatest)
@@ -78,7 +61,7 @@ impl VertexCells {
 }
 
 /// Returns the vertical distance between `p` and a counterclockwise triangle, or 0 if `p` is neither over nor under it.
-fn vertical_distance(corners: &[[i32; 3]; 3], p: [i32; 3]) -> f64 {
+pub(crate) fn vertical_distance(corners: &[[i32; 3]; 3], p: [i32; 3]) -> f64 {
     let [a, b, c] = *corners;
     let weight = |from, to| orient2d(plane(from), plane(to), plane(p));
     let of_a = weight(b, c);

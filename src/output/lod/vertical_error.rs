@@ -18,8 +18,8 @@ const STEPS_PER_EDGE: u64 = 64;
 /// Looking through this many triangles around a vertex counts as a step. Few vertices have as many, but the hub of a fan may have all.
 const TRIANGLES_PER_STEP: u64 = 8;
 
-/// The number of triangles that are measured in the order of their bounds.
-const SORTED: usize = 256;
+/// The number of triangles that are measured first. On LiDAR hardly any of the others can have a greater error.
+const MEASURED_FIRST: usize = 1024;
 
 /// Returns the greatest vertical distance in steps of z between two terrains. It is never too small. The triangles `fine` are between
 /// `positions` (lattice x, y, z), and the triangles `coarse` between `moved`: the same x and y, with other heights within the same
@@ -27,26 +27,30 @@ const SORTED: usize = 256;
 pub fn vertical_error(positions: &[[i32; 3]], fine: &[[u32; 3]], moved: &[[i32; 3]], coarse: &[[u32; 3]]) -> f64 {
     let heights = HeightBounds::new(positions, fine);
     let corners = |triangle: &[u32; 3]| triangle.map(|v| moved[v as usize]);
-    let mut bounds: Vec<(u64, u32)> = coarse.iter().map(|t| heights.error_bound(&corners(t))).zip(0..).collect();
+    let mut bounds: Vec<(u64, u32)> = coarse.iter().map(|t| heights.error_bound(t, &corners(t))).zip(0..).collect();
     // Triangles that may have the greatest error come first, so that most of the others can be skipped.
-    let sorted = SORTED.min(bounds.len());
-    if sorted < bounds.len() {
-        bounds.select_nth_unstable_by(sorted, |a, b| b.cmp(a));
+    let first = MEASURED_FIRST.min(bounds.len());
+    if first < bounds.len() {
+        bounds.select_nth_unstable_by(first, |a, b| b.cmp(a));
     }
-    bounds[..sorted].sort_unstable_by(|a, b| b.cmp(a));
-    let (mesh, vertices) = (FineMesh::new(positions, fine), VertexCells::new(positions, 1));
-    let mut steps = STEPS_PER_EDGE * (3 * coarse.len() as u64 + 1000);
-    let mut vertex_steps = VertexCells::steps_for(coarse.len());
+    let mut steps = StepsLeft::new(coarse.len());
     let mut greatest = 0.0f64;
-    for (bound, triangle) in bounds {
-        if bound as f64 > greatest {
-            let triangle = &coarse[triangle as usize];
-            let at_crossings = mesh.error_at_crossings(triangle, moved, &mut steps);
-            let at_vertices = vertices.furthest_inside(&corners(triangle), &mut vertex_steps);
-            let (Some(at_crossings), Some((at_vertices, _))) = (at_crossings, at_vertices) else {
-                return height_range(positions);
-            };
-            greatest = greatest.max(at_crossings).max(at_vertices);
+    let (first, others) = bounds.split_at(first);
+    for bounds in [first, others] {
+        let mut measured: Vec<_> = bounds.iter().filter(|(bound, _)| *bound as f64 > greatest).copied().collect();
+        if measured.is_empty() {
+            continue;
+        }
+        measured.sort_unstable_by(|a, b| b.cmp(a));
+        let triangles = || measured.iter().map(|(_, triangle)| coarse[*triangle as usize]);
+        let near = NearTerrain::new(&heights, positions, fine, triangles());
+        for ((bound, _), triangle) in measured.iter().zip(triangles()) {
+            if *bound as f64 > greatest {
+                match near.error_of(&triangle, moved, &mut steps) {
+                    Some(error) => greatest = greatest.max(error),
+                    None => return height_range(positions),
+                }
+            }
         }
     }
     // Rounding loses about 2^-50 of a height.
@@ -58,6 +62,46 @@ pub fn vertical_error(positions: &[[i32; 3]], fine: &[[u32; 3]], moved: &[[i32; 
 fn height_range(positions: &[[i32; 3]]) -> f64 {
     let (low, high) = positions.iter().fold((i32::MAX, i32::MIN), |(l, h), p| (l.min(p[2]), h.max(p[2])));
     if low > high { 0.0 } else { high as f64 - low as f64 }
+}
+
+/// How much work is left before a rougher bound must do.
+struct StepsLeft {
+    of_walks: u64,
+    of_vertices: u64,
+}
+
+impl StepsLeft {
+    /// Returns the steps for a terrain of so many simplified triangles.
+    fn new(coarse: usize) -> StepsLeft {
+        let of_walks = STEPS_PER_EDGE * (3 * coarse as u64 + 1000);
+        StepsLeft { of_walks, of_vertices: VertexCells::steps_for(coarse) }
+    }
+}
+
+/// What of the terrain is near the simplified triangles that are measured.
+struct NearTerrain<'a> {
+    mesh: FineMesh<'a>,
+    vertices: VertexCells,
+}
+
+impl<'a> NearTerrain<'a> {
+    fn new(
+        heights: &HeightBounds,
+        positions: &'a [[i32; 3]],
+        fine: &[[u32; 3]],
+        measured: impl Iterator<Item = [u32; 3]>,
+    ) -> NearTerrain<'a> {
+        let (vertices, triangles) = heights.near(fine, measured);
+        NearTerrain { mesh: FineMesh::new(positions, &triangles), vertices: VertexCells::new(positions, &vertices) }
+    }
+
+    /// Returns the greatest distance between the terrain and a simplified triangle. `None` if that takes more than `steps`.
+    fn error_of(&self, triangle: &[u32; 3], moved: &[[i32; 3]], steps: &mut StepsLeft) -> Option<f64> {
+        let at_crossings = self.mesh.error_at_crossings(triangle, moved, &mut steps.of_walks)?;
+        let corners = triangle.map(|v| moved[v as usize]);
+        let at_vertices = self.vertices.furthest_inside(&corners, &mut steps.of_vertices)?;
+        Some(at_crossings.max(at_vertices))
+    }
 }
 
 /// The terrain before it was simplified.
@@ -240,12 +284,11 @@ mod tests {
             for (p, lift) in moved.iter_mut().step_by(7).zip(&lifts) {
                 p[2] = (p[2] + lift).clamp(low, high);
             }
-            let (mesh, vertices) = (FineMesh::new(&positions, fine.corners()), VertexCells::new(&positions, 1));
-            let (mut steps, mut vertex_steps) = (u64::MAX, u64::MAX);
-            let furthest = coarse.iter().map(|t| {
-                let at_crossings = mesh.error_at_crossings(t, &moved, &mut steps).unwrap();
-                at_crossings.max(vertices.furthest_inside(&t.map(|v| moved[v as usize]), &mut vertex_steps).unwrap().0)
-            });
+            let every_vertex: Vec<u32> = (0..positions.len() as u32).collect();
+            let (mesh, vertices) = (FineMesh::new(&positions, fine.corners()), VertexCells::new(&positions, &every_vertex));
+            let whole = NearTerrain { mesh, vertices };
+            let mut steps = StepsLeft { of_walks: u64::MAX, of_vertices: u64::MAX };
+            let furthest = coarse.iter().map(|t| whole.error_of(t, &moved, &mut steps).unwrap());
             let furthest = furthest.fold(0.0, f64::max);
             let found = vertical_error(&positions, fine.corners(), &moved, &coarse);
             prop_assert!(found == 0.0 && furthest == 0.0 || found == furthest + 1e-9, "{} and {}", found, furthest);

@@ -1,0 +1,42 @@
+//! The normals of a tile as its file has them. What few vertices are asked for is not worth unpacking for all.
+
+use crate::output::gltf::encoding::{from_long_octahedral, from_octahedral};
+
+/// The normals of a mesh, in one of the forms that this program writes.
+#[derive(Clone, Debug)]
+pub enum StoredNormals {
+    /// In single precision.
+    Single(Vec<[f32; 3]>),
+    /// In signed 16 bits, 32767 for 1. The fourth number is padding.
+    Shorts(Vec<[i16; 4]>),
+    /// In signed bytes, 127 for 1. The fourth byte is padding.
+    Bytes(Vec<[i8; 4]>),
+    /// In signed 16 bits on an octahedron, whose size is the third number.
+    OctahedralShorts(Vec<[i16; 4]>),
+    /// In signed bytes on an octahedron, whose size is the third byte.
+    OctahedralBytes(Vec<[i8; 4]>),
+}
+
+impl StoredNormals {
+    /// Returns the number of normals.
+    pub(crate) fn count(&self) -> usize {
+        match self {
+            StoredNormals::Single(all) => all.len(),
+            StoredNormals::Shorts(all) | StoredNormals::OctahedralShorts(all) => all.len(),
+            StoredNormals::Bytes(all) | StoredNormals::OctahedralBytes(all) => all.len(),
+        }
+    }
+
+    /// Returns the normal (x, y up, z) of vertex `v`. A viewer divides it by the scale of the node and makes it a unit vector.
+    pub fn get(&self, v: usize) -> [f32; 3] {
+        let of_shorts = |[x, y, z, _]: [i16; 4]| [x, y, z].map(|v| f32::from(v) / 32767.0);
+        let of_bytes = |[x, y, z, _]: [i8; 4]| [x, y, z].map(|v| f32::from(v) / 127.0);
+        match self {
+            StoredNormals::Single(all) => all[v],
+            StoredNormals::Shorts(all) => of_shorts(all[v]),
+            StoredNormals::Bytes(all) => of_bytes(all[v]),
+            StoredNormals::OctahedralShorts(all) => of_shorts(from_long_octahedral(all[v])),
+            StoredNormals::OctahedralBytes(all) => of_bytes(from_octahedral(all[v])),
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! For each triangle of a simplified terrain the vertex of the surface with the greatest vertical distance from it.
+
+use crate::output::lod::filling::Filling;
+use crate::output::lod::vertex_cells::vertical_distance;
+
+/// Steps of the walks from vertex to vertex, on average, before the search gives up. Terrains need far fewer.
+const STEPS_PER_VERTEX: u64 = 64;
+
+/// A vertex of the surface that is over or under a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct FarVertex {
+    /// The vertical distance in steps of z.
+    pub(crate) distance: f64,
+    pub(crate) vertex: u32,
+    pub(crate) triangle: u32,
+}
+
+/// The vertices with the greatest distances, at most one for each triangle.
+pub(crate) struct Furthest {
+    vertices: Vec<FarVertex>,
+    /// The mean distance in steps of z, over all triangles.
+    pub(crate) mean: f64,
+}
+
+impl Furthest {
+    /// Compares the triangles of `filling`, between the positions `moved`, with one of every `every` vertices of `surface`.
+    ///
+    /// Stops looking where that would take far longer than usual: where nearly all triangles are slivers.
+    pub(crate) fn find(surface: &[[i32; 3]], moved: &[[i32; 3]], filling: &Filling, every: usize) -> Furthest {
+        let mut furthest = vec![(0.0, 0); filling.triangles()];
+        let mut steps = steps_for(surface.len());
+        let mut near = 0;
+        for v in (0..surface.len()).step_by(every) {
+            // Vertices that follow each other are near each other, most of them.
+            let Some(triangle) = filling.locate(v as u32, near, &mut steps) else { break };
+            near = triangle;
+            let Some(corners) = filling.corners(triangle) else { continue };
+            let distance = vertical_distance(&corners.map(|v| moved[v as usize]), surface[v]);
+            if distance > furthest[triangle].0 {
+                furthest[triangle] = (distance, v as u32);
+            }
+        }
+        let found = (0..).zip(furthest).filter(|(_, (distance, _))| *distance > 0.0);
+        let found = found.map(|(triangle, (distance, vertex))| FarVertex { distance, vertex, triangle });
+        let vertices: Vec<FarVertex> = found.collect();
+        let sum: f64 = vertices.iter().map(|far| far.distance).sum();
+        Furthest { vertices, mean: sum / filling.triangles_within().max(1) as f64 }
+    }
+
+    /// Returns those of the vertices that are wanted, the first `count` by their distance, in the order of their triangles.
+    pub(crate) fn first(self, count: usize, is_wanted: impl Fn(usize) -> bool) -> Vec<FarVertex> {
+        let wanted = self.vertices.into_iter().filter(|far| is_wanted(far.vertex as usize));
+        let mut wanted: Vec<FarVertex> = wanted.collect();
+        if count < wanted.len() {
+            // Distances are not negative, so their bits are in the same order.
+            wanted.select_nth_unstable_by_key(count, |far| std::cmp::Reverse((far.distance.to_bits(), far.vertex)));
+            wanted.truncate(count);
+            wanted.sort_unstable_by_key(|far| far.triangle);
+        }
+        wanted
+    }
+}
+
+/// Returns the steps that walks to so many vertices may take.
+pub(crate) fn steps_for(vertices: usize) -> u64 {
+    STEPS_PER_VERTEX * (vertices as u64 + 1000)
+}
