@@ -28,22 +28,34 @@ impl RgbModels {
     pub(super) fn next<R: Read>(&mut self, data: &mut RangeDecoder<R>, last: Rgb) -> Rgb {
         let changes = data.symbol(&mut self.changes);
         let mut next = last;
-        // Returns how much byte `i` grows, if it is expected to grow by `expected`.
-        let mut change = |i: usize, expected: i32| {
-            if changes & 1 << i != 0 {
-                let guess = (last[i] as i32 + expected).clamp(0, 255) as u8;
-                next[i] = guess.wrapping_add(data.symbol(&mut self.bytes[i]) as u8);
-            }
-            next[i] as i32 - last[i] as i32
-        };
-        let (low_red, high_red) = (change(0, 0), change(1, 0));
+        let low_red = self.change(data, changes, 0, &mut next[0], 0);
+        let high_red = self.change(data, changes, 1, &mut next[1], 0);
         if changes & 64 == 0 {
             return [next[0], next[1], next[0], next[1], next[0], next[1]];
         }
-        let low_green = change(2, low_red);
-        change(4, (low_red + low_green) / 2);
-        let high_green = change(3, high_red);
-        change(5, (high_red + high_green) / 2);
+        let low_green = self.change(data, changes, 2, &mut next[2], low_red);
+        self.change(data, changes, 4, &mut next[4], (low_red + low_green) / 2);
+        let high_green = self.change(data, changes, 3, &mut next[3], high_red);
+        self.change(data, changes, 5, &mut next[5], (high_red + high_green) / 2);
         next
+    }
+
+    /// Changes byte `i`, which is expected to grow by `expected`, if it is among `changes`. Returns how much it grew.
+    #[inline(always)]
+    fn change<R: Read>(
+        &mut self,
+        data: &mut RangeDecoder<R>,
+        changes: u32,
+        i: usize,
+        byte: &mut u8,
+        expected: i32,
+    ) -> i32 {
+        if changes & 1 << i == 0 {
+            return 0;
+        }
+        let last = *byte as i32;
+        let guess = (last + expected).clamp(0, 255) as u8;
+        *byte = guess.wrapping_add(data.symbol(&mut self.bytes[i]) as u8);
+        *byte as i32 - last
     }
 }
