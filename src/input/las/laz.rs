@@ -1,7 +1,7 @@
 //! Compressed point records: LASzip chunks, pointwise and layered, each decoded from its own bytes.
 //!
-//! The format is described in Isenburg 2013, "LASzip: lossless compression of lidar data". The decoders are those of the `laz`
-//! crate. They may panic on hostile data, so every call is wrapped in [`catch_panic`].
+//! The decoders for the usual forms are in `laszip/`, and those of the `laz` crate decode the others. The latter may panic on hostile data, so
+//! every call is wrapped in [`catch_panic`].
 
 use std::io;
 use std::ops::Range;
@@ -17,6 +17,10 @@ use crate::input::las::chunk_table::{self, LazChunk};
 use crate::input::las::compression::LazCompression;
 use crate::input::las::copc::{CopcIndex, place};
 use crate::input::las::header::LasHeader;
+use crate::input::las::laszip::decode_error::DecodeError;
+use crate::input::las::laszip::items::{KnownItems, WantedLayers};
+use crate::input::las::laszip::layered::LayeredDecoder;
+use crate::input::las::laszip::pointwise::PointwiseDecoder;
 use crate::input::las::layout::RecordLayout;
 use crate::input::las::uncompressed::push_records;
 use crate::input::las::vlr::Vlr;
@@ -63,6 +67,8 @@ enum ChunkError {
     Panicked(#[from] Panicked),
     #[error("its data ends before its points do")]
     CutShort,
+    #[error("its data cannot have been written by LASzip")]
+    Nonsense,
     #[error("its layers do not fit in it")]
     Layers,
     #[error("it says itself that it has only {0} points")]
@@ -231,9 +237,17 @@ impl ChunkDecoder<'_> {
         let end = self.chunk.first + held;
         let read_ahead = if self.points.compression.layers.is_some() { LAYER_READ_AHEAD } else { READ_AHEAD };
         let mut range = self.file.range_with(self.chunk.bytes.clone(), read_ahead)?;
-        while self.next < end {
-            let stop = self.chunk.restart.map_or(end, |records| self.next.saturating_add(records).min(end));
-            range = self.decode_run(range, stop, filter)?;
+        // Without a table, the next chunk begins where the decoder stops, and only the decoders of the `laz` crate tell where that is.
+        match self.points.compression.known_items() {
+            Some(items) if self.chunk.restart.is_none() && self.next < end => {
+                self.decode_known(items, range, end, filter)?;
+            }
+            _ => {
+                while self.next < end {
+                    let stop = self.chunk.restart.map_or(end, |records| self.next.saturating_add(records).min(end));
+                    range = self.decode_run(range, stop, filter)?;
+                }
+            }
         }
         if held < self.wanted { Err(ChunkError::FewerPoints(held)) } else { Ok(()) }
     }
@@ -272,24 +286,66 @@ impl ChunkDecoder<'_> {
     ) -> std::result::Result<FileRange, ChunkError> {
         let selection = self.selection();
         let mut decoder = catch_panic(|| self.points.compression.decoder(range, selection))??;
+        let (file, length) = (self.file, self.points.layout.length);
+        self.decode_blocks(stop, filter, |block, done| {
+            catch_panic(|| decode_block(decoder.as_mut(), block, length, done))?.map_err(|error| match error.kind() {
+                io::ErrorKind::UnexpectedEof => ChunkError::CutShort,
+                _ => ChunkError::Stopped(Error::io("read", file.path())(error)),
+            })
+        })?;
+        Ok(decoder.box_into_inner())
+    }
+
+    /// Decodes the records up to number `stop` with the decoders of this crate.
+    fn decode_known(
+        &mut self,
+        items: KnownItems,
+        range: FileRange,
+        stop: u64,
+        filter: &mut impl RecordSink,
+    ) -> std::result::Result<(), ChunkError> {
+        let file = self.file;
+        let explain = |error| match error {
+            DecodeError::CutShort => ChunkError::CutShort,
+            DecodeError::Nonsense => ChunkError::Nonsense,
+            DecodeError::Read(error) => ChunkError::Stopped(Error::io("read", file.path())(error)),
+        };
+        match items {
+            KnownItems::Pointwise(items) => {
+                let mut decoder = PointwiseDecoder::new(items, range).map_err(explain)?;
+                self.decode_blocks(stop, filter, |block, done| decoder.decode(block, done).map_err(explain))
+            }
+            KnownItems::Layered(items) => {
+                let wanted = WantedLayers { intensity: self.fields.intensity, rgb: self.fields.rgb };
+                let mut decoder = LayeredDecoder::new(items, wanted, range).map_err(explain)?;
+                self.decode_blocks(stop, filter, |block, done| decoder.decode(block, done).map_err(explain))
+            }
+        }
+    }
+
+    /// Sends the records up to number `stop` through `filter`. `decode` fills a block with records, and counts the bytes that it decoded even
+    /// if it fails.
+    fn decode_blocks(
+        &mut self,
+        stop: u64,
+        filter: &mut impl RecordSink,
+        mut decode: impl FnMut(&mut [u8], &mut usize) -> std::result::Result<(), ChunkError>,
+    ) -> std::result::Result<(), ChunkError> {
         let length = self.points.layout.length;
         let mut block = vec![0; (BLOCK / length).clamp(1, (stop - self.next) as usize) * length];
         while self.next < stop {
             let wanted = ((block.len() / length) as u64).min(stop - self.next) as usize * length;
             let mut done = 0;
-            let outcome = catch_panic(|| decode_block(decoder.as_mut(), &mut block[..wanted], length, &mut done));
+            let outcome = decode(&mut block[..wanted], &mut done);
             if let Some(cell) = &self.cell {
                 let records = block[..done].chunks_exact(length);
                 filter.misplaced(records.filter(|record| !cell.hold(&place(record))).count() as u64);
             }
             push_records(&self.points.layout, &block[..done], self.next, self.fields, filter)?;
             self.next += (done / length) as u64;
-            outcome?.map_err(|error| match error.kind() {
-                io::ErrorKind::UnexpectedEof => ChunkError::CutShort,
-                _ => ChunkError::Stopped(Error::io("read", self.file.path())(error)),
-            })?;
+            outcome?;
         }
-        Ok(decoder.box_into_inner())
+        Ok(())
     }
 
     /// Returns the fields to decompress.

@@ -5,6 +5,7 @@ pub(crate) mod compression;
 pub(crate) mod copc;
 pub(crate) mod crs_records;
 pub(crate) mod header;
+pub(crate) mod laszip;
 pub(crate) mod layout;
 pub(crate) mod laz;
 pub(crate) mod uncompressed;

@@ -2,7 +2,7 @@
 
 use std::io::Read;
 
-use crate::input::las::laszip::DecodeError;
+use crate::input::las::laszip::decode_error::DecodeError;
 use crate::input::las::laszip::models::ByteModel;
 use crate::input::las::laszip::range_decoder::RangeDecoder;
 

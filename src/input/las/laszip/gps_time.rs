@@ -2,7 +2,7 @@
 
 use std::io::Read;
 
-use crate::input::las::laszip::DecodeError;
+use crate::input::las::laszip::decode_error::DecodeError;
 use crate::input::las::laszip::integer::IntegerDecoder;
 use crate::input::las::laszip::models::{SmallModel, TimeModel};
 use crate::input::las::laszip::range_decoder::RangeDecoder;

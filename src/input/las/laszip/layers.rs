@@ -4,7 +4,8 @@ use std::io::{Cursor, Read, Seek, SeekFrom};
 
 use crate::input::file::bytes::uint32;
 use crate::input::las::laszip::range_decoder::RangeDecoder;
-use crate::input::las::laszip::{DecodeError, LayeredItems, WantedLayers};
+use crate::input::las::laszip::decode_error::DecodeError;
+use crate::input::las::laszip::items::{LayeredItems, WantedLayers};
 
 /// A decoder of the data of a layer.
 pub(super) type Layer = RangeDecoder<Cursor<Vec<u8>>>;

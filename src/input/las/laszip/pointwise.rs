@@ -7,11 +7,13 @@ use crate::input::las::laszip::gps_time::{self, GpsTimeDecoder};
 use crate::input::las::laszip::point10::{self, Point10Decoder};
 use crate::input::las::laszip::range_decoder::RangeDecoder;
 use crate::input::las::laszip::rgb::{self, Rgb, RgbModels};
-use crate::input::las::laszip::{DecodeError, PointwiseItems};
+use crate::input::las::laszip::decode_error::DecodeError;
+use crate::input::las::laszip::items::PointwiseItems;
 
 /// A decoder of a chunk.
 pub(crate) struct PointwiseDecoder<R> {
-    data: RangeDecoder<R>,
+    /// Taken while records are decoded, since the compiler keeps a local one in registers; not put back if they are damaged.
+    data: Option<RangeDecoder<R>>,
     /// The number of bytes of a record.
     length: usize,
     /// The first record, until it is handed out.
@@ -39,43 +41,45 @@ impl<R: Read> PointwiseDecoder<R> {
         let extra_bytes = (!rest.is_empty()).then(|| ExtraBytesDecoder::new(rest));
         let (point, length) = (Point10Decoder::new(&first), first.len());
         let data = RangeDecoder::new(source)?;
-        Ok(PointwiseDecoder { data, length, first: Some(first), point, time, rgb, extra_bytes })
+        Ok(PointwiseDecoder { data: Some(data), length, first: Some(first), point, time, rgb, extra_bytes })
     }
 
     /// Decodes the next records into `records`. `done` counts the decoded bytes, even if decoding fails.
     pub(crate) fn decode(&mut self, records: &mut [u8], done: &mut usize) -> Result<(), DecodeError> {
+        let mut data = self.data.take().ok_or(DecodeError::CutShort)?;
         for record in records.chunks_exact_mut(self.length) {
             match self.first.take() {
                 Some(first) => record.copy_from_slice(&first),
-                None => self.next(record)?,
+                None => self.next(&mut data, record)?,
             }
             *done += self.length;
         }
+        self.data = Some(data);
         Ok(())
     }
 
     #[inline(always)]
-    fn next(&mut self, record: &mut [u8]) -> Result<(), DecodeError> {
-        self.data.refill()?;
+    fn next(&mut self, data: &mut RangeDecoder<R>, record: &mut [u8]) -> Result<(), DecodeError> {
+        data.refill()?;
         let Some((point, mut rest)) = record.split_first_chunk_mut() else {
             return Ok(());
         };
-        self.point.next(&mut self.data, point);
+        self.point.next(data, point);
         if let Some(time) = &mut self.time
             && let Some(out) = rest.split_off_mut(..gps_time::SIZE)
         {
-            out.copy_from_slice(&time.next(&mut self.data)?);
+            out.copy_from_slice(&time.next(data)?);
         }
         if let Some((models, last)) = &mut self.rgb
             && let Some(out) = rest.split_off_mut(..rgb::SIZE)
         {
-            *last = models.next(&mut self.data, *last);
+            *last = models.next(data, *last);
             out.copy_from_slice(last);
         }
         if let Some(extra_bytes) = &mut self.extra_bytes {
-            extra_bytes.next(&mut self.data, rest)?;
+            extra_bytes.next(data, rest)?;
         }
-        self.data.check_end()
+        data.check_end()
     }
 }
 

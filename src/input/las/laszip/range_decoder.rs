@@ -2,7 +2,7 @@
 
 use std::io::{self, Read};
 
-use crate::input::las::laszip::DecodeError;
+use crate::input::las::laszip::decode_error::DecodeError;
 use crate::input::las::laszip::models::{BitModel, SymbolModel};
 
 /// The number of bytes in memory at once; a power of two.
