@@ -97,17 +97,17 @@ impl GpsTimeDecoder {
         let (multiple, context, is_unusual) = match symbol {
             0 => (0, 7, true),
             1 => (1, 1, false),
-            ..10 => (symbol, 2, false),
-            ..MOST => (symbol, 3, false),
+            2..10 => (symbol, 2, false),
+            10..MOST => (symbol, 3, false),
             MOST => (MOST, 4, true),
-            ..UNCHANGED if MOST - symbol > LEAST => (MOST - symbol, 5, false),
-            ..UNCHANGED => (LEAST, 6, true),
             UNCHANGED => return 0,
             NEW_SEQUENCE => {
                 self.begin_sequence(data);
                 return 0;
             }
-            _ => return (symbol - NEW_SEQUENCE) as u32,
+            _ if symbol > NEW_SEQUENCE => return (symbol - NEW_SEQUENCE) as u32,
+            _ if MOST - symbol > LEAST => (MOST - symbol, 5, false),
+            _ => (LEAST, 6, true),
         };
         let sequence = &mut self.sequences[self.current & 3];
         let step = self.steps.next(data, sequence.step.wrapping_mul(multiple), context);

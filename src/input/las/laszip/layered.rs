@@ -2,11 +2,11 @@
 
 use std::io::{Read, Seek};
 
+use crate::input::las::laszip::decode_error::DecodeError;
+use crate::input::las::laszip::items::{LayeredItems, WantedLayers};
 use crate::input::las::laszip::layers::{self, Layer, PointLayers};
 use crate::input::las::laszip::point14::{self, Point14Decoder};
 use crate::input::las::laszip::rgb::{self, Rgb, RgbModels};
-use crate::input::las::laszip::decode_error::DecodeError;
-use crate::input::las::laszip::items::{LayeredItems, WantedLayers};
 
 /// A decoder of a chunk.
 pub(crate) struct LayeredDecoder {

@@ -3,9 +3,9 @@
 use std::io::{Cursor, Read, Seek, SeekFrom};
 
 use crate::input::file::bytes::uint32;
-use crate::input::las::laszip::range_decoder::RangeDecoder;
 use crate::input::las::laszip::decode_error::DecodeError;
 use crate::input::las::laszip::items::{LayeredItems, WantedLayers};
+use crate::input::las::laszip::range_decoder::RangeDecoder;
 
 /// A decoder of the data of a layer.
 pub(super) type Layer = RangeDecoder<Cursor<Vec<u8>>>;
@@ -75,23 +75,29 @@ impl PointLayers {
     #[inline(always)]
     pub(super) fn refill(&mut self) -> Result<(), DecodeError> {
         self.place.refill()?;
-        for layer in [&mut self.height, &mut self.class, &mut self.flags, &mut self.intensity] {
-            if let Some(layer) = layer {
-                layer.refill()?;
-            }
-        }
-        Ok(())
+        refill(&mut self.height)?;
+        refill(&mut self.class)?;
+        refill(&mut self.flags)?;
+        refill(&mut self.intensity)
     }
 
     /// Fails if bytes of any layer were used that it does not have.
     #[inline(always)]
     pub(super) fn check_end(&self) -> Result<(), DecodeError> {
         self.place.check_end()?;
-        for layer in [&self.height, &self.class, &self.flags, &self.intensity] {
-            if let Some(layer) = layer {
-                layer.check_end()?;
-            }
-        }
-        Ok(())
+        check_end(&self.height)?;
+        check_end(&self.class)?;
+        check_end(&self.flags)?;
+        check_end(&self.intensity)
     }
+}
+
+#[inline(always)]
+fn refill(layer: &mut Option<Layer>) -> Result<(), DecodeError> {
+    layer.as_mut().map_or(Ok(()), Layer::refill)
+}
+
+#[inline(always)]
+fn check_end(layer: &Option<Layer>) -> Result<(), DecodeError> {
+    layer.as_ref().map_or(Ok(()), Layer::check_end)
 }

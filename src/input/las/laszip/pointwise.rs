@@ -2,13 +2,13 @@
 
 use std::io::Read;
 
+use crate::input::las::laszip::decode_error::DecodeError;
 use crate::input::las::laszip::extra_bytes::ExtraBytesDecoder;
 use crate::input::las::laszip::gps_time::{self, GpsTimeDecoder};
+use crate::input::las::laszip::items::PointwiseItems;
 use crate::input::las::laszip::point10::{self, Point10Decoder};
 use crate::input::las::laszip::range_decoder::RangeDecoder;
 use crate::input::las::laszip::rgb::{self, Rgb, RgbModels};
-use crate::input::las::laszip::decode_error::DecodeError;
-use crate::input::las::laszip::items::PointwiseItems;
 
 /// A decoder of a chunk.
 pub(crate) struct PointwiseDecoder<R> {
@@ -31,11 +31,15 @@ impl<R: Read> PointwiseDecoder<R> {
         source.read_exact(&mut first)?;
         let mut rest = &first[point10::SIZE..];
         let mut time = None;
-        if items.time && let Some((first, after)) = rest.split_first_chunk() {
+        if items.time
+            && let Some((first, after)) = rest.split_first_chunk()
+        {
             (time, rest) = (Some(GpsTimeDecoder::new(*first)), after);
         }
         let mut rgb = None;
-        if items.rgb && let Some((first, after)) = rest.split_first_chunk() {
+        if items.rgb
+            && let Some((first, after)) = rest.split_first_chunk()
+        {
             (rgb, rest) = (Some((RgbModels::new(), *first)), after);
         }
         let extra_bytes = (!rest.is_empty()).then(|| ExtraBytesDecoder::new(rest));
