@@ -8,5 +8,6 @@ pub(crate) mod header;
 pub(crate) mod laszip;
 pub(crate) mod layout;
 pub(crate) mod laz;
+pub(crate) mod laz_chunk;
 pub(crate) mod uncompressed;
 pub(crate) mod vlr;
