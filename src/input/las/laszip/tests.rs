@@ -20,6 +20,9 @@ const FORMATS: [u8; 7] = [0, 1, 2, 3, 6, 7, 8];
 
 const ALL: WantedLayers = WantedLayers { intensity: true, rgb: true };
 
+/// The number of records that are decoded at once.
+const BLOCK: usize = 7;
+
 /// How the records of a chunk end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Outcome {
@@ -145,12 +148,12 @@ impl Chunk {
     fn by_ours(&self, wanted: WantedLayers) -> (Vec<u8>, Outcome) {
         let source = Cursor::new(self.bytes.as_slice());
         let (mut records, mut done) = (vec![0; self.records * self.length], 0);
+        let mut blocks = records.chunks_mut(BLOCK * self.length);
         let result = match KnownItems::of(&self.items).unwrap() {
-            KnownItems::Pointwise(items) => {
-                PointwiseDecoder::new(items, source).and_then(|mut decoder| decoder.decode(&mut records, &mut done))
-            }
+            KnownItems::Pointwise(items) => PointwiseDecoder::new(items, source)
+                .and_then(|mut decoder| blocks.try_for_each(|block| decoder.decode(block, &mut done))),
             KnownItems::Layered(items) => LayeredDecoder::new(items, wanted, source)
-                .and_then(|mut decoder| decoder.decode(&mut records, &mut done)),
+                .and_then(|mut decoder| blocks.try_for_each(|block| decoder.decode(block, &mut done))),
         };
         records.truncate(done);
         let outcome = match result {
