@@ -3,6 +3,9 @@
 use std::io::{Cursor, ErrorKind};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use laz::compressors::IntegerCompressorBuilder;
+use laz::encoders::ArithmeticEncoder;
+use laz::models::ArithmeticModelBuilder;
 use laz::record::{
     LayeredPointRecordCompressor, LayeredPointRecordDecompressor, RecordCompressor, RecordDecompressor,
     SequentialPointRecordCompressor, SequentialPointRecordDecompressor,
@@ -256,6 +259,26 @@ fn a_number_outside_of_the_interval_is_nonsense() {
         chunk.bytes[data..].fill(255);
         assert_eq!(chunk.by_ours(ALL), (Vec::new(), Outcome::Nonsense));
     }
+}
+
+/// Such a time makes the crate call itself for each leap, until the stack is full if there are many.
+#[test]
+fn a_time_that_leaps_from_sequence_to_sequence_is_nonsense() {
+    let mut chunk = Chunk::encode(1, 0, &[0; 28]);
+    chunk.records = 2;
+    let mut encoder = ArithmeticEncoder::new(Cursor::new(Vec::new()));
+    let model = |symbols| ArithmeticModelBuilder::new(symbols).with_compression(true).build();
+    encoder.encode_symbol(&mut model(64), 0).unwrap();
+    for contexts in [2, 22, 20] {
+        let mut integers = IntegerCompressorBuilder::new().bits(32).contexts(contexts).build_initialized();
+        integers.compress(&mut encoder, 0, 0, 0).unwrap();
+    }
+    let mut time = model(6);
+    (0..100).for_each(|_| encoder.encode_symbol(&mut time, 3).unwrap());
+    encoder.done().unwrap();
+    chunk.bytes.truncate(28);
+    chunk.bytes.extend(encoder.into_inner().into_inner());
+    assert_eq!(chunk.by_ours(ALL), (vec![0; 28], Outcome::Nonsense));
 }
 
 #[test]
