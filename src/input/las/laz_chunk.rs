@@ -79,17 +79,13 @@ impl ChunkDecoder<'_> {
         let end = self.chunk.first + held;
         let read_ahead = if self.compression.layers.is_some() { LAYER_READ_AHEAD } else { READ_AHEAD };
         let mut range = self.file.range_with(self.chunk.bytes.clone(), read_ahead)?;
-        // Without a table, the next chunk begins where the decoder stops, and only the decoders of the `laz` crate tell where that is.
-        match self.compression.known_items() {
-            Some(items) if self.chunk.restart.is_none() && self.next < end => {
-                self.decode_known(items, range, end, filter)?;
-            }
-            _ => {
-                while self.next < end {
-                    let stop = self.chunk.restart.map_or(end, |records| self.next.saturating_add(records).min(end));
-                    range = self.decode_run(range, stop, filter)?;
-                }
-            }
+        let known_items = self.compression.known_items();
+        while self.next < end {
+            let stop = self.chunk.restart.map_or(end, |records| self.next.saturating_add(records).min(end));
+            range = match known_items {
+                Some(items) => self.decode_known(items, range, stop, filter)?,
+                None => self.decode_run(range, stop, filter)?,
+            };
         }
         if held < self.wanted { Err(ChunkError::FewerPoints(held)) } else { Ok(()) }
     }
@@ -119,7 +115,7 @@ impl ChunkDecoder<'_> {
         Ok(head.ok_or(ChunkError::Layers)?.records)
     }
 
-    /// Decodes the records up to number `stop` with fresh models, and returns the range, now behind these records.
+    /// Decodes the records up to number `stop` with fresh models of the `laz` crate, and returns the range, now behind these records.
     fn decode_run(
         &mut self,
         range: FileRange,
@@ -138,14 +134,14 @@ impl ChunkDecoder<'_> {
         Ok(decoder.box_into_inner())
     }
 
-    /// Decodes the records up to number `stop` with the decoders of this crate.
+    /// Does what [`ChunkDecoder::decode_run`] does, with the decoders of this crate.
     fn decode_known(
         &mut self,
         items: KnownItems,
-        range: FileRange,
+        mut range: FileRange,
         stop: u64,
         filter: &mut impl RecordSink,
-    ) -> std::result::Result<(), ChunkError> {
+    ) -> std::result::Result<FileRange, ChunkError> {
         let file = self.file;
         let explain = |error| match error {
             DecodeError::CutShort => ChunkError::CutShort,
@@ -155,12 +151,14 @@ impl ChunkDecoder<'_> {
         match items {
             KnownItems::Pointwise(items) => {
                 let mut decoder = PointwiseDecoder::new(items, range).map_err(explain)?;
-                self.decode_blocks(stop, filter, |block, done| decoder.decode(block, done).map_err(explain))
+                self.decode_blocks(stop, filter, |block, done| decoder.decode(block, done).map_err(explain))?;
+                decoder.into_source().map_err(explain)
             }
             KnownItems::Layered(items) => {
                 let wanted = WantedLayers { intensity: self.fields.intensity, rgb: self.fields.rgb };
-                let mut decoder = LayeredDecoder::new(items, wanted, range).map_err(explain)?;
-                self.decode_blocks(stop, filter, |block, done| decoder.decode(block, done).map_err(explain))
+                let mut decoder = LayeredDecoder::new(items, wanted, &mut range).map_err(explain)?;
+                self.decode_blocks(stop, filter, |block, done| decoder.decode(block, done).map_err(explain))?;
+                Ok(range)
             }
         }
     }

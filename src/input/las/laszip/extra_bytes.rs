@@ -3,7 +3,7 @@
 use std::io::Read;
 
 use crate::input::las::laszip::decode_error::DecodeError;
-use crate::input::las::laszip::models::ByteModel;
+use crate::input::las::laszip::models::ExtraByteModel;
 use crate::input::las::laszip::range_decoder::RangeDecoder;
 
 /// The number of bytes for which the window of the decoder suffices.
@@ -12,13 +12,13 @@ const RUN: usize = 64;
 /// The latest bytes, and the models of how they change.
 pub(super) struct ExtraBytesDecoder {
     last: Vec<u8>,
-    models: Vec<ByteModel>,
+    models: Vec<ExtraByteModel>,
 }
 
 impl ExtraBytesDecoder {
     /// Starts behind the bytes `first`.
     pub(super) fn new(first: &[u8]) -> ExtraBytesDecoder {
-        ExtraBytesDecoder { last: first.to_vec(), models: vec![ByteModel::new(256); first.len()] }
+        ExtraBytesDecoder { last: first.to_vec(), models: vec![ExtraByteModel::new(256); first.len()] }
     }
 
     /// Decodes the next bytes into `out`, which has room for as many.

@@ -2,9 +2,6 @@
 
 use laz::{LazItem, LazItemType};
 
-/// The most extra bytes of a pointwise record. Each has a model of 4 kB; so the memory of a decoder is bounded.
-const MOST_EXTRA_BYTES: u16 = 1 << 8;
-
 /// The records that these decoders know.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum KnownItems {
@@ -60,7 +57,7 @@ impl PointwiseItems {
         let rgb = items.next_if_eq(&LazItemType::RGB12).is_some();
         let extra_bytes = match items.next() {
             None => 0,
-            Some(LazItemType::Byte(count)) if count <= MOST_EXTRA_BYTES => count as usize,
+            Some(LazItemType::Byte(count)) => count as usize,
             Some(_) => return None,
         };
         items.next().is_none().then_some(PointwiseItems { time, rgb, extra_bytes })

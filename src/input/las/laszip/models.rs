@@ -20,6 +20,8 @@ pub(super) struct SymbolModel<const SYMBOLS: usize, const TABLE: usize> {
 
 /// A model of at most 256 symbols.
 pub(super) type ByteModel = SymbolModel<256, 1024>;
+/// A model of 256 symbols in 2 kB: a record may have thousands of extra bytes.
+pub(super) type ExtraByteModel = SymbolModel<256, 256>;
 /// A model of the number of bits of an integer, 33 symbols at most.
 pub(super) type LengthModel = SymbolModel<64, 512>;
 /// A model of at most 16 symbols.

@@ -1,6 +1,6 @@
 //! Chunks in which the fields of a record follow each other, records of point formats 0 to 3.
 
-use std::io::Read;
+use std::io::{Read, Seek};
 
 use crate::input::las::laszip::decode_error::DecodeError;
 use crate::input::las::laszip::extra_bytes::ExtraBytesDecoder;
@@ -84,6 +84,14 @@ impl<R: Read> PointwiseDecoder<R> {
             extra_bytes.next(data, rest)?;
         }
         data.check_end()
+    }
+}
+
+impl<R: Read + Seek> PointwiseDecoder<R> {
+    /// Returns the source behind the records that were decoded.
+    pub(crate) fn into_source(self) -> Result<R, DecodeError> {
+        let data = self.data.ok_or(DecodeError::CutShort)?;
+        Ok(data.into_source()?)
     }
 }
 

@@ -1,6 +1,6 @@
 //! The arithmetic decoder: a number in an interval, which each symbol narrows, and which bytes of the data widen again.
 
-use std::io::{self, Read};
+use std::io::{self, Read, Seek, SeekFrom};
 
 use crate::input::las::laszip::decode_error::DecodeError;
 use crate::input::las::laszip::models::{BitModel, SymbolModel};
@@ -154,5 +154,14 @@ impl<R: Read> RangeDecoder<R> {
         let shorter = |than: u32| (self.length < than) as u32;
         self.widen(shorter(1 << 24) + shorter(1 << 16) + shorter(1 << 8));
         number
+    }
+}
+
+impl<R: Read + Seek> RangeDecoder<R> {
+    /// Returns the source behind the last byte that was used.
+    pub(super) fn into_source(mut self) -> io::Result<R> {
+        let unused = self.filled.saturating_sub(self.at) as i64;
+        self.source.seek(SeekFrom::Current(-unused))?;
+        Ok(self.source)
     }
 }
