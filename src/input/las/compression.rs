@@ -11,6 +11,7 @@ use crate::input::file::bytes::{uint16, uint32};
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::file::range::FileRange;
 use crate::input::las::header::LasHeader;
+use crate::input::las::laszip::items::KnownItems;
 
 /// The number of bytes of a LASzip record before its items, which follow their 16-bit count.
 const RECORD_HEAD: usize = 32;
@@ -71,7 +72,12 @@ impl LazCompression {
         })
     }
 
-    /// Returns a decoder of the records in `range`.
+    /// Returns what the decoders of this crate have to know of the records; `None` if they do not know them.
+    pub(crate) fn known_items(&self) -> Option<KnownItems> {
+        KnownItems::of(&self.items)
+    }
+
+    /// Returns a decoder of the `laz` crate for the records in `range`.
     pub(crate) fn decoder(
         &self,
         range: FileRange,

@@ -1,27 +1,19 @@
 //! Compressed point records: LASzip chunks, pointwise and layered, each decoded from its own bytes.
-//!
-//! The format is described in Isenburg 2013, "LASzip: lossless compression of lidar data". The decoders are those of the `laz`
-//! crate. They may panic on hostile data, so every call is wrapped in [`catch_panic`].
 
-use std::io;
 use std::ops::Range;
 
-use laz::record::RecordDecompressor;
-use laz::{DecompressionSelection, LazVlr};
+use laz::LazVlr;
 use serde::{Deserialize, Serialize};
 
-use crate::catch_panic::{Panicked, catch_panic};
 use crate::input::file::random_access::RandomAccessFile;
-use crate::input::file::range::{FileRange, READ_AHEAD};
 use crate::input::las::chunk_table::{self, LazChunk};
 use crate::input::las::compression::LazCompression;
-use crate::input::las::copc::{CopcIndex, place};
+use crate::input::las::copc::CopcIndex;
 use crate::input::las::header::LasHeader;
 use crate::input::las::layout::RecordLayout;
-use crate::input::las::uncompressed::push_records;
+use crate::input::las::laz_chunk::{ChunkDecoder, ChunkError};
 use crate::input::las::vlr::Vlr;
 use crate::input::points::chunk_request::ChunkRequest;
-use crate::input::points::optional_fields::OptionalFields;
 use crate::input::points::raw_bounds::RawBounds;
 use crate::input::points::record_sink::RecordSink;
 use crate::{Error, Result, Warnings};
@@ -29,15 +21,6 @@ use crate::{Error, Result, Warnings};
 /// The least number of records of a chunk of the source, as long as there are enough. Smaller LAZ chunks (COPC has them) go
 /// together.
 const LEAST_RECORDS: u64 = 50_000;
-
-/// The number of decoded bytes held at once, unless a single record is longer.
-const BLOCK: usize = 1 << 17;
-
-/// The number of bytes to read ahead in a layered chunk. Layers are read as a whole, and those that are not wanted are skipped.
-const LAYER_READ_AHEAD: usize = 1 << 9;
-
-/// The most bytes of a layered chunk that is decoded: its layers must be in memory together.
-const LARGEST_CHUNK: u64 = 1 << 26;
 
 /// The point data of a LAZ file.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -52,26 +35,6 @@ pub(crate) struct CompressedPoints {
     index: Option<CopcIndex>,
     /// The number of records that the header promises and no chunk holds.
     pub(crate) missing: u64,
-}
-
-/// Why the rest of a chunk cannot be decoded.
-#[derive(Debug, thiserror::Error)]
-enum ChunkError {
-    #[error("{0}")]
-    Decoder(#[from] laz::LasZipError),
-    #[error("{0}")]
-    Panicked(#[from] Panicked),
-    #[error("its data ends before its points do")]
-    CutShort,
-    #[error("its layers do not fit in it")]
-    Layers,
-    #[error("it says itself that it has only {0} points")]
-    FewerPoints(u64),
-    #[error("it has {0} bytes, which must be in memory together; write the file again with smaller chunks")]
-    TooLarge(u64),
-    /// This is not about the chunk: the file cannot be read, or the job stops.
-    #[error(transparent)]
-    Stopped(#[from] Error),
 }
 
 impl CompressedPoints {
@@ -172,7 +135,8 @@ impl CompressedPoints {
             left -= wanted;
             let cell = self.cell(laz_chunk, request.bounds).filter(|_| may_reach);
             let (fields, next) = (request.fields, laz_chunk.first);
-            let mut decoder = ChunkDecoder { points: self, file, chunk: laz_chunk, fields, cell, wanted, next };
+            let (compression, layout) = (&self.compression, &self.layout);
+            let mut decoder = ChunkDecoder { compression, layout, file, chunk: laz_chunk, fields, cell, wanted, next };
             match decoder.decode(filter) {
                 Ok(()) => {}
                 Err(ChunkError::Stopped(error)) => return Err(error),
@@ -207,109 +171,4 @@ fn group(laz_chunks: Vec<LazChunk>) -> Vec<Vec<LazChunk>> {
         chunks.push(chunk);
     }
     chunks
-}
-
-/// Decodes one LAZ chunk.
-struct ChunkDecoder<'a> {
-    points: &'a CompressedPoints,
-    file: &'a RandomAccessFile,
-    chunk: &'a LazChunk,
-    /// What is wanted besides place and class.
-    fields: OptionalFields,
-    /// Where its points lie, if an index says so and that matters.
-    cell: Option<RawBounds>,
-    /// The number of records to decode, from the first.
-    wanted: u64,
-    /// The number of the next record in the file.
-    next: u64,
-}
-
-impl ChunkDecoder<'_> {
-    /// Decodes the wanted records as far as possible; `self.next` then says how far.
-    fn decode(&mut self, filter: &mut impl RecordSink) -> std::result::Result<(), ChunkError> {
-        let held = self.records_held()?.min(self.wanted);
-        let end = self.chunk.first + held;
-        let read_ahead = if self.points.compression.layers.is_some() { LAYER_READ_AHEAD } else { READ_AHEAD };
-        let mut range = self.file.range_with(self.chunk.bytes.clone(), read_ahead)?;
-        while self.next < end {
-            let stop = self.chunk.restart.map_or(end, |records| self.next.saturating_add(records).min(end));
-            range = self.decode_run(range, stop, filter)?;
-        }
-        if held < self.wanted { Err(ChunkError::FewerPoints(held)) } else { Ok(()) }
-    }
-
-    /// Counts the wanted records from `self.next` on as malformed.
-    fn count_lost(&self, damage: &ChunkError, filter: &mut impl RecordSink) {
-        let LazChunk { number, first, .. } = self.chunk;
-        let (at, left) = (self.next, first + self.wanted - self.next);
-        filter.malformed(left, || {
-            format!(
-                "chunk {number} is damaged at point {at}: {damage}; {left} points are lost, so copy the file again or allow the \
-                 loss"
-            )
-        });
-    }
-
-    /// Returns the number of records that a layered chunk says it has; for other chunks, the number in the chunk table.
-    fn records_held(&self) -> std::result::Result<u64, ChunkError> {
-        let Some(layers) = &self.points.compression.layers else {
-            return Ok(self.chunk.count);
-        };
-        let size = self.chunk.bytes.end - self.chunk.bytes.start;
-        if size > LARGEST_CHUNK {
-            return Err(ChunkError::TooLarge(size));
-        }
-        let head = layers.read_head(self.file, self.chunk.bytes.clone())?;
-        Ok(head.ok_or(ChunkError::Layers)?.records)
-    }
-
-    /// Decodes the records up to number `stop` with fresh models, and returns the range, now behind these records.
-    fn decode_run(
-        &mut self,
-        range: FileRange,
-        stop: u64,
-        filter: &mut impl RecordSink,
-    ) -> std::result::Result<FileRange, ChunkError> {
-        let selection = self.selection();
-        let mut decoder = catch_panic(|| self.points.compression.decoder(range, selection))??;
-        let length = self.points.layout.length;
-        let mut block = vec![0; (BLOCK / length).clamp(1, (stop - self.next) as usize) * length];
-        while self.next < stop {
-            let wanted = ((block.len() / length) as u64).min(stop - self.next) as usize * length;
-            let mut done = 0;
-            let outcome = catch_panic(|| decode_block(decoder.as_mut(), &mut block[..wanted], length, &mut done));
-            if let Some(cell) = &self.cell {
-                let records = block[..done].chunks_exact(length);
-                filter.misplaced(records.filter(|record| !cell.hold(&place(record))).count() as u64);
-            }
-            push_records(&self.points.layout, &block[..done], self.next, self.fields, filter)?;
-            self.next += (done / length) as u64;
-            outcome?.map_err(|error| match error.kind() {
-                io::ErrorKind::UnexpectedEof => ChunkError::CutShort,
-                _ => ChunkError::Stopped(Error::io("read", self.file.path())(error)),
-            })?;
-        }
-        Ok(decoder.box_into_inner())
-    }
-
-    /// Returns the fields to decompress.
-    fn selection(&self) -> DecompressionSelection {
-        let needed = DecompressionSelection::base().decompress_z().decompress_classification().decompress_flags();
-        let needed = if self.fields.intensity { needed.decompress_intensity() } else { needed };
-        if self.fields.rgb && self.points.layout.has_rgb() { needed.decompress_rgb() } else { needed }
-    }
-}
-
-/// Decodes record after record into `block`. `done` counts the decoded bytes, even if decoding fails.
-fn decode_block(
-    decoder: &mut dyn RecordDecompressor<FileRange>,
-    block: &mut [u8],
-    length: usize,
-    done: &mut usize,
-) -> io::Result<()> {
-    for record in block.chunks_exact_mut(length) {
-        decoder.decompress_next(record)?;
-        *done += length;
-    }
-    Ok(())
 }
