@@ -10,19 +10,20 @@ use crate::mesh::index::{HalfEdgeIndex, SiteIndex};
 /// Returns the position of a triangle that `p` lies in, or on the border of, looking from triangle `start` on. Returns `None` if `p` lies
 /// outside the mesh, or if the walk takes more than `steps`, of which it uses up some. A walk in a Delaunay triangulation always ends.
 pub fn locate(mesh: &HalfEdgeMesh, sites: &[Site], start: usize, p: Site, steps: &mut u64) -> Option<usize> {
-    let is_beyond = |h: &HalfEdgeIndex| {
-        let [from, to] = [mesh.origin(*h), mesh.destination(*h)].map(|v| sites[v.get()]);
-        orient2d(from, to, p) < 0
-    };
-    let mut beyond = HalfEdgeIndex::of_triangle(start).into_iter().find(is_beyond);
     let mut triangle = start;
-    while let Some(h) = beyond {
-        let entry = Some(mesh.twin(h)).filter(|&twin| twin != HalfEdgeIndex::HULL)?;
+    // The corner at which the side begins that the walk came through; it need not be looked at again.
+    let mut entry = 3;
+    loop {
+        let corners = mesh.triangles[triangle].map(|v| sites[v.get()]);
+        let is_beyond = |k: usize| k != entry && orient2d(corners[k], corners[(k + 1) % 3], p) < 0;
+        let Some(side) = (0..3).find(|&k| is_beyond(k)) else { return Some(triangle) };
+        let twin = mesh.twins[3 * triangle + side];
         *steps = steps.checked_sub(1)?;
-        triangle = entry.triangle();
-        beyond = [entry.next(), entry.previous()].into_iter().find(is_beyond);
+        if twin == HalfEdgeIndex::HULL {
+            return None;
+        }
+        (triangle, entry) = (twin.triangle(), twin.corner());
     }
-    Some(triangle)
 }
 
 /// Inserts site `v` into the canonical Delaunay triangulation `mesh`, which stays one. It lies in this `triangle` or on its border, but not on

@@ -1,10 +1,14 @@
 //! For each triangle of a simplified terrain the vertex of the surface with the greatest vertical distance from it.
 
+use crate::output::lod::cell_grid::CellGrid;
 use crate::output::lod::filling::Filling;
 use crate::output::lod::vertex_cells::vertical_distance;
 
 /// Steps of the walks from vertex to vertex, on average, before the search gives up. Terrains need far fewer.
 const STEPS_PER_VERTEX: u64 = 64;
+
+/// Triangles in a cell, from one of which a walk starts.
+const TRIANGLES_PER_CELL: usize = 4;
 
 /// A vertex of the surface that is over or under a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,11 +33,10 @@ impl Furthest {
     pub(crate) fn find(surface: &[[i32; 3]], moved: &[[i32; 3]], filling: &Filling, every: usize) -> Furthest {
         let mut furthest = vec![(0.0, 0); filling.triangles()];
         let mut steps = steps_for(surface.len());
-        let mut near = 0;
+        let starts = StartCells::new(moved, filling);
         for v in (0..surface.len()).step_by(every) {
-            // Vertices that follow each other are near each other, most of them.
-            let Some(triangle) = filling.locate(v as u32, near, &mut steps) else { break };
-            near = triangle;
+            let start = starts.near(&surface[v]);
+            let Some(triangle) = filling.locate(v as u32, start, &mut steps) else { break };
             let Some(corners) = filling.corners(triangle) else { continue };
             let distance = vertical_distance(&corners.map(|v| moved[v as usize]), surface[v]);
             if distance > furthest[triangle].0 {
@@ -58,6 +61,39 @@ impl Furthest {
             wanted.sort_unstable_by_key(|far| far.triangle);
         }
         wanted
+    }
+}
+
+/// A triangle for every place, from which it is not far to the one that holds the place.
+struct StartCells {
+    cells: CellGrid,
+    /// A triangle with a corner in each cell, or near it.
+    triangles: Vec<u32>,
+}
+
+impl StartCells {
+    /// Notes the triangles of `filling` that lie within the boundary, between the positions `moved`.
+    fn new(moved: &[[i32; 3]], filling: &Filling) -> StartCells {
+        let cells = CellGrid::new(moved, filling.triangles() / TRIANGLES_PER_CELL + 1);
+        let mut triangles = vec![u32::MAX; cells.count()];
+        for triangle in 0..filling.triangles() {
+            if let Some([corner, ..]) = filling.corners(triangle) {
+                triangles[cells.of(&moved[corner as usize]) as usize] = triangle as u32;
+            }
+        }
+        // Where a cell has none, that of the cell before it must do.
+        let mut last = triangles.iter().copied().find(|&triangle| triangle != u32::MAX).unwrap_or(0);
+        for triangle in &mut triangles {
+            if *triangle == u32::MAX {
+                *triangle = last;
+            }
+            last = *triangle;
+        }
+        StartCells { cells, triangles }
+    }
+
+    fn near(&self, place: &[i32; 3]) -> usize {
+        self.triangles[self.cells.of(place) as usize] as usize
     }
 }
 

@@ -47,6 +47,11 @@ impl CellBox {
     }
 
     #[inline(always)]
+    fn is_one(&self) -> bool {
+        self.columns[0] == self.columns[1] && self.rows[0] == self.rows[1]
+    }
+
+    #[inline(always)]
     fn cells(&self) -> usize {
         let count = |ends: [u32; 2]| (ends[1] - ends[0]) as usize + 1;
         count(self.columns) * count(self.rows)
@@ -94,12 +99,15 @@ impl HeightBounds {
     #[inline(always)]
     fn add(&mut self, triangle: &[u32; 3], range: [i32; 2]) {
         let around = self.around(triangle);
-        if around.cells() > MOST_CELLS {
+        if around.is_one() {
+            let known = &mut self.ranges[self.cells.at(around.rows[0] as usize, around.columns[0] as usize)];
+            *known = union(*known, range);
+        } else if around.cells() > MOST_CELLS {
             self.everywhere = union(self.everywhere, range);
-            return;
-        }
-        for run in around.runs(&self.cells) {
-            self.ranges[run].iter_mut().for_each(|known| *known = union(*known, range));
+        } else {
+            for run in around.runs(&self.cells) {
+                self.ranges[run].iter_mut().for_each(|known| *known = union(*known, range));
+            }
         }
     }
 
@@ -134,6 +142,9 @@ impl HeightBounds {
         }
         let touches = |triangle: &&[u32; 3]| {
             let around = self.around(triangle);
+            if around.is_one() {
+                return is_near[self.cells.at(around.rows[0] as usize, around.columns[0] as usize)];
+            }
             around.cells() > MOST_CELLS || around.runs(&self.cells).any(|run| is_near[run].contains(&true))
         };
         let near = |place: &[u32; 2]| is_near[self.cells.at(place[1] as usize, place[0] as usize)];
