@@ -5,8 +5,6 @@
 //! and its third corner is a new vertex or the next one of the ring before. The index codec writes both cases without further bytes.
 //! All of it is done in whole numbers, so the bytes do not depend on the machine, nor on the order in which triangles were found.
 
-use crate::mesh::adjacency::VertexAdjacency;
-
 /// Up to this many triangles around a vertex are searched one by one; more are sorted.
 const SEARCHED: usize = 48;
 
@@ -16,20 +14,25 @@ const NEW: u32 = u32::MAX;
 /// Returns the triangles in their new order, with the new numbers of their corners, and the old number of every new one. Vertices
 /// without a triangle come last.
 pub(crate) fn order_vertices(vertices: usize, triangles: &[[u32; 3]]) -> (Vec<[u32; 3]>, Vec<u32>) {
-    let adjacency = VertexAdjacency::new(vertices, triangles);
+    let around = TrianglesAround::new(vertices, triangles);
     let mut order = VertexOrder {
         numbers: vec![NEW; vertices],
         old_numbers: Vec::with_capacity(vertices),
         triangles: Vec::with_capacity(triangles.len()),
     };
+    let mut is_done = vec![false; triangles.len()];
     let mut left = Vec::new();
     let mut next = 0;
-    for seed in (0..vertices as u32).filter(|&v| !adjacency.around(v).is_empty()) {
+    for seed in (0..vertices as u32).filter(|&v| !around.of(v).is_empty()) {
         order.number(seed);
         while let Some(&v) = order.old_numbers.get(next) {
-            // Triangles with a corner of a lower number are in the list.
-            let is_left = |edge: &&[u32; 2]| edge.iter().all(|&w| order.numbers[w as usize] > next as u32);
-            left.extend(adjacency.around(v).iter().filter(is_left));
+            for &t in around.of(v) {
+                let is_done = &mut is_done[t as usize];
+                if !*is_done {
+                    *is_done = true;
+                    left.push(opposite(triangles[t as usize], v));
+                }
+            }
             order.append_fans(v, &mut left);
             next += 1;
         }
@@ -37,6 +40,55 @@ pub(crate) fn order_vertices(vertices: usize, triangles: &[[u32; 3]]) -> (Vec<[u
     let unused = (0..vertices as u32).filter(|&v| order.numbers[v as usize] == NEW);
     order.old_numbers.extend(unused);
     (order.triangles, order.old_numbers)
+}
+
+/// Returns the edge of a triangle opposite its corner `v`.
+#[inline(always)]
+fn opposite([a, b, c]: [u32; 3], v: u32) -> [u32; 2] {
+    if a == v {
+        [b, c]
+    } else if b == v {
+        [c, a]
+    } else {
+        [a, b]
+    }
+}
+
+/// The triangles around each vertex. Unlike [`crate::mesh::adjacency::VertexAdjacency`] it has only their numbers: two thirds of the
+/// triangles around a vertex are in the list when its turn comes, and nobody asks for their corners.
+struct TrianglesAround {
+    /// The triangles at vertex v are `triangles[starts[v]..starts[v + 1]]`. There is one entry more than that needs.
+    starts: Vec<u32>,
+    triangles: Vec<u32>,
+}
+
+impl TrianglesAround {
+    fn new(vertices: usize, triangles: &[[u32; 3]]) -> TrianglesAround {
+        // One place further than needed: filling moves every start to the next one's place.
+        let mut starts = vec![0u32; vertices + 2];
+        for &v in triangles.as_flattened() {
+            starts[v as usize + 2] += 1;
+        }
+        let mut sum = 0;
+        for start in &mut starts {
+            sum += *start;
+            *start = sum;
+        }
+        let mut numbers = vec![0; 3 * triangles.len()];
+        for (t, corners) in (0..).zip(triangles) {
+            for &v in corners {
+                let place = &mut starts[v as usize + 1];
+                numbers[*place as usize] = t;
+                *place += 1;
+            }
+        }
+        TrianglesAround { starts, triangles: numbers }
+    }
+
+    #[inline(always)]
+    fn of(&self, v: u32) -> &[u32] {
+        &self.triangles[self.starts[v as usize] as usize..self.starts[v as usize + 1] as usize]
+    }
 }
 
 /// The new order while it grows.
@@ -54,14 +106,14 @@ impl VertexOrder {
         if left.len() > SEARCHED {
             return self.append_many_fans(v, left);
         }
-        while !left.is_empty() {
-            let is_start = |edge: &[u32; 2]| left.iter().all(|other| other[1] != edge[0]);
-            let starts = (0..left.len()).filter(|&i| is_start(&left[i]));
-            let mut at = starts.min_by_key(|&i| left[i]).or_else(|| (0..left.len()).min_by_key(|&i| left[i]));
-            while let Some(i) = at {
-                let [from, to] = left.swap_remove(i);
+        while let Some(mut at) = first(left) {
+            loop {
+                let [from, to] = left.swap_remove(at);
                 self.append([v, from, to]);
-                at = left.iter().position(|edge| edge[0] == to);
+                match left.iter().position(|edge| edge[0] == to) {
+                    Some(next) => at = next,
+                    None => break,
+                }
             }
         }
     }
@@ -99,6 +151,17 @@ impl VertexOrder {
         }
         *number
     }
+}
+
+/// Returns where the edge is at which the next fan begins: the least of those that no other one leads to, or the least of all.
+#[inline(always)]
+fn first(left: &[[u32; 2]]) -> Option<usize> {
+    if left.len() < 2 {
+        return if left.is_empty() { None } else { Some(0) };
+    }
+    let least = |edges: &mut dyn Iterator<Item = usize>| edges.min_by_key(|&i| left[i]);
+    let is_start = |&i: &usize| left.iter().all(|other| other[1] != left[i][0]);
+    least(&mut (0..left.len()).filter(is_start)).or_else(|| least(&mut (0..left.len())))
 }
 
 #[cfg(test)]
