@@ -19,22 +19,20 @@ pub(crate) fn order_vertices(vertices: usize, triangles: &[[u32; 3]]) -> (Vec<[u
         numbers: vec![NEW; vertices],
         old_numbers: Vec::with_capacity(vertices),
         triangles: Vec::with_capacity(triangles.len()),
+        turn: 0,
     };
     let mut is_done = vec![false; triangles.len()];
     let mut left = Vec::new();
-    let mut next = 0;
     for seed in (0..vertices as u32).filter(|&v| !around.of(v).is_empty()) {
         order.number(seed);
-        while let Some(&v) = order.old_numbers.get(next) {
+        while let Some(&v) = order.old_numbers.get(order.turn as usize) {
             for &t in around.of(v) {
-                let is_done = &mut is_done[t as usize];
-                if !*is_done {
-                    *is_done = true;
+                if !std::mem::replace(&mut is_done[t as usize], true) {
                     left.push(opposite(triangles[t as usize], v));
                 }
             }
-            order.append_fans(v, &mut left);
-            next += 1;
+            order.append_fans(&mut left);
+            order.turn += 1;
         }
     }
     let unused = (0..vertices as u32).filter(|&v| order.numbers[v as usize] == NEW);
@@ -97,29 +95,38 @@ struct VertexOrder {
     numbers: Vec<u32>,
     old_numbers: Vec<u32>,
     triangles: Vec<[u32; 3]>,
+    /// The new number of the vertex whose triangles are appended.
+    turn: u32,
 }
 
 impl VertexOrder {
-    /// Appends the triangles between vertex `v` and the edges in `left`, one fan after the other, each from a triangle that follows on
-    /// no other one; empties `left`. Fans begin in the order of the vertices, so the order of the mesh does not matter.
-    fn append_fans(&mut self, v: u32, left: &mut Vec<[u32; 2]>) {
+    /// Appends the triangles between the vertex whose turn it is and the edges in `left`, one fan after the other, each from a triangle
+    /// that follows on no other one; empties `left`. Fans begin in the order of the vertices, so the order of the mesh does not matter.
+    fn append_fans(&mut self, left: &mut Vec<[u32; 2]>) {
         if left.len() > SEARCHED {
-            return self.append_many_fans(v, left);
+            self.append_many_fans(left);
+        } else if is_one_fan(left) {
+            self.append_fan(left);
+        } else {
+            self.append_some_fans(left);
         }
-        while let Some(mut at) = first(left) {
-            loop {
-                let [from, to] = left.swap_remove(at);
-                self.append([v, from, to]);
-                match left.iter().position(|edge| edge[0] == to) {
-                    Some(next) => at = next,
-                    None => break,
-                }
-            }
+        left.clear();
+    }
+
+    fn append_some_fans(&mut self, mut left: &mut [[u32; 2]]) {
+        while !left.is_empty() {
+            let is_start = |&i: &usize| left.iter().all(|other| other[1] != left[i][0]);
+            let starts = (0..left.len()).filter(is_start).min_by_key(|&i| left[i]);
+            let start = starts.or_else(|| (0..left.len()).min_by_key(|&i| left[i])).unwrap_or(0);
+            let count = follow(left, start);
+            let (fan, others) = left.split_at_mut(count);
+            self.append_fan(fan);
+            left = others;
         }
     }
 
     /// Does the same quickly around a vertex with thousands of triangles.
-    fn append_many_fans(&mut self, v: u32, left: &mut Vec<[u32; 2]>) {
+    fn append_many_fans(&mut self, left: &mut [[u32; 2]]) {
         left.sort_unstable();
         let mut ends: Vec<u32> = left.iter().map(|edge| edge[1]).collect();
         ends.sort_unstable();
@@ -130,16 +137,21 @@ impl VertexOrder {
             let mut at = Some(start);
             while let Some(i) = at.filter(|&i| !done[i]) {
                 done[i] = true;
-                self.append([v, left[i][0], left[i][1]]);
+                self.append_fan(&[left[i]]);
                 at = left.binary_search_by_key(&left[i][1], |edge| edge[0]).ok();
             }
         }
-        left.clear();
     }
 
-    fn append(&mut self, triangle: [u32; 3]) {
-        let triangle = triangle.map(|v| self.number(v));
-        self.triangles.push(triangle);
+    /// Appends the triangles between the vertex whose turn it is and edges each of which begins where the one before ends.
+    fn append_fan(&mut self, fan: &[[u32; 2]]) {
+        let Some([first, _]) = fan.first() else { return };
+        let mut from = self.number(*first);
+        for &[_, to] in fan {
+            let to = self.number(to);
+            self.triangles.push([self.turn, from, to]);
+            from = to;
+        }
     }
 
     /// Returns the new number of vertex `v`, and gives it the next one if it has none.
@@ -153,15 +165,34 @@ impl VertexOrder {
     }
 }
 
-/// Returns where the edge is at which the next fan begins: the least of those that no other one leads to, or the least of all.
+/// Tells whether the edges make one fan that does not go all the way round, as they do at most vertices; if so, puts them in order.
 #[inline(always)]
-fn first(left: &[[u32; 2]]) -> Option<usize> {
-    if left.len() < 2 {
-        return if left.is_empty() { None } else { Some(0) };
+fn is_one_fan(left: &mut [[u32; 2]]) -> bool {
+    let mut start = 0;
+    // Back as long as there is an edge before.
+    for _ in 1..left.len() {
+        match left.iter().position(|edge| edge[1] == left[start][0]) {
+            Some(before) => start = before,
+            None => break,
+        }
     }
-    let least = |edges: &mut dyn Iterator<Item = usize>| edges.min_by_key(|&i| left[i]);
-    let is_start = |&i: &usize| left.iter().all(|other| other[1] != left[i][0]);
-    least(&mut (0..left.len()).filter(is_start)).or_else(|| least(&mut (0..left.len())))
+    let count = left.len();
+    let (Some(first), true) = (left.get(start).copied(), follow(left, start) == count) else { return count == 0 };
+    left[count - 1][1] != first[0]
+}
+
+/// Puts the edge at `start` first and after each edge the one that begins where it ends. Returns the number of edges that follow one
+/// another so.
+#[inline(always)]
+fn follow(left: &mut [[u32; 2]], start: usize) -> usize {
+    let mut at = Some(start);
+    for count in 0..left.len() {
+        let Some(next) = at else { return count };
+        left.swap(count, next);
+        let to = left[count][1];
+        at = left[count + 1..].iter().position(|edge| edge[0] == to).map(|next| count + 1 + next);
+    }
+    left.len()
 }
 
 #[cfg(test)]

@@ -200,57 +200,117 @@ struct DrawnTriangle<'a> {
 }
 
 impl<'a> DrawnTriangle<'a> {
-    fn new(canvas: &'a Canvas, tile: &'a Tile, triangle: [u32; 3]) -> DrawnTriangle<'a> {
-        let [a, b, c] = triangle;
-        let corners = [a, c, b];
+    #[inline(always)]
+    fn new(canvas: &'a Canvas, tile: &'a Tile, [a, b, c]: [u32; 3]) -> DrawnTriangle<'a> {
+        let corners = from_least(tile, [a, c, b]);
         DrawnTriangle { canvas, tile, corners, places: corners.map(|v| canvas.place(tile.positions[v as usize])) }
     }
 
+    #[inline(always)]
     fn draw(&self, columns: [i64; 2], rows: [i64; 2], pixels: &mut Vec<PreviewPixel>) {
         let sliver =
             (rows[1] - rows[0] >= SLIVER_ROWS).then(|| Sliver::new(self.places, self.canvas.center, self.canvas.pitch));
+        let edges = self.edges([self.canvas.middle(columns[0]), self.canvas.middle(rows[0])]);
         // Many triangles cover no pixel. Where points are few, one covers thousands.
         let mut shading = None;
         for row in rows[0]..rows[1] {
             if sliver.as_ref().is_some_and(|sliver| sliver.misses(row)) {
                 continue;
             }
-            let (edges, [first, last]) = self.covered(columns, row);
+            let edges = edges.map(|edge| edge.below(row - rows[0]));
+            let [first, last] = covered(&edges, columns[1] - columns[0]);
             for column in first..last {
-                let weights = edges.map(|(value, step)| value.wrapping_add((column - columns[0]).wrapping_mul(step)));
-                let shading = shading.get_or_insert_with(|| Shading::new(self.canvas, self.tile, self.corners));
-                pixels.push(shading.pixel(row as u32 * self.canvas.width + column as u32, weights));
+                let weights = edges.map(|edge| edge.right(column));
+                // A branch for each corner would often be foretold wrongly.
+                if (0..3).fold(true, |is_inside, k| is_inside & (weights[k] >= edges[k].least)) {
+                    let shading = shading.get_or_insert_with(|| Shading::new(self.canvas, self.tile, self.corners));
+                    let pixel = row as u32 * self.canvas.width + (columns[0] + column) as u32;
+                    pixels.push(shading.pixel(pixel, weights));
+                }
             }
         }
     }
 
-    /// Returns for the edge opposite every corner its function at the first column and its step per column, and the columns of `row`
-    /// that are inside all three edges.
-    ///
-    /// The function is twice the area between the edge and a point inside the triangle's bounding box, so it is below 2^63.
-    /// Intermediate values may wrap.
-    fn covered(&self, columns: [i64; 2], row: i64) -> ([(i64, i64); 3], [i64; 2]) {
-        let point = [self.canvas.middle(columns[0]), self.canvas.middle(row)];
-        let mut range = columns;
-        let edges = [0, 1, 2].map(|k| {
+    /// Returns the edges opposite the corners, with the values of their functions at `point`.
+    #[inline(always)]
+    fn edges(&self, point: [i64; 2]) -> [Edge; 3] {
+        [0, 1, 2].map(|k| {
             let (p, q) = (self.places[(k + 1) % 3], self.places[(k + 2) % 3]);
             let (du, dv) = (q[0] - p[0], q[1] - p[1]);
-            let value = (du * (point[1] - p[1])).wrapping_sub(dv * (point[0] - p[0]));
-            let step = -dv * self.canvas.pitch;
+            let value = du.wrapping_mul(point[1] - p[1]).wrapping_sub(dv.wrapping_mul(point[0] - p[0]));
             // A centre on an edge belongs to one of its two triangles: dv has another sign in each.
-            let least = if dv > 0 { 0 } else { 1 };
-            narrow(&mut range, columns[0], value, step, least);
-            (value, step)
-        });
-        (edges, range)
+            let least = i64::from(dv <= 0);
+            Edge { value, column: -dv * self.canvas.pitch, row: du * self.canvas.pitch, least }
+        })
+    }
+}
+
+/// Returns the corners in the same sense of rotation from the one on that is least in (x, y). Interpolation starts there, so that it does
+/// not depend on the order in which a file has the corners.
+#[inline(always)]
+fn from_least(tile: &Tile, corners: [u32; 3]) -> [u32; 3] {
+    let places = corners.map(|v| {
+        let [x, y, _] = tile.positions[v as usize];
+        i64::from(x) << 32 | i64::from(y.wrapping_sub(i32::MIN) as u32)
+    });
+    // Without branches, which would be foretold wrongly.
+    let least = if places[1] < places[0] { 1 } else { 0 };
+    let least = if places[2] < places[least] { 2 } else { least };
+    [corners[least], corners[[1, 2, 0][least]], corners[[2, 0, 1][least]]]
+}
+
+/// The function of an edge: twice the area between the edge and a point. Inside the triangle's bounding box it is below 2^63.
+/// Intermediate values may wrap.
+#[derive(Clone, Copy)]
+struct Edge {
+    value: i64,
+    /// What it grows by from column to column.
+    column: i64,
+    /// What it grows by from row to row.
+    row: i64,
+    /// Its least value at a pixel centre that the triangle covers.
+    least: i64,
+}
+
+impl Edge {
+    #[inline(always)]
+    fn below(self, rows: i64) -> Edge {
+        Edge { value: self.value.wrapping_add(self.row.wrapping_mul(rows)), ..self }
+    }
+
+    #[inline(always)]
+    fn right(&self, columns: i64) -> i64 {
+        self.value.wrapping_add(self.column.wrapping_mul(columns))
+    }
+}
+
+/// Up to this many columns are tried one by one, which takes no division.
+const FEW_COLUMNS: i64 = 4;
+
+/// Returns the columns, from 0 to `columns`, that may be inside all three edges: all of few, of many only those that are.
+#[inline(always)]
+fn covered(edges: &[Edge; 3], columns: i64) -> [i64; 2] {
+    let mut range = [0, columns];
+    if columns > FEW_COLUMNS {
+        edges.iter().for_each(|edge| narrow(&mut range, edge));
+    }
+    range
+}
+
+/// Narrows `range` to the columns where the edge has at least its least value.
+fn narrow(range: &mut [i64; 2], edge: &Edge) {
+    let Edge { value, column: step, least, .. } = *edge;
+    if step > 0 && value < least {
+        range[0] = range[0].max((least - value + step - 1) / step);
+    } else if step <= 0 && value < least {
+        range[1] = range[0];
+    } else if step < 0 {
+        range[1] = range[1].min((value - least) / -step + 1);
     }
 }
 
 /// What the pixels of a triangle are computed from.
 struct Shading {
-    /// Where the corner is that is least in (x, y). Interpolation starts there, so that it does not depend on the order in which a file
-    /// has the corners.
-    turn: usize,
     normals: Normals,
     /// The linear colours of the corners.
     colors: [[f64; 3]; 3],
@@ -262,10 +322,10 @@ enum Normals {
 }
 
 impl Shading {
+    /// Returns the shading of a triangle with its corners in the order of [`from_least`].
+    #[inline(always)]
     fn new(canvas: &Canvas, tile: &Tile, corners: [u32; 3]) -> Shading {
-        let mut corners = corners.map(|v| v as usize);
-        let turn = (0..3).min_by_key(|&k| tile.positions[corners[k]]).unwrap_or(0);
-        corners.rotate_left(turn);
+        let corners = corners.map(|v| v as usize);
         let normals = match &tile.normals {
             Some(normals) => Normals::Corners(corners.map(|v| normals[v].map(f64::from))),
             None => {
@@ -277,12 +337,12 @@ impl Shading {
             Some(colors) => colors[v].map(f64::from),
             None => height_color(tile.positions[v][2], canvas.heights).map(f64::from),
         });
-        Shading { turn, normals, colors }
+        Shading { normals, colors }
     }
 
     /// Returns the pixel of this number. `weights` are the areas opposite the corners.
-    fn pixel(&self, pixel: u32, mut weights: [i64; 3]) -> PreviewPixel {
-        weights.rotate_left(self.turn);
+    #[inline(always)]
+    fn pixel(&self, pixel: u32, weights: [i64; 3]) -> PreviewPixel {
         let weights = weights.map(|w| w as f64);
         let normal = match &self.normals {
             Normals::Corners(normals) => mean(normals, weights),
@@ -296,21 +356,8 @@ impl Shading {
 }
 
 /// Returns the mean of the corners' values, weighted by the areas.
+#[inline(always)]
 fn mean([a, b, c]: &[[f64; 3]; 3], weights: [f64; 3]) -> [f64; 3] {
     let total: f64 = weights.iter().sum();
     [0, 1, 2].map(|k| (a[k] * weights[0] + b[k] * weights[1] + c[k] * weights[2]) / total)
-}
-
-/// Narrows `range` to the columns where `value + step * (column - first)` is at least `least`.
-fn narrow(range: &mut [i64; 2], first: i64, value: i64, step: i64, least: i64) {
-    if range[1] - first == 1 {
-        // Most triangles span one column and need no division.
-        range[1] -= (value < least) as i64;
-    } else if step > 0 && value < least {
-        range[0] = range[0].max(first + (least - value + step - 1) / step);
-    } else if step <= 0 && value < least {
-        range[1] = range[0];
-    } else if step < 0 {
-        range[1] = range[1].min(first + (value - least) / -step + 1);
-    }
 }
