@@ -149,7 +149,13 @@ impl IndexEncoder {
         let first = if self.take_next(a) { 0 } else { FREE };
         let [second, third] = [(b, back[0]), (c, back[1])].map(|(v, back)| {
             // Codes 1 to 14 are places in the queue.
-            if back < 14 { back as u8 + 1 } else if self.take_next(v) { 0 } else { FREE }
+            if back < 14 {
+                back as u8 + 1
+            } else if self.take_next(v) {
+                0
+            } else {
+                FREE
+            }
         });
         let pair = second << 4 | third;
         let listed = PAIRS[..USED_PAIRS].iter().position(|&listed| listed == pair);
@@ -266,7 +272,7 @@ mod tests {
         #[test]
         fn strips_of_any_turn_are_those_of_meshoptimizer(steps in prop::collection::vec((0u32..3, 0u32..12), 1..400)) {
             let mut triangles = vec![[0, 1, 2]];
-            let mut next = 3;
+            let mut next = 3u32;
             for (turn, back) in steps {
                 let [a, b, c] = triangles[triangles.len() - 1];
                 // Now and then a corner that was there, else a new one.

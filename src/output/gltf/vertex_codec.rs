@@ -39,6 +39,7 @@ pub(crate) fn encode_vertices<T: Copy, B: NoUninit>(
     convert: impl Fn(T) -> B,
     packed: &mut Vec<u8>,
 ) {
+    const { assert!(size_of::<B>() <= LARGEST && size_of::<B>().is_multiple_of(4)) };
     let count = order.map_or(values.len(), <[u32]>::len);
     packed.push(HEADER);
     let mut first = None;
@@ -94,7 +95,9 @@ impl BlockEncoder {
             match size {
                 4 => pick::<4>(&mut self.row, differences, byte),
                 8 => pick::<8>(&mut self.row, differences, byte),
-                _ => self.row.iter_mut().zip(differences[byte..].iter().step_by(size)).for_each(|(to, &from)| *to = from),
+                _ => {
+                    self.row.iter_mut().zip(differences[byte..].iter().step_by(size)).for_each(|(to, &from)| *to = from)
+                }
             }
             let length = pack_row(&self.row[..aligned], &mut self.packed);
             packed.extend_from_slice(&self.packed[..length]);

@@ -73,8 +73,8 @@ impl Coverage {
     #[inline(never)]
     fn each_of_many(&self, edges: [Edge; 3], mut hit: impl FnMut(i64, i64, [i64; 3])) {
         let ([left, right], [top, bottom]) = (self.columns, self.rows);
-        let sliver = (bottom - top >= SLIVER_ROWS)
-            .then(|| Sliver::new(self.places, self.centers.first, self.centers.pitch));
+        let sliver =
+            (bottom - top >= SLIVER_ROWS).then(|| Sliver::new(self.places, self.centers.first, self.centers.pitch));
         for row in top..bottom {
             if sliver.as_ref().is_some_and(|sliver| sliver.misses(row)) {
                 continue;
