@@ -201,7 +201,7 @@ impl Width {
     fn large(self, bytes: u64) -> u64 {
         const HIGH: u64 = ONES << 7;
         // No sum leaves its byte.
-        ((bytes & !HIGH) + (0x80 - u64::from(self.large)) * ONES | bytes) & HIGH
+        (((bytes & !HIGH) + (0x80 - u64::from(self.large)) * ONES) | bytes) & HIGH
     }
 
     /// Returns eight numbers one after the other, the first in the highest bits of the first byte.
@@ -209,7 +209,7 @@ impl Width {
     fn joined(self, bytes: u64, large: u64) -> u64 {
         // All bits of the bytes that do not fit.
         let full = (large >> 7) * 0xff;
-        let numbers = (bytes | full) & u64::from(self.large) * ONES;
+        let numbers = (bytes | full) & (u64::from(self.large) * ONES);
         let pairs = (numbers << self.bits | numbers >> 8) & 0x00ff_00ff_00ff_00ff;
         match self.bits {
             2 => {

@@ -63,9 +63,7 @@ impl<'a> Shading<'a> {
         let (tile, batch) = (self.tile, &mut self.batch);
         let at = batch.count % BATCH;
         batch.pixels[at] = pixel;
-        for k in 0..3 {
-            batch.weights[k][at] = weights[k] as f64;
-        }
+        (0..3).for_each(|k| batch.weights[k][at] = weights[k] as f64);
         for (k, v) in corners.into_iter().enumerate() {
             let color = match &tile.colors {
                 Some(colors) => colors[v as usize],
