@@ -103,12 +103,17 @@ impl VertexOrder {
     /// Appends the triangles between the vertex whose turn it is and the edges in `left`, one fan after the other, each from a triangle
     /// that follows on no other one; empties `left`. Fans begin in the order of the vertices, so the order of the mesh does not matter.
     fn append_fans(&mut self, left: &mut Vec<[u32; 2]>) {
-        if left.len() > SEARCHED {
-            self.append_many_fans(left);
-        } else if is_one_fan(left) {
-            self.append_fan(left);
-        } else {
-            self.append_some_fans(left);
+        match left[..] {
+            [] => return,
+            // Fans of one or two need no search.
+            [_] => self.append_fan(left),
+            [[a, b], [c, d]] if b == c && d != a => self.append_fan(left),
+            [[a, b], [c, d]] if d == a && b != c => self.append_fan(&[[c, d], [a, b]]),
+            _ if left.len() > SEARCHED => self.append_many_fans(left),
+            _ => match is_one_fan(left) {
+                true => self.append_fan(left),
+                false => self.append_some_fans(left),
+            },
         }
         left.clear();
     }
@@ -144,6 +149,7 @@ impl VertexOrder {
     }
 
     /// Appends the triangles between the vertex whose turn it is and edges each of which begins where the one before ends.
+    #[inline(always)]
     fn append_fan(&mut self, fan: &[[u32; 2]]) {
         let Some([first, _]) = fan.first() else { return };
         let mut from = self.number(*first);
