@@ -22,10 +22,12 @@ use crate::output::gltf::encoding::{
     EXPONENTIAL_REACH, color_bytes, exponential, long_octahedron, needs_long_normals, normal_bytes,
     normal_long_octahedral, normal_octahedral, normal_shorts,
 };
+use crate::output::gltf::index_codec::encode_triangles;
 use crate::output::gltf::meshopt::{PackedFilter, PackedMode, PackedView, fallback_buffer};
 use crate::output::gltf::metadata::{self, METADATA};
 use crate::output::gltf::parts::SplitPart;
 use crate::output::gltf::schema::{GENERATOR, MESHOPT, QUANTIZATION, to_text};
+use crate::output::gltf::vertex_codec::encode_vertices;
 use crate::output::gltf::vertex_order::order_vertices;
 use crate::{Error, Result};
 
@@ -186,11 +188,9 @@ impl<'a> DocumentBuilder<'a> {
     ) -> Result<Index<Accessor>> {
         let count = order.map_or(values.len(), <[u32]>::len);
         let mut view = if self.compression == Compression::Meshopt {
-            let vertex = |i: usize| order.map_or(i, |order| order[i] as usize);
-            let converted: Vec<B> = (0..count).map(|i| convert(values[vertex(i)])).collect();
-            // Version 0 is the one of the extension.
-            let packed = meshopt::encode_vertex_buffer_level(&converted, 0, Some(0)).map_err(not_packed)?;
-            self.add_packed(&packed, PackedMode::Attributes, element.filter, size_of::<B>(), count)
+            let start = self.binary.len();
+            encode_vertices(values, order, convert, &mut self.binary);
+            self.add_packed(start, PackedMode::Attributes, element.filter, size_of::<B>(), count)
         } else {
             match order {
                 Some(order) => self.add_plain(order, |v| convert(values[v as usize])),
@@ -209,8 +209,9 @@ impl<'a> DocumentBuilder<'a> {
         let short = vertices <= u16::MAX as usize;
         let component = if short { ComponentType::U16 } else { ComponentType::U32 };
         let mut view = if self.compression == Compression::Meshopt {
-            let packed = meshopt::encode_index_buffer(corners, vertices).map_err(not_packed)?;
-            self.add_packed(&packed, PackedMode::Triangles, None, component.size(), corners.len())
+            let start = self.binary.len();
+            encode_triangles(triangles, vertices, &mut self.binary);
+            self.add_packed(start, PackedMode::Triangles, None, component.size(), corners.len())
         } else if short {
             self.add_plain(corners, |v| v as u16)
         } else {
@@ -248,20 +249,18 @@ impl<'a> DocumentBuilder<'a> {
         view(STORED, start as u64, (values.len() * size_of::<B>()) as u64)
     }
 
-    /// Appends `packed` data of `count` elements of `size` bytes each to the binary chunk, and returns the view of the unpacked
-    /// elements.
+    /// Returns the view of the unpacked data of `count` elements of `size` bytes each, whose packed data lie in the binary chunk from
+    /// `start` on.
     fn add_packed(
         &mut self,
-        packed: &[u8],
+        start: usize,
         mode: PackedMode,
         filter: Option<PackedFilter>,
         size: usize,
         count: usize,
     ) -> View {
-        let start = self.binary.len();
-        self.binary.extend_from_slice(packed);
+        let (byte_offset, byte_length) = (start as u64, (self.binary.len() - start) as u64);
         self.pad();
-        let (byte_offset, byte_length) = (start as u64, packed.len() as u64);
         let (buffer, byte_stride, count) = (STORED as usize, size as u64, count as u64);
         let packed = PackedView { buffer, byte_offset, byte_length, byte_stride, count, mode, filter };
         let length = count * byte_stride;
@@ -349,8 +348,4 @@ fn append_converted<T: Copy, B: Pod>(bytes: &mut Vec<u8>, values: &[T], convert:
         }
         bytes.extend_from_slice(cast_slice(&piece[..values.len()]));
     }
-}
-
-fn not_packed(error: meshopt::Error) -> Error {
-    Error::Broken(format!("a tile could not be packed: {error}"))
 }

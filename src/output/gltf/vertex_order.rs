@@ -5,8 +5,6 @@
 //! and its third corner is a new vertex or the next one of the ring before. The index codec writes both cases without further bytes.
 //! All of it is done in whole numbers, so the bytes do not depend on the machine, nor on the order in which triangles were found.
 
-use crate::mesh::adjacency::VertexAdjacency;
-
 /// Up to this many triangles around a vertex are searched one by one; more are sorted.
 const SEARCHED: usize = 48;
 
@@ -16,27 +14,79 @@ const NEW: u32 = u32::MAX;
 /// Returns the triangles in their new order, with the new numbers of their corners, and the old number of every new one. Vertices
 /// without a triangle come last.
 pub(crate) fn order_vertices(vertices: usize, triangles: &[[u32; 3]]) -> (Vec<[u32; 3]>, Vec<u32>) {
-    let adjacency = VertexAdjacency::new(vertices, triangles);
+    let around = TrianglesAround::new(vertices, triangles);
     let mut order = VertexOrder {
         numbers: vec![NEW; vertices],
         old_numbers: Vec::with_capacity(vertices),
         triangles: Vec::with_capacity(triangles.len()),
+        turn: 0,
     };
+    let mut is_done = vec![false; triangles.len()];
     let mut left = Vec::new();
-    let mut next = 0;
-    for seed in (0..vertices as u32).filter(|&v| !adjacency.around(v).is_empty()) {
+    for seed in (0..vertices as u32).filter(|&v| !around.of(v).is_empty()) {
         order.number(seed);
-        while let Some(&v) = order.old_numbers.get(next) {
-            // Triangles with a corner of a lower number are in the list.
-            let is_left = |edge: &&[u32; 2]| edge.iter().all(|&w| order.numbers[w as usize] > next as u32);
-            left.extend(adjacency.around(v).iter().filter(is_left));
-            order.append_fans(v, &mut left);
-            next += 1;
+        while let Some(&v) = order.old_numbers.get(order.turn as usize) {
+            for &t in around.of(v) {
+                if !std::mem::replace(&mut is_done[t as usize], true) {
+                    left.push(opposite(triangles[t as usize], v));
+                }
+            }
+            order.append_fans(&mut left);
+            order.turn += 1;
         }
     }
     let unused = (0..vertices as u32).filter(|&v| order.numbers[v as usize] == NEW);
     order.old_numbers.extend(unused);
     (order.triangles, order.old_numbers)
+}
+
+/// Returns the edge of a triangle opposite its corner `v`.
+#[inline(always)]
+fn opposite([a, b, c]: [u32; 3], v: u32) -> [u32; 2] {
+    if a == v {
+        [b, c]
+    } else if b == v {
+        [c, a]
+    } else {
+        [a, b]
+    }
+}
+
+/// The triangles around each vertex. Unlike [`crate::mesh::adjacency::VertexAdjacency`] it has only their numbers: two thirds of the
+/// triangles around a vertex are in the list when its turn comes, and nobody asks for their corners.
+struct TrianglesAround {
+    /// The triangles at vertex v are `triangles[starts[v]..starts[v + 1]]`. There is one entry more than that needs.
+    starts: Vec<u32>,
+    triangles: Vec<u32>,
+}
+
+impl TrianglesAround {
+    fn new(vertices: usize, triangles: &[[u32; 3]]) -> TrianglesAround {
+        // One place further than needed: filling moves every start to the next one's place.
+        let mut starts = vec![0u32; vertices + 2];
+        for &v in triangles.as_flattened() {
+            starts[v as usize + 2] += 1;
+        }
+        let mut sum = 0;
+        for start in &mut starts {
+            sum += *start;
+            *start = sum;
+        }
+        let mut numbers = vec![0; 3 * triangles.len()];
+        for (t, corners) in (0..).zip(triangles) {
+            for &v in corners {
+                let place = &mut starts[v as usize + 1];
+                numbers[*place as usize] = t;
+                *place += 1;
+            }
+        }
+        TrianglesAround { starts, triangles: numbers }
+    }
+
+    #[inline(always)]
+    fn of(&self, v: u32) -> &[u32] {
+        &self.triangles[self.starts[v as usize] as usize..self.starts[v as usize + 1] as usize]
+    }
 }
 
 /// The new order while it grows.
@@ -45,29 +95,43 @@ struct VertexOrder {
     numbers: Vec<u32>,
     old_numbers: Vec<u32>,
     triangles: Vec<[u32; 3]>,
+    /// The new number of the vertex whose triangles are appended.
+    turn: u32,
 }
 
 impl VertexOrder {
-    /// Appends the triangles between vertex `v` and the edges in `left`, one fan after the other, each from a triangle that follows on
-    /// no other one; empties `left`. Fans begin in the order of the vertices, so the order of the mesh does not matter.
-    fn append_fans(&mut self, v: u32, left: &mut Vec<[u32; 2]>) {
-        if left.len() > SEARCHED {
-            return self.append_many_fans(v, left);
+    /// Appends the triangles between the vertex whose turn it is and the edges in `left`, one fan after the other, each from a triangle
+    /// that follows on no other one; empties `left`. Fans begin in the order of the vertices, so the order of the mesh does not matter.
+    fn append_fans(&mut self, left: &mut Vec<[u32; 2]>) {
+        match left[..] {
+            [] => return,
+            // Fans of one or two need no search.
+            [_] => self.append_fan(left),
+            [[a, b], [c, d]] if b == c && d != a => self.append_fan(left),
+            [[a, b], [c, d]] if d == a && b != c => self.append_fan(&[[c, d], [a, b]]),
+            _ if left.len() > SEARCHED => self.append_many_fans(left),
+            _ => match is_one_fan(left) {
+                true => self.append_fan(left),
+                false => self.append_some_fans(left),
+            },
         }
+        left.clear();
+    }
+
+    fn append_some_fans(&mut self, mut left: &mut [[u32; 2]]) {
         while !left.is_empty() {
-            let is_start = |edge: &[u32; 2]| left.iter().all(|other| other[1] != edge[0]);
-            let starts = (0..left.len()).filter(|&i| is_start(&left[i]));
-            let mut at = starts.min_by_key(|&i| left[i]).or_else(|| (0..left.len()).min_by_key(|&i| left[i]));
-            while let Some(i) = at {
-                let [from, to] = left.swap_remove(i);
-                self.append([v, from, to]);
-                at = left.iter().position(|edge| edge[0] == to);
-            }
+            let is_start = |&i: &usize| left.iter().all(|other| other[1] != left[i][0]);
+            let starts = (0..left.len()).filter(is_start).min_by_key(|&i| left[i]);
+            let start = starts.or_else(|| (0..left.len()).min_by_key(|&i| left[i])).unwrap_or(0);
+            let count = follow(left, start);
+            let (fan, others) = left.split_at_mut(count);
+            self.append_fan(fan);
+            left = others;
         }
     }
 
     /// Does the same quickly around a vertex with thousands of triangles.
-    fn append_many_fans(&mut self, v: u32, left: &mut Vec<[u32; 2]>) {
+    fn append_many_fans(&mut self, left: &mut [[u32; 2]]) {
         left.sort_unstable();
         let mut ends: Vec<u32> = left.iter().map(|edge| edge[1]).collect();
         ends.sort_unstable();
@@ -78,16 +142,22 @@ impl VertexOrder {
             let mut at = Some(start);
             while let Some(i) = at.filter(|&i| !done[i]) {
                 done[i] = true;
-                self.append([v, left[i][0], left[i][1]]);
+                self.append_fan(&[left[i]]);
                 at = left.binary_search_by_key(&left[i][1], |edge| edge[0]).ok();
             }
         }
-        left.clear();
     }
 
-    fn append(&mut self, triangle: [u32; 3]) {
-        let triangle = triangle.map(|v| self.number(v));
-        self.triangles.push(triangle);
+    /// Appends the triangles between the vertex whose turn it is and edges each of which begins where the one before ends.
+    #[inline(always)]
+    fn append_fan(&mut self, fan: &[[u32; 2]]) {
+        let Some([first, _]) = fan.first() else { return };
+        let mut from = self.number(*first);
+        for &[_, to] in fan {
+            let to = self.number(to);
+            self.triangles.push([self.turn, from, to]);
+            from = to;
+        }
     }
 
     /// Returns the new number of vertex `v`, and gives it the next one if it has none.
@@ -99,6 +169,36 @@ impl VertexOrder {
         }
         *number
     }
+}
+
+/// Tells whether the edges make one fan that does not go all the way round, as they do at most vertices; if so, puts them in order.
+#[inline(always)]
+fn is_one_fan(left: &mut [[u32; 2]]) -> bool {
+    let mut start = 0;
+    // Back as long as there is an edge before.
+    for _ in 1..left.len() {
+        match left.iter().position(|edge| edge[1] == left[start][0]) {
+            Some(before) => start = before,
+            None => break,
+        }
+    }
+    let count = left.len();
+    let (Some(first), true) = (left.get(start).copied(), follow(left, start) == count) else { return count == 0 };
+    left[count - 1][1] != first[0]
+}
+
+/// Puts the edge at `start` first and after each edge the one that begins where it ends. Returns the number of edges that follow one
+/// another so.
+#[inline(always)]
+fn follow(left: &mut [[u32; 2]], start: usize) -> usize {
+    let mut at = Some(start);
+    for count in 0..left.len() {
+        let Some(next) = at else { return count };
+        left.swap(count, next);
+        let to = left[count][1];
+        at = left[count + 1..].iter().position(|edge| edge[0] == to).map(|next| count + 1 + next);
+    }
+    left.len()
 }
 
 #[cfg(test)]

@@ -5,13 +5,12 @@
 
 use std::collections::BTreeMap;
 
-use bytemuck::{Pod, Zeroable};
-
 use crate::geometry::Bounds;
-use crate::output::color::{HeightRange, height_color, to_srgb};
+use crate::output::color::HeightRange;
 use crate::output::frame::Frame;
-use crate::output::normals::{cross, unit_normal};
-use crate::output::preview::sliver::{SLIVER_ROWS, Sliver};
+use crate::output::preview::coverage::{Centers, Coverage};
+pub use crate::output::preview::pixel::PreviewPixel;
+use crate::output::preview::shading::Shading;
 use crate::output::tile::Tile;
 use crate::{Result, interrupt};
 
@@ -42,20 +41,6 @@ pub struct Canvas {
     inverse: u64,
     /// Subdivisions from a pixel's edge to its centre, an odd number.
     center: i64,
-}
-
-/// One pixel of a tile, in plain bytes so that a tile's pixels can be kept on disk.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
-pub struct PreviewPixel {
-    /// The number of the pixel, row by row from the north-west corner.
-    pub pixel: u32,
-    /// The east and north components of the unit normal, 32767 for 1.
-    pub slope: [i16; 2],
-    /// The sRGB colour.
-    pub color: [u8; 3],
-    /// 1 for the look of a vertex, in a pixel whose centre no triangle may cover.
-    pub(super) dot: u8,
 }
 
 impl Canvas {
@@ -119,24 +104,31 @@ impl Canvas {
     /// [`Error::Interrupted`](crate::Error::Interrupted) if the process was asked to stop.
     pub fn draw(&self, tile: &Tile) -> Result<Vec<PreviewPixel>> {
         let cells: Vec<u32> = tile.positions.iter().map(|&p| self.cell(p)).collect();
-        let (mut pixels, mut drawn) = (Vec::new(), 0u32);
-        for &triangle in &tile.triangles {
-            let corners = triangle.map(|v| cells[v as usize]);
+        let mut shading = Shading::new(tile, &self.frame, self.heights);
+        let mut drawn = 0u32;
+        for &[a, b, c] in &tile.triangles {
+            let [i, j, k] = [a, b, c].map(|v| cells[v as usize]);
             // Most triangles lie between two rows or columns of centres and cover none.
-            let differs = (corners[0] ^ corners[1]) | (corners[0] ^ corners[2]);
+            let differs = (i ^ j) | (i ^ k);
             if differs & 0xffff != 0 && differs >> 16 != 0 {
                 drawn += 1;
                 if drawn.is_multiple_of(TRIANGLES_BETWEEN_CHECKS) {
                     interrupt::check()?;
                 }
                 let [columns, rows] = [0, 16].map(|shift| {
-                    let at = corners.map(|cell| (cell >> shift & 0xffff) as i64);
+                    let at = [i, j, k].map(|cell| (cell >> shift & 0xffff) as i64);
                     [at[0].min(at[1]).min(at[2]), at[0].max(at[1]).max(at[2])]
                 });
-                DrawnTriangle::new(self, tile, triangle).draw(columns, rows, &mut pixels);
+                // Counterclockwise where y goes down.
+                let corners = from_least(tile, [a, c, b]);
+                let places = corners.map(|v| self.place(tile.positions[v as usize]));
+                let centers = Centers { first: self.center, pitch: self.pitch };
+                Coverage { places, centers, columns, rows }.each(|column, row, weights| {
+                    shading.add(row as u32 * self.width + column as u32, corners, weights);
+                });
             }
         }
-        Ok(pixels)
+        Ok(shading.finish())
     }
 
     /// Returns the pixels in which vertices of `tile` lie, each with the look of one of them, if the tile is so narrow that it has hardly
@@ -154,13 +146,14 @@ impl Canvas {
             let row = row.min(i64::from(self.height) - 1) as u32;
             vertices.entry(row * self.width + column).or_insert(v);
         }
-        let dot = |(pixel, v)| {
-            let seen = Shading::new(self, tile, [v; 3]).pixel(pixel, [1, 0, 0]);
+        let mut shading = Shading::new(tile, &self.frame, self.heights);
+        vertices.into_iter().for_each(|(pixel, v)| shading.add(pixel, [v; 3], [1, 0, 0]));
+        let dot = |seen: PreviewPixel| {
             // Without normals it is flat, because a vertex alone has no triangle.
             let slope = if tile.normals.is_some() { seen.slope } else { [0; 2] };
             PreviewPixel { slope, dot: 1, ..seen }
         };
-        vertices.into_iter().map(dot).collect()
+        shading.finish().into_iter().map(dot).collect()
     }
 
     /// Returns how far a point is right of and below the corner, in subdivisions: even numbers.
@@ -177,11 +170,20 @@ impl Canvas {
         let [column, row] = self.place(point).map(centers);
         row << 16 | column
     }
+}
 
-    /// Returns the middle of a column or row in subdivisions, an odd number.
-    fn middle(&self, index: i64) -> i64 {
-        index * self.pitch + self.center
-    }
+/// Returns the corners in the same sense of rotation from the one on that is least in (x, y). Interpolation starts there, so that it does
+/// not depend on the order in which a file has the corners.
+#[inline(always)]
+fn from_least(tile: &Tile, corners: [u32; 3]) -> [u32; 3] {
+    let places = corners.map(|v| {
+        let [x, y, _] = tile.positions[v as usize];
+        i64::from(x) << 32 | i64::from(y.wrapping_sub(i32::MIN) as u32)
+    });
+    // Without branches, which would be foretold wrongly.
+    let least = if places[1] < places[0] { 1 } else { 0 };
+    let least = if places[2] < places[least] { 2 } else { least };
+    [corners[least], corners[[1, 2, 0][least]], corners[[2, 0, 1][least]]]
 }
 
 /// A tile is narrow if it is at least so many times as long in pixels as it covers pixels.
@@ -189,128 +191,3 @@ const NARROW: i64 = 4;
 
 /// A million slivers as long as the terrain take seconds, so after this many the process asks whether it should stop.
 const TRIANGLES_BETWEEN_CHECKS: u32 = 1 << 12;
-
-/// A triangle that may cover pixels.
-struct DrawnTriangle<'a> {
-    canvas: &'a Canvas,
-    tile: &'a Tile,
-    /// The vertices, clockwise seen from above: counterclockwise where y goes down.
-    corners: [u32; 3],
-    places: [[i64; 2]; 3],
-}
-
-impl<'a> DrawnTriangle<'a> {
-    fn new(canvas: &'a Canvas, tile: &'a Tile, triangle: [u32; 3]) -> DrawnTriangle<'a> {
-        let [a, b, c] = triangle;
-        let corners = [a, c, b];
-        DrawnTriangle { canvas, tile, corners, places: corners.map(|v| canvas.place(tile.positions[v as usize])) }
-    }
-
-    fn draw(&self, columns: [i64; 2], rows: [i64; 2], pixels: &mut Vec<PreviewPixel>) {
-        let sliver =
-            (rows[1] - rows[0] >= SLIVER_ROWS).then(|| Sliver::new(self.places, self.canvas.center, self.canvas.pitch));
-        // Many triangles cover no pixel. Where points are few, one covers thousands.
-        let mut shading = None;
-        for row in rows[0]..rows[1] {
-            if sliver.as_ref().is_some_and(|sliver| sliver.misses(row)) {
-                continue;
-            }
-            let (edges, [first, last]) = self.covered(columns, row);
-            for column in first..last {
-                let weights = edges.map(|(value, step)| value.wrapping_add((column - columns[0]).wrapping_mul(step)));
-                let shading = shading.get_or_insert_with(|| Shading::new(self.canvas, self.tile, self.corners));
-                pixels.push(shading.pixel(row as u32 * self.canvas.width + column as u32, weights));
-            }
-        }
-    }
-
-    /// Returns for the edge opposite every corner its function at the first column and its step per column, and the columns of `row`
-    /// that are inside all three edges.
-    ///
-    /// The function is twice the area between the edge and a point inside the triangle's bounding box, so it is below 2^63.
-    /// Intermediate values may wrap.
-    fn covered(&self, columns: [i64; 2], row: i64) -> ([(i64, i64); 3], [i64; 2]) {
-        let point = [self.canvas.middle(columns[0]), self.canvas.middle(row)];
-        let mut range = columns;
-        let edges = [0, 1, 2].map(|k| {
-            let (p, q) = (self.places[(k + 1) % 3], self.places[(k + 2) % 3]);
-            let (du, dv) = (q[0] - p[0], q[1] - p[1]);
-            let value = (du * (point[1] - p[1])).wrapping_sub(dv * (point[0] - p[0]));
-            let step = -dv * self.canvas.pitch;
-            // A centre on an edge belongs to one of its two triangles: dv has another sign in each.
-            let least = if dv > 0 { 0 } else { 1 };
-            narrow(&mut range, columns[0], value, step, least);
-            (value, step)
-        });
-        (edges, range)
-    }
-}
-
-/// What the pixels of a triangle are computed from.
-struct Shading {
-    /// Where the corner is that is least in (x, y). Interpolation starts there, so that it does not depend on the order in which a file
-    /// has the corners.
-    turn: usize,
-    normals: Normals,
-    /// The linear colours of the corners.
-    colors: [[f64; 3]; 3],
-}
-
-enum Normals {
-    Corners([[f64; 3]; 3]),
-    Triangle([f64; 3]),
-}
-
-impl Shading {
-    fn new(canvas: &Canvas, tile: &Tile, corners: [u32; 3]) -> Shading {
-        let mut corners = corners.map(|v| v as usize);
-        let turn = (0..3).min_by_key(|&k| tile.positions[corners[k]]).unwrap_or(0);
-        corners.rotate_left(turn);
-        let normals = match &tile.normals {
-            Some(normals) => Normals::Corners(corners.map(|v| normals[v].map(f64::from))),
-            None => {
-                let [a, c, b] = corners.map(|v| tile.positions[v]);
-                Normals::Triangle(unit_normal(cross(a, b, c), &canvas.frame).map(f64::from))
-            }
-        };
-        let colors = corners.map(|v| match &tile.colors {
-            Some(colors) => colors[v].map(f64::from),
-            None => height_color(tile.positions[v][2], canvas.heights).map(f64::from),
-        });
-        Shading { turn, normals, colors }
-    }
-
-    /// Returns the pixel of this number. `weights` are the areas opposite the corners.
-    fn pixel(&self, pixel: u32, mut weights: [i64; 3]) -> PreviewPixel {
-        weights.rotate_left(self.turn);
-        let weights = weights.map(|w| w as f64);
-        let normal = match &self.normals {
-            Normals::Corners(normals) => mean(normals, weights),
-            Normals::Triangle(normal) => *normal,
-        };
-        let length = normal.iter().map(|v| v * v).sum::<f64>().sqrt();
-        let slope = [0, 1].map(|k| (normal[k] / length * 32767.0) as i16);
-        let color = mean(&self.colors, weights).map(|v| to_srgb((v + 0.5) as u16));
-        PreviewPixel { pixel, slope, color, dot: 0 }
-    }
-}
-
-/// Returns the mean of the corners' values, weighted by the areas.
-fn mean([a, b, c]: &[[f64; 3]; 3], weights: [f64; 3]) -> [f64; 3] {
-    let total: f64 = weights.iter().sum();
-    [0, 1, 2].map(|k| (a[k] * weights[0] + b[k] * weights[1] + c[k] * weights[2]) / total)
-}
-
-/// Narrows `range` to the columns where `value + step * (column - first)` is at least `least`.
-fn narrow(range: &mut [i64; 2], first: i64, value: i64, step: i64, least: i64) {
-    if range[1] - first == 1 {
-        // Most triangles span one column and need no division.
-        range[1] -= (value < least) as i64;
-    } else if step > 0 && value < least {
-        range[0] = range[0].max(first + (least - value + step - 1) / step);
-    } else if step <= 0 && value < least {
-        range[1] = range[0];
-    } else if step < 0 {
-        range[1] = range[1].min(first + (value - least) / -step + 1);
-    }
-}
