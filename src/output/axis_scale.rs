@@ -1,6 +1,7 @@
 //! The map from lattice integers to the steps of a scene along one kind of axis: horizontal or vertical.
 
 use crate::{Error, Result};
+use multiversion::multiversion;
 use serde::{Deserialize, Serialize};
 
 /// An f32 holds every whole number of steps up to this.
@@ -77,11 +78,40 @@ impl AxisScale {
         AxisScale { step: self.step / 2.0, ratio: self.ratio * 2.0 }
     }
 
+    /// Rounds each of `places`, in metres along the axis, to a lattice integer. Returns whether all of them are exactly where their integers
+    /// are; if not, the integers mean nothing.
+    pub(crate) fn integers<const N: usize>(self, places: &[f64; N], found: &mut [i32; N]) -> bool {
+        integers(self, places, found)
+    }
+
     /// Returns lattice integer `i` in glTF steps, a whole number below 2^39.
     #[inline(always)]
     pub(crate) fn steps(&self, i: i32) -> f64 {
         nearest(i as f64 * self.ratio)
     }
+}
+
+/// Rounds `value` to the nearest whole number, for magnitudes below 2^31. It vectorizes too.
+#[inline(always)]
+pub(crate) fn nearest_integer(value: f64) -> i32 {
+    const SHIFT: f64 = 1.5 * (1u64 << 52) as f64;
+    // The last bits of the sum are those of the number.
+    (value + SHIFT).to_bits() as i32
+}
+
+/// Rounds each of `places`, in metres, to a lattice integer; returns whether all of them are exactly where their integers are.
+#[multiversion(targets("x86_64+avx2"))]
+fn integers<const N: usize>(axis: AxisScale, places: &[f64; N], integers: &mut [i32; N]) -> bool {
+    let per_metre = 1.0 / (axis.ratio * axis.step);
+    let mut off = 0;
+    for (&place, integer) in places.iter().zip(integers) {
+        let near = nearest(place * per_metre);
+        // What counts is this check, so it does not matter that the quotient was rounded.
+        let is_there = near.abs() <= f64::from(i32::MAX) && nearest(near * axis.ratio) * axis.step == place;
+        off += u32::from(!is_there);
+        *integer = nearest_integer(near);
+    }
+    off == 0
 }
 
 /// Returns the greatest power of two that is not above `value`, or zero for zero. Exact, unlike a logarithm.

@@ -29,6 +29,9 @@ const STEPS_HALVED: usize = 8;
 /// earth that is a square about 640 km wide.
 const STEEPEST: f64 = 0.1;
 
+/// Points that are led back to the lattice together.
+const AT_ONCE: usize = 64;
+
 /// Steps that a 16-bit position reaches from its origin.
 const SHORT_REACH: f64 = 65535.0;
 
@@ -253,51 +256,57 @@ impl Frame {
         let [xy, up] = self.resolution_metres();
         let moved = [world[0], -world[2], world[1]];
         let steps = [xy, xy, up];
-        self.checked(
-            world,
-            match self.curvature() {
-                Some(curvature) => curvature.flat(moved, steps),
-                None => [0, 1, 2].map(|k| moved[k] / steps[k]),
-            },
-        )
-    }
-
-    /// Returns the lattice point nearest to `place` if its world position is `world`.
-    #[inline(always)]
-    fn checked(&self, world: [f64; 3], place: [f64; 3]) -> Option<[i32; 3]> {
-        let point = place.map(nearest);
+        let flat = match self.curvature() {
+            Some(curvature) => curvature.flat(moved, steps),
+            None => [0, 1, 2].map(|k| moved[k] / steps[k]),
+        };
+        let point = flat.map(nearest);
         let is_there = point.iter().all(|v| v.abs() <= i32::MAX as f64);
         let point = point.map(|v| v as i32);
         (is_there && self.world(point) == world).then_some(point)
     }
 
-    /// Returns the way back from many world positions.
-    pub(crate) fn inverse(&self) -> InverseFrame<'_> {
-        let [xy, up] = self.resolution_metres();
-        InverseFrame { frame: self, per_metre: self.curvature().is_none().then_some([1.0 / xy, 1.0 / xy, 1.0 / up]) }
+    /// Returns the lattice points at `positions` of a mesh that its node moves by `translation` and stretches by `scale`, or the first place
+    /// in metres where the lattice has no point.
+    pub(crate) fn points(
+        &self,
+        positions: &[[f32; 3]],
+        translation: [f64; 3],
+        scale: [f64; 3],
+    ) -> std::result::Result<Vec<[i32; 3]>, [f64; 3]> {
+        if self.curvature().is_none()
+            && let Some(points) = self.flat_points(positions, translation, scale)
+        {
+            return Ok(points);
+        }
+        let world = |p: &[f32; 3]| [0, 1, 2].map(|k| translation[k] + scale[k] * f64::from(p[k]));
+        positions.iter().map(world).map(|world| self.integers(world).ok_or(world)).collect()
+    }
+
+    /// Does what [`Frame::points`] does, if the scene is not bent, many points at a time. `None` if one of them is not found like this.
+    fn flat_points(&self, positions: &[[f32; 3]], translation: [f64; 3], scale: [f64; 3]) -> Option<Vec<[i32; 3]>> {
+        let mut points = Vec::with_capacity(positions.len());
+        let axes = [(0, 1.0, self.horizontal), (2, -1.0, self.horizontal), (1, 1.0, self.vertical)];
+        for some in positions.chunks(AT_ONCE) {
+            let mut along = [[0; AT_ONCE]; 3];
+            for (along, (k, sign, axis)) in along.iter_mut().zip(axes) {
+                let mut places = [0.0; AT_ONCE];
+                places
+                    .iter_mut()
+                    .zip(some)
+                    .for_each(|(place, p)| *place = sign * (translation[k] + scale[k] * f64::from(p[k])));
+                if !axis.integers(&places, along) {
+                    return None;
+                }
+            }
+            points.extend((0..some.len()).map(|i| along.map(|values| values[i])));
+        }
+        Some(points)
     }
 
     /// Returns steps as metres.
     pub(crate) fn metres(&self, steps: [f64; 3]) -> [f64; 3] {
         [steps[0] * self.horizontal.step, steps[1] * self.vertical.step, steps[2] * self.horizontal.step]
-    }
-}
-
-/// The map from glTF metres to lattice integers.
-pub(crate) struct InverseFrame<'a> {
-    frame: &'a Frame,
-    /// Lattice steps in a metre along x, y and z, unless the scene is bent.
-    per_metre: Option<[f64; 3]>,
-}
-
-impl InverseFrame<'_> {
-    /// Does what [`Frame::integers`] does, more quickly.
-    #[inline(always)]
-    pub(crate) fn integers(&self, world: [f64; 3]) -> Option<[i32; 3]> {
-        let [east, up, south] = world;
-        // The point is checked, so it does not matter that this is not quite a division.
-        let near = self.per_metre.map(|[x, y, z]| [east * x, -south * y, up * z]);
-        near.and_then(|place| self.frame.checked(world, place)).or_else(|| self.frame.integers(world))
     }
 }
 

@@ -1,6 +1,6 @@
 //! Buffer views that `EXT_meshopt_compression` packs: their description, and how to unpack them.
 
-use bytemuck::allocation::pod_collect_to_vec;
+use bytemuck::allocation::{pod_collect_to_vec, try_cast_vec};
 use bytemuck::{cast, cast_slice_mut};
 use gltf::json::{Value, buffer, extensions};
 use serde::{Deserialize, Serialize};
@@ -68,16 +68,22 @@ impl PackedView {
         self.count.checked_mul(self.byte_stride)
     }
 
-    /// Unpacks the view's bytes, but for the filter. The result is a sentence if `packed` is not what the view says.
-    pub(crate) fn unpack_unfiltered(&self, packed: &[u8]) -> Decoded<Vec<u8>> {
+    /// Checks that so many `packed` bytes can hold what the view says, before memory is taken for it.
+    fn check_length(&self, packed: &[u8]) -> Decoded<()> {
         let length = self.unpacked_length().unwrap_or(u64::MAX);
         let plausible = match self.mode {
             PackedMode::Attributes => length / MOST_VERTEX_RATIO <= packed.len() as u64,
             PackedMode::Triangles => self.count / 3 <= packed.len() as u64 && self.count.is_multiple_of(3),
         };
-        if !plausible {
-            return Err(format!("{} packed bytes cannot hold {} elements", packed.len(), self.count));
+        match plausible {
+            true => Ok(()),
+            false => Err(format!("{} packed bytes cannot hold {} elements", packed.len(), self.count)),
         }
+    }
+
+    /// Unpacks the view's bytes, but for the filter. The result is a sentence if `packed` is not what the view says.
+    pub(crate) fn unpack_unfiltered(&self, packed: &[u8]) -> Decoded<Vec<u8>> {
+        self.check_length(packed)?;
         let count = self.count as usize;
         let unpacked = match (self.mode, self.byte_stride) {
             (PackedMode::Attributes, 4) => vertices::<4>(packed, count),
@@ -92,6 +98,15 @@ impl PackedView {
             (_, stride) => return Err(format!("packed elements of {stride} bytes")),
         };
         unpacked.ok_or_else(|| "packed data are damaged".into())
+    }
+
+    /// Unpacks triangles from the view's bytes, whether it has them in 16 or in 32 bits. Corners may be out of range.
+    pub(crate) fn unpack_triangles(&self, packed: &[u8]) -> Decoded<Vec<[u32; 3]>> {
+        self.check_length(packed)?;
+        let corners = meshopt::decode_index_buffer::<u32>(packed, self.count as usize);
+        let corners = corners.map_err(|_| "packed data are damaged")?;
+        let copied = |corners: Vec<u32>| corners.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+        Ok(try_cast_vec(corners).unwrap_or_else(|(_, corners)| copied(corners)))
     }
 
     /// Unpacks the view's bytes. The result is a sentence if `packed` is not what the view says.

@@ -320,17 +320,37 @@ impl<'b> Decoder<'b> {
         if accessor.count % 3 != 0 {
             return Err(format!("{} indices are not whole triangles", accessor.count));
         }
-        let triangles: Vec<[u32; 3]> = if accessor.component == ComponentType::U16 {
-            let short: Vec<u16> = self.elements(indices, ComponentType::U16, Type::Scalar)?;
-            short.chunks_exact(3).map(|t| [t[0] as u32, t[1] as u32, t[2] as u32]).collect()
-        } else {
-            let corners: Vec<u32> = self.elements(indices, ComponentType::U32, Type::Scalar)?;
-            corners.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect()
+        let triangles = match item(&self.document.views, accessor.view, "buffer view")?.stored.packed_triangles() {
+            Some(_) => self.packed_triangles(indices)?,
+            None if accessor.component == ComponentType::U16 => {
+                let short: Vec<u16> = self.elements(indices, ComponentType::U16, Type::Scalar)?;
+                short.chunks_exact(3).map(|t| [t[0] as u32, t[1] as u32, t[2] as u32]).collect()
+            }
+            None => {
+                let corners: Vec<u32> = self.elements(indices, ComponentType::U32, Type::Scalar)?;
+                corners.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect()
+            }
         };
-        match triangles.as_flattened().iter().find(|&&v| v as usize >= vertices) {
-            Some(v) => Err(format!("index {v} of {vertices} vertices")),
-            None => Ok(triangles),
+        let greatest = triangles.as_flattened().iter().fold(0, |greatest, &v| greatest.max(v));
+        match greatest as usize >= vertices && !triangles.is_empty() {
+            true => Err(format!("index {greatest} of {vertices} vertices")),
+            false => Ok(triangles),
         }
+    }
+
+    /// Returns triangles that the index codec has packed.
+    fn packed_triangles(&mut self, indices: usize) -> Decoded<Vec<[u32; 3]>> {
+        let accessor = item(&self.document.elements, indices, "accessor")?;
+        let view = item(&self.document.views, accessor.view, "buffer view")?.stored;
+        let is_index = matches!(accessor.component, ComponentType::U16 | ComponentType::U32);
+        let packed = view.packed_triangles().filter(|_| is_index && accessor.shape == Type::Scalar);
+        let packed = packed.ok_or_else(|| format!("accessor {indices} holds no indices"))?;
+        let mut triangles = packed.unpack_triangles(self.stored(&view)?)?;
+        if accessor.count > 3 * triangles.len() as u64 {
+            return Err(format!("accessor {indices} goes past the end of the data"));
+        }
+        triangles.truncate(accessor.count as usize / 3);
+        Ok(triangles)
     }
 
     /// Returns the elements of an accessor of this type, tightly packed.

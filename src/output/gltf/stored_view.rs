@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use gltf::json::buffer::View;
 
 use crate::output::gltf::check_json::Decoded;
-use crate::output::gltf::meshopt::{PackedFilter, PackedView};
+use crate::output::gltf::meshopt::{PackedFilter, PackedMode, PackedView};
 
 /// The data of a buffer view in the binary chunk, packed or not.
 #[derive(Clone, Copy, Debug)]
@@ -48,6 +48,11 @@ impl StoredView {
             Some(packed) => packed.unpack_unfiltered(stored).map(Cow::Owned),
             None => Ok(Cow::Borrowed(stored)),
         }
+    }
+
+    /// Returns how the view's triangles are packed, if they are.
+    pub(crate) fn packed_triangles(&self) -> Option<PackedView> {
+        self.packed.filter(|packed| matches!(packed.mode, PackedMode::Triangles))
     }
 
     /// Returns the filter that follows unpacking.

@@ -50,8 +50,9 @@ pub fn join(frame: &Frame, files: Vec<TileFile>) -> Result<Joined, VertexOffLatt
     };
     let mut vertex_at = VertexAt::default();
     for (part, number) in parts.iter_mut().zip(0..) {
-        let points = lattice_points(frame, part)?;
-        part.positions = Vec::new();
+        let positions = std::mem::take(&mut part.positions);
+        let points = frame.points(&positions, part.translation, part.scale).map_err(VertexOffLattice)?;
+        drop(positions);
         let triangles = std::mem::take(&mut part.triangles);
         // Only vertices on a boundary can be in another part too.
         let on_border = on_boundary(points.len(), &triangles);
@@ -60,16 +61,6 @@ pub fn join(frame: &Frame, files: Vec<TileFile>) -> Result<Joined, VertexOffLatt
     }
     joined.parts = parts;
     Ok(joined)
-}
-
-/// Returns the lattice points of the vertices of `part`.
-fn lattice_points(frame: &Frame, part: &TilePart) -> Result<Vec<[i32; 3]>, VertexOffLattice> {
-    let inverse = frame.inverse();
-    let point = |v| {
-        let world = part.world(v);
-        inverse.integers(world).ok_or(VertexOffLattice(world))
-    };
-    (0..part.positions.len()).map(point).collect()
 }
 
 impl Joined {
