@@ -92,11 +92,10 @@ impl AcceptanceCheck {
         let mut inverted = false;
         let fetched = &mut self.tester.corners;
         for ((record, triangle), fetched) in block.as_chunks::<8>().0.iter().zip(triangles).zip(fetched) {
-            let corners = [record[0], record[1], record[2]];
-            if corners[0].max(corners[1]).max(corners[2]) >= n as u32 {
+            let [a, b, c] = [record[0] as usize, record[1] as usize, record[2] as usize];
+            if a >= n || b >= n || c >= n {
                 return Err(Rejection::NotAccepted("a corner is no site"));
             }
-            let [a, b, c] = [corners[0] as usize, corners[1] as usize, corners[2] as usize];
             let [p, q, r] = [sites[a], sites[b], sites[c]];
             *fetched = [p, q, r];
             inverted |= orient2d(p, q, r) <= 0;

@@ -59,9 +59,9 @@ fn insert(
         let h = sides[side.corner()];
         let g = mesh.twin(h);
         mesh.flip(h);
-        flips.suspects.extend([h, h.previous(), g, g.previous()]);
+        flips.suspects.push(g.previous());
     }
-    flips.run(mesh, sites)?;
+    flips.run_around(mesh, sites)?;
     Ok(sides[0])
 }
 
@@ -72,26 +72,29 @@ fn locate(
     near: ClosedEdge,
     flips: &mut FlipQueue,
 ) -> Result<InsertionPoint, Rejection> {
+    let turn = |h: ClosedEdge| orient2d(mesh.origin(h).site(sites), mesh.destination(h).site(sites), p);
     let mut h = start(mesh, near, flips)?;
-    loop {
-        flips.step()?;
-        let edges = [h, h.next(), h.previous()];
-        let [a, b, c] = edges.map(|edge| mesh.origin(edge).site(sites));
-        let turns = [orient2d(a, b, p), orient2d(b, c, p), orient2d(c, a, p)];
-        match turns.iter().position(|&turn| turn < 0) {
-            Some(i) => {
-                h = mesh.twin(edges[i]);
-                if mesh.is_ghost(h) {
-                    return Ok(InsertionPoint { triangle: h, on: None });
-                }
-            }
-            None => {
-                let mut on = edges.into_iter().zip(turns).filter(|&(_, turn)| turn == 0).map(|(edge, _)| edge);
-                let place = InsertionPoint { triangle: h, on: on.next() };
-                return on.next().map_or(Ok(place), |_| Err(Rejection::NotAccepted("two sites in one place")));
-            }
-        }
+    if turn(h) < 0 {
+        h = mesh.twin(h);
     }
+    // From here on the site does not lie to the right of `h`, so that two sides of each triangle are left to look at.
+    while mesh.apex(h) != mesh.infinity() {
+        flips.step()?;
+        let side = match (turn(h.next()) < 0, turn(h.previous()) < 0) {
+            (true, _) => h.next(),
+            (false, true) => h.previous(),
+            (false, false) => return inside(h, h.triangle().sides().map(turn)),
+        };
+        h = mesh.twin(side);
+    }
+    Ok(InsertionPoint { triangle: h, on: None })
+}
+
+/// Returns the place of a site that lies in the triangle of `h`, given how its sides turn to the site.
+fn inside(h: ClosedEdge, turns: [i64; 3]) -> Result<InsertionPoint, Rejection> {
+    let mut on = h.triangle().sides().into_iter().zip(turns).filter(|&(_, turn)| turn == 0).map(|(side, _)| side);
+    let place = InsertionPoint { triangle: h, on: on.next() };
+    on.next().map_or(Ok(place), |_| Err(Rejection::NotAccepted("two sites in one place")))
 }
 
 /// Returns a half-edge of a finite triangle: that of `near`, its neighbour if `near` is a ghost, or one that comes soon after it.

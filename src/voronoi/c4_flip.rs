@@ -65,6 +65,22 @@ impl FlipQueue {
         Ok(())
     }
 
+    /// Flips edges until every edge is Delaunay. The suspects are the sides, opposite to a new vertex, of all its triangles. A flip
+    /// gives the vertex one more edge, which is Delaunay because the mesh was Delaunay without the vertex. So only sides opposite to it
+    /// are tested.
+    pub(super) fn run_around(&mut self, mesh: &mut ClosedMesh, sites: &[Site]) -> Result<(), Rejection> {
+        while let Some(h) = self.suspects.pop() {
+            if mesh.fails(sites, h) {
+                self.step()?;
+                self.done += 1;
+                let g = mesh.twin(h);
+                mesh.flip(h);
+                self.suspects.extend([h, g.previous()]);
+            }
+        }
+        Ok(())
+    }
+
     #[inline(always)]
     fn flip(&mut self, mesh: &mut ClosedMesh, h: ClosedEdge) -> Result<(), Rejection> {
         self.step()?;

@@ -9,6 +9,7 @@ use crate::mesh::index::SiteIndex;
 use crate::voronoi::c3_insert::MissingSite;
 use crate::voronoi::counts::PipelineCounts;
 use crate::voronoi::index::VertexIndex;
+use crate::voronoi::pixel_map::PixelMap;
 use crate::voronoi::rejection::Rejection;
 use crate::voronoi::texture_request::{TextureRequest, pixels_along};
 
@@ -58,8 +59,8 @@ impl SiteTexture {
         request: &TextureRequest,
         counts: &mut PipelineCounts,
     ) -> Result<(), Rejection> {
-        let scale = self.fit(sites, request)?;
-        self.sort_by_row(sites, scale);
+        let map = self.fit(sites, request)?;
+        self.sort_by_row(sites, &map);
         self.clear(sites.len());
         let max_missing = (MAX_MISSING * sites.len() as f64) as usize;
         for y in 0..self.height {
@@ -81,8 +82,8 @@ impl SiteTexture {
         self.vertices[64 * self.words * y + x]
     }
 
-    /// Chooses a width and height in the proportions of the sites' bounding box; returns the origin and the pixels per lattice step.
-    fn fit(&mut self, sites: &[Site], request: &TextureRequest) -> Result<(Site, f64), Rejection> {
+    /// Chooses a width and height in the proportions of the sites' bounding box; returns where the pixels lie.
+    fn fit(&mut self, sites: &[Site], request: &TextureRequest) -> Result<PixelMap, Rejection> {
         let bounds = Bounds::of_points(sites.iter().copied()).ok_or(Rejection::TooFew)?;
         let within_reach = |c: &i32| (-REACH..=REACH).contains(c);
         if !bounds.min.iter().chain(&bounds.max).all(within_reach) {
@@ -92,7 +93,11 @@ impl SiteTexture {
         let scale = request.scale(extent, sites.len());
         [self.width, self.height] = extent.map(|side| pixels_along(side, scale));
         self.words = self.width.div_ceil(64);
-        Ok((bounds.min, scale))
+        let map = PixelMap::new(sites, bounds.min, extent, scale);
+        match map.missing(sites, [self.width, self.height]) > MAX_MISSING {
+            true => Err(Rejection::Crowded),
+            false => Ok(map),
+        }
     }
 
     /// Returns the missing sites, each with its pixel (y << 16 | x).
@@ -102,14 +107,11 @@ impl SiteTexture {
     }
 
     /// Fills `rows` and `row_ends`.
-    fn sort_by_row(&mut self, sites: &[Site], (low, scale): (Site, f64)) {
+    fn sort_by_row(&mut self, sites: &[Site], map: &PixelMap) {
         self.row_ends.clear();
         self.row_ends.resize(self.height + 1, 0);
         self.pixels.clear();
-        self.pixels.extend(sites.iter().map(|site| {
-            let pixel = |i: usize| ((site[i] - low[i]) as f64 * scale) as i32 as u32;
-            pixel(1) << 16 | pixel(0)
-        }));
+        map.append_to(&mut self.pixels, sites.iter());
         for &pixel in &self.pixels {
             self.row_ends[(pixel >> 16) as usize + 1] += 1;
         }

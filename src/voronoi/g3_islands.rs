@@ -13,14 +13,14 @@ use crate::voronoi::index::{ClosedEdge, VertexIndex};
 use crate::voronoi::rejection::Rejection;
 use std::cmp::Reverse;
 
-/// Fans with more triangles than this are not followed.
+/// Fans with as many triangles as this are not followed.
 const MAX_TRIANGLES: usize = 64;
 
 /// Buffers of the search.
 #[derive(Default)]
 pub(super) struct IslandSearch {
-    /// The number of triangles that have a vertex as a corner, by vertex.
-    degrees: Vec<u16>,
+    /// The number of triangles that have a vertex as a corner, by vertex. That of the vertex at infinity includes free records.
+    degrees: Vec<u32>,
     fans: Vec<TriangleFan>,
 }
 
@@ -91,19 +91,16 @@ impl IslandSearch {
 
     /// Returns a half-edge that starts at a vertex whose only triangles are two of `fan`.
     fn enclosed(&self, mesh: &ClosedMesh, fan: &TriangleFan) -> Option<ClosedEdge> {
-        let turn = |outgoing: &ClosedEdge| Some(mesh.twin(outgoing.previous()));
-        let sides = std::iter::successors(Some(fan.outgoing), turn).take(fan.degree.0).map(ClosedEdge::next);
-        let mut behind = sides.map(|side| mesh.twin(side));
+        let mut behind = around(mesh, fan.outgoing).map(|outgoing| mesh.twin(outgoing.next()));
         behind.find(|&h| mesh.origin(h) != mesh.infinity() && self.degrees[mesh.origin(h).get()] == 2)
     }
 
     fn count_degrees(&mut self, mesh: &ClosedMesh, sites: usize) {
         self.degrees.clear();
         self.degrees.resize(sites, 0);
-        for corners in mesh.triangles().filter_map(|t| mesh.corners(t)) {
-            for vertex in corners {
-                let degree = &mut self.degrees[vertex.get()];
-                *degree = degree.saturating_add(1);
+        for record in mesh.records()[mesh.front().get()..].as_chunks::<8>().0 {
+            for &vertex in &record[..3] {
+                self.degrees[vertex as usize] += 1;
             }
         }
     }
@@ -111,30 +108,33 @@ impl IslandSearch {
     /// Lists the fans that have an inverted triangle and are not the only fan of their vertex.
     fn find_fans(&mut self, mesh: &ClosedMesh, sites: &[Site], inverted: &[ClosedEdge]) {
         self.fans.clear();
-        for h in inverted.iter().flat_map(|t| t.sides()) {
-            let fan = fan(mesh, sites, h).filter(|fan| fan.degree.0 < self.degrees[fan.vertex.get()] as usize);
-            self.fans.extend(fan);
+        for h in inverted.iter().filter(|&&t| !mesh.is_free(t)).flat_map(|t| t.sides()) {
+            // Nearly all fans are the only one.
+            if around(mesh, h).count() < self.degrees[mesh.origin(h).get()] as usize {
+                self.fans.extend(fan(mesh, sites, h));
+            }
         }
         self.fans.sort_unstable();
         self.fans.dedup();
     }
 }
 
-/// Returns the fan around the origin of `h`, if the triangle of `h` still exists.
+/// Returns the half-edges that start where `h` starts, `h` first, but not more than [`MAX_TRIANGLES`].
+fn around(mesh: &ClosedMesh, h: ClosedEdge) -> impl Iterator<Item = ClosedEdge> {
+    let turn = move |outgoing: &ClosedEdge| Some(mesh.twin(outgoing.previous())).filter(|&next| next != h);
+    std::iter::successors(Some(h), turn).take(MAX_TRIANGLES)
+}
+
+/// Returns the fan around the origin of `h`, if the triangle of `h` still exists and the fan is small.
 fn fan(mesh: &ClosedMesh, sites: &[Site], h: ClosedEdge) -> Option<TriangleFan> {
     if mesh.is_free(h) {
         return None;
     }
     let mut fan = TriangleFan { vertex: mesh.origin(h), inverted: 0, degree: Reverse(0), outgoing: h };
-    let mut outgoing = h;
-    while fan.degree.0 < MAX_TRIANGLES {
+    for outgoing in around(mesh, h) {
         fan.inverted += is_inverted(mesh, sites, outgoing) as usize;
         fan.degree.0 += 1;
         fan.outgoing = fan.outgoing.min(outgoing);
-        outgoing = mesh.twin(outgoing.previous());
-        if outgoing == h {
-            return Some(fan);
-        }
     }
-    None
+    (fan.degree.0 < MAX_TRIANGLES).then_some(fan)
 }

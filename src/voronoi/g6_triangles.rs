@@ -86,8 +86,12 @@ impl TextureScan {
 
     /// Returns a triangle near the site of a pixel (y << 16 | x).
     pub(super) fn start_near(&self, pixel: u32) -> ClosedEdge {
-        let words = self.floors.len() - 1;
-        self.starts[(pixel >> 16) as usize * words + (pixel & 0xffff) as usize / 64]
+        let (words, x) = (self.floors.len() - 1, pixel & 0xffff);
+        let word = (pixel >> 16) as usize * words + x as usize / 64;
+        let (first, end) = (self.starts[word], self.starts[word + 1]);
+        // The triangles of a word were made from the west to the east.
+        let made = (end.0 - first.0) / 8;
+        ClosedEdge(first.0 + made * (x % 64) / 64 * 8)
     }
 
     /// Visits the corners between two rows. To the west of corner x lies pixel x - 1, which has index x in a row.

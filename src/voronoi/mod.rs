@@ -6,7 +6,7 @@
 //!
 //! | step | on this thread | on a device | then on this thread |
 //! |---|---|---|---|
-//! | G1 | `g1_write_sites`: writes the sites into a texture; losers move or are missing | `g1_write_sites` | |
+//! | G1 | `g1_write_sites`: writes the sites into a texture; losers move or are missing; `pixel_map`: where sites crowd, pixels are small | `g1_write_sites` | |
 //! | G2 | `g2_voronoi`: labels each pixel with its nearest site, one row at a time | `g2_voronoi_exact`, or `g2_voronoi_jfa` | |
 //! | G3 | `g3_islands`, after G6: removes the triangles that pieces of torn regions have made | `g3_islands`: gives the pieces other colours | |
 //! | G4-G6 | `g6_triangles`: makes linked triangles where colours meet, with C2's tests and C4's flips while the row is in the cache | `g4_vertices`, `g5_count`, `g6_triangles` | `device_mesh`: checks all numbers |
@@ -18,7 +18,8 @@
 //!
 //! `completion` has the steps from C2 on, which are the same for both ways. They differ from the paper in some ways:
 //!
-//! - G1: a site that loses its pixel moves to a free neighbour, where the paper leaves it out. So C3, which is slow, has less to do.
+//! - G1: a site that loses its pixel moves to a free neighbour, where the paper leaves it out. So C3, which is slow, has less to do. Where
+//!   sites crowd along an axis, columns or rows are narrower. So one texture does for clusters.
 //! - G2: the diagram is exact, where the paper floods by jumps and gets some pixels wrong. Two passes also cost less than a dozen.
 //! - G4-G6: triangles are linked when they are made, and ghost triangles beyond the hull close the mesh. So no step needs a search for
 //!   neighbours, and the hull is no special case.
@@ -47,6 +48,7 @@ mod g3_islands;
 mod g6_triangles;
 mod index;
 pub mod mesh_reply;
+mod pixel_map;
 pub mod rejection;
 #[cfg(test)]
 pub(crate) mod test_cases;

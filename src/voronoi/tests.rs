@@ -47,6 +47,18 @@ fn uniform_sites_are_never_rejected() {
     }
 }
 
+/// In square pixels, nearly all sites of a spot would share a few.
+#[test]
+fn a_leaf_with_dense_spots_is_accepted() {
+    let mut random = Random(3);
+    let spots: Vec<Site> = (0..3).map(|_| [random.below(1 << 25), random.below(1 << 25)]).collect();
+    let mut offset = || (0..4).map(|_| random.below(1 << 18)).sum::<i32>();
+    let sites: BTreeSet<Site> = (0..20_000).map(|i| spots[i % 3].map(|c| c + offset())).collect();
+    let sites: Vec<Site> = sites.into_iter().collect();
+    let (_, counts) = triangulate(&sites, &mut PipelineBuffers::default()).unwrap();
+    assert!(counts.missing < counts.sites / 3, "{counts:?}");
+}
+
 /// Between two sites far out on a circle a region is thin and falls apart. Its pieces lie within pieces of the next region.
 #[test]
 fn islands_within_islands_are_removed() {
@@ -60,7 +72,7 @@ fn islands_within_islands_are_removed() {
             Err(why) => assert_eq!(why, Rejection::Crowded, "{sites:?}"),
         }
     }
-    assert!(islands > 100, "{islands}");
+    assert!(islands > 50, "{islands}");
 }
 
 #[test]

@@ -1,0 +1,140 @@
+//! Which pixel a site belongs to. Where sites lie evenly, pixels are squares. Where they crowd, as in clusters, columns are narrower there,
+//! and so are rows: fewer sites then share a pixel. The mesh is the same with any pixels, because later steps move all sites to their true
+//! places and repair what that breaks.
+//!
+//! Width and height of the pixels follow the sites along each axis alone, so that their order stays along both. They follow the root of
+//! the density: where pixels are far from square, the diagram is less like that of the sites, and more edges must be flipped.
+
+use crate::geometry::Site;
+use crate::voronoi::texture_request::pixels_along;
+
+/// The parts of each axis that have pixels of one size.
+const BINS: usize = 256;
+/// About so many sites are looked at to find out how the sites are spread.
+const SAMPLE: usize = 1 << 12;
+/// The texture has up to so many blocks along each axis, in which the sites of the sample are counted.
+const BLOCKS: usize = 32;
+/// If a site shares its part of both axes with more others than this, relative to evenly spread sites, the pixels are adapted.
+const MAX_CROWDING: f64 = 3.0;
+/// The part of an axis that has no sites gets so much of the pixels, relative to a part with the mean number.
+const LEAST: f64 = 0.03;
+
+/// The map from lattice points to pixels. Pixel (x, y) is column x from the west, row y from the south.
+pub(super) struct PixelMap {
+    low: Site,
+    /// Pixels per lattice step, if they are squares.
+    scale: f64,
+    /// Otherwise the columns and the rows.
+    adapted: Option<[AxisMap; 2]>,
+}
+
+/// The columns or rows of a texture.
+struct AxisMap {
+    bins_per_step: f64,
+    /// The first pixel of every part of the axis, and its number of pixels.
+    parts: Vec<[f64; 2]>,
+    last: u32,
+}
+
+impl PixelMap {
+    /// Returns the pixels for `sites`, whose box is `extent` steps wide and high and begins at `low`.
+    pub(super) fn new(sites: &[Site], low: Site, extent: [f64; 2], scale: f64) -> PixelMap {
+        let histograms = histograms(sites, low, extent);
+        let crowding = histograms.iter().map(crowding).product::<f64>();
+        let axis = |axis: usize| AxisMap::new(&histograms[axis], extent[axis], pixels_along(extent[axis], scale));
+        PixelMap { low, scale, adapted: (crowding > MAX_CROWDING).then(|| [0, 1].map(axis)) }
+    }
+
+    /// Appends the pixel (y << 16 | x) of each site to `pixels`.
+    pub(super) fn append_to<'a>(&self, pixels: &mut Vec<u32>, sites: impl ExactSizeIterator<Item = &'a Site>) {
+        let join = |[x, y]: [u32; 2]| y << 16 | x;
+        let pixel = |site: &Site, axis: usize| (self.steps(site, axis) * self.scale) as i32 as u32;
+        match &self.adapted {
+            None => pixels.extend(sites.map(|site| join([0, 1].map(|axis| pixel(site, axis))))),
+            Some(axes) => {
+                pixels.extend(sites.map(|site| join([0, 1].map(|axis| axes[axis].pixel(self.steps(site, axis))))))
+            }
+        }
+    }
+
+    /// Returns about which part of `sites` has no pixel of its own in a texture of `size` pixels, or less: how the sites are spread within
+    /// blocks of the texture is left out. This takes a small part of the time of writing them. Of few sites it says nothing.
+    pub(super) fn missing(&self, sites: &[Site], size: [usize; 2]) -> f64 {
+        if sites.len() < SAMPLE {
+            return 0.0;
+        }
+        let mut counts = [[0u32; BLOCKS]; BLOCKS];
+        let mut pixels = Vec::with_capacity(SAMPLE);
+        self.append_to(&mut pixels, sample(sites));
+        let shifts = size.map(|side| (side.div_ceil(BLOCKS)).next_power_of_two().ilog2());
+        for pixel in &pixels {
+            counts[(pixel >> 16 >> shifts[1]) as usize][((pixel & 0xffff) >> shifts[0]) as usize] += 1;
+        }
+        // Sites that lose their pixels may move out of the block, one pixel to the west or east.
+        let pixels_per_block = f64::from(((1u32 << shifts[0]) + 2) << shifts[1]);
+        let room = pixels_per_block * pixels.len() as f64 / sites.len() as f64;
+        let missing = counts.as_flattened().iter().map(|&count| (f64::from(count) - room).max(0.0)).sum::<f64>();
+        missing / pixels.len() as f64
+    }
+
+    #[inline(always)]
+    fn steps(&self, site: &Site, axis: usize) -> f64 {
+        f64::from(site[axis] - self.low[axis])
+    }
+}
+
+impl AxisMap {
+    fn new(histogram: &[u32; BINS], extent: f64, pixels: usize) -> AxisMap {
+        let mean = f64::from(histogram.iter().sum::<u32>()) / BINS as f64;
+        let weight = |bin: usize| {
+            // Pixels whose size changes by degrees keep more of the diagram.
+            let around = [bin.saturating_sub(1), bin, bin, (bin + 1).min(BINS - 1)];
+            let density = around.map(|i| f64::from(histogram[i])).iter().sum::<f64>() / (4.0 * mean);
+            density.sqrt() + LEAST
+        };
+        let weights: Vec<f64> = (0..BINS).map(weight).collect();
+        let pixels_per_weight = pixels as f64 / weights.iter().sum::<f64>();
+        let mut first = 0.0;
+        let part = |weight: &f64| {
+            let part = [first, weight * pixels_per_weight];
+            first += part[1];
+            part
+        };
+        let parts = weights.iter().map(part).collect();
+        AxisMap { bins_per_step: BINS as f64 / extent, parts, last: pixels as u32 - 1 }
+    }
+
+    /// Returns the pixel at `steps` lattice steps from the first one.
+    #[inline(always)]
+    fn pixel(&self, steps: f64) -> u32 {
+        let bins = steps * self.bins_per_step;
+        let bin = (bins as usize).min(BINS - 1);
+        let [first, pixels] = self.parts[bin];
+        ((first + (bins - bin as f64) * pixels) as u32).min(self.last)
+    }
+}
+
+/// Returns every site of a few, a sample of many.
+fn sample(sites: &[Site]) -> impl ExactSizeIterator<Item = &Site> {
+    sites.iter().step_by(sites.len().div_ceil(SAMPLE))
+}
+
+/// Counts the sites of a sample along both axes.
+fn histograms(sites: &[Site], low: Site, extent: [f64; 2]) -> [[u32; BINS]; 2] {
+    let bins_per_step = extent.map(|extent| BINS as f64 / extent);
+    let mut histograms = [[0; BINS]; 2];
+    for site in sample(sites) {
+        for axis in 0..2 {
+            let bin = (f64::from(site[axis] - low[axis]) * bins_per_step[axis]) as usize;
+            histograms[axis][bin.min(BINS - 1)] += 1;
+        }
+    }
+    histograms
+}
+
+/// Returns with how many sites a site shares its part of the axis, relative to evenly spread sites.
+fn crowding(histogram: &[u32; BINS]) -> f64 {
+    let sum = |power: i32| histogram.iter().map(|&count| f64::from(count).powi(power)).sum::<f64>();
+    // Where there are few sites, chance alone puts some together.
+    BINS as f64 * (sum(2) - sum(1)) / sum(1).powi(2)
+}
