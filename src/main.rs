@@ -21,7 +21,7 @@ use gdt_batch::submit::request::Request;
 use gdt_batch::submit::{Engine, kubernetes, slurm};
 use gdt_batch::threads::{self, on_threads};
 use gdt_batch::verify::Conclusion;
-use gdt_batch::{Error, Result, config, init, input, interrupt, manual, sample, say, shortage, verify};
+use gdt_batch::{Error, Result, completions, config, init, input, interrupt, manual, sample, say, shortage, verify};
 use serde::Serialize;
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
@@ -79,7 +79,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
             sample::write(file, *points, *seed, *overwrite).map(|()| ExitCode::SUCCESS)
         }
         (Some(CliCommand::Completions { shell }), _) => {
-            print_text(&manual::completions(*shell)).map(|()| ExitCode::SUCCESS)
+            print_text(&completions::script(*shell)).map(|()| ExitCode::SUCCESS)
         }
         (Some(CliCommand::Man { command }), _) => {
             print_text(&manual::man(command.as_deref())?).map(|()| ExitCode::SUCCESS)

@@ -1,9 +1,8 @@
-//! The man page and the completions of shells, made from the definition of the command line.
+//! The man page, made from the definition of the command line.
 
 use crate::cli::Cli;
 use crate::{Error, Result};
 use clap::{Command, CommandFactory};
-use clap_complete::Shell;
 use clap_mangen::Man;
 use roff::{Roff, roman};
 use std::io;
@@ -13,14 +12,6 @@ const PROGRAM: &str = "gdt-batch";
 
 /// The part of the manual that programs are in.
 const MANUAL: &str = "User Commands";
-
-/// Returns the script that lets `shell` complete the command line.
-pub fn completions(shell: Shell) -> String {
-    let mut script = Vec::new();
-    clap_complete::generate(shell, &mut Cli::command(), PROGRAM, &mut script);
-    // clap_complete 4.6 has two names for one function of bash if the program's name has a hyphen, so that options were not completed.
-    String::from_utf8_lossy(&script).replace("gdt__subcmd__batch", "gdt__batch")
-}
 
 /// Returns the man page of all commands, or of the one of this name, in roff.
 ///
@@ -130,7 +121,6 @@ fn notes(all: &Command) -> Roff {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::ValueEnum;
 
     /// Returns the commands, and the options of all of them with their dashes.
     fn names() -> (Vec<String>, Vec<String>) {
@@ -140,18 +130,6 @@ mod tests {
         let arguments = commands.iter().chain([&all]).flat_map(Command::get_arguments).filter(|a| !a.is_hide_set());
         let long = arguments.filter_map(|argument| argument.get_long()).map(|name| format!("--{name}"));
         (commands.iter().map(|command| command.get_name().to_string()).collect(), long.collect())
-    }
-
-    #[test]
-    fn completions_of_every_shell_have_all_commands_and_options() {
-        let (commands, options) = names();
-        assert!(commands.len() >= 12 && options.len() > 30, "{commands:?} {options:?}");
-        for shell in Shell::value_variants() {
-            let script = completions(*shell);
-            let found = |name: &String| script.contains(name.trim_start_matches('-'));
-            let lost: Vec<&String> = commands.iter().chain(&options).filter(|name| !found(name)).collect();
-            assert!(lost.is_empty() && script.contains(PROGRAM), "{shell}: {lost:?}");
-        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 
 use crate::job::phase::{Phase, PhaseTasks};
 use crate::submit::request::Request;
-use crate::submit::shell::quoted;
+use crate::shell_word::quoted;
 use crate::{Error, Result, interrupt, say, threads};
 use std::ffi::OsString;
 use std::process::{Child, Command, ExitStatus, Stdio};

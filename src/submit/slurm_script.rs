@@ -5,7 +5,7 @@
 
 use crate::job::phase::{Phase, PhaseTasks};
 use crate::submit::request::Request;
-use crate::submit::shell::quoted;
+use crate::shell_word::quoted;
 use std::path::{Path, PathBuf};
 
 /// The name of the engine, with which its folder ends.
