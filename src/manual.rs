@@ -36,12 +36,21 @@ pub fn man(command: Option<&str>) -> Result<String> {
     Ok(with_one_preamble(&String::from_utf8_lossy(&page)))
 }
 
-/// Returns the page with the definitions that every section begins with once, at its beginning.
+/// Returns the page with the definitions that every section begins with once, at its beginning, and with an empty date in its title.
 fn with_one_preamble(page: &str) -> String {
-    let is_definition = |line: &&str| line.starts_with(".ie ") || line.starts_with(".el ");
     let start = page.lines().take_while(is_definition);
     let rest = page.lines().filter(|line| !is_definition(line));
-    start.chain(rest).map(|line| format!("{line}\n")).collect()
+    start.chain(rest).map(|line| format!("{}\n", dated(line))).collect()
+}
+
+/// Tells whether every section begins with this line.
+fn is_definition(line: &&str) -> bool {
+    line.starts_with(".ie ") || line.starts_with(".el ")
+}
+
+/// Returns the line of the title with an empty date: clap_mangen leaves it out, so that the version is shown as the date.
+fn dated(line: &str) -> String {
+    if line.starts_with(".TH ") { line.replacen("  \"", " \"\" \"", 1) } else { line.trim_end().into() }
 }
 
 /// Returns the commands that help shows.
@@ -76,14 +85,18 @@ fn write_command(command: Command, page: &mut Vec<u8>) -> io::Result<()> {
     let is_common = |argument: &clap::Arg| argument.is_global_set() || argument.get_id() == "help";
     let command = command.mut_args(|argument| if is_common(&argument) { argument.hide(true) } else { argument });
     let own = Man::new(command);
+    let mut is_first = true;
     for render in [Man::render_synopsis_section, Man::render_description_section, Man::render_options_section] {
         let mut section = Vec::new();
         render(&own, &mut section)?;
         let text = String::from_utf8_lossy(&section);
         // The section of the command has no headings in it.
-        let lines = text.lines().filter(|line| !line.starts_with(".SH "));
+        let lines = text.lines().filter(|line| !line.starts_with(".SH ") && !is_definition(line));
         let text: String = lines.map(|line| format!("{line}\n")).collect();
-        page.extend_from_slice(b".PP\n");
+        // Headings and options are apart from what stands before them.
+        if !std::mem::take(&mut is_first) && !text.starts_with('.') {
+            page.extend_from_slice(b".PP\n");
+        }
         page.extend_from_slice(text.as_bytes());
     }
     Ok(())
@@ -148,6 +161,8 @@ mod tests {
             "{page}"
         );
         assert!(!page.contains("--fresh"));
+        assert!(page.contains(concat!(".TH gdt-batch 1 \"\" \"gdt-batch ", env!("CARGO_PKG_VERSION"), "\"")), "{page}");
+        assert!(!page.contains("\"\n.PP\n") && !page.contains(".PP\n."), "no paragraph is empty: {page}");
         // The options of all commands are said once.
         assert_eq!(page.matches("Print the result as JSON").count(), 1);
     }
