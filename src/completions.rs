@@ -76,7 +76,8 @@ fn without(all: &Command, name: &str) -> Command {
 /// PowerShell and Elvish.
 fn with_values_as_commands(all: &Command) -> Command {
     all.clone().mut_subcommands(|command| {
-        let values = command.get_positionals().flat_map(Arg::get_possible_values).map(|value| value.get_name().to_string());
+        let values =
+            command.get_positionals().flat_map(Arg::get_possible_values).map(|value| value.get_name().to_string());
         // Fish would find the command itself among those that have been given already.
         let values: Vec<String> = values.filter(|value| value != command.get_name()).collect();
         if values.is_empty() {

@@ -181,7 +181,8 @@ fn zsh_completes_what_is_behind_a_command() {
         return;
     };
     let said = String::from_utf8_lossy(&output.stdout);
-    let lines: Vec<&str> = said.split("LINE:").skip(1).filter_map(|rest| rest.split(':').next()).map(str::trim).collect();
+    let lines: Vec<&str> =
+        said.split("LINE:").skip(1).filter_map(|rest| rest.split(':').next()).map(str::trim).collect();
     assert_eq!(lines, whole, "{output:?}");
 }
 
