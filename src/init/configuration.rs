@@ -4,7 +4,8 @@ use crate::init::draft::{Draft, NeededLine, quoted};
 use crate::init::findings::{Findings, NO_UNIT_OF_HEIGHTS, rectangle, unit_of_heights};
 use crate::init::needs::Runnable;
 use crate::init::page::Page;
-use crate::input::{Crs, Source, Unit};
+use crate::input::{Source, Unit};
+use crate::job::plan::job_plan::Plan;
 use crate::job::preflight::check::Preflight;
 use crate::output::page::is_built_in;
 
@@ -161,11 +162,11 @@ pub(crate) fn summary_of(line: &NeededLine) -> String {
     format!("{} = {}: {}", line.key, line.value, line.why)
 }
 
-/// Returns what the summary says of the units of the system `crs` of a job.
-pub(crate) fn units_of(preflight: &Preflight, crs: &Crs) -> String {
-    match crs.horizontal {
+/// Returns what the summary says of the units of a job.
+pub(crate) fn units_of(preflight: &Preflight, plan: &Plan) -> String {
+    match plan.crs.horizontal {
         Unit::Unknown => format!("{} (no file says it)", preflight.unit),
-        unit => match unit_of_heights(crs) {
+        unit => match unit_of_heights(plan) {
             Some(z) => format!("{} in x and y, {} in z", unit.name(), z.name()),
             None => format!("{} in x and y; {NO_UNIT_OF_HEIGHTS}", unit.name()),
         },

@@ -101,15 +101,16 @@ fn unit(sources: &[&Source], plan: &Plan, is_unknown: bool) -> String {
         false => "as the names of columns say",
     };
     let xy = plan.crs.horizontal.name();
-    match unit_of_heights(&plan.crs) {
+    match unit_of_heights(plan) {
         Some(z) => format!("Unit: {xy} in x and y, {} in z, {by}.", z.name()),
         None => format!("Unit: {xy} in x and y, {by}; {NO_UNIT_OF_HEIGHTS}."),
     }
 }
 
-/// Returns the unit of z, if anything says it.
-pub(crate) fn unit_of_heights(crs: &Crs) -> Option<Unit> {
-    crs.vertical.map(|metres| Unit::from_metres(Some(metres)))
+/// Returns the unit of z, if a file says it. Points that are transformed get one in any case.
+pub(crate) fn unit_of_heights(plan: &Plan) -> Option<Unit> {
+    let is_said = plan.inputs.iter().any(|input| input.source.own_crs().vertical.is_some());
+    plan.crs.vertical.filter(|_| is_said).map(|metres| Unit::from_metres(Some(metres)))
 }
 
 fn crs(draft: &Draft, sources: &[&Source], plan: &Plan) -> String {

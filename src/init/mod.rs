@@ -98,7 +98,7 @@ pub fn init(clouds: &[PathBuf], file: &Path, replace: bool) -> Result<NewConfigu
         file: file.map(Path::to_path_buf),
         needed: found.draft.needed,
         notes,
-        unit: units_of(&found.preflight, &found.plan.crs),
+        unit: units_of(&found.preflight, &found.plan),
         check: found.preflight,
         text,
         misfit: found.misfit,
