@@ -170,10 +170,11 @@ fn zsh_completes_what_is_behind_a_command() {
         "gdt-batch man verify",
     ];
     let begun = "'gdt-batch init --fo' 'gdt-batch jo' 'gdt-batch job.toml --res' 'gdt-batch com' 'gdt-batch man ver'";
+    // The terminal shows what is typed too, so the marks are typed otherwise.
     let terminal = format!(
         "zmodload zsh/zpty; zpty z zsh -f -i; zpty -w z \"PS1= PS2=; autoload -Uz compinit; compinit -u -D; source completions; \
          compdef _gdt-batch gdt-batch; w() {{ for BUFFER in {begun}; do CURSOR=\\$#BUFFER; zle complete-word; \
-         print -r -- LINE\"\":\\$BUFFER:; done; print THE\"\"END; exit }}; zle -N w; bindkey '^I' w\"; \
+         print -r -- LI''NE:\\$BUFFER:; done; print THE''END; exit }}; zle -N w; bindkey '^I' w\"; \
          zpty -w -n z $'\\t'; zpty -r z said '*THEEND*'; print -r -- $said"
     );
     let Ok(output) = Command::new("zsh").args(["-f", "-c", &terminal]).current_dir(folder.path()).output() else {

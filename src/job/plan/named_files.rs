@@ -72,14 +72,14 @@ fn links_back(start: &str) -> Result<Vec<PathBuf>> {
     Ok(links)
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
 mod tests {
-    use super::*;
-    use std::fs;
-    use std::os::unix::fs::symlink;
-
+    #[cfg(unix)]
     #[test]
     fn a_search_ends_though_links_lead_back() {
+        use super::files_of;
+        use std::fs;
+        use std::os::unix::fs::symlink;
         let root = tempfile::tempdir().unwrap();
         let folder = root.path().join("a/b");
         fs::create_dir_all(&folder).unwrap();
