@@ -127,8 +127,8 @@ fn colors_can_show_class_or_height_or_be_left_out() {
 #[test]
 fn normals_are_unit_vectors_or_left_out() {
     let (_, tile) = Square::new().run();
-    for [x, y, z] in tile.parts[0].normals.as_ref().unwrap() {
-        assert!(*y > 0.0 && (x * x + y * y + z * z - 1.0).abs() < 1e-5, "points up and has length one");
+    for [x, y, z] in tile.parts[0].normals.as_ref().unwrap().iter() {
+        assert!(y > 0.0 && (x * x + y * y + z * z - 1.0).abs() < 1e-5, "points up and has length one");
     }
     let (_, bare) = Square::new().with("output", "normals = false").run();
     assert!(bare.parts[0].normals.is_none() && bare.parts[0].colors.is_some());

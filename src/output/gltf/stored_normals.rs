@@ -39,4 +39,16 @@ impl StoredNormals {
             StoredNormals::OctahedralBytes(all) => of_bytes(from_octahedral(all[v])),
         }
     }
+
+    /// Returns all normals, as [`StoredNormals::get`] does.
+    pub fn iter(&self) -> impl Iterator<Item = [f32; 3]> {
+        (0..self.count()).map(|v| self.get(v))
+    }
+}
+
+/// Normals are the same if viewers see the same, in whichever form they are stored.
+impl PartialEq for StoredNormals {
+    fn eq(&self, other: &StoredNormals) -> bool {
+        self.iter().eq(other.iter())
+    }
 }
