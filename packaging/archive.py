@@ -13,7 +13,9 @@ import time
 import zipfile
 from pathlib import Path
 
-EPOCH = int(os.environ.get("SOURCE_DATE_EPOCH", "315532800"))
+# 1980, before which a .zip knows no times.
+FIRST_OF_ZIP = 315532800
+EPOCH = int(os.environ.get("SOURCE_DATE_EPOCH", FIRST_OF_ZIP))
 
 
 def files_of(folder):
@@ -40,20 +42,32 @@ def zipped(folder):
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         for path in files_of(folder):
-            entry = zipfile.ZipInfo(path.relative_to(folder.parent).as_posix(), time.gmtime(EPOCH)[:6])
+            entry = zipfile.ZipInfo(path.relative_to(folder.parent).as_posix(), time.gmtime(max(EPOCH, FIRST_OF_ZIP))[:6])
             entry.external_attr = (0o100000 | mode_of(path)) << 16
             archive.writestr(entry, path.read_bytes(), zipfile.ZIP_DEFLATED)
     return packed.getvalue()
 
 
+def replace(file, data):
+    """Writes a file whole or not at all."""
+    new = file.with_name(file.name + ".new")
+    new.write_bytes(data)
+    new.replace(file)
+
+
 def main(folder):
+    if not files_of(folder):
+        sys.exit(f"archive.py: there is no file in {folder}: run packaging/build first")
     is_windows = any((folder / "bin").glob("*.exe"))
     archive = folder.with_name(folder.name + (".zip" if is_windows else ".tar.gz"))
     data = zipped(folder) if is_windows else tar_gz(folder)
-    archive.write_bytes(data)
     checksum = hashlib.sha256(data).hexdigest()
+    beside = archive.with_name(archive.name + ".sha256")
+    # An archive never stands beside the checksum of another one.
+    beside.unlink(missing_ok=True)
+    replace(archive, data)
     # In the form of `sha256sum`, which also checks it.
-    archive.with_name(archive.name + ".sha256").write_text(f"{checksum}  {archive.name}\n", newline="\n")
+    replace(beside, f"{checksum}  {archive.name}\n".encode())
     print(f"{archive}: {len(data) / 1e6:.1f} MB, SHA-256 {checksum}")
 
 

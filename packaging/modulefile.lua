@@ -14,5 +14,13 @@ man gdt-batch               tells the rest
 ]])
 
 prepend_path("PATH", pathJoin(root, "bin"))
-prepend_path("MANPATH", pathJoin(root, "share/man"))
+-- Without MANPATH, man finds share/man beside the folders of PATH; with it, man looks nowhere else.
+if os.getenv("MANPATH") then
+  prepend_path("MANPATH", pathJoin(root, "share/man"))
+end
+-- Without XDG_DATA_DIRS these two count; with it, only what it names.
+if not os.getenv("XDG_DATA_DIRS") then
+  append_path("XDG_DATA_DIRS", "/usr/local/share")
+  append_path("XDG_DATA_DIRS", "/usr/share")
+end
 prepend_path("XDG_DATA_DIRS", pathJoin(root, "share"))

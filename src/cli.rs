@@ -24,7 +24,7 @@ The shortest configuration:
   files = [\"clouds/*.laz\"]
   [output]
   directory = \"out\"
-`gdt-batch init` writes one with more options in it; configs/full.toml explains all.
+`gdt-batch init` writes one with more options in it; the manual explains all in options.md.
 
 After an interruption, run the same command again: the job continues where it stopped.
 
@@ -85,7 +85,7 @@ pub enum CliCommand {
         /// The configuration to write; - for standard output.
         #[arg(long, short, value_name = "FILE", default_value = "job.toml")]
         output: PathBuf,
-        /// Replace the configuration if it is there.
+        /// Replace the configuration if it is there. Any other file stays.
         #[arg(long)]
         force: bool,
     },

@@ -5,6 +5,7 @@
 use clap::Parser;
 use gdt_batch::cli::{Cli, CliCommand, PrintOptions, ViewOptions};
 use gdt_batch::gpu_trial;
+use gdt_batch::init::NewConfiguration;
 use gdt_batch::input::histogram::Histogram;
 use gdt_batch::input::info::{SourceDescription, describe};
 use gdt_batch::job;
@@ -21,7 +22,7 @@ use gdt_batch::submit::request::Request;
 use gdt_batch::submit::{Engine, kubernetes, slurm};
 use gdt_batch::threads::{self, on_threads};
 use gdt_batch::verify::Conclusion;
-use gdt_batch::{Error, Result, config, init, input, interrupt, manual, sample, say, shortage, verify};
+use gdt_batch::{Error, Result, completions, config, init, input, interrupt, manual, sample, say, shortage, verify};
 use serde::Serialize;
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
@@ -79,7 +80,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
             sample::write(file, *points, *seed, *overwrite).map(|()| ExitCode::SUCCESS)
         }
         (Some(CliCommand::Completions { shell }), _) => {
-            print_text(&manual::completions(*shell)).map(|()| ExitCode::SUCCESS)
+            print_text(&completions::script(*shell)).map(|()| ExitCode::SUCCESS)
         }
         (Some(CliCommand::Man { command }), _) => {
             print_text(&manual::man(command.as_deref())?).map(|()| ExitCode::SUCCESS)
@@ -185,7 +186,7 @@ fn submit(engine: Engine, request: &Request, added: &[String], print: PrintOptio
     Ok(ExitCode::SUCCESS)
 }
 
-/// Writes a configuration for point clouds. If the job does not fit this machine, the error says so once it is written.
+/// Writes a configuration for point clouds. If the job does not fit this machine, a message says so once it is written.
 fn write_configuration(clouds: &[PathBuf], file: &Path, force: bool, print: PrintOptions) -> Result<ExitCode> {
     let is_printed = file == Path::new("-");
     if is_printed && print.json {
@@ -196,10 +197,24 @@ fn write_configuration(clouds: &[PathBuf], file: &Path, force: bool, print: Prin
     let made = on_threads(threads::available(), || init::init(clouds, file, force))?;
     if is_printed {
         print_text(&made.text)?;
-    } else {
-        print_result(&made, print)?;
+        return made.misfit.map_or(Ok(ExitCode::SUCCESS), Err);
     }
-    made.misfit.map_or(Ok(ExitCode::SUCCESS), Err)
+    show_configuration(&made, file, print)?;
+    let Some(misfit) = made.misfit else { return Ok(ExitCode::SUCCESS) };
+    say(&format!("error: {} is written, but its job would stop: {misfit}", file.display()));
+    Ok(ExitCode::from(misfit.exit_code()))
+}
+
+/// Prints what a configuration says that was written. If that fails, it is there nevertheless: to write it again would be refused.
+fn show_configuration(made: &NewConfiguration, file: &Path, print: PrintOptions) -> Result<()> {
+    let Err(error) = print_result(made, print) else { return Ok(()) };
+    let done = format!("{} is written", file.display());
+    if print.json {
+        say(&done);
+        return Err(error);
+    }
+    say(&format!("{done}, but what it says cannot be shown: {error}"));
+    Ok(())
 }
 
 fn check_job(path: &Path, print: PrintOptions) -> Result<ExitCode> {

@@ -1,16 +1,15 @@
 //! Which point clouds the arguments of `init` mean, and what the configuration calls them.
 
 use crate::init::config_folder::{ConfigFolder, named};
+use crate::init::folder_files::{FolderFiles, LASER, TEXT, kind_of, leads_nowhere};
 use crate::input::{self, TextOptions, is_url};
 use crate::{Error, Result};
 use std::collections::{BTreeMap, HashSet};
+use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
-/// The endings of the names of LAS and LAZ files.
-const LASER: [&str; 2] = ["las", "laz"];
-
-/// The endings of texts that may be point clouds, in a folder that has no LAS and no LAZ.
-const TEXT: [&str; 6] = ["csv", "txt", "xyz", "asc", "pts", "tsv"];
+/// The signs that have a meaning in patterns.
+const SIGNS: [char; 3] = ['*', '?', '['];
 
 /// So many files that are all of their kind in a folder are named by a pattern.
 const MANY: usize = 6;
@@ -28,7 +27,7 @@ impl NamedClouds {
     /// Returns the clouds that `arguments` name: files, folders, or patterns. Without any, those of the current folder.
     ///
     /// # Errors
-    /// [`Error::Config`] if there is none, or one whose name no configuration can hold; [`Error::Io`] if a folder cannot be read.
+    /// [`Error::Config`] if there is none, or one whose name no configuration can hold; [`Error::Io`] if something cannot be read.
     pub(crate) fn of(arguments: &[PathBuf], config: &ConfigFolder) -> Result<NamedClouds> {
         let mut clouds = NamedClouds::default();
         if arguments.is_empty() {
@@ -36,22 +35,19 @@ impl NamedClouds {
         }
         let mut files = Vec::new();
         for argument in arguments {
-            if let Some(url) = argument.to_str().filter(|name| is_url(name)) {
-                // Its query may be a secret.
-                let place = url.split('?').next().unwrap_or_default();
-                return Err(Error::Config(format!(
-                    "{place}: init looks at files of this machine only; write URLs into [input] files yourself"
-                )));
-            }
-            if argument.is_dir() {
-                clouds.add_folder(argument, config)?;
-            } else if argument.symlink_metadata().is_ok() {
-                files.push(argument.clone());
-            } else {
-                clouds.add_pattern(argument, config)?;
+            refuse_url(argument)?;
+            match argument.metadata() {
+                Ok(data) if data.is_dir() => clouds.add_folder(argument, config)?,
+                Ok(_) => files.push(argument.clone()),
+                Err(error) if error.kind() == ErrorKind::NotFound && argument.is_symlink() => {
+                    return Err(Error::Config(leads_nowhere(argument)));
+                }
+                Err(error) => clouds.add_pattern(argument, config, error)?,
             }
         }
         clouds.add_files(files, config)?;
+        let mut known = HashSet::new();
+        clouds.patterns.retain(|pattern| known.insert(pattern.clone()));
         Ok(clouds)
     }
 
@@ -65,11 +61,8 @@ impl NamedClouds {
         for ((folder, ending), mut group) in groups {
             group.sort();
             group.dedup();
-            let is_kind = |path: &PathBuf| kind_of(path).1 == ending;
-            let is_whole = group.len() >= MANY && !ending.is_empty() && {
-                let all: Vec<PathBuf> = files_in(&folder)?.into_iter().filter(is_kind).collect();
-                all == group
-            };
+            let is_whole =
+                group.len() >= MANY && !ending.is_empty() && FolderFiles::of(&folder)?.of_kind(&ending) == group;
             if is_whole {
                 self.patterns.push(config.pattern(&folder, &format!("*.{ending}"))?);
                 by_pattern.extend(group);
@@ -83,25 +76,22 @@ impl NamedClouds {
 
     /// Adds the clouds of a folder: LAS and LAZ, or, if it has none, the texts that are point clouds.
     fn add_folder(&mut self, folder: &Path, config: &ConfigFolder) -> Result<()> {
-        let files = files_in(folder)?;
-        let of = |endings: &[&str]| -> Vec<PathBuf> {
-            let is_one = |path: &&PathBuf| endings.contains(&kind_of(path).1.to_ascii_lowercase().as_str());
-            files.iter().filter(is_one).filter(|path| path.to_str().is_some()).cloned().collect()
-        };
-        let (laser, texts) = (of(&LASER), of(&TEXT));
+        let files = FolderFiles::of(folder)?;
+        let (laser, texts) = (files.with_endings(&LASER), files.with_endings(&TEXT));
         if let Some(first) = texts.first().filter(|_| !laser.is_empty()) {
             let (texts, them) = some(texts.len(), first);
             self.notes.push(format!("{texts} left out beside LAS and LAZ: name {them} to read {them} too"));
         }
-        let clouds = if laser.is_empty() { self.point_clouds(texts) } else { laser };
+        let (clouds, others) = if laser.is_empty() { point_clouds(texts)? } else { (laser, Vec::new()) };
         if clouds.is_empty() {
-            return Err(nothing_in(folder));
+            return Err(files.nothing_in(others.first()));
         }
+        self.notes.extend(others.iter().map(|why| format!("left out, because it is no point cloud: {why}")));
+        self.notes.extend(files.broken_clouds().map(|link| format!("left out: {}", leads_nowhere(link))));
         let mut by_ending: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
         clouds.iter().for_each(|path| by_ending.entry(kind_of(path).1).or_default().push(path.clone()));
         for (ending, group) in by_ending {
-            let all = files.iter().filter(|path| kind_of(path).1 == ending).count();
-            if group.len() > 1 && group.len() == all {
+            if group.len() > 1 && group.len() == files.of_kind(&ending).len() {
                 self.patterns.push(config.pattern(folder, &format!("*.{ending}"))?);
             } else {
                 self.patterns.extend(group.iter().map(|file| config.name(file)).collect::<Result<Vec<_>>>()?);
@@ -110,55 +100,64 @@ impl NamedClouds {
         Ok(())
     }
 
-    /// Returns those of `texts` that are point clouds, and notes that the others are not.
-    fn point_clouds(&mut self, texts: Vec<PathBuf>) -> Vec<PathBuf> {
-        let mut clouds = Vec::new();
-        for text in texts {
-            match input::open(&text, &TextOptions::default()) {
-                Ok(_) => clouds.push(text),
-                Err(why) => self.notes.push(format!("left out, because it is no point cloud: {why}")),
-            }
-        }
-        clouds
-    }
-
-    /// Adds a pattern such as `clouds/*.laz`.
-    fn add_pattern(&mut self, pattern: &Path, config: &ConfigFolder) -> Result<()> {
-        let missing = || Error::Config(format!("there is no file {}: correct its name", pattern.display()));
-        let text = pattern.to_str().filter(|text| text.contains(['*', '?', '['])).ok_or_else(missing)?;
+    /// Adds a pattern such as `clouds/*.laz`. `error` is why no file has this name.
+    fn add_pattern(&mut self, pattern: &Path, config: &ConfigFolder, error: io::Error) -> Result<()> {
+        let Some(text) = pattern.to_str().filter(|text| text.contains(SIGNS)) else {
+            return Err(missing(pattern, pattern, error));
+        };
         // The path before the first sign with a meaning is a folder.
-        let signs = text.find(['*', '?', '[']).unwrap_or(0);
+        let signs = text.find(SIGNS).unwrap_or(0);
         let (folder, rest) = match text[..signs].rfind(std::path::is_separator) {
             None => ("", text),
             Some(0) => ("/", &text[1..]),
             Some(at) => (&text[..at], &text[at + 1..]),
         };
-        if !named(Path::new(folder)).is_dir() {
-            return Err(missing());
+        let folder = Path::new(folder);
+        match named(folder).metadata() {
+            Ok(data) if data.is_dir() => {}
+            Ok(_) => return Err(missing(pattern, folder, ErrorKind::NotADirectory.into())),
+            Err(error) => return Err(missing(pattern, folder, error)),
         }
-        self.patterns.push(config.pattern(Path::new(folder), rest)?);
+        self.patterns.push(config.pattern(folder, rest)?);
         Ok(())
     }
 }
 
-/// Returns the folder and the ending of a file.
-fn kind_of(path: &Path) -> (PathBuf, String) {
-    let ending = path.extension().unwrap_or_default().to_string_lossy().into_owned();
-    (path.parent().unwrap_or(Path::new("")).to_path_buf(), ending)
+fn refuse_url(argument: &Path) -> Result<()> {
+    match argument.to_str().filter(|name| is_url(name)) {
+        // Its query may be a secret.
+        Some(url) => Err(Error::Config(format!(
+            "{}: init looks at files of this machine only; write URLs into [input] files yourself",
+            url.split('?').next().unwrap_or_default()
+        ))),
+        None => Ok(()),
+    }
 }
 
-/// Returns the files in a folder, by their names.
-fn files_in(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(named(folder)).map_err(Error::io("read", folder))?;
-    let mut files = Vec::new();
-    for entry in entries {
-        let path = folder.join(entry.map_err(Error::io("read", folder))?.file_name());
-        if path.is_file() {
-            files.push(path);
+/// Returns the error for an argument that names nothing, because of `error` at `path`.
+fn missing(argument: &Path, path: &Path, error: io::Error) -> Error {
+    match error.kind() {
+        ErrorKind::NotFound | ErrorKind::NotADirectory => {
+            Error::Config(format!("there is no file {}: correct its name", argument.display()))
+        }
+        _ => Error::io("read", path)(error),
+    }
+}
+
+/// Returns those of `texts` that are point clouds, and why the others are none.
+///
+/// # Errors
+/// [`Error::Io`] if one cannot be read: it may be a point cloud.
+fn point_clouds(texts: Vec<PathBuf>) -> Result<(Vec<PathBuf>, Vec<Error>)> {
+    let (mut clouds, mut others) = (Vec::new(), Vec::new());
+    for text in texts {
+        match input::open(&text, &TextOptions::default()) {
+            Ok(_) => clouds.push(text),
+            Err(why @ Error::Input { .. }) => others.push(why),
+            Err(error) => return Err(error),
         }
     }
-    files.sort();
-    Ok(files)
+    Ok((clouds, others))
 }
 
 /// Says that some texts are, and what to call them.
@@ -169,25 +168,6 @@ fn some(count: usize, first: &Path) -> (String, &'static str) {
     }
 }
 
-/// Returns the error for a folder without point clouds. It names folders in it that have some.
-fn nothing_in(folder: &Path) -> Error {
-    let entries = std::fs::read_dir(named(folder)).into_iter().flatten().flatten();
-    let has_clouds = |path: &PathBuf| {
-        let is_laser = |file: &PathBuf| LASER.contains(&kind_of(file).1.to_ascii_lowercase().as_str());
-        path.is_dir() && files_in(path).is_ok_and(|files| files.iter().any(is_laser))
-    };
-    let mut others: Vec<PathBuf> = entries.map(|entry| folder.join(entry.file_name())).filter(has_clouds).collect();
-    others.sort();
-    let others = match others.first() {
-        Some(other) => format!(", such as {}, which has some", other.display()),
-        None => String::new(),
-    };
-    Error::Config(format!(
-        "{} has no point clouds (.las, .laz, or texts such as .csv and .xyz): name files or folders{others}",
-        named(folder).display()
-    ))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -195,7 +175,7 @@ mod tests {
 
     /// Returns what a configuration in `root` calls the clouds that are meant, or the error, and the notes.
     fn clouds(root: &Path, arguments: &[&str]) -> (Vec<String>, Vec<String>) {
-        let config = ConfigFolder::of(&root.join("job.toml")).unwrap();
+        let config = ConfigFolder::of(Some(&root.join("job.toml"))).unwrap();
         let arguments: Vec<PathBuf> = arguments.iter().map(|name| root.join(name)).collect();
         match NamedClouds::of(&arguments, &config) {
             Ok(clouds) => (clouds.patterns, clouds.notes),
@@ -238,6 +218,45 @@ mod tests {
         write(&root, &["a/1.laz"]);
         fs::write(root.join("a").join(std::ffi::OsStr::from_bytes(b"\xff.laz")), "").unwrap();
         assert_eq!(clouds(&root, &["a"]).0, ["a/1.laz"]);
+        fs::remove_file(root.join("a/1.laz")).unwrap();
+        let (found, _) = clouds(&root, &["a"]);
+        assert!(found[0].contains("has no point clouds") && found[0].contains("rename it"), "{found:?}");
+    }
+
+    #[test]
+    fn a_folder_without_clouds_says_why_its_texts_are_none() {
+        let root = tempfile::tempdir().unwrap();
+        let root = root.path().canonicalize().unwrap();
+        write(&root, &["a/1.laz"]);
+        fs::create_dir(root.join("b")).unwrap();
+        fs::write(root.join("b/abc.csv"), "a,b,c\n1,2,3\n").unwrap();
+        let (found, _) = clouds(&root, &["b"]);
+        assert!(found[0].contains("b has no point clouds") && found[0].contains("abc.csv: "), "{found:?}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_that_lead_nowhere_are_named() {
+        let root = tempfile::tempdir().unwrap();
+        let root = root.path().canonicalize().unwrap();
+        write(&root, &["a/1.laz", "a/2.laz"]);
+        fs::create_dir(root.join("b")).unwrap();
+        for link in ["a/3.laz", "b/1.laz"] {
+            std::os::unix::fs::symlink("gone.laz", root.join(link)).unwrap();
+        }
+        let (found, notes) = clouds(&root, &["a"]);
+        // A pattern would match the link too.
+        assert_eq!(found, ["a/1.laz", "a/2.laz"]);
+        assert!(notes.len() == 1 && notes[0].contains("3.laz is a link to a file that is not there"), "{notes:?}");
+        for argument in ["a/3.laz", "b"] {
+            let (found, _) = clouds(&root, &[argument]);
+            assert!(found[0].contains(".laz is a link to a file that is not there"), "{found:?}");
+        }
+        // What cannot be read may be a cloud.
+        write(&root, &["c/1.csv"]);
+        std::os::unix::fs::symlink("2.csv", root.join("c/2.csv")).unwrap();
+        let (found, _) = clouds(&root, &["c"]);
+        assert!(found[0].contains("cannot read") && found[0].contains("2.csv"), "{found:?}");
     }
 
     #[test]
@@ -250,7 +269,7 @@ mod tests {
         write(&root, &["b/1.csv", "b/[2].csv"]);
         assert_eq!(clouds(&root, &names[1..]).0, names[1..]);
         assert_eq!(clouds(&root, &names).0, ["a/*.laz"]);
-        assert_eq!(clouds(&root, &["b/[2].csv", "b/1.csv"]).0, ["b/[[]2[]].csv", "b/1.csv"]);
+        assert_eq!(clouds(&root, &["b/[2].csv", "b/1.csv", "b/./1.csv"]).0, ["b/[[]2[]].csv", "b/1.csv"]);
         assert_eq!(clouds(&root, &["b/*.csv", "a/[12].la?"]).0, ["b/*.csv", "a/[12].la?"]);
         for name in ["b/2.csv", "no/*.csv"] {
             assert!(clouds(&root, &[name]).0[0].contains("there is no file"), "{name}");

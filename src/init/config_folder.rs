@@ -10,14 +10,18 @@ pub(crate) struct ConfigFolder {
     /// The same without links.
     real: PathBuf,
     is_current: bool,
+    /// Whether the configuration may be moved anywhere, because it has no file yet.
+    is_open: bool,
 }
 
 impl ConfigFolder {
-    /// Returns the folder of the configuration at `file`.
+    /// Returns the folder of the configuration at `file`; without one, the current folder.
     ///
     /// # Errors
     /// [`Error::Config`] if there is no such folder.
-    pub(crate) fn of(file: &Path) -> Result<ConfigFolder> {
+    pub(crate) fn of(file: Option<&Path>) -> Result<ConfigFolder> {
+        let is_open = file.is_none();
+        let file = file.unwrap_or(Path::new(""));
         let path = file.parent().unwrap_or(Path::new("")).to_path_buf();
         if !named(&path).is_dir() {
             let (file, path) = (file.display(), path.display());
@@ -25,7 +29,7 @@ impl ConfigFolder {
         }
         let (real, current) = (real(&path)?, real(Path::new(""))?);
         let is_current = real == current;
-        Ok(ConfigFolder { path, real, is_current })
+        Ok(ConfigFolder { path, real, is_current, is_open })
     }
 
     /// Returns what the configuration calls the file at `path`: a pattern that no other file matches.
@@ -53,6 +57,9 @@ impl ConfigFolder {
     fn way_to(&self, folder: &Path) -> Result<PathBuf> {
         if self.is_current && folder.is_relative() {
             return Ok(folder.strip_prefix(".").unwrap_or(folder).to_path_buf());
+        }
+        if self.is_open && folder.is_absolute() {
+            return Ok(folder.to_path_buf());
         }
         let target = real(folder)?;
         if let Ok(below) = target.strip_prefix(&self.real) {
@@ -109,7 +116,7 @@ mod tests {
     /// A folder that is not the current one.
     fn folder_in(root: &Path, name: &str) -> ConfigFolder {
         fs::create_dir_all(root.join(name)).unwrap();
-        ConfigFolder::of(&root.join(name).join("job.toml")).unwrap()
+        ConfigFolder::of(Some(&root.join(name).join("job.toml"))).unwrap()
     }
 
     #[test]
@@ -153,12 +160,20 @@ mod tests {
         assert_eq!(name("other/a.laz"), real.join("other/a.laz").to_str().unwrap());
         assert_eq!(here.pattern(&real.join("jobs/east/clouds"), "*.laz").unwrap(), "clouds/*.laz");
         assert_eq!(here.pattern(&real.join("jobs/east"), "*.laz").unwrap(), "*.laz");
+        // So does every one in a configuration that is printed, and may be written anywhere.
+        let printed = ConfigFolder::of(None).unwrap();
+        let absolute = std::env::current_dir().unwrap();
+        assert_eq!(
+            printed.pattern(&absolute, "*.laz").unwrap(),
+            format!("{}/*.laz", absolute.to_str().unwrap().replace('\\', "/"))
+        );
+        assert_eq!(printed.name(Path::new("./a.laz")).unwrap(), "a.laz");
     }
 
     #[test]
     fn a_folder_that_is_not_there_is_refused() {
         let root = tempfile::tempdir().unwrap();
-        let what = ConfigFolder::of(&root.path().join("no/job.toml")).err().unwrap();
+        let what = ConfigFolder::of(Some(&root.path().join("no/job.toml"))).err().unwrap();
         assert!(what.exit_code() == 2 && what.to_string().contains("make it first"), "{what}");
     }
 
@@ -167,7 +182,7 @@ mod tests {
     fn a_name_that_is_no_text_is_refused() {
         use std::os::unix::ffi::OsStrExt;
         let name = std::ffi::OsStr::from_bytes(b"a\xff.laz");
-        let here = ConfigFolder::of(Path::new("job.toml")).unwrap();
+        let here = ConfigFolder::of(None).unwrap();
         let what = here.name(Path::new(name)).unwrap_err();
         assert!(what.exit_code() == 2 && what.to_string().contains("not UTF-8"), "{what}");
     }

@@ -1,16 +1,20 @@
 //! The text of a configuration: what was found, what is needed, and what may be changed.
 
 use crate::init::draft::{Draft, NeededLine, quoted};
-use crate::init::findings::{Findings, rectangle, unit_of_heights};
+use crate::init::findings::{Findings, NO_UNIT_OF_HEIGHTS, rectangle, unit_of_heights};
 use crate::init::needs::Runnable;
 use crate::init::page::Page;
-use crate::input::{Crs, Source, Unit};
+use crate::input::{Source, Unit};
+use crate::job::plan::job_plan::Plan;
 use crate::job::preflight::check::Preflight;
 use crate::output::page::is_built_in;
 
-/// Returns the text of the configuration. `name` is that of its file, if it has one; `notes` are about files that are left out.
+/// What every configuration begins with that `init` writes.
+pub(crate) const FIRST_WORDS: &str = "A job for gdt-batch";
+
+/// Returns the text of the configuration. `name` is that of its file for a shell, if it has one; `notes` are about files that are left out.
 pub(crate) fn text_of(runnable: &Runnable, name: Option<&str>, notes: &[String]) -> String {
-    let Runnable { draft, preflight, plan, misfit } = runnable;
+    let Runnable { draft, preflight, plan, misfit, offers } = runnable;
     let sources: Vec<&Source> = plan.inputs.iter().map(|input| &input.source).collect();
     let findings = Findings::of(draft, preflight, plan);
     let mut page = Page::default();
@@ -26,8 +30,8 @@ pub(crate) fn text_of(runnable: &Runnable, name: Option<&str>, notes: &[String])
         page.blank();
         warnings.iter().for_each(|warning| page.say(&format!("Warning: {warning}.")));
     }
-    about_surface(&mut page, &findings, preflight, &sources);
-    about_coordinates(&mut page, &findings, draft, plan.crs.is_named());
+    about_surface(&mut page, &findings, &sources, offers.ground);
+    about_coordinates(&mut page, &findings, draft, (plan.crs.is_named(), offers.utm));
     about_area(&mut page, &sources);
     about_output(&mut page, draft, preflight);
     page.blank();
@@ -46,13 +50,14 @@ pub(crate) fn text_of(runnable: &Runnable, name: Option<&str>, notes: &[String])
 }
 
 fn head(page: &mut Page, name: Option<&str>) {
-    page.say("A job for gdt-batch, written by `gdt-batch init`.");
+    page.say(&format!("{FIRST_WORDS}, written by `gdt-batch init`."));
     if let Some(name) = name {
         page.show(&format!("gdt-batch check {name}"), "says what it would do");
         page.show(&format!("gdt-batch {name}"), "runs it");
     }
     page.say("A line with # and no blank after it is an option that is off: remove the # to use it.");
-    page.say("configs/full.toml in the sources of gdt-batch explains all options.");
+    page.say("The manual explains all options in options.md. So does full.toml: it is in configs/ of the sources and of archives, and in \
+              share/doc/gdt-batch/ of installed packages.");
 }
 
 fn files(patterns: &[String]) -> String {
@@ -65,12 +70,11 @@ fn files(patterns: &[String]) -> String {
     }
 }
 
-fn about_surface(page: &mut Page, findings: &Findings, preflight: &Preflight, sources: &[&Source]) {
-    let shares = preflight.surface_sample;
+fn about_surface(page: &mut Page, findings: &Findings, sources: &[&Source], has_ground: bool) {
     page.blank();
     page.say(&findings.classes);
     page.say(&findings.surface);
-    if shares.ground > 0 && shares.ground < shares.points {
+    if has_ground {
         page.offer("surface = \"ground\"", "bare earth: only points on the ground and on water");
     }
     if sources.iter().any(|source| source.by_return.iter().skip(1).any(|count| *count > 0)) {
@@ -78,7 +82,7 @@ fn about_surface(page: &mut Page, findings: &Findings, preflight: &Preflight, so
     }
 }
 
-fn about_coordinates(page: &mut Page, findings: &Findings, draft: &Draft, is_named: bool) {
+fn about_coordinates(page: &mut Page, findings: &Findings, draft: &Draft, (is_named, utm): (bool, bool)) {
     page.blank();
     page.say(&findings.unit);
     // What is transformed takes its unit from its system.
@@ -92,7 +96,7 @@ fn about_coordinates(page: &mut Page, findings: &Findings, draft: &Draft, is_nam
     if !draft.sets("crs") && !draft.sets("missing_crs") {
         page.offer("crs = \"EPSG:26915\"", what);
     }
-    if !draft.sets("to_crs") && is_named {
+    if utm {
         page.offer("to_crs = \"utm\"", "or a code: transforms all points into another CRS");
     }
 }
@@ -158,10 +162,13 @@ pub(crate) fn summary_of(line: &NeededLine) -> String {
     format!("{} = {}: {}", line.key, line.value, line.why)
 }
 
-/// Returns what the summary says of the units of the system `crs` of a job.
-pub(crate) fn units_of(preflight: &Preflight, crs: &Crs) -> String {
-    match crs.horizontal {
+/// Returns what the summary says of the units of a job.
+pub(crate) fn units_of(preflight: &Preflight, plan: &Plan) -> String {
+    match plan.crs.horizontal {
         Unit::Unknown => format!("{} (no file says it)", preflight.unit),
-        unit => format!("{} in x and y, {} in z", unit.name(), unit_of_heights(crs)),
+        unit => match unit_of_heights(plan) {
+            Some(z) => format!("{} in x and y, {} in z", unit.name(), z.name()),
+            None => format!("{} in x and y; {NO_UNIT_OF_HEIGHTS}", unit.name()),
+        },
     }
 }

@@ -10,6 +10,9 @@ use crate::job::progress::number_text::{grouped, mebibytes};
 /// The most systems that a sentence names.
 const MOST_NAMED: usize = 3;
 
+/// What is said of the unit of z where no file says it, and no name of a column.
+pub(crate) const NO_UNIT_OF_HEIGHTS: &str = "nothing says the unit of z: that of x and y is taken";
+
 /// A map of a zone is badly distorted over areas that are wider, in metres.
 const WIDE: f64 = 1e6;
 
@@ -93,17 +96,21 @@ fn unit(sources: &[&Source], plan: &Plan, is_unknown: bool) -> String {
     if is_unknown {
         return "Unit: no file says it, so metres are taken. If the coordinates are in feet, say so here:".into();
     }
-    let z = unit_of_heights(&plan.crs);
     let by = match sources.iter().any(|source| source.own_crs().is_named()) || plan.crs.is_named() {
         true => "as the coordinate reference system says",
         false => "as the names of columns say",
     };
-    format!("Unit: {} in x and y, {z} in z, {by}.", plan.crs.horizontal.name())
+    let xy = plan.crs.horizontal.name();
+    match unit_of_heights(plan) {
+        Some(z) => format!("Unit: {xy} in x and y, {} in z, {by}.", z.name()),
+        None => format!("Unit: {xy} in x and y, {by}; {NO_UNIT_OF_HEIGHTS}."),
+    }
 }
 
-/// Returns the name of the unit of z: that of x and y, if nothing else is said.
-pub(crate) fn unit_of_heights(crs: &Crs) -> String {
-    crs.vertical.map_or(crs.horizontal.name(), |metres| Unit::from_metres(Some(metres)).name())
+/// Returns the unit of z, if a file says it. Points that are transformed get one in any case.
+pub(crate) fn unit_of_heights(plan: &Plan) -> Option<Unit> {
+    let is_said = plan.inputs.iter().any(|input| input.source.own_crs().vertical.is_some());
+    plan.crs.vertical.filter(|_| is_said).map(|metres| Unit::from_metres(Some(metres)))
 }
 
 fn crs(draft: &Draft, sources: &[&Source], plan: &Plan) -> String {

@@ -4,27 +4,36 @@
 
 mod bad_files;
 mod clouds;
+mod config_file;
 mod config_folder;
 mod configuration;
 mod draft;
 mod findings;
+mod folder_files;
 mod needs;
+mod offers;
 mod page;
+mod refusals;
 mod systems;
+mod triangle;
 
 use crate::init::clouds::NamedClouds;
+use crate::init::config_file::{check_is_no_cloud, check_may_be_written, write};
 use crate::init::config_folder::ConfigFolder;
 use crate::init::configuration::{summary_of, text_of, units_of};
 use crate::init::draft::{Draft, options_of};
 use crate::init::needs::runnable;
+use crate::init::page::harmless;
+use crate::init::refusals::with_way_out;
 use crate::job::durable::directory::JobDirectory;
 use crate::job::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours};
+use crate::job::plan::inputs::input_paths;
 use crate::job::preflight::check::Preflight;
 use crate::job::progress::number_text::{grouped, mebibytes};
+use crate::shell_word::quoted;
 use crate::{Error, Result};
 use serde::Serialize;
 use std::fmt;
-use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 pub use crate::init::draft::NeededLine;
@@ -38,6 +47,9 @@ const STANDARD_OUTPUT: &str = "-";
 /// The first name of the output directory, and how many others are tried if something is in its way.
 const DIRECTORY: &str = "out";
 const MOST_DIRECTORIES: usize = 100;
+
+/// The most bytes of a configuration's name that its output directory has in its own: no system takes more than 255, and others follow.
+const LONGEST_STEM: usize = 100;
 
 /// A configuration that was made.
 #[derive(Debug, Serialize)]
@@ -64,16 +76,20 @@ pub struct NewConfiguration {
 ///
 /// # Errors
 /// [`Error::Config`] if the file is there and may not be replaced, or there are no clouds; that of `check` if no configuration makes a job
-/// of them; [`Error::Io`] if it cannot be written.
+/// of them; [`Error::Io`] if it cannot be written. A file is replaced only if it is a configuration.
 pub fn init(clouds: &[PathBuf], file: &Path, replace: bool) -> Result<NewConfiguration> {
     let file = Some(file).filter(|file| *file != Path::new(STANDARD_OUTPUT));
     if let Some(file) = file {
         check_may_be_written(file, replace)?;
     }
-    let folder = ConfigFolder::of(file.unwrap_or(Path::new("job.toml")))?;
-    let NamedClouds { patterns, notes } = NamedClouds::of(clouds, &folder)?;
-    let found = runnable(Draft::new(patterns, free_directory(&folder.path, file)?, &folder))?;
-    let text = text_of(&found, file.map(|file| file.display().to_string()).as_deref(), &notes);
+    let folder = ConfigFolder::of(file)?;
+    let NamedClouds { patterns, notes } = NamedClouds::of(clouds, &folder).map_err(with_way_out)?;
+    let draft = Draft::new(patterns, free_directory(&folder.path, file)?, &folder);
+    if let Some(file) = file.filter(|file| file.exists()) {
+        check_is_no_cloud(file, &input_paths(&draft.options()?.input)?)?;
+    }
+    let found = runnable(draft).map_err(with_way_out)?;
+    let text = text_of(&found, file.map(as_argument).as_deref(), &notes);
     options_of(&text, &folder.path)?;
     if let Some(file) = file {
         write(file, &text, replace)?;
@@ -82,35 +98,17 @@ pub fn init(clouds: &[PathBuf], file: &Path, replace: bool) -> Result<NewConfigu
         file: file.map(Path::to_path_buf),
         needed: found.draft.needed,
         notes,
-        unit: units_of(&found.preflight, &found.plan.crs),
+        unit: units_of(&found.preflight, &found.plan),
         check: found.preflight,
         text,
         misfit: found.misfit,
     })
 }
 
-fn check_may_be_written(file: &Path, replace: bool) -> Result<()> {
-    let Ok(data) = file.metadata() else { return Ok(()) };
-    if !data.is_file() {
-        return Err(Error::Config(format!(
-            "{} is there and is no regular file: give another name, or - for standard output",
-            file.display()
-        )));
-    }
-    if replace { Ok(()) } else { Err(exists_already(file)) }
-}
-
-fn exists_already(file: &Path) -> Error {
-    Error::Config(format!(
-        "{} exists already: give another name with --output, or add --force to replace it",
-        file.display()
-    ))
-}
-
 /// Returns an output directory in which nothing is in the way of a job, except the results of an earlier one. A configuration that is not
 /// called job.toml has one of its own, so that two of them can stand in one folder.
 fn free_directory(folder: &Path, file: Option<&Path>) -> Result<String> {
-    let stem = file.and_then(Path::file_stem).and_then(|stem| stem.to_str()).unwrap_or("job");
+    let stem = file.and_then(Path::file_stem).and_then(|stem| stem.to_str()).map_or("job".into(), plain);
     let first = if stem == "job" { DIRECTORY.to_string() } else { format!("{DIRECTORY}-{stem}") };
     let is_free = |name: &String| {
         let directory = JobDirectory::new(&folder.join(name));
@@ -124,37 +122,24 @@ fn free_directory(folder: &Path, file: Option<&Path>) -> Result<String> {
     }
 }
 
-/// Writes the file whole or not at all.
-fn write(file: &Path, text: &str, replace: bool) -> Result<()> {
-    let failed = |error: std::io::Error| match error.kind() {
-        ErrorKind::AlreadyExists => exists_already(file),
-        _ => Error::io("write", file)(error),
-    };
-    let folder = config_folder::named(file.parent().unwrap_or(Path::new("")));
-    let mut new = builder().tempfile_in(folder).map_err(failed)?;
-    new.write_all(text.as_bytes()).map_err(failed)?;
-    let placed = if replace { new.persist(file) } else { new.persist_noclobber(file) };
-    placed.map(drop).map_err(|error| failed(error.error))
+/// Returns the beginning of a name without signs that mean something in a configuration, in a shell or to a system.
+fn plain(name: &str) -> String {
+    let is_plain = |sign: char| sign.is_alphanumeric() || "-_.+=, ".contains(sign);
+    let signs = name.char_indices().take_while(|(at, sign)| at + sign.len_utf8() <= LONGEST_STEM);
+    let name: String = signs.map(|(_, sign)| if is_plain(sign) { sign } else { '_' }).collect();
+    name.trim_end_matches([' ', '.']).into()
 }
 
-/// Returns what makes files with the permissions that others of the user have.
-#[cfg(unix)]
-fn builder() -> tempfile::Builder<'static, 'static> {
-    use std::os::unix::fs::PermissionsExt;
-    let mut builder = tempfile::Builder::new();
-    builder.permissions(std::fs::Permissions::from_mode(0o666));
-    builder
-}
-
-#[cfg(not(unix))]
-fn builder() -> tempfile::Builder<'static, 'static> {
-    tempfile::Builder::new()
+/// Returns a file as an argument of a command that a shell reads.
+fn as_argument(file: &Path) -> String {
+    let name = file.display().to_string();
+    quoted(&if name.starts_with('-') { format!("./{name}") } else { name })
 }
 
 impl fmt::Display for NewConfiguration {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Preflight { files, records, crs, surface, memory, disk, warnings, .. } = &self.check;
-        let mut row = |name: &str, value: String| writeln!(f, "{name:<9} {value}");
+        let mut row = |name: &str, value: String| writeln!(f, "{name:<9} {}", harmless(&value));
         row("files", format!("{} with {} points", grouped(files.len() as u64), grouped(*records)))?;
         row("unit", self.unit.clone())?;
         row("crs", crs.clone().unwrap_or_else(|| "none".into()))?;
@@ -165,10 +150,13 @@ impl fmt::Display for NewConfiguration {
         self.needed.iter().try_for_each(|line| row("set", summary_of(line)))?;
         self.notes.iter().try_for_each(|note| row("note", note.clone()))?;
         for warning in warnings.iter() {
-            writeln!(f, "warning: {warning}")?;
+            writeln!(f, "warning: {}", harmless(warning))?;
         }
         match &self.file {
-            Some(file) => writeln!(f, "written to {0}; run it: gdt-batch {0}", file.display()),
+            Some(file) => {
+                let name = file.display().to_string();
+                writeln!(f, "written to {}; run it: gdt-batch {}", harmless(&name), harmless(&as_argument(file)))
+            }
             None => Ok(()),
         }
     }

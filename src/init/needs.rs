@@ -3,18 +3,18 @@
 
 use crate::init::bad_files::{Damage, line_for_damage, lines_for_bad_files};
 use crate::init::draft::{Draft, NeededLine};
+use crate::init::offers::Offers;
+use crate::init::refusals::Refusals;
 use crate::init::systems::Ways;
+use crate::init::triangle::may_have_triangle;
 use crate::input::Source;
 use crate::job::plan::job_plan::{Plan, PlannedInput};
-use crate::job::plan::no_points::no_point_is_left;
+use crate::job::plan::no_points::{no_point_is_left, no_triangle};
 use crate::job::plan::text_inputs::{allowed_malformed, count, stop_at};
 use crate::job::preflight::check::{Preflight, look};
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::io::ErrorKind;
-
-/// The least number of points that make a triangle.
-const CORNERS: u64 = 3;
 
 /// A configuration that runs, and what `check` says of it.
 pub(crate) struct Runnable {
@@ -23,6 +23,8 @@ pub(crate) struct Runnable {
     pub(crate) plan: Plan,
     /// Why this machine has no room for the job, if it has none.
     pub(crate) misfit: Option<Error>,
+    /// The options that the job would take.
+    pub(crate) offers: Offers,
 }
 
 /// What a try of a draft shows.
@@ -37,7 +39,7 @@ enum Trial {
 /// # Errors
 /// That of `check`, if nothing lets it run.
 pub(crate) fn runnable(draft: Draft) -> Result<Runnable> {
-    let (mut now, mut ways, mut refused): (Draft, Option<Ways>, Option<Error>) = (draft, None, None);
+    let (mut now, mut ways, mut refusals): (Draft, Option<Ways>, Refusals) = (draft, None, Refusals::default());
     loop {
         let (error, next) = match trial(&now) {
             Ok(Trial::Runs(found)) => return fitted(now, *found),
@@ -47,11 +49,7 @@ pub(crate) fn runnable(draft: Draft) -> Result<Runnable> {
                     Some(ways) => ways.after_stray_points().or_else(allowed),
                     None => allowed(),
                 };
-                match next {
-                    Some(draft) => now = draft,
-                    None => return Err(damage.error),
-                }
-                continue;
+                (damage.error, next)
             }
             Err(error @ Error::Input { .. }) => {
                 let next = lines_for_bad_files(&now)?.map(|lines| now.with(lines));
@@ -65,13 +63,13 @@ pub(crate) fn runnable(draft: Draft) -> Result<Runnable> {
                 let next = ways.next();
                 (error, next)
             }
-            Err(error) => (error, None),
+            Err(error @ Error::NoTerrain(_)) => (error, None),
+            Err(error) => return Err(error),
         };
-        // The first reason is that of the clouds as they are; later ones are about ways that nobody asked for.
-        let first = refused.get_or_insert(error);
+        refusals.add(&now, error);
         match next {
             Some(draft) => now = draft,
-            None => return Err(std::mem::replace(first, Error::Interrupted)),
+            None => return Err(refusals.into_error()),
         }
     }
 }
@@ -83,16 +81,13 @@ fn trial(draft: &Draft) -> Result<Trial> {
     if sample.read >= plan.records && sample.kept == 0 {
         return Err(no_point_is_left(&plan, sample));
     }
-    if plan.records < CORNERS {
-        return Err(Error::NoTerrain(format!(
-            "there is no terrain in {} points: a triangle takes three different places in x and y that are not on one line",
-            plan.records
-        )));
-    }
     let is_doubtful = sample.malformed > 0 || inputs.iter().any(|input| input.source.has_lost_chunk_table());
     let damage = if is_doubtful { damage(&plan)? } else { None };
     if let Some(damage) = damage {
         return Ok(Trial::Damaged(damage));
+    }
+    if !may_have_triangle(&plan)? {
+        return Err(no_triangle(&plan));
     }
     Ok(Trial::Runs(Box::new((preflight, plan))))
 }
@@ -114,15 +109,16 @@ fn damage(plan: &Plan) -> Result<Option<Damage>> {
 
 /// Returns the draft with what lets the job fit this machine, if something does.
 fn fitted(draft: Draft, (preflight, plan): (Preflight, Plan)) -> Result<Runnable> {
-    let Err(misfit) = preflight.passes() else { return Ok(Runnable { draft, preflight, plan, misfit: None }) };
+    let offers = Offers::of(&draft, &preflight, &plan)?;
+    let Err(misfit) = preflight.passes() else { return Ok(Runnable { draft, preflight, plan, misfit: None, offers }) };
     for line in lines_for_room(&misfit, preflight.threads) {
         let smaller = draft.with([line]);
         let (preflight, plan) = look(&smaller.options()?)?;
         if preflight.passes().is_ok() {
-            return Ok(Runnable { draft: smaller, preflight, plan, misfit: None });
+            return Ok(Runnable { draft: smaller, preflight, plan, misfit: None, offers });
         }
     }
-    Ok(Runnable { draft, preflight, plan, misfit: Some(misfit) })
+    Ok(Runnable { draft, preflight, plan, misfit: Some(misfit), offers })
 }
 
 /// Returns lines of which one may let a job fit, the mildest first.

@@ -69,8 +69,9 @@ impl Page {
     }
 }
 
-/// Returns a text without characters that would end a comment, or that TOML allows in none. Names of files and of systems may have them.
-fn harmless(text: &str) -> String {
+/// Returns a text without characters that would end a comment, that TOML allows in none, or that a terminal would obey. Names of files
+/// and of systems may have them.
+pub(crate) fn harmless(text: &str) -> String {
     let is_harmful = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
     text.chars().map(|c| if is_harmful(c) { '\u{fffd}' } else { c }).collect()
 }

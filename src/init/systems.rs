@@ -57,8 +57,8 @@ impl Ways {
         }
     }
 
-    /// Returns the draft for coordinates of which some are no place on earth, though all files say that they are degrees; `None` if they
-    /// can be degrees, or if that was tried before.
+    /// Returns the draft for files that all say that they are in degrees, and of which each has coordinates that are no place on earth;
+    /// `None` if one of them can be in degrees, or if that was tried before.
     pub(crate) fn after_stray_points(&mut self) -> Option<Draft> {
         self.waiting = Vec::new().into_iter();
         // The columns of a text may be exchanged, or a row of it may be a mistake. So may x and y of another file.
@@ -67,7 +67,8 @@ impl Ways {
             source.format != FileFormat::Text && (x > 360.0 || y > 90.0) && (x > 90.0 || y > 180.0)
         };
         let all_say_degrees = self.sources.iter().all(|source| source.crs.horizontal == Unit::Degree);
-        let is_plane = all_say_degrees && self.sources.iter().any(is_nowhere);
+        // Degrees and pixels have no plane in common.
+        let is_plane = all_say_degrees && self.sources.iter().all(is_nowhere);
         (is_plane && std::mem::take(&mut self.may_be_plane)).then(|| self.draft.with(self.lines(Way::Plane)))
     }
 

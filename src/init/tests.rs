@@ -111,6 +111,8 @@ fn what_is_needed_stands_there_with_its_reason() {
     assert_eq!(needed, [("to_crs", "\"utm\""), ("missing_crs", "\"EPSG:4326\"")]);
     assert!(new.text.contains("\nto_crs = \"utm\"\n") && new.text.contains("UTM zone 32N"), "{}", new.text);
     assert!(!new.text.contains("#to_crs") && !new.text.contains("#unit"), "{}", new.text);
+    // Names of columns say no unit of z, nor does the system of the map.
+    assert_eq!(new.unit, "metre in x and y; nothing says the unit of z: that of x and y is taken");
     // One row that is damaged, and one file that is no cloud.
     fs::write(folder.path().join("a.csv"), format!("{rows}11.5x,48,1\n")).unwrap();
     fs::write(folder.path().join("b.csv"), "version https://git-lfs.github.com/spec/v1\n").unwrap();
@@ -134,4 +136,13 @@ fn a_folder_in_which_something_else_is_keeps_it() {
     }
     let east = init(&[folder.path().to_path_buf()], &folder.path().join("east.toml"), false).unwrap();
     assert!(east.text.contains("directory = \"out-east\""), "{}", east.text);
+}
+
+#[test]
+fn control_characters_do_not_reach_the_terminal() {
+    let folder = tempfile::tempdir().unwrap();
+    crate::sample::write(&folder.path().join("cloud.laz"), 2000, 1, false).unwrap();
+    let mut new = made(folder.path());
+    new.check.crs = Some("a\u{1b}[31mb".into());
+    assert!(!new.to_string().contains('\u{1b}') && new.to_string().contains("a\u{fffd}[31mb"), "{new}");
 }

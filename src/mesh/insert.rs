@@ -105,10 +105,11 @@ mod tests {
                 sites.push([x, y]);
                 near = locate(&mesh, &sites, near, [x, y], &mut u64::MAX.clone()).unwrap();
                 insert(&mut mesh, &sites, v, near);
-                prop_assert!(mesh.half_edges().all(|h| {
+                let is_linked = |h| {
                     let twin = mesh.twin(h);
                     twin == HalfEdgeIndex::HULL || mesh.twin(twin) == h && mesh.origin(twin) == mesh.destination(h)
-                }));
+                };
+                prop_assert!(mesh.half_edges().all(is_linked), "not linked");
             }
             prop_assert_eq!(normal_form(&mesh), normal_form(&canonical(&sites).unwrap()));
         }

@@ -2,8 +2,8 @@
 //! without a scheduler.
 
 use crate::job::phase::{Phase, PhaseTasks};
+use crate::shell_word::quoted;
 use crate::submit::request::Request;
-use crate::submit::shell::quoted;
 use crate::{Error, Result, interrupt, say, threads};
 use std::ffi::OsString;
 use std::process::{Child, Command, ExitStatus, Stdio};

@@ -6,7 +6,6 @@
 pub mod kubernetes;
 pub mod local;
 pub mod request;
-mod shell;
 pub mod slurm;
 mod slurm_script;
 pub mod submitted;

@@ -4,8 +4,8 @@
 //! that failed and was done by a later submission. Every phase checks by itself that what it needs is complete.
 
 use crate::job::phase::{Phase, PhaseTasks};
+use crate::shell_word::quoted;
 use crate::submit::request::Request;
-use crate::submit::shell::quoted;
 use std::path::{Path, PathBuf};
 
 /// The name of the engine, with which its folder ends.

@@ -135,9 +135,15 @@ fn bash_completes_commands_and_options() {
     let script = run(&["completions", "bash"]);
     let ask = "name=$(complete -p gdt-batch | grep -o '_gdt[_-]*batch'); COMP_WORDS=(gdt-batch \"${@:1}\"); COMP_CWORD=$#; \
                $name gdt-batch \"${!#}\" \"${@:$#-1:1}\"; echo \"${COMPREPLY[*]}\"";
-    for (words, offered) in
-        [(&["com"][..], "completions"), (&["init", "--fo"], "--force"), (&["completions", "z"], "zsh")]
-    {
+    for (words, offered) in [
+        (&["com"][..], "completions"),
+        (&["init", "--fo"], "--force"),
+        (&["completions", "z"], "zsh"),
+        (&["man", "ver"], "verify"),
+        // Bash itself offers files then.
+        (&["init", ""], ""),
+        (&["--fr"], ""),
+    ] {
         let mut command = Command::new("bash");
         command.arg("-c").arg(format!("{script}\n{ask}")).arg("bash").args(words);
         let Ok(output) = command.output() else {
@@ -147,6 +153,38 @@ fn bash_completes_commands_and_options() {
         let reply = String::from_utf8_lossy(&output.stdout).into_owned();
         assert_eq!(reply.trim(), offered, "{words:?}: {output:?}");
     }
+}
+
+/// Zsh, as somebody uses it at a terminal, completes commands, options behind them, and the configuration of a job.
+#[test]
+#[cfg(unix)]
+fn zsh_completes_what_is_behind_a_command() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("completions"), run(&["completions", "zsh"])).unwrap();
+    fs::write(folder.path().join("job.toml"), "").unwrap();
+    let whole = [
+        "gdt-batch init --force",
+        "gdt-batch job.toml",
+        "gdt-batch job.toml --restart",
+        "gdt-batch completions",
+        "gdt-batch man verify",
+    ];
+    let begun = "'gdt-batch init --fo' 'gdt-batch jo' 'gdt-batch job.toml --res' 'gdt-batch com' 'gdt-batch man ver'";
+    // The terminal shows what is typed too, so the marks are typed otherwise.
+    let terminal = format!(
+        "zmodload zsh/zpty; zpty z zsh -f -i; zpty -w z \"PS1= PS2=; autoload -Uz compinit; compinit -u -D; source completions; \
+         compdef _gdt-batch gdt-batch; w() {{ for BUFFER in {begun}; do CURSOR=\\$#BUFFER; zle complete-word; \
+         print -r -- LI''NE:\\$BUFFER:; done; print THE''END; exit }}; zle -N w; bindkey '^I' w\"; \
+         zpty -w -n z $'\\t'; zpty -r z said '*THEEND*'; print -r -- $said"
+    );
+    let Ok(output) = Command::new("zsh").args(["-f", "-c", &terminal]).current_dir(folder.path()).output() else {
+        eprintln!("not tested with zsh, which is not installed");
+        return;
+    };
+    let said = String::from_utf8_lossy(&output.stdout);
+    let lines: Vec<&str> =
+        said.split("LINE:").skip(1).filter_map(|rest| rest.split(':').next()).map(str::trim).collect();
+    assert_eq!(lines, whole, "{output:?}");
 }
 
 #[test]

@@ -1,13 +1,15 @@
 //! `gdt-batch init` writes configurations that run as they are, and that say what is in the clouds.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use serde_json::Value;
 
 use crate::clouds;
 use crate::common::shared;
-use crate::program::{Said, gdt_batch, gdt_batch_within_kib, number};
+use crate::program::{Said, gdt_batch, gdt_batch_into, gdt_batch_within_kib, number};
 
 /// What a configuration must say of some clouds.
 struct Expected {
@@ -27,6 +29,8 @@ const FOOT: f64 = 0.3048;
 const US_FOOT: f64 = 1200.0 / 3937.0;
 const NO_UNIT: &str = "no file says it";
 const METRES: &str = "metre in x and y, metre in z";
+/// No record says the unit of heights.
+const METRES_IN_XY: &str = "metre in x and y";
 const NO_CLASSES: &str = "the points have no classes";
 /// Files of PDAL's stadium: a foot is no metre, but two of them name no system.
 const STADIUM: &str = "26 % ground";
@@ -38,7 +42,7 @@ const CLOUDS: [Expected; 21] = [
     Expected {
         files: &["autzen_trim.las"],
         metres: [FOOT, FOOT],
-        unit: "foot in x and y, foot in z",
+        unit: "foot in x and y",
         crs: Some("NAD_1983_HARN_Lambert_Conformal_Conic"),
         surface: "23 % ground",
         ..UNKNOWN
@@ -63,14 +67,14 @@ const CLOUDS: [Expected; 21] = [
     Expected {
         files: &["file_with_both_wkt_and_geotiff_vlrs.las"],
         metres: [US_FOOT, US_FOOT],
-        unit: "US survey foot in x and y, US survey foot in z",
+        unit: "US survey foot in x and y",
         crs: Some("NAD83_2011_Nebraska_ft"),
         surface: "39 % ground",
         ..UNKNOWN
     },
     Expected {
         files: &["append-bug.laz"],
-        unit: METRES,
+        unit: METRES_IN_XY,
         crs: Some("RGF93 / Lambert-93"),
         surface: "60 % ground",
         ..UNKNOWN
@@ -83,7 +87,7 @@ const CLOUDS: [Expected; 21] = [
     Expected { files: &["quoted2.txt"], ..UNKNOWN },
     Expected {
         files: &["autzen-dd.las"],
-        unit: METRES,
+        unit: METRES_IN_XY,
         crs: Some("WGS 84 / UTM zone 10N"),
         surface: STADIUM,
         needed: &["to_crs"],
@@ -100,7 +104,7 @@ const CLOUDS: [Expected; 21] = [
     },
     Expected {
         files: &["bad/bad_vlr_count.las"],
-        unit: METRES,
+        unit: METRES_IN_XY,
         crs: Some("WGS 84 / UTM zone 17N"),
         surface: "100 % ground",
         ..UNKNOWN
@@ -114,7 +118,7 @@ const CLOUDS: [Expected; 21] = [
     Expected { files: &["bad/garbage_nVariableLength.las"], needed: &["max_malformed_fraction"], ..UNKNOWN },
     Expected {
         files: &["bad/truncated-mid-chunk.laz"],
-        unit: METRES,
+        unit: METRES_IN_XY,
         crs: Some("NAD83(CSRS) / MTM zone 7"),
         surface: "19 % ground",
         needed: &["max_malformed_fraction"],
@@ -153,6 +157,8 @@ fn configurations_of_real_clouds_run_as_they_are_and_say_what_they_are() {
         assert!(number(&report["sites"]) > 8, "{what}");
 
         let flat = configuration.replace("\n# ", " ");
+        let has_heights = expected.unit == NO_UNIT || expected.unit.ends_with(" in z");
+        assert_eq!(flat.contains("nothing says the unit of z"), !has_heights, "{what}");
         let unit = if expected.unit == NO_UNIT { "Unit: no file says it" } else { &format!("Unit: {}", expected.unit) };
         assert!(text(&new["unit"]).contains(expected.unit) && flat.contains(unit), "{} {what}", new["unit"]);
         let place = fs::read(folder.path().join("out/georeference.json")).unwrap();
@@ -193,7 +199,7 @@ fn configurations_of_real_clouds_run_as_they_are_and_say_what_they_are() {
 fn clouds_of_which_no_job_can_be_made_are_refused_as_check_refuses_them() {
     let Some(data) = shared().map(|folder| folder.join("data")) else { return };
     for (name, words) in [
-        ("utm15.las", "three different places"),
+        ("utm15.las", "utm15.las: the points make no triangle"),
         ("bad/1.2-no-points.las", "1065 of them are not there"),
         ("bad/badheader.txt", "names 2 columns x"),
         ("bad/git-lfs-pointer.laz", "git lfs pull"),
@@ -202,6 +208,76 @@ fn clouds_of_which_no_job_can_be_made_are_refused_as_check_refuses_them() {
         gdt_batch(folder.path(), &["init", data.join(name).to_str().unwrap()]).refused(3, &[words]);
         assert!(fs::read_dir(folder.path()).unwrap().next().is_none(), "{name}");
     }
+    // What the first reason advises was tried.
+    let refuses = |names: [&str; 2], words: &[&str]| {
+        let files = names.map(|name| data.join(name));
+        let arguments = ["init", "-o", "-", files[0].to_str().unwrap(), files[1].to_str().unwrap()];
+        gdt_batch(Path::new("."), &arguments).refused(2, words);
+    };
+    refuses(["autzen-dd.las", "1.2-with-color.las"], &["are in degrees", "; with to_crs = \"utm\": ", "names no CRS"]);
+    // Pixels and degrees have no plane in common.
+    refuses(["simple1_4.las", "autzen-dd.las"], &["are in degrees", "the longitudes of"]);
+}
+
+#[test]
+fn only_options_that_the_job_takes_are_offered() {
+    let folder = tempfile::tempdir().unwrap();
+    let classes = |last: &str| format!("x,y,z,classification\n0,0,1,2\n9,0,2,5\n9,9,3,2\n0,9,4,{last}\n");
+    for (last, is_offered) in [("2", true), ("bad", false)] {
+        fs::write(folder.path().join("a.csv"), classes(last)).unwrap();
+        let text = gdt_batch(folder.path(), &["init", "-o", "-", "a.csv"]).succeeded().out;
+        assert_eq!(text.contains("#surface = \"ground\""), is_offered, "{text}");
+    }
+    let Some(data) = shared().map(|folder| folder.join("data")) else { return };
+    // No UTM zone has its datum.
+    let text = gdt_batch(&data, &["init", "-o", "-", "append-bug.laz"]).succeeded().out;
+    assert!(text.contains("CRS: RGF93") && !text.contains("#to_crs"), "{text}");
+}
+
+#[test]
+fn clouds_without_a_triangle_are_refused_by_name() {
+    for (rows, words) in [
+        ("0,0,0\n1,1,1\n2,2,2\n", "a.csv: the points make no triangle"),
+        ("1,1,1\n1,1,1\n1,1,2\n", "a.csv: the points make no triangle"),
+        ("x,y,z\n", "a.csv: no point is left to triangulate, because none is there"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("a.csv"), rows).unwrap();
+        gdt_batch(folder.path(), &["init", "a.csv"]).refused(3, &[words]);
+        assert!(!folder.path().join("job.toml").exists());
+    }
+}
+
+#[test]
+fn names_of_configurations_have_any_signs() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("a.csv"), "0 0 1\n9 0 2\n9 9 3\n").unwrap();
+    let long = format!("{}.toml", "x".repeat(240));
+    for (name, command) in [("-a$b %A%.toml", "gdt-batch './-a$b %A%.toml'"), (&long, &*format!("gdt-batch {long}"))] {
+        let said = gdt_batch(folder.path(), &["init", "a.csv", &format!("--output={name}")]).succeeded().out;
+        assert!(said.contains(command), "{said}");
+        gdt_batch(folder.path(), &["--quiet", &format!("./{name}")]).succeeded();
+    }
+    assert!(folder.path().join("out--a_b _A_/tileset.json").is_file());
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_configuration_that_is_written_is_not_said_to_be_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("a.csv"), "0 0 1\n9 0 2\n9 9 3\n").unwrap();
+    let said = gdt_batch_into("/dev/full", folder.path(), &["init", "a.csv"]);
+    assert!(said.code == 0 && said.err.contains("job.toml is written, but"), "{said:?}");
+    let said = gdt_batch_into("/dev/full", folder.path(), &["init", "a.csv", "--force", "--json"]);
+    assert!(said.code == 1 && said.err.contains("job.toml is written\n"), "{said:?}");
+    // A limit to the size of files leaves nothing behind.
+    let limited =
+        format!("(ulimit -f 0; {} init a.csv -o b.toml 2>&1; echo code $?) | cat", env!("CARGO_BIN_EXE_gdt-batch"));
+    let output = Command::new("sh").args(["-c", &limited]).current_dir(folder.path()).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(said.contains("error: cannot write b.toml") && said.contains("code 1"), "{said}");
+    let names = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name());
+    assert_eq!(names.collect::<BTreeSet<_>>(), BTreeSet::from(["a.csv", "job.toml"].map(Into::into)));
 }
 
 /// Runs init in a folder with a sample terrain in `clouds/`.
@@ -237,8 +313,16 @@ fn a_configuration_is_replaced_only_if_that_is_asked_for() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("job.toml");
     fs::write(&path, "mine").unwrap();
+    for arguments in [&["clouds"][..], &["clouds", "--force"]] {
+        let said = init(folder.path(), arguments);
+        said.refused(2, &["job.toml exists already and is no configuration"]);
+        assert!(!said.err.contains("--force") && fs::read_to_string(&path).unwrap() == "mine", "{said:?}");
+    }
+    let cloud = fs::read(folder.path().join("clouds/a.laz")).unwrap();
+    init(folder.path(), &["clouds/a.laz", "--force", "-o", "clouds/a.laz"]).refused(2, &["no configuration"]);
+    assert!(fs::read(folder.path().join("clouds/a.laz")).unwrap() == cloud, "the cloud stays");
+    fs::write(&path, "[input]\nfiles = []\n").unwrap();
     init(folder.path(), &["clouds"]).refused(2, &["job.toml exists already", "--force"]);
-    assert_eq!(fs::read_to_string(&path).unwrap(), "mine");
     init(folder.path(), &["clouds", "--force"]).succeeded();
     assert!(fs::read_to_string(&path).unwrap().contains("clouds/a.laz"));
     init(folder.path(), &["clouds", "--output", "clouds"]).refused(2, &["no regular file"]);

@@ -1,4 +1,5 @@
-//! The message for a job of which no point is left: it says what became of the points, and where they lie if not within the bounds.
+//! The messages for jobs without a terrain. If no point is left, it says what became of the points, and where they lie if not within the
+//! bounds.
 
 use crate::Error;
 use crate::input::surface_doubts::no_ground;
@@ -10,6 +11,9 @@ type Rectangle = [f64; 4];
 
 /// Returns the error for a job of which no point is left.
 pub fn no_point_is_left(plan: &Plan, counts: &PointCounts) -> Error {
+    if plan.records == 0 {
+        return Error::NoTerrain(format!("{}no point is left to triangulate, because none is there", first_file(plan)));
+    }
     let remedy = match plan.options.input.bounds.zip(box_of_inputs(plan)) {
         Some((bounds, inputs)) if counts.out_of_bounds > 0 && counts.classes.is_empty() => {
             compare(bounds.0, inputs, are_from_headers(plan))
@@ -35,6 +39,25 @@ pub fn no_point_is_left(plan: &Plan, counts: &PointCounts) -> Error {
          {remedy}",
         counts.read, counts.malformed, counts.withheld, counts.other_class, counts.out_of_bounds
     ))
+}
+
+/// Returns the error for a job whose points make no triangle.
+pub(crate) fn no_triangle(plan: &Plan) -> Error {
+    Error::NoTerrain(format!(
+        "{}the points make no triangle in steps of {}: a triangle takes three different places in x and y that are not on one line",
+        first_file(plan),
+        plan.lattice.resolution
+    ))
+}
+
+/// Names the input, or the first of them, at the beginning of a message.
+fn first_file(plan: &Plan) -> String {
+    let first = plan.inputs.first().map(|input| input.source.path.display());
+    match (first, plan.inputs.len()) {
+        (None, _) => String::new(),
+        (Some(first), 1) => format!("{first}: "),
+        (Some(first), count) => format!("{first} and {} more: ", count - 1),
+    }
 }
 
 /// Returns the rectangle of all inputs, as far as their headers can be believed.

@@ -8,6 +8,7 @@ use crate::job::levels::make_level::LevelStats;
 use crate::job::merge_records::HullCount;
 use crate::job::mesh::leaf::LeafStats;
 use crate::job::plan::job_plan::Plan;
+use crate::job::plan::no_points::no_triangle;
 use crate::job::progress::number_text::grouped;
 use crate::job::publish::flat_tile::FlatScene;
 use crate::job::publish::one_file_limits::{fits_one_file, too_large_for_one_file};
@@ -98,10 +99,7 @@ pub(crate) fn some_triangles(written: &TileStats, plan: &Plan) -> Result<()> {
             "[output] max_edge leaves out all {by_length} triangles{slivers}: give a greater one"
         )));
     }
-    Err(Error::NoTerrain(format!(
-        "the points make no triangle in steps of {}: a triangle takes three different places in x and y that are not on one line",
-        plan.lattice.resolution
-    )))
+    Err(no_triangle(plan))
 }
 
 /// What step 8 gives back.

@@ -38,6 +38,23 @@ impl CellGrid {
         row * self.columns + column
     }
 
+    /// Returns the cells in the column and the row before those of `cell`: three of them, or the cell itself in place of those that there
+    /// are not.
+    #[inline(always)]
+    pub(crate) fn neighbours_before(&self, cell: usize) -> [usize; 3] {
+        let west = usize::from(!cell.is_multiple_of(self.columns));
+        let south = if cell >= self.columns { self.columns } else { 0 };
+        [cell - west, cell - south, cell - west - south]
+    }
+
+    /// Does what [`CellGrid::neighbours_before`] does, for the next column and the next row.
+    #[inline(always)]
+    pub(crate) fn neighbours_after(&self, cell: usize) -> [usize; 3] {
+        let east = usize::from(!(cell + 1).is_multiple_of(self.columns));
+        let north = if cell + self.columns < self.count() { self.columns } else { 0 };
+        [cell + east, cell + north, cell + east + north]
+    }
+
     /// Returns the number of the cell around a point.
     pub(crate) fn of(&self, p: &[i32; 3]) -> u32 {
         self.at(self.row(p[1] as f64), self.column(p[0] as f64)) as u32

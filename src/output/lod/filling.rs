@@ -46,11 +46,6 @@ impl<'a> Filling<'a> {
         self.mesh.triangles.len()
     }
 
-    /// Returns the number of triangles within the boundary.
-    pub(crate) fn triangles_within(&self) -> usize {
-        self.within.iter().filter(|&&within| within).count()
-    }
-
     /// Returns the number in the terrain of the corners of a triangle, or `None` if it does not lie within the boundary.
     pub(crate) fn corners(&self, triangle: usize) -> Option<[u32; 3]> {
         self.within[triangle].then(|| self.mesh.triangles[triangle].map(|v| self.vertices[v.get()]))

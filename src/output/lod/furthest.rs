@@ -27,14 +27,21 @@ pub(crate) struct Furthest {
 }
 
 impl Furthest {
-    /// Compares the triangles of `filling`, between the positions `moved`, with one of every `every` vertices of `surface`.
+    /// Compares the triangles of `filling`, between the positions `moved`, with one of every `every` vertices of `surface`. Only vertices that
+    /// are not `kept`, so that the filling does not have them, are among the results.
     ///
     /// Stops looking where that would take far longer than usual: where nearly all triangles are slivers.
-    pub(crate) fn find(surface: &[[i32; 3]], moved: &[[i32; 3]], filling: &Filling, every: usize) -> Furthest {
+    pub(crate) fn find(
+        surface: &[[i32; 3]],
+        moved: &[[i32; 3]],
+        kept: &[bool],
+        filling: &Filling,
+        every: usize,
+    ) -> Furthest {
         let mut furthest = vec![(0.0, 0); filling.triangles()];
         let mut steps = steps_for(surface.len());
         let starts = StartCells::new(moved, filling);
-        for v in (0..surface.len()).step_by(every) {
+        for v in (0..surface.len()).step_by(every).filter(|&v| !kept[v]) {
             let start = starts.near(&surface[v]);
             let Some(triangle) = filling.locate(v as u32, start, &mut steps) else { break };
             let Some(corners) = filling.corners(triangle) else { continue };
@@ -43,11 +50,20 @@ impl Furthest {
                 furthest[triangle] = (distance, v as u32);
             }
         }
-        let found = (0..).zip(furthest).filter(|(_, (distance, _))| *distance > 0.0);
-        let found = found.map(|(triangle, (distance, vertex))| FarVertex { distance, vertex, triangle });
-        let vertices: Vec<FarVertex> = found.collect();
-        let sum: f64 = vertices.iter().map(|far| far.distance).sum();
-        Furthest { vertices, mean: sum / filling.triangles_within().max(1) as f64 }
+        let at_corner = |v: u32| match (v as usize).is_multiple_of(every) {
+            true => f64::from(moved[v as usize][2].abs_diff(surface[v as usize][2])),
+            false => 0.0,
+        };
+        let (mut sum, mut within, mut vertices) = (0.0, 0u64, Vec::new());
+        for (triangle, (distance, vertex)) in furthest.into_iter().enumerate() {
+            let Some(corners) = filling.corners(triangle) else { continue };
+            sum += corners.map(at_corner).into_iter().fold(distance, f64::max);
+            within += 1;
+            if distance > 0.0 {
+                vertices.push(FarVertex { distance, vertex, triangle: triangle as u32 });
+            }
+        }
+        Furthest { vertices, mean: sum / within.max(1) as f64 }
     }
 
     /// Returns those of the vertices that are wanted, the first `count` by their distance, in the order of their triangles.

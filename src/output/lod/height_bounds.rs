@@ -46,9 +46,16 @@ impl CellBox {
         CellBox { columns: ends(0), rows: ends(1) }
     }
 
+    /// Tells whether the box has at most two columns and two rows.
     #[inline(always)]
-    fn is_one(&self) -> bool {
-        self.columns[0] == self.columns[1] && self.rows[0] == self.rows[1]
+    fn is_small(&self) -> bool {
+        self.columns[1] - self.columns[0] < 2 && self.rows[1] - self.rows[0] < 2
+    }
+
+    /// Returns the first cell of the box.
+    #[inline(always)]
+    fn first(&self, grid: &CellGrid) -> usize {
+        grid.at(self.rows[0] as usize, self.columns[0] as usize)
     }
 
     #[inline(always)]
@@ -85,6 +92,7 @@ impl HeightBounds {
         let ranges = vec![NONE; cells.count()];
         let mut bounds = HeightBounds { cells, places, ranges, everywhere: NONE, all: NONE };
         fine.iter().for_each(|triangle| bounds.add(triangle, heights(&triangle.map(|v| positions[v as usize]))));
+        bounds.spread();
         bounds.all = bounds.ranges.iter().copied().fold(bounds.everywhere, union);
         bounds
     }
@@ -95,12 +103,13 @@ impl HeightBounds {
         CellBox::around(triangle.map(|v| self.places[v as usize]))
     }
 
-    /// Adds the `range` of heights of a triangle to every cell that holds a point of it.
+    /// Adds the `range` of heights of a triangle to every cell that holds a point of it. Most triangles are in a small box, and only its
+    /// first cell gets the range: see [`HeightBounds::spread`].
     #[inline(always)]
     fn add(&mut self, triangle: &[u32; 3], range: [i32; 2]) {
         let around = self.around(triangle);
-        if around.is_one() {
-            let known = &mut self.ranges[self.cells.at(around.rows[0] as usize, around.columns[0] as usize)];
+        if around.is_small() {
+            let known = &mut self.ranges[around.first(&self.cells)];
             *known = union(*known, range);
         } else if around.cells() > MOST_CELLS {
             self.everywhere = union(self.everywhere, range);
@@ -108,6 +117,14 @@ impl HeightBounds {
             for run in around.runs(&self.cells) {
                 self.ranges[run].iter_mut().for_each(|known| *known = union(*known, range));
             }
+        }
+    }
+
+    /// Adds the range of each cell to the cells next to it in the next column and the next row.
+    fn spread(&mut self) {
+        for cell in (0..self.ranges.len()).rev() {
+            let before = self.cells.neighbours_before(cell).map(|before| self.ranges[before]);
+            self.ranges[cell] = before.into_iter().fold(self.ranges[cell], union);
         }
     }
 
@@ -130,7 +147,7 @@ impl HeightBounds {
     }
 
     /// Returns what of the terrain is near some triangles between its vertices: the numbers of all vertices and those of its triangles `fine`
-    /// that have a point in a cell around one of them.
+    /// that have a point in a cell around one of them, and some more.
     pub(crate) fn near(
         &self,
         fine: &[[u32; 3]],
@@ -140,10 +157,14 @@ impl HeightBounds {
         for triangle in triangles {
             self.around(&triangle).runs(&self.cells).for_each(|run| is_near[run].fill(true));
         }
+        // The first cell of a small box then tells for the whole box.
+        for cell in 0..is_near.len() {
+            is_near[cell] |= self.cells.neighbours_after(cell).into_iter().any(|after| is_near[after]);
+        }
         let touches = |triangle: &&[u32; 3]| {
             let around = self.around(triangle);
-            if around.is_one() {
-                return is_near[self.cells.at(around.rows[0] as usize, around.columns[0] as usize)];
+            if around.is_small() {
+                return is_near[around.first(&self.cells)];
             }
             around.cells() > MOST_CELLS || around.runs(&self.cells).any(|run| is_near[run].contains(&true))
         };

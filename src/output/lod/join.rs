@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
+use std::ops::Range;
 
 use crate::output::attributes::{AttributeChoice, PointAttributes};
 use crate::output::frame::Frame;
@@ -67,17 +68,34 @@ impl Joined {
     /// Appends the vertices of part `part` at these lattice points, but for those that are there already. Returns the number of each.
     fn append(&mut self, part: u32, points: &[[i32; 3]], on_border: &[bool], vertex_at: &mut VertexAt) -> Vec<u32> {
         let mut numbers = Vec::with_capacity(points.len());
-        for ((v, point), &on_border) in (0..).zip(points).zip(on_border) {
-            let next = self.positions.len() as u32;
-            let number = if on_border { *vertex_at.entry([point[0], point[1]]).or_insert(next) } else { next };
-            numbers.push(number);
-            if number == next {
-                self.positions.push(*point);
-                self.on_border.push(on_border);
-                self.origins.push([part, v]);
+        // Nearly all vertices are new, and many follow each other without one that is not.
+        let mut new_from = 0;
+        for v in (0..points.len()).filter(|&v| on_border[v]) {
+            let next = (self.positions.len() + v - new_from) as u32;
+            let number = *vertex_at.entry([points[v][0], points[v][1]]).or_insert(next);
+            if number != next {
+                self.append_new(part, points, on_border, new_from..v, &mut numbers);
+                numbers.push(number);
+                new_from = v + 1;
             }
         }
+        self.append_new(part, points, on_border, new_from..points.len(), &mut numbers);
         numbers
+    }
+
+    fn append_new(
+        &mut self,
+        part: u32,
+        points: &[[i32; 3]],
+        on_border: &[bool],
+        vertices: Range<usize>,
+        numbers: &mut Vec<u32>,
+    ) {
+        let next = self.positions.len();
+        numbers.extend(next as u32..(next + vertices.len()) as u32);
+        self.origins.extend((vertices.start as u32..vertices.end as u32).map(|v| [part, v]));
+        self.positions.extend_from_slice(&points[vertices.clone()]);
+        self.on_border.extend_from_slice(&on_border[vertices]);
     }
 
     /// Returns the whole mesh, to be simplified.

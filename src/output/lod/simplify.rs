@@ -96,10 +96,10 @@ pub fn simplify(frame: &Frame, terrain: &Terrain, triangles: usize, lines: Optio
     interrupt::check()?;
     let mut filling = Filling::new(positions, &kept, &boundary.edges)?;
     let rest = (boundary.vertices + wanted).saturating_sub(kept.iter().filter(|&&kept| kept).count());
-    let furthest = Furthest::find(&surface, &moved, &filling, LOOKED_AT);
+    let furthest = Furthest::find(&surface, &moved, &kept, &filling, LOOKED_AT);
     let typical_error = furthest.mean * up;
     let mut steps = steps_for(rest);
-    for far in furthest.first(rest, |v| !kept[v] && kept_lines.allows(v)) {
+    for far in furthest.first(rest, |v| kept_lines.allows(v)) {
         if filling.insert(far.vertex, far.triangle as usize, &mut steps) {
             moved[far.vertex as usize] = surface[far.vertex as usize];
         }

@@ -1,7 +1,7 @@
 //! Words of the shell, in scripts and in commands that are shown.
 
 /// Returns the word that the shell reads as `text`: as it is if it is plain, otherwise between apostrophes.
-pub(super) fn quoted(text: &str) -> String {
+pub(crate) fn quoted(text: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@%".contains(c);
     if !text.is_empty() && text.chars().all(is_plain) {
         return text.into();
