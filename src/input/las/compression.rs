@@ -11,16 +11,21 @@ use crate::input::file::bytes::{uint16, uint32};
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::file::range::FileRange;
 use crate::input::las::header::LasHeader;
-use crate::input::las::laszip::items::KnownItems;
+use crate::input::las::laszip::items::{KnownItems, can_fill_the_stack};
 
 /// The number of bytes of a LASzip record before its items, which follow their 16-bit count.
 const RECORD_HEAD: usize = 32;
 
 /// What is wrong with a LASzip record.
 #[derive(Debug, thiserror::Error)]
-#[error("has a LASzip record that {what}; the file is damaged or of a newer kind")]
-pub(crate) struct LaszipError {
-    what: String,
+pub(crate) enum LaszipError {
+    #[error("has a LASzip record that {0}; the file is damaged or of a newer kind")]
+    Broken(String),
+    #[error(
+        "has a LASzip record that puts its points together as no usual program does ({0}), and such points with GPS times are not \
+         decoded; write the file again, for example with `pdal translate` or `las2las`"
+    )]
+    Unusual(String),
 }
 
 /// How the records of a file are compressed.
@@ -39,7 +44,7 @@ pub(crate) struct LazCompression {
 impl LazCompression {
     /// Reads and checks the data of the LASzip record.
     pub(crate) fn parse(bytes: &[u8], header: &LasHeader) -> std::result::Result<LazCompression, LaszipError> {
-        let broken = |what: String| LaszipError { what };
+        let broken = LaszipError::Broken;
         if bytes.len() < RECORD_HEAD + 2 {
             return Err(broken(format!("has {} bytes of at least {}", bytes.len(), RECORD_HEAD + 2)));
         }
@@ -62,6 +67,9 @@ impl LazCompression {
                 "has compressor {compressor}, which does not go with point format {}",
                 header.format
             )));
+        }
+        if can_fill_the_stack(&items) {
+            return Err(LaszipError::Unusual(named(&items)));
         }
         let layers = items.iter().map(layers_of).sum();
         Ok(LazCompression {
@@ -105,6 +113,16 @@ fn is_known(item: &LazItem, layered: bool) -> bool {
     };
     let versions = if layered { 3..=4 } else { 1..=2 };
     item.size() == size && versions.contains(&item.version())
+}
+
+/// Returns the first items in words; a damaged file may have thousands.
+fn named(items: &[LazItem]) -> String {
+    let mut names: Vec<String> =
+        items.iter().take(6).map(|item| format!("{:?} in version {}", item.item_type(), item.version())).collect();
+    if items.len() > names.len() {
+        names.push("and others".to_string());
+    }
+    names.join(", ")
 }
 
 /// Returns the number of layers of an item in layered compression.

@@ -1,7 +1,9 @@
 //! One LAZ chunk.
 //!
 //! The decoders for the usual forms are in `laszip/`, and those of the `laz` crate decode the others. The latter may panic on hostile
-//! data, so every call is wrapped in [`catch_panic`].
+//! data, so every call is wrapped in [`catch_panic`]. They may also fill the stack with GPS times, which nothing can catch, so they
+//! never decode times that have sequences: [`LazCompression::parse`] refuses such pointwise records, and [`selection`] leaves out the
+//! times of layered ones.
 
 use std::io;
 
@@ -122,7 +124,7 @@ impl ChunkDecoder<'_> {
         stop: u64,
         filter: &mut impl RecordSink,
     ) -> std::result::Result<FileRange, ChunkError> {
-        let selection = self.selection();
+        let selection = selection(self.fields, self.layout.has_rgb());
         let mut decoder = catch_panic(|| self.compression.decoder(range, selection))??;
         let (file, length) = (self.file, self.layout.length);
         self.decode_blocks(stop, filter, |block, done| {
@@ -187,13 +189,13 @@ impl ChunkDecoder<'_> {
         }
         Ok(())
     }
+}
 
-    /// Returns the fields to decompress.
-    fn selection(&self) -> DecompressionSelection {
-        let needed = DecompressionSelection::base().decompress_z().decompress_classification().decompress_flags();
-        let needed = if self.fields.intensity { needed.decompress_intensity() } else { needed };
-        if self.fields.rgb && self.layout.has_rgb() { needed.decompress_rgb() } else { needed }
-    }
+/// Returns the fields of layered records to decompress. Times must not be among them.
+fn selection(fields: OptionalFields, has_rgb: bool) -> DecompressionSelection {
+    let needed = DecompressionSelection::base().decompress_z().decompress_classification().decompress_flags();
+    let needed = if fields.intensity { needed.decompress_intensity() } else { needed };
+    if fields.rgb && has_rgb { needed.decompress_rgb() } else { needed }
 }
 
 /// Decodes record after record into `block`. `done` counts the decoded bytes, even if decoding fails.
@@ -208,4 +210,19 @@ fn decode_block(
         *done += length;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::selection;
+    use crate::input::points::optional_fields::OptionalFields;
+
+    #[test]
+    fn the_crate_never_decodes_times() {
+        for (rgb, intensity) in [(false, false), (true, true)] {
+            let selection = selection(OptionalFields { rgb, intensity }, true);
+            assert!(!selection.should_decompress_gps_time());
+            assert_eq!((selection.should_decompress_rgb(), selection.should_decompress_intensity()), (rgb, intensity));
+        }
+    }
 }

@@ -70,6 +70,16 @@ fn of_kind(layered: bool, bytes: &[u8]) -> Vec<Case> {
     ] {
         add(&mut cases, name, patched(bytes, at, &value), gives);
     }
+    if !layered {
+        let value = [1, 0];
+        let gives = Refused(3, "no usual program");
+        add(
+            &mut cases,
+            "colours of another version than times",
+            patched(bytes, record + 34 + 2 * 6 + 4, &value),
+            gives,
+        );
+    }
     let mut noise = bytes.to_vec();
     noise[table + 8..].fill(0x5a);
     add(&mut cases, "table of noise", noise, one_by_one());

@@ -5,7 +5,7 @@ use laz::{LazItem, LazItemType};
 /// The records that these decoders know.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum KnownItems {
-    /// Point formats 0 to 3, version 2.
+    /// Point formats 0 to 5, version 2.
     Pointwise(PointwiseItems),
     /// Point formats 6 to 8, version 3.
     Layered(LayeredItems),
@@ -16,6 +16,7 @@ pub(crate) enum KnownItems {
 pub(crate) struct PointwiseItems {
     pub(super) time: bool,
     pub(super) rgb: bool,
+    pub(super) wave_packet: bool,
     pub(super) extra_bytes: usize,
 }
 
@@ -39,7 +40,9 @@ impl KnownItems {
     pub(crate) fn of(items: &[LazItem]) -> Option<KnownItems> {
         let (first, rest) = items.split_first()?;
         let version = first.version();
-        if rest.iter().any(|item| item.version() != version) {
+        // Wave packets of versions 1 and 2 are the same, and LASzip writes version 1 beside version 2 of the rest.
+        let is_other = |item: &LazItem| item.version() != version && item.item_type() != LazItemType::WavePacket13;
+        if rest.iter().any(is_other) {
             return None;
         }
         match (first.item_type(), version) {
@@ -50,17 +53,25 @@ impl KnownItems {
     }
 }
 
+/// Returns whether the `laz` crate would have to decode GPS times that can end the program. Its decoder of version 2 calls itself for each
+/// leap from sequence to sequence, until the stack is full if the data are made to harm. Version 1 knows no sequences.
+pub(crate) fn can_fill_the_stack(items: &[LazItem]) -> bool {
+    let leaps = |item: &LazItem| item.item_type() == LazItemType::GpsTime && item.version() == 2;
+    KnownItems::of(items).is_none() && items.iter().any(leaps)
+}
+
 impl PointwiseItems {
     fn of(items: &[LazItem]) -> Option<PointwiseItems> {
         let mut items = items.iter().map(LazItem::item_type).peekable();
         let time = items.next_if_eq(&LazItemType::GpsTime).is_some();
         let rgb = items.next_if_eq(&LazItemType::RGB12).is_some();
+        let wave_packet = items.next_if_eq(&LazItemType::WavePacket13).is_some();
         let extra_bytes = match items.next() {
             None => 0,
             Some(LazItemType::Byte(count)) => count as usize,
             Some(_) => return None,
         };
-        items.next().is_none().then_some(PointwiseItems { time, rgb, extra_bytes })
+        items.next().is_none().then_some(PointwiseItems { time, rgb, wave_packet, extra_bytes })
     }
 }
 

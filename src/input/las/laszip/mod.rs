@@ -21,6 +21,7 @@ mod point14;
 mod range_decoder;
 mod returns;
 mod rgb;
+mod wave_packet;
 
 #[cfg(test)]
 mod tests;

@@ -1,4 +1,4 @@
-//! Chunks in which the fields of a record follow each other, records of point formats 0 to 3.
+//! Chunks in which the fields of a record follow each other, records of point formats 0 to 5.
 
 use std::io::{Read, Seek};
 
@@ -9,6 +9,7 @@ use crate::input::las::laszip::items::PointwiseItems;
 use crate::input::las::laszip::point10::{self, Point10Decoder};
 use crate::input::las::laszip::range_decoder::RangeDecoder;
 use crate::input::las::laszip::rgb::{self, Rgb, RgbModels};
+use crate::input::las::laszip::wave_packet::{self, WavePacketDecoder};
 
 /// A decoder of a chunk.
 pub(crate) struct PointwiseDecoder<R> {
@@ -21,6 +22,7 @@ pub(crate) struct PointwiseDecoder<R> {
     point: Point10Decoder,
     time: Option<GpsTimeDecoder>,
     rgb: Option<(Box<RgbModels>, Rgb)>,
+    wave_packet: Option<Box<WavePacketDecoder>>,
     extra_bytes: Option<ExtraBytesDecoder>,
 }
 
@@ -42,10 +44,17 @@ impl<R: Read> PointwiseDecoder<R> {
         {
             (rgb, rest) = (Some((RgbModels::new(), *first)), after);
         }
+        let mut wave_packet = None;
+        if items.wave_packet
+            && let Some((first, after)) = rest.split_first_chunk()
+        {
+            (wave_packet, rest) = (Some(Box::new(WavePacketDecoder::new(first))), after);
+        }
         let extra_bytes = (!rest.is_empty()).then(|| ExtraBytesDecoder::new(rest));
         let (point, length) = (Point10Decoder::new(&first), first.len());
         let data = RangeDecoder::new(source)?;
-        Ok(PointwiseDecoder { data: Some(data), length, first: Some(first), point, time, rgb, extra_bytes })
+        let (data, first) = (Some(data), Some(first));
+        Ok(PointwiseDecoder { data, length, first, point, time, rgb, wave_packet, extra_bytes })
     }
 
     /// Decodes the next records into `records`. `done` counts the decoded bytes, even if decoding fails.
@@ -80,6 +89,11 @@ impl<R: Read> PointwiseDecoder<R> {
             *last = models.next(data, *last);
             out.copy_from_slice(last);
         }
+        if let Some(wave_packet) = &mut self.wave_packet
+            && let Some(out) = rest.split_off_mut(..wave_packet::SIZE)
+        {
+            out.copy_from_slice(&wave_packet.next(data));
+        }
         if let Some(extra_bytes) = &mut self.extra_bytes {
             extra_bytes.next(data, rest)?;
         }
@@ -100,6 +114,7 @@ impl PointwiseItems {
     pub(crate) fn record_length(&self) -> usize {
         let time = if self.time { gps_time::SIZE } else { 0 };
         let rgb = if self.rgb { rgb::SIZE } else { 0 };
-        point10::SIZE + time + rgb + self.extra_bytes
+        let wave_packet = if self.wave_packet { wave_packet::SIZE } else { 0 };
+        point10::SIZE + time + rgb + wave_packet + self.extra_bytes
     }
 }

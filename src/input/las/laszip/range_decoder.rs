@@ -12,7 +12,7 @@ const WINDOW: usize = 1 << 12;
 const LOOK: usize = 4;
 
 /// Bytes that suffice between two calls of [`RangeDecoder::refill`]. A symbol takes at most 2, raw bits take at most 6. The fields of
-/// a record are fewer than 40 symbols, 8 of them with raw bits.
+/// a record are fewer than 50 symbols, and at most 14 numbers of raw bits.
 const RESERVE: usize = 1 << 8;
 
 /// `value` is always less than `length`, whatever the data are. That bounds all products here, and the search for a symbol.

@@ -3,23 +3,23 @@
 use std::io::{Cursor, ErrorKind};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use laz::compressors::IntegerCompressorBuilder;
-use laz::encoders::ArithmeticEncoder;
-use laz::models::ArithmeticModelBuilder;
 use laz::record::{
     LayeredPointRecordCompressor, LayeredPointRecordDecompressor, RecordCompressor, RecordDecompressor,
     SequentialPointRecordCompressor, SequentialPointRecordDecompressor,
 };
-use laz::{DecompressionSelection, LazItem, LazItemRecordBuilder};
+use laz::{DecompressionSelection, LazItem, LazItemRecordBuilder, LazVlr};
 
 use crate::input::las::laszip::decode_error::DecodeError;
-use crate::input::las::laszip::items::{KnownItems, WantedLayers};
+use crate::input::las::laszip::items::{KnownItems, PointwiseItems, WantedLayers, can_fill_the_stack};
 use crate::input::las::laszip::layered::LayeredDecoder;
 use crate::input::las::laszip::pointwise::PointwiseDecoder;
+use crate::input::las::laszip::tests::records::{Random, length, records};
 
+mod hostile;
 mod real_files;
+mod records;
 
-const FORMATS: [u8; 7] = [0, 1, 2, 3, 6, 7, 8];
+const FORMATS: [u8; 9] = [0, 1, 2, 3, 4, 5, 6, 7, 8];
 
 const ALL: WantedLayers = WantedLayers { intensity: true, rgb: true };
 
@@ -42,72 +42,6 @@ struct Chunk {
     is_layered: bool,
     bytes: Vec<u8>,
     records: usize,
-}
-
-/// A generator of numbers (xorshift64*), the same on every machine.
-struct Random(u64);
-
-impl Random {
-    /// Returns a number less than `end`.
-    fn below(&mut self, end: u64) -> u64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 32) % end
-    }
-
-    /// Returns a step that is usually small.
-    fn step(&mut self) -> i64 {
-        let bits = self.below(10) * self.below(4);
-        self.below(1 << (bits + 1)) as i64 - (1 << bits)
-    }
-}
-
-/// Returns records that change as those of a scanner do, with leaps in between.
-fn records(format: u8, extra_bytes: usize, count: usize, random: &mut Random) -> Vec<u8> {
-    let time_at = [None, Some(20), None, Some(20), None, None, Some(22), Some(22), Some(22)][format as usize];
-    let rgb_at = [None, None, Some(20), Some(28), None, None, None, Some(30), Some(30)][format as usize];
-    let length = length(format, extra_bytes);
-    let mut record = vec![0; length];
-    let (mut place, mut times, mut rgb, mut steps) = ([0i64; 3], [0i64; 4], [0u16; 3], [1i64; 4]);
-    let mut all = Vec::new();
-    for _ in 0..count {
-        for (axis, coordinate) in place.iter_mut().enumerate() {
-            *coordinate += random.step();
-            record[4 * axis..4 * axis + 4].copy_from_slice(&(*coordinate as i32).to_le_bytes());
-        }
-        for byte in &mut record[12..if format >= 6 { 22 } else { 20 }] {
-            if random.below(4) == 0 {
-                *byte = byte.wrapping_add(random.step() as u8);
-            }
-        }
-        if let Some(at) = time_at {
-            let sequence = random.below(40).min(3) as usize;
-            match random.below(30) {
-                0 => times[sequence] = (random.below(1 << 31) << 32) as i64,
-                1..4 => steps[sequence] = random.step(),
-                4..10 => {}
-                _ => times[sequence] += steps[sequence] * [1, 1, 1, 2, 30, 600, -3, -40][random.below(8) as usize],
-            }
-            record[at..at + 8].copy_from_slice(&times[sequence].to_le_bytes());
-        }
-        if let Some(at) = rgb_at {
-            let is_grey = random.below(3) == 0;
-            for band in 0..3 {
-                rgb[band] = if is_grey { rgb[0] } else { rgb[band].wrapping_add(random.step() as u16) };
-                record[at + 2 * band..at + 2 * band + 2].copy_from_slice(&rgb[band].to_le_bytes());
-            }
-        }
-        for byte in &mut record[length - extra_bytes..] {
-            *byte = byte.wrapping_add(random.below(3) as u8);
-        }
-        all.extend(&record);
-    }
-    all
-}
-
-fn length(format: u8, extra_bytes: usize) -> usize {
-    [20, 28, 26, 34, 0, 0, 30, 36, 38][format as usize] + extra_bytes
 }
 
 impl Chunk {
@@ -218,7 +152,7 @@ fn records_come_out_as_they_went_in() {
 #[test]
 fn a_chunk_ends_where_the_next_begins() {
     let mut random = Random(4);
-    for format in [0, 1, 2, 3] {
+    for format in [0, 1, 2, 3, 4, 5] {
         let chunks = [2000, 1].map(|count| Chunk::encode(format, 1, &records(format, 1, count, &mut random)));
         let bytes = [chunks[0].bytes.as_slice(), &chunks[1].bytes].concat();
         let Some(KnownItems::Pointwise(items)) = KnownItems::of(&chunks[0].items) else {
@@ -267,40 +201,71 @@ fn damage_has_the_same_consequences() {
     assert!(outcomes[0] > 100 && outcomes[1] > 100, "{outcomes:?}");
 }
 
-#[test]
-fn a_number_outside_of_the_interval_is_nonsense() {
-    for format in [0, 6] {
-        let mut chunk = Chunk::encode(format, 0, &records(format, 0, 100, &mut Random(3)));
-        let data = if chunk.is_layered { chunk.length + 4 + 4 * 9 } else { chunk.length };
-        chunk.bytes[data..].fill(255);
-        assert_eq!(chunk.by_ours(ALL), (Vec::new(), Outcome::Nonsense));
-    }
+/// Returns items of these types, sizes and versions.
+fn items(items: &[[u16; 3]]) -> Vec<LazItem> {
+    let mut record = vec![0; 32];
+    record[0] = 2;
+    record.extend((items.len() as u16).to_le_bytes());
+    record.extend(items.iter().flatten().flat_map(|number| number.to_le_bytes()));
+    LazVlr::from_buffer(record).unwrap().items().clone()
 }
 
-/// Such a time makes the crate call itself for each leap, until the stack is full if there are many.
+const fn point(version: u16) -> [u16; 3] {
+    [6, 20, version]
+}
+
+const fn time(version: u16) -> [u16; 3] {
+    [7, 8, version]
+}
+
+const RGB: [u16; 3] = [8, 6, 2];
+
+const fn wave_packet(version: u16) -> [u16; 3] {
+    [9, 29, version]
+}
+
+const EXTRA_BYTES: [u16; 3] = [0, 5, 2];
+
 #[test]
-fn a_time_that_leaps_from_sequence_to_sequence_is_nonsense() {
-    let mut chunk = Chunk::encode(1, 0, &[0; 28]);
-    chunk.records = 2;
-    let mut encoder = ArithmeticEncoder::new(Cursor::new(Vec::new()));
-    let model = |symbols| ArithmeticModelBuilder::new(symbols).with_compression(true).build();
-    encoder.encode_symbol(&mut model(64), 0).unwrap();
-    for contexts in [2, 22, 20] {
-        let mut integers = IntegerCompressorBuilder::new().bits(32).contexts(contexts).build_initialized();
-        integers.compress(&mut encoder, 0, 0, 0).unwrap();
+fn wave_packets_are_known_in_both_versions() {
+    let known = |rgb, extra_bytes| PointwiseItems { time: true, rgb, wave_packet: true, extra_bytes };
+    for version in [1, 2] {
+        for (list, expected) in [
+            (items(&[point(2), time(2), wave_packet(version)]), known(false, 0)),
+            (items(&[point(2), time(2), RGB, wave_packet(version), EXTRA_BYTES]), known(true, 5)),
+        ] {
+            assert_eq!(KnownItems::of(&list), Some(KnownItems::Pointwise(expected)));
+            assert!(!can_fill_the_stack(&list));
+        }
     }
-    let mut time = model(6);
-    (0..100).for_each(|_| encoder.encode_symbol(&mut time, 3).unwrap());
-    encoder.done().unwrap();
-    chunk.bytes.truncate(28);
-    chunk.bytes.extend(encoder.into_inner().into_inner());
-    assert_eq!(chunk.by_ours(ALL), (vec![0; 28], Outcome::Nonsense));
+    let mut random = Random(5);
+    let mut chunk = Chunk::encode(4, 0, &records(4, 0, 500, &mut random));
+    chunk.items = items(&[point(2), time(2), wave_packet(1)]);
+    assert_eq!(chunk.compare(ALL), Outcome::Complete);
 }
 
 #[test]
-fn other_records_are_left_to_the_crate() {
-    let items = |format, extra_bytes| LazItemRecordBuilder::default_for_point_format_id(format, extra_bytes).unwrap();
-    assert!(KnownItems::of(&items(3, 1)).is_some());
-    assert!(KnownItems::of(&items(9, 0)).is_none());
-    assert!(KnownItems::of(&[]).is_none());
+fn other_records_are_left_to_the_crate_unless_they_can_harm() {
+    let usual = |format| LazItemRecordBuilder::default_for_point_format_id(format, 1).unwrap();
+    assert!(KnownItems::of(&usual(3)).is_some());
+    for list in [
+        usual(9),
+        usual(10),
+        items(&[point(1), time(1), [8, 6, 1]]),
+        items(&[point(2), time(1)]),
+        items(&[point(2), EXTRA_BYTES, RGB]),
+        Vec::new(),
+    ] {
+        assert_eq!((KnownItems::of(&list), can_fill_the_stack(&list)), (None, false), "{list:?}");
+    }
+    for list in [
+        items(&[point(2), RGB, time(2)]),
+        items(&[point(1), time(2)]),
+        items(&[point(2), time(2), [8, 6, 1]]),
+        items(&[point(2), time(2), wave_packet(1), RGB]),
+        items(&[point(2), time(2), EXTRA_BYTES, EXTRA_BYTES]),
+        items(&[point(2), time(1), time(2)]),
+    ] {
+        assert!(can_fill_the_stack(&list), "{list:?}");
+    }
 }
