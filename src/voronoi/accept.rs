@@ -188,3 +188,22 @@ fn turns_left_or_continues(p: Site, q: Site, r: Site) -> bool {
 fn is_upward(p: Site, q: Site) -> bool {
     q[1] > p[1] || (q[1] == p[1] && q[0] > p[0])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A kite whose diagonal, between its far corners, is not Delaunay. One of its halves leads to the unused number of a record, where the
+    /// test of the circle would see nothing.
+    #[test]
+    fn a_half_edge_that_leads_to_no_corner_is_found() {
+        let (sites, out) = ([[0, 0], [50, -5], [100, 0], [50, 5]], u32::MAX);
+        for (diagonal, unused) in [(2, 0), (3, 2)] {
+            let records = [0, 1, 2, unused, out, out, 8, 4 * unused, 0, 2, 3, 0, diagonal, out, out, 0];
+            let mut mesh = ClosedMesh::default();
+            mesh.start_with(16, VertexIndex(4)).copy_from_slice(&records);
+            let checked = AcceptanceCheck::default().accept(&mesh, &sites, None, &mut HalfEdgeMesh::default());
+            assert!(checked.is_err(), "{diagonal}");
+        }
+    }
+}

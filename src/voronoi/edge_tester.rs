@@ -71,7 +71,7 @@ impl EdgeTester {
             if CHECK {
                 let there = near[h.corner()] ^ far[g.next().corner()];
                 let back = near[h.next().corner()] ^ far[g.corner()];
-                links.broken |= (there | back | (far[4 + g.corner()] ^ h.0) | (g.0 & 4)) != 0;
+                links.broken |= (there | back | (far[4 + g.corner()] ^ h.0) | u32::from(g.0 & 7 > 2)) != 0;
             }
             let Some(&d) = sites.get(far[g.previous().corner()] as usize) else {
                 links.broken = true;

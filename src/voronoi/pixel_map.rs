@@ -40,7 +40,7 @@ impl PixelMap {
     /// Returns the pixels for `sites`, whose box is `extent` steps wide and high and begins at `low`.
     pub(super) fn new(sites: &[Site], low: Site, extent: [f64; 2], scale: f64) -> PixelMap {
         let histograms = histograms(sites, low, extent);
-        let crowding = histograms.iter().map(crowding).product::<f64>();
+        let crowding = histograms.iter().map(|histogram| crowding(histogram, sites.len())).product::<f64>();
         let axis = |axis: usize| AxisMap::new(&histograms[axis], extent[axis], pixels_along(extent[axis], scale));
         PixelMap { low, scale, adapted: (crowding > MAX_CROWDING).then(|| [0, 1].map(axis)) }
     }
@@ -114,9 +114,15 @@ impl AxisMap {
     }
 }
 
-/// Returns every site of a few, a sample of many.
+/// Returns every site of a few, a sample of many: one of each run of sites, at a place in the run that follows no rule. Sites of a raster
+/// come row by row, and one of every so many would see only some of the columns.
 fn sample(sites: &[Site]) -> impl ExactSizeIterator<Item = &Site> {
-    sites.iter().step_by(sites.len().div_ceil(SAMPLE))
+    let run = sites.len().div_ceil(SAMPLE).max(1);
+    let place = move |number: usize| {
+        let mixed = (number as u32).wrapping_mul(0x9e37_79b9);
+        (number * run + ((u64::from(mixed) * run as u64) >> 32) as usize).min(sites.len() - 1)
+    };
+    (0..sites.len().div_ceil(run)).map(move |number| &sites[place(number)])
 }
 
 /// Counts the sites of a sample along both axes.
@@ -132,9 +138,12 @@ fn histograms(sites: &[Site], low: Site, extent: [f64; 2]) -> [[u32; BINS]; 2] {
     histograms
 }
 
-/// Returns with how many sites a site shares its part of the axis, relative to evenly spread sites.
-fn crowding(histogram: &[u32; BINS]) -> f64 {
-    let sum = |power: i32| histogram.iter().map(|&count| f64::from(count).powi(power)).sum::<f64>();
+/// Returns with how many of `sites` a site shares its part of the axis, relative to evenly spread sites.
+fn crowding(histogram: &[u32; BINS], sites: usize) -> f64 {
+    // The columns of a raster are no crowds, so parts are not narrower than those of a square one.
+    let together = (BINS as f64 / (sites as f64).sqrt()).ceil().clamp(1.0, BINS as f64) as usize;
+    let counts = || histogram.chunks(together).map(|counts| f64::from(counts.iter().sum::<u32>()));
+    let (sum, squares) = (counts().sum::<f64>(), counts().map(|count| count * count).sum::<f64>());
     // Where there are few sites, chance alone puts some together.
-    BINS as f64 * (sum(2) - sum(1)) / sum(1).powi(2)
+    counts().len() as f64 * (squares - sum) / (sum * sum)
 }

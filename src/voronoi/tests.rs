@@ -59,6 +59,16 @@ fn a_leaf_with_dense_spots_is_accepted() {
     assert!(counts.missing < counts.sites / 3, "{counts:?}");
 }
 
+/// Every site of a raster has a pixel of its own, whatever the length of the rows has in common with the number of sites that are looked at.
+#[test]
+fn sites_of_a_raster_keep_their_pixels() {
+    for side in [40, 100, 120, 128, 150, 200, 216, 300] {
+        let sites: Vec<Site> = (0..side * side).map(|i| [i % side * 100, i / side * 100]).collect();
+        let (_, counts) = triangulate(&sites, &mut PipelineBuffers::default()).unwrap();
+        assert_eq!((counts.missing, counts.moved), (0, 0), "{side}: {counts:?}");
+    }
+}
+
 /// Between two sites far out on a circle a region is thin and falls apart. Its pieces lie within pieces of the next region.
 #[test]
 fn islands_within_islands_are_removed() {

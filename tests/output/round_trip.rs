@@ -334,6 +334,13 @@ fn hostile_packed_files_take_no_memory() {
     assert!(said("\"byteStride\":8,\"count\":30", "\"byteStride\":9,\"count\":30").contains("of 9 bytes"));
     let corners = format!("\"byteStride\":2,\"count\":{}", 3 * tile.triangles.len());
     assert!(said(&corners, &corners.replace("\"count\":1", "\"count\":9")).contains("cannot hold"));
+    assert!(
+        said(&corners, &corners.replace("\"byteStride\":2", "\"byteStride\":4"))
+            .contains("does not hold packed indices")
+    );
+    assert!(
+        said("\"byteStride\":4,\"count\":30", "\"byteStride\":8,\"count\":30").contains("elements of another size")
+    );
     assert!(said("ATTRIBUTES", "TRIANGLESS").contains("TRIANGLESS"));
     assert!(said("OCTAHEDRAL", "QUATERNION").contains("QUATERNION"));
 }

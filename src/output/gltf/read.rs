@@ -142,6 +142,7 @@ struct Elements {
 }
 
 /// A buffer view, and the bytes from one of its elements to the next if it says them.
+#[derive(Clone, Copy)]
 struct StrideView {
     stored: StoredView,
     stride: Option<usize>,
@@ -341,16 +342,26 @@ impl<'b> Decoder<'b> {
     /// Returns triangles that the index codec has packed.
     fn packed_triangles(&mut self, indices: usize) -> Decoded<Vec<[u32; 3]>> {
         let accessor = item(&self.document.elements, indices, "accessor")?;
-        let view = item(&self.document.views, accessor.view, "buffer view")?.stored;
-        let is_index = matches!(accessor.component, ComponentType::U16 | ComponentType::U32);
-        let packed = view.packed_triangles().filter(|_| is_index && accessor.shape == Type::Scalar);
-        let packed = packed.ok_or_else(|| format!("accessor {indices} holds no indices"))?;
+        let StrideView { stored: view, stride } = *item(&self.document.views, accessor.view, "buffer view")?;
+        let size = accessor.component.size();
+        let is_index = matches!(accessor.component, ComponentType::U16 | ComponentType::U32)
+            && accessor.shape == Type::Scalar
+            && stride.is_none_or(|stride| stride == size);
+        let packed = view
+            .packed_triangles()
+            .filter(|packed| is_index && packed.byte_stride == size as u64 && packed.filter.is_none());
+        let packed = packed.ok_or_else(|| format!("accessor {indices} does not hold packed indices"))?;
         let mut triangles = packed.unpack_triangles(self.stored(&view)?)?;
         if accessor.count > 3 * triangles.len() as u64 {
             return Err(format!("accessor {indices} goes past the end of the data"));
         }
         triangles.truncate(accessor.count as usize / 3);
-        Ok(triangles)
+        // Viewers cut numbers that are too large for 16 bits.
+        let is_short = accessor.component == ComponentType::U16;
+        match is_short && triangles.as_flattened().iter().any(|&v| v > u32::from(u16::MAX)) {
+            true => Err(format!("accessor {indices} has indices of more than 16 bits")),
+            false => Ok(triangles),
+        }
     }
 
     /// Returns the elements of an accessor of this type, tightly packed.
@@ -391,6 +402,9 @@ impl<'b> Decoder<'b> {
         // Elements without a stride follow each other without padding.
         if view.stride.unwrap_or(component.size() * shape.multiplicity()) != size_of::<T>() {
             return Err(format!("accessor {accessor} is not {} bytes an element", size_of::<T>()));
+        }
+        if view.stored.packed_stride().is_some_and(|stride| stride != size_of::<T>() as u64) {
+            return Err(format!("accessor {accessor} is packed as elements of another size"));
         }
         let bytes = unpack(&view.stored, self.stored(&view.stored)?)?;
         let length = elements.count.checked_mul(size_of::<T>() as u64).and_then(|length| usize::try_from(length).ok());

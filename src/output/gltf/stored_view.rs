@@ -55,6 +55,11 @@ impl StoredView {
         self.packed.filter(|packed| matches!(packed.mode, PackedMode::Triangles))
     }
 
+    /// Returns the bytes of a packed element, if the view is packed.
+    pub(crate) fn packed_stride(&self) -> Option<u64> {
+        self.packed.map(|packed| packed.byte_stride)
+    }
+
     /// Returns the filter that follows unpacking.
     pub(crate) fn filter(&self) -> Option<PackedFilter> {
         self.packed.and_then(|packed| packed.filter)

@@ -289,7 +289,7 @@ mod tests {
     fn any_number_of_elements_packs() {
         for count in [0, 1, 2, 15, 16, 17, 255, 256, 257, 300, 512, 1000] {
             check_all(&vec![0; 16 * count]);
-            check_all(&(0..16 * count as u32).map(|i| (i * i >> 3) as u8).collect::<Vec<_>>());
+            check_all(&(0..16 * count as u32).map(|i| ((i * i) >> 3) as u8).collect::<Vec<_>>());
         }
     }
 

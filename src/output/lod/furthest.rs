@@ -4,7 +4,7 @@ use crate::output::lod::cell_grid::CellGrid;
 use crate::output::lod::filling::Filling;
 use crate::output::lod::vertex_cells::vertical_distance;
 
-/// Steps of the walks from vertex to vertex, on average, before the search gives up. Terrains need far fewer.
+/// Steps of the walks to the vertices, on average, before the search gives up. Terrains need far fewer.
 const STEPS_PER_VERTEX: u64 = 64;
 
 /// Triangles in a cell, from one of which a walk starts.
@@ -39,7 +39,7 @@ impl Furthest {
         every: usize,
     ) -> Furthest {
         let mut furthest = vec![(0.0, 0); filling.triangles()];
-        let mut steps = steps_for(surface.len());
+        let mut steps = steps_for(surface.len() / every);
         let starts = StartCells::new(moved, filling);
         for v in (0..surface.len()).step_by(every).filter(|&v| !kept[v]) {
             let start = starts.near(&surface[v]);

@@ -113,15 +113,18 @@ impl Joined {
             let part = &self.parts[part];
             part.normals.as_ref().map(|normals| unscaled_normal(normals.get(v), part.scale))
         };
-        let color = |[part, v]: [usize; 2]| self.parts[part].colors.as_ref().map(|colors| colors[v]);
+        let color = |[part, v]: [usize; 2]| {
+            let [red, green, blue, _] = self.parts[part].colors.as_ref()?[v];
+            Some([red, green, blue])
+        };
         let mut attributes = PointAttributes::empty(AttributeChoice {
             classification: all_have(|part| part.attributes.classification.is_some()),
             intensity: all_have(|part| part.attributes.intensity.is_some()),
         });
         origins().for_each(|[part, v]| attributes.push_from(&self.parts[part].attributes, v));
         Tile {
-            normals: origins().map(normal).collect(),
-            colors: origins().map(|at| color(at).map(|[red, green, blue, _]| [red, green, blue])).collect(),
+            normals: all_have(|part| part.normals.is_some()).then(|| origins().filter_map(normal).collect()),
+            colors: all_have(|part| part.colors.is_some()).then(|| origins().filter_map(color).collect()),
             attributes,
             ..tile
         }
