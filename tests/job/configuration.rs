@@ -168,7 +168,7 @@ fn anything_in_the_way_of_the_output_is_named() {
 #[test]
 fn help_names_the_commands_examples_and_exit_codes() {
     let help = gdt_batch(Path::new("."), &["--help"]).succeeded().out;
-    for words in ["check", "verify", "info", "sample", "Examples", "Exit codes", "configs/full.toml"] {
+    for words in ["check", "verify", "info", "sample", "Examples", "Exit codes", "options.md"] {
         assert!(help.contains(words), "{words}");
     }
 }
