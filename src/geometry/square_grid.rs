@@ -1,5 +1,7 @@
 //! A grid of square cells over a part of the plane.
 
+use multiversion::multiversion;
+
 use crate::geometry::bounds::Bounds;
 
 /// Square cells over a box, numbered row by row from its least corner. A point outside belongs to the nearest cell.
@@ -39,6 +41,21 @@ impl SquareGrid {
         let line = |value: i32, low: f64| ((f64::from(value) - low) / self.side) as usize;
         line(y, self.low[1]).min(self.rows - 1) * self.columns + line(x, self.low[0]).min(self.columns - 1)
     }
+
+    /// Returns the cell of every point, as [`SquareGrid::cell`] does, of grids with fewer than 2^31 cells.
+    pub fn cells_of(&self, points: &[[i32; 3]]) -> Vec<u32> {
+        cells_of(self, points)
+    }
+}
+
+#[multiversion(targets("x86_64+avx2"))]
+fn cells_of(grid: &SquareGrid, points: &[[i32; 3]]) -> Vec<u32> {
+    let last = [grid.columns, grid.rows].map(|lines| (lines - 1) as f64);
+    let line = |p: &[i32; 3], axis: usize| {
+        let line = (f64::from(p[axis]) - grid.low[axis]) / grid.side;
+        line.max(0.0).min(last[axis]) as i32 as u32
+    };
+    points.iter().map(|p| line(p, 1).wrapping_mul(grid.columns as u32).wrapping_add(line(p, 0))).collect()
 }
 
 #[cfg(test)]

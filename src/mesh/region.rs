@@ -4,17 +4,26 @@ use crate::mesh::half_edge::HalfEdgeMesh;
 use crate::mesh::index::{HalfEdgeIndex, SiteIndex};
 use crate::{Error, Result};
 
-/// Marks the triangles of `mesh` that lie to the left of the directed edges `boundary`, which are given by their sites: those that a
-/// flood from the left of the edges reaches without crossing one of them.
+/// Marks the triangles of `mesh` that lie to the left of the directed edges `boundary`, which are given by their sites and go
+/// all around: those that a flood from the right of the edges does not reach without crossing one of them.
 ///
 /// # Errors
 /// [`Error::Broken`] if a boundary edge is missing from the mesh. This should be impossible: an edge of the triangulation of all
 /// sites is an edge of the triangulation of any subset with its two ends.
 pub fn covered(mesh: &HalfEdgeMesh, boundary: &[[SiteIndex; 2]]) -> Result<Vec<bool>> {
     let edges = EdgesByOrigin::new(boundary);
-    let is_boundary: Vec<bool> =
-        mesh.half_edges().map(|h| edges.contains([mesh.origin(h), mesh.destination(h)])).collect();
-    let found = is_boundary.iter().filter(|&&b| b).count();
+    let mut is_boundary = vec![false; mesh.twins.len()];
+    let mut found = 0;
+    for (triangle, corners) in mesh.triangles.iter().enumerate() {
+        // Most triangles have no corner where a boundary edge begins.
+        if corners.iter().any(|&v| edges.leaves(v)) {
+            for k in 0..3 {
+                let is_edge = edges.contains([corners[k], corners[(k + 1) % 3]]);
+                is_boundary[3 * triangle + k] = is_edge;
+                found += usize::from(is_edge);
+            }
+        }
+    }
     if found != boundary.len() {
         return Err(Error::Broken(format!(
             "{} of {} boundary edges are not in the triangulation",
@@ -22,20 +31,14 @@ pub fn covered(mesh: &HalfEdgeMesh, boundary: &[[SiteIndex; 2]]) -> Result<Vec<b
             boundary.len()
         )));
     }
-    let mut covered = vec![false; mesh.triangles.len()];
-    let mut pending = Vec::new();
-    let mut reach = |triangle: usize, pending: &mut Vec<usize>| {
-        if !std::mem::replace(&mut covered[triangle], true) {
-            pending.push(triangle);
-        }
-    };
-    mesh.half_edges().filter(|h| is_boundary[h.get()]).for_each(|h| reach(h.triangle(), &mut pending));
+    // What lies to the right of the boundary is little: pockets between it and the hull.
+    let mut covered = vec![!boundary.is_empty(); mesh.triangles.len()];
+    let right_of = |h: usize| Some(mesh.twins[h]).filter(|&twin| twin != HalfEdgeIndex::HULL);
+    let beyond = |h: usize| right_of(h).filter(|twin| !is_boundary[twin.get()]).map(HalfEdgeIndex::triangle);
+    let mut pending: Vec<usize> = (0..is_boundary.len()).filter(|&h| is_boundary[h]).filter_map(beyond).collect();
     while let Some(triangle) = pending.pop() {
-        for h in HalfEdgeIndex::of_triangle(triangle) {
-            let twin = mesh.twin(h);
-            if !is_boundary[h.get()] && twin != HalfEdgeIndex::HULL {
-                reach(twin.triangle(), &mut pending);
-            }
+        if std::mem::replace(&mut covered[triangle], false) {
+            pending.extend((3 * triangle..3 * triangle + 3).filter_map(beyond));
         }
     }
     Ok(covered)
@@ -60,6 +63,12 @@ impl EdgesByOrigin {
         }
         first.push(edges.len() as u32);
         EdgesByOrigin { first, ends: edges.iter().map(|edge| edge[1]).collect() }
+    }
+
+    /// Tells whether an edge starts at this site.
+    #[inline(always)]
+    fn leaves(&self, origin: SiteIndex) -> bool {
+        self.first.get(origin.get()..origin.get() + 2).is_some_and(|ends| ends[0] < ends[1])
     }
 
     fn contains(&self, [origin, destination]: [SiteIndex; 2]) -> bool {

@@ -3,6 +3,11 @@
 //! Unlike [`crate::geometry::square_grid::SquareGrid`] it fits a number of cells to the points: cells are as wide as the points'
 //! box divided by whole numbers, and not square.
 
+use multiversion::multiversion;
+
+use crate::geometry::Bounds;
+use crate::output::tile::bounds;
+
 /// The cells, numbered row by row.
 pub(crate) struct CellGrid {
     low: [f64; 2],
@@ -15,11 +20,8 @@ pub(crate) struct CellGrid {
 impl CellGrid {
     /// Returns about `about` cells over `positions` (lattice x, y, z).
     pub(crate) fn new(positions: &[[i32; 3]], about: usize) -> CellGrid {
-        let none = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
-        let [low, high] = positions.iter().fold(none, |[low, high], p| {
-            let p = [p[0] as f64, p[1] as f64];
-            [[0, 1].map(|k| low[k].min(p[k])), [0, 1].map(|k| high[k].max(p[k]))]
-        });
+        let bounds = bounds(positions).unwrap_or(Bounds::of_point([0; 3]));
+        let [low, high] = [bounds.min, bounds.max].map(|p| [f64::from(p[0]), f64::from(p[1])]);
         let size = [0, 1].map(|k| (high[k] - low[k]).max(1.0));
         let about = about.max(1) as f64;
         let columns = (about * size[0] / size[1]).sqrt().ceil().clamp(1.0, about);
@@ -38,41 +40,38 @@ impl CellGrid {
         row * self.columns + column
     }
 
-    /// Returns the cells in the column and the row before those of `cell`: three of them, or the cell itself in place of those that there
-    /// are not.
-    #[inline(always)]
-    pub(crate) fn neighbours_before(&self, cell: usize) -> [usize; 3] {
-        let west = usize::from(!cell.is_multiple_of(self.columns));
-        let south = if cell >= self.columns { self.columns } else { 0 };
-        [cell - west, cell - south, cell - west - south]
+    /// Returns the number of columns and of rows.
+    pub(crate) fn lines(&self) -> [usize; 2] {
+        [self.columns, self.rows]
     }
 
-    /// Does what [`CellGrid::neighbours_before`] does, for the next column and the next row.
-    #[inline(always)]
-    pub(crate) fn neighbours_after(&self, cell: usize) -> [usize; 3] {
-        let east = usize::from(!(cell + 1).is_multiple_of(self.columns));
-        let north = if cell + self.columns < self.count() { self.columns } else { 0 };
-        [cell + east, cell + north, cell + east + north]
+    /// Returns a number of lattice steps along each axis: points that are no further apart are in the same cell or in cells side by side.
+    pub(crate) fn reach(&self) -> [u32; 2] {
+        // A hundredth is more than rounding can move a point.
+        self.scale.map(|scale| (0.99 / scale) as u32)
     }
 
     /// Returns the number of the cell around a point.
+    #[inline(always)]
     pub(crate) fn of(&self, p: &[i32; 3]) -> u32 {
         self.at(self.row(p[1] as f64), self.column(p[0] as f64)) as u32
     }
 
-    /// Returns the column and the row of the cell around a point.
-    pub(crate) fn place(&self, p: &[i32; 3]) -> [u32; 2] {
-        [self.column(p[0] as f64), self.row(p[1] as f64)].map(|at| at as u32)
+    /// Returns the numbers of the cells around points.
+    pub(crate) fn of_all(&self, points: &[[i32; 3]]) -> Vec<u32> {
+        cells_of(self, points)
     }
 
     /// Returns the column at `x`, or the outermost one on that side.
+    #[inline(always)]
     pub(crate) fn column(&self, x: f64) -> usize {
-        (((x - self.low[0]) * self.scale[0]) as usize).min(self.columns - 1)
+        line((x - self.low[0]) * self.scale[0], self.columns)
     }
 
     /// Returns the row at `y`, or the outermost one on that side.
+    #[inline(always)]
     pub(crate) fn row(&self, y: f64) -> usize {
-        (((y - self.low[1]) * self.scale[1]) as usize).min(self.rows - 1)
+        line((y - self.low[1]) * self.scale[1], self.rows)
     }
 
     /// Returns the first and the last column that the triangle touches in `row`. Rounding may add one column at either end.
@@ -93,4 +92,16 @@ impl CellGrid {
         let spare = 0.01 / self.scale[0];
         [span[0] - spare, span[1] + spare].map(|x| self.column(x))
     }
+}
+
+/// Returns the line, of so many, in which a coordinate in lines lies; the outermost one on its side for others.
+#[inline(always)]
+fn line(at: f64, lines: usize) -> usize {
+    // There are fewer than 2^31 lines, and these steps work on several numbers at a time.
+    at.max(0.0).min((lines - 1) as f64) as i32 as usize
+}
+
+#[multiversion(targets("x86_64+avx2"))]
+fn cells_of(grid: &CellGrid, points: &[[i32; 3]]) -> Vec<u32> {
+    points.iter().map(|p| grid.of(p)).collect()
 }

@@ -27,31 +27,32 @@ pub(crate) struct Furthest {
 }
 
 impl Furthest {
-    /// Compares the triangles of `filling`, between the positions `moved`, with one of every `every` vertices of `surface`. Only vertices that
-    /// are not `kept`, so that the filling does not have them, are among the results.
+    /// Compares the triangles of `filling`, between the positions `moved`, with the surface, whose `heights` are those of one of every `every`
+    /// vertices. Only vertices that are not `kept`, so that the filling does not have them, are among the results.
     ///
     /// Stops looking where that would take far longer than usual: where nearly all triangles are slivers.
     pub(crate) fn find(
-        surface: &[[i32; 3]],
+        heights: &[i32],
         moved: &[[i32; 3]],
         kept: &[bool],
         filling: &Filling,
         every: usize,
     ) -> Furthest {
         let mut furthest = vec![(0.0, 0); filling.triangles()];
-        let mut steps = steps_for(surface.len() / every);
+        let mut steps = steps_for(moved.len() / every);
         let starts = StartCells::new(moved, filling);
-        for v in (0..surface.len()).step_by(every).filter(|&v| !kept[v]) {
-            let start = starts.near(&surface[v]);
+        for (v, &height) in (0..).step_by(every).zip(heights).filter(|&(v, _)| !kept[v]) {
+            let [x, y, _] = moved[v];
+            let start = starts.near(&moved[v]);
             let Some(triangle) = filling.locate(v as u32, start, &mut steps) else { break };
             let Some(corners) = filling.corners(triangle) else { continue };
-            let distance = vertical_distance(&corners.map(|v| moved[v as usize]), surface[v]);
+            let distance = vertical_distance(&corners.map(|v| moved[v as usize]), [x, y, height]);
             if distance > furthest[triangle].0 {
                 furthest[triangle] = (distance, v as u32);
             }
         }
         let at_corner = |v: u32| match (v as usize).is_multiple_of(every) {
-            true => f64::from(moved[v as usize][2].abs_diff(surface[v as usize][2])),
+            true => f64::from(moved[v as usize][2].abs_diff(heights[v as usize / every])),
             false => 0.0,
         };
         let (mut sum, mut within, mut vertices) = (0.0, 0u64, Vec::new());

@@ -1,14 +1,15 @@
-//! The least and greatest height of a terrain in each cell of a grid. They bound how far a simplified triangle can be from the terrain, and
+//! The least and greatest height of a terrain around each cell of a grid. They bound how far a simplified triangle can be from the terrain, and
 //! the cells tell which triangles of the terrain are near it.
-
-use std::ops::RangeInclusive;
+//!
+//! Nearly all triangles of a terrain are narrower than a cell. So a place has its height from vertices in its own cell and the eight cells
+//! around it, and the heights of vertices are enough: no triangle must be drawn into cells. The few wide triangles are, each by itself.
 
 use crate::output::lod::cell_grid::CellGrid;
 
 /// Vertices of the terrain in a cell, on average.
-const VERTICES_PER_CELL: usize = 8;
+const VERTICES_PER_CELL: usize = 12;
 
-/// A triangle in more cells than this counts everywhere, so that a fan of slivers takes no longer than other terrains.
+/// A wide triangle in more cells than this counts everywhere, so that a fan of slivers takes no longer than other terrains.
 const MOST_CELLS: usize = 64;
 
 /// A simplified triangle whose box has more cells than this is compared with the heights of the whole terrain.
@@ -17,10 +18,13 @@ const MOST_CELLS_COMPARED: usize = 1 << 12;
 /// The heights of a terrain, cell by cell.
 pub(crate) struct HeightBounds {
     cells: CellGrid,
-    /// The column and the row of the cell of each vertex.
-    places: Vec<[u32; 2]>,
-    /// The least and the greatest height in each cell.
+    /// The cell of each vertex.
+    cell_of: Vec<u32>,
+    /// The least and the greatest height of the terrain in each cell and those next to it in the next column and the next row, and of some
+    /// vertices around them.
     ranges: Vec<[i32; 2]>,
+    /// The triangles of the terrain that are wider or higher than a cell.
+    wide: Vec<u32>,
     /// The least and the greatest height of triangles that are in more than [`MOST_CELLS`].
     everywhere: [i32; 2],
     /// The least and the greatest height of the terrain.
@@ -34,16 +38,19 @@ const NONE: [i32; 2] = [i32::MAX, i32::MIN];
 #[derive(Clone, Copy)]
 struct CellBox {
     /// The first and the last column.
-    columns: [u32; 2],
+    columns: [usize; 2],
     /// The first and the last row.
-    rows: [u32; 2],
+    rows: [usize; 2],
 }
 
 impl CellBox {
     #[inline(always)]
-    fn around([a, b, c]: [[u32; 2]; 3]) -> CellBox {
-        let ends = |k: usize| [a[k].min(b[k]).min(c[k]), a[k].max(b[k]).max(c[k])];
-        CellBox { columns: ends(0), rows: ends(1) }
+    fn around(cells: &CellGrid, corners: &[[i32; 3]; 3]) -> CellBox {
+        let ends = |k: usize| {
+            let [a, b, c] = corners.map(|p| p[k]);
+            [a.min(b).min(c), a.max(b).max(c)].map(f64::from)
+        };
+        CellBox { columns: ends(0).map(|x| cells.column(x)), rows: ends(1).map(|y| cells.row(y)) }
     }
 
     /// Tells whether the box has at most two columns and two rows.
@@ -52,24 +59,20 @@ impl CellBox {
         self.columns[1] - self.columns[0] < 2 && self.rows[1] - self.rows[0] < 2
     }
 
-    /// Returns the first cell of the box.
-    #[inline(always)]
-    fn first(&self, grid: &CellGrid) -> usize {
-        grid.at(self.rows[0] as usize, self.columns[0] as usize)
+    fn count(&self) -> usize {
+        [self.columns, self.rows].map(|ends| ends[1] - ends[0] + 1).iter().product()
     }
 
-    #[inline(always)]
-    fn cells(&self) -> usize {
-        let count = |ends: [u32; 2]| (ends[1] - ends[0]) as usize + 1;
-        count(self.columns) * count(self.rows)
+    /// Returns the cells in each row of the box.
+    fn runs(self, cells: &CellGrid) -> impl Iterator<Item = std::ops::RangeInclusive<usize>> + use<'_> {
+        let [west, east] = self.columns;
+        (self.rows[0]..=self.rows[1]).map(move |row| cells.at(row, west)..=cells.at(row, east))
     }
+}
 
-    /// Returns the cells of `grid` in each row of the box.
-    #[inline(always)]
-    fn runs<'a>(&self, grid: &'a CellGrid) -> impl Iterator<Item = RangeInclusive<usize>> + use<'a> {
-        let [west, east] = self.columns.map(|column| column as usize);
-        (self.rows[0]..=self.rows[1]).map(move |row| grid.at(row as usize, west)..=grid.at(row as usize, east))
-    }
+#[inline(always)]
+fn union(a: [i32; 2], b: [i32; 2]) -> [i32; 2] {
+    [a[0].min(b[0]), a[1].max(b[1])]
 }
 
 /// Returns the least and the greatest height of a triangle.
@@ -79,97 +82,149 @@ fn heights(corners: &[[i32; 3]; 3]) -> [i32; 2] {
     [a.min(b).min(c), a.max(b).max(c)]
 }
 
-#[inline(always)]
-fn union(a: [i32; 2], b: [i32; 2]) -> [i32; 2] {
-    [a[0].min(b[0]), a[1].max(b[1])]
-}
-
 impl HeightBounds {
     /// Returns the heights of the terrain with the triangles `fine`, whose corners are `positions` (lattice x, y, z).
     pub(crate) fn new(positions: &[[i32; 3]], fine: &[[u32; 3]]) -> HeightBounds {
         let cells = CellGrid::new(positions, positions.len() / VERTICES_PER_CELL + 1);
-        let places = positions.iter().map(|p| cells.place(p)).collect();
-        let ranges = vec![NONE; cells.count()];
-        let mut bounds = HeightBounds { cells, places, ranges, everywhere: NONE, all: NONE };
-        fine.iter().for_each(|triangle| bounds.add(triangle, heights(&triangle.map(|v| positions[v as usize]))));
+        let cell_of = cells.of_all(positions);
+        let mut ranges = vec![NONE; cells.count()];
+        for (p, &cell) in positions.iter().zip(&cell_of) {
+            let known = &mut ranges[cell as usize];
+            *known = union(*known, [p[2]; 2]);
+        }
+        let all = ranges.iter().copied().fold(NONE, union);
+        let wide = wide_triangles(positions, fine, cells.reach());
+        let mut bounds = HeightBounds { cells, cell_of, ranges, wide, everywhere: NONE, all };
+        bounds.add_wide(positions, fine);
         bounds.spread();
-        bounds.all = bounds.ranges.iter().copied().fold(bounds.everywhere, union);
         bounds
     }
 
-    /// Returns the cells around a triangle between the vertices.
-    #[inline(always)]
-    fn around(&self, triangle: &[u32; 3]) -> CellBox {
-        CellBox::around(triangle.map(|v| self.places[v as usize]))
-    }
-
-    /// Adds the `range` of heights of a triangle to every cell that holds a point of it. Most triangles are in a small box, and only its
-    /// first cell gets the range: see [`HeightBounds::spread`].
-    #[inline(always)]
-    fn add(&mut self, triangle: &[u32; 3], range: [i32; 2]) {
-        let around = self.around(triangle);
-        if around.is_small() {
-            let known = &mut self.ranges[around.first(&self.cells)];
-            *known = union(*known, range);
-        } else if around.cells() > MOST_CELLS {
-            self.everywhere = union(self.everywhere, range);
-        } else {
+    /// Adds the heights of every wide triangle to all cells of its box.
+    fn add_wide(&mut self, positions: &[[i32; 3]], fine: &[[u32; 3]]) {
+        for &triangle in &self.wide {
+            let corners = fine[triangle as usize].map(|v| positions[v as usize]);
+            let (around, range) = (CellBox::around(&self.cells, &corners), heights(&corners));
+            if around.count() > MOST_CELLS {
+                self.everywhere = union(self.everywhere, range);
+                continue;
+            }
             for run in around.runs(&self.cells) {
                 self.ranges[run].iter_mut().for_each(|known| *known = union(*known, range));
             }
         }
     }
 
-    /// Adds the range of each cell to the cells next to it in the next column and the next row.
+    /// Adds to the range of each cell those of the cells around it, where the corners of its triangles may be, and the same for the cells in
+    /// the next column and the next row.
     fn spread(&mut self) {
-        for cell in (0..self.ranges.len()).rev() {
-            let before = self.cells.neighbours_before(cell).map(|before| self.ranges[before]);
-            self.ranges[cell] = before.into_iter().fold(self.ranges[cell], union);
-        }
+        let [columns, rows] = self.cells.lines();
+        (0..rows).for_each(|row| spread_along(&mut self.ranges[row * columns..(row + 1) * columns], 1));
+        (0..columns).for_each(|column| spread_along(&mut self.ranges[column..], columns));
     }
 
-    /// Returns a number of z steps: no point of this triangle between the vertices is further above or below the terrain, if its corners have
-    /// these heights.
-    pub(crate) fn error_bound(&self, triangle: &[u32; 3], corners: &[[i32; 3]; 3]) -> u64 {
+    /// Returns a number of z steps: no point of a simplified triangle with these corners is further above or below the terrain.
+    #[inline(always)]
+    pub(crate) fn error_bound(&self, corners: &[[i32; 3]; 3]) -> u32 {
         let [low, high] = heights(corners);
-        let around = self.around(triangle);
-        let mut terrain = self.everywhere;
-        if around.cells() > MOST_CELLS_COMPARED {
-            terrain = self.all;
+        let around = CellBox::around(&self.cells, corners);
+        let terrain = if around.is_small() {
+            union(self.everywhere, self.ranges[self.cells.at(around.rows[0], around.columns[0])])
         } else {
-            for run in around.runs(&self.cells) {
-                terrain = self.ranges[run].iter().copied().fold(terrain, union);
-            }
-        }
+            self.heights_within(around)
+        };
+        // The difference of two heights, so 32 bits hold it.
         let above = high as i64 - terrain[0] as i64;
         let below = terrain[1] as i64 - low as i64;
-        above.max(below).max(0) as u64
+        above.max(below).clamp(0, u32::MAX.into()) as u32
     }
 
-    /// Returns what of the terrain is near some triangles between its vertices: the numbers of all vertices and those of its triangles `fine`
+    /// Returns the least and the greatest height of the terrain in a box.
+    #[inline(never)]
+    fn heights_within(&self, around: CellBox) -> [i32; 2] {
+        if around.count() > MOST_CELLS_COMPARED {
+            return self.all;
+        }
+        let ranges = around.runs(&self.cells).flat_map(|run| &self.ranges[run]);
+        ranges.copied().fold(self.everywhere, union)
+    }
+
+    /// Returns the difference between the greatest and the least height. No two terrains within this range are further apart.
+    pub(crate) fn height_range(&self) -> f64 {
+        let [low, high] = self.all;
+        if low > high { 0.0 } else { high as f64 - low as f64 }
+    }
+
+    /// Returns what of the terrain is near some triangles with these corners: the numbers of all vertices and those of its triangles `fine`
     /// that have a point in a cell around one of them, and some more.
     pub(crate) fn near(
         &self,
+        positions: &[[i32; 3]],
         fine: &[[u32; 3]],
-        triangles: impl Iterator<Item = [u32; 3]>,
+        triangles: impl Iterator<Item = [[i32; 3]; 3]>,
     ) -> (Vec<u32>, Vec<[u32; 3]>) {
         let mut is_near = vec![false; self.cells.count()];
-        for triangle in triangles {
-            self.around(&triangle).runs(&self.cells).for_each(|run| is_near[run].fill(true));
+        for corners in triangles {
+            CellBox::around(&self.cells, &corners).runs(&self.cells).for_each(|run| is_near[run].fill(true));
         }
-        // The first cell of a small box then tells for the whole box.
-        for cell in 0..is_near.len() {
-            is_near[cell] |= self.cells.neighbours_after(cell).into_iter().any(|after| is_near[after]);
-        }
-        let touches = |triangle: &&[u32; 3]| {
-            let around = self.around(triangle);
-            if around.is_small() {
-                return is_near[around.first(&self.cells)];
-            }
-            around.cells() > MOST_CELLS || around.runs(&self.cells).any(|run| is_near[run].contains(&true))
-        };
-        let near = |place: &[u32; 2]| is_near[self.cells.at(place[1] as usize, place[0] as usize)];
-        let vertices = (0..).zip(&self.places).filter(|(_, place)| near(place)).map(|(v, _)| v).collect();
-        (vertices, fine.iter().filter(touches).copied().collect())
+        let vertices = (0..).zip(&self.cell_of).filter(|(_, cell)| is_near[**cell as usize]).map(|(v, _)| v).collect();
+        // Any corner of a triangle that is not wide is at most one cell away from all of its points.
+        let is_beside = self.beside(&is_near);
+        let mut near: Vec<[u32; 3]> =
+            fine.iter().filter(|t| is_beside[self.cell_of[t[0] as usize] as usize]).copied().collect();
+        let others = self.wide.iter().map(|&wide| fine[wide as usize]);
+        near.extend(others.filter(|t| {
+            let around = CellBox::around(&self.cells, &t.map(|v| positions[v as usize]));
+            !is_beside[self.cell_of[t[0] as usize] as usize]
+                && (around.count() > MOST_CELLS || around.runs(&self.cells).any(|run| is_near[run].contains(&true)))
+        }));
+        (vertices, near)
     }
+
+    /// Tells for each cell whether it is among the `chosen` or next to one of them.
+    fn beside(&self, chosen: &[bool]) -> Vec<bool> {
+        let [columns, rows] = self.cells.lines();
+        let mut beside = vec![false; chosen.len()];
+        for at in (0..chosen.len()).filter(|&at| chosen[at]) {
+            let (row, column) = (at / columns, at % columns);
+            let around = CellBox {
+                columns: [column.saturating_sub(1), (column + 1).min(columns - 1)],
+                rows: [row.saturating_sub(1), (row + 1).min(rows - 1)],
+            };
+            around.runs(&self.cells).for_each(|run| beside[run].fill(true));
+        }
+        beside
+    }
+}
+
+/// Adds to each of the ranges that are so many, `step`, apart that of the one before and those of the next two.
+fn spread_along(ranges: &mut [[i32; 2]], step: usize) {
+    let mut before = NONE;
+    for at in (0..ranges.len()).step_by(step) {
+        let after = |count: usize| ranges.get(at + count * step).copied().unwrap_or(NONE);
+        let (own, around) = (after(0), [before, after(1), after(2)]);
+        ranges[at] = around.into_iter().fold(own, union);
+        before = own;
+    }
+}
+
+/// Returns the numbers of the triangles `fine` between `positions` that are wider or higher than so many lattice steps, `most`.
+fn wide_triangles(positions: &[[i32; 3]], fine: &[[u32; 3]], most: [u32; 2]) -> Vec<u32> {
+    let half = most.map(|most| most / 2);
+    // Two corners that are at most half as far from the third prove most triangles narrow, with one comparison for each axis.
+    let is_close =
+        |a: [i32; 3], b: [i32; 3], k: usize| (b[k].wrapping_sub(a[k]) as u32).wrapping_add(half[k]) <= 2 * half[k];
+    let is_wide = |corners: [[i32; 3]; 3]| {
+        (0..2).any(|k| {
+            let [a, b, c] = corners.map(|p| p[k]);
+            a.max(b).max(c).abs_diff(a.min(b).min(c)) > most[k]
+        })
+    };
+    let candidates = (0..).zip(fine.iter().map(|t| t.map(|v| positions[v as usize])));
+    let wide = candidates.filter(|&(_, corners)| {
+        let [a, b, c] = corners;
+        let is_narrow = is_close(a, b, 0) & is_close(a, b, 1) & is_close(a, c, 0) & is_close(a, c, 1);
+        !is_narrow && is_wide(corners)
+    });
+    wide.map(|(triangle, _)| triangle).collect()
 }

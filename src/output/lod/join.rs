@@ -8,7 +8,7 @@ use crate::output::attributes::{AttributeChoice, PointAttributes};
 use crate::output::frame::Frame;
 use crate::output::gltf::read::{TileFile, TilePart};
 use crate::output::lod::boundary::on_boundary;
-use crate::output::lod::simplify::Terrain;
+use crate::output::lod::simplify::{NearBoundary, Terrain};
 use crate::output::tile::Tile;
 
 /// A vertex is at this scene position in metres, where the job's lattice has no point.
@@ -28,11 +28,27 @@ pub struct Joined {
     triangles: Vec<[u32; 3]>,
     /// Whether a vertex is on the boundary of a mesh of the tiles. Only such vertices can be on the boundary of the whole.
     on_border: Vec<bool>,
-    /// Which of the `parts` has a vertex, and its number there.
-    origins: Vec<[u32; 2]>,
+    /// The triangles that have such a vertex.
+    near_border: Vec<u32>,
+    /// Where the vertices come from, ascending.
+    runs: Vec<Run>,
     /// The meshes of the tiles, without positions and triangles.
     parts: Vec<TilePart>,
 }
+
+/// Vertices that follow each other in a part as they do in the whole.
+#[derive(Clone, Copy)]
+struct Run {
+    /// The number of the first in the whole. The run ends where the next one begins.
+    start: u32,
+    /// The part.
+    part: u32,
+    /// The number of the first in the part.
+    first: u32,
+}
+
+/// Marks the number of a vertex on the boundary of a part. There are far fewer vertices.
+const ON_BORDER: u32 = 1 << 31;
 
 /// Joins all of `files`, tiles of the job of `frame`, into one mesh. A vertex that several of them share becomes one vertex, with the
 /// normal, the colour and the attributes of the first. Vertices are in the order of the files.
@@ -46,7 +62,8 @@ pub fn join(frame: &Frame, files: Vec<TileFile>) -> Result<Joined, VertexOffLatt
         positions: Vec::with_capacity(vertices),
         triangles: Vec::with_capacity(parts.iter().map(|part| part.triangles.len()).sum()),
         on_border: Vec::with_capacity(vertices),
-        origins: Vec::with_capacity(vertices),
+        near_border: Vec::new(),
+        runs: Vec::new(),
         parts: Vec::new(),
     };
     let mut vertex_at = VertexAt::default();
@@ -58,14 +75,15 @@ pub fn join(frame: &Frame, files: Vec<TileFile>) -> Result<Joined, VertexOffLatt
         // Only vertices on a boundary can be in another part too.
         let on_border = on_boundary(points.len(), &triangles);
         let numbers = joined.append(number, &points, &on_border, &mut vertex_at);
-        joined.triangles.extend(triangles.iter().map(|t| t.map(|v| numbers[v as usize])));
+        joined.append_triangles(&triangles, &numbers);
     }
     joined.parts = parts;
     Ok(joined)
 }
 
 impl Joined {
-    /// Appends the vertices of part `part` at these lattice points, but for those that are there already. Returns the number of each.
+    /// Appends the vertices of part `part` at these lattice points, but for those that are there already. Returns the number of each, with a
+    /// mark if it is on the border of the part.
     fn append(&mut self, part: u32, points: &[[i32; 3]], on_border: &[bool], vertex_at: &mut VertexAt) -> Vec<u32> {
         let mut numbers = Vec::with_capacity(points.len());
         // Nearly all vertices are new, and many follow each other without one that is not.
@@ -75,7 +93,7 @@ impl Joined {
             let number = *vertex_at.entry([points[v][0], points[v][1]]).or_insert(next);
             if number != next {
                 self.append_new(part, points, on_border, new_from..v, &mut numbers);
-                numbers.push(number);
+                numbers.push(number | ON_BORDER);
                 new_from = v + 1;
             }
         }
@@ -91,29 +109,60 @@ impl Joined {
         vertices: Range<usize>,
         numbers: &mut Vec<u32>,
     ) {
-        let next = self.positions.len();
-        numbers.extend(next as u32..(next + vertices.len()) as u32);
-        self.origins.extend((vertices.start as u32..vertices.end as u32).map(|v| [part, v]));
-        self.positions.extend_from_slice(&points[vertices.clone()]);
-        self.on_border.extend_from_slice(&on_border[vertices]);
+        if vertices.is_empty() {
+            return;
+        }
+        let start = self.positions.len() as u32;
+        let on_border = &on_border[vertices.clone()];
+        numbers.extend((start..).zip(on_border).map(|(number, on)| number | u32::from(*on) * ON_BORDER));
+        self.runs.push(Run { start, part, first: vertices.start as u32 });
+        self.positions.extend_from_slice(&points[vertices]);
+        self.on_border.extend_from_slice(on_border);
+    }
+
+    /// Appends the triangles of a part, whose vertices have these `numbers`.
+    fn append_triangles(&mut self, triangles: &[[u32; 3]], numbers: &[u32]) {
+        let near_border = &mut self.near_border;
+        let start = self.triangles.len() as u32;
+        self.triangles.extend((start..).zip(triangles).map(|(at, triangle)| {
+            let [a, b, c] = triangle.map(|v| numbers[v as usize]);
+            if (a | b | c) & ON_BORDER != 0 {
+                near_border.push(at);
+            }
+            [a, b, c].map(|v| v & !ON_BORDER)
+        }));
+    }
+
+    /// Returns for each of these ascending `vertices` which of the parts has it, and its number there.
+    fn origins(&self, vertices: &[u32]) -> Vec<[usize; 2]> {
+        let mut run = 0;
+        let origin = |&v: &u32| {
+            while self.runs.get(run + 1).is_some_and(|next| next.start <= v) {
+                run += 1;
+            }
+            let Run { start, part, first } = self.runs[run];
+            [part, first + (v - start)].map(|at| at as usize)
+        };
+        vertices.iter().map(origin).collect()
     }
 
     /// Returns the whole mesh, to be simplified.
     pub fn terrain(&self) -> Terrain<'_> {
-        Terrain { positions: &self.positions, triangles: &self.triangles, may_be_on_boundary: Some(&self.on_border) }
+        let near = NearBoundary { vertices: &self.on_border, triangles: &self.near_border };
+        Terrain { positions: &self.positions, triangles: &self.triangles, may_be_on_boundary: Some(near) }
     }
 
     /// Returns the tile of these triangles between the vertices, each at its place in `positions`. It has normals if all tiles have them,
     /// and likewise colours and attributes.
     pub fn tile(&self, positions: &[[i32; 3]], triangles: Vec<[u32; 3]>) -> Tile {
         let (tile, vertices) = Tile::with_vertices(positions, triangles);
-        let origins = || vertices.iter().map(|&v| self.origins[v as usize].map(|at| at as usize));
+        let origins = self.origins(&vertices);
         let all_have = |has: fn(&TilePart) -> bool| self.parts.iter().all(has);
-        let normal = |[part, v]: [usize; 2]| {
+        let normal = |&[part, v]: &[usize; 2]| {
             let part = &self.parts[part];
             part.normals.as_ref().map(|normals| unscaled_normal(normals.get(v), part.scale))
         };
-        let color = |[part, v]: [usize; 2]| {
+        let color = |&[part, v]: &[usize; 2]| {
             let [red, green, blue, _] = self.parts[part].colors.as_ref()?[v];
             Some([red, green, blue])
         };
@@ -121,10 +170,10 @@ impl Joined {
             classification: all_have(|part| part.attributes.classification.is_some()),
             intensity: all_have(|part| part.attributes.intensity.is_some()),
         });
-        origins().for_each(|[part, v]| attributes.push_from(&self.parts[part].attributes, v));
+        origins.iter().for_each(|&[part, v]| attributes.push_from(&self.parts[part].attributes, v));
         Tile {
-            normals: all_have(|part| part.normals.is_some()).then(|| origins().filter_map(normal).collect()),
-            colors: all_have(|part| part.colors.is_some()).then(|| origins().filter_map(color).collect()),
+            normals: all_have(|part| part.normals.is_some()).then(|| origins.iter().filter_map(normal).collect()),
+            colors: all_have(|part| part.colors.is_some()).then(|| origins.iter().filter_map(color).collect()),
             attributes,
             ..tile
         }

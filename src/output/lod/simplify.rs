@@ -19,7 +19,6 @@ use crate::breaklines::Breaklines;
 use crate::geometry::Bounds;
 use crate::geometry::square_grid::SquareGrid;
 use crate::output::frame::Frame;
-use crate::output::lod::boundary::{on_boundary, on_boundary_among};
 use crate::output::lod::filling::Filling;
 use crate::output::lod::furthest::{Furthest, steps_for};
 use crate::output::lod::kept_lines::KeptLines;
@@ -33,8 +32,17 @@ pub struct Terrain<'a> {
     pub positions: &'a [[i32; 3]],
     /// The triangles, counterclockwise seen from above. They cover their ground once.
     pub triangles: &'a [[u32; 3]],
-    /// Whether a vertex may be on the boundary, if that is known.
-    pub may_be_on_boundary: Option<&'a [bool]>,
+    /// What may be on the boundary, if that is known.
+    pub may_be_on_boundary: Option<NearBoundary<'a>>,
+}
+
+/// The surroundings of the boundary of a terrain.
+#[derive(Clone, Copy)]
+pub struct NearBoundary<'a> {
+    /// Whether a vertex may be on the boundary.
+    pub vertices: &'a [bool],
+    /// The numbers of the triangles that have such a vertex.
+    pub triangles: &'a [u32],
 }
 
 /// A simplified terrain.
@@ -84,7 +92,7 @@ pub fn simplify(frame: &Frame, terrain: &Terrain, triangles: usize, lines: Optio
         return Ok(Simplified { positions, triangles, greatest_error: 0.0, typical_error: 0.0, spacing: 0.0 });
     }
     let [xy, up] = frame.resolution_metres();
-    let surface = smoothed(positions, terrain.triangles, &boundary.on, LOOKED_AT);
+    let heights = smoothed(positions, terrain.triangles, &boundary.on, LOOKED_AT);
     let mut moved = positions.to_vec();
     let mut kept = boundary.on.clone();
     let bounds = most_of(positions).unwrap_or(Bounds::of_point([0; 2]));
@@ -96,12 +104,12 @@ pub fn simplify(frame: &Frame, terrain: &Terrain, triangles: usize, lines: Optio
     interrupt::check()?;
     let mut filling = Filling::new(positions, &kept, &boundary.edges)?;
     let rest = (boundary.vertices + wanted).saturating_sub(kept.iter().filter(|&&kept| kept).count());
-    let furthest = Furthest::find(&surface, &moved, &kept, &filling, LOOKED_AT);
+    let furthest = Furthest::find(&heights, &moved, &kept, &filling, LOOKED_AT);
     let typical_error = furthest.mean * up;
     let mut steps = steps_for(rest);
     for far in furthest.first(rest, |v| kept_lines.allows(v)) {
         if filling.insert(far.vertex, far.triangle as usize, &mut steps) {
-            moved[far.vertex as usize] = surface[far.vertex as usize];
+            moved[far.vertex as usize][2] = heights[far.vertex as usize / LOOKED_AT];
         }
     }
     let coarse = filling.into_triangles();
@@ -128,19 +136,19 @@ struct Boundary {
 
 impl Boundary {
     fn of(terrain: &Terrain) -> Boundary {
-        let (vertices, triangles) = (terrain.positions.len(), terrain.triangles);
-        let on = match terrain.may_be_on_boundary {
-            Some(may_be) => on_boundary_among(may_be, triangles),
-            None => on_boundary(vertices, triangles),
+        let sides_of = |&[a, b, c]: &[u32; 3]| [[a, b], [b, c], [c, a]];
+        let sides: Vec<[u32; 2]> = match terrain.may_be_on_boundary {
+            Some(NearBoundary { vertices, triangles }) => {
+                let sides = triangles.iter().flat_map(|&t| sides_of(&terrain.triangles[t as usize]));
+                sides.filter(|side| side.iter().all(|&v| vertices[v as usize])).collect()
+            }
+            None => terrain.triangles.iter().flat_map(sides_of).collect(),
         };
-        // Few triangles have two corners there, and those are quickly told.
-        let touches = |corners: &&[u32; 3]| corners.iter().filter(|&&v| on[v as usize]).count() >= 2;
-        let between = |&[a, b]: &[u32; 2]| on[a as usize] && on[b as usize];
-        let touching = triangles.iter().filter(touches);
-        let sides: Vec<[u32; 2]> = touching.flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).filter(between).collect();
         let mut known = sides.clone();
         known.sort_unstable();
-        let edges = sides.into_iter().filter(|&[a, b]| known.binary_search(&[b, a]).is_err()).collect();
+        let edges: Vec<_> = sides.into_iter().filter(|&[a, b]| known.binary_search(&[b, a]).is_err()).collect();
+        let mut on = vec![false; terrain.positions.len()];
+        edges.as_flattened().iter().for_each(|&v| on[v as usize] = true);
         let vertices = on.iter().filter(|&&on| on).count();
         Boundary { edges, on, vertices }
     }
@@ -161,15 +169,17 @@ fn keep_by_grid(
         return side;
     }
     let grid = SquareGrid::new(bounds, side, cells as f64);
-    let cell_of: Vec<u32> = positions.iter().map(|p| grid.cell(p[0], p[1]) as u32).collect();
+    let cell_of = grid.cells_of(positions);
     let heights = seen_heights(positions, &cell_of, grid.cells());
-    let mut nearest = vec![(u32::MAX, u32::MAX); grid.cells()];
+    // The difference in height in the upper half of the bits, the vertex in the lower one.
+    let mut nearest = vec![u64::MAX; grid.cells()];
     let vertices = (0..).zip(positions.iter().zip(&cell_of));
     for (v, (p, &cell)) in vertices.filter(|(v, _)| lines.allows(*v as usize)) {
         let nearest = &mut nearest[cell as usize];
-        *nearest = (*nearest).min((p[2].abs_diff(heights[cell as usize]), v));
+        *nearest = (*nearest).min(u64::from(p[2].abs_diff(heights[cell as usize])) << 32 | v);
     }
-    for (height, (_, v)) in heights.into_iter().zip(nearest).filter(|(_, (_, v))| *v != u32::MAX) {
+    for (height, nearest) in heights.into_iter().zip(nearest).filter(|(_, nearest)| *nearest != u64::MAX) {
+        let v = nearest as u32;
         if !std::mem::replace(&mut kept[v as usize], true) {
             moved[v as usize][2] = height;
         }

@@ -5,27 +5,32 @@
 //! and y stay those of a site, because the triangulation needs that. It also keeps the site's normal and colour: means of them would
 //! be smoother, and so brighter, than the terrain looks from afar.
 
-/// Returns the `positions` of the vertices of `triangles` where one of every `every` vertices has the mean of its own height, twice, and the heights at the
-/// other ends of its edges. The vertices that are `fixed` keep theirs, like all others.
-pub(crate) fn smoothed(positions: &[[i32; 3]], triangles: &[[u32; 3]], fixed: &[bool], every: usize) -> Vec<[i32; 3]> {
+/// This many triangles are looked at together for corners that are wanted.
+const AT_ONCE: usize = 256;
+
+/// Returns the heights of one of every `every` vertices of `triangles` between `positions`: the mean of a vertex's own height, twice, and
+/// the heights at the other ends of its edges. The vertices that are `fixed` keep theirs.
+pub(crate) fn smoothed(positions: &[[i32; 3]], triangles: &[[u32; 3]], fixed: &[bool], every: usize) -> Vec<i32> {
     // Every edge inside counts in both of its triangles, so a vertex that counts twice itself must count four times here.
     let own = |p: &[i32; 3]| Mean { sum: 4 * p[2] as i64, count: 4 };
     let mut means: Vec<Mean> = positions.iter().step_by(every).map(own).collect();
     let height = |v: u32| positions[v as usize][2] as i64;
-    for &[a, b, c] in triangles {
-        for (v, to, from) in [(a, b, c), (b, c, a), (c, a, b)] {
-            if (v as usize).is_multiple_of(every) {
-                means[v as usize / every].add(height(to) + height(from), 2);
+    let mut wanted = [[0; 3]; 3 * AT_ONCE];
+    for triangles in triangles.chunks(AT_ONCE) {
+        // A branch for each corner would often be foretold wrongly.
+        let mut count = 0;
+        for &[a, b, c] in triangles {
+            for corner in [[a, b, c], [b, c, a], [c, a, b]] {
+                wanted[count] = corner;
+                count += usize::from((corner[0] as usize).is_multiple_of(every));
             }
         }
-    }
-    let mut smoothed = positions.to_vec();
-    for ((p, fixed), mean) in smoothed.iter_mut().zip(fixed).step_by(every).zip(means) {
-        if !fixed {
-            p[2] = mean.rounded();
+        for &[v, to, from] in &wanted[..count] {
+            means[v as usize / every].add(height(to) + height(from), 2);
         }
     }
-    smoothed
+    let vertices = positions.iter().zip(fixed).step_by(every);
+    vertices.zip(means).map(|((p, fixed), mean)| if *fixed { p[2] } else { mean.rounded() }).collect()
 }
 
 /// Returns the height of the surface that is seen in each of so many `cells`: the mean height of those of `positions` in it that are not
@@ -37,9 +42,9 @@ pub(crate) fn seen_heights(positions: &[[i32; 3]], cell_of: &[u32], cells: usize
     let means: Vec<i32> = all.iter().map(|mean| mean.rounded()).collect();
     let mut upper = vec![Mean::default(); cells];
     for (p, &cell) in positions.iter().zip(cell_of) {
-        if p[2] >= means[cell as usize] {
-            upper[cell as usize].add(p[2].into(), 1);
-        }
+        // Without a branch, which would be foretold wrongly for half of them.
+        let count = i64::from(p[2] >= means[cell as usize]);
+        upper[cell as usize].add(count * i64::from(p[2]), count);
     }
     // Rounding up may leave nothing above the mean.
     upper.iter().zip(means).map(|(upper, mean)| if upper.count > 0 { upper.rounded() } else { mean }).collect()
@@ -86,7 +91,10 @@ mod tests {
         let wheel: Vec<[u32; 3]> = (0..4).map(|i| [4, i, (i + 1) % 4]).collect();
         let positions: Vec<_> = corners.into_iter().chain([[4, 4, 60]]).collect();
         let heights = |fixed: [bool; 5], every| {
-            smoothed(&positions, &wheel, &fixed, every).iter().map(|p| p[2]).collect::<Vec<_>>()
+            let mut heights: Vec<i32> = positions.iter().map(|p| p[2]).collect();
+            let smoothed = smoothed(&positions, &wheel, &fixed, every);
+            heights.iter_mut().step_by(every).zip(smoothed).for_each(|(height, smooth)| *height = smooth);
+            heights
         };
         let hub = [true, true, true, true, false];
         assert_eq!([heights(hub, 1), heights(hub, 2), heights(hub, 4)], [[0, 0, 0, 0, 20]; 3]);

@@ -20,7 +20,7 @@ impl VertexCells {
     pub(crate) fn new(positions: &[[i32; 3]], vertices: &[u32]) -> VertexCells {
         let positions: Vec<[i32; 3]> = vertices.iter().map(|&v| positions[v as usize]).collect();
         let cells = CellGrid::new(&positions, positions.len() + 1);
-        let cell_of: Vec<u32> = positions.iter().map(|p| cells.of(p)).collect();
+        let cell_of = cells.of_all(&positions);
         let mut starts = vec![0; cells.count() + 1];
         cell_of.iter().for_each(|&cell| starts[cell as usize] += 1);
         let mut end = 0;

@@ -30,7 +30,7 @@ const LOST: f64 = 1.0 / (1u64 << 48) as f64;
 pub fn vertical_error(positions: &[[i32; 3]], fine: &[[u32; 3]], moved: &[[i32; 3]], coarse: &[[u32; 3]]) -> f64 {
     let heights = HeightBounds::new(positions, fine);
     let corners = |triangle: &[u32; 3]| triangle.map(|v| moved[v as usize]);
-    let mut bounds: Vec<(u64, u32)> = coarse.iter().map(|t| heights.error_bound(t, &corners(t))).zip(0..).collect();
+    let mut bounds: Vec<(u32, u32)> = coarse.iter().map(|t| heights.error_bound(&corners(t))).zip(0..).collect();
     // Triangles that may have the greatest error come first, so that most of the others can be skipped.
     let first = MEASURED_FIRST.min(bounds.len());
     if first < bounds.len() {
@@ -46,26 +46,20 @@ pub fn vertical_error(positions: &[[i32; 3]], fine: &[[u32; 3]], moved: &[[i32; 
         }
         measured.sort_unstable_by(|a, b| b.cmp(a));
         let triangles = || measured.iter().map(|(_, triangle)| coarse[*triangle as usize]);
-        let near = NearTerrain::new(&heights, positions, fine, triangles());
+        let near = NearTerrain::new(&heights, positions, fine, triangles().map(|t| corners(&t)));
         for ((bound, _), triangle) in measured.iter().zip(triangles()) {
             if *bound as f64 > greatest {
                 match near.error_of(&triangle, moved, &mut steps) {
                     Some(error) => greatest = greatest.max(error),
-                    None => return height_range(positions),
+                    None => return heights.height_range(),
                 }
             }
         }
     }
     // Rounding loses about 2^-50 of a height.
-    let range = height_range(positions);
+    let range = heights.height_range();
     let lost = 1e-9 + range * LOST;
     if greatest > 0.0 { (greatest + lost).min(range.max(greatest)) } else { 0.0 }
-}
-
-/// Returns the difference between the greatest and the least height. No two terrains within this range are further apart.
-fn height_range(positions: &[[i32; 3]]) -> f64 {
-    let (low, high) = positions.iter().fold((i32::MAX, i32::MIN), |(l, h), p| (l.min(p[2]), h.max(p[2])));
-    if low > high { 0.0 } else { high as f64 - low as f64 }
 }
 
 /// How much work is left before a rougher bound must do.
@@ -93,9 +87,9 @@ impl<'a> NearTerrain<'a> {
         heights: &HeightBounds,
         positions: &'a [[i32; 3]],
         fine: &[[u32; 3]],
-        measured: impl Iterator<Item = [u32; 3]>,
+        measured: impl Iterator<Item = [[i32; 3]; 3]>,
     ) -> NearTerrain<'a> {
-        let (vertices, triangles) = heights.near(fine, measured);
+        let (vertices, triangles) = heights.near(positions, fine, measured);
         NearTerrain { mesh: FineMesh::new(positions, &triangles), vertices: VertexCells::new(positions, &vertices) }
     }
 
