@@ -10,7 +10,7 @@ use crate::job::tiles::style::TileStyle;
 use crate::job::tiles::write_tile::write_glb;
 use crate::output::frame::Frame;
 use crate::output::gltf::read::{TileFile, read_tile};
-use crate::output::lod::join::join;
+use crate::output::lod::join::Joining;
 use crate::output::lod::simplify::{Simplified, simplify};
 use crate::output::tile::Tile;
 use crate::{Error, Result};
@@ -137,9 +137,12 @@ fn memory_for(children: &[Child]) -> Option<u64> {
 
 /// Joins and simplifies the meshes of `children`, the tiles below `node`. Returns the coarser tile and what is known of it.
 fn simplified(room: &LevelRoom, node: NodeIndex, children: &[Child]) -> Result<(Tile, Simplified)> {
-    let meshes = children.iter().filter(|child| child.own.vertices > 0).map(|child| read_own(&child.path));
-    let meshes = meshes.collect::<Result<Vec<_>>>()?;
-    let joined = join(&room.style.frame, meshes).map_err(|what| contradiction(node, &what))?;
+    let vertices = children.iter().map(|child| child.own.vertices as usize).sum();
+    let mut joining = Joining::new(&room.style.frame, vertices);
+    for child in children.iter().filter(|child| child.own.vertices > 0) {
+        joining.add(read_own(&child.path)?).map_err(|what| contradiction(node, &what))?;
+    }
+    let joined = joining.finish();
     let terrain = joined.terrain();
     let target = room.sizes.target(terrain.triangles.len());
     let mut simple = simplify(&room.style.frame, &terrain, target, room.style.lines.as_deref())?;

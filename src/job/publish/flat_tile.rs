@@ -4,7 +4,7 @@ use crate::output::Compression;
 use crate::output::frame::Frame;
 use crate::output::gltf::glb::GlbEncoder;
 use crate::output::gltf::read::read_tile;
-use crate::output::lod::join::join;
+use crate::output::lod::join::Joining;
 use crate::{Error, Result};
 use std::path::Path;
 
@@ -24,8 +24,10 @@ impl FlatScene<'_> {
     /// # Errors
     /// [`Error::Io`] or [`Error::Input`] if the tile cannot be read or is damaged, [`Error::Config`] if a triangle is too long for f32.
     pub fn tile(&self, path: &Path) -> Result<Vec<u8>> {
-        let joined = join(self.bent, vec![read_tile(path)?]);
-        let tile = joined.map_err(|what| Error::input(path, what.to_string()))?.into_tile();
+        let file = read_tile(path)?;
+        let mut joining = Joining::new(self.bent, file.parts.iter().map(|part| part.positions.len()).sum());
+        joining.add(file).map_err(|what| Error::input(path, what.to_string()))?;
+        let tile = joining.finish().into_tile();
         let compression = match self.compression {
             Compression::Meshopt => Compression::Quantized,
             plain => plain,

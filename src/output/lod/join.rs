@@ -50,35 +50,53 @@ struct Run {
 /// Marks the number of a vertex on the boundary of a part. There are far fewer vertices.
 const ON_BORDER: u32 = 1 << 31;
 
-/// Joins all of `files`, tiles of the job of `frame`, into one mesh. A vertex that several of them share becomes one vertex, with the
-/// normal, the colour and the attributes of the first. Vertices are in the order of the files.
-///
-/// # Errors
-/// [`VertexOffLattice`] if a vertex is not on the lattice.
-pub fn join(frame: &Frame, files: Vec<TileFile>) -> Result<Joined, VertexOffLattice> {
-    let mut parts: Vec<TilePart> = files.into_iter().flat_map(|file| file.parts).collect();
-    let vertices = parts.iter().map(|part| part.positions.len()).sum();
-    let mut joined = Joined {
-        positions: Vec::with_capacity(vertices),
-        triangles: Vec::with_capacity(parts.iter().map(|part| part.triangles.len()).sum()),
-        on_border: Vec::with_capacity(vertices),
-        near_border: Vec::new(),
-        runs: Vec::new(),
-        parts: Vec::new(),
-    };
-    let mut vertex_at = VertexAt::default();
-    for (part, number) in parts.iter_mut().zip(0..) {
-        let positions = std::mem::take(&mut part.positions);
-        let points = frame.points(&positions, part.translation, part.scale).map_err(VertexOffLattice)?;
-        drop(positions);
-        let triangles = std::mem::take(&mut part.triangles);
-        // Only vertices on a boundary can be in another part too.
-        let on_border = on_boundary(points.len(), &triangles);
-        let numbers = joined.append(number, &points, &on_border, &mut vertex_at);
-        joined.append_triangles(&triangles, &numbers);
+/// Tiles that are joined one after the other, so that no two of them are in memory besides what is joined.
+pub struct Joining<'a> {
+    frame: &'a Frame,
+    joined: Joined,
+    vertex_at: VertexAt,
+}
+
+impl<'a> Joining<'a> {
+    /// Begins to join tiles of the job of `frame`, with so many `vertices` all together.
+    pub fn new(frame: &'a Frame, vertices: usize) -> Joining<'a> {
+        let joined = Joined {
+            positions: Vec::with_capacity(vertices),
+            // A mesh has fewer than twice as many triangles as vertices.
+            triangles: Vec::with_capacity(2 * vertices),
+            on_border: Vec::with_capacity(vertices),
+            near_border: Vec::new(),
+            runs: Vec::new(),
+            parts: Vec::new(),
+        };
+        Joining { frame, joined, vertex_at: VertexAt::default() }
     }
-    joined.parts = parts;
-    Ok(joined)
+
+    /// Joins a tile. A vertex that it shares with an earlier one keeps the normal, the colour and the attributes of that one. Vertices are in
+    /// the order of the tiles.
+    ///
+    /// # Errors
+    /// [`VertexOffLattice`] if a vertex is not on the lattice.
+    pub fn add(&mut self, file: TileFile) -> Result<(), VertexOffLattice> {
+        for mut part in file.parts {
+            let positions = std::mem::take(&mut part.positions);
+            let points = self.frame.points(&positions, part.translation, part.scale).map_err(VertexOffLattice)?;
+            drop(positions);
+            let triangles = std::mem::take(&mut part.triangles);
+            // Only vertices on a boundary can be in another part too.
+            let on_border = on_boundary(points.len(), &triangles);
+            let number = self.joined.parts.len() as u32;
+            let numbers = self.joined.append(number, &points, &on_border, &mut self.vertex_at);
+            self.joined.append_triangles(&triangles, &numbers);
+            self.joined.parts.push(part);
+        }
+        Ok(())
+    }
+
+    /// Returns the mesh of all tiles.
+    pub fn finish(self) -> Joined {
+        self.joined
+    }
 }
 
 impl Joined {
