@@ -299,7 +299,8 @@ impl Frame {
                     return None;
                 }
             }
-            points.extend((0..some.len()).map(|i| along.map(|values| values[i])));
+            let [x, y, z] = &along;
+            points.extend((0..some.len()).map(|i| [x[i], y[i], z[i]]));
         }
         Some(points)
     }

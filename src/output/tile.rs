@@ -61,19 +61,35 @@ const TABLE_PER_CORNER: usize = 8;
 /// Gives the vertices of `triangles` new numbers from 0 on, in the order of the old ones, and returns the old ones.
 fn renumber(triangles: &mut [[u32; 3]]) -> Vec<u32> {
     let corners = triangles.as_flattened_mut();
-    let Some((first, last)) = corners.iter().min().copied().zip(corners.iter().max().copied()) else {
+    if corners.is_empty() {
         return Vec::new();
-    };
+    }
+    let [first, last] = ends(corners);
     let span = (last - first) as usize + 1;
     if span > TABLE_PER_CORNER * corners.len() {
         return renumber_by_sorting(triangles);
     }
-    let mut number = vec![0u32; span];
-    corners.iter().for_each(|&v| number[(v - first) as usize] = 1);
-    let vertices: Vec<u32> = (first..=last).zip(&number).filter(|(_, used)| **used > 0).map(|(v, _)| v).collect();
-    vertices.iter().zip(0..).for_each(|(&v, new)| number[(v - first) as usize] = new);
+    let (mut number, mut used) = (vec![0u32; span], 0);
+    for &v in corners.iter() {
+        let is_used = &mut number[(v - first) as usize];
+        used += usize::from(*is_used == 0);
+        *is_used = 1;
+    }
+    // One place more: each vertex is written where the next used one belongs. A branch would often be foretold wrongly.
+    let (mut vertices, mut next) = (vec![0; used + 1], 0);
+    for (v, number) in (first..=last).zip(&mut number) {
+        vertices[next as usize] = v;
+        next += std::mem::replace(number, next);
+    }
+    vertices.truncate(used);
     corners.iter_mut().for_each(|v| *v = number[(*v - first) as usize]);
     vertices
+}
+
+/// Returns the least and the greatest number.
+#[multiversion(targets("x86_64+avx2"))]
+fn ends(numbers: &[u32]) -> [u32; 2] {
+    numbers.iter().fold([u32::MAX, 0], |[least, greatest], &v| [least.min(v), greatest.max(v)])
 }
 
 /// Does what [`renumber`] does, for old numbers that are far apart.

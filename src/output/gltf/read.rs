@@ -11,6 +11,7 @@ use gltf::json::buffer::View;
 use gltf::json::mesh::{Primitive, Semantic};
 use gltf::json::scene::{Node, Scene};
 use gltf::json::validation::Checked::Valid;
+use multiversion::multiversion;
 
 use crate::output::attributes::PointAttributes;
 use crate::output::frame::Extras;
@@ -247,9 +248,6 @@ impl<'b> Decoder<'b> {
             return Err(format!("mesh {} does not have one primitive", node.mesh));
         };
         let positions = self.positions(surface.positions)?;
-        if !positions.as_flattened().iter().chain(&[0.0]).all(|v| v.is_finite()) {
-            return Err("a position is not a finite number".into());
-        }
         let same_count = |count: usize, name: &str| match count == positions.len() {
             true => Ok(()),
             false => Err(format!("{} positions, but {count} {name}", positions.len())),
@@ -268,7 +266,11 @@ impl<'b> Decoder<'b> {
 
     fn positions(&mut self, accessor: usize) -> Decoded<Vec<[f32; 3]>> {
         if self.component(accessor)? == ComponentType::F32 {
-            return self.elements(accessor, ComponentType::F32, Type::Vec3);
+            let positions: Vec<[f32; 3]> = self.elements(accessor, ComponentType::F32, Type::Vec3)?;
+            return match positions.as_flattened().iter().all(|v| v.is_finite()) {
+                true => Ok(positions),
+                false => Err("a position is not a finite number".into()),
+            };
         }
         let short: Vec<[u16; 4]> = self.elements(accessor, ComponentType::U16, Type::Vec3)?;
         Ok(short.into_iter().map(|[x, y, z, _]| [x, y, z].map(f32::from)).collect())
@@ -332,7 +334,7 @@ impl<'b> Decoder<'b> {
                 corners.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect()
             }
         };
-        let greatest = triangles.as_flattened().iter().fold(0, |greatest, &v| greatest.max(v));
+        let greatest = greatest_of(triangles.as_flattened());
         match greatest as usize >= vertices && !triangles.is_empty() {
             true => Err(format!("index {greatest} of {vertices} vertices")),
             false => Ok(triangles),
@@ -421,6 +423,12 @@ impl<'b> Decoder<'b> {
         }
         Ok(stored)
     }
+}
+
+/// Returns the greatest of the numbers, or 0 without any.
+#[multiversion(targets("x86_64+avx2"))]
+fn greatest_of(numbers: &[u32]) -> u32 {
+    numbers.iter().fold(0, |greatest, &number| greatest.max(number))
 }
 
 fn item<'a, T>(items: &'a [T], index: usize, name: &str) -> Decoded<&'a T> {

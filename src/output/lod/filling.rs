@@ -28,7 +28,8 @@ impl<'a> Filling<'a> {
     /// # Errors
     /// [`Error::Broken`] if the boundary is not that of a part of a Delaunay triangulation, [`Error::Interrupted`].
     pub(crate) fn new(positions: &'a [[i32; 3]], kept: &[bool], boundary: &[[u32; 2]]) -> Result<Filling<'a>> {
-        let vertices: Vec<u32> = (0..).zip(kept).filter(|(_, kept)| **kept).map(|(v, _)| v).collect();
+        let mut vertices = Vec::with_capacity(kept.iter().filter(|kept| **kept).count());
+        vertices.extend((0u32..).zip(kept).filter(|(_, kept)| **kept).map(|(v, _)| v));
         let mut number = vec![SiteIndex(u32::MAX); kept.len()];
         vertices.iter().zip(0..).for_each(|(&v, n)| number[v as usize] = SiteIndex(n));
         let sites: Vec<Site> = vertices.iter().map(|&v| plane(positions[v as usize])).collect();
@@ -72,7 +73,8 @@ impl<'a> Filling<'a> {
 
     /// Returns the triangles within the boundary, between vertices of the terrain.
     pub(crate) fn into_triangles(self) -> Vec<[u32; 3]> {
-        let triangles = (0..self.mesh.triangles.len()).filter_map(|triangle| self.corners(triangle)).collect();
+        let mut triangles = Vec::with_capacity(self.mesh.triangles.len());
+        triangles.extend((0..self.mesh.triangles.len()).filter_map(|triangle| self.corners(triangle)));
         triangulation::recycle(self.mesh);
         triangles
     }
