@@ -146,8 +146,8 @@ fn simplified(room: &LevelRoom, node: NodeIndex, children: &[Child]) -> Result<(
     let terrain = joined.terrain();
     let target = room.sizes.target(terrain.triangles.len());
     let mut simple = simplify(&room.style.frame, &terrain, target, room.style.lines.as_deref())?;
-    let triangles = std::mem::take(&mut simple.triangles);
-    Ok((joined.tile(&simple.positions, triangles), simple))
+    let mesh = std::mem::take(&mut simple.mesh);
+    Ok((joined.tile(mesh), simple))
 }
 
 /// Returns the range of heights in metres.

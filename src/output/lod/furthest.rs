@@ -27,33 +27,36 @@ pub(crate) struct Furthest {
 }
 
 impl Furthest {
-    /// Compares the triangles of `filling`, between the positions `moved`, with the surface, whose `heights` are those of one of every `every`
+    /// Compares the triangles of `filling` with the surface of a terrain at `positions`, whose `heights` are those of one of every `every`
     /// vertices. Only vertices that are not `kept`, so that the filling does not have them, are among the results.
     ///
     /// Stops looking where that would take far longer than usual: where nearly all triangles are slivers.
     pub(crate) fn find(
+        positions: &[[i32; 3]],
         heights: &[i32],
-        moved: &[[i32; 3]],
         kept: &[bool],
         filling: &Filling,
         every: usize,
     ) -> Furthest {
         let mut furthest = vec![(0.0, 0); filling.triangles()];
-        let mut steps = steps_for(moved.len() / every);
-        let starts = StartCells::new(moved, filling);
+        let mut steps = steps_for(positions.len() / every);
+        let starts = StartCells::new(filling);
         for (v, &height) in (0..).step_by(every).zip(heights).filter(|&(v, _)| !kept[v]) {
-            let [x, y, _] = moved[v];
-            let start = starts.near(&moved[v]);
+            let [x, y, _] = positions[v];
+            let start = starts.near(&positions[v]);
             let Some(triangle) = filling.locate(v as u32, start, &mut steps) else { break };
             let Some(corners) = filling.corners(triangle) else { continue };
-            let distance = vertical_distance(&corners.map(|v| moved[v as usize]), [x, y, height]);
+            let distance = vertical_distance(&corners.map(|site| filling.positions[site as usize]), [x, y, height]);
             if distance > furthest[triangle].0 {
                 furthest[triangle] = (distance, v as u32);
             }
         }
-        let at_corner = |v: u32| match (v as usize).is_multiple_of(every) {
-            true => f64::from(moved[v as usize][2].abs_diff(heights[v as usize / every])),
-            false => 0.0,
+        let at_corner = |site: u32| {
+            let v = filling.vertices[site as usize] as usize;
+            match v.is_multiple_of(every) {
+                true => f64::from(filling.positions[site as usize][2].abs_diff(heights[v / every])),
+                false => 0.0,
+            }
         };
         let (mut sum, mut within, mut vertices) = (0.0, 0u64, Vec::new());
         for (triangle, (distance, vertex)) in furthest.into_iter().enumerate() {
@@ -89,13 +92,13 @@ struct StartCells {
 }
 
 impl StartCells {
-    /// Notes the triangles of `filling` that lie within the boundary, between the positions `moved`.
-    fn new(moved: &[[i32; 3]], filling: &Filling) -> StartCells {
-        let cells = CellGrid::new(moved, filling.triangles() / TRIANGLES_PER_CELL + 1);
+    /// Notes the triangles of `filling` that lie within the boundary.
+    fn new(filling: &Filling) -> StartCells {
+        let cells = CellGrid::new(&filling.positions, filling.triangles() / TRIANGLES_PER_CELL + 1);
         let mut triangles = vec![u32::MAX; cells.count()];
         for triangle in 0..filling.triangles() {
             if let Some([corner, ..]) = filling.corners(triangle) {
-                triangles[cells.of(&moved[corner as usize]) as usize] = triangle as u32;
+                triangles[cells.of(&filling.positions[corner as usize]) as usize] = triangle as u32;
             }
         }
         // Where a cell has none, that of the cell before it must do.

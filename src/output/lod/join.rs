@@ -8,6 +8,7 @@ use crate::output::attributes::{AttributeChoice, PointAttributes};
 use crate::output::frame::Frame;
 use crate::output::gltf::read::{TileFile, TilePart};
 use crate::output::lod::boundary::on_boundary;
+use crate::output::lod::filling::CoarseMesh;
 use crate::output::lod::simplify::{NearBoundary, Terrain};
 use crate::output::tile::Tile;
 
@@ -170,11 +171,15 @@ impl Joined {
         Terrain { positions: &self.positions, triangles: &self.triangles, may_be_on_boundary: Some(near) }
     }
 
-    /// Returns the tile of these triangles between the vertices, each at its place in `positions`. It has normals if all tiles have them,
-    /// and likewise colours and attributes.
-    pub fn tile(&self, positions: &[[i32; 3]], triangles: Vec<[u32; 3]>) -> Tile {
-        let (tile, vertices) = Tile::with_vertices(positions, triangles);
-        let origins = self.origins(&vertices);
+    /// Returns the tile of a mesh between some of the vertices. It has normals if all tiles have them, and likewise colours and attributes.
+    pub fn tile(&self, mesh: CoarseMesh) -> Tile {
+        let CoarseMesh { vertices, positions, triangles } = mesh;
+        self.dressed(Tile { positions, triangles, ..Tile::default() }, &vertices)
+    }
+
+    /// Adds to a tile what these `vertices` carry, which are its own in their order.
+    fn dressed(&self, tile: Tile, vertices: &[u32]) -> Tile {
+        let origins = self.origins(vertices);
         let all_have = |has: fn(&TilePart) -> bool| self.parts.iter().all(has);
         let normal = |&[part, v]: &[usize; 2]| {
             let part = &self.parts[part];
@@ -200,7 +205,8 @@ impl Joined {
     /// Returns the whole mesh as a tile.
     pub fn into_tile(mut self) -> Tile {
         let triangles = std::mem::take(&mut self.triangles);
-        self.tile(&self.positions, triangles)
+        let (tile, vertices) = Tile::with_vertices(&self.positions, triangles);
+        self.dressed(tile, &vertices)
     }
 }
 

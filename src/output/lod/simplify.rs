@@ -19,6 +19,7 @@ use crate::breaklines::Breaklines;
 use crate::geometry::Bounds;
 use crate::geometry::square_grid::SquareGrid;
 use crate::output::frame::Frame;
+pub use crate::output::lod::filling::CoarseMesh;
 use crate::output::lod::filling::Filling;
 use crate::output::lod::furthest::{Furthest, steps_for};
 use crate::output::lod::kept_lines::KeptLines;
@@ -48,10 +49,8 @@ pub struct NearBoundary<'a> {
 /// A simplified terrain.
 #[derive(Debug)]
 pub struct Simplified {
-    /// The positions of the vertices of the original, those that are not used any more among them. Those inside may have other heights.
-    pub positions: Vec<[i32; 3]>,
-    /// Triangles between some of the vertices.
-    pub triangles: Vec<[u32; 3]>,
+    /// The triangles between some of the vertices.
+    pub mesh: CoarseMesh,
     /// The greatest vertical distance to the original in metres.
     pub greatest_error: f64,
     /// The vertical distance in metres by which a triangle misses the surface at worst, on average over the triangles.
@@ -88,40 +87,32 @@ pub fn simplify(frame: &Frame, terrain: &Terrain, triangles: usize, lines: Optio
     let least = (triangles as f64 * LEAST_INSIDE) as usize;
     let wanted = (triangles / 2).saturating_sub(boundary.vertices / 2).max(least).min(inside);
     if wanted >= inside {
-        let (positions, triangles) = (positions.to_vec(), terrain.triangles.to_vec());
-        return Ok(Simplified { positions, triangles, greatest_error: 0.0, typical_error: 0.0, spacing: 0.0 });
+        let vertices = (0..positions.len() as u32).collect();
+        let mesh = CoarseMesh { vertices, positions: positions.to_vec(), triangles: terrain.triangles.to_vec() };
+        return Ok(Simplified { mesh, greatest_error: 0.0, typical_error: 0.0, spacing: 0.0 });
     }
     let [xy, up] = frame.resolution_metres();
     let heights = smoothed(positions, terrain.triangles, &boundary.on, LOOKED_AT);
-    let mut moved = positions.to_vec();
     let mut kept = boundary.on.clone();
     let bounds = most_of(positions).unwrap_or(Bounds::of_point([0; 2]));
     let longest = PIECES_TO_SPACING * side_of(bounds, wanted);
     let kept_lines = KeptLines::choose(lines, positions, &boundary.on, wanted / 2, longest);
     kept_lines.vertices.iter().for_each(|&v| kept[v] = true);
     let by_grid = ((wanted - kept_lines.vertices.len()) as f64 * BY_GRID) as usize;
-    let side = keep_by_grid(positions, bounds, by_grid, &kept_lines, &mut kept, &mut moved);
+    let (side, moved) = keep_by_grid(positions, bounds, by_grid, &kept_lines, &mut kept);
     interrupt::check()?;
-    let mut filling = Filling::new(positions, &kept, &boundary.edges)?;
-    let rest = (boundary.vertices + wanted).saturating_sub(kept.iter().filter(|&&kept| kept).count());
-    let furthest = Furthest::find(&heights, &moved, &kept, &filling, LOOKED_AT);
+    let mut filling = Filling::new(positions, &kept, &moved, &boundary.edges)?;
+    let rest = (boundary.vertices + wanted).saturating_sub(filling.vertices.len());
+    let furthest = Furthest::find(positions, &heights, &kept, &filling, LOOKED_AT);
     let typical_error = furthest.mean * up;
     let mut steps = steps_for(rest);
     for far in furthest.first(rest, |v| kept_lines.allows(v)) {
-        if filling.insert(far.vertex, far.triangle as usize, &mut steps) {
-            moved[far.vertex as usize][2] = heights[far.vertex as usize / LOOKED_AT];
-        }
+        filling.insert(far.vertex, heights[far.vertex as usize / LOOKED_AT], far.triangle as usize, &mut steps);
     }
-    let coarse = filling.into_triangles();
+    let mesh = filling.into_coarse();
     interrupt::check()?;
-    let greatest = vertical_error(positions, terrain.triangles, &moved, &coarse);
-    Ok(Simplified {
-        positions: moved,
-        triangles: coarse,
-        greatest_error: greatest * up,
-        typical_error,
-        spacing: side * xy,
-    })
+    let greatest_error = vertical_error(positions, terrain.triangles, &mesh) * up;
+    Ok(Simplified { mesh, greatest_error, typical_error, spacing: side * xy })
 }
 
 /// The edges around a terrain.
@@ -155,18 +146,17 @@ impl Boundary {
 }
 
 /// Keeps one vertex of `positions` in each cell of a grid with about `cells` cells within `bounds`: the one nearest to the height that is seen in the
-/// cell. Unless it was `kept` already, it gets that height in `moved`. Returns the side of a cell in lattice steps.
+/// cell. Returns the side of a cell in lattice steps, and the vertices that were not `kept` already with that height.
 fn keep_by_grid(
     positions: &[[i32; 3]],
     bounds: Bounds<2>,
     cells: usize,
     lines: &KeptLines,
     kept: &mut [bool],
-    moved: &mut [[i32; 3]],
-) -> f64 {
+) -> (f64, Vec<(u32, i32)>) {
     let side = side_of(bounds, cells);
     if cells == 0 {
-        return side;
+        return (side, Vec::new());
     }
     let grid = SquareGrid::new(bounds, side, cells as f64);
     let cell_of = grid.cells_of(positions);
@@ -178,13 +168,14 @@ fn keep_by_grid(
         let nearest = &mut nearest[cell as usize];
         *nearest = (*nearest).min(u64::from(p[2].abs_diff(heights[cell as usize])) << 32 | v);
     }
+    let mut moved = Vec::with_capacity(nearest.len());
     for (height, nearest) in heights.into_iter().zip(nearest).filter(|(_, nearest)| *nearest != u64::MAX) {
         let v = nearest as u32;
         if !std::mem::replace(&mut kept[v as usize], true) {
-            moved[v as usize][2] = height;
+            moved.push((v, height));
         }
     }
-    side
+    (side, moved)
 }
 
 /// Returns the side of square cells of which `cells` have the area of the box.

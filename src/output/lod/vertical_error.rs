@@ -9,6 +9,7 @@
 
 use crate::geometry::predicates::orient2d;
 use crate::mesh::adjacency::VertexAdjacency;
+use crate::output::lod::filling::CoarseMesh;
 use crate::output::lod::height_bounds::HeightBounds;
 use crate::output::lod::vertex_cells::{VertexCells, plane};
 
@@ -25,18 +26,18 @@ const MEASURED_FIRST: usize = 1024;
 const LOST: f64 = 1.0 / (1u64 << 48) as f64;
 
 /// Returns the greatest vertical distance in steps of z between two terrains. It is never too small. The triangles `fine` are between
-/// `positions` (lattice x, y, z), and the triangles `coarse` between `moved`: the same x and y, with other heights within the same
-/// range. Both terrains must cover the same ground once, with counterclockwise triangles.
-pub fn vertical_error(positions: &[[i32; 3]], fine: &[[u32; 3]], moved: &[[i32; 3]], coarse: &[[u32; 3]]) -> f64 {
+/// `positions` (lattice x, y, z), and those of `coarse` between some of them, with other heights within the same range. Both terrains must cover the same ground once, with counterclockwise triangles.
+pub fn vertical_error(positions: &[[i32; 3]], fine: &[[u32; 3]], coarse: &CoarseMesh) -> f64 {
     let heights = HeightBounds::new(positions, fine);
-    let corners = |triangle: &[u32; 3]| triangle.map(|v| moved[v as usize]);
-    let mut bounds: Vec<(u32, u32)> = coarse.iter().map(|t| heights.error_bound(&corners(t))).zip(0..).collect();
+    let corners = |triangle: &[u32; 3]| triangle.map(|v| coarse.positions[v as usize]);
+    let mut bounds: Vec<(u32, u32)> =
+        coarse.triangles.iter().map(|t| heights.error_bound(&corners(t))).zip(0..).collect();
     // Triangles that may have the greatest error come first, so that most of the others can be skipped.
     let first = MEASURED_FIRST.min(bounds.len());
     if first < bounds.len() {
         bounds.select_nth_unstable_by(first, |a, b| b.cmp(a));
     }
-    let mut steps = StepsLeft::new(coarse.len());
+    let mut steps = StepsLeft::new(coarse.triangles.len());
     let mut greatest = 0.0f64;
     let (first, others) = bounds.split_at(first);
     for bounds in [first, others] {
@@ -45,11 +46,11 @@ pub fn vertical_error(positions: &[[i32; 3]], fine: &[[u32; 3]], moved: &[[i32; 
             continue;
         }
         measured.sort_unstable_by(|a, b| b.cmp(a));
-        let triangles = || measured.iter().map(|(_, triangle)| coarse[*triangle as usize]);
+        let triangles = || measured.iter().map(|(_, triangle)| coarse.triangles[*triangle as usize]);
         let near = NearTerrain::new(&heights, positions, fine, triangles().map(|t| corners(&t)));
         for ((bound, _), triangle) in measured.iter().zip(triangles()) {
             if *bound as f64 > greatest {
-                match near.error_of(&triangle, moved, &mut steps) {
+                match near.error_of(triangle.map(|v| coarse.vertices[v as usize]), &corners(&triangle), &mut steps) {
                     Some(error) => greatest = greatest.max(error),
                     None => return heights.height_range(),
                 }
@@ -93,11 +94,11 @@ impl<'a> NearTerrain<'a> {
         NearTerrain { mesh: FineMesh::new(positions, &triangles), vertices: VertexCells::new(positions, &vertices) }
     }
 
-    /// Returns the greatest distance between the terrain and a simplified triangle. `None` if that takes more than `steps`.
-    fn error_of(&self, triangle: &[u32; 3], moved: &[[i32; 3]], steps: &mut StepsLeft) -> Option<f64> {
-        let at_crossings = self.mesh.error_at_crossings(triangle, moved, &mut steps.of_walks)?;
-        let corners = triangle.map(|v| moved[v as usize]);
-        let at_vertices = self.vertices.furthest_inside(&corners, &mut steps.of_vertices)?;
+    /// Returns the greatest distance between the terrain and a simplified triangle between these vertices, whose `corners` may have other
+    /// heights. `None` if that takes more than `steps`.
+    fn error_of(&self, vertices: [u32; 3], corners: &[[i32; 3]; 3], steps: &mut StepsLeft) -> Option<f64> {
+        let at_crossings = self.mesh.error_at_crossings(vertices, corners, &mut steps.of_walks)?;
+        let at_vertices = self.vertices.furthest_inside(corners, &mut steps.of_vertices)?;
         Some(at_crossings.max(at_vertices))
     }
 }
@@ -133,18 +134,20 @@ impl<'a> FineMesh<'a> {
 
     /// Returns the greatest distance where an edge of a coarse triangle crosses an edge of this mesh. `None` if that takes more than
     /// `steps`, or if the edge leaves the mesh.
-    fn error_at_crossings(&self, &[a, b, c]: &[u32; 3], moved: &[[i32; 3]], steps: &mut u64) -> Option<f64> {
+    fn error_at_crossings(&self, vertices: [u32; 3], corners: &[[i32; 3]; 3], steps: &mut u64) -> Option<f64> {
         let mut greatest = 0.0f64;
-        // The other triangle at an edge has it in the other direction; the boundary is the same in both meshes.
-        for (from, to) in [(a, b), (b, c), (c, a)].into_iter().filter(|(from, to)| from < to) {
-            greatest = greatest.max(self.error_along(from, to, moved, steps)?);
+        for [i, j] in [[0, 1], [1, 2], [2, 0]] {
+            // The other triangle at an edge has it in the other direction; the boundary is the same in both meshes.
+            if vertices[i] < vertices[j] {
+                let edge = CoarseEdge { from: corners[i], to: corners[j] };
+                greatest = greatest.max(self.error_along(vertices[i], vertices[j], &edge, steps)?);
+            }
         }
         Some(greatest)
     }
 
     /// Returns the greatest distance along one coarse edge, between its ends.
-    fn error_along(&self, from: u32, to: u32, moved: &[[i32; 3]], steps: &mut u64) -> Option<f64> {
-        let edge = CoarseEdge { from: moved[from as usize], to: moved[to as usize] };
+    fn error_along(&self, from: u32, to: u32, edge: &CoarseEdge, steps: &mut u64) -> Option<f64> {
         let mut greatest = 0.0f64;
         let mut at = WalkPosition::Vertex(from);
         loop {
@@ -152,12 +155,12 @@ impl<'a> FineMesh<'a> {
             *steps = steps.checked_sub(self.steps_around(v))?;
             at = match at {
                 WalkPosition::Vertex(v) if v == to => return Some(greatest),
-                WalkPosition::Vertex(v) => self.leave_vertex(v, to, &edge)?,
+                WalkPosition::Vertex(v) => self.leave_vertex(v, to, edge)?,
                 WalkPosition::Edge(right, left) => {
                     let [r, l] = [right, left].map(|v| self.positions[v as usize]);
                     greatest = greatest.max(edge.distance_to_edge(r, l));
                     let next = self.third(left, right)?;
-                    self.leave_edge(right, left, next, &edge)
+                    self.leave_edge(right, left, next, edge)
                 }
             };
             // The ends are among the vertices in the triangle.
@@ -274,21 +277,25 @@ mod tests {
             kept.iter_mut().step_by(every).for_each(|kept| *kept = true);
             fine.hull().for_each(|h| kept[fine.origin(h).get()] = true);
             let kept: Vec<u32> = all.into_iter().filter(|&v| kept[v as usize]).collect();
-            let coarse = triangulation(&positions, &kept).triangles;
-            let coarse: Vec<[u32; 3]> = coarse.iter().map(|t| t.map(|v| kept[v.get()])).collect();
+            let triangles = triangulation(&positions, &kept).corners().to_vec();
 
             let (low, high) = positions.iter().fold((i32::MAX, i32::MIN), |(l, h), p| (l.min(p[2]), h.max(p[2])));
             let mut moved = positions.clone();
             for (p, lift) in moved.iter_mut().step_by(7).zip(&lifts) {
                 p[2] = (p[2] + lift).clamp(low, high);
             }
+            let coarse = CoarseMesh { positions: kept.iter().map(|&v| moved[v as usize]).collect(), vertices: kept, triangles };
+
             let every_vertex: Vec<u32> = (0..positions.len() as u32).collect();
             let (mesh, vertices) = (FineMesh::new(&positions, fine.corners()), VertexCells::new(&positions, &every_vertex));
             let whole = NearTerrain { mesh, vertices };
             let mut steps = StepsLeft { of_walks: u64::MAX, of_vertices: u64::MAX };
-            let furthest = coarse.iter().map(|t| whole.error_of(t, &moved, &mut steps).unwrap());
+            let furthest = coarse.triangles.iter().map(|t| {
+                let corners = t.map(|v| coarse.positions[v as usize]);
+                whole.error_of(t.map(|v| coarse.vertices[v as usize]), &corners, &mut steps).unwrap()
+            });
             let furthest = furthest.fold(0.0, f64::max);
-            let found = vertical_error(&positions, fine.corners(), &moved, &coarse);
+            let found = vertical_error(&positions, fine.corners(), &coarse);
             let most = furthest + 2e-9;
             prop_assert!(found == 0.0 && furthest == 0.0 || (furthest..most).contains(&found), "{} and {}", found, furthest);
         }

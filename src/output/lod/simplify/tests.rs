@@ -28,7 +28,7 @@ fn terrain(mut points: Vec<[i32; 3]>) -> Tile {
 fn simplified(tile: &Tile, triangles: usize, lines: Option<&Breaklines>) -> (Tile, f64) {
     let terrain = Terrain { positions: &tile.positions, triangles: &tile.triangles, may_be_on_boundary: None };
     let simple = simplify(&frame(), &terrain, triangles, lines).unwrap();
-    (Tile::of(&simple.positions, simple.triangles), simple.greatest_error)
+    (Tile::of(&simple.mesh.positions, simple.mesh.triangles), simple.greatest_error)
 }
 
 /// Returns twice the area, and asserts that all triangles are counterclockwise.
