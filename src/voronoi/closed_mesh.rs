@@ -291,6 +291,19 @@ impl ClosedMesh {
         orient2d(z, w, u) > 0 && orient2d(w, z, v) > 0
     }
 
+    /// Returns the sites of the triangle of `h`.
+    #[inline(always)]
+    pub(super) fn triangle_sites(&self, sites: &[Site], h: ClosedEdge) -> [Site; 3] {
+        h.triangle().sides().map(|side| self.origin(side).site(sites))
+    }
+
+    /// Returns the site opposite to edge `h` in the triangle beyond it. If that is a slot, it returns any site.
+    #[inline(always)]
+    pub(super) fn site_beyond(&self, sites: &[Site], h: ClosedEdge) -> Site {
+        let g = self.twin(h).max(self.front());
+        self.apex(g).site(sites)
+    }
+
     /// Returns the two ends of edge `h`, the apex of its triangle and the apex of its twin's triangle.
     #[inline(always)]
     pub(super) fn quadrilateral(&self, h: ClosedEdge) -> [VertexIndex; 4] {
