@@ -84,18 +84,36 @@ fn inside_or_in_doubt(sites: &[[Site; InCircleBatch::LANES]; 4], count: usize) -
     let mut doubtful = [false; InCircleBatch::LANES];
     for first in (0..count.min(InCircleBatch::LANES)).step_by(GROUP) {
         for i in first..first + GROUP {
-            let along = |p: Site, axis: usize| p[axis].wrapping_sub(d[i][axis]) as f32;
-            let (ax, ay, bx, by) = (along(a[i], 0), along(a[i], 1), along(b[i], 0), along(b[i], 1));
-            let (cx, cy) = (along(c[i], 0), along(c[i], 1));
-            let (al, bl, cl) = (ax * ax + ay * ay, bx * bx + by * by, cx * cx + cy * cy);
-            let (bc, cb, ca, ac) = (bx * cy, cx * by, cx * ay, ax * cy);
-            let (ab, ba) = (ax * by, bx * ay);
-            let det = al * (bc - cb) + bl * (ca - ac) + cl * (ab - ba);
-            let permanent = al * (bc.abs() + cb.abs()) + bl * (ca.abs() + ac.abs()) + cl * (ab.abs() + ba.abs());
-            doubtful[i] = det >= -IN_CIRCLE_ERROR_SINGLE * permanent;
+            doubtful[i] = is_inside_or_in_doubt(a[i], b[i], c[i], d[i]);
         }
     }
     doubtful
+}
+
+/// Returns for each of four counterclockwise triangles and sites whether [`in_circle`] may be true. It is never false where `in_circle` is
+/// true.
+#[inline(always)]
+pub fn four_inside_or_in_doubt(triangles: [[Site; 3]; 4], sites: [Site; 4]) -> [bool; 4] {
+    let mut doubtful = [false; 4];
+    for i in 0..4 {
+        let [a, b, c] = triangles[i];
+        doubtful[i] = is_inside_or_in_doubt(a, b, c, sites[i]);
+    }
+    doubtful
+}
+
+/// Tells in single precision whether [`in_circle`] may be true. It is never false where `in_circle` is true.
+#[inline(always)]
+fn is_inside_or_in_doubt(a: Site, b: Site, c: Site, d: Site) -> bool {
+    let along = |p: Site, axis: usize| p[axis].wrapping_sub(d[axis]) as f32;
+    let (ax, ay, bx, by) = (along(a, 0), along(a, 1), along(b, 0), along(b, 1));
+    let (cx, cy) = (along(c, 0), along(c, 1));
+    let (al, bl, cl) = (ax * ax + ay * ay, bx * bx + by * by, cx * cx + cy * cy);
+    let (bc, cb, ca, ac) = (bx * cy, cx * by, cx * ay, ax * cy);
+    let (ab, ba) = (ax * by, bx * ay);
+    let det = al * (bc - cb) + bl * (ca - ac) + cl * (ab - ba);
+    let permanent = al * (bc.abs() + cb.abs()) + bl * (ca.abs() + ac.abs()) + cl * (ab.abs() + ba.abs());
+    det >= -IN_CIRCLE_ERROR_SINGLE * permanent
 }
 
 /// Decides [`in_circle`] where floating point is in doubt.

@@ -1,6 +1,7 @@
 //! Step C4: flip edges until all are Delaunay (Lawson), by the canonical in-circle test.
 
 use crate::geometry::Site;
+use crate::geometry::predicates::four_inside_or_in_doubt;
 use crate::voronoi::closed_mesh::ClosedMesh;
 use crate::voronoi::index::ClosedEdge;
 use crate::voronoi::rejection::Rejection;
@@ -50,9 +51,28 @@ impl FlipQueue {
                 self.later.push(h);
                 continue;
             }
-            self.flip(mesh, h)?;
+            self.step()?;
+            self.done += 1;
+            mesh.flip(h);
+            self.suspect_outline(mesh, sites, h, g);
         }
         Ok(())
+    }
+
+    /// Adds those sides of the two triangles of `h` and `g`, whose common edge was flipped, that may fail.
+    #[inline(always)]
+    fn suspect_outline(&mut self, mesh: &ClosedMesh, sites: &[Site], h: ClosedEdge, g: ClosedEdge) {
+        let outline = [h, h.previous(), g, g.previous()];
+        let [t, u] = [h, g].map(|side| mesh.triangle_sites(sites, side));
+        let beyond = outline.map(|side| mesh.site_beyond(sites, side));
+        let doubtful = four_inside_or_in_doubt([t, t, u, u], beyond);
+        let mut found = [ClosedEdge::default(); 4];
+        let mut count = 0;
+        for (side, doubt) in outline.into_iter().zip(doubtful) {
+            found[count % 4] = side;
+            count += doubt as usize;
+        }
+        self.suspects.extend_from_slice(&found[..count]);
     }
 
     /// Flips edges until every edge is Delaunay.

@@ -3,7 +3,7 @@
 //!
 //! A triangle is a record of eight numbers: three corners (counterclockwise) and an unused number, three twins and an unused
 //! number. So a corner and a twin are one load each. A record without a triangle is *free*: its corners are at infinity, so that every
-//! corner is a vertex. The first records are *slots*, which stand for the open ends of Voronoi edges while the texture is scanned (see
+//! corner is a vertex. The first records hold *slots*, which stand for the open ends of Voronoi edges while the texture is scanned (see
 //! `g6_triangles`).
 //!
 //! Nothing is written as a corner or twin but what was one before. So no index is ever out of bounds, even where the links of a mesh that
@@ -22,7 +22,7 @@ pub(super) struct ClosedMesh {
     /// The records up to `end`. What follows is room that is kept from leaf to leaf.
     records: Vec<u32>,
     end: usize,
-    /// The number of records that hold slots.
+    /// The number of records whose room the slots take.
     slots: usize,
     /// The triangles whose records are free.
     free: Vec<ClosedEdge>,
@@ -32,7 +32,8 @@ pub(super) struct ClosedMesh {
 impl ClosedMesh {
     /// Clears the mesh, and makes room for `slots` slots and for the triangles of `sites` sites. Vertex `infinity` is the ghost.
     pub(super) fn reset(&mut self, slots: usize, sites: usize, infinity: VertexIndex) {
-        self.slots = slots.div_ceil(4);
+        // Slots have twins, four numbers on, but no origins. So they need no gaps between them.
+        self.slots = (slots + 4).div_ceil(8);
         self.end = 8 * self.slots;
         let room = self.end + 8 * (2 * sites + sites / 8 + 64);
         if self.records.len() < room {
@@ -47,6 +48,7 @@ impl ClosedMesh {
     /// `infinity` is the ghost.
     pub(super) fn start_with(&mut self, length: usize, infinity: VertexIndex) -> &mut [u32] {
         self.reset(0, length / 16, infinity);
+        self.slots = 0;
         self.end = length;
         &mut self.records[..length]
     }
@@ -60,7 +62,18 @@ impl ClosedMesh {
     /// Returns the half-edge that stands for slot `i`. It has a twin, but no origin.
     #[inline(always)]
     pub(super) const fn slot(i: usize) -> ClosedEdge {
-        ClosedEdge(((i >> 2) << 3 | (i & 3)) as u32)
+        ClosedEdge(i as u32)
+    }
+
+    /// Makes room for so many more triangles, and returns what writes them.
+    #[inline(always)]
+    pub(super) fn writer(&mut self, triangles: usize) -> TriangleWriter<'_> {
+        let needed = self.end + 8 * triangles;
+        if needed > self.records.len() {
+            self.records.resize(2 * needed, NO_CORNER);
+        }
+        let front = self.front();
+        TriangleWriter { records: &mut self.records, end: self.end, mesh_end: &mut self.end, front }
     }
 
     /// Returns the vertex at infinity.
@@ -278,6 +291,19 @@ impl ClosedMesh {
         orient2d(z, w, u) > 0 && orient2d(w, z, v) > 0
     }
 
+    /// Returns the sites of the triangle of `h`.
+    #[inline(always)]
+    pub(super) fn triangle_sites(&self, sites: &[Site], h: ClosedEdge) -> [Site; 3] {
+        h.triangle().sides().map(|side| self.origin(side).site(sites))
+    }
+
+    /// Returns the site opposite to edge `h` in the triangle beyond it. If that is a slot, it returns any site.
+    #[inline(always)]
+    pub(super) fn site_beyond(&self, sites: &[Site], h: ClosedEdge) -> Site {
+        let g = self.twin(h).max(self.front());
+        self.apex(g).site(sites)
+    }
+
     /// Returns the two ends of edge `h`, the apex of its triangle and the apex of its twin's triangle.
     #[inline(always)]
     pub(super) fn quadrilateral(&self, h: ClosedEdge) -> [VertexIndex; 4] {
@@ -350,6 +376,64 @@ impl ClosedMesh {
                 }
             }
         }
+    }
+}
+
+/// Adds triangles at the end of a closed mesh.
+pub(super) struct TriangleWriter<'a> {
+    records: &'a mut [u32],
+    /// The end of the records. A number of its own, which stays in a register.
+    end: usize,
+    mesh_end: &'a mut usize,
+    front: ClosedEdge,
+}
+
+impl Drop for TriangleWriter<'_> {
+    #[inline(always)]
+    fn drop(&mut self) {
+        *self.mesh_end = self.end;
+    }
+}
+
+impl TriangleWriter<'_> {
+    /// Returns the first half-edge of the mesh that is no slot.
+    #[inline(always)]
+    pub(super) fn front(&self) -> ClosedEdge {
+        self.front
+    }
+
+    /// Returns the first half-edge of the next triangle.
+    #[inline(always)]
+    pub(super) fn end(&self) -> ClosedEdge {
+        ClosedEdge(self.end as u32)
+    }
+
+    #[inline(always)]
+    pub(super) fn twin(&self, h: ClosedEdge) -> ClosedEdge {
+        ClosedEdge(self.records[h.get() + 4])
+    }
+
+    #[inline(always)]
+    pub(super) fn set_twin(&mut self, h: ClosedEdge, to: ClosedEdge) {
+        self.records[h.get() + 4] = to.0;
+    }
+
+    /// Makes two half-edges each other's twins.
+    #[inline(always)]
+    pub(super) fn link(&mut self, h: ClosedEdge, g: ClosedEdge) {
+        self.set_twin(h, g);
+        self.set_twin(g, h);
+    }
+
+    /// Adds a triangle whose half-edges have `twins`, which need not lead back yet; returns its first half-edge.
+    #[inline(always)]
+    pub(super) fn push(&mut self, [a, b, c]: [VertexIndex; 3], [f, g, h]: [ClosedEdge; 3]) -> ClosedEdge {
+        let t = self.end();
+        let record = &mut self.records[self.end..self.end + 8];
+        (record[0], record[1], record[2]) = (a.0, b.0, c.0);
+        (record[4], record[5], record[6]) = (f.0, g.0, h.0);
+        self.end += 8;
+        t
     }
 }
 

@@ -29,7 +29,7 @@ pub(super) struct SiteTexture {
     /// Bit x % 64 of word `y * words + x / 64` says whether pixel (x, y) has a site.
     pub(super) occupied: Vec<u64>,
     /// The vertex in a pixel that has a site, at `64 * words * y + x`. Other entries are left from earlier leaves.
-    vertices: Vec<VertexIndex>,
+    pub(super) vertices: Vec<VertexIndex>,
     /// The position of every site in the input, by vertex: first the sites in the texture, then the missing ones.
     pub(super) order: Vec<SiteIndex>,
     /// The site of every vertex, with one more entry for the vertex at infinity.
@@ -73,13 +73,6 @@ impl SiteTexture {
         self.append_missing(sites);
         counts.missing += self.missing.len() as u64;
         Ok(())
-    }
-
-    /// Returns the vertex in the pixel `label` (y << 16 | x).
-    #[inline(always)]
-    pub(super) fn vertex(&self, label: u32) -> VertexIndex {
-        let (x, y) = ((label & 0xffff) as usize, (label >> 16) as usize);
-        self.vertices[64 * self.words * y + x]
     }
 
     /// Chooses a width and height in the proportions of the sites' bounding box; returns where the pixels lie.

@@ -1,5 +1,5 @@
-//! Step G2: the exact discrete Voronoi diagram. The label of a pixel is the pixel (y << 16 | x) of its nearest site: the site's
-//! pixel with the least (d^2, x, y). This rule for ties keeps the mesh clean.
+//! Step G2: the exact discrete Voronoi diagram. The label of a pixel is the vertex of its nearest site: the site whose pixel has
+//! the least (d^2, x, y). This rule for ties keeps the mesh clean.
 //!
 //! Columns come first: for the whole texture, the distance of every pixel to the nearest site north of it in its column. Then come
 //! rows, from the south: the distance to the nearest site south in the column, the nearer of both as one 16-bit key per column, and
@@ -8,9 +8,7 @@
 //! columns' parabolas (Felzenszwalb and Huttenlocher 2012), which is exact at any distance.
 
 use crate::voronoi::g1_write_sites::SiteTexture;
-
-/// The label of pixels outside the texture.
-pub(super) const FRAME: u32 = u32::MAX;
+use crate::voronoi::index::VertexIndex;
 
 /// The least key that means "no site within seven pixels".
 const FAR: i16 = 64 << 8;
@@ -34,6 +32,8 @@ pub(super) struct LabelRows {
     /// One key per column, with `REACH` + 1 more on either side.
     columns: Vec<i16>,
     keys: Vec<i16>,
+    /// For the row at hand, the pixel of the nearest site of every pixel, at `stride * y + x`.
+    nearest: Vec<u32>,
     envelope: Vec<Parabola>,
 }
 
@@ -43,7 +43,7 @@ struct Parabola {
     from: i64,
     column: i64,
     height: i64,
-    label: u32,
+    pixel: u32,
 }
 
 impl LabelRows {
@@ -57,6 +57,7 @@ impl LabelRows {
         self.columns.clear();
         self.columns.resize(self.stride + 2 * (REACH + 1), FAR);
         self.keys.resize(self.stride, FAR);
+        self.nearest.resize(texture.width, 0);
         self.measure_north(texture);
     }
 
@@ -70,43 +71,43 @@ impl LabelRows {
     }
 
     /// Writes the labels of row `y` to `labels[1..=width]`. Callers must ask for the rows in order.
-    pub(super) fn row(&mut self, texture: &SiteTexture, y: usize, labels: &mut [u32]) {
+    pub(super) fn row(&mut self, texture: &SiteTexture, y: usize, labels: &mut [VertexIndex]) {
         let occupied = &texture.occupied[y * texture.words..][..texture.words];
         grow(&mut self.south, occupied);
         for_each_bit(occupied, |x| self.south_row[x] = y as u32 + 1);
         let north = &self.north[y * self.stride..][..self.stride];
         column_keys(&self.south, north, &mut self.columns[REACH + 1..][..self.stride]);
         let far = nearest_keys(&self.columns, &mut self.keys, texture.width);
-        let base = ((y as u32) << 16).wrapping_sub(8 << 16 | 8);
-        for (x, (label, &key)) in labels[1..=texture.width].iter_mut().zip(&self.keys).enumerate() {
-            let key = key as u32;
-            *label = base.wrapping_add(x as u32).wrapping_add((key & 15) << 16).wrapping_add(key >> 4 & 15);
-        }
+        nearest_pixels(&self.keys, texture.words, y, &mut self.nearest);
         if far {
-            self.far_runs(texture, y, &mut labels[1..=texture.width]);
+            self.far_runs(texture, y);
+        }
+        for (label, &pixel) in labels[1..=texture.width].iter_mut().zip(&self.nearest) {
+            *label = texture.vertices[pixel as usize];
         }
     }
 
-    /// Labels the runs of pixels whose nearest site is more than seven pixels away.
+    /// Finds the nearest sites of the runs of pixels whose nearest site is more than seven pixels away.
     #[cold]
-    fn far_runs(&mut self, texture: &SiteTexture, y: usize, labels: &mut [u32]) {
-        let mut x = 0;
-        while x < labels.len() {
+    fn far_runs(&mut self, texture: &SiteTexture, y: usize) {
+        let (width, mut x) = (texture.width, 0);
+        while x < width {
             if self.keys[x] < FAR {
                 x += 1;
                 continue;
             }
-            let end = (x..labels.len()).find(|&i| self.keys[i] < FAR).unwrap_or(labels.len());
-            // Along a row, the columns of the labels never decrease: those of the run lie between those of its neighbours.
-            let first = if x == 0 { 0 } else { labels[x - 1] & 0xffff };
-            let last = if end == labels.len() { labels.len() as u32 - 1 } else { labels[end] & 0xffff };
-            self.build_envelope(texture, y, first as usize..last as usize + 1, x as i64);
+            let end = (x..width).find(|&i| self.keys[i] < FAR).unwrap_or(width);
+            // Along a row, the columns of the nearest sites never decrease: those of the run lie between those of its neighbours.
+            let column = |i: usize| self.nearest[i] as usize % self.stride;
+            let (first, last) =
+                (x.checked_sub(1).map_or(0, column), if end == width { width - 1 } else { column(end) });
+            self.build_envelope(texture, y, first..last + 1, x as i64);
             let mut at = 0;
-            for (i, label) in labels[x..end].iter_mut().enumerate() {
+            for (i, pixel) in self.nearest[x..end].iter_mut().enumerate() {
                 while at + 1 < self.envelope.len() && self.envelope[at + 1].from <= (x + i) as i64 {
                     at += 1;
                 }
-                *label = self.envelope[at].label;
+                *pixel = self.envelope[at].pixel;
             }
             x = end;
         }
@@ -118,8 +119,8 @@ impl LabelRows {
         for x in columns {
             let Some(row) = self.nearest_in_column(texture.height, x, y) else { continue };
             let height = (row as i64 - y as i64).pow(2);
-            let label = (row << 16 | x) as u32;
-            let mut new = Parabola { from: start, column: x as i64, height, label };
+            let pixel = (self.stride * row + x) as u32;
+            let mut new = Parabola { from: start, column: x as i64, height, pixel };
             while let Some(top) = self.envelope.last() {
                 new.from = new.overtakes(top).max(start);
                 if new.from > top.from {
@@ -180,6 +181,19 @@ fn column_keys(south: &[u8], north: &[u8], keys: &mut [i16]) {
         let distance = south.min(north).min(8) as i16;
         let dy = if south <= north { -distance } else { distance };
         *key = ((distance * distance) << 8) + dy + 8;
+    }
+}
+
+/// Finds the pixels of the sites that the keys of row `y` tell, in a texture whose rows have `words` words. Where a key is far, the result
+/// is arbitrary.
+fn nearest_pixels(keys: &[i16], words: usize, y: usize, nearest: &mut [u32]) {
+    let first = (64 * words * y) as u32;
+    let origin = first.wrapping_sub((8 * 64 * words + 8) as u32);
+    for (x, (pixel, &key)) in nearest.iter_mut().zip(keys).enumerate() {
+        // Words fit 16 bits, in which a processor multiplies faster.
+        let words_north = (key as u16 & 15).wrapping_mul(words as u16);
+        *pixel =
+            origin.wrapping_add(x as u32).wrapping_add(u32::from(words_north) << 6).wrapping_add(key as u32 >> 4 & 15);
     }
 }
 

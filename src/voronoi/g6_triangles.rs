@@ -14,20 +14,22 @@
 //! Step C2's tests of what a row has made, and most flips of step C4, follow at once, while the row is in the cache. Flips work with
 //! open edges too, because slots are half-edges.
 
+use crate::geometry::Site;
 use crate::geometry::predicates::{in_circle, orient2d};
 use crate::voronoi::c2_shift::ShiftRepair;
 use crate::voronoi::c4_flip::FlipQueue;
-use crate::voronoi::closed_mesh::ClosedMesh;
+use crate::voronoi::closed_mesh::{ClosedMesh, TriangleWriter};
 use crate::voronoi::g1_write_sites::SiteTexture;
-use crate::voronoi::g2_voronoi::{FRAME, LabelRows};
+use crate::voronoi::g2_voronoi::LabelRows;
 use crate::voronoi::index::{ClosedEdge, VertexIndex};
 use crate::voronoi::rejection::Rejection;
+use std::hint::select_unpredictable;
 
 /// Buffers of the scan.
 #[derive(Default)]
 pub(super) struct TextureScan {
-    south: Vec<u32>,
-    north: Vec<u32>,
+    south: Vec<VertexIndex>,
+    north: Vec<VertexIndex>,
     south_walls: Vec<u64>,
     north_walls: Vec<u64>,
     floors: Vec<u64>,
@@ -56,11 +58,12 @@ impl TextureScan {
         shift: &mut ShiftRepair,
         flips: &mut FlipQueue,
     ) -> Result<(), Rejection> {
-        mesh.reset(texture.width + 3, texture.placed, VertexIndex((texture.sites.len() - 1) as u32));
+        let infinity = VertexIndex((texture.sites.len() - 1) as u32);
         let words = texture.width / 64 + 1;
+        mesh.reset(words * 64 + 3, texture.placed, infinity);
         for row in [&mut self.south, &mut self.north] {
             row.clear();
-            row.resize(words * 64 + 1, FRAME);
+            row.resize(words * 64 + 1, infinity);
         }
         for walls in [&mut self.south_walls, &mut self.north_walls, &mut self.floors] {
             walls.clear();
@@ -72,9 +75,9 @@ impl TextureScan {
             if y < texture.height {
                 labels.row(texture, y, &mut self.north);
             } else {
-                self.north.fill(FRAME);
+                self.north.fill(infinity);
             }
-            self.scan_row(texture, mesh, &mut flips.suspects);
+            self.scan_row(&texture.sites, mesh, &mut flips.suspects);
             tested = shift.test(mesh, &texture.sites, tested, y == texture.height, &mut flips.suspects);
             flips.run_early(mesh, &texture.sites)?;
             std::mem::swap(&mut self.south, &mut self.north);
@@ -95,125 +98,184 @@ impl TextureScan {
     }
 
     /// Visits the corners between two rows. To the west of corner x lies pixel x - 1, which has index x in a row.
-    fn scan_row(&mut self, texture: &SiteTexture, mesh: &mut ClosedMesh, suspects: &mut Vec<ClosedEdge>) {
+    fn scan_row(&mut self, sites: &[Site], mesh: &mut ClosedMesh, suspects: &mut Vec<ClosedEdge>) {
         let words = self.floors.len() - 1;
         for word in 0..words {
             let (north, south) = (&self.north[word * 64..][..65], &self.south[word * 64..][..65]);
             self.north_walls[word] = differences(&north[..64], &north[1..]);
             self.floors[word] = differences(&south[..64], &north[..64]);
         }
+        let mut writer = mesh.writer(2 * 64 * words);
+        // The other end of the Voronoi edge that goes east at the moment.
+        let mut open = UNUSED;
         for word in 0..words {
-            self.starts.push(mesh.end());
-            let (s, n, w) = (self.south_walls[word], self.north_walls[word], self.floors[word]);
-            let e = w >> 1 | self.floors[word + 1] << 63;
-            // All corners except those without arms and those that an edge passes straight through.
-            let mut corners = (s ^ n) | (w ^ e) | (s & n & w & e);
-            while corners != 0 {
-                let bit = corners.trailing_zeros();
-                let arms = (w >> bit & 1) | (s >> bit & 1) << 1 | (e >> bit & 1) << 2 | (n >> bit & 1) << 3;
-                self.corner(texture, mesh, word * 64 + bit as usize, arms as u32, suspects);
-                corners &= corners - 1;
-            }
+            self.starts.push(writer.end());
+            let arms = self.arms(word);
+            let first = writer.end();
+            self.add_triangles(word, arms, &mut writer);
+            open = self.join_arms(word, arms, first, open, sites, &mut writer, suspects);
         }
     }
 
-    /// Does what the arms (west, south, east, north: bits 0 to 3) of corner `x` require.
     #[inline(always)]
-    fn corner(
+    fn arms(&self, word: usize) -> Arms {
+        let west = self.floors[word];
+        let east = west >> 1 | self.floors[word + 1] << 63;
+        Arms { west, south: self.south_walls[word], east, north: self.north_walls[word] }
+    }
+
+    /// Returns the labels south and north of the corners of a word.
+    #[inline(always)]
+    fn labels(&self, word: usize) -> [&[VertexIndex; 65]; 2] {
+        [&self.south, &self.north].map(|row| row[word * 64..].first_chunk().expect("rows are whole words and one more"))
+    }
+
+    /// Makes the triangles of the corners with three arms in a word, and links them to the south and the north.
+    #[inline(always)]
+    fn add_triangles(&self, word: usize, arms: Arms, writer: &mut TriangleWriter) {
+        let [south_row, north_row] = self.labels(word);
+        let mut corners = arms.three();
+        // All shapes are treated alike, because no processor can predict which shape comes next.
+        while corners != 0 {
+            let bit = corners.trailing_zeros();
+            let (i, column) = (bit as usize % 64, column(word * 64 + bit as usize));
+            let (west, south) = (arms.west >> bit & 1, arms.south >> bit & 1 != 0);
+            let (sw, se, ne, nw) = (south_row[i], south_row[i + 1], north_row[i + 1], north_row[i]);
+            let (b, c) = (select_unpredictable(south, se, ne), select_unpredictable(west != 0, nw, ne));
+            let from_south = writer.twin(column);
+            // The half-edges across the arms lie counterclockwise from the south. What is not right here, links to the west and the east
+            // overwrite.
+            let t = writer.push([sw, b, c], [from_south, column, column]);
+            writer.set_twin(select_unpredictable(south, from_south, UNUSED), t);
+            writer.set_twin(column, t.side(2 - west as u32));
+            corners &= corners - 1;
+        }
+    }
+
+    /// Joins the arms of the corners of a word to the west and the east. The word's triangles begin at `t`. `open` is the other end of the
+    /// Voronoi edge that comes from the west; returns that of the edge that leaves to the east.
+    #[inline(always)]
+    fn join_arms(
         &self,
-        texture: &SiteTexture,
-        mesh: &mut ClosedMesh,
-        x: usize,
-        arms: u32,
+        word: usize,
+        arms: Arms,
+        mut t: ClosedEdge,
+        mut open: ClosedEdge,
+        sites: &[Site],
+        writer: &mut TriangleWriter,
         suspects: &mut Vec<ClosedEdge>,
-    ) {
-        // One branch separates bends from corners with three arms. All shapes of each are treated alike, because no processor can
-        // predict which shape comes next.
-        match arms.count_ones() {
-            2 => bend(mesh, x, arms, suspects),
-            3 => self.three_colours(texture, mesh, x, arms),
-            _ => self.four_arms(texture, mesh, x, suspects),
+    ) -> ClosedEdge {
+        let (three, four) = (arms.three(), arms.four());
+        let mut joined = [UNUSED; 64];
+        let mut count = 0;
+        let mut corners = arms.corners();
+        while corners != 0 {
+            let bit = corners.trailing_zeros();
+            corners &= corners - 1;
+            let x = word * 64 + bit as usize;
+            if four >> bit & 1 != 0 {
+                open = self.four_arms(x, open, sites, writer, suspects);
+                continue;
+            }
+            let is_triangle = (three >> bit & 1) as u32;
+            let (west, south) = ((arms.west >> bit & 1) as u32, (arms.south >> bit & 1) as u32);
+            let along = select_unpredictable(south != 0, writer.twin(column(x)), column(x));
+            let to_west = select_unpredictable(is_triangle != 0, t.side(1 + west), along);
+            let to_east = select_unpredictable(is_triangle != 0, t.side(south), along);
+            // Where no arm goes west, this writes only what the arm to the east overwrites.
+            writer.link(open, to_west);
+            // If both ends are triangles that were there before, they were tested before they had this edge, so it is a suspect.
+            joined[count % 64] = to_west;
+            count += ((is_triangle == 0) & (open.0.min(to_west.0) >= writer.front().0)) as usize;
+            open = select_unpredictable(arms.east >> bit & 1 != 0, to_east, UNUSED);
+            t = ClosedEdge(t.0 + 8 * is_triangle);
         }
+        suspects.extend_from_slice(&joined[..count]);
+        open
+    }
+
+    /// Handles a corner with four arms; returns the other end of the Voronoi edge that leaves to the east. If two pixels of one colour face
+    /// each other across the corner, they are connected there, and no three colours meet. Otherwise four colours meet.
+    #[inline(never)]
+    fn four_arms(
+        &self,
+        x: usize,
+        open: ClosedEdge,
+        sites: &[Site],
+        writer: &mut TriangleWriter,
+        suspects: &mut Vec<ClosedEdge>,
+    ) -> ClosedEdge {
+        let labels = [self.south[x], self.south[x + 1], self.north[x + 1], self.north[x]];
+        // The edges from the west and from the south may be one.
+        writer.link(EAST, open);
+        let (from_west, from_south) = (writer.twin(EAST), writer.twin(column(x)));
+        if labels[0] == labels[2] {
+            writer.link(column(x), from_west);
+            writer.link(EAST, from_south);
+        } else if labels[1] == labels[3] {
+            writer.link(from_west, from_south);
+            if from_west.0.min(from_south.0) >= writer.front().0 {
+                suspects.push(from_west);
+            }
+            writer.link(EAST, column(x));
+        } else {
+            let [s, e, n, w] = two_triangles(writer, sites, labels);
+            writer.link(from_south, s);
+            writer.link(from_west, w);
+            writer.link(e, EAST);
+            writer.link(n, column(x));
+        }
+        writer.twin(EAST)
+    }
+}
+
+/// The arms of 64 corners: bit i of a word says whether corner i has an arm in that direction.
+#[derive(Clone, Copy)]
+struct Arms {
+    west: u64,
+    south: u64,
+    east: u64,
+    north: u64,
+}
+
+impl Arms {
+    /// Returns the corners with arms but those that an edge passes straight through.
+    #[inline(always)]
+    fn corners(self) -> u64 {
+        (self.south ^ self.north) | (self.west ^ self.east) | self.four()
     }
 
     #[inline(always)]
-    fn three_colours(&self, texture: &SiteTexture, mesh: &mut ClosedMesh, x: usize, arms: u32) {
-        let (west, south, east, north) = (arms & 1 != 0, arms & 2 != 0, arms & 4 != 0, arms & 8 != 0);
-        let (sw, se, ne, nw) = (self.south[x], self.south[x + 1], self.north[x + 1], self.north[x]);
-        let (b, c) = (if south { se } else { ne }, if north & west { nw } else { ne });
-        let t = mesh.push([sw, b, c].map(|label| vertex(texture, mesh, label)));
-        let (from_west, from_south) = (mesh.twin(EAST), mesh.twin(column(x)));
-        // The half-edges across the arms, counterclockwise from the south. For a missing arm, unused slots are linked.
-        let or_unused = |exists: bool, h: ClosedEdge| if exists { h } else { UNUSED };
-        mesh.link(or_unused(south, t), or_unused(south, from_south));
-        mesh.link(or_unused(west, t.side(2)), or_unused(west, from_west));
-        mesh.link(or_unused(east, t.side(south as u32)), or_unused(east, EAST));
-        mesh.link(or_unused(north, t.side(2 - west as u32)), or_unused(north, column(x)));
+    fn three(self) -> u64 {
+        (self.south & self.north & (self.west ^ self.east)) | (self.west & self.east & (self.south ^ self.north))
     }
 
-    /// Handles a corner with four arms. If two pixels of one colour face each other across the corner, they are connected there, and
-    /// no three colours meet. Otherwise four colours meet.
-    fn four_arms(&self, texture: &SiteTexture, mesh: &mut ClosedMesh, x: usize, suspects: &mut Vec<ClosedEdge>) {
-        let labels = [self.south[x], self.south[x + 1], self.north[x + 1], self.north[x]];
-        let (from_west, from_south) = (mesh.twin(EAST), mesh.twin(column(x)));
-        if labels[0] == labels[2] {
-            mesh.link(column(x), from_west);
-            mesh.link(EAST, from_south);
-        } else if labels[1] == labels[3] {
-            join(mesh, from_west, from_south, suspects);
-            mesh.link(EAST, column(x));
-        } else {
-            let vertices = labels.map(|label| vertex(texture, mesh, label));
-            let [s, e, n, w] = two_triangles(texture, mesh, vertices);
-            mesh.link(from_south, s);
-            mesh.link(from_west, w);
-            mesh.link(e, EAST);
-            mesh.link(n, column(x));
-        }
+    #[inline(always)]
+    fn four(self) -> u64 {
+        self.south & self.north & self.west & self.east
     }
-}
-
-/// Joins the two arms of a bend: one end of the Voronoi edge lies in the west or east, the other in the south or north.
-#[inline(always)]
-fn bend(mesh: &mut ClosedMesh, x: usize, arms: u32, suspects: &mut Vec<ClosedEdge>) {
-    let across = if arms & 1 != 0 { mesh.twin(EAST) } else { EAST };
-    let along = if arms & 2 != 0 { mesh.twin(column(x)) } else { column(x) };
-    join(mesh, across, along, suspects);
-}
-
-/// Links the ends of a Voronoi edge. If both ends are triangles, they were tested before they had this edge, so it is a suspect.
-#[inline(always)]
-fn join(mesh: &mut ClosedMesh, a: ClosedEdge, b: ClosedEdge, suspects: &mut Vec<ClosedEdge>) {
-    mesh.link(a, b);
-    if a.0.min(b.0) >= mesh.front().0 {
-        suspects.push(a);
-    }
-}
-
-#[inline(always)]
-fn vertex(texture: &SiteTexture, mesh: &ClosedMesh, label: u32) -> VertexIndex {
-    if label == FRAME { mesh.infinity() } else { texture.vertex(label) }
 }
 
 /// Makes two triangles for four colours around a corner; returns the half-edges on its south, east, north and west arms.
-fn two_triangles(texture: &SiteTexture, mesh: &mut ClosedMesh, [sw, se, ne, nw]: [VertexIndex; 4]) -> [ClosedEdge; 4] {
-    let [a, b, c, d] = [sw, se, ne, nw].map(|v| v.site(&texture.sites));
+fn two_triangles(writer: &mut TriangleWriter, sites: &[Site], [sw, se, ne, nw]: [VertexIndex; 4]) -> [ClosedEdge; 4] {
+    let [a, b, c, d] = [sw, se, ne, nw].map(|v| v.site(sites));
+    let unlinked = [UNUSED; 3];
     if orient2d(a, b, c) > 0 && orient2d(a, c, d) > 0 && !in_circle(a, b, c, d) {
-        let t = mesh.push([sw, se, ne]);
-        let u = mesh.push([sw, ne, nw]);
-        mesh.link(t.side(2), u);
+        let t = writer.push([sw, se, ne], unlinked);
+        let u = writer.push([sw, ne, nw], unlinked);
+        writer.link(t.side(2), u);
         [t, t.side(1), u.side(1), u.side(2)]
     } else {
-        let t = mesh.push([sw, se, nw]);
-        let u = mesh.push([se, ne, nw]);
-        mesh.link(t.side(1), u.side(2));
+        let t = writer.push([sw, se, nw], unlinked);
+        let u = writer.push([se, ne, nw], unlinked);
+        writer.link(t.side(1), u.side(2));
         [t, u, u.side(1), t.side(2)]
     }
 }
 
 /// Returns a word of 64 bits, in which bit i says whether `a[i] != b[i]`.
 #[inline(always)]
-fn differences(a: &[u32], b: &[u32]) -> u64 {
+fn differences(a: &[VertexIndex], b: &[VertexIndex]) -> u64 {
     let mut bytes = [0u8; 64];
     for ((byte, a), b) in bytes.iter_mut().zip(a).zip(b) {
         *byte = (a != b) as u8;

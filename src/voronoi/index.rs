@@ -18,17 +18,18 @@ impl ClosedEdge {
         self.0 as usize
     }
 
-    /// Returns the half-edge after this one in its triangle. A table of two-bit numbers replaces a branch that would be mispredicted
-    /// one time in three.
+    /// Returns the half-edge after this one in its triangle. Arithmetic replaces a branch that would be mispredicted one time in three.
     #[inline(always)]
     pub(super) fn next(self) -> ClosedEdge {
-        ClosedEdge((self.0 & !3) | (0b00_10_01 >> (2 * (self.0 & 3)) & 3))
+        let is_last = self.0 >> 1 & 1;
+        ClosedEdge(self.0.wrapping_add(1).wrapping_sub(3 * is_last))
     }
 
     /// Returns the half-edge before this one in its triangle.
     #[inline(always)]
     pub(super) fn previous(self) -> ClosedEdge {
-        ClosedEdge((self.0 & !3) | (0b01_00_10 >> (2 * (self.0 & 3)) & 3))
+        let is_first = (self.0 & 3 == 0) as u32;
+        ClosedEdge(self.0.wrapping_add(3 * is_first).wrapping_sub(1))
     }
 
     /// Returns the corner of the triangle at which the half-edge starts: 0, 1 or 2.

@@ -6,6 +6,7 @@ use crate::mesh::half_edge::HalfEdgeMesh;
 use crate::voronoi::counts::PipelineCounts;
 use crate::voronoi::g1_write_sites::SiteTexture;
 use crate::voronoi::g2_voronoi::LabelRows;
+use crate::voronoi::index::VertexIndex;
 use crate::voronoi::rejection::Rejection;
 use crate::voronoi::test_cases::{Random, case};
 use crate::voronoi::texture_request::{TextureRequest, TextureResolution};
@@ -132,13 +133,13 @@ fn check_labels(sites: &[Site]) {
     let pixels = (0..texture.width).flat_map(|x| (0..texture.height).map(move |y| (x, y)));
     let placed: Vec<(usize, usize)> = pixels.filter(|&(x, y)| occupied(x, y)).collect();
     rows.start(&texture);
-    let mut labels = vec![0; texture.width + 2];
+    let mut labels = vec![VertexIndex::NONE; texture.width + 2];
     for y in 0..texture.height {
         rows.row(&texture, y, &mut labels);
         for x in 0..texture.width {
             let key = |&(sx, sy): &(usize, usize)| (sx.abs_diff(x).pow(2) + sy.abs_diff(y).pow(2), sx, sy);
             let (_, sx, sy) = placed.iter().map(key).min().unwrap();
-            assert_eq!(labels[x + 1], (sy << 16 | sx) as u32, "pixel ({x}, {y}) of {sites:?}");
+            assert_eq!(labels[x + 1], texture.vertices[64 * texture.words * sy + sx], "pixel ({x}, {y}) of {sites:?}");
         }
     }
 }
