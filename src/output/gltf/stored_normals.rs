@@ -1,5 +1,7 @@
 //! The normals of a tile as its file has them. What few vertices are asked for is not worth unpacking for all.
 
+use multiversion::multiversion;
+
 use crate::output::gltf::encoding::{from_long_octahedral, from_octahedral};
 
 /// The normals of a mesh, in one of the forms that this program writes.
@@ -30,7 +32,6 @@ impl StoredNormals {
     /// Returns the normal (x, y up, z) of vertex `v`. A viewer divides it by the scale of the node and makes it a unit vector.
     pub fn get(&self, v: usize) -> [f32; 3] {
         let of_shorts = |[x, y, z, _]: [i16; 4]| [x, y, z].map(|v| f32::from(v) / 32767.0);
-        let of_bytes = |[x, y, z, _]: [i8; 4]| [x, y, z].map(|v| f32::from(v) / 127.0);
         match self {
             StoredNormals::Single(all) => all[v],
             StoredNormals::Shorts(all) => of_shorts(all[v]),
@@ -40,10 +41,31 @@ impl StoredNormals {
         }
     }
 
+    /// Returns the normals of these vertices, as [`StoredNormals::get`] does, many at a time.
+    pub(crate) fn pick(&self, vertices: &[u32]) -> Vec<[f32; 3]> {
+        match self {
+            StoredNormals::OctahedralBytes(all) => {
+                let picked: Vec<[i8; 4]> = vertices.iter().map(|&v| all[v as usize]).collect();
+                from_octahedral_bytes(&picked)
+            }
+            _ => vertices.iter().map(|&v| self.get(v as usize)).collect(),
+        }
+    }
+
     /// Returns all normals, as [`StoredNormals::get`] does.
     pub fn iter(&self) -> impl Iterator<Item = [f32; 3]> {
         (0..self.count()).map(|v| self.get(v))
     }
+}
+
+#[inline(always)]
+fn of_bytes([x, y, z, _]: [i8; 4]) -> [f32; 3] {
+    [x, y, z].map(|v| f32::from(v) / 127.0)
+}
+
+#[multiversion(targets("x86_64+avx2"))]
+fn from_octahedral_bytes(stored: &[[i8; 4]]) -> Vec<[f32; 3]> {
+    stored.iter().map(|&normal| of_bytes(from_octahedral(normal))).collect()
 }
 
 /// Normals are the same if viewers see the same, in whichever form they are stored.

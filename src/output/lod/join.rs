@@ -4,6 +4,8 @@ use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 use std::ops::Range;
 
+use multiversion::multiversion;
+
 use crate::output::attributes::{AttributeChoice, PointAttributes};
 use crate::output::frame::Frame;
 use crate::output::gltf::read::{TileFile, TilePart};
@@ -181,10 +183,6 @@ impl Joined {
     fn dressed(&self, tile: Tile, vertices: &[u32]) -> Tile {
         let origins = self.origins(vertices);
         let all_have = |has: fn(&TilePart) -> bool| self.parts.iter().all(has);
-        let normal = |&[part, v]: &[usize; 2]| {
-            let part = &self.parts[part];
-            part.normals.as_ref().map(|normals| unscaled_normal(normals.get(v), part.scale))
-        };
         let color = |&[part, v]: &[usize; 2]| {
             let [red, green, blue, _] = self.parts[part].colors.as_ref()?[v];
             Some([red, green, blue])
@@ -195,11 +193,23 @@ impl Joined {
         });
         origins.iter().for_each(|&[part, v]| attributes.push_from(&self.parts[part].attributes, v));
         Tile {
-            normals: all_have(|part| part.normals.is_some()).then(|| origins.iter().filter_map(normal).collect()),
+            normals: self.normals(&origins),
             colors: all_have(|part| part.colors.is_some()).then(|| origins.iter().filter_map(color).collect()),
             attributes,
             ..tile
         }
+    }
+
+    /// Returns the unit normals of vertices by their ascending origins, if all tiles have normals.
+    fn normals(&self, origins: &[[usize; 2]]) -> Option<Vec<[f32; 3]>> {
+        let mut all =
+            self.parts.iter().all(|part| part.normals.is_some()).then(|| Vec::with_capacity(origins.len()))?;
+        for of_part in origins.chunk_by(|a, b| a[0] == b[0]) {
+            let part = &self.parts[of_part[0][0]];
+            let vertices: Vec<u32> = of_part.iter().map(|origin| origin[1] as u32).collect();
+            append_unscaled(&part.normals.as_ref()?.pick(&vertices), part.scale, &mut all);
+        }
+        Some(all)
     }
 
     /// Returns the whole mesh as a tile.
@@ -210,11 +220,14 @@ impl Joined {
     }
 }
 
-/// Returns the unit normal (x east, y north, z up) for the normal of a mesh that its node stretches by `scale`.
-fn unscaled_normal(normal: [f32; 3], scale: [f64; 3]) -> [f32; 3] {
-    let [x, up, z] = [0, 1, 2].map(|k| normal[k] as f64 / scale[k]);
-    let length = (x * x + up * up + z * z).sqrt();
-    if length > 0.0 { [x / length, -z / length, up / length].map(|v| v as f32) } else { [0.0, 0.0, 1.0] }
+/// Appends the unit normals (x east, y north, z up) for the `normals` of a mesh that its node stretches by `scale`.
+#[multiversion(targets("x86_64+avx2"))]
+fn append_unscaled(normals: &[[f32; 3]], scale: [f64; 3], all: &mut Vec<[f32; 3]>) {
+    all.extend(normals.iter().map(|normal| {
+        let [x, up, z] = [0, 1, 2].map(|k| normal[k] as f64 / scale[k]);
+        let length = (x * x + up * up + z * z).sqrt();
+        if length > 0.0 { [x / length, -z / length, up / length].map(|v| v as f32) } else { [0.0, 0.0, 1.0] }
+    }));
 }
 
 /// A multiplication: the sites of a mesh need to be spread, not protected.

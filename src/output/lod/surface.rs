@@ -15,17 +15,20 @@ pub(crate) fn smoothed(positions: &[[i32; 3]], triangles: &[[u32; 3]], fixed: &[
     let own = |p: &[i32; 3]| Mean { sum: 4 * p[2] as i64, count: 4 };
     let mut means: Vec<Mean> = positions.iter().step_by(every).map(own).collect();
     let height = |v: u32| positions[v as usize][2] as i64;
-    let mut wanted = [[0; 3]; 3 * AT_ONCE];
+    // The number of a triangle, times four, and of its corner.
+    let mut wanted = [0u32; 3 * AT_ONCE];
     for triangles in triangles.chunks(AT_ONCE) {
         // A branch for each corner would often be foretold wrongly.
         let mut count = 0;
-        for &[a, b, c] in triangles {
-            for corner in [[a, b, c], [b, c, a], [c, a, b]] {
+        for (at, corners) in (0..).step_by(4).zip(triangles) {
+            for (corner, &v) in (at..).zip(corners) {
                 wanted[count] = corner;
-                count += usize::from((corner[0] as usize).is_multiple_of(every));
+                count += usize::from((v as usize).is_multiple_of(every));
             }
         }
-        for &[v, to, from] in &wanted[..count] {
+        for &corner in &wanted[..count] {
+            let [a, b, c] = triangles[corner as usize / 4];
+            let [v, to, from] = [[a, b, c], [b, c, a], [c, a, b]][corner as usize % 4];
             means[v as usize / every].add(height(to) + height(from), 2);
         }
     }
