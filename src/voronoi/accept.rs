@@ -29,6 +29,7 @@ use crate::voronoi::closed_mesh::ClosedMesh;
 use crate::voronoi::edge_tester::EdgeTester;
 use crate::voronoi::index::{ClosedEdge, VertexIndex};
 use crate::voronoi::rejection::Rejection;
+use multiversion::multiversion;
 
 /// Buffers of the check.
 #[derive(Default)]
@@ -50,25 +51,14 @@ impl AcceptanceCheck {
         order: Option<&[SiteIndex]>,
         mesh: &mut HalfEdgeMesh,
     ) -> Result<(), Rejection> {
-        let (n, front, records) = (sites.len(), closed.front().get(), closed.records());
-        let triangles = (records.len() - front) / 8;
+        let n = sites.len();
+        let triangles = (closed.records().len() - closed.front().get()) / 8;
         self.used.clear();
         self.used.resize(n, false);
         self.hull.clear();
         mesh.triangles.resize(triangles, [SiteIndex::default(); 3]);
         mesh.twins.resize(3 * triangles, HalfEdgeIndex::HULL);
-        let mut links = 0;
-        for start in (front..records.len()).step_by(EdgeTester::BLOCK) {
-            let end = records.len().min(start + EdgeTester::BLOCK);
-            let first = (start - front) / 8;
-            let (block, triangles) = (&records[start..end], &mut mesh.triangles[first..]);
-            match order.map(|order| &order[..n]) {
-                Some(order) => self.write_triangles(block, sites, |v| order[v], triangles)?,
-                None => self.write_triangles(block, sites, SiteIndex::new, triangles)?,
-            }
-            self.write_twins(&records[start..end], front as u32, &mut mesh.twins[3 * first..]);
-            links += self.check_edges(closed, sites, start, end)?;
-        }
+        let links = check_blocks(self, closed, sites, order, mesh)?;
         if 2 * links + self.hull.len() != 3 * triangles {
             return Err(Rejection::NotAccepted("twins do not fit"));
         }
@@ -109,6 +99,7 @@ impl AcceptanceCheck {
     }
 
     /// Numbers the twins as in a half-edge mesh, and notes the hull for point 3.
+    #[inline(always)]
     fn write_twins(&mut self, block: &[u32], front: u32, twins: &mut [HalfEdgeIndex]) {
         for (record, twins) in block.as_chunks::<8>().0.iter().zip(twins.as_chunks_mut::<3>().0) {
             for i in 0..3 {
@@ -124,6 +115,7 @@ impl AcceptanceCheck {
 
     /// Checks points 2 and 5 for the edges of a block; returns the number of pairs of twins. Every pair is found once, from its
     /// greater half-edge. So all half-edges are paired if there are half as many pairs as half-edges.
+    #[inline(always)]
     fn check_edges(
         &mut self,
         closed: &ClosedMesh,
@@ -175,6 +167,32 @@ impl AcceptanceCheck {
             false => Err(rejection),
         }
     }
+}
+
+/// Checks points 1, 2 and 5, a block of triangles at a time, and writes the triangles to `mesh`. Returns the number of pairs of twins.
+// With the instructions of today's processors this takes less time.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn check_blocks(
+    check: &mut AcceptanceCheck,
+    closed: &ClosedMesh,
+    sites: &[Site],
+    order: Option<&[SiteIndex]>,
+    mesh: &mut HalfEdgeMesh,
+) -> Result<usize, Rejection> {
+    let (front, records) = (closed.front().get(), closed.records());
+    let mut links = 0;
+    for start in (front..records.len()).step_by(EdgeTester::BLOCK) {
+        let end = records.len().min(start + EdgeTester::BLOCK);
+        let first = (start - front) / 8;
+        let (block, triangles) = (&records[start..end], &mut mesh.triangles[first..]);
+        match order.map(|order| &order[..sites.len()]) {
+            Some(order) => check.write_triangles(block, sites, |v| order[v], triangles)?,
+            None => check.write_triangles(block, sites, SiteIndex::new, triangles)?,
+        }
+        check.write_twins(block, front as u32, &mut mesh.twins[3 * first..]);
+        links += check.check_edges(closed, sites, start, end)?;
+    }
+    Ok(links)
 }
 
 /// Returns whether the path p, q, r turns left or continues straight ahead.

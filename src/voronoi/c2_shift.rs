@@ -39,6 +39,7 @@ impl ShiftRepair {
 
     /// Tests the triangles from record `start` on, and their edges to triangles before them, at the true places of `sites`. Unless
     /// `all`, it tests whole blocks only. Returns the first record that was not tested.
+    #[inline(always)]
     pub(super) fn test(
         &mut self,
         mesh: &ClosedMesh,
@@ -55,8 +56,8 @@ impl ShiftRepair {
             let triangles = (start as u32..).step_by(8).map(ClosedEdge).zip(records[start..end].as_chunks::<8>().0);
             for ((t, record), fetched) in triangles.zip(&mut self.tester.corners) {
                 let [a, b, c, ..] = *record;
-                *fetched = [a, b, c].map(|v| sites[v as usize]);
-                let [p, q, r] = *fetched;
+                let (p, q, r) = (sites[a as usize], sites[b as usize], sites[c as usize]);
+                *fetched = [p, q, r];
                 // The scan leaves no record free.
                 if orient2d(p, q, r) <= 0 && a.max(b).max(c) != infinity {
                     self.inverted.push(t);

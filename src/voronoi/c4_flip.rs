@@ -40,6 +40,7 @@ impl FlipQueue {
 
     /// Flips what can be flipped during the scan, while sites are not yet at their true places: only edges whose two triangles are
     /// counterclockwise afterwards. The others wait in `later`.
+    #[inline(always)]
     pub(super) fn run_early(&mut self, mesh: &mut ClosedMesh, sites: &[Site]) -> Result<(), Rejection> {
         while let Some(h) = self.suspects.pop() {
             let g = mesh.twin(h);
@@ -63,8 +64,14 @@ impl FlipQueue {
     #[inline(always)]
     fn suspect_outline(&mut self, mesh: &ClosedMesh, sites: &[Site], h: ClosedEdge, g: ClosedEdge) {
         let outline = [h, h.previous(), g, g.previous()];
-        let [t, u] = [h, g].map(|side| mesh.triangle_sites(sites, side));
-        let beyond = outline.map(|side| mesh.site_beyond(sites, side));
+        let (t, u) = (mesh.triangle_sites(sites, h), mesh.triangle_sites(sites, g));
+        let [i, j, k, l] = outline;
+        let beyond = [
+            mesh.site_beyond(sites, i),
+            mesh.site_beyond(sites, j),
+            mesh.site_beyond(sites, k),
+            mesh.site_beyond(sites, l),
+        ];
         let doubtful = four_inside_or_in_doubt([t, t, u, u], beyond);
         let mut found = [ClosedEdge::default(); 4];
         let mut count = 0;

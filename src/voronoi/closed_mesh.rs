@@ -287,14 +287,16 @@ impl ClosedMesh {
     /// Returns whether both triangles are counterclockwise after a flip of edge `h` between two finite triangles.
     #[inline(always)]
     pub(super) fn is_convex(&self, sites: &[Site], h: ClosedEdge) -> bool {
-        let [u, v, w, z] = self.quadrilateral(h).map(|vertex| vertex.site(sites));
+        let [u, v, w, z] = self.quadrilateral(h);
+        let (u, v, w, z) = (u.site(sites), v.site(sites), w.site(sites), z.site(sites));
         orient2d(z, w, u) > 0 && orient2d(w, z, v) > 0
     }
 
     /// Returns the sites of the triangle of `h`.
     #[inline(always)]
     pub(super) fn triangle_sites(&self, sites: &[Site], h: ClosedEdge) -> [Site; 3] {
-        h.triangle().sides().map(|side| self.origin(side).site(sites))
+        let t = h.triangle();
+        [self.origin(t).site(sites), self.origin(t.side(1)).site(sites), self.origin(t.side(2)).site(sites)]
     }
 
     /// Returns the site opposite to edge `h` in the triangle beyond it. If that is a slot, it returns any site.

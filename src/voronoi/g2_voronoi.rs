@@ -71,6 +71,7 @@ impl LabelRows {
     }
 
     /// Writes the labels of row `y` to `labels[1..=width]`. Callers must ask for the rows in order.
+    #[inline(always)]
     pub(super) fn row(&mut self, texture: &SiteTexture, y: usize, labels: &mut [VertexIndex]) {
         let occupied = &texture.occupied[y * texture.words..][..texture.words];
         grow(&mut self.south, occupied);
@@ -157,6 +158,7 @@ impl Parabola {
 }
 
 /// Moves distances to the nearest occupied pixel on one side by one row.
+#[inline(always)]
 fn grow(distances: &mut [u8], occupied: &[u64]) {
     for distance in distances.iter_mut() {
         *distance = distance.saturating_add(1);
@@ -176,6 +178,7 @@ fn for_each_bit(words: &[u64], mut f: impl FnMut(usize)) {
 }
 
 /// Computes the key of the nearer of the two sites of each column. At the same distance, the southern one wins.
+#[inline(always)]
 fn column_keys(south: &[u8], north: &[u8], keys: &mut [i16]) {
     for ((key, &south), &north) in keys.iter_mut().zip(south).zip(north) {
         let distance = south.min(north).min(8) as i16;
@@ -186,6 +189,7 @@ fn column_keys(south: &[u8], north: &[u8], keys: &mut [i16]) {
 
 /// Finds the pixels of the sites that the keys of row `y` tell, in a texture whose rows have `words` words. Where a key is far, the result
 /// is arbitrary.
+#[inline(always)]
 fn nearest_pixels(keys: &[i16], words: usize, y: usize, nearest: &mut [u32]) {
     let first = (64 * words * y) as u32;
     let origin = first.wrapping_sub((8 * 64 * words + 8) as u32);
@@ -198,6 +202,7 @@ fn nearest_pixels(keys: &[i16], words: usize, y: usize, nearest: &mut [u32]) {
 }
 
 /// Computes the least key of every pixel over the columns within reach; returns whether any of the first `width` pixels has none.
+#[inline(always)]
 fn nearest_keys(columns: &[i16], keys: &mut [i16], width: usize) -> bool {
     let (whole, rest) = (width / BLOCK, width % BLOCK);
     let mut far = false;

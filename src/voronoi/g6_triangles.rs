@@ -23,6 +23,7 @@ use crate::voronoi::g1_write_sites::SiteTexture;
 use crate::voronoi::g2_voronoi::LabelRows;
 use crate::voronoi::index::{ClosedEdge, VertexIndex};
 use crate::voronoi::rejection::Rejection;
+use multiversion::multiversion;
 use std::hint::select_unpredictable;
 
 /// Buffers of the scan.
@@ -70,19 +71,7 @@ impl TextureScan {
             walls.resize(words + 1, 0);
         }
         self.starts.clear();
-        let mut tested = mesh.front().get();
-        for y in 0..=texture.height {
-            if y < texture.height {
-                labels.row(texture, y, &mut self.north);
-            } else {
-                self.north.fill(infinity);
-            }
-            self.scan_row(&texture.sites, mesh, &mut flips.suspects);
-            tested = shift.test(mesh, &texture.sites, tested, y == texture.height, &mut flips.suspects);
-            flips.run_early(mesh, &texture.sites)?;
-            std::mem::swap(&mut self.south, &mut self.north);
-            std::mem::swap(&mut self.south_walls, &mut self.north_walls);
-        }
+        scan_rows(self, texture, labels, mesh, shift, flips)?;
         std::mem::swap(&mut flips.later, &mut shift.suspects);
         Ok(())
     }
@@ -98,6 +87,7 @@ impl TextureScan {
     }
 
     /// Visits the corners between two rows. To the west of corner x lies pixel x - 1, which has index x in a row.
+    #[inline(always)]
     fn scan_row(&mut self, sites: &[Site], mesh: &mut ClosedMesh, suspects: &mut Vec<ClosedEdge>) {
         let words = self.floors.len() - 1;
         for word in 0..words {
@@ -127,7 +117,9 @@ impl TextureScan {
     /// Returns the labels south and north of the corners of a word.
     #[inline(always)]
     fn labels(&self, word: usize) -> [&[VertexIndex; 65]; 2] {
-        [&self.south, &self.north].map(|row| row[word * 64..].first_chunk().expect("rows are whole words and one more"))
+        const WHOLE: &str = "rows are whole words and one more";
+        let (south, north) = (self.south[word * 64..].first_chunk(), self.north[word * 64..].first_chunk());
+        [south.expect(WHOLE), north.expect(WHOLE)]
     }
 
     /// Makes the triangles of the corners with three arms in a word, and links them to the south and the north.
@@ -227,6 +219,33 @@ impl TextureScan {
         }
         writer.twin(EAST)
     }
+}
+
+/// Scans all rows, and tests and flips what they make.
+// With the instructions of today's processors this takes 5 % less time.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn scan_rows(
+    scan: &mut TextureScan,
+    texture: &SiteTexture,
+    labels: &mut LabelRows,
+    mesh: &mut ClosedMesh,
+    shift: &mut ShiftRepair,
+    flips: &mut FlipQueue,
+) -> Result<(), Rejection> {
+    let mut tested = mesh.front().get();
+    for y in 0..=texture.height {
+        if y < texture.height {
+            labels.row(texture, y, &mut scan.north);
+        } else {
+            scan.north.fill(mesh.infinity());
+        }
+        scan.scan_row(&texture.sites, mesh, &mut flips.suspects);
+        tested = shift.test(mesh, &texture.sites, tested, y == texture.height, &mut flips.suspects);
+        flips.run_early(mesh, &texture.sites)?;
+        std::mem::swap(&mut scan.south, &mut scan.north);
+        std::mem::swap(&mut scan.south_walls, &mut scan.north_walls);
+    }
+    Ok(())
 }
 
 /// The arms of 64 corners: bit i of a word says whether corner i has an arm in that direction.
