@@ -102,8 +102,8 @@ impl TextureScan {
             self.starts.push(writer.end());
             let arms = self.arms(word);
             let first = writer.end();
-            self.add_triangles(word, arms, &mut writer);
-            open = self.join_arms(word, arms, first, open, sites, &mut writer, suspects);
+            self.add_triangles(arms, &mut writer);
+            open = self.join_arms(arms, first, open, sites, &mut writer, suspects);
         }
     }
 
@@ -111,26 +111,20 @@ impl TextureScan {
     fn arms(&self, word: usize) -> Arms {
         let west = self.floors[word];
         let east = west >> 1 | self.floors[word + 1] << 63;
-        Arms { west, south: self.south_walls[word], east, north: self.north_walls[word] }
-    }
-
-    /// Returns the labels south and north of the corners of a word.
-    #[inline(always)]
-    fn labels(&self, word: usize) -> [&[VertexIndex; 65]; 2] {
-        const WHOLE: &str = "rows are whole words and one more";
-        let (south, north) = (self.south[word * 64..].first_chunk(), self.north[word * 64..].first_chunk());
-        [south.expect(WHOLE), north.expect(WHOLE)]
+        Arms { first: word * 64, west, south: self.south_walls[word], east, north: self.north_walls[word] }
     }
 
     /// Makes the triangles of the corners with three arms in a word, and links them to the south and the north.
     #[inline(always)]
-    fn add_triangles(&self, word: usize, arms: Arms, writer: &mut TriangleWriter) {
-        let [south_row, north_row] = self.labels(word);
+    fn add_triangles(&self, arms: Arms, writer: &mut TriangleWriter) {
+        // Rows are whole words and one label more. Arrays of one length need no bounds checks.
+        let labels = [&self.south, &self.north].map(|row| row[arms.first..].first_chunk::<65>());
+        let [Some(south_row), Some(north_row)] = labels else { return };
         let mut corners = arms.three();
         // All shapes are treated alike, because no processor can predict which shape comes next.
         while corners != 0 {
             let bit = corners.trailing_zeros();
-            let (i, column) = (bit as usize % 64, column(word * 64 + bit as usize));
+            let (i, column) = (bit as usize % 64, column(arms.first + bit as usize));
             let (west, south) = (arms.west >> bit & 1, arms.south >> bit & 1 != 0);
             let (sw, se, ne, nw) = (south_row[i], south_row[i + 1], north_row[i + 1], north_row[i]);
             let (b, c) = (select_unpredictable(south, se, ne), select_unpredictable(west != 0, nw, ne));
@@ -149,7 +143,6 @@ impl TextureScan {
     #[inline(always)]
     fn join_arms(
         &self,
-        word: usize,
         arms: Arms,
         mut t: ClosedEdge,
         mut open: ClosedEdge,
@@ -164,7 +157,7 @@ impl TextureScan {
         while corners != 0 {
             let bit = corners.trailing_zeros();
             corners &= corners - 1;
-            let x = word * 64 + bit as usize;
+            let x = arms.first + bit as usize;
             if four >> bit & 1 != 0 {
                 open = self.four_arms(x, open, sites, writer, suspects);
                 continue;
@@ -248,9 +241,10 @@ fn scan_rows(
     Ok(())
 }
 
-/// The arms of 64 corners: bit i of a word says whether corner i has an arm in that direction.
+/// The arms of 64 corners: bit i of a word says whether the corner `first + i` has an arm in that direction.
 #[derive(Clone, Copy)]
 struct Arms {
+    first: usize,
     west: u64,
     south: u64,
     east: u64,

@@ -135,7 +135,7 @@ impl Joined {
         }
         let start = self.positions.len() as u32;
         let on_border = &on_border[vertices.clone()];
-        numbers.extend((start..).zip(on_border).map(|(number, on)| number | u32::from(*on) * ON_BORDER));
+        numbers.extend((start..).zip(on_border).map(|(number, on)| number | (u32::from(*on) * ON_BORDER)));
         self.runs.push(Run { start, part, first: vertices.start as u32 });
         self.positions.extend_from_slice(&points[vertices]);
         self.on_border.extend_from_slice(on_border);
