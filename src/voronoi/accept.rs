@@ -57,8 +57,9 @@ impl AcceptanceCheck {
         self.used.resize(n, false);
         self.hull.clear();
         mesh.triangles.resize(triangles, [SiteIndex::default(); 3]);
-        mesh.twins.resize(3 * triangles, HalfEdgeIndex::HULL);
+        mesh.twins.resize(3 * triangles + 1, HalfEdgeIndex::HULL);
         let links = check_blocks(self, closed, sites, order, mesh)?;
+        mesh.twins.truncate(3 * triangles);
         if 2 * links + self.hull.len() != 3 * triangles {
             return Err(Rejection::NotAccepted("twins do not fit"));
         }
@@ -98,18 +99,30 @@ impl AcceptanceCheck {
         }
     }
 
-    /// Numbers the twins as in a half-edge mesh, and notes the hull for point 3.
+    /// Numbers the twins as in a half-edge mesh, and notes the hull for point 3. One more number than there are twins is written.
     #[inline(always)]
     fn write_twins(&mut self, block: &[u32], front: u32, twins: &mut [HalfEdgeIndex]) {
-        for (record, twins) in block.as_chunks::<8>().0.iter().zip(twins.as_chunks_mut::<3>().0) {
-            for i in 0..3 {
-                let g = record[4 + i];
-                twins[i] = HalfEdgeIndex((g.wrapping_sub(front) >> 3).wrapping_mul(3).wrapping_add(g & 7));
-                if g == ClosedEdge::OUTSIDE.0 {
-                    twins[i] = HalfEdgeIndex::HULL;
-                    self.hull.push([record[i], record[(i + 1) % 3]].map(VertexIndex));
-                }
+        for (t, record) in block.as_chunks::<8>().0.iter().enumerate() {
+            // Four numbers, of which the next triangle overwrites the last, are computed at once.
+            let twins = &mut twins[3 * t..3 * t + 4];
+            let mut numbers = [HalfEdgeIndex::HULL; 4];
+            for (number, &g) in numbers.iter_mut().zip(&record[4..]) {
+                // Three times the number of the triangle, and the corner.
+                let eight = g.wrapping_sub(front) & !7;
+                *number = HalfEdgeIndex((eight >> 2).wrapping_add(eight >> 3).wrapping_add(g & 7));
             }
+            twins.copy_from_slice(&numbers);
+            if record[4].max(record[5]).max(record[6]) == ClosedEdge::OUTSIDE.0 {
+                self.write_hull(record, twins);
+            }
+        }
+    }
+
+    #[cold]
+    fn write_hull(&mut self, record: &[u32; 8], twins: &mut [HalfEdgeIndex]) {
+        for i in (0..3).filter(|&i| record[4 + i] == ClosedEdge::OUTSIDE.0) {
+            twins[i] = HalfEdgeIndex::HULL;
+            self.hull.push([record[i], record[(i + 1) % 3]].map(VertexIndex));
         }
     }
 

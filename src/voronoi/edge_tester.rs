@@ -60,6 +60,7 @@ impl EdgeTester {
         let records = mesh.records().as_chunks::<8>().0;
         let block = &records[start / 8..end / 8];
         let mut links = LinkCheck { count: self.list(block, start as u32, mesh.front().0), broken: false };
+        let mut wrong = 0;
         for (lane, &h) in self.edges[..links.count].iter().enumerate() {
             let t = (h.get() - start) / 8;
             let near = &block[t];
@@ -71,7 +72,7 @@ impl EdgeTester {
             if CHECK {
                 let there = near[h.corner()] ^ far[g.next().corner()];
                 let back = near[h.next().corner()] ^ far[g.corner()];
-                links.broken |= (there | back | (far[4 + g.corner()] ^ h.0) | u32::from(g.0 & 7 > 2)) != 0;
+                wrong |= there | back | (far[4 + g.corner()] ^ h.0) | u32::from(g.0 & 7 > 2);
             }
             let Some(&d) = sites.get(far[g.previous().corner()] as usize) else {
                 links.broken = true;
@@ -80,6 +81,7 @@ impl EdgeTester {
             let [a, b, c] = self.corners[t % EdgeTester::ROOM];
             self.batch.set(lane % InCircleBatch::LANES, a, b, c, d);
         }
+        links.broken |= wrong != 0;
         let doubtful = self.batch.inside_or_in_doubt(links.count);
         // Branch-free: about one edge in seven fails, and which one is unpredictable.
         let mut found = 0;
