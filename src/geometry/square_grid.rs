@@ -82,7 +82,9 @@ mod tests {
     fn points_outside_are_in_the_outermost_cells() {
         let grid = SquareGrid::new(Bounds { min: [10, 20], max: [29, 29] }, 7.5, 100.0);
         assert_eq!((grid.columns(), grid.cells()), (3, 6));
-        assert_eq!((grid.cell(-5, -5), grid.cell(99, 99)), (0, 5));
+        let points = [[-5, -5, 0], [99, 99, 0], [17, 21, 9], [18, 21, 9]];
+        assert_eq!(points.map(|[x, y, _]| grid.cell(x, y)), [0, 5, 0, 1]);
+        assert_eq!(grid.cells_of(&points), [0, 5, 0, 1]);
         assert_eq!(SquareGrid::new(Bounds { min: [0, 0], max: [999, 0] }, 1.0, 10.0).cells(), 10);
     }
 }

@@ -25,8 +25,8 @@ pub(crate) struct Filling<'a> {
 }
 
 impl<'a> Filling<'a> {
-    /// Triangulates those vertices of `terrain` that are `kept`, among them all ends of the `boundary`, which has the terrain on its left. The
-    /// vertices that are `moved` have another height.
+    /// Triangulates those vertices of `terrain` that are `kept`, among them all ends of the `boundary`, which has the terrain on its
+    /// left. The vertices that are `moved` have another height.
     ///
     /// # Errors
     /// [`Error::Broken`] if the boundary is not that of a part of a Delaunay triangulation, [`Error::Interrupted`].
@@ -68,8 +68,8 @@ impl<'a> Filling<'a> {
         locate(&self.mesh, &self.sites, start, plane(self.terrain[v as usize]), steps)
     }
 
-    /// Takes in vertex `v`, which the mesh does not have, at this `height`, and looks for its place from triangle `start` on. It leaves the vertex
-    /// out if that takes more than `steps`.
+    /// Takes in vertex `v`, which the mesh does not have, at this `height`, and looks for its place from triangle `start` on. It leaves
+    /// the vertex out if that takes more than `steps`.
     pub(crate) fn insert(&mut self, v: u32, height: i32, start: usize, steps: &mut u64) {
         let Some(triangle) = self.locate(v, start, steps).filter(|&triangle| self.within[triangle]) else { return };
         let [x, y, _] = self.terrain[v as usize];

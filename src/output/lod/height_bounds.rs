@@ -1,5 +1,5 @@
-//! The least and greatest height of a terrain around each cell of a grid. They bound how far a simplified triangle can be from the terrain, and
-//! the cells tell which triangles of the terrain are near it.
+//! The least and greatest height of a terrain around each cell of a grid. They bound how far a simplified triangle can be from the
+//! terrain, and the cells tell which triangles of the terrain are near it.
 //!
 //! Nearly all triangles of a terrain are narrower than a cell. So a place has its height from vertices in its own cell and the eight cells
 //! around it, and the heights of vertices are enough: no triangle must be drawn into cells. The few wide triangles are, each by itself.
@@ -115,8 +115,8 @@ impl HeightBounds {
         }
     }
 
-    /// Adds to the range of each cell those of the cells around it, where the corners of its triangles may be, and the same for the cells in
-    /// the next column and the next row.
+    /// Adds to the range of each cell those of the cells around it, where the corners of its triangles may be, and the same for the cells
+    /// in the next column and the next row.
     fn spread(&mut self) {
         let [columns, rows] = self.cells.lines();
         (0..rows).for_each(|row| spread_along(&mut self.ranges[row * columns..(row + 1) * columns], 1));

@@ -75,8 +75,8 @@ impl<'a> Joining<'a> {
         Joining { frame, joined, vertex_at: VertexAt::default() }
     }
 
-    /// Joins a tile. A vertex that it shares with an earlier one keeps the normal, the colour and the attributes of that one. Vertices are in
-    /// the order of the tiles.
+    /// Joins a tile. A vertex that it shares with an earlier one keeps the normal, the colour and the attributes of that one. Vertices
+    /// are in the order of the tiles.
     ///
     /// # Errors
     /// [`VertexOffLattice`] if a vertex is not on the lattice.
@@ -103,8 +103,8 @@ impl<'a> Joining<'a> {
 }
 
 impl Joined {
-    /// Appends the vertices of part `part` at these lattice points, but for those that are there already. Returns the number of each, with a
-    /// mark if it is on the border of the part.
+    /// Appends the vertices of part `part` at these lattice points, but for those that are there already. Returns the number of each,
+    /// with a mark if it is on the border of the part.
     fn append(&mut self, part: u32, points: &[[i32; 3]], on_border: &[bool], vertex_at: &mut VertexAt) -> Vec<u32> {
         let mut numbers = Vec::with_capacity(points.len());
         // Nearly all vertices are new, and many follow each other without one that is not.

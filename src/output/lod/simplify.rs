@@ -145,8 +145,8 @@ impl Boundary {
     }
 }
 
-/// Keeps one vertex of `positions` in each cell of a grid with about `cells` cells within `bounds`: the one nearest to the height that is seen in the
-/// cell. Returns the side of a cell in lattice steps, and the vertices that were not `kept` already with that height.
+/// Keeps one vertex of `positions` in each cell of a grid with about `cells` cells within `bounds`: the one nearest to the height that
+/// is seen in the cell. Returns the side of a cell in lattice steps, and the vertices that were not `kept` already with that height.
 fn keep_by_grid(
     positions: &[[i32; 3]],
     bounds: Bounds<2>,

@@ -1,8 +1,9 @@
 //! The vertical distance between a simplified terrain and the one that it was made of: the greatest value over all of the ground, not
 //! a sample.
 //!
-//! The simplified terrain has some vertices of the other, but their heights may differ. Both terrains are linear over every triangle. So their difference is linear over every piece that the two sets of edges together
-//! cut the ground into, and it is greatest at a corner of such a piece. A corner is a vertex of the fine mesh (the vertices of the
+//! The simplified terrain has some vertices of the other, but their heights may differ. Both terrains are linear over every triangle.
+//! So their difference is linear over every piece that the two sets of edges together cut the ground into, and it is greatest at a
+//! corner of such a piece. A corner is a vertex of the fine mesh (the vertices of the
 //! coarse mesh are among them), or a place where a fine and a coarse edge cross. `FineMesh` finds the crossings by walking along a
 //! coarse edge through the fine mesh, and `VertexCells` finds the fine vertices in a coarse triangle. `HeightBounds` bounds the
 //! error of a coarse triangle in advance, so that few triangles need this.
@@ -26,7 +27,8 @@ const MEASURED_FIRST: usize = 1024;
 const LOST: f64 = 1.0 / (1u64 << 48) as f64;
 
 /// Returns the greatest vertical distance in steps of z between two terrains. It is never too small. The triangles `fine` are between
-/// `positions` (lattice x, y, z), and those of `coarse` between some of them, with other heights within the same range. Both terrains must cover the same ground once, with counterclockwise triangles.
+/// `positions` (lattice x, y, z), and those of `coarse` between some of them, with other heights within the same range. Both terrains
+/// must cover the same ground once, with counterclockwise triangles.
 pub fn vertical_error(positions: &[[i32; 3]], fine: &[[u32; 3]], coarse: &CoarseMesh) -> f64 {
     let heights = HeightBounds::new(positions, fine);
     let corners = |triangle: &[u32; 3]| triangle.map(|v| coarse.positions[v as usize]);
