@@ -4,9 +4,10 @@
 //! Between any two pixels of different colours runs a piece of a Voronoi edge: an *arm* of the corners at both its ends. A corner
 //! with two arms is a bend of an edge. A corner with three arms is a Voronoi vertex, that is, a triangle, and each half-edge of the
 //! triangle crosses one arm. The scan meets the corners row by row from the south, and each row from the west. It keeps the end of
-//! every open edge in a slot: one slot per column for the arm that goes north from there, and one for the arm that goes east. A slot
-//! is a half-edge like those of triangles, and its twin is the other end of the Voronoi edge, which may be a slot too. So following
-//! an edge, joining two ends and linking two triangles are all the same two writes.
+//! every open edge in a slot: one slot per column for the arm that goes north from there. A slot is a half-edge like those of
+//! triangles, and its twin is the other end of the Voronoi edge, which may be a slot too. So following an edge, joining two ends and
+//! linking two triangles are all the same two writes. The end of the one edge that goes east is at hand, and only where four arms
+//! meet is it in a slot too.
 //!
 //! The frame around the texture counts as the colour "infinity". Its triangles are the ghosts that close the sphere. Step G5's
 //! prefix sums are needed only where rows are processed in parallel.
@@ -215,7 +216,7 @@ impl TextureScan {
 }
 
 /// Scans all rows, and tests and flips what they make.
-// With the instructions of today's processors this takes 5 % less time.
+// With the instructions of today's processors this takes less time.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 fn scan_rows(
     scan: &mut TextureScan,
