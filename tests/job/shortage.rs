@@ -1,22 +1,34 @@
 //! Too little memory, at every amount: the program says so and exits with 1. It never aborts or panics.
 
 use std::path::Path;
+use std::sync::OnceLock;
 
 use crate::clouds;
 use crate::program::{Job, gdt_batch, gdt_batch_within_kib};
 
+/// Returns the KiB of address space from which on the program itself says what is wrong. With less, the system cannot load it; with a little
+/// more than that, it aborts before `main`, where the standard library wants memory.
+fn least_to_start() -> u64 {
+    let code = |kibibytes: u64| {
+        let mut command = std::process::Command::new("sh");
+        command.env("RUST_BACKTRACE", "0").arg("-c").arg(format!("ulimit -v {kibibytes} && exec \"$0\" --version"));
+        command.arg(env!("CARGO_BIN_EXE_gdt-batch")).output().unwrap().status.code()
+    };
+    let started = (20_000..).step_by(100).find(|&kibibytes| matches!(code(kibibytes), Some(0 | 1))).unwrap();
+    assert_eq!(code(started - 1_000), Some(127), "it aborts over a long range below {started} KiB");
+    started
+}
+
 /// Runs the program with more and more address space until it succeeds a few times. Returns how many runs were refused.
 #[track_caller]
 fn refused_until_it_fits(folder: &Path, arguments: &[&str], before: impl Fn()) -> usize {
-    // With less, the system cannot even map the program.
-    let (mut refused, mut fitted, mut kibibytes) = (0, 0, 34_000);
+    static LEAST: OnceLock<u64> = OnceLock::new();
+    let (mut refused, mut fitted, mut kibibytes) = (0, 0, *LEAST.get_or_init(least_to_start));
     while fitted < 3 {
         before();
         let said = gdt_batch_within_kib(kibibytes, folder, arguments);
         match said.code {
             0 => fitted += 1,
-            // The system could not even load the program.
-            127 => {}
             code => {
                 let has_words =
                     ["memory", "cannot start", "Cannot allocate"].iter().any(|word| said.err.contains(word));
