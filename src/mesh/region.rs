@@ -4,8 +4,8 @@ use crate::mesh::half_edge::HalfEdgeMesh;
 use crate::mesh::index::{HalfEdgeIndex, SiteIndex};
 use crate::{Error, Result};
 
-/// Marks the triangles of `mesh` that lie to the left of the directed edges `boundary`, which are given by their sites and go
-/// all around: those that a flood from the right of the edges does not reach without crossing one of them.
+/// Marks the triangles of `mesh` that lie to the left of the directed edges `boundary`, which are given by their sites. The edges form
+/// closed loops, so these are the triangles that a flood from the right of the edges does not reach without crossing one of them.
 ///
 /// # Errors
 /// [`Error::Broken`] if a boundary edge is missing from the mesh. This should be impossible: an edge of the triangulation of all

@@ -65,6 +65,7 @@ impl FlipQueue {
     fn suspect_outline(&mut self, mesh: &ClosedMesh, sites: &[Site], h: ClosedEdge, g: ClosedEdge) {
         let outline = [h, h.previous(), g, g.previous()];
         let (t, u) = (mesh.triangle_sites(sites, h), mesh.triangle_sites(sites, g));
+        // Written out: a map over the array would become calls.
         let [i, j, k, l] = outline;
         let beyond = [
             mesh.site_beyond(sites, i),

@@ -12,6 +12,7 @@
 use crate::geometry::Site;
 use crate::geometry::predicates::{in_circle, orient2d};
 use crate::voronoi::index::{ClosedEdge, VertexIndex};
+use crate::voronoi::triangle_writer::TriangleWriter;
 
 /// A corner in room that no triangle has used, in a slot, or in a record that [`ClosedMesh::compact`] takes away.
 const NO_CORNER: u32 = VertexIndex::NONE.0;
@@ -73,7 +74,7 @@ impl ClosedMesh {
             self.records.resize(2 * needed, NO_CORNER);
         }
         let front = self.front();
-        TriangleWriter { records: &mut self.records, end: self.end, mesh_end: &mut self.end, front }
+        TriangleWriter::new(&mut self.records, &mut self.end, front)
     }
 
     /// Returns the vertex at infinity.
@@ -378,64 +379,6 @@ impl ClosedMesh {
                 }
             }
         }
-    }
-}
-
-/// Adds triangles at the end of a closed mesh.
-pub(super) struct TriangleWriter<'a> {
-    records: &'a mut [u32],
-    /// The end of the records. A number of its own, which stays in a register.
-    end: usize,
-    mesh_end: &'a mut usize,
-    front: ClosedEdge,
-}
-
-impl Drop for TriangleWriter<'_> {
-    #[inline(always)]
-    fn drop(&mut self) {
-        *self.mesh_end = self.end;
-    }
-}
-
-impl TriangleWriter<'_> {
-    /// Returns the first half-edge of the mesh that is no slot.
-    #[inline(always)]
-    pub(super) fn front(&self) -> ClosedEdge {
-        self.front
-    }
-
-    /// Returns the first half-edge of the next triangle.
-    #[inline(always)]
-    pub(super) fn end(&self) -> ClosedEdge {
-        ClosedEdge(self.end as u32)
-    }
-
-    #[inline(always)]
-    pub(super) fn twin(&self, h: ClosedEdge) -> ClosedEdge {
-        ClosedEdge(self.records[h.get() + 4])
-    }
-
-    #[inline(always)]
-    pub(super) fn set_twin(&mut self, h: ClosedEdge, to: ClosedEdge) {
-        self.records[h.get() + 4] = to.0;
-    }
-
-    /// Makes two half-edges each other's twins.
-    #[inline(always)]
-    pub(super) fn link(&mut self, h: ClosedEdge, g: ClosedEdge) {
-        self.set_twin(h, g);
-        self.set_twin(g, h);
-    }
-
-    /// Adds a triangle whose half-edges have `twins`, which need not lead back yet; returns its first half-edge.
-    #[inline(always)]
-    pub(super) fn push(&mut self, [a, b, c]: [VertexIndex; 3], [f, g, h]: [ClosedEdge; 3]) -> ClosedEdge {
-        let t = self.end();
-        let record = &mut self.records[self.end..self.end + 8];
-        (record[0], record[1], record[2]) = (a.0, b.0, c.0);
-        (record[4], record[5], record[6]) = (f.0, g.0, h.0);
-        self.end += 8;
-        t
     }
 }
 

@@ -32,7 +32,7 @@ pub(super) struct LabelRows {
     /// One key per column, with `REACH` + 1 more on either side.
     columns: Vec<i16>,
     keys: Vec<i16>,
-    /// For the row at hand, the pixel of the nearest site of every pixel, at `stride * y + x`.
+    /// For every pixel of the row at hand, the pixel of its nearest site, as the number `stride * y + x`.
     nearest: Vec<u32>,
     envelope: Vec<Parabola>,
 }

@@ -19,11 +19,12 @@ use crate::geometry::Site;
 use crate::geometry::predicates::{in_circle, orient2d};
 use crate::voronoi::c2_shift::ShiftRepair;
 use crate::voronoi::c4_flip::FlipQueue;
-use crate::voronoi::closed_mesh::{ClosedMesh, TriangleWriter};
+use crate::voronoi::closed_mesh::ClosedMesh;
 use crate::voronoi::g1_write_sites::SiteTexture;
 use crate::voronoi::g2_voronoi::LabelRows;
 use crate::voronoi::index::{ClosedEdge, VertexIndex};
 use crate::voronoi::rejection::Rejection;
+use crate::voronoi::triangle_writer::TriangleWriter;
 use multiversion::multiversion;
 use std::hint::select_unpredictable;
 

@@ -55,6 +55,7 @@ pub(crate) mod test_cases;
 #[cfg(test)]
 mod tests;
 pub mod texture_request;
+mod triangle_writer;
 
 use crate::geometry::Site;
 use crate::mesh::half_edge::HalfEdgeMesh;
