@@ -126,7 +126,7 @@ impl SurfaceShares {
         }
         let what = match mesh {
             MeshOf::Surface(Surface::All | Surface::Ground) => {
-                "the mesh of all points has vegetation and buildings in it"
+                "the mesh of all points has vegetation or buildings in it"
             }
             MeshOf::Surface(Surface::First) => "the mesh of first returns has roofs and tree tops in it",
             MeshOf::Surface(Surface::Last) => "the mesh of last returns has buildings and dense vegetation in it",
@@ -195,7 +195,7 @@ mod tests {
             |classes: &[(u8, u64)], surface| shares(classes).sentence(MeshOf::Surface(surface)).unwrap_or_default();
         assert_eq!(
             say(&[(2, 60), (9, 2), (5, 38), (7, 1000)], Surface::All),
-            "62 % ground: the mesh of all points has vegetation and buildings in it; surface = \"ground\" makes bare earth"
+            "62 % ground: the mesh of all points has vegetation or buildings in it; surface = \"ground\" makes bare earth"
         );
         assert!(say(&[(2, 1), (6, 2)], Surface::First).contains("33 % ground: the mesh of first returns has roofs"));
         assert!(say(&[(2, 1), (6, 2)], Surface::Last).contains("last returns"));

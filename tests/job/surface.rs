@@ -106,7 +106,7 @@ fn what_the_mesh_is_stands_in_the_report_in_check_and_in_info() {
     let job = |surface: &str| Job::on(&[&las]).with("input", &format!("surface = \"{surface}\""));
     // Nine of ten are no noise, and five of them are ground.
     let all =
-        "56 % ground: the mesh of all points has vegetation and buildings in it; surface = \"ground\" makes bare earth";
+        "56 % ground: the mesh of all points has vegetation or buildings in it; surface = \"ground\" makes bare earth";
     let report = job("all").report();
     assert_eq!(said(&report), all);
     assert!(job("all").run().succeeded().out.contains(all));
