@@ -45,49 +45,128 @@ pub fn in_circle(a: Site, b: Site, c: Site, d: Site) -> bool {
 /// integers up to 2^30, so that terms that are not zero lie between 1 and 2^123.
 const IN_CIRCLE_ERROR_SINGLE: f32 = 1e-6;
 
-/// Many in-circle tests at once. They leave doubtful cases undecided, and their layout lets the compiler use vector instructions.
-pub struct InCircleBatch {
-    /// The sites a, b, c and d of each test. A site is copied whole, which takes half as long as to part its coordinates here.
-    sites: [[Site; InCircleBatch::LANES]; 4],
+/// The orientation of many triangles, and whether the site beyond each of their sides is inside their circle, all at once. Doubtful cases
+/// stay undecided. The layout lets the compiler use vector instructions.
+///
+/// All three tests of a triangle use its lifted plane (Guibas and Stolfi 1985): with `a` as the origin and `l = x^2 + y^2`, the lifted corners
+/// lie on the plane `p x + q y + o l = 0`, and `d` is outside the circle if and only if it is above the plane. `o` is the orientation.
+pub struct TriangleBatch {
+    /// The three corners of each triangle: corner `i` of triangle `t` is `corners[i][t]`. A site is copied whole, which takes half as long
+    /// as to part its coordinates here.
+    pub corners: [[Site; TriangleBatch::LANES]; 3],
+    /// The site beyond side `i` of triangle `t`, the side from corner `i` to the next.
+    pub beyond: [[Site; TriangleBatch::LANES]; 3],
 }
 
-impl Default for InCircleBatch {
+/// What a [`TriangleBatch`] leaves in doubt: bit `t` is that of triangle `t`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Doubts {
+    /// The triangles that may not be counterclockwise.
+    pub orientation: u64,
+    /// The triangles for which [`in_circle`] may be true with the site beyond side `i`.
+    pub sides: [u64; 3],
+}
+
+impl Default for TriangleBatch {
     fn default() -> Self {
-        InCircleBatch { sites: [[[0; 2]; InCircleBatch::LANES]; 4] }
+        TriangleBatch { corners: [[[0; 2]; TriangleBatch::LANES]; 3], beyond: [[[0; 2]; TriangleBatch::LANES]; 3] }
     }
 }
 
-impl InCircleBatch {
-    /// How many tests fit.
+impl TriangleBatch {
+    /// How many triangles fit.
     pub const LANES: usize = 64;
 
-    /// Sets test number `lane`: the counterclockwise triangle `abc` and `d`.
+    /// Returns what is in doubt about the first `count` triangles. A bit is never clear where [`orient2d`] is not positive, or [`in_circle`]
+    /// is true.
     #[inline(always)]
-    pub fn set(&mut self, lane: usize, a: Site, b: Site, c: Site, d: Site) {
-        let sites = &mut self.sites;
-        (sites[0][lane], sites[1][lane], sites[2][lane], sites[3][lane]) = (a, b, c, d);
-    }
-
-    /// Returns for each of the first `count` tests whether [`in_circle`] may be true. It is never false where `in_circle` is true.
-    #[inline(always)]
-    pub fn inside_or_in_doubt(&self, count: usize) -> [bool; InCircleBatch::LANES] {
-        inside_or_in_doubt(&self.sites, count)
+    pub fn doubts(&self, count: usize) -> Doubts {
+        let Doubts { orientation, sides } = doubts(self, count);
+        let all = u64::MAX >> (TriangleBatch::LANES - count.clamp(1, TriangleBatch::LANES));
+        Doubts { orientation: orientation & all, sides: sides.map(|side| side & all) }
     }
 }
 
 // As a function of its own it compiles to vector instructions. Inlined into its callers it might not.
 #[multiversion(targets("x86_64+avx2"), attrs(inline(never)))]
-fn inside_or_in_doubt(sites: &[[Site; InCircleBatch::LANES]; 4], count: usize) -> [bool; InCircleBatch::LANES] {
-    // Arrays of one constant length need no bounds checks.
-    const GROUP: usize = 16;
-    let [a, b, c, d] = sites;
-    let mut doubtful = [false; InCircleBatch::LANES];
-    for first in (0..count.min(InCircleBatch::LANES)).step_by(GROUP) {
-        for i in first..first + GROUP {
-            doubtful[i] = is_inside_or_in_doubt(a[i], b[i], c[i], d[i]);
+fn doubts(batch: &TriangleBatch, count: usize) -> Doubts {
+    // Half a word at a time, whose bits have the width of the numbers. Arrays of one constant length need no bounds checks.
+    const HALF: usize = TriangleBatch::LANES / 2;
+    let TriangleBatch { corners: [a, b, c], beyond: [d, e, f] } = batch;
+    let mut words = [0u64; 4];
+    let mut from_a = [[[0f32; HALF]; 2]; 5];
+    for first in (0..count.min(TriangleBatch::LANES)).step_by(HALF) {
+        // Coordinates are parted in a loop of their own: with them, the compiler takes half as many lanes for the rest.
+        for i in 0..HALF {
+            let t = first + i;
+            for (from_a, to) in from_a.iter_mut().zip([b[t], c[t], d[t], e[t], f[t]]) {
+                let [x, y] = difference(to, a[t]);
+                (from_a[0][i], from_a[1][i]) = (x, y);
+            }
+        }
+        let [u, v, d, e, f] = &from_a;
+        let mut halves = [0u32; 4];
+        for i in 0..HALF {
+            let at = |from_a: &[[f32; HALF]; 2]| [from_a[0][i], from_a[1][i]];
+            let plane = LiftedPlane::new(at(u), at(v));
+            halves[0] |= u32::from(!plane.is_counterclockwise()) << i as u32;
+            halves[1] |= u32::from(!plane.is_below(at(d))) << i as u32;
+            halves[2] |= u32::from(!plane.is_below(at(e))) << i as u32;
+            halves[3] |= u32::from(!plane.is_below(at(f))) << i as u32;
+        }
+        for (word, half) in words.iter_mut().zip(halves) {
+            *word |= u64::from(half) << first;
         }
     }
-    doubtful
+    let [orientation, sides @ ..] = words;
+    Doubts { orientation, sides }
+}
+
+/// Relative error of what [`LiftedPlane`] computes in single precision. With `e = 2^-24`, a difference is wrong by `e`, a lift by 4 e, a
+/// product of both by 6 e, and `p` and `q` by 7 e of the sum of the sizes of their two terms; `o` by 4 e. Times a coordinate or a lift, a
+/// term is wrong by 9 e or 10 e, and the sum of four by 13 e of the sum of all sizes. The rest is for terms of second order, and for the
+/// rounding of the error itself. Nothing overflows: differences are integers up to 2^30, and sums stay below 2^126.
+const PLANE_ERROR: f32 = 20.0 / (1 << 24) as f32;
+
+/// The plane through the lifted corners of a triangle, lowered by more than its error.
+#[derive(Clone, Copy)]
+struct LiftedPlane {
+    p: f32,
+    q: f32,
+    o: f32,
+    lowered: f32,
+    orientation: f32,
+}
+
+impl LiftedPlane {
+    #[inline(always)]
+    fn new([ux, uy]: [f32; 2], [vx, vy]: [f32; 2]) -> LiftedPlane {
+        let (ul, vl) = (ux * ux + uy * uy, vx * vx + vy * vy);
+        let (p1, p2, q1, q2, o1, o2) = (uy * vl, ul * vy, ul * vx, ux * vl, ux * vy, uy * vx);
+        // The error is that of (|p1| + |p2|) |x| + (|q1| + |q2|) |y| + (|o1| + |o2|) l, and neither |x| nor |y| is greater than
+        // (l / size + size) / 2 for any size.
+        let size = ux.abs() + uy.abs() + vx.abs() + vy.abs();
+        let linear = (0.5 * PLANE_ERROR) * (p1.abs() + p2.abs() + q1.abs() + q2.abs());
+        let orientation = (o1 - o2) - PLANE_ERROR * (o1.abs() + o2.abs());
+        LiftedPlane { p: p1 - p2, q: q1 - q2, o: orientation - linear / size, lowered: linear * size, orientation }
+    }
+
+    /// Returns whether the triangle is surely counterclockwise.
+    #[inline(always)]
+    fn is_counterclockwise(self) -> bool {
+        self.orientation > 0.0
+    }
+
+    /// Returns whether the plane is surely below the lifted `d`.
+    #[inline(always)]
+    fn is_below(self, [x, y]: [f32; 2]) -> bool {
+        self.p * x + self.q * y + self.o * (x * x + y * y) - self.lowered > 0.0
+    }
+}
+
+#[inline(always)]
+fn difference(to: Site, from: Site) -> [f32; 2] {
+    [to[0].wrapping_sub(from[0]) as f32, to[1].wrapping_sub(from[1]) as f32]
 }
 
 /// Returns for each of four counterclockwise triangles and sites whether [`in_circle`] may be true. It is never false where `in_circle` is
@@ -187,9 +266,7 @@ mod tests {
             if orient2d(a, b, c) == 0 || [c, d].iter().flatten().any(|v| v.abs() > 1 << 29) {
                 continue;
             }
-            let mut batch = InCircleBatch::default();
-            batch.set(17, a, b, c, d);
-            let doubtful = batch.inside_or_in_doubt(18)[17];
+            let doubtful = four_inside_or_in_doubt([[a, b, c]; 4], [d; 4])[1];
             let exact = in_circle_determinant(a, b, c, d);
             assert_eq!(in_circle(a, b, c, d), exact > 0 || (exact == 0 && tie(a, b, c, d)));
             assert!(doubtful || exact < 0, "{a:?} {b:?} {c:?} {d:?}");
@@ -197,6 +274,33 @@ mod tests {
             sure += !doubtful as usize;
         }
         assert!(inside > 10_000 && sure > 10_000);
+    }
+
+    fn set(batch: &mut TriangleBatch, t: usize, corners: [Site; 3], beyond: [Site; 3]) {
+        for i in 0..3 {
+            (batch.corners[i][t], batch.beyond[i][t]) = (corners[i], beyond[i]);
+        }
+    }
+
+    #[test]
+    fn a_batch_is_sure_of_most_triangles() {
+        let mut state = 9;
+        let mut sites = || -> [Site; 4] { [(); 4].map(|()| [number(&mut state, 20), number(&mut state, 20)]) };
+        let mut batch = TriangleBatch::default();
+        let mut quadrilaterals = Vec::new();
+        for t in 0..TriangleBatch::LANES {
+            let [a, mut b, mut c, d] = sites();
+            if orient2d(a, b, c) < 0 {
+                std::mem::swap(&mut b, &mut c);
+            }
+            set(&mut batch, t, [a, b, c], [d; 3]);
+            quadrilaterals.push([a, b, c, d]);
+        }
+        let doubts = batch.doubts(TriangleBatch::LANES);
+        let inside = (0..)
+            .zip(&quadrilaterals)
+            .fold(0u64, |inside, (t, &[a, b, c, d])| inside | u64::from(in_circle(a, b, c, d)) << t);
+        assert_eq!(doubts, Doubts { orientation: 0, sides: [inside; 3] });
     }
 
     /// Returns the sign of `value`.
@@ -284,9 +388,30 @@ mod tests {
             prop_assert_eq!(in_circle_determinant(a, b, c, d).signum() as i64, expected);
             if orient2d(a, b, c) > 0 && ![a, b, c].contains(&d) {
                 prop_assert_eq!(in_circle(a, b, c, d), expected > 0 || (expected == 0 && tie(a, b, c, d)));
-                let mut batch = InCircleBatch::default();
-                batch.set(0, a, b, c, d);
-                prop_assert!(batch.inside_or_in_doubt(1)[0] || expected < 0);
+                prop_assert!(four_inside_or_in_doubt([[a, b, c]; 4], [d; 4])[0] || expected < 0);
+            }
+        }
+
+        /// Every triangle is tested in any place of the batch and from all its corners, beside triangles of another kind.
+        #[test]
+        fn a_batch_leaves_in_doubt_what_may_be_wrong(
+            [a, b, c, d] in prop_oneof![random(), extreme(), near_a_line(), cocircular(), near_a_circle()],
+            [e, f, g, h] in prop_oneof![random(), extreme()],
+            place in 0..TriangleBatch::LANES,
+        ) {
+            let mut batch = TriangleBatch::default();
+            (0..TriangleBatch::LANES).for_each(|t| set(&mut batch, t, [e, f, g], [h; 3]));
+            for corners in [[a, b, c], [b, c, a], [c, a, b]] {
+                set(&mut batch, place, corners, [d, h, d]);
+                let doubts = batch.doubts(place + 1);
+                let is_doubtful = |word: u64| word >> place & 1 != 0;
+                prop_assert!(is_doubtful(doubts.orientation) || orient2d(a, b, c) > 0);
+                for (side, beyond) in doubts.sides.into_iter().zip([d, h, d]) {
+                    prop_assert!(is_doubtful(side) || robust_in_circle(a, b, c, beyond) < 0);
+                }
+                // What comes after the last triangle is not in doubt.
+                let all = doubts.sides.iter().fold(doubts.orientation, |all, side| all | side);
+                prop_assert_eq!(u128::from(all) >> (place + 1), 0);
             }
         }
 

@@ -22,11 +22,11 @@
 //! tie rule says) it is then the canonical Delaunay triangulation.
 
 use crate::geometry::Site;
-use crate::geometry::predicates::orient2d;
+use crate::geometry::predicates::{Doubts, orient2d};
 use crate::mesh::half_edge::HalfEdgeMesh;
 use crate::mesh::index::{HalfEdgeIndex, SiteIndex};
 use crate::voronoi::closed_mesh::ClosedMesh;
-use crate::voronoi::edge_tester::EdgeTester;
+use crate::voronoi::edge_tester::{Block, EdgeTester, sides};
 use crate::voronoi::index::{ClosedEdge, VertexIndex};
 use crate::voronoi::rejection::Rejection;
 use multiversion::multiversion;
@@ -38,7 +38,6 @@ pub(super) struct AcceptanceCheck {
     successor: Vec<VertexIndex>,
     hull: Vec<[VertexIndex; 2]>,
     tester: EdgeTester,
-    doubtful: Vec<ClosedEdge>,
 }
 
 impl AcceptanceCheck {
@@ -69,40 +68,36 @@ impl AcceptanceCheck {
         self.check_hull(sites)
     }
 
-    /// Checks point 1, and notes the corners for point 4.
+    /// Fetches the corners of a block of triangles and writes them. Notes them for point 4.
     #[inline(always)]
     fn write_triangles(
         &mut self,
-        block: &[u32],
+        block: &Block,
         sites: &[Site],
-        position: impl Fn(usize) -> SiteIndex,
+        order: Option<&[SiteIndex]>,
         triangles: &mut [[SiteIndex; 3]],
     ) -> Result<(), Rejection> {
         let n = sites.len();
-        let used = &mut self.used[..n];
-        let mut inverted = false;
-        let fetched = &mut self.tester.corners;
-        for ((record, triangle), fetched) in block.as_chunks::<8>().0.iter().zip(triangles).zip(fetched) {
+        let (used, order) = (&mut self.used[..n], order.map(|order| &order[..n]));
+        for (t, (record, triangle)) in block.records.iter().zip(triangles).enumerate() {
             let [a, b, c] = [record[0] as usize, record[1] as usize, record[2] as usize];
             if a >= n || b >= n || c >= n {
                 return Err(Rejection::NotAccepted("a corner is no site"));
             }
-            let [p, q, r] = [sites[a], sites[b], sites[c]];
-            *fetched = [p, q, r];
-            inverted |= orient2d(p, q, r) <= 0;
+            self.tester.set_corners(t, [sites[a], sites[b], sites[c]]);
             (used[a], used[b], used[c]) = (true, true, true);
-            *triangle = [position(a), position(b), position(c)];
+            *triangle = match order {
+                Some(order) => [order[a], order[b], order[c]],
+                None => [SiteIndex::new(a), SiteIndex::new(b), SiteIndex::new(c)],
+            };
         }
-        match inverted {
-            true => Err(Rejection::NotAccepted("a triangle is not counterclockwise")),
-            false => Ok(()),
-        }
+        Ok(())
     }
 
     /// Numbers the twins as in a half-edge mesh, and notes the hull for point 3. One more number than there are twins is written.
     #[inline(always)]
-    fn write_twins(&mut self, block: &[u32], front: u32, twins: &mut [HalfEdgeIndex]) {
-        for (t, record) in block.as_chunks::<8>().0.iter().enumerate() {
+    fn write_twins(&mut self, block: &[[u32; 8]], front: u32, twins: &mut [HalfEdgeIndex]) {
+        for (t, record) in block.iter().enumerate() {
             // Four numbers, of which the next triangle overwrites the last, are computed at once.
             let twins = &mut twins[3 * t..3 * t + 4];
             let mut numbers = [HalfEdgeIndex::HULL; 4];
@@ -126,25 +121,21 @@ impl AcceptanceCheck {
         }
     }
 
-    /// Checks points 2 and 5 for the edges of a block; returns the number of pairs of twins. Every pair is found once, from its
-    /// greater half-edge. So all half-edges are paired if there are half as many pairs as half-edges.
-    #[inline(always)]
-    fn check_edges(
-        &mut self,
-        closed: &ClosedMesh,
-        sites: &[Site],
-        start: usize,
-        end: usize,
-    ) -> Result<usize, Rejection> {
-        self.doubtful.clear();
-        let links = self.tester.test::<true>(closed, sites, start, end, &mut self.doubtful);
-        if links.broken {
-            return Err(Rejection::NotAccepted("twins do not fit"));
+    /// Decides points 1 and 5 exactly where a block from record `first` on is in doubt.
+    #[cold]
+    fn decide(closed: &ClosedMesh, sites: &[Site], first: usize, doubts: Doubts) -> Result<(), Rejection> {
+        if sides(doubts.orientation, first, 0).any(|t| {
+            let [a, b, c] = closed.triangle_sites(sites, t);
+            orient2d(a, b, c) <= 0
+        }) {
+            return Err(Rejection::NotAccepted("a triangle is not counterclockwise"));
         }
-        match self.doubtful.iter().any(|&h| closed.fails(sites, h)) {
-            true => Err(Rejection::NotAccepted("an edge is not Delaunay")),
-            false => Ok(links.count),
+        for (i, side) in doubts.sides.into_iter().enumerate() {
+            if sides(side, first, i).any(|h| closed.fails(sites, h)) {
+                return Err(Rejection::NotAccepted("an edge is not Delaunay"));
+            }
         }
+        Ok(())
     }
 
     /// Checks point 3.
@@ -182,7 +173,8 @@ impl AcceptanceCheck {
     }
 }
 
-/// Checks points 1, 2 and 5, a block of triangles at a time, and writes the triangles to `mesh`. Returns the number of pairs of twins.
+/// Checks points 1, 2 and 5, a block of triangles at a time, and writes the triangles to `mesh`. Returns the number of pairs of twins: every
+/// pair is found once, from its greater half-edge. So all half-edges are paired if there are half as many pairs as half-edges.
 // With the instructions of today's processors this takes less time.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 fn check_blocks(
@@ -192,18 +184,24 @@ fn check_blocks(
     order: Option<&[SiteIndex]>,
     mesh: &mut HalfEdgeMesh,
 ) -> Result<usize, Rejection> {
-    let (front, records) = (closed.front().get(), closed.records());
-    let mut links = 0;
-    for start in (front..records.len()).step_by(EdgeTester::BLOCK) {
-        let end = records.len().min(start + EdgeTester::BLOCK);
-        let first = (start - front) / 8;
-        let (block, triangles) = (&records[start..end], &mut mesh.triangles[first..]);
-        match order.map(|order| &order[..sites.len()]) {
-            Some(order) => check.write_triangles(block, sites, |v| order[v], triangles)?,
-            None => check.write_triangles(block, sites, SiteIndex::new, triangles)?,
+    let (front, records) = (closed.front().get() / 8, closed.records().as_chunks::<8>().0);
+    let (mut links, mut padded) = (0, [[0; 8]; EdgeTester::TRIANGLES]);
+    for first in (front..records.len()).step_by(EdgeTester::TRIANGLES) {
+        let block = Block::new(records, first, &mut padded);
+        let triangles = &mut mesh.triangles[first - front..][..block.count];
+        match order {
+            Some(order) => check.write_triangles(&block, sites, Some(order), triangles)?,
+            None => check.write_triangles(&block, sites, None, triangles)?,
         }
-        check.write_twins(block, front as u32, &mut mesh.twins[3 * first..]);
-        links += check.check_edges(closed, sites, start, end)?;
+        let tested = check.tester.test::<true>(records, front, first, &block, sites);
+        if tested.broken {
+            return Err(Rejection::NotAccepted("twins do not fit"));
+        }
+        if tested.doubts != Doubts::default() {
+            AcceptanceCheck::decide(closed, sites, first, tested.doubts)?;
+        }
+        links += tested.edges;
+        check.write_twins(&block.records[..block.count], 8 * front as u32, &mut mesh.twins[3 * (first - front)..]);
     }
     Ok(links)
 }

@@ -4,7 +4,7 @@
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
 use crate::voronoi::closed_mesh::{ClosedMesh, HoleFilling, OneRing};
-use crate::voronoi::edge_tester::EdgeTester;
+use crate::voronoi::edge_tester::{Block, EdgeTester, sides as tested_sides};
 use crate::voronoi::index::{ClosedEdge, VertexIndex};
 use crate::voronoi::rejection::Rejection;
 
@@ -48,25 +48,22 @@ impl ShiftRepair {
         all: bool,
         suspects: &mut Vec<ClosedEdge>,
     ) -> usize {
-        let records = mesh.records();
-        let mut start = start;
-        while start + EdgeTester::BLOCK <= records.len() || (all && start < records.len()) {
-            let end = records.len().min(start + EdgeTester::BLOCK);
-            let infinity = mesh.infinity().0;
-            let triangles = (start as u32..).step_by(8).map(ClosedEdge).zip(records[start..end].as_chunks::<8>().0);
-            for ((t, record), fetched) in triangles.zip(&mut self.tester.corners) {
-                let [a, b, c, ..] = *record;
-                let (p, q, r) = (sites[a as usize], sites[b as usize], sites[c as usize]);
-                *fetched = [p, q, r];
-                // The scan leaves no record free.
-                if orient2d(p, q, r) <= 0 && a.max(b).max(c) != infinity {
-                    self.inverted.push(t);
-                }
+        let (mut first, records) = (start / 8, mesh.records().as_chunks::<8>().0);
+        let mut padded = [[0; 8]; EdgeTester::TRIANGLES];
+        while first + EdgeTester::TRIANGLES <= records.len() || (all && first < records.len()) {
+            let block = Block::new(records, first, &mut padded);
+            for (t, [a, b, c, ..]) in block.records.iter().enumerate() {
+                self.tester.set_corners(t, [sites[*a as usize], sites[*b as usize], sites[*c as usize]]);
             }
-            self.tester.test::<false>(mesh, sites, start, end, suspects);
-            start = end;
+            let doubts = self.tester.test::<false>(records, mesh.front().get() / 8, first, &block, sites).doubts;
+            // The scan leaves no record free.
+            self.inverted.extend(tested_sides(doubts.orientation, first, 0).filter(|&t| is_inverted(mesh, sites, t)));
+            for (i, side) in doubts.sides.into_iter().enumerate() {
+                suspects.extend(tested_sides(side, first, i));
+            }
+            first += block.count;
         }
-        start
+        8 * first
     }
 
     /// Makes every triangle counterclockwise.

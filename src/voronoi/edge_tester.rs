@@ -1,112 +1,149 @@
-//! The in-circle test of all edges of a mesh, in batches. First the edges are listed and their corners fetched, without unpredictable
-//! branches. Then many determinants are computed side by side in single precision, with a bound on their error. The caller decides
-//! exactly what the bound leaves in doubt.
+//! The tests of all triangles and edges of a mesh, a block of triangles at a time. First the corners are fetched, and the sites beyond the
+//! edges, without unpredictable branches. Then many determinants are computed side by side in single precision, with a bound on their error.
+//! The caller decides exactly what the bound leaves in doubt.
 
 use crate::geometry::Site;
-use crate::geometry::predicates::InCircleBatch;
-use crate::voronoi::closed_mesh::ClosedMesh;
+use crate::geometry::predicates::{Doubts, TriangleBatch};
 use crate::voronoi::index::ClosedEdge;
 
 /// Tests a block of triangles at a time.
-pub(super) struct EdgeTester {
-    /// The sites of the corners of the block's triangles. The caller fetches them, and may need them too.
-    pub(super) corners: [[Site; 3]; EdgeTester::ROOM],
-    batch: InCircleBatch,
-    /// The edges of the batch, and room for one more.
-    edges: [ClosedEdge; EdgeTester::ROOM_FOR_EDGES],
-    found: [ClosedEdge; EdgeTester::ROOM_FOR_EDGES],
-}
-
-impl Default for EdgeTester {
-    fn default() -> Self {
-        EdgeTester {
-            corners: [[[0; 2]; 3]; EdgeTester::ROOM],
-            batch: InCircleBatch::default(),
-            edges: [ClosedEdge::default(); EdgeTester::ROOM_FOR_EDGES],
-            found: [ClosedEdge::default(); EdgeTester::ROOM_FOR_EDGES],
-        }
-    }
-}
-
-/// What [`EdgeTester::test`] found out about the links between half-edges.
 #[derive(Default)]
-pub(super) struct LinkCheck {
-    /// How many edges were tested.
-    pub(super) count: usize,
+pub(super) struct EdgeTester {
+    batch: TriangleBatch,
+}
+
+/// What [`EdgeTester::test`] found out. Bit `t` is that of triangle `t` of the block.
+pub(super) struct TestedBlock {
+    /// The triangles that may not be counterclockwise, and the edges that fail the in-circle test or may fail it. An edge belongs to the
+    /// later of its triangles. The result for edges to infinity is arbitrary.
+    pub(super) doubts: Doubts,
+    /// The number of edges.
+    pub(super) edges: usize,
     /// Whether some half-edge and its twin are not each other's twins or have different ends.
     pub(super) broken: bool,
 }
 
 impl EdgeTester {
-    /// The length, in numbers, of the records of as many triangles as one batch tests. Each triangle has at most three edges.
-    pub(super) const BLOCK: usize = InCircleBatch::LANES / 3 * 8;
-    /// Room for the triangles of a block: a power of two, so that no index needs a check.
-    const ROOM: usize = (InCircleBatch::LANES / 3).next_power_of_two();
-    /// Room for the edges of a block, a power of two as well.
-    const ROOM_FOR_EDGES: usize = (InCircleBatch::LANES + 1).next_power_of_two();
+    /// How many triangles a block may have.
+    pub(super) const TRIANGLES: usize = TriangleBatch::LANES;
 
-    /// Appends to `failing` the edges of the triangles in records `start..end`, at most [`EdgeTester::BLOCK`], that fail the
-    /// in-circle test or may fail it. The sites of their corners must be in `corners`. An edge belongs to the later of its triangles. The
-    /// result for edges to infinity is arbitrary. With `CHECK`, the links are checked too.
+    /// Sets the corners of triangle `t` of the block.
+    #[inline(always)]
+    pub(super) fn set_corners(&mut self, t: usize, [a, b, c]: [Site; 3]) {
+        let [p, q, r] = &mut self.batch.corners;
+        (p[t], q[t], r[t]) = (a, b, c);
+    }
+
+    /// Tests the triangles of `block`, whose first record is `first` of `records`. Their corners must be set. The mesh begins with record
+    /// `front`. With `CHECK`, the links are checked too.
     #[inline(always)]
     pub(super) fn test<const CHECK: bool>(
         &mut self,
-        mesh: &ClosedMesh,
+        records: &[[u32; 8]],
+        front: usize,
+        first: usize,
+        block: &Block,
         sites: &[Site],
-        start: usize,
-        end: usize,
-        failing: &mut Vec<ClosedEdge>,
-    ) -> LinkCheck {
-        let records = mesh.records().as_chunks::<8>().0;
-        let block = &records[start / 8..end / 8];
-        let mut links = LinkCheck { count: self.list(block, start as u32, mesh.front().0), broken: false };
-        let mut wrong = 0;
-        for (lane, &h) in self.edges[..links.count].iter().enumerate() {
-            let t = (h.get() - start) / 8;
-            let near = &block[t];
-            let g = ClosedEdge(near[4 + h.corner()]);
-            let Some(far) = records.get(g.get() / 8) else {
-                links.broken = true;
-                continue;
-            };
-            if CHECK {
-                let there = near[h.corner()] ^ far[g.next().corner()];
-                let back = near[h.next().corner()] ^ far[g.corner()];
-                wrong |= there | back | (far[4 + g.corner()] ^ h.0) | u32::from(g.0 & 7 > 2);
-            }
-            let Some(&d) = sites.get(far[g.previous().corner()] as usize) else {
-                links.broken = true;
-                continue;
-            };
-            let [a, b, c] = self.corners[t % EdgeTester::ROOM];
-            self.batch.set(lane % InCircleBatch::LANES, a, b, c, d);
+    ) -> TestedBlock {
+        let own = block.own_sides(8 * (first - front) as u32, 8 * front as u32);
+        let (mut edges, mut broken) = (0, false);
+        for i in 0..3 {
+            broken |= self.fetch_beyond::<CHECK>(records, first, block.records, i, own[i], sites);
+            edges += own[i].count_ones() as usize;
         }
-        links.broken |= wrong != 0;
-        let doubtful = self.batch.inside_or_in_doubt(links.count);
-        // Branch-free: about one edge in seven fails, and which one is unpredictable.
-        let mut found = 0;
-        for (&h, doubt) in self.edges.iter().zip(doubtful).take(links.count) {
-            self.found[found % EdgeTester::ROOM_FOR_EDGES] = h;
-            found += doubt as usize;
+        let mut doubts = self.batch.doubts(block.count);
+        for i in 0..3 {
+            doubts.sides[i] &= own[i];
         }
-        failing.extend_from_slice(&self.found[..found]);
-        links
+        TestedBlock { doubts, edges, broken }
     }
 
-    /// Lists the edges of a block of triangles, the first of which has the half-edge `start`, that lead to triangles before them; returns
-    /// their number.
+    /// Fetches the sites beyond side `i` of the triangles `own`. With `CHECK`, returns whether some link is wrong.
     #[inline(always)]
-    fn list(&mut self, block: &[[u32; 8]], start: u32, front: u32) -> usize {
-        let mut count = 0;
-        // Branch-free, as one half-edge in two is listed.
-        for (t, record) in (start..).step_by(8).zip(block) {
-            for i in 0..3 {
-                self.edges[count % EdgeTester::ROOM_FOR_EDGES] = ClosedEdge(t + i);
-                // Slots, which come before the front, wrap around, and so do not count as before the triangle.
-                let twin = record[4 + i as usize].wrapping_sub(front);
-                count += (twin < t + i - front) as usize;
+    fn fetch_beyond<const CHECK: bool>(
+        &mut self,
+        records: &[[u32; 8]],
+        first: usize,
+        block: &[[u32; 8]; EdgeTester::TRIANGLES],
+        i: usize,
+        own: u64,
+        sites: &[Site],
+    ) -> bool {
+        let beyond = &mut self.batch.beyond[i];
+        let (mut wrong, mut corners) = (0, 0);
+        let mut left = own;
+        while left != 0 {
+            let t = left.trailing_zeros() as usize % EdgeTester::TRIANGLES;
+            left &= left - 1;
+            let near = &block[t];
+            let twin = near[4 + i];
+            let Some(far) = records.get(twin as usize / 8) else { return true };
+            // The corners 1, 2, 0 come after 0, 1, 2, and 2, 0, 1 before them.
+            let (corner, twice) = ((twin & 3) as usize, 2 * (twin & 3));
+            let (next, previous) = ((0b00_10_01 >> twice & 3) as usize, (0b01_00_10 >> twice & 3) as usize);
+            if CHECK {
+                let h = (8 * (first + t) + i) as u32;
+                wrong |= (near[i] ^ far[next]) | (near[(i + 1) % 3] ^ far[corner]) | (far[4 + corner] ^ h);
+                // No corner has the number 3 or more.
+                corners |= twin | (twin & twin << 1) << 1;
+            }
+            let Some(&site) = sites.get(far[previous] as usize) else { return true };
+            beyond[t] = site;
+        }
+        CHECK && (wrong != 0 || corners & 4 != 0)
+    }
+}
+
+/// The records of a block of triangles.
+pub(super) struct Block<'a> {
+    /// The records. Those from `count` on have no triangles.
+    pub(super) records: &'a [[u32; 8]; EdgeTester::TRIANGLES],
+    /// How many triangles there are.
+    pub(super) count: usize,
+}
+
+impl<'a> Block<'a> {
+    /// Returns a block of `records`, from `first` on. If there are not enough for a block, they are copied to `padded`.
+    #[inline(always)]
+    pub(super) fn new(
+        records: &'a [[u32; 8]],
+        first: usize,
+        padded: &'a mut [[u32; 8]; EdgeTester::TRIANGLES],
+    ) -> Block<'a> {
+        let records = &records[first..];
+        if let Some(records) = records.first_chunk() {
+            return Block { records, count: EdgeTester::TRIANGLES };
+        }
+        *padded = [[0; 8]; EdgeTester::TRIANGLES];
+        padded[..records.len()].copy_from_slice(records);
+        Block { records: padded, count: records.len() }
+    }
+
+    /// Returns for each side of the triangles whether it leads to an earlier triangle. The first half-edge of the block comes `start` after
+    /// the first of the mesh, `front`.
+    #[inline(always)]
+    fn own_sides(&self, start: u32, front: u32) -> [u64; 3] {
+        let mut own = [0; 3];
+        for (t, record) in self.records.iter().enumerate().rev() {
+            let h = start + 8 * t as u32;
+            for (i, own) in own.iter_mut().enumerate() {
+                // Slots, which come before the front, wrap around, and so do not count as earlier.
+                let is_earlier = record[4 + i].wrapping_sub(front) < h;
+                *own = (*own << 1) + u64::from(is_earlier);
             }
         }
-        count
+        let all = u64::MAX >> (EdgeTester::TRIANGLES - self.count);
+        own.map(|own| own & all)
     }
+}
+
+/// Returns the half-edges that are side `i` of the triangles in `word`, a bit for each triangle from record `first` on.
+#[inline(always)]
+pub(super) fn sides(mut word: u64, first: usize, i: usize) -> impl Iterator<Item = ClosedEdge> {
+    std::iter::from_fn(move || {
+        let t = word.trailing_zeros() as usize;
+        let found = word != 0;
+        word &= word.wrapping_sub(1);
+        found.then_some(ClosedEdge((8 * (first + t) + i) as u32))
+    })
 }
