@@ -11,7 +11,7 @@ use crate::voronoi::counts::PipelineCounts;
 use crate::voronoi::index::VertexIndex;
 use crate::voronoi::pixel_map::PixelMap;
 use crate::voronoi::rejection::Rejection;
-use crate::voronoi::texture_request::{TextureRequest, pixels_along};
+use crate::voronoi::texture_request::TextureRequest;
 
 /// The largest fraction of missing sites with which the pipeline is still worthwhile.
 pub(super) const MAX_MISSING: f64 = 0.4;
@@ -84,10 +84,10 @@ impl SiteTexture {
         }
         let extent = [0, 1].map(|axis| bounds.extent(axis) as f64 + 1.0);
         let scale = request.scale(extent, sites.len());
-        [self.width, self.height] = extent.map(|side| pixels_along(side, scale));
-        self.words = self.width.div_ceil(64);
         let map = PixelMap::new(sites, bounds.min, extent, scale);
-        match map.missing(sites, [self.width, self.height]) > MAX_MISSING {
+        [self.width, self.height] = map.size;
+        self.words = self.width.div_ceil(64);
+        match map.missing(sites) > MAX_MISSING {
             true => Err(Rejection::Crowded),
             false => Ok(map),
         }

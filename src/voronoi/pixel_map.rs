@@ -19,8 +19,14 @@ const MAX_CROWDING: f64 = 3.0;
 /// The part of an axis that has no sites gets so much of the pixels, relative to a part with the mean number.
 const LEAST: f64 = 0.03;
 
+/// So much smaller each side of the texture is where pixels are adapted. Sites crowd within columns and rows too, so a good part of them
+/// misses a pixel anyway, while empty pixels cost as much as others.
+const CROWDED_SIDE: f64 = 0.84;
+
 /// The map from lattice points to pixels. Pixel (x, y) is column x from the west, row y from the south.
 pub(super) struct PixelMap {
+    /// The number of columns and rows.
+    pub(super) size: [usize; 2],
     low: Site,
     /// Pixels per lattice step, if they are squares.
     scale: f64,
@@ -41,8 +47,11 @@ impl PixelMap {
     pub(super) fn new(sites: &[Site], low: Site, extent: [f64; 2], scale: f64) -> PixelMap {
         let histograms = histograms(sites, low, extent);
         let crowding = histograms.iter().map(|histogram| crowding(histogram, sites.len())).product::<f64>();
-        let axis = |axis: usize| AxisMap::new(&histograms[axis], extent[axis], pixels_along(extent[axis], scale));
-        PixelMap { low, scale, adapted: (crowding > MAX_CROWDING).then(|| [0, 1].map(axis)) }
+        let is_crowded = crowding > MAX_CROWDING;
+        let scale = if is_crowded { CROWDED_SIDE * scale } else { scale };
+        let size = extent.map(|side| pixels_along(side, scale));
+        let axis = |axis: usize| AxisMap::new(&histograms[axis], extent[axis], size[axis]);
+        PixelMap { size, low, scale, adapted: is_crowded.then(|| [0, 1].map(axis)) }
     }
 
     /// Appends the pixel (y << 16 | x) of each site to `pixels`.
@@ -57,16 +66,16 @@ impl PixelMap {
         }
     }
 
-    /// Returns about which part of `sites` has no pixel of its own in a texture of `size` pixels, or less: how the sites are spread within
-    /// blocks of the texture is left out. This takes a small part of the time of writing them. Of few sites it says nothing.
-    pub(super) fn missing(&self, sites: &[Site], size: [usize; 2]) -> f64 {
+    /// Returns about which part of `sites` has no pixel of its own, or less: how the sites are spread within blocks of the texture is left
+    /// out. This takes a small part of the time of writing them. Of few sites it says nothing.
+    pub(super) fn missing(&self, sites: &[Site]) -> f64 {
         if sites.len() < SAMPLE {
             return 0.0;
         }
         let mut counts = [[0u32; BLOCKS]; BLOCKS];
         let mut pixels = Vec::with_capacity(SAMPLE);
         self.append_to(&mut pixels, sample(sites));
-        let shifts = size.map(|side| (side.div_ceil(BLOCKS)).next_power_of_two().ilog2());
+        let shifts = self.size.map(|side| (side.div_ceil(BLOCKS)).next_power_of_two().ilog2());
         for pixel in &pixels {
             counts[(pixel >> 16 >> shifts[1]) as usize][((pixel & 0xffff) >> shifts[0]) as usize] += 1;
         }
