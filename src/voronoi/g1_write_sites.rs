@@ -17,7 +17,25 @@ use crate::voronoi::texture_request::TextureRequest;
 pub(super) const MAX_MISSING: f64 = 0.4;
 
 /// A pixel of the row at hand that has no site.
-const EMPTY: SiteIndex = SiteIndex(u32::MAX);
+const EMPTY: u32 = u32::MAX;
+
+/// A site of a row of the texture.
+#[derive(Clone, Copy, Default)]
+struct RowSite {
+    /// The column of its pixel.
+    x: u32,
+    /// Its position in the input.
+    index: SiteIndex,
+    site: Site,
+}
+
+impl RowSite {
+    /// Sites that share a pixel come from the west to the east by this key.
+    #[inline(always)]
+    fn key(&self) -> (Site, SiteIndex) {
+        (self.site, self.index)
+    }
+}
 
 /// A texture with the sites in it. Pixel (x, y) is column x from the west, row y from the south.
 #[derive(Default)]
@@ -41,14 +59,15 @@ pub(super) struct SiteTexture {
     /// The pixel (y << 16 | x) of every site of the input.
     pixels: Vec<u32>,
     /// The missing sites, in the order of `missing`.
-    missing_sites: Vec<SiteIndex>,
+    missing_sites: Vec<RowSite>,
     /// The end of every row in `rows`.
     row_ends: Vec<u32>,
-    /// The pixel column and the position in the input of every site, row by row.
-    rows: Vec<(u32, SiteIndex)>,
-    /// The position in the input of the site in each pixel of the row at hand.
-    row: Vec<SiteIndex>,
-    losers: Vec<(u32, SiteIndex)>,
+    /// The sites, row by row.
+    rows: Vec<RowSite>,
+    /// The position in `rows` of the site in each pixel of the row at hand.
+    row: Vec<u32>,
+    /// The positions in `rows` of the sites that have lost their pixels.
+    losers: Vec<u32>,
 }
 
 impl SiteTexture {
@@ -64,13 +83,13 @@ impl SiteTexture {
         self.clear(sites.len());
         let max_missing = (MAX_MISSING * sites.len() as f64) as usize;
         for y in 0..self.height {
-            self.write_row(sites, y, counts);
+            self.write_row(y, counts);
             // Stop early: a caller that cuts a crowded leaf may have to try many times.
             if self.missing.len() > max_missing {
                 return Err(Rejection::Crowded);
             }
         }
-        self.append_missing(sites);
+        self.append_missing();
         counts.missing += self.missing.len() as u64;
         Ok(())
     }
@@ -105,16 +124,32 @@ impl SiteTexture {
         self.row_ends.resize(self.height + 1, 0);
         self.pixels.clear();
         map.append_to(&mut self.pixels, sites.iter());
+        self.rows.resize(sites.len(), RowSite::default());
+        let numbered = (0..).map(SiteIndex).zip(self.pixels.iter().zip(sites));
+        let row_sites = numbered.map(|(index, (&pixel, &site))| RowSite { x: pixel & 0xffff, index, site });
+        if self.pixels.is_sorted_by_key(|pixel| pixel >> 16) {
+            // As in a job. To count them would take longer, because each count waits for the one before.
+            for (i, pixels) in self.pixels.windows(2).enumerate() {
+                if pixels[0] >> 16 != pixels[1] >> 16 {
+                    self.row_ends[(pixels[0] >> 16) as usize..(pixels[1] >> 16) as usize].fill(i as u32 + 1);
+                }
+            }
+            let last = self.pixels.last().map_or(0, |pixel| (pixel >> 16) as usize);
+            self.row_ends[last..].fill(sites.len() as u32);
+            for (to, site) in self.rows.iter_mut().zip(row_sites) {
+                *to = site;
+            }
+            return;
+        }
         for &pixel in &self.pixels {
             self.row_ends[(pixel >> 16) as usize + 1] += 1;
         }
         for y in 0..self.height {
             self.row_ends[y + 1] += self.row_ends[y];
         }
-        self.rows.resize(sites.len(), (0, SiteIndex::default()));
-        for (i, &pixel) in self.pixels.iter().enumerate() {
+        for (site, &pixel) in row_sites.zip(&self.pixels) {
             let end = &mut self.row_ends[(pixel >> 16) as usize];
-            self.rows[*end as usize] = (pixel & 0xffff, SiteIndex::new(i));
+            self.rows[*end as usize] = site;
             *end += 1;
         }
     }
@@ -137,45 +172,46 @@ impl SiteTexture {
     }
 
     /// Writes row `y` and numbers its sites from west to east.
-    fn write_row(&mut self, sites: &[Site], y: usize, counts: &mut PipelineCounts) {
-        let first = if y == 0 { 0 } else { self.row_ends[y - 1] as usize };
+    fn write_row(&mut self, y: usize, counts: &mut PipelineCounts) {
+        let first = if y == 0 { 0 } else { self.row_ends[y - 1] };
         self.losers.clear();
-        for &(x, i) in &self.rows[first..self.row_ends[y] as usize] {
-            let winner = &mut self.row[x as usize];
-            if *winner == EMPTY {
-                *winner = i;
-                self.occupied[y * self.words + x as usize / 64] |= 1 << (x % 64);
+        for (at, site) in (first..).zip(&self.rows[first as usize..self.row_ends[y] as usize]) {
+            let x = site.x as usize;
+            if self.row[x] == EMPTY {
+                self.row[x] = at;
+                self.occupied[y * self.words + x / 64] |= 1 << (x % 64);
             } else {
-                self.losers.push((x, i));
+                self.losers.push(at);
             }
         }
         if self.losers.len() > self.width / 8 {
             // If many sites will be missing, neighbours should be inserted one after the other.
-            self.losers.sort_unstable_by_key(|&(_, i)| sites[i.get()]);
+            self.losers.sort_unstable_by_key(|&at| self.rows[at as usize].site);
         }
-        for at in 0..self.losers.len() {
-            let (x, i) = self.losers[at];
-            counts.moved += self.place_loser(sites, y, x as usize, i) as u64;
+        for i in 0..self.losers.len() {
+            counts.moved += self.place_loser(y, self.losers[i]) as u64;
         }
         for word in y * self.words..(y + 1) * self.words {
             let mut bits = self.occupied[word];
             while bits != 0 {
                 let x = (word - y * self.words) * 64 + bits.trailing_zeros() as usize;
-                let i = std::mem::replace(&mut self.row[x], EMPTY);
+                let RowSite { index, site, .. } = self.rows[std::mem::replace(&mut self.row[x], EMPTY) as usize];
                 self.vertices[64 * self.words * y + x] = VertexIndex(self.sites.len() as u32);
-                self.order.push(i);
-                self.sites.push(sites[i.get()]);
+                self.order.push(index);
+                self.sites.push(site);
                 bits &= bits - 1;
             }
         }
     }
 
-    /// Places site `i`, which has lost pixel `x`: it or the winner moves one pixel west or east, in the order of their x. Returns
-    /// false if the site is missing.
-    fn place_loser(&mut self, sites: &[Site], y: usize, x: usize, i: SiteIndex) -> bool {
+    /// Places the site at `loser` in `rows`, which has lost its pixel: it or the winner moves one pixel west or east, in the order of their
+    /// x. Returns false if the site is missing.
+    fn place_loser(&mut self, y: usize, loser: u32) -> bool {
+        let site = self.rows[loser as usize];
+        let x = site.x as usize;
         let winner = self.row[x];
-        let key = |i: SiteIndex| (sites[i.get()], i);
-        let (west, east) = if key(i) < key(winner) { (i, winner) } else { (winner, i) };
+        let is_west = site.key() < self.rows[winner as usize].key();
+        let (west, east) = if is_west { (loser, winner) } else { (winner, loser) };
         if x + 1 < self.width && self.row[x + 1] == EMPTY {
             self.row[x] = west;
             self.row[x + 1] = east;
@@ -188,16 +224,16 @@ impl SiteTexture {
             true
         } else {
             self.missing.push((y << 16 | x) as u32);
-            self.missing_sites.push(i);
+            self.missing_sites.push(site);
             false
         }
     }
 
     /// Gives the missing sites the numbers after those in the texture, and the vertex at infinity the last number.
-    fn append_missing(&mut self, sites: &[Site]) {
+    fn append_missing(&mut self) {
         self.placed = self.sites.len();
-        self.order.extend_from_slice(&self.missing_sites);
-        self.sites.extend(self.missing_sites.iter().map(|&i| sites[i.get()]));
+        self.order.extend(self.missing_sites.iter().map(|missing| missing.index));
+        self.sites.extend(self.missing_sites.iter().map(|missing| missing.site));
         self.sites.push([0; 2]);
     }
 }

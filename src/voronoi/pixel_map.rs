@@ -23,13 +23,16 @@ const LEAST: f64 = 0.03;
 /// misses a pixel anyway, while empty pixels cost as much as others.
 const CROWDED_SIDE: f64 = 0.84;
 
+/// The unit of `PixelMap::scale`. A pixel is at least a lattice step, and there are at most 2^30 steps, so products fit.
+const ONE: u64 = 1 << 31;
+
 /// The map from lattice points to pixels. Pixel (x, y) is column x from the west, row y from the south.
 pub(super) struct PixelMap {
     /// The number of columns and rows.
     pub(super) size: [usize; 2],
     low: Site,
-    /// Pixels per lattice step, if they are squares.
-    scale: f64,
+    /// Pixels per lattice step, if they are squares, in units of 1 / [`ONE`].
+    scale: u64,
     /// Otherwise the columns and the rows.
     adapted: Option<[AxisMap; 2]>,
 }
@@ -51,18 +54,19 @@ impl PixelMap {
         let scale = if is_crowded { CROWDED_SIDE * scale } else { scale };
         let size = extent.map(|side| pixels_along(side, scale));
         let axis = |axis: usize| AxisMap::new(&histograms[axis], extent[axis], size[axis]);
+        // Rounded down, so that no site is beyond the last pixel.
+        let scale = (scale * ONE as f64) as u64;
         PixelMap { size, low, scale, adapted: is_crowded.then(|| [0, 1].map(axis)) }
     }
 
     /// Appends the pixel (y << 16 | x) of each site to `pixels`.
     pub(super) fn append_to<'a>(&self, pixels: &mut Vec<u32>, sites: impl ExactSizeIterator<Item = &'a Site>) {
         let join = |[x, y]: [u32; 2]| y << 16 | x;
-        let pixel = |site: &Site, axis: usize| (self.steps(site, axis) * self.scale) as i32 as u32;
+        let pixel = |site: &Site, axis: usize| ((u64::from(self.steps(site, axis)) * self.scale) / ONE) as u32;
         match &self.adapted {
             None => pixels.extend(sites.map(|site| join([0, 1].map(|axis| pixel(site, axis))))),
-            Some(axes) => {
-                pixels.extend(sites.map(|site| join([0, 1].map(|axis| axes[axis].pixel(self.steps(site, axis))))))
-            }
+            Some(axes) => pixels
+                .extend(sites.map(|site| join([0, 1].map(|axis| axes[axis].pixel(f64::from(self.steps(site, axis))))))),
         }
     }
 
@@ -87,8 +91,8 @@ impl PixelMap {
     }
 
     #[inline(always)]
-    fn steps(&self, site: &Site, axis: usize) -> f64 {
-        f64::from(site[axis] - self.low[axis])
+    fn steps(&self, site: &Site, axis: usize) -> u32 {
+        (site[axis] - self.low[axis]) as u32
     }
 }
 
