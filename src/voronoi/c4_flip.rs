@@ -45,10 +45,11 @@ impl FlipQueue {
         while let Some(h) = self.suspects.pop() {
             let g = mesh.twin(h);
             // An open edge is tested when its second triangle exists. Edges to infinity are left to step C1.
-            if g < mesh.front() || !mesh.fails_inside(sites, h) {
+            if g < mesh.front() {
                 continue;
             }
-            if !mesh.is_convex(sites, h) {
+            let Some(is_convex) = mesh.failing_inside(sites, h) else { continue };
+            if !is_convex {
                 self.later.push(h);
                 continue;
             }

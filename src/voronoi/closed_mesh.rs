@@ -10,7 +10,7 @@
 //! was made elsewhere are wrong.
 
 use crate::geometry::Site;
-use crate::geometry::predicates::{in_circle, orient2d};
+use crate::geometry::predicates::{failing_edge, in_circle, orient2d};
 use crate::voronoi::index::{ClosedEdge, VertexIndex};
 use crate::voronoi::triangle_writer::TriangleWriter;
 
@@ -277,12 +277,14 @@ impl ClosedMesh {
         in_circle(u.site(sites), v.site(sites), w.site(sites), z.site(sites))
     }
 
-    /// Returns whether edge `h` between two finite triangles should be flipped.
+    /// If edge `h` between two finite triangles fails, returns whether both triangles are counterclockwise after a flip.
     #[inline(always)]
-    pub(super) fn fails_inside(&self, sites: &[Site], h: ClosedEdge) -> bool {
+    pub(super) fn failing_inside(&self, sites: &[Site], h: ClosedEdge) -> Option<bool> {
         let [u, v, w, z] = self.quadrilateral(h);
-        u.0.max(v.0).max(w.0).max(z.0) != self.infinity.0
-            && in_circle(u.site(sites), v.site(sites), w.site(sites), z.site(sites))
+        if u.0.max(v.0).max(w.0).max(z.0) == self.infinity.0 {
+            return None;
+        }
+        failing_edge(u.site(sites), v.site(sites), w.site(sites), z.site(sites))
     }
 
     /// Returns whether both triangles are counterclockwise after a flip of edge `h` between two finite triangles.

@@ -16,7 +16,7 @@
 //! open edges too, because slots are half-edges.
 
 use crate::geometry::Site;
-use crate::geometry::predicates::{in_circle, orient2d};
+use crate::geometry::predicates::seems_delaunay;
 use crate::voronoi::c2_shift::ShiftRepair;
 use crate::voronoi::c4_flip::FlipQueue;
 use crate::voronoi::closed_mesh::ClosedMesh;
@@ -271,21 +271,17 @@ impl Arms {
     }
 }
 
-/// Makes two triangles for four colours around a corner; returns the half-edges on its south, east, north and west arms.
+/// Makes two triangles for four colours around a corner; returns the half-edges on its south, east, north and west arms. Which diagonal is
+/// better cannot be predicted, so both are treated alike.
+#[inline(always)]
 fn two_triangles(writer: &mut TriangleWriter, sites: &[Site], [sw, se, ne, nw]: [VertexIndex; 4]) -> [ClosedEdge; 4] {
-    let [a, b, c, d] = [sw, se, ne, nw].map(|v| v.site(sites));
-    let unlinked = [UNUSED; 3];
-    if orient2d(a, b, c) > 0 && orient2d(a, c, d) > 0 && !in_circle(a, b, c, d) {
-        let t = writer.push([sw, se, ne], unlinked);
-        let u = writer.push([sw, ne, nw], unlinked);
-        writer.link(t.side(2), u);
-        [t, t.side(1), u.side(1), u.side(2)]
-    } else {
-        let t = writer.push([sw, se, nw], unlinked);
-        let u = writer.push([se, ne, nw], unlinked);
-        writer.link(t.side(1), u.side(2));
-        [t, u, u.side(1), t.side(2)]
-    }
+    let [a, b, c, d] = [sw.site(sites), se.site(sites), ne.site(sites), nw.site(sites)];
+    let ac = seems_delaunay(a, b, c, d);
+    let t = writer.push([sw, se, select_unpredictable(ac, ne, nw)], [UNUSED; 3]);
+    let u = writer.push([select_unpredictable(ac, sw, se), ne, nw], [UNUSED; 3]);
+    writer.link(select_unpredictable(ac, t.side(2), t.side(1)), select_unpredictable(ac, u, u.side(2)));
+    let (east, west) = (select_unpredictable(ac, t.side(1), u), select_unpredictable(ac, u.side(2), t.side(2)));
+    [t, east, u.side(1), west]
 }
 
 /// Returns a word of 64 bits, in which bit i says whether `a[i] != b[i]`.
