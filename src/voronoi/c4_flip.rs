@@ -1,7 +1,7 @@
 //! Step C4: flip edges until all are Delaunay (Lawson), by the canonical in-circle test.
 
 use crate::geometry::Site;
-use crate::geometry::predicates::four_inside_or_in_doubt;
+use crate::geometry::predicates::{failing_edge, four_inside_or_in_doubt};
 use crate::voronoi::closed_mesh::ClosedMesh;
 use crate::voronoi::index::ClosedEdge;
 use crate::voronoi::rejection::Rejection;
@@ -48,7 +48,8 @@ impl FlipQueue {
             if g < mesh.front() {
                 continue;
             }
-            let Some(is_convex) = mesh.failing_inside(sites, h) else { continue };
+            let Some([u, v, w, z]) = mesh.finite_quadrilateral(sites, h) else { continue };
+            let Some(is_convex) = failing_edge(u, v, w, z) else { continue };
             if !is_convex {
                 self.later.push(h);
                 continue;
@@ -56,16 +57,14 @@ impl FlipQueue {
             self.step()?;
             self.done += 1;
             mesh.flip(h);
-            self.suspect_outline(mesh, sites, h, g);
+            self.suspect_outline(mesh, sites, [h, h.previous(), g, g.previous()], [[u, z, w], [v, w, z]]);
         }
         Ok(())
     }
 
-    /// Adds those sides of the two triangles of `h` and `g`, whose common edge was flipped, that may fail.
+    /// Adds those sides that may fail of the `outline` of two triangles whose common edge was flipped, two sides of each.
     #[inline(always)]
-    fn suspect_outline(&mut self, mesh: &ClosedMesh, sites: &[Site], h: ClosedEdge, g: ClosedEdge) {
-        let outline = [h, h.previous(), g, g.previous()];
-        let (t, u) = (mesh.triangle_sites(sites, h), mesh.triangle_sites(sites, g));
+    fn suspect_outline(&mut self, mesh: &ClosedMesh, sites: &[Site], outline: [ClosedEdge; 4], [t, u]: [[Site; 3]; 2]) {
         // Written out: a map over the array would become calls.
         let [i, j, k, l] = outline;
         let beyond = [

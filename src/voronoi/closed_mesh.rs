@@ -10,7 +10,7 @@
 //! was made elsewhere are wrong.
 
 use crate::geometry::Site;
-use crate::geometry::predicates::{failing_edge, in_circle, orient2d};
+use crate::geometry::predicates::{in_circle, orient2d};
 use crate::voronoi::index::{ClosedEdge, VertexIndex};
 use crate::voronoi::triangle_writer::TriangleWriter;
 
@@ -277,14 +277,14 @@ impl ClosedMesh {
         in_circle(u.site(sites), v.site(sites), w.site(sites), z.site(sites))
     }
 
-    /// If edge `h` between two finite triangles fails, returns whether both triangles are counterclockwise after a flip.
+    /// Returns the sites of the [`ClosedMesh::quadrilateral`] of edge `h`, if it lies between two finite triangles.
     #[inline(always)]
-    pub(super) fn failing_inside(&self, sites: &[Site], h: ClosedEdge) -> Option<bool> {
+    pub(super) fn finite_quadrilateral(&self, sites: &[Site], h: ClosedEdge) -> Option<[Site; 4]> {
         let [u, v, w, z] = self.quadrilateral(h);
         if u.0.max(v.0).max(w.0).max(z.0) == self.infinity.0 {
             return None;
         }
-        failing_edge(u.site(sites), v.site(sites), w.site(sites), z.site(sites))
+        Some([u.site(sites), v.site(sites), w.site(sites), z.site(sites)])
     }
 
     /// Returns whether both triangles are counterclockwise after a flip of edge `h` between two finite triangles.

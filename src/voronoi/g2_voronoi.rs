@@ -170,10 +170,23 @@ fn bring_near(texture: &SiteTexture, y: usize) {
 /// Moves distances to the nearest occupied pixel on one side by one row.
 #[inline(always)]
 fn grow(distances: &mut [u8], occupied: &[u64]) {
-    for distance in distances.iter_mut() {
-        *distance = distance.saturating_add(1);
+    for (distances, &word) in distances.as_chunks_mut::<64>().0.iter_mut().zip(occupied) {
+        for (distance, is_free) in distances.iter_mut().zip(free_bytes(word)) {
+            *distance = distance.saturating_add(1) & is_free;
+        }
     }
-    for_each_bit(occupied, |x| distances[x] = 0);
+}
+
+/// Returns a byte for each bit of a word: 0 if it is set, else 255.
+#[inline(always)]
+fn free_bytes(word: u64) -> [u8; 64] {
+    let mut free = [0; 64];
+    for (eight, byte) in free.as_chunks_mut::<8>().0.iter_mut().zip(word.to_le_bytes()) {
+        for (free, bit) in eight.iter_mut().zip([1, 2, 4, 8, 16, 32, 64, 128]) {
+            *free = if byte & bit == 0 { u8::MAX } else { 0 };
+        }
+    }
+    free
 }
 
 #[inline(always)]
