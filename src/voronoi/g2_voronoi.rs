@@ -75,7 +75,7 @@ impl LabelRows {
     pub(super) fn row(&mut self, texture: &SiteTexture, y: usize, labels: &mut [VertexIndex]) {
         let occupied = &texture.occupied[y * texture.words..][..texture.words];
         grow(&mut self.south, occupied);
-        for_each_bit(occupied, |x| self.south_row[x] = y as u32 + 1);
+        note_row(&mut self.south_row, occupied, y as u32 + 1);
         let north = &self.north[y * self.stride..][..self.stride];
         column_keys(&self.south, north, &mut self.columns[REACH + 1..][..self.stride]);
         bring_near(texture, y + REACH);
@@ -177,6 +177,16 @@ fn grow(distances: &mut [u8], occupied: &[u64]) {
     }
 }
 
+/// Notes `row` in the columns of occupied pixels.
+#[inline(always)]
+fn note_row(rows: &mut [u32], occupied: &[u64], row: u32) {
+    for (rows, &word) in rows.as_chunks_mut::<64>().0.iter_mut().zip(occupied) {
+        for (noted, is_free) in rows.iter_mut().zip(free_bytes(word)) {
+            *noted = if is_free == 0 { row } else { *noted };
+        }
+    }
+}
+
 /// Returns a byte for each bit of a word: 0 if it is set, else 255.
 #[inline(always)]
 fn free_bytes(word: u64) -> [u8; 64] {
@@ -187,17 +197,6 @@ fn free_bytes(word: u64) -> [u8; 64] {
         }
     }
     free
-}
-
-#[inline(always)]
-fn for_each_bit(words: &[u64], mut f: impl FnMut(usize)) {
-    for (word, &bits) in words.iter().enumerate() {
-        let mut bits = bits;
-        while bits != 0 {
-            f(word * 64 + bits.trailing_zeros() as usize);
-            bits &= bits - 1;
-        }
-    }
 }
 
 /// Computes the key of the nearer of the two sites of each column. At the same distance, the southern one wins.
