@@ -444,6 +444,8 @@ mod tests {
             if orient2d(a, b, c) > 0 && ![a, b, c].contains(&d) {
                 prop_assert_eq!(in_circle(a, b, c, d), expected > 0 || (expected == 0 && tie(a, b, c, d)));
                 prop_assert!(four_inside_or_in_doubt([[a, b, c]; 4], [d; 4])[0] || expected < 0);
+                let is_convex = robust_orientation(d, b, c) > 0 && robust_orientation(d, c, a) > 0;
+                prop_assert_eq!(failing_edge(a, b, c, d), in_circle(a, b, c, d).then_some(is_convex));
             }
         }
 

@@ -47,12 +47,24 @@ impl IslandSearch {
     ) -> Result<(), Rejection> {
         // No vertex has been removed yet.
         let mut expected = 2 * placed - 2;
+        if mesh.len() > expected {
+            self.count_degrees(mesh, sites.len());
+        }
+        self.fans.clear();
+        // After the first round, only what is new is looked at, and what was found before.
+        let mut seen = 0;
         while mesh.len() > expected {
-            let before = mesh.len();
+            let (before, is_whole) = (mesh.len(), seen == 0);
+            self.find_fans(mesh, sites, &shift.inverted[seen..]);
+            seen = shift.inverted.len();
             self.remove_apart(mesh, sites, shift, counts);
             expected = 2 * (placed - shift.removed.len()) - 2;
             if mesh.len() == before {
-                return Err(Rejection::NotAccepted("an island could not be removed"));
+                if is_whole {
+                    return Err(Rejection::NotAccepted("an island could not be removed"));
+                }
+                // A fan that was too large to follow may have become smaller.
+                seen = 0;
             }
         }
         match mesh.len() == expected {
@@ -69,9 +81,9 @@ impl IslandSearch {
         shift: &mut ShiftRepair,
         counts: &mut PipelineCounts,
     ) {
-        self.count_degrees(mesh, sites.len());
-        self.find_fans(mesh, sites, &shift.inverted);
-        for fans in self.fans.chunk_by(|a, b| a.vertex == b.vertex) {
+        let fans = std::mem::take(&mut self.fans);
+        let mut changes = DegreeChanges::default();
+        for fans in fans.chunk_by(|a, b| a.vertex == b.vertex) {
             // If every fan of the vertex is listed, the first is the best and stays.
             let listed: usize = fans.iter().map(|fan| fan.degree.0).sum();
             let all = listed == self.degrees[fans[0].vertex.get()] as usize;
@@ -80,13 +92,16 @@ impl IslandSearch {
                 if fan(mesh, sites, found.outgoing).as_ref() != Some(found) {
                     continue;
                 }
-                if shift.remove_island(mesh, sites, found.outgoing) {
+                let h = found.outgoing;
+                if changes.note(mesh, shift, h, |mesh, shift| shift.remove_island(mesh, sites, h)) {
                     counts.islands += 1;
                 } else if let Some(h) = self.enclosed(mesh, found) {
-                    shift.remove(mesh, sites, h, true);
+                    changes.note(mesh, shift, h, |mesh, shift| shift.remove(mesh, sites, h, true));
                 }
             }
         }
+        changes.apply(&mut self.degrees);
+        self.fans = fans;
     }
 
     /// Returns a half-edge that starts at a vertex whose only triangles are two of `fan`.
@@ -105,10 +120,10 @@ impl IslandSearch {
         }
     }
 
-    /// Lists the fans that have an inverted triangle and are not the only fan of their vertex.
+    /// Lists the fans that have one of the `inverted` triangles, or were listed before, and are not the only fan of their vertex.
     fn find_fans(&mut self, mesh: &ClosedMesh, sites: &[Site], inverted: &[ClosedEdge]) {
-        self.fans.clear();
-        for h in inverted.iter().filter(|&&t| !mesh.is_free(t)).flat_map(|t| t.sides()) {
+        let before = std::mem::take(&mut self.fans).into_iter().map(|fan| fan.outgoing);
+        for h in before.chain(inverted.iter().flat_map(|t| t.sides())).filter(|&h| !mesh.is_free(h)) {
             // Nearly all fans are the only one.
             if around(mesh, h).count() < self.degrees[mesh.origin(h).get()] as usize {
                 self.fans.extend(fan(mesh, sites, h));
@@ -116,6 +131,46 @@ impl IslandSearch {
         }
         self.fans.sort_unstable();
         self.fans.dedup();
+    }
+}
+
+/// How the degrees of vertices change while fans are removed.
+#[derive(Default)]
+struct DegreeChanges {
+    /// The corners of triangles that are gone.
+    gone: Vec<[VertexIndex; 3]>,
+    /// The corners of those that have taken their place.
+    new: Vec<[VertexIndex; 3]>,
+}
+
+impl DegreeChanges {
+    /// Notes what changes if `remove` removes the fan around the origin of `h`; returns whether it does.
+    fn note(
+        &mut self,
+        mesh: &mut ClosedMesh,
+        shift: &mut ShiftRepair,
+        h: ClosedEdge,
+        remove: impl FnOnce(&mut ClosedMesh, &mut ShiftRepair) -> bool,
+    ) -> bool {
+        let (gone, first) = (self.gone.len(), shift.suspects.len());
+        self.gone.extend(around(mesh, h).filter_map(|outgoing| mesh.corners(outgoing)));
+        let removed = remove(mesh, shift);
+        if !removed {
+            self.gone.truncate(gone);
+        }
+        // Three sides of each new triangle, and then the seam.
+        let (new, _) = shift.suspects[first..].as_chunks::<3>();
+        self.new.extend(new.iter().filter_map(|sides| mesh.corners(sides[0])));
+        removed
+    }
+
+    fn apply(self, degrees: &mut [u32]) {
+        for vertex in self.gone.into_iter().flatten() {
+            degrees[vertex.get()] -= 1;
+        }
+        for vertex in self.new.into_iter().flatten() {
+            degrees[vertex.get()] += 1;
+        }
     }
 }
 
