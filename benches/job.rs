@@ -9,15 +9,13 @@
 //! It prints the medians, their ratios, and the stages of the median jobs. The default FILE is autzen.laz from the test data, or a
 //! sample terrain of 4 million points if there is none. The default number of RUNS is 5.
 
+mod jobs;
+
 use gdt_batch::job::progress::stage::ProgressOutput;
 use gdt_batch::job::report::job_report::Report;
+use jobs::{FULL, Outcome, PLAIN, as_las, default_file, empty, write_config};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-
-type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
-
-const PLAIN: &str = "compression = \"none\"\nlevels = false";
-const FULL: &str = "format = \"3dtiles\"";
 
 fn main() -> Outcome<()> {
     let mut arguments = std::env::args().skip(1).filter(|a| !a.starts_with("--"));
@@ -54,18 +52,6 @@ fn main() -> Outcome<()> {
     Ok(())
 }
 
-fn default_file(scratch: &Path) -> Outcome<PathBuf> {
-    let shared = std::env::var_os("GDT_SHARED")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
-    let autzen = shared.join("data/autzen.laz");
-    if autzen.is_file() {
-        return Ok(autzen);
-    }
-    let sample = scratch.join("sample.laz");
-    gdt_batch::sample::write(&sample, 4_000_000, 1, true)?;
-    Ok(sample)
-}
-
 /// Returns the seconds that one thread takes to decode every record as fast as the `las` crate can: in batches, into one buffer.
 fn decode(file: &Path) -> Outcome<f64> {
     let start = Instant::now();
@@ -75,46 +61,12 @@ fn decode(file: &Path) -> Outcome<f64> {
     Ok(start.elapsed().as_secs_f64())
 }
 
-/// Writes the same points without compression, and returns the path.
-fn as_las(file: &Path, scratch: &Path) -> Outcome<PathBuf> {
-    let path = scratch.join("unpacked.las");
-    let mut reader = las::Reader::from_path(file)?;
-    let mut writer = las::Writer::from_path(&path, reader.header().clone())?;
-    let mut batch = las::PointDataBuilder::new().for_header(reader.header()).build();
-    while reader.fill_points(100_000, &mut batch)? > 0 {
-        writer.write_points(&batch)?;
-    }
-    writer.close()?;
-    Ok(path)
-}
-
 /// Runs a job and returns its report, in which the wall time includes writing the report and cleaning up.
 fn job(file: &Path, output: &Path, look: &str) -> Outcome<Report> {
-    let config = output.with_extension("toml");
-    std::fs::write(
-        &config,
-        format!(
-            "[input]\nfiles = [{:?}]\nunit = \"metre\"\n[output]\ndirectory = {:?}\n{look}\n",
-            file.canonicalize()?,
-            output
-        ),
-    )?;
+    let config = write_config(file, output, look)?;
     let start = Instant::now();
     let mut report = gdt_batch::job::run(&gdt_batch::config::load(&config)?, ProgressOutput::Quiet)?;
     report.wall_s = start.elapsed().as_secs_f64();
     empty(output)?;
     Ok(report)
-}
-
-/// Truncates the files in `folder`, so that every job starts with the same disk and memory in use. The files themselves stay: after
-/// many files were removed, ext4 is slow to make new ones for minutes.
-fn empty(folder: &Path) -> Outcome<()> {
-    for entry in std::fs::read_dir(folder)? {
-        let path = entry?.path();
-        match path.is_dir() {
-            true => empty(&path)?,
-            false => std::fs::File::options().write(true).open(&path)?.set_len(0)?,
-        }
-    }
-    Ok(())
 }

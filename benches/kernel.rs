@@ -5,79 +5,33 @@
 //! reference. Runs alternate, and the medians are printed. Real data is read from `$GDT_SHARED/data` or `../shared/data`, if it
 //! exists.
 
+mod leaves;
 mod points;
 
 use delaunator::Point;
-use gdt_batch::geometry::{Bounds, Site};
+use gdt_batch::geometry::Site;
 use gdt_batch::triangulation::reference;
 use gdt_batch::voronoi::counts::{PipelineCounts, STEP_NAMES};
 use gdt_batch::voronoi::{PipelineBuffers, triangulate};
-use points::{Random, distinct, gaussian, median, uniform};
+use leaves::{Case, cases, cpu_time, cut};
+use points::median;
 use spade::{DelaunayTriangulation, Point2, Triangulation};
-use std::path::PathBuf;
 
-/// The size of leaves in a job, by default.
-const LEAF: usize = 50_000;
 /// Leaves up to this size are not cut further.
 const SMALL: usize = 3_000;
-
-struct Case {
-    name: String,
-    leaves: Vec<Vec<Site>>,
-}
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
     let all = arguments.iter().any(|a| a == "--all");
-    let wanted = |name: &str| {
-        let mut names = arguments.iter().filter(|a| !a.starts_with("--")).peekable();
-        names.peek().is_none() || names.any(|n| name.contains(n.as_str()))
-    };
     println!(
         "ns per site (medians)      kernel   spade  delaun.  x spade  x delaun.  removed%  missing%  flips  reference"
     );
     let mut buffers = PipelineBuffers::default();
     let mut totals = Vec::new();
-    for (name, make) in cases(all) {
-        if !wanted(&name) {
-            continue;
-        }
-        if let Some(leaves) = make() {
-            totals.push((name.clone(), measure(&Case { name, leaves }, &mut buffers)));
-        }
+    for case in cases(&arguments, all) {
+        totals.push((case.name.clone(), measure(&case, &mut buffers)));
     }
     print_steps(&totals);
-}
-
-type Make = Box<dyn Fn() -> Option<Vec<Vec<Site>>>>;
-
-fn cases(all: bool) -> Vec<(String, Make)> {
-    let mut cases: Vec<(String, Make)> = Vec::new();
-    let mut add = |name: &str, make: Make| cases.push((name.to_string(), make));
-    for (label, n) in [("25 k", 25_000), ("50 k", 50_000), ("100 k", 100_000), ("250 k", 250_000), ("1 M", 1_000_000)] {
-        add(&format!("uniform {label}"), Box::new(move || Some(vec![uniform(n)])));
-    }
-    for leaf in [12_500, 25_000, 50_000, 100_000, 250_000] {
-        let name = format!("uniform 1 M, leaves {leaf}");
-        add(&name, Box::new(move || Some(cut(uniform(1_000_000), leaf))));
-    }
-    add("gaussian 1 M, leaves", Box::new(|| Some(cut(gaussian(1_000_000), LEAF))));
-    add("clusters 1 M, leaves", Box::new(|| Some(cut(clusters(1_000_000, 100), LEAF))));
-    add("clusters 1 M, one leaf", Box::new(|| Some(vec![clusters(1_000_000, 100)])));
-    add("lattice 100 k", Box::new(|| Some(vec![lattice(316)])));
-    add("circle 100 k", Box::new(|| Some(vec![circle(100_000)])));
-    add("crop, one leaf", Box::new(|| Some(vec![shared("crop.laz")?])));
-    add("crop, leaves", Box::new(|| Some(cut(shared("crop.laz")?, LEAF))));
-    add("Topography, leaves", Box::new(|| Some(cut(shared("Topography.laz")?, LEAF))));
-    add("autzen_trim, leaves", Box::new(|| Some(cut(shared("autzen_trim.las")?, LEAF))));
-    add("autzen every 9th leaf", Box::new(|| Some(cut(shared("autzen.laz")?, LEAF).into_iter().step_by(9).collect())));
-    if all {
-        for (label, n) in [("4 M", 4_000_000), ("10 M", 10_000_000)] {
-            add(&format!("uniform {label}, leaves"), Box::new(move || Some(cut(uniform(n), LEAF))));
-        }
-        add("autzen, leaves", Box::new(|| Some(cut(shared("autzen.laz")?, LEAF))));
-    }
-    cases
 }
 
 /// Runs the three in turn until each has run for about a second, at least three times, and prints the medians.
@@ -162,59 +116,4 @@ fn print_steps(totals: &[(String, (usize, PipelineCounts))]) {
         }
         println!("  (islands {}, inverted {}, moved {})", counts.islands, counts.inverted, counts.moved);
     }
-}
-
-/// Returns the nanoseconds that this thread has run, so that other work on the machine counts as little as possible.
-fn cpu_time() -> f64 {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    time.tv_sec as f64 * 1e9 + time.tv_nsec as f64
-}
-
-/// Cuts the sites at the median of the longer side until no part has more than `leaf` sites.
-fn cut(mut sites: Vec<Site>, leaf: usize) -> Vec<Vec<Site>> {
-    if sites.len() <= leaf {
-        return vec![sites];
-    }
-    let bounds = Bounds::of_points(sites.iter().copied()).expect("a leaf has sites");
-    let axis = (bounds.extent(1) > bounds.extent(0)) as usize;
-    let half = sites.len() / 2;
-    sites.select_nth_unstable_by_key(half, |s| s[axis]);
-    let other = sites.split_off(half);
-    let mut leaves = cut(sites, leaf);
-    leaves.extend(cut(other, leaf));
-    leaves
-}
-
-/// Reads the distinct sites of a file of the shared test data.
-fn shared(name: &str) -> Option<Vec<Site>> {
-    let folder = std::env::var_os("GDT_SHARED").map(PathBuf::from);
-    let folder = folder.unwrap_or_else(|| PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared")));
-    let Ok(mut reader) = las::Reader::from_path(folder.join("data").join(name)) else {
-        println!("{name} was not found");
-        return None;
-    };
-    let points = reader.read_all().ok()?;
-    let low = [points.x_raw().min()?, points.y_raw().min()?];
-    let sites = points.x_raw().zip(points.y_raw()).map(|(x, y)| [x - low[0], y - low[1]]).collect();
-    Some(distinct(sites))
-}
-
-fn clusters(n: usize, spots: usize) -> Vec<Site> {
-    let mut random = Random(3);
-    let centres: Vec<[f64; 2]> = (0..spots).map(|_| [random.unit() * 1e8, random.unit() * 1e8]).collect();
-    let mut site = |i: usize| {
-        let (centre, [x, y]) = (centres[i % spots], random.normal());
-        [(centre[0] + 1e5 * x) as i32, (centre[1] + 1e5 * y) as i32]
-    };
-    distinct((0..n).map(&mut site).collect())
-}
-
-fn lattice(side: i32) -> Vec<Site> {
-    (0..side * side).map(|i| [i % side * 100, i / side * 100]).collect()
-}
-
-fn circle(n: usize) -> Vec<Site> {
-    let mut random = Random(4);
-    let angles = (0..n).map(|_| random.unit() * std::f64::consts::TAU);
-    distinct(angles.map(|a| [(1e8 * a.cos()) as i32, (1e8 * a.sin()) as i32]).collect())
 }

@@ -41,7 +41,9 @@ pub fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> Result<T> + Se
     // A thread that starts without room for its signal stack would end the process.
     let bytes = RESERVE + BYTES_PER_THREAD * threads as u64;
     address_space::require(bytes, address_space::left(), || format!("starting {threads} threads"))?;
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    // Profilers, and the benchmark `serial`, tell the threads by their names.
+    let name = |number| format!("worker {number}");
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).thread_name(name).build();
     let pool = pool.map_err(|e| Error::Memory(format!("cannot start {threads} threads: {e}")))?;
     pool.install(work)
 }
