@@ -22,17 +22,28 @@ pub(crate) fn normal_shorts(normal: [f32; 3], anisotropy: f32) -> [i16; 4] {
     [x, y, z, 0]
 }
 
-/// Returns the nearest whole number, of two the one further from 0. Takes fewer steps than `f32::round`, which is a call on most processors.
+/// Numbers below this, and above its negative, are rounded.
+const ROUNDED_REACH: f32 = (1 << 22) as f32;
+
+/// The sum of this and a number below [`ROUNDED_REACH`] has no place for a fraction.
+const SHIFT: f32 = 3.0 * ROUNDED_REACH;
+
+/// Returns the nearest whole number, of two the one further from 0; 0 if the number is out of reach. Unlike `f32::round`, and unlike a
+/// conversion to whole numbers, it is a few steps that every processor does for several numbers at a time.
 #[inline(always)]
-fn rounded(v: f32) -> f32 {
-    let towards_zero = v as i32 as f32;
-    let is_half_off = (v - towards_zero).abs() >= 0.5;
-    towards_zero + if is_half_off { 1.0f32.copysign(v) } else { 0.0 }
+fn rounded(v: f32) -> i32 {
+    let v = if v.abs() < ROUNDED_REACH { v } else { 0.0 };
+    let shifted = v + SHIFT;
+    // The sum was rounded to the even one of two.
+    let off = v - (shifted - SHIFT);
+    let whole = shifted.to_bits() as i32 - SHIFT.to_bits() as i32;
+    let (is_up, is_down) = (v > 0.0 && off == 0.5, v < 0.0 && off == -0.5);
+    whole + i32::from(is_up) - i32::from(is_down)
 }
 
 /// Returns the normal with its y stretched, as whole numbers of about this `length`.
 #[inline(always)]
-fn stretched([x, y, z]: [f32; 3], anisotropy: f32, length: f32) -> [f32; 3] {
+fn stretched([x, y, z]: [f32; 3], anisotropy: f32, length: f32) -> [i32; 3] {
     let y = y * anisotropy;
     let scale = length / (x * x + y * y + z * z).sqrt();
     [x, y, z].map(|v| rounded(v * scale))
@@ -63,7 +74,7 @@ pub(crate) fn normal_long_octahedral(normal: [f32; 3], anisotropy: f32, one: i16
 
 /// Returns the place of a normal, with its y stretched, on the octahedron whose corners are this far, `one`, from its middle.
 #[inline(always)]
-fn on_octahedron([x, y, z]: [f32; 3], anisotropy: f32, one: f32) -> [f32; 2] {
+fn on_octahedron([x, y, z]: [f32; 3], anisotropy: f32, one: f32) -> [i32; 2] {
     let y = y * anisotropy;
     let scale = 1.0 / (x.abs() + y.abs() + z.abs());
     let (u, v) = (x * scale, y * scale);
@@ -89,7 +100,7 @@ pub(crate) fn from_long_octahedral([u, v, one, padding]: [i16; 4]) -> [i16; 4] {
 /// Returns the normal of a place on the octahedron, as whole numbers of this `length`. Single precision and this order of operations
 /// make the result the same on every machine.
 #[inline(always)]
-fn off_octahedron([u, v, one]: [f32; 3], length: f32) -> [f32; 3] {
+fn off_octahedron([u, v, one]: [f32; 3], length: f32) -> [i32; 3] {
     let one = one.max(1.0);
     let (u, v) = (u / one, v / one);
     let z = 1.0 - u.abs() - v.abs();
@@ -142,6 +153,16 @@ mod tests {
         let b = b / anisotropy;
         let cosine = (x * a + y * b + z * c) / (a * a + b * b + c * c).sqrt();
         cosine.min(1.0).acos().to_degrees()
+    }
+
+    #[test]
+    fn rounding_is_that_of_the_standard_library() {
+        let near = |v: f32| [v.next_down(), v, v.next_up()];
+        let halves = (-80_000..80_000).map(|half| half as f32 / 2.0);
+        for v in halves.flat_map(near).chain(near(ROUNDED_REACH - 1.5)).chain([-0.0, 0.1, f32::MIN_POSITIVE]) {
+            assert_eq!(rounded(v), v.round() as i32, "{v}");
+        }
+        assert_eq!([f32::NAN, f32::INFINITY, -ROUNDED_REACH].map(rounded), [0; 3]);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! glTF: writes tiles as GLB files, packed or plain, and reads them back.
 
+pub(crate) mod arcs_around;
 pub(crate) mod check_json;
 pub(crate) mod container;
 pub(crate) mod document;

@@ -360,7 +360,7 @@ impl<'b> Decoder<'b> {
         triangles.truncate(accessor.count as usize / 3);
         // Viewers cut numbers that are too large for 16 bits.
         let is_short = accessor.component == ComponentType::U16;
-        match is_short && triangles.as_flattened().iter().any(|&v| v > u32::from(u16::MAX)) {
+        match is_short && greatest_of(triangles.as_flattened()) > u32::from(u16::MAX) {
             true => Err(format!("accessor {indices} has indices of more than 16 bits")),
             false => Ok(triangles),
         }
