@@ -47,13 +47,13 @@ impl EdgeTester {
     ) -> TestedBlock {
         let own = block.own_sides(8 * (first - front) as u32, 8 * front as u32);
         let (mut edges, mut broken) = (0, false);
-        for i in 0..3 {
-            broken |= self.fetch_beyond::<CHECK>(records, first, block.records, i, own[i], sites);
-            edges += own[i].count_ones() as usize;
+        for (i, own) in own.into_iter().enumerate() {
+            broken |= self.fetch_beyond::<CHECK>(records, first, block.records, i, own, sites);
+            edges += own.count_ones() as usize;
         }
         let mut doubts = self.batch.doubts(block.count);
-        for i in 0..3 {
-            doubts.sides[i] &= own[i];
+        for (side, own) in doubts.sides.iter_mut().zip(own) {
+            *side &= own;
         }
         TestedBlock { doubts, edges, broken }
     }
