@@ -60,6 +60,14 @@ impl ClosedMesh {
         self.free.push(h.triangle());
     }
 
+    /// Takes away the triangle of `h`, whose twins may be anything. Other triangles may lead to it.
+    pub(super) fn isolate(&mut self, h: ClosedEdge) {
+        for side in h.triangle().sides() {
+            self.set_twin(side, side);
+        }
+        self.release(h);
+    }
+
     /// Returns the half-edge that stands for slot `i`. It has a twin, but no origin.
     #[inline(always)]
     pub(super) const fn slot(i: usize) -> ClosedEdge {

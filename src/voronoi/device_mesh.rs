@@ -81,7 +81,7 @@ impl<'a> DeviceMesh<'a> {
         for (part, _) in strange.into_iter().enumerate().filter(|&(_, is_strange)| is_strange) {
             for (t, record) in (0..).step_by(8).map(ClosedEdge).zip(records).skip(part * PART).take(PART) {
                 match record[0] == VertexIndex::NONE.0 {
-                    true => mesh.release(t),
+                    true => mesh.isolate(t),
                     false if copy(&[*record], &mut [[0; 8]], limits) => (),
                     false => return Err(wrong),
                 }

@@ -11,7 +11,7 @@ use crate::voronoi::counts::PipelineCounts;
 use crate::voronoi::index::VertexIndex;
 use crate::voronoi::pixel_map::PixelMap;
 use crate::voronoi::rejection::Rejection;
-use crate::voronoi::texture_request::TextureRequest;
+use crate::voronoi::texture_request::{TextureRequest, TextureResolution};
 
 /// The largest fraction of missing sites with which the pipeline is still worthwhile.
 pub(super) const MAX_MISSING: f64 = 0.4;
@@ -103,7 +103,9 @@ impl SiteTexture {
         }
         let extent = [0, 1].map(|axis| bounds.extent(axis) as f64 + 1.0);
         let scale = request.scale(extent, sites.len());
-        let map = PixelMap::new(sites, bounds.min, extent, scale);
+        // A size that somebody asked for stays.
+        let may_shrink = matches!(request.resolution, TextureResolution::PixelsPerSite(_));
+        let map = PixelMap::new(sites, bounds.min, extent, scale, may_shrink);
         [self.width, self.height] = map.size;
         self.words = self.width.div_ceil(64);
         match map.missing(sites) > MAX_MISSING {

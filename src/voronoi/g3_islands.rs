@@ -102,6 +102,17 @@ impl IslandSearch {
         }
         changes.apply(&mut self.degrees);
         self.fans = fans;
+        #[cfg(test)]
+        self.check_degrees(mesh, sites);
+    }
+
+    /// Checks the degrees of all finite vertices.
+    #[cfg(test)]
+    fn check_degrees(&self, mesh: &ClosedMesh, sites: &[Site]) {
+        let mut again = IslandSearch::default();
+        again.count_degrees(mesh, sites.len());
+        let infinity = mesh.infinity().get();
+        assert!(self.degrees[..infinity] == again.degrees[..infinity], "{sites:?}");
     }
 
     /// Returns a half-edge that starts at a vertex whose only triangles are two of `fan`.
@@ -165,11 +176,12 @@ impl DegreeChanges {
     }
 
     fn apply(self, degrees: &mut [u32]) {
-        for vertex in self.gone.into_iter().flatten() {
-            degrees[vertex.get()] -= 1;
-        }
+        // First what is new: some of it is gone again.
         for vertex in self.new.into_iter().flatten() {
             degrees[vertex.get()] += 1;
+        }
+        for vertex in self.gone.into_iter().flatten() {
+            degrees[vertex.get()] -= 1;
         }
     }
 }

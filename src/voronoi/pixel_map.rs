@@ -47,11 +47,12 @@ struct AxisMap {
 
 impl PixelMap {
     /// Returns the pixels for `sites`, whose box is `extent` steps wide and high and begins at `low`.
-    pub(super) fn new(sites: &[Site], low: Site, extent: [f64; 2], scale: f64) -> PixelMap {
+    /// Where they crowd, the texture `may_shrink`.
+    pub(super) fn new(sites: &[Site], low: Site, extent: [f64; 2], scale: f64, may_shrink: bool) -> PixelMap {
         let histograms = histograms(sites, low, extent);
         let crowding = histograms.iter().map(|histogram| crowding(histogram, sites.len())).product::<f64>();
         let is_crowded = crowding > MAX_CROWDING;
-        let scale = if is_crowded { CROWDED_SIDE * scale } else { scale };
+        let scale = if is_crowded && may_shrink { CROWDED_SIDE * scale } else { scale };
         let size = extent.map(|side| pixels_along(side, scale));
         let axis = |axis: usize| AxisMap::new(&histograms[axis], extent[axis], size[axis]);
         // Rounded down, so that no site is beyond the last pixel.

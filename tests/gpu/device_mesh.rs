@@ -184,8 +184,12 @@ fn crossed_links(answer: &mut Answer, random: &mut Random) {
 
 fn lost_triangles(answer: &mut Answer, random: &mut Random) {
     for _ in 0..=random.below(3) {
-        let h = pick_half_edge(answer, random);
-        answer.records[h & !7] = UNUSED;
+        let t = pick_half_edge(answer, random) & !7;
+        answer.records[t] = UNUSED;
+        // A record without a triangle has any twins.
+        if random.below(2) == 0 {
+            answer.records[t + 4..t + 7].fill(UNUSED);
+        }
     }
 }
 
