@@ -69,6 +69,10 @@ impl<'a> DocumentBuilder<'a> {
             Compression::None => (ascending(tile.positions.len(), &tile.triangles), None),
             _ => {
                 let (triangles, order) = order_vertices(tile.positions.len(), &tile.triangles);
+                // Orders are those of planar meshes, in which no directed edge has two triangles.
+                if triangles.len() != tile.triangles.len() {
+                    return Err(Error::Broken("the triangles of a tile are not a planar mesh".into()));
+                }
                 (triangles, Some(order))
             }
         };
