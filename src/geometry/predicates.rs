@@ -10,8 +10,8 @@ use multiversion::multiversion;
 /// (10 + 96 eps) eps in Shewchuk 1997, "Adaptive Precision Floating-Point Arithmetic", rounded up.
 const IN_CIRCLE_ERROR: f64 = 1.2e-15;
 
-/// Relative error of the difference of two rounded products of exactly represented differences, which is 2^-53 of the sum of their sizes,
-/// rounded up.
+/// Relative error of the difference of two rounded products of exactly represented differences: 2^-53 of the sum of their sizes, doubled
+/// for what is rounded here.
 const AREA_ERROR: f64 = 2.3e-16;
 
 /// Returns twice the signed area of triangle abc in square lattice steps, which is positive if a, b, c turn left. Exact.
@@ -179,7 +179,7 @@ fn doubts(batch: &TriangleBatch, count: usize) -> Doubts {
 
 /// Relative error of what [`LiftedPlane`] computes in single precision. With `e = 2^-24`, a difference is wrong by `e`, a lift by 4 e, a
 /// product of both by 6 e, and `p` and `q` by 7 e of the sum of the sizes of their two terms; `o` by 4 e. Times a coordinate or a lift, a
-/// term is wrong by 9 e or 10 e, and the sum of four by 13 e of the sum of all sizes. The rest is for terms of second order, and for the
+/// term is wrong by 9 e to 11 e, and the sum of four by 13 e of the sum of all sizes. The rest is for terms of second order, and for the
 /// rounding of the error itself. Nothing overflows: differences are integers up to 2^30, and sums stay below 2^126.
 const PLANE_ERROR: f32 = 20.0 / (1 << 24) as f32;
 

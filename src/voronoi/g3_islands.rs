@@ -19,7 +19,7 @@ const MAX_TRIANGLES: usize = 64;
 /// Buffers of the search.
 #[derive(Default)]
 pub(super) struct IslandSearch {
-    /// The number of triangles that have a vertex as a corner, by vertex. That of the vertex at infinity includes free records.
+    /// The number of triangles that have a vertex as a corner, by vertex.
     degrees: Vec<u32>,
     fans: Vec<TriangleFan>,
 }
@@ -133,11 +133,13 @@ impl IslandSearch {
 
     /// Lists the fans that have one of the `inverted` triangles, or were listed before, and are not the only fan of their vertex.
     fn find_fans(&mut self, mesh: &ClosedMesh, sites: &[Site], inverted: &[ClosedEdge]) {
-        let before = std::mem::take(&mut self.fans).into_iter().map(|fan| fan.outgoing);
+        // Another triangle may have taken the record of one that is gone.
+        let before = std::mem::take(&mut self.fans).into_iter();
+        let before = before.filter(|fan| mesh.origin(fan.outgoing) == fan.vertex).map(|fan| fan.outgoing);
         for h in before.chain(inverted.iter().flat_map(|t| t.sides())).filter(|&h| !mesh.is_free(h)) {
             // Nearly all fans are the only one.
             if around(mesh, h).count() < self.degrees[mesh.origin(h).get()] as usize {
-                self.fans.extend(fan(mesh, sites, h));
+                self.fans.extend(fan(mesh, sites, h).filter(|fan| fan.inverted > 0));
             }
         }
         self.fans.sort_unstable();

@@ -121,7 +121,8 @@ impl<N: Number> VertexOrder<N> {
             at = N::after(arcs, at);
             *to = at;
         }
-        let is_fan = at == end && start != N::NONE;
+        // Where a closed fan has been taken whole and others are left, both ends are the same.
+        let is_fan = at == end && start != N::NONE && start != end;
         if is_fan && left.get() > 0 {
             self.append_fan(start, left.get(), |i| fan[i + 1]);
         }
