@@ -119,8 +119,8 @@ impl<'a> Block<'a> {
         Block { records: padded, count: records.len() }
     }
 
-    /// Returns for each side of the triangles whether it leads to an earlier triangle. The first half-edge of the block comes `start` after
-    /// the first of the mesh, `front`.
+    /// Returns for each side of the triangles whether it leads to an earlier triangle. A side that leads to its own triangle does not count,
+    /// so a mesh with such sides has too few edges. The first half-edge of the block comes `start` after the first of the mesh, `front`.
     #[inline(always)]
     fn own_sides(&self, start: u32, front: u32) -> [u64; 3] {
         let mut own = [0; 3];
