@@ -130,14 +130,7 @@ impl SiteTexture {
         let numbered = (0..).map(SiteIndex).zip(self.pixels.iter().zip(sites));
         let row_sites = numbered.map(|(index, (&pixel, &site))| RowSite { x: pixel & 0xffff, index, site });
         if self.pixels.is_sorted_by_key(|pixel| pixel >> 16) {
-            // As in a job. To count them would take longer, because each count waits for the one before.
-            for (i, pixels) in self.pixels.windows(2).enumerate() {
-                if pixels[0] >> 16 != pixels[1] >> 16 {
-                    self.row_ends[(pixels[0] >> 16) as usize..(pixels[1] >> 16) as usize].fill(i as u32 + 1);
-                }
-            }
-            let last = self.pixels.last().map_or(0, |pixel| (pixel >> 16) as usize);
-            self.row_ends[last..].fill(sites.len() as u32);
+            find_row_ends(&self.pixels, &mut self.row_ends);
             for (to, site) in self.rows.iter_mut().zip(row_sites) {
                 *to = site;
             }
@@ -238,4 +231,18 @@ impl SiteTexture {
         self.sites.extend(self.missing_sites.iter().map(|missing| missing.site));
         self.sites.push([0; 2]);
     }
+}
+
+/// Finds the end of every row of pixels (y << 16 | x) that come row by row, as in a job. To count them would take longer, because each
+/// count waits for the one before.
+fn find_row_ends(pixels: &[u32], row_ends: &mut [u32]) {
+    let mut first = 0;
+    for (i, pair) in (1..).zip(pixels.windows(2)) {
+        let [row, next] = [pair[0] >> 16, pair[1] >> 16].map(|row| row as usize);
+        if row != next {
+            row_ends[row..next].fill(i);
+            first = next;
+        }
+    }
+    row_ends[first..].fill(pixels.len() as u32);
 }
