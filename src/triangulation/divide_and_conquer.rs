@@ -2,7 +2,8 @@
 //! diagrams", section 9): n log n time on any sites. It triangulates the inner nodes of the tree, whose sites lie along borders,
 //! and the leaves that the pipeline rejects.
 //!
-//! The sites are sorted and halved; two triangulations that lie side by side are joined from their lower common tangent upwards.
+//! The sites are halved along the axis on which they reach further (after Dwyer 1987, "A faster divide-and-conquer algorithm for
+//! constructing Delaunay triangulations"). Two triangulations that lie side by side are joined from their lower common tangent upwards.
 //! Every decision is exact, and ties follow the rule of `geometry::predicates`, which is that of sites raised by symbolic amounts, so
 //! that joining meets no ties at all.
 
@@ -30,23 +31,20 @@ pub fn triangulate(sites: &[Site]) -> Result<HalfEdgeMesh> {
     if sites.len() > MAX_SITES || sites.as_flattened().iter().any(|c| !(-REACH..=REACH).contains(c)) {
         return Err(Error::Broken("a site is out of reach, or there are too many for one node".into()));
     }
-    let mut order: Vec<SiteIndex> = (0..sites.len()).map(SiteIndex::new).collect();
-    order.sort_unstable_by_key(|&i| sites[i.get()]);
-    let sorted: Vec<Site> = order.iter().map(|&i| sites[i.get()]).collect();
-    if sorted.windows(2).any(|pair| pair[0] == pair[1]) {
-        return Err(Error::Broken("two sites of one tile coincide".into()));
-    }
-    if sites.len() < 3 {
+    let mut subdivision = Subdivision::new(sites);
+    if sites.len() < 2 {
         return Ok(HalfEdgeMesh::default());
     }
-    let mut subdivision = Subdivision::new(&sorted);
-    subdivision.triangulate(0, sorted.len())?;
-    let mut mesh = subdivision.into_mesh(&order)?;
+    subdivision.triangulate(0, sites.len(), Axis::X)?;
+    let mut mesh = subdivision.into_mesh()?;
     interrupt::check()?;
     let flips = legalize(&mut mesh, sites);
     debug_assert_eq!(flips, 0, "joining decides every edge");
     Ok(mesh)
 }
+
+/// A part with so many sites or fewer is sorted at once, and halved along one axis alone.
+const SMALL_PART: usize = 32;
 
 /// A directed edge. The other direction of edge `e` is `e ^ 1`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,8 +68,48 @@ struct Links {
     clockwise: Edge,
 }
 
-/// Two edges on the hull of a part: the one that leaves its first site and has the hull on its left side, and the one that leaves
-/// its last site and has the hull on its right side.
+/// The direction in which a part is halved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Axis {
+    X,
+    Y,
+}
+
+impl Axis {
+    /// Returns what ascends along the axis. Sites with the same place on it go by the other coordinate. Both orders are the same but for a
+    /// quarter turn, so that joining needs not know the axis.
+    #[inline]
+    fn key(self, [x, y]: Site) -> u64 {
+        let [along, across] = match self {
+            Axis::X => [x, y],
+            Axis::Y => [y, -x],
+        };
+        // One number is compared faster than two.
+        let from_zero = |coordinate: i32| u64::from(coordinate.wrapping_sub(i32::MIN) as u32);
+        from_zero(along) << 32 | from_zero(across)
+    }
+
+    /// Returns the axis along which `sites` reach further. Sites of merges lie in strips along borders: halves across a strip have few
+    /// edges in common.
+    fn longer(sites: &[PlacedSite]) -> Axis {
+        let extent = |k: usize| {
+            let along = || sites.iter().map(|placed| placed.site[k]);
+            i64::from(along().max().unwrap_or(0)) - i64::from(along().min().unwrap_or(0))
+        };
+        if extent(1) > extent(0) { Axis::Y } else { Axis::X }
+    }
+}
+
+/// A site in the order of the parts.
+#[derive(Clone, Copy)]
+struct PlacedSite {
+    site: Site,
+    /// Its number where the caller has it.
+    index: SiteIndex,
+}
+
+/// Two edges on the hull of a part: the one that leaves its first site along an axis and has the hull on its left side, and the one that
+/// leaves its last site and has the hull on its right side.
 #[derive(Clone, Copy)]
 struct HullEnds {
     first: Edge,
@@ -79,9 +117,8 @@ struct HullEnds {
 }
 
 /// The edges of the triangulations of the parts.
-struct Subdivision<'a> {
-    /// Sorted by x, then by y.
-    sites: &'a [Site],
+struct Subdivision {
+    sites: Vec<PlacedSite>,
     edges: Vec<Links>,
     /// Edges that were deleted, the even one of each pair.
     free: Vec<Edge>,
@@ -90,24 +127,66 @@ struct Subdivision<'a> {
 /// The origin of deleted edges.
 const DELETED: u32 = u32::MAX;
 
-impl Subdivision<'_> {
-    fn new(sites: &[Site]) -> Subdivision<'_> {
-        Subdivision { sites, edges: Vec::with_capacity(6 * sites.len()), free: Vec::new() }
+impl Subdivision {
+    fn new(sites: &[Site]) -> Subdivision {
+        let placed = |(i, &site)| PlacedSite { site, index: SiteIndex::new(i) };
+        let sites: Vec<PlacedSite> = sites.iter().enumerate().map(placed).collect();
+        Subdivision { edges: Vec::with_capacity(6 * sites.len()), sites, free: Vec::new() }
     }
 
-    /// Triangulates the sites from `start` to before `end`, at least two of them.
-    fn triangulate(&mut self, start: usize, end: usize) -> Result<HullEnds> {
+    /// Triangulates the sites from `start` to before `end`, at least two of them. Returns the ends along `wanted`.
+    fn triangulate(&mut self, start: usize, end: usize, wanted: Axis) -> Result<HullEnds> {
+        let part = &mut self.sites[start..end];
+        let axis = Axis::longer(part);
+        let ends = if part.len() <= SMALL_PART {
+            part.sort_unstable_by_key(|placed| axis.key(placed.site));
+            if part.windows(2).any(|pair| pair[0].site == pair[1].site) {
+                return Err(coincidence());
+            }
+            self.triangulate_sorted(start, end)?
+        } else {
+            if part.len() > STEPS_BETWEEN_CHECKS {
+                interrupt::check()?;
+            }
+            let middle = part.len() / 2;
+            part.select_nth_unstable_by_key(middle, |placed| axis.key(placed.site));
+            let left = self.triangulate(start, start + middle, axis)?;
+            let right = self.triangulate(start + middle, end, axis)?;
+            if self.site(self.origin(left.last)) == self.site(self.origin(right.first)) {
+                return Err(coincidence());
+            }
+            self.join(left, right)?
+        };
+        Ok(if axis == wanted { ends } else { self.ends_along(wanted, ends.first) })
+    }
+
+    /// Triangulates the sites from `start` to before `end`, at least two of them, which are sorted along an axis. Returns the ends along it.
+    fn triangulate_sorted(&mut self, start: usize, end: usize) -> Result<HullEnds> {
         match end - start {
             2 => Ok(self.segment(start)),
             3 => Ok(self.triangle(start)),
             n => {
-                if n > STEPS_BETWEEN_CHECKS {
-                    interrupt::check()?;
-                }
-                let middle = start + n / 2;
-                let left = self.triangulate(start, middle)?;
-                let right = self.triangulate(middle, end)?;
+                let left = self.triangulate_sorted(start, start + n / 2)?;
+                let right = self.triangulate_sorted(start + n / 2, end)?;
                 self.join(left, right)
+            }
+        }
+    }
+
+    /// Returns the ends along `axis` of the part with `edge` on its hull, and the hull on its left side.
+    fn ends_along(&self, axis: Axis, edge: Edge) -> HullEnds {
+        let key = |site: u32| axis.key(self.site(site));
+        let (mut first, mut last, mut at) = (edge, edge, edge);
+        loop {
+            at = self.right_previous(at);
+            if at == edge {
+                return HullEnds { first, last: last.reversed() };
+            }
+            if key(self.origin(at)) < key(self.origin(first)) {
+                first = at;
+            }
+            if key(self.destination(at)) > key(self.destination(last)) {
+                last = at;
             }
         }
     }
@@ -122,7 +201,7 @@ impl Subdivision<'_> {
         let a = self.add(first, first + 1);
         let b = self.add(first + 1, first + 2);
         self.splice(a.reversed(), b);
-        match orient2d(self.sites[start], self.sites[start + 1], self.sites[start + 2]) {
+        match orient2d(self.site(first), self.site(first + 1), self.site(first + 2)) {
             0 => HullEnds { first: a, last: b.reversed() },
             turn => {
                 let c = self.connect(b, a);
@@ -219,13 +298,17 @@ impl Subdivision<'_> {
 
     /// Returns a positive number if `site` lies to the left of `edge`, a negative one if it lies to the right, zero on its line.
     fn turn(&self, site: u32, edge: Edge) -> i64 {
-        let [from, to, site] = [self.origin(edge), self.destination(edge), site].map(|i| self.sites[i as usize]);
+        let [from, to, site] = [self.origin(edge), self.destination(edge), site].map(|i| self.site(i));
         orient2d(from, to, site)
     }
 
     fn in_circle(&self, a: u32, b: u32, c: u32, d: u32) -> bool {
-        let [a, b, c, d] = [a, b, c, d].map(|i| self.sites[i as usize]);
+        let [a, b, c, d] = [a, b, c, d].map(|i| self.site(i));
         in_circle(a, b, c, d)
+    }
+
+    fn site(&self, at: u32) -> Site {
+        self.sites[at as usize].site
     }
 
     fn origin(&self, edge: Edge) -> u32 {
@@ -284,11 +367,11 @@ impl Subdivision<'_> {
         self.edges[after_a.get()].clockwise = b;
     }
 
-    /// Returns the triangles, with `order[i]` in the place of site `i`.
+    /// Returns the triangles.
     ///
     /// # Errors
     /// [`Error::Interrupted`].
-    fn into_mesh(self, order: &[SiteIndex]) -> Result<HalfEdgeMesh> {
+    fn into_mesh(self) -> Result<HalfEdgeMesh> {
         let mut half_edge_of = vec![HalfEdgeIndex::HULL; self.edges.len()];
         let mut mesh = HalfEdgeMesh { triangles: Vec::with_capacity(2 * self.sites.len()), twins: Vec::new() };
         for edge in (0..self.edges.len() as u32).map(Edge) {
@@ -298,7 +381,7 @@ impl Subdivision<'_> {
             if let Some(sides) = self.triangle_left_of(edge).filter(|_| half_edge_of[edge.get()] == HalfEdgeIndex::HULL)
             {
                 let half_edges = HalfEdgeIndex::of_triangle(mesh.triangles.len());
-                mesh.triangles.push(sides.map(|side| order[self.origin(side) as usize]));
+                mesh.triangles.push(sides.map(|side| self.sites[self.origin(side) as usize].index));
                 sides.iter().zip(half_edges).for_each(|(side, h)| half_edge_of[side.get()] = h);
             }
         }
@@ -318,9 +401,14 @@ impl Subdivision<'_> {
     }
 }
 
+fn coincidence() -> Error {
+    Error::Broken("two sites of one tile coincide".into())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::triangulation::reference;
 
     #[test]
     fn two_sites_in_one_place_are_an_error() {
@@ -334,6 +422,38 @@ mod tests {
             assert!(matches!(triangulate(&[[0, 0], [4, 1], far]), Err(Error::Broken(_))));
         }
         assert_eq!(triangulate(&[[-REACH, -REACH], [REACH, -REACH], [0, REACH]]).unwrap().triangles.len(), 1);
+    }
+
+    /// Equal sites come apart where a part is halved between them.
+    #[test]
+    fn two_sites_in_one_place_are_found_in_any_part() {
+        let line: Vec<Site> = (0..200).map(|i| [i, 3 * i % 7]).collect();
+        let column: Vec<Site> = line.iter().map(|&[x, y]| [y, -x]).collect();
+        for sites in [line, column] {
+            for twice in 0..sites.len() {
+                let twins = [&sites[..], &[sites[twice]]].concat();
+                assert!(matches!(triangulate(&twins), Err(Error::Broken(_))), "{:?}", sites[twice]);
+            }
+        }
+    }
+
+    /// Parts are halved along both axes here, and most of their hulls have sites in line.
+    #[test]
+    fn strips_along_borders_are_canonical() {
+        let is_near = |v: i32, gap: i32| v.rem_euclid(40).min(40 - v.rem_euclid(40)) < gap;
+        let square = |size: i32| (0..size).flat_map(move |x| (0..size).map(move |y| [x, y]));
+        for gap in 1..4 {
+            let sites: Vec<Site> = square(81).filter(|p| p.iter().any(|&v| is_near(v, gap))).collect();
+            for scale in [[1, 1], [1, 50], [50, 1], [-3, 2]] {
+                let sites: Vec<Site> = sites.iter().map(|p| [p[0] * scale[0], p[1] * scale[1]]).collect();
+                let least = |mesh: HalfEdgeMesh| {
+                    let first = |&[a, b, c]: &[u32; 3]| [a, b, c].min([b, c, a]).min([c, a, b]);
+                    mesh.corners().iter().map(first).collect::<std::collections::BTreeSet<_>>()
+                };
+                let expected = least(reference::triangulate(&sites).unwrap());
+                assert_eq!(least(triangulate(&sites).unwrap()), expected, "{gap} {scale:?}");
+            }
+        }
     }
 
     /// Quadratic time would be 10^11 steps here, hours rather than a second.

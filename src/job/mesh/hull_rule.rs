@@ -50,6 +50,11 @@ impl HullRule {
     /// Returns the corner at which the edge begins that the triangle flows over.
     #[inline]
     pub fn flow(&self, corners: [Site; 3]) -> Option<usize> {
+        let [a, b, c] = corners;
+        // Few triangles have a long edge, so this branch is foreseen. Half of all are obtuse.
+        if !(self.is_long(a, b) | self.is_long(b, c) | self.is_long(c, a)) {
+            return None;
+        }
         let is_obtuse = |&apex: &usize| dot(corners[apex], corners[(apex + 1) % 3], corners[(apex + 2) % 3]) < 0;
         let from = ((0..3).find(is_obtuse)? + 1) % 3;
         self.is_long(corners[from], corners[(from + 1) % 3]).then_some(from)
