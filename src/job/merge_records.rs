@@ -157,7 +157,8 @@ impl Seam {
             tiles.sort_unstable();
             touching.extend((0..3).filter(|&i| i == 0 || tiles[i] != tiles[i - 1]).map(|i| (tiles[i], at)));
         }
-        touching.sort_unstable_by_key(|&(tile, at)| (tile, triangles[at as usize]));
+        // This keeps the order of the triangles.
+        radsort::sort_by_key(&mut touching, |&(tile, _)| tile.0);
         let mut seam = Seam { index: Vec::new(), triangles: Vec::with_capacity(touching.len()), trimmed, hull };
         for (tile, at) in touching {
             match seam.index.last_mut() {

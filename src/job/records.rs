@@ -199,12 +199,25 @@ impl Leaf {
             let rest = unpack(rest, count, |[intensity]| intensity as u16, &mut intensity);
             rest.filter(|rest| rest.is_empty()).ok_or_else(|| Leaf::damaged(tile))?;
         }
-        let triangles = if has_short_corners(count) {
-            columns.column::<[u16; 3]>()?.iter().map(|t| t.map(u32::from)).collect()
-        } else {
-            columns.column_vec()?
-        };
-        Ok(Leaf { positions, rgb, class, intensity, triangles })
+        Ok(Leaf { positions, rgb, class, intensity, triangles: Leaf::read_triangles(&mut columns, count)? })
+    }
+
+    /// Reads the positions of the sites of `tile` and the triangles, without what else is known of the sites.
+    ///
+    /// # Errors
+    /// As [`Leaf::load`].
+    pub fn load_mesh(store: &Store, tile: TileIndex) -> Result<(Vec<[i32; 3]>, Vec<[u32; 3]>)> {
+        let mut columns = ColumnReader::open(store, StepRecord::Leaf(tile))?;
+        let (count, positions) = Leaf::read_positions(&mut columns, tile)?;
+        columns.skip_column::<u8>()?;
+        Ok((positions, Leaf::read_triangles(&mut columns, count)?))
+    }
+
+    fn read_triangles(columns: &mut ColumnReader<StepRecord>, count: usize) -> Result<Vec<[u32; 3]>> {
+        if has_short_corners(count) {
+            return Ok(columns.column::<[u16; 3]>()?.iter().map(|t| t.map(u32::from)).collect());
+        }
+        columns.column_vec()
     }
 
     fn read_positions(columns: &mut ColumnReader<StepRecord>, tile: TileIndex) -> Result<(usize, Vec<[i32; 3]>)> {

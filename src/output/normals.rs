@@ -42,6 +42,15 @@ impl NormalSums {
         }
     }
 
+    /// Tells of every vertex whether it is a corner of a triangle: then the z of its sum is above zero, because counterclockwise triangles
+    /// have an area.
+    pub fn corners(&self) -> Vec<bool> {
+        match self {
+            NormalSums::Narrow(sums) => sums.iter().map(|sum| sum[2] > 0).collect(),
+            NormalSums::Wide(sums) => sums.iter().map(|sum| sum[2] > 0).collect(),
+        }
+    }
+
     /// Returns the unit normals of all vertices, each as [`unit_normal`] does.
     pub fn unit_normals(&self, frame: &Frame) -> Vec<[f32; 3]> {
         let weights = weights(frame);
@@ -176,5 +185,14 @@ mod tests {
     #[test]
     fn a_vertex_without_triangles_has_a_normal_straight_up() {
         assert_eq!(unit_normal([0; 3], &frame()), [0.0, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn corners_of_triangles_are_known_by_their_sums() {
+        let far = 1 << 29;
+        for size in [1, far] {
+            let positions = [[0, 0, -far], [size, 0, far], [0, size, -far], [5, 5, 5]];
+            assert_eq!(NormalSums::new(&positions, &[[0, 1, 2]]).corners(), [true, true, true, false]);
+        }
     }
 }

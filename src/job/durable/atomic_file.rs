@@ -38,8 +38,10 @@ pub fn write_pending(path: &Path, content: &[u8]) -> Result<PendingFile> {
 pub fn write_pending_pieces(path: &Path, pieces: &[&[u8]]) -> Result<PendingFile> {
     let partial = partial_path(path);
     let write = |file: File| {
-        let mut file = WriteFrom { file: &file, at: 0 };
-        pieces.iter().try_for_each(|piece| file.write_all(piece))
+        let mut writer = WriteFrom { file: &file, at: 0 };
+        pieces.iter().try_for_each(|piece| writer.write_all(piece))?;
+        disk::begin_sync(&file);
+        Ok(())
     };
     disk::create(&partial).and_then(write).map_err(Error::io("write", &partial))?;
     let mut hasher = Xxh3::new();

@@ -59,9 +59,13 @@ fn look(point: &Point) -> (u8, [u16; 3], u16) {
 /// Sorts by y, then x: neighbours in the plane become neighbours in memory, and the pipeline works row by row.
 fn sort(points: &mut Vec<Point>) {
     match packed_keys(points) {
-        Some((mut keys, index_bits)) => {
+        Some(PackedKeys { mut keys, place_bits, index_bits }) => {
             // Indices ascend, and the sort keeps the order of equal keys.
-            radsort::sort_by_key(&mut keys, |key| key >> index_bits);
+            match place_bits {
+                // Half as many digits are counted.
+                ..=u32::BITS => radsort::sort_by_key(&mut keys, |key| (key >> index_bits) as u32),
+                _ => radsort::sort_by_key(&mut keys, |key| key >> index_bits),
+            }
             let index = |key: u64| (key & ((1 << index_bits) - 1)) as usize;
             *points = keys.into_iter().map(|key| points[index(key)]).collect();
         }
@@ -69,17 +73,28 @@ fn sort(points: &mut Vec<Point>) {
     }
 }
 
-/// Returns for every point its y, its x and its index in one number, and the number of bits of the index: numbers sort several times
-/// faster than points. Returns `None` if 64 bits do not hold them.
-fn packed_keys(points: &[Point]) -> Option<(Vec<u64>, u32)> {
+/// For every point its y, its x and its index in one number, from the highest bits on.
+struct PackedKeys {
+    keys: Vec<u64>,
+    /// The bits of y and x together.
+    place_bits: u32,
+    /// The bits of the index.
+    index_bits: u32,
+}
+
+/// Returns the keys of `points`: numbers sort several times faster than points. Returns `None` if 64 bits do not hold them.
+fn packed_keys(points: &[Point]) -> Option<PackedKeys> {
     let Bounds { min, max } = bounds(points)?;
     let bits = |value: u64| u64::BITS - value.leading_zeros();
     let along = |p: [i32; 2], axis: usize| (p[axis] as i64 - min[axis] as i64) as u64;
     let (x_bits, index_bits) = (bits(along(max, 0)), bits(points.len() as u64));
-    let fits = bits(along(max, 1)) + x_bits + index_bits <= u64::BITS;
+    let place_bits = bits(along(max, 1)) + x_bits;
+    if place_bits + index_bits > u64::BITS {
+        return None;
+    }
     let key =
         |(i, p): (usize, &Point)| (along(p.position, 1) << x_bits | along(p.position, 0)) << index_bits | i as u64;
-    fits.then(|| (points.iter().enumerate().map(key).collect(), index_bits))
+    Some(PackedKeys { keys: points.iter().enumerate().map(key).collect(), place_bits, index_bits })
 }
 
 /// Returns the box of the points' x and y.
@@ -105,6 +120,20 @@ mod tests {
             [(1 << 29, 1 << 29, 1), (-(1 << 29), 1 << 29, 2), (0, -(1 << 29), 3), (0, 0, 4), (1 << 29, 1 << 29, 0)];
         let kept = keep(&points, Duplicates::Lowest);
         assert_eq!(kept, [(0, -(1 << 29), 3), (0, 0, 4), (-(1 << 29), 1 << 29, 2), (1 << 29, 1 << 29, 0)]);
+    }
+
+    /// The keys take 31 to 36 bits, and the indices 7.
+    #[test]
+    fn tiles_of_any_width_are_sorted() {
+        for reach in [1 << 14, 1 << 15, 1 << 16, 1 << 17] {
+            let place = |i: i32| [i * 7919 % reach, i * 104_729 % reach];
+            let mut points: Vec<Point> = (0..100).map(|i| Point::new(place(i), i, [0; 3], 2, i as u64)).collect();
+            points.extend([[0, 0], [reach, reach]].map(|corner| Point::new(corner, 7, [0; 3], 2, 0)));
+            let mut expected = points.clone();
+            expected.sort_by_key(|point| (point.position[1], point.position[0]));
+            sort(&mut points);
+            assert_eq!(points, expected, "{reach}");
+        }
     }
 
     #[test]

@@ -19,6 +19,8 @@ pub(crate) struct TileContent {
     colors: Vec<[u16; 3]>,
     attributes: PointAttributes,
     triangles: Vec<[u32; 3]>,
+    /// Whether a triangle that stays has this corner.
+    is_used: Vec<bool>,
     /// Triangles that are left out.
     cut: Vec<[u32; 3]>,
     /// How many of them are slivers along the hull.
@@ -36,7 +38,8 @@ impl TileContent {
         let mut cut = slivers.take(&leaf.positions, &mut leaf.triangles);
         let slivers = cut.len() as u64;
         cut.extend(style.take_long(&leaf.positions, &mut leaf.triangles));
-        let mut normals = NormalSums::new(&leaf.positions, &leaf.triangles).unit_normals(&style.frame);
+        let sums = NormalSums::new(&leaf.positions, &leaf.triangles);
+        let (is_used, mut normals) = (sums.corners(), sums.unit_normals(&style.frame));
         for vertex in &border.vertices {
             normals[vertex.site.get()] = vertex.normal;
         }
@@ -53,7 +56,7 @@ impl TileContent {
                 intensity
             }),
         };
-        TileContent { positions, normals, colors, attributes, triangles, cut, slivers }
+        TileContent { positions, normals, colors, attributes, triangles, is_used, cut, slivers }
     }
 
     /// Adds the triangles of the seam that `tile` owns, with the vertices that belong to neighbours. Returns the number of triangles
@@ -85,7 +88,12 @@ impl TileContent {
             let is_sliver = slivers.has(&triangle);
             let is_cut = is_sliver || style.leaves_out(triangle.map(|corner| corner.position));
             self.slivers += u64::from(is_sliver);
-            if is_cut { &mut self.cut } else { &mut self.triangles }.push(corners);
+            if is_cut {
+                self.cut.push(corners);
+            } else {
+                self.triangles.push(corners);
+                corners.iter().for_each(|&v| self.is_used[v as usize] = true);
+            }
         }
         Ok((self.triangles.len() - before) as u64)
     }
@@ -103,6 +111,7 @@ impl TileContent {
             ))
         })?;
         self.positions.push(border.position);
+        self.is_used.push(false);
         self.normals.push(vertex.normal);
         if let Some(coloring) = &style.coloring {
             self.colors.push(coloring.color(border.position[2], vertex.rgb, vertex.class as u8));
@@ -118,10 +127,9 @@ impl TileContent {
 
     /// Returns the finished tile. It lacks the sites whose triangles all belong to other tiles or are left out.
     pub(crate) fn into_tile(mut self, style: &TileStyle) -> Tile {
-        let mut used = vec![false; self.positions.len()];
-        self.triangles.as_flattened().iter().for_each(|&v| used[v as usize] = true);
-        if used.contains(&false) {
-            self.drop_unused(&used);
+        let is_used = std::mem::take(&mut self.is_used);
+        if is_used.contains(&false) {
+            self.drop_unused(&is_used);
         }
         Tile {
             positions: self.positions,
