@@ -202,15 +202,15 @@ impl Leaf {
         Ok(Leaf { positions, rgb, class, intensity, triangles: Leaf::read_triangles(&mut columns, count)? })
     }
 
-    /// Reads the positions of the sites of `tile` and the triangles, without what else is known of the sites.
+    /// Reads the record of `tile` without colours, classes and intensities.
     ///
     /// # Errors
     /// As [`Leaf::load`].
-    pub fn load_mesh(store: &Store, tile: TileIndex) -> Result<(Vec<[i32; 3]>, Vec<[u32; 3]>)> {
+    pub fn load_mesh(store: &Store, tile: TileIndex) -> Result<Leaf> {
         let mut columns = ColumnReader::open(store, StepRecord::Leaf(tile))?;
         let (count, positions) = Leaf::read_positions(&mut columns, tile)?;
         columns.skip_column::<u8>()?;
-        Ok((positions, Leaf::read_triangles(&mut columns, count)?))
+        Ok(Leaf { positions, triangles: Leaf::read_triangles(&mut columns, count)?, ..Leaf::default() })
     }
 
     fn read_triangles(columns: &mut ColumnReader<StepRecord>, count: usize) -> Result<Vec<[u32; 3]>> {

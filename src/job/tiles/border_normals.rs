@@ -83,7 +83,7 @@ fn take_left_out(
     style: &TileStyle,
     sums: &mut [NormalSum],
 ) -> Result<()> {
-    let (positions, mut triangles) = Leaf::load_mesh(store, tile)?;
+    let Leaf { positions, mut triangles, .. } = Leaf::load_mesh(store, tile)?;
     let mut left_out = slivers.take(&positions, &mut triangles);
     left_out.extend(style.take_long(&positions, &mut triangles));
     for triangle in left_out {
