@@ -207,3 +207,25 @@ impl Seam {
         Ok(SeamOfTile { triangles, trimmed })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::index::SiteIndex;
+
+    #[test]
+    fn each_tile_has_its_triangles_in_the_order_of_the_mesh() {
+        let corner =
+            |tile: u32, site: u32| BorderVertex { tile: TileIndex(tile), site: SiteIndex(site), position: [0; 3] };
+        let triangles: Vec<SeamTriangle> =
+            (0..200).map(|i| [i * 7 % 5, i * 3 % 4, i % 300 / 100 * 250].map(|tile| corner(tile, 1000 - i))).collect();
+        let seam = Seam::new(&triangles, Vec::new(), HullCount::default());
+        assert!(seam.index.is_sorted_by(|a, b| a[0] < b[0]));
+        for &[tile, first, count] in &seam.index {
+            let touches = |triangle: &&SeamTriangle| triangle.iter().any(|corner| corner.tile.0 == tile);
+            let expected: Vec<SeamTriangle> = triangles.iter().filter(touches).copied().collect();
+            assert_eq!(seam.triangles[first as usize..][..count as usize], expected, "{tile}");
+        }
+        assert_eq!(seam.index.iter().map(|[tile, ..]| *tile).collect::<Vec<_>>(), [0, 1, 2, 3, 4, 250]);
+    }
+}

@@ -189,10 +189,11 @@ mod tests {
 
     #[test]
     fn corners_of_triangles_are_known_by_their_sums() {
-        let far = 1 << 29;
-        for size in [1, far] {
-            let positions = [[0, 0, -far], [size, 0, far], [0, size, -far], [5, 5, 5]];
-            assert_eq!(NormalSums::new(&positions, &[[0, 1, 2]]).corners(), [true, true, true, false]);
+        for (x, z) in [(1, 1), (1 << 29, i32::MAX)] {
+            let positions = [[-x, -x, -z], [x, -x, z], [-x, x, -z], [0, 0, 0]];
+            let sums = NormalSums::new(&positions, &[[0, 1, 2], [0, 1, 2]]);
+            assert_eq!(matches!(sums, NormalSums::Wide(_)), z > 1);
+            assert_eq!(sums.corners(), [true, true, true, false]);
         }
     }
 }

@@ -7,9 +7,9 @@
 //! Every decision is exact, and ties follow the rule of `geometry::predicates`, which is that of sites raised by symbolic amounts, so
 //! that joining meets no ties at all.
 
-use crate::geometry::Site;
 use crate::geometry::lattice::REACH;
 use crate::geometry::predicates::{in_circle, orient2d};
+use crate::geometry::{Bounds, Site};
 use crate::mesh::flip::legalize;
 use crate::mesh::half_edge::HalfEdgeMesh;
 use crate::mesh::index::{HalfEdgeIndex, SiteIndex};
@@ -77,7 +77,7 @@ enum Axis {
 
 impl Axis {
     /// Returns what ascends along the axis. Sites with the same place on it go by the other coordinate. Both orders are the same but for a
-    /// quarter turn, so that joining needs not know the axis.
+    /// quarter turn, so that joining need not know the axis.
     #[inline]
     fn key(self, [x, y]: Site) -> u64 {
         let [along, across] = match self {
@@ -92,11 +92,8 @@ impl Axis {
     /// Returns the axis along which `sites` reach further. Sites of merges lie in strips along borders: halves across a strip have few
     /// edges in common.
     fn longer(sites: &[PlacedSite]) -> Axis {
-        let extent = |k: usize| {
-            let along = || sites.iter().map(|placed| placed.site[k]);
-            i64::from(along().max().unwrap_or(0)) - i64::from(along().min().unwrap_or(0))
-        };
-        if extent(1) > extent(0) { Axis::Y } else { Axis::X }
+        let bounds = Bounds::of_points(sites.iter().map(|placed| placed.site));
+        if bounds.is_some_and(|bounds| bounds.extent(1) > bounds.extent(0)) { Axis::Y } else { Axis::X }
     }
 }
 

@@ -31,6 +31,9 @@ pub fn write_pending(path: &Path, content: &[u8]) -> Result<PendingFile> {
     write_pending_pieces(path, &[content])
 }
 
+/// The system begins at once to bring larger files to the disk, so that little is left to wait for at the end of a job.
+const WORTH_BEGINNING: u64 = 256 << 10;
+
 /// Writes the concatenated `pieces` under the [`partial_path`] of `path`.
 ///
 /// # Errors
@@ -40,7 +43,9 @@ pub fn write_pending_pieces(path: &Path, pieces: &[&[u8]]) -> Result<PendingFile
     let write = |file: File| {
         let mut writer = WriteFrom { file: &file, at: 0 };
         pieces.iter().try_for_each(|piece| writer.write_all(piece))?;
-        disk::begin_sync(&file);
+        if writer.at >= WORTH_BEGINNING {
+            disk::begin_sync(&file);
+        }
         Ok(())
     };
     disk::create(&partial).and_then(write).map_err(Error::io("write", &partial))?;

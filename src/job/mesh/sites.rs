@@ -122,17 +122,17 @@ mod tests {
         assert_eq!(kept, [(0, -(1 << 29), 3), (0, 0, 4), (-(1 << 29), 1 << 29, 2), (1 << 29, 1 << 29, 0)]);
     }
 
-    /// The keys take 31 to 36 bits, and the indices 7.
+    /// Places take 30 to 36 bits, and indices 7.
     #[test]
     fn tiles_of_any_width_are_sorted() {
-        for reach in [1 << 14, 1 << 15, 1 << 16, 1 << 17] {
-            let place = |i: i32| [i * 7919 % reach, i * 104_729 % reach];
+        for reach in [[1 << 14, 1 << 14], [1 << 15, 1 << 15], [1 << 16, 1 << 15], [1 << 17, 1 << 17]] {
+            let place = |i: i32| [i * 7919 % reach[0], i * 104_729 % reach[1]];
             let mut points: Vec<Point> = (0..100).map(|i| Point::new(place(i), i, [0; 3], 2, i as u64)).collect();
-            points.extend([[0, 0], [reach, reach]].map(|corner| Point::new(corner, 7, [0; 3], 2, 0)));
+            points.extend([[0, 0], reach].map(|corner| Point::new(corner, 7, [0; 3], 2, 0)));
             let mut expected = points.clone();
             expected.sort_by_key(|point| (point.position[1], point.position[0]));
             sort(&mut points);
-            assert_eq!(points, expected, "{reach}");
+            assert_eq!(points, expected, "{reach:?}");
         }
     }
 

@@ -128,6 +128,7 @@ impl TileContent {
     /// Returns the finished tile. It lacks the sites whose triangles all belong to other tiles or are left out.
     pub(crate) fn into_tile(mut self, style: &TileStyle) -> Tile {
         let is_used = std::mem::take(&mut self.is_used);
+        debug_assert!(self.triangles.as_flattened().iter().all(|&v| is_used[v as usize]), "corners are used");
         if is_used.contains(&false) {
             self.drop_unused(&is_used);
         }
