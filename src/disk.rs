@@ -79,7 +79,7 @@ pub(crate) fn begin_sync(file: &File) {
     #[cfg(target_os = "linux")]
     {
         use rustix::fs::{Advice, fadvise};
-        // Linux begins to write all pages that are not on the disk. It forgets only those that are.
+        // Linux begins to write the pages that are not on the disk yet, and keeps them in memory meanwhile.
         let _ = fadvise(file, 0, None, Advice::DontNeed);
     }
     #[cfg(not(target_os = "linux"))]

@@ -157,7 +157,7 @@ impl Seam {
             tiles.sort_unstable();
             touching.extend((0..3).filter(|&i| i == 0 || tiles[i] != tiles[i - 1]).map(|i| (tiles[i], at)));
         }
-        // This keeps the order of the triangles.
+        // A stable sort: the triangles of a tile stay in the order of the mesh.
         radsort::sort_by_key(&mut touching, |&(tile, _)| tile.0);
         let mut seam = Seam { index: Vec::new(), triangles: Vec::with_capacity(touching.len()), trimmed, hull };
         for (tile, at) in touching {
@@ -218,7 +218,7 @@ mod tests {
         let corner =
             |tile: u32, site: u32| BorderVertex { tile: TileIndex(tile), site: SiteIndex(site), position: [0; 3] };
         let triangles: Vec<SeamTriangle> =
-            (0..200).map(|i| [i * 7 % 5, i * 3 % 4, i % 300 / 100 * 250].map(|tile| corner(tile, 1000 - i))).collect();
+            (0..200).map(|i| [i * 7 % 5, i * 3 % 4, i / 100 * 250].map(|tile| corner(tile, 1000 - i))).collect();
         let seam = Seam::new(&triangles, Vec::new(), HullCount::default());
         assert!(seam.index.is_sorted_by(|a, b| a[0] < b[0]));
         for &[tile, first, count] in &seam.index {

@@ -44,7 +44,7 @@ impl NormalSums {
 
     /// Tells of every vertex whether it is a corner of a triangle: then the z of its sum is above zero, because counterclockwise triangles
     /// have an area.
-    pub fn corners(&self) -> Vec<bool> {
+    pub fn are_corners(&self) -> Vec<bool> {
         match self {
             NormalSums::Narrow(sums) => sums.iter().map(|sum| sum[2] > 0).collect(),
             NormalSums::Wide(sums) => sums.iter().map(|sum| sum[2] > 0).collect(),
@@ -193,7 +193,7 @@ mod tests {
             let positions = [[-x, -x, -z], [x, -x, z], [-x, x, -z], [0, 0, 0]];
             let sums = NormalSums::new(&positions, &[[0, 1, 2], [0, 1, 2]]);
             assert_eq!(matches!(sums, NormalSums::Wide(_)), z > 1);
-            assert_eq!(sums.corners(), [true, true, true, false]);
+            assert_eq!(sums.are_corners(), [true, true, true, false]);
         }
     }
 }

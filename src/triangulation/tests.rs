@@ -67,3 +67,18 @@ fn sites_on_a_line_make_no_triangle() {
         }
     }
 }
+
+/// Parts are halved along both axes here, and most of their hulls have sites in line.
+#[test]
+fn strips_along_borders_are_canonical() {
+    let is_near = |v: i32, gap: i32| v.rem_euclid(40).min(40 - v.rem_euclid(40)) < gap;
+    let square = |size: i32| (0..size).flat_map(move |x| (0..size).map(move |y| [x, y]));
+    for gap in 1..4 {
+        let strips: Vec<Site> = square(81).filter(|p| p.iter().any(|&v| is_near(v, gap))).collect();
+        for [x, y] in [[1, 1], [1, 50], [50, 1], [-3, 2]] {
+            let sites: Vec<Site> = strips.iter().map(|p| [p[0] * x, p[1] * y]).collect();
+            let [expected, divided] = OTHERS.map(|triangulate| triangles(&triangulate(&sites).unwrap()));
+            assert_eq!(divided, expected, "{gap} {x} {y}");
+        }
+    }
+}

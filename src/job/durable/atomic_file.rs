@@ -31,7 +31,7 @@ pub fn write_pending(path: &Path, content: &[u8]) -> Result<PendingFile> {
     write_pending_pieces(path, &[content])
 }
 
-/// The system begins at once to bring larger files to the disk, so that little is left to wait for at the end of a job.
+/// The system begins at once to bring files of so many bytes or more to the disk. So little is left to wait for at the end of a job.
 const WORTH_BEGINNING: u64 = 256 << 10;
 
 /// Writes the concatenated `pieces` under the [`partial_path`] of `path`.

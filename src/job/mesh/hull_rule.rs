@@ -51,7 +51,7 @@ impl HullRule {
     #[inline]
     pub fn flow(&self, corners: [Site; 3]) -> Option<usize> {
         let [a, b, c] = corners;
-        // Few triangles have a long edge, so this branch is foreseen. Half of all are obtuse.
+        // Few triangles have a long edge, so the processor predicts this branch. Half of all triangles are obtuse.
         if !(self.is_long(a, b) | self.is_long(b, c) | self.is_long(c, a)) {
             return None;
         }

@@ -39,7 +39,7 @@ impl TileContent {
         let slivers = cut.len() as u64;
         cut.extend(style.take_long(&leaf.positions, &mut leaf.triangles));
         let sums = NormalSums::new(&leaf.positions, &leaf.triangles);
-        let (is_used, mut normals) = (sums.corners(), sums.unit_normals(&style.frame));
+        let (is_used, mut normals) = (sums.are_corners(), sums.unit_normals(&style.frame));
         for vertex in &border.vertices {
             normals[vertex.site.get()] = vertex.normal;
         }
