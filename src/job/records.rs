@@ -190,7 +190,7 @@ impl Leaf {
         let mut columns = ColumnReader::open(store, StepRecord::Leaf(tile))?;
         let (count, positions) = Leaf::read_positions(&mut columns, tile)?;
         let attributes = columns.column::<u8>()?;
-        let (mut rgb, mut class) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        let (mut rgb, mut class) = (Vec::with_capacity(count), Vec::with_capacity(with_room(count)));
         let rest = unpack(&attributes, count, |rgb| rgb.map(|value| value as u16), &mut rgb)
             .and_then(|rest| unpack(rest, count, |[class]| class as u8, &mut class))
             .ok_or_else(|| Leaf::damaged(tile))?;
@@ -215,7 +215,10 @@ impl Leaf {
 
     fn read_triangles(columns: &mut ColumnReader<StepRecord>, count: usize) -> Result<Vec<[u32; 3]>> {
         if has_short_corners(count) {
-            return Ok(columns.column::<[u16; 3]>()?.iter().map(|t| t.map(u32::from)).collect());
+            let short = columns.column::<[u16; 3]>()?;
+            let mut triangles = Vec::with_capacity(with_room(short.len()));
+            triangles.extend(short.iter().map(|t| t.map(u32::from)));
+            return Ok(triangles);
         }
         columns.column_vec()
     }
@@ -225,7 +228,7 @@ impl Leaf {
         let count = columns.column::<u64>()?;
         let &[count] = &count[..] else { return Err(Leaf::damaged(tile)) };
         let packed = columns.column::<u8>()?;
-        let mut positions = Vec::with_capacity((count as usize).min(packed.len()));
+        let mut positions = Vec::with_capacity(with_room((count as usize).min(packed.len())));
         let rest = unpack(&packed, count as usize, |corner| corner.map(|value| value as i32), &mut positions);
         rest.map(|_| (count as usize, positions)).ok_or_else(|| Leaf::damaged(tile))
     }
@@ -243,6 +246,11 @@ impl Leaf {
         positions.iter().for_each(visit);
         Ok(())
     }
+}
+
+/// Returns the capacity for so many vertices or triangles of a leaf, and for those that a seam adds: if it adds more, all are copied.
+fn with_room(count: usize) -> usize {
+    count + count / 16
 }
 
 fn has_short_corners(sites: usize) -> bool {

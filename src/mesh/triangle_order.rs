@@ -1,56 +1,70 @@
 //! An order of triangles that depends on the mesh alone, not on the way in which it was found.
 
-/// Below this many vertices the three corners of a triangle fit a number of 64 bits.
-const MANY_VERTICES: usize = 1 << CORNER_BITS;
-const CORNER_BITS: u32 = 21;
-
-/// Returns the triangles of a mesh with `vertices` vertices in ascending order, each from its lowest corner on, in the same sense of
-/// rotation.
-pub fn ascending(vertices: usize, triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
-    if vertices >= MANY_VERTICES {
-        let mut ordered: Vec<_> = triangles.iter().map(|&[a, b, c]| [a, b, c].min([b, c, a]).min([c, a, b])).collect();
-        ordered.sort_unstable();
-        return ordered;
-    }
-    let keys: Vec<u64> = triangles.iter().map(|&triangle| key(triangle)).collect();
-    let corner = |key: u64, k: u32| (key >> (CORNER_BITS * (2 - k))) as u32 & (MANY_VERTICES as u32 - 1);
-    let ordered = sorted(vertices, &keys, |key| corner(key, 0) as usize);
-    ordered.into_iter().map(|key| [0, 1, 2].map(|k| corner(key, k))).collect()
+/// Sorts the triangles of meshes. It keeps its memory from mesh to mesh, so that its pages are faulted in once.
+#[derive(Debug, Default)]
+pub struct TriangleSorter {
+    /// Where the next triangle with this first corner goes.
+    first_places: Vec<u32>,
+    /// Where the next triangle with this second corner goes.
+    second_places: Vec<u32>,
+    by_second: Vec<[u32; 3]>,
+    sorted: Vec<[u32; 3]>,
 }
 
-/// Returns the corners as one number, from the lowest on.
-#[inline(always)]
-fn key([a, b, c]: [u32; 3]) -> u64 {
-    let joined = |[a, b, c]: [u32; 3]| (u64::from(a) << CORNER_BITS | u64::from(b)) << CORNER_BITS | u64::from(c);
-    joined([a, b, c]).min(joined([b, c, a])).min(joined([c, a, b]))
-}
-
-/// Returns `keys` in ascending order. They are put into groups first, which take half the time of a sort: `group` is a number below
-/// `groups` that ascends with the key. Most groups have two keys.
-fn sorted(groups: usize, keys: &[u64], group: impl Fn(u64) -> usize) -> Vec<u64> {
-    let mut ends = vec![0u32; groups + 1];
-    for &key in keys {
-        ends[group(key) + 1] += 1;
-    }
-    for v in 1..ends.len() {
-        ends[v] += ends[v - 1];
-    }
-    // This moves every start to the next one's place.
-    let mut ordered = vec![0; keys.len()];
-    for &key in keys {
-        let place = &mut ends[group(key)];
-        ordered[*place as usize] = key;
-        *place += 1;
-    }
-    let mut start = 0;
-    for &end in &ends[..groups] {
-        match &mut ordered[start..end as usize] {
-            [a, b] => (*a, *b) = ((*a).min(*b), (*a).max(*b)),
-            keys => keys.sort_unstable(),
+impl TriangleSorter {
+    /// Returns the triangles of a mesh with `vertices` vertices in ascending order, each from its lowest corner on, in the same sense of
+    /// rotation. No two of them may have the same directed edge, so the first two corners tell them apart.
+    ///
+    /// By counting, first for the second corner and then for the first one. That takes half the time of sorting the few triangles of each
+    /// first corner, whose comparisons no processor foretells.
+    pub fn ascending(&mut self, vertices: usize, triangles: &[[u32; 3]]) -> &[[u32; 3]] {
+        self.count(vertices, triangles);
+        self.by_second.resize(triangles.len(), [0; 3]);
+        for &triangle in triangles {
+            let turned = from_lowest(triangle);
+            self.by_second[next(&mut self.second_places, turned[1])] = turned;
         }
-        start = end as usize;
+        self.sorted.resize(triangles.len(), [0; 3]);
+        for &triangle in &self.by_second {
+            self.sorted[next(&mut self.first_places, triangle[0])] = triangle;
+        }
+        &self.sorted
     }
-    ordered
+
+    /// Finds where the triangles of each first and each second corner begin.
+    fn count(&mut self, vertices: usize, triangles: &[[u32; 3]]) {
+        let (first, second) = (&mut self.first_places, &mut self.second_places);
+        for counts in [&mut *first, &mut *second] {
+            counts.clear();
+            counts.resize(vertices, 0);
+        }
+        for &triangle in triangles {
+            let [a, b, _] = from_lowest(triangle);
+            first[a as usize] += 1;
+            second[b as usize] += 1;
+        }
+        for counts in [first, second] {
+            let mut start = 0;
+            counts.iter_mut().for_each(|count| start += std::mem::replace(count, start));
+        }
+    }
+}
+
+/// Returns a place and moves on to the one after it.
+#[inline(always)]
+fn next(places: &mut [u32], corner: u32) -> usize {
+    let place = &mut places[corner as usize];
+    *place += 1;
+    *place as usize - 1
+}
+
+/// Returns the triangle from its lowest corner on, without branches.
+#[inline(always)]
+fn from_lowest([a, b, c]: [u32; 3]) -> [u32; 3] {
+    let edge = |from: u32, to: u32| u64::from(from) << u32::BITS | u64::from(to);
+    let lowest = edge(a, b).min(edge(b, c)).min(edge(c, a));
+    let (first, second) = ((lowest >> u32::BITS) as u32, lowest as u32);
+    [first, second, a ^ b ^ c ^ first ^ second]
 }
 
 #[cfg(test)]
@@ -64,19 +78,24 @@ mod tests {
             triangles in prop::collection::btree_set([0u32..12, 12..24, 24..40], 0..200),
             turns in prop::collection::vec(0usize..3, 200),
             keys in prop::collection::vec(any::<u32>(), 200),
-            vertices in prop::sample::select(vec![40, MANY_VERTICES]),
+            earlier in 0u32..300,
         ) {
             // Half of them have the other sense of rotation.
             let mut expected: Vec<[u32; 3]> =
                 triangles.iter().map(|&[a, b, c]| if b % 2 == 0 { [a, b, c] } else { [a, c, b] }).collect();
             expected.sort_unstable();
+            expected.dedup_by_key(|&mut [a, b, _]| [a, b]);
             let mut shuffled: Vec<_> = expected.iter().copied().zip(turns).zip(keys).collect();
             shuffled.sort_by_key(|&(_, key)| key);
             let turned = shuffled.into_iter().map(|((mut triangle, turn), _)| {
                 triangle.rotate_left(turn);
                 triangle
             });
-            prop_assert_eq!(ascending(vertices, &turned.collect::<Vec<_>>()), expected);
+            let triangles: Vec<_> = turned.collect();
+            let mut sorter = TriangleSorter::default();
+            let strip: Vec<_> = (0..earlier).map(|a| [a, a + 1, a + 2]).collect();
+            sorter.ascending(302, &strip);
+            prop_assert_eq!(sorter.ascending(40, &triangles), expected);
         }
     }
 }

@@ -56,6 +56,7 @@ impl TileContent {
                 intensity
             }),
         };
+        normals.reserve_exact(positions.capacity() - positions.len());
         TileContent { positions, normals, colors, attributes, triangles, is_used, cut, slivers }
     }
 

@@ -10,9 +10,10 @@ use gltf::json::validation::USize64;
 use gltf::json::{Asset, Index, Root};
 use multiversion::multiversion;
 use serde_json::json;
+use std::borrow::Cow;
 
 use crate::geometry::Bounds;
-use crate::mesh::triangle_order::ascending;
+use crate::mesh::triangle_order::TriangleSorter;
 use crate::output::attributes::{AttributeChoice, PointAttributes};
 use crate::output::color::LinearRgb;
 use crate::output::compression::Compression;
@@ -62,18 +63,18 @@ impl<'a> DocumentBuilder<'a> {
     }
 
     /// Appends a node, its mesh and the data of both.
-    pub(crate) fn add_part(&mut self, part: &SplitPart) -> Result<()> {
+    pub(crate) fn add_part(&mut self, part: &SplitPart, sorter: &mut TriangleSorter) -> Result<()> {
         let tile = &*part.tile;
         // Either order depends on the mesh alone, so a tile is the same with every backend.
         let (triangles, order) = match self.compression {
-            Compression::None => (ascending(tile.positions.len(), &tile.triangles), None),
+            Compression::None => (Cow::Borrowed(sorter.ascending(tile.positions.len(), &tile.triangles)), None),
             _ => {
                 let (triangles, order) = order_vertices(tile.positions.len(), &tile.triangles);
                 // Orders are those of planar meshes, in which no directed edge has two triangles.
                 if triangles.len() != tile.triangles.len() {
                     return Err(Error::Broken("the triangles of a tile are not a planar mesh".into()));
                 }
-                (triangles, Some(order))
+                (Cow::Owned(triangles), Some(order))
             }
         };
         let order = order.as_deref();

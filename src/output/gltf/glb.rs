@@ -1,6 +1,7 @@
 //! Encodes one tile as a binary glTF 2.0 file.
 
 use crate::Result;
+use crate::mesh::triangle_order::TriangleSorter;
 use crate::output::compression::Compression;
 use crate::output::frame::Frame;
 use crate::output::gltf::container::write_head;
@@ -13,6 +14,7 @@ use crate::output::tile::Tile;
 pub struct GlbEncoder {
     head: Vec<u8>,
     binary: Vec<u8>,
+    sorter: TriangleSorter,
 }
 
 impl GlbEncoder {
@@ -34,7 +36,7 @@ impl GlbEncoder {
         };
         let mut document = DocumentBuilder::new(frame, compression, std::mem::take(&mut self.binary));
         for part in &parts {
-            document.add_part(part)?;
+            document.add_part(part, &mut self.sorter)?;
         }
         self.head.clear();
         let (json, binary) = document.finish(copyright)?;
