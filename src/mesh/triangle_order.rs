@@ -1,32 +1,54 @@
 //! An order of triangles that depends on the mesh alone, not on the way in which it was found.
 
-/// Sorts the triangles of meshes. It keeps its memory from mesh to mesh, so that its pages are faulted in once.
+/// A number of a vertex: in two bytes where that is enough, or in four.
+pub trait Corner: Copy + Default + Into<u32> {
+    /// Returns `number`, which must fit.
+    fn of(number: u32) -> Self;
+}
+
+impl Corner for u16 {
+    #[inline(always)]
+    fn of(number: u32) -> u16 {
+        number as u16
+    }
+}
+
+impl Corner for u32 {
+    #[inline(always)]
+    fn of(number: u32) -> u32 {
+        number
+    }
+}
+
+/// Sorts the triangles of meshes. It keeps its memory from mesh to mesh, so that its pages are faulted in once. It has the numbers of
+/// vertices as they are written, because a job waits for memory more than for anything else here.
 #[derive(Debug, Default)]
-pub struct TriangleSorter {
+pub struct TriangleSorter<C> {
     /// Where the next triangle with this first corner goes.
     first_places: Vec<u32>,
     /// Where the next triangle with this second corner goes.
     second_places: Vec<u32>,
-    by_second: Vec<[u32; 3]>,
-    sorted: Vec<[u32; 3]>,
+    by_second: Vec<[C; 3]>,
+    sorted: Vec<[C; 3]>,
 }
 
-impl TriangleSorter {
+impl<C: Corner> TriangleSorter<C> {
     /// Returns the triangles of a mesh with `vertices` vertices in ascending order, each from its lowest corner on, in the same sense of
-    /// rotation. No two of them may have the same directed edge, so the first two corners tell them apart.
+    /// rotation. No two of them may have the same directed edge, so the first two corners tell them apart. Every number of a vertex must
+    /// fit a `C`.
     ///
     /// By counting, first for the second corner and then for the first one. That takes half the time of sorting the few triangles of each
     /// first corner, whose comparisons no processor foretells.
-    pub fn ascending(&mut self, vertices: usize, triangles: &[[u32; 3]]) -> &[[u32; 3]] {
+    pub fn ascending(&mut self, vertices: usize, triangles: &[[u32; 3]]) -> &[[C; 3]] {
         self.count(vertices, triangles);
-        self.by_second.resize(triangles.len(), [0; 3]);
+        self.by_second.resize(triangles.len(), [C::default(); 3]);
         for &triangle in triangles {
             let turned = from_lowest(triangle);
-            self.by_second[next(&mut self.second_places, turned[1])] = turned;
+            self.by_second[next(&mut self.second_places, turned[1])] = turned.map(C::of);
         }
-        self.sorted.resize(triangles.len(), [0; 3]);
+        self.sorted.resize(triangles.len(), [C::default(); 3]);
         for &triangle in &self.by_second {
-            self.sorted[next(&mut self.first_places, triangle[0])] = triangle;
+            self.sorted[next(&mut self.first_places, triangle[0].into())] = triangle;
         }
         &self.sorted
     }
@@ -92,10 +114,14 @@ mod tests {
                 triangle
             });
             let triangles: Vec<_> = turned.collect();
-            let mut sorter = TriangleSorter::default();
+            let mut sorter = TriangleSorter::<u32>::default();
+            let mut short_sorter = TriangleSorter::<u16>::default();
             let strip: Vec<_> = (0..earlier).map(|a| [a, a + 1, a + 2]).collect();
             sorter.ascending(302, &strip);
-            prop_assert_eq!(sorter.ascending(40, &triangles), expected);
+            short_sorter.ascending(302, &strip);
+            let short: Vec<_> = short_sorter.ascending(40, &triangles).iter().map(|t| t.map(u32::from)).collect();
+            prop_assert_eq!(sorter.ascending(40, &triangles), &expected);
+            prop_assert_eq!(short, expected);
         }
     }
 }

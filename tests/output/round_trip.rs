@@ -166,7 +166,7 @@ fn a_tile_comes_back_whole() {
     assert_eq!(file.parts.len(), 1);
     assert_eq!(file.parts[0].attributes, tile.attributes);
     assert_eq!(integers(&file), tile.positions);
-    let mut sorter = TriangleSorter::default();
+    let mut sorter = TriangleSorter::<u32>::default();
     assert_eq!(file.parts[0].triangles, sorter.ascending(tile.positions.len(), &tile.triangles));
     let normals = file.parts[0].normals.as_ref().unwrap();
     assert!(normals.iter().zip(tile.normals.as_ref().unwrap()).all(|(g, s)| g == [s[0], s[2], -s[1]]));

@@ -11,6 +11,7 @@ use crate::output::normals::NormalSums;
 use crate::{Error, Result};
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
+use std::ops::Range;
 
 /// The vertices and triangles of a tile. Its own sites come first, then those of its neighbours.
 pub(crate) struct TileContent {
@@ -143,24 +144,40 @@ impl TileContent {
     }
 
     fn drop_unused(&mut self, used: &[bool]) {
-        let number = |next: &mut u32, &used: &bool| Some(std::mem::replace(next, *next + used as u32));
-        let numbers: Vec<u32> = used.iter().scan(0, number).collect();
+        let runs = runs_of(used);
+        let mut numbers = vec![0; used.len()];
+        let mut next = 0..;
+        for run in &runs {
+            numbers[run.clone()].iter_mut().zip(&mut next).for_each(|(number, new)| *number = new);
+        }
         self.triangles.as_flattened_mut().iter_mut().for_each(|v| *v = numbers[*v as usize]);
-        keep(&mut self.positions, used);
-        keep(&mut self.normals, used);
-        keep(&mut self.colors, used);
-        self.attributes.classification.iter_mut().for_each(|classes| keep(classes, used));
-        self.attributes.intensity.iter_mut().for_each(|intensities| keep(intensities, used));
+        keep(&mut self.positions, &runs);
+        keep(&mut self.normals, &runs);
+        keep(&mut self.colors, &runs);
+        self.attributes.classification.iter_mut().for_each(|classes| keep(classes, &runs));
+        self.attributes.intensity.iter_mut().for_each(|intensities| keep(intensities, &runs));
     }
 }
 
-/// Keeps the values whose flag in `wanted` is set. An empty column stays empty.
-fn keep<T: Copy>(values: &mut Vec<T>, wanted: &[bool]) {
+/// Returns where `wanted` is true without a gap. Most runs go from one border of the tile to the other.
+fn runs_of(wanted: &[bool]) -> Vec<Range<usize>> {
+    let mut end = 0;
+    let runs = wanted.chunk_by(|a, b| a == b).map(|run| {
+        end += run.len();
+        (run[0], end - run.len()..end)
+    });
+    runs.filter(|(wanted, _)| *wanted).map(|(_, run)| run).collect()
+}
+
+/// Keeps the values in `runs`, which ascend. An empty column stays empty.
+fn keep<T: Copy>(values: &mut Vec<T>, runs: &[Range<usize>]) {
+    if values.is_empty() {
+        return;
+    }
     let mut kept = 0;
-    // Branch-free.
-    for at in 0..values.len() {
-        values[kept] = values[at];
-        kept += wanted[at] as usize;
+    for run in runs {
+        values.copy_within(run.clone(), kept);
+        kept += run.len();
     }
     values.truncate(kept);
 }

@@ -10,7 +10,6 @@ use gltf::json::validation::USize64;
 use gltf::json::{Asset, Index, Root};
 use multiversion::multiversion;
 use serde_json::json;
-use std::borrow::Cow;
 
 use crate::geometry::Bounds;
 use crate::mesh::triangle_order::TriangleSorter;
@@ -40,6 +39,15 @@ const UNPACKED: u32 = 1;
 /// What a vertex attribute is, and the accessor that has its values.
 type VertexAttribute = (Checked<Semantic>, Index<Accessor>);
 
+/// Sort the triangles of plain tiles. They keep their memory from tile to tile.
+#[derive(Debug, Default)]
+pub(crate) struct TriangleSorters {
+    /// For tiles whose indices take two bytes.
+    short: TriangleSorter<u16>,
+    /// For those whose indices take four.
+    long: TriangleSorter<u32>,
+}
+
 /// A document and its binary chunk while they are put together.
 pub(crate) struct DocumentBuilder<'a> {
     frame: &'a Frame,
@@ -63,21 +71,19 @@ impl<'a> DocumentBuilder<'a> {
     }
 
     /// Appends a node, its mesh and the data of both.
-    pub(crate) fn add_part(&mut self, part: &SplitPart, sorter: &mut TriangleSorter) -> Result<()> {
+    pub(crate) fn add_part(&mut self, part: &SplitPart, sorters: &mut TriangleSorters) -> Result<()> {
         let tile = &*part.tile;
+        let vertices = tile.positions.len();
         // Either order depends on the mesh alone, so a tile is the same with every backend.
-        let (triangles, order) = match self.compression {
-            Compression::None => (Cow::Borrowed(sorter.ascending(tile.positions.len(), &tile.triangles)), None),
-            _ => {
-                let (triangles, order) = order_vertices(tile.positions.len(), &tile.triangles);
-                // Orders are those of planar meshes, in which no directed edge has two triangles.
-                if triangles.len() != tile.triangles.len() {
-                    return Err(Error::Broken("the triangles of a tile are not a planar mesh".into()));
-                }
-                (Cow::Owned(triangles), Some(order))
-            }
+        let ordered = match self.compression {
+            Compression::None => None,
+            _ => Some(order_vertices(vertices, &tile.triangles)),
         };
-        let order = order.as_deref();
+        // Orders are those of planar meshes, in which no directed edge has two triangles.
+        if ordered.as_ref().is_some_and(|(triangles, _)| triangles.len() != tile.triangles.len()) {
+            return Err(Error::Broken("the triangles of a tile are not a planar mesh".into()));
+        }
+        let order = ordered.as_ref().map(|(_, order)| &order[..]);
         let mut attributes = vec![(Valid(Semantic::Positions), self.add_positions(part, order)?)];
         if let Some(normals) = &tile.normals {
             attributes.push((Valid(Semantic::Normals), self.add_normals(normals, order)?));
@@ -88,9 +94,13 @@ impl<'a> DocumentBuilder<'a> {
         }
         self.attributes = tile.attributes.choice();
         attributes.extend(self.add_point_attributes(&tile.attributes, order)?);
+        let indices = match &ordered {
+            Some((triangles, _)) => self.add_triangles(triangles, vertices),
+            None => self.add_ascending(&tile.triangles, vertices, sorters),
+        };
         let primitive = Primitive {
             attributes: attributes.into_iter().collect(),
-            indices: Some(self.add_triangles(&triangles, tile.positions.len())?),
+            indices: Some(indices),
             material: Some(Index::new(0)),
             extensions: (!self.attributes.is_none()).then(metadata::of_primitive),
             extras: None,
@@ -208,22 +218,40 @@ impl<'a> DocumentBuilder<'a> {
         Ok(self.add_accessor(view, count, element))
     }
 
-    fn add_triangles(&mut self, triangles: &[[u32; 3]], vertices: usize) -> Result<Index<Accessor>> {
+    fn add_triangles(&mut self, triangles: &[[u32; 3]], vertices: usize) -> Index<Accessor> {
         let corners = triangles.as_flattened();
-        // Index 65535 would restart a primitive.
-        let short = vertices <= u16::MAX as usize;
-        let component = if short { ComponentType::U16 } else { ComponentType::U32 };
-        let mut view = if self.compression == Compression::Meshopt {
+        let component = index_type(vertices);
+        let view = if self.compression == Compression::Meshopt {
             let start = self.binary.len();
             encode_triangles(triangles, vertices, &mut self.binary);
             self.add_packed(start, PackedMode::Triangles, None, component.size(), corners.len())
-        } else if short {
+        } else if component == ComponentType::U16 {
             self.add_plain(corners, |v| v as u16)
         } else {
             self.add_plain(corners, |v| v)
         };
-        view.target = Some(Valid(Target::ElementArrayBuffer));
-        Ok(self.add_accessor(view, corners.len(), ElementType::new(component, Type::Scalar)))
+        self.add_indices(view, corners.len(), component)
+    }
+
+    /// Appends the triangles in ascending order.
+    fn add_ascending(
+        &mut self,
+        triangles: &[[u32; 3]],
+        vertices: usize,
+        sorters: &mut TriangleSorters,
+    ) -> Index<Accessor> {
+        let component = index_type(vertices);
+        let view = if component == ComponentType::U16 {
+            self.add_plain(sorters.short.ascending(vertices, triangles), |corners| corners)
+        } else {
+            self.add_plain(sorters.long.ascending(vertices, triangles), |corners| corners)
+        };
+        self.add_indices(view, 3 * triangles.len(), component)
+    }
+
+    fn add_indices(&mut self, view: View, count: usize, component: ComponentType) -> Index<Accessor> {
+        let view = View { target: Some(Valid(Target::ElementArrayBuffer)), ..view };
+        self.add_accessor(view, count, ElementType::new(component, Type::Scalar))
     }
 
     /// Appends an accessor of all `count` elements of `view`, and the view.
@@ -317,6 +345,11 @@ impl<'a> DocumentBuilder<'a> {
             self.root.extensions_used.push(METADATA.into());
         }
     }
+}
+
+/// Returns the type of the numbers of so many vertices. Index 65535 would restart a primitive.
+fn index_type(vertices: usize) -> ComponentType {
+    if vertices <= u16::MAX as usize { ComponentType::U16 } else { ComponentType::U32 }
 }
 
 /// Returns the version of glTF, the name of this program, and whose the data are.

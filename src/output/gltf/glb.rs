@@ -1,11 +1,10 @@
 //! Encodes one tile as a binary glTF 2.0 file.
 
 use crate::Result;
-use crate::mesh::triangle_order::TriangleSorter;
 use crate::output::compression::Compression;
 use crate::output::frame::Frame;
 use crate::output::gltf::container::write_head;
-use crate::output::gltf::document::DocumentBuilder;
+use crate::output::gltf::document::{DocumentBuilder, TriangleSorters};
 use crate::output::gltf::parts::{split, split_short};
 use crate::output::tile::Tile;
 
@@ -14,7 +13,7 @@ use crate::output::tile::Tile;
 pub struct GlbEncoder {
     head: Vec<u8>,
     binary: Vec<u8>,
-    sorter: TriangleSorter,
+    sorters: TriangleSorters,
 }
 
 impl GlbEncoder {
@@ -36,7 +35,7 @@ impl GlbEncoder {
         };
         let mut document = DocumentBuilder::new(frame, compression, std::mem::take(&mut self.binary));
         for part in &parts {
-            document.add_part(part, &mut self.sorter)?;
+            document.add_part(part, &mut self.sorters)?;
         }
         self.head.clear();
         let (json, binary) = document.finish(copyright)?;
