@@ -27,18 +27,34 @@ pub fn load_sites(files: &PointFiles, blocks: &[PointBlock], rule: Duplicates) -
     Ok((points, duplicates))
 }
 
-/// Sorts `points`, keeps one of every x and y, and returns how many were dropped.
+/// Sorts `points` by y, then x, keeps one of every x and y, and returns how many were dropped. Neighbours in the plane become neighbours
+/// in memory, and the pipeline works row by row.
 fn keep_one(points: &mut Vec<Point>, rule: Duplicates) -> u64 {
     let before = points.len();
-    sort(points);
-    points.dedup_by(|next, kept| {
-        let same = next.position == kept.position;
-        if same && preferred(next, kept, rule) {
-            *kept = *next;
+    *points = match packed_keys(points) {
+        Some(keys) => one_of_each_place(keys.sorted().map(|index| points[index]), before, rule),
+        None => {
+            points.sort_unstable_by_key(|p| (p.position[1], p.position[0]));
+            one_of_each_place(points.iter().copied(), before, rule)
         }
-        same
-    });
+    };
     (before - points.len()) as u64
+}
+
+/// Returns one point of every x and y. There are `count` points, and those of one place come one after the other.
+fn one_of_each_place(points: impl Iterator<Item = Point>, count: usize, rule: Duplicates) -> Vec<Point> {
+    let mut kept: Vec<Point> = Vec::with_capacity(count);
+    for point in points {
+        match kept.last_mut() {
+            Some(last) if last.position == point.position => {
+                if preferred(&point, last, rule) {
+                    *last = point;
+                }
+            }
+            _ => kept.push(point),
+        }
+    }
+    kept
 }
 
 /// Tells whether `a` stays rather than `b`, which has the same x and y. Where the rule leaves it open, the other values decide, so that
@@ -56,23 +72,6 @@ fn look(point: &Point) -> (u8, [u16; 3], u16) {
     (point.class, point.rgb, point.intensity)
 }
 
-/// Sorts by y, then x: neighbours in the plane become neighbours in memory, and the pipeline works row by row.
-fn sort(points: &mut Vec<Point>) {
-    match packed_keys(points) {
-        Some(PackedKeys { mut keys, place_bits, index_bits }) => {
-            // Indices ascend, and the sort keeps the order of equal keys.
-            match place_bits {
-                // Half as many digits are counted.
-                ..=u32::BITS => radsort::sort_by_key(&mut keys, |key| (key >> index_bits) as u32),
-                _ => radsort::sort_by_key(&mut keys, |key| key >> index_bits),
-            }
-            let index = |key: u64| (key & ((1 << index_bits) - 1)) as usize;
-            *points = keys.into_iter().map(|key| points[index(key)]).collect();
-        }
-        None => points.sort_unstable_by_key(|p| (p.position[1], p.position[0])),
-    }
-}
-
 /// For every point its y, its x and its index in one number, from the highest bits on.
 struct PackedKeys {
     keys: Vec<u64>,
@@ -80,6 +79,20 @@ struct PackedKeys {
     place_bits: u32,
     /// The bits of the index.
     index_bits: u32,
+}
+
+impl PackedKeys {
+    /// Returns the indices of the points by y, then x.
+    fn sorted(mut self) -> impl Iterator<Item = usize> {
+        let index_bits = self.index_bits;
+        // Indices ascend, and the sort keeps the order of equal keys.
+        match self.place_bits {
+            // Half as many digits are counted.
+            ..=u32::BITS => radsort::sort_by_key(&mut self.keys, |key| (key >> index_bits) as u32),
+            _ => radsort::sort_by_key(&mut self.keys, |key| key >> index_bits),
+        }
+        self.keys.into_iter().map(move |key| (key & ((1 << index_bits) - 1)) as usize)
+    }
 }
 
 /// Returns the keys of `points`: numbers sort several times faster than points. Returns `None` if 64 bits do not hold them.
@@ -131,7 +144,7 @@ mod tests {
             points.extend([[0, 0], reach].map(|corner| Point::new(corner, 7, [0; 3], 2, 0)));
             let mut expected = points.clone();
             expected.sort_by_key(|point| (point.position[1], point.position[0]));
-            sort(&mut points);
+            assert_eq!(keep_one(&mut points, Duplicates::First), 0);
             assert_eq!(points, expected, "{reach:?}");
         }
     }

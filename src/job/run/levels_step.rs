@@ -63,9 +63,16 @@ pub(crate) fn make_levels(
             run.journal.commit()?;
         }
         for (tiles, threads) in batches(&room, height, run.threads)? {
-            // Threads keep the memory of the largest mesh that they have made, so each batch has its own.
+            if tiles.is_empty() {
+                continue;
+            }
             let make_all = || tiles.into_par_iter().with_max_len(1).map(make).try_reduce(LevelStats::default, sum);
-            stats += on_threads(threads, make_all)?;
+            stats += if output.levels {
+                // Threads keep the memory of the largest mesh that they have made, so each batch has its own.
+                on_threads(threads, make_all)?
+            } else {
+                make_all()?
+            };
         }
     }
     run.add_stage(stage.finish());
