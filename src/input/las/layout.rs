@@ -38,18 +38,24 @@ impl RecordLayout {
     }
 
     /// Reads a record of at least `self.length` bytes.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn record(&self, bytes: &[u8], fields: OptionalFields) -> PointRecord {
-        let raw = [0, 4, 8].map(|at| int32(bytes, at) as i64);
+        // All formats begin with so many bytes. Their length is checked once.
+        let head = &bytes[..LEAST_LENGTHS[0] as usize];
+        // One by one: `array::map` compiles to a call for every record here.
+        let raw = [int32(head, 0) as i64, int32(head, 4) as i64, int32(head, 8) as i64];
         let (class, withheld) =
-            if self.extended { (bytes[16], bytes[15] & 4 != 0) } else { (bytes[15] & 31, bytes[15] & 128 != 0) };
+            if self.extended { (head[16], head[15] & 4 != 0) } else { (head[15] & 31, head[15] & 128 != 0) };
         let rgb = match self.rgb {
-            Some(at) if fields.rgb => [at, at + 2, at + 4].map(|at| uint16(bytes, at)),
+            Some(at) if fields.rgb => {
+                let rgb = &bytes[at..at + 6];
+                [uint16(rgb, 0), uint16(rgb, 2), uint16(rgb, 4)]
+            }
             _ => [0; 3],
         };
-        let intensity = if fields.intensity { uint16(bytes, 12) } else { 0 };
+        let intensity = if fields.intensity { uint16(head, 12) } else { 0 };
         let (number, of) =
-            if self.extended { (bytes[14] & 15, bytes[14] >> 4) } else { (bytes[14] & 7, bytes[14] >> 3 & 7) };
+            if self.extended { (head[14] & 15, head[14] >> 4) } else { (head[14] & 7, head[14] >> 3 & 7) };
         let pulse_return = PulseReturn { number, of };
         PointRecord { raw, rgb, intensity, class, withheld, pulse_return, rounded: [false; 2] }
     }

@@ -33,20 +33,20 @@ pub(crate) struct PointFilter<'a> {
     counts: PointCounts,
     /// Records within the bounds and not withheld, by class.
     classes: [u64; 256],
+    /// Points handed on, by class.
+    kept: [u64; 256],
 }
 
 impl<'a> PointFilter<'a> {
     /// Returns a filter for records of the file at `path` with these `axes`; points that pass `rules` go to `sink`.
     pub(crate) fn new(path: &'a Path, axes: &'a [Axis; 3], rules: &'a PointRules, sink: Sink<'a>) -> PointFilter<'a> {
         let (points, counts) = (Vec::with_capacity(SLICE), PointCounts::default());
-        PointFilter { path, axes, rules, sink, points, counts, classes: [0; 256] }
+        PointFilter { path, axes, rules, sink, points, counts, classes: [0; 256], kept: [0; 256] }
     }
 
     #[inline]
     fn keep(&mut self, point: Point) -> Result<()> {
-        self.counts.kept += 1;
-        self.counts.ground += u64::from(is_ground(point.class));
-        self.counts.unclassified += u64::from(is_unclassified(point.class));
+        self.kept[point.class as usize] += 1;
         self.counts.max_rgb = self.counts.max_rgb.max(point.rgb[0].max(point.rgb[1]).max(point.rgb[2]));
         self.points.push(point);
         if self.points.len() == SLICE { self.flush() } else { Ok(()) }
@@ -55,6 +55,11 @@ impl<'a> PointFilter<'a> {
     /// Hands on the last points and returns the counts.
     pub(crate) fn finish(mut self) -> Result<PointCounts> {
         self.flush()?;
+        for (class, kept) in (0..=u8::MAX).zip(self.kept) {
+            self.counts.kept += kept;
+            self.counts.ground += if is_ground(class) { kept } else { 0 };
+            self.counts.unclassified += if is_unclassified(class) { kept } else { 0 };
+        }
         let PointCounts { withheld, other_class, other_return, out_of_bounds, malformed, kept, .. } = self.counts;
         self.counts.read = withheld + other_class + other_return + out_of_bounds + malformed + kept;
         let classes: BTreeMap<u8, u64> = (0..=u8::MAX).zip(self.classes).filter(|(_, count)| *count > 0).collect();
