@@ -248,7 +248,7 @@ impl Leaf {
     }
 }
 
-/// Returns the capacity for so many vertices or triangles of a leaf, and for those that a seam adds: if it adds more, all are copied.
+/// Returns a capacity with room for what a seam adds to so many vertices or triangles. If it adds more, the column is copied once.
 fn with_room(count: usize) -> usize {
     count + count / 16
 }

@@ -9,6 +9,7 @@ pub trait Corner: Copy + Default + Into<u32> {
 impl Corner for u16 {
     #[inline(always)]
     fn of(number: u32) -> u16 {
+        debug_assert!(number <= u16::MAX.into(), "{number} takes more than two bytes");
         number as u16
     }
 }
@@ -20,8 +21,8 @@ impl Corner for u32 {
     }
 }
 
-/// Sorts the triangles of meshes. It keeps its memory from mesh to mesh, so that its pages are faulted in once. It has the numbers of
-/// vertices as they are written, because a job waits for memory more than for anything else here.
+/// Sorts the triangles of meshes. It keeps its memory from mesh to mesh, so that its pages are faulted in once. Numbers of vertices have
+/// the width that the file gives them: less memory to wait for.
 #[derive(Debug, Default)]
 pub struct TriangleSorter<C> {
     /// Where the next triangle with this first corner goes.
@@ -34,11 +35,11 @@ pub struct TriangleSorter<C> {
 
 impl<C: Corner> TriangleSorter<C> {
     /// Returns the triangles of a mesh with `vertices` vertices in ascending order, each from its lowest corner on, in the same sense of
-    /// rotation. No two of them may have the same directed edge, so the first two corners tell them apart. Every number of a vertex must
-    /// fit a `C`.
+    /// rotation. No two of them may have the same directed edge, so the first two corners tell them apart. Numbers of vertices must be below
+    /// `vertices` and fit a `C`.
     ///
-    /// By counting, first for the second corner and then for the first one. That takes half the time of sorting the few triangles of each
-    /// first corner, whose comparisons no processor foretells.
+    /// It counts, first for the second corner, then for the first. That takes half the time of sorting the few triangles of each first
+    /// corner, whose comparisons no processor foretells.
     pub fn ascending(&mut self, vertices: usize, triangles: &[[u32; 3]]) -> &[[C; 3]] {
         self.count(vertices, triangles);
         self.by_second.resize(triangles.len(), [C::default(); 3]);

@@ -118,14 +118,14 @@ pub fn make_level(room: &LevelRoom, index: usize) -> Result<StepOutput<LevelStat
     Ok(StepOutput { files, ..StepOutput::new(stats, vec![record]) })
 }
 
-/// Returns the bytes of memory that making coarser tile `index` takes, whose children must exist: 0 if it gets no mesh.
+/// Returns the bytes of memory that making coarser tile `index` takes, whose children must exist: 0 if it is left out.
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Broken`] on the store.
 pub fn level_memory(room: &LevelRoom, index: usize) -> Result<u64> {
     let children = room.hierarchy.tiles[index].children.iter().map(|&child| Child::find(room, child));
     let needed = memory_for(&children.collect::<Result<Vec<_>>>()?);
-    Ok(needed.filter(|bytes| room.meshes && *bytes <= room.sizes.memory).unwrap_or(0))
+    Ok(needed.filter(|bytes| *bytes <= room.sizes.memory).unwrap_or(0))
 }
 
 /// Returns the bytes of memory that joining and simplifying `children` takes; `None` if one of them has been left out.

@@ -56,23 +56,20 @@ pub(crate) fn make_levels(
         a += b;
         Ok(a)
     };
+    let make_all =
+        |tiles: Vec<usize>| tiles.into_par_iter().with_max_len(1).map(make).try_reduce(LevelStats::default, sum);
     let mut stats = LevelStats::default();
     for height in hierarchy.by_height() {
-        if output.levels {
-            // A level reads the tiles below, which must have their names.
-            run.journal.commit()?;
+        if !output.levels {
+            stats += make_all(height)?;
+            continue;
         }
-        for (tiles, threads) in batches(&room, height, run.threads)? {
-            if tiles.is_empty() {
-                continue;
-            }
-            let make_all = || tiles.into_par_iter().with_max_len(1).map(make).try_reduce(LevelStats::default, sum);
-            stats += if output.levels {
-                // Threads keep the memory of the largest mesh that they have made, so each batch has its own.
-                on_threads(threads, make_all)?
-            } else {
-                make_all()?
-            };
+        // A level reads the tiles below, which must have their names.
+        run.journal.commit()?;
+        for (tiles, threads) in batches(&room, height, run.threads)?.into_iter().filter(|(tiles, _)| !tiles.is_empty())
+        {
+            // Threads keep the memory of the largest mesh that they have made, so each batch has its own.
+            stats += on_threads(threads, || make_all(tiles))?;
         }
     }
     run.add_stage(stage.finish());

@@ -57,6 +57,7 @@ impl TileContent {
                 intensity
             }),
         };
+        // As much room for the seam as the columns of the leaf have: growing would double them.
         normals.reserve_exact(positions.capacity() - positions.len());
         TileContent { positions, normals, colors, attributes, triangles, is_used, cut, slivers }
     }
@@ -159,7 +160,7 @@ impl TileContent {
     }
 }
 
-/// Returns where `wanted` is true without a gap. Most runs go from one border of the tile to the other.
+/// Returns the ranges in which `wanted` is true. Most of them go from one border of the tile to the other.
 fn runs_of(wanted: &[bool]) -> Vec<Range<usize>> {
     let mut end = 0;
     let runs = wanted.chunk_by(|a, b| a == b).map(|run| {
@@ -197,5 +198,24 @@ impl NeighbourBorders<'_> {
             Entry::Occupied(entry) => entry.into_mut(),
             Entry::Vacant(entry) => entry.insert((self.border_of)(tile)?),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn wanted_values_stay_in_order(wanted in prop::collection::vec(any::<bool>(), 0..40)) {
+            let mut values: Vec<usize> = (0..wanted.len()).collect();
+            let expected: Vec<usize> = values.iter().copied().filter(|&at| wanted[at]).collect();
+            let (runs, mut none) = (runs_of(&wanted), Vec::<u8>::new());
+            keep(&mut values, &runs);
+            keep(&mut none, &runs);
+            prop_assert_eq!((values, none), (expected, vec![]));
+            prop_assert!(runs.windows(2).all(|two| two[0].end < two[1].start), "{:?}", runs);
+        }
     }
 }

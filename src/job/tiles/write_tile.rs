@@ -94,7 +94,7 @@ pub fn write_tile(
 }
 
 thread_local! {
-    /// The bytes of the current file. A thread keeps the buffer from tile to tile, so that its pages are faulted in once.
+    /// Encodes the thread's files. It keeps its memory from tile to tile, so that its pages are faulted in once.
     static GLB: RefCell<GlbEncoder> = RefCell::default();
 }
 

@@ -74,12 +74,13 @@ impl<'a> DocumentBuilder<'a> {
     pub(crate) fn add_part(&mut self, part: &SplitPart, sorters: &mut TriangleSorters) -> Result<()> {
         let tile = &*part.tile;
         let vertices = tile.positions.len();
-        // Either order depends on the mesh alone, so a tile is the same with every backend.
+        // A plain tile has its triangles in ascending order, a packed one in that of `order_vertices`. Either depends on the mesh alone, so
+        // a tile is the same with every backend.
         let ordered = match self.compression {
             Compression::None => None,
             _ => Some(order_vertices(vertices, &tile.triangles)),
         };
-        // Orders are those of planar meshes, in which no directed edge has two triangles.
+        // Both orders are those of planar meshes, in which no directed edge has two triangles. Here it shows.
         if ordered.as_ref().is_some_and(|(triangles, _)| triangles.len() != tile.triangles.len()) {
             return Err(Error::Broken("the triangles of a tile are not a planar mesh".into()));
         }

@@ -17,7 +17,7 @@ pub struct GlbEncoder {
 }
 
 impl GlbEncoder {
-    /// Encodes the file of `tile`, whose rights `copyright` tells. The same tile gives the same bytes. Unless `compression` is none,
+    /// Encodes the file of `tile`, whose rights `copyright` tells. The same tile, which must be a planar mesh, gives the same bytes. Unless `compression` is none,
     /// `frame` should be [`Frame::packed`].
     ///
     /// # Errors
