@@ -23,8 +23,6 @@ use crate::threads::run_concurrently;
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::sync::Arc;
-use std::sync::mpsc::sync_channel;
-use std::thread::Builder;
 
 /// The mesh of a part, written as tiles as far as it is finished.
 pub(crate) struct MeshInTiles {
@@ -94,45 +92,27 @@ fn do_steps(
     let unmerged = Unmerged::default();
     let walk =
         TreeWalk { run, plan, partition, points, stage: &stage, activity: &activity, queue: &queue, freeing, unmerged };
-    let walked = while_removing_points(run, |leaves_are_done| {
-        rayon::scope(|scope| {
-            if let Writing::AtOnce(look) = &writing {
-                queue.begin(scope, look.clone());
-            }
-            let leaves = walk.walk(scope, NodeIndex::ROOT)?;
-            queue.attempt(|| walk.unmerged.check(&plan.options))?;
-            let all_leaves = run.journal.position();
-            // This closes the point files: an open file is not freed when it is removed.
-            drop(walk);
-            match writing {
-                Writing::AtOnce(_) => leaves_are_done(all_leaves),
-                Writing::AfterLeaves(look) => {
-                    // Not while tiles are written: on a small disk the results need the room.
-                    let look = || run_concurrently(|| run.remove_points(all_leaves), || look(leaves.sites));
-                    queue.attempt(|| look().map(|look| queue.begin(scope, look)))?;
-                }
-                Writing::Later => {}
-            }
-            Some((leaves, all_leaves))
-        })
+    let walked = rayon::scope(|scope| {
+        if let Writing::AtOnce(look) = &writing {
+            queue.begin(scope, look.clone());
+        }
+        let leaves = walk.walk(scope, NodeIndex::ROOT)?;
+        queue.attempt(|| walk.unmerged.check(&plan.options))?;
+        let all_leaves = run.journal.position();
+        // This closes the point files: an open file is not freed when it is removed.
+        drop(walk);
+        if let Writing::AfterLeaves(look) = writing {
+            // Not while tiles are written: on a small disk the results need the room.
+            let look = || run_concurrently(|| run.remove_points(all_leaves), || look(leaves.sites));
+            queue.attempt(|| look().map(|look| queue.begin(scope, look)))?;
+        }
+        Some((leaves, all_leaves))
     });
     run.add_stage(activity.finish());
     let tiles = queue.finish()?;
     let (leaves, all_leaves) = walked.unwrap_or_default();
     stage.finish();
     Ok(MeshInTiles { leaves, tiles, all_leaves })
-}
-
-/// Does `work`, which tells when the journal has all leaves. Then the points are removed on a thread of its own while tiles are still
-/// written, and the pages of memory that held them hold tiles next.
-fn while_removing_points<T>(run: &RunContext, work: impl FnOnce(&(dyn Fn(JournalPosition) + Sync)) -> T) -> T {
-    std::thread::scope(|scope| {
-        let (tell, told) = sync_channel(1);
-        // If this fails, or no thread can be started, the points go at the end of the job, and an error is told then.
-        let remove = move || told.recv().map(|all_leaves| run.remove_points(all_leaves));
-        let _ = Builder::new().name("points".into()).spawn_scoped(scope, remove);
-        work(&|all_leaves| _ = tell.send(all_leaves))
-    })
 }
 
 /// Opens the point files if a leaf is still to be done.
