@@ -42,7 +42,6 @@ impl RecordLayout {
     pub(crate) fn record(&self, bytes: &[u8], fields: OptionalFields) -> PointRecord {
         // All formats begin with so many bytes. Their length is checked once.
         let head = &bytes[..LEAST_LENGTHS[0] as usize];
-        // One by one: `array::map` compiles to a call for every record here.
         let raw = [int32(head, 0) as i64, int32(head, 4) as i64, int32(head, 8) as i64];
         let (class, withheld) =
             if self.extended { (head[16], head[15] & 4 != 0) } else { (head[15] & 31, head[15] & 128 != 0) };

@@ -92,8 +92,6 @@ pub fn partial_path(path: &Path) -> PathBuf {
 
 /// How many threads wait for the disk at the same time.
 const PARALLEL_SYNCS: usize = 8;
-/// Starting a thread is not worth it for fewer files.
-const LEAST_SYNCS: usize = 2;
 
 /// Gives pending files their names. A file is on the disk before its name is, and all names are on the disk before this returns.
 ///
@@ -110,7 +108,7 @@ pub fn publish(paths: &[PathBuf]) -> Result<()> {
 
 /// Brings pending files to the disk on several threads: overlapping waits take little longer than one.
 fn sync_partial_files(paths: &[PathBuf]) -> Result<()> {
-    let share = paths.len().div_ceil(PARALLEL_SYNCS).max(LEAST_SYNCS);
+    let share = paths.len().div_ceil(PARALLEL_SYNCS).max(1);
     let sync = |paths: &[PathBuf]| paths.iter().try_for_each(|path| sync_file(&partial_path(path)));
     std::thread::scope(|scope| {
         let mut shares = paths.chunks(share);

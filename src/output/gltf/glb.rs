@@ -17,8 +17,8 @@ pub struct GlbEncoder {
 }
 
 impl GlbEncoder {
-    /// Encodes the file of `tile`, whose rights `copyright` tells. The same tile, which must be a planar mesh, gives the same bytes. Unless `compression` is none,
-    /// `frame` should be [`Frame::packed`].
+    /// Encodes the file of `tile`, a planar mesh, whose rights `copyright` tells. The same tile gives the same bytes. Unless `compression` is
+    /// none, `frame` should be [`Frame::packed`].
     ///
     /// # Errors
     /// [`crate::Error::Config`] if a triangle is too long to be exact in f32 ([`Frame::longest_triangle`]) or the file would pass 4 GiB.
