@@ -118,6 +118,11 @@ impl AxisMap {
         }
     }
 
+    /// Returns `mul` and `add` if the integer of every raw `i32` is `raw * mul + add`, which fits an `i64`: nothing is rounded.
+    pub fn exact(&self) -> Option<[i64; 2]> {
+        self.narrow.and_then(|[mul, add, div]| (div == 1).then_some([mul, add]))
+    }
+
     fn round(&self, raw: i64) -> Option<(i32, bool)> {
         match self.narrow {
             Some([mul, add, div]) if i32::try_from(raw).is_ok() => divide(raw * mul + add, div),

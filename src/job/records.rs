@@ -152,7 +152,8 @@ pub struct Leaf {
 }
 
 impl Leaf {
-    /// Writes the record of `tile`, whose sites are `points`. Returns the record and the number of triangles.
+    /// Writes the record of `tile`, whose sites are `points`. Of the `triangles` come those that are marked as final. Returns the record
+    /// and their number.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -160,7 +161,7 @@ impl Leaf {
         store: &Store,
         tile: TileIndex,
         points: &[Point],
-        triangles: impl Iterator<Item = [u32; 3]>,
+        triangles: impl ExactSizeIterator<Item = ([u32; 3], bool)>,
     ) -> Result<(RecordRef, u64)> {
         let key = StepRecord::Leaf(tile);
         // These records are most of what a job stores, so they are packed.
@@ -174,10 +175,10 @@ impl Leaf {
         let columns = ColumnWriter::default().push(&count).push(&positions).push(&attributes);
         // Packing triangles would take more time than it saves, but corners take two bytes where that is enough.
         if has_short_corners(points.len()) {
-            let triangles: Vec<[u16; 3]> = triangles.map(|t| t.map(|v| v as u16)).collect();
+            let triangles = marked(triangles.map(|(t, is_final)| (t.map(|v| v as u16), is_final)));
             Ok((columns.push(&triangles).write(store, key)?, triangles.len() as u64))
         } else {
-            let triangles: Vec<[u32; 3]> = triangles.collect();
+            let triangles = marked(triangles);
             Ok((columns.push(&triangles).write(store, key)?, triangles.len() as u64))
         }
     }
@@ -215,10 +216,7 @@ impl Leaf {
 
     fn read_triangles(columns: &mut ColumnReader<StepRecord>, count: usize) -> Result<Vec<[u32; 3]>> {
         if has_short_corners(count) {
-            let short = columns.column::<[u16; 3]>()?;
-            let mut triangles = Vec::with_capacity(with_room(short.len()));
-            triangles.extend(short.iter().map(|t| t.map(u32::from)));
-            return Ok(triangles);
+            return Ok(widened(&columns.column::<[u16; 3]>()?));
         }
         columns.column_vec()
     }
@@ -246,6 +244,39 @@ impl Leaf {
         positions.iter().for_each(visit);
         Ok(())
     }
+}
+
+/// Values that are put together in the first-level cache before they go to a column.
+const PIECE: usize = 64;
+
+/// Returns the values that are marked. Nearly all are: each is written before its mark is looked at, so nothing has to be foretold.
+fn marked<T: Pod>(values: impl ExactSizeIterator<Item = (T, bool)>) -> Vec<T> {
+    let mut kept = Vec::with_capacity(values.len());
+    let (mut piece, mut count) = ([T::zeroed(); PIECE], 0);
+    for (value, is_marked) in values {
+        piece[count] = value;
+        count += usize::from(is_marked);
+        if count == PIECE {
+            kept.extend_from_slice(&piece);
+            count = 0;
+        }
+    }
+    kept.extend_from_slice(&piece[..count]);
+    kept
+}
+
+/// Returns triangles with corners of four bytes, and room for those of the seam.
+fn widened(short: &[[u16; 3]]) -> Vec<[u32; 3]> {
+    let mut triangles = Vec::with_capacity(with_room(short.len()));
+    let mut piece = [[0u32; 3]; PIECE];
+    for short in short.chunks(PIECE) {
+        // As flat numbers, which vector instructions widen.
+        for (corner, &short) in piece.as_flattened_mut().iter_mut().zip(short.as_flattened()) {
+            *corner = short.into();
+        }
+        triangles.extend_from_slice(&piece[..short.len()]);
+    }
+    triangles
 }
 
 /// Returns a capacity with room for what a seam adds to so many vertices or triangles. If it adds more, the column is copied once.

@@ -23,9 +23,15 @@ impl HalfEdgeMesh {
         (0..self.twins.len()).map(HalfEdgeIndex::new)
     }
 
-    /// Returns the half-edges on the hull.
+    /// Returns the half-edges on the hull, ascending.
     pub fn hull(&self) -> impl Iterator<Item = HalfEdgeIndex> {
-        self.half_edges().filter(|&h| self.twin(h) == HalfEdgeIndex::HULL)
+        // Few are: vector instructions tell which pieces have any.
+        const PIECE: usize = 64;
+        let has_any =
+            |piece: &[HalfEdgeIndex]| piece.iter().fold(false, |any, &twin| any | (twin == HalfEdgeIndex::HULL));
+        let pieces = self.twins.chunks(PIECE).enumerate().filter(move |(_, piece)| has_any(piece));
+        let half_edges = pieces.flat_map(|(at, piece)| (at * PIECE..at * PIECE + piece.len()).map(HalfEdgeIndex::new));
+        half_edges.filter(|&h| self.twin(h) == HalfEdgeIndex::HULL)
     }
 
     /// Returns the half-edge in the opposite direction of `h`, or [`HalfEdgeIndex::HULL`].

@@ -51,8 +51,10 @@ impl HullRule {
     #[inline]
     pub fn flow(&self, corners: [Site; 3]) -> Option<usize> {
         let [a, b, c] = corners;
-        // Few triangles have a long edge, so the processor predicts this branch. Half of all triangles are obtuse.
-        if !(self.is_long(a, b) | self.is_long(b, c) | self.is_long(c, a)) {
+        let [width, height] = [0, 1].map(|k| i64::from(a[k].max(b[k]).max(c[k])) - i64::from(a[k].min(b[k]).min(c[k])));
+        // Few triangles have a box with a long diagonal, and so a long edge. Thus the processor predicts this branch. Half of all triangles
+        // are obtuse.
+        if (width * width + height * height) as u64 <= self.limit {
             return None;
         }
         let is_obtuse = |&apex: &usize| dot(corners[apex], corners[(apex + 1) % 3], corners[(apex + 2) % 3]) < 0;
@@ -86,6 +88,22 @@ mod tests {
     }
 
     proptest! {
+        /// The least of what `flow` says: an obtuse triangle flows over its longest edge if that is long.
+        #[test]
+        fn a_triangle_flows_over_its_longest_edge_if_that_is_long(
+            corners in prop::array::uniform3(prop::array::uniform2(-60i32..60)),
+            limit in 0u64..20_000,
+        ) {
+            let rule = HullRule { limit };
+            let square = |from: usize| {
+                let [a, b] = [corners[from], corners[(from + 1) % 3]];
+                dot(a, b, b)
+            };
+            let (longest, rest) = (0..3).map(square).fold((0, 0), |(most, sum), s| (most.max(s), sum + s));
+            let flow = (2 * longest > rest && longest as u64 > limit).then_some(longest);
+            prop_assert_eq!(rule.flow(corners).map(square), flow);
+        }
+
         /// Even where many sites lie on one circle, so that there are several triangulations.
         #[test]
         fn edges_grow_along_a_way(sites in prop::collection::btree_set(prop::array::uniform2(-30i32..30), 3..120)) {

@@ -67,8 +67,8 @@ pub fn triangulate_leaf(
     let found = find_final(&mesh, &sites, cell.as_ref(), |_| false);
     check_precision(&mesh, &sites, &found.states, PrecisionLimit::of(&plan.frame))?;
     let normals = partial_normals(&mesh, &found, &points);
-    let is_final = |(_, state): &(&[u32; 3], &TriangleState)| **state == TriangleState::Final;
-    let triangles = mesh.corners().iter().zip(&found.states).filter(is_final).map(|(triangle, _)| *triangle);
+    let corners = mesh.corners().iter().zip(&found.states);
+    let triangles = corners.map(|(triangle, state)| (*triangle, *state == TriangleState::Final));
     let (leaf, triangles) = Leaf::save(store, tile, &points, triangles)?;
     let vertex = |&site: &SiteIndex| BorderVertex { tile, site, position: points[site.get()].corner() };
     let is_root = cell.is_none();
