@@ -457,3 +457,23 @@ impl LevelSummary {
         Ok(LevelSummary { own, leaves: columns.column_vec()? })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn marked_values_stay_in_order(values in prop::collection::vec((any::<[u16; 3]>(), any::<bool>()), 0..5 * PIECE)) {
+            let expected: Vec<_> = values.iter().filter(|(_, is_marked)| *is_marked).map(|(value, _)| *value).collect();
+            prop_assert_eq!(marked(values.into_iter()), expected);
+        }
+
+        #[test]
+        fn widened_triangles_have_the_same_corners(short in prop::collection::vec(any::<[u16; 3]>(), 0..3 * PIECE)) {
+            let expected: Vec<[u32; 3]> = short.iter().map(|t| t.map(u32::from)).collect();
+            prop_assert_eq!(widened(&short), expected);
+        }
+    }
+}

@@ -76,3 +76,21 @@ impl HalfEdgeMesh {
         std::iter::successors(Some(h), turn).map(HalfEdgeIndex::triangle)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_hull_is_all_half_edges_without_a_twin(
+            twins in prop::collection::vec(prop::option::weighted(0.97, 0u32..1000), 0..400),
+        ) {
+            let expected: Vec<usize> = (0..twins.len()).filter(|&h| twins[h].is_none()).collect();
+            let twins = twins.into_iter().map(|twin| twin.map_or(HalfEdgeIndex::HULL, HalfEdgeIndex)).collect();
+            let mesh = HalfEdgeMesh { triangles: Vec::new(), twins };
+            prop_assert_eq!(mesh.hull().map(HalfEdgeIndex::get).collect::<Vec<_>>(), expected);
+        }
+    }
+}
