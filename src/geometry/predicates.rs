@@ -111,9 +111,6 @@ pub struct TriangleBatch {
     pub corners: [[Site; TriangleBatch::LANES]; 3],
     /// The site beyond side `i` of triangle `t`, the side from corner `i` to the next.
     pub beyond: [[Site; TriangleBatch::LANES]; 3],
-    /// The other two corners and the three sites beyond, seen from corner 0, of half of the triangles: x and y apart. It stays from batch to
-    /// batch, because to clear it takes longer than to fill it.
-    from_a: [[[f32; TriangleBatch::HALF]; 2]; 5],
 }
 
 /// What a [`TriangleBatch`] leaves in doubt: bit `t` is that of triangle `t`.
@@ -127,8 +124,7 @@ pub struct Doubts {
 
 impl Default for TriangleBatch {
     fn default() -> Self {
-        let sites = [[[0; 2]; TriangleBatch::LANES]; 3];
-        TriangleBatch { corners: sites, beyond: sites, from_a: [[[0.0; TriangleBatch::HALF]; 2]; 5] }
+        TriangleBatch { corners: [[[0; 2]; TriangleBatch::LANES]; 3], beyond: [[[0; 2]; TriangleBatch::LANES]; 3] }
     }
 }
 
@@ -136,13 +132,10 @@ impl TriangleBatch {
     /// How many triangles fit.
     pub const LANES: usize = 64;
 
-    /// Half a word of triangles: then bits have the width of the numbers.
-    const HALF: usize = TriangleBatch::LANES / 2;
-
     /// Returns what is in doubt about the first `count` triangles. A bit is never clear where [`orient2d`] is not positive, or [`in_circle`]
     /// is true.
     #[inline(always)]
-    pub fn doubts(&mut self, count: usize) -> Doubts {
+    pub fn doubts(&self, count: usize) -> Doubts {
         let Doubts { orientation, sides } = doubts(self, count);
         let all = u64::MAX >> (TriangleBatch::LANES - count.clamp(1, TriangleBatch::LANES));
         Doubts { orientation: orientation & all, sides: sides.map(|side| side & all) }
@@ -151,11 +144,12 @@ impl TriangleBatch {
 
 // As a function of its own it compiles to vector instructions. Inlined into its callers it might not.
 #[multiversion(targets("x86_64+avx2"), attrs(inline(never)))]
-fn doubts(batch: &mut TriangleBatch, count: usize) -> Doubts {
-    // Arrays of one constant length need no bounds checks.
-    const HALF: usize = TriangleBatch::HALF;
-    let TriangleBatch { corners: [a, b, c], beyond: [d, e, f], from_a } = batch;
+fn doubts(batch: &TriangleBatch, count: usize) -> Doubts {
+    // Half a word at a time, whose bits have the width of the numbers. Arrays of one constant length need no bounds checks.
+    const HALF: usize = TriangleBatch::LANES / 2;
+    let TriangleBatch { corners: [a, b, c], beyond: [d, e, f] } = batch;
     let mut words = [0u64; 4];
+    let mut from_a = [[[0f32; HALF]; 2]; 5];
     for first in (0..count.min(TriangleBatch::LANES)).step_by(HALF) {
         // Coordinates are parted in a loop of their own: with them, the compiler takes half as many lanes for the rest.
         for i in 0..HALF {
@@ -165,7 +159,7 @@ fn doubts(batch: &mut TriangleBatch, count: usize) -> Doubts {
                 (from_a[0][i], from_a[1][i]) = (x, y);
             }
         }
-        let [u, v, d, e, f] = &*from_a;
+        let [u, v, d, e, f] = &from_a;
         let mut halves = [0u32; 4];
         for i in 0..HALF {
             let at = |from_a: &[[f32; HALF]; 2]| [from_a[0][i], from_a[1][i]];

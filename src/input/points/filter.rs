@@ -165,7 +165,7 @@ impl<'a> PointFilter<'a> {
 impl RecordSink for PointFilter<'_> {
     #[inline]
     fn push(&mut self, number: u64, record: &PointRecord, place: impl Fn() -> String) -> Result<()> {
-        // Nearly all records of nearly all files. Asking for everything in turn takes three times the instructions.
+        // Nearly all records of nearly all files. To ask for everything in turn takes 1.6 times the instructions.
         if let Some([x, y, z]) = self.plain_place(record) {
             self.classes[record.class as usize] += 1;
             if !self.rules.classes[record.class as usize] {
