@@ -1,5 +1,6 @@
 //! Axis-aligned boxes of lattice points.
 
+use multiversion::multiversion;
 use serde::de::{Deserialize, Deserializer, Error};
 use serde::ser::{Serialize, Serializer};
 
@@ -53,6 +54,12 @@ impl<const N: usize> Bounds<N> {
     pub fn middle(&self) -> [i32; N] {
         std::array::from_fn(|axis| ((self.min[axis] as i64 + self.max[axis] as i64) >> 1) as i32)
     }
+}
+
+/// Returns the least box that holds all `points`, or `None` if there are none. With vector instructions, where points lie one after another.
+#[multiversion(targets("x86_64+avx2"))]
+pub fn bounds_of<const N: usize>(points: &[[i32; N]]) -> Option<Bounds<N>> {
+    Bounds::of_points(points.iter().copied())
 }
 
 /// Written as `[min, max]`.

@@ -118,7 +118,8 @@ impl AxisMap {
         }
     }
 
-    /// Returns `mul` and `add` if the integer of every raw `i32` is `raw * mul + add`, which fits an `i64`: nothing is rounded.
+    /// Returns `mul` and `add` of a map that rounds nothing: the integer of a raw `i32` is `raw * mul + add`, which does not overflow an
+    /// `i64`. Returns `None` for maps of very large numbers too.
     pub fn exact(&self) -> Option<[i64; 2]> {
         self.narrow.and_then(|[mul, add, div]| (div == 1).then_some([mul, add]))
     }
@@ -245,6 +246,16 @@ mod tests {
             let map = AxisMap::new(offset, scale, Decimal::new(123, 2), step).unwrap();
             proptest::prop_assert!(map.narrow.is_some());
             proptest::prop_assert_eq!(map.apply(raw.into()), map.apply_wide(raw.into()));
+        }
+
+        #[test]
+        fn exact_maps_round_nothing(raw: i32, offset in -3_000_000i64..3_000_000, scale in 1i64..30, step in 1i64..4) {
+            let map = AxisMap::new(Decimal::from(offset), Decimal::from(scale), Decimal::ZERO, Decimal::from(step)).unwrap();
+            proptest::prop_assert_eq!(map.exact().is_some(), offset % step == 0 && scale % step == 0);
+            if let Some([mul, add]) = map.exact() {
+                let integer = i32::try_from(i64::from(raw) * mul + add).ok();
+                proptest::prop_assert_eq!(map.apply(raw.into()), integer.map(|integer| (integer, false)));
+            }
         }
 
         #[test]

@@ -7,6 +7,6 @@ mod site;
 pub mod square_grid;
 mod vertex_digest;
 
-pub use bounds::Bounds;
+pub use bounds::{Bounds, bounds_of};
 pub use site::Site;
 pub use vertex_digest::VertexDigest;

@@ -152,8 +152,8 @@ pub struct Leaf {
 }
 
 impl Leaf {
-    /// Writes the record of `tile`, whose sites are `points`. Of the `triangles` come those that are marked as final. Returns the record
-    /// and their number.
+    /// Writes the record of `tile`: its sites, which are `points`, and those of the `triangles` that are marked as final. Returns the record
+    /// and the number of these triangles.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -246,10 +246,11 @@ impl Leaf {
     }
 }
 
-/// Values that are put together in the first-level cache before they go to a column.
+/// How many values are put together in the first-level cache before they go to a column.
 const PIECE: usize = 64;
 
-/// Returns the values that are marked. Nearly all are: each is written before its mark is looked at, so nothing has to be foretold.
+/// Returns the values that are marked. Each is written before its mark is looked at, so no branch depends on the
+/// mark.
 fn marked<T: Pod>(values: impl ExactSizeIterator<Item = (T, bool)>) -> Vec<T> {
     let mut kept = Vec::with_capacity(values.len());
     let (mut piece, mut count) = ([T::zeroed(); PIECE], 0);

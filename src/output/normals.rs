@@ -1,8 +1,8 @@
 //! Vertex normals, weighted by the area of the triangles around the vertex. They come from exact integer sums, so neither the order
 //! of the triangles nor the cut into tiles changes a bit of them.
 
+use crate::geometry::bounds_of;
 use crate::output::frame::Frame;
-use crate::output::tile::bounds;
 use multiversion::multiversion;
 
 /// The sum of the normals of the triangles around a vertex, each with a length of twice the triangle's area, in lattice steps
@@ -108,7 +108,7 @@ fn accumulate<T: Copy + std::ops::AddAssign>(
 
 /// Tells whether the sum of `triangles` normals, all at one vertex, stays within an `i64`.
 fn narrow_suffices(positions: &[[i32; 3]], triangles: usize) -> bool {
-    let Some(bounds) = bounds(positions) else { return true };
+    let Some(bounds) = bounds_of(positions) else { return true };
     let [x, y, z] = [0, 1, 2].map(|axis| bounds.extent(axis) as u128);
     let largest = (x * y).max(y * z).max(x * z) * 2;
     largest.saturating_mul(triangles as u128) < 1 << 63

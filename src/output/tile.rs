@@ -1,8 +1,7 @@
 //! The content of one tile, in lattice steps and source axes.
 
-use crate::geometry::Bounds;
+use crate::geometry::{Bounds, bounds_of};
 use crate::output::attributes::PointAttributes;
-use multiversion::multiversion;
 
 /// A piece of the terrain: vertices on the job's lattice and the triangles between them. Every vertex is the corner of at
 /// least one triangle.
@@ -45,14 +44,8 @@ impl Tile {
 
     /// Returns the box of the vertices, or `None` without vertices.
     pub fn bounds(&self) -> Option<Bounds<3>> {
-        bounds(&self.positions)
+        bounds_of(&self.positions)
     }
-}
-
-/// Returns the box of `positions`, or `None` if there are none.
-#[multiversion(targets("x86_64+avx2"))]
-pub(crate) fn bounds(positions: &[[i32; 3]]) -> Option<Bounds<3>> {
-    Bounds::of_points(positions.iter().copied())
 }
 
 /// Up to this many times the number of corners, a table by vertex is quicker than sorting the corners.

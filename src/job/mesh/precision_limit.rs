@@ -1,9 +1,8 @@
 //! Whether glTF can hold the triangles of the mesh: its coordinates have 24 binary digits.
 
-use crate::geometry::{Bounds, Site};
+use crate::geometry::{Bounds, Site, bounds_of};
 use crate::output::frame::Frame;
 use crate::{Error, Result};
-use multiversion::multiversion;
 
 /// The longest extent in x, y and in z that a triangle may have, in lattice steps.
 #[derive(Clone, Copy, Debug)]
@@ -27,7 +26,7 @@ impl PrecisionLimit {
 
     /// Tells whether no triangle of these `sites` can be too long.
     pub fn holds_all(&self, sites: &[Site]) -> bool {
-        bounds(sites).is_none_or(|bounds| (0..2).all(|axis| bounds.extent(axis) <= self.horizontal))
+        bounds_of(sites).is_none_or(|bounds| (0..2).all(|axis| bounds.extent(axis) <= self.horizontal))
     }
 
     /// Checks the triangle abc.
@@ -70,10 +69,4 @@ impl PrecisionLimit {
             what: format!("heights span {span:.0} m, and with their step glTF holds {limit:.0} m exactly"),
         })
     }
-}
-
-/// Returns the box of the sites.
-#[multiversion(targets("x86_64+avx2"))]
-fn bounds(sites: &[Site]) -> Option<Bounds<2>> {
-    Bounds::of_points(sites.iter().copied())
 }

@@ -5,8 +5,7 @@
 
 use multiversion::multiversion;
 
-use crate::geometry::Bounds;
-use crate::output::tile::bounds;
+use crate::geometry::{Bounds, bounds_of};
 
 /// The cells, numbered row by row.
 pub(crate) struct CellGrid {
@@ -20,7 +19,7 @@ pub(crate) struct CellGrid {
 impl CellGrid {
     /// Returns about `about` cells over `positions` (lattice x, y, z).
     pub(crate) fn new(positions: &[[i32; 3]], about: usize) -> CellGrid {
-        let bounds = bounds(positions).unwrap_or(Bounds::of_point([0; 3]));
+        let bounds = bounds_of(positions).unwrap_or(Bounds::of_point([0; 3]));
         let [low, high] = [bounds.min, bounds.max].map(|p| [f64::from(p[0]), f64::from(p[1])]);
         let size = [0, 1].map(|k| (high[k] - low[k]).max(1.0));
         let about = about.max(1) as f64;
