@@ -2,6 +2,7 @@
 
 use crate::geometry::{Bounds, bounds_of};
 use crate::output::attributes::PointAttributes;
+use multiversion::multiversion;
 
 /// A piece of the terrain: vertices on the job's lattice and the triangles between them. Every vertex is the corner of at
 /// least one triangle.
