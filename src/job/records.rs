@@ -249,8 +249,7 @@ impl Leaf {
 /// How many values are put together in the first-level cache before they go to a column.
 const PIECE: usize = 64;
 
-/// Returns the values that are marked. Each is written before its mark is looked at, so no branch depends on the
-/// mark.
+/// Returns the values that are marked. Each is written before its mark is looked at, so no branch depends on the mark.
 fn marked<T: Pod>(values: impl ExactSizeIterator<Item = (T, bool)>) -> Vec<T> {
     let mut kept = Vec::with_capacity(values.len());
     let (mut piece, mut count) = ([T::zeroed(); PIECE], 0);

@@ -29,7 +29,7 @@ pub(crate) struct PointFilter<'a> {
     axes: &'a [Axis; 3],
     rules: &'a PointRules,
     /// The maps of x, y and z, if all are exact and the rules look at nothing but the class of a record.
-    plain: Option<[[i64; 2]; 3]>,
+    quick_maps: Option<[[i64; 2]; 3]>,
     sink: Sink<'a>,
     points: Vec<Point>,
     counts: PointCounts,
@@ -43,14 +43,14 @@ impl<'a> PointFilter<'a> {
     /// Returns a filter for records of the file at `path` with these `axes`; points that pass `rules` go to `sink`.
     pub(crate) fn new(path: &'a Path, axes: &'a [Axis; 3], rules: &'a PointRules, sink: Sink<'a>) -> PointFilter<'a> {
         let (points, counts) = (Vec::with_capacity(SLICE), PointCounts::default());
-        let plain = plain_maps(rules);
-        PointFilter { path, axes, rules, plain, sink, points, counts, classes: [0; 256], kept: [0; 256] }
+        let quick_maps = quick_maps(rules);
+        PointFilter { path, axes, rules, quick_maps, sink, points, counts, classes: [0; 256], kept: [0; 256] }
     }
 
     /// Returns the lattice integers of a record whose class alone decides its fate; `None` if a closer look is needed.
     #[inline(always)]
-    fn plain_place(&self, record: &PointRecord) -> Option<[i32; 3]> {
-        let maps = self.plain.as_ref()?;
+    fn quick_place(&self, record: &PointRecord) -> Option<[i32; 3]> {
+        let maps = self.quick_maps.as_ref()?;
         let mut fits = !(record.withheld | record.rounded[0] | record.rounded[1]);
         let mut place = [0; 3];
         for ((place, &raw), [mul, add]) in place.iter_mut().zip(&record.raw).zip(maps) {
@@ -62,8 +62,20 @@ impl<'a> PointFilter<'a> {
         (fits & in_reach(place[0]) & in_reach(place[1])).then_some(place)
     }
 
-    #[inline]
-    fn keep(&mut self, point: Point) -> Result<()> {
+    /// Counts a class, and returns whether the job keeps it.
+    #[inline(always)]
+    fn keeps_class(&mut self, class: u8) -> bool {
+        self.classes[class as usize] += 1;
+        let is_kept = self.rules.classes[class as usize];
+        self.counts.other_class += u64::from(!is_kept);
+        is_kept
+    }
+
+    /// Keeps record `number`, whose lattice integers are `place`.
+    #[inline(always)]
+    fn keep(&mut self, number: u64, record: &PointRecord, [x, y, z]: [i32; 3]) -> Result<()> {
+        let point = Point::new([x, y], z, record.rgb, record.class, self.rules.first_order + number);
+        let point = point.with_intensity(record.intensity);
         self.kept[point.class as usize] += 1;
         self.counts.max_rgb = self.counts.max_rgb.max(point.rgb[0].max(point.rgb[1]).max(point.rgb[2]));
         self.points.push(point);
@@ -108,12 +120,7 @@ impl<'a> PointFilter<'a> {
             self.counts.withheld += 1;
             return Ok(());
         }
-        self.classes[record.class as usize] += 1;
-        if !self.rules.classes[record.class as usize] {
-            self.counts.other_class += 1;
-            return Ok(());
-        }
-        if !self.keeps_return(record.pulse_return) {
+        if !self.keeps_class(record.class) || !self.keeps_return(record.pulse_return) {
             return Ok(());
         }
         // One by one: `array::map` compiles to a call for every record here.
@@ -123,8 +130,7 @@ impl<'a> PointFilter<'a> {
             [Some((x, round_x)), Some((y, round_y)), Some((z, round_z))] if in_reach(x) && in_reach(y) => {
                 self.counts.rounded_xy += (round_x | round_y | record.rounded[0]) as u64;
                 self.counts.rounded_z += (round_z | record.rounded[1]) as u64;
-                let point = Point::new([x, y], z, record.rgb, record.class, self.rules.first_order + number);
-                self.keep(point.with_intensity(record.intensity))
+                self.keep(number, record, [x, y, z])
             }
             _ => {
                 let (value, name) = self.out_of_reach(record, &mapped);
@@ -165,16 +171,11 @@ impl RecordSink for PointFilter<'_> {
     #[inline]
     fn push(&mut self, number: u64, record: &PointRecord, place: impl Fn() -> String) -> Result<()> {
         // Nearly all records of jobs without bounds and returns. To ask for everything in turn takes 1.6 times the instructions.
-        if let Some([x, y, z]) = self.plain_place(record) {
-            self.classes[record.class as usize] += 1;
-            if !self.rules.classes[record.class as usize] {
-                self.counts.other_class += 1;
-                return Ok(());
-            }
-            let point = Point::new([x, y], z, record.rgb, record.class, self.rules.first_order + number);
-            return self.keep(point.with_intensity(record.intensity));
+        match self.quick_place(record) {
+            None => self.push_any(number, record, place),
+            Some(place) if self.keeps_class(record.class) => self.keep(number, record, place),
+            Some(_) => Ok(()),
         }
-        self.push_any(number, record, place)
     }
 
     #[inline]
@@ -211,7 +212,7 @@ impl RecordSink for PointFilter<'_> {
 }
 
 /// Returns the maps of x, y and z if all are exact, and neither bounds nor returns leave records out.
-fn plain_maps(rules: &PointRules) -> Option<[[i64; 2]; 3]> {
+fn quick_maps(rules: &PointRules) -> Option<[[i64; 2]; 3]> {
     let asks_for_more = rules.bounds.is_some() || rules.returns != KeptReturns::All;
     let [x, y, z] = &rules.maps;
     if asks_for_more { None } else { Some([x.exact()?, y.exact()?, z.exact()?]) }
@@ -236,7 +237,7 @@ mod tests {
         AxisMap::new(Decimal::from(offset), Decimal::from(scale), Decimal::ZERO, Decimal::ONE).unwrap()
     }
 
-    /// Returns the points that pass, and the counts; with `only_any`, every record takes the way of those that are not plain.
+    /// Returns the points that pass, and the counts; with `only_any`, no record takes the quick way.
     fn filtered(rules: &PointRules, records: &[PointRecord], only_any: bool) -> (Vec<Point>, PointCounts) {
         let axes = [Axis { offset: Decimal::ZERO, scale: Decimal::ONE }; 3];
         let mut points = Vec::new();
@@ -245,9 +246,9 @@ mod tests {
             Ok(())
         };
         let mut filter = PointFilter::new(Path::new("cloud.las"), &axes, rules, &mut sink);
-        assert!(filter.plain.is_some(), "the rules are plain");
+        assert!(filter.quick_maps.is_some(), "these rules allow the quick way");
         if only_any {
-            filter.plain = None;
+            filter.quick_maps = None;
         }
         for (number, record) in (0..).zip(records) {
             filter.push(number, record, || format!("point {number}")).unwrap();
@@ -276,7 +277,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn plain_records_fare_as_any_others(
+        fn on_the_quick_way_records_fare_as_any_others(
             records in prop::collection::vec(record(), 0..60),
             offsets in prop::array::uniform3(prop_oneof![3 => Just(0), 3 => -1000i64..1000, 1 => -(1i64 << 31)..1 << 31]),
             scales in prop::array::uniform3(prop_oneof![Just(1), 1i64..50]),
@@ -295,8 +296,8 @@ mod tests {
     }
 
     #[test]
-    fn rules_that_leave_records_out_or_round_them_are_not_plain() {
-        let plain = PointRules {
+    fn rules_that_leave_records_out_or_round_them_allow_no_quick_way() {
+        let rules = PointRules {
             maps: [map(7, 1); 3],
             classes: [true; 256],
             returns: KeptReturns::All,
@@ -304,15 +305,15 @@ mod tests {
             first_order: 0,
             fields: OptionalFields::default(),
         };
-        assert_eq!(plain_maps(&plain), Some([[1, 7]; 3]));
-        assert_eq!(plain_maps(&PointRules { returns: KeptReturns::First, ..plain.clone() }), None);
+        assert_eq!(quick_maps(&rules), Some([[1, 7]; 3]));
+        assert_eq!(quick_maps(&PointRules { returns: KeptReturns::First, ..rules.clone() }), None);
         let everywhere = RawBounds { min: [i64::MIN; 2], max: [i64::MAX; 2] };
-        assert_eq!(plain_maps(&PointRules { bounds: Some(everywhere), ..plain.clone() }), None);
+        assert_eq!(quick_maps(&PointRules { bounds: Some(everywhere), ..rules.clone() }), None);
         let rounding = AxisMap::new(Decimal::ZERO, Decimal::ONE, Decimal::ZERO, Decimal::from(2)).unwrap();
         for axis in 0..3 {
-            let mut rules = plain.clone();
-            rules.maps[axis] = rounding;
-            assert_eq!(plain_maps(&rules), None, "axis {axis}");
+            let mut changed = rules.clone();
+            changed.maps[axis] = rounding;
+            assert_eq!(quick_maps(&changed), None, "axis {axis}");
         }
     }
 }
