@@ -5,19 +5,20 @@ use crate::geometry::Bounds;
 use crate::input::Point;
 use crate::job::partition::buckets::Buckets;
 use crate::job::partition::grid::Grid;
+use multiversion::multiversion;
 
 /// Sorts points by bucket before they go to the shared buffers, so that each bucket is locked once for many points.
-pub(crate) struct BucketSorter<'a> {
+pub(crate) struct BucketSorter<'a, 'b> {
     grid: &'a Grid,
-    buckets: &'a Buckets<'a>,
+    buckets: &'a Buckets<'b>,
     bucket_of: Vec<u32>,
     ends: Vec<u32>,
     sorted: Vec<Point>,
     bounds: Option<Bounds<3>>,
 }
 
-impl<'a> BucketSorter<'a> {
-    pub(crate) fn new(grid: &'a Grid, buckets: &'a Buckets<'a>) -> BucketSorter<'a> {
+impl<'a, 'b> BucketSorter<'a, 'b> {
+    pub(crate) fn new(grid: &'a Grid, buckets: &'a Buckets<'b>) -> BucketSorter<'a, 'b> {
         let (bucket_of, ends, sorted) = (Vec::new(), Vec::new(), Vec::new());
         BucketSorter { grid, buckets, bucket_of, ends, sorted, bounds: None }
     }
@@ -29,13 +30,9 @@ impl<'a> BucketSorter<'a> {
 
     /// Adds `points` to their buckets.
     pub(crate) fn add(&mut self, points: &[Point]) -> Result<()> {
-        self.count(points);
-        self.sorted.resize(points.len(), bytemuck::Zeroable::zeroed());
-        for (point, &bucket) in points.iter().zip(&self.bucket_of).rev() {
-            let end = &mut self.ends[bucket as usize];
-            *end -= 1;
-            self.sorted[*end as usize] = *point;
-        }
+        let Some(first) = points.first().map(Point::corner) else { return Ok(()) };
+        let bounds = self.bounds.unwrap_or(Bounds::of_point(first));
+        self.bounds = Some(sort(self, points, bounds));
         // Each end has come down to where its bucket starts.
         self.ends.push(points.len() as u32);
         for bucket in 0..self.grid.buckets() {
@@ -46,25 +43,78 @@ impl<'a> BucketSorter<'a> {
         }
         Ok(())
     }
+}
 
-    /// Finds the bucket of every point, where the run of each bucket ends in sorted order, and the box of all points.
-    fn count(&mut self, points: &[Point]) {
-        self.ends.clear();
-        self.ends.resize(self.grid.buckets(), 0);
-        self.bucket_of.clear();
-        let Some(first) = points.first().map(Point::corner) else { return };
-        let mut bounds = self.bounds.unwrap_or(Bounds::of_point(first));
-        for point in points {
-            let bucket = self.grid.bucket(point.position);
-            self.bucket_of.push(bucket);
-            self.ends[bucket as usize] += 1;
-            bounds.include(point.corner());
-        }
-        self.bounds = Some(bounds);
-        let mut end = 0;
-        for count in &mut self.ends {
-            end += *count;
-            *count = end;
+/// Sorts `points` by bucket, and returns the box of all points. Leaves where the run of each bucket starts.
+// With the instructions of today's processors this takes less time.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn sort(sorter: &mut BucketSorter, points: &[Point], mut bounds: Bounds<3>) -> Bounds<3> {
+    let BucketSorter { grid, bucket_of, ends, sorted, .. } = sorter;
+    ends.clear();
+    ends.resize(grid.buckets(), 0);
+    bucket_of.resize(points.len(), 0);
+    for (point, bucket) in points.iter().zip(bucket_of.iter_mut()) {
+        *bucket = grid.bucket(point.position);
+        ends[*bucket as usize] += 1;
+        bounds.include(point.corner());
+    }
+    let mut end = 0;
+    for count in ends.iter_mut() {
+        end += *count;
+        *count = end;
+    }
+    sorted.resize(points.len(), bytemuck::Zeroable::zeroed());
+    for (point, &bucket) in points.iter().zip(bucket_of.iter()).rev() {
+        let end = &mut ends[bucket as usize];
+        *end -= 1;
+        sorted[*end as usize] = *point;
+    }
+    bounds
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::partition::point_file::{PointFile, PointFiles};
+    use proptest::prelude::*;
+    use rayon::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(32))]
+
+        /// Two threads add slices of any length, and buffers are full now and then.
+        #[test]
+        fn every_point_gets_into_its_bucket(
+            places in prop::collection::vec(prop::array::uniform3(-50i32..150), 0..2000),
+            slice in 1usize..700,
+            memory in 0u64..50_000,
+        ) {
+            let folder = tempfile::tempdir().unwrap();
+            let file = PointFile::create(&folder.path().join("points"), 0).unwrap();
+            let point = |(order, &[x, y, z]): (u64, &[i32; 3])| Point::new([x, y], z, [0; 3], 0, order);
+            let points: Vec<Point> = (0..).zip(&places).map(point).collect();
+            let grid = Grid::over(Bounds { min: [0, 0], max: [99, 49] }, 8);
+            let fill = |buckets: &Buckets| {
+                let add = |points: &[Point]| {
+                    let mut sorter = BucketSorter::new(&grid, buckets);
+                    points.chunks(slice).try_for_each(|points| sorter.add(points))?;
+                    Ok(sorter.bounds())
+                };
+                points.par_chunks(1000).map(add).collect::<Result<Vec<_>>>()
+            };
+            let (bounds, buckets) = Buckets::fill(&vec![Some(&file); grid.buckets()], memory, fill).unwrap();
+            let bounds = bounds.into_iter().flatten().reduce(Bounds::union);
+            prop_assert_eq!(bounds, Bounds::of_points(places));
+            let files = PointFiles::open(&[]).unwrap().and(file);
+            for (index, bucket) in buckets.iter().enumerate() {
+                let mut found = Vec::new();
+                bucket.blocks.iter().for_each(|&block| files.read(block, &mut found).unwrap());
+                found.sort_by_key(Point::order);
+                let expected: Vec<_> =
+                    points.iter().copied().filter(|p| grid.bucket(p.position) as usize == index).collect();
+                prop_assert_eq!(bucket.points, found.len() as u64);
+                prop_assert_eq!(found, expected);
+            }
         }
     }
 }
