@@ -153,6 +153,11 @@ impl InputOptions {
         (!is_open).then(|| "surface and returns choose different returns: leave out one of both keys".into())
     }
 
+    /// Tells whether the job needs the numbers of points: to know which was read first, or which came from a file that proved bad.
+    pub fn needs_numbers(&self) -> bool {
+        self.duplicates == Duplicates::First || self.on_bad_file == OnBadFile::Skip
+    }
+
     /// Returns which rows of a text the job wants, and which `fields` of them.
     pub fn row_choice(&self, fields: OptionalFields) -> RowChoice {
         RowChoice {
@@ -315,6 +320,20 @@ mod tests {
         ] {
             let options: InputOptions = toml::from_str(&format!("files = [\"a\"]\n{text}")).unwrap();
             assert_eq!(options.mesh_of(), mesh, "{text}");
+        }
+    }
+
+    #[test]
+    fn points_have_numbers_where_their_order_decides_or_their_file_may_be_left_out() {
+        for (text, needed) in [
+            ("", false),
+            ("duplicates = \"lowest\"", false),
+            ("duplicates = \"highest\"\non_bad_file = \"stop\"", false),
+            ("duplicates = \"first\"", true),
+            ("on_bad_file = \"skip\"", true),
+        ] {
+            let options: InputOptions = toml::from_str(&format!("files = [\"a\"]\n{text}")).unwrap();
+            assert_eq!(options.needs_numbers(), needed, "{text}");
         }
     }
 
