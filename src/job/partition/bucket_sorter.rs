@@ -8,17 +8,17 @@ use crate::job::partition::grid::Grid;
 use multiversion::multiversion;
 
 /// Sorts points by bucket before they go to the shared buffers, so that each bucket is locked once for many points.
-pub(crate) struct BucketSorter<'a, 'b> {
+pub(crate) struct BucketSorter<'a> {
     grid: &'a Grid,
-    buckets: &'a Buckets<'b>,
+    buckets: &'a Buckets<'a>,
     bucket_of: Vec<u32>,
     ends: Vec<u32>,
     sorted: Vec<Point>,
     bounds: Option<Bounds<3>>,
 }
 
-impl<'a, 'b> BucketSorter<'a, 'b> {
-    pub(crate) fn new(grid: &'a Grid, buckets: &'a Buckets<'b>) -> BucketSorter<'a, 'b> {
+impl<'a> BucketSorter<'a> {
+    pub(crate) fn new(grid: &'a Grid, buckets: &'a Buckets<'a>) -> BucketSorter<'a> {
         let (bucket_of, ends, sorted) = (Vec::new(), Vec::new(), Vec::new());
         BucketSorter { grid, buckets, bucket_of, ends, sorted, bounds: None }
     }
@@ -94,16 +94,15 @@ mod tests {
             let point = |(order, &[x, y, z]): (u64, &[i32; 3])| Point::new([x, y], z, [0; 3], 0, order);
             let points: Vec<Point> = (0..).zip(&places).map(point).collect();
             let grid = Grid::over(Bounds { min: [0, 0], max: [99, 49] }, 8);
-            let fill = |buckets: &Buckets| {
-                let add = |points: &[Point]| {
-                    let mut sorter = BucketSorter::new(&grid, buckets);
-                    points.chunks(slice).try_for_each(|points| sorter.add(points))?;
-                    Ok(sorter.bounds())
-                };
-                points.par_chunks(1000).map(add).collect::<Result<Vec<_>>>()
+            let buckets = Buckets::new(&file, grid.buckets(), memory);
+            let add = |points: &[Point]| {
+                let mut sorter = BucketSorter::new(&grid, &buckets);
+                points.chunks(slice).try_for_each(|points| sorter.add(points))?;
+                Ok(sorter.bounds())
             };
-            let (bounds, buckets) = Buckets::fill(&vec![Some(&file); grid.buckets()], memory, fill).unwrap();
-            let bounds = bounds.into_iter().flatten().reduce(Bounds::union);
+            let bounds: Result<Vec<_>> = points.par_chunks(1000).map(add).collect();
+            let buckets = buckets.finish().unwrap();
+            let bounds = bounds.unwrap().into_iter().flatten().reduce(Bounds::union);
             prop_assert_eq!(bounds, Bounds::of_points(places));
             let files = PointFiles::open(&[]).unwrap().and(file);
             for (index, bucket) in buckets.iter().enumerate() {

@@ -3,7 +3,6 @@
 use crate::input::Point;
 use crate::job::partition::point_file::{PointBlock, PointFile, PointFiles, PointRun};
 use crate::{Error, Result};
-use memmap2::MmapMut;
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -47,7 +46,7 @@ impl Bucket {
 
 /// Smaller blocks cost more system calls than their memory is worth, and more bytes, because points are packed in groups of 256.
 const LEAST_BLOCK: u64 = 64;
-/// Larger blocks take more memory and no less time.
+/// Larger blocks take more memory and hardly less time.
 const LARGEST_BLOCK: u64 = 2048;
 /// Points are packed in pieces of this many, so that a block of whole pieces is not padded.
 const PIECE: u64 = 32;
@@ -55,38 +54,32 @@ const PIECE: u64 = 32;
 /// Buckets that several threads fill at the same time.
 pub struct Buckets<'a> {
     /// The file that each bucket is written to; `None` if it must not get another point.
-    files: &'a [Option<&'a PointFile>],
-    open: Vec<Mutex<OpenBucket<'a>>>,
+    files: Vec<Option<&'a PointFile>>,
+    /// Points that a buffer holds.
+    capacity: usize,
+    open: Vec<Mutex<OpenBucket>>,
 }
 
-struct OpenBucket<'a> {
-    /// Room for points, the first `held` of which are there.
-    buffer: &'a mut [Point],
-    held: usize,
+#[derive(Default)]
+struct OpenBucket {
+    buffer: Vec<Point>,
     run: PointRun,
     bucket: Bucket,
 }
 
-impl Buckets<'_> {
-    /// Makes an empty bucket for each of `files`, which is where it is written to, and lets `add` fill them. Together they buffer at most
-    /// `memory` bytes. A bucket without a file refuses points. Returns what `add` returns, and the buckets.
-    ///
-    /// # Errors
-    /// Those of `add`, [`Error::Io`] if a buffer cannot be written, [`Error::Memory`] if there is no memory for the buffers.
-    pub fn fill<T>(
-        files: &[Option<&PointFile>],
-        memory: u64,
-        add: impl FnOnce(&Buckets) -> Result<T>,
-    ) -> Result<(T, Vec<Bucket>)> {
-        let room = memory / files.len() as u64 / size_of::<Point>() as u64;
+impl<'a> Buckets<'a> {
+    /// Returns `count` empty buckets in one file that together buffer at most `memory` bytes.
+    pub fn new(file: &'a PointFile, count: usize, memory: u64) -> Buckets<'a> {
+        Buckets::on(vec![Some(file); count], memory)
+    }
+
+    /// Returns an empty bucket for each of `files`, which is where it is written to. Together they buffer at most `memory` bytes. A bucket
+    /// without a file refuses points.
+    pub fn on(files: Vec<Option<&'a PointFile>>, memory: u64) -> Buckets<'a> {
+        let count = files.len();
+        let room = memory / count as u64 / size_of::<Point>() as u64;
         let capacity = (room / PIECE * PIECE).clamp(LEAST_BLOCK, LARGEST_BLOCK) as usize;
-        let mut map = map_memory(files.len() * capacity * size_of::<Point>())?;
-        let buffers = bytemuck::cast_slice_mut(&mut map).chunks_exact_mut(capacity);
-        let open =
-            |buffer| Mutex::new(OpenBucket { buffer, held: 0, run: PointRun::default(), bucket: Bucket::default() });
-        let buckets = Buckets { files, open: buffers.map(open).collect() };
-        let added = add(&buckets)?;
-        Ok((added, buckets.finish()?))
+        Buckets { files, capacity, open: (0..count).map(|_| Mutex::default()).collect() }
     }
 
     /// Returns the bytes of one buffer where memory is ample.
@@ -101,13 +94,13 @@ impl Buckets<'_> {
     pub fn extend(&self, index: usize, mut points: &[Point]) -> Result<()> {
         let mut open = lock(&self.open[index]);
         while !points.is_empty() {
-            let OpenBucket { buffer, held, .. } = &mut *open;
-            let room = &mut buffer[*held..];
-            let (now, later) = points.split_at(points.len().min(room.len()));
-            room[..now.len()].copy_from_slice(now);
-            *held += now.len();
+            if open.buffer.capacity() == 0 {
+                open.buffer.reserve_exact(self.capacity);
+            }
+            let (now, later) = points.split_at(points.len().min(self.capacity - open.buffer.len()));
+            open.buffer.extend_from_slice(now);
             points = later;
-            if *held == buffer.len() {
+            if open.buffer.len() == self.capacity {
                 self.flush(index, &mut open, false)?;
             }
         }
@@ -116,39 +109,31 @@ impl Buckets<'_> {
 
     fn flush(&self, index: usize, open: &mut OpenBucket, is_last: bool) -> Result<()> {
         let file = self.files[index].ok_or(Error::NeedsOnePart)?;
-        let block = file.append(&mut open.run, &open.buffer[..open.held], is_last)?;
+        let block = file.append(&mut open.run, &open.buffer, is_last)?;
         open.bucket.blocks.push(block);
         open.bucket.points += block.points as u64;
-        open.held = 0;
+        open.buffer.clear();
         Ok(())
     }
 
     /// Writes what is still in the buffers and returns the buckets.
-    fn finish(self) -> Result<Vec<Bucket>> {
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`] if a buffer cannot be written.
+    pub fn finish(self) -> Result<Vec<Bucket>> {
         let finish = |(index, open): (usize, &Mutex<OpenBucket>)| {
             let mut open = lock(open);
-            if open.held > 0 {
+            if !open.buffer.is_empty() {
                 self.flush(index, &mut open, true)?;
             }
+            open.buffer = Vec::new();
             Ok(std::mem::take(&mut open.bucket))
         };
         self.open.par_iter().enumerate().map(finish).collect()
     }
 }
 
-/// Returns memory for the buffers, in huge pages if the system has them. The buffers are most of the memory that reading takes: one page
-/// fault for every 4 KiB of it was a sixth of the time of reading LAS.
-fn map_memory(bytes: usize) -> Result<MmapMut> {
-    let no_memory =
-        |e| Error::Memory(format!("there are no {} MiB for points that are read: {e}", bytes.div_ceil(1 << 20)));
-    let map = MmapMut::map_anon(bytes).map_err(no_memory)?;
-    // Without huge pages all works as well.
-    #[cfg(target_os = "linux")]
-    let _ = map.advise(memmap2::Advice::HugePage);
-    Ok(map)
-}
-
-fn lock<'b, 'a>(open: &'b Mutex<OpenBucket<'a>>) -> MutexGuard<'b, OpenBucket<'a>> {
+fn lock(open: &Mutex<OpenBucket>) -> MutexGuard<'_, OpenBucket> {
     open.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -160,9 +145,10 @@ mod tests {
     fn only_the_points_of_the_given_records_are_removed() {
         let folder = tempfile::tempdir().unwrap();
         let file = PointFile::create(&folder.path().join("points"), 0).unwrap();
+        let buckets = Buckets::new(&file, 1, 0);
         let points: Vec<Point> = (0..1000).map(|i| Point::new([i as i32, 0], 0, [0; 3], 0, i)).collect();
-        let (_, mut buckets) = Buckets::fill(&[Some(&file)], 0, |buckets| buckets.extend(0, &points)).unwrap();
-        let mut bucket = buckets.remove(0);
+        buckets.extend(0, &points).unwrap();
+        let mut bucket = buckets.finish().unwrap().remove(0);
         let files = PointFiles::open(&[]).unwrap().and(file);
         bucket.remove_records(&files, &[0..1, 64..64, 100..300, 999..2000]).unwrap();
         let mut left = Vec::new();
@@ -172,10 +158,5 @@ mod tests {
         assert_eq!(bucket.points, 798);
         bucket.remove_records(&files, &[0..500, 500..1000]).unwrap();
         assert_eq!(bucket, Bucket::default());
-    }
-    #[test]
-    fn memory_that_the_system_does_not_have_is_an_error() {
-        let error = map_memory(usize::MAX / 2).unwrap_err();
-        assert_eq!(error.exit_code(), 1, "{error}");
     }
 }

@@ -81,10 +81,9 @@ pub fn read_inputs(
     let inputs = parts.new_inputs(reader);
     let files = parts.all().map(|part| create(parts, directory, reader, part)).collect::<Result<Vec<_>>>()?;
     let file_of = |bucket: usize| files[parts.part_of(bucket).get()].as_ref();
-    let file_of_each: Vec<_> = (0..parts.grid.buckets()).map(file_of).collect();
-    let (by_input, buckets) = Buckets::fill(&file_of_each, read_buffer_memory(&plan.options), |buckets| {
-        decode(plan, inputs.iter().copied(), malformed, &parts.grid, buckets, stage)
-    })?;
+    let buckets = Buckets::on((0..parts.grid.buckets()).map(file_of).collect(), read_buffer_memory(&plan.options));
+    let by_input = decode(plan, inputs.iter().copied(), malformed, &parts.grid, &buckets, stage)?;
+    let buckets = buckets.finish()?;
     let bad = by_input.0.iter().find(|(_, summary)| summary.counts.malformed > 0);
     let malformed = bad.map(|(input, summary)| (*input, summary.counts.clone()));
     let JudgedInputs { summary, skipped, .. } = judge(plan, by_input);
@@ -205,11 +204,9 @@ impl<'a> PointsOfPart<'a> {
             bucket.blocks.push(block);
         }
         let max_rgb = plan.claims.map_or(0, |claims| claims.max_rgb);
-        let own_file = vec![Some(files.growing()?); parts.grid.buckets()];
-        let (_, sites) = Buckets::fill(&own_file, read_buffer_memory(&plan.options), |sites| {
-            add_line_sites(plan, max_rgb, &parts.grid, sites, |bucket| parts.part_of(bucket) == part)
-        })?;
-        for (bucket, sites) in buckets.iter_mut().zip(sites) {
+        let sites = Buckets::new(files.growing()?, parts.grid.buckets(), read_buffer_memory(&plan.options));
+        add_line_sites(plan, max_rgb, &parts.grid, &sites, |bucket| parts.part_of(bucket) == part)?;
+        for (bucket, sites) in buckets.iter_mut().zip(sites.finish()?) {
             bucket.points += sites.points;
             bucket.blocks.extend(sites.blocks);
         }

@@ -35,17 +35,15 @@ pub fn read_points(plan: &Plan, directory: &JobDirectory, stage: &Stage) -> Resu
     let max_points_per_tile = plan.options.triangulation.max_points_per_tile.0;
     let memory = read_buffer_memory(&plan.options);
     let grid = Grid::over(plan.extent, wanted_buckets(plan.records, max_points_per_tile));
-    let (judged, mut buckets) = Buckets::fill(&vec![Some(file); grid.buckets()], memory, |buckets| {
-        let by_input = decode(plan, 0..plan.inputs.len(), 0, &grid, buckets, stage)?;
-        let mut judged = judge(plan, by_input);
-        // Lines alone are no terrain.
-        if let Some(points) = judged.summary.bounds {
-            add_line_sites(plan, judged.summary.counts.max_rgb, &grid, buckets, |_| true)?;
-            judged.summary.bounds = Some(plan.with_lines(points));
-        }
-        Ok(judged)
-    })?;
-    let JudgedInputs { summary, skipped, orders } = judged;
+    let buckets = Buckets::new(file, grid.buckets(), memory);
+    let by_input = decode(plan, 0..plan.inputs.len(), 0, &grid, &buckets, stage)?;
+    let JudgedInputs { mut summary, skipped, orders } = judge(plan, by_input);
+    // Lines alone are no terrain.
+    if let Some(points) = summary.bounds {
+        add_line_sites(plan, summary.counts.max_rgb, &grid, &buckets, |_| true)?;
+        summary.bounds = Some(plan.with_lines(points));
+    }
+    let mut buckets = buckets.finish()?;
     if !orders.is_empty() {
         buckets.par_iter_mut().try_for_each(|bucket| bucket.remove_records(&files, &orders))?;
     }
@@ -147,10 +145,10 @@ pub(crate) fn decode(
 }
 
 /// One way over inputs, chunk by chunk.
-struct Pass<'a, 'b> {
+struct Pass<'a> {
     plan: &'a Plan,
     grid: &'a Grid,
-    buckets: &'a Buckets<'b>,
+    buckets: &'a Buckets<'a>,
     /// What drops points at breaklines.
     lines: Option<&'a Breaklines>,
     /// The malformed records so far.
@@ -160,7 +158,7 @@ struct Pass<'a, 'b> {
 /// Takes points of an input.
 type PointSink<'a> = &'a mut dyn FnMut(&[Point]) -> Result<()>;
 
-impl Pass<'_, '_> {
+impl Pass<'_> {
     /// Decodes all chunks of these inputs with `decode`, in parallel: what bounds leave in, or what an index leaves out.
     fn over(
         &self,

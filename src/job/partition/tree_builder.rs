@@ -117,14 +117,14 @@ impl<'a> TreeBuilder<'a> {
         };
         let file = self.files.growing()?;
         let grid = Grid::over(bounds, wanted_buckets(bucket.points, self.max_points_per_tile));
-        let (_, finer) = Buckets::fill(&vec![Some(file); grid.buckets()], self.memory, |finer| {
-            bucket.blocks.par_iter().try_for_each(|&block| {
-                interrupt::check()?;
-                let mut points = Vec::new();
-                self.files.read(block, &mut points)?;
-                BucketSorter::new(&grid, finer).add(&points)
-            })
+        let finer = Buckets::new(file, grid.buckets(), self.memory);
+        bucket.blocks.par_iter().try_for_each(|&block| {
+            interrupt::check()?;
+            let mut points = Vec::new();
+            self.files.read(block, &mut points)?;
+            BucketSorter::new(&grid, &finer).add(&points)
         })?;
+        let finer = finer.finish()?;
         if !self.keeps_crowded {
             file.free(&bucket.blocks)?;
         }
