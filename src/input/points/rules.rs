@@ -23,7 +23,6 @@ pub struct PointRules {
     /// The number in the whole job of the source's first record.
     pub first_order: u64,
     /// Whether points go without their numbers in the job, because nothing in it asks for them. Points without numbers take less room.
-    #[serde(default)]
     pub unnumbered: bool,
     /// What the job wants of the points besides place and class.
     pub fields: OptionalFields,
