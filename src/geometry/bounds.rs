@@ -56,8 +56,8 @@ impl<const N: usize> Bounds<N> {
     }
 }
 
-/// Returns the least box that holds all `points`, or `None` if there are none. Points that lie side by side
-/// are compared with vector instructions.
+/// Returns the least box that holds all `points`, or `None` if there are none. Points that lie side by side are
+/// compared with vector instructions.
 #[multiversion(targets("x86_64+avx2"))]
 pub fn bounds_of<const N: usize>(points: &[[i32; N]]) -> Option<Bounds<N>> {
     Bounds::of_points(points.iter().copied())

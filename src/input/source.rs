@@ -316,7 +316,7 @@ impl Source {
 
     /// Decodes chunk `chunk` (below [`Source::chunks`]) and hands the points that pass `rules` to `sink` in record order, at
     /// most 65,536 at a time. The point of record `i` of the source gets the order `rules.first_order + i`, or 0 if points are
-    /// unnumbered. Records that cannot be read are counted as malformed; the caller decides whether there are too many.
+    /// not numbered. Records that cannot be read are counted as malformed; the caller decides whether there are too many.
     ///
     /// # Errors
     /// `Io` or `Input` if the file cannot be read or has changed since it was opened, and the errors of `sink`.

@@ -178,7 +178,7 @@ impl<'a> Inputs<'a> {
             returns: input.map_or(KeptReturns::All, |input| input.kept_returns()),
             bounds: input.and_then(|input| input.bounds).and_then(|bounds| source.raw_bounds(bounds.0)),
             first_order,
-            unnumbered: false,
+            numbered: true,
             fields: OptionalFields::default(),
         })
     }

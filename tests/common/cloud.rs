@@ -41,7 +41,7 @@ pub(crate) fn rules(source: &Source, lattice: &Lattice) -> PointRules {
         returns: KeptReturns::All,
         bounds: None,
         first_order: 0,
-        unnumbered: false,
+        numbered: true,
         fields: OptionalFields::RGB,
     }
 }
@@ -100,7 +100,7 @@ pub(crate) fn survives(extension: &str, bytes: &[u8]) {
         returns: KeptReturns::All,
         bounds: None,
         first_order: 0,
-        unnumbered: false,
+        numbered: true,
         fields: OptionalFields::RGB,
     };
     for chunk in 0..source.chunks().min(64) {

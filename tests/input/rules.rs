@@ -34,10 +34,10 @@ fn class_bounds_order_color_and_intensity_rules_hold() {
     assert!(all.iter().all(|p| p.intensity == 0) && !wanted.is_empty());
     assert_eq!(some, wanted);
     assert!(counts.withheld > 0 && counts.other_class > 0 && counts.out_of_bounds > 0, "{counts:?}");
-    rules.unnumbered = true;
+    rules.numbered = false;
     let without_number = |p: &Point| Point::new(p.position, p.z, p.rgb, p.class, 0).with_intensity(p.intensity);
-    let (unnumbered, _) = decode(&source, &rules).unwrap();
-    assert_eq!(unnumbered, wanted.iter().map(without_number).collect::<Vec<_>>());
+    let (some, _) = decode(&source, &rules).unwrap();
+    assert_eq!(some, wanted.iter().map(without_number).collect::<Vec<_>>());
 }
 
 #[test]

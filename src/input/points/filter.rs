@@ -74,7 +74,7 @@ impl<'a> PointFilter<'a> {
     /// Keeps record `number`, whose lattice integers are `place`.
     #[inline(always)]
     fn keep(&mut self, number: u64, record: &PointRecord, [x, y, z]: [i32; 3]) -> Result<()> {
-        let order = if self.rules.unnumbered { 0 } else { self.rules.first_order + number };
+        let order = if self.rules.numbered { self.rules.first_order + number } else { 0 };
         let point = Point::new([x, y], z, record.rgb, record.class, order);
         let point = point.with_intensity(record.intensity);
         self.kept[point.class as usize] += 1;
@@ -283,7 +283,7 @@ mod tests {
             offsets in prop::array::uniform3(prop_oneof![3 => Just(0), 3 => -1000i64..1000, 1 => -(1i64 << 31)..1 << 31]),
             scales in prop::array::uniform3(prop_oneof![Just(1), 1i64..50]),
             first_order in 0u64..1 << 39,
-            unnumbered in any::<bool>(),
+            numbered in any::<bool>(),
         ) {
             let rules = PointRules {
                 maps: [0, 1, 2].map(|axis| map(offsets[axis], scales[axis])),
@@ -291,7 +291,7 @@ mod tests {
                 returns: KeptReturns::All,
                 bounds: None,
                 first_order,
-                unnumbered,
+                numbered,
                 fields: OptionalFields::default(),
             };
             prop_assert_eq!(filtered(&rules, &records, false), filtered(&rules, &records, true));
@@ -306,7 +306,7 @@ mod tests {
             returns: KeptReturns::All,
             bounds: None,
             first_order: 0,
-            unnumbered: false,
+            numbered: true,
             fields: OptionalFields::default(),
         };
         assert_eq!(quick_maps(&rules), Some([[1, 7]; 3]));

@@ -22,8 +22,8 @@ pub struct PointRules {
     pub bounds: Option<RawBounds>,
     /// The number in the whole job of the source's first record.
     pub first_order: u64,
-    /// Whether points go without their numbers in the job, because nothing in it asks for them. Points without numbers take less room.
-    pub unnumbered: bool,
+    /// Whether points keep their numbers in the job. Without them they take less room.
+    pub numbered: bool,
     /// What the job wants of the points besides place and class.
     pub fields: OptionalFields,
 }

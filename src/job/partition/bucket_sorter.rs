@@ -45,7 +45,7 @@ impl<'a> BucketSorter<'a> {
     }
 }
 
-/// Sorts `points` by bucket, and returns the box of all points. Leaves where the run of each bucket starts.
+/// Sorts `points` by bucket, leaves in `ends` where the run of each bucket starts, and returns the union of `bounds` and their box.
 // With the instructions of today's processors this takes less time.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 fn sort(sorter: &mut BucketSorter, points: &[Point], mut bounds: Bounds<3>) -> Bounds<3> {
@@ -82,7 +82,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(32))]
 
-        /// Two threads add slices of any length, and buffers are full now and then.
+        /// Several threads add slices of any length, and buffers are full now and then.
         #[test]
         fn every_point_gets_into_its_bucket(
             places in prop::collection::vec(prop::array::uniform3(-50i32..150), 0..2000),

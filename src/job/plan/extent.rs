@@ -127,7 +127,7 @@ fn measure(source: &Source, options: &InputOptions, chunks: Range<usize>, record
         returns: options.kept_returns(),
         bounds: None,
         first_order: 0,
-        unnumbered: true,
+        numbered: false,
         fields: OptionalFields::default(),
     };
     let union = |a: Option<Bounds<3>>, b| a.into_iter().chain(b).reduce(Bounds::union);

@@ -306,13 +306,13 @@ fn lattice_extent(lattice: &Lattice, extent: &Extent, clip: Option<Bounds<2>>) -
 fn point_rules(sources: &[Source], options: &JobOptions, lattice: &Lattice) -> Result<Vec<PointRules>> {
     let fields = wanted_fields(options);
     let (classes, returns) = (options.input.kept_classes(), options.input.kept_returns());
-    let unnumbered = !options.input.needs_numbers();
+    let numbered = options.input.needs_numbers();
     let mut first_order = 0;
     let mut rules = Vec::with_capacity(sources.len());
     for source in sources {
         let maps = [axis_map(source, 0, lattice)?, axis_map(source, 1, lattice)?, axis_map(source, 2, lattice)?];
         let bounds = options.input.bounds.and_then(|bounds| source.raw_bounds(bounds.0));
-        rules.push(PointRules { maps, classes, returns, bounds, first_order, unnumbered, fields });
+        rules.push(PointRules { maps, classes, returns, bounds, first_order, numbered, fields });
         first_order += source.records;
     }
     Ok(rules)

@@ -96,7 +96,7 @@ fn rules(source: &Source) -> Option<PointRules> {
         returns: KeptReturns::All,
         bounds: None,
         first_order: 5,
-        unnumbered: false,
+        numbered: true,
         fields: OptionalFields { rgb: true, intensity: true },
     })
 }
