@@ -231,7 +231,7 @@ pub struct ViewOptions {
     /// Do not open a browser.
     #[arg(long)]
     pub no_open: bool,
-    /// The address of this machine to listen on. With 0.0.0.0, every machine that reaches this one can read the files.
+    /// The address of this machine to listen on. With 0.0.0.0, every machine that reaches this one can read the results.
     #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
     pub address: IpAddr,
     /// A name that browsers know this machine by, if it is not its host name, such as that of a proxy. May be given several times.

@@ -1,4 +1,4 @@
-//! `gdt-batch view`: serves an output directory to a browser on this machine, together with the page that shows it.
+//! `gdt-batch view`: serves the results in an output directory to a browser on this machine, together with the page that shows it.
 
 mod body;
 pub mod browser;
@@ -6,6 +6,7 @@ mod content;
 mod hosts;
 mod impatient_stream;
 mod response;
+mod results;
 mod server;
 mod site;
 
@@ -18,6 +19,7 @@ use serde::Serialize;
 use crate::output::file_names::OutputFiles;
 use crate::output::page::page_for;
 use crate::view::hosts::Hosts;
+use crate::view::results::Results;
 use crate::view::server::Server;
 use crate::view::site::Site;
 use crate::{Error, Result};
@@ -47,7 +49,7 @@ impl View {
         let root = directory.canonicalize().map_err(Error::io("read", directory))?;
         let listener = TcpListener::bind(wanted).map_err(|error| not_listening(wanted, &error))?;
         let bound = listener.local_addr().map_err(Error::io("listen on", wanted.to_string()))?;
-        let site = Site { root, page: page_for(terrain)?, hosts: Hosts::new(hosts) };
+        let site = Site { results: Results::new(&root), root, page: page_for(terrain)?, hosts: Hosts::new(hosts) };
         // An address such as 0.0.0.0 stands for all of this machine.
         let shown = if wanted.ip().is_unspecified() { "localhost".into() } else { ip_text(wanted.ip()) };
         Ok(View {
@@ -71,7 +73,7 @@ impl fmt::Display for View {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{} is shown at {}", self.directory.display(), self.url)?;
         if self.is_public {
-            writeln!(f, "every machine that reaches this one can read all files of the folder")?;
+            writeln!(f, "every machine that reaches this one can read the results in it")?;
         }
         write!(f, "Ctrl-C ends it")
     }

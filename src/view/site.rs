@@ -1,4 +1,4 @@
-//! From the target of a request to a file below the output directory.
+//! From the target of a request to a result in the output directory.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -6,11 +6,14 @@ use std::path::{Path, PathBuf};
 use percent_encoding::percent_decode_str;
 
 use crate::view::hosts::Hosts;
+use crate::view::results::Results;
 
 /// What is served.
 pub(super) struct Site {
     /// The output directory, without links.
     pub(super) root: PathBuf,
+    /// The files that may be served.
+    pub(super) results: Results,
     /// The page that shows it.
     pub(super) page: String,
     /// Whom it is for.
@@ -34,13 +37,15 @@ impl Site {
         self.file(&names).map_or(Target::Nothing, |(path, file)| Target::File(path, file))
     }
 
-    /// Opens the file with these names below the output directory. A link must not lead out of it, and opening a pipe would wait.
+    /// Opens the result with these names below the output directory. No part of its path may be a link, and its letters must be those of
+    /// its name on systems that take others for the same. Opening a pipe would wait.
     fn file(&self, names: &[String]) -> Option<(PathBuf, File)> {
-        let path = self.root.join(names.iter().collect::<PathBuf>()).canonicalize().ok()?;
-        if !path.starts_with(&self.root) || !path.is_file() {
+        if !self.results.contain(&names.join("/")) {
             return None;
         }
-        let file = File::open(&path).ok()?;
+        let path = self.root.join(names.iter().collect::<PathBuf>());
+        let is_itself = path.canonicalize().ok()?.as_os_str() == path.as_os_str();
+        let file = (is_itself && path.is_file()).then(|| File::open(&path).ok())??;
         Some((path, file))
     }
 }

@@ -1,7 +1,8 @@
 //! `gdt-batch view` and its page, as a user meets them: a job writes the terrain and the page, the program serves it, and a headless
 //! Chromium opens it, clicks, and reads what the page says.
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Write};
+use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
@@ -77,6 +78,16 @@ impl Terrain {
         terrain
     }
 
+    /// Returns the terrain of a job that writes to the folder of its inputs and its configuration.
+    fn among_inputs() -> Terrain {
+        let terrain = Terrain::new("", "format = \"3dtiles\"\nraster = { resolution = 5 }");
+        let config = terrain.folder.path().join("job.toml");
+        let text = std::fs::read_to_string(&config).unwrap().replace("directory = \"out\"", "directory = \".\"");
+        std::fs::write(&config, text).unwrap();
+        terrain.succeeds(&["job.toml", "--quiet"]);
+        terrain
+    }
+
     #[track_caller]
     fn succeeds(&self, arguments: &[&str]) {
         let output = Command::new(PROGRAM).args(arguments).current_dir(self.folder.path()).output().unwrap();
@@ -134,6 +145,16 @@ impl Server {
         let url = line.trim_end().to_owned();
         assert!(url.starts_with("http://127.0.0.1:"), "{line}");
         Server { program, url }
+    }
+
+    /// Returns the status of the answer to a request for the path `target`, letter by letter.
+    fn status(&self, target: &str) -> u16 {
+        let host = self.url.trim_start_matches("http://").trim_end_matches('/');
+        let mut stream = TcpStream::connect(host).unwrap();
+        write!(stream, "GET {target} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n").unwrap();
+        let mut line = String::new();
+        BufReader::new(stream).read_line(&mut line).unwrap();
+        line.split(' ').nth(1).unwrap().parse().unwrap()
     }
 }
 
@@ -333,6 +354,51 @@ fn every_way_to_look_draws_something_else() {
     let pictures: Vec<Vec<u8>> = (0..ways.len()).map(|number| std::fs::read(shot(number)).unwrap()).collect();
     for (number, picture) in pictures.iter().enumerate() {
         assert!(!pictures[..number].contains(picture), "{} changes nothing", ways[number]);
+    }
+}
+
+#[test]
+fn inputs_and_configurations_beside_the_results_are_not_served() {
+    let terrain = Terrain::among_inputs();
+    let folder = terrain.folder.path();
+    for name in [".git/config", ".env", "tiles/notes.txt", "tiles/000999.glb"] {
+        std::fs::create_dir_all(folder.join(name).parent().unwrap()).unwrap();
+        std::fs::write(folder.join(name), "secret").unwrap();
+    }
+    let server = Server::start(folder);
+    let results = [
+        "/",
+        "/index.html",
+        "/tileset.json",
+        "/tiles/000000.glb",
+        "/terrain.tif",
+        "/preview.png",
+        "/preview.pgw",
+        "/georeference.json",
+        "/report.json",
+    ];
+    for target in results {
+        assert_eq!(server.status(target), 200, "{target}");
+    }
+    let others = [
+        "/job.toml",
+        "/cloud.csv",
+        "/.git/config",
+        "/.env",
+        "/%2eenv",
+        "/tiles/notes.txt",
+        "/tiles/000999.glb",
+        "/out/tileset.json",
+        "/tiles",
+        "/tiles/",
+        "/JOB.toml",
+        "/tiles/../job.toml",
+        "/tiles%2f..%2fjob.toml",
+        "/.\\job.toml",
+        "/XXH128SUMS",
+    ];
+    for target in others {
+        assert_eq!(server.status(target), 404, "{target}");
     }
 }
 

@@ -1,5 +1,7 @@
 use super::*;
+use crate::output::checksums::{Checksum, list_text};
 use crate::view::hosts::Hosts;
+use crate::view::results::Results;
 use flate2::read::GzDecoder;
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpStream};
@@ -38,10 +40,12 @@ impl Rig {
         std::fs::create_dir_all(root.join("tiles")).unwrap();
         std::fs::write(root.join("tiles/000000.glb"), tile()).unwrap();
         std::fs::write(root.join("report.json"), json()).unwrap();
+        std::fs::write(root.join("XXH128SUMS"), list()).unwrap();
         std::fs::write(folder.path().join("secret.json"), "secret").unwrap();
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
         let address = listener.local_addr().unwrap();
-        let site = Site { root, page: "<p>the page".into(), hosts: Hosts::new(&["maps.example".into()]) };
+        let hosts = Hosts::new(&["maps.example".into()]);
+        let site = Site { results: Results::new(&root), root, page: "<p>the page".into(), hosts };
         let server = Server { stillness, ..Server::new(listener, site).unwrap() };
         thread::spawn(move || server.run());
         Rig { folder, address }
@@ -75,8 +79,19 @@ fn tile() -> Vec<u8> {
     (0..100_000u32).flat_map(|i| (i % 251).to_le_bytes()).collect()
 }
 
+/// Returns the list of the results. Not all of them are there.
+fn list() -> String {
+    let names = ["tiles/000000.glb", "large.glb", "link.json", "up/secret.json", "inside.json", "pipe.json"];
+    list_text(&names.map(|name| (name.into(), Checksum::default())))
+}
+
+/// Returns a report.
 fn json() -> String {
-    "{\"warnings\": []}\n".repeat(5_000)
+    let list = Checksum::of(list().as_bytes());
+    format!(
+        "{{\"generator\": \"gdt-batch 9\", \"file_list\": \"{list}\", \"warnings\": [{}0]}}\n",
+        "0, ".repeat(20_000)
+    )
 }
 
 fn unchunked(mut bytes: &[u8]) -> Vec<u8> {
@@ -163,9 +178,10 @@ fn browsers_need_not_fetch_twice_what_has_not_changed() {
     let tag = rig.get("/report.json").header("ETag").unwrap().to_owned();
     let same = rig.ask("GET /report.json", &format!("If-None-Match: {tag}\r\n"));
     assert_eq!((same.status, same.body.len()), (304, 0));
-    std::fs::write(rig.out().join("report.json"), "{}").unwrap();
+    let other = json().replace("gdt-batch 9", "gdt-batch 10");
+    std::fs::write(rig.out().join("report.json"), &other).unwrap();
     let new = rig.ask("GET /report.json", &format!("If-None-Match: {tag}\r\n"));
-    assert_eq!((new.status, new.body), (200, b"{}".to_vec()));
+    assert_eq!((new.status, new.body), (200, other.into_bytes()));
 }
 
 #[test]
@@ -204,9 +220,38 @@ fn nothing_outside_the_folder_is_served() {
     assert_eq!(rig.get("//tiles//000000.glb").status, 200);
 }
 
+#[test]
+fn nothing_but_results_is_served() {
+    let rig = Rig::new();
+    let others =
+        [".env", ".git/config", "job.toml", "cloud.laz", "job/plan.json", "tiles/000001.glb", "tiles/roof.glb"];
+    for name in others {
+        let path = rig.out().join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, "secret").unwrap();
+    }
+    let ways = [
+        "/%2egit/config",
+        "/.git%2fconfig",
+        "/JOB.TOML",
+        "/tiles/000000.GLB",
+        "/Tiles/000000.glb",
+        "/job.toml/",
+        "/XXH128SUMS",
+    ];
+    for path in others.iter().map(|name| format!("/{name}")).chain(ways.map(String::from)) {
+        for method in ["GET", "HEAD"] {
+            let answer = rig.ask(&format!("{method} {path}"), "");
+            assert_eq!((answer.status, answer.header("ETag")), (404, None), "{method} {path}");
+            assert!(!answer.body.ends_with(b"secret"), "{path}");
+        }
+    }
+    assert_eq!(rig.get("/tiles/000000.glb").status, 200);
+}
+
 #[cfg(unix)]
 #[test]
-fn links_may_not_lead_out_of_the_folder_and_pipes_are_not_opened() {
+fn links_and_pipes_are_not_opened_even_if_they_have_names_of_results() {
     use std::os::unix::fs::symlink;
     let rig = Rig::new();
     symlink(rig.folder.path().join("secret.json"), rig.out().join("link.json")).unwrap();
@@ -214,10 +259,9 @@ fn links_may_not_lead_out_of_the_folder_and_pipes_are_not_opened() {
     symlink(Path::new("report.json"), rig.out().join("inside.json")).unwrap();
     let made = std::process::Command::new("mkfifo").arg(rig.out().join("pipe.json")).status().unwrap();
     assert!(made.success());
-    for path in ["/link.json", "/up/secret.json", "/pipe.json"] {
+    for path in ["/link.json", "/up/secret.json", "/inside.json", "/pipe.json"] {
         assert_eq!(rig.get(path).status, 404, "{path}");
     }
-    assert_eq!(rig.get("/inside.json").status, 200);
 }
 
 #[test]
