@@ -126,6 +126,43 @@ fn a_job_that_cannot_make_its_output_directory_may_be_retried() {
     gdt_batch(folder.path(), &["job.toml"]).refused(1, &["/proc/none/out", "cannot write"]);
 }
 
+/// A job may write to the folder of its inputs and its configuration. It leaves them there, and takes none of them for a result.
+#[test]
+fn a_job_in_the_folder_of_its_inputs_leaves_them_alone() {
+    let folder = folder_with_cloud();
+    let path = |name: &str| folder.path().join(name);
+    fs::write(path("job.toml"), LEAST.replace("\"out\"", "\".\"")).unwrap();
+    fs::write(path(".env"), "theirs").unwrap();
+    let own = || ["cloud.csv", "job.toml", ".env"].map(|name| fs::read(path(name)).unwrap());
+    let before = own();
+    for _ in 0..2 {
+        gdt_batch(folder.path(), &["job.toml"]).succeeded();
+        gdt_batch(folder.path(), &["verify", "."]).succeeded();
+    }
+    assert!(own() == before && !path("job").exists());
+    let sums = fs::read_to_string(path("XXH128SUMS")).unwrap();
+    assert!(
+        sums.contains("  terrain.glb\n") && ["cloud.csv", "job.toml", ".env"].iter().all(|name| !sums.contains(name))
+    );
+}
+
+#[test]
+fn an_input_where_a_result_would_be_is_named() {
+    let folder = folder_with_cloud();
+    let cloud = fs::read(folder.path().join("cloud.csv")).unwrap();
+    for directory in [".", "../here"] {
+        let here = folder.path().join("here");
+        fs::create_dir_all(&here).unwrap();
+        fs::write(here.join("breaklines.csv"), &cloud).unwrap();
+        let config = LEAST.replace("\"out\"", &format!("{directory:?}")).replace("cloud.csv", "*.csv");
+        fs::write(here.join("job.toml"), config).unwrap();
+        let words =
+            ["[input] files: ", "breaklines.csv is where a job writes a result", "choose another [output] directory"];
+        gdt_batch(&here, &["job.toml"]).refused(2, &words);
+        assert!(fs::read(here.join("breaklines.csv")).unwrap() == cloud);
+    }
+}
+
 /// Before it reads the first point, a job names anything else that stands where it needs to write, and leaves it there.
 #[test]
 #[cfg(unix)]

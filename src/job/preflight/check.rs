@@ -14,6 +14,7 @@ use crate::job::plan::job_plan::{Plan, SkippedInput};
 use crate::job::plan::lattice_choice::LatticeCoarsening;
 use crate::job::plan::make_plan::make_plan;
 use crate::job::preflight::estimate::{self, DiskEstimate};
+use crate::job::preflight::input_places::check_inputs_are_no_results;
 use crate::job::preflight::kept_points::{KeptPoints, has_filter};
 use crate::job::progress::number_text::{grouped, mebibytes};
 use crate::job::publish::height_offset_check::check_height_offset;
@@ -103,6 +104,7 @@ pub fn look(options: &JobOptions) -> Result<(Preflight, Plan)> {
     check_nothing_in_the_way(&directory)?;
     check_results_are_ours(&directory, options.output.page)?;
     let plan = Parts::cut_or_whole(make_plan(options, LatticeCoarsening::default())?);
+    check_inputs_are_no_results(&plan)?;
     check_height_offset(&plan)?;
     check_raster(&plan)?;
     let threads = workers(options, plan.records)?;

@@ -2,4 +2,5 @@
 
 pub mod check;
 pub mod estimate;
+pub(crate) mod input_places;
 pub(crate) mod kept_points;

@@ -14,6 +14,7 @@ use crate::job::plan::job_plan::Plan;
 use crate::job::plan::lattice_choice::LatticeCoarsening;
 use crate::job::plan::make_plan::make_plan;
 use crate::job::preflight::check::require_room;
+use crate::job::preflight::input_places::check_inputs_are_no_results;
 use crate::job::progress::clock::JobClock;
 use crate::job::progress::stage::{JobProgress, ProgressOutput};
 use crate::job::publish::height_offset_check::check_height_offset;
@@ -191,6 +192,7 @@ fn attempt(
         Some(plan) => plan,
         None => on_threads(workers(options, 0)?, || make_plan(options, coarsening).map(Parts::cut_or_whole))?,
     };
+    check_inputs_are_no_results(&plan)?;
     check_height_offset(&plan)?;
     check_raster(&plan)?;
     stage.advance(1);

@@ -8,6 +8,7 @@ use crate::job::plan::budget::workers;
 use crate::job::plan::fingerprint::{Fingerprint, JobHeader};
 use crate::job::plan::make_plan::make_plan;
 use crate::job::preflight::check::require_room;
+use crate::job::preflight::input_places::check_inputs_are_no_results;
 use crate::job::progress::clock::JobClock;
 use crate::job::progress::stage::JobProgress;
 use crate::job::publish::height_offset_check::check_height_offset;
@@ -44,6 +45,7 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> Result<Option<Strin
         Some(plan) => plan,
         None => on_threads(workers(options, 0)?, || make_plan(options, coarsening).map(Parts::cut_or_whole))?,
     };
+    check_inputs_are_no_results(&plan)?;
     check_height_offset(&plan)?;
     check_raster(&plan)?;
     note_skipped(&plan.skipped, &JobProgress::new(run.progress, JobClock::start(), Vec::new()));
