@@ -1,7 +1,9 @@
 //! `[output.raster]`: every cell has the height of the triangle at its centre, whatever the tiles, threads and parts.
 
+use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::BufReader;
+use std::io::{BufReader, Cursor};
+use std::path::{Path, PathBuf};
 
 use gdt_batch::output::gltf::read::read_tile;
 use serde_json::Value;
@@ -174,7 +176,14 @@ fn points_at_the_centres_are_the_cells() {
     for (i, [_, _, z]) in points.iter().enumerate() {
         assert_eq!(cells[(19 - i / 30) * 30 + i % 30], *z as f32);
     }
-    assert!(warnings(&report).contains("1 cells of terrain.tif have the height -300"), "{}", warnings(&report));
+    let said = warnings(&report);
+    let lowest = points.iter().find(|point| point[2] == -300).unwrap();
+    let place = format!("points at ({}, {}) have it", lowest[0], lowest[1]);
+    for words in
+        ["terrain.tif has the height -300 in 1 cell,", &place, "[input] nodata = -300;", "[output.raster] nodata = "]
+    {
+        assert!(said.contains(words), "{words}: {said}");
+    }
     // Centres on edges and on vertices belong to no tile more than to another.
     let other = with_raster(
         Job::on(&[&cloud]).tiles_of(24).with("output", "hull = \"whole\""),
@@ -182,6 +191,45 @@ fn points_at_the_centres_are_the_cells() {
     );
     other.report();
     assert!(bytes(&other) == bytes(&job));
+}
+
+/// Returns the height of point number `column`, `row` of a grid in hundredths.
+fn dem_height(column: i64, row: i64) -> i64 {
+    31_250 + 117 * column - 53 * row + (column * 7919 + row * 104_729) % 997
+}
+
+/// A grid of heights whose cell centres are at whole multiples of the cells' side comes back cell by cell, on the border too.
+#[test]
+fn a_grid_of_heights_comes_back_if_the_origin_is_its_own() {
+    let (columns, rows, west, south) = (60, 50, 461_200.0, 5_732_800.0);
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = String::from("x,y,z\n");
+    for (column, row) in (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row))) {
+        let [x, y, z] = [west + 0.5 * column as f64, south + 0.5 * row as f64, dem_height(column, row) as f64 / 100.0];
+        text += &format!("{x},{y},{z}\n");
+    }
+    let dem = folder.path().join("dem.csv");
+    fs::write(&dem, text).unwrap();
+    // Any corner of a cell will do, in any tiling.
+    for (origin, per_tile) in [("[0.25, 0.25]", 5_000), ("[461199.75, -7.25]", 300)] {
+        let job = with_raster(Job::on(&[&dem]).tiles_of(per_tile), &format!("resolution = 0.5, origin = {origin}"));
+        let check = job.run_with(&["check"]).succeeded().out;
+        assert!(check.contains("about 60 x 50 cells"), "{check}");
+        job.report();
+        let raster = raster(&job);
+        assert_eq!(raster.corner, [west - 0.25, south + 0.5 * rows as f64 - 0.25]);
+        let Image { width, height, cells } = &raster.images[0];
+        assert_eq!((*width as i64, *height as i64), (columns, rows));
+        for (number, found) in (0..).zip(cells) {
+            let (column, row) = (number % columns, rows - 1 - number / columns);
+            assert_eq!(*found, (dem_height(column, row) as f64 / 100.0) as f32, "column {column}, row {row}");
+        }
+    }
+    // By default centres are between four of its points.
+    let job = with_raster(Job::on(&[&dem]), "resolution = 0.5");
+    job.report();
+    let image = &raster(&job).images[0];
+    assert_eq!((image.width, image.height), (59, 49));
 }
 
 #[test]
@@ -277,6 +325,48 @@ fn a_grid_of_files_has_the_cells_of_the_one_file() {
     assert!(!by_parts.out().join("terrain.vrt").exists() && !by_parts.out().join("raster").exists());
 }
 
+/// Returns the names and the bytes of all files of a raster, and the list of them.
+fn grid_of_files(job: &Job) -> BTreeMap<PathBuf, Vec<u8>> {
+    let paths = files_below(&job.out().join("raster")).into_iter().chain([job.out().join("terrain.vrt")]);
+    paths.map(|path| (path.strip_prefix(job.out()).unwrap().into(), fs::read(&path).unwrap())).collect()
+}
+
+/// The box around a large tile of a band along a curve reaches over many files without a cell of the terrain.
+#[test]
+fn which_files_a_grid_has_depends_on_its_cells_alone() {
+    let along_curve = |n: i64| {
+        let angle = n as f64 / 4_000.0 * std::f64::consts::FRAC_PI_2;
+        let radius = 19_000.0 + (n * 7919 % 1_000) as f64;
+        [(radius * angle.cos()) as i64, (radius * angle.sin()) as i64, n % 97]
+    };
+    let band: Cloud = (0..4_000).map(along_curve).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let files = in_files(folder.path(), &band, 100_000);
+    let run = |job: Job| {
+        let job = with_raster(job, "resolution = 9.0, cells_per_file = 512").with("output", "max_edge = 900.0");
+        let report = job.report();
+        let found = grid_of_files(&job);
+        assert_eq!(number(&report["raster"]["files"]), found.len() as u64 - 1);
+        (job, found)
+    };
+    let (job, found) = run(Job::on(&files).tiles_of(100_000));
+    job.verified();
+    let list = String::from_utf8(found[Path::new("terrain.vrt")].clone()).unwrap();
+    for name in found.keys().filter(|name| name.starts_with("raster")) {
+        assert!(list.contains(&format!(">{}<", name.display())), "{}", name.display());
+        let mut decoder = Decoder::new(Cursor::new(&found[name])).unwrap();
+        let DecodingResult::F32(cells) = decoder.read_image().unwrap() else { panic!("not of single precision") };
+        assert!(cells.iter().any(|z| *z != -9999.0), "{} has no height", name.display());
+    }
+    // The box of the band has 25 files.
+    assert!((7..20).contains(&found.len()) && list.matches("<SimpleSource>").count() == found.len() - 1, "{list}");
+    for job in [Job::on(&files).tiles_of(300), in_parts(&files, 1_000)] {
+        let (_, other) = run(job);
+        assert_eq!(other.keys().collect::<Vec<_>>(), found.keys().collect::<Vec<_>>());
+        assert!(other == found, "other bytes");
+    }
+}
+
 #[test]
 fn a_raster_has_any_size_that_a_file_can_have() {
     let folder = tempfile::tempdir().unwrap();
@@ -360,6 +450,12 @@ fn wrong_options_are_refused() {
         ("resolution = 1, nodata = 1e40", ["line 5", "nodata"]),
         ("resolution = 1, nodata = 1e-50", ["line 5", "nodata"]),
         ("resolution = 1, cells_per_file = 100", ["line 5", "from 512 to 524288"]),
+        ("resolution = 1, origin = 0.5", ["line 5", "two numbers such as [0.5, 0.5]"]),
+        ("resolution = 1, origin = [0.5]", ["line 5", "origin"]),
+        ("resolution = 1, origin = [0.5, 0.5, 0]", ["line 5", "origin"]),
+        ("resolution = 1, origin = [0.5, \"0.5\"]", ["line 5", "origin"]),
+        ("resolution = 1, origin = [0.5, nan]", ["line 5", "origin"]),
+        ("resolution = 1, origin = [1e25, 0]", ["origin = [1e25, 0.0]", "too many digits"]),
         ("resolution = 1, compression = \"lzw\"", ["line 5", "lzw"]),
         ("resolution = 1, size = 3", ["line 5", "size"]),
     ] {

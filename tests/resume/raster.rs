@@ -36,7 +36,12 @@ fn a_raster_that_was_stopped_anywhere_ends_with_the_same_bytes() {
 #[test]
 fn another_raster_keeps_the_tiles() {
     let mut rig = rig();
-    for options in ["resolution = 30.0", "resolution = 15.0, nodata = 0"] {
+    for options in [
+        "resolution = 30.0",
+        "resolution = 15.0, nodata = 0",
+        "resolution = 15.0, origin = [7.5, 7.5]",
+        "resolution = 15.0, cells_per_file = 512",
+    ] {
         rig.forget();
         rig.configure(&with_raster("resolution = 15.0"));
         rig.run_to("signal-waiting_blocks", 2).stopped(&["error: interrupted"]);

@@ -26,6 +26,8 @@ const STORE_PER_SITE: u64 = 9 + 2 * 6;
 const STORE_PER_BORDER_SITE: u64 = 500;
 /// Bytes of a GLB besides its arrays.
 const RESULT_PER_TILE: u64 = 6000;
+/// Bytes of a file of a raster besides its cells, and of its entry in the list of files.
+const RASTER_FILE: u64 = 2000;
 /// The most pixels of the preview.
 const PIXELS: u64 = LONGER_SIDE * LONGER_SIDE;
 /// Bytes that a process takes before it has done anything.
@@ -125,14 +127,17 @@ fn result_bytes(points: u64, tiles: u64, output: &OutputOptions, max_one_file: u
     in_tiles + in_one_file + in_tiles / 2 + 4 * PIXELS
 }
 
-/// Returns the bytes of the raster. While it is put together, its blocks take as many once more.
+/// Returns the bytes of the raster. While it is put together, its blocks take as many once more. All files of a grid of files count, because
+/// the headers of the inputs do not tell which will have no height.
 fn raster_bytes(plan: &Plan) -> u64 {
-    let Some(grid) = planned_raster(plan) else { return 0 };
-    let stored = grid.stored_cells();
-    match plan.options.output.raster.map(|raster| raster.compression) {
-        Some(RasterCompression::None) => stored * size_of::<f32>() as u64,
+    let Some((options, grid)) = plan.options.output.raster.zip(planned_raster(plan)) else { return 0 };
+    let files = grid.files(options.cells_per_file);
+    let stored: u64 = files.iter().map(|cells| grid.part(*cells).stored_cells()).sum();
+    let heads = files.len() as u64 * RASTER_FILE;
+    match options.compression {
+        RasterCompression::None => stored * size_of::<f32>() as u64 + heads,
         // Three bytes for a cell of rough terrain, and a third more for overviews. Cells without a height take a thousandth.
-        _ => grid.cells() * 4 + stored / 200,
+        RasterCompression::Deflate => grid.cells() * 4 + stored / 200 + heads,
     }
 }
 

@@ -31,5 +31,5 @@ pub(crate) fn write_raster(
     let stage = run.progress.stage("raster", work.blocks(), "blocks");
     let stats = run.journal.step(JobStep::Raster, || work.write(run.directory, &|| stage.advance(1)))?;
     run.add_stage(stage.finish());
-    Ok(Some(WrittenRaster { warnings: work.warnings(&stats), stats }))
+    Ok(Some(WrittenRaster { warnings: work.warnings(run.directory, &stats)?, stats }))
 }

@@ -1,14 +1,17 @@
 //! Where the cells of a raster are.
 //!
-//! Cells are aligned: their edges are at whole multiples of the resolution in the CRS of the job, so that rasters of neighbouring areas,
-//! and of other programs, share them. Columns count from the west and rows from the north, so along both axes of the grid, which are x and -y.
+//! Cells are aligned: their edges are at whole multiples of the resolution from an origin in the CRS of the job, by default (0, 0), so that
+//! rasters of neighbouring areas, and of other programs, share them. Columns count from the west and rows from the north, so along both
+//! axes of the grid, which are x and -y.
 //!
-//! A lattice step and a cell are decimals. Their greatest common divisor is the **subunit** (of half a cell, so that a centre is a whole
-//! number too): a lattice step has `step` subunits, a cell `pitch`, and the first centre is `origin` subunits from the lattice's zero.
+//! A lattice step, a cell and the origin are decimals. Their greatest common divisor is the **subunit** (of half a cell, so that a centre
+//! is a whole number too): a lattice step has `step` subunits, a cell `pitch`, and the first centre is `first_center` subunits from the
+//! lattice's zero.
 
 use crate::geometry::Bounds;
 use crate::geometry::lattice::Lattice;
 use crate::output::raster::BLOCK;
+use crate::output::raster::options::FileSide;
 use crate::output::raster::whole_numbers::WholeNumber;
 use rust_decimal::Decimal;
 use rust_decimal::prelude::ToPrimitive;
@@ -52,11 +55,31 @@ const WIDE_BITS: u32 = 90;
 /// The same for an `i64`. What is multiplied is also bounded by [`Subunits::longest`].
 const NARROW_BITS: u32 = 60;
 
+/// Where the cells of all rasters with the same options are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CellAlignment {
+    /// The x and the y of a corner of a cell.
+    pub origin: [Decimal; 2],
+    /// The side of a cell.
+    pub resolution: Decimal,
+}
+
+impl CellAlignment {
+    /// Returns the x of the edge and the y of the edge that are so many columns east and rows south of the origin.
+    fn corner(&self, [columns, rows]: [i128; 2]) -> Option<[Decimal; 2]> {
+        let shifted = |origin: Decimal, cells: i128| {
+            let cells = Decimal::from(i64::try_from(cells).ok()?);
+            origin.checked_add(self.resolution.checked_mul(cells)?)
+        };
+        Some([shifted(self.origin[0], columns)?, shifted(self.origin[1], -rows)?])
+    }
+}
+
 /// The cells of a raster.
 #[derive(Clone, Debug)]
 pub struct RasterGrid {
-    resolution: Decimal,
-    /// Cells from zero to the western and to the northern edge.
+    alignment: CellAlignment,
+    /// Cells from the origin to the western and to the northern edge.
     first: [i128; 2],
     size: [u32; 2],
     wide: Subunits<i128>,
@@ -71,7 +94,7 @@ pub(crate) struct Subunits<T> {
     /// In a cell.
     pub(crate) pitch: T,
     /// From the lattice's zero to the centre of the first column and of the first row.
-    pub(crate) origin: [T; 2],
+    pub(crate) first_center: [T; 2],
     /// No triangle with a greater extent, in lattice steps, may be drawn with these numbers.
     pub(crate) longest: i64,
 }
@@ -90,7 +113,7 @@ impl<T: WholeNumber> Subunits<T> {
     /// Returns which of `cells` columns (axis 0) or rows (axis 1) are beside `coordinate`.
     #[inline(always)]
     pub(crate) fn beside(&self, axis: usize, coordinate: i32, cells: u32) -> Beside {
-        let distance = T::from(coordinate) * self.step - self.origin[axis];
+        let distance = T::from(coordinate) * self.step - self.first_center[axis];
         let (before, is_centre) = distance.divided(self.pitch);
         let past = before + T::from(1i32);
         let from = if is_centre { before } else { past };
@@ -100,22 +123,22 @@ impl<T: WholeNumber> Subunits<T> {
     /// Returns the centre of a column or row.
     #[inline(always)]
     pub(crate) fn center(&self, axis: usize, cell: u32) -> T {
-        self.origin[axis] + self.pitch * T::from(cell)
+        self.first_center[axis] + self.pitch * T::from(cell)
     }
 }
 
 impl RasterGrid {
-    /// Returns the grid of cells with the side `resolution` that meet the box of lattice points `bounds`.
+    /// Returns the grid of the cells of `alignment` that meet the box of lattice points `bounds`.
     ///
     /// # Errors
     /// A sentence that begins with a verb, if there are too many cells, or numbers have too many digits.
     pub fn new(
         lattice: &Lattice,
-        resolution: Decimal,
+        alignment: CellAlignment,
         bounds: Bounds<2>,
         limit: CellLimit,
     ) -> Result<RasterGrid, String> {
-        let numbers = Integers::of(lattice, resolution).ok_or_else(too_many_digits)?;
+        let numbers = Integers::of(lattice, &alignment).ok_or_else(too_many_digits)?;
         let [low, high] = [0, 1].map(|axis| match axis {
             0 => [bounds.min[0], bounds.max[0]],
             _ => [-bounds.max[1], -bounds.min[1]],
@@ -126,12 +149,14 @@ impl RasterGrid {
             let [from, to] = numbers.cells(axis, least, most).ok_or_else(too_many_digits)?;
             (first[axis], sides[axis]) = (from, to - from + 1);
         }
-        let size = fitting(sides, resolution, limit)?;
+        let size = fitting(sides, alignment.resolution, limit)?;
         let wide = numbers.subunits(first).ok_or_else(too_many_digits)?;
-        if !wide.fits(size, WIDE_BITS) {
+        let past = [0, 1].map(|axis| first[axis] + sides[axis]);
+        let has_corners = [first, past].iter().all(|cells| alignment.corner(*cells).is_some());
+        if !wide.fits(size, WIDE_BITS) || !has_corners {
             return Err(too_many_digits());
         }
-        Ok(RasterGrid { resolution, first, size, narrow: wide.narrow_for(size), wide })
+        Ok(RasterGrid { alignment, first, size, narrow: wide.narrow_for(size), wide })
     }
 
     /// Returns the grid of some of these columns and rows, each given as the first and the one after the last.
@@ -139,14 +164,17 @@ impl RasterGrid {
         let begin = [columns[0], rows[0]].map(i128::from);
         let size = [columns[1] - columns[0], rows[1] - rows[0]];
         let first = [0, 1].map(|axis| self.first[axis] + begin[axis]);
-        let origin = [0, 1].map(|axis| self.wide.origin[axis] + self.wide.pitch * begin[axis]);
-        let wide = Subunits { origin, ..self.wide };
-        RasterGrid { resolution: self.resolution, first, size, narrow: wide.narrow_for(size), wide }
+        let first_center = [0, 1].map(|axis| self.wide.first_center[axis] + self.wide.pitch * begin[axis]);
+        let wide = Subunits { first_center, ..self.wide };
+        RasterGrid { alignment: self.alignment, first, size, narrow: wide.narrow_for(size), wide }
     }
 
-    /// Returns the parts of the raster, row by row, if it is cut at whole multiples of `side` cells: the same for neighbouring rasters.
-    pub(crate) fn files(&self, side: u32) -> Vec<[[u32; 2]; 2]> {
-        let side = u64::from(side);
+    /// Returns the columns and the rows of the files of the raster, row by row. Files are cut at whole multiples of `side` cells from the
+    /// origin: at the same places in neighbouring rasters. Without a side there is one file.
+    pub(crate) fn files(&self, side: Option<FileSide>) -> Vec<[[u32; 2]; 2]> {
+        let Some(side) = side.map(|side| u64::from(side.cells())) else {
+            return vec![self.size.map(|cells| [0, cells])];
+        };
         let cuts = |axis: usize| {
             let (before, end) = (self.first[axis].rem_euclid(i128::from(side)) as u64, u64::from(self.size[axis]));
             let next = move |at: &u64| Some((at + before) / side * side + side - before);
@@ -168,16 +196,13 @@ impl RasterGrid {
 
     /// Returns the x of the western edge and the y of the northern edge.
     pub fn corner(&self) -> [f64; 2] {
-        let [west, north] = [self.first[0], -self.first[1]];
-        [west, north].map(|cells| {
-            let exact = i64::try_from(cells).ok().and_then(|cells| self.resolution.checked_mul(Decimal::from(cells)));
-            exact.map_or(f64::NAN, nearest)
-        })
+        // Every grid that `new` returns has corners.
+        self.alignment.corner(self.first).map_or([f64::NAN; 2], |corner| corner.map(nearest))
     }
 
     /// Returns the side of a cell.
     pub fn cell_size(&self) -> f64 {
-        nearest(self.resolution)
+        nearest(self.alignment.resolution)
     }
 
     /// Returns the columns and the rows with a centre within a box of lattice points, each as the first and the one after the last.
@@ -269,7 +294,7 @@ fn two_digits(value: f64) -> String {
 
 /// The decimals as whole numbers of one unit.
 struct Integers {
-    /// Of the lattice's zero along the axes of the grid.
+    /// From the origin of the cells to the lattice's zero along the axes of the grid.
     offset: [i128; 2],
     step: i128,
     cell: i128,
@@ -277,12 +302,14 @@ struct Integers {
 
 impl Integers {
     /// Returns `None` if the numbers have too many digits.
-    fn of(lattice: &Lattice, resolution: Decimal) -> Option<Integers> {
-        let all = [lattice.offset[0], lattice.offset[1], lattice.resolution, resolution].map(|d| d.normalize());
+    fn of(lattice: &Lattice, alignment: &CellAlignment) -> Option<Integers> {
+        let ([x, y, _], [from_x, from_y]) = (lattice.offset, alignment.origin);
+        let all = [x, y, from_x, from_y, lattice.resolution, alignment.resolution].map(|d| d.normalize());
         let digits = all.iter().map(Decimal::scale).max()?;
         let integer = |d: Decimal| 10i128.checked_pow(digits - d.scale())?.checked_mul(d.mantissa());
-        let [x, y, step, cell] = all.map(integer);
-        let numbers = Integers { offset: [x?, -y?], step: step?, cell: cell? };
+        let [x, y, from_x, from_y, step, cell] = all.map(integer);
+        let offset = [x?.checked_sub(from_x?)?, from_y?.checked_sub(y?)?];
+        let numbers = Integers { offset, step: step?, cell: cell? };
         (numbers.step > 0 && numbers.cell > 0).then_some(numbers)
     }
 
@@ -304,10 +331,10 @@ impl Integers {
             let halves = twice(first[axis])?.checked_add(1)?;
             self.cell.checked_mul(halves)?.checked_sub(twice(self.offset[axis])?)
         };
-        let (step, pitch, origin) = (twice(self.step)?, twice(self.cell)?, [center(0)?, center(1)?]);
-        let common = [pitch, origin[0], origin[1]].into_iter().fold(step, |a, b| gcd(a, b.abs()));
-        let origin = origin.map(|value| value / common);
-        Some(Subunits { step: step / common, pitch: pitch / common, origin, longest: i64::MAX })
+        let (step, pitch, first_center) = (twice(self.step)?, twice(self.cell)?, [center(0)?, center(1)?]);
+        let common = [pitch, first_center[0], first_center[1]].into_iter().fold(step, |a, b| gcd(a, b.abs()));
+        let first_center = first_center.map(|value| value / common);
+        Some(Subunits { step: step / common, pitch: pitch / common, first_center, longest: i64::MAX })
     }
 }
 
@@ -319,8 +346,8 @@ impl Subunits<i128> {
     /// Returns the greatest lengths of a raster of this size. Lattice coordinates are below 2^30.
     fn lengths(&self, size: [u32; 2]) -> Option<Vec<i128>> {
         let mut lengths = vec![self.step.checked_mul(1 << 30)?, self.pitch];
-        for (origin, side) in self.origin.into_iter().zip(size) {
-            lengths.extend([origin, self.pitch.checked_mul(i128::from(side) + 1)?.checked_add(origin)?]);
+        for (center, side) in self.first_center.into_iter().zip(size) {
+            lengths.extend([center, self.pitch.checked_mul(i128::from(side) + 1)?.checked_add(center)?]);
         }
         Some(lengths)
     }
@@ -341,7 +368,7 @@ impl Subunits<i128> {
         Subunits {
             step: self.step as i64,
             pitch: self.pitch as i64,
-            origin: self.origin.map(|origin| origin as i64),
+            first_center: self.first_center.map(|center| center as i64),
             longest: most as i64,
         }
     }
@@ -360,8 +387,13 @@ pub(super) mod tests {
         Lattice::new([decimal(x), decimal(y), Decimal::ZERO], decimal(step), decimal("0.01")).unwrap()
     }
 
+    /// Returns cells of this side whose edges are at whole multiples of it.
+    pub(in crate::output::raster) fn aligned(resolution: Decimal) -> CellAlignment {
+        CellAlignment { origin: [Decimal::ZERO; 2], resolution }
+    }
+
     fn in_one_file(lattice: &Lattice, cell: &str, bounds: Bounds<2>) -> Result<RasterGrid, String> {
-        RasterGrid::new(lattice, decimal(cell), bounds, CellLimit::OneFile)
+        RasterGrid::new(lattice, aligned(decimal(cell)), bounds, CellLimit::OneFile)
     }
 
     impl RasterGrid {
@@ -384,6 +416,27 @@ pub(super) mod tests {
         // A terrain that is a line on an edge.
         let grid = in_one_file(&lattice, "0.25", Bounds { min: [0, 0], max: [0, 0] }).unwrap();
         assert_eq!((grid.corner(), grid.size()), ([100.25, -7.0], [1, 1]));
+    }
+
+    #[test]
+    fn the_origin_is_a_corner_of_a_cell_and_of_a_file() {
+        let lattice = lattice("100", "-7", "0.5");
+        // x from 100 to 102, y from -8 to -6.5; centres are at whole numbers.
+        let bounds = Bounds { min: [0, -2], max: [4, 1] };
+        for origin in [["0.5", "0.5"], ["-300.5", "1000.5"]] {
+            let alignment = CellAlignment { origin: origin.map(decimal), resolution: Decimal::ONE };
+            let grid = RasterGrid::new(&lattice, alignment, bounds, CellLimit::OneFile).unwrap();
+            assert_eq!((grid.corner(), grid.size()), ([99.5, -6.5], [3, 2]), "{origin:?}");
+            assert_eq!(grid.cells_within(bounds), [[0, 3], [0, 2]]);
+        }
+        // 512 cells west of this origin and 512 north of it is a cut.
+        let alignment = CellAlignment { origin: ["612.5", "-519.5"].map(decimal), resolution: Decimal::ONE };
+        let grid = RasterGrid::new(&lattice, alignment, bounds, CellLimit::Files(512)).unwrap();
+        let files = grid.files(side(512));
+        assert_eq!(files, [[[0, 1], [0, 1]], [[1, 3], [0, 1]], [[0, 1], [1, 2]], [[1, 3], [1, 2]]]);
+        assert_eq!(grid.part(files[3]).corner(), [100.5, -7.5]);
+        let far = CellAlignment { origin: ["10000000000000000000000000", "0"].map(decimal), ..alignment };
+        assert!(RasterGrid::new(&lattice, far, bounds, CellLimit::OneFile).unwrap_err().contains("too many digits"));
     }
 
     #[test]
@@ -423,16 +476,22 @@ pub(super) mod tests {
     #[test]
     fn a_narrow_grid_has_no_more_files_than_a_wide_one() {
         let corridor = Bounds { min: [0, 0], max: [40_000_000, 400] };
-        let grid = |side| RasterGrid::new(&lattice("0", "0", "1"), decimal("1"), corridor, CellLimit::Files(side));
+        let grid =
+            |side| RasterGrid::new(&lattice("0", "0", "1"), aligned(decimal("1")), corridor, CellLimit::Files(side));
         assert!(grid(512).unwrap_err().contains("at most 65536 files"));
         assert!(grid(2048).is_ok());
+    }
+
+    fn side(cells: u32) -> Option<FileSide> {
+        FileSide::try_from(cells).ok()
     }
 
     #[test]
     fn files_are_cut_at_whole_multiples_and_hold_every_cell_once() {
         let bounds = Bounds { min: [-700, -1300], max: [900, 20] };
-        let grid = RasterGrid::new(&lattice("0", "0", "1"), decimal("1"), bounds, CellLimit::Files(512)).unwrap();
-        let files = grid.files(512);
+        let grid =
+            RasterGrid::new(&lattice("0", "0", "1"), aligned(decimal("1")), bounds, CellLimit::Files(512)).unwrap();
+        let files = grid.files(side(512));
         let mut cells = 0;
         for &[columns, rows] in &files {
             let part = grid.part([columns, rows]);
@@ -447,7 +506,7 @@ pub(super) mod tests {
         // Columns from -700 to 900 are cut at -512, 0 and 512; rows from 20 down to -1300 at 0, -512 and -1024.
         assert_eq!((files.len(), cells), (16, grid.cells()));
         assert_eq!(
-            grid.files(1 << 19),
+            grid.files(side(1 << 19)),
             [[[0, 700], [0, 20]], [[700, 1600], [0, 20]], [[0, 700], [20, 1320]], [[700, 1600], [20, 1320]]]
         );
     }
@@ -459,15 +518,18 @@ pub(super) mod tests {
             step in 1i64..5_000,
             cell in 1i64..5_000_000,
             place in -30_000i32..30_000,
+            origin in -1_000_000_000i64..1_000_000_000,
         ) {
             let lattice = Lattice::new([Decimal::new(offset, 4); 3], Decimal::new(step, 4), Decimal::ONE).unwrap();
             let bounds = Bounds { min: [-30_000; 2], max: [30_000; 2] };
-            let Ok(grid) = RasterGrid::new(&lattice, Decimal::new(cell, 5), bounds, CellLimit::OneFile) else { return Ok(()) };
+            let alignment = CellAlignment { origin: [Decimal::new(origin, 5); 2], resolution: Decimal::new(cell, 5) };
+            let Ok(grid) = RasterGrid::new(&lattice, alignment, bounds, CellLimit::OneFile) else { return Ok(()) };
             let [columns, rows] = grid.size();
             // In units of 5 decimals: the coordinate, and the first centres, which are half a cell inside.
             let world = |place: i32| i128::from(offset) * 20 + i128::from(step) * i128::from(place) * 20;
             let west = (grid.corner()[0] * 1e5).round() as i128;
             let north = (grid.corner()[1] * 1e5).round() as i128;
+            prop_assert_eq!([(west - i128::from(origin)) % i128::from(cell), (north - i128::from(origin)) % i128::from(cell)], [0, 0]);
             let centre = |column: u32| 2 * west + (2 * i128::from(column) + 1) * i128::from(cell);
             for subunits in [grid.narrow().map(|s| s.beside(0, place, columns)), Some(grid.wide().beside(0, place, columns))] {
                 let Beside { from, past } = subunits.unwrap();

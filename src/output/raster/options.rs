@@ -2,6 +2,7 @@
 
 use crate::geometry::lattice::shortest_decimal;
 use crate::output::raster::BLOCK;
+use crate::output::raster::grid::CellAlignment;
 use rust_decimal::Decimal;
 use serde::{Deserialize, Serialize};
 
@@ -11,6 +12,9 @@ use serde::{Deserialize, Serialize};
 pub struct RasterOptions {
     /// The side of a cell.
     pub resolution: CellSize,
+    /// Where a corner of a cell is; (0, 0) if the user says nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub origin: Option<CellOrigin>,
     /// How the file is packed.
     #[serde(default)]
     pub compression: RasterCompression,
@@ -20,6 +24,14 @@ pub struct RasterOptions {
     /// The side of a file in cells, for a grid of files instead of one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cells_per_file: Option<FileSide>,
+}
+
+impl RasterOptions {
+    /// Returns where the cells are.
+    pub(crate) fn alignment(&self) -> CellAlignment {
+        let origin = self.origin.map_or([Decimal::ZERO; 2], CellOrigin::exact);
+        CellAlignment { origin, resolution: self.resolution.exact() }
+    }
 }
 
 /// The side of a file of a grid of files in cells.
@@ -78,11 +90,7 @@ impl TryFrom<toml::Value> for CellSize {
     type Error = String;
 
     fn try_from(value: toml::Value) -> Result<CellSize, String> {
-        let written = match value {
-            toml::Value::Integer(i) => i as f64,
-            toml::Value::Float(f) => f,
-            _ => 0.0,
-        };
+        let written = number(&value).unwrap_or_default();
         let exact = shortest_decimal(written).filter(|exact| *exact > Decimal::ZERO);
         let exact = exact.ok_or("resolution is the side of a cell in source units, a positive number such as 0.5")?;
         Ok(CellSize { exact, written })
@@ -93,6 +101,54 @@ impl From<CellSize> for toml::Value {
     fn from(size: CellSize) -> toml::Value {
         toml::Value::Float(size.written)
     }
+}
+
+/// The x and the y of a corner of a cell in source units: decimals.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "toml::Value", into = "toml::Value")]
+pub struct CellOrigin {
+    exact: [Decimal; 2],
+    /// The numbers that the user wrote.
+    written: [f64; 2],
+}
+
+impl CellOrigin {
+    /// Returns the exact decimals.
+    pub fn exact(self) -> [Decimal; 2] {
+        self.exact
+    }
+
+    /// Returns the nearest numbers.
+    pub fn numbers(self) -> [f64; 2] {
+        self.written
+    }
+}
+
+impl TryFrom<toml::Value> for CellOrigin {
+    type Error = String;
+
+    fn try_from(value: toml::Value) -> Result<CellOrigin, String> {
+        let numbers: Vec<f64> = value.as_array().into_iter().flatten().filter_map(number).collect();
+        let is_pair = value.as_array().is_some_and(|all| all.len() == 2);
+        let pair = <[f64; 2]>::try_from(numbers).ok().filter(|_| is_pair);
+        let origin = pair.and_then(|written @ [x, y]| {
+            let exact = [shortest_decimal(x)?, shortest_decimal(y)?];
+            Some(CellOrigin { exact, written })
+        });
+        origin.ok_or_else(|| {
+            "origin is the x and the y of a corner of a cell in source units, two numbers such as [0.5, 0.5]".into()
+        })
+    }
+}
+
+impl From<CellOrigin> for toml::Value {
+    fn from(origin: CellOrigin) -> toml::Value {
+        toml::Value::Array(origin.written.map(toml::Value::Float).into())
+    }
+}
+
+fn number(value: &toml::Value) -> Option<f64> {
+    value.as_float().or_else(|| value.as_integer().map(|i| i as f64))
 }
 
 /// How the blocks of the file are packed.

@@ -16,7 +16,8 @@ pub(crate) struct HeightScale {
 }
 
 impl HeightScale {
-    fn source(self, lattice: f64) -> f32 {
+    /// Returns a height of the lattice as a cell has it.
+    pub(crate) fn source(self, lattice: f64) -> f32 {
         (self.offset + self.step * lattice) as f32
     }
 }
@@ -212,6 +213,7 @@ mod tests {
     use crate::geometry::Bounds;
     use crate::geometry::lattice::Lattice;
     use crate::output::raster::grid::CellLimit;
+    use crate::output::raster::grid::tests::aligned;
     use proptest::prelude::*;
     use rust_decimal::Decimal;
 
@@ -219,7 +221,7 @@ mod tests {
 
     fn grid(cell: Decimal) -> RasterGrid {
         let lattice = Lattice::new([Decimal::ZERO; 3], Decimal::ONE, Decimal::ONE).unwrap();
-        RasterGrid::new(&lattice, cell, Bounds { min: [0; 2], max: [40; 2] }, CellLimit::OneFile).unwrap()
+        RasterGrid::new(&lattice, aligned(cell), Bounds { min: [0; 2], max: [40; 2] }, CellLimit::OneFile).unwrap()
     }
 
     fn drawn(grid: &RasterGrid, positions: &[[i32; 3]], triangles: &[[u32; 3]]) -> Vec<u32> {

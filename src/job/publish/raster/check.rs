@@ -12,10 +12,11 @@ use crate::{Error, Result};
 /// # Errors
 /// [`Error::Config`] if they are too many, or the resolution does not meet the lattice.
 pub(crate) fn grid_over(plan: &Plan, options: &RasterOptions, bounds: Bounds<2>) -> Result<RasterGrid> {
-    let resolution = options.resolution;
     let limit = options.cells_per_file.map_or(CellLimit::OneFile, |side| CellLimit::Files(side.cells()));
-    RasterGrid::new(&plan.lattice, resolution.exact(), bounds, limit)
-        .map_err(|what| Error::Config(format!("[output.raster] resolution = {} {what}", resolution.number())))
+    let origin = options.origin.map_or_else(String::new, |origin| format!(" with origin = {:?}", origin.numbers()));
+    RasterGrid::new(&plan.lattice, options.alignment(), bounds, limit).map_err(|what| {
+        Error::Config(format!("[output.raster] resolution = {}{origin} {what}", options.resolution.number()))
+    })
 }
 
 /// Checks that `[output.raster]` asks for a raster that can be written, as far as the headers of the inputs tell. Returns its cells.

@@ -14,4 +14,5 @@ pub(crate) mod tile_meshes;
 pub(crate) mod waiting_blocks;
 pub mod write_raster;
 
+mod nodata_heights;
 mod pyramid;

@@ -15,6 +15,8 @@ use std::path::Path;
 pub(crate) struct TileBox {
     pub(crate) tile: TileIndex,
     pub(crate) bounds: Bounds<2>,
+    /// The lowest and the highest height.
+    pub(crate) heights: [i32; 2],
 }
 
 /// Returns all tiles with triangles.
@@ -26,7 +28,8 @@ pub(crate) fn boxes(tiles: &dyn EachTile) -> Result<Vec<TileBox>> {
     tiles.visit(&mut |store, tile| {
         interrupt::check()?;
         if let Some(Bounds { min, max }) = TileSummary::load(store, tile)?.bounds() {
-            boxes.push(TileBox { tile, bounds: Bounds { min: [min[0], min[1]], max: [max[0], max[1]] } });
+            let bounds = Bounds { min: [min[0], min[1]], max: [max[0], max[1]] };
+            boxes.push(TileBox { tile, bounds, heights: [min[2], max[2]] });
         }
         Ok(())
     })?;

@@ -55,6 +55,15 @@ impl WaitingBlocks {
         disk::write_all_at(&self.file, bytes, at).map_err(Error::io("write", &self.path))
     }
 
+    /// Removes the file.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub(crate) fn discard(self) -> Result<()> {
+        drop(self.file);
+        disk::remove_file(&self.path).map_err(Error::io("remove", &self.path))
+    }
+
     /// Ends the adding. `empty` stands for blocks without a height.
     pub(crate) fn finish(self, empty: Vec<u8>) -> FinishedBlocks {
         let places = self.places.into_inner().unwrap_or_else(PoisonError::into_inner);

@@ -7,9 +7,10 @@ use crate::job::index::TileIndex;
 use crate::job::plan::budget::working_memory;
 use crate::job::plan::job_plan::Plan;
 use crate::job::publish::raster::check::{grid_over, planned_raster};
+use crate::job::publish::raster::nodata_heights::NodataPoints;
 use crate::job::publish::raster::pyramid::{Pyramid, TileCells};
 use crate::job::publish::raster::system::{system_of, system_warning};
-use crate::job::publish::raster::tile_meshes::{boxes, lattice_mesh};
+use crate::job::publish::raster::tile_meshes::{TileBox, boxes, lattice_mesh};
 use crate::job::publish::raster::waiting_blocks::WaitingBlocks;
 use crate::job::publish::side_files::EachTile;
 use crate::job::records::StepOutput;
@@ -21,7 +22,7 @@ use crate::output::raster::file_list::{ListedFile, RasterList};
 use crate::output::raster::geotiff::{RasterHead, head};
 use crate::output::raster::grid::{RasterGrid, blocks};
 use crate::output::raster::options::RasterOptions;
-use crate::output::raster::window::{HeightScale, Window};
+use crate::output::raster::window::{HeightScale, LatticeMesh, Window};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
@@ -71,6 +72,8 @@ pub struct RasterWork<'a> {
     options: RasterOptions,
     frame: &'a Frame,
     grid: RasterGrid,
+    boxes: Vec<TileBox>,
+    /// The tiles that may cover a cell.
     tiles: Vec<TileCells>,
 }
 
@@ -85,11 +88,12 @@ impl<'a> RasterWork<'a> {
         let all = boxes.iter().map(|tile| tile.bounds).reduce(Bounds::union);
         let all = all.ok_or_else(|| Error::Broken("there is no tile to make a raster of".into()))?;
         let grid = grid_over(plan, &options, all)?;
-        let tiles = boxes.iter().filter_map(|tile| {
+        let cells = |tile: &TileBox| {
             let [columns, rows] = grid.cells_within(tile.bounds);
             (columns[0] < columns[1] && rows[0] < rows[1]).then_some(TileCells { tile: tile.tile, columns, rows })
-        });
-        Ok(Some(RasterWork { plan, options, frame, tiles: tiles.collect(), grid }))
+        };
+        let tiles = boxes.iter().filter_map(cells).collect();
+        Ok(Some(RasterWork { plan, options, frame, grid, boxes, tiles }))
     }
 
     /// Returns the number of blocks of the raster itself.
@@ -101,12 +105,10 @@ impl<'a> RasterWork<'a> {
 
     /// Returns the files of the raster.
     fn parts(&self) -> Vec<RasterPart> {
-        let [columns, rows] = self.grid.size();
-        let Some(side) = self.options.cells_per_file else {
-            return vec![RasterPart { uri: None, cells: [[0, columns], [0, rows]], grid: self.grid.clone() }];
-        };
-        let parts = (0..).zip(self.grid.files(side.cells()));
-        parts.map(|(n, cells)| RasterPart { uri: Some(raster_uri(n)), cells, grid: self.grid.part(cells) }).collect()
+        let side = self.options.cells_per_file;
+        let parts = (0..).zip(self.grid.files(side));
+        let part = |(n, cells)| RasterPart { uri: side.map(|_| raster_uri(n)), cells, grid: self.grid.part(cells) };
+        parts.map(part).collect()
     }
 
     /// Writes the raster from the tiles, which must have their names. Calls `done` for each block that has a height.
@@ -117,12 +119,7 @@ impl<'a> RasterWork<'a> {
         let mut stats = RasterStats { size: self.grid.size(), ..RasterStats::default() };
         let (mut files, mut listed) = (Vec::new(), Vec::new());
         for part in self.parts() {
-            let tiles = self.tiles_of(&part);
-            // A grid of files has none where there is no tile.
-            if tiles.is_empty() && part.uri.is_some() {
-                continue;
-            }
-            let (file, figures) = self.write_part(directory, &part, &tiles, done)?;
+            let Some((file, figures)) = self.write_part(directory, &part, done)? else { continue };
             stats += figures;
             files.push(file);
             listed.extend(part.uri.map(|uri| ListedFile { uri, cells: part.cells }));
@@ -147,18 +144,23 @@ impl<'a> RasterWork<'a> {
         tiles.collect()
     }
 
-    /// Writes one file of the raster.
+    /// Writes one file of the raster. Returns `None` for a file of a grid in which no cell has a height. The tiles alone do not tell that:
+    /// the box of a tile may reach beyond its triangles, and a box depends on the tiling.
     fn write_part(
         &self,
         directory: &JobDirectory,
         part: &RasterPart,
-        tiles: &[TileCells],
         done: &(dyn Fn() + Sync),
-    ) -> Result<(PendingFile, RasterStats)> {
+    ) -> Result<Option<(PendingFile, RasterStats)>> {
+        let tiles = self.tiles_of(part);
+        let may_be_empty = part.uri.is_some();
+        if tiles.is_empty() && may_be_empty {
+            return Ok(None);
+        }
         let levels = part.grid.levels();
         let waiting = WaitingBlocks::create(&directory.raster_blocks(), &levels)?;
         let window_level = window_level(working_memory(&self.plan.options)).min(levels.len() - 1);
-        let read = |tile: TileIndex| lattice_mesh(&directory.output().tile(tile.number()), self.frame);
+        let read = |tile: TileIndex| self.mesh(directory, tile);
         let pyramid = Pyramid {
             options: self.options,
             levels,
@@ -170,9 +172,14 @@ impl<'a> RasterWork<'a> {
             same_as_nodata: AtomicU64::new(0),
         };
         let mut window = Window::new(&part.grid, self.heights(), BLOCK << window_level);
-        pyramid.draw(&mut window, tiles)?;
+        pyramid.draw(&mut window, &tiles)?;
         drop(window);
         let Pyramid { levels, heights, same_as_nodata, .. } = pyramid;
+        let (heights, same_as_nodata) = (heights.into_inner(), same_as_nodata.into_inner());
+        if heights == 0 && may_be_empty {
+            waiting.discard()?;
+            return Ok(None);
+        }
         let nodata = self.options.nodata.number();
         let blocks = waiting.finish(packed(&vec![nodata; BLOCK * BLOCK], self.options.compression));
         let system = system_of(self.plan);
@@ -188,8 +195,7 @@ impl<'a> RasterWork<'a> {
         let path = part.uri.as_ref().map_or_else(|| output.raster(), |uri| output.directory().join(uri));
         create_folder_of(&path)?;
         let file = blocks.write(&head, &path)?;
-        let (heights, same_as_nodata) = (heights.into_inner(), same_as_nodata.into_inner());
-        Ok((file, RasterStats { files: 1, heights, same_as_nodata, ..RasterStats::default() }))
+        Ok(Some((file, RasterStats { files: 1, heights, same_as_nodata, ..RasterStats::default() })))
     }
 
     /// Writes the list by which programs open all files as one raster.
@@ -210,23 +216,30 @@ impl<'a> RasterWork<'a> {
         HeightScale { offset: extras.offset[2], step: extras.resolution_z }
     }
 
-    /// Returns what the user should know of the raster.
-    pub fn warnings(&self, stats: &RasterStats) -> Vec<String> {
+    fn mesh(&self, directory: &JobDirectory, tile: TileIndex) -> Result<LatticeMesh> {
+        lattice_mesh(&directory.output().tile(tile.number()), self.frame)
+    }
+
+    /// Returns what the user should know of the raster. Reads tiles again if cells have the height that stands for none.
+    ///
+    /// # Errors
+    /// [`Error::Io`] or [`Error::Input`] on a tile, [`Error::Interrupted`].
+    pub fn warnings(&self, directory: &JobDirectory, stats: &RasterStats) -> Result<Vec<String>> {
         let file = if self.options.cells_per_file.is_some() { "terrain.vrt" } else { "terrain.tif" };
-        let same = (stats.same_as_nodata > 0).then(|| {
-            format!(
-                "{} cells of {file} have the height {}, which stands for none there: set another [output.raster] nodata",
-                stats.same_as_nodata,
-                self.options.nodata.number()
-            )
-        });
-        let empty = (stats.heights == 0).then(|| {
-            format!(
+        let nodata = self.options.nodata;
+        let mut warnings = Vec::new();
+        if stats.same_as_nodata > 0 {
+            let read = |tile: &TileBox| self.mesh(directory, tile.tile);
+            let points = NodataPoints::find(&self.boxes, self.heights(), nodata, &read)?;
+            warnings.push(points.warning(file, stats, nodata, &self.plan.lattice));
+        }
+        if stats.heights == 0 {
+            warnings.push(format!(
                 "{file} has no height, because no centre of a cell lies within the terrain: set a finer [output.raster] resolution"
-            )
-        });
-        let system = system_warning(&self.plan.crs, &system_of(self.plan));
-        same.into_iter().chain(empty).chain(system).collect()
+            ));
+        }
+        warnings.extend(system_warning(&self.plan.crs, &system_of(self.plan)));
+        Ok(warnings)
     }
 }
 
