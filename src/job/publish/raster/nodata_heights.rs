@@ -61,7 +61,7 @@ impl NodataPoints {
             1 => "1 cell".into(),
             cells => format!("{cells} cells"),
         };
-        let warning = format!("{file} has the height {height} in {cells}, and {height} stands for no height there");
+        let warning = format!("{file} has the height {height} in {cells}, and {height} stands for nodata there");
         if self.first.is_empty() {
             return format!(
                 "{warning}: no point has this height, it is between the heights of points; set [output.raster] nodata = \"nan\" or \
@@ -72,7 +72,7 @@ impl NodataPoints {
         let places: Vec<String> = self.first.iter().map(place).collect();
         let more = if self.are_more { " and other places" } else { "" };
         format!(
-            "{warning}: points at {}{more} have it; if it means no height in the input too, leave these points out with [input] nodata = \
+            "{warning}: points at {}{more} have it; if it stands for nodata in the input too, leave these points out with [input] nodata = \
              {height}; if it is a height, set [output.raster] nodata = \"nan\" or another number",
             places.join(", ")
         )
