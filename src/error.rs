@@ -142,7 +142,7 @@ fn remedy(path: &Path, error: &std::io::Error) -> &'static str {
         std::io::ErrorKind::PermissionDenied => "; check the permissions",
         _ if is_about_the_path(error) => "; correct the path",
         _ if is_shortage_of_files(error) => {
-            "; too many files are open at once: raise the limit (ulimit -n 4096, or LimitNOFILE of a service), or set fewer [limits] \
+            "; raise the limit on open files (ulimit -n 4096, or LimitNOFILE of a service), or set fewer [limits] \
              threads, and run again"
         }
         _ => "",
