@@ -1,5 +1,6 @@
 //! Errors: a sentence that a user can act on, and an exit code for each.
 
+use crate::terminal::name;
 use std::path::{Path, PathBuf};
 
 /// The result of everything in this crate that can fail.
@@ -12,7 +13,7 @@ pub const STANDARD_OUTPUT: &str = "standard output";
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The operating system refused an operation: it may succeed later (exit code 1), or the path itself is wrong (exit code 2).
-    #[error("cannot {action} {}: {source}{}", path.display(), remedy(path, source))]
+    #[error("cannot {action} {}: {source}{}", name(path), remedy(path, source))]
     Io {
         /// The operation as a verb: "read", "create", "write".
         action: &'static str,
@@ -22,7 +23,7 @@ pub enum Error {
         source: std::io::Error,
     },
     /// Another process works in the job directory (exit code 1).
-    #[error("{} is working in {}: wait for it, or choose another [output] directory", working(holder), directory.display())]
+    #[error("{} is working in {}: wait for it, or choose another [output] directory", working(holder), name(directory))]
     InUse {
         /// The job directory.
         directory: PathBuf,
@@ -32,7 +33,7 @@ pub enum Error {
     /// A job has not put all its results in place (exit code 1).
     #[error(
         "{}: a job is under way here, or was stopped, so its results are not all in place: run the job again, or wait for it",
-        directory.display()
+        name(directory)
     )]
     Unfinished {
         /// The output directory.
@@ -70,7 +71,7 @@ pub enum Error {
     #[error("interrupted")]
     Interrupted,
     /// A job stopped, and its finished steps are kept (the exit code of `why`).
-    #[error("{why}\nfinished steps are kept in {} ({steps}): {}, without --restart, to go on", job.display(), again(why))]
+    #[error("{why}\nfinished steps are kept in {} ({steps}): {}, without --restart, to go on", name(job), again(why))]
     Resumable {
         /// Why the job stopped.
         why: Box<Error>,
@@ -99,7 +100,7 @@ pub enum Error {
         what: String,
     },
     /// An input file cannot be used (exit code 3).
-    #[error("{}: {what}", path.display())]
+    #[error("{}: {what}", name(path))]
     Input {
         /// The input file.
         path: PathBuf,
@@ -140,6 +141,10 @@ fn remedy(path: &Path, error: &std::io::Error) -> &'static str {
         std::io::ErrorKind::FileTooLarge => "; raise the limit on the size of files (ulimit -f), and run again",
         std::io::ErrorKind::PermissionDenied => "; check the permissions",
         _ if is_about_the_path(error) => "; correct the path",
+        _ if is_shortage_of_files(error) => {
+            "; raise the limit on open files (ulimit -n 4096, or LimitNOFILE of a service), or set fewer [limits] \
+             threads, and run again"
+        }
         _ => "",
     }
 }
@@ -158,6 +163,18 @@ fn is_circle_of_links(error: &std::io::Error) -> bool {
 
 #[cfg(not(target_os = "linux"))]
 fn is_circle_of_links(_: &std::io::Error) -> bool {
+    false
+}
+
+/// Tells whether the process, or the system, has as many files open as it may.
+#[cfg(target_os = "linux")]
+fn is_shortage_of_files(error: &std::io::Error) -> bool {
+    use rustix::io::Errno;
+    [Errno::MFILE, Errno::NFILE].iter().any(|shortage| error.raw_os_error() == Some(shortage.raw_os_error()))
+}
+
+#[cfg(not(target_os = "linux"))]
+fn is_shortage_of_files(_: &std::io::Error) -> bool {
     false
 }
 
@@ -193,5 +210,24 @@ impl Error {
     /// Returns an [`Error::Input`]: the file at `path` cannot be used because of `what`.
     pub fn input(path: impl AsRef<Path>, what: impl Into<String>) -> Error {
         Error::Input { path: path.as_ref().to_path_buf(), what: what.into() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_cannot_write_lines_of_their_own() {
+        let error = Error::input("a\nerror: \u{1b}[2J.laz", "is bad");
+        assert_eq!(error.to_string(), "a\\nerror: \\u{1b}[2J.laz: is bad");
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_shortage_of_open_files_names_its_cure() {
+        let shortage = std::io::Error::from_raw_os_error(rustix::io::Errno::MFILE.raw_os_error());
+        let error = Error::io("read", "a.laz")(shortage);
+        assert!(error.exit_code() == 1 && error.to_string().contains("ulimit -n"), "{error}");
     }
 }

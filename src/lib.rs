@@ -23,11 +23,13 @@ pub mod job;
 pub mod manual;
 pub mod mesh;
 pub mod output;
+mod path_text;
 pub mod positional_io;
 pub mod sample;
 mod shell_word;
 pub mod shortage;
 pub mod submit;
+pub mod terminal;
 pub mod threads;
 pub mod triangulation;
 pub mod verify;
@@ -39,8 +41,8 @@ mod warnings;
 pub use error::{Error, Result};
 pub use warnings::Warnings;
 
-/// Writes a line to standard error. A closed or full standard error must not end the job, so failures are ignored.
+/// Writes a message to standard error, as a terminal can show it. A closed or full standard error must not end the job, so failures are ignored.
 pub fn say(text: &str) {
     use std::io::Write;
-    let _ = writeln!(std::io::stderr(), "{text}");
+    let _ = writeln!(std::io::stderr(), "{}", terminal::harmless(text));
 }

@@ -22,7 +22,9 @@ use gdt_batch::submit::request::Request;
 use gdt_batch::submit::{Engine, kubernetes, slurm};
 use gdt_batch::threads::{self, on_threads};
 use gdt_batch::verify::Conclusion;
-use gdt_batch::{Error, Result, completions, config, init, input, interrupt, manual, sample, say, shortage, verify};
+use gdt_batch::{
+    Error, Result, completions, config, init, input, interrupt, manual, sample, say, shortage, terminal, verify,
+};
 use serde::Serialize;
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
@@ -30,14 +32,25 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    // clap itself exits with code 2 if the command line is wrong.
-    match shortage::listen().and_then(|()| run(Cli::parse())) {
+    match shortage::listen().and_then(|()| run(command_line())) {
         Ok(code) => code,
         Err(error) => {
             say(&format!("error: {error}"));
             ExitCode::from(error.exit_code())
         }
     }
+}
+
+/// Returns what the command line says. If it is wrong, ends the process with code 2, as clap does.
+fn command_line() -> Cli {
+    Cli::try_parse().unwrap_or_else(|error| {
+        let has_signs = std::env::args_os().any(|word| word.to_string_lossy().chars().any(char::is_control));
+        if error.use_stderr() && has_signs {
+            say(&error.render().to_string());
+            std::process::exit(error.exit_code())
+        }
+        error.exit()
+    })
 }
 
 fn run(cli: Cli) -> Result<ExitCode> {
@@ -305,7 +318,7 @@ fn print_result(result: &(impl Display + Serialize), print: PrintOptions) -> Res
     } else if print.quiet {
         return Ok(());
     } else {
-        result.to_string()
+        terminal::harmless(&result.to_string())
     };
     print_text(&text)
 }

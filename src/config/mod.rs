@@ -2,15 +2,19 @@
 //! shows the line.
 
 mod paths;
+mod short_message;
 
-use crate::config::paths::{Anchored, anchor};
+use crate::config::paths::{Anchored, anchor, as_pattern};
+use crate::config::short_message::shortened;
 use crate::gpu::options::{GpuOptions, TextureSide, VoronoiMethod};
 use crate::input::lines::options::LineOptions;
 use crate::input::options::{InputOptions, is_by_url};
 use crate::job::options::{JobOptions, Limits};
 use crate::output::options::OutputOptions;
+use crate::path_text::encoded;
 use crate::triangulation::options::{Backend, MaxPointsPerPart, MaxPointsPerTile, TriangulationOptions};
 use crate::{Error, Result, Warnings};
+use glob::Pattern;
 use serde::Deserialize;
 use std::path::Path;
 
@@ -121,9 +125,9 @@ fn resolve_paths(options: &mut JobOptions, base: &Path) -> std::result::Result<(
     let of_lines = options.breaklines.iter_mut().flat_map(|lines| &mut lines.files);
     for (key, file) in of_points.chain(of_lines.map(|file| ("[[breaklines]] files", file))) {
         let Anchored { base, path } = anchor(key, file, base)?;
-        if !Path::new(path).is_absolute() {
-            *file = format!("{}{path}", glob_prefix(&base));
-        }
+        let (pattern, warning) = as_pattern(key, path, &base);
+        options.warnings.extend(warning);
+        *file = if Path::new(path).is_absolute() { pattern } else { format!("{}{pattern}", glob_prefix(&base)) };
     }
     Ok(())
 }
@@ -160,7 +164,10 @@ fn without_queries(message: &str) -> String {
 
 /// Reads and checks the text of a configuration. The error shows the line.
 fn parse(text: &str) -> std::result::Result<JobOptions, String> {
-    let mut file: ConfigFile = toml::from_str(text).map_err(|e| without_queries(&e.to_string()))?;
+    let mut file: ConfigFile = toml::from_str(text).map_err(|e| shortened(&without_queries(&e.to_string())))?;
+    if let Some(place) = text.parse::<toml::Table>().ok().and_then(|table| nul_in(&table.into())) {
+        return Err(format!("{place} has a NUL character (\\u0000), which no name of a file can have: remove it"));
+    }
     if file.input.files.is_empty() {
         return Err("[input] files is empty: name at least one point cloud".into());
     }
@@ -198,6 +205,18 @@ fn parse(text: &str) -> std::result::Result<JobOptions, String> {
     })
 }
 
+/// Returns the place of a text with a NUL character in the value of a configuration, such as `output directory`.
+fn nul_in(value: &toml::Value) -> Option<String> {
+    match value {
+        toml::Value::String(text) => text.contains('\0').then(String::new),
+        toml::Value::Array(values) => values.iter().find_map(nul_in),
+        toml::Value::Table(table) => table
+            .iter()
+            .find_map(|(key, value)| nul_in(value).map(|rest| format!("{key} {rest}").trim_end().to_string())),
+        _ => None,
+    }
+}
+
 /// Returns the value of a key that may be in `[gpu]` or, under its old name, in `[triangulation]`.
 fn one_of<T>(key: &str, in_gpu: Option<T>, in_triangulation: Option<T>) -> std::result::Result<Option<T>, String> {
     match (in_gpu, in_triangulation) {
@@ -225,12 +244,12 @@ fn old_names(text: &str) -> Warnings {
     warnings
 }
 
-/// Returns `directory` as the beginning of a glob pattern, with its own special characters escaped.
+/// Returns `directory` as the beginning of a pattern, with its own special characters escaped.
 fn glob_prefix(directory: &Path) -> String {
     if directory.as_os_str().is_empty() {
         return String::new();
     }
-    format!("{}/", glob::Pattern::escape(&directory.to_string_lossy()))
+    format!("{}/", Pattern::escape(&encoded(directory.as_os_str())))
 }
 
 #[cfg(test)]

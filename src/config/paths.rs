@@ -3,6 +3,8 @@
 //! `~/` is the home directory, as everywhere. Variables are refused: the same configuration would read and write somewhere else in
 //! another shell, or, where a variable is not set, in a folder called `$NAME`.
 
+use crate::path_text::is_pattern;
+use glob::Pattern;
 use std::path::{Path, PathBuf, is_separator};
 
 /// A path, and the directory that it counts from.
@@ -40,6 +42,40 @@ pub(crate) fn anchor<'a>(option: &str, path: &'a str, base: &Path) -> Result<Anc
             Err(format!("{option}: {path}: the home directory is not known (HOME is not set); write the path itself"))
         }
     }
+}
+
+/// Returns a path of the `option` as a pattern. A folder or a file that is really called like a pattern is meant alone; then a warning names
+/// another that the pattern matches too.
+pub(crate) fn as_pattern(option: &str, path: &str, base: &Path) -> (String, Option<String>) {
+    let (mut place, mut is_real, mut pattern, mut warning) = (base.to_path_buf(), true, String::new(), None);
+    for piece in path.split_inclusive(is_separator) {
+        let name = piece.trim_end_matches(is_separator);
+        is_real = is_real && (!is_pattern(name) || place.join(name).symlink_metadata().is_ok());
+        if is_real && is_pattern(name) {
+            warning = warning.or_else(|| other_match(&place, name).map(|other| meant_alone(option, name, &other)));
+            pattern += &Pattern::escape(name);
+            pattern += &piece[name.len()..];
+        } else {
+            pattern += piece;
+        }
+        place = place.join(piece);
+    }
+    (pattern, warning)
+}
+
+fn meant_alone(option: &str, name: &str, other: &str) -> String {
+    format!(
+        "{option}: something is called {name}, so only that is meant, although the pattern matches {other} too: name {other} as well, or \
+         rename {name}"
+    )
+}
+
+/// Returns another name in `folder` that `name` matches as a pattern.
+fn other_match(folder: &Path, name: &str) -> Option<String> {
+    let pattern = Pattern::new(name).ok()?;
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let names = folder.read_dir().ok()?.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
+    names.filter(|other| other != name && pattern.matches(other)).min()
 }
 
 /// Tells whether the folder or file whose name has such a sign is really called so.
@@ -90,6 +126,31 @@ mod tests {
         ] {
             assert_eq!(variable_in(path), name, "{path}");
         }
+    }
+
+    #[test]
+    fn a_file_that_is_called_like_a_pattern_is_meant_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a[1].laz", "a1.laz", "b[.laz", "c*.laz"] {
+            std::fs::write(folder.path().join(name), "").unwrap();
+        }
+        let pattern = |path: &str| as_pattern("[input] files", path, folder.path());
+        for path in ["a1.laz", "a?.laz", "*.laz", "c[*].laz", "d[.laz"] {
+            assert_eq!(pattern(path), (path.to_string(), None));
+        }
+        assert_eq!(pattern("b[.laz"), ("b[[].laz".to_string(), None));
+        assert_eq!(pattern("c*.laz"), ("c[*].laz".to_string(), None));
+        let (escaped, warning) = pattern("a[1].laz");
+        assert_eq!(escaped, "a[[]1[]].laz");
+        assert!(
+            warning
+                .unwrap()
+                .contains("something is called a[1].laz, so only that is meant, although the pattern matches a1.laz")
+        );
+        // Folders too.
+        std::fs::create_dir(folder.path().join("d [2]")).unwrap();
+        assert_eq!(pattern("d [2]/*.laz"), ("d [[]2[]]/*.laz".to_string(), None));
+        assert_eq!(pattern("**/d [2]/*.laz"), ("**/d [2]/*.laz".to_string(), None));
     }
 
     #[test]

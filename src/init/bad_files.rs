@@ -59,7 +59,7 @@ fn skipping(bad: &[String]) -> NeededLine {
         more => format!("; and {more} more"),
     };
     let named = bad.iter().take(MOST_NAMED).cloned().collect::<Vec<_>>().join("; ");
-    let why = format!("Bad files are left out: {named}{more}. Mend them, and remove this line.");
+    let why = format!("Bad files are left out by this line: {named}{more}. Mend them, and remove it.");
     NeededLine::of_input("on_bad_file", "skip", &why)
 }
 
@@ -74,7 +74,8 @@ fn allowing(sources: &[Source], each: bool) -> Option<NeededLine> {
         false => fraction(all.0, all.1),
     };
     let why = format!(
-        "{} of {} points are damaged or missing, as in {}. The job reads the rest. Copy the file again, and remove this line.",
+        "{} of {} points are damaged or missing, as in {}. So the job stops. Copy the file again, or let the job \
+         read the rest: remove the #.",
         all.0,
         all.1,
         first.path.display()
@@ -93,7 +94,8 @@ pub(crate) fn line_for_damage(draft: &Draft, damage: &Damage) -> Option<NeededLi
         _ => String::new(),
     };
     let why = format!(
-        "{malformed} of {records} points cannot be read{file}. The job reads the rest. Copy the file again, and remove this line."
+        "{malformed} of {records} points cannot be read{file}. So the job stops. Copy the file again, or let the job read the rest: remove \
+         the #."
     );
     Some(NeededLine::of_input("max_malformed_fraction", fraction(*malformed, *records), &why))
 }

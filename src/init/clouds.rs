@@ -3,13 +3,11 @@
 use crate::init::config_folder::{ConfigFolder, named};
 use crate::init::folder_files::{FolderFiles, LASER, TEXT, kind_of, leads_nowhere};
 use crate::input::{self, TextOptions, is_url};
+use crate::path_text::{PATTERN_SIGNS, is_pattern};
 use crate::{Error, Result};
 use std::collections::{BTreeMap, HashSet};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
-
-/// The signs that have a meaning in patterns.
-const SIGNS: [char; 3] = ['*', '?', '['];
 
 /// So many files that are all of their kind in a folder are named by a pattern.
 const MANY: usize = 6;
@@ -102,11 +100,11 @@ impl NamedClouds {
 
     /// Adds a pattern such as `clouds/*.laz`. `error` is why no file has this name.
     fn add_pattern(&mut self, pattern: &Path, config: &ConfigFolder, error: io::Error) -> Result<()> {
-        let Some(text) = pattern.to_str().filter(|text| text.contains(SIGNS)) else {
+        let Some(text) = pattern.to_str().filter(|text| is_pattern(text)) else {
             return Err(missing(pattern, pattern, error));
         };
         // The path before the first sign with a meaning is a folder.
-        let signs = text.find(SIGNS).unwrap_or(0);
+        let signs = text.find(PATTERN_SIGNS).unwrap_or(0);
         let (folder, rest) = match text[..signs].rfind(std::path::is_separator) {
             None => ("", text),
             Some(0) => ("/", &text[1..]),
@@ -211,16 +209,15 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_file_whose_name_is_no_text_is_left_out_of_a_folder() {
+    fn a_file_whose_name_is_not_utf8_is_one_of_its_folder() {
         use std::os::unix::ffi::OsStrExt;
         let root = tempfile::tempdir().unwrap();
         let root = root.path().canonicalize().unwrap();
         write(&root, &["a/1.laz"]);
         fs::write(root.join("a").join(std::ffi::OsStr::from_bytes(b"\xff.laz")), "").unwrap();
-        assert_eq!(clouds(&root, &["a"]).0, ["a/1.laz"]);
+        assert_eq!(clouds(&root, &["a"]).0, ["a/*.laz"]);
         fs::remove_file(root.join("a/1.laz")).unwrap();
-        let (found, _) = clouds(&root, &["a"]);
-        assert!(found[0].contains("has no point clouds") && found[0].contains("rename it"), "{found:?}");
+        assert_eq!(clouds(&root, &["a"]).0, ["a/?.laz"]);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! How a configuration names files: paths and patterns that count from its folder.
 
+use crate::job::plan::named_files::paths_like;
 use crate::{Error, Result};
 use std::path::{Component, Path, PathBuf};
 
@@ -35,18 +36,31 @@ impl ConfigFolder {
     /// Returns what the configuration calls the file at `path`: a pattern that no other file matches.
     ///
     /// # Errors
-    /// [`Error::Config`] if the path is not UTF-8.
+    /// [`Error::Config`] if the path is not UTF-8, and every pattern matches another file too.
     pub(crate) fn name(&self, path: &Path) -> Result<String> {
         let folder = self.way_to(path.parent().unwrap_or(Path::new("")))?;
-        text(&folder.join(path.file_name().unwrap_or_default())).map(|path| escaped(&path))
+        self.pattern_of(&folder.join(path.file_name().unwrap_or_default()))
+    }
+
+    /// Returns a pattern that matches this path alone, as it counts from here.
+    fn pattern_of(&self, path: &Path) -> Result<String> {
+        match path.to_str() {
+            // Every system takes slashes, and they need no quotes.
+            Some(text) if cfg!(windows) => Ok(escaped(&text.replace('\\', "/"))),
+            Some(text) => Ok(escaped(text)),
+            None => {
+                check_is_alone(&real(&self.path.join(path))?)?;
+                Ok(with_question_marks(path))
+            }
+        }
     }
 
     /// Returns what the configuration calls the files in `folder` that match `pattern`.
     ///
     /// # Errors
-    /// [`Error::Config`] if the path is not UTF-8.
+    /// [`Error::Config`] if the path is not UTF-8, and every pattern matches another folder too.
     pub(crate) fn pattern(&self, folder: &Path, pattern: &str) -> Result<String> {
-        let folder = escaped(&text(&self.way_to(folder)?)?);
+        let folder = self.pattern_of(&self.way_to(folder)?)?;
         Ok(match folder.as_str() {
             "" => pattern.to_string(),
             folder => format!("{}/{pattern}", folder.trim_end_matches('/')),
@@ -86,13 +100,17 @@ fn real(folder: &Path) -> Result<PathBuf> {
     named(folder).canonicalize().map_err(Error::io("read", folder))
 }
 
-fn text(path: &Path) -> Result<String> {
-    match path.to_str() {
-        // Every system takes slashes, and they need no quotes.
-        Some(text) if cfg!(windows) => Ok(text.replace('\\', "/")),
-        Some(text) => Ok(text.to_string()),
-        None => Err(Error::Config(format!(
-            "{}: its name is not UTF-8, and a configuration cannot hold it: rename it",
+/// Returns a pattern for a path that is not UTF-8: a configuration is, so a `?` stands for what is not.
+fn with_question_marks(path: &Path) -> String {
+    escaped(&path.to_string_lossy()).replace(char::REPLACEMENT_CHARACTER, "?")
+}
+
+/// Fails if the pattern for a path that is not UTF-8 matches another path too.
+fn check_is_alone(path: &Path) -> Result<()> {
+    match paths_like(&with_question_marks(path))?.len() {
+        0 | 1 => Ok(()),
+        _ => Err(Error::Config(format!(
+            "{}: its name is not UTF-8, and every pattern for it matches another name too: rename it",
             path.display()
         ))),
     }
@@ -179,11 +197,16 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_name_that_is_no_text_is_refused() {
+    fn a_pattern_stands_for_a_name_that_is_not_utf8_if_it_matches_no_other() {
         use std::os::unix::ffi::OsStrExt;
-        let name = std::ffi::OsStr::from_bytes(b"a\xff.laz");
-        let here = ConfigFolder::of(None).unwrap();
-        let what = here.name(Path::new(name)).unwrap_err();
-        assert!(what.exit_code() == 2 && what.to_string().contains("not UTF-8"), "{what}");
+        let root = tempfile::tempdir().unwrap();
+        let here = folder_in(root.path(), "x");
+        let [file, other] =
+            [&b"a\xff[1].laz"[..], b"a\xfe[1].laz"].map(|name| here.path.join(std::ffi::OsStr::from_bytes(name)));
+        fs::write(&file, "").unwrap();
+        assert_eq!(here.name(&file).unwrap(), "a?[[]1[]].laz");
+        fs::write(&other, "").unwrap();
+        let what = here.name(&file).unwrap_err();
+        assert!(what.exit_code() == 2 && what.to_string().contains("rename it"), "{what}");
     }
 }

@@ -14,7 +14,7 @@ pub(crate) const FIRST_WORDS: &str = "A job for gdt-batch";
 
 /// Returns the text of the configuration. `name` is that of its file for a shell, if it has one; `notes` are about files that are left out.
 pub(crate) fn text_of(runnable: &Runnable, name: Option<&str>, notes: &[String]) -> String {
-    let Runnable { draft, preflight, plan, misfit, offers } = runnable;
+    let Runnable { draft, preflight, plan, misfit, offers, .. } = runnable;
     let sources: Vec<&Source> = plan.inputs.iter().map(|input| &input.source).collect();
     let findings = Findings::of(draft, preflight, plan);
     let mut page = Page::default();
@@ -25,6 +25,7 @@ pub(crate) fn text_of(runnable: &Runnable, name: Option<&str>, notes: &[String])
     notes.iter().for_each(|note| page.say(&format!("Note: {note}.")));
     page.set(&files(&draft.files));
     page.need(draft.lines_of("input"));
+    page.choose(draft.choices.iter());
     let warnings: Vec<&str> = preflight.warnings.iter().collect();
     if !warnings.is_empty() {
         page.blank();
@@ -160,6 +161,11 @@ fn cell(preflight: &Preflight) -> f64 {
 /// Returns what the summary says of lines that are needed.
 pub(crate) fn summary_of(line: &NeededLine) -> String {
     format!("{} = {}: {}", line.key, line.value, line.why)
+}
+
+/// Returns what the summary says of lines on which the user decides.
+pub(crate) fn choice_of(line: &NeededLine) -> String {
+    format!("#{} = {}: {}", line.key, line.value, line.why)
 }
 
 /// Returns what the summary says of the units of a job.

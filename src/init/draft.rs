@@ -25,6 +25,11 @@ impl NeededLine {
         NeededLine { table: "input", key, value: value.into().to_string(), why: why.into() }
     }
 
+    /// Tells whether the user decides on this line, because it loses points that another copy of the file may have.
+    fn loses_points(&self) -> bool {
+        self.key == "max_malformed_fraction"
+    }
+
     pub(crate) fn of_limits(key: &'static str, value: impl Into<toml::Value>, why: &str) -> NeededLine {
         NeededLine { table: "limits", key, value: value.into().to_string(), why: why.into() }
     }
@@ -39,39 +44,61 @@ pub(crate) struct Draft {
     pub(crate) directory: String,
     /// The lines that are needed.
     pub(crate) needed: Vec<NeededLine>,
+    /// The lines without which the job stops, but which lose points: the user decides on them, so they are written as comments.
+    pub(crate) choices: Vec<NeededLine>,
     /// The folder of the configuration.
     pub(crate) folder: PathBuf,
 }
 
 impl Draft {
     pub(crate) fn new(files: Vec<String>, directory: String, folder: &ConfigFolder) -> Draft {
-        Draft { files, directory, needed: Vec::new(), folder: folder.path.clone() }
+        Draft { files, directory, needed: Vec::new(), choices: Vec::new(), folder: folder.path.clone() }
     }
 
     /// Returns the draft with these lines too.
     pub(crate) fn with(&self, lines: impl IntoIterator<Item = NeededLine>) -> Draft {
         let mut draft = self.clone();
-        draft.needed.extend(lines);
+        for line in lines {
+            if line.loses_points() { draft.choices.push(line) } else { draft.needed.push(line) }
+        }
+        // A file that has lost points is a bad one: it would be left out whole before the user has decided.
+        if !draft.choices.is_empty() {
+            let (of_files, needed): (Vec<_>, Vec<_>) =
+                draft.needed.into_iter().partition(|line| line.key == "on_bad_file");
+            draft.choices.splice(0..0, of_files);
+            draft.needed = needed;
+        }
         draft
+    }
+
+    /// Returns the draft as it is until the user has decided.
+    pub(crate) fn undecided(&self) -> Draft {
+        Draft { choices: Vec::new(), ..self.clone() }
+    }
+
+    /// Returns the lines that are needed, and those on which the user decides.
+    pub(crate) fn all_lines(&self) -> impl Iterator<Item = &NeededLine> {
+        self.needed.iter().chain(&self.choices)
     }
 
     /// Returns whether one of the lines sets `key`.
     pub(crate) fn sets(&self, key: &str) -> bool {
-        self.needed.iter().any(|line| line.key == key)
+        self.all_lines().any(|line| line.key == key)
     }
 
-    /// Returns the lines of a table.
+    /// Returns the needed lines of a table.
     pub(crate) fn lines_of(&self, table: &str) -> impl Iterator<Item = &NeededLine> {
         self.needed.iter().filter(move |line| line.table == table)
     }
 
-    /// Returns the options of the job, as the program reads them from the configuration.
+    /// Returns the options of the job, as the program reads them from the configuration once the user has taken the choices.
     ///
     /// # Errors
     /// [`Error::Broken`] if it does not take what is written here.
     pub(crate) fn options(&self) -> Result<JobOptions> {
         let lines = |table: &str| -> String {
-            self.lines_of(table).map(|NeededLine { key, value, .. }| format!("{key} = {value}\n")).collect()
+            let lines = self.all_lines().filter(|line| line.table == table);
+            lines.map(|NeededLine { key, value, .. }| format!("{key} = {value}\n")).collect()
         };
         let text = format!(
             "[input]\nfiles = {}\n{}[output]\ndirectory = {}\n{}[limits]\n{}",

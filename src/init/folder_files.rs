@@ -42,10 +42,9 @@ impl FolderFiles {
         Ok(found)
     }
 
-    /// Returns the files with one of these endings, apart from those whose names no configuration can hold.
+    /// Returns the files with one of these endings.
     pub(crate) fn with_endings(&self, endings: &[&str]) -> Vec<PathBuf> {
-        let is_one = |path: &&PathBuf| has_ending(path, endings) && path.to_str().is_some();
-        self.files.iter().filter(is_one).cloned().collect()
+        self.files.iter().filter(|path| has_ending(path, endings)).cloned().collect()
     }
 
     /// Returns all files with exactly this ending: all that a pattern such as `*.laz` matches.
@@ -63,14 +62,10 @@ impl FolderFiles {
     pub(crate) fn nothing_in(&self, why: Option<&Error>) -> Error {
         let others =
             self.first_folder_with_clouds().map(|other| format!(", such as {}, which has some", other.display()));
-        let nameless = self.files.iter().find(|path| path.to_str().is_none() && has_ending(path, &LASER));
-        let why = match (why, nameless, self.broken_clouds().next()) {
-            (Some(why), ..) => format!("; {why}"),
-            (None, Some(file), _) => {
-                format!("; the name of {} is not UTF-8, and a configuration cannot hold it: rename it", file.display())
-            }
-            (None, None, Some(link)) => format!("; {}", leads_nowhere(link)),
-            (None, None, None) => String::new(),
+        let why = match (why, self.broken_clouds().next()) {
+            (Some(why), _) => format!("; {why}"),
+            (None, Some(link)) => format!("; {}", leads_nowhere(link)),
+            (None, None) => String::new(),
         };
         Error::Config(format!(
             "{} has no point clouds (.las, .laz, or texts such as .csv and .xyz): name files or folders{}{why}",

@@ -1,4 +1,5 @@
-//! `gdt-batch init`: a configuration for point clouds that runs as it is, with what was found in comments.
+//! `gdt-batch init`: a configuration for point clouds that runs as it is, or says what the user has to decide, with what was found in
+//! comments.
 //!
 //! The clouds are looked at as `check` does. If a job of them would be refused, `needs.rs` tries what the message of the refusal names.
 
@@ -20,7 +21,7 @@ mod triangle;
 use crate::init::clouds::NamedClouds;
 use crate::init::config_file::{check_is_no_cloud, check_may_be_written, write};
 use crate::init::config_folder::ConfigFolder;
-use crate::init::configuration::{summary_of, text_of, units_of};
+use crate::init::configuration::{choice_of, summary_of, text_of, units_of};
 use crate::init::draft::{Draft, options_of};
 use crate::init::needs::runnable;
 use crate::init::page::harmless;
@@ -55,9 +56,12 @@ const LONGEST_STEM: usize = 100;
 #[derive(Debug, Serialize)]
 pub struct NewConfiguration {
     /// Its file; `None` if it is for standard output.
+    #[serde(serialize_with = "crate::path_text::shown_if_any")]
     pub file: Option<PathBuf>,
     /// The lines that the clouds need, or the machine.
     pub needed: Vec<NeededLine>,
+    /// The lines without which the job stops, and on which the user decides: they are comments.
+    pub choices: Vec<NeededLine>,
     /// About files that are left out.
     pub notes: Vec<String>,
     /// The units of coordinates.
@@ -67,7 +71,7 @@ pub struct NewConfiguration {
     /// Its text.
     #[serde(skip)]
     pub text: String,
-    /// Why this machine has no room for the job, if it has none.
+    /// Why the job stops as it is: the user has to decide, or this machine has no room for it.
     #[serde(skip)]
     pub misfit: Option<Error>,
 }
@@ -97,11 +101,12 @@ pub fn init(clouds: &[PathBuf], file: &Path, replace: bool) -> Result<NewConfigu
     Ok(NewConfiguration {
         file: file.map(Path::to_path_buf),
         needed: found.draft.needed,
+        choices: found.draft.choices,
         notes,
         unit: units_of(&found.preflight, &found.plan),
         check: found.preflight,
         text,
-        misfit: found.misfit,
+        misfit: found.stop.or(found.misfit),
     })
 }
 
@@ -148,6 +153,7 @@ impl fmt::Display for NewConfiguration {
         }
         row("takes", format!("about {} of memory, {} of disk", mebibytes(*memory), mebibytes(*disk)))?;
         self.needed.iter().try_for_each(|line| row("set", summary_of(line)))?;
+        self.choices.iter().try_for_each(|line| row("decide", choice_of(line)))?;
         self.notes.iter().try_for_each(|note| row("note", note.clone()))?;
         for warning in warnings.iter() {
             writeln!(f, "warning: {}", harmless(warning))?;

@@ -23,6 +23,8 @@ pub(crate) struct Runnable {
     pub(crate) plan: Plan,
     /// Why this machine has no room for the job, if it has none.
     pub(crate) misfit: Option<Error>,
+    /// Why the job stops until the user has decided, if there is something to decide.
+    pub(crate) stop: Option<Error>,
     /// The options that the job would take.
     pub(crate) offers: Offers,
 }
@@ -110,15 +112,30 @@ fn damage(plan: &Plan) -> Result<Option<Damage>> {
 /// Returns the draft with what lets the job fit this machine, if something does.
 fn fitted(draft: Draft, (preflight, plan): (Preflight, Plan)) -> Result<Runnable> {
     let offers = Offers::of(&draft, &preflight, &plan)?;
-    let Err(misfit) = preflight.passes() else { return Ok(Runnable { draft, preflight, plan, misfit: None, offers }) };
+    let stop = why_it_stops(&draft);
+    let Err(misfit) = preflight.passes() else {
+        return Ok(Runnable { draft, preflight, plan, misfit: None, stop, offers });
+    };
     for line in lines_for_room(&misfit, preflight.threads) {
         let smaller = draft.with([line]);
         let (preflight, plan) = look(&smaller.options()?)?;
         if preflight.passes().is_ok() {
-            return Ok(Runnable { draft: smaller, preflight, plan, misfit: None, offers });
+            return Ok(Runnable { draft: smaller, preflight, plan, misfit: None, stop, offers });
         }
     }
-    Ok(Runnable { draft, preflight, plan, misfit: Some(misfit), offers })
+    Ok(Runnable { draft, preflight, plan, misfit: Some(misfit), stop, offers })
+}
+
+/// Returns why the job of a draft stops until the user has decided; `None` if there is nothing to decide.
+fn why_it_stops(draft: &Draft) -> Option<Error> {
+    if draft.choices.is_empty() {
+        return None;
+    }
+    match trial(&draft.undecided()) {
+        Ok(Trial::Runs(_)) => None,
+        Ok(Trial::Damaged(damage)) => Some(damage.error),
+        Err(error) => Some(error),
+    }
 }
 
 /// Returns lines of which one may let a job fit, the mildest first.

@@ -53,6 +53,15 @@ impl Page {
         }
     }
 
+    /// Writes lines on which the user decides, each after its reason.
+    pub(crate) fn choose<'a>(&mut self, lines: impl Iterator<Item = &'a NeededLine>) {
+        for NeededLine { key, value, why, .. } in lines {
+            self.blank();
+            self.say(why);
+            self.set(&format!("#{key} = {value}"));
+        }
+    }
+
     /// Leaves a line empty.
     pub(crate) fn blank(&mut self) {
         self.line("");

@@ -19,7 +19,7 @@ struct Refusal {
 impl Refusals {
     /// Adds why a draft was refused.
     pub(crate) fn add(&mut self, draft: &Draft, error: Error) {
-        let lines: Vec<String> = draft.needed.iter().map(|line| format!("{} = {}", line.key, line.value)).collect();
+        let lines: Vec<String> = draft.all_lines().map(|line| format!("{} = {}", line.key, line.value)).collect();
         self.0.push(Refusal { lines: lines.join(" and "), error });
     }
 

@@ -119,9 +119,20 @@ fn what_is_needed_stands_there_with_its_reason() {
     let files = ["a.csv", "b.csv"].map(|name| folder.path().join(name));
     let new = init(&files, &folder.path().join("job.toml"), true).unwrap();
     let keys: Vec<&str> = new.needed.iter().map(|line| line.key).collect();
-    assert_eq!(keys, ["on_bad_file", "max_malformed_fraction", "to_crs", "missing_crs"]);
-    assert!(new.needed[0].why.contains("b.csv: is a Git LFS pointer"), "{:?}", new.needed);
-    assert_eq!(new.needed[1].value, "0.2");
+    assert_eq!(keys, ["to_crs", "missing_crs"]);
+    // Whether points may be lost, the user decides.
+    let choices: Vec<(&str, &str)> = new.choices.iter().map(|line| (line.key, line.value.as_str())).collect();
+    assert_eq!(choices, [("on_bad_file", "\"skip\""), ("max_malformed_fraction", "0.2")]);
+    assert!(new.choices[0].why.contains("b.csv: is a Git LFS pointer"), "{:?}", new.choices);
+    assert!(
+        new.text.contains("\n#max_malformed_fraction = 0.2\n") && new.text.contains("So the job stops"),
+        "{}",
+        new.text
+    );
+    let why = new.misfit.unwrap();
+    assert!(why.exit_code() == 3 && why.to_string().contains("b.csv: is a Git LFS pointer"), "{why}");
+    let decided = new.text.replace("#max_malformed", "max_malformed").replace("#on_bad_file", "on_bad_file");
+    check(&config::of_text(&decided, folder.path()).unwrap()).unwrap();
 }
 
 #[test]

@@ -10,6 +10,7 @@ use crate::input::histogram::Histogram;
 use crate::input::points::axis::AXIS_NAMES;
 use crate::input::source::{FileFormat, Source};
 use crate::input::surface::{MeshOf, Surface, SurfaceShares};
+use crate::terminal::one_line;
 use crate::{Result, Warnings};
 
 /// The output of `gdt-batch info`: `Display` is for people, `Serialize` for programs.
@@ -132,7 +133,7 @@ impl SourceDescription {
 
 impl fmt::Display for SourceDescription {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        writeln!(f, "{}", self.file)?;
+        writeln!(f, "{}", one_line(&self.file))?;
         writeln!(f, "  format   {}, {} bytes", self.kind(), self.size)?;
         writeln!(f, "  points   {} ({})", self.points, self.content())?;
         if !self.points_by_return.is_empty() {
@@ -155,7 +156,7 @@ impl fmt::Display for SourceDescription {
             write!(f, "{histogram}")?;
         }
         for warning in self.warnings.iter() {
-            writeln!(f, "  warning  {warning}")?;
+            writeln!(f, "  warning  {}", one_line(warning))?;
         }
         Ok(())
     }

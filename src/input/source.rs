@@ -52,10 +52,11 @@ pub enum FileFormat {
 /// the truth.
 ///
 /// A source can be written down and read back, in JSON without loss: it holds no open file, its decimals are written as text, and
-/// none of its floating-point numbers is infinite or NaN. Its path must be UTF-8 for that.
+/// none of its floating-point numbers is infinite or NaN.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Source {
     /// The file, or the public name of one of another machine.
+    #[serde(with = "crate::path_text")]
     pub path: PathBuf,
     /// Its size in bytes when it was opened. Decoding fails if the size changes later.
     pub size: u64,

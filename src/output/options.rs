@@ -14,6 +14,7 @@ use std::path::PathBuf;
 #[serde(deny_unknown_fields)]
 pub struct OutputOptions {
     /// The directory to write to, relative to the configuration file.
+    #[serde(with = "crate::path_text")]
     pub directory: PathBuf,
     /// Where vertex colours come from.
     #[serde(default)]

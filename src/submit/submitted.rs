@@ -16,6 +16,7 @@ pub struct Submitted {
     /// A command that shows how they fare.
     pub watch: String,
     /// Where the tasks' logs are, if they are files.
+    #[serde(serialize_with = "crate::path_text::shown_if_any")]
     pub logs: Option<PathBuf>,
 }
 

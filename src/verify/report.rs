@@ -57,6 +57,7 @@ pub(super) struct ReportedPoints {
 /// An input that was left out.
 #[derive(Clone, Debug, Deserialize)]
 pub(super) struct SkippedFile {
+    #[serde(deserialize_with = "crate::path_text::deserialize")]
     pub(super) file: PathBuf,
 }
 

@@ -28,6 +28,7 @@ use crate::{Error, Result};
 #[derive(Serialize)]
 pub struct View {
     /// The output directory.
+    #[serde(serialize_with = "crate::path_text::shown")]
     pub directory: PathBuf,
     /// The address of the page.
     pub url: String,

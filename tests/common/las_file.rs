@@ -38,7 +38,7 @@ impl LasFile {
     }
 
     fn header_size(&self) -> usize {
-        [227, 227, 227, 235, 375][self.minor as usize]
+        [227, 227, 227, 235, 375, 393][self.minor as usize]
     }
 
     fn header(&self, vlr_bytes: usize, compressed: bool) -> Vec<u8> {

@@ -29,6 +29,26 @@ fn a_wrong_table_is_not_trusted() {
 }
 
 #[test]
+fn a_table_with_a_wrong_bit_anywhere_leads_to_no_wrong_point() {
+    for (format, minor) in [(3, 2), (7, 4)] {
+        let file = LasFile::new(minor, format, 0, 1000);
+        let sound = file.laz(&[300], false);
+        let at = points_at(&sound);
+        let table = u64::from_le_bytes(sound[at..at + 8].try_into().unwrap()) as usize;
+        for bit in 4 * 8..(sound.len() - table) * 8 {
+            let mut wrong = sound.clone();
+            wrong[table + bit / 8] ^= 1 << (bit % 8);
+            assert_reads(&file, &format!("format {format}, bit {bit}"), &wrong);
+        }
+        for length in 1..sound.len() - table {
+            let mut zeros = sound.clone();
+            zeros[table..table + length].fill(0);
+            assert_reads(&file, &format!("format {format}, {length} zeros"), &zeros);
+        }
+    }
+}
+
+#[test]
 fn a_damaged_chunk_loses_only_its_own_points() {
     let file = LasFile::new(4, 7, 0, 1000);
     let mut bytes = file.laz(&[300], false);

@@ -1,4 +1,4 @@
-//! `gdt-batch init` writes configurations that run as they are, and that say what is in the clouds.
+//! `gdt-batch init` writes configurations that run as they are, unless points are lost, and that say what is in the clouds.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -23,6 +23,8 @@ struct Expected {
     surface: &'static str,
     /// The keys of lines that are needed.
     needed: &'static [&'static str],
+    /// Whether points are lost, so that the job stops until the user allows the loss.
+    stops: bool,
 }
 
 const FOOT: f64 = 0.3048;
@@ -34,8 +36,15 @@ const METRES_IN_XY: &str = "metre in x and y";
 const NO_CLASSES: &str = "the points have no classes";
 /// Files of PDAL's stadium: a foot is no metre, but two of them name no system.
 const STADIUM: &str = "26 % ground";
-const UNKNOWN: Expected =
-    Expected { files: &[], metres: [1.0, 1.0], unit: NO_UNIT, crs: None, surface: NO_CLASSES, needed: &[] };
+const UNKNOWN: Expected = Expected {
+    files: &[],
+    metres: [1.0, 1.0],
+    unit: NO_UNIT,
+    crs: None,
+    surface: NO_CLASSES,
+    needed: &[],
+    stops: false,
+};
 
 /// LAS, LAZ, COPC, texts, feet, degrees, pixels that say they are degrees, two systems, and damaged files.
 const CLOUDS: [Expected; 21] = [
@@ -109,19 +118,14 @@ const CLOUDS: [Expected; 21] = [
         surface: "100 % ground",
         ..UNKNOWN
     },
-    Expected {
-        files: &["bad/1.2-with-color-clipped.las"],
-        surface: STADIUM,
-        needed: &["max_malformed_fraction"],
-        ..UNKNOWN
-    },
-    Expected { files: &["bad/garbage_nVariableLength.las"], needed: &["max_malformed_fraction"], ..UNKNOWN },
+    Expected { files: &["bad/1.2-with-color-clipped.las"], surface: STADIUM, stops: true, ..UNKNOWN },
+    Expected { files: &["bad/garbage_nVariableLength.las"], stops: true, ..UNKNOWN },
     Expected {
         files: &["bad/truncated-mid-chunk.laz"],
         unit: METRES_IN_XY,
         crs: Some("NAD83(CSRS) / MTM zone 7"),
         surface: "19 % ground",
-        needed: &["max_malformed_fraction"],
+        stops: true,
         ..UNKNOWN
     },
     Expected {
@@ -150,8 +154,18 @@ fn configurations_of_real_clouds_run_as_they_are_and_say_what_they_are() {
         let files: Vec<PathBuf> = expected.files.iter().map(|name| data.join(name)).collect();
         let mut arguments = vec!["init", "--json"];
         arguments.extend(files.iter().map(|file| file.to_str().unwrap()));
-        let new = gdt_batch(folder.path(), &arguments).succeeded().json();
-        let configuration = fs::read_to_string(folder.path().join("job.toml")).unwrap();
+        let said = gdt_batch(folder.path(), &arguments);
+        if expected.stops {
+            said.refused(3, &["is written, but its job would stop", "max_malformed_fraction"]);
+        }
+        let new = said.json();
+        let mut configuration = fs::read_to_string(folder.path().join("job.toml")).unwrap();
+        assert_eq!(configuration.contains("\n#max_malformed_fraction = "), expected.stops, "{configuration}");
+        if expected.stops {
+            gdt_batch(folder.path(), &["--quiet", "job.toml"]).refused(3, &["max_malformed_fraction"]);
+            configuration = configuration.replace("#max_malformed_fraction", "max_malformed_fraction");
+            fs::write(folder.path().join("job.toml"), &configuration).unwrap();
+        }
         let report = gdt_batch(folder.path(), &["--json", "--quiet", "job.toml"]).succeeded().json();
         let what = format!("{:?}: {configuration}", expected.files);
         assert!(number(&report["sites"]) > 8, "{what}");

@@ -48,6 +48,8 @@ mod limits;
 mod manual;
 mod many_tiles;
 mod messages;
+#[cfg(unix)]
+mod names;
 mod overlap;
 mod parts;
 mod preflight;

@@ -176,6 +176,14 @@ fn what_no_server_can_hand_out_is_refused() {
     refused(&server.url("/none.laz"), 2, &["there is no file", "/none.laz", "404"]);
     refused(&server.url("/a/*.laz"), 2, &["[input] files", "name each one"]);
     refused("http://user:secret@127.0.0.1/a.laz", 2, &["a user and a password is refused"]);
+    for (place, words) in [
+        ("Location: file:///etc/hosts", "the server redirects "),
+        ("Location: file://host/a.laz", "the server redirects from http to file, which is not followed"),
+        ("Location: ftp://host/a.laz", "the server redirects from http to ftp, which is not followed"),
+    ] {
+        server.answer(move |_, _| Answer::Status(302, place));
+        refused(&server.url("/a/cloud.las"), 1, &[words]);
+    }
     refused("gs://bucket/a.laz", 2, &["not by gs://"]);
     refused("http://127.0.0.1:1/a.laz", 1, &["127.0.0.1:1 refuses connections"]);
     refused("https://no-such-host.invalid/a.laz", 1, &["no-such-host.invalid", "look after the network"]);
@@ -279,6 +287,8 @@ fn buckets_are_listed_and_requests_signed() {
     with_key("s3://bucket/clouds/*.las").run().refused(2, &["there is no file s3://bucket/clouds/*.las"]);
     with_key("s3://bucket/clouds/").run().refused(2, &["is a folder", "s3://bucket/clouds/*.laz"]);
     with_key("s3://bucket/clouds/x.laz").run().refused(2, &["there is no file s3://bucket/clouds/x.laz", "404"]);
+    server.answer(|_, _| list(&["clouds/c.laz"], true));
+    with_key("s3://bucket/clouds/*.laz").run().refused(2, &["the server repeats parts of the list of the bucket"]);
     let nobody = job("s3://bucket/clouds/c.laz").variable("AWS_ACCESS_KEY_ID", "");
     nobody.run().refused(2, &["AWS_ACCESS_KEY_ID", "AWS_SKIP_SIGNATURE=true"]);
     server.answer(|_, _| Answer::Right);

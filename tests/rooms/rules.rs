@@ -95,14 +95,15 @@ fn broken_rule(arrow: &Arrow) -> Option<&'static str> {
         _ if rule.is_some() => rule.map(|rule| rule.why),
         (Some(from), Some(to)) if from < to => Some("a step imports only from the steps before it"),
         _ if is_from(&"config") && !is_open_to_config(&arrow.to) => {
-            Some("config imports only options, errors, warnings and geometry")
+            Some("config imports only options, errors, warnings, geometry and the text of paths")
         }
         _ => None,
     }
 }
 
 fn is_open_to_config(file: &str) -> bool {
-    file.ends_with("/options.rs") || ["config", "geometry", "error", "warnings"].iter().any(|room| is_in(file, room))
+    file.ends_with("/options.rs")
+        || ["config", "geometry", "error", "warnings", "path_text"].iter().any(|room| is_in(file, room))
 }
 
 fn is_in(file: &str, room: &str) -> bool {

@@ -45,6 +45,8 @@ enum TableError {
     Undecodable(#[from] Panicked),
     #[error("lets chunk {0} reach beyond the points")]
     BeyondPoints(usize),
+    #[error("leaves out {0} bytes of the points, so it is damaged")]
+    LeavesOut(u64),
     /// The file cannot be read. This says nothing about the table.
     #[error(transparent)]
     Unreadable(#[from] Error),
@@ -104,7 +106,8 @@ fn from_table(
         first += kept;
         at = end;
     }
-    Ok((chunks, surplus))
+    // Chunks follow one another up to the table.
+    if at < table_at { Err(TableError::LeavesOut(table_at - at)) } else { Ok((chunks, surplus)) }
 }
 
 /// Returns the position of the chunk table. It is stored before the points or, by writers that cannot seek back, at the end of

@@ -1,4 +1,5 @@
-//! The public header block of a LAS or LAZ file (LAS 1.4 R15, section 2.4). Every field is checked before it is used.
+//! The public header block of a LAS or LAZ file (LAS 1.4 R15, section 2.4; LAS 1.5 appends times, which no terrain needs). Every field is
+//! checked before it is used.
 
 use rust_decimal::Decimal;
 
@@ -12,7 +13,7 @@ use crate::{Error, Result, Warnings};
 /// The size of the header in versions 1.0 to 1.2, the smallest there is.
 const LEAST: usize = 227;
 
-/// The size of the header in version 1.4; no more is read.
+/// The size of the header in version 1.4. Version 1.5 appends 18 bytes, and its drafts 16, which are not read.
 const MOST: usize = 375;
 
 /// The most points of a file: their numbers must fit 40 bits.
@@ -26,7 +27,7 @@ const MOST_STEPS: Decimal = Decimal::from_parts(0, 1 << 21, 0, false, 0);
 pub(crate) enum HeaderError {
     #[error("is too short for a LAS header: {0} bytes of at least {LEAST}; copy it again")]
     TooShort(u64),
-    #[error("has LAS version {0}.{1}, but only versions 1.0 to 1.4 can be read; write it again in one of those")]
+    #[error("has LAS version {0}.{1}, but only versions 1.0 to 1.5 can be read; write it again in one of those")]
     Version(u8, u8),
     #[error("says its header has {size} bytes, but a header of LAS 1.{minor} has {least}; the file is damaged")]
     Size { size: u16, minor: u8, least: usize },
@@ -50,7 +51,7 @@ pub(crate) enum HeaderError {
 /// What the header says.
 #[derive(Clone, Debug)]
 pub(crate) struct LasHeader {
-    /// The minor version, 0 to 4.
+    /// The minor version, 0 to 5.
     pub(crate) minor: u8,
     /// The point format, 0 to 10, without the compression bits.
     pub(crate) format: u8,
@@ -95,7 +96,7 @@ impl LasHeader {
         }
         let minor = version(bytes)?;
         let size = uint16(bytes, 94);
-        let least = [LEAST, LEAST, LEAST, 235, MOST][minor as usize];
+        let least = [LEAST, LEAST, LEAST, 235, MOST, MOST][minor as usize];
         if (size as usize) < least || bytes.len() < least {
             return Err(HeaderError::Size { size, minor, least });
         }
@@ -130,7 +131,7 @@ impl LasHeader {
 
 fn version(bytes: &[u8]) -> std::result::Result<u8, HeaderError> {
     match (bytes[24], bytes[25]) {
-        (1, minor @ 0..=4) => Ok(minor),
+        (1, minor @ 0..=5) => Ok(minor),
         (major, minor) => Err(HeaderError::Version(major, minor)),
     }
 }

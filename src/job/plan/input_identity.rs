@@ -17,6 +17,7 @@ pub struct InputIdentities(Vec<InputIdentity>);
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct InputIdentity {
     /// As messages and the report name it. It depends on the working directory.
+    #[serde(with = "crate::path_text")]
     path: PathBuf,
     /// Its place, whatever the working directory, and however many links lead there. It changes with a folder that is moved.
     place: String,

@@ -59,16 +59,6 @@ pub fn open_all(options: &InputOptions, choice: &RowChoice) -> Result<(Vec<Sourc
     Ok((sources, skipped))
 }
 
-/// Returns a warning for every file beside the inputs that no pattern can name, because its name is not UTF-8.
-pub fn unreadable_names(options: &InputOptions) -> Vec<String> {
-    let folders: HashSet<&Path> = options.files.iter().filter_map(|p| Path::new(p).parent()).collect();
-    let entries = folders.into_iter().filter_map(|folder| std::fs::read_dir(folder).ok()).flatten().flatten();
-    let mut names: Vec<PathBuf> = entries.map(|e| e.path()).filter(|p| p.to_str().is_none() && p.is_file()).collect();
-    names.sort_unstable();
-    let warning = |name: PathBuf| format!("{}: left out, because its name is not UTF-8; rename it", name.display());
-    names.into_iter().map(warning).collect()
-}
-
 /// Checks that the files hold enough of the records that they promise: all files together, or each by itself where bad files are
 /// to be left out.
 ///

@@ -121,6 +121,7 @@ fn range_of_colors(max_rgb: u16) -> u8 {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SkippedInput {
     /// The file.
+    #[serde(with = "crate::path_text")]
     pub file: PathBuf,
     /// What is wrong with it.
     pub why: String,

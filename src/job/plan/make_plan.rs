@@ -13,7 +13,7 @@ use crate::job::plan::budget::network_memory;
 use crate::job::plan::common_crs::{common_crs, horizontal_unit};
 use crate::job::plan::extent::{Extent, SourceBox, to_float};
 use crate::job::plan::height_range::HeightSample;
-use crate::job::plan::inputs::{check_missing_records, open_all, unreadable_names};
+use crate::job::plan::inputs::{check_missing_records, open_all};
 use crate::job::plan::job_plan::{Claims, Plan, PlannedInput, SkippedInput, decoded_records};
 use crate::job::plan::lattice_choice::{LatticeCoarsening, LatticeWish, choose_lattice, fineness};
 use crate::job::plan::text_inputs::{
@@ -99,7 +99,6 @@ fn try_plan(
     coarsening: LatticeCoarsening,
 ) -> Result<(Plan, Vec<(PointRules, Bounds<2>)>)> {
     let mut warnings = Warnings::default();
-    warnings.extend(unreadable_names(&options.input));
     sources.iter().for_each(|source| warnings.extend_from_file(&source.path, &source.warnings));
     warnings.shorten(MAX_WARNINGS);
     let records = sources.iter().map(|s| s.records).sum();

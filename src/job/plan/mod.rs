@@ -15,6 +15,6 @@ pub mod job_plan;
 pub mod lattice_choice;
 pub mod make_plan;
 mod missing_attributes;
-mod named_files;
+pub(crate) mod named_files;
 pub mod no_points;
 pub(crate) mod text_inputs;

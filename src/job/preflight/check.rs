@@ -21,6 +21,7 @@ use crate::job::publish::height_offset_check::check_height_offset;
 use crate::job::publish::one_file_limits::MAX_TRIANGLES_IN_ONE_FILE;
 use crate::job::publish::raster::check::{check_raster, planned_raster};
 use crate::job::report::skipped_inputs::write_skipped;
+use crate::terminal::one_line;
 use crate::{Error, Result, Warnings, address_space};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -30,7 +31,7 @@ use std::{fmt, io};
 #[derive(Clone, Debug, Serialize)]
 pub struct Preflight {
     /// Every input: path, format, records.
-    pub files: Vec<(PathBuf, String, u64)>,
+    pub files: Vec<(String, String, u64)>,
     /// Records in all inputs.
     pub records: u64,
     /// How many points the job keeps at most, as far as headers and a sample of the points tell.
@@ -74,6 +75,7 @@ pub struct Preflight {
     /// Bytes that the results of an earlier job take in the output directory. They stay until the new ones are whole.
     pub disk_earlier: u64,
     /// The output directory.
+    #[serde(serialize_with = "crate::path_text::shown")]
     pub output: PathBuf,
     /// The backend that triangulates.
     pub backend: String,
@@ -149,7 +151,8 @@ impl Preflight {
         warnings.extend(plan.sample.notes.iter().cloned().map(of_sample));
         warnings.extend(unclear_returns(&options.input, &plan.sample).map(of_sample));
         let disk = DiskEstimate::of(plan, kept, MAX_TRIANGLES_IN_ONE_FILE);
-        let describe = |source: &Source| (source.path.clone(), format!("{:?}", source.format), source.records);
+        let describe =
+            |source: &Source| (source.path.display().to_string(), format!("{:?}", source.format), source.records);
         Preflight {
             files: plan.inputs.iter().map(|input| describe(&input.source)).collect(),
             records: plan.records,
@@ -227,7 +230,7 @@ impl Preflight {
 impl fmt::Display for Preflight {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (path, format, records) in &self.files {
-            writeln!(f, "{:<8} {:>14} points  {}", format, grouped(*records), path.display())?;
+            writeln!(f, "{:<8} {:>14} points  {}", format, grouped(*records), one_line(path))?;
         }
         let mut row = |name: &str, value: String| writeln!(f, "{name:<18} {value}");
         row("points", grouped(self.records))?;
@@ -264,7 +267,7 @@ impl fmt::Display for Preflight {
             )?;
         }
         for warning in self.warnings.iter() {
-            writeln!(f, "warning: {warning}")?;
+            writeln!(f, "warning: {}", one_line(warning))?;
         }
         write_skipped(f, self.files.len(), &self.skipped)
     }

@@ -9,6 +9,7 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct BreaklineReport {
     /// The files of lines. Ids of features have the numbers of their files in this list, from 0 on.
+    #[serde(serialize_with = "crate::path_text::all_shown")]
     pub files: Vec<PathBuf>,
     /// Features that lie outside the box of the points. No other figure counts them.
     pub features_outside: u64,

@@ -2,6 +2,7 @@
 
 use crate::job::phase::Phase;
 use crate::job::report::job_report::SlowestPart;
+use crate::terminal::name;
 use serde::Serialize;
 use std::fmt;
 use std::path::PathBuf;
@@ -10,6 +11,7 @@ use std::path::PathBuf;
 #[derive(Debug, Serialize)]
 pub struct JobStatus {
     /// The output directory.
+    #[serde(serialize_with = "crate::path_text::shown")]
     pub output: PathBuf,
     /// What is to be done.
     pub state: JobState,
@@ -62,7 +64,7 @@ impl fmt::Display for JobStatus {
             JobState::LeftToPublish => "not done part by part: the phase publish does all of it",
             JobState::Done => "done: all results are in place",
         };
-        writeln!(f, "{}: {state}", self.output.display())?;
+        writeln!(f, "{}: {state}", name(&self.output))?;
         for PhaseStatus { phase, done, of, missing_parts, missing_tasks } in &self.phases {
             write!(f, "{:<8} {done:>6} of {of}", phase.name())?;
             match missing_tasks {

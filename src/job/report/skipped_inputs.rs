@@ -1,6 +1,7 @@
 //! The inputs that are left out, in words.
 
 use crate::job::plan::job_plan::SkippedInput;
+use crate::terminal::{name, one_line};
 use std::fmt;
 
 /// Writes how many inputs are left out, and each of them with its reason. Writes nothing if none is.
@@ -8,7 +9,7 @@ pub(crate) fn write_skipped(f: &mut fmt::Formatter<'_>, used: usize, skipped: &[
     if let Some(summary) = skipped_summary(used, skipped) {
         writeln!(f, "\n{summary}:")?;
     }
-    skipped.iter().try_for_each(|bad| writeln!(f, "  {}: {}", bad.file.display(), bad.why))
+    skipped.iter().try_for_each(|bad| writeln!(f, "  {}: {}", name(&bad.file), one_line(&bad.why)))
 }
 
 /// Returns a sentence about the inputs that are left out; `None` if none is. `used` is the number of the others.

@@ -6,6 +6,7 @@ use crate::job::progress::number_text::{grouped, precise_mebibytes};
 use crate::job::report::breakline_report::BreaklineReport;
 use crate::job::report::job_report::{Report, SlowestPart, StepSeconds};
 use crate::job::report::skipped_inputs::write_skipped;
+use crate::terminal::one_line;
 use crate::triangulation::TriangulationCounts;
 use std::fmt;
 
@@ -139,7 +140,7 @@ impl fmt::Display for Report {
         let peak = self.peak_memory.map_or("unknown".into(), precise_mebibytes);
         row("peak memory", format!("{peak} of {}", precise_mebibytes(self.memory_limit)))?;
         for warning in self.warnings.iter() {
-            writeln!(f, "warning: {warning}")?;
+            writeln!(f, "warning: {}", one_line(warning))?;
         }
         write_skipped(f, self.files, &self.skipped)
     }

@@ -1,5 +1,6 @@
 //! `[output] height_offset`.
 
+use crate::path_text::{decoded, encoded};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -41,7 +42,7 @@ impl TryFrom<toml::Value> for HeightOffset {
     fn try_from(value: toml::Value) -> Result<HeightOffset, String> {
         let metres = match value {
             toml::Value::String(text) if text == "egm96" => return Ok(HeightOffset::Egm96),
-            toml::Value::String(text) if is_grid(&text) => return Ok(HeightOffset::Grid(text.into())),
+            toml::Value::String(text) if is_grid(&text) => return Ok(HeightOffset::Grid(decoded(&text).into())),
             toml::Value::Integer(metres) => metres as f64,
             toml::Value::Float(metres) => metres,
             _ => f64::NAN,
@@ -61,7 +62,7 @@ impl From<HeightOffset> for toml::Value {
         match offset {
             HeightOffset::Metres(metres) => toml::Value::Float(metres),
             HeightOffset::Egm96 => toml::Value::String("egm96".into()),
-            HeightOffset::Grid(path) => toml::Value::String(path.to_string_lossy().into_owned()),
+            HeightOffset::Grid(path) => toml::Value::String(encoded(path.as_os_str())),
         }
     }
 }

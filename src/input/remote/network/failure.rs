@@ -45,7 +45,7 @@ impl Failure {
     /// Returns the failure of a request that got no answer from `host`.
     pub(crate) fn of_request(error: ureq::Error, host: &str) -> Failure {
         use ureq::Error::{
-            ConnectProxyFailed, HostNotFound, Io, Protocol, RequireHttpsOnly, Rustls, Timeout, TooManyRedirects,
+            BadUri, ConnectProxyFailed, HostNotFound, Io, Protocol, RequireHttpsOnly, Rustls, Timeout, TooManyRedirects,
         };
         use ureq::Timeout::{Connect, Resolve};
         let (kind, what) = match error {
@@ -78,9 +78,12 @@ impl Failure {
             Io(error) => (FailureKind::Passing, format!("the connection failed: {error}")),
             ConnectProxyFailed(_) => (FailureKind::Unreachable, "the proxy did not make the connection".into()),
             TooManyRedirects => (FailureKind::Refused, "the server redirects without an end".into()),
-            RequireHttpsOnly(_) => (
+            // The URL of a job has a scheme that is read, so a redirect led to this one.
+            RequireHttpsOnly(place) => (FailureKind::Refused, not_followed("https", &place)),
+            BadUri(what) if what.starts_with("unknown scheme") => (FailureKind::Refused, not_followed("http", &what)),
+            Protocol(error) if error.to_string().contains("location header") => (
                 FailureKind::Refused,
-                "the server redirects from https to http, which is not followed: name the place itself".into(),
+                "the server redirects to what is no URL of http:// or https://: correct the URL".into(),
             ),
             Protocol(error) => (FailureKind::Passing, format!("the answer is no HTTP: {error}")),
             // Others may name the URL with its query.
@@ -102,6 +105,19 @@ impl Failure {
     pub(crate) fn into_read_error(self, name: &Path, part: &str) -> Error {
         Error::io("read", name)(std::io::Error::other(format!("{part}{}", self.what)))
     }
+}
+
+/// Says why a redirect is not followed. `place` is the URL that it leads to, or ends with its scheme.
+fn not_followed(from: &str, place: &str) -> String {
+    let before = place.split("://").next().unwrap_or_default();
+    let scheme = before.rsplit(|c: char| !c.is_ascii_alphanumeric() && !"+-.".contains(c)).next().unwrap_or_default();
+    let why = match scheme {
+        "http" => "which is not safe and not followed: name the place itself, with http://",
+        _ => {
+            "which is not followed, because files are read by https:// and http:// only: correct the URL, or ask who runs the server"
+        }
+    };
+    format!("the server redirects from {from} to {scheme}, {why}")
 }
 
 /// Says why there is no safe connection.

@@ -1,6 +1,7 @@
 //! The objects of a bucket that a pattern means.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashSet};
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io::Read;
 
 use glob::{MatchOptions, Pattern};
@@ -20,10 +21,17 @@ const RULES: MatchOptions =
 const SPECIAL: [char; 3] = ['*', '?', '['];
 
 /// The longest answer that is read; a thousand keys of the greatest length are shorter.
-const LONGEST: u64 = 1 << 24;
+const LONGEST: u64 = 1 << 23;
 
-/// Objects may appear while the list is read, but no list goes on for ever.
-const MOST_PAGES: usize = 100_000;
+/// The most elements and texts of an answer; a thousand objects have some ten thousand.
+const MOST_NODES: u32 = 200_000;
+
+/// The most answers of a list, of a thousand objects each. Objects may appear while the list is read, but no list goes on for ever.
+const MOST_PAGES: usize = 20_000;
+
+/// The most objects that a pattern may match, and the most bytes of their names: they are held in memory.
+const MOST_OBJECTS: usize = 1_000_000;
+const MOST_BYTES: usize = 1 << 26;
 
 /// One answer of S3: a thousand keys at most.
 struct Page {
@@ -44,23 +52,68 @@ pub(crate) fn files_at(name: &str) -> Result<Vec<String>> {
     let literal = &key[..key.find(SPECIAL).unwrap_or(key.len())];
     // Without a pattern in a folder's name, one folder is enough.
     let is_in_one_folder = !key[literal.len()..].contains('/') && !key.contains("**");
-    let mut found = BTreeSet::new();
+    let wanted = |key: &String| !key.ends_with('/') && pattern.matches_with(key, RULES);
+    let mut list = ObjectList::default();
     let mut next = None;
-    for _ in 0..MOST_PAGES {
+    loop {
         let address = Address::List { bucket: bucket.into(), query: query(literal, is_in_one_folder, next.as_deref()) };
-        let page = page(address, name)?;
-        found.extend(page.keys.into_iter().filter(|key| !key.ends_with('/') && pattern.matches_with(key, RULES)));
-        next = page.next;
+        next = list.add(page(address, name)?, wanted).map_err(|error| Error::Config(format!("{name}: {error}")))?;
         if next.is_none() {
-            break;
+            return Ok(list.found.into_iter().map(|key| format!("s3://{bucket}/{key}")).collect());
         }
     }
-    if next.is_some() {
-        return Err(Error::Config(format!(
-            "{name}: the bucket has too many objects there: name a folder, or fewer files"
-        )));
+}
+
+/// Why a list is not read to its end.
+#[derive(Debug, thiserror::Error)]
+enum ListError {
+    #[error("the server repeats parts of the list of the bucket, so the list never ends: name each object by itself")]
+    Repeated,
+    #[error(
+        "the list of the bucket has more than {MOST_PAGES} pages of objects: write more of their names before the first star"
+    )]
+    Pages,
+    #[error(
+        "more than {MOST_OBJECTS} objects match, or their names have more than {} MiB: make several jobs, each with a pattern for fewer",
+        MOST_BYTES >> 20
+    )]
+    Objects,
+}
+
+/// The objects that were found, and what tells a list that never ends.
+#[derive(Default)]
+struct ObjectList {
+    found: BTreeSet<String>,
+    /// The bytes of the names in `found`.
+    bytes: usize,
+    pages: usize,
+    /// Hashes of the tokens that lead to next pages, and of the last key of every page.
+    known: HashSet<u64>,
+}
+
+impl ObjectList {
+    /// Adds the wanted keys of a page, and returns the token of the next one.
+    fn add(&mut self, page: Page, wanted: impl Fn(&String) -> bool) -> std::result::Result<Option<String>, ListError> {
+        self.pages += 1;
+        let marks =
+            page.keys.last().map(|key| ("key", key)).into_iter().chain(page.next.as_ref().map(|next| ("next", next)));
+        for mark in marks {
+            let mut hasher = DefaultHasher::new();
+            mark.hash(&mut hasher);
+            if !self.known.insert(hasher.finish()) {
+                return Err(ListError::Repeated);
+            }
+        }
+        for key in page.keys.into_iter().filter(wanted) {
+            self.bytes += key.len();
+            self.found.insert(key);
+        }
+        match page.next {
+            _ if self.found.len() > MOST_OBJECTS || self.bytes > MOST_BYTES => Err(ListError::Objects),
+            Some(_) if self.pages >= MOST_PAGES => Err(ListError::Pages),
+            next => Ok(next),
+        }
     }
-    Ok(found.into_iter().map(|key| format!("s3://{bucket}/{key}")).collect())
 }
 
 /// Returns the query for a page, with its parameters in the order that signatures want.
@@ -97,7 +150,8 @@ fn page(address: Address, name: &str) -> Result<Page> {
 }
 
 fn parse(text: &str) -> Option<Page> {
-    let document = roxmltree::Document::parse(text).ok()?;
+    let options = roxmltree::ParsingOptions { nodes_limit: MOST_NODES, ..Default::default() };
+    let document = roxmltree::Document::parse_with_options(text, options).ok()?;
     let root = document.root_element();
     if root.tag_name().name() != "ListBucketResult" {
         return None;
@@ -136,6 +190,41 @@ mod tests {
             "<ListBucketResult><IsTruncated>true</IsTruncated><Contents><Key>a</Key></Contents></ListBucketResult>";
         assert!(parse(cut).is_none(), "the rest of the list is lost");
         assert!(parse("<html></html>").is_none() && parse("no list").is_none());
+    }
+
+    fn page_of(keys: &[String], next: Option<&str>) -> Page {
+        Page { keys: keys.to_vec(), next: next.map(str::to_string) }
+    }
+
+    #[test]
+    fn a_list_that_repeats_itself_ends() {
+        let [one, two] = ["a", "b"].map(|key| [key.to_string()]);
+        let added = |pages: &[(&[String], &str)]| {
+            let mut list = ObjectList::default();
+            pages
+                .iter()
+                .map(|&(keys, next)| list.add(page_of(keys, Some(next)), |_| true))
+                .find_map(|added| added.err())
+        };
+        assert!(added(&[(&one, "1"), (&two, "2"), (&[], "3"), (&[], "4")]).is_none(), "pages may be empty");
+        for pages in [[(&one[..], "1"), (&two, "1")], [(&one, "1"), (&one, "2")], [(&[], "1"), (&[], "1")]] {
+            assert!(matches!(added(&pages), Some(ListError::Repeated)), "{pages:?}");
+        }
+        assert!(matches!(added(&[(&one, "1"), (&two, "2"), (&[], "1")]), Some(ListError::Repeated)));
+    }
+
+    #[test]
+    fn a_list_that_never_ends_does_not_fill_the_memory() {
+        let mut list = ObjectList::default();
+        let long = |at: usize| [format!("{at}{}", "x".repeat(MOST_BYTES / 50))];
+        let outcome = (0..).find_map(|at| list.add(page_of(&long(at), Some(&at.to_string())), |_| true).err());
+        let error = outcome.unwrap();
+        assert!(matches!(error, ListError::Objects) && list.found.len() == 50, "{error}");
+        assert!(error.to_string().contains("64 MiB"), "{error}");
+        let mut list = ObjectList::default();
+        let pages =
+            (0..).find_map(|at| list.add(page_of(&[], Some(&at.to_string())), |_| true).err().map(|e| (at + 1, e)));
+        assert!(matches!(pages, Some((MOST_PAGES, ListError::Pages))), "{pages:?}");
     }
 
     #[test]

@@ -31,6 +31,7 @@ const SHARE_OF_MEMORY: u64 = 4;
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PlannedBreaklines {
     /// The files of lines; a feature's id has the number of its file here.
+    #[serde(serialize_with = "crate::path_text::all_shown")]
     pub files: Vec<PathBuf>,
     /// What the report says.
     pub findings: Findings,
