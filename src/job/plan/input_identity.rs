@@ -13,6 +13,17 @@ use std::time::SystemTime;
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct InputIdentities(Vec<InputIdentity>);
 
+/// How an input differs from what it was.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum InputChange {
+    /// In nothing.
+    Nothing,
+    /// It was modified since, though samples of its content are the same.
+    Time,
+    /// In its content.
+    Content,
+}
+
 /// What identifies an input file.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct InputIdentity {
@@ -61,7 +72,7 @@ impl InputIdentities {
         self.0.iter().map(text).collect()
     }
 
-    /// Returns the same without the times of the files: machines may see different ones.
+    /// Returns the same without the times of the files.
     pub(crate) fn without_times(&self) -> InputIdentities {
         let without = |file: &InputIdentity| InputIdentity {
             content: ContentIdentity { modified: 0, ..file.content },
@@ -99,14 +110,26 @@ impl InputIdentities {
         is_same.then(|| RenamedInputs(pairs.filter(|(old, new)| old != new).collect()))
     }
 
-    /// Tells whether the input that had the path `known` still holds what it did, as far as samples tell. It is at `path` now. Its time
-    /// does not count, because machines may see different ones.
+    /// Returns how the input that had the path `known` when the job was `begun` differs from what it was. It is at `path` now.
     ///
     /// # Errors
     /// [`Error::Io`] if it cannot be read.
-    pub(crate) fn has_same_content(&self, known: &Path, path: &Path) -> Result<bool> {
+    pub(crate) fn change_of(&self, known: &Path, path: &Path, begun: SystemTime) -> Result<InputChange> {
         let samples = FileSamples::of(path)?;
-        Ok(self.0.iter().any(|file| file.path == known && file.content.samples == samples))
+        let mut known = self.0.iter().filter(|file| file.path == known);
+        Ok(match known.find(|file| file.content.samples == samples) {
+            None => InputChange::Content,
+            Some(file) if file.content.is_modified(path, begun) => InputChange::Time,
+            Some(_) => InputChange::Nothing,
+        })
+    }
+
+    /// Returns the paths of those files that seem to have been modified since a job was `begun` with the files `planned`, which had the same
+    /// contents in the same order.
+    pub(crate) fn modified_since(&self, planned: &InputIdentities, begun: SystemTime) -> Vec<String> {
+        let pairs = self.0.iter().zip(&planned.0);
+        let modified = pairs.filter(|(now, planned)| planned.content.is_modified(&now.path, begun));
+        modified.map(|(now, _)| now.path.display().to_string()).collect()
     }
 
     /// Returns what the inputs are called by now. They must have the same contents in the same order as `earlier`.
@@ -166,9 +189,22 @@ impl ContentIdentity {
             return Ok(ContentIdentity { samples, modified: 0 });
         }
         let data = path.metadata().map_err(Error::io("read", path))?;
-        let modified = data.modified().ok().and_then(|time| time.duration_since(SystemTime::UNIX_EPOCH).ok());
-        Ok(ContentIdentity { samples, modified: modified.map_or(0, |age| age.as_secs()) })
+        Ok(ContentIdentity { samples, modified: data.modified().map_or(0, seconds) })
     }
+
+    /// Tells whether the file, which is at `path` now, seems to have been modified since a job was `begun` with this content. Only a time after
+    /// that counts: machines and file systems tell other times of the same file, but hardly a later one.
+    fn is_modified(&self, path: &Path, begun: SystemTime) -> bool {
+        let Some(now) = path.metadata().ok().and_then(|data| data.modified().ok()) else { return false };
+        // With a clock that is ahead, a file has its time from the future at both times.
+        let is_other = seconds(now) != self.modified || now.duration_since(begun).is_ok_and(|age| age.as_secs() == 0);
+        now > begun && is_other
+    }
+}
+
+/// Returns the whole seconds since 1970.
+fn seconds(time: SystemTime) -> u64 {
+    time.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |age| age.as_secs())
 }
 
 #[cfg(test)]
