@@ -63,6 +63,7 @@ impl KnownResults {
         if content(waits)? == content(place)? {
             return Ok(());
         }
-        Err(Error::Config(format!("{} came during the job, and no job wrote it: move it away", place.display())))
+        let what = "came during the job, and no job wrote it: move it away, and run the same command again";
+        Err(Error::Config(format!("{} {what}", place.display())))
     }
 }

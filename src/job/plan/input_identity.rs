@@ -210,6 +210,7 @@ fn seconds(time: SystemTime) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::time::Duration;
 
     fn identities(files: &[(&str, u64)]) -> InputIdentities {
         let content = |samples| ContentIdentity { samples: FileSamples { bytes: 1, samples }, modified: 2 };
@@ -246,5 +247,35 @@ mod tests {
         let mut path = PathBuf::from("b");
         renamed.rename(&mut path);
         assert_eq!(path, Path::new("a"));
+    }
+
+    #[test]
+    fn only_a_time_after_the_plan_tells_of_an_edit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("cloud.csv");
+        std::fs::write(&path, "1,2,3\n").unwrap();
+        let begun = SystemTime::UNIX_EPOCH + Duration::from_secs(1_700_000_000);
+        let at = |time: SystemTime| {
+            let file = std::fs::File::options().write(true).open(&path).unwrap();
+            file.set_modified(time).unwrap();
+            ContentIdentity::of(&path).unwrap()
+        };
+        let (second, year) = (Duration::from_secs(1), Duration::from_secs(31_536_000));
+        for (planned, now, is_modified) in [
+            (begun - year, begun - year, false),
+            // Another machine, or a copy from before.
+            (begun - year, begun - second, false),
+            (begun - year, begun + year, true),
+            (begun - second / 2, begun + second / 2, true),
+            // The plan and the edit are in one second.
+            (begun, begun + second / 4, true),
+            // A clock that was ahead wrote the file.
+            (begun + year, begun + year, false),
+            (begun + year, begun + year + second, true),
+        ] {
+            let planned = at(planned);
+            at(now);
+            assert_eq!(planned.is_modified(&path, begun), is_modified, "{planned:?} {now:?}");
+        }
     }
 }
