@@ -139,6 +139,9 @@ pub enum CliCommand {
         /// The number of a submission that starts the job over, as `submit --restart` gives it: what was done before does not count.
         #[arg(long, value_name = "NUMBER", default_value_t = 0, hide_default_value = true)]
         submission: u64,
+        /// Stop when standard input ends. The engine `local` holds its other end, so no task outlives the engine.
+        #[arg(long, hide = true)]
+        until_stdin_ends: bool,
     },
     /// Send a large job to an engine that does its tasks.
     ///

@@ -5,7 +5,7 @@ use std::panic::Location;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock};
 
-/// Whether a signal has come. Signals concern the whole process, so this is global.
+/// Whether a signal has come, or the end of standard input. Both concern the whole process, so this is global.
 static STOP: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 
 /// Makes Ctrl-C, SIGTERM and the hangup of the terminal (unless `nohup` says to ignore it) set what [`check`] sees; a second signal
@@ -27,6 +27,21 @@ pub fn listen() -> Result<()> {
     signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default())
         .map_err(Error::io("listen to the signals of", "the system"))?;
     Ok(())
+}
+
+/// Makes the end of standard input set what [`check`] sees. The process that started this one holds the other end, and the system closes it
+/// with that process, however it ends.
+///
+/// # Errors
+/// [`Error::Memory`] if no thread can be started.
+pub fn listen_to_stdin() -> Result<()> {
+    let wait = || {
+        // An error is an end too.
+        let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
+        STOP.store(true, Ordering::Relaxed);
+    };
+    let thread = std::thread::Builder::new().name("stdin".into()).spawn(wait);
+    thread.map(|_| ()).map_err(|e| Error::Memory(format!("cannot start a thread: {e}")))
 }
 
 #[cfg(unix)]

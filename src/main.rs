@@ -64,7 +64,10 @@ fn run(cli: Cli) -> Result<ExitCode> {
         (Some(CliCommand::Check { config }), _) => check_job(config, print),
         (Some(CliCommand::Verify { directory, memory, input }), _) => verify_output(directory, *memory, input, print),
         (Some(CliCommand::View(options)), _) => view_output(options, print),
-        (Some(CliCommand::Work { config, phase, task, tasks, threads, force, submission }), _) => {
+        (Some(CliCommand::Work { config, phase, task, tasks, threads, force, submission, until_stdin_ends }), _) => {
+            if *until_stdin_ends {
+                interrupt::listen_to_stdin()?;
+            }
             let task = match task {
                 Some(task) => *task,
                 None => Task::of_environment(*phase, *tasks, |name| std::env::var(name).ok())?,

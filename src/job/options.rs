@@ -76,8 +76,8 @@ pub struct Limits {
     pub keep_steps: KeepSteps,
 }
 
-/// Whether points and steps stay on the disk until the job is done, though no later step needs them. If they do, an interrupted job
-/// can go on with another style; if not, it takes less than half of the disk.
+/// Whether points and steps of a job of one part stay on the disk until it is done, though no later step needs them. If they do, an
+/// interrupted job can go on with another style; if not, it takes less than half of the disk. A job of several parts never keeps them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "toml::Value", into = "toml::Value")]
 pub enum KeepSteps {
@@ -95,7 +95,7 @@ impl KeepSteps {
     /// minutes.
     const FEW_POINTS: u64 = 50_000_000;
 
-    /// Tells whether a job of `points` points keeps its steps.
+    /// Tells whether a job of one part and of `points` points keeps its steps.
     pub fn keeps(self, points: u64) -> bool {
         match self {
             KeepSteps::Auto => points < KeepSteps::FEW_POINTS,

@@ -4,7 +4,7 @@
 //! ten seconds at first, then after twice as long each time, up to some minutes. Nothing waits in a pod, so phases that come later
 //! never take the room of those that come first.
 
-use crate::job::phase::PhaseTasks;
+use crate::job::phase::{Phase, PhaseTasks};
 use crate::submit::request::Request;
 use crate::submit::submitted::{SentTasks, Submitted};
 use crate::{Error, Result};
@@ -13,6 +13,7 @@ use serde_json::{Value, json};
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};
+use xxhash_rust::xxh3::xxh3_64;
 
 /// The name of the engine.
 pub(super) const ENGINE: &str = "kubernetes";
@@ -29,6 +30,13 @@ const GRACE_SECONDS: u32 = 60;
 /// The most cores of a pod: as many as a job has threads.
 const MOST_CORES: u16 = 1024;
 
+/// Kubernetes lets a name have 63 characters, with the phase and the number of a task. This is what a name takes of the configuration's,
+/// before the digest.
+const LONGEST_STEM: usize = 31;
+
+/// The annotation of a Job that says of which configuration it is.
+const CONFIGURATION: &str = "gdt-batch/configuration";
+
 /// The options after `--`.
 #[derive(Parser, Debug)]
 #[command(name = "gdt-batch submit --engine kubernetes --", no_binary_name = true, disable_version_flag = true)]
@@ -43,7 +51,7 @@ struct KubernetesOptions {
     /// The path of the configuration in the pods. Default: the one that it has here.
     #[arg(long, value_name = "FILE")]
     config: Option<String>,
-    /// The name of the Jobs, to which that of the phase is added. Default: that of the configuration.
+    /// The name of the Jobs, to which that of the phase is added. Default: that of the configuration, with a digest of its path.
     #[arg(long)]
     name: Option<String>,
     /// The namespace.
@@ -95,7 +103,7 @@ pub fn send(request: &Request, added: &[String]) -> Result<Submitted> {
     kubectl(&options, &["apply", "--filename", "-"], &yaml(&jobs(request, &options))?)?;
     let sent = |tasks: &PhaseTasks| SentTasks {
         phase: tasks.phase,
-        job: options.job_name(request, tasks),
+        job: options.job_name(request, tasks.phase),
         tasks: tasks.missing.clone(),
     };
     let jobs = request.phases.iter().map(sent).collect();
@@ -106,8 +114,7 @@ impl KubernetesOptions {
     fn read(request: &Request, added: &[String]) -> Result<KubernetesOptions> {
         let options = KubernetesOptions::try_parse_from(added).map_err(|e| Error::Config(e.to_string()))?;
         let config = options.config_in_pods(request);
-        let is_seen = |volume: &Volume| Path::new(&config).starts_with(&volume.folder);
-        if !options.volumes.iter().any(is_seen) {
+        if options.volume_of(&config).is_none() {
             return Err(Error::Config(format!(
                 "no volume of the pods has the configuration {config}: name its path in the pods with -- --config FILE"
             )));
@@ -115,12 +122,28 @@ impl KubernetesOptions {
         Ok(options)
     }
 
-    fn name(&self, request: &Request) -> String {
-        self.name.clone().unwrap_or_else(|| request.name())
+    /// Returns the volume that has the file at `path` in the pods.
+    fn volume_of(&self, path: &str) -> Option<&Volume> {
+        let holding = self.volumes.iter().filter(|volume| Path::new(path).starts_with(&volume.folder));
+        holding.max_by_key(|volume| volume.folder.len())
     }
 
-    fn job_name(&self, request: &Request, tasks: &PhaseTasks) -> String {
-        format!("{}-{}", self.name(request), tasks.phase)
+    /// Returns what tells the configuration from all others of the namespace: its claim and its path in the pods.
+    fn identity(&self, request: &Request) -> String {
+        let spelled = || request.config.canonicalize().unwrap_or_else(|_| request.config.clone());
+        let path = self.config.clone().unwrap_or_else(|| spelled().to_string_lossy().into_owned());
+        let claim = self.volume_of(&self.config_in_pods(request)).map_or("", |volume| &volume.claim);
+        format!("{claim}:{path}")
+    }
+
+    /// Returns the name of the Jobs. Two configurations of one name in one namespace have different digests.
+    fn name(&self, request: &Request) -> String {
+        let digest = || xxh3_64(self.identity(request).as_bytes()) as u32;
+        self.name.clone().unwrap_or_else(|| format!("{}-{:08x}", request.name(LONGEST_STEM), digest()))
+    }
+
+    fn job_name(&self, request: &Request, phase: Phase) -> String {
+        format!("{}-{phase}", self.name(request))
     }
 
     fn config_in_pods(&self, request: &Request) -> String {
@@ -153,7 +176,11 @@ fn job(request: &Request, options: &KubernetesOptions, tasks: &PhaseTasks) -> Va
     let mut job = json!({
         "apiVersion": "batch/v1",
         "kind": "Job",
-        "metadata": {"name": options.job_name(request, tasks), "labels": labels},
+        "metadata": {
+            "name": options.job_name(request, tasks.phase),
+            "labels": labels,
+            "annotations": {CONFIGURATION: options.identity(request)},
+        },
         "spec": {
             "completionMode": "Indexed",
             "completions": tasks.missing.len(),
@@ -226,18 +253,34 @@ fn yaml(jobs: &[Value]) -> Result<String> {
     Ok(documents.join("---\n"))
 }
 
-/// Checks that Kubernetes has no Jobs of an earlier submission. It would take new ones of the same names for changes of those, and
-/// refuse them or do nothing.
+/// Checks that Kubernetes has no Jobs of these names. It would take new ones for changes of those, and refuse them or do nothing.
 fn nothing_is_there(request: &Request, options: &KubernetesOptions) -> Result<()> {
-    let found = kubectl(options, &["get", "jobs", "--output", "name", "--selector", &options.selector(request)], "")?;
-    match found.lines().next() {
+    let fields = format!("{{.metadata.name}}{{\"\\t\"}}{{.metadata.annotations.{CONFIGURATION}}}{{\"\\n\"}}");
+    let output = format!("jsonpath={{range .items[*]}}{fields}{{end}}");
+    let found = kubectl(options, &["get", "jobs", "--output", &output, "--selector", &options.selector(request)], "")?;
+    let mut jobs = found.lines().map(|line| line.split_once('\t').unwrap_or((line, "")));
+    let is_in_the_way = |name: &str| Phase::ALL.iter().any(|&phase| options.job_name(request, phase) == name);
+    match jobs.find(|(name, _)| is_in_the_way(name)) {
         None => Ok(()),
-        Some(first) => Err(Error::Engine(format!(
-            "{first} of an earlier submission is still there: wait for its end ({}), then remove it: {}",
-            options.command(request, "get"),
-            options.command(request, "delete")
-        ))),
+        Some((name, configuration)) => Err(in_the_way(request, options, name, configuration)),
     }
+}
+
+/// Returns the error about the Job `name`, which is there already. Only a Job that says so is taken for one of the same `configuration`.
+fn in_the_way(request: &Request, options: &KubernetesOptions, name: &str, configuration: &str) -> Error {
+    let (watch, remove) = (options.command(request, "get"), options.command(request, "delete"));
+    let own = options.identity(request);
+    let another = "give this job another name with -- --name NAME";
+    Error::Engine(match configuration {
+        "" => format!(
+            "job.batch/{name} is there, and does not say of which configuration it is: {another}. If it is an earlier submission of {own}, \
+             wait for its end ({watch}), then remove it: {remove}"
+        ),
+        same if same == own => format!(
+            "job.batch/{name} of an earlier submission is still there: wait for its end ({watch}), then remove it: {remove}"
+        ),
+        other => format!("job.batch/{name} is there, and is of another configuration ({other}): {another}"),
+    })
 }
 
 /// Runs `kubectl` with `input`, and returns what it prints.
@@ -288,7 +331,9 @@ mod tests {
     fn every_phase_is_a_job_with_an_index_for_each_task() {
         let jobs = read(&request("/data/Big job.toml", 5), &[]);
         let names: Vec<&str> = jobs.iter().map(|job| job["metadata"]["name"].as_str().unwrap()).collect();
-        assert_eq!(names, Phase::ALL.map(|phase| format!("big-job-{phase}")));
+        let name = |digest: &str| Phase::ALL.map(|phase| format!("big-job-{digest}-{phase}"));
+        let digest = names[0].split('-').nth(2).unwrap();
+        assert!(digest.len() == 8 && names == name(digest), "{names:?}");
         for (job, phase) in jobs.iter().zip(Phase::ALL) {
             let tasks = phase.tasks(5);
             assert_eq!(job["spec"]["completions"], tasks);
@@ -299,6 +344,55 @@ mod tests {
             assert_eq!(work["command"], json!(command));
             assert_eq!(work["resources"], json!({"requests": {"memory": "4352Mi"}, "limits": {"memory": "4352Mi"}}));
         }
+    }
+
+    #[test]
+    fn every_configuration_has_a_name_and_an_annotation_of_its_own() {
+        let long = "x".repeat(90);
+        let north = format!("/data/{long}north.toml");
+        let south = format!("/data/{long}south.toml");
+        let elsewhere = ["--volume", "archive:/data/old"];
+        let jobs = [
+            ("/data/a/job.toml", &[][..], "survey:/data/a/job.toml"),
+            ("/data/b/job.toml", &[], "survey:/data/b/job.toml"),
+            (&north, &[], &format!("survey:{north}")),
+            (&south, &[], &format!("survey:{south}")),
+            ("/data/old/job.toml", &[], "survey:/data/old/job.toml"),
+            // Another volume has another file at this path.
+            ("/data/old/job.toml", &elsewhere, "archive:/data/old/job.toml"),
+            ("/home/me/job.toml", &["--config", "/data/c/job.toml"], "survey:/data/c/job.toml"),
+        ];
+        let mut names = std::collections::HashSet::new();
+        for (config, added, identity) in jobs {
+            let job = read(&request(config, 9_999), added).pop().unwrap();
+            let metadata = &job["metadata"];
+            assert_eq!(metadata["annotations"][CONFIGURATION], identity);
+            let name = metadata["name"].as_str().unwrap();
+            // With the number of a task it is the name of a host.
+            assert!(name.len() + "-9999".len() <= 63 && names.insert(name.to_owned()), "{name}");
+            let label = metadata["labels"]["app.kubernetes.io/instance"].as_str().unwrap();
+            assert_eq!(name, format!("{label}-publish"));
+        }
+        // From wherever it is submitted, the same file of the pods has the same name.
+        let name = |config: &str, added: &[&str]| read(&request(config, 2), added)[0]["metadata"]["name"].clone();
+        assert_eq!(name("/home/you/job.toml", &["--config", "/data/c/job.toml"]), name("/data/c/job.toml", &[]));
+    }
+
+    #[test]
+    fn a_job_of_somebody_else_is_not_taken_for_an_earlier_submission() {
+        let request = request("/data/job.toml", 2);
+        let options = KubernetesOptions::read(&request, &words(&["--name", "north"])).unwrap();
+        let said = |configuration: &str| in_the_way(&request, &options, "north-plan", configuration).to_string();
+        let own = said("survey:/data/job.toml");
+        assert!(
+            own.contains("of an earlier submission is still there") && own.contains("kubectl delete jobs"),
+            "{own}"
+        );
+        let other = said("survey:/data/other/job.toml");
+        assert!(other.contains("another configuration (survey:/data/other/job.toml)"), "{other}");
+        assert!(other.contains("--name") && !other.contains("delete"), "{other}");
+        let unknown = said("");
+        assert!(unknown.contains("does not say of which configuration") && unknown.contains("--name"), "{unknown}");
     }
 
     #[test]

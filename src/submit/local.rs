@@ -19,7 +19,8 @@ pub struct LocalEngine<'a> {
     json: bool,
 }
 
-/// A task under way. It is asked to stop if nobody waits for it any more.
+/// A task under way. Its standard input is a pipe that ends with this process, however that ends: then the task stops, and keeps what it has
+/// done.
 struct RunningTask {
     number: u32,
     child: Child,
@@ -27,11 +28,8 @@ struct RunningTask {
 
 impl Drop for RunningTask {
     fn drop(&mut self) {
-        if let Ok(None) = self.child.try_wait() {
-            terminate(&self.child);
-            // What it has done is kept, so its end is worth waiting for.
-            let _ = self.child.wait();
-        }
+        // This closes the pipe first. What the task has done is kept, so its end is worth waiting for.
+        let _ = self.child.wait();
     }
 }
 
@@ -112,7 +110,7 @@ impl<'a> LocalEngine<'a> {
 
     fn start(&self, phase: &PhaseTasks, task: u32) -> Result<RunningTask> {
         let mut command = Command::new(&self.request.program);
-        command.args(self.arguments(phase, task)).stdin(Stdio::null());
+        command.args(self.arguments(phase, task)).arg("--until-stdin-ends").stdin(Stdio::piped());
         if phase.phase == Phase::Publish {
             // What it prints is what a job prints.
             command.args(self.json.then_some("--json"));
@@ -158,15 +156,3 @@ impl<'a> LocalEngine<'a> {
 fn code_of(status: ExitStatus) -> u8 {
     status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(1)
 }
-
-/// Asks a task to stop. It keeps what it has done.
-#[cfg(target_os = "linux")]
-fn terminate(child: &Child) {
-    if let Some(process) = i32::try_from(child.id()).ok().and_then(rustix::process::Pid::from_raw) {
-        // It may have ended by itself.
-        let _ = rustix::process::kill_process(process, rustix::process::Signal::TERM);
-    }
-}
-
-#[cfg(not(target_os = "linux"))]
-fn terminate(_: &Child) {}

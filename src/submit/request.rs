@@ -49,11 +49,12 @@ impl Request {
         })
     }
 
-    /// Returns the name of the job: that of its configuration, with nothing but letters, digits and hyphens, as engines like it.
-    pub fn name(&self) -> String {
+    /// Returns the name of the job: that of its configuration, with nothing but letters, digits and hyphens, as engines like it, and no
+    /// longer than `longest`. Jobs may have the same name.
+    pub fn name(&self, longest: usize) -> String {
         let stem = self.config.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
         let plain = |c: char| if c.is_ascii_lowercase() || c.is_ascii_digit() { c } else { '-' };
-        let name: String = stem.chars().map(plain).take(LONGEST_NAME).collect();
+        let name: String = stem.chars().map(plain).take(longest).collect();
         let name = name.trim_matches('-');
         if name.is_empty() { "gdt-batch".into() } else { name.into() }
     }
@@ -78,9 +79,6 @@ impl Request {
 /// What a task takes besides the memory that the configuration allows: a shell, and files that the system has just read ahead.
 const SPARE_MEMORY: u64 = 256 << 20;
 
-/// Kubernetes lets a name have 63 characters, with the phase and the number of a task.
-const LONGEST_NAME: usize = 40;
-
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
@@ -100,10 +98,10 @@ pub(super) mod tests {
 
     #[test]
     fn a_name_is_one_that_engines_take() {
-        let name = |config: &str| request(config, 1).name();
+        let name = |config: &str| request(config, 1).name(40);
         assert_eq!(name("/data/job.toml"), "job");
         assert_eq!(name("/data/Böhmen 2024_v2.toml"), "b-hmen-2024-v2");
         assert_eq!(name("/data/---.toml"), "gdt-batch");
-        assert_eq!(name(&format!("/data/{}.toml", "x".repeat(90))).len(), LONGEST_NAME);
+        assert_eq!(name(&format!("/data/{}.toml", "x".repeat(90))).len(), 40);
     }
 }

@@ -11,6 +11,9 @@ use std::path::{Path, PathBuf};
 /// The name of the engine, with which its folder ends.
 pub(super) const ENGINE: &str = "slurm";
 
+/// The most characters of the name of a job, which is for people alone: numbers tell jobs apart.
+const LONGEST_NAME: usize = 40;
+
 /// The most elements of an array, because every element has a log of its own in one folder.
 const MOST_ELEMENTS: u32 = 1000;
 
@@ -42,7 +45,7 @@ pub(super) fn scripts(request: &Request) -> Vec<Script> {
 
 fn script_text(request: &Request, phase: Phase) -> String {
     let count = request.tasks;
-    let (name, mebibytes) = (request.name(), request.mebibytes());
+    let (name, mebibytes) = (request.name(LONGEST_NAME), request.mebibytes());
     let [program, config] = [&request.program, &request.config].map(|path| quoted(&path.to_string_lossy()));
     let (cores, threads) = match request.threads {
         // As many as Slurm gives.

@@ -35,6 +35,18 @@ pub enum Backend {
 #[serde(try_from = "i64", into = "i64")]
 pub struct MaxPointsPerPart(pub u64);
 
+impl MaxPointsPerPart {
+    /// Returns the most points of a job of one part. With a few more than a part has, two parts would be small.
+    pub fn most_in_one_part(self) -> u64 {
+        self.0 / 2 * 3
+    }
+
+    /// Returns the least number with which a job of `points` points is one part.
+    pub fn for_one_part(points: u64) -> MaxPointsPerPart {
+        MaxPointsPerPart(2 * points.div_ceil(3))
+    }
+}
+
 impl Default for MaxPointsPerPart {
     /// A part of this size takes half a minute of one core and less than a gigabyte of disk, and what parts cost besides their points is
     /// little.

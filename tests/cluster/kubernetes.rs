@@ -2,11 +2,13 @@
 
 use crate::rig::{Rig, succeeded};
 use std::collections::BTreeMap;
+use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use serde_json::Value;
+use tempfile::TempDir;
 
 /// Returns the Jobs that `submit` would send, as they are written and as they are read.
 fn jobs(rig: &Rig, added: &[&str]) -> (String, Vec<Value>) {
@@ -83,7 +85,8 @@ fn unread() -> tempfile::TempDir {
 fn submit(folder: &Path, added: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_gdt-batch"));
     let volume = format!("survey:{}", folder.display());
-    command.current_dir(folder).args(["submit", "out.toml", "--engine", "kubernetes", "--tasks", "7"]).args(added);
+    command.current_dir(folder).arg("submit").arg(folder.join("out.toml"));
+    command.args(["--engine", "kubernetes", "--tasks", "7"]).args(added);
     command.args(["--", "--image", "registry.example/gdt-batch:1", "--volume", &volume, "--namespace", "gis"]);
     command
 }
@@ -113,30 +116,77 @@ fn the_jobs_fit_the_schema_of_kubernetes() {
     }
 }
 
-/// With a `kubectl` that keeps what it gets.
+/// Makes a `kubectl` in `folder` that keeps the YAML that it gets, and that has the Jobs in the file `jobs`, whatever they are asked by.
+/// Returns the path where programs are found.
+fn stub(folder: &Path) -> OsString {
+    let script =
+        "#!/bin/sh\ncase \"$*\" in *' apply '*) cat > applied;; *' get '*) cat jobs 2>/dev/null;; esac; exit 0\n";
+    // A shell writes it: a file that this process has open for writing could not be run yet.
+    let mut write = Command::new("sh");
+    write.args(["-c", "printf %s \"$0\" > kubectl && chmod +x kubectl", script]).current_dir(folder);
+    succeeded(write.output().unwrap());
+    std::env::join_paths([folder, Path::new("/usr/bin"), Path::new("/bin")]).unwrap()
+}
+
+/// Returns the Jobs that were applied as the stub lists them: the name and the configuration of each.
+fn applied(folder: &Path) -> Vec<[String; 2]> {
+    let text = fs::read_to_string(folder.join("applied")).unwrap();
+    let jobs = yaml_serde::Deserializer::from_str(&text);
+    let jobs = jobs.map(|job| -> Value { serde::Deserialize::deserialize(job).unwrap() });
+    jobs.map(|job| {
+        let metadata = &job["metadata"];
+        [&metadata["name"], &metadata["annotations"]["gdt-batch/configuration"]]
+            .map(|text| text.as_str().unwrap().to_owned())
+    })
+    .collect()
+}
+
+/// Lets the stub have these Jobs.
+fn list(folder: &Path, jobs: &[[String; 2]]) {
+    let lines = jobs.iter().map(|[name, configuration]| format!("{name}\t{configuration}\n"));
+    fs::write(folder.join("jobs"), lines.collect::<String>()).unwrap();
+}
+
 #[test]
 fn jobs_are_given_to_kubectl_unless_earlier_ones_are_there() {
     let folder = unread();
-    let input = folder.path().join("input");
-    let script = format!(
-        "#!/bin/sh\ncase \"$*\" in *' apply '*) cat > {0};; *) ls {0} 2>/dev/null;; esac; exit 0\n",
-        input.display()
-    );
-    // A shell writes it: a file that this process has open for writing could not be run yet.
-    let mut write = Command::new("sh");
-    write.args(["-c", "printf %s \"$0\" > kubectl && chmod +x kubectl", &script]).current_dir(folder.path());
-    succeeded(write.output().unwrap());
-    let path = std::env::join_paths([folder.path(), Path::new("/usr/bin"), Path::new("/bin")]).unwrap();
+    let path = stub(folder.path());
     let sent: Value =
         serde_json::from_str(&succeeded(submit(folder.path(), &["--json"]).env("PATH", &path).output().unwrap()))
             .unwrap();
     let names: BTreeMap<&str, &str> = (sent["jobs"].as_array().unwrap().iter())
         .map(|job| (job["phase"].as_str().unwrap(), job["job"].as_str().unwrap()))
         .collect();
-    assert_eq!((names.len(), names["mesh"]), (7, "out-mesh"));
+    assert!(names.len() == 7 && names["mesh"].starts_with("out-") && names["mesh"].ends_with("-mesh"), "{names:?}");
     let shown = succeeded(submit(folder.path(), &["--dry-run"]).output().unwrap());
-    assert_eq!(fs::read_to_string(&input).unwrap().trim_end(), shown.trim_end());
+    assert_eq!(fs::read_to_string(folder.path().join("applied")).unwrap().trim_end(), shown.trim_end());
+    list(folder.path(), &applied(folder.path()));
     let again = submit(folder.path(), &[]).env("PATH", &path).output().unwrap();
     let why = String::from_utf8_lossy(&again.stderr).into_owned();
     assert!(again.status.code() == Some(1) && why.contains("kubectl --namespace gis delete jobs"), "{again:?}");
+}
+
+/// Two people have a configuration of the same name, in folders of their own, and one namespace.
+#[test]
+fn configurations_of_one_name_do_not_meet() {
+    let (first, second) = (unread(), unread());
+    let path = stub(second.path());
+    // The stub's files are where it runs.
+    let named = |folder: &TempDir, name: &[&str]| {
+        submit(folder.path(), &[]).args(name).current_dir(second.path()).env("PATH", &path).output().unwrap()
+    };
+    succeeded(named(&first, &[]));
+    let of_first = applied(second.path());
+    list(second.path(), &of_first);
+    succeeded(named(&second, &[]));
+    let of_second = applied(second.path());
+    assert!(of_first.iter().zip(&of_second).all(|(a, b)| a[0] != b[0] && a[1] != b[1]), "{of_second:?}");
+    // With a name that the user gives, the annotation tells.
+    succeeded(named(&first, &["--name", "north"]));
+    list(second.path(), &applied(second.path()));
+    let refused = named(&second, &["--name", "north"]);
+    let why = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert_eq!(refused.status.code(), Some(1), "{why}");
+    assert!(why.contains("job.batch/north-plan is there, and is of another configuration"), "{why}");
+    assert!(why.contains(first.path().to_str().unwrap()) && !why.contains("delete"), "{why}");
 }

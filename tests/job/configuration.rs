@@ -202,6 +202,39 @@ fn anything_in_the_way_of_the_output_is_named() {
     gdt_batch(folder.path(), &["job.toml"]).succeeded();
 }
 
+/// Only what the list of the earlier job names is this program's to remove or replace.
+#[test]
+fn files_of_others_among_the_results_of_an_earlier_job_are_named_and_stay() {
+    let folder = folder_with_cloud();
+    fs::write(folder.path().join("job.toml"), LEAST).unwrap();
+    let there = |name: &str| folder.path().join("out").join(name);
+    let run = |arguments: &[&str]| gdt_batch(folder.path(), arguments);
+    run(&["job.toml"]).succeeded();
+    for name in
+        ["tiles/123456.glb", "tiles/256/482/123456.glb", "terrain.tif", "tilesets/000000.json", "breaklines.csv"]
+    {
+        fs::create_dir_all(there(name).parent().unwrap()).unwrap();
+        fs::write(there(name), "theirs").unwrap();
+        let report = fs::read(there("report.json")).unwrap();
+        for arguments in [&["job.toml"][..], &["--restart", "job.toml"], &["check", "job.toml"]] {
+            run(arguments).refused(2, &[name, "nothing says that an earlier job wrote it", "move it away"]);
+        }
+        assert_eq!(fs::read(there(name)).unwrap(), b"theirs");
+        assert!(fs::read(there("report.json")).unwrap() == report, "{name}");
+        fs::remove_file(there(name)).unwrap();
+    }
+    // Names that no job writes.
+    fs::write(there("tiles/roof.glb"), "theirs").unwrap();
+    fs::write(there("notes.txt"), "theirs").unwrap();
+    run(&["job.toml"]).succeeded();
+    assert!(there("tiles/roof.glb").exists() && there("notes.txt").exists());
+    // Without the list nothing tells whose the files are.
+    fs::remove_file(there("XXH128SUMS")).unwrap();
+    run(&["job.toml"]).refused(2, &["nothing says that an earlier job wrote it", "XXH128SUMS is gone or damaged"]);
+    fs::remove_dir_all(folder.path().join("out")).unwrap();
+    run(&["job.toml"]).succeeded();
+}
+
 #[test]
 fn help_names_the_commands_examples_and_exit_codes() {
     let help = gdt_batch(Path::new("."), &["--help"]).succeeded().out;

@@ -126,6 +126,23 @@ fn max_edge_auto_cuts_the_same_triangles_where_the_claims_are_wide() {
     assert_eq!(kept(in_parts(&[file], 2_000)), whole);
 }
 
+/// What the user asks for in vain is said, with a remedy that works.
+#[test]
+fn keep_steps_is_said_to_have_no_effect() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = in_files(folder.path(), &hills(8_000, 3), 4_000);
+    let wanted = |points: u64| in_parts(&files, points).with("limits", "keep_steps = true");
+    let warnings = |job: &Job| job.run_with(&["check", "--json"]).succeeded().json()["warnings"].to_string();
+    let job = wanted(2_000);
+    let said = warnings(&job);
+    assert!(said.contains("keep_steps = true has no effect"), "{said}");
+    assert!(job.report()["warnings"].to_string().contains("keep_steps = true has no effect"));
+    let enough: u64 = said.split("max_points_per_part = ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    assert!(!warnings(&wanted(enough)).contains("keep_steps"));
+    assert!(warnings(&wanted(enough - 2)).contains("keep_steps"));
+    assert!(!warnings(&in_parts(&files, 2_000)).contains("keep_steps"));
+}
+
 /// The header claims a box that holds the first points and not the last.
 #[test]
 fn a_header_that_proves_wrong_gives_one_part() {

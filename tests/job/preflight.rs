@@ -37,12 +37,24 @@ fn a_job_refused_for_disk_or_memory_may_be_retried_and_one_below_a_file_not() {
 #[test]
 fn the_disk_estimate_is_close_to_what_the_job_writes() {
     let folder = tempfile::tempdir().unwrap();
-    let job = small_job(folder.path());
-    let estimate = job.run_with(&["check", "--json"]).succeeded().json();
-    let report = job.report();
-    for (estimated, real) in [("temporary", "bytes_temporary"), ("results", "bytes_written")] {
-        let ratio = number(&estimate[estimated]) as f64 / number(&report[real]) as f64;
-        assert!((0.9..2.0).contains(&ratio), "{estimated}: {ratio} times the real size");
+    // A square, and a strip whose preview has a tenth of the pixels.
+    let strip: Vec<_> = clouds::uniform(60_000, 1_000_000, 4).into_iter().map(|[x, y, z]| [x, y / 10, z]).collect();
+    let strip = || Job::on(&[clouds::write(folder.path(), "strip.csv", &strip)]);
+    let few = || Job::on(&[clouds::write(folder.path(), "few.csv", &clouds::uniform(2_000, 1_000_000, 5))]);
+    for (what, job) in [
+        ("square", small_job(folder.path())),
+        ("one format", small_job(folder.path()).with("output", "format = \"3dtiles\"")),
+        ("strip", strip()),
+        ("strip in parts", strip().with("triangulation", "max_points_per_part = 10000")),
+        ("few points", few()),
+    ] {
+        let estimate = job.run_with(&["check", "--json"]).succeeded().json();
+        let report = job.report();
+        let ratio = |estimated: u64, real: u64| estimated as f64 / real as f64;
+        let [temporary, results] = ["temporary", "results"].map(|name| number(&estimate[name]));
+        let [real, written] = ["bytes_temporary", "bytes_written"].map(|name| number(&report[name]));
+        let ratios = [ratio(temporary, real), ratio(results, written), ratio(temporary + results, real + written)];
+        assert!(ratios.iter().all(|ratio| *ratio >= 1.0) && ratios[2] < 1.6, "{what}: {ratios:?} times the real size");
     }
 }
 

@@ -1,6 +1,6 @@
 //! Jobs that tasks do: any number of them leave the bytes that one process leaves, and what they cannot do by parts, `publish` does.
 
-use crate::clouds::Cloud;
+use crate::clouds::{self, Cloud};
 use crate::globe::{Source, gaps, square};
 use crate::las_file::LasFile;
 use crate::levels::hills;
@@ -338,6 +338,47 @@ fn what_has_changed_since_the_plan_is_told() {
     let said = [1, 2].map(|number| task(&job, "read", &format!("{number}/2")));
     let refused = said.iter().find(|said| said.code != 0).expect("a task reads the file");
     refused.refused(2, &[files[0].file_name().unwrap().to_str().unwrap(), "has changed since the job was planned"]);
+}
+
+/// Whoever edits a record of a large file in place changes neither its size nor its samples, but its time.
+#[cfg(unix)]
+#[test]
+fn an_input_that_is_edited_in_place_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = hills(24_000, 10);
+    let file = clouds::write(folder.path(), "large.csv", &cloud);
+    let files = [file.clone(), clouds::write(folder.path(), "small.csv", &clouds::uniform(2_000, 9_000, 4))];
+    let text = fs::read_to_string(&file).unwrap();
+    assert!(text.len() > 250_000, "samples are all of it");
+    // Where no sample is.
+    let at = text.len() / 2 + (text.len() / 40) + text[text.len() / 2 + text.len() / 40..].find(',').unwrap() + 1;
+    let edit = || {
+        let edited = fs::File::options().write(true).open(&file).unwrap();
+        std::os::unix::fs::FileExt::write_all_at(&edited, b"7", at as u64).unwrap();
+    };
+    let report =
+        |job: &Job| -> Value { serde_json::from_slice(&fs::read(job.out().join("report.json")).unwrap()).unwrap() };
+    let job = in_parts(&files, 2_000);
+    up_to(&job, "read", 2);
+    edit();
+    let said = [1, 2].map(|number| task(&job, "read", &format!("{number}/2")));
+    let refused = said.iter().find(|said| said.code != 0).expect("a task reads the file");
+    refused.refused(2, &["large.csv was modified after the job was planned", "phase plan again"]);
+    // The plan starts the job over, and so does a submission.
+    let said = task(&job, "plan", "1/1").succeeded();
+    assert!(said.err.contains("large.csv") && said.err.contains("starting over"), "{}", said.err);
+    up_to(&job, "publish", 2);
+    edit();
+    task(&job, "publish", "1/1").succeeded();
+    let warnings = report(&job)["warnings"].to_string();
+    assert!(warnings.contains("large.csv: modified after the job was planned") && warnings.contains("--restart"));
+    up_to(&job, "join", 2);
+    edit();
+    local(&job, 2).succeeded();
+    assert!(!report(&job)["warnings"].to_string().contains("--restart"));
+    let one = in_parts(&files, 2_000);
+    one.report();
+    assert_eq!(bytes(&job), bytes(&one));
 }
 
 /// The inputs alone do not tell a job from others: a submission with another style would end at once.

@@ -298,3 +298,27 @@ fn damaged_leaves_are_made_again_before_auto_counts_their_sites() {
     stores.iter().zip(bytes).for_each(|(store, bytes)| fs::write(store, bytes).unwrap());
     rig.completes("leaves of zeroes");
 }
+
+/// What the warning about `keep_steps` advises for a job of several parts works.
+#[test]
+fn a_job_of_several_parts_starts_over_with_another_style_and_one_part_goes_on() {
+    let setup = |points: u64| Setup {
+        triangulation: format!("{}\nmax_points_per_part = {points}", base().triangulation),
+        limits: "threads = 1\nkeep_steps = true".into(),
+        ..base()
+    };
+    let mut rig = Rig::of_files(tempfile::tempdir().unwrap(), &scattered::gaussian(20_000), 60_000, &setup(4_000))
+        .committing_every(0);
+    let files = |setup: Setup| Setup { input: "files = [\"part_*.csv\"]".into(), ..setup };
+    let check = Run::start(&mut rig.command_of(&["check", "job.toml"])).end().succeeded().out;
+    let enough = check.split("max_points_per_part = ").nth(1).unwrap().split(' ').next().unwrap();
+    for (points, starts_over) in [(4_000, true), (enough.parse().unwrap(), false)] {
+        rig.forget();
+        rig.configure(&files(setup(points)));
+        assert!(rig.run_to("committed", 30).was_killed());
+        rig.expect(&files(setup(points).output("normals = false")));
+        let said = rig.run().succeeded().err;
+        assert_eq!(said.contains("starting over"), starts_over, "{said}");
+        rig.is_complete(&said);
+    }
+}

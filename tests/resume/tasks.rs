@@ -102,7 +102,7 @@ fn processes_of_local_killed_at_random_moments_leave_the_same_bytes() {
         let end = run.end();
         assert!(end.was_killed() || matches!(end.status.code(), Some(0 | 1)), "{end:?}");
         if end.was_killed() {
-            // Its tasks go on without it.
+            // Its tasks end without it, as soon as they notice.
             while tasks.iter().any(|task| fs::metadata(format!("/proc/{task}")).is_ok()) {
                 std::thread::sleep(std::time::Duration::from_millis(1));
             }
@@ -115,6 +115,27 @@ fn processes_of_local_killed_at_random_moments_leave_the_same_bytes() {
     }
     assert!(killed >= wanted * 2 / 3, "only {killed} kills");
     completes(&rig, 8, "in the end");
+}
+
+#[test]
+fn tasks_of_local_end_with_the_engine() {
+    let rig = job_of_parts().committing_every(0);
+    up_to(&rig, "mesh", 1);
+    let before = stored(&rig, 0);
+    let mut engine = Run::start(&mut local(&rig, 1));
+    engine.wait_until(|| stored(&rig, 0) > before);
+    let tasks = children(engine.child.id());
+    assert!(!tasks.is_empty());
+    engine.signal("KILL");
+    assert!(engine.end().was_killed());
+    while tasks.iter().any(|task| fs::metadata(format!("/proc/{task}")).is_ok()) {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    // They were not done: without a task, the phase is not complete.
+    let again = run(rig.command_of(&["status", "job.toml", "--json"])).succeeded();
+    let status: serde_json::Value = serde_json::from_str(&again.out).unwrap();
+    assert!(status["phases"][2]["done"].as_u64() < status["phases"][2]["of"].as_u64(), "{status}");
+    completes(&rig, 2, "after the engine was killed");
 }
 
 /// Returns the bytes in the store of a part.

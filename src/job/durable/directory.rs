@@ -280,10 +280,17 @@ impl JobDirectory {
 mod tests {
     use super::*;
     use crate::job::durable::cleaning::remove_job;
+    use crate::output::checksums::{Checksum, list_text};
     use std::fs;
 
     fn names(names: &[&str]) -> HashSet<PathBuf> {
         names.iter().map(PathBuf::from).collect()
+    }
+
+    /// Writes the list of these results.
+    fn write_list(output: &OutputFiles, names: &[&str]) {
+        let files: Vec<_> = names.iter().map(|name| (name.to_string(), Checksum::default())).collect();
+        fs::write(output.checksums(), list_text(&files)).unwrap();
     }
 
     #[test]
@@ -293,14 +300,17 @@ mod tests {
         for (folder, _) in directory.results().numbered_folders() {
             fs::create_dir_all(folder).unwrap();
         }
-        let [theirs, old] = ["cut/roof.glb", "tiles/000007.glb"].map(|name| output.path().join(name));
-        fs::write(&theirs, "x").unwrap();
-        fs::write(&old, "x").unwrap();
+        let names_of_theirs = ["cut/roof.glb", "tiles/123456.glb", "terrain.glb", "tiles/000008.partial"];
+        let theirs = names_of_theirs.map(|name| output.path().join(name));
+        let old = output.path().join("tiles/000007.glb");
+        theirs.iter().chain([&old]).for_each(|path| fs::write(path, "x").unwrap());
+        write_list(directory.results(), &["tiles/000007.glb"]);
         drop(directory.create().unwrap());
-        assert!(theirs.exists() && old.exists());
+        assert!(theirs.iter().all(|path| path.exists()) && old.exists());
         fs::write(directory.output().report(), "{}").unwrap();
         directory.replace_results(&names(&["report.json"])).unwrap();
-        assert!(theirs.exists() && !old.exists() && !directory.results().levels().exists());
+        assert!(theirs.iter().all(|path| path.exists()));
+        assert!(!old.exists() && !directory.results().levels().exists() && !directory.results().checksums().exists());
         // A kill may leave an empty job directory: the next job may take it.
         remove_job(&directory).unwrap();
         fs::create_dir(output.path().join("job")).unwrap();
@@ -319,6 +329,7 @@ mod tests {
             "levels/000001.glb",
             "tilesets/000000.json",
             "tileset.json",
+            "XXH128SUMS",
             "report.json",
         ];
         for done in 0..=new.len() {
@@ -330,7 +341,7 @@ mod tests {
                 fs::create_dir_all(path.parent().unwrap()).unwrap();
                 fs::write(path, text).unwrap();
             };
-            for name in [
+            let old = [
                 "tiles/000000.glb",
                 // An earlier version had no folders below.
                 "tiles/000300.glb",
@@ -339,12 +350,23 @@ mod tests {
                 "cut/002/000512.glb",
                 "terrain.glb",
                 "report.json",
-            ] {
-                write(directory.results(), name, "old");
-            }
+            ];
+            old.iter().for_each(|name| write(directory.results(), name, "old"));
+            write_list(directory.results(), &old[..6]);
             new.iter().for_each(|name| write(directory.output(), name, "new"));
+            write_list(directory.output(), &new[..5]);
+            let list = fs::read(directory.output().checksums()).unwrap();
             if done > 0 {
                 fs::remove_file(directory.results().report()).unwrap();
+            }
+            if done >= 6 {
+                // The list goes when all that it names and that is outdated is gone.
+                ["tiles/256", "levels/001", "cut"]
+                    .iter()
+                    .for_each(|folder| fs::remove_dir_all(output.path().join(folder)).unwrap());
+                ["terrain.glb", "tiles/000300.glb"]
+                    .iter()
+                    .for_each(|name| fs::remove_file(output.path().join(name)).unwrap());
             }
             for name in &new[..done] {
                 fs::create_dir_all(output.path().join(name).parent().unwrap()).unwrap();
@@ -357,7 +379,9 @@ mod tests {
             if done < new.len() {
                 assert_eq!(found, names(&new), "cut off after {done}");
             }
-            assert!(new.iter().all(|name| fs::read(output.path().join(name)).unwrap() == b"new"), "{done}");
+            let is_new = |name: &&str| fs::read(output.path().join(name)).unwrap() == b"new";
+            assert!(new.iter().filter(|name| **name != "XXH128SUMS").all(is_new), "{done}");
+            assert!(fs::read(directory.results().checksums()).unwrap() == list, "{done}");
             if done < new.len() {
                 let gone = ["tiles/256", "levels/001", "cut"];
                 assert!(gone.iter().all(|folder| !output.path().join(folder).exists()), "cut off after {done}");
@@ -382,6 +406,29 @@ mod tests {
         fs::remove_file(directory.results().page()).unwrap();
         directory.replace_results(&names).unwrap();
         assert!(fs::read_to_string(directory.results().page()).unwrap().contains("data-terrain"));
+    }
+
+    #[test]
+    fn a_file_that_somebody_put_in_the_place_of_a_result_stays() {
+        let output = tempfile::tempdir().unwrap();
+        let directory = JobDirectory::new(output.path());
+        let _lock = directory.create().unwrap();
+        fs::create_dir_all(directory.results().tiles()).unwrap();
+        for (folder, text) in [(directory.output(), "new"), (directory.results(), "theirs")] {
+            fs::write(folder.tile(0), text).unwrap();
+        }
+        fs::write(directory.output().tile(1), "new").unwrap();
+        // An interrupted run has put this one in its place already, and another has written it again.
+        fs::write(directory.results().tile(1), "new").unwrap();
+        fs::write(directory.output().report(), "{}").unwrap();
+        let names = names(&["tiles/000000.glb", "tiles/000001.glb", "report.json"]);
+        let error = directory.replace_results(&names).unwrap_err();
+        assert_eq!(error.exit_code(), 2);
+        assert!(error.to_string().contains("000000.glb came during the job, and no job wrote it"), "{error}");
+        assert_eq!(fs::read(directory.results().tile(0)).unwrap(), b"theirs");
+        fs::remove_file(directory.results().tile(0)).unwrap();
+        directory.replace_results(&names).unwrap();
+        assert_eq!(fs::read(directory.results().tile(0)).unwrap(), b"new");
     }
 
     #[test]

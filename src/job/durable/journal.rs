@@ -11,10 +11,10 @@ use crate::job::durable::directory::JobDirectory;
 use crate::job::durable::store::{RecordKey, RecordRef};
 use crate::output::checksums::Checksum;
 use crate::{Error, Result, fault, interrupt};
-use serde::de::DeserializeOwned;
+use serde::de::{DeserializeOwned, IgnoredAny};
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fmt::Debug;
 use std::fs::File;
 use std::hash::Hash;
@@ -253,6 +253,27 @@ where
         }
     }
     Ok(())
+}
+
+/// The files of a line, whatever its step is.
+#[derive(Deserialize)]
+struct FilesOfLine {
+    files: Vec<PublishedFile>,
+}
+
+/// Returns the names of all files in the journal that an earlier run left, up to the first damaged line.
+///
+/// # Errors
+/// [`Error::Io`] if the journal cannot be read.
+pub(crate) fn names_of_files(directory: &JobDirectory) -> Result<HashSet<PathBuf>> {
+    let mut names = HashSet::new();
+    let Some(mut lines) = JournalLines::open(directory)? else { return Ok(names) };
+    if lines.next::<IgnoredAny>()?.is_some() {
+        while let Some(FilesOfLine { files }) = lines.next()? {
+            names.extend(files.into_iter().map(|file| file.name));
+        }
+    }
+    Ok(names)
 }
 
 /// A position in the journal of a run: after a number of records. The default is the start.

@@ -8,6 +8,7 @@ pub mod columns;
 pub(crate) mod committer;
 pub mod directory;
 pub mod journal;
+pub(crate) mod known_results;
 mod listing;
 pub mod lock;
 pub mod mapped;

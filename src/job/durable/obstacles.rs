@@ -2,11 +2,14 @@
 
 use crate::job::durable::atomic_file::partial_path;
 use crate::job::durable::directory::JobDirectory;
-use crate::job::durable::listing::{Leftovers, check_page_is_ours, exists, is_folder};
+use crate::job::durable::journal::names_of_files;
+use crate::job::durable::known_results::KnownResults;
+use crate::job::durable::listing::{Leftovers, check_page_is_ours, exists, is_folder, is_partial};
 use crate::job::durable::lock::lock_file;
 use crate::output::checksums::read_file;
 use crate::{Error, Result, disk};
 use serde_json::Value;
+use std::collections::HashSet;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -43,32 +46,68 @@ pub(crate) fn check_nothing_in_the_way(directory: &JobDirectory) -> Result<()> {
     )))
 }
 
-/// Checks that a job wrote the files that this job would remove or overwrite. `page` tells whether it writes a page.
+/// Checks that jobs wrote the files that this job would remove or overwrite. `page` tells whether it writes a page.
 ///
 /// # Errors
-/// [`Error::Config`] if such files exist and nothing says that a job wrote them.
+/// [`Error::Config`] if such a file exists and nothing says that a job wrote it.
 pub(crate) fn check_results_are_ours(directory: &JobDirectory, page: bool) -> Result<()> {
+    let results = directory.results();
     if page {
-        check_page_is_ours(directory.results())?;
+        check_page_is_ours(results)?;
     }
-    let report = directory.results().report();
-    let report = match read_file(&report) {
-        Err(e) if e.kind() == ErrorKind::NotFound => None,
-        text => serde_json::from_slice::<Value>(&text.map_err(Error::io("read", &report))?).ok(),
-    };
-    let is_ours = |report: &Value| report["generator"].as_str().is_some_and(|by| by.starts_with("gdt-batch"));
+    let is_finished = has_own_report(&results.report())?;
     // Only a job that had passed this check took the lock and left it.
-    if exists(&lock_file(directory.job()))? || report.as_ref().is_some_and(is_ours) {
-        return Ok(());
+    let known = match is_finished || exists(&lock_file(directory.job()))? {
+        true => KnownResults::of(results, directory.output())?,
+        false => KnownResults::default(),
+    };
+    let Some(found) = first_unknown(directory, &known)? else { return Ok(()) };
+    let why = match is_finished && !known.has_list {
+        true => format!(" ({} is gone or damaged, which would name it)", results.checksums().display()),
+        false => String::new(),
+    };
+    Err(Error::Config(format!(
+        "{} exists, a job would overwrite or remove it, and nothing says that an earlier job wrote it{why}: choose another [output] \
+         directory, or move it away",
+        found.display()
+    )))
+}
+
+/// Tells whether the report at `path` is that of a job.
+fn has_own_report(path: &Path) -> Result<bool> {
+    let report = match read_file(path) {
+        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(false),
+        text => serde_json::from_slice::<Value>(&text.map_err(Error::io("read", path))?).ok(),
+    };
+    Ok(report.is_some_and(|report| report["generator"].as_str().is_some_and(|by| by.starts_with("gdt-batch"))))
+}
+
+/// Returns the first file with the name of a result that is none of those `known`, nor of a job under way.
+fn first_unknown(directory: &JobDirectory, known: &KnownResults) -> Result<Option<PathBuf>> {
+    let is_unknown = |path: &PathBuf| !is_partial(path) && !known.contains(&directory.name(path));
+    let mut unknown = Vec::new();
+    for path in Leftovers::of(directory.results())?.files.into_iter().filter(is_unknown) {
+        if is_there(&path)? {
+            unknown.push(path);
+        }
     }
-    match find(&mut Leftovers::of(directory.results())?.files.into_iter(), is_there)? {
-        None => Ok(()),
-        Some(found) => Err(Error::Config(format!(
-            "{} exists, a job would overwrite or remove it, and nothing says that an earlier job wrote it: choose another \
-             [output] directory, or move it away",
-            found.display()
-        ))),
+    if !unknown.is_empty() {
+        let placed = names_in_journals(directory)?;
+        unknown.retain(|path| !placed.contains(&directory.name(path)));
     }
+    Ok(unknown.into_iter().next())
+}
+
+/// Returns the names of the files that the journals of a job under way name.
+///
+/// # Errors
+/// [`Error::Io`] if one cannot be read.
+fn names_in_journals(directory: &JobDirectory) -> Result<HashSet<PathBuf>> {
+    let mut names = names_of_files(directory)?;
+    for part in directory.folders_of_parts()? {
+        names.extend(names_of_files(&part)?);
+    }
+    Ok(names)
 }
 
 /// Returns the paths of the files that the job keeps for itself, under their names or their partial names.

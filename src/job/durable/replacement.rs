@@ -6,7 +6,8 @@
 
 use crate::disk::OpenFolder;
 use crate::job::durable::atomic_file::{create_folder, remove_file, sync_folder};
-use crate::job::durable::listing::{Leftovers, check_page_is_ours, exists, is_partial};
+use crate::job::durable::known_results::KnownResults;
+use crate::job::durable::listing::{Leftovers, check_page_is_ours, exists};
 use crate::output::file_names::OutputFiles;
 use crate::{Error, Result, disk, fault};
 use std::collections::HashSet;
@@ -18,12 +19,13 @@ pub(crate) struct Replacement {
     /// The report of the earlier job, or the place of the new one.
     report: PathBuf,
     new_report: PathBuf,
-    /// The results that wait besides the report, and their places.
+    /// The results that wait, and their places, besides the report and the list.
     waiting: Vec<(PathBuf, PathBuf)>,
+    /// The list of all results, if it waits, and its place. That of the earlier job tells which files are outdated, so it stays until
+    /// these are gone.
+    list: Option<(PathBuf, PathBuf)>,
     /// Results of the earlier job that this one does not have.
     outdated: Vec<PathBuf>,
-    /// What a killed run of an early version of the program left half-written. No result.
-    partial: Vec<PathBuf>,
     directory: OpenFolder,
     /// The folders of numbered files, each after those in it. They can be opened, but they are too many to keep open.
     numbered_folders: Vec<PathBuf>,
@@ -35,7 +37,7 @@ impl Replacement {
     ///
     /// # Errors
     /// [`Error::Io`] if a file is in neither place, or the system does not tell; if a folder cannot be made or opened. [`Error::Config`]
-    /// if somebody else's page is in the place of the job's. No result has been touched then.
+    /// if somebody else's file is in the place of a result. No result has been touched then.
     pub(crate) fn prepare(
         results: &OutputFiles,
         waiting: &OutputFiles,
@@ -50,10 +52,11 @@ impl Replacement {
             // Somebody may have put it there since the job wrote its own. The lists of results name that one by now.
             check_page_is_ours(results)?;
         }
-        let mut found = Vec::new();
+        let (known, mut found) = (KnownResults::of(results, waiting)?, Vec::new());
         for name in names {
             let [place, waits] = [results, waiting].map(|folder| folder.directory().join(name));
             if exists(&waits)? {
+                known.check_place(name, &waits, &place)?;
                 found.push((waits, place));
             } else if waits == new_report || !exists(&place)? {
                 let gone =
@@ -64,20 +67,22 @@ impl Replacement {
         found.retain(|(waits, _)| *waits != new_report);
         // What is done must not depend on the order of a hash set.
         found.sort_unstable();
-        let mut others = Vec::new();
+        let new_list = waiting.checksums();
+        let list = found.iter().position(|(waits, _)| *waits == new_list).map(|at| found.remove(at));
+        let mut outdated = Vec::new();
         for path in Leftovers::of(results)?.files {
             let name = path.strip_prefix(results.directory()).unwrap_or(&path);
-            if path != report && !names.contains(name) && exists(&path)? {
-                others.push(path);
+            // A file that no list names is somebody else's.
+            if path != report && !names.contains(name) && known.contains(name) && exists(&path)? {
+                outdated.push(path);
             }
         }
-        let (partial, outdated) = others.into_iter().partition(|path| is_partial(path));
         let folders: HashSet<&Path> = found.iter().filter_map(|(_, place)| place.parent()).collect();
         folders.into_iter().try_for_each(create_folder)?;
         let numbered_folders = Leftovers::of(results)?.folders;
         numbered_folders.iter().try_for_each(|path| open(path).map(|_| ()))?;
         let directory = open(results.directory())?;
-        Ok(Some(Replacement { report, new_report, waiting: found, outdated, partial, directory, numbered_folders }))
+        Ok(Some(Replacement { report, new_report, waiting: found, list, outdated, directory, numbered_folders }))
     }
 
     /// Does it. Every file is replaced at once, so there is no moment without one.
@@ -92,10 +97,6 @@ impl Replacement {
             rename(waits, place)?;
         }
         self.outdated.iter().try_for_each(|path| remove_file(path))?;
-        for path in &self.partial {
-            // It does not matter to the results whether it goes.
-            let _ = disk::remove_file(path);
-        }
         for folder in &self.numbered_folders {
             // This fails, as it should, where a folder holds files of this job or of somebody else.
             if disk::remove_folder(folder).is_err() {
@@ -103,6 +104,11 @@ impl Replacement {
             }
         }
         sync(&self.directory)?;
+        if let Some((waits, place)) = &self.list {
+            fault::point("replacing");
+            rename(waits, place)?;
+            sync(&self.directory)?;
+        }
         fault::point("replacing");
         rename(&self.new_report, &self.report)?;
         sync(&self.directory)

@@ -4,7 +4,7 @@ use crate::input::lines::files_of_lines;
 use crate::input::samples::fingerprint_of;
 use crate::job::options::JobOptions;
 use crate::job::plan::breaklines::line_files::line_paths;
-use crate::job::plan::input_identity::{InputIdentities, RenamedInputs};
+use crate::job::plan::input_identity::{InputChange, InputIdentities, RenamedInputs};
 use crate::job::plan::inputs::input_paths;
 use crate::job::plan::lattice_choice::LatticeCoarsening;
 use crate::output::checksums::Checksum;
@@ -32,9 +32,19 @@ pub struct JobHeader {
     /// The submission that started it over; 0 if none did.
     #[serde(default)]
     pub submission: u64,
-    /// When a job of several parts was begun.
+    /// When a job of several parts was begun: before tasks looked at its inputs.
     #[serde(default)]
     pub begun: Option<SystemTime>,
+}
+
+impl JobHeader {
+    /// Returns how the input that had the path `known` differs from what it was when tasks planned the job. It is at `path` now.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be read.
+    pub(crate) fn change_of(&self, known: &Path, path: &Path) -> Result<InputChange> {
+        self.fingerprint.files.change_of(known, path, self.begun.unwrap_or_else(SystemTime::now))
+    }
 }
 
 /// What tells a job from others in its report.
@@ -135,8 +145,22 @@ impl Fingerprint {
         Ok(now.since_planned(&same_files))
     }
 
-    /// Returns what has changed since a job was planned with the fingerprint `planned`, maybe on another machine, to which files may seem to
-    /// have other times.
+    /// Tells whether a job that was planned is the same, and no input seems to have been modified since.
+    pub(crate) fn is_same_job(&self, planned: &JobHeader) -> bool {
+        self.since_planned(&planned.fingerprint).is_none() && self.modified_since(planned).is_none()
+    }
+
+    /// Returns the paths of the inputs that seem to have been modified since a job was planned. They must be those that were planned otherwise.
+    pub(crate) fn modified_since(&self, JobHeader { fingerprint: planned, begun, .. }: &JobHeader) -> Option<String> {
+        let begun = (*begun)?;
+        let [files, lines] = [(&self.files, &planned.files), (&self.lines, &planned.lines)]
+            .map(|(now, then)| now.modified_since(then, begun));
+        let paths = [files, lines].concat();
+        (!paths.is_empty()).then(|| first_few(paths))
+    }
+
+    /// Returns what has changed since a job was planned with the fingerprint `planned`, besides the times of files: machines may see
+    /// different ones.
     pub(crate) fn since_planned(&self, planned: &Fingerprint) -> Option<String> {
         let without_times = |this: &Fingerprint| {
             let (files, lines) = (this.files.without_times(), this.lines.without_times());
@@ -152,14 +176,6 @@ impl Fingerprint {
     /// Returns the present names of the inputs at `paths`, which are those that the options name now; `None` if they are other files.
     pub(crate) fn present_names(&self, paths: &[PathBuf]) -> Option<RenamedInputs> {
         self.files.present_names(paths)
-    }
-
-    /// Tells whether the input that had the path `known` still holds what it did. It is at `path` now.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if it cannot be read.
-    pub(crate) fn has_same_content(&self, known: &Path, path: &Path) -> Result<bool> {
-        self.files.has_same_content(known, path)
     }
 
     /// Returns what tells options from others that lead to other bytes. It looks at no input, and not at paths.

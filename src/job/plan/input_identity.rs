@@ -13,6 +13,17 @@ use std::time::SystemTime;
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct InputIdentities(Vec<InputIdentity>);
 
+/// How an input differs from what it was.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum InputChange {
+    /// In nothing.
+    Nothing,
+    /// It was modified since, though samples of its content are the same.
+    Time,
+    /// In its content.
+    Content,
+}
+
 /// What identifies an input file.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct InputIdentity {
@@ -62,7 +73,7 @@ impl InputIdentities {
         self.0.iter().map(text).collect()
     }
 
-    /// Returns the same without the times of the files: machines may see different ones.
+    /// Returns the same without the times of the files.
     pub(crate) fn without_times(&self) -> InputIdentities {
         let without = |file: &InputIdentity| InputIdentity {
             content: ContentIdentity { modified: 0, ..file.content },
@@ -100,14 +111,26 @@ impl InputIdentities {
         is_same.then(|| RenamedInputs(pairs.filter(|(old, new)| old != new).collect()))
     }
 
-    /// Tells whether the input that had the path `known` still holds what it did, as far as samples tell. It is at `path` now. Its time
-    /// does not count, because machines may see different ones.
+    /// Returns how the input that had the path `known` when the job was `begun` differs from what it was. It is at `path` now.
     ///
     /// # Errors
     /// [`Error::Io`] if it cannot be read.
-    pub(crate) fn has_same_content(&self, known: &Path, path: &Path) -> Result<bool> {
+    pub(crate) fn change_of(&self, known: &Path, path: &Path, begun: SystemTime) -> Result<InputChange> {
         let samples = FileSamples::of(path)?;
-        Ok(self.0.iter().any(|file| file.path == known && file.content.samples == samples))
+        let mut known = self.0.iter().filter(|file| file.path == known);
+        Ok(match known.find(|file| file.content.samples == samples) {
+            None => InputChange::Content,
+            Some(file) if file.content.is_modified(path, begun) => InputChange::Time,
+            Some(_) => InputChange::Nothing,
+        })
+    }
+
+    /// Returns the paths of those files that seem to have been modified since a job was `begun` with the files `planned`, which had the same
+    /// contents in the same order.
+    pub(crate) fn modified_since(&self, planned: &InputIdentities, begun: SystemTime) -> Vec<String> {
+        let pairs = self.0.iter().zip(&planned.0);
+        let modified = pairs.filter(|(now, planned)| planned.content.is_modified(&now.path, begun));
+        modified.map(|(now, _)| now.path.display().to_string()).collect()
     }
 
     /// Returns what the inputs are called by now. They must have the same contents in the same order as `earlier`.
@@ -167,14 +190,28 @@ impl ContentIdentity {
             return Ok(ContentIdentity { samples, modified: 0 });
         }
         let data = path.metadata().map_err(Error::io("read", path))?;
-        let modified = data.modified().ok().and_then(|time| time.duration_since(SystemTime::UNIX_EPOCH).ok());
-        Ok(ContentIdentity { samples, modified: modified.map_or(0, |age| age.as_secs()) })
+        Ok(ContentIdentity { samples, modified: data.modified().map_or(0, seconds) })
     }
+
+    /// Tells whether the file, which is at `path` now, seems to have been modified since a job was `begun` with this content. Only a time after
+    /// that counts: machines and file systems tell other times of the same file, but hardly a later one.
+    fn is_modified(&self, path: &Path, begun: SystemTime) -> bool {
+        let Some(now) = path.metadata().ok().and_then(|data| data.modified().ok()) else { return false };
+        // With a clock that is ahead, a file has its time from the future at both times.
+        let is_other = seconds(now) != self.modified || now.duration_since(begun).is_ok_and(|age| age.as_secs() == 0);
+        now > begun && is_other
+    }
+}
+
+/// Returns the whole seconds since 1970.
+fn seconds(time: SystemTime) -> u64 {
+    time.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |age| age.as_secs())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::time::Duration;
 
     fn identities(files: &[(&str, u64)]) -> InputIdentities {
         let content = |samples| ContentIdentity { samples: FileSamples { bytes: 1, samples }, modified: 2 };
@@ -211,5 +248,35 @@ mod tests {
         let mut path = PathBuf::from("b");
         renamed.rename(&mut path);
         assert_eq!(path, Path::new("a"));
+    }
+
+    #[test]
+    fn only_a_time_after_the_plan_tells_of_an_edit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("cloud.csv");
+        std::fs::write(&path, "1,2,3\n").unwrap();
+        let begun = SystemTime::UNIX_EPOCH + Duration::from_secs(1_700_000_000);
+        let at = |time: SystemTime| {
+            let file = std::fs::File::options().write(true).open(&path).unwrap();
+            file.set_modified(time).unwrap();
+            ContentIdentity::of(&path).unwrap()
+        };
+        let (second, year) = (Duration::from_secs(1), Duration::from_secs(31_536_000));
+        for (planned, now, is_modified) in [
+            (begun - year, begun - year, false),
+            // Another machine, or a copy from before.
+            (begun - year, begun - second, false),
+            (begun - year, begun + year, true),
+            (begun - second / 2, begun + second / 2, true),
+            // The plan and the edit are in one second.
+            (begun, begun + second / 4, true),
+            // A clock that was ahead wrote the file.
+            (begun + year, begun + year, false),
+            (begun + year, begun + year + second, true),
+        ] {
+            let planned = at(planned);
+            at(now);
+            assert_eq!(planned.is_modified(&path, begun), is_modified, "{planned:?} {now:?}");
+        }
     }
 }

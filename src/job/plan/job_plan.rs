@@ -5,7 +5,7 @@ use crate::geometry::Bounds;
 use crate::geometry::lattice::Lattice;
 use crate::input::{Crs, PointCounts, PointRules, Source};
 use crate::job::durable::atomic_file::{PendingFile, write_pending};
-use crate::job::options::JobOptions;
+use crate::job::options::{JobOptions, KeepSteps};
 use crate::job::plan::breaklines::PlannedBreaklines;
 use crate::job::plan::input_identity::RenamedInputs;
 use crate::job::plan::lattice_choice::LatticeCoarsening;
@@ -13,6 +13,7 @@ use crate::job::plan::missing_attributes::missing_attributes;
 use crate::output::color::HeightRange;
 use crate::output::curvature::Curvature;
 use crate::output::frame::Frame;
+use crate::triangulation::options::MaxPointsPerPart;
 use crate::{Error, Result, Warnings};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -167,7 +168,22 @@ impl Plan {
         warnings.extend(self.warnings.clone());
         let sources = self.inputs.iter().map(|input| &input.source);
         warnings.extend(missing_attributes(sources, self.options.output.attributes));
+        warnings.extend(self.freed_steps());
         warnings
+    }
+
+    /// Says that a job of several parts does not keep its steps, if the user wants it to.
+    fn freed_steps(&self) -> Option<String> {
+        let is_wanted = self.options.limits.keep_steps == KeepSteps::Always;
+        (is_wanted && !self.is_one_part()).then(|| {
+            let points = self.inputs.iter().map(PlannedInput::decoded_records).sum();
+            format!(
+                "[limits] keep_steps = true has no effect in a job of several parts: they free their steps, and with another style the \
+                 job starts over; with [triangulation] max_points_per_part = {} or more the job is one part and keeps them, but it takes \
+                 more disk (gdt-batch check says how much)",
+                MaxPointsPerPart::for_one_part(points).0
+            )
+        })
     }
 
     /// Calls the inputs what they are called by now.

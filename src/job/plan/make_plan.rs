@@ -141,7 +141,7 @@ fn try_plan(
     let breaklines = PlannedBreaklines::of(&lines, options, &cloud, &mut warnings)?;
     let claimed = extent.boxes.iter().map(|claim| claimed_box(&lattice, claim, clipped)).collect::<Vec<_>>();
     let decoded: u64 = sources.iter().zip(&rules).map(|(source, rules)| decoded_records(source, rules)).sum();
-    let has_parts = !coarsening.one_part && decoded > options.triangulation.max_points_per_part.0 / 2 * 3;
+    let has_parts = !coarsening.one_part && decoded > options.triangulation.max_points_per_part.most_in_one_part();
     let claims = has_parts.then(|| claims(sources, &rules, &lattice, &extent, clipped)).transpose()?;
     let lines_at = breaklines.as_ref().and_then(|lines| lines.bounds);
     let claims = claims.map(|claims| claims.with_lines(lines_at));

@@ -1,5 +1,6 @@
 //! Estimates of the disk and the memory that a job needs.
 
+use crate::geometry::Bounds;
 use crate::input::is_url;
 use crate::job::durable::directory::JobDirectory;
 use crate::job::levels::hierarchy::{BYTES_PER_LEVEL_VERTEX, LevelSizes};
@@ -8,13 +9,14 @@ use crate::job::options::JobOptions;
 use crate::job::partition::tree_builder::buffer_bytes;
 use crate::job::plan::budget::{BYTES_PER_LEAF_SITE, network_memory, read_buffer_memory};
 use crate::job::plan::job_plan::{Plan, PlannedInput};
-use crate::job::preflight::kept_points::KeptPoints;
+use crate::job::preflight::kept_points::{KeptPoints, has_filter};
 use crate::job::publish::raster::check::planned_raster;
 use crate::job::publish::raster::write_raster::raster_memory;
 use crate::output::Compression;
 use crate::output::attributes::AttributeChoice;
-use crate::output::options::{MaxEdge, OutputOptions};
-use crate::output::preview::canvas::{LONGER_SIDE, PreviewPixel};
+use crate::output::color::HeightRange;
+use crate::output::options::{MaxEdge, OutputFormat, OutputOptions};
+use crate::output::preview::canvas::{Canvas, LONGER_SIDE, PreviewPixel};
 use crate::output::raster::options::RasterCompression;
 use std::path::PathBuf;
 
@@ -24,24 +26,29 @@ const BYTES_PER_POINT: u64 = 12;
 const STORE_PER_SITE: u64 = 9 + 2 * 6;
 /// Bytes that the store takes for a site on a tile's frontier, in all records that it is in.
 const STORE_PER_BORDER_SITE: u64 = 500;
+/// Bytes of the journal and the plan of a small job, and of what the files of the store take to whole blocks of the disk.
+const OWN_FILES: u64 = 128 << 10;
 /// Bytes of a GLB besides its arrays.
 const RESULT_PER_TILE: u64 = 6000;
 /// Bytes of a file of a raster besides its cells, and of its entry in the list of files.
 const RASTER_FILE: u64 = 2000;
-/// The most pixels of the preview.
-const PIXELS: u64 = LONGER_SIDE * LONGER_SIDE;
+/// Bytes of the preview for a pixel: its colours where neighbours have nothing in common.
+const PREVIEW_PER_PIXEL: u64 = 3;
+/// Bytes of the page that shows the terrain.
+const PAGE: u64 = 1 << 20;
 /// Bytes that a process takes before it has done anything.
 const PROCESS_MEMORY: u64 = 64 << 20;
 
 /// Bytes that an intensity takes, packed as the values of points are.
 const PACKED_INTENSITY: u64 = 2;
 
-/// Returns the bytes of results for a site: position, normal, colour, these attributes and two triangles with 16-bit corners.
+/// Returns the bytes of results for a site: position, normal, colour, these attributes and two triangles with 16-bit corners. Quantized
+/// positions take 8 bytes, and 12 in wide tiles; normals and colours take 4 or 8 each, and few tiles have all at their widest.
 fn result_per_site(compression: Compression, attributes: AttributeChoice) -> u64 {
     let count = u64::from(attributes.classification) + u64::from(attributes.intensity);
     match compression {
         Compression::None => 12 + 12 + 8 + 2 * 6 + count * 4,
-        Compression::Quantized => 8 + 4 + 4 + 2 * 6 + count * 4,
+        Compression::Quantized => 12 + 8 + 4 + 2 * 6 + count * 4,
         // What it takes for dense clouds, and half as much again for others.
         Compression::Meshopt => 15 + count * 2,
     }
@@ -67,10 +74,14 @@ impl DiskEstimate {
         let options = &plan.options;
         let intensity = if options.output.attributes.intensity { PACKED_INTENSITY } else { 0 };
         let (point_file, leaves) = (points * (BYTES_PER_POINT + intensity), points * (STORE_PER_SITE + intensity));
-        let border = border_bytes(points, options.triangulation.max_points_per_tile.0, tiles);
+        let per_tile = most_per_tile(plan);
+        let pixels = preview_pixels(plan);
+        let border = border_bytes(points, per_tile, tiles) + pixels * size_of::<PreviewPixel>() as u64 + OWN_FILES;
         let store = leaves + border;
         let raster = raster_bytes(plan);
-        let results = result_bytes(points, tiles, &options.output, max_one_file) + raster;
+        let in_tiles = tile_bytes(points, tiles, &options.output, max_one_file, points > per_tile);
+        let page = if options.output.page { PAGE } else { 0 };
+        let results = in_tiles + pixels * PREVIEW_PER_PIXEL + page + raster;
         if plan.is_one_part() && options.limits.keep_steps.keeps(points) {
             // The points may go before the results come.
             return DiskEstimate {
@@ -107,24 +118,44 @@ pub(crate) fn has_room_besides_points(plan: &Plan, kept: KeptPoints, max_one_fil
 
 /// Returns about how many tiles there will be: tiles come out between half full and full.
 pub(crate) fn tiles(plan: &Plan, kept: KeptPoints) -> u64 {
-    (kept.0 * 4).div_ceil(plan.options.triangulation.max_points_per_tile.0 * 3)
+    (kept.0 * 4).div_ceil(most_per_tile(plan) * 3)
+}
+
+/// Returns the most points that a tile may have.
+fn most_per_tile(plan: &Plan) -> u64 {
+    let triangulation = &plan.options.triangulation;
+    let most = triangulation.max_points_per_tile.0;
+    if plan.is_one_part() { most } else { most.min(triangulation.max_points_per_part.0) }
 }
 
 /// Returns the bytes of the records that stay until the job is done.
 fn border_bytes(points: u64, per_tile: u64, tiles: u64) -> u64 {
-    // A tile of n sites has about 2.2 sqrt(n) on its frontier.
-    let border_sites = (2.2 * (per_tile.min(points) as f64).sqrt()) as u64 * tiles;
-    border_sites * STORE_PER_BORDER_SITE + PIXELS * size_of::<PreviewPixel>() as u64
+    // A tile of n sites has about 2.2 sqrt(n) on its frontier, and more where points lie in rows.
+    let border_sites = (2.5 * (per_tile.min(points) as f64).sqrt()) as u64 * tiles;
+    border_sites * STORE_PER_BORDER_SITE
 }
 
-fn result_bytes(points: u64, tiles: u64, output: &OutputOptions, max_one_file: u64) -> u64 {
+/// Returns the most pixels of the preview: those of the box in the headers. What a filter leaves of the points may have any other.
+fn preview_pixels(plan: &Plan) -> u64 {
+    if has_filter(plan) {
+        return LONGER_SIDE * LONGER_SIDE;
+    }
+    let [[xmin, ymin], [xmax, ymax]] = [plan.extent.min, plan.extent.max];
+    let bounds = plan.with_lines(Bounds { min: [xmin, ymin, 0], max: [xmax, ymax, 0] });
+    let size = Canvas::new(&plan.frame, bounds, HeightRange { low: 0, high: 0 }).size();
+    size.map(u64::from).iter().product()
+}
+
+/// Returns the bytes of the tiles, the coarser ones and `terrain.glb`. `has_levels` tells whether there are coarser tiles.
+fn tile_bytes(points: u64, tiles: u64, output: &OutputOptions, max_one_file: u64, has_levels: bool) -> u64 {
     let (compression, attributes) = (output.packing(), output.attributes);
     let in_tiles = points * result_per_site(compression, attributes) + tiles * RESULT_PER_TILE;
+    let in_levels = if has_levels && output.levels { in_tiles / 3 } else { 0 };
     // terrain.glb is never packed with meshopt.
     let unpacked = if compression == Compression::None { Compression::None } else { Compression::Quantized };
-    let in_one_file = if 2 * points <= max_one_file { points * result_per_site(unpacked, attributes) } else { 0 };
-    // Levels add about a third.
-    in_tiles + in_one_file + in_tiles / 2 + 4 * PIXELS
+    let has_one_file = output.format != OutputFormat::Tiles3d && 2 * points <= max_one_file;
+    let in_one_file = if has_one_file { points * result_per_site(unpacked, attributes) } else { 0 };
+    in_tiles + in_levels + in_one_file
 }
 
 /// Returns the bytes of the raster. While it is put together, its blocks take as many once more. All files of a grid of files count, because

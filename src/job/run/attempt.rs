@@ -62,6 +62,8 @@ struct JobRequest<'a> {
     triangulator: Triangulator,
     directory: JobDirectory,
     fingerprint: Fingerprint,
+    /// Says which inputs seem to have changed since tasks planned the job.
+    modified: Option<String>,
     clock: JobClock,
     walk: Walk,
     work: EarlierWork,
@@ -105,14 +107,15 @@ pub(crate) fn run_until_it_fits(
         EarlierWork::ByTasks => Triangulator::without_gpu(&options.triangulation),
     };
     let fingerprint = on_threads(workers(options, 0)?, || Fingerprint::of(options))?;
-    let fingerprint = match (work, &earlier) {
+    let (fingerprint, modified) = match (work, &earlier) {
         (EarlierWork::ByTasks, Some(earlier)) => earlier.as_planned(fingerprint)?,
         (EarlierWork::ByTasks, None) => {
             return Err(Error::TooEarly("the plan of the job is gone: submit the job again".into()));
         }
-        (EarlierWork::Interrupted, _) => fingerprint,
+        (EarlierWork::Interrupted, _) => (fingerprint, None),
     };
-    let job = JobRequest { options, run, triangulator, directory, fingerprint, clock, walk, work, submission };
+    let job =
+        JobRequest { options, run, triangulator, directory, fingerprint, modified, clock, walk, work, submission };
     let mut coarsening = coarsening_of(&job.directory, earlier.as_ref(), &job.fingerprint)?;
     loop {
         let outcome = attempt(&job, coarsening, earlier.take(), lock.take());
@@ -188,11 +191,12 @@ fn attempt(
     let header =
         JobHeader { fingerprint: job.fingerprint.clone(), coarsening, id: 0, submission: job.submission, begun: None };
     let stage = JobProgress::new(run.progress, clock, Vec::new()).stage("plan", 1, "job");
-    let plan = match earlier.as_ref().and_then(|earlier| earlier.plan(directory, &header, options)) {
+    let mut plan = match earlier.as_ref().and_then(|earlier| earlier.plan(directory, &header, options)) {
         Some(plan) => plan,
         None => on_threads(workers(options, 0)?, || make_plan(options, coarsening).map(Parts::cut_or_whole))?,
     };
     check_inputs_are_no_results(&plan)?;
+    plan.warnings.extend(job.modified.clone());
     check_height_offset(&plan)?;
     check_raster(&plan)?;
     stage.advance(1);
@@ -226,8 +230,9 @@ fn attempt(
         return Ok(report);
     }
     job.triangulator.prepare(plan.records, threads);
+    let is_one_part = plan.is_one_part();
     on_threads(threads, || {
-        let start = match plan.is_one_part() {
+        let start = match is_one_part {
             true => resume::start(directory, &header, earlier, options.output.max_edge, run.progress)?,
             // That tasks have done steps is nothing to tell.
             false if job.work == EarlierWork::ByTasks => {
@@ -259,13 +264,19 @@ fn attempt(
         let steps = journal.close() + outcome.as_ref().err().map_or(0, |_| of_parts());
         // An open file is not freed when it is removed.
         drop(store);
-        end(directory, outcome, steps, job.work)
+        end(directory, outcome, steps, job.work, is_one_part)
     })
 }
 
 /// Ends an attempt: puts the results in place, or keeps the finished steps if the job can go on from them. Removes everything else, but
 /// never the work of tasks after an error.
-fn end(directory: &JobDirectory, outcome: Result<Report>, steps: u64, work: EarlierWork) -> Result<Report> {
+fn end(
+    directory: &JobDirectory,
+    outcome: Result<Report>,
+    steps: u64,
+    work: EarlierWork,
+    is_one_part: bool,
+) -> Result<Report> {
     let is_by_tasks = work == EarlierWork::ByTasks;
     let outcome = outcome.and_then(|report| match place_results_of_finished_job(directory) {
         Err(Error::Io { source, .. }) if is_by_tasks && source.kind() == ErrorKind::NotFound => {
@@ -275,6 +286,8 @@ fn end(directory: &JobDirectory, outcome: Result<Report>, steps: u64, work: Earl
     });
     match outcome {
         Err(why) if is_by_tasks && !may_go_on(&why) => Err(why),
+        // With a corrected configuration a job of several parts may start over, so nothing is promised.
+        Err(why @ Error::Config(_)) if steps > 0 && !is_one_part => Err(why),
         Err(why) if may_go_on(&why) && steps > 0 => {
             Err(Error::Resumable { why: Box::new(why), steps, job: directory.job().into() })
         }

@@ -82,15 +82,22 @@ impl EarlierRun {
     }
 
     /// Returns the fingerprint `now` of the job with the inputs as they were when tasks planned it: machines may see other times and names.
+    /// Also says which inputs seem to have been modified since: the points are read, and only the user knows whether they are old.
     ///
     /// # Errors
     /// [`Error::Config`] if the job has changed since.
-    pub(crate) fn as_planned(&self, now: Fingerprint) -> Result<Fingerprint> {
-        let Some(JobHeader { fingerprint: planned, .. }) = &self.header else { return Ok(now) };
-        match now.since_planned(planned) {
-            Some(what) => Err(Error::Config(format!("{what}: changed since the job was planned; {PLAN_AGAIN}"))),
-            None => Ok(now.with_names_of(planned)),
+    pub(crate) fn as_planned(&self, now: Fingerprint) -> Result<(Fingerprint, Option<String>)> {
+        let Some(planned) = &self.header else { return Ok((now, None)) };
+        if let Some(what) = now.since_planned(&planned.fingerprint) {
+            return Err(Error::Config(format!("{what}: changed since the job was planned; {PLAN_AGAIN}")));
         }
+        let warning = now.modified_since(planned).map(|files| {
+            format!(
+                "{files}: modified after the job was planned; if the content has changed, the terrain may show the old one: submit the job \
+                 with --restart"
+            )
+        });
+        Ok((now.with_names_of(&planned.fingerprint), warning))
     }
 
     /// Tells whether its journal can be read.

@@ -44,7 +44,11 @@ pub(crate) fn start_parts<'a>(
             remove_file(&directory.journal())?;
             directory.clear_parts()?;
             directory.clear(&Alone::notes(directory)?)?;
-            (Vec::new(), JobHeader { id: new_id(), begun: Some(SystemTime::now()), ..header.clone() }, 0)
+            (
+                Vec::new(),
+                JobHeader { id: new_id(), begun: header.begun.or(Some(SystemTime::now())), ..header.clone() },
+                0,
+            )
         }
     };
     create_folder(&directory.output().tiles())?;

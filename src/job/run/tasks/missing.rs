@@ -125,7 +125,7 @@ pub(crate) fn missing_tasks(options: &JobOptions, tasks: u32) -> Result<Vec<Phas
     }
     let fingerprint = on_threads(workers(options, 0)?, || Fingerprint::of(options))?;
     let known = planned(&directory, 0)?;
-    let is_same = known.is_some_and(|(header, _)| fingerprint.since_planned(&header.fingerprint).is_none());
+    let is_same = known.is_some_and(|(header, _)| fingerprint.is_same_job(&header));
     if is_same { missing_tasks_of_planned(options, tasks) } else { Ok(PhaseTasks::all(tasks)) }
 }
 

@@ -22,6 +22,7 @@ use crate::job::run::resume_parts::start_parts;
 use crate::job::run::tasks::planned_job::planned;
 use crate::threads::on_threads;
 use crate::{Error, Result, disk};
+use std::time::SystemTime;
 
 /// Plans the job, unless that is done. Returns what there is to say.
 ///
@@ -29,6 +30,7 @@ use crate::{Error, Result, disk};
 /// Those of the plan; [`Error::InUse`] if another process works in the job directory.
 pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> Result<Option<String>> {
     let directory = &JobDirectory::new(&options.output.directory);
+    let begun = SystemTime::now();
     check_nothing_in_the_way(directory)?;
     let fingerprint = on_threads(workers(options, 0)?, || Fingerprint::of(options))?;
     if is_planned(directory, &fingerprint, run.submission)? {
@@ -39,7 +41,7 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> Result<Option<Strin
     let earlier = read_earlier(directory, run)?;
     let coarsening = coarsening_of(directory, earlier.as_ref(), &fingerprint)?;
     let submission = run.submission.max(known_submission(directory)?);
-    let header = JobHeader { fingerprint, coarsening, id: 0, submission, begun: None };
+    let header = JobHeader { fingerprint, coarsening, id: 0, submission, begun: Some(begun) };
     let known = earlier.as_ref().and_then(|earlier| earlier.plan(directory, &header, options));
     let plan = match known {
         Some(plan) => plan,
@@ -75,5 +77,5 @@ fn is_planned(directory: &JobDirectory, fingerprint: &Fingerprint, submission: u
     }
     let _lock = directory.share_lock()?;
     let known = planned(directory, submission)?;
-    Ok(known.is_some_and(|(header, _)| fingerprint.since_planned(&header.fingerprint).is_none()))
+    Ok(known.is_some_and(|(header, _)| fingerprint.is_same_job(&header)))
 }

@@ -5,6 +5,7 @@ use crate::job::durable::journal;
 use crate::job::options::JobOptions;
 use crate::job::partition::parts::Parts;
 use crate::job::plan::fingerprint::{JobHeader, PLAN_AGAIN};
+use crate::job::plan::input_identity::InputChange;
 use crate::job::plan::inputs::input_paths;
 use crate::job::plan::job_plan::Plan;
 use crate::job::records::{JobStep, StepRecord};
@@ -39,20 +40,19 @@ impl PlannedJob {
     /// # Errors
     /// [`Error::Config`] if one has changed, [`Error::Io`] if one cannot be read.
     pub(crate) fn find_inputs(&mut self, inputs: impl Iterator<Item = usize>) -> Result<()> {
-        let fingerprint = &self.header.fingerprint;
-        let renamed = fingerprint.present_names(&input_paths(&self.plan.options.input)?);
+        let renamed = self.header.fingerprint.present_names(&input_paths(&self.plan.options.input)?);
         let renamed =
             renamed.ok_or_else(|| Error::Config(format!("[input] files names other files now; {PLAN_AGAIN}")))?;
         let known: Vec<_> = self.plan.inputs.iter().map(|input| input.source.path.clone()).collect();
         self.plan.rename_inputs(&renamed);
         for input in inputs {
             let now = &self.plan.inputs[input].source.path;
-            if !fingerprint.has_same_content(&known[input], now)? {
-                return Err(Error::Config(format!(
-                    "{} has changed since the job was planned; {PLAN_AGAIN}",
-                    now.display()
-                )));
-            }
+            let what = match self.header.change_of(&known[input], now)? {
+                InputChange::Nothing => continue,
+                InputChange::Content => format!("has changed since the job was planned; {PLAN_AGAIN}"),
+                InputChange::Time => format!("was modified after the job was planned; {PLAN_AGAIN}"),
+            };
+            return Err(Error::Config(format!("{} {what}", now.display())));
         }
         Ok(())
     }
