@@ -3,6 +3,7 @@
 
 pub(crate) mod choice;
 pub(crate) mod codes;
+pub(crate) mod crs_name;
 pub(crate) mod datum;
 pub(crate) mod datum_names;
 pub(crate) mod doubts;
