@@ -29,6 +29,7 @@ pub mod transform_sources;
 mod transform_warnings;
 pub mod transformation;
 
+pub(crate) use crs::area_of_use::{AreaOfUse, arc};
 pub use crs::choice::CrsChoice;
 pub(crate) use crs::datum::Sameness;
 pub use crs::system::{ComparableCrs, Crs, CrsKind};
@@ -38,6 +39,7 @@ pub(crate) use crs::transform::between::DatumNote;
 pub use crs::transform::datum_rule::DatumRule;
 pub use crs::transform::to_globe::GlobeWay;
 pub use crs::unit::Unit;
+pub(crate) use crs::unit::same_length;
 pub use crs::vertical::VerticalSystem;
 pub use decoded_chunks::DecodedChunks;
 pub use file::random_access::not_a_file;

@@ -7,6 +7,7 @@ use crate::geometry::lattice::shortest_decimal;
 use crate::input::crs::choice::CrsChoice;
 use crate::input::crs::target::{NamedCrs, TargetCrs};
 use crate::input::crs::transform::datum_rule::DatumRule;
+use crate::input::crs::unit::Unit;
 use crate::input::points::classes::{IGNORED_GROUND, is_noise};
 use crate::input::points::optional_fields::OptionalFields;
 use crate::input::points::returns::KeptReturns;
@@ -57,6 +58,9 @@ pub struct InputOptions {
     /// Which datums are one when points are transformed.
     #[serde(default, skip_serializing_if = "DatumRule::is_default")]
     pub datums: DatumRule,
+    /// What the job does if points lie far outside the area that their coordinate reference system is made for.
+    #[serde(default, skip_serializing_if = "OutsideCrsArea::is_default")]
+    pub outside_crs_area: OutsideCrsArea,
     /// The unit of x and y.
     #[serde(default)]
     pub unit: UnitChoice,
@@ -197,6 +201,24 @@ pub enum OnBadFile {
     Skip,
 }
 
+/// What the job does if points lie far outside the area of use of their coordinate reference system.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum OutsideCrsArea {
+    /// It stops with an error.
+    #[default]
+    Stop,
+    /// It goes on with a warning.
+    Warn,
+}
+
+impl OutsideCrsArea {
+    /// Returns whether the job does what the program does by itself.
+    pub(crate) fn is_default(&self) -> bool {
+        *self == OutsideCrsArea::Stop
+    }
+}
+
 /// The unit of x and y.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -210,6 +232,18 @@ pub enum UnitChoice {
     Foot,
     /// The US survey foot, 1200/3937 m.
     UsFoot,
+}
+
+impl UnitChoice {
+    /// Returns the unit that is chosen, or [`Unit::Unknown`].
+    pub(crate) fn unit(self) -> Unit {
+        match self {
+            UnitChoice::Auto => Unit::Unknown,
+            UnitChoice::Metre => Unit::Metre,
+            UnitChoice::Foot => Unit::Foot,
+            UnitChoice::UsFoot => Unit::UsFoot,
+        }
+    }
 }
 
 /// What is wrong with the value of an option.

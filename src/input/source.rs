@@ -34,6 +34,7 @@ use crate::input::text::table::TextTable;
 use crate::{Error, Result, Warnings};
 
 mod crs_origin;
+mod geocentric;
 mod transformed;
 
 /// How a file holds its points.
@@ -155,7 +156,7 @@ fn open_las(file: &RandomAccessFile, with_index: bool) -> Result<Source> {
         let held = header.records - missing;
         warnings.push(format!("the header promises {} points, but the file has only {held}", header.records));
     }
-    Ok(Source {
+    let mut source = Source {
         path: file.path().to_path_buf(),
         size: file.size(),
         format: if header.compressed { FileFormat::Laz } else { FileFormat::Las },
@@ -176,7 +177,9 @@ fn open_las(file: &RandomAccessFile, with_index: bool) -> Result<Source> {
         warnings,
         transform: None,
         points,
-    })
+    };
+    source.drop_false_geocentric_crs()?;
+    Ok(source)
 }
 
 fn open_text(file: &RandomAccessFile, options: &TextOptions, choice: &RowChoice) -> Result<Source> {

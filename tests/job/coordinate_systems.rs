@@ -45,6 +45,18 @@ pub(crate) fn write(folder: &Path, name: &str, records: &[(u16, Vec<u8>)]) -> Pa
     path
 }
 
+/// Moves the points of a file that [`write`] wrote around a place, and its box.
+pub(crate) fn move_to(path: &Path, place: [f64; 3]) {
+    let mut bytes = fs::read(path).unwrap();
+    for (axis, value) in place.into_iter().enumerate() {
+        let half = if axis < 2 { 2_000.0 } else { 1.0 };
+        for (at, value) in [(155 + 8 * axis, value), (179 + 16 * axis, value + half), (187 + 16 * axis, value - half)] {
+            bytes[at..at + 8].copy_from_slice(&value.to_le_bytes());
+        }
+    }
+    fs::write(path, bytes).unwrap();
+}
+
 pub(crate) fn text(text: &str) -> (u16, Vec<u8>) {
     (TEXT, text.as_bytes().to_vec())
 }
@@ -97,6 +109,12 @@ fn geocentric_coordinates_are_refused_by_code_text_and_keys() {
         ("model.las", keys(&[[1024, 0, 1, 3], [2048, 0, 1, 4326]])),
     ] {
         let file = write(folder.path(), name, &[record]);
+        let unplaced = Job::on(&[&file]).with("input", "unit = \"us-foot\"").report();
+        let said = warnings(&unplaced);
+        assert!(said.contains("is geocentric, but its points do not lie on the surface of the earth"), "{said}");
+        assert_eq!((unplaced["unit"].as_str(), unplaced["crs"].as_str()), (Some("us-foot"), None));
+        assert_eq!(Job::on(&[&file]).report()["unit"], "metre");
+        move_to(&file, [4_177_000.0, 855_000.0, 4_728_000.0]);
         let words = ["geocentric", "z is no height", "pdal translate", "[input] crs"];
         Job::on(&[&file]).run().refused(2, &words);
         Job::on(&[&file]).with("input", "unit = \"metre\"").run().refused(2, &words);
@@ -304,4 +322,29 @@ fn a_crs_that_is_not_known_is_an_error_of_the_configuration() {
     let file = write(folder.path(), "a.las", &[]);
     Job::on(&[&file]).with("input", "crs = \"UTM 15\"").run().refused(2, &["line", "EPSG:26915", "well-known text"]);
     Job::on(&[&file]).with("input", "crs = \"EPSG:4978\"").run().refused(2, &["geocentric"]);
+    let urn = "crs = \"urn:ogc:def:crs:EPSG::1\"";
+    Job::on(&[&file]).with("input", urn).run().refused(2, &["line", "EPSG:1 is not"]);
+}
+
+#[test]
+fn urns_and_urls_name_systems_as_codes_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = write(folder.path(), "a.las", &[]);
+    let report = |lines: &str| Job::on(&[&file]).with("input", lines).report();
+    let version = "urn:ogc:def:crs:EPSG:9.6.2:26915";
+    for crs in ["urn:ogc:def:crs:EPSG::26915", version, "http://www.opengis.net/def/crs/EPSG/0/26915"] {
+        for key in ["crs", "missing_crs"] {
+            assert_eq!(report(&format!("{key} = \"{crs}\""))["crs"], "NAD83 / UTM zone 15N", "{key} {crs}");
+        }
+    }
+    let compound = "urn:ogc:def:crs,crs:EPSG::26915,crs:EPSG::6360";
+    assert!(warnings(&report(&format!("crs = \"{compound}\""))).contains("heights are in another unit"));
+    let path = folder.path().join("degrees.csv");
+    let place = |i: usize| [-93.0 + (i % 10) as f64 * 1e-4, 45.0 + (i / 10) as f64 * 1e-4];
+    let rows = (0..60).map(|i| format!("{:.6},{:.6},{}\n", place(i)[0], place(i)[1], i % 3)).collect::<String>();
+    fs::write(&path, rows).unwrap();
+    let lines = "missing_crs = \"urn:ogc:def:crs:OGC:1.3:CRS84\"\nto_crs = \"urn:ogc:def:crs:EPSG::32615\"";
+    let moved = Job::on(&[&path]).with("input", lines).report();
+    assert_eq!(moved["crs"], "WGS 84 / UTM zone 15N");
+    assert_eq!(moved["transformations"][0]["inputs"], 1);
 }

@@ -74,7 +74,8 @@ fn columns_of_degrees_are_no_coordinates_of_a_map_and_latitudes_end_at_the_poles
         }
     }
     // With a unit, the user says that they are none.
-    Job::on(&[&named]).with("input", "crs = \"EPSG:26915\"\nunit = \"metre\"").run().succeeded();
+    let metres = "crs = \"EPSG:26915\"\nunit = \"metre\"\noutside_crs_area = \"warn\"";
+    Job::on(&[&named]).with("input", metres).run().succeeded();
     let swapped = write("swapped.csv", "x,y,z", [1, 0]);
     // The middle lies at 90 degrees west.
     let fit = fs::read_to_string(&swapped).unwrap().replace(",-9", ",-19").replace(",-8", ",-18");

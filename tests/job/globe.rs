@@ -361,10 +361,19 @@ fn one_file_stays_flat() {
     assert!(flat[0].len() > 3_000 && flat.iter().all(|mesh| *mesh == flat[0]));
 }
 
-/// A file may say another unit than the code that it names, and a user may say it of a text.
+/// The text of a system may give it another unit than its code has.
 #[test]
 fn coordinates_in_feet_are_where_they_belong_although_the_code_means_metres() {
     const FOOT: f64 = 1200.0 / 3937.0;
+    let system = |metres: f64| {
+        format!(
+            r#"PROJCS["UTM",GEOGCS["NAD83",DATUM["North_American_Datum_1983",SPHEROID["GRS 1980",6378137,298.257222101]],
+            PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],
+            PARAMETER["latitude_of_origin",0],PARAMETER["central_meridian",-93],PARAMETER["scale_factor",0.9996],
+            PARAMETER["false_easting",{}],PARAMETER["false_northing",0],UNIT["unit",{metres}],AUTHORITY["EPSG","26915"]]"#,
+            500_000.0 / metres
+        )
+    };
     let placed = |unit: &str, metres: f64| {
         let folder = tempfile::tempdir().unwrap();
         let mut random = Random(7);
@@ -375,7 +384,7 @@ fn coordinates_in_feet_are_where_they_belong_although_the_code_means_metres() {
         }
         let cloud = folder.path().join("cloud.csv");
         std::fs::write(&cloud, text).unwrap();
-        let job = Job::on(&[&cloud]).with("input", &format!("crs = \"EPSG:26915\"\nunit = \"{unit}\""));
+        let job = Job::on(&[&cloud]).with("input", &format!("crs = '''{}'''\nunit = \"{unit}\"", system(metres)));
         let job = job.with("output", "format = \"3dtiles\"");
         job.report();
         (numbers::<16>(&georeference(&job, "globe")["transform"]).unwrap(), job)

@@ -21,6 +21,7 @@ mod program;
 mod tileset;
 mod transformed;
 
+mod areas_of_use;
 mod attributes;
 mod bad_files;
 mod breaklines;

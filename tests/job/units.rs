@@ -153,3 +153,44 @@ fn files_without_a_unit_beside_a_text_with_one_are_named() {
     assert!(metres(&[&other, &named], "").1.contains("do not say the unit of their coordinates"));
     assert!(!metres(&[&other, &bare], "unit = \"metre\"").1.contains("do not say the unit"));
 }
+
+/// NAD83 / UTM 15N without a code.
+const WORDED: &str = r#"PROJCS["UTM",GEOGCS["GCS_North_American_1983",DATUM["D_North_American_1983",
+    SPHEROID["GRS_1980",6378137.0,298.257222101]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],
+    PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",500000.0],PARAMETER["False_Northing",0.0],
+    PARAMETER["Central_Meridian",-93.0],PARAMETER["Scale_Factor",0.9996],PARAMETER["Latitude_Of_Origin",0.0],
+    UNIT["Meter",1.0]]"#;
+
+#[test]
+fn a_unit_that_contradicts_the_crs_is_refused_with_both_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let bare = csv(&folder, "bare.csv", "x,y,z");
+    let [metre, feet] =
+        [("m.las", 26915), ("ft.las", 2276)].map(|(name, crs)| write(folder.path(), name, &[code(crs)]));
+    let worded = write(folder.path(), "text.las", &[text(WORDED)]);
+    for (file, lines, words) in [
+        (
+            &metre,
+            "unit = \"us-foot\"",
+            ["m.las is in NAD83 / UTM zone 15N (EPSG:26915), whose unit is the metre", "US"],
+        ),
+        (&worded, "unit = \"foot\"", ["text.las is in UTM, whose unit is the metre", "unit says foot"]),
+        // The two kinds of foot.
+        (&feet, "unit = \"foot\"", ["whose unit is the US survey foot", "unit says foot"]),
+        (&metre, "crs = \"first\"\nunit = \"foot\"", ["m.las is in NAD83", "unit says foot"]),
+        (&bare, "crs = \"EPSG:26915\"\nunit = \"us-foot\"", ["[input] crs is NAD83", "leave unit out"]),
+        (&bare, "missing_crs = \"EPSG:26915\"\nunit = \"foot\"", ["[input] missing_crs is NAD83", "leave unit out"]),
+        (&bare, "crs = \"EPSG:2276\"\nto_crs = \"utm\"\nunit = \"metre\"", ["[input] crs is NAD83", "unit says metre"]),
+    ] {
+        Job::on(&[file]).with("input", lines).run().refused(2, &words);
+        Job::on(&[file]).with("input", lines).run_with(&["check"]).refused(2, &words);
+    }
+    // The same unit, a CRS of the user in that unit, and no CRS.
+    assert_eq!(metres(&[&metre], "unit = \"metre\"").0, [1.0, 1.0]);
+    let in_feet =
+        WORDED.replace("500000.0", "1640416.666666667").replace("\"Meter\",1.0", "\"Foot_US\",0.3048006096012192");
+    let lines = format!("crs = '''{in_feet}'''\nunit = \"us-foot\"\noutside_crs_area = \"warn\"");
+    assert_eq!(metres(&[&metre], &lines).0, [US_FOOT, US_FOOT]);
+    assert_eq!(metres(&[&metre], "crs = \"none\"\nunit = \"us-foot\"").0, [US_FOOT, US_FOOT]);
+    assert_eq!(metres(&[&bare], "unit = \"us-foot\"").0, [US_FOOT, US_FOOT]);
+}

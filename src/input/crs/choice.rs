@@ -1,8 +1,8 @@
 //! The coordinate reference system that a user names for all inputs.
 
-use crate::input::crs::from_wkt::{from_epsg, parse};
+use crate::input::crs::crs_name::CrsName;
+use crate::input::crs::from_wkt::parse;
 use crate::input::crs::system::Crs;
-use crate::input::crs::vertical::VerticalSystem;
 use serde::{Deserialize, Serialize};
 
 /// The value of `[input] crs`: which coordinate reference system the inputs are in.
@@ -57,26 +57,11 @@ impl From<CrsChoice> for String {
 
 /// Returns the system of codes or of well-known text; `None` if the text is of another kind.
 pub(crate) fn named(text: &str) -> Result<Option<Crs>, String> {
-    Ok(of_codes(text)?.or_else(|| parse(text)))
-}
-
-/// Returns the system of `EPSG:n` or `EPSG:n+m`; `None` if the text is of another kind.
-fn of_codes(text: &str) -> Result<Option<Crs>, String> {
-    let Some((authority, codes)) = text.split_once(':') else { return Ok(None) };
-    let (horizontal, vertical) = codes.split_once('+').map_or((codes, None), |(n, m)| (n, Some(m)));
-    let number = |code: &str| code.trim().parse::<u32>().ok();
-    let (true, Some(code)) = (authority.trim().eq_ignore_ascii_case("EPSG"), number(horizontal)) else {
-        return Ok(None);
-    };
-    let unknown = |code: &str| format!("crs: EPSG:{code} is not in the list of known codes; give its well-known text");
-    let mut crs = from_epsg(code).ok_or_else(|| unknown(horizontal))?;
-    if let Some(vertical) = vertical {
-        let system = number(vertical).map(|code| VerticalSystem { epsg: Some(code), ..VerticalSystem::default() });
-        let metres = system.as_ref().and_then(VerticalSystem::metres_of_code).ok_or_else(|| unknown(vertical))?;
-        crs.vertical = Some(metres);
-        crs.vertical_system = system;
+    let unknown = |code: u32| format!("crs: EPSG:{code} is not in the list of known codes; give its well-known text");
+    match CrsName::read(text) {
+        Some(name) => name.system().map(Some).map_err(unknown),
+        None => Ok(parse(text)),
     }
-    Ok(Some(crs))
 }
 
 #[cfg(test)]
@@ -94,6 +79,7 @@ mod tests {
     #[test]
     fn codes_and_texts_are_read() {
         assert_eq!(given("EPSG:26915").epsg, Some(26915));
+        assert_eq!(given("urn:ogc:def:crs:EPSG::26915"), given("EPSG:26915"));
         let compound = given("epsg:26915+6360");
         assert_eq!((compound.horizontal, compound.vertical), (Unit::Metre, Some(Unit::US_FOOT)));
         assert_eq!(

@@ -1,5 +1,5 @@
 //! What EPSG codes stand for. The crate `crs-definitions` knows most systems; the tables beside this file, written from version 11.022
-//! of the EPSG dataset, hold those that it lacks or has otherwise, and all systems of heights.
+//! of the EPSG dataset, hold those that it lacks or has otherwise, all systems of heights, and the areas of use of all systems of places.
 
 use std::collections::HashMap;
 use std::sync::OnceLock;
@@ -14,6 +14,9 @@ const SYSTEMS: &str = include_str!("codes/systems.tsv");
 /// On each line the code of a system of heights, that of its datum, up or down, the metres of its unit, and the comparable names that
 /// only this datum has, by EPSG and by ESRI. A name stands on the first line of its datum only.
 const HEIGHTS: &str = include_str!("codes/heights.tsv");
+
+/// On each line the area of use of some systems, west, south, east and north in degrees, and their codes, such as `2001,4601-4604`.
+const AREAS: &str = include_str!("codes/areas.tsv");
 
 /// A system of heights that has a code.
 #[derive(Clone, Copy, Debug)]
@@ -53,6 +56,11 @@ pub(crate) fn proj4_of_code(code: u32) -> Option<&'static str> {
         return None;
     }
     Some(crs_definitions::from_code(u16::try_from(code).ok()?)?.proj4)
+}
+
+/// Returns the areas of use and the codes of the systems that are made for them, as the table has them.
+pub(crate) fn lines_of_areas() -> impl Iterator<Item = (&'static str, &'static str)> {
+    AREAS.lines().filter_map(|line| line.split_once('\t'))
 }
 
 /// Returns the systems of heights that have codes.

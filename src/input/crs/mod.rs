@@ -1,8 +1,10 @@
 //! Coordinate reference systems, as far as a terrain needs them: the units, a text for readers, and whether two systems agree.
 //! This room knows no files: the readers of file formats hand it the records that describe the system.
 
+pub(crate) mod area_of_use;
 pub(crate) mod choice;
 pub(crate) mod codes;
+pub(crate) mod crs_name;
 pub(crate) mod datum;
 pub(crate) mod datum_names;
 pub(crate) mod doubts;

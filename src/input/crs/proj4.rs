@@ -7,8 +7,17 @@ use crate::input::crs::wkt::{BASE, DATUM, PROJECTED, WktNode, find};
 
 /// Returns the definition of the system of this code, or else of this text; `None` if neither gives one.
 pub(crate) fn definition(epsg: Option<u32>, wkt: Option<&str>) -> Option<String> {
-    let of_code = epsg.and_then(proj4_of_code).map(str::to_string);
-    of_code.or_else(|| of_text(wkt?))
+    let of_code = epsg.and_then(proj4_of_code).filter(|definition| leads_to_wgs84(definition));
+    of_code.map(str::to_string).or_else(|| of_text(wkt?))
+}
+
+/// Returns whether a definition says the way to WGS 84, or needs none because its ellipsoid is that of WGS 84 and all datums like it, or a
+/// sphere. Without a shift, a datum on another ellipsoid is hundreds of metres off.
+fn leads_to_wgs84(definition: &str) -> bool {
+    let value = |key: &str| definition.split_whitespace().find_map(|word| word.strip_prefix(key)?.strip_prefix('='));
+    let says_way = ["+towgs84", "+datum", "+nadgrids"].iter().any(|key| value(key).is_some());
+    let is_sphere = value("+R").is_some() || value("+a").is_some() && value("+a") == value("+b");
+    says_way || is_sphere || value("+ellps").is_some_and(|name| ["GRS80", "WGS84"].contains(&name))
 }
 
 fn of_text(text: &str) -> Option<String> {
@@ -43,6 +52,19 @@ mod tests {
     fn a_code_gives_its_own_definition() {
         let definition = definition(Some(26915), None).unwrap();
         assert!(definition.contains("+proj=utm +zone=15"), "{definition}");
+    }
+
+    #[test]
+    fn a_code_without_a_shift_of_its_datum_gives_none() {
+        // Anguilla 1957 and Xian 1980.
+        for code in [2000, 2334] {
+            assert!(!proj4_of_code(code).unwrap().contains("towgs84"));
+            assert_eq!(definition(Some(code), None), None, "EPSG:{code}");
+        }
+        // ITRF2000-like datums, a sphere, and a datum with a shift.
+        for code in [6344, 2163, 31467] {
+            assert!(definition(Some(code), None).is_some(), "EPSG:{code}");
+        }
     }
 
     #[test]

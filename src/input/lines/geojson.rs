@@ -7,6 +7,7 @@ use serde::{Deserialize, Deserializer};
 use serde_json::Value;
 use serde_json::value::RawValue;
 
+use crate::input::crs::crs_name::CrsName;
 use crate::input::crs::from_wkt::from_epsg;
 use crate::input::crs::system::Crs;
 use crate::input::lines::attribute::{Attribute, WantedAttributes, no_attribute};
@@ -123,16 +124,9 @@ fn add(
 /// Returns the system of the member `crs`, as in `{"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::25832"}}`.
 fn named_crs(value: &Value) -> Option<Crs> {
     let name = value.get("properties")?.get("name")?.as_str()?;
-    let last = name.rsplit([':', '/']).next()?;
-    match last {
-        "CRS84" | "CRS84h" => from_epsg(WGS_84),
-        code if name.to_ascii_uppercase().contains("EPSG") => {
-            let code = code.parse().ok()?;
-            // A code that is not in the list is still a code: two files with the same one agree.
-            Some(from_epsg(code).unwrap_or(Crs { epsg: Some(code), ..Crs::default() }))
-        }
-        _ => None,
-    }
+    let name = CrsName::read(name)?;
+    // A code that is not in the list is still a code: two files with the same one agree.
+    Some(name.system().unwrap_or(Crs { epsg: Some(name.plane), ..Crs::default() }))
 }
 
 #[cfg(test)]
@@ -189,6 +183,8 @@ mod tests {
         assert_eq!(named("urn:ogc:def:crs:EPSG::25832").unwrap().epsg, Some(25832));
         assert_eq!(named("EPSG:99999").unwrap().epsg, Some(99999));
         assert_eq!(named("urn:ogc:def:crs:OGC:1.3:CRS84").unwrap().epsg, Some(4326));
+        let compound = named("urn:ogc:def:crs,crs:EPSG::25832,crs:EPSG::5783").unwrap();
+        assert_eq!((compound.epsg, compound.vertical), (Some(25832), Some(1.0)));
         assert_eq!(with("null").unwrap(), Crs::default());
         assert!(named("my grid").unwrap_err().to_string().contains("my grid"));
         for choice in ["points", "EPSG:25832"] {

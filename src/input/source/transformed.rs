@@ -30,6 +30,11 @@ impl Source {
         self.transform.as_deref()
     }
 
+    /// Returns what the coordinates of the file are in, if its points are moved into another system.
+    pub(crate) fn transformed_from(&self) -> Option<&Crs> {
+        self.transform().filter(|transform| transform.is_moved).map(|transform| &transform.from)
+    }
+
     /// Returns the system that the file itself says its coordinates are in.
     pub fn own_crs(&self) -> &Crs {
         self.transform.as_ref().map_or(&self.crs, |transform| &transform.own.crs)

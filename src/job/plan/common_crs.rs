@@ -18,7 +18,7 @@ struct Said<'a> {
 impl Said<'_> {
     /// `[input] unit` says what the columns of a text are in: x and y, and heights in the same unit.
     fn of(source: &Source, unit: UnitChoice) -> Said<'_> {
-        let (chosen, named) = (unit_of(unit), source.crs.horizontal.metres_per_unit());
+        let (chosen, named) = (unit.unit(), source.crs.horizontal.metres_per_unit());
         if source.format != FileFormat::Text || chosen == Unit::Unknown {
             return Said { source, crs: Cow::Borrowed(&source.crs) };
         }
@@ -37,7 +37,7 @@ impl Said<'_> {
 /// # Errors
 /// [`Error::Config`] if two sources differ, or cannot be compared, and the user does not say which CRS to take.
 pub fn common_crs(sources: &[Source], choice: &CrsChoice, unit: UnitChoice, warnings: &mut Warnings) -> Result<Crs> {
-    warn_of_other_units(sources, unit_of(unit), warnings);
+    warn_of_other_units(sources, unit.unit(), warnings);
     let said: Vec<Said> = sources.iter().map(|source| Said::of(source, unit)).collect();
     let mut crs = match choice {
         CrsChoice::Auto => {
@@ -290,15 +290,6 @@ fn are_feet(own: Unit, other: Unit) -> bool {
     is_foot(own) && is_foot(other)
 }
 
-fn unit_of(choice: UnitChoice) -> Unit {
-    match choice {
-        UnitChoice::Auto => Unit::Unknown,
-        UnitChoice::Metre => Unit::Metre,
-        UnitChoice::Foot => Unit::Foot,
-        UnitChoice::UsFoot => Unit::UsFoot,
-    }
-}
-
 /// What to do about coordinates that are not on a map.
 const TRANSFORM: &str = "Transform the points to a projected CRS first, for example with `pdal translate \
     --writers.las.scale_x=0.01 --writers.las.scale_y=0.01 in.laz out.laz reprojection --filters.reprojection.out_srs=EPSG:...`";
@@ -332,7 +323,7 @@ pub fn horizontal_unit(
             crs.label()
         )));
     }
-    let unit = if choice == UnitChoice::Auto { crs.horizontal } else { unit_of(choice) };
+    let unit = if choice == UnitChoice::Auto { crs.horizontal } else { choice.unit() };
     if let Some(metres) = unit.metres_per_unit() {
         return Ok((key_of(unit), metres));
     }

@@ -3,6 +3,7 @@
 //! One point of noise, or a header with a wrong greatest height, must not give all of a terrain one colour. So a sample of the points
 //! decides. It is the same for a job of one part and of several, whose tiles are coloured before the last point is read.
 
+use crate::geometry::Site;
 use crate::input::{DecodedChunks, OptionalFields, PointCounts, PointRules, Source};
 use crate::output::color::HeightRange;
 use crate::{Result, interrupt};
@@ -37,8 +38,29 @@ pub(crate) struct HeightSample {
     records: u64,
     /// What became of the records at which it looked.
     pub(crate) counts: PointCounts,
-    /// The same of each file at which it looked.
-    pub(crate) by_file: BTreeMap<PathBuf, PointCounts>,
+    /// What it found in each file at which it looked.
+    pub(crate) by_file: BTreeMap<PathBuf, FileSample>,
+}
+
+/// What the sample found in a file.
+#[derive(Default)]
+pub(crate) struct FileSample {
+    /// What became of its records.
+    pub(crate) counts: PointCounts,
+    /// The lattice integers of its points in x and y, in no order.
+    plane: [Vec<i32>; 2],
+}
+
+impl FileSample {
+    /// Returns the median x and the median y of its points, in lattice integers; `None` without points. Stray points do not move them.
+    pub(crate) fn middle(&self) -> Option<[i32; 2]> {
+        let median = |values: &[i32]| {
+            let mut values = values.to_vec();
+            let middle = values.len() / 2;
+            (!values.is_empty()).then(|| *values.select_nth_unstable(middle).1)
+        };
+        Some([median(&self.plane[0])?, median(&self.plane[1])?])
+    }
 }
 
 impl HeightSample {
@@ -68,14 +90,19 @@ impl HeightSample {
             let at = ends.partition_point(|&end| end <= chunk);
             let (source, rules, decoded) = &inputs[at];
             let chunk = decoded.chunk(chunk + decoded.len() - ends[at]);
-            first_heights(source, rules, chunk, RECORDS / most as u64).map(|found| (&source.path, found))
+            first_points(source, rules, chunk, RECORDS / most as u64).map(|found| (&source.path, found))
         };
         let found = (0..places).into_par_iter().map(look).collect::<Result<Vec<_>>>()?;
         let (mut heights, mut counts, mut by_file) = (Vec::new(), PointCounts::default(), BTreeMap::new());
-        for (path, (more, its_counts)) in found {
-            heights.extend(more);
+        for (path, (points, its_counts)) in found {
             counts += its_counts.clone();
-            *by_file.entry(path.clone()).or_insert_with(PointCounts::default) += its_counts;
+            let of_file: &mut FileSample = by_file.entry(path.clone()).or_default();
+            of_file.counts += its_counts;
+            for ([x, y], z) in points {
+                of_file.plane[0].push(x);
+                of_file.plane[1].push(y);
+                heights.push(z);
+            }
         }
         heights.sort_unstable();
         Ok(HeightSample { heights, places, seen: counts.read - counts.not_decoded, records, counts, by_file })
@@ -110,15 +137,20 @@ fn may_reach(source: &Source, bounds: Option<[f64; 4]>) -> bool {
     min[0] <= xmax && min[1] <= ymax && max[0] >= xmin && max[1] >= ymin
 }
 
-/// Returns the heights of the points that the job keeps among the first `records` records of a chunk, and what became of these records.
-fn first_heights(source: &Source, rules: &PointRules, chunk: usize, records: u64) -> Result<(Vec<i32>, PointCounts)> {
+/// Returns the points that the job keeps among the first `records` records of a chunk, and what became of these records.
+fn first_points(
+    source: &Source,
+    rules: &PointRules,
+    chunk: usize,
+    records: u64,
+) -> Result<(Vec<(Site, i32)>, PointCounts)> {
     let rules = PointRules { fields: OptionalFields::default(), ..rules.clone() };
-    let mut heights = Vec::new();
+    let mut found = Vec::new();
     let counts = source.decode_start(chunk, records, &rules, &mut |points| {
-        heights.extend(points.iter().map(|point| point.z));
+        found.extend(points.iter().map(|point| (point.position, point.z)));
         Ok(())
     })?;
-    Ok((heights, counts))
+    Ok((found, counts))
 }
 
 #[cfg(test)]

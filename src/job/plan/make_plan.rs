@@ -7,6 +7,7 @@ use crate::input::surface_doubts::no_ground;
 use crate::input::transform_sources::transform_sources;
 use crate::input::{Axis, CrsChoice, FileFormat, PointCounts, PointRules, Source, set_network_memory};
 use crate::job::options::JobOptions;
+use crate::job::plan::area_check::{CommonPlace, check_places};
 use crate::job::plan::breaklines::line_files::LineFiles;
 use crate::job::plan::breaklines::{CloudOfPlan, PlannedBreaklines};
 use crate::job::plan::budget::network_memory;
@@ -16,6 +17,7 @@ use crate::job::plan::height_range::HeightSample;
 use crate::job::plan::inputs::{check_missing_records, open_all};
 use crate::job::plan::job_plan::{Claims, Plan, PlannedInput, SkippedInput, decoded_records};
 use crate::job::plan::lattice_choice::{LatticeCoarsening, LatticeWish, choose_lattice, fineness};
+use crate::job::plan::other_unit::refuse_other_unit;
 use crate::job::plan::text_inputs::{
     check_malformed_rows, farthest_row, leave_out_outliers, refuse_degrees, refuse_missing_classes,
     refuse_missing_returns, row_choice, wanted_fields,
@@ -106,6 +108,7 @@ fn try_plan(
         return Err(Error::Config(format!("{records} records are more than one job can hold (2^40)")));
     }
     check_missing_records(sources, &options.input)?;
+    refuse_other_unit(sources, &options.input)?;
     transform_sources(sources, &options.input, &mut warnings)?;
     refuse_degrees(sources, &options.input)?;
     refuse_missing_classes(sources, &options.input)?;
@@ -137,6 +140,9 @@ fn try_plan(
     check_malformed_rows(sources, &rules, options)?;
     let (clipped, claimed_area) =
         (lattice_extent(&lattice, &extent, clip), claimed_area(&lattice, sources, &extent, clip.is_some()));
+    let sample = HeightSample::take(sources, &rules, options.input.bounds.map(|bounds| bounds.0))?;
+    let place = CommonPlace { crs: &crs, metres, lattice: &lattice, extent: &extent, sample: &sample };
+    check_places(sources, &place, &options.input, &mut warnings)?;
     let cloud = CloudOfPlan { sources, rules: &rules, lattice: &lattice, extent: &extent, clipped, area: claimed_area };
     let breaklines = PlannedBreaklines::of(&lines, options, &cloud, &mut warnings)?;
     let claimed = extent.boxes.iter().map(|claim| claimed_box(&lattice, claim, clipped)).collect::<Vec<_>>();
@@ -146,7 +152,6 @@ fn try_plan(
     let lines_at = breaklines.as_ref().and_then(|lines| lines.bounds);
     let claims = claims.map(|claims| claims.with_lines(lines_at));
     let [low, high] = claimed_heights(&lattice, &extent).map(|z| z.round() as i32);
-    let sample = HeightSample::take(sources, &rules, options.input.bounds.map(|bounds| bounds.0))?;
     let heights = sample.range_within(HeightRange { low, high });
     let plan = Plan {
         claims,
@@ -222,7 +227,7 @@ fn claims(
 /// Returns a sentence about the files whose sample has no ground, if the job wants only that, and others have some.
 fn files_without_ground(sample: &HeightSample, options: &JobOptions) -> Option<String> {
     let lacks_ground = |counts: &PointCounts| no_ground(&options.input, counts);
-    let mut without = sample.by_file.iter().filter_map(|(path, counts)| Some((path, lacks_ground(counts)?)));
+    let mut without = sample.by_file.iter().filter_map(|(path, found)| Some((path, lacks_ground(&found.counts)?)));
     let (path, what) = without.next().filter(|_| lacks_ground(&sample.counts).is_none())?;
     let others = match without.count() {
         0 => String::new(),

@@ -1,6 +1,7 @@
 //! Step 1: the plan says what a job is. It is made from the options, the inputs' headers and samples of their points. It can be
 //! written down and read back, so that every later step is a function of the plan, an index and the store.
 
+pub(crate) mod area_check;
 pub mod breaklines;
 pub mod budget;
 pub mod common_crs;
@@ -17,4 +18,5 @@ pub mod make_plan;
 mod missing_attributes;
 pub(crate) mod named_files;
 pub mod no_points;
+mod other_unit;
 pub(crate) mod text_inputs;

@@ -1,0 +1,158 @@
+//! The areas that systems are made for. A place far outside of that of its system is most often a mistake: exchanged coordinates, or the
+//! wrong system.
+
+use crate::input::crs::codes::{lines_of_areas, text_of_code};
+use crate::input::crs::projection::Projection;
+use crate::input::crs::system::Crs;
+use crate::input::crs::wkt::{PROJECTED, find};
+use std::ops::RangeInclusive;
+
+/// The area of use of a system: one or several rectangles of longitude and latitude in degrees.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct AreaOfUse {
+    rectangles: Vec<Rectangle>,
+}
+
+/// The longitudes of its western and its eastern end, and its latitudes. One across the date line has its west east of its east.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Rectangle {
+    west: f64,
+    south: f64,
+    east: f64,
+    north: f64,
+}
+
+impl AreaOfUse {
+    /// Returns the area of a system by its EPSG code. That of a system without one, or whose text contradicts it, is that of all codes with
+    /// the same projection. Returns `None` if there is no such code.
+    pub(crate) fn of(crs: &Crs) -> Option<AreaOfUse> {
+        let code = crs.epsg.filter(|_| crs.difference_to_code().is_none());
+        let by_code = code.map(|code| rectangles(&[code])).filter(|found| !found.is_empty());
+        let rectangles = by_code.or_else(|| Some(rectangles(&codes_of_projection(crs.form()?.projection()?))))?;
+        (!rectangles.is_empty()).then_some(AreaOfUse { rectangles })
+    }
+
+    /// Returns how far a place in degrees lies outside: degrees of arc to the east or west, and to the north or south.
+    pub(crate) fn beyond(&self, place: [f64; 2]) -> [f64; 2] {
+        self.nearest(place).beyond(place)
+    }
+
+    /// Returns the part of the area that is nearest to a place, for a sentence.
+    pub(crate) fn label(&self, place: [f64; 2]) -> String {
+        let Rectangle { west, south, east, north } = self.nearest(place);
+        let [west, south, east, north] = [west, south, east, north].map(|degrees| (degrees * 10.0).round() / 10.0);
+        format!("longitude {west} to {east}, latitude {south} to {north}")
+    }
+
+    fn nearest(&self, place: [f64; 2]) -> Rectangle {
+        let distance = |rectangle: &&Rectangle| arc(rectangle.beyond(place));
+        let nearest = self.rectangles.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        nearest.copied().unwrap_or(Rectangle::EARTH)
+    }
+}
+
+/// Returns the length of a way in degrees of arc by its parts to the east and to the north.
+pub(crate) fn arc([across, along]: [f64; 2]) -> f64 {
+    libm::hypot(across, along)
+}
+
+impl Rectangle {
+    const EARTH: Rectangle = Rectangle { west: -180.0, south: -90.0, east: 180.0, north: 90.0 };
+
+    /// Reads four numbers between blanks.
+    fn read(text: &str) -> Option<Rectangle> {
+        let numbers = text.split(' ').map(|number| number.parse().ok()).collect::<Option<Vec<f64>>>()?;
+        let [west, south, east, north] = numbers.try_into().ok()?;
+        Some(Rectangle { west, south, east, north })
+    }
+
+    fn beyond(&self, [longitude, latitude]: [f64; 2]) -> [f64; 2] {
+        let turn = |degrees: f64| degrees.rem_euclid(360.0);
+        let width = if self.west <= self.east { self.east - self.west } else { self.east - self.west + 360.0 };
+        let from_west = turn(longitude - self.west);
+        let across = if from_west <= width { 0.0 } else { (from_west - width).min(360.0 - from_west) };
+        let along = (self.south - latitude).max(latitude - self.north).max(0.0);
+        [across * libm::cos(latitude.to_radians()), along]
+    }
+}
+
+/// Returns the rectangles of the areas of `codes`.
+fn rectangles(codes: &[u32]) -> Vec<Rectangle> {
+    let is_meant = |list: &str| codes.iter().any(|code| runs(list).any(|run| run.contains(code)));
+    lines_of_areas().filter(|(_, list)| is_meant(list)).filter_map(|(area, _)| Rectangle::read(area)).collect()
+}
+
+/// Returns the runs of codes of a list such as `2001,4601-4604`.
+fn runs(list: &str) -> impl Iterator<Item = RangeInclusive<u32>> {
+    list.split(',').filter_map(|run| {
+        let (first, last) = run.split_once('-').unwrap_or((run, run));
+        Some(first.parse().ok()?..=last.parse().ok()?)
+    })
+}
+
+/// Returns the codes of the systems that have this projection, on any datum and in any unit.
+fn codes_of_projection(projection: &Projection) -> Vec<u32> {
+    // Reading all texts takes a while; most show at a glance that their origin is elsewhere.
+    let meridian = (projection.value("lon_0") * 1e6).round() / 1e6;
+    let meridian = format!("\",{}", meridian.trunc());
+    let has_it = |text: &str| {
+        let system = if text.contains(&meridian) { find(text, &PROJECTED) } else { None };
+        system.and_then(|system| Projection::of(&system)).is_some_and(|other| other.difference(projection).is_none())
+    };
+    (1..=u32::from(u16::MAX)).filter(|code| text_of_code(*code).is_some_and(has_it)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::crs::from_wkt::{from_epsg, parse};
+
+    fn beyond(code: u32, place: [f64; 2]) -> f64 {
+        arc(AreaOfUse::of(&from_epsg(code).unwrap()).unwrap().beyond(place))
+    }
+
+    #[test]
+    fn every_line_of_the_table_is_read_and_every_known_code_has_an_area() {
+        for (area, list) in lines_of_areas() {
+            let Rectangle { west, south, east, north } = Rectangle::read(area).unwrap();
+            assert!(south < north && west != east, "{area}");
+            assert!([west, east].iter().all(|degrees| degrees.abs() <= 180.0), "{area}");
+            assert_eq!(runs(list).count(), list.split(',').count(), "{list}");
+        }
+        let is_plane = |text: &str| text.starts_with("PROJCS") || text.starts_with("GEOGCS");
+        let codes = (1..=32_767u32).filter(|code| text_of_code(*code).is_some_and(is_plane));
+        let without: Vec<u32> = codes.filter(|code| rectangles(&[*code]).is_empty()).collect();
+        assert!(without.len() < 10, "{without:?}");
+    }
+
+    #[test]
+    fn places_are_within_the_area_or_some_degrees_of_arc_beyond() {
+        assert_eq!(beyond(25832, [9.0, 50.0]), 0.0);
+        assert_eq!(beyond(25832, [9.0, 4.53]), 32.0);
+        assert!((beyond(25832, [18.01, 60.0]) - 3.0).abs() < 1e-9);
+        assert_eq!(beyond(4326, [-180.0, 90.0]), 0.0);
+        // Fiji's area is on both sides of the date line.
+        assert_eq!((beyond(3460, [179.9, -17.0]), beyond(3460, [-179.9, -17.0])), (0.0, 0.0));
+        assert!(beyond(3460, [0.0, -17.0]) > 100.0);
+    }
+
+    #[test]
+    fn a_text_without_a_code_has_the_area_of_its_projection() {
+        let esri = r#"PROJCS["NAD_1983_UTM_Zone_15N",GEOGCS["GCS_North_American_1983",DATUM["D_North_American_1983",
+            SPHEROID["GRS_1980",6378137.0,298.257222101]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],
+            PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",500000.0],PARAMETER["False_Northing",0.0],
+            PARAMETER["Central_Meridian",-93.0],PARAMETER["Scale_Factor",0.9996],PARAMETER["Latitude_Of_Origin",0.0],
+            UNIT["Meter",1.0]]"#;
+        let area = AreaOfUse::of(&parse(esri).unwrap()).unwrap();
+        assert_eq!((area.beyond([-93.0, 1.0]), area.beyond([-93.0, 45.0])), ([0.0; 2], [0.0; 2]));
+        assert_eq!(area.beyond([-93.0, -30.0]), [0.0, 30.0]);
+        // That of a site is nobody else's.
+        let site = esri.replace("-93.0", "-93.4321");
+        assert_eq!(AreaOfUse::of(&parse(&site).unwrap()), None);
+        // A text that contradicts its code.
+        let text = text_of_code(26915).unwrap().replace("\"central_meridian\",-93", "\"central_meridian\",-99");
+        let other = parse(&text).unwrap();
+        assert_eq!(other.epsg, Some(26915));
+        assert_eq!(AreaOfUse::of(&other).unwrap().beyond([-99.0, 45.0]), [0.0; 2]);
+    }
+}

@@ -1,0 +1,111 @@
+//! Whether points can count from the middle of the earth, as the file says.
+
+use crate::Result;
+use crate::geometry::lattice::AxisMap;
+use crate::input::crs::system::{Crs, CrsKind};
+use crate::input::points::axis::Axis;
+use crate::input::points::optional_fields::OptionalFields;
+use crate::input::points::returns::KeptReturns;
+use crate::input::points::rules::PointRules;
+use crate::input::source::Source;
+
+/// The records by which a file is judged.
+const RECORDS: u64 = 4096;
+
+/// The number of raw steps in a step of a look at the points: every raw integer then lies within reach.
+const COARSE: i64 = 16;
+
+/// The half axes of the earth in metres.
+const EARTH: [f64; 2] = [6_378_137.0, 6_356_752.3];
+
+/// No terrain lies lower or higher above the ellipsoid, in metres: the bottom of the sea, and more than the highest mountain.
+const HEIGHTS: [f64; 2] = [-12_000.0, 20_000.0];
+
+impl Source {
+    /// Drops a record of a geocentric system if no point of a sample lies near the surface of the earth: then it is false, and the
+    /// coordinates are a plane. Its unit stays.
+    ///
+    /// # Errors
+    /// `Io` or `Input` if the file cannot be read any more.
+    pub(super) fn drop_false_geocentric_crs(&mut self) -> Result<()> {
+        if self.crs.kind != CrsKind::Geocentric {
+            return Ok(());
+        }
+        let metres = self.crs.metres_per_unit().unwrap_or(1.0);
+        let places = self.first_places()?;
+        let is_on_earth = |place: &[f64; 3]| lies_near_surface(place.map(|value| value * metres));
+        let Some([x, y, z]) = places.first().filter(|_| !places.iter().any(is_on_earth)) else { return Ok(()) };
+        self.warnings.push(format!(
+            "its coordinate system ({}) is geocentric, but its points do not lie on the surface of the earth, about 6,370 km from the \
+             middle: the first is at x {x:.0}, y {y:.0}, z {z:.0}, {:.0} km from it. The system is ignored, and the coordinates are \
+             taken as a plane (set [input] crs or unit to say otherwise)",
+            self.crs.label(),
+            libm::hypot(libm::hypot(*x, *y), *z) * metres / 1000.0
+        ));
+        self.crs = Crs { horizontal: self.crs.horizontal, ..Crs::default() };
+        Ok(())
+    }
+
+    /// Returns x, y and z of the first records of the first chunk.
+    fn first_places(&self) -> Result<Vec<[f64; 3]>> {
+        let coarse =
+            |axis: &Axis| AxisMap::new(axis.offset, axis.scale, axis.offset, axis.scale.checked_mul(COARSE.into())?);
+        let [Some(x), Some(y), Some(z)] = self.axes.each_ref().map(coarse) else { return Ok(Vec::new()) };
+        let rules = PointRules {
+            maps: [x, y, z],
+            classes: [true; 256],
+            returns: KeptReturns::All,
+            bounds: None,
+            first_order: 0,
+            numbered: false,
+            fields: OptionalFields::default(),
+        };
+        let mut places = Vec::new();
+        if self.chunks() > 0 {
+            self.decode_start(0, RECORDS, &rules, &mut |points| {
+                let steps = points.iter().map(|point| [point.position[0], point.position[1], point.z]);
+                places.extend(steps.map(|steps| self.coarse_place(steps)));
+                Ok(())
+            })?;
+        }
+        Ok(places)
+    }
+
+    fn coarse_place(&self, steps: [i32; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|axis| self.axes[axis].value(i64::from(steps[axis]) * COARSE))
+    }
+}
+
+/// Returns whether a place in metres from the middle of the earth may be one of a terrain.
+fn lies_near_surface([x, y, z]: [f64; 3]) -> bool {
+    let across = libm::hypot(x, y);
+    let distance = libm::hypot(across, z);
+    if distance == 0.0 {
+        return false;
+    }
+    let [major, minor] = EARTH;
+    let surface = major * minor / libm::hypot(minor * across / distance, major * z / distance);
+    let [lowest, highest] = HEIGHTS;
+    (lowest..=highest).contains(&(distance - surface))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::lies_near_surface;
+
+    #[test]
+    fn places_of_terrains_lie_near_the_surface() {
+        // Munich, Quito, the south pole, and the bottom of a deep sea.
+        for place in [
+            [4_177_000.0, 855_000.0, 4_728_000.0],
+            [1_272_000.0, -6_253_000.0, -20_000.0],
+            [0.0, 0.0, -6_359_600.0],
+            [6_367_200.0, 0.0, 0.0],
+        ] {
+            assert!(lies_near_surface(place), "{place:?}");
+        }
+        for place in [[0.0; 3], [691_000.0, 5_334_000.0, 520.0], [500_000.0, 6_340_000.0, 20.0], [11.5, 48.1, 520.0]] {
+            assert!(!lies_near_surface(place), "{place:?}");
+        }
+    }
+}

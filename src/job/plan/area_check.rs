@@ -1,0 +1,263 @@
+//! Whether the points lie where their coordinate reference system is made for. If not, the terrain would be placed in another country or in
+//! a sea: x and y are exchanged, or the system is another one.
+
+use crate::geometry::lattice::Lattice;
+use crate::input::options::{InputOptions, OutsideCrsArea};
+use crate::input::{AreaOfUse, Crs, CrsTransform, DatumRule, FileFormat, Source, Unit, arc};
+use crate::job::plan::extent::{Extent, SourceBox};
+use crate::job::plan::globe_system::globe_system;
+use crate::job::plan::height_range::HeightSample;
+use crate::output::geoid::Geoid;
+use crate::output::tiles3d::globe::Globe;
+use crate::{Error, Result, Warnings};
+use std::collections::HashMap;
+
+/// Surveys and zones reach some hundred kilometres beyond the area of use. Farther out, in degrees of arc, there is a warning.
+const DOUBTFUL: f64 = 3.0;
+
+/// Farther outside than this, in degrees of arc, no survey uses a system.
+const HOPELESS: f64 = 6.0;
+
+/// Neighbouring zones are used to the east and to the west. Where x and y exchanged would fit, so many degrees to the north or south are
+/// enough to be sure.
+const EXCHANGED: f64 = 1.0;
+
+/// Kilometres of a degree of arc.
+const DEGREE: f64 = 111.2;
+
+/// What the points of the job have in common.
+pub(crate) struct CommonPlace<'a> {
+    /// The system of the job.
+    pub(crate) crs: &'a Crs,
+    /// Metres of its unit of x and y.
+    pub(crate) metres: f64,
+    pub(crate) lattice: &'a Lattice,
+    pub(crate) extent: &'a Extent,
+    pub(crate) sample: &'a HeightSample,
+}
+
+/// Checks that the points of each source lie in the area of use of the system that they are in, and of that which they are transformed into.
+///
+/// # Errors
+/// [`Error::Input`] names a source that lies hopelessly far outside, [`Error::NoTerrain`] the first of all sources if all do.
+pub(crate) fn check_places(
+    sources: &[Source],
+    common: &CommonPlace,
+    options: &InputOptions,
+    warnings: &mut Warnings,
+) -> Result<()> {
+    let places: Vec<(&Source, Vec<[f64; 2]>)> = sources
+        .iter()
+        .zip(&common.extent.boxes)
+        .map(|(source, claim)| (source, places(source, claim, common)))
+        .filter(|(_, places)| !places.is_empty())
+        .collect();
+    let mut ways = Ways::default();
+    let outside: Vec<(&Source, Outside)> = places
+        .iter()
+        .filter_map(|(source, places)| Some((*source, outside(source, places, common, &mut ways)?)))
+        .collect();
+    if options.outside_crs_area == OutsideCrsArea::Stop {
+        refuse_hopeless(&outside, places.len())?;
+    }
+    if let Some((source, first)) = outside.first() {
+        let count = match sources.len() {
+            1 => String::new(),
+            all => format!("{} of {all} inputs, such as ", outside.len()),
+        };
+        warnings.push(format!("{count}{}: {}", source.path.display(), first.sentence(source)));
+    }
+    Ok(())
+}
+
+/// Returns how the points of a source lie outside the area of a system that they are in, if they do.
+fn outside(source: &Source, places: &[[f64; 2]], common: &CommonPlace, ways: &mut Ways) -> Option<Outside> {
+    systems(source, common).into_iter().find_map(|said| Outside::of(&said, ways.of(&said.crs)?, &said.own(places)?))
+}
+
+/// Fails if a source lies hopelessly far outside. Whoever leaves bad files out leaves such a one out too, unless all are: then the system
+/// is wrong.
+fn refuse_hopeless(outside: &[(&Source, Outside)], count: usize) -> Result<()> {
+    let hopeless: Vec<&(&Source, Outside)> = outside.iter().filter(|(_, found)| found.is_hopeless()).collect();
+    let Some((source, first)) = hopeless.first() else { return Ok(()) };
+    let what = format!(
+        "{}; if the CRS and the coordinates are right, set [input] outside_crs_area = \"warn\"",
+        first.sentence(source)
+    );
+    Err(match hopeless.len() == count {
+        true => Error::NoTerrain(format!("{}: {what}", source.path.display())),
+        false => Error::input(&source.path, what),
+    })
+}
+
+/// A system that the points of a source are in, and the way to it from the system of the job.
+struct SaidSystem {
+    crs: Crs,
+    /// `None` for the system of the job.
+    back: Option<CrsTransform>,
+    /// Whether the points have been transformed into it.
+    is_target: bool,
+}
+
+impl SaidSystem {
+    /// Returns the places in this system; `None` if it has none of them.
+    fn own(&self, places: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
+        let own: Vec<[f64; 2]> = match &self.back {
+            None => places.to_vec(),
+            Some(back) => places.iter().filter_map(|place| back.apply(*place)).collect(),
+        };
+        (!own.is_empty()).then_some(own)
+    }
+}
+
+/// Returns what the file is in, if its points are transformed, and the system of the job.
+fn systems(source: &Source, common: &CommonPlace) -> Vec<SaidSystem> {
+    let crs = Crs { horizontal: Unit::from_metres(Some(common.metres)), ..common.crs.clone() };
+    let from = source.transformed_from();
+    let own = from.and_then(|from| {
+        let back = CrsTransform::between(&crs, from, DatumRule::Close).ok()?;
+        Some(SaidSystem { crs: from.clone(), back: Some(back), is_target: false })
+    });
+    own.into_iter().chain([SaidSystem { is_target: from.is_some(), crs, back: None }]).collect()
+}
+
+/// Returns where the points of a source lie, in the system of the job: in the middle of those of the sample, or at nine places of the box
+/// that the source claims. A box may be wide because of one stray point or a wrong header, so that only all of its places together tell.
+fn places(source: &Source, claim: &Option<SourceBox>, common: &CommonPlace) -> Vec<[f64; 2]> {
+    let middle = common.sample.by_file.get(&source.path).and_then(|found| found.middle());
+    if let Some([x, y]) = middle {
+        return vec![[common.lattice.world(0, x), common.lattice.world(1, y)]];
+    }
+    let Some([min, max]) = claim.as_ref().filter(|_| source.claimed_rectangle().is_some()) else { return Vec::new() };
+    let at = |i: usize, axis: usize| min[axis] + (max[axis] - min[axis]) * 0.5 * i as f64;
+    (0..9).map(|i| [at(i % 3, 0), at(i / 3, 1)]).collect()
+}
+
+/// The ways to the globe of systems that sources have in common.
+#[derive(Default)]
+struct Ways(HashMap<String, Option<(AreaOfUse, ToDegrees)>>);
+
+impl Ways {
+    fn of(&mut self, crs: &Crs) -> Option<&(AreaOfUse, ToDegrees)> {
+        let way = || Some((AreaOfUse::of(crs)?, ToDegrees::of(crs)?));
+        self.0.entry(format!("{crs:?}")).or_insert_with(way).as_ref()
+    }
+}
+
+/// The way from a system to longitude and latitude.
+enum ToDegrees {
+    Computed(CrsTransform),
+    /// For maps that this program does not compute itself.
+    Library(Box<Globe>),
+}
+
+impl ToDegrees {
+    fn of(crs: &Crs) -> Option<ToDegrees> {
+        if let Ok(way) = CrsTransform::to_degrees(crs) {
+            return Some(ToDegrees::Computed(way));
+        }
+        let metres = crs.metres_per_unit()?;
+        let globe = Globe::new(globe_system(crs, metres).ok()?, metres, Geoid::open(None).ok()?).ok()?;
+        Some(ToDegrees::Library(Box::new(globe)))
+    }
+
+    fn apply(&self, place: [f64; 2]) -> Option<[f64; 2]> {
+        match self {
+            ToDegrees::Computed(way) => way.apply(place),
+            ToDegrees::Library(globe) => {
+                globe.geographic(place[0], place[1]).ok().map(|place| place.map(f64::to_degrees))
+            }
+        }
+    }
+}
+
+/// Points that lie outside the area of use of a system.
+struct Outside {
+    /// Where the points lie in the system.
+    place: [f64; 2],
+    /// The same in degrees; `None` if it is no place on earth.
+    degrees: Option<[f64; 2]>,
+    /// How far outside that is, to the east or west, and to the north or south.
+    beyond: [f64; 2],
+    /// Whether they would lie within the area with x and y exchanged.
+    exchanged: bool,
+    /// The unit of length in which they would lie within the area.
+    other_unit: Option<Unit>,
+    is_target: bool,
+    label: String,
+    area: String,
+}
+
+impl Outside {
+    /// Returns how the nearest of some places lies outside the area of a system; `None` if it does not lie far outside.
+    fn of(said: &SaidSystem, (area, way): &(AreaOfUse, ToDegrees), places: &[[f64; 2]]) -> Option<Outside> {
+        let beyond = |place: &[f64; 2]| way.apply(*place).map_or([f64::INFINITY; 2], |degrees| area.beyond(degrees));
+        let place = *places.iter().min_by(|a, b| arc(beyond(a)).total_cmp(&arc(beyond(b))))?;
+        let (degrees, beyond) = (way.apply(place), beyond(&place));
+        let fits = |place: [f64; 2]| way.apply(place).is_some_and(|degrees| area.beyond(degrees) == [0.0; 2]);
+        let exchanged = !said.is_target && arc(beyond) > EXCHANGED && fits([place[1], place[0]]);
+        if !exchanged && arc(beyond) <= DOUBTFUL {
+            return None;
+        }
+        let own = said.crs.metres_per_unit().filter(|_| !said.is_target);
+        let in_unit = |unit: &Unit| {
+            let factor = unit.metres_per_unit()? / own?;
+            Some(place.map(|value| value * factor))
+        };
+        let mut units = [Unit::Metre, Unit::Foot].into_iter();
+        let other_unit = units.find(|unit| in_unit(unit).is_some_and(fits));
+        let (label, area) = (said.crs.label(), area.label(degrees.unwrap_or_default()));
+        Some(Outside { place, degrees, beyond, exchanged, other_unit, is_target: said.is_target, label, area })
+    }
+
+    /// Returns whether a terrain there is wrong for certain.
+    fn is_hopeless(&self) -> bool {
+        let is_far = arc(self.beyond) > HOPELESS;
+        is_far || self.exchanged && (arc(self.beyond) > DOUBTFUL || self.beyond[1] > EXCHANGED)
+    }
+
+    /// Says where the points lie and what to do.
+    fn sentence(&self, source: &Source) -> String {
+        let [x, y] = self.place;
+        let lie = match self.degrees {
+            Some([longitude, latitude]) => format!(
+                "lie at longitude {longitude:.2} and latitude {latitude:.2}, about {:.0} km outside its area of use ({})",
+                arc(self.beyond) * DEGREE,
+                self.area
+            ),
+            None => format!("are no place on earth; its area of use is {}", self.area),
+        };
+        format!("in {}, its points (around x {x:.2}, y {y:.2}) {lie}. {}", self.label, self.what_to_do(source))
+    }
+
+    fn what_to_do(&self, source: &Source) -> String {
+        let is_angle = self.place[0].abs() <= 360.0 && self.place[1].abs() <= 90.0;
+        match (self.exchanged, source.format, self.other_unit) {
+            (true, FileFormat::Text, _) => {
+                "With x and y exchanged, they lie within it: say with columns under [input.csv] which column is which, such as \
+                 columns = [\"y\", \"x\", \"z\"]"
+                    .into()
+            }
+            (true, ..) => {
+                "With x and y exchanged, they lie within it: exchange them first, for example with `pdal translate in.laz out.laz \
+                 --writers.las.forward=scale --writers.las.offset_x=auto --writers.las.offset_y=auto transformation \
+                 --filters.transformation.matrix=\"0 1 0 0 1 0 0 0 0 0 1 0 0 0 0 1\"`"
+                    .into()
+            }
+            (.., Some(unit)) => {
+                format!("In the unit {}, they lie within it: name a CRS in that unit with [input] crs", unit.name())
+            }
+            _ if self.is_target => "Name a CRS that is made for their place with [input] to_crs, such as to_crs = \"utm\"".into(),
+            _ if is_angle => {
+                "If they are longitude and latitude, [input] crs = \"EPSG:4326\" says so, and to_crs = \"utm\" transforms them; if they are \
+                 a site's own grid, crs = \"none\" takes them as a plane"
+                    .into()
+            }
+            _ => {
+                "Say with [input] crs = \"EPSG:...\" what the points are in, or with crs = \"none\" that they are a plane, which is placed \
+                 nowhere"
+                    .into()
+            }
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! Points that lie far outside the area that their coordinate reference system is made for.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use tempfile::TempDir;
+
+use crate::coordinate_systems::{code, keys, move_to, text, warnings, write};
+use crate::program::Job;
+
+/// Writes a table of rows around a place.
+fn csv(folder: &TempDir, name: &str, [x, y]: [f64; 2], step: f64) -> PathBuf {
+    let row = |i: usize| {
+        let [across, along] = [i % 10, i / 10].map(|count| count as f64 * step);
+        format!("{:.7},{:.7},{}\n", x + across, y + along, i % 3)
+    };
+    let path = folder.path().join(name);
+    fs::write(&path, format!("x,y,z\n{}", (0..60).map(row).collect::<String>())).unwrap();
+    path
+}
+
+/// Writes a LAS file in EPSG:25832 around a place.
+fn las(folder: &TempDir, name: &str, [x, y]: [f64; 2]) -> PathBuf {
+    let path = write(folder.path(), name, &[code(25832)]);
+    move_to(&path, [x, y, 0.0]);
+    path
+}
+
+const PLACE: [f64; 2] = [500_000.0, 5_500_000.0];
+const EXCHANGED: [f64; 2] = [5_500_000.0, 500_000.0];
+
+#[test]
+fn exchanged_coordinates_are_refused_with_the_way_to_exchange_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = csv(&folder, "table.csv", EXCHANGED, 7.0);
+    let words = ["outside its area of use (longitude 6 to 12", "With x and y exchanged, they lie within it"];
+    let job = |file: &Path, line: &str| Job::on(&[file]).with("input", line);
+    for line in ["crs = \"EPSG:25832\"", "missing_crs = \"EPSG:25832\""] {
+        let refused = job(&table, line).run();
+        refused.refused(3, &["table.csv", "columns = [\"y\", \"x\", \"z\"]"]);
+        refused.refused(3, &words);
+        job(&table, line).run_with(&["check"]).refused(3, &words);
+    }
+    let file = las(&folder, "cloud.las", EXCHANGED);
+    job(&file, "").run().refused(3, &["cloud.las", "around x 55000", words[1], "pdal translate"]);
+    // What the message says, and the option for whoever insists.
+    let cured = "crs = \"EPSG:25832\"\n[input.csv]\ncolumns = [\"y\", \"x\", \"z\"]";
+    assert!(!warnings(&job(&table, cured).report()).contains("area of use"));
+    let said = warnings(&job(&file, "outside_crs_area = \"warn\"").report());
+    assert!(said.contains("cloud.las: in ETRS89 / UTM zone 32N (EPSG:25832), its points"), "{said}");
+    assert!(!warnings(&job(&las(&folder, "right.las", PLACE), "").report()).contains("area of use"));
+}
+
+#[test]
+fn small_countries_whose_exchanged_coordinates_lie_near_are_known_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let [right, exchanged] = [("r.csv", [84_600.0, 447_000.0]), ("e.csv", [447_000.0, 84_600.0])]
+        .map(|(name, place)| csv(&folder, name, place, 7.0));
+    let job = |file: &Path| Job::on(&[file]).with("input", "crs = \"EPSG:28992\"");
+    assert!(!warnings(&job(&right).report()).contains("area of use"));
+    job(&exchanged).run().refused(3, &["Amersfoort / RD New", "exchanged"]);
+}
+
+#[test]
+fn coordinates_of_another_country_and_of_a_plane_are_refused_with_their_cures() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, place, crs, word) in [
+        ("dutch.csv", [84_600.0, 447_000.0], 25832, "[input] crs = \"EPSG:...\""),
+        ("zone_4.csv", [4_500_000.0, 5_500_000.0], 31467, "[input] crs = \"EPSG:...\""),
+        ("site.csv", [0.0, 0.0], 25832, "crs = \"none\""),
+        ("degrees.csv", [9.0, 50.0], 25832, "crs = \"EPSG:4326\""),
+        // Krovak's projection is computed by a library.
+        ("south.csv", [700_000.0, 1_050_000.0], 5514, "S-JTSK"),
+        ("feet.csv", [1_640_419.0, 18_044_619.0], 25832, "In the unit foot, they lie within it"),
+        ("nowhere.csv", [30_000_000.0, 5_500_000.0], 25832, "are no place on earth"),
+    ] {
+        let file = csv(&folder, name, place, if name == "degrees.csv" { 1e-4 } else { 7.0 });
+        let job = Job::on(&[&file]).with("input", &format!("crs = \"EPSG:{crs}\""));
+        job.run().refused(3, &[name, "area of use", word, "outside_crs_area = \"warn\""]);
+    }
+}
+
+#[test]
+fn surveys_beyond_the_area_are_taken_and_those_farther_out_with_a_warning() {
+    let folder = tempfile::tempdir().unwrap();
+    // At 50 degrees north, about 3, 6 and 8.5 degrees of longitude east of zone 32.
+    for (name, x, is_warned) in
+        [("a.csv", 930_000.0, false), ("b.csv", 1_140_000.0, true), ("c.csv", 1_320_000.0, true)]
+    {
+        let file = csv(&folder, name, [x, 5_600_000.0], 7.0);
+        let said = warnings(&Job::on(&[&file]).with("input", "crs = \"EPSG:25832\"").report());
+        assert_eq!(said.contains("outside its area of use"), is_warned, "{name}: {said}");
+    }
+}
+
+#[test]
+fn the_points_decide_and_neither_headers_nor_stray_points() {
+    let folder = tempfile::tempdir().unwrap();
+    let empty_box = |path: &Path| {
+        let mut bytes = fs::read(path).unwrap();
+        bytes[179..227].fill(0);
+        fs::write(path, bytes).unwrap();
+    };
+    let [right, exchanged] =
+        [("right.las", PLACE), ("exchanged.las", EXCHANGED)].map(|(name, at)| las(&folder, name, at));
+    [&right, &exchanged].into_iter().for_each(|file| empty_box(file));
+    assert!(!warnings(&Job::on(&[&right]).report()).contains("area of use"));
+    Job::on(&[&exchanged]).run().refused(3, &["exchanged.las", "With x and y exchanged"]);
+    let stray = csv(&folder, "stray.csv", EXCHANGED, 7.0);
+    let rows = fs::read_to_string(&stray).unwrap();
+    fs::write(&stray, format!("{rows}500000,5500000,1\n0,0,0\n")).unwrap();
+    Job::on(&[&stray]).with("input", "crs = \"EPSG:25832\"").run().refused(3, &["stray.csv", "With x and y exchanged"]);
+}
+
+#[test]
+fn a_file_elsewhere_is_a_bad_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let [right, exchanged] =
+        [("right.las", PLACE), ("exchanged.las", EXCHANGED)].map(|(name, at)| las(&folder, name, at));
+    let job = |line: &str| Job::on(&[&exchanged, &right]).with("input", line);
+    job("").run().refused(3, &["exchanged.las: in ETRS89"]);
+    let report = job("on_bad_file = \"skip\"").report();
+    assert_eq!(report["skipped"].as_array().map(Vec::len), Some(1), "{report}");
+    // If all are, the CRS is wrong, and none is left out.
+    Job::on(&[&exchanged]).with("input", "on_bad_file = \"skip\"").run().refused(3, &["exchanged.las: in ETRS89"]);
+}
+
+#[test]
+fn systems_without_a_code_have_the_area_of_their_projection() {
+    let folder = tempfile::tempdir().unwrap();
+    let zone_32 = r#"PROJCS["ETRS_1989_UTM_Zone_32N",GEOGCS["GCS_ETRS_1989",DATUM["D_ETRS_1989",
+        SPHEROID["GRS_1980",6378137.0,298.257222101]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],
+        PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",500000.0],PARAMETER["False_Northing",0.0],
+        PARAMETER["Central_Meridian",9.0],PARAMETER["Scale_Factor",0.9996],PARAMETER["Latitude_Of_Origin",0.0],
+        UNIT["Meter",1.0]]"#;
+    let file = write(folder.path(), "esri.las", &[text(zone_32)]);
+    move_to(&file, [EXCHANGED[0], EXCHANGED[1], 0.0]);
+    Job::on(&[&file]).run().refused(3, &["in ETRS_1989_UTM_Zone_32N, its points", "With x and y exchanged"]);
+    move_to(&file, [PLACE[0], PLACE[1], 0.0]);
+    assert!(!warnings(&Job::on(&[&file]).report()).contains("area of use"));
+}
+
+#[test]
+fn what_is_transformed_is_judged_by_both_systems() {
+    let folder = tempfile::tempdir().unwrap();
+    let degrees = keys(&[[1024, 0, 1, 2], [2048, 0, 1, 4258]]);
+    let file = write(folder.path(), "swapped.las", &[degrees]);
+    move_to(&file, [50.0, 9.0, 0.0]);
+    let mut bytes = fs::read(&file).unwrap();
+    for (at, value) in [(131, 1e-7), (139, 1e-7), (179, 50.1), (187, 49.9), (195, 9.1), (203, 8.9)] {
+        bytes[at..at + 8].copy_from_slice(&f64::to_le_bytes(value));
+    }
+    fs::write(&file, bytes).unwrap();
+    for to in ["utm", "EPSG:25832"] {
+        let job = Job::on(&[&file]).with("input", &format!("to_crs = \"{to}\"\ndatums = \"close\""));
+        job.run().refused(3, &["swapped.las: in ETRS89 (EPSG:4258)", "With x and y exchanged"]);
+    }
+    let table = csv(&folder, "table.csv", PLACE, 7.0);
+    let far = "crs = \"EPSG:25832\"\nto_crs = \"EPSG:32615\"\ndatums = \"close\"";
+    Job::on(&[&table]).with("input", far).run().refused(3, &["WGS 84 / UTM zone 15N", "with [input] to_crs"]);
+}
