@@ -1,7 +1,11 @@
 //! Messages about the text of a configuration, of which lines may be long: what they show of it is short.
 
-/// The most characters of a line of the text that are shown, and the most of what is said about it.
+/// The most characters of a line of the text that are shown.
 const MOST: usize = 160;
+
+/// How many characters are shown at the beginning and at the end of what is said about it, which may have a value of any length, and lists
+/// what is known there.
+const ENDS: [usize; 2] = [300, 1000];
 
 /// How many characters are shown before the place of the error, if the line is longer.
 const BEFORE: usize = 60;
@@ -16,7 +20,7 @@ pub(crate) fn shortened(message: &str) -> String {
     let start = if marks.saturating_add(BEFORE) < MOST { 0 } else { marks.saturating_sub(BEFORE) };
     let short = |line: &str| match split(line) {
         Some((gutter, shown)) => format!("{gutter}{}", part(shown, start)),
-        None => part(line, 0),
+        None => ends(line),
     };
     message.lines().map(short).collect::<Vec<_>>().join("\n")
 }
@@ -42,6 +46,18 @@ fn part(line: &str, start: usize) -> String {
     // Marks are far to the right of nothing.
     let before = if shown.trim_matches([' ', '^']).is_empty() { " ".repeat(before.len()) } else { before.into() };
     format!("{before}{shown}{after}")
+}
+
+/// Returns a line without its middle, if it is long.
+fn ends(line: &str) -> String {
+    let length = line.chars().count();
+    let [first, last] = ENDS;
+    if length <= first.saturating_add(last) {
+        return line.into();
+    }
+    let start: String = line.chars().take(first).collect();
+    let end: String = line.chars().skip(length.saturating_sub(last)).collect();
+    format!("{start}{DOTS}{end}")
 }
 
 #[cfg(test)]
@@ -79,6 +95,6 @@ mod tests {
             "TOML parse error at line 1, column 1\n  |\n1 | a\n  | ^\ninvalid type: string \"{}\"",
             "x".repeat(50_000_000)
         );
-        assert!(shortened(&message).len() < 400);
+        assert!(shortened(&message).len() < 1500);
     }
 }

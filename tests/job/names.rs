@@ -47,9 +47,6 @@ fn files_in_latin_1_are_read_wherever_they_are() {
     assert_eq!(report["mesh_digest"], expected["mesh_digest"]);
     let sums = [&home, &other].map(|folder| fs::read_to_string(folder.join("out/XXH128SUMS")).unwrap());
     assert_eq!(sums[0], sums[1]);
-    // The job is known again, and its inputs are.
-    let again = gdt_batch(&home, &["job.toml"]).succeeded();
-    assert!(again.err.is_empty(), "{}", again.err);
     let inputs = [home.join("a.xyz"), home.join(latin("Süd/Höhe.xyz"))];
     let words = ["verify", "out", "--json", "--input"].map(OsStr::new);
     let verdict = run(&home, &[&words[..], &[inputs[0].as_ref(), inputs[1].as_ref()]].concat()).succeeded().json();
@@ -120,17 +117,19 @@ fn a_terminal_obeys_no_name() {
     let is_harmless = |said: &Said| {
         let all = format!("{}{}", said.out, said.err);
         assert!(!all.chars().any(|c| c.is_control() && c != '\n' && c != '\t'), "{all:?}");
-        assert!(all.contains("\\u{1b}[31mred"), "{all}");
+        all
     };
-    is_harmless(&gdt_batch(root.path(), &["check", "job.toml"]).succeeded());
-    is_harmless(&gdt_batch(root.path(), &["info", name]).succeeded());
-    is_harmless(&gdt_batch(root.path(), &["info", &format!("no{name}")]));
-    is_harmless(&gdt_batch(root.path(), &["sample", name]));
+    let is_escaped = |said: &Said| assert!(is_harmless(said).contains("\\u{1b}[31mred"), "{said:?}");
+    is_escaped(&gdt_batch(root.path(), &["check", "job.toml"]).succeeded());
+    is_escaped(&gdt_batch(root.path(), &["info", name]).succeeded());
+    is_escaped(&gdt_batch(root.path(), &["info", &format!("no{name}")]));
+    is_escaped(&gdt_batch(root.path(), &["sample", name]));
+    // The parser of arguments leaves such signs out.
     is_harmless(&gdt_batch(root.path(), &[&format!("--{name}")]));
-    is_harmless(&gdt_batch(root.path(), &["init", "-o", "job.toml", name]));
+    is_harmless(&gdt_batch(root.path(), &["init", "-o", "-", name]).succeeded());
     fs::write(root.path().join(name), "version https://git-lfs.github.com/spec/v1\n").unwrap();
     let said = gdt_batch(root.path(), &["job.toml"]);
-    is_harmless(&said);
+    is_escaped(&said);
     said.refused(3, &["red\\nerror: \\u{9b}.xyz: is a Git LFS pointer"]);
     // What programs read has the name itself.
     write_square(&root.path().join(name), 0, 12);
