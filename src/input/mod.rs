@@ -38,6 +38,7 @@ pub(crate) use crs::transform::between::DatumNote;
 pub use crs::transform::datum_rule::DatumRule;
 pub use crs::transform::to_globe::GlobeWay;
 pub use crs::unit::Unit;
+pub(crate) use crs::unit::same_length;
 pub use crs::vertical::VerticalSystem;
 pub use decoded_chunks::DecodedChunks;
 pub use file::random_access::not_a_file;

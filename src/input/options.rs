@@ -7,6 +7,7 @@ use crate::geometry::lattice::shortest_decimal;
 use crate::input::crs::choice::CrsChoice;
 use crate::input::crs::target::{NamedCrs, TargetCrs};
 use crate::input::crs::transform::datum_rule::DatumRule;
+use crate::input::crs::unit::Unit;
 use crate::input::points::classes::{IGNORED_GROUND, is_noise};
 use crate::input::points::optional_fields::OptionalFields;
 use crate::input::points::returns::KeptReturns;
@@ -197,11 +198,11 @@ pub enum OnBadFile {
     Skip,
 }
 
-/// The unit of x and y.
+/// A unit that the user chooses: of x and y of points, or of the heights of lines.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum UnitChoice {
-    /// The unit that the CRS says, or metres if there is no CRS.
+    /// The unit that the CRS says; where there is none, metres for x and y, and for heights the unit of those of the points.
     #[default]
     Auto,
     /// The metre.
@@ -210,6 +211,23 @@ pub enum UnitChoice {
     Foot,
     /// The US survey foot, 1200/3937 m.
     UsFoot,
+}
+
+impl UnitChoice {
+    /// Returns the unit that is chosen, or [`Unit::Unknown`].
+    pub(crate) fn unit(self) -> Unit {
+        match self {
+            UnitChoice::Auto => Unit::Unknown,
+            UnitChoice::Metre => Unit::Metre,
+            UnitChoice::Foot => Unit::Foot,
+            UnitChoice::UsFoot => Unit::UsFoot,
+        }
+    }
+
+    /// Returns its length in metres, if one is chosen.
+    pub(crate) fn metres(self) -> Option<f64> {
+        self.unit().metres_per_unit()
+    }
 }
 
 /// What is wrong with the value of an option.

@@ -3,6 +3,7 @@
 //! One point of noise, or a header with a wrong greatest height, must not give all of a terrain one colour. So a sample of the points
 //! decides. It is the same for a job of one part and of several, whose tiles are coloured before the last point is read.
 
+use crate::geometry::Site;
 use crate::input::{DecodedChunks, OptionalFields, PointCounts, PointRules, Source};
 use crate::output::color::HeightRange;
 use crate::{Result, interrupt};
@@ -27,6 +28,8 @@ const NOISE: usize = 1000;
 
 /// A sample of the heights of the points that a job keeps.
 pub(crate) struct HeightSample {
+    /// The points: where each is, and its height.
+    pub(crate) points: Vec<(Site, i32)>,
     /// Lattice integers of z, ascending.
     heights: Vec<i32>,
     /// The number of chunks in which it looked.
@@ -68,17 +71,18 @@ impl HeightSample {
             let at = ends.partition_point(|&end| end <= chunk);
             let (source, rules, decoded) = &inputs[at];
             let chunk = decoded.chunk(chunk + decoded.len() - ends[at]);
-            first_heights(source, rules, chunk, RECORDS / most as u64).map(|found| (&source.path, found))
+            first_points(source, rules, chunk, RECORDS / most as u64).map(|found| (&source.path, found))
         };
         let found = (0..places).into_par_iter().map(look).collect::<Result<Vec<_>>>()?;
-        let (mut heights, mut counts, mut by_file) = (Vec::new(), PointCounts::default(), BTreeMap::new());
+        let (mut points, mut counts, mut by_file) = (Vec::new(), PointCounts::default(), BTreeMap::new());
         for (path, (more, its_counts)) in found {
-            heights.extend(more);
+            points.extend(more);
             counts += its_counts.clone();
             *by_file.entry(path.clone()).or_insert_with(PointCounts::default) += its_counts;
         }
+        let mut heights: Vec<i32> = points.iter().map(|(_, z)| *z).collect();
         heights.sort_unstable();
-        Ok(HeightSample { heights, places, seen: counts.read - counts.not_decoded, records, counts, by_file })
+        Ok(HeightSample { points, heights, places, seen: counts.read - counts.not_decoded, records, counts, by_file })
     }
 
     /// Returns the heights that colours span, without what may be noise; `None` if the sample has too few points to tell. Where the
@@ -110,15 +114,20 @@ fn may_reach(source: &Source, bounds: Option<[f64; 4]>) -> bool {
     min[0] <= xmax && min[1] <= ymax && max[0] >= xmin && max[1] >= ymin
 }
 
-/// Returns the heights of the points that the job keeps among the first `records` records of a chunk, and what became of these records.
-fn first_heights(source: &Source, rules: &PointRules, chunk: usize, records: u64) -> Result<(Vec<i32>, PointCounts)> {
+/// Returns the points that the job keeps among the first `records` records of a chunk, and what became of these records.
+fn first_points(
+    source: &Source,
+    rules: &PointRules,
+    chunk: usize,
+    records: u64,
+) -> Result<(Vec<(Site, i32)>, PointCounts)> {
     let rules = PointRules { fields: OptionalFields::default(), ..rules.clone() };
-    let mut heights = Vec::new();
+    let mut found = Vec::new();
     let counts = source.decode_start(chunk, records, &rules, &mut |points| {
-        heights.extend(points.iter().map(|point| point.z));
+        found.extend(points.iter().map(|point| (point.position, point.z)));
         Ok(())
     })?;
-    Ok((heights, counts))
+    Ok((found, counts))
 }
 
 #[cfg(test)]
@@ -131,7 +140,15 @@ mod tests {
     fn sample(count: i32, places: usize, records: u64) -> HeightSample {
         let counts = PointCounts::default();
         let by_file = BTreeMap::new();
-        HeightSample { heights: (0..count).collect(), places, seen: count as u64, records, counts, by_file }
+        HeightSample {
+            points: Vec::new(),
+            heights: (0..count).collect(),
+            places,
+            seen: count as u64,
+            records,
+            counts,
+            by_file,
+        }
     }
 
     fn range(low: i32, high: i32) -> Option<HeightRange> {
