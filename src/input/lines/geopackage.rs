@@ -393,9 +393,9 @@ mod tests {
             (view("SELECT id, zeroblob(100000000) AS shape FROM a"), "zeroblob"),
             (view("SELECT id, randomblob(100000000) AS shape FROM a"), "randomblob"),
             (view("SELECT id, printf('%100000000d', 1) AS shape FROM a"), "printf"),
-            (view("SELECT a.id, shape FROM a, json_each('[1, 2, 3]')"), "json_each"),
+            (view("SELECT a.id, shape FROM a, json_each('[1, 2, 3]')"), "not authorized"),
             (view("SELECT load_extension('a.so') AS id, shape FROM a"), "load_extension"),
-            (view(endless), "is to compute what it holds"),
+            (view(endless), "would have SQLite compute"),
             (view(&doubled), "too big"),
             (format!("{many}{}", view("SELECT a.id, a.shape FROM a, a AS b, a AS c")), "holds more than the file"),
             (

@@ -89,7 +89,7 @@ pub(super) fn broken(path: &Path, error: &rusqlite::Error) -> Error {
             format!("takes more memory to read than its share of [limits] memory: raise that, or {how}")
         }
         Some(ErrorCode::AuthorizationForStatementDenied) => {
-            format!("is to compute what it holds ({error}), which is not done: {how}")
+            format!("would have SQLite compute what it holds ({error}): {how}")
         }
         _ => format!("is no GeoPackage that can be read: {error}"),
     };

@@ -1,12 +1,9 @@
 //! Heights of lines that the terrain around makes doubtful: in another unit, counted from another zero, or missing and written as 0.
 
 use crate::breaklines::{Feature, Vertex};
-use crate::geometry::Site;
 use crate::input::Unit;
 use crate::input::lines::LineFile;
-use crate::job::plan::breaklines::planned::CloudOfPlan;
 use crate::job::plan::breaklines::terrain::{Around, SampledTerrain};
-use crate::job::plan::extent::to_float;
 use crate::{Result, interrupt};
 
 /// So many vertices of a file are compared with the terrain, to judge the file.
@@ -37,26 +34,21 @@ const SPIKE: f64 = 10.0;
 ///
 /// # Errors
 /// [`crate::Error::Interrupted`].
-pub(super) fn height_doubts(
-    files: &[LineFile],
-    features: &[Feature],
-    terrain: &SampledTerrain,
-    cloud: &CloudOfPlan,
-) -> Result<Vec<String>> {
-    let judge = Judge { terrain, cloud };
+pub(super) fn height_doubts(files: &[LineFile], features: &[Feature], terrain: &SampledTerrain) -> Result<Vec<String>> {
+    let judge = Judge { terrain };
     let mut found = Vec::new();
-    for (number, file) in (0u32..).zip(files) {
+    // Features come in the order of their files.
+    for features in features.chunk_by(|one, other| one.id.file == other.id.file) {
         interrupt::check()?;
-        let of_file: Vec<&Feature> = features.iter().filter(|feature| feature.id.file == number).collect();
-        let doubt = judge.of_file(&of_file).or_else(|| judge.of_vertices(&of_file));
-        found.extend(doubt.map(|doubt| format!("{}: {doubt}", file.path.display())));
+        let doubt = judge.of_file(features).or_else(|| judge.of_vertices(features));
+        let file = features.first().and_then(|feature| files.get(feature.id.file as usize));
+        found.extend(file.zip(doubt).map(|(file, doubt)| format!("{}: {doubt}", file.path.display())));
     }
     Ok(found)
 }
 
 struct Judge<'a> {
     terrain: &'a SampledTerrain<'a>,
-    cloud: &'a CloudOfPlan<'a>,
 }
 
 /// Heights of lines that seem to be in feet while those of the points are in metres, or the reverse.
@@ -90,10 +82,11 @@ type Pair = (f64, Around);
 
 impl Judge<'_> {
     /// Says that all heights of a file seem to be in another unit or to count from another zero.
-    fn of_file(&self, features: &[&Feature]) -> Option<String> {
+    fn of_file(&self, features: &[Feature]) -> Option<String> {
         let all = || features.iter().flat_map(|feature| feature.paths.iter().flatten());
         let every = all().count().div_ceil(OF_FILE).max(1);
-        let pairs: Vec<Pair> = all().step_by(every).filter_map(|vertex| self.pair(vertex)).collect();
+        let sampled = || all().step_by(every);
+        let pairs: Vec<Pair> = sampled().filter_map(|vertex| self.pair(vertex)).collect();
         let [line, points] = [median(pairs.iter().map(|(z, _)| *z))?, median(pairs.iter().map(|(_, a)| a.middle))?];
         let numbers =
             format!("in the middle {}, where that of the points around is {}", rounded(line), rounded(points));
@@ -101,8 +94,9 @@ impl Judge<'_> {
             return Some(unit.sentence(&numbers));
         }
         let beyond = median(pairs.iter().map(|(z, around)| around.beyond(*z)))?;
-        let all_zero = pairs.iter().all(|(z, _)| self.is_zero(*z));
-        if all_zero {
+        let zeros = sampled().filter(|vertex| self.terrain.is_zero(vertex)).count();
+        let count = sampled().filter(|vertex| vertex.z.is_some()).count();
+        if zeros == count {
             return (beyond.abs() > self.terrain.from_metres(SHORE)).then(|| {
                 format!(
                     "all its heights are 0, where the middle one of the points around is {}; if it has none, set heights = \"points\" in \
@@ -112,8 +106,7 @@ impl Judge<'_> {
             });
         }
         let slack = median(pairs.iter().map(|(_, around)| around.relief() + around.reach))?;
-        let zeros = pairs.iter().filter(|(z, _)| self.is_zero(*z)).count();
-        let is_far = beyond.abs() > self.terrain.from_metres(OTHER_ZERO) + slack && zeros < pairs.len().div_ceil(2);
+        let is_far = beyond.abs() > self.terrain.from_metres(OTHER_ZERO) + slack && zeros < count.div_ceil(2);
         is_far.then(|| {
             let side = if beyond > 0.0 { "above" } else { "below" };
             format!(
@@ -146,7 +139,7 @@ impl Judge<'_> {
     }
 
     /// Says which vertices are far from the terrain, by features.
-    fn of_vertices(&self, features: &[&Feature]) -> Option<String> {
+    fn of_vertices(&self, features: &[Feature]) -> Option<String> {
         let mut found = features.iter().filter_map(|feature| Some((feature, self.doubtful_vertex(feature)?)));
         let (feature, (vertex, around)) = found.next()?;
         let others = match found.count() {
@@ -154,16 +147,15 @@ impl Judge<'_> {
             count => format!(" (and {count} features more have such vertices)"),
         };
         let z = self.terrain.height(vertex)?;
-        let is_zero = self.is_zero(z);
-        let (z, what) = match is_zero {
+        let (z, what) = match self.terrain.is_zero(vertex) {
             true => (0.0, ": if 0 stands for no height,"),
-            false => (z, ", and its neighbours on the line are as far away:"),
+            false => (z, ", far from its neighbours on the line too:"),
         };
         Some(format!(
             "feature {} has the height {z} at {}, where the points around lie from {} to {}{others}{what} correct it, or set heights = \
              \"points\" in [[breaklines]] to take all heights from the points around",
             feature.id.feature,
-            self.place_text(vertex.place),
+            self.terrain.place_text(vertex.place),
             rounded(around.lowest),
             rounded(around.highest)
         ))
@@ -172,51 +164,41 @@ impl Judge<'_> {
     /// Returns the first vertex of a feature whose height is no height of the terrain around.
     fn doubtful_vertex<'f>(&self, feature: &'f Feature) -> Option<(&'f Vertex, Around)> {
         let vertices = || feature.paths.iter().flatten();
-        let is_all_zero = vertices().filter_map(|vertex| self.terrain.height(vertex)).all(|z| self.is_zero(z));
+        let is_all_zero = vertices().all(|vertex| vertex.z.is_none() || self.terrain.is_zero(vertex));
         let from_zero = self.terrain.from_metres(FROM_ZERO[usize::from(is_all_zero)]);
         let spike = self.terrain.from_metres(SPIKE);
-        let zeros = vertices().filter(|vertex| self.terrain.height(vertex).is_some_and(|z| self.is_zero(z)));
-        let spikes = feature.paths.iter().flat_map(|path| self.spikes(path, spike));
-        let candidates = zeros.map(|vertex| (vertex, from_zero)).take(OF_FEATURE);
-        let candidates = candidates.chain(spikes.map(|vertex| (vertex, spike)).take(OF_FEATURE));
-        candidates.into_iter().find_map(|(vertex, least)| {
+        let zeros = vertices().filter(|vertex| self.terrain.is_zero(vertex));
+        let spikes = feature.paths.iter().flat_map(|path| spikes(path, self.terrain.steps(spike)));
+        let mut candidates = zeros
+            .map(|vertex| (vertex, from_zero))
+            .take(OF_FEATURE)
+            .chain(spikes.map(|vertex| (vertex, spike)).take(OF_FEATURE));
+        candidates.find_map(|(vertex, least)| {
             let (z, around) = self.pair(vertex)?;
             // A line may lead to a peak that the sample does not show.
-            let reach = if self.is_zero(z) { 0.0 } else { around.reach };
+            let reach = if self.terrain.is_zero(vertex) { 0.0 } else { around.reach };
             let is_far = around.beyond(z).abs() > least + around.relief() + reach;
             is_far.then_some((vertex, around))
         })
     }
 
-    /// Returns the vertices of a path that lie more than `least` above both neighbours or below both. One at an end has one neighbour.
-    fn spikes<'f>(&self, path: &'f [Vertex], least: f64) -> impl Iterator<Item = &'f Vertex> + use<'f, '_> {
-        let height = |at: Option<usize>| self.terrain.height(path.get(at?)?);
-        let differences = move |at: usize| {
-            let z = height(Some(at))?;
-            let [before, after] =
-                [at.checked_sub(1), at.checked_add(1)].map(|next| height(next).map(|other| z - other));
-            before.or(after).zip(after.or(before))
-        };
-        let is_spike = move |(before, after): (f64, f64)| before.min(after) > least || before.max(after) < -least;
-        (0..path.len()).filter(move |at| differences(*at).is_some_and(is_spike)).filter_map(|at| path.get(at))
-    }
-
     /// Returns the height of a vertex in the box of the points, and what is around it.
     fn pair(&self, vertex: &Vertex) -> Option<Pair> {
-        let clipped = self.cloud.clipped;
-        let is_within = |axis: usize| (clipped.min[axis]..=clipped.max[axis]).contains(&vertex.place[axis]);
-        let z = self.terrain.height(vertex).filter(|_| is_within(0) && is_within(1))?;
-        Some((z, self.terrain.around(vertex.place)?))
+        Some((self.terrain.height(vertex)?, self.terrain.around(vertex.place)?))
     }
+}
 
-    /// Tells whether a height is 0 in the source, whose heights may lie between two of the lattice.
-    fn is_zero(&self, z: f64) -> bool {
-        2.0 * z.abs() <= to_float(self.cloud.lattice.step(2))
-    }
-
-    fn place_text(&self, [x, y]: Site) -> String {
-        format!("({}, {})", self.cloud.lattice.world(0, x), self.cloud.lattice.world(1, y))
-    }
+/// Returns the vertices of a path that lie more than `least` steps above both neighbours or below both. One at an end has one neighbour.
+fn spikes(path: &[Vertex], least: i64) -> impl Iterator<Item = &Vertex> {
+    let height = |at: Option<usize>| Some(i64::from(path.get(at?)?.z?));
+    let differences = move |at: usize| {
+        let z = height(Some(at))?;
+        let neighbours = [at.checked_sub(1), at.checked_add(1)];
+        let [before, after] = neighbours.map(|next| height(next).map(|other| z.saturating_sub(other)));
+        before.or(after).zip(after.or(before))
+    };
+    let is_spike = move |(before, after): (i64, i64)| before.min(after) > least || before.max(after) < -least;
+    (0..path.len()).filter(move |at| differences(*at).is_some_and(is_spike)).filter_map(|at| path.get(at))
 }
 
 /// Returns the middle one of `values`; of two, the greater.

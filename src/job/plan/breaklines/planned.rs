@@ -98,8 +98,8 @@ impl PlannedBreaklines {
         let nearest = nearest_heights(&built, cloud)?;
         nearest.settle(&mut built);
         refuse_sites_without_height(&built, &files.files, cloud.lattice)?;
-        let terrain = SampledTerrain::new(cloud.sample, cloud.metres, cloud.lattice);
-        warnings.extend(height_doubts(&files.files, &features, &terrain, cloud)?);
+        let terrain = SampledTerrain::new(cloud.sample, cloud.metres, cloud.lattice, cloud.clipped);
+        warnings.extend(height_doubts(&files.files, &features, &terrain)?);
         warnings.extend(sentences(&files.files, cloud.lattice, &options, &findings, features_outside));
         Ok(Some(PlannedBreaklines {
             files: files.files.iter().map(|file| file.path.clone()).collect(),

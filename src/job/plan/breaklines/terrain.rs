@@ -1,8 +1,8 @@
 //! What the terrain is like around a place, as far as a sample of the points shows it.
 
 use crate::breaklines::Vertex;
-use crate::geometry::Site;
 use crate::geometry::lattice::Lattice;
+use crate::geometry::{Bounds, Site};
 use crate::job::plan::extent::to_float;
 
 /// So many sampled points around a place tell its height.
@@ -13,6 +13,8 @@ pub(super) struct SampledTerrain<'a> {
     lattice: &'a Lattice,
     /// The lengths of a unit of x and y and of one of heights in metres.
     metres: [f64; 2],
+    /// The box of the points.
+    within: Bounds<2>,
     /// Places and heights, by x.
     points: Vec<(Site, i32)>,
 }
@@ -40,10 +42,15 @@ impl Around {
 }
 
 impl<'a> SampledTerrain<'a> {
-    pub(super) fn new(sample: &[(Site, i32)], metres: [f64; 2], lattice: &'a Lattice) -> SampledTerrain<'a> {
+    pub(super) fn new(
+        sample: &[(Site, i32)],
+        metres: [f64; 2],
+        lattice: &'a Lattice,
+        within: Bounds<2>,
+    ) -> SampledTerrain<'a> {
         let mut points = sample.to_vec();
         points.sort_unstable();
-        SampledTerrain { lattice, metres, points }
+        SampledTerrain { lattice, metres, within, points }
     }
 
     /// Returns so many metres in the unit of heights.
@@ -56,8 +63,28 @@ impl<'a> SampledTerrain<'a> {
         Some(self.lattice.world(2, vertex.z?))
     }
 
-    /// Returns the heights around a place; `None` if the sample has too few points.
+    /// Returns a difference of heights in lattice steps.
+    pub(super) fn steps(&self, difference: f64) -> i64 {
+        (difference / to_float(self.lattice.step(2))).ceil() as i64
+    }
+
+    /// Tells whether the height of a vertex is 0 in its file: heights there may lie between two of the lattice.
+    pub(super) fn is_zero(&self, vertex: &Vertex) -> bool {
+        let [offset, step] = [self.lattice.offset[2], self.lattice.step(2)].map(to_float);
+        vertex.z.is_some_and(|z| f64::from(z) == (-offset / step).round())
+    }
+
+    /// Returns a place as messages have it.
+    pub(super) fn place_text(&self, [x, y]: Site) -> String {
+        format!("({}, {})", self.lattice.world(0, x), self.lattice.world(1, y))
+    }
+
+    /// Returns the heights around a place; `None` outside of the box of the points, and if the sample has too few points.
     pub(super) fn around(&self, place: Site) -> Option<Around> {
+        let is_within = |axis: usize| (self.within.min[axis]..=self.within.max[axis]).contains(&place[axis]);
+        if !is_within(0) || !is_within(1) {
+            return None;
+        }
         let nearest = self.nearest(place);
         let (farthest, _) = *nearest.get(NEIGHBOURS - 1)?;
         let mut heights: Vec<i32> = nearest.into_iter().map(|(_, z)| z).collect();
@@ -99,16 +126,18 @@ mod tests {
 
     #[test]
     fn the_nearest_points_tell_the_height_of_a_place() {
+        const WITHIN: Bounds<2> = Bounds { min: [0, i32::MIN], max: [i32::MAX; 2] };
         let step = Decimal::new(1, 2);
         let lattice = Lattice::new([Decimal::ZERO; 3], step, step).unwrap();
         let sample: Vec<(Site, i32)> =
             (0..50).flat_map(|x| (0..50).map(move |y| ([100 * x, 100 * y], 1000 * x))).collect();
-        let terrain = SampledTerrain::new(&sample, [1.0; 2], &lattice);
+        let terrain = SampledTerrain::new(&sample, [1.0; 2], &lattice, WITHIN);
         let around = terrain.around([2010, 2020]).unwrap();
         assert_eq!([around.lowest, around.middle, around.highest], [190.0, 200.0, 210.0]);
         assert!((1.0..2.0).contains(&around.reach), "{around:?}");
         assert_eq!([180.0, 195.0, 260.0].map(|z| around.beyond(z)), [-10.0, 0.0, 50.0]);
         assert_eq!(terrain.around([i32::MAX, i32::MIN]).unwrap().highest, 490.0);
-        assert_eq!(SampledTerrain::new(&sample[..7], [1.0; 2], &lattice).around([0, 0]), None);
+        assert_eq!(terrain.around([-1, 0]), None);
+        assert_eq!(SampledTerrain::new(&sample[..7], [1.0; 2], &lattice, WITHIN).around([0, 0]), None);
     }
 }
