@@ -219,11 +219,11 @@ impl OutsideCrsArea {
     }
 }
 
-/// The unit of x and y.
+/// A unit that the user chooses: of x and y of points, or of the heights of lines.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum UnitChoice {
-    /// The unit that the CRS says, or metres if there is no CRS.
+    /// The unit that the CRS says; where there is none, metres for x and y, and for heights the unit of those of the points.
     #[default]
     Auto,
     /// The metre.
@@ -243,6 +243,11 @@ impl UnitChoice {
             UnitChoice::Foot => Unit::Foot,
             UnitChoice::UsFoot => Unit::UsFoot,
         }
+    }
+
+    /// Returns its length in metres, if one is chosen.
+    pub(crate) fn metres(self) -> Option<f64> {
+        self.unit().metres_per_unit()
     }
 }
 

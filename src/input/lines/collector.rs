@@ -5,6 +5,7 @@ use std::path::Path;
 use crate::breaklines::FeatureKind;
 use crate::input::lines::attribute::WantedAttributes;
 use crate::input::lines::feature::{LineFeature, LineShape, RawGeometry};
+use crate::input::lines::lake_rings::{Flaw, flaw_of, remove_repeated, simplified};
 use crate::input::lines::options::{LineHeights, LineOptions, kind_of_name};
 use crate::{Error, Result, Warnings};
 
@@ -20,15 +21,20 @@ pub(super) struct FeatureCollector<'a> {
     too_short: LeftOut,
     without_parts: LeftOut,
     of_other_kinds: LeftOut,
+    crossing: LeftOut,
+    hole_outside: LeftOut,
+    enclosing_nothing: LeftOut,
+    not_looked_at: LeftOut,
     /// Whether a part of the feature at hand was too short.
     has_short_part: bool,
 }
 
-/// How many features are left out for one reason, and the first of them.
+/// How many features are left out or doubtful for one reason, and the first of them, with a place.
 #[derive(Default)]
 struct LeftOut {
     count: u64,
     first: u64,
+    place: [f64; 2],
 }
 
 impl LeftOut {
@@ -37,6 +43,17 @@ impl LeftOut {
             self.first = number;
         }
         self.count += 1;
+    }
+
+    fn note_at(&mut self, number: u64, place: [f64; 2]) {
+        self.place = if self.count == 0 { place } else { self.place };
+        self.note(number);
+    }
+
+    /// Returns a warning that names the place too.
+    fn warning_at(&self, why: &str, what_to_do: &str) -> Option<String> {
+        let [x, y] = self.place;
+        self.warning(why).map(|warning| format!("{warning} at ({x}, {y}): {what_to_do}"))
     }
 
     fn warning(&self, why: &str) -> Option<String> {
@@ -55,6 +72,10 @@ impl<'a> FeatureCollector<'a> {
             without_parts: LeftOut::default(),
             has_short_part: false,
             of_other_kinds: LeftOut::default(),
+            crossing: LeftOut::default(),
+            hole_outside: LeftOut::default(),
+            enclosing_nothing: LeftOut::default(),
+            not_looked_at: LeftOut::default(),
         }
     }
 
@@ -89,19 +110,43 @@ impl<'a> FeatureCollector<'a> {
         Ok(())
     }
 
+    /// Returns the first vertex that `is_wanted`, with the number of its feature.
+    pub(super) fn find_vertex(&self, is_wanted: impl Fn(&&[f64; 3]) -> bool) -> Option<(u64, [f64; 3])> {
+        let vertex_of = |feature: &LineFeature| {
+            let vertex = feature.shape.outlines().iter().flatten().find(&is_wanted)?;
+            Some((feature.number, *vertex))
+        };
+        self.features.iter().find_map(vertex_of)
+    }
+
     /// Returns the features, and what there is to say about those that are left out.
     pub(super) fn finish(self) -> (Vec<LineFeature>, Warnings) {
         let mut warnings = Warnings::default();
         warnings.extend(self.without_geometry.warning("have no geometry and are left out"));
-        warnings.extend(
-            self.too_short.warning("have no two different vertices (an area: three in its outline) and are left out"),
-        );
+        warnings.extend(self.too_short.warning(
+            "have no two different vertices (an area: three in its outline, not all on one line) and are left out",
+        ));
         warnings.extend(self.without_parts.warning(
             "have a part without two different vertices (an area: an outline without three), which is left out",
         ));
         warnings.extend(
             self.of_other_kinds.warning("have a value of kind_field that kinds does not list and are left out"),
         );
+        warnings.extend(self.crossing.warning_at(
+            "are lakes whose outlines cross",
+            "water and land alternate there; mend them (in QGIS: \"Fix geometries\") if they should not",
+        ));
+        warnings.extend(self.hole_outside.warning_at(
+            "are lakes with a hole outside of their outline",
+            "it is taken for water; make it a lake of its own, or remove it",
+        ));
+        warnings.extend(self.enclosing_nothing.warning_at(
+            "are lakes whose outlines enclose nothing",
+            "they go over all of their way twice, and no water is there; remove what repeats it",
+        ));
+        warnings.extend(self.not_looked_at.warning(
+            "are lakes with too many edges side by side or too many holes, so that faults of their outlines are not looked for",
+        ));
         (self.features, warnings)
     }
 
@@ -178,11 +223,15 @@ impl<'a> FeatureCollector<'a> {
         height: Option<f64>,
         rings: Vec<Vec<[f64; 3]>>,
     ) -> Result<()> {
+        let is_lake = kind == FeatureKind::Lake;
         let mut kept = Vec::with_capacity(rings.len());
         for (index, ring) in rings.into_iter().enumerate() {
             let mut ring = self.checked(number, height, ring)?;
             while ring.len() > 1 && is_closed(&ring) {
                 ring.pop();
+            }
+            if is_lake {
+                ring = simplified(ring);
             }
             if ring.len() >= 3 {
                 kept.push(ring);
@@ -194,10 +243,58 @@ impl<'a> FeatureCollector<'a> {
                 return Ok(());
             }
         }
+        if is_lake {
+            self.look_at_lake(number, &mut kept)?;
+        }
         if !kept.is_empty() {
             self.features.push(LineFeature { number, kind, shape: LineShape::Area(kept) });
         }
         Ok(())
+    }
+
+    /// Removes repeated holes of a lake, and notes what is wrong with its outlines.
+    fn look_at_lake(&mut self, number: u64, rings: &mut Vec<Vec<[f64; 3]>>) -> Result<()> {
+        let Some(outline) = rings.first().cloned() else { return Ok(()) };
+        let mut holes = rings.split_off(1);
+        if remove_repeated(&outline, &mut holes) {
+            let [x, y, _] = outline[0];
+            let what = format!(
+                "has a hole that is the same as its outline, at ({x}, {y}), so that no lake is left: remove the hole"
+            );
+            return Err(self.refuse(number, what));
+        }
+        rings.append(&mut holes);
+        match flaw_of(rings)? {
+            None => {}
+            Some(Flaw::Crossing(place)) => self.crossing.note_at(number, place),
+            Some(Flaw::HoleOutside(place)) => self.hole_outside.note_at(number, place),
+            Some(Flaw::EnclosesNothing(place)) => self.enclosing_nothing.note_at(number, place),
+            Some(Flaw::TooMany) => self.not_looked_at.note(number),
+        }
+        Ok(())
+    }
+
+    /// Checks that all vertices of a line have heights.
+    fn check_heights(&self, number: u64, line: &[[f64; 3]]) -> Result<()> {
+        let has_height = |vertex: &[f64; 3]| vertex[2].abs() < BEYOND_THE_EARTH;
+        let Some((index, vertex)) = line.iter().enumerate().find(|(_, vertex)| !has_height(vertex)) else {
+            return Ok(());
+        };
+        if !line.iter().any(has_height) {
+            return Err(self.refuse(
+                number,
+                "has no heights: a breakline takes x, y and z. Give it heights (in QGIS: \"Drape\" with an elevation model), or name \
+                 an attribute that has them with height_field, or set heights = \"points\" to take them from the points around",
+            ));
+        }
+        let what = format!(
+            "has a vertex without a height, its number {}, at ({}, {}): give it one, or set heights = \"points\" to take all heights from \
+             the points around",
+            index.saturating_add(1),
+            vertex[0],
+            vertex[1]
+        );
+        Err(self.refuse(number, what))
     }
 
     /// Returns the vertices with their heights, without those that repeat the one before.
@@ -217,13 +314,9 @@ impl<'a> FeatureCollector<'a> {
                 LineHeights::File => height.unwrap_or(vertex[2]),
                 LineHeights::Points => f64::NAN,
             };
-            if self.options.heights == LineHeights::File && !is_place(vertex[2]) {
-                return Err(self.refuse(
-                    number,
-                    "has no heights: a breakline takes x, y and z. Give it heights (in QGIS: \"Drape\" with an elevation model), or name \
-                     an attribute that has them with height_field, or set heights = \"points\" to take them from the points around",
-                ));
-            }
+        }
+        if self.options.heights == LineHeights::File {
+            self.check_heights(number, &line)?;
         }
         // NaN is no height, and all that have none are the same.
         line.dedup_by(|next, before| next.map(f64::to_bits) == before.map(f64::to_bits));
@@ -258,6 +351,10 @@ mod tests {
 
     fn line(z: f64) -> RawGeometry {
         RawGeometry::Lines(vec![vec![[0.0, 0.0, z], [0.0, 0.0, z], [1.0, 2.0, z]]])
+    }
+
+    fn with_heights(heights: [f64; 3]) -> RawGeometry {
+        RawGeometry::Lines(vec![heights.iter().zip(0..).map(|(z, x)| [f64::from(x), 0.0, *z]).collect()])
     }
 
     fn square() -> Vec<[f64; 3]> {
@@ -318,6 +415,9 @@ mod tests {
             (line(f64::NAN), "height_field"),
             (line(-1e39), "height_field"),
             (RawGeometry::Lines(vec![vec![[0.0, f64::NAN, 1.0], [1.0, 1.0, 1.0]]]), "its number 1"),
+            (with_heights([1.0, f64::NAN, 3.0]), "a vertex without a height, its number 2, at (1, 0)"),
+            (with_heights([1.0, 3.0, -3.4e38]), "a vertex without a height, its number 3"),
+            (with_heights([-1.1e38, 1.0, 1.0]), "a vertex without a height, its number 1"),
             (RawGeometry::Other("a point"), "is a point"),
         ] {
             let error = collect("", geometry, WantedAttributes::NONE).unwrap_err().to_string();

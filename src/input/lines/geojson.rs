@@ -21,6 +21,12 @@ use crate::{Error, Result, interrupt};
 /// The system of GeoJSON that says none.
 const WGS_84: u32 = 4326;
 
+/// What begins a document of a text sequence.
+const RECORD_SEPARATOR: u8 = 0x1e;
+
+/// Longitudes may go on beyond the antimeridian.
+const FARTHEST: [f64; 2] = [540.0, 90.0];
+
 /// A longer value of the member `crs` says nothing.
 const LONGEST_CRS: usize = 1 << 16;
 
@@ -48,14 +54,23 @@ fn with_null<'de, D: Deserializer<'de>>(deserializer: D) -> std::result::Result<
     <&RawValue>::deserialize(deserializer).map(Some)
 }
 
-/// Hands the features of the document `bytes` to `collector`. Returns the coordinate reference system that it says.
+/// Hands the features of the document `bytes`, or of the documents one after the other, to `collector`. Returns the coordinate reference
+/// system that it says.
 ///
 /// # Errors
 /// `Input` if it is no GeoJSON, and those of the collector.
 pub(super) fn read(path: &Path, bytes: &[u8], options: &LineOptions, collector: &mut FeatureCollector) -> Result<Crs> {
     let broken = |error: serde_json::Error| Error::input(path, format!("is no GeoJSON that can be read: {error}"));
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    let document: Document = serde_json::from_slice(text).map_err(broken)?;
+    let mut documents = serde_json::Deserializer::from_slice(text).into_iter::<Document>();
+    let first = documents.next();
+    let rest = text.get(documents.byte_offset()..).unwrap_or_default();
+    let document = match first {
+        Some(Ok(document)) if rest.trim_ascii().is_empty() => document,
+        Some(Ok(_)) if is_json(rest) => return read_sequence(path, text, options, collector),
+        _ if text.starts_with(&[RECORD_SEPARATOR]) => return read_sequence(path, text, options, collector),
+        _ => serde_json::from_slice(text).map_err(broken)?,
+    };
     let crs = if options.crs.is_read() { document_crs(path, document.crs)? } else { Crs::default() };
     match document.kind.as_str() {
         "FeatureCollection" => {
@@ -72,7 +87,62 @@ pub(super) fn read(path: &Path, bytes: &[u8], options: &LineOptions, collector: 
             add(path, 1, Feature { geometry: Some(geometry), properties: None }, options, collector)?;
         }
     }
+    if options.crs.is_read() && document.crs.is_none() {
+        refuse_metres(collector)?;
+    }
     Ok(crs)
+}
+
+/// Tells whether a text goes on as JSON does, after blanks and record separators.
+pub(super) fn is_json(text: &[u8]) -> bool {
+    let is_before = |byte: &u8| byte.is_ascii_whitespace() || *byte == RECORD_SEPARATOR;
+    text.iter().find(|byte| !is_before(byte)) == Some(&b'{')
+}
+
+/// Reads features or geometries one after the other, as newline-delimited GeoJSON and text sequences (RFC 8142) have them.
+fn read_sequence(path: &Path, text: &[u8], options: &LineOptions, collector: &mut FeatureCollector) -> Result<Crs> {
+    let records = text.split(|byte| *byte == RECORD_SEPARATOR);
+    let documents = records.flat_map(|record| serde_json::Deserializer::from_slice(record).into_iter::<&RawValue>());
+    let mut first_crs = None;
+    for (number, document) in (1..).zip(documents) {
+        interrupt::check()?;
+        let refused = |error: serde_json::Error| collector.refuse(number, format!("cannot be read: {error}"));
+        let text = document.map_err(refused)?;
+        let document: Document = serde_json::from_str(text.get()).map_err(refused)?;
+        first_crs = first_crs.or(document.crs);
+        let feature = match document.kind.as_str() {
+            "FeatureCollection" => {
+                let what = "is a collection: in a file of several documents, each is a feature; make one file of it, for example with \
+                            `ogr2ogr lines.gpkg FILE`";
+                return Err(collector.refuse(number, what.replace("FILE", &path.display().to_string())));
+            }
+            "Feature" => serde_json::from_str(text.get()).map_err(refused)?,
+            _ => Feature { geometry: Some(text), properties: None },
+        };
+        add(path, number, feature, options, collector)?;
+    }
+    if !options.crs.is_read() {
+        return Ok(Crs::default());
+    }
+    if first_crs.is_none() {
+        refuse_metres(collector)?;
+    }
+    document_crs(path, first_crs)
+}
+
+/// Refuses coordinates that are no longitude and latitude, where nothing says what they are.
+fn refuse_metres(collector: &FeatureCollector) -> Result<()> {
+    let is_beyond = |[x, y, _]: &&[f64; 3]| x.abs() > FARTHEST[0] || y.abs() > FARTHEST[1];
+    match collector.find_vertex(is_beyond) {
+        None => Ok(()),
+        Some((number, [x, y, _])) => Err(collector.refuse(
+            number,
+            format!(
+                "has a vertex at ({x}, {y}), and the file says no CRS: set crs in [[breaklines]] to that of its coordinates, such as crs = \
+                 \"points\" for the CRS of the points. GeoJSON without the member crs is in degrees on WGS 84, which these are not"
+            ),
+        )),
+    }
 }
 
 fn document_crs(path: &Path, member: Option<&RawValue>) -> Result<Crs> {
@@ -191,6 +261,52 @@ mod tests {
             let text = r#"{"type": "FeatureCollection", "crs": {"type": "my grid"}, "features": []}"#;
             assert_eq!(read_text(text, &format!("crs = {choice:?}")).unwrap().0, Crs::default(), "{choice}");
         }
+    }
+
+    #[test]
+    fn documents_one_after_the_other_are_read() {
+        let feature = format!(r#"{{"type": "Feature", "properties": {{"T": "river"}}, "geometry": {LINE}}}"#);
+        for text in [
+            format!("{feature}\n{feature}"),
+            format!("{feature}\r\n\n{LINE}\n"),
+            format!("\u{1e}{feature}\n\u{1e}{feature}\n"),
+            format!("\u{feff}{LINE}{LINE}"),
+            format!("\u{1e}{feature}\n{feature}"),
+        ] {
+            let (crs, features) = read_text(&text, "").unwrap();
+            assert_eq!((crs.epsg, features.len(), features[1].number), (Some(4326), 2, 2), "{text}");
+        }
+        let (_, features) = read_text(&format!("{feature}\n{feature}"), "kind_field = \"T\"").unwrap();
+        assert_eq!(features[1].kind, FeatureKind::River);
+        let cut = &feature[..feature.len() - 9];
+        for (text, word) in [
+            (format!("{feature}\n{cut}"), "feature 2 cannot be read"),
+            (format!("\u{1e}{cut}\n\u{1e}{feature}\n"), "feature 1 cannot be read"),
+            (format!("{feature}\n{{\"type\": \"FeatureCollection\", \"features\": []}}"), "feature 2 is a collection"),
+            (format!("{feature} and more"), "trailing characters"),
+        ] {
+            let error = read_text(&text, "").unwrap_err().to_string();
+            assert!(error.contains(word), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn metres_without_a_system_are_refused() {
+        let metres = LINE.replace("[2, 0", "[565020, 5933030");
+        let error = read_text(&metres, "").unwrap_err().to_string();
+        assert!(error.starts_with("a.geojson: feature 1 has a vertex at (565020, 5933030)"), "{error}");
+        assert!(error.contains("set crs in [[breaklines]]") && error.contains("crs = \"points\""), "{error}");
+        assert!(read_text(&format!("{LINE}\n{metres}"), "").unwrap_err().to_string().contains("feature 2"));
+        assert_eq!(read_text(&metres, "crs = \"points\"").unwrap().1.len(), 1);
+        let named = r#"{"type": "LineString", "crs": {"type": "name", "properties": {"name": "EPSG:25832"}},"#;
+        assert_eq!(read_text(&metres.replace(r#"{"type": "LineString","#, named), "").unwrap().0.epsg, Some(25832));
+    }
+
+    #[test]
+    fn a_height_may_be_null() {
+        let error = read_text(&LINE.replace("1.5", "null"), "").unwrap_err().to_string();
+        assert!(error.contains("feature 1 has a vertex without a height, its number 2, at (2, 0)"), "{error}");
+        assert_eq!(read_text(&LINE.replace("1.5", "null"), "heights = \"points\"").unwrap().1.len(), 1);
     }
 
     #[test]

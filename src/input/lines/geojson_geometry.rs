@@ -21,7 +21,7 @@ struct Members<'a> {
     geometries: Option<Vec<&'a RawValue>>,
 }
 
-/// A vertex: x, y, and its height or NaN. More numbers say nothing here.
+/// A vertex: x, y, and its height or NaN, where there is none or null. More numbers say nothing here.
 struct Position([f64; 3]);
 
 impl<'de> Deserialize<'de> for Position {
@@ -41,11 +41,15 @@ impl<'de> Visitor<'de> for PositionVisitor {
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut numbers: A) -> Result<Position, A::Error> {
         let mut position = [f64::NAN; 3];
-        for number in &mut position {
+        for number in &mut position[..2] {
             match numbers.next_element()? {
                 Some(found) => *number = found,
                 None => return Ok(Position(position)),
             }
+        }
+        match numbers.next_element::<Option<f64>>()? {
+            Some(height) => position[2] = height.unwrap_or(f64::NAN),
+            None => return Ok(Position(position)),
         }
         while numbers.next_element::<IgnoredAny>()?.is_some() {}
         Ok(Position(position))

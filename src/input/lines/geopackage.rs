@@ -1,41 +1,73 @@
-//! Reading GeoPackages: tables of an SQLite database.
+//! Reading GeoPackages: tables of an SQLite database, and views of them.
 
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use rusqlite::types::ValueRef;
-use rusqlite::{Connection, OpenFlags, OptionalExtension, Row};
+use rusqlite::{Connection, OptionalExtension, Row};
 
 use crate::input::crs::from_wkt::{from_epsg, parse};
 use crate::input::crs::system::Crs;
 use crate::input::lines::attribute::{Attribute, WantedAttributes, no_attribute};
 use crate::input::lines::collector::FeatureCollector;
 use crate::input::lines::feature::RawGeometry;
+use crate::input::lines::guarded_sqlite::{self, Column, TableName};
 use crate::input::lines::options::LineOptions;
 use crate::input::lines::wkb;
 use crate::{Error, Result, interrupt};
 
-/// A table of features.
+/// A table of features, or a view of some.
 struct Layer {
     table: String,
     geometry: String,
     srs: i64,
     /// All its columns.
     columns: Vec<String>,
-    /// The column that numbers its features.
-    key: String,
+    /// The column that numbers its features; a view has none.
+    key: Option<String>,
 }
 
-/// Hands the features of the file at `path` to `collector`. Returns the coordinate reference system of its layer.
+/// Hands the features of the file at `path`, which has `size` bytes, to `collector`. Returns the coordinate reference system of its layer.
+/// The job may take `memory` bytes.
 ///
 /// # Errors
 /// `Input` if the file is damaged, has no such layer, or lacks attributes that the options name.
-pub(super) fn read(path: &Path, options: &LineOptions, collector: &mut FeatureCollector) -> Result<Crs> {
+pub(super) fn read(
+    path: &Path,
+    size: u64,
+    memory: u64,
+    options: &LineOptions,
+    collector: &mut FeatureCollector,
+) -> Result<Crs> {
     refuse_open_journal(path)?;
-    let broken = |error: rusqlite::Error| Error::input(path, format!("is no GeoPackage that can be read: {error}"));
-    let file = open(path).map_err(broken)?;
-    let layer = find_layer(path, &file, options)?;
+    let broken = |error: rusqlite::Error| guarded_sqlite::broken(path, &error);
+    let (file, tables) = guarded_sqlite::open(path, size, memory).map_err(broken)?;
+    let layer = find_layer(path, &file, &tables, options)?;
+    let mut statement = file.prepare(&query_of(path, &file, &layer, options)?).map_err(broken)?;
+    let mut rows = statement.query([]).map_err(broken)?;
+    let (mut place, mut bytes) = (0u64, 0u64);
+    while let Some(row) = rows.next().map_err(broken)? {
+        interrupt::check()?;
+        place = place.saturating_add(1);
+        let length = row.get_ref(1).map_err(broken)?.as_blob_or_null().ok().flatten().map_or(0, <[u8]>::len);
+        bytes = bytes.saturating_add(1).saturating_add(length as u64);
+        if bytes > size {
+            let what = format!(
+                "its layer {:?} holds more than the file does, so that it must repeat or compute it: write it again as a plain table, for \
+                 example with `ogr2ogr lines.gpkg {}`",
+                layer.table,
+                path.display()
+            );
+            return Err(Error::input(path, what));
+        }
+        add(row, layer.key.is_none().then_some(place), collector).map_err(broken)??;
+    }
+    if options.crs.is_read() { crs(path, &file, layer.srs) } else { Ok(Crs::default()) }
+}
+
+/// Returns the query for the number, the geometry, the kind and the height of all features.
+fn query_of(path: &Path, file: &Connection, layer: &Layer, options: &LineOptions) -> Result<String> {
     for name in options.kind_field.iter().chain(&options.height_field) {
         if layer.column(name).is_none() {
             let there: Vec<String> =
@@ -47,46 +79,29 @@ pub(super) fn read(path: &Path, options: &LineOptions, collector: &mut FeatureCo
         Some(column) => quoted(column),
         None => "NULL".into(),
     };
-    let query = format!(
-        "SELECT {number}, {}, {}, {} FROM {} ORDER BY {key}",
+    let (number, order) = match &layer.key {
+        None => ("0".into(), String::new()),
+        Some(key) => {
+            let number = number_of(file, layer, key).map_err(|error| guarded_sqlite::broken(path, &error))?;
+            (number, format!(" ORDER BY {}", quoted(key)))
+        }
+    };
+    Ok(format!(
+        "SELECT {number}, {}, {}, {} FROM {}{order}",
         quoted(&layer.geometry),
         wanted(&options.kind_field),
         wanted(&options.height_field),
-        quoted(&layer.table),
-        number = number_of(&file, &layer).map_err(broken)?,
-        key = quoted(&layer.key)
-    );
-    let mut statement = file.prepare(&query).map_err(broken)?;
-    let mut rows = statement.query([]).map_err(broken)?;
-    while let Some(row) = rows.next().map_err(broken)? {
-        interrupt::check()?;
-        add(row, collector).map_err(broken)??;
-    }
-    if options.crs.is_read() { crs(path, &file, layer.srs) } else { Ok(Crs::default()) }
+        quoted(&layer.table)
+    ))
 }
 
 /// Returns what numbers the rows of the layer: its key, or, where this is not always a whole number above 0, the place of the row in their
 /// order by key.
-fn number_of(file: &Connection, layer: &Layer) -> rusqlite::Result<String> {
-    let [key, table] = [&layer.key, &layer.table].map(|name| quoted(name));
+fn number_of(file: &Connection, layer: &Layer, key: &str) -> rusqlite::Result<String> {
+    let [key, table] = [key, &layer.table].map(quoted);
     let query = format!("SELECT EXISTS (SELECT 1 FROM {table} WHERE typeof({key}) <> 'integer' OR {key} < 0)");
     let is_odd: bool = file.query_row(&query, [], |row| row.get(0))?;
     Ok(if is_odd { format!("row_number() OVER (ORDER BY {key})") } else { key })
-}
-
-/// Opens the file for reading. `immutable` keeps SQLite from making files beside it, which may not be allowed.
-fn open(path: &Path) -> rusqlite::Result<Connection> {
-    let escaped: String = path.to_string_lossy().chars().map(escape).collect();
-    let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-    Connection::open_with_flags(format!("file:{escaped}?immutable=1"), flags)
-}
-
-/// Writes a character as a URI takes it.
-fn escape(character: char) -> String {
-    match character {
-        '%' | '?' | '#' => format!("%{:02X}", u32::from(character)),
-        _ => character.into(),
-    }
 }
 
 /// What another program has written, and not yet put into the file, must not be missed; and what it has begun to write must not be read.
@@ -112,30 +127,71 @@ fn refuse_open_journal(path: &Path) -> Result<()> {
 }
 
 /// Finds the layer that the options name, or the only one.
-fn find_layer(path: &Path, file: &Connection, options: &LineOptions) -> Result<Layer> {
-    let broken = |error: rusqlite::Error| Error::input(path, format!("is no GeoPackage that can be read: {error}"));
-    // A view may compute what it likes, so only tables count.
-    let query = "SELECT g.table_name, g.column_name, g.srs_id FROM gpkg_geometry_columns g JOIN sqlite_master m \
-                 ON m.type = 'table' AND lower(m.name) = lower(g.table_name) ORDER BY g.table_name";
+fn find_layer(path: &Path, file: &Connection, tables: &[TableName], options: &LineOptions) -> Result<Layer> {
+    let broken = |error: rusqlite::Error| guarded_sqlite::broken(path, &error);
+    plain_columns(path, file, "gpkg_geometry_columns", |_| true)?;
+    let query = "SELECT table_name, column_name, srs_id FROM gpkg_geometry_columns ORDER BY table_name";
     let mut statement = file.prepare(query).map_err(broken)?;
     let found = statement.query_map([], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?))).map_err(broken)?;
-    let layers: Vec<(String, String, i64)> = found.collect::<rusqlite::Result<_>>().map_err(broken)?;
+    let mut layers: Vec<(String, String, i64)> = found.collect::<rusqlite::Result<_>>().map_err(broken)?;
+    layers.retain(|(table, ..)| find_table(tables, table).is_some());
     let names = layers.iter().map(|(table, ..)| format!("{table:?}")).collect::<Vec<_>>().join(", ");
-    let is_wanted = |table: &str| options.layer.as_ref().is_none_or(|name| name.eq_ignore_ascii_case(table));
+    let is_wanted = |table: &str| match &options.layer {
+        Some(name) => name.eq_ignore_ascii_case(table),
+        // Views show again what tables hold.
+        None => layers.len() == 1 || find_table(tables, table).is_some_and(|table| !table.is_view),
+    };
     let mut wanted = layers.iter().filter(|(table, ..)| is_wanted(table));
     let (table, geometry, srs) = match (wanted.next(), wanted.next(), &options.layer) {
         (Some(layer), None, _) => layer.clone(),
         (None, _, Some(name)) => return Err(Error::input(path, format!("has no layer {name:?}: it has {names}"))),
-        (None, _, None) => return Err(Error::input(path, "is a database without a layer of features")),
-        (Some(_), Some(_), _) => {
-            return Err(Error::input(path, format!("has several layers: name one of them with layer: {names}")));
+        (None, _, None) if layers.is_empty() => {
+            return Err(Error::input(path, "is a database without a layer of features"));
         }
+        _ => return Err(Error::input(path, format!("has several layers: name one of them with layer: {names}"))),
     };
-    let mut statement = file.prepare("SELECT name, pk FROM pragma_table_info(?1)").map_err(broken)?;
-    let found = statement.query_map([&table], |row| Ok((row.get(0)?, row.get(1)?))).map_err(broken)?;
-    let columns: Vec<(String, i64)> = found.collect::<rusqlite::Result<_>>().map_err(broken)?;
-    let key = columns.iter().find(|(_, key)| *key == 1).map_or("rowid".into(), |(name, _)| name.clone());
-    Ok(Layer { table, geometry, srs, columns: columns.into_iter().map(|(name, _)| name).collect(), key })
+    let is_named = |column: &Column, name: &String| column.name.eq_ignore_ascii_case(name);
+    let is_read = |column: &Column| {
+        let mut names = [&geometry].into_iter().chain(&options.kind_field).chain(&options.height_field);
+        column.is_key || names.any(|name| is_named(column, name))
+    };
+    let columns = plain_columns(path, file, &table, is_read)?;
+    let is_view = find_table(tables, &table).is_some_and(|table| table.is_view);
+    if is_view {
+        tables
+            .iter()
+            .filter(|table| !table.is_view)
+            .try_for_each(|table| plain_columns(path, file, &table.name, |_| true).map(drop))?;
+    }
+    let key = columns.iter().find(|column| column.is_key).map_or("rowid".into(), |column| column.name.clone());
+    let columns = columns.into_iter().map(|column| column.name).collect();
+    Ok(Layer { table, geometry, srs, columns, key: (!is_view).then_some(key) })
+}
+
+fn find_table<'t>(tables: &'t [TableName], name: &str) -> Option<&'t TableName> {
+    tables.iter().find(|table| table.name.eq_ignore_ascii_case(name))
+}
+
+/// Returns the columns of a table, and refuses one that is wanted and that SQLite would have to compute.
+fn plain_columns(
+    path: &Path,
+    file: &Connection,
+    table: &str,
+    is_wanted: impl Fn(&Column) -> bool,
+) -> Result<Vec<Column>> {
+    let columns = guarded_sqlite::columns_of(file, table).map_err(|error| guarded_sqlite::broken(path, &error))?;
+    match columns.iter().find(|column| column.is_computed && is_wanted(column)) {
+        None => Ok(columns),
+        Some(column) => Err(Error::input(
+            path,
+            format!(
+                "its table {table:?} has the column {:?}, which is computed (GENERATED ALWAYS) and not read: write it again with plain columns, \
+                 for example with `ogr2ogr lines.gpkg {}`",
+                column.name,
+                path.display()
+            ),
+        )),
+    }
 }
 
 impl Layer {
@@ -144,9 +200,9 @@ impl Layer {
     }
 }
 
-/// Adds a row: its key, geometry, kind and height. The outer result is SQLite's.
-fn add(row: &Row, collector: &mut FeatureCollector) -> rusqlite::Result<Result<()>> {
-    let number = u64::try_from(row.get::<_, i64>(0)?).unwrap_or(0);
+/// Adds a row: its key, or the `place` that numbers it, its geometry, kind and height. The outer result is SQLite's.
+fn add(row: &Row, place: Option<u64>, collector: &mut FeatureCollector) -> rusqlite::Result<Result<()>> {
+    let number = place.unwrap_or(u64::try_from(row.get::<_, i64>(0)?).unwrap_or(0));
     let geometry = match row.get_ref(1)? {
         ValueRef::Null => Ok(RawGeometry::Empty),
         ValueRef::Blob(bytes) => geometry(bytes),
@@ -186,6 +242,7 @@ fn geometry(blob: &[u8]) -> std::result::Result<RawGeometry, String> {
 
 fn crs(path: &Path, file: &Connection, srs: i64) -> Result<Crs> {
     let broken = |error: rusqlite::Error| Error::input(path, format!("its table of CRSs cannot be read: {error}"));
+    plain_columns(path, file, "gpkg_spatial_ref_sys", |_| true)?;
     // Negative numbers and 0 say that the CRS is not known.
     if srs <= 0 {
         return Ok(Crs::default());
@@ -250,7 +307,7 @@ mod tests {
         std::fs::write(&path, bytes).unwrap();
         let options: LineOptions = toml::from_str(&format!("files = [\"a\"]\n{rest}")).unwrap();
         let mut collector = FeatureCollector::new(&path, &options);
-        let crs = read(&path, &options, &mut collector)?;
+        let crs = read(&path, bytes.len() as u64, 1 << 30, &options, &mut collector)?;
         let folder = std::fs::read_dir(folder.path()).unwrap();
         assert_eq!(folder.count(), 1, "nothing is left beside the file");
         Ok((crs, collector.finish().0))
@@ -287,6 +344,87 @@ mod tests {
                      INSERT INTO t SELECT 'key ' || id, shape, sort FROM a;
                      DROP TABLE a; ALTER TABLE t RENAME TO a;";
         assert_eq!(numbers(texts), [1, 2, 4]);
+    }
+
+    /// Reads a file in which `sql` has changed something.
+    fn read_changed(sql: &str, rest: &str) -> Result<Vec<LineFeature>> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.gpkg");
+        std::fs::write(&path, package(false)).unwrap();
+        let file = Connection::open(&path).unwrap();
+        file.execute_batch(sql).unwrap();
+        file.close().unwrap();
+        read_bytes(&std::fs::read(&path).unwrap(), rest).map(|(_, features)| features)
+    }
+
+    /// Registers the view or table `v` as a layer.
+    const AND_REGISTER: &str = "; INSERT INTO gpkg_geometry_columns VALUES ('v', 'shape', 7)";
+
+    #[test]
+    fn views_that_choose_among_columns_and_rows_are_layers() {
+        for view in [
+            "SELECT id, shape, sort FROM a",
+            "SELECT id AS OGC_FID, shape, upper(sort) AS sort FROM a WHERE id > 0",
+            "SELECT b.shape, a.sort FROM a JOIN a AS b USING (id) ORDER BY id",
+        ] {
+            let sql = format!("CREATE VIEW v AS {view}{AND_REGISTER}");
+            let features = read_changed(&sql, "layer = \"v\"\nkind_field = \"sort\"").unwrap();
+            // Its rows are numbered: the first has no geometry.
+            assert_eq!((features.len(), features[0].number), (1, 2), "{view}");
+            assert_eq!(features[0].kind, crate::breaklines::FeatureKind::River);
+            // A view of a table is not another layer without a name.
+            assert_eq!(read_changed(&sql, "").unwrap()[0].number, 8);
+        }
+    }
+
+    /// None of them may take memory or time that the file's size does not explain.
+    #[test]
+    fn what_sqlite_would_have_to_compute_is_refused() {
+        let view = |query: &str| format!("CREATE VIEW v AS {query}{AND_REGISTER}");
+        let doubled = (0..18).fold("SELECT id, shape FROM a".to_string(), |query, _| {
+            format!("SELECT id, shape || shape AS shape FROM ({query})")
+        });
+        let many = "WITH RECURSIVE c(n) AS (SELECT 10 UNION ALL SELECT n + 1 FROM c WHERE n < 300)
+                    INSERT INTO a SELECT n, (SELECT shape FROM a WHERE id = 8), 'line' FROM c;";
+        let endless = "WITH RECURSIVE c(n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM c) SELECT n AS id, shape FROM c, a";
+        let computed = "zeroblob(100000000)) VIRTUAL; UPDATE gpkg_geometry_columns SET column_name = 'big'";
+        for (sql, word) in [
+            (format!("ALTER TABLE a ADD COLUMN big BLOB GENERATED ALWAYS AS ({computed}"), "GENERATED ALWAYS"),
+            (view("SELECT id, zeroblob(100000000) AS shape FROM a"), "zeroblob"),
+            (view("SELECT id, randomblob(100000000) AS shape FROM a"), "randomblob"),
+            (view("SELECT id, printf('%100000000d', 1) AS shape FROM a"), "printf"),
+            (view("SELECT a.id, shape FROM a, json_each('[1, 2, 3]')"), "not authorized"),
+            (view("SELECT load_extension('a.so') AS id, shape FROM a"), "load_extension"),
+            (view(endless), "would have SQLite compute"),
+            (view(&doubled), "too big"),
+            (format!("{many}{}", view("SELECT a.id, a.shape FROM a, a AS b, a AS c")), "holds more than the file"),
+            (
+                format!(
+                    "{many}{}",
+                    view("SELECT a.id, a.shape FROM a, a b, a c, a d WHERE a.id + b.id + c.id + d.id < 0")
+                ),
+                "takes too long",
+            ),
+            (
+                format!("{many}{}", view("SELECT 1 AS id, NULL AS shape FROM a, a b, a c, a d")),
+                "holds more than the file",
+            ),
+            (format!("CREATE VIRTUAL TABLE v USING fts5(shape){AND_REGISTER}"), "has no layer"),
+            (
+                "ALTER TABLE gpkg_geometry_columns RENAME TO g;
+              CREATE VIEW gpkg_geometry_columns AS SELECT hex(zeroblob(9)) AS table_name, column_name, srs_id FROM g"
+                    .into(),
+                "zeroblob",
+            ),
+        ] {
+            let layer = if sql.contains("'v', 'shape'") { "layer = \"v\"" } else { "" };
+            let error = read_changed(&sql, layer).map(drop).unwrap_err();
+            assert!(error.exit_code() == 3 && error.to_string().contains(word), "{sql}: {error}");
+        }
+        // An attribute that is not read may be computed.
+        let beside = "ALTER TABLE a ADD COLUMN more TEXT GENERATED ALWAYS AS (sort || sort) VIRTUAL";
+        assert_eq!(read_changed(beside, "").unwrap().len(), 1);
+        assert!(read_changed(beside, "kind_field = \"more\"").unwrap_err().to_string().contains("GENERATED"));
     }
 
     #[test]

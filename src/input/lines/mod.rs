@@ -12,6 +12,8 @@ mod geojson;
 mod geojson_geometry;
 mod geojson_properties;
 mod geopackage;
+mod guarded_sqlite;
+mod lake_rings;
 mod open;
 pub mod options;
 mod polygons;

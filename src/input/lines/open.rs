@@ -29,11 +29,11 @@ pub fn files_of_lines(path: &Path) -> Vec<PathBuf> {
     if is_shapefile { shapefile::all_files(path) } else { vec![path.to_path_buf()] }
 }
 
-/// Reads the file at `path`, which the options name.
+/// Reads the file at `path`, which the options name. The job may take `memory` bytes.
 ///
 /// # Errors
 /// `Input` if it is no file of lines, is damaged, or a feature cannot be used; `Io` if it cannot be read.
-pub fn read_lines(path: &Path, options: &LineOptions) -> Result<LineFile> {
+pub fn read_lines(path: &Path, options: &LineOptions, memory: u64) -> Result<LineFile> {
     let file = RandomAccessFile::open(path)?;
     let bytes = |file: &RandomAccessFile| file.bytes(0..file.size());
     let mut start = [0; 16];
@@ -42,7 +42,7 @@ pub fn read_lines(path: &Path, options: &LineOptions) -> Result<LineFile> {
     let (mut collector, mut warnings) = (FeatureCollector::new(path, options), Warnings::default());
     let crs = match &start {
         [0, 0, 0x27, 0x0a, ..] => shapefile::read(path, &bytes(&file)?, options, &mut collector, &mut warnings)?,
-        b"SQLite format 3\0" => geopackage::read(path, options, &mut collector)?,
+        b"SQLite format 3\0" => geopackage::read(path, file.size(), memory, options, &mut collector)?,
         start if is_json(&start[..held]) => geojson::read(path, &bytes(&file)?, options, &mut collector)?,
         _ => return Err(Error::input(path, other_format(path, held))),
     };
@@ -52,8 +52,7 @@ pub fn read_lines(path: &Path, options: &LineOptions) -> Result<LineFile> {
 }
 
 fn is_json(start: &[u8]) -> bool {
-    let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(start);
-    text.trim_ascii_start().starts_with(b"{")
+    geojson::is_json(start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(start))
 }
 
 fn other_format(path: &Path, held: usize) -> String {
@@ -81,7 +80,7 @@ mod tests {
         let path = folder.path().join(name);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(&path, bytes).unwrap();
-        read_lines(&path, &toml::from_str("files = [\"a\"]").unwrap())
+        read_lines(&path, &toml::from_str("files = [\"a\"]").unwrap(), 1 << 30)
     }
 
     #[test]

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::breaklines::FeatureKind;
 use crate::input::crs::choice::CrsChoice;
 use crate::input::crs::system::Crs;
+use crate::input::options::UnitChoice;
 
 /// `[[breaklines]]`: files of lines that become edges of the mesh.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -32,6 +33,9 @@ pub struct LineOptions {
     /// The attribute with the height of a feature, which takes the place of the heights of its vertices.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub height_field: Option<String>,
+    /// The unit of the heights of these files, of their vertices and of `height_field`.
+    #[serde(default)]
+    pub height_unit: UnitChoice,
     /// The layer of a GeoPackage, if it has several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub layer: Option<String>,
@@ -48,6 +52,9 @@ impl LineOptions {
         }
         if self.heights == LineHeights::Points && self.height_field.is_some() {
             return Some("[[breaklines]] heights = \"points\" and height_field are both set: keep one of them");
+        }
+        if self.heights == LineHeights::Points && self.height_unit != UnitChoice::Auto {
+            return Some("[[breaklines]] heights = \"points\" and height_unit are both set: keep one of them");
         }
         match (&self.kind, &self.kind_field, &self.kinds) {
             (Some(_), Some(_), _) => Some("[[breaklines]] kind and kind_field are both set: keep one of them"),
@@ -186,7 +193,7 @@ mod tests {
             "",
             "kind = \"river\"\nspacing = 2",
             "kind_field = \"T\"\nkinds = { \"1\" = \"lake\" }\nspacing = \"auto\"\nheight_field = \"Z\"\ncrs = \"points\"",
-            "layer = \"banks\"\nspacing = 0.5\ncrs = \"EPSG:26915\"",
+            "height_unit = \"us-foot\"\nlayer = \"banks\"\nspacing = 0.5\ncrs = \"EPSG:26915\"",
         ] {
             let read = options(text).unwrap();
             assert_eq!(read.contradiction(), None);
@@ -204,12 +211,14 @@ mod tests {
             ("crs = \"first\"", "points"),
             ("crs = \"EPSG:1\"", "EPSG:1 is not"),
             ("kinds = { a = \"creek\" }", "river"),
+            ("height_unit = \"feet\"", "us-foot"),
         ] {
             let error = options(text).unwrap_err();
             assert!(error.contains(word), "{error}");
         }
         assert!(options("kind = \"line\"\nkind_field = \"T\"").unwrap().contradiction().is_some());
         assert!(options("kinds = { a = \"lake\" }").unwrap().contradiction().is_some());
+        assert!(options("heights = \"points\"\nheight_unit = \"foot\"").unwrap().contradiction().is_some());
         assert!(toml::from_str::<LineOptions>("files = []").unwrap().contradiction().is_some());
         assert_eq!(kind_of_name("RIVER"), Some(FeatureKind::River));
     }

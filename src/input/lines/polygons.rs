@@ -81,8 +81,8 @@ fn looked_at(island: &Ring) -> impl Iterator<Item = &[f64; 3]> {
     island.iter().step_by((island.len() / VERTICES).max(1)).take(VERTICES)
 }
 
-/// Tells whether most of the vertices of `island` are within `outline`: they may touch it.
-fn holds(outline: &Ring, island: &Ring) -> bool {
+/// Tells whether most of the vertices of `island` that are looked at are within `outline`, which is closed: they may touch it.
+pub(super) fn holds(outline: &Ring, island: &Ring) -> bool {
     let (mut within, mut all) = (0, 0);
     for vertex in looked_at(island) {
         within += usize::from(is_within(outline, vertex));

@@ -28,6 +28,8 @@ const NOISE: usize = 1000;
 
 /// A sample of the heights of the points that a job keeps.
 pub(crate) struct HeightSample {
+    /// The points: where each is, and its height.
+    pub(crate) points: Vec<(Site, i32)>,
     /// Lattice integers of z, ascending.
     heights: Vec<i32>,
     /// The number of chunks in which it looked.
@@ -93,19 +95,20 @@ impl HeightSample {
             first_points(source, rules, chunk, RECORDS / most as u64).map(|found| (&source.path, found))
         };
         let found = (0..places).into_par_iter().map(look).collect::<Result<Vec<_>>>()?;
-        let (mut heights, mut counts, mut by_file) = (Vec::new(), PointCounts::default(), BTreeMap::new());
-        for (path, (points, its_counts)) in found {
+        let (mut points, mut counts, mut by_file) = (Vec::new(), PointCounts::default(), BTreeMap::new());
+        for (path, (more, its_counts)) in found {
             counts += its_counts.clone();
             let of_file: &mut FileSample = by_file.entry(path.clone()).or_default();
             of_file.counts += its_counts;
-            for ([x, y], z) in points {
-                of_file.plane[0].push(x);
-                of_file.plane[1].push(y);
-                heights.push(z);
+            for ([x, y], _) in &more {
+                of_file.plane[0].push(*x);
+                of_file.plane[1].push(*y);
             }
+            points.extend(more);
         }
+        let mut heights: Vec<i32> = points.iter().map(|(_, z)| *z).collect();
         heights.sort_unstable();
-        Ok(HeightSample { heights, places, seen: counts.read - counts.not_decoded, records, counts, by_file })
+        Ok(HeightSample { points, heights, places, seen: counts.read - counts.not_decoded, records, counts, by_file })
     }
 
     /// Returns the heights that colours span, without what may be noise; `None` if the sample has too few points to tell. Where the
@@ -163,7 +166,15 @@ mod tests {
     fn sample(count: i32, places: usize, records: u64) -> HeightSample {
         let counts = PointCounts::default();
         let by_file = BTreeMap::new();
-        HeightSample { heights: (0..count).collect(), places, seen: count as u64, records, counts, by_file }
+        HeightSample {
+            points: Vec::new(),
+            heights: (0..count).collect(),
+            places,
+            seen: count as u64,
+            records,
+            counts,
+            by_file,
+        }
     }
 
     fn range(low: i32, high: i32) -> Option<HeightRange> {

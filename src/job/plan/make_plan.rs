@@ -9,7 +9,7 @@ use crate::input::{Axis, CrsChoice, FileFormat, PointCounts, PointRules, Source,
 use crate::job::options::JobOptions;
 use crate::job::plan::area_check::{CommonPlace, check_places};
 use crate::job::plan::breaklines::line_files::LineFiles;
-use crate::job::plan::breaklines::{CloudOfPlan, PlannedBreaklines};
+use crate::job::plan::breaklines::{CloudOfPlan, PlannedBreaklines, SystemOfPoints};
 use crate::job::plan::budget::network_memory;
 use crate::job::plan::common_crs::{common_crs, horizontal_unit};
 use crate::job::plan::extent::{Extent, SourceBox, to_float};
@@ -113,16 +113,19 @@ fn try_plan(
     refuse_degrees(sources, &options.input)?;
     refuse_missing_classes(sources, &options.input)?;
     refuse_missing_returns(sources, &options.input)?;
-    let (choice, unit) = said_of_sources(options);
-    let crs = common_crs(sources, choice, unit, &mut warnings)?;
-    let (unit, metres) = horizontal_unit(sources, unit, choice, &crs, &mut warnings)?;
+    let (choice, unit_choice) = said_of_sources(options);
+    let crs = common_crs(sources, choice, unit_choice, &mut warnings)?;
+    let (unit, metres) = horizontal_unit(sources, unit_choice, choice, &crs, &mut warnings)?;
     let metres_z = crs.vertical.unwrap_or(metres);
     let wish = LatticeWish {
         metres: [metres, metres_z],
         steps: [options.input.resolution.step(), options.input.resolution_z.step()],
         coarsening,
     };
-    let lines = LineFiles::read(options, &crs, &mut warnings)?;
+    let is_known = crs.metres_per_unit().or(unit_choice.metres()).is_some();
+    let height_metres = crs.vertical.or(is_known.then_some(metres));
+    let system = SystemOfPoints { crs: &crs, height_metres, datums: options.input.datums };
+    let lines = LineFiles::read(options, &system, &mut warnings)?;
     let mut extent = extent_without_outliers(sources, options, &wish)?;
     lines.extend_heights(&mut extent)?;
     let lattice = choose_lattice(sources, &extent, &wish, &mut warnings)?;
@@ -143,7 +146,16 @@ fn try_plan(
     let sample = HeightSample::take(sources, &rules, options.input.bounds.map(|bounds| bounds.0))?;
     let place = CommonPlace { crs: &crs, metres, lattice: &lattice, extent: &extent, sample: &sample };
     check_places(sources, &place, &options.input, &mut warnings)?;
-    let cloud = CloudOfPlan { sources, rules: &rules, lattice: &lattice, extent: &extent, clipped, area: claimed_area };
+    let cloud = CloudOfPlan {
+        sources,
+        rules: &rules,
+        lattice: &lattice,
+        extent: &extent,
+        clipped,
+        area: claimed_area,
+        sample: &sample.points,
+        metres: wish.metres,
+    };
     let breaklines = PlannedBreaklines::of(&lines, options, &cloud, &mut warnings)?;
     let claimed = extent.boxes.iter().map(|claim| claimed_box(&lattice, claim, clipped)).collect::<Vec<_>>();
     let decoded: u64 = sources.iter().zip(&rules).map(|(source, rules)| decoded_records(source, rules)).sum();

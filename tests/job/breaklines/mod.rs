@@ -3,6 +3,8 @@
 
 mod bad;
 pub(crate) mod files;
+mod heights;
+mod lakes;
 mod same;
 mod terrain;
 

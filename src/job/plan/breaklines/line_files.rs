@@ -1,11 +1,10 @@
 //! The files of lines: which ones the options name, and what they hold.
 
 use crate::breaklines::FeatureKind;
-use crate::input::Crs;
-use crate::input::lines::options::{LineHeights, LineOptions};
+use crate::input::lines::options::LineOptions;
 use crate::input::lines::{LineFeature, LineFile, is_side_file, read_lines};
 use crate::job::options::JobOptions;
-use crate::job::plan::breaklines::line_crs::bring_to_points;
+use crate::job::plan::breaklines::line_crs::{SystemOfPoints, bring_to_points};
 use crate::job::plan::extent::Extent;
 use crate::job::plan::named_files::files_of;
 use crate::{Error, Result, Warnings};
@@ -17,6 +16,10 @@ const FILES: &str = "[[breaklines]] files";
 
 /// Heights of lines and points differ by less than this many units, on the earth and in the sea.
 const FAR_AWAY: f64 = 100_000.0;
+
+/// What programs write for a height that they do not know. As heights they are deeper than nearly all of the sea, or higher than all mountains.
+const NO_HEIGHTS: [f64; 9] =
+    [-9999.0, -99_999.0, -999_999.0, -32_767.0, -32_768.0, 32_767.0, 99_999.0, 999_999.0, 9_999_999.0];
 
 /// Lines are held in memory whole, with all that is made of them. Their files may take this share of the limit.
 const SHARE_OF_MEMORY: u64 = 8;
@@ -71,29 +74,24 @@ pub(crate) struct LineFiles {
 }
 
 impl LineFiles {
-    /// Reads all files that the options name, and transforms their lines into the system `crs` of the points.
+    /// Reads all files that the options name, and transforms their lines into the system of the `points`.
     ///
     /// # Errors
     /// [`Error::Config`] if there is no way from its system to that of the points, or they are too large; [`Error::Input`] if one is bad;
     /// [`Error::Io`] if one cannot be read.
-    pub(crate) fn read(options: &JobOptions, crs: &Crs, warnings: &mut Warnings) -> Result<LineFiles> {
+    pub(crate) fn read(options: &JobOptions, points: &SystemOfPoints, warnings: &mut Warnings) -> Result<LineFiles> {
         let paths = line_paths(&options.breaklines)?;
-        check_size(&paths, options.limits.memory.0)?;
-        let datums = options.input.datums;
+        let memory = options.limits.memory.0;
+        check_size(&paths, memory)?;
         let read = |(options, path): &(&LineOptions, PathBuf)| {
-            let mut file = read_lines(path, options)?;
-            bring_to_points(&mut file, &options.crs, crs, datums)?;
+            let mut file = read_lines(path, options, memory)?;
+            bring_to_points(&mut file, options, points)?;
             Ok(file)
         };
         let read: Vec<Result<LineFile>> = paths.par_iter().map(read).collect();
         // The first error in the order of the files.
         let files = read.into_iter().collect::<Result<Vec<_>>>()?;
-        for ((options, _), file) in paths.iter().zip(&files) {
-            warnings.extend_from_file(&file.path, &file.warnings);
-            if options.heights == LineHeights::File && options.height_field.is_none() {
-                warnings.extend(all_at_zero(file));
-            }
-        }
+        files.iter().for_each(|file| warnings.extend_from_file(&file.path, &file.warnings));
         Ok(LineFiles { files })
     }
 
@@ -105,13 +103,18 @@ impl LineFiles {
     /// Extends the heights of `extent` to those of the lines above and below it.
     ///
     /// # Errors
-    /// [`Error::Input`] if a height is far from all points: the lattice would be made for it, and too coarse for all others.
+    /// [`Error::Input`] if a height stands for none, or is far from all points: the lattice would be made for it, and too coarse for all
+    /// others.
     pub(crate) fn extend_heights(&self, extent: &mut Extent) -> Result<()> {
-        let points = [extent.min[2] - FAR_AWAY, extent.max[2] + FAR_AWAY];
+        let own = [extent.min[2], extent.max[2]];
+        let points = [own[0] - FAR_AWAY, own[1] + FAR_AWAY];
         for file in &self.files {
             for feature in &file.features {
                 for vertex in vertices_that_count(feature, extent) {
                     let z = vertex[2];
+                    if NO_HEIGHTS.contains(&z) && (z < own[0] || z > own[1]) {
+                        return Err(no_height(file, feature, vertex));
+                    }
                     if z < points[0] || z > points[1] {
                         return Err(too_far_away(file, feature, vertex));
                     }
@@ -147,6 +150,15 @@ fn vertices_that_count(feature: &LineFeature, extent: &Extent) -> Vec<[f64; 3]> 
     found
 }
 
+fn no_height(file: &LineFile, feature: &LineFeature, [x, y, z]: [f64; 3]) -> Error {
+    let what = format!(
+        "feature {} has the height {z:?} at ({x}, {y}), which stands for no height (nodata): correct it, leave the feature out, or take its \
+         heights from the points around with heights = \"points\" in [[breaklines]]",
+        feature.number
+    );
+    Error::input(&file.path, what)
+}
+
 fn too_far_away(file: &LineFile, feature: &LineFeature, [x, y, z]: [f64; 3]) -> Error {
     let what = format!(
         "feature {} has the height {z:?} at ({x}, {y}), more than {FAR_AWAY} above or below all points: correct it, leave the feature out, or \
@@ -172,21 +184,10 @@ fn check_size(paths: &[(&LineOptions, PathBuf)], memory: u64) -> Result<()> {
     )))
 }
 
-/// Says that the lines of a file have heights, but all are zero, as programs write them that know none.
-fn all_at_zero(file: &LineFile) -> Option<String> {
-    let mut heights = file.features.iter().flat_map(|f| f.shape.outlines()).flatten().map(|vertex| vertex[2]);
-    let is_zero = !file.features.is_empty() && heights.all(|z| z == 0.0);
-    is_zero.then(|| {
-        format!(
-            "{}: all its heights are 0; if it has none, say heights = \"points\" in [[breaklines]] to take them from the points around",
-            file.path.display()
-        )
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::input::Crs;
     use crate::input::lines::LineShape;
 
     fn extended(kind: FeatureKind, heights: [f64; 4]) -> Result<[f64; 2]> {
@@ -198,6 +199,20 @@ mod tests {
         let mut extent = Extent { min: [0.0; 3], max: [10.0, 10.0, 20.0], boxes: Vec::new() };
         LineFiles { files: vec![file] }.extend_heights(&mut extent)?;
         Ok([extent.min[2], extent.max[2]])
+    }
+
+    #[test]
+    fn numbers_that_stand_for_no_height_are_refused() {
+        for heights in [[8.0, -9999.0, 8.0, 8.0], [-32_768.0; 4], [99_999.0; 4]] {
+            let error = extended(FeatureKind::Lake, heights).unwrap_err();
+            let text = error.to_string();
+            assert!(
+                error.exit_code() == 3 && text.contains("stands for no height") && text.contains("heights ="),
+                "{text}"
+            );
+        }
+        // Far from the box, and so never used.
+        assert_eq!(extended(FeatureKind::Line, [8.0, 8.0, -9999.0, 8.0]).unwrap(), [0.0, 20.0]);
     }
 
     #[test]

@@ -9,10 +9,12 @@ use crate::geometry::{Bounds, Site};
 use crate::input::lines::LineFile;
 use crate::input::{PointRules, Source};
 use crate::job::options::JobOptions;
+use crate::job::plan::breaklines::height_doubts::height_doubts;
 use crate::job::plan::breaklines::line_files::LineFiles;
 use crate::job::plan::breaklines::on_lattice::on_lattice;
 use crate::job::plan::breaklines::sentences::sentences;
 use crate::job::plan::breaklines::spacing::spacing;
+use crate::job::plan::breaklines::terrain::SampledTerrain;
 use crate::job::plan::extent::Extent;
 use crate::{Error, Result, Warnings, interrupt};
 use rayon::prelude::*;
@@ -63,6 +65,10 @@ pub(crate) struct CloudOfPlan<'a> {
     pub(crate) clipped: Bounds<2>,
     /// The area of the box around all records in square lattice steps.
     pub(crate) area: u64,
+    /// A sample of the points that the job keeps: where each is, and its height.
+    pub(crate) sample: &'a [(Site, i32)],
+    /// The lengths of a unit of x and y and of one of heights in metres.
+    pub(crate) metres: [f64; 2],
 }
 
 impl PlannedBreaklines {
@@ -93,6 +99,8 @@ impl PlannedBreaklines {
         let nearest = nearest_heights(&built, cloud)?;
         nearest.settle(&mut built);
         refuse_sites_without_height(&built, &files.files, cloud.lattice)?;
+        let terrain = SampledTerrain::new(cloud.sample, cloud.metres, cloud.lattice, cloud.clipped);
+        warnings.extend(height_doubts(&files.files, &features, &terrain)?);
         warnings.extend(sentences(&files.files, cloud.lattice, &options, &findings, features_outside));
         Ok(Some(PlannedBreaklines {
             files: files.files.iter().map(|file| file.path.clone()).collect(),

@@ -1,0 +1,131 @@
+//! Heights of lines in another unit than those of the points, counted from another zero, or missing: they are converted, refused or named.
+
+use std::fs;
+use std::path::Path;
+
+use super::files::{Features, UTM_33, geojson, shapefile};
+use super::terrain::{Mesh, Survey};
+use crate::program::Job;
+
+/// The length of a foot in metres.
+const FOOT: f64 = 0.3048;
+
+/// A line on the slope of the survey, with another height at each vertex.
+fn on_slope(change: impl Fn(usize, f64) -> f64) -> Vec<[f64; 3]> {
+    let height = |x: f64, y: f64| 15.15 - x / 20.0 + y / 40.0;
+    (0..8)
+        .map(|i| [10.0 + 18.0 * i as f64, 30.0])
+        .enumerate()
+        .map(|(i, [x, y])| [x, y, change(i, height(x, y))])
+        .collect()
+}
+
+/// Returns what a job with this line says.
+fn said(survey: &Survey, line: Vec<[f64; 3]>, rest: &str) -> String {
+    let file = geojson(survey.folder(), "line.geojson", &Features::lines(&[("line", line)]));
+    survey.job_with(&[file], rest).run_with(&["check"]).succeeded().out
+}
+
+fn highest(job: &Job) -> i64 {
+    Mesh::listed(job).iter().flatten().map(|end| end[2]).max().unwrap()
+}
+
+/// The plane is that of the points, and only heights have another unit.
+#[test]
+fn heights_in_feet_are_converted_though_the_plane_is_the_same() {
+    let survey = Survey::new(2_000);
+    let in_feet = || Features::lines(&[("line", on_slope(|_, z| z / FOOT))]);
+    let shp = shapefile(survey.folder(), "feet", &in_feet());
+    let heights = r#"["EGM2008_Geoid",VDATUM["EGM2008_Geoid"],PARAMETER["Vertical_Shift",0.0],PARAMETER["Direction",1.0],UNIT["Foot",0.3048]]"#;
+    for text in [
+        format!("{UTM_33},VERTCS{heights}"),
+        format!(
+            r#"COMPD_CS["both",{UTM_33},VERT_CS["EGM2008 height",VERT_DATUM["EGM2008 geoid",2005],UNIT["foot",0.3048]]]"#
+        ),
+    ] {
+        fs::write(shp.with_extension("prj"), text).unwrap();
+        let job = survey.job_with(&[&shp], "");
+        let said = job.run().succeeded();
+        assert!(said.out.contains("its heights are converted from foot to metre"), "{}", said.out);
+        assert!((1_400..1_600).contains(&highest(&job)), "{}", highest(&job));
+    }
+    // Points in feet, and lines in metres.
+    fs::write(
+        shp.with_extension("prj"),
+        format!("{UTM_33},VERTCS{}", heights.replace(r#""Foot",0.3048"#, r#""Meter",1.0"#)),
+    )
+    .unwrap();
+    let job = survey.job_with(&[&shp], "").with("input", "crs = \"EPSG:32633+3855\"");
+    assert!(!job.run_with(&["check"]).out.contains("converted"));
+    let text = survey.job_with(&[&shp], "height_unit = \"foot\"").run_with(&["check"]).out;
+    assert!(text.contains("converted from foot to metre"), "{text}");
+}
+
+#[test]
+fn heights_that_seem_to_be_in_feet_are_named_with_the_option_that_converts_them() {
+    let survey = Survey::new(2_000);
+    let feet = || on_slope(|_, z| z / FOOT);
+    let text = said(&survey, feet(), "");
+    assert!(text.contains("line.geojson: its heights seem to be in feet, and those of the points in metres"), "{text}");
+    let text = said(&survey, feet(), "height_unit = \"foot\"");
+    assert!(!text.contains("seem") && text.contains("its heights are converted from foot to metre"), "{text}");
+    let text = said(&survey, on_slope(|_, z| z * FOOT), "");
+    assert!(text.contains("seem to be in metres") && text.contains("[input] unit or crs"), "{text}");
+    let text = said(&survey, on_slope(|_, z| z + 45.0), "");
+    assert!(text.contains("its heights lie above the terrain") && text.contains("ellipsoid"), "{text}");
+    for metres in [-4.0, -0.5, 0.0, 0.5, 4.0] {
+        let text = said(&survey, on_slope(|_, z| z + metres), "");
+        assert!(!text.contains("height"), "{metres}: {text}");
+    }
+}
+
+#[test]
+fn heights_that_stand_for_none_are_refused_or_named() {
+    let survey = Survey::new(2_000);
+    let one = |wrong: f64| on_slope(move |i, z| if i == 3 { wrong } else { z });
+    let run = |line: Vec<[f64; 3]>| {
+        let file = shapefile(survey.folder(), "one", &Features::lines(&[("line", on_slope(|_, z| z)), ("line", line)]));
+        survey.job_with(&[file], "").run_with(&["check"])
+    };
+    for wrong in [-9999.0, -32_768.0] {
+        run(one(wrong))
+            .refused(3, &["one.shp: feature 2 has the height", "at (500064, 4000030)", "stands for no height"]);
+    }
+    for wrong in [f64::NAN, -3.4e38, -1e39] {
+        run(one(wrong))
+            .refused(3, &["one.shp: feature 2 has a vertex without a height, its number 4, at (500064, 4000030)"]);
+    }
+    for (wrong, word) in [(0.0, "if 0 stands for no height"), (-99.0, "neighbours"), (127.0, "neighbours")] {
+        let text = run(one(wrong)).succeeded().out;
+        let named =
+            format!("one.shp: feature 2 has the height {wrong} at (500064, 4000030), where the points around lie from");
+        assert!(text.contains(&named) && text.contains(word) && text.contains("heights = \"points\""), "{text}");
+    }
+    let text = run(on_slope(|_, _| 0.0)).succeeded().out;
+    assert!(text.contains("feature 2 has the height 0 at"), "{text}");
+    let text = said(&survey, on_slope(|_, _| 0.0), "");
+    assert!(text.contains("all its heights are 0, where the middle one of the points around is"), "{text}");
+}
+
+/// At the sea, 0 is a height.
+#[test]
+fn the_shore_of_the_sea_and_rivers_that_flow_into_it_are_not_doubtful() {
+    let survey = Survey::new(100);
+    let cloud = survey.folder().join("coast.csv");
+    let height = |x: u32| f64::from(x) * 0.15 + 0.2;
+    let rows = (0..60)
+        .flat_map(|x| (0..60).map(move |y| format!("{},{},{}\n", 500_000 + 2 * x, 4_000_000 + 2 * y, height(2 * x))));
+    fs::write(&cloud, format!("x,y,z\n{}", rows.collect::<String>())).unwrap();
+    let said = |lines: &Features| {
+        let file = geojson(survey.folder(), "sea.geojson", lines);
+        let job = Job::on::<&Path>(&[&cloud]).with("input", "crs = \"EPSG:32633\"");
+        job.with("[breaklines]", &format!("files = [{file:?}]")).run_with(&["check"]).succeeded().out
+    };
+    let shore: Vec<[f64; 3]> = (0..12).map(|i| [1.0, 10.0 * f64::from(i), 0.0]).collect();
+    let river: Vec<[f64; 3]> = (0..11).map(|i| [110.0 - 10.0 * f64::from(i), 61.0, height(110 - 10 * i)]).collect();
+    let river = [river, vec![[0.0, 61.0, 0.0]]].concat();
+    for lines in [Features::lines(&[("line", shore.clone())]), Features::lines(&[("line", shore), ("river", river)])] {
+        let text = said(&lines);
+        assert!(!text.contains("height"), "{text}");
+    }
+}

@@ -1,0 +1,112 @@
+//! Outlines of lakes that are no outlines of areas: the water is right, or a message names the lake.
+
+use super::files::{Features, geojson, shapefile};
+use super::terrain::{Mesh, Survey, inside};
+use crate::program::Said;
+
+type Ring = Vec<[f64; 2]>;
+
+const SQUARE: [[f64; 2]; 4] = [[40.0, 40.0], [100.0, 40.0], [100.0, 100.0], [40.0, 100.0]];
+const ISLAND: [[f64; 2]; 4] = [[60.0, 60.0], [80.0, 60.0], [80.0, 80.0], [60.0, 80.0]];
+const BESIDE: [[f64; 2]; 4] = [[110.0, 40.0], [130.0, 40.0], [130.0, 60.0], [110.0, 60.0]];
+
+fn twice(ring: &[[f64; 2]]) -> Ring {
+    [ring, ring].concat()
+}
+
+/// Runs a job with these lakes, each of which has its rings. Returns what is said, and how many points are left in the square and in the
+/// island.
+fn run(survey: &Survey, lakes: &[&[Ring]]) -> (Said, [usize; 2]) {
+    let area = |rings: &&[Ring]| {
+        let rings = rings.iter().map(|ring| ring.iter().map(|[x, y]| [*x, *y, 5.0]).collect());
+        ("lake", rings.collect::<Vec<Vec<[f64; 3]>>>())
+    };
+    let features = Features::areas(&lakes.iter().map(area).collect::<Vec<_>>());
+    let job = survey.job_with(&[geojson(survey.folder(), "lakes.geojson", &features)], "kind = \"lake\"");
+    let said = job.run();
+    if said.code != 0 {
+        return (said, [0; 2]);
+    }
+    job.verified();
+    let mesh = Mesh::of(&job);
+    let steps = |ring: [[f64; 2]; 4]| ring.map(|place| place.map(|value| (value * 100.0) as i64));
+    let (square, island) = (steps(SQUARE), steps(ISLAND));
+    let points = mesh.vertices.iter().filter(|p| !mesh.ends.contains(*p));
+    let (on_island, rest): (Vec<_>, Vec<_>) = points.partition(|p| inside(&island, **p));
+    (said, [rest.into_iter().filter(|p| inside(&square, **p)).count(), on_island.len()])
+}
+
+#[test]
+fn rings_that_go_over_their_way_again_enclose_water() {
+    let survey = Survey::new(2_000);
+    let (square, island) = (SQUARE.to_vec(), ISLAND.to_vec());
+    let spiked: Ring =
+        [&square[..2], &[[100.0, 40.0], [130.0, 50.0], [140.0, 60.0], [130.0, 50.0], [100.0, 40.0]], &square[2..]]
+            .concat();
+    let turned: Ring = island.iter().rev().copied().collect();
+    let (said, plain) = run(&survey, &[&[square.clone(), island.clone()]]);
+    assert!(said.code == 0 && plain[0] == 0 && plain[1] > 5, "{plain:?}");
+    for rings in [
+        &[twice(&square), island.clone()][..],
+        &[twice(&twice(&square)), twice(&island)],
+        &[spiked, island.clone()],
+        &[square.clone(), island.clone(), turned],
+    ] {
+        let (said, left) = run(&survey, &[rings]);
+        assert!(said.code == 0 && !said.out.contains("lakes.geojson"), "{}", said.out);
+        assert_eq!(left, plain, "{rings:?}");
+    }
+    // The same lake twice in a file.
+    let lake = [square.clone(), island.clone()];
+    assert_eq!(run(&survey, &[&lake, &lake]).1, plain);
+}
+
+#[test]
+fn what_encloses_nothing_or_is_no_area_is_named() {
+    let survey = Survey::new(2_000);
+    let (square, island) = (SQUARE.to_vec(), ISLAND.to_vec());
+    let eight = vec![SQUARE[0], SQUARE[2], SQUARE[1], SQUARE[3]];
+    let beyond = vec![[90.0, 50.0], [120.0, 50.0], [120.0, 70.0], [90.0, 70.0]];
+    let flat = vec![[40.0, 40.0], [60.0, 60.0], [80.0, 80.0]];
+    let back = vec![SQUARE[0], SQUARE[1], SQUARE[2], SQUARE[1]];
+    for (rings, words) in [
+        (&[eight][..], "1 features are lakes whose outlines cross, the first is feature 1 at (500070, 4000070)"),
+        (
+            &[square.clone(), beyond],
+            "1 features are lakes whose outlines cross, the first is feature 1 at (500100, 40000",
+        ),
+        (
+            &[square.clone(), BESIDE.to_vec()],
+            "lakes with a hole outside of their outline, the first is feature 1 at (500110, 4000040)",
+        ),
+        (
+            &[[&square[..], &[[40.0, 40.0], [70.0, 40.0]], &square[1..]].concat()],
+            "lakes whose outlines enclose nothing",
+        ),
+        (&[flat], "1 features have no two different vertices"),
+        (&[back], "1 features have no two different vertices"),
+    ] {
+        let (said, _) = run(&survey, &[rings]);
+        assert!(said.code == 0 && said.out.contains(words), "{}", said.out);
+    }
+    let mut same = square.clone();
+    same.reverse();
+    for hole in [square.clone(), same, twice(&square)] {
+        let (said, _) = run(&survey, &[&[island.clone()], &[square.clone(), hole]]);
+        said.refused(3, &["lakes.geojson: feature 2 has a hole that is the same as its outline, at (500040, 4000040)"]);
+    }
+    let (said, _) = run(&survey, &[&[square], &[island]]);
+    assert!(said.out.contains("lie inside a lake"), "{}", said.out);
+}
+
+/// A Shapefile has one list of rings.
+#[test]
+fn a_ring_beside_the_only_outline_is_named() {
+    let survey = Survey::new(500);
+    let clockwise = |ring: &[[f64; 2]]| ring.iter().rev().map(|[x, y]| [*x, *y, 5.0]).collect::<Vec<_>>();
+    let other = |ring: &[[f64; 2]]| ring.iter().map(|[x, y]| [*x, *y, 5.0]).collect::<Vec<_>>();
+    let features = Features::areas(&[("lake", vec![clockwise(&SQUARE), other(&BESIDE)])]);
+    let job = survey.job_with(&[shapefile(survey.folder(), "lakes", &features)], "kind = \"lake\"");
+    let text = job.run_with(&["check"]).succeeded().out;
+    assert!(text.contains("a hole outside of their outline"), "{text}");
+}
