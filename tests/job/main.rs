@@ -48,6 +48,7 @@ mod limits;
 mod manual;
 mod many_tiles;
 mod messages;
+mod nodata;
 mod overlap;
 mod parts;
 mod preflight;

@@ -3,7 +3,7 @@
 //! One point of noise, or a header with a wrong greatest height, must not give all of a terrain one colour. So a sample of the points
 //! decides. It is the same for a job of one part and of several, whose tiles are coloured before the last point is read.
 
-use crate::input::{DecodedChunks, OptionalFields, PointCounts, PointRules, Source};
+use crate::input::{DecodedChunks, Extremes, OptionalFields, PointCounts, PointRules, Source};
 use crate::output::color::HeightRange;
 use crate::{Result, interrupt};
 use rayon::prelude::*;
@@ -39,6 +39,8 @@ pub(crate) struct HeightSample {
     pub(crate) counts: PointCounts,
     /// The same of each file at which it looked.
     pub(crate) by_file: BTreeMap<PathBuf, PointCounts>,
+    /// The lowest and the highest heights of each file, in steps of the lattice.
+    pub(crate) extremes: BTreeMap<PathBuf, Extremes>,
 }
 
 impl HeightSample {
@@ -72,13 +74,16 @@ impl HeightSample {
         };
         let found = (0..places).into_par_iter().map(look).collect::<Result<Vec<_>>>()?;
         let (mut heights, mut counts, mut by_file) = (Vec::new(), PointCounts::default(), BTreeMap::new());
+        let mut extremes = BTreeMap::new();
         for (path, (more, its_counts)) in found {
+            let its_extremes = extremes.entry(path.clone()).or_insert_with(Extremes::default);
+            more.iter().for_each(|height| its_extremes.see(f64::from(*height), 0));
             heights.extend(more);
             counts += its_counts.clone();
             *by_file.entry(path.clone()).or_insert_with(PointCounts::default) += its_counts;
         }
         heights.sort_unstable();
-        Ok(HeightSample { heights, places, seen: counts.read - counts.not_decoded, records, counts, by_file })
+        Ok(HeightSample { heights, places, seen: counts.read - counts.not_decoded, records, counts, by_file, extremes })
     }
 
     /// Returns the heights that colours span, without what may be noise; `None` if the sample has too few points to tell. Where the
@@ -130,8 +135,9 @@ mod tests {
     /// A sample in `places` chunks of heights from 0 that saw every record that passed, of `records`.
     fn sample(count: i32, places: usize, records: u64) -> HeightSample {
         let counts = PointCounts::default();
-        let by_file = BTreeMap::new();
-        HeightSample { heights: (0..count).collect(), places, seen: count as u64, records, counts, by_file }
+        let (by_file, extremes) = (BTreeMap::new(), BTreeMap::new());
+        let heights = (0..count).collect();
+        HeightSample { heights, places, seen: count as u64, records, counts, by_file, extremes }
     }
 
     fn range(low: i32, high: i32) -> Option<HeightRange> {

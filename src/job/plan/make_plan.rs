@@ -11,6 +11,7 @@ use crate::job::plan::breaklines::line_files::LineFiles;
 use crate::job::plan::breaklines::{CloudOfPlan, PlannedBreaklines};
 use crate::job::plan::budget::network_memory;
 use crate::job::plan::common_crs::{common_crs, horizontal_unit};
+use crate::job::plan::doubtful_heights::refuse_doubtful_heights;
 use crate::job::plan::extent::{Extent, SourceBox, to_float};
 use crate::job::plan::height_range::HeightSample;
 use crate::job::plan::inputs::{check_missing_records, open_all, unreadable_names};
@@ -148,6 +149,7 @@ fn try_plan(
     let claims = claims.map(|claims| claims.with_lines(lines_at));
     let [low, high] = claimed_heights(&lattice, &extent).map(|z| z.round() as i32);
     let sample = HeightSample::take(sources, &rules, options.input.bounds.map(|bounds| bounds.0))?;
+    refuse_doubtful_heights(sources, &sample, &lattice, options)?;
     let heights = sample.range_within(HeightRange { low, high });
     let plan = Plan {
         claims,
