@@ -28,6 +28,7 @@ mod text;
 pub mod transform_sources;
 mod transform_warnings;
 pub mod transformation;
+mod windows_1252;
 
 pub(crate) use crs::area_of_use::{AreaOfUse, arc};
 pub use crs::choice::CrsChoice;
@@ -45,6 +46,8 @@ pub use decoded_chunks::DecodedChunks;
 pub use file::random_access::not_a_file;
 pub use points::axis::Axis;
 pub use points::counts::PointCounts;
+pub(crate) use points::nodata::{DoubtfulHeight, Extremes, is_nodata_beside, is_number_in_steps, shown_height};
+pub use points::nodata_choice::NodataChoice;
 pub use points::optional_fields::OptionalFields;
 pub use points::point::Point;
 pub use points::raw_bounds::RawBounds;

@@ -9,6 +9,7 @@ use crate::input::crs::target::{NamedCrs, TargetCrs};
 use crate::input::crs::transform::datum_rule::DatumRule;
 use crate::input::crs::unit::Unit;
 use crate::input::points::classes::{IGNORED_GROUND, is_noise};
+use crate::input::points::nodata_choice::NodataChoice;
 use crate::input::points::optional_fields::OptionalFields;
 use crate::input::points::returns::KeptReturns;
 use crate::input::remote::name::{is_url, public_name};
@@ -43,6 +44,9 @@ pub struct InputOptions {
     /// Keep only the points within this rectangle, in the system of the job: with `to_crs`, in that.
     #[serde(default)]
     pub bounds: Option<SourceBounds>,
+    /// Which heights are left out because they stand for nodata.
+    #[serde(default, skip_serializing_if = "NodataChoice::is_auto")]
+    pub nodata: NodataChoice,
     /// Which of several points with the same x and y the job keeps.
     #[serde(default)]
     pub duplicates: Duplicates,
@@ -171,6 +175,7 @@ impl InputOptions {
             classes: self.kept_classes(),
             strict_classes: self.chooses_classes(),
             returns: self.kept_returns(),
+            nodata: self.nodata.clone(),
             use_index: self.bounds.is_some(),
             fields,
         }

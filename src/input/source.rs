@@ -21,6 +21,7 @@ use crate::input::points::axis::Axis;
 use crate::input::points::chunk_request::ChunkRequest;
 use crate::input::points::counts::PointCounts;
 use crate::input::points::filter::PointFilter;
+use crate::input::points::nodata_sink::NodataSink;
 use crate::input::points::point::Point;
 use crate::input::points::raw_bounds::RawBounds;
 use crate::input::points::record_sink::RecordSink;
@@ -35,6 +36,7 @@ use crate::{Error, Result, Warnings};
 
 mod crs_origin;
 mod geocentric;
+mod nodata;
 mod transformed;
 
 /// How a file holds its points.
@@ -97,6 +99,9 @@ pub struct Source {
     /// The way of its points into another system; `axes`, `grid`, `min`, `max` and `crs` then are those after it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     transform: Option<Box<SourceTransform>>,
+    /// The raw heights of a LAS or LAZ file that stand for nodata.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    nodata: Vec<i64>,
     points: PointData,
 }
 
@@ -130,7 +135,7 @@ pub fn open_chosen(path: &Path, text: &TextOptions, choice: &RowChoice) -> Resul
     file.read_exact_at(&mut start[..held], 0)?;
     let start = &start[..held];
     let mut source = if start.starts_with(b"LASF") {
-        open_las(&file, choice.use_index)?
+        open_las(&file, choice)?
     } else {
         refuse_other_formats(path, start)?;
         open_text(&file, text, choice)?
@@ -139,14 +144,14 @@ pub fn open_chosen(path: &Path, text: &TextOptions, choice: &RowChoice) -> Resul
     Ok(source)
 }
 
-fn open_las(file: &RandomAccessFile, with_index: bool) -> Result<Source> {
+fn open_las(file: &RandomAccessFile, choice: &RowChoice) -> Result<Source> {
     let mut warnings = Warnings::default();
     let header = LasHeader::read(file, &mut warnings)?;
     let vlrs = vlr::list(file, &header, &mut warnings)?;
     let crs = crs_records::read(file, &vlrs, &mut warnings)?;
     let crs = plausible(crs, header.min, header.max, &mut warnings);
     let (missing, points) = if header.compressed {
-        let points = CompressedPoints::read(file, &header, &vlrs, with_index, &mut warnings)?;
+        let points = CompressedPoints::read(file, &header, &vlrs, choice.use_index, &mut warnings)?;
         (points.missing, PointData::Laz(points))
     } else {
         let points = UncompressedPoints::new(&header, file.size());
@@ -176,9 +181,11 @@ fn open_las(file: &RandomAccessFile, with_index: bool) -> Result<Source> {
         by_return: header.by_return,
         warnings,
         transform: None,
+        nodata: Vec::new(),
         points,
     };
     source.drop_false_geocentric_crs()?;
+    source.find_nodata(choice)?;
     Ok(source)
 }
 
@@ -191,8 +198,8 @@ fn open_text(file: &RandomAccessFile, options: &TextOptions, choice: &RowChoice)
         format: FileFormat::Text,
         version: None,
         point_format: None,
-        records: table.records,
-        missing: 0,
+        records: table.records + table.missing,
+        missing: table.missing,
         min: table.min,
         max: table.max,
         axes: table.axes(),
@@ -205,6 +212,7 @@ fn open_text(file: &RandomAccessFile, options: &TextOptions, choice: &RowChoice)
         by_return: Vec::new(),
         warnings,
         transform: None,
+        nodata: Vec::new(),
         points: PointData::Text(Box::new(table)),
     })
 }
@@ -230,7 +238,7 @@ impl Source {
     /// Returns the number of records that decoding will count as malformed, as far as it is known without decoding.
     pub fn known_malformed(&self) -> u64 {
         match &self.points {
-            PointData::Text(table) => table.malformed(),
+            PointData::Text(table) => table.malformed() + table.missing,
             _ => self.missing,
         }
     }
@@ -420,6 +428,14 @@ impl Source {
 
     /// As [`Source::read_chunk`], in the coordinates of the file.
     fn read_own_chunk(&self, chunk: usize, request: ChunkRequest, sink: &mut impl RecordSink) -> Result<()> {
+        match self.nodata.as_slice() {
+            [] => self.read_chunk_of_file(chunk, request, sink),
+            heights => self.read_chunk_of_file(chunk, request, &mut NodataSink { heights, inner: sink }),
+        }
+    }
+
+    /// As [`Source::read_chunk`], as the file has the records.
+    fn read_chunk_of_file(&self, chunk: usize, request: ChunkRequest, sink: &mut impl RecordSink) -> Result<()> {
         let file = RandomAccessFile::reopen(&self.path, self.size)?;
         if file.is_remote() {
             // What an index lists within bounds is read later, all of it, when a sample looks at its beginning.

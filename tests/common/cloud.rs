@@ -57,7 +57,7 @@ pub(crate) fn decode(source: &Source, rules: &PointRules) -> Result<(Vec<Point>,
         })?;
     }
     let dropped = counts.withheld + counts.other_class + counts.other_return + counts.out_of_bounds + counts.malformed;
-    assert_eq!(counts.read, dropped + counts.kept);
+    assert_eq!(counts.read, dropped + counts.nodata + counts.kept);
     assert_eq!(counts.kept, points.len() as u64);
     assert_eq!(counts.read, source.records);
     Ok((points, counts))

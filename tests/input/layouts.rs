@@ -209,8 +209,8 @@ fn the_columns_of_late_rows_are_counted_before_they_are_read() {
 #[test]
 fn messages_about_rows_name_the_right_column() {
     for (content, words) in [
-        ("1 2 3\n1 2 1e30\n", "column 3 (z) is \"1e30\", which is too large"),
-        ("1 2 3\n1 2 -3.4028235e+38\n", "\"-3.4028235e+38\", which is too large"),
+        ("1 2 3\n1 2 15e29\n", "column 3 (z) is \"15e29\", which is too large"),
+        ("1 2 3\n1 -3.4028235e+38 3\n", "\"-3.4028235e+38\", which is too large"),
         ("id,desc,x,y,z\n1,a,1,2,3\n77\n", "column 2 is missing"),
         ("P1 565026.16 5933012.3 12.1\nP2 565027.16 5933013.3 12.2\n", "column 1 (x) is \"P1\""),
     ] {
@@ -278,6 +278,25 @@ fn whole_columns_that_may_be_decimals_need_names() {
     let columns = Some(["x", "y", "z", "i"].map(str::to_owned).to_vec());
     let path = file(".csv", rows.as_bytes());
     assert_eq!(open(&path, &TextOptions { columns, ..TextOptions::default() }).unwrap().records, 50);
+}
+
+#[test]
+fn a_column_after_whole_coordinates_is_read_with_a_warning() {
+    let rows: String = (0..60).map(|i| format!("{},{},{},{}\n", 1000 + i / 4, i % 4, 200 + i % 3, 1 + i % 7)).collect();
+    let cloud = text(&rows).unwrap();
+    assert_eq!((cloud.counts.kept, cloud.source.max[2]), (60, 202.0));
+    let warnings = cloud.source.warnings.iter().map(|warning| warning.to_string()).collect::<String>();
+    assert!(warnings.contains("`columns` under [input.csv]") && warnings.contains("before the decimals"), "{warnings}");
+}
+
+#[test]
+fn names_and_texts_may_be_in_windows_1252() {
+    let utf8 = "Punkt;Rechtswert;Hochwert;H\u{f6}he\nT\u{fc}r;1,5;2;3,25\nB;4;5;6\n";
+    let western: Vec<u8> = utf8.chars().map(|character| u32::from(character) as u8).collect();
+    for bytes in [utf8.as_bytes(), &western] {
+        let cloud = read_bytes(".csv", bytes).unwrap();
+        assert_eq!((cloud.counts.kept, cloud.source.min, cloud.source.max), (2, [1.5, 2.0, 3.25], [4.0, 5.0, 6.0]));
+    }
 }
 
 #[test]

@@ -51,6 +51,7 @@ mod many_tiles;
 mod messages;
 #[cfg(unix)]
 mod names;
+mod nodata;
 mod overlap;
 mod parts;
 mod preflight;

@@ -4,6 +4,8 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use crate::input::windows_1252::decoded;
+
 /// What the encodings that are read are called in a `.cpg`: UTF-8, and those that Windows-1252 includes.
 const KNOWN: [&str; 12] = [
     "",
@@ -18,12 +20,6 @@ const KNOWN: [&str; 12] = [
     "cp1252",
     "ansi1252",
     "windows1252",
-];
-
-/// The characters of Windows-1252 from 0x80 to 0x9f. All other bytes are those of Latin-1, which begins as Unicode does.
-const FROM_80: [char; 32] = [
-    '€', '\u{81}', '‚', 'ƒ', '„', '…', '†', '‡', 'ˆ', '‰', 'Š', '‹', 'Œ', '\u{8d}', 'Ž', '\u{8f}', '\u{90}', '‘', '’',
-    '“', '”', '•', '–', '—', '˜', '™', 'š', '›', 'œ', '\u{9d}', 'ž', 'Ÿ',
 ];
 
 /// How texts are written.
@@ -52,21 +48,13 @@ impl Encoding {
     /// # Errors
     /// A sentence without its subject, if the encoding is not known and it matters.
     pub(super) fn text(&self, bytes: &[u8]) -> Result<String, String> {
-        match (std::str::from_utf8(bytes), &self.unknown) {
-            (Ok(text), _) => Ok(text.to_string()),
-            (Err(_), None) => Ok(bytes.iter().map(|&byte| character(byte)).collect()),
-            (Err(_), Some(name)) => Err(format!(
+        match &self.unknown {
+            Some(name) if std::str::from_utf8(bytes).is_err() => Err(format!(
                 "has a text in the encoding {name:?}, as the .cpg says, which is not known here: write the file anew in UTF-8, for example with \
                  `ogr2ogr -lco ENCODING=UTF-8`"
             )),
+            _ => Ok(decoded(bytes).into_owned()),
         }
-    }
-}
-
-fn character(byte: u8) -> char {
-    match byte {
-        0x80..=0x9f => FROM_80[usize::from(byte - 0x80)],
-        _ => char::from(byte),
     }
 }
 

@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 pub(crate) const MOST_EXAMPLES: usize = 5;
 
 /// What happened to the records of a source, or of a part of it:
-/// `read = out_of_bounds + withheld + other_class + other_return + malformed + at_breaklines +
+/// `read = out_of_bounds + withheld + other_class + other_return + nodata + malformed + at_breaklines +
 /// kept`. The first reason that applies counts, in the order
-/// out of bounds, withheld, class, return, lattice. So the numbers do not depend on whether an index tells what is out of bounds.
+/// out of bounds, withheld, class, return, nodata, lattice. So the numbers do not depend on whether an index tells what is out of bounds.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PointCounts {
     /// Records seen, including the records missing from a truncated file.
@@ -28,6 +28,9 @@ pub struct PointCounts {
     /// Those of them that were not even decoded, because the index of the file says where they lie.
     #[serde(default)]
     pub not_decoded: u64,
+    /// Dropped: their height stands for nodata.
+    #[serde(default)]
+    pub nodata: u64,
     /// Dropped: not readable, or outside the lattice.
     pub malformed: u64,
     /// Dropped: they lie at a breakline, or in a lake.
@@ -97,6 +100,7 @@ impl AddAssign for PointCounts {
         self.other_return += other.other_return;
         self.out_of_bounds += other.out_of_bounds;
         self.not_decoded += other.not_decoded;
+        self.nodata += other.nodata;
         self.malformed += other.malformed;
         self.at_breaklines += other.at_breaklines;
         self.rounded_xy += other.rounded_xy;

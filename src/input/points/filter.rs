@@ -9,7 +9,7 @@ use crate::input::points::axis::{AXIS_NAMES, Axis};
 use crate::input::points::classes::{is_ground, is_unclassified};
 use crate::input::points::counts::PointCounts;
 use crate::input::points::point::Point;
-use crate::input::points::record::PointRecord;
+use crate::input::points::record::{NODATA, PointRecord};
 use crate::input::points::record_sink::RecordSink;
 use crate::input::points::returns::{KeptReturns, PulseReturn};
 use crate::input::points::rules::PointRules;
@@ -91,8 +91,9 @@ impl<'a> PointFilter<'a> {
             self.counts.ground += if is_ground(class) { kept } else { 0 };
             self.counts.unclassified += if is_unclassified(class) { kept } else { 0 };
         }
-        let PointCounts { withheld, other_class, other_return, out_of_bounds, malformed, kept, .. } = self.counts;
-        self.counts.read = withheld + other_class + other_return + out_of_bounds + malformed + kept;
+        let PointCounts { withheld, other_class, other_return, out_of_bounds, nodata, malformed, kept, .. } =
+            self.counts;
+        self.counts.read = withheld + other_class + other_return + out_of_bounds + nodata + malformed + kept;
         let classes: BTreeMap<u8, u64> = (0..=u8::MAX).zip(self.classes).filter(|(_, count)| *count > 0).collect();
         self.counts.classes = classes;
         Ok(self.counts)
@@ -122,6 +123,10 @@ impl<'a> PointFilter<'a> {
             return Ok(());
         }
         if !self.keeps_class(record.class) || !self.keeps_return(record.pulse_return) {
+            return Ok(());
+        }
+        if record.raw[2] == NODATA {
+            self.counts.nodata += 1;
             return Ok(());
         }
         // One by one: `array::map` compiles to a call for every record here.
@@ -263,7 +268,7 @@ mod tests {
         let reach = i64::from(REACH);
         let ends = [reach, -reach, i64::from(i32::MAX), i64::from(i32::MIN)];
         let beyond = ends.map(|end| end + end.signum());
-        let edges = [&ends[..], &beyond, &[0, BEYOND]].concat();
+        let edges = [&ends[..], &beyond, &[0, BEYOND, NODATA]].concat();
         prop_oneof![6 => -1000i64..1000, 1 => prop::sample::select(edges), 1 => any::<i32>().prop_map(i64::from)]
     }
 

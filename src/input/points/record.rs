@@ -2,6 +2,9 @@
 
 use crate::input::points::returns::PulseReturn;
 
+/// The raw height of a record whose height stands for nodata. It lies outside every lattice.
+pub(crate) const NODATA: i64 = i64::MAX;
+
 /// What a record says before the rules are applied to it. `raw` counts steps of the source's axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct PointRecord {

@@ -4,7 +4,7 @@ use crate::Result;
 use crate::geometry::lattice::BEYOND;
 use crate::input::crs::transform::between::CrsTransform;
 use crate::input::points::axis::Axis;
-use crate::input::points::record::PointRecord;
+use crate::input::points::record::{NODATA, PointRecord};
 use crate::input::points::record_sink::RecordSink;
 use crate::input::points::returns::PulseReturn;
 use rust_decimal::prelude::ToPrimitive;
@@ -94,7 +94,7 @@ impl<S: RecordSink> RecordSink for TransformedSink<'_, S> {
     fn push(&mut self, number: u64, record: &PointRecord, place: impl Fn() -> String) -> Result<()> {
         let mut moved = *record;
         if let Some(factor) = self.transform.heights
-            && record.raw[2] != BEYOND
+            && ![BEYOND, NODATA].contains(&record.raw[2])
         {
             moved.raw[2] = self.to[2].raw(self.from[2].value(record.raw[2]) * factor);
         }

@@ -45,6 +45,11 @@ impl Source {
         self.transform.as_ref().map_or(1.0, |transform| transform.steps_of_height())
     }
 
+    /// Returns what the heights of the file are multiplied by.
+    pub(crate) fn factor_of_heights(&self) -> f64 {
+        self.transform.as_ref().and_then(|transform| transform.heights).unwrap_or(1.0)
+    }
+
     /// Returns what the file itself says of its coordinates, for a transform of them.
     pub(crate) fn own_coordinates(&self) -> OwnCoordinates {
         OwnCoordinates { axes: self.axes, grid: self.grid, min: self.min, max: self.max, crs: self.crs.clone() }

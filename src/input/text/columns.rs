@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::input::points::returns::KeptReturns;
 use crate::input::text::comment_names::{names_in_comments, texts_of};
+use crate::input::text::commented_header::unread_header;
 use crate::input::text::decimal_comma::{self, CommaUse, Names};
 use crate::input::text::decimal_sign::{self, DecimalSign};
 use crate::input::text::delimiter::{CANDIDATES, Delimiter};
@@ -35,6 +36,10 @@ const UNCLEAR_COMMA: &str = "has only whole numbers with commas between them, mo
                              [input.csv], for example [\"x\", \"y\", \"z\", \"class\"], and if they do, write it again with points before \
                              decimals or with semicolons between columns";
 
+const DOUBTFUL_COMMA: &str = "has only whole numbers with commas between them, more than three in a row, and no line names all of them: the commas are \
+                              taken to stand between columns; name all columns with `columns` under [input.csv], and if commas also stand \
+                              before the decimals of heights, as in 565000,5933000,12,5, write it again with points there";
+
 const UNCLEAR_THOUSANDS: &str = "has commas that may stand before decimals or between thousands, as in 565,000: write it again with points \
                                  before decimals, and nothing between thousands";
 
@@ -59,6 +64,8 @@ pub(crate) struct Columns {
     pub(crate) unit_colors: bool,
     /// Whether intensities are, likewise.
     pub(crate) unit_intensity: bool,
+    /// Whether numbers for nodata that are too large for any height are no reason to take a row for malformed.
+    pub(crate) huge_heights: bool,
     /// Lines that begin with one of these are skipped.
     comments: Vec<String>,
 }
@@ -68,6 +75,8 @@ pub(crate) struct DetectedColumns {
     pub(crate) columns: Columns,
     /// How many lines come before the rows: up to the last one of a header.
     pub(crate) header_lines: usize,
+    /// The number of rows, if the first line holds it.
+    pub(crate) promised: Option<u64>,
     /// Whether x and y are named as longitude and latitude.
     pub(crate) degrees: bool,
     /// What the names say about units.
@@ -119,7 +128,7 @@ impl Columns {
         let texts: Vec<&[u8]> = pointed.iter().map(|line| &**line).collect();
         let decimal_comma = sign != DecimalSign::Point;
         let header = header::find(&texts, &candidates, options.header, options.columns.is_some());
-        if header.count {
+        if header.count.is_some() {
             warnings.push("the first line holds one number, taken for the number of points and skipped");
         }
         if let Some((at, _)) = header.lines.checked_sub(1).and_then(|last| rows.get(last)) {
@@ -143,6 +152,9 @@ impl Columns {
                 let in_comments = names_in_comments(&lines[..end], &comments, &candidates, data).map_err(bad)?;
                 words = in_comments.words;
                 let named = in_comments.named;
+                let is_open = named.is_none() && words.is_none();
+                let unread = is_open.then(|| unread_header(&lines[..end], &comments, &candidates, data)).flatten();
+                unread.map_or(Ok(()), |what| Err(bad(what)))?;
                 names_among_rows(data, &candidates)
                     .filter(|_| named.is_none())
                     .map_or(Ok(named), |what| Err(bad(what)))?
@@ -153,7 +165,7 @@ impl Columns {
         if options.columns.as_ref().is_none_or(|names| data.iter().any(|row| delimiter.has_more_than(names.len(), row)))
         {
             let found = found.as_ref().filter(|_| options.columns.is_none());
-            refuse_decimal_comma(path, delimiter, found, words, data)?;
+            warnings.extend(refuse_decimal_comma(path, delimiter, found, words, data)?);
         }
         if found.is_none() && are_numbered(delimiter, data) {
             return Err(bad(NUMBERED.to_string()));
@@ -172,9 +184,20 @@ impl Columns {
         let strict_classes = choice.strict_classes;
         warnings.extend(unreadable_class(delimiter, &roles, data).filter(|_| !strict_classes));
         let (unit_colors, unit_intensity) = (false, false);
-        let columns =
-            Columns { delimiter, roles, named, decimal_comma, strict_classes, unit_colors, unit_intensity, comments };
-        Ok(DetectedColumns { columns, header_lines, degrees: found.is_some_and(|found| found.degrees), units })
+        let huge_heights = choice.nodata.is_on();
+        let columns = Columns {
+            delimiter,
+            roles,
+            named,
+            decimal_comma,
+            strict_classes,
+            unit_colors,
+            unit_intensity,
+            huge_heights,
+            comments,
+        };
+        let (promised, degrees) = (header.count, found.is_some_and(|found| found.degrees));
+        Ok(DetectedColumns { columns, header_lines, promised, degrees, units })
     }
 
     /// Returns the sign before decimals.
@@ -238,14 +261,14 @@ fn names_warning(found: Option<&NamedColumns>, units: &UnitsOfAxes, columns: usi
     Some(warning.to_string())
 }
 
-/// Fails if commas stand before decimals too, or may. `words` are those of a comment that begins with x, y and z.
+/// Fails if commas stand before decimals too, or probably do, and returns a warning if they may. `words` are those of a comment that begins with x, y and z.
 fn refuse_decimal_comma(
     path: &Path,
     delimiter: Delimiter,
     found: Option<&NamedColumns>,
     words: Option<usize>,
     rows: &[&[u8]],
-) -> Result<()> {
+) -> Result<Option<String>> {
     let names = match found {
         None => words.map_or(Names::None, Names::InComment),
         Some(found) if found.roles.starts_with(&COORDINATES) => Names::CoordinatesFirst,
@@ -254,7 +277,8 @@ fn refuse_decimal_comma(
     match decimal_comma::second_use(delimiter, names, found.map(|found| found.count), rows) {
         Some(CommaUse::Decimals) => Err(Error::input(path, DECIMAL_COMMA)),
         Some(CommaUse::Unclear) => Err(Error::input(path, UNCLEAR_COMMA)),
-        None => Ok(()),
+        Some(CommaUse::Columns) => Ok(Some(DOUBTFUL_COMMA.to_string())),
+        None => Ok(None),
     }
 }
 

@@ -35,12 +35,14 @@ const PATTERNS: [usize; 3] = [0b011, Z_ALONE, 0b111];
 const Z_ALONE: usize = 0b100;
 
 /// What the commas of rows stand for, if not only between columns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum CommaUse {
     /// Before decimals as well.
     Decimals,
-    /// Nobody can tell.
+    /// Probably before decimals as well.
     Unclear,
+    /// Between columns, but maybe before the decimals of z as well.
+    Columns,
 }
 
 /// What is known of the columns without looking at the rows.
@@ -98,7 +100,7 @@ pub(crate) fn second_use(delimiter: Delimiter, names: Names, named: Option<usize
         Names::InComment(words) => Some(words),
         Names::CoordinatesFirst | Names::Others => return None,
     };
-    may_be_decimals(&whole, words).then_some(CommaUse::Unclear)
+    possible_decimals(&whole, words)
 }
 
 /// Returns whether `field` is a number with a point. A date, a time or the name of a file is none.
@@ -158,13 +160,14 @@ fn usual_length(rows: &[WholeRow]) -> usize {
     with_length.into_iter().max_by_key(|(_, rows)| *rows).map_or(0, |(length, _)| length)
 }
 
-/// Returns whether columns that nothing names can be read as coordinates with decimals, with or without the number of the row before
-/// them. If a comment has so many `words`, rows of any width can, if it has no word for the decimals.
-fn may_be_decimals(rows: &[WholeRow], words: Option<usize>) -> bool {
+/// Returns what commas stand for if columns that nothing names can be read as coordinates with decimals, with or without the number of the
+/// row before them. If a comment has so many `words`, rows of any width can, if it has no word for the decimals. If only z has decimals, the
+/// column after it is as likely a class or an intensity, unless z is the same in all rows, or a comment names all other columns.
+fn possible_decimals(rows: &[WholeRow], words: Option<usize>) -> Option<CommaUse> {
     let usual = usual_length(rows);
     let rows: Vec<&WholeRow> = rows.iter().filter(|row| row.len() == usual).collect();
     if rows.len() < LEAST_ROWS || usual < 4 {
-        return false;
+        return None;
     }
     let starts = if are_numbered(&rows) { 0..2 } else { 0..1 };
     let is_usual = |pattern: usize| {
@@ -174,8 +177,15 @@ fn may_be_decimals(rows: &[WholeRow], words: Option<usize>) -> bool {
             _ => usual <= MOST_COLUMNS || unnamed >= pattern.count_ones() as usize,
         }
     };
+    let is_unnamed = words.is_some_and(|words| usual == words + 1);
+    let use_of = |start: usize, pattern: usize| {
+        let is_column = pattern == Z_ALONE && !is_unnamed && !are_same(&rows, start + 2);
+        if is_column { CommaUse::Columns } else { CommaUse::Unclear }
+    };
     let patterns = || PATTERNS.into_iter().filter(|pattern| is_usual(*pattern));
-    starts.into_iter().any(|start| patterns().any(|pattern| fits_pattern(&rows, start, pattern)))
+    let readings = starts.flat_map(|start| patterns().map(move |pattern| (start, pattern)));
+    let fitting = readings.filter(|(start, pattern)| fits_pattern(&rows, *start, *pattern));
+    fitting.map(|(start, pattern)| use_of(start, pattern)).min()
 }
 
 /// Returns whether the first column counts the rows.
@@ -188,14 +198,16 @@ fn are_numbered(rows: &[&WholeRow]) -> bool {
 /// Returns whether the columns from `start` on can be x, y and z if those have decimals whose bits are set in `pattern`.
 fn fits_pattern(rows: &[&WholeRow], start: usize, pattern: usize) -> bool {
     let mut column = start;
+    // Without decimals, the points would lie on a line.
+    let is_line = pattern != Z_ALONE && are_same(rows, start + 1);
     for axis in 0..3 {
         column += 1;
         if pattern & (1 << axis) == 0 {
             continue;
         }
-        // If z alone has decimals, they differ from row to row: a column that does not holds something else, such as a class.
-        let alone = pattern == Z_ALONE;
-        if column >= rows[0].len() || !are_decimals(rows, column) || (alone && are_same(rows, column)) {
+        // A column that is the same in all rows holds something else than decimals, such as a class, unless it is the y of no terrain.
+        let is_class = column >= rows[0].len() || (are_same(rows, column) && !is_line);
+        if is_class || !are_decimals(rows, column) {
             return false;
         }
         column += 1;
@@ -297,6 +309,20 @@ mod tests {
             assert_eq!(used(Names::None, &text), Some(CommaUse::Unclear), "{text}");
             assert_eq!(used(Names::CoordinatesFirst, &text), None, "{text}");
         }
+    }
+
+    #[test]
+    fn a_column_after_whole_coordinates_is_a_column() {
+        let heights = |i: usize| format!("{},{},{},{}", 565_000 + i, 5_933_000 + 7 * i, 12 + i % 3, 10 + i % 90);
+        let strip = |i: usize| format!("{},{},{},{}", 1000 + i / 4, i % 4, 200 + i % 3, 1 + i % 7);
+        for text in [table(50, heights), table(50, strip)] {
+            assert_eq!(used(Names::None, &text), Some(CommaUse::Columns), "{text}");
+            assert_eq!(used(Names::CoordinatesFirst, &text), None, "{text}");
+        }
+        let classed = |i: usize| format!("{},{},{},2", 1000 + i / 4, i % 4, 200 + i % 3);
+        let flagged = |i: usize| format!("{},{},{},2,0", 1000 + i / 4, i % 4, 200 + i % 3);
+        assert_eq!(used(Names::None, &table(50, classed)), None);
+        assert_eq!(used(Names::None, &table(50, flagged)), None);
     }
 
     #[test]

@@ -32,8 +32,8 @@ pub(crate) struct Header {
     pub(crate) lines: usize,
     /// What the columns are called; an error if a line should say it and does not.
     pub(crate) names: Option<Result<NamedColumns, String>>,
-    /// Whether one of the lines holds the number of points.
-    pub(crate) count: bool,
+    /// The number of points, if the first of the lines holds it.
+    pub(crate) count: Option<u64>,
 }
 
 /// Returns what the lines before the first row say. `rows` are the first lines that are neither blank nor a comment. `named` tells
@@ -47,7 +47,7 @@ pub(crate) fn find(rows: &[&[u8]], candidates: &[Delimiter], wanted: Option<bool
         None => before,
     };
     if before == 0 {
-        return Header { lines: 0, names: None, count: false };
+        return Header { lines: 0, names: None, count: None };
     }
     // Without any row, the first line is what the message is about.
     let lines = if before == rows.len() { &rows[..1] } else { &rows[..before] };
@@ -62,13 +62,13 @@ pub(crate) fn find(rows: &[&[u8]], candidates: &[Delimiter], wanted: Option<bool
             let (before, after) = (&lines[at], after(at));
             let named = with_units(names, &lines[at + 1..after]);
             let named = named.map_err(|error| format!("the line of names, {}, {error}", shown(before)));
-            Header { lines: after, names: Some(named), count: false }
+            Header { lines: after, names: Some(named), count: None }
         }
-        None if named => Header { lines: after(0), names: None, count: is_count(lines[0]) },
-        None if is_count(lines[0]) => Header { lines: 1, names: None, count: true },
+        None if named => Header { lines: after(0), names: None, count: count_in(lines[0]) },
+        None if count_in(lines[0]).is_some() => Header { lines: 1, names: None, count: count_in(lines[0]) },
         None => {
             let error = names(lines[0]).err().map(|error| error.to_string()).unwrap_or_default();
-            Header { lines: 1, names: Some(Err(format!("the first line, {}, {error}", shown(lines[0])))), count: false }
+            Header { lines: 1, names: Some(Err(format!("the first line, {}, {error}", shown(lines[0])))), count: None }
         }
     }
 }
@@ -107,10 +107,11 @@ pub(crate) fn separator_line(line: &[u8]) -> Option<char> {
     name.eq_ignore_ascii_case("sep=").then_some(separator)
 }
 
-/// Returns whether `line` is one whole number. Some formats have a line with the number of points before the points.
-fn is_count(line: &[u8]) -> bool {
+/// Returns the whole number that `line` is. Some formats have a line with the number of points before the points.
+fn count_in(line: &[u8]) -> Option<u64> {
     let line = line.trim_ascii();
-    !line.is_empty() && line.iter().all(u8::is_ascii_digit)
+    let digits = std::str::from_utf8(line).ok().filter(|line| line.bytes().all(|byte| byte.is_ascii_digit()));
+    digits?.parse().ok()
 }
 
 /// Returns what `line` names under the first delimiter that gives x, y and z and fits `rows`, or what is wrong under the delimiter that

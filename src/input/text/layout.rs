@@ -26,6 +26,8 @@ pub(crate) struct FirstRow {
 pub(crate) struct Layout {
     pub(crate) columns: Columns,
     pub(crate) first: FirstRow,
+    /// The number of rows, if the first line holds it.
+    pub(crate) promised: Option<u64>,
     pub(crate) named_degrees: bool,
     pub(crate) units: UnitsOfAxes,
 }
@@ -50,7 +52,8 @@ pub(crate) fn detect(
     let before: usize = lines[..found.header_lines].iter().map(|line| line.len() + 1).sum();
     let at = ((mark + before) as u64).min(file.size());
     let first = FirstRow { at, line: found.header_lines as u64 + 1 };
-    Ok(Layout { columns: found.columns, first, named_degrees: found.degrees, units: found.units })
+    let promised = found.promised;
+    Ok(Layout { columns: found.columns, first, promised, named_degrees: found.degrees, units: found.units })
 }
 
 /// Fails if lines end with carriage returns alone.

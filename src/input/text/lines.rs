@@ -6,6 +6,7 @@ use memchr::memchr;
 
 use crate::Result;
 use crate::input::file::random_access::RandomAccessFile;
+use crate::input::windows_1252::decoded;
 
 /// The longest line that is read, in bytes.
 pub(crate) const LONGEST: usize = 1 << 16;
@@ -73,7 +74,7 @@ pub(crate) fn is_skipped(line: &[u8], comments: &[String]) -> bool {
 /// Returns the start of `text` in quotes, for a message.
 pub(crate) fn shown(text: &[u8]) -> String {
     const MOST: usize = 60;
-    let text = String::from_utf8_lossy(&text[..text.len().min(4 * MOST)]).into_owned();
+    let text = decoded(text);
     let short: String = text.chars().take(MOST).collect();
     let dots = if short.len() < text.len() { "..." } else { "" };
     format!("{short:?}{dots}")

@@ -3,6 +3,7 @@
 
 pub(crate) mod columns;
 pub(crate) mod comment_names;
+pub(crate) mod commented_header;
 pub(crate) mod cut_off;
 pub(crate) mod decimal_comma;
 pub(crate) mod decimal_sign;
@@ -14,6 +15,7 @@ pub(crate) mod layout;
 pub(crate) mod lines;
 pub(crate) mod name;
 pub(crate) mod names;
+pub(crate) mod nodata_rows;
 pub(crate) mod noise;
 pub(crate) mod noise_warning;
 pub(crate) mod number;

@@ -2,6 +2,7 @@
 
 use crate::input::text::role::ColumnRole;
 use crate::input::text::units::{TextUnit, letters};
+use crate::input::windows_1252::decoded;
 
 /// The names of one role, the clearest first: if several columns have one, that with the clearest name is taken.
 pub(crate) type Names = (&'static [&'static str], ColumnRole);
@@ -101,16 +102,19 @@ pub(crate) struct Name {
     pub(crate) plain: String,
     /// What is in brackets after it, with the brackets.
     beside: String,
+    /// Whether there are blanks in the name.
+    has_blanks: bool,
 }
 
 impl Name {
     pub(crate) fn read(text: &[u8]) -> Name {
-        let text = String::from_utf8_lossy(text).trim().to_lowercase();
+        let text = decoded(text).trim().to_lowercase();
         let (name, beside) = match text.find(['[', '(', '{']) {
             Some(at) if at > 0 && text.ends_with([']', ')', '}']) => text.split_at(at),
             _ => (text.as_str(), ""),
         };
-        Name { plain: letters(name), beside: beside.to_string() }
+        let has_blanks = name.trim().contains([' ', '\t']);
+        Name { plain: letters(name), beside: beside.to_string(), has_blanks }
     }
 
     /// Returns what the column holds, and how unclear the name is. In some countries x is the northing, and brackets say so.
@@ -128,6 +132,11 @@ impl Name {
     pub(crate) fn is_degrees(&self, axis: usize) -> bool {
         let is = |name: &str| DEGREES[axis].contains(&name);
         is(&self.plain) || self.names_beside().any(|name| is(&name))
+    }
+
+    /// Returns whether the name, without what is in brackets, has several words.
+    pub(crate) fn has_blanks(&self) -> bool {
+        self.has_blanks
     }
 
     /// Returns what is in each pair of brackets, or before or after a comma there.
@@ -159,6 +168,17 @@ impl Name {
     }
 }
 
+/// Returns the words of a name without case, such as "latitude" and "deg" of "Latitude(deg)".
+pub(crate) fn words_of(field: &[u8]) -> Vec<String> {
+    let text = decoded(field).to_lowercase();
+    text.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_string).collect()
+}
+
+/// Returns whether a word names x, y or z.
+pub(crate) fn is_coordinate(word: &str) -> bool {
+    matches!(role_of(word), Some((_, ColumnRole::Coordinate(_))))
+}
+
 fn words(text: &str) -> impl Iterator<Item = &str> {
     text.split([' ', '\t', '/', ':']).filter(|word| !word.is_empty())
 }
@@ -170,7 +190,7 @@ fn other_words(text: &str) -> impl Iterator<Item = &str> {
 
 /// Returns the unit that a column of a line of units says, as in "m" or "deg E".
 pub(crate) fn unit_alone(field: &[u8]) -> Option<TextUnit> {
-    let text = String::from_utf8_lossy(field).to_lowercase();
+    let text = decoded(field).to_lowercase();
     TextUnit::read(&other_words(&text).collect::<Vec<_>>().join(" "))
 }
 

@@ -78,6 +78,17 @@ impl Number {
         Some(if negative { Number { mantissa: -number.mantissa, ..number } } else { number })
     }
 
+    /// Returns what stands for a number that is too large to be read.
+    pub(crate) fn too_large(negative: bool) -> Number {
+        Number { mantissa: if negative { -i64::MAX } else { i64::MAX }, decimals: 0, rounded: true }
+    }
+
+    /// Returns whether this is [`Number::too_large`].
+    #[inline(always)]
+    pub(crate) fn is_too_large(&self) -> bool {
+        self.mantissa == i64::MAX || self.mantissa == -i64::MAX
+    }
+
     /// Returns whether the number has more digits than double precision holds, some of which may be noise.
     #[inline]
     pub(crate) fn is_long(&self) -> bool {

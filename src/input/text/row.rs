@@ -2,7 +2,8 @@
 
 use crate::geometry::lattice::BEYOND;
 use crate::input::points::axis::AXIS_NAMES;
-use crate::input::points::record::PointRecord;
+use crate::input::points::nodata::is_nodata_number;
+use crate::input::points::record::{NODATA, PointRecord};
 use crate::input::points::returns::PulseReturn;
 use crate::input::text::columns::Columns;
 use crate::input::text::decimal_sign::{swapped, swapped_in_quotes};
@@ -97,6 +98,8 @@ pub(crate) struct RowReader<'a> {
     intensity: u16,
     /// What the intensity of the last row shows.
     pub(crate) brightness: RowBrightness,
+    /// The height of the last row, if it is too large for a number.
+    huge_height: f64,
     /// The last row with points before decimals, if the text has commas there.
     pointed: Vec<u8>,
 }
@@ -114,6 +117,7 @@ impl<'a> RowReader<'a> {
             pulse_return: PulseReturn::default(),
             intensity: 0,
             brightness: none,
+            huge_height: 0.0,
             pointed: Vec::new(),
         }
     }
@@ -186,10 +190,15 @@ impl<'a> RowReader<'a> {
         }
     }
 
-    /// Returns 0 for a colour, a class, an intensity or a return that is not there or need not be read, and the rest of the line after it.
+    /// Returns 0 for a colour, a class, an intensity or a return that is not there or need not be read, and the rest of the line after it;
+    /// of a number for nodata that is too large for any height what stands for it.
     #[cold]
-    fn nothing<'b>(&self, line: &'b [u8], role: ColumnRole) -> Option<(Number, Option<&'b [u8]>)> {
+    fn nothing<'b>(&mut self, line: &'b [u8], role: ColumnRole) -> Option<(Number, Option<&'b [u8]>)> {
         let (field, rest) = self.columns.delimiter.split(line);
+        if role == ColumnRole::Coordinate(2) && self.columns.huge_heights && is_too_large(field) {
+            self.huge_height = std::str::from_utf8(field).ok()?.parse().ok()?;
+            return is_nodata_number(self.huge_height).then(|| (Number::too_large(self.huge_height < 0.0), rest));
+        }
         let is_optional = match role {
             ColumnRole::Coordinate(_) => false,
             ColumnRole::Class => field.is_empty() || !self.columns.strict_classes,
@@ -205,6 +214,20 @@ impl<'a> RowReader<'a> {
         let Some(named) = self.columns.named else { return false };
         let unused = named.saturating_sub(self.columns.roles.len());
         self.columns.delimiter.has_more_than(unused, rest)
+    }
+
+    /// Returns the height of the last row, which may be too large for any.
+    #[inline(always)]
+    pub(crate) fn height(&self) -> f64 {
+        if self.numbers[2].is_too_large() { self.huge_height } else { self.numbers[2].value() }
+    }
+
+    /// Returns the record of the last row, whose height stands for nodata, as [`RowReader::record`] does.
+    #[cold]
+    pub(crate) fn without_height(&self, decimals: &[u8; 3]) -> PointRecord {
+        let record = self.record(decimals);
+        let [x, y, _] = record.raw;
+        PointRecord { raw: [x, y, NODATA], ..record }
     }
 
     /// Returns the class of the last row.

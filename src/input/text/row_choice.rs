@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::input::points::nodata_choice::NodataChoice;
 use crate::input::points::optional_fields::OptionalFields;
 use crate::input::points::returns::{KeptReturns, PulseReturn};
 use crate::input::text::number::Number;
@@ -45,6 +46,8 @@ pub struct RowChoice {
     pub strict_classes: bool,
     /// Only rows of these returns.
     pub returns: KeptReturns,
+    /// Which heights are left out because they stand for nodata. A LAS file leaves them out too.
+    pub nodata: NodataChoice,
     /// Whether the index of a file of another format may tell what lies out of the bounds of the job. Without it, everything is decoded.
     pub use_index: bool,
     /// What is read besides place and class if the text has it.
@@ -60,6 +63,7 @@ impl RowChoice {
             classes: [true; 256],
             strict_classes: false,
             returns: KeptReturns::All,
+            nodata: NodataChoice::Auto,
             use_index: false,
             fields: OptionalFields::RGB,
         }

@@ -4,9 +4,12 @@ use std::ops::Range;
 
 use crate::Result;
 use crate::input::file::random_access::RandomAccessFile;
+use crate::input::points::nodata::{Extremes, FoundNodata, NO_HEIGHT, is_nodata_number};
+use crate::input::points::nodata_choice::NodataChoice;
 use crate::input::text::columns::Columns;
 use crate::input::text::granularity::Granularity;
 use crate::input::text::lines::{TextLine, for_each_line};
+use crate::input::text::nodata_rows::NodataRows;
 use crate::input::text::noise;
 use crate::input::text::number::Number;
 use crate::input::text::optional_columns::BrightnessScale;
@@ -28,6 +31,12 @@ pub(crate) struct Survey {
     pub(crate) malformed: u64,
     /// What the rows hold that the job wants.
     pub(crate) wanted: Findings,
+    /// The lowest and the highest heights that the job wants, with the numbers of their lines from 0.
+    pub(crate) heights: Extremes,
+    /// Likewise, those that are too large for any height.
+    pub(crate) huge_heights: Extremes,
+    /// The number of rows whose heights stand for nodata.
+    pub(crate) without_height: u64,
     /// The colours of all rows.
     pub(crate) colors: BrightnessScale,
     /// The intensities of all rows.
@@ -150,6 +159,7 @@ impl Findings {
 #[derive(Clone, Copy)]
 pub(crate) struct Wanted<'a> {
     pub(crate) choice: &'a RowChoice,
+    pub(crate) nodata: &'a NodataRows,
     pub(crate) within: Option<RowBox>,
 }
 
@@ -162,12 +172,22 @@ impl Survey {
             rows: 0,
             malformed: 0,
             wanted: Findings::none(),
+            heights: Extremes::default(),
+            huge_heights: Extremes::default(),
+            without_height: 0,
             colors: BrightnessScale::default(),
             intensities: BrightnessScale::default(),
             outliers: 0,
             outlier_box: none,
             others: none,
         }
+    }
+
+    /// Returns the survey of all lines, given those of their chunks.
+    pub(crate) fn of_all(surveys: &[Survey]) -> Survey {
+        let mut all = Survey::empty();
+        surveys.iter().for_each(|survey| all.add(survey));
+        all
     }
 
     /// Surveys the lines that begin in `range`. The first row of the text is at byte `first`.
@@ -181,16 +201,20 @@ impl Survey {
         let mut survey = Survey::empty();
         let mut reader = RowReader::new(columns);
         let is_all = wanted.choice.is_all() && wanted.within.is_none();
-        survey.lines = for_each_line(file, first, range, |_, line| {
+        survey.lines = for_each_line(file, first, range, |index, line| {
             match line {
                 TextLine::Whole(line) if columns.skips(line) => return Ok(()),
                 TextLine::Whole(line) if reader.read(line).is_ok() => {
                     survey.colors.see(reader.colors);
                     survey.intensities.see(reader.brightness);
-                    if is_all || wanted.has(&reader) {
+                    let height = reader.height();
+                    if wanted.nodata.has(height) {
+                        survey.see_nodata(&reader, wanted, index);
+                    } else if is_all || wanted.has(&reader) {
+                        survey.heights.see(height, index);
                         survey.wanted.see(&reader.numbers);
                     } else {
-                        if wanted.choice.wants(&reader.numbers, reader.class(), reader.pulse_return()) {
+                        if wanted.is_chosen(&reader) {
                             survey.outliers += 1;
                             survey.outlier_box.see(&reader.numbers);
                         }
@@ -205,8 +229,21 @@ impl Survey {
         Ok(survey)
     }
 
+    /// Counts the last row of `reader`, whose height stands for nodata, on line `index`.
+    #[cold]
+    fn see_nodata(&mut self, reader: &RowReader, wanted: Wanted, index: u64) {
+        self.without_height += 1;
+        let height = reader.height();
+        if height.abs() >= NO_HEIGHT && wanted.is_chosen(reader) {
+            self.huge_heights.see(height, index);
+        }
+    }
+
     /// Adds the survey of the lines that follow.
     pub(crate) fn add(&mut self, other: &Survey) {
+        self.heights.add(&other.heights, self.lines);
+        self.huge_heights.add(&other.huge_heights, self.lines);
+        self.without_height += other.without_height;
         self.lines += other.lines;
         self.rows += other.rows;
         self.malformed += other.malformed;
@@ -218,6 +255,16 @@ impl Survey {
         self.others.add(&other.others);
     }
 
+    /// Returns the heights that stand for nodata beside those that `choice` names.
+    pub(crate) fn nodata(&self, choice: &NodataChoice) -> FoundNodata {
+        if !choice.is_on() {
+            return FoundNodata::default();
+        }
+        let mut heights = self.heights.clone();
+        heights.add(&self.huge_heights, 0);
+        heights.nodata(is_nodata_number)
+    }
+
     /// Returns the box of all rows that can be read.
     pub(crate) fn bounds(&self) -> Option<RowBox> {
         let mut all = self.wanted.bounds;
@@ -227,9 +274,15 @@ impl Survey {
 }
 
 impl Wanted<'_> {
+    /// Returns whether place, class and return of the last row of `reader` are wanted.
+    fn is_chosen(&self, reader: &RowReader) -> bool {
+        self.choice.wants(&reader.numbers, reader.class(), reader.pulse_return())
+    }
+
     /// Returns whether the last row of `reader` is wanted.
     pub(crate) fn has(&self, reader: &RowReader) -> bool {
-        self.choice.wants(&reader.numbers, reader.class(), reader.pulse_return())
+        !self.nodata.has(reader.height())
+            && self.is_chosen(reader)
             && self.within.is_none_or(|within| within.holds(&reader.numbers))
     }
 }

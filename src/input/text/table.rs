@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::input::crs::unit::Unit;
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::points::axis::{AXIS_NAMES, Axis};
+use crate::input::points::nodata::{DoubtfulHeight, SharedHeight, left_out};
 use crate::input::points::record_sink::RecordSink;
 use crate::input::points::returns::KeptReturns;
 use crate::input::text::columns::Columns;
@@ -17,6 +18,7 @@ use crate::input::text::degrees;
 use crate::input::text::granularity::Granularity;
 use crate::input::text::layout::{Layout, detect};
 use crate::input::text::lines::{LONGEST, TextLine, bytes_around, for_each_line, shown};
+use crate::input::text::nodata_rows::NodataRows;
 use crate::input::text::noise_warning::noise_warning;
 use crate::input::text::number::{MOST_DECIMALS, POWERS};
 use crate::input::text::options::TextOptions;
@@ -48,6 +50,8 @@ pub(crate) struct TextTable {
     cut: Option<(u64, String)>,
     /// The number of rows, including malformed rows.
     pub(crate) records: u64,
+    /// The number of rows that the first line promises and the text does not hold.
+    pub(crate) missing: u64,
     /// The number of malformed rows. Rows that [`TextTable::leave_out_outliers`] found are not among them.
     malformed: u64,
     /// The least x, y, z of all rows; 0 if there is no row that can be read.
@@ -66,6 +70,10 @@ pub(crate) struct TextTable {
     outliers: Outliers,
     /// The first chunk with outliers: the message about one of them says what to do.
     first_outlier_in: Option<usize>,
+    /// The heights that stand for nodata.
+    nodata: NodataRows,
+    /// A height that may.
+    doubtful_height: Option<DoubtfulHeight>,
     /// The bounds that the job wants. They hold for the numbers in the text, before these are rounded to a lattice.
     bounds: Option<[f64; 4]>,
 }
@@ -118,7 +126,7 @@ impl TextTable {
         choice: &RowChoice,
         warnings: &mut Warnings,
     ) -> Result<TextTable> {
-        let Layout { mut columns, first, named_degrees, units } = detect(file, options, choice, warnings)?;
+        let Layout { mut columns, first, promised, named_degrees, units } = detect(file, options, choice, warnings)?;
         let mut rows = first.at..file.size();
         let cut = match cut_off::find(file, &columns, &rows)? {
             Ending::CutOff(cut) => Some(cut),
@@ -129,14 +137,21 @@ impl TextTable {
             Ending::Whole => None,
         };
         rows.end = cut.as_ref().map_or(rows.end, |cut| cut.at);
-        let surveys = survey(file, &columns, &rows, Wanted { choice, within: None })?;
-        let (mut chunks, mut all) = (Vec::with_capacity(surveys.len()), Survey::empty());
-        for survey in &surveys {
-            chunks.push(ChunkStart { row: all.rows, line: first.line + all.lines });
-            all.add(survey);
+        let mut nodata = NodataRows::named(&choice.nodata);
+        let mut surveys = survey(file, &columns, &rows, Wanted { choice, nodata: &nodata, within: None })?;
+        let mut all = Survey::of_all(&surveys);
+        let found = all.nodata(&choice.nodata);
+        if nodata.add(&found) {
+            surveys = survey(file, &columns, &rows, Wanted { choice, nodata: &nodata, within: None })?;
+            all = Survey::of_all(&surveys);
         }
+        let on_line = |height: &SharedHeight| SharedHeight { first: first.line + height.first, ..*height };
+        warnings.extend(found.heights.iter().map(|height| left_out(&on_line(height), "line")));
+        let doubtful_height = all.heights.doubtful().filter(|_| choice.nodata.is_auto());
+        let doubtful_height = doubtful_height.map(|doubt| DoubtfulHeight { height: on_line(&doubt.height), ..doubt });
+        let chunks = starts_of_chunks(&surveys, first.line);
         let bounds = all.bounds();
-        if all.rows > 0 && bounds.is_none() {
+        if all.rows > all.without_height && bounds.is_none() {
             warnings.push("no line has numbers where x, y and z should be");
         }
         refuse_tiny(file, &all.wanted)?;
@@ -158,6 +173,7 @@ impl TextTable {
             chunks,
             cut,
             records,
+            missing: missing_rows(promised, records, warnings),
             malformed,
             min,
             max,
@@ -167,6 +183,8 @@ impl TextTable {
             without_outliers: None,
             outliers: Outliers::default(),
             first_outlier_in: None,
+            nodata,
+            doubtful_height,
             bounds: choice.bounds,
         };
         let (is_open, rows) = (units.horizontal == Unit::Unknown, table.wanted.bounds);
@@ -200,7 +218,8 @@ impl TextTable {
         let sampled: Vec<Range<u64>> = (0..SAMPLED_CHUNKS.min(chunks))
             .map(|index| chunk_range(&self.rows, index * chunks / SAMPLED_CHUNKS.min(chunks)))
             .collect();
-        middle(file, &self.columns, self.rows.start, &sampled, Wanted { choice, within: None })
+        let wanted = Wanted { choice, nodata: &self.nodata, within: None };
+        middle(file, &self.columns, self.rows.start, &sampled, wanted)
     }
 
     /// Finds the rows that lie so far from all others that they are mistakes, if they are few, and leaves them out: decoding counts them
@@ -216,9 +235,9 @@ impl TextTable {
         let Some(within) = plausible.filter(|plausible| !plausible.holds_box(&bounds)) else {
             return Ok(Outliers::default());
         };
-        let surveys = survey(file, &self.columns, &self.rows, Wanted { choice, within: Some(within) })?;
-        let mut rest = Survey::empty();
-        surveys.iter().for_each(|survey| rest.add(survey));
+        let wanted = Wanted { choice, nodata: &self.nodata, within: Some(within) };
+        let surveys = survey(file, &self.columns, &self.rows, wanted)?;
+        let rest = Survey::of_all(&surveys);
         self.outliers = Outliers::of(&rest);
         self.without_outliers = (self.outliers.rows > 0).then(|| WantedRows::new(&rest.wanted));
         self.first_outlier_in = surveys.iter().position(|survey| survey.outliers > 0);
@@ -249,7 +268,7 @@ impl TextTable {
         for (chunk, start) in self.chunks.iter().enumerate() {
             interrupt::check()?;
             let mut reader = RowReader::new(&self.columns);
-            let wanted = Wanted { choice, within: self.held().bounds };
+            let wanted = Wanted { choice, nodata: &self.nodata, within: self.held().bounds };
             for_each_line(file, self.rows.start, chunk_range(&self.rows, chunk as u64), |index, line| {
                 if let TextLine::Whole(line) = line
                     && !self.columns.skips(line)
@@ -265,6 +284,11 @@ impl TextTable {
             })?;
         }
         Ok(farthest)
+    }
+
+    /// Returns a height that may stand for nodata.
+    pub(crate) fn doubtful_height(&self) -> Option<&DoubtfulHeight> {
+        self.doubtful_height.as_ref().filter(|_| self.outliers() == 0)
     }
 
     /// Returns the number of rows that the job wants, apart from those that are left out.
@@ -355,6 +379,9 @@ impl TextTable {
                 TextLine::Whole(line) if self.columns.skips(line) => return Ok(()),
                 TextLine::Whole(line) => match (reader.read(line), &within) {
                     (Ok(()), _) if is_outside(&reader) => filter.push_out_of_bounds(reader.class()),
+                    (Ok(()), _) if self.nodata.has(reader.height()) => {
+                        filter.push(row, &reader.without_height(decimals), || format!("line {}", number()))?;
+                    }
                     (Ok(()), Some(within)) if !within.holds(&reader.numbers) => {
                         filter.push_outlier(reader.class(), reader.pulse_return(), || {
                             let what = if explained { String::new() } else { far_from(within) };
@@ -374,6 +401,10 @@ impl TextTable {
         })?;
         if let Some((line, what)) = self.cut.as_ref().filter(|_| is_whole && chunk + 1 == self.chunks.len()) {
             filter.malformed(1, || format!("line {line}: {what}"));
+        }
+        if self.missing > 0 && is_whole && chunk + 1 == self.chunks.len() {
+            filter
+                .malformed(self.missing, || format!("{} rows are missing that the first line promises", self.missing));
         }
         Ok(())
     }
@@ -414,6 +445,29 @@ fn refuse_tiny(file: &RandomAccessFile, found: &Findings) -> Result<()> {
              micrometres"
         ),
     ))
+}
+
+/// Returns how many of the rows are missing that the first line promises.
+fn missing_rows(promised: Option<u64>, rows: u64, warnings: &mut Warnings) -> u64 {
+    // No job holds more, and no sum of so many files runs over.
+    let promised = promised.map(|promised| promised.min(1 << 40));
+    let Some(promised) = promised.filter(|promised| *promised != rows) else { return 0 };
+    warnings.push(if promised > rows {
+        format!("the first line promises {promised} points, but the file has only {rows}")
+    } else {
+        format!("the first line promises {promised} points, but the file has {rows}: all of them are read")
+    });
+    promised.saturating_sub(rows)
+}
+
+/// Returns where chunks begin, by their surveys. The first of their lines is line `first` of the file.
+fn starts_of_chunks(surveys: &[Survey], first: u64) -> Vec<ChunkStart> {
+    let mut next = ChunkStart { row: 0, line: first };
+    let start = |survey: &Survey| {
+        let after = ChunkStart { row: next.row + survey.rows, line: next.line + survey.lines };
+        std::mem::replace(&mut next, after)
+    };
+    surveys.iter().map(start).collect()
 }
 
 /// Surveys all rows, chunk by chunk.

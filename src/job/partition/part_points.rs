@@ -86,7 +86,7 @@ pub fn read_inputs(
     let buckets = buckets.finish()?;
     let bad = by_input.0.iter().find(|(_, summary)| summary.counts.malformed > 0);
     let malformed = bad.map(|(input, summary)| (*input, summary.counts.clone()));
-    let JudgedInputs { summary, skipped, .. } = judge(plan, by_input);
+    let JudgedInputs { summary, skipped, .. } = judge(plan, by_input)?;
     let broken = |bounds| plan.claims.is_some_and(|claims| claims.are_broken_by(bounds, summary.counts.max_rgb));
     if !skipped.is_empty() || summary.bounds.is_some_and(broken) {
         return Err(Error::NeedsOnePart);

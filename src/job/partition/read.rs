@@ -16,10 +16,11 @@ use crate::job::partition::result::{Partition, PointSummary};
 use crate::job::partition::tree::Cell;
 use crate::job::partition::tree_builder::{TreeBuilder, wanted_buckets};
 use crate::job::plan::budget::{network_memory, read_buffer_memory};
+use crate::job::plan::doubtful_heights::unannounced_nodata;
 use crate::job::plan::job_plan::{Plan, PlannedInput, SkippedInput};
 use crate::job::plan::text_inputs::{allowed_malformed, stop_at, too_many_malformed};
 use crate::job::progress::stage::Stage;
-use crate::{Result, interrupt};
+use crate::{Error, Result, interrupt};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -37,7 +38,7 @@ pub fn read_points(plan: &Plan, directory: &JobDirectory, stage: &Stage) -> Resu
     let grid = Grid::over(plan.extent, wanted_buckets(plan.records, max_points_per_tile));
     let buckets = Buckets::new(file, grid.buckets(), memory);
     let by_input = decode(plan, 0..plan.inputs.len(), 0, &grid, &buckets, stage)?;
-    let JudgedInputs { mut summary, skipped, orders } = judge(plan, by_input);
+    let JudgedInputs { mut summary, skipped, orders } = judge(plan, by_input)?;
     // Lines alone are no terrain.
     if let Some(points) = summary.bounds {
         add_line_sites(plan, summary.counts.max_rgb, &grid, &buckets, |_| true)?;
@@ -64,22 +65,30 @@ pub(crate) struct JudgedInputs {
 }
 
 /// Sums up the inputs. Each is judged by itself, so the others have no say in whether it is left out.
-pub(crate) fn judge(plan: &Plan, by_input: ByInput) -> JudgedInputs {
+///
+/// # Errors
+/// [`Error::Input`] if the points of one show that its header hides nodata, and bad files must not be left out.
+pub(crate) fn judge(plan: &Plan, by_input: ByInput) -> Result<JudgedInputs> {
     let options = &plan.options.input;
     let mut judged = JudgedInputs { summary: PointSummary::default(), skipped: Vec::new(), orders: Vec::new() };
     for (index, summary) in by_input.0 {
         let input = &plan.inputs[index];
         let (records, malformed) = (input.source.records, summary.counts.malformed);
         let is_bad = malformed > allowed_malformed(options.max_malformed_fraction.0, records);
-        if is_bad && options.on_bad_file == OnBadFile::Skip {
-            let why = too_many_malformed(&summary.counts, malformed, records);
+        let is_skipped = options.on_bad_file == OnBadFile::Skip;
+        let why = unannounced_nodata(&input.source, summary.bounds, &plan.lattice, &plan.options);
+        if let Some(why) = why.as_ref().filter(|_| !is_skipped) {
+            return Err(Error::input(&input.source.path, why));
+        }
+        let too_many = || is_bad.then(|| too_many_malformed(&summary.counts, malformed, records));
+        if let Some(why) = why.or_else(too_many).filter(|_| is_skipped) {
             judged.skipped.push(SkippedInput { file: input.source.path.clone(), why });
             judged.orders.push(input.rules.first_order..input.rules.first_order + records);
         } else {
             judged.summary += with_notes(input, options, summary);
         }
     }
-    judged
+    Ok(judged)
 }
 
 /// Adds what the user should know about an input that only reading it shows.

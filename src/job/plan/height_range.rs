@@ -4,7 +4,7 @@
 //! decides. It is the same for a job of one part and of several, whose tiles are coloured before the last point is read.
 
 use crate::geometry::Site;
-use crate::input::{DecodedChunks, OptionalFields, PointCounts, PointRules, Source};
+use crate::input::{DecodedChunks, Extremes, OptionalFields, PointCounts, PointRules, Source};
 use crate::output::color::HeightRange;
 use crate::{Result, interrupt};
 use rayon::prelude::*;
@@ -51,6 +51,8 @@ pub(crate) struct FileSample {
     pub(crate) counts: PointCounts,
     /// The lattice integers of its points in x and y, in no order.
     plane: [Vec<i32>; 2],
+    /// Their lowest and highest heights, in steps of the lattice.
+    pub(crate) extremes: Extremes,
 }
 
 impl FileSample {
@@ -100,9 +102,10 @@ impl HeightSample {
             counts += its_counts.clone();
             let of_file: &mut FileSample = by_file.entry(path.clone()).or_default();
             of_file.counts += its_counts;
-            for ([x, y], _) in &more {
+            for ([x, y], z) in &more {
                 of_file.plane[0].push(*x);
                 of_file.plane[1].push(*y);
+                of_file.extremes.see(f64::from(*z), 0);
             }
             points.extend(more);
         }

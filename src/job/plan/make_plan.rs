@@ -12,6 +12,7 @@ use crate::job::plan::breaklines::line_files::LineFiles;
 use crate::job::plan::breaklines::{CloudOfPlan, PlannedBreaklines, SystemOfPoints};
 use crate::job::plan::budget::network_memory;
 use crate::job::plan::common_crs::{common_crs, horizontal_unit};
+use crate::job::plan::doubtful_heights::refuse_doubtful_heights;
 use crate::job::plan::extent::{Extent, SourceBox, to_float};
 use crate::job::plan::height_range::HeightSample;
 use crate::job::plan::inputs::{check_missing_records, open_all};
@@ -144,6 +145,7 @@ fn try_plan(
     let (clipped, claimed_area) =
         (lattice_extent(&lattice, &extent, clip), claimed_area(&lattice, sources, &extent, clip.is_some()));
     let sample = HeightSample::take(sources, &rules, options.input.bounds.map(|bounds| bounds.0))?;
+    refuse_doubtful_heights(sources, &sample, &lattice, options)?;
     let place = CommonPlace { crs: &crs, metres, lattice: &lattice, extent: &extent, sample: &sample };
     check_places(sources, &place, &options.input, &mut warnings)?;
     let cloud = CloudOfPlan {

@@ -6,6 +6,7 @@ pub mod breaklines;
 pub mod budget;
 pub mod common_crs;
 pub(crate) mod distinct_crs;
+pub(crate) mod doubtful_heights;
 pub mod extent;
 pub mod fingerprint;
 pub(crate) mod globe_system;

@@ -23,6 +23,9 @@ pub fn no_point_is_left(plan: &Plan, counts: &PointCounts) -> Error {
                                           the lakes"
                 .into()
         }
+        _ if counts.nodata > 0 => {
+            "all heights that [input] leaves stand for nodata: name other files, or keep them with [input] nodata = \"none\"".into()
+        }
         _ => no_ground(&plan.options.input, counts)
             .unwrap_or("check [input] surface, returns, classes and bounds".into()),
     };
@@ -30,12 +33,16 @@ pub fn no_point_is_left(plan: &Plan, counts: &PointCounts) -> Error {
         0 => String::new(),
         count => format!(", {count} of other returns"),
     };
+    let nodata = match counts.nodata {
+        0 => String::new(),
+        count => format!(", {count} nodata"),
+    };
     let at_breaklines = match counts.at_breaklines {
         0 => String::new(),
         dropped => format!(", {dropped} at breaklines or in lakes"),
     };
     Error::NoTerrain(format!(
-        "no point is left to triangulate: of {} read, {} are malformed, {} withheld, {} of other classes{other_returns}, {} out of bounds{at_breaklines}; \
+        "no point is left to triangulate: of {} read, {} are malformed, {} withheld, {} of other classes{other_returns}{nodata}, {} out of bounds{at_breaklines}; \
          {remedy}",
         counts.read, counts.malformed, counts.withheld, counts.other_class, counts.out_of_bounds
     ))

@@ -45,6 +45,9 @@ impl fmt::Display for Report {
         if self.points.not_decoded > 0 {
             row("    by the octree, not decoded", grouped(self.points.not_decoded))?;
         }
+        if self.points.nodata > 0 {
+            row("  nodata", grouped(self.points.nodata))?;
+        }
         row("  malformed", grouped(self.points.malformed))?;
         row("  duplicates in x, y", grouped(self.duplicates))?;
         if let Some(BreaklineReport { findings, .. }) = &self.breaklines {

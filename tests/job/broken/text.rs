@@ -48,6 +48,22 @@ pub(super) fn cases() -> Vec<Case> {
         ("JSON", b"{\"points\": [[1, 2, 3], [4, 5, 6]]}\n".to_vec(), Refused(3, "is JSON")),
         ("a line cut", rows_and("7,8"), Refused(3, "line 6: column 3 (z) is missing")),
         ("not a number", rows_and("nan,1,2\n"), Refused(3, "line 6: column 1 (x) is \"nan\"")),
+        (
+            "fewer points than the first line promises",
+            [b"7\n", ROWS.as_bytes()].concat(),
+            Refused(3, "2 of them are not there"),
+        ),
+        (
+            "more points than the first line promises",
+            [b"4\n", ROWS.as_bytes()].concat(),
+            Read(5, 0, "promises 4 points"),
+        ),
+        ("a height of twenty digits", rows_and("1,1,12345678901234567890\n"), Refused(3, "column 3 (z)")),
+        (
+            "a comment that names other columns",
+            b"# time, lat, lon, level\n1.5,2,3.5,4\n2.5,3,3.5,4\n3.5,2,7.5,4\n".to_vec(),
+            Refused(3, "names no column z"),
+        ),
         ("infinite", rows_and("1,-inf,2\n"), Refused(3, "line 6: column 2 (y) is \"-inf\"")),
         ("hexadecimal", rows_and("0x10,1,2\n"), Refused(3, "column 1 (x) is \"0x10\"")),
         ("beyond all numbers", rows_and("1e300,1,2\n"), Refused(3, "column 1 (x) is \"1e300\", which is too large")),

@@ -1,0 +1,327 @@
+//! Heights that stand for "nothing measured" (nodata), such as -9999 in a grid that was written as points. They are told from heights by
+//! their number, and by their distance from all heights.
+
+use serde::{Deserialize, Serialize};
+
+/// The fewest units between a number that stands for nodata and the nearest height.
+const FAR: f64 = 100.0;
+
+/// The fewest units between any other value that may stand for nodata and the nearest height.
+const DOUBTFUL: f64 = 20.0;
+
+/// Such a value is so many times as far from the nearest height as the heights there lie apart: a shore would join it to them.
+const ALONE: f64 = 10.0;
+
+/// A value that fewer records have may be a mistake of each, and no mark.
+const FEW: u64 = 5;
+
+/// Heights of fewer values do not vary, so the distance of another one from them shows nothing.
+const LEAST_VALUES: usize = 5;
+
+/// How many of the lowest and of the highest values are kept.
+const KEPT: usize = 8;
+
+/// No height is as large, whatever its unit.
+pub(crate) const NO_HEIGHT: f64 = 1e18;
+
+/// The greatest numbers of single and of double precision, and half of the first, which programs write with more or fewer digits.
+const ENDS_OF_FLOATS: [f64; 3] = [f32::MAX as f64, f64::MAX, 1.701_411_834_6e38];
+
+/// The ends of 16 and of 32 bits, and those that some programs keep for nodata beside them.
+const ENDS_OF_INTEGERS: [f64; 6] = [-32768.0, -32767.0, 32767.0, -2_147_483_648.0, -2_147_483_647.0, 2_147_483_647.0];
+
+/// Returns whether programs write `value` for nodata: nines alone, the end of a kind of number, or a great power of ten.
+pub(crate) fn is_nodata_number(value: f64) -> bool {
+    let least_digits = if value < 0.0 { 3 } else { 4 };
+    let is_nines = || (least_digits..=15).any(|digits| value.abs() == power_of_ten(digits) - 1.0);
+    let is_end = || ENDS_OF_FLOATS.into_iter().any(|end| (value.abs() / end - 1.0).abs() < 1e-4);
+    ENDS_OF_INTEGERS.contains(&value) || is_nines() || is_great_power_of_ten(value.abs()) || is_end()
+}
+
+fn is_great_power_of_ten(value: f64) -> bool {
+    let power = value.log10().round();
+    value >= 0.999e9 && (value / 10_f64.powf(power) - 1.0).abs() < 1e-9
+}
+
+fn power_of_ten(power: u32) -> f64 {
+    10_i64.checked_pow(power).map_or(f64::INFINITY, |power| power as f64)
+}
+
+/// Returns whether a value that programs write for nodata is none without other heights to compare it with.
+fn stands_for_nodata_alone(value: f64) -> bool {
+    value <= -9999.0 || value.abs() >= power_of_ten(9)
+}
+
+/// A height and who has it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct SharedHeight {
+    pub(crate) value: f64,
+    /// How many records have it.
+    pub(crate) count: u64,
+    /// The number of the first of them, or of its line.
+    pub(crate) first: u64,
+}
+
+/// The lowest and the highest values of heights, and how many records have each.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Extremes {
+    lowest: Lowest,
+    /// With the other sign.
+    highest: Lowest,
+}
+
+/// The lowest values, ascending.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Lowest(Vec<SharedHeight>);
+
+impl Lowest {
+    #[inline(always)]
+    fn see(&mut self, height: SharedHeight) {
+        let is_higher = |last: &SharedHeight| self.0.len() == KEPT && height.value > last.value;
+        if !self.0.last().is_some_and(is_higher) {
+            self.insert(height);
+        }
+    }
+
+    #[inline(never)]
+    fn insert(&mut self, height: SharedHeight) {
+        match self.0.binary_search_by(|known| known.value.total_cmp(&height.value)) {
+            Ok(at) => {
+                let known = &mut self.0[at];
+                known.count = known.count.saturating_add(height.count);
+                known.first = known.first.min(height.first);
+            }
+            Err(at) => {
+                self.0.insert(at, height);
+                self.0.truncate(KEPT);
+            }
+        }
+    }
+
+    /// Returns the value of the first height that is not a number for nodata.
+    fn rest(&self, is_number: impl Fn(f64) -> bool) -> Option<f64> {
+        self.0.iter().map(|height| height.value).find(|value| !is_number(*value))
+    }
+}
+
+/// A value that may stand for nodata, though it is none of the numbers that programs write for it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct DoubtfulHeight {
+    pub(crate) height: SharedHeight,
+    /// Where all other heights lie.
+    pub(crate) others: [f64; 2],
+}
+
+/// Which heights stand for nodata.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct FoundNodata {
+    pub(crate) heights: Vec<SharedHeight>,
+    /// Where all other heights lie; `None` if there is none.
+    pub(crate) others: Option<[f64; 2]>,
+}
+
+impl Extremes {
+    /// Takes the height of record or line `number`.
+    #[inline(always)]
+    pub(crate) fn see(&mut self, value: f64, number: u64) {
+        self.see_shared(SharedHeight { value, count: 1, first: number });
+    }
+
+    #[inline(always)]
+    fn see_shared(&mut self, height: SharedHeight) {
+        // -0 is 0.
+        self.lowest.see(SharedHeight { value: height.value + 0.0, ..height });
+        self.highest.see(SharedHeight { value: 0.0 - height.value, ..height });
+    }
+
+    /// Takes the heights of the records after these, whose numbers are counted from `before`.
+    pub(crate) fn add(&mut self, other: &Extremes, before: u64) {
+        let moved = |height: &SharedHeight| SharedHeight { first: height.first.saturating_add(before), ..*height };
+        other.lowest.0.iter().for_each(|height| self.lowest.see(moved(height)));
+        other.highest.0.iter().for_each(|height| self.highest.see(moved(height)));
+    }
+
+    /// Returns these heights in other units.
+    pub(crate) fn map(&self, to: impl Fn(f64) -> f64) -> Extremes {
+        let map = |lowest: &Lowest, sign: f64| {
+            let moved =
+                lowest.0.iter().map(|height| SharedHeight { value: sign * to(sign * height.value) + 0.0, ..*height });
+            Lowest(moved.collect())
+        };
+        Extremes { lowest: map(&self.lowest, 1.0), highest: map(&self.highest, -1.0) }
+    }
+
+    /// Returns the heights that stand for nodata: those for which `is_number` holds, and which lie farther from all others than these
+    /// from each other.
+    pub(crate) fn nodata(&self, is_number: impl Fn(f64) -> bool + Copy) -> FoundNodata {
+        let high_number = |value: f64| is_number(0.0 - value);
+        let Some((low, high)) = self.lowest.rest(is_number).zip(self.highest.rest(high_number)) else {
+            return self.nodata_alone(is_number);
+        };
+        let mut others = [low, 0.0 - high];
+        let restored = self.highest.0.iter().map(|height| SharedHeight { value: 0.0 - height.value, ..*height });
+        let is_outside = |height: &SharedHeight| height.value < low || height.value > 0.0 - high;
+        let mut heights: Vec<SharedHeight> = self.lowest.0.iter().copied().chain(restored).filter(is_outside).collect();
+        // A number among heights is a height, and then the next one may be among them too.
+        while let Some(near) = heights.iter().position(|height| !is_far(height.value, others, FAR)) {
+            let SharedHeight { value, .. } = heights.swap_remove(near);
+            others = [others[0].min(value), others[1].max(value)];
+        }
+        heights.sort_unstable_by(|a, b| a.value.total_cmp(&b.value));
+        FoundNodata { heights, others: Some(others) }
+    }
+
+    /// Returns the heights that stand for nodata where no other height is known.
+    fn nodata_alone(&self, is_number: impl Fn(f64) -> bool) -> FoundNodata {
+        let is_nodata = |height: &SharedHeight| is_number(height.value) && stands_for_nodata_alone(height.value);
+        let (heights, others): (Vec<_>, Vec<_>) = self.lowest.0.iter().partition(|height| is_nodata(height));
+        let others = others.first().map(|low: &SharedHeight| {
+            let high = others.last().map_or(low.value, |high| high.value);
+            [low.value, high]
+        });
+        FoundNodata { heights, others }
+    }
+
+    /// Returns the lowest or the highest value if several records share it, and nothing joins it to the other heights: it lies farther from
+    /// them than they lie from each other, or much farther than the nearest of them do. It may stand for nodata, such as 0 among mountains.
+    pub(crate) fn doubtful(&self) -> Option<DoubtfulHeight> {
+        let doubt = |end: &Lowest, other: &Lowest, sign: f64| {
+            let (first, next) = (*end.0.first()?, end.0.get(1)?);
+            let others = [sign * next.value, 0.0 - sign * other.0.first()?.value];
+            let others = [others[0].min(others[1]), others[0].max(others[1])];
+            let height = SharedHeight { value: sign * first.value + 0.0, ..first };
+            let is_alone = end
+                .0
+                .get(KEPT - 1)
+                .is_some_and(|last| next.value - first.value > (ALONE * (last.value - next.value)).max(DOUBTFUL));
+            let is_apart = is_alone || (end.0.len() > LEAST_VALUES && is_far(height.value, others, DOUBTFUL));
+            let is_doubtful = height.count >= FEW && is_apart;
+            is_doubtful.then_some(DoubtfulHeight { height, others })
+        };
+        doubt(&self.lowest, &self.highest, 1.0).or_else(|| doubt(&self.highest, &self.lowest, -1.0))
+    }
+}
+
+/// Returns whether `value` lies farther from all of `others` than these from each other, and at least so far.
+pub(crate) fn is_far(value: f64, [low, high]: [f64; 2], least: f64) -> bool {
+    (low - value).max(value - high) > (high - low).max(least)
+}
+
+/// Returns whether `value` is a number for nodata and lies far from all of `others`.
+pub(crate) fn is_nodata_beside(value: f64, step: f64, others: [f64; 2]) -> bool {
+    is_number_in_steps(value, step) && is_far(value, others, FAR)
+}
+
+/// Returns whether `value`, in steps of so many units, is as near to a number for nodata as it can be.
+pub(crate) fn is_number_in_steps(value: f64, step: f64) -> bool {
+    let whole = value.round();
+    is_nodata_number(whole) && (value - whole).abs() <= 0.501 * step
+}
+
+/// Returns a height as people write it.
+pub(crate) fn shown_height(value: f64) -> String {
+    if value.abs() >= NO_HEIGHT { format!("{value:e}") } else { value.to_string() }
+}
+
+/// Returns a warning about a height that stands for nodata. Records of the file are called `record`.
+pub(crate) fn left_out(SharedHeight { value, count, first }: &SharedHeight, record: &str) -> String {
+    let height = shown_height(*value);
+    let (records, first) = match count {
+        1 => (format!("{record} {first} has"), String::new()),
+        _ => (format!("{count} {record}s have"), format!(" (the first is {record} {first})")),
+    };
+    format!(
+        "{records} the height {height}{first}, which stands for nodata, far from all other heights: left out; [input] nodata = \"none\" \
+         keeps such points"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn extremes(heights: impl IntoIterator<Item = f64>) -> Extremes {
+        let mut extremes = Extremes::default();
+        (0..).zip(heights).for_each(|(number, height)| extremes.see(height, number));
+        extremes
+    }
+
+    fn nodata(heights: impl IntoIterator<Item = f64>) -> Vec<f64> {
+        extremes(heights).nodata(is_nodata_number).heights.iter().map(|height| height.value).collect()
+    }
+
+    #[test]
+    fn numbers_for_nodata_are_known() {
+        let known = [
+            -999.0,
+            -9999.0,
+            9999.0,
+            -99999.0,
+            -32768.0,
+            -32767.0,
+            1e20,
+            1e30,
+            -3.4028235e38,
+            -3.40282e38,
+            1.70141e38,
+            f64::MIN,
+            1e10,
+        ];
+        assert!(known.into_iter().all(is_nodata_number));
+        assert!(
+            ![0.0, -1.0, 999.0, -9998.0, 99.0, -99.0, 10000.0, 32768.0, 8848.0, 1.5e18, -1.234e19]
+                .into_iter()
+                .any(is_nodata_number)
+        );
+    }
+
+    #[test]
+    fn numbers_far_from_all_heights_stand_for_nodata() {
+        let hills = || (0..500).map(|i| 100.0 + f64::from(i % 97));
+        assert_eq!(nodata(hills().chain([-9999.0])), [-9999.0]);
+        assert_eq!(
+            nodata([-9999.0, 9999.0, -32768.0, 1e30].into_iter().chain(hills())),
+            [-32768.0, -9999.0, 9999.0, 1e30]
+        );
+        assert_eq!(nodata(hills()), [0.0; 0]);
+        // Among heights in millimetres it is one.
+        assert_eq!(nodata((0..500).map(|i| -12_000.0 + 30.0 * f64::from(i)).chain([-9999.0])), [0.0; 0]);
+        assert_eq!(nodata((0..500).map(|i| -9990.0 + 30.0 * f64::from(i)).chain([-9999.0])), [0.0; 0]);
+        // A floor at 999 that nothing else is as far from as it is high.
+        assert_eq!(nodata((0..500).map(|i| 300.0 + 2.0 * f64::from(i)).chain([-999.0])), [-999.0]);
+        assert_eq!(nodata([-9999.0; 7]), [-9999.0]);
+        assert_eq!(nodata([9999.0; 7]), [0.0; 0]);
+        let found = extremes(hills().chain([-9999.0, -9999.0])).nodata(is_nodata_number);
+        assert_eq!(found.heights, [SharedHeight { value: -9999.0, count: 2, first: 500 }]);
+        assert_eq!(found.others, Some([100.0, 196.0]));
+    }
+
+    #[test]
+    fn a_value_that_several_records_share_far_from_all_heights_is_doubtful() {
+        let peaks = || (0..500).map(|i| 1500.0 + f64::from(i % 97));
+        let zeros = |count: usize| std::iter::repeat_n(0.0, count);
+        let doubt = extremes(zeros(7).chain(peaks())).doubtful().unwrap();
+        assert_eq!((doubt.height.value, doubt.height.count, doubt.others), (0.0, 7, [1500.0, 1596.0]));
+        let doubt = extremes(peaks().chain([5000.0; 9])).doubtful().unwrap();
+        assert_eq!((doubt.height.value, doubt.height.first), (5000.0, 500));
+        let alps = || (0..5000).map(|i| 800.0 + 0.5 * f64::from(i));
+        assert_eq!(extremes(zeros(5).chain(alps())).doubtful().map(|doubt| doubt.others), Some([800.0, 3299.5]));
+        assert_eq!(extremes(zeros(2).chain(peaks())).doubtful(), None);
+        // The sea, and a lake with a shore.
+        assert_eq!(extremes(zeros(200).chain((0..400).map(f64::from))).doubtful(), None);
+        assert_eq!(extremes(zeros(200).chain(peaks()).chain([800.0])).doubtful(), None);
+        assert_eq!(extremes(zeros(200).chain(alps()).chain([1.0, 30.0, 40.0])).doubtful(), None);
+        // A platform and what stands on it.
+        assert_eq!(extremes(zeros(200).chain([100.0, 100.0, 100.5])).doubtful(), None);
+    }
+
+    #[test]
+    fn extremes_of_parts_are_those_of_the_whole() {
+        let heights: Vec<f64> = (0..1000).map(|i| f64::from((i * 7919) % 353) - 50.0).collect();
+        let mut parts = Extremes::default();
+        for (number, part) in (0..).zip(heights.chunks(100)) {
+            parts.add(&extremes(part.iter().copied()), number * 100);
+        }
+        assert_eq!(parts, extremes(heights));
+    }
+}

@@ -1,0 +1,117 @@
+//! Finding the heights of a LAS or LAZ file that stand for nodata. A text is surveyed for them when it is opened.
+
+use crate::geometry::lattice::shortest_decimal;
+use crate::input::points::axis::Axis;
+use crate::input::points::chunk_request::ChunkRequest;
+use crate::input::points::nodata::{DoubtfulHeight, Extremes, FoundNodata, is_number_in_steps, left_out};
+use crate::input::points::raw_bounds::RawBounds;
+use crate::input::points::record::PointRecord;
+use crate::input::points::record_sink::RecordSink;
+use crate::input::points::returns::PulseReturn;
+use crate::input::source::{PointData, Source};
+use crate::input::text::row_choice::RowChoice;
+use crate::{Result, interrupt};
+use rayon::prelude::*;
+use rust_decimal::prelude::ToPrimitive;
+
+impl Source {
+    /// Finds the heights of a LAS or LAZ file that stand for nodata, and leaves them out. A file whose header claims none is not read for
+    /// that.
+    ///
+    /// # Errors
+    /// `Io` or `Input` if the file cannot be read.
+    pub(super) fn find_nodata(&mut self, choice: &RowChoice) -> Result<()> {
+        let z = self.axes[2];
+        self.nodata = choice.nodata.heights().iter().filter_map(|height| raw_of(&z, *height)).collect();
+        if choice.nodata.is_on() && self.claims_nodata() {
+            let FoundNodata { heights, others } = self.heights_of(choice)?.nodata(|value| is_number(&z, value));
+            self.nodata.extend(heights.iter().filter_map(|height| raw_of(&z, height.value)));
+            self.warnings.extend(heights.iter().map(|height| left_out(height, "point")));
+            let [low, high] = others.unwrap_or_default();
+            (self.min[2], self.max[2]) = (low, high);
+        }
+        Ok(())
+    }
+
+    /// Returns whether the lowest or the highest height that the header claims stands for nodata, or may.
+    fn claims_nodata(&self) -> bool {
+        let z = &self.axes[2];
+        let is_named = |value: f64| raw_of(z, value).is_some_and(|raw| self.nodata.contains(&raw));
+        [self.min[2], self.max[2]].into_iter().any(|value| is_named(value) || is_number(z, value))
+    }
+
+    /// Reads the lowest and the highest heights of all points that the job wants, in the unit of the file, apart from those that the user
+    /// names as nodata. A file that is not a text has them only in its points.
+    ///
+    /// # Errors
+    /// `Io` or `Input` if the file cannot be read.
+    pub(crate) fn heights_of(&self, choice: &RowChoice) -> Result<Extremes> {
+        let axes = self.transform.as_ref().map_or(&self.axes, |transform| &transform.own.axes);
+        let bounds = choice.bounds.map(|bounds| RawBounds::of(axes, bounds));
+        let request = ChunkRequest { bounds: bounds.as_ref(), ..ChunkRequest::all() };
+        let _ahead = self.read_ahead(bounds.as_ref(), false)?;
+        let look = |chunk| {
+            interrupt::check()?;
+            let extremes = Extremes::default();
+            let mut heights = Heights { choice, bounds: bounds.as_ref(), named: &self.nodata, extremes };
+            self.read_chunk_of_file(chunk, request, &mut heights)?;
+            Ok(heights.extremes)
+        };
+        let add = |mut a: Extremes, b: Extremes| {
+            a.add(&b, 0);
+            a
+        };
+        let all = (0..self.chunks()).into_par_iter().map(look).try_reduce(Extremes::default, |a, b| Ok(add(a, b)))?;
+        Ok(all.map(|raw| axes[2].value(raw as i64)))
+    }
+
+    /// Returns a height of a text that may stand for nodata.
+    pub(crate) fn doubtful_height(&self) -> Option<&DoubtfulHeight> {
+        match &self.points {
+            PointData::Text(table) => table.doubtful_height(),
+            _ => None,
+        }
+    }
+}
+
+/// Returns whether a height on this axis is a number for nodata, or the end of the raw integers: a writer makes that of what does not fit.
+fn is_number(z: &Axis, value: f64) -> bool {
+    let is_end = |raw: i64| raw == i64::from(i32::MIN) || raw == i64::from(i32::MAX);
+    is_number_in_steps(value, z.scale.to_f64().unwrap_or(1.0)) || raw_of(z, value).is_some_and(is_end)
+}
+
+/// Returns the raw integer of a height.
+fn raw_of(z: &Axis, value: f64) -> Option<i64> {
+    shortest_decimal(value)?.checked_sub(z.offset)?.checked_div(z.scale)?.round().to_i64()
+}
+
+/// Sees the heights of the records that a job wants.
+struct Heights<'a> {
+    choice: &'a RowChoice,
+    bounds: Option<&'a RawBounds>,
+    /// The raw heights that the user names as nodata.
+    named: &'a [i64],
+    extremes: Extremes,
+}
+
+impl RecordSink for Heights<'_> {
+    fn push(&mut self, number: u64, record: &PointRecord, _: impl Fn() -> String) -> Result<()> {
+        let is_within = self.bounds.is_none_or(|bounds| bounds.hold(&record.raw));
+        let is_wanted = self.choice.classes[record.class as usize] && self.choice.returns.has(record.pulse_return);
+        if is_within && is_wanted && !record.withheld && !self.named.contains(&record.raw[2]) {
+            self.extremes.see(record.raw[2] as f64, number);
+        }
+        Ok(())
+    }
+
+    fn push_out_of_bounds(&mut self, _: u8) {}
+
+    fn push_outlier(&mut self, _: u8, _: PulseReturn, _: impl FnOnce() -> String) {}
+
+    /// A record that cannot be read has no height.
+    fn malformed(&mut self, _: u64, _: impl FnOnce() -> String) {}
+
+    fn not_decoded(&mut self, _: u64) {}
+
+    fn misplaced(&mut self, _: u64) {}
+}

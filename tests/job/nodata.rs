@@ -1,0 +1,186 @@
+//! Heights that stand for "nothing measured", such as -9999: they are left out where they are sure, and refused where they are doubtful.
+
+use std::fs;
+use std::path::PathBuf;
+
+use serde_json::Value;
+
+use crate::las_file::LasFile;
+use crate::program::{Job, gdt_batch, number};
+
+/// Points of a made grid.
+const POINTS: usize = 2500;
+
+/// Every so many points have no height.
+const EVERY: usize = 50;
+
+/// Heights in centimetres of a slope from 1500 m on.
+fn slope(i: usize) -> i32 {
+    150_000 + (i * 37 % 900) as i32 + 2 * i as i32
+}
+
+fn has_no_height(i: usize) -> bool {
+    i % EVERY == 6
+}
+
+struct Files(tempfile::TempDir);
+
+impl Files {
+    fn new() -> Files {
+        Files(tempfile::tempdir().unwrap())
+    }
+
+    fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.0.path().join(name);
+        fs::write(&path, bytes).unwrap();
+        path
+    }
+
+    /// Writes a grid as text, with `mark` where there is no height.
+    fn text(&self, mark: &str, is_marked: impl Fn(usize) -> bool) -> PathBuf {
+        let row = |i: usize| {
+            let height = if is_marked(i) { mark.to_owned() } else { format!("{:.2}", f64::from(slope(i)) / 100.0) };
+            format!("{} {} {height}\n", 400_000 + 2 * (i % 50), 5_000_000 + 2 * (i / 50))
+        };
+        self.write("grid.xyz", (0..POINTS).map(row).collect::<String>())
+    }
+
+    /// Writes the same grid as LAS, or as LAZ, in centimetres. The header claims heights between `claimed`.
+    fn las(&self, name: &str, mark: i32, claimed: [f64; 2]) -> PathBuf {
+        let record = |i: usize| {
+            let height = if has_no_height(i) { mark } else { slope(i) };
+            let place = [200 * (i % 50) as i32, 200 * (i / 50) as i32, height];
+            let mut record: Vec<u8> = place.iter().flat_map(|raw| raw.to_le_bytes()).collect();
+            record.extend([0, 0, 0b1001, 2, 0, 0, 0, 0]);
+            record
+        };
+        let records = (0..POINTS).flat_map(record).collect();
+        let file = LasFile { minor: 2, format: 0, extra: 0, stray: 0, records };
+        let mut bytes = if name.ends_with("laz") { file.laz(&[500; 5], false) } else { file.las() };
+        let [low, high] = claimed;
+        let claims = [500_098.0, 500_000.0, 4_000_098.0, 4_000_000.0, high, low];
+        bytes[179..227].copy_from_slice(&claims.map(f64::to_le_bytes).concat());
+        self.write(name, bytes)
+    }
+}
+
+/// Runs a job, and asserts that it left out all points without a height, and that its mesh is that of the others.
+#[track_caller]
+fn left_out(path: &PathBuf, options: &[&str]) -> Value {
+    let job = options.iter().fold(Job::on(&[path]), |job, option| job.with("input", option));
+    let report = job.report();
+    let points = &report["points"];
+    let (kept, nodata) = ((POINTS - POINTS / EVERY) as u64, (POINTS / EVERY) as u64);
+    assert_eq!(["kept", "nodata", "malformed"].map(|name| number(&points[name])), [kept, nodata, 0], "{points}");
+    assert_eq!(report["lattice"]["resolution_z"], "0.01");
+    let input = path.to_str().unwrap();
+    let verdict = gdt_batch(job.folder(), &["verify", "out", "--json", "--input", input]).succeeded().json();
+    assert_eq!(verdict["failures"], serde_json::json!([]));
+    report
+}
+
+fn warnings(report: &Value) -> String {
+    report["warnings"].to_string()
+}
+
+#[test]
+fn numbers_for_nodata_in_a_text_are_left_out() {
+    for mark in
+        ["-9999", "-9999.000", "-32768", "-99999.0", "9999", "-3.4028235e38", "-3.40282346638529E+38", "1e20", "1e+30"]
+    {
+        let files = Files::new();
+        let warnings = warnings(&left_out(&files.text(mark, has_no_height), &[]));
+        for words in ["grid.xyz: 50 lines have the height", "the first is line 7", "[input] nodata = "] {
+            assert!(warnings.contains(words), "{mark}: {words:?} in {warnings}");
+        }
+    }
+}
+
+#[test]
+fn one_number_for_nodata_is_left_out() {
+    let files = Files::new();
+    let report = Job::on(&[files.text("-9999", |i| i == 1204)]).report();
+    assert_eq!(number(&report["points"]["nodata"]), 1);
+    assert!(warnings(&report).contains("line 1205 has the height -9999, which stands for nodata"), "{report}");
+}
+
+#[test]
+fn numbers_for_nodata_that_a_header_claims_are_left_out() {
+    let files = Files::new();
+    for (name, mark, low) in [
+        ("a.las", -999_900, -9999.0),
+        ("b.las", -3_276_800, -32768.0),
+        ("c.las", i32::MIN, -21_474_836.48),
+        ("d.laz", -999_900, -9999.0),
+    ] {
+        let report = left_out(&files.las(name, mark, [low, 1560.0]), &[]);
+        let warnings = warnings(&report);
+        assert!(
+            warnings.contains(&format!("{name}: 50 points have the height {low} (the first is point 6)")),
+            "{warnings}"
+        );
+    }
+}
+
+#[test]
+fn nodata_that_a_header_hides_is_refused_until_an_option_decides() {
+    let files = Files::new();
+    let path = files.las("a.las", -999_900, [1500.0, 1560.0]);
+    let words = ["a.las", "the height -9999", "[input] nodata = -9999", "\"none\""];
+    for command in ["check", "run"] {
+        let job = Job::on(&[&path]);
+        let said = if command == "run" { job.run() } else { job.run_with(&["check"]) };
+        said.refused(3, &words);
+    }
+    left_out(&path, &["nodata = -9999"]);
+    let report = Job::on(&[&path]).with("input", "nodata = \"none\"").report();
+    assert_eq!(number(&report["points"]["kept"]), POINTS as u64);
+}
+
+#[test]
+fn another_height_that_many_points_share_far_from_all_others_is_doubtful() {
+    let files = Files::new();
+    let inputs =
+        [files.text("0", has_no_height), files.las("a.las", 0, [0.0, 1560.0]), files.las("b.laz", 0, [1500.0, 1560.0])];
+    for path in inputs {
+        let words = ["50 ", "have the height 0", "between 150", "[input] nodata = 0", "\"none\""];
+        Job::on(&[&path]).run().refused(3, &words);
+        Job::on(&[&path]).run_with(&["check"]).refused(3, &words);
+        let report = left_out(&path, &["nodata = 0"]);
+        assert!(!warnings(&report).contains("nodata"), "{report}");
+        let report = Job::on(&[&path]).with("input", "nodata = \"none\"").report();
+        assert_eq!(number(&report["points"]["kept"]), POINTS as u64);
+    }
+}
+
+#[test]
+fn the_sea_and_low_ground_are_heights() {
+    let files = Files::new();
+    let coast = |i: usize| format!("{} {} {}\n", i % 50, i / 50, (i / 50).saturating_sub(20) * 9);
+    for path in
+        [files.write("coast.xyz", (0..POINTS).map(coast).collect::<String>()), files.text("1498.2", has_no_height)]
+    {
+        let report = Job::on(&[&path]).report();
+        assert_eq!((number(&report["points"]["nodata"]), number(&report["points"]["kept"])), (0, POINTS as u64));
+        assert!(!warnings(&report).contains("nodata"), "{report}");
+    }
+}
+
+#[test]
+fn tasks_and_bounds_leave_out_the_same() {
+    let files = Files::new();
+    let path = files.text("-9999", has_no_height);
+    let whole = Job::on(&[&path]).tiles_of(200).digest();
+    assert_eq!(Job::on(&[&path]).tiles_of(700).threads(1).digest(), whole);
+    let bounds = "bounds = [400000.0, 5000000.0, 400100.0, 5000038.0]";
+    let report = Job::on(&[&path]).with("input", bounds).report();
+    let points = &report["points"];
+    assert_eq!((number(&points["nodata"]), number(&points["out_of_bounds"])), (20, 1500), "{points}");
+}
+
+#[test]
+fn a_file_of_nodata_alone_leaves_no_point() {
+    let files = Files::new();
+    let path = files.text("-9999", |_| true);
+    Job::on(&[&path]).run().refused(3, &["no point is left", "2500 nodata", "nodata = \"none\""]);
+}
