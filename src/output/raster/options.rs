@@ -2,7 +2,6 @@
 
 use crate::geometry::lattice::shortest_decimal;
 use crate::output::raster::BLOCK;
-use crate::output::raster::grid::CellAlignment;
 use rust_decimal::Decimal;
 use serde::{Deserialize, Serialize};
 
@@ -24,14 +23,6 @@ pub struct RasterOptions {
     /// The side of a file in cells, for a grid of files instead of one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cells_per_file: Option<FileSide>,
-}
-
-impl RasterOptions {
-    /// Returns where the cells are.
-    pub(crate) fn alignment(&self) -> CellAlignment {
-        let origin = self.origin.map_or([Decimal::ZERO; 2], CellOrigin::exact);
-        CellAlignment { origin, resolution: self.resolution.exact() }
-    }
 }
 
 /// The side of a file of a grid of files in cells.

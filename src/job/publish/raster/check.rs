@@ -3,9 +3,10 @@
 
 use crate::geometry::Bounds;
 use crate::job::plan::job_plan::Plan;
-use crate::output::raster::grid::{CellLimit, RasterGrid};
-use crate::output::raster::options::RasterOptions;
+use crate::output::raster::grid::{CellAlignment, CellLimit, RasterGrid};
+use crate::output::raster::options::{CellOrigin, RasterOptions};
 use crate::{Error, Result};
+use rust_decimal::Decimal;
 
 /// Returns the cells of the raster over the lattice box `bounds`.
 ///
@@ -14,7 +15,9 @@ use crate::{Error, Result};
 pub(crate) fn grid_over(plan: &Plan, options: &RasterOptions, bounds: Bounds<2>) -> Result<RasterGrid> {
     let limit = options.cells_per_file.map_or(CellLimit::OneFile, |side| CellLimit::Files(side.cells()));
     let origin = options.origin.map_or_else(String::new, |origin| format!(" with origin = {:?}", origin.numbers()));
-    RasterGrid::new(&plan.lattice, options.alignment(), bounds, limit).map_err(|what| {
+    let corner = options.origin.map_or([Decimal::ZERO; 2], CellOrigin::exact);
+    let alignment = CellAlignment { origin: corner, resolution: options.resolution.exact() };
+    RasterGrid::new(&plan.lattice, alignment, bounds, limit).map_err(|what| {
         Error::Config(format!("[output.raster] resolution = {}{origin} {what}", options.resolution.number()))
     })
 }

@@ -2,7 +2,6 @@
 
 use crate::geometry::lattice::Lattice;
 use crate::job::publish::raster::tile_meshes::TileBox;
-use crate::job::publish::raster::write_raster::RasterStats;
 use crate::output::raster::options::Nodata;
 use crate::output::raster::window::{HeightScale, LatticeMesh};
 use crate::{Result, interrupt};
@@ -54,10 +53,10 @@ impl NodataPoints {
         }
     }
 
-    /// Returns the warning about the raster `file`, in which some cells have this height.
-    pub(super) fn warning(&self, file: &str, stats: &RasterStats, nodata: Nodata, lattice: &Lattice) -> String {
+    /// Returns the warning about the raster `file`, in which so many cells have this height.
+    pub(super) fn warning(&self, file: &str, cells: u64, nodata: Nodata, lattice: &Lattice) -> String {
         let height = nodata.text();
-        let cells = match stats.same_as_nodata {
+        let cells = match cells {
             1 => "1 cell".into(),
             cells => format!("{cells} cells"),
         };
@@ -105,7 +104,7 @@ mod tests {
             Ok(LatticeMesh { positions, triangles: Vec::new() })
         };
         let points = NodataPoints::find(&tiles, scale, nodata, &read).unwrap();
-        points.warning("terrain.tif", &RasterStats { same_as_nodata: 2, ..RasterStats::default() }, nodata, &lattice)
+        points.warning("terrain.tif", 2, nodata, &lattice)
     }
 
     #[test]

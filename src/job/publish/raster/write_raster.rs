@@ -231,7 +231,7 @@ impl<'a> RasterWork<'a> {
         if stats.same_as_nodata > 0 {
             let read = |tile: &TileBox| self.mesh(directory, tile.tile);
             let points = NodataPoints::find(&self.boxes, self.heights(), nodata, &read)?;
-            warnings.push(points.warning(file, stats, nodata, &self.plan.lattice));
+            warnings.push(points.warning(file, stats.same_as_nodata, nodata, &self.plan.lattice));
         }
         if stats.heights == 0 {
             warnings.push(format!(
