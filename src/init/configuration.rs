@@ -86,8 +86,9 @@ fn about_surface(page: &mut Page, findings: &Findings, sources: &[&Source], has_
 fn about_coordinates(page: &mut Page, findings: &Findings, draft: &Draft, (is_named, utm): (bool, bool)) {
     page.blank();
     page.say(&findings.unit);
-    // What is transformed takes its unit from its system.
-    if !draft.sets("to_crs") {
+    // What is transformed takes its unit from its system, and no other unit may contradict that of a CRS.
+    let is_of_crs = draft.sets("to_crs") || is_named && !findings.unit_is_unknown;
+    if !is_of_crs {
         let unit = if findings.unit_is_unknown { "us-foot" } else { "metre" };
         page.offer(&format!("unit = \"{unit}\""), "or \"metre\", \"foot\", \"us-foot\": whatever the files say");
     }

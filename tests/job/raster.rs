@@ -407,7 +407,10 @@ fn a_system_and_its_heights_are_named() {
     }
     // A code that says heights too is the code of its plane and that of its heights: a reader would take it for no plane.
     let cloud = write(folder.path(), "plain.las", &[]);
-    let job = with_raster(Job::on(&[&cloud]).with("input", "crs = \"EPSG:7405\""), "resolution = 10");
+    let job = with_raster(
+        Job::on(&[&cloud]).with("input", "crs = \"EPSG:7405\"\noutside_crs_area = \"warn\""),
+        "resolution = 10",
+    );
     job.report();
     let keys = raster(&job).keys;
     let value = |key: u32| keys[4..].chunks(4).find(|entry| entry[0] == key).map(|entry| entry[3]);

@@ -284,7 +284,7 @@ fn ruler_steps() -> Value {
 fn a_double_click_is_one_place_of_the_ruler_and_heights_have_their_own_unit() {
     let Some(chromium) = chromium() else { return };
     // Feet in the plane, metres upward.
-    let terrain = Terrain::new("crs = \"EPSG:2992+5703\"", "format = \"3dtiles\"");
+    let terrain = Terrain::new("crs = \"EPSG:2992+5703\"\noutside_crs_area = \"warn\"", "format = \"3dtiles\"");
     let seen = terrain.seen(&chromium, &ruler_steps());
     let cells: Vec<String> = serde_json::from_value(seen["values"][1].clone()).unwrap();
     let [flat, up, direct, slope] = cells.as_slice() else { panic!("two places make one line: {cells:?}") };
