@@ -5,6 +5,7 @@ pub(crate) mod chunk_request;
 pub(crate) mod classes;
 pub(crate) mod counts;
 pub(crate) mod filter;
+pub(crate) mod measured;
 pub(crate) mod optional_fields;
 pub(crate) mod point;
 pub(crate) mod raw_bounds;

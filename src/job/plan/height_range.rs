@@ -3,6 +3,7 @@
 //! One point of noise, or a header with a wrong greatest height, must not give all of a terrain one colour. So a sample of the points
 //! decides. It is the same for a job of one part and of several, whose tiles are coloured before the last point is read.
 
+use crate::geometry::{Bounds, bounds_of};
 use crate::input::{DecodedChunks, OptionalFields, PointCounts, PointRules, Source};
 use crate::output::color::HeightRange;
 use crate::{Result, interrupt};
@@ -25,10 +26,15 @@ const LEAST_POINTS: usize = 256;
 /// One point of so many may be noise, at either end.
 const NOISE: usize = 1000;
 
+/// One point of so many lies beyond either end of the middle.
+const TAIL: usize = 20;
+
 /// A sample of the heights of the points that a job keeps.
 pub(crate) struct HeightSample {
     /// Lattice integers of z, ascending.
     heights: Vec<i32>,
+    /// Lattice integers of x and y.
+    positions: Vec<[i32; 2]>,
     /// The number of chunks in which it looked.
     places: usize,
     /// The number of records at which it looked.
@@ -68,17 +74,38 @@ impl HeightSample {
             let at = ends.partition_point(|&end| end <= chunk);
             let (source, rules, decoded) = &inputs[at];
             let chunk = decoded.chunk(chunk + decoded.len() - ends[at]);
-            first_heights(source, rules, chunk, RECORDS / most as u64).map(|found| (&source.path, found))
+            first_places(source, rules, chunk, RECORDS / most as u64).map(|found| (&source.path, found))
         };
         let found = (0..places).into_par_iter().map(look).collect::<Result<Vec<_>>>()?;
-        let (mut heights, mut counts, mut by_file) = (Vec::new(), PointCounts::default(), BTreeMap::new());
-        for (path, (more, its_counts)) in found {
-            heights.extend(more);
+        let (mut heights, mut positions) = (Vec::new(), Vec::new());
+        let (mut counts, mut by_file) = (PointCounts::default(), BTreeMap::new());
+        for (path, (places, its_counts)) in found {
+            heights.extend(places.iter().map(|place| place[2]));
+            positions.extend(places.iter().map(|[x, y, _]| [*x, *y]));
             counts += its_counts.clone();
             *by_file.entry(path.clone()).or_insert_with(PointCounts::default) += its_counts;
         }
         heights.sort_unstable();
-        Ok(HeightSample { heights, places, seen: counts.read - counts.not_decoded, records, counts, by_file })
+        Ok(HeightSample { heights, positions, places, seen: counts.read - counts.not_decoded, records, counts, by_file })
+    }
+
+    /// Returns the lattice box of the points; `None` without any.
+    pub(crate) fn bounds(&self) -> Option<Bounds<3>> {
+        let plane = bounds_of(&self.positions)?;
+        let (low, high) = (*self.heights.first()?, *self.heights.last()?);
+        Some(Bounds { min: [plane.min[0], plane.min[1], low], max: [plane.max[0], plane.max[1], high] })
+    }
+
+    /// Returns the length of the middle of the points, nine in ten, on its longer side in x and y; `None` if there are too few to tell.
+    pub(crate) fn middle(&self) -> Option<u64> {
+        let count = self.positions.len();
+        let length = |axis: usize| {
+            let mut values: Vec<i32> = self.positions.iter().map(|place| place[axis]).collect();
+            values.sort_unstable();
+            let cut = count / TAIL;
+            u64::from(values[count - 1 - cut].abs_diff(values[cut]))
+        };
+        (count >= LEAST_POINTS).then(|| length(0).max(length(1)))
     }
 
     /// Returns the heights that colours span, without what may be noise; `None` if the sample has too few points to tell. Where the
@@ -105,20 +132,20 @@ impl HeightSample {
 }
 
 /// Tells whether a source may have points within `bounds`, as far as it claims.
-fn may_reach(source: &Source, bounds: Option<[f64; 4]>) -> bool {
+pub(crate) fn may_reach(source: &Source, bounds: Option<[f64; 4]>) -> bool {
     let (Some([xmin, ymin, xmax, ymax]), Some([min, max])) = (bounds, source.claimed_rectangle()) else { return true };
     min[0] <= xmax && min[1] <= ymax && max[0] >= xmin && max[1] >= ymin
 }
 
-/// Returns the heights of the points that the job keeps among the first `records` records of a chunk, and what became of these records.
-fn first_heights(source: &Source, rules: &PointRules, chunk: usize, records: u64) -> Result<(Vec<i32>, PointCounts)> {
+/// Returns the places of the points that the job keeps among the first `records` records of a chunk, and what became of these records.
+fn first_places(source: &Source, rules: &PointRules, chunk: usize, records: u64) -> Result<(Vec<[i32; 3]>, PointCounts)> {
     let rules = PointRules { fields: OptionalFields::default(), ..rules.clone() };
-    let mut heights = Vec::new();
+    let mut places = Vec::new();
     let counts = source.decode_start(chunk, records, &rules, &mut |points| {
-        heights.extend(points.iter().map(|point| point.z));
+        places.extend(points.iter().map(|point| [point.position[0], point.position[1], point.z]));
         Ok(())
     })?;
-    Ok((heights, counts))
+    Ok((places, counts))
 }
 
 #[cfg(test)]
@@ -131,7 +158,7 @@ mod tests {
     fn sample(count: i32, places: usize, records: u64) -> HeightSample {
         let counts = PointCounts::default();
         let by_file = BTreeMap::new();
-        HeightSample { heights: (0..count).collect(), places, seen: count as u64, records, counts, by_file }
+        HeightSample { heights: (0..count).collect(), positions: Vec::new(), places, seen: count as u64, records, counts, by_file }
     }
 
     fn range(low: i32, high: i32) -> Option<HeightRange> {

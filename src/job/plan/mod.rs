@@ -1,11 +1,13 @@
 //! Step 1: the plan says what a job is. It is made from the options, the inputs' headers and samples of their points. It can be
 //! written down and read back, so that every later step is a function of the plan, an index and the store.
 
+pub(crate) mod area_hint;
 pub mod breaklines;
 pub mod budget;
 pub mod common_crs;
 pub(crate) mod distinct_crs;
 pub mod extent;
+pub(crate) mod far_points;
 pub mod fingerprint;
 pub(crate) mod globe_system;
 pub(crate) mod height_range;
@@ -17,4 +19,7 @@ pub mod make_plan;
 mod missing_attributes;
 mod named_files;
 pub mod no_points;
+pub(crate) mod point_survey;
+pub(crate) mod rounded_box;
+pub(crate) mod stretch;
 pub(crate) mod text_inputs;
