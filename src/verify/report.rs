@@ -7,8 +7,8 @@ use serde::Deserialize;
 
 use crate::geometry::VertexDigest;
 use crate::geometry::lattice::Lattice;
-use crate::input::{PlausiblePoints, TextReading};
 use crate::input::options::InputOptions;
+use crate::input::{PlausiblePoints, TextReading};
 use crate::output::checksums::{Checksum, read_file, seal};
 use crate::output::file_names::OutputFiles;
 use crate::output::frame::Extras;

@@ -72,7 +72,8 @@ impl Middle {
     /// Returns where most of these places lie; `None` if they are too few to tell. A place counts once, however many rows have it: rows
     /// at one place are one mistake.
     pub(crate) fn of(mut places: Vec<[f64; 3]>) -> Option<Middle> {
-        places.sort_unstable_by(|a, b| a.iter().zip(b).fold(Ordering::Equal, |order, (a, b)| order.then(a.total_cmp(b))));
+        places
+            .sort_unstable_by(|a, b| a.iter().zip(b).fold(Ordering::Equal, |order, (a, b)| order.then(a.total_cmp(b))));
         places.dedup();
         if places.len() < LEAST_ROWS {
             return None;

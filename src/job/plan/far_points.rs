@@ -1,6 +1,9 @@
 //! Points that lie so far from all others that they are mistakes, such as 0, 0, 0 among coordinates of a national grid: they are looked
 //! for where they cost the others their precision.
 
+use crate::Result;
+use crate::input::options::{InputOptions, OnBadFile};
+use crate::input::{FileFormat, Outliers, Source};
 use crate::job::options::JobOptions;
 use crate::job::plan::extent::{Extent, SourceBox, to_float};
 use crate::job::plan::lattice_choice::{LatticeCoarsening, LatticeWish, fineness};
@@ -8,10 +11,7 @@ use crate::job::plan::make_plan::make_plan;
 use crate::job::plan::point_survey::PointSurvey;
 use crate::job::plan::rounded_box::rounded;
 use crate::job::plan::text_inputs::row_choice;
-use crate::input::options::{InputOptions, OnBadFile};
-use crate::input::{FileFormat, Outliers, Source};
 use crate::output::frame::Frame;
-use crate::Result;
 use rust_decimal::Decimal;
 
 /// Returns the box of the sources. If no lattice holds all of it at the precision of the inputs or to a millimetre, and some points lie so
@@ -73,7 +73,9 @@ fn leave_out_outliers(
     for (index, source) in sources.iter_mut().enumerate() {
         all.add(match source.format {
             FileFormat::Text => source.leave_out_outliers(&choice)?,
-            FileFormat::Las | FileFormat::Laz => look_at(source, &options.input, claims.map(|extent| &extent.boxes[index]))?,
+            FileFormat::Las | FileFormat::Laz => {
+                look_at(source, &options.input, claims.map(|extent| &extent.boxes[index]))?
+            }
         });
         points += source.wanted_rows();
     }

@@ -86,7 +86,15 @@ impl HeightSample {
             *by_file.entry(path.clone()).or_insert_with(PointCounts::default) += its_counts;
         }
         heights.sort_unstable();
-        Ok(HeightSample { heights, positions, places, seen: counts.read - counts.not_decoded, records, counts, by_file })
+        Ok(HeightSample {
+            heights,
+            positions,
+            places,
+            seen: counts.read - counts.not_decoded,
+            records,
+            counts,
+            by_file,
+        })
     }
 
     /// Returns the lattice box of the points; `None` without any.
@@ -138,7 +146,12 @@ pub(crate) fn may_reach(source: &Source, bounds: Option<[f64; 4]>) -> bool {
 }
 
 /// Returns the places of the points that the job keeps among the first `records` records of a chunk, and what became of these records.
-fn first_places(source: &Source, rules: &PointRules, chunk: usize, records: u64) -> Result<(Vec<[i32; 3]>, PointCounts)> {
+fn first_places(
+    source: &Source,
+    rules: &PointRules,
+    chunk: usize,
+    records: u64,
+) -> Result<(Vec<[i32; 3]>, PointCounts)> {
     let rules = PointRules { fields: OptionalFields::default(), ..rules.clone() };
     let mut places = Vec::new();
     let counts = source.decode_start(chunk, records, &rules, &mut |points| {
@@ -158,7 +171,15 @@ mod tests {
     fn sample(count: i32, places: usize, records: u64) -> HeightSample {
         let counts = PointCounts::default();
         let by_file = BTreeMap::new();
-        HeightSample { heights: (0..count).collect(), positions: Vec::new(), places, seen: count as u64, records, counts, by_file }
+        HeightSample {
+            heights: (0..count).collect(),
+            positions: Vec::new(),
+            places,
+            seen: count as u64,
+            records,
+            counts,
+            by_file,
+        }
     }
 
     fn range(low: i32, high: i32) -> Option<HeightRange> {

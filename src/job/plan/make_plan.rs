@@ -7,11 +7,11 @@ use crate::input::surface_doubts::no_ground;
 use crate::input::transform_sources::transform_sources;
 use crate::input::{Axis, CrsChoice, FileFormat, PointCounts, PointRules, Source, set_network_memory};
 use crate::job::options::JobOptions;
+use crate::job::plan::area_hint::AreaHint;
 use crate::job::plan::breaklines::line_files::LineFiles;
 use crate::job::plan::breaklines::{CloudOfPlan, PlannedBreaklines};
 use crate::job::plan::budget::network_memory;
 use crate::job::plan::common_crs::{common_crs, horizontal_unit};
-use crate::job::plan::area_hint::AreaHint;
 use crate::job::plan::extent::{Extent, SourceBox, to_float};
 use crate::job::plan::far_points::extent_without_outliers;
 use crate::job::plan::height_range::HeightSample;
@@ -19,8 +19,8 @@ use crate::job::plan::inputs::{check_missing_records, open_all, unreadable_names
 use crate::job::plan::job_plan::{Claims, Plan, PlannedInput, SkippedInput, decoded_records};
 use crate::job::plan::lattice_choice::{LatticeCoarsening, LatticeWish, choose_lattice, fineness};
 use crate::job::plan::text_inputs::{
-    check_malformed_rows, farthest_row, refuse_degrees, refuse_missing_classes,
-    refuse_missing_returns, row_choice, wanted_fields,
+    check_malformed_rows, farthest_row, refuse_degrees, refuse_missing_classes, refuse_missing_returns, row_choice,
+    wanted_fields,
 };
 use crate::output::color::HeightRange;
 use crate::output::frame::Frame;

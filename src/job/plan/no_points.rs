@@ -1,13 +1,13 @@
 //! The messages for jobs without a terrain. If no point is left, it says what became of the points, and where they lie if not within the
 //! bounds.
 
+use crate::input::surface_doubts::no_ground;
+use crate::input::{FileFormat, PointCounts, Source};
 use crate::job::plan::height_range::may_reach;
+use crate::job::plan::job_plan::Plan;
 use crate::job::plan::job_plan::decoded_records;
 use crate::job::plan::text_inputs::count;
 use crate::{Error, Result};
-use crate::input::surface_doubts::no_ground;
-use crate::input::{FileFormat, PointCounts, Source};
-use crate::job::plan::job_plan::Plan;
 
 /// A rectangle [xmin, ymin, xmax, ymax] in source units.
 type Rectangle = [f64; 4];

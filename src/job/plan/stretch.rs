@@ -121,11 +121,22 @@ fn sentence(found: &SplitBoxes, is_sample: bool) -> Option<String> {
         true => format!(
             "{share} % {of} lie within {:.0} x {:.0} units; {others} the area to {:.0} x {:.0}: to leave them out, set [input] bounds = \
              [{}, {}, {}, {}]",
-            size(rest, 0).ceil(), size(rest, 1).ceil(), size(all, 0), size(all, 1), x[0], y[0], x[1], y[1]
+            size(rest, 0),
+            size(rest, 1),
+            size(all, 0),
+            size(all, 1),
+            x[0],
+            y[0],
+            x[1],
+            y[1]
         ),
         false => format!(
             "{share} % {of} have heights from {} to {}; {others} the heights to {:.0} units, from {} to {}: correct or remove them",
-            z[0], z[1], size(all, 2), all[0][2], all[1][2]
+            z[0],
+            z[1],
+            size(all, 2),
+            all[0][2],
+            all[1][2]
         ),
     })
 }
