@@ -22,11 +22,13 @@ use crate::input::points::chunk_request::ChunkRequest;
 use crate::input::points::counts::PointCounts;
 use crate::input::points::filter::PointFilter;
 use crate::input::points::nodata_sink::NodataSink;
+use crate::input::points::measured::{MeasuredPoints, PlausiblePoints};
 use crate::input::points::point::Point;
 use crate::input::points::raw_bounds::RawBounds;
 use crate::input::points::record_sink::RecordSink;
 use crate::input::points::rules::PointRules;
 use crate::input::points::transformed_sink::TransformedSink;
+use crate::input::samples::{FileSamples, fingerprint_of};
 use crate::input::source_transform::SourceTransform;
 use crate::input::text::options::TextOptions;
 use crate::input::text::outliers::Outliers;
@@ -102,6 +104,9 @@ pub struct Source {
     /// The raw heights of a LAS or LAZ file that stand for nodata.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     nodata: Vec<i64>,
+    /// Where the points of a binary file lie, if they had to be looked at.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    measured: Option<Box<MeasuredPoints>>,
     points: PointData,
 }
 
@@ -149,7 +154,9 @@ fn open_las(file: &RandomAccessFile, choice: &RowChoice) -> Result<Source> {
     let header = LasHeader::read(file, &mut warnings)?;
     let vlrs = vlr::list(file, &header, &mut warnings)?;
     let crs = crs_records::read(file, &vlrs, &mut warnings)?;
-    let crs = plausible(crs, header.min, header.max, &mut warnings);
+    // Bounds that no writer has filled in, or wrong ones, say nothing about the points.
+    let has_box = is_box(header.min, header.max) && [header.min, header.max] != [[0.0; 3]; 2];
+    let crs = if has_box { plausible(crs, header.min, header.max, &mut warnings) } else { crs };
     let (missing, points) = if header.compressed {
         let points = CompressedPoints::read(file, &header, &vlrs, choice.use_index, &mut warnings)?;
         (points.missing, PointData::Laz(points))
@@ -182,11 +189,17 @@ fn open_las(file: &RandomAccessFile, choice: &RowChoice) -> Result<Source> {
         warnings,
         transform: None,
         nodata: Vec::new(),
+        measured: None,
         points,
     };
     source.drop_false_geocentric_crs()?;
     source.find_nodata(choice)?;
     Ok(source)
+}
+
+/// Returns whether these are the least and the greatest coordinates of something.
+pub(crate) fn is_box<const N: usize>(min: [f64; N], max: [f64; N]) -> bool {
+    min.iter().zip(&max).all(|(min, max)| min <= max)
 }
 
 fn open_text(file: &RandomAccessFile, options: &TextOptions, choice: &RowChoice) -> Result<Source> {
@@ -213,15 +226,16 @@ fn open_text(file: &RandomAccessFile, options: &TextOptions, choice: &RowChoice)
         warnings,
         transform: None,
         nodata: Vec::new(),
+        measured: None,
         points: PointData::Text(Box::new(table)),
     })
 }
 
 impl Source {
     /// Returns the box of the points that the job wants, its least and its greatest x, y, z, if that is known without decoding: for
-    /// text. Rows that are left out as outliers are not in it.
+    /// text, and where all points have been looked at. Those that are left out as outliers are not in it.
     pub fn wanted_box(&self) -> Option<[[f64; 3]; 2]> {
-        let PointData::Text(table) = &self.points else { return None };
+        let PointData::Text(table) = &self.points else { return self.measured.as_ref()?.rest };
         match &self.transform {
             None => table.wanted_box(),
             Some(transform) => transform.around(table.wanted_box()?),
@@ -231,7 +245,7 @@ impl Source {
     /// Returns the least and the greatest x and y that the source claims; `None` for a header that gives no box.
     pub fn claimed_rectangle(&self) -> Option<[[f64; 2]; 2]> {
         let [min, max] = [self.min, self.max].map(|[x, y, _]| [x, y]);
-        let has_box = self.records <= 1 || (0..2).any(|axis| min[axis] < max[axis]);
+        let has_box = is_box(min, max) && (self.records <= 1 || min != max);
         has_box.then_some([min, max])
     }
 
@@ -239,7 +253,7 @@ impl Source {
     pub fn known_malformed(&self) -> u64 {
         match &self.points {
             PointData::Text(table) => table.malformed() + table.missing,
-            _ => self.missing,
+            _ => self.missing + self.outliers(),
         }
     }
 
@@ -259,11 +273,49 @@ impl Source {
         Ok(found)
     }
 
-    /// Returns the number of rows of a text that the job wants, outliers included.
+    /// Takes over what a look at all points of a binary file has shown. Decoding counts its outliers as malformed.
+    pub fn set_measured(&mut self, measured: MeasuredPoints) {
+        self.measured = Some(Box::new(measured));
+    }
+
+    /// Returns what a look at all points of a binary file has shown, if there was one.
+    pub fn measured(&self) -> Option<&MeasuredPoints> {
+        self.measured.as_deref()
+    }
+
+    /// Returns what tells those who read a binary file again which of its points are mistakes, if some are.
+    pub fn plausible_points(&self) -> Option<PlausiblePoints> {
+        let measured = self.measured.as_ref()?;
+        Some(PlausiblePoints { content: measured.content.clone(), within: measured.plausible? })
+    }
+
+    /// Leaves out the points that a job left out as mistakes, if this is one of the files in `known`.
+    ///
+    /// # Errors
+    /// `Io` if the file cannot be read.
+    pub fn leave_out_known(&mut self, known: &[PlausiblePoints]) -> Result<()> {
+        if known.is_empty() {
+            return Ok(());
+        }
+        let content = fingerprint_of(vec![FileSamples::of(&self.path)?]);
+        let found = known.iter().find(|known| known.content == content);
+        let measured = |known: &PlausiblePoints| MeasuredPoints { plausible: Some(known.within), ..Default::default() };
+        self.measured = found.map(|known| Box::new(measured(known)));
+        Ok(())
+    }
+
+    /// Takes over where the others lie, and what to do about the outliers of a binary file.
+    pub fn set_remedy(&mut self, remedy: &str) {
+        if let Some(measured) = &mut self.measured {
+            measured.remedy = remedy.into();
+        }
+    }
+
+    /// Returns the number of points that the job wants, outliers included; of a binary file at which nobody has looked, that of all records.
     pub fn wanted_rows(&self) -> u64 {
         match &self.points {
             PointData::Text(table) => table.wanted_rows(),
-            _ => 0,
+            _ => self.measured.as_ref().map_or(self.records, |measured| measured.points),
         }
     }
 
@@ -287,21 +339,25 @@ impl Source {
         (!compares_itself).then(|| RawBounds::of(&self.axes, bounds))
     }
 
-    /// Returns the number of rows that [`Source::leave_out_outliers`] leaves out.
+    /// Returns the number of points that are left out as outliers.
     pub fn outliers(&self) -> u64 {
         match &self.points {
             PointData::Text(table) => table.outliers(),
-            _ => 0,
+            _ => self.measured.as_ref().map_or(0, |measured| measured.outliers.rows),
         }
     }
 
-    /// Returns whether rows are left out that are not rare in this file.
+    /// Returns whether points are left out that are not rare in this file.
     pub fn has_frequent_outliers(&self) -> bool {
-        matches!(&self.points, PointData::Text(table) if table.has_frequent_outliers())
+        match &self.points {
+            PointData::Text(table) => table.has_frequent_outliers(),
+            _ => self.measured.as_ref().is_some_and(|measured| measured.has_frequent_outliers()),
+        }
     }
 
-    /// Undoes [`Source::leave_out_outliers`].
+    /// Undoes [`Source::leave_out_outliers`] and [`Source::set_measured`].
     pub fn keep_outliers(&mut self) {
+        self.measured = None;
         if let PointData::Text(table) = &mut self.points {
             table.keep_outliers();
             let (axes, grid) = (table.axes(), table.grid());
@@ -379,6 +435,12 @@ impl Source {
         sink: &mut dyn FnMut(&[Point]) -> Result<()>,
     ) -> Result<PointCounts> {
         let mut filter = PointFilter::new(&self.path, &self.axes, rules, sink);
+        if let Some(measured) = &self.measured
+            && let Some(plausible) = measured.plausible
+        {
+            let remedy = if measured.first_in == Some(chunk) { measured.remedy.as_str() } else { "" };
+            filter = filter.within(plausible, remedy);
+        }
         self.read_chunk(chunk, request, &mut filter)?;
         filter.finish()
     }

@@ -120,6 +120,7 @@ impl<'a> Inputs<'a> {
         if let Some(input) = &facts.input {
             transform_sources(&mut sources, input, &mut Warnings::default())?;
         }
+        sources.iter_mut().try_for_each(|source| source.leave_out_known(&facts.plausible_points))?;
         // As the job did it: after the transform, which says how far degrees reach.
         for source in sources.iter_mut().filter(|_| reading.outliers_left_out) {
             source.leave_out_outliers(&choice)?;

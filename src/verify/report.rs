@@ -7,8 +7,8 @@ use serde::Deserialize;
 
 use crate::geometry::VertexDigest;
 use crate::geometry::lattice::Lattice;
-use crate::input::TextReading;
 use crate::input::options::InputOptions;
+use crate::input::{PlausiblePoints, TextReading};
 use crate::output::checksums::{Checksum, read_file, seal};
 use crate::output::file_names::OutputFiles;
 use crate::output::frame::Extras;
@@ -30,6 +30,9 @@ pub(super) struct ReportedFacts {
     pub(super) input: Option<InputOptions>,
     /// How the job read its texts. Earlier versions did not say it.
     pub(super) texts: Option<TextReading>,
+    /// Which points of binary files it kept, where it left some out because they lie far from all others.
+    #[serde(default)]
+    pub(super) plausible_points: Vec<PlausiblePoints>,
     /// The inputs that were left out because they are bad.
     #[serde(default)]
     pub(super) skipped: Vec<SkippedFile>,

@@ -36,6 +36,7 @@ mod cutting;
 mod decimals;
 mod doubtful_systems;
 mod doubtful_transforms;
+mod far_points;
 mod globe;
 mod hard_shapes;
 mod height_offsets;

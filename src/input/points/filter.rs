@@ -8,6 +8,7 @@ use crate::geometry::lattice::{BEYOND, REACH};
 use crate::input::points::axis::{AXIS_NAMES, Axis};
 use crate::input::points::classes::{is_ground, is_unclassified};
 use crate::input::points::counts::PointCounts;
+use crate::input::points::measured::RawBox;
 use crate::input::points::point::Point;
 use crate::input::points::record::{NODATA, PointRecord};
 use crate::input::points::record_sink::RecordSink;
@@ -30,6 +31,8 @@ pub(crate) struct PointFilter<'a> {
     rules: &'a PointRules,
     /// The maps of x, y and z, if all are exact and the rules look at nothing but the class of a record.
     quick_maps: Option<[[i64; 2]; 3]>,
+    /// Points outside this box are mistakes, and what to say about the first of them.
+    plausible: Option<(RawBox, &'a str)>,
     sink: Sink<'a>,
     points: Vec<Point>,
     counts: PointCounts,
@@ -44,7 +47,13 @@ impl<'a> PointFilter<'a> {
     pub(crate) fn new(path: &'a Path, axes: &'a [Axis; 3], rules: &'a PointRules, sink: Sink<'a>) -> PointFilter<'a> {
         let (points, counts) = (Vec::with_capacity(SLICE), PointCounts::default());
         let quick_maps = quick_maps(rules);
-        PointFilter { path, axes, rules, quick_maps, sink, points, counts, classes: [0; 256], kept: [0; 256] }
+        let (plausible, classes, kept) = (None, [0; 256], [0; 256]);
+        PointFilter { path, axes, rules, quick_maps, plausible, sink, points, counts, classes, kept }
+    }
+
+    /// Has points outside of this box count as malformed. The message about the first of them gives the `remedy`.
+    pub(crate) fn within(self, plausible: RawBox, remedy: &'a str) -> PointFilter<'a> {
+        PointFilter { quick_maps: None, plausible: Some((plausible, remedy)), ..self }
     }
 
     /// Returns the lattice integers of a record whose class alone decides its fate; `None` if a closer look is needed.
@@ -129,6 +138,10 @@ impl<'a> PointFilter<'a> {
             self.counts.nodata += 1;
             return Ok(());
         }
+        if self.plausible.is_some_and(|(plausible, _)| !plausible.holds(&record.raw)) {
+            self.push_far(record, &place());
+            return Ok(());
+        }
         // One by one: `array::map` compiles to a call for every record here.
         let [x, y, z] = &self.rules.maps;
         let mapped = [x.apply(record.raw[0]), y.apply(record.raw[1]), z.apply(record.raw[2])];
@@ -160,16 +173,27 @@ impl<'a> PointFilter<'a> {
         Ok(())
     }
 
+    /// Counts a record that lies far from all others.
+    #[cold]
+    fn push_far(&mut self, record: &PointRecord, place: &str) {
+        let remedy = self.plausible.as_mut().map_or("", |(_, remedy)| std::mem::take(remedy));
+        let [x, y, z] = [0, 1, 2].map(|axis| self.value_text(record, axis));
+        self.malformed(1, || format!("{place}: ({x}, {y}, {z}) lies far from all other points{remedy}"));
+    }
+
+    fn value_text(&self, record: &PointRecord, axis: usize) -> String {
+        match record.raw[axis] {
+            BEYOND => format!("more than 10^18 steps of {}", self.axes[axis].scale),
+            raw => self.axes[axis].value(raw).to_string(),
+        }
+    }
+
     /// Returns the first coordinate that is outside the lattice's reach, and the name of its axis.
     #[cold]
     fn out_of_reach(&self, record: &PointRecord, mapped: &Mapped) -> (String, &'static str) {
         let is_out = |axis: usize| mapped[axis].is_none_or(|(v, _)| axis < 2 && !in_reach(v));
         let axis = (0..3).find(|&axis| is_out(axis)).unwrap_or(2);
-        let value = match record.raw[axis] {
-            BEYOND => format!("more than 10^18 steps of {}", self.axes[axis].scale),
-            raw => self.axes[axis].value(raw).to_string(),
-        };
-        (value, AXIS_NAMES[axis])
+        (self.value_text(record, axis), AXIS_NAMES[axis])
     }
 }
 

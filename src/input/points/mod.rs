@@ -8,6 +8,7 @@ pub(crate) mod filter;
 pub(crate) mod nodata;
 pub(crate) mod nodata_choice;
 pub(crate) mod nodata_sink;
+pub(crate) mod measured;
 pub(crate) mod optional_fields;
 pub(crate) mod point;
 pub(crate) mod raw_bounds;

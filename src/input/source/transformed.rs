@@ -2,7 +2,7 @@
 
 use crate::input::crs::system::Crs;
 use crate::input::points::axis::Axis;
-use crate::input::source::Source;
+use crate::input::source::{Source, is_box};
 use crate::input::source_transform::{OwnCoordinates, SourceTransform};
 use rust_decimal::Decimal;
 
@@ -12,7 +12,8 @@ impl Source {
         self.axes = transform.axes();
         self.grid = transform.grid(&self.axes);
         // A header's box without any place in the other system is no box.
-        [self.min, self.max] = transform.around([self.min, self.max]).unwrap_or_default();
+        let own = Some([self.min, self.max]).filter(|[min, max]| is_box(*min, *max));
+        [self.min, self.max] = own.and_then(|own| transform.around(own)).unwrap_or_default();
         self.crs = crs;
         self.transform = Some(Box::new(transform));
     }

@@ -1,5 +1,6 @@
 //! Rows that lie so far from all others that they are mistakes, such as 0, 0, 0 among coordinates of a national grid.
 
+use std::cmp::Ordering;
 use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
@@ -18,6 +19,9 @@ const ROWS_OF_A_CHUNK: u64 = 4096;
 
 /// The sizes of the middle of the rows by which an outlier at least lies outside it.
 const FAR: f64 = 10.0;
+
+/// A height that no terrain has above or below its middle unless this is steep.
+const HIGH: f64 = 5000.0;
 
 /// The fraction of the rows beyond either end of their middle.
 const TAIL: f64 = 0.05;
@@ -65,6 +69,26 @@ pub(crate) struct Middle {
 }
 
 impl Middle {
+    /// Returns where most of these places lie; `None` if they are too few to tell. A place counts once, however many rows have it: rows
+    /// at one place are one mistake.
+    pub(crate) fn of(mut places: Vec<[f64; 3]>) -> Option<Middle> {
+        places
+            .sort_unstable_by(|a, b| a.iter().zip(b).fold(Ordering::Equal, |order, (a, b)| order.then(a.total_cmp(b))));
+        places.dedup();
+        if places.len() < LEAST_ROWS {
+            return None;
+        }
+        let cut = ((places.len() as f64 * TAIL) as usize).max(1);
+        let (mut bounds, mut centre) = (RowBox::empty(), [0.0; 3]);
+        for axis in 0..3 {
+            let mut values: Vec<f64> = places.iter().map(|place| place[axis]).collect();
+            values.sort_unstable_by(f64::total_cmp);
+            (bounds.min[axis], bounds.max[axis]) = (values[cut], values[values.len() - 1 - cut]);
+            centre[axis] = values[values.len() / 2];
+        }
+        Some(Middle { bounds, centre })
+    }
+
     /// Returns how far a row lies from the centre, on the axis on which it is farthest, in the unit of z. One of x and y has so many `steps`
     /// of z.
     pub(crate) fn distance_to(&self, numbers: &[Number; 3], steps: f64) -> f64 {
@@ -79,7 +103,9 @@ pub(crate) fn plausible_box(middle: &RowBox, steps: f64) -> Option<RowBox> {
     // A strip or a plane is narrow on one axis, which says nothing about how far its rows may lie apart there.
     let size = |axis: usize| middle.max[axis] - middle.min[axis];
     let widest = (size(0).max(size(1)) * steps).max(size(2));
-    let margins = [FAR * widest / steps, FAR * widest / steps, FAR * widest];
+    // A wide area is no reason for points in outer space.
+    let upwards = (FAR * widest).min((FAR * size(2)).max(HIGH));
+    let margins = [FAR * widest / steps, FAR * widest / steps, upwards];
     let beside = |corner: [f64; 3], side: f64| std::array::from_fn(|axis| corner[axis] + side * margins[axis]);
     (widest > 0.0).then(|| RowBox { min: beside(middle.min, -1.0), max: beside(middle.max, 1.0) })
 }
@@ -93,7 +119,7 @@ pub(crate) fn middle(
     chunks: &[Range<u64>],
     wanted: Wanted,
 ) -> Result<Option<Middle>> {
-    let mut values: [Vec<f64>; 3] = Default::default();
+    let mut places: Vec<[f64; 3]> = Vec::new();
     for chunk in chunks {
         let mut lines = 0;
         for_each_line(file, first, chunk.clone(), |_, _| {
@@ -109,20 +135,10 @@ pub(crate) fn middle(
                 && reader.read(line).is_ok()
                 && wanted.has(&reader)
             {
-                (0..3).for_each(|axis| values[axis].push(reader.numbers[axis].value()));
+                places.push(reader.numbers.each_ref().map(Number::value));
             }
             Ok(())
         })?;
     }
-    let cut = ((values[0].len() as f64 * TAIL) as usize).max(1);
-    if values[0].len() < LEAST_ROWS {
-        return Ok(None);
-    }
-    let (mut bounds, mut centre) = (RowBox::empty(), [0.0; 3]);
-    for (axis, values) in values.iter_mut().enumerate() {
-        values.sort_unstable_by(f64::total_cmp);
-        (bounds.min[axis], bounds.max[axis]) = (values[cut], values[values.len() - 1 - cut]);
-        centre[axis] = values[values.len() / 2];
-    }
-    Ok(Some(Middle { bounds, centre }))
+    Ok(Middle::of(places))
 }

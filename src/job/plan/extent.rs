@@ -49,7 +49,7 @@ impl Extent {
         (0..3).any(is_too_wide)
     }
 
-    fn around(boxes: Vec<Option<SourceBox>>, options: &InputOptions) -> Extent {
+    pub(crate) fn around(boxes: Vec<Option<SourceBox>>, options: &InputOptions) -> Extent {
         let mut extent = Extent { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3], boxes };
         for [min, max] in extent.boxes.iter().flatten() {
             for axis in 0..3 {
@@ -86,7 +86,7 @@ impl Extent {
 /// Returns the box of a source by its header, or by its points if the first of them show that the header is wrong.
 fn header_box(source: &Source, options: &InputOptions) -> Result<Option<SourceBox>> {
     // Every row of a text has been looked at.
-    if source.format == FileFormat::Text {
+    if source.format == FileFormat::Text || source.measured().is_some() {
         return Ok(source.wanted_box());
     }
     let header = [source.min, source.max];
@@ -105,7 +105,7 @@ fn header_box(source: &Source, options: &InputOptions) -> Result<Option<SourceBo
 }
 
 /// The number of raw steps in a step of the measurement: every raw integer then lies within reach of the lattice.
-const MEASURE: i64 = 16;
+pub(crate) const MEASURE: i64 = 16;
 
 /// The records by which the header of a file with an index is judged. They lie all over the area, because they are those of the index's
 /// root, and more of them would be read whatever the bounds.
@@ -114,21 +114,11 @@ const SAMPLED_RECORDS: u64 = 4096;
 /// Returns the box of the points that have a class and a return that the job wants, among the first `records` records of each of `chunks`,
 /// to within [`MEASURE`] raw steps; `None` without a point.
 fn measure(source: &Source, options: &InputOptions, chunks: Range<usize>, records: u64) -> Result<Option<SourceBox>> {
-    if source.format == FileFormat::Text {
+    if source.format == FileFormat::Text || source.measured().is_some() {
         return Ok(source.wanted_box());
     }
-    let map = |axis: &Axis| AxisMap::new(axis.offset, axis.scale, axis.offset, axis.scale.checked_mul(MEASURE.into())?);
-    let [Some(x), Some(y), Some(z)] = source.axes.each_ref().map(map) else {
+    let Some(rules) = measuring_rules(source, options, [MEASURE; 3]) else {
         return Ok(Some([source.min, source.max]));
-    };
-    let rules = PointRules {
-        maps: [x, y, z],
-        classes: options.kept_classes(),
-        returns: options.kept_returns(),
-        bounds: None,
-        first_order: 0,
-        numbered: false,
-        fields: OptionalFields::default(),
     };
     let union = |a: Option<Bounds<3>>, b| a.into_iter().chain(b).reduce(Bounds::union);
     let measure_chunk = |chunk| {
@@ -146,6 +136,24 @@ fn measure(source: &Source, options: &InputOptions, chunks: Range<usize>, record
     let value = |axis: usize, steps: i32| source.axes[axis].value(steps as i64 * MEASURE);
     let corner = |corner: [i32; 3]| [0, 1, 2].map(|axis| value(axis, corner[axis]));
     Ok(found.map(|bounds| [corner(bounds.min), corner(bounds.max)]))
+}
+
+/// Returns the rules for the points that have a class and a return that the job wants, wherever they lie, on a lattice that has one step
+/// for so many `steps` of each axis, and the offsets of the axes; `None` if these have too many digits.
+pub(crate) fn measuring_rules(source: &Source, options: &InputOptions, steps: [i64; 3]) -> Option<PointRules> {
+    let map = |axis: usize| {
+        let Axis { offset, scale } = source.axes[axis];
+        AxisMap::new(offset, scale, offset, scale.checked_mul(steps[axis].into())?)
+    };
+    Some(PointRules {
+        maps: [map(0)?, map(1)?, map(2)?],
+        classes: options.kept_classes(),
+        returns: options.kept_returns(),
+        bounds: None,
+        first_order: 0,
+        numbered: false,
+        fields: OptionalFields::default(),
+    })
 }
 
 /// Returns `step` as a floating-point number.

@@ -3,7 +3,7 @@
 //! One point of noise, or a header with a wrong greatest height, must not give all of a terrain one colour. So a sample of the points
 //! decides. It is the same for a job of one part and of several, whose tiles are coloured before the last point is read.
 
-use crate::geometry::Site;
+use crate::geometry::{Bounds, Site, bounds_of};
 use crate::input::{DecodedChunks, Extremes, OptionalFields, PointCounts, PointRules, Source};
 use crate::output::color::HeightRange;
 use crate::{Result, interrupt};
@@ -25,6 +25,9 @@ const LEAST_POINTS: usize = 256;
 
 /// One point of so many may be noise, at either end.
 const NOISE: usize = 1000;
+
+/// One point of so many lies beyond either end of the middle.
+const TAIL: usize = 20;
 
 /// A sample of the heights of the points that a job keeps.
 pub(crate) struct HeightSample {
@@ -114,6 +117,26 @@ impl HeightSample {
         Ok(HeightSample { points, heights, places, seen: counts.read - counts.not_decoded, records, counts, by_file })
     }
 
+    /// Returns the lattice box of the points; `None` without any.
+    pub(crate) fn bounds(&self) -> Option<Bounds<3>> {
+        let positions: Vec<Site> = self.points.iter().map(|(position, _)| *position).collect();
+        let plane = bounds_of(&positions)?;
+        let (low, high) = (*self.heights.first()?, *self.heights.last()?);
+        Some(Bounds { min: [plane.min[0], plane.min[1], low], max: [plane.max[0], plane.max[1], high] })
+    }
+
+    /// Returns the length of the middle of the points, nine in ten, on its longer side in x and y; `None` if there are too few to tell.
+    pub(crate) fn middle(&self) -> Option<u64> {
+        let count = self.points.len();
+        let length = |axis: usize| {
+            let mut values: Vec<i32> = self.points.iter().map(|(position, _)| position[axis]).collect();
+            values.sort_unstable();
+            let cut = count / TAIL;
+            u64::from(values[count - 1 - cut].abs_diff(values[cut]))
+        };
+        (count >= LEAST_POINTS).then(|| length(0).max(length(1)))
+    }
+
     /// Returns the heights that colours span, without what may be noise; `None` if the sample has too few points to tell. Where the
     /// sample did not see all records, the range is as much wider as a slope would go on behind the last of them, but reaches no farther
     /// than `claimed`.
@@ -138,7 +161,7 @@ impl HeightSample {
 }
 
 /// Tells whether a source may have points within `bounds`, as far as it claims.
-fn may_reach(source: &Source, bounds: Option<[f64; 4]>) -> bool {
+pub(crate) fn may_reach(source: &Source, bounds: Option<[f64; 4]>) -> bool {
     let (Some([xmin, ymin, xmax, ymax]), Some([min, max])) = (bounds, source.claimed_rectangle()) else { return true };
     min[0] <= xmax && min[1] <= ymax && max[0] >= xmin && max[1] >= ymin
 }

@@ -60,6 +60,9 @@ pub struct Plan {
     /// The breaklines; `None` without any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub breaklines: Option<PlannedBreaklines>,
+    /// A sentence about a few points that stretch the area, if there are some.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stretch: Option<String>,
     /// What the user should know about the inputs. [`Plan::all_warnings`] adds what there is to know about the options.
     pub warnings: Warnings,
 }

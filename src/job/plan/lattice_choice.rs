@@ -19,6 +19,9 @@ pub struct LatticeCoarsening {
     /// Whether the job is one part whatever its size, because a header proved wrong.
     #[serde(default)]
     pub one_part: bool,
+    /// Whether every point is looked at before the lattice is chosen, because some lie far outside what headers claim.
+    #[serde(default)]
+    pub far_points: bool,
 }
 
 /// What a lattice is to be like.

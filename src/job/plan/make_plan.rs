@@ -8,20 +8,22 @@ use crate::input::transform_sources::transform_sources;
 use crate::input::{Axis, CrsChoice, FileFormat, PointCounts, PointRules, Source, set_network_memory};
 use crate::job::options::JobOptions;
 use crate::job::plan::area_check::{CommonPlace, check_places};
+use crate::job::plan::area_hint::AreaHint;
 use crate::job::plan::breaklines::line_files::LineFiles;
 use crate::job::plan::breaklines::{CloudOfPlan, PlannedBreaklines, SystemOfPoints};
 use crate::job::plan::budget::network_memory;
 use crate::job::plan::common_crs::{common_crs, horizontal_unit};
 use crate::job::plan::doubtful_heights::refuse_doubtful_heights;
 use crate::job::plan::extent::{Extent, SourceBox, to_float};
+use crate::job::plan::far_points::extent_without_outliers;
 use crate::job::plan::height_range::HeightSample;
 use crate::job::plan::inputs::{check_missing_records, open_all};
 use crate::job::plan::job_plan::{Claims, Plan, PlannedInput, SkippedInput, decoded_records};
 use crate::job::plan::lattice_choice::{LatticeCoarsening, LatticeWish, choose_lattice, fineness};
 use crate::job::plan::other_unit::refuse_other_unit;
 use crate::job::plan::text_inputs::{
-    check_malformed_rows, farthest_row, leave_out_outliers, refuse_degrees, refuse_missing_classes,
-    refuse_missing_returns, row_choice, wanted_fields,
+    check_malformed_rows, farthest_row, refuse_degrees, refuse_missing_classes, refuse_missing_returns, row_choice,
+    wanted_fields,
 };
 use crate::output::color::HeightRange;
 use crate::output::frame::Frame;
@@ -145,6 +147,12 @@ fn try_plan(
     let (clipped, claimed_area) =
         (lattice_extent(&lattice, &extent, clip), claimed_area(&lattice, sources, &extent, clip.is_some()));
     let sample = HeightSample::take(sources, &rules, options.input.bounds.map(|bounds| bounds.0))?;
+    let hint = AreaHint { sources, options, extent: &extent, clipped, lattice: &lattice, wish: &wish };
+    if hint.shows_far_points(&sample) {
+        return try_plan(sources, options, LatticeCoarsening { far_points: true, ..coarsening });
+    }
+    let stretch = hint.stretch(&sample)?;
+    warnings.extend(stretch.clone());
     refuse_doubtful_heights(sources, &sample, &lattice, options)?;
     let place = CommonPlace { crs: &crs, metres, lattice: &lattice, extent: &extent, sample: &sample };
     check_places(sources, &place, &options.input, &mut warnings)?;
@@ -188,6 +196,7 @@ fn try_plan(
         frame,
         curvature: None,
         breaklines,
+        stretch,
         warnings,
     };
     Ok((plan, rules.into_iter().zip(claimed).collect()))
@@ -254,25 +263,6 @@ fn files_without_ground(sample: &HeightSample, options: &JobOptions) -> Option<S
 fn claimed_heights(lattice: &Lattice, extent: &Extent) -> [f64; 2] {
     let offset = lattice.offset[2].to_f64().unwrap_or(0.0);
     [extent.min[2], extent.max[2]].map(|z| (z - offset) / to_float(lattice.step(2)))
-}
-
-/// Returns the box of the sources. If no lattice holds all of it at the precision of the inputs or to a millimetre, and some rows of texts lie so far
-/// from all others that they are mistakes, these are left out, provided that this helps.
-fn extent_without_outliers(sources: &mut [Source], options: &JobOptions, wish: &LatticeWish) -> Result<Extent> {
-    sources.iter_mut().for_each(Source::keep_outliers);
-    let all = Extent::of(sources, &options.input, wish.metres[0])?;
-    let before = fineness(sources, &all, wish);
-    if before.is_meaningful() {
-        return Ok(all);
-    }
-    if leave_out_outliers(sources, options, before.is_useless())? {
-        let rest = Extent::of(sources, &options.input, wish.metres[0])?;
-        if fineness(sources, &rest, wish).is_better_than(&before) {
-            return Ok(rest);
-        }
-        sources.iter_mut().for_each(Source::keep_outliers);
-    }
-    Ok(all)
 }
 
 /// Returns the lattice box of `bounds`, for the size of the job. Which points lie within them, their raw integers decide. It is inside out

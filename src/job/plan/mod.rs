@@ -2,12 +2,14 @@
 //! written down and read back, so that every later step is a function of the plan, an index and the store.
 
 pub(crate) mod area_check;
+pub(crate) mod area_hint;
 pub mod breaklines;
 pub mod budget;
 pub mod common_crs;
 pub(crate) mod distinct_crs;
 pub(crate) mod doubtful_heights;
 pub mod extent;
+pub(crate) mod far_points;
 pub mod fingerprint;
 pub(crate) mod globe_system;
 pub(crate) mod height_range;
@@ -20,4 +22,7 @@ mod missing_attributes;
 pub(crate) mod named_files;
 pub mod no_points;
 mod other_unit;
+pub(crate) mod point_survey;
+pub(crate) mod rounded_box;
+pub(crate) mod stretch;
 pub(crate) mod text_inputs;

@@ -1,10 +1,13 @@
 //! The messages for jobs without a terrain. If no point is left, it says what became of the points, and where they lie if not within the
 //! bounds.
 
-use crate::Error;
 use crate::input::surface_doubts::no_ground;
-use crate::input::{FileFormat, PointCounts};
+use crate::input::{FileFormat, PointCounts, Source};
+use crate::job::plan::height_range::may_reach;
 use crate::job::plan::job_plan::Plan;
+use crate::job::plan::job_plan::decoded_records;
+use crate::job::plan::text_inputs::count;
+use crate::{Error, Result};
 
 /// A rectangle [xmin, ymin, xmax, ymax] in source units.
 type Rectangle = [f64; 4];
@@ -70,13 +73,39 @@ fn first_file(plan: &Plan) -> String {
 /// Returns the rectangle of all inputs, as far as their headers can be believed.
 fn box_of_inputs(plan: &Plan) -> Option<Rectangle> {
     let sources = plan.inputs.iter().map(|input| &input.source).filter(|source| source.records > 0);
-    let boxes = sources.map(|source| [source.min[0], source.min[1], source.max[0], source.max[1]]);
+    let boxes = sources.filter_map(Source::claimed_rectangle).map(|[min, max]| [min[0], min[1], max[0], max[1]]);
     boxes.reduce(|a, b| [a[0].min(b[0]), a[1].min(b[1]), a[2].max(b[2]), a[3].max(b[3])])
 }
 
 /// Returns whether the rectangle of all inputs is what headers say. Of texts it is that of their rows.
 fn are_from_headers(plan: &Plan) -> bool {
     plan.inputs.iter().any(|input| input.source.format != FileFormat::Text)
+}
+
+/// The most records of which a preflight reads all, only to know whether a point is left.
+const MOST_RECORDS: u64 = 1 << 24;
+
+/// Returns the error of a job that is bound to end without a point, if that is sure before it begins: no header reaches the bounds, or a
+/// sample has no point that the job keeps, and neither have all records.
+///
+/// # Errors
+/// Those of reading.
+pub(crate) fn nothing_will_be_left(plan: &Plan) -> Result<Option<Error>> {
+    if plan.sample.kept > 0 {
+        return Ok(None);
+    }
+    let inputs = || plan.inputs.iter().map(|input| (&input.source, &input.rules));
+    let bounds = plan.options.input.bounds.map(|bounds| bounds.0);
+    let (within, beyond): (Vec<_>, Vec<_>) = inputs().partition(|(source, _)| may_reach(source, bounds));
+    if within.iter().map(|(source, rules)| decoded_records(source, rules)).sum::<u64>() > MOST_RECORDS {
+        return Ok(None);
+    }
+    let out_of_bounds = beyond.iter().map(|(source, _)| source.records).sum();
+    let mut counts = PointCounts { read: out_of_bounds, out_of_bounds, ..PointCounts::default() };
+    for (source, rules) in within {
+        counts += count(source, rules)?;
+    }
+    Ok((counts.kept == 0).then(|| no_point_is_left(plan, &counts)))
 }
 
 fn compare(bounds: Rectangle, inputs: Rectangle, from_headers: bool) -> String {

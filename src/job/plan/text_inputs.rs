@@ -4,7 +4,7 @@ use crate::input::options::{InputOptions, OnBadFile, UnitChoice};
 use crate::input::surface::Surface;
 use crate::input::surface_doubts::no_column_of_classes;
 use crate::input::{
-    CrsChoice, CrsKind, FileFormat, KeptReturns, OptionalFields, Outliers, PointCounts, PointRules, RowChoice, Source,
+    CrsChoice, CrsKind, FileFormat, KeptReturns, OptionalFields, PointCounts, PointRules, RowChoice, Source,
     TextReading, Unit,
 };
 use crate::job::options::JobOptions;
@@ -20,7 +20,7 @@ pub(crate) fn row_choice(options: &JobOptions) -> RowChoice {
 
 /// Returns how the texts of a plan are read.
 pub(crate) fn text_reading(plan: &Plan) -> TextReading {
-    let sources = || plan.inputs.iter().map(|input| &input.source);
+    let sources = || plan.inputs.iter().map(|input| &input.source).filter(|source| source.format == FileFormat::Text);
     let OptionalFields { rgb, intensity } = wanted_fields(&plan.options);
     TextReading {
         colors: rgb,
@@ -114,24 +114,6 @@ pub(crate) fn refuse_missing_returns(sources: &[Source], options: &InputOptions)
     }
 }
 
-/// Leaves out the rows that lie so far from all others that they are mistakes: all of them if they are rare in the job, or else those of
-/// files in which they are rare. `even_among_few` tells whether one of a few rows may be one. Returns whether there are any.
-///
-/// # Errors
-/// [`Error::Io`] if a file cannot be read.
-pub(crate) fn leave_out_outliers(sources: &mut [Source], options: &JobOptions, even_among_few: bool) -> Result<bool> {
-    let choice = row_choice(options);
-    let (mut all, mut rows) = (Outliers::default(), 0);
-    for source in sources.iter_mut() {
-        all.add(source.leave_out_outliers(&choice)?);
-        rows += source.wanted_rows();
-    }
-    if !all.are_rare(rows, even_among_few) {
-        sources.iter_mut().filter(|source| source.has_frequent_outliers()).for_each(Source::keep_outliers);
-    }
-    Ok(sources.iter().any(|source| source.outliers() > 0))
-}
-
 /// Returns a warning about the row that lies farthest from the middle of its file, if it makes the lattice coarse: if it lies
 /// three quarters as far out as the job is wide, or farther: the outermost row of an even area lies half as far out. Files that lie far apart do so
 /// without such a row.
@@ -175,18 +157,19 @@ pub(crate) fn too_many_malformed(counts: &PointCounts, malformed: u64, records: 
     )
 }
 
-/// Checks the number of malformed rows, which is known of texts, so that `check` says what the job would say.
+/// Checks the number of malformed records, as far as it is known of texts, and of other files with outliers, so that `check` says what the
+/// job would say.
 ///
 /// # Errors
 /// [`Error::Input`] names the first file with too many.
 pub(crate) fn check_malformed_rows(sources: &[Source], rules: &[PointRules], options: &JobOptions) -> Result<()> {
     let input = &options.input;
     let fraction = input.max_malformed_fraction.0;
-    let is_text = |source: &&Source| source.format == FileFormat::Text;
+    let is_known = |source: &&Source| source.format == FileFormat::Text || source.outliers() > 0;
     let rows = |source: &Source| (source.known_malformed(), source.records);
     let all = sources.iter().map(rows).fold((0, 0), |(bad, records), more| (bad + more.0, records + more.1));
     for (source, rules) in
-        sources.iter().zip(rules).filter(|(source, _)| is_text(source) && source.known_malformed() > 0)
+        sources.iter().zip(rules).filter(|(source, _)| is_known(source) && source.known_malformed() > 0)
     {
         let (malformed, records) = if input.on_bad_file == OnBadFile::Skip { rows(source) } else { all };
         if malformed > allowed_malformed(fraction, records) {

@@ -13,6 +13,7 @@ use crate::job::plan::budget::workers;
 use crate::job::plan::job_plan::{Plan, SkippedInput};
 use crate::job::plan::lattice_choice::LatticeCoarsening;
 use crate::job::plan::make_plan::make_plan;
+use crate::job::plan::no_points::nothing_will_be_left;
 use crate::job::preflight::estimate::{self, DiskEstimate};
 use crate::job::preflight::input_places::check_inputs_are_no_results;
 use crate::job::preflight::kept_points::{KeptPoints, has_filter};
@@ -85,6 +86,15 @@ pub struct Preflight {
     pub surface_sample: SurfaceShares,
     /// What the user should know.
     pub warnings: Warnings,
+    /// Why no point is left, if that is sure.
+    #[serde(skip)]
+    pub nothing_is_left: Option<String>,
+    /// A sentence about a few points that stretch the area, if there are some.
+    #[serde(skip)]
+    pub stretch: Option<String>,
+    /// The longest triangle in metres that the lattice allows, if the area is longer: with a longer one, the job takes a coarser lattice.
+    #[serde(skip)]
+    pub longest_triangle: Option<f64>,
     /// The inputs that would be left out because they are bad. More may prove bad when they are read.
     pub skipped: Vec<SkippedInput>,
 }
@@ -110,11 +120,14 @@ pub fn look(options: &JobOptions) -> Result<(Preflight, Plan)> {
     check_height_offset(&plan)?;
     check_raster(&plan)?;
     let threads = workers(options, plan.records)?;
-    let preflight = if has_filter(&plan) {
+    let mut preflight = if has_filter(&plan) {
         closer_look(&plan, threads)?
     } else {
         Preflight::of(&plan, threads, KeptPoints::by_headers(&plan))
     };
+    if let Some(why) = nothing_will_be_left(&plan)? {
+        (preflight.kept, preflight.nothing_is_left) = (0, Some(why.to_string()));
+    }
     Ok((preflight, plan))
 }
 
@@ -179,6 +192,9 @@ impl Preflight {
             surface: surface_sample.estimate(options.input.mesh_of()),
             surface_sample,
             warnings,
+            nothing_is_left: None,
+            stretch: plan.stretch.clone(),
+            longest_triangle: longest_triangle(plan),
             skipped: plan.skipped.clone(),
         }
     }
@@ -190,16 +206,20 @@ impl Preflight {
     /// Checks that the machine has what the job needs.
     ///
     /// # Errors
-    /// [`Error::Io`] if nothing can be written to the output directory or its disk is too small, [`Error::Memory`] if too little
+    /// [`Error::NoTerrain`] if no point will be left, [`Error::Io`] if nothing can be written to the output directory or its disk is too small, [`Error::Memory`] if too little
     /// memory is free.
     pub fn passes(&self) -> Result<()> {
+        if let Some(why) = &self.nothing_is_left {
+            return Err(Error::NoTerrain(why.clone()));
+        }
         machine::check_writable(&self.output)?;
         if let Some(free) = self.disk_free.filter(|free| *free < self.disk) {
             let what = format!(
-                "the job takes about {} there, and {} are free or its own already{} (--force runs it anyway)",
+                "the job takes about {} there, and {} are free or its own already{}{} (--force runs it anyway)",
                 mebibytes(self.disk),
                 mebibytes(free),
-                self.earlier_results()
+                self.earlier_results(),
+                self.because_of_stretch()
             );
             return Err(Error::io("write to", &self.output)(io::Error::new(io::ErrorKind::StorageFull, what)));
         }
@@ -207,12 +227,18 @@ impl Preflight {
         match self.memory_free.filter(|free| *free < self.memory) {
             Some(free) => Err(Error::Memory(format!(
                 "the job takes about {}, and this machine has {} free; end other programs, or lower [limits] threads or \
-                 [triangulation] max_points_per_tile (--force runs it anyway)",
+                 [triangulation] max_points_per_tile{} (--force runs it anyway)",
                 mebibytes(self.memory),
-                mebibytes(free)
+                mebibytes(free),
+                self.because_of_stretch()
             ))),
             None => Ok(()),
         }
+    }
+
+    /// Returns what makes the area large, or nothing.
+    fn because_of_stretch(&self) -> String {
+        self.stretch.as_ref().map_or(String::new(), |stretch| format!("; {stretch}"))
     }
 
     /// Returns what a small disk would gain without the results of an earlier job, or nothing.
@@ -225,6 +251,13 @@ impl Preflight {
             ),
         }
     }
+}
+
+/// Returns the longest triangle in metres that glTF holds in steps of the lattice, if the area is longer.
+fn longest_triangle(plan: &Plan) -> Option<f64> {
+    let (longest, step) = (plan.frame.longest_triangle()[0], plan.frame.resolution_metres()[0]);
+    let is_longer = (0..2).any(|axis| plan.extent.extent(axis) as f64 * step > longest);
+    (is_longer && plan.options.input.resolution.step().is_none()).then_some(longest)
 }
 
 impl fmt::Display for Preflight {
@@ -248,7 +281,10 @@ impl fmt::Display for Preflight {
             row("raster", format!("about {} x {} cells", grouped(columns.into()), grouped(rows.into())))?;
         }
         row("area", format!("{:.1} x {:.1} {}", self.size[0], self.size[1], self.unit))?;
-        row("lattice step", format!("{} (z {})", self.resolution[0], self.resolution[1]))?;
+        let coarser = self.longest_triangle.map_or(String::new(), |longest| {
+            format!(", coarser in x and y if the mesh has a triangle longer than {longest:.0} m")
+        });
+        row("lattice step", format!("{} (z {}){coarser}", self.resolution[0], self.resolution[1]))?;
         row("crs", self.crs.clone().unwrap_or_else(|| "none".into()))?;
         for transformation in &self.transformations {
             row("transformed", transformation.to_string())?;

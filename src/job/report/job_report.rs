@@ -8,7 +8,7 @@ use crate::input::options::InputOptions;
 use crate::input::surface::SurfaceShares;
 use crate::input::surface_doubts::unclear_returns;
 use crate::input::transformation::{Transformation, transformations};
-use crate::input::{NetworkTraffic, PointCounts, TextReading};
+use crate::input::{NetworkTraffic, PlausiblePoints, PointCounts, TextReading};
 use crate::job::levels::make_level::LevelStats;
 use crate::job::machine;
 use crate::job::mesh::hull_rule::HullRule;
@@ -122,6 +122,9 @@ pub struct Report {
     pub input: InputOptions,
     /// How texts were read.
     pub texts: TextReading,
+    /// The points of binary files of which some were left out because they lie far from all others, by file.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub plausible_points: Vec<PlausiblePoints>,
     /// Tells the content of all inputs from that of others, whatever their names and their order: a hash of sizes and samples.
     pub inputs_fingerprint: String,
     /// Tells the options, as far as results depend on them, and the version of the program from others.
@@ -297,6 +300,7 @@ impl Report {
             warnings,
             input: InputOptions { files: Vec::new(), ..plan.options.input.clone() },
             texts: text_reading(plan),
+            plausible_points: plan.inputs.iter().filter_map(|input| input.source.plausible_points()).collect(),
             inputs_fingerprint: parts.identity.inputs,
             options_fingerprint: Some(parts.identity.options),
             job_fingerprint: Some(parts.identity.job),

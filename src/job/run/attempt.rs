@@ -9,6 +9,7 @@ use crate::job::options::{JobOptions, RunOptions};
 use crate::job::partition::parts::Parts;
 use crate::job::partition::result::Partition;
 use crate::job::plan::budget::workers;
+use crate::job::plan::far_points::are_there_far_points;
 use crate::job::plan::fingerprint::{Fingerprint, JobHeader};
 use crate::job::plan::job_plan::Plan;
 use crate::job::plan::lattice_choice::LatticeCoarsening;
@@ -117,8 +118,18 @@ pub(crate) fn run_until_it_fits(
     let job =
         JobRequest { options, run, triangulator, directory, fingerprint, modified, clock, walk, work, submission };
     let mut coarsening = coarsening_of(&job.directory, earlier.as_ref(), &job.fingerprint)?;
+    let mut has_looked = coarsening.far_points;
     loop {
         let outcome = attempt(&job, coarsening, earlier.take(), lock.take());
+        // A few points that are mistakes must not cost all others their precision.
+        if matches!(outcome, Err(Error::NeedsOnePart | Error::TooFine { .. })) && !has_looked {
+            has_looked = true;
+            coarsening.far_points = on_threads(workers(options, 0)?, || are_there_far_points(options, coarsening))?;
+            if coarsening.far_points {
+                run.progress.note("some points lie far from all others; starting again without them");
+                continue;
+            }
+        }
         // Only the finished mesh knows its longest triangle. To round in advance would often round for nothing.
         if let (Err(Error::NeedsOnePart), false) = (&outcome, coarsening.one_part) {
             run.progress.note("what was read contradicts the header of a file; starting again without parts");

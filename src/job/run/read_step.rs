@@ -3,6 +3,7 @@
 use crate::Result;
 use crate::job::partition::read::read_points;
 use crate::job::partition::result::Partition;
+use crate::job::plan::area_hint::stretch_of_read;
 use crate::job::plan::job_plan::{Plan, SkippedInput};
 use crate::job::plan::make_plan::replan_without;
 use crate::job::progress::stage::JobProgress;
@@ -33,6 +34,9 @@ pub(crate) fn read(run: &RunContext, mut plan: Plan, earlier: Option<Partition>)
         }
         if is_read {
             run.add_stage(stats);
+            if let Some(bounds) = partition.summary.bounds {
+                partition.summary.counts.notes.extend(stretch_of_read(&plan, bounds)?);
+            }
             partition.skipped.clone_from(&plan.skipped);
             let files = vec![plan.write(&run.directory.plan())?];
             let output = StepOutput { files, ..StepOutput::new((), vec![partition.save(run.store)?]) };

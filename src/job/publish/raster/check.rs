@@ -28,7 +28,10 @@ pub(crate) fn grid_over(plan: &Plan, options: &RasterOptions, bounds: Bounds<2>)
 /// [`Error::Config`] if it does not.
 pub fn check_raster(plan: &Plan) -> Result<Option<RasterGrid>> {
     let Some(options) = &plan.options.output.raster else { return Ok(None) };
-    grid_over(plan, options, plan.extent).map(Some)
+    match (grid_over(plan, options, plan.extent), &plan.stretch) {
+        (Err(Error::Config(what)), Some(stretch)) => Err(Error::Config(format!("{what}; {stretch}"))),
+        (grid, _) => grid.map(Some),
+    }
 }
 
 /// Returns the cells of the raster of a job that [`check_raster`] has let pass, as far as the headers tell.

@@ -1,0 +1,171 @@
+//! A hint about a few points that stretch an area to many times its size: they cost room in a raster, and often precision.
+
+use crate::Result;
+use crate::input::options::InputOptions;
+use crate::input::{RowBox, Source};
+use crate::job::plan::extent::SourceBox;
+use crate::job::plan::point_survey::{PointSurvey, SplitBoxes, at_places, box_around};
+use crate::job::plan::rounded_box::rounded;
+
+/// An area is stretched if it is so many times as long as without a few points, and as the middle of its points. Strips, mosaics and
+/// scans that thin out are not.
+const STRETCHED: f64 = 6.0;
+
+/// A point lies far out if it is so many times the size of the middle of its file away from that.
+const FAR_OUT: f64 = 3.0;
+
+/// At most one point in so many stretches an area. If there are more, they are a part of it.
+const FEW: u64 = 1000;
+
+/// The most records of files that are all looked at only for the sake of the hint.
+const MOST_RECORDS: u64 = 1 << 24;
+
+/// Which points are told from which others.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Hint {
+    /// A few that lie far out in x and y.
+    Few,
+    /// All that are not among the majority of their file, because the area is too wide or too high for the lattice.
+    Many,
+}
+
+impl Hint {
+    /// Returns the box outside which points of a file lie far out.
+    fn body(self, survey: &PointSurvey) -> Result<Option<RowBox>> {
+        let around = |bounds: RowBox, times: f64, upwards: f64| {
+            let size = |axis: usize| bounds.max[axis] - bounds.min[axis];
+            let wide = size(0).max(size(1));
+            let margin = [times * wide, times * wide, upwards * wide.max(size(2))];
+            let beside = |corner: [f64; 3], side: f64| [0, 1, 2].map(|axis| corner[axis] + side * margin[axis]);
+            RowBox { min: beside(bounds.min, -1.0), max: beside(bounds.max, 1.0) }
+        };
+        Ok(match self {
+            Hint::Few => survey.middle()?.map(|middle| around(middle.bounds, FAR_OUT, f64::INFINITY)),
+            Hint::Many => majority(&survey.sample()?).map(|bounds| around(bounds, FAR_OUT, FAR_OUT)),
+        })
+        .map(|body| body.filter(|body| body.min[0] < body.max[0]))
+    }
+
+    /// Tells whether so few points stretch the area so much that a user should know.
+    fn is_worth_it(self, found: &SplitBoxes) -> bool {
+        let (Some([min, max]), Some(all)) = (found.within.1, found.all()) else { return false };
+        let size = |[min, max]: SourceBox, axis: usize| max[axis] - min[axis];
+        let wide = size([min, max], 0).max(size([min, max], 1));
+        let grows = |axis: usize| size(all, axis) > STRETCHED * if axis < 2 { wide } else { wide.max(max[2] - min[2]) };
+        let [few, rest] = [found.outside.0, found.within.0];
+        match self {
+            Hint::Few => few > 0 && few <= rest / FEW && (grows(0) || grows(1)),
+            Hint::Many => few > 0 && few < rest && (0..3).any(grows),
+        }
+    }
+}
+
+/// Returns a sentence about points of the `sources` that stretch the area, if there are some. `claims` are the boxes of the sources, if they
+/// can be believed.
+///
+/// # Errors
+/// Those of reading.
+pub(crate) fn stretch_hint<'a>(
+    sources: impl Iterator<Item = &'a Source>,
+    options: &InputOptions,
+    claims: Option<&[Option<SourceBox>]>,
+    hint: Hint,
+) -> Result<Option<String>> {
+    let (mut found, mut unread) = (SplitBoxes::default(), Vec::new());
+    for (index, source) in sources.enumerate() {
+        let Some(survey) = PointSurvey::new(source, options) else { continue };
+        let claim = claims.map(|claims| claims[index]);
+        let body = hint.body(&survey)?;
+        match (body, claim) {
+            (_, Some(None)) => {}
+            (Some(body), Some(Some(claim))) if survey.holds_claim(&body, claim) => {
+                found.add(SplitBoxes { within: (source.records, Some(claim)), outside: (0, None) });
+            }
+            (Some(body), _) => unread.push((survey, body)),
+            (None, Some(Some(claim))) => {
+                found.add(SplitBoxes { within: (source.records, Some(claim)), outside: (0, None) });
+            }
+            (None, None) => {}
+        }
+    }
+    let is_sample = unread.iter().map(|(survey, _)| survey.records()).sum::<u64>() > MOST_RECORDS;
+    for (survey, body) in &unread {
+        found.add(if is_sample { at_places(&survey.sample()?, body) } else { survey.split_at(body)? });
+    }
+    Ok(hint.is_worth_it(&found).then(|| sentence(&found, is_sample)).flatten())
+}
+
+/// Returns the shortest ranges that have six in ten of the places, axis by axis; `None` without places.
+fn majority(places: &[[f64; 3]]) -> Option<RowBox> {
+    let count = (places.len() * 6).div_ceil(10);
+    let shortest = |axis: usize| {
+        let mut values: Vec<f64> = places.iter().map(|place| place[axis]).collect();
+        values.sort_unstable_by(f64::total_cmp);
+        let ranges = values.windows(count).map(|window| [window[0], window[count - 1]]);
+        ranges.min_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))
+    };
+    let [x, y, z] = if places.is_empty() { return None } else { [shortest(0)?, shortest(1)?, shortest(2)?] };
+    box_around([[x[0], y[0], z[0]], [x[1], y[1], z[1]]].into_iter()).map(|[min, max]| RowBox { min, max })
+}
+
+fn sentence(found: &SplitBoxes, is_sample: bool) -> Option<String> {
+    let (points, rest) = found.within;
+    let (rest, all, few) = (rest?, found.all()?, found.outside.0);
+    let share = (points as f64 / (points + few) as f64 * 10_000.0).floor() / 100.0;
+    let of = if is_sample { "of a sample of the points" } else { "of the points" };
+    let size = |[min, max]: SourceBox, axis: usize| max[axis] - min[axis];
+    let is_wider = (0..2).any(|axis| size(all, axis) > 2.0 * size(rest, 0).max(size(rest, 1)));
+    let [x, y, z] = [0, 1, 2].map(|axis| rounded([rest[0][axis], rest[1][axis]]));
+    let others = if few == 1 { "1 point stretches".into() } else { format!("{few} points stretch") };
+    Some(match is_wider {
+        true => format!(
+            "{share} % {of} lie within {:.0} x {:.0} units; {others} the area to {:.0} x {:.0}: to leave them out, set [input] bounds = \
+             [{}, {}, {}, {}]",
+            size(rest, 0),
+            size(rest, 1),
+            size(all, 0),
+            size(all, 1),
+            x[0],
+            y[0],
+            x[1],
+            y[1]
+        ),
+        false => format!(
+            "{share} % {of} have heights from {} to {}; {others} the heights to {:.0} units, from {} to {}: correct or remove them",
+            z[0],
+            z[1],
+            size(all, 2),
+            all[0][2],
+            all[1][2]
+        ),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_majority_is_the_shortest_range() {
+        let places: Vec<[f64; 3]> = (0..10).map(|i| [f64::from(i * i), f64::from(100 - i * i), 7.0]).collect();
+        let found = majority(&places).unwrap();
+        assert_eq!((found.min, found.max), ([0.0, 75.0, 7.0], [25.0, 100.0, 7.0]));
+        assert!(majority(&[]).is_none());
+    }
+
+    #[test]
+    fn a_few_far_points_are_told_and_a_part_of_the_terrain_is_not() {
+        let found = |few: u64, far: f64| SplitBoxes {
+            within: (100_000, Some([[0.0; 3], [80.0, 70.0, 9.0]])),
+            outside: (few, Some([[far, 0.0, 0.0], [far, 0.0, 9.0]])),
+        };
+        for (few, far, expected) in [(12, 5000.0, true), (1, 481.0, true), (1, 479.0, false), (101, 5000.0, false)] {
+            assert_eq!(Hint::Few.is_worth_it(&found(few, far)), expected, "{few} at {far}");
+        }
+        assert_eq!(
+            sentence(&found(12, 5000.0), false).unwrap(),
+            "99.98 % of the points lie within 80 x 70 units; 12 points stretch the area to 5000 x 70: to leave them out, set [input] \
+             bounds = [0.0, 0.0, 80.0, 70.0]"
+        );
+    }
+}
