@@ -17,10 +17,8 @@ fn twice(ring: &[[f64; 2]]) -> Ring {
 /// Runs a job with these lakes, each of which has its rings. Returns what is said, and how many points are left in the square and in the
 /// island.
 fn run(survey: &Survey, lakes: &[&[Ring]]) -> (Said, [usize; 2]) {
-    let area = |rings: &&[Ring]| {
-        let rings = rings.iter().map(|ring| ring.iter().map(|[x, y]| [*x, *y, 5.0]).collect());
-        ("lake", rings.collect::<Vec<Vec<[f64; 3]>>>())
-    };
+    let with_height = |ring: &Ring| ring.iter().map(|[x, y]| [*x, *y, 5.0]).collect::<Vec<[f64; 3]>>();
+    let area = |rings: &&[Ring]| ("lake", rings.iter().map(with_height).collect::<Vec<_>>());
     let features = Features::areas(&lakes.iter().map(area).collect::<Vec<_>>());
     let job = survey.job_with(&[geojson(survey.folder(), "lakes.geojson", &features)], "kind = \"lake\"");
     let said = job.run();
@@ -31,9 +29,10 @@ fn run(survey: &Survey, lakes: &[&[Ring]]) -> (Said, [usize; 2]) {
     let mesh = Mesh::of(&job);
     let steps = |ring: [[f64; 2]; 4]| ring.map(|place| place.map(|value| (value * 100.0) as i64));
     let (square, island) = (steps(SQUARE), steps(ISLAND));
-    let points = mesh.vertices.iter().filter(|p| !mesh.ends.contains(*p));
-    let (on_island, rest): (Vec<_>, Vec<_>) = points.partition(|p| inside(&island, **p));
-    (said, [rest.into_iter().filter(|p| inside(&square, **p)).count(), on_island.len()])
+    let points: Vec<[i64; 3]> = mesh.vertices.iter().filter(|p| !mesh.ends.contains(*p)).copied().collect();
+    let within = |ring: &[[i64; 2]]| points.iter().filter(|p| inside(ring, **p)).count();
+    let on_island = within(&island);
+    (said, [within(&square) - on_island, on_island])
 }
 
 #[test]
