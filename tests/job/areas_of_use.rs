@@ -126,7 +126,7 @@ fn a_file_elsewhere_is_a_bad_file() {
 }
 
 #[test]
-fn systems_without_a_code_have_the_area_of_their_projection() {
+fn systems_without_a_code_have_the_area_of_their_datum_and_projection() {
     let folder = tempfile::tempdir().unwrap();
     let zone_32 = r#"PROJCS["ETRS_1989_UTM_Zone_32N",GEOGCS["GCS_ETRS_1989",DATUM["D_ETRS_1989",
         SPHEROID["GRS_1980",6378137.0,298.257222101]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],
