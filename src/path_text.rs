@@ -79,7 +79,8 @@ pub(crate) fn all_shown<S: Serializer>(paths: &[PathBuf], serializer: S) -> Resu
     serializer.collect_seq(paths.iter().map(|path| path.display().to_string()))
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
+#[cfg(unix)]
 mod tests {
     use super::*;
     use std::os::unix::ffi::OsStrExt;
