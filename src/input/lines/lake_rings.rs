@@ -42,7 +42,7 @@ pub(super) fn simplified(ring: Ring) -> Ring {
         return Vec::new();
     }
     let mut places = ring.clone();
-    merge_repeated(&mut places, |next, before| is_same(next, before));
+    merge_repeated(&mut places, is_same);
     let (count, period) = (without_spikes(places.clone()).len(), period(&places));
     if count == places.len() && period == places.len() {
         return ring;

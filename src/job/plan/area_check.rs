@@ -146,7 +146,7 @@ impl Ways {
 
 /// The way from a system to longitude and latitude.
 enum ToDegrees {
-    Computed(CrsTransform),
+    Computed(Box<CrsTransform>),
     /// For maps that this program does not compute itself.
     Library(Box<Globe>),
 }
@@ -154,7 +154,7 @@ enum ToDegrees {
 impl ToDegrees {
     fn of(crs: &Crs) -> Option<ToDegrees> {
         if let Ok(way) = CrsTransform::to_degrees(crs) {
-            return Some(ToDegrees::Computed(way));
+            return Some(ToDegrees::Computed(Box::new(way)));
         }
         let metres = crs.metres_per_unit()?;
         let globe = Globe::new(globe_system(crs, metres).ok()?, metres, Geoid::open(None).ok()?).ok()?;

@@ -91,7 +91,7 @@ fn what_encloses_nothing_or_is_no_area_is_named() {
     let mut same = square.clone();
     same.reverse();
     for hole in [square.clone(), same, twice(&square)] {
-        let (said, _) = run(&survey, &[&[island.clone()], &[square.clone(), hole]]);
+        let (said, _) = run(&survey, &[std::slice::from_ref(&island), &[square.clone(), hole]]);
         said.refused(3, &["lakes.geojson: feature 2 has a hole that is the same as its outline, at (500040, 4000040)"]);
     }
     let (said, _) = run(&survey, &[&[square], &[island]]);

@@ -97,7 +97,7 @@ impl Judge<'_> {
         let zeros = sampled().filter(|vertex| self.terrain.is_zero(vertex)).count();
         let count = sampled().filter(|vertex| vertex.z.is_some()).count();
         if zeros == count {
-            return (beyond.abs() > self.terrain.from_metres(SHORE)).then(|| {
+            return (beyond.abs() > self.terrain.in_height_unit(SHORE)).then(|| {
                 format!(
                     "all its heights are 0, where the middle one of the points around is {}; if it has none, set heights = \"points\" in \
                      [[breaklines]] to take them from the points around",
@@ -106,7 +106,7 @@ impl Judge<'_> {
             });
         }
         let slack = median(pairs.iter().map(|(_, around)| around.relief() + around.reach))?;
-        let is_far = beyond.abs() > self.terrain.from_metres(OTHER_ZERO) + slack && zeros < count.div_ceil(2);
+        let is_far = beyond.abs() > self.terrain.in_height_unit(OTHER_ZERO) + slack && zeros < count.div_ceil(2);
         is_far.then(|| {
             let side = if beyond > 0.0 { "above" } else { "below" };
             format!(
@@ -118,17 +118,17 @@ impl Judge<'_> {
 
     /// Returns the units in which the heights of a file and those of the points seem to be, if these differ.
     fn other_unit(&self, pairs: &[Pair]) -> Option<OtherUnit> {
-        let metres_z = self.terrain.from_metres(1.0).recip();
+        let metres_z = self.terrain.in_height_unit(1.0).recip();
         let foot = if Unit::from_metres(Some(metres_z)) == Unit::UsFoot { Unit::US_FOOT } else { Unit::FOOT };
         let apart = |factor: f64| median(pairs.iter().map(move |(z, around)| (z * factor - around.middle).abs()));
         let shift = median(pairs.iter().map(|(z, around)| z - around.middle))?;
         let shifted = median(pairs.iter().map(|(z, around)| (z - around.middle - shift).abs()))?;
         let as_written = apart(1.0)?;
-        let is_more_than = |value: f64, metres: f64| value > self.terrain.from_metres(metres);
+        let is_more_than = |value: f64, metres: f64| value > self.terrain.in_height_unit(metres);
         let fits = |factor: f64| {
             let converted = apart(factor)?;
             // Heights from another zero fit better when they are shifted.
-            let is_shifted = converted > 2.0 * shifted.max(self.terrain.from_metres(LEAST_RISE));
+            let is_shifted = converted > 2.0 * shifted.max(self.terrain.in_height_unit(LEAST_RISE));
             let rises = is_more_than(shifted, LEAST_RISE) && shifted > TIMES_NEARER * converted;
             let is_apart = is_more_than(as_written, LEAST_APART) || rises;
             (as_written > TIMES_NEARER * converted && !is_shifted && is_apart).then_some(())
@@ -165,8 +165,8 @@ impl Judge<'_> {
     fn doubtful_vertex<'f>(&self, feature: &'f Feature) -> Option<(&'f Vertex, Around)> {
         let vertices = || feature.paths.iter().flatten();
         let is_all_zero = vertices().all(|vertex| vertex.z.is_none() || self.terrain.is_zero(vertex));
-        let from_zero = self.terrain.from_metres(FROM_ZERO[usize::from(is_all_zero)]);
-        let spike = self.terrain.from_metres(SPIKE);
+        let from_zero = self.terrain.in_height_unit(FROM_ZERO[usize::from(is_all_zero)]);
+        let spike = self.terrain.in_height_unit(SPIKE);
         let zeros = vertices().filter(|vertex| self.terrain.is_zero(vertex));
         let spikes = feature.paths.iter().flat_map(|path| spikes(path, self.terrain.steps(spike)));
         let mut candidates = zeros

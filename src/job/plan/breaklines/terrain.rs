@@ -54,7 +54,7 @@ impl<'a> SampledTerrain<'a> {
     }
 
     /// Returns so many metres in the unit of heights.
-    pub(super) fn from_metres(&self, metres: f64) -> f64 {
+    pub(super) fn in_height_unit(&self, metres: f64) -> f64 {
         metres / self.metres[1]
     }
 
