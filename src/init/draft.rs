@@ -122,5 +122,28 @@ pub(crate) fn options_of(text: &str, folder: &Path) -> Result<JobOptions> {
 
 /// Returns a text as TOML has it.
 pub(crate) fn quoted(text: &str) -> String {
-    toml::Value::from(text).to_string()
+    if !text.contains(char::is_control) {
+        return toml::Value::from(text).to_string();
+    }
+    // TOML allows some control characters as they are, and a terminal would obey them.
+    let sign = |c: char| match c {
+        '"' | '\\' => format!("\\{c}"),
+        c if c.is_control() => format!("\\u{:04X}", u32::from(c)),
+        c => c.to_string(),
+    };
+    format!("\"{}\"", text.chars().map(sign).collect::<String>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_is_quoted_without_control_characters() {
+        for text in ["a", "it's \"b\"", "c\\d\t", "\u{1b}[31m\n\u{9b}\u{7f}\"'\\"] {
+            let value = quoted(text);
+            assert!(!value.contains(char::is_control), "{value:?}");
+            assert_eq!(format!("a = {value}").parse::<toml::Table>().unwrap()["a"].as_str(), Some(text));
+        }
+    }
 }
