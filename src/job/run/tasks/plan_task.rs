@@ -18,6 +18,7 @@ use crate::job::run::attempt::{coarsening_of, read_earlier};
 use crate::job::run::finished::known_submission;
 use crate::job::run::parts::write_plan;
 use crate::job::run::read_step::note_skipped;
+use crate::job::run::resume::EarlierRun;
 use crate::job::run::resume_parts::start_parts;
 use crate::job::run::tasks::planned_job::planned;
 use crate::threads::on_threads;
@@ -38,7 +39,13 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> Result<Option<Strin
     }
     check_results_are_ours(directory, options.output.page)?;
     let _lock = directory.lock()?;
-    let earlier = read_earlier(directory, run)?;
+    let mut earlier = read_earlier(directory, run)?;
+    if let Some(earlier) = earlier.as_mut()
+        && let Some(what) = modified_inputs(earlier, &fingerprint)
+    {
+        run.progress.note(&format!("changed since the interrupted run: {what}; starting over"));
+        earlier.forget();
+    }
     let coarsening = coarsening_of(directory, earlier.as_ref(), &fingerprint)?;
     let submission = run.submission.max(known_submission(directory)?);
     let header = JobHeader { fingerprint, coarsening, id: 0, submission, begun: Some(begun) };
@@ -67,6 +74,13 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> Result<Option<Strin
         start.journal.close();
         Ok(None)
     })
+}
+
+/// Returns the inputs that seem to have been modified since the same job was planned. Two changes within a second leave the same time in
+/// the fingerprint, and yet tasks refuse what was modified after the plan.
+fn modified_inputs(earlier: &EarlierRun, now: &Fingerprint) -> Option<String> {
+    let planned = earlier.header.as_ref().filter(|planned| now.since_planned(&planned.fingerprint).is_none())?;
+    now.modified_since(planned)
 }
 
 /// Tells whether the job with this fingerprint is planned. Nobody starts it over meanwhile.
