@@ -396,7 +396,12 @@ mod tests {
             (view("SELECT a.id, shape FROM a, json_each('[1, 2, 3]')"), "not authorized"),
             (view("SELECT load_extension('a.so') AS id, shape FROM a"), "load_extension"),
             (view(endless), "would have SQLite compute"),
-            (view(&doubled), "too big"),
+            (view(&doubled), "would have SQLite compute"),
+            (
+                format!("CREATE VIEW w AS SELECT id, sort || sort AS sort, shape FROM a; {}", view("SELECT id, shape, sort FROM w")),
+                "would have SQLite compute",
+            ),
+            (view("SELECT id, shape FROM a WHERE sort LIKE '%a%a%a%b'"), "not authorized"),
             (format!("{many}{}", view("SELECT a.id, a.shape FROM a, a AS b, a AS c")), "holds more than the file"),
             (
                 format!(

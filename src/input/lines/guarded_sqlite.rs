@@ -29,8 +29,8 @@ const STEPS: i32 = 10_000;
 const LEAST_STEPS: u64 = 10_000_000;
 const STEPS_PER_BYTE: u64 = 100;
 
-/// Functions that make nothing longer.
-const FUNCTIONS: [&str; 16] = [
+/// Functions that make nothing longer, and whose time follows from the length of their values.
+const FUNCTIONS: [&str; 15] = [
     "typeof",
     "row_number",
     "lower",
@@ -45,7 +45,6 @@ const FUNCTIONS: [&str; 16] = [
     "length",
     "min",
     "max",
-    "like",
     "count",
 ];
 
@@ -160,9 +159,17 @@ fn tables_of(file: &Connection) -> rusqlite::Result<Vec<TableName>> {
     Ok(tables)
 }
 
-/// Lets queries read these tables, and call no functions but harmless ones.
+/// Returns the views that join texts. No function does that, so the authorizer is not asked, and a single step of a query may copy a long text.
+fn joining_views(file: &Connection) -> rusqlite::Result<HashSet<String>> {
+    let query = "SELECT name FROM sqlite_schema WHERE type = 'view' AND instr(sql, '||') > 0";
+    file.prepare(query)?.query_map([], |row| row.get::<_, String>(0).map(|name| name.to_lowercase()))?.collect()
+}
+
+/// Lets queries read these tables, but for views that join texts, and call no functions but harmless ones.
 fn authorize(file: &mut Connection, tables: &[TableName]) -> rusqlite::Result<()> {
-    let known: HashSet<String> = tables.iter().map(|table| table.name.to_lowercase()).collect();
+    let joining = joining_views(file)?;
+    let mut known: HashSet<String> = tables.iter().map(|table| table.name.to_lowercase()).collect();
+    known.retain(|name| !joining.contains(name));
     let allows = move |context: AuthContext| {
         let is_allowed = match context.action {
             AuthAction::Select => true,
