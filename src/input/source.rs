@@ -299,7 +299,7 @@ impl Source {
         }
     }
 
-    /// Returns the number of points that the job wants, outliers included; of a binary file at which nobody has looked, that of all records.
+    /// Returns the number of points that the job wants, outliers included; of a binary file that was not measured, that of all records.
     pub fn wanted_rows(&self) -> u64 {
         match &self.points {
             PointData::Text(table) => table.wanted_rows(),

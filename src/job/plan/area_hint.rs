@@ -28,7 +28,7 @@ pub(crate) struct AreaHint<'a> {
 
 impl AreaHint<'_> {
     /// Tells whether points of the sample lie so far outside what the headers claim that a lattice for all points would be coarser, and
-    /// nobody has looked at all points yet.
+    /// not all points have been looked at yet.
     pub(crate) fn shows_far_points(&self, sample: &HeightSample) -> bool {
         let Some(found) = sample.bounds().filter(|_| !self.wish.coarsening.far_points) else { return false };
         let value = |corner: [i32; 3]| [0, 1, 2].map(|axis| self.lattice.world(axis, corner[axis]));
