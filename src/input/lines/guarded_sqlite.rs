@@ -87,7 +87,10 @@ pub(super) fn broken(path: &Path, error: &rusqlite::Error) -> Error {
         Some(ErrorCode::OutOfMemory) => {
             format!("takes more memory to read than its share of [limits] memory: raise that, or {how}")
         }
-        Some(ErrorCode::AuthorizationForStatementDenied) => {
+        // SQLite has no code for a function that is not allowed.
+        code if code == Some(ErrorCode::AuthorizationForStatementDenied)
+            || error.to_string().starts_with("not authorized") =>
+        {
             format!("would have SQLite compute what it holds ({error}): {how}")
         }
         _ => format!("is no GeoPackage that can be read: {error}"),

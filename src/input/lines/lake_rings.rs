@@ -13,8 +13,9 @@ const MOST_PAIRS: u64 = 20_000_000;
 /// The same of vertices of holes and edges of the outline around them, which take less time.
 const MOST_IN_HOLES: u64 = 1_000_000_000;
 
-/// The heights of the map at which it is looked for an inside, as parts of that of the outlines.
-const CUTS: [f64; 5] = [0.137, 0.293, 0.511, 0.677, 0.871];
+/// The heights of the map at which it is looked for an inside, as parts of that of the outlines. They are no round numbers, so that they meet
+/// no regular shape where its edges happen to cross.
+const CUTS: [f64; 5] = [0.145_898_034, 0.291_796_068, 0.527_864_045, 0.673_762_079, 0.854_101_966];
 
 /// An inside that is less, as part of the width, comes of rounding.
 const NOTHING: f64 = 1e-9;

@@ -138,6 +138,7 @@ fn check(counts: &PointCounts) {
             + counts.other_class
             + counts.other_return
             + counts.out_of_bounds
+            + counts.nodata
             + counts.malformed
             + counts.kept
     );
