@@ -52,7 +52,9 @@ impl Replacement {
             // Somebody may have put it there since the job wrote its own. The lists of results name that one by now.
             check_page_is_ours(results)?;
         }
-        let (known, mut found) = (KnownResults::of(results, waiting)?, Vec::new());
+        // The list that waits names every new result, also where somebody else's file has come into its place. That of the earlier job stays
+        // until all others are in place.
+        let (known, mut found) = (KnownResults::of(&[results])?, Vec::new());
         for name in names {
             let [place, waits] = [results, waiting].map(|folder| folder.directory().join(name));
             if exists(&waits)? {
