@@ -66,7 +66,7 @@ pub(super) struct Column {
 
 /// Opens the file of `size` bytes for reading, and returns its plain tables and its views. A job may take `memory` bytes.
 pub(super) fn open(path: &Path, size: u64, memory: u64) -> rusqlite::Result<(Connection, Vec<TableName>)> {
-    let escaped: String = path.to_string_lossy().chars().map(escape).collect();
+    let escaped: String = path.as_os_str().as_encoded_bytes().iter().map(escape).collect();
     let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     // `immutable` keeps SQLite from making files beside it, which may not be allowed.
     let mut file = Connection::open_with_flags(format!("file:{escaped}?immutable=1"), flags)?;
@@ -109,11 +109,11 @@ pub(super) fn columns_of(file: &Connection, table: &str) -> rusqlite::Result<Vec
     Ok(columns)
 }
 
-/// Writes a character as a URI takes it.
-fn escape(character: char) -> String {
-    match character {
-        '%' | '?' | '#' => format!("%{:02X}", u32::from(character)),
-        _ => character.into(),
+/// Writes a byte of a name as a URI takes it. Names need not be UTF-8.
+fn escape(byte: &u8) -> String {
+    match byte {
+        b'%' | b'?' | b'#' | 0x80.. => format!("%{byte:02X}"),
+        _ => char::from(*byte).into(),
     }
 }
 

@@ -421,7 +421,8 @@ mod tests {
         // An interrupted run has put this one in its place already, and another has written it again.
         fs::write(directory.results().tile(1), "new").unwrap();
         fs::write(directory.output().report(), "{}").unwrap();
-        let names = names(&["tiles/000000.glb", "tiles/000001.glb", "report.json"]);
+        write_list(directory.output(), &["tiles/000000.glb", "tiles/000001.glb"]);
+        let names = names(&["tiles/000000.glb", "tiles/000001.glb", "XXH128SUMS", "report.json"]);
         let error = directory.replace_results(&names).unwrap_err();
         assert_eq!(error.exit_code(), 2);
         assert!(error.to_string().contains("000000.glb came during the job, and no job wrote it"), "{error}");

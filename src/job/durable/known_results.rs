@@ -18,17 +18,17 @@ pub(crate) struct KnownResults {
 }
 
 impl KnownResults {
-    /// Returns what the lists name: that of the earlier job in `results`, which goes last but for the report, and that of the job whose
-    /// results are `waiting`.
+    /// Returns what the lists in these folders name, and the lists and the reports themselves.
     ///
     /// # Errors
     /// [`Error::Io`] if a list cannot be read.
-    pub(crate) fn of(results: &OutputFiles, waiting: &OutputFiles) -> Result<KnownResults> {
-        let own = [results.report(), results.checksums()];
-        let names = own.iter().filter_map(|path| path.strip_prefix(results.directory()).ok()).map(Path::to_path_buf);
-        let mut known = KnownResults { names: names.collect(), has_list: false };
-        for list in [results.checksums(), waiting.checksums()] {
-            known.add(&list)?;
+    pub(crate) fn of(folders: &[&OutputFiles]) -> Result<KnownResults> {
+        let mut known = KnownResults::default();
+        for folder in folders {
+            let own = [folder.report(), folder.checksums()];
+            let names = own.iter().filter_map(|path| path.strip_prefix(folder.directory()).ok());
+            known.names.extend(names.map(Path::to_path_buf));
+            known.add(&folder.checksums())?;
         }
         Ok(known)
     }

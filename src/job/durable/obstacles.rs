@@ -58,7 +58,7 @@ pub(crate) fn check_results_are_ours(directory: &JobDirectory, page: bool) -> Re
     let is_finished = has_own_report(&results.report())?;
     // Only a job that had passed this check took the lock and left it.
     let known = match is_finished || exists(&lock_file(directory.job()))? {
-        true => KnownResults::of(results, directory.output())?,
+        true => KnownResults::of(&[results, directory.output()])?,
         false => KnownResults::default(),
     };
     let Some(found) = first_unknown(directory, &known)? else { return Ok(()) };

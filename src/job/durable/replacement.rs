@@ -10,7 +10,7 @@ use crate::job::durable::known_results::KnownResults;
 use crate::job::durable::listing::{Leftovers, check_page_is_ours, exists};
 use crate::output::file_names::OutputFiles;
 use crate::{Error, Result, disk, fault};
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -52,8 +52,11 @@ impl Replacement {
             // Somebody may have put it there since the job wrote its own. The lists of results name that one by now.
             check_page_is_ours(results)?;
         }
-        let (known, mut found) = (KnownResults::of(results, waiting)?, Vec::new());
-        for name in names {
+        // The list that waits names every new result, also where somebody else's file has come into its place. That of the earlier job stays
+        // until all others are in place.
+        let (known, mut found) = (KnownResults::of(&[results])?, Vec::new());
+        // Neither what is done nor which file a message names may depend on the order of a hash set.
+        for name in names.iter().collect::<BTreeSet<_>>() {
             let [place, waits] = [results, waiting].map(|folder| folder.directory().join(name));
             if exists(&waits)? {
                 known.check_place(name, &waits, &place)?;
@@ -65,8 +68,6 @@ impl Replacement {
             }
         }
         found.retain(|(waits, _)| *waits != new_report);
-        // What is done must not depend on the order of a hash set.
-        found.sort_unstable();
         let new_list = waiting.checksums();
         let list = found.iter().position(|(waits, _)| *waits == new_list).map(|at| found.remove(at));
         let mut outdated = Vec::new();

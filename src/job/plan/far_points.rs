@@ -2,12 +2,11 @@
 //! for where they cost the others their precision.
 
 use crate::Result;
-use crate::input::options::{InputOptions, OnBadFile};
+use crate::input::options::InputOptions;
 use crate::input::{FileFormat, Outliers, Source};
 use crate::job::options::JobOptions;
 use crate::job::plan::extent::{Extent, SourceBox, to_float};
-use crate::job::plan::lattice_choice::{LatticeCoarsening, LatticeWish, fineness};
-use crate::job::plan::make_plan::make_plan;
+use crate::job::plan::lattice_choice::{LatticeWish, fineness};
 use crate::job::plan::point_survey::PointSurvey;
 use crate::job::plan::rounded_box::rounded;
 use crate::job::plan::text_inputs::row_choice;
@@ -43,20 +42,6 @@ pub(crate) fn extent_without_outliers(
         sources.iter_mut().for_each(Source::keep_outliers);
     }
     Ok(all)
-}
-
-/// Tells whether points lie so far from all others that they are mistakes, though no header says so: whether the plan would leave some
-/// out, or a file with them.
-///
-/// # Errors
-/// As [`make_plan`], if there are too many of them.
-pub(crate) fn are_there_far_points(options: &JobOptions, coarsening: LatticeCoarsening) -> Result<bool> {
-    let plan = make_plan(options, LatticeCoarsening { far_points: true, ..coarsening })?;
-    if plan.inputs.iter().any(|input| input.source.outliers() > 0) {
-        return Ok(true);
-    }
-    let leaves_files_out = options.input.on_bad_file == OnBadFile::Skip && !plan.skipped.is_empty();
-    Ok(leaves_files_out && make_plan(options, coarsening)?.skipped.len() < plan.skipped.len())
 }
 
 /// Leaves out the points that lie so far from all others that they are mistakes: all of them if they are rare in the job, or else those of

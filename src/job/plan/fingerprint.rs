@@ -150,7 +150,7 @@ impl Fingerprint {
         self.since_planned(&planned.fingerprint).is_none() && self.modified_since(planned).is_none()
     }
 
-    /// Returns the paths of the inputs that seem to have been modified since a job was planned. They must be those that were planned otherwise.
+    /// Returns the paths of the inputs that seem to have been modified since a job was planned. All else about them must be as it was.
     pub(crate) fn modified_since(&self, JobHeader { fingerprint: planned, begun, .. }: &JobHeader) -> Option<String> {
         let begun = (*begun)?;
         let [files, lines] = [(&self.files, &planned.files), (&self.lines, &planned.lines)]

@@ -64,6 +64,26 @@ pub fn replan_without(plan: Plan, bad: &[SkippedInput]) -> Result<Plan> {
     Ok(Plan { claims: again.claims.filter(|_| !is_whole), ..again })
 }
 
+/// Tells whether points lie so far from all others that they are mistakes, though no header claims them: whether a plan that looks at all
+/// points leaves out more of them than the usual one, or a file with them.
+///
+/// # Errors
+/// As [`make_plan`], if there are too many of them.
+pub(crate) fn are_there_far_points(options: &JobOptions, coarsening: LatticeCoarsening) -> Result<bool> {
+    let left_out = |plan: &Plan| {
+        let points = plan.inputs.iter().map(|input| input.source.outliers()).sum::<u64>();
+        (points, plan.skipped.len())
+    };
+    let (points, files) = left_out(&make_plan(options, LatticeCoarsening { far_points: true, ..coarsening })?);
+    let leaves_files_out = options.input.on_bad_file == OnBadFile::Skip && files > 0;
+    if points == 0 && !leaves_files_out {
+        return Ok(false);
+    }
+    // The usual plan may have left out the same.
+    let (known_points, known_files) = left_out(&make_plan(options, coarsening)?);
+    Ok(points > known_points || files > known_files)
+}
+
 /// Plans a job of `sources`. If bad files are to be left out, this leaves out those that no plan can use.
 fn plan_sources(
     mut sources: Vec<Source>,
