@@ -14,7 +14,8 @@ use crate::input::options::Duplicates;
 use crate::input::samples::{FileSamples, fingerprint_of};
 use crate::input::transform_sources::transform_sources;
 use crate::input::{
-    KeptReturns, OptionalFields, Point, PointRules, RowChoice, Source, TextOptions, TextReading, open_chosen,
+    KeptReturns, NodataChoice, OptionalFields, Point, PointRules, RowChoice, Source, TextOptions, TextReading,
+    open_chosen,
 };
 use crate::output::frame::Extras;
 use crate::verify::breaklines::BreaklineEdges;
@@ -104,8 +105,11 @@ impl<'a> Inputs<'a> {
             Some(input) => (input.csv.clone(), input.row_choice(reading.fields())),
             None => (TextOptions::default(), RowChoice { fields: reading.fields(), ..RowChoice::all() }),
         };
+        // Earlier versions left no heights out that stand for nodata.
+        let counts_nodata = facts.points.is_some_and(|points| points.nodata.is_some());
+        let nodata = if counts_nodata { choice.nodata.clone() } else { NodataChoice::None };
         // The proof trusts no index of a file.
-        let choice = RowChoice { use_index: false, ..choice };
+        let choice = RowChoice { use_index: false, nodata, ..choice };
         // As the job opened it: what it did not want has no say about the digits of a text.
         let open_again = |file: &PathBuf| open_chosen(file, &text, &choice);
         let is_skipped = |file: &Path| {

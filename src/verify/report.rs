@@ -55,6 +55,9 @@ pub(super) struct ReportedPoints {
     /// Those that were dropped at breaklines.
     #[serde(default)]
     pub(super) at_breaklines: u64,
+    /// Those whose height stands for nodata. Earlier versions left none out, and did not count them.
+    #[serde(default)]
+    pub(super) nodata: Option<u64>,
 }
 
 /// An input that was left out.

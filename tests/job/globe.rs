@@ -433,7 +433,7 @@ fn what_is_too_wide_to_be_bent_stays_flat() {
     let folder = tempfile::tempdir().unwrap();
     let cloud = folder.path().join("cloud.las");
     let mut points = square(30, 5_000.0, [0.0; 2]);
-    points.push([40_000_000, 100_000_000, 0]);
+    points.extend(square(30, 5_000.0, [400_000.0, 1_000_000.0]));
     std::fs::write(&cloud, utm(&points)).unwrap();
     let job = Job::on(&[&cloud]).tiles_of(500).with("output", "format = \"3dtiles\"\nhull = \"whole\"");
     job.report();

@@ -9,6 +9,7 @@ use tempfile::TempDir;
 use crate::bad_files::write;
 use crate::breaklines::with_doubtful_heights;
 use crate::clouds;
+use crate::far_points::with_a_far_point;
 use crate::las_file::LasFile;
 use crate::levels::hills;
 use crate::parts::{in_files, in_parts};
@@ -91,6 +92,8 @@ fn add_jobs_of_one_part(documents: &Documents) {
     let (_survey, job) = with_doubtful_heights();
     documents.run(&job);
     documents.verify(&job, &[], "proved");
+    let (_cloud, far) = with_a_far_point();
+    documents.run(&far);
     fs::write(job.out().join("tiles/000000.glb"), "its only tile").unwrap();
     documents.verify(&job, &[], "failed");
     // The program believes in a GPU that is a millisecond late.

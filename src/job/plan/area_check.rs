@@ -6,7 +6,7 @@ use crate::input::options::{InputOptions, OutsideCrsArea};
 use crate::input::{AreaOfUse, Crs, CrsTransform, DatumRule, FileFormat, Source, Unit, arc};
 use crate::job::plan::extent::{Extent, SourceBox};
 use crate::job::plan::globe_system::globe_system;
-use crate::job::plan::height_range::HeightSample;
+use crate::job::plan::height_range::{HeightSample, may_reach};
 use crate::output::geoid::Geoid;
 use crate::output::tiles3d::globe::Globe;
 use crate::{Error, Result, Warnings};
@@ -39,7 +39,7 @@ pub(crate) struct CommonPlace<'a> {
 /// Checks that the points of each source lie in the area of use of the system that they are in, and of that which they are transformed into.
 ///
 /// # Errors
-/// [`Error::Input`] names a source that lies hopelessly far outside, [`Error::NoTerrain`] the first of all sources if all do.
+/// [`Error::NoTerrain`] names the first source that lies hopelessly far outside.
 pub(crate) fn check_places(
     sources: &[Source],
     common: &CommonPlace,
@@ -49,6 +49,7 @@ pub(crate) fn check_places(
     let places: Vec<(&Source, Vec<[f64; 2]>)> = sources
         .iter()
         .zip(&common.extent.boxes)
+        .filter(|(source, _)| may_reach(source, options.bounds.map(|bounds| bounds.0)))
         .map(|(source, claim)| (source, places(source, claim, common)))
         .filter(|(_, places)| !places.is_empty())
         .collect();
@@ -58,7 +59,7 @@ pub(crate) fn check_places(
         .filter_map(|(source, places)| Some((*source, outside(source, places, common, &mut ways)?)))
         .collect();
     if options.outside_crs_area == OutsideCrsArea::Stop {
-        refuse_hopeless(&outside, places.len())?;
+        refuse_hopeless(&outside)?;
     }
     if let Some((source, first)) = outside.first() {
         let count = match sources.len() {
@@ -75,19 +76,15 @@ fn outside(source: &Source, places: &[[f64; 2]], common: &CommonPlace, ways: &mu
     systems(source, common).into_iter().find_map(|said| Outside::of(&said, ways.of(&said.crs)?, &said.own(places)?))
 }
 
-/// Fails if a source lies hopelessly far outside. Whoever leaves bad files out leaves such a one out too, unless all are: then the system
-/// is wrong.
-fn refuse_hopeless(outside: &[(&Source, Outside)], count: usize) -> Result<()> {
-    let hopeless: Vec<&(&Source, Outside)> = outside.iter().filter(|(_, found)| found.is_hopeless()).collect();
-    let Some((source, first)) = hopeless.first() else { return Ok(()) };
+/// Fails if a source lies hopelessly far outside. It is no bad file that a job may leave out: what the sample of all files has of one depends
+/// on the others, and so would the mesh.
+fn refuse_hopeless(outside: &[(&Source, Outside)]) -> Result<()> {
+    let Some((source, first)) = outside.iter().find(|(_, found)| found.is_hopeless()) else { return Ok(()) };
     let what = format!(
         "{}; if the CRS and the coordinates are right, set [input] outside_crs_area = \"warn\"",
         first.sentence(source)
     );
-    Err(match hopeless.len() == count {
-        true => Error::NoTerrain(format!("{}: {what}", source.path.display())),
-        false => Error::input(&source.path, what),
-    })
+    Err(Error::NoTerrain(format!("{}: {what}", source.path.display())))
 }
 
 /// A system that the points of a source are in, and the way to it from the system of the job.

@@ -15,7 +15,8 @@ use crate::{Error, Result};
 /// looks like it, all of them are read to decide.
 ///
 /// # Errors
-/// [`Error::Input`] names the first such file, [`Error::Io`] one that cannot be read.
+/// [`Error::NoTerrain`] names the first such file, [`Error::Io`] one that cannot be read. It is no bad file that a job may leave out: what the
+/// sample of all files has of one depends on the others, and so would the mesh.
 pub(crate) fn refuse_doubtful_heights(
     sources: &[Source],
     sample: &HeightSample,
@@ -37,7 +38,7 @@ pub(crate) fn refuse_doubtful_heights(
             },
         };
         if let Some(what) = what {
-            return Err(Error::input(&source.path, what));
+            return Err(Error::NoTerrain(format!("{}: {what}", source.path.display())));
         }
     }
     Ok(())

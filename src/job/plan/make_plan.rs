@@ -171,11 +171,11 @@ fn try_plan(
     if hint.shows_far_points(&sample) {
         return try_plan(sources, options, LatticeCoarsening { far_points: true, ..coarsening });
     }
-    let stretch = hint.stretch(&sample)?;
-    warnings.extend(stretch.clone());
     refuse_doubtful_heights(sources, &sample, &lattice, options)?;
     let place = CommonPlace { crs: &crs, metres, lattice: &lattice, extent: &extent, sample: &sample };
     check_places(sources, &place, &options.input, &mut warnings)?;
+    let stretch = hint.stretch(&sample)?;
+    warnings.extend(stretch.clone());
     let cloud = CloudOfPlan {
         sources,
         rules: &rules,

@@ -72,19 +72,22 @@ pub(crate) fn stretch_hint<'a>(
     hint: Hint,
 ) -> Result<Option<String>> {
     let (mut found, mut unread) = (SplitBoxes::default(), Vec::new());
+    let whole = claims.and_then(|claims| box_around(claims.iter().flatten().flatten().copied()));
+    let longer = |[min, max]: SourceBox| (max[0] - min[0]).max(max[1] - min[1]);
+    // A file whose own box is short has no points that stretch the area of all. There may be thousands of them.
+    let is_short = |claim| hint == Hint::Few && whole.is_some_and(|whole| 2.0 * longer(claim) < longer(whole));
     for (index, source) in sources.enumerate() {
+        let claim = match claims.map(|claims| claims[index]) {
+            Some(None) => continue,
+            Some(claim) => claim,
+            None => None,
+        };
         let Some(survey) = PointSurvey::new(source, options) else { continue };
-        let claim = claims.map(|claims| claims[index]);
-        let body = hint.body(&survey)?;
+        let body = if claim.is_some_and(is_short) { None } else { hint.body(&survey)? };
         match (body, claim) {
-            (_, Some(None)) => {}
-            (Some(body), Some(Some(claim))) if survey.holds_claim(&body, claim) => {
-                found.add(SplitBoxes { within: (source.records, Some(claim)), outside: (0, None) });
-            }
-            (Some(body), _) => unread.push((survey, body)),
-            (None, Some(Some(claim))) => {
-                found.add(SplitBoxes { within: (source.records, Some(claim)), outside: (0, None) });
-            }
+            (Some(body), Some(claim)) if !survey.holds_claim(&body, claim) => unread.push((survey, body)),
+            (Some(body), None) => unread.push((survey, body)),
+            (_, Some(claim)) => found.add(SplitBoxes { within: (source.records, Some(claim)), outside: (0, None) }),
             (None, None) => {}
         }
     }
