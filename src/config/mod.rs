@@ -162,8 +162,14 @@ fn without_queries(message: &str) -> String {
     out + rest
 }
 
+/// No configuration has so many opening brackets in a row. The parser would keep some 50 bytes for each.
+const BRACKETS: &str = "[[[[[[[[[[[[[[[[";
+
 /// Reads and checks the text of a configuration. The error shows the line.
 fn parse(text: &str) -> std::result::Result<JobOptions, String> {
+    if let Some(line) = text.lines().position(|line| line.contains(BRACKETS)) {
+        return Err(format!("line {} has more brackets in a row than any value needs: remove them", line + 1));
+    }
     let mut file: ConfigFile = toml::from_str(text).map_err(|e| shortened(&without_queries(&e.to_string())))?;
     if let Some(place) = text.parse::<toml::Table>().ok().and_then(|table| nul_in(&table.into())) {
         return Err(format!("{place} has a NUL character (\\u0000), which no name of a file can have: remove it"));
@@ -321,6 +327,8 @@ mod tests {
         assert!(wrong.contains("line 5") && wrong.contains("elevation"), "{wrong}");
         let memory = error(&format!("{LEAST}[limits]\nmemory = \"4 GB of it\"\n"));
         assert!(memory.contains("line 6") && memory.contains("4 GiB"), "{memory}");
+        let deep = error(&LEAST.replace("[output]", &format!("classes = {}\n[output]", "[".repeat(100_000))));
+        assert!(deep.contains("line 3") && deep.contains("brackets") && deep.len() < 100, "{deep}");
         let bounds = error(&LEAST.replace("[output]", "bounds = [1, 1, 0, 2]\n[output]"));
         assert!(bounds.contains("line 3") && bounds.contains("xmin"), "{bounds}");
         let edge = error(&format!("{LEAST}max_edge = -1\n"));

@@ -142,7 +142,7 @@ impl<'a> FeatureCollector<'a> {
         ));
         warnings.extend(self.enclosing_nothing.warning_at(
             "are lakes whose outlines enclose nothing",
-            "they go over all of their way twice, and no water is there; remove what repeats it",
+            "they go over all of their way twice, or a hole covers them, and no water is there; remove what repeats or covers them",
         ));
         warnings.extend(self.not_looked_at.warning(
             "are lakes with too many edges side by side or too many holes, so that faults of their outlines are not looked for",

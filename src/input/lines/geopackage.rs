@@ -157,6 +157,9 @@ fn find_layer(path: &Path, file: &Connection, tables: &[TableName], options: &Li
     };
     let columns = plain_columns(path, file, &table, is_read)?;
     let is_view = find_table(tables, &table).is_some_and(|table| table.is_view);
+    if !is_view {
+        refuse_damage(path, file, &table)?;
+    }
     if is_view {
         tables
             .iter()
@@ -170,6 +173,17 @@ fn find_layer(path: &Path, file: &Connection, tables: &[TableName], options: &Li
 
 fn find_table<'t>(tables: &'t [TableName], name: &str) -> Option<&'t TableName> {
     tables.iter().find(|table| table.name.eq_ignore_ascii_case(name))
+}
+
+/// Fails if pages of a table are damaged.
+fn refuse_damage(path: &Path, file: &Connection, table: &str) -> Result<()> {
+    let found = guarded_sqlite::damage_of(file, table).map_err(|error| guarded_sqlite::broken(path, &error))?;
+    found.map_or(Ok(()), |what| {
+        Err(Error::input(
+            path,
+            format!("its table {table:?} is damaged ({what}): copy the file again, or write it again from its source"),
+        ))
+    })
 }
 
 /// Returns the columns of a table, and refuses one that is wanted and that SQLite would have to compute.
@@ -355,6 +369,27 @@ mod tests {
         file.execute_batch(sql).unwrap();
         file.close().unwrap();
         read_bytes(&std::fs::read(&path).unwrap(), rest).map(|(_, features)| features)
+    }
+
+    #[test]
+    fn damaged_pages_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.gpkg");
+        std::fs::write(&path, package(false)).unwrap();
+        let file = Connection::open(&path).unwrap();
+        let many = "WITH RECURSIVE c(n) AS (SELECT 10 UNION ALL SELECT n + 1 FROM c WHERE n < 3000)
+                    INSERT INTO a SELECT n, (SELECT shape FROM a WHERE id = 8), 'line' FROM c";
+        file.execute_batch(many).unwrap();
+        let size: usize = file.query_row("PRAGMA page_size", [], |row| row.get(0)).unwrap();
+        file.close().unwrap();
+        let mut bytes = std::fs::read(&path).unwrap();
+        assert!(read_bytes(&bytes, "").unwrap().1.len() > 2000);
+        // A leaf of a table with rows begins with 13; its number of cells follows after two bytes.
+        let leaf = |page: &usize| bytes[page * size] == 13 && bytes[page * size + 4] > 20;
+        let leaf = (1..bytes.len() / size).rev().find(leaf).unwrap();
+        bytes[leaf * size + 4] /= 2;
+        let error = read_bytes(&bytes, "").map(drop).unwrap_err();
+        assert!(error.exit_code() == 3 && error.to_string().contains("is damaged ("), "{error}");
     }
 
     /// Registers the view or table `v` as a layer.

@@ -109,6 +109,18 @@ pub(super) fn columns_of(file: &Connection, table: &str) -> rusqlite::Result<Vec
     Ok(columns)
 }
 
+/// Returns what is wrong with the pages of a table; `None` if they are sound. SQLite reads damaged ones as if some rows were there twice, or not
+/// at all.
+pub(super) fn damage_of(file: &Connection, table: &str) -> rusqlite::Result<Option<String>> {
+    let mut found = None;
+    file.pragma(None, "quick_check", table, |row| {
+        let what: String = row.get(0)?;
+        found = found.take().or((what != "ok").then_some(what));
+        Ok(())
+    })?;
+    Ok(found)
+}
+
 /// Writes a byte of a name as a URI takes it. Names need not be UTF-8.
 fn escape(byte: &u8) -> String {
     match byte {
@@ -178,7 +190,7 @@ fn authorize(file: &mut Connection, tables: &[TableName]) -> rusqlite::Result<()
             AuthAction::Select => true,
             AuthAction::Read { table_name, .. } => known.contains(&table_name.to_lowercase()),
             AuthAction::Function { function_name } => FUNCTIONS.contains(&function_name.to_lowercase().as_str()),
-            AuthAction::Pragma { pragma_name, .. } => pragma_name == "table_xinfo",
+            AuthAction::Pragma { pragma_name, .. } => ["table_xinfo", "quick_check"].contains(&pragma_name),
             _ => false,
         };
         if is_allowed { Authorization::Allow } else { Authorization::Deny }

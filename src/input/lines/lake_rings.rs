@@ -17,8 +17,8 @@ const MOST_IN_HOLES: u64 = 1_000_000_000;
 /// no regular shape where its edges happen to cross.
 const CUTS: [f64; 5] = [0.145_898_034, 0.291_796_068, 0.527_864_045, 0.673_762_079, 0.854_101_966];
 
-/// An inside that is less, as part of the width, comes of rounding.
-const NOTHING: f64 = 1e-9;
+/// An inside that is less, as part of the width, is no lake, but what rounding leaves between an outline and a hole that covers it.
+const NOTHING: f64 = 2e-3;
 
 /// Between so many pairs it is checked whether the process should stop.
 const SOME: u64 = 1 << 20;

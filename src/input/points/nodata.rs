@@ -6,20 +6,31 @@ use serde::{Deserialize, Serialize};
 /// The fewest units between a number that stands for nodata and the nearest height.
 const FAR: f64 = 100.0;
 
-/// The fewest units between any other value that may stand for nodata and the nearest height.
-const DOUBTFUL: f64 = 20.0;
+/// The fewest units between any other value that may stand for nodata and the nearest height, at the foot of all heights. The sea lies at the
+/// foot of cliffs, and a lake in a quarry.
+const DOUBTFUL_LOW: f64 = 100.0;
+
+/// The same at the top, where buildings stand out.
+const DOUBTFUL_HIGH: f64 = 500.0;
 
 /// Such a value is so many times as far from the nearest height as the heights there lie apart: a shore would join it to them.
 const ALONE: f64 = 10.0;
 
-/// A value that fewer records have may be a mistake of each, and no mark.
-const FEW: u64 = 5;
+/// A value that fewer records have, at the foot of all heights and at their top, may be a mistake of each, and no mark. Roofs and masts stand
+/// out, and nothing lies that far below.
+const FEW: [u64; 2] = [3, 5];
 
 /// Heights of fewer values do not vary, so the distance of another one from them shows nothing.
 const LEAST_VALUES: usize = 5;
 
 /// How many of the lowest and of the highest values are kept.
-const KEPT: usize = 8;
+const KEPT: usize = 12;
+
+/// So many records beside a value, below it and above, may be noise that joins it to nothing.
+const STRAYS: u64 = 2;
+
+/// What is among so many records is no noise, but a shore, if fewer than this many times as many share the value.
+const TIMES_STRAYS: u64 = 10;
 
 /// No height is as large, whatever its unit.
 pub(crate) const NO_HEIGHT: f64 = 1e18;
@@ -98,9 +109,10 @@ impl Lowest {
         }
     }
 
-    /// Returns the value of the first height that is not a number for nodata.
-    fn rest(&self, is_number: impl Fn(f64) -> bool) -> Option<f64> {
-        self.0.iter().map(|height| height.value).find(|value| !is_number(*value))
+    /// Returns the heights that are not numbers for nodata; `None` if there is none.
+    fn rest(&self, is_number: impl Fn(f64) -> bool) -> Option<Vec<SharedHeight>> {
+        let rest: Vec<SharedHeight> = self.0.iter().filter(|height| !is_number(height.value)).copied().collect();
+        (!rest.is_empty()).then_some(rest)
     }
 }
 
@@ -152,18 +164,21 @@ impl Extremes {
     }
 
     /// Returns the heights that stand for nodata: those for which `is_number` holds, and which lie farther from all others than these
-    /// from each other.
+    /// from each other, or much farther than the nearest of them do.
     pub(crate) fn nodata(&self, is_number: impl Fn(f64) -> bool + Copy) -> FoundNodata {
         let high_number = |value: f64| is_number(0.0 - value);
-        let Some((low, high)) = self.lowest.rest(is_number).zip(self.highest.rest(high_number)) else {
+        let Some((lowest, highest)) = self.lowest.rest(is_number).zip(self.highest.rest(high_number)) else {
             return self.nodata_alone(is_number);
         };
+        let is_alone = |value: f64| is_apart_from(&lowest, value, FAR) || is_apart_from(&highest, 0.0 - value, FAR);
+        let (low, high) = (lowest[0].value, highest[0].value);
         let mut others = [low, 0.0 - high];
         let restored = self.highest.0.iter().map(|height| SharedHeight { value: 0.0 - height.value, ..*height });
         let is_outside = |height: &SharedHeight| height.value < low || height.value > 0.0 - high;
         let mut heights: Vec<SharedHeight> = self.lowest.0.iter().copied().chain(restored).filter(is_outside).collect();
         // A number among heights is a height, and then the next one may be among them too.
-        while let Some(near) = heights.iter().position(|height| !is_far(height.value, others, FAR)) {
+        let is_near = |value: f64, others: [f64; 2]| !is_far(value, others, FAR) && !is_alone(value);
+        while let Some(near) = heights.iter().position(|height| is_near(height.value, others)) {
             let SharedHeight { value, .. } = heights.swap_remove(near);
             others = [others[0].min(value), others[1].max(value)];
         }
@@ -183,23 +198,65 @@ impl Extremes {
     }
 
     /// Returns the lowest or the highest value if several records share it, and nothing joins it to the other heights: it lies farther from
-    /// them than they lie from each other, or much farther than the nearest of them do. It may stand for nodata, such as 0 among mountains.
+    /// them than they lie from each other, or, at their foot, much farther than the nearest of them do. It may stand for nodata, such as 0
+    /// among mountains.
     pub(crate) fn doubtful(&self) -> Option<DoubtfulHeight> {
-        let doubt = |end: &Lowest, other: &Lowest, sign: f64| {
-            let (first, next) = (*end.0.first()?, end.0.get(1)?);
-            let others = [sign * next.value, 0.0 - sign * other.0.first()?.value];
-            let others = [others[0].min(others[1]), others[0].max(others[1])];
-            let height = SharedHeight { value: sign * first.value + 0.0, ..first };
-            let is_alone = end
-                .0
-                .get(KEPT - 1)
-                .is_some_and(|last| next.value - first.value > (ALONE * (last.value - next.value)).max(DOUBTFUL));
-            let is_apart = is_alone || (end.0.len() > LEAST_VALUES && is_far(height.value, others, DOUBTFUL));
-            let is_doubtful = height.count >= FEW && is_apart;
-            is_doubtful.then_some(DoubtfulHeight { height, others })
+        let [few_low, few_high] = FEW;
+        let low = self.lowest.doubtful(&self.highest, few_low, |height, above, others| {
+            is_apart_from(above, height, DOUBTFUL_LOW) || is_far(height, others, DOUBTFUL_LOW)
+        });
+        let high = || {
+            let found = self
+                .highest
+                .doubtful(&self.lowest, few_high, |height, _, others| is_far(height, others, DOUBTFUL_HIGH))?;
+            let [low, high] = found.others;
+            let height = SharedHeight { value: 0.0 - found.height.value, ..found.height };
+            Some(DoubtfulHeight { height, others: [0.0 - high, 0.0 - low] })
         };
-        doubt(&self.lowest, &self.highest, 1.0).or_else(|| doubt(&self.highest, &self.lowest, -1.0))
+        low.or_else(high)
     }
+}
+
+impl Lowest {
+    /// Returns the first value that `few` records share, apart from a few strays below, if it is apart from those above it and from `others`,
+    /// the range of these. `top` has the greatest values with the other sign.
+    fn doubtful(
+        &self,
+        top: &Lowest,
+        few: u64,
+        is_apart: impl Fn(f64, &[SharedHeight], [f64; 2]) -> bool,
+    ) -> Option<DoubtfulHeight> {
+        let greatest = 0.0 - top.0.first()?.value;
+        let is_shared = |(at, height): &(usize, &SharedHeight)| {
+            let strays = records(&self.0[..*at]);
+            strays <= STRAYS && height.count >= few.max(TIMES_STRAYS * strays)
+        };
+        let (at, height) = self.0.iter().enumerate().find(is_shared)?;
+        let above = &self.0[at + 1..];
+        let others = [above.first()?.value, greatest];
+        let is_doubtful = above.len() >= LEAST_VALUES && is_apart(height.value, above, others);
+        is_doubtful.then_some(DoubtfulHeight { height: *height, others })
+    }
+}
+
+/// Returns the number of records that have these heights.
+fn records(heights: &[SharedHeight]) -> u64 {
+    heights.iter().map(|height| height.count).sum()
+}
+
+/// Returns whether `value` lies at least so far below the lowest `heights`, which are ascending, and much farther than these lie from each
+/// other. A few strays may lie between.
+fn is_apart_from(heights: &[SharedHeight], value: f64, least: f64) -> bool {
+    (0..heights.len()).take_while(|&strays| records(&heights[..strays]) <= STRAYS).any(|strays| {
+        let body = &heights[strays..];
+        let is_enough = strays == 0 || body.len() >= LEAST_VALUES;
+        match (body.first(), body.last()) {
+            (Some(first), Some(last)) if is_enough => {
+                first.value - value > least.max(ALONE * (last.value - first.value))
+            }
+            _ => false,
+        }
+    })
 }
 
 /// Returns whether `value` lies farther from all of `others` than these from each other, and at least so far.
@@ -289,6 +346,12 @@ mod tests {
         assert_eq!(nodata((0..500).map(|i| -9990.0 + 30.0 * f64::from(i)).chain([-9999.0])), [0.0; 0]);
         // A floor at 999 that nothing else is as far from as it is high.
         assert_eq!(nodata((0..500).map(|i| 300.0 + 2.0 * f64::from(i)).chain([-999.0])), [-999.0]);
+        // In high mountains it is not, but nothing joins it to the lowest of them.
+        assert_eq!(nodata((0..900).map(|i| 300.0 + 2.0 * f64::from(i)).chain([-999.0])), [-999.0]);
+        assert_eq!(
+            nodata((0..900).map(|i| 300.0 + 2.0 * f64::from(i)).chain([-999.0, 40.0, -300.0, -310.0])),
+            [0.0; 0]
+        );
         assert_eq!(nodata([-9999.0; 7]), [-9999.0]);
         assert_eq!(nodata([9999.0; 7]), [0.0; 0]);
         let found = extremes(hills().chain([-9999.0, -9999.0])).nodata(is_nodata_number);
@@ -306,11 +369,21 @@ mod tests {
         assert_eq!((doubt.height.value, doubt.height.first), (5000.0, 500));
         let alps = || (0..5000).map(|i| 800.0 + 0.5 * f64::from(i));
         assert_eq!(extremes(zeros(5).chain(alps())).doubtful().map(|doubt| doubt.others), Some([800.0, 3299.5]));
+        assert_eq!(extremes(zeros(3).chain(peaks())).doubtful().map(|doubt| doubt.height.count), Some(3));
         assert_eq!(extremes(zeros(2).chain(peaks())).doubtful(), None);
+        // Strays below and between join it to nothing.
+        for strays in [[-40.0, 450.0], [-40.0, -300.0], [450.0, 780.0]] {
+            let doubt = extremes(zeros(100).chain(alps()).chain(strays)).doubtful();
+            assert_eq!(doubt.map(|doubt| doubt.height.value), Some(0.0), "{strays:?}");
+        }
+        assert_eq!(nodata([-9999.0; 50].into_iter().chain(alps()).chain([-6000.0, -5000.0])), [-9999.0]);
         // The sea, and a lake with a shore.
         assert_eq!(extremes(zeros(200).chain((0..400).map(f64::from))).doubtful(), None);
-        assert_eq!(extremes(zeros(200).chain(peaks()).chain([700.0])).doubtful(), None);
+        assert_eq!(extremes(zeros(200).chain(peaks()).chain([700.0, 750.0, 800.0])).doubtful(), None);
         assert_eq!(extremes(zeros(200).chain(alps()).chain([1.0, 30.0, 40.0])).doubtful(), None);
+        // The sea at the foot of a cliff, and a tower in a plain.
+        assert_eq!(extremes(zeros(200).chain((0..400).map(|i| 60.0 + f64::from(i) / 50.0))).doubtful(), None);
+        assert_eq!(extremes((0..400).map(|i| f64::from(i) / 50.0).chain([140.0; 9])).doubtful(), None);
         // A platform and what stands on it.
         assert_eq!(extremes(zeros(200).chain([100.0, 100.0, 100.5])).doubtful(), None);
     }

@@ -10,7 +10,7 @@ use crate::input::text::names::named_columns;
 use crate::input::text::role::ColumnRole;
 
 /// Words in the names of columns that are often beside coordinates.
-const TIMES: [&str; 7] = ["time", "utc", "gps", "gpstime", "seconds", "epoch", "timestamp"];
+const TIMES: [&str; 9] = ["time", "utc", "gps", "gpstime", "seconds", "epoch", "timestamp", "zeit", "tiempo"];
 
 /// So many names of coordinates and times make a header.
 const LEAST_KNOWN: usize = 2;
@@ -98,6 +98,7 @@ mod tests {
                 "1 2 42504.4 301.2 78.3 1956.5",
             ),
             ("# Columns: time, lat, lon, level", "42000.5,78.1,301.2,1903.3"),
+            ("# zeit breite laenge pegel", "42000.5 78.1 301.2 1903.3"),
             ("# one,two,three", "42000.5,78.1,301.2"),
         ] {
             let what = unread(comment, row);

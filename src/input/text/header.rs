@@ -62,7 +62,8 @@ pub(crate) fn find(rows: &[&[u8]], candidates: &[Delimiter], wanted: Option<bool
             let (before, after) = (&lines[at], after(at));
             let named = with_units(names, &lines[at + 1..after]);
             let named = named.map_err(|error| format!("the line of names, {}, {error}", shown(before)));
-            Header { lines: after, names: Some(named), count: None }
+            let count = if at > 0 { count_in(lines[0]) } else { None };
+            Header { lines: after, names: Some(named), count }
         }
         None if named => Header { lines: after(0), names: None, count: count_in(lines[0]) },
         None if count_in(lines[0]).is_some() => Header { lines: 1, names: None, count: count_in(lines[0]) },

@@ -24,6 +24,10 @@ pub(crate) const NAMES: [Names; 10] = [
             "east",
             "rechtswert",
             "ostwert",
+            "ost",
+            "osten",
+            "est",
+            "este",
             "utmx",
             "utme",
             "rechts",
@@ -33,6 +37,9 @@ pub(crate) const NAMES: [Names; 10] = [
             "longitude",
             "long",
             "lng",
+            "longitud",
+            "laenge",
+            "länge",
         ],
         ColumnRole::Coordinate(0),
     ),
@@ -51,6 +58,9 @@ pub(crate) const NAMES: [Names; 10] = [
             "north",
             "hochwert",
             "nordwert",
+            "nord",
+            "norden",
+            "norte",
             "utmy",
             "utmn",
             "hoch",
@@ -58,6 +68,8 @@ pub(crate) const NAMES: [Names; 10] = [
             "n",
             "lat",
             "latitude",
+            "latitud",
+            "breite",
         ],
         ColumnRole::Coordinate(1),
     ),
@@ -80,6 +92,9 @@ pub(crate) const NAMES: [Names; 10] = [
             "orthometricheight",
             "hoehe",
             "höhe",
+            "cota",
+            "quota",
+            "altitud",
             "h",
         ],
         ColumnRole::Coordinate(2),
@@ -94,7 +109,8 @@ pub(crate) const NAMES: [Names; 10] = [
 ];
 
 /// The names of longitude and latitude.
-const DEGREES: [&[&str]; 2] = [&["lon", "longitude", "long", "lng"], &["lat", "latitude"]];
+const DEGREES: [&[&str]; 2] =
+    [&["lon", "longitude", "long", "lng", "longitud", "laenge", "länge"], &["lat", "latitude", "latitud", "breite"]];
 
 /// A column's name.
 pub(crate) struct Name {

@@ -156,6 +156,8 @@ mod tests {
             "East;North;Height",
             "X_Coord;Y_Coord;Elev.",
             "E;N;H",
+            "Ost;Nord;Hoehe",
+            "este;norte;cota",
             "Easting (m);Northing (m);Elevation (m)",
         ] {
             assert_eq!(coordinates(line), Some([0, 1, 2]), "{line}");

@@ -95,6 +95,31 @@ pub(crate) fn is_finer(sources: &[Source], wish: &LatticeWish, [a, b]: [&Extent;
     (0..2).any(|axes| a[axes] < b[axes])
 }
 
+/// Returns a warning about the file that lies farthest from the one with the most points, if that is three quarters of the width of all or more.
+pub(crate) fn farthest_file(sources: &[Source], extent: &Extent) -> Option<String> {
+    let placed = || sources.iter().zip(&extent.boxes).filter_map(|(source, claim)| Some((source, (*claim)?)));
+    let middle = |[min, max]: SourceBox| [0, 1].map(|axis| (min[axis] + max[axis]) / 2.0);
+    let (_, main) = placed().max_by_key(|(source, _)| source.records)?;
+    let distance = |claim: SourceBox| {
+        let ([x, y], [a, b]) = (middle(claim), middle(main));
+        (x - a).abs().max((y - b).abs())
+    };
+    let (source, found) = placed().max_by(|(_, a), (_, b)| distance(*a).total_cmp(&distance(*b)))?;
+    let size = extent.size(0).max(extent.size(1));
+    let [x, y] = [0, 1].map(|axis| rounded([found[0][axis], found[1][axis]]));
+    (4.0 * distance(found) >= 3.0 * size).then(|| {
+        format!(
+            "the file farthest from the others is {} (x from {} to {}, y from {} to {}); if it is a mistake, leave it out of [input] files, or \
+             its points with [input] bounds",
+            source.path.display(),
+            x[0],
+            x[1],
+            y[0],
+            y[1]
+        )
+    })
+}
+
 /// The most powers of ten that are tried.
 const MOST_POWERS: u32 = 28;
 

@@ -15,7 +15,7 @@ use crate::job::plan::budget::network_memory;
 use crate::job::plan::common_crs::{common_crs, horizontal_unit};
 use crate::job::plan::doubtful_heights::refuse_doubtful_heights;
 use crate::job::plan::extent::{Extent, SourceBox, to_float};
-use crate::job::plan::far_points::extent_without_outliers;
+use crate::job::plan::far_points::{extent_without_outliers, farthest_file};
 use crate::job::plan::height_range::HeightSample;
 use crate::job::plan::inputs::{check_missing_records, open_all};
 use crate::job::plan::job_plan::{Claims, Plan, PlannedInput, SkippedInput, decoded_records};
@@ -153,7 +153,8 @@ fn try_plan(
     lines.extend_heights(&mut extent)?;
     let lattice = choose_lattice(sources, &extent, &wish, &mut warnings)?;
     if fineness(sources, &extent, &wish).is_coarse() {
-        warnings.extend(farthest_row(sources, options, &extent)?);
+        let row = farthest_row(sources, options, &extent)?;
+        warnings.extend(row.or_else(|| farthest_file(sources, &extent)));
     }
     if metres_z != metres {
         warnings.push(format!(

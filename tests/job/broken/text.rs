@@ -54,6 +54,11 @@ pub(super) fn cases() -> Vec<Case> {
             Refused(3, "2 of them are not there"),
         ),
         (
+            "fewer points than the first line promises, and names",
+            [b"7\nx y z\n", ROWS.as_bytes()].concat(),
+            Refused(3, "2 of them are not there"),
+        ),
+        (
             "more points than the first line promises",
             [b"4\n", ROWS.as_bytes()].concat(),
             Read(5, 0, "promises 4 points"),

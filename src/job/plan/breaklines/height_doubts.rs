@@ -30,6 +30,12 @@ const FROM_ZERO: [f64; 2] = [3.0, 10.0];
 /// A vertex is doubtful if it lies so many metres beyond its neighbours on the line and beyond the terrain.
 const SPIKE: f64 = 10.0;
 
+/// Any vertex is doubtful if it lies so many metres beyond the terrain.
+const BEYOND: f64 = 50.0;
+
+/// So many vertices of a feature are looked at for that, evenly.
+const EVENLY: usize = 16;
+
 /// Returns the warnings about heights of the `features`, which come from `files`.
 ///
 /// # Errors
@@ -149,11 +155,11 @@ impl Judge<'_> {
         let z = self.terrain.height(vertex)?;
         let (z, what) = match self.terrain.is_zero(vertex) {
             true => (0.0, ": if 0 stands for no height,"),
-            false => (z, ", far from its neighbours on the line too:"),
+            false => (z, ":"),
         };
         Some(format!(
-            "feature {} has the height {z} at {}, where the points around lie from {} to {}{others}{what} correct it, or set heights = \
-             \"points\" in [[breaklines]] to take all heights from the points around",
+            "feature {} has the height {z} at {}, where the points around lie from {} to {}{others}{what} correct it, set height_unit in \
+             [[breaklines]] if the heights of the file are in another unit, or heights = \"points\" to take all heights from the points around",
             feature.id.feature,
             self.terrain.place_text(vertex.place),
             rounded(around.lowest),
@@ -168,11 +174,14 @@ impl Judge<'_> {
         let from_zero = self.terrain.in_height_unit(FROM_ZERO[usize::from(is_all_zero)]);
         let spike = self.terrain.in_height_unit(SPIKE);
         let zeros = vertices().filter(|vertex| self.terrain.is_zero(vertex));
+        let beyond = self.terrain.in_height_unit(BEYOND);
+        let evenly = vertices().step_by(vertices().count().div_ceil(EVENLY).max(1));
         let spikes = feature.paths.iter().flat_map(|path| spikes(path, self.terrain.steps(spike)));
         let mut candidates = zeros
             .map(|vertex| (vertex, from_zero))
             .take(OF_FEATURE)
-            .chain(spikes.map(|vertex| (vertex, spike)).take(OF_FEATURE));
+            .chain(spikes.map(|vertex| (vertex, spike)).take(OF_FEATURE))
+            .chain(evenly.map(|vertex| (vertex, beyond)));
         candidates.find_map(|(vertex, least)| {
             let (z, around) = self.pair(vertex)?;
             // A line may lead to a peak that the sample does not show.
