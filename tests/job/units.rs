@@ -185,6 +185,10 @@ fn a_unit_that_contradicts_the_crs_is_refused_with_both_names() {
         Job::on(&[file]).with("input", lines).run().refused(2, &words);
         Job::on(&[file]).with("input", lines).run_with(&["check"]).refused(2, &words);
     }
+    let degrees = folder.path().join("degrees.csv");
+    std::fs::write(&degrees, "9.90,53.50,1\n9.91,53.50,2\n9.90,53.51,3\n9.91,53.52,2\n").unwrap();
+    let job = Job::on(&[&degrees]).with("input", "crs = \"EPSG:4326\"\nunit = \"foot\"");
+    job.run().refused(2, &["[input] crs is", "whose unit is the degree", "to_crs = \"utm\"", "crs = \"none\""]);
     // The same unit, a CRS of the user in that unit, and no CRS.
     assert_eq!(metres(&[&metre], "unit = \"metre\"").0, [1.0, 1.0]);
     let in_feet =

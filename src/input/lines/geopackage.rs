@@ -380,7 +380,8 @@ mod tests {
         let many = "WITH RECURSIVE c(n) AS (SELECT 10 UNION ALL SELECT n + 1 FROM c WHERE n < 3000)
                     INSERT INTO a SELECT n, (SELECT shape FROM a WHERE id = 8), 'line' FROM c";
         file.execute_batch(many).unwrap();
-        let size: usize = file.query_row("PRAGMA page_size", [], |row| row.get(0)).unwrap();
+        let size: u32 = file.query_row("PRAGMA page_size", [], |row| row.get(0)).unwrap();
+        let size = size as usize;
         file.close().unwrap();
         let mut bytes = std::fs::read(&path).unwrap();
         assert!(read_bytes(&bytes, "").unwrap().1.len() > 2000);

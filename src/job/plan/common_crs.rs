@@ -341,7 +341,7 @@ pub fn horizontal_unit(
         }
         _ => Err(Error::Config(format!(
             "{}the coordinates are in degrees ({}), and a Delaunay triangulation in degrees is distorted: [input] to_crs = \"utm\" or \
-             \"EPSG:...\" transforms them; {what_to_do}, or set [input] unit = \"metre\"",
+             \"EPSG:...\" transforms them; {what_to_do}, or set [input] crs = \"none\" and unit = \"metre\"",
             named(&|crs| crs.horizontal == Unit::Degree),
             crs.name.as_deref().unwrap_or("geographic CRS"),
         ))),

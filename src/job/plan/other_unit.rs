@@ -2,7 +2,7 @@
 //! and the terrain would be placed far from where it is.
 
 use crate::input::options::InputOptions;
-use crate::input::{Crs, CrsChoice, FileFormat, Source, same_length};
+use crate::input::{Crs, CrsChoice, FileFormat, Source, Unit, same_length};
 use crate::{Error, Result};
 
 /// Checks that the unit of x and y that the user names is that of the system of every source.
@@ -14,7 +14,10 @@ pub(super) fn refuse_other_unit(sources: &[Source], options: &InputOptions) -> R
     let is_named = |source: &&Source| source.own_crs().is_named();
     match &options.crs {
         CrsChoice::None => Ok(()),
-        CrsChoice::Given { crs, .. } => refuse(crs, || "[input] crs is".into(), options),
+        CrsChoice::Given { crs, .. } => {
+            refuse_degrees_as_lengths(crs, sources, || "[input] crs is".into(), options)?;
+            refuse(crs, || "[input] crs is".into(), options)
+        }
         CrsChoice::First => {
             sources.iter().find(is_named).map_or(Ok(()), |source| refuse(source.own_crs(), || of_file(source), options))
         }
@@ -24,11 +27,37 @@ pub(super) fn refuse_other_unit(sources: &[Source], options: &InputOptions) -> R
                 refuse(&missing.crs, || "[input] missing_crs is".into(), options)
             }
             _ if is_named(&source) && source.format != FileFormat::Text => {
+                refuse_degrees_as_lengths(source.own_crs(), std::slice::from_ref(source), || of_file(source), options)?;
                 refuse(source.own_crs(), || of_file(source), options)
             }
             _ => Ok(()),
         }),
     }
+}
+
+/// Fails if `crs` is in degrees, the user names a unit of length, and the coordinates of all `sources` may be degrees.
+fn refuse_degrees_as_lengths(
+    crs: &Crs,
+    sources: &[Source],
+    subject: impl Fn() -> String,
+    options: &InputOptions,
+) -> Result<()> {
+    let is_length = options.unit.metres().is_some();
+    let may_be_degrees = |source: &Source| {
+        source
+            .claimed_rectangle()
+            .is_some_and(|corners| corners.iter().all(|[x, y]| x.abs() <= 360.0 && y.abs() <= 90.0))
+    };
+    if crs.horizontal != Unit::Degree || !is_length || !sources.iter().all(may_be_degrees) {
+        return Ok(());
+    }
+    Err(Error::Config(format!(
+        "{} {}, whose unit is the degree, but [input] unit says {}: leave unit out, and set to_crs = \"utm\" to transform the degrees. If the \
+         coordinates are lengths, set crs = \"none\" as well",
+        subject(),
+        crs.label(),
+        options.unit.unit().name(),
+    )))
 }
 
 /// Fails if `crs` has another unit of length than the one that the user names.
