@@ -99,10 +99,11 @@ fn the_row_that_makes_the_lattice_coarse_is_named() {
     let said = warnings(&report);
     assert!(said.contains("rounded to") && said.contains("farthest from the others is"), "{said}");
     assert!(said.contains("0.txt: line 3") && said.contains("4565"), "{said}");
-    // Files that lie far apart are no row's fault.
-    let apart = Texts::new(&[plain(300), rows(300, 5, " ", ".").replace("565", "4565")]);
+    // Files that lie far apart are no row's fault. The one with fewer points is named.
+    let apart = Texts::new(&[plain(300), rows(200, 5, " ", ".").replace("565", "4565")]);
     let said = warnings(&apart.job().report());
-    assert!(said.contains("rounded to") && !said.contains("farthest from the others"), "{said}");
+    assert!(said.contains("rounded to") && !said.contains("the row farthest"), "{said}");
+    assert!(said.contains("the file farthest from the others is") && said.contains("1.txt (x from 4565"), "{said}");
 }
 
 #[test]

@@ -99,7 +99,9 @@ pub(crate) fn is_finer(sources: &[Source], wish: &LatticeWish, [a, b]: [&Extent;
 pub(crate) fn farthest_file(sources: &[Source], extent: &Extent) -> Option<String> {
     let placed = || sources.iter().zip(&extent.boxes).filter_map(|(source, claim)| Some((source, (*claim)?)));
     let middle = |[min, max]: SourceBox| [0, 1].map(|axis| (min[axis] + max[axis]) / 2.0);
-    let (_, main) = placed().max_by_key(|(source, _)| source.records)?;
+    // Of files with as many points the first by name, whatever their order.
+    let more = |a: &Source, b: &Source| a.records.cmp(&b.records).then(b.path.cmp(&a.path));
+    let (_, main) = placed().max_by(|(a, _), (b, _)| more(a, b))?;
     let distance = |claim: SourceBox| {
         let ([x, y], [a, b]) = (middle(claim), middle(main));
         (x - a).abs().max((y - b).abs())

@@ -95,11 +95,22 @@ fn heights_that_stand_for_none_are_refused_or_named() {
         run(one(wrong))
             .refused(3, &["one.shp: feature 2 has a vertex without a height, its number 4, at (500064, 4000030)"]);
     }
-    for (wrong, word) in [(0.0, "if 0 stands for no height"), (-99.0, "neighbours"), (127.0, "neighbours")] {
+    for (wrong, word) in [(0.0, "if 0 stands for no height"), (-99.0, "correct it"), (127.0, "correct it")] {
         let text = run(one(wrong)).succeeded().out;
         let named =
             format!("one.shp: feature 2 has the height {wrong} at (500064, 4000030), where the points around lie from");
         assert!(text.contains(&named) && text.contains(word) && text.contains("heights = \"points\""), "{text}");
+    }
+    // All of a line is far from the terrain.
+    for wrong in [9000.0, -999.9, 60.0] {
+        let right = || ("line", on_slope(|_, z| z));
+        let lines = [right(), ("line", on_slope(|_, z| z + wrong)), right()];
+        let file = shapefile(survey.folder(), "among", &Features::lines(&lines));
+        let text = survey.job_with(&[file], "").run_with(&["check"]).succeeded().out;
+        assert!(
+            text.contains("among.shp: feature 2 has the height") && text.contains("set height_unit"),
+            "{wrong}: {text}"
+        );
     }
     let text = run(on_slope(|_, _| 0.0)).succeeded().out;
     assert!(text.contains("feature 2 has the height 0 at"), "{text}");
