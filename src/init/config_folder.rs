@@ -42,7 +42,7 @@ impl ConfigFolder {
         self.pattern_of(&folder.join(path.file_name().unwrap_or_default()))
     }
 
-    /// Returns a pattern that matches this path alone, as it counts from here.
+    /// Returns a pattern that matches this path alone, relative to this folder.
     fn pattern_of(&self, path: &Path) -> Result<String> {
         match path.to_str() {
             // Every system takes slashes, and they need no quotes.

@@ -152,7 +152,7 @@ mod tests {
             UNIT["Meter",1.0]]"#;
         let area = AreaOfUse::of(&parse(esri).unwrap()).unwrap();
         assert_eq!((area.beyond([-93.0, 45.0]), area.beyond([-93.0, 25.0])[1] > 0.5), ([0.0; 2], true));
-        // That of a site is nobody else's, and the same projection on a datum of another country is of no use.
+        // That of a site is its own, and the same projection on a datum of another country is of no use.
         let site = esri.replace("-93.0", "-93.4321");
         let elsewhere = esri.replace("North_American_1983", "European_1950").replace("D_European", "D_European_Datum");
         for text in [site, elsewhere] {

@@ -51,7 +51,7 @@ impl<'a> PointFilter<'a> {
         PointFilter { path, axes, rules, quick_maps, plausible, sink, points, counts, classes, kept }
     }
 
-    /// Has points outside of this box count as malformed. The message about the first of them gives the `remedy`.
+    /// Makes points outside of this box malformed. The message about the first of them gives the `remedy`.
     pub(crate) fn within(self, plausible: RawBox, remedy: &'a str) -> PointFilter<'a> {
         PointFilter { quick_maps: None, plausible: Some((plausible, remedy)), ..self }
     }

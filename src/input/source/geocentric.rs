@@ -1,4 +1,4 @@
-//! Whether points can count from the middle of the earth, as the file says.
+//! Whether points can be geocentric, as their file states.
 
 use crate::Result;
 use crate::geometry::lattice::AxisMap;

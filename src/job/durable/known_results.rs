@@ -54,7 +54,7 @@ impl KnownResults {
     /// the same file there.
     ///
     /// # Errors
-    /// [`Error::Config`] if a file of somebody else is there, [`Error::Io`] if it cannot be read.
+    /// [`Error::Config`] if a foreign file is there, [`Error::Io`] if it cannot be read.
     pub(crate) fn check_place(&self, name: &Path, waits: &Path, place: &Path) -> Result<()> {
         if self.contains(name) || !exists(place)? {
             return Ok(());

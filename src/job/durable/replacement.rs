@@ -37,7 +37,7 @@ impl Replacement {
     ///
     /// # Errors
     /// [`Error::Io`] if a file is in neither place, or the system does not tell; if a folder cannot be made or opened. [`Error::Config`]
-    /// if somebody else's file is in the place of a result. No result has been touched then.
+    /// if a foreign file is in the place of a result. No result has been touched then.
     pub(crate) fn prepare(
         results: &OutputFiles,
         waiting: &OutputFiles,
@@ -52,7 +52,7 @@ impl Replacement {
             // Somebody may have put it there since the job wrote its own. The lists of results name that one by now.
             check_page_is_ours(results)?;
         }
-        // The list that waits names every new result, also where somebody else's file has come into its place. That of the earlier job stays
+        // The list that waits names every new result, also where a foreign file has come into its place. That of the earlier job stays
         // until all others are in place.
         let (known, mut found) = (KnownResults::of(&[results])?, Vec::new());
         // Neither what is done nor which file a message names may depend on the order of a hash set.
@@ -73,7 +73,7 @@ impl Replacement {
         let mut outdated = Vec::new();
         for path in Leftovers::of(results)?.files {
             let name = path.strip_prefix(results.directory()).unwrap_or(&path);
-            // A file that no list names is somebody else's.
+            // A file that no list names is foreign.
             if path != report && !names.contains(name) && known.contains(name) && exists(&path)? {
                 outdated.push(path);
             }

@@ -87,7 +87,7 @@ impl OtherUnit {
 type Pair = (f64, Around);
 
 impl Judge<'_> {
-    /// Says that all heights of a file seem to be in another unit or to count from another zero.
+    /// Returns a sentence if all heights of a file seem to be in another unit or to have another zero.
     fn of_file(&self, features: &[Feature]) -> Option<String> {
         let all = || features.iter().flat_map(|feature| feature.paths.iter().flatten());
         let every = all().count().div_ceil(OF_FILE).max(1);
@@ -144,7 +144,7 @@ impl Judge<'_> {
         Some(OtherUnit { lines_in_feet, points_in })
     }
 
-    /// Says which vertices are far from the terrain, by features.
+    /// Returns a sentence about the vertices that are far from the terrain, by features.
     fn of_vertices(&self, features: &[Feature]) -> Option<String> {
         let mut found = features.iter().filter_map(|feature| Some((feature, self.doubtful_vertex(feature)?)));
         let (feature, (vertex, around)) = found.next()?;
