@@ -3,6 +3,7 @@
 //! [`journal::Journal`]).
 
 pub mod atomic_file;
+mod bits;
 pub mod cleaning;
 pub mod columns;
 pub(crate) mod committer;

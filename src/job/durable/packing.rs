@@ -5,13 +5,11 @@
 //! difference to it, and the number of zero bits at the end of all differences, which are left out (colours are often 8 bits times
 //! 256). Full groups are laid out for vector instructions; the last one in pieces of 32, so that little is padded.
 
-use bitpacking::{BitPacker, BitPacker1x, BitPacker8x};
+use crate::job::durable::bits::{PIECE, pack_group, pack_piece, unpack_group, unpack_piece};
 use multiversion::multiversion;
 
 /// Values of a full group.
-const GROUP: usize = BitPacker8x::BLOCK_LEN;
-/// Values of a piece of the last group.
-const PIECE: usize = BitPacker1x::BLOCK_LEN;
+const GROUP: usize = 256;
 
 /// A column of a group.
 type Column = [u32; GROUP];
@@ -68,12 +66,12 @@ fn pack_column(column: &mut Column, length: usize, bytes: &mut Vec<u8>) {
     bytes.resize(start + packed_bytes(length, width), 0);
     let packed = &mut bytes[start..];
     if length == GROUP {
-        BitPacker8x::new().compress(column, packed, width);
+        pack_group(column, width.into(), packed);
         return;
     }
     column[length..].fill(0);
     for (piece, packed) in column.chunks_exact(PIECE).zip(packed.chunks_exact_mut(packed_piece(width).max(1))) {
-        BitPacker1x::new().compress(piece, packed, width);
+        pack_piece(piece, width.into(), packed);
     }
 }
 
@@ -88,10 +86,10 @@ fn unpack_column<'a>(bytes: &'a [u8], length: usize, column: &mut Column) -> Opt
     let (packed, rest) = rest.split_at_checked(packed_bytes(length, width))?;
     match width {
         0 => column[..length].fill(0),
-        _ if length == GROUP => _ = BitPacker8x::new().decompress(packed, column, width),
+        _ if length == GROUP => unpack_group(packed, width.into(), column),
         _ => {
             for (packed, piece) in packed.chunks_exact(packed_piece(width)).zip(column.chunks_exact_mut(PIECE)) {
-                BitPacker1x::new().decompress(packed, piece, width);
+                unpack_piece(packed, width.into(), piece);
             }
         }
     }
