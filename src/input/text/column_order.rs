@@ -224,7 +224,8 @@ impl List {
         if !is_other {
             return None;
         }
-        let is_list = self.between(run).contains(&Token::Separator) && self.is_named_list();
+        let between = self.between(run);
+        let is_list = between.contains(&Token::Separator) && !between.contains(&Token::Unknown) && self.is_named_list();
         if self.is_dense() { Some(Doubt::Certain) } else { is_list.then_some(Doubt::Possible) }
     }
 
@@ -275,6 +276,12 @@ fn listed(tokens: &[Token]) -> Option<Vec<Listed>> {
     let mut places: Vec<usize> = listed.iter().filter_map(|listed| listed.place).collect();
     let have_all = places.len() == listed.len();
     places.dedup();
+    // "north 3, east 4" are values.
+    let are_places =
+        is_place_first || tokens.contains(&Token::List) || places.iter().min().is_none_or(|least| *least <= 1);
+    if have_all && !are_places {
+        return None;
+    }
     if have_all && (places.len() > 1 || listed.len() == 1 || has_one_letter_and_direction(&listed)) {
         by_place(&mut listed);
     } else if is_place_first {
@@ -382,6 +389,10 @@ mod tests {
             "field 1: northing of the prism\nfield 2: easting of the prism\nfield 3: height above the sea",
             "y1,x1,z1",
             "Βορράς Ανατολή Υψόμετρο",
+            "GridNorth GridEast GridHeight",
+            "mN mE mRL",
+            "Nordachse, Ostachse, Hoehe",
+            "NED",
             "A: north\nB: east\nC: height",
             "Coordenada Norte Coordenada Este Cota",
             "Northing and easting in metres, heights DHHN2016",
@@ -416,6 +427,9 @@ mod tests {
             "PROJCS[\"GK\", AXIS[\"Northing\",NORTH],AXIS[\"Easting\",EAST]]",
             "x (east), y (north), z (up)",
             "2024-05-01 12:30:01 operator",
+            "position: north 3, east 4, up 5",
+            "order of points: from north to south, from west to east",
+            "scanned in Nordhausen, Ostpreussen, Hohenstein",
         ] {
             assert_eq!(doubt_of(comments, 3), None, "{comments}");
         }

@@ -65,6 +65,7 @@ const AXES: [(&[&str], ColumnWord); 8] = [
     (
         &[
             "depth",
+            "down",
             "depths",
             "tiefe",
             "tiefen",
@@ -146,7 +147,7 @@ const AXES: [(&[&str], ColumnWord); 8] = [
 ];
 
 /// Words that say that columns are listed.
-const LISTS: [&str; 32] = [
+const LISTS: [&str; 33] = [
     "attributes",
     "axes",
     "axis",
@@ -179,6 +180,7 @@ const LISTS: [&str; 32] = [
     "spalte",
     "spalten",
     "variables",
+    "frame",
 ];
 
 const FILLERS: [&str; 59] = [
@@ -278,12 +280,16 @@ const BEGINNINGS: [(&str, ColumnWord); 22] = [
     ("標高", ColumnWord::Height),
 ];
 
+/// How the ends of such compounds begin.
+const AXIS_ENDS: [&str; 13] =
+    ["ach", "angab", "ax", "coor", "dir", "ing", "ois", "komp", "koo", "kord", "rich", "val", "wer"];
+
 /// Columns have places up to this one.
 const MOST_PLACES: usize = 40;
 
 /// Returns the tokens of a comment without its mark.
 pub(crate) fn tokens(text: &[u8]) -> Vec<Token> {
-    let text = folded(&decoded(text).to_lowercase());
+    let text = folded(&with_parted_words(&decoded(text)).to_lowercase());
     let characters: Vec<char> = text.chars().collect();
     let digit = |at: Option<usize>| at.and_then(|at| characters.get(at)).is_some_and(char::is_ascii_digit);
     let mut tokens = Vec::new();
@@ -301,6 +307,20 @@ pub(crate) fn tokens(text: &[u8]) -> Vec<Token> {
     }
     read_word(&word, &mut tokens);
     tokens
+}
+
+/// Returns a text with blanks in words such as "GridNorth".
+fn with_parted_words(text: &str) -> String {
+    let mut parted = String::with_capacity(text.len());
+    let mut is_after_small = false;
+    for character in text.chars() {
+        if is_after_small && character.is_uppercase() {
+            parted.push(' ');
+        }
+        is_after_small = character.is_lowercase();
+        parted.push(character);
+    }
+    parted
 }
 
 fn read_word(word: &str, tokens: &mut Vec<Token>) {
@@ -355,8 +375,17 @@ fn column(word: &str) -> Option<ColumnWord> {
     // "Eastings", "Hochwerte", "Höhen".
     let singular = ["s", "e", "n", "en"].into_iter().filter_map(|end| word.strip_suffix(end));
     let mut forms = std::iter::once(word).chain(singular.filter(|word| word.chars().count() >= 4));
-    let begins = || BEGINNINGS.iter().find(|(start, _)| word.starts_with(start)).map(|(_, column)| *column);
+    let begins = || {
+        let is_compound =
+            |start: &str| word.strip_prefix(start).is_some_and(|rest| !start.is_ascii() || is_of_axis(rest));
+        BEGINNINGS.iter().find(|(start, _)| is_compound(start)).map(|(_, column)| *column)
+    };
     forms.find_map(|word| named(word).or_else(|| known(word))).or_else(begins)
+}
+
+/// Returns whether a direction before this end of a word names an axis, as in "Nordachse", and no place, as in "Nordhausen".
+fn is_of_axis(end: &str) -> bool {
+    end.chars().count() <= 1 || AXIS_ENDS.iter().any(|start| end.starts_with(start))
 }
 
 fn named(word: &str) -> Option<ColumnWord> {
@@ -373,6 +402,7 @@ fn named(word: &str) -> Option<ColumnWord> {
 fn code(word: &str) -> Option<Vec<ColumnWord>> {
     let latitude_first = [ColumnWord::Direction(1), ColumnWord::Direction(0), ColumnWord::Height];
     match word {
+        "ned" => return Some(vec![ColumnWord::Initial(1), ColumnWord::Initial(0), ColumnWord::Depth]),
         "latlon" | "latlong" => return Some(latitude_first[..2].to_vec()),
         "latlonh" | "llh" | "blh" => return Some(latitude_first.to_vec()),
         "zxy" | "zyx" => return Some(word.chars().filter_map(letter).collect()),

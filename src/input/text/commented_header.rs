@@ -90,7 +90,7 @@ impl Comments<'_> {
     fn unread_list(&self) -> Option<(&[u8], Doubt, String)> {
         let widths = self.widths();
         let lists = self.lines.iter().rev().flat_map(|line| {
-            let texts = texts_of(line, self.marks).into_iter();
+            let texts = lists_of(line, self.marks).into_iter();
             let headers = texts.flat_map(|text| CANDIDATES.map(|own| (own, own.fields(text))));
             let unread = headers.filter(|(_, fields)| !begins_with_xyz(fields));
             let doubts = unread.filter_map(|(own, fields)| Some((header_doubt(own, &fields, &widths)?, fields)));
@@ -103,6 +103,18 @@ impl Comments<'_> {
         let certain = lists.iter().position(|(_, doubt, _)| *doubt == Doubt::Certain).unwrap_or(0);
         lists.into_iter().nth(certain)
     }
+}
+
+/// Returns what may be a list in a comment: all of its text, and what follows its last colon, unless that is the value of something else.
+fn lists_of<'a>(line: &'a [u8], marks: &[String]) -> Vec<&'a [u8]> {
+    let mut texts = texts_of(line, marks);
+    if let [after, whole] = texts.as_slice() {
+        let title = tokens(&whole[..whole.len() - after.len()]);
+        if title.contains(&Token::Unknown) && !title.contains(&Token::List) {
+            texts.remove(0);
+        }
+    }
+    texts
 }
 
 /// Returns whether these fields name columns, and the rows have so many columns: all are names, and some of coordinates or times. Where
@@ -122,7 +134,7 @@ fn header_doubt(delimiter: Delimiter, fields: &[&[u8]], widths: &[usize]) -> Opt
     let are_words = delimiter != Delimiter::Blank && fields.iter().all(|field| is_word(&field));
     let fields: Vec<(bool, Vec<Token>)> = fields.iter().map(|field| (is_word(field), tokens(field))).collect();
     let count = |wanted: fn(bool, &[Token]) -> bool| fields.iter().filter(|(word, field)| wanted(*word, field)).count();
-    if count(|_, field| names_column(field) && field.contains(&Token::Value)) > 0 {
+    if count(|_, field| gives_value(field)) > 0 {
         // "north: 5933000, east: 565000"
         return None;
     }
@@ -141,6 +153,12 @@ fn header_doubt(delimiter: Delimiter, fields: &[&[u8]], widths: &[usize]) -> Opt
     }
     let has_unknown = count(|_, field| field.contains(&Token::Unknown)) > 0;
     (is_as_wide && are_words && has_unknown).then_some(Doubt::Possible)
+}
+
+/// Returns whether a field gives the value of what it names, and not the place of a column.
+fn gives_value(tokens: &[Token]) -> bool {
+    let is_number = |token: &Token| matches!(token, Token::Value | Token::Place(_));
+    names_column(tokens) && !tokens.contains(&Token::List) && tokens.iter().any(is_number)
 }
 
 fn names_column(tokens: &[Token]) -> bool {
@@ -227,6 +245,8 @@ mod tests {
             ("# surveyed 2020, Meyer, Bern", "1,2,3"),
             ("# 12, 13, 14", "1,2,3"),
             ("# hill, dale", "1,2,3"),
+            ("# client: East Height Ltd", "1 2 3"),
+            ("# position: north 3, east 4, up 5", "1,2,3"),
         ] {
             assert_eq!(unread(comment, row), None, "{comment}");
         }
