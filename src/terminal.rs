@@ -31,10 +31,19 @@ fn escaped(text: &str, stays: impl Fn(char) -> bool) -> String {
     out
 }
 
-/// Tells whether a terminal does something at this character instead of showing it: control characters, and those that end lines or
-/// change the direction of writing.
-fn is_obeyed(c: char) -> bool {
-    c.is_control() || matches!(c, '\u{2028}' | '\u{2029}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+/// Tells whether a terminal does something at this character instead of showing it, or shows nothing: control characters, those that end
+/// lines or change the direction of writing, and those without a width, by which names differ that look alike.
+pub(crate) fn is_obeyed(c: char) -> bool {
+    c.is_control() || is_invisible(c)
+}
+
+/// Tells whether a character has no form of its own. Accents and the variants of signs are none.
+fn is_invisible(c: char) -> bool {
+    matches!(c,
+        '\u{ad}' | '\u{34f}' | '\u{61c}' | '\u{115f}' | '\u{1160}' | '\u{17b4}' | '\u{17b5}' | '\u{180b}'..='\u{180f}'
+        | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{3164}'
+        | '\u{feff}' | '\u{ffa0}' | '\u{fff0}'..='\u{fffb}' | '\u{1bca0}'..='\u{1bca3}' | '\u{1d173}'..='\u{1d17a}'
+        | '\u{e0000}'..='\u{e0fff}')
 }
 
 fn shortened(line: &str) -> String {
@@ -58,6 +67,7 @@ mod tests {
     fn a_terminal_obeys_nothing() {
         assert_eq!(harmless("a\u{1b}[31m b\tc\nd\r\u{9b}\u{202e}e"), "a\\u{1b}[31m b\tc\nd\\r\\u{9b}\\u{202e}e");
         assert_eq!(one_line("a\nb\tc ü"), "a\\nb\\tc ü");
+        assert_eq!(one_line("a\u{200b}b\u{feff}c\u{2060}d\u{ad}"), "a\\u{200b}b\\u{feff}c\\u{2060}d\\u{ad}");
         assert_eq!(name(Path::new("x\u{7}.laz")), "x\\u{7}.laz");
     }
 

@@ -3,6 +3,7 @@
 use crate::config;
 use crate::init::config_folder::ConfigFolder;
 use crate::job::options::JobOptions;
+use crate::terminal::is_obeyed;
 use crate::{Error, Result};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -122,13 +123,13 @@ pub(crate) fn options_of(text: &str, folder: &Path) -> Result<JobOptions> {
 
 /// Returns a text as TOML has it.
 pub(crate) fn quoted(text: &str) -> String {
-    if !text.contains(char::is_control) {
+    if !text.contains(is_obeyed) {
         return toml::Value::from(text).to_string();
     }
-    // TOML allows some control characters as they are, and a terminal would obey them.
+    // TOML allows some characters as they are that a terminal would obey, or not show.
     let sign = |c: char| match c {
         '"' | '\\' => format!("\\{c}"),
-        c if c.is_control() => format!("\\u{:04X}", u32::from(c)),
+        c if is_obeyed(c) => format!("\\U{:08X}", u32::from(c)),
         c => c.to_string(),
     };
     format!("\"{}\"", text.chars().map(sign).collect::<String>())
@@ -140,9 +141,9 @@ mod tests {
 
     #[test]
     fn a_text_is_quoted_without_control_characters() {
-        for text in ["a", "it's \"b\"", "c\\d\t", "\u{1b}[31m\n\u{9b}\u{7f}\"'\\"] {
+        for text in ["a", "it's \"b\"", "c\\d\t", "\u{1b}[31m\n\u{9b}\u{7f}\"'\\", "\u{200b}\u{e0001}"] {
             let value = quoted(text);
-            assert!(!value.contains(char::is_control), "{value:?}");
+            assert!(!value.contains(is_obeyed), "{value:?}");
             assert_eq!(format!("a = {value}").parse::<toml::Table>().unwrap()["a"].as_str(), Some(text));
         }
     }

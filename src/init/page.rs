@@ -1,6 +1,7 @@
 //! A page of TOML: comments, lines that count, and options that stand there as comments.
 
 use crate::init::draft::NeededLine;
+use crate::terminal::is_obeyed;
 
 /// No line of prose is longer, apart from a word that is.
 const WIDTH: usize = 100;
@@ -81,8 +82,7 @@ impl Page {
 /// Returns a text without characters that would end a comment, that TOML allows in none, or that a terminal would obey. Names of files
 /// and of systems may have them.
 pub(crate) fn harmless(text: &str) -> String {
-    let is_harmful = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
-    text.chars().map(|c| if is_harmful(c) { '\u{fffd}' } else { c }).collect()
+    text.chars().map(|c| if is_obeyed(c) { '\u{fffd}' } else { c }).collect()
 }
 
 #[cfg(test)]

@@ -91,17 +91,18 @@ pub(crate) fn refuse_other_formats(path: &Path, start: &[u8]) -> Result<()> {
     Ok(())
 }
 
-/// Returns whether the text begins as PTX does: the numbers of columns and rows of a scan in a line each, then the position of the
-/// scanner.
+/// Returns whether the text begins as PTX does, after blank lines and comments: the numbers of columns and rows of a scan in a line each,
+/// then the position of the scanner.
 fn is_ptx(text: &[u8]) -> bool {
-    let mut lines = text.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii);
-    let mut columns =
-        || lines.next().map_or(0, |line| line.split(u8::is_ascii_whitespace).filter(|c| !c.is_empty()).count());
-    let counts = [columns(), columns(), columns(), columns()];
-    let begins = |line: usize| {
-        text.split(|byte| *byte == b'\n').nth(line).is_some_and(|line| line.trim_ascii().iter().all(u8::is_ascii_digit))
+    let lines = text.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii);
+    let is_skipped = |line: &&[u8]| line.is_empty() || line.starts_with(b"#") || line.starts_with(b"//");
+    let first: Vec<&[u8]> = lines.skip_while(is_skipped).take(4).collect();
+    let parts = |line: &&[u8]| {
+        let is_between = |byte: &u8| byte.is_ascii_whitespace() || matches!(byte, b',' | b';');
+        line.split(is_between).filter(|part| !part.is_empty()).count()
     };
-    counts == [1, 1, 3, 3] && begins(0) && begins(1)
+    let is_count = |line: &&[u8]| line.iter().all(u8::is_ascii_digit);
+    first.iter().map(parts).eq([1, 1, 3, 3]) && first.iter().take(2).all(is_count)
 }
 
 #[cfg(test)]
@@ -123,6 +124,7 @@ mod tests {
             (b"II*\0abc", "TIFF"),
             (b"ncols 4\nnrows 5\n", "ESRI"),
             (b"100\n200\n0 0 0\n1 0 0\n0 1 0\n", "is PTX"),
+            (b"\n# scan\n100\r\n200\r\n0,0,0\r\n1,0,0\r\n", "is PTX"),
         ] {
             let error = refuse_other_formats(Path::new("a.csv"), start).err().map(|error| error.to_string());
             assert!(error.as_ref().is_some_and(|error| error.contains(words)), "{words}: {error:?}");

@@ -271,3 +271,103 @@ fn the_scale_of_colours_is_that_of_the_whole_text() {
     assert_eq!(last("0.4,0.6,0.2", 1, "140,160,120"), ([65535; 3], false));
     assert_eq!(last("0,0,0", 5000, "140,160,120"), ([140, 160, 120], false));
 }
+
+/// Rows in the order northing, easting, height.
+const NORTH_FIRST: &str = "5933001.5 565002.25 12.5\n5933004.5 565005.25 13.5\n5933011.5 565001.25 14.5\n";
+
+#[test]
+fn names_in_many_languages_and_forms_are_read() {
+    for header in [
+        "# N/E/H (m)",
+        "# X_north Y_east Z",
+        "X_north Y_east Z",
+        "# utm_north utm_east ellipsoidal_h",
+        "% Hochwert Rechtswert Hoehe",
+        "; N E H",
+        "-- N E H",
+        "Columns: N E H",
+        "\u{feff}# Norden Osten Höhe",
+        "# nord est hauteur",
+        "# Norte Este Altura",
+        "# Noord Oost Hoogte",
+        "# Północ Wschód Wysokość",
+        "# Sever Východ Výška",
+        "# Norr Öster Höjd",
+        "# Pohjoinen Itä Korkeus",
+        "# Север Восток Высота",
+    ] {
+        let cloud = text(&format!("{header}\n{NORTH_FIRST}")).unwrap_or_else(|error| panic!("{header}: {error}"));
+        assert_eq!(cloud.source.min, [565_001.25, 5_933_001.5, 12.5], "{header}");
+    }
+}
+
+#[test]
+fn comments_that_list_columns_in_another_order_are_no_remarks() {
+    for header in [
+        "# north, east",
+        "# NEZ",
+        "# col1: north\n# col2: east\n# col3: height",
+        "# column 2 = easting\n# column 1 = northing\n# column 3 = height",
+        "# Northing\n# Easting\n# Height",
+        "# X Y Z are in the order north east up",
+        "# Northing and easting in metres, heights DHHN2016",
+        "# export of a device, X (north), Y (east), Z",
+    ] {
+        let error = text(&format!("{header}\n{NORTH_FIRST}")).err().unwrap_or_else(|| panic!("{header} was read"));
+        let message = error.to_string();
+        assert!(error.exit_code() == 3 && message.contains("`columns` under [input.csv]"), "{header}: {message}");
+        assert!(message.contains("the comment"), "{header}: {message}");
+    }
+    for header in ["# X Y Z\n# North East Up", "# X = north, Y = east\nX Y Z"] {
+        let error = text(&format!("{header}\n{NORTH_FIRST}")).err().unwrap_or_else(|| panic!("{header} was read"));
+        assert!(
+            error.exit_code() == 3 && error.to_string().contains("gives them other directions"),
+            "{header}: {error}"
+        );
+    }
+}
+
+#[test]
+fn remarks_are_no_headers() {
+    for remark in [
+        "# made by a scanner, north of the river",
+        "# scanned from north to east, height in m",
+        "# WGS84, UTM32N, EGM96",
+        "# surveyed 2020, Meyer, Bern",
+        "# north: 5933200.5, east: 565400.25, height: 14",
+        "# X Y Z, north east corner",
+        "# Author: Y. Nord",
+    ] {
+        let cloud = text(&format!("{remark}\n1.5,2,3.25\n4,5,6\n")).unwrap_or_else(|error| panic!("{remark}: {error}"));
+        assert_eq!(cloud.source.min, [1.5, 2.0, 3.25], "{remark}");
+        assert!(cloud.source.warnings.iter().next().is_none(), "{remark}: {:?}", cloud.source.warnings);
+    }
+    let cloud = text("# Meyer, Berger, Bern\n1.5,2,3.25\n4,5,6\n").unwrap();
+    assert!(first_warning(&cloud).contains("the first three are taken for x, y and z"));
+}
+
+#[test]
+fn a_mark_that_may_be_the_name_of_a_column_is_not_left_out() {
+    for header in ["#\tX\tY\tZ", "%\tX\tY\tZ"] {
+        let error = text(&format!("{header}\n17\t1.5\t2\t3.25\n12\t4\t5\t6\n")).err().expect("was read");
+        assert!(error.exit_code() == 3 && error.to_string().contains("rows have 4"), "{error}");
+    }
+}
+
+#[test]
+fn blanks_commas_and_points_between_thousands_are_refused() {
+    let pointed = |value: usize| match value {
+        0..1000 => value.to_string(),
+        _ => format!("{}.{:03}", value / 1000, value % 1000),
+    };
+    for row in [
+        &|i: usize| format!("565 {:03},50\t5 933 {},25\t99,5\n", 10 * i, 300 + i) as String,
+        &|i: usize| format!("565,{:03},5,933,{},100\n", 10 * i, 300 + i),
+        &|i: usize| format!("{};{};7.5\n", pointed(137 * i), pointed(91 * i)),
+    ] as [&dyn Fn(usize) -> String; 3]
+    {
+        let rows: String = (1..90).map(row).collect();
+        let error = text(&rows).err().unwrap_or_else(|| panic!("{} was read", row(1)));
+        assert!(error.exit_code() == 3 && error.to_string().contains("between thousands"), "{}: {error}", row(1));
+    }
+}

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::input::points::returns::KeptReturns;
 use crate::input::text::comment_names::{names_in_comments, texts_of};
-use crate::input::text::commented_header::unread_header;
+use crate::input::text::commented_header::{Comments, UnreadHeader};
 use crate::input::text::decimal_comma::{self, CommaUse, Names};
 use crate::input::text::decimal_sign::{self, DecimalSign};
 use crate::input::text::delimiter::{CANDIDATES, Delimiter};
@@ -21,6 +21,7 @@ use crate::input::text::optional_columns::{drop_unreadable_colors, unreadable_cl
 use crate::input::text::options::TextOptions;
 use crate::input::text::role::ColumnRole;
 use crate::input::text::row_choice::RowChoice;
+use crate::input::text::thousands::are_separated;
 use crate::input::text::units::UnitsOfAxes;
 use crate::{Error, Result, Warnings};
 
@@ -42,6 +43,10 @@ const DOUBTFUL_COMMA: &str = "has only whole numbers with commas between them, m
 
 const UNCLEAR_THOUSANDS: &str = "has commas that may stand before decimals or between thousands, as in 565,000: write it again with points \
                                  before decimals, and nothing between thousands";
+
+const THOUSANDS: &str = "has blanks, commas or points between thousands, as in 565 000, so that parts of numbers look like columns or decimals: \
+                         write it again with nothing between thousands, or name the columns with `columns` under [input.csv] if they are \
+                         no thousands";
 
 const NUMBERED: &str = "has columns that no line names, and the first of them counts the rows: it looks like the number of the point, and \
                         not like x; name the columns with `columns` under [input.csv], for example [\"id\", \"x\", \"y\", \"z\"], or \
@@ -137,31 +142,46 @@ impl Columns {
         let data = &texts[header.lines..];
         let bad = |what: String| Error::input(path, what);
         let mut words = None;
+        let mut doubts = None;
+        let before = &lines[..rows.get(header.lines).map_or(0, |row| row.0)];
+        let remarks = Comments { lines: before, marks: &comments, candidates: &candidates, rows: data };
         let found = match (&options.columns, header.names) {
             (Some(names), _) => {
                 let mut named = named_by_user(names)?;
-                let end = rows.get(header.lines).map_or(0, |row| row.0);
-                let comments = lines[..end].iter().flat_map(|line| texts_of(line, &comments));
+                let comments = before.iter().flat_map(|line| texts_of(line, &comments));
                 texts[..header.lines].iter().copied().chain(comments).for_each(|line| named.add_units_beside(line));
                 Some(named)
             }
             (None, Some(names)) => Some(names.map_err(bad)?),
             (None, None) if options.header == Some(false) => None,
             (None, None) => {
-                let end = rows.get(header.lines).map_or(0, |row| row.0);
-                let in_comments = names_in_comments(&lines[..end], &comments, &candidates, data).map_err(bad)?;
+                let in_comments = names_in_comments(before, &comments, &candidates, data).map_err(bad)?;
                 words = in_comments.words;
-                let named = in_comments.named;
-                let is_open = named.is_none() && words.is_none();
-                let unread = is_open.then(|| unread_header(&lines[..end], &comments, &candidates, data)).flatten();
-                unread.map_or(Ok(()), |what| Err(bad(what)))?;
-                names_among_rows(data, &candidates)
-                    .filter(|_| named.is_none())
-                    .map_or(Ok(named), |what| Err(bad(what)))?
+                let unread = in_comments.named.is_none().then(|| remarks.unread_header(words.is_some()));
+                match unread.flatten() {
+                    Some(UnreadHeader::Certain(what)) => return Err(bad(what)),
+                    Some(UnreadHeader::Possible(what)) => doubts = Some(what),
+                    None => {}
+                }
+                let among_rows = || names_among_rows(data, &candidates);
+                match in_comments.named {
+                    Some(named) => Some(named),
+                    None => among_rows().map_or(Ok(None), |what| Err(bad(what)))?,
+                }
             }
         };
+        if let Some(what) =
+            found.as_ref().filter(|_| options.columns.is_none()).and_then(|named| remarks.other_directions(named))
+        {
+            return Err(bad(what));
+        }
         let mut roles = used_roles(found.as_ref(), choice);
         let delimiter = row_delimiter(&candidates, &roles, data);
+        let places: Vec<usize> =
+            (0..roles.len()).filter(|at| matches!(roles[*at], ColumnRole::Coordinate(_))).collect();
+        if options.columns.is_none() && are_separated(delimiter, &places, data) {
+            return Err(bad(THOUSANDS.to_string()));
+        }
         if options.columns.as_ref().is_none_or(|names| data.iter().any(|row| delimiter.has_more_than(names.len(), row)))
         {
             let found = found.as_ref().filter(|_| options.columns.is_none());
@@ -175,7 +195,7 @@ impl Columns {
         let columns_of_last = texts.last().map_or(0, filled);
         let units = found.as_ref().map_or(Ok(UnitsOfAxes::default()), NamedColumns::units);
         let units = units.map_err(|what| bad(format!("its header {what}")))?;
-        warnings.extend(names_warning(found.as_ref(), &units, columns_of_last));
+        warnings.extend(doubts.or_else(|| names_warning(found.as_ref(), &units, columns_of_last)));
         warnings.extend(unknown_units(found.as_ref()));
         let named = found.as_ref().filter(|_| options.columns.is_none()).map(|found| found.count);
         warnings.extend(drop_unreadable_colors(delimiter, &mut roles, data));

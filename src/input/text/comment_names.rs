@@ -1,5 +1,6 @@
 //! Names of columns in a comment before the rows, such as `# x y z`.
 
+use crate::input::text::column_order::doubt;
 use crate::input::text::decimal_comma::is_pointed;
 use crate::input::text::delimiter::{CANDIDATES, Delimiter};
 use crate::input::text::header::{ROWS_FOR_NAMES, columns_of};
@@ -7,6 +8,9 @@ use crate::input::text::lines::{is_skipped, shown};
 use crate::input::text::names::{NamedColumns, named_columns};
 use crate::input::text::numbered::are_numbered;
 use crate::input::text::role::ColumnRole;
+
+/// What parts names in comments, though no columns, as in `# E/N/H`.
+const SLASH: Delimiter = Delimiter::Byte(b'/');
 
 /// What comments say of columns.
 pub(crate) struct CommentNames {
@@ -33,13 +37,14 @@ pub(crate) fn names_in_comments(
     for (at, line) in lines.iter().enumerate().rev().filter(|(_, line)| is_comment(line)) {
         for text in texts_of(line, comments) {
             let others = candidates.iter().filter(|own| !CANDIDATES.contains(own));
-            let readings = CANDIDATES.iter().chain(others).filter_map(|delimiter| {
+            let readings = CANDIDATES.iter().chain(others).chain(&[SLASH]).filter_map(|delimiter| {
                 let fields = Some(delimiter.fields(text)).filter(|fields| fields.len() >= 3)?;
                 let names = named_columns(fields.into_iter()).ok()?;
                 Some((*delimiter, names))
             });
             for (delimiter, names) in readings {
                 match rows.fit(delimiter, &names) {
+                    _ if rows.may_number(&names, line) => misfit = misfit.or(Some((line, names.count))),
                     Some(mut named) => {
                         let mut below = lines[at + 1..].iter().flat_map(|line| texts_of(line, comments));
                         let added = below.try_for_each(|text| named.add_units_of_comment(text));
@@ -47,7 +52,8 @@ pub(crate) fn names_in_comments(
                         return Ok(CommentNames { named: Some(named), words: None });
                     }
                     None if rows.mean_the_same(&names) => words = words.or(Some(names.count)),
-                    None => misfit = misfit.or(Some((line, names.count))),
+                    None if rows.may_mean(&names, text) => misfit = misfit.or(Some((line, names.count))),
+                    None => {}
                 }
             }
         }
@@ -73,7 +79,7 @@ pub(crate) fn texts_of<'a>(line: &'a [u8], comments: &[String]) -> Vec<&'a [u8]>
     let line = line.trim_ascii_start();
     let Some(comment) = comments.iter().find(|comment| line.starts_with(comment.as_bytes())) else { return Vec::new() };
     let text = &line[comment.len()..];
-    let marks = text.iter().take_while(|byte| matches!(byte, b'#' | b'/')).count();
+    let marks = text.iter().take_while(|byte| matches!(byte, b'#' | b'/' | b'!')).count();
     let text = text[marks..].trim_ascii();
     // "Columns: x y z" are three names.
     let after_colon = text.iter().rposition(|byte| *byte == b':').map(|colon| text[colon + 1..].trim_ascii());
@@ -114,12 +120,26 @@ impl Rows<'_> {
         Some(names)
     }
 
+    /// Returns whether the mark of the comment `line` may be the name of a first column, of numbers, as in `#<tab>x<tab>y<tab>z`.
+    fn may_number(&self, names: &NamedColumns, line: &[u8]) -> bool {
+        let after = line.trim_ascii_start().strip_prefix(b"#").unwrap_or_default();
+        after.starts_with(b"\t") && self.columns().any(|columns| columns == names.count + 1)
+    }
+
     /// Returns whether commas may stand before decimals as well: they part columns, and no number has a point.
     fn may_have_decimal_commas(&self, delimiter: Delimiter) -> bool {
         let has_point = |row: &&[u8]| delimiter.fields(row).iter().any(|field| is_pointed(field));
         delimiter == Delimiter::Byte(b',')
             && self.readings().any(|(own, _)| own == delimiter)
             && !self.rows.iter().any(has_point)
+    }
+
+    /// Returns whether a comment with more or fewer names than columns may name these columns, in another order or in other places. It may
+    /// be a sentence.
+    fn may_mean(&self, names: &NamedColumns, text: &[u8]) -> bool {
+        let columns = self.columns().max().unwrap_or(0);
+        let is_in_order = [0, 1, 2].map(|axis| names.place(axis)).is_sorted();
+        is_in_order && columns != 3 || doubt(&[text], columns).is_some()
     }
 
     /// Returns whether columns without names mean the same: x, y and z come first, or are all there is in the order x, y, z.

@@ -1,48 +1,125 @@
-//! A comment that is a header, such as `# time, latitude, longitude, height`, but does not name x, y and z by names that are known. Without
-//! it, the first three columns would be taken for x, y and z.
+//! A comment that is a header, such as `# time, latitude, longitude, height`, but does not name x, y and z by names that are known, or
+//! lists them in another order. Without it, the first three columns would be taken for x, y and z.
 
+use crate::input::text::column_order::{Doubt, doubt, doubt_about_letters};
+use crate::input::text::column_words::{ColumnWord, Token, tokens};
 use crate::input::text::comment_names::texts_of;
 use crate::input::text::delimiter::{CANDIDATES, Delimiter};
 use crate::input::text::header::{ROWS_FOR_NAMES, columns_of};
 use crate::input::text::lines::shown;
-use crate::input::text::name::{Name, is_coordinate, words_of};
-use crate::input::text::names::named_columns;
+use crate::input::text::name::{Name, words_of};
+use crate::input::text::names::{NamedColumns, named_columns};
 use crate::input::text::role::ColumnRole;
-
-/// Words in the names of columns that are often beside coordinates.
-const TIMES: [&str; 9] = ["time", "utc", "gps", "gpstime", "seconds", "epoch", "timestamp", "zeit", "tiempo"];
 
 /// So many names of coordinates and times make a header.
 const LEAST_KNOWN: usize = 2;
 
-/// Returns a sentence about the last comment among `lines` that is a header of `rows`, the first of the text, if it names other columns
-/// first than x, y and z. It is known that no comment names x, y and z by names that are known.
-pub(crate) fn unread_header(
-    lines: &[&[u8]],
-    comments: &[String],
-    candidates: &[Delimiter],
-    rows: &[&[u8]],
-) -> Option<String> {
-    let rows = &rows[..rows.len().min(ROWS_FOR_NAMES)];
-    let readings = rows.iter().flat_map(|row| candidates.iter().map(move |own| (own, *row)));
-    let widths: Vec<usize> =
-        readings.filter(|(own, row)| own.numbers(row) >= 3).map(|(own, row)| columns_of(*own, row)).collect();
-    lines.iter().rev().find_map(|line| {
-        let texts = texts_of(line, comments).into_iter();
-        let headers = texts.flat_map(|text| CANDIDATES.map(|own| (own, own.fields(text))));
-        let mut unread = headers.filter(|(own, fields)| is_header(*own, fields, &widths) && !begins_with_xyz(fields));
-        let error = unread.find_map(|(_, fields)| named_columns(fields.into_iter()).err())?;
+/// So many comments before the rows are looked at, and so many bytes of each.
+const MOST_COMMENTS: usize = 1000;
+const LONGEST_COMMENT: usize = 1 << 14;
+
+const REMEDY: &str = "name the columns with `columns` under [input.csv], or set header = false there to take the first three for x, y and z";
+
+/// A comment that may be a header and was not read as one.
+#[derive(Debug, PartialEq)]
+pub(crate) enum UnreadHeader {
+    /// It is one, for this reason.
+    Certain(String),
+    /// It may be one: a warning.
+    Possible(String),
+}
+
+/// The comments before the rows of a text, and its first rows.
+pub(crate) struct Comments<'a> {
+    pub(crate) lines: &'a [&'a [u8]],
+    /// What begins a comment.
+    pub(crate) marks: &'a [String],
+    pub(crate) candidates: &'a [Delimiter],
+    pub(crate) rows: &'a [&'a [u8]],
+}
+
+impl Comments<'_> {
+    /// Returns what to say of a comment that names other columns first than x, y and z. It is known that no comment names the columns by
+    /// names that are known. If `has_words`, one begins with x, y and z.
+    pub(crate) fn unread_header(&self, has_words: bool) -> Option<UnreadHeader> {
+        let list = if has_words { None } else { self.unread_list() };
+        if let Some((line, Doubt::Certain, error)) = list {
+            return Some(UnreadHeader::Certain(format!("the comment {} {error}: {REMEDY}", shown(line))));
+        }
+        let (lines, texts): (Vec<&[u8]>, Vec<&[u8]>) = self.texts().unzip();
+        let order = doubt(&texts, self.widths().into_iter().max().unwrap_or(0));
+        let order = order.and_then(|(at, doubt)| Some((*lines.get(at)?, doubt)));
+        if let Some((line, Doubt::Certain)) = order {
+            let what = "lists other columns first than x, y and z, or in another order";
+            return Some(UnreadHeader::Certain(format!("the comment {} {what}: {REMEDY}", shown(line))));
+        }
+        let (line, _) = order.or(list.map(|(line, doubt, _)| (line, doubt)))?;
+        Some(UnreadHeader::Possible(format!(
+            "the comment {} may name the columns: the first three are taken for x, y and z; say otherwise with `columns` under [input.csv]",
+            shown(line)
+        )))
+    }
+
+    /// Returns a sentence about a comment that says that x or y of these names has another direction.
+    pub(crate) fn other_directions(&self, named: &NamedColumns) -> Option<String> {
+        let order = [named.place(0)?, named.place(1)?];
+        let (lines, texts): (Vec<&[u8]>, Vec<&[u8]>) = self.texts().unzip();
+        let line = lines.get(doubt_about_letters(&texts, order).filter(|_| named.letters)?)?;
         Some(format!(
-            "the comment {} {error}: name the columns with `columns` under [input.csv], or set header = false there to take the first three \
-             for x, y and z",
+            "its columns are named x and y, but the comment {} gives them other directions: name the columns with `columns` under \
+             [input.csv], with \"x\" for the easting and \"y\" for the northing",
             shown(line)
         ))
-    })
+    }
+
+    /// Returns each comment and its text.
+    fn texts(&self) -> impl Iterator<Item = (&[u8], &[u8])> {
+        let last = &self.lines[self.lines.len().saturating_sub(MOST_COMMENTS)..];
+        let texts = last.iter().filter_map(|line| Some((*line, texts_of(line, self.marks).pop()?)));
+        texts.map(|(line, text)| (line, &text[..text.len().min(LONGEST_COMMENT)]))
+    }
+
+    /// Returns how many columns the first rows have.
+    fn widths(&self) -> Vec<usize> {
+        let rows = &self.rows[..self.rows.len().min(ROWS_FOR_NAMES)];
+        let readings = rows.iter().flat_map(|row| self.candidates.iter().map(move |own| (own, *row)));
+        readings.filter(|(own, row)| own.numbers(row) >= 3).map(|(own, row)| columns_of(*own, row)).collect()
+    }
+
+    /// Returns the last comment that is a list of names, and what is wrong with them.
+    fn unread_list(&self) -> Option<(&[u8], Doubt, String)> {
+        let widths = self.widths();
+        let lists = self.lines.iter().rev().flat_map(|line| {
+            let texts = lists_of(line, self.marks).into_iter();
+            let headers = texts.flat_map(|text| CANDIDATES.map(|own| (own, own.fields(text))));
+            let unread = headers.filter(|(_, fields)| !begins_with_xyz(fields));
+            let doubts = unread.filter_map(|(own, fields)| Some((header_doubt(own, &fields, &widths)?, fields)));
+            doubts.filter_map(|(doubt, fields)| {
+                Some((*line, doubt, named_columns(fields.into_iter()).err()?.to_string()))
+            })
+        });
+        // Of several, the first is the last comment.
+        let lists: Vec<_> = lists.collect();
+        let certain = lists.iter().position(|(_, doubt, _)| *doubt == Doubt::Certain).unwrap_or(0);
+        lists.into_iter().nth(certain)
+    }
+}
+
+/// Returns what may be a list in a comment: all of its text, and what follows its last colon, unless that is the value of something else.
+fn lists_of<'a>(line: &'a [u8], marks: &[String]) -> Vec<&'a [u8]> {
+    let mut texts = texts_of(line, marks);
+    if let [after, whole] = texts.as_slice() {
+        let title = tokens(&whole[..whole.len() - after.len()]);
+        if title.contains(&Token::Unknown) && !title.contains(&Token::List) {
+            texts.remove(0);
+        }
+    }
+    texts
 }
 
 /// Returns whether these fields name columns, and the rows have so many columns: all are names, and some of coordinates or times. Where
 /// something else than blanks parts them, single words are enough, or fewer or more names than columns.
-fn is_header(delimiter: Delimiter, fields: &[&[u8]], widths: &[usize]) -> bool {
+fn header_doubt(delimiter: Delimiter, fields: &[&[u8]], widths: &[usize]) -> Option<Doubt> {
     let named = fields.len() - fields.last().is_some_and(|last| last.is_empty()) as usize;
     let fields = &fields[..named];
     let is_name = |field: &&[u8]| {
@@ -50,17 +127,56 @@ fn is_header(delimiter: Delimiter, fields: &[&[u8]], widths: &[usize]) -> bool {
             && std::str::from_utf8(field).map_or(true, |text| text.parse::<f64>().is_err())
     };
     if named < 3 || !fields.iter().all(is_name) {
-        return false;
+        return None;
     }
     let is_as_wide = widths.contains(&named);
-    let is_known =
-        |field: &&&[u8]| words_of(field).iter().any(|word| is_coordinate(word) || TIMES.contains(&word.as_str()));
-    let has_known = fields.iter().filter(is_known).count() >= LEAST_KNOWN;
-    let are_words = || fields.iter().all(|field| !Name::read(field).has_blanks());
-    match delimiter {
-        Delimiter::Blank => is_as_wide && has_known,
-        Delimiter::Byte(_) => has_known || (is_as_wide && are_words()),
+    let is_word = |field: &&[u8]| !Name::read(field).has_blanks();
+    let are_words = delimiter != Delimiter::Blank && fields.iter().all(|field| is_word(&field));
+    let fields: Vec<(bool, Vec<Token>)> = fields.iter().map(|field| (is_word(field), tokens(field))).collect();
+    let count = |wanted: fn(bool, &[Token]) -> bool| fields.iter().filter(|(word, field)| wanted(*word, field)).count();
+    if count(|_, field| gives_value(field)) > 0 {
+        // "north: 5933000, east: 565000"
+        return None;
     }
+    let known = count(|is_word, field| names_column(field) && (is_word || is_column(field)));
+    let is_kind = |kind: fn(&[Token]) -> bool| fields.iter().any(|(_, field)| kind(field));
+    let kinds = [
+        is_kind(|field| names_axis(field, 0)),
+        is_kind(|field| names_axis(field, 1)),
+        is_kind(|field| names_axis(field, 2)),
+    ];
+    let axes = kinds.into_iter().filter(|kind| *kind).count();
+    let are_known = known >= LEAST_KNOWN && axes > 0 && (axes > 1 || is_kind(names_other));
+    let is_long = delimiter != Delimiter::Blank && count(|_, field| is_column(field)) >= LEAST_KNOWN;
+    if are_known && (is_as_wide || is_long) || is_as_wide && are_words && known > 0 {
+        return Some(Doubt::Certain);
+    }
+    let has_unknown = count(|_, field| field.contains(&Token::Unknown)) > 0;
+    (is_as_wide && are_words && has_unknown).then_some(Doubt::Possible)
+}
+
+/// Returns whether a field gives the value of what it names, and not the place of a column.
+fn gives_value(tokens: &[Token]) -> bool {
+    let is_number = |token: &Token| matches!(token, Token::Value | Token::Place(_));
+    names_column(tokens) && !tokens.contains(&Token::List) && tokens.iter().any(is_number)
+}
+
+fn names_column(tokens: &[Token]) -> bool {
+    tokens.iter().any(|token| matches!(token, Token::Column(_)))
+}
+
+fn names_axis(tokens: &[Token], axis: usize) -> bool {
+    tokens.iter().any(|token| matches!(token, Token::Column(word) if word.axis() == Some(axis)))
+}
+
+/// Returns whether a field names something else than an axis.
+fn names_other(tokens: &[Token]) -> bool {
+    tokens.iter().any(|token| matches!(token, Token::Column(ColumnWord::Other)))
+}
+
+/// Returns whether a field names a column, and not a thing that lies north of another.
+fn is_column(tokens: &[Token]) -> bool {
+    names_column(tokens) && !tokens.iter().any(|token| matches!(token, Token::Unknown | Token::Stop))
 }
 
 /// Returns whether the first words of the fields are x, y and z, in a sentence such as "x, y, z in metres".
@@ -76,10 +192,11 @@ fn begins_with_xyz(fields: &[&[u8]]) -> bool {
 mod tests {
     use super::*;
 
-    fn unread(comment: &str, row: &str) -> Option<String> {
-        let comments = ["#".to_string(), "//".to_string()];
+    fn unread(comment: &str, row: &str) -> Option<UnreadHeader> {
+        let marks = ["#".to_string(), "//".to_string()];
         let lines: Vec<&[u8]> = comment.lines().map(str::as_bytes).collect();
-        unread_header(&lines, &comments, &CANDIDATES, &[row.as_bytes()])
+        let comments = Comments { lines: &lines, marks: &marks, candidates: &CANDIDATES, rows: &[row.as_bytes()] };
+        comments.unread_header(false)
     }
 
     #[test]
@@ -99,10 +216,20 @@ mod tests {
             ),
             ("# Columns: time, lat, lon, level", "42000.5,78.1,301.2,1903.3"),
             ("# zeit breite laenge pegel", "42000.5 78.1 301.2 1903.3"),
-            ("# one,two,three", "42000.5,78.1,301.2"),
+            ("# time,two,three", "42000.5,78.1,301.2"),
         ] {
             let what = unread(comment, row);
-            assert!(what.is_some_and(|what| what.contains("names no column")), "{comment}");
+            let words = ["names no column", "lists other columns first"];
+            let is_named = |what: &str| words.iter().any(|word| what.contains(word));
+            assert!(matches!(&what, Some(UnreadHeader::Certain(what)) if is_named(what)), "{comment}: {what:?}");
+        }
+    }
+
+    #[test]
+    fn lists_of_other_words_are_only_doubtful() {
+        for comment in ["# one,two,three", "# Meyer, Berger, Bern", "# NCOLS, NROWS, CELLSIZE"] {
+            let what = unread(comment, "42000.5,78.1,301.2");
+            assert!(matches!(what, Some(UnreadHeader::Possible(what)) if what.contains("first three")), "{comment}");
         }
     }
 
@@ -113,8 +240,14 @@ mod tests {
             ("# made by a scanner", "1 2 3 4"),
             ("# x, y, z in metres", "1,2,3"),
             ("# scanned in May, by two people, in the rain", "1,2,3"),
+            ("# scanned in May, on the north bank, and on the east bank, by me", "1,2,3"),
+            ("# WGS84, UTM32N, EGM96", "1,2,3"),
+            ("# surveyed 2020, Meyer, Bern", "1,2,3"),
             ("# 12, 13, 14", "1,2,3"),
             ("# hill, dale", "1,2,3"),
+            ("# processed: filtered, gridded, exported", "1,2,3"),
+            ("# client: East Height Ltd", "1 2 3"),
+            ("# position: north 3, east 4, up 5", "1,2,3"),
         ] {
             assert_eq!(unread(comment, row), None, "{comment}");
         }

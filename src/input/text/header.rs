@@ -16,6 +16,8 @@ pub(crate) enum HeaderLineError {
          a tab or spaces between them"
     )]
     NoNames,
+    #[error("is no number of points as PTS begins with, which is in digits alone: write it so, or remove the line")]
+    NoCount,
     #[error("{0}; name the columns with `columns` under [input.csv]")]
     Names(#[from] NamesError),
     #[error(
@@ -68,7 +70,8 @@ pub(crate) fn find(rows: &[&[u8]], candidates: &[Delimiter], wanted: Option<bool
         None if named => Header { lines: after(0), names: None, count: count_in(lines[0]) },
         None if count_in(lines[0]).is_some() => Header { lines: 1, names: None, count: count_in(lines[0]) },
         None => {
-            let error = names(lines[0]).err().map(|error| error.to_string()).unwrap_or_default();
+            let error = if is_like_count(lines[0]) { Some(HeaderLineError::NoCount) } else { names(lines[0]).err() };
+            let error = error.map(|error| error.to_string()).unwrap_or_default();
             Header { lines: 1, names: Some(Err(format!("the first line, {}, {error}", shown(lines[0])))), count: None }
         }
     }
@@ -115,6 +118,24 @@ fn count_in(line: &[u8]) -> Option<u64> {
     digits?.parse().ok()
 }
 
+/// Returns whether a line may be meant as a number of points: one number with signs between thousands, a sign or a word beside it.
+fn is_like_count(line: &[u8]) -> bool {
+    let text = String::from_utf8_lossy(line).to_lowercase();
+    let is_beside = |c: char| !c.is_ascii_digit();
+    let number = text.trim_matches(is_beside);
+    let words = ["", "points", "pts", "count", "number of points"];
+    let beside = text.replace(number, "");
+    !number.is_empty()
+        && words.contains(&beside.trim_matches(|c: char| !c.is_alphabetic()))
+        && number
+            .chars()
+            .all(|c| c.is_ascii_digit() || matches!(c, '.' | ',' | ' ' | '\'' | '_' | '\u{a0}' | 'e' | '+'))
+        && number
+            .split(is_beside)
+            .skip(1)
+            .all(|group| group.len() == 3 || number.contains(['e']) || number.ends_with(".0"))
+}
+
 /// Returns what `line` names under the first delimiter that gives x, y and z and fits `rows`, or what is wrong under the delimiter that
 /// gives most of x, y and z, and of several the one that gives as many columns as there are, or most. All delimiters are tried, the `candidates` for the rows first: a header may use another one.
 pub(crate) fn header_names(
@@ -127,13 +148,22 @@ pub(crate) fn header_names(
     }
     let others = CANDIDATES.iter().filter(|other| !candidates.contains(other));
     let all: Vec<Delimiter> = candidates.iter().chain(others).copied().collect();
-    let split = |delimiter: &Delimiter| named_columns(delimiter.fields(line).into_iter());
-    let found: Vec<(Delimiter, NamedColumns)> =
-        all.iter().filter_map(|delimiter| Some((*delimiter, split(delimiter).ok()?))).collect();
-    if let Some((_, names)) = found.iter().find(|(delimiter, names)| fits_rows(*delimiter, names, candidates, rows)) {
+    let split = |delimiter: &Delimiter| {
+        let (mark, fields) = without_mark(*delimiter, line);
+        named_columns(fields.into_iter()).map(|names| (mark, names))
+    };
+    let found: Vec<(Delimiter, bool, NamedColumns)> = all
+        .iter()
+        .filter_map(|delimiter| split(delimiter).ok().map(|(mark, names)| (*delimiter, mark, names)))
+        .collect();
+    let fits = |(delimiter, mark, names): &&(Delimiter, bool, NamedColumns)| {
+        let may_be_name = *mark && has_width(names.count + 1, candidates, rows);
+        !may_be_name && fits_rows(*delimiter, names, candidates, rows)
+    };
+    if let Some((_, _, names)) = found.iter().find(fits) {
         return Ok(names.clone());
     }
-    if let Some((_, names)) = found.first() {
+    if let Some((_, _, names)) = found.first() {
         let columns = |row: &&[u8]| candidates.iter().find(|d| d.numbers(row) >= 3).map(|d| columns_of(*d, row));
         let rows = rows.first().and_then(columns).unwrap_or(0);
         return Err(HeaderLineError::OtherCount { names: names.count, rows });
@@ -143,7 +173,31 @@ pub(crate) fn header_names(
         let fits = rows.first().is_some_and(|row| columns_of(**delimiter, row) == fields.len());
         (coordinates(fields.iter().copied()), fits, fields.len())
     });
-    Ok(split(most.unwrap_or(&Delimiter::Blank))?)
+    Ok(split(most.unwrap_or(&Delimiter::Blank))?.1)
+}
+
+/// Returns the fields of a line of names without what may stand before them, as in `% x y z` or `Columns: x y z`, and whether that was a
+/// mark, which may also be the name of a column.
+fn without_mark(delimiter: Delimiter, line: &[u8]) -> (bool, Vec<&[u8]>) {
+    let mut fields = delimiter.fields(line);
+    let is_title = |field: &&[u8]| field.len() > 1 && field.ends_with(b":");
+    let title = fields.iter().rposition(is_title).filter(|at| delimiter == Delimiter::Blank && at + 3 < fields.len());
+    if let Some(last) = title {
+        fields.drain(..=last);
+    }
+    let is_mark = fields.first().is_some_and(|first| !first.is_empty() && first.iter().all(u8::is_ascii_punctuation));
+    if is_mark && fields.len() > 3 {
+        fields.remove(0);
+        return (true, fields);
+    }
+    (false, fields)
+}
+
+/// Returns whether rows have so many columns.
+fn has_width(width: usize, candidates: &[Delimiter], rows: &[&[u8]]) -> bool {
+    let rows = rows.iter().take(ROWS_FOR_NAMES);
+    let mut readings = rows.flat_map(|row| candidates.iter().map(move |own| (*own, *row)));
+    readings.any(|(own, row)| own.numbers(row) >= 3 && columns_of(own, row) == width)
 }
 
 /// Returns whether names that this delimiter parts can be those of the columns of `rows`: as many, or with the delimiter of the rows and

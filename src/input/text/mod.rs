@@ -1,6 +1,8 @@
 //! Points as text, one per line. A first pass over the whole file finds out how it is laid out and what it holds; then its chunks
 //! are decoded independently.
 
+pub(crate) mod column_order;
+pub(crate) mod column_words;
 pub(crate) mod columns;
 pub(crate) mod comment_names;
 pub(crate) mod commented_header;
@@ -29,4 +31,5 @@ pub(crate) mod row_box;
 pub(crate) mod row_choice;
 pub(crate) mod survey;
 pub(crate) mod table;
+pub(crate) mod thousands;
 pub(crate) mod units;

@@ -23,6 +23,8 @@ pub(crate) struct NamedColumns {
     pub(crate) count: usize,
     /// Whether x and y are named as longitude and latitude.
     pub(crate) degrees: bool,
+    /// Whether x and y are named by these letters alone, which are northing and easting in some countries.
+    pub(crate) letters: bool,
     /// What is in brackets after the names of x, y and z, and neither a unit that is known nor a name.
     pub(crate) unknown_units: Vec<String>,
     /// What is known of their units.
@@ -111,7 +113,8 @@ pub(crate) fn named_columns<'a>(
     let units = TextUnits(places.map(|name| name.and_then(Name::unit)));
     let mut unknown_units: Vec<String> = places.into_iter().flatten().filter_map(Name::unknown_unit).collect();
     unknown_units.dedup();
-    Ok(NamedColumns { roles, count: names.len(), degrees: degree(0) && degree(1), unknown_units, units })
+    let letters = places[..2].iter().flatten().all(|name| name.is_letter_alone());
+    Ok(NamedColumns { roles, count: names.len(), degrees: degree(0) && degree(1), letters, unknown_units, units })
 }
 
 /// Returns how many of x, y and z the names name.

@@ -43,7 +43,12 @@ impl RowError {
             format!("column {} ({name})", column + 1)
         };
         match *self {
-            RowError::Missing { column } => format!("{} is missing in {}", place(column), shown(line)),
+            RowError::Missing { column } => {
+                let is_count = line.trim_ascii().iter().all(u8::is_ascii_digit);
+                let hint =
+                    if is_count { ": it may be the number of points of another scan; remove such lines" } else { "" };
+                format!("{} is missing in {}{hint}", place(column), shown(line))
+            }
             RowError::Unexpected { column, expected } => {
                 let field = columns.delimiter.fields(line).get(column).copied().unwrap_or_default();
                 if is_too_large(field) {

@@ -47,6 +47,17 @@ pub(super) fn cases() -> Vec<Case> {
         ("a page", b"<!DOCTYPE html>\n<html><body>404</body></html>\n".to_vec(), Refused(3, "web page")),
         ("JSON", b"{\"points\": [[1, 2, 3], [4, 5, 6]]}\n".to_vec(), Refused(3, "is JSON")),
         ("a line cut", rows_and("7,8"), Refused(3, "line 6: column 3 (z) is missing")),
+        (
+            "the number of points of a second scan",
+            rows_and("5\n1,2,3\n"),
+            Refused(3, "number of points of another scan"),
+        ),
+        (
+            "a number of points with commas",
+            b"1,500\n1 2 3\n4 5 6\n7 8 1\n".to_vec(),
+            Refused(3, "is no number of points"),
+        ),
+        ("PTX after a blank line", b"\n10\n20\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n".to_vec(), Refused(3, "is PTX")),
         ("not a number", rows_and("nan,1,2\n"), Refused(3, "line 6: column 1 (x) is \"nan\"")),
         (
             "fewer points than the first line promises",
