@@ -89,7 +89,7 @@ impl<'a> SampledTerrain<'a> {
 
     /// Returns the heights around a place; `None` outside of the box of the points, and if the sample has too few points.
     pub(super) fn around(&self, place: Site) -> Option<Around> {
-        if self.into_box(place) != place {
+        if self.nearest_in_box(place) != place {
             return None;
         }
         let nearest = self.nearest(place);
@@ -103,13 +103,13 @@ impl<'a> SampledTerrain<'a> {
 
     /// Returns the heights around the place in the box of the points that is nearest to this one, and how far it is, in units of height.
     pub(super) fn beside(&self, place: Site) -> Option<(Around, f64)> {
-        let nearest = self.into_box(place);
+        let nearest = self.nearest_in_box(place);
         let square = |axis: usize| i128::from(place[axis].abs_diff(nearest[axis])).pow(2);
         Some((self.around(nearest)?, self.length(square(0).saturating_add(square(1)))))
     }
 
     /// Returns the place in the box of the points that is nearest to this one.
-    fn into_box(&self, place: Site) -> Site {
+    fn nearest_in_box(&self, place: Site) -> Site {
         // A box without points may be inside out.
         [0, 1].map(|axis| place[axis].min(self.within.max[axis]).max(self.within.min[axis]))
     }
