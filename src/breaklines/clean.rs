@@ -96,6 +96,7 @@ impl Cleaner<'_> {
             // A closed ring repeats its first vertex, so three different ones make four.
             if ring.len() < 4 { self.findings.empty_paths += 1 } else { rings.extend(ring.windows(2).map(in_order)) }
         }
+        self.findings.empty_paths += u64::from(!rings.is_empty() && cancel_out(&rings));
         self.shore(feature, height, rings);
         self.lakes += 1;
     }
@@ -171,6 +172,14 @@ impl Cleaner<'_> {
     }
 }
 
+/// Tells whether outlines go over each of their segments an even number of times, so that there is no water between them: a hole may cover
+/// its lake on the lattice, though not in the file.
+fn cancel_out(rings: &[[Site; 2]]) -> bool {
+    let mut segments = rings.to_vec();
+    segments.sort_unstable();
+    segments.chunk_by(|one, other| one == other).all(|same| same.len().is_multiple_of(2))
+}
+
 /// Returns the segment between neighbouring vertices, the lesser first.
 fn in_order(pair: &[Site]) -> [Site; 2] {
     [pair[0].min(pair[1]), pair[0].max(pair[1])]
@@ -216,4 +225,27 @@ fn rise_of(id: FeatureId, line: &[Vertex]) -> Option<Rise> {
         Rise { id, place, steps: z.abs_diff(lowest) }
     });
     rises.filter(|rise| rise.steps > 0).max_by_key(|rise| (rise.steps, Reverse(rise.place)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// In the file, the hole may be smaller by less than half a step.
+    #[test]
+    fn lakes_that_a_hole_covers_on_the_lattice_are_counted() {
+        let square = |low: i32, high: i32| {
+            [[low, low], [high, low], [high, high], [low, high]].map(|place| Vertex { place, z: Some(5) }).to_vec()
+        };
+        let covered = |hole: Vec<Vertex>| {
+            let id = FeatureId { file: 0, feature: 1 };
+            let lake = Feature { kind: FeatureKind::Lake, id, paths: vec![square(0, 100), hole] };
+            let mut findings = Findings::default();
+            segments_of(&[lake], &BreaklineOptions::new(10, None), &mut findings).unwrap();
+            findings.empty_paths
+        };
+        let mut turned = square(0, 100);
+        turned.reverse();
+        assert_eq!([square(0, 100), turned, square(1, 99), square(0, 50)].map(covered), [1, 1, 0, 0]);
+    }
 }

@@ -13,6 +13,8 @@ pub struct LineFile {
     pub path: PathBuf,
     /// The coordinate reference system that the file says.
     pub crs: Crs,
+    /// By what its heights have been multiplied to be in the unit of the points' heights.
+    pub height_scale: f64,
     /// Its features, in their order.
     pub features: Vec<LineFeature>,
     /// What the user should know about the file.

@@ -24,6 +24,9 @@ const WGS_84: u32 = 4326;
 /// What begins a document of a text sequence.
 const RECORD_SEPARATOR: u8 = 0x1e;
 
+/// What programs write for numbers that JSON does not have, in small letters or capitals.
+const NO_NUMBERS: [&str; 5] = ["-Infinity", "-Inf", "Infinity", "Inf", "NaN"];
+
 /// Longitudes may go on beyond the antimeridian.
 const FARTHEST: [f64; 2] = [540.0, 90.0];
 
@@ -60,7 +63,9 @@ fn with_null<'de, D: Deserializer<'de>>(deserializer: D) -> std::result::Result<
 /// # Errors
 /// `Input` if it is no GeoJSON, and those of the collector.
 pub(super) fn read(path: &Path, bytes: &[u8], options: &LineOptions, collector: &mut FeatureCollector) -> Result<Crs> {
-    let broken = |error: serde_json::Error| Error::input(path, format!("is no GeoJSON that can be read: {error}"));
+    let broken = |error: serde_json::Error| {
+        Error::input(path, format!("is no GeoJSON that can be read: {}", why_no_json(bytes, &error)))
+    };
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut documents = serde_json::Deserializer::from_slice(text).into_iter::<Document>();
     let first = documents.next();
@@ -76,7 +81,9 @@ pub(super) fn read(path: &Path, bytes: &[u8], options: &LineOptions, collector: 
         "FeatureCollection" => {
             for (number, feature) in (1..).zip(document.features.unwrap_or_default()) {
                 interrupt::check()?;
-                let refused = |error: serde_json::Error| collector.refuse(number, format!("cannot be read: {error}"));
+                let refused = |error: serde_json::Error| {
+                    collector.refuse(number, format!("cannot be read: {}", without_place(&error)))
+                };
                 let feature = serde_json::from_str(feature.get()).map_err(refused)?;
                 add(path, number, feature, options, collector)?;
             }
@@ -93,6 +100,29 @@ pub(super) fn read(path: &Path, bytes: &[u8], options: &LineOptions, collector: 
     Ok(crs)
 }
 
+/// Returns why a text is no JSON. Some programs write numbers that JSON does not have.
+fn why_no_json(text: &[u8], error: &serde_json::Error) -> String {
+    let line = text.split(|byte| *byte == b'\n').nth(error.line().saturating_sub(1)).unwrap_or_default();
+    // The column is that of the byte that does not fit: the first of the number, or one after it.
+    let starts = [1, 2, 3].map(|back| line.get(error.column().saturating_sub(back)..).unwrap_or_default());
+    let is_at =
+        |number: &[u8], start: &[u8]| start.get(..number.len()).is_some_and(|of| of.eq_ignore_ascii_case(number));
+    match NO_NUMBERS.iter().find(|number| starts.iter().any(|start| is_at(number.as_bytes(), start))) {
+        Some(number) => format!(
+            "it has {number} in line {}, near column {}, and JSON has no such number: give this vertex a number, or leave out its feature",
+            error.line(),
+            error.column()
+        ),
+        None => error.to_string(),
+    }
+}
+
+/// Returns the error of a feature without its place, which does not count from the beginning of the file.
+fn without_place(error: &serde_json::Error) -> String {
+    let text = error.to_string();
+    text.rsplit_once(" at line ").map_or(text.as_str(), |(what, _)| what).into()
+}
+
 /// Tells whether a text goes on as JSON does, after blanks and record separators.
 pub(super) fn is_json(text: &[u8]) -> bool {
     let is_before = |byte: &u8| byte.is_ascii_whitespace() || *byte == RECORD_SEPARATOR;
@@ -106,7 +136,9 @@ fn read_sequence(path: &Path, text: &[u8], options: &LineOptions, collector: &mu
     let mut first_crs = None;
     for (number, document) in (1..).zip(documents) {
         interrupt::check()?;
-        let refused = |error: serde_json::Error| collector.refuse(number, format!("cannot be read: {error}"));
+        let refused = |error: serde_json::Error| {
+            collector.refuse(number, format!("cannot be read: {}", why_no_json(text, &error)))
+        };
         let text = document.map_err(refused)?;
         let document: Document = serde_json::from_str(text.get()).map_err(refused)?;
         first_crs = first_crs.or(document.crs);
@@ -167,7 +199,9 @@ fn add(
     options: &LineOptions,
     collector: &mut FeatureCollector,
 ) -> Result<()> {
-    let unreadable = |error: serde_json::Error| Error::input(path, format!("feature {number} cannot be read: {error}"));
+    let unreadable = |error: serde_json::Error| {
+        Error::input(path, format!("feature {number} cannot be read: {}", without_place(&error)))
+    };
     let wanted = [options.kind_field.as_deref(), options.height_field.as_deref()];
     let wanted = match wanted {
         [None, None] => WantedAttributes::NONE,
@@ -320,6 +354,13 @@ mod tests {
                 "feature 1",
             ),
             (r#"{"type": "LineString", "coordinates": [[0, null, 1]]}"#, "null"),
+            (
+                r#"{"type": "LineString", "coordinates": [[0, 1, NaN], [1, 2, 3]]}"#,
+                "it has NaN in line 1, near column 4",
+            ),
+            ("{\"type\": \"LineString\",\n \"coordinates\": [[0, 1, -Infinity]]}", "it has -Infinity in line 2"),
+            (r#"{"type": "LineString", "coordinates": [[0, 1, nan], [1, 2, 3]]}"#, "it has NaN"),
+            ("{\"type\": \"Point\"}\n{\"type\": \"LineString\", \"coordinates\": [[0, 1, Infinity]]}", "is a point"),
             (r#"{"type": "LineString", "coordinates": [[0], [1]]}"#, "no place"),
             (r#"{"type": "LineString", "coordinates": [[0, 0], [1, 1]]}"#, "no heights"),
         ] {

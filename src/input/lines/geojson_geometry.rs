@@ -21,6 +21,41 @@ struct Members<'a> {
     geometries: Option<Vec<&'a RawValue>>,
 }
 
+/// A number of a position, or null.
+struct Number(Option<f64>);
+
+impl<'de> Deserialize<'de> for Number {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Number, D::Error> {
+        deserializer.deserialize_any(NumberVisitor)
+    }
+}
+
+struct NumberVisitor;
+
+impl Visitor<'_> for NumberVisitor {
+    type Value = Number;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+        formatter.write_str("a number, as in [1.0, 2.0, 3.0]")
+    }
+
+    fn visit_f64<E>(self, number: f64) -> Result<Number, E> {
+        Ok(Number(Some(number)))
+    }
+
+    fn visit_i64<E>(self, number: i64) -> Result<Number, E> {
+        Ok(Number(Some(number as f64)))
+    }
+
+    fn visit_u64<E>(self, number: u64) -> Result<Number, E> {
+        Ok(Number(Some(number as f64)))
+    }
+
+    fn visit_unit<E>(self) -> Result<Number, E> {
+        Ok(Number(None))
+    }
+}
+
 /// A vertex: x, y, and its height or NaN, where there is none or null. More numbers say nothing here.
 struct Position([f64; 3]);
 
@@ -43,12 +78,13 @@ impl<'de> Visitor<'de> for PositionVisitor {
         let mut position = [f64::NAN; 3];
         for number in &mut position[..2] {
             match numbers.next_element()? {
-                Some(found) => *number = found,
+                Some(Number(Some(found))) => *number = found,
+                Some(Number(None)) => return Err(A::Error::custom("a vertex has null in place of x or y")),
                 None => return Ok(Position(position)),
             }
         }
-        match numbers.next_element::<Option<f64>>()? {
-            Some(height) => position[2] = height.unwrap_or(f64::NAN),
+        match numbers.next_element()? {
+            Some(Number(height)) => position[2] = height.unwrap_or(f64::NAN),
             None => return Ok(Position(position)),
         }
         while numbers.next_element::<IgnoredAny>()?.is_some() {}
@@ -125,7 +161,9 @@ mod tests {
         for (text, word) in [
             (r#"{"type": "Circle"}"#, "Circle"),
             (r#"{"type": "LineString"}"#, "coordinates"),
-            (r#"{"type": "LineString", "coordinates": [[1, "2"]]}"#, "string"),
+            (r#"{"type": "LineString", "coordinates": [[1, "2"]]}"#, "string \"2\", expected a number"),
+            (r#"{"type": "LineString", "coordinates": [[1, 2, "3"]]}"#, "string \"3\", expected a number"),
+            (r#"{"type": "LineString", "coordinates": [[1, null, 3]]}"#, "null in place of x or y"),
             (r#"{"type": "Polygon", "coordinates": [[1, 2], [3, 4]]}"#, "position"),
             (&deep, "deep"),
         ] {

@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, OptionalExtension, Row};
@@ -16,6 +17,9 @@ use crate::input::lines::guarded_sqlite::{self, Column, TableName};
 use crate::input::lines::options::LineOptions;
 use crate::input::lines::wkb;
 use crate::{Error, Result, interrupt};
+
+/// Held while a file is read.
+static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
 /// A table of features, or a view of some.
 struct Layer {
@@ -41,6 +45,8 @@ pub(super) fn read(
     collector: &mut FeatureCollector,
 ) -> Result<Crs> {
     refuse_open_journal(path)?;
+    // SQLite's limit of memory holds for all connections together: side by side, files would fail that can be read one after the other.
+    let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     let broken = |error: rusqlite::Error| guarded_sqlite::broken(path, &error);
     let (file, tables) = guarded_sqlite::open(path, size, memory).map_err(broken)?;
     let layer = find_layer(path, &file, &tables, options)?;

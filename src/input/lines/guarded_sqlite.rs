@@ -91,11 +91,20 @@ pub(super) fn broken(path: &Path, error: &rusqlite::Error) -> Error {
         code if code == Some(ErrorCode::AuthorizationForStatementDenied)
             || error.to_string().starts_with("not authorized") =>
         {
-            format!("would have SQLite compute what it holds ({error}): {how}")
+            format!("would have SQLite compute what it holds ({}): {how}", what_is_computed(error))
         }
         _ => format!("is no GeoPackage that can be read: {error}"),
     };
     Error::input(path, what)
+}
+
+/// Returns which part of a query is not allowed. SQLite names the function, but of a view only a column.
+fn what_is_computed(error: &rusqlite::Error) -> String {
+    let text = error.to_string();
+    match text.contains("is prohibited") {
+        true => format!("a view that joins texts with ||, or a table of a module: {text}"),
+        false => text,
+    }
 }
 
 /// Returns the columns of a table or a view.
@@ -145,7 +154,7 @@ fn set_limits(file: &Connection, size: u64, memory: u64) -> rusqlite::Result<()>
     file.pragma_update(None, "cache_size", -CACHE)?;
     // What is sorted stays in memory, and goes to no file.
     file.pragma_update(None, "temp_store", "MEMORY")?;
-    // It holds for the whole process.
+    // It holds for the whole process, in which one file is read at a time.
     let heap = i64::try_from((memory / SHARE_OF_MEMORY).saturating_add(BASE_MEMORY)).unwrap_or(i64::MAX);
     file.pragma(None, "hard_heap_limit", heap, |_| Ok(()))
 }

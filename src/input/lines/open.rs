@@ -48,7 +48,7 @@ pub fn read_lines(path: &Path, options: &LineOptions, memory: u64) -> Result<Lin
     };
     let (features, left_out) = collector.finish();
     warnings.extend(left_out);
-    Ok(LineFile { path: path.to_path_buf(), crs, features, warnings })
+    Ok(LineFile { path: path.to_path_buf(), crs, height_scale: 1.0, features, warnings })
 }
 
 fn is_json(start: &[u8]) -> bool {

@@ -1,7 +1,7 @@
 //! The input files: which ones the options name, and what their headers say.
 
 use crate::input::options::{InputOptions, OnBadFile};
-use crate::input::{RowChoice, Source, is_url, open_chosen, remote_files};
+use crate::input::{FileFormat, RowChoice, Source, is_url, open_chosen, remote_files};
 use crate::job::plan::input_identity::place;
 use crate::job::plan::job_plan::SkippedInput;
 use crate::job::plan::named_files::files_of;
@@ -75,14 +75,24 @@ pub fn check_missing_records(sources: &[Source], options: &InputOptions) -> Resu
         OnBadFile::Stop => None,
     };
     match lacking {
-        Some(first) => Err(Error::input(
-            &first.path,
-            format!(
-                "says that it holds {} records, but {} of them are not there: the file is cut off or its header is wrong. Copy it \
-                 again, or raise [input] max_malformed_fraction to use what is there",
-                first.records, first.missing
-            ),
-        )),
+        Some(first) => Err(Error::input(&first.path, missing_records(first))),
         None => Ok(()),
     }
+}
+
+fn missing_records(Source { records, missing, format, .. }: &Source) -> String {
+    let start = format!("says that it holds {records} records, but");
+    if missing < records {
+        return format!(
+            "{start} {missing} of them are not there: the file is cut off or its header is wrong. Copy it again, or raise [input] \
+             max_malformed_fraction to use what is there"
+        );
+    }
+    let why = match format {
+        FileFormat::Laz => {
+            "the file is cut off before the end of its first compressed chunk, which cannot be read in part"
+        }
+        _ => "the file is cut off after its header, or its header is wrong",
+    };
+    format!("{start} none of them is there: {why}. Copy it again, or leave it out with [input] on_bad_file = \"skip\"")
 }

@@ -118,6 +118,87 @@ fn heights_that_stand_for_none_are_refused_or_named() {
     assert!(text.contains("all its heights are 0, where the middle one of the points around is"), "{text}");
 }
 
+/// Returns what a job says about these lines, the second of which is between two that are right.
+fn said_among(survey: &Survey, line: Vec<[f64; 3]>, rest: &str) -> String {
+    let right =
+        |y: f64| ("line", on_slope(|_, z| z).into_iter().map(|[x, _, z]| [x, 30.0 + y, z + y / 40.0]).collect());
+    let lines = [right(-9.0), ("line", line), right(9.0), right(18.0), right(27.0)];
+    let file = geojson(survey.folder(), "among.geojson", &Features::lines(&lines));
+    survey.job_with(&[file], rest).run_with(&["check"]).succeeded().out
+}
+
+#[test]
+fn a_feature_in_another_unit_is_named_among_others() {
+    let survey = Survey::new(2_000);
+    let text = said_among(&survey, on_slope(|_, z| z / FOOT), "");
+    assert!(
+        text.contains("among.geojson: the heights of feature 2 seem to be in feet, and those of the points in metres")
+            && text.contains("height_unit = \"foot\" in its [[breaklines]]"),
+        "{text}"
+    );
+    let text = said_among(&survey, on_slope(|_, z| z * FOOT), "");
+    assert!(text.contains("the heights of feature 2 are 3.28 times too low"), "{text}");
+    // A bridge, a river bed, and a road on a dam.
+    for other in [7.0, -6.0, 3.0, 18.0] {
+        let text = said_among(&survey, on_slope(|_, z| z + other), "");
+        assert!(!text.contains("height"), "{other}: {text}");
+    }
+}
+
+/// Roofs that stand over low ground are 3.28 times as high as this by chance.
+#[test]
+fn roofs_over_low_ground_are_not_doubtful() {
+    let survey = Survey::new(100);
+    let cloud = survey.folder().join("low.csv");
+    let rows = (0..60).flat_map(|x| {
+        (0..60).map(move |y| {
+            format!("{},{},{}\n", 500_000 + 2 * x, 4_000_000 + 2 * y, 5.0 + f64::from((x * 7 + y) % 9) * 0.02)
+        })
+    });
+    fs::write(&cloud, format!("x,y,z\n{}", rows.collect::<String>())).unwrap();
+    let roof = |i: usize| {
+        let (x, y, z) = (10.0 + 20.0 * (i % 5) as f64, 10.0 + 20.0 * (i / 5) as f64, 8.0 + (i * 7 % 20) as f64);
+        ("line", [[0.0, 0.0], [8.0, 0.0], [8.0, 6.0], [0.0, 6.0]].map(|[dx, dy]| [x + dx, y + dy, z]).to_vec())
+    };
+    let roofs: Vec<_> = (0..25).map(roof).collect();
+    let file = geojson(survey.folder(), "roofs.geojson", &Features::lines(&roofs));
+    let job = Job::on::<&Path>(&[&cloud]).with("input", "crs = \"EPSG:32633\"");
+    let text = job.with("[breaklines]", &format!("files = [{file:?}]")).run_with(&["check"]).succeeded().out;
+    assert!(!text.contains("seem to be") && !text.contains("heights of feature"), "{text}");
+}
+
+/// The remedy that was taken is not offered again.
+#[test]
+fn a_wrong_unit_of_heights_is_named() {
+    let survey = Survey::new(2_000);
+    let text = said(&survey, on_slope(|_, z| z), "height_unit = \"foot\"");
+    assert!(
+        text.contains("its heights seem to be in metres, but they are converted from feet")
+            && text.contains("set height_unit = \"metre\" in [[breaklines]] instead"),
+        "{text}"
+    );
+    let feet = said(&survey, on_slope(|_, z| z / FOOT), "height_unit = \"metre\"");
+    assert!(feet.contains("set height_unit = \"foot\" in [[breaklines]]"), "{feet}");
+}
+
+#[test]
+fn missing_heights_are_named_in_other_units_and_beside_the_points() {
+    let survey = Survey::new(2_000);
+    let one = |wrong: f64| on_slope(move |i, z| if i == 3 { wrong } else { z / FOOT });
+    let file = geojson(survey.folder(), "feet.geojson", &Features::lines(&[("line", one(-9999.0))]));
+    survey
+        .job_with(&[file], "height_unit = \"foot\"")
+        .run_with(&["check"])
+        .refused(3, &["feet.geojson: feature 1 has the height -9999 at", "stands for no height"]);
+    // The first vertex lies west of the points.
+    let outside = |wrong: f64| [vec![[-8.0, 30.0, wrong]], on_slope(|_, z| z)].concat();
+    for (wrong, is_named) in [(0.0, true), (14.0, false), (9.0, false)] {
+        let text = said(&survey, outside(wrong), "");
+        let named = text.contains("feature 1 has the height 0 at (499992, 4000030), where the points around lie from");
+        assert!(named == is_named && text.contains("height") == is_named, "{wrong}: {text}");
+    }
+}
+
 /// At the sea, 0 is a height.
 #[test]
 fn the_shore_of_the_sea_and_rivers_that_flow_into_it_are_not_doubtful() {

@@ -1,25 +1,28 @@
 //! Heights of lines that the terrain around makes doubtful: in another unit, counted from another zero, or missing and written as 0.
 
-use crate::breaklines::{Feature, Vertex};
-use crate::input::Unit;
+use crate::breaklines::{Feature, FeatureKind, Vertex};
+use crate::input::is_number_in_steps;
 use crate::input::lines::LineFile;
-use crate::job::plan::breaklines::terrain::{Around, SampledTerrain};
+use crate::job::plan::breaklines::other_unit::UnitJudge;
+use crate::job::plan::breaklines::terrain::{Around, Pair, SampledTerrain};
+use crate::job::plan::extent::to_float;
 use crate::{Result, interrupt};
 
 /// So many vertices of a file are compared with the terrain, to judge the file.
 const OF_FILE: usize = 512;
 
-/// So many of the same feature are, to judge them one by one.
+/// So many missing heights of a feature are compared, and so many spikes.
 const OF_FEATURE: usize = 64;
-
-/// Heights in another unit are so many times nearer to the terrain when they are converted, and were farther from it than so many metres,
-/// or fewer where they rise and fall with it.
-const TIMES_NEARER: f64 = 4.0;
-const LEAST_APART: f64 = 10.0;
-const LEAST_RISE: f64 = 1.0;
 
 /// So many metres are more than between lines and the points beside them, and less than between most ellipsoids and the sea.
 const OTHER_ZERO: f64 = 20.0;
+
+/// A vertex with a missing height may lie beside the box of the points. From there, terrain falls to the sea by less than this, of many metres.
+const FALL: f64 = 0.2;
+
+/// Of the heights of a file that counts from another zero, so many in a hundred lie as far from the terrain. Otherwise its features are judged
+/// one by one.
+const MOST: usize = 80;
 
 /// Where all heights of a file are 0, a terrain within so many metres may be the shore of the sea.
 const SHORE: f64 = 1.0;
@@ -33,7 +36,7 @@ const SPIKE: f64 = 10.0;
 /// Any vertex is doubtful if it lies so many metres beyond the terrain.
 const BEYOND: f64 = 50.0;
 
-/// So many vertices of a feature are looked at for that, evenly.
+/// So many vertices of a feature are looked at, evenly.
 const EVENLY: usize = 16;
 
 /// Returns the warnings about heights of the `features`, which come from `files`.
@@ -41,125 +44,125 @@ const EVENLY: usize = 16;
 /// # Errors
 /// [`crate::Error::Interrupted`].
 pub(super) fn height_doubts(files: &[LineFile], features: &[Feature], terrain: &SampledTerrain) -> Result<Vec<String>> {
-    let judge = Judge { terrain };
     let mut found = Vec::new();
     // Features come in the order of their files.
     for features in features.chunk_by(|one, other| one.id.file == other.id.file) {
         interrupt::check()?;
-        let doubt = judge.of_file(features).or_else(|| judge.of_vertices(features));
-        let file = features.first().and_then(|feature| files.get(feature.id.file as usize));
-        found.extend(file.zip(doubt).map(|(file, doubt)| format!("{}: {doubt}", file.path.display())));
+        let Some(file) = features.first().and_then(|feature| files.get(feature.id.file as usize)) else { continue };
+        let doubts = Judge { terrain, scale: file.height_scale }.doubts(features);
+        found.extend(doubts.into_iter().map(|doubt| format!("{}: {doubt}", file.path.display())));
     }
     Ok(found)
 }
 
 struct Judge<'a> {
     terrain: &'a SampledTerrain<'a>,
+    /// By what the heights of the file have been multiplied.
+    scale: f64,
 }
 
-/// Heights of lines that seem to be in feet while those of the points are in metres, or the reverse.
-struct OtherUnit {
-    lines_in_feet: bool,
-    /// What the heights of the points are taken to be in.
-    points_in: Unit,
+/// Why a vertex is doubtful.
+enum Doubt {
+    /// Its height is 0 in the file.
+    Zero,
+    /// Its height is a number that programs write for none.
+    Nodata,
+    Far,
 }
-
-impl OtherUnit {
-    /// Returns the sentence about it. `numbers` are those of the lines and of the points.
-    fn sentence(&self, numbers: &str) -> String {
-        let (seem, others) = if self.lines_in_feet { ("feet", "metres") } else { ("metres", "feet") };
-        let start = format!("its heights seem to be in {seem}, and those of the points in {others}: {numbers}");
-        match (self.lines_in_feet, self.points_in) {
-            (true, Unit::Metre) => format!("{start}; set height_unit = \"foot\" in [[breaklines]] to convert them"),
-            (false, Unit::Foot | Unit::UsFoot) => {
-                format!("{start}; set height_unit = \"metre\" in [[breaklines]] to convert them")
-            }
-            _ => format!(
-                "{start}, but the points are taken to be in {}: say with [input] unit or crs what the points are in, and with height_unit in \
-                 [[breaklines]] what the lines are in",
-                self.points_in.name()
-            ),
-        }
-    }
-}
-
-/// A height, and what is around it.
-type Pair = (f64, Around);
 
 impl Judge<'_> {
-    /// Returns a sentence if all heights of a file seem to be in another unit or to have another zero.
-    fn of_file(&self, features: &[Feature]) -> Option<String> {
+    /// Returns sentences about the features of a file.
+    fn doubts(&self, features: &[Feature]) -> Vec<String> {
+        let units = UnitJudge { terrain: self.terrain, scale: self.scale };
+        let pairs = self.pairs(features);
+        if let Some(doubt) = units.of_file(&pairs).or_else(|| self.all_zero(features, &pairs)) {
+            return vec![doubt];
+        }
+        let by_feature: Vec<Vec<Pair>> = features.iter().map(|feature| self.pairs_of_feature(feature)).collect();
+        let in_other_unit = units.of_features(features, &by_feature);
+        if in_other_unit.is_none()
+            && let Some(doubt) = self.other_zero(features, &pairs)
+        {
+            return vec![doubt];
+        }
+        let known = in_other_unit.as_ref().map(|(known, _)| known.as_slice()).unwrap_or_default();
+        let others = features.iter().filter(|feature| !known.contains(&feature.id.feature));
+        let vertices = self.of_vertices(others);
+        in_other_unit.map(|(_, sentence)| sentence).into_iter().chain(vertices).collect()
+    }
+
+    /// Returns the heights of some vertices of a file, and what is around them.
+    fn pairs(&self, features: &[Feature]) -> Vec<Pair> {
+        self.sampled(features).filter_map(|vertex| self.terrain.pair(vertex)).collect()
+    }
+
+    fn sampled<'f>(&self, features: &'f [Feature]) -> impl Iterator<Item = &'f Vertex> {
         let all = || features.iter().flat_map(|feature| feature.paths.iter().flatten());
-        let every = all().count().div_ceil(OF_FILE).max(1);
-        let sampled = || all().step_by(every);
-        let pairs: Vec<Pair> = sampled().filter_map(|vertex| self.pair(vertex)).collect();
-        let [line, points] = [median(pairs.iter().map(|(z, _)| *z))?, median(pairs.iter().map(|(_, a)| a.middle))?];
-        let numbers =
-            format!("in the middle {}, where that of the points around is {}", rounded(line), rounded(points));
-        if let Some(unit) = self.other_unit(&pairs) {
-            return Some(unit.sentence(&numbers));
-        }
+        all().step_by(all().count().div_ceil(OF_FILE).max(1))
+    }
+
+    /// Returns the heights of some vertices of a feature, without those of 0, and what is around them.
+    fn pairs_of_feature(&self, feature: &Feature) -> Vec<Pair> {
+        let some = evenly(feature).filter(|vertex| !self.terrain.is_zero(vertex));
+        some.filter_map(|vertex| self.terrain.pair(vertex)).collect()
+    }
+
+    /// Returns a sentence if all heights of a file are 0.
+    fn all_zero(&self, features: &[Feature], pairs: &[Pair]) -> Option<String> {
         let beyond = median(pairs.iter().map(|(z, around)| around.beyond(*z)))?;
-        let zeros = sampled().filter(|vertex| self.terrain.is_zero(vertex)).count();
-        let count = sampled().filter(|vertex| vertex.z.is_some()).count();
-        if zeros == count {
-            return (beyond.abs() > self.terrain.in_height_unit(SHORE)).then(|| {
-                format!(
-                    "all its heights are 0, where the middle one of the points around is {}; if it has none, set heights = \"points\" in \
-                     [[breaklines]] to take them from the points around",
-                    rounded(points)
-                )
-            });
-        }
-        let slack = median(pairs.iter().map(|(_, around)| around.relief() + around.reach))?;
-        let is_far = beyond.abs() > self.terrain.in_height_unit(OTHER_ZERO) + slack && zeros < count.div_ceil(2);
-        is_far.then(|| {
-            let side = if beyond > 0.0 { "above" } else { "below" };
+        let is_all_zero = self.sampled(features).all(|vertex| vertex.z.is_none() || self.terrain.is_zero(vertex));
+        (is_all_zero && beyond.abs() > self.terrain.in_height_unit(SHORE)).then(|| {
             format!(
-                "its heights lie {side} the terrain, {numbers}: they may count from another zero, such as the ellipsoid, or be no heights of \
-                 the ground; convert them, or set heights = \"points\" in [[breaklines]] to take them from the points around"
+                "all its heights are 0, where the middle one of the points around is {}; if it has none, set heights = \"points\" in \
+                 [[breaklines]] to take them from the points around",
+                rounded(median(pairs.iter().map(|(_, around)| around.middle)).unwrap_or_default())
             )
         })
     }
 
-    /// Returns the units in which the heights of a file and those of the points seem to be, if these differ.
-    fn other_unit(&self, pairs: &[Pair]) -> Option<OtherUnit> {
-        let metres_z = self.terrain.in_height_unit(1.0).recip();
-        let foot = if Unit::from_metres(Some(metres_z)) == Unit::UsFoot { Unit::US_FOOT } else { Unit::FOOT };
-        let apart = |factor: f64| median(pairs.iter().map(move |(z, around)| (z * factor - around.middle).abs()));
-        let shift = median(pairs.iter().map(|(z, around)| z - around.middle))?;
-        let shifted = median(pairs.iter().map(|(z, around)| (z - around.middle - shift).abs()))?;
-        let as_written = apart(1.0)?;
-        let is_more_than = |value: f64, metres: f64| value > self.terrain.in_height_unit(metres);
-        let fits = |factor: f64| {
-            let converted = apart(factor)?;
-            // Heights from another zero fit better when they are shifted.
-            let is_shifted = converted > 2.0 * shifted.max(self.terrain.in_height_unit(LEAST_RISE));
-            let rises = is_more_than(shifted, LEAST_RISE) && shifted > TIMES_NEARER * converted;
-            let is_apart = is_more_than(as_written, LEAST_APART) || rises;
-            (as_written > TIMES_NEARER * converted && !is_shifted && is_apart).then_some(())
-        };
-        let lines_in_feet = fits(foot).map(|()| true).or_else(|| fits(foot.recip()).map(|()| false))?;
-        let points_in = Unit::from_metres(Some(metres_z));
-        Some(OtherUnit { lines_in_feet, points_in })
+    /// Returns a sentence if all heights of a file seem to have another zero.
+    fn other_zero(&self, features: &[Feature], pairs: &[Pair]) -> Option<String> {
+        let beyond = median(pairs.iter().map(|(z, around)| around.beyond(*z)))?;
+        let zeros = self.sampled(features).filter(|vertex| self.terrain.is_zero(vertex)).count();
+        let count = self.sampled(features).filter(|vertex| vertex.z.is_some()).count();
+        let least = self.terrain.in_height_unit(OTHER_ZERO);
+        let slack = median(pairs.iter().map(|(_, around)| around.relief() + around.reach))?;
+        let are_beyond = |(z, around): &&Pair| around.beyond(*z) * beyond.signum() > least;
+        let is_most = pairs.iter().filter(are_beyond).count().saturating_mul(100) >= pairs.len().saturating_mul(MOST);
+        let is_far = beyond.abs() > least + slack && is_most && zeros < count.div_ceil(2);
+        let [line, points] = middles(pairs)?;
+        let units = UnitJudge { terrain: self.terrain, scale: self.scale };
+        is_far.then(|| {
+            let side = if beyond > 0.0 { "above" } else { "below" };
+            let unit = units.hint(pairs).map(|unit| format!("be in another unit ({unit}), ")).unwrap_or_default();
+            format!(
+                "its heights lie {side} the terrain, in the middle {line}, where that of the points around is {points}: they may {unit}count \
+                 from another zero, such as the ellipsoid, or be no heights of the ground; convert them, or set heights = \"points\" in \
+                 [[breaklines]] to take them from the points around"
+            )
+        })
     }
 
     /// Returns a sentence about the vertices that are far from the terrain, by features.
-    fn of_vertices(&self, features: &[Feature]) -> Option<String> {
-        let mut found = features.iter().filter_map(|feature| Some((feature, self.doubtful_vertex(feature)?)));
-        let (feature, (vertex, around)) = found.next()?;
+    fn of_vertices<'f>(&self, features: impl Iterator<Item = &'f Feature>) -> Option<String> {
+        let mut found = features.filter_map(|feature| Some((feature, self.doubtful_vertex(feature)?)));
+        let (feature, (vertex, around, doubt)) = found.next()?;
         let others = match found.count() {
             0 => String::new(),
-            count => format!(" (and {count} features more have such vertices)"),
+            1 => " (and another feature has such a vertex)".into(),
+            count => format!(" (and {count} other features have such vertices)"),
         };
         let z = self.terrain.height(vertex)?;
-        let (z, what) = match self.terrain.is_zero(vertex) {
-            true => (0.0, ": if 0 stands for no height,"),
-            false => (z, ":"),
+        let (z, what) = match doubt {
+            Doubt::Zero => (0.0, ": if 0 stands for no height, correct it,"),
+            Doubt::Nodata => (z, ", which may stand for no height (nodata): correct it,"),
+            Doubt::Far => {
+                (z, ": correct it, set height_unit in [[breaklines]] if the heights of the file are in another unit,")
+            }
         };
         Some(format!(
-            "feature {} has the height {z} at {}, where the points around lie from {} to {}{others}{what} correct it, set height_unit in \
-             [[breaklines]] if the heights of the file are in another unit, or heights = \"points\" to take all heights from the points around",
+            "feature {} has the height {z} at {}, where the points around lie from {} to {}{others}{what} or set heights = \"points\" in \
+             [[breaklines]] to take all heights from the points around",
             feature.id.feature,
             self.terrain.place_text(vertex.place),
             rounded(around.lowest),
@@ -168,33 +171,53 @@ impl Judge<'_> {
     }
 
     /// Returns the first vertex of a feature whose height is no height of the terrain around.
-    fn doubtful_vertex<'f>(&self, feature: &'f Feature) -> Option<(&'f Vertex, Around)> {
+    fn doubtful_vertex<'f>(&self, feature: &'f Feature) -> Option<(&'f Vertex, Around, Doubt)> {
+        self.missing_height(feature).or_else(|| self.far_vertex(feature))
+    }
+
+    /// Returns the first vertex of a feature whose height seems to be missing: it is 0, or a number for none, and the terrain lies elsewhere.
+    fn missing_height<'f>(&self, feature: &'f Feature) -> Option<(&'f Vertex, Around, Doubt)> {
         let vertices = || feature.paths.iter().flatten();
         let is_all_zero = vertices().all(|vertex| vertex.z.is_none() || self.terrain.is_zero(vertex));
         let from_zero = self.terrain.in_height_unit(FROM_ZERO[usize::from(is_all_zero)]);
-        let spike = self.terrain.in_height_unit(SPIKE);
-        let zeros = vertices().filter(|vertex| self.terrain.is_zero(vertex));
-        let beyond = self.terrain.in_height_unit(BEYOND);
-        let evenly = vertices().step_by(vertices().count().div_ceil(EVENLY).max(1));
-        let spikes = feature.paths.iter().flat_map(|path| spikes(path, self.terrain.steps(spike)));
-        let mut candidates = zeros
-            .map(|vertex| (vertex, from_zero))
-            .take(OF_FEATURE)
-            .chain(spikes.map(|vertex| (vertex, spike)).take(OF_FEATURE))
-            .chain(evenly.map(|vertex| (vertex, beyond)));
-        candidates.find_map(|(vertex, least)| {
-            let (z, around) = self.pair(vertex)?;
-            // A line may lead to a peak that the sample does not show.
-            let reach = if self.terrain.is_zero(vertex) { 0.0 } else { around.reach };
-            let is_far = around.beyond(z).abs() > least + around.relief() + reach;
-            is_far.then_some((vertex, around))
+        // All of a lake gets its lowest height, wherever that is.
+        let fall = if feature.kind == FeatureKind::Lake { 0.0 } else { FALL };
+        let missing = vertices().filter_map(|vertex| {
+            let is_zero = self.terrain.is_zero(vertex);
+            (is_zero || self.is_nodata(vertex)).then_some((vertex, if is_zero { Doubt::Zero } else { Doubt::Nodata }))
+        });
+        missing.take(OF_FEATURE).find_map(|(vertex, doubt)| {
+            let (around, outside) = self.terrain.beside(vertex.place)?;
+            let least = from_zero + around.relief() + fall * outside;
+            (around.beyond(self.terrain.height(vertex)?).abs() > least).then_some((vertex, around, doubt))
         })
     }
 
-    /// Returns the height of a vertex in the box of the points, and what is around it.
-    fn pair(&self, vertex: &Vertex) -> Option<Pair> {
-        Some((self.terrain.height(vertex)?, self.terrain.around(vertex.place)?))
+    /// Tells whether the height of a vertex is a number that programs write for none.
+    fn is_nodata(&self, vertex: &Vertex) -> bool {
+        let step = to_float(self.terrain.lattice.step(2)) / self.scale;
+        self.terrain.height(vertex).is_some_and(|z| is_number_in_steps(z / self.scale, step))
     }
+
+    /// Returns the first vertex of a feature that lies far beyond the terrain, and more so beyond its neighbours.
+    fn far_vertex<'f>(&self, feature: &'f Feature) -> Option<(&'f Vertex, Around, Doubt)> {
+        let [spike, beyond] = [SPIKE, BEYOND].map(|metres| self.terrain.in_height_unit(metres));
+        let spikes = feature.paths.iter().flat_map(|path| spikes(path, self.terrain.steps(spike)));
+        let spikes = spikes.map(|vertex| (vertex, spike)).take(OF_FEATURE);
+        let mut candidates = spikes.chain(evenly(feature).map(|vertex| (vertex, beyond)));
+        candidates.find_map(|(vertex, least)| {
+            let (z, around) = self.terrain.pair(vertex)?;
+            // A line may lead to a peak that the sample does not show.
+            let is_far = around.beyond(z).abs() > least + around.relief() + around.reach;
+            (is_far && !self.terrain.is_zero(vertex)).then_some((vertex, around, Doubt::Far))
+        })
+    }
+}
+
+/// Returns some vertices of a feature, evenly.
+fn evenly(feature: &Feature) -> impl Iterator<Item = &Vertex> {
+    let vertices = || feature.paths.iter().flatten();
+    vertices().step_by(vertices().count().div_ceil(EVENLY).max(1))
 }
 
 /// Returns the vertices of a path that lie more than `least` steps above both neighbours or below both. One at an end has one neighbour.
@@ -210,8 +233,16 @@ fn spikes(path: &[Vertex], least: i64) -> impl Iterator<Item = &Vertex> {
     (0..path.len()).filter(move |at| differences(*at).is_some_and(is_spike)).filter_map(|at| path.get(at))
 }
 
+/// Returns the middle height of lines and that of the points around, for messages.
+pub(super) fn middles(pairs: &[Pair]) -> Option<[f64; 2]> {
+    Some([
+        rounded(median(pairs.iter().map(|(z, _)| *z))?),
+        rounded(median(pairs.iter().map(|(_, around)| around.middle))?),
+    ])
+}
+
 /// Returns the middle one of `values`; of two, the greater.
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+pub(super) fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     let mut values: Vec<f64> = values.collect();
     values.sort_unstable_by(f64::total_cmp);
     values.get(values.len() / 2).copied()

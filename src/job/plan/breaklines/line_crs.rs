@@ -95,6 +95,7 @@ fn convert_heights(file: &mut LineFile, own: &Crs, points: &SystemOfPoints) {
 fn scale_heights(file: &mut LineFile, factor: f64) {
     let vertices = file.features.iter_mut().flat_map(|feature| feature.shape.vertices_mut());
     vertices.for_each(|vertex| vertex[2] *= factor);
+    file.height_scale *= factor;
 }
 
 fn unit_name(metres: f64) -> String {
@@ -207,7 +208,13 @@ mod tests {
     fn bring_vertex(vertex: [f64; 3], own: &Crs, choice: &str, points: &Crs) -> Result<([f64; 3], Warnings)> {
         let shape = LineShape::Line(vec![vertex; 2]);
         let features = vec![LineFeature { number: 1, kind: FeatureKind::Line, shape }];
-        let mut file = LineFile { path: "a.gpkg".into(), crs: own.clone(), features, warnings: Warnings::default() };
+        let mut file = LineFile {
+            path: "a.gpkg".into(),
+            crs: own.clone(),
+            height_scale: 1.0,
+            features,
+            warnings: Warnings::default(),
+        };
         let options = toml::from_str(&format!("files = [\"a\"]\ncrs = {choice:?}")).unwrap();
         bring_to_points(&mut file, &options, &system_of(points, DatumRule::Strict))?;
         Ok((file.features[0].shape.outlines()[0][1], file.warnings))
@@ -238,8 +245,13 @@ mod tests {
         let lines = |crs: &Crs, rule: DatumRule| {
             let shape = LineShape::Line(vec![SOUTH; 2]);
             let features = vec![LineFeature { number: 1, kind: FeatureKind::Line, shape }];
-            let mut file =
-                LineFile { path: "a.gpkg".into(), crs: crs.clone(), features, warnings: Warnings::default() };
+            let mut file = LineFile {
+                path: "a.gpkg".into(),
+                crs: crs.clone(),
+                height_scale: 1.0,
+                features,
+                warnings: Warnings::default(),
+            };
             bring_to_points(&mut file, &toml::from_str("files = [\"a\"]").unwrap(), &system_of(&zone_15, rule))
                 .unwrap();
             file.warnings.iter().map(|warning| warning.to_string()).collect::<Vec<_>>().concat()
@@ -298,7 +310,13 @@ mod tests {
     fn height(own: &Crs, rest: &str, points: &Crs) -> (f64, String) {
         let shape = LineShape::Line(vec![[5e5, 49e5, 10.0]; 2]);
         let features = vec![LineFeature { number: 1, kind: FeatureKind::Line, shape }];
-        let mut file = LineFile { path: "a.gpkg".into(), crs: own.clone(), features, warnings: Warnings::default() };
+        let mut file = LineFile {
+            path: "a.gpkg".into(),
+            crs: own.clone(),
+            height_scale: 1.0,
+            features,
+            warnings: Warnings::default(),
+        };
         let options = toml::from_str(&format!("files = [\"a\"]\n{rest}")).unwrap();
         bring_to_points(&mut file, &options, &system_of(points, DatumRule::Strict)).unwrap();
         (file.features[0].shape.outlines()[0][0][2], file.warnings.iter().collect::<Vec<_>>().join("; "))

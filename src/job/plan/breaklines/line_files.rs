@@ -3,6 +3,7 @@
 use crate::breaklines::FeatureKind;
 use crate::input::lines::options::LineOptions;
 use crate::input::lines::{LineFeature, LineFile, is_side_file, read_lines};
+use crate::input::{is_number_in_steps, shown_height};
 use crate::job::options::JobOptions;
 use crate::job::plan::breaklines::line_crs::{SystemOfPoints, bring_to_points};
 use crate::job::plan::extent::Extent;
@@ -17,9 +18,11 @@ const FILES: &str = "[[breaklines]] files";
 /// Heights of lines and points differ by less than this many units, on the earth and in the sea.
 const FAR_AWAY: f64 = 100_000.0;
 
-/// What programs write for a height that they do not know. As heights they are deeper than nearly all of the sea, or higher than all mountains.
-const NO_HEIGHTS: [f64; 9] =
-    [-9999.0, -99_999.0, -999_999.0, -32_767.0, -32_768.0, 32_767.0, 99_999.0, 999_999.0, 9_999_999.0];
+/// Numbers that stand for no height lie farther from all heights of the points, in units of the file.
+const FAR_FROM_HEIGHTS: f64 = 100.0;
+
+/// Heights have so many digits after the point, at most: the others come from converting them.
+const DIGITS: f64 = 1e-6;
 
 /// Lines are held in memory whole, with all that is made of them. Their files may take this share of the limit.
 const SHARE_OF_MEMORY: u64 = 8;
@@ -112,7 +115,9 @@ impl LineFiles {
             for feature in &file.features {
                 for vertex in vertices_that_count(feature, extent) {
                     let z = vertex[2];
-                    if NO_HEIGHTS.contains(&z) && (z < own[0] || z > own[1]) {
+                    let far = FAR_FROM_HEIGHTS * file.height_scale;
+                    let is_nodata = is_number_in_steps(z / file.height_scale, DIGITS);
+                    if is_nodata && (z < own[0] - far || z > own[1] + far) {
                         return Err(no_height(file, feature, vertex));
                     }
                     if z < points[0] || z > points[1] {
@@ -151,8 +156,9 @@ fn vertices_that_count(feature: &LineFeature, extent: &Extent) -> Vec<[f64; 3]> 
 }
 
 fn no_height(file: &LineFile, feature: &LineFeature, [x, y, z]: [f64; 3]) -> Error {
+    let z = shown_height((z / file.height_scale).round());
     let what = format!(
-        "feature {} has the height {z:?} at ({x}, {y}), which stands for no height (nodata): correct it, leave the feature out, or take its \
+        "feature {} has the height {z} at ({x}, {y}), which stands for no height (nodata): correct it, leave the feature out, or take its \
          heights from the points around with heights = \"points\" in [[breaklines]]",
         feature.number
     );
@@ -195,7 +201,13 @@ mod tests {
         let ring = corners.iter().zip(heights).map(|([x, y], z)| [*x, *y, z]).collect();
         let shape = if kind == FeatureKind::Lake { LineShape::Area(vec![ring]) } else { LineShape::Line(ring) };
         let features = vec![LineFeature { number: 4, kind, shape }];
-        let file = LineFile { path: "a.shp".into(), crs: Crs::default(), features, warnings: Warnings::default() };
+        let file = LineFile {
+            path: "a.shp".into(),
+            crs: Crs::default(),
+            height_scale: 1.0,
+            features,
+            warnings: Warnings::default(),
+        };
         let mut extent = Extent { min: [0.0; 3], max: [10.0, 10.0, 20.0], boxes: Vec::new() };
         LineFiles { files: vec![file] }.extend_heights(&mut extent)?;
         Ok([extent.min[2], extent.max[2]])

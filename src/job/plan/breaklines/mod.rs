@@ -5,6 +5,7 @@ mod height_doubts;
 mod line_crs;
 pub(crate) mod line_files;
 mod on_lattice;
+mod other_unit;
 mod planned;
 mod sentences;
 mod spacing;

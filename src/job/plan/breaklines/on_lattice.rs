@@ -109,7 +109,13 @@ mod tests {
 
     fn file(kind: FeatureKind, shape: LineShape) -> LineFile {
         let features = vec![LineFeature { number: 5, kind, shape }];
-        LineFile { path: "a.shp".into(), crs: Crs::default(), features, warnings: Warnings::default() }
+        LineFile {
+            path: "a.shp".into(),
+            crs: Crs::default(),
+            height_scale: 1.0,
+            features,
+            warnings: Warnings::default(),
+        }
     }
 
     const WITHIN: Bounds<2> = Bounds { min: [0, 0], max: [1000, 1000] };

@@ -25,7 +25,8 @@ pub(super) fn sentences(
     found.extend(findings.worst_uneven.first().map(|worst| names.uneven(worst)));
     if findings.empty_paths > 0 {
         found.push(format!(
-            "[[breaklines]]: {} parts of features, lines shorter than a step of the lattice or outlines without three places on it, are left out",
+            "[[breaklines]]: {} parts of features are left out: lines shorter than a step of the lattice, outlines without three places on it, or \
+             lakes that a hole covers there",
             findings.empty_paths
         ));
     }
@@ -57,6 +58,8 @@ impl Names<'_> {
         let features: u64 = self.files.iter().map(|file| file.features.len() as u64).sum();
         let why = if features == 0 {
             "the files have no feature that is used".into()
+        } else if self.findings.segments == 0 && self.findings.empty_paths > 0 && outside < features {
+            "what lies in the box of the points is smaller than a step of the lattice".into()
         } else if self.findings.segments == 0 {
             format!(
                 "none of {features} features reaches into the box of the points ({outside} are far from it): look at their CRS"

@@ -10,7 +10,7 @@ const NEIGHBOURS: usize = 8;
 
 /// A sample of the points, with heights in source units.
 pub(super) struct SampledTerrain<'a> {
-    lattice: &'a Lattice,
+    pub(super) lattice: &'a Lattice,
     /// The lengths of a unit of x and y and of one of heights in metres.
     metres: [f64; 2],
     /// The box of the points.
@@ -28,6 +28,9 @@ pub(super) struct Around {
     /// How far the farthest of them is, in units of height.
     pub(super) reach: f64,
 }
+
+/// A height, and what is around it.
+pub(super) type Pair = (f64, Around);
 
 impl Around {
     /// Returns how far a height lies above all of them (above 0) or below all of them (below 0).
@@ -79,10 +82,14 @@ impl<'a> SampledTerrain<'a> {
         format!("({}, {})", self.lattice.world(0, x), self.lattice.world(1, y))
     }
 
+    /// Returns the height of a vertex in the box of the points, and what is around it.
+    pub(super) fn pair(&self, vertex: &Vertex) -> Option<Pair> {
+        Some((self.height(vertex)?, self.around(vertex.place)?))
+    }
+
     /// Returns the heights around a place; `None` outside of the box of the points, and if the sample has too few points.
     pub(super) fn around(&self, place: Site) -> Option<Around> {
-        let is_within = |axis: usize| (self.within.min[axis]..=self.within.max[axis]).contains(&place[axis]);
-        if !is_within(0) || !is_within(1) {
+        if self.nearest_in_box(place) != place {
             return None;
         }
         let nearest = self.nearest(place);
@@ -90,9 +97,27 @@ impl<'a> SampledTerrain<'a> {
         let mut heights: Vec<i32> = nearest.into_iter().map(|(_, z)| z).collect();
         heights.sort_unstable();
         let at = |index: usize| heights.get(index).map(|z| self.lattice.world(2, *z));
-        let [metres, metres_z] = self.metres;
-        let reach = (farthest as f64).sqrt() * to_float(self.lattice.resolution) * metres / metres_z;
+        let reach = self.length(farthest);
         Some(Around { lowest: at(0)?, middle: at(NEIGHBOURS / 2)?, highest: at(NEIGHBOURS - 1)?, reach })
+    }
+
+    /// Returns the heights around the place in the box of the points that is nearest to this one, and how far it is, in units of height.
+    pub(super) fn beside(&self, place: Site) -> Option<(Around, f64)> {
+        let nearest = self.nearest_in_box(place);
+        let square = |axis: usize| i128::from(place[axis].abs_diff(nearest[axis])).pow(2);
+        Some((self.around(nearest)?, self.length(square(0).saturating_add(square(1)))))
+    }
+
+    /// Returns the place in the box of the points that is nearest to this one.
+    fn nearest_in_box(&self, place: Site) -> Site {
+        // A box without points may be inside out.
+        [0, 1].map(|axis| place[axis].min(self.within.max[axis]).max(self.within.min[axis]))
+    }
+
+    /// Returns a length in the plane in units of height, from its square in steps.
+    fn length(&self, square: i128) -> f64 {
+        let [metres, metres_z] = self.metres;
+        (square as f64).sqrt() * to_float(self.lattice.resolution) * metres / metres_z
     }
 
     /// Returns the squares of the distances of the nearest points and their heights, the nearest first.
@@ -138,6 +163,8 @@ mod tests {
         assert_eq!([180.0, 195.0, 260.0].map(|z| around.beyond(z)), [-10.0, 0.0, 50.0]);
         assert_eq!(terrain.around([i32::MAX, i32::MIN]).unwrap().highest, 490.0);
         assert_eq!(terrain.around([-1, 0]), None);
+        let (beside, outside) = terrain.beside([-300, 2020]).unwrap();
+        assert_eq!((terrain.around([0, 2020]), outside), (Some(beside), 3.0));
         assert_eq!(SampledTerrain::new(&sample[..7], [1.0; 2], &lattice, WITHIN).around([0, 0]), None);
     }
 }

@@ -1,0 +1,173 @@
+//! Heights of lines that seem to be in another unit than those of the points: of all features of a file, or of some.
+
+use crate::breaklines::Feature;
+use crate::input::Unit;
+use crate::job::plan::breaklines::height_doubts::{median, middles};
+use crate::job::plan::breaklines::terrain::{Pair, SampledTerrain};
+
+/// Heights of a file in another unit are so many times nearer to the terrain when they are converted, and were farther from it than so many
+/// metres, or fewer where they rise and fall with it.
+const TIMES_NEARER: f64 = 4.0;
+const LEAST_APART: f64 = 10.0;
+const LEAST_RISE: f64 = 1.0;
+
+/// Farther from the terrain than this, most lines are no roofs, and heights need not come onto the ground when they are converted.
+const FAR_APART: f64 = 30.0;
+
+/// The same of a feature among others.
+const FEATURE_NEARER: f64 = 10.0;
+const FEATURE_APART: f64 = 5.0;
+
+/// Converted, the heights of a feature lie nearer to the middle of the points around than these to each other, or than so many metres.
+const ON_GROUND: f64 = 0.5;
+
+/// Of the features that lie off the terrain, so many in a hundred fit when they are converted. Of many roofs and bridges, a few do by chance.
+const MOST: usize = 80;
+
+/// Units are the same if they differ by less than this part: it is far more than between the two feet.
+const SAME_UNIT: f64 = 1e-4;
+
+/// Compares heights of a file with the terrain around.
+pub(super) struct UnitJudge<'a> {
+    pub(super) terrain: &'a SampledTerrain<'a>,
+    /// By what the heights of the file have been multiplied.
+    pub(super) scale: f64,
+}
+
+impl UnitJudge<'_> {
+    /// Returns a sentence if the heights of a file seem to be in another unit.
+    pub(super) fn of_file(&self, pairs: &[Pair]) -> Option<String> {
+        let factor = self.factors().into_iter().find(|factor| self.fits(pairs, *factor).unwrap_or(false))?;
+        let [line, points] = middles(pairs)?;
+        let numbers = format!("in the middle {line}, where that of the points around is {points}");
+        Some(match self.unit_of_lines(factor) {
+            Some((unit, option)) => format!(
+                "its heights seem to be in {unit}, {}: {numbers}; set height_unit = \"{option}\" in [[breaklines]] {}",
+                self.taken(),
+                if self.scale == 1.0 { "to convert them" } else { "instead" }
+            ),
+            None => format!(
+                "its heights seem to be in {}, and those of the points in {}: {numbers}, but the points are taken to be in {}: say with \
+                 [input] unit or crs what the points are in, such as crs = \"EPSG:26915+6360\" for heights in US survey feet, and with \
+                 height_unit in [[breaklines]] what the lines are in",
+                if factor < 1.0 { "feet" } else { "metres" },
+                if factor < 1.0 { "metres" } else { "feet" },
+                self.unit_of_points().name()
+            ),
+        })
+    }
+
+    /// Returns the numbers of the features that seem to be in another unit, and a sentence about them. `pairs` are those of each.
+    pub(super) fn of_features(&self, features: &[Feature], pairs: &[Vec<Pair>]) -> Option<(Vec<u64>, String)> {
+        let off: Vec<(u64, &Vec<Pair>)> = features
+            .iter()
+            .map(|feature| feature.id.feature)
+            .zip(pairs)
+            .filter(|(_, pairs)| self.is_off(pairs))
+            .collect();
+        let fitting = |factor: f64| {
+            let of_unit = off.iter().filter(|(_, pairs)| self.feature_fits(pairs, factor).unwrap_or(false));
+            let of_unit: Vec<(u64, &Vec<Pair>)> = of_unit.copied().collect();
+            let is_most = of_unit.len().saturating_mul(100) >= off.len().saturating_mul(MOST);
+            (is_most && !of_unit.is_empty()).then_some((factor, of_unit))
+        };
+        let (factor, found) = self.factors().into_iter().find_map(fitting)?;
+        let (first, pairs) = *found.first()?;
+        let mut numbers: Vec<u64> = found.iter().map(|(number, _)| *number).collect();
+        numbers.dedup();
+        let others = match numbers.len() {
+            1 => String::new(),
+            count => format!(" (and {} more of {} features)", count.saturating_sub(1), features.len()),
+        };
+        let [line, points] = middles(pairs)?;
+        let numbers_of_first = format!("in the middle {line}, where that of the points around is {points}");
+        let sentence = match self.unit_of_lines(factor) {
+            Some((unit, option)) => format!(
+                "the heights of feature {first}{others} seem to be in {unit}, {}: {numbers_of_first}; convert them, or put such features into a \
+                 file of their own, with height_unit = \"{option}\" in its [[breaklines]]",
+                self.taken()
+            ),
+            None => format!(
+                "the heights of feature {first}{others} are 3.28 times too {}, as if they had been converted between feet and metres once too \
+                 often: {numbers_of_first}; correct them",
+                if factor < 1.0 { "high" } else { "low" }
+            ),
+        };
+        Some((numbers, sentence))
+    }
+
+    /// Returns the option to try where heights that fit no unit well would come much nearer to the terrain.
+    pub(super) fn hint(&self, pairs: &[Pair]) -> Option<String> {
+        let apart = |factor: f64| median(pairs.iter().map(move |(z, around)| (z * factor - around.middle).abs()));
+        let is_nearer = |factor: &f64| {
+            apart(1.0)
+                .zip(apart(*factor))
+                .is_some_and(|(as_written, converted)| as_written > FEATURE_NEARER * converted)
+        };
+        let factor = self.factors().into_iter().find(is_nearer)?;
+        self.unit_of_lines(factor).map(|(_, option)| format!("set height_unit = \"{option}\" then"))
+    }
+
+    /// Returns by what heights in feet are multiplied to be in metres, and the reverse.
+    fn factors(&self) -> [f64; 2] {
+        let foot = if self.unit_of_points() == Unit::UsFoot { Unit::US_FOOT } else { Unit::FOOT };
+        [foot, foot.recip()]
+    }
+
+    fn unit_of_points(&self) -> Unit {
+        Unit::from_metres(Some(self.terrain.in_height_unit(1.0).recip()))
+    }
+
+    /// Returns how the heights of the file are taken, as the end of "its heights seem to be in feet".
+    fn taken(&self) -> &'static str {
+        let is_in_feet = self.unit_of_lines(1.0).is_some_and(|(unit, _)| unit == "feet");
+        match (self.scale == 1.0, is_in_feet) {
+            (true, false) => "and those of the points in metres",
+            (true, true) => "and those of the points in feet",
+            (false, false) => "but they are converted from metres",
+            (false, true) => "but they are converted from feet",
+        }
+    }
+
+    /// Returns the unit, and its option, in which heights are that fit the terrain after they are multiplied by `factor`; `None` if there is none,
+    /// so that the points must be in another unit than they are taken to be.
+    fn unit_of_lines(&self, factor: f64) -> Option<(&'static str, &'static str)> {
+        let metres = factor * self.scale / self.terrain.in_height_unit(1.0);
+        let is = |other: f64| (metres / other - 1.0).abs() < SAME_UNIT;
+        let foot = if self.unit_of_points() == Unit::UsFoot { "us-foot" } else { "foot" };
+        let known = [(1.0, ("metres", "metre")), (Unit::FOOT, ("feet", foot))];
+        known.into_iter().find_map(|(unit, name)| is(unit).then_some(name))
+    }
+
+    /// Tells whether the heights of a file fit the terrain after they are multiplied by `factor`.
+    fn fits(&self, pairs: &[Pair], factor: f64) -> Option<bool> {
+        let apart = |factor: f64| median(pairs.iter().map(move |(z, around)| (z * factor - around.middle).abs()));
+        let shift = median(pairs.iter().map(|(z, around)| z - around.middle))?;
+        let shifted = median(pairs.iter().map(|(z, around)| (z - around.middle - shift).abs()))?;
+        let (as_written, converted) = (apart(1.0)?, apart(factor)?);
+        let is_more_than = |value: f64, metres: f64| value > self.terrain.in_height_unit(metres);
+        // Heights from another zero fit better when they are shifted.
+        let is_shifted = converted > 2.0 * shifted.max(self.terrain.in_height_unit(LEAST_RISE));
+        let rises = is_more_than(shifted, LEAST_RISE) && shifted > TIMES_NEARER * converted;
+        let is_apart = is_more_than(as_written, LEAST_APART) || rises;
+        // Roofs over low ground come nearer to it, but not onto it.
+        let relief = median(pairs.iter().map(|(_, around)| around.relief()))?;
+        let is_on_ground = converted <= 2.0 * relief || !is_more_than(converted, LEAST_RISE);
+        let is_far = is_more_than(as_written, FAR_APART) && as_written > FEATURE_NEARER * converted;
+        Some(as_written > TIMES_NEARER * converted && !is_shifted && is_apart && (is_on_ground || is_far))
+    }
+
+    /// Tells whether a feature lies off the terrain.
+    fn is_off(&self, pairs: &[Pair]) -> bool {
+        let beyond = median(pairs.iter().map(|(z, around)| around.beyond(*z)));
+        beyond.is_some_and(|beyond| beyond.abs() > self.terrain.in_height_unit(FEATURE_APART))
+    }
+
+    /// Tells whether a feature that lies off the terrain lies on it after its heights are multiplied by `factor`.
+    fn feature_fits(&self, pairs: &[Pair], factor: f64) -> Option<bool> {
+        let apart = |factor: f64| median(pairs.iter().map(move |(z, around)| (z * factor - around.middle).abs()));
+        let relief = median(pairs.iter().map(|(_, around)| around.relief()))?;
+        let (as_written, converted) = (apart(1.0)?, apart(factor)?);
+        Some(as_written > FEATURE_NEARER * converted && converted <= relief.max(self.terrain.in_height_unit(ON_GROUND)))
+    }
+}
