@@ -11,6 +11,7 @@ pub(crate) mod doubtful_heights;
 pub mod extent;
 pub(crate) mod far_points;
 pub mod fingerprint;
+pub(crate) mod geocentric_inputs;
 pub(crate) mod globe_system;
 pub(crate) mod height_range;
 pub mod input_identity;
