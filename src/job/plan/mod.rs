@@ -2,6 +2,7 @@
 //! written down and read back, so that every later step is a function of the plan, an index and the store.
 
 pub(crate) mod area_check;
+pub(crate) mod area_cure;
 pub(crate) mod area_hint;
 pub mod breaklines;
 pub mod budget;
