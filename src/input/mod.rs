@@ -34,6 +34,7 @@ mod windows_1252;
 pub(crate) use crs::area_of_use::{AreaOfUse, arc};
 pub use crs::choice::CrsChoice;
 pub(crate) use crs::datum::Sameness;
+pub(crate) use crs::rectangle::turned;
 pub use crs::system::{ComparableCrs, Crs, CrsKind};
 pub use crs::target::{NamedCrs, TargetCrs};
 pub use crs::transform::between::CrsTransform;

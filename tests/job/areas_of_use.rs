@@ -159,3 +159,103 @@ fn what_is_transformed_is_judged_by_both_systems() {
     let far = "crs = \"EPSG:25832\"\nto_crs = \"EPSG:32615\"\ndatums = \"close\"";
     Job::on(&[&table]).with("input", far).run().refused(3, &["WGS 84 / UTM zone 15N", "with [input] to_crs"]);
 }
+
+/// The text of a map without a name, a code or a datum.
+fn nameless(projection: &str, parameters: &[(&str, f64)]) -> String {
+    let parameters: String = parameters.iter().map(|(name, value)| format!("PARAMETER[\"{name}\",{value}],")).collect();
+    format!("PROJCS[\"unknown\",PROJECTION[\"{projection}\"],{parameters}UNIT[\"metre\",1]]")
+}
+
+#[test]
+fn a_projection_without_name_code_and_datum_has_the_area_that_it_is_good_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let cylinder = nameless(
+        "Transverse_Mercator",
+        &[
+            ("latitude_of_origin", 0.0),
+            ("central_meridian", 11.0),
+            ("scale_factor", 0.9996),
+            ("false_easting", 500_000.0),
+            ("false_northing", 0.0),
+        ],
+    );
+    let cone = nameless(
+        "Lambert_Conformal_Conic_2SP",
+        &[
+            ("latitude_of_origin", 46.5),
+            ("central_meridian", 3.0),
+            ("standard_parallel_1", 49.0),
+            ("standard_parallel_2", 44.0),
+            ("false_easting", 700_000.0),
+            ("false_northing", 6_600_000.0),
+        ],
+    );
+    for (name, text, [x, y]) in [("c", &cylinder, PLACE), ("l", &cone, [652_000.0, 6_861_000.0])] {
+        let job = |file: &Path| Job::on(&[file]).with("input", &format!("crs = '''{text}'''"));
+        assert!(!warnings(&job(&csv(&folder, &format!("{name}r.csv"), [x, y], 7.0)).report()).contains("area of use"));
+        let exchanged = csv(&folder, &format!("{name}e.csv"), [y, x], 7.0);
+        job(&exchanged).run().refused(3, &["estimated from its projection", "With x and y exchanged"]);
+    }
+}
+
+#[test]
+fn the_mistake_that_explains_the_place_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, place, step, crs, word) in [
+        ("prefix.csv", [32_500_000.0, 5_500_000.0], 7.0, 25832, "With 32000000 subtracted from x"),
+        ("no_prefix.csv", [500_000.0, 5_400_000.0], 7.0, 31467, "With 3000000 added to x"),
+        (
+            "lv95.csv",
+            [2_600_000.0, 1_200_000.0],
+            7.0,
+            21781,
+            "With 2000000 subtracted from x and 1000000 subtracted from y",
+        ),
+        ("south.csv", [333_000.0, -3_740_000.0], 7.0, 7856, "With 10000000 added to y"),
+        ("krovak.csv", [744_000.0, 1_041_000.0], 7.0, 5514, "With the sign of x and y changed"),
+        ("km.csv", [500.0, 5_500.0], 0.007, 25832, "In the unit kilometre"),
+        ("degrees.csv", [2.35, 48.85], 1e-4, 2154, "As longitude and latitude, they lie within it"),
+        ("latitude.csv", [48.85, 2.35], 1e-4, 2154, "Latitude comes first: say so with columns"),
+    ] {
+        let file = csv(&folder, name, place, step);
+        let job = Job::on(&[&file]).with("input", &format!("crs = \"EPSG:{crs}\""));
+        job.run().refused(3, &[name, "area of use", word]);
+    }
+    let path = folder.path().join("geocentric.csv");
+    let row = |i: usize| format!("{},{},{}\n", 4_181_455 + i % 10 * 7, 850_749 + i / 10 * 9, 4_724_370 + i);
+    fs::write(&path, format!("x,y,z\n{}", (0..60).map(row).collect::<String>())).unwrap();
+    let words = ["As geocentric coordinates, they lie on the surface of the earth", "pdal translate"];
+    Job::on(&[&path]).with("input", "crs = \"EPSG:25832\"").run().refused(3, &words);
+    let said = warnings(&Job::on(&[&path]).report());
+    assert!(said.contains("geocentric.csv: its coordinates look geocentric"), "{said}");
+    assert!(!warnings(&Job::on(&[&path]).with("input", "crs = \"none\"").report()).contains("geocentric"));
+}
+
+#[test]
+fn degrees_in_the_wrong_order_or_with_the_wrong_sign_are_named_where_the_target_is_missed() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, place, to, word) in [
+        ("lat_lon.csv", [53.5, 9.9], "EPSG:25832", "With x and y exchanged, they lie within it"),
+        ("sign.csv", [118.2, 34.0], "EPSG:26911", "With the sign of x changed, they lie within it"),
+    ] {
+        let file = csv(&folder, name, place, 1e-4);
+        let lines = format!("crs = \"EPSG:4326\"\nto_crs = \"{to}\"\ndatums = \"close\"");
+        Job::on(&[&file]).with("input", &lines).run().refused(3, &[name, "outside its area of use", word]);
+    }
+}
+
+#[test]
+fn longitudes_beyond_180_degrees_are_taken_without_whole_turns_and_with_a_warning() {
+    let folder = tempfile::tempdir().unwrap();
+    let job = |name: &str, x: f64| {
+        let file = csv(&folder, name, [x, 34.0], 1e-4);
+        Job::on(&[&file]).with("input", "crs = \"EPSG:4326\"\nto_crs = \"utm\"").report()
+    };
+    let (west, turned) = (job("west.csv", -118.2), job("turned.csv", 241.8));
+    assert_eq!((&west["crs"], &west["points"]), (&turned["crs"], &turned["points"]));
+    assert!(
+        warnings(&turned).contains("lie beyond 180 degrees, and whole turns are taken away: from -118.2"),
+        "{turned}"
+    );
+    assert!(!warnings(&west).contains("whole turns"), "{west}");
+}

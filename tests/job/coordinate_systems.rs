@@ -96,6 +96,35 @@ pub(crate) fn warnings(report: &Value) -> String {
 }
 
 #[test]
+fn the_cure_of_a_geocentric_system_is_one_that_helps() {
+    let folder = tempfile::tempdir().unwrap();
+    let (map, bare) = (write(folder.path(), "map.las", &[code(26915)]), write(folder.path(), "bare.las", &[]));
+    let false_record = write(folder.path(), "false.las", &[keys(&[[2048, 0, 1, 4978]])]);
+    let words = ["which is geocentric, but the points of", "bare.las do not lie on the surface of the earth"];
+    for (line, key) in
+        [("crs = \"EPSG:4978\"", "[input] crs is"), ("missing_crs = \"EPSG:4978\"", "[input] missing_crs is")]
+    {
+        Job::on(&[&bare, &map]).with("input", line).run().refused(2, &[words[0], words[1], key]);
+    }
+    // The user states a CRS already, or the other file does.
+    for (files, line) in [(vec![&false_record], "crs = \"EPSG:26915\""), (vec![&false_record, &map], "")] {
+        let job = Job::on(&files).with("input", line).report();
+        let said = warnings(&job);
+        assert!(
+            said.contains("The record is ignored: unless [input] crs, missing_crs or another file states"),
+            "{said}"
+        );
+        assert_eq!(job["crs"], "NAD83 / UTM zone 15N");
+    }
+    let earth = write(folder.path(), "earth.las", &[keys(&[[2048, 0, 1, 4978]])]);
+    move_to(&earth, [4_177_000.0, 855_000.0, 4_728_000.0]);
+    for line in ["", "to_crs = \"utm\""] {
+        let refused = Job::on(&[&map, &earth]).with("input", line).run();
+        refused.refused(2, &["earth.las: the coordinates are geocentric", "pdal translate"]);
+    }
+}
+
+#[test]
 fn geocentric_coordinates_are_refused_by_code_text_and_keys() {
     let folder = tempfile::tempdir().unwrap();
     let version_1 = r#"GEOCCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0],

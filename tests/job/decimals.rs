@@ -332,7 +332,8 @@ fn degrees_are_refused_by_the_names_of_columns() {
     ] {
         let text = Text::new(&format!("{header}\n{rows}"));
         text.job().run().refused(2, &["cloud.csv", "degrees", "projected CRS", "unit"]);
-        run(&text.job().with("input", "unit = \"metre\""));
+        text.job().with("input", "unit = \"metre\"").run().refused(2, &["degrees", "unit says metre"]);
+        run(&text.job().with("input", "crs = \"none\"\nunit = \"metre\""));
         run(&text.job().with("input", "crs = \"none\""));
     }
     // Metres may begin at zero.

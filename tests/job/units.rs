@@ -198,3 +198,35 @@ fn a_unit_that_contradicts_the_crs_is_refused_with_both_names() {
     assert_eq!(metres(&[&metre], "crs = \"none\"\nunit = \"us-foot\"").0, [US_FOOT, US_FOOT]);
     assert_eq!(metres(&[&bare], "unit = \"us-foot\"").0, [US_FOOT, US_FOOT]);
 }
+
+#[test]
+fn a_record_that_is_left_aside_and_states_another_unit_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let las = write(folder.path(), "metre.las", &[code(26915)]);
+    let (found, said) = metres(&[&las], "crs = \"none\"\nunit = \"foot\"");
+    assert_eq!(found, [0.3048, 0.3048]);
+    let words = "the coordinates are taken in foot, though 1 of 1 inputs state another unit, such as";
+    assert!(said.contains(words) && said.contains("metre.las: metre for x and y"), "{said}");
+    assert!(!metres(&[&las], "crs = \"none\"\nunit = \"metre\"").1.contains("state another unit"));
+    let heights = write(folder.path(), "heights.las", &[keys(&FEET_OF_HEIGHT)]);
+    let (found, said) = metres(&[&heights], "crs = \"none\"\nunit = \"metre\"");
+    assert_eq!(found, [1.0, 1.0]);
+    assert!(said.contains("heights.las: US survey foot for z"), "{said}");
+    let (found, said) = metres(&[&heights], "unit = \"metre\"");
+    assert_eq!(found, [1.0, US_FOOT]);
+    assert!(said.contains("[input] unit is that of x and y alone"), "{said}");
+}
+
+#[test]
+fn a_unit_of_length_over_columns_of_degrees_must_be_stated_twice() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("degrees.csv");
+    let row =
+        |i: usize| format!("{:.6},{:.6},{}\n", 11.5 + (i % 10) as f64 * 1e-4, 48.1 + (i / 10) as f64 * 1e-4, i % 3);
+    fs::write(&path, format!("lon,lat,z\n{}", (0..60).map(row).collect::<String>())).unwrap();
+    let words = ["degrees.csv: its columns are named as degrees", "[input] unit says metre", "to_crs = \"utm\""];
+    Job::on(&[&path]).with("input", "unit = \"metre\"").run().refused(2, &words);
+    let (found, said) = metres(&[&path], "unit = \"metre\"\ncrs = \"none\"");
+    assert_eq!(found, [1.0, 1.0]);
+    assert!(said.contains("degrees.csv: degree for x and y"), "{said}");
+}

@@ -1,10 +1,12 @@
 //! The areas that systems are made for. A place far outside of that of its system is most often a mistake: exchanged coordinates, or the
 //! wrong system.
 
+use crate::input::crs::area_of_projection::area_of_projection;
 use crate::input::crs::codes::{lines_of_areas, text_of_code};
-use crate::input::crs::datum::Sameness;
+use crate::input::crs::datum::{Datum, Sameness};
 use crate::input::crs::form::CrsForm;
 use crate::input::crs::projection::Projection;
+use crate::input::crs::rectangle::Rectangle;
 use crate::input::crs::system::Crs;
 use std::ops::RangeInclusive;
 
@@ -12,29 +14,27 @@ use std::ops::RangeInclusive;
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct AreaOfUse {
     rectangles: Vec<Rectangle>,
-}
-
-/// The longitudes of its western and its eastern end, and its latitudes. One across the date line has its west east of its east.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Rectangle {
-    west: f64,
-    south: f64,
-    east: f64,
-    north: f64,
+    /// Whether no dataset states it: it is all that its projection is good for.
+    is_estimated: bool,
 }
 
 impl AreaOfUse {
     /// Returns the area of a system by its EPSG code. That of a system without one, or whose text contradicts it, is that of all codes with
-    /// the same datum and the same projection. Returns `None` if there is no such code.
+    /// the same datum and the same projection, or else what its projection is good for. Returns `None` if nothing is known of that.
     pub(crate) fn of(crs: &Crs) -> Option<AreaOfUse> {
         let code = crs.epsg.filter(|_| crs.difference_to_code().is_none());
         let by_code = code.map(|code| rectangles(&[code])).filter(|found| !found.is_empty());
-        let by_form = || {
-            let form = crs.form()?;
-            Some(rectangles(&codes_of_form(&form, form.projection()?)))
-        };
-        let rectangles = by_code.or_else(by_form)?;
-        (!rectangles.is_empty()).then_some(AreaOfUse { rectangles })
+        if let Some(rectangles) = by_code {
+            return Some(AreaOfUse { rectangles, is_estimated: false });
+        }
+        let form = crs.form()?;
+        let projection = form.projection()?;
+        let by_form = rectangles(&codes_of_form(&form, projection));
+        if !by_form.is_empty() {
+            return Some(AreaOfUse { rectangles: by_form, is_estimated: false });
+        }
+        let meridian = form.datum().map_or(0.0, Datum::meridian);
+        Some(AreaOfUse { rectangles: vec![area_of_projection(projection, meridian)?], is_estimated: true })
     }
 
     /// Returns how far a place in degrees lies outside: degrees of arc to the east or west, and to the north or south.
@@ -46,7 +46,8 @@ impl AreaOfUse {
     pub(crate) fn label(&self, place: [f64; 2]) -> String {
         let Rectangle { west, south, east, north } = self.nearest(place);
         let [west, south, east, north] = [west, south, east, north].map(|degrees| (degrees * 10.0).round() / 10.0);
-        format!("longitude {west} to {east}, latitude {south} to {north}")
+        let estimated = if self.is_estimated { "estimated from its projection: " } else { "" };
+        format!("{estimated}longitude {west} to {east}, latitude {south} to {north}")
     }
 
     fn nearest(&self, place: [f64; 2]) -> Rectangle {
@@ -59,26 +60,6 @@ impl AreaOfUse {
 /// Returns the length of a way in degrees of arc by its parts to the east and to the north.
 pub(crate) fn arc([across, along]: [f64; 2]) -> f64 {
     libm::hypot(across, along)
-}
-
-impl Rectangle {
-    const EARTH: Rectangle = Rectangle { west: -180.0, south: -90.0, east: 180.0, north: 90.0 };
-
-    /// Reads four numbers between blanks.
-    fn read(text: &str) -> Option<Rectangle> {
-        let numbers = text.split(' ').map(|number| number.parse().ok()).collect::<Option<Vec<f64>>>()?;
-        let [west, south, east, north] = numbers.try_into().ok()?;
-        Some(Rectangle { west, south, east, north })
-    }
-
-    fn beyond(&self, [longitude, latitude]: [f64; 2]) -> [f64; 2] {
-        let turn = |degrees: f64| degrees.rem_euclid(360.0);
-        let width = if self.west <= self.east { self.east - self.west } else { self.east - self.west + 360.0 };
-        let from_west = turn(longitude - self.west);
-        let across = if from_west <= width { 0.0 } else { (from_west - width).min(360.0 - from_west) };
-        let along = (self.south - latitude).max(latitude - self.north).max(0.0);
-        [across * libm::cos(latitude.to_radians()), along]
-    }
 }
 
 /// Returns the rectangles of the areas of `codes`.
@@ -111,6 +92,26 @@ mod tests {
     use super::*;
     use crate::input::crs::from_wkt::{from_epsg, parse};
     use std::collections::HashSet;
+
+    #[test]
+    fn the_areas_of_codes_lie_within_what_their_projections_are_good_for() {
+        // The sign of the longitude is wrong in three old ones; one cone serves the coast of Antarctica far around its pole.
+        const ODD: [u32; 4] = [2155, 2156, 3033, 6141];
+        let mut judged = 0;
+        let areas = lines_of_areas().flat_map(|(area, list)| runs(list).flatten().map(move |code| (area, code)));
+        for (area, code) in areas {
+            let Some(form) = CrsForm::of_code(code) else { continue };
+            let meridian = form.datum().map_or(0.0, Datum::meridian);
+            let estimated = form.projection().and_then(|projection| area_of_projection(projection, meridian));
+            let (Some(estimated), Some(known)) = (estimated, Rectangle::read(area)) else { continue };
+            let corners = [[known.west, known.south], [known.east, known.north]];
+            let beyond = corners.map(|corner| arc(estimated.beyond(corner)));
+            let is_near = beyond.iter().all(|degrees| *degrees < 3.0);
+            assert!(is_near || ODD.contains(&code), "EPSG:{code} {beyond:?} {known:?} {estimated:?}");
+            judged += 1;
+        }
+        assert!(judged > 4_000, "{judged}");
+    }
 
     fn beyond(code: u32, place: [f64; 2]) -> f64 {
         arc(AreaOfUse::of(&from_epsg(code).unwrap()).unwrap().beyond(place))
@@ -155,8 +156,10 @@ mod tests {
         // That of a site is its own, and the same projection on a datum of another country is of no use.
         let site = esri.replace("-93.0", "-93.4321");
         let elsewhere = esri.replace("North_American_1983", "European_1950").replace("D_European", "D_European_Datum");
-        for text in [site, elsewhere] {
-            assert_eq!(AreaOfUse::of(&parse(&text).unwrap()), None, "{text}");
+        for (text, east) in [(site, -80.0), (elsewhere, -80.0)] {
+            let area = AreaOfUse::of(&parse(&text).unwrap()).unwrap();
+            assert!(area.is_estimated && area.beyond([-93.0, 25.0]) == [0.0; 2], "{area:?}");
+            assert!(area.beyond([east, 25.0])[0] > 0.5, "{area:?}");
         }
         // A text that contradicts its code.
         let text = text_of_code(26915).unwrap().replace("\"central_meridian\",-93", "\"central_meridian\",-99");

@@ -1,6 +1,7 @@
 //! Coordinate reference systems, as far as a terrain needs them: the units, a text for readers, and whether two systems agree.
 //! This room knows no files: the readers of file formats hand it the records that describe the system.
 
+pub(crate) mod area_of_projection;
 pub(crate) mod area_of_use;
 pub(crate) mod choice;
 pub(crate) mod codes;
@@ -21,6 +22,7 @@ pub(crate) mod plausible;
 pub(crate) mod proj4;
 pub(crate) mod projection;
 pub(crate) mod projection_names;
+pub(crate) mod rectangle;
 pub(crate) mod system;
 pub(crate) mod target;
 pub(crate) mod transform;

@@ -30,7 +30,8 @@ pub(crate) fn plausible(crs: Crs, min: [f64; 3], max: [f64; 3], warnings: &mut W
     }
     warnings.push(format!(
         "its coordinate system ({}) is in degrees, but its coordinates are x {} to {} and y {} to {}, which no longitude and \
-         latitude is: the system is ignored, and the coordinates are taken as a plane (set [input] crs or unit to say otherwise)",
+         latitude is. The record is ignored: unless [input] crs, missing_crs or another file states what the points are in, they are taken \
+         as a plane",
         crs.label(),
         min[0],
         max[0],

@@ -28,6 +28,9 @@ impl Unit {
     /// The US survey foot in metres.
     pub const US_FOOT: f64 = 1200.0 / 3937.0;
 
+    /// The kilometre in metres.
+    pub(crate) const KILOMETRE: f64 = 1000.0;
+
     /// Returns the unit of this length. The two feet differ by 6e-7 m; files give them with 9 digits or more.
     pub fn from_metres(metres: Option<f64>) -> Unit {
         let near = |value: f64, other: f64| (value - other).abs() < 1e-8;
@@ -58,6 +61,7 @@ impl Unit {
             Unit::Foot => "foot".into(),
             Unit::UsFoot => "US survey foot".into(),
             Unit::Degree => "degree".into(),
+            Unit::Other(metres) if *metres == Unit::KILOMETRE => "kilometre".into(),
             Unit::Other(metres) => format!("{metres} m"),
             Unit::Unknown => "unknown".into(),
         }

@@ -7,7 +7,7 @@ use crate::input::points::axis::Axis;
 use crate::input::points::optional_fields::OptionalFields;
 use crate::input::points::returns::KeptReturns;
 use crate::input::points::rules::PointRules;
-use crate::input::source::Source;
+use crate::input::source::{Source, is_box};
 
 /// The records by which a file is judged.
 const RECORDS: u64 = 4096;
@@ -21,8 +21,11 @@ const EARTH: [f64; 2] = [6_378_137.0, 6_356_752.3];
 /// No terrain lies lower or higher above the ellipsoid, in metres: the bottom of the sea, and more than the highest mountain.
 const HEIGHTS: [f64; 2] = [-12_000.0, 20_000.0];
 
+/// No height of a terrain is greater, in metres.
+const NO_HEIGHT: f64 = 20_000.0;
+
 impl Source {
-    /// Drops a record of a geocentric system if no point of a sample lies near the surface of the earth: then it is false, and the
+    /// Drops a record of a geocentric system if most points of a sample lie far from the surface of the earth: then it is false, and the
     /// coordinates are a plane. Its unit stays.
     ///
     /// # Errors
@@ -33,17 +36,39 @@ impl Source {
         }
         let metres = self.crs.metres_per_unit().unwrap_or(1.0);
         let places = self.first_places()?;
-        let is_on_earth = |place: &[f64; 3]| lies_near_surface(place.map(|value| value * metres));
-        let Some([x, y, z]) = places.first().filter(|_| !places.iter().any(is_on_earth)) else { return Ok(()) };
+        let is_elsewhere = |place: &&[f64; 3]| !lies_near_surface(place.map(|value| value * metres));
+        let elsewhere = places.iter().filter(is_elsewhere).count();
+        // A stray point or two may lie anywhere.
+        let first = places.iter().find(is_elsewhere).filter(|_| elsewhere.saturating_mul(2) > places.len());
+        let Some([x, y, z]) = first else { return Ok(()) };
         self.warnings.push(format!(
             "its coordinate system ({}) is geocentric, but its points do not lie on the surface of the earth, about 6,370 km from the \
-             middle: the first is at x {x:.0}, y {y:.0}, z {z:.0}, {:.0} km from it. The system is ignored, and the coordinates are \
-             taken as a plane (set [input] crs or unit to say otherwise)",
+             middle: the first is at x {x:.0}, y {y:.0}, z {z:.0}, {:.0} km from it. The record is ignored: unless [input] crs, missing_crs \
+             or another file states what the points are in, they are taken as a plane",
             self.crs.label(),
             libm::hypot(libm::hypot(*x, *y), *z) * metres / 1000.0
         ));
         self.crs = Crs { horizontal: self.crs.horizontal, ..Crs::default() };
         Ok(())
+    }
+
+    /// Returns whether the box that the file claims lies on the surface of the earth as geocentric coordinates in metres do, with a z that
+    /// is no height.
+    pub(crate) fn looks_geocentric(&self) -> bool {
+        self.claimed_middle().is_some_and(|place| lies_near_surface(place) && place[2].abs() > NO_HEIGHT)
+    }
+
+    /// Returns whether the box that the file claims, if it claims one, may hold geocentric coordinates in metres.
+    pub(crate) fn may_be_geocentric(&self) -> bool {
+        self.claimed_middle().is_none_or(lies_near_surface)
+    }
+
+    /// Returns the middle of the box that the file claims, in its own coordinates.
+    fn claimed_middle(&self) -> Option<[f64; 3]> {
+        let own = self.transform().map(|transform| &transform.own);
+        let [min, max] = own.map_or([self.min, self.max], |own| [own.min, own.max]);
+        let has_box = is_box(min, max) && (self.records <= 1 || min != max);
+        has_box.then(|| [0, 1, 2].map(|axis| min[axis] + (max[axis] - min[axis]) * 0.5))
     }
 
     /// Returns x, y and z of the first records of the first chunk.

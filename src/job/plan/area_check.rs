@@ -3,7 +3,9 @@
 
 use crate::geometry::lattice::Lattice;
 use crate::input::options::{InputOptions, OutsideCrsArea};
-use crate::input::{AreaOfUse, Crs, CrsTransform, DatumRule, FileFormat, Source, Unit, arc};
+use crate::input::{AreaOfUse, Crs, CrsKind, CrsTransform, DatumRule, Source, Unit, arc, turned};
+use crate::job::plan::area_cure::{Change, changes};
+use crate::job::plan::common_crs::TRANSFORM;
 use crate::job::plan::extent::{Extent, SourceBox};
 use crate::job::plan::globe_system::globe_system;
 use crate::job::plan::height_range::{HeightSample, may_reach};
@@ -53,6 +55,7 @@ pub(crate) fn check_places(
         .map(|(source, claim)| (source, places(source, claim, common)))
         .filter(|(_, places)| !places.is_empty())
         .collect();
+    warn_of_long_turns(&places, warnings);
     let mut ways = Ways::default();
     let outside: Vec<(&Source, Outside)> = places
         .iter()
@@ -71,6 +74,23 @@ pub(crate) fn check_places(
     Ok(())
 }
 
+/// Warns about longitudes that count on beyond 180 degrees: whole turns are taken away.
+fn warn_of_long_turns(places: &[(&Source, Vec<[f64; 2]>)], warnings: &mut Warnings) {
+    let beyond = |source: &Source| {
+        let own = source.transform().filter(|transform| transform.from.kind == CrsKind::Geographic)?;
+        let (west, east) = (own.own.min[0], own.own.max[0]);
+        (west > 180.0 || east < -180.0).then_some([west, east])
+    };
+    if let Some((source, [west, east])) = places.iter().find_map(|(source, _)| Some((source, beyond(source)?))) {
+        warnings.push(format!(
+            "{}: its longitudes, from {west} to {east}, lie beyond 180 degrees, and whole turns are taken away: from {:.4} to {:.4}",
+            source.path.display(),
+            turned(west),
+            turned(east)
+        ));
+    }
+}
+
 /// Returns how the points of a source lie outside the area of a system that they are in, if they do.
 fn outside(source: &Source, places: &[[f64; 2]], common: &CommonPlace, ways: &mut Ways) -> Option<Outside> {
     systems(source, common).into_iter().find_map(|said| Outside::of(&said, ways.of(&said.crs)?, &said.own(places)?))
@@ -87,11 +107,13 @@ fn refuse_hopeless(outside: &[(&Source, Outside)]) -> Result<()> {
     Err(Error::NoTerrain(format!("{}: {what}", source.path.display())))
 }
 
-/// A system that the points of a source are in, and the way to it from the system of the job.
+/// A system that the points of a source are in.
 struct SaidSystem {
     crs: Crs,
-    /// `None` for the system of the job.
-    back: Option<CrsTransform>,
+    /// What the file is in.
+    of_file: Crs,
+    /// The way from the system of the job to that of the file, and the way back; `None` if they are one.
+    to_file: Option<[CrsTransform; 2]>,
     /// Whether the points have been transformed into it.
     is_target: bool,
 }
@@ -99,23 +121,45 @@ struct SaidSystem {
 impl SaidSystem {
     /// Returns the places in this system; `None` if it has none of them.
     fn own(&self, places: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
-        let own: Vec<[f64; 2]> = match &self.back {
-            None => places.to_vec(),
-            Some(back) => places.iter().filter_map(|place| back.apply(*place)).collect(),
+        let own: Vec<[f64; 2]> = match &self.to_file {
+            Some([to_file, _]) if !self.is_target => places.iter().filter_map(|place| to_file.apply(*place)).collect(),
+            _ => places.to_vec(),
         };
         (!own.is_empty()).then_some(own)
+    }
+
+    /// Returns a place of this system in the system of the file.
+    fn in_file(&self, place: [f64; 2]) -> Option<[f64; 2]> {
+        match &self.to_file {
+            Some([to_file, _]) if self.is_target => to_file.apply(place),
+            _ => Some(place),
+        }
+    }
+
+    /// Returns where a place of the file lies in this system.
+    fn of_place_in_file(&self, place: [f64; 2]) -> Option<[f64; 2]> {
+        match &self.to_file {
+            Some([_, from_file]) if self.is_target => from_file.apply(place),
+            _ => Some(place),
+        }
     }
 }
 
 /// Returns what the file is in, if its points are transformed, and the system of the job.
 fn systems(source: &Source, common: &CommonPlace) -> Vec<SaidSystem> {
     let crs = Crs { horizontal: Unit::from_metres(Some(common.metres)), ..common.crs.clone() };
-    let from = source.transformed_from();
-    let own = from.and_then(|from| {
-        let back = CrsTransform::between(&crs, from, DatumRule::Close).ok()?;
-        Some(SaidSystem { crs: from.clone(), back: Some(back), is_target: false })
-    });
-    own.into_iter().chain([SaidSystem { is_target: from.is_some(), crs, back: None }]).collect()
+    let ways = |from: &Crs| {
+        let way = |from: &Crs, to: &Crs| CrsTransform::between(from, to, DatumRule::Close).ok();
+        Some([way(&crs, from)?, way(from, &crs)?])
+    };
+    let Some(from) = source.transformed_from() else {
+        return vec![SaidSystem { of_file: crs.clone(), crs, to_file: None, is_target: false }];
+    };
+    let Some(to_file) = ways(from) else { return Vec::new() };
+    let of_file = from.clone();
+    [(from.clone(), false), (crs.clone(), true)]
+        .map(|(crs, is_target)| SaidSystem { crs, of_file: of_file.clone(), to_file: Some(to_file.clone()), is_target })
+        .into()
 }
 
 /// Returns where the points of a source lie, in the system of the job: in the middle of those of the sample, or at nine places of the box
@@ -150,7 +194,7 @@ enum ToDegrees {
 
 impl ToDegrees {
     fn of(crs: &Crs) -> Option<ToDegrees> {
-        if let Ok(way) = CrsTransform::to_degrees(crs) {
+        if let Ok(way) = CrsTransform::to_rough_degrees(crs) {
             return Some(ToDegrees::Computed(Box::new(way)));
         }
         let metres = crs.metres_per_unit()?;
@@ -176,10 +220,8 @@ struct Outside {
     degrees: Option<[f64; 2]>,
     /// How far outside that is, to the east or west, and to the north or south.
     beyond: [f64; 2],
-    /// Whether they would lie within the area with x and y exchanged.
-    exchanged: bool,
-    /// The unit of length in which they would lie within the area.
-    other_unit: Option<Unit>,
+    /// What would bring them into the area.
+    change: Option<Change>,
     is_target: bool,
     label: String,
     area: String,
@@ -191,26 +233,30 @@ impl Outside {
         let beyond = |place: &[f64; 2]| way.apply(*place).map_or([f64::INFINITY; 2], |degrees| area.beyond(degrees));
         let place = *places.iter().min_by(|a, b| arc(beyond(a)).total_cmp(&arc(beyond(b))))?;
         let (degrees, beyond) = (way.apply(place), beyond(&place));
-        let fits = |place: [f64; 2]| way.apply(place).is_some_and(|degrees| area.beyond(degrees) == [0.0; 2]);
-        let exchanged = !said.is_target && arc(beyond) > EXCHANGED && fits([place[1], place[0]]);
-        if !exchanged && arc(beyond) <= DOUBTFUL {
+        let is_within = |degrees: [f64; 2]| area.beyond(degrees) == [0.0; 2];
+        let fits = |place: [f64; 2]| way.apply(place).is_some_and(is_within);
+        let is_near = arc(beyond) <= DOUBTFUL;
+        if is_near && (said.is_target || arc(beyond) <= EXCHANGED || !fits([place[1], place[0]])) {
             return None;
         }
-        let own = said.crs.metres_per_unit().filter(|_| !said.is_target);
-        let in_unit = |unit: &Unit| {
-            let factor = unit.metres_per_unit()? / own?;
-            Some(place.map(|value| value * factor))
+        let in_file = said.in_file(place);
+        let helps = |change: &Change| {
+            let changed = change.apply(in_file?, &said.of_file)?;
+            Some(change.is_in_degrees() && is_within(changed) || said.of_place_in_file(changed).is_some_and(fits))
         };
-        let mut units = [Unit::Metre, Unit::Foot].into_iter();
-        let other_unit = units.find(|unit| in_unit(unit).is_some_and(fits));
+        let all = in_file.into_iter().flat_map(|place| changes(place, &said.of_file));
+        let is_far = arc(beyond) > HOPELESS;
+        let mut likely = all.filter(|change| is_far || change.is_likely_near_by());
+        let change = likely.find(|change| helps(change) == Some(true));
         let (label, area) = (said.crs.label(), area.label(degrees.unwrap_or_default()));
-        Some(Outside { place, degrees, beyond, exchanged, other_unit, is_target: said.is_target, label, area })
+        Some(Outside { place, degrees, beyond, change, is_target: said.is_target, label, area })
     }
 
     /// Returns whether a terrain there is wrong for certain.
     fn is_hopeless(&self) -> bool {
         let is_far = arc(self.beyond) > HOPELESS;
-        is_far || self.exchanged && (arc(self.beyond) > DOUBTFUL || self.beyond[1] > EXCHANGED)
+        let is_exchanged = self.change == Some(Change::Exchanged);
+        is_far || is_exchanged && (arc(self.beyond) > DOUBTFUL || self.beyond[1] > EXCHANGED)
     }
 
     /// Says where the points lie and what to do.
@@ -218,7 +264,8 @@ impl Outside {
         let [x, y] = self.place;
         let lie = match self.degrees {
             Some([longitude, latitude]) => format!(
-                "lie at longitude {longitude:.2} and latitude {latitude:.2}, about {:.0} km outside its area of use ({})",
+                "lie at longitude {:.2} and latitude {latitude:.2}, about {:.0} km outside its area of use ({})",
+                turned(longitude),
                 arc(self.beyond) * DEGREE,
                 self.area
             ),
@@ -229,28 +276,20 @@ impl Outside {
 
     fn what_to_do(&self, source: &Source) -> String {
         let is_angle = self.place[0].abs() <= 360.0 && self.place[1].abs() <= 90.0;
-        match (self.exchanged, source.format, self.other_unit) {
-            (true, FileFormat::Text, _) => {
-                "With x and y exchanged, they lie within it: say with columns under [input.csv] which column is which, such as \
-                 columns = [\"y\", \"x\", \"z\"]"
-                    .into()
+        if source.looks_geocentric() {
+            return format!("As geocentric coordinates, they lie on the surface of the earth. {TRANSFORM}");
+        }
+        match &self.change {
+            Some(change) => change.cure(source.format),
+            None if self.is_target => {
+                "Name a CRS that is made for their place with [input] to_crs, such as to_crs = \"utm\"".into()
             }
-            (true, ..) => {
-                "With x and y exchanged, they lie within it: exchange them first, for example with `pdal translate in.laz out.laz \
-                 --writers.las.forward=scale --writers.las.offset_x=auto --writers.las.offset_y=auto transformation \
-                 --filters.transformation.matrix=\"0 1 0 0 1 0 0 0 0 0 1 0 0 0 0 1\"`"
-                    .into()
-            }
-            (.., Some(unit)) => {
-                format!("In the unit {}, they lie within it: name a CRS in that unit with [input] crs", unit.name())
-            }
-            _ if self.is_target => "Name a CRS that is made for their place with [input] to_crs, such as to_crs = \"utm\"".into(),
-            _ if is_angle => {
+            None if is_angle => {
                 "If they are longitude and latitude, [input] crs = \"EPSG:4326\" says so, and to_crs = \"utm\" transforms them; if they are \
                  a site's own grid, crs = \"none\" takes them as a plane"
                     .into()
             }
-            _ => {
+            None => {
                 "Say with [input] crs = \"EPSG:...\" what the points are in, or with crs = \"none\" that they are a plane, which is placed \
                  nowhere"
                     .into()

@@ -1,7 +1,7 @@
 //! The CRS and the units that all inputs of a job have in common.
 
 use crate::input::options::UnitChoice;
-use crate::input::{ComparableCrs, Crs, CrsChoice, CrsKind, FileFormat, Source, Unit};
+use crate::input::{ComparableCrs, Crs, CrsChoice, FileFormat, Source, Unit};
 use crate::job::plan::distinct_crs::DistinctCrs;
 use crate::{Error, Result, Warnings};
 use std::borrow::Cow;
@@ -59,6 +59,9 @@ pub fn common_crs(sources: &[Source], choice: &CrsChoice, unit: UnitChoice, warn
     if *choice == CrsChoice::First {
         warn_of_gaps(&said, &crs, unit, warnings);
         warn_of_depths(&said, &crs, warnings);
+    }
+    if *choice == CrsChoice::None {
+        return Ok(crs);
     }
     let overruled: Vec<(&Said, Vec<String>)> =
         said.iter().map(|s| (s, crs.differences(&s.crs))).filter(|(_, found)| !found.is_empty()).collect();
@@ -291,13 +294,13 @@ fn are_feet(own: Unit, other: Unit) -> bool {
 }
 
 /// What to do about coordinates that are not on a map.
-const TRANSFORM: &str = "Transform the points to a projected CRS first, for example with `pdal translate \
+pub(super) const TRANSFORM: &str = "Transform the points to a projected CRS first, for example with `pdal translate \
     --writers.las.scale_x=0.01 --writers.las.scale_y=0.01 in.laz out.laz reprojection --filters.reprojection.out_srs=EPSG:...`";
 
 /// Returns the name of the unit of x and y and its length in metres.
 ///
 /// # Errors
-/// [`Error::Config`] if the coordinates are in degrees or count from the middle of the earth.
+/// [`Error::Config`] if the coordinates are in degrees.
 pub fn horizontal_unit(
     sources: &[Source],
     choice: UnitChoice,
@@ -315,14 +318,6 @@ pub fn horizontal_unit(
         CrsChoice::Given { .. } => "if the files are in another CRS than [input] crs says, name that one",
         _ => "if the CRS record is wrong, say with [input] crs what the files are in",
     };
-    if crs.kind == CrsKind::Geocentric {
-        return Err(Error::Config(format!(
-            "{}the coordinates are geocentric ({}): they count from the middle of the earth, and z is no height. {TRANSFORM}; \
-             {what_to_do}, or \"none\" for a plane",
-            named(&|crs| crs.kind == CrsKind::Geocentric),
-            crs.label()
-        )));
-    }
     let unit = if choice == UnitChoice::Auto { crs.horizontal } else { choice.unit() };
     if let Some(metres) = unit.metres_per_unit() {
         return Ok((key_of(unit), metres));

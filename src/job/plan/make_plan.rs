@@ -16,11 +16,12 @@ use crate::job::plan::common_crs::{common_crs, horizontal_unit};
 use crate::job::plan::doubtful_heights::refuse_doubtful_heights;
 use crate::job::plan::extent::{Extent, SourceBox, to_float};
 use crate::job::plan::far_points::{extent_without_outliers, farthest_file};
+use crate::job::plan::geocentric_inputs::{refuse_geocentric, warn_of_geocentric};
 use crate::job::plan::height_range::HeightSample;
 use crate::job::plan::inputs::{check_missing_records, open_all};
 use crate::job::plan::job_plan::{Claims, Plan, PlannedInput, SkippedInput, decoded_records};
 use crate::job::plan::lattice_choice::{LatticeCoarsening, LatticeWish, choose_lattice, fineness};
-use crate::job::plan::other_unit::refuse_other_unit;
+use crate::job::plan::other_unit::{refuse_other_unit, warn_of_dropped_units};
 use crate::job::plan::text_inputs::{
     check_malformed_rows, farthest_row, refuse_degrees, refuse_missing_classes, refuse_missing_returns, row_choice,
     wanted_fields,
@@ -132,6 +133,7 @@ fn try_plan(
     }
     check_missing_records(sources, &options.input)?;
     refuse_other_unit(sources, &options.input)?;
+    refuse_geocentric(sources, &options.input)?;
     transform_sources(sources, &options.input, &mut warnings)?;
     refuse_degrees(sources, &options.input)?;
     refuse_missing_classes(sources, &options.input)?;
@@ -140,6 +142,8 @@ fn try_plan(
     let crs = common_crs(sources, choice, unit_choice, &mut warnings)?;
     let (unit, metres) = horizontal_unit(sources, unit_choice, choice, &crs, &mut warnings)?;
     let metres_z = crs.vertical.unwrap_or(metres);
+    warn_of_geocentric(sources, &options.input, &mut warnings);
+    warn_of_dropped_units(sources, &options.input, [metres, metres_z], &mut warnings);
     let wish = LatticeWish {
         metres: [metres, metres_z],
         steps: [options.input.resolution.step(), options.input.resolution_z.step()],
@@ -157,8 +161,12 @@ fn try_plan(
         warnings.extend(row.or_else(|| farthest_file(sources, &extent)));
     }
     if metres_z != metres {
+        let other = match unit_choice {
+            UnitChoice::Auto => "",
+            _ => ". [input] unit is that of x and y alone: the CRS or the columns state that of heights",
+        };
         warnings.push(format!(
-            "heights are in another unit than x and y ({metres_z} m and {metres} m): glTF has both in metres, see metres_per_unit_z"
+            "heights are in another unit than x and y ({metres_z} m and {metres} m): glTF has both in metres, see metres_per_unit_z{other}"
         ));
     }
     let frame = Frame::new(&lattice, metres, metres_z, crs.wkt.clone())?;

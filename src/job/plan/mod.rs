@@ -2,6 +2,7 @@
 //! written down and read back, so that every later step is a function of the plan, an index and the store.
 
 pub(crate) mod area_check;
+pub(crate) mod area_cure;
 pub(crate) mod area_hint;
 pub mod breaklines;
 pub mod budget;
@@ -11,6 +12,7 @@ pub(crate) mod doubtful_heights;
 pub mod extent;
 pub(crate) mod far_points;
 pub mod fingerprint;
+pub(crate) mod geocentric_inputs;
 pub(crate) mod globe_system;
 pub(crate) mod height_range;
 pub mod input_identity;

@@ -3,7 +3,7 @@
 
 use crate::input::options::InputOptions;
 use crate::input::{Crs, CrsChoice, FileFormat, Source, Unit, same_length};
-use crate::{Error, Result};
+use crate::{Error, Result, Warnings};
 
 /// Checks that the unit of x and y that the user names is that of the system of every source.
 ///
@@ -43,11 +43,6 @@ fn refuse_degrees_as_lengths(
     options: &InputOptions,
 ) -> Result<()> {
     let is_length = options.unit.metres().is_some();
-    let may_be_degrees = |source: &Source| {
-        source
-            .claimed_rectangle()
-            .is_some_and(|corners| corners.iter().all(|[x, y]| x.abs() <= 360.0 && y.abs() <= 90.0))
-    };
     if crs.horizontal != Unit::Degree || !is_length || !sources.iter().all(may_be_degrees) {
         return Ok(());
     }
@@ -58,6 +53,11 @@ fn refuse_degrees_as_lengths(
         crs.label(),
         options.unit.unit().name(),
     )))
+}
+
+fn may_be_degrees(source: &Source) -> bool {
+    let corners = source.claimed_rectangle();
+    corners.is_some_and(|corners| corners.iter().all(|[x, y]| x.abs() <= 360.0 && y.abs() <= 90.0))
 }
 
 /// Fails if `crs` has another unit of length than the one that the user names.
@@ -79,4 +79,43 @@ fn refuse(crs: &Crs, subject: impl Fn() -> String, options: &InputOptions) -> Re
         unit.name(),
         unit.name(),
     )))
+}
+
+/// Warns about sources whose records or columns give x, y or z another unit than the job takes, whose `[input] crs = "none"` leaves records
+/// aside. `metres` are the lengths of the job's units of x and y, and of z.
+pub(super) fn warn_of_dropped_units(
+    sources: &[Source],
+    options: &InputOptions,
+    metres: [f64; 2],
+    warnings: &mut Warnings,
+) {
+    if options.crs != CrsChoice::None {
+        return;
+    }
+    let others: Vec<(&Source, String)> =
+        sources.iter().filter_map(|source| Some((source, dropped_unit(source, metres)?))).collect();
+    let Some((first, what)) = others.first() else { return };
+    let name = |metres| Unit::from_metres(Some(metres)).name();
+    let [plane, heights] = metres.map(name);
+    let taken = if plane == heights { plane } else { format!("{plane}, and z in {heights}") };
+    warnings.push(format!(
+        "[input] crs = \"none\" leaves records of coordinate systems aside, and the coordinates are taken in {taken}, though {} of {} inputs \
+         state another unit, such as {}: {what}. If the file is right, leave crs out, or set [input] unit to its unit",
+        others.len(),
+        sources.len(),
+        first.path.display()
+    ));
+}
+
+/// Says which unit a source states, if it is not what the job takes.
+fn dropped_unit(source: &Source, [plane, heights]: [f64; 2]) -> Option<String> {
+    let crs = source.own_crs();
+    if crs.horizontal == Unit::Degree && may_be_degrees(source) {
+        return Some("degree for x and y".into());
+    }
+    let is_text = source.format == FileFormat::Text;
+    let other = |own: Option<f64>, taken: f64| own.filter(|own| !is_text && !same_length(*own, taken));
+    let name = |metres| Unit::from_metres(Some(metres)).name();
+    let of_plane = other(crs.metres_per_unit(), plane).map(|own| format!("{} for x and y", name(own)));
+    of_plane.or_else(|| other(crs.vertical, heights).map(|own| format!("{} for z", name(own))))
 }

@@ -36,29 +36,42 @@ pub(crate) fn wanted_fields(options: &JobOptions) -> OptionalFields {
     OptionalFields { rgb: output.color.may_be_own(), intensity: output.attributes.intensity }
 }
 
-/// Fails if the columns of a text are longitude and latitude, unless the user says that they are not.
+/// Fails if the columns of a text are longitude and latitude, unless the user states twice that they are lengths: with a map or no CRS, and
+/// with a unit.
 ///
 /// # Errors
 /// [`Error::Config`] names the first such file.
 pub(crate) fn refuse_degrees(sources: &[Source], options: &InputOptions) -> Result<()> {
     let is_in_degrees = |s: &&Source| s.format == FileFormat::Text && s.crs.horizontal == Unit::Degree;
-    // A map has no degrees, whatever the user calls it. What is said of longitude and latitude is refused elsewhere.
-    let is_map = |choice: &CrsChoice| matches!(choice, CrsChoice::Given { crs, .. } if crs.kind == CrsKind::Projected);
-    let is_silent = matches!(options.crs, CrsChoice::Auto | CrsChoice::First);
-    let is_open = options.unit == UnitChoice::Auto && (is_silent || is_map(&options.crs));
+    // What is said of longitude and latitude is refused elsewhere.
+    let is_map = match &options.crs {
+        CrsChoice::Given { crs, .. } => crs.kind == CrsKind::Projected,
+        _ => options.missing_crs.as_ref().is_some_and(|missing| missing.crs.kind == CrsKind::Projected),
+    };
+    let is_silent = matches!(options.crs, CrsChoice::Auto | CrsChoice::First) && !is_map;
+    let is_open = is_silent || is_map && options.unit == UnitChoice::Auto;
     match sources.iter().find(is_in_degrees) {
         Some(source) if is_open => Err(Error::Config(format!(
-            "{}: its columns are named as degrees (x from {} to {}, y from {} to {}{}), and a Delaunay triangulation in \
-             degrees is distorted: [input] to_crs = \"utm\" with missing_crs = \"EPSG:4326\", if that is what they are in, transforms them to a \
-             projected CRS; if they are no degrees, set [input] unit, for example to \"metre\"",
+            "{}: its columns are named as degrees (x from {} to {}, y from {} to {}{}), {}: [input] to_crs = \"utm\" with missing_crs = \
+             \"EPSG:4326\", if that is what they are in, transforms them to a projected CRS; if they are no degrees, set [input] crs = \
+             \"none\", and unit, for example to \"metre\"",
             source.path.display(),
             source.min[0],
             source.max[0],
             source.min[1],
             source.max[1],
-            if is_exchanged(source) { "; longitude and latitude look exchanged" } else { "" }
+            if is_exchanged(source) { "; longitude and latitude look exchanged" } else { "" },
+            why_no_degrees(options)
         ))),
         _ => Ok(()),
+    }
+}
+
+/// Says what speaks against a text in degrees.
+fn why_no_degrees(options: &InputOptions) -> String {
+    match options.unit {
+        UnitChoice::Auto => "and a Delaunay triangulation in degrees is distorted".into(),
+        unit => format!("but [input] unit says {}, which is no unit of degrees", unit.unit().name()),
     }
 }
 

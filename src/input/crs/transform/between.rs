@@ -3,7 +3,7 @@
 use crate::input::crs::datum::Datum;
 use crate::input::crs::system::{Crs, CrsKind};
 use crate::input::crs::transform::datum_rule::{DatumRule, DatumWay, datum_way};
-use crate::input::crs::transform::ellipsoid::Ellipsoid;
+use crate::input::crs::transform::ellipsoid::{Ellipsoid, WGS84};
 use crate::input::crs::transform::map_projection::{DEGREE, MapProjection};
 use crate::input::crs::wkt::{GEOGRAPHIC, degrees, find};
 
@@ -60,13 +60,30 @@ impl CrsTransform {
         Ok(CrsTransform { from: source, to: target, datums })
     }
 
+    /// Returns the way from `crs` to longitude and latitude, some hundred metres off at most: a map without an ellipsoid counts as one on
+    /// that of WGS 84.
+    ///
+    /// # Errors
+    /// As [`CrsTransform::between`], but for the datum.
+    pub(crate) fn to_rough_degrees(crs: &Crs) -> Result<CrsTransform, String> {
+        let form = crs.form().ok_or_else(|| crs.why_without_form())?;
+        let projection = match form.projection() {
+            Some(projection) if form.datum().and_then(Datum::ellipsoid).is_none() => projection,
+            _ => return CrsTransform::to_degrees(crs),
+        };
+        let ellipsoid = Ellipsoid::of(WGS84).ok_or("no ellipsoid")?;
+        let unit = crs.metres_per_unit().ok_or("no unit of x and y")?;
+        let meridian = form.datum().map_or(0.0, Datum::meridian) * DEGREE;
+        let from = Coordinates { projection: Some(MapProjection::of(projection, ellipsoid)?), unit, meridian };
+        Ok(CrsTransform { from, to: Coordinates::DEGREES, datums: DatumNote::Same })
+    }
+
     /// Returns the way from `crs` to longitude and latitude on its own datum, in degrees east of Greenwich and north.
     ///
     /// # Errors
     /// As [`CrsTransform::between`].
     pub(crate) fn to_degrees(crs: &Crs) -> Result<CrsTransform, String> {
-        let to = Coordinates { projection: None, unit: DEGREE, meridian: 0.0 };
-        Ok(CrsTransform { from: Coordinates::of(crs)?.1, to, datums: DatumNote::Same })
+        Ok(CrsTransform { from: Coordinates::of(crs)?.1, to: Coordinates::DEGREES, datums: DatumNote::Same })
     }
 
     /// Returns x and y in the other system; `None` if one of them has no such place. Neither is ever infinite or NaN.
@@ -93,6 +110,9 @@ impl CrsTransform {
 }
 
 impl Coordinates {
+    /// Degrees east of Greenwich and north.
+    const DEGREES: Coordinates = Coordinates { projection: None, unit: DEGREE, meridian: 0.0 };
+
     /// Returns what the x and y of a system mean, and its datum.
     fn of(crs: &Crs) -> Result<(Datum, Coordinates), String> {
         let label = crs.label();

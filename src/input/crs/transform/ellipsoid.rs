@@ -19,6 +19,9 @@ const FROM_CONFORMAL: [&[f64]; 6] = [
     &[601676.0 / 22275.0],
 ];
 
+/// The half axes of the ellipsoid of WGS 84 in metres.
+pub(crate) const WGS84: [f64; 2] = [6_378_137.0, 6_356_752.314_245_179];
+
 /// An ellipsoid of revolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Ellipsoid {

@@ -5,12 +5,9 @@
 
 use crate::input::crs::system::Crs;
 use crate::input::crs::transform::between::CrsTransform;
-use crate::input::crs::transform::ellipsoid::{Ellipsoid, sin_cos};
+use crate::input::crs::transform::ellipsoid::{Ellipsoid, WGS84, sin_cos};
 use crate::input::crs::transform::map_projection::DEGREE;
 use std::f64::consts::PI;
-
-/// The half axes of the ellipsoid of WGS 84 in metres.
-const WGS84: [f64; 2] = [6_378_137.0, 6_356_752.314_245_179];
 
 /// The squares of eccentricities that differ by less are those of one ellipsoid, as for PROJ: that of WGS 84 and GRS 80.
 const SAME_SHAPE: f64 = 5e-11;
