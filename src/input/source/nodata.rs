@@ -63,7 +63,8 @@ impl Source {
         let look = |chunk| {
             interrupt::check()?;
             let extremes = Extremes::default();
-            let mut heights = Heights { choice, bounds: bounds.as_ref(), named: &self.nodata, kept: self.kept_heights, extremes };
+            let mut heights =
+                Heights { choice, bounds: bounds.as_ref(), named: &self.nodata, kept: self.kept_heights, extremes };
             self.read_chunk_of_file(chunk, request, &mut heights)?;
             Ok(heights.extremes)
         };

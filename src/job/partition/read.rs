@@ -18,8 +18,8 @@ use crate::job::partition::tree_builder::{TreeBuilder, wanted_buckets};
 use crate::job::plan::budget::{network_memory, read_buffer_memory};
 use crate::job::plan::doubtful_heights::unannounced_nodata;
 use crate::job::plan::job_plan::{Plan, PlannedInput, SkippedInput};
-use crate::job::plan::text_inputs::{allowed_malformed, stop_at, too_many_malformed};
 use crate::job::plan::stray_heights::unforeseen_heights;
+use crate::job::plan::text_inputs::{allowed_malformed, stop_at, too_many_malformed};
 use crate::job::progress::stage::Stage;
 use crate::{Error, Result, interrupt};
 use rayon::prelude::*;
@@ -104,7 +104,9 @@ fn with_notes(input: &PlannedInput, plan: &Plan, mut summary: PointSummary) -> P
         ));
     }
     counts.notes.extend(heights.map(|what| format!("{path}: {what}")));
-    counts.notes.extend(no_ground(&plan.options.input, counts).map(|what| format!("{path}: no point is left of it: {what}")));
+    counts
+        .notes
+        .extend(no_ground(&plan.options.input, counts).map(|what| format!("{path}: no point is left of it: {what}")));
     summary
 }
 

@@ -277,3 +277,41 @@ fn quantile(groups: &[HeightGroup], rank: u64) -> HeightGroup {
     };
     groups.iter().find(holds).or(groups.last()).copied().unwrap_or(HeightGroup { count: 0, low: 0, high: 0, first: 0 })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns what lies apart among heights in centimetres: how many points below and above, and the range of all others.
+    fn apart(heights: impl Iterator<Item = i32>) -> Option<([u64; 2], [i64; 2])> {
+        let heights: Vec<i32> = heights.collect();
+        let found = heights_apart(&HeightBins::of(&heights).groups(), TerrainScale::new(0.01, 0.0))?;
+        let count = |group: Option<HeightGroup>| group.map_or(0, |group| group.count);
+        Some(([count(found.below), count(found.above)], [found.others.low, found.others.high]))
+    }
+
+    fn hills() -> impl Iterator<Item = i32> {
+        (0..1000).map(|i| 84_000 + i * 7919 % 12_001)
+    }
+
+    #[test]
+    fn gaps_and_tails_that_no_terrain_has_are_found() {
+        let body = [hills().min().unwrap().into(), hills().max().unwrap().into()];
+        assert_eq!(apart(hills()), None);
+        assert_eq!(apart(hills().chain([500_000])), Some(([0, 1], body)));
+        assert_eq!(apart(hills().chain([500_000, -1_200_000])), Some(([1, 1], body)));
+        assert_eq!(apart(hills().chain((0..40).map(|i| i % 5))), Some(([40, 0], body)));
+        assert_eq!(apart(hills().chain((0..9000).map(|i| -995_390 + i % 31))), Some(([9000, 0], body)));
+        // A few points between, and a ramp from nodata to the terrain.
+        assert_eq!(apart(hills().chain([0; 40]).chain([20_000, 50_000])), Some(([42, 0], body)));
+        assert_eq!(apart(hills().chain((0..50).map(|i| -999_900 + 20_000 * i))), Some(([50, 0], body)));
+    }
+
+    #[test]
+    fn shores_towers_and_depths_are_terrain() {
+        assert_eq!(apart(hills().chain((0..300).map(|i| 280 * i))), None);
+        assert_eq!(apart(hills().chain([66_000, 140_000])), None);
+        assert_eq!(apart((0..1000).map(|i| -400_000 + i * i / 4)), None);
+        assert_eq!(apart((0..1000).map(|i| (i - 940).max(0) * 1500)), None);
+    }
+}

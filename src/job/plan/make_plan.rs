@@ -23,8 +23,8 @@ use crate::job::plan::lattice_choice::{LatticeCoarsening, LatticeWish, choose_la
 use crate::job::plan::other_unit::refuse_other_unit;
 use crate::job::plan::stray_heights::JobHeights;
 use crate::job::plan::text_inputs::{
-    check_malformed_rows, check_malformed_sample, farthest_row, refuse_degrees, refuse_missing_classes, refuse_missing_returns, row_choice,
-    wanted_fields,
+    check_malformed_rows, check_malformed_sample, farthest_row, refuse_degrees, refuse_missing_classes,
+    refuse_missing_returns, row_choice, wanted_fields,
 };
 use crate::job::plan::zero_points::refuse_zero_points;
 use crate::output::color::HeightRange;

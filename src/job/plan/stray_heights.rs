@@ -7,7 +7,9 @@ use crate::input::{FileFormat, OptionalFields, PointRules, Source};
 use crate::job::options::JobOptions;
 use crate::job::plan::doubtful_heights::own_height;
 use crate::job::plan::extent::{Extent, SourceBox, to_float};
-use crate::job::plan::height_groups::{FLAT, HIGH, HeightBins, HeightGroup, HeightsApart, LOW, TerrainScale, heights_apart};
+use crate::job::plan::height_groups::{
+    FLAT, HIGH, HeightBins, HeightGroup, HeightsApart, LOW, TerrainScale, heights_apart,
+};
 use crate::job::plan::height_range::HeightSample;
 use crate::job::plan::job_plan::{Plan, decoded_records};
 use crate::job::plan::point_survey::box_around;
@@ -89,8 +91,7 @@ impl JobHeights<'_> {
     /// Reads the heights of all points that the job wants of a source, most of which lie between `ends`.
     fn read(&self, index: usize, ends: [i64; 2]) -> Result<HeightBins> {
         let (source, rules) = (&self.sources[index], &self.rules[index]);
-        let rules =
-            PointRules { first_order: 0, numbered: true, fields: OptionalFields::default(), ..rules.clone() };
+        let rules = PointRules { first_order: 0, numbered: true, fields: OptionalFields::default(), ..rules.clone() };
         let look = |chunk: usize| {
             interrupt::check()?;
             let mut bins = HeightBins::between(ends);
@@ -107,17 +108,16 @@ impl JobHeights<'_> {
 
     fn sentence(&self, source: &Source, found: &HeightsApart, sampled: Option<usize>) -> String {
         let value = |height: i64| own_height(source, self.lattice, height);
-        let range = |group: &HeightGroup| match [group.low, group.high].map(value) {
-            [low, high] if low == high => format!("the height {low}"),
-            [low, high] => format!("heights from {low} to {high}"),
-        };
+        let range = |group: &HeightGroup| range_text([group.low, group.high].map(value));
         let record = if source.format == FileFormat::Text { "row" } else { "point" };
         let apart = |group: &HeightGroup| {
             let (points, has) = if group.count == 1 { ("point", "has") } else { ("points", "have") };
             match (sampled, group.count) {
                 (Some(_), count) => format!("{count} {points} {has} {}", range(group)),
                 (None, 1) => format!("{record} {} has {}", group.first, range(group)),
-                (None, count) => format!("{count} points have {} (the first is {record} {})", range(group), group.first),
+                (None, count) => {
+                    format!("{count} points have {} (the first is {record} {})", range(group), group.first)
+                }
             }
         };
         let parts: Vec<String> = found.below.iter().chain(&found.above).map(apart).collect();
@@ -136,11 +136,13 @@ impl JobHeights<'_> {
 
     /// Returns a warning about the first file that claims one height, far below those of all files around it or far above.
     fn flat_file(&self) -> Option<String> {
-        let claims = self.sources.iter().zip(&self.extent.boxes).filter_map(|(source, claim)| Some((source, (*claim)?)));
+        let claims =
+            self.sources.iter().zip(&self.extent.boxes).filter_map(|(source, claim)| Some((source, (*claim)?)));
         let is_flat = |[min, max]: SourceBox| (max[2] - min[2]) * self.metres <= FLAT;
         let (flat, others): (Vec<_>, Vec<_>) = claims.partition(|(_, claim)| is_flat(*claim));
         let is_apart = |claim: SourceBox| {
-            let mut around = others.iter().map(|(_, other)| *other).filter(|other| are_neighbours(claim, *other)).peekable();
+            let mut around =
+                others.iter().map(|(_, other)| *other).filter(|other| are_neighbours(claim, *other)).peekable();
             around.peek().is_some() && around.all(|other| self.lies_apart(claim, other))
         };
         let mut found = flat.into_iter().filter(|(_, claim)| is_apart(*claim));
@@ -153,11 +155,10 @@ impl JobHeights<'_> {
         let [min, max] = box_around(others.iter().flat_map(|(_, other)| *other))?;
         let [low, high] = rounded([own(min[2]), own(max[2])]);
         Some(format!(
-            "{}: all points have heights from {} to {}, far from those of the files around it{more}: they may be mistakes, or stand for nodata; \
+            "{}: all points have {}, far from those of the files around it{more}: they may be mistakes, or stand for nodata; \
              leave them out with [input] heights = [{low}, {high}], or the file out of [input] files",
             source.path.display(),
-            own(claim[0][2]),
-            own(claim[1][2])
+            range_text([own(claim[0][2]), own(claim[1][2])])
         ))
     }
 
@@ -166,6 +167,10 @@ impl JobHeights<'_> {
         let [below, above] = [other[0][2] - claim[1][2], claim[0][2] - other[1][2]].map(|gap| gap * self.metres);
         below >= LOW || above >= HIGH
     }
+}
+
+fn range_text([low, high]: [f64; 2]) -> String {
+    if low == high { format!("the height {low}") } else { format!("heights from {low} to {high}") }
 }
 
 /// Returns whether two boxes lie side by side in x and y: no farther apart than the first of them is long.

@@ -87,7 +87,9 @@ pub(crate) fn stretch_hint<'a>(
         match (body, claim) {
             (Some(body), Some(claim)) if !survey.holds_claim(&body, claim) => unread.push((source, survey, body)),
             (Some(body), None) => unread.push((source, survey, body)),
-            (_, Some(claim)) => found.add(SplitBoxes { within: (source.records, Some(claim)), outside: (0, None), first: None }),
+            (_, Some(claim)) => {
+                found.add(SplitBoxes { within: (source.records, Some(claim)), outside: (0, None), first: None })
+            }
             (None, None) => {}
         }
     }
@@ -129,8 +131,7 @@ fn sentence(found: &SplitBoxes, first: Option<String>, is_sample: bool) -> Optio
     let is_wider = (0..2).any(|axis| size(all, axis) > 2.0 * size(rest, 0).max(size(rest, 1)));
     let [x, y, z] = [0, 1, 2].map(|axis| rounded([rest[0][axis], rest[1][axis]]));
     let first = first.unwrap_or_default();
-    let others =
-        if few == 1 { format!("1 point{first} stretches") } else { format!("{few} points{first} stretch") };
+    let others = if few == 1 { format!("1 point{first} stretches") } else { format!("{few} points{first} stretch") };
     Some(match is_wider {
         true => format!(
             "{share} % {of} lie within {:.0} x {:.0} units; {others} the area to {:.0} x {:.0}: to leave them out, set [input] bounds = \

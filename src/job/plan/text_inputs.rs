@@ -191,7 +191,9 @@ pub(crate) fn check_malformed_rows(sources: &[Source], rules: &[PointRules], opt
 pub(crate) fn check_malformed_sample(sources: &[Source], sample: &HeightSample, options: &InputOptions) -> Result<()> {
     let records = sources.iter().map(|source| source.records).sum();
     let malformed = sample.counts.malformed;
-    if options.on_bad_file == OnBadFile::Skip || malformed <= allowed_malformed(options.max_malformed_fraction.0, records) {
+    if options.on_bad_file == OnBadFile::Skip
+        || malformed <= allowed_malformed(options.max_malformed_fraction.0, records)
+    {
         return Ok(());
     }
     let counts = |source: &Source| sample.by_file.get(&source.path).map(|file| &file.counts);

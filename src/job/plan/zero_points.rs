@@ -10,7 +10,12 @@ use crate::{Error, Result};
 ///
 /// # Errors
 /// [`Error::Input`] names the first such file.
-pub(crate) fn refuse_zero_points(sources: &[Source], extent: &Extent, sample: &HeightSample, lattice: &Lattice) -> Result<()> {
+pub(crate) fn refuse_zero_points(
+    sources: &[Source],
+    extent: &Extent,
+    sample: &HeightSample,
+    lattice: &Lattice,
+) -> Result<()> {
     let is_zero = |source: &Source| {
         let is_origin = |axis: usize, steps: &i32| lattice.world(axis, *steps) == 0.0;
         sample.by_file.get(&source.path).is_some_and(|found| {
