@@ -49,6 +49,7 @@ pub use file::random_access::not_a_file;
 pub use measured::{MeasuredPoints, PlausiblePoints};
 pub use points::axis::Axis;
 pub use points::counts::PointCounts;
+pub use points::kept_heights::KeptHeights;
 pub(crate) use points::nodata::{DoubtfulHeight, Extremes, is_nodata_beside, is_number_in_steps, shown_height};
 pub use points::nodata_choice::NodataChoice;
 pub use points::optional_fields::OptionalFields;

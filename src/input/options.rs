@@ -9,6 +9,7 @@ use crate::input::crs::target::{NamedCrs, TargetCrs};
 use crate::input::crs::transform::datum_rule::DatumRule;
 use crate::input::crs::unit::Unit;
 use crate::input::points::classes::{IGNORED_GROUND, is_noise};
+use crate::input::points::kept_heights::KeptHeights;
 use crate::input::points::nodata_choice::NodataChoice;
 use crate::input::points::optional_fields::OptionalFields;
 use crate::input::points::returns::KeptReturns;
@@ -44,6 +45,9 @@ pub struct InputOptions {
     /// Keep only the points within this rectangle, in the system of the job: with `to_crs`, in that.
     #[serde(default)]
     pub bounds: Option<SourceBounds>,
+    /// Keep only the points between these heights, in the unit of the files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub heights: Option<KeptHeights>,
     /// Which heights are left out because they stand for nodata.
     #[serde(default, skip_serializing_if = "NodataChoice::is_auto")]
     pub nodata: NodataChoice,
@@ -175,6 +179,7 @@ impl InputOptions {
             classes: self.kept_classes(),
             strict_classes: self.chooses_classes(),
             returns: self.kept_returns(),
+            heights: self.heights,
             nodata: self.nodata.clone(),
             use_index: self.bounds.is_some(),
             fields,
@@ -265,6 +270,9 @@ pub enum InvalidValue {
     /// Another number of numbers.
     #[error("bounds are four numbers, [xmin, ymin, xmax, ymax], without heights, and not {0}")]
     BoundsCount(usize),
+    /// Not a range of heights.
+    #[error("heights are two numbers, [lowest, highest] with lowest < highest, not {0:?}")]
+    Heights(Vec<f64>),
     /// Not a step.
     #[error("resolution is \"auto\" or a positive number of source units, such as 0.01")]
     Resolution,

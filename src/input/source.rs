@@ -22,6 +22,7 @@ use crate::input::points::axis::Axis;
 use crate::input::points::chunk_request::ChunkRequest;
 use crate::input::points::counts::PointCounts;
 use crate::input::points::filter::PointFilter;
+use crate::input::points::kept_heights::RawHeights;
 use crate::input::points::nodata_sink::NodataSink;
 use crate::input::points::point::Point;
 use crate::input::points::raw_bounds::RawBounds;
@@ -104,6 +105,9 @@ pub struct Source {
     /// The raw heights of a LAS or LAZ file that stand for nodata.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     nodata: Vec<i64>,
+    /// The raw heights that the job keeps of a LAS or LAZ file; `None`: all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    kept_heights: Option<RawHeights>,
     /// Where the points of a binary file lie, if they had to be looked at.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     measured: Option<Box<MeasuredPoints>>,
@@ -189,10 +193,12 @@ fn open_las(file: &RandomAccessFile, choice: &RowChoice) -> Result<Source> {
         warnings,
         transform: None,
         nodata: Vec::new(),
+        kept_heights: None,
         measured: None,
         points,
     };
     source.drop_false_geocentric_crs()?;
+    source.keep_heights(choice);
     source.find_nodata(choice)?;
     Ok(source)
 }
@@ -226,6 +232,7 @@ fn open_text(file: &RandomAccessFile, options: &TextOptions, choice: &RowChoice)
         warnings,
         transform: None,
         nodata: Vec::new(),
+        kept_heights: None,
         measured: None,
         points: PointData::Text(Box::new(table)),
     })
@@ -490,9 +497,9 @@ impl Source {
 
     /// As [`Source::read_chunk`], in the coordinates of the file.
     fn read_own_chunk(&self, chunk: usize, request: ChunkRequest, sink: &mut impl RecordSink) -> Result<()> {
-        match self.nodata.as_slice() {
-            [] => self.read_chunk_of_file(chunk, request, sink),
-            heights => self.read_chunk_of_file(chunk, request, &mut NodataSink { heights, inner: sink }),
+        match (self.nodata.as_slice(), self.kept_heights) {
+            ([], None) => self.read_chunk_of_file(chunk, request, sink),
+            (nodata, kept) => self.read_chunk_of_file(chunk, request, &mut NodataSink { nodata, kept, inner: sink }),
         }
     }
 

@@ -81,7 +81,8 @@ impl Far {
 /// Returns a job that leaves out a point far from all others, and does without what is found of nodata and of areas of use.
 pub(crate) fn with_a_far_point() -> (impl Drop, Job) {
     let cloud = Far::new(500, &[ZERO], 200, Header::All);
-    let job = cloud.without().with("input", "nodata = -9999.0\noutside_crs_area = \"warn\"");
+    let job =
+        cloud.without().with("input", "nodata = -9999.0\nheights = [-1000.0, 1000.0]\noutside_crs_area = \"warn\"");
     (cloud._folder, job)
 }
 
@@ -166,7 +167,7 @@ fn many_far_points_are_no_mistakes_and_the_bounds_of_the_others_are_told() {
     let far: Vec<[i32; 3]> = (0..60).map(|_| [random.below(1 << 30) as i32, random.below(1 << 29) as i32, 7]).collect();
     let cloud = Far::new(500, &far, 100, Header::All);
     for said in [cloud.job().run_with(&["check"]).succeeded(), cloud.job().run().succeeded()] {
-        assert!((said.out + &said.err).contains("60 points stretch the area to"), "{}", said.err);
+        assert!((said.out + &said.err).contains("60 points (the first is point 100 of "), "{}", said.err);
     }
 }
 
@@ -185,7 +186,7 @@ fn one_bad_file_of_several_is_left_out() {
 #[test]
 fn a_few_points_that_stretch_the_area_are_told_with_the_bounds_of_the_others() {
     let far: Vec<[i32; 3]> = (0..4).map(|i| [200_000 + 50_000 * i, 300_000, 100]).collect();
-    let hint = "4 points stretch the area to 3500 x 3000: to leave them out, set [input] bounds = [";
+    let hint = " stretch the area to 3500 x 3000: to leave them out, set [input] bounds = [";
     for header in [Header::All, Header::Near, Header::Zeros] {
         let cloud = Far::of(near(6000, 8000), &far, 5000, header, 2);
         let report = cloud.job().report();

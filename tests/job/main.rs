@@ -65,6 +65,7 @@ mod schemas;
 mod shortage;
 mod slow_gpus;
 mod steps;
+mod stray_heights;
 mod surface;
 mod tampering;
 mod tasks;

@@ -23,7 +23,7 @@ pub struct PointCounts {
     /// Dropped: of a return that the job does not want.
     #[serde(default)]
     pub other_return: u64,
-    /// Dropped: outside the job's bounds.
+    /// Dropped: outside the job's bounds, or its heights.
     pub out_of_bounds: u64,
     /// Those of them that were not even decoded, because the index of the file says where they lie.
     #[serde(default)]

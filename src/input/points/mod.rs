@@ -5,6 +5,7 @@ pub(crate) mod chunk_request;
 pub(crate) mod classes;
 pub(crate) mod counts;
 pub(crate) mod filter;
+pub(crate) mod kept_heights;
 pub(crate) mod nodata;
 pub(crate) mod nodata_choice;
 pub(crate) mod nodata_sink;

@@ -1,23 +1,29 @@
-//! Marks the records whose heights stand for nodata on their way out of a file.
+//! Leaves the heights out that a job does not want, on the way of the records out of a LAS or LAZ file.
 
 use crate::Result;
+use crate::input::points::kept_heights::RawHeights;
 use crate::input::points::record::{NODATA, PointRecord};
 use crate::input::points::record_sink::RecordSink;
 use crate::input::points::returns::PulseReturn;
 
-/// Marks records that have one of these raw heights, and hands all on.
+/// Marks records whose raw heights stand for nodata, counts those as out of bounds that the job does not keep, and hands all others on.
 pub(crate) struct NodataSink<'a, S> {
-    pub(crate) heights: &'a [i64],
+    pub(crate) nodata: &'a [i64],
+    pub(crate) kept: Option<RawHeights>,
     pub(crate) inner: &'a mut S,
 }
 
 impl<S: RecordSink> RecordSink for NodataSink<'_, S> {
     #[inline]
     fn push(&mut self, number: u64, record: &PointRecord, place: impl Fn() -> String) -> Result<()> {
-        if !self.heights.contains(&record.raw[2]) {
+        let [x, y, z] = record.raw;
+        if self.kept.is_some_and(|kept| !kept.hold(z)) {
+            self.inner.push_out_of_bounds(record.class);
+            return Ok(());
+        }
+        if !self.nodata.contains(&z) {
             return self.inner.push(number, record, place);
         }
-        let [x, y, _] = record.raw;
         self.inner.push(number, &PointRecord { raw: [x, y, NODATA], ..*record }, place)
     }
 

@@ -1,8 +1,9 @@
-//! Finding the heights of a LAS or LAZ file that stand for nodata. A text is surveyed for them when it is opened.
+//! The heights of a LAS or LAZ file that a job keeps, and finding those that stand for nodata. A text is surveyed for them when it is opened.
 
 use crate::geometry::lattice::shortest_decimal;
 use crate::input::points::axis::Axis;
 use crate::input::points::chunk_request::ChunkRequest;
+use crate::input::points::kept_heights::RawHeights;
 use crate::input::points::nodata::{DoubtfulHeight, Extremes, FoundNodata, is_number_in_steps, left_out};
 use crate::input::points::raw_bounds::RawBounds;
 use crate::input::points::record::PointRecord;
@@ -15,6 +16,15 @@ use rayon::prelude::*;
 use rust_decimal::prelude::ToPrimitive;
 
 impl Source {
+    /// Keeps only the heights of a LAS or LAZ file that `choice` wants. The header claims no others then.
+    pub(super) fn keep_heights(&mut self, choice: &RowChoice) {
+        if let Some(heights) = choice.heights {
+            self.kept_heights = Some(heights.raw(&self.axes[2]));
+            let [low, high] = heights.0;
+            [self.min[2], self.max[2]] = [self.min[2], self.max[2]].map(|height| height.clamp(low, high));
+        }
+    }
+
     /// Finds the heights of a LAS or LAZ file that stand for nodata, and leaves them out. A file whose header claims none is not read for
     /// that.
     ///
@@ -53,7 +63,8 @@ impl Source {
         let look = |chunk| {
             interrupt::check()?;
             let extremes = Extremes::default();
-            let mut heights = Heights { choice, bounds: bounds.as_ref(), named: &self.nodata, extremes };
+            let mut heights =
+                Heights { choice, bounds: bounds.as_ref(), named: &self.nodata, kept: self.kept_heights, extremes };
             self.read_chunk_of_file(chunk, request, &mut heights)?;
             Ok(heights.extremes)
         };
@@ -91,12 +102,15 @@ struct Heights<'a> {
     bounds: Option<&'a RawBounds>,
     /// The raw heights that the user names as nodata.
     named: &'a [i64],
+    /// Those that the job keeps.
+    kept: Option<RawHeights>,
     extremes: Extremes,
 }
 
 impl RecordSink for Heights<'_> {
     fn push(&mut self, number: u64, record: &PointRecord, _: impl Fn() -> String) -> Result<()> {
-        let is_within = self.bounds.is_none_or(|bounds| bounds.hold(&record.raw));
+        let is_within = self.bounds.is_none_or(|bounds| bounds.hold(&record.raw))
+            && self.kept.is_none_or(|kept| kept.hold(record.raw[2]));
         let is_wanted = self.choice.classes[record.class as usize] && self.choice.returns.has(record.pulse_return);
         if is_within && is_wanted && !record.withheld && !self.named.contains(&record.raw[2]) {
             self.extremes.see(record.raw[2] as f64, number);

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::input::points::kept_heights::KeptHeights;
 use crate::input::points::nodata_choice::NodataChoice;
 use crate::input::points::optional_fields::OptionalFields;
 use crate::input::points::returns::{KeptReturns, PulseReturn};
@@ -46,6 +47,8 @@ pub struct RowChoice {
     pub strict_classes: bool,
     /// Only rows of these returns.
     pub returns: KeptReturns,
+    /// Only rows between these heights. A LAS file leaves the others out too.
+    pub heights: Option<KeptHeights>,
     /// Which heights are left out because they stand for nodata. A LAS file leaves them out too.
     pub nodata: NodataChoice,
     /// Whether the index of a file of another format may tell what lies out of the bounds of the job. Without it, everything is decoded.
@@ -63,6 +66,7 @@ impl RowChoice {
             classes: [true; 256],
             strict_classes: false,
             returns: KeptReturns::All,
+            heights: None,
             nodata: NodataChoice::Auto,
             use_index: false,
             fields: OptionalFields::RGB,
@@ -71,13 +75,16 @@ impl RowChoice {
 
     /// Returns whether every row is wanted.
     pub(crate) fn is_all(&self) -> bool {
-        self.bounds.is_none() && self.returns == KeptReturns::All && self.classes.iter().all(|&wanted| wanted)
+        let has_box = self.bounds.is_some() || self.heights.is_some();
+        !has_box && self.returns == KeptReturns::All && self.classes.iter().all(|&wanted| wanted)
     }
 
     /// Returns whether the row with these x, y, z, this class and this return is wanted.
     pub(crate) fn wants(&self, numbers: &[Number; 3], class: u8, pulse_return: PulseReturn) -> bool {
         let is_kept = self.classes[class as usize] && self.returns.has(pulse_return);
-        is_kept && self.bounds.is_none_or(|bounds| is_within(bounds, numbers))
+        let z = &numbers[2];
+        let has_height = self.heights.is_none_or(|heights| !z.is_too_large() && heights.hold(z.value()));
+        is_kept && has_height && self.bounds.is_none_or(|bounds| is_within(bounds, numbers))
     }
 }
 

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::input::crs::unit::Unit;
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::points::axis::{AXIS_NAMES, Axis};
+use crate::input::points::kept_heights::KeptHeights;
 use crate::input::points::nodata::{DoubtfulHeight, SharedHeight, left_out};
 use crate::input::points::record_sink::RecordSink;
 use crate::input::points::returns::KeptReturns;
@@ -76,6 +77,9 @@ pub(crate) struct TextTable {
     doubtful_height: Option<DoubtfulHeight>,
     /// The bounds that the job wants. They hold for the numbers in the text, before these are rounded to a lattice.
     bounds: Option<[f64; 4]>,
+    /// The heights that the job wants, likewise.
+    #[serde(default)]
+    heights: Option<KeptHeights>,
 }
 
 /// What the lattice has to hold.
@@ -186,6 +190,7 @@ impl TextTable {
             nodata,
             doubtful_height,
             bounds: choice.bounds,
+            heights: choice.heights,
         };
         let (is_open, rows) = (units.horizontal == Unit::Unknown, table.wanted.bounds);
         if let (true, false, Some(rows)) = (is_open && !choice.is_transformed, named_degrees, rows) {
@@ -368,7 +373,10 @@ impl TextTable {
         let WantedRows { bounds, ref decimals, .. } = *self.held();
         let within = bounds.filter(|_| self.without_outliers.is_some());
         let mut reader = RowReader::new(&self.columns);
-        let is_outside = |reader: &RowReader| self.bounds.is_some_and(|bounds| !is_within(bounds, &reader.numbers));
+        let is_outside = |reader: &RowReader| {
+            self.bounds.is_some_and(|bounds| !is_within(bounds, &reader.numbers))
+                || self.heights.is_some_and(|heights| !heights.hold(reader.height()))
+        };
         let mut explained = self.first_outlier_in != Some(chunk);
         let whole = chunk_range(&self.rows, chunk as u64);
         let range = self.start_of(chunk, records);

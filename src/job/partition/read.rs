@@ -1,7 +1,7 @@
 //! Reading the points: every input is decoded once, and its points go to the buckets of a grid, from which the tree is grown.
 
 use crate::breaklines::Breaklines;
-use crate::input::options::{InputOptions, OnBadFile};
+use crate::input::options::OnBadFile;
 use crate::input::surface::SurfaceShares;
 use crate::input::surface_doubts::no_ground;
 use crate::input::{Point, PointCounts, set_network_memory};
@@ -18,6 +18,7 @@ use crate::job::partition::tree_builder::{TreeBuilder, wanted_buckets};
 use crate::job::plan::budget::{network_memory, read_buffer_memory};
 use crate::job::plan::doubtful_heights::unannounced_nodata;
 use crate::job::plan::job_plan::{Plan, PlannedInput, SkippedInput};
+use crate::job::plan::stray_heights::unforeseen_heights;
 use crate::job::plan::text_inputs::{allowed_malformed, stop_at, too_many_malformed};
 use crate::job::progress::stage::Stage;
 use crate::{Error, Result, interrupt};
@@ -85,14 +86,15 @@ pub(crate) fn judge(plan: &Plan, by_input: ByInput) -> Result<JudgedInputs> {
             judged.skipped.push(SkippedInput { file: input.source.path.clone(), why });
             judged.orders.push(input.rules.first_order..input.rules.first_order + records);
         } else {
-            judged.summary += with_notes(input, options, summary);
+            judged.summary += with_notes(input, plan, summary);
         }
     }
     Ok(judged)
 }
 
 /// Adds what the user should know about an input that only reading it shows.
-fn with_notes(input: &PlannedInput, options: &InputOptions, mut summary: PointSummary) -> PointSummary {
+fn with_notes(input: &PlannedInput, plan: &Plan, mut summary: PointSummary) -> PointSummary {
+    let heights = unforeseen_heights(&input.source, summary.bounds, plan);
     let counts = &mut summary.counts;
     let path = input.source.path.display();
     if counts.misplaced > 0 {
@@ -101,7 +103,10 @@ fn with_notes(input: &PlannedInput, options: &InputOptions, mut summary: PointSu
             counts.misplaced
         ));
     }
-    counts.notes.extend(no_ground(options, counts).map(|what| format!("{path}: no point is left of it: {what}")));
+    counts.notes.extend(heights.map(|what| format!("{path}: {what}")));
+    counts
+        .notes
+        .extend(no_ground(&plan.options.input, counts).map(|what| format!("{path}: no point is left of it: {what}")));
     summary
 }
 

@@ -29,7 +29,7 @@ pub(crate) fn refuse_doubtful_heights(
             _ => match sample
                 .by_file
                 .get(&source.path)
-                .map(|file| file.extremes.map(|z| own_height(source, lattice, z as i32)))
+                .map(|file| file.extremes.map(|z| own_height(source, lattice, z as i64)))
             {
                 Some(heights) if of_heights(source, &heights, lattice, options).is_some() => {
                     of_heights(source, &source.heights_of(&row_choice(options))?, lattice, options)
@@ -46,7 +46,7 @@ pub(crate) fn refuse_doubtful_heights(
 
 /// Returns a sentence about the heights of a file that is not a text, if some of them stand for nodata or may.
 fn of_heights(source: &Source, heights: &Extremes, lattice: &Lattice, options: &JobOptions) -> Option<String> {
-    let step = to_float(lattice.resolution_z);
+    let step = to_float(lattice.resolution_z) / source.factor_of_heights();
     let found = heights.nodata(|value| is_number_in_steps(value, step));
     if let Some(height) = found.heights.first() {
         return Some(unannounced(source, height.value));
@@ -74,10 +74,10 @@ pub(crate) fn unannounced_nodata(
     options: &JobOptions,
 ) -> Option<String> {
     let Bounds { min, max } = read.filter(|_| source.format != FileFormat::Text && options.input.nodata.is_on())?;
-    let step = to_float(lattice.resolution_z);
+    let step = to_float(lattice.resolution_z) / source.factor_of_heights();
     let claimed = [source.min[2], source.max[2]].map(|height| height / source.factor_of_heights());
     let is_nodata = |value: &f64| is_nodata_beside(*value, step, claimed);
-    let found = [min[2], max[2]].map(|steps| own_height(source, lattice, steps)).into_iter().find(is_nodata)?;
+    let found = [min[2], max[2]].map(|steps| own_height(source, lattice, steps.into())).into_iter().find(is_nodata)?;
     Some(unannounced(source, found))
 }
 
@@ -91,7 +91,7 @@ fn unannounced(source: &Source, height: f64) -> String {
 }
 
 /// Returns the height of a lattice point as the file has it.
-fn own_height(source: &Source, lattice: &Lattice, steps: i32) -> f64 {
+pub(crate) fn own_height(source: &Source, lattice: &Lattice, steps: i64) -> f64 {
     let axis = Axis { offset: lattice.offset[2], scale: lattice.resolution_z };
-    axis.value(i64::from(steps)) / source.factor_of_heights()
+    axis.value(steps) / source.factor_of_heights()
 }

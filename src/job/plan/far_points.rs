@@ -145,7 +145,10 @@ fn explain(sources: &mut [Source], rest: &Extent) {
         let is_beside = source.measured().is_some_and(|found| is_beside(found.all, rest));
         let bounds = match is_beside {
             true => format!("[input] bounds = [{}, {}, {}, {}] or ", x[0], y[0], x[1], y[1]),
-            false => String::new(),
+            false => {
+                let [low, high] = rounded([rest.min[2], rest.max[2]].map(|height| height / source.factor_of_heights()));
+                format!("[input] heights = [{low}, {high}] or ")
+            }
         };
         source.set_remedy(&format!(
             " (x from {} to {}, y from {} to {}, z from {} to {}), and no lattice holds both at full precision: leave such points out with \

@@ -5,6 +5,7 @@
 
 use crate::geometry::{Bounds, Site, bounds_of};
 use crate::input::{DecodedChunks, Extremes, OptionalFields, PointCounts, PointRules, Source};
+use crate::job::plan::height_groups::{HeightBins, HeightGroup};
 use crate::output::color::HeightRange;
 use crate::{Result, interrupt};
 use rayon::prelude::*;
@@ -53,8 +54,10 @@ pub(crate) struct FileSample {
     /// What became of its records.
     pub(crate) counts: PointCounts,
     /// The lattice integers of its points in x and y, in no order.
-    plane: [Vec<i32>; 2],
-    /// Their lowest and highest heights, in steps of the lattice.
+    pub(crate) plane: [Vec<i32>; 2],
+    /// Their heights, likewise.
+    pub(crate) heights: Vec<i32>,
+    /// The lowest and the highest of them, in steps of the lattice.
     pub(crate) extremes: Extremes,
 }
 
@@ -108,6 +111,7 @@ impl HeightSample {
             for ([x, y], z) in &more {
                 of_file.plane[0].push(*x);
                 of_file.plane[1].push(*y);
+                of_file.heights.push(*z);
                 of_file.extremes.see(f64::from(*z), 0);
             }
             points.extend(more);
@@ -115,6 +119,11 @@ impl HeightSample {
         let mut heights: Vec<i32> = points.iter().map(|(_, z)| *z).collect();
         heights.sort_unstable();
         Ok(HeightSample { points, heights, places, seen: counts.read - counts.not_decoded, records, counts, by_file })
+    }
+
+    /// Returns the heights of all points in groups, ascending.
+    pub(crate) fn groups(&self) -> Vec<HeightGroup> {
+        HeightBins::of(&self.heights).groups()
     }
 
     /// Returns the lattice box of the points; `None` without any.

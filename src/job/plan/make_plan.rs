@@ -22,10 +22,12 @@ use crate::job::plan::inputs::{check_missing_records, open_all};
 use crate::job::plan::job_plan::{Claims, Plan, PlannedInput, SkippedInput, decoded_records};
 use crate::job::plan::lattice_choice::{LatticeCoarsening, LatticeWish, choose_lattice, fineness};
 use crate::job::plan::other_unit::{refuse_other_unit, warn_of_dropped_units};
+use crate::job::plan::stray_heights::JobHeights;
 use crate::job::plan::text_inputs::{
-    check_malformed_rows, farthest_row, refuse_degrees, refuse_missing_classes, refuse_missing_returns, row_choice,
-    wanted_fields,
+    check_malformed_rows, check_malformed_sample, farthest_row, refuse_degrees, refuse_missing_classes,
+    refuse_missing_returns, row_choice, wanted_fields,
 };
+use crate::job::plan::zero_points::refuse_zero_points;
 use crate::output::color::HeightRange;
 use crate::output::frame::Frame;
 use crate::{Error, Result, Warnings};
@@ -180,7 +182,19 @@ fn try_plan(
     if hint.shows_far_points(&sample) {
         return try_plan(sources, options, LatticeCoarsening { far_points: true, ..coarsening });
     }
+    check_malformed_sample(sources, &sample, &options.input)?;
+    refuse_zero_points(sources, &extent, &sample, &lattice)?;
     refuse_doubtful_heights(sources, &sample, &lattice, options)?;
+    let heights = JobHeights {
+        sources,
+        rules: &rules,
+        options,
+        lattice: &lattice,
+        extent: &extent,
+        sample: &sample,
+        metres: metres_z,
+    };
+    warnings.extend(heights.warnings()?);
     let place = CommonPlace { crs: &crs, metres, lattice: &lattice, extent: &extent, sample: &sample };
     check_places(sources, &place, &options.input, &mut warnings)?;
     let stretch = hint.stretch(&sample)?;

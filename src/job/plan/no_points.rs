@@ -21,6 +21,9 @@ pub fn no_point_is_left(plan: &Plan, counts: &PointCounts) -> Error {
         Some((bounds, inputs)) if counts.out_of_bounds > 0 && counts.classes.is_empty() => {
             compare(bounds.0, inputs, are_from_headers(plan))
         }
+        None if counts.out_of_bounds > 0 && counts.classes.is_empty() => {
+            "no height lies between those of [input] heights: correct them, in the unit of the files".into()
+        }
         _ if counts.at_breaklines > 0 => {
             "all that [input] leaves lie in lakes or at lines of [[breaklines]]: leave this area out, or correct \
                                           the lakes"

@@ -63,6 +63,8 @@ pub(crate) struct Split {
     outside: PointGroup,
     /// The first chunk with points outside.
     first_in: Option<usize>,
+    /// The number of the first record outside.
+    first: Option<u64>,
 }
 
 impl Split {
@@ -72,6 +74,7 @@ impl Split {
             within: self.within.and(later.within),
             outside: self.outside.and(later.outside),
             first_in: self.first_in.or(later.first_in),
+            first: self.first.or(later.first),
         }
     }
 }
@@ -81,6 +84,8 @@ impl Split {
 pub(crate) struct SplitBoxes {
     pub(crate) within: (u64, Option<SourceBox>),
     pub(crate) outside: (u64, Option<SourceBox>),
+    /// The number of the first record outside, of one file.
+    pub(crate) first: Option<u64>,
 }
 
 impl SplitBoxes {
@@ -111,7 +116,7 @@ pub(crate) fn at_places(places: &[[f64; 3]], within: &RowBox) -> SplitBoxes {
     let holds = |place: &[f64; 3]| within.holds_box(&RowBox { min: *place, max: *place });
     let (inner, outer): (Vec<[f64; 3]>, Vec<[f64; 3]>) = places.iter().copied().partition(holds);
     let of = |places: Vec<[f64; 3]>| (places.len() as u64, box_around(places.into_iter()));
-    SplitBoxes { within: of(inner), outside: of(outer) }
+    SplitBoxes { within: of(inner), outside: of(outer), first: None }
 }
 
 impl<'a> PointSurvey<'a> {
@@ -123,7 +128,7 @@ impl<'a> PointSurvey<'a> {
         let steps = [0, 1, 2].map(|axis| steps_of(source, axis));
         let rules = measuring_rules(source, options, steps)?;
         let bounds = options.bounds.and_then(|bounds| source.raw_bounds(bounds.0));
-        Some(PointSurvey { source, rules: PointRules { bounds, ..rules }, steps })
+        Some(PointSurvey { source, rules: PointRules { bounds, numbered: true, ..rules }, steps })
     }
 
     /// Returns the box outside which a point is a mistake if such points are few; `None` if there are too few points to tell.
@@ -151,7 +156,7 @@ impl<'a> PointSurvey<'a> {
     /// Looks at all points: which lie outside `plausible`, and where the others lie.
     pub(crate) fn measure(&self, plausible: &RowBox) -> Result<MeasuredPoints> {
         let cells = self.cells_of(plausible);
-        let Split { within, outside, first_in } = self.split(&cells)?;
+        let Split { within, outside, first_in, .. } = self.split(&cells)?;
         let raw = |corner: [i32; 3]| [0, 1, 2].map(|axis| i64::from(corner[axis]).saturating_mul(self.steps[axis]));
         let is_one_place = outside.bounds.is_some_and(|bounds| bounds.min == bounds.max);
         let rows = outside.points;
@@ -169,9 +174,9 @@ impl<'a> PointSurvey<'a> {
 
     /// Looks at all points: how many lie within a box, how many outside, and where.
     pub(crate) fn split_at(&self, within: &RowBox) -> Result<SplitBoxes> {
-        let Split { within, outside, .. } = self.split(&self.cells_of(within))?;
+        let Split { within, outside, first, .. } = self.split(&self.cells_of(within))?;
         let of = |group: PointGroup| (group.points, group.bounds.map(|bounds| self.source_box(bounds)));
-        Ok(SplitBoxes { within: of(within), outside: of(outside) })
+        Ok(SplitBoxes { within: of(within), outside: of(outside), first })
     }
 
     /// Returns the number of records that a look at all points decodes.
@@ -216,7 +221,12 @@ impl<'a> PointSurvey<'a> {
             self.source.decode(chunk, &self.rules, &mut |points| {
                 for point in points {
                     let place = [point.position[0], point.position[1], point.z];
-                    if holds(&place) { split.within.see(place) } else { split.outside.see(place) }
+                    if holds(&place) {
+                        split.within.see(place);
+                    } else {
+                        split.outside.see(place);
+                        split.first = split.first.or(Some(point.order()));
+                    }
                 }
                 Ok(())
             })?;

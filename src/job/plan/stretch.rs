@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::input::options::InputOptions;
-use crate::input::{RowBox, Source};
+use crate::input::{FileFormat, RowBox, Source};
 use crate::job::plan::extent::SourceBox;
 use crate::job::plan::point_survey::{PointSurvey, SplitBoxes, at_places, box_around};
 use crate::job::plan::rounded_box::rounded;
@@ -85,17 +85,22 @@ pub(crate) fn stretch_hint<'a>(
         let Some(survey) = PointSurvey::new(source, options) else { continue };
         let body = if claim.is_some_and(is_short) { None } else { hint.body(&survey)? };
         match (body, claim) {
-            (Some(body), Some(claim)) if !survey.holds_claim(&body, claim) => unread.push((survey, body)),
-            (Some(body), None) => unread.push((survey, body)),
-            (_, Some(claim)) => found.add(SplitBoxes { within: (source.records, Some(claim)), outside: (0, None) }),
+            (Some(body), Some(claim)) if !survey.holds_claim(&body, claim) => unread.push((source, survey, body)),
+            (Some(body), None) => unread.push((source, survey, body)),
+            (_, Some(claim)) => {
+                found.add(SplitBoxes { within: (source.records, Some(claim)), outside: (0, None), first: None })
+            }
             (None, None) => {}
         }
     }
-    let is_sample = unread.iter().map(|(survey, _)| survey.records()).sum::<u64>() > MOST_RECORDS;
-    for (survey, body) in &unread {
-        found.add(if is_sample { at_places(&survey.sample()?, body) } else { survey.split_at(body)? });
+    let is_sample = unread.iter().map(|(_, survey, _)| survey.records()).sum::<u64>() > MOST_RECORDS;
+    let mut first = None;
+    for (source, survey, body) in &unread {
+        let split = if is_sample { at_places(&survey.sample()?, body) } else { survey.split_at(body)? };
+        first = first.or_else(|| split.first.map(|number| place(source, number)));
+        found.add(split);
     }
-    Ok(hint.is_worth_it(&found).then(|| sentence(&found, is_sample)).flatten())
+    Ok(hint.is_worth_it(&found).then(|| sentence(&found, first, is_sample)).flatten())
 }
 
 /// Returns the shortest ranges that have six in ten of the places, axis by axis; `None` without places.
@@ -111,7 +116,13 @@ fn majority(places: &[[f64; 3]]) -> Option<RowBox> {
     box_around([[x[0], y[0], z[0]], [x[1], y[1], z[1]]].into_iter()).map(|[min, max]| RowBox { min, max })
 }
 
-fn sentence(found: &SplitBoxes, is_sample: bool) -> Option<String> {
+/// Returns a remark about the first of some records.
+fn place(source: &Source, number: u64) -> String {
+    let record = if source.format == FileFormat::Text { "row" } else { "point" };
+    format!(" (the first is {record} {number} of {})", source.path.display())
+}
+
+fn sentence(found: &SplitBoxes, first: Option<String>, is_sample: bool) -> Option<String> {
     let (points, rest) = found.within;
     let (rest, all, few) = (rest?, found.all()?, found.outside.0);
     let share = (points as f64 / (points + few) as f64 * 10_000.0).floor() / 100.0;
@@ -119,7 +130,8 @@ fn sentence(found: &SplitBoxes, is_sample: bool) -> Option<String> {
     let size = |[min, max]: SourceBox, axis: usize| max[axis] - min[axis];
     let is_wider = (0..2).any(|axis| size(all, axis) > 2.0 * size(rest, 0).max(size(rest, 1)));
     let [x, y, z] = [0, 1, 2].map(|axis| rounded([rest[0][axis], rest[1][axis]]));
-    let others = if few == 1 { "1 point stretches".into() } else { format!("{few} points stretch") };
+    let first = first.unwrap_or_default();
+    let others = if few == 1 { format!("1 point{first} stretches") } else { format!("{few} points{first} stretch") };
     Some(match is_wider {
         true => format!(
             "{share} % {of} lie within {:.0} x {:.0} units; {others} the area to {:.0} x {:.0}: to leave them out, set [input] bounds = \
@@ -134,12 +146,15 @@ fn sentence(found: &SplitBoxes, is_sample: bool) -> Option<String> {
             y[1]
         ),
         false => format!(
-            "{share} % {of} have heights from {} to {}; {others} the heights to {:.0} units, from {} to {}: correct or remove them",
+            "{share} % {of} have heights from {} to {}; {others} the heights to {:.0} units, from {} to {}: [input] heights = \
+             [{}, {}] leaves them out",
             z[0],
             z[1],
             size(all, 2),
             all[0][2],
-            all[1][2]
+            all[1][2],
+            z[0],
+            z[1]
         ),
     })
 }
@@ -161,13 +176,14 @@ mod tests {
         let found = |few: u64, far: f64| SplitBoxes {
             within: (100_000, Some([[0.0; 3], [80.0, 70.0, 9.0]])),
             outside: (few, Some([[far, 0.0, 0.0], [far, 0.0, 9.0]])),
+            first: None,
         };
         for (few, far, expected) in [(12, 5000.0, true), (1, 481.0, true), (1, 479.0, false), (101, 5000.0, false)] {
             assert_eq!(Hint::Few.is_worth_it(&found(few, far)), expected, "{few} at {far}");
         }
         assert_eq!(
-            sentence(&found(12, 5000.0), false).unwrap(),
-            "99.98 % of the points lie within 80 x 70 units; 12 points stretch the area to 5000 x 70: to leave them out, set [input] \
+            sentence(&found(12, 5000.0), Some(" (the first is point 7 of a.las)".into()), false).unwrap(),
+            "99.98 % of the points lie within 80 x 70 units; 12 points (the first is point 7 of a.las) stretch the area to 5000 x 70: to leave them out, set [input] \
              bounds = [0.0, 0.0, 80.0, 70.0]"
         );
     }

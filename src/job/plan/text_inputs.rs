@@ -9,6 +9,7 @@ use crate::input::{
 };
 use crate::job::options::JobOptions;
 use crate::job::plan::extent::Extent;
+use crate::job::plan::height_range::HeightSample;
 use crate::job::plan::job_plan::Plan;
 use crate::{Error, Result, interrupt};
 use rayon::prelude::*;
@@ -194,6 +195,24 @@ pub(crate) fn check_malformed_rows(sources: &[Source], rules: &[PointRules], opt
         }
     }
     Ok(())
+}
+
+/// Fails if a sample has more malformed records than the whole job may have, so that `check` ends as the job does.
+///
+/// # Errors
+/// [`Error::Input`] names the first file with such records.
+pub(crate) fn check_malformed_sample(sources: &[Source], sample: &HeightSample, options: &InputOptions) -> Result<()> {
+    let records = sources.iter().map(|source| source.records).sum();
+    let malformed = sample.counts.malformed;
+    if options.on_bad_file == OnBadFile::Skip
+        || malformed <= allowed_malformed(options.max_malformed_fraction.0, records)
+    {
+        return Ok(());
+    }
+    let counts = |source: &Source| sample.by_file.get(&source.path).map(|file| &file.counts);
+    let is_bad = |counts: &&PointCounts| counts.malformed > 0;
+    let first = sources.iter().find_map(|source| Some((source, counts(source).filter(is_bad)?)));
+    first.map_or(Ok(()), |(source, counts)| Err(stop_at(source, counts, malformed, records)))
 }
 
 /// Decodes a source for its counts.
