@@ -34,6 +34,30 @@ const NAMED: [(&str, [f64; 7]); 9] = [
     ("OSGB36", [446.448, -125.157, 542.06, 0.1502, 0.247, 0.8421, -20.4894]),
 ];
 
+/// The prime meridians that PROJ has names for, in degrees.
+const MERIDIANS: [(&str, f64); 13] = [
+    ("greenwich", 0.0),
+    ("lisbon", -9.131_906_111),
+    ("paris", 2.337_229_167),
+    ("bogota", -74.080_916_667),
+    ("madrid", -3.687_938_889),
+    ("rome", 12.452_333_333),
+    ("bern", 7.439_583_333),
+    ("jakarta", 106.807_719_444),
+    ("ferro", -17.666_666_667),
+    ("brussels", 4.367_975),
+    ("stockholm", 18.058_277_778),
+    ("athens", 23.716_337_5),
+    ("oslo", 10.722_916_667),
+];
+
+/// A tenth of a metre, in degrees. A meridian in another unit is kilometres off.
+const SAME_MERIDIAN: f64 = 1e-6;
+
+/// What to do with points in a system that is not computed.
+const ELSEWHERE: &str =
+    "transform the points to another CRS first, such as a UTM zone, with the filter `reprojection` of `pdal translate`";
+
 /// The way to the longitude and latitude of WGS 84. The same bits come out on every machine.
 #[derive(Clone, Debug)]
 pub struct GlobeWay {
@@ -46,18 +70,21 @@ pub struct GlobeWay {
 
 impl GlobeWay {
     /// Returns the way from `crs`, whose `definition` in the form of PROJ.4 says what its datum is to WGS 84. Coordinates are in units of
-    /// `metres`. Returns `None` if this program does not compute it.
-    pub fn of(crs: &Crs, definition: &str, metres: f64) -> Option<GlobeWay> {
-        let to_degrees = CrsTransform::to_degrees(crs).ok()?;
-        let form = crs.form()?;
-        form.projection()?;
-        let datum = form.datum()?;
-        // Texts do not agree in what unit they give another meridian than that of Greenwich.
-        if datum.meridian() != 0.0 || definition.contains("+pm=") {
-            return None;
+    /// `metres`.
+    ///
+    /// # Errors
+    /// A sentence if this program does not compute it.
+    pub fn of(crs: &Crs, definition: &str, metres: f64) -> Result<GlobeWay, String> {
+        let to_degrees = CrsTransform::to_degrees(crs).map_err(|why| format!("{why} ({ELSEWHERE})"))?;
+        let form = crs.form().filter(|form| form.projection().is_some());
+        let (form, own) = form.zip(crs.metres_per_unit()).ok_or("it is not a projected system")?;
+        let datum = form.datum().ok_or_else(|| format!("{} does not say its datum", crs.label()))?;
+        if meridian(definition).is_none_or(|east| (east - datum.meridian()).abs() > SAME_MERIDIAN) {
+            return Err(format!("{} and {definition} differ in the prime meridian ({ELSEWHERE})", crs.label()));
         }
-        let ellipsoid = Ellipsoid::of(datum.ellipsoid()?)?;
-        Some(GlobeWay { to_degrees, scale: metres / crs.metres_per_unit()?, shift: Shift::of(definition, ellipsoid)? })
+        let ellipsoid = datum.ellipsoid().and_then(Ellipsoid::of);
+        let ellipsoid = ellipsoid.ok_or_else(|| format!("{} has no ellipsoid", crs.label()))?;
+        Ok(GlobeWay { to_degrees, scale: metres / own, shift: Shift::of(definition, ellipsoid)? })
     }
 
     /// Returns longitude and latitude in radians; `None` if the map has no such place.
@@ -87,23 +114,27 @@ struct Shift {
 }
 
 impl Shift {
-    /// Returns the shift that a definition names, `Some(None)` if it names none; `None` if it is not known here.
-    fn of(definition: &str, from: Ellipsoid) -> Option<Option<Shift>> {
-        let value =
-            |key: &str| definition.split_whitespace().find_map(|word| word.strip_prefix(key)?.strip_prefix('='));
+    /// Returns the shift that a definition names, if it names one.
+    ///
+    /// # Errors
+    /// A sentence if it is not known here. A datum such as NAD27 leads to WGS 84 by a grid alone.
+    fn of(definition: &str, from: Ellipsoid) -> Result<Option<Shift>, String> {
+        let value = |key: &str| value(definition, key);
         let numbers = match (value("+nadgrids"), value("+towgs84"), value("+datum")) {
-            (Some("@null"), ..) | (None, None, None) => return Some(None),
-            (Some(_), ..) => return None,
-            (None, Some(list), _) => seven(list)?,
-            (None, None, Some(name)) => NAMED.iter().find(|(known, _)| *known == name)?.1,
+            (Some("@null"), ..) | (None, None, None) => return Ok(None),
+            (None, Some(list), _) => seven(list).ok_or_else(|| format!("the shift in {definition} cannot be read"))?,
+            (grids, _, name) => {
+                let known = NAMED.iter().find(|(known, _)| grids.is_none() && Some(*known) == name);
+                known.map(|(_, numbers)| *numbers).ok_or_else(|| needs_grid(definition))?
+            }
         };
-        let to = Ellipsoid::of(WGS84)?;
+        let to = Ellipsoid::of(WGS84).ok_or("WGS 84 has no ellipsoid")?;
         if numbers == [0.0; 7] && from.a == to.a && (from.e2 - to.e2).abs() < SAME_SHAPE {
-            return Some(None);
+            return Ok(None);
         }
         let [x, y, z, turn_x, turn_y, turn_z, millionths] = numbers;
         let turns = [turn_x, turn_y, turn_z].map(|seconds| seconds * SECOND);
-        Some(Some(Shift { from, to, metres: [x, y, z], turns, scale: 1.0 + millionths / 1e6 }))
+        Ok(Some(Shift { from, to, metres: [x, y, z], turns, scale: 1.0 + millionths / 1e6 }))
     }
 
     fn apply(&self, [longitude, latitude]: [f64; 2]) -> [f64; 2] {
@@ -125,6 +156,25 @@ impl Shift {
             libm::atan2(up + e2 * sin * a / (1.0 - e2 * sin * sin).sqrt(), across)
         })
     }
+}
+
+/// Returns the value of a key of a definition.
+fn value<'a>(definition: &'a str, key: &str) -> Option<&'a str> {
+    definition.split_whitespace().find_map(|word| word.strip_prefix(key)?.strip_prefix('='))
+}
+
+/// Returns the prime meridian of a definition in degrees; `None` if it is not known here.
+fn meridian(definition: &str) -> Option<f64> {
+    let Some(name) = value(definition, "+pm") else { return Some(0.0) };
+    let named = MERIDIANS.iter().find(|(known, _)| *known == name).map(|(_, east)| *east);
+    named.or_else(|| name.parse().ok())
+}
+
+fn needs_grid(definition: &str) -> String {
+    format!(
+        "the way from the datum of {definition} to WGS 84 needs a grid, which this program does not have (transform the points to a datum \
+         such as NAD83 first)"
+    )
 }
 
 /// Returns three or seven numbers as seven.
