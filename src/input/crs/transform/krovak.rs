@@ -48,7 +48,7 @@ impl Krovak {
         let isometric = self.parallel[0] - libm::log(distance / self.parallel[1]) / self.turn;
         let around = libm::atan2(-x, -y) / self.turn;
         // The map has a gap behind the cone.
-        if around.abs() > PI || isometric < -1e-6 {
+        if around.abs() > PI * 1.000_001 || isometric < -1e-6 {
             return None;
         }
         let (shrink, [west, south]) = (1.0 / libm::cosh(isometric), sin_cos(around));

@@ -28,23 +28,29 @@ impl Cassini {
         Cassini { ellipsoid, meridian: TransverseMercator::new(ellipsoid, latitude, 1.0) }
     }
 
-    pub(crate) fn forward(&self, [longitude, latitude]: [f64; 2]) -> Option<[f64; 2]> {
+    pub(crate) fn forward(&self, place: [f64; 2]) -> Option<[f64; 2]> {
+        self.shows(place).then(|| self.map(place))?
+    }
+
+    pub(crate) fn inverse(&self, map: [f64; 2]) -> Option<[f64; 2]> {
+        let [_, latitude] = self.meridian.inverse([0.0, map[1]])?;
+        let start = [map[0] / (self.ellipsoid.a * libm::cos(latitude)), latitude];
+        place_of(|place| self.map(place), start, map).filter(|place| self.shows(*place))
+    }
+
+    fn shows(&self, [longitude, latitude]: [f64; 2]) -> bool {
+        latitude.abs() <= NORTHMOST && (longitude * libm::cos(latitude)).abs() <= FARTHEST[0]
+    }
+
+    fn map(&self, [longitude, latitude]: [f64; 2]) -> Option<[f64; 2]> {
         let ([sin, cos], e2) = (sin_cos(latitude), self.ellipsoid.e2);
         let (across, tangent) = (longitude * cos, sin / cos);
-        if latitude.abs() > NORTHMOST || across.abs() > FARTHEST[0] {
-            return None;
-        }
         let (t, c, square) = (tangent * tangent, e2 * cos * cos / (1.0 - e2), across * across);
         let normal = self.ellipsoid.a / (1.0 - e2 * sin * sin).sqrt();
         let east = across * (1.0 - square * t * (1.0 / 6.0 + (8.0 - t + 8.0 * c) * square / 120.0));
         let north = tangent * square * (0.5 + (5.0 - t + 6.0 * c) * square / 24.0);
         let [_, arc] = self.meridian.forward([0.0, latitude])?;
         Some([normal * east, arc + normal * north])
-    }
-
-    pub(crate) fn inverse(&self, map: [f64; 2]) -> Option<[f64; 2]> {
-        let start = self.meridian.inverse([0.0, map[1]])?;
-        place_of(|place| self.forward(place), [map[0] / (self.ellipsoid.a * libm::cos(start[1])), start[1]], map)
     }
 }
 
@@ -60,10 +66,24 @@ impl Polyconic {
         Polyconic { ellipsoid, meridian: TransverseMercator::new(ellipsoid, latitude, 1.0) }
     }
 
-    pub(crate) fn forward(&self, [longitude, latitude]: [f64; 2]) -> Option<[f64; 2]> {
-        if latitude.abs() > NORTHMOST || longitude.abs() > FARTHEST[1] {
-            return None;
-        }
+    pub(crate) fn forward(&self, place: [f64; 2]) -> Option<[f64; 2]> {
+        self.shows(place).then(|| self.map(place))?
+    }
+
+    pub(crate) fn inverse(&self, map: [f64; 2]) -> Option<[f64; 2]> {
+        let [_, latitude] = self.meridian.inverse([0.0, map[1]])?;
+        let [sin, cos] = sin_cos(latitude);
+        let longitude = map[0] / (self.ellipsoid.a * cos);
+        // The parallels bend to the poles: the place is nearer to the equator than the map is.
+        let start = [longitude, latitude - longitude * longitude * sin * cos / 2.0];
+        place_of(|place| self.map(place), start, map).filter(|place| self.shows(*place))
+    }
+
+    fn shows(&self, [longitude, latitude]: [f64; 2]) -> bool {
+        latitude.abs() <= NORTHMOST && longitude.abs() <= FARTHEST[1]
+    }
+
+    fn map(&self, [longitude, latitude]: [f64; 2]) -> Option<[f64; 2]> {
         let [sin, cos] = sin_cos(latitude);
         let [_, arc] = self.meridian.forward([0.0, latitude])?;
         // At the equator the cone is a cylinder.
@@ -73,15 +93,6 @@ impl Polyconic {
         let distance = self.ellipsoid.a * cos / (sin * (1.0 - self.ellipsoid.e2 * sin * sin).sqrt());
         let half = libm::sin(longitude * sin / 2.0);
         Some([distance * libm::sin(longitude * sin), arc + 2.0 * distance * half * half])
-    }
-
-    pub(crate) fn inverse(&self, map: [f64; 2]) -> Option<[f64; 2]> {
-        let start = self.meridian.inverse([0.0, map[1]])?;
-        let cos = libm::cos(start[1]);
-        let [longitude, latitude] = [map[0] / (self.ellipsoid.a * cos), start[1]];
-        // The parallels bend to the poles: the place is nearer to the equator than the map is.
-        let start = [longitude, latitude - longitude * longitude * libm::sin(latitude) * cos / 2.0];
-        place_of(|place| self.forward(place), start, map)
     }
 }
 

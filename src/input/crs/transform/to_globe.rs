@@ -192,12 +192,29 @@ fn seven(list: &str) -> Option<[f64; 7]> {
 mod tests {
     use super::*;
     use crate::input::crs::from_wkt::from_epsg;
+    use crate::input::crs::system::CrsKind;
     use proj4rs::{Proj, transform::transform};
+    use std::collections::BTreeMap;
 
     fn way(code: u32) -> (GlobeWay, String) {
         let crs = from_epsg(code).unwrap();
         let (definition, metres) = (crs.proj4_definition().unwrap(), crs.metres_per_unit().unwrap());
-        (GlobeWay::of(&crs, &definition, metres).unwrap_or_else(|| panic!("EPSG:{code}: {definition}")), definition)
+        (GlobeWay::of(&crs, &definition, metres).unwrap_or_else(|why| panic!("EPSG:{code}: {why}")), definition)
+    }
+
+    /// Returns how far the way is off another library on places around `at`, in radians.
+    fn off(code: u32, at: [f64; 2]) -> f64 {
+        let (way, definition) = way(code);
+        let [from, to] =
+            [definition.as_str(), "+proj=longlat +datum=WGS84"].map(|d| Proj::from_proj_string(d).unwrap());
+        let off = (0..100).map(|i| {
+            let place = [at[0] + f64::from(i % 10) * 997.0, at[1] - f64::from(i / 10) * 1013.0];
+            let mut theirs = (place[0], place[1], 0.0);
+            transform(&from, &to, &mut theirs).unwrap();
+            let [longitude, latitude] = way.geographic(place).unwrap();
+            (longitude - theirs.0).abs().max((latitude - theirs.1).abs())
+        });
+        off.fold(0.0, f64::max)
     }
 
     #[test]
@@ -217,43 +234,113 @@ mod tests {
             (3413, [100_000.0, -1_500_000.0]),
             (2100, [500_000.0, 4_200_000.0]),
         ] {
-            let (way, definition) = way(code);
-            let [from, to] =
-                [definition.as_str(), "+proj=longlat +datum=WGS84"].map(|d| Proj::from_proj_string(d).unwrap());
-            for i in 0..100 {
-                let place = [at[0] + f64::from(i % 10) * 997.0, at[1] - f64::from(i / 10) * 1013.0];
-                let mut theirs = (place[0], place[1], 0.0);
-                transform(&from, &to, &mut theirs).unwrap();
-                let [longitude, latitude] = way.geographic(place).unwrap();
-                let off = (longitude - theirs.0).abs().max((latitude - theirs.1).abs());
-                // A hundredth of a millimetre.
-                assert!(off < 1.5e-12, "EPSG:{code} {place:?}: {off} radians");
-            }
+            let off = off(code, at);
+            // A hundredth of a millimetre.
+            assert!(off < 1.5e-12, "EPSG:{code}: {off} radians");
+        }
+    }
+
+    #[test]
+    fn oblique_and_other_maps_are_those_of_another_library() {
+        for (code, at) in [
+            (2056, [2_683_000.0, 1_247_000.0]),
+            (21781, [683_000.0, 247_000.0]),
+            (21780, [85_000.0, 47_000.0]),
+            (23700, [650_000.0, 239_000.0]),
+            (5514, [-743_000.0, -1_043_000.0]),
+            (5221, [-743_000.0, -1_043_000.0]),
+            (8353, [-600_000.0, -1_280_000.0]),
+            (3375, [743_000.0, 348_000.0]),
+            (3376, [590_000.0, 553_000.0]),
+            (29873, [590_000.0, 553_000.0]),
+            (26931, [775_000.0, 720_000.0]),
+            (3078, [620_000.0, 280_000.0]),
+            (3068, [24_000.0, 20_000.0]),
+            (30200, [66_000.0, 82_000.0]),
+            (3378, [-4_000.0, -2_000.0]),
+            (5880, [5_754_000.0, 7_395_000.0]),
+            (6933, [1_157_000.0, 5_172_000.0]),
+            (2053, [80_000.0, 2_843_000.0]),
+            (31253, [0.0, 340_000.0]),
+            (20790, [110_000.0, 190_000.0]),
+            (27393, [-1_000.0, 211_000.0]),
+            (21100, [3_500_000.0, 210_000.0]),
+        ] {
+            let off = off(code, at);
+            assert!(off < 1e-11, "EPSG:{code}: {off} radians");
+        }
+        // The text has the meridian of Paris to a third of a millimetre.
+        for (code, at) in [(27572, [600_000.0, 2_427_000.0]), (29702, [513_000.0, 799_000.0])] {
+            let off = off(code, at);
+            assert!(off < 7e-11, "EPSG:{code}: {off} radians");
         }
     }
 
     #[test]
     fn the_bits_are_those_of_every_machine() {
-        let bits = [(27700, [530_000.0, 180_000.0]), (2277, [2_300_000.0, 10_000_000.0])]
-            .map(|(code, place)| way(code).0.geographic(place).unwrap().map(f64::to_bits));
+        let bits = [
+            (27700, [530_000.0, 180_000.0]),
+            (2277, [2_300_000.0, 10_000_000.0]),
+            (2056, [2_683_000.0, 1_247_000.0]),
+            (5514, [-743_000.0, -1_043_000.0]),
+            (27572, [600_000.0, 2_427_000.0]),
+        ]
+        .map(|(code, place)| way(code).0.geographic(place).unwrap().map(f64::to_bits));
         let expected = [
             [13_790_684_007_957_377_804, 4_606_271_919_018_445_997],
             [13_833_936_471_851_274_948, 4_602_907_052_258_766_745],
+            [4_594_536_583_784_806_335, 4_605_621_815_907_048_335],
+            [4_598_205_000_748_869_246, 4_606_049_227_011_466_186],
+            [4_586_037_797_926_763_645, 4_605_853_339_240_275_558],
         ];
         assert_eq!(bits, expected);
     }
 
+    /// Returns why there is no way.
+    fn refused(code: u32, definition: &str) -> String {
+        GlobeWay::of(&from_epsg(code).unwrap(), definition, 1.0).err().unwrap()
+    }
+
     #[test]
-    fn what_is_not_computed_is_left_to_others() {
-        let krovak = from_epsg(5514).unwrap();
-        assert!(GlobeWay::of(&krovak, "+proj=krovak +towgs84=0,0,0", 1.0).is_none());
-        let british = from_epsg(27700).unwrap();
-        assert!(GlobeWay::of(&british, "+proj=tmerc +nadgrids=OSTN15.gsb", 1.0).is_none());
-        assert!(GlobeWay::of(&british, "+proj=tmerc +towgs84=1,2", 1.0).is_none());
-        assert!(GlobeWay::of(&from_epsg(4326).unwrap(), "+proj=longlat", 1.0).is_none());
-        // A map that counts from Paris.
-        let french = from_epsg(27572).unwrap();
-        assert!(GlobeWay::of(&french, &french.proj4_definition().unwrap(), 1.0).is_none());
-        assert!(GlobeWay::of(&british, &french.proj4_definition().unwrap(), 1.0).is_none());
+    fn what_is_not_computed_is_refused_by_name() {
+        let southings = refused(5513, "+proj=krovak +towgs84=0,0,0");
+        assert!(southings.contains("S-JTSK / Krovak") && southings.contains("pdal translate"), "{southings}");
+        assert!(refused(27200, "+proj=nzmg").contains("New_Zealand_Map_Grid"));
+        let british = "+proj=tmerc +nadgrids=OSTN15.gsb";
+        assert!(refused(27700, british).contains(&format!("the datum of {british} to WGS 84 needs a grid")));
+        let old = refused(26715, "+proj=utm +zone=15 +datum=NAD27 +units=m +no_defs");
+        assert!(old.contains("needs a grid") && old.contains("NAD27") && old.contains("NAD83"), "{old}");
+        assert!(refused(27700, "+proj=tmerc +towgs84=1,2").contains("cannot be read"));
+        assert!(refused(4326, "+proj=longlat").contains("not a projected system"));
+        // Another meridian than that of the text.
+        for meridian in ["paris", "2.5969213", "unknown"] {
+            let definition = format!("+proj=tmerc +pm={meridian}");
+            assert!(refused(27700, &definition).contains("differ in the prime meridian"), "{meridian}");
+        }
+        assert!(refused(27572, "+proj=lcc").contains("differ in the prime meridian"));
+    }
+
+    #[test]
+    fn of_all_codes_these_are_not_computed() {
+        let codes = (1..=u32::from(u16::MAX)).filter_map(from_epsg).filter(|crs| crs.kind == CrsKind::Projected);
+        let mut reasons: BTreeMap<String, Vec<u32>> = BTreeMap::new();
+        for crs in codes {
+            let Some((definition, metres)) = crs.proj4_definition().zip(crs.metres_per_unit()) else { continue };
+            let why = GlobeWay::of(&crs, &definition, metres).err().filter(|why| !why.contains("needs a grid"));
+            if let Some(why) = why {
+                let (_, reason) = why.split_once(": ").unwrap();
+                let reason = reason.split_once(" (").map_or(reason, |(reason, _)| reason).to_string();
+                reasons.entry(reason).or_default().push(crs.epsg.unwrap());
+            }
+        }
+        let expected = [
+            ("its projection is Equirectangular", &[3786, 4087, 4088, 32662, 32663][..]),
+            ("its projection is New_Zealand_Map_Grid", &[27200]),
+            ("its x grows to the west, or its y to the south", &[2065, 5513, 8352]),
+            // Laborde's projection, and that of Belgium with a cone that is turned.
+            ("the parameter alpha of its projection", &[8441]),
+            ("the parameter lat_1 of its projection", &[31300]),
+        ];
+        assert_eq!(reasons, expected.map(|(reason, codes)| (reason.to_string(), codes.to_vec())).into());
     }
 }
