@@ -337,10 +337,14 @@ fn oblique_maps_and_other_meridians_are_placed_to_a_millimetre() {
         assert!(!said.contains("globe"), "EPSG:{code}: {said}");
         let globe = georeference(&job, "globe");
         let [x, y, z] = numbers(&georeference(&job, "offset")).unwrap();
-        let [own, earth] = [globe["definition"].as_str().unwrap(), "+proj=geocent +datum=WGS84"]
+        let own = globe["definition"].as_str().unwrap();
+        let [own, degrees, earth] = [own, "+proj=longlat +datum=WGS84", "+proj=geocent +datum=WGS84"]
             .map(|definition| Proj::from_proj_string(definition).unwrap());
         let mut place = (x, y, z);
-        transform(&own, &earth, &mut place).unwrap();
+        transform(&own, &degrees, &mut place).unwrap();
+        // Heights stay as they are.
+        place.2 = z;
+        transform(&degrees, &earth, &mut place).unwrap();
         let columns: [f64; 16] = numbers(&globe["transform"]).unwrap();
         let off = distance([columns[12], columns[13], columns[14]], [place.0, place.1, place.2]);
         assert!(off < 0.001, "EPSG:{code}: {off} m");
