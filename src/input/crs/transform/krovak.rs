@@ -3,7 +3,6 @@
 
 use crate::input::crs::transform::ellipsoid::{Ellipsoid, sin_cos};
 use crate::input::crs::transform::gauss_sphere::GaussSphere;
-use crate::input::crs::transform::map_projection::DEGREE;
 use std::f64::consts::PI;
 
 /// How far the axis of the cone leans, in degrees: a constant of the method.
@@ -28,8 +27,10 @@ impl Krovak {
     /// Returns the projection; `None` if the origin is at a pole.
     pub(crate) fn new(ellipsoid: Ellipsoid, latitude: f64, scale: f64) -> Option<Krovak> {
         let sphere = GaussSphere::new(ellipsoid, latitude)?;
-        let ([cos_axis, sin_axis], [sin, cos]) =
-            ([COLATITUDE, 90.0 - COLATITUDE].map(|angle| libm::sin(angle * DEGREE)), sin_cos(PARALLEL * DEGREE));
+        let ([cos_axis, sin_axis], [sin, cos]) = (
+            [COLATITUDE, 90.0 - COLATITUDE].map(|angle| libm::sin(angle.to_radians())),
+            sin_cos(PARALLEL.to_radians()),
+        );
         let parallel = [libm::atanh(sin), sphere.radius * scale * cos / sin];
         Some(Krovak { sphere, axis: [sin_axis, cos_axis], turn: sin, parallel })
     }
